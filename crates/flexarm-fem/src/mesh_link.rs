@@ -191,25 +191,22 @@ pub enum ReductionStep {
     Assembly,
     /// Sparse Cholesky and static shapes.
     Factorisation,
-    /// Fixed-interface modes.
-    FixedModes,
-    /// Modes with A held, to judge the result.
-    HeldModes,
+    /// Fixed-interface modes, and those with A held, to judge the result.
+    Modes,
     /// Parts, chains and checks.
     Parts,
 }
 
 impl ReductionStep {
     /// All steps, in order.
-    pub const ALL: [Self; 5] = [Self::Assembly, Self::Factorisation, Self::FixedModes, Self::HeldModes, Self::Parts];
+    pub const ALL: [Self; 4] = [Self::Assembly, Self::Factorisation, Self::Modes, Self::Parts];
 
     /// What it is called.
     pub fn name(self) -> &'static str {
         match self {
             Self::Assembly => "assembly",
             Self::Factorisation => "factorisation and static shapes",
-            Self::FixedModes => "fixed-interface modes",
-            Self::HeldModes => "modes of the mesh with A held",
+            Self::Modes => "modes, interfaces fixed and A held",
             Self::Parts => "parts and checks",
         }
     }
@@ -243,13 +240,10 @@ pub fn reduce_mesh(
         .map_err(|error| with_cause(error, plan, &bodies))?;
     let unit_loads = condensation.unit_load_shapes().columns(0, 6).into_owned();
 
-    step(ReductionStep::FixedModes);
-    let fixed_modes = condensation.fixed_modes(plan.modes)?;
+    step(ReductionStep::Modes);
+    let (fixed_modes, held_modes) = condensation.fixed_and_held_modes(plan.modes, plan.judged_modes)?;
     let frame = |i: &Interface| InterfaceFrame { name: i.name.clone(), X_LI: i.X_LI, tie: Some(i.tie) };
     let superelement = condensation.superelement(plan.interfaces.iter().map(frame).collect(), &fixed_modes);
-
-    step(ReductionStep::HeldModes);
-    let held_modes = condensation.held_modes(ModesWanted::Count(plan.judged_modes))?;
 
     step(ReductionStep::Parts);
     let densities: Vec<f64> = materials.iter().map(|m| m.rho).collect();

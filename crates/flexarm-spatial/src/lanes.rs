@@ -172,6 +172,18 @@ macro_rules! lanes {
             }
 
             #[inline(always)]
+            fn load(from: &[f64]) -> Self {
+                let mut lanes = [0.0; $lanes];
+                lanes.copy_from_slice(&from[..$lanes]);
+                Self::new(lanes)
+            }
+
+            #[inline(always)]
+            fn store(self, to: &mut [f64]) {
+                to[..$lanes].copy_from_slice(&self.lanes());
+            }
+
+            #[inline(always)]
             fn sqrt(self) -> Self {
                 // SAFETY: see the module page.
                 Self(unsafe { $sqrt(self.0) })

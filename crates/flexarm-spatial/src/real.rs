@@ -48,6 +48,12 @@ pub trait Real:
     /// The same, to be changed.
     fn flat_mut(all: &mut [Self]) -> &mut [f64];
 
+    /// The first numbers of a slice, one per lane.
+    fn load(from: &[f64]) -> Self;
+
+    /// Puts the lanes into the first numbers of a slice.
+    fn store(self, to: &mut [f64]);
+
     /// Square root.
     fn sqrt(self) -> Self;
 
@@ -241,6 +247,16 @@ impl Real for f64 {
     #[inline(always)]
     fn flat_mut(all: &mut [Self]) -> &mut [f64] {
         all
+    }
+
+    #[inline(always)]
+    fn load(from: &[f64]) -> Self {
+        from[0]
+    }
+
+    #[inline(always)]
+    fn store(self, to: &mut [f64]) {
+        to[0] = self;
     }
 
     #[inline(always)]

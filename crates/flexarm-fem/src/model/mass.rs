@@ -1,10 +1,11 @@
 //! Mass of a model: one number per pair of nodes for solids, a general sparse part for beams.
 
+use flexarm_spatial::Real;
 use nalgebra::DMatrix;
 
 use super::DofMap;
 use super::scatter::NodeGraph;
-use crate::sparse::SparseSymmetric;
+use crate::sparse::{Block, Row, SparseSymmetric, WIDTH, Wide, Work, quickly};
 
 /// Consistent mass. Solids act alike in x, y and z, so a ninth of the entries is enough for them.
 #[derive(Debug, Clone)]
@@ -59,15 +60,25 @@ impl MassMatrix {
         Y
     }
 
-    /// `Y = M X` without allocation.
+    /// `Y = M X`.
+    ///
+    /// # Panics
+    /// If `X` has another number of rows.
+    pub fn product_into(&self, X: &DMatrix<f64>, Y: &mut DMatrix<f64>) {
+        assert!(X.nrows() == self.size && Y.shape() == X.shape(), "mass of {} rows times {:?}", self.size, X.shape());
+        by_blocks(X, Y, |x, y| self.block_product(x, y));
+    }
+
+    /// `Y = M X`.
     ///
     /// # Panics
     /// If the shapes do not fit.
-    pub fn product_into(&self, X: &DMatrix<f64>, Y: &mut DMatrix<f64>) {
-        assert!(X.nrows() == self.size && Y.shape() == X.shape(), "mass of {} rows times {:?}", self.size, X.shape());
-        match &self.general {
-            Some(general) => general.product_into(X, Y),
-            None => Y.fill(0.0),
+    pub fn block_product(&self, X: &Block, Y: &mut Block) {
+        assert!(X.rows.len() == self.size && Y.rows.len() == self.size, "mass of {} rows times another", self.size);
+        Y.rows.fill(Row::ZERO);
+        Y.width = X.width;
+        if let Some(general) = &self.general {
+            general.add_block_product(X, Y);
         }
         self.add_nodal_product(X, Y);
     }
@@ -75,36 +86,69 @@ impl MassMatrix {
     /// The part of `M X` that belongs to solids: on node i `Σ_j m_ij x_j`, component by component.
     pub(crate) fn solid_product(&self, X: &DMatrix<f64>) -> DMatrix<f64> {
         let mut Y = DMatrix::zeros(X.nrows(), X.ncols());
-        self.add_nodal_product(X, &mut Y);
+        by_blocks(X, &mut Y, |x, y| self.add_nodal_product(x, y));
         Y
     }
 
-    fn add_nodal_product(&self, X: &DMatrix<f64>, Y: &mut DMatrix<f64>) {
-        let Some((nodal, first)) = &self.nodal else { return };
-        let pattern = nodal.pattern();
-        for (x, y) in X.as_slice().chunks_exact(self.size).zip(Y.as_mut_slice().chunks_exact_mut(self.size)) {
-            for j in 0..nodal.size() {
-                let entries = pattern.column(j);
-                if entries.is_empty() {
-                    continue;
-                }
-                let at = first[j] as usize;
-                let own = [x[at], x[at + 1], x[at + 2]];
-                let mut sum = [0.0; 3];
-                for (row, value) in pattern.rows[entries.clone()].iter().zip(&nodal.values[entries]) {
-                    let to = first[*row as usize] as usize;
-                    let diagonal = *row as usize == j;
-                    for k in 0..3 {
-                        sum[k] += value * x[to + k];
-                        if !diagonal {
-                            y[to + k] += value * own[k];
-                        }
-                    }
-                }
+    fn add_nodal_product(&self, X: &Block, Y: &mut Block) {
+        if let Some((nodal, first)) = &self.nodal {
+            quickly(NodalProduct { nodal, first, X: &X.rows, Y: &mut Y.rows });
+        }
+    }
+}
+
+/// Columns of X, eight at a time, into those of Y.
+fn by_blocks(X: &DMatrix<f64>, Y: &mut DMatrix<f64>, product: impl Fn(&Block, &mut Block)) {
+    for at in (0..X.ncols()).step_by(WIDTH) {
+        let x = Block::of_columns(X, at, WIDTH.min(X.ncols() - at));
+        let mut y = Block::zeros(X.nrows(), x.width);
+        product(&x, &mut y);
+        y.put_columns(Y, at);
+    }
+}
+
+struct NodalProduct<'a> {
+    nodal: &'a SparseSymmetric,
+    first: &'a [u32],
+    X: &'a [Row],
+    Y: &'a mut [Row],
+}
+
+impl Work for NodalProduct<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Real, const P: usize>(self) {
+        let pattern = self.nodal.pattern();
+        for j in 0..self.nodal.size() {
+            let entries = pattern.column(j);
+            if entries.is_empty() {
+                continue;
+            }
+            let at = self.first[j] as usize;
+            let [x, y, z] = [&self.X[at], &self.X[at + 1], &self.X[at + 2]];
+            let own = [Wide::<T, P>::load(x), Wide::<T, P>::load(y), Wide::<T, P>::load(z)];
+            let mut sum = [Wide::<T, P>::zero(); 3];
+            for (row, value) in pattern.rows[entries.clone()].iter().zip(&self.nodal.values[entries]) {
+                let to = self.first[*row as usize] as usize;
+                let x = &self.X[to..to + 3];
                 for k in 0..3 {
-                    y[at + k] += sum[k];
+                    sum[k].add(*value, Wide::<T, P>::load(&x[k]));
+                }
+                if *row as usize != j {
+                    add_to(&mut self.Y[to..to + 3], *value, &own);
                 }
             }
+            add_to(&mut self.Y[at..at + 3], 1.0, &sum);
         }
+    }
+}
+
+#[inline(always)]
+fn add_to<T: Real, const P: usize>(Y: &mut [Row], factor: f64, x: &[Wide<T, P>; 3]) {
+    for k in 0..3 {
+        let mut y = Wide::<T, P>::load(&Y[k]);
+        y.add(factor, x[k]);
+        y.store(&mut Y[k]);
     }
 }

@@ -8,8 +8,9 @@ use super::superelement::{InterfaceFrame, Superelement};
 use crate::error::Direction;
 use crate::model::FeModel;
 use crate::sparse::{
-    Cholesky, FactorFigures, Modes, ModesError, ModesWanted, NotPositiveDefinite, Ordering, Threads, add_product, gram,
-    smallest_modes,
+    Block, Cholesky, FactorFigures, Modes, ModesError, ModesWanted, NotPositiveDefinite, Ordering, Pencil, Released,
+    Row, Threads, WIDTH, add_product, gram, grams, modes_of_two_supports, orthonormalising, smallest_modes,
+    subtract_products,
 };
 
 /// A pivot this far below its diagonal entry is rounding: a mechanism that passed by its sign. Links of
@@ -90,14 +91,14 @@ pub struct SolverFigures {
 struct Saddle {
     /// G over the solved DoF, by rows.
     rows: Vec<Vec<(u32, f64)>>,
-    /// `K_ii⁻¹ Gᵀ`.
-    Z: DMatrix<f64>,
+    /// `K_ii⁻¹ Gᵀ`, by blocks.
+    Z: Vec<Block>,
     /// Inverse of the small matrix for the forces λ and, where nothing holds the mesh, its rigid motion.
     small: nalgebra::LU<f64, nalgebra::Dyn, nalgebra::Dyn>,
     /// Scale of the compliances in it.
     scale: f64,
     /// Rigid motions of the whole mesh, if nothing else holds it.
-    rigid: Option<DMatrix<f64>>,
+    rigid: Option<Block>,
 }
 
 /// A model, its boundary, the factor of `K_ii` and the static shapes.
@@ -111,6 +112,8 @@ pub struct Condensation<'m> {
     saddle: Option<Saddle>,
     /// Static shapes, one column per boundary DoF, over all DoF.
     T: DMatrix<f64>,
+    /// The same without the first six columns, by blocks.
+    T_B: Vec<Block>,
     K_g: DMatrix<f64>,
     M_g: DMatrix<f64>,
     /// Largest relative asymmetry of `K_g` as computed.
@@ -175,6 +178,7 @@ impl<'m> Condensation<'m> {
             factor,
             saddle: None,
             T: empty.clone(),
+            T_B: Vec::new(),
             K_g: empty.clone(),
             M_g: empty.clone(),
             asymmetry: 0.0,
@@ -182,6 +186,7 @@ impl<'m> Condensation<'m> {
         };
         this.saddle = this.saddle_of(rigid);
         let (T, lambda) = this.static_shapes(columns);
+        this.T_B = blocks(&T.columns(6.min(columns), columns.saturating_sub(6)).into_owned());
         this.T = T;
         let KT = this.model.K.product(&this.T);
         // The energy is symmetric whatever T is; the forces on the interfaces are so only if T solves the equations.
@@ -227,7 +232,7 @@ impl<'m> Condensation<'m> {
             }
         }
         self.factor.solve_in_place(&mut Z);
-        let S = apply_rows(&rows, &Z);
+        let S = apply_rows(&rows, m, |at, j| Z[(at, j)]);
         let scale = S.amax();
         // [S/s, -GR; -(GR)ᵀ, 0] [λ; a/s] = [(G y - g)/s; -Rᵀ f]
         let extra = if rigid.is_some() { 6 } else { 0 };
@@ -242,46 +247,42 @@ impl<'m> Condensation<'m> {
                 }
             }
         }
+        let Z = blocks(&Z);
+        let rigid = rigid.map(|R| Block::of_columns(&R, 0, 6));
         Some(Saddle { rows, Z, small: small.lu(), scale, rigid })
     }
 
     /// Solves `K u + Gᵀ λ = F` on the free DoF with `G u = g`; tied DoF are zero. F is replaced by u.
     ///
     /// Returns λ, one row per constrained boundary DoF.
-    fn solve_constrained(&self, F: &mut DMatrix<f64>, g: Option<&DMatrix<f64>>) -> DMatrix<f64> {
-        let width = F.ncols();
-        let mut forces = DMatrix::zeros(0, width);
-        let mut y = DMatrix::from_fn(self.solved.len(), width, |k, j| F[(self.solved[k] as usize, j)]);
-        self.factor.solve_in_place(&mut y);
-        let mut motion = None;
-        if let Some(saddle) = &self.saddle {
-            let m = saddle.rows.len();
-            let mut right = DMatrix::zeros(saddle.small.l().nrows(), width);
-            let mut gap = apply_rows(&saddle.rows, &y);
-            if let Some(g) = g {
-                gap -= g;
-            }
-            right.view_mut((0, 0), (m, width)).copy_from(&(gap / saddle.scale));
-            if let Some(R) = &saddle.rigid {
-                right.view_mut((m, 0), (6, width)).copy_from(&-gram(R, F));
-            }
-            if saddle.small.solve_mut(&mut right) {
-                let lambda = right.rows(0, m).into_owned();
-                add_product(&mut y, -1.0, &saddle.Z, &lambda);
-                forces = lambda;
-                motion = saddle.rigid.as_ref().map(|R| (R, right.rows(m, 6) * saddle.scale));
-            } else {
-                y.fill(f64::NAN);
-            }
+    fn solve_constrained(&self, F: &mut Block, g: Option<&DMatrix<f64>>) -> DMatrix<f64> {
+        let width = F.width;
+        let Some(saddle) = &self.saddle else {
+            self.factor.solve_rows(&mut F.rows, Some(&self.solved));
+            fill_others(&mut F.rows, &self.solved);
+            return DMatrix::zeros(0, width);
+        };
+        let mut y = Block { rows: self.solved.iter().map(|dof| F.rows[*dof as usize]).collect(), width };
+        self.factor.solve_block(&mut y);
+        let m = saddle.rows.len();
+        let mut right = DMatrix::zeros(saddle.small.l().nrows(), width);
+        let mut gap = apply_rows(&saddle.rows, width, |at, j| y.rows[at].0[j]);
+        if let Some(g) = g {
+            gap -= g;
         }
-        F.fill(0.0);
-        for (k, dof) in self.solved.iter().enumerate() {
-            for j in 0..width {
-                F[(*dof as usize, j)] = y[(k, j)];
-            }
+        right.view_mut((0, 0), (m, width)).copy_from(&(gap / saddle.scale));
+        if let Some(R) = &saddle.rigid {
+            right.view_mut((m, 0), (6, width)).copy_from(&-R.gram(F));
         }
-        if let Some((R, a)) = motion {
-            add_product(F, 1.0, R, &a);
+        if !saddle.small.solve_mut(&mut right) {
+            right.fill(f64::NAN);
+        }
+        let forces = right.rows(0, m).into_owned();
+        subtract_products(&mut y, &saddle.Z, &forces);
+        self.solved.iter().zip(&y.rows).for_each(|(dof, y)| F.rows[*dof as usize] = *y);
+        fill_others(&mut F.rows, &self.solved);
+        if let Some(R) = &saddle.rigid {
+            F.subtract_product(R, &(right.rows(m, 6) * -saddle.scale));
         }
         forces
     }
@@ -291,7 +292,14 @@ impl<'m> Condensation<'m> {
         let mut X = -self.model.K.product(&B);
         let means = self.boundary.means();
         let g = DMatrix::from_fn(means.len(), columns, |k, j| if means[k].0 == j { 1.0 } else { 0.0 });
-        let lambda = self.solve_constrained(&mut X, Some(&g));
+        let mut lambda = DMatrix::zeros(means.len(), columns);
+        for first in (0..columns).step_by(WIDTH) {
+            let width = WIDTH.min(columns - first);
+            let mut block = Block::of_columns(&X, first, width);
+            let forces = self.solve_constrained(&mut block, Some(&g.columns(first, width).into_owned()));
+            block.put_columns(&mut X, first);
+            lambda.columns_mut(first, width).copy_from(&forces);
+        }
         (X + B, lambda)
     }
 
@@ -338,11 +346,17 @@ impl<'m> Condensation<'m> {
 
     /// Displacements of all DoF and of the boundary under nodal forces, the first interface held.
     pub fn solve_held(&self, F: &mut DMatrix<f64>) {
-        let n = self.K_g.nrows();
-        let T_B = self.T.columns(6, n - 6).into_owned();
-        let u_B = self.tip_under(F);
+        for first in (0..F.ncols()).step_by(WIDTH) {
+            let mut block = Block::of_columns(F, first, WIDTH.min(F.ncols() - first));
+            self.solve_held_block(&mut block);
+            block.put_columns(F, first);
+        }
+    }
+
+    fn solve_held_block(&self, F: &mut Block) {
+        let u_B = &self.tip * grams(&self.T_B, F);
         self.solve_constrained(F, None);
-        add_product(F, 1.0, &T_B, &u_B);
+        subtract_products(F, &self.T_B, &-u_B);
     }
 
     /// Displacements of the interfaces but the first under nodal forces, the first one held.
@@ -357,11 +371,11 @@ impl<'m> Condensation<'m> {
     /// # Errors
     /// [`ModesError`].
     pub fn fixed_modes(&self, wanted: ModesWanted) -> Result<Modes, ModesError> {
-        let dimension = self.boundary.free().len() - self.boundary.means().len();
-        let mut solve = |F: &mut DMatrix<f64>| {
+        let solve = &mut |F: &mut Block| {
             self.solve_constrained(F, None);
         };
-        smallest_modes(self.model.size(), dimension, wanted, &mut solve, &mut |X, Y| self.model.M.product_into(X, Y))
+        let mass = &mut self.mass_product();
+        smallest_modes(&mut self.pencil(0, solve, mass), wanted)
     }
 
     /// Modes with the first interface held and the others free.
@@ -369,9 +383,41 @@ impl<'m> Condensation<'m> {
     /// # Errors
     /// [`ModesError`].
     pub fn held_modes(&self, wanted: ModesWanted) -> Result<Modes, ModesError> {
-        let dimension = self.boundary.free().len() - self.boundary.means().len() + self.boundary.columns() - 6;
-        let mut solve = |F: &mut DMatrix<f64>| self.solve_held(F);
-        smallest_modes(self.model.size(), dimension, wanted, &mut solve, &mut |X, Y| self.model.M.product_into(X, Y))
+        let solve = &mut |F: &mut Block| self.solve_held_block(F);
+        let freed = self.boundary.columns() - 6;
+        let mass = &mut self.mass_product();
+        smallest_modes(&mut self.pencil(freed, solve, mass), wanted)
+    }
+
+    /// [`Self::fixed_modes`] and so many of [`Self::held_modes`]; with two interfaces for the solves of the former alone.
+    ///
+    /// # Errors
+    /// [`ModesError`].
+    pub fn fixed_and_held_modes(&self, wanted: ModesWanted, held: usize) -> Result<(Modes, Modes), ModesError> {
+        let [T_B] = self.T_B.as_slice() else {
+            return Ok((self.fixed_modes(wanted)?, self.held_modes(ModesWanted::Count(held))?));
+        };
+        let solve = &mut |F: &mut Block| {
+            self.solve_constrained(F, None);
+        };
+        let mass = &mut self.mass_product();
+        let mut pencil = self.pencil(0, solve, mass);
+        modes_of_two_supports(&mut pencil, wanted, &Released { T: T_B, C: &self.tip }, held)
+    }
+
+    fn mass_product(&self) -> impl FnMut(&Block, &mut Block) {
+        |X, Y| self.model.M.block_product(X, Y)
+    }
+
+    /// The pencil behind a solver that leaves so many boundary coordinates free.
+    fn pencil<'a>(
+        &self,
+        freed: usize,
+        solve: &'a mut dyn FnMut(&mut Block),
+        mass: &'a mut dyn FnMut(&Block, &mut Block),
+    ) -> Pencil<'a> {
+        let dimension = self.boundary.free().len() - self.boundary.means().len() + freed;
+        Pencil { rows: self.model.size(), dimension, solve, mass }
     }
 
     /// Elastic modes of the free link.
@@ -379,22 +425,22 @@ impl<'m> Condensation<'m> {
     /// # Errors
     /// [`ModesError`].
     pub fn free_modes(&self, wanted: ModesWanted) -> Result<Modes, ModesError> {
-        let dimension = self.boundary.free().len() - self.boundary.means().len() + self.boundary.columns() - 6;
         // u <- u - R (Rᵀ M R)⁻¹ Rᵀ M u leaves what moves no mass as a whole.
         let n = self.T.ncols();
         let R_b = DMatrix::from_fn(n, 6, |i, j| if i < 6 { f64::from(i == j) } else { self.rigid_at(i, j) });
         let mut R = DMatrix::zeros(self.T.nrows(), 6);
         add_product(&mut R, 1.0, &self.T, &R_b);
-        let MR = self.model.M.product(&R);
-        let Some(inverse) = gram(&R, &MR).try_inverse() else { return Err(ModesError::NotFinite) };
-        let mut solve = |F: &mut DMatrix<f64>| {
-            add_product(F, -1.0, &MR, &(&inverse * gram(&R, F)));
-            self.solve_held(F);
-            add_product(F, -1.0, &R, &(&inverse * gram(&MR, F)));
+        let (R, MR) = (Block::of_columns(&R, 0, 6), Block::of_columns(&self.model.M.product(&R), 0, 6));
+        let Some(inverse) = R.gram(&MR).try_inverse() else { return Err(ModesError::NotFinite) };
+        let solve = &mut |F: &mut Block| {
+            F.subtract_product(&MR, &(&inverse * R.gram(F)));
+            self.solve_held_block(F);
+            F.subtract_product(&R, &(&inverse * MR.gram(F)));
         };
-        smallest_modes(self.model.size(), dimension - 6, wanted, &mut solve, &mut |X, Y| {
-            self.model.M.product_into(X, Y)
-        })
+        let mass = &mut self.mass_product();
+        let mut pencil = self.pencil(self.boundary.columns() - 6, solve, mass);
+        pencil.dimension -= 6;
+        smallest_modes(&mut pencil, wanted)
     }
 
     /// Row `i` of the boundary under the rigid motion that moves the first interface by `j`, from the stiffness itself.
@@ -467,7 +513,8 @@ impl<'m> Condensation<'m> {
         self.asymmetry
     }
 
-    /// Condition number of `K_ii`: largest over smallest eigenvalue, each by a few power iterations.
+    /// Condition number of `K_ii`: largest over smallest eigenvalue, the one by power iteration, the other by two steps of
+    /// subspace iteration that begin with the static shapes of an interface.
     pub fn condition_estimate(&self) -> f64 {
         let rows = self.model.size();
         let inside = |x: &mut DMatrix<f64>| {
@@ -475,10 +522,9 @@ impl<'m> Condensation<'m> {
             self.solved.iter().for_each(|dof| kept[*dof as usize] = x[*dof as usize]);
             *x = kept;
         };
-        // Neighbouring nodes against each other excite the stiff end, all together the soft one.
+        // Neighbouring nodes against each other excite the stiff end.
         let mut stiff = DMatrix::from_fn(rows, 1, |i, _| if (i * 2_654_435_761) & 64 == 0 { 1.0 } else { -1.0 });
-        let mut soft = DMatrix::from_element(rows, 1, 1.0);
-        let (mut largest, mut smallest) = (0.0, 1.0);
+        let mut largest = 0.0;
         inside(&mut stiff);
         for _ in 0..20 {
             stiff /= stiff.norm();
@@ -486,16 +532,13 @@ impl<'m> Condensation<'m> {
             inside(&mut stiff);
             largest = stiff.norm();
         }
-        for _ in 0..5 {
-            let mut y = DMatrix::from_fn(self.solved.len(), 1, |k, _| soft[self.solved[k] as usize]);
-            y /= y.norm();
-            self.factor.solve_in_place(&mut y);
-            smallest = 1.0 / y.norm();
-            for (k, dof) in self.solved.iter().enumerate() {
-                soft[*dof as usize] = y[k];
-            }
-        }
-        largest / smallest
+        let Some(T_B) = self.T_B.first() else { return f64::NAN };
+        let mut y = Block { rows: self.solved.iter().map(|dof| T_B.rows[*dof as usize]).collect(), width: T_B.width };
+        self.factor.solve_block(&mut y);
+        y.multiply(&orthonormalising(&y.gram(&y), 0.0).0);
+        let Q = y.clone();
+        self.factor.solve_block(&mut y);
+        largest * SymmetricEigen::new(symmetric(Q.gram(&y))).eigenvalues.max()
     }
 
     /// Size of the linear algebra.
@@ -509,8 +552,25 @@ impl<'m> Condensation<'m> {
     }
 }
 
-fn apply_rows(rows: &[Vec<(u32, f64)>], X: &DMatrix<f64>) -> DMatrix<f64> {
-    DMatrix::from_fn(rows.len(), X.ncols(), |k, j| rows[k].iter().map(|(at, w)| w * X[(*at as usize, j)]).sum())
+/// G times a tall matrix whose entries are `x`.
+fn apply_rows(rows: &[Vec<(u32, f64)>], columns: usize, x: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
+    DMatrix::from_fn(rows.len(), columns, |k, j| rows[k].iter().map(|(at, w)| w * x(*at as usize, j)).sum())
+}
+
+/// Zeros in all rows but those, which ascend.
+fn fill_others(rows: &mut [Row], kept: &[u32]) {
+    let mut next = 0;
+    for row in kept {
+        rows[next..*row as usize].fill(Row::ZERO);
+        next = *row as usize + 1;
+    }
+    rows[next..].fill(Row::ZERO);
+}
+
+/// A tall matrix by blocks.
+fn blocks(X: &DMatrix<f64>) -> Vec<Block> {
+    let firsts = (0..X.ncols()).step_by(WIDTH);
+    firsts.map(|first| Block::of_columns(X, first, WIDTH.min(X.ncols() - first))).collect()
 }
 
 /// The largest of some measures; a NaN among them stays.

@@ -1,6 +1,8 @@
 //! Condensation against closed forms, itself, and the whole mesh.
 #![allow(clippy::print_stderr, reason = "tables of measured errors, shown with --nocapture")]
 
+mod modes;
+
 use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, Matrix6, Rotation3, Vector3, Vector6};
 
@@ -370,20 +372,6 @@ fn a_third_interface_that_is_left_free_changes_nothing_between_the_first_two() {
     let body = condensed_body(&element);
     let whole = mass_properties(&mesh, &[STEEL.rho]).unwrap();
     assert!((body.mass / whole.mass - 1.0).abs() < 1e-10 && (body.com - whole.com).norm() < 1e-9);
-}
-
-#[test]
-fn modes_up_to_a_bound_are_those_below_it() {
-    let (mesh, interfaces) = casting(ElementKind::Hex20, [Tie::Rigid, Tie::Distributing]);
-    let model = FeModel::assemble(&mesh, &AssemblyOptions { material: Some(STEEL), ..Default::default() }).unwrap();
-    let reduction = Condensation::new(&model, &interfaces, CondensationOptions::default()).unwrap();
-    let all = reduction.fixed_modes(ModesWanted::Count(12)).unwrap();
-    let bound = (all.omega2[7] + all.omega2[8]) / 2.0;
-    let below = reduction.fixed_modes(ModesWanted::Below { omega2: bound, at_most: 50 }).unwrap();
-    assert_eq!(below.len(), 8);
-    // The modes are mass-normalised and orthogonal, and do not move the interfaces.
-    let gram = below.shapes.transpose() * model.M.product(&below.shapes);
-    assert!((gram - DMatrix::identity(8, 8)).amax() < 1e-10);
 }
 
 #[test]

@@ -5,19 +5,21 @@ use std::fmt;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{LltError, LltRegularization};
 use faer::perm::Perm;
+use faer::sparse::linalg::SupernodalThreshold;
+use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
-    factorize_symbolic_cholesky,
+    CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, Par, Side, Spec};
+use faer::{Par, Side, Spec};
 use nalgebra::DMatrix;
 
-use super::dense::view_mut;
+use super::block::{Block, Row, WIDTH};
 use super::ordering::{Ordering, nested_dissection};
 use super::symmetric::SparseSymmetric;
+use super::triangular;
 
-/// How many threads a factorisation or a solve may use.
+/// How many threads a factorisation may use; solves take one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Threads(pub usize);
 
@@ -77,7 +79,6 @@ pub struct Cholesky {
     symbolic: SymbolicCholesky<u32>,
     values: Vec<f64>,
     figures: FactorFigures,
-    threads: Threads,
     smallest_pivot: (f64, usize),
 }
 
@@ -123,7 +124,7 @@ impl Cholesky {
         }
         let figures = FactorFigures { size: n, matrix_entries: K.stored(), factor_entries: entries, ordering };
         let smallest_pivot = smallest_pivot(&symbolic, &values, &K.diagonal());
-        Ok(Self { symbolic, values, figures, threads, smallest_pivot })
+        Ok(Self { symbolic, values, figures, smallest_pivot })
     }
 
     /// Size and cost.
@@ -144,17 +145,40 @@ impl Cholesky {
     /// If `B` has another number of rows.
     pub fn solve_in_place(&self, B: &mut DMatrix<f64>) {
         assert_eq!(B.nrows(), self.figures.size, "right-hand side of another size");
-        if B.is_empty() {
-            return;
+        for first in (0..B.ncols()).step_by(WIDTH) {
+            let mut block = Block::of_columns(B, first, WIDTH.min(B.ncols() - first));
+            self.solve_block(&mut block);
+            block.put_columns(B, first);
         }
-        let par = self.threads.par();
-        let mut memory = MemBuffer::new(self.symbolic.solve_in_place_scratch::<f64>(B.ncols(), par));
-        LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
-            Conj::No,
-            view_mut(B),
-            par,
-            MemStack::new(&mut memory),
-        );
+    }
+
+    /// Replaces `B` by `K⁻¹ B`.
+    ///
+    /// # Panics
+    /// If `B` has another number of rows.
+    pub fn solve_block(&self, B: &mut Block) {
+        assert_eq!(B.rows.len(), self.figures.size, "right-hand side of another size");
+        self.solve_rows(&mut B.rows, None);
+    }
+
+    /// The same for right-hand sides by rows, of which the unknowns are those in `at`, or all.
+    pub(crate) fn solve_rows(&self, B: &mut [Row], at: Option<&[u32]>) {
+        let order = self.symbolic.perm().map(|perm| perm.arrays().0);
+        let place = |k: usize| {
+            let unknown = order.map_or(k, |order| order[k] as usize);
+            at.map_or(unknown, |at| at[unknown] as usize)
+        };
+        let mut x: Vec<Row> = (0..self.figures.size).map(|k| B[place(k)]).collect();
+        triangular::solve(supernodes(&self.symbolic), &self.values, &mut x);
+        x.iter().enumerate().for_each(|(k, x)| B[place(k)] = *x);
+    }
+}
+
+/// The blocks of the factor.
+fn supernodes(symbolic: &SymbolicCholesky<u32>) -> &SymbolicSupernodalCholesky<u32> {
+    match symbolic.raw() {
+        SymbolicCholeskyRaw::Supernodal(raw) => raw,
+        SymbolicCholeskyRaw::Simplicial(_) => unreachable!("factors by blocks were asked for"),
     }
 }
 
@@ -170,19 +194,13 @@ fn smallest_pivot(symbolic: &SymbolicCholesky<u32>, values: &[f64], diagonal: &[
             smallest = (ratio, unknown);
         }
     };
-    match symbolic.raw() {
-        SymbolicCholeskyRaw::Simplicial(raw) => {
-            (0..diagonal.len()).for_each(|j| see(j, values[raw.col_ptr()[j] as usize]));
-        }
-        SymbolicCholeskyRaw::Supernodal(raw) => {
-            for s in 0..raw.n_supernodes() {
-                let columns = raw.supernode_begin()[s] as usize..raw.supernode_end()[s] as usize;
-                let block = raw.col_ptr_for_val()[s] as usize..raw.col_ptr_for_val()[s + 1] as usize;
-                let rows = block.len().checked_div(columns.len()).unwrap_or(0);
-                for (k, column) in columns.enumerate() {
-                    see(column, values[block.start + k * rows + k]);
-                }
-            }
+    let raw = supernodes(symbolic);
+    for s in 0..raw.n_supernodes() {
+        let columns = raw.supernode_begin()[s] as usize..raw.supernode_end()[s] as usize;
+        let block = raw.col_ptr_for_val()[s] as usize..raw.col_ptr_for_val()[s + 1] as usize;
+        let rows = block.len().checked_div(columns.len()).unwrap_or(0);
+        for (k, column) in columns.enumerate() {
+            see(column, values[block.start + k * rows + k]);
         }
     }
     smallest
@@ -198,7 +216,10 @@ fn analyse(
         Ordering::NestedDissection => nested_dissection(K.pattern()),
         _ => None,
     };
-    let parameters = CholeskySymbolicParams::default();
+    let parameters = CholeskySymbolicParams {
+        supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+        ..CholeskySymbolicParams::default()
+    };
     let symbolic = match &dissected {
         Some(order) => {
             let mut position = vec![0_u32; n];

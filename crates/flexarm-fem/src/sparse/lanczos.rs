@@ -2,25 +2,45 @@
 //!
 //! ```text
 //! K⁻¹ M φ = θ φ,   θ = 1/ω²
-//! W = K⁻¹ M V_j,   W <- W - V Vᵀ M W (twice),   W = V_{j+1} R_{j+1},   H = Vᵀ M K⁻¹ M V
-//! H s = θ s,   ‖K⁻¹ M φ - θ φ‖_M = ‖R_{j+1} s_last‖   for φ = V s
+//! K⁻¹ M V_j = V_{j-1} R_jᵀ + V_j A_j + V_{j+1} R_{j+1},   Vᵀ M V = 1
+//! H = Vᵀ M K⁻¹ M V: block tridiagonal of A_j and R_j,   H s = θ s
+//! ‖K⁻¹ M φ - θ φ‖_M = ‖R_{j+1} s_last‖   for φ = V s
 //! ```
-//! All basis vectors are kept M-orthonormal, so no ghost modes appear; a block finds multiple
-//! frequencies (the two bending planes of a round tube) together, and one pass over the factor serves
-//! the whole block. The operator is given as two closures, so that constraints stay outside.
+//! All basis vectors are kept M-orthonormal, so no ghost modes appear; a block of eight finds multiple frequencies (the two
+//! bending planes of a round tube) together, and one pass over the factor serves the whole block. The operator is given as two
+//! closures, so that constraints stay outside.
+//!
+//! Modes of the same body without one of its supports come from the same basis ([`modes_of_two_supports`]): no further solves.
 //!
 //! Source: Grimes, Lewis & Simon (1994), A shifted block Lanczos algorithm, sections 2 and 4, with full
 //! reorthogonalisation in place of their selective one.
 
-use nalgebra::{DMatrix, SymmetricEigen};
+mod basis;
+mod released;
 
-use super::dense::{add_product, gram, symmetric_eigen};
+use nalgebra::DMatrix;
+
+use self::basis::Basis;
+use super::block::Block;
+use super::dense::symmetric_eigen;
+
+pub(crate) use basis::orthonormalising;
+pub use released::Released;
 
 /// Residual `‖K⁻¹ M φ - θ φ‖_M / θ` at which a mode counts as found.
 const TOLERANCE: f64 = 1e-10;
 
-/// Columns of one block.
-const BLOCK: usize = 4;
+/// The pencil, by what it does to blocks of vectors.
+pub struct Pencil<'a> {
+    /// Length of a vector.
+    pub rows: usize,
+    /// Of the space that `solve` maps into, at most `rows`.
+    pub dimension: usize,
+    /// Replaces F by `K⁻¹ F`, with every constraint fulfilled.
+    pub solve: &'a mut dyn FnMut(&mut Block),
+    /// `Y = M X`.
+    pub mass: &'a mut dyn FnMut(&Block, &mut Block),
+}
 
 /// Which modes are asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,7 +65,7 @@ pub struct Modes {
     pub shapes: DMatrix<f64>,
     /// `‖K⁻¹ M φ - θ φ‖_M / θ` of each mode, from the recurrence.
     pub residuals: Vec<f64>,
-    /// Right-hand sides solved.
+    /// Right-hand sides solved; none where the basis of other modes had them.
     pub solves: usize,
 }
 
@@ -100,90 +120,112 @@ pub enum ModesError {
     NotFinite,
 }
 
-/// The lowest modes of the pencil behind `solve` and `mass`.
-///
-/// * `rows`: length of a vector; `dimension`: of the space that `solve` maps into (at most `rows`).
-/// * `solve`: replaces F by `K⁻¹ F`, with every constraint fulfilled.
-/// * `mass`: `Y = M X`.
+/// The lowest modes of a pencil.
 ///
 /// Fewer modes than asked for are returned only where the space has no more.
 ///
 /// # Errors
 /// [`ModesError`].
-pub fn smallest_modes(
-    rows: usize,
-    dimension: usize,
-    wanted: ModesWanted,
-    solve: &mut dyn FnMut(&mut DMatrix<f64>),
-    mass: &mut dyn FnMut(&DMatrix<f64>, &mut DMatrix<f64>),
-) -> Result<Modes, ModesError> {
-    let count = match wanted {
-        ModesWanted::Count(count) => count.min(dimension),
-        ModesWanted::Below { at_most, .. } => (at_most + 1).min(dimension),
+pub fn smallest_modes(pencil: &mut Pencil<'_>, wanted: ModesWanted) -> Result<Modes, ModesError> {
+    let count = wanted.count(pencil.dimension);
+    if count == 0 {
+        return Ok(Modes::none(pencil.rows));
+    }
+    let mut basis = Basis::start(pencil, None)?;
+    let limit = pencil.dimension.min(8 * count + 120);
+    let (ritz, found) = loop {
+        basis.advance(pencil, None)?;
+        if basis.is_to_be_looked_at(count, limit) {
+            let ritz = basis.ritz().ok_or(ModesError::NotFinite)?;
+            match ritz.settled(wanted, count, &basis)? {
+                Some(found) => break (ritz, found),
+                None => basis.refuse_if_full(&ritz, count, limit)?,
+            }
+        }
     };
-    if count == 0 || dimension == 0 {
-        return Ok(Modes::none(rows));
+    Ok(basis.modes(&ritz, found, None))
+}
+
+/// The lowest modes of a pencil, and so many of the same without some support, from one basis.
+///
+/// ```text
+/// K_r⁻¹ = K⁻¹ + T C Tᵀ                                T: static shapes of the support that is taken away, C = (Tᵀ K T)⁻¹
+/// K_r⁻¹ M [V T] = [V T] P + V_{j+1} R_{j+1} s_last    where V begins with K⁻¹ M T
+/// ```
+/// The basis of the one pencil, with T beside it, is a Lanczos basis of the other one.
+///
+/// # Errors
+/// [`ModesError`].
+pub fn modes_of_two_supports(
+    pencil: &mut Pencil<'_>,
+    wanted: ModesWanted,
+    released: &Released<'_>,
+    released_count: usize,
+) -> Result<(Modes, Modes), ModesError> {
+    let (rows, dimension) = (pencil.rows, pencil.dimension);
+    let count = wanted.count(dimension);
+    let others = ModesWanted::Count(released_count.min(dimension + released.T.width));
+    let most = count.max(released_count);
+    if most == 0 {
+        return Ok((Modes::none(rows), Modes::none(rows)));
     }
-    let mut basis = Basis::new(rows, BLOCK.min(dimension));
-    basis.start(solve, mass)?;
-    if basis.exhausted {
-        // No vector has mass.
-        return Err(ModesError::NotFinite);
-    }
-    let limit = dimension.min(8 * count + 120);
-    let mut next_look = count.min(dimension);
+    let mut basis = Basis::start(pencil, Some(released))?;
+    let limit = dimension.min(8 * most + 120);
     loop {
-        basis.advance(solve, mass)?;
-        let full = basis.len() >= limit || basis.exhausted;
-        // The small eigenproblem grows with the cube of the basis: a larger one is looked at less often.
-        if basis.len() < next_look && !full {
+        basis.advance(pencil, Some(released.T))?;
+        if !basis.is_to_be_looked_at(most, limit) {
             continue;
         }
-        next_look = basis.len() + (basis.len() / 12).max(1);
         let ritz = basis.ritz().ok_or(ModesError::NotFinite)?;
-        if let Some(found) = ritz.settled(count, wanted, basis.exhausted)? {
-            let shapes = basis.shapes(&ritz, found);
-            let omega2 = ritz.theta[..found].iter().map(|theta| 1.0 / theta).collect();
-            return Ok(Modes { omega2, shapes, residuals: ritz.residuals[..found].to_vec(), solves: basis.solves });
-        }
-        if full {
-            let found = ritz.converged();
-            let residual = ritz.residuals.iter().take(count).fold(0.0, |worst: f64, r| worst.max(*r));
-            return Err(ModesError::NotConverged { found, wanted: count, basis: basis.len(), residual });
+        let found = if count == 0 { Some(0) } else { ritz.settled(wanted, count, &basis)? };
+        let other = basis.released_ritz(released).ok_or(ModesError::NotFinite)?;
+        match (found, other.settled(others, others.count(usize::MAX), &basis)?) {
+            (Some(found), Some(other_found)) => {
+                let T = Some(released.T);
+                let other = Modes { solves: 0, ..basis.modes(&other, other_found, T) };
+                return Ok((basis.modes(&ritz, found, None), other));
+            }
+            (None, _) => basis.refuse_if_full(&ritz, count, limit)?,
+            (_, None) => basis.refuse_if_full(&other, released_count, limit)?,
         }
     }
 }
 
-/// The basis, by blocks, and the projected operator.
-struct Basis {
-    rows: usize,
-    width: usize,
-    blocks: Vec<DMatrix<f64>>,
-    /// `M` times the newest block.
-    mass_newest: DMatrix<f64>,
-    /// Newest block not yet multiplied.
-    newest: DMatrix<f64>,
-    /// `H`, grown block by block.
-    projected: DMatrix<f64>,
-    /// `R_{j+1}`.
-    coupling: DMatrix<f64>,
-    solves: usize,
-    exhausted: bool,
+impl ModesWanted {
+    /// How many have to be looked for in a space of this dimension.
+    fn count(self, dimension: usize) -> usize {
+        match self {
+            Self::Count(count) => count.min(dimension),
+            Self::Below { at_most, .. } => (at_most + 1).min(dimension),
+        }
+    }
 }
 
+/// Eigenpairs of a projected operator, largest θ first.
 struct Ritz {
     theta: Vec<f64>,
+    /// Over the basis.
     vectors: DMatrix<f64>,
+    /// Over the shapes of a support that is taken away; no rows where there are none.
+    beside: DMatrix<f64>,
     residuals: Vec<f64>,
 }
 
 impl Ritz {
+    /// Eigenpairs of `H`; `None` if it is not finite.
+    fn of(H: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
+        let (eigenvalues, eigenvectors) = symmetric_eigen(H)?;
+        let positive: Vec<usize> = (0..eigenvalues.len()).rev().filter(|k| eigenvalues[*k] > 0.0).collect();
+        Some((positive.iter().map(|k| eigenvalues[*k]).collect(), eigenvectors.select_columns(&positive)))
+    }
+
     fn converged(&self) -> usize {
         self.residuals.iter().take_while(|r| **r <= TOLERANCE).count()
     }
 
     /// Number of modes to return, once that is certain.
-    fn settled(&self, count: usize, wanted: ModesWanted, exhausted: bool) -> Result<Option<usize>, ModesError> {
+    fn settled(&self, wanted: ModesWanted, count: usize, basis: &Basis) -> Result<Option<usize>, ModesError> {
+        let exhausted = basis.is_exhausted();
         let good = if exhausted { self.theta.len() } else { self.converged() };
         match wanted {
             ModesWanted::Count(_) => Ok((good >= count || exhausted).then_some(good.min(count))),
@@ -196,193 +238,6 @@ impl Ritz {
                 Ok((below < good || exhausted).then_some(below))
             }
         }
-    }
-}
-
-impl Basis {
-    fn new(rows: usize, width: usize) -> Self {
-        let empty = DMatrix::zeros(rows, 0);
-        Self {
-            rows,
-            width,
-            blocks: Vec::new(),
-            mass_newest: empty.clone(),
-            newest: empty,
-            projected: DMatrix::zeros(0, 0),
-            coupling: DMatrix::zeros(0, 0),
-            solves: 0,
-            exhausted: false,
-        }
-    }
-
-    fn len(&self) -> usize {
-        self.blocks.iter().map(DMatrix::ncols).sum()
-    }
-
-    /// First block: `K⁻¹ M` of pseudo-random vectors, the same ones on every run.
-    fn start(
-        &mut self,
-        solve: &mut dyn FnMut(&mut DMatrix<f64>),
-        mass: &mut dyn FnMut(&DMatrix<f64>, &mut DMatrix<f64>),
-    ) -> Result<(), ModesError> {
-        let mut state = 0x9e37_79b9_7f4a_7c15_u64;
-        let random = DMatrix::from_fn(self.rows, self.width, |_, _| {
-            // xorshift64*, Vigna (2016); the upper bits as a number in (-1, 1).
-            state ^= state >> 12;
-            state ^= state << 25;
-            state ^= state >> 27;
-            (state.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-        });
-        let mut W = DMatrix::zeros(self.rows, self.width);
-        mass(&random, &mut W);
-        solve(&mut W);
-        self.solves += self.width;
-        self.append(W, mass)?;
-        Ok(())
-    }
-
-    /// One step of the recurrence.
-    fn advance(
-        &mut self,
-        solve: &mut dyn FnMut(&mut DMatrix<f64>),
-        mass: &mut dyn FnMut(&DMatrix<f64>, &mut DMatrix<f64>),
-    ) -> Result<(), ModesError> {
-        let mut W = std::mem::replace(&mut self.mass_newest, DMatrix::zeros(0, 0));
-        let block = std::mem::replace(&mut self.newest, DMatrix::zeros(0, 0));
-        let width = block.ncols();
-        self.blocks.push(block);
-        solve(&mut W);
-        self.solves += width;
-
-        // Twice is enough to keep the basis orthonormal to rounding.
-        let size = self.len();
-        let mut coefficients = DMatrix::zeros(size, width);
-        let mut MW = DMatrix::zeros(self.rows, width);
-        for _ in 0..2 {
-            mass(&W, &mut MW);
-            let mut row = 0;
-            for V in &self.blocks {
-                let C = gram(V, &MW);
-                add_product(&mut W, -1.0, V, &C);
-                let mut part = coefficients.view_mut((row, 0), C.shape());
-                part += &C;
-                row += V.ncols();
-            }
-        }
-
-        // H gets this block column; what lies above is its mirror image.
-        let mut H = DMatrix::zeros(size, size);
-        let old = size - width;
-        H.view_mut((0, 0), (old, old)).copy_from(&self.projected);
-        H.view_mut((0, old), (size, width)).copy_from(&coefficients);
-        let mirrored = coefficients.rows(0, old).transpose();
-        H.view_mut((old, 0), (width, old)).copy_from(&mirrored);
-        let corner = coefficients.rows(old, width).into_owned();
-        H.view_mut((old, old), (width, width)).copy_from(&((&corner + corner.transpose()) * 0.5));
-        self.projected = H;
-        self.append(W, mass)
-    }
-
-    /// Makes `W` M-orthonormal and takes it as the newest block; directions that vanish are dropped.
-    fn append(
-        &mut self,
-        W: DMatrix<f64>,
-        mass: &mut dyn FnMut(&DMatrix<f64>, &mut DMatrix<f64>),
-    ) -> Result<(), ModesError> {
-        let width = W.ncols();
-        let mut MW = DMatrix::zeros(self.rows, width);
-        mass(&W, &mut MW);
-        let mut G = gram(&W, &MW);
-        G = (&G + G.transpose()) * 0.5;
-        if G.iter().any(|x| !x.is_finite()) {
-            return Err(ModesError::NotFinite);
-        }
-        // W = V R with V = W Q Λ^-1/2, R = Λ^1/2 Qᵀ, where G = Q Λ Qᵀ is scaled first.
-        let scale: Vec<f64> = G.diagonal().iter().map(|g| if *g > 0.0 { 1.0 / g.sqrt() } else { 0.0 }).collect();
-        let scaled = DMatrix::from_fn(width, width, |i, j| G[(i, j)] * scale[i] * scale[j]);
-        let eigen = SymmetricEigen::new(scaled);
-        // What is left after orthogonalisation must stand out of the rounding of the operator.
-        let reference = self.projected.diagonal().iter().fold(0.0, |peak: f64, h| peak.max(h.abs()));
-        let noise = 1e-13 * reference;
-        let keep: Vec<usize> = (0..width)
-            .filter(|k| {
-                let vector = eigen.eigenvectors.column(*k);
-                let size = (0..width).map(|i| (vector[i] / scale[i].max(1e-300)).powi(2)).sum::<f64>().sqrt();
-                eigen.eigenvalues[*k] > 1e-10
-                    && eigen.eigenvalues[*k].sqrt() * size.min(1e300) > noise
-                    && scale.iter().any(|s| *s > 0.0)
-            })
-            .collect();
-        if keep.is_empty() {
-            self.exhausted = true;
-            self.coupling = DMatrix::zeros(0, width);
-            self.newest = DMatrix::zeros(self.rows, 0);
-            self.mass_newest = DMatrix::zeros(self.rows, 0);
-            return Ok(());
-        }
-        let Q = DMatrix::from_fn(width, keep.len(), |i, k| {
-            scale[i] * eigen.eigenvectors[(i, keep[k])] / eigen.eigenvalues[keep[k]].sqrt()
-        });
-        let mut V = DMatrix::zeros(self.rows, keep.len());
-        add_product(&mut V, 1.0, &W, &Q);
-        let mut MV = DMatrix::zeros(self.rows, keep.len());
-        // Once more against the basis and itself: a near-dependent block magnifies what was left.
-        for _ in 0..1 {
-            mass(&V, &mut MV);
-            for U in &self.blocks {
-                let C = gram(U, &MV);
-                add_product(&mut V, -1.0, U, &C);
-            }
-        }
-        mass(&V, &mut MV);
-        let G = gram(&V, &MV);
-        let Some(R) = ((&G + G.transpose()) * 0.5).cholesky() else {
-            return Err(ModesError::NotFinite);
-        };
-        let inverse = R.l().transpose().try_inverse().ok_or(ModesError::NotFinite)?;
-        let (mut orthonormal, mut M_orthonormal) =
-            (DMatrix::zeros(self.rows, keep.len()), DMatrix::zeros(self.rows, keep.len()));
-        add_product(&mut orthonormal, 1.0, &V, &inverse);
-        add_product(&mut M_orthonormal, 1.0, &MV, &inverse);
-        self.coupling = gram(&orthonormal, &MW);
-        self.newest = orthonormal;
-        self.mass_newest = M_orthonormal;
-        Ok(())
-    }
-
-    /// Ritz values, largest θ first.
-    fn ritz(&self) -> Option<Ritz> {
-        let (eigenvalues, eigenvectors) = symmetric_eigen(&self.projected)?;
-        let order = (0..eigenvalues.len()).rev();
-        let size = self.projected.nrows();
-        let last = self.blocks.last().map_or(0, DMatrix::ncols);
-        let positive: Vec<usize> = order.filter(|k| eigenvalues[*k] > 0.0).collect();
-        let theta: Vec<f64> = positive.iter().map(|k| eigenvalues[*k]).collect();
-        let vectors = eigenvectors.select_columns(&positive);
-        let bottom = vectors.rows(size - last, last);
-        let residuals = match self.coupling.nrows() {
-            0 => vec![0.0; theta.len()],
-            _ => (&self.coupling * bottom).column_iter().zip(&theta).map(|(r, theta)| r.norm() / theta).collect(),
-        };
-        Some(Ritz { theta, vectors, residuals })
-    }
-
-    fn shapes(&self, ritz: &Ritz, count: usize) -> DMatrix<f64> {
-        let mut shapes = DMatrix::zeros(self.rows, count);
-        let mut row = 0;
-        for V in &self.blocks {
-            let S = ritz.vectors.view((row, 0), (V.ncols(), count)).into_owned();
-            add_product(&mut shapes, 1.0, V, &S);
-            row += V.ncols();
-        }
-        for mut shape in shapes.column_iter_mut() {
-            let peak =
-                shape.iter().fold(0.0, |peak: f64, x| if x.abs() > peak.abs() * (1.0 + 1e-9) { *x } else { peak });
-            if peak < 0.0 {
-                shape.neg_mut();
-            }
-        }
-        shapes
     }
 }
 
@@ -410,7 +265,9 @@ mod tests {
 
     fn modes_of(K: &SparseSymmetric, wanted: ModesWanted) -> Result<Modes, ModesError> {
         let factor = Cholesky::new(K, Ordering::MinimumDegree, Threads(1)).unwrap();
-        smallest_modes(K.size(), K.size(), wanted, &mut |F| factor.solve_in_place(F), &mut |X, Y| Y.copy_from(X))
+        let solve = &mut |F: &mut Block| factor.solve_block(F);
+        let mass = &mut |X: &Block, Y: &mut Block| Y.clone_from(X);
+        smallest_modes(&mut Pencil { rows: K.size(), dimension: K.size(), solve, mass }, wanted)
     }
 
     #[test]
@@ -448,8 +305,9 @@ mod tests {
     fn a_body_without_mass_has_no_modes() {
         let (K, _) = chain(20, 1);
         let factor = Cholesky::new(&K, Ordering::MinimumDegree, Threads(1)).unwrap();
-        let mut solve = |F: &mut DMatrix<f64>| factor.solve_in_place(F);
-        let found = smallest_modes(20, 20, ModesWanted::Count(3), &mut solve, &mut |_, Y| Y.fill(0.0));
+        let solve = &mut |F: &mut Block| factor.solve_block(F);
+        let mass = &mut |_: &Block, Y: &mut Block| *Y = Block::zeros(20, Y.width);
+        let found = smallest_modes(&mut Pencil { rows: 20, dimension: 20, solve, mass }, ModesWanted::Count(3));
         assert_eq!(found.unwrap_err(), ModesError::NotFinite);
     }
 

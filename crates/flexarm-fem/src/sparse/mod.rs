@@ -1,25 +1,32 @@
 //! Sparse symmetric matrices: storage, products, Cholesky factors, eigenpairs. The one place that names faer.
 //!
 //! ```text
-//! SparseSymmetric --(Ordering)--> Cholesky --solve--> K⁻¹ F        many right-hand sides at a time
+//! SparseSymmetric --(Ordering)--> Cholesky --solve--> K⁻¹ F        eight right-hand sides at a time
 //!                                     |
 //!                                 smallest_modes: shift-invert block Lanczos on any operator (K, M)
 //! ```
 //! Only the lower triangle is stored, by columns. Tall results are nalgebra matrices, one column per
-//! right-hand side.
+//! right-hand side; whatever reads a factor, a matrix or a basis takes them as [`Block`]s, row by row.
 //!
 //! Not here: what the rows mean. Degrees of freedom, ties and boundaries are the business of
 //! [`crate::reduction`].
 
+mod block;
 mod cholesky;
 mod dense;
 mod lanczos;
 mod ordering;
 mod symmetric;
+mod triangular;
+mod vectors;
 
+pub use block::{Block, WIDTH};
 pub use cholesky::{Cholesky, FactorFigures, NotPositiveDefinite, Threads};
-pub use lanczos::{Modes, ModesError, ModesWanted, smallest_modes};
+pub use lanczos::{Modes, ModesError, ModesWanted, Pencil, Released, modes_of_two_supports, smallest_modes};
 pub use ordering::Ordering;
 pub use symmetric::{Pattern, SparseSymmetric};
 
+pub(crate) use block::{Row, grams, subtract_products};
 pub(crate) use dense::{add_product, gram};
+pub(crate) use lanczos::orthonormalising;
+pub(crate) use vectors::{Wide, Work, quickly};

@@ -2,7 +2,11 @@
 
 use std::sync::Arc;
 
+use flexarm_spatial::Real;
 use nalgebra::DMatrix;
+
+use super::block::{Block, Row, WIDTH};
+use super::vectors::{Wide, Work, quickly};
 
 /// Where the entries of a lower triangle are, by columns; rows ascend within a column.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -119,7 +123,7 @@ impl SparseSymmetric {
         Y
     }
 
-    /// `Y = A X` without allocation.
+    /// `Y = A X`.
     ///
     /// # Panics
     /// If the shapes do not fit.
@@ -131,22 +135,42 @@ impl SparseSymmetric {
             X.shape(),
             Y.shape()
         );
-        Y.fill(0.0);
-        for (x, y) in X.as_slice().chunks_exact(n.max(1)).zip(Y.as_mut_slice().chunks_exact_mut(n.max(1))) {
-            for j in 0..n {
-                let entries = self.pattern.column(j);
-                let (mut sum, x_j) = (0.0, x[j]);
-                for (row, value) in self.pattern.rows[entries.clone()].iter().zip(&self.values[entries]) {
-                    let i = *row as usize;
-                    // The diagonal entry would be counted twice: it goes through `sum` alone.
-                    if i != j {
-                        y[i] += value * x_j;
-                    }
-                    sum += value * x[i];
-                }
-                y[j] += sum;
-            }
+        if X.ncols() == 1 {
+            Y.fill(0.0);
+            return self.add_vector_product(X.as_slice(), Y.as_mut_slice());
         }
+        for first in (0..X.ncols()).step_by(WIDTH) {
+            let x = Block::of_columns(X, first, WIDTH.min(X.ncols() - first));
+            let mut y = Block::zeros(n, x.width);
+            self.add_block_product(&x, &mut y);
+            y.put_columns(Y, first);
+        }
+    }
+
+    /// `y += A x`.
+    fn add_vector_product(&self, x: &[f64], y: &mut [f64]) {
+        for j in 0..self.size() {
+            let entries = self.pattern.column(j);
+            let (mut sum, x_j) = (0.0, x[j]);
+            for (row, value) in self.pattern.rows[entries.clone()].iter().zip(&self.values[entries]) {
+                let i = *row as usize;
+                // The diagonal entry would be counted twice: it goes through `sum` alone.
+                if i != j {
+                    y[i] += value * x_j;
+                }
+                sum += value * x[i];
+            }
+            y[j] += sum;
+        }
+    }
+
+    /// `Y += A X`, each column with the bits of a product by itself.
+    ///
+    /// # Panics
+    /// If the shapes do not fit.
+    pub fn add_block_product(&self, X: &Block, Y: &mut Block) {
+        assert!(X.rows.len() == self.size() && Y.rows.len() == self.size(), "blocks of another size");
+        quickly(BlockProduct { A: self, X: &X.rows, Y: &mut Y.rows });
     }
 
     /// The rows and columns in `keep` (ascending), in that order.
@@ -169,6 +193,36 @@ impl SparseSymmetric {
             starts.push(rows.len() as u32);
         }
         Self { pattern: Arc::new(Pattern { starts, rows }), values }
+    }
+}
+
+struct BlockProduct<'a> {
+    A: &'a SparseSymmetric,
+    X: &'a [Row],
+    Y: &'a mut [Row],
+}
+
+impl Work for BlockProduct<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Real, const P: usize>(self) {
+        for j in 0..self.A.size() {
+            let entries = self.A.pattern.column(j);
+            let (mut sum, x_j) = (Wide::<T, P>::zero(), Wide::<T, P>::load(&self.X[j]));
+            for (row, value) in self.A.pattern.rows[entries.clone()].iter().zip(&self.A.values[entries]) {
+                let i = *row as usize;
+                if i != j {
+                    let mut y = Wide::<T, P>::load(&self.Y[i]);
+                    y.add(*value, x_j);
+                    y.store(&mut self.Y[i]);
+                }
+                sum.add(*value, Wide::<T, P>::load(&self.X[i]));
+            }
+            let mut y = Wide::<T, P>::load(&self.Y[j]);
+            y.add(1.0, sum);
+            y.store(&mut self.Y[j]);
+        }
     }
 }
 

@@ -219,8 +219,8 @@ fn phases(read: Duration, starts: &[Instant]) -> PhaseFigures {
         Some([from, to]) => (*to - *from).as_secs_f64(),
         _ => 0.0,
     };
-    let [assembly_s, factorisation_s, fixed_modes_s, held_modes_s, parts_s] = [0, 1, 2, 3, 4].map(step);
-    PhaseFigures { read_s: read.as_secs_f64(), assembly_s, factorisation_s, fixed_modes_s, held_modes_s, parts_s }
+    let [assembly_s, factorisation_s, modes_s, parts_s] = [0, 1, 2, 3].map(step);
+    PhaseFigures { read_s: read.as_secs_f64(), assembly_s, factorisation_s, modes_s, parts_s }
 }
 
 /// The sheets of pictures, as PNG with their file names; none without the feature `png`.

@@ -257,10 +257,7 @@ fn cost(summary: &ReduceSummary) -> ReportTable {
             "read, assemble, factorise".into(),
             format!("{}, {}, {}", seconds(p.read_s), seconds(p.assembly_s), seconds(p.factorisation_s)),
         ],
-        vec![
-            "kept modes, judging modes, parts".into(),
-            format!("{}, {}, {}", seconds(p.fixed_modes_s), seconds(p.held_modes_s), seconds(p.parts_s)),
-        ],
+        vec!["modes (kept and judging), parts".into(), format!("{}, {}", seconds(p.modes_s), seconds(p.parts_s))],
         vec!["peak memory".into(), memory],
         vec![
             "factor".into(),

@@ -1701,10 +1701,8 @@ class PhaseFigures(TypedDict):
     """Element matrices."""
     factorisation_s: float
     """Cholesky factor and static shapes."""
-    fixed_modes_s: float
-    """Fixed-interface modes."""
-    held_modes_s: float
-    """Modes of the mesh with A held."""
+    modes_s: float
+    """Fixed-interface modes, and those of the mesh with A held."""
     parts_s: float
     """Parts, chains, checks."""
 

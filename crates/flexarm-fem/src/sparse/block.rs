@@ -1,0 +1,255 @@
+//! Up to eight tall columns side by side: the shape in which factors, masses and bases are passed over.
+//!
+//! A row is one cache line. What is read once, an entry of a factor or of a matrix, serves all eight columns, and their
+//! numbers go through the vector units together. Sums run over the rows in order, the same on every machine.
+
+use flexarm_spatial::Real;
+use nalgebra::DMatrix;
+
+use super::vectors::{Wide, Work, quickly};
+
+/// Columns of a block.
+pub const WIDTH: usize = 8;
+
+/// Rows that are worked on while they are in the first cache.
+const PANEL: usize = 256;
+
+/// One row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(C, align(64))]
+pub struct Row(pub [f64; WIDTH]);
+
+impl Row {
+    /// Zeros.
+    pub const ZERO: Self = Self([0.0; WIDTH]);
+}
+
+/// A small matrix over the columns of two blocks, by rows.
+pub(super) type Small = [Row; WIDTH];
+
+/// Tall columns; those from `width` on are zero.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Block {
+    /// Row by row.
+    pub rows: Vec<Row>,
+    /// Columns in use.
+    pub width: usize,
+}
+
+impl Block {
+    /// Zeros.
+    ///
+    /// # Panics
+    /// If there are more columns than fit.
+    pub fn zeros(rows: usize, width: usize) -> Self {
+        assert!(width <= WIDTH, "a block has at most {WIDTH} columns");
+        Self { rows: vec![Row::ZERO; rows], width }
+    }
+
+    /// Columns `first..first + width` of a tall matrix.
+    pub fn of_columns(X: &DMatrix<f64>, first: usize, width: usize) -> Self {
+        let mut block = Self::zeros(X.nrows(), width);
+        block.set_columns(X, first);
+        block
+    }
+
+    /// The same, into the columns in use.
+    pub fn set_columns(&mut self, X: &DMatrix<f64>, first: usize) {
+        for k in 0..self.width {
+            let column = &X.as_slice()[(first + k) * X.nrows()..][..X.nrows()];
+            self.rows.iter_mut().zip(column).for_each(|(row, x)| row.0[k] = *x);
+        }
+    }
+
+    /// Puts the columns in use into a tall matrix, from column `first` on.
+    pub fn put_columns(&self, X: &mut DMatrix<f64>, first: usize) {
+        let n = X.nrows();
+        for k in 0..self.width {
+            let column = &mut X.as_mut_slice()[(first + k) * n..][..n];
+            self.rows.iter().zip(column).for_each(|(row, x)| *x = row.0[k]);
+        }
+    }
+
+    /// The tall matrix of the columns in use.
+    pub fn to_columns(&self) -> DMatrix<f64> {
+        let mut X = DMatrix::zeros(self.rows.len(), self.width);
+        self.put_columns(&mut X, 0);
+        X
+    }
+
+    /// `selfᵀ other`.
+    pub fn gram(&self, other: &Self) -> DMatrix<f64> {
+        grams(std::slice::from_ref(self), other)
+    }
+
+    /// `self -= other C`.
+    pub fn subtract_product(&mut self, other: &Self, C: &DMatrix<f64>) {
+        subtract_products(self, std::slice::from_ref(other), C);
+    }
+
+    /// `self <- self C`, of as many columns as C.
+    pub fn multiply(&mut self, C: &DMatrix<f64>) {
+        let C_small = small(C, 0, self.width);
+        quickly(Multiply { X: &mut self.rows, C: &C_small });
+        self.width = C.ncols();
+    }
+}
+
+/// `[V_1 V_2 ...]ᵀ X`.
+pub(crate) fn grams(basis: &[Block], X: &Block) -> DMatrix<f64> {
+    let sums = quickly(Grams { basis, X: &X.rows });
+    let rows: usize = basis.iter().map(|V| V.width).sum();
+    let mut result = DMatrix::zeros(rows, X.width);
+    let mut row = 0;
+    for (V, sum) in basis.iter().zip(&sums) {
+        for i in 0..V.width {
+            for j in 0..X.width {
+                result[(row + i, j)] = sum[i].0[j];
+            }
+        }
+        row += V.width;
+    }
+    result
+}
+
+/// `X -= [V_1 V_2 ...] C`.
+pub(crate) fn subtract_products(X: &mut Block, basis: &[Block], C: &DMatrix<f64>) {
+    let mut row = 0;
+    let mut factors = Vec::with_capacity(basis.len());
+    for V in basis {
+        factors.push(small(C, row, V.width));
+        row += V.width;
+    }
+    quickly(SubtractProducts { X: &mut X.rows, basis, factors: &factors });
+}
+
+/// Rows `first..first + count` of C.
+fn small(C: &DMatrix<f64>, first: usize, count: usize) -> Small {
+    let entry = |i: usize, j: usize| if i < count && j < C.ncols() { C[(first + i, j)] } else { 0.0 };
+    std::array::from_fn(|i| Row(std::array::from_fn(|j| entry(i, j))))
+}
+
+struct Grams<'a> {
+    basis: &'a [Block],
+    X: &'a [Row],
+}
+
+impl Work for Grams<'_> {
+    type Output = Vec<Small>;
+
+    #[inline(always)]
+    fn run<T: Real, const P: usize>(self) -> Vec<Small> {
+        let mut sums = vec![[Row::ZERO; WIDTH]; self.basis.len()];
+        for (panel, x) in self.X.chunks(PANEL).enumerate() {
+            for (V, sum) in self.basis.iter().zip(&mut sums) {
+                let v = &V.rows[panel * PANEL..][..x.len()];
+                // Four rows of the result at a time stay in registers.
+                add_gram::<T, P, 0>(v, x, sum);
+                add_gram::<T, P, 4>(v, x, sum);
+            }
+        }
+        sums
+    }
+}
+
+/// Rows `FIRST` to `FIRST + 3` of `sum += vᵀ x`.
+#[inline(always)]
+#[allow(clippy::needless_range_loop, reason = "indices keep the vectors in registers")]
+fn add_gram<T: Real, const P: usize, const FIRST: usize>(v: &[Row], x: &[Row], sum: &mut Small) {
+    let mut part = [Wide::<T, P>::zero(); 4];
+    for (v, x) in v.iter().zip(x) {
+        let x = Wide::<T, P>::load(x);
+        for i in 0..4 {
+            part[i].add(v.0[FIRST + i], x);
+        }
+    }
+    for i in 0..4 {
+        let sum = &mut sum[FIRST + i];
+        let mut total = Wide::<T, P>::load(sum);
+        total.add(1.0, part[i]);
+        total.store(sum);
+    }
+}
+
+struct SubtractProducts<'a> {
+    X: &'a mut [Row],
+    basis: &'a [Block],
+    factors: &'a [Small],
+}
+
+impl Work for SubtractProducts<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Real, const P: usize>(self) {
+        for (panel, x) in self.X.chunks_mut(PANEL).enumerate() {
+            for (V, C) in self.basis.iter().zip(self.factors) {
+                let v = &V.rows[panel * PANEL..][..x.len()];
+                subtract::<T, P, 0>(x, v, C);
+                subtract::<T, P, 4>(x, v, C);
+            }
+        }
+    }
+}
+
+/// `x -= v C` for the columns `FIRST` to `FIRST + 3` of v.
+#[inline(always)]
+#[allow(clippy::needless_range_loop, reason = "indices keep the vectors in registers")]
+fn subtract<T: Real, const P: usize, const FIRST: usize>(x: &mut [Row], v: &[Row], C: &Small) {
+    let mut factors = [Wide::<T, P>::zero(); 4];
+    for i in 0..4 {
+        factors[i] = Wide::<T, P>::load(&C[FIRST + i]);
+    }
+    for (x, v) in x.iter_mut().zip(v) {
+        let mut sum = Wide::<T, P>::load(x);
+        for i in 0..4 {
+            sum.subtract(v.0[FIRST + i], factors[i]);
+        }
+        sum.store(x);
+    }
+}
+
+struct Multiply<'a> {
+    X: &'a mut [Row],
+    C: &'a Small,
+}
+
+impl Work for Multiply<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Real, const P: usize>(self) {
+        for x in self.X {
+            let mut sum = Wide::<T, P>::zero();
+            for i in 0..WIDTH {
+                sum.add(x.0[i], Wide::<T, P>::load(&self.C[i]));
+            }
+            sum.store(x);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn products_of_blocks_are_those_of_their_matrices() {
+        let n = 2 * PANEL + 17;
+        let matrix =
+            |columns, seed: f64| DMatrix::from_fn(n, columns, |i, j| (seed * (i * 7 + j * 3 + 1) as f64).sin());
+        let (A, B, X) = (matrix(8, 0.3), matrix(3, 0.7), matrix(6, 1.1));
+        let basis = [Block::of_columns(&A, 0, 8), Block::of_columns(&B, 0, 3)];
+        let mut x = Block::of_columns(&X, 0, 6);
+        let AB = DMatrix::from_fn(n, 11, |i, j| if j < 8 { A[(i, j)] } else { B[(i, j - 8)] });
+        let C = grams(&basis, &x);
+        assert!((&C - AB.transpose() * &X).amax() < 1e-11); // measured 2e-13
+        subtract_products(&mut x, &basis, &C);
+        let expected = &X - &AB * &C;
+        assert!((x.to_columns() - &expected).amax() < 1e-12 * expected.amax().max(1e3));
+        assert!(x.rows.iter().all(|row| row.0[6..] == [0.0; 2]));
+        x.multiply(&C.transpose().columns(0, 5).into_owned());
+        let expected = expected * C.transpose().columns(0, 5);
+        assert!((x.to_columns() - &expected).amax() < 1e-13 * expected.amax());
+    }
+}

@@ -1,0 +1,272 @@
+//! The Lanczos basis, block by block, and the projected operator.
+
+use nalgebra::{DMatrix, SymmetricEigen};
+
+use super::{Modes, ModesError, Pencil, Released, Ritz};
+use crate::sparse::block::{Block, WIDTH, grams, subtract_products};
+
+/// What is left of a direction, over the largest θ, that is rounding of the operator.
+const NOISE: f64 = 1e-13;
+/// Smallest eigenvalue of the scaled Gram matrix of a block below which a direction is dropped.
+const DEPENDENT: f64 = 1e-10;
+/// The same, below which the block is orthogonalised once more: a near-dependent block magnifies what was left.
+const NEAR_DEPENDENT: f64 = 1e-4;
+
+/// M-orthonormal blocks `V_1 V_2 ...` with `H = Vᵀ M K⁻¹ M V`.
+pub(super) struct Basis {
+    pub(super) blocks: Vec<Block>,
+    /// The newest block, not yet multiplied; no columns where the space is exhausted.
+    newest: Block,
+    /// M times it.
+    mass_newest: Block,
+    /// `H`, grown block by block.
+    pub(super) projected: DMatrix<f64>,
+    /// `R_{j+1}`: what the newest block is in the last product.
+    pub(super) coupling: DMatrix<f64>,
+    /// Of the shapes of a support that is taken away.
+    pub(super) beside: Option<Beside>,
+    solves: usize,
+    next_look: usize,
+}
+
+/// Products of T, the shapes of a support that is taken away, with the basis.
+pub(super) struct Beside {
+    /// `Vᵀ M T`.
+    pub(super) X: DMatrix<f64>,
+    /// `V_1ᵀ M K⁻¹ M T`; of the later blocks it is zero.
+    pub(super) Y_1: DMatrix<f64>,
+    /// `Tᵀ M T`.
+    pub(super) G: DMatrix<f64>,
+    /// `Tᵀ M K⁻¹ M T`.
+    pub(super) S: DMatrix<f64>,
+}
+
+impl Basis {
+    /// First block: `K⁻¹ M` of T and of pseudo-random vectors, the same ones on every run.
+    pub(super) fn start(pencil: &mut Pencil<'_>, released: Option<&Released<'_>>) -> Result<Self, ModesError> {
+        let (rows, beside) = (pencil.rows, released.map_or(0, |released| released.T.width));
+        let mut W = Block::zeros(rows, WIDTH.min(beside + pencil.dimension));
+        let mut state = 0x9e37_79b9_7f4a_7c15_u64;
+        for (i, row) in W.rows.iter_mut().enumerate() {
+            for (k, x) in row.0[..W.width].iter_mut().enumerate() {
+                // xorshift64*, Vigna (2016); the upper bits as a number in (-1, 1).
+                state ^= state >> 12;
+                state ^= state << 25;
+                state ^= state >> 27;
+                let random = (state.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0;
+                *x = released.filter(|_| k < beside).map_or(random, |released| released.T.rows[i].0[k]);
+            }
+        }
+        let mut MW = Block::zeros(rows, W.width);
+        (pencil.mass)(&W, &mut MW);
+        W.clone_from(&MW);
+        (pencil.solve)(&mut W);
+        let products = released.map(|released| {
+            let of_T = |A: DMatrix<f64>| A.columns(0, beside).into_owned();
+            (of_T(released.T.gram(&MW)), of_T(W.gram(&MW)).rows(0, beside).into_owned())
+        });
+        let empty = Block::zeros(rows, 0);
+        let mut basis = Self {
+            blocks: Vec::new(),
+            newest: empty.clone(),
+            mass_newest: empty,
+            projected: DMatrix::zeros(0, 0),
+            coupling: DMatrix::zeros(0, 0),
+            beside: None,
+            solves: W.width,
+            next_look: 0,
+        };
+        basis.append(W, MW, pencil)?;
+        if basis.is_exhausted() {
+            // No vector has mass.
+            return Err(ModesError::NotFinite);
+        }
+        basis.beside = products.map(|(G, S)| Beside {
+            X: DMatrix::zeros(0, beside),
+            Y_1: basis.coupling.columns(0, beside).into_owned(),
+            G: (&G + G.transpose()) * 0.5,
+            S: (&S + S.transpose()) * 0.5,
+        });
+        Ok(basis)
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.projected.nrows()
+    }
+
+    /// Whether the basis spans all that there is.
+    pub(super) fn is_exhausted(&self) -> bool {
+        self.newest.width == 0
+    }
+
+    /// One step of the recurrence; `T` as at the start.
+    pub(super) fn advance(&mut self, pencil: &mut Pencil<'_>, T: Option<&Block>) -> Result<(), ModesError> {
+        let empty = || Block::zeros(0, 0);
+        let V = std::mem::replace(&mut self.newest, empty());
+        let MV = std::mem::replace(&mut self.mass_newest, empty());
+        let width = V.width;
+        if let (Some(beside), Some(T)) = (&mut self.beside, T) {
+            let (old, columns) = beside.X.shape();
+            beside.X = std::mem::take(&mut beside.X).resize(old + width, columns, 0.0);
+            beside.X.rows_mut(old, width).copy_from(&MV.gram(T));
+        }
+        let mut W = MV.clone();
+        (pencil.solve)(&mut W);
+        self.solves += width;
+        if let Some(previous) = self.blocks.last() {
+            W.subtract_product(previous, &self.coupling.transpose());
+        }
+        let mut A = MV.gram(&W);
+        W.subtract_product(&V, &A);
+        self.blocks.push(V);
+        // The recurrence alone loses the modes that were found; once is enough to keep the basis orthonormal to rounding.
+        let mut MW = MV;
+        (pencil.mass)(&W, &mut MW);
+        let C = grams(&self.blocks, &MW);
+        subtract_products(&mut W, &self.blocks, &C);
+        let old = self.len();
+        A += C.rows(old, width);
+
+        let mut H = DMatrix::zeros(old + width, old + width);
+        H.view_mut((0, 0), (old, old)).copy_from(&self.projected);
+        H.view_mut((old, old), (width, width)).copy_from(&((&A + A.transpose()) * 0.5));
+        if old > 0 {
+            let (now, before) = self.coupling.shape();
+            H.view_mut((old, old - before), (now, before)).copy_from(&self.coupling);
+            H.view_mut((old - before, old), (before, now)).copy_from(&self.coupling.transpose());
+        }
+        self.projected = H;
+        self.append(W, MW, pencil)
+    }
+
+    /// Makes `W` M-orthonormal and takes it as the newest block; directions that vanish are dropped.
+    ///
+    /// ```text
+    /// G = Wᵀ M W,   V = W B with Bᵀ G B = 1,   R = Vᵀ M W = Bᵀ G
+    /// ```
+    /// * `MW`: room for M times it.
+    fn append(&mut self, mut W: Block, mut MW: Block, pencil: &mut Pencil<'_>) -> Result<(), ModesError> {
+        (pencil.mass)(&W, &mut MW);
+        let G = W.gram(&MW);
+        if G.iter().any(|x| !x.is_finite()) {
+            return Err(ModesError::NotFinite);
+        }
+        // What is left after orthogonalisation must stand out of the rounding of the operator.
+        let reference = self.projected.diagonal().iter().fold(0.0, |peak: f64, h| peak.max(h.abs()));
+        let (Q, smallest) = orthonormalising(&G, NOISE * reference);
+        if Q.ncols() == 0 {
+            self.coupling = DMatrix::zeros(0, W.width);
+            self.newest = Block::zeros(W.rows.len(), 0);
+            self.mass_newest = self.newest.clone();
+            return Ok(());
+        }
+        let near_dependent = (smallest < NEAR_DEPENDENT).then(|| MW.clone());
+        W.multiply(&Q);
+        MW.multiply(&Q);
+        if near_dependent.is_some() {
+            (pencil.mass)(&W, &mut MW);
+            let C = grams(&self.blocks, &MW);
+            subtract_products(&mut W, &self.blocks, &C);
+            (pencil.mass)(&W, &mut MW);
+        }
+        let second = W.gram(&MW);
+        let Some(L) = ((&second + second.transpose()) * 0.5).cholesky() else {
+            return Err(ModesError::NotFinite);
+        };
+        let inverse = L.l().transpose().try_inverse().ok_or(ModesError::NotFinite)?;
+        W.multiply(&inverse);
+        MW.multiply(&inverse);
+        self.coupling = match near_dependent {
+            Some(product) => W.gram(&product),
+            None => (Q * inverse).transpose() * (&G + G.transpose()) * 0.5,
+        };
+        (self.newest, self.mass_newest) = (W, MW);
+        Ok(())
+    }
+
+    /// Whether the projected operator is to be looked at; `count`: modes wanted.
+    pub(super) fn is_to_be_looked_at(&mut self, count: usize, limit: usize) -> bool {
+        // The small eigenproblem grows with the cube of the basis: a larger one is looked at less often.
+        if self.len() < self.next_look.max(2 * count + WIDTH) && !self.is_full(limit) {
+            return false;
+        }
+        self.next_look = self.len() + (self.len() / 12).max(1);
+        true
+    }
+
+    fn is_full(&self, limit: usize) -> bool {
+        self.len() >= limit || self.is_exhausted()
+    }
+
+    /// An error where the basis may not grow any further.
+    pub(super) fn refuse_if_full(&self, ritz: &Ritz, wanted: usize, limit: usize) -> Result<(), ModesError> {
+        if !self.is_full(limit) {
+            return Ok(());
+        }
+        let residual = ritz.residuals.iter().take(wanted).fold(0.0, |worst: f64, r| worst.max(*r));
+        Err(ModesError::NotConverged { found: ritz.converged(), wanted, basis: self.len(), residual })
+    }
+
+    /// Ritz values, largest θ first.
+    pub(super) fn ritz(&self) -> Option<Ritz> {
+        let (theta, vectors) = Ritz::of(&self.projected)?;
+        let residuals = self.residuals(&theta, &vectors);
+        let beside = DMatrix::zeros(0, theta.len());
+        Some(Ritz { theta, vectors, beside, residuals })
+    }
+
+    /// `‖R_{j+1} s_last‖ / θ` of each vector over the basis.
+    pub(super) fn residuals(&self, theta: &[f64], vectors: &DMatrix<f64>) -> Vec<f64> {
+        if self.is_exhausted() {
+            return vec![0.0; theta.len()];
+        }
+        let last = self.coupling.ncols();
+        let bottom = vectors.rows(self.len() - last, last);
+        (&self.coupling * bottom).column_iter().zip(theta).map(|(r, theta)| r.norm() / theta).collect()
+    }
+
+    /// The first `count` modes; `T`: the shapes beside the basis.
+    pub(super) fn modes(&self, ritz: &Ritz, count: usize, T: Option<&Block>) -> Modes {
+        let rows = self.newest.rows.len();
+        let mut shapes = DMatrix::zeros(rows, count);
+        for first in (0..count).step_by(WIDTH) {
+            let width = WIDTH.min(count - first);
+            let mut block = Block::zeros(rows, width);
+            subtract_products(&mut block, &self.blocks, &-ritz.vectors.columns(first, width));
+            if let Some(T) = T {
+                block.subtract_product(T, &-ritz.beside.columns(first, width));
+            }
+            block.put_columns(&mut shapes, first);
+        }
+        for mut shape in shapes.column_iter_mut() {
+            let peak =
+                shape.iter().fold(0.0, |peak: f64, x| if x.abs() > peak.abs() * (1.0 + 1e-9) { *x } else { peak });
+            if peak < 0.0 {
+                shape.neg_mut();
+            }
+        }
+        let omega2 = ritz.theta[..count].iter().map(|theta| 1.0 / theta).collect();
+        Modes { omega2, shapes, residuals: ritz.residuals[..count].to_vec(), solves: self.solves }
+    }
+}
+
+/// `Q` with `Qᵀ G Q = 1` for a positive semidefinite G whose rows may have different units, and the smallest eigenvalue of the
+/// scaled G that was kept. Directions that depend on the others, or are shorter than `noise`, are dropped.
+pub(crate) fn orthonormalising(G: &DMatrix<f64>, noise: f64) -> (DMatrix<f64>, f64) {
+    let n = G.nrows();
+    let scale: Vec<f64> = G.diagonal().iter().map(|g| if *g > 0.0 { 1.0 / g.sqrt() } else { 0.0 }).collect();
+    let scaled = DMatrix::from_fn(n, n, |i, j| 0.5 * (G[(i, j)] + G[(j, i)]) * scale[i] * scale[j]);
+    let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(scaled);
+    let keep: Vec<usize> = (0..n)
+        .filter(|k| {
+            let vector = eigenvectors.column(*k);
+            let size = (0..n).map(|i| (vector[i] / scale[i].max(1e-300)).powi(2)).sum::<f64>().sqrt();
+            eigenvalues[*k] > DEPENDENT
+                && eigenvalues[*k].sqrt() * size.min(1e300) > noise
+                && scale.iter().any(|s| *s > 0.0)
+        })
+        .collect();
+    let smallest = keep.iter().map(|k| eigenvalues[*k]).fold(f64::INFINITY, f64::min);
+    let entry = |i: usize, k: usize| scale[i] * eigenvectors[(i, keep[k])] / eigenvalues[keep[k]].sqrt();
+    (DMatrix::from_fn(n, keep.len(), entry), smallest)
+}

@@ -1,0 +1,101 @@
+//! Loops over the rows of blocks with the vector instructions that the processor has. Operations and their order are the same
+//! with and without.
+
+use flexarm_spatial::Real;
+
+use super::block::{Row, WIDTH};
+
+/// Loops over rows, inlined down to the instructions.
+pub(crate) trait Work {
+    /// What comes of it.
+    type Output;
+
+    /// Does it with `P` vectors for a row; mark it `#[inline(always)]`, and what it calls.
+    fn run<T: Real, const P: usize>(self) -> Self::Output;
+}
+
+/// Does the work.
+pub(crate) fn quickly<W: Work>(work: W) -> W::Output {
+    let mut kept = Some(work);
+    #[cfg(target_arch = "x86_64")]
+    {
+        use flexarm_spatial::lanes::{OverLanes, with_lanes};
+
+        struct Compiled<'a, W>(&'a mut Option<W>);
+        impl<W: Work> OverLanes for Compiled<'_, W> {
+            type Output = Option<W::Output>;
+
+            #[inline(always)]
+            fn run<T: Real>(self) -> Self::Output {
+                const { assert!(2 * T::LANES == WIDTH, "two vectors are a row") };
+                // No closure: it would lose the instructions.
+                let work = self.0.take()?;
+                Some(work.run::<T, 2>())
+            }
+        }
+        if let Some(Some(done)) = with_lanes(Compiled(&mut kept)) {
+            return done;
+        }
+    }
+    match kept {
+        Some(work) => work.run::<f64, WIDTH>(),
+        None => unreachable!("work that was taken gave its result"),
+    }
+}
+
+/// A row in vectors.
+#[derive(Clone, Copy)]
+pub(crate) struct Wide<T, const P: usize>([T; P]);
+
+impl<T: Real, const P: usize> Wide<T, P> {
+    /// Zeros.
+    #[inline(always)]
+    pub(crate) fn zero() -> Self {
+        Self([T::splat(0.0); P])
+    }
+
+    /// A row.
+    #[inline(always)]
+    pub(crate) fn load(row: &Row) -> Self {
+        let mut wide = Self::zero();
+        for p in 0..P {
+            wide.0[p] = T::load(&row.0[p * T::LANES..][..T::LANES]);
+        }
+        wide
+    }
+
+    /// Into a row.
+    #[inline(always)]
+    pub(crate) fn store(self, row: &mut Row) {
+        for p in 0..P {
+            self.0[p].store(&mut row.0[p * T::LANES..][..T::LANES]);
+        }
+    }
+
+    /// `self += factor other`.
+    #[inline(always)]
+    pub(crate) fn add(&mut self, factor: f64, other: Self) {
+        let factor = T::splat(factor);
+        for p in 0..P {
+            self.0[p] += factor * other.0[p];
+        }
+    }
+
+    /// `self -= factor other`.
+    #[inline(always)]
+    pub(crate) fn subtract(&mut self, factor: f64, other: Self) {
+        let factor = T::splat(factor);
+        for p in 0..P {
+            self.0[p] -= factor * other.0[p];
+        }
+    }
+
+    /// `self *= factor`.
+    #[inline(always)]
+    pub(crate) fn scale(&mut self, factor: f64) {
+        let factor = T::splat(factor);
+        for p in 0..P {
+            self.0[p] *= factor;
+        }
+    }
+}
