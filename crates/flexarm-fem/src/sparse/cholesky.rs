@@ -15,6 +15,7 @@ use nalgebra::DMatrix;
 
 use super::dense::view_mut;
 use super::ordering::{Ordering, nested_dissection};
+use super::registers::clear_upper_halves;
 use super::symmetric::SparseSymmetric;
 
 /// How many threads a factorisation or a solve may use.
@@ -114,6 +115,7 @@ impl Cholesky {
             MemStack::new(&mut memory),
             Spec::default(),
         );
+        clear_upper_halves();
         if let Err(error) = factor {
             let LltError::NonPositivePivot { index } = error;
             // faer counts from 0 in some of its kernels and from 1 in others.
@@ -155,6 +157,7 @@ impl Cholesky {
             par,
             MemStack::new(&mut memory),
         );
+        clear_upper_halves();
     }
 }
 

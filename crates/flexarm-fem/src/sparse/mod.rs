@@ -15,6 +15,7 @@ mod cholesky;
 mod dense;
 mod lanczos;
 mod ordering;
+mod registers;
 mod symmetric;
 
 pub use cholesky::{Cholesky, FactorFigures, NotPositiveDefinite, Threads};
