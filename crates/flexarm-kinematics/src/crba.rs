@@ -398,13 +398,11 @@ impl<'m, T: Real> Lower<'m, T> {
     /// The joint's own six columns: the translations meet the mass alone.
     #[inline(always)]
     fn put_own_block(&mut self, k: usize, mass: T, S: &ElasticSubspace<T>, F: &SixWrenches<T>) {
-        let zero = T::zero();
         let (tr, rr) = (three_by_six(&S.L, &F.force), three_by_six(&S.B, &F.torque));
         for c in 0..3 {
             let mut values = tr[c];
-            for r in 0..3 {
-                values[r] = if r == c { mass } else { zero };
-            }
+            values[..3].copy_from_slice(&[T::zero(); 3]);
+            values[c] = mass;
             self.put_block_column(k, k + c, &values);
             self.put_block_column(k, k + 3 + c, &rr[c]);
         }

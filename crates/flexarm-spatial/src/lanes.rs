@@ -37,22 +37,27 @@ pub fn most_lanes() -> usize {
     }
 }
 
-/// Does the work with vector instructions, in lanes for this many things at most: the number of them is [`lanes_for`]. `None` where the
-/// processor has none.
-pub fn with_lanes<W: OverLanes>(things: usize, work: W) -> Option<W::Output> {
+/// Does the work with vector instructions, in four lanes; `None` where the processor has none.
+pub fn with_four_lanes<W: OverLanes>(work: W) -> Option<W::Output> {
     #[target_feature(enable = "avx2")]
     fn over_four<W: OverLanes>(work: W) -> W::Output {
         work.run::<Four>()
     }
+    // SAFETY: the processor has what the function is compiled for.
+    is_x86_feature_detected!("avx2").then(|| unsafe { over_four(work) })
+}
+
+/// Does the work with vector instructions, in lanes for this many things at most: the number of them is [`lanes_for`]. `None` where the
+/// processor has none.
+pub fn with_lanes<W: OverLanes>(things: usize, work: W) -> Option<W::Output> {
     #[target_feature(enable = "avx512f,avx512dq")]
     fn over_eight<W: OverLanes>(work: W) -> W::Output {
         work.run::<Eight>()
     }
     match lanes_for(things) {
-        // SAFETY: the processor has what the functions are compiled for.
+        // SAFETY: the processor has what the function is compiled for.
         8 => Some(unsafe { over_eight(work) }),
-        4 => Some(unsafe { over_four(work) }),
-        _ => None,
+        _ => with_four_lanes(work),
     }
 }
 

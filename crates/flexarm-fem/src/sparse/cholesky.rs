@@ -16,6 +16,7 @@ use nalgebra::DMatrix;
 
 use super::block::{Block, Row, WIDTH};
 use super::ordering::{Ordering, nested_dissection};
+use super::registers::clear_upper_halves;
 use super::symmetric::SparseSymmetric;
 use super::triangular;
 
@@ -115,6 +116,7 @@ impl Cholesky {
             MemStack::new(&mut memory),
             Spec::default(),
         );
+        clear_upper_halves();
         if let Err(error) = factor {
             let LltError::NonPositivePivot { index } = error;
             // faer counts from 0 in some of its kernels and from 1 in others.

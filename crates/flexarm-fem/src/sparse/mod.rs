@@ -16,6 +16,7 @@ mod cholesky;
 mod dense;
 mod lanczos;
 mod ordering;
+mod registers;
 mod symmetric;
 mod triangular;
 mod vectors;

@@ -19,7 +19,7 @@ pub(crate) fn quickly<W: Work>(work: W) -> W::Output {
     let mut kept = Some(work);
     #[cfg(target_arch = "x86_64")]
     {
-        use flexarm_spatial::lanes::{OverLanes, with_lanes};
+        use flexarm_spatial::lanes::{OverLanes, with_four_lanes};
 
         struct Compiled<'a, W>(&'a mut Option<W>);
         impl<W: Work> OverLanes for Compiled<'_, W> {
@@ -33,7 +33,7 @@ pub(crate) fn quickly<W: Work>(work: W) -> W::Output {
                 Some(work.run::<T, 2>())
             }
         }
-        if let Some(Some(done)) = with_lanes(Compiled(&mut kept)) {
+        if let Some(Some(done)) = with_four_lanes(Compiled(&mut kept)) {
             return done;
         }
     }

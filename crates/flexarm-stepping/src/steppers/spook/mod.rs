@@ -28,7 +28,8 @@ use flexarm_kinematics::{
     BalancerPlace, Data, ElasticAngles, JointMotion, Model, PlacedBalancer, Pose, State, Twist, Wrench,
     forward_kinematics_velocity, rotation_vector,
 };
-use flexarm_spatial::products::{mul, turn_symmetric};
+use flexarm_spatial::products::{mul, sub, turn_symmetric};
+use flexarm_spatial::{composed, quaternion};
 use nalgebra::{DVector, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use crate::arm::FlexibleArm;
@@ -122,7 +123,7 @@ impl BodyState {
     /// Pose of the body frame B.
     fn X_WB(&self) -> Pose {
         let R = self.R.to_rotation_matrix();
-        Pose::from_parts((self.x - R * self.com).into(), R)
+        Pose::from_parts(sub(&self.x, &mul(R.matrix(), &self.com)).into(), R)
     }
 }
 
@@ -459,30 +460,31 @@ impl Spook {
         let (h, t) = (self.dt, self.t);
         for (i, body) in self.arm.model.bodies().iter().enumerate().skip(1) {
             let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
-            let (X_WP, X_WQ) = (self.poses[body.parent] * body.X_PJ, self.poses[i]);
+            let (on, X_WQ) = (&self.poses[body.parent], &self.poses[i]);
+            let X_WP = || composed(on, &body.X_PJ);
             self.rows[i] = match body.motion {
                 JointMotion::Elastic(angles) => {
-                    Rows::new(self.settings.form, angles, &X_WP, &parent.x, &X_WQ, &child.x)
+                    Rows::new(self.settings.form, angles, &X_WP(), &parent.x, X_WQ, &child.x)
                 }
                 // A single spring is measured from its relaxed place.
                 _ if body.elastic => {
-                    Rows::new(ConstraintForm::Local, Default::default(), &X_WP, &parent.x, &X_WQ, &child.x)
+                    Rows::new(ConstraintForm::Local, Default::default(), &X_WP(), &parent.x, X_WQ, &child.x)
                 }
                 JointMotion::Axis(motion) => {
                     let q = match self.now.q.get(body.coordinate) {
                         Some(q) => *q,
                         // A dependent joint is where its bodies are.
                         None => {
-                            let X = X_WP.inverse() * X_WQ;
+                            let X = X_WP().inverse() * X_WQ;
                             let turn = rotation_vector(X.rotation.matrix());
                             motion.coordinate_of(&joined(&X.translation.vector, &turn))
                         }
                     };
-                    let moved = X_WP * motion.pose(q);
-                    Rows::hard(Some(motion), &moved, &parent.x, &X_WQ, &child.x)
+                    let moved = composed(on, &body.X_PB(q));
+                    Rows::hard(Some(motion), &moved, &parent.x, X_WQ, &child.x)
                 }
                 JointMotion::Interface { .. } | JointMotion::Welded => {
-                    Rows::hard(None, &X_WP, &parent.x, &X_WQ, &child.x)
+                    Rows::hard(None, &X_WP(), &parent.x, X_WQ, &child.x)
                 }
             };
             let deflection = self.rows[i].g.amax();
@@ -560,7 +562,7 @@ impl Spook {
         for ((trial, body), v) in self.trial.iter_mut().zip(&self.bodies).zip(&self.velocities).skip(1) {
             trial.V = Twist::from_vector(v);
             trial.x = body.x + trial.V.linear * h;
-            trial.R = UnitQuaternion::from_scaled_axis(trial.V.angular * h) * body.R;
+            trial.R = quaternion(&(trial.V.angular * h)) * body.R;
             trial.R.renormalize_fast();
             let speed = v.amax();
             largest = if speed.is_finite() { largest.max(speed) } else { f64::INFINITY };
