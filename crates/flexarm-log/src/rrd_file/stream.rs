@@ -80,7 +80,7 @@ pub(crate) struct RrdStream {
     manifests: Vec<(StoreId, Manifest)>,
 }
 
-/// The list of a recording's chunks in the making; empty beyond [`MOST_LISTED`].
+/// The list of a recording's chunks in the making.
 #[derive(Default)]
 struct Manifest {
     /// All chunks, for the end of the file.
@@ -94,20 +94,20 @@ struct Manifest {
     chunks: usize,
 }
 
-/// Chunks beyond which a file has no list of them, which the format allows: it is read from its beginning to its end then. A
-/// list would grow with the run, and be copied for each provisional end.
+/// Chunks beyond which provisional ends have no list of them: it would be copied for each, and a file without one is read
+/// from its beginning to its end. Finished files have theirs however long it is: `rerun rrd verify` refuses one without.
 const MOST_LISTED: usize = 2048;
 
 impl Manifest {
     /// `add`: puts a chunk into a list.
     fn append(&mut self, add: impl Fn(&mut RrdManifestBuilder) -> std::result::Result<(), CodecError>) -> Result<()> {
         self.chunks += 1;
-        if !self.is_listed() {
-            *self = Self { chunks: self.chunks, ..Self::default() };
-            return Ok(());
+        if self.is_listed() {
+            add(&mut self.since)?;
+            self.new += 1;
+        } else {
+            (self.before, self.since, self.new) = Default::default();
         }
-        self.new += 1;
-        add(&mut self.since)?;
         Ok(add(&mut self.all)?)
     }
 
@@ -203,7 +203,7 @@ impl RrdStream {
             let span = Span::from_start_end(start, position + tail.len() as u64);
             builder.append(&batch, span, uncompressed)?;
         }
-        if !self.is_listed() {
+        if self.manifests.iter().any(|(_, manifest)| !manifest.is_listed()) {
             return Ok(self.file.set_tail(&tail)?);
         }
         let mut manifests = Vec::new();
@@ -216,19 +216,12 @@ impl RrdStream {
         Ok(self.file.set_tail(&tail)?)
     }
 
-    /// Whether the end of the file has the list of its chunks.
-    fn is_listed(&self) -> bool {
-        self.manifests.iter().all(|(_, manifest)| manifest.is_listed())
-    }
-
-    /// Ends the file, with the list of its chunks unless it has more than [`MOST_LISTED`].
+    /// Ends the file with the list of its chunks.
     pub(crate) fn finish(&mut self) -> Result<()> {
-        if self.is_listed() {
-            let manifests = std::mem::take(&mut self.manifests).into_iter();
-            let manifests = manifests.map(|(store, manifest)| Ok(manifest.all.build(store)?)).collect::<Result<_>>()?;
-            let end = end(manifests, self.file.position())?;
-            self.file.write_all(&end)?;
-        }
+        let manifests = std::mem::take(&mut self.manifests).into_iter();
+        let manifests = manifests.map(|(store, manifest)| Ok(manifest.all.build(store)?)).collect::<Result<_>>()?;
+        let end = end(manifests, self.file.position())?;
+        self.file.write_all(&end)?;
         Ok(self.file.flush()?)
     }
 }
