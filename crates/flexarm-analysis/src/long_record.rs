@@ -68,8 +68,8 @@ pub struct LongRecord {
 }
 
 impl LongRecord {
-    /// Samples that are kept one by one: 262,144, which is 8 minutes and 44 seconds at 500 samples a second.
-    pub const MOST: usize = 1 << 18;
+    /// Samples that are kept one by one: 65,536, which is 2 minutes and 11 seconds at 500 samples a second and takes 8 MB.
+    pub const MOST: usize = 1 << 16;
 
     /// An empty record of a motion with these moves (start and end, s, ascending). `rests_there` says that the tool comes
     /// to rest where the static part of its error is: it is then the final value of stops ([`ErrorRecord::quasi_static`]).

@@ -240,7 +240,7 @@ impl Stage {
             arrow(&mut image, &view, unit, &self.tool, &self.moved);
             image
         });
-        let png = without_ground(&white, &black).to_png().map_err(ArmPictureError::Encode)?;
+        let png = without_ground(&white, &black).to_png_quickly().map_err(ArmPictureError::Encode)?;
         Ok(ArmPicture { png, axes: [0, 1, 2].map(|k| [view.right[k], view.up[k]]) })
     }
 

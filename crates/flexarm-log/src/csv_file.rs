@@ -46,7 +46,7 @@ struct Lines {
 }
 
 /// Bytes that wait until they are worth a system call.
-const MOST_WAITING: usize = 8 << 10;
+const MOST_WAITING: usize = 128 << 10;
 
 impl Lines {
     fn new(file: File) -> Self {

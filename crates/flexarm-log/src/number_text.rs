@@ -40,6 +40,24 @@ fn binary_digits(value: f64) -> i32 {
 /// A number other than zero, written with or without an exponent: with one.
 fn push_with_exponent(text: &mut Vec<u8>, written: &[u8]) {
     let unsigned = written.strip_prefix(b"-").unwrap_or(written);
+    // Nearly all numbers: two digits of the exponent, and those next to the ones without an exponent.
+    if let [mantissa @ .., b'e', b'-', tens, units] = written {
+        text.extend_from_slice(mantissa);
+        text.extend_from_slice(b"e-");
+        text.extend(Some(*tens).filter(|tens| *tens != b'0'));
+        text.push(*units);
+        return;
+    }
+    if let Some([first @ b'1'..=b'9', others @ ..]) = unsigned.strip_prefix(b"0.0000") {
+        text.extend_from_slice(&written[..written.len() - unsigned.len()]);
+        text.push(*first);
+        if !others.is_empty() {
+            text.push(b'.');
+            text.extend_from_slice(others);
+        }
+        text.extend_from_slice(b"e-5");
+        return;
+    }
     let (mantissa, exponent) = match unsigned.iter().position(|letter| *letter == b'e') {
         Some(at) => (&unsigned[..at], std::str::from_utf8(&unsigned[at + 1..]).ok().and_then(|e| e.parse().ok())),
         None => (unsigned, Some(0_i32)),

@@ -14,7 +14,7 @@ use crate::{Event, LogError, RunHeader, RunResult, Sample};
 /// * **Rows** of such a run have the figures of the tool alone (their lists are empty). At [`Trace::LIMIT`] rows every second
 ///   one is dropped and only every second sample is taken from then on, so that they stay evenly spaced; [`Trace::stride`]
 ///   tells.
-/// * The sample of the largest error ([`Trace::peak`]), and the error of the first [`Trace::LIMIT`] samples
+/// * The sample of the largest error ([`Trace::peak`]), and the error of the first [`Trace::BEGINNING`] samples
 ///   ([`Trace::beginning`]), are always kept.
 #[derive(Clone, Debug, Default)]
 pub struct Trace {
@@ -114,8 +114,10 @@ fn size(error: &[f64; 6]) -> f64 {
 impl Trace {
     /// Most samples of a run whose rows and curves are kept as they are.
     pub const WHOLE: usize = 1 << 13;
-    /// Rows at which a run is thinned.
-    pub const LIMIT: usize = 100_000;
+    /// Rows at which a run is thinned: ten times as many as a plot has points.
+    pub const LIMIT: usize = 1 << 15;
+    /// First samples of a long run whose errors are kept, for its spectrum.
+    pub const BEGINNING: usize = 100_000;
 
     /// An empty trace of a run.
     #[must_use]
@@ -149,7 +151,7 @@ impl Trace {
         }
         self.row.fill(sample);
         self.blocks.push(&self.row);
-        if self.beginning.len() < Self::LIMIT {
+        if self.beginning.len() < Self::BEGINNING {
             self.beginning.push(translation(&self.row));
         }
         if (self.seen - 1).is_multiple_of(self.stride.max(1)) {
@@ -169,7 +171,7 @@ impl Trace {
     fn shorten(&mut self) {
         self.rows.iter().for_each(|row| self.blocks.push(row));
         self.beginning = self.rows.iter().map(translation).collect();
-        self.beginning.reserve_exact(Self::LIMIT - self.beginning.len());
+        self.beginning.reserve_exact(Self::BEGINNING - self.beginning.len());
         let mut rows = Vec::with_capacity(Self::LIMIT);
         rows.extend(self.rows.iter().map(TraceRow::without_lists));
         self.rows = rows;
@@ -217,7 +219,7 @@ impl Trace {
         self.blocks.size().max(1)
     }
 
-    /// Time (s) and translation of the error (m, world axes) of every sample, of the first [`Trace::LIMIT`] samples in a long
+    /// Time (s) and translation of the error (m, world axes) of every sample, of the first [`Trace::BEGINNING`] samples in a long
     /// run.
     #[must_use]
     pub fn beginning(&self) -> Vec<(f64, [f64; 3])> {

@@ -123,8 +123,8 @@ fn every_topic_is_there_with_schema_quality_of_service_and_all_samples() {
         ("/deviation/tcp", "std_msgs/msg/Float64MultiArray", n),
         ("/deviation/tcp_path", "std_msgs/msg/Float64MultiArray", n),
         ("/elastic/joint_states", "sensor_msgs/msg/JointState", n),
-        ("/elastic/upper_arm", "geometry_msgs/msg/WrenchStamped", n),
-        ("/elastic/upper_arm/deflection", "geometry_msgs/msg/TwistStamped", n),
+        ("/elastic/upper_arm", "geometry_msgs/msg/WrenchStamped", 121), // 60 Hz, both ends
+        ("/elastic/upper_arm/deflection", "geometry_msgs/msg/TwistStamped", 121),
         ("/energy", "std_msgs/msg/Float64MultiArray", n),
         ("/events", "rcl_interfaces/msg/Log", 3),
         ("/joint_states", "sensor_msgs/msg/JointState", n),
@@ -203,13 +203,15 @@ fn messages_hold_the_samples() {
     assert_eq!(cdr.sequence(), sample.elastic[0].load);
     cdr.end();
 
-    let data = message("/elastic/upper_arm/deflection");
+    // At the twelfth sixtieth of a second, which is the hundredth sample.
+    let picture = |topic: &str| messages(&file, topic)[12].1.clone();
+    let data = picture("/elastic/upper_arm/deflection");
     let mut cdr = CdrReader::new(&data);
     assert_eq!(cdr.header(), (START_NS + 200_000_000, "upper_arm".to_owned()));
     assert_eq!(cdr.f64s(6), sample.elastic[0].deflection);
     cdr.end();
 
-    let data = message("/elastic/upper_arm");
+    let data = picture("/elastic/upper_arm");
     let mut cdr = CdrReader::new(&data);
     assert_eq!(cdr.header().1, "upper_arm");
     assert_eq!(cdr.f64s(6), sample.elastic[0].load);
@@ -508,7 +510,7 @@ fn chunks_keep_their_size_and_checksums() {
         assert!(chunk.uncompressed_size <= 1 << 20, "{}", chunk.uncompressed_size);
     }
     let checked = MessageStream::new_with_options(&file, Options::ValidateChunkCrcs.into()).unwrap();
-    assert_eq!(checked.map(Result::unwrap).count() as u64, 16 * synthetic::SAMPLES + 3 + 3 + 41 + 2);
+    assert_eq!(checked.map(Result::unwrap).count() as u64, 14 * synthetic::SAMPLES + 2 * 121 + 3 + 3 + 41 + 2);
 }
 
 /// Number of samples in the undamaged part of a file.
@@ -583,7 +585,7 @@ fn a_dropped_recorder_closes_its_file() {
     drop(recorder);
     let file = std::fs::read(&path).unwrap();
     let summary = Summary::read(&file).unwrap().unwrap();
-    assert_eq!(summary.stats.unwrap().message_count, 10 * 16 + 3 + 1); // latched ones, the error
+    assert_eq!(summary.stats.unwrap().message_count, 10 * 14 + 2 * 2 + 3 + 1); // two pictures, latched ones, the error
     std::fs::remove_file(path).unwrap();
 }
 

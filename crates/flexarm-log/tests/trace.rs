@@ -83,7 +83,7 @@ fn curves_of_a_long_run_lose_no_peak() {
     let way = (1..ALL).map(|k| if k % 100 == 0 { 9.9 } else { 0.1 }).sum::<f64>();
     assert!((ways[ways.len() - 1] - way).abs() < 1e-9 * way && ways.is_sorted());
     let beginning = trace.beginning();
-    assert_eq!((beginning.len(), beginning[7].0), (Trace::LIMIT, 7e-3));
+    assert_eq!((beginning.len(), beginning[7].0), (Trace::BEGINNING, 7e-3));
 }
 
 #[test]

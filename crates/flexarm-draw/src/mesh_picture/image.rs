@@ -65,12 +65,21 @@ impl Image {
     /// # Errors
     /// An image without pixels, or of more than a PNG can hold.
     pub fn to_png(&self) -> Result<Vec<u8>, String> {
+        self.png(png::Compression::Balanced)
+    }
+
+    /// The same with a quick compression, which takes more bytes.
+    pub(crate) fn to_png_quickly(&self) -> Result<Vec<u8>, String> {
+        self.png(png::Compression::Fast)
+    }
+
+    fn png(&self, compression: png::Compression) -> Result<Vec<u8>, String> {
         let size = |n: usize| u32::try_from(n).map_err(|_| format!("{n} pixels are too many for a PNG"));
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, size(self.width)?, size(self.height)?);
         encoder.set_color(png::ColorType::Rgba);
         encoder.set_depth(png::BitDepth::Eight);
-        encoder.set_compression(png::Compression::Balanced);
+        encoder.set_compression(compression);
         let mut writer = encoder.write_header().map_err(|error| error.to_string())?;
         writer.write_image_data(&self.rgba).map_err(|error| error.to_string())?;
         writer.finish().map_err(|error| error.to_string())?;

@@ -20,6 +20,12 @@ impl Cdr {
         self
     }
 
+    /// Gives memory beyond so many bytes back.
+    pub(crate) fn shrink_to(&mut self, kept: usize) {
+        self.bytes.clear();
+        self.bytes.shrink_to(kept);
+    }
+
     /// The message so far.
     pub(crate) fn bytes(&self) -> &[u8] {
         &self.bytes

@@ -101,7 +101,9 @@ impl Channels {
         };
         let mut elastic = Vec::new();
         for (name, element) in topic_names(&header.elements).iter().zip(&header.elements) {
-            let load = format!("load of {element} on its distal part, axes of the proximal face [N, N m]");
+            let load = format!(
+                "load of {element} on its distal part, axes of the proximal face [N, N m], as in /elastic/joint_states"
+            );
             let deflection = format!("not a velocity: deflection of {element}, axes of the proximal face [m, rad]");
             elastic.push(ElasticChannels {
                 load: add(&format!("/elastic/{name}"), "geometry_msgs/WrenchStamped", &load),

@@ -37,9 +37,10 @@ pub(super) struct Written {
 }
 
 impl OpenChunk {
-    /// Without anything in it, with the memory that it has.
-    pub(super) fn clear(&mut self) {
+    /// Without anything in it, with the memory that it has, up to so many bytes.
+    pub(super) fn clear(&mut self, kept: usize) {
         self.records.clear();
+        self.records.shrink_to(kept);
         self.others = 0;
         self.times = None;
         self.entries.iter_mut().for_each(Vec::clear);

@@ -113,6 +113,11 @@ impl Frames {
         }
     }
 
+    /// Whether this sample is one for a picture.
+    pub(crate) fn is_pictured(&self) -> bool {
+        self.due
+    }
+
     /// The magnified arm, if this sample shows it.
     pub(crate) fn magnified(&self) -> Option<&TwinSample> {
         (self.due && self.magnifier.is_some()).then_some(&self.magnified)

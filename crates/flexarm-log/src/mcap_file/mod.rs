@@ -52,8 +52,8 @@ use crate::{CreateOptions, EventKind, LogError, RunHeader, RunResult, START_NS, 
 /// | `/tcp/static_error` | `std_msgs/Float64MultiArray` | what of the error the arm would have standing still: x, y, z, world axes |
 /// | `/tcp/contributions` | `std_msgs/Float64MultiArray` | what each of [`RunHeader::contributors`] does to the tool: x, y, z of each, world axes |
 /// | `/elastic/joint_states` | `sensor_msgs/JointState` | all elements as joints `<element>/x` to `<element>/rz`, so that curves have names: deflection, load |
-/// | `/elastic/<element>` | `geometry_msgs/WrenchStamped` | load |
-/// | `/elastic/<element>/deflection` | `geometry_msgs/TwistStamped` | not a velocity: deflection, translation and rotation |
+/// | `/elastic/<element>` | `geometry_msgs/WrenchStamped` | the same load, for arrows; at most 60 times a second |
+/// | `/elastic/<element>/deflection` | `geometry_msgs/TwistStamped` | not a velocity: the same deflection, translation and rotation; at most 60 times a second |
 /// | `/energy`, `/solver` | `std_msgs/Float64MultiArray` | |
 /// | `/events` | `rcl_interfaces/Log` | what happened, at its own time: name is the kind |
 /// | `/markers` | `visualization_msgs/MarkerArray` | surfaces, once, latched; namespaces `flexible`, `rigid`, `magnified` |
@@ -135,6 +135,9 @@ pub struct McapFile {
     /// Messages so far of topics that do not get one from each sample.
     paths: u32,
     errors: u32,
+    pictures: u32,
+    /// Deflections and loads of a sample; the memory is used again.
+    values: Vec<f64>,
     /// Time of the last message with paths.
     paths_at: Option<Stamp>,
 }
@@ -162,6 +165,8 @@ impl McapFile {
             samples: 0,
             paths: 0,
             errors: 0,
+            pictures: 0,
+            values: Vec::new(),
             paths_at: None,
         })
     }
@@ -226,8 +231,8 @@ impl McapFile {
         if let Some((channels, rigid)) = rigid {
             self.joint_states(channels.joint_states, stamp, rigid)?;
             self.send(channels.tcp, stamp, |cdr| messages::pose_stamped(cdr, stamp, WORLD, &rigid.X_WT))?;
-            self.error(stamp, channels.error, channels.error_plot, "x [m],y [m],z [m]", &sample.error_world)?;
-            let axes = "tangential [m],normal [m],binormal [m]";
+            self.error(stamp, channels.error, channels.error_plot, "x [m],y [m],z [m],norm [m]", &sample.error_world)?;
+            let axes = "tangential [m],normal [m],binormal [m],norm [m]";
             self.error(stamp, channels.error_path, channels.error_path_plot, axes, &sample.error_path)?;
         }
         if let Some(channel) = self.channels.static_error {
@@ -276,21 +281,26 @@ impl McapFile {
         self.output.send(channel, self.samples, stamp, |cdr| messages::joint_state(cdr, stamp, &self.joints, values))
     }
 
-    /// Deflections and loads: one topic pair per element, and all by name for tools that plot joints.
+    /// Deflections and loads: all by name with each sample, and one topic pair per element for what draws them.
     fn elastic(&mut self, stamp: Stamp, sample: &Sample) -> io::Result<()> {
-        for (index, element) in sample.elastic.iter().enumerate() {
-            let (channels, name) = (self.channels.elastic[index], &self.elements[index]);
-            let load = |cdr: &mut Cdr| messages::six_vector_stamped(cdr, stamp, name, &element.load);
-            self.output.send(channels.load, self.samples, stamp, load)?;
-            let deflection = |cdr: &mut Cdr| messages::six_vector_stamped(cdr, stamp, name, &element.deflection);
-            self.output.send(channels.deflection, self.samples, stamp, deflection)?;
-        }
         if let Some(channel) = self.channels.elastic_joint_states {
-            let deflections: Vec<f64> = sample.elastic.iter().flat_map(|element| element.deflection).collect();
-            let loads: Vec<f64> = sample.elastic.iter().flat_map(|element| element.load).collect();
-            let values = [deflections.as_slice(), &[], loads.as_slice()];
+            self.values.clear();
+            self.values.extend(sample.elastic.iter().flat_map(|element| element.deflection));
+            self.values.extend(sample.elastic.iter().flat_map(|element| element.load));
+            let (deflections, loads) = self.values.split_at(self.values.len() / 2);
+            let values = [deflections, &[], loads];
             let write = |cdr: &mut Cdr| messages::joint_state(cdr, stamp, &self.deflections, values);
             self.output.send(channel, self.samples, stamp, write)?;
+        }
+        if self.frames.is_pictured() {
+            for (index, element) in sample.elastic.iter().enumerate() {
+                let (channels, name) = (self.channels.elastic[index], &self.elements[index]);
+                let load = |cdr: &mut Cdr| messages::six_vector_stamped(cdr, stamp, name, &element.load);
+                self.output.send(channels.load, self.pictures, stamp, load)?;
+                let deflection = |cdr: &mut Cdr| messages::six_vector_stamped(cdr, stamp, name, &element.deflection);
+                self.output.send(channels.deflection, self.pictures, stamp, deflection)?;
+            }
+            self.pictures = self.pictures.wrapping_add(1);
         }
         Ok(())
     }
@@ -300,8 +310,7 @@ impl McapFile {
         self.send(vector, stamp, |cdr| messages::six_vector_stamped(cdr, stamp, WORLD, error))?;
         let [x, y, z, ..] = *error;
         let norm = (x * x + y * y + z * z).sqrt();
-        let labels = format!("{axes},norm [m]");
-        self.send(plot, stamp, |cdr| messages::labelled_array(cdr, &labels, &[x, y, z, norm]))
+        self.send(plot, stamp, |cdr| messages::labelled_array(cdr, axes, &[x, y, z, norm]))
     }
 
     /// The paths up to the last sample, unless they are in the file already.

@@ -18,8 +18,11 @@ use super::messages::Stamp;
 use super::records::{ATTACHMENT, Body, CHANNEL, HEADER, METADATA, SCHEMA, push_head};
 use crate::tail_file::TailFile;
 
-/// Uncompressed size at which a chunk is closed.
+/// Uncompressed size at which a chunk is closed, and the same for chunks behind so many bytes: the list of chunks is in memory
+/// until the file ends, and is part of each provisional end.
 const CHUNK_BYTES: usize = 1 << 20;
+const LONG_CHUNK_BYTES: usize = 4 * CHUNK_BYTES;
+const LONG_FILE_BYTES: u64 = 64 << 20;
 
 /// Level of zstd. On chunks of runs level 1 takes half the time of level 3, which is zstd's own choice, and 2 % more room;
 /// level -1, the first of its fast ones, 0.7 of that time and 3 % more.
@@ -38,8 +41,9 @@ pub(crate) struct Output {
     schemas: BTreeMap<String, u16>,
     channels: u16,
     compressor: Compressor<'static>,
-    /// Bytes of the last chunk; the memory is used again.
+    /// The last chunk, compressed and with its indexes; the memory is used again.
     compressed: Vec<u8>,
+    bytes: Vec<u8>,
     cdr: Cdr,
     /// The last message and the end are in the file.
     finished: bool,
@@ -57,6 +61,7 @@ impl Output {
             channels: 0,
             compressor: Compressor::new(COMPRESSION)?,
             compressed: Vec::new(),
+            bytes: Vec::new(),
             cdr: Cdr::default(),
             finished: false,
         };
@@ -109,7 +114,8 @@ impl Output {
     ) -> io::Result<()> {
         write(&mut self.cdr);
         let size = OpenChunk::size_of_message(self.cdr.bytes().len());
-        if self.chunk.messages() > 0 && self.chunk.messages() + size > CHUNK_BYTES {
+        let most = if self.file.position() > LONG_FILE_BYTES { LONG_CHUNK_BYTES } else { CHUNK_BYTES };
+        if self.chunk.messages() > 0 && self.chunk.messages() + size > most {
             self.close_chunk()?;
         }
         self.chunk.message(channel, sequence, stamp, self.cdr.bytes());
@@ -126,12 +132,18 @@ impl Output {
         self.compressed.reserve(compress_bound(records.len()));
         self.compressor.compress_to_buffer(records, &mut self.compressed)?;
         let compressed = self.compressed.as_slice();
-        let mut bytes = Vec::with_capacity(compressed.len() + records.len() / 8);
+        let mut bytes = std::mem::take(&mut self.bytes);
         let checksum = crc32fast::hash(records);
         let written = self.chunk.write(&mut bytes, self.file.position(), ("zstd", compressed), checksum);
-        self.chunk.clear();
+        self.chunk.clear(2 * LONG_CHUNK_BYTES);
         self.index.chunk(&written);
-        self.commit(&bytes)
+        let committed = self.commit(&bytes);
+        bytes.clear();
+        self.bytes = bytes;
+        // What the surfaces took is not needed again.
+        self.bytes.shrink_to(LONG_CHUNK_BYTES);
+        self.compressed.shrink_to(LONG_CHUNK_BYTES);
+        committed
     }
 
     /// Whether so much is held back that [`Output::flush`] should be called even before its time. An index that has grown
@@ -171,6 +183,7 @@ impl Output {
 
     pub(crate) fn metadata(&mut self, name: &str, pairs: impl IntoIterator<Item = (String, String)>) -> io::Result<()> {
         self.close_chunk()?;
+        self.cdr.shrink_to(CHUNK_BYTES);
         let (mut bytes, mut body) = (Vec::new(), Body::default());
         body.string(name).pairs(&BTreeMap::from_iter(pairs)).push(&mut bytes, METADATA);
         self.index.metadata(self.file.position(), bytes.len() as u64, name);

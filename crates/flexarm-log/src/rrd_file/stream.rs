@@ -95,8 +95,8 @@ struct Manifest {
 }
 
 /// Chunks beyond which provisional ends have no list of them: it would be copied for each, and a file without one is read
-/// from its beginning to its end.
-const MOST_LISTED: usize = 10_000;
+/// from its beginning to its end. Finished files have theirs however long it is: `rerun rrd verify` refuses one without.
+const MOST_LISTED: usize = 2048;
 
 impl Manifest {
     /// `add`: puts a chunk into a list.

@@ -10,6 +10,9 @@ use crate::read::cdr::CdrReader;
 use crate::read::exact_time;
 use crate::{Event, EventKind, RunHeader, Sample, TwinSample};
 
+/// Deflections and loads of all elements.
+const ELASTIC: &str = "/elastic/joint_states";
+
 /// What a message of a topic holds; several topics make one sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Topic {
@@ -21,6 +24,8 @@ pub(super) enum Topic {
     RigidTool,
     Error,
     PathError,
+    Elastic,
+    /// In older files, which have them with each sample.
     Load(usize),
     Deflection(usize),
     StaticError,
@@ -66,6 +71,7 @@ impl Assembly {
             ("/tcp/rigid", Topic::RigidTool),
             ("/tcp/error", Topic::Error),
             ("/tcp/error_path", Topic::PathError),
+            (ELASTIC, Topic::Elastic),
             ("/tcp/static_error", Topic::StaticError),
             ("/tcp/contributions", Topic::Contributions),
             ("/energy", Topic::Energy),
@@ -105,6 +111,10 @@ impl Assembly {
             Record::Channel(channel) => {
                 if let Some(topic) = self.known.get(&channel.topic) {
                     self.channels.insert(channel.id, *topic);
+                }
+                // Where all elements are together, those by themselves are for pictures.
+                if self.channels.values().any(|topic| *topic == Topic::Elastic) {
+                    self.channels.retain(|_, topic| !matches!(topic, Topic::Load(_) | Topic::Deflection(_)));
                 }
                 Ok(None)
             }
@@ -160,6 +170,17 @@ impl Assembly {
                 let error = if topic == Topic::Error { &mut sample.error_world } else { &mut sample.error_path };
                 *error = cdr.f64s()?;
             }
+            Topic::Elastic => {
+                let [deflections, velocities, loads] = joint_values(&mut cdr)?;
+                let whole = |values: &[f64]| values.len() == 6 * sample.elastic.len();
+                if !(whole(&deflections) && velocities.is_empty() && whole(&loads)) {
+                    return None;
+                }
+                let parts = deflections.as_chunks().0.iter().zip(loads.as_chunks().0);
+                for (element, (deflection, load)) in sample.elastic.iter_mut().zip(parts) {
+                    (element.deflection, element.load) = (*deflection, *load);
+                }
+            }
             Topic::Load(k) => {
                 cdr.header()?;
                 sample.elastic[k].load = cdr.f64s()?;
@@ -198,16 +219,16 @@ impl Assembly {
 }
 
 fn joint_state(cdr: &mut CdrReader<'_>, joints: usize, twin: &mut TwinSample) -> Option<()> {
+    [twin.q, twin.qdot, twin.effort] = joint_values(cdr)?;
+    [&twin.q, &twin.qdot, &twin.effort].iter().all(|values| values.len() == joints).then_some(())
+}
+
+/// Positions, velocities and efforts of a `sensor_msgs/JointState`.
+fn joint_values(cdr: &mut CdrReader<'_>) -> Option<[Vec<f64>; 3]> {
     cdr.header()?;
     let names = cdr.u32()?;
     for _ in 0..names {
         cdr.string()?;
     }
-    for values in [&mut twin.q, &mut twin.qdot, &mut twin.effort] {
-        *values = cdr.f64_sequence()?;
-        if values.len() != joints {
-            return None;
-        }
-    }
-    Some(())
+    Some([cdr.f64_sequence()?, cdr.f64_sequence()?, cdr.f64_sequence()?])
 }

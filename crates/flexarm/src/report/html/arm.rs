@@ -12,8 +12,8 @@ use super::number::{number, short};
 use crate::html_page::escaped;
 use crate::report::picture::{pictures, scale_colors};
 
-/// Width of the pictures of the arm (pixels): sharp at the width at which the page shows them.
-const PICTURE_WIDTH: usize = 1080;
+/// Width of the pictures of the arm (pixels): more than the page shows, whose two pictures stand beside each other.
+const PICTURE_WIDTH: usize = 810;
 
 pub(super) fn arm_pictures(runs: &[ReportRun<'_>]) -> String {
     let mut out = "<section id=\"arm\" class=\"block\"><h2>The arm at its largest error</h2>\n".to_owned();
