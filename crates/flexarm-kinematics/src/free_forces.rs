@@ -228,6 +228,7 @@ impl<S: Space> PointTree<S> {
         let still = S::scaled(&self.up, S::Real::splat(0.0));
         let world =
             Moving { omega: still, alpha: still, a: self.up, W: S::dyad(&still, &still, &still, S::Real::splat(0.0)) };
+        let mut last = world;
         for i in 0..self.nodes.len() {
             let (inward, outward) = self.nodes.split_at_mut(i);
             let node = &mut outward[0];
@@ -235,10 +236,12 @@ impl<S: Space> PointTree<S> {
             if node.part == Part::Placed {
                 continue;
             }
-            match node.parent {
-                Some(parent) => node.follow(&inward[parent].moving, &rates),
+            // Mostly the parent is the body just done, whose motion is still in registers.
+            last = match node.parent {
                 None => node.follow(&world, &rates),
-            }
+                Some(parent) if parent + 1 == i => node.follow(&last, &rates),
+                Some(parent) => node.follow(&inward[parent].moving, &rates),
+            };
             if node.part == Part::Loading {
                 node.load(loads.map(|loads| &loads[i + 1]));
             }
@@ -253,22 +256,30 @@ impl<S: Space> PointTree<S> {
     #[inline(always)]
     fn carry_inward(&mut self, tau: &mut [S::Real]) {
         tau.fill(S::Real::splat(0.0));
+        // What the body just done puts on the one before it, if that is its parent.
+        let none = [S::fixed(&Fixed::default()); 2];
+        let mut carried = none;
         for i in (0..self.nodes.len()).rev() {
             let (inward, outward) = self.nodes.split_at_mut(i);
             let node = &outward[0];
             if node.part != Part::Loading {
                 continue;
             }
-            let force = S::turn(&node.R, &node.force);
+            let [force, torque] = [S::add(&node.force, &carried[0]), S::add(&node.torque, &carried[1])];
+            carried = none;
+            let force = S::turn(&node.R, &force);
             if let Some(row) = node.row {
-                let own = node.project(&force, &node.torque);
+                let own = node.project(&force, &torque);
                 for (tau, own) in tau[row..].iter_mut().zip(own).take(node.size()) {
                     *tau += own;
                 }
             }
-            let Some(parent) = node.parent.map(|parent| &mut inward[parent]) else { continue };
-            if parent.part == Part::Loading {
-                let torque = S::add(&S::turn(&node.R, &node.torque), &S::cross(&node.p, &force));
+            let Some(number) = node.parent.filter(|parent| inward[*parent].part == Part::Loading) else { continue };
+            let torque = S::add(&S::turn(&node.R, &torque), &S::cross(&node.p, &force));
+            if number + 1 == i {
+                carried = [force, torque];
+            } else {
+                let parent = &mut inward[number];
                 parent.force = S::add(&parent.force, &force);
                 parent.torque = S::add(&parent.torque, &torque);
             }
@@ -441,7 +452,7 @@ impl<S: Space> Node<S> {
 
     /// (1) to (3).
     #[inline(always)]
-    fn follow(&mut self, parent: &Moving<S>, rates: &JointRates<S>) {
+    fn follow(&mut self, parent: &Moving<S>, rates: &JointRates<S>) -> Moving<S> {
         let R = &self.R;
         let (mut omega, mut alpha) = (S::turn_back(R, &parent.omega), S::turn_back(R, &parent.alpha));
         if let Some([w, wdot]) = &rates.turn {
@@ -456,6 +467,7 @@ impl<S: Space> Node<S> {
         // [ω]x² = ω ωᵀ - ω·ω 1
         let W = S::dyad(&omega, &omega, &alpha, -S::dot(&omega, &omega));
         self.moving = Moving { omega, alpha, a: S::turn_back(R, &a), W }; // (3)
+        self.moving
     }
 
     /// (4) and (5).

@@ -226,6 +226,13 @@ lanes!(
     Div div DivAssign div_assign _mm512_div_pd
 );
 
+/// Sines and cosines of four angles (rad), as [`Real::sin_cos`] has each; only with AVX2.
+#[inline(always)]
+pub(crate) fn sin_cos_of_four(angles: __m256d) -> [__m256d; 2] {
+    let (sine, cosine) = Four(angles).sin_cos();
+    [sine.0, cosine.0]
+}
+
 /// Sines and cosines of angles (rad), as [`Real::sin_cos`] has each; only with AVX2. Angles beyond the last whole four are left.
 #[inline(always)]
 pub(crate) fn sin_cos_by_fours(angles: &[f64], sines: &mut [f64], cosines: &mut [f64]) {

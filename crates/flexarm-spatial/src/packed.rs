@@ -276,6 +276,11 @@ impl Space for Packed {
     }
 
     #[inline(always)]
+    fn sin_cos(angles: &Register) -> [Register; 2] {
+        crate::lanes::sin_cos_of_four(angles.0).map(Register)
+    }
+
+    #[inline(always)]
     fn mul(A: &[Register; 3], v: &Register) -> Register {
         Register::combined(A, *v)
     }

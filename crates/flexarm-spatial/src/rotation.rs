@@ -7,7 +7,7 @@
 
 use nalgebra::{Matrix3, Quaternion, Scalar, UnitQuaternion, Vector3};
 
-use crate::products::{add, add3, cross, dot, mul, mul3, scaled, scaled3};
+use crate::products::{add, add3, columns, cross, dot, mul3, scaled, scaled3};
 use crate::real::Real;
 use crate::space::Space;
 use crate::vectors::skew;
@@ -57,7 +57,8 @@ impl ElasticAngles {
         match self {
             Self::RotationVector => rotation_vector_motion(angles, rates),
             Self::EulerZyx => {
-                let kin = euler_zyx_kinematics(&S::components(angles), &S::components(rates));
+                let [sines, cosines] = S::sin_cos(angles);
+                let kin = euler_zyx(&S::components(&sines), &S::components(&cosines), &S::components(rates));
                 AngleMotion { R: S::both(&kin.R), B: S::both(&kin.B), bias: S::vector(&kin.bias) }
             }
         }
@@ -272,38 +273,46 @@ fn rotation_vector_motion<S: Space>(phi: &S::Vector, rates: &S::Vector) -> Angle
 #[inline(always)]
 fn euler_zyx_kinematics<T: Real>(angles: &Vector3<T>, rates: &Vector3<T>) -> AngleKinematics<T> {
     let ((sx, cx), (sy, cy), (sz, cz)) = (angles.x.sin_cos(), angles.y.sin_cos(), angles.z.sin_cos());
+    euler_zyx(&Vector3::new(sx, sy, sz), &Vector3::new(cx, cy, cz), rates)
+}
+
+/// From the sines and cosines of the angles.
+#[inline(always)]
+fn euler_zyx<T: Real>(sines: &Vector3<T>, cosines: &Vector3<T>, rates: &Vector3<T>) -> AngleKinematics<T> {
+    let (sx, sy, sz) = (sines.x, sines.y, sines.z);
+    let (cx, cy, cz) = (cosines.x, cosines.y, cosines.z);
+    let (sysx, sycx) = (sy * sx, sy * cx);
     let R = Matrix3::new(
         cz * cy,
-        cz * sy * sx - sz * cx,
-        cz * sy * cx + sz * sx,
+        cz * sysx - sz * cx,
+        cz * sycx + sz * sx,
         sz * cy,
-        sz * sy * sx + cz * cx,
-        sz * sy * cx - cz * sx,
+        sz * sysx + cz * cx,
+        sz * sycx - cz * sx,
         -sy,
         cy * sx,
         cy * cx,
     );
     let (zero, one) = (T::zero(), T::one());
     let B = Matrix3::new(one, zero, -sy, zero, cx, sx * cy, zero, -sx, cx * cy);
-    let Bdot = euler_zyx_rate_derivative(angles, rates);
-    AngleKinematics { R, B, bias: mul(&Bdot, rates) }
+    // The columns of dB/dt but the first, which is zero.
+    let [y, z] = euler_zyx_rate_columns((sx, cx), (sy, cy), rates);
+    AngleKinematics { R, B, bias: add(&scaled(&y, rates.y), &scaled(&z, rates.z)) }
+}
+
+/// Second and third column of `dB/dt`.
+#[inline(always)]
+fn euler_zyx_rate_columns<T: Real>((sx, cx): (T, T), (sy, cy): (T, T), rates: &Vector3<T>) -> [Vector3<T>; 2] {
+    [
+        Vector3::new(T::zero(), -sx * rates.x, -cx * rates.x),
+        Vector3::new(-cy * rates.y, cx * cy * rates.x - sx * sy * rates.y, -sx * cy * rates.x - cx * sy * rates.y),
+    ]
 }
 
 #[inline(always)]
 fn euler_zyx_rate_derivative<T: Real>(angles: &Vector3<T>, rates: &Vector3<T>) -> Matrix3<T> {
-    let zero = T::zero();
-    let ((sx, cx), (sy, cy)) = (angles.x.sin_cos(), angles.y.sin_cos());
-    Matrix3::new(
-        zero,
-        zero,
-        -cy * rates.y,
-        zero,
-        -sx * rates.x,
-        cx * cy * rates.x - sx * sy * rates.y,
-        zero,
-        -cx * rates.x,
-        -sx * cy * rates.x - cx * sy * rates.y,
-    )
+    let [y, z] = euler_zyx_rate_columns(angles.x.sin_cos(), angles.y.sin_cos(), rates);
+    columns(Vector3::from_element(T::zero()), y, z)
 }
 
 #[cfg(test)]

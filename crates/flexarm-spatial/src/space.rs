@@ -82,6 +82,9 @@ pub trait Space: Copy + Send + Sync + Debug + 'static {
     /// `aᵀ b`.
     fn dot(a: &Self::Vector, b: &Self::Vector) -> Self::Real;
 
+    /// Sines and cosines of three angles (rad).
+    fn sin_cos(angles: &Self::Vector) -> [Self::Vector; 2];
+
     /// `A v`.
     fn mul(A: &Self::Matrix, v: &Self::Vector) -> Self::Vector;
 
@@ -183,6 +186,12 @@ impl<T: Real> Space for Plain<T> {
     #[inline(always)]
     fn dot(a: &Vector3<T>, b: &Vector3<T>) -> T {
         dot(a, b)
+    }
+
+    #[inline(always)]
+    fn sin_cos(angles: &Vector3<T>) -> [Vector3<T>; 2] {
+        let ((sx, cx), (sy, cy), (sz, cz)) = (angles.x.sin_cos(), angles.y.sin_cos(), angles.z.sin_cos());
+        [Vector3::new(sx, sy, sz), Vector3::new(cx, cy, cz)]
     }
 
     #[inline(always)]
