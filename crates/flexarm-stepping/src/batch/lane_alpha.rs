@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::arm::FlexibleArm;
 use crate::batch::lane_arm::{LaneArm, set_lane};
-use crate::dense::{congruence, dot, larger, product, solve_in_place};
+use crate::dense::{congruence_quickly, dot, larger, product, solve_quickly};
 use crate::error::StepError;
 use crate::events::{IMPULSE_DEFECT, SLOW};
 use crate::implicit::{ImplicitStep, Newton, Search, Sizes};
@@ -491,14 +491,13 @@ impl Matrices {
 
     /// `M^-1 K` and the inverse of Newton's matrix from S and a run's C and K, as the dispersion correction of a single run has them; false
     /// if there is none.
-    #[inline(always)]
     fn invert(&mut self, c_h2: f64, C: &[f64], K: &[f64]) -> bool {
         let Self { n, S, product, L, turned, M_inverse_K, inverse } = self;
         let n = *n;
         L.copy_from_slice(S);
         M_inverse_K.copy_from_slice(K);
-        let positive = solve_in_place(L, M_inverse_K, n);
-        congruence(c_h2, M_inverse_K, C, n, [L, turned], product);
+        let positive = solve_quickly(L, M_inverse_K, n);
+        congruence_quickly(c_h2, M_inverse_K, C, n, [L, turned], product);
         // M + c h² K + S C Sᵀ, and Sᵀ on the right-hand side, which is kept transposed.
         for ((s, k), c) in S.iter_mut().zip(K).zip(product.iter()) {
             *s += c_h2 * *k;
@@ -511,7 +510,7 @@ impl Matrices {
         for (i, s) in inverse.iter_mut().zip(M_inverse_K.iter()) {
             *i += c_h2 * *s;
         }
-        solve_in_place(S, inverse, n) && positive
+        solve_quickly(S, inverse, n) && positive
     }
 }
 

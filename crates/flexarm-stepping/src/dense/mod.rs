@@ -3,87 +3,19 @@
 //! Over numbers or lanes of them. Sums have the order of the same operations in nalgebra, which a single run uses: each lane
 //! has its bits. What a [`Factor`] does is its own, for single poses and lanes alike.
 
+mod quick;
+mod sized;
+
 use flexarm_kinematics::Real;
 
-/// Loops over numbers, inlined down to them.
-pub(crate) trait Loops {
-    /// Does them.
-    fn run(self);
-}
-
-/// Runs loops with the vector instructions that the processor has. Operations and their order are the same with and without.
-#[inline(always)]
-pub(crate) fn quickly(loops: impl Loops) {
-    #[cfg(target_arch = "x86_64")]
-    {
-        struct Here<L>(L);
-        impl<L: Loops> flexarm_kinematics::packed::Loops for Here<L> {
-            #[inline(always)]
-            fn run(self) {
-                self.0.run();
-            }
-        }
-        flexarm_kinematics::packed::quickly(Here(loops));
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    loops.run();
-}
-
-/// `y = A x`, with the vector instructions that the processor has.
-pub(crate) fn product_of_numbers(A: &[f64], x: &[f64], y: &mut [f64]) {
-    struct Product<'a>(&'a [f64], &'a [f64], &'a mut [f64]);
-    impl Loops for Product<'_> {
-        #[inline(always)]
-        fn run(self) {
-            product(self.0, self.1, self.2);
-        }
-    }
-    quickly(Product(A, x, y));
-}
-
-/// [`solve_in_place`] with the vector instructions that the processor has.
-pub(crate) fn solve_quickly(A: &mut [f64], Bt: &mut [f64], n: usize) -> bool {
-    struct Solve<'a>(&'a mut [f64], &'a mut [f64], usize, &'a mut bool);
-    impl Loops for Solve<'_> {
-        #[inline(always)]
-        fn run(self) {
-            *self.3 = solve_in_place(self.0, self.1, self.2);
-        }
-    }
-    let mut positive = false;
-    quickly(Solve(A, Bt, n, &mut positive));
-    positive
-}
-
-/// [`congruence`] with the vector instructions that the processor has.
-pub(crate) fn congruence_quickly(c: f64, X: &[f64], C: &[f64], n: usize, room: [&mut [f64]; 2], product: &mut [f64]) {
-    struct Congruence<'a>(f64, &'a [f64], &'a [f64], usize, [&'a mut [f64]; 2], &'a mut [f64]);
-    impl Loops for Congruence<'_> {
-        #[inline(always)]
-        fn run(self) {
-            congruence(self.0, self.1, self.2, self.3, self.4, self.5);
-        }
-    }
-    quickly(Congruence(c, X, C, n, room, product));
-}
-
-/// `|x|`, with the vector instructions that the processor has.
-pub(crate) fn norm(x: &[f64]) -> f64 {
-    struct Square<'a>(&'a [f64], &'a mut f64);
-    impl Loops for Square<'_> {
-        #[inline(always)]
-        fn run(self) {
-            *self.1 = dot(self.0, self.0);
-        }
-    }
-    let mut square = 0.0;
-    quickly(Square(x, &mut square));
-    square.sqrt()
-}
+pub(crate) use quick::{Loops, congruence_quickly, largest_quickly, norm, product_of_numbers, quickly, solve_quickly};
 
 /// `y = A x`.
 #[inline(always)]
 pub(crate) fn product<T: Real>(A: &[T], x: &[T], y: &mut [T]) {
+    if sized::product(A, x, y) {
+        return;
+    }
     let Some((x_0, x)) = x.split_first() else { return };
     let (first, columns) = A.split_at(y.len());
     for (y, a) in y.iter_mut().zip(first) {
@@ -199,7 +131,7 @@ pub(crate) fn cholesky<T: Real>(A: &mut [T], n: usize) -> T {
 
 /// Replaces A by its factor and `Bᵀ` by `A^-1 B`; false if A is not positive definite.
 #[inline(always)]
-pub(crate) fn solve_in_place(A: &mut [f64], Bt: &mut [f64], n: usize) -> bool {
+fn solve_in_place(A: &mut [f64], Bt: &mut [f64], n: usize) -> bool {
     let positive = cholesky(A, n) == 1.0;
     solve_transposed(A, Bt, n);
     transpose(Bt, n);
@@ -240,7 +172,7 @@ fn subtract<T: Real>(to: &mut [T], factor: T, from: &[T]) {
 
 /// `S C Sᵀ` with `Sᵀ = 1 + c X` of a symmetric C; both rooms are as large.
 #[inline(always)]
-pub(crate) fn congruence(c: f64, X: &[f64], C: &[f64], n: usize, room: [&mut [f64]; 2], product: &mut [f64]) {
+fn congruence(c: f64, X: &[f64], C: &[f64], n: usize, room: [&mut [f64]; 2], product: &mut [f64]) {
     let [room, Xt] = room;
     if n == 0 {
         return;
@@ -303,20 +235,6 @@ pub(crate) fn largest_of_numbers(x: &[f64]) -> f64 {
     let all = larger(larger(most[0], most[1]), larger(most[2], most[3]));
     let finite = (broken[0] + broken[1]) + (broken[2] + broken[3]) == 0.0;
     if finite { all } else { f64::INFINITY }
-}
-
-/// [`largest_of_numbers`] with the vector instructions that the processor has.
-pub(crate) fn largest_quickly(x: &[f64]) -> f64 {
-    struct Largest<'a>(&'a [f64], &'a mut f64);
-    impl Loops for Largest<'_> {
-        #[inline(always)]
-        fn run(self) {
-            *self.1 = largest_of_numbers(self.0);
-        }
-    }
-    let mut largest = 0.0;
-    quickly(Largest(x, &mut largest));
-    largest
 }
 
 /// `A = L Lᵀ` of a symmetric matrix, in storage that is filled again and again.

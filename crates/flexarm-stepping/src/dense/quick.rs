@@ -1,0 +1,106 @@
+//! Small dense matrices and loops of single runs, with the vector instructions that the processor has. Operations and their order are the
+//! same with and without.
+
+use super::{congruence, dot, largest_of_numbers, product, sized, solve_in_place};
+
+/// Loops over numbers, inlined down to them.
+pub(crate) trait Loops {
+    /// Does them.
+    fn run(self);
+}
+
+/// Runs loops with the vector instructions that the processor has. Operations and their order are the same with and without.
+#[inline(always)]
+pub(crate) fn quickly(loops: impl Loops) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        struct Here<L>(L);
+        impl<L: Loops> flexarm_kinematics::packed::Loops for Here<L> {
+            #[inline(always)]
+            fn run(self) {
+                self.0.run();
+            }
+        }
+        flexarm_kinematics::packed::quickly(Here(loops));
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    loops.run();
+}
+
+/// `y = A x`, with the vector instructions that the processor has.
+pub(crate) fn product_of_numbers(A: &[f64], x: &[f64], y: &mut [f64]) {
+    struct Product<'a>(&'a [f64], &'a [f64], &'a mut [f64]);
+    impl Loops for Product<'_> {
+        #[inline(always)]
+        fn run(self) {
+            product(self.0, self.1, self.2);
+        }
+    }
+    quickly(Product(A, x, y));
+}
+
+/// `A ← L`, `Bᵀ ← A^-1 B`; false if A (n × n) is not positive definite; with the vector instructions that the processor has.
+pub(crate) fn solve_quickly(A: &mut [f64], Bt: &mut [f64], n: usize) -> bool {
+    struct Solve<'a>(&'a mut [f64], &'a mut [f64], usize, &'a mut bool);
+    impl Loops for Solve<'_> {
+        #[inline(always)]
+        fn run(self) {
+            let Self(A, Bt, n, positive) = self;
+            *positive = match n {
+                6 => sized::solve::<6>(A, Bt),
+                12 => sized::solve::<12>(A, Bt),
+                18 => sized::solve::<18>(A, Bt),
+                _ => solve_in_place(A, Bt, n),
+            };
+        }
+    }
+    let mut positive = false;
+    quickly(Solve(A, Bt, n, &mut positive));
+    positive
+}
+
+/// `S C Sᵀ` with `Sᵀ = 1 + c X` of a symmetric C (n × n); both rooms are as large; with the vector instructions that the processor has.
+pub(crate) fn congruence_quickly(c: f64, X: &[f64], C: &[f64], n: usize, room: [&mut [f64]; 2], product: &mut [f64]) {
+    struct Congruence<'a>(f64, &'a [f64], &'a [f64], usize, [&'a mut [f64]; 2], &'a mut [f64]);
+    impl Loops for Congruence<'_> {
+        #[inline(always)]
+        fn run(self) {
+            let Self(c, X, C, n, room, product) = self;
+            match n {
+                6 => sized::congruence::<6>(c, X, C, room, product),
+                12 => sized::congruence::<12>(c, X, C, room, product),
+                18 => sized::congruence::<18>(c, X, C, room, product),
+                _ => congruence(c, X, C, n, room, product),
+            }
+        }
+    }
+    quickly(Congruence(c, X, C, n, room, product));
+}
+
+/// `|x|`, with the vector instructions that the processor has.
+pub(crate) fn norm(x: &[f64]) -> f64 {
+    struct Square<'a>(&'a [f64], &'a mut f64);
+    impl Loops for Square<'_> {
+        #[inline(always)]
+        fn run(self) {
+            *self.1 = dot(self.0, self.0);
+        }
+    }
+    let mut square = 0.0;
+    quickly(Square(x, &mut square));
+    square.sqrt()
+}
+
+/// [`largest_of_numbers`] with the vector instructions that the processor has.
+pub(crate) fn largest_quickly(x: &[f64]) -> f64 {
+    struct Largest<'a>(&'a [f64], &'a mut f64);
+    impl Loops for Largest<'_> {
+        #[inline(always)]
+        fn run(self) {
+            *self.1 = largest_of_numbers(self.0);
+        }
+    }
+    let mut largest = 0.0;
+    quickly(Largest(x, &mut largest));
+    largest
+}
