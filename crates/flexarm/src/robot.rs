@@ -36,6 +36,9 @@ pub struct LoadOptions {
     pub urdf: ReadOptions,
 }
 
+/// A mechanism with the model that was made of it last.
+type KeptModel = Arc<Mutex<Option<(Mechanism, Arc<Model>)>>>;
+
 /// A loaded robot.
 #[derive(Clone, Debug)]
 pub struct Robot {
@@ -72,7 +75,7 @@ pub struct Robot {
     /// What only the text of the file shows.
     written: Vec<Caveat>,
     /// The last tree of the rigid robot, with the mechanism that it is of.
-    rigid_tree: Arc<Mutex<Option<(Mechanism, Arc<Model>)>>>,
+    rigid_tree: KeptModel,
 }
 
 impl Robot {

@@ -47,7 +47,7 @@ fn rows<T: Real, const N: usize, const R: usize>(A: &[T], x: &[T], first: usize,
 #[inline(always)]
 fn add<const N: usize>(to: &mut [f64; N], factor: f64, from: &[f64; N]) {
     for r in 0..N {
-        to[r] = from[r] * factor + to[r];
+        to[r] += from[r] * factor;
     }
 }
 
@@ -120,9 +120,10 @@ pub(super) fn congruence<const N: usize>(c: f64, X: &[f64], C: &[f64], room: [&m
 
 #[inline(always)]
 fn transpose<const N: usize>(A: &mut [[f64; N]; N]) {
-    for j in 0..N {
-        for i in j + 1..N {
-            (A[j][i], A[i][j]) = (A[i][j], A[j][i]);
+    let columns = *A;
+    for (j, row) in A.iter_mut().enumerate() {
+        for (entry, column) in row.iter_mut().zip(&columns) {
+            *entry = column[j];
         }
     }
 }
