@@ -171,15 +171,18 @@ impl Cholesky {
             at.map_or(unknown, |at| at[unknown] as usize)
         };
         let mut x: Vec<Row> = (0..self.figures.size).map(|k| B[place(k)]).collect();
-        triangular::solve(supernodes(&self.symbolic), &self.values, &mut x);
+        if let Some(supernodes) = supernodes(&self.symbolic) {
+            triangular::solve(supernodes, &self.values, &mut x);
+        }
         x.iter().enumerate().for_each(|(k, x)| B[place(k)] = *x);
     }
 }
 
-/// The blocks of the factor.
-fn supernodes(symbolic: &SymbolicCholesky<u32>) -> &SymbolicSupernodalCholesky<u32> {
+/// The blocks of the factor; none of a matrix without unknowns.
+fn supernodes(symbolic: &SymbolicCholesky<u32>) -> Option<&SymbolicSupernodalCholesky<u32>> {
     match symbolic.raw() {
-        SymbolicCholeskyRaw::Supernodal(raw) => raw,
+        SymbolicCholeskyRaw::Supernodal(raw) => Some(raw),
+        SymbolicCholeskyRaw::Simplicial(_) if symbolic.nrows() == 0 => None,
         SymbolicCholeskyRaw::Simplicial(_) => unreachable!("factors by blocks were asked for"),
     }
 }
@@ -196,7 +199,7 @@ fn smallest_pivot(symbolic: &SymbolicCholesky<u32>, values: &[f64], diagonal: &[
             smallest = (ratio, unknown);
         }
     };
-    let raw = supernodes(symbolic);
+    let Some(raw) = supernodes(symbolic) else { return smallest };
     for s in 0..raw.n_supernodes() {
         let columns = raw.supernode_begin()[s] as usize..raw.supernode_end()[s] as usize;
         let block = raw.col_ptr_for_val()[s] as usize..raw.col_ptr_for_val()[s + 1] as usize;
@@ -219,7 +222,8 @@ fn analyse(
         _ => None,
     };
     let parameters = CholeskySymbolicParams {
-        supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+        // Below every ratio: `FORCE_SUPERNODAL` is zero, which a diagonal matrix does not exceed.
+        supernodal_flop_ratio_threshold: SupernodalThreshold(f64::NEG_INFINITY),
         ..CholeskySymbolicParams::default()
     };
     let symbolic = match &dissected {
@@ -235,4 +239,37 @@ fn analyse(
     };
     let used = if dissected.is_some() { Ordering::NestedDissection } else { Ordering::MinimumDegree };
     symbolic.map(|symbolic| (symbolic, used)).map_err(|_| NotPositiveDefinite::OutOfMemory { entries: 0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Parts of `part` unknowns, each coupled to all others of its part and to none outside.
+    fn parts(n: usize, part: usize) -> SparseSymmetric {
+        let mut triplets = Vec::new();
+        for i in 0..n {
+            triplets.push((i as u32, i as u32, part as f64 + (i % 7) as f64));
+            triplets.extend((i / part * part..i).map(|j| (i as u32, j as u32, 0.5 + ((i * 3 + j) % 5) as f64 / 10.0)));
+        }
+        SparseSymmetric::from_triplets(n, &triplets)
+    }
+
+    #[test]
+    fn a_matrix_of_any_coupling_is_solved_also_a_diagonal_one_and_one_without_unknowns() {
+        for ordering in [Ordering::Auto, Ordering::MinimumDegree, Ordering::NestedDissection] {
+            for n in [0, 1, 2, 7, 60] {
+                for part in [1, 2, 3, 30, 60] {
+                    let K = parts(n, part);
+                    let factor = Cholesky::new(&K, ordering, Threads(1)).unwrap();
+                    let B = DMatrix::from_fn(n, 11, |i, j| ((i * 5 + j * 3) % 13) as f64 - 6.0);
+                    let mut X = B.clone();
+                    factor.solve_in_place(&mut X);
+                    let residual = (K.product(&X) - &B).iter().fold(0.0_f64, |most, r| most.max(r.abs()));
+                    assert!(residual < 1e-13, "{n} unknowns in parts of {part}: {residual:e}");
+                    assert_eq!(factor.smallest_pivot().0.is_finite(), n > 0);
+                }
+            }
+        }
+    }
 }

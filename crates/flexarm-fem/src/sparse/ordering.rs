@@ -36,10 +36,10 @@ impl Ordering {
 
 /// Order of elimination by nested dissection: `order[k]` is eliminated as number `k`.
 ///
-/// `None` where METIS declines (out of memory, or more than 2³¹ neighbours).
+/// `None` where METIS declines (out of memory, or more than 2³¹ neighbours), and where nothing is coupled: it divides by zero.
 pub(super) fn nested_dissection(pattern: &Pattern) -> Option<Vec<u32>> {
     let (group_of, groups) = group_equal_columns(pattern);
-    let graph = Graph::of_groups(pattern, &group_of, groups.len())?;
+    let graph = Graph::of_groups(pattern, &group_of, groups.len()).filter(Graph::has_edges)?;
     let order = metis_node_nd(graph, &groups.iter().map(|g| g.len() as i32).collect::<Vec<_>>())?;
     Some(order.into_iter().flat_map(|group| groups[group as usize].clone()).collect())
 }
@@ -107,6 +107,10 @@ impl Graph {
             }
         }
         Some(Self { starts, neighbours })
+    }
+
+    fn has_edges(&self) -> bool {
+        !self.neighbours.is_empty()
     }
 }
 
