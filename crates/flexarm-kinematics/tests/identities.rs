@@ -138,6 +138,39 @@ proptest! {
         }
     }
 
+    /// Poses, forces and energies of one pass over points are those of the recursions over spatial vectors, and packed vectors have the
+    /// bits of numbers. Measured 3e-13 of the forces, 2e-15 of a pose, 4e-15 of the energies.
+    #[test]
+    fn what_is_observed_in_one_pass_is_what_the_recursions_find(seed in any::<u64>(), n in 1usize..=40) {
+        // Balancers and links that bend in modes are not for it.
+        let Case { model, mut data, state, qddot, .. } = case((seed & !1) | 2, n);
+        let tau = inverse_dynamics(&model, &mut data, &state, &qddot).clone();
+        world_poses(&model, &mut data);
+        let truth = [kinetic_energy_of(&model, &data), potential_energy_of(&model, &data)];
+        let motions = Motions { q: state.q.as_slice(), qdot: state.qdot.as_slice(), qddot: qddot.as_slice() };
+        let seen = [Observer::plain(&model).unwrap(), Observer::new(&model).unwrap()].map(|mut observer| {
+            let (mut X_WB, mut tau) = (vec![Pose::identity(); model.bodies().len()], DVector::zeros(model.nv()));
+            let mut energies = [0.0; 2];
+            let observe = || {
+                energies = observer.observe(&model, motions, Some(&data.F_ext), &mut X_WB, tau.as_mut_slice());
+            };
+            assert_eq!(count_allocations(observe), 0);
+            (X_WB, tau, energies)
+        });
+        let [(X_WB, found, energies), packed] = &seen;
+        prop_assert!(*X_WB == packed.0 && *found == packed.1 && *energies == packed.2);
+        prop_assert!((found - &tau).amax() <= 1e-11 * tau.amax(), "{:e}", (found - &tau).amax() / tau.amax());
+        let size = X_WB.iter().map(|X| X.translation.vector.norm()).fold(1.0, f64::max);
+        for (X, truth) in X_WB.iter().zip(&data.X_WB) {
+            let shift = (X.translation.vector - truth.translation.vector).norm() / size;
+            let turn = (X.rotation.matrix() - truth.rotation.matrix()).amax();
+            prop_assert!(shift.max(turn) <= 1e-13, "{shift:e} {turn:e}");
+        }
+        let weight = model.moving_mass() * model.gravity.norm() * size;
+        prop_assert!((energies[0] - truth[0]).abs() <= 1e-12 * truth[0], "{:e}", energies[0] / truth[0] - 1.0);
+        prop_assert!((energies[1] - truth[1]).abs() <= 1e-13 * weight, "{:e}", (energies[1] - truth[1]) / weight);
+    }
+
     /// The tangent of the static forces, with loads that keep their direction and loads that turn along, is what central
     /// differences of them make; measured below 2e-8 of the largest entry, the error of the
     /// differences.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use flexarm_kinematics::{Model, Pose, kinetic_energy_of, potential_energy_of};
+use flexarm_kinematics::{Model, Pose};
 use nalgebra::{DVector, Vector6};
 
 use crate::arm::FlexibleArm;
@@ -56,7 +56,7 @@ impl Observation {
     }
 }
 
-/// Fills an observation from the reduced arm after [`ReducedArm::evaluate`].
+/// Fills an observation from the reduced arm.
 pub(crate) fn observe_reduced(
     system: &mut ReducedArm,
     t: f64,
@@ -65,7 +65,7 @@ pub(crate) fn observe_reduced(
     a: &DVector<f64>,
     out: &mut Observation,
 ) {
-    system.evaluate(t, x, v, a);
+    let [kinetic, potential] = system.observe(t, x, v, a, &mut out.X_WB);
     let (arm, data, state) = (&system.arm, &system.data, &system.state);
     let (n, driven) = (arm.model.n_actuated(), &arm.torque_driven);
     let (e, rates) = (&x.as_slice()[driven.len()..], &v.as_slice()[driven.len()..]);
@@ -73,7 +73,6 @@ pub(crate) fn observe_reduced(
     out.model.clone_from(&arm.model);
     out.q.copy_from(&state.q);
     out.qdot.copy_from(&state.qdot);
-    out.X_WB.copy_from_slice(&data.X_WB);
 
     // Drives: what the prescribed motion needs, what the controller holds.
     out.drive.copy_from(&data.tau.rows(0, n));
@@ -101,7 +100,7 @@ pub(crate) fn observe_reduced(
     out.power = [out.drive.dot(&out.qdot.rows(0, n)), loads.sum(), damping];
     out.impulse_work = system.struck;
     let elastic = gears.map_or_else(|| arm.elastic_energy(e), |gears| gears.energy(arm));
-    out.energy = [kinetic_energy_of(&arm.model, data), potential_energy_of(&arm.model, data), elastic];
+    out.energy = [kinetic, potential, elastic];
 }
 
 /// Loads `-(K e + D ė)` of the elements, their first six components; the power that the dampers take, `ėᵀ D ė` (W).

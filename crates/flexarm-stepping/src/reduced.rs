@@ -8,8 +8,8 @@
 //! its samples. What happens at discrete times is in `events`. Not here: integration.
 
 use flexarm_kinematics::{
-    Data, FreeForces, JointMotion, Motions, Roles, State, Wrench, forward_kinematics, hybrid_dynamics,
-    inverse_dynamics, mass_matrix_at_poses, world_poses,
+    Data, FreeForces, JointMotion, Motions, Observer, Pose, Roles, State, Wrench, forward_kinematics, hybrid_dynamics,
+    inverse_dynamics, kinetic_energy_of, mass_matrix_at_poses, potential_energy_of, world_poses,
 };
 use nalgebra::{Cholesky, DMatrix, DMatrixView, DVector, Dyn};
 
@@ -58,8 +58,20 @@ pub struct ReducedArm {
     modes: Option<HeldModes>,
     /// The equations of motion of the free coordinates alone, where they are enough and the tree is for it.
     points: Option<FreeForces>,
-    /// Whether the last motion was that of a residual by `points`, which leaves no poses in `data`.
-    of_residual: bool,
+    poses: Poses,
+    /// What a run is shown comes from it, if the tree is for it; made with the first observation.
+    observer: Option<Option<Observer>>,
+}
+
+/// Where the poses of the state are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Poses {
+    /// In `data`.
+    InData,
+    /// In `points`, after a residual.
+    InPoints,
+    /// In neither, after an observation.
+    Nowhere,
 }
 
 /// Which of the free coordinates are modes that are eliminated first.
@@ -138,7 +150,8 @@ impl ReducedArm {
             tree: ElasticTree::that_pays(&arm),
             modes: HeldModes::that_pay(&arm),
             points: if geometric { None } else { points },
-            of_residual: false,
+            poses: Poses::InData,
+            observer: None,
             arm,
         }
     }
@@ -214,11 +227,14 @@ impl ReducedArm {
         if let Some(points) = &mut self.points {
             points.weigh(&self.arm.model);
         }
+        if let Some(Some(observer)) = &mut self.observer {
+            observer.weigh(&self.arm.model);
+        }
     }
 
-    /// Poses of the state into `data`, where a residual left none.
+    /// Poses of the state into `data`, where a residual or an observation left none.
     fn place(&mut self) {
-        if self.of_residual {
+        if self.poses != Poses::InData {
             forward_kinematics(&self.arm.model, &mut self.data, &self.state.q);
         }
     }
@@ -319,17 +335,48 @@ impl ReducedArm {
     pub(crate) fn evaluate(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>, a: &DVector<f64>) {
         self.set(t, x, v);
         self.set_accelerations(a);
-        self.of_residual = false;
+        self.poses = Poses::InData;
         inverse_dynamics(&self.arm.model, &mut self.data, &self.state, &self.qddot);
-        match &self.gears {
-            Some(_) => self.add_gear_torques(x, v),
-            None => {
-                for k in 0..self.arm.model.n_actuated() {
-                    self.data.tau[k] += self.arm.friction_torque(k, self.state.qdot[k]);
-                }
-            }
-        }
+        self.add_joint_torques(x, v);
         world_poses(&self.arm.model, &mut self.data);
+    }
+
+    /// As [`ReducedArm::evaluate`], with the poses into `X_WB` and no twists; kinetic energy and potential energy of gravity (J).
+    pub(crate) fn observe(
+        &mut self,
+        t: f64,
+        x: &DVector<f64>,
+        v: &DVector<f64>,
+        a: &DVector<f64>,
+        X_WB: &mut [Pose],
+    ) -> [f64; 2] {
+        let is_plain = self.points.is_some() && self.arm.loads.is_empty();
+        let make = || if is_plain { Observer::new(&self.arm.model) } else { None };
+        let Some(mut observer) = self.observer.take().unwrap_or_else(make) else {
+            self.observer = Some(None);
+            self.evaluate(t, x, v, a);
+            X_WB.copy_from_slice(&self.data.X_WB);
+            return [kinetic_energy_of(&self.arm.model, &self.data), potential_energy_of(&self.arm.model, &self.data)];
+        };
+        self.set(t, x, v);
+        self.set_accelerations(a);
+        self.poses = Poses::Nowhere;
+        let Self { arm, data, state, qddot, .. } = self;
+        let motions = Motions { q: state.q.as_slice(), qdot: state.qdot.as_slice(), qddot: qddot.as_slice() };
+        let energies = observer.observe(&arm.model, motions, None, X_WB, data.tau.as_mut_slice());
+        self.observer = Some(Some(observer));
+        self.add_joint_torques(x, v);
+        energies
+    }
+
+    /// What friction and gears add to the forces of the actuated joints in `data.tau`, in the state that was set.
+    fn add_joint_torques(&mut self, x: &DVector<f64>, v: &DVector<f64>) {
+        if self.gears.is_some() {
+            return self.add_gear_torques(x, v);
+        }
+        for k in 0..self.arm.model.n_actuated() {
+            self.data.tau[k] += self.arm.friction_torque(k, self.state.qdot[k]);
+        }
     }
 
     /// Torques that the controller holds now, in the order of [`FlexibleArm::torque_driven`]; empty without one.
@@ -435,7 +482,7 @@ impl SecondOrderSystem for ReducedArm {
                 let motions = Motions { q: state.q.as_slice(), qdot: state.qdot.as_slice(), qddot: qddot.as_slice() };
                 let loads = (!arm.loads.is_empty()).then_some(data.F_ext.as_slice());
                 points.compute(motions, loads, r.as_mut_slice());
-                self.of_residual = true;
+                self.poses = Poses::InPoints;
             }
             None => {
                 inverse_dynamics(&arm.model, data, state, qddot);
@@ -458,7 +505,7 @@ impl SecondOrderSystem for ReducedArm {
         a: &mut DVector<f64>,
     ) -> Result<(), StepError> {
         self.set(t, x, v);
-        self.of_residual = false;
+        self.poses = Poses::InData;
         let mut forces = std::mem::replace(&mut self.geometric_force, DVector::zeros(0));
         for pass in 0..GEOMETRIC_PASSES {
             forces.fill(0.0);
@@ -487,11 +534,12 @@ impl SecondOrderSystem for ReducedArm {
     }
 
     fn mass(&mut self, M: &mut DMatrix<f64>) {
-        if self.of_residual
+        if self.poses == Poses::InPoints
             && let Some(points) = &mut self.points
         {
             return points.mass(M.as_mut_slice());
         }
+        self.place();
         mass_matrix_at_poses(&self.arm.model, &mut self.data);
         for (column, &l) in self.free.iter().enumerate() {
             for (row, &k) in self.free.iter().enumerate() {

@@ -16,11 +16,12 @@
 //! other one not even in that.
 //!
 //! Start at [`PointTree`], the recursion over any [`Space`], or at [`FreeForces`], which is it over one state in the quickest space of the
-//! processor. Trees with closed loops, balancers or bodies that bend in modes are not for it.
+//! processor; [`Observer`] is it for all coordinates, with poses and energies. Trees with closed loops, balancers or bodies that bend in modes are not for it.
 //!
 //! Source: [Luh, Walker & Paul 1980].
 
 mod node;
+mod observed;
 
 use flexarm_spatial::space::{Fixed, Plain, Space};
 use flexarm_spatial::{Pose, Real, Wrench};
@@ -30,6 +31,7 @@ use crate::data::pose;
 use crate::lanes::Tree;
 use crate::model::Model;
 use node::{Composite, Moving, Node, NodeJoint};
+pub use observed::Observer;
 
 /// Motion of all coordinates: positions, velocities and accelerations.
 #[derive(Clone, Copy, Debug)]

@@ -220,6 +220,22 @@ impl<S: Space> Node<S> {
         }
     }
 
+    /// ṗ, P axes, of a joint that shifts its body.
+    #[inline(always)]
+    pub(super) fn shift_rate(&self, qdot: &[S::Real]) -> Option<S::Vector> {
+        let k = self.coordinate;
+        match &self.joint {
+            NodeJoint::Turns { along: None, .. } => None,
+            NodeJoint::Turns { along: Some(along), .. } | NodeJoint::Slides { along } => {
+                Some(S::scaled(&S::fixed(along), S::Real::splat(self.ratio) * qdot[k]))
+            }
+            NodeJoint::Elastic { is_parallel, .. } => {
+                let rate = S::vector(&Vector3::new(qdot[k], qdot[k + 1], qdot[k + 2]));
+                Some(if *is_parallel { rate } else { S::turn(&self.R_PJ, &rate) })
+            }
+        }
+    }
+
     /// (1) to (3).
     #[inline(always)]
     pub(super) fn follow(&mut self, parent: &Moving<S>, rates: &JointRates<S>) -> Moving<S> {

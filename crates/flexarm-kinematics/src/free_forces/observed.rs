@@ -1,0 +1,197 @@
+//! All that a run is shown of a tree at an instant, in one pass outward behind the recursion of the module above.
+//!
+//! ```text
+//!   v_B  = R_BP (v_P + ω_P × p + ṗ)                              (7)   v: velocity of Bo, B axes
+//!   T    = Σ m v·v / 2 + v·(ω × h) + ω·I ω / 2                   (8)
+//!   R_WB = R_WP R_PB,   p_WB = p_WP + R_WP p,   Σ R_WB h + m p_WB (9)
+//! ```
+
+use flexarm_spatial::space::{Fixed, Plain, Space};
+use flexarm_spatial::{Pose, Wrench};
+use nalgebra::Vector3;
+
+use super::{Motions, PointTree};
+use crate::aba::Roles;
+use crate::data::{pose, rotor_energy};
+use crate::model::Model;
+
+/// A body as (7) and (9) find it.
+#[derive(Clone, Copy, Debug)]
+struct Placed<S: Space> {
+    R: S::Both,
+    p: S::Vector,
+    v: S::Vector,
+}
+
+/// A tree all of whose coordinates count, with what is found of its bodies.
+#[derive(Clone, Debug)]
+struct ObservedTree<S: Space> {
+    tree: PointTree<S>,
+    placed: Vec<Placed<S>>,
+}
+
+/// Sums over the bodies: kinetic energy without rotors, first moment about the world origin.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    kinetic: f64,
+    moment: Vector3<f64>,
+}
+
+impl<S: Space<Real = f64>> ObservedTree<S> {
+    #[inline(always)]
+    fn of(model: &Model) -> Option<Self> {
+        let tree = PointTree::of(model, &Roles::all_free(model))?;
+        let zero = S::fixed(&Fixed::default());
+        let placed = Placed { R: S::dyad_both(&zero, &zero, &zero, 1.0), p: zero, v: zero };
+        Some(Self { placed: vec![placed; model.bodies.len() - 1], tree })
+    }
+
+    #[inline(always)]
+    fn observe(
+        &mut self,
+        motions: Motions<'_, f64>,
+        loads: Option<&[Wrench]>,
+        X_WB: &mut [Pose],
+        tau: &mut [f64],
+    ) -> Sums {
+        self.tree.forces(motions, loads, tau);
+        let zero = S::fixed(&Fixed::default());
+        let (mut kinetic, mut moment) = (0.0, zero);
+        for (i, node) in self.tree.nodes.iter().enumerate() {
+            let mut v = node.shift_rate(motions.qdot).unwrap_or(zero);
+            let (mut R, mut p) = (node.R, node.p);
+            if let Some(parent) = node.parent {
+                let (omega, parent) = (&self.tree.nodes[parent].moving.omega, &self.placed[parent]);
+                v = S::add(&S::add(&parent.v, &S::cross(omega, &p)), &v);
+                p = S::add(&parent.p, &S::turn(&parent.R, &p));
+                R = S::turned(&parent.R, &R);
+            }
+            v = S::turn_back(&node.R, &v);
+            let omega = &node.moving.omega;
+            let own = node.mass * S::dot(&v, &v) + S::dot(omega, &S::mul(&node.I, omega));
+            kinetic += 0.5 * own + S::dot(&v, &S::cross(omega, &node.h));
+            moment = S::add(&moment, &S::add(&S::turn(&R, &node.h), &S::scaled(&p, node.mass)));
+            X_WB[i + 1] = pose(S::entries(&R), S::components(&p));
+            self.placed[i] = Placed { R, p, v };
+        }
+        Sums { kinetic, moment: S::components(&moment) }
+    }
+}
+
+/// Inverse dynamics, poses and energies of a tree in one go, in the quickest vectors of the processor; the same bits in all.
+pub struct Observer(Way);
+
+enum Way {
+    /// Over numbers.
+    Plain(Box<ObservedTree<Plain<f64>>>),
+    /// In registers.
+    #[cfg(target_arch = "x86_64")]
+    Packed(packed::Room),
+}
+
+impl Observer {
+    /// `None` of trees with closed loops, balancers or bodies that bend in modes.
+    pub fn new(model: &Model) -> Option<Self> {
+        #[cfg(target_arch = "x86_64")]
+        if let Some(room) = packed::Room::new(packed::Make(model)) {
+            return Some(Self(Way::Packed(room)));
+        }
+        Self::plain(model)
+    }
+
+    /// Over numbers, whatever the processor has.
+    pub fn plain(model: &Model) -> Option<Self> {
+        Some(Self(Way::Plain(Box::new(ObservedTree::of(model)?))))
+    }
+
+    /// Poses of all bodies in the world into `X_WB`, generalised forces of all coordinates (N m or N) into `tau`; kinetic energy,
+    /// rotors included, and potential energy of gravity, zero at the world origin (J). They are those of [`crate::inverse_dynamics`],
+    /// [`crate::world_poses`], [`crate::kinetic_energy_of`] and [`crate::potential_energy_of`], to rounding. O(n), no allocation.
+    ///
+    /// * `loads`: external wrench on each body at Bo, B axes, if there are any; they are subtracted.
+    pub fn observe(
+        &mut self,
+        model: &Model,
+        motions: Motions<'_, f64>,
+        loads: Option<&[Wrench]>,
+        X_WB: &mut [Pose],
+        tau: &mut [f64],
+    ) -> [f64; 2] {
+        X_WB[0] = Pose::identity();
+        let Sums { kinetic, moment } = match &mut self.0 {
+            Way::Plain(tree) => tree.observe(motions, loads, X_WB, tau),
+            #[cfg(target_arch = "x86_64")]
+            Way::Packed(room) => {
+                let mut sums = Sums::default();
+                room.run(packed::Observe { motions, loads, X_WB, tau, sums: &mut sums });
+                sums
+            }
+        };
+        [kinetic + rotor_energy(model, motions.qdot), -model.gravity.dot(&moment)]
+    }
+
+    /// The model has other inertias than before, and is else the same.
+    pub fn weigh(&mut self, model: &Model) {
+        match &mut self.0 {
+            Way::Plain(tree) => tree.tree.weigh(model),
+            #[cfg(target_arch = "x86_64")]
+            Way::Packed(room) => room.run(packed::Weigh(model)),
+        }
+    }
+}
+
+/// The pass in registers.
+#[cfg(target_arch = "x86_64")]
+mod packed {
+    use flexarm_spatial::packed::{Keeps, Kept, OverPacked, PackedRoom};
+    use flexarm_spatial::space::Space;
+    use flexarm_spatial::{Pose, Wrench};
+
+    use super::{Motions, ObservedTree, Sums};
+    use crate::model::Model;
+
+    pub(super) type Room = PackedRoom<Tree>;
+
+    /// What is kept.
+    pub(super) struct Tree;
+
+    impl Kept for Tree {
+        type Of<S: Space<Real = f64>> = ObservedTree<S>;
+    }
+
+    /// Makes it.
+    pub(super) struct Make<'a>(pub(super) &'a Model);
+
+    impl Keeps<Tree> for Make<'_> {
+        #[inline(always)]
+        fn make<S: Space<Real = f64>>(self) -> Option<ObservedTree<S>> {
+            ObservedTree::of(self.0)
+        }
+    }
+
+    /// See [`super::Observer::observe`].
+    pub(super) struct Observe<'a> {
+        pub(super) motions: Motions<'a, f64>,
+        pub(super) loads: Option<&'a [Wrench]>,
+        pub(super) X_WB: &'a mut [Pose],
+        pub(super) tau: &'a mut [f64],
+        pub(super) sums: &'a mut Sums,
+    }
+
+    impl OverPacked<Tree> for Observe<'_> {
+        #[inline(always)]
+        fn run<S: Space<Real = f64>>(self, tree: &mut ObservedTree<S>) {
+            *self.sums = tree.observe(self.motions, self.loads, self.X_WB, self.tau);
+        }
+    }
+
+    /// See [`super::Observer::weigh`].
+    pub(super) struct Weigh<'a>(pub(super) &'a Model);
+
+    impl OverPacked<Tree> for Weigh<'_> {
+        #[inline(always)]
+        fn run<S: Space<Real = f64>>(self, tree: &mut ObservedTree<S>) {
+            tree.tree.weigh(self.0);
+        }
+    }
+}
