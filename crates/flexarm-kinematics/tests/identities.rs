@@ -155,10 +155,21 @@ proptest! {
                 energies = observer.observe(&model, motions, Some(&data.F_ext), &mut X_WB, tau.as_mut_slice());
             };
             assert_eq!(count_allocations(observe), 0);
-            (X_WB, tau, energies)
+            let motions: Vec<_> = (1..model.bodies().len()).map(|body| observer.motion(body)).collect();
+            (X_WB, tau, energies, motions)
         });
-        let [(X_WB, found, energies), packed] = &seen;
-        prop_assert!(*X_WB == packed.0 && *found == packed.1 && *energies == packed.2);
+        let [(X_WB, found, energies, moving), packed] = &seen;
+        prop_assert!(*X_WB == packed.0 && *found == packed.1 && *energies == packed.2 && *moving == packed.3);
+        let r = Vector3::new(0.3, -0.2, 0.5);
+        for ((moving, V), A) in moving.iter().zip(&data.V[1..]).zip(&data.A[1..]) {
+            let velocity = V.linear + V.angular.cross(&r);
+            let error = (moving.velocity(&r) - velocity).norm() / velocity.norm();
+            prop_assert!(error <= 1e-12, "velocity {error:e}");
+            // Spatial acceleration + w × v is that of the point.
+            let acceleration = A.linear + A.angular.cross(&r) + V.angular.cross(&velocity);
+            let error = (moving.acceleration(&r) - acceleration).norm() / acceleration.norm().max(9.0);
+            prop_assert!(error <= 1e-12, "acceleration {error:e}");
+        }
         prop_assert!((found - &tau).amax() <= 1e-11 * tau.amax(), "{:e}", (found - &tau).amax() / tau.amax());
         let size = X_WB.iter().map(|X| X.translation.vector.norm()).fold(1.0, f64::max);
         for (X, truth) in X_WB.iter().zip(&data.X_WB) {

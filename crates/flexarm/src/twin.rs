@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use flexarm_kinematics::{
-    Data, Frame, Model, State, forward_kinematics_velocity, frame_jacobian, frame_twist, inverse_dynamics, world_poses,
+    Data, Frame, Model, Motions, Observer, State, forward_kinematics, forward_kinematics_velocity, frame_jacobian,
+    frame_twist, inverse_dynamics, world_poses,
 };
 use flexarm_stepping::FlexibleArm;
 use nalgebra::{DVector, Matrix6xX, Vector3};
@@ -21,6 +22,8 @@ pub(crate) struct RigidTwin {
     pub(crate) acceleration: Vector3<f64>,
     /// What stands where, and how it moves, in [`Self::data`] and [`Self::J`]; `None` where other functions were there last.
     placed: Option<(Arc<Model>, State)>,
+    /// Forces come from it, if the tree is for it, with the inertias of this model; made with the first forces.
+    observer: Option<(Arc<Model>, Option<Observer>)>,
 }
 
 impl RigidTwin {
@@ -34,6 +37,7 @@ impl RigidTwin {
             velocity: Vector3::zeros(),
             acceleration: Vector3::zeros(),
             placed: None,
+            observer: None,
         }
     }
 
@@ -76,6 +80,16 @@ impl RigidTwin {
         self.placed = None;
         let model = &arm.model;
         arm.prescribed_state(t, &mut self.state, &mut self.qddot);
+        if tcp.body > 0 && self.observe(model) {
+            frame_jacobian(model, &self.data, tcp, &mut self.J);
+            if let Some((_, Some(observer))) = &mut self.observer {
+                let (moving, R) = (observer.motion(tcp.body), self.data.X_WB[tcp.body].rotation);
+                let r = &tcp.X_BF.translation.vector;
+                self.velocity = R * moving.velocity(r);
+                self.acceleration = R * moving.acceleration(r) + model.gravity;
+            }
+            return;
+        }
         inverse_dynamics(model, &mut self.data, &self.state, &self.qddot);
         world_poses(model, &mut self.data);
         self.look_at_tool(arm, tcp);
@@ -84,5 +98,23 @@ impl RigidTwin {
         let A = self.data.A[tcp.body].at_child(&tcp.X_BF);
         let R = self.data.X_WB[tcp.body].rotation * tcp.X_BF.rotation;
         self.acceleration = R * (A.linear + V.angular.cross(&V.linear)) + model.gravity;
+    }
+
+    /// Poses in the world and forces of the state into `data`, in one pass; false where the tree is not for it.
+    fn observe(&mut self, model: &Arc<Model>) -> bool {
+        let Self { data, state, qddot, observer, .. } = self;
+        let (weighed, observer) = observer.get_or_insert_with(|| {
+            // What the Jacobian needs of springs, which stay as they are.
+            forward_kinematics(model, data, &state.q);
+            (model.clone(), Observer::new(model))
+        });
+        let Some(observer) = observer else { return false };
+        if !Arc::ptr_eq(weighed, model) {
+            observer.weigh(model);
+            weighed.clone_from(model);
+        }
+        let motions = Motions { q: state.q.as_slice(), qdot: state.qdot.as_slice(), qddot: qddot.as_slice() };
+        observer.observe(model, motions, None, &mut data.X_WB, data.tau.as_mut_slice());
+        true
     }
 }

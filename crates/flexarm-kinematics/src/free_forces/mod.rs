@@ -31,7 +31,7 @@ use crate::data::pose;
 use crate::lanes::Tree;
 use crate::model::Model;
 use node::{Composite, Moving, Node, NodeJoint};
-pub use observed::Observer;
+pub use observed::{BodyMotion, Observer};
 
 /// Motion of all coordinates: positions, velocities and accelerations.
 #[derive(Clone, Copy, Debug)]

@@ -30,6 +30,31 @@ struct ObservedTree<S: Space> {
     placed: Vec<Placed<S>>,
 }
 
+/// How a body moves, B axes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BodyMotion {
+    /// Velocity of Bo (m/s).
+    pub v: Vector3<f64>,
+    /// Angular velocity (rad/s).
+    pub omega: Vector3<f64>,
+    /// Acceleration of the point Bo less gravity (m/s²).
+    pub a: Vector3<f64>,
+    /// Angular acceleration (rad/s²).
+    pub alpha: Vector3<f64>,
+}
+
+impl BodyMotion {
+    /// Velocity of a point r of the body (m/s).
+    pub fn velocity(&self, r: &Vector3<f64>) -> Vector3<f64> {
+        self.v + self.omega.cross(r)
+    }
+
+    /// Acceleration of a point r of the body less gravity (m/s²).
+    pub fn acceleration(&self, r: &Vector3<f64>) -> Vector3<f64> {
+        self.a + self.alpha.cross(r) + self.omega.cross(&self.omega.cross(r))
+    }
+}
+
 /// Sums over the bodies: kinetic energy without rotors, first moment about the world origin.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums {
@@ -75,6 +100,15 @@ impl<S: Space<Real = f64>> ObservedTree<S> {
             self.placed[i] = Placed { R, p, v };
         }
         Sums { kinetic, moment: S::components(&moment) }
+    }
+
+    /// Of a body other than the world.
+    #[inline(always)]
+    fn motion(&self, body: usize) -> BodyMotion {
+        let moving = &self.tree.nodes[body - 1].moving;
+        let [v, omega, a, alpha] =
+            [&self.placed[body - 1].v, &moving.omega, &moving.a, &moving.alpha].map(S::components);
+        BodyMotion { v, omega, a, alpha }
     }
 }
 
@@ -130,6 +164,22 @@ impl Observer {
         [kinetic + rotor_energy(model, motions.qdot), -model.gravity.dot(&moment)]
     }
 
+    /// How a body moved in the last observation.
+    ///
+    /// # Panics
+    /// If the body is not one of the tree, or is the world.
+    pub fn motion(&mut self, body: usize) -> BodyMotion {
+        match &mut self.0 {
+            Way::Plain(tree) => tree.motion(body),
+            #[cfg(target_arch = "x86_64")]
+            Way::Packed(room) => {
+                let mut motion = BodyMotion::default();
+                room.run(packed::Motion(body, &mut motion));
+                motion
+            }
+        }
+    }
+
     /// The model has other inertias than before, and is else the same.
     pub fn weigh(&mut self, model: &Model) {
         match &mut self.0 {
@@ -147,7 +197,7 @@ mod packed {
     use flexarm_spatial::space::Space;
     use flexarm_spatial::{Pose, Wrench};
 
-    use super::{Motions, ObservedTree, Sums};
+    use super::{BodyMotion, Motions, ObservedTree, Sums};
     use crate::model::Model;
 
     pub(super) type Room = PackedRoom<Tree>;
@@ -182,6 +232,16 @@ mod packed {
         #[inline(always)]
         fn run<S: Space<Real = f64>>(self, tree: &mut ObservedTree<S>) {
             *self.sums = tree.observe(self.motions, self.loads, self.X_WB, self.tau);
+        }
+    }
+
+    /// See [`super::Observer::motion`].
+    pub(super) struct Motion<'a>(pub(super) usize, pub(super) &'a mut BodyMotion);
+
+    impl OverPacked<Tree> for Motion<'_> {
+        #[inline(always)]
+        fn run<S: Space<Real = f64>>(self, tree: &mut ObservedTree<S>) {
+            *self.1 = tree.motion(self.0);
         }
     }
 

@@ -21,7 +21,7 @@ use crate::tail_file::TailFile;
 /// Uncompressed size at which a chunk is closed, and the same for chunks behind so many bytes: the list of chunks is in memory
 /// until the file ends, and is part of each provisional end.
 const CHUNK_BYTES: usize = 1 << 20;
-const LONG_CHUNK_BYTES: usize = 4 * CHUNK_BYTES;
+const LONG_CHUNK_BYTES: usize = 2 * CHUNK_BYTES;
 const LONG_FILE_BYTES: u64 = 64 << 20;
 
 /// Level of zstd. On chunks of runs level 1 takes half the time of level 3, which is zstd's own choice, and 2 % more room;
@@ -129,7 +129,7 @@ impl Output {
         }
         let records = self.chunk.records();
         self.compressed.clear();
-        self.compressed.reserve(compress_bound(records.len()));
+        self.compressed.reserve_exact(compress_bound(records.len()));
         self.compressor.compress_to_buffer(records, &mut self.compressed)?;
         let compressed = self.compressed.as_slice();
         let mut bytes = std::mem::take(&mut self.bytes);

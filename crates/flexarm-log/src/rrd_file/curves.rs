@@ -5,7 +5,7 @@ use crate::rerun::{Color, EntityPath};
 
 use super::colors::{axis, faint, series, total};
 use super::path;
-use super::stream::{Ids, StreamError};
+use super::stream::{Ids, Put, StreamError};
 use super::tracks::{ScalarTrack, Seen};
 use crate::{RunHeader, Sample};
 
@@ -126,21 +126,19 @@ impl Curves {
         self.error.iter().chain(&self.causes).map(|track| track.style(ids)).collect()
     }
 
-    /// Chunks of the rows that wait.
-    pub(crate) fn rows(
+    /// Chunks of the rows of the error that wait.
+    pub(crate) fn error_rows(&self, ids: &mut Ids, times: &[TimeColumn], put: &mut Put<'_>) -> Result<(), StreamError> {
+        self.error.iter().try_for_each(|track| put(track.chunk(ids, times)?))
+    }
+
+    /// Chunks of the rows of all else that wait.
+    pub(crate) fn cause_rows(
         &self,
         ids: &mut Ids,
-        times: &[TimeColumn],
         pose_times: &[TimeColumn],
-        chunks: &mut Vec<Chunk>,
+        put: &mut Put<'_>,
     ) -> Result<(), StreamError> {
-        for track in &self.error {
-            chunks.push(track.chunk(ids, times)?);
-        }
-        for track in &self.causes {
-            chunks.extend(track.waiting().then(|| track.chunk(ids, pose_times)).transpose()?);
-        }
-        Ok(())
+        self.causes.iter().filter(|track| track.waiting()).try_for_each(|track| put(track.chunk(ids, pose_times)?))
     }
 
     /// Where each group of curves is, how high and low it goes, and its names.
@@ -148,8 +146,12 @@ impl Curves {
         self.error.iter().chain(&self.causes).map(ScalarTrack::seen)
     }
 
-    pub(crate) fn clear(&mut self) {
-        self.error.iter_mut().chain(&mut self.causes).for_each(ScalarTrack::clear);
+    pub(crate) fn clear_errors(&mut self) {
+        self.error.iter_mut().for_each(ScalarTrack::clear);
+    }
+
+    pub(crate) fn clear_causes(&mut self) {
+        self.causes.iter_mut().for_each(ScalarTrack::clear);
     }
 }
 

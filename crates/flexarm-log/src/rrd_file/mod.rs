@@ -25,7 +25,7 @@ use crate::rerun::{EntityPath, StoreId, TextDocument, TimePoint, Timeline, ViewC
 use re_log_types::StoreKind;
 
 use self::layout::{Part, PlotPlace};
-use self::run::{RunTracks, Seat};
+use self::run::{Rows, RunTracks, Seat};
 use self::stream::{Ids, RrdStream, StreamError};
 use self::tracks::{SIM_TIME, Seen};
 use crate::create::FlushClock;
@@ -42,10 +42,11 @@ pub(crate) const RESULT_ENTITY: [&str; 2] = ["recording", "result.json"];
 
 /// Samples of a chunk: enough for compression, few enough for quick reading.
 const CHUNK_ROWS: usize = 1024;
-/// So many times rows are committed before the run is a long one, and samples of its chunks from then on. The list of all
-/// chunks is in memory until the file ends; rows that wait are, too.
-const SHORT_COMMITS: usize = 64;
+/// So many times rows are committed before the run is a long one, and samples and poses of its chunks from then on. The list of
+/// all chunks is in memory until the file ends; rows that wait are, too.
+const SHORT_COMMITS: usize = 16;
 const LONG_CHUNK_ROWS: usize = 8 * CHUNK_ROWS;
+const LONG_CHUNK_POSES: usize = 4 * CHUNK_ROWS;
 
 /// Writes a run as a Rerun recording.
 ///
@@ -222,7 +223,7 @@ impl RunWriter {
         for scenery in &header.scenery {
             scenery::write(store, scenery)?;
         }
-        store.stream.set_tail(&store.recording, &[])?;
+        store.stream.set_tail(&store.recording, |_| Ok(()))?;
         let has_layout = matches!(seat, Seat::Alone | Seat::InStudy(0, _));
         let layout = has_layout.then(|| window::window(header, &seat, labels));
         // Surfaces and files are in the recording now.
@@ -248,10 +249,18 @@ impl RunWriter {
             store.append_all(ids, &tools)?;
         }
         self.tracks.push((time_ns, i64::try_from(sample.step).unwrap_or(i64::MAX)), sample);
-        let is_long = self.commits >= SHORT_COMMITS;
-        if self.tracks.waiting() >= if is_long { LONG_CHUNK_ROWS } else { CHUNK_ROWS } {
-            self.commit(store)?;
-        } else if is_long {
+        let [samples, poses] = self.tracks.waiting();
+        if self.commits < SHORT_COMMITS {
+            if samples >= CHUNK_ROWS {
+                self.commit(store, Rows::All)?;
+            }
+        } else {
+            if samples >= LONG_CHUNK_ROWS {
+                self.commit(store, Rows::OfSamples)?;
+            }
+            if poses >= LONG_CHUNK_POSES {
+                self.commit(store, Rows::OfPoses)?;
+            }
             let mut ids = *store.stream.ids();
             let chunks = self.tracks.take_large(&mut ids)?;
             store.append_all(ids, &chunks)?;
@@ -261,19 +270,21 @@ impl RunWriter {
         } else {
             // The rows that wait, and the ways so far, as a provisional end.
             let mut ids = *store.stream.ids();
-            let mut chunks = self.tracks.rows(&mut ids)?;
-            chunks.extend(self.tracks.ways(&mut ids)?);
-            store.stream.set_tail(&store.recording, &chunks)?;
+            store.stream.set_tail(&store.recording, |put| {
+                self.tracks.rows(Rows::All, &mut ids, put)?;
+                self.tracks.ways(&mut ids)?.into_iter().try_for_each(put)
+            })?;
             store.flush.done();
         }
         Ok(())
     }
 
-    fn commit(&mut self, store: &mut Store) -> Result<(), StreamError> {
-        let mut ids = *store.stream.ids();
-        let chunks = self.tracks.rows(&mut ids)?;
-        store.append_all(ids, &chunks)?;
-        self.tracks.clear();
+    fn commit(&mut self, store: &mut Store, which: Rows) -> Result<(), StreamError> {
+        let Store { stream, recording, .. } = store;
+        let mut ids = *stream.ids();
+        self.tracks.rows(which, &mut ids, &mut |chunk| stream.append(recording, &chunk))?;
+        *stream.ids() = ids;
+        self.tracks.clear(which);
         self.commits += 1;
         Ok(())
     }
@@ -298,7 +309,7 @@ impl RunWriter {
     fn finish(&mut self, store: &mut Store, result: &RunResult) -> Result<(), StreamError> {
         self.layout(store, None)?;
         self.tracks.close();
-        self.commit(store)?;
+        self.commit(store, Rows::All)?;
         store.seen.extend(self.tracks.seen());
         let mut ids = *store.stream.ids();
         let mut chunks = self.tracks.ways(&mut ids)?;

@@ -7,7 +7,7 @@ use flexarm_kinematics::{Pose, rotation_vector};
 use nalgebra::{Point3, Vector3};
 
 use super::colors::{self, ColorScale};
-use super::stream::{Ids, StreamError};
+use super::stream::{Ids, Put, StreamError};
 use super::tracks::{Instant, PoseTrack, ShapeTrack, SkeletonTrack, TintTrack, Track, point};
 use super::{link_part, path};
 use crate::{LinkMesh, RunHeader, Sample, TwinSample};
@@ -256,11 +256,8 @@ impl RobotTracks {
     }
 
     /// Chunks of the rows that wait.
-    pub(crate) fn rows(&self, ids: &mut Ids, chunks: &mut Vec<Chunk>) -> Result<(), StreamError> {
-        for track in self.tracks() {
-            chunks.extend(track.chunk(ids)?);
-        }
-        Ok(())
+    pub(crate) fn rows(&self, ids: &mut Ids, put: &mut Put<'_>) -> Result<(), StreamError> {
+        self.tracks().try_for_each(|track| track.chunk(ids)?.map_or(Ok(()), &mut *put))
     }
 
     /// Chunks of bent surfaces whose rows that wait take much room; forgets these rows.

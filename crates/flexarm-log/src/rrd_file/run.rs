@@ -2,8 +2,8 @@
 
 use crate::rerun::Chunk;
 use crate::rerun::{
-    Color, EntityPath, LineStrip3D, LineStrips3D, Points3D, Scalars, SeriesPoints, TextDocument, TextLog, TimePoint,
-    Timeline,
+    Color, EntityPath, LineStrip3D, LineStrips3D, Points3D, Scalars, SeriesPoints, TextDocument, TextLog, TimeColumn,
+    TimePoint, Timeline,
 };
 
 use super::colors::{self, ColorScale};
@@ -11,10 +11,10 @@ use super::curves::{Curves, size};
 use super::eye::{Eye, eye};
 use super::path;
 use super::robot::{Look, Paint, RobotTracks};
-use super::stream::{Ids, StreamError};
+use super::stream::{Ids, Put, StreamError};
 use super::tracks::{ArrowTrack, Instant, PathTrack, SIM_TIME, Seen, Times, Track, point};
 use crate::plot_room::Envelope;
-use crate::{EventKind, RunHeader, RunResult, Sample, TwinSample};
+use crate::{Event, EventKind, RunHeader, RunResult, Sample, TwinSample};
 use flexarm_draw::Magnifier;
 
 /// Shortest time between two poses (ns): every sample of a run logged at up to 200 Hz, fewer of faster ones. Curves have all.
@@ -43,6 +43,26 @@ impl Seat {
             Self::Alone => None,
             Self::InStudy(k, _) => Some(colors::series(*k)),
         }
+    }
+}
+
+/// Which of the rows that wait.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Rows {
+    /// Those that come with every sample: curves of the error.
+    OfSamples,
+    /// Those that come with poses: robots, and all other curves.
+    OfPoses,
+    All,
+}
+
+impl Rows {
+    fn of_samples(self) -> bool {
+        self != Self::OfPoses
+    }
+
+    fn of_poses(self) -> bool {
+        self != Self::OfSamples
     }
 }
 
@@ -300,29 +320,28 @@ impl RunTracks {
         seen
     }
 
-    /// Rows that wait, as of the number of samples.
-    pub(crate) fn waiting(&self) -> usize {
-        self.times.rows()
+    /// Samples whose rows wait, and poses.
+    pub(crate) fn waiting(&self) -> [usize; 2] {
+        [self.times.rows(), self.pose_times.rows()]
     }
 
     /// Chunks of the rows that wait.
-    pub(crate) fn rows(&self, ids: &mut Ids) -> Result<Vec<Chunk>, StreamError> {
-        let mut chunks = Vec::new();
-        if self.times.rows() == 0 {
-            return Ok(chunks);
+    pub(crate) fn rows(&self, which: Rows, ids: &mut Ids, put: &mut Put<'_>) -> Result<(), StreamError> {
+        let curves = || self.curves.iter().chain(&self.study_curves);
+        if which.of_poses() && self.pose_times.rows() > 0 {
+            let drawn = std::iter::once(&self.flexible).chain(&self.rigid).chain(&self.magnified);
+            drawn.filter_map(|drawn| drawn.robot.as_ref()).try_for_each(|robot| robot.rows(ids, put))?;
+            if let Some(arrow) = self.arrow.as_ref().map(|arrow| arrow.chunk(ids)).transpose()?.flatten() {
+                put(arrow)?;
+            }
+            let times = self.pose_times.columns();
+            curves().try_for_each(|curves| curves.cause_rows(ids, &times, put))?;
         }
-        let drawn = std::iter::once(&self.flexible).chain(&self.rigid).chain(&self.magnified);
-        for robot in drawn.filter_map(|drawn| drawn.robot.as_ref()) {
-            robot.rows(ids, &mut chunks)?;
+        if which.of_samples() && self.times.rows() > 0 {
+            let times = self.times.columns();
+            curves().try_for_each(|curves| curves.error_rows(ids, &times, put))?;
         }
-        if let Some(arrow) = &self.arrow {
-            chunks.extend(arrow.chunk(ids)?);
-        }
-        let (times, pose_times) = (self.times.columns(), self.pose_times.columns());
-        for curves in self.curves.iter().chain(&self.study_curves) {
-            curves.rows(ids, &times, &pose_times, &mut chunks)?;
-        }
-        Ok(chunks)
+        Ok(())
     }
 
     /// Chunks of surfaces whose rows that wait take much room; forgets these rows.
@@ -336,15 +355,27 @@ impl RunTracks {
         Ok(chunks)
     }
 
-    /// Forgets the rows that wait; they have been written.
-    pub(crate) fn clear(&mut self) {
-        self.times.clear();
-        self.pose_times.clear();
-        for drawn in std::iter::once(&mut self.flexible).chain(&mut self.rigid).chain(&mut self.magnified) {
-            drawn.robot.iter_mut().for_each(RobotTracks::clear);
+    /// Forgets rows that wait; they have been written.
+    pub(crate) fn clear(&mut self, which: Rows) {
+        let curves = self.curves.iter_mut().chain(&mut self.study_curves);
+        if which.of_samples() {
+            self.times.clear();
         }
-        self.arrow.iter_mut().for_each(Track::clear);
-        self.curves.iter_mut().chain(&mut self.study_curves).for_each(Curves::clear);
+        if which.of_poses() {
+            self.pose_times.clear();
+            for drawn in std::iter::once(&mut self.flexible).chain(&mut self.rigid).chain(&mut self.magnified) {
+                drawn.robot.iter_mut().for_each(RobotTracks::clear);
+            }
+            self.arrow.iter_mut().for_each(Track::clear);
+        }
+        for curves in curves {
+            if which.of_samples() {
+                curves.clear_errors();
+            }
+            if which.of_poses() {
+                curves.clear_causes();
+            }
+        }
     }
 
     /// The ways of the tool so far.
@@ -384,24 +415,28 @@ impl RunTracks {
             }
         }
         if self.curves.is_some() {
-            for event in &result.events {
-                let level = match event.kind {
-                    EventKind::Stopped => "ERROR",
-                    EventKind::Limit => "WARN",
-                    EventKind::MoveStart
-                    | EventKind::MoveEnd
-                    | EventKind::Load
-                    | EventKind::Peak
-                    | EventKind::Settled => "INFO",
-                };
-                let text = TextLog::new(event.text.as_str()).with_level(level);
-                let time_ns = (event.time_s * 1e9).round() as i64;
-                let when = TimePoint::default().with(Timeline::new_duration(SIM_TIME), time_ns);
-                chunks.push(ids.single(&path(["events"]), &when, &text)?);
-            }
+            chunks.extend(events(&result.events, ids)?);
         }
         Ok(chunks)
     }
+}
+
+/// What happened when, as one chunk.
+fn events(events: &[Event], ids: &mut Ids) -> Result<Option<Chunk>, StreamError> {
+    if events.is_empty() {
+        return Ok(None);
+    }
+    let level = |event: &Event| match event.kind {
+        EventKind::Stopped => "ERROR",
+        EventKind::Limit => "WARN",
+        EventKind::MoveStart | EventKind::MoveEnd | EventKind::Load | EventKind::Peak | EventKind::Settled => "INFO",
+    };
+    let times = events.iter().map(|event| (event.time_s * 1e9).round() as i64);
+    let texts = TextLog::update_fields()
+        .with_many_text(events.iter().map(|event| event.text.as_str()))
+        .with_many_level(events.iter().map(level));
+    let times = [TimeColumn::new_duration_nanos(SIM_TIME, times)];
+    ids.columns(&path(["events"]), &times, texts.columns_of_unit_batches()?).map(Some)
 }
 
 fn peak_label(error_m: f64, (nanoseconds, _): Instant) -> String {

@@ -37,6 +37,9 @@ pub(crate) enum StreamError {
 
 type Result<T> = std::result::Result<T, StreamError>;
 
+/// Takes chunks one after another, so that they need not all be in memory.
+pub(crate) type Put<'a> = dyn FnMut(Chunk) -> Result<()> + 'a;
+
 /// Identifiers for chunks and rows, in the order of writing.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Ids(u64);
@@ -190,25 +193,29 @@ impl RrdStream {
         manifest.append(|list| list.append(&batch, span, uncompressed))
     }
 
-    /// Writes out everything, with these chunks as the provisional end, and a footer: what a killed run leaves is a whole
+    /// Writes out everything, with what `chunks` puts as the provisional end, and a footer: what a killed run leaves is a whole
     /// file. Beyond [`MOST_LISTED`] chunks the footer is left out, which the format allows.
-    pub(crate) fn set_tail(&mut self, store: &StoreId, chunks: &[Chunk]) -> Result<()> {
+    pub(crate) fn set_tail(&mut self, store: &StoreId, chunks: impl FnOnce(&mut Put<'_>) -> Result<()>) -> Result<()> {
         let position = self.file.position();
         let (mut tail, mut builder) = (Vec::new(), RrdManifestBuilder::default());
-        for chunk in chunks {
+        let is_listed = self.manifests.iter().all(|(_, manifest)| manifest.is_listed());
+        chunks(&mut |chunk| {
             let start = position + (tail.len() + MessageHeader::ENCODED_SIZE_BYTES) as u64;
             let batch = chunk.to_chunk_batch()?;
-            let (bytes, uncompressed) = encode(&arrow_message(store, chunk, (&batch).into()))?;
+            let (bytes, uncompressed) = encode(&arrow_message(store, &chunk, (&batch).into()))?;
             tail.extend(bytes);
-            let span = Span::from_start_end(start, position + tail.len() as u64);
-            builder.append(&batch, span, uncompressed)?;
-        }
-        if self.manifests.iter().any(|(_, manifest)| !manifest.is_listed()) {
+            if is_listed {
+                builder.append(&batch, Span::from_start_end(start, position + tail.len() as u64), uncompressed)?;
+            }
+            Ok(())
+        })?;
+        if !is_listed {
             return Ok(self.file.set_tail(&tail)?);
         }
+        let has_end = !tail.is_empty();
         let mut manifests = Vec::new();
         for (known, manifest) in &mut self.manifests {
-            let ends_here = *known == *store && !chunks.is_empty();
+            let ends_here = *known == *store && has_end;
             let end = if ends_here { std::mem::take(&mut builder) } else { RrdManifestBuilder::default() };
             manifests.extend(manifest.so_far(known, end, ends_here)?);
         }

@@ -114,7 +114,8 @@ impl Recorder for StudySeat {
         match (shared.as_mut(), self.run.take()) {
             (Some(store), Some(mut run)) => {
                 // Into the file at once: the next run may take long, or fail.
-                let written = run.finish(store, result).and_then(|()| store.stream.set_tail(&store.recording, &[]));
+                let written =
+                    run.finish(store, result).and_then(|()| store.stream.set_tail(&store.recording, |_| Ok(())));
                 written.map_err(stream_error(&self.path, "write the end of a run"))
             }
             _ => Err(LogError::not_open(&self.path, "finish")),
