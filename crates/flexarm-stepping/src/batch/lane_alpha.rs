@@ -185,7 +185,8 @@ impl<T: Real> LaneAlpha<T> {
         }
         let [qdot, qddot] = all.arm.joint_rates();
         all.joints.begin(qdot, qddot);
-        all.arm.place_joints();
+        // Poses of the joints, before any step.
+        all.arm.residual(T::one(), &all.x, &all.v, &all.acceleration, &mut all.r);
         all.a.copy_from_slice(&all.acceleration);
         all.x_tilde.copy_from_slice(&all.acceleration);
         all.previous.copy_from_slice(&all.acceleration);
