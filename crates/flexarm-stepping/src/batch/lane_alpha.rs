@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::arm::FlexibleArm;
 use crate::batch::lane_arm::{LaneArm, set_lane};
-use crate::dense::{congruence_quickly, dot, larger, product, solve_quickly};
+use crate::dense::{change_and_product, congruence_quickly, dot, larger, product, solve_quickly};
 use crate::error::StepError;
 use crate::events::{IMPULSE_DEFECT, SLOW};
 use crate::implicit::{ImplicitStep, Newton, Search, Sizes};
@@ -20,7 +20,7 @@ use crate::motion::PrescribedMotion;
 use crate::reduced::ReducedArm;
 use crate::statics::static_equilibrium;
 use crate::stepper::{LARGEST_DEFLECTION, Start};
-use crate::steppers::{AlphaSettings, Coefficients, Course, FOLLOWED_TO, GeneralizedAlpha, add, follows, leave_of};
+use crate::steppers::{AlphaSettings, Coefficients, Course, FOLLOWED_TO, GeneralizedAlpha, follows, leave_of};
 use crate::system::SecondOrderSystem;
 
 /// Parts of a step.
@@ -128,6 +128,8 @@ pub(super) struct LaneAlpha<T: Real> {
     inverse: Vec<T>,
     /// What a step adds to both, by their courses.
     changes: [Vec<T>; 2],
+    /// Whether each of them still lacks what this step adds: that comes with its next product.
+    behind: [bool; 2],
     /// Workspaces of the matrices.
     S: Vec<T>,
     matrices: Matrices,
@@ -174,6 +176,7 @@ impl<T: Real> LaneAlpha<T> {
             M_inverse_K: square(),
             inverse: square(),
             changes: [square(), square()],
+            behind: [false; 2],
             S: square(),
             matrices: Matrices::new(n),
         };
@@ -307,7 +310,7 @@ impl<T: Real> LaneAlpha<T> {
         }
     }
 
-    /// The matrices of the next step, where they are followed.
+    /// What the next step adds to the matrices that are followed.
     #[inline(always)]
     fn follow(&mut self) {
         for (k, lane) in self.lanes.iter_mut().enumerate() {
@@ -316,8 +319,7 @@ impl<T: Real> LaneAlpha<T> {
                 set_lane(&mut self.changes[1], k, &change[1]);
             }
         }
-        add(&mut self.inverse, &self.changes[0]);
-        add(&mut self.M_inverse_K, &self.changes[1]);
+        self.behind = [true; 2];
     }
 
     /// 1 in the lanes that fulfil a condition, else 0.
@@ -370,7 +372,10 @@ impl<T: Real> LaneAlpha<T> {
     /// As in a single run, where `active` is 1.
     #[inline(always)]
     fn place(&mut self, active: T) {
-        product(&self.M_inverse_K, &self.trial, &mut self.shift);
+        match std::mem::take(&mut self.behind[1]) {
+            true => change_and_product(&mut self.M_inverse_K, &self.changes[1], &self.trial, &mut self.shift),
+            false => product(&self.M_inverse_K, &self.trial, &mut self.shift),
+        }
         let h = self.grid.step_size();
         for k in 0..self.x.len() {
             let x_tilde = T::splat(self.c_h2) * self.shift[k] + self.trial[k];
@@ -385,7 +390,10 @@ impl<T: Real> LaneAlpha<T> {
     #[inline(always)]
     fn correct(&mut self, active: T) -> T {
         let zero = T::zero();
-        product(&self.inverse, &self.r, &mut self.d);
+        match std::mem::take(&mut self.behind[0]) {
+            true => change_and_product(&mut self.inverse, &self.changes[0], &self.r, &mut self.d),
+            false => product(&self.inverse, &self.r, &mut self.d),
+        }
         let norm = dot(&self.d, &self.d).sqrt();
         for d in &mut self.d {
             *d = picked(active, zero, *d);
@@ -442,6 +450,10 @@ impl<T: Real> LaneAlpha<T> {
     /// Mostly it is one lane, so matrices are factorised one by one: there the instructions go along the columns.
     #[inline(always)]
     fn factor(&mut self, wanted: T) {
+        debug_assert_eq!(
+            self.behind, [false; 2],
+            "a matrix is renewed after the first correction of a step at the earliest"
+        );
         self.arm.mass(&mut self.S);
         for k in (0..T::LANES).filter(|k| wanted.lane(*k) == 1.0) {
             let (lane, matrices) = (&mut self.lanes[k], &mut self.matrices);
