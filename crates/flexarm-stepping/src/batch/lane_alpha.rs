@@ -377,12 +377,17 @@ impl<T: Real> LaneAlpha<T> {
             false => product(&self.M_inverse_K, &self.trial, &mut self.shift),
         }
         let h = self.grid.step_size();
-        for k in 0..self.x.len() {
-            let x_tilde = T::splat(self.c_h2) * self.shift[k] + self.trial[k];
-            let (x, v) = self.coefficients.advance(h, self.x[k], self.v[k], self.a[k], self.x_tilde[k], x_tilde);
-            self.x_tilde_new[k] = picked(active, self.x_tilde_new[k], x_tilde);
-            self.x_new[k] = picked(active, self.x_new[k], x);
-            self.v_new[k] = picked(active, self.v_new[k], v);
+        let c_h2 = T::splat(self.c_h2);
+        let n = self.trial.len();
+        let (x, v, a, x_tilde) = (&self.x[..n], &self.v[..n], &self.a[..n], &self.x_tilde[..n]);
+        let (shift, x_tilde_new) = (&self.shift[..n], &mut self.x_tilde_new[..n]);
+        let (x_new, v_new) = (&mut self.x_new[..n], &mut self.v_new[..n]);
+        for (k, trial) in self.trial.iter().enumerate() {
+            let new = c_h2 * shift[k] + *trial;
+            let (place, speed) = self.coefficients.advance(h, x[k], v[k], a[k], x_tilde[k], new);
+            x_tilde_new[k] = picked(active, x_tilde_new[k], new);
+            x_new[k] = picked(active, x_new[k], place);
+            v_new[k] = picked(active, v_new[k], speed);
         }
     }
 
@@ -400,15 +405,18 @@ impl<T: Real> LaneAlpha<T> {
         }
         product(&self.M_inverse_K, &self.d, &mut self.shift);
         let (c_D, c_K) = self.coefficients.derivatives(self.grid.step_size());
-        let mut sizes = LaneSizes { norm, correction: zero, acceleration: zero, place: zero };
-        for k in 0..self.d.len() {
-            let d = self.d[k];
-            let d_tilde = d + T::splat(self.c_h2) * self.shift[k];
-            self.trial[k] -= d;
-            self.x_tilde_new[k] -= d_tilde;
-            self.x_new[k] -= T::splat(c_K) * d_tilde;
-            self.v_new[k] -= T::splat(c_D) * d_tilde;
-            sizes.include(d, self.trial[k], self.x_new[k]);
+        let (c_h2, c_D, c_K) = (T::splat(self.c_h2), T::splat(c_D), T::splat(c_K));
+        let mut sizes = LaneSizes { norm, correction: zero, broken: zero, acceleration: zero, place: zero };
+        let n = self.d.len();
+        let (shift, trial, x_tilde) = (&self.shift[..n], &mut self.trial[..n], &mut self.x_tilde_new[..n]);
+        let (x, v) = (&mut self.x_new[..n], &mut self.v_new[..n]);
+        for (k, d) in self.d.iter().enumerate() {
+            let d_tilde = *d + c_h2 * shift[k];
+            trial[k] -= *d;
+            x_tilde[k] -= d_tilde;
+            x[k] -= c_K * d_tilde;
+            v[k] -= c_D * d_tilde;
+            sizes.include(*d, trial[k], x[k]);
         }
         self.judge(active, &sizes)
     }
@@ -531,6 +539,8 @@ impl Matrices {
 struct LaneSizes<T> {
     norm: T,
     correction: T,
+    /// Zero, or not a number where some correction is none.
+    broken: T,
     acceleration: T,
     place: T,
 }
@@ -538,9 +548,9 @@ struct LaneSizes<T> {
 impl<T: Real> LaneSizes<T> {
     #[inline(always)]
     fn include(&mut self, correction: T, acceleration: T, place: T) {
-        // Zero, or not a number: that stays in a sum and passes by in a largest value.
-        let broken = correction * T::zero();
-        self.correction = larger(self.correction, correction.abs()) + broken;
+        // What is not a number stays in a sum, and passes by in a largest value.
+        self.broken += correction * T::zero();
+        self.correction = larger(self.correction, correction.abs());
         self.acceleration = larger(self.acceleration, acceleration.abs());
         self.place = larger(self.place, place.abs());
     }
@@ -548,7 +558,7 @@ impl<T: Real> LaneSizes<T> {
     #[inline(always)]
     fn lane(&self, k: usize) -> Sizes {
         let mut sizes = Sizes::of(self.norm.lane(k));
-        sizes.include(self.correction.lane(k), self.acceleration.lane(k), self.place.lane(k));
+        sizes.include(self.correction.lane(k) + self.broken.lane(k), self.acceleration.lane(k), self.place.lane(k));
         sizes
     }
 }

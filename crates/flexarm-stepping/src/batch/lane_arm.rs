@@ -155,14 +155,17 @@ impl<T: Real> LaneArm<T> {
         let (x, v) = (&self.state.q.as_slice()[n..], &self.state.qdot.as_slice()[n..]);
         for element in &self.elements {
             let range = element.first..element.first + element.size;
+            let (x, v, r) = (&x[range.clone()], &v[range.clone()], &mut r[range]);
             let y = &mut self.shifted[..element.size];
-            y.copy_from_slice(&x[range.clone()]);
-            if self.D.is_none() {
-                for (y, v) in y.iter_mut().zip(&v[range.clone()]) {
-                    *y += element.tau * *v;
+            match self.D.is_none() {
+                true => {
+                    for ((y, x), v) in y.iter_mut().zip(x).zip(v) {
+                        *y = *x + element.tau * *v;
+                    }
                 }
+                false => y.copy_from_slice(x),
             }
-            add_product(&element.K, y, &mut r[range]);
+            add_product(&element.K, y, r);
         }
         if let Some(D) = &self.D {
             add_product(D, v, r);

@@ -44,7 +44,9 @@ pub(crate) fn change_and_product<T: Real>(A: &mut [T], B: &[T], x: &[T], y: &mut
 /// `y += A x`.
 #[inline(always)]
 pub(crate) fn add_product<T: Real>(A: &[T], x: &[T], y: &mut [T]) {
-    add_columns(A, x.iter().copied(), y);
+    if !sized::add_product(A, x, y) {
+        add_columns(A, x.iter().copied(), y);
+    }
 }
 
 /// `y -= A x`.

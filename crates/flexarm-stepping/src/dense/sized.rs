@@ -43,6 +43,22 @@ fn rows<T: Real, const N: usize, const R: usize>(A: &[T], x: &[T], first: usize,
     true
 }
 
+/// `y += A x` of a spring of six coordinates; false where the size is another one.
+#[inline(always)]
+pub(super) fn add_product<T: Real>(A: &[T], x: &[T], y: &mut [T]) -> bool {
+    let (Some(A), Some(x), Ok(y)) = (columns::<T, 6>(A), x.first_chunk::<6>(), <&mut [T; 6]>::try_from(y)) else {
+        return false;
+    };
+    let mut sums = *y;
+    for k in 0..6 {
+        for r in 0..6 {
+            sums[r] = A[k][r] * x[k] + sums[r];
+        }
+    }
+    *y = sums;
+    true
+}
+
 /// `A ← A + B`, then `y = A x`; false where the size is another one.
 #[inline(always)]
 pub(super) fn change_and_product<T: Real>(A: &mut [T], B: &[T], x: &[T], y: &mut [T]) -> bool {
