@@ -9,7 +9,7 @@ use std::sync::Arc;
 use flexarm_spatial::products::{add, lift, lift3, mul};
 use flexarm_spatial::space::Plain;
 use flexarm_spatial::{ElasticAngles, Pose, Real, SpatialInertia};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use crate::aba::Roles;
 use crate::axis_motion::AxisMotion;
@@ -102,16 +102,10 @@ pub fn point_tree<T: Real>(tree: &LaneTree<T>, roles: &Roles) -> Option<PointTre
     PointTree::of(tree, roles)
 }
 
-/// [`crate::FreeForces::compute`] without loads; the poses of bodies on joints of one coordinate are in `data.X_PB` after it.
+/// [`crate::FreeForces::compute`] without loads.
 #[inline(always)]
-pub fn free_forces<T: Real>(
-    points: &mut PointTree<Plain<T>>,
-    data: &mut Data<T>,
-    motions: Motions<'_, T>,
-    tau: &mut [T],
-) {
+pub fn free_forces<T: Real>(points: &mut PointTree<Plain<T>>, motions: Motions<'_, T>, tau: &mut [T]) {
     points.forces(motions, None, tau);
-    points.poses_of_axes(&mut data.X_PB);
 }
 
 /// [`crate::FreeForces::mass`], at the poses of the last [`free_forces`].
@@ -175,25 +169,67 @@ pub fn static_tangent<T: Real>(
 /// For the poses of the joints that the last algorithm left in `data`, at the same joint coordinates; the elastic ones may be others.
 #[inline(always)]
 pub fn rigid_and_flexible<T: Real>(tree: &LaneTree<T>, data: &Data<T>, frame: &Frame, q: &[T]) -> [Vector3<T>; 2] {
-    let model = tree.model();
-    let own = lift(&frame.X_BF.translation.vector);
-    let [mut rigid, mut flexible] = [own; 2];
+    places(
+        tree.model(),
+        frame,
+        q,
+        #[inline(always)]
+        |i| (data.X_PB[i].rotation.matrix(), &data.X_PB[i].translation.vector),
+    )
+}
+
+/// [`rigid_and_flexible`] for the poses of the joints of the last [`free_forces`].
+#[inline(always)]
+pub fn rigid_and_flexible_of_points<T: Real>(
+    tree: &LaneTree<T>,
+    points: &PointTree<Plain<T>>,
+    frame: &Frame,
+    q: &[T],
+) -> [Vector3<T>; 2] {
+    places(
+        tree.model(),
+        frame,
+        q,
+        #[inline(always)]
+        |i| points.pose(i),
+    )
+}
+
+/// Both places, where a body on a joint of one coordinate has this rotation and origin in its parent.
+#[inline(always)]
+fn places<'a, T: Real>(
+    model: &Model,
+    frame: &Frame,
+    q: &[T],
+    pose: impl Fn(usize) -> (&'a Matrix3<T>, &'a Vector3<T>),
+) -> [Vector3<T>; 2] {
+    let mut rigid = lift(&frame.X_BF.translation.vector);
     let mut i = frame.body;
+    // Outward of all springs both are the same.
+    while i > 0 {
+        let body = &model.bodies[i];
+        if body.elastic || !matches!(body.motion, JointMotion::Axis(_) | JointMotion::Welded) {
+            break;
+        }
+        rigid = carried(pose(i), &rigid);
+        i = body.parent;
+    }
+    let mut flexible = rigid;
     while i > 0 {
         let body = &model.bodies[i];
         let elastic = match body.motion {
             // A spring of one coordinate.
             JointMotion::Axis(motion) if body.elastic => {
-                let value = q[body.coordinate];
-                rigid = carried(&along_axis(body, motion, T::zero()), &rigid);
-                flexible = carried(&along_axis(body, motion, value), &flexible);
+                let [still, moved] =
+                    [along_axis(body, motion, T::zero()), along_axis(body, motion, q[body.coordinate])];
+                rigid = carried((still.rotation.matrix(), &still.translation.vector), &rigid);
+                flexible = carried((moved.rotation.matrix(), &moved.translation.vector), &flexible);
                 i = body.parent;
                 continue;
             }
             JointMotion::Axis(_) | JointMotion::Welded => {
-                let X_PB = &data.X_PB[i];
-                rigid = carried(X_PB, &rigid);
-                flexible = carried(X_PB, &flexible);
+                rigid = carried(pose(i), &rigid);
+                flexible = carried(pose(i), &flexible);
                 i = body.parent;
                 continue;
             }
@@ -212,8 +248,8 @@ pub fn rigid_and_flexible<T: Real>(tree: &LaneTree<T>, data: &Data<T>, frame: &F
         };
         // The joint frame in the parent holds for both.
         let (R_PJ, p_PJ) = (lift3(body.X_PJ.rotation.matrix()), lift(&body.X_PJ.translation.vector));
-        rigid = add(&p_PJ, &mul(&R_PJ, &rigid));
-        flexible = add(&p_PJ, &mul(&R_PJ, &elastic));
+        rigid = carried((&R_PJ, &p_PJ), &rigid);
+        flexible = carried((&R_PJ, &p_PJ), &elastic);
         i = body.parent;
     }
     [rigid, flexible]
@@ -230,6 +266,6 @@ pub(crate) fn along_axis<T: Real>(body: &Body, motion: AxisMotion, coordinate: T
 
 /// A point of B in P.
 #[inline(always)]
-fn carried<T: Real>(X_PB: &Pose<T>, p: &Vector3<T>) -> Vector3<T> {
-    add(&X_PB.translation.vector, &mul(X_PB.rotation.matrix(), p))
+fn carried<T: Real>((R_PB, p_PB): (&Matrix3<T>, &Vector3<T>), p: &Vector3<T>) -> Vector3<T> {
+    add(p_PB, &mul(R_PB, p))
 }

@@ -7,9 +7,10 @@
 #![allow(unsafe_code, reason = "vector instructions, which are called where they were found to be there")]
 
 use std::arch::x86_64::{
-    __m256d, __m512d, _CMP_LT_OQ, _mm256_add_pd, _mm256_blendv_pd, _mm256_cmp_pd, _mm256_div_pd, _mm256_movemask_pd,
-    _mm256_mul_pd, _mm256_set1_pd, _mm256_sqrt_pd, _mm256_sub_pd, _mm256_xor_pd, _mm512_add_pd, _mm512_cmp_pd_mask,
-    _mm512_div_pd, _mm512_mask_blend_pd, _mm512_mul_pd, _mm512_set1_pd, _mm512_sqrt_pd, _mm512_sub_pd, _mm512_xor_pd,
+    __m256d, __m512d, _CMP_LT_OQ, _mm256_add_pd, _mm256_andnot_pd, _mm256_blendv_pd, _mm256_cmp_pd, _mm256_div_pd,
+    _mm256_movemask_pd, _mm256_mul_pd, _mm256_set1_pd, _mm256_sqrt_pd, _mm256_sub_pd, _mm256_xor_pd, _mm512_add_pd,
+    _mm512_andnot_pd, _mm512_cmp_pd_mask, _mm512_div_pd, _mm512_mask_blend_pd, _mm512_mul_pd, _mm512_set1_pd,
+    _mm512_sqrt_pd, _mm512_sub_pd, _mm512_xor_pd,
 };
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
@@ -71,7 +72,7 @@ pub fn lanes_for(things: usize) -> usize {
 
 /// Numbers side by side: type, lanes, register and its instructions.
 macro_rules! lanes {
-    ($name:ident, $lanes:literal, $register:ident, $splat:ident, $xor:ident, $sqrt:ident, $($trait:ident $method:ident $assign:ident $assign_method:ident $instruction:ident),+) => {
+    ($name:ident, $lanes:literal, $register:ident, $splat:ident, $xor:ident, $andnot:ident, $sqrt:ident, $($trait:ident $method:ident $assign:ident $assign_method:ident $instruction:ident),+) => {
         #[doc = concat!("So many numbers: ", $lanes, ".")]
         #[derive(Clone, Copy, Debug)]
         #[repr(transparent)]
@@ -208,18 +209,24 @@ macro_rules! lanes {
             fn pick_below(self, bound: Self, yes: Self, no: Self) -> Self {
                 self.picked(bound, yes, no)
             }
+
+            #[inline(always)]
+            fn abs(self) -> Self {
+                // SAFETY: see the module page.
+                Self(unsafe { $andnot($splat(-0.0), self.0) })
+            }
         }
     };
 }
 lanes!(
-    Four, 4, __m256d, _mm256_set1_pd, _mm256_xor_pd, _mm256_sqrt_pd,
+    Four, 4, __m256d, _mm256_set1_pd, _mm256_xor_pd, _mm256_andnot_pd, _mm256_sqrt_pd,
     Add add AddAssign add_assign _mm256_add_pd,
     Sub sub SubAssign sub_assign _mm256_sub_pd,
     Mul mul MulAssign mul_assign _mm256_mul_pd,
     Div div DivAssign div_assign _mm256_div_pd
 );
 lanes!(
-    Eight, 8, __m512d, _mm512_set1_pd, _mm512_xor_pd, _mm512_sqrt_pd,
+    Eight, 8, __m512d, _mm512_set1_pd, _mm512_xor_pd, _mm512_andnot_pd, _mm512_sqrt_pd,
     Add add AddAssign add_assign _mm512_add_pd,
     Sub sub SubAssign sub_assign _mm512_sub_pd,
     Mul mul MulAssign mul_assign _mm512_mul_pd,

@@ -16,6 +16,9 @@ use num_traits::{One, Zero};
 /// Angles up to this (rad) have sine and cosine of this module; beyond, a quarter of a million turns, of the system.
 const LARGEST_ANGLE: f64 = 1.5e6;
 
+/// Up to here, less than π/4, an angle is its own rest: no quarter of a turn is taken off, and the bits are the same without.
+const NEAR_ZERO: f64 = 0.78;
+
 /// A real number of a recursion, or lanes of them.
 pub trait Real:
     Scalar
@@ -103,7 +106,11 @@ pub trait Real:
     /// Sine and cosine (rad), within one unit of the last place.
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
-        if self.abs().all_below(LARGEST_ANGLE) { sine_and_cosine(self) } else { sin_cos_by_lane(self) }
+        let size = self.abs();
+        if size.all_below(NEAR_ZERO) {
+            return (sine_near_zero(self, Self::zero()), cosine_near_zero(self, Self::zero()));
+        }
+        if size.all_below(LARGEST_ANGLE) { sine_and_cosine(self) } else { sin_cos_by_lane(self) }
     }
 }
 
@@ -306,6 +313,15 @@ mod tests {
             let (s, c) = f64::sin_cos(x);
             assert!(places(sine, s) <= 1, "sin {x}: {sine} against {s}");
             assert!(places(cosine, c) <= 1, "cos {x}: {cosine} against {c}");
+        }
+    }
+
+    #[test]
+    fn without_the_quarters_an_angle_near_zero_has_the_same_bits() {
+        let angles = (0..10_000).map(|k| NEAR_ZERO * f64::from(k) / 10_000.0);
+        for x in angles.chain((0..1100).map(|k| 0.5f64.powi(k))).filter(|x| *x < NEAR_ZERO).flat_map(|x| [x, -x]) {
+            let ((sine, cosine), (s, c)) = (Real::sin_cos(x), sine_and_cosine(x));
+            assert_eq!([sine.to_bits(), cosine.to_bits()], [s.to_bits(), c.to_bits()], "{x}");
         }
     }
 

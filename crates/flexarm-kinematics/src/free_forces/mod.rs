@@ -24,10 +24,10 @@ mod node;
 mod observed;
 
 use flexarm_spatial::space::{Fixed, Plain, Space};
-use flexarm_spatial::{Pose, Real, Wrench};
+use flexarm_spatial::{Real, Wrench};
+use nalgebra::{Matrix3, Vector3};
 
 use crate::aba::Roles;
-use crate::data::pose;
 use crate::lanes::Tree;
 use crate::model::Model;
 use node::{Composite, Moving, Node, NodeJoint};
@@ -100,12 +100,16 @@ impl<S: Space> PointTree<S> {
         for (i, body) in model.bodies.iter().enumerate().skip(1) {
             let row = if roles.prescribed_body[i] { None } else { row(body.coordinate) };
             nodes.push(Node::new(body, parts[i], row, &tree.inertia(i))?);
+            if let Some(parent) = body.parent.checked_sub(1) {
+                nodes[parent].branches |= body.parent + 1 != i;
+            }
         }
         let single = model.rotors.iter().map(|&(k, inertia)| (k, k, inertia));
         let coupled = model.rotor_couplings.iter().flat_map(|&(a, b, inertia)| [(a, b, inertia), (b, a, inertia)]);
         let rotors = single.chain(coupled).filter_map(|(to, of, inertia)| Some((row(to)?, of, inertia))).collect();
         // Whole registers of them.
-        let zeros = vec![S::Real::splat(0.0); model.turning.len().next_multiple_of(4)];
+        let together = if S::Real::LANES > 1 { 1 } else { 4 };
+        let zeros = vec![S::Real::splat(0.0); model.turning.len().next_multiple_of(together)];
         let up = S::fixed(&Fixed::from(&-model.gravity));
         Some(Self { nodes, up, angles: zeros.clone(), sines: zeros.clone(), cosines: zeros, rotors })
     }
@@ -151,8 +155,11 @@ impl<S: Space> PointTree<S> {
                 Some(parent) if parent + 1 == i => node.follow(&last, &rates),
                 Some(parent) => node.follow(&inward[parent].moving, &rates),
             };
+            if node.branches {
+                node.moving = last;
+            }
             if node.part == Part::Loading {
-                node.load(loads.map(|loads| &loads[i + 1]));
+                node.load(&last, loads.map(|loads| &loads[i + 1]));
             }
         }
         self.carry_inward(tau);
@@ -235,14 +242,11 @@ impl<S: Space> PointTree<S> {
 }
 
 impl<T: Real> PointTree<Plain<T>> {
-    /// Poses of the bodies on joints of one coordinate in their parents, as the last forces found them.
+    /// Rotation of a body in its parent and place of its origin, as the last forces found them.
     #[inline(always)]
-    pub(crate) fn poses_of_axes(&self, X_PB: &mut [Pose<T>]) {
-        for (node, X) in self.nodes.iter().zip(&mut X_PB[1..]) {
-            if !matches!(node.joint, NodeJoint::Elastic { .. }) {
-                *X = pose(node.R, node.p);
-            }
-        }
+    pub(crate) fn pose(&self, body: usize) -> (&Matrix3<T>, &Vector3<T>) {
+        let node = &self.nodes[body - 1];
+        (&node.R, &node.p)
     }
 }
 

@@ -34,7 +34,9 @@ pub(super) struct Node<S: Space> {
     pub(super) B: S::Both,
     /// `R_PJ` of an elastic joint.
     pub(super) R_PJ: S::Both,
+    /// Its motion, where a body other than the next one hangs on it.
     pub(super) moving: Moving<S>,
+    pub(super) branches: bool,
     pub(super) force: S::Vector,
     pub(super) torque: S::Vector,
     /// Inertia of the body with all that it carries outward.
@@ -147,6 +149,7 @@ impl<S: Space> Node<S> {
                 S::components(&S::fixed(&c)),
             )),
             moving: Moving { omega: zero, alpha: zero, a: zero, W: matrix },
+            branches: false,
             force: zero,
             torque: zero,
             composite: Composite { mass: S::Real::splat(0.0), h: zero, I: matrix },
@@ -238,7 +241,7 @@ impl<S: Space> Node<S> {
 
     /// (1) to (3).
     #[inline(always)]
-    pub(super) fn follow(&mut self, parent: &Moving<S>, rates: &JointRates<S>) -> Moving<S> {
+    pub(super) fn follow(&self, parent: &Moving<S>, rates: &JointRates<S>) -> Moving<S> {
         let R = &self.R;
         let (mut omega, mut alpha) = (S::turn_back(R, &parent.omega), S::turn_back(R, &parent.alpha));
         if let Some([w, wdot]) = &rates.turn {
@@ -252,14 +255,13 @@ impl<S: Space> Node<S> {
         }
         // [ω]x² = ω ωᵀ - ω·ω 1
         let W = S::dyad(&omega, &omega, &alpha, -S::dot(&omega, &omega));
-        self.moving = Moving { omega, alpha, a: S::turn_back(R, &a), W }; // (3)
-        self.moving
+        Moving { omega, alpha, a: S::turn_back(R, &a), W } // (3)
     }
 
     /// (4) and (5).
     #[inline(always)]
-    pub(super) fn load(&mut self, external: Option<&Wrench<S::Real>>) {
-        let Moving { omega, alpha, a, W } = &self.moving;
+    pub(super) fn load(&mut self, moving: &Moving<S>, external: Option<&Wrench<S::Real>>) {
+        let Moving { omega, alpha, a, W } = moving;
         let h = &self.h;
         let gyroscopic = S::cross(omega, &S::mul(&self.I, omega));
         self.force = S::add(&S::scaled(a, self.mass), &S::mul(W, h));

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::arm::FlexibleArm;
 use crate::batch::lane_arm::{LaneArm, set_lane};
-use crate::dense::{congruence_quickly, dot, larger, product, solve_quickly};
+use crate::dense::{change_and_product, congruence_quickly, dot, larger, product, solve_quickly};
 use crate::error::StepError;
 use crate::events::{IMPULSE_DEFECT, SLOW};
 use crate::implicit::{ImplicitStep, Newton, Search, Sizes};
@@ -20,7 +20,7 @@ use crate::motion::PrescribedMotion;
 use crate::reduced::ReducedArm;
 use crate::statics::static_equilibrium;
 use crate::stepper::{LARGEST_DEFLECTION, Start};
-use crate::steppers::{AlphaSettings, Coefficients, Course, FOLLOWED_TO, GeneralizedAlpha, add, follows, leave_of};
+use crate::steppers::{AlphaSettings, Coefficients, Course, FOLLOWED_TO, GeneralizedAlpha, follows, leave_of};
 use crate::system::SecondOrderSystem;
 
 /// Parts of a step.
@@ -128,6 +128,8 @@ pub(super) struct LaneAlpha<T: Real> {
     inverse: Vec<T>,
     /// What a step adds to both, by their courses.
     changes: [Vec<T>; 2],
+    /// Whether each of them still lacks what this step adds: that comes with its next product.
+    behind: [bool; 2],
     /// Workspaces of the matrices.
     S: Vec<T>,
     matrices: Matrices,
@@ -174,6 +176,7 @@ impl<T: Real> LaneAlpha<T> {
             M_inverse_K: square(),
             inverse: square(),
             changes: [square(), square()],
+            behind: [false; 2],
             S: square(),
             matrices: Matrices::new(n),
         };
@@ -185,7 +188,8 @@ impl<T: Real> LaneAlpha<T> {
         }
         let [qdot, qddot] = all.arm.joint_rates();
         all.joints.begin(qdot, qddot);
-        all.arm.place_joints();
+        // Poses of the joints, before any step.
+        all.arm.residual(T::one(), &all.x, &all.v, &all.acceleration, &mut all.r);
         all.a.copy_from_slice(&all.acceleration);
         all.x_tilde.copy_from_slice(&all.acceleration);
         all.previous.copy_from_slice(&all.acceleration);
@@ -306,7 +310,7 @@ impl<T: Real> LaneAlpha<T> {
         }
     }
 
-    /// The matrices of the next step, where they are followed.
+    /// What the next step adds to the matrices that are followed.
     #[inline(always)]
     fn follow(&mut self) {
         for (k, lane) in self.lanes.iter_mut().enumerate() {
@@ -315,8 +319,7 @@ impl<T: Real> LaneAlpha<T> {
                 set_lane(&mut self.changes[1], k, &change[1]);
             }
         }
-        add(&mut self.inverse, &self.changes[0]);
-        add(&mut self.M_inverse_K, &self.changes[1]);
+        self.behind = [true; 2];
     }
 
     /// 1 in the lanes that fulfil a condition, else 0.
@@ -369,14 +372,22 @@ impl<T: Real> LaneAlpha<T> {
     /// As in a single run, where `active` is 1.
     #[inline(always)]
     fn place(&mut self, active: T) {
-        product(&self.M_inverse_K, &self.trial, &mut self.shift);
+        match std::mem::take(&mut self.behind[1]) {
+            true => change_and_product(&mut self.M_inverse_K, &self.changes[1], &self.trial, &mut self.shift),
+            false => product(&self.M_inverse_K, &self.trial, &mut self.shift),
+        }
         let h = self.grid.step_size();
-        for k in 0..self.x.len() {
-            let x_tilde = T::splat(self.c_h2) * self.shift[k] + self.trial[k];
-            let (x, v) = self.coefficients.advance(h, self.x[k], self.v[k], self.a[k], self.x_tilde[k], x_tilde);
-            self.x_tilde_new[k] = picked(active, self.x_tilde_new[k], x_tilde);
-            self.x_new[k] = picked(active, self.x_new[k], x);
-            self.v_new[k] = picked(active, self.v_new[k], v);
+        let c_h2 = T::splat(self.c_h2);
+        let n = self.trial.len();
+        let (x, v, a, x_tilde) = (&self.x[..n], &self.v[..n], &self.a[..n], &self.x_tilde[..n]);
+        let (shift, x_tilde_new) = (&self.shift[..n], &mut self.x_tilde_new[..n]);
+        let (x_new, v_new) = (&mut self.x_new[..n], &mut self.v_new[..n]);
+        for (k, trial) in self.trial.iter().enumerate() {
+            let new = c_h2 * shift[k] + *trial;
+            let (place, speed) = self.coefficients.advance(h, x[k], v[k], a[k], x_tilde[k], new);
+            x_tilde_new[k] = picked(active, x_tilde_new[k], new);
+            x_new[k] = picked(active, x_new[k], place);
+            v_new[k] = picked(active, v_new[k], speed);
         }
     }
 
@@ -384,22 +395,28 @@ impl<T: Real> LaneAlpha<T> {
     #[inline(always)]
     fn correct(&mut self, active: T) -> T {
         let zero = T::zero();
-        product(&self.inverse, &self.r, &mut self.d);
+        match std::mem::take(&mut self.behind[0]) {
+            true => change_and_product(&mut self.inverse, &self.changes[0], &self.r, &mut self.d),
+            false => product(&self.inverse, &self.r, &mut self.d),
+        }
         let norm = dot(&self.d, &self.d).sqrt();
         for d in &mut self.d {
             *d = picked(active, zero, *d);
         }
         product(&self.M_inverse_K, &self.d, &mut self.shift);
         let (c_D, c_K) = self.coefficients.derivatives(self.grid.step_size());
-        let mut sizes = LaneSizes { norm, correction: zero, acceleration: zero, place: zero };
-        for k in 0..self.d.len() {
-            let d = self.d[k];
-            let d_tilde = d + T::splat(self.c_h2) * self.shift[k];
-            self.trial[k] -= d;
-            self.x_tilde_new[k] -= d_tilde;
-            self.x_new[k] -= T::splat(c_K) * d_tilde;
-            self.v_new[k] -= T::splat(c_D) * d_tilde;
-            sizes.include(d, self.trial[k], self.x_new[k]);
+        let (c_h2, c_D, c_K) = (T::splat(self.c_h2), T::splat(c_D), T::splat(c_K));
+        let mut sizes = LaneSizes { norm, correction: zero, broken: zero, acceleration: zero, place: zero };
+        let n = self.d.len();
+        let (shift, trial, x_tilde) = (&self.shift[..n], &mut self.trial[..n], &mut self.x_tilde_new[..n]);
+        let (x, v) = (&mut self.x_new[..n], &mut self.v_new[..n]);
+        for (k, d) in self.d.iter().enumerate() {
+            let d_tilde = *d + c_h2 * shift[k];
+            trial[k] -= *d;
+            x_tilde[k] -= d_tilde;
+            x[k] -= c_K * d_tilde;
+            v[k] -= c_D * d_tilde;
+            sizes.include(*d, trial[k], x[k]);
         }
         self.judge(active, &sizes)
     }
@@ -441,6 +458,10 @@ impl<T: Real> LaneAlpha<T> {
     /// Mostly it is one lane, so matrices are factorised one by one: there the instructions go along the columns.
     #[inline(always)]
     fn factor(&mut self, wanted: T) {
+        debug_assert_eq!(
+            self.behind, [false; 2],
+            "a matrix is renewed after the first correction of a step at the earliest"
+        );
         self.arm.mass(&mut self.S);
         for k in (0..T::LANES).filter(|k| wanted.lane(*k) == 1.0) {
             let (lane, matrices) = (&mut self.lanes[k], &mut self.matrices);
@@ -518,6 +539,8 @@ impl Matrices {
 struct LaneSizes<T> {
     norm: T,
     correction: T,
+    /// Zero, or not a number where some correction is none.
+    broken: T,
     acceleration: T,
     place: T,
 }
@@ -525,9 +548,9 @@ struct LaneSizes<T> {
 impl<T: Real> LaneSizes<T> {
     #[inline(always)]
     fn include(&mut self, correction: T, acceleration: T, place: T) {
-        // Zero, or not a number: that stays in a sum and passes by in a largest value.
-        let broken = correction * T::zero();
-        self.correction = larger(self.correction, correction.abs()) + broken;
+        // What is not a number stays in a sum, and passes by in a largest value.
+        self.broken += correction * T::zero();
+        self.correction = larger(self.correction, correction.abs());
         self.acceleration = larger(self.acceleration, acceleration.abs());
         self.place = larger(self.place, place.abs());
     }
@@ -535,7 +558,7 @@ impl<T: Real> LaneSizes<T> {
     #[inline(always)]
     fn lane(&self, k: usize) -> Sizes {
         let mut sizes = Sizes::of(self.norm.lane(k));
-        sizes.include(self.correction.lane(k), self.acceleration.lane(k), self.place.lane(k));
+        sizes.include(self.correction.lane(k) + self.broken.lane(k), self.acceleration.lane(k), self.place.lane(k));
         sizes
     }
 }

@@ -4,8 +4,8 @@
 //! nothing happens at discrete times.
 
 use flexarm_kinematics::lanes::{
-    LaneTree, forward_kinematics, free_forces, free_mass, inverse_dynamics, mass_matrix_at_poses, point_tree,
-    rigid_and_flexible,
+    LaneTree, free_forces, free_mass, inverse_dynamics, mass_matrix_at_poses, point_tree, rigid_and_flexible,
+    rigid_and_flexible_of_points,
 };
 use flexarm_kinematics::products::sub;
 use flexarm_kinematics::space::Plain;
@@ -124,17 +124,14 @@ impl<T: Real> LaneArm<T> {
         [&self.state.qdot.as_slice()[..n], &self.qddot[..n]]
     }
 
-    /// Poses of the joints before any residual.
-    #[inline(always)]
-    pub(super) fn place_joints(&mut self) {
-        forward_kinematics(&self.tree, &mut self.data, self.state.q.as_slice());
-    }
-
     /// Flexible minus rigid place of a frame (m, world axes), for the joints of the last residual and elastic coordinates x.
     #[inline(always)]
     pub(super) fn deflection(&mut self, tool: &Frame, x: &[T]) -> Vector3<T> {
         self.q[self.tree.model().n_actuated()..].copy_from_slice(x);
-        let [rigid, flexible] = rigid_and_flexible(&self.tree, &self.data, tool, &self.q);
+        let [rigid, flexible] = match &self.points {
+            Some(points) => rigid_and_flexible_of_points(&self.tree, points, tool, &self.q),
+            None => rigid_and_flexible(&self.tree, &self.data, tool, &self.q),
+        };
         sub(&flexible, &rigid)
     }
 
@@ -148,7 +145,7 @@ impl<T: Real> LaneArm<T> {
         match &mut self.points {
             Some(points) => {
                 let (q, qdot) = (self.state.q.as_slice(), self.state.qdot.as_slice());
-                free_forces(points, &mut self.data, Motions { q, qdot, qddot: &self.qddot }, r);
+                free_forces(points, Motions { q, qdot, qddot: &self.qddot }, r);
             }
             None => {
                 inverse_dynamics(&self.tree, &mut self.data, &self.state, &self.qddot);
@@ -158,14 +155,17 @@ impl<T: Real> LaneArm<T> {
         let (x, v) = (&self.state.q.as_slice()[n..], &self.state.qdot.as_slice()[n..]);
         for element in &self.elements {
             let range = element.first..element.first + element.size;
+            let (x, v, r) = (&x[range.clone()], &v[range.clone()], &mut r[range]);
             let y = &mut self.shifted[..element.size];
-            y.copy_from_slice(&x[range.clone()]);
-            if self.D.is_none() {
-                for (y, v) in y.iter_mut().zip(&v[range.clone()]) {
-                    *y += element.tau * *v;
+            match self.D.is_none() {
+                true => {
+                    for ((y, x), v) in y.iter_mut().zip(x).zip(v) {
+                        *y = *x + element.tau * *v;
+                    }
                 }
+                false => y.copy_from_slice(x),
             }
-            add_product(&element.K, y, &mut r[range]);
+            add_product(&element.K, y, r);
         }
         if let Some(D) = &self.D {
             add_product(D, v, r);

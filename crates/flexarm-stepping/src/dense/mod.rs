@@ -24,10 +24,29 @@ pub(crate) fn product<T: Real>(A: &[T], x: &[T], y: &mut [T]) {
     add_columns(columns, x.iter().copied(), y);
 }
 
+/// `A ← A + B`.
+#[inline(always)]
+pub(crate) fn add<T: Real>(A: &mut [T], B: &[T]) {
+    for (a, b) in A.iter_mut().zip(B) {
+        *a += *b;
+    }
+}
+
+/// `A ← A + B`, then `y = A x`: each entry is fetched once.
+#[inline(always)]
+pub(crate) fn change_and_product<T: Real>(A: &mut [T], B: &[T], x: &[T], y: &mut [T]) {
+    if !sized::change_and_product(A, B, x, y) {
+        add(A, B);
+        product(A, x, y);
+    }
+}
+
 /// `y += A x`.
 #[inline(always)]
 pub(crate) fn add_product<T: Real>(A: &[T], x: &[T], y: &mut [T]) {
-    add_columns(A, x.iter().copied(), y);
+    if !sized::add_product(A, x, y) {
+        add_columns(A, x.iter().copied(), y);
+    }
 }
 
 /// `y -= A x`.

@@ -43,6 +43,60 @@ fn rows<T: Real, const N: usize, const R: usize>(A: &[T], x: &[T], first: usize,
     true
 }
 
+/// `y += A x` of a spring of six coordinates; false where the size is another one.
+#[inline(always)]
+pub(super) fn add_product<T: Real>(A: &[T], x: &[T], y: &mut [T]) -> bool {
+    let (Some(A), Some(x), Ok(y)) = (columns::<T, 6>(A), x.first_chunk::<6>(), <&mut [T; 6]>::try_from(y)) else {
+        return false;
+    };
+    let mut sums = *y;
+    for k in 0..6 {
+        for r in 0..6 {
+            sums[r] = A[k][r] * x[k] + sums[r];
+        }
+    }
+    *y = sums;
+    true
+}
+
+/// `A ← A + B`, then `y = A x`; false where the size is another one.
+#[inline(always)]
+pub(super) fn change_and_product<T: Real>(A: &mut [T], B: &[T], x: &[T], y: &mut [T]) -> bool {
+    match y.len() {
+        6 => changed_rows::<T, 6, 6>(A, B, x, 0, y),
+        12 => changed_rows::<T, 12, 12>(A, B, x, 0, y),
+        18 => changed_rows::<T, 18, 12>(A, B, x, 0, y) && changed_rows::<T, 18, 6>(A, B, x, 12, y),
+        _ => false,
+    }
+}
+
+/// R rows of [`change_and_product`] from the first one on.
+#[inline(always)]
+fn changed_rows<T: Real, const N: usize, const R: usize>(
+    A: &mut [T],
+    B: &[T],
+    x: &[T],
+    first: usize,
+    y: &mut [T],
+) -> bool {
+    let (Some(A), Some(B), Some(x)) = (columns_mut::<T, N>(A), columns::<T, N>(B), x.first_chunk::<N>()) else {
+        return false;
+    };
+    let mut sums = [T::zero(); R];
+    for r in 0..R {
+        A[0][first + r] += B[0][first + r];
+        sums[r] = A[0][first + r] * x[0];
+    }
+    for k in 1..N {
+        for r in 0..R {
+            A[k][first + r] += B[k][first + r];
+            sums[r] = A[k][first + r] * x[k] + sums[r];
+        }
+    }
+    y[first..first + R].copy_from_slice(&sums);
+    true
+}
+
 /// `to += factor from`.
 #[inline(always)]
 fn add<const N: usize>(to: &mut [f64; N], factor: f64, from: &[f64; N]) {

@@ -93,7 +93,7 @@ pub(super) struct Add<'a>(pub(super) &'a mut [f64], pub(super) &'a [f64]);
 impl Loops for Add<'_> {
     #[inline(always)]
     fn run(self) {
-        super::add(self.0, self.1);
+        crate::dense::add(self.0, self.1);
     }
 }
 

@@ -397,14 +397,6 @@ impl GeneralizedAlpha {
     }
 }
 
-/// `A ← A + B`, over numbers or lanes.
-#[inline(always)]
-pub(crate) fn add<T: Real>(A: &mut [T], B: &[T]) {
-    for (a, b) in A.iter_mut().zip(B) {
-        *a += *b;
-    }
-}
-
 impl ImplicitStep for GeneralizedAlpha {
     const MOTION_RULE: &'static [(f64, f64)] = &Self::ENDS;
 
