@@ -159,14 +159,13 @@ impl<'m> Condensation<'m> {
             Some(R)
         };
         let K_ii = model.K.submatrix(&solved);
-        let factor = Cholesky::new(&K_ii, options.ordering, options.threads).map_err(|error| match error {
+        let factor = Cholesky::new(K_ii, options.ordering, options.threads).map_err(|error| match error {
             NotPositiveDefinite::Pivot { unknown } => {
                 let (node, component) = model.dofs.node_of(solved[unknown] as usize);
                 ReductionError::Loose { node, component: crate::error::COMPONENTS[component] }
             }
             NotPositiveDefinite::OutOfMemory { entries } => ReductionError::OutOfMemory { entries },
         })?;
-        drop(K_ii);
         let (pivot, unknown) = factor.smallest_pivot();
         if !(pivot > SINGULAR) {
             let (node, component) = model.dofs.node_of(solved[unknown] as usize);
