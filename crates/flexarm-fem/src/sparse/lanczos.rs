@@ -143,7 +143,8 @@ pub fn smallest_modes(pencil: &mut Pencil<'_>, wanted: ModesWanted) -> Result<Mo
             }
         }
     };
-    Ok(basis.modes(&ritz, found, None))
+    let [modes] = basis.into_modes([(&ritz, found)], None);
+    Ok(modes)
 }
 
 /// The lowest modes of a pencil, and so many of the same without some support, from one basis.
@@ -181,9 +182,8 @@ pub fn modes_of_two_supports(
         let other = basis.released_ritz(released).ok_or(ModesError::NotFinite)?;
         match (found, other.settled(others, others.count(usize::MAX), &basis)?) {
             (Some(found), Some(other_found)) => {
-                let T = Some(released.T);
-                let other = Modes { solves: 0, ..basis.modes(&other, other_found, T) };
-                return Ok((basis.modes(&ritz, found, None), other));
+                let [modes, other] = basis.into_modes([(&ritz, found), (&other, other_found)], Some(released.T));
+                return Ok((modes, Modes { solves: 0, ..other }));
             }
             (None, _) => basis.refuse_if_full(&ritz, count, limit)?,
             (_, None) => basis.refuse_if_full(&other, released_count, limit)?,

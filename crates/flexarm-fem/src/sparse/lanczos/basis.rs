@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::{Modes, ModesError, Pencil, Released, Ritz};
-use crate::sparse::block::{Block, WIDTH, grams, subtract_products};
+use crate::sparse::block::{Block, WIDTH, combine, grams, subtract_products};
 
 /// What is left of a direction, over the largest θ, that is rounding of the operator.
 const NOISE: f64 = 1e-13;
@@ -225,28 +225,41 @@ impl Basis {
         (&self.coupling * bottom).column_iter().zip(theta).map(|(r, theta)| r.norm() / theta).collect()
     }
 
-    /// The first `count` modes; `T`: the shapes beside the basis.
-    pub(super) fn modes(&self, ritz: &Ritz, count: usize, T: Option<&Block>) -> Modes {
+    /// The first modes of each of some Ritz pairs, so many; `T`: the shapes beside the basis.
+    ///
+    /// The shapes take the place of the basis, which would be half of all memory beside them.
+    pub(super) fn into_modes<const N: usize>(self, of: [(&Ritz, usize); N], T: Option<&Block>) -> [Modes; N] {
         let rows = self.newest.rows.len();
-        let mut shapes = DMatrix::zeros(rows, count);
-        for first in (0..count).step_by(WIDTH) {
-            let width = WIDTH.min(count - first);
-            let mut block = Block::zeros(rows, width);
-            subtract_products(&mut block, &self.blocks, &-ritz.vectors.columns(first, width));
-            if let Some(T) = T {
-                block.subtract_product(T, &-ritz.beside.columns(first, width));
-            }
-            block.put_columns(&mut shapes, first);
-        }
-        for mut shape in shapes.column_iter_mut() {
-            let peak =
-                shape.iter().fold(0.0, |peak: f64, x| if x.abs() > peak.abs() * (1.0 + 1e-9) { *x } else { peak });
-            if peak < 0.0 {
-                shape.neg_mut();
+        let Self { mut blocks, projected, solves, .. } = self;
+        blocks.extend(T.cloned());
+        let vectors = projected.nrows() + T.map_or(0, |T| T.width);
+        let mut factors = Vec::new();
+        for (ritz, count) in of {
+            for first in (0..count).step_by(WIDTH) {
+                let width = WIDTH.min(count - first);
+                let mut C = DMatrix::zeros(vectors, width);
+                C.rows_mut(0, projected.nrows()).copy_from(&ritz.vectors.columns(first, width));
+                C.rows_mut(projected.nrows(), ritz.beside.nrows()).copy_from(&ritz.beside.columns(first, width));
+                factors.push(C);
             }
         }
-        let omega2 = ritz.theta[..count].iter().map(|theta| 1.0 / theta).collect();
-        Modes { omega2, shapes, residuals: ritz.residuals[..count].to_vec(), solves: self.solves }
+        combine(&mut blocks, &factors);
+        let mut combined = blocks.into_iter();
+        of.map(|(ritz, count)| {
+            let mut shapes = DMatrix::zeros(rows, count);
+            for (first, block) in (0..count).step_by(WIDTH).zip(&mut combined) {
+                block.put_columns(&mut shapes, first);
+            }
+            for mut shape in shapes.column_iter_mut() {
+                let peak =
+                    shape.iter().fold(0.0, |peak: f64, x| if x.abs() > peak.abs() * (1.0 + 1e-9) { *x } else { peak });
+                if peak < 0.0 {
+                    shape.neg_mut();
+                }
+            }
+            let omega2 = ritz.theta[..count].iter().map(|theta| 1.0 / theta).collect();
+            Modes { omega2, shapes, residuals: ritz.residuals[..count].to_vec(), solves }
+        })
     }
 }
 
