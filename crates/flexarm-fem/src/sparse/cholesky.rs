@@ -317,4 +317,18 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn a_stiffness_of_zero_below_zero_or_of_no_number_is_refused_with_its_unknown() {
+        for ordering in [Ordering::MinimumDegree, Ordering::NestedDissection] {
+            for (n, bad) in [(1, 0), (2, 1), (60, 17)] {
+                for value in [0.0, -1.0, f64::NAN] {
+                    let mut K = parts(n, 1);
+                    K.values[bad] = value;
+                    let refused = Cholesky::new(K, ordering, Threads(1)).err();
+                    assert_eq!(refused, Some(NotPositiveDefinite::Pivot { unknown: bad }), "{n} unknowns, {value}");
+                }
+            }
+        }
+    }
 }

@@ -7,6 +7,9 @@ use crate::sparse::block::{Block, WIDTH, combine, grams, subtract_products};
 
 /// What is left of a direction, over the largest θ, that is rounding of the operator.
 const NOISE: f64 = 1e-13;
+/// Size of `K⁻¹ M x` over that of x, in parts of the largest one of the first block, below which it is rounding: uniform acceleration
+/// moves nothing in some directions.
+const VANISHED: f64 = 1e-10;
 /// Smallest eigenvalue of the scaled Gram matrix of a block below which a direction is dropped.
 const DEPENDENT: f64 = 1e-10;
 /// The same, below which the block is orthogonalised once more: a near-dependent block magnifies what was left.
@@ -25,6 +28,8 @@ pub(super) struct Basis {
     pub(super) coupling: DMatrix<f64>,
     /// Of the shapes of a support that is taken away.
     pub(super) beside: Option<Beside>,
+    /// Of the space that is to be spanned.
+    dimension: usize,
     solves: usize,
     next_look: usize,
 }
@@ -59,6 +64,7 @@ impl Basis {
         }
         let mut MW = Block::zeros(rows, W.width);
         (pencil.mass)(&W, &mut MW);
+        let sizes2 = W.gram(&MW).diagonal();
         W.clone_from(&MW);
         (pencil.solve)(&mut W);
         let products = released.map(|released| {
@@ -73,10 +79,11 @@ impl Basis {
             projected: DMatrix::zeros(0, 0),
             coupling: DMatrix::zeros(0, 0),
             beside: None,
+            dimension: pencil.dimension,
             solves: W.width,
             next_look: 0,
         };
-        basis.append(W, MW, pencil)?;
+        basis.append(W, MW, pencil, sizes2.as_slice())?;
         if basis.is_exhausted() {
             // No vector has mass.
             return Err(ModesError::NotFinite);
@@ -136,7 +143,7 @@ impl Basis {
             H.view_mut((old - before, old), (before, now)).copy_from(&self.coupling.transpose());
         }
         self.projected = H;
-        self.append(W, MW, pencil)
+        self.append(W, MW, pencil, &[])
     }
 
     /// Makes `W` M-orthonormal and takes it as the newest block; directions that vanish are dropped.
@@ -145,16 +152,30 @@ impl Basis {
     /// G = Wᵀ M W,   V = W B with Bᵀ G B = 1,   R = Vᵀ M W = Bᵀ G
     /// ```
     /// * `MW`: room for M times it.
-    fn append(&mut self, mut W: Block, mut MW: Block, pencil: &mut Pencil<'_>) -> Result<(), ModesError> {
+    /// * `sizes2`: at the start, `xᵀ M x` of the columns of which W is `K⁻¹ M`.
+    fn append(
+        &mut self,
+        mut W: Block,
+        mut MW: Block,
+        pencil: &mut Pencil<'_>,
+        sizes2: &[f64],
+    ) -> Result<(), ModesError> {
         (pencil.mass)(&W, &mut MW);
-        let G = W.gram(&MW);
+        let mut G = W.gram(&MW);
         if G.iter().any(|x| !x.is_finite()) {
             return Err(ModesError::NotFinite);
+        }
+        let most = sizes2.iter().enumerate().map(|(k, size2)| G[(k, k)] / size2).fold(0.0, f64::max);
+        for (k, size2) in sizes2.iter().enumerate() {
+            if G[(k, k)] <= VANISHED.powi(2) * most * size2 {
+                G.row_mut(k).fill(0.0);
+                G.column_mut(k).fill(0.0);
+            }
         }
         // What is left after orthogonalisation must stand out of the rounding of the operator.
         let reference = self.projected.diagonal().iter().fold(0.0, |peak: f64, h| peak.max(h.abs()));
         let (Q, smallest) = orthonormalising(&G, NOISE * reference);
-        if Q.ncols() == 0 {
+        if Q.ncols() == 0 || self.len() >= self.dimension {
             self.coupling = DMatrix::zeros(0, W.width);
             self.newest = Block::zeros(W.rows.len(), 0);
             self.mass_newest = self.newest.clone();
