@@ -251,7 +251,8 @@ impl Basis {
     /// The shapes take the place of the basis, which would be half of all memory beside them.
     pub(super) fn into_modes<const N: usize>(self, of: [(&Ritz, usize); N], T: Option<&Block>) -> [Modes; N] {
         let rows = self.newest.rows.len();
-        let Self { mut blocks, projected, solves, .. } = self;
+        let Self { mut blocks, newest, mass_newest, projected, solves, .. } = self;
+        drop((newest, mass_newest));
         blocks.extend(T.cloned());
         let vectors = projected.nrows() + T.map_or(0, |T| T.width);
         let mut factors = Vec::new();
