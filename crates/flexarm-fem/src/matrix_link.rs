@@ -21,7 +21,9 @@ use crate::gate::GateLimits;
 use crate::mesh_link::{MeshLinkError, SplitAt, condensed_body, split_point};
 use crate::model::FeModel;
 use crate::reduced::{LinkDetails, Provenance, ReducedLink};
-use crate::reduction::{Boundary, Condensation, CondensationOptions, InterfaceFrame, Superelement, stiffness12};
+use crate::reduction::{
+    Boundary, Condensation, CondensationOptions, InterfaceFrame, ReductionError, Superelement, TieError, stiffness12,
+};
 use crate::rigid_part::RigidPart;
 use crate::sparse::{ModesWanted, SparseSymmetric};
 
@@ -82,6 +84,9 @@ pub fn reduce_matrices(
     modes: ModesWanted,
     options: CondensationOptions,
 ) -> Result<Superelement, MeshLinkError> {
+    if boundary.len() < 12 {
+        return Err(ReductionError::from(TieError::TooFew { found: boundary.len() / 6 }).into());
+    }
     let model = FeModel::from_matrices(K, M);
     let boundary = Boundary::retained(model.size(), boundary);
     let condensation = Condensation::with_boundary(&model, boundary, options)?;

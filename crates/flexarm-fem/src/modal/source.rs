@@ -201,8 +201,6 @@ impl Integrals {
     fn add_solids(&mut self, model: &FeModel, shapes: &DMatrix<f64>) {
         let n = shapes.ncols();
         let M_shapes = model.M.solid_product(shapes);
-        let axes = [0, 1, 2].map(|axis| rows_of(model, axis, shapes));
-        let M_axes = [0, 1, 2].map(|axis| rows_of(model, axis, &M_shapes));
 
         // 1, x, y, z of the nodes, in the first component.
         let mut places = DMatrix::zeros(model.size(), 4);
@@ -216,16 +214,18 @@ impl Integrals {
         self.first += Vector3::from_fn(|a, _| moments[(0, 1 + a)]);
         self.second += moments.fixed_view::<3, 3>(1, 1);
 
-        for (b, M_axis) in M_axes.iter().enumerate() {
-            let with_places = gram(&X, M_axis);
+        // One axis at a time: copies of all would be most of the memory.
+        for b in 0..3 {
+            let M_axis = rows_of(model, b, &M_shapes);
+            let with_places = gram(&X, &M_axis);
             for k in 0..n {
                 self.C_t[(b, k)] += with_places[(0, k)];
                 for a in 0..3 {
                     self.P[k][(a, b)] += with_places[(1 + a, k)];
                 }
             }
-            for (a, axis) in axes.iter().enumerate().take(b + 1) {
-                let products = gram(axis, M_axis);
+            for a in 0..=b {
+                let products = gram(&rows_of(model, a, shapes), &M_axis);
                 for (k, l) in (0..n).flat_map(|k| (k..n).map(move |l| (k, l))) {
                     self.N[k * n + l][(a, b)] += products[(k, l)];
                     if a != b {

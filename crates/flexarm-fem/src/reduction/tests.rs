@@ -1,6 +1,7 @@
 //! Condensation against closed forms, itself, and the whole mesh.
 #![allow(clippy::print_stderr, reason = "tables of measured errors, shown with --nocapture")]
 
+mod degenerate;
 mod modes;
 
 use flexarm_spatial::Pose;

@@ -114,13 +114,40 @@ pub(crate) fn grams(basis: &[Block], X: &Block) -> DMatrix<f64> {
 
 /// `X -= [V_1 V_2 ...] C`.
 pub(crate) fn subtract_products(X: &mut Block, basis: &[Block], C: &DMatrix<f64>) {
+    quickly(SubtractProducts { X: &mut X.rows, first: 0, basis, factors: &basis_factors(basis, C) });
+}
+
+/// The rows of C that belong to each block of a basis.
+fn basis_factors(basis: &[Block], C: &DMatrix<f64>) -> Vec<Small> {
     let mut row = 0;
-    let mut factors = Vec::with_capacity(basis.len());
-    for V in basis {
-        factors.push(small(C, row, V.width));
+    let of = |V: &Block| {
         row += V.width;
+        small(C, row - V.width, V.width)
+    };
+    basis.iter().map(of).collect()
+}
+
+/// Combinations `[V_1 V_2 ...] C` of a basis, each of at most eight columns. They take the place of the basis, which they would be
+/// a good part of beside it.
+pub(crate) fn combine(basis: &mut Vec<Block>, combinations: &[DMatrix<f64>]) {
+    let rows = basis.first().map_or(0, |V| V.rows.len());
+    let factors: Vec<_> = combinations.iter().map(|C| basis_factors(basis, &-C)).collect();
+    let mut combined = vec![[Row::ZERO; PANEL]; factors.len()];
+    while basis.len() < factors.len() {
+        basis.push(Block::zeros(rows, 0));
     }
-    quickly(SubtractProducts { X: &mut X.rows, basis, factors: &factors });
+    for first in (0..rows).step_by(PANEL) {
+        let count = PANEL.min(rows - first);
+        for (X, factors) in combined.iter_mut().zip(&factors) {
+            X.fill(Row::ZERO);
+            quickly(SubtractProducts { X: &mut X[..count], first, basis, factors });
+        }
+        for (V, X) in basis.iter_mut().zip(&combined) {
+            V.rows[first..][..count].copy_from_slice(&X[..count]);
+        }
+    }
+    basis.truncate(factors.len());
+    basis.iter_mut().zip(combinations).for_each(|(V, C)| V.width = C.ncols());
 }
 
 /// Rows `first..first + count` of C.
@@ -173,6 +200,8 @@ fn add_gram<T: Real, const P: usize, const FIRST: usize>(v: &[Row], x: &[Row], s
 
 struct SubtractProducts<'a> {
     X: &'a mut [Row],
+    /// Row of the basis at which X begins.
+    first: usize,
     basis: &'a [Block],
     factors: &'a [Small],
 }
@@ -184,7 +213,7 @@ impl Work for SubtractProducts<'_> {
     fn run<T: Real, const P: usize>(self) {
         for (panel, x) in self.X.chunks_mut(PANEL).enumerate() {
             for (V, C) in self.basis.iter().zip(self.factors) {
-                let v = &V.rows[panel * PANEL..][..x.len()];
+                let v = &V.rows[self.first + panel * PANEL..][..x.len()];
                 subtract::<T, P, 0>(x, v, C);
                 subtract::<T, P, 4>(x, v, C);
             }
@@ -248,6 +277,11 @@ mod tests {
         let expected = &X - &AB * &C;
         assert!((x.to_columns() - &expected).amax() < 1e-12 * expected.amax().max(1e3));
         assert!(x.rows.iter().all(|row| row.0[6..] == [0.0; 2]));
+        let mut blocks = basis.to_vec();
+        combine(&mut blocks, &[C.clone(), C.columns(1, 3).into_owned(), C.columns(2, 1).into_owned()]);
+        assert_eq!(blocks.iter().map(|V| V.width).collect::<Vec<_>>(), [6, 3, 1]);
+        assert!((blocks[0].to_columns() - &AB * &C).amax() < 1e-12 * (&AB * &C).amax());
+        assert!((blocks[2].to_columns() - &AB * C.columns(2, 1)).amax() < 1e-12 * (&AB * &C).amax());
         x.multiply(&C.transpose().columns(0, 5).into_owned());
         let expected = expected * C.transpose().columns(0, 5);
         assert!((x.to_columns() - &expected).amax() < 1e-13 * expected.amax());

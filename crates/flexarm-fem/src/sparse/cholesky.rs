@@ -6,11 +6,13 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{LltError, LltRegularization};
 use faer::perm::Perm;
 use faer::sparse::linalg::SupernodalThreshold;
-use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
+use faer::sparse::linalg::cholesky::supernodal::{
+    SymbolicSupernodalCholesky, factorize_supernodal_numeric_llt, factorize_supernodal_numeric_llt_scratch,
+};
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
 };
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use faer::sparse::{SparseColMat, SymbolicSparseColMat, SymbolicSparseColMatRef};
 use faer::{Par, Side, Spec};
 use nalgebra::DMatrix;
 
@@ -18,7 +20,7 @@ use super::block::{Block, Row, WIDTH};
 use super::ordering::{Ordering, nested_dissection};
 use super::registers::clear_upper_halves;
 use super::symmetric::SparseSymmetric;
-use super::triangular;
+use super::triangular::{self, Columns};
 
 /// How many threads a factorisation may use; solves take one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,7 +45,7 @@ pub struct FactorFigures {
     pub size: usize,
     /// Stored entries of the lower triangle of the matrix.
     pub matrix_entries: usize,
-    /// Stored entries of the factor, with the zeros inside its dense blocks.
+    /// Stored entries of the factor, with the zeros below the diagonal inside its dense blocks.
     pub factor_entries: usize,
     /// The order that was used.
     pub ordering: Ordering,
@@ -78,7 +80,7 @@ impl fmt::Display for NotPositiveDefinite {
 /// The factor `P K Pᵀ = L Lᵀ` of a sparse symmetric positive definite matrix.
 pub struct Cholesky {
     symbolic: SymbolicCholesky<u32>,
-    values: Vec<f64>,
+    columns: Columns,
     figures: FactorFigures,
     smallest_pivot: (f64, usize),
 }
@@ -90,43 +92,30 @@ impl fmt::Debug for Cholesky {
 }
 
 impl Cholesky {
-    /// Factorises `K`.
+    /// Factorises `K`, which is given away: of the memory that a factorisation needs it would be a tenth.
     ///
     /// # Errors
     /// [`NotPositiveDefinite`], with the unknown at which it was found.
-    pub fn new(K: &SparseSymmetric, ordering: Ordering, threads: Threads) -> Result<Self, NotPositiveDefinite> {
-        let n = K.size();
-        let pattern = K.pattern();
-        let places = SymbolicSparseColMatRef::new_checked(n, n, &pattern.starts, None, &pattern.rows);
-        let (symbolic, ordering) = analyse(K, places, ordering)?;
-
-        let entries = symbolic.len_val();
-        let out_of_memory = NotPositiveDefinite::OutOfMemory { entries };
-        let mut values = Vec::new();
-        values.try_reserve_exact(entries).map_err(|_| out_of_memory)?;
-        values.resize(entries, 0.0);
-        let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(threads.par(), Spec::default());
-        let mut memory = MemBuffer::try_new(scratch).map_err(|_| out_of_memory)?;
-        let factor = symbolic.factorize_numeric_llt(
-            &mut values,
-            SparseColMatRef::new(places, &K.values),
-            Side::Lower,
-            LltRegularization::default(),
-            threads.par(),
-            MemStack::new(&mut memory),
-            Spec::default(),
-        );
-        clear_upper_halves();
-        if let Err(error) = factor {
-            let LltError::NonPositivePivot { index } = error;
-            // faer counts from 0 in some of its kernels and from 1 in others.
-            let index = index.min(n - 1);
-            let order = symbolic.perm().map(|perm| perm.arrays().0);
-            return Err(NotPositiveDefinite::Pivot { unknown: order.map_or(index, |order| order[index] as usize) });
-        }
-        let figures = FactorFigures { size: n, matrix_entries: K.stored(), factor_entries: entries, ordering };
-        let smallest_pivot = smallest_pivot(&symbolic, &values, &K.diagonal());
-        Ok(Self { symbolic, values, figures, smallest_pivot })
+    pub fn new(K: SparseSymmetric, ordering: Ordering, threads: Threads) -> Result<Self, NotPositiveDefinite> {
+        let (n, matrix_entries, diagonal) = (K.size(), K.stored(), K.diagonal());
+        let (symbolic, ordering) = analyse(&K, ordering)?;
+        let columns = match supernodes(&symbolic) {
+            Some(supernodes) => {
+                let ordered = in_order(&K, symbolic.perm().map(|perm| perm.arrays().1));
+                drop(K);
+                factorise(supernodes, &ordered, threads)
+            }
+            None => Ok(Columns::default()),
+        };
+        let columns = columns.map_err(|error| match error {
+            NotPositiveDefinite::Pivot { unknown } => {
+                NotPositiveDefinite::Pivot { unknown: unknown_at(&symbolic, unknown) }
+            }
+            other => other,
+        })?;
+        let figures = FactorFigures { size: n, matrix_entries, factor_entries: columns.values.len(), ordering };
+        let smallest_pivot = smallest_pivot(&symbolic, &columns, &diagonal);
+        Ok(Self { symbolic, columns, figures, smallest_pivot })
     }
 
     /// Size and cost.
@@ -172,7 +161,7 @@ impl Cholesky {
         };
         let mut x: Vec<Row> = (0..self.figures.size).map(|k| B[place(k)]).collect();
         if let Some(supernodes) = supernodes(&self.symbolic) {
-            triangular::solve(supernodes, &self.values, &mut x);
+            triangular::solve(supernodes, &self.columns, &mut x);
         }
         x.iter().enumerate().for_each(|(k, x)| B[place(k)] = *x);
     }
@@ -187,36 +176,92 @@ fn supernodes(symbolic: &SymbolicCholesky<u32>) -> Option<&SymbolicSupernodalCho
     }
 }
 
-/// Over the unknowns: `L_jj² / K_jj`, smallest, with its unknown.
-fn smallest_pivot(symbolic: &SymbolicCholesky<u32>, values: &[f64], diagonal: &[f64]) -> (f64, usize) {
-    let order = symbolic.perm().map(|perm| perm.arrays().0);
-    let mut smallest = (f64::INFINITY, 0);
-    let mut see = |column: usize, L_jj: f64| {
-        let unknown = order.map_or(column, |order| order[column] as usize);
-        let ratio = L_jj * L_jj / diagonal[unknown];
-        // A NaN counts as the smallest of all.
-        if !(ratio >= smallest.0) {
-            smallest = (ratio, unknown);
-        }
+/// The unknown that is eliminated as number `k`.
+fn unknown_at(symbolic: &SymbolicCholesky<u32>, k: usize) -> usize {
+    symbolic.perm().map_or(k, |perm| perm.arrays().0[k] as usize)
+}
+
+/// The lower triangle of `P K Pᵀ`; rows of a column in any order.
+///
+/// * `position`: number at which each unknown is eliminated.
+fn in_order(K: &SparseSymmetric, position: Option<&[u32]>) -> SparseColMat<u32, f64> {
+    let (n, pattern) = (K.size(), K.pattern());
+    let place = |unknown: usize| position.map_or(unknown as u32, |position| position[unknown]);
+    let entries = || {
+        let column = move |j: usize| pattern.column(j).map(move |entry| (entry, j));
+        let lower = move |(entry, j): (usize, usize)| {
+            let (a, b) = (place(pattern.rows[entry] as usize), place(j));
+            (entry, a.max(b), a.min(b))
+        };
+        (0..n).flat_map(column).map(lower)
     };
-    let Some(raw) = supernodes(symbolic) else { return smallest };
-    for s in 0..raw.n_supernodes() {
-        let columns = raw.supernode_begin()[s] as usize..raw.supernode_end()[s] as usize;
-        let block = raw.col_ptr_for_val()[s] as usize..raw.col_ptr_for_val()[s + 1] as usize;
-        let rows = block.len().checked_div(columns.len()).unwrap_or(0);
-        for (k, column) in columns.enumerate() {
-            see(column, values[block.start + k * rows + k]);
+    let mut starts = vec![0_u32; n + 1];
+    entries().for_each(|(_, _, column)| starts[column as usize + 1] += 1);
+    (0..n).for_each(|j| starts[j + 1] += starts[j]);
+    let mut next = starts.clone();
+    let (mut rows, mut values) = (vec![0_u32; K.stored()], vec![0.0; K.stored()]);
+    for (entry, row, column) in entries() {
+        let to = &mut next[column as usize];
+        (rows[*to as usize], values[*to as usize]) = (row, K.values[entry]);
+        *to += 1;
+    }
+    SparseColMat::new(SymbolicSparseColMat::new_unsorted_checked(n, n, starts, None, rows), values)
+}
+
+/// The factor of a matrix whose unknowns are in the order of elimination. The pivot of an error is counted in that order.
+fn factorise(
+    supernodes: &SymbolicSupernodalCholesky<u32>,
+    K: &SparseColMat<u32, f64>,
+    threads: Threads,
+) -> Result<Columns, NotPositiveDefinite> {
+    let entries = supernodes.len_val();
+    let out_of_memory = NotPositiveDefinite::OutOfMemory { entries };
+    let mut values = Vec::new();
+    values.try_reserve_exact(entries).map_err(|_| out_of_memory)?;
+    values.resize(entries, 0.0);
+    let scratch = factorize_supernodal_numeric_llt_scratch::<u32, f64>(supernodes, threads.par(), Spec::default());
+    let mut memory = MemBuffer::try_new(scratch).map_err(|_| out_of_memory)?;
+    let factor = factorize_supernodal_numeric_llt(
+        &mut values,
+        K.as_ref(),
+        LltRegularization::default(),
+        supernodes,
+        threads.par(),
+        MemStack::new(&mut memory),
+        Spec::default(),
+    );
+    clear_upper_halves();
+    match factor {
+        Ok(_) => Ok(Columns::of_blocks(supernodes, values)),
+        // faer counts from 0 in some of its kernels and from 1 in others.
+        Err(LltError::NonPositivePivot { index }) => {
+            Err(NotPositiveDefinite::Pivot { unknown: index.min(K.ncols() - 1) })
+        }
+    }
+}
+
+/// Over the unknowns: `L_jj² / K_jj`, smallest, with its unknown.
+fn smallest_pivot(symbolic: &SymbolicCholesky<u32>, columns: &Columns, diagonal: &[f64]) -> (f64, usize) {
+    let mut smallest = (f64::INFINITY, 0);
+    let Some(supernodes) = supernodes(symbolic) else { return smallest };
+    for s in 0..supernodes.n_supernodes() {
+        let node = columns.supernode(supernodes, s);
+        for k in 0..node.width {
+            let unknown = unknown_at(symbolic, node.first + k);
+            let L_jj = node.entries[node.start_of(k)];
+            let ratio = L_jj * L_jj / diagonal[unknown];
+            // A NaN counts as the smallest of all.
+            if !(ratio >= smallest.0) {
+                smallest = (ratio, unknown);
+            }
         }
     }
     smallest
 }
 
-fn analyse(
-    K: &SparseSymmetric,
-    places: SymbolicSparseColMatRef<'_, u32>,
-    ordering: Ordering,
-) -> Result<(SymbolicCholesky<u32>, Ordering), NotPositiveDefinite> {
-    let n = K.size();
+fn analyse(K: &SparseSymmetric, ordering: Ordering) -> Result<(SymbolicCholesky<u32>, Ordering), NotPositiveDefinite> {
+    let (n, pattern) = (K.size(), K.pattern());
+    let places = SymbolicSparseColMatRef::new_checked(n, n, &pattern.starts, None, &pattern.rows);
     let dissected = match ordering.resolve(n) {
         Ordering::NestedDissection => nested_dissection(K.pattern()),
         _ => None,
@@ -261,13 +306,27 @@ mod tests {
             for n in [0, 1, 2, 7, 60] {
                 for part in [1, 2, 3, 30, 60] {
                     let K = parts(n, part);
-                    let factor = Cholesky::new(&K, ordering, Threads(1)).unwrap();
+                    let factor = Cholesky::new(K.clone(), ordering, Threads(1)).unwrap();
                     let B = DMatrix::from_fn(n, 11, |i, j| ((i * 5 + j * 3) % 13) as f64 - 6.0);
                     let mut X = B.clone();
                     factor.solve_in_place(&mut X);
                     let residual = (K.product(&X) - &B).iter().fold(0.0_f64, |most, r| most.max(r.abs()));
                     assert!(residual < 1e-13, "{n} unknowns in parts of {part}: {residual:e}");
                     assert_eq!(factor.smallest_pivot().0.is_finite(), n > 0);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_stiffness_of_zero_below_zero_or_of_no_number_is_refused_with_its_unknown() {
+        for ordering in [Ordering::MinimumDegree, Ordering::NestedDissection] {
+            for (n, bad) in [(1, 0), (2, 1), (60, 17)] {
+                for value in [0.0, -1.0, f64::NAN] {
+                    let mut K = parts(n, 1);
+                    K.values[bad] = value;
+                    let refused = Cholesky::new(K, ordering, Threads(1)).err();
+                    assert_eq!(refused, Some(NotPositiveDefinite::Pivot { unknown: bad }), "{n} unknowns, {value}");
                 }
             }
         }

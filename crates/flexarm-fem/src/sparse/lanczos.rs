@@ -143,7 +143,8 @@ pub fn smallest_modes(pencil: &mut Pencil<'_>, wanted: ModesWanted) -> Result<Mo
             }
         }
     };
-    Ok(basis.modes(&ritz, found, None))
+    let [modes] = basis.into_modes([(&ritz, found)], None);
+    Ok(modes)
 }
 
 /// The lowest modes of a pencil, and so many of the same without some support, from one basis.
@@ -181,9 +182,8 @@ pub fn modes_of_two_supports(
         let other = basis.released_ritz(released).ok_or(ModesError::NotFinite)?;
         match (found, other.settled(others, others.count(usize::MAX), &basis)?) {
             (Some(found), Some(other_found)) => {
-                let T = Some(released.T);
-                let other = Modes { solves: 0, ..basis.modes(&other, other_found, T) };
-                return Ok((basis.modes(&ritz, found, None), other));
+                let [modes, other] = basis.into_modes([(&ritz, found), (&other, other_found)], Some(released.T));
+                return Ok((modes, Modes { solves: 0, ..other }));
             }
             (None, _) => basis.refuse_if_full(&ritz, count, limit)?,
             (_, None) => basis.refuse_if_full(&other, released_count, limit)?,
@@ -264,7 +264,7 @@ mod tests {
     }
 
     fn modes_of(K: &SparseSymmetric, wanted: ModesWanted) -> Result<Modes, ModesError> {
-        let factor = Cholesky::new(K, Ordering::MinimumDegree, Threads(1)).unwrap();
+        let factor = Cholesky::new(K.clone(), Ordering::MinimumDegree, Threads(1)).unwrap();
         let solve = &mut |F: &mut Block| factor.solve_block(F);
         let mass = &mut |X: &Block, Y: &mut Block| Y.clone_from(X);
         smallest_modes(&mut Pencil { rows: K.size(), dimension: K.size(), solve, mass }, wanted)
@@ -304,7 +304,7 @@ mod tests {
     #[test]
     fn a_body_without_mass_has_no_modes() {
         let (K, _) = chain(20, 1);
-        let factor = Cholesky::new(&K, Ordering::MinimumDegree, Threads(1)).unwrap();
+        let factor = Cholesky::new(K.clone(), Ordering::MinimumDegree, Threads(1)).unwrap();
         let solve = &mut |F: &mut Block| factor.solve_block(F);
         let mass = &mut |_: &Block, Y: &mut Block| *Y = Block::zeros(20, Y.width);
         let found = smallest_modes(&mut Pencil { rows: 20, dimension: 20, solve, mass }, ModesWanted::Count(3));

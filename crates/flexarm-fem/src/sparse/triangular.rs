@@ -13,36 +13,63 @@ use flexarm_spatial::Real;
 use super::block::Row;
 use super::vectors::{Wide, Work, quickly};
 
+/// The columns of a factor, from the diagonal down, supernode by supernode.
+#[derive(Default)]
+pub(super) struct Columns {
+    pub(super) values: Vec<f64>,
+    /// Start of each supernode in `values`.
+    starts: Vec<usize>,
+}
+
+/// Columns of a supernode (the triangle, then the rows below), and those rows.
+pub(super) struct Supernode<'a> {
+    pub(super) first: usize,
+    pub(super) width: usize,
+    height: usize,
+    pub(super) entries: &'a [f64],
+    below: &'a [u32],
+}
+
+impl Columns {
+    /// Leaves out of the blocks of a factorisation what is above the diagonal, an eighth of all.
+    pub(super) fn of_blocks(symbolic: &SymbolicSupernodalCholesky<u32>, mut values: Vec<f64>) -> Self {
+        let mut starts = Vec::with_capacity(symbolic.n_supernodes());
+        let mut to = 0;
+        for s in 0..symbolic.n_supernodes() {
+            starts.push(to);
+            let width = (symbolic.supernode_end()[s] - symbolic.supernode_begin()[s]) as usize;
+            let height = width + symbolic.supernode(s).pattern().len();
+            for k in 0..width {
+                let from = symbolic.col_ptr_for_val()[s] as usize + k * height + k;
+                values.copy_within(from..from + height - k, to);
+                to += height - k;
+            }
+        }
+        values.truncate(to);
+        values.shrink_to_fit();
+        Self { values, starts }
+    }
+
+    #[inline(always)]
+    pub(super) fn supernode<'a>(&'a self, symbolic: &'a SymbolicSupernodalCholesky<u32>, s: usize) -> Supernode<'a> {
+        let node = symbolic.supernode(s);
+        let (first, below) = (node.start(), node.pattern());
+        let width = symbolic.supernode_end()[s] as usize - first;
+        let height = width + below.len();
+        let entries = &self.values[self.starts[s]..][..width * height - width * (width - 1) / 2];
+        Supernode { first, width, height, entries, below }
+    }
+}
+
 /// Replaces `x`, in the order of elimination, by `L⁻ᵀ L⁻¹ x`.
-pub(super) fn solve(symbolic: &SymbolicSupernodalCholesky<u32>, values: &[f64], x: &mut [Row]) {
-    quickly(Solve { symbolic, values, x });
+pub(super) fn solve(symbolic: &SymbolicSupernodalCholesky<u32>, columns: &Columns, x: &mut [Row]) {
+    quickly(Solve { symbolic, columns, x });
 }
 
 struct Solve<'a> {
     symbolic: &'a SymbolicSupernodalCholesky<u32>,
-    values: &'a [f64],
+    columns: &'a Columns,
     x: &'a mut [Row],
-}
-
-/// Columns of a supernode, their entries by columns of `height` (the triangle, then the rows below), and those rows.
-struct Supernode<'a> {
-    first: usize,
-    width: usize,
-    height: usize,
-    entries: &'a [f64],
-    below: &'a [u32],
-}
-
-impl Solve<'_> {
-    #[inline(always)]
-    fn supernode(&self, s: usize) -> Supernode<'_> {
-        let node = self.symbolic.supernode(s);
-        let (first, below) = (node.start(), node.pattern());
-        let width = self.symbolic.supernode_end()[s] as usize - first;
-        let height = width + below.len();
-        let start = self.symbolic.col_ptr_for_val()[s] as usize;
-        Supernode { first, width, height, entries: &self.values[start..][..width * height], below }
-    }
 }
 
 impl Work for Solve<'_> {
@@ -54,7 +81,7 @@ impl Work for Solve<'_> {
         let x = std::mem::take(&mut self.x);
         let mut rows = Vec::new();
         for s in 0..count {
-            let node = self.supernode(s);
+            let node = self.columns.supernode(self.symbolic, s);
             node.rows_into(&mut rows);
             for k in (0..node.width).step_by(4) {
                 match node.width - k {
@@ -66,7 +93,7 @@ impl Work for Solve<'_> {
             }
         }
         for s in (0..count).rev() {
-            let node = self.supernode(s);
+            let node = self.columns.supernode(self.symbolic, s);
             node.rows_into(&mut rows);
             for k in (0..node.width).step_by(4).rev() {
                 match node.width - k {
@@ -89,12 +116,18 @@ impl<'a> Supernode<'a> {
         rows.extend_from_slice(self.below);
     }
 
-    /// Entries of `N` columns from column `k` on, from row `from` on.
+    /// Where column `k` begins, with its diagonal.
+    #[inline(always)]
+    pub(super) fn start_of(&self, k: usize) -> usize {
+        k * (2 * self.height + 1 - k) / 2
+    }
+
+    /// Entries of `N` columns from column `k` on, from row `from` on; what they say above the diagonal belongs to other columns.
     #[inline(always)]
     fn columns<const N: usize>(&self, k: usize, from: usize) -> [&'a [f64]; N] {
         let mut columns = [&self.entries[..0]; N];
         for (c, column) in columns.iter_mut().enumerate() {
-            *column = &self.entries[(k + c) * self.height + from..][..self.height - from];
+            *column = &self.entries[self.start_of(k + c) + from - (k + c)..][..self.height - from];
         }
         columns
     }

@@ -16,31 +16,23 @@ pub(crate) trait Work {
 
 /// Does the work.
 pub(crate) fn quickly<W: Work>(work: W) -> W::Output {
-    let mut kept = Some(work);
     #[cfg(target_arch = "x86_64")]
-    {
+    if flexarm_spatial::lanes::most_lanes() > 1 {
         use flexarm_spatial::lanes::{OverLanes, with_four_lanes};
 
-        struct Compiled<'a, W>(&'a mut Option<W>);
-        impl<W: Work> OverLanes for Compiled<'_, W> {
-            type Output = Option<W::Output>;
+        struct InLanes<W>(W);
+        impl<W: Work> OverLanes for InLanes<W> {
+            type Output = W::Output;
 
             #[inline(always)]
-            fn run<T: Real>(self) -> Self::Output {
+            fn run<T: Real>(self) -> W::Output {
                 const { assert!(2 * T::LANES == WIDTH, "two vectors are a row") };
-                // No closure: it would lose the instructions.
-                let work = self.0.take()?;
-                Some(work.run::<T, 2>())
+                self.0.run::<T, 2>()
             }
         }
-        if let Some(Some(done)) = with_four_lanes(Compiled(&mut kept)) {
-            return done;
-        }
+        return with_four_lanes(InLanes(work)).unwrap_or_else(|| unreachable!("a processor with lanes has four"));
     }
-    match kept {
-        Some(work) => work.run::<f64, WIDTH>(),
-        None => unreachable!("work that was taken gave its result"),
-    }
+    work.run::<f64, WIDTH>()
 }
 
 /// A row in vectors.

@@ -3,10 +3,13 @@
 use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::{Modes, ModesError, Pencil, Released, Ritz};
-use crate::sparse::block::{Block, WIDTH, grams, subtract_products};
+use crate::sparse::block::{Block, WIDTH, combine, grams, subtract_products};
 
 /// What is left of a direction, over the largest θ, that is rounding of the operator.
 const NOISE: f64 = 1e-13;
+/// Size of `K⁻¹ M x` over that of x, in parts of the largest one of the first block, below which it is rounding: uniform acceleration
+/// moves nothing in some directions.
+const VANISHED: f64 = 1e-10;
 /// Smallest eigenvalue of the scaled Gram matrix of a block below which a direction is dropped.
 const DEPENDENT: f64 = 1e-10;
 /// The same, below which the block is orthogonalised once more: a near-dependent block magnifies what was left.
@@ -25,6 +28,8 @@ pub(super) struct Basis {
     pub(super) coupling: DMatrix<f64>,
     /// Of the shapes of a support that is taken away.
     pub(super) beside: Option<Beside>,
+    /// Of the space that is to be spanned.
+    dimension: usize,
     solves: usize,
     next_look: usize,
 }
@@ -59,6 +64,7 @@ impl Basis {
         }
         let mut MW = Block::zeros(rows, W.width);
         (pencil.mass)(&W, &mut MW);
+        let sizes2 = W.gram(&MW).diagonal();
         W.clone_from(&MW);
         (pencil.solve)(&mut W);
         let products = released.map(|released| {
@@ -73,10 +79,11 @@ impl Basis {
             projected: DMatrix::zeros(0, 0),
             coupling: DMatrix::zeros(0, 0),
             beside: None,
+            dimension: pencil.dimension,
             solves: W.width,
             next_look: 0,
         };
-        basis.append(W, MW, pencil)?;
+        basis.append(W, MW, pencil, sizes2.as_slice())?;
         if basis.is_exhausted() {
             // No vector has mass.
             return Err(ModesError::NotFinite);
@@ -136,7 +143,7 @@ impl Basis {
             H.view_mut((old - before, old), (before, now)).copy_from(&self.coupling.transpose());
         }
         self.projected = H;
-        self.append(W, MW, pencil)
+        self.append(W, MW, pencil, &[])
     }
 
     /// Makes `W` M-orthonormal and takes it as the newest block; directions that vanish are dropped.
@@ -145,16 +152,30 @@ impl Basis {
     /// G = Wᵀ M W,   V = W B with Bᵀ G B = 1,   R = Vᵀ M W = Bᵀ G
     /// ```
     /// * `MW`: room for M times it.
-    fn append(&mut self, mut W: Block, mut MW: Block, pencil: &mut Pencil<'_>) -> Result<(), ModesError> {
+    /// * `sizes2`: at the start, `xᵀ M x` of the columns of which W is `K⁻¹ M`.
+    fn append(
+        &mut self,
+        mut W: Block,
+        mut MW: Block,
+        pencil: &mut Pencil<'_>,
+        sizes2: &[f64],
+    ) -> Result<(), ModesError> {
         (pencil.mass)(&W, &mut MW);
-        let G = W.gram(&MW);
+        let mut G = W.gram(&MW);
         if G.iter().any(|x| !x.is_finite()) {
             return Err(ModesError::NotFinite);
+        }
+        let most = sizes2.iter().enumerate().map(|(k, size2)| G[(k, k)] / size2).fold(0.0, f64::max);
+        for (k, size2) in sizes2.iter().enumerate() {
+            if G[(k, k)] <= VANISHED.powi(2) * most * size2 {
+                G.row_mut(k).fill(0.0);
+                G.column_mut(k).fill(0.0);
+            }
         }
         // What is left after orthogonalisation must stand out of the rounding of the operator.
         let reference = self.projected.diagonal().iter().fold(0.0, |peak: f64, h| peak.max(h.abs()));
         let (Q, smallest) = orthonormalising(&G, NOISE * reference);
-        if Q.ncols() == 0 {
+        if Q.ncols() == 0 || self.len() >= self.dimension {
             self.coupling = DMatrix::zeros(0, W.width);
             self.newest = Block::zeros(W.rows.len(), 0);
             self.mass_newest = self.newest.clone();
@@ -225,28 +246,42 @@ impl Basis {
         (&self.coupling * bottom).column_iter().zip(theta).map(|(r, theta)| r.norm() / theta).collect()
     }
 
-    /// The first `count` modes; `T`: the shapes beside the basis.
-    pub(super) fn modes(&self, ritz: &Ritz, count: usize, T: Option<&Block>) -> Modes {
+    /// The first modes of each of some Ritz pairs, so many; `T`: the shapes beside the basis.
+    ///
+    /// The shapes take the place of the basis, which would be half of all memory beside them.
+    pub(super) fn into_modes<const N: usize>(self, of: [(&Ritz, usize); N], T: Option<&Block>) -> [Modes; N] {
         let rows = self.newest.rows.len();
-        let mut shapes = DMatrix::zeros(rows, count);
-        for first in (0..count).step_by(WIDTH) {
-            let width = WIDTH.min(count - first);
-            let mut block = Block::zeros(rows, width);
-            subtract_products(&mut block, &self.blocks, &-ritz.vectors.columns(first, width));
-            if let Some(T) = T {
-                block.subtract_product(T, &-ritz.beside.columns(first, width));
-            }
-            block.put_columns(&mut shapes, first);
-        }
-        for mut shape in shapes.column_iter_mut() {
-            let peak =
-                shape.iter().fold(0.0, |peak: f64, x| if x.abs() > peak.abs() * (1.0 + 1e-9) { *x } else { peak });
-            if peak < 0.0 {
-                shape.neg_mut();
+        let Self { mut blocks, newest, mass_newest, projected, solves, .. } = self;
+        drop((newest, mass_newest));
+        blocks.extend(T.cloned());
+        let vectors = projected.nrows() + T.map_or(0, |T| T.width);
+        let mut factors = Vec::new();
+        for (ritz, count) in of {
+            for first in (0..count).step_by(WIDTH) {
+                let width = WIDTH.min(count - first);
+                let mut C = DMatrix::zeros(vectors, width);
+                C.rows_mut(0, projected.nrows()).copy_from(&ritz.vectors.columns(first, width));
+                C.rows_mut(projected.nrows(), ritz.beside.nrows()).copy_from(&ritz.beside.columns(first, width));
+                factors.push(C);
             }
         }
-        let omega2 = ritz.theta[..count].iter().map(|theta| 1.0 / theta).collect();
-        Modes { omega2, shapes, residuals: ritz.residuals[..count].to_vec(), solves: self.solves }
+        combine(&mut blocks, &factors);
+        let mut combined = blocks.into_iter();
+        of.map(|(ritz, count)| {
+            let mut shapes = DMatrix::zeros(rows, count);
+            for (first, block) in (0..count).step_by(WIDTH).zip(&mut combined) {
+                block.put_columns(&mut shapes, first);
+            }
+            for mut shape in shapes.column_iter_mut() {
+                let peak =
+                    shape.iter().fold(0.0, |peak: f64, x| if x.abs() > peak.abs() * (1.0 + 1e-9) { *x } else { peak });
+                if peak < 0.0 {
+                    shape.neg_mut();
+                }
+            }
+            let omega2 = ritz.theta[..count].iter().map(|theta| 1.0 / theta).collect();
+            Modes { omega2, shapes, residuals: ritz.residuals[..count].to_vec(), solves }
+        })
     }
 }
 
