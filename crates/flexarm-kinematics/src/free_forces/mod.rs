@@ -101,7 +101,7 @@ impl<S: Space> PointTree<S> {
             let row = if roles.prescribed_body[i] { None } else { row(body.coordinate) };
             nodes.push(Node::new(body, parts[i], row, &tree.inertia(i))?);
             if let Some(parent) = body.parent.checked_sub(1) {
-                nodes[parent].branches |= body.parent + 1 != i;
+                nodes[parent].keeps_motion |= body.parent + 1 != i;
             }
         }
         let single = model.rotors.iter().map(|&(k, inertia)| (k, k, inertia));
@@ -155,7 +155,7 @@ impl<S: Space> PointTree<S> {
                 Some(parent) if parent + 1 == i => node.follow(&last, &rates),
                 Some(parent) => node.follow(&inward[parent].moving, &rates),
             };
-            if node.branches {
+            if node.keeps_motion {
                 node.moving = last;
             }
             if node.part == Part::Loading {

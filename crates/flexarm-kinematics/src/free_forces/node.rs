@@ -34,9 +34,9 @@ pub(super) struct Node<S: Space> {
     pub(super) B: S::Both,
     /// `R_PJ` of an elastic joint.
     pub(super) R_PJ: S::Both,
-    /// Its motion, where a body other than the next one hangs on it.
+    /// Its motion, where that is kept: where a body other than the next one hangs on it, or it is looked at.
     pub(super) moving: Moving<S>,
-    pub(super) branches: bool,
+    pub(super) keeps_motion: bool,
     pub(super) force: S::Vector,
     pub(super) torque: S::Vector,
     /// Inertia of the body with all that it carries outward.
@@ -149,7 +149,7 @@ impl<S: Space> Node<S> {
                 S::components(&S::fixed(&c)),
             )),
             moving: Moving { omega: zero, alpha: zero, a: zero, W: matrix },
-            branches: false,
+            keeps_motion: false,
             force: zero,
             torque: zero,
             composite: Composite { mass: S::Real::splat(0.0), h: zero, I: matrix },

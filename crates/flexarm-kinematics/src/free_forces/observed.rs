@@ -65,7 +65,8 @@ struct Sums {
 impl<S: Space<Real = f64>> ObservedTree<S> {
     #[inline(always)]
     fn of(model: &Model) -> Option<Self> {
-        let tree = PointTree::of(model, &Roles::all_free(model))?;
+        let mut tree = PointTree::of(model, &Roles::all_free(model))?;
+        tree.nodes.iter_mut().for_each(|node| node.keeps_motion = true);
         let zero = S::fixed(&Fixed::default());
         let placed = Placed { R: S::dyad_both(&zero, &zero, &zero, 1.0), p: zero, v: zero };
         Some(Self { placed: vec![placed; model.bodies.len() - 1], tree })
