@@ -139,7 +139,8 @@ proptest! {
     }
 
     /// Poses, forces and energies of one pass over points are those of the recursions over spatial vectors, and packed vectors have the
-    /// bits of numbers. Measured 3e-13 of the forces, 2e-15 of a pose, 4e-15 of the energies.
+    /// bits of numbers. Measured in 288 trees: 4e-15 of the forces, 9e-16 of a pose, 6e-15 of a velocity, 5e-15 of an acceleration,
+    /// 2e-15 and 2e-16 of the energies.
     #[test]
     fn what_is_observed_in_one_pass_is_what_the_recursions_find(seed in any::<u64>(), n in 1usize..=40) {
         // Balancers and links that bend in modes are not for it.
@@ -155,31 +156,35 @@ proptest! {
                 energies = observer.observe(&model, motions, Some(&data.F_ext), &mut X_WB, tau.as_mut_slice());
             };
             assert_eq!(count_allocations(observe), 0);
-            let motions: Vec<_> = (1..model.bodies().len()).map(|body| observer.motion(body)).collect();
-            (X_WB, tau, energies, motions)
+            let moving: Vec<_> = (1..model.bodies().len()).map(|body| observer.motion(body)).collect();
+            // Without forces the poses and velocities have the same bits.
+            let mut placed = vec![Pose::identity(); X_WB.len()];
+            assert_eq!(count_allocations(|| observer.place(motions, &mut placed)), 0);
+            assert!(placed == X_WB && moving.iter().zip(1..).all(|(moving, body)| observer.motion(body) == *moving));
+            (X_WB, tau, energies, moving)
         });
         let [(X_WB, found, energies, moving), packed] = &seen;
         prop_assert!(*X_WB == packed.0 && *found == packed.1 && *energies == packed.2 && *moving == packed.3);
         let r = Vector3::new(0.3, -0.2, 0.5);
         for ((moving, V), A) in moving.iter().zip(&data.V[1..]).zip(&data.A[1..]) {
             let velocity = V.linear + V.angular.cross(&r);
-            let error = (moving.velocity(&r) - velocity).norm() / velocity.norm();
-            prop_assert!(error <= 1e-12, "velocity {error:e}");
+            let error = (moving.velocity(&r) - velocity).norm() / velocity.norm().max(1.0);
+            prop_assert!(error <= 1e-13, "velocity {error:e}");
             // Spatial acceleration + w × v is that of the point.
             let acceleration = A.linear + A.angular.cross(&r) + V.angular.cross(&velocity);
             let error = (moving.acceleration(&r) - acceleration).norm() / acceleration.norm().max(9.0);
-            prop_assert!(error <= 1e-12, "acceleration {error:e}");
+            prop_assert!(error <= 1e-13, "acceleration {error:e}");
         }
         prop_assert!((found - &tau).amax() <= 1e-11 * tau.amax(), "{:e}", (found - &tau).amax() / tau.amax());
         let size = X_WB.iter().map(|X| X.translation.vector.norm()).fold(1.0, f64::max);
         for (X, truth) in X_WB.iter().zip(&data.X_WB) {
             let shift = (X.translation.vector - truth.translation.vector).norm() / size;
             let turn = (X.rotation.matrix() - truth.rotation.matrix()).amax();
-            prop_assert!(shift.max(turn) <= 1e-13, "{shift:e} {turn:e}");
+            prop_assert!(shift.max(turn) <= 1e-14, "{shift:e} {turn:e}");
         }
         let weight = model.moving_mass() * model.gravity.norm() * size;
-        prop_assert!((energies[0] - truth[0]).abs() <= 1e-12 * truth[0], "{:e}", energies[0] / truth[0] - 1.0);
-        prop_assert!((energies[1] - truth[1]).abs() <= 1e-13 * weight, "{:e}", (energies[1] - truth[1]) / weight);
+        prop_assert!((energies[0] - truth[0]).abs() <= 1e-13 * truth[0], "{:e}", energies[0] / truth[0] - 1.0);
+        prop_assert!((energies[1] - truth[1]).abs() <= 1e-14 * weight, "{:e}", (energies[1] - truth[1]) / weight);
     }
 
     /// The tangent of the static forces, with loads that keep their direction and loads that turn along, is what central

@@ -114,8 +114,8 @@ fn size(error: &[f64; 6]) -> f64 {
 impl Trace {
     /// Most samples of a run whose rows and curves are kept as they are.
     pub const WHOLE: usize = 1 << 13;
-    /// Rows at which a run is thinned: five times as many as a plot has points.
-    pub const LIMIT: usize = 1 << 14;
+    /// Rows at which a run is thinned: ten times as many as a plot has points.
+    pub const LIMIT: usize = 1 << 15;
     /// First samples of a long run whose errors are kept, for its spectrum.
     pub const BEGINNING: usize = 100_000;
 

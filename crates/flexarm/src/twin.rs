@@ -22,7 +22,7 @@ pub(crate) struct RigidTwin {
     pub(crate) acceleration: Vector3<f64>,
     /// What stands where, and how it moves, in [`Self::data`] and [`Self::J`]; `None` where other functions were there last.
     placed: Option<(Arc<Model>, State)>,
-    /// Forces come from it, if the tree is for it, with the inertias of this model; made with the first forces.
+    /// All comes from it, if the tree is for it, with the inertias of this model; made at the first look.
     observer: Option<(Arc<Model>, Option<Observer>)>,
 }
 
@@ -65,12 +65,10 @@ impl RigidTwin {
         } else {
             self.placed = Some((arm.model.clone(), self.state.clone()));
         }
+        if self.look(&arm.model, tcp, false) {
+            return;
+        }
         forward_kinematics_velocity(&arm.model, &mut self.data, &self.state);
-        self.look_at_tool(arm, tcp);
-    }
-
-    /// Jacobian and velocity of the tool, from poses and twists.
-    fn look_at_tool(&mut self, arm: &FlexibleArm, tcp: &Frame) {
         frame_jacobian(&arm.model, &self.data, tcp, &mut self.J);
         self.velocity = frame_twist(&self.data, tcp).linear;
     }
@@ -80,19 +78,13 @@ impl RigidTwin {
         self.placed = None;
         let model = &arm.model;
         arm.prescribed_state(t, &mut self.state, &mut self.qddot);
-        if tcp.body > 0 && self.observe(model) {
-            frame_jacobian(model, &self.data, tcp, &mut self.J);
-            if let Some((_, Some(observer))) = &mut self.observer {
-                let (moving, R) = (observer.motion(tcp.body), self.data.X_WB[tcp.body].rotation);
-                let r = &tcp.X_BF.translation.vector;
-                self.velocity = R * moving.velocity(r);
-                self.acceleration = R * moving.acceleration(r) + model.gravity;
-            }
+        if self.look(model, tcp, true) {
             return;
         }
         inverse_dynamics(model, &mut self.data, &self.state, &self.qddot);
         world_poses(model, &mut self.data);
-        self.look_at_tool(arm, tcp);
+        frame_jacobian(model, &self.data, tcp, &mut self.J);
+        self.velocity = frame_twist(&self.data, tcp).linear;
         // Acceleration of the point: spatial acceleration + w × v, gravity taken out again.
         let V = self.data.V[tcp.body].at_child(&tcp.X_BF);
         let A = self.data.A[tcp.body].at_child(&tcp.X_BF);
@@ -100,13 +92,14 @@ impl RigidTwin {
         self.acceleration = R * (A.linear + V.angular.cross(&V.linear)) + model.gravity;
     }
 
-    /// Poses in the world and forces of the state into `data`, in one pass; false where the tree is not for it.
-    fn observe(&mut self, model: &Arc<Model>) -> bool {
+    /// Poses in the world, Jacobian and velocity of the tool, with forces its acceleration as well, from one pass; false where
+    /// the tree is not for it.
+    fn look(&mut self, model: &Arc<Model>, tcp: &Frame, with_forces: bool) -> bool {
         let Self { data, state, qddot, observer, .. } = self;
         let (weighed, observer) = observer.get_or_insert_with(|| {
             // What the Jacobian needs of springs, which stay as they are.
             forward_kinematics(model, data, &state.q);
-            (model.clone(), Observer::new(model))
+            (model.clone(), if tcp.body > 0 { Observer::new(model) } else { None })
         });
         let Some(observer) = observer else { return false };
         if !Arc::ptr_eq(weighed, model) {
@@ -114,7 +107,17 @@ impl RigidTwin {
             weighed.clone_from(model);
         }
         let motions = Motions { q: state.q.as_slice(), qdot: state.qdot.as_slice(), qddot: qddot.as_slice() };
-        observer.observe(model, motions, None, &mut data.X_WB, data.tau.as_mut_slice());
+        if with_forces {
+            observer.observe(model, motions, None, &mut data.X_WB, data.tau.as_mut_slice());
+        } else {
+            observer.place(motions, &mut data.X_WB);
+        }
+        let (moving, R, r) = (observer.motion(tcp.body), &data.X_WB[tcp.body].rotation, &tcp.X_BF.translation.vector);
+        self.velocity = R * moving.velocity(r);
+        if with_forces {
+            self.acceleration = R * moving.acceleration(r) + model.gravity;
+        }
+        frame_jacobian(model, data, tcp, &mut self.J);
         true
     }
 }

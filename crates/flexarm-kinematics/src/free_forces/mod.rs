@@ -122,6 +122,23 @@ impl<S: Space> PointTree<S> {
         }
     }
 
+    /// Sines and cosines of the joints that turn.
+    #[inline(always)]
+    fn turn_joints(&mut self, q: &[S::Real]) {
+        for node in &self.nodes {
+            if let NodeJoint::Turns { turning, .. } = node.joint {
+                self.angles[turning] = node.value(q);
+            }
+        }
+        S::sin_cos_all(&self.angles, &mut self.sines, &mut self.cosines);
+    }
+
+    /// Angular velocity of the world.
+    #[inline(always)]
+    fn still(&self) -> S::Vector {
+        S::scaled(&self.up, S::Real::splat(0.0))
+    }
+
     /// Generalised forces `τ = M(q) q̈ + bias(q, q̇)` (N m or N) of the free coordinates, in their order, into `tau`.
     ///
     /// * `loads`: external wrench on each body at Bo, B axes, if there are any; they are subtracted.
@@ -132,13 +149,8 @@ impl<S: Space> PointTree<S> {
         loads: Option<&[Wrench<S::Real>]>,
         tau: &mut [S::Real],
     ) {
-        for node in &self.nodes {
-            if let NodeJoint::Turns { turning, .. } = node.joint {
-                self.angles[turning] = node.value(motions.q);
-            }
-        }
-        S::sin_cos_all(&self.angles, &mut self.sines, &mut self.cosines);
-        let still = S::scaled(&self.up, S::Real::splat(0.0));
+        self.turn_joints(motions.q);
+        let still = self.still();
         let world =
             Moving { omega: still, alpha: still, a: self.up, W: S::dyad(&still, &still, &still, S::Real::splat(0.0)) };
         let mut last = world;

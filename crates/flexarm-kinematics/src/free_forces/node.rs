@@ -223,6 +223,13 @@ impl<S: Space> Node<S> {
         }
     }
 
+    /// (1) alone.
+    #[inline(always)]
+    pub(super) fn turns_with(&self, parent: &S::Vector, rates: &JointRates<S>) -> S::Vector {
+        let omega = S::turn_back(&self.R, parent);
+        rates.turn.as_ref().map_or(omega, |[w, _]| S::add(&omega, w))
+    }
+
     /// ṗ, P axes, of a joint that shifts its body.
     #[inline(always)]
     pub(super) fn shift_rate(&self, qdot: &[S::Real]) -> Option<S::Vector> {

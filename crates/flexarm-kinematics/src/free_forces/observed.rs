@@ -20,6 +20,7 @@ use crate::model::Model;
 struct Placed<S: Space> {
     R: S::Both,
     p: S::Vector,
+    omega: S::Vector,
     v: S::Vector,
 }
 
@@ -68,7 +69,7 @@ impl<S: Space<Real = f64>> ObservedTree<S> {
         let mut tree = PointTree::of(model, &Roles::all_free(model))?;
         tree.nodes.iter_mut().for_each(|node| node.keeps_motion = true);
         let zero = S::fixed(&Fixed::default());
-        let placed = Placed { R: S::dyad_both(&zero, &zero, &zero, 1.0), p: zero, v: zero };
+        let placed = Placed { R: S::dyad_both(&zero, &zero, &zero, 1.0), p: zero, omega: zero, v: zero };
         Some(Self { placed: vec![placed; model.bodies.len() - 1], tree })
     }
 
@@ -81,34 +82,53 @@ impl<S: Space<Real = f64>> ObservedTree<S> {
         tau: &mut [f64],
     ) -> Sums {
         self.tree.forces(motions, loads, tau);
-        let zero = S::fixed(&Fixed::default());
-        let (mut kinetic, mut moment) = (0.0, zero);
-        for (i, node) in self.tree.nodes.iter().enumerate() {
-            let mut v = node.shift_rate(motions.qdot).unwrap_or(zero);
-            let (mut R, mut p) = (node.R, node.p);
-            if let Some(parent) = node.parent {
-                let (omega, parent) = (&self.tree.nodes[parent].moving.omega, &self.placed[parent]);
-                v = S::add(&S::add(&parent.v, &S::cross(omega, &p)), &v);
-                p = S::add(&parent.p, &S::turn(&parent.R, &p));
-                R = S::turned(&parent.R, &R);
-            }
-            v = S::turn_back(&node.R, &v);
-            let omega = &node.moving.omega;
-            let own = node.mass * S::dot(&v, &v) + S::dot(omega, &S::mul(&node.I, omega));
-            kinetic += 0.5 * own + S::dot(&v, &S::cross(omega, &node.h));
+        let (mut kinetic, mut moment) = (0.0, S::fixed(&Fixed::default()));
+        for i in 0..self.placed.len() {
+            let Placed { R, p, omega, v } = self.follow(i, self.tree.nodes[i].moving.omega, motions.qdot, X_WB);
+            let node = &self.tree.nodes[i];
+            let own = node.mass * S::dot(&v, &v) + S::dot(&omega, &S::mul(&node.I, &omega));
+            kinetic += 0.5 * own + S::dot(&v, &S::cross(&omega, &node.h));
             moment = S::add(&moment, &S::add(&S::turn(&R, &node.h), &S::scaled(&p, node.mass)));
-            X_WB[i + 1] = pose(S::entries(&R), S::components(&p));
-            self.placed[i] = Placed { R, p, v };
         }
         Sums { kinetic, moment: S::components(&moment) }
+    }
+
+    /// Poses and velocities alone, the same bits.
+    #[inline(always)]
+    fn place(&mut self, motions: Motions<'_, f64>, X_WB: &mut [Pose]) {
+        self.tree.turn_joints(motions.q);
+        let still = self.tree.still();
+        for i in 0..self.placed.len() {
+            let PointTree { nodes, sines, cosines, .. } = &mut self.tree;
+            let rates = nodes[i].place(motions, sines, cosines);
+            let parent = nodes[i].parent.map_or(still, |parent| self.placed[parent].omega);
+            let omega = nodes[i].turns_with(&parent, &rates);
+            self.follow(i, omega, motions.qdot, X_WB);
+        }
+    }
+
+    /// (7) and the poses of (9), for a body that turns so, B axes.
+    #[inline(always)]
+    fn follow(&mut self, i: usize, omega: S::Vector, qdot: &[f64], X_WB: &mut [Pose]) -> Placed<S> {
+        let node = &self.tree.nodes[i];
+        let mut v = node.shift_rate(qdot).unwrap_or(S::fixed(&Fixed::default()));
+        let (mut R, mut p) = (node.R, node.p);
+        if let Some(parent) = node.parent.map(|parent| &self.placed[parent]) {
+            v = S::add(&S::add(&parent.v, &S::cross(&parent.omega, &p)), &v);
+            p = S::add(&parent.p, &S::turn(&parent.R, &p));
+            R = S::turned(&parent.R, &R);
+        }
+        v = S::turn_back(&node.R, &v);
+        X_WB[i + 1] = pose(S::entries(&R), S::components(&p));
+        self.placed[i] = Placed { R, p, omega, v };
+        self.placed[i]
     }
 
     /// Of a body other than the world.
     #[inline(always)]
     fn motion(&self, body: usize) -> BodyMotion {
-        let moving = &self.tree.nodes[body - 1].moving;
-        let [v, omega, a, alpha] =
-            [&self.placed[body - 1].v, &moving.omega, &moving.a, &moving.alpha].map(S::components);
+        let (placed, moving) = (&self.placed[body - 1], &self.tree.nodes[body - 1].moving);
+        let [v, omega, a, alpha] = [&placed.v, &placed.omega, &moving.a, &moving.alpha].map(S::components);
         BodyMotion { v, omega, a, alpha }
     }
 }
@@ -165,7 +185,17 @@ impl Observer {
         [kinetic + rotor_energy(model, motions.qdot), -model.gravity.dot(&moment)]
     }
 
-    /// How a body moved in the last observation.
+    /// Poses as [`Observer::observe`] finds them, and velocities; neither forces nor accelerations.
+    pub fn place(&mut self, motions: Motions<'_, f64>, X_WB: &mut [Pose]) {
+        X_WB[0] = Pose::identity();
+        match &mut self.0 {
+            Way::Plain(tree) => tree.place(motions, X_WB),
+            #[cfg(target_arch = "x86_64")]
+            Way::Packed(room) => room.run(packed::Place(motions, X_WB)),
+        }
+    }
+
+    /// How a body moved in the last observation; after [`Observer::place`] its velocities are new.
     ///
     /// # Panics
     /// If the body is not one of the tree, or is the world.
@@ -233,6 +263,16 @@ mod packed {
         #[inline(always)]
         fn run<S: Space<Real = f64>>(self, tree: &mut ObservedTree<S>) {
             *self.sums = tree.observe(self.motions, self.loads, self.X_WB, self.tau);
+        }
+    }
+
+    /// See [`super::Observer::place`].
+    pub(super) struct Place<'a>(pub(super) Motions<'a, f64>, pub(super) &'a mut [Pose]);
+
+    impl OverPacked<Tree> for Place<'_> {
+        #[inline(always)]
+        fn run<S: Space<Real = f64>>(self, tree: &mut ObservedTree<S>) {
+            tree.place(self.0, self.1);
         }
     }
 
