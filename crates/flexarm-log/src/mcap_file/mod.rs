@@ -1,7 +1,7 @@
 //! A run as an MCAP file of ROS 2 messages, for Foxglove, PlotJuggler, Rerun and ROS itself.
 //!
 //! Profile `ros2`: CDR messages, their definitions embedded, `offered_qos_profiles` on every channel. Chunks of
-//! at most 1 MiB, compressed with zstd, are closed where the data says so; between two chunks the open one is
+//! at most 1 MiB (2 in a long file), compressed with zstd, are closed where the data says so; between two chunks the open one is
 //! in the file as a provisional chunk with a provisional index ([`index`], [`crate::tail_file`]), so that what a
 //! killed run leaves is a whole MCAP file.
 //!
