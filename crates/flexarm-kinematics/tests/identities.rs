@@ -131,6 +131,13 @@ proptest! {
             numbers.mass(M.as_mut_slice());
             registers.mass(M_quick.as_mut_slice());
             prop_assert_eq!(&M, &M_quick);
+            // At positions alone the same bits.
+            let mut at_q = DMatrix::from_element(free.len(), free.len(), f64::NAN);
+            let mut others = FreeForces::new(&model, &roles).unwrap();
+            others.mass_at(state.q.as_slice(), at_q.as_mut_slice());
+            prop_assert_eq!(&M, &at_q);
+            assert_eq!(count_allocations(|| others.mass_at(state.q.as_slice(), at_q.as_mut_slice())), 0);
+            prop_assert_eq!(&M, &at_q);
             let whole = mass_matrix(&model, &mut data, &state.q);
             let of_free = DMatrix::from_fn(free.len(), free.len(), |i, j| whole[(free[i], free[j])]);
             let scale = whole.amax();

@@ -33,6 +33,7 @@ pub mod lanes;
 #[cfg(target_arch = "x86_64")]
 pub mod packed;
 pub mod products;
+pub mod quickest;
 mod real;
 mod rotation;
 pub mod space;

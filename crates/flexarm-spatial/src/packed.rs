@@ -1,7 +1,7 @@
 //! Vectors of three numbers in one register each, for processors with AVX2: what a recursion over one run is fastest in.
 //!
-//! `Packed` is a [`Space`]: it has the bits of [`crate::space::Plain`]. Nobody outside can name it: it is what a [`PackedRoom`] hands to
-//! its work, and there is none where the processor does not have the instructions.
+//! `Packed` is a [`Space`]: it has the bits of [`crate::space::Plain`]. Nobody outside can name it: it is what [`crate::quickest::Quickest`]
+//! hands to its work, where the processor has the instructions.
 
 #![allow(unsafe_code, reason = "vector instructions, which are called where they were found to be there")]
 
@@ -14,6 +14,7 @@ use std::arch::x86_64::{
 use nalgebra::{Matrix3, Vector3};
 
 use crate::products::columns;
+use crate::quickest::{Kept, Make, Work};
 use crate::space::{Fixed, Space, TurnTable};
 
 /// Three numbers; the fourth is finite and means nothing.
@@ -25,32 +26,14 @@ struct Register(__m256d);
 #[derive(Clone, Copy, Debug)]
 struct Packed(());
 
-/// What a work keeps between two calls, over any space.
-pub trait Kept {
-    /// It.
-    type Of<S: Space<Real = f64>>: Send;
-}
-
-/// Work over packed vectors. What it calls is inlined, down to the instructions: mark it `#[inline(always)]`.
-pub trait OverPacked<K: Kept> {
-    /// Does it, with what is kept.
-    fn run<S: Space<Real = f64>>(self, kept: &mut K::Of<S>);
-}
-
-/// How what is kept is made.
-pub trait Keeps<K: Kept> {
-    /// Makes it, if it can be.
-    fn make<S: Space<Real = f64>>(self) -> Option<K::Of<S>>;
-}
-
 /// What a work keeps, over packed vectors; it is there only where the processor has the instructions.
-pub struct PackedRoom<K: Kept>(Box<K::Of<Packed>>);
+pub(crate) struct PackedRoom<K: Kept>(Box<K::Of<Packed>>);
 
 impl<K: Kept> PackedRoom<K> {
     /// `None` where the processor does not pack vectors, or nothing is made.
-    pub fn new(make: impl Keeps<K>) -> Option<Self> {
+    pub(crate) fn new(make: impl Make<K>) -> Option<Self> {
         #[target_feature(enable = "avx2")]
-        fn compiled<K: Kept>(make: impl Keeps<K>) -> Option<Box<K::Of<Packed>>> {
+        fn compiled<K: Kept>(make: impl Make<K>) -> Option<Box<K::Of<Packed>>> {
             make.make::<Packed>().map(Box::new)
         }
         // SAFETY: the processor has what `compiled` is compiled for.
@@ -59,13 +42,13 @@ impl<K: Kept> PackedRoom<K> {
 
     /// Does the work.
     #[inline]
-    pub fn run(&mut self, work: impl OverPacked<K>) {
+    pub(crate) fn run<W: Work<K>>(&mut self, work: W) -> W::Output {
         #[target_feature(enable = "avx2")]
-        fn compiled<K: Kept>(work: impl OverPacked<K>, kept: &mut K::Of<Packed>) {
-            work.run::<Packed>(kept);
+        fn compiled<K: Kept, W: Work<K>>(work: W, kept: &mut K::Of<Packed>) -> W::Output {
+            work.run::<Packed>(kept)
         }
         // SAFETY: there is no room where the processor does not have what `compiled` is compiled for.
-        unsafe { compiled::<K>(work, &mut self.0) }
+        unsafe { compiled::<K, W>(work, &mut self.0) }
     }
 }
 
@@ -315,6 +298,21 @@ impl Space for Packed {
         let [a, b, c] = R.rows;
         let [a, b, c] = [Self::mul(A, &a), Self::mul(A, &b), Self::mul(A, &c)];
         [Self::turn(R, &a), Self::turn(R, &b), Self::turn(R, &c)]
+    }
+
+    #[inline(always)]
+    fn of_columns(columns: [Register; 3]) -> [Register; 3] {
+        columns
+    }
+
+    #[inline(always)]
+    fn columns(A: &[Register; 3]) -> [Register; 3] {
+        *A
+    }
+
+    #[inline(always)]
+    fn transposed(A: &BothSides) -> BothSides {
+        BothSides { columns: A.rows, rows: A.columns }
     }
 
     #[inline(always)]

@@ -16,6 +16,15 @@ use crate::real::{Real, sin_cos_all};
 #[repr(align(32))]
 pub struct Fixed(pub(crate) [f64; 4]);
 
+impl Fixed {
+    /// 1 along an axis, 0, 1 or 2.
+    pub const fn unit(axis: usize) -> Self {
+        let mut all = [0.0; 4];
+        all[axis] = 1.0;
+        Self(all)
+    }
+}
+
 impl From<&Vector3<f64>> for Fixed {
     fn from(v: &Vector3<f64>) -> Self {
         Self([v.x, v.y, v.z, 0.0])
@@ -102,6 +111,15 @@ pub trait Space: Copy + Send + Sync + Debug + 'static {
 
     /// `R A Rᵀ`.
     fn congruent(R: &Self::Both, A: &Self::Matrix) -> Self::Matrix;
+
+    /// From three columns.
+    fn of_columns(columns: [Self::Vector; 3]) -> Self::Matrix;
+
+    /// The columns of A.
+    fn columns(A: &Self::Matrix) -> [Self::Vector; 3];
+
+    /// `Aᵀ`.
+    fn transposed(A: &Self::Both) -> Self::Both;
 
     /// Column j of A.
     fn column(A: &Self::Both, j: usize) -> Self::Vector;
@@ -223,6 +241,21 @@ impl<T: Real> Space for Plain<T> {
     fn congruent(R: &Matrix3<T>, A: &Matrix3<T>) -> Matrix3<T> {
         let [a, b, c] = [mul(A, &Self::row(R, 0)), mul(A, &Self::row(R, 1)), mul(A, &Self::row(R, 2))];
         columns(mul(R, &a), mul(R, &b), mul(R, &c))
+    }
+
+    #[inline(always)]
+    fn of_columns([a, b, c]: [Vector3<T>; 3]) -> Matrix3<T> {
+        columns(a, b, c)
+    }
+
+    #[inline(always)]
+    fn columns(A: &Matrix3<T>) -> [Vector3<T>; 3] {
+        [column(A, 0), column(A, 1), column(A, 2)]
+    }
+
+    #[inline(always)]
+    fn transposed(A: &Matrix3<T>) -> Matrix3<T> {
+        columns(Self::row(A, 0), Self::row(A, 1), Self::row(A, 2))
     }
 
     #[inline(always)]

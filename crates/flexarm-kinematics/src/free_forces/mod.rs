@@ -20,9 +20,11 @@
 //!
 //! Source: [Luh, Walker & Paul 1980].
 
+mod composite;
 mod node;
 mod observed;
 
+use flexarm_spatial::quickest::{Kept, Make, Quickest, Work};
 use flexarm_spatial::space::{Fixed, Plain, Space};
 use flexarm_spatial::{Real, Wrench};
 use nalgebra::{Matrix3, Vector3};
@@ -30,7 +32,8 @@ use nalgebra::{Matrix3, Vector3};
 use crate::aba::Roles;
 use crate::lanes::Tree;
 use crate::model::Model;
-use node::{Composite, Moving, Node, NodeJoint};
+use composite::Composites;
+use node::{Moving, Node, NodeJoint};
 pub use observed::{BodyMotion, Observer};
 
 /// Motion of all coordinates: positions, velocities and accelerations.
@@ -57,6 +60,8 @@ pub struct PointTree<S: Space> {
     cosines: Vec<S::Real>,
     /// Free row, coordinate and inertia of what rotors add.
     rotors: Vec<(usize, usize, f64)>,
+    /// The workspace of the mass matrix, once it is asked for.
+    composites: Option<Box<Composites<S>>>,
 }
 
 /// What (1) to (6) need of a body.
@@ -111,7 +116,7 @@ impl<S: Space> PointTree<S> {
         let together = if S::Real::LANES > 1 { 1 } else { 4 };
         let zeros = vec![S::Real::splat(0.0); model.turning.len().next_multiple_of(together)];
         let up = S::fixed(&Fixed::from(&-model.gravity));
-        Some(Self { nodes, up, angles: zeros.clone(), sines: zeros.clone(), cosines: zeros, rotors })
+        Some(Self { nodes, up, angles: zeros.clone(), sines: zeros.clone(), cosines: zeros, rotors, composites: None })
     }
 
     /// Inertias of the tree, which is otherwise that of before.
@@ -131,6 +136,17 @@ impl<S: Space> PointTree<S> {
             }
         }
         S::sin_cos_all(&self.angles, &mut self.sines, &mut self.cosines);
+    }
+
+    /// Poses of the bodies in their parents.
+    #[inline(always)]
+    fn place(&mut self, q: &[S::Real]) {
+        self.turn_joints(q);
+        // Nothing is computed of rates that nobody looks at.
+        let motions = Motions { q, qdot: q, qddot: q };
+        for node in &mut self.nodes {
+            node.place(motions, &self.sines, &self.cosines);
+        }
     }
 
     /// Angular velocity of the world.
@@ -215,44 +231,6 @@ impl<S: Space> PointTree<S> {
     }
 }
 
-impl<S: Space> PointTree<S> {
-    /// Mass matrix of the free coordinates (kg, kg m, kg m²) at the poses of the last forces, column after column into M.
-    ///
-    /// # Source
-    /// [Featherstone 2008], section 6.2, over the free joints alone.
-    #[inline(always)]
-    pub(crate) fn mass(&mut self, M: &mut [S::Real]) {
-        let n = M.len().isqrt();
-        M.fill(S::Real::splat(0.0));
-        for node in &mut self.nodes {
-            node.composite = Composite { mass: node.mass, h: node.h, I: node.I };
-        }
-        for i in (0..self.nodes.len()).rev() {
-            let (inward, outward) = self.nodes.split_at_mut(i);
-            let node = &outward[0];
-            if node.part != Part::Loading {
-                continue;
-            }
-            if let Some(row) = node.row {
-                for c in 0..node.size() {
-                    node.column(inward, row, c, M, n);
-                }
-            }
-            if let Some(parent) = node.parent.map(|parent| &mut inward[parent])
-                && parent.part == Part::Loading
-            {
-                parent.composite.take(&node.composite, &node.R, &node.p);
-            }
-        }
-        for &(row, coordinate, inertia) in &self.rotors {
-            let column = self.nodes.iter().find(|node| node.coordinate == coordinate).and_then(|node| node.row);
-            if let Some(column) = column {
-                M[column * n + row] += S::Real::splat(inertia);
-            }
-        }
-    }
-}
-
 impl<T: Real> PointTree<Plain<T>> {
     /// Rotation of a body in its parent and place of its origin, as the last forces found them.
     #[inline(always)]
@@ -263,29 +241,17 @@ impl<T: Real> PointTree<Plain<T>> {
 }
 
 /// The recursion over one state: packed where the processor packs vectors, to the same bits.
-pub struct FreeForces(Way);
-
-enum Way {
-    /// Over numbers.
-    Plain(Box<PointTree<Plain<f64>>>),
-    /// In registers.
-    #[cfg(target_arch = "x86_64")]
-    Packed(packed::Room),
-}
+pub struct FreeForces(Quickest<FreeTree>);
 
 impl FreeForces {
     /// For the free coordinates of the roles; `None` of trees with closed loops, balancers or bodies that bend in modes.
     pub fn new(model: &Model, roles: &Roles) -> Option<Self> {
-        #[cfg(target_arch = "x86_64")]
-        if let Some(room) = packed::Room::new(packed::Make(model, roles)) {
-            return Some(Self(Way::Packed(room)));
-        }
-        Self::plain(model, roles)
+        Some(Self(Quickest::new(Of(model, roles))?))
     }
 
     /// Over numbers, whatever the processor has.
     pub fn plain(model: &Model, roles: &Roles) -> Option<Self> {
-        Some(Self(Way::Plain(Box::new(PointTree::of(model, roles)?))))
+        Some(Self(Quickest::plain(Of(model, roles))?))
     }
 
     /// Generalised forces `τ = M(q) q̈ + bias(q, q̇)` (N m or N) of the free coordinates, in their order, into `tau`: those of
@@ -297,94 +263,88 @@ impl FreeForces {
     /// [Luh, Walker & Paul 1980].
     #[inline]
     pub fn compute(&mut self, motions: Motions<'_, f64>, loads: Option<&[Wrench]>, tau: &mut [f64]) {
-        match &mut self.0 {
-            Way::Plain(tree) => tree.forces(motions, loads, tau),
-            #[cfg(target_arch = "x86_64")]
-            Way::Packed(room) => room.run(packed::Forces { motions, loads, tau }),
-        }
+        self.0.run(Forces { motions, loads, tau });
     }
 
-    /// Mass matrix of the free coordinates (kg, kg m, kg m²) at the poses of the last forces, column after column into M: that of
-    /// [`crate::mass_matrix`], to rounding. No allocation.
+    /// Mass matrix of the free coordinates (kg, kg m, kg m²) at the poses of the last forces, column after column into M, both triangles:
+    /// that of [`crate::mass_matrix`], to rounding. Allocates when it is called first, and not again.
+    ///
+    /// # Source
+    /// [Featherstone 2008], section 6.2.
     pub fn mass(&mut self, M: &mut [f64]) {
-        match &mut self.0 {
-            Way::Plain(tree) => tree.mass(M),
-            #[cfg(target_arch = "x86_64")]
-            Way::Packed(room) => room.run(packed::Mass(M)),
-        }
+        self.0.run(Mass { q: None, M });
+    }
+
+    /// [`FreeForces::mass`] at the positions of all coordinates (rad or m).
+    pub fn mass_at(&mut self, q: &[f64], M: &mut [f64]) {
+        self.0.run(Mass { q: Some(q), M });
     }
 
     /// The model has other inertias than before, and is else the same.
     pub fn weigh(&mut self, model: &Model) {
-        match &mut self.0 {
-            Way::Plain(tree) => tree.weigh(model),
-            #[cfg(target_arch = "x86_64")]
-            Way::Packed(room) => room.run(packed::Weigh(model)),
-        }
+        self.0.run(Weigh(model));
     }
 }
 
-/// The recursion in registers.
-#[cfg(target_arch = "x86_64")]
-mod packed {
-    use flexarm_spatial::Wrench;
-    use flexarm_spatial::packed::{Keeps, Kept, OverPacked, PackedRoom};
-    use flexarm_spatial::space::Space;
+/// What [`FreeForces`] keeps.
+struct FreeTree;
 
-    use super::{Motions, PointTree};
-    use crate::aba::Roles;
-    use crate::model::Model;
+impl Kept for FreeTree {
+    type Of<S: Space<Real = f64>> = PointTree<S>;
+}
 
-    pub(super) type Room = PackedRoom<Tree>;
+#[derive(Clone, Copy)]
+struct Of<'a>(&'a Model, &'a Roles);
 
-    /// What is kept.
-    pub(super) struct Tree;
-
-    impl Kept for Tree {
-        type Of<S: Space<Real = f64>> = PointTree<S>;
+impl Make<FreeTree> for Of<'_> {
+    #[inline(always)]
+    fn make<S: Space<Real = f64>>(self) -> Option<PointTree<S>> {
+        PointTree::of(self.0, self.1)
     }
+}
 
-    /// Makes it, of a model that is known to be for it.
-    pub(super) struct Make<'a>(pub(super) &'a Model, pub(super) &'a Roles);
+/// See [`FreeForces::compute`].
+struct Forces<'a> {
+    motions: Motions<'a, f64>,
+    loads: Option<&'a [Wrench]>,
+    tau: &'a mut [f64],
+}
 
-    impl Keeps<Tree> for Make<'_> {
-        #[inline(always)]
-        fn make<S: Space<Real = f64>>(self) -> Option<PointTree<S>> {
-            PointTree::of(self.0, self.1)
+impl Work<FreeTree> for Forces<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Space<Real = f64>>(self, tree: &mut PointTree<S>) {
+        tree.forces(self.motions, self.loads, self.tau);
+    }
+}
+
+/// See [`FreeForces::mass`] and [`FreeForces::mass_at`].
+struct Mass<'a> {
+    q: Option<&'a [f64]>,
+    M: &'a mut [f64],
+}
+
+impl Work<FreeTree> for Mass<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Space<Real = f64>>(self, tree: &mut PointTree<S>) {
+        if let Some(q) = self.q {
+            tree.place(q);
         }
+        tree.mass(self.M);
     }
+}
 
-    /// See [`super::FreeForces::compute`].
-    pub(super) struct Forces<'a> {
-        pub(super) motions: Motions<'a, f64>,
-        pub(super) loads: Option<&'a [Wrench]>,
-        pub(super) tau: &'a mut [f64],
-    }
+/// See [`FreeForces::weigh`].
+struct Weigh<'a>(&'a Model);
 
-    impl OverPacked<Tree> for Forces<'_> {
-        #[inline(always)]
-        fn run<S: Space<Real = f64>>(self, tree: &mut PointTree<S>) {
-            tree.forces(self.motions, self.loads, self.tau);
-        }
-    }
+impl Work<FreeTree> for Weigh<'_> {
+    type Output = ();
 
-    /// See [`super::FreeForces::mass`].
-    pub(super) struct Mass<'a>(pub(super) &'a mut [f64]);
-
-    impl OverPacked<Tree> for Mass<'_> {
-        #[inline(always)]
-        fn run<S: Space<Real = f64>>(self, tree: &mut PointTree<S>) {
-            tree.mass(self.0);
-        }
-    }
-
-    /// See [`super::FreeForces::weigh`].
-    pub(super) struct Weigh<'a>(pub(super) &'a Model);
-
-    impl OverPacked<Tree> for Weigh<'_> {
-        #[inline(always)]
-        fn run<S: Space<Real = f64>>(self, tree: &mut PointTree<S>) {
-            tree.weigh(self.0);
-        }
+    #[inline(always)]
+    fn run<S: Space<Real = f64>>(self, tree: &mut PointTree<S>) {
+        tree.weigh(self.0);
     }
 }

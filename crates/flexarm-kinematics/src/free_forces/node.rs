@@ -39,41 +39,6 @@ pub(super) struct Node<S: Space> {
     pub(super) keeps_motion: bool,
     pub(super) force: S::Vector,
     pub(super) torque: S::Vector,
-    /// Inertia of the body with all that it carries outward.
-    pub(super) composite: Composite<S>,
-}
-
-/// Mass, first moment about Bo and inertia about Bo, B axes.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Composite<S: Space> {
-    pub(super) mass: S::Real,
-    pub(super) h: S::Vector,
-    pub(super) I: S::Matrix,
-}
-
-impl<S: Space> Composite<S> {
-    /// Force and torque at Bo that give it these accelerations while it does not move.
-    #[inline(always)]
-    pub(super) fn wrench(&self, [a, alpha]: &[S::Vector; 2]) -> [S::Vector; 2] {
-        let force = S::add(&S::scaled(a, self.mass), &S::cross(alpha, &self.h));
-        [force, S::add(&S::mul(&self.I, alpha), &S::cross(&self.h, a))]
-    }
-
-    /// Takes in that of a body which sits at p, turned by R.
-    #[inline(always)]
-    pub(super) fn take(&mut self, other: &Self, R: &S::Both, p: &S::Vector) {
-        let real = S::Real::splat;
-        let zero = S::fixed(&Fixed::default());
-        let h = S::turn(R, &other.h);
-        // R I Rᵀ + (2 p·h + m p·p) 1 - (p hᵀ + h pᵀ + m p pᵀ), with k = h + m p/2
-        let k = S::add(&h, &S::scaled(p, other.mass * real(0.5)));
-        let [back, k_back] = [S::scaled(p, real(-1.0)), S::scaled(&k, real(-1.0))];
-        let moved =
-            S::sum(&S::dyad(&back, &k, &zero, real(2.0) * S::dot(p, &k)), &S::dyad(&k_back, p, &zero, real(0.0)));
-        self.I = S::sum(&self.I, &S::sum(&S::congruent(R, &other.I), &moved));
-        self.h = S::add(&self.h, &S::add(&h, &S::scaled(p, other.mass)));
-        self.mass += other.mass;
-    }
 }
 
 /// (1) to (3) of a body.
@@ -152,7 +117,6 @@ impl<S: Space> Node<S> {
             keeps_motion: false,
             force: zero,
             torque: zero,
-            composite: Composite { mass: S::Real::splat(0.0), h: zero, I: matrix },
         };
         node.weigh(inertia);
         Some(node)
@@ -306,53 +270,6 @@ impl<S: Space> Node<S> {
             }
         }
         tau
-    }
-
-    /// Entries of M between one of its coordinates and those of its own joint and of all joints inward.
-    #[inline(always)]
-    pub(super) fn column(&self, inward: &[Self], row: usize, c: usize, M: &mut [S::Real], n: usize) {
-        let [mut force, mut torque] = self.composite.wrench(&self.accelerated(c));
-        let mut force_P = S::turn(&self.R, &force);
-        for (k, entry) in self.project(&force_P, &torque).into_iter().take(self.size()).enumerate() {
-            M[(row + c) * n + row + k] += entry;
-        }
-        let mut at = self;
-        while let Some(parent) = at.parent.map(|parent| &inward[parent])
-            && parent.part == Part::Loading
-        {
-            torque = S::add(&S::turn(&at.R, &torque), &S::cross(&at.p, &force_P));
-            force = force_P;
-            force_P = S::turn(&parent.R, &force);
-            if let Some(inner) = parent.row {
-                for (k, entry) in parent.project(&force_P, &torque).into_iter().take(parent.size()).enumerate() {
-                    M[(row + c) * n + inner + k] += entry;
-                    M[(inner + k) * n + row + c] += entry;
-                }
-            }
-            at = parent;
-        }
-    }
-
-    /// Acceleration of Bo and angular acceleration, B axes, of a coordinate that is accelerated by 1 while nothing moves.
-    #[inline(always)]
-    pub(super) fn accelerated(&self, coordinate: usize) -> [S::Vector; 2] {
-        let ratio = S::Real::splat(self.ratio);
-        let zero = S::fixed(&Fixed::default());
-        match &self.joint {
-            NodeJoint::Turns { axis, along, .. } => {
-                let a = match along {
-                    Some(along) => S::scaled(&S::turn_back(&self.R, &S::fixed(along)), ratio),
-                    None => zero,
-                };
-                [a, S::scaled(&S::fixed(axis), ratio)]
-            }
-            NodeJoint::Slides { along } => [S::scaled(&S::turn_back(&self.R, &S::fixed(along)), ratio), zero],
-            NodeJoint::Elastic { is_parallel, .. } => match coordinate {
-                0..3 if *is_parallel => [S::row(&self.R, coordinate), zero],
-                0..3 => [S::turn_back(&self.R, &S::column(&self.R_PJ, coordinate)), zero],
-                _ => [zero, S::column(&self.B, coordinate - 3)],
-            },
-        }
     }
 }
 

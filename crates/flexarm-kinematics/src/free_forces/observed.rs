@@ -6,7 +6,8 @@
 //!   R_WB = R_WP R_PB,   p_WB = p_WP + R_WP p,   Σ R_WB h + m p_WB (9)
 //! ```
 
-use flexarm_spatial::space::{Fixed, Plain, Space};
+use flexarm_spatial::quickest::{Kept, Make, Quickest, Work};
+use flexarm_spatial::space::{Fixed, Space};
 use flexarm_spatial::{Pose, Wrench};
 use nalgebra::Vector3;
 
@@ -134,29 +135,17 @@ impl<S: Space<Real = f64>> ObservedTree<S> {
 }
 
 /// Inverse dynamics, poses and energies of a tree in one go, in the quickest vectors of the processor; the same bits in all.
-pub struct Observer(Way);
-
-enum Way {
-    /// Over numbers.
-    Plain(Box<ObservedTree<Plain<f64>>>),
-    /// In registers.
-    #[cfg(target_arch = "x86_64")]
-    Packed(packed::Room),
-}
+pub struct Observer(Quickest<WholeTree>);
 
 impl Observer {
     /// `None` of trees with closed loops, balancers or bodies that bend in modes.
     pub fn new(model: &Model) -> Option<Self> {
-        #[cfg(target_arch = "x86_64")]
-        if let Some(room) = packed::Room::new(packed::Make(model)) {
-            return Some(Self(Way::Packed(room)));
-        }
-        Self::plain(model)
+        Some(Self(Quickest::new(Of(model))?))
     }
 
     /// Over numbers, whatever the processor has.
     pub fn plain(model: &Model) -> Option<Self> {
-        Some(Self(Way::Plain(Box::new(ObservedTree::of(model)?))))
+        Some(Self(Quickest::plain(Of(model))?))
     }
 
     /// Poses of all bodies in the world into `X_WB`, generalised forces of all coordinates (N m or N) into `tau`; kinetic energy,
@@ -173,26 +162,14 @@ impl Observer {
         tau: &mut [f64],
     ) -> [f64; 2] {
         X_WB[0] = Pose::identity();
-        let Sums { kinetic, moment } = match &mut self.0 {
-            Way::Plain(tree) => tree.observe(motions, loads, X_WB, tau),
-            #[cfg(target_arch = "x86_64")]
-            Way::Packed(room) => {
-                let mut sums = Sums::default();
-                room.run(packed::Observe { motions, loads, X_WB, tau, sums: &mut sums });
-                sums
-            }
-        };
+        let Sums { kinetic, moment } = self.0.run(Observe { motions, loads, X_WB, tau });
         [kinetic + rotor_energy(model, motions.qdot), -model.gravity.dot(&moment)]
     }
 
     /// Poses as [`Observer::observe`] finds them, and velocities; neither forces nor accelerations.
     pub fn place(&mut self, motions: Motions<'_, f64>, X_WB: &mut [Pose]) {
         X_WB[0] = Pose::identity();
-        match &mut self.0 {
-            Way::Plain(tree) => tree.place(motions, X_WB),
-            #[cfg(target_arch = "x86_64")]
-            Way::Packed(room) => room.run(packed::Place(motions, X_WB)),
-        }
+        self.0.run(Place(motions, X_WB));
     }
 
     /// How a body moved in the last observation; after [`Observer::place`] its velocities are new.
@@ -200,99 +177,81 @@ impl Observer {
     /// # Panics
     /// If the body is not one of the tree, or is the world.
     pub fn motion(&mut self, body: usize) -> BodyMotion {
-        match &mut self.0 {
-            Way::Plain(tree) => tree.motion(body),
-            #[cfg(target_arch = "x86_64")]
-            Way::Packed(room) => {
-                let mut motion = BodyMotion::default();
-                room.run(packed::Motion(body, &mut motion));
-                motion
-            }
-        }
+        self.0.run(MotionOf(body))
     }
 
     /// The model has other inertias than before, and is else the same.
     pub fn weigh(&mut self, model: &Model) {
-        match &mut self.0 {
-            Way::Plain(tree) => tree.tree.weigh(model),
-            #[cfg(target_arch = "x86_64")]
-            Way::Packed(room) => room.run(packed::Weigh(model)),
-        }
+        self.0.run(Weigh(model));
     }
 }
 
-/// The pass in registers.
-#[cfg(target_arch = "x86_64")]
-mod packed {
-    use flexarm_spatial::packed::{Keeps, Kept, OverPacked, PackedRoom};
-    use flexarm_spatial::space::Space;
-    use flexarm_spatial::{Pose, Wrench};
+/// What [`Observer`] keeps.
+struct WholeTree;
 
-    use super::{BodyMotion, Motions, ObservedTree, Sums};
-    use crate::model::Model;
+impl Kept for WholeTree {
+    type Of<S: Space<Real = f64>> = ObservedTree<S>;
+}
 
-    pub(super) type Room = PackedRoom<Tree>;
+#[derive(Clone, Copy)]
+struct Of<'a>(&'a Model);
 
-    /// What is kept.
-    pub(super) struct Tree;
-
-    impl Kept for Tree {
-        type Of<S: Space<Real = f64>> = ObservedTree<S>;
+impl Make<WholeTree> for Of<'_> {
+    #[inline(always)]
+    fn make<S: Space<Real = f64>>(self) -> Option<ObservedTree<S>> {
+        ObservedTree::of(self.0)
     }
+}
 
-    /// Makes it.
-    pub(super) struct Make<'a>(pub(super) &'a Model);
+/// See [`Observer::observe`].
+struct Observe<'a> {
+    motions: Motions<'a, f64>,
+    loads: Option<&'a [Wrench]>,
+    X_WB: &'a mut [Pose],
+    tau: &'a mut [f64],
+}
 
-    impl Keeps<Tree> for Make<'_> {
-        #[inline(always)]
-        fn make<S: Space<Real = f64>>(self) -> Option<ObservedTree<S>> {
-            ObservedTree::of(self.0)
-        }
+impl Work<WholeTree> for Observe<'_> {
+    type Output = Sums;
+
+    #[inline(always)]
+    fn run<S: Space<Real = f64>>(self, tree: &mut ObservedTree<S>) -> Sums {
+        tree.observe(self.motions, self.loads, self.X_WB, self.tau)
     }
+}
 
-    /// See [`super::Observer::observe`].
-    pub(super) struct Observe<'a> {
-        pub(super) motions: Motions<'a, f64>,
-        pub(super) loads: Option<&'a [Wrench]>,
-        pub(super) X_WB: &'a mut [Pose],
-        pub(super) tau: &'a mut [f64],
-        pub(super) sums: &'a mut Sums,
+/// See [`Observer::place`].
+struct Place<'a>(Motions<'a, f64>, &'a mut [Pose]);
+
+impl Work<WholeTree> for Place<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Space<Real = f64>>(self, tree: &mut ObservedTree<S>) {
+        tree.place(self.0, self.1);
     }
+}
 
-    impl OverPacked<Tree> for Observe<'_> {
-        #[inline(always)]
-        fn run<S: Space<Real = f64>>(self, tree: &mut ObservedTree<S>) {
-            *self.sums = tree.observe(self.motions, self.loads, self.X_WB, self.tau);
-        }
+/// See [`Observer::motion`].
+struct MotionOf(usize);
+
+impl Work<WholeTree> for MotionOf {
+    type Output = BodyMotion;
+
+    #[inline(always)]
+    fn run<S: Space<Real = f64>>(self, tree: &mut ObservedTree<S>) -> BodyMotion {
+        tree.motion(self.0)
     }
+}
 
-    /// See [`super::Observer::place`].
-    pub(super) struct Place<'a>(pub(super) Motions<'a, f64>, pub(super) &'a mut [Pose]);
+/// See [`Observer::weigh`].
+struct Weigh<'a>(&'a Model);
 
-    impl OverPacked<Tree> for Place<'_> {
-        #[inline(always)]
-        fn run<S: Space<Real = f64>>(self, tree: &mut ObservedTree<S>) {
-            tree.place(self.0, self.1);
-        }
-    }
+impl Work<WholeTree> for Weigh<'_> {
+    type Output = ();
 
-    /// See [`super::Observer::motion`].
-    pub(super) struct Motion<'a>(pub(super) usize, pub(super) &'a mut BodyMotion);
-
-    impl OverPacked<Tree> for Motion<'_> {
-        #[inline(always)]
-        fn run<S: Space<Real = f64>>(self, tree: &mut ObservedTree<S>) {
-            *self.1 = tree.motion(self.0);
-        }
-    }
-
-    /// See [`super::Observer::weigh`].
-    pub(super) struct Weigh<'a>(pub(super) &'a Model);
-
-    impl OverPacked<Tree> for Weigh<'_> {
-        #[inline(always)]
-        fn run<S: Space<Real = f64>>(self, tree: &mut ObservedTree<S>) {
-            tree.tree.weigh(self.0);
-        }
+    #[inline(always)]
+    fn run<S: Space<Real = f64>>(self, tree: &mut ObservedTree<S>) {
+        tree.tree.weigh(self.0);
     }
 }
