@@ -67,8 +67,9 @@ pub(crate) struct Frames {
     /// Whether this sample is one for poses, and for a picture.
     shown: bool,
     due: bool,
-    /// Poses of the last sample, if they were not one for poses.
+    /// Poses of the last sample, if it was not one for poses and they are known ([`Frames::keep`]).
     unshown: Sample,
+    kept: bool,
 }
 
 struct LinkFrame {
@@ -110,6 +111,7 @@ impl Frames {
             shown: true,
             due: false,
             unshown: Sample::default(),
+            kept: false,
         }
     }
 
@@ -119,23 +121,29 @@ impl Frames {
         let Shown { due, new_peak } = self.clock.take(since_start_ns, sample, self.has_rigid);
         self.shown = due || new_peak;
         self.due = due && self.pictures.due(since_start_ns);
-        if !self.shown {
-            for (twin, now) in
-                [(&mut self.unshown.flexible, &sample.flexible), (&mut self.unshown.rigid, &sample.rigid)]
-            {
-                twin.X_WL.clone_from(&now.X_WL);
-                twin.X_WS.clone_from(&now.X_WS);
-            }
-        }
+        self.kept = false;
         if let Some(magnifier) = self.magnifier.as_ref().filter(|_| self.due) {
             magnifier.magnify(sample, &mut self.magnified);
         }
         self.shown
     }
 
-    /// Writes the frames of the last sample, once, if it was not one for poses.
+    /// Keeps the poses of the sample that was gone to last, unless they are written.
+    pub(crate) fn keep(&mut self, sample: &Sample) {
+        if self.shown {
+            return;
+        }
+        self.kept = true;
+        let twins = [(&mut self.unshown.flexible, &sample.flexible), (&mut self.unshown.rigid, &sample.rigid)];
+        for (twin, now) in twins {
+            twin.X_WL.clone_from(&now.X_WL);
+            twin.X_WS.clone_from(&now.X_WS);
+        }
+    }
+
+    /// What writes the frames of the last sample, once, if it was not one for poses.
     pub(crate) fn close(&mut self) -> Option<impl FnOnce(&mut Cdr, Stamp)> {
-        let this = (!std::mem::replace(&mut self.shown, true)).then_some(&*self);
+        let this = std::mem::take(&mut self.kept).then_some(&*self);
         this.map(|this| move |cdr: &mut Cdr, stamp| this.write(cdr, stamp, &this.unshown, Moving::Yes))
     }
 

@@ -32,7 +32,7 @@ use self::channels::Channels;
 use self::frames::{Frames, Moving, WORLD};
 use self::markers::{MovingMarkers, SurfaceFrames};
 use self::mesh_files::mesh_files;
-use self::messages::{Level, Stamp};
+use self::messages::{JointNames, Level, Stamp};
 use self::output::Output;
 use crate::create::FlushClock;
 use crate::file_recorder::{FileRecorder, OpenFile};
@@ -111,6 +111,10 @@ impl OpenFile for McapFile {
         Ok(())
     }
 
+    fn keep(&mut self, sample: &Sample) {
+        self.frames.keep(sample);
+    }
+
     fn finish(&mut self, path: &Path, result: &RunResult) -> Result<(), LogError> {
         let times = result.events.iter().map(|event| stamp(path, self.start.0, event.time_s));
         let times = times.collect::<Result<Vec<_>, _>>()?;
@@ -125,10 +129,10 @@ pub struct McapFile {
     shape: Shape,
     frames: Frames,
     markers: MovingMarkers,
-    joints: Vec<String>,
+    joints: JointNames,
     elements: Vec<String>,
     /// `<element>/x` and so on.
-    deflections: Vec<String>,
+    deflections: JointNames,
     /// Label of the contributions.
     contributions: String,
     flush: FlushClock,
@@ -159,9 +163,9 @@ impl McapFile {
             shape: Shape::of(header),
             frames: Frames::of(header),
             markers: MovingMarkers::new(header),
-            joints: header.joints.clone(),
+            joints: JointNames::new(&header.joints),
             elements: header.elements.clone(),
-            deflections: parts(&header.elements, &["x", "y", "z", "rx", "ry", "rz"], "/"),
+            deflections: JointNames::new(&parts(&header.elements, &["x", "y", "z", "rx", "ry", "rz"], "/")),
             contributions: parts(&header.contributors, &["x [m]", "y [m]", "z [m]"], " ").join(","),
             flush,
             start,

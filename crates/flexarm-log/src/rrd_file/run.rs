@@ -91,7 +91,9 @@ pub(crate) struct RunTracks {
     shapes: bool,
     /// Which samples have poses; curves have all.
     clock: PoseClock,
-    /// The last sample and its instant, if it has not been drawn.
+    /// Instant of the last sample if it has not been drawn.
+    now: Option<Instant>,
+    /// The same with the sample, once it is kept.
     undrawn: Option<Instant>,
     last: Sample,
     /// Largest error so far (m), its instant, and where the tool is drawn then.
@@ -196,6 +198,7 @@ impl RunTracks {
             study_curves,
             shapes,
             clock: PoseClock::default(),
+            now: None,
             undrawn: None,
             last: Sample::default(),
             peak: None,
@@ -267,8 +270,14 @@ impl RunTracks {
         if due {
             self.pose(when, sample, error);
         }
-        self.undrawn = (!due).then_some(when);
-        if !due {
+        self.now = (!due).then_some(when);
+        self.undrawn = None;
+    }
+
+    /// Keeps the sample that was pushed last, unless it is drawn.
+    pub(crate) fn keep(&mut self, sample: &Sample) {
+        self.undrawn = self.now;
+        if self.undrawn.is_some() {
             self.last.clone_from(sample);
         }
     }
