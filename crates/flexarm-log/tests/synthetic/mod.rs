@@ -143,7 +143,7 @@ pub(crate) fn samples_with_poses(count: u64) -> Vec<u64> {
         let error = error(step);
         let is_peak = error > largest;
         largest = error.max(largest);
-        is_peak || step % 3 == 0 || step + 1 == count
+        is_peak || step.is_multiple_of(3) || step + 1 == count
     };
     (0..count).filter(|step| has_poses(*step)).collect()
 }
