@@ -86,40 +86,94 @@ impl BentLine<'_> {
     /// The motion of the section at `s` metres along the line (link axes).
     #[must_use]
     pub fn section(&self, s: f64) -> Pose {
+        match self.between(s) {
+            Ok(piece) => {
+                let turn = piece.turn();
+                Pose::from_parts(Translation3::from(piece.middle + piece.moved() - turn * piece.middle), turn)
+            }
+            Err(station) => self.moved[station] * Translation3::from(-self.line.stations[station]),
+        }
+    }
+
+    /// Where the point at `s` metres along the line is (link axes): what [`BentLine::section`] does to it, without its turn.
+    #[must_use]
+    pub fn point(&self, s: f64) -> Point3<f64> {
+        match self.between(s) {
+            Ok(piece) => Point3::from(piece.middle + piece.moved()),
+            Err(_) => self.section(s) * self.line.point(s),
+        }
+    }
+
+    /// The piece of the line at a place, or the station with which it is rigid there.
+    fn between(&self, s: f64) -> Result<Piece, usize> {
         let BendLine { stations, along, .. } = self.line;
         let last = stations.len() - 1;
-        let rigid = |k: usize| self.moved[k] * Translation3::from(-stations[k]);
         if s <= 0.0 {
-            return rigid(0);
+            return Err(0);
         }
         if s >= along[last] {
-            return rigid(last);
+            return Err(last);
         }
         let k = along.partition_point(|place| *place <= s).clamp(1, last) - 1;
-        let [(u0, theta0), (u1, theta1)] = [self.ends[k], self.ends[k + 1]];
         let line = stations[k + 1] - stations[k];
+        let x = (s - along[k]) / (along[k + 1] - along[k]);
         let length = line.norm();
         let direction = line / length;
-        let x = (s - along[k]) / (along[k + 1] - along[k]);
-        // Slopes of the deflection across the line, per unit of x.
-        let (slope0, slope1) = (theta0.cross(&line), theta1.cross(&line));
-        let across = |v: Vector3<f64>| v - direction * direction.dot(&v);
-        let (v0, v1) = (across(u0), across(u1));
+        let ends = [self.ends[k], self.ends[k + 1]];
+        Ok(Piece { x, line, length, direction, ends, middle: stations[k] + line * x })
+    }
+}
+
+/// A beam between two stations, and a place on it.
+struct Piece {
+    /// From the first station (0) to the second (1).
+    x: f64,
+    /// From station to station; its length (m) and direction.
+    line: Vector3<f64>,
+    length: f64,
+    direction: Vector3<f64>,
+    /// As in [`BentLine`].
+    ends: [(Vector3<f64>, Vector3<f64>); 2],
+    /// The undeformed place.
+    middle: Vector3<f64>,
+}
+
+impl Piece {
+    /// Displacements of the ends across the line, and slopes there per unit of x.
+    fn hermite(&self) -> [Vector3<f64>; 4] {
+        let [(u0, theta0), (u1, theta1)] = &self.ends;
+        let across = |v: &Vector3<f64>| v - self.direction * self.direction.dot(v);
+        [across(u0), across(u1), theta0.cross(&self.line), theta1.cross(&self.line)]
+    }
+
+    /// Along the line, and between its ends.
+    fn mixed(&self, a: &Vector3<f64>, b: &Vector3<f64>) -> Vector3<f64> {
+        self.direction * (self.direction.dot(a) * (1.0 - self.x) + self.direction.dot(b) * self.x)
+    }
+
+    /// Displacement of the place (m).
+    fn moved(&self) -> Vector3<f64> {
+        let [v0, v1, slope0, slope1] = self.hermite();
+        let x = self.x;
         let (x2, x3) = (x * x, x * x * x);
         let deflection = v0 * (1.0 - 3.0 * x2 + 2.0 * x3)
             + v1 * (3.0 * x2 - 2.0 * x3)
             + slope0 * (x - 2.0 * x2 + x3)
             + slope1 * (x3 - x2);
+        self.mixed(&self.ends[0].0, &self.ends[1].0) + deflection
+    }
+
+    /// Rotation of the section: slope of the line, and twist.
+    fn turn(&self) -> Rotation3<f64> {
+        let [v0, v1, slope0, slope1] = self.hermite();
+        let x = self.x;
+        let x2 = x * x;
         let slope = v0 * (6.0 * x2 - 6.0 * x)
             + v1 * (6.0 * x - 6.0 * x2)
             + slope0 * (1.0 - 4.0 * x + 3.0 * x2)
             + slope1 * (3.0 * x2 - 2.0 * x);
-        let mixed = |a: &Vector3<f64>, b: &Vector3<f64>| direction.dot(a) * (1.0 - x) + direction.dot(b) * x;
-        let stretch = direction * mixed(&u0, &u1);
-        let twist = direction * mixed(&theta0, &theta1);
-        let turn = Rotation3::from_scaled_axis(direction.cross(&(slope / length)) + twist);
-        let middle = stations[k] + line * x;
-        Pose::from_parts(Translation3::from(middle + stretch + deflection - turn * middle), turn)
+        let twist = self.mixed(&self.ends[0].1, &self.ends[1].1);
+        Rotation3::from_scaled_axis(self.direction.cross(&(slope / self.length)) + twist)
     }
 }
 
@@ -282,6 +336,24 @@ mod tests {
     }
 
     /// Truth: what is beyond the far interface turns and moves with it as a rigid body, exactly.
+    #[test]
+    fn a_point_of_the_line_is_where_its_section_takes_it() {
+        let bend = bend(&[[0.0, 0.1, 0.0], [0.5, 0.1, 0.2], [1.0, 0.0, 0.3]]);
+        let line = BendLine::new(&bend).unwrap();
+        let moved: Vec<Pose> = (0..3)
+            .map(|k| {
+                let [x, y, z] = bend.X_LS[k].translation.vector.into();
+                let part = |c: usize| ((3 * k + c) as f64).sin();
+                pose([x + 0.01 * part(1), y + 0.02 * part(2), z], [0.1 * part(3), 0.2 * part(4), 0.1 * part(5)])
+            })
+            .collect();
+        let bent = line.bent(&moved);
+        for s in [-0.1, 0.0, 0.1, 0.4, 0.7, line.length(), 1.5] {
+            let error = (bent.point(s) - bent.section(s) * line.point(s)).norm();
+            assert!(error < 1e-15, "{s}: {error:e}");
+        }
+    }
+
     #[test]
     fn the_surface_beyond_the_far_interface_is_rigid_with_it() {
         let line = BendLine::new(&bend(&[[0.0; 3], [0.5, 0.0, 0.1], [1.0, 0.0, 0.2]])).unwrap();

@@ -36,6 +36,10 @@ pub trait OpenFile: Send + Sized {
     /// As [`Recorder::record`].
     fn record(&mut self, path: &Path, sample: &Sample) -> Result<(), LogError>;
 
+    /// Copies what a file without further samples needs of the one that was added last. Called after [`OpenFile::record`], of
+    /// several samples in a row after the last.
+    fn keep(&mut self, _sample: &Sample) {}
+
     /// Adds the result and ends the file.
     ///
     /// # Errors
@@ -64,10 +68,21 @@ impl<F: OpenFile> Recorder for FileRecorder<F> {
     }
 
     fn record(&mut self, sample: &Sample) -> Result<(), LogError> {
-        match &mut self.state {
-            State::Open(file) => file.record(&self.path, sample),
-            _ => Err(LogError::not_open(&self.path, "record")),
+        self.record_all(std::slice::from_ref(sample))
+    }
+
+    fn record_all(&mut self, samples: &[Sample]) -> Result<(), LogError> {
+        let State::Open(file) = &mut self.state else { return Err(LogError::not_open(&self.path, "record")) };
+        let mut last = None;
+        let written = samples.iter().try_for_each(|sample| {
+            file.record(&self.path, sample)?;
+            last = Some(sample);
+            Ok(())
+        });
+        if let Some(last) = last {
+            file.keep(last);
         }
+        written
     }
 
     fn finish(&mut self, result: &RunResult) -> Result<(), LogError> {

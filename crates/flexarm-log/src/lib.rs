@@ -62,6 +62,8 @@ mod number_text;
 mod parquet_file;
 #[cfg(any(test, feature = "rerun"))]
 mod plot_room;
+#[cfg(any(feature = "mcap", feature = "rerun"))]
+mod poses;
 mod read;
 mod record;
 #[cfg(feature = "rerun")]

@@ -23,9 +23,28 @@ pub(crate) fn push_number(text: &mut Vec<u8>, value: f64) {
     if binary_digits(value) <= MOST_BINARY_DIGITS {
         let _ = write!(text, "{value:?}"); // memory does not fail
     } else if size >= SMALL {
-        text.extend_from_slice(buffer.format_finite(value).as_bytes());
+        push_text(text, buffer.format_finite(value).as_bytes());
     } else {
         push_with_exponent(text, buffer.format_finite(value).as_bytes());
+    }
+}
+
+/// Adds a text of up to 24 letters, as all numbers are. Copies of a length that the compiler knows need no call: the first half
+/// and the last, which may overlap.
+fn push_text(text: &mut Vec<u8>, written: &[u8]) {
+    let end = text.len() + written.len();
+    match (written.first_chunk::<16>(), written.first_chunk::<8>(), written.last_chunk::<8>()) {
+        (Some(first), _, Some(last)) if written.len() <= 24 => {
+            text.extend_from_slice(first);
+            text.truncate(end - last.len());
+            text.extend_from_slice(last);
+        }
+        (None, Some(first), Some(last)) => {
+            text.extend_from_slice(first);
+            text.truncate(end - last.len());
+            text.extend_from_slice(last);
+        }
+        _ => text.extend_from_slice(written),
     }
 }
 
@@ -42,10 +61,11 @@ fn push_with_exponent(text: &mut Vec<u8>, written: &[u8]) {
     let unsigned = written.strip_prefix(b"-").unwrap_or(written);
     // Nearly all numbers: two digits of the exponent, and those next to the ones without an exponent.
     if let [mantissa @ .., b'e', b'-', tens, units] = written {
-        text.extend_from_slice(mantissa);
-        text.extend_from_slice(b"e-");
-        text.extend(Some(*tens).filter(|tens| *tens != b'0'));
-        text.push(*units);
+        push_text(text, mantissa);
+        match tens {
+            b'0' => text.extend_from_slice(&[b'e', b'-', *units]),
+            _ => text.extend_from_slice(&[b'e', b'-', *tens, *units]),
+        }
         return;
     }
     if let Some([first @ b'1'..=b'9', others @ ..]) = unsigned.strip_prefix(b"0.0000") {

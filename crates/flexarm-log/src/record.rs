@@ -27,6 +27,14 @@ pub trait Recorder: Send {
     /// (full disk).
     fn record(&mut self, sample: &Sample) -> Result<(), crate::LogError>;
 
+    /// Adds instants one after another, up to the first that fails.
+    ///
+    /// # Errors
+    /// As [`Recorder::record`].
+    fn record_all(&mut self, samples: &[Sample]) -> Result<(), crate::LogError> {
+        samples.iter().try_for_each(|sample| self.record(sample))
+    }
+
     /// Adds the result and closes the file so that every reader accepts it.
     ///
     /// # Errors

@@ -200,8 +200,7 @@ fn write(
     while let Ok(message) = received.recv() {
         match message {
             Message::Samples(batch) if writes => {
-                let written = batch.samples[..batch.used].iter().try_for_each(|sample| recorder.record(sample));
-                if let Err(error) = written {
+                if let Err(error) = recorder.record_all(&batch.samples[..batch.used]) {
                     writes = false;
                     *failed.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
                 }

@@ -2,7 +2,7 @@
 //!
 //! Start at [`Blocks::push`]. Memory does not grow with the run: when there are too many blocks, pairs become one.
 
-use crate::TraceRow;
+use crate::{ElasticSample, TraceRow};
 
 /// Most blocks that are kept, more than a page has points for.
 const MOST_BLOCKS: usize = 4096;
@@ -49,6 +49,8 @@ pub enum CurveQuantity {
 }
 
 impl CurveQuantity {
+    const SIZES: [Self; 5] = [Self::ErrorSize, Self::TurnSize, Self::AcrossPath, Self::StaticSize, Self::MovingSize];
+
     /// Its value in a row; not a number if the run has no such joint, contributor or element.
     #[must_use]
     pub fn of(self, row: &TraceRow) -> f64 {
@@ -76,10 +78,34 @@ impl CurveQuantity {
         }
     }
 
+    /// The values of [`CurveQuantity::all`], in its order.
+    fn all_values(row: &TraceRow, values: &mut Vec<f64>) {
+        let TraceRow { error_world, error_path, energy, .. } = row;
+        values.clear();
+        values.extend_from_slice(error_world);
+        for quantity in Self::SIZES {
+            values.push(quantity.of(row));
+        }
+        let energies = [energy.kinetic, energy.potential, energy.elastic];
+        values.extend(error_path.iter().zip(energies).flat_map(|(path, energy)| [*path, energy]));
+        values.extend(row.contributions.iter().flat_map(|moved| [moved[0], moved[1], moved[2], norm(moved)]));
+        for list in [&row.q, &row.qdot, &row.effort, &row.rigid_effort] {
+            values.extend_from_slice(list);
+        }
+        for ElasticSample { deflection, load } in &row.elastic {
+            for (deflection, load) in deflection.iter().zip(load) {
+                values.extend_from_slice(&[*deflection, *load]);
+            }
+            for half in [0..3, 3..6] {
+                values.extend_from_slice(&[norm(&deflection[half.clone()]), norm(&load[half])]);
+            }
+        }
+    }
+
     /// All of a run with as many contributors, joints and elements as this row.
     fn all(row: &TraceRow) -> Vec<Self> {
         let mut all: Vec<Self> = (0..6).map(Self::Error).collect();
-        all.extend([Self::ErrorSize, Self::TurnSize, Self::AcrossPath, Self::StaticSize, Self::MovingSize]);
+        all.extend(Self::SIZES);
         all.extend((0..3).flat_map(|c| [Self::AlongPath(c), Self::Energy(c)]));
         for k in 0..row.contributions.len() {
             all.extend((0..3).map(|c| Self::Contribution(k, c)).chain([Self::ContributionSize(k)]));
@@ -115,6 +141,8 @@ pub(crate) struct Blocks {
     filled: u64,
     way: f64,
     last_m: [f64; 3],
+    /// Of the last sample; the memory is used again.
+    values: Vec<f64>,
 }
 
 impl Blocks {
@@ -143,9 +171,9 @@ impl Blocks {
         let last = self.times.len() - 1;
         (self.times[last][1], self.ways[last][1]) = (row.time_s, self.way);
         let ranges = &mut self.ranges[last * self.quantities.len()..];
-        for (range, quantity) in ranges.iter_mut().zip(&self.quantities) {
-            let value = quantity.of(row);
-            *range = wider(*range, [value; 2]);
+        CurveQuantity::all_values(row, &mut self.values);
+        for (range, value) in ranges.iter_mut().zip(&self.values) {
+            *range = wider(*range, [*value; 2]);
         }
     }
 
@@ -193,4 +221,38 @@ impl Blocks {
 /// A range around two; what is not a number does not count.
 fn wider(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_values_of_a_row_are_those_of_its_quantities_in_their_order() {
+        let number = std::cell::Cell::new(0.0);
+        let next = || {
+            number.set(number.get() + 1.0);
+            f64::sin(number.get())
+        };
+        let list = |length: usize| (0..length).map(|_| next()).collect::<Vec<f64>>();
+        let element =
+            |_| ElasticSample { deflection: std::array::from_fn(|_| next()), load: std::array::from_fn(|_| next()) };
+        let row = TraceRow {
+            error_world: std::array::from_fn(|_| next()),
+            error_path: std::array::from_fn(|_| next()),
+            static_m: std::array::from_fn(|_| next()),
+            contributions: (0..3).map(|_| std::array::from_fn(|_| next())).collect(),
+            q: list(2),
+            qdot: list(2),
+            effort: list(2),
+            rigid_effort: list(2),
+            elastic: (0..2).map(element).collect(),
+            energy: crate::EnergySample { kinetic: next(), potential: next(), elastic: next() },
+            ..TraceRow::default()
+        };
+        let mut values = Vec::new();
+        CurveQuantity::all_values(&row, &mut values);
+        let expected: Vec<f64> = CurveQuantity::all(&row).into_iter().map(|quantity| quantity.of(&row)).collect();
+        assert_eq!(values, expected);
+    }
 }

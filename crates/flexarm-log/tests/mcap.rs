@@ -123,8 +123,8 @@ fn every_topic_is_there_with_schema_quality_of_service_and_all_samples() {
         ("/deviation/tcp", "std_msgs/msg/Float64MultiArray", n),
         ("/deviation/tcp_path", "std_msgs/msg/Float64MultiArray", n),
         ("/elastic/joint_states", "sensor_msgs/msg/JointState", n),
-        ("/elastic/upper_arm", "geometry_msgs/msg/WrenchStamped", 121), // 60 Hz, both ends
-        ("/elastic/upper_arm/deflection", "geometry_msgs/msg/TwistStamped", 121),
+        ("/elastic/upper_arm", "geometry_msgs/msg/WrenchStamped", 120), // 60 Hz, of the samples with poses
+        ("/elastic/upper_arm/deflection", "geometry_msgs/msg/TwistStamped", 120),
         ("/energy", "std_msgs/msg/Float64MultiArray", n),
         ("/events", "rcl_interfaces/msg/Log", 3),
         ("/joint_states", "sensor_msgs/msg/JointState", n),
@@ -140,7 +140,7 @@ fn every_topic_is_there_with_schema_quality_of_service_and_all_samples() {
         ("/tcp/flexible", "geometry_msgs/msg/PoseStamped", n),
         ("/tcp/rigid", "geometry_msgs/msg/PoseStamped", n),
         ("/tcp/static_error", "std_msgs/msg/Float64MultiArray", n),
-        ("/tf", "tf2_msgs/msg/TFMessage", n),
+        ("/tf", "tf2_msgs/msg/TFMessage", synthetic::samples_with_poses(n).len() as u64),
         ("/tf_static", "tf2_msgs/msg/TFMessage", 1),
     ];
     let expected = expected.map(|(topic, schema, count)| (topic.to_owned(), (schema.to_owned(), count)));
@@ -203,11 +203,12 @@ fn messages_hold_the_samples() {
     assert_eq!(cdr.sequence(), sample.elastic[0].load);
     cdr.end();
 
-    // At the twelfth sixtieth of a second, which is the hundredth sample.
+    // The first sample with poses from the twelfth sixtieth of a second on.
+    let sample = synthetic::sample(102);
     let picture = |topic: &str| messages(&file, topic)[12].1.clone();
     let data = picture("/elastic/upper_arm/deflection");
     let mut cdr = CdrReader::new(&data);
-    assert_eq!(cdr.header(), (START_NS + 200_000_000, "upper_arm".to_owned()));
+    assert_eq!(cdr.header(), (START_NS + 204_000_000, "upper_arm".to_owned()));
     assert_eq!(cdr.f64s(6), sample.elastic[0].deflection);
     cdr.end();
 
@@ -218,13 +219,14 @@ fn messages_hold_the_samples() {
     cdr.end();
 }
 
-/// Frames of a file up to a message of `/tf`: child, its parent, translation and quaternion.
+/// Frames of a file up to a sample: child, its parent, translation and quaternion.
 type Frames = BTreeMap<String, (String, [f64; 7])>;
 
-fn frames(file: &[u8], last: usize) -> Frames {
+fn frames(file: &[u8], step: u64) -> Frames {
     let moving = messages(file, "/tf");
+    let moving = moving.iter().filter(|(time, _)| *time <= START_NS + step * 2_000_000);
     let mut tree = Frames::new();
-    for (_, data) in messages(file, "/tf_static").iter().chain(&moving[..=last]) {
+    for (_, data) in messages(file, "/tf_static").iter().chain(moving) {
         let mut cdr = CdrReader::new(data);
         for _ in 0..cdr.u32() {
             let ((_, parent), child) = (cdr.header(), cdr.string());
@@ -255,11 +257,11 @@ fn in_world(tree: &Frames, frame: &str) -> nalgebra::Isometry3<f64> {
 fn the_frames_of_all_robots_chain_up_to_their_poses() {
     let header = synthetic::header();
     let file = run("frames.mcap", &header, 60, NEVER);
-    // The first sample of a sixtieth of a second: 50 / 500 s = 6 / 60 s.
-    let tree = frames(&file, 50);
+    // The first sample with poses of a sixtieth of a second: 51 / 500 s > 6 / 60 s.
+    let tree = frames(&file, 51);
     assert_eq!(tree.len(), 3 * (header.links.len() + 1) + 2 + 10, "three trees with tools, two stations, ten slabs");
 
-    let sample = synthetic::sample(50);
+    let sample = synthetic::sample(51);
     let magnified = Magnifier::new(&header).magnified(&sample);
     let robots = [("", &sample.flexible, 1e-13), ("rigid/", &sample.rigid, 1e-13), ("magnified/", &magnified, 1e-6)];
     for (prefix, twin, allowed) in robots {
@@ -283,15 +285,20 @@ fn the_frames_of_all_robots_chain_up_to_their_poses() {
     assert!(error < 1e-6, "{error:e}");
 }
 
-/// Truth: the rate of pictures, 60 a second, beside 500 samples a second.
+/// Truth: the rates of poses and pictures, at most 200 and 60 a second, beside 500 samples a second.
 #[test]
-fn the_magnified_arm_is_sent_less_often_than_the_robots() {
+fn frames_are_sent_less_often_than_samples_and_the_magnified_arm_less_often_than_the_robots() {
     let file = run("rates.mcap", &synthetic::header(), 501, NEVER);
+    let times: Vec<u64> = messages(&file, "/tf").iter().map(|(time, _)| (time - START_NS) / 2_000_000).collect();
+    let expected = synthetic::samples_with_poses(501);
+    assert_eq!(times, expected);
+    assert!(expected.contains(&500) && expected.len() < 501 && expected.iter().any(|step| !step.is_multiple_of(3)));
     let with = |frame: &str| {
         let has = |data: &[u8]| data.windows(frame.len()).any(|part| part == frame.as_bytes());
         messages(&file, "/tf").iter().filter(|(_, data)| has(data)).count()
     };
-    assert_eq!((with("rigid/forearm"), with("magnified/forearm"), with("magnified/upper_arm/bend_3")), (501, 61, 61));
+    let counts = (with("rigid/forearm"), with("magnified/forearm"), with("magnified/upper_arm/bend_3"));
+    assert_eq!(counts, (expected.len(), 60, 60));
 }
 
 /// A marker as far as tests look at it: frame, namespace, number, kind, colour, points.
@@ -509,8 +516,10 @@ fn chunks_keep_their_size_and_checksums() {
         assert_eq!(chunk.compression, "zstd");
         assert!(chunk.uncompressed_size <= 1 << 20, "{}", chunk.uncompressed_size);
     }
+    let poses = synthetic::samples_with_poses(synthetic::SAMPLES).len() as u64;
+    let messages = 13 * synthetic::SAMPLES + poses + 2 * 120 + 3 + 3 + 41 + 2;
     let checked = MessageStream::new_with_options(&file, Options::ValidateChunkCrcs.into()).unwrap();
-    assert_eq!(checked.map(Result::unwrap).count() as u64, 14 * synthetic::SAMPLES + 2 * 121 + 3 + 3 + 41 + 2);
+    assert_eq!(checked.map(Result::unwrap).count() as u64, messages);
 }
 
 /// Number of samples in the undamaged part of a file.

@@ -167,7 +167,7 @@ pub struct FormatInfo {
 /// How much of a run a format holds, most first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Holds {
-    /// Every number of every sample, poses, surfaces, and what is said about the run.
+    /// Every number of every sample, poses (of links at most 200 a second), surfaces, and what is said about the run.
     Everything,
     /// A table of scalars with names, set-up, result and events.
     DescribedTable,

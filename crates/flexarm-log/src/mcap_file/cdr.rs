@@ -31,6 +31,12 @@ impl Cdr {
         &self.bytes
     }
 
+    /// A part that was made before at the same place of another message.
+    pub(crate) fn made(&mut self, bytes: &[u8]) -> &mut Self {
+        self.bytes.extend_from_slice(bytes);
+        self
+    }
+
     /// Any bytes instead of a message.
     #[cfg(test)]
     pub(crate) fn raw(&mut self, bytes: &[u8]) {

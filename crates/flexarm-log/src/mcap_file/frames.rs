@@ -6,6 +6,7 @@ use super::beat::Beat;
 use super::bent::BentLink;
 use super::cdr::Cdr;
 use super::messages::{self, Stamp, Transform};
+use crate::poses::{PoseClock, Shown};
 use crate::{LinkInfo, RunHeader, Sample, TwinSample};
 use flexarm_draw::Magnifier;
 
@@ -61,9 +62,14 @@ pub(crate) struct Frames {
     magnified: TwinSample,
     /// Links in slabs, with the names of these.
     bent: Vec<(BentLink, Vec<String>)>,
+    clock: PoseClock,
     pictures: Beat,
-    /// Whether this sample is one for a picture.
+    /// Whether this sample is one for poses, and for a picture.
+    shown: bool,
     due: bool,
+    /// Poses of the last sample, if it was not one for poses and they are known ([`Frames::keep`]).
+    unshown: Sample,
+    kept: bool,
 }
 
 struct LinkFrame {
@@ -100,17 +106,45 @@ impl Frames {
             magnifier: is_magnified(header).then(|| Magnifier::new(header)),
             magnified: TwinSample::default(),
             bent: bent.collect(),
+            clock: PoseClock::default(),
             pictures: Beat::new(PICTURES_HZ),
+            shown: true,
             due: false,
+            unshown: Sample::default(),
+            kept: false,
         }
     }
 
-    /// Goes on to a sample; makes the magnified arm if it is time for a picture.
-    pub(crate) fn advance(&mut self, since_start_ns: u64, sample: &Sample) {
-        self.due = self.pictures.due(since_start_ns);
+    /// Goes on to a sample; makes the magnified arm if it is time for a picture. Returns whether the sample's frames are to be
+    /// written.
+    pub(crate) fn advance(&mut self, since_start_ns: u64, sample: &Sample) -> bool {
+        let Shown { due, new_peak } = self.clock.take(since_start_ns, sample, self.has_rigid);
+        self.shown = due || new_peak;
+        self.due = due && self.pictures.due(since_start_ns);
+        self.kept = false;
         if let Some(magnifier) = self.magnifier.as_ref().filter(|_| self.due) {
             magnifier.magnify(sample, &mut self.magnified);
         }
+        self.shown
+    }
+
+    /// Keeps the poses of the sample that was gone to last, unless they are written.
+    pub(crate) fn keep(&mut self, sample: &Sample) {
+        if self.shown {
+            return;
+        }
+        self.kept = true;
+        let twins = [(&mut self.unshown.flexible, &sample.flexible), (&mut self.unshown.rigid, &sample.rigid)];
+        for (twin, now) in twins {
+            twin.X_WL.clone_from(&now.X_WL);
+            twin.X_WS.clone_from(&now.X_WS);
+        }
+    }
+
+    /// What writes the frames of the last sample, once, if it was not one for poses.
+    pub(crate) fn close(&mut self) -> Option<impl FnOnce(&mut Cdr, Stamp)> {
+        let this = std::mem::take(&mut self.kept).then_some(&*self);
+        this.map(|this| move |cdr: &mut Cdr, stamp| this.write(cdr, stamp, &this.unshown, Moving::Yes))
     }
 
     /// Whether this sample is one for a picture.

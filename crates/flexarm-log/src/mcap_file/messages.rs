@@ -67,10 +67,23 @@ pub(crate) fn transforms(cdr: &mut Cdr, stamp: Stamp, transforms: &[Transform<'_
     }
 }
 
+/// What is the same in all messages of some joints: frame and names, as they follow the time.
+pub(crate) struct JointNames(Vec<u8>);
+
+impl JointNames {
+    pub(crate) fn new(names: &[String]) -> Self {
+        let mut cdr = Cdr::default();
+        time(cdr.start(), Stamp(0));
+        let before = cdr.bytes().len();
+        cdr.string("").string_sequence(names);
+        Self(cdr.bytes()[before..].to_vec())
+    }
+}
+
 /// `sensor_msgs/JointState` with positions, velocities and efforts.
-pub(crate) fn joint_state(cdr: &mut Cdr, stamp: Stamp, names: &[String], values: [&[f64]; 3]) {
-    header(cdr.start(), stamp, "");
-    cdr.string_sequence(names);
+pub(crate) fn joint_state(cdr: &mut Cdr, stamp: Stamp, names: &JointNames, values: [&[f64]; 3]) {
+    time(cdr.start(), stamp);
+    cdr.made(&names.0);
     for values in values {
         cdr.f64_sequence(values);
     }

@@ -32,7 +32,7 @@ use self::channels::Channels;
 use self::frames::{Frames, Moving, WORLD};
 use self::markers::{MovingMarkers, SurfaceFrames};
 use self::mesh_files::mesh_files;
-use self::messages::{Level, Stamp};
+use self::messages::{JointNames, Level, Stamp};
 use self::output::Output;
 use crate::create::FlushClock;
 use crate::file_recorder::{FileRecorder, OpenFile};
@@ -44,7 +44,7 @@ use crate::{CreateOptions, EventKind, LogError, RunHeader, RunResult, START_NS, 
 /// | topic | message | |
 /// | --- | --- | --- |
 /// | `/robot_description` | `std_msgs/String` | the URDF, once, latched |
-/// | `/tf`, `/tf_static` | `tf2_msgs/TFMessage` | three trees under `world`: links, `rigid/` links and `magnified/` links; stations of a bent link as its children `<link>/station_<k>`, the tool centre point as `<link>/tcp` |
+/// | `/tf`, `/tf_static` | `tf2_msgs/TFMessage` | three trees under `world`: links, `rigid/` links and `magnified/` links; stations of a bent link as its children `<link>/station_<k>`, the tool centre point as `<link>/tcp`; at most 200 times a second |
 /// | `/joint_states`, `/rigid/joint_states` | `sensor_msgs/JointState` | effort: what the drives must supply |
 /// | `/tcp/flexible`, `/tcp/rigid` | `geometry_msgs/PoseStamped` | in `world` |
 /// | `/tcp/error`, `/tcp/error_path` | `geometry_msgs/TwistStamped` | an error: translation and rotation vector; world axes, path axes |
@@ -59,6 +59,9 @@ use crate::{CreateOptions, EventKind, LogError, RunHeader, RunResult, START_NS, 
 /// | `/markers` | `visualization_msgs/MarkerArray` | surfaces, once, latched; namespaces `flexible`, `rigid`, `magnified` |
 /// | `/markers/path` | `visualization_msgs/MarkerArray` | paths of the tool so far, each second; namespaces `path/flexible`, `path/rigid`, `path/magnified` |
 /// | `/markers/error` | `visualization_msgs/MarkerArray` | the TCP error, magnified, 20 times a second |
+///
+/// All else comes with every sample. `/tf` is also there at each sample whose error is larger than all before it, so that the
+/// largest one has its poses, and at the last sample; an `.rrd` made of the file is the one of the run.
 ///
 /// Topics with `rigid` and `error` need a rigid twin, the magnified arm also [`RunHeader::magnification`]. It is sent at
 /// most 60 times per second of simulated time, with the precision of `f32`. A link of [`RunHeader::bends`] is drawn bent in
@@ -108,6 +111,10 @@ impl OpenFile for McapFile {
         Ok(())
     }
 
+    fn keep(&mut self, sample: &Sample) {
+        self.frames.keep(sample);
+    }
+
     fn finish(&mut self, path: &Path, result: &RunResult) -> Result<(), LogError> {
         let times = result.events.iter().map(|event| stamp(path, self.start.0, event.time_s));
         let times = times.collect::<Result<Vec<_>, _>>()?;
@@ -122,10 +129,10 @@ pub struct McapFile {
     shape: Shape,
     frames: Frames,
     markers: MovingMarkers,
-    joints: Vec<String>,
+    joints: JointNames,
     elements: Vec<String>,
     /// `<element>/x` and so on.
-    deflections: Vec<String>,
+    deflections: JointNames,
     /// Label of the contributions.
     contributions: String,
     flush: FlushClock,
@@ -133,6 +140,7 @@ pub struct McapFile {
     last: Stamp,
     samples: u32,
     /// Messages so far of topics that do not get one from each sample.
+    poses: u32,
     paths: u32,
     errors: u32,
     pictures: u32,
@@ -155,14 +163,15 @@ impl McapFile {
             shape: Shape::of(header),
             frames: Frames::of(header),
             markers: MovingMarkers::new(header),
-            joints: header.joints.clone(),
+            joints: JointNames::new(&header.joints),
             elements: header.elements.clone(),
-            deflections: parts(&header.elements, &["x", "y", "z", "rx", "ry", "rz"], "/"),
+            deflections: JointNames::new(&parts(&header.elements, &["x", "y", "z", "rx", "ry", "rz"], "/")),
             contributions: parts(&header.contributors, &["x [m]", "y [m]", "z [m]"], " ").join(","),
             flush,
             start,
             last: start,
             samples: 0,
+            poses: 0,
             paths: 0,
             errors: 0,
             pictures: 0,
@@ -216,12 +225,15 @@ impl McapFile {
         let rigid = self.channels.rigid.map(|channels| (channels, &sample.rigid));
 
         // Frames. What does not move is known only with the first sample.
-        self.frames.advance(since_start, sample);
-        for (channel, moving) in [(self.channels.tf_static, Moving::No), (self.channels.tf, Moving::Yes)] {
-            if moving == Moving::Yes || self.samples == 0 {
-                let write = |cdr: &mut Cdr| self.frames.write(cdr, stamp, sample, moving);
-                self.output.send(channel, self.samples, stamp, write)?;
-            }
+        let shown = self.frames.advance(since_start, sample);
+        if self.samples == 0 {
+            let write = |cdr: &mut Cdr| self.frames.write(cdr, stamp, sample, Moving::No);
+            self.output.send(self.channels.tf_static, 0, stamp, write)?;
+        }
+        if shown {
+            let write = |cdr: &mut Cdr| self.frames.write(cdr, stamp, sample, Moving::Yes);
+            self.output.send(self.channels.tf, self.poses, stamp, write)?;
+            self.poses = self.poses.wrapping_add(1);
         }
 
         // Joints and tool centre point of either robot.
@@ -327,8 +339,16 @@ impl McapFile {
         Ok(())
     }
 
-    /// The last paths, the events, the result and the index.
+    /// The frames of the last sample, unless they are in the file already.
+    fn last_frames(&mut self) -> io::Result<()> {
+        let Some(write) = self.frames.close() else { return Ok(()) };
+        let stamp = self.last;
+        self.output.send(self.channels.tf, self.poses, stamp, |cdr| write(cdr, stamp))
+    }
+
+    /// The last frames and paths, the events, the result and the index.
     fn end(&mut self, result: &RunResult, event_times: &[Stamp]) -> io::Result<()> {
+        self.last_frames()?;
         self.paths()?;
         // In a chunk of their own: their times span the run, those of the chunk before need not.
         self.output.close_chunk()?;
@@ -352,6 +372,6 @@ impl McapFile {
 impl Drop for McapFile {
     /// A run that was given up still gets its index; errors have nowhere to go.
     fn drop(&mut self) {
-        let _ = self.output.finish();
+        let _ = self.last_frames().and_then(|()| self.output.finish());
     }
 }

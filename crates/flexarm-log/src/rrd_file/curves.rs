@@ -7,6 +7,7 @@ use super::colors::{axis, faint, series, total};
 use super::path;
 use super::stream::{Ids, Put, StreamError};
 use super::tracks::{ScalarTrack, Seen};
+use crate::poses::size;
 use crate::{RunHeader, Sample};
 
 /// All curves of a run.
@@ -156,7 +157,3 @@ impl Curves {
 }
 
 const MILLI: f64 = 1e3;
-
-pub(crate) fn size(parts: &[f64]) -> f64 {
-    parts.iter().map(|part| part * part).sum::<f64>().sqrt()
-}

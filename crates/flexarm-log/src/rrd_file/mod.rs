@@ -97,6 +97,10 @@ impl OpenFile for RrdFile {
         self.run.record(&mut self.store, path, sample)
     }
 
+    fn keep(&mut self, sample: &Sample) {
+        self.run.tracks.keep(sample);
+    }
+
     fn finish(&mut self, path: &Path, result: &RunResult) -> Result<(), LogError> {
         self.end(result).map_err(stream_error(path, "write the result and the index"))
     }

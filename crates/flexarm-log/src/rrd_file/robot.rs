@@ -334,7 +334,7 @@ fn tints(line: &BendLine, real: &[Pose], sample: &Sample, link: usize, scale: Co
     std::array::from_fn(|k| {
         let s = line.length() * (k as f64 + 0.5) / TINTS as f64;
         let point = line.point(s);
-        let deviation = X_flexible * (bent.section(s) * point) - X_rigid * point;
+        let deviation = X_flexible * bent.point(s) - X_rigid * point;
         scale.rgb(deviation.norm())
     })
 }

@@ -7,18 +7,16 @@ use crate::rerun::{
 };
 
 use super::colors::{self, ColorScale};
-use super::curves::{Curves, size};
+use super::curves::Curves;
 use super::eye::{Eye, eye};
 use super::path;
 use super::robot::{Look, Paint, RobotTracks};
 use super::stream::{Ids, Put, StreamError};
 use super::tracks::{ArrowTrack, Instant, PathTrack, SIM_TIME, Seen, Times, Track, point};
 use crate::plot_room::Envelope;
+use crate::poses::{PoseClock, Shown, size};
 use crate::{Event, EventKind, RunHeader, RunResult, Sample, TwinSample};
 use flexarm_draw::Magnifier;
-
-/// Shortest time between two poses (ns): every sample of a run logged at up to 200 Hz, fewer of faster ones. Curves have all.
-const POSE_EVERY_NS: i64 = 5_000_000;
 
 /// What a run is in its recording.
 #[derive(Clone, Debug)]
@@ -91,8 +89,11 @@ pub(crate) struct RunTracks {
     study_curves: Option<Curves>,
     /// What is shown has no size: nothing is told about errors.
     shapes: bool,
-    last_pose_ns: Option<i64>,
-    /// The last sample and its instant, if it has not been drawn.
+    /// Which samples have poses; curves have all.
+    clock: PoseClock,
+    /// Instant of the last sample if it has not been drawn.
+    now: Option<Instant>,
+    /// The same with the sample, once it is kept.
     undrawn: Option<Instant>,
     last: Sample,
     /// Largest error so far (m), its instant, and where the tool is drawn then.
@@ -196,7 +197,8 @@ impl RunTracks {
             curves,
             study_curves,
             shapes,
-            last_pose_ns: None,
+            clock: PoseClock::default(),
+            now: None,
             undrawn: None,
             last: Sample::default(),
             peak: None,
@@ -256,8 +258,8 @@ impl RunTracks {
             curves.push_study(sample);
         }
         let error = size(&sample.error_world[..3]);
-        let new_peak = !self.shapes && self.rigid.is_some() && self.peak.is_none_or(|(largest, ..)| error > largest);
-        let due = self.last_pose_ns.is_none_or(|last| when.0 - last >= POSE_EVERY_NS);
+        let has_error = !self.shapes && self.rigid.is_some();
+        let Shown { due, new_peak } = self.clock.take(when.0.unsigned_abs(), sample, has_error);
         if self.magnified.is_some() && (due || new_peak) {
             self.magnifier.magnify(sample, &mut self.enlarged);
         }
@@ -266,11 +268,16 @@ impl RunTracks {
             self.peak = Some((error, when, point(&shown.X_WT)));
         }
         if due {
-            self.last_pose_ns = Some(when.0);
             self.pose(when, sample, error);
         }
-        self.undrawn = (!due).then_some(when);
-        if !due {
+        self.now = (!due).then_some(when);
+        self.undrawn = None;
+    }
+
+    /// Keeps the sample that was pushed last, unless it is drawn.
+    pub(crate) fn keep(&mut self, sample: &Sample) {
+        self.undrawn = self.now;
+        if self.undrawn.is_some() {
             self.last.clone_from(sample);
         }
     }

@@ -104,7 +104,11 @@ impl Recorder for StudySeat {
     fn record(&mut self, sample: &Sample) -> Result<(), LogError> {
         let mut shared = lock(&self.store);
         match (shared.as_mut(), self.run.as_mut()) {
-            (Some(store), Some(run)) => run.record(store, &self.path, sample),
+            (Some(store), Some(run)) => {
+                run.record(store, &self.path, sample)?;
+                run.tracks.keep(sample);
+                Ok(())
+            }
             _ => Err(LogError::not_open(&self.path, "record")),
         }
     }

@@ -134,6 +134,20 @@ pub(crate) fn sample(step: u64) -> Sample {
     }
 }
 
+/// The first so many samples of which poses are written: every 6 ms at 500 samples a second, those with a larger error than
+/// all before, and the last.
+pub(crate) fn samples_with_poses(count: u64) -> Vec<u64> {
+    let error = |step: u64| sample(step).error_world[..3].iter().map(|part| part * part).sum::<f64>().sqrt();
+    let mut largest = -1.0;
+    let mut has_poses = |step: u64| {
+        let error = error(step);
+        let is_peak = error > largest;
+        largest = error.max(largest);
+        is_peak || step.is_multiple_of(3) || step + 1 == count
+    };
+    (0..count).filter(|step| has_poses(*step)).collect()
+}
+
 /// A path for a test's file; nothing is there.
 pub(crate) fn scratch(name: &str) -> PathBuf {
     let path = std::env::temp_dir().join(format!("flexarm-log-{}-{name}", std::process::id()));

@@ -36,9 +36,9 @@ pub(super) enum Topic {
 }
 
 impl Topic {
-    /// Whether there is one such message per sample.
+    /// Whether there is one such message per sample. Frames have fewer, but for older files.
     fn is_of_a_sample(self) -> bool {
-        !matches!(self, Self::FixedFrames | Self::Events)
+        !matches!(self, Self::Frames | Self::FixedFrames | Self::Events)
     }
 }
 
@@ -52,6 +52,8 @@ pub(super) struct Assembly {
     joints: usize,
     pub(super) frames: Frames,
     sequence: Option<u32>,
+    /// Time of the sample at hand (ns).
+    log_time: u64,
     sample: Sample,
     seen: Vec<Topic>,
     /// The last sample that [`Assembly::take`] or [`Assembly::close`] finished, and its topics in order.
@@ -94,6 +96,7 @@ impl Assembly {
             joints: header.joints.len(),
             frames: Frames::of(header),
             sequence: None,
+            log_time: 0,
             sample: Sample { elastic, ..Sample::default() },
             seen: Vec::new(),
             done: Sample::default(),
@@ -121,9 +124,12 @@ impl Assembly {
             Record::Message { header, data } => {
                 let Some(&topic) = self.channels.get(&header.channel_id) else { return Ok(None) };
                 let next = topic.is_of_a_sample() && self.sequence != Some(header.sequence);
-                let closed = next && self.close();
+                // Frames come before the rest of their sample and are numbered by themselves. Those of the last one can come
+                // behind it.
+                let of_next = topic == Topic::Frames && self.log_time != header.log_time;
+                let closed = (next || of_next) && self.close();
                 if next {
-                    self.sequence = Some(header.sequence);
+                    (self.sequence, self.log_time) = (Some(header.sequence), header.log_time);
                     let time_ns = header.log_time.saturating_sub(self.epoch_ns);
                     (self.sample.time_s, self.sample.step) = exact_time(time_ns, self.step_s);
                 }
