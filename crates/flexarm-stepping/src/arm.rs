@@ -18,6 +18,7 @@ use crate::gear::{GearCoupling, Hysteresis, LoadFriction, TransmissionError};
 use crate::load::Load;
 use crate::modes::{Modes, modes_at};
 use crate::motion::PrescribedMotion;
+use crate::workspaces::Workspaces;
 
 /// Stiffness and damping of one group of elastic coordinates, before it has its place in the model.
 #[derive(Clone, Debug)]
@@ -200,6 +201,8 @@ pub struct FlexibleArm {
     pub cross_damping: Vec<(usize, usize, f64)>,
     /// Natural modes at the start pose, drives locked.
     pub modes: Modes,
+    /// Shared with all copies of the arm.
+    pub workspaces: Workspaces,
 }
 
 /// Sampled joint controllers; see [`ServoAxis`].
@@ -251,6 +254,7 @@ impl FlexibleArm {
         }
         let n = model.n_elastic();
         let mut arm = Self {
+            workspaces: Workspaces::of(&model),
             model,
             elements,
             D: DMatrix::zeros(n, n),
@@ -495,7 +499,7 @@ impl FlexibleArm {
         let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));
         self.prescribed_state(0.0, &mut state, &mut qddot);
         state.q.rows_mut(model.n_actuated(), n).copy_from(&self.modes.equilibrium);
-        let mut data = Data::new(model);
+        let mut data = self.lend_data();
         let M = mass_matrix(model, &mut data, &state.q);
         M.view((model.n_actuated(), model.n_actuated()), (n, n)).clone_owned()
     }

@@ -10,6 +10,7 @@ use flexarm_kinematics::{Data, ElasticAngles, JointMotion, Model, Pose, SpatialI
 use nalgebra::{Matrix3, Matrix6};
 
 use crate::arm::{Damping, FlexibleArm, add_product};
+use crate::dense::{Loops, quickly};
 use crate::tree_matrix::{TreeMatrices, TreeNode};
 
 /// Fewest elastic joints for which elimination is taken instead of a dense inverse: with two, 12 coordinates, a step takes as
@@ -132,6 +133,33 @@ impl ElasticJoint {
     }
 }
 
+/// `f += D v` of a block on the diagonal of a matrix.
+struct AddBlock<'a> {
+    D: &'a [f64],
+    rows: usize,
+    first: usize,
+    v: &'a [f64],
+    f: &'a mut [f64],
+}
+
+impl Loops for AddBlock<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { D, rows, first, v, f } = self;
+        let columns = D.chunks_exact(rows).skip(first).map(|column| &column[first..]).zip(v);
+        // Mostly of an elastic joint: a loop of known length.
+        if let Ok(f) = <&mut [f64; 6]>::try_from(&mut *f) {
+            let mut sum = *f;
+            for (column, rate) in columns {
+                sum.iter_mut().zip(&column[..6]).for_each(|(sum, d)| *sum += d * rate);
+            }
+            *f = sum;
+        } else {
+            columns.for_each(|(column, rate)| f.iter_mut().zip(column).for_each(|(f, d)| *f += d * rate));
+        }
+    }
+}
+
 impl FlexibleArm {
     /// Whether the damping matrix has blocks on its diagonal alone, one per element.
     pub(crate) fn damps_by_element(&self) -> bool {
@@ -145,11 +173,8 @@ impl FlexibleArm {
             return add_product(&self.D, v, f);
         }
         for element in &self.elements {
-            let (first, size) = (self.offset(element), element.size);
-            for (c, rate) in v[first..first + size].iter().enumerate() {
-                let column = &self.D.as_slice()[(first + c) * self.D.nrows() + first..][..size];
-                f[first..first + size].iter_mut().zip(column).for_each(|(f, d)| *f += d * rate);
-            }
+            let (first, range) = (self.offset(element), self.offset(element)..self.offset(element) + element.size);
+            quickly(AddBlock { D: self.D.as_slice(), rows: v.len(), first, v: &v[range.clone()], f: &mut f[range] });
         }
     }
 

@@ -97,6 +97,11 @@ impl EventQueue {
         Self { jumps, jumps_over: 0, changes: arm.inertia_changes.clone(), changes_over: 0, clock }
     }
 
+    /// Of an arm that stands still: changes of inertia alone.
+    pub(crate) fn of_changes(arm: &FlexibleArm) -> Self {
+        Self { jumps: Vec::new(), jumps_over: 0, changes: arm.inertia_changes.clone(), changes_over: 0, clock: None }
+    }
+
     /// The next event after `t`, if any: at `end` if that is the same time.
     pub(crate) fn next(&self, t: f64, end: f64) -> Option<f64> {
         let change = self.changes.get(self.changes_over).map(|change| change.t);
@@ -219,11 +224,12 @@ impl ReducedArm {
     pub(crate) fn at_time(&mut self, t: f64, x: &DVector<f64>, v: &mut DVector<f64>) -> Result<Change, StepError> {
         let mut what = Change::Nothing;
         while let Some((number, change)) = self.events.due_change(t) {
-            self.arm.model = Arc::new(self.arm.model.with_inertia(change.body, change.inertia));
+            let arm = Arc::make_mut(&mut self.arm);
+            arm.model = Arc::new(arm.model.with_inertia(change.body, change.inertia));
             if let Some((D, tau, proportional)) = self.dampings.get_mut(number) {
-                std::mem::swap(&mut self.arm.D, D);
-                std::mem::swap(&mut self.arm.tau, tau);
-                self.arm.proportional = *proportional;
+                std::mem::swap(&mut arm.D, D);
+                std::mem::swap(&mut arm.tau, tau);
+                arm.proportional = *proportional;
             }
             self.weigh();
             what = Change::Matrices;

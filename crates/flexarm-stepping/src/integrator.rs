@@ -2,6 +2,8 @@
 //!
 //! [`ReducedStepper`] puts any of them behind a flexible arm, once for all: its steps end at events too.
 
+use std::sync::Arc;
+
 use nalgebra::DVector;
 
 use crate::arm::FlexibleArm;
@@ -200,7 +202,7 @@ pub(crate) struct ReducedStepper<I> {
 impl<I: Integrator> ReducedStepper<I> {
     /// An arm at `t = 0` with elastic coordinates `e`, and the integrator that is made for it from positions and velocities.
     pub(crate) fn start(
-        arm: FlexibleArm,
+        arm: impl Into<Arc<FlexibleArm>>,
         e: &DVector<f64>,
         make: impl FnOnce(&mut ReducedArm, DVector<f64>, DVector<f64>) -> Result<I, StepError>,
     ) -> Result<Self, StepError> {

@@ -62,6 +62,7 @@ mod stepper;
 pub mod steppers;
 mod system;
 mod tree_matrix;
+mod workspaces;
 
 pub use arm::{Damping, ElasticElement, FlexibleArm, GeometricStiffness, InertiaChange, Servo, Spring};
 pub use batch::{Batch, BatchRun, ToolDeflection};
@@ -88,3 +89,4 @@ pub use stepper::{Counts, Start, Stepper};
 pub use steppers::*;
 pub use system::SecondOrderSystem;
 pub use tree_matrix::{TreeMatrices, TreeNode};
+pub use workspaces::{Lent, Workspaces};

@@ -1,6 +1,6 @@
 //! Natural frequencies and shapes of the arm about its static pose, drives locked.
 
-use flexarm_kinematics::{Data, State, mass_matrix};
+use flexarm_kinematics::{State, mass_matrix};
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
 use crate::arm::FlexibleArm;
@@ -38,7 +38,7 @@ pub fn modes_at(arm: &FlexibleArm, t: f64) -> Result<Modes, StepError> {
     }
     let model = &arm.model;
     let equilibrium = static_equilibrium(arm, t)?;
-    let mut data = Data::new(model);
+    let mut data = arm.lend_data();
     let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));
     arm.prescribed_state(t, &mut state, &mut qddot);
     let K = for_vibration(arm, &arm.stiffness(), state.q.as_slice(), &equilibrium);

@@ -6,6 +6,7 @@ use flexarm_kinematics::{Model, Pose};
 use nalgebra::{DVector, Vector6};
 
 use crate::arm::FlexibleArm;
+use crate::dense::dot;
 use crate::reduced::ReducedArm;
 
 /// What a run can see of a stepper at its current time.
@@ -66,7 +67,7 @@ pub(crate) fn observe_reduced(
     out: &mut Observation,
 ) {
     let [kinetic, potential] = system.observe(t, x, v, a, &mut out.X_WB);
-    let (arm, data, state) = (&system.arm, &system.data, &system.state);
+    let (arm, data, state) = (&*system.arm, &system.data, &system.state);
     let (n, driven) = (arm.model.n_actuated(), &arm.torque_driven);
     let (e, rates) = (&x.as_slice()[driven.len()..], &v.as_slice()[driven.len()..]);
     out.t = t;
@@ -82,9 +83,12 @@ pub(crate) fn observe_reduced(
 
     // Springs, and what dampers and friction take away.
     let gears = system.gears.as_ref();
-    let mut damping = match gears {
-        Some(gears) => gears.loads(arm, &mut out.load),
-        None => element_loads(arm, e, rates, system.shifted.as_mut_slice(), &mut out.load),
+    let [mut damping, elastic] = match gears {
+        Some(gears) => [gears.loads(arm, &mut out.load), gears.energy(arm)],
+        None => {
+            let rooms = [system.shifted.as_mut_slice(), system.forces.as_mut_slice()];
+            element_loads(arm, e, rates, rooms, &mut out.load)
+        }
     };
     for k in 0..n {
         let rate = state.qdot[k];
@@ -99,34 +103,40 @@ pub(crate) fn observe_reduced(
     });
     out.power = [out.drive.dot(&out.qdot.rows(0, n)), loads.sum(), damping];
     out.impulse_work = system.struck;
-    let elastic = gears.map_or_else(|| arm.elastic_energy(e), |gears| gears.energy(arm));
     out.energy = [kinetic, potential, elastic];
 }
 
-/// Loads `-(K e + D ė)` of the elements, their first six components; the power that the dampers take, `ėᵀ D ė` (W).
+/// Loads `-(K e + D ė)` of the elements, their first six components; the power that the dampers take, `ėᵀ D ė` (W), and the elastic
+/// energy (J).
 ///
-/// * `dampers`: scratch, a number per elastic coordinate at least.
-fn element_loads(arm: &FlexibleArm, e: &[f64], rates: &[f64], dampers: &mut [f64], loads: &mut [Vector6<f64>]) -> f64 {
+/// * `rooms`: scratch, a number per elastic coordinate at least.
+fn element_loads(
+    arm: &FlexibleArm,
+    e: &[f64],
+    rates: &[f64],
+    rooms: [&mut [f64]; 2],
+    loads: &mut [Vector6<f64>],
+) -> [f64; 2] {
     if rates.is_empty() {
-        return 0.0;
+        return [0.0; 2];
     }
-    let dampers = &mut dampers[..rates.len()];
+    let [dampers, springs] = rooms.map(|room| &mut room[..rates.len()]);
     dampers.fill(0.0);
+    springs.fill(0.0);
     arm.add_damping(rates, dampers);
+    let mut energy = 0.0;
     for (load, element) in loads.iter_mut().zip(&arm.elements) {
-        let first = arm.offset(element);
-        let (own, dampers) = (&e[first..first + element.size], &dampers[first..first + element.size]);
-        let mut force = [0.0; 6];
-        match &element.curve {
-            Some(curve) => force[..dampers.len().min(6)].fill(curve.torque(own[0])),
-            None => {
-                for (column, e) in element.K.as_slice().chunks_exact(element.size).zip(own) {
-                    force.iter_mut().zip(column).for_each(|(force, k)| *force += k * e);
-                }
-            }
-        }
-        force.iter_mut().zip(dampers).for_each(|(force, damper)| *force = -(*force + damper));
-        *load = Vector6::from(force);
+        let range = arm.offset(element)..arm.offset(element) + element.size;
+        let (own, spring) = (&e[range.clone()], &mut springs[range.clone()]);
+        element.add_spring_force(own, spring);
+        energy += match &element.curve {
+            Some(curve) => curve.energy(own[0]),
+            None => 0.5 * dot(own, spring),
+        };
+        load.fill(0.0);
+        let forces = spring.iter().zip(&dampers[range]);
+        load.iter_mut().zip(forces).for_each(|(load, (spring, damper))| *load = -(spring + damper));
     }
-    dampers.iter().zip(rates).map(|(damper, rate)| damper * rate).sum()
+    let crossed = arm.cross_stiffness.iter().map(|&(i, j, k)| k * e[i] * e[j]);
+    [dot(dampers, rates), energy + crossed.sum::<f64>()]
 }

@@ -7,6 +7,8 @@
 //! the free coordinates. Torques of a sampled controller stay constant between
 //! its samples. What happens at discrete times is in `events`. Not here: integration.
 
+use std::sync::Arc;
+
 use flexarm_kinematics::{
     Data, FreeForces, JointMotion, Motions, Observer, Pose, Roles, State, Wrench, forward_kinematics, hybrid_dynamics,
     inverse_dynamics, kinetic_energy_of, mass_matrix_at_poses, potential_energy_of, world_poses,
@@ -23,14 +25,15 @@ use crate::mode_matrix::ModeMatrices;
 use crate::servo::ServoState;
 use crate::system::SecondOrderSystem;
 use crate::tree_matrix::TreeMatrices;
+use crate::workspaces::Lent;
 
 /// Passes after which the stiffness by load of an acceleration has settled.
 const GEOMETRIC_PASSES: usize = 12;
 
 /// A flexible arm as a second-order system; see the module page.
 pub struct ReducedArm {
-    pub(crate) arm: FlexibleArm,
-    pub(crate) data: Data,
+    pub(crate) arm: Arc<FlexibleArm>,
+    pub(crate) data: Lent<Data>,
     pub(crate) state: State,
     pub(crate) qddot: DVector<f64>,
     pub(crate) tau: DVector<f64>,
@@ -49,7 +52,8 @@ pub struct ReducedArm {
     /// Storage of the factor of `M_ff` in a blow.
     pub(crate) mass_factor: Option<Cholesky<f64, Dyn>>,
     pub(crate) shifted: DVector<f64>,
-    geometric_force: DVector<f64>,
+    /// Forces of the springs, or of loads that stiffen them.
+    pub(crate) forces: DVector<f64>,
     /// What gears do beside giving way.
     pub(crate) gears: Option<Box<GearState>>,
     /// The elastic joints as a tree, where they are enough and damped by element.
@@ -57,10 +61,10 @@ pub struct ReducedArm {
     /// The modes that are eliminated first, where they are enough.
     modes: Option<HeldModes>,
     /// The equations of motion of the free coordinates alone, where they are enough and the tree is for it.
-    points: Option<FreeForces>,
+    points: Option<Lent<FreeForces>>,
     poses: Poses,
     /// What a run is shown comes from it, if the tree is for it; made with the first observation.
-    observer: Option<Option<Observer>>,
+    observer: Option<Option<Lent<Observer>>>,
 }
 
 /// Where the poses of the state are.
@@ -120,17 +124,18 @@ fn is_alone(A: &DMatrixView<'_, f64>, k: usize) -> bool {
 }
 
 impl ReducedArm {
-    /// Workspaces for the arm.
-    pub fn new(arm: FlexibleArm) -> Self {
+    /// Workspaces for the arm, those of a run that is over where there are some.
+    pub fn new(arm: impl Into<Arc<FlexibleArm>>) -> Self {
+        let arm = arm.into();
         let model = &arm.model;
         let n = arm.n_free();
         let driven = arm.torque_driven.clone();
         let roles = Roles::new(model, |k| k < model.n_actuated() && !driven.contains(&k));
         // Loads on links that stiffen them are in the spatial accelerations.
         let geometric = arm.elements.iter().any(|e| e.geometric.is_some());
-        let points = FreeForces::new(model, &roles);
+        let points = if geometric { None } else { arm.lend_points(&roles) };
         Self {
-            data: Data::new(model),
+            data: arm.lend_data(),
             state: State::zeros(model),
             qddot: DVector::zeros(model.nv()),
             tau: DVector::zeros(model.nv()),
@@ -145,11 +150,11 @@ impl ReducedArm {
             step_start: StepStart::new(model.n_actuated()),
             mass_factor: Cholesky::new(DMatrix::identity(n, n)),
             shifted: DVector::zeros(n),
-            geometric_force: DVector::zeros(n),
+            forces: DVector::zeros(n),
             gears: GearState::of(&arm),
             tree: ElasticTree::that_pays(&arm),
             modes: HeldModes::that_pay(&arm),
-            points: if geometric { None } else { points },
+            points,
             poses: Poses::InData,
             observer: None,
             arm,
@@ -226,9 +231,11 @@ impl ReducedArm {
     pub(crate) fn weigh(&mut self) {
         if let Some(points) = &mut self.points {
             points.weigh(&self.arm.model);
+            points.keep();
         }
         if let Some(Some(observer)) = &mut self.observer {
             observer.weigh(&self.arm.model);
+            observer.keep();
         }
     }
 
@@ -351,7 +358,7 @@ impl ReducedArm {
         X_WB: &mut [Pose],
     ) -> [f64; 2] {
         let is_plain = self.points.is_some() && self.arm.loads.is_empty();
-        let make = || if is_plain { Observer::new(&self.arm.model) } else { None };
+        let make = || if is_plain { self.arm.lend_observer() } else { None };
         let Some(mut observer) = self.observer.take().unwrap_or_else(make) else {
             self.observer = Some(None);
             self.evaluate(t, x, v, a);
@@ -506,7 +513,7 @@ impl SecondOrderSystem for ReducedArm {
     ) -> Result<(), StepError> {
         self.set(t, x, v);
         self.poses = Poses::InData;
-        let mut forces = std::mem::replace(&mut self.geometric_force, DVector::zeros(0));
+        let mut forces = std::mem::replace(&mut self.forces, DVector::zeros(0));
         for pass in 0..GEOMETRIC_PASSES {
             forces.fill(0.0);
             if pass > 0 {
@@ -529,7 +536,7 @@ impl SecondOrderSystem for ReducedArm {
             // The loads belong to the accelerations just found.
             inverse_dynamics(&self.arm.model, &mut self.data, &self.state, &self.qddot);
         }
-        self.geometric_force = forces;
+        self.forces = forces;
         Ok(())
     }
 

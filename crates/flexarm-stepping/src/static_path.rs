@@ -1,21 +1,26 @@
-//! Static equilibria along a motion: each is sought from the one before, with the stiffness that was factored there.
+//! Static equilibria along a motion: each is sought from the one before, with the stiffness that was inverted there.
 
 use std::sync::Arc;
 
-use flexarm_kinematics::{Data, Frame, State, forward_kinematics, gravity_forces};
-use nalgebra::{Cholesky, DVector, Dyn, Vector3};
+use flexarm_kinematics::products::{add, mul};
+use flexarm_kinematics::{
+    Data, Frame, FreeForces, JointMotion, Motions, Roles, State, forward_kinematics, gravity_forces,
+};
+use nalgebra::{DMatrix, DVector, Vector3};
 
-use crate::arm::FlexibleArm;
+use crate::arm::{FlexibleArm, InertiaChange};
+use crate::dense::product_of_numbers;
 use crate::error::StepError;
 use crate::events::EventQueue;
 use crate::reduced::add_geometric_forces;
 use crate::statics::{add_spring_forces, static_equilibrium, tangent_stiffness, with_curves};
+use crate::workspaces::Lent;
 
 /// A correction below this part of the deflection ends the search: the next one would be ten times smaller at least.
 const SMALL: f64 = 1e-7;
 /// Deflections below this are none (m, rad).
 const NOTHING: f64 = 1e-15;
-/// Corrections with one factor; a factor of the right place needs three or four.
+/// Corrections with one inverse; that of the right place needs three or four.
 const MOST_CORRECTIONS: usize = 8;
 
 /// An instant before t (s), nearer than anything happens.
@@ -26,26 +31,46 @@ pub(crate) fn before(t: f64) -> f64 {
 /// The elastic coordinates of an arm that stands still wherever its motion is, for times in ascending order.
 ///
 /// The same equilibria as [`static_equilibrium`], at the price of a few evaluations of weight each: the tangent stiffness
-/// changes little along a motion, so that one factor serves many instants.
+/// changes little along a motion, so that its inverse at one place serves many instants.
 pub struct StaticPath {
-    arm: FlexibleArm,
+    arm: Arc<FlexibleArm>,
     events: EventQueue,
-    data: Data,
+    data: Lent<Data>,
+    /// Weight on the springs alone, where the tree is for it.
+    points: Option<Lent<FreeForces>>,
+    /// Drives at the last time, springs at `e`.
     state: State,
     qddot: DVector<f64>,
+    /// Neither velocity nor acceleration.
+    still: DVector<f64>,
     e: DVector<f64>,
     unbalanced: DVector<f64>,
-    factor: Option<Cholesky<f64, Dyn>>,
+    correction: DVector<f64>,
+    /// Of the tangent stiffness.
+    inverse: Option<DMatrix<f64>>,
+    /// When the equilibrium was sought anew and the inverse is still to be taken (s).
+    sought_at: Option<f64>,
 }
 
 impl StaticPath {
     /// For an arm with its loads and its changes of inertia.
-    pub fn new(arm: FlexibleArm) -> Self {
+    pub fn new(arm: impl Into<Arc<FlexibleArm>>) -> Self {
+        let arm = arm.into();
         let (nv, n) = (arm.model.nv(), arm.n_elastic_coordinates());
-        let (data, state) = (Data::new(&arm.model), State::zeros(&arm.model));
-        let e = if arm.modes.equilibrium.len() == n { arm.modes.equilibrium.clone() } else { DVector::zeros(n) };
-        let (qddot, unbalanced) = (DVector::zeros(nv), DVector::zeros(n));
-        Self { events: EventQueue::of(&arm), data, state, qddot, unbalanced, e, factor: None, arm }
+        Self {
+            events: EventQueue::of_changes(&arm),
+            data: arm.lend_data(),
+            points: arm.lend_points(&Roles::actuated_prescribed(&arm.model)),
+            state: State::zeros(&arm.model),
+            qddot: DVector::zeros(nv),
+            still: DVector::zeros(nv),
+            e: if arm.modes.equilibrium.len() == n { arm.modes.equilibrium.clone() } else { DVector::zeros(n) },
+            unbalanced: DVector::zeros(n),
+            correction: DVector::zeros(n),
+            inverse: None,
+            sought_at: None,
+            arm,
+        }
     }
 
     /// All coordinates at time `t` (s), not before the last one asked for: drives where the motion is, springs in balance
@@ -54,8 +79,9 @@ impl StaticPath {
     /// # Errors
     /// As [`static_equilibrium`].
     pub fn at(&mut self, t: f64) -> Result<&DVector<f64>, StepError> {
+        self.take_inverse();
         while let Some((_, change)) = self.events.due_change(t) {
-            self.arm.model = Arc::new(self.arm.model.with_inertia(change.body, change.inertia));
+            carry(&mut self.arm, &mut self.points, change);
         }
         self.balanced(t)
     }
@@ -65,36 +91,49 @@ impl StaticPath {
     /// # Errors
     /// As [`static_equilibrium`].
     pub fn just_before(&mut self, t: f64) -> Result<&DVector<f64>, StepError> {
+        self.take_inverse();
         while let Some((_, change)) = self.events.change_before(t) {
-            self.arm.model = Arc::new(self.arm.model.with_inertia(change.body, change.inertia));
+            carry(&mut self.arm, &mut self.points, change);
         }
         self.balanced(before(t))
     }
 
     fn balanced(&mut self, t: f64) -> Result<&DVector<f64>, StepError> {
-        if self.e.is_empty() || self.correct(t) {
-            self.place(t);
-            return Ok(&self.state.q);
+        self.arm.prescribed_state(t, &mut self.state, &mut self.qddot);
+        if !(self.e.is_empty() || self.correct(t)) {
+            self.e = static_equilibrium(&self.arm, t)?;
+            self.bend();
+            self.sought_at = Some(t);
         }
-        self.e = static_equilibrium(&self.arm, t)?;
-        self.place(t);
-        let K = with_curves(&self.arm, &self.arm.stiffness(), self.state.q.as_slice(), &self.e);
-        self.factor = tangent_stiffness(&self.arm, &mut self.data, t, &self.e, &K).cholesky();
-        self.place(t);
         Ok(&self.state.q)
     }
 
     /// How far a frame is from where it would be with all springs undeformed (m, world axes), at the coordinates of the last
     /// time asked for.
     pub fn displacement(&mut self, frame: &Frame) -> Vector3<f64> {
-        let Self { arm, data, state, e, .. } = self;
-        let (model, n) = (&arm.model, arm.model.n_actuated());
-        forward_kinematics(model, data, &state.q);
-        let yielding = data.X_WF(frame).translation.vector;
-        state.q.as_mut_slice()[n..].fill(0.0);
-        forward_kinematics(model, data, &state.q);
-        state.q.as_mut_slice()[n..].copy_from_slice(e.as_slice());
-        yielding - data.X_WF(frame).translation.vector
+        forward_kinematics(&self.arm.model, &mut self.data, &self.state.q);
+        let yielding = self.data.X_WF(frame).translation.vector;
+        yielding - self.undeformed(frame)
+    }
+
+    /// Where a frame would be, for the poses in `data`; of closed loops these poses are lost.
+    fn undeformed(&mut self, frame: &Frame) -> Vector3<f64> {
+        let Self { arm, data, state, .. } = self;
+        if !arm.model.loops().is_empty() {
+            state.q.as_mut_slice()[arm.model.n_actuated()..].fill(0.0);
+            forward_kinematics(&arm.model, data, &state.q);
+            self.bend();
+            return self.data.X_WF(frame).translation.vector;
+        }
+        let (mut p, mut i) = (frame.X_BF.translation.vector, frame.body);
+        while i > 0 {
+            let body = &arm.model.bodies()[i];
+            let bends = body.elastic || matches!(body.motion, JointMotion::Interface { .. });
+            let X = if bends { &body.X_PJ } else { &data.X_PB[i] };
+            p = add(&mul(X.rotation.matrix(), &p), &X.translation.vector);
+            i = body.parent;
+        }
+        p
     }
 
     /// The arm that stands still, with what it carries now.
@@ -102,24 +141,33 @@ impl StaticPath {
         &self.arm
     }
 
-    fn place(&mut self, t: f64) {
-        self.arm.prescribed_state(t, &mut self.state, &mut self.qddot);
-        self.state.q.rows_mut(self.arm.model.n_actuated(), self.e.len()).copy_from(&self.e);
+    /// The inverse where the equilibrium was sought anew: only a second time asks for it.
+    fn take_inverse(&mut self) {
+        let Some(t) = self.sought_at.take().filter(|_| !self.e.is_empty()) else { return };
+        let K = with_curves(&self.arm, &self.arm.stiffness(), self.state.q.as_slice(), &self.e);
+        let factor = tangent_stiffness(&self.arm, &mut self.data, t, &self.e, &K).cholesky();
+        self.inverse = factor.map(|factor| factor.inverse());
     }
 
-    /// Newton with the factor at hand; false if it does not lead to the equilibrium.
+    /// The springs into the state.
+    fn bend(&mut self) {
+        self.state.q.as_mut_slice()[self.arm.model.n_actuated()..].copy_from_slice(self.e.as_slice());
+    }
+
+    /// Newton with the inverse at hand; false if it does not lead to the equilibrium.
     fn correct(&mut self, t: f64) -> bool {
-        let Some(factor) = self.factor.take() else { return false };
+        let Some(inverse) = self.inverse.take() else { return false };
         let (mut found, mut last) = (false, f64::INFINITY);
         for _ in 0..MOST_CORRECTIONS {
             self.balance(t);
-            factor.solve_mut(&mut self.unbalanced);
-            let size = self.unbalanced.amax();
-            // A factor of another place makes small steps too; it must make them quickly smaller.
+            product_of_numbers(inverse.as_slice(), self.unbalanced.as_slice(), self.correction.as_mut_slice());
+            let size = self.correction.amax();
+            // An inverse of another place makes small steps too; it must make them quickly smaller.
             if !size.is_finite() || size > 0.1 * last {
                 break;
             }
-            self.e -= &self.unbalanced;
+            self.e -= &self.correction;
+            self.bend();
             last = size;
             if size <= (SMALL * self.e.amax()).max(NOTHING) {
                 found = true;
@@ -127,21 +175,41 @@ impl StaticPath {
             }
         }
         if found {
-            self.factor = Some(factor);
+            self.inverse = Some(inverse);
         }
         found
     }
 
-    /// Forces of springs, weight and loads at the elastic coordinates.
+    /// Forces of springs, weight and loads in the state.
     fn balance(&mut self, t: f64) {
-        self.place(t);
-        let Self { arm, data, state, e, unbalanced, .. } = self;
+        let Self { arm, data, points, state, still, e, unbalanced, .. } = self;
         if !arm.loads.is_empty() {
             forward_kinematics(&arm.model, data, &state.q);
             arm.apply_loads(data, t);
         }
-        unbalanced.copy_from(&gravity_forces(&arm.model, data, &state.q).rows(arm.model.n_actuated(), e.len()));
-        add_geometric_forces(arm, data, e.as_slice(), unbalanced.as_mut_slice());
+        match points {
+            Some(points) => {
+                let still = still.as_slice();
+                let motions = Motions { q: state.q.as_slice(), qdot: still, qddot: still };
+                let loads = (!arm.loads.is_empty()).then_some(data.F_ext.as_slice());
+                points.compute(motions, loads, unbalanced.as_mut_slice());
+            }
+            None => {
+                let forces = gravity_forces(&arm.model, data, &state.q);
+                unbalanced.copy_from(&forces.rows(arm.model.n_actuated(), e.len()));
+                add_geometric_forces(arm, data, e.as_slice(), unbalanced.as_mut_slice());
+            }
+        }
         add_spring_forces(arm, state.q.as_slice(), e.as_slice(), unbalanced.as_mut_slice());
+    }
+}
+
+/// What the arm carries from now on.
+fn carry(arm: &mut Arc<FlexibleArm>, points: &mut Option<Lent<FreeForces>>, change: &InertiaChange) {
+    let arm = Arc::make_mut(arm);
+    arm.model = Arc::new(arm.model.with_inertia(change.body, change.inertia));
+    if let Some(points) = points {
+        points.weigh(&arm.model);
+        points.keep();
     }
 }

@@ -32,7 +32,7 @@ pub fn static_equilibrium(arm: &FlexibleArm, t: f64) -> Result<DVector<f64>, Ste
     if n == 0 {
         return Ok(e);
     }
-    let mut data = Data::new(&arm.model);
+    let mut data = arm.lend_data();
     let K = arm.stiffness();
     let mut residual = f64::INFINITY;
     // A loop's first loading may be soft, then stiff: full steps may go to and fro between its pieces.

@@ -6,6 +6,8 @@
 //! Start at [`Piece::hermite`]; everything else evaluates. Extrema come from the real roots of the next
 //! derivative, isolated between the roots of the derivative after that: no sampling, none is missed.
 
+use std::ops::Deref;
+
 /// Where a quantity is least and where it is greatest within a piece, as `(τ, value)`.
 pub(crate) type Range = [(f64, f64); 2];
 
@@ -76,8 +78,11 @@ impl Piece {
     pub(crate) fn range(&self, order: usize) -> Range {
         let value = |u: f64| self.at(u * self.width)[order];
         let (mut least, mut greatest) = ((0.0, value(0.0)), (0.0, value(0.0)));
+        if self.is_still() {
+            return [least, greatest];
+        }
         let inner = roots_in_unit_interval(&self.derivative_in_u(order + 1));
-        for u in inner.into_iter().chain([1.0]) {
+        for u in inner.iter().copied().chain([1.0]) {
             let candidate = (u * self.width, value(u));
             if candidate.1 < least.1 {
                 least = candidate;
@@ -93,13 +98,13 @@ impl Piece {
     pub(crate) fn first_crossing(&self, order: usize, level: f64) -> Option<f64> {
         let mut p = self.derivative_in_u(order);
         // The derivative with respect to u = τ / width is width^order times the one with respect to τ.
-        p[0] -= level * self.width.powi(order as i32);
+        p.all[0] -= level * self.width.powi(order as i32);
         roots_in_unit_interval(&p).first().map(|u| u * self.width)
     }
 
     /// Coefficients of `d^order q / du^order` in `u = τ / width`, lowest first.
-    fn derivative_in_u(&self, order: usize) -> Vec<f64> {
-        let mut p: Vec<f64> = (0..6).map(|k| self.c[k] * self.width.powi(k as i32)).collect();
+    fn derivative_in_u(&self, order: usize) -> Few {
+        let mut p = Few::of((0..6).map(|k| self.c[k] * self.width.powi(k as i32)));
         for _ in 0..order {
             p = differentiate(&p);
         }
@@ -107,8 +112,43 @@ impl Piece {
     }
 }
 
-fn differentiate(p: &[f64]) -> Vec<f64> {
-    p.iter().enumerate().skip(1).map(|(k, c)| k as f64 * c).collect()
+/// A few numbers, in place: coefficients of a polynomial of degree five at most, or its roots and the ends of their interval.
+#[derive(Clone, Copy, Debug, Default)]
+struct Few {
+    all: [f64; 12],
+    count: usize,
+}
+
+impl Few {
+    fn of(numbers: impl IntoIterator<Item = f64>) -> Self {
+        let mut few = Self::default();
+        numbers.into_iter().for_each(|x| few.push(x));
+        few
+    }
+
+    fn push(&mut self, x: f64) {
+        self.all[self.count] = x;
+        self.count += 1;
+    }
+
+    /// Adds a root, if it is not the one found last.
+    fn push_new(&mut self, root: f64) {
+        if self.last() != Some(&root) {
+            self.push(root);
+        }
+    }
+}
+
+impl Deref for Few {
+    type Target = [f64];
+
+    fn deref(&self) -> &[f64] {
+        &self.all[..self.count]
+    }
+}
+
+fn differentiate(p: &[f64]) -> Few {
+    Few::of(p.iter().enumerate().skip(1).map(|(k, c)| k as f64 * c))
 }
 
 fn evaluate(p: &[f64], u: f64) -> f64 {
@@ -119,28 +159,26 @@ fn evaluate(p: &[f64], u: f64) -> f64 {
 ///
 /// Between two neighbouring roots of `p'` the polynomial is monotone and has one root at most, so the
 /// recursion over the derivatives finds all of them.
-fn roots_in_unit_interval(p: &[f64]) -> Vec<f64> {
+fn roots_in_unit_interval(p: &[f64]) -> Few {
     if p.len() < 2 {
-        return Vec::new();
+        return Few::default();
     }
     let slope = differentiate(p);
-    let mut ends = vec![0.0];
-    ends.extend(roots_in_unit_interval(&slope));
-    ends.push(1.0);
+    let inner = roots_in_unit_interval(&slope);
+    let ends = Few::of([0.0].into_iter().chain(inner.iter().copied()).chain([1.0]));
 
-    let mut roots = Vec::new();
+    let mut roots = Few::default();
     for pair in ends.windows(2) {
         let (low, high) = (evaluate(p, pair[0]), evaluate(p, pair[1]));
         if low == 0.0 {
-            roots.push(pair[0]);
+            roots.push_new(pair[0]);
         } else if low.signum() * high.signum() < 0.0 && high != 0.0 {
-            roots.push(bracketed_root(p, &slope, pair[0], pair[1]));
+            roots.push_new(bracketed_root(p, &slope, pair[0], pair[1]));
         }
     }
     if evaluate(p, 1.0) == 0.0 {
-        roots.push(1.0);
+        roots.push_new(1.0);
     }
-    roots.dedup();
     roots
 }
 

@@ -18,6 +18,7 @@ use flexarm_stepping::{
 use nalgebra::{DMatrix, DVector, Matrix6, Vector3};
 
 use crate::caveat::Caveat;
+use crate::caveat::size::Size;
 use crate::drive_entry::{DriveKind, ServoEntry};
 use crate::error::{Error, ModellingError, PoseError};
 use crate::gear_entry::{GearLaws, RobotCoupling};
@@ -246,6 +247,8 @@ pub struct FlexibleRobot {
     pub doubts: Vec<Caveat>,
     /// The springs under the base, as the last of the spans.
     pub(crate) mounting: Option<usize>,
+    /// How far its mass or its tool reaches, a yardstick (m).
+    pub(crate) extent: f64,
     /// Links that bend in modes though rigid parts are asked for, and why: sentences.
     pub modal_instead: Vec<String>,
 }
@@ -432,6 +435,7 @@ impl Robot {
             torque,
             doubts,
             mounting,
+            extent: Size::of(&self.urdf.mechanism).extent.max(self.tcp.1.translation.vector.norm()),
             modal_instead,
         })
     }

@@ -48,7 +48,7 @@ impl Prepared {
 /// A run whose input makes sense.
 pub(crate) struct Checked {
     pub(crate) flexible: Arc<FlexibleRobot>,
-    pub(crate) arm: FlexibleArm,
+    pub(crate) arm: Arc<FlexibleArm>,
     pub(crate) stepper: Box<dyn Stepper>,
     pub(crate) load_caveats: Vec<Caveat>,
 }
@@ -84,6 +84,7 @@ pub(crate) fn checked(
     if options.log_rate_hz * options.step_s > 1.0 + 1e-9 && options.log_rate_hz != RunOptions::default().log_rate_hz {
         load_caveats.push(kinds::LOG_RATE.found("run", options.log_rate_hz, 1.0 / options.step_s));
     }
+    let arm = Arc::new(arm);
     let stepper = new_stepper(options.stepper, arm.clone(), options.step_s, scenario.start)
         .map_err(|error| flexible.explained(error))?;
     Ok(Checked { flexible, arm, stepper, load_caveats })

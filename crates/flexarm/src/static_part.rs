@@ -3,6 +3,8 @@
 //! Drives at their commanded places, springs in balance with weight and with the loads of the instant, no inertia force. The
 //! curve is smooth between the instants at which something jumps: it is computed on a grid and interpolated by cubics.
 
+use std::sync::Arc;
+
 use flexarm_kinematics::Frame;
 use flexarm_stepping::{FlexibleArm, StaticPath};
 use nalgebra::Vector3;
@@ -39,7 +41,13 @@ struct Block {
 }
 
 impl StaticPart {
-    pub(crate) fn new(arm: &FlexibleArm, tcp: &Frame, moves: Vec<(f64, f64)>, duration: f64, sample_s: f64) -> Self {
+    pub(crate) fn new(
+        arm: &Arc<FlexibleArm>,
+        tcp: &Frame,
+        moves: Vec<(f64, f64)>,
+        duration: f64,
+        sample_s: f64,
+    ) -> Self {
         let changes = arm.inertia_changes.iter().map(|change| change.t);
         let ends = moves.iter().flat_map(|&(start, end)| [start, end]);
         let mut breaks: Vec<f64> =

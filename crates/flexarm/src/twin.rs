@@ -6,12 +6,12 @@ use flexarm_kinematics::{
     Data, Frame, Model, Motions, Observer, State, forward_kinematics, forward_kinematics_velocity, frame_jacobian,
     frame_twist, inverse_dynamics, world_poses,
 };
-use flexarm_stepping::FlexibleArm;
+use flexarm_stepping::{FlexibleArm, Lent};
 use nalgebra::{DVector, Matrix6xX, Vector3};
 
 /// Kinematics and required torques of the rigid twin at one time.
 pub(crate) struct RigidTwin {
-    pub(crate) data: Data,
+    pub(crate) data: Lent<Data>,
     pub(crate) state: State,
     qddot: DVector<f64>,
     /// Jacobian of the TCP, world axes.
@@ -23,14 +23,14 @@ pub(crate) struct RigidTwin {
     /// What stands where, and how it moves, in [`Self::data`] and [`Self::J`]; `None` where other functions were there last.
     placed: Option<(Arc<Model>, State)>,
     /// All comes from it, if the tree is for it, with the inertias of this model; made at the first look.
-    observer: Option<(Arc<Model>, Option<Observer>)>,
+    observer: Option<(Arc<Model>, Option<Lent<Observer>>)>,
 }
 
 impl RigidTwin {
     pub(crate) fn new(arm: &FlexibleArm) -> Self {
         let model = &arm.model;
         Self {
-            data: Data::new(model),
+            data: arm.lend_data(),
             state: State::zeros(model),
             qddot: DVector::zeros(model.nv()),
             J: Matrix6xX::zeros(model.nv()),
@@ -65,7 +65,7 @@ impl RigidTwin {
         } else {
             self.placed = Some((arm.model.clone(), self.state.clone()));
         }
-        if self.look(&arm.model, tcp, false) {
+        if self.look(arm, tcp, false) {
             return;
         }
         forward_kinematics_velocity(&arm.model, &mut self.data, &self.state);
@@ -78,7 +78,7 @@ impl RigidTwin {
         self.placed = None;
         let model = &arm.model;
         arm.prescribed_state(t, &mut self.state, &mut self.qddot);
-        if self.look(model, tcp, true) {
+        if self.look(arm, tcp, true) {
             return;
         }
         inverse_dynamics(model, &mut self.data, &self.state, &self.qddot);
@@ -94,16 +94,18 @@ impl RigidTwin {
 
     /// Poses in the world, Jacobian and velocity of the tool, with forces its acceleration as well, from one pass; false where
     /// the tree is not for it.
-    fn look(&mut self, model: &Arc<Model>, tcp: &Frame, with_forces: bool) -> bool {
-        let Self { data, state, qddot, observer, .. } = self;
+    fn look(&mut self, arm: &FlexibleArm, tcp: &Frame, with_forces: bool) -> bool {
+        let (model, data) = (&arm.model, &mut *self.data);
+        let Self { state, qddot, observer, .. } = self;
         let (weighed, observer) = observer.get_or_insert_with(|| {
             // What the Jacobian needs of springs, which stay as they are.
             forward_kinematics(model, data, &state.q);
-            (model.clone(), if tcp.body > 0 { Observer::new(model) } else { None })
+            (model.clone(), if tcp.body > 0 { arm.lend_observer() } else { None })
         });
         let Some(observer) = observer else { return false };
         if !Arc::ptr_eq(weighed, model) {
             observer.weigh(model);
+            observer.keep();
             weighed.clone_from(model);
         }
         let motions = Motions { q: state.q.as_slice(), qdot: state.qdot.as_slice(), qddot: qddot.as_slice() };

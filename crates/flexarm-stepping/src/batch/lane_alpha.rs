@@ -220,14 +220,15 @@ impl<T: Real> LaneAlpha<T> {
         system.sample_joints(0.0);
         self.place_joints(lane, &system);
         let mut newton = Newton::new(0, h);
-        if let Some(left) = leave_of(settings, arm, h) {
+        let left = leave_of(settings, arm, h);
+        if let Some(left) = left {
             newton = newton.leaving(left);
         }
         let [mut C, mut K] = [DMatrix::zeros(n, n), DMatrix::zeros(n, n)];
         let (c_D, c_K) = self.coefficients.derivatives(h);
         system.damping_and_stiffness(c_D, c_K, &mut C);
         system.stiffness(&mut K);
-        let course = follows(settings, arm, h).then(Course::default);
+        let course = (left.is_some() && follows(settings, arm, h)).then(Course::default);
         if course.is_some() {
             newton = newton.keeping(FOLLOWED_TO);
         }

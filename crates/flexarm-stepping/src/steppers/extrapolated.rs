@@ -13,6 +13,8 @@
 //!
 //! Source: [Hairer & Wanner 1996], section IV.9.
 
+use std::sync::Arc;
+
 use nalgebra::DVector;
 
 use crate::arm::FlexibleArm;
@@ -47,7 +49,7 @@ impl Method for ExtrapolatedAlpha {
         self.0.settings()
     }
 
-    fn start(&self, arm: FlexibleArm, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
+    fn start(&self, arm: Arc<FlexibleArm>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
         // Matrices that are followed differ more between the two runs, and what differs has no series in h: three times the error.
         let coarse = self.0.stepper(arm.clone(), h, e, false)?;
         let fine = self.0.stepper(arm, 0.5 * h, e, false)?;

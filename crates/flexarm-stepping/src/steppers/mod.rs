@@ -13,6 +13,8 @@ mod rk4;
 mod sdirk3;
 mod spook;
 
+use std::sync::Arc;
+
 use nalgebra::DVector;
 
 use crate::arm::FlexibleArm;
@@ -147,7 +149,7 @@ trait Method {
     }
 
     /// The stepper at `t = 0` with elastic coordinates `e`; `h` (s) is positive.
-    fn start(&self, arm: FlexibleArm, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError>;
+    fn start(&self, arm: Arc<FlexibleArm>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError>;
 }
 
 /// Makes a stepper of the kind, started at `t = 0`.
@@ -158,14 +160,17 @@ trait Method {
 /// explicit stepper, [`StepError::Singular`] if the first accelerations cannot be solved.
 pub fn new_stepper(
     kind: StepperKind,
-    mut arm: FlexibleArm,
+    arm: impl Into<Arc<FlexibleArm>>,
     h: f64,
     start: Start,
 ) -> Result<Box<dyn Stepper>, StepError> {
     if !(h.is_finite() && h > 0.0) {
         return Err(StepError::Setup(format!("the step must be a positive time in seconds, found {h}")));
     }
-    arm.carry_from_start()?;
+    let mut arm = arm.into();
+    if !arm.inertia_changes.is_empty() {
+        Arc::make_mut(&mut arm).carry_from_start()?;
+    }
     let e = match start {
         Start::Equilibrium => static_equilibrium(&arm, 0.0)?,
         Start::Undeformed => DVector::zeros(arm.n_elastic_coordinates()),

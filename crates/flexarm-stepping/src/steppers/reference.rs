@@ -23,6 +23,8 @@
 //! Sources: BDF of variable order [Shampine & Reichelt 1997], ESDIRK3(4) [Jørgensen, Kristensen & Thomsen 2018],
 //! explicit 5(4) pair [Tsitouras 2011].
 
+use std::sync::Arc;
+
 use std::cell::RefCell;
 use std::collections::VecDeque;
 
@@ -135,7 +137,7 @@ impl Method for ReferenceSettings {
         vec![("rtol", StepperSetting::Number(self.rtol)), ("method", StepperSetting::Word(self.method.name()))]
     }
 
-    fn start(&self, arm: FlexibleArm, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
+    fn start(&self, arm: Arc<FlexibleArm>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
         if !arm.hysteresis.is_empty() {
             let text = "the reference stepper has continuous equations and does not know the hysteresis of gears: use \
                         sdirk3 or rk4 with a small step";

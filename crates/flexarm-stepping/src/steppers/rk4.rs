@@ -34,9 +34,9 @@ impl Method for Rk4Settings {
         &ENTRY
     }
 
-    fn start(&self, arm: FlexibleArm, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
+    fn start(&self, arm: Arc<FlexibleArm>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
         check_explicit_step(&arm, h)?;
-        let mut changed = arm.clone();
+        let mut changed = FlexibleArm::clone(&arm);
         for change in &arm.inertia_changes {
             changed.model = Arc::new(changed.model.with_inertia(change.body, change.inertia));
             // An arm that cannot stand with this payload may be able to move with it.

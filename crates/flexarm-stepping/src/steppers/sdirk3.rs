@@ -28,6 +28,8 @@
 //!
 //! Source: [Alexander 1977]; [Hairer & Wanner 1996], section IV.6.
 
+use std::sync::Arc;
+
 use nalgebra::DVector;
 
 use crate::arm::FlexibleArm;
@@ -57,7 +59,7 @@ impl Method for Sdirk3Settings {
         &ENTRY
     }
 
-    fn start(&self, arm: FlexibleArm, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
+    fn start(&self, arm: Arc<FlexibleArm>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
         Ok(Box::new(ReducedStepper::start(arm, e, |system, x, v| Sdirk3::new(system, 0.0, h, x, v))?))
     }
 }

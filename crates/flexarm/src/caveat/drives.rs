@@ -6,7 +6,7 @@ use flexarm_flexlink::GearStiffness;
 use flexarm_kinematics::{Mechanism, Model};
 
 use super::links::CREEP;
-use super::size::Loads;
+use super::size::inertia_moved;
 use super::slip::{self, slip};
 use super::{Caveat, kinds};
 use crate::drive_entry::{Drive, DriveKind};
@@ -49,7 +49,8 @@ const STABLE: f64 = 2.0;
 /// All of them about the drives as they are written.
 pub(crate) fn of_drives(drives: &[Drive], mechanism: &Mechanism, rigid: &Model) -> Vec<Caveat> {
     let mut caveats = Vec::new();
-    let heaviest = Loads::of(rigid).inertia.into_iter().zip(rigid.coordinates());
+    let heaviest = inertia_moved(rigid);
+    let heaviest = heaviest.iter().zip(rigid.coordinates());
     let armature = |joint: &str| drives.iter().find(|d| d.joint == joint).map_or(0.0, |d| d.armature);
     let heaviest = heaviest.map(|(inertia, c)| inertia - armature(&c.joint)).fold(0.0, f64::max);
     for drive in drives {

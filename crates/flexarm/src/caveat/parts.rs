@@ -3,7 +3,7 @@
 use flexarm_kinematics::{Joint, Link, LinkInertia, Mechanism, Model};
 use nalgebra::Vector3;
 
-use super::size::{Loads, Size, gyration, least_density};
+use super::size::{Size, gyration, inertia_moved, least_density, weight_carried};
 use super::slip::{self, slip};
 use super::{Caveat, kinds};
 use crate::robot::{PAYLOAD_LINK, Robot};
@@ -193,21 +193,22 @@ fn joint_limits(mechanism: &Mechanism, size: &Size) -> Vec<Caveat> {
 
 /// Effort limits far beyond what the arm weighs and what its inertia asks for.
 fn strong_drives(model: &Model, size: &Size) -> Option<Caveat> {
-    let loads = Loads::of(model);
-    let most = loads.weight.iter().fold(0.0f64, |m, w| m.max(*w));
+    let weight = weight_carried(model);
+    let most = weight.iter().fold(0.0f64, |m, w| m.max(*w));
     let limited = |k: &usize| model.coordinates()[*k].limits.effort.is_finite();
     let effort = |k: usize| model.coordinates()[k].limits.effort;
     let joints: Vec<usize> = (0..model.nv()).filter(limited).collect();
-    let least = joints.iter().filter(|k| loads.weight[**k] > 0.05 * most && most > 0.0);
-    let least = least.map(|k| (effort(*k) / loads.weight[*k], *k)).min_by(|a, b| a.0.total_cmp(&b.0));
+    let least = joints.iter().filter(|k| weight[**k] > 0.05 * most && most > 0.0);
+    let least = least.map(|k| (effort(*k) / weight[*k], *k)).min_by(|a, b| a.0.total_cmp(&b.0));
     let joint = |k: usize| format!("joint {:?}", model.coordinates()[k].joint);
     if let Some((ratio, k)) = least {
-        let caveat = || kinds::EFFORT_LIMIT.found(joint(k), effort(k), loads.weight[k]);
+        let caveat = || kinds::EFFORT_LIMIT.found(joint(k), effort(k), weight[k]);
         return (ratio > STRONG).then(|| caveat().likely(slip(ratio, &(0.5..=100.0), slip::EFFORT, 1.0)));
     }
     // Nothing weighs on a joint: by what it could accelerate.
-    let heaviest = joints.into_iter().max_by(|a, b| loads.inertia[*a].total_cmp(&loads.inertia[*b]))?;
-    let acceleration = effort(heaviest) / loads.inertia[heaviest] * size.extent;
+    let inertia = inertia_moved(model);
+    let heaviest = joints.into_iter().max_by(|a, b| inertia[*a].total_cmp(&inertia[*b]))?;
+    let acceleration = effort(heaviest) / inertia[heaviest] * size.extent;
     let caveat = || kinds::TIP_ACCELERATION.found(joint(heaviest), acceleration, TIP_ACCELERATION);
     let turns = model.coordinates()[heaviest].kind != "prismatic";
     (turns && acceleration > TIP_ACCELERATION)

@@ -3,7 +3,6 @@
 use flexarm_stepping::FlexibleArm;
 
 use super::drives::{give, speed_loop};
-use super::size::Size;
 use super::{Caveat, kinds};
 use crate::flexible::{FlexibleRobot, Owner};
 use crate::robot::Robot;
@@ -31,8 +30,7 @@ pub(crate) struct Standing<'a> {
 impl Standing<'_> {
     /// All of them.
     pub(crate) fn caveats(&self) -> Vec<Caveat> {
-        let size = Size::of(&self.robot.urdf.mechanism);
-        let extent = size.extent.max(self.robot.tcp.1.translation.vector.norm());
+        let extent = self.flexible.extent;
         let mut caveats = self.gears();
         if extent > 0.0 && self.sag_m > SAG[0] * extent {
             let caveat = kinds::SAG.found("the TCP", self.sag_m, extent);

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use flexarm_kinematics::{Data, LinkInertia, Mechanism, Model, State, gravity_forces, mass_matrix};
+use flexarm_kinematics::{Data, LinkInertia, Mechanism, Model, gravity_forces, mass_matrix};
 use nalgebra::DVector;
 
 /// Poses at which torques of weight are looked at.
@@ -66,32 +66,25 @@ pub(crate) fn least_density(inertia: &LinkInertia) -> f64 {
     inertia.mass / (4.0 / 3.0 * std::f64::consts::PI * squared.max(0.0).powf(1.5))
 }
 
-/// What the joints of the rigid robot carry and move.
-pub(crate) struct Loads {
-    /// Largest torque of weight and balancers in poses spread over the joint ranges (N m or N).
-    pub(crate) weight: Vec<f64>,
-    /// Inertia in the middle of the ranges, rotors included (kg m² or kg).
-    pub(crate) inertia: Vec<f64>,
+/// Largest torque of weight and balancers that each joint of the rigid robot carries in poses spread over the joint ranges (N m or N).
+pub(crate) fn weight_carried(model: &Model) -> DVector<f64> {
+    let mut data = Data::new(model);
+    let mut weight = DVector::zeros(model.nv());
+    for q in spread_poses(model) {
+        let torques = gravity_forces(model, &mut data, &q).abs();
+        // A balancer may have no room there, which has a caveat of its own.
+        if torques.iter().all(|torque| torque.is_finite()) {
+            weight = weight.sup(&torques);
+        }
+    }
+    weight
 }
 
-impl Loads {
-    pub(crate) fn of(model: &Model) -> Self {
-        let n = model.nv();
-        let (mut data, mut state) = (Data::new(model), State::zeros(model));
-        let mut weight = DVector::zeros(n);
-        for q in spread_poses(model) {
-            let torques = gravity_forces(model, &mut data, &q).abs();
-            // A balancer may have no room there, which has a caveat of its own.
-            if torques.iter().all(|torque| torque.is_finite()) {
-                weight = weight.sup(&torques);
-            }
-        }
-        for (q, c) in state.q.iter_mut().zip(model.coordinates()) {
-            *q = middle(c.limits.lower, c.limits.upper);
-        }
-        let M = mass_matrix(model, &mut data, &state.q);
-        Self { weight: weight.as_slice().to_vec(), inertia: M.diagonal().as_slice().to_vec() }
-    }
+/// Inertia that each joint moves in the middle of the ranges, rotors included (kg m² or kg).
+pub(crate) fn inertia_moved(model: &Model) -> DVector<f64> {
+    let limits = |k: usize| &model.coordinates()[k].limits;
+    let q = DVector::from_fn(model.nv(), |k, _| middle(limits(k).lower, limits(k).upper));
+    mass_matrix(model, &mut Data::new(model), &q).diagonal()
 }
 
 /// Poses spread over the joint ranges (rad or m); open ranges count from -3 to 3.

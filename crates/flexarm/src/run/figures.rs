@@ -1,7 +1,7 @@
 //! The figures of a run, from what its monitors have seen, and whether its models held.
 
 use flexarm_analysis::TcpMetrics;
-use flexarm_kinematics::{Data, Frame, State, forward_kinematics};
+use flexarm_kinematics::{Frame, State, forward_kinematics};
 use flexarm_log::Event;
 use flexarm_stepping::{FlexibleArm, StepRule, StepperKind};
 use flexarm_trajectory::LimitViolation;
@@ -211,7 +211,7 @@ impl Run<'_> {
 /// TCP error with the drives at rest in their first position, also for runs that start undeformed (m).
 pub(crate) fn static_sag(arm: &FlexibleArm, tcp: &Frame) -> f64 {
     let model = &arm.model;
-    let (mut data, mut state) = (Data::new(model), State::zeros(model));
+    let (mut data, mut state) = (arm.lend_data(), State::zeros(model));
     arm.prescribed_state(0.0, &mut state, &mut nalgebra::DVector::zeros(model.nv()));
     forward_kinematics(model, &mut data, &state.q);
     let rigid = data.X_WF(tcp).translation.vector;

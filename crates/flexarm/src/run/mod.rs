@@ -270,7 +270,7 @@ struct Run<'a> {
     options: &'a RunOptions,
     flexible: &'a FlexibleRobot,
     /// The model is that of the last sample, with what it carries then.
-    arm: FlexibleArm,
+    arm: Arc<FlexibleArm>,
     stepper: Box<dyn Stepper>,
     tcp: Frame,
     twin: RigidTwin,
@@ -296,7 +296,7 @@ impl<'a> Run<'a> {
         motion: &'a Motion,
         options: &'a RunOptions,
         flexible: &'a FlexibleRobot,
-        arm: FlexibleArm,
+        arm: Arc<FlexibleArm>,
         stepper: Box<dyn Stepper>,
         wanted: Wanted,
     ) -> Self {
@@ -370,7 +370,7 @@ impl<'a> Run<'a> {
         self.stepper.observe(&mut self.seen);
         // The twin carries what the arm carries.
         if !Arc::ptr_eq(&self.arm.model, &self.seen.model) {
-            self.arm.model.clone_from(&self.seen.model);
+            Arc::make_mut(&mut self.arm).model.clone_from(&self.seen.model);
         }
         // What its drives must supply stands in samples alone.
         match self.wanted {
@@ -406,7 +406,7 @@ pub(crate) fn steps_per_sample(options: &RunOptions) -> u64 {
 
 /// For a run whose samples are `sample_s` apart (s).
 fn tool_monitor(
-    arm: &FlexibleArm,
+    arm: &Arc<FlexibleArm>,
     tcp: &Frame,
     twin: &mut RigidTwin,
     motion: &Motion,

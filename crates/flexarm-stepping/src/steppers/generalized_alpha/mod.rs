@@ -36,6 +36,8 @@ mod course;
 mod dispersion;
 mod loops;
 
+use std::sync::Arc;
+
 use flexarm_kinematics::Real;
 use nalgebra::DVector;
 
@@ -87,7 +89,7 @@ impl Method for AlphaSettings {
         vec![("rho_inf", StepperSetting::Number(self.rho)), ("dispersion_correction", correction)]
     }
 
-    fn start(&self, arm: FlexibleArm, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
+    fn start(&self, arm: Arc<FlexibleArm>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
         Ok(Box::new(self.stepper(arm, h, e, true)?))
     }
 }
@@ -101,13 +103,14 @@ impl AlphaSettings {
     /// The stepper of an arm, with what its searches may leave; `follow`: its matrices go on along lines where that is good.
     pub(crate) fn stepper(
         self,
-        arm: FlexibleArm,
+        arm: Arc<FlexibleArm>,
         h: f64,
         e: &DVector<f64>,
         follow: bool,
     ) -> Result<ReducedStepper<GeneralizedAlpha>, StepError> {
         let rho = self.rho;
-        let (left, follows) = (leave_of(self, &arm, h), follow && follows(self, &arm, h));
+        let left = leave_of(self, &arm, h);
+        let follows = follow && left.is_some() && follows(self, &arm, h);
         if !(0.0..=1.0).contains(&rho) {
             return Err(StepError::Setup(format!("the spectral radius must lie between 0 and 1, found {rho}")));
         }
@@ -129,10 +132,9 @@ pub(crate) fn leave_of(settings: AlphaSettings, arm: &FlexibleArm, h: f64) -> Op
     (left > 0.0 && forgets_errors(arm)).then_some(left)
 }
 
-/// Whether the matrices of an arm go on along a line between two renewals ([`Course`]): of arms whose steps are quick, and short.
+/// Whether the matrices of an arm whose steps may leave something go on along a line between two renewals ([`Course`]): of short steps.
 pub(crate) fn follows(settings: AlphaSettings, arm: &FlexibleArm, h: f64) -> bool {
-    let short = arm.modes.omega.first().is_some_and(|omega| h * omega <= course::SHORT);
-    short && settings.dispersion_correction && leave_of(settings, arm, h).is_some()
+    settings.dispersion_correction && arm.modes.omega.first().is_some_and(|omega| h * omega <= course::SHORT)
 }
 
 /// Part of the first correction of Newton's method that steps of a damped arm may leave: an error well below the scheme's own, for

@@ -24,6 +24,8 @@ mod constraint;
 mod pins;
 mod solve;
 
+use std::sync::Arc;
+
 use flexarm_kinematics::{
     BalancerPlace, Data, ElasticAngles, JointMotion, Model, PlacedBalancer, Pose, State, Twist, Wrench,
     forward_kinematics_velocity, rotation_vector,
@@ -98,8 +100,8 @@ impl Method for SpookSettings {
         vec![("form", StepperSetting::Word(form)), ("preset", StepperSetting::Word(preset))]
     }
 
-    fn start(&self, arm: FlexibleArm, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
-        Ok(Box::new(Spook::new(arm, h, *self, e)?))
+    fn start(&self, arm: Arc<FlexibleArm>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
+        Ok(Box::new(Spook::new(Arc::unwrap_or_clone(arm), h, *self, e)?))
     }
 }
 
