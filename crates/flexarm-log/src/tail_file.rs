@@ -58,9 +58,9 @@ impl TailFile {
     ///
     /// # Errors
     /// Those of the operating system; the file then is what it was before, as far as that can be had.
-    pub(crate) fn set_tail(&mut self, tail: &[u8]) -> io::Result<()> {
+    pub(crate) fn set_tail(&mut self, mut tail: Vec<u8>) -> io::Result<()> {
         let old_end = self.written + self.tail.len() as u64;
-        if let Err(error) = self.replace_tail(tail, old_end) {
+        if let Err(error) = self.replace_tail(&tail, old_end) {
             // In place, where the space is taken already. Should even that fail, the first error is the one to tell.
             let _ = self.file.seek(SeekFrom::Start(self.written)).and_then(|_| self.file.write_all(&self.tail));
             let _ = self.file.set_len(old_end);
@@ -69,9 +69,9 @@ impl TailFile {
         self.written += self.pending.len() as u64;
         self.pending.clear();
         // What the beginning took, surfaces and files, is not needed again.
-        self.pending.shrink_to(2 * PENDING_LIMIT);
-        self.tail.clear();
-        self.tail.extend_from_slice(tail);
+        self.pending.shrink_to(PENDING_LIMIT + PENDING_LIMIT / 4);
+        tail.shrink_to_fit();
+        self.tail = tail;
         Ok(())
     }
 
@@ -97,7 +97,7 @@ impl Write for TailFile {
 
     /// Writes out what is committed and removes the tail.
     fn flush(&mut self) -> io::Result<()> {
-        self.set_tail(&[])
+        self.set_tail(Vec::new())
     }
 }
 
@@ -114,12 +114,12 @@ mod tests {
 
         file.write_all(b"one ").unwrap();
         assert_eq!((read().as_str(), file.position()), ("", 4));
-        file.set_tail(b"provisional").unwrap();
+        file.set_tail(b"provisional".to_vec()).unwrap();
         assert_eq!((read().as_str(), file.position()), ("one provisional", 4));
-        file.set_tail(b"longer provisional").unwrap();
+        file.set_tail(b"longer provisional".to_vec()).unwrap();
         assert_eq!(read(), "one longer provisional");
         file.write_all(b"two ").unwrap();
-        file.set_tail(b"end").unwrap();
+        file.set_tail(b"end".to_vec()).unwrap();
         assert_eq!((read().as_str(), file.position()), ("one two end", 8));
         file.flush().unwrap();
         assert_eq!(read(), "one two ");
@@ -132,14 +132,14 @@ mod tests {
         let path = std::env::temp_dir().join(format!("flexarm-tail-fails-{}", std::process::id()));
         let mut file = TailFile::new(File::create(&path).unwrap());
         file.write_all(b"one ").unwrap();
-        file.set_tail(b"end").unwrap();
+        file.set_tail(b"end".to_vec()).unwrap();
         file.file = File::open(&path).unwrap();
         file.write_all(b"two ").unwrap();
-        assert!(file.set_tail(b"another end").is_err());
+        assert!(file.set_tail(b"another end".to_vec()).is_err());
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "one end");
         // Once there is room again, nothing has been lost.
         file.file = std::fs::OpenOptions::new().write(true).open(&path).unwrap();
-        file.set_tail(b"last end").unwrap();
+        file.set_tail(b"last end".to_vec()).unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "one two last end");
         std::fs::remove_file(&path).unwrap();
     }

@@ -155,7 +155,7 @@ impl Output {
     /// Brings everything so far into the file: closed chunks for good, the open one and an index provisionally.
     pub(crate) fn flush(&mut self) -> io::Result<()> {
         let end = self.file.position();
-        let written = self.file.set_tail(&self.index.provisional_end(end, &self.chunk));
+        let written = self.file.set_tail(self.index.provisional_end(end, &self.chunk));
         match written {
             Ok(()) => self.shown = self.chunk.records().len(),
             Err(_) => self.show_what_fits(end),
@@ -174,7 +174,7 @@ impl Output {
             if least.is_some_and(|least| part <= least) {
                 return;
             }
-            if self.file.set_tail(&self.index.provisional_end(end, &beginning)).is_ok() {
+            if self.file.set_tail(self.index.provisional_end(end, &beginning)).is_ok() {
                 self.shown = part;
                 return;
             }

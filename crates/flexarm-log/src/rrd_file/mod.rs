@@ -263,11 +263,12 @@ impl RunWriter {
                 self.commit(store, Rows::OfSamples)?;
             }
             if poses >= LONG_CHUNK_POSES {
-                self.commit(store, Rows::OfPoses)?;
+                self.commit(store, Rows::OfCauses)?;
             }
-            let mut ids = *store.stream.ids();
-            let chunks = self.tracks.take_large(&mut ids)?;
-            store.append_all(ids, &chunks)?;
+            let Store { stream, recording, .. } = store;
+            let mut ids = *stream.ids();
+            self.tracks.take_full(LONG_CHUNK_POSES, &mut ids, &mut |chunk| stream.append(recording, &chunk))?;
+            *stream.ids() = ids;
         }
         if !store.flush.due() {
             store.stream.relieve()?;

@@ -260,27 +260,15 @@ impl RobotTracks {
         self.tracks().try_for_each(|track| track.chunk(ids)?.map_or(Ok(()), &mut *put))
     }
 
-    /// Chunks of bent surfaces whose rows that wait take much room; forgets these rows.
-    pub(crate) fn take_large(&mut self, ids: &mut Ids, chunks: &mut Vec<Chunk>) -> Result<(), StreamError> {
-        for bent in self.bent.iter_mut().filter(|bent| bent.shape.is_large()) {
-            chunks.extend(bent.shape.chunk(ids)?);
-            bent.shape.clear();
-        }
-        Ok(())
-    }
-
-    pub(crate) fn clear(&mut self) {
-        self.links.iter_mut().map(|(_, track)| track).chain([&mut self.tcp]).for_each(Track::clear);
-        self.tints.iter_mut().for_each(|(_, _, track)| track.clear());
-        for bent in &mut self.bent {
-            bent.shape.clear();
-            bent.far.clear();
-            bent.tint.iter_mut().for_each(|(middle, far)| {
-                middle.clear();
-                far.clear();
-            });
-        }
-        self.skeleton.iter_mut().for_each(Track::clear);
+    pub(crate) fn tracks_mut(&mut self) -> impl Iterator<Item = &mut dyn Track> {
+        let bent = self.bent.iter_mut().flat_map(|bent| {
+            let tints = bent.tint.iter_mut().flat_map(|(middle, far)| [middle as &mut dyn Track, far]);
+            [&mut bent.shape as &mut dyn Track, &mut bent.far].into_iter().chain(tints)
+        });
+        let links = self.links.iter_mut().map(|(_, track)| track).chain([&mut self.tcp]);
+        let tints = self.tints.iter_mut().map(|(_, _, track)| track as &mut dyn Track);
+        let skeleton = self.skeleton.as_mut().map(|track| track as &mut dyn Track);
+        links.map(|track| track as &mut dyn Track).chain(bent).chain(tints).chain(skeleton)
     }
 }
 

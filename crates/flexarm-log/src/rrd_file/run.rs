@@ -49,17 +49,17 @@ impl Seat {
 pub(crate) enum Rows {
     /// Those that come with every sample: curves of the error.
     OfSamples,
-    /// Those that come with poses: robots, and all other curves.
-    OfPoses,
+    /// All other curves, which come with poses.
+    OfCauses,
     All,
 }
 
 impl Rows {
     fn of_samples(self) -> bool {
-        self != Self::OfPoses
+        self != Self::OfCauses
     }
 
-    fn of_poses(self) -> bool {
+    fn of_causes(self) -> bool {
         self != Self::OfSamples
     }
 }
@@ -77,6 +77,8 @@ pub(crate) struct RunTracks {
     /// Of every sample, and of those in which the robots are drawn.
     times: Times,
     pose_times: Times,
+    /// Rows at which each track of [`RunTracks::drawn_mut`] becomes a chunk; nothing in a short run.
+    room: Vec<usize>,
     flexible: Drawn,
     rigid: Option<Drawn>,
     magnified: Option<Drawn>,
@@ -187,6 +189,7 @@ impl RunTracks {
             root,
             times: Times::default(),
             pose_times: Times::default(),
+            room: Vec::new(),
             flexible,
             rigid,
             magnified,
@@ -335,12 +338,14 @@ impl RunTracks {
     /// Chunks of the rows that wait.
     pub(crate) fn rows(&self, which: Rows, ids: &mut Ids, put: &mut Put<'_>) -> Result<(), StreamError> {
         let curves = || self.curves.iter().chain(&self.study_curves);
-        if which.of_poses() && self.pose_times.rows() > 0 {
+        if which == Rows::All {
             let drawn = std::iter::once(&self.flexible).chain(&self.rigid).chain(&self.magnified);
             drawn.filter_map(|drawn| drawn.robot.as_ref()).try_for_each(|robot| robot.rows(ids, put))?;
             if let Some(arrow) = self.arrow.as_ref().map(|arrow| arrow.chunk(ids)).transpose()?.flatten() {
                 put(arrow)?;
             }
+        }
+        if which.of_causes() && self.pose_times.rows() > 0 {
             let times = self.pose_times.columns();
             curves().try_for_each(|curves| curves.cause_rows(ids, &times, put))?;
         }
@@ -351,35 +356,49 @@ impl RunTracks {
         Ok(())
     }
 
-    /// Chunks of surfaces whose rows that wait take much room; forgets these rows.
-    pub(crate) fn take_large(&mut self, ids: &mut Ids) -> Result<Vec<Chunk>, StreamError> {
-        let mut chunks = Vec::new();
-        for drawn in std::iter::once(&mut self.flexible).chain(&mut self.rigid).chain(&mut self.magnified) {
-            if let Some(robot) = &mut drawn.robot {
-                robot.take_large(ids, &mut chunks)?;
+    /// Tracks of the robots and of the arrow.
+    fn drawn_mut(&mut self) -> impl Iterator<Item = &mut dyn Track> {
+        let drawn = std::iter::once(&mut self.flexible).chain(&mut self.rigid).chain(&mut self.magnified);
+        let robots = drawn.filter_map(|drawn| drawn.robot.as_mut()).flat_map(RobotTracks::tracks_mut);
+        robots.chain(self.arrow.as_mut().map(|arrow| arrow as &mut dyn Track))
+    }
+
+    /// Chunks of the robots' tracks with so many rows, or with large ones; forgets these rows. Each track has its turn: the
+    /// first chunks are shorter, one a little longer than the other, so that half of the rows wait at most, and few chunks
+    /// at once.
+    pub(crate) fn take_full(&mut self, rows: usize, ids: &mut Ids, put: &mut Put<'_>) -> Result<(), StreamError> {
+        let mut room = std::mem::take(&mut self.room);
+        if room.is_empty() {
+            let count = self.drawn_mut().count();
+            room = (1..=count).map(|k| (rows * k).div_ceil(count)).collect();
+        }
+        for (track, room) in self.drawn_mut().zip(&mut room) {
+            if track.waiting() >= *room || track.is_large() {
+                track.chunk(ids)?.map_or(Ok(()), &mut *put)?;
+                track.clear();
+                *room = rows;
             }
         }
-        Ok(chunks)
+        self.room = room;
+        Ok(())
     }
 
     /// Forgets rows that wait; they have been written.
     pub(crate) fn clear(&mut self, which: Rows) {
-        let curves = self.curves.iter_mut().chain(&mut self.study_curves);
         if which.of_samples() {
             self.times.clear();
         }
-        if which.of_poses() {
+        if which.of_causes() {
             self.pose_times.clear();
-            for drawn in std::iter::once(&mut self.flexible).chain(&mut self.rigid).chain(&mut self.magnified) {
-                drawn.robot.iter_mut().for_each(RobotTracks::clear);
-            }
-            self.arrow.iter_mut().for_each(Track::clear);
         }
-        for curves in curves {
+        if which == Rows::All {
+            self.drawn_mut().for_each(Track::clear);
+        }
+        for curves in self.curves.iter_mut().chain(&mut self.study_curves) {
             if which.of_samples() {
                 curves.clear_errors();
             }
-            if which.of_poses() {
+            if which.of_causes() {
                 curves.clear_causes();
             }
         }

@@ -210,7 +210,7 @@ impl RrdStream {
             Ok(())
         })?;
         if !is_listed {
-            return Ok(self.file.set_tail(&tail)?);
+            return Ok(self.file.set_tail(tail)?);
         }
         let has_end = !tail.is_empty();
         let mut manifests = Vec::new();
@@ -220,7 +220,7 @@ impl RrdStream {
             manifests.extend(manifest.so_far(known, end, ends_here)?);
         }
         tail.extend(end(manifests, position + tail.len() as u64)?);
-        Ok(self.file.set_tail(&tail)?)
+        Ok(self.file.set_tail(tail)?)
     }
 
     /// Ends the file with the list of its chunks.

@@ -52,6 +52,14 @@ impl Times {
 
 /// A track with times of its own: rows only where something changes.
 pub(crate) trait Track {
+    /// How many rows wait.
+    fn waiting(&self) -> usize;
+
+    /// Whether the rows that wait are worth a chunk by their size.
+    fn is_large(&self) -> bool {
+        false
+    }
+
     /// The rows that wait, if any.
     fn chunk(&self, ids: &mut Ids) -> Chunks;
 
@@ -88,6 +96,10 @@ impl PoseTrack {
 }
 
 impl Track for PoseTrack {
+    fn waiting(&self) -> usize {
+        self.times.rows()
+    }
+
     fn chunk(&self, ids: &mut Ids) -> Chunks {
         if self.times.rows() == 0 {
             return Ok(None);
@@ -138,6 +150,10 @@ impl TintTrack {
 }
 
 impl Track for TintTrack {
+    fn waiting(&self) -> usize {
+        self.times.rows()
+    }
+
     fn chunk(&self, ids: &mut Ids) -> Chunks {
         if self.times.rows() == 0 {
             return Ok(None);
@@ -171,15 +187,18 @@ impl ShapeTrack {
         self.times.push(when);
         self.positions.extend(positions);
     }
-
-    /// Whether the rows that wait are worth a chunk by their size.
-    pub(crate) fn is_large(&self) -> bool {
-        const LARGE: usize = 1 << 20;
-        size_of_val(self.positions.as_slice()) > LARGE
-    }
 }
 
 impl Track for ShapeTrack {
+    fn waiting(&self) -> usize {
+        self.times.rows()
+    }
+
+    fn is_large(&self) -> bool {
+        const LARGE: usize = 1 << 20;
+        size_of_val(self.positions.as_slice()) > LARGE
+    }
+
     fn chunk(&self, ids: &mut Ids) -> Chunks {
         let rows = self.times.rows();
         if rows == 0 {
@@ -229,6 +248,10 @@ impl ArrowTrack {
 }
 
 impl Track for ArrowTrack {
+    fn waiting(&self) -> usize {
+        self.times.rows()
+    }
+
     fn chunk(&self, ids: &mut Ids) -> Chunks {
         if self.times.rows() == 0 {
             return Ok(None);
@@ -283,6 +306,10 @@ impl SkeletonTrack {
 }
 
 impl Track for SkeletonTrack {
+    fn waiting(&self) -> usize {
+        self.times.rows()
+    }
+
     fn chunk(&self, ids: &mut Ids) -> Chunks {
         if self.times.rows() == 0 || self.pairs.is_empty() {
             return Ok(None);
