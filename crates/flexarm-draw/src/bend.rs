@@ -335,7 +335,7 @@ mod tests {
         }
     }
 
-    /// Truth: what is beyond the far interface turns and moves with it as a rigid body, exactly.
+    /// Truth: the motion of the section, applied to the undeformed place.
     #[test]
     fn a_point_of_the_line_is_where_its_section_takes_it() {
         let bend = bend(&[[0.0, 0.1, 0.0], [0.5, 0.1, 0.2], [1.0, 0.0, 0.3]]);
@@ -354,6 +354,7 @@ mod tests {
         }
     }
 
+    /// Truth: what is beyond the far interface turns and moves with it as a rigid body, exactly.
     #[test]
     fn the_surface_beyond_the_far_interface_is_rigid_with_it() {
         let line = BendLine::new(&bend(&[[0.0; 3], [0.5, 0.0, 0.1], [1.0, 0.0, 0.2]])).unwrap();
