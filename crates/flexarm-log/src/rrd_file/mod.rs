@@ -5,6 +5,7 @@
 //! shows, [`layout`] writes that down; [`stream`] writes the file. All knowledge of the `rerun` crate, which breaks about
 //! monthly, is in this module.
 
+mod chunk_list;
 mod colors;
 mod curves;
 mod eye;
@@ -287,7 +288,16 @@ impl RunWriter {
     fn commit(&mut self, store: &mut Store, which: Rows) -> Result<(), StreamError> {
         let Store { stream, recording, .. } = store;
         let mut ids = *stream.ids();
-        self.tracks.rows(which, &mut ids, &mut |chunk| stream.append(recording, &chunk))?;
+        let is_long = self.commits >= SHORT_COMMITS;
+        let mut put = |chunk: Chunk| {
+            stream.append(recording, &chunk)?;
+            // The last rows of a long run are many.
+            if is_long { stream.relieve() } else { Ok(()) }
+        };
+        if which == Rows::All {
+            self.tracks.take_drawn(&mut ids, &mut put)?;
+        }
+        self.tracks.rows(which, &mut ids, &mut put)?;
         *stream.ids() = ids;
         self.tracks.clear(which);
         self.commits += 1;

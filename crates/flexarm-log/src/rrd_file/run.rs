@@ -364,7 +364,7 @@ impl RunTracks {
     }
 
     /// Chunks of the robots' tracks with so many rows, or with large ones; forgets these rows. Each track has its turn: the
-    /// first chunks are shorter, one a little longer than the other, so that half of the rows wait at most, and few chunks
+    /// first chunks are shorter, one a little longer than the other, so that about half of the rows wait, and few chunks
     /// at once.
     pub(crate) fn take_full(&mut self, rows: usize, ids: &mut Ids, put: &mut Put<'_>) -> Result<(), StreamError> {
         let mut room = std::mem::take(&mut self.room);
@@ -380,6 +380,15 @@ impl RunTracks {
             }
         }
         self.room = room;
+        Ok(())
+    }
+
+    /// Chunks of all rows of the robots' tracks; forgets each track's as they are put.
+    pub(crate) fn take_drawn(&mut self, ids: &mut Ids, put: &mut Put<'_>) -> Result<(), StreamError> {
+        for track in self.drawn_mut() {
+            track.chunk(ids)?.map_or(Ok(()), &mut *put)?;
+            track.clear();
+        }
         Ok(())
     }
 

@@ -14,12 +14,13 @@ use crate::rerun::arrow::datatypes::Schema;
 use crate::rerun::{AsComponents, EntityPath, SerializationError, SerializedComponentColumn, StoreId, TimePoint};
 use crate::rerun::{Chunk, ChunkComponents, ChunkError, ChunkId, LogMsg, RowId, TimeColumn};
 use re_log_encoding::{
-    CodecError, CrateVersion, Encodable, EncodingOptions, MessageHeader, MessageKind, RRD_FOURCC, RawRrdManifest,
-    RrdFooter, RrdManifestBuilder, StreamFooter, StreamHeader, ToTransport,
+    CodecError, CrateVersion, Encodable, EncodingOptions, MessageHeader, MessageKind, RRD_FOURCC, RrdFooter,
+    RrdManifestBuilder, StreamFooter, StreamHeader, ToTransport,
 };
 use re_log_types::{ArrowMsg, BlueprintActivationCommand, SetStoreInfo, StoreInfo, StoreSource};
 use re_tuid::Tuid;
 
+use super::chunk_list::ChunkList;
 use crate::tail_file::TailFile;
 
 /// Why a message could not be written.
@@ -80,60 +81,12 @@ pub(crate) struct RrdStream {
     file: TailFile,
     ids: Ids,
     /// Per recording or blueprint, in the order of their appearance.
-    manifests: Vec<(StoreId, Manifest)>,
-}
-
-/// The list of a recording's chunks in the making.
-#[derive(Default)]
-struct Manifest {
-    /// All chunks, for the end of the file.
-    all: RrdManifestBuilder,
-    /// The same for provisional ends, because a builder can be used only once: the chunks up to the last such end, and those
-    /// since, with their number.
-    before: Option<RawRrdManifest>,
-    since: RrdManifestBuilder,
-    new: usize,
-    /// Chunks in all.
-    chunks: usize,
+    lists: Vec<(StoreId, ChunkList)>,
 }
 
 /// Chunks beyond which provisional ends have no list of them: it would be copied for each, and a file without one is read
 /// from its beginning to its end. Finished files have theirs however long it is: `rerun rrd verify` refuses one without.
 const MOST_LISTED: usize = 2048;
-
-impl Manifest {
-    /// `add`: puts a chunk into a list.
-    fn append(&mut self, add: impl Fn(&mut RrdManifestBuilder) -> std::result::Result<(), CodecError>) -> Result<()> {
-        self.chunks += 1;
-        if self.is_listed() {
-            add(&mut self.since)?;
-            self.new += 1;
-        } else {
-            (self.before, self.since, self.new) = Default::default();
-        }
-        Ok(add(&mut self.all)?)
-    }
-
-    fn is_listed(&self) -> bool {
-        self.chunks <= MOST_LISTED
-    }
-
-    /// The list so far and, behind it, the chunks of a provisional end; `None` while there is none.
-    fn so_far(&mut self, store: &StoreId, end: RrdManifestBuilder, with_end: bool) -> Result<Option<RawRrdManifest>> {
-        let with = |before: Option<RawRrdManifest>, new: RrdManifestBuilder| {
-            let new = new.build(store.clone())?;
-            match before {
-                Some(before) => RawRrdManifest::merge(store.clone(), vec![before, new]),
-                None => Ok(new),
-            }
-        };
-        if std::mem::take(&mut self.new) > 0 {
-            self.before = Some(with(self.before.take(), std::mem::take(&mut self.since))?);
-        }
-        let before = self.before.clone();
-        Ok(if with_end { Some(with(before, end)?) } else { before })
-    }
-}
 
 impl RrdStream {
     /// Starts the file.
@@ -144,7 +97,7 @@ impl RrdStream {
         StreamHeader { fourcc: RRD_FOURCC, version, options }.to_rrd_bytes(&mut bytes)?;
         let mut file = TailFile::new(file);
         file.write_all(&bytes)?;
-        Ok(Self { file, ids: Ids::default(), manifests: Vec::new() })
+        Ok(Self { file, ids: Ids::default(), lists: Vec::new() })
     }
 
     /// Writes out what is committed if that is much. The end of the file is missing then until the next tail is set: that can
@@ -166,7 +119,7 @@ impl RrdStream {
         let source = StoreSource::Other(concat!("flexarm ", env!("CARGO_PKG_VERSION")).to_owned());
         let info = StoreInfo::new(store.clone(), source);
         let row_id = self.ids.chunk().as_tuid();
-        self.manifests.push((store.clone(), Manifest::default()));
+        self.lists.push((store.clone(), ChunkList::default()));
         let bytes = encode(&LogMsg::SetStoreInfo(SetStoreInfo { row_id, info }))?.0;
         Ok(self.file.write_all(&bytes)?)
     }
@@ -188,56 +141,63 @@ impl RrdStream {
         self.file.write_all(&bytes)?;
 
         let span = Span::from_start_end(start, self.file.position());
-        let manifest = self.manifests.iter_mut().find(|(known, _)| known == store);
-        let (_, manifest) = manifest.expect("a store is opened before chunks are added to it");
-        manifest.append(|list| list.append(&batch, span, uncompressed))
+        let list = self.lists.iter_mut().find(|(known, _)| known == store);
+        let (_, list) = list.expect("a store is opened before chunks are added to it");
+        let mut one = RrdManifestBuilder::default();
+        one.append(&batch, span, uncompressed)?;
+        Ok(list.append(one, store)?)
     }
 
     /// Writes out everything, with what `chunks` puts as the provisional end, and a footer: what a killed run leaves is a whole
     /// file. Beyond [`MOST_LISTED`] chunks the footer is left out, which the format allows.
     pub(crate) fn set_tail(&mut self, store: &StoreId, chunks: impl FnOnce(&mut Put<'_>) -> Result<()>) -> Result<()> {
         let position = self.file.position();
-        let (mut tail, mut builder) = (Vec::new(), RrdManifestBuilder::default());
-        let is_listed = self.manifests.iter().all(|(_, manifest)| manifest.is_listed());
-        chunks(&mut |chunk| {
+        let mut tail = Vec::new();
+        let is_listed = self.lists.iter().all(|(_, list)| list.len() <= MOST_LISTED);
+        let own = self.lists.iter().position(|(known, _)| known == store);
+        let own = own.expect("a store is opened before chunks are added to it");
+        let mark = self.lists[own].1.mark();
+        let list = &mut self.lists[own].1;
+        let written = chunks(&mut |chunk| {
             let start = position + (tail.len() + MessageHeader::ENCODED_SIZE_BYTES) as u64;
             let batch = chunk.to_chunk_batch()?;
             let (bytes, uncompressed) = encode(&arrow_message(store, &chunk, (&batch).into()))?;
             tail.extend(bytes);
             if is_listed {
-                builder.append(&batch, Span::from_start_end(start, position + tail.len() as u64), uncompressed)?;
+                let mut one = RrdManifestBuilder::default();
+                one.append(&batch, Span::from_start_end(start, position + tail.len() as u64), uncompressed)?;
+                list.append(one, store)?;
             }
             Ok(())
-        })?;
-        if !is_listed {
-            return Ok(self.file.set_tail(tail)?);
-        }
-        let has_end = !tail.is_empty();
-        let mut manifests = Vec::new();
-        for (known, manifest) in &mut self.manifests {
-            let ends_here = *known == *store && has_end;
-            let end = if ends_here { std::mem::take(&mut builder) } else { RrdManifestBuilder::default() };
-            manifests.extend(manifest.so_far(known, end, ends_here)?);
-        }
-        tail.extend(end(manifests, position + tail.len() as u64)?);
+        });
+        let end = written.and_then(|()| match is_listed {
+            true => end(&self.lists, position + tail.len() as u64),
+            false => Ok(Vec::new()),
+        });
+        // They are not there for good.
+        self.lists[own].1.cut(mark);
+        tail.extend(end?);
         Ok(self.file.set_tail(tail)?)
     }
 
     /// Ends the file with the list of its chunks.
     pub(crate) fn finish(&mut self) -> Result<()> {
-        let manifests = std::mem::take(&mut self.manifests).into_iter();
-        let manifests = manifests.map(|(store, manifest)| Ok(manifest.all.build(store)?)).collect::<Result<_>>()?;
-        let end = end(manifests, self.file.position())?;
+        if self.lists.iter().any(|(_, list)| list.len() > MOST_LISTED) {
+            // The long list is made once there is room: what is held is written, and a provisional end would have none anyway.
+            self.file.flush()?;
+        }
+        let end = end(&std::mem::take(&mut self.lists), self.file.position())?;
         self.file.write_all(&end)?;
         Ok(self.file.flush()?)
     }
 }
 
 /// The end of a file, to be put at `position`: the last message, with lists of all chunks, and where it is.
-fn end(manifests: Vec<RawRrdManifest>, position: u64) -> Result<Vec<u8>> {
+fn end(lists: &[(StoreId, ChunkList)], position: u64) -> Result<Vec<u8>> {
     let mut footer = RrdFooter { manifests: HashMap::new() }.to_transport(())?;
-    for mut manifest in manifests {
-        // The library has manifests, and the fields of their schemas, in random order.
+    for (store, list) in lists.iter().filter(|(_, list)| list.len() > 0) {
+        let mut manifest = list.table(store.clone())?;
+        // The library has the fields of their schemas in random order.
         let mut fields = manifest.sorbet_schema.fields().to_vec();
         fields.sort();
         manifest.sorbet_schema = Schema::new(fields);

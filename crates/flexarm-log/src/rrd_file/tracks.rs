@@ -38,8 +38,7 @@ impl Times {
     }
 
     pub(crate) fn clear(&mut self) {
-        self.nanoseconds.clear();
-        self.steps.clear();
+        *self = Self::default();
     }
 
     pub(crate) fn columns(&self) -> [TimeColumn; 2] {
@@ -63,7 +62,7 @@ pub(crate) trait Track {
     /// The rows that wait, if any.
     fn chunk(&self, ids: &mut Ids) -> Chunks;
 
-    /// Forgets them; they have been written.
+    /// Forgets them; they have been written. Their memory is given back: tracks do not have many rows at the same time.
     fn clear(&mut self);
 }
 
@@ -112,8 +111,8 @@ impl Track for PoseTrack {
 
     fn clear(&mut self) {
         self.times.clear();
-        self.translations.clear();
-        self.quaternions.clear();
+        self.translations = Vec::new();
+        self.quaternions = Vec::new();
     }
 }
 
@@ -165,7 +164,7 @@ impl Track for TintTrack {
 
     fn clear(&mut self) {
         self.times.clear();
-        self.strips.clear();
+        self.strips = Vec::new();
     }
 }
 
@@ -211,7 +210,7 @@ impl Track for ShapeTrack {
 
     fn clear(&mut self) {
         self.times.clear();
-        self.positions.clear();
+        self.positions = Vec::new();
     }
 }
 
@@ -265,8 +264,8 @@ impl Track for ArrowTrack {
 
     fn clear(&mut self) {
         self.times.clear();
-        self.arrows.clear();
-        self.labels.clear();
+        self.arrows = Vec::new();
+        self.labels = Vec::new();
     }
 }
 
@@ -321,7 +320,7 @@ impl Track for SkeletonTrack {
 
     fn clear(&mut self) {
         self.times.clear();
-        self.lines.clear();
+        self.lines = Vec::new();
     }
 }
 
@@ -363,7 +362,7 @@ impl ScalarTrack {
     }
 
     pub(crate) fn clear(&mut self) {
-        self.values.clear();
+        self.values = Vec::new();
     }
 
     /// Whether there are rows that have not been written.
