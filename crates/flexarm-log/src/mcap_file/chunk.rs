@@ -113,22 +113,30 @@ impl OpenChunk {
 
     /// Adds the chunk and its indexes to the bytes of a file that begin at place `start`.
     ///
-    /// * `data`: the records, compressed in a way that has a name; `checksum` of them as they are, 0 for none.
-    pub(super) fn write(
+    /// * `data`: name of a compression, and what adds the records so compressed; `checksum` of them as they are, 0 for none.
+    pub(super) fn write<E>(
         &self,
         file: &mut Vec<u8>,
         start: u64,
-        (compression, data): (&'static str, &[u8]),
+        (compression, data): (&'static str, impl FnOnce(&mut Vec<u8>) -> Result<(), E>),
         checksum: u32,
-    ) -> Written {
+    ) -> Result<Written, E> {
         let place = start + file.len() as u64;
         let times = self.times.unwrap_or_default();
         let mut head = Body::default();
         head.u64(times.0).u64(times.1).u64(self.records.len() as u64).u32(checksum);
-        head.string(compression).u64(data.len() as u64);
-        push_head(file, CHUNK, (head.bytes().len() + data.len()) as u64);
+        head.string(compression);
+        let (before, size) = (file.len(), size_of::<u64>());
+        // Lengths are put in when they are known.
+        push_head(file, CHUNK, 0);
         file.extend_from_slice(head.bytes());
-        file.extend_from_slice(data);
+        file.extend_from_slice(&[0; size_of::<u64>()]);
+        let from = file.len();
+        data(file)?;
+        let compressed = (file.len() - from) as u64;
+        file[from - size..from].copy_from_slice(&compressed.to_le_bytes());
+        let length = (file.len() - before - HEAD) as u64;
+        file[before + HEAD - size..before + HEAD].copy_from_slice(&length.to_le_bytes());
         let end = start + file.len() as u64;
 
         let (mut indexes, mut counts) = (Vec::new(), Vec::new());
@@ -139,16 +147,16 @@ impl OpenChunk {
             body.u16(channel).block(entries);
             body.push(file, MESSAGE_INDEX);
         }
-        Written {
+        Ok(Written {
             times,
             start: place,
             length: end - place,
             compression,
-            compressed: data.len() as u64,
+            compressed,
             uncompressed: self.records.len() as u64,
             indexes,
             indexes_length: start + file.len() as u64 - end,
             counts,
-        }
+        })
     }
 }

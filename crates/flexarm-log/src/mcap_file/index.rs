@@ -4,6 +4,7 @@
 //! file that readers which want an index (Foxglove, Rerun) open as any other. [MCAP specification]
 
 use std::collections::BTreeMap;
+use std::convert::Infallible;
 
 use super::chunk::{OpenChunk, Written};
 use super::records::{
@@ -84,7 +85,14 @@ impl Index {
     /// The end of a file from place `start` on, with the messages of the open chunk, not compressed.
     pub(super) fn provisional_end(&self, start: u64, open: &OpenChunk) -> Vec<u8> {
         let mut file = Vec::with_capacity(open.records().len() + self.size() + (64 << 10));
-        let written = (!open.records().is_empty()).then(|| open.write(&mut file, start, ("", open.records()), 0));
+        let plain = |file: &mut Vec<u8>| {
+            file.extend_from_slice(open.records());
+            Ok::<(), Infallible>(())
+        };
+        let written = (!open.records().is_empty()).then(|| {
+            let Ok(written) = open.write(&mut file, start, ("", plain), 0);
+            written
+        });
         self.close(&mut file, start, written.as_ref(), 0);
         file
     }

@@ -24,6 +24,10 @@ const CHUNK_BYTES: usize = 1 << 20;
 const LONG_CHUNK_BYTES: usize = 2 * CHUNK_BYTES;
 const LONG_FILE_BYTES: u64 = 64 << 20;
 
+/// Memory that is used again: of a chunk with its indexes, and of a message.
+const KEPT_BYTES: usize = LONG_CHUNK_BYTES + LONG_CHUNK_BYTES / 8;
+const LEAST_KEPT_BYTES: usize = 64 << 10;
+
 /// Level of zstd. On chunks of runs level 1 takes half the time of level 3, which is zstd's own choice, and 2 % more room;
 /// level -1, the first of its fast ones, 0.7 of that time and 3 % more.
 const COMPRESSION: i32 = -1;
@@ -42,7 +46,6 @@ pub(crate) struct Output {
     channels: u16,
     compressor: Compressor<'static>,
     /// The last chunk, compressed and with its indexes; the memory is used again.
-    compressed: Vec<u8>,
     bytes: Vec<u8>,
     cdr: Cdr,
     /// The last message and the end are in the file.
@@ -60,7 +63,6 @@ impl Output {
             schemas: BTreeMap::new(),
             channels: 0,
             compressor: Compressor::new(COMPRESSION)?,
-            compressed: Vec::new(),
             bytes: Vec::new(),
             cdr: Cdr::default(),
             finished: false,
@@ -128,21 +130,23 @@ impl Output {
             return Ok(());
         }
         let records = self.chunk.records();
-        self.compressed.clear();
-        self.compressed.reserve_exact(compress_bound(records.len()));
-        self.compressor.compress_to_buffer(records, &mut self.compressed)?;
-        let compressed = self.compressed.as_slice();
         let mut bytes = std::mem::take(&mut self.bytes);
+        let compress = |file: &mut Vec<u8>| {
+            let start = file.len();
+            file.resize(start + compress_bound(records.len()), 0);
+            let size = self.compressor.compress_to_buffer(records, &mut file[start..])?;
+            file.truncate(start + size);
+            io::Result::Ok(())
+        };
         let checksum = crc32fast::hash(records);
-        let written = self.chunk.write(&mut bytes, self.file.position(), ("zstd", compressed), checksum);
-        self.chunk.clear(2 * LONG_CHUNK_BYTES);
+        let written = self.chunk.write(&mut bytes, self.file.position(), ("zstd", compress), checksum)?;
+        self.chunk.clear(KEPT_BYTES);
         self.index.chunk(&written);
         let committed = self.commit(&bytes);
         bytes.clear();
         self.bytes = bytes;
         // What the surfaces took is not needed again.
-        self.bytes.shrink_to(LONG_CHUNK_BYTES);
-        self.compressed.shrink_to(LONG_CHUNK_BYTES);
+        self.bytes.shrink_to(KEPT_BYTES);
         committed
     }
 
@@ -183,7 +187,7 @@ impl Output {
 
     pub(crate) fn metadata(&mut self, name: &str, pairs: impl IntoIterator<Item = (String, String)>) -> io::Result<()> {
         self.close_chunk()?;
-        self.cdr.shrink_to(CHUNK_BYTES);
+        self.cdr.shrink_to(LEAST_KEPT_BYTES);
         let (mut bytes, mut body) = (Vec::new(), Body::default());
         body.string(name).pairs(&BTreeMap::from_iter(pairs)).push(&mut bytes, METADATA);
         self.index.metadata(self.file.position(), bytes.len() as u64, name);
