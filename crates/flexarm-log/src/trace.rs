@@ -13,7 +13,7 @@ use crate::{Event, LogError, RunHeader, RunResult, Sample};
 ///   equal stretches; [`Trace::samples_per_block`] tells. No peak is lost.
 /// * **Rows** of such a run have the figures of the tool alone (their lists are empty). At [`Trace::LIMIT`] rows every second
 ///   one is dropped and only every second sample is taken from then on, so that they stay evenly spaced; [`Trace::stride`]
-///   tells.
+///   tells. A trace of [`Trace::for_page`] does so at [`Trace::WHOLE`] rows.
 /// * The sample of the largest error ([`Trace::peak`]), and the error of the first [`Trace::BEGINNING`] samples
 ///   ([`Trace::beginning`]), are always kept.
 #[derive(Clone, Debug, Default)]
@@ -29,6 +29,7 @@ pub struct Trace {
     stride: u64,
     seen: u64,
     without_curves: bool,
+    for_page: bool,
     peak_error: f64,
     /// Curves of a long run, and the row that fills them.
     blocks: Blocks,
@@ -131,6 +132,17 @@ impl Trace {
         Self { without_curves: true, ..Self::new(header) }
     }
 
+    /// An empty trace that keeps few rows of a long run: a page shows its curves.
+    #[must_use]
+    pub fn for_page(header: RunHeader) -> Self {
+        Self { for_page: true, ..Self::new(header) }
+    }
+
+    /// Rows at which a long run is thinned.
+    fn limit(&self) -> usize {
+        if self.for_page { Self::WHOLE } else { Self::LIMIT }
+    }
+
     /// Adds one instant.
     pub fn push(&mut self, sample: &Sample) {
         let error = size(&sample.error_world);
@@ -157,7 +169,7 @@ impl Trace {
         if (self.seen - 1).is_multiple_of(self.stride.max(1)) {
             self.rows.push(self.row.without_lists());
         }
-        if self.rows.len() >= Self::LIMIT {
+        if self.rows.len() >= self.limit() {
             let mut keep = false;
             self.rows.retain(|_| {
                 keep = !keep;
@@ -169,11 +181,14 @@ impl Trace {
 
     /// From now on the run is a long one.
     fn shorten(&mut self) {
-        self.rows.iter().for_each(|row| self.blocks.push(row));
-        self.beginning = self.rows.iter().map(translation).collect();
-        self.beginning.reserve_exact(Self::BEGINNING - self.beginning.len());
-        let mut rows = Vec::with_capacity(Self::LIMIT);
-        rows.extend(self.rows.iter().map(TraceRow::without_lists));
+        let mut rows = Vec::with_capacity(self.limit());
+        self.beginning.reserve_exact(Self::BEGINNING);
+        // One after the other: the blocks take the memory of their lists.
+        for row in std::mem::take(&mut self.rows) {
+            self.blocks.push(&row);
+            self.beginning.push(translation(&row));
+            rows.push(row.without_lists());
+        }
         self.rows = rows;
     }
 

@@ -134,8 +134,9 @@ pub(crate) struct Blocks {
     times: Vec<[f64; 2]>,
     /// Way of the rigid tool at the same times (m).
     ways: Vec<[f64; 2]>,
-    /// Smallest and largest value of each quantity, block after block; not a number where there is none.
-    ranges: Vec<[f64; 2]>,
+    /// Smallest and largest value of each quantity, for each block; not a number where there is none. Blocks behind those that
+    /// count are memory to be used again. Each is small: together they take what the start of a program has left free.
+    ranges: Vec<Vec<[f64; 2]>>,
     /// Samples of a full block, and of the last one.
     size: u64,
     filled: u64,
@@ -164,33 +165,35 @@ impl Blocks {
             }
             self.times.push([row.time_s; 2]);
             self.ways.push([self.way; 2]);
-            self.ranges.extend(self.quantities.iter().map(|_| [f64::NAN; 2]));
+            match self.ranges.get_mut(self.times.len() - 1) {
+                Some(ranges) => ranges.fill([f64::NAN; 2]),
+                None => self.ranges.push(vec![[f64::NAN; 2]; self.quantities.len()]),
+            }
             self.filled = 0;
         }
         self.filled += 1;
         let last = self.times.len() - 1;
         (self.times[last][1], self.ways[last][1]) = (row.time_s, self.way);
-        let ranges = &mut self.ranges[last * self.quantities.len()..];
         CurveQuantity::all_values(row, &mut self.values);
-        for (range, value) in ranges.iter_mut().zip(&self.values) {
+        for (range, value) in self.ranges[last].iter_mut().zip(&self.values) {
             *range = wider(*range, [*value; 2]);
         }
     }
 
     /// Makes one block of every two.
     fn halve(&mut self) {
-        let width = self.quantities.len();
         for k in 0..MOST_BLOCKS / 2 {
             self.times[k] = [self.times[2 * k][0], self.times[2 * k + 1][1]];
             self.ways[k] = [self.ways[2 * k][0], self.ways[2 * k + 1][1]];
-            for quantity in 0..width {
-                let of = |block: usize| self.ranges[block * width + quantity];
-                self.ranges[k * width + quantity] = wider(of(2 * k), of(2 * k + 1));
+            let second = std::mem::take(&mut self.ranges[2 * k + 1]);
+            for (range, other) in self.ranges[2 * k].iter_mut().zip(&second) {
+                *range = wider(*range, *other);
             }
+            self.ranges[2 * k + 1] = second;
+            self.ranges.swap(k, 2 * k);
         }
         self.times.truncate(MOST_BLOCKS / 2);
         self.ways.truncate(MOST_BLOCKS / 2);
-        self.ranges.truncate(MOST_BLOCKS / 2 * width);
         self.size *= 2;
     }
 
@@ -199,7 +202,7 @@ impl Blocks {
         let Some(at) = self.quantities.iter().position(|known| *known == quantity) else {
             return vec![f64::NAN; 2 * self.times.len()];
         };
-        self.ranges.iter().skip(at).step_by(self.quantities.len()).flatten().copied().collect()
+        self.ranges[..self.times.len()].iter().flat_map(|ranges| ranges[at]).collect()
     }
 
     /// The times that belong to [`Blocks::values`] (s).

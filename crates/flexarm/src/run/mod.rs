@@ -144,6 +144,9 @@ pub(crate) struct Together<'a> {
     pub(crate) prepared: Option<&'a Prepared>,
 }
 
+/// Samples from which on a run takes a little longer at its end, for less memory.
+const LONG_RUN: u64 = 100_000;
+
 /// As [`simulate_traced`], as one of several runs.
 pub(crate) fn run_traced(
     robot: &Robot,
@@ -187,7 +190,11 @@ pub(crate) fn run_traced(
     files.begin(&head)?;
     write_layouts(&files.names, &head)?;
     files.set.on_threads();
-    run.trace = if wanted < Wanted::Curves { Trace::without_curves(head) } else { Trace::new(head) };
+    run.trace = match outputs {
+        _ if wanted < Wanted::Curves => Trace::without_curves(head),
+        Some(_) => Trace::for_page(head),
+        None => Trace::new(head),
+    };
     let end = run.go(&mut files.set, outputs.is_some(), progress, together.observer);
 
     let robot_caveats = together.robot_caveats.map_or_else(|| robot.caveats(), |known| known.to_vec());
@@ -205,10 +212,14 @@ pub(crate) fn run_traced(
     summary.cpu_s_per_simulated_s = summary.cpu_s / summary.duration_s.max(1e-9);
     summary.files = files.names.clone();
     run.trace.finish(if wanted < Wanted::Curves { RunResult::default() } else { result(&summary, events) });
-    // The page is made while the recordings are closed.
+    // The page is made while the recordings are closed, of long runs afterwards: each takes memory, the page what they leave.
     files.set.begin_to_finish(&run.trace.result);
-    let page = outputs.map(|_| crate::report::page(&summary, &run.trace));
+    let mut page = None;
+    if run.trace.samples() < LONG_RUN {
+        page = outputs.map(|_| crate::report::page(&summary, &run.trace));
+    }
     let closed = files.set.finish(&run.trace.result).map_err(Error::from);
+    let page = page.or_else(|| outputs.map(|_| crate::report::page(&summary, &run.trace)));
     let write = |(outputs, page): (_, String)| crate::report::write(outputs, &summary, &run.trace, &page);
     let reported = closed.and_then(|()| outputs.zip(page).map_or(Ok(()), write));
     how_it_ended(end, reported).map(|()| (summary, run.trace))
