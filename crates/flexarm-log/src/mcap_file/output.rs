@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, Write};
+use std::io::{self, Cursor, Write};
 
 use zstd::bulk::Compressor;
 use zstd::zstd_safe::compress_bound;
@@ -132,11 +132,12 @@ impl Output {
         let records = self.chunk.records();
         let mut bytes = std::mem::take(&mut self.bytes);
         let compress = |file: &mut Vec<u8>| {
-            let start = file.len();
-            file.resize(start + compress_bound(records.len()), 0);
-            let size = self.compressor.compress_to_buffer(records, &mut file[start..])?;
-            file.truncate(start + size);
-            io::Result::Ok(())
+            file.reserve(compress_bound(records.len()));
+            let mut behind = Cursor::new(std::mem::take(file));
+            behind.set_position(behind.get_ref().len() as u64);
+            let compressed = self.compressor.compress_to_buffer(records, &mut behind);
+            *file = behind.into_inner();
+            compressed.map(drop)
         };
         let checksum = crc32fast::hash(records);
         let written = self.chunk.write(&mut bytes, self.file.position(), ("zstd", compress), checksum)?;

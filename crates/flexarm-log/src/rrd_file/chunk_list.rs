@@ -5,41 +5,40 @@
 
 use std::sync::Arc;
 
-use re_log_encoding::{CodecError, RawRrdManifest, RrdManifestBuilder};
+use re_log_encoding::{CodecError, RawRrdManifest};
+use re_log_types::{AbsoluteTimeRange, TimeInt};
+use re_sdk_types::ComponentDescriptor;
+use re_sorbet::{ChunkBatch, SchemaBuilder};
 
-use crate::rerun::StoreId;
 use crate::rerun::arrow::array::{
-    Array, ArrayRef, AsArray, BooleanArray, DurationNanosecondArray, FixedSizeBinaryArray, Int64Array, RecordBatch,
+    Array, ArrayRef, BooleanArray, DurationNanosecondArray, FixedSizeBinaryArray, Int64Array, RecordBatch,
     RecordBatchOptions, StringArray, UInt64Array,
 };
-use crate::rerun::arrow::datatypes::{
-    DataType, DurationNanosecondType, Field, Int64Type, Schema, TimeUnit, UInt64Type,
-};
+use crate::rerun::arrow::datatypes::{DataType, Field, Fields, Schema, TimeUnit};
 use crate::rerun::arrow::error::ArrowError;
-
-/// Columns that each chunk has: entity, identifier, whether it holds always, rows, place, size in the file and unpacked.
-const ALWAYS: usize = 7;
+use crate::rerun::{Chunk, EntityPath, Span, StoreId, Timeline};
 
 /// See the module.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ChunkList {
-    /// Columns that each chunk has, once there is one, and all others, in the order of their appearance.
-    always: Vec<Arc<Field>>,
-    columns: Vec<Arc<Field>>,
+    /// Columns besides those that each chunk has, in the order of their appearance.
+    columns: Vec<Field>,
     /// Chunks with the same columns of the same entity, in the order of their appearance.
     kinds: Vec<Kind>,
     chunks: Vec<Listed>,
-    /// Values of one chunk after the other, each as [`number`] has them.
+    /// Values of one chunk after the other, in the order of its kind's columns; [`NONE`] where there is none.
     values: Vec<i64>,
+    /// What the recording holds.
+    holds: SchemaBuilder,
 }
 
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 struct Kind {
-    entity: String,
+    entity: EntityPath,
+    /// What its chunks have.
+    fields: Fields,
     /// Columns of which its chunks have values, by their numbers.
     columns: Vec<usize>,
-    /// What the recording holds of it.
-    holds: Schema,
 }
 
 /// A chunk in the list.
@@ -49,63 +48,61 @@ struct Listed {
     is_static: bool,
     id: [u8; 16],
     rows: u64,
-    start: u64,
-    size: u64,
+    place: Span<u64>,
     unpacked: u64,
 }
 
-/// A length to which a list can be cut.
-#[derive(Clone, Copy, Debug)]
+/// A state to which a list can be brought back.
+#[derive(Clone, Debug)]
 pub(super) struct Mark {
     columns: usize,
     kinds: usize,
     chunks: usize,
     values: usize,
+    holds: SchemaBuilder,
 }
 
 impl ChunkList {
-    /// Adds a chunk, as the list of it alone.
-    pub(super) fn append(&mut self, one: RrdManifestBuilder, store: &StoreId) -> Result<(), CodecError> {
-        let RawRrdManifest { sorbet_schema: holds, data: table, .. } = one.build(store.clone())?;
-        let schema = table.schema();
-        let (always, columns) = schema.fields().split_at(ALWAYS);
-        if self.always.is_empty() {
-            self.always = always.to_vec();
-        }
-        let number_of = |column: &Arc<Field>| {
-            let known = self.columns.iter().position(|known| known == column);
-            known.unwrap_or_else(|| {
-                self.columns.push(column.clone());
-                self.columns.len() - 1
-            })
+    /// Adds a chunk, which is also there as a table.
+    ///
+    /// * `place`: its bytes in the file, without the header of their message; `unpacked`: their number without compression.
+    pub(super) fn append(&mut self, chunk: &Chunk, batch: &ChunkBatch, place: Span<u64>, unpacked: u64) {
+        let is_known = |kind: &Kind| kind.entity == *chunk.entity_path() && kind.fields == *batch.fields();
+        let kind = match self.kinds.iter().position(is_known) {
+            Some(known) => known,
+            None => self.add_kind(chunk, batch),
         };
-        let columns = columns.iter().map(number_of).collect();
-        let entity = table.column(0).as_string::<i32>().value(0).to_owned();
-        let kind = Kind { entity, columns, holds };
-        let known = self.kinds.iter().position(|known| *known == kind);
-        let kind = known.unwrap_or_else(|| {
-            self.kinds.push(kind);
-            self.kinds.len() - 1
+        self.holds.add_chunk(batch);
+        let id = chunk.id().as_tuid().as_bytes();
+        let (is_static, rows) = (chunk.is_static(), chunk.num_rows() as u64);
+        self.chunks.push(Listed { kind: kind as u32, is_static, id, rows, place, unpacked });
+        each_column(chunk, |_, value| self.values.push(value));
+    }
+
+    /// Adds what chunks like this one have; returns its number.
+    fn add_kind(&mut self, chunk: &Chunk, batch: &ChunkBatch) -> usize {
+        let mut columns = Vec::new();
+        each_column(chunk, |column, _| {
+            let field = column.field();
+            let known = self.columns.iter().position(|known| *known == field);
+            columns.push(known.unwrap_or_else(|| {
+                self.columns.push(field);
+                self.columns.len() - 1
+            }));
         });
-        let mut id = [0; 16];
-        id.copy_from_slice(table.column(1).as_fixed_size_binary().value(0));
-        let is_static = table.column(2).as_boolean().value(0);
-        let [rows, start, size, unpacked] = [3, 4, 5, 6].map(|k| table.column(k).as_primitive::<UInt64Type>().value(0));
-        self.chunks.push(Listed { kind: kind as u32, is_static, id, rows, start, size, unpacked });
-        for column in &table.columns()[ALWAYS..] {
-            self.values.push(number(column)?);
-        }
-        Ok(())
+        self.kinds.push(Kind { entity: chunk.entity_path().clone(), fields: batch.fields().clone(), columns });
+        self.kinds.len() - 1
     }
 
     pub(super) fn len(&self) -> usize {
         self.chunks.len()
     }
 
-    /// Where the list ends now.
+    /// The state of now.
     pub(super) fn mark(&self) -> Mark {
-        let Self { columns, kinds, chunks, values, .. } = self;
-        Mark { columns: columns.len(), kinds: kinds.len(), chunks: chunks.len(), values: values.len() }
+        let Self { columns, kinds, chunks, values, holds, .. } = self;
+        let [columns, kinds, chunks, values] = [columns.len(), kinds.len(), chunks.len(), values.len()];
+        Mark { columns, kinds, chunks, values, holds: holds.clone() }
     }
 
     /// Forgets what was added since.
@@ -114,6 +111,7 @@ impl ChunkList {
         self.kinds.truncate(mark.kinds);
         self.chunks.truncate(mark.chunks);
         self.values.truncate(mark.values);
+        self.holds = mark.holds;
     }
 
     /// The list as the file has it, once there is a chunk.
@@ -134,13 +132,20 @@ impl ChunkList {
             });
             columns.push(column(self.columns[*number].data_type(), values)?);
         }
-        let fields = self.always.iter().chain(order.iter().map(|number| &self.columns[*number]));
-        let fields: Vec<Arc<Field>> = fields.cloned().collect();
+        let mut fields = vec![
+            RawRrdManifest::field_chunk_entity_path(),
+            RawRrdManifest::field_chunk_id(),
+            RawRrdManifest::field_chunk_is_static(),
+            RawRrdManifest::field_chunk_num_rows(),
+            RawRrdManifest::field_chunk_byte_offset(),
+            RawRrdManifest::field_chunk_byte_size(),
+            RawRrdManifest::field_chunk_byte_size_uncompressed(),
+        ];
+        fields.extend(order.iter().map(|number| self.columns[*number].clone()));
         let rows = RecordBatchOptions::new().with_row_count(Some(self.chunks.len()));
         let data = RecordBatch::try_new_with_options(Arc::new(Schema::new(fields)), columns, &rows)
             .map_err(CodecError::ArrowSerialization)?;
-        let sorbet_schema = Schema::try_merge(self.kinds.iter().map(|kind| kind.holds.clone()))
-            .map_err(CodecError::ArrowSerialization)?;
+        let sorbet_schema = Schema::new(self.holds.clone().build());
         let sorbet_schema_sha256 =
             RawRrdManifest::compute_sorbet_schema_sha256(&sorbet_schema).map_err(CodecError::ArrowSerialization)?;
         Ok(RawRrdManifest { store_id: store, sorbet_schema, sorbet_schema_sha256, data })
@@ -150,14 +155,15 @@ impl ChunkList {
     fn always(&self) -> Vec<ArrayRef> {
         let chunks = || self.chunks.iter();
         let counts = |of: fn(&Listed) -> u64| Arc::new(UInt64Array::from_iter_values(chunks().map(of))) as ArrayRef;
+        let entity = |chunk: &Listed| self.kinds[chunk.kind as usize].entity.to_string();
         let ids = FixedSizeBinaryArray::try_from_iter(chunks().map(|chunk| chunk.id));
         vec![
-            Arc::new(StringArray::from_iter_values(chunks().map(|chunk| &self.kinds[chunk.kind as usize].entity))),
+            Arc::new(StringArray::from_iter_values(chunks().map(entity))),
             Arc::new(ids.expect("identifiers are equally long")),
             Arc::new(BooleanArray::from_iter(chunks().map(|chunk| Some(chunk.is_static)))),
             counts(|chunk| chunk.rows),
-            counts(|chunk| chunk.start),
-            counts(|chunk| chunk.size),
+            counts(|chunk| chunk.place.start),
+            counts(|chunk| chunk.place.len),
             counts(|chunk| chunk.unpacked),
         ]
     }
@@ -166,17 +172,55 @@ impl ChunkList {
 /// Stands for an empty place in a column of times.
 const NONE: i64 = i64::MIN;
 
-/// The only value of a column.
-fn number(column: &ArrayRef) -> Result<i64, CodecError> {
-    if column.is_null(0) {
-        return Ok(NONE);
+/// What a column of the list tells of a chunk.
+enum Column<'a> {
+    /// Whether a component holds always.
+    IsStatic(&'a ComponentDescriptor),
+    /// First and last time of the chunk, or of one of its components.
+    Start(&'a Timeline, Option<&'a ComponentDescriptor>),
+    End(&'a Timeline, Option<&'a ComponentDescriptor>),
+    /// Rows that have the component.
+    Rows(&'a Timeline, &'a ComponentDescriptor),
+}
+
+impl Column<'_> {
+    fn field(&self) -> Field {
+        match self {
+            Self::IsStatic(component) => RawRrdManifest::field_has_static_data(component),
+            Self::Start(timeline, component) => RawRrdManifest::field_index_start(timeline, *component),
+            Self::End(timeline, component) => RawRrdManifest::field_index_end(timeline, *component),
+            Self::Rows(timeline, component) => RawRrdManifest::field_index_num_rows(timeline, Some(component)),
+        }
     }
-    match column.data_type() {
-        DataType::Boolean => Ok(column.as_boolean().value(0).into()),
-        DataType::UInt64 => Ok(column.as_primitive::<UInt64Type>().value(0) as i64),
-        DataType::Int64 => Ok(column.as_primitive::<Int64Type>().value(0)),
-        DataType::Duration(TimeUnit::Nanosecond) => Ok(column.as_primitive::<DurationNanosecondType>().value(0)),
-        other => Err(unknown(other)),
+}
+
+/// Calls with each column that a chunk has a value in, and the value; always in the same order.
+fn each_column<'a>(chunk: &'a Chunk, mut call: impl FnMut(Column<'a>, i64)) {
+    let mut components: Vec<_> = chunk.components().values().collect();
+    components.sort_by_key(|component| &component.descriptor);
+    for component in &components {
+        call(Column::IsStatic(&component.descriptor), chunk.is_static().into());
+    }
+    let mut timelines: Vec<_> = chunk.timelines().values().collect();
+    timelines.sort_by_key(|times| times.timeline().name());
+    let of_time = |time: TimeInt| if time.is_static() { NONE } else { time.as_i64() };
+    for times in timelines {
+        let timeline = times.timeline();
+        let mut put = |range: AbsoluteTimeRange, component| {
+            let range = Some(range).filter(|range| *range != AbsoluteTimeRange::EMPTY);
+            call(Column::Start(timeline, component), range.map_or(NONE, |range| of_time(range.min())));
+            call(Column::End(timeline, component), range.map_or(NONE, |range| of_time(range.max())));
+        };
+        put(times.time_range(), None);
+        let ranges = times.time_range_per_component(chunk.components());
+        for component in &components {
+            let descriptor = &component.descriptor;
+            put(ranges.get(&descriptor.component).copied().unwrap_or(AbsoluteTimeRange::EMPTY), Some(descriptor));
+        }
+        for component in &components {
+            let list = &component.list_array;
+            call(Column::Rows(timeline, &component.descriptor), (list.len() - list.null_count()) as i64);
+        }
     }
 }
 
@@ -201,8 +245,9 @@ fn unknown(kind: &DataType) -> CodecError {
 mod tests {
     use super::*;
     use crate::rerun::components::Position3D;
-    use crate::rerun::{Chunk, EntityPath, Points3D, RowId, Scalars, Span, TimePoint, Timeline};
+    use crate::rerun::{Points3D, RowId, Scalars, TimePoint};
     use re_chunk::ChunkId;
+    use re_log_encoding::RrdManifestBuilder;
     use re_log_types::StoreKind;
     use re_tuid::Tuid;
 
@@ -217,7 +262,11 @@ mod tests {
         let builder = match k % 3 {
             0 => builder.with_archetype(row, when, &Scalars::single(k as f64)),
             1 => builder.with_archetype(row, TimePoint::default().with(step, k as i64), &Scalars::single(0.0)),
-            _ => builder.with_archetype(row, when, &Points3D::new([Position3D::new(1.0, 2.0, 3.0)]).with_labels(["a"])),
+            _ => {
+                // Labels that are there, and a list without any.
+                let labels = if k.is_multiple_of(2) { vec!["a"] } else { vec![] };
+                builder.with_archetype(row, when, &Points3D::new([Position3D::new(1.0, 2.0, 3.0)]).with_labels(labels))
+            }
         };
         builder.build().unwrap()
     }
@@ -228,17 +277,15 @@ mod tests {
         let store = StoreId::new(StoreKind::Recording, "test", "list");
         let (mut list, mut truth) = (ChunkList::default(), RrdManifestBuilder::default());
         for k in 0..40 {
-            let batch = chunk(k).to_chunk_batch().unwrap();
+            let this = chunk(k);
+            let batch = this.to_chunk_batch().unwrap();
             let span = Span { start: 100 * k, len: 90 + k };
-            let mut one = RrdManifestBuilder::default();
-            one.append(&batch, span, 200 + k).unwrap();
-            list.append(one, &store).unwrap();
+            list.append(&this, &batch, span, 200 + k);
             truth.append(&batch, span, 200 + k).unwrap();
             // What is cut leaves nothing.
             let mark = list.mark();
-            let mut one = RrdManifestBuilder::default();
-            one.append(&chunk(1000 + k).to_chunk_batch().unwrap(), span, 1).unwrap();
-            list.append(one, &store).unwrap();
+            let other = chunk(1000 + k);
+            list.append(&other, &other.to_chunk_batch().unwrap(), span, 1);
             list.cut(mark);
         }
         let (table, truth) = (list.table(store.clone()).unwrap(), truth.build(store).unwrap());

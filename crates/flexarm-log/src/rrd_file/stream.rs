@@ -15,7 +15,7 @@ use crate::rerun::{AsComponents, EntityPath, SerializationError, SerializedCompo
 use crate::rerun::{Chunk, ChunkComponents, ChunkError, ChunkId, LogMsg, RowId, TimeColumn};
 use re_log_encoding::{
     CodecError, CrateVersion, Encodable, EncodingOptions, MessageHeader, MessageKind, RRD_FOURCC, RrdFooter,
-    RrdManifestBuilder, StreamFooter, StreamHeader, ToTransport,
+    StreamFooter, StreamHeader, ToTransport,
 };
 use re_log_types::{ArrowMsg, BlueprintActivationCommand, SetStoreInfo, StoreInfo, StoreSource};
 use re_tuid::Tuid;
@@ -143,9 +143,8 @@ impl RrdStream {
         let span = Span::from_start_end(start, self.file.position());
         let list = self.lists.iter_mut().find(|(known, _)| known == store);
         let (_, list) = list.expect("a store is opened before chunks are added to it");
-        let mut one = RrdManifestBuilder::default();
-        one.append(&batch, span, uncompressed)?;
-        Ok(list.append(one, store)?)
+        list.append(chunk, &batch, span, uncompressed);
+        Ok(())
     }
 
     /// Writes out everything, with what `chunks` puts as the provisional end, and a footer: what a killed run leaves is a whole
@@ -164,9 +163,7 @@ impl RrdStream {
             let (bytes, uncompressed) = encode(&arrow_message(store, &chunk, (&batch).into()))?;
             tail.extend(bytes);
             if is_listed {
-                let mut one = RrdManifestBuilder::default();
-                one.append(&batch, Span::from_start_end(start, position + tail.len() as u64), uncompressed)?;
-                list.append(one, store)?;
+                list.append(&chunk, &batch, Span::from_start_end(start, position + tail.len() as u64), uncompressed);
             }
             Ok(())
         });
