@@ -26,27 +26,72 @@ pub(super) fn fixed(x: f64) -> String {
 /// Sizes below are nothing.
 const SMALLEST: f64 = 1e-300;
 
+/// With more digits the standard library is asked, and also where a number lies so near to the middle of two that rounding of
+/// the scaled one could choose the other (in units of the last digit).
+const MOST_SCALED: usize = 9;
+const NEAR_MIDDLE: f64 = 1e-4;
+
+/// Significant digits of a number above zero as a whole number, and the power of ten of the first of them.
+fn rounded(x: f64, digits: usize) -> (u64, i32) {
+    scaled(x, digits).unwrap_or_else(|| {
+        let written = format!("{x:.*e}", digits - 1);
+        let (mantissa, exponent) = written.split_once('e').unwrap_or((&written, "0"));
+        (mantissa.replace('.', "").parse().unwrap_or(0), exponent.parse().unwrap_or(0))
+    })
+}
+
+/// As [`rounded`], from the number times a power of ten; none where that could be wrong.
+fn scaled(x: f64, digits: usize) -> Option<(u64, i32)> {
+    let least = 10_u64.pow((digits - 1) as u32);
+    // At most one off, which is seen.
+    let mut exponent = x.log10().floor() as i32;
+    if digits > MOST_SCALED || exponent.abs() > 250 {
+        return None;
+    }
+    let times = |exponent: i32| match digits as i32 - 1 - exponent {
+        power @ 0.. => x * 10_f64.powi(power),
+        power => x / 10_f64.powi(-power),
+    };
+    let mut scaled = times(exponent);
+    if scaled < least as f64 {
+        exponent -= 1;
+        scaled = times(exponent);
+    } else if scaled >= (10 * least) as f64 {
+        exponent += 1;
+        scaled = times(exponent);
+    }
+    let whole = scaled as u64;
+    let rest = scaled - whole as f64;
+    if (rest - 0.5).abs() < NEAR_MIDDLE {
+        return None;
+    }
+    match whole + u64::from(rest > 0.5) {
+        next if next == 10 * least => Some((least, exponent + 1)),
+        whole => Some((whole, exponent)),
+    }
+}
+
 /// Adds the shorter form of a number with so many significant digits, at most fifteen; null if it is none.
 pub(super) fn push_short(text: &mut String, x: f64, digits: usize) {
-    use std::fmt::Write as _;
     if !x.is_finite() {
         text.push_str("null");
         return;
     }
-    // So many digits are those of the number that they mean: `-1.2300e-5`.
-    let start = text.len();
-    let _ = write!(text, "{x:.*e}", digits - 1);
-    let written = text.split_off(start);
-    let (mantissa, exponent) = written.split_once('e').unwrap_or((&written, "0"));
-    let exponent: i32 = exponent.parse().unwrap_or(0);
-    let (sign, mantissa) = mantissa.strip_prefix('-').map_or(("", mantissa), |rest| ("-", rest));
-    let (first, rest) = mantissa.split_at(1);
-    let rest = rest.trim_start_matches('.').trim_end_matches('0');
-    if first == "0" || x.abs() < SMALLEST {
+    if x.abs() < SMALLEST {
         text.push('0');
         return;
     }
-    text.push_str(sign);
+    let (mut number, exponent) = rounded(x.abs(), digits);
+    let mut letters = [b'0'; 20];
+    let mut start = letters.len();
+    while number > 0 {
+        start -= 1;
+        letters[start] = b'0' + (number % 10) as u8;
+        number /= 10;
+    }
+    let written = std::str::from_utf8(&letters[start..]).unwrap_or("0").trim_end_matches('0');
+    let (first, rest) = written.split_at(1);
+    text.push_str(if x < 0.0 { "-" } else { "" });
     // Letters of `0.000123`, `12300`, `12.3` and of `1.23e-4`.
     let places = exponent.unsigned_abs() as usize;
     let plain = match exponent {
@@ -56,17 +101,25 @@ pub(super) fn push_short(text: &mut String, x: f64, digits: usize) {
     };
     let point = usize::from(!rest.is_empty());
     let scientific = 1 + point + rest.len() + 1 + usize::from(exponent < 0) + places.max(1).ilog10() as usize + 1;
+    let zeros = |count: usize| &"000000000000000"[..count]; // beyond that the other form is shorter
     if scientific < plain {
-        let _ = write!(text, "{first}{}{rest}e{exponent}", &"."[..point]);
+        let sign = if exponent < 0 { "e-" } else { "e" };
+        [first, &"."[..point], rest, sign].into_iter().for_each(|part| text.push_str(part));
+        push_digits(text, places);
     } else if exponent < 0 {
-        text.push_str("0.");
-        text.extend(std::iter::repeat_n('0', places - 1));
-        text.extend([first, rest]);
+        ["0.", zeros(places - 1), first, rest].into_iter().for_each(|part| text.push_str(part));
     } else if places >= rest.len() {
-        text.extend([first, rest]);
-        text.extend(std::iter::repeat_n('0', places - rest.len()));
+        [first, rest, zeros(places - rest.len())].into_iter().for_each(|part| text.push_str(part));
     } else {
-        text.extend([first, &rest[..places], ".", &rest[places..]]);
+        [first, &rest[..places], ".", &rest[places..]].into_iter().for_each(|part| text.push_str(part));
+    }
+}
+
+/// Adds a whole number below a thousand.
+fn push_digits(text: &mut String, number: usize) {
+    let digit = |unit: usize| char::from(b'0' + (number / unit % 10) as u8);
+    for unit in [100, 10, 1].into_iter().filter(|unit| number >= *unit || *unit == 1) {
+        text.push(digit(unit));
     }
 }
 
@@ -108,6 +161,16 @@ mod tests {
         }
         for x in [0.0, -0.0, 1.0, -1.0, 10.0, 99999.6, 1e15, 1.1e-300, 1.5e300, -120.0, 0.001, 0.01, 1000.0] {
             check(x, 5);
+        }
+        // Middles of two numbers and their neighbours, and powers of ten and theirs.
+        for k in 0..20_000_i32 {
+            let middle = (f64::from(10_000 + 4 * k) + 0.5) * 10f64.powi(k % 25 - 12);
+            let ten = 10f64.powi(k % 600 - 300);
+            for x in [middle, ten, 9.99995 * ten, 9.9999949 * ten] {
+                for x in [x.next_down(), x, -x, x.next_up()] {
+                    [1, 5, 6, 9].into_iter().for_each(|digits| check(x, digits));
+                }
+            }
         }
         assert_eq!([f64::NAN, f64::INFINITY, 1e-310].map(|x| short(x, 5)), ["null", "null", "0"]);
     }
