@@ -7,10 +7,11 @@ const EDGE: f64 = 1e-9;
 
 /// A number that is linear on the picture: at the first sample, per column, per row.
 #[derive(Clone, Copy, Debug, Default)]
-struct Linear([f64; 3]);
+pub(super) struct Linear([f64; 3]);
 
 impl Linear {
-    fn at(&self, column: f64, row: f64) -> f64 {
+    /// At so many columns and rows from the first sample.
+    pub(super) fn at(&self, column: f64, row: f64) -> f64 {
         self.0[0] + self.0[1] * column + self.0[2] * row
     }
 }
@@ -18,13 +19,11 @@ impl Linear {
 /// A triangle on a picture: the weights of its corners, 1 at its own corner and 0 on the side across.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Facet {
-    /// Sample from which columns and rows are counted.
-    first: [f64; 2],
     weights: [Linear; 3],
 }
 
 impl Facet {
-    /// Of corners in samples, counted from a sample near them; none for a triangle without area.
+    /// Of corners in samples; columns and rows are counted from a sample near them. None for a triangle without area.
     pub(super) fn new([a, b, c]: [[f64; 3]; 3], first: [usize; 2]) -> Option<Self> {
         let first = first.map(|n| n as f64);
         // What is counted from near by has no large numbers that cancel.
@@ -37,14 +36,13 @@ impl Facet {
         let weight = |p: [f64; 2], q: [f64; 2]| {
             Linear([p[0] * q[1] - p[1] * q[0], p[1] - q[1], q[0] - p[0]].map(|number| number * scale))
         };
-        Some(Self { first, weights: [weight(b, c), weight(c, a), weight(a, b)] })
+        Some(Self { weights: [weight(b, c), weight(c, a), weight(a, b)] })
     }
 
-    /// Weights of the corners at a sample.
-    pub(super) fn at(&self, x: usize, y: usize) -> [f64; 3] {
-        let (column, row) = (x as f64 - self.first[0], y as f64 - self.first[1]);
-        let [a, b, c] = &self.weights;
-        [a.at(column, row), b.at(column, row), c.at(column, row)]
+    /// What is linear on the triangle and has these values at its corners.
+    pub(super) fn mean(&self, values: [f64; 3]) -> Linear {
+        let part = |k: usize| self.weights.iter().zip(values).map(|(weight, value)| weight.0[k] * value).sum();
+        Linear([part(0), part(1), part(2)])
     }
 
     /// Calls with each row that a triangle has samples in, of some rows of a picture so wide: the row, its columns, depth at
@@ -62,28 +60,55 @@ impl Facet {
             return;
         }
         let Some(facet) = Self::new(corners, [columns.start, rows.start]) else { return };
-        let depth = |k: usize| facet.weights.iter().zip([a, b, c]).map(|(weight, p)| weight.0[k] * p[2]).sum();
-        let depth = Linear([depth(0), depth(1), depth(2)]);
-        let inverse = facet.weights.map(|weight| 1.0 / weight.0[1]);
+        let depth = facet.mean([a[2], b[2], c[2]]);
+        let limits = Limits::new(&facet, columns.len());
         for y in rows.clone() {
             let row = (y - rows.start) as f64;
-            let (mut low, mut high) = (0.0, (columns.len() - 1) as f64);
-            for (weight, inverse) in facet.weights.iter().zip(inverse) {
-                let (at, slope) = (weight.at(0.0, row), weight.0[1]);
-                let limit = (-EDGE - at) * inverse;
-                if slope > 0.0 {
-                    low = limit.max(low);
-                } else if slope < 0.0 {
-                    high = limit.min(high);
-                } else if at < -EDGE {
-                    high = -1.0;
-                }
-            }
+            let [low, high] = limits.at(row);
             if low <= high {
-                let (first, last) = (ceil(low), high as usize);
+                let (first, last) = (ceil(low), high as u32 as usize);
                 let at = columns.start + first..columns.start + last + 1;
                 call(y, at, [depth.at(first as f64, row), depth.0[1]]);
             }
+        }
+    }
+}
+
+/// Columns between which a triangle lies in a row: each side is a first or a last one, linear in the row.
+struct Limits {
+    low: [[f64; 2]; 3],
+    high: [[f64; 2]; 3],
+    /// Weights of sides along rows, which tell whether the row is in it at all.
+    along: [[f64; 2]; 3],
+    last: f64,
+}
+
+impl Limits {
+    /// Among so many columns.
+    fn new(facet: &Facet, columns: usize) -> Self {
+        let last = (columns - 1) as f64;
+        let (mut low, mut high, mut along) = ([[0.0; 2]; 3], [[last, 0.0]; 3], [[0.0; 2]; 3]);
+        for (k, Linear([start, per_column, per_row])) in facet.weights.into_iter().enumerate() {
+            let limit = [(-EDGE - start) / per_column, -per_row / per_column];
+            if per_column > 0.0 {
+                low[k] = limit;
+            } else if per_column < 0.0 {
+                high[k] = limit;
+            } else {
+                along[k] = [start, per_row];
+            }
+        }
+        Self { low, high, along, last }
+    }
+
+    /// Of a row. The first one is not before the first column, the last one not behind the last.
+    fn at(&self, row: f64) -> [f64; 2] {
+        let (greater, less) = (|a: f64, b: f64| if b > a { b } else { a }, |a: f64, b: f64| if b < a { b } else { a });
+        let value = |[start, slope]: [f64; 2]| start + slope * row;
+        let (low, high) = (self.low.map(value), self.high.map(value));
+        match self.along.iter().any(|side| value(*side) < -EDGE) {
+            true => [0.0, -1.0],
+            false => [low.into_iter().fold(0.0, greater), high.into_iter().fold(self.last, less)],
         }
     }
 }
@@ -103,17 +128,22 @@ fn ceil(x: f64) -> usize {
 
 /// Rows of a picture that are drawn together: what is known of their samples stays near the processor.
 const BAND: usize = 48;
-/// Rows above and below a band that are known with it, for [`Nearest::is_below_beside`].
+/// Samples around each row and column that are known with it, for [`Nearest::lowest_beside`].
 const AROUND: usize = 2;
+/// Depth where there is nothing, and beside the picture.
+const NOTHING: f32 = f32::NEG_INFINITY;
+const BESIDE: f32 = f32::INFINITY;
 
 /// The nearest triangle at each sample of a band of rows.
 pub(super) struct Nearest {
     width: usize,
-    /// Rows of the picture, and those that are known.
+    /// Rows of the picture, and the first of the band.
     height: usize,
-    known: Range<usize>,
-    /// Depth in the upper half, so that more is nearer; number of the triangle below. Zero where there is nothing.
-    keys: Vec<u64>,
+    first: usize,
+    /// Depth of what is nearest, row by row, with [`AROUND`] rows and columns more on each side.
+    depths: Vec<f32>,
+    /// Number of the triangle.
+    numbers: Vec<u32>,
     /// Columns of each row outside of which there is nothing.
     touched: Vec<Range<usize>>,
 }
@@ -139,38 +169,58 @@ impl Nearest {
         for (triangle, number) in (0..triangles).zip(0_u32..) {
             members[bands_of(triangle)].iter_mut().for_each(|band| band.push(number));
         }
-        let (keys, touched) = (vec![0; width * (BAND + 2 * AROUND)], vec![0..0; BAND + 2 * AROUND]);
-        let mut band = Self { width, height, known: 0..0, keys, touched };
+        let rows = BAND + 2 * AROUND;
+        let mut depths = vec![NOTHING; (width + 2 * AROUND) * rows];
+        for row in depths.chunks_exact_mut(width + 2 * AROUND) {
+            row[..AROUND].fill(BESIDE);
+            row[width + AROUND..].fill(BESIDE);
+        }
+        let mut band =
+            Self { width, height, first: 0, depths, numbers: vec![0; width * rows], touched: vec![0..0; rows] };
         for (k, members) in members.iter().enumerate().filter(|(_, members)| !members.is_empty()) {
             let rows = k * BAND..((k + 1) * BAND).min(height);
-            band.begin(rows.start.saturating_sub(AROUND)..(rows.end + AROUND).min(height));
+            band.begin(rows.start);
             members.iter().for_each(|number| band.add(*number, corners(*number as usize)));
             rows.filter(|y| !band.columns(*y).is_empty()).for_each(|y| call(&band, y));
         }
     }
 
-    /// Nothing in these rows yet.
-    fn begin(&mut self, known: Range<usize>) {
-        for (row, touched) in self.keys.chunks_exact_mut(self.width).zip(&mut self.touched) {
-            row[std::mem::take(touched)].fill(0);
+    /// The band that begins at a row, with nothing in it yet.
+    fn begin(&mut self, first: usize) {
+        self.first = first;
+        let Self { width, height, depths, touched, .. } = self;
+        for (k, (row, touched)) in depths.chunks_exact_mut(*width + 2 * AROUND).zip(touched).enumerate() {
+            let row = &mut row[AROUND..][..*width];
+            row[std::mem::take(touched)].fill(NOTHING);
+            if first + k < AROUND || first + k >= *height + AROUND {
+                row.fill(BESIDE);
+                *touched = 0..*width;
+            }
         }
-        self.known = known;
+    }
+
+    /// Row of the band where this one of the picture is.
+    fn row(&self, y: usize) -> usize {
+        y + AROUND - self.first
     }
 
     fn add(&mut self, number: u32, corners: [[f64; 3]; 3]) {
-        let Self { width, known, keys, touched, .. } = self;
-        Facet::rows(corners, *width, known, |y, columns, [first, slope]| {
-            let y = y - known.start;
+        let Self { width, height, first: top, depths, numbers, touched } = self;
+        let known = top.saturating_sub(AROUND)..(*top + BAND + AROUND).min(*height);
+        Facet::rows(corners, *width, &known, |y, columns, [first, slope]| {
+            let y = y + AROUND - *top;
             let row: &mut Range<usize> = &mut touched[y];
             *row = match row.start < row.end {
                 true => row.start.min(columns.start)..row.end.max(columns.end),
                 false => columns.clone(),
             };
+            let depths = &mut depths[y * (*width + 2 * AROUND) + AROUND..][columns.clone()];
+            let numbers = &mut numbers[y * *width..][columns];
             let mut column = 0.0;
-            for key in &mut keys[y * *width..][columns] {
-                let depth = u64::from(ordered((first + slope * column) as f32));
-                if depth > *key >> 32 {
-                    *key = depth << 32 | u64::from(number);
+            for (nearest, nearest_number) in depths.iter_mut().zip(numbers) {
+                let depth = (first + slope * column) as f32;
+                if depth > *nearest {
+                    (*nearest, *nearest_number) = (depth, number);
                 }
                 column += 1.0;
             }
@@ -179,43 +229,30 @@ impl Nearest {
 
     /// Columns of a row outside of which there is nothing.
     pub(super) fn columns(&self, y: usize) -> Range<usize> {
-        self.touched[y - self.known.start].clone()
+        self.touched[self.row(y)].clone()
     }
 
-    fn key(&self, x: usize, y: usize) -> u64 {
-        self.keys[(y - self.known.start) * self.width + x]
+    /// Of some columns of a row: the depth of what is nearest, and the number of the triangle.
+    pub(super) fn at(&self, columns: Range<usize>, y: usize) -> impl Iterator<Item = Option<(f32, usize)>> {
+        let row = self.row(y);
+        let depths = &self.depths[row * (self.width + 2 * AROUND) + AROUND..][columns.clone()];
+        let numbers = &self.numbers[row * self.width..][columns];
+        depths.iter().zip(numbers).map(|(depth, number)| (*depth > NOTHING).then_some((*depth, *number as usize)))
     }
 
-    /// Depth and number of what is nearest.
-    pub(super) fn at(&self, x: usize, y: usize) -> Option<(f32, usize)> {
-        match self.key(x, y) {
-            0 => None,
-            key => Some((depth(key), (key & u64::from(u32::MAX)) as usize)),
+    /// Of some columns of a row: the smallest depth beside each sample, one or two samples on in any direction.
+    pub(super) fn lowest_beside(&self, columns: Range<usize>, y: usize, lowest: &mut Vec<f32>) {
+        let (stride, count) = (self.width + 2 * AROUND, columns.len());
+        let at = self.row(y) * stride + AROUND + columns.start;
+        let from = |start: usize| &self.depths[start..][..count];
+        let lower = |a: f32, b: f32| if b < a { b } else { a };
+        lowest.clear();
+        lowest.extend_from_slice(from(at - 1));
+        let others = [at + 1, at - 2, at + 2, at - stride, at + stride, at - 2 * stride, at + 2 * stride];
+        for other in others.map(from) {
+            lowest.iter_mut().zip(other).for_each(|(lowest, other)| *lowest = lower(*lowest, *other));
         }
     }
-
-    /// Whether something beside a sample lies lower than this, or nothing is there: one or two samples on in any direction.
-    pub(super) fn is_below_beside(&self, x: usize, y: usize, depth: f32) -> bool {
-        let (limit, at) = (u64::from(ordered(depth)) << 32, (y - self.known.start) * self.width + x);
-        let lower = |at: usize| self.keys[at] < limit;
-        (1..=AROUND).any(|k| {
-            x + k < self.width && lower(at + k)
-                || x >= k && lower(at - k)
-                || y + k < self.height && lower(at + k * self.width)
-                || y >= k && lower(at - k * self.width)
-        })
-    }
-}
-
-/// A number of the same order: more than zero, and larger for a larger depth.
-fn ordered(depth: f32) -> u32 {
-    let bits = depth.to_bits();
-    if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
-}
-
-fn depth(key: u64) -> f32 {
-    let bits = (key >> 32) as u32;
-    f32::from_bits(if bits >> 31 == 1 { bits & !(1 << 31) } else { !bits })
 }
 
 #[cfg(test)]
@@ -243,13 +280,17 @@ mod tests {
         triangles.push([[10.5, 10.5, 30.0], [20.5, 10.5, 30.0], [10.5, 20.5, 30.0]]);
         triangles.push([[1.0, 1.0, 90.0], [2.0, 2.0, 90.0], [3.0, 3.0, 90.0]]);
         let mut found = vec![None; width * height];
+        let (mut lowest, mut buffer) = (vec![BESIDE; width * height], Vec::new());
         Nearest::each_row(
             [width, height],
             triangles.len(),
             |k| triangles[k],
             |nearest, y| {
-                (0..width).for_each(|x| found[y * width + x] = nearest.at(x, y));
-                assert!((0..width).filter(|x| nearest.at(*x, y).is_some()).all(|x| nearest.columns(y).contains(&x)));
+                let row = &mut found[y * width..][..width];
+                row.iter_mut().zip(nearest.at(0..width, y)).for_each(|(found, at)| *found = at);
+                assert!((0..width).filter(|x| row[*x].is_some()).all(|x| nearest.columns(y).contains(&x)));
+                nearest.lowest_beside(0..width, y, &mut buffer);
+                lowest[y * width..][..width].copy_from_slice(&buffer);
             },
         );
         let mut covered = 0;
@@ -270,21 +311,30 @@ mod tests {
             assert_eq!(found.map(|(_, number)| number), truth.map(|(_, number)| number), "at {x}, {y}");
             if let (Some((found, number)), Some((truth, _))) = (found, truth) {
                 assert!((f64::from(found) - truth).abs() < 1e-5, "{found} {truth}"); // f32; measured 9.5e-7
-                let weights = Facet::new(triangles[number], [x / 2, y + 3]).unwrap().at(x, y);
-                let depth: f64 = weights.iter().zip(triangles[number]).map(|(w, p)| w * p[2]).sum();
-                assert!((depth - truth).abs() < 1e-9 && (weights.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+                let facet = Facet::new(triangles[number], [x / 2, y + 3]).unwrap();
+                let at = |corners: [f64; 3]| facet.mean(corners).at((x - x / 2) as f64, -3.0);
+                let depth = at(triangles[number].map(|p| p[2]));
+                assert!((depth - truth).abs() < 1e-9 && (at([1.0; 3]) - 1.0).abs() < 1e-9);
                 covered += 1;
             }
+        }
+        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+            let depth = |x: Option<usize>, y: Option<usize>| match (x.filter(|x| *x < width), y.filter(|y| *y < height))
+            {
+                (Some(x), Some(y)) => found[y * width + x].map_or(NOTHING, |(depth, _)| depth),
+                _ => BESIDE,
+            };
+            let beside = [1, 2].into_iter().flat_map(|k| {
+                let (before, after) = ((x.checked_sub(k), y.checked_sub(k)), (Some(x + k), Some(y + k)));
+                [(before.0, Some(y)), (after.0, Some(y)), (Some(x), before.1), (Some(x), after.1)]
+            });
+            let truth = beside.map(|(x, y)| depth(x, y)).fold(BESIDE, f32::min);
+            // Rows without anything are not shown.
+            let is_shown = (0..width).any(|x| found[y * width + x].is_some());
+            assert!(!is_shown || lowest[y * width + x] == truth, "beside {x}, {y}: {} {truth}", lowest[y * width + x]);
         }
         assert!((1000..4200).contains(&covered), "{covered}");
         let on_a_side = found[15 * width + 15].map(|(_, number)| number);
         assert_eq!(on_a_side, Some(60), "a sample on a side belongs to it");
-    }
-
-    #[test]
-    fn depths_keep_their_order_as_whole_numbers() {
-        let depths = [f32::MIN, -3.5, -1e-30, -0.0, 0.0, 1e-30, 2.0, 1e4, f32::MAX];
-        assert!(depths.windows(2).all(|pair| ordered(pair[0]) < ordered(pair[1])) && ordered(depths[0]) > 0);
-        assert!(depths.iter().all(|d| depth(u64::from(ordered(*d)) << 32 | 77).to_bits() == d.to_bits()));
     }
 }

@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use super::color;
 use super::draw::cover_line;
 use super::image::{Image, Rgb};
-use super::raster::{Facet, Nearest};
+use super::raster::{Facet, Linear, Nearest};
 pub use super::topology::corner_normals;
 use super::view::View;
 
@@ -264,54 +264,67 @@ impl Samples {
         mut call: impl FnMut(usize, usize, f32, Rgb, bool),
     ) {
         let step = (OUTLINE * self.size) as f32;
-        let mut seen = Seen { number: usize::MAX, facet: Facet::default(), light: [0.0; 3], values: [0.0; 3] };
+        let scale = match scene.paint {
+            Paint::Magnitude { .. } => (0..=SCALE_STEPS).map(|k| color::magnitude(f64::from(k) / SCALE_END)).collect(),
+            Paint::Faces { .. } => Vec::new(),
+        };
+        let mut faces: Vec<Option<Face>> = vec![None; scene.triangles.len()];
+        let mut lowest = Vec::new();
         let corners = |number: usize| scene.triangles[number].map(|v| self.projected[v as usize]);
         Nearest::each_row([self.width, self.height], scene.triangles.len(), corners, |nearest, y| {
-            for x in nearest.columns(y) {
-                let Some((depth, number)) = nearest.at(x, y) else { continue };
-                // Samples beside each other mostly show the same triangle.
-                if seen.number != number {
-                    seen = self.seen(scene, normals, number, [x, y]);
-                }
-                let (color, line) = (seen.color(scene, x, y), nearest.is_below_beside(x, y, depth - step));
+            let columns = nearest.columns(y);
+            nearest.lowest_beside(columns.clone(), y, &mut lowest);
+            for ((x, at), lowest) in columns.clone().zip(nearest.at(columns, y)).zip(&lowest) {
+                let Some((depth, number)) = at else { continue };
+                let face = faces[number].get_or_insert_with(|| self.face(scene, normals, number, [x, y]));
+                let (place, light) = face.at(x, y);
+                let own = match scene.paint {
+                    Paint::Faces { colors, .. } => colors[number][usize::from(place > 0.0)],
+                    Paint::Magnitude { .. } => scale[(place.clamp(0.0, SCALE_END) + 0.5) as usize],
+                };
+                let (color, line) = (lit(own, light), *lowest < depth - step);
                 let color = if line { color::mix(color, color::INK, OUTLINE_INK) } else { color };
                 call(x, y, depth, color, line);
             }
         });
     }
 
-    fn seen(&self, scene: &Scene<'_>, normals: &[[Vector3<f64>; 3]], number: usize, near: [usize; 2]) -> Seen {
+    /// `near`: a sample in the triangle.
+    fn face(&self, scene: &Scene<'_>, normals: &[[Vector3<f64>; 3]], number: usize, near: [usize; 2]) -> Face {
         let View { right, up, toward, .. } = self.view;
         let corners = scene.triangles[number].map(|v| v as usize);
         let light = normals[number].map(|n| brightness(right.dot(&n), up.dot(&n), toward.dot(&n)));
-        let (values, light) = match scene.paint {
-            Paint::Faces { bright, side, .. } if bright[number] => (side, light.map(|light| 0.68 + 0.32 * light)),
-            Paint::Faces { side, .. } => (side, light),
-            Paint::Magnitude { values, .. } => (values, light),
+        let (place, light) = match scene.paint {
+            Paint::Faces { bright, side, .. } if bright[number] => {
+                (corners.map(|v| side[v]), light.map(|light| 0.68 + 0.32 * light))
+            }
+            Paint::Faces { side, .. } => (corners.map(|v| side[v]), light),
+            Paint::Magnitude { values, peak } => (corners.map(|v| SCALE_END * (values[v] / peak)), light),
         };
         let facet = Facet::new(corners.map(|v| self.projected[v]), near).unwrap_or_default();
-        Seen { number, facet, light, values: corners.map(|v| values[v]) }
+        Face { first: near.map(|n| n as f64), place: facet.mean(place), light: facet.mean(light) }
     }
 }
 
+/// Steps of the scale of colours: finer than what a channel of a colour can tell.
+const SCALE_STEPS: u32 = 2048;
+const SCALE_END: f64 = SCALE_STEPS as f64;
+
 /// What is to be known of a triangle to colour its samples.
-struct Seen {
-    number: usize,
-    facet: Facet,
-    /// At its corners.
-    light: [f64; 3],
-    values: [f64; 3],
+#[derive(Clone, Copy)]
+struct Face {
+    /// Sample from which columns and rows are counted.
+    first: [f64; 2],
+    /// On the scale of colours, in its steps, or on which side of a border, and the light.
+    place: Linear,
+    light: Linear,
 }
 
-impl Seen {
-    fn color(&self, scene: &Scene<'_>, x: usize, y: usize) -> Rgb {
-        let w = self.facet.at(x, y);
-        let mean = |x: [f64; 3]| w[0] * x[0] + w[1] * x[1] + w[2] * x[2];
-        let own = match scene.paint {
-            Paint::Faces { colors, .. } => colors[self.number][usize::from(mean(self.values) > 0.0)],
-            Paint::Magnitude { peak, .. } => color::magnitude(mean(self.values) / peak),
-        };
-        lit(own, mean(self.light))
+impl Face {
+    /// Place and light at a sample.
+    fn at(&self, x: usize, y: usize) -> (f64, f64) {
+        let (column, row) = (x as f64 - self.first[0], y as f64 - self.first[1]);
+        (self.place.at(column, row), self.light.at(column, row))
     }
 }
 
