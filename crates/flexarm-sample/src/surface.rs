@@ -98,11 +98,11 @@ impl LinkMesh {
     /// The part of the surface whose triangles are wanted, without corners that no triangle uses.
     pub fn part(&self, wanted: impl Fn(&[u32; 3]) -> bool) -> Self {
         let with_normals = self.normals.len() == self.positions.len();
-        let mut new_index: HashMap<u32, u32> = HashMap::new();
+        let mut new_index = vec![None; self.positions.len()];
         let mut part = Self { positions: Vec::new(), normals: Vec::new(), triangles: Vec::new(), ..self.clone() };
         for triangle in self.triangles.iter().filter(|t| wanted(t)) {
             let corners = triangle.map(|corner| {
-                *new_index.entry(corner).or_insert_with(|| {
+                *new_index[corner as usize].get_or_insert_with(|| {
                     part.positions.push(self.positions[corner as usize]);
                     if with_normals {
                         part.normals.push(self.normals[corner as usize]);
