@@ -41,6 +41,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use args::{CheckArgs, Cli, Command, FormName, InspectArgs, MethodName, PresetName, RobotArgs, RunArgs, StartName};
+use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, Parser};
 use failure::Failure;
 use flexarm::{
@@ -64,11 +65,25 @@ pub fn run(line: Vec<OsString>) -> u8 {
             failure.exit_code()
         }),
         Err(usage) => {
+            let usage = with_number_tip(usage);
             let _ = usage.print(); // a closed pipe
             return usage.exit_code().try_into().unwrap_or(2);
         }
     };
     [0, 1].into_iter().find(|number| ExitCode::from(*number) == code).unwrap_or(2)
+}
+
+/// Says how a number is written where a word stands that is none.
+fn with_number_tip(mut usage: clap::Error) -> clap::Error {
+    let tip = match std::error::Error::source(&usage) {
+        Some(cause) if cause.is::<std::num::ParseFloatError>() => {
+            "numbers have a decimal point and no unit, such as 500, 0.002 or 2e-3"
+        }
+        Some(cause) if cause.is::<std::num::ParseIntError>() => "a whole number is expected, such as 8",
+        _ => return usage,
+    };
+    usage.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
+    usage
 }
 
 /// Where robots and trajectories are besides: a folder with `robots/` and `trajectories/` in it. The first call counts.

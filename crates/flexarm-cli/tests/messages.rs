@@ -386,3 +386,16 @@ fn the_case_studies_name_their_flags() {
         ],
     );
 }
+
+#[test]
+fn a_word_that_is_no_number_is_answered_with_how_numbers_are_written() {
+    let place = Place::new();
+    let float = "tip: numbers have a decimal point and no unit, such as 500, 0.002 or 2e-3";
+    for (flag, found) in [("--log-rate", "fast"), ("--step", "1ms"), ("--settling-band", "0,1"), ("--magnify", "")] {
+        place.refused(&[&COMPARE[..], &[flag, found]].concat(), &[flag, found, float]);
+    }
+    for found in ["two", "2.5"] {
+        let whole = ["--segments", found, "tip: a whole number is expected, such as 8"];
+        place.refused(&[&COMPARE[..], &["--segments", found]].concat(), &whole);
+    }
+}
