@@ -268,7 +268,8 @@ impl Samples {
             Paint::Magnitude { .. } => (0..=SCALE_STEPS).map(|k| color::magnitude(f64::from(k) / SCALE_END)).collect(),
             Paint::Faces { .. } => Vec::new(),
         };
-        let mut faces: Vec<Option<Face>> = vec![None; scene.triangles.len()];
+        // Each row meets mostly the triangles of the row above it.
+        let mut faces = vec![(usize::MAX, Face::default()); FACES.min(scene.triangles.len())];
         let mut lowest = Vec::new();
         let corners = |number: usize| scene.triangles[number].map(|v| self.projected[v as usize]);
         Nearest::each_row([self.width, self.height], scene.triangles.len(), corners, |nearest, y| {
@@ -276,8 +277,11 @@ impl Samples {
             nearest.lowest_beside(columns.clone(), y, &mut lowest);
             for ((x, at), lowest) in columns.clone().zip(nearest.at(columns, y)).zip(&lowest) {
                 let Some((depth, number)) = at else { continue };
-                let face = faces[number].get_or_insert_with(|| self.face(scene, normals, number, [x, y]));
-                let (place, light) = face.at(x, y);
+                let slot = number % faces.len();
+                if faces[slot].0 != number {
+                    faces[slot] = (number, self.face(scene, normals, number, [x, y]));
+                }
+                let (place, light) = faces[slot].1.at(x, y);
                 let own = match scene.paint {
                     Paint::Faces { colors, .. } => colors[number][usize::from(place > 0.0)],
                     Paint::Magnitude { .. } => scale[(place.clamp(0.0, SCALE_END) + 0.5) as usize],
@@ -310,8 +314,11 @@ impl Samples {
 const SCALE_STEPS: u32 = 2048;
 const SCALE_END: f64 = SCALE_STEPS as f64;
 
+/// Triangles that are known at a time, each in the place of its number.
+const FACES: usize = 4096;
+
 /// What is to be known of a triangle to colour its samples.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 struct Face {
     /// Sample from which columns and rows are counted.
     first: [f64; 2],

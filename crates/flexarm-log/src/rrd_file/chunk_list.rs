@@ -3,6 +3,7 @@
 //! As a table it has a column for each component and timeline, and nearly all of a chunk's places in it are empty: 1.7 kB for
 //! a chunk of an arm. [`ChunkList`] keeps what is not empty, and makes the table when it is written.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use re_log_encoding::{CodecError, RawRrdManifest};
@@ -25,6 +26,8 @@ pub(super) struct ChunkList {
     columns: Vec<Field>,
     /// Chunks with the same columns of the same entity, in the order of their appearance.
     kinds: Vec<Kind>,
+    /// Their numbers, by entity: few each, while studies have thousands of entities.
+    of_entity: HashMap<EntityPath, Vec<usize>>,
     chunks: Vec<Listed>,
     /// Values of one chunk after the other, in the order of its kind's columns; [`NONE`] where there is none.
     values: Vec<i64>,
@@ -67,9 +70,9 @@ impl ChunkList {
     ///
     /// * `place`: its bytes in the file, without the header of their message; `unpacked`: their number without compression.
     pub(super) fn append(&mut self, chunk: &Chunk, batch: &ChunkBatch, place: Span<u64>, unpacked: u64) {
-        let is_known = |kind: &Kind| kind.entity == *chunk.entity_path() && kind.fields == *batch.fields();
-        let kind = match self.kinds.iter().position(is_known) {
-            Some(known) => known,
+        let of_entity = self.of_entity.get(chunk.entity_path()).map_or(&[][..], Vec::as_slice);
+        let kind = match of_entity.iter().find(|kind| self.kinds[**kind].fields == *batch.fields()) {
+            Some(known) => *known,
             None => self.add_kind(chunk, batch),
         };
         self.holds.add_chunk(batch);
@@ -90,8 +93,10 @@ impl ChunkList {
                 self.columns.len() - 1
             }));
         });
-        self.kinds.push(Kind { entity: chunk.entity_path().clone(), fields: batch.fields().clone(), columns });
-        self.kinds.len() - 1
+        let (number, entity) = (self.kinds.len(), chunk.entity_path());
+        self.kinds.push(Kind { entity: entity.clone(), fields: batch.fields().clone(), columns });
+        self.of_entity.entry(entity.clone()).or_default().push(number);
+        number
     }
 
     pub(super) fn len(&self) -> usize {
@@ -108,7 +113,10 @@ impl ChunkList {
     /// Forgets what was added since.
     pub(super) fn cut(&mut self, mark: Mark) {
         self.columns.truncate(mark.columns);
-        self.kinds.truncate(mark.kinds);
+        for kind in self.kinds.drain(mark.kinds..).rev() {
+            // They came in this order, so each is the last of its entity.
+            self.of_entity.get_mut(&kind.entity).and_then(Vec::pop);
+        }
         self.chunks.truncate(mark.chunks);
         self.values.truncate(mark.values);
         self.holds = mark.holds;
@@ -290,6 +298,8 @@ mod tests {
         }
         let (table, truth) = (list.table(store.clone()).unwrap(), truth.build(store).unwrap());
         assert_eq!((list.len(), table.data.num_columns()), (40, truth.data.num_columns()));
+        // Three entities, each always or over time, one of them with and without labels.
+        assert!(list.kinds.len() <= 7, "{} kinds", list.kinds.len());
         assert_eq!(table.sorbet_schema_sha256, truth.sorbet_schema_sha256);
         for (field, column) in truth.data.schema().fields().iter().zip(truth.data.columns()) {
             assert_eq!(table.data.schema().field_with_name(field.name()).unwrap(), &**field);
