@@ -9,6 +9,7 @@ use crate::file_recorder::{FileRecorder, OpenFile};
 use crate::number_text::push_number;
 use crate::shape::Shape;
 use crate::table;
+use crate::written_behind::WrittenBehind;
 use crate::{CreateOptions, LogError, RunHeader, RunResult, Sample};
 
 /// Writes a run as comma-separated values with a header line.
@@ -43,6 +44,7 @@ struct Lines {
     /// Bytes of whole lines in the file.
     written: u64,
     waiting: Vec<u8>,
+    behind: WrittenBehind,
 }
 
 /// Bytes that wait until they are worth a system call.
@@ -50,7 +52,7 @@ const MOST_WAITING: usize = 128 << 10;
 
 impl Lines {
     fn new(file: File) -> Self {
-        Self { file, written: 0, waiting: Vec::new() }
+        Self { file, written: 0, waiting: Vec::new(), behind: WrittenBehind::default() }
     }
 
     fn add_names(&mut self, names: &[String]) -> csv::Result<()> {
@@ -85,6 +87,7 @@ impl Lines {
             return Err(error);
         }
         self.written += length;
+        self.behind.advance(&self.file, self.written);
         Ok(())
     }
 }

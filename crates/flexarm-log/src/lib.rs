@@ -81,6 +81,7 @@ mod trace;
 mod trace_blocks;
 #[cfg(feature = "described-tables")]
 mod whole_file;
+mod written_behind;
 
 pub use create::CreateOptions;
 pub use csv_file::CsvRecorder;

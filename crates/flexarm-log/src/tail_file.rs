@@ -11,6 +11,8 @@
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
 
+use crate::written_behind::WrittenBehind;
+
 /// Committed bytes beyond which a recorder should write them out even before its time: what is held in memory, and what is
 /// lost where the file may not grow further. A quarter of what is in the file, within these.
 const PENDING_LIMIT: usize = 3 << 20;
@@ -30,12 +32,13 @@ pub(crate) struct TailFile {
     written: u64,
     /// Provisional bytes in the file, behind the committed ones.
     tail: Vec<u8>,
+    behind: WrittenBehind,
 }
 
 impl TailFile {
     /// Around a new, empty file.
     pub(crate) fn new(file: File) -> Self {
-        Self { file, pending: Vec::new(), written: 0, tail: Vec::new() }
+        Self { file, pending: Vec::new(), written: 0, tail: Vec::new(), behind: WrittenBehind::default() }
     }
 
     /// Number of committed bytes.
@@ -72,6 +75,7 @@ impl TailFile {
         self.pending.shrink_to(PENDING_LIMIT + PENDING_LIMIT / 4);
         tail.shrink_to_fit();
         self.tail = tail;
+        self.behind.advance(&self.file, self.written);
         Ok(())
     }
 
