@@ -510,3 +510,16 @@ fn a_study_has_its_runs_in_the_order_of_colours_and_says_whose_events_and_shares
         assert!(titles.iter().any(|known| known == title), "{titles:?}");
     }
 }
+
+#[test]
+fn arms_from_a_tenth_of_a_millimetre_to_a_kilometre_are_recorded() {
+    for extent in [1e-4, 0.02, 0.07, 3.0, 1e3] {
+        let volume = Some([[0.0, 0.0, 0.0], [extent, extent, 0.5 * extent]]);
+        for color_scale_m in [0.0, 1e-6, 1e-3, 0.1] {
+            let header = synthetic::header();
+            let header = RunHeader { volume, color_scale_m, ..header };
+            let file = run("sizes.rrd", &header, 20, Duration::from_secs(3600));
+            assert_eq!(rows(&file)["/plots/tcp_error/norm"], 20, "{extent} m, scale {color_scale_m} m");
+        }
+    }
+}

@@ -102,6 +102,40 @@ pub(crate) struct RunTracks {
     peak: Option<(f64, Instant, [f32; 3])>,
 }
 
+/// Sizes on the screen, as lengths in the scene (m).
+struct Fineness {
+    pixel_m: f64,
+    /// How far a corner of an arm at true scale moves unseen.
+    true_tolerance_m: f64,
+    /// To which places of magnified arms are rounded.
+    quantum_m: f32,
+}
+
+impl Fineness {
+    fn of(header: &RunHeader) -> Self {
+        const PIXELS: f64 = 800.0;
+        let extent = header.volume.map_or(3.0, |[low, high]| size(&[0, 1, 2].map(|c| high[c] - low[c])));
+        let pixel_m = extent / PIXELS;
+        // Of arms that bend by centimetres in proportion; of arms of a few centimetres a pixel is less.
+        let true_tolerance_m = (0.02 * header.color_scale_m).max(1e-4).min(pixel_m);
+        // A power of two, so that rounded numbers are short.
+        let quantum_m = (0.5 * pixel_m).log2().floor().exp2() as f32;
+        Self { pixel_m, true_tolerance_m, quantum_m }
+    }
+}
+
+/// The first run of a study is solid, the others are seen through.
+fn magnified_paint(seat: &Seat, scale: ColorScale) -> Paint {
+    match (seat, seat.color()) {
+        (Seat::InStudy(0, _), Some(color)) => Paint::Plain(color),
+        (Seat::InStudy(..), Some(color)) => {
+            let [red, green, blue, _] = color.0.to_array();
+            Paint::Plain(Color::from_unmultiplied_rgba(red, green, blue, 0x90))
+        }
+        _ => Paint::Deviation(scale),
+    }
+}
+
 impl RunTracks {
     /// The tracks of a run, and what never changes about it.
     pub(crate) fn new(header: &RunHeader, seat: &Seat, ids: &mut Ids) -> Result<(Self, Vec<Chunk>), StreamError> {
@@ -111,14 +145,7 @@ impl RunTracks {
         let scale = ColorScale { full_m: header.color_scale_m };
         let alone = matches!(seat, Seat::Alone);
         let first = matches!(seat, Seat::Alone | Seat::InStudy(0, _));
-        // Sizes on the screen, as lengths in the scene.
-        let extent = header.volume.map_or(3.0, |[low, high]| size(&[0, 1, 2].map(|c| high[c] - low[c])));
-        const PIXELS: f64 = 800.0;
-        let pixel_m = extent / PIXELS;
-        // Of arms that bend by centimetres in proportion.
-        let true_tolerance_m = (0.02 * header.color_scale_m).clamp(1e-4, pixel_m);
-        // A power of two, so that rounded numbers are short.
-        let quantum_m = (0.5 * pixel_m).log2().floor().exp2() as f32;
+        let Fineness { pixel_m, true_tolerance_m, quantum_m } = Fineness::of(header);
 
         let mut fixed = Vec::new();
         let mut robot = |name: &str, paint: Paint, bends: bool, tolerance_m: f64, quantum_m: f32, ids: &mut Ids| {
@@ -156,16 +183,7 @@ impl RunTracks {
         let magnified = match with_magnified {
             false => None,
             true => {
-                // The first run of a study is solid, the others are seen through.
-                let paint = match (seat, seat.color()) {
-                    (Seat::InStudy(0, _), Some(color)) => Paint::Plain(color),
-                    (Seat::InStudy(..), Some(color)) => {
-                        let [red, green, blue, _] = color.0.to_array();
-                        Paint::Plain(Color::from_unmultiplied_rgba(red, green, blue, 0x90))
-                    }
-                    _ => Paint::Deviation(scale),
-                };
-                let robot = robot("magnified", paint, true, pixel_m, quantum_m, ids)?;
+                let robot = robot("magnified", magnified_paint(seat, scale), true, pixel_m, quantum_m, ids)?;
                 Some(Drawn { robot, way: way("magnified"), way_color: seat.color() })
             }
         };
