@@ -273,7 +273,7 @@ pub(crate) mod meshes {
     /// Its media type.
     pub(crate) const MEDIA_TYPE: &str = "application/zstd";
 
-    /// Surfaces of an arm take a sixth more than with level 9, whose search was half of what an MCAP file took to begin.
+    /// Surfaces of an arm take a sixth more than with level 9, whose search was a sixth of what an MCAP file took to begin.
     const LEVEL: i32 = 1;
 
     pub(crate) fn write(meshes: &[LinkMesh]) -> std::io::Result<Vec<u8>> {

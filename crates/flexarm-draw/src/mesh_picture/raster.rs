@@ -140,8 +140,9 @@ pub(super) struct Nearest {
     /// Rows of the picture, and the first of the band.
     height: usize,
     first: usize,
-    /// Depth of what is nearest, row by row, with [`AROUND`] rows and columns more on each side.
+    /// Depth of what is nearest, row by row, with [`AROUND`] rows and columns more on each side, and the length of such a row.
     depths: Vec<f32>,
+    stride: usize,
     /// Number of the triangle.
     numbers: Vec<u32>,
     /// Columns of each row outside of which there is nothing.
@@ -169,14 +170,14 @@ impl Nearest {
         for (triangle, number) in (0..triangles).zip(0_u32..) {
             members[bands_of(triangle)].iter_mut().for_each(|band| band.push(number));
         }
-        let rows = BAND + 2 * AROUND;
-        let mut depths = vec![NOTHING; (width + 2 * AROUND) * rows];
-        for row in depths.chunks_exact_mut(width + 2 * AROUND) {
+        let (rows, stride) = (BAND + 2 * AROUND, width + 2 * AROUND);
+        let mut depths = vec![NOTHING; stride * rows];
+        for row in depths.chunks_exact_mut(stride) {
             row[..AROUND].fill(BESIDE);
             row[width + AROUND..].fill(BESIDE);
         }
         let mut band =
-            Self { width, height, first: 0, depths, numbers: vec![0; width * rows], touched: vec![0..0; rows] };
+            Self { width, height, stride, first: 0, depths, numbers: vec![0; width * rows], touched: vec![0..0; rows] };
         for (k, members) in members.iter().enumerate().filter(|(_, members)| !members.is_empty()) {
             let rows = k * BAND..((k + 1) * BAND).min(height);
             band.begin(rows.start);
@@ -188,8 +189,8 @@ impl Nearest {
     /// The band that begins at a row, with nothing in it yet.
     fn begin(&mut self, first: usize) {
         self.first = first;
-        let Self { width, height, depths, touched, .. } = self;
-        for (k, (row, touched)) in depths.chunks_exact_mut(*width + 2 * AROUND).zip(touched).enumerate() {
+        let Self { width, height, depths, stride, touched, .. } = self;
+        for (k, (row, touched)) in depths.chunks_exact_mut(*stride).zip(touched).enumerate() {
             let row = &mut row[AROUND..][..*width];
             row[std::mem::take(touched)].fill(NOTHING);
             if first + k < AROUND || first + k >= *height + AROUND {
@@ -205,7 +206,7 @@ impl Nearest {
     }
 
     fn add(&mut self, number: u32, corners: [[f64; 3]; 3]) {
-        let Self { width, height, first: top, depths, numbers, touched } = self;
+        let Self { width, height, first: top, depths, stride, numbers, touched } = self;
         let known = top.saturating_sub(AROUND)..(*top + BAND + AROUND).min(*height);
         Facet::rows(corners, *width, &known, |y, columns, [first, slope]| {
             let y = y + AROUND - *top;
@@ -214,7 +215,7 @@ impl Nearest {
                 true => row.start.min(columns.start)..row.end.max(columns.end),
                 false => columns.clone(),
             };
-            let depths = &mut depths[y * (*width + 2 * AROUND) + AROUND..][columns.clone()];
+            let depths = &mut depths[y * *stride + AROUND..][columns.clone()];
             let numbers = &mut numbers[y * *width..][columns];
             let mut column = 0.0;
             for (nearest, nearest_number) in depths.iter_mut().zip(numbers) {
@@ -235,14 +236,14 @@ impl Nearest {
     /// Of some columns of a row: the depth of what is nearest, and the number of the triangle.
     pub(super) fn at(&self, columns: Range<usize>, y: usize) -> impl Iterator<Item = Option<(f32, usize)>> {
         let row = self.row(y);
-        let depths = &self.depths[row * (self.width + 2 * AROUND) + AROUND..][columns.clone()];
+        let depths = &self.depths[row * self.stride + AROUND..][columns.clone()];
         let numbers = &self.numbers[row * self.width..][columns];
         depths.iter().zip(numbers).map(|(depth, number)| (*depth > NOTHING).then_some((*depth, *number as usize)))
     }
 
     /// Of some columns of a row: the smallest depth beside each sample, one or two samples on in any direction.
     pub(super) fn lowest_beside(&self, columns: Range<usize>, y: usize, lowest: &mut Vec<f32>) {
-        let (stride, count) = (self.width + 2 * AROUND, columns.len());
+        let (stride, count) = (self.stride, columns.len());
         let at = self.row(y) * stride + AROUND + columns.start;
         let from = |start: usize| &self.depths[start..][..count];
         let lower = |a: f32, b: f32| if b < a { b } else { a };

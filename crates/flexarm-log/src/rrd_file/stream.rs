@@ -155,8 +155,8 @@ impl RrdStream {
         let is_listed = self.lists.iter().all(|(_, list)| list.len() <= MOST_LISTED);
         let own = self.lists.iter().position(|(known, _)| known == store);
         let own = own.expect("a store is opened before chunks are added to it");
-        let mark = self.lists[own].1.mark();
         let list = &mut self.lists[own].1;
+        let mark = is_listed.then(|| list.mark());
         let written = chunks(&mut |chunk| {
             let start = position + (tail.len() + MessageHeader::ENCODED_SIZE_BYTES) as u64;
             let batch = chunk.to_chunk_batch()?;
@@ -171,8 +171,10 @@ impl RrdStream {
             true => end(&self.lists, position + tail.len() as u64),
             false => Ok(Vec::new()),
         });
-        // They are not there for good.
-        self.lists[own].1.cut(mark);
+        if let Some(mark) = mark {
+            // They are not there for good.
+            self.lists[own].1.cut(mark);
+        }
         tail.extend(end?);
         Ok(self.file.set_tail(tail)?)
     }

@@ -214,12 +214,10 @@ pub(crate) fn run_traced(
     run.trace.finish(if wanted < Wanted::Curves { RunResult::default() } else { result(&summary, events) });
     // The page is made while the recordings are closed, of long runs afterwards: each takes memory, the page what they leave.
     files.set.begin_to_finish(&run.trace.result);
-    let mut page = None;
-    if run.trace.samples() < LONG_RUN {
-        page = outputs.map(|_| crate::report::page(&summary, &run.trace));
-    }
+    let make_page = || outputs.map(|_| crate::report::page(&summary, &run.trace));
+    let early = if run.trace.samples() < LONG_RUN { make_page() } else { None };
     let closed = files.set.finish(&run.trace.result).map_err(Error::from);
-    let page = page.or_else(|| outputs.map(|_| crate::report::page(&summary, &run.trace)));
+    let page = early.or_else(make_page);
     let write = |(outputs, page): (_, String)| crate::report::write(outputs, &summary, &run.trace, &page);
     let reported = closed.and_then(|()| outputs.zip(page).map_or(Ok(()), write));
     how_it_ended(end, reported).map(|()| (summary, run.trace))
