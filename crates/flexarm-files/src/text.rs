@@ -68,4 +68,9 @@ impl Source {
         let column = before.len() - before.rfind('\n').map_or(0, |i| i + 1) + 1;
         TextFileError { path: self.path.clone(), line, column, message: message.into() }
     }
+
+    /// What a reader of TOML says, in the words of the file format instead of those of Rust.
+    pub fn unread(&self, span: Option<std::ops::Range<usize>>, message: &str) -> TextFileError {
+        self.error(span.unwrap_or(0..0), flexarm_settings::without_types(message))
+    }
 }

@@ -1,5 +1,6 @@
 //! What errors and caveats are made of: the settings that they speak of, as values that each face names in its own words
-//! ([`Setting`]); the [`Caveat`], which compares a value with a yardstick; whom an error is to blame on ([`Fault`]).
+//! ([`Setting`]); the [`Caveat`], which compares a value with a yardstick; whom an error is to blame on ([`Fault`]); messages of
+//! the reader of TOML without names of types ([`without_types`]).
 //!
 //! An error that says "try a smaller step" means a field of a struct to a Rust program, a keyword argument to a Python one
 //! and a flag to somebody at a terminal. Errors and caveats therefore carry a [`Setting`], and its name is asked for when
@@ -19,12 +20,14 @@
 
 pub mod caveat;
 mod fault;
+mod toml_message;
 
 use std::fmt;
 use std::sync::OnceLock;
 
 pub use caveat::Caveat;
 pub use fault::Fault;
+pub use toml_message::without_types;
 
 /// A setting that a message speaks of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -62,7 +62,7 @@ impl Trajectory {
             TrajectoryError::from(Box::new(FileError { origin: origin.to_owned(), line, column, problem }))
         };
         let unread = |error: toml::de::Error| {
-            let message = error.message().split_whitespace().collect::<Vec<_>>().join(" ");
+            let message = flexarm_settings::without_types(error.message());
             let message = format!("{message}; docs/motions.md has all keys, with types and units");
             fail(error.span().map(|span| span.start), Problem::Toml { message })
         };

@@ -18,11 +18,11 @@ pub(crate) fn parsed<T: DeserializeOwned>(
     format: impl Fn(&T) -> &Spanned<i64>,
 ) -> Result<T, RobotFileError> {
     let file: T = toml::from_str(text).map_err(|error| {
-        let mut message = error.message().trim().replace('\n', " ");
-        if message.contains("missing field `format`") {
-            message += ": add format = 1 as the first line";
-        }
-        source.error(error.span().unwrap_or(0..0), message)
+        let hint = match error.message().contains("missing field `format`") {
+            true => ": add format = 1 as the first line",
+            false => "",
+        };
+        source.unread(error.span(), &format!("{}{hint}", error.message().trim()))
     })?;
     let version = format(&file);
     if *version.get_ref() != 1 {

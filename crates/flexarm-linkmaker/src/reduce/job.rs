@@ -273,11 +273,11 @@ fn is_job(text: &str) -> bool {
 fn parse_job(text: &str, path: &Path) -> Result<ReduceJob, LinkError> {
     let source = Source::new(path, text);
     let failed = |error: toml::de::Error| {
-        let mut message = error.message().trim().replace('\n', " ");
-        if message.contains("missing field `mesh`") {
-            message += ": add mesh = \"file.msh\"";
-        }
-        LinkError::from(source.error(error.span().unwrap_or(0..0), message))
+        let hint = match error.message().contains("missing field `mesh`") {
+            true => ": add mesh = \"file.msh\"",
+            false => "",
+        };
+        LinkError::from(source.unread(error.span(), &format!("{}{hint}", error.message().trim())))
     };
     let mut job: ReduceJob = toml::from_str(text).map_err(failed)?;
     let places: Places = toml::from_str(text).map_err(failed)?;

@@ -197,7 +197,7 @@ pub(crate) fn read_path_file(
     let source = Source::new(path, text);
     let file: PathFile = toml::from_str(text).map_err(|error| {
         let message = format!("{}; docs/motions.md has all keys of path files", error.message());
-        source.error(error.span().unwrap_or(0..0), message)
+        source.unread(error.span(), &message)
     })?;
     if *file.format.get_ref() != 1 {
         return Err(source.error(file.format.span(), "format must be 1").into());
