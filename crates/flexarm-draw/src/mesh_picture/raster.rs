@@ -14,6 +14,16 @@ impl Linear {
     pub(super) fn at(&self, column: f64, row: f64) -> f64 {
         self.0[0] + self.0[1] * column + self.0[2] * row
     }
+
+    /// From there on in the row, at one column after the other.
+    pub(super) fn along(&self, column: f64, row: f64) -> impl Iterator<Item = f64> + use<> {
+        let (first, slope) = (self.at(column, row), self.0[1]);
+        let mut column = -1.0;
+        std::iter::repeat_with(move || {
+            column += 1.0;
+            first + slope * column
+        })
+    }
 }
 
 /// A triangle on a picture: the weights of its corners, 1 at its own corner and 0 on the side across.
@@ -44,72 +54,71 @@ impl Facet {
         let part = |k: usize| self.weights.iter().zip(values).map(|(weight, value)| weight.0[k] * value).sum();
         Linear([part(0), part(1), part(2)])
     }
-
-    /// Calls with each row that a triangle has samples in, of some rows of a picture so wide: the row, its columns, depth at
-    /// the first of them and per column.
-    pub(super) fn rows(
-        corners: [[f64; 3]; 3],
-        width: usize,
-        rows: &Range<usize>,
-        mut call: impl FnMut(usize, Range<usize>, [f64; 2]),
-    ) {
-        let [a, b, c] = corners;
-        let columns = extent(corners, 0, &(0..width));
-        let rows = extent(corners, 1, rows);
-        if columns.is_empty() || rows.is_empty() {
-            return;
-        }
-        let Some(facet) = Self::new(corners, [columns.start, rows.start]) else { return };
-        let depth = facet.mean([a[2], b[2], c[2]]);
-        let limits = Limits::new(&facet, columns.len());
-        for y in rows.clone() {
-            let row = (y - rows.start) as f64;
-            let [low, high] = limits.at(row);
-            if low <= high {
-                let (first, last) = (ceil(low), high as u32 as usize);
-                let at = columns.start + first..columns.start + last + 1;
-                call(y, at, [depth.at(first as f64, row), depth.0[1]]);
-            }
-        }
-    }
 }
 
-/// Columns between which a triangle lies in a row: each side is a first or a last one, linear in the row.
-struct Limits {
-    low: [[f64; 2]; 3],
-    high: [[f64; 2]; 3],
-    /// Weights of sides along rows, which tell whether the row is in it at all.
-    along: [[f64; 2]; 3],
+/// The samples of a triangle, row by row.
+pub(super) struct Spans {
+    /// Rows in which there may be some.
+    pub(super) rows: Range<usize>,
+    /// First column and row that the numbers below are counted from.
+    first: [usize; 2],
+    /// Columns between which the triangle lies in a row: one or two of its sides are on the left, one or two on the right.
+    low: [[f64; 2]; 2],
+    high: [[f64; 2]; 2],
     last: f64,
+    depth: Linear,
 }
 
-impl Limits {
-    /// Among so many columns.
-    fn new(facet: &Facet, columns: usize) -> Self {
-        let last = (columns - 1) as f64;
-        let (mut low, mut high, mut along) = ([[0.0; 2]; 3], [[last, 0.0]; 3], [[0.0; 2]; 3]);
-        for (k, Linear([start, per_column, per_row])) in facet.weights.into_iter().enumerate() {
+/// Its sum with a small number is a whole one, which has that number, rounded, as its last bits.
+const WHOLE: f64 = 1.5 * (1_u64 << 52) as f64;
+/// What is added to a number so that the nearest whole one is the next that is not smaller, but for an edge.
+const UP: f64 = 0.5 - EDGE;
+
+impl Spans {
+    /// Among some rows of a picture so wide; none for a triangle that has no samples there, or no area.
+    pub(super) fn new(corners: [[f64; 3]; 3], width: usize, rows: &Range<usize>) -> Option<Self> {
+        let [columns, mut rows] = [extent(corners, 0, &(0..width)), extent(corners, 1, rows)];
+        if columns.is_empty() || rows.is_empty() {
+            return None;
+        }
+        let first = [columns.start, rows.start];
+        let facet = Facet::new(corners, first)?;
+        let last = (columns.len() - 1) as f64;
+        let (mut low, mut high) = ([[0.0; 2]; 2], [[last, 0.0]; 2]);
+        let (mut lows, mut highs) = (0, 0);
+        for Linear([start, per_column, per_row]) in facet.weights {
             let limit = [(-EDGE - start) / per_column, -per_row / per_column];
             if per_column > 0.0 {
-                low[k] = limit;
+                low[lows.min(1)] = [limit[0] + UP, limit[1]];
+                lows += 1;
             } else if per_column < 0.0 {
-                high[k] = limit;
+                high[highs.min(1)] = [limit[0] - UP, limit[1]];
+                highs += 1;
             } else {
-                along[k] = [start, per_row];
+                let outside = |row: usize| start + per_row * ((row - first[1]) as f64) < -EDGE;
+                while !rows.is_empty() && outside(rows.start) {
+                    rows.start += 1;
+                }
+                while !rows.is_empty() && outside(rows.end - 1) {
+                    rows.end -= 1;
+                }
             }
         }
-        Self { low, high, along, last }
+        Some(Self { rows, first, low, high, last, depth: facet.mean(corners.map(|corner| corner[2])) })
     }
 
-    /// Of a row. The first one is not before the first column, the last one not behind the last.
-    fn at(&self, row: f64) -> [f64; 2] {
+    /// Columns of one of its rows, and depths there.
+    pub(super) fn at(&self, row: usize) -> Option<(Range<usize>, impl Iterator<Item = f64> + use<>)> {
         let (greater, less) = (|a: f64, b: f64| if b > a { b } else { a }, |a: f64, b: f64| if b < a { b } else { a });
+        let row = f64::from((row - self.first[1]) as u32);
         let value = |[start, slope]: [f64; 2]| start + slope * row;
-        let (low, high) = (self.low.map(value), self.high.map(value));
-        match self.along.iter().any(|side| value(*side) < -EDGE) {
-            true => [0.0, -1.0],
-            false => [low.into_iter().fold(0.0, greater), high.into_iter().fold(self.last, less)],
-        }
+        let [low, high] = [self.low.map(value), self.high.map(value)];
+        // Not before the first column and not behind the last.
+        let first = greater(greater(0.0, low[0]), low[1]) + WHOLE;
+        let last = less(less(self.last, high[0]), high[1]) + WHOLE;
+        let [start, end] = [first, last].map(|x| x.to_bits() as u32 as usize);
+        let columns = self.first[0] + start..self.first[0] + end + 1;
+        (first <= last).then(|| (columns, self.depth.along(first - WHOLE, row)))
     }
 }
 
@@ -130,8 +139,7 @@ fn ceil(x: f64) -> usize {
 const BAND: usize = 48;
 /// Samples around each row and column that are known with it, for [`Nearest::lowest_beside`].
 const AROUND: usize = 2;
-/// Depth where there is nothing, and beside the picture.
-const NOTHING: f32 = f32::NEG_INFINITY;
+/// Depth beside the picture.
 const BESIDE: f32 = f32::INFINITY;
 
 /// The nearest triangle at each sample of a band of rows.
@@ -145,11 +153,14 @@ pub(super) struct Nearest {
     stride: usize,
     /// Number of the triangle.
     numbers: Vec<u32>,
-    /// Columns of each row outside of which there is nothing.
+    /// Columns of each row outside of which there is nothing; an empty row ends before it begins.
     touched: Vec<Range<usize>>,
 }
 
 impl Nearest {
+    /// Depth where there is nothing.
+    pub(super) const NOTHING: f32 = f32::NEG_INFINITY;
+
     /// Calls with each row of a picture of `width` and `height` samples in which there is something, from the top down, and
     /// with the band that knows it. Of two triangles that are equally near the first counts.
     pub(super) fn each_row(
@@ -171,13 +182,20 @@ impl Nearest {
             members[bands_of(triangle)].iter_mut().for_each(|band| band.push(number));
         }
         let (rows, stride) = (BAND + 2 * AROUND, width + 2 * AROUND);
-        let mut depths = vec![NOTHING; stride * rows];
+        let mut depths = vec![Self::NOTHING; stride * rows];
         for row in depths.chunks_exact_mut(stride) {
             row[..AROUND].fill(BESIDE);
             row[width + AROUND..].fill(BESIDE);
         }
-        let mut band =
-            Self { width, height, stride, first: 0, depths, numbers: vec![0; width * rows], touched: vec![0..0; rows] };
+        let mut band = Self {
+            width,
+            height,
+            stride,
+            first: 0,
+            depths,
+            numbers: vec![0; width * rows],
+            touched: vec![width..0; rows],
+        };
         for (k, members) in members.iter().enumerate().filter(|(_, members)| !members.is_empty()) {
             let rows = k * BAND..((k + 1) * BAND).min(height);
             band.begin(rows.start);
@@ -192,7 +210,8 @@ impl Nearest {
         let Self { width, height, depths, stride, touched, .. } = self;
         for (k, (row, touched)) in depths.chunks_exact_mut(*stride).zip(touched).enumerate() {
             let row = &mut row[AROUND..][..*width];
-            row[std::mem::take(touched)].fill(NOTHING);
+            let used = std::mem::replace(touched, *width..0);
+            row.get_mut(used).unwrap_or_default().fill(Self::NOTHING);
             if first + k < AROUND || first + k >= *height + AROUND {
                 row.fill(BESIDE);
                 *touched = 0..*width;
@@ -206,26 +225,21 @@ impl Nearest {
     }
 
     fn add(&mut self, number: u32, corners: [[f64; 3]; 3]) {
-        let Self { width, height, first: top, depths, stride, numbers, touched } = self;
-        let known = top.saturating_sub(AROUND)..(*top + BAND + AROUND).min(*height);
-        Facet::rows(corners, *width, &known, |y, columns, [first, slope]| {
-            let y = y + AROUND - *top;
-            let row: &mut Range<usize> = &mut touched[y];
-            *row = match row.start < row.end {
-                true => row.start.min(columns.start)..row.end.max(columns.end),
-                false => columns.clone(),
-            };
-            let depths = &mut depths[y * *stride + AROUND..][columns.clone()];
-            let numbers = &mut numbers[y * *width..][columns];
-            let mut column = 0.0;
-            for (nearest, nearest_number) in depths.iter_mut().zip(numbers) {
-                let depth = (first + slope * column) as f32;
-                if depth > *nearest {
-                    (*nearest, *nearest_number) = (depth, number);
+        let Self { width, height, first, depths, stride, numbers, touched } = self;
+        let known = first.saturating_sub(AROUND)..(*first + BAND + AROUND).min(*height);
+        let Some(spans) = Spans::new(corners, *width, &known) else { return };
+        let skipped = spans.rows.start + AROUND - *first;
+        let rows = depths.chunks_exact_mut(*stride).zip(numbers.chunks_exact_mut(*width)).zip(touched).skip(skipped);
+        for (y, ((depths, numbers), touched)) in spans.rows.clone().zip(rows) {
+            let Some((columns, along)) = spans.at(y) else { continue };
+            *touched = touched.start.min(columns.start)..touched.end.max(columns.end);
+            let depths = &mut depths[AROUND + columns.start..AROUND + columns.end];
+            for ((nearest, nearest_number), depth) in depths.iter_mut().zip(&mut numbers[columns]).zip(along) {
+                if depth as f32 > *nearest {
+                    (*nearest, *nearest_number) = (depth as f32, number);
                 }
-                column += 1.0;
             }
-        });
+        }
     }
 
     /// Columns of a row outside of which there is nothing.
@@ -233,12 +247,11 @@ impl Nearest {
         self.touched[self.row(y)].clone()
     }
 
-    /// Of some columns of a row: the depth of what is nearest, and the number of the triangle.
-    pub(super) fn at(&self, columns: Range<usize>, y: usize) -> impl Iterator<Item = Option<(f32, usize)>> {
+    /// Of some columns of a row: the depth of what is nearest, [`Nearest::NOTHING`] where there is nothing, and the number of
+    /// the triangle.
+    pub(super) fn at(&self, columns: Range<usize>, y: usize) -> (&[f32], &[u32]) {
         let row = self.row(y);
-        let depths = &self.depths[row * self.stride + AROUND..][columns.clone()];
-        let numbers = &self.numbers[row * self.width..][columns];
-        depths.iter().zip(numbers).map(|(depth, number)| (*depth > NOTHING).then_some((*depth, *number as usize)))
+        (&self.depths[row * self.stride + AROUND..][columns.clone()], &self.numbers[row * self.width..][columns])
     }
 
     /// Of some columns of a row: the smallest depth beside each sample, one or two samples on in any direction.
@@ -288,7 +301,10 @@ mod tests {
             |k| triangles[k],
             |nearest, y| {
                 let row = &mut found[y * width..][..width];
-                row.iter_mut().zip(nearest.at(0..width, y)).for_each(|(found, at)| *found = at);
+                let (depths, numbers) = nearest.at(0..width, y);
+                for ((found, depth), number) in row.iter_mut().zip(depths).zip(numbers) {
+                    *found = (*depth > Nearest::NOTHING).then_some((*depth, *number as usize));
+                }
                 assert!((0..width).filter(|x| row[*x].is_some()).all(|x| nearest.columns(y).contains(&x)));
                 nearest.lowest_beside(0..width, y, &mut buffer);
                 lowest[y * width..][..width].copy_from_slice(&buffer);
@@ -322,7 +338,7 @@ mod tests {
         for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
             let depth = |x: Option<usize>, y: Option<usize>| match (x.filter(|x| *x < width), y.filter(|y| *y < height))
             {
-                (Some(x), Some(y)) => found[y * width + x].map_or(NOTHING, |(depth, _)| depth),
+                (Some(x), Some(y)) => found[y * width + x].map_or(Nearest::NOTHING, |(depth, _)| depth),
                 _ => BESIDE,
             };
             let beside = [1, 2].into_iter().flat_map(|k| {
