@@ -237,12 +237,13 @@ pub fn distal_joint<'m>(
 ///
 /// Joints of a lumped link beyond the plane through S across A-B, and always the distal joint, move to the distal part
 /// `<link>__distal`. Joints of a link that bends in modes move to the nearest of its interfaces. At zero elastic
-/// coordinates every frame is where it was.
+/// coordinates every frame is where it was, and the actuated coordinates keep their order.
 ///
 /// # Errors
 /// [`SubstitutionError`], naming the link.
 pub fn substitute(mechanism: &Mechanism, links: &[FlexibleLink]) -> Result<Substituted, SubstitutionError> {
     let mut result = Substituted { mechanism: mechanism.clone(), springs: Vec::new(), spans: Vec::new() };
+    result.mechanism.keep_coordinate_order();
     for (i, flexible) in links.iter().enumerate() {
         if links[..i].iter().any(|other| other.link == flexible.link) {
             return Err(SubstitutionError::Twice { link: flexible.link.clone() });

@@ -4,6 +4,7 @@
 //! [`crate::Model::new`] checks it once and turns it into the immutable tree that the recursions read.
 //! Start at [`Mechanism`]. Not here: any computation.
 
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use flexarm_spatial::{ElasticAngles, Pose, SpatialInertia};
@@ -33,6 +34,9 @@ pub struct Mechanism {
     pub loops: Vec<LoopClosure>,
     /// Acceleration of gravity in world (= base link) axes (m/s²).
     pub gravity: Vector3<f64>,
+    /// Joints in the order of the actuated coordinates; those that are not named follow in the order of the tree, depth first. See
+    /// [`Mechanism::keep_coordinate_order`].
+    pub coordinate_order: Vec<String>,
 }
 
 /// Inertia between two joints, of rotors that turn with both: `q̇_1 q̇_2` times this in the kinetic energy.
@@ -244,7 +248,27 @@ impl Mechanism {
             rotor_couplings: Vec::new(),
             loops: Vec::new(),
             gravity: Vector3::new(0.0, 0.0, -9.81),
+            coordinate_order: Vec::new(),
         }
+    }
+
+    /// Keeps the order that the actuated coordinates have now, however the tree is changed afterwards: joints that move to another
+    /// link come in another place of the tree, and joint values are told by their order.
+    pub fn keep_coordinate_order(&mut self) {
+        if !self.coordinate_order.is_empty() {
+            return;
+        }
+        let children: HashSet<&str> = self.joints.iter().map(|joint| joint.child.as_str()).collect();
+        let base = self.links.iter().map(|link| link.name.as_str()).find(|name| !children.contains(name));
+        let mut from: HashMap<&str, Vec<&Joint>> = HashMap::new();
+        self.joints.iter().rev().for_each(|joint| from.entry(&joint.parent).or_default().push(joint));
+        let mut order = Vec::new();
+        let mut open = base.and_then(|base| from.remove(base)).unwrap_or_default();
+        while let Some(joint) = open.pop() {
+            order.push(joint.name.clone());
+            open.extend(from.remove(joint.child.as_str()).into_iter().flatten());
+        }
+        self.coordinate_order = order;
     }
 
     /// The link of that name.

@@ -756,8 +756,14 @@ impl<'a> Builder<'a> {
     fn number(&mut self, dependent: &[usize]) -> Numbering {
         let mut to = Numbering { coordinates: Vec::new(), elastic: Vec::new(), n_actuated: 0 };
         let joints: HashMap<&str, &Joint> = self.children.values().flatten().map(|j| (j.name.as_str(), *j)).collect();
+        let places: HashMap<&str, usize> =
+            self.mechanism.coordinate_order.iter().map(String::as_str).zip(0..).collect();
+        let place = |i: usize| places.get(self.bodies[i].joint.as_str()).copied().unwrap_or(usize::MAX);
+        let mut ordered: Vec<usize> = (0..self.bodies.len()).collect();
+        ordered.sort_by_key(|i| place(*i));
         for elastic_pass in [false, true] {
-            for i in 0..self.bodies.len() {
+            for k in 0..self.bodies.len() {
+                let i = if elastic_pass { k } else { ordered[k] };
                 let body = &self.bodies[i];
                 let none = matches!(body.motion, JointMotion::Interface { .. } | JointMotion::Welded);
                 let follows = dependent.contains(&i) || self.followers.iter().any(|f| f.body == i);
