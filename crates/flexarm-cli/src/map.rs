@@ -158,7 +158,7 @@ fn bounds(text: &str) -> Result<[[f64; 3]; 2], Failure> {
 }
 
 /// Reads `joint=from:to:n`.
-fn joint_range(text: &str) -> Result<JointRange, Failure> {
+fn joint_range(text: &str, robot: &Robot) -> Result<JointRange, Failure> {
     let wrong = || {
         Failure::Usage(format!(
             "--over {text:?}: expected JOINT=FROM:TO:N, rad or m, or degrees as in joint_2=-90deg:0deg:46"
@@ -167,6 +167,10 @@ fn joint_range(text: &str) -> Result<JointRange, Failure> {
     let (joint, rest) = text.rsplit_once('=').ok_or_else(wrong)?;
     let parts: Vec<&str> = rest.split(':').map(str::trim).collect();
     let [from, to, points] = parts[..] else { return Err(wrong()) };
+    let slides = robot.rigid_model()?.coordinates().iter().any(|c| c.joint == joint.trim() && c.kind == "prismatic");
+    if slides && (from.ends_with("deg") || to.ends_with("deg")) {
+        return Err(Failure::Usage(format!("--over {text:?}: joint {:?} slides; give it in m", joint.trim())));
+    }
     let number = |text: &str| -> Option<f64> {
         match text.strip_suffix("deg") {
             Some(digits) => digits.trim().parse::<f64>().ok().map(f64::to_radians),
@@ -184,7 +188,7 @@ fn region(args: &MapArgs, robot: &Robot) -> Result<MapRegion, Failure> {
         return Ok(MapRegion::Along { motion: Box::new(motion), points: args.points });
     }
     if !args.over.is_empty() {
-        return Ok(MapRegion::Joints(args.over.iter().map(|text| joint_range(text)).collect::<Result<_, _>>()?));
+        return Ok(MapRegion::Joints(args.over.iter().map(|text| joint_range(text, robot)).collect::<Result<_, _>>()?));
     }
     let tool = ToolDirections {
         axis: three("--tool-axis", &args.tool_axis, " (world)")?,

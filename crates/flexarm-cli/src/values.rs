@@ -8,13 +8,19 @@ use crate::failure::Failure;
 /// Reads a joint vector: `v1,v2,...` in coordinate order, or `name=value,...` with the rest zero; rad or m, or degrees
 /// with the ending `deg`.
 ///
+/// * `joints`: names, and whether they slide.
+///
 /// # Errors
 /// [`Failure::Usage`] saying which joints there are.
-fn parse_joint_values(text: &str, joints: &[&str]) -> Result<Vec<f64>, Failure> {
+fn parse_joint_values(text: &str, joints: &[(&str, bool)]) -> Result<Vec<f64>, Failure> {
     let mut values = vec![0.0; joints.len()];
     let items: Vec<&str> = text.split(',').map(str::trim).filter(|s| !s.is_empty()).collect();
-    let number = |s: &str| {
+    let names: Vec<&str> = joints.iter().map(|(name, _)| *name).collect();
+    let number = |s: &str, (joint, slides): (&str, bool)| {
         let (digits, unit) = match s.trim().strip_suffix("deg") {
+            Some(_) if slides => {
+                return Err(Failure::Usage(format!("joint value {s:?}: joint {joint:?} slides; give it in m")));
+            }
             Some(digits) => (digits.trim(), std::f64::consts::PI / 180.0),
             None => (s.trim(), 1.0),
         };
@@ -29,24 +35,24 @@ fn parse_joint_values(text: &str, joints: &[&str]) -> Result<Vec<f64>, Failure> 
             let (name, value) = item
                 .split_once('=')
                 .ok_or_else(|| Failure::Usage(format!("{item:?}: either all joint values have names or none")))?;
-            let k = joints.iter().position(|j| *j == name.trim()).ok_or_else(|| {
-                Failure::Usage(format!("there is no movable joint {:?}; the joints are {joints:?}", name.trim()))
+            let k = names.iter().position(|j| *j == name.trim()).ok_or_else(|| {
+                Failure::Usage(format!("there is no movable joint {:?}; the joints are {names:?}", name.trim()))
             })?;
             if std::mem::replace(&mut given[k], true) {
-                return Err(Failure::Usage(format!("joint {:?} is given twice", joints[k])));
+                return Err(Failure::Usage(format!("joint {:?} is given twice", names[k])));
             }
-            values[k] = number(value)?;
+            values[k] = number(value, joints[k])?;
         }
     } else {
         if items.len() != joints.len() {
             return Err(Failure::Usage(format!(
-                "{} joint values given, the robot has {} movable joints: {joints:?}",
+                "{} joint values given, the robot has {} movable joints: {names:?}",
                 items.len(),
                 joints.len()
             )));
         }
-        for (value, item) in values.iter_mut().zip(items) {
-            *value = number(item)?;
+        for ((value, item), joint) in values.iter_mut().zip(items).zip(joints) {
+            *value = number(item, *joint)?;
         }
     }
     Ok(values)
@@ -59,7 +65,8 @@ fn parse_joint_values(text: &str, joints: &[&str]) -> Result<Vec<f64>, Failure> 
 pub(crate) fn joint_values(text: Option<&str>, robot: &Robot) -> Result<Option<Vec<f64>>, Failure> {
     let Some(text) = text else { return Ok(None) };
     let model = robot.rigid_model()?;
-    let joints: Vec<&str> = model.coordinates().iter().map(|c| c.joint.as_str()).collect();
+    let joints: Vec<(&str, bool)> =
+        model.coordinates().iter().map(|c| (c.joint.as_str(), c.kind == "prismatic")).collect();
     parse_joint_values(text, &joints).map(Some)
 }
 

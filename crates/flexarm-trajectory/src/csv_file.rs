@@ -21,7 +21,7 @@
 use crate::error::{FileError, TrajectoryError};
 use crate::problem::{Problem, SampleError};
 use crate::spline::{JointSamples, Samples};
-use crate::trajectory::Trajectory;
+use crate::trajectory::{ToldUnit, Trajectory};
 use crate::warning::Warning;
 
 /// A joint of a file without a unit that reaches this is likely to be in degrees: two turns.
@@ -101,7 +101,8 @@ fn parse(text: &str) -> Result<Trajectory, Located> {
 
     let samples = assemble(&header, &rows, &units)?;
     let trajectory = samples.interpolate().map_err(|error| placed(error, &samples, &header, &rows))?;
-    Ok(with_doubts(trajectory, &samples, &units))
+    let told = samples.joints.iter().filter_map(|joint| units.told(&joint.name)).collect();
+    Ok(with_doubts(trajectory, &samples, &units).with_told_units(told))
 }
 
 /// Line of a record, from 1. The position that the reader gives lies before the blank and comment lines that it
@@ -242,6 +243,8 @@ fn with_doubts(trajectory: Trajectory, samples: &Samples, units: &Units) -> Traj
 struct Units {
     /// Is the angle unit degrees? `None` when the file does not say.
     degrees: Option<bool>,
+    /// Line that says so.
+    line: usize,
     /// Prismatic joints, with the line that names them.
     metres: Vec<(usize, String)>,
 }
@@ -281,8 +284,17 @@ impl Units {
             let problem = Problem::ContradictingUnits { key: "unit", first, second: value.to_owned() };
             return Err(located(line, None, problem));
         }
-        self.degrees = Some(degrees);
+        (self.degrees, self.line) = (Some(degrees), line);
         Ok(())
+    }
+
+    /// What they say about a joint.
+    fn told(&self, joint: &str) -> Option<ToldUnit> {
+        let told = |is_length: bool, line: usize| ToldUnit { joint: joint.to_owned(), is_length, line };
+        match self.metres.iter().find(|(_, name)| name == joint) {
+            Some((line, _)) => Some(told(true, *line)),
+            None => (self.degrees == Some(true)).then(|| told(false, self.line)),
+        }
     }
 
     /// Factor from the unit of a joint's columns to SI.

@@ -96,6 +96,14 @@ pub enum Problem {
         /// Second value.
         second: String,
     },
+    /// Numbers of a joint were read as what it has not.
+    #[error("joint {joint:?} {}", contradicted(joint, *is_length))]
+    UnitOfJoint {
+        /// The joint.
+        joint: String,
+        /// They were read as metres, otherwise as degrees.
+        is_length: bool,
+    },
     /// A name that is no joint of the file.
     #[error("{name:?} in `{key}` is not a joint of this file; it has {}", list(joints))]
     UnknownJoint {
@@ -405,6 +413,17 @@ pub(crate) fn list(names: &[String]) -> String {
     match names.is_empty() {
         true => "none".to_owned(),
         false => names.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", "),
+    }
+}
+
+/// What a robot says against the unit of a joint, and how to mend it.
+fn contradicted(joint: &str, is_length: bool) -> String {
+    match is_length {
+        true => {
+            "turns, and `metres` names it as one that slides; take it out of `metres`, and give its numbers in `unit`"
+                .into()
+        }
+        false => format!("slides, and its numbers are read as degrees; add {joint:?} to `metres` and give them in m"),
     }
 }
 

@@ -30,10 +30,10 @@ const MOST_ROWS: f64 = 5e6;
 #[serde(deny_unknown_fields)]
 pub(crate) struct SamplesFileToml {
     pub(crate) format: Spanned<i64>,
-    unit: Spanned<String>,
+    pub(crate) unit: Spanned<String>,
     #[serde(default)]
-    metres: Vec<Spanned<String>>,
-    joints: Spanned<Vec<Spanned<String>>>,
+    pub(crate) metres: Vec<Spanned<String>>,
+    pub(crate) joints: Spanned<Vec<Spanned<String>>>,
     samples: Spanned<SamplesToml>,
 }
 

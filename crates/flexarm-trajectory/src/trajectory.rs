@@ -2,9 +2,10 @@
 //!
 //! Start at [`Trajectory::sample`]. Built by [`crate::Plan`] and [`crate::Samples`], never changed afterwards.
 
-use crate::error::TrajectoryError;
+use crate::error::{FileError, TrajectoryError};
 use crate::polynomial::Piece;
-use crate::problem::SampleError;
+use crate::problem::{Problem, SampleError};
+use crate::table::KnownJoint;
 use crate::warning::{QUIET_SPEED, Warning};
 
 /// A joint that moves less than this within a piece, in rad or m, is at rest there.
@@ -23,6 +24,17 @@ pub struct Trajectory {
     duration: f64,
     /// What the reader or planner noticed; see [`Trajectory::warnings`].
     notes: Vec<Warning>,
+    /// What the file said about the units of its joints.
+    told: Vec<ToldUnit>,
+}
+
+/// What a file says about the unit of a joint: degrees, or metres.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct ToldUnit {
+    pub(crate) joint: String,
+    pub(crate) is_length: bool,
+    /// Where, from 1.
+    pub(crate) line: usize,
 }
 
 /// One joint: `knots[i] <= t < knots[i + 1]` belongs to `pieces[i]`.
@@ -80,7 +92,7 @@ impl Trajectory {
                 return Err(TrajectoryError::OutOfRange { joint: joint.clone(), time_s: curve.knots[i] });
             }
         }
-        Ok(Self { joints, curves, duration, notes })
+        Ok(Self { joints, curves, duration, notes, told: Vec::new() })
     }
 
     /// The curve of a joint as it is stored, for programs that keep motions: knots (s), one more than there are pieces, and of
@@ -179,6 +191,7 @@ impl Trajectory {
             curves: order.iter().map(|&i| self.curves[i].clone()).collect(),
             duration: self.duration,
             notes: self.notes.clone(),
+            told: Vec::new(),
         })
     }
 
@@ -326,6 +339,29 @@ impl Trajectory {
 
     pub(crate) fn curves(&self) -> &[Curve] {
         &self.curves
+    }
+
+    /// Checks the units that the file tells against a robot whose joints slide or turn. In a trajectory that was made of another
+    /// one they are not told any more.
+    ///
+    /// * `origin`: file name for messages.
+    ///
+    /// # Errors
+    /// [`TrajectoryError::File`] for a joint that slides and whose numbers were read as degrees, and for one that turns and
+    /// whose numbers were read as metres.
+    pub fn check_units(&self, origin: &str, joints: &[KnownJoint<'_>]) -> Result<(), TrajectoryError> {
+        let contradicts = |told: &ToldUnit| {
+            joints.iter().any(|joint| joint.name == told.joint && joint.is_prismatic != told.is_length)
+        };
+        let Some(ToldUnit { joint, is_length, line }) = self.told.iter().find(|told| contradicts(told)) else {
+            return Ok(());
+        };
+        let problem = Problem::UnitOfJoint { joint: joint.clone(), is_length: *is_length };
+        Err(Box::new(FileError { origin: origin.to_owned(), line: Some(*line), column: None, problem }).into())
+    }
+
+    pub(crate) fn with_told_units(self, told: Vec<ToldUnit>) -> Self {
+        Self { told, ..self }
     }
 
     /// Adds what a reader noticed about its file.

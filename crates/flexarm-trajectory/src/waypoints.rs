@@ -44,7 +44,7 @@ use crate::limits::JointLimits;
 use crate::problem::{PlanError, Problem};
 use crate::samples_toml::{self, SamplesFileToml, has_samples};
 use crate::trajectory::Trajectory;
-use crate::waypoints_check::{Checked, check};
+use crate::waypoints_check::{Checked, check, told_units};
 use crate::waypoints_toml::FileToml;
 
 impl Trajectory {
@@ -66,25 +66,28 @@ impl Trajectory {
             let message = format!("{message}; docs/motions.md has all keys, with types and units");
             fail(error.span().map(|span| span.start), Problem::Toml { message })
         };
+        let line = |offset: usize| place(text, offset).0;
         if has_samples(text) {
             let file: SamplesFileToml = toml::from_str(text).map_err(unread)?;
             if *file.format.get_ref() != 1 {
                 return Err(fail(Some(file.format.span().start), Problem::Format { found: *file.format.get_ref() }));
             }
-            return samples_toml::trajectory(&file).map_err(|error| fail(error.offset, *error.problem));
+            let read = samples_toml::trajectory(&file).map_err(|error| fail(error.offset, *error.problem))?;
+            return Ok(read.with_told_units(told_units(&file.unit, &file.metres, &file.joints, line)));
         }
         let file: FileToml = toml::from_str(text).map_err(unread)?;
 
         let Checked { plan, move_offsets } =
             check(&file, limits).map_err(|error| fail(error.offset, *error.problem))?;
-        plan.build().map_err(|error| match error {
+        let planned = plan.build().map_err(|error| match error {
             TrajectoryError::Plan(error) => {
                 let offset = PlanError::move_number(&error).and_then(|number| move_offsets.get(number - 1).copied());
                 fail(offset, Problem::Plan(error))
             }
             TrajectoryError::OutOfRange { joint, .. } => fail(None, Problem::OutOfRange { joint }),
             other => other,
-        })
+        })?;
+        Ok(planned.with_told_units(told_units(&file.unit, &file.metres, &file.joints, line)))
     }
 }
 

@@ -9,6 +9,7 @@ use toml::Spanned;
 use crate::limits::JointLimits;
 use crate::plan::{MotionLimits, Plan, PlannedMove, Profile};
 use crate::problem::Problem;
+use crate::trajectory::ToldUnit;
 use crate::waypoints_toml::{FileToml, MoveToml, ProfileToml, Values};
 
 /// Rounding of trapezoids when the file does not say.
@@ -94,6 +95,26 @@ pub(crate) fn scales(
     }
     let is_prismatic = |joint: &String| metres.iter().any(|entry| entry.get_ref() == joint);
     Ok(joints.iter().map(|joint| if is_prismatic(joint) { 1.0 } else { angle }).collect())
+}
+
+/// What a file says about the units of its joints, with the lines where.
+pub(crate) fn told_units(
+    unit: &Spanned<String>,
+    metres: &[Spanned<String>],
+    joints: &Spanned<Vec<Spanned<String>>>,
+    line: impl Fn(usize) -> usize,
+) -> Vec<ToldUnit> {
+    let told = |name: &Spanned<String>| {
+        let joint = name.get_ref().clone();
+        match metres.iter().find(|entry| *entry.get_ref() == joint) {
+            Some(entry) => Some(ToldUnit { joint, is_length: true, line: line(entry.span().start) }),
+            None if unit.get_ref() == "deg" => {
+                Some(ToldUnit { joint, is_length: false, line: line(unit.span().start) })
+            }
+            None => None,
+        }
+    };
+    joints.get_ref().iter().filter_map(told).collect()
 }
 
 fn unknown_joint(entry: &Spanned<String>, key: &'static str, joints: &[String]) -> Located {

@@ -165,6 +165,7 @@ impl Motion {
         let file = MotionFile { path, joints: Some(&joints), limits: &named, options, cell: Some(cell), text };
         let read = motion_formats::read(&file)?;
         let ReadMotion { trajectory, format, topic, samples, dropped, caveats, tool_path } = read;
+        trajectory.check_units(&path.display().to_string(), &joints)?;
         let motion = Self::of(trajectory, path, model, hold)?;
         Ok(Self { format, topic, samples, dropped, notes: caveats, tool_path: tool_path.map(Arc::new), ..motion })
     }

@@ -72,6 +72,9 @@ impl Trajectory {
         request: &TableRequest<'_>,
     ) -> Result<(Self, TableInfo), TrajectoryError> {
         let text = text.trim_start_matches('\u{feff}');
+        // Lines that end as on an old Macintosh.
+        let with_ends = (text.contains('\r') && !text.contains('\n')).then(|| text.replace('\r', "\n"));
+        let text = with_ends.as_deref().unwrap_or(text);
         let mut table = Table::find(text, request);
         if request.columns.is_none() && table.as_ref().is_ok_and(|table| table.is_own(request)) {
             let own = Self::parse_csv(text, origin);
