@@ -77,7 +77,7 @@ pub(crate) enum Change {
 /// What happens at discrete times, and how much of it is over: the part of a run's state that knows. Times nearer than
 /// [`SAME_TIME`] are one.
 pub(crate) struct EventQueue {
-    /// When loads or prescribed velocities jump, ascending, and how many of these times are over.
+    /// When loads or prescribed velocities jump, and other stops of loads, ascending, and how many of these times are over.
     jumps: Vec<f64>,
     jumps_over: usize,
     /// Changes of inertia, by time, and how many of them have been carried out.
@@ -90,7 +90,10 @@ pub(crate) struct EventQueue {
 impl EventQueue {
     /// Of an arm whose run begins: nothing is over.
     pub(crate) fn of(arm: &FlexibleArm) -> Self {
-        let loads = arm.loads.iter().flat_map(|load| load.wrench.jumps.iter().copied().filter(|t| jumps_at(load, *t)));
+        let loads = arm.loads.iter().flat_map(|load| {
+            let jumps = load.wrench.jumps.iter().copied().filter(|t| jumps_at(load, *t));
+            jumps.chain(load.wrench.stops.iter().copied())
+        });
         let mut jumps: Vec<f64> = loads.chain(arm.motion.velocity_jumps()).collect();
         jumps.sort_by(f64::total_cmp);
         let clock = arm.servo.as_ref().map(|servo| SampleClock { sample_s: servo.sample_s, next: 0 });

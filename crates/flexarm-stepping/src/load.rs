@@ -25,6 +25,9 @@ pub struct TimedWrench {
     pub value: Arc<dyn Fn(f64) -> Wrench + Send + Sync>,
     /// Times at which it begins, ends, jumps or bends (s); the reference stepper steps over none of them.
     pub jumps: Vec<f64>,
+    /// Times at which steps of given length end, beside those at which it jumps (s): what is shorter than a step would fall
+    /// between two of its ends.
+    pub stops: Vec<f64>,
     /// Shortest period in it (s), infinite without one: the steps of the reference stepper stay well below.
     pub period: f64,
 }
@@ -32,7 +35,8 @@ pub struct TimedWrench {
 impl TimedWrench {
     /// In world axes, without jumps and without a period.
     pub fn new(value: impl Fn(f64) -> Wrench + Send + Sync + 'static) -> Self {
-        Self { axes: LoadAxes::World, value: Arc::new(value), jumps: Vec::new(), period: f64::INFINITY }
+        let value = Arc::new(value);
+        Self { axes: LoadAxes::World, value, jumps: Vec::new(), stops: Vec::new(), period: f64::INFINITY }
     }
 
     /// The same in these axes.
@@ -45,6 +49,12 @@ impl TimedWrench {
     #[must_use]
     pub fn with_jumps(self, jumps: Vec<f64>) -> Self {
         Self { jumps, ..self }
+    }
+
+    /// The same with these times at which steps of given length end (s).
+    #[must_use]
+    pub fn with_stops(self, stops: Vec<f64>) -> Self {
+        Self { stops, ..self }
     }
 
     /// The same with this as the shortest period in it (s).
@@ -62,7 +72,8 @@ impl TimedWrench {
 impl fmt::Debug for TimedWrench {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut shown = f.debug_struct("TimedWrench");
-        shown.field("axes", &self.axes).field("jumps", &self.jumps).field("period", &self.period);
+        shown.field("axes", &self.axes).field("jumps", &self.jumps).field("stops", &self.stops);
+        shown.field("period", &self.period);
         shown.finish_non_exhaustive()
     }
 }

@@ -157,7 +157,18 @@ pub(crate) fn parse_loads(
     let folder = path.parent().unwrap_or(Path::new("."));
     let loads = file.load.iter().map(|entry| load(entry, folder, duration, &source));
     let payloads = file.payload.iter().map(|entry| payload(entry, &source));
-    Ok((loads.collect::<Result<_, _>>()?, payloads.collect()))
+    let loads = loads.collect::<Result<_, _>>()?;
+    for (k, entry) in file.payload.iter().enumerate() {
+        let same = |other: &Spanned<PayloadEntry>| {
+            let [a, b] = [entry, other].map(Spanned::get_ref);
+            a.at == b.at && a.link.as_ref().map(Spanned::get_ref) == b.link.as_ref().map(Spanned::get_ref)
+        };
+        if file.payload[..k].iter().any(same) {
+            let message = format!("two payloads change at {} s on the same link: keep one of them", entry.get_ref().at);
+            return Err(source.error(entry.span(), message).into());
+        }
+    }
+    Ok((loads, payloads.collect()))
 }
 
 fn load(entry: &Spanned<LoadEntry>, folder: &Path, duration: f64, source: &Source) -> Result<AppliedLoad, Error> {
@@ -172,7 +183,8 @@ fn load(entry: &Spanned<LoadEntry>, folder: &Path, duration: f64, source: &Sourc
     let jumps = [e.start].into_iter().chain(last).chain(bends).collect();
     let name = e.frame.as_ref().map_or("tcp", |frame| frame.get_ref());
     let written = Written::new(source, entry.span(), e.frame.as_ref().map(Spanned::span), None);
-    let load = AppliedLoad::new(name, TimedWrench { axes, value, jumps, period }).starting_at(e.start);
+    let load =
+        AppliedLoad::new(name, TimedWrench { axes, value, jumps, stops: Vec::new(), period }).starting_at(e.start);
     Ok(AppliedLoad { written: Some(written), ..load })
 }
 
