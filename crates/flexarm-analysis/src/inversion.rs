@@ -113,6 +113,8 @@ pub enum InversionError {
 const WEAK: f64 = 0.02;
 /// Part of the error that one use may leave at the highest frequency that is corrected.
 const LEFT: f64 = 0.5;
+/// Times of the slowest term of the series in which an error comes to rest at the end of a motion.
+const COMES_TO_REST: f64 = 3.0;
 /// Terms of the series.
 const ORDER: usize = 5;
 /// Frequencies at which that is looked at (Hz): a factor apart, from the lowest to the highest.
@@ -183,7 +185,8 @@ impl Inversion {
 
     /// Change of the commands for which the tool moves by `y`, below the cutoff.
     ///
-    /// * `y`: k×N, a column per time from 0, `step_s` apart; before and after it stays as at the ends.
+    /// * `y`: k×N, a column per time from 0, `step_s` apart; before and after it stays as at the ends, and over
+    ///   [`Inversion::edge_s`] it goes to that.
     ///
     /// Returns m×N.
     pub fn commands(&self, y: &DMatrix<f64>, step_s: f64) -> DMatrix<f64> {
@@ -193,7 +196,7 @@ impl Inversion {
             return DMatrix::zeros(m, N);
         }
         // Derivatives are of the curve with its ends held on, so that none is one-sided.
-        let (smooth, pad) = filtered(y, step_s, self.cutoff_hz);
+        let (smooth, pad) = filtered(&ending_at_rest(y, step_s, self.rest_s()), step_s, self.cutoff_hz);
         let mut derivatives = vec![smooth];
         for order in 1..ORDER {
             derivatives.push(derivative(&derivatives[order - 1], step_s));
@@ -225,13 +228,41 @@ impl Inversion {
         u
     }
 
-    /// Numbers of the nodes before and behind a time, with their weights.
-    fn place(&self, t: f64) -> [(usize, f64); 2] {
-        let last = self.series.len() - 1;
+    /// How far from its end an error is changed, so that it ends at rest (s): one that is known so much longer than the commands
+    /// are needed leaves them alone.
+    pub fn edge_s(&self) -> f64 {
+        self.rest_s() + 1.0 / self.cutoff_hz
+    }
+
+    /// Time in which an error comes to rest at the end: so slowly that no term of the series takes more than the error itself does.
+    fn rest_s(&self) -> f64 {
+        let Some(end) = self.series.last() else { return 0.0 };
+        let size = end.A[0].norm();
+        let time = |(order, A): (i32, &DMatrix<f64>)| (A.norm() / size).powf(1.0 / f64::from(order));
+        let slowest = (1..).zip(&end.A[1..]).map(time).filter(|time| time.is_finite()).fold(0.0, f64::max);
+        (COMES_TO_REST * slowest).max(1.0 / self.cutoff_hz)
+    }
+
+    /// Numbers of the nodes about a time, with their weights, which are those of a cubic B-spline: what goes along with the arm has
+    /// no kink at a node, and commands no velocity that jumps there. At the ends it is even.
+    fn place(&self, t: f64) -> [(usize, f64); 4] {
+        let last = self.series.len() as i64 - 1;
         let at = (t / self.spacing_s).clamp(0.0, last as f64);
-        let k = (at as usize).min(last.saturating_sub(1));
-        let part = at - k as f64;
-        [(k, 1.0 - part), ((k + 1).min(last), part)]
+        let k = (at as i64).min((last - 1).max(0));
+        let u = at - k as f64;
+        let inner = |u: f64| (u * u * (3.0 * u - 6.0) + 4.0) / 6.0;
+        let weights = [(1.0 - u).powi(3) / 6.0, inner(u), inner(1.0 - u), u.powi(3) / 6.0];
+        let number = |i: i64| {
+            if i < 0 {
+                -i
+            } else if i > last {
+                2 * last - i
+            } else {
+                i
+            }
+            .clamp(0, last) as usize
+        };
+        std::array::from_fn(|i| (number(k - 1 + i as i64), weights[i]))
     }
 }
 
@@ -348,6 +379,19 @@ fn derivative(y: &DMatrix<f64>, h: f64) -> DMatrix<f64> {
     DMatrix::from_fn(y.nrows(), y.ncols(), |i, k| {
         let at = |offset: i64| y[(i, (k as i64 + offset).clamp(0, last) as usize)];
         (8.0 * (at(1) - at(-1)) - (at(2) - at(-2))) / (12.0 * h)
+    })
+}
+
+/// An error that ends at rest, within so many seconds. What the tool still swings by at the end of a motion is a kink where it is
+/// held on, and the derivatives of a kink would have the joints struck there.
+fn ending_at_rest(y: &DMatrix<f64>, step_s: f64, within_s: f64) -> DMatrix<f64> {
+    let last = y.ncols() - 1;
+    let length = (within_s / step_s).ceil().clamp(ORDER as f64, (0.5 * last as f64).max(ORDER as f64));
+    // From 0 to 1 with four derivatives that are 0 at both ends.
+    let rise = |s: f64| s.powi(5) * (126.0 + s * (-420.0 + s * (540.0 + s * (-315.0 + s * 70.0))));
+    DMatrix::from_fn(y.nrows(), y.ncols(), |i, k| {
+        let part = (last - k) as f64 / length;
+        if part >= 1.0 { y[(i, k)] } else { y[(i, last)] + (y[(i, k)] - y[(i, last)]) * rise(part) }
     })
 }
 

@@ -26,11 +26,14 @@ pub struct NodeServo {
 }
 
 impl NodeServo {
-    /// Controllers between two nodes, by their weights.
-    pub(crate) fn between(all: &[Self], [(a, weight_a), (b, weight_b)]: [(usize, f64); 2]) -> Self {
-        let (a, b) = (&all[a], &all[b]);
-        let ahead = std::array::from_fn(|k| &a.ahead[k] * weight_a + &b.ahead[k] * weight_b);
-        Self { ahead, ..a.clone() }
+    /// Controllers among some nodes, by their weights.
+    pub(crate) fn between(all: &[Self], nodes: [(usize, f64); 4]) -> Self {
+        let first = &all[nodes[0].0];
+        let sum = |k: usize| {
+            let zero = DMatrix::zeros(first.ahead[k].nrows(), first.ahead[k].ncols());
+            nodes.iter().fold(zero, |sum, (node, weight)| sum + &all[*node].ahead[k] * *weight)
+        };
+        Self { ahead: std::array::from_fn(sum), ..first.clone() }
     }
 
     /// Adds the controllers to the dynamic stiffness of the free coordinates, of which their motors are the first, and to the forces

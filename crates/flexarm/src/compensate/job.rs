@@ -116,11 +116,17 @@ impl<'a> Job<'a> {
 
     /// The motion with changed joints.
     fn moved(&self, change: &DMatrix<f64>) -> Result<Motion, Error> {
+        self.moved_and_held(change, 0)
+    }
+
+    /// The same, held at its end for so many samples more.
+    fn moved_and_held(&self, change: &DMatrix<f64>, beyond: usize) -> Result<Motion, Error> {
         let (m, h, last) = (self.q.nrows(), self.step_s(), self.times.len() - 1);
         let of = |k: usize, i: i64| change[(k, i.clamp(0, last as i64) as usize)];
         let mut reference = vec![Vec::with_capacity(last + 1); m];
         let (mut q, mut v, mut a) = (vec![0.0; m], vec![0.0; m], vec![0.0; m]);
-        for t in &self.times {
+        let times = self.times_and(beyond);
+        for t in &times {
             self.motion.trajectory.sample(*t, &mut q, &mut v, &mut a);
             (0..m).for_each(|k| reference[k].push([q[k], v[k], a[k]]));
         }
@@ -142,8 +148,14 @@ impl<'a> Job<'a> {
             knots
         };
         let joints: Vec<JointKnots> = (0..m).map(joint).collect();
-        let trajectory = Trajectory::through_knots(&self.times, &joints)?;
+        let trajectory = Trajectory::through_knots(&times, &joints)?;
         Motion::along(trajectory, &format!("{}_compensated", self.motion.name), self.arm.robot())
+    }
+
+    /// The times of this job and so many more.
+    fn times_and(&self, beyond: usize) -> Vec<f64> {
+        let further = (0..beyond).map(|k| self.step_s() * (self.times.len() + k) as f64);
+        self.times.iter().copied().chain(further).collect()
     }
 
     /// The motion as it is, at the times of this job.
@@ -153,13 +165,19 @@ impl<'a> Job<'a> {
 
     /// Run of a motion on an arm, with the loads of the scenario.
     pub(super) fn seen(&self, arm: &Arm, run: &RunOptions, motion: &Motion) -> Result<Seen, Error> {
+        self.seen_until(arm, run, motion, 0)
+    }
+
+    /// The same, of a motion that is held at its end for so many samples more.
+    fn seen_until(&self, arm: &Arm, run: &RunOptions, motion: &Motion, beyond: usize) -> Result<Seen, Error> {
         let options =
             RunOptions { log_rate_hz: 1.0 / self.step_s(), with_twin: false, ignore_limits: true, ..run.clone() };
         let mut progress = |_, _| if (self.stop)() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
         let run = arm.simulate_watched(self.along(motion), &options, None, None, &mut progress)?;
         let (t, p, r) = (run.time_s(), run.values("tcp_position"), run.values("tcp_quaternion_wxyz"));
-        let mut error = DMatrix::zeros(6, self.times.len());
-        for (k, time) in self.times.iter().enumerate() {
+        let times = self.times_and(beyond);
+        let mut error = DMatrix::zeros(6, times.len());
+        for (k, time) in times.iter().enumerate() {
             let row = t.partition_point(|x| *x < time - 0.5 * self.step_s()).min(t.len() - 1);
             let off = (t[row] - time).abs();
             if off > LOGGED_WITHIN * self.step_s() {
@@ -168,7 +186,7 @@ impl<'a> Job<'a> {
             let place = Translation3::new(p[3 * row], p[3 * row + 1], p[3 * row + 2]);
             let turn = Quaternion::new(r[4 * row], r[4 * row + 1], r[4 * row + 2], r[4 * row + 3]);
             let turn: Rotation3<f64> = UnitQuaternion::from_quaternion(turn).to_rotation_matrix();
-            let wanted = &self.wanted[k];
+            let wanted = &self.wanted[k.min(self.wanted.len() - 1)];
             let moved = place.vector - wanted.translation.vector;
             let turned = rotation_vector((turn * wanted.rotation.inverse()).matrix());
             error.fixed_view_mut::<3, 1>(0, k).copy_from(&moved);
@@ -184,8 +202,10 @@ impl<'a> Job<'a> {
         Ok(Seen { error, efforts: (0..m).map(worst).collect() })
     }
 
-    fn error(&self, motion: &Motion) -> Result<DMatrix<f64>, Error> {
-        Ok(self.seen(self.arm, &self.request.run, motion)?.error)
+    /// Error of the tool on the model with changed joints, and what it is when they are held at the end for so many samples more.
+    fn error(&self, change: &DMatrix<f64>, beyond: usize) -> Result<DMatrix<f64>, Error> {
+        let motion = self.moved_and_held(change, beyond)?;
+        Ok(self.seen_until(self.arm, &self.request.run, &motion, beyond)?.error)
     }
 
     /// A motion with the loads, payloads and start of the scenario.
@@ -255,23 +275,30 @@ impl<'a> Job<'a> {
             fewest: inversion.fewest_directions(),
             quicker: 0.0,
         };
-        let mut error = self.error(&self.as_it_is()?)?;
+        // How the tool swings on behind the end, so that the inverse meets no edge there. Loads are known up to the end alone.
+        let beyond = match self.scenario.loads.is_empty() {
+            true => (inversion.edge_s() / self.step_s()).ceil() as usize,
+            false => 0,
+        };
+        let within = |error: &DMatrix<f64>| error.columns(0, N).into_owned();
+        let mut whole = self.error(&change, beyond)?;
+        let mut error = within(&whole);
         let size = |error: &DMatrix<f64>| error.select_rows(&self.rows).norm();
         let (first, mut least) = (size(&error), size(&error));
         let mut left_over = error.clone();
         best.peaks.push(peak(&error));
         for iteration in 1..=self.request.iterations {
-            let y = -error.select_rows(&self.rows);
-            change += inversion.commands(&y, self.step_s());
-            let motion = self.moved(&change)?;
-            error = self.error(&motion)?;
+            let y = -whole.select_rows(&self.rows);
+            change += inversion.commands(&y, self.step_s()).columns(0, N);
+            whole = self.error(&change, beyond)?;
+            error = within(&whole);
             let left = size(&error);
             best.peaks.push(peak(&error));
             if left.is_nan() || left >= least {
                 break;
             }
             let settled = left > SETTLED * least || left < ENOUGH * first;
-            (least, best.motion, best.change, best.kept) = (left, motion, change.clone(), iteration);
+            (least, best.motion, best.change, best.kept) = (left, self.moved(&change)?, change.clone(), iteration);
             left_over.copy_from(&error);
             if settled {
                 break;
@@ -322,7 +349,7 @@ impl<'a> Job<'a> {
             change.set_column(k, &value);
         }
         let motion = self.moved(&change)?;
-        let peaks = vec![peak(&self.error(&self.as_it_is()?)?), peak(&self.error(&motion)?)];
+        let peaks = vec![peak(&self.error(&DMatrix::zeros(m, N), 0)?), peak(&self.error(&change, 0)?)];
         Ok(Commands { motion, change, peaks, kept: 1, cutoff_hz: None, fewest: None, quicker: 0.0 })
     }
 }
