@@ -36,6 +36,11 @@ pub struct HoldMetrics {
     pub line: Option<SpectralLine>,
 }
 
+/// Whether a line is worth telling: far below the settling band (m) it neither delays settling nor is it vibration.
+pub(crate) fn is_seen(line: &SpectralLine, band_m: f64) -> bool {
+    line.amplitude > 1e-6 * band_m
+}
+
 /// The samples of one hold.
 pub(crate) struct Hold<'a> {
     /// At least two, s.
@@ -54,8 +59,7 @@ impl Hold<'_> {
     /// Computes the figures; `start_s` may lie before the first sample.
     pub(crate) fn metrics(&self, start_s: f64, band_m: f64) -> HoldMetrics {
         let line = strongest_line(self.times, &self.errors, Taper::FadeOut);
-        // A line far below the band does not delay settling.
-        let line = line.filter(|line| line.amplitude > 1e-6 * band_m);
+        let line = line.filter(|line| is_seen(line, band_m));
         let final_error = self.final_static.unwrap_or_else(|| self.resting_value(line));
         HoldMetrics {
             start_s,

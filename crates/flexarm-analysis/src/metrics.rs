@@ -4,7 +4,7 @@
 
 use nalgebra::Vector3;
 
-use crate::hold::{Hold, HoldMetrics};
+use crate::hold::{Hold, HoldMetrics, is_seen};
 use crate::path_frame::{path_frames, tangential_at};
 use crate::record::{ErrorRecord, RecordError};
 use crate::repeated_pose::{RepeatedPose, repeated_poses};
@@ -134,7 +134,7 @@ pub fn tcp_metrics_on_path(
         rms_rad: rms(record.times, &angles),
         settling_s: settling.flatten(),
         overshoot_m: holds.iter().map(|hold| hold.overshoot_m).fold(0.0, f64::max),
-        dominant_hz: dominant_hz(record, &holds, settings.lowest_hz),
+        dominant_hz: dominant_hz(record, &holds, settings),
         tangential_peak_m,
         normal_peak_m,
         binormal_peak_m,
@@ -215,7 +215,7 @@ fn holds(record: &ErrorRecord<'_>, band: f64) -> Vec<HoldMetrics> {
     holds
 }
 
-fn dominant_hz(record: &ErrorRecord<'_>, holds: &[HoldMetrics], lowest_hz: f64) -> Option<f64> {
+fn dominant_hz(record: &ErrorRecord<'_>, holds: &[HoldMetrics], settings: &MetricSettings) -> Option<f64> {
     let lines = holds.iter().filter_map(|hold| hold.line);
     if let Some(line) = lines.max_by(|a, b| a.amplitude.total_cmp(&b.amplitude)) {
         return Some(line.hz);
@@ -223,5 +223,7 @@ fn dominant_hz(record: &ErrorRecord<'_>, holds: &[HoldMetrics], lowest_hz: f64) 
     let trend = |i: usize, c: usize| record.quasi_static.map_or(0.0, |values| values[i][c]);
     let rest = record.errors.iter().enumerate();
     let rest: Vec<[f64; 3]> = rest.map(|(i, e)| std::array::from_fn(|c| e[c] - trend(i, c))).collect();
-    strongest_line_from(record.times, &rest, Taper::Both, lowest_hz).map(|line| line.hz)
+    let line = strongest_line_from(record.times, &rest, Taper::Both, settings.lowest_hz);
+    // An arm that stands still swings by rounding.
+    line.filter(|line| is_seen(line, settings.settling_band_m)).map(|line| line.hz)
 }

@@ -129,6 +129,13 @@ fn answer(cli: &Cli, json: impl FnOnce() -> String, text: impl FnOnce() -> Strin
     }
 }
 
+/// Text that was made in memory; for programs under a key.
+fn written(cli: &Cli, key: &str, bytes: Vec<u8>) -> ExitCode {
+    let text = String::from_utf8_lossy(&bytes);
+    answer(cli, || to_json(&serde_json::json!({ key: text })), || text.to_string());
+    ExitCode::SUCCESS
+}
+
 fn to_json(value: &impl serde::Serialize) -> String {
     serde_json::to_string(value).expect("plain numbers and strings")
 }
@@ -162,13 +169,14 @@ fn command(cli: &Cli, line: &[OsString]) -> Result<ExitCode, Failure> {
             Ok(ExitCode::SUCCESS)
         }
         Command::Completions { shell } => {
-            clap_complete::generate(*shell, &mut Cli::command(), "flexarm", &mut std::io::stdout());
-            Ok(ExitCode::SUCCESS)
+            let mut script = Vec::new();
+            clap_complete::generate(*shell, &mut Cli::command(), "flexarm", &mut script);
+            Ok(written(cli, "script", script))
         }
         Command::Man => {
-            let page = clap_mangen::Man::new(Cli::command());
-            let _ = page.render(&mut std::io::stdout());
-            Ok(ExitCode::SUCCESS)
+            let mut page = Vec::new();
+            clap_mangen::Man::new(Cli::command()).render(&mut page).expect("memory takes what is written");
+            Ok(written(cli, "page", page))
         }
     }
 }

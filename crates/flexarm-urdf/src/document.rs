@@ -382,7 +382,8 @@ impl Reader<'_, '_> {
 
     /// An attribute that must be there.
     fn required<'n>(&mut self, node: Node<'n, '_>, owner: &str, attribute: &'static str) -> Option<&'n str> {
-        let value = node.attribute(attribute);
+        // An empty name is none.
+        let value = node.attribute(attribute).filter(|value| attribute != "name" || !value.trim().is_empty());
         if value.is_none() {
             let owner = if owner.starts_with('<') || owner.contains(", <") {
                 owner.to_owned()

@@ -248,7 +248,13 @@ fn beam_link(
         let k = axis.abs().imin();
         Vector3::from_fn(|i, _| if i == k { 1.0 } else { 0.0 })
     });
+    let own = mechanism.link(name).and_then(|link| link.inertia);
     let parts = match beam.parts.as_deref() {
+        None if own.is_none() => {
+            let text = format!("link {name:?} has no inertia: it gets the mass of its section, spread along the beam");
+            warnings.push(text);
+            Parts::Reduced
+        }
         None | Some("from-link") => Parts::FromLink(beam.split),
         Some("uniform") => Parts::Reduced,
         Some(other) => return Err(fail(format!("parts {other:?} are not known; use \"from-link\" or \"uniform\""))),
@@ -260,7 +266,7 @@ fn beam_link(
     link.theory = theory;
     link.split_fraction = beam.split;
     // The link's own mass spread along the beam; the section's where the URDF gives none.
-    link.mass = mechanism.link(name).and_then(|l| l.inertia).map(|i| i.mass);
+    link.mass = own.map(|own| own.mass);
     let reduced = link.reduce().map_err(|e| fail(e.to_string()))?;
     Ok((reduced, parts, Some(link)))
 }

@@ -1,5 +1,6 @@
 //! What recordings of a run say once: header, meshes, files.
 
+use std::fs::{File, TryLockError};
 use std::path::{Component, Path, PathBuf};
 
 use flexarm_files::Undo;
@@ -21,6 +22,8 @@ pub(crate) struct Recordings {
     pub(crate) names: Files,
     /// Folders that were made for them.
     folders: Undo,
+    /// The folder is this run's as long as they are there.
+    held: Option<FolderLock>,
 }
 
 impl Recordings {
@@ -73,7 +76,47 @@ fn remove_leftovers(outputs: &Outputs, ours: &[&str]) -> Result<(), Error> {
                 .map_err(|e| Error::File { what: format!("is of an earlier run and cannot be removed: {e}"), path })?;
         }
     }
+    remove_figures(&outputs.folder.join(FIGURES_FOLDER))
+}
+
+/// Removes the figures of an earlier run, and their folder if nothing else is in it: drawings beside their data of the same name,
+/// and pictures of the arm.
+fn remove_figures(folder: &Path) -> Result<(), Error> {
+    if !folder.symlink_metadata().is_ok_and(|there| there.is_dir()) {
+        return Ok(());
+    }
+    let fail = |e: std::io::Error| Error::File {
+        path: folder.to_owned(),
+        what: format!("holds figures of an earlier run that cannot be removed: {e}"),
+    };
+    let mut old: Vec<PathBuf> = vec![folder.join("arm_side.png"), folder.join("arm_oblique.png")];
+    for entry in std::fs::read_dir(folder).map_err(fail)? {
+        let drawing = entry.map_err(fail)?.path();
+        let data = drawing.with_extension("csv");
+        if drawing.extension().is_some_and(|ending| ending == "svg") && data.is_file() {
+            old.extend([drawing, data]);
+        }
+    }
+    for path in old.iter().filter(|path| path.symlink_metadata().is_ok_and(|there| there.is_file())) {
+        std::fs::remove_file(path).map_err(fail)?;
+    }
+    // One that is not empty stays.
+    let _ = std::fs::remove_dir(folder);
     Ok(())
+}
+
+/// A folder that one run writes into; others are told. Where folders cannot be locked nobody is.
+pub(crate) struct FolderLock(#[expect(dead_code, reason = "the lock lasts as long as the open folder")] Option<File>);
+
+impl FolderLock {
+    /// None while another run has it.
+    fn take(folder: &Path) -> Option<Self> {
+        let opened = File::open(folder).ok();
+        match opened.as_ref().map(File::try_lock) {
+            Some(Err(TryLockError::WouldBlock)) => None,
+            _ => Some(Self(opened)),
+        }
+    }
 }
 
 /// A recorder of this format.
@@ -91,7 +134,8 @@ pub(crate) fn recorder(
 /// Recorders for the outputs; refuses to overwrite before anything is made. `in_study`: the recording of the study is being
 /// written too.
 pub(crate) fn recorders(outputs: Option<&Outputs>, in_study: bool) -> Result<Recordings, Error> {
-    let mut recordings = Recordings { set: RecorderSet::new(), names: Files::default(), folders: Undo::default() };
+    let mut recordings =
+        Recordings { set: RecorderSet::new(), names: Files::default(), folders: Undo::default(), held: None };
     let Some(outputs) = outputs else { return Ok(recordings) };
     let mut ours = vec!["report.html", "report.md", "summary.json"];
     ours.extend(outputs.recordings.iter().map(|format| format.info().file_name));
@@ -113,15 +157,22 @@ pub(crate) fn recorders(outputs: Option<&Outputs>, in_study: bool) -> Result<Rec
     if outputs.figures {
         recordings.names.figures = text(FIGURES_FOLDER);
     }
+    let unusable = |what: String| Error::File { path: outputs.folder.clone(), what };
+    if outputs.folder.exists() && !outputs.folder.is_dir() {
+        return Err(unusable(
+            "is a file; the results need a folder: choose another place, or move the file away".into(),
+        ));
+    }
     // Nothing is removed before all that is to come in its place can be written.
     recordings.set.check()?;
+    recordings.folders.make(&outputs.folder).map_err(|e| unusable(format!("the output folder cannot be made: {e}")))?;
+    let held = FolderLock::take(&outputs.folder).ok_or_else(|| {
+        unusable("another run is writing into this folder: wait for its end, or choose another folder".into())
+    })?;
+    recordings.held = Some(held);
     if outputs.overwrite {
         remove_leftovers(outputs, &ours)?;
     }
-    recordings.folders.make(&outputs.folder).map_err(|e| Error::File {
-        path: outputs.folder.clone(),
-        what: format!("the output folder cannot be made: {e}"),
-    })?;
     Ok(recordings)
 }
 

@@ -147,7 +147,8 @@ fn sweep(cli: &Cli, args: &SweepRunArgs, study: &Path) -> Result<ExitCode, Failu
     bar.clear();
     let summary = result?;
     answer(cli, || to_json(&summary), || text(&summary));
-    Ok(ExitCode::SUCCESS)
+    // Some runs of a study may fail; a study of which nothing is left has.
+    Ok(if summary.failed > 0 && summary.done == 0 { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
 /// The command that runs the files of a run.

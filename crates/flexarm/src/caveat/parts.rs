@@ -191,14 +191,19 @@ fn joint_limits(mechanism: &Mechanism, size: &Size) -> Vec<Caveat> {
     fast.chain(ranges).collect()
 }
 
+/// Torques below this part of the arm's weight times its reach are none.
+const NO_WEIGHT: f64 = 1e-4;
+
 /// Effort limits far beyond what the arm weighs and what its inertia asks for.
 fn strong_drives(model: &Model, size: &Size) -> Option<Caveat> {
     let weight = weight_carried(model);
     let most = weight.iter().fold(0.0f64, |m, w| m.max(*w));
+    // A joint that hardly leaves the horizontal carries what its axis is off, no weight to measure a drive by.
+    let some = NO_WEIGHT * size.mass * model.gravity.norm() * size.extent;
     let limited = |k: &usize| model.coordinates()[*k].limits.effort.is_finite();
     let effort = |k: usize| model.coordinates()[k].limits.effort;
     let joints: Vec<usize> = (0..model.nv()).filter(limited).collect();
-    let least = joints.iter().filter(|k| weight[**k] > 0.05 * most && most > 0.0);
+    let least = joints.iter().filter(|k| weight[**k] > 0.05 * most && weight[**k] > some);
     let least = least.map(|k| (effort(*k) / weight[*k], *k)).min_by(|a, b| a.0.total_cmp(&b.0));
     let joint = |k: usize| format!("joint {:?}", model.coordinates()[k].joint);
     if let Some((ratio, k)) = least {
@@ -211,6 +216,6 @@ fn strong_drives(model: &Model, size: &Size) -> Option<Caveat> {
     let acceleration = effort(heaviest) / inertia[heaviest] * size.extent;
     let caveat = || kinds::TIP_ACCELERATION.found(joint(heaviest), acceleration, TIP_ACCELERATION);
     let turns = model.coordinates()[heaviest].kind != "prismatic";
-    (turns && acceleration > TIP_ACCELERATION)
+    (turns && acceleration.is_finite() && acceleration > TIP_ACCELERATION)
         .then(|| caveat().likely(slip(acceleration, &(0.1..=TIP_ACCELERATION), slip::EFFORT, 1.0)))
 }

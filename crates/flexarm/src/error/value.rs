@@ -117,6 +117,12 @@ pub enum ValueError {
         /// The lowest frequency (Hz).
         lowest: f64,
     },
+    /// A rigid robot, whose tool has no error that could depend on anything.
+    #[error(
+        "the robot has no flexible link and no elastic drive: its tool is where the rigid arm has it, and nothing changes that; add \
+         [[flexible_link]] or [[drive]] entries"
+    )]
+    NothingYields,
     /// A name of which no number of the robot is called.
     #[error(
         "no parameter is called {pattern:?}: expected some of {}, * for anything; an entry of a lumped link's 6x6 is \

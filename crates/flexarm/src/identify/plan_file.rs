@@ -159,6 +159,11 @@ impl PlanRequest {
                 return Some(format!("a {what} has the entry {bad}, expected finite numbers"));
             }
         }
+        if let Some(force) = self.forces.iter().find(|force| Vector3::from(**force).norm() < 1e-9) {
+            return Some(format!(
+                "the force {force:?} is zero: nothing moves under it; give some of its numbers a size (N)"
+            ));
+        }
         let none = self.directions.iter().find(|d| Vector3::from(**d).norm() < 1e-9);
         none.map(|d| format!("the direction {d:?} of a gauge has no length"))
     }
@@ -187,6 +192,9 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
     let (joints, slides): (Vec<String>, Vec<bool>) = joints_of(&arm).into_iter().unzip();
     if let Some(text) = request.fault() {
         return Err(IdentifyFileError::Fit(text).into());
+    }
+    if arm.flexible().springs.is_empty() {
+        return Err(IdentifyFileError::NothingGives.into());
     }
     let targets =
         request.output.as_ref().map(|folder| [folder.join("measurements.toml"), folder.join("displacements.csv")]);

@@ -137,6 +137,9 @@ pub fn cut(robot: &Robot, tool: &CuttingTool, at: Option<&[f64]>, request: &CutR
     if !(request.depth_m.is_finite() && request.depth_m > 0.0) {
         return Err(LobesError::Deepest { found: request.depth_m }.into());
     }
+    if let Some(found) = request.seconds.filter(|seconds| !(seconds.is_finite() && *seconds > 0.0)) {
+        return Err(LobesError::Seconds { found }.into());
+    }
     let paths = request.output.as_ref().map(|folder| files::CUT_NAMES.map(|name| folder.join(name)));
     check_free(paths.as_ref().map_or(&[], |paths| paths.as_slice()), request.overwrite)?;
 

@@ -204,6 +204,12 @@ pub enum LobesError {
         /// Most.
         most: usize,
     },
+    /// A length of a run that makes no sense.
+    #[error("{} is {found} s, expected a positive number", flexarm_settings::Setting::Seconds)]
+    Seconds {
+        /// Found.
+        found: f64,
+    },
     /// A speed that makes no sense.
     #[error("the spindle speed is {found} 1/min, expected a positive number")]
     Speed {

@@ -45,6 +45,9 @@ fn mechanical_energy(model: &Model, seen: &Observation) -> f64 {
     kinetic_energy(model, &mut data, &state) + potential_energy(model, &mut data, &state.q)
 }
 
+/// An energy that changes by less than this part of its size rests: what is left is rounding.
+const REST: f64 = 1e-9;
+
 /// Work that goes in and out between samples, by the trapezoidal rule.
 #[derive(Default)]
 struct EnergyBook {
@@ -60,6 +63,8 @@ struct EnergyBook {
     /// Largest gap between what is stored and what was supplied, and largest change of what is stored (J).
     gap: f64,
     swing: f64,
+    /// Largest sum of the sizes of its parts (J).
+    size: f64,
     struck: f64,
     /// Taken by the hysteresis of gears up to the last sample, and before the first one (J).
     hysteresis: [f64; 2],
@@ -101,6 +106,7 @@ impl EnergyBook {
         self.gross[1] += (-struck).max(0.0);
         self.struck = impulse_work;
         self.last = energy.iter().sum();
+        self.size = self.size.max(energy.iter().map(|part| part.abs()).sum());
         self.before = Some((t, power));
         let first = *self.first.get_or_insert(self.last);
         let supplied = self.work[0] + self.work[1] - self.work[2] + self.exchanged;
@@ -118,7 +124,7 @@ impl EnergyBook {
             hysteresis_j: self.hysteresis[0] - self.hysteresis[1],
             payload_j: self.exchanged,
             stored_j: self.last - self.first.unwrap_or(self.last),
-            imbalance: if self.swing > 0.0 { self.gap / self.swing } else { 0.0 },
+            imbalance: if self.gap > 0.0 { self.gap / self.swing.max(REST * self.size) } else { 0.0 },
         }
     }
 }

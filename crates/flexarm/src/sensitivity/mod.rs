@@ -137,6 +137,9 @@ impl Arm {
         };
         runnable(&scenario.motion, options)?;
         let flexible = self.flexible();
+        if flexible.springs.is_empty() && !flexible.has_servo() {
+            return Err(ValueError::NothingYields.into());
+        }
         crate::loops::along_motion(&flexible.rigid, &scenario.motion.trajectory)?;
         let explained = |error| flexible.explained(error);
         let arm = flexible.arm(scenario.motion.prescribed()).map_err(explained)?;

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::arm::Arm;
 use crate::caveat::Caveat;
-use crate::error::Error;
+use crate::error::{Error, ValueError};
 use crate::identify::Parameter;
 use crate::inspect::joint_values;
 use crate::options::Modelling;
@@ -68,6 +68,9 @@ pub fn pose_sensitivity(
     parameters: &[String],
 ) -> Result<PoseSensitivity, Error> {
     let arm = robot.flexible(modelling)?;
+    if arm.flexible().springs.is_empty() {
+        return Err(ValueError::NothingYields.into());
+    }
     let joints: Vec<String> = arm.joints().map(str::to_owned).collect();
     let names: Vec<&str> = joints.iter().map(String::as_str).collect();
     let at = joint_values(at, &names)?;
