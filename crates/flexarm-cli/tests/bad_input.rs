@@ -911,7 +911,7 @@ mod outputs {
         let place = Place::new();
         place.refused(
             &["compare", "robot.toml", "swing.toml", "-o", "beam.urdf"],
-            &["beam.urdf", "folder cannot be made"],
+            &["beam.urdf", "is a file; the results need a folder"],
         );
     }
 }
@@ -945,4 +945,70 @@ fn a_column_that_comes_twice_is_refused_with_both_places() {
         place.write("twice.csv", doubled.collect::<String>());
         place.refused(&["convert", "twice.csv", "x.csv"], &["twice.csv", "columns", name]);
     }
+}
+
+/// A slide instead of the swing: numbers in degrees, of joints and of motions, are no places of it; and the other way round.
+#[test]
+fn units_that_contradict_what_a_joint_does_are_refused_wherever_it_is_told() {
+    let place = Place::new();
+    let slide = URDF.replace("type=\"revolute\"", "type=\"prismatic\"");
+    place.write("slide.urdf", slide);
+    place.write("slide.toml", ROBOT.replace("beam.urdf", "slide.urdf"));
+    let run = |robot: &'static str, motion: &'static str| ["compare", robot, motion, "-o", "result"];
+    let mend = ["joint \"swing\" slides", "read as degrees", "add \"swing\" to `metres`"];
+    place.refused(&run("slide.toml", "swing.toml"), &[&["swing.toml, line 2"][..], &mend].concat());
+    place.write("deg.csv", "# unit: deg\ntime,swing\n0,0\n1,0.1\n2,0.1\n");
+    place.refused(&run("slide.toml", "deg.csv"), &[&["deg.csv, line 1"][..], &mend].concat());
+    let sampled =
+        "format = 1\nunit = \"deg\"\njoints = [\"swing\"]\n[samples]\ntime = [0.0, 1.0]\nposition = [[0.0], [0.1]]\n";
+    place.write("sampled.toml", sampled);
+    place.refused(&run("slide.toml", "sampled.toml"), &[&["sampled.toml, line 2"][..], &mend].concat());
+    for at in ["1deg", "swing=1deg"] {
+        place.refused(&["statics", "slide.toml", "--at", at], &["joint \"swing\" slides", "give it in m"]);
+    }
+    place.refused(
+        &["map", "slide.toml", "--over", "swing=0deg:9deg:3", "--no-files"],
+        &["joint \"swing\" slides", "give it in m"],
+    );
+    let turns = ["joint \"swing\" turns", "take it out of `metres`"];
+    place.write("m.toml", with(SWING, "unit = \"deg\"", "unit = \"deg\"\nmetres = [\"swing\"]"));
+    place.refused(&run("robot.toml", "m.toml"), &[&["m.toml, line 3"][..], &turns].concat());
+    place.write("m.csv", "# metres: swing\ntime,swing\n0,0\n1,0.1\n2,0.1\n");
+    place.refused(&run("robot.toml", "m.csv"), &[&["m.csv, line 1"][..], &turns].concat());
+    // What is told rightly is read: 0.3 m, and as radians without a word.
+    place.write(
+        "right.toml",
+        with(SWING, "unit = \"deg\"", "unit = \"deg\"\nmetres = [\"swing\"]").replace("60.0", "0.3"),
+    );
+    place.write("si.toml", SWING.replace("\"deg\"", "\"rad\"").replace("60.0", "0.3"));
+    let [right, si] = ["right.toml", "si.toml"].map(|motion| {
+        let found = place.json(&["compare", "slide.toml", motion, "--no-files"]);
+        found["tcp"]["peak_m"].as_f64().unwrap()
+    });
+    assert!(right == si && right > 0.0, "{right} {si}");
+}
+
+#[test]
+fn questions_about_a_robot_that_does_not_bend_and_cuts_of_no_length_are_refused() {
+    let place = Place::new();
+    let yields = ["no flexible link and no elastic drive", "add [[flexible_link]] or [[drive]]"];
+    place.refused(&["sensitivity", "beam.urdf", "swing.toml"], &yields);
+    place.refused(&["sensitivity", "robot.toml", "swing.toml", "--links", "rigid"], &yields);
+    place.refused(&["sensitivity", "robot.toml", "--links", "rigid", "--at", "0"], &yields);
+    place.refused(&["identify", "beam.urdf", "--plan", "2", "--no-files"], &yields[..1]);
+    let zero = ["the force [0.0, 0.0, 0.0] is zero"];
+    place.refused(&["identify", "robot.toml", "--plan", "2", "--pull", "0,0,0", "--no-files"], &zero);
+    for seconds in ["--seconds=-1", "--seconds=0", "--seconds=nan", "--seconds=inf"] {
+        let cut = ["lobes", "robot.toml", "--tool", "endmill_20mm", "--no-files", "--cut", "8000,0.0001", seconds];
+        place.refused(&cut, &["--seconds is", "expected a positive number"]);
+    }
+    let twice = "[[payload]]\nat = 0.2\nmass = 1.0\ncom = [0.0, 0.0, 0.0]\n";
+    place.write("twice.toml", format!("format = 1\n{twice}{twice}"));
+    let run = ["compare", "robot.toml", "swing.toml", "--no-files", "--loads", "twice.toml"];
+    place.refused(&run, &["twice.toml:6", "two payloads change at 0.2 s on the same link"]);
+}
+
+#[test]
+fn a_link_without_a_name_is_refused() {
+    urdf(&URDF.replace("<link name=\"base\"/>", "<link name=\"\"/>"), "<link name=\"\"/>", &["no attribute \"name\""]);
 }

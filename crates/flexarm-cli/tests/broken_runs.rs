@@ -75,8 +75,11 @@ fn a_killed_run_leaves_a_whole_recording_up_to_the_last_second() {
     }
     // And a report can be made of what is left.
     let report = place.json(&["report", "result/run.mcap", "-o", "left.html"]);
-    for (k, part) in ["was not finished", "no result"].into_iter().enumerate() {
-        assert!(report["warnings"][k].as_str().unwrap().contains(part), "{report}");
+    // Between them stands how many samples are kept, if a quick machine has got that far.
+    let warnings: Vec<&str> =
+        report["warnings"].as_array().unwrap().iter().map(|text| text.as_str().unwrap()).collect();
+    for part in ["was not finished", "no result"] {
+        assert!(warnings.iter().any(|text| text.contains(part)), "{report}");
     }
     assert!(place.text("left.html").contains("TCP error"));
 }

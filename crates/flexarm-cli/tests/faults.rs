@@ -254,3 +254,19 @@ fn a_conversion_names_the_files_that_it_was_given_and_leaves_nothing_when_stoppe
         assert!(place.snapshot() == before, "{output} after a limit: something is left");
     }
 }
+
+#[test]
+fn a_second_run_into_the_folder_of_one_that_is_under_way_is_refused_and_the_first_goes_on() {
+    let place = place();
+    let mut first = place.command(&LONG).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    under_way(&place, &mut first);
+    let second = place.flexarm(&["compare", "robot.toml", "swing.toml", "-o", "result", "--force"]);
+    assert_eq!((second.code, second.out.as_str()), (2, ""), "{}", second.err);
+    second.says(&["result", "another run is writing into this folder", "choose another folder"]);
+    let rows = place.text("result/run.csv").lines().count();
+    send(common::stop_signal(), &first);
+    ended(first);
+    assert!(place.text("result/run.csv").lines().count() >= rows && place.path("result/summary.json").exists());
+    // When it has ended the folder is free.
+    place.json(&["compare", "robot.toml", "swing.toml", "-o", "result", "--force"]);
+}

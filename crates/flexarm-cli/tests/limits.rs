@@ -49,14 +49,14 @@ fn a_signal_during_the_preparation_ends_the_program_at_once() {
     let place = Place::new();
     let mut child =
         place.command(&["compare", "robot.toml", "swing.toml", "-o", "out", "--segments", "100"]).spawn().unwrap();
-    std::thread::sleep(Duration::from_millis(400));
+    std::thread::sleep(Duration::from_millis(120));
     let begin = Instant::now();
     let killed = std::process::Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap();
     assert!(killed.success());
     let status = child.wait().unwrap();
-    // Measured 2 ms; the preparation takes 4 s in a debug build, 1 s in a release build.
+    // Measured 2 ms; the preparation takes 4 s in a debug build, 0.4 to 1 s in a release build.
     assert!(begin.elapsed() < Duration::from_millis(900), "{:?}", begin.elapsed());
-    assert!(!status.success() && !place.path("out").exists(), "{status}");
+    assert!(!status.success() && status.code() != Some(2) && !place.path("out").exists(), "{status}");
 }
 
 #[test]

@@ -113,10 +113,10 @@ fn caveats_of_a_run_name_the_flags_in_every_place() {
     coarse.says(&["steps per period of the first mode are coarse: lower --step\n"]);
     place.write(
         "loads.toml",
-        "format = 1\n[[load]]\nkind = \"step\"\nframe = \"tcp\"\nforce = [9.0, 0.0, 0.0]\nstart = 0.3\nend = 0.302\n",
+        "format = 1\n[[load]]\nkind = \"sine\"\nframe = \"tcp\"\nforce = [9.0, 0.0, 0.0]\nfrequency = 500.0\n",
     );
-    let short = "a load from 0.3 s to 0.302 s lasts 2.0 steps: its impulse is not met well; lower --step";
-    told(&place, &[&COMPARE[..], &["--force", "--loads", "loads.toml"]].concat(), &[short]);
+    let fast = "a load of 500.0 Hz has 2.0 steps per period: it does not act as written; lower --step";
+    told(&place, &[&COMPARE[..], &["--force", "--loads", "loads.toml"]].concat(), &[fast]);
 }
 
 #[test]

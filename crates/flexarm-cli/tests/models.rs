@@ -365,8 +365,6 @@ mod bad_loads_files {
         };
         warned("[[load]]\nkind = \"step\"\nstart = 99.0\nforce = [1.0, 0.0, 0.0]", &["99 s", "does nothing"]);
         warned("[[payload]]\nat = 99.0\nmass = 1.0", &["99 s", "stays as it is"]);
-        let pulse = "[[load]]\nkind = \"impulse\"\nstart = 0.1\nduration = 0.001\nforce = [1.0, 0.0, 0.0]";
-        warned(pulse, &["1.0 steps", "lower --step"]);
         let sine = "[[load]]\nkind = \"sine\"\nfrequency = 500.0\nforce = [1.0, 0.0, 0.0]";
         warned(sine, &["500.0 Hz", "2.0 steps per period"]);
         // An expression is looked at where it acts.
@@ -411,5 +409,88 @@ mod bad_loads_files {
             place.write("force.csv", text);
             place.refused(&run, &[&["force.csv"], words].concat());
         }
+    }
+}
+
+/// Truth: forward kinematics, and that an impulse of the same size moves an arm alike however short it is; 20 us steps see all of it.
+#[test]
+fn an_impulse_within_one_step_acts_as_it_does_in_fine_steps() {
+    let place = Place::new();
+    place.write("robot.toml", slender());
+    let peak = |duration: f64, extra: &[&str]| {
+        let load = "[[load]]\nkind = \"impulse\"\nstart = 0.70037\nforce = [0.0, 0.0, 0.5]\n";
+        place.write("blow.toml", format!("format = 1\n{load}duration = {duration}\n"));
+        let found = place.json(&[&RUN[..], &["--loads", "blow.toml"], extra].concat());
+        found["tcp"]["peak_m"].as_f64().unwrap()
+    };
+    for duration in [1e-4, 5e-4, 1e-3, 2e-3, 5e-3] {
+        let (coarse, fine) = (peak(duration, &[]), peak(duration, &["--step", "2e-5"]));
+        near(coarse, fine, 0.02, &format!("peak of an impulse of {duration} s"));
+    }
+}
+
+/// Truth: by hand, x = cos 0.2 + 0.8 cos 1.2 and z = -sin 0.2 - 0.8 sin 1.2. The joint of the camera is on the near half of the
+/// flexible link and written behind the one at its end.
+#[test]
+fn joints_have_their_values_whichever_half_of_a_flexible_link_carries_them() {
+    let place = Place::new();
+    let link = |name: &str, mass: f64, x: f64| {
+        format!(
+            "<link name=\"{name}\"><inertial><origin xyz=\"{x} 0 0\"/><mass value=\"{mass}\"/><inertia ixx=\"0.05\" iyy=\"0.1\" izz=\"0.1\" \
+             ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial></link>"
+        )
+    };
+    let joint = |name: &str, [parent, child]: [&str; 2], x: f64, axis: &str| {
+        format!(
+            "<joint name=\"{name}\" type=\"revolute\"><parent link=\"{parent}\"/><child link=\"{child}\"/><origin xyz=\"{x} 0 0\"/>\
+             <axis xyz=\"{axis}\"/><limit lower=\"-3\" upper=\"3\" effort=\"1000\" velocity=\"5\"/></joint>"
+        )
+    };
+    let urdf = [
+        "<robot name=\"branch\"><link name=\"base\"/>".into(),
+        link("arm", 10.0, 0.5),
+        link("fore", 5.0, 0.4),
+        link("camera", 1.0, 0.0),
+        joint("shoulder", ["base", "arm"], 0.0, "0 1 0"),
+        joint("elbow", ["arm", "fore"], 1.0, "0 1 0"),
+        joint("pan", ["arm", "camera"], 0.2, "0 0 1"),
+        "</robot>".into(),
+    ];
+    place.write("branch.urdf", urdf.concat());
+    let robot = "format = 1\nurdf = \"branch.urdf\"\ntcp = { link = \"fore\", xyz = [0.8, 0.0, 0.0] }\n[[flexible_link]]\nlink = \"arm\"\n\
+                 distal = \"elbow\"\ndamping = { stiffness_beta = 5e-4 }\n\
+                 beam = { section = \"tube\", outer_diameter = 0.08, wall = 0.004, material = \"aluminium\", parts = \"uniform\" }\n";
+    place.write("branch.toml", robot);
+    let motion = "format = 1\nunit = \"rad\"\njoints = [\"shoulder\", \"elbow\", \"pan\"]\nstart = [0.0, 0.0, 0.0]\n[[move]]\n\
+                  to = [0.2, 1.0, -0.5]\nduration = 1.0\nhold = 0.5\n";
+    place.write("branch_motion.toml", motion);
+    for links in ["lumped", "modal"] {
+        let statics =
+            place.json(&["statics", "branch.toml", "--links", links, "--at", "shoulder=0.2,elbow=1,pan=-0.5"]);
+        assert_eq!(numbers(&statics["at"]), [0.2, 1.0, -0.5]);
+        assert_eq!(statics["joints"], serde_json::json!(["shoulder", "elbow", "pan"]));
+        place.json(&["compare", "branch.toml", "branch_motion.toml", "--links", links, "-o", "result", "--force"]);
+        let table = common::Table::parse(&place.text("result/run.csv"));
+        let last = |name: &str| *table.column(name).last().unwrap();
+        for (column, value) in [
+            ("rigid_x_m", 0.2f64.cos() + 0.8 * 1.2f64.cos()),
+            ("rigid_z_m", -0.2f64.sin() - 0.8 * 1.2f64.sin()),
+            ("elbow_position_rad", 1.0),
+            ("pan_position_rad", -0.5),
+        ] {
+            assert!((last(column) - value).abs() < 1e-9, "{column}: {} instead of {value}", last(column));
+        }
+    }
+}
+
+/// An arm at rest: its energy does not change but by rounding, nothing swings.
+#[test]
+fn an_arm_that_stands_still_neither_swings_nor_loses_energy() {
+    let place = Place::new();
+    place.write("still.csv", "time,swing\n0,0.3\n0.5,0.3\n1,0.3\n");
+    for extra in [&[][..], &["--links", "modal"]] {
+        let found = place.json(&[&["compare", "robot.toml", "still.csv", "--no-files"], extra].concat());
+        assert!(found["tcp"]["dominant_hz"].is_null(), "{}", found["tcp"]);
+        assert!(found["energy"]["imbalance"].as_f64().unwrap() < 1e-3, "{}", found["energy"]);
     }
 }

@@ -112,11 +112,13 @@ fn options_of_other_runs_stand_before_two_dashes() {
 fn force_leaves_no_recording_of_an_earlier_run_beside_the_new_ones() {
     let place = Place::new();
     place.json(&COMPARE);
+    let figures = ["result/figures/torques_j9.svg", "result/figures/torques_j9.csv", "result/figures/arm_side.png"];
     for file in ["result/study.rrd", "result/run.parquet", "result/notes.txt", "result/figures/mine.svg"] {
         place.write(file, "old");
     }
+    figures.iter().for_each(|file| place.write(file, "old"));
     place.json(&[&COMPARE[..], &["--force"]].concat());
-    for gone in ["result/study.rrd", "result/run.parquet"] {
+    for gone in ["result/study.rrd", "result/run.parquet"].iter().chain(&figures) {
         assert!(!place.path(gone).exists(), "{gone}");
     }
     for kept in ["result/notes.txt", "result/figures/mine.svg"] {

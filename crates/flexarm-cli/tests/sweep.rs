@@ -182,3 +182,15 @@ fn the_least_width_of_a_beam_has_the_frequency_that_must_hold() {
     place.refused(&["sweep", "study.toml", "--minimise", "-o", "x"], &["[minimise]"]);
     place.refused(&["sweep", "study.toml", "--minimise", "weight", "-o", "x"], &["\"weight\" is no metric"]);
 }
+
+#[test]
+fn a_study_of_which_no_run_is_left_has_failed() {
+    let place = Place::new();
+    let study = "format = 1\nrobot = \"robot.toml\"\nmotion = \"swing.toml\"\n[[parameter]]\npath = \"link.bar.beam.width\"\nvalues = ";
+    place.write("none.toml", format!("{study}[-1.0]\n"));
+    let none = place.flexarm(&["sweep", "none.toml", "-o", "none", "--json"]);
+    assert_eq!((none.code, &none.json()["failed"]), (1, &serde_json::json!(1)));
+    place.write("some.toml", format!("{study}[-1.0, 0.02]\n"));
+    let some = place.flexarm(&["sweep", "some.toml", "-o", "some", "--json"]);
+    assert_eq!((some.code, &some.json()["done"]), (0, &serde_json::json!(1)), "{}", some.err);
+}

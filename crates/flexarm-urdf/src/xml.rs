@@ -64,12 +64,7 @@ pub(crate) fn decode(bytes: Vec<u8>, file: &Path) -> Result<String, Box<Issue>> 
 
 /// The tree of the text, or the first place where it is not XML.
 pub(crate) fn parse<'t>(text: &'t str, lines: &Lines<'_>) -> Result<Document<'t>, Box<Issue>> {
-    let document = Document::parse(text).map_err(|error| Box::new(describe(text, lines, &error)))?;
-    // The parser does not ask for the end of the last tag.
-    if !text.trim_end().ends_with('>') {
-        return Err(Box::new(issue(lines.end(), "the end of the file inside its last tag", "> (is the file whole?)")));
-    }
-    Ok(document)
+    Document::parse(text).map_err(|error| Box::new(describe(text, lines, &error)))
 }
 
 fn describe(text: &str, lines: &Lines<'_>, error: &Error) -> Issue {

@@ -392,3 +392,87 @@ fn a_compensation_that_is_stopped_leaves_nothing() {
         }
     }
 }
+
+/// A slender arm whose tool still swings when its motion ends; gearboxes alone yield, so that nothing but the step ends the series.
+/// Truth: joints that rested in the motion rest in the commands, after which the tool swings less everywhere.
+#[test]
+fn an_arm_that_rests_at_the_end_of_its_motion_is_not_struck_there() {
+    let place = std::env::temp_dir().join(format!("flexarm-compensate-end-{}", std::process::id()));
+    std::fs::create_dir_all(&place).unwrap();
+    let link = |name: &str, mass: f64, at: f64, inertia: f64| {
+        format!(
+            r#"<link name="{name}"><inertial><origin xyz="{at} 0 0"/><mass value="{mass}"/><inertia ixx="0.1" iyy="{inertia}" izz="{inertia}" ixy="0" ixz="0" iyz="0"/></inertial></link>"#
+        )
+    };
+    let joint = |name: &str, parent: &str, child: &str, x: f64| {
+        format!(
+            r#"<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/><origin xyz="{x} 0 0"/><axis xyz="0 1 0"/><limit lower="-3" upper="3" effort="3000" velocity="8"/></joint>"#
+        )
+    };
+    let urdf = [
+        r#"<robot name="slender"><link name="base"/>"#.into(),
+        link("arm", 20.0, 0.4, 1.0),
+        link("fore", 8.0, 0.3, 0.4),
+        joint("j1", "base", "arm", 0.0),
+        joint("j2", "arm", "fore", 0.8),
+        "</robot>".into(),
+    ];
+    std::fs::write(place.join("arm.urdf"), urdf.concat()).unwrap();
+    let drive = |joint: &str, inertia: f64, stiffness: f64, damping: f64| {
+        format!(
+            "[[drive]]\njoint = {joint:?}\nkind = \"gearbox\"\nratio = 100.0\nmotor_inertia = {inertia}\n\
+             gearbox = {{ stiffness = {stiffness}, damping = {damping} }}\n"
+        )
+    };
+    let robot = "format = 1\nurdf = \"arm.urdf\"\ntcp = { link = \"fore\", xyz = [0.6, 0.0, 0.0] }\n".to_owned()
+        + &drive("j1", 0.001, 1e5, 60.0)
+        + &drive("j2", 0.0004, 3e4, 12.0);
+    std::fs::write(place.join("robot.toml"), robot).unwrap();
+    let motion = "format = 1\nunit = \"deg\"\njoints = [\"j1\", \"j2\"]\nstart = [-60.0, 80.0]\n\
+                  [[move]]\nto = [-20.0, 12.0]\nduration = 1.0\nhold = 0.4\n";
+    std::fs::write(place.join("motion.toml"), motion).unwrap();
+    let robot = Robot::load(&place).unwrap();
+    let motion = Motion::load(place.join("motion.toml"), &robot).unwrap();
+    let components = [true, false, true, false, false, false];
+    let found = compensate_motion(&robot, &motion, &CompensateRequest { components, ..request() }).unwrap();
+    std::fs::remove_dir_all(&place).unwrap();
+    told("slender", &found);
+    // Best of two iterations 0.00151 of 3.203 mm; with the error held on behind its end 0.040, and 189 rad/s² in the last 12 ms.
+    assert!(found.after.peak_m < 1e-3 * found.before.peak_m, "{:e}", found.after.peak_m);
+    let (mut q, mut v, mut a) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+    let largest = |a: [f64; 2]| a[0].abs().max(a[1].abs());
+    let mut at_end = 0.0_f64;
+    for k in 1360..1400 {
+        found.trajectory.sample(1e-3 * f64::from(k), &mut q, &mut v, &mut a);
+        at_end = at_end.max(largest(a));
+    }
+    eprintln!("largest acceleration in the last 40 ms: {at_end:.3} rad/s2");
+    assert!(at_end < 4.0, "{at_end}"); // measured 1.29
+}
+
+/// Truth: a command that has a velocity at every time has none that jumps; the arm linearised goes along every 20 ms.
+#[test]
+fn commands_of_a_smooth_motion_have_no_kink_where_the_arm_is_linearised_anew() {
+    let (robot, motion) = shipped("kr210", "pick_and_place.toml");
+    let found = compensate_motion(&robot, &motion, &request()).unwrap();
+    let m = motion.trajectory.joints().len();
+    let (mut q, mut v, mut a, mut b) = (vec![0.0; m], vec![0.0; m], vec![0.0; m], vec![0.0; m]);
+    let mut change = |t: f64| {
+        found.trajectory.sample(t, &mut q, &mut v, &mut a);
+        motion.trajectory.sample(t, &mut q, &mut v, &mut b);
+        a.iter().zip(&b).map(|(a, b)| a - b).collect::<Vec<f64>>()
+    };
+    // What a sample of the change's acceleration has beside the mean of its neighbours, at nodes and half way between.
+    let mut beside = |t: f64| {
+        let [before, at, behind] = [change(t - 2e-3), change(t), change(t + 2e-3)];
+        (0..m).map(|k| (at[k] - 0.5 * (before[k] + behind[k])).abs()).fold(0.0, f64::max)
+    };
+    let count = (motion.trajectory.duration() / 0.02).floor() as u32 - 1;
+    let (mut at_nodes, mut between) = (0.0_f64, 0.0_f64);
+    for k in 2..count {
+        at_nodes = at_nodes.max(beside(0.02 * f64::from(k)));
+        between = between.max(beside(0.02 * f64::from(k) + 0.01));
+    }
+    eprintln!("acceleration beside the mean of its neighbours: {at_nodes:.4} at nodes, {between:.4} between (rad/s2)");
+    assert!(at_nodes < 3.0 * between.max(1e-3), "{at_nodes} {between}"); // measured 0.0022 and 0.0013; 0.188 with a chord
+}
