@@ -761,9 +761,9 @@ impl<'a> Builder<'a> {
         let place = |i: usize| places.get(self.bodies[i].joint.as_str()).copied().unwrap_or(usize::MAX);
         let mut ordered: Vec<usize> = (0..self.bodies.len()).collect();
         ordered.sort_by_key(|i| place(*i));
-        for elastic_pass in [false, true] {
-            for k in 0..self.bodies.len() {
-                let i = if elastic_pass { k } else { ordered[k] };
+        let as_they_are = (0..self.bodies.len()).collect();
+        for (elastic_pass, order) in [(false, ordered), (true, as_they_are)] {
+            for i in order {
                 let body = &self.bodies[i];
                 let none = matches!(body.motion, JointMotion::Interface { .. } | JointMotion::Welded);
                 let follows = dependent.contains(&i) || self.followers.iter().any(|f| f.body == i);
