@@ -30,6 +30,8 @@ const PIECES: u32 = 64;
 const LONGEST_REST: f64 = 500.0;
 /// An iteration that leaves more than this part of the one before is the last.
 const SETTLED: f64 = 0.9;
+/// Speeds below this are rest (rad/s or m/s).
+const REST: f64 = 1e-6;
 /// Least part of the peak below which nothing more is asked for.
 const ENOUGH: f64 = 1e-5;
 
@@ -262,6 +264,14 @@ impl<'a> Job<'a> {
         Ok(Node { M: at.M, D: at.D, K: at.K, M_a: at.M_a, D_a: at.D_a, K_a: at.K_a, J, J_a, servo })
     }
 
+    /// Whether all joints rest where the motion ends.
+    fn ends_at_rest(&self) -> bool {
+        let m = self.q.nrows();
+        let (mut q, mut v, mut a) = (vec![0.0; m], vec![0.0; m], vec![0.0; m]);
+        self.motion.trajectory.sample(self.motion.trajectory.duration(), &mut q, &mut v, &mut a);
+        v.iter().all(|v| v.abs() < REST)
+    }
+
     pub(super) fn dynamic(&self) -> Result<Commands, Error> {
         let (inversion, cutoff) = self.inversion()?;
         let (m, N) = self.q.shape();
@@ -275,8 +285,9 @@ impl<'a> Job<'a> {
             fewest: inversion.fewest_directions(),
             quicker: 0.0,
         };
-        // How the tool swings on behind the end, so that the inverse meets no edge there. Loads are known up to the end alone.
-        let beyond = match self.scenario.loads.is_empty() {
+        // How the tool swings on behind the end, so that the inverse meets no edge there. Loads are known up to the end alone, and
+        // joints that have not come to rest would be stopped within a sample.
+        let beyond = match self.scenario.loads.is_empty() && self.ends_at_rest() {
             true => (inversion.edge_s() / self.step_s()).ceil() as usize,
             false => 0,
         };
