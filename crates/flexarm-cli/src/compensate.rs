@@ -228,14 +228,13 @@ fn plants_text(found: &Compensation) -> String {
     let mut t = table(&["mm", "peak before", "after", "RMS before", "after", "taken away", "end before", "after"]);
     let mut row = |name: &str, before: &ErrorFigures, after: &ErrorFigures| {
         let mm = |x: f64| format!("{:.4}", 1e3 * x);
-        let part = format!("{:.2} %", 100.0 * (1.0 - after.rms_m / before.rms_m.max(f64::MIN_POSITIVE)));
         t.add_row(vec![
             name.to_owned(),
             mm(before.peak_m),
             mm(after.peak_m),
             mm(before.rms_m),
             mm(after.rms_m),
-            part,
+            before.reduction_to(after),
             mm(before.end_m),
             mm(after.end_m),
         ]);

@@ -107,16 +107,7 @@ fn page_of(error: &flexarm::Error) -> Option<&'static str> {
     match error {
         flexarm::Error::InStudy { source, .. } => page_of(source),
         flexarm::Error::Trajectory(TrajectoryError::File(_)) | flexarm::Error::Motion(_) => Some("motion"),
-        flexarm::Error::RobotFile(fault)
-            if fault.message.contains("unknown field") && fault.message.contains("`pareto`")
-                || fault.message.contains("`distribution`") =>
-        {
-            Some("study")
-        }
-        flexarm::Error::RobotFile(fault) if fault.message.contains("unknown field") => {
-            let loads = fault.message.contains("`payload`, ") || fault.message.contains("spindle_rpm");
-            Some(if loads && !fault.message.contains("`urdf`") { "loads" } else { "robot" })
-        }
+        flexarm::Error::RobotFile(fault) if fault.message.contains("unknown field") => Some(fault.page),
         _ => None,
     }
 }

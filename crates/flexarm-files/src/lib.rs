@@ -5,7 +5,7 @@
 //!
 //! // What is wrong in a text is said with line and column.
 //! let text = "format = 1\nmodes = -3\n";
-//! let error = Source::new("arm.toml".as_ref(), text).error(19..21, "modes is -3, at least 0 is needed");
+//! let error = Source::new("arm.toml".as_ref(), text, "robot").error(19..21, "modes is -3, at least 0 is needed");
 //! assert_eq!(error.to_string(), "arm.toml:2:9: modes is -3, at least 0 is needed");
 //!
 //! // Results come together, and what is there is not replaced unasked.

@@ -45,6 +45,8 @@ pub struct TextFileError {
     pub column: usize,
     /// What was found, what was expected, how to mend it.
     pub message: String,
+    /// Page of the documentation that describes the format: `robot`, `loads`, `measurements`, ...
+    pub page: &'static str,
 }
 
 /// The text of a file with its place, to point into it.
@@ -53,12 +55,13 @@ pub struct Source {
     /// The file.
     pub path: PathBuf,
     text: String,
+    page: &'static str,
 }
 
 impl Source {
-    /// The text of the file at `path`.
-    pub fn new(path: &Path, text: &str) -> Self {
-        Self { path: path.to_owned(), text: text.to_owned() }
+    /// The text of the file at `path`, in a format that `page` of the documentation describes.
+    pub fn new(path: &Path, text: &str, page: &'static str) -> Self {
+        Self { path: path.to_owned(), text: text.to_owned(), page }
     }
 
     /// An error at a byte range of the text.
@@ -66,7 +69,7 @@ impl Source {
         let before = self.text.get(..span.start).unwrap_or(&self.text);
         let line = before.matches('\n').count() + 1;
         let column = before.len() - before.rfind('\n').map_or(0, |i| i + 1) + 1;
-        TextFileError { path: self.path.clone(), line, column, message: message.into() }
+        TextFileError { path: self.path.clone(), line, column, message: message.into(), page: self.page }
     }
 
     /// What a reader of TOML says, in the words of the file format instead of those of Rust.

@@ -126,7 +126,7 @@ fn place(texts: &[Text], fail: &Fail) -> TextFileError {
     let text = &texts[fail.span.file];
     let excerpt = text.excerpt(fail.span);
     let message = if excerpt.is_empty() { fail.message.clone() } else { format!("`{excerpt}`: {}", fail.message) };
-    Source::new(&text.path, &text.text).error(fail.span.start..fail.span.end, message)
+    Source::new(&text.path, &text.text, "program").error(fail.span.start..fail.span.end, message)
 }
 
 /// Text of UTF-8, else of Latin-1, which every byte is; ends of lines as they are.

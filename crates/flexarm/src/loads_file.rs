@@ -152,7 +152,7 @@ pub(crate) fn parse_loads(
     path: &Path,
     duration: f64,
 ) -> Result<(Vec<AppliedLoad>, Vec<PayloadChange>), Error> {
-    let source = Source::new(path, text);
+    let source = Source::new(path, text, "loads");
     let file: LoadsFile = parsed(text, &source, |file: &LoadsFile| &file.format)?;
     let folder = path.parent().unwrap_or(Path::new("."));
     let loads = file.load.iter().map(|entry| load(entry, folder, duration, &source));

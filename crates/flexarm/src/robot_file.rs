@@ -168,7 +168,7 @@ pub(crate) struct DampingEntry {
 /// # Errors
 /// [`RobotFileError`] with line and column for anything that is not the format.
 pub(crate) fn parse_robot_file(text: &str, path: &Path) -> Result<(RobotFile, Source), RobotFileError> {
-    let source = Source::new(path, text);
+    let source = Source::new(path, text, "robot");
     let file: RobotFile = parsed(text, &source, |file: &RobotFile| &file.format)?;
     Ok((file, source))
 }

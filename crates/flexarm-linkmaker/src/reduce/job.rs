@@ -271,7 +271,7 @@ fn is_job(text: &str) -> bool {
 }
 
 fn parse_job(text: &str, path: &Path) -> Result<ReduceJob, LinkError> {
-    let source = Source::new(path, text);
+    let source = Source::new(path, text, "flex");
     let failed = |error: toml::de::Error| {
         let hint = match error.message().contains("missing field `mesh`") {
             true => ": add mesh = \"file.msh\"",

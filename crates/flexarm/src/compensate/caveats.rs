@@ -2,7 +2,7 @@
 
 use flexarm_trajectory::Extreme;
 
-use super::job::Commands;
+use super::job::{Commands, Discarded};
 use super::{Compensation, limits};
 use crate::arm::Arm;
 use crate::caveat::Caveat;
@@ -37,6 +37,32 @@ fn quick_caveat(answer: &Compensation, quicker: f64) -> Option<Caveat> {
             100.0 * quicker
         );
         Caveat::said("too-quick", "compensation", text, "give the motion more time or smoother accelerations")
+    })
+}
+
+/// Iterations that made the error on the model larger, with the frequency up to which the kept ones correct.
+fn discarded_caveat(answer: &Compensation, discarded: &[Discarded]) -> Option<Caveat> {
+    let each = |of: &Discarded| match of.growth.is_finite() {
+        true => {
+            format!("iteration {} (up to {:.1} Hz) made it {:.3} times as large", of.iteration, of.cutoff_hz, of.growth)
+        }
+        false => format!("iteration {} (up to {:.1} Hz) diverged", of.iteration, of.cutoff_hz),
+    };
+    let named: Vec<String> = discarded.iter().map(each).collect();
+    let kept = match (answer.iterations, answer.cutoff_hz) {
+        (0, _) | (_, None) => "no iteration is kept".to_owned(),
+        (kept, Some(hz)) => format!("{kept} kept, corrected up to {hz:.1} Hz"),
+    };
+    (!named.is_empty()).then(|| {
+        let text =
+            format!("iterations that enlarge the RMS error on the model are discarded: {}; {kept}", named.join(", "));
+        let caveat = Caveat::said(
+            "discarded",
+            "compensation",
+            text,
+            "choose a lower cutoff, or give links and gearboxes their damping",
+        );
+        if answer.iterations > 0 { caveat.as_note() } else { caveat }
     })
 }
 
@@ -99,6 +125,7 @@ pub(super) fn of(
             "the model is not that of the plant, or the motion is too quick for it",
         ));
     }
+    caveats.extend(discarded_caveat(answer, &found.discarded));
     caveats.extend(quick_caveat(answer, found.quicker));
     caveats.extend(found.fewest.and_then(|fewest| singular_caveat(fewest, asked)));
     caveats

@@ -11,7 +11,9 @@ pub enum CompensateError {
     #[error("the robot has no flexible link and no elastic drive: its tool is where the rigid arm has it")]
     NothingYields,
     /// Corners.
-    #[error("the velocity jumps at {t_s} s: no command takes that away; round the corners of the motion first")]
+    #[error(
+        "the velocity jumps at {t_s} s, which the dynamic method cannot correct: let the motion begin and end at rest and round its corners, or take the static method"
+    )]
     Corner {
         /// When (s).
         t_s: f64,

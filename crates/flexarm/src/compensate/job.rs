@@ -72,6 +72,19 @@ pub(super) struct Commands {
     pub(super) fewest: Option<(f64, usize)>,
     /// Part of what is left on the model, by its RMS, that is quicker than the cutoff.
     pub(super) quicker: f64,
+    /// Iterations that made the error larger.
+    pub(super) discarded: Vec<Discarded>,
+}
+
+/// An iteration that made the error larger.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Discarded {
+    /// Its number, from 1.
+    pub(super) iteration: usize,
+    /// Highest frequency that it corrected (Hz).
+    pub(super) cutoff_hz: f64,
+    /// RMS error after it over that before it; NaN if the run diverged.
+    pub(super) growth: f64,
 }
 
 impl<'a> Job<'a> {
@@ -216,7 +229,7 @@ impl<'a> Job<'a> {
     }
 
     /// The arm linearised along the motion.
-    fn inversion(&self) -> Result<(Inversion, f64), Error> {
+    fn inversion(&self) -> Result<Inversion, Error> {
         let duration = self.motion.trajectory.duration();
         let count = ((duration / NODE_S).ceil() as usize).max(1);
         let spacing = duration / count as f64;
@@ -227,12 +240,10 @@ impl<'a> Job<'a> {
         };
         let nodes = (0..=count).into_par_iter().map(node).collect::<Result<Vec<Node>, Error>>()?;
         let inversion = Inversion::new(&nodes, spacing).map_err(CompensateError::from)?;
-        let inversion = match self.request.cutoff_hz {
+        Ok(match self.request.cutoff_hz {
             Some(hz) => inversion.below(hz),
             None => inversion,
-        };
-        let cutoff = inversion.cutoff_hz();
-        Ok((inversion, cutoff))
+        })
     }
 
     /// The arm held where the motion begins: gains of servos and dampings of a run are those of its start.
@@ -272,50 +283,65 @@ impl<'a> Job<'a> {
         v.iter().all(|v| v.abs() < REST)
     }
 
-    pub(super) fn dynamic(&self) -> Result<Commands, Error> {
-        let (inversion, cutoff) = self.inversion()?;
-        let (m, N) = self.q.shape();
-        let mut change = DMatrix::zeros(m, N);
-        let mut best = Commands {
-            motion: self.motion.clone(),
-            change: change.clone(),
-            peaks: Vec::new(),
-            kept: 0,
-            cutoff_hz: Some(cutoff),
-            fewest: inversion.fewest_directions(),
-            quicker: 0.0,
-        };
-        // How the tool swings on behind the end, so that the inverse meets no edge there. Loads are known up to the end alone, and
-        // joints that have not come to rest would be stopped within a sample.
-        let beyond = match self.scenario.loads.is_empty() && self.ends_at_rest() {
+    /// Samples for which the motion is held at its end, so that the inverse sees how the tool swings on there. None with loads, which
+    /// are known up to the end only, and none where the joints do not come to rest.
+    fn samples_beyond(&self, inversion: &Inversion) -> usize {
+        match self.scenario.loads.is_empty() && self.ends_at_rest() {
             true => (inversion.edge_s() / self.step_s()).ceil() as usize,
             false => 0,
-        };
+        }
+    }
+
+    /// Corrects the commands by the inverse of the arm until the error settles. An iteration that makes the error larger is
+    /// discarded, and the next one corrects up to half the frequency.
+    pub(super) fn dynamic(&self) -> Result<Commands, Error> {
+        let mut inversion = self.inversion()?;
+        let (m, N) = self.q.shape();
         let within = |error: &DMatrix<f64>| error.columns(0, N).into_owned();
-        let mut whole = self.error(&change, beyond)?;
-        let mut error = within(&whole);
         let size = |error: &DMatrix<f64>| error.select_rows(&self.rows).norm();
-        let (first, mut least) = (size(&error), size(&error));
-        let mut left_over = error.clone();
-        best.peaks.push(peak(&error));
+        let mut beyond = self.samples_beyond(&inversion);
+        let mut whole = self.error(&DMatrix::zeros(m, N), beyond)?;
+        let mut error = within(&whole);
+        let mut best = Commands {
+            motion: self.motion.clone(),
+            change: DMatrix::zeros(m, N),
+            peaks: vec![peak(&error)],
+            kept: 0,
+            cutoff_hz: Some(inversion.cutoff_hz()),
+            fewest: inversion.fewest_directions(),
+            quicker: 0.0,
+            discarded: Vec::new(),
+        };
+        let first = size(&error);
+        let mut least = first;
         for iteration in 1..=self.request.iterations {
             let y = -whole.select_rows(&self.rows);
-            change += inversion.commands(&y, self.step_s()).columns(0, N);
-            whole = self.error(&change, beyond)?;
-            error = within(&whole);
-            let left = size(&error);
-            best.peaks.push(peak(&error));
-            if left.is_nan() || left >= least {
+            let change = &best.change + inversion.commands(&y, self.step_s()).columns(0, N);
+            let next = self.error(&change, beyond)?;
+            let left = size(&within(&next));
+            best.peaks.push(peak(&within(&next)));
+            if left.is_nan() || left > least / SETTLED {
+                let cutoff_hz = inversion.cutoff_hz();
+                best.discarded.push(Discarded { iteration, cutoff_hz, growth: left / least });
+                inversion = inversion.below(0.5 * cutoff_hz);
+                beyond = self.samples_beyond(&inversion);
+                whole = self.error(&best.change, beyond)?;
+                continue;
+            }
+            if left >= least {
                 break;
             }
             let settled = left > SETTLED * least || left < ENOUGH * first;
-            (least, best.motion, best.change, best.kept) = (left, self.moved(&change)?, change.clone(), iteration);
-            left_over.copy_from(&error);
+            (least, best.motion, best.change) = (left, self.moved(&change)?, change);
+            best.kept += 1;
+            best.cutoff_hz = Some(inversion.cutoff_hz());
+            error = within(&next);
+            whole = next;
             if settled {
                 break;
             }
         }
-        let left_over = left_over.select_rows(&self.rows);
+        let left_over = error.select_rows(&self.rows);
         best.quicker =
             inversion.quicker_than_cutoff(&left_over, self.step_s()).norm() / left_over.norm().max(f64::MIN_POSITIVE);
         Ok(best)
@@ -361,7 +387,16 @@ impl<'a> Job<'a> {
         }
         let motion = self.moved(&change)?;
         let peaks = vec![peak(&self.error(&DMatrix::zeros(m, N), 0)?), peak(&self.error(&change, 0)?)];
-        Ok(Commands { motion, change, peaks, kept: 1, cutoff_hz: None, fewest: None, quicker: 0.0 })
+        Ok(Commands {
+            motion,
+            change,
+            peaks,
+            kept: 1,
+            cutoff_hz: None,
+            fewest: None,
+            quicker: 0.0,
+            discarded: Vec::new(),
+        })
     }
 }
 

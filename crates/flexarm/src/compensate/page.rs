@@ -12,22 +12,28 @@ pub(super) fn html(answer: &Compensation) -> String {
     let mut page = opening(&format!("Compensation of {} on {}", answer.motion, answer.robot), "");
     let _ = writeln!(
         page,
-        "<p>Largest distance of the tool from the rigid arm's: {:.4} mm before, <b>{:.4} mm</b> after ({}, {} iterations).</p>",
+        "<p>Largest distance of the tool from the rigid arm's: {:.4} mm before, <b>{:.4} mm</b> after ({} method, {} iterations{}).</p>",
         1e3 * answer.before.peak_m,
         1e3 * answer.after.peak_m,
         answer.method,
-        answer.iterations
+        answer.iterations,
+        answer.cutoff_hz.map(|hz| format!(", corrected up to {hz:.1} Hz")).unwrap_or_default()
     );
     for caveat in &answer.caveats {
         let _ = writeln!(page, "<p class=\"no\">{}</p>", escaped(&caveat.message));
     }
     page += &curves(answer);
-    page += "<h2>On other plants</h2>\n<table><tr><th>plant</th><th>peak before (mm)</th><th>after</th><th>RMS before</th><th>after</th><th>taken away</th></tr>\n";
+    page += "<h2>On other plants</h2>\n<table><tr><th>plant</th><th>peak before (mm)</th><th>after</th><th>RMS before</th><th>after</th><th>RMS taken away</th></tr>\n";
     page += &row("as given", &answer.before, &answer.after);
     for plant in &answer.plants {
         page += &row(&escaped(&plant.plant), &plant.before, &plant.after);
     }
-    page += "</table>\n<h2>Largest change of each joint</h2>\n<table><tr><th>joint</th><th>rad or m</th><th>deg</th></tr>\n";
+    page += "</table>\n";
+    if answer.plants.iter().any(|plant| plant.after.rms_m > plant.before.rms_m) {
+        page +=
+            "<p>Where the error becomes larger, the commands correct a deflection that this plant does not have.</p>\n";
+    }
+    page += "<h2>Largest change of each joint</h2>\n<table><tr><th>joint</th><th>rad or m</th><th>deg</th></tr>\n";
     for change in &answer.changes {
         let _ = writeln!(
             page,
@@ -93,12 +99,12 @@ fn limits(answer: &Compensation) -> String {
 
 fn row(name: &str, before: &ErrorFigures, after: &ErrorFigures) -> String {
     format!(
-        "<tr><td>{name}</td><td>{:.4}</td><td>{:.4}</td><td>{:.4}</td><td>{:.4}</td><td>{:.1} %</td></tr>\n",
+        "<tr><td>{name}</td><td>{:.4}</td><td>{:.4}</td><td>{:.4}</td><td>{:.4}</td><td>{}</td></tr>\n",
         1e3 * before.peak_m,
         1e3 * after.peak_m,
         1e3 * before.rms_m,
         1e3 * after.rms_m,
-        100.0 * (1.0 - after.rms_m / before.rms_m.max(f64::MIN_POSITIVE))
+        before.reduction_to(after)
     )
 }
 

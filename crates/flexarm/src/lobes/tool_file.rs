@@ -177,7 +177,7 @@ impl CuttingTool {
     pub fn load(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
         let text = read_text(path)?;
-        let source = Source::new(path, &text);
+        let source = Source::new(path, &text, "tool");
         let file: ToolFile = parsed(&text, &source, |file: &ToolFile| &file.format)?;
         let reader = Reader {
             source: &source,

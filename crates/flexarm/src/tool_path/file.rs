@@ -194,7 +194,7 @@ pub(crate) fn read_path_file(
     text: &str,
     cell: &Cell<'_>,
 ) -> Result<(flexarm_trajectory::Trajectory, ToolPath), Error> {
-    let source = Source::new(path, text);
+    let source = Source::new(path, text, "path");
     let file: PathFile = toml::from_str(text).map_err(|error| {
         let message = format!("{}; docs/motions.md has all keys of path files", error.message());
         source.unread(error.span(), &message)

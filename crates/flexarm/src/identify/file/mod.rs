@@ -139,7 +139,7 @@ pub(super) struct Cell<'a> {
 /// [`Error`] with file, place, what was found and what was expected.
 pub(super) fn read(path: &Path, cell: &Cell<'_>) -> Result<MeasurementInput, Error> {
     let text = read_text(path)?;
-    let source = Source::new(path, &text);
+    let source = Source::new(path, &text, "measurements");
     let file: MeasurementFile = parsed(&text, &source, |file: &MeasurementFile| &file.format)?;
     let (length, length_m) = unit("length", &file.length, &LENGTHS, &source)?;
     let units = Units {
