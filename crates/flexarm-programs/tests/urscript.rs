@@ -94,7 +94,7 @@ fn statements_that_cannot_be_run_are_named_with_place_and_remedy() {
         ("run t()", "threads are not simulated"),
         ("movej(q)", "`q`: depends on `q`"),
         ("movej([0,0,0,0,0,0], r=-1)", "the blend of this move is -1: it must be 0 or more"),
-        ("movej([0,0,0,0,0,0], v=0)", "the joint speed of this move is 0: it must be above 0"),
+        ("movej([0,0,0,0,0,0], v=0)", "the joint speed is 0, expected 1e-6 to 1e12 (rad/s)"),
         ("movel(p[1,2,3,0,0,0]", "`)` is expected here"),
         ("if True:\nmovej([0,0,0,0,0,1])", "this block does not end: `end` is missing"),
     ];
