@@ -380,7 +380,8 @@ mod tests {
     }
 
     proptest! {
-        /// Truth: the tool keeps its orientation. Programs round their numbers, so ends differ a little.
+        /// Truth: the tool keeps its orientation. Where rounded ends differ, what is turned grows by (a/2) / sin(a/2) at most, 21
+        /// at the largest angle a.
         #[test]
         fn a_tool_that_is_told_the_same_orientation_at_both_ends_of_an_arc_does_not_turn(
             angle in prop_oneof![Just(std::f64::consts::PI), 3.1..3.2f64, 0.3..6.0f64],
@@ -392,7 +393,7 @@ mod tests {
             let [X0, X_via, X1] = about_z(angle, R0, Rotation3::new(noise) * R0);
             let via = by_via.then_some(&R0);
             let arc = ToolCurve::arc(&X0, &X_via.translation.vector, via, &X1, None, with_path).unwrap();
-            let bound = 1e-9 + 3.0 * noise.norm();
+            let bound = 1e-9 + 25.0 * noise.norm();
             prop_assert!(turned(&arc) < bound, "{} rad", turned(&arc)); // measured up to 1e-13 without rounding
         }
 

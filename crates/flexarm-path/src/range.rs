@@ -28,7 +28,11 @@ pub struct OutOfRange {
 /// A number without long rows of zeros.
 fn short(value: f64) -> String {
     let size = value.abs();
-    if size.is_finite() && size != 0.0 && !(1e-4..1e6).contains(&size) { format!("{value:e}") } else { value.to_string() }
+    if size.is_finite() && size != 0.0 && !(1e-4..1e6).contains(&size) {
+        format!("{value:e}")
+    } else {
+        value.to_string()
+    }
 }
 
 fn within(what: &'static str, unit: &'static str, value: f64, range: [f64; 2]) -> Result<(), OutOfRange> {
@@ -49,7 +53,10 @@ fn check_point(what: &'static str, p: &nalgebra::Vector3<f64>) -> Result<(), Out
 
 fn check_pose(what: &'static str, X: &Pose) -> Result<(), OutOfRange> {
     check_point(what, &X.translation.vector)?;
-    X.rotation.matrix().iter().try_for_each(|value| within("a direction of the tool or a frame", "1", *value, [-1.1, 1.1]))
+    X.rotation
+        .matrix()
+        .iter()
+        .try_for_each(|value| within("a direction of the tool or a frame", "1", *value, [-1.1, 1.1]))
 }
 
 /// Checks the time at which a motion ends (s).

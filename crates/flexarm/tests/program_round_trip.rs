@@ -76,7 +76,8 @@ fn program(language: &str, model: &Model, all: &[[f64; 6]]) -> String {
             let status = u8::from(ahead < 0.0) + 2 * u8::from(bend > 0.0) + 4 * u8::from(q[4] < 0.0) + 16;
             let turn = (0..6).map(|k| u8::from(q[k] < 0.0) << k).sum::<u8>();
             let (x, y, z) = (p.x, p.y, p.z);
-            writeln!(text, "PTP {{X {x:.9},Y {y:.9},Z {z:.9},A {a:.10},B {b:.10},C {c:.10},S {status},T {turn}}}").unwrap();
+            writeln!(text, "PTP {{X {x:.9},Y {y:.9},Z {z:.9},A {a:.10},B {b:.10},C {c:.10},S {status},T {turn}}}")
+                .unwrap();
         } else {
             let r = UnitQuaternion::from_rotation_matrix(&X.rotation);
             let quarter = |k: usize| (q[k].to_degrees() / 90.0).floor();
@@ -114,8 +115,7 @@ fn joints_of_a_program_come_back_from_its_targets_and_from_those_that_are_writte
     let arm = arm_of(&model);
     let mut draw = Draw(7);
     let all: Vec<[f64; 6]> = (0..400).map(|_| random_axes(&mut draw, &model)).collect();
-    let moved: Vec<[f64; 6]> =
-        all.iter().map(|q| q.map(|a| a + draw.between(-0.005, 0.005))).collect();
+    let moved: Vec<[f64; 6]> = all.iter().map(|q| q.map(|a| a + draw.between(-0.005, 0.005))).collect();
     for language in ["src", "mod"] {
         let (text, found) = read(language, program(language, &model, &all).as_bytes(), &arm);
         assert_same(&found, &all, 1e-8); // measured 1e-9

@@ -176,7 +176,10 @@ fn what_is_wrong_is_told_with_its_place_and_the_remedy() {
         (format!("{head}{start}[[move]]\nline = [9000, 0, 1300]\n"), "the arm cannot go on beyond"),
         (format!("{head}{start}[[move]]\njoint_to = [9000, 0, 1300]\n"), "out of reach by about"),
         (format!("{head}[[move]]\njoints = [0, -60, 90]\n"), "3 values for the 6 joints"),
-        (format!("{head}speed = -2.0\n{start}[[move]]\nline = [1700, 0, 1300]\n"), "the speed of the path is -0.002, expected"),
+        (
+            format!("{head}speed = -2.0\n{start}[[move]]\nline = [1700, 0, 1300]\n"),
+            "the speed of the path is -0.002, expected",
+        ),
         (format!("{head}[limits]\njoint_9 = {{ velocity = 1 }}\n{start}"), "the robot has no joint \"joint_9\""),
         (format!("{head}{start}[[move]]\nline = [1700, 0, 1300]\nquaternion = [2, 0, 0, 0]\n"), "it must be 1"),
         (head.to_string(), "no move"),
