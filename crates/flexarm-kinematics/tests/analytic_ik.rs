@@ -247,9 +247,10 @@ fn a_wrist_centre_on_axis_1_leaves_joint_1_free_and_keeps_it() {
     }
 }
 
-/// Truth: the closed form of the wrist centre in the plane of the arm, by the data sheet's lengths.
+/// Truth: the closed form of the wrist centre in the plane of the arm, by the data sheet's lengths; for bit 2 what controllers
+/// recorded (next test but one).
 #[test]
-fn kuka_status_and_turn_are_those_of_the_manual() {
+fn kuka_status_and_turn_are_those_of_the_controller() {
     let mut tree = kr300();
     let limits = [185.0, 185.0, -140.0, -5.0, -120.0, 168.0, 350.0, 350.0, 125.0, 125.0, 350.0, 350.0];
     for (k, joint) in tree.joints[..6].iter_mut().enumerate() {
@@ -265,8 +266,8 @@ fn kuka_status_and_turn_are_those_of_the_manual() {
     let home = degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]);
     assert_eq!((arm.kuka_status(&home, &axes), kuka_turn(&home, &axes)), (Some(2), 2));
     // Stretched where axis 3 is at -atan2(41 mm, 1000 mm) = -2.35°.
-    assert_eq!(arm.kuka_status(&degrees([10.0, -60.0, -2.3, 5.0, 20.0, 0.0]), &axes), Some(6));
-    assert_eq!(arm.kuka_status(&degrees([10.0, -60.0, -2.4, 5.0, -20.0, 0.0]), &axes), Some(0));
+    assert_eq!(arm.kuka_status(&degrees([10.0, -60.0, -2.3, 5.0, -20.0, 0.0]), &axes), Some(6));
+    assert_eq!(arm.kuka_status(&degrees([10.0, -60.0, -2.4, 5.0, 20.0, 0.0]), &axes), Some(0));
 
     let mut draw = Draw(17);
     let mut solutions = Solutions::default();
@@ -278,7 +279,7 @@ fn kuka_status_and_turn_are_those_of_the_manual() {
         let (a2, a23) = (q[1], q[1] + q[2]);
         let x = 0.35 + 1.15 * a2.cos() + 1.0 * a23.cos() - 0.041 * a23.sin();
         let stretched = -(0.041_f64.atan2(1.0));
-        let status = u8::from(x < 0.0) + 2 * u8::from(q[2] > stretched) + 4 * u8::from(q[4] > 0.0);
+        let status = u8::from(x < 0.0) + 2 * u8::from(q[2] > stretched) + 4 * u8::from(q[4] < 0.0);
         assert_eq!(arm.kuka_status(&q, &axes), Some(status), "{q:?}");
         behind += u32::from(x < 0.0);
         // There and back: the pose with its S and T is the joint values, wherever one looks from.
@@ -290,6 +291,66 @@ fn kuka_status_and_turn_are_those_of_the_manual() {
         solved += 1;
     }
     assert!(behind > 200 && solved == 2000);
+}
+
+/// Status and turn of points that KUKA controllers recorded: data lists and positions in public programs of welding, milling,
+/// printing and handling cells. Bits 3 and 4 of the status say nothing of the branch.
+const RECORDED_BY_KUKA: [(u8, &[u8]); 5] = [
+    (0, &[14]),
+    (2, &[2, 3, 10, 11, 34, 35]),
+    (6, &[18, 19, 26, 27, 50, 58, 59]),
+    (18, &[2, 10, 34]),
+    (22, &[18, 26, 27, 50]),
+];
+
+/// Truth: the words of the same point in [`RECORDED_BY_KUKA`], of which the turn tells the signs of the axes.
+#[test]
+fn the_status_of_axes_with_recorded_signs_is_the_one_that_was_recorded_with_them() {
+    let model = Model::new(&kr300()).unwrap();
+    let arm = AnalyticArm::new(&model, model.frame("tool").unwrap()).unwrap();
+    let mut draw = Draw(31);
+    let mut solutions = Solutions::default();
+    for (status, turn) in RECORDED_BY_KUKA.iter().flat_map(|(s, turns)| turns.iter().map(move |t| (*s, *t))) {
+        for _ in 0..50 {
+            // Axis 3 clear of the stretched arm at -2.35°, the wrist centre ahead of axis 1.
+            let largest = [1.5, 1.5, 1.6, 3.0, 2.0, 3.0];
+            let q: [f64; 6] = std::array::from_fn(|k| {
+                let size = draw.between(0.1, largest[k]);
+                if turn >> k & 1 == 1 { -size } else { size }
+            });
+            let (a2, a23) = (q[1], q[1] + q[2]);
+            if 0.35 + 1.15 * a2.cos() + a23.cos() - 0.041 * a23.sin() < 0.05 {
+                continue;
+            }
+            assert_eq!(kuka_turn(&q, &ControllerAxes::SAME), turn);
+            assert_eq!(arm.kuka_status(&q, &ControllerAxes::SAME), Some(status & 7), "T {turn}: {q:?}");
+            arm.solve(&arm.pose(&q), &mut solutions);
+            for turn in [Some(turn), None] {
+                let meant = Selection::Kuka { status: Some(status), turn };
+                let chosen = arm.choose(&solutions, &meant, &ControllerAxes::SAME, &[0.0; 6]).unwrap();
+                assert!(apart(&chosen, &q) < 1e-8, "{meant:?}: {chosen:?} {q:?}");
+            }
+        }
+    }
+}
+
+/// Truth: positions that a controller recorded at one moment as axis values (degrees) and as a target with its confdata: arms
+/// IRB 4600-40/2.55 on gantries, from the public backup of a research cell.
+#[test]
+fn the_confdata_of_recorded_axes_are_those_that_the_controller_recorded_with_them() {
+    let recorded = [
+        ([-129.552, -20.8879, 34.2834, 126.408, 88.3995, -56.5566], [-2, 1, -1, 0]),
+        ([180.0, 90.0, 1.01189e-28, 0.0, 5.25048e-29, -1.2737e-28], [2, 0, -1, 0]),
+        ([-62.5085, -53.3891, 33.5052, 180.037, 70.2409, -27.766], [-1, 2, -1, 0]),
+        ([-62.5085, -53.389, 33.5055, 180.037, 70.2406, -27.7658], [-1, 2, -1, 0]),
+        ([0.000460403, 89.9923, -0.000577472, -0.000631446, 15.0005, -0.00429965], [0, -1, -1, 0]),
+    ];
+    let model = Model::new(&irb4600()).unwrap();
+    let arm = AnalyticArm::new(&model, model.frame("tool").unwrap()).unwrap();
+    for (degrees, [a, b, c, cfx]) in recorded {
+        let q = degrees.map(f64::to_radians);
+        assert_eq!(arm.abb_configuration(&q, &ControllerAxes::SAME), Some(([a, b, c], cfx)), "{degrees:?}");
+    }
 }
 
 /// Truth: the table of the manual, by the wrist centre in the plane of the arm.

@@ -56,8 +56,11 @@ pub(crate) struct Start {
 }
 
 impl Start {
-    /// Before the first move.
+    /// Before the first move, once all numbers are checked.
     pub(crate) fn of(items: &[Item], arm: &ProgramArm<'_>) -> Result<Self, PathError> {
+        for item in items {
+            item.check().map_err(|source| PathError::out_of_range(item, source))?;
+        }
         let first = items.iter().find_map(|item| match item {
             Item::Move(first) => Some(first),
             Item::Dwell { .. } => None,
@@ -125,7 +128,6 @@ impl<'m> Legs<'m> {
     ) -> Result<Vec<Leg>, PathError> {
         let mut legs: Vec<Leg> = Vec::new();
         while let Some(Item::Move(of)) = items.get(*k) {
-            check(of)?;
             let group = spline_group(items, *k);
             if group.is_empty() {
                 *k += 1;
@@ -388,38 +390,6 @@ fn natural_second_derivatives(p: &[Vector3<f64>], h: &[f64]) -> Vec<Vector3<f64>
         second[k] = rhs[k] - second[k + 1] * factor[k];
     }
     second
-}
-
-/// Numbers of a move that must be positive.
-fn check(of: &Move) -> Result<(), PathError> {
-    let speed = &of.speed;
-    let blend = match of.blend {
-        Blend::Distance(value) | Blend::Fraction(value) | Blend::Velocity(value) | Blend::Orientation(value)
-            if value != 0.0 =>
-        {
-            Some(value)
-        }
-        _ => None,
-    };
-    let values = [
-        ("the speed of the path", speed.linear_m_s),
-        ("the acceleration of the path", speed.linear_m_s2),
-        ("the jerk of the path", speed.linear_m_s3),
-        ("the speed of turning", speed.angular_rad_s),
-        ("the acceleration of turning", speed.angular_rad_s2),
-        ("the part of the joint speeds", speed.joint_fraction),
-        ("the part of the joint accelerations", speed.joint_acceleration_fraction),
-        ("the joint speed", speed.joint_rad_s),
-        ("the joint acceleration", speed.joint_rad_s2),
-        ("the duration", speed.duration_s),
-        ("the size of the blend", blend),
-    ];
-    for (what, value) in values {
-        if let Some(value) = value.filter(|value| !(*value > 0.0 && value.is_finite())) {
-            return Err(PathError::Value { line: of.line, statement: of.statement.clone(), what, value });
-        }
-    }
-    Ok(())
 }
 
 /// A path that cannot be followed, as a sentence.

@@ -18,6 +18,7 @@ mod legs;
 mod limits;
 mod plan;
 pub mod program;
+mod range;
 mod route;
 mod schedule;
 mod targets;
@@ -28,4 +29,5 @@ pub use follow::{Blocked, Follower, GuidedJoint, JointJet, ToolWay, coordinates_
 pub use plan::{
     ControllerAxis, JointBounds, PathError, PathOptions, Planned, PlannedMove, ProgramArm, Slowed, SlowedBy, plan,
 };
+pub use range::{OutOfRange, check_axes, check_rate};
 pub use targets::{base_of, target_at, target_joints, tool_of};

@@ -9,6 +9,7 @@ use crate::curve::ArcError;
 use crate::follow::{Blocked, coordinates_of};
 use crate::legs::{Legs, Start};
 use crate::program::{Item, Program};
+use crate::range::{OutOfRange, check_end};
 use crate::route::Route;
 use crate::schedule::{Knot, Schedule};
 
@@ -252,17 +253,15 @@ pub enum PathError {
         /// Which.
         source: ArcError,
     },
-    /// A number that is none, or not positive where it must be.
-    #[error("line {line}: {statement}: {what} is {value}: it must be a positive number")]
+    /// A number that is none, or outside of what a robot can do.
+    #[error("line {line}: {statement}: {source}")]
     Value {
         /// Line.
         line: usize,
         /// Statement.
         statement: String,
-        /// Of what.
-        what: &'static str,
-        /// The number.
-        value: f64,
+        /// Which.
+        source: OutOfRange,
     },
     /// The time law.
     #[error("line {line}: {statement}: {why}")]
@@ -277,6 +276,15 @@ pub enum PathError {
     /// Joints over time.
     #[error(transparent)]
     Trajectory(#[from] TrajectoryError),
+}
+
+impl PathError {
+    pub(crate) fn out_of_range(item: &Item, source: OutOfRange) -> Self {
+        match item {
+            Item::Move(of) => Self::Value { line: of.line, statement: of.statement.clone(), source },
+            Item::Dwell { line, .. } => Self::Value { line: *line, statement: "wait".to_owned(), source },
+        }
+    }
 }
 
 /// The motion that a program asks for.
@@ -313,11 +321,7 @@ fn plan_holding(
     let mut start = Start::of(items, arm)?;
     let mut k = start.first;
     while k < items.len() {
-        if let Item::Dwell { seconds, line } = &items[k] {
-            if !(*seconds >= 0.0 && seconds.is_finite()) {
-                let (line, what) = (*line, "a dwell");
-                return Err(PathError::Value { line, statement: String::new(), what, value: *seconds });
-            }
+        if let Item::Dwell { seconds, .. } = &items[k] {
             if !start.known {
                 waiting += seconds;
             } else if *seconds > 0.0 {
@@ -341,9 +345,8 @@ fn plan_holding(
             now += schedule.duration();
         }
     }
-    if knots.is_empty() {
-        return Err(PathError::NoMove);
-    }
+    let last = items.last().filter(|_| !knots.is_empty()).ok_or(PathError::NoMove)?;
+    check_end(now).map_err(|source| PathError::out_of_range(last, source))?;
     let held = legs.held();
     Ok(Planned { trajectory: trajectory(arm.model, knots)?, moves, stops, held })
 }

@@ -115,7 +115,7 @@ pub enum Configuration {
     /// The one nearest to these joint values, rad or m.
     Near(Vec<f64>),
     /// KUKA's status and turn. Status: bit 0 wrist centre behind axis 1, bit 1 elbow (axis 3 positive, less the angle of the
-    /// forearm's offset), bit 2 axis 5 positive. Turn: bit k set if axis k+1 is negative.
+    /// forearm's offset), bit 2 axis 5 negative; bits 3 and 4 do not name a branch. Turn: bit k set if axis k+1 is negative.
     Kuka {
         /// Bits of S; `None`: not told.
         status: Option<u8>,

@@ -76,8 +76,10 @@ pub fn target_at(arm: &ProgramArm<'_>, of: &Move, q: &DVector<f64>) -> Target {
     let configuration = match (configuration, AnalyticArm::new(arm.model, &frame)) {
         (Configuration::Kuka { status, turn }, Ok(analytic)) => {
             let (counted, six) = (arm.controller_axes(*analytic.joints()), analytic.joints().map(|k| q[k]));
-            let status = status.map(|old| analytic.kuka_status(&six, &counted).unwrap_or(old));
-            Configuration::Kuka { status, turn: turn.map(|_| kuka_turn(&six, &counted)) }
+            // Other bits of the old words say nothing of the branch and stay.
+            let told = analytic.kuka_status(&six, &counted);
+            let status = status.map(|old| told.map_or(old, |told| old & !7 | told));
+            Configuration::Kuka { status, turn: turn.map(|old| old & !63 | kuka_turn(&six, &counted)) }
         }
         (Configuration::Abb { .. }, Ok(analytic)) => {
             let (counted, six) = (arm.controller_axes(*analytic.joints()), analytic.joints().map(|k| q[k]));

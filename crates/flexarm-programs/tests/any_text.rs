@@ -75,6 +75,78 @@ fn programs_that_grow_without_bound_end_with_a_clear_error() {
     assert!(error.contains("operators follow each other"), "{error}");
 }
 
+/// A number that no robot can follow is refused where it stands, before any work on it.
+#[test]
+fn numbers_beyond_what_a_robot_can_do_are_refused_with_their_place() {
+    let huge = format!("1{}", "0".repeat(308));
+    let zero = "[9E9,9E9,9E9,9E9,9E9,9E9]";
+    let krl = |line: &str| format!("DEF a()\nPTP {{A1 0,A2 0,A3 0,A4 0,A5 0,A6 0}}\n{line}\nEND\n");
+    let rapid = |line: &str| format!("MODULE a\nPROC main()\n{line}\nENDPROC\nENDMODULE\n");
+    let script = |line: &str| format!("def a():\nmovej([0,0,0,0,0,0])\n{line}\nend\n");
+    let gcode = |line: &str| format!("G21 F100\nG0 X0 Y0 Z0\n{line}\n");
+    let pose = |x: &str, conf: &str| format!("[[{x},0,500],[1,0,0,0],{conf},{zero}]");
+    let cases = [
+        (
+            "a.src",
+            krl("PTP {X 1e308,Y 0,Z 0,A 0,B 0,C 0}"),
+            "a.src:3:1: `PTP {X 1e308",
+            "a coordinate of the target is 1e305",
+        ),
+        (
+            "a.src",
+            krl("PTP {A1 -1e308}"),
+            "a.src:3:1",
+            "an axis value is -1.745329251994329",
+        ),
+        ("a.src", krl("LIN {X 1e308*1e308,Y 0,Z 0,A 0,B 0,C 0}"), "a.src:3", "expected -10000 to 10000"),
+        ("a.src", krl("$VEL.CP=1e-300\nLIN {X 0,Y 0,Z 0,A 0,B 0,C 0}"), "a.src:4", "the speed of the path is 1e-300"),
+        (
+            "a.src",
+            krl("$BASE={X 1e300,Y 0,Z 0,A 0,B 0,C 0}\nPTP {X 0,Y 0,Z 0,A 0,B 0,C 0}"),
+            "a.src:4",
+            "of the base is 1e297",
+        ),
+        ("a.src", krl("PTP {X 0,Y 0,Z 0,A 1e400,B 0,C 0}"), "a.src:3", "expected"),
+        ("a.src", krl("WAIT SEC 1e308"), "a.src:3", "the time to wait is 1e308, expected 0 to 1e7 (s)"),
+        ("a.mod", rapid(&format!("MoveAbsJ [[1e308,0,0,0,0,0],{zero}],v5,fine,tool0;")), "a.mod:3:1", "9E9"),
+        (
+            "a.mod",
+            rapid(&format!("MoveAbsJ [[1e8,0,0,0,0,0],{zero}],v5,fine,tool0;")),
+            "a.mod:3:1",
+            "an axis value is 1.745329251994329",
+        ),
+        (
+            "a.mod",
+            rapid(&format!("MoveJ {},v5,fine,tool0;", pose("1e308", "[0,0,0,0]"))),
+            "a.mod:3:1",
+            "a coordinate of the target",
+        ),
+        (
+            "a.mod",
+            rapid(&format!("MoveJ {},v5,fine,tool0;", pose("500", "[4294967296,0,0,0]"))),
+            "a.mod:3:",
+            "expected quarter turns",
+        ),
+        ("a.script", script("movej([1e308,0,0,0,0,0])"), "a.script:3:1", "an axis value is 1e308"),
+        ("a.script", script("movel(p[1e308,0,0,0,0,0])"), "a.script:3:1", "a coordinate of the target is 1e308"),
+        ("a.script", script("movel(p[0,0,0,1e308,0,0])"), "a.script:3:1", "expected"),
+        ("a.script", script("movej([0,0,0,0,0,1], t=1e308)"), "a.script:3:1", "the duration is 1e308"),
+        ("a.nc", gcode(&format!("G0 X{huge}")), "a.nc:3:4: `X1", "X is 1e308, expected -1e9 to 1e9"),
+        ("a.nc", gcode(&format!("G2 X1 I{huge}")), "a.nc:3:", "I is 1e308"),
+        (
+            "a.nc",
+            gcode("G1 X99999999"),
+            "a.nc:3:1",
+            "a coordinate of the target is 99999.999, expected -10000 to 10000 (m)",
+        ),
+        ("a.nc", gcode(&format!("G4 P{huge}")), "a.nc:3:", "expected"),
+    ];
+    for (name, text, place, message) in cases {
+        let error = read_text(name, &text, &ReadOptions::default()).unwrap_err();
+        assert!(error.contains(place) && error.contains(message), "{text}\n  gives {error}\n  not   {place} {message}");
+    }
+}
+
 #[test]
 fn files_of_western_europe_and_of_windows_are_read() {
     let text = b"DEF a()\r\n; f\xfcr den Gru\xdf\r\nPTP {A1 1,A2 0,A3 0,A4 0,A5 0,A6 0}\r\nEND\r\n";

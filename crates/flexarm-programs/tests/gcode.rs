@@ -135,6 +135,30 @@ fn work_frames_offsets_and_tilts_are_those_of_the_options() {
     assert_relative_eq!(place_mm(moves[5])[0], 7.0, max_relative = 1e-12);
 }
 
+/// Truth: a place of the tool at the start, which the kinematics tell; what a line leaves out stays.
+#[test]
+fn from_joint_values_at_the_start_rapids_at_a_speed_are_lines_from_where_the_tool_is() {
+    let start = at_mm(40.0, 30.0, 80.0, Rotation3::identity());
+    let forward = |_: &[f64]| Some(start);
+    for rapid_m_s in [Some(0.5), None] {
+        let options = ReadOptions {
+            start: Some(vec![0.0; 6]),
+            forward: Some(&forward),
+            own_tool: Some(at_mm(0.0, 0.0, 20.0, Rotation3::identity())),
+            gcode: GCodeOptions { rapid_m_s, ..GCodeOptions::default() },
+            ..ReadOptions::default()
+        };
+        let program = read_text("s.nc", "G21 G90\nG0 Z150\nG91\nG0 X5\nM30\n", &options).unwrap();
+        let moves = moves(&program);
+        let kind = if rapid_m_s.is_some() { MoveKind::Line } else { MoveKind::Joint };
+        assert!(moves.iter().all(|step| step.kind == kind && step.speed.linear_m_s == rapid_m_s));
+        let places = [place_mm(moves[0]), place_mm(moves[1])];
+        for (found, truth) in places.iter().flatten().zip([40.0, 30.0, 150.0, 45.0, 30.0, 150.0]) {
+            assert!((found - truth).abs() < 1e-9, "{places:?}");
+        }
+    }
+}
+
 #[test]
 fn what_is_assumed_is_told() {
     let program = read_text("n.nc", "G1 F100\nG0 Z5\nG1 X10\n", &ReadOptions::default()).unwrap();

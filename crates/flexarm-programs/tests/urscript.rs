@@ -93,8 +93,8 @@ fn statements_that_cannot_be_run_are_named_with_place_and_remedy() {
         ("grip_close()", "`grip_close` is not known here"),
         ("run t()", "threads are not simulated"),
         ("movej(q)", "`q`: depends on `q`"),
-        ("movej([0,0,0,0,0,0], r=-1)", "the blend of this move is -1: it must be 0 or more"),
-        ("movej([0,0,0,0,0,0], v=0)", "the joint speed of this move is 0: it must be above 0"),
+        ("movej([0,0,0,0,0,0], r=-1)", "the size of the blend is -1, expected 0 to 10000"),
+        ("movej([0,0,0,0,0,0], v=0)", "the joint speed is 0, expected 1e-6 to 1e12 (rad/s)"),
         ("movel(p[1,2,3,0,0,0]", "`)` is expected here"),
         ("if True:\nmovej([0,0,0,0,0,1])", "this block does not end: `end` is missing"),
     ];

@@ -310,7 +310,7 @@ fn the_new_motion_is_written_by_the_endings_of_its_files_with_a_recording_of_bot
 const KRL: &str = "&ACCESS RVP\nDEF cut()\n$VEL.CP = 0.2\n$APO.CDIS = 5\nPTP {A1 10, A2 -80, A3 95, A4 5, A5 50, A6 -10}\n\
     PTP XP1\nLIN {X 1600, Y 100, Z 1100, A 10, B 80, C 20} C_DIS\nLIN {Y -100}\n\
     CIRC {X 1700, Y 0, Z 1000}, {X 1600, Y 100, Z 900, A 10, B 80, C 20}\nLIN_REL {Z 20}\nEND\n";
-const DAT: &str = "DEFDAT cut\nDECL E6POS XP1={X 1650.0,Y 0.0,Z 1200.0,A 0.0,B 85.0,C 0.0,S 6,T 2}\nENDDAT\n";
+const DAT: &str = "DEFDAT cut\nDECL E6POS XP1={X 1650.0,Y 0.0,Z 1200.0,A 0.0,B 85.0,C 0.0,S 2,T 2}\nENDDAT\n";
 const RAPID: &str = "MODULE Cut\n  CONST robtarget p1:=[[1650,0,1200],[0.7071068,0,0.7071068,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n\
     PROC main()\n  ConfL \\Off; ConfJ \\Off;\n  MoveAbsJ [[0,-70,80,0,60,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v200,fine,tool0;\n  MoveJ p1,v200,z5,tool0;\n\
       MoveL [[1600,150,1100],[0.7,0.1,0.7,0.1],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\n  ENDPROC\nENDMODULE\n";

@@ -176,7 +176,10 @@ fn what_is_wrong_is_told_with_its_place_and_the_remedy() {
         (format!("{head}{start}[[move]]\nline = [9000, 0, 1300]\n"), "the arm cannot go on beyond"),
         (format!("{head}{start}[[move]]\njoint_to = [9000, 0, 1300]\n"), "out of reach by about"),
         (format!("{head}[[move]]\njoints = [0, -60, 90]\n"), "3 values for the 6 joints"),
-        (format!("{head}speed = -2.0\n{start}[[move]]\nline = [1700, 0, 1300]\n"), "it must be a positive number"),
+        (
+            format!("{head}speed = -2.0\n{start}[[move]]\nline = [1700, 0, 1300]\n"),
+            "the speed of the path is -0.002, expected",
+        ),
         (format!("{head}[limits]\njoint_9 = {{ velocity = 1 }}\n{start}"), "the robot has no joint \"joint_9\""),
         (format!("{head}{start}[[move]]\nline = [1700, 0, 1300]\nquaternion = [2, 0, 0, 0]\n"), "it must be 1"),
         (head.to_string(), "no move"),
@@ -253,4 +256,101 @@ fn jerks_of_joints_hold_in_a_path_file_and_in_a_program_and_are_shown_with_their
     let error = load(&robot, "path.toml", &wrong).unwrap_err().to_string();
     assert!(error.contains("path.toml:") && error.contains("jerk of joint \"") && error.contains("is 0,"), "{error}");
     std::fs::remove_dir_all(folder).unwrap();
+}
+
+/// Truth: a circle by hand, and a tool that does not turn. Full circles are programmed as two halves.
+#[test]
+fn two_halves_of_a_circle_with_one_orientation_leave_the_tool_as_it_stands_in_every_language() {
+    let robot = kr210();
+    let model = robot.rigid_model().unwrap();
+    // The tool points down: turned by half a turn about y. The flange is 350 mm above the tool centre point.
+    let rapid = "MODULE m\nVAR robtarget p:=[[1700,0,1200],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\nPROC main()\n\
+        ConfJ \\Off;\nConfL \\Off;\nMoveAbsJ [[0,-60,90,0,60,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v500,fine,tool0;\nMoveL p,v500,fine,tool0;\n\
+        MoveC Offs(p,-100,100,0),Offs(p,-200,0,0),v200,z1,tool0;\nMoveC Offs(p,-100,-100,0),p,v200,fine,tool0;\nENDPROC\nENDMODULE\n";
+    let krl = "DEF m()\n$VEL.CP=0.2\n$CIRC_TYPE=#PATH\n$TOOL={X 0,Y 0,Z 0,A 0,B 0,C 0}\n\
+        PTP {A1 0,A2 -60,A3 90,A4 0,A5 60,A6 0}\nLIN {X 1700,Y 0,Z 1200,A 0,B 180,C 0}\n\
+        CIRC {X 1600,Y 100,Z 1200},{X 1500,Y 0,Z 1200,A 0,B 180,C 0}, CA 360\nEND\n";
+    let script = "def m():\n  set_tcp(p[0,0,0,0,0,0])\n  movej([0,-1.0471976,1.5707963,0,1.0471976,0])\n\
+        movel(p[1.7,0,1.2,0,3.14159265,0])\n  movec(p[1.6,0.1,1.2,0,3.14159265,0],p[1.5,0,1.2,0,3.14159265,0])\n\
+        movec(p[1.6,-0.1,1.2,0,3.14159265,0],p[1.7,0,1.2,0,3.14159265,0])\nend\n";
+    let path = "format = 1\n[path]\nlengths = \"mm\"\nangles = \"deg\"\nspeed = 200.0\ntool = { xyz = [0, 0, 0] }\n\
+        [[move]]\njoints = [0, -60, 90, 0, 60, 0]\n[[move]]\nline = [1700, 0, 1200]\nrpy = [0, 180, 0]\n\
+        [[move]]\narc = [1500, 0, 1200]\nvia = [1600, 100, 1200]\nturns_with_path = true\n\
+        [[move]]\narc = [1700, 0, 1200]\nvia = [1600, -100, 1200]\nturns_with_path = true\n";
+    for (name, text) in [("m.mod", rapid), ("m.src", krl), ("m.script", script), ("m.toml", path)] {
+        let motion = load(&robot, name, text).unwrap();
+        let arcs: Vec<_> = motion.tool_path.as_ref().unwrap().moves[1..].to_vec();
+        let (from, to) = (arcs[0].span_s[0], arcs[arcs.len() - 1].span_s[1]);
+        let down = Rotation3::from_axis_angle(&Vector3::y_axis(), std::f64::consts::PI);
+        let (mut turned, mut off, mut farthest) = (0.0f64, 0.0f64, 0.0f64);
+        for (t, X) in poses(&model, &motion, 4000).iter().filter(|(t, _)| *t >= from + 1e-9 && *t <= to) {
+            turned = turned.max((X.rotation.inverse() * down).angle());
+            let flange = X * nalgebra::Point3::new(0.0, 0.0, -0.35);
+            off = off.max(((flange - nalgebra::Point3::new(1.6, 0.0, 1.2)).norm() - 0.1).abs());
+            farthest = farthest.max((flange - nalgebra::Point3::new(1.7, 0.0, 1.2)).norm());
+            assert!(t.is_finite());
+        }
+        // Measured: 2e-7 rad (a quaternion of RAPID is exact; URScript's angles have nine digits), 2e-6 m in the blend.
+        assert!(turned < 1e-6 && off < 1e-4 && farthest > 0.1999, "{name}: {turned:.1e} rad, {off:.1e} m, {farthest}");
+    }
+}
+
+/// A number that no robot can follow is refused where it stands, before any work on it.
+#[test]
+fn numbers_of_path_files_beyond_what_a_robot_can_do_are_refused() {
+    let robot = kr210();
+    let head = "format = 1\n[path]\nlengths = \"mm\"\nangles = \"deg\"\n";
+    let start = "[[move]]\njoints = [0, -60, 90, 0, 60, 0]\n";
+    let program = folder("huge-nc");
+    std::fs::write(program.join("part.nc"), "G21 G90\nG0 X1700 Y0 Z1200\nM30\n").unwrap();
+    let file = format!("[program]\nfile = {:?}\nrpy = [0, 180, 0]\n", program.join("part.nc").display().to_string());
+    let cases = [
+        format!("{head}[[move]]\njoints = [inf, -60, 90, 0, 60, 0]\n"),
+        format!("{head}[[move]]\njoints = [0, -60, 90, 0, 60, nan]\n"),
+        format!("{head}[[move]]\njoints = [1e308, -60, 90, 0, 60, 0]\n"),
+        format!("{head}{start}[[move]]\nline = [1e308, 0, 1200]\n"),
+        format!("{head}{start}[[move]]\nline = [-inf, 0, 1200]\n"),
+        format!("{head}{start}[[move]]\njoint_to = [1700, 0, 1200]\nrpy = [0, 180, 0]\nnear = [inf, 0, 0, 0, 0, 0]\n"),
+        format!("{head}{start}[[move]]\nline = [1700, 0, 1200]\nrpy = [inf, 0, 0]\n"),
+        format!("{head}{start}[[move]]\narc = [1700, 0, 1200]\nvia = [1e300, 0, 1200]\n"),
+        format!("{head}{start}[[move]]\narc = [1700, 0, 1200]\nvia = [1600, 0, 1200]\nangle = 1e300\n"),
+        format!("{head}{start}[[move]]\ndwell = inf\n"),
+        format!("{head}{start}[[move]]\ndwell = 1e300\n"),
+        format!("{head}speed = 1e-300\n{start}"),
+        format!("{head}blend = inf\n{start}"),
+        format!("{head}rise = 1e300\n{start}"),
+        format!("{head}base = {{ xyz = [inf, 0, 0] }}\n{start}"),
+        format!("{head}tool = {{ xyz = [1e300, 0, 0] }}\n{start}"),
+        format!("{head}redundancy = [1e300, 0, 0, 0, 0, 0]\n{start}"),
+        format!("{head}[limits]\njoint_1 = {{ velocity = 1e-300 }}\n{start}"),
+        format!("{head}[standard]\nmotion = \"settle\"\ncentre = [inf, 0, 0]\nside = 100.0\nrpy = [0, 180, 0]\n"),
+        format!("{head}[standard]\nmotion = \"settle\"\ncentre = [0, 0, 0]\nside = 1e300\nrpy = [0, 180, 0]\n"),
+        format!("{head}{file}start = [inf, -60, 90, 0, 60, 0]\n"),
+        format!("{head}{file}rapid = inf\n"),
+        format!("{head}{file}rapid = 1e-300\n"),
+    ];
+    for text in cases {
+        let error = load(&robot, "huge.toml", &text).unwrap_err().to_string();
+        assert!(error.contains("expected") && error.contains("huge.toml"), "{text}\n  gives {error}");
+    }
+    std::fs::remove_dir_all(program).unwrap();
+}
+
+/// Truth: the straight line between the tool at the start and the first point.
+#[test]
+fn the_first_rapid_from_joint_values_is_a_line_where_rapids_have_a_speed() {
+    let robot = kr210();
+    let model = robot.rigid_model().unwrap();
+    let folder = folder("first-rapid");
+    std::fs::write(folder.join("part.nc"), "G21 G90 G61\nG0 X1600 Y300 Z1200\nG1 X1700 F6000\nM30\n").unwrap();
+    let text = format!(
+        "format = 1\n[path]\nlengths = \"mm\"\nangles = \"deg\"\n[program]\nfile = {:?}\nstart = [0, -60, 90, 0, 60, 0]\nrapid = 300.0\n",
+        folder.join("part.nc").display().to_string()
+    );
+    let motion = load(&robot, "part.toml", &text).unwrap();
+    std::fs::remove_dir_all(folder).unwrap();
+    let places: Vec<Vector3<f64>> = poses(&model, &motion, 2000).iter().map(|(_, X)| X.translation.vector).collect();
+    let corners = [places[0], Vector3::new(1.6, 0.3, 1.2), Vector3::new(1.7, 0.3, 1.2)];
+    let off = places.iter().map(|p| from_polyline(p, &corners)).fold(0.0, f64::max);
+    assert!(off < 1e-6, "{off:.1e} m from the lines");
 }

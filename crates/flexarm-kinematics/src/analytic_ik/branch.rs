@@ -250,7 +250,7 @@ impl AnalyticArm {
     }
 
     /// KUKA's status of joint values (rad): bit 0 set where the wrist centre lies behind axis 1 (x in the system that turns with axis
-    /// 1 negative), bit 1 where axis 3 is beyond the angle of the stretched arm, bit 2 where axis 5 is positive.
+    /// 1 negative), bit 1 where axis 3 is beyond the angle of the stretched arm, bit 2 where axis 5 is negative.
     ///
     /// Ahead is where axis 2 lies from axis 1; where they meet, where the wrist centre is at zero joint values. Bits 3 and 4 (accuracy
     /// model) are zero. `None` for other arms than those with a spherical wrist and axes 2 and 3 parallel.
@@ -258,7 +258,7 @@ impl AnalyticArm {
         let branch = self.branch(q);
         let bits = u8::from(!branch.shoulder)
             + 2 * u8::from(self.bent_forward(branch))
-            + 4 * u8::from(wrapped(axes.axis(4, q)) > 0.0);
+            + 4 * u8::from(wrapped(axes.axis(4, q)) < 0.0);
         self.is_industrial().then_some(bits)
     }
 
@@ -296,7 +296,7 @@ impl AnalyticArm {
                 agree(Some(b.shoulder), shoulder) && agree(Some(b.elbow), elbow) && agree(Some(b.wrist), wrist)
             }
             Selection::Kuka { status: None, .. } => true,
-            Selection::Kuka { status: Some(s), .. } => bits(s & 1 == 0, s & 2 != 0, s & 4 != 0),
+            Selection::Kuka { status: Some(s), .. } => bits(s & 1 == 0, s & 2 != 0, s & 4 == 0),
             Selection::Abb { cfx, .. } => (0..8).contains(&cfx) && bits(cfx & 4 == 0, cfx & 2 == 0, cfx & 1 == 0),
             Selection::Words { front: None, elbow_up: None, wrist_flipped: None } => true,
             Selection::Words { front, elbow_up, wrist_flipped } => {

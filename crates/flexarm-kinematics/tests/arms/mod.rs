@@ -94,6 +94,19 @@ pub(crate) fn irb120() -> Mechanism {
     from_rows("ABB IRB 120", &rows, (NONE, [0.0, Q, 0.0]))
 }
 
+/// IRB 4600-40/2.55.
+pub(crate) fn irb4600() -> Mechanism {
+    let rows: [Row; 6] = [
+        ([0.0, 0.0, 0.495], NONE, Z),
+        ([0.175, 0.0, 0.0], NONE, Y),
+        ([0.0, 0.0, 1.095], NONE, Y),
+        ([0.6, 0.0, 0.175], NONE, X),
+        ([0.67, 0.0, 0.0], NONE, Y),
+        ([0.135, 0.0, 0.0], NONE, X),
+    ];
+    from_rows("ABB IRB 4600", &rows, (NONE, [0.0, Q, 0.0]))
+}
+
 pub(crate) fn ur5() -> Mechanism {
     let rows = [
         [0.089159, 0.0, Q],

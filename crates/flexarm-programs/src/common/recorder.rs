@@ -117,13 +117,11 @@ impl<'a> Recorder<'a> {
 
     /// The robot stands still.
     pub(crate) fn dwell(&mut self, seconds: f64, span: Span) -> Result<()> {
-        if !(seconds.is_finite() && seconds >= 0.0) {
-            return fail(span, format!("the robot cannot wait for {seconds} s: give 0 or more"));
-        }
+        let item = Item::Dwell { line: self.line(span), seconds };
+        item.check().or_else(|error| fail(span, error.to_string()))?;
         if seconds > 0.0 {
             self.count(span)?;
-            let line = self.line(span);
-            self.items.push(Item::Dwell { line, seconds });
+            self.items.push(item);
             self.sources.push(Sources::default());
             self.stop();
         }
@@ -152,7 +150,7 @@ impl<'a> Recorder<'a> {
     /// A move, whose `line` and `statement` are set from its place.
     pub(crate) fn add(&mut self, mut step: Move, span: Span) -> Result<()> {
         self.count(span)?;
-        check(&step, span)?;
+        step.check().or_else(|error| fail(span, error.to_string()))?;
         let first = !self.items.iter().any(|item| matches!(item, Item::Move(_)));
         if first && !matches!(step.kind, MoveKind::Joint) && self.options.start.is_none() {
             return fail(
@@ -288,45 +286,4 @@ impl Told {
         let line = (self.file == 0).then(|| self.lines[0]);
         Note { line, text: format!("{} ({word} {}{more}{file})", self.text, lines.join(", ")) }
     }
-}
-
-/// All numbers of a move are numbers.
-fn check(step: &Move, span: Span) -> Result<()> {
-    let finite_pose = |X: &Pose| X.to_homogeneous().iter().all(|value| value.is_finite());
-    let target = match &step.to {
-        Target::Joints(joints) => joints.iter().all(|value| value.is_finite()),
-        Target::Pose { X_BT, .. } => finite_pose(X_BT),
-    };
-    let via = match &step.kind {
-        MoveKind::Arc { via, angle, .. } => via.iter().chain(angle).all(|value| value.is_finite()),
-        _ => true,
-    };
-    if !(target && via && finite_pose(&step.X_WB) && step.X_FT.as_ref().is_none_or(finite_pose)) {
-        return fail(span, "a number of this move is infinite or no number: check the values that it is computed from");
-    }
-    let speed = &step.speed;
-    let bounds = [
-        ("speed", speed.linear_m_s),
-        ("acceleration", speed.linear_m_s2),
-        ("turning speed", speed.angular_rad_s),
-        ("turning acceleration", speed.angular_rad_s2),
-        ("joint speed", speed.joint_fraction),
-        ("joint acceleration", speed.joint_acceleration_fraction),
-        ("joint speed", speed.joint_rad_s),
-        ("joint acceleration", speed.joint_rad_s2),
-        ("duration", speed.duration_s),
-    ];
-    for (name, value) in bounds {
-        if value.is_some_and(|value| !(value.is_finite() && value > 0.0)) {
-            return fail(span, format!("the {name} of this move is {}: it must be above 0", value.unwrap_or(0.0)));
-        }
-    }
-    let blend = match step.blend {
-        Blend::Distance(value) | Blend::Fraction(value) | Blend::Velocity(value) | Blend::Orientation(value) => value,
-        Blend::Stop | Blend::Pass => 0.0,
-    };
-    if !(blend.is_finite() && blend >= 0.0) {
-        return fail(span, format!("the blend of this move is {blend}: it must be 0 or more"));
-    }
-    Ok(())
 }

@@ -25,6 +25,9 @@ use words::{Line, Parameters, Word};
 /// Work frames, by their code times 10.
 const WORK_FRAMES: [i32; 9] = [540, 550, 560, 570, 580, 590, 591, 592, 593];
 
+/// Largest number behind a letter, in the unit of the program.
+const LARGEST: f64 = 1e9;
+
 /// How a line moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Motion {
@@ -182,6 +185,9 @@ impl<'a> Gcode<'a> {
                     return fail(*span, format!("the axis {letter} is not read: the tool has X, Y, Z and A, B, C"));
                 }
                 _ => {
+                    if value.is_nan() || value.abs() > LARGEST {
+                        return fail(*span, format!("{letter} is {value:e}, expected -{LARGEST:e} to {LARGEST:e}"));
+                    }
                     if values.insert(*letter, (*value, *span)).is_some() {
                         return fail(*span, format!("the letter {letter} stands twice in this line"));
                     }
@@ -193,6 +199,7 @@ impl<'a> Gcode<'a> {
             self.recorder.stop();
         }
         self.modes(&codes, &values)?;
+        self.place_at_start(span);
         if let Some((feed, at)) = values.get(&'F').copied() {
             self.set_feed(feed, at)?;
         }
@@ -280,6 +287,9 @@ impl<'a> Gcode<'a> {
         self.work_frame = code;
         let now = self.frame(code);
         if !self.has_moved && self.recorder.options.gcode.start_mm.is_none() {
+            if self.recorder.options.start.is_some() {
+                self.at = [None; 3]; // told again in the new frame by `place_at_start`
+            }
             return Ok(());
         }
         if let [Some(x), Some(y), Some(z)] = self.at {
@@ -443,6 +453,19 @@ impl<'a> Gcode<'a> {
         Ok(())
     }
 
+    /// Takes the coordinates before the first move from the joint values at the start, if the robot's kinematics are known.
+    fn place_at_start(&mut self, span: Span) {
+        if self.has_moved || self.recorder.options.start.is_none() {
+            return;
+        }
+        if let Ok(X_BT) = self.recorder.pose(&self.frame(self.work_frame), &None, span) {
+            let place = X_BT.translation.vector - self.offset;
+            for (at, value) in self.at.iter_mut().zip(place.iter()) {
+                *at = at.or(Some(*value));
+            }
+        }
+    }
+
     /// Coordinates at the end of the line, in the work frame without offsets, m.
     fn goal(&self, values: &HashMap<char, (f64, Span)>, absolute: bool) -> Result<[Option<f64>; 3]> {
         let mut goal = self.at;
@@ -551,8 +574,8 @@ impl<'a> Gcode<'a> {
         let is_rapid = self.motion == Some(Motion::Rapid);
         let to = self.settled(goal, span);
         let kind = match (is_rapid, self.recorder.options.gcode.rapid_m_s) {
-            // The first move comes from anywhere.
-            (true, Some(_)) if self.has_moved => MoveKind::Line,
+            // Without joint values at the start, the first move comes from anywhere.
+            (true, Some(_)) if self.has_moved || self.recorder.options.start.is_some() => MoveKind::Line,
             (true, _) => MoveKind::Joint,
             _ => MoveKind::Line,
         };

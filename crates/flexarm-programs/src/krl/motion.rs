@@ -1,5 +1,6 @@
 //! Moves: PTP, LIN, CIRC, their relative and spline forms, and SPLINE blocks.
 
+use flexarm_path::ToolCurve;
 use flexarm_path::program::{Blend, Configuration, Move, MoveKind, Speed, Target};
 use flexarm_spatial::Pose;
 use nalgebra::Vector3;
@@ -343,7 +344,7 @@ fn arc(machine: &mut Krls<'_>, context: &Context, arguments: &[Argument], span: 
                     "start, auxiliary point and target are on a line or at one place: they must make a circle",
                 );
             };
-            Some(circle.turn(angle.unwrap_or(circle.angle)))
+            Some(circle.turn(circle.angle))
         }
         _ => None,
     };
@@ -375,12 +376,11 @@ fn target_point(machine: &mut Krls<'_>, context: &Context, arguments: &[Argument
 
 /// Where an arc of a told angle ends, if where it starts is known.
 fn end_of_arc(machine: &Krls<'_>, context: &Context, kind: &MoveKind, to: &Target, span: Span) -> Option<Pose> {
-    let (MoveKind::Arc { via, angle: Some(angle), .. }, Target::Pose { X_BT, .. }) = (kind, to) else { return None };
+    let MoveKind::Arc { via, angle: angle @ Some(_), turns_with_path, .. } = kind else { return None };
+    let Target::Pose { X_BT, .. } = to else { return None };
     let start = machine.recorder.pose(&context.X_WB, &context.X_FT, span).ok()?;
-    let circle = Circle::through(start.translation.vector, *via, X_BT.translation.vector)?;
-    let turn = (start.rotation.inverse() * X_BT.rotation).scaled_axis() * (angle / circle.angle);
-    let place = circle.centre + circle.turn(*angle) * (start.translation.vector - circle.centre);
-    Some(Pose::from_parts(place.into(), start.rotation * nalgebra::Rotation3::new(turn)))
+    let arc = ToolCurve::arc(&start, via, None, X_BT, *angle, *turns_with_path).ok()?;
+    Some(arc.at(arc.length()).X)
 }
 
 /// A number of a system variable's part, if it was set.

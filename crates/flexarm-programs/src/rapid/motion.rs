@@ -259,7 +259,9 @@ fn pose(machine: &mut Rapids<'_>, value: Value, kind: &MoveKind, span: Span) -> 
         {
             let mut numbers = [0; 4];
             for (number, (_, value)) in numbers.iter_mut().zip(&conf.fields) {
-                *number = value.count(span)? as i32;
+                let count = value.count(span)?;
+                *number = i32::try_from(count)
+                    .or_else(|_| fail(span, format!("confdata has {count}, expected quarter turns of an axis")))?;
             }
             Configuration::Abb { quadrants: [numbers[0], numbers[1], numbers[2]], cfx: numbers[3] }
         }

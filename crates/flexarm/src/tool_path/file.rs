@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use flexarm_kinematics::{Data, NullSpaceRule, Pose, forward_kinematics};
 use flexarm_path::program::{Blend, Configuration, Item, Move, MoveKind, Program, Speed, Target};
-use flexarm_path::{ControllerAxis, PathOptions, ProgramArm};
+use flexarm_path::{ControllerAxis, PathOptions, ProgramArm, check_axes, check_rate};
 use flexarm_programs::{GCodeOptions, ReadOptions, Rotary};
 use flexarm_trajectory::Trajectory;
 use nalgebra::{DVector, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
@@ -158,6 +158,8 @@ struct MoveTable {
     blend: Option<f64>,
 }
 
+/// Longest time in which accelerations rise, s.
+const LONGEST_RISE: f64 = 100.0;
 /// Work frames of G-code that stand in the base of the path.
 const WORK_FRAMES: [&str; 6] = ["G54", "G55", "G56", "G57", "G58", "G59"];
 
@@ -249,8 +251,8 @@ fn options(
 ) -> Result<PathOptions, RobotFileError> {
     let mut options = PathOptions::default();
     if let Some(rise) = &file.path.rise {
-        if !(*rise.get_ref() > 0.0 && rise.get_ref().is_finite()) {
-            let message = format!("rise is {}, it must be a positive time in s", rise.get_ref());
+        if !(*rise.get_ref() > 0.0 && *rise.get_ref() <= LONGEST_RISE) {
+            let message = format!("rise is {}, expected a time above 0 and up to {LONGEST_RISE} s", rise.get_ref());
             return Err(source.error(rise.span(), message));
         }
         options.rise_s = *rise.get_ref();
@@ -259,7 +261,7 @@ fn options(
         options.rule = match told.get_ref() {
             Redundancy::Word(word) if word == "hold" => None,
             Redundancy::Word(word) if word == "away-from-limits" => Some(NullSpaceRule::AwayFromLimits),
-            Redundancy::Posture(values) if values.len() == arm.axes.len() && values.iter().all(|q| q.is_finite()) => {
+            Redundancy::Posture(values) if values.len() == arm.axes.len() && check_axes(values).is_ok() => {
                 let mut posture = arm.rest.clone();
                 for (value, &k) in values.iter().zip(&arm.axes) {
                     let slides = arm.model.coordinates()[k].kind == "prismatic";
@@ -311,10 +313,11 @@ fn overrides(file: &PathFile, source: &Source, cell: &Cell<'_>, units: Units) ->
         };
         let unit = if coordinates[k].kind == "prismatic" { units.length } else { units.angle };
         let value = |key: &str, value: &Option<Spanned<f64>>, factor: f64| match value {
-            Some(value) if !(*value.get_ref() > 0.0 && value.get_ref().is_finite()) => {
+            Some(value) if check_rate("", "", value.get_ref() * factor).is_err() => {
                 let (joint, found) = (joint.get_ref(), value.get_ref());
                 let message = format!(
-                    "limits: {key} of joint {joint:?} is {found}, expected a positive number; leave it out to keep the robot's own"
+                    "limits: {key} of joint {joint:?} is {found:?}, expected a positive number, neither tiny nor huge; leave it \
+                     out to keep the robot's own"
                 );
                 Err(source.error(value.span(), message))
             }
@@ -511,6 +514,10 @@ impl Reader<'_> {
             ..GCodeOptions::default()
         };
         gcode.R_BT = R.unwrap_or(gcode.R_BT);
+        if let Some(speed) = gcode.rapid_m_s {
+            let out = |error| self.source.error(table.span(), format!("rapid: {error}"));
+            check_rate("the speed of rapids", "m/s", speed).map_err(out)?;
+        }
         let start = entry.start.as_ref();
         let options = ReadOptions {
             entry: entry.entry.clone(),
@@ -530,6 +537,7 @@ impl Reader<'_> {
                     format!("start has {} values for the {} joints that move the tool", start.len(), arm.axes.len());
                 return Err(self.source.error(table.span(), message).into());
             }
+            check_axes(start).map_err(|error| self.source.error(table.span(), format!("start: {error}")))?;
             let mut rest = arm.rest.clone();
             arm.set_axes(start, &mut rest);
             arm.rest = rest;
