@@ -114,7 +114,7 @@ fn the_zero_order_solution_is_near_in_slots_and_misses_flips() {
         let response = |w: f64| case.structure.frequency_response(w);
         let mut ratios = Vec::new();
         for (rpm, expected) in &case.rows {
-            let found = zero_order_limit(&response, &case.cutter, rpm * TAU / 60.0, &band).unwrap();
+            let found = zero_order_limit(&response, &case.cutter, rpm * TAU / 60.0, &band, f64::INFINITY).unwrap();
             if let (Some(found), Some((depth, kind, _))) = (found, expected) {
                 ratios.push((found.depth / depth, *kind));
             }
