@@ -20,7 +20,7 @@ const PER_TURN: f64 = 24.0;
 /// Bisections of a crossing.
 const BISECTIONS: usize = 50;
 /// Most points of a search.
-const MOST_POINTS: usize = 300_000;
+const MOST_POINTS: usize = 100_000;
 /// Between two frequencies of the band the response is at most this many times that at the larger end.
 const BETWEEN: f64 = 4.0;
 /// An eigenvalue below this part of the product of norms is nothing.
