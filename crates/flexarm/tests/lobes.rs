@@ -345,7 +345,7 @@ fn a_tool_axis_in_world_axes_is_the_same_axis() {
         let (a, b) = (a.depth_m.unwrap(), b.depth_m.unwrap());
         assert!((a / b - 1.0).abs() < 1e-9, "{a} {b}");
     }
-    let alone = folder.tool(&text.replace("[tool]", "[tool]\naxis_axes = \"world\"\n#")).map(|_| ());
+    let alone = folder.tool(&text.replace("axis = [0.0, 0.0, 1.0]", "axis_axes = \"world\"")).map(|_| ());
     let error = alone.unwrap_err().to_string();
     assert!(error.contains("axis_axes") && error.contains("tool.toml:"), "{error}");
 }
