@@ -14,7 +14,7 @@ const EXACT: f64 = 1e-10;
 /// Directions beyond the number of states at first.
 const MORE: usize = 30;
 
-/// The eigenvalue of largest size.
+/// The eigenvalue of largest size; infinite for a map that overflows.
 pub(crate) fn leading(map: &PeriodMap) -> Complex<f64> {
     if map.size() <= SMALL {
         return largest(&map.matrix());
@@ -29,7 +29,7 @@ pub(crate) fn leading(map: &PeriodMap) -> Complex<f64> {
         let n = krylov.directions();
         let H = krylov.H.view((0, 0), (n, n)).into_owned();
         let value = largest(&H);
-        if whole || krylov.residual(&H, value) <= EXACT * value.norm() {
+        if whole || !value.norm().is_finite() || krylov.residual(&H, value) <= EXACT * value.norm() {
             return value;
         }
         wanted += wanted / 2;
@@ -38,6 +38,10 @@ pub(crate) fn leading(map: &PeriodMap) -> Complex<f64> {
 
 fn largest(matrix: &DMatrix<f64>) -> Complex<f64> {
     let larger = |a: &Complex<f64>, b: &Complex<f64>| a.norm_sqr().total_cmp(&b.norm_sqr());
+    // The iteration for eigenvalues would not end.
+    if !matrix.iter().all(|x| x.is_finite()) {
+        return Complex::new(f64::INFINITY, 0.0);
+    }
     matrix.complex_eigenvalues().iter().copied().max_by(larger).unwrap_or_default()
 }
 

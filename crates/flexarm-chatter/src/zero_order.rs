@@ -19,6 +19,10 @@ use crate::structure::Structure;
 const PER_TURN: f64 = 24.0;
 /// Bisections of a crossing.
 const BISECTIONS: usize = 50;
+/// Most points of a search.
+const MOST_POINTS: usize = 100_000;
+/// Between two frequencies of the band the response is at most this many times that at the larger end.
+const BETWEEN: f64 = 4.0;
 /// An eigenvalue below this part of the product of norms is nothing.
 const NOTHING: f64 = 1e-12;
 
@@ -31,19 +35,22 @@ pub struct ZeroOrderLimit {
     pub chatter_hz: f64,
 }
 
-/// The smallest depth of the zero-order solution at a spindle speed (rad/s); none if no frequency of the band chatters.
+/// The smallest depth of the zero-order solution at a spindle speed (rad/s); none if no frequency of the band chatters up to the deepest
+/// cut (m).
 ///
 /// * `response`: of the tip, m/N, at an angular frequency in rad/s.
 /// * `band`: angular frequencies (rad/s), ascending, fine enough for the resonances ([`Structure::frequencies`]); points are put between
 ///   them as the tooth period asks.
 ///
 /// # Errors
-/// [`ChatterError::Value`] for a cutter or a speed that makes no sense.
+/// [`ChatterError::Value`] for a cutter or a speed that makes no sense, [`ChatterError::TooSlow`] where a tooth period holds too many
+/// oscillations.
 pub fn zero_order_limit(
     response: &dyn Fn(f64) -> Matrix3<Complex<f64>>,
     cutter: &Cutter,
     spindle: f64,
     band: &[f64],
+    deepest: f64,
 ) -> Result<Option<ZeroOrderLimit>, ChatterError> {
     cutter.check()?;
     if !(spindle.is_finite() && spindle > 0.0) {
@@ -51,10 +58,22 @@ pub fn zero_order_limit(
     }
     let H = cutter.mean_force_matrix().map(|x| Complex::new(x, 0.0));
     let T = cutter.tooth_period(spindle);
+    let size = |w: f64| (response(w) * H).norm();
     let eigenvalues = |w: f64| eigenvalues(&(response(w) * H));
     let mut best: Option<ZeroOrderLimit> = None;
+    let mut points = 0.0;
     for pair in band.windows(2) {
+        // |b (1 - e^{-i ω T})| = 1/|λ| with |1 - e^{-i ω T}| <= 2 and |λ| <= |G H|.
+        let known = best.map_or(deepest, |best| best.depth.min(deepest));
+        if 2.0 * known * BETWEEN * size(pair[0]).max(size(pair[1])) < 1.0 {
+            continue;
+        }
         let parts = ((pair[1] - pair[0]) * T / TAU * PER_TURN).ceil().max(1.0);
+        points += parts;
+        if points > MOST_POINTS as f64 {
+            let rpm = spindle * 60.0 / TAU;
+            return Err(ChatterError::TooSlow { rpm, unknowns: points as usize, most: MOST_POINTS });
+        }
         let step = (pair[1] - pair[0]) / parts;
         let mut low = (pair[0], eigenvalues(pair[0]));
         for k in 1..=parts as usize {
@@ -67,7 +86,7 @@ pub fn zero_order_limit(
             low = high;
         }
     }
-    Ok(best)
+    Ok(best.filter(|best| best.depth <= deepest))
 }
 
 /// `b` times the square of `1 - e^{-i ω T}`, real where there is a limit.

@@ -8,7 +8,8 @@
 use std::f64::consts::TAU;
 
 use flexarm_chatter::{
-    Coefficients, Cutter, Engagement, Kind, LimitOptions, Mode, Structure, limit_of_depth, zero_order_limit,
+    ChatterError, Coefficients, Cutter, Engagement, Kind, LimitOptions, Mode, Structure, limit_of_depth,
+    zero_order_limit,
 };
 use nalgebra::Vector3;
 use serde_json::Value;
@@ -114,7 +115,7 @@ fn the_zero_order_solution_is_near_in_slots_and_misses_flips() {
         let response = |w: f64| case.structure.frequency_response(w);
         let mut ratios = Vec::new();
         for (rpm, expected) in &case.rows {
-            let found = zero_order_limit(&response, &case.cutter, rpm * TAU / 60.0, &band).unwrap();
+            let found = zero_order_limit(&response, &case.cutter, rpm * TAU / 60.0, &band, f64::INFINITY).unwrap();
             if let (Some(found), Some((depth, kind, _))) = (found, expected) {
                 ratios.push((found.depth / depth, *kind));
             }
@@ -130,5 +131,57 @@ fn the_zero_order_solution_is_near_in_slots_and_misses_flips() {
         if case.name == "one_dof_down_0p05" {
             assert!(far(Kind::Flip) > 0.5, "{}", far(Kind::Flip));
         }
+    }
+}
+
+/// Truth: the search over the whole band. Up to a depth the limit is the same or none, and where nothing chatters nothing is searched.
+#[test]
+fn a_search_up_to_a_depth_finds_the_same_limit_with_less_work() {
+    let mut work = [0, 0];
+    for case in cases() {
+        let band = case.structure.frequencies();
+        for (rpm, _) in &case.rows {
+            let found = [f64::INFINITY, 5e-4].map(|deepest| {
+                let calls = std::cell::Cell::new(0);
+                let response = |w: f64| {
+                    calls.set(calls.get() + 1);
+                    case.structure.frequency_response(w)
+                };
+                let found = zero_order_limit(&response, &case.cutter, rpm * TAU / 60.0, &band, deepest).unwrap();
+                (found, calls.get())
+            });
+            let [(whole, all), (shallow, few)] = found;
+            assert_eq!(whole.filter(|limit| limit.depth <= 5e-4), shallow, "{rpm} 1/min");
+            work = [work[0] + all, work[1] + few];
+        }
+    }
+    println!("{work:?} responses");
+    assert!(10 * work[1] < 7 * work[0], "{work:?}"); // measured 0.57
+}
+
+/// A mode damped to 30000 times critical has poles from 2e-5 to 6e4 times its frequency: 23 million points of the whole band. Where the
+/// teeth are so slow that the resonance alone takes too many, the search is refused.
+#[test]
+fn the_work_of_a_limit_does_not_grow_with_the_damping() {
+    let cutter = Cutter::straight(3, Coefficients { tangential: 8e8, radial: 2.5e8, axial: 0.0 }, Engagement::slot());
+    let mode = |damping_ratio: f64, stiffness: f64| {
+        let omega = TAU * 1200.0;
+        let shape = nalgebra::Vector3::x() * omega / stiffness.sqrt();
+        let mode = |shape| Mode { angular_frequency: omega, damping_ratio, shape };
+        Structure::from_modes(&[mode(shape), mode(nalgebra::Vector3::y() * omega / stiffness.sqrt())]).unwrap()
+    };
+    for (damping, stiffness) in [(0.03, 1.5e7), (3.0, 1.5e7), (30_000.0, 1.5e7), (30_000.0, 1e2), (100.0, 1.0)] {
+        let (structure, calls) = (mode(damping, stiffness), std::cell::Cell::new(0_u64));
+        let response = |w: f64| {
+            calls.set(calls.get() + 1);
+            structure.frequency_response(w)
+        };
+        let band = structure.frequencies();
+        let found = zero_order_limit(&response, &cutter, 6000.0 * TAU / 60.0, &band, 0.02);
+        println!("damping {damping}, {stiffness:e} N/m: {} responses, {found:?}", calls.get());
+        assert!(found.is_ok() && calls.get() < 5000, "{} {found:?}", calls.get()); // measured 2223
+        let slow = zero_order_limit(&response, &cutter, 1e-6 * TAU / 60.0, &band, 1.0);
+        assert!(matches!(slow, Ok(None) | Err(ChatterError::TooSlow { .. })), "{slow:?}");
+        assert!(calls.get() < 800_000, "{}", calls.get());
     }
 }

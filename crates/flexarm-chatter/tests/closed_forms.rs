@@ -45,7 +45,8 @@ fn constant_forces_have_the_lobes_of_turning() {
         worst = worst.max((found.depth / truth - 1.0).abs());
         assert!(found.kind == Kind::Hopf && found.chatter_hz > 150.0);
         let response = |w: f64| structure.frequency_response(w);
-        let zero = zero_order_limit(&response, &cutter, spindle, &structure.frequencies()).unwrap().unwrap();
+        let zero =
+            zero_order_limit(&response, &cutter, spindle, &structure.frequencies(), f64::INFINITY).unwrap().unwrap();
         zero_order = zero_order.max((zero.depth / truth - 1.0).abs());
     }
     eprintln!("semi-discrete {worst:.1e}, zero order {zero_order:.1e}");
@@ -79,9 +80,9 @@ fn the_lowest_limit_of_one_mode_is_two_k_zeta() {
     let cutter = Cutter::straight(4, STEEL, Engagement::full());
     let response = |w: f64| structure.frequency_response(w);
     let band = structure.frequencies();
-    let limits = (0..400)
-        .map(|j| 200.0 + 2.0 * f64::from(j))
-        .map(|rpm| zero_order_limit(&response, &cutter, rpm * TAU / 60.0, &band).unwrap().unwrap().depth);
+    let limits = (0..400).map(|j| 200.0 + 2.0 * f64::from(j)).map(|rpm| {
+        zero_order_limit(&response, &cutter, rpm * TAU / 60.0, &band, f64::INFINITY).unwrap().unwrap().depth
+    });
     let lowest = limits.fold(f64::INFINITY, f64::min);
     let truth = 2.0 * k * zeta * (1.0 + zeta) / (2.0 * STEEL.radial);
     eprintln!("{lowest:.6e}, closed form {truth:.6e}");
@@ -132,7 +133,8 @@ fn at_a_depth_of_one_axial_pitch_a_helix_cuts_with_constant_force() {
     // Scale the coefficients so that the limit lies exactly there, by the zero-order solution.
     let spindle = 4321.0 * TAU / 60.0;
     let response = |w: f64| structure.frequency_response(w);
-    let limit = zero_order_limit(&response, &cutter, spindle, &structure.frequencies()).unwrap().unwrap();
+    let limit =
+        zero_order_limit(&response, &cutter, spindle, &structure.frequencies(), f64::INFINITY).unwrap().unwrap();
     let factor = limit.depth / pitch;
     let k = STEEL;
     let scaled = Coefficients { tangential: k.tangential * factor, radial: k.radial * factor, axial: k.axial * factor };

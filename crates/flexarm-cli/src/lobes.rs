@@ -5,7 +5,9 @@ use std::process::ExitCode;
 
 use clap::Args;
 use comfy_table::CellAlignment;
-use flexarm::lobes::{CutRequest, CutRun, CuttingPlace, CuttingTool, LobePoint, Lobes, LobesRequest, cut, lobes};
+use flexarm::lobes::{
+    CutRequest, CutRun, CuttingPlace, CuttingTool, LobePoint, Lobes, LobesRequest, cut, lobes, rounded_down,
+};
 use flexarm::{Motion, Robot};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
@@ -162,7 +164,7 @@ fn cut_text(c: &CutRun) -> String {
         c.seconds
     );
     let limit = match (c.limit_m, c.limit_hz) {
-        (Some(limit), Some(hz)) => format!("{:.3} mm, then at {hz:.1} Hz", 1e3 * limit),
+        (Some(limit), Some(hz)) => format!("{} mm, then at {hz:.1} Hz", rounded_down(1e3 * limit, 3)),
         _ => "none".to_owned(),
     };
     out += &format!("limit of depth at this speed: {limit}; largest multiplier {:.5}\n", c.multiplier);
@@ -192,7 +194,7 @@ fn progress(cli: &Cli) -> ProgressBar {
 }
 
 fn mm(x: Option<f64>) -> String {
-    x.map_or_else(|| "-".into(), |x| format!("{:.3}", 1e3 * x))
+    x.map_or_else(|| "-".into(), |x| rounded_down(1e3 * x, 3))
 }
 
 fn text(found: &Lobes) -> String {
@@ -205,10 +207,10 @@ fn text(found: &Lobes) -> String {
     );
     out += &match (found.stable_below_m, found.stable_below_at_rpm) {
         (Some(depth), Some(rpm)) => format!(
-            "stable at every speed below {:.3} mm (at {rpm:.0} 1/min); deepest at {:.0} 1/min: {:.3} mm\n\n",
-            1e3 * depth,
+            "stable at every speed below {} mm (at {rpm:.0} 1/min); deepest at {:.0} 1/min: {} mm\n\n",
+            rounded_down(1e3 * depth, 3),
             found.best_rpm,
-            1e3 * found.best_depth_m
+            rounded_down(1e3 * found.best_depth_m, 3)
         ),
         _ => "no chatter at any of the speeds\n\n".to_owned(),
     };
@@ -259,7 +261,7 @@ fn row(found: &Lobes, point: &LobePoint, along: bool, ranges: bool) -> Vec<Strin
     }
     if ranges {
         let all: Vec<String> =
-            point.unstable_m.iter().map(|[a, b]| format!("{:.3} to {:.3}", 1e3 * a, 1e3 * b)).collect();
+            point.unstable_m.iter().map(|[a, b]| format!("{} to {:.3}", rounded_down(1e3 * a, 3), 1e3 * b)).collect();
         row.push(if all.is_empty() { "-".into() } else { all.join(", ") });
     }
     row

@@ -6,7 +6,8 @@ use std::process::ExitCode;
 use clap::{Args, ValueEnum};
 use comfy_table::CellAlignment;
 use flexarm::map::{
-    JointRange, KeptPoses, Map, MapPose, MapRegion, MapRequest, ToolDirections, WorkspaceGrid, map, readable_quantity,
+    JointRange, KeptPoses, Map, MapPose, MapRegion, MapRequest, ToolDirections, WorkspaceGrid, map, read_poses,
+    readable_quantity,
 };
 use flexarm::reduce::numbers;
 use flexarm::{Motion, Robot};
@@ -29,6 +30,8 @@ Examples:
       flexarm map kr210 --cone 20 --tilts 9 --rolls 6
   In joints 2 and 3, the others at zero:
       flexarm map kr210 --over joint_2=-120deg:0deg:61 --over joint_3=0deg:120deg:61
+  At poses of a file, with the 6x6 compliance of each:
+      flexarm map kr210 --poses poses.csv
   Along a motion:
       flexarm map kr210 --along pick_and_place --points 500
   How deep an end mill may cut before it chatters, over a table:
@@ -83,6 +86,10 @@ pub(crate) struct MapArgs {
     /// Instants of that motion
     #[arg(long, help_heading = "Where", value_name = "N", default_value_t = 1000, requires = "along")]
     pub(crate) points: usize,
+    /// Go through the poses of a file: a table with a column for each joint (_deg after its name for degrees), or a .toml file with
+    /// poses = [[...], ...]; the table of the map then has the 6x6 compliance of each
+    #[arg(long, help_heading = "Where", value_name = "FILE", conflicts_with_all = ["bounds", "grid", "over", "along"])]
+    pub(crate) poses: Option<PathBuf>,
     /// Joints that the map does not move, and near which branches are taken [default: zero]
     #[arg(long, help_heading = "Where", value_name = "Q1,Q2,...", allow_hyphen_values = true)]
     pub(crate) at: Option<String>,
@@ -115,7 +122,7 @@ pub(crate) struct MapArgs {
     #[arg(long, help_heading = "What", value_name = "N", default_value_t = 3)]
     pub(crate) frequencies: usize,
     /// Find the best place for a box with these edges (m, along world axes)
-    #[arg(long, help_heading = "What", value_name = "DX,DY,DZ", allow_hyphen_values = true, conflicts_with_all = ["over", "along"])]
+    #[arg(long, help_heading = "What", value_name = "DX,DY,DZ", allow_hyphen_values = true, conflicts_with_all = ["over", "along", "poses"])]
     pub(crate) workpiece: Option<String>,
     #[command(flatten)]
     pub(crate) input: MotionInputArgs,
@@ -186,6 +193,10 @@ fn region(args: &MapArgs, robot: &Robot) -> Result<MapRegion, Failure> {
     if let Some(motion) = &args.along {
         let motion = Motion::load_with(shipped::trajectory(motion), robot, &args.input.options())?;
         return Ok(MapRegion::Along { motion: Box::new(motion), points: args.points });
+    }
+    if let Some(file) = &args.poses {
+        let at = values::joint_values(args.at.as_deref(), robot)?;
+        return Ok(MapRegion::Poses(read_poses(file, robot, at.as_deref())?));
     }
     if !args.over.is_empty() {
         return Ok(MapRegion::Joints(args.over.iter().map(|text| joint_range(text, robot)).collect::<Result<_, _>>()?));

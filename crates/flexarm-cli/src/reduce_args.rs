@@ -105,7 +105,7 @@ pub(crate) struct ReduceArgs {
     /// Order of elimination
     #[arg(long, value_enum, help_heading = "Reduction", hide_short_help = true)]
     pub(crate) ordering: Option<OrderingName>,
-    /// Threads of the solver; more than one may change the last digits [default: 1]
+    /// Threads of the solver [default: 1]
     #[arg(long, value_name = "N", help_heading = "Reduction", hide_short_help = true)]
     pub(crate) threads: Option<usize>,
     /// Name of the link [default: that of --link, or of the mesh file]

@@ -78,7 +78,7 @@ impl Roles {
 
 /// Accelerations q̈ for the generalised forces `tau` (all joints free). Fills `data.{X_PB, V, A, qddot}`.
 ///
-/// O(n), no allocation; with mimic joints O(n³) by the mass matrix.
+/// O(n), no allocation; with mimic joints O(n³) by the mass matrix. Accelerations are NaN where a mass matrix is not positive definite.
 pub fn forward_dynamics<'d>(
     model: &Model,
     data: &'d mut Data,
@@ -95,7 +95,7 @@ pub fn forward_dynamics<'d>(
 ///
 /// On entry `qddot` holds the accelerations of the prescribed coordinates and `tau` the forces of the free
 /// ones; on return both are complete. External wrenches in `data.F_ext` and balancers act. Fills `data.{X_PB, V, A}`.
-/// O(n), no allocation (dense where a free coordinate is mimicked).
+/// O(n), no allocation (dense where a free coordinate is mimicked). Accelerations are NaN where a mass matrix is not positive definite.
 pub fn hybrid_dynamics(
     model: &Model,
     data: &mut Data,
@@ -344,7 +344,11 @@ fn eliminate_modal(model: &Model, data: &mut Data, i: usize, m: usize, prescribe
     }
     let mut H = modal.factor.take().map_or_else(|| DMatrix::zeros(entry.n, entry.n), Cholesky::unpack_dirty);
     H.copy_from(&modal.H);
-    let factor = Cholesky::new(H).expect("the mass matrix of a modal body with its load is positive definite");
+    let Some(factor) = Cholesky::new(H) else {
+        modal.solved.fill(f64::NAN);
+        data.pA[i] = data.pA[i] * f64::NAN;
+        return;
+    };
     for (k, F) in modal.columns.iter().enumerate() {
         let (f, t) = (&F.force, &F.torque);
         for (c, value) in [f.x, f.y, f.z, t.x, t.y, t.z].into_iter().enumerate() {
@@ -445,7 +449,11 @@ fn solve_dense(model: &Model, data: &mut Data, state: &State, roles: &Roles) {
     crate::crba::mass_matrix_at_poses(model, data);
     let right = &tau - bias - &data.M * &qddot;
     let M_ff = data.M.select_rows(free).select_columns(free);
-    let solved = Cholesky::new(M_ff).expect("a mass matrix is positive definite").solve(&right.select_rows(free));
+    let mut solved = right.select_rows(free);
+    match Cholesky::new(M_ff) {
+        Some(factor) => factor.solve_mut(&mut solved),
+        None => solved.fill(f64::NAN),
+    }
     for (&k, a) in free.iter().zip(solved.iter()) {
         qddot[k] = *a;
     }

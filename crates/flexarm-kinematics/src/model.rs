@@ -11,6 +11,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::slice::ChunksExact;
 
+use flexarm_settings::{OutOfRange, Quantity};
 use flexarm_spatial::{ElasticAngles, Pose, SpatialInertia};
 use nalgebra::{Rotation3, Vector3};
 
@@ -258,6 +259,16 @@ pub enum ModelError {
         /// Its value.
         value: f64,
     },
+    /// A number of a size that no robot has.
+    #[error("{part} {name:?}: {what}")]
+    OutOfRange {
+        /// "mechanism", "link" or "joint".
+        part: &'static str,
+        /// Its name.
+        name: String,
+        /// The number and its range.
+        what: OutOfRange,
+    },
     /// A rotor that couples what are not two joints.
     #[error(
         "the rotor between joint {joint:?} and another one: it needs two joints of one coordinate each, and a finite inertia"
@@ -324,6 +335,8 @@ impl Model {
     /// [`ModelError`], with the names of the links or joints that are wrong.
     pub fn new(mechanism: &Mechanism) -> Result<Self, ModelError> {
         let base = check_tree(mechanism)?;
+        let gravity = Quantity::ACCELERATION.check_all("gravity", &mechanism.gravity);
+        gravity.map_err(|what| out_of_range("mechanism", &mechanism.name, what))?;
         let mut build = Builder {
             mechanism,
             links: mechanism.links.iter().enumerate().map(|(i, link)| (link.name.as_str(), i)).collect(),
@@ -599,6 +612,9 @@ impl<'a> Builder<'a> {
         if !joint.X_PJ.translation.vector.iter().chain(joint.X_PJ.rotation.matrix().iter()).all(|x| x.is_finite()) {
             return Err(ModelError::NotFinite { what: "origin", name: joint.name.clone() });
         }
+        let of_joint = |what| out_of_range("joint", &joint.name, what);
+        Quantity::LENGTH.check_all("origin", &joint.X_PJ.translation.vector).map_err(of_joint)?;
+        Quantity::INERTIA.check("inertia of the rotor", joint.armature).map_err(of_joint)?;
         let mechanism = self.mechanism;
         let link = &mechanism.links[parent];
         let X_BJ = X_BL * joint.X_PJ;
@@ -886,6 +902,10 @@ pub fn moment_floor(mass: f64, largest: f64) -> f64 {
     MOMENT_TOLERANCE * largest.abs() + 1e-12 * mass.abs() + 1e-20
 }
 
+fn out_of_range(part: &'static str, name: &str, what: OutOfRange) -> ModelError {
+    ModelError::OutOfRange { part, name: name.to_owned(), what }
+}
+
 /// Finite, and of a body that there can be. What stands on the base does not move: nothing follows from its inertia.
 fn check_inertia(link: &str, inertia: &crate::mechanism::LinkInertia, moves: bool) -> Result<(), ModelError> {
     let finite =
@@ -899,6 +919,9 @@ fn check_inertia(link: &str, inertia: &crate::mechanism::LinkInertia, moves: boo
     if inertia.mass < 0.0 {
         return Err(ModelError::BadInertia { link: link.to_owned(), what: "mass [kg]", value: inertia.mass });
     }
+    Quantity::MASS.check("mass", inertia.mass).map_err(|what| out_of_range("link", link, what))?;
+    Quantity::LENGTH.check_all("centre of mass", &inertia.com).map_err(|what| out_of_range("link", link, what))?;
+    Quantity::INERTIA.check_all("inertia", &inertia.inertia_com).map_err(|what| out_of_range("link", link, what))?;
     let moments = inertia.inertia_com.symmetric_eigenvalues();
     let smallest = moments.min();
     if smallest < -moment_floor(inertia.mass, moments.amax()) {

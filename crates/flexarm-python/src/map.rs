@@ -173,6 +173,8 @@ fn over_joints(joints: &Bound<'_, PyDict>) -> PyResult<MapRegion> {
 ///     Directions in the cone, and rotations of the tool, that count.
 /// joints : dict of str to (float, float, int), optional
 ///     Go through values of joints instead: from, to, how many (rad or m).
+/// poses : array_like, shape (m, n), optional
+///     Go through these joint values instead, in coordinate order (rad or m); the table then has the 6x6 compliance of each.
 /// along : Motion or path, optional
 ///     Go along a motion instead, at ``points`` instants.
 /// points : int, default 1000
@@ -212,7 +214,7 @@ fn over_joints(joints: &Bound<'_, PyDict>) -> PyResult<MapRegion> {
 /// 25
 #[pyfunction]
 #[pyo3(signature = (robot, *, bounds=None, spacing=None, keep_out=0.0, tool_axis=None, roll=0.0, cone=0.0, tilts=None, rolls=1,
-                    joints=None, along=None, points=1000, at=None, wrench=None, by=None, keep="best", frequencies=3,
+                    joints=None, poses=None, along=None, points=1000, at=None, wrench=None, by=None, keep="best", frequencies=3,
                     workpiece=None, tool=None, rpm=None, zero_order=false, links=None, drives=None, output=None, overwrite=false,
                     progress=None))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments")]
@@ -228,6 +230,7 @@ pub(crate) fn map<'py>(
     #[pyo3(from_py_with = maybe_whole)] tilts: Option<usize>,
     #[pyo3(from_py_with = whole)] rolls: usize,
     joints: Option<&Bound<'py, PyDict>>,
+    poses: Option<&Bound<'py, PyAny>>,
     along: Option<&Bound<'py, PyAny>>,
     #[pyo3(from_py_with = whole)] points: usize,
     at: Option<&Bound<'py, PyAny>>,
@@ -245,19 +248,24 @@ pub(crate) fn map<'py>(
     overwrite: bool,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<PyMap> {
-    let places = [bounds.is_some() || spacing.is_some(), joints.is_some(), along.is_some()];
+    let places = [bounds.is_some() || spacing.is_some(), joints.is_some(), poses.is_some(), along.is_some()];
     if places.into_iter().filter(|given| *given).count() > 1 {
         return Err(PyValueError::new_err(
-            "bounds and spacing, joints, and along exclude each other: give one of them",
+            "bounds and spacing, joints, poses, and along exclude each other: give one of them",
         ));
     }
-    let region = match (joints, along) {
-        (Some(joints), _) => over_joints(joints)?,
-        (None, Some(along)) => {
+    let n = robot.get().robot.rigid_model().or_raise()?.n_actuated();
+    let region = match (joints, poses, along) {
+        (Some(joints), ..) => over_joints(joints)?,
+        (None, Some(poses), _) => {
+            let poses = numbers("poses", poses, &[(n, "joints")], true)?;
+            MapRegion::Poses(poses.values().chunks_exact(n.max(1)).map(<[f64]>::to_vec).collect())
+        }
+        (None, None, Some(along)) => {
             let motion: Motion = scenario(robot, Some(along), None, None, None)?.motion;
             MapRegion::Along { motion: Box::new(motion), points }
         }
-        (None, None) => {
+        (None, None, None) => {
             let usual = ToolDirections::default();
             let tool = ToolDirections {
                 axis: tool_axis.map_or(Ok(usual.axis), |axis| three("tool_axis", axis))?,
@@ -275,7 +283,6 @@ pub(crate) fn map<'py>(
         }
     };
     let kept = [("best", KeptPoses::Best), ("worst", KeptPoses::Worst), ("all", KeptPoses::All)];
-    let n = robot.get().robot.rigid_model().or_raise()?.n_actuated();
     let at = at.map(|at| numbers("at", at, &[(n, "joints")], false)).transpose()?;
     let request = MapRequest {
         modelling: modelling(links, drives, None, None)?,

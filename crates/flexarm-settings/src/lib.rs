@@ -1,6 +1,6 @@
 //! What errors and caveats are made of: the settings that they speak of, as values that each face names in its own words
-//! ([`Setting`]); the [`Caveat`], which compares a value with a yardstick; whom an error is to blame on ([`Fault`]); messages of
-//! the reader of TOML without names of types ([`without_types`]).
+//! ([`Setting`]); the [`Caveat`], which compares a value with a yardstick; whom an error is to blame on ([`Fault`]); ranges of
+//! physical quantities ([`Quantity`]); messages of the reader of TOML without names of types ([`without_types`]).
 //!
 //! An error that says "try a smaller step" means a field of a struct to a Rust program, a keyword argument to a Python one
 //! and a flag to somebody at a terminal. Errors and caveats therefore carry a [`Setting`], and its name is asked for when
@@ -20,6 +20,7 @@
 
 pub mod caveat;
 mod fault;
+mod quantity;
 mod toml_message;
 
 use std::fmt;
@@ -27,6 +28,7 @@ use std::sync::OnceLock;
 
 pub use caveat::Caveat;
 pub use fault::Fault;
+pub use quantity::{OutOfRange, Quantity};
 pub use toml_message::without_types;
 
 /// A setting that a message speaks of.

@@ -87,7 +87,9 @@ pub enum StepError {
     },
     /// An explicit stepper cannot work with this step.
     #[error(
-        "{stepper} with step {h:e} s is unstable here: the highest frequency is {highest_hz:.1} Hz, which needs a step below {largest_s:.2e} s; use {} or {} generalized-alpha",
+        "{stepper} with step {h:e} s is unstable here: the highest frequency is {highest_hz:.1} Hz, which needs a step below {:.2e} s; use {} or {} generalized-alpha",
+        // Rounding to three digits stays below it.
+        0.995 * largest_s,
         Setting::Step,
         Setting::Stepper
     )]

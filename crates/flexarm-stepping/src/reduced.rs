@@ -475,6 +475,21 @@ fn geometric_loads<'a>(
     own.into_iter().chain(wrenches)
 }
 
+impl ReducedArm {
+    /// Checks that the mass matrix of the last coordinates is positive definite.
+    #[cold]
+    fn check_mass(&mut self, t: f64) -> Result<(), StepError> {
+        let n = self.dimension();
+        let mut M = DMatrix::zeros(n, n);
+        self.mass(&mut M);
+        let finite = M.iter().all(|m| m.is_finite());
+        match finite && Cholesky::new(M).is_none() {
+            true => Err(StepError::Singular { matrix: "mass matrix", t }),
+            false => Ok(()),
+        }
+    }
+}
+
 impl SecondOrderSystem for ReducedArm {
     fn dimension(&self) -> usize {
         self.arm.n_free()
@@ -537,7 +552,10 @@ impl SecondOrderSystem for ReducedArm {
             inverse_dynamics(&self.arm.model, &mut self.data, &self.state, &self.qddot);
         }
         self.forces = forces;
-        Ok(())
+        match a.iter().all(|a| a.is_finite()) {
+            true => Ok(()),
+            false => self.check_mass(t),
+        }
     }
 
     fn mass(&mut self, M: &mut DMatrix<f64>) {

@@ -1,6 +1,7 @@
 //! Loads as values: what programs apply where people write a file of loads.
 
 use flexarm_kinematics::{Frame, Model, Wrench};
+use flexarm_settings::Quantity;
 use flexarm_stepping::{Load, TimedWrench};
 
 use crate::error::{Error, LoadError};
@@ -72,7 +73,12 @@ impl AppliedLoad {
             let known = moving_links(model).into_iter().map(str::to_owned).collect();
             Written::frame(self.written.as_ref(), LoadError::UnknownFrame { frame: self.frame.clone(), known })
         })?;
-        let jumps = self.wrench.jumps.iter().copied().filter(|t| *t <= duration_s).collect();
+        let jumps: Vec<f64> = self.wrench.jumps.iter().copied().filter(|t| *t <= duration_s).collect();
+        for F in jumps.iter().map(|t| (self.wrench.value)(*t)) {
+            let force = Quantity::FORCE.check_all("the force of a load", &F.force);
+            let torque = Quantity::TORQUE.check_all("the torque of a load", &F.torque);
+            force.and(torque).map_err(|cause| Written::entry(self.written.as_ref(), cause))?;
+        }
         Ok(Load { body: frame.body, X_BF: frame.X_BF, wrench: self.wrench.clone().with_jumps(jumps) })
     }
 }

@@ -4,11 +4,12 @@ use flexarm_flexlink::LinkForm;
 use flexarm_kinematics::{
     Data, State, forward_kinematics_velocity, frame_jacobian, gravity_forces, mass_matrix, nonlinear_effects,
 };
+use flexarm_settings::Quantity;
 use nalgebra::{DMatrix, Matrix6xX, UnitQuaternion};
 use serde::Serialize;
 
 use crate::balancer::{self, BalancerInfo};
-use crate::error::{Error, PoseError};
+use crate::error::{Error, PoseError, ValueError};
 use crate::loops::{self, LoopInfo};
 use crate::mounting::RobotMounting;
 use crate::options::Modelling;
@@ -182,7 +183,10 @@ pub(crate) fn joint_values(values: Option<&[f64]>, joints: &[&str]) -> Result<Ve
     }
     match values.iter().zip(joints).find(|(value, _)| !value.is_finite()) {
         Some((value, joint)) => Err(PoseError::NotFinite { joint: (*joint).to_owned(), value: *value }.into()),
-        None => Ok(values.to_vec()),
+        None => {
+            let named = |(value, joint): (&f64, &&str)| Quantity::JOINT.check(&format!("joint {joint:?}"), *value);
+            Ok(values.iter().zip(joints).map(named).collect::<Result<_, _>>().map_err(ValueError::from)?)
+        }
     }
 }
 

@@ -84,6 +84,7 @@ mod options;
 mod payload;
 mod posed;
 mod prepare;
+mod ranges;
 mod record;
 mod recursions;
 pub mod reduce;

@@ -21,6 +21,7 @@ use crate::applied_load::AppliedLoad;
 use crate::error::{Error, LoadError};
 use crate::load_jumps::jumps_of;
 use crate::payload::PayloadChange;
+use crate::ranges::OF_LOADS;
 use crate::robot_file::{RobotFileError, Source};
 use crate::toml_file::parsed;
 
@@ -153,7 +154,7 @@ pub(crate) fn parse_loads(
     duration: f64,
 ) -> Result<(Vec<AppliedLoad>, Vec<PayloadChange>), Error> {
     let source = Source::new(path, text, "loads");
-    let file: LoadsFile = parsed(text, &source, |file: &LoadsFile| &file.format)?;
+    let file: LoadsFile = parsed(text, &source, OF_LOADS, |file: &LoadsFile| &file.format)?;
     let folder = path.parent().unwrap_or(Path::new("."));
     let loads = file.load.iter().map(|entry| load(entry, folder, duration, &source));
     let payloads = file.payload.iter().map(|entry| payload(entry, &source));

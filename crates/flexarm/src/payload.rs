@@ -1,6 +1,7 @@
 //! Payloads that are picked up and put down during a run.
 
 use flexarm_kinematics::{LinkInertia, Model, Pose, SpatialInertia};
+use flexarm_settings::Quantity;
 use flexarm_stepping::InertiaChange;
 use nalgebra::{Matrix3, Vector3};
 
@@ -57,6 +58,13 @@ impl PayloadChange {
         if numbers.any(|x| !x.is_finite()) || *mass < 0.0 || self.at_s < 0.0 {
             return Err(fail(PayloadError::Numbers));
         }
+        let ranges = [
+            Quantity::TIME.check_all("the time of the payload", [&self.at_s]),
+            Quantity::MASS.check_all("the mass of the payload", [mass]),
+            Quantity::LENGTH.check_all("the centre of mass of the payload", com),
+            Quantity::INERTIA.check_all("the inertia of the payload", inertia_com),
+        ];
+        ranges.into_iter().collect::<Result<(), _>>().map_err(|cause| Written::entry(self.written.as_ref(), cause))?;
         let (link, body, X_BF) = self.carrier(robot, model)?;
         if inertia_com.symmetric_eigenvalues().min() < -1e-9 * inertia_com.norm() {
             return Err(Written::inertia(self.written.as_ref(), PayloadError::NegativeMoment));

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use flexarm_analysis::engineering_strain;
 use flexarm_kinematics::{Data, Frame, Pose, State, Wrench, forward_kinematics, rotation_vector};
+use flexarm_settings::Quantity;
 use flexarm_stepping::{FlexibleArm, Held, Linear, OperatingPoint, StepError, linearise};
 use nalgebra::{DVector, Vector6};
 
@@ -11,7 +12,7 @@ use crate::arm::Arm;
 use crate::balancer;
 use crate::caveat::pose::Standing;
 use crate::caveat::{Caveat, kinds, validity};
-use crate::error::{Error, PoseError};
+use crate::error::{Error, PoseError, ValueError};
 use crate::flexible::FlexibleRobot;
 use crate::inspect::joint_values;
 use crate::loops;
@@ -85,6 +86,8 @@ impl Posed {
     /// The linear structure about the equilibrium under weight and a wrench at the TCP (world axes).
     pub(crate) fn linear(&self, wrench: &Vector6<f64>) -> Result<Linear, Error> {
         let F = Wrench::new(wrench.fixed_rows::<3>(0).into(), wrench.fixed_rows::<3>(3).into());
+        Quantity::FORCE.check_all("the force at the tool", &F.force).map_err(ValueError::from)?;
+        Quantity::TORQUE.check_all("the torque at the tool", &F.torque).map_err(ValueError::from)?;
         linearise(&self.arm, &self.tool, &F, 0.0).map_err(|error| self.flexible.explained(error))
     }
 

@@ -20,6 +20,7 @@ use crate::link_entry::{LinkHome, flexible_link};
 use crate::loop_entry::add_loops;
 use crate::loops;
 use crate::mounting::{RobotMounting, add_mounting};
+use crate::ranges::not_finite;
 use crate::robot_file::{FlexibleLinkEntry, PayloadEntry, RobotFile, RobotFileError, Source, parse_robot_file};
 
 /// Name of the frame that is added for the tool centre point.
@@ -204,7 +205,11 @@ impl Robot {
             Some(text) => parse_urdf(text, &urdf_path, &urdf_options)?,
             None => files.urdf(&urdf_path, &urdf_options)?,
         };
-        Self::of_file(path, urdf_path, urdf, &file, &source, options, files)
+        let found = Self::of_file(path, urdf_path, urdf, &file, &source, options, files)?;
+        match not_finite(text) {
+            Some((span, message)) => Err(source.error(span, message).into()),
+            None => Ok(found),
+        }
     }
 
     /// What a robot file makes of a description that was read for it.

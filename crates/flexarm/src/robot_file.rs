@@ -18,6 +18,7 @@ use crate::drive_entry::DriveEntry;
 use crate::gear_entry::CouplingEntry;
 use crate::loop_entry::LoopEntry;
 use crate::mounting::MountingEntry;
+use crate::ranges::OF_ROBOT;
 use crate::toml_file::parsed;
 
 /// The file as written.
@@ -169,6 +170,6 @@ pub(crate) struct DampingEntry {
 /// [`RobotFileError`] with line and column for anything that is not the format.
 pub(crate) fn parse_robot_file(text: &str, path: &Path) -> Result<(RobotFile, Source), RobotFileError> {
     let source = Source::new(path, text, "robot");
-    let file: RobotFile = parsed(text, &source, |file: &RobotFile| &file.format)?;
+    let file: RobotFile = parsed(text, &source, OF_ROBOT, |file: &RobotFile| &file.format)?;
     Ok((file, source))
 }

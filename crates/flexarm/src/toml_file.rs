@@ -4,10 +4,12 @@ use flexarm_files::Source;
 use serde::de::DeserializeOwned;
 use toml::Spanned;
 
+use crate::ranges::{Ranges, not_finite, outside};
 use crate::robot_file::RobotFileError;
 
 /// The content of a file.
 ///
+/// * `ranges`: of its numbers.
 /// * `format`: where its version stands.
 ///
 /// # Errors
@@ -15,6 +17,7 @@ use crate::robot_file::RobotFileError;
 pub(crate) fn parsed<T: DeserializeOwned>(
     text: &str,
     source: &Source,
+    ranges: Ranges,
     format: impl Fn(&T) -> &Spanned<i64>,
 ) -> Result<T, RobotFileError> {
     let file: T = toml::from_str(text).map_err(|error| {
@@ -30,5 +33,10 @@ pub(crate) fn parsed<T: DeserializeOwned>(
         let message = format!("format is {found}, this program reads format 1: change it or update flexarm");
         return Err(source.error(version.span(), message));
     }
-    Ok(file)
+    // Files with ranges of their own say for each key what it is; the others are only read here.
+    let unknown = if ranges.is_empty() { not_finite(text) } else { None };
+    match outside(text, ranges).or(unknown) {
+        Some((span, message)) => Err(source.error(span, message)),
+        None => Ok(file),
+    }
 }

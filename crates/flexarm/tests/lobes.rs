@@ -8,7 +8,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use flexarm::lobes::{CutRequest, CuttingPlace, CuttingTool, Lobes, LobesRequest, cut, lobes};
+use flexarm::lobes::{CutRequest, CuttingPlace, CuttingTool, Lobes, LobesRequest, cut, lobes, rounded_down};
 use flexarm::{DriveModel, Error, LinkModel, Modelling, Motion, Robot};
 use serde_json::Value;
 
@@ -319,4 +319,82 @@ fn table_diagram_page_and_figures_are_written_together() {
     assert!(std::fs::read_to_string(found.files.page.as_ref().unwrap()).unwrap().contains("<svg"));
     let place = CuttingPlace::At(None);
     assert!(matches!(lobes(&robot, &tool, &place, &request, &|_, _| true), Err(Error::Taken { .. })));
+}
+
+/// Truth: the same direction in other axes. The tool's axis at the pose is known from a run with the axes of the TCP.
+#[test]
+fn a_tool_axis_in_world_axes_is_the_same_axis() {
+    let (robot, folder) = (kr210(), Folder::new("axis"));
+    let pose = [0.2, -1.0, 1.6, 0.4, 0.9, -0.3];
+    let text = std::fs::read_to_string(root().join("robots/tools/face_mill_63mm.toml")).unwrap();
+    let request = LobesRequest { zero_order: true, ..LobesRequest::default() };
+    let own = folder.tool(&text).unwrap().at_speeds(vec![2000.0, 5000.0]);
+    let found = at(&robot, &own, &pose, &request);
+    let ([x, y, z], [fx, fy, fz]) = (found.poses[0].axis, found.poses[0].feed);
+    let lines = text
+        .lines()
+        .filter(|line| !line.starts_with("axis") && !line.starts_with("feed =") && !line.starts_with("feed_axes"));
+    let world = lines.collect::<Vec<_>>().join("\n").replace(
+        "[tool]",
+        &format!(
+            "[tool]\naxis = [{x}, {y}, {z}]\naxis_axes = \"world\"\nfeed = [{fx}, {fy}, {fz}]\nfeed_axes = \"world\"\n#"
+        ),
+    );
+    let world = folder.tool(&world).unwrap().at_speeds(vec![2000.0, 5000.0]);
+    for (a, b) in at(&robot, &world, &pose, &request).points.iter().zip(&found.points) {
+        let (a, b) = (a.depth_m.unwrap(), b.depth_m.unwrap());
+        assert!((a / b - 1.0).abs() < 1e-9, "{a} {b}");
+    }
+    let alone = folder.tool(&text.replace("axis = [0.0, 0.0, 1.0]", "axis_axes = \"world\"")).map(|_| ());
+    let error = alone.unwrap_err().to_string();
+    assert!(error.contains("axis_axes") && error.contains("tool.toml:"), "{error}");
+}
+
+#[test]
+fn what_no_tool_has_is_refused_and_what_few_have_is_told_with_its_slip() {
+    let folder = Folder::new("slips");
+    let good = std::fs::read_to_string(root().join("robots/tools/endmill_20mm.toml")).unwrap();
+    for (old, new, words) in [
+        ("damping = 0.03", "damping = 30000.0", "damping is 30000"),
+        ("damping = 0.03", "damping = nan", "finite"),
+        ("stiffness = 1.5e7", "stiffness = 1e300", "stiffness is 1e300"),
+        ("frequency = 1200.0", "frequency = 1e-300", "frequency is"),
+        ("frequency = 1200.0", "frequency = 1e12", "frequency is"),
+        ("diameter = 20.0", "diameter = 20000.0", "diameter is 20 m"),
+        ("deepest = 20.0", "deepest = 1e40", "deepest is"),
+        ("to = 18000.0", "to = 1e12", "to is 1e12 1/min"),
+        ("feed_per_tooth = 0.1", "feed_per_tooth = 1e40", "feed_per_tooth is"),
+    ] {
+        assert!(good.contains(old), "{old}");
+        let error = folder.tool(&good.replace(old, new)).map(|_| ()).unwrap_err().to_string();
+        assert!(error.contains(words) && error.contains("tool.toml:"), "{new}: {error}");
+    }
+    let rigid = LobesRequest { modelling: rigid(), zero_order: true, ..LobesRequest::default() };
+    for (old, new, code, slip) in [
+        ("damping = 0.03", "damping = 3.0", "tool-damping", "per cent"),
+        ("stiffness = 1.5e7", "stiffness = 15.0", "tool-stiffness", "N/um"),
+        ("frequency = 1200.0", "frequency = 1.2", "tool-frequency", "kHz"),
+        ("diameter = 20.0", "diameter = 600.0", "tool-diameter", ""),
+    ] {
+        let tool = folder.tool(&good.replace(old, new)).unwrap().at_speeds(vec![6000.0]);
+        let found = at(&kr210(), &tool, &[0.0, -1.0, 1.6, 0.0, 0.9, 0.0], &rigid);
+        let caveat = found.caveats.iter().find(|caveat| caveat.code == code).unwrap();
+        assert!(caveat.likely.contains(slip) && caveat.value.is_some(), "{caveat:?}");
+        assert!(found.warnings.iter().any(|text| *text == caveat.message));
+    }
+    let usual =
+        at(&kr210(), &folder.tool(&good).unwrap().at_speeds(vec![6000.0]), &[0.0, -1.0, 1.6, 0.0, 0.9, 0.0], &rigid);
+    assert!(!usual.caveats.iter().any(|caveat| caveat.code.starts_with("tool-")), "{:?}", usual.caveats);
+}
+
+#[test]
+fn a_limit_for_people_is_never_above_the_limit() {
+    assert_eq!(rounded_down(0.02974, 3), "0.029");
+    assert_eq!(rounded_down(2.0, 3), "2.000");
+    assert_eq!(rounded_down(0.000_297, 3), "0.00029");
+    for k in 1..20_000 {
+        let x = 1.7e-5 * f64::from(k);
+        let shown: f64 = rounded_down(x, 3).parse().unwrap();
+        assert!(shown <= x && x - shown < 1.001e-3 && shown > 0.9 * x, "{x} {shown}");
+    }
 }

@@ -5,7 +5,9 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use flexarm::lobes::{CuttingPlace, CuttingTool, LobesError, LobesRequest, lobes};
-use flexarm::map::{JointRange, KeptPoses, Map, MapError, MapRegion, MapRequest, ToolDirections, WorkspaceGrid, map};
+use flexarm::map::{
+    JointRange, KeptPoses, Map, MapError, MapRegion, MapRequest, ToolDirections, WorkspaceGrid, map, read_poses,
+};
 use flexarm::{Error, Fault, Modelling, Motion, Robot, modes, statics};
 
 fn root() -> PathBuf {
@@ -354,4 +356,54 @@ fn a_tool_that_cannot_be_judged_is_refused_before_the_map_is_taken() {
     std::fs::remove_dir_all(&folder).unwrap();
     assert!(matches!(&error, Error::Map(MapError::NothingToCompare { by }) if by == "depth_m"), "{error}");
     assert!(error.to_string().contains("feed"), "{error}");
+}
+
+/// Truth: statics at each pose; the file is read in three forms.
+#[test]
+fn a_map_of_listed_poses_has_the_compliance_of_statics_at_each() {
+    let robot = robot("kr210");
+    let folder = std::env::temp_dir().join(format!("flexarm-poses-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let poses = [[0.1, -1.0, 1.5, 0.3, 0.7, 0.2], [-0.4, -0.8, 1.2, 0.0, -0.5, 0.9], [0.0, -1.2, 1.9, 1.0, 0.3, 0.0]];
+    let written = |name: &str, text: String| {
+        let path = folder.join(name);
+        std::fs::write(&path, text).unwrap();
+        read_poses(&path, &robot, Some(&[0.0, 0.0, 0.0, 0.0, 0.0, 0.25]))
+    };
+    let row = |values: &[f64]| values.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
+    let table: String = poses.iter().map(|pose| row(pose) + "\n").collect();
+    let read = written("a.csv", format!("joint_1,joint_2,joint_3,joint_4,joint_5,joint_6\n{table}")).unwrap();
+    assert_eq!(read, poses);
+    let listed: Vec<String> = poses.iter().map(|pose| format!("[{}]", row(pose))).collect();
+    assert_eq!(written("b.toml", format!("format = 1\nposes = [{}]\n", listed.join(", "))).unwrap(), poses);
+    let named = written("c.csv", "joint_2_deg;joint_1_rad\n-90;0,5\n".into()).unwrap();
+    assert_eq!(named, [[0.5, (-90.0_f64).to_radians(), 0.0, 0.0, 0.0, 0.25]]);
+    for (name, text, words) in [
+        ("d.csv", "joint_9\n1\n", "joint_9"),
+        ("e.csv", "joint_1,joint_2\n1,1e9\n", "line 2"),
+        ("f.csv", "joint_1\n", "no pose"),
+        ("g.toml", "format = 1\nposes = [[1.0]]\n", "expected 6"),
+    ] {
+        let error = written(name, text.into()).unwrap_err().to_string();
+        assert!(error.contains(words) && error.contains(name), "{error}");
+    }
+
+    let request = MapRequest { region: MapRegion::Poses(read), wrench: WRENCH, ..MapRequest::default() };
+    let found = taken(&robot, &request);
+    assert_eq!((found.points, found.table.rows()), (3, 3));
+    let entries =
+        ["x", "y", "z", "rx", "ry", "rz"].map(|a| ["fx", "fy", "fz", "tx", "ty", "tz"].map(|b| format!("c_{a}_{b}_")));
+    for (k, pose) in poses.iter().enumerate() {
+        let truth = statics(&robot, &Modelling::default(), Some(pose), WRENCH).unwrap();
+        for (i, line) in entries.iter().enumerate() {
+            for (j, name) in line.iter().enumerate() {
+                let column = found.table.columns.iter().position(|column| column.name.starts_with(name)).unwrap();
+                assert_eq!(found.table.row(k)[column], truth.compliance[i][j], "{name}");
+            }
+        }
+    }
+    assert!(!found.caveats.iter().any(|caveat| caveat.code == "one-place"));
+    let one = MapRequest { region: MapRegion::Poses(vec![poses[0].to_vec()]), ..MapRequest::default() };
+    assert!(taken(&robot, &one).caveats.iter().any(|caveat| caveat.code == "one-place"));
+    std::fs::remove_dir_all(&folder).unwrap();
 }

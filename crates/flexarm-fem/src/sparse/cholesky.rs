@@ -318,6 +318,35 @@ mod tests {
         }
     }
 
+    /// Truth: the bits of one thread. Large dense blocks, many small ones, and a grid whose separators are both.
+    #[test]
+    fn a_factor_has_the_same_bits_on_any_number_of_threads() {
+        let side = 16;
+        let grid = |n: usize| {
+            let place = |k: usize| [k % side, k / side % side, k / side / side];
+            let near = |i: usize, j: usize| place(i).iter().zip(place(j)).all(|(a, b)| a.abs_diff(b) <= 1);
+            let mut triplets = Vec::new();
+            for i in 0..n {
+                triplets.push((i as u32, i as u32, 30.0 + (i % 7) as f64));
+                let coupled = (i.saturating_sub(2 * side * side)..i).filter(|j| near(i, *j));
+                triplets.extend(coupled.map(|j| (i as u32, j as u32, -0.5 - ((i * 3 + j) % 5) as f64 / 10.0)));
+            }
+            SparseSymmetric::from_triplets(n, &triplets)
+        };
+        for K in [parts(900, 900), parts(400, 20), grid(side * side * side)] {
+            for ordering in [Ordering::MinimumDegree, Ordering::NestedDissection] {
+                let factor = |threads| Cholesky::new(K.clone(), ordering, Threads(threads)).unwrap().columns.values;
+                let one = factor(1);
+                for threads in [2, 3, 8] {
+                    let other = factor(threads);
+                    let worst = one.iter().zip(&other).fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs()));
+                    let same = one.iter().zip(&other).all(|(a, b)| a.to_bits() == b.to_bits());
+                    assert!(same, "{threads} threads, {} unknowns: {worst:e}", K.size());
+                }
+            }
+        }
+    }
+
     #[test]
     fn a_stiffness_of_zero_below_zero_or_of_no_number_is_refused_with_its_unknown() {
         for ordering in [Ordering::MinimumDegree, Ordering::NestedDissection] {

@@ -203,6 +203,7 @@ def map(
     tilts: int | None = None,
     rolls: int = 1,
     joints: dict[str, tuple[float, float, int]] | None = None,
+    poses: ArrayLike | None = None,
     along: Motion | _Path | None = None,
     points: int = 1000,
     at: ArrayLike | None = None,

@@ -78,6 +78,34 @@ pub(crate) const OUTSIDE_LIMITS: CaveatKind = CaveatKind::warning(
 
 // What the files say of the robot.
 
+/// A cutter of a size that no arm carries, or finer than any.
+pub(crate) const TOOL_DIAMETER: CaveatKind = CaveatKind::warning(
+    "tool-diameter",
+    "the cutter of {where} has a diameter of {value} m, the usual range ends at {yardstick} m",
+    "m",
+    "check diameter and lengths of the tool's file",
+);
+/// A mode of a tool that is slower or faster than those of tools.
+pub(crate) const TOOL_FREQUENCY: CaveatKind = CaveatKind::warning(
+    "tool-frequency",
+    "{where} has a natural frequency of {value} Hz, the usual range of tools and spindles ends at {yardstick} Hz",
+    "Hz",
+    "frequencies of modes are in Hz",
+);
+/// A mode of a tool that is softer or stiffer than those of tools.
+pub(crate) const TOOL_STIFFNESS: CaveatKind = CaveatKind::warning(
+    "tool-stiffness",
+    "{where} has a stiffness of {value} N/m, the usual range of tools and spindles ends at {yardstick} N/m",
+    "N/m",
+    "the stiffness of a mode is in N/m, its mass in kg",
+);
+/// A mode of a tool that is damped as no tool is.
+pub(crate) const TOOL_DAMPING: CaveatKind = CaveatKind::warning(
+    "tool-damping",
+    "{where} has a damping ratio of {value}, the usual range of tools and spindles ends at {yardstick}",
+    "",
+    "damping is a ratio: 3 per cent is 0.03",
+);
 /// An angle of more than a turn.
 pub(crate) const ANGLE: CaveatKind = CaveatKind::warning(
     "angle",

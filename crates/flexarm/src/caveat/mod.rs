@@ -16,6 +16,7 @@ pub(crate) mod parts;
 pub(crate) mod pose;
 pub(crate) mod size;
 pub(crate) mod slip;
+pub(crate) mod tool;
 pub(crate) mod validity;
 
 pub use flexarm_settings::caveat::{Caveat, Severity};

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use flexarm_analysis::LinearError;
 use flexarm_flexlink::{GearboxError, MountingError, SubstitutionError};
-use flexarm_settings::Setting;
+use flexarm_settings::{OutOfRange, Setting};
 use flexarm_stepping::StepError;
 
 /// Links and drives that cannot be modelled as asked for.
@@ -375,7 +375,7 @@ pub enum ChannelError {
 }
 
 /// A load as values that makes no sense.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LoadError {
     /// Samples that are no function of time.
@@ -397,6 +397,9 @@ pub enum LoadError {
         /// Links that move.
         known: Vec<String>,
     },
+    /// A number of a size that no load has.
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
     /// A change of what a link carries.
     #[error(transparent)]
     Payload(#[from] PayloadError),

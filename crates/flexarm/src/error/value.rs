@@ -1,6 +1,6 @@
 //! Numbers of options that make no sense, each with the number and what is expected.
 
-use flexarm_settings::Setting;
+use flexarm_settings::{OutOfRange, Setting};
 
 /// A number of a run or a response that makes no sense.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -17,6 +17,9 @@ pub enum ValueError {
         /// The entry.
         found: f64,
     },
+    /// A number of a size that no robot has.
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
     /// The log rate, which must be positive.
     #[error("the log rate must be positive, found {0} Hz")]
     LogRate(f64),

@@ -131,12 +131,8 @@ pub fn cut(robot: &Robot, tool: &CuttingTool, at: Option<&[f64]>, request: &CutR
     if tool.measured.is_some() {
         return Err(LobesError::MeasuredTool.into());
     }
-    if !(request.spindle_rpm.is_finite() && request.spindle_rpm > 0.0) {
-        return Err(LobesError::Speed { found: request.spindle_rpm }.into());
-    }
-    if !(request.depth_m.is_finite() && request.depth_m > 0.0) {
-        return Err(LobesError::Deepest { found: request.depth_m }.into());
-    }
+    super::check_speeds(&[request.spindle_rpm])?;
+    super::check_deepest(request.depth_m)?;
     if let Some(found) = request.seconds.filter(|seconds| !(seconds.is_finite() && *seconds > 0.0)) {
         return Err(LobesError::Seconds { found }.into());
     }
@@ -165,8 +161,9 @@ pub fn cut(robot: &Robot, tool: &CuttingTool, at: Option<&[f64]>, request: &CutR
     answer.limit_m = limit.as_ref().map(|limit| limit.depth);
     answer.limit_hz = limit.map(|limit| limit.chatter_hz);
     answer.curves = curves;
-    answer.warnings = caveat::warnings(&place.caveats);
     answer.caveats = place.caveats;
+    answer.caveats.extend(caveat::tool::of_tool(tool));
+    answer.warnings = caveat::warnings(&answer.caveats);
     if let Some(paths) = paths {
         files::save_cut(&mut answer, paths)?;
     }

@@ -34,6 +34,18 @@ pub(super) fn save(answer: &mut Lobes, tool: &CuttingTool, paths: [PathBuf; 4]) 
     Ok(write_all(&files.collect::<Vec<_>>())?)
 }
 
+/// A positive number with this many digits behind the point, or as many as show two that count, never above the number itself: what is
+/// called safe below a limit is safe.
+pub fn rounded_down(x: f64, digits: usize) -> String {
+    let needed = if x > 0.0 { (1.0 - x.log10().floor()).clamp(0.0, 12.0) as usize } else { 0 };
+    let digits = digits.max(needed);
+    let text = format!("{x:.digits$}");
+    match text.parse::<f64>() {
+        Ok(rounded) if rounded > x => format!("{:.digits$}", rounded - 0.1_f64.powi(digits as i32)),
+        _ => text,
+    }
+}
+
 fn cell(x: Option<f64>) -> String {
     x.map_or_else(String::new, |x| x.to_string())
 }
@@ -129,8 +141,8 @@ fn notes(answer: &Lobes, tool: &CuttingTool) -> Vec<String> {
         e.exit.to_degrees()
     );
     let stable = answer.stable_below_m.map_or_else(
-        || format!("stable at every speed up to {:.2} mm", 1e3 * answer.deepest_m),
-        |depth| format!("stable at every speed below {:.3} mm", 1e3 * depth),
+        || format!("stable at every speed up to {} mm", rounded_down(1e3 * answer.deepest_m, 2)),
+        |depth| format!("stable at every speed below {} mm", rounded_down(1e3 * depth, 3)),
     );
     let n = answer.poses.len();
     let place = if n > 1 {
@@ -146,12 +158,16 @@ fn html(answer: &Lobes, picture: Option<&str>) -> String {
     let _ = match (answer.stable_below_m, answer.stable_below_at_rpm) {
         (Some(depth), Some(rpm)) => writeln!(
             page,
-            "<p>Stable at every speed below <b>{:.3} mm</b> (at {rpm:.0} 1/min); deepest at <b>{:.0} 1/min</b>: {:.3} mm.</p>",
-            1e3 * depth,
+            "<p>Stable at every speed below <b>{} mm</b> (at {rpm:.0} 1/min); deepest at <b>{:.0} 1/min</b>: {} mm.</p>",
+            rounded_down(1e3 * depth, 3),
             answer.best_rpm,
-            1e3 * answer.best_depth_m
+            rounded_down(1e3 * answer.best_depth_m, 3)
         ),
-        _ => writeln!(page, "<p>No chatter up to {:.2} mm at any of the speeds.</p>", 1e3 * answer.deepest_m),
+        _ => writeln!(
+            page,
+            "<p>No chatter up to {} mm at any of the speeds.</p>",
+            rounded_down(1e3 * answer.deepest_m, 2)
+        ),
     };
     for caveat in &answer.caveats {
         let _ = writeln!(page, "<p class=\"no\">{}</p>", escaped(&caveat.message));
@@ -169,7 +185,7 @@ fn html(answer: &Lobes, picture: Option<&str>) -> String {
             page,
             "<tr><td>{}</td><td>{}</td><td>{}</td><td>{x}</td><td>{y}</td><td>{z}</td><td>{}</td></tr>",
             number(pose.time_s, 1.0, 2),
-            number(pose.stable_below_m, 1e3, 3),
+            pose.stable_below_m.map_or_else(|| "-".into(), |depth| rounded_down(1e3 * depth, 3)),
             number(pose.stable_below_at_rpm, 1.0, 0),
             hz.join(", ")
         );
@@ -229,7 +245,9 @@ fn cut_plot(answer: &CutRun) -> Result<String, PlotError> {
         panel("displacement of the tip [mm]", true, &|k, axis| 1e3 * c.displacement[k][axis]),
         panel("force on the tool [N]", false, &|k, axis| c.force[k][axis]),
     ];
-    let limit = answer.limit_m.map_or_else(|| "no limit".to_owned(), |limit| format!("limit {:.3} mm", 1e3 * limit));
+    let limit = answer
+        .limit_m
+        .map_or_else(|| "no limit".to_owned(), |limit| format!("limit {} mm", rounded_down(1e3 * limit, 3)));
     let verdict = if answer.chatters { "chatters" } else { "does not chatter" };
     let title = format!(
         "{} on {}: {:.0} 1/min, {:.3} mm {verdict}",

@@ -15,16 +15,18 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use flexarm_chatter::{Kind, LimitOptions, limit_of_depth, unstable_ranges, zero_order_limit};
 use flexarm_files::check_free;
+use flexarm_settings::Quantity;
 use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::caveat::{self, Caveat};
-use crate::error::Error;
+use crate::error::{Error, ValueError};
 use crate::motion::Motion;
 use crate::options::Modelling;
 use crate::robot::Robot;
 
 pub use cut::{CutRequest, CutRun, cut};
+pub use files::rounded_down;
 pub use flexarm_chatter::{ChatterError, Simulated};
 pub use tool_file::CuttingTool;
 
@@ -233,10 +235,8 @@ pub fn lobes(
     go_on: &(dyn Fn(usize, usize) -> bool + Sync),
 ) -> Result<Lobes, Error> {
     let deepest_m = request.deepest_m.unwrap_or(tool.deepest);
-    if !(deepest_m.is_finite() && deepest_m > 0.0) {
-        return Err(LobesError::Deepest { found: deepest_m }.into());
-    }
-    check_speeds(tool)?;
+    check_deepest(deepest_m)?;
+    check_speeds(&tool.rpm)?;
     if tool.measured.is_some() && request.ranges {
         return Err(LobesError::MeasuredTool.into());
     }
@@ -261,6 +261,7 @@ pub fn lobes(
     let mut answer = assembled(robot, tool, &places, &all, deepest_m);
     answer.method = if zero_order { "zero-order" } else { "floquet" };
     answer.left_out = left_out;
+    answer.caveats.extend(caveat::tool::of_tool(tool));
     if tool.measured.is_some() && !request.zero_order {
         let message = "the tool has a measured response: the limits are those of the zero-order solution, which does not see period doubling";
         answer.caveats.push(Caveat::said(
@@ -287,8 +288,7 @@ fn point(
     pose: usize,
 ) -> Result<LobePoint, ChatterError> {
     let spindle = TAU * rpm / 60.0;
-    let zero = zero_order_limit(&|w| place.response(w), &tool.cutter, spindle, &place.band)?;
-    let zero = zero.filter(|limit| limit.depth <= deepest_m);
+    let zero = zero_order_limit(&|w| place.response(w), &tool.cutter, spindle, &place.band, deepest_m)?;
     let mut point = LobePoint {
         spindle_rpm: rpm,
         depth_m: None,
@@ -317,9 +317,19 @@ fn point(
     Ok(point)
 }
 
-fn check_speeds(tool: &CuttingTool) -> Result<(), LobesError> {
-    let wrong = tool.rpm.iter().copied().find(|rpm| !(rpm.is_finite() && *rpm > 0.0));
-    wrong.map_or(Ok(()), |found| Err(LobesError::Speed { found }))
+fn check_speeds(rpm: &[f64]) -> Result<(), Error> {
+    if let Some(found) = rpm.iter().copied().find(|rpm| !(rpm.is_finite() && *rpm > 0.0)) {
+        return Err(LobesError::Speed { found }.into());
+    }
+    Ok(Quantity::SPEED.check_all("the spindle speed", rpm).map_err(ValueError::from)?)
+}
+
+fn check_deepest(depth_m: f64) -> Result<(), Error> {
+    if !(depth_m.is_finite() && depth_m > 0.0) {
+        return Err(LobesError::Deepest { found: depth_m }.into());
+    }
+    Quantity::LENGTH.check("the deepest cut", depth_m).map_err(ValueError::from)?;
+    Ok(())
 }
 
 /// The lowest limit of depth at a pose over all speeds of the tool (m): the deepest cut that is looked at where nothing chatters, NaN
@@ -336,7 +346,7 @@ pub(crate) fn lowest_limit(
     zero_order: bool,
     q: &[f64],
 ) -> Result<f64, Error> {
-    check_speeds(tool)?;
+    check_speeds(&tool.rpm)?;
     let place = match Place::at(robot, modelling, tool, Some(q)) {
         Err(Error::Lobes(LobesError::FeedAlongAxis)) => return Ok(f64::NAN),
         other => other?,

@@ -86,7 +86,7 @@ impl Place {
         let mut tip = |t: f64| {
             forward_kinematics(&model, &mut data, &DVector::from_vec(sample(t)));
             let X_WT = data.X_WF(&frame);
-            (X_WT.transform_point(&tool.tip.into()).coords, X_WT.rotation * tool.axis)
+            (X_WT.transform_point(&tool.tip.into()).coords, tool.axis.in_world(&X_WT.rotation))
         };
         let (mut places, mut left_out) = (Vec::new(), 0);
         for k in 0..n {
@@ -113,13 +113,12 @@ impl Place {
     ) -> Result<Self, Error> {
         let linear = posed.linear(&Vector6::zeros())?;
         let R_WT = linear.X_WT.rotation;
-        let axis = R_WT * tool.axis;
+        let axis = tool.axis.in_world(&R_WT);
         let feed = match (tool.feed, along) {
-            (Some((feed, true)), _) => feed,
-            (Some((feed, false)), _) => R_WT * feed,
+            (Some(feed), _) => feed.in_world(&R_WT),
             (None, Some(along)) => along,
             // Any direction across the tool: the x axis of the TCP, or y where that is the tool's.
-            (None, None) if tool.axis.x.abs() < 0.9 => R_WT * Vector3::x(),
+            (None, None) if (R_WT.inverse() * axis).x.abs() < 0.9 => R_WT * Vector3::x(),
             (None, None) => R_WT * Vector3::y(),
         };
         let R_WC = cutting_axes(&feed, &axis)?;

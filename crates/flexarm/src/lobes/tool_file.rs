@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use flexarm_chatter::{Coefficients, Cutter, Engagement};
 use flexarm_files::{NumberTable, read_text};
-use nalgebra::Vector3;
+use flexarm_settings::{OutOfRange, Quantity};
+use nalgebra::{Rotation3, Vector3};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -79,6 +80,7 @@ struct SpindleEntry {
 #[serde(deny_unknown_fields)]
 struct ToolEntry {
     axis: Option<Spanned<[f64; 3]>>,
+    axis_axes: Option<Spanned<String>>,
     feed: Option<Spanned<[f64; 3]>>,
     feed_axes: Option<Spanned<String>>,
     tip: Option<Spanned<[f64; 3]>>,
@@ -122,16 +124,35 @@ pub struct CuttingTool {
     pub(crate) rpm: Vec<f64>,
     /// Deepest cut that is looked at, m.
     pub(crate) deepest: f64,
-    /// From the spindle to the tip, unit vector in the axes of the TCP.
-    pub(crate) axis: Vector3<f64>,
-    /// Along the feed, and whether in world axes.
-    pub(crate) feed: Option<(Vector3<f64>, bool)>,
+    /// From the spindle to the tip.
+    pub(crate) axis: Direction,
+    /// Along the feed.
+    pub(crate) feed: Option<Direction>,
     /// The tip in the axes of the TCP, m.
     pub(crate) tip: Vector3<f64>,
     /// m, for runs over time.
     pub(crate) feed_per_tooth: f64,
     pub(crate) modes: Vec<ToolMode>,
     pub(crate) measured: Option<MeasuredResponse>,
+}
+
+/// A unit vector in the axes of the TCP or of the world.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Direction {
+    /// Turns with the TCP.
+    Tcp(Vector3<f64>),
+    /// Stays as it is.
+    World(Vector3<f64>),
+}
+
+impl Direction {
+    /// In world axes. `R_WT`: TCP to world.
+    pub(crate) fn in_world(self, R_WT: &Rotation3<f64>) -> Vector3<f64> {
+        match self {
+            Self::Tcp(direction) => R_WT * direction,
+            Self::World(direction) => direction,
+        }
+    }
 }
 
 /// A mode of the tool itself.
@@ -162,6 +183,8 @@ const DEEPEST: f64 = 1.0;
 const FEED: f64 = 0.005;
 /// Spindle speeds of a range if the file does not say.
 const POINTS: usize = 101;
+/// Diameters of cutters.
+const DIAMETER: Quantity = Quantity { unit: "m", least: 1e-6, most: 2.0 };
 /// Most spindle speeds.
 const MOST_POINTS: usize = 10_000;
 
@@ -178,7 +201,7 @@ impl CuttingTool {
         let path = path.as_ref();
         let text = read_text(path)?;
         let source = Source::new(path, &text, "tool");
-        let file: ToolFile = parsed(&text, &source, |file: &ToolFile| &file.format)?;
+        let file: ToolFile = parsed(&text, &source, &[], |file: &ToolFile| &file.format)?;
         let reader = Reader {
             source: &source,
             folder: path.parent().unwrap_or(Path::new(".")),
@@ -231,18 +254,16 @@ impl Reader<'_> {
     fn tool(&self, file: &ToolFile, name: String) -> Result<CuttingTool, Error> {
         let cutter = self.cutter(&file.cutter, &file.engagement)?;
         let deepest = match &file.deepest {
-            Some(depth) => self.length * self.positive("deepest", depth)?,
+            Some(depth) => self.positive("deepest", depth, self.length, Quantity::LENGTH)?,
             None => DEEPEST * cutter.diameter,
         };
         let feed_per_tooth = match &file.tool.feed_per_tooth {
-            Some(feed) => self.length * self.positive("feed_per_tooth", feed)?,
+            Some(feed) => self.positive("feed_per_tooth", feed, self.length, Quantity::LENGTH)?,
             None => FEED * cutter.diameter,
         };
-        let axis = match &file.tool.axis {
-            Some(axis) => self.direction("axis", axis)?,
-            None => Vector3::z(),
-        };
-        let tip = file.tool.tip.as_ref().map_or(Ok(Vector3::zeros()), |tip| self.finite("tip", tip))? * self.length;
+        let axis = self.direction(["axis", "axis_axes"], &file.tool.axis, &file.tool.axis_axes)?;
+        let feed = self.direction(["feed", "feed_axes"], &file.tool.feed, &file.tool.feed_axes)?;
+        let tip = file.tool.tip.as_ref().map_or(Ok(Vector3::zeros()), |tip| self.point("tip", tip))?;
         if let (Some(_), Some(mode)) = (&file.measured, file.mode.first()) {
             let message = "a tool has either [[mode]] entries or a [measured] response, not both";
             return Err(self.error(mode.span(), message));
@@ -252,8 +273,8 @@ impl Reader<'_> {
             cutter,
             rpm: self.speeds(&file.spindle)?,
             deepest,
-            axis,
-            feed: self.feed(&file.tool)?,
+            axis: axis.unwrap_or(Direction::Tcp(Vector3::z())),
+            feed,
             tip,
             feed_per_tooth,
             modes: file.mode.iter().map(|mode| self.mode(mode)).collect::<Result<_, Error>>()?,
@@ -284,7 +305,7 @@ impl Reader<'_> {
             radial: k.radial * self.pressure,
             axial: k.axial * self.pressure,
         };
-        let diameter = self.length * self.positive("diameter", &e.diameter)?;
+        let diameter = self.positive("diameter", &e.diameter, self.length, DIAMETER)?;
         let cutter = Cutter {
             teeth,
             diameter,
@@ -376,15 +397,17 @@ impl Reader<'_> {
             (Some(list), None, None) if e.points.is_none() => {
                 let rpm = list.get_ref();
                 let ascending = rpm.windows(2).all(|pair| pair[0] < pair[1]);
-                if rpm.is_empty() || !ascending || rpm.len() > MOST_POINTS || !rpm.iter().all(|x| sensible(*x)) {
+                if rpm.is_empty() || !ascending || rpm.len() > MOST_POINTS || rpm[0] <= 0.0 {
                     return Err(self.error(list.span(), "rpm must be positive, ascending speeds (1/min)"));
                 }
+                self.told(list.span(), Quantity::SPEED.check_all("rpm", rpm))?;
                 Ok(rpm.clone())
             }
             (None, Some(from), Some(to)) => {
-                let (low, high) = (self.positive("from", from)?, self.positive("to", to)?);
+                let speed = |what, value| self.positive(what, value, 1.0, Quantity::SPEED);
+                let (low, high) = (speed("from", from)?, speed("to", to)?);
                 let points = e.points.as_ref().map_or(POINTS, |points| *points.get_ref());
-                if !(sensible(low) && sensible(high) && high > low) {
+                if high <= low {
                     return Err(self.error(to.span(), format!("speeds from {low} to {high} 1/min: expected a range")));
                 }
                 if !(2..=MOST_POINTS).contains(&points) {
@@ -400,17 +423,28 @@ impl Reader<'_> {
         }
     }
 
-    fn feed(&self, entry: &ToolEntry) -> Result<Option<(Vector3<f64>, bool)>, Error> {
-        let world = match entry.feed_axes.as_ref().map(|word| (word.get_ref().as_str(), word.span())) {
+    /// A direction and the axes that it is given in.
+    fn direction(
+        &self,
+        [what, its_axes]: [&str; 2],
+        value: &Option<Spanned<[f64; 3]>>,
+        axes: &Option<Spanned<String>>,
+    ) -> Result<Option<Direction>, Error> {
+        let world = match axes.as_ref().map(|word| (word.get_ref().as_str(), word.span())) {
             None | Some(("tcp", _)) => false,
             Some(("world", _)) => true,
             Some((other, span)) => {
-                return Err(self.error(span, format!("feed_axes = {other:?} is not known; use \"tcp\" or \"world\"")));
+                return Err(self.error(span, format!("{its_axes} = {other:?} is not known; use \"tcp\" or \"world\"")));
             }
         };
-        match (&entry.feed, &entry.feed_axes) {
-            (Some(feed), _) => Ok(Some((self.direction("feed", feed)?, world))),
-            (None, Some(axes)) => Err(self.error(axes.span(), "feed_axes tells nothing without feed = [...]")),
+        match (value, axes) {
+            (Some(value), _) => {
+                let direction = self.unit_vector(what, *value.get_ref(), value.span())?;
+                Ok(Some(if world { Direction::World(direction) } else { Direction::Tcp(direction) }))
+            }
+            (None, Some(axes)) => {
+                Err(self.error(axes.span(), format!("{its_axes} tells nothing without {what} = [...]")))
+            }
             (None, None) => Ok(None),
         }
     }
@@ -430,10 +464,18 @@ impl Reader<'_> {
                 ToolDirection::Along(self.unit_vector("direction", *vector, e.direction.span())?)
             }
         };
-        let omega = std::f64::consts::TAU * self.positive("frequency", &e.frequency)?;
+        let omega = std::f64::consts::TAU * self.positive("frequency", &e.frequency, 1.0, Quantity::FREQUENCY)?;
         let mass = match (&e.mass, &e.stiffness) {
-            (Some(mass), None) => self.positive("mass", mass)?,
-            (None, Some(stiffness)) => self.positive("stiffness", stiffness)? / (omega * omega),
+            (Some(mass), None) => {
+                let mass = self.positive("mass", mass, 1.0, Quantity::MASS)?;
+                let stiffness = Quantity::TOOL_STIFFNESS.check("the stiffness of the mode", mass * omega * omega);
+                self.told(entry.span(), stiffness)?;
+                mass
+            }
+            (None, Some(stiffness)) => {
+                let stiffness = self.positive("stiffness", stiffness, 1.0, Quantity::TOOL_STIFFNESS)?;
+                self.told(entry.span(), Quantity::MASS.check("the mass of the mode", stiffness / (omega * omega)))?
+            }
             (Some(_), Some(both)) => {
                 return Err(self.error(both.span(), "give mass or stiffness, not both: the frequency tells the other"));
             }
@@ -441,7 +483,8 @@ impl Reader<'_> {
                 return Err(self.error(entry.span(), "a mode needs mass = ... (kg) or stiffness = ... (N/m)"));
             }
         };
-        Ok(ToolMode { direction, omega, damping_ratio: self.positive("damping", &e.damping)?, mass })
+        let damping_ratio = self.positive("damping", &e.damping, 1.0, Quantity::DAMPING_RATIO)?;
+        Ok(ToolMode { direction, omega, damping_ratio, mass })
     }
 
     fn measured(&self, entry: &Spanned<MeasuredEntry>) -> Result<MeasuredResponse, Error> {
@@ -454,22 +497,22 @@ impl Reader<'_> {
         MeasuredResponse::new(&NumberTable::read(&path)?, &path)
     }
 
-    fn positive(&self, what: &str, value: &Spanned<f64>) -> Result<f64, Error> {
-        match *value.get_ref() {
-            x if sensible(x) => Ok(x),
-            x => Err(self.error(value.span(), format!("{what} = {x}: expected a positive number"))),
+    /// A positive number in SI units.
+    fn positive(&self, what: &str, value: &Spanned<f64>, unit: f64, quantity: Quantity) -> Result<f64, Error> {
+        match unit * *value.get_ref() {
+            x if x > 0.0 || x.is_nan() => self.told(value.span(), quantity.check(what, x)),
+            _ => Err(self.error(value.span(), format!("{what} = {}: expected a positive number", value.get_ref()))),
         }
     }
 
-    fn finite(&self, what: &str, value: &Spanned<[f64; 3]>) -> Result<Vector3<f64>, Error> {
-        match value.get_ref() {
-            x if x.iter().all(|x| x.abs() < 1e6) => Ok((*x).into()),
-            x => Err(self.error(value.span(), format!("{what} = {x:?}: expected three finite numbers"))),
-        }
+    /// A point, m.
+    fn point(&self, what: &str, value: &Spanned<[f64; 3]>) -> Result<Vector3<f64>, Error> {
+        let point = Vector3::from(*value.get_ref()) * self.length;
+        self.told(value.span(), Quantity::LENGTH.check_all(what, &point)).map(|()| point)
     }
 
-    fn direction(&self, what: &str, value: &Spanned<[f64; 3]>) -> Result<Vector3<f64>, Error> {
-        self.unit_vector(what, *value.get_ref(), value.span())
+    fn told<T>(&self, span: Range<usize>, checked: Result<T, OutOfRange>) -> Result<T, Error> {
+        checked.map_err(|outside| self.error(span, outside.to_string()))
     }
 
     fn unit_vector(&self, what: &str, value: [f64; 3], span: Range<usize>) -> Result<Vector3<f64>, Error> {
@@ -484,9 +527,4 @@ impl Reader<'_> {
     fn error(&self, span: Range<usize>, message: impl Into<String>) -> Error {
         self.source.error(span, message).into()
     }
-}
-
-/// A positive number of a size that a tool can have.
-fn sensible(x: f64) -> bool {
-    x > 1e-9 && x < 1e15
 }

@@ -45,6 +45,8 @@ pub(super) struct Layout {
     pub(super) frequencies: usize,
     pub(super) loaded: bool,
     pub(super) cuts: bool,
+    /// Whether the compliance is told in full.
+    pub(super) matrix: bool,
     /// Elastic elements: their coordinates after the joints.
     pub(super) elements: Vec<std::ops::Range<usize>>,
 }
@@ -66,12 +68,14 @@ impl Layout {
     /// * `joints`: names, and whether they slide.
     /// * `loaded`: whether a wrench acts besides weight.
     /// * `tool`: one that cuts.
+    /// * `matrix`: whether the compliance is told in full.
     pub(super) fn new(
         arm: &FlexibleArm,
         joints: &[(String, bool)],
         loaded: bool,
         frequencies: usize,
         tool: Option<&CuttingTool>,
+        matrix: bool,
     ) -> Self {
         let elastic = arm.n_elastic_coordinates();
         let frequencies = frequencies.min(elastic).min(MOST_FREQUENCIES);
@@ -98,6 +102,9 @@ impl Layout {
             columns.push(place(name, "direction of that force, world"));
         }
         columns.push(less("rotation_worst_rad_per_nm", "largest rotation per moment, over all directions"));
+        if matrix {
+            columns.extend(full_compliance());
+        }
         for k in 1..=frequencies {
             let column = less(&format!("frequency_{k}_hz"), "natural frequency under weight, undamped, drives locked");
             columns.push(MapColumn { more_is_better: true, ..column });
@@ -116,7 +123,7 @@ impl Layout {
         }
         let range = |first: usize, size: usize| first..first + size;
         let elements = arm.elements.iter().map(|element| range(arm.offset(element), element.size)).collect();
-        Self { columns, joints: joints.len(), frequencies, loaded, cuts: tool.is_some(), elements }
+        Self { columns, joints: joints.len(), frequencies, loaded, cuts: tool.is_some(), matrix, elements }
     }
 
     pub(super) fn width(&self) -> usize {
@@ -147,6 +154,17 @@ fn place(name: &str, meaning: &str) -> MapColumn {
 
 fn less(name: &str, meaning: &str) -> MapColumn {
     MapColumn { quantity: true, ..place(name, meaning) }
+}
+
+/// Row after row of the 6x6 compliance: displacement and rotation per force and moment.
+fn full_compliance() -> Vec<MapColumn> {
+    let moved = [("x", "m"), ("y", "m"), ("z", "m"), ("rx", "rad"), ("ry", "rad"), ("rz", "rad")];
+    let pushed = [("fx", "n"), ("fy", "n"), ("fz", "n"), ("tx", "nm"), ("ty", "nm"), ("tz", "nm")];
+    let entry = |(row, unit): (&str, &str), (column, per): (&str, &str)| {
+        let meaning = format!("entry of the 6x6 compliance: {row} of the tool per {column} on it, world axes");
+        place(&format!("c_{row}_{column}_{unit}_per_{per}"), &meaning)
+    };
+    moved.iter().flat_map(|row| pushed.iter().map(move |column| entry(*row, *column))).collect()
 }
 
 /// Components, size, and angle.

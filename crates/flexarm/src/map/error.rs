@@ -99,6 +99,12 @@ pub enum MapError {
         /// Number of values.
         points: usize,
     },
+    /// A list of no or too many poses.
+    #[error("the list has {found} poses, expected one to {MOST_PLACES}")]
+    Poses {
+        /// How many it has.
+        found: usize,
+    },
     /// No joint to go through.
     #[error("no joint is named that the map is to go through")]
     NoJoints,

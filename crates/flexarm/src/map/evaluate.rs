@@ -127,6 +127,9 @@ fn push_row(
         rows.push(size(&[moved[0] - sag[0], moved[1] - sag[1], moved[2] - sag[2]]));
     }
     push_compliance(&found.compliance, rows);
+    if layout.matrix {
+        rows.extend(found.compliance.transpose().iter());
+    }
     rows.extend(&weighed.hz[..layout.frequencies]);
     rows.extend(depth);
     push_shares(layout, &moved, found, rows);

@@ -26,6 +26,7 @@ mod finder;
 mod iso_surface;
 mod page;
 mod placement;
+mod poses;
 mod recording;
 mod region;
 mod table;
@@ -43,6 +44,7 @@ use serde::Serialize;
 pub use columns::MapColumn;
 pub use error::MapError;
 pub use placement::Placement;
+pub use poses::read_poses;
 pub use recording::readable as readable_quantity;
 pub use region::{Grid, JointRange, MOST_PLACES, MapRegion, ToolDirections, WorkspaceGrid};
 pub use table::{MapPose, MapTable, QUANTILES, Spread};
@@ -226,7 +228,8 @@ pub fn map(
     let actuated = &model.coordinates()[..model.n_actuated()];
     let joints: Vec<(String, bool)> = actuated.iter().map(|c| (c.joint.clone(), c.kind == "prismatic")).collect();
     let loaded = request.wrench != [0.0; 6];
-    let layout = Layout::new(at.arm(), &joints, loaded, request.frequencies.unwrap_or(3), request.tool.as_ref());
+    let (frequencies, listed) = (request.frequencies.unwrap_or(3), matches!(request.region, MapRegion::Poses(_)));
+    let layout = Layout::new(at.arm(), &joints, loaded, frequencies, request.tool.as_ref(), listed);
     let by = layout.compared_by(request.by.as_deref())?;
     let near = home(model, request.at.as_deref())?;
     if let Some(tool) = &request.tool
@@ -254,6 +257,8 @@ pub fn map(
     let table = MapTable { columns: layout.columns.clone(), values: std::mem::take(&mut taken.rows) };
     let mut found = summed_up(robot, &arm, request, table, &taken, by, grid.as_ref(), rotations.len())?;
     found.caveats.extend(caveats);
+    found.caveats.extend(one_place(&found));
+    found.caveats.extend(request.tool.iter().flat_map(caveat::tool::of_tool));
     found.caveats.extend(validity(robot, request, &found));
     found.warnings = caveat::warnings(&found.caveats);
     found.wall_s = begun.elapsed().as_secs_f64();
@@ -334,6 +339,7 @@ fn region_of<'m>(
             Ok((Region::Grid(grid, Box::new(finder), workspace.keep_out_m), caveats))
         }
         MapRegion::Joints(ranges) => joint_region(ranges, model, near),
+        MapRegion::Poses(poses) => poses::region(poses, model),
         MapRegion::Along { motion, points } => {
             if !(1..=MOST_PLACES).contains(points) {
                 return Err(MapError::Instants.into());
@@ -525,6 +531,20 @@ fn cost_by_place(table: &MapTable, grid: &Grid, by: usize) -> Vec<f64> {
         *slot = slot.min(table.cost(by, row[by]));
     }
     cost
+}
+
+/// A map of one place compares nothing.
+fn one_place(found: &Map) -> Option<Caveat> {
+    let message = match (found.reachable, found.points) {
+        (1, 1) => "the map has one place: its best and its worst pose say nothing of the workspace".to_owned(),
+        (1, points) => {
+            format!("the tool reaches one place of {points}: best and worst pose say nothing of the workspace")
+        }
+        _ => return None,
+    };
+    let help =
+        "take more places: a larger box, a smaller spacing or more values of the joints; statics answers one pose";
+    Some(Caveat::said("one-place", "map", message, help))
 }
 
 /// What is doubtful about the worst pose: the elements there are bent most.

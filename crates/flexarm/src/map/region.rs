@@ -19,6 +19,8 @@ pub enum MapRegion {
     Workspace(WorkspaceGrid),
     /// On a grid of joint values; joints that are not named stay where [`super::MapRequest::at`] says.
     Joints(Vec<JointRange>),
+    /// At poses that are listed: all actuated joints in coordinate order (rad or m). The table has the 6x6 compliance of each.
+    Poses(Vec<Vec<f64>>),
     /// At equal distances of time along a motion.
     Along {
         /// The motion.

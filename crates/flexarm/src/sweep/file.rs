@@ -177,7 +177,7 @@ const MOST_VALUES: i64 = 1_000_000;
 pub(super) fn read(path: &Path) -> Result<StudyFile, Error> {
     let text = read_text(path)?;
     let source = Source::new(path, &text, "study");
-    let file: StudyToml = parsed(&text, &source, |file: &StudyToml| &file.format)?;
+    let file: StudyToml = parsed(&text, &source, &[], |file: &StudyToml| &file.format)?;
     let placed = |text: &Spanned<String>| Placed { text: text.get_ref().clone(), place: source.error(text.span(), "") };
     let folder = path.parent().unwrap_or(Path::new("."));
     let mut parameters =

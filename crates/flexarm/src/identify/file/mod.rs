@@ -140,7 +140,7 @@ pub(super) struct Cell<'a> {
 pub(super) fn read(path: &Path, cell: &Cell<'_>) -> Result<MeasurementInput, Error> {
     let text = read_text(path)?;
     let source = Source::new(path, &text, "measurements");
-    let file: MeasurementFile = parsed(&text, &source, |file: &MeasurementFile| &file.format)?;
+    let file: MeasurementFile = parsed(&text, &source, &[], |file: &MeasurementFile| &file.format)?;
     let (length, length_m) = unit("length", &file.length, &LENGTHS, &source)?;
     let units = Units {
         length: length_m,
