@@ -96,9 +96,7 @@ pub(crate) fn run(cli: &Cli, args: &IdentifyArgs) -> Result<ExitCode, Failure> {
                 overwrite: args.force,
             };
             let found = identify_robot(&robot, measurements, &request)?;
-            if !cli.quiet {
-                found.caveats.iter().for_each(|caveat| warning(&caveat.message));
-            }
+            crate::print::caveats(cli, &found.caveats);
             answer(cli, || to_json(&found), || text(&found));
             Ok(ExitCode::SUCCESS)
         }

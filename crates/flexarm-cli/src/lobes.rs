@@ -113,9 +113,7 @@ pub(crate) fn run(cli: &Cli, args: &LobesArgs) -> Result<ExitCode, Failure> {
     });
     bar.finish_and_clear();
     let found = found?;
-    if !cli.quiet {
-        found.warnings.iter().for_each(|text| warning(text));
-    }
+    crate::print::caveats(cli, &found.caveats);
     answer(cli, || to_json(&found), || text(&found));
     Ok(ExitCode::SUCCESS)
 }
@@ -144,9 +142,7 @@ fn follow(
         overwrite: args.force,
     };
     let found = cut(robot, tool, at, &request)?;
-    if !cli.quiet {
-        found.warnings.iter().for_each(|text| warning(text));
-    }
+    crate::print::caveats(cli, &found.caveats);
     answer(cli, || to_json(&found), || cut_text(&found));
     Ok(ExitCode::SUCCESS)
 }

@@ -233,9 +233,7 @@ pub(crate) fn run(cli: &Cli, args: &MapArgs) -> Result<ExitCode, Failure> {
     });
     bar.clear();
     let found = found?;
-    if !cli.quiet {
-        found.warnings.iter().for_each(|text| warning(text));
-    }
+    crate::print::caveats(cli, &found.caveats);
     answer(cli, || to_json(&found), || text(&found));
     Ok(ExitCode::SUCCESS)
 }

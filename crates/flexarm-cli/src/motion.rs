@@ -76,9 +76,7 @@ pub(crate) fn run(cli: &Cli, args: &MotionArgs) -> Result<ExitCode, Failure> {
     let motion = shipped::trajectory(&args.motion);
     let options = args.input.options();
     let report = flexarm::motion_report(&motion, robot.as_ref(), &options, &outputs, args.rate, args.force)?;
-    if !cli.quiet {
-        report.warnings.iter().for_each(|text| warning(text));
-    }
+    crate::print::warnings(cli, &report.warnings);
     answer(cli, || to_json(&report), || text(&report));
     Ok(ExitCode::SUCCESS)
 }

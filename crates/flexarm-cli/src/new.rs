@@ -5,12 +5,13 @@ use std::process::ExitCode;
 
 use clap::Args;
 use flexarm::new::NewLink;
+use flexarm::written::visible;
 use flexarm::{LoadOptions, Motion, NewOptions, NewRobot, Outputs, ReadOptions, Robot, RunOptions, Scenario, Summary};
 
 use crate::args::{Cli, RobotArgs};
 use crate::failure::Failure;
-use crate::print::{lines, table, warning};
-use crate::{Bar, answer, load_options, signals, summary_table, to_json};
+use crate::print::{lines, table, warnings};
+use crate::{Bar, answer_styled, load_options, signals, summary_table, to_json};
 
 #[derive(Clone, Debug, Args)]
 pub(crate) struct NewArgs {
@@ -104,12 +105,9 @@ pub(crate) fn run(cli: &Cli, args: &NewArgs) -> Result<ExitCode, Failure> {
     if !args.no_run {
         made.summary = Some(Box::new(first_run(cli, &made, &folder, args.force)?));
     }
-    if !cli.quiet {
-        for finding in made.findings.iter().filter(|f| f.severity != "note") {
-            warning(&format!("{}: {}", finding.location, finding.message));
-        }
-    }
-    answer(cli, || to_json(&made), || text(&made));
+    let findings = made.findings.iter().filter(|f| f.severity != "note");
+    warnings(cli, &findings.map(|f| format!("{}: {}", f.location, f.message)).collect::<Vec<_>>());
+    answer_styled(cli, || to_json(&made), || text(&made));
     let wrong = made.findings.iter().any(|f| f.severity == "error");
     Ok(if wrong { ExitCode::from(1) } else { ExitCode::SUCCESS })
 }
@@ -173,6 +171,7 @@ fn text(made: &NewRobot) -> String {
     for file in [&made.robot, &made.motion] {
         out += &format!("wrote    {file}\n");
     }
+    let mut out = visible(&out);
     if let Some(summary) = &made.summary {
         out += "\nfirst run\n";
         out += &summary_table::summary(summary, summary_table::terminal_width());

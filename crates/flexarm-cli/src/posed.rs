@@ -24,12 +24,6 @@ fn load(pose: &PoseArgs) -> Result<Robot, Failure> {
     Ok(Robot::load_with(&shipped::robot(Some(&pose.robot))?, &load_options(&pose.load)?)?)
 }
 
-fn warn(cli: &Cli, warnings: &[String]) {
-    if !cli.quiet {
-        warnings.iter().for_each(|text| warning(text));
-    }
-}
-
 pub(crate) fn statics(cli: &Cli, args: &StaticsArgs) -> Result<ExitCode, Failure> {
     let wrench = args.wrench.as_deref().map_or(Ok([0.0; 6]), |text| values::wrench("--wrench", text))?;
     let (robot, modelling) = (load(&args.pose)?, args.pose.modelling.modelling());
@@ -42,7 +36,7 @@ pub(crate) fn statics(cli: &Cli, args: &StaticsArgs) -> Result<ExitCode, Failure
         }
         None => flexarm::statics(&robot, &modelling, at, wrench)?,
     };
-    warn(cli, &found.warnings);
+    caveats(cli, &found.caveats);
     answer(cli, || to_json(&found), || statics_text(&found));
     Ok(ExitCode::SUCCESS)
 }
@@ -63,7 +57,7 @@ pub(crate) fn modes(cli: &Cli, args: &ModesArgs) -> Result<ExitCode, Failure> {
         }
         None => flexarm::modes(&robot, &modelling, at, args.count)?,
     };
-    warn(cli, &found.warnings);
+    caveats(cli, &found.caveats);
     answer(cli, || to_json(&found), || modes_text(&found));
     Ok(ExitCode::SUCCESS)
 }
@@ -94,7 +88,7 @@ pub(crate) fn response(cli: &Cli, args: &ResponseArgs) -> Result<ExitCode, Failu
         &request,
         outputs.as_ref(),
     )?;
-    warn(cli, &found.warnings);
+    caveats(cli, &found.caveats);
     answer(cli, || to_json(&found), || response_text(&found));
     Ok(ExitCode::SUCCESS)
 }

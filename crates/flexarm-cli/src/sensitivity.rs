@@ -71,9 +71,7 @@ pub(crate) fn run(cli: &Cli, args: &SensitivityArgs) -> Result<ExitCode, Failure
     if args.at.is_some() {
         let at = values::joint_values(args.at.as_deref(), &robot)?;
         let found = pose_sensitivity(&robot, args.modelling.modelling(), at.as_deref(), &args.by)?;
-        if !cli.quiet {
-            found.caveats.iter().for_each(|caveat| warning(&caveat.message));
-        }
+        crate::print::caveats(cli, &found.caveats);
         answer(cli, || to_json(&found), || pose_text(&found));
         return Ok(ExitCode::SUCCESS);
     }
@@ -99,9 +97,7 @@ pub(crate) fn run(cli: &Cli, args: &SensitivityArgs) -> Result<ExitCode, Failure
         overwrite: args.force,
     };
     let found = sensitivity(&robot, scenario, &request)?;
-    if !cli.quiet {
-        found.caveats.iter().for_each(|caveat| warning(&caveat.message));
-    }
+    crate::print::caveats(cli, &found.caveats);
     answer(cli, || to_json(&found), || text(&found));
     Ok(ExitCode::SUCCESS)
 }

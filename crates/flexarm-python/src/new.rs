@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use flexarm::{NewOptions, ReadOptions, new_robot as make};
+use flexarm::written::message;
+use flexarm::{Finding, NewOptions, ReadOptions, new_robot as make};
 use pyo3::prelude::*;
 
 use crate::caveat;
@@ -45,7 +46,11 @@ pub(crate) fn new_robot<'py>(
     let read = ReadOptions { search_paths: flexarm::search_paths_from_environment(), ..ReadOptions::default() };
     let options = NewOptions { base, tool, joints, payload_kg: payload, urdf: read };
     let made = py.detach(|| make(&urdf, &folder, overwrite, &options)).or_raise()?;
-    let doubtful: Vec<_> = made.findings.iter().filter(|finding| finding.severity != "note").collect();
+    let shown = |finding: &Finding| {
+        let [location, message] = [&finding.location, &finding.message].map(|text| message(text));
+        Finding { location, message, ..finding.clone() }
+    };
+    let doubtful: Vec<_> = made.findings.iter().filter(|finding| finding.severity != "note").map(shown).collect();
     caveat::say(py, "doubts", (plain(py, &doubtful)?,))?;
     caveat::answer(py, &made, &[])
 }

@@ -6,6 +6,7 @@ use flexarm_log::{Caption, ElasticSample, RunResult, Sample, TwinSample};
 use flexarm_stepping::Linear;
 use nalgebra::{DVector, Vector6};
 
+use flexarm_settings::written::markdown;
 use crate::bends::stations;
 use crate::error::{Error, PoseError, ValueError};
 use crate::modes::{ModeTable, modes_of, table};
@@ -113,6 +114,7 @@ fn name(k: usize, mode: &DampedMode) -> String {
 
 /// The modes as a table of Markdown.
 fn list(robot: &str, shown: &[DampedMode], start: impl Fn(usize) -> f64) -> String {
+    let robot = markdown(robot);
     let mut text = format!(
         "# Modes of {robot}\n\nShapes have no size: each is drawn as large as can be seen and swings once a second, whatever its \
          frequency. The ghost is the rigid robot.\n\n| mode | frequency | damping | shown from |\n| --- | --- | --- | --- |\n"

@@ -9,6 +9,7 @@ use flexarm_log::{Attachment, CreateOptions, LinkInfo, LinkMesh, Recorder, Recor
 use flexarm_stepping::FlexibleArm;
 use flexarm_urdf::Geometry;
 
+use flexarm_settings::written::{markdown, markdown_code, markdown_row};
 use crate::error::{Error, RecordingError};
 use crate::motion::Motion;
 use crate::options::{Outputs, RunOptions};
@@ -385,18 +386,18 @@ fn description(
     frequencies: &[String],
 ) -> String {
     let mut text = format!(
-        "# {} on {}\n\nFlexible arm (solid) against its rigid twin (ghost), TCP `{}`.\n\n| | |\n|---|---|\n\
+        "# {} on {}\n\nFlexible arm (solid) against its rigid twin (ghost), TCP {}.\n\n| | |\n|---|---|\n\
          | duration | {:.3} s |\n| stepper | {}, step {} s |\n| links | {} |\n",
-        robot.name,
-        motion.name,
-        robot.tcp.0,
+        markdown(&robot.name),
+        markdown(&motion.name),
+        markdown_code(&robot.tcp.0),
         motion.trajectory.duration(),
         options.stepper.name(),
         options.step_s,
         links_model,
     );
     for f in robot.flexible.iter().map(|f| &f.flexible) {
-        text += &format!("| flexible link | {}: {} |\n", f.link, f.reduced.provenance.method);
+        text += &markdown_row(&["flexible link", &format!("{}: {}", f.link, f.reduced.provenance.method)]);
     }
     if !frequencies.is_empty() {
         text += &format!("| first frequencies | {} Hz |\n", frequencies[..frequencies.len().min(3)].join(", "));

@@ -431,7 +431,9 @@ impl Robot {
         let of_urdf = |text: &&String| self.urdf.warnings_only().any(|w| **text == told(w));
         let own = self.warnings.iter().filter(|text| !of_urdf(text));
         let own = own.map(|text| Caveat::said("flexible-link", &file, text, "compare both sources"));
+        let of_description = |caveat| Caveat { of_description: true, ..caveat };
         let urdf = self.urdf.warnings_only().map(|w| Caveat::said(w.code, &w.location, told(w), &w.help));
+        let urdf = urdf.map(of_description);
         let mut caveats: Vec<Caveat> = own.chain(urdf).chain(self.written.iter().cloned()).collect();
         caveats.extend(caveat::parts::of_robot(self));
         caveats.extend(self.flexible.iter().flat_map(caveat::links::of_link));

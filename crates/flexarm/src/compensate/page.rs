@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use flexarm_draw::{CurveLook, LinePlot, Panel, PlotCurve};
 
 use super::{Compensation, ErrorFigures};
-use crate::html_page::{escaped, opening};
+use crate::html_page::opening;
+use flexarm_settings::written::markup;
 
 /// The page.
 pub(super) fn html(answer: &Compensation) -> String {
@@ -19,20 +20,20 @@ pub(super) fn html(answer: &Compensation) -> String {
         answer.iterations
     );
     for caveat in &answer.caveats {
-        let _ = writeln!(page, "<p class=\"no\">{}</p>", escaped(&caveat.message));
+        let _ = writeln!(page, "<p class=\"no\">{}</p>", markup(&caveat.message));
     }
     page += &curves(answer);
     page += "<h2>On other plants</h2>\n<table><tr><th>plant</th><th>peak before (mm)</th><th>after</th><th>RMS before</th><th>after</th><th>taken away</th></tr>\n";
     page += &row("as given", &answer.before, &answer.after);
     for plant in &answer.plants {
-        page += &row(&escaped(&plant.plant), &plant.before, &plant.after);
+        page += &row(&markup(&plant.plant), &plant.before, &plant.after);
     }
     page += "</table>\n<h2>Largest change of each joint</h2>\n<table><tr><th>joint</th><th>rad or m</th><th>deg</th></tr>\n";
     for change in &answer.changes {
         let _ = writeln!(
             page,
             "<tr><td>{}</td><td>{:.3e}</td><td>{:.4}</td></tr>",
-            escaped(&change.joint),
+            markup(&change.joint),
             change.largest,
             change.largest.to_degrees()
         );
@@ -81,7 +82,7 @@ fn limits(answer: &Compensation) -> String {
         let _ = writeln!(
             text,
             "<tr><td>{}</td><td>{}</td><td>{:.4}</td><td>{:.4}</td><td>{:.3}</td></tr>",
-            escaped(&limit.joint),
+            markup(&limit.joint),
             limit.kind,
             limit.value,
             limit.limit,

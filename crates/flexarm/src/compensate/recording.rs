@@ -9,6 +9,7 @@ use flexarm_log::{LogError, Recorder, RunHeader, RunResult, Sample, TwinSample};
 use nalgebra::Vector3;
 
 use super::{CompensateRequest, Compensation, Found};
+use flexarm_settings::written::markdown;
 use crate::arm::Arm;
 use crate::error::Error;
 use crate::magnification::Expected;
@@ -51,8 +52,8 @@ pub(super) fn record(
         "# {} on {}\n\nDistance of the tool from where the rigid arm has it on the motion that was asked for.\n\n\
          | | peak | RMS | at the end |\n| --- | --- | --- | --- |\n\
          | before | {:.4} mm | {:.4} mm | {:.4} mm |\n| after | {:.4} mm | {:.4} mm | {:.4} mm |\n",
-        answer.motion,
-        answer.robot,
+        markdown(&answer.motion),
+        markdown(&answer.robot),
         mm(answer.before.peak_m),
         mm(answer.before.rms_m),
         mm(answer.before.end_m),

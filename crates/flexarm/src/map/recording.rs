@@ -11,6 +11,7 @@ use nalgebra::{DVector, Matrix3, Rotation3, UnitQuaternion};
 use super::iso_surface::iso_surface;
 use super::region::Grid;
 use super::{Map, MapPose, MapRequest, columns};
+use flexarm_settings::written::markdown;
 use crate::arm::Arm;
 use crate::error::Error;
 use crate::record::{link_frames, robot_header};
@@ -128,7 +129,7 @@ pub(super) fn shown(map: &Map) -> Vec<usize> {
 }
 
 fn text(map: &Map) -> String {
-    let mut text = format!("# {}: {} of {} places are reached\n\n", map.robot, map.reachable, map.points);
+    let mut text = format!("# {}: {} of {} places are reached\n\n", markdown(&map.robot), map.reachable, map.points);
     text += "Dark is little, light is much. The colours go from the lowest to the 98th percent of the values.\n\n";
     text += "| view | least | median | most |\n| --- | --- | --- | --- |\n";
     for k in shown(map) {
@@ -137,6 +138,7 @@ fn text(map: &Map) -> String {
         let (factor, unit) = readable(name);
         let median = spread.quantiles.get("0.5").copied().unwrap_or(f64::NAN);
         let [low, middle, high] = [spread.min, median, spread.max].map(|x| factor * x);
+        let name = markdown(name);
         text += &format!("| {name} | {low:.4} {unit} | {middle:.4} {unit} | {high:.4} {unit} |\n");
     }
     if let Some(placement) = &map.placement {
