@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 use flexarm::new::NewLink;
 use flexarm::written::visible;
-use flexarm::{LoadOptions, Motion, NewOptions, NewRobot, Outputs, ReadOptions, Robot, RunOptions, Scenario, Summary};
+use flexarm::{LoadOptions, Motion, gathered, NewOptions, NewRobot, Outputs, ReadOptions, Robot, RunOptions, Scenario, Summary};
 
 use crate::args::{Cli, RobotArgs};
 use crate::failure::Failure;
@@ -31,7 +31,7 @@ pub(crate) struct NewArgs {
     #[arg(long, help_heading = "Robot", value_name = "LINK")]
     pub(crate) base: Option<String>,
     /// Link that is the tool [default: tool0, tcp, flange, ... at the end of the arm with most joints]
-    #[arg(long, help_heading = "Robot", value_name = "LINK", visible_alias = "tcp")]
+    #[arg(long, help_heading = "Robot", value_name = "LINK", alias = "tcp")]
     pub(crate) tool: Option<String>,
     /// Joints that the sample motion moves, with commas between; all others are held [default: those from base to tool]
     #[arg(long, help_heading = "Robot", value_name = "JOINT,...", value_delimiter = ',')]
@@ -39,22 +39,23 @@ pub(crate) struct NewArgs {
     /// Mass that the tool carries (kg), 0 for none [default: about 15 % of the mass that moves, and said]
     #[arg(long, help_heading = "Robot", value_name = "KG", allow_hyphen_values = true)]
     pub(crate) payload: Option<f64>,
-    /// Mass of the arm's links without <inertial> together (kg), spread by the volume of their meshes
+    /// Mass of the arm's links without <inertial>, or with one that only holds a place, together (kg): spread by the volumes of
+    /// their meshes or by their lengths
     #[arg(
-        long,
+        long = "inertia-from-total-mass",
         help_heading = "Robot",
         value_name = "KG",
-        visible_alias = "inertia-from-total-mass",
+        alias = "mass",
         conflicts_with = "density",
         allow_hyphen_values = true
     )]
     pub(crate) mass: Option<f64>,
     /// Density of links without <inertial>, taken as solid (kg/m^3)
     #[arg(
-        long,
+        long = "inertia-from-density",
         help_heading = "Robot",
         value_name = "KG_PER_M3",
-        visible_alias = "inertia-from-density",
+        alias = "density",
         allow_hyphen_values = true
     )]
     pub(crate) density: Option<f64>,
@@ -162,6 +163,10 @@ fn text(made: &NewRobot) -> String {
     out += &lines(&t);
     for held in &made.held {
         out += &format!("held     {} at {}: {}\n", held.joint, held.at, held.why);
+    }
+    let masses = made.assumptions.iter().filter(|assumed| assumed.about == "masses");
+    for doubt in gathered(&masses.map(|a| format!("{}; better: {}", a.text, a.mend)).collect::<Vec<_>>()) {
+        out += &format!("masses   {doubt}\n");
     }
     out += &format!(
         "\n{} assumptions (each marked in robot.toml and listed in README.md with what to ask of the maker)\n",
