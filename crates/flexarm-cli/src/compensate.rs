@@ -13,7 +13,7 @@ use flexarm::{Motion, Robot, RunOptions, Scenario};
 use crate::args::{Cli, ModellingArgs, RobotArgs};
 use crate::failure::Failure;
 use crate::motion::MotionInputArgs;
-use crate::print::{lines, table, warning};
+use crate::print::{lines, table};
 use crate::shipped::OutputFolder;
 use crate::{answer, load_options, shipped, to_json};
 

@@ -12,7 +12,7 @@ use flexarm::identify::{
 
 use crate::args::{Cli, ModellingArgs, RobotArgs};
 use crate::failure::Failure;
-use crate::print::{lines, table, warning};
+use crate::print::{lines, table};
 use crate::shipped::OutputFolder;
 use crate::{answer, load_options, shipped, to_json};
 

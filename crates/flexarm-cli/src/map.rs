@@ -15,7 +15,7 @@ use crate::args::{Cli, ModellingArgs, RobotArgs};
 use crate::failure::Failure;
 use crate::lobes::cutting_tool;
 use crate::motion::MotionInputArgs;
-use crate::print::{lines, table, warning};
+use crate::print::{lines, table};
 use crate::shipped::OutputFolder;
 use crate::{Bar, answer, load_options, shipped, signals, to_json, values};
 

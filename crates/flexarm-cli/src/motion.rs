@@ -9,7 +9,7 @@ use flexarm::{ColumnMap, MotionCurve, MotionOptions, MotionPeak, MotionReport, R
 
 use crate::args::{Cli, RobotArgs};
 use crate::failure::Failure;
-use crate::print::{lines, table, warning};
+use crate::print::{lines, table};
 use crate::{answer, load_options, shipped, to_json};
 
 /// Letters of a curve in the terminal.

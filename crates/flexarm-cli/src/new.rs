@@ -6,7 +6,9 @@ use std::process::ExitCode;
 use clap::Args;
 use flexarm::new::NewLink;
 use flexarm::written::visible;
-use flexarm::{LoadOptions, Motion, gathered, NewOptions, NewRobot, Outputs, ReadOptions, Robot, RunOptions, Scenario, Summary};
+use flexarm::{
+    LoadOptions, Motion, NewOptions, NewRobot, Outputs, ReadOptions, Robot, RunOptions, Scenario, Summary, gathered,
+};
 
 use crate::args::{Cli, RobotArgs};
 use crate::failure::Failure;

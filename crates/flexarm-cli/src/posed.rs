@@ -11,7 +11,7 @@ use flexarm::{
 use crate::args::Cli;
 use crate::failure::Failure;
 use crate::posed_args::{ModesArgs, PoseArgs, QuantityName, ResponseArgs, SpacingName, StaticsArgs};
-use crate::print::{lines, table, warning};
+use crate::print::{caveats, lines, table};
 use crate::shipped::OutputFolder;
 use crate::{answer, load_options, shipped, to_json, values};
 

@@ -56,11 +56,11 @@ impl TextTable {
     }
 }
 
-pub(crate) fn table<C: ToString>(header: &[C]) -> TextTable {
+pub(crate) fn table(header: &[&str]) -> TextTable {
     let mut table = TextTable { table: Table::new(), shortens: false };
     table.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Dynamic);
     if !header.is_empty() {
-        table.set_header(header.iter().map(ToString::to_string));
+        table.set_header(header);
     }
     table
 }

@@ -11,7 +11,7 @@ use flexarm::{Motion, Robot, RunOptions, Scenario};
 use crate::args::{Cli, ModellingArgs, RobotArgs};
 use crate::failure::Failure;
 use crate::motion::MotionInputArgs;
-use crate::print::{lines, table, warning};
+use crate::print::{lines, table};
 use crate::{answer, load_options, shipped, to_json, values};
 
 const EXAMPLES: &str = "\
@@ -143,7 +143,7 @@ fn value(value: f64, unit: &str) -> String {
 }
 
 /// The table with numbers to the right.
-fn right(t: &mut comfy_table::Table) -> String {
+fn right(t: &mut crate::print::TextTable) -> String {
     for column in t.column_iter_mut().skip(1) {
         column.set_cell_alignment(CellAlignment::Right);
     }

@@ -11,6 +11,7 @@ use flexarm::Error;
 
 use crate::args::Cli;
 use crate::failure::Failure;
+use crate::print::{complaint, warning};
 use crate::{answer, to_json};
 
 /// Version of the viewer that this program writes `.rrd` files for.

@@ -6,7 +6,6 @@ use flexarm_log::{Caption, ElasticSample, RunResult, Sample, TwinSample};
 use flexarm_stepping::Linear;
 use nalgebra::{DVector, Vector6};
 
-use flexarm_settings::written::markdown;
 use crate::bends::stations;
 use crate::error::{Error, PoseError, ValueError};
 use crate::modes::{ModeTable, modes_of, table};
@@ -15,6 +14,7 @@ use crate::options::Outputs;
 use crate::posed::Posed;
 use crate::record::{link_frames, recorders, robot_header};
 use crate::robot::Robot;
+use flexarm_settings::written::markdown;
 
 /// Swings per second on the screen, whatever the frequency of the mode.
 const SHOWN_HZ: f64 = 1.0;

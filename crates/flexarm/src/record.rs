@@ -9,13 +9,13 @@ use flexarm_log::{Attachment, CreateOptions, LinkInfo, LinkMesh, Recorder, Recor
 use flexarm_stepping::FlexibleArm;
 use flexarm_urdf::Geometry;
 
-use flexarm_settings::written::{markdown, markdown_code, markdown_row};
 use crate::error::{Error, RecordingError};
 use crate::motion::Motion;
 use crate::options::{Outputs, RunOptions};
 use crate::robot::Robot;
 use crate::scenario::Scenario;
 use crate::summary::Files;
+use flexarm_settings::written::{markdown, markdown_code, markdown_row};
 
 /// Recorders of a run with the names of their files.
 pub(crate) struct Recordings {

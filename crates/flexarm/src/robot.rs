@@ -379,7 +379,8 @@ impl Robot {
             return Ok(());
         }
         if payload.com.is_none() {
-            let message = "payload has no com: its centre of mass in axes of the link, such as com = [0.0, 0.0, 0.1], in m";
+            let message =
+                "payload has no com: its centre of mass in axes of the link, such as com = [0.0, 0.0, 0.1], in m";
             return Err(source.error(entry.span(), message).into());
         }
         let [xx, yy, zz, xy, xz, yz] = payload.inertia;

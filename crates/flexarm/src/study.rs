@@ -5,7 +5,6 @@ use std::path::PathBuf;
 
 use flexarm_log::{Recorder, RecordingFormat, Trace, TraceRow};
 
-use flexarm_settings::written::{markdown, markdown_row};
 use crate::error::{Error, StudyError};
 use crate::magnification::Expected;
 use crate::options::{Outputs, RunOptions};
@@ -15,6 +14,7 @@ use crate::robot::Robot;
 use crate::run::{Progress, Together, run_traced};
 use crate::scenario::Scenario;
 use crate::summary::{DifferenceFigures, Summary, TcpFigures};
+use flexarm_settings::written::{markdown, markdown_row};
 
 /// One run of a study.
 #[derive(Debug)]

@@ -9,13 +9,13 @@ use flexarm_log::{LogError, Recorder, RunHeader, RunResult, Sample, TwinSample};
 use nalgebra::Vector3;
 
 use super::{CompensateRequest, Compensation, Found};
-use flexarm_settings::written::markdown;
 use crate::arm::Arm;
 use crate::error::Error;
 use crate::magnification::Expected;
 use crate::options::RunOptions;
 use crate::run::{Together, run_traced};
 use crate::scenario::Scenario;
+use flexarm_settings::written::markdown;
 
 /// Samples of the recording per second.
 const RECORDED_HZ: f64 = 200.0;

@@ -86,12 +86,8 @@ fn quantities(map: &Map) -> String {
         let (factor, unit) = readable(&column.name);
         let at = |part: &str| spread.quantiles.get(part).copied().unwrap_or(f64::NAN);
         let values = [spread.min, at("0.05"), at("0.5"), at("0.95"), spread.max];
-        let _ = write!(
-            table,
-            "<tr><td title=\"{}\">{}</td><td>{unit}</td>",
-            markup(&column.meaning),
-            markup(&column.name)
-        );
+        let _ =
+            write!(table, "<tr><td title=\"{}\">{}</td><td>{unit}</td>", markup(&column.meaning), markup(&column.name));
         for value in values {
             let _ = write!(table, "<td>{:.4}</td>", factor * value);
         }

@@ -11,11 +11,11 @@ use nalgebra::{DVector, Matrix3, Rotation3, UnitQuaternion};
 use super::iso_surface::iso_surface;
 use super::region::Grid;
 use super::{Map, MapPose, MapRequest, columns};
-use flexarm_settings::written::markdown;
 use crate::arm::Arm;
 use crate::error::Error;
 use crate::record::{link_frames, robot_header};
 use crate::robot::Robot;
+use flexarm_settings::written::markdown;
 
 /// Most points of a view; of larger maps every so many-th.
 const MOST_POINTS: usize = 300_000;

@@ -291,17 +291,17 @@ fn joints(model: &Model, mechanism: &Mechanism, chain: &Chain, workspace: &Works
     // One number for all that is wrong for some was never meant.
     let same = |j: &DraftJoint| j.joint.limits.effort == joints[0].joint.limits.effort;
     let weak = |j: &DraftJoint| j.joint.limits.effort < j.weight;
-    let fault = match joints.len() > 2 && joints.iter().all(same) {
-        true if joints.iter().any(weak) => {
-            Some("is the same for all joints and below what the arm needs to hold itself")
+    if joints.len() > 2 && joints.iter().all(same) {
+        let (weak, faulty) = (joints.iter().any(weak), joints.iter().any(|j| j.effort_fault.is_some()));
+        let too_little = "is the same for all joints and below what the arm needs to hold itself";
+        let too_much = "is the same for all joints and far above what some of them can need";
+        for joint in &mut joints {
+            joint.effort_fault = match joint.effort_fault {
+                _ if weak => Some(too_little),
+                None if faulty => Some(too_much),
+                own => own,
+            };
         }
-        true if joints.iter().any(|j| j.effort_fault.is_some()) => {
-            Some("is the same for all joints and far above what some of them can need")
-        }
-        _ => None,
-    };
-    if let Some(fault) = fault.filter(|_| joints[0].joint.limits.effort.is_finite()) {
-        joints.iter_mut().for_each(|j| j.effort_fault = Some(fault));
     }
     for joint in &mut joints {
         joint.rated = match joint.effort_fault {
@@ -478,7 +478,8 @@ fn masses(draft: &Draft, list: &mut Vec<Assumption>) {
     let alike = placeholders(&draft.urdf.mechanism);
     let mass = alike.first().and_then(|name| draft.urdf.mechanism.link(name)?.inertia).map_or(0.0, |i| i.mass);
     if !alike.is_empty() && draft.discarded.is_empty() {
-        let text = format!("{} links have {mass} kg each: this number only holds the place of their masses", alike.len());
+        let text =
+            format!("{} links have {mass} kg each: this number only holds the place of their masses", alike.len());
         let mend = format!(
             "{} KG spreads the mass of the arm over these links, by the volumes of their meshes or by their lengths; best the \
              masses of the maker",

@@ -191,7 +191,10 @@ fn links(t: &mut String, draft: &Draft, beams: &[&DraftLink]) -> std::fmt::Resul
             section_words(s)
         )?;
         if s.ends.is_some() {
-            writeln!(t, "# The frames of the description do not run along it: ends are those of its shape between the joint axes.")?;
+            writeln!(
+                t,
+                "# The frames of the description do not run along it: ends are those of its shape between the joint axes."
+            )?;
         }
         if link.of_collisions {
             writeln!(t, "# The outline is that of the shapes for collisions, which are often larger.")?;

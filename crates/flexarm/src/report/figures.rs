@@ -78,9 +78,7 @@ fn svg(plot: &Plot, view: &PlotView, bands: &[(f64, f64)]) -> Result<String, fle
 /// The data of a plot: a column per curve, units in the names; sets of curves with axes of their own beside each other.
 fn csv(plot: &Plot, view: &PlotView) -> String {
     let plain = |unit: &str| unit.replace('°', "deg").replace(' ', "_");
-    let name = |text: &str, unit: &str| {
-        csv_field(&format!("{}_{}", text.replace(' ', "_"), plain(unit)))
-    };
+    let name = |text: &str, unit: &str| csv_field(&format!("{}_{}", text.replace(' ', "_"), plain(unit)));
     let several = view.tables.len() > 1;
     let (mut heads, mut columns): (Vec<String>, Vec<&[f64]>) = (Vec::new(), Vec::new());
     for table in &view.tables {

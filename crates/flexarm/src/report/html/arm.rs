@@ -9,8 +9,8 @@ use flexarm_log::RunHeader;
 use super::ReportRun;
 use super::figures::lies_on_twin;
 use super::number::{number, short};
-use flexarm_settings::written::markup;
 use crate::report::picture::{pictures, scale_colors};
+use flexarm_settings::written::markup;
 
 /// Width of the pictures of the arm (pixels): more than the page shows, whose two pictures stand beside each other.
 const PICTURE_WIDTH: usize = 810;

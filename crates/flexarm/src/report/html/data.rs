@@ -5,8 +5,8 @@ use flexarm_log::EventKind;
 use super::ReportRun;
 use super::figures::lies_on_twin;
 use super::number::{push_short, short};
-use flexarm_settings::written::markup;
 use crate::report::curves::{Kind, Plot, overlays};
+use flexarm_settings::written::markup;
 
 /// What of the samples the plots do not show, if there is something.
 pub(super) fn thinning(runs: &[ReportRun<'_>], drawn: &[Vec<Plot>]) -> String {

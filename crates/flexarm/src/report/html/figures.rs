@@ -7,8 +7,8 @@ use flexarm_draw::palette;
 use super::number::{fixed, number};
 use super::tables::STABILISATION;
 use super::{ReportRun, method};
-use flexarm_settings::written::markup;
 use crate::summary::{EnergyFigures, Summary, TcpFigures};
+use flexarm_settings::written::markup;
 
 /// Errors below this are rounding (m).
 const NOTHING_M: f64 = 1e-12;

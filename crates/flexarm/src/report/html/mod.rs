@@ -21,10 +21,10 @@ use self::figures::{comparison, tiles};
 use self::number::number;
 use self::tables::{iso_table, parts_tables, stops_table, tool_path};
 use super::curves::{Plot, plots};
-use flexarm_settings::gathered;
-use flexarm_settings::written::markup;
 use crate::stepper_settings::SettingValue;
 use crate::summary::Summary;
+use flexarm_settings::gathered;
+use flexarm_settings::written::markup;
 
 const STYLE: &str = include_str!("../../../assets/report.css");
 

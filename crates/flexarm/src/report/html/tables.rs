@@ -7,10 +7,10 @@ use base64::Engine as _;
 use super::ReportRun;
 use super::figures::{moving, within, without_number};
 use super::number::number;
-use flexarm_settings::written::markup;
 use crate::monitor::tool_path::PathMoveFigures;
 use crate::report::path_plan::path_plan;
 use crate::summary::Summary;
+use flexarm_settings::written::markup;
 
 /// Most moves of the tool in the table of the page.
 const MOST_MOVES: usize = 200;
