@@ -13,7 +13,7 @@ use flexarm::{Motion, Robot, RunOptions, Scenario};
 use crate::args::{Cli, ModellingArgs, RobotArgs};
 use crate::failure::Failure;
 use crate::motion::MotionInputArgs;
-use crate::print::{lines, table, warning};
+use crate::print::{lines, table};
 use crate::shipped::OutputFolder;
 use crate::{answer, load_options, shipped, to_json};
 
@@ -201,9 +201,7 @@ pub(crate) fn run(cli: &Cli, args: &CompensateArgs) -> Result<ExitCode, Failure>
         scenario = scenario.with_loads_file(loads)?;
     }
     let found = compensate_motion(&robot, scenario, &request)?;
-    if !cli.quiet {
-        found.caveats.iter().for_each(|caveat| warning(&caveat.message));
-    }
+    crate::print::caveats(cli, &found.caveats);
     answer(cli, || to_json(&found), || text(&found));
     Ok(ExitCode::SUCCESS)
 }

@@ -42,11 +42,7 @@ pub(crate) fn run(cli: &Cli, args: &ConvertArgs) -> Result<ExitCode, Failure> {
     let options = ConvertOptions { from: args.from, to: args.to, overwrite: args.force };
     let mut stop = crate::signals::stop_when_asked();
     let summary = flexarm::convert_until(&args.input, &args.output, &options, &mut |_| stop())?;
-    if !cli.quiet {
-        for warning in &summary.warnings {
-            eprintln!("warning: {warning}");
-        }
-    }
+    crate::print::warnings(cli, &summary.warnings);
     crate::answer(cli, || crate::to_json(&summary), || text(&summary));
     Ok(ExitCode::SUCCESS)
 }

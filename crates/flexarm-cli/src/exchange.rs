@@ -18,7 +18,7 @@ pub(crate) fn import(cli: &Cli, args: &ImportArgs) -> Result<ExitCode, Failure> 
     let outputs = ImportOutputs { folder: folder.path(), flex: args.flex.clone(), overwrite: args.force };
     let outputs = (!args.no_files).then_some(outputs);
     let summary = flexarm::import::import(&job, outputs.as_ref())?;
-    warn(cli, &summary.warnings);
+    print::warnings(cli, &summary.warnings);
     answer(cli, || to_json(&summary), || print::imported(&summary));
     Ok(ExitCode::SUCCESS)
 }
@@ -42,17 +42,9 @@ pub(crate) fn export(cli: &Cli, args: &ExportArgs) -> Result<ExitCode, Failure> 
         overwrite: args.force,
     };
     let summary = flexarm::export::export(&job)?;
-    warn(cli, &summary.warnings);
+    print::warnings(cli, &summary.warnings);
     answer(cli, || to_json(&summary), || print::exported(&summary));
     Ok(ExitCode::SUCCESS)
-}
-
-fn warn(cli: &Cli, warnings: &[String]) {
-    if !cli.quiet {
-        for warning in warnings {
-            print::warning(warning);
-        }
-    }
 }
 
 fn import_job(args: &ImportArgs) -> Result<ImportJob, Failure> {

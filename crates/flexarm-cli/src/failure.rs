@@ -5,6 +5,8 @@ use std::process::ExitCode;
 
 use flexarm::{Fault, TrajectoryError};
 
+use crate::print::complaint;
+
 /// What ends a command.
 #[derive(Debug)]
 pub(crate) enum Failure {
@@ -79,12 +81,12 @@ impl Failure {
     /// The message with its causes, and where help is to be had.
     pub(crate) fn print(&self) {
         let text = self.to_string();
-        eprintln!("error: {text}");
+        complaint("error", &text);
         let mut source = std::error::Error::source(self);
         while let Some(cause) = source {
             // Messages that already contain their cause do not say it twice.
             if !text.contains(&cause.to_string()) {
-                eprintln!("  because: {cause}");
+                complaint("  because", &cause.to_string());
             }
             source = cause.source();
         }

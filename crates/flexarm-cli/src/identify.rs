@@ -12,7 +12,7 @@ use flexarm::identify::{
 
 use crate::args::{Cli, ModellingArgs, RobotArgs};
 use crate::failure::Failure;
-use crate::print::{lines, table, warning};
+use crate::print::{lines, table};
 use crate::shipped::OutputFolder;
 use crate::{answer, load_options, shipped, to_json};
 
@@ -96,9 +96,7 @@ pub(crate) fn run(cli: &Cli, args: &IdentifyArgs) -> Result<ExitCode, Failure> {
                 overwrite: args.force,
             };
             let found = identify_robot(&robot, measurements, &request)?;
-            if !cli.quiet {
-                found.caveats.iter().for_each(|caveat| warning(&caveat.message));
-            }
+            crate::print::caveats(cli, &found.caveats);
             answer(cli, || to_json(&found), || text(&found));
             Ok(ExitCode::SUCCESS)
         }

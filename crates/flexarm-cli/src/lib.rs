@@ -44,6 +44,7 @@ use args::{CheckArgs, Cli, Command, FormName, InspectArgs, MethodName, PresetNam
 use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, Parser};
 use failure::Failure;
+use flexarm::written::{message, visible};
 use flexarm::{
     AlphaSettings, ConstraintForm, FlexibleRobot, InertiaEstimate, LoadOptions, Modelling, ReadOptions,
     ReferenceMethod, ReferenceSettings, Robot, RunOptions, Scenario, SpookPreset, SpookSettings, Start, StepperOptions,
@@ -65,12 +66,26 @@ pub fn run(line: Vec<OsString>) -> u8 {
             failure.exit_code()
         }),
         Err(usage) => {
-            let usage = with_number_tip(usage);
+            let usage = with_visible_words(with_number_tip(usage));
             let _ = usage.print(); // a closed pipe
             return usage.exit_code().try_into().unwrap_or(2);
         }
     };
     [0, 1].into_iter().find(|number| ExitCode::from(*number) == code).unwrap_or(2)
+}
+
+/// Shows what was typed without characters that a terminal obeys.
+fn with_visible_words(mut usage: clap::Error) -> clap::Error {
+    let shown = |value: &ContextValue| match value {
+        ContextValue::String(text) => Some(ContextValue::String(message(text))),
+        ContextValue::Strings(texts) => Some(ContextValue::Strings(texts.iter().map(|text| message(text)).collect())),
+        _ => None,
+    };
+    let typed: Vec<_> = usage.context().filter_map(|(kind, value)| Some((kind, shown(value)?))).collect();
+    for (kind, value) in typed {
+        usage.insert(kind, value);
+    }
+    usage
 }
 
 /// Says how a number is written where a word stands that is none.
@@ -114,19 +129,31 @@ pub fn shipped_tool(given: &Path) -> PathBuf {
     shipped::find(given, "robots/tools", &["", ".toml"])
 }
 
-/// Text for people or JSON for programs; a closed pipe is not an error.
+/// Text for people or JSON for programs, without characters that a terminal obeys; a closed pipe is not an error.
 fn answer(cli: &Cli, json: impl FnOnce() -> String, text: impl FnOnce() -> String) {
-    let out = if cli.json { json() + "\n" } else { text() };
+    answer_styled(cli, json, || visible(&text()));
+}
+
+/// The same for a text with styles, whose names are [`visible`] already.
+fn answer_styled(cli: &Cli, json: impl FnOnce() -> String, text: impl FnOnce() -> String) {
+    let out = if cli.json { visible_json(&json()) + "\n" } else { text() };
     // Colours go to terminals alone, and not there if NO_COLOR is set.
     let mut stdout = anstream::stdout().lock();
     match stdout.write_all(out.as_bytes()).and_then(|()| stdout.flush()) {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
             // An answer that is lost must not look like one that was given.
-            eprintln!("error: standard output cannot be written: {error}");
+            print::complaint("error", &format!("standard output cannot be written: {error}"));
             std::process::exit(1);
         }
         _ => {}
     }
+}
+
+/// JSON with the control characters escaped that its writer leaves: they stand in strings alone.
+fn visible_json(text: &str) -> String {
+    let is_left = |c: &char| ('\u{7f}'..='\u{9f}').contains(c);
+    let escaped = |c: char| if is_left(&c) { format!("\\u{:04x}", u32::from(c)) } else { c.to_string() };
+    if text.chars().any(|c| is_left(&c)) { text.chars().map(escaped).collect() } else { text.to_owned() }
 }
 
 /// Text that was made in memory; for programs under a key.
@@ -311,17 +338,8 @@ fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool, line: &[OsString]) -> Re
     };
     bar.clear();
     let summary = result?;
-    if !cli.quiet {
-        for warning in &summary.warnings {
-            print::warning(warning);
-        }
-        for other in &summary.with {
-            for warning in other.warnings.iter().filter(|warning| !summary.warnings.contains(warning)) {
-                print::warning(&format!("{}: {warning}", other.label.as_deref().unwrap_or_default()));
-            }
-        }
-    }
-    answer(cli, || to_json(&summary), || summary_table::summary(&summary, summary_table::terminal_width()));
+    print::caveats(cli, &study::caveats(&summary));
+    answer_styled(cli, || to_json(&summary), || summary_table::summary(&summary, summary_table::terminal_width()));
     Ok(ExitCode::SUCCESS)
 }
 

@@ -14,7 +14,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use crate::args::Cli;
 use crate::failure::Failure;
 use crate::posed_args::PoseArgs;
-use crate::print::{lines, table, warning};
+use crate::print::{lines, table};
 use crate::shipped::OutputFolder;
 use crate::{answer, load_options, shipped, to_json, values};
 
@@ -115,9 +115,7 @@ pub(crate) fn run(cli: &Cli, args: &LobesArgs) -> Result<ExitCode, Failure> {
     });
     bar.finish_and_clear();
     let found = found?;
-    if !cli.quiet {
-        found.warnings.iter().for_each(|text| warning(text));
-    }
+    crate::print::caveats(cli, &found.caveats);
     answer(cli, || to_json(&found), || text(&found));
     Ok(ExitCode::SUCCESS)
 }
@@ -146,9 +144,7 @@ fn follow(
         overwrite: args.force,
     };
     let found = cut(robot, tool, at, &request)?;
-    if !cli.quiet {
-        found.warnings.iter().for_each(|text| warning(text));
-    }
+    crate::print::caveats(cli, &found.caveats);
     answer(cli, || to_json(&found), || cut_text(&found));
     Ok(ExitCode::SUCCESS)
 }

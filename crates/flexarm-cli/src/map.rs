@@ -16,7 +16,7 @@ use crate::args::{Cli, ModellingArgs, RobotArgs};
 use crate::failure::Failure;
 use crate::lobes::cutting_tool;
 use crate::motion::MotionInputArgs;
-use crate::print::{lines, table, warning};
+use crate::print::{lines, table};
 use crate::shipped::OutputFolder;
 use crate::{Bar, answer, load_options, shipped, signals, to_json, values};
 
@@ -244,9 +244,7 @@ pub(crate) fn run(cli: &Cli, args: &MapArgs) -> Result<ExitCode, Failure> {
     });
     bar.clear();
     let found = found?;
-    if !cli.quiet {
-        found.warnings.iter().for_each(|text| warning(text));
-    }
+    crate::print::caveats(cli, &found.caveats);
     answer(cli, || to_json(&found), || text(&found));
     Ok(ExitCode::SUCCESS)
 }

@@ -9,7 +9,7 @@ use flexarm::{ColumnMap, MotionCurve, MotionOptions, MotionPeak, MotionReport, R
 
 use crate::args::{Cli, RobotArgs};
 use crate::failure::Failure;
-use crate::print::{lines, table, warning};
+use crate::print::{lines, table};
 use crate::{answer, load_options, shipped, to_json};
 
 /// Letters of a curve in the terminal.
@@ -76,9 +76,7 @@ pub(crate) fn run(cli: &Cli, args: &MotionArgs) -> Result<ExitCode, Failure> {
     let motion = shipped::trajectory(&args.motion);
     let options = args.input.options();
     let report = flexarm::motion_report(&motion, robot.as_ref(), &options, &outputs, args.rate, args.force)?;
-    if !cli.quiet {
-        report.warnings.iter().for_each(|text| warning(text));
-    }
+    crate::print::warnings(cli, &report.warnings);
     answer(cli, || to_json(&report), || text(&report));
     Ok(ExitCode::SUCCESS)
 }

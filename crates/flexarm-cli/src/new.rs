@@ -5,12 +5,15 @@ use std::process::ExitCode;
 
 use clap::Args;
 use flexarm::new::NewLink;
-use flexarm::{LoadOptions, Motion, NewOptions, NewRobot, Outputs, ReadOptions, Robot, RunOptions, Scenario, Summary};
+use flexarm::written::visible;
+use flexarm::{
+    LoadOptions, Motion, NewOptions, NewRobot, Outputs, ReadOptions, Robot, RunOptions, Scenario, Summary, gathered,
+};
 
 use crate::args::{Cli, RobotArgs};
 use crate::failure::Failure;
-use crate::print::{lines, table, warning};
-use crate::{Bar, answer, load_options, signals, summary_table, to_json};
+use crate::print::{lines, table, warnings};
+use crate::{Bar, answer_styled, load_options, signals, summary_table, to_json};
 
 #[derive(Clone, Debug, Args)]
 pub(crate) struct NewArgs {
@@ -30,7 +33,7 @@ pub(crate) struct NewArgs {
     #[arg(long, help_heading = "Robot", value_name = "LINK")]
     pub(crate) base: Option<String>,
     /// Link that is the tool [default: tool0, tcp, flange, ... at the end of the arm with most joints]
-    #[arg(long, help_heading = "Robot", value_name = "LINK", visible_alias = "tcp")]
+    #[arg(long, help_heading = "Robot", value_name = "LINK", alias = "tcp")]
     pub(crate) tool: Option<String>,
     /// Joints that the sample motion moves, with commas between; all others are held [default: those from base to tool]
     #[arg(long, help_heading = "Robot", value_name = "JOINT,...", value_delimiter = ',')]
@@ -38,22 +41,23 @@ pub(crate) struct NewArgs {
     /// Mass that the tool carries (kg), 0 for none [default: about 15 % of the mass that moves, and said]
     #[arg(long, help_heading = "Robot", value_name = "KG", allow_hyphen_values = true)]
     pub(crate) payload: Option<f64>,
-    /// Mass of the arm's links without <inertial> together (kg), spread by the volume of their meshes
+    /// Mass of the arm's links without <inertial>, or with one that only holds a place, together (kg): spread by the volumes of
+    /// their meshes or by their lengths
     #[arg(
-        long,
+        long = "inertia-from-total-mass",
         help_heading = "Robot",
         value_name = "KG",
-        visible_alias = "inertia-from-total-mass",
+        alias = "mass",
         conflicts_with = "density",
         allow_hyphen_values = true
     )]
     pub(crate) mass: Option<f64>,
     /// Density of links without <inertial>, taken as solid (kg/m^3)
     #[arg(
-        long,
+        long = "inertia-from-density",
         help_heading = "Robot",
         value_name = "KG_PER_M3",
-        visible_alias = "inertia-from-density",
+        alias = "density",
         allow_hyphen_values = true
     )]
     pub(crate) density: Option<f64>,
@@ -104,12 +108,9 @@ pub(crate) fn run(cli: &Cli, args: &NewArgs) -> Result<ExitCode, Failure> {
     if !args.no_run {
         made.summary = Some(Box::new(first_run(cli, &made, &folder, args.force)?));
     }
-    if !cli.quiet {
-        for finding in made.findings.iter().filter(|f| f.severity != "note") {
-            warning(&format!("{}: {}", finding.location, finding.message));
-        }
-    }
-    answer(cli, || to_json(&made), || text(&made));
+    let findings = made.findings.iter().filter(|f| f.severity != "note");
+    warnings(cli, &findings.map(|f| format!("{}: {}", f.location, f.message)).collect::<Vec<_>>());
+    answer_styled(cli, || to_json(&made), || text(&made));
     let wrong = made.findings.iter().any(|f| f.severity == "error");
     Ok(if wrong { ExitCode::from(1) } else { ExitCode::SUCCESS })
 }
@@ -165,6 +166,10 @@ fn text(made: &NewRobot) -> String {
     for held in &made.held {
         out += &format!("held     {} at {}: {}\n", held.joint, held.at, held.why);
     }
+    let masses = made.assumptions.iter().filter(|assumed| assumed.about == "masses");
+    for doubt in gathered(&masses.map(|a| format!("{}; better: {}", a.text, a.mend)).collect::<Vec<_>>()) {
+        out += &format!("masses   {doubt}\n");
+    }
     out += &format!(
         "\n{} assumptions (each marked in robot.toml and listed in README.md with what to ask of the maker)\n",
         made.assumptions.len()
@@ -173,6 +178,7 @@ fn text(made: &NewRobot) -> String {
     for file in [&made.robot, &made.motion] {
         out += &format!("wrote    {file}\n");
     }
+    let mut out = visible(&out);
     if let Some(summary) = &made.summary {
         out += "\nfirst run\n";
         out += &summary_table::summary(summary, summary_table::terminal_width());

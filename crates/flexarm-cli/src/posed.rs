@@ -11,7 +11,7 @@ use flexarm::{
 use crate::args::Cli;
 use crate::failure::Failure;
 use crate::posed_args::{ModesArgs, PoseArgs, QuantityName, ResponseArgs, SpacingName, StaticsArgs};
-use crate::print::{lines, table, warning};
+use crate::print::{caveats, lines, table};
 use crate::shipped::OutputFolder;
 use crate::{answer, load_options, shipped, to_json, values};
 
@@ -22,12 +22,6 @@ const SHOWN_PEAKS: usize = 3;
 
 fn load(pose: &PoseArgs) -> Result<Robot, Failure> {
     Ok(Robot::load_with(&shipped::robot(Some(&pose.robot))?, &load_options(&pose.load)?)?)
-}
-
-fn warn(cli: &Cli, warnings: &[String]) {
-    if !cli.quiet {
-        warnings.iter().for_each(|text| warning(text));
-    }
 }
 
 pub(crate) fn statics(cli: &Cli, args: &StaticsArgs) -> Result<ExitCode, Failure> {
@@ -42,7 +36,7 @@ pub(crate) fn statics(cli: &Cli, args: &StaticsArgs) -> Result<ExitCode, Failure
         }
         None => flexarm::statics(&robot, &modelling, at, wrench)?,
     };
-    warn(cli, &found.warnings);
+    caveats(cli, &found.caveats);
     answer(cli, || to_json(&found), || statics_text(&found));
     Ok(ExitCode::SUCCESS)
 }
@@ -63,7 +57,7 @@ pub(crate) fn modes(cli: &Cli, args: &ModesArgs) -> Result<ExitCode, Failure> {
         }
         None => flexarm::modes(&robot, &modelling, at, args.count)?,
     };
-    warn(cli, &found.warnings);
+    caveats(cli, &found.caveats);
     answer(cli, || to_json(&found), || modes_text(&found));
     Ok(ExitCode::SUCCESS)
 }
@@ -94,7 +88,7 @@ pub(crate) fn response(cli: &Cli, args: &ResponseArgs) -> Result<ExitCode, Failu
         &request,
         outputs.as_ref(),
     )?;
-    warn(cli, &found.warnings);
+    caveats(cli, &found.caveats);
     answer(cli, || to_json(&found), || response_text(&found));
     Ok(ExitCode::SUCCESS)
 }

@@ -1,11 +1,63 @@
 //! Tables for people.
 
+use std::ops::{Deref, DerefMut};
+
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 use flexarm::reduce::{MeshListing, ReduceSummary, ReportTable, SetListing};
-use flexarm::{Finding, Inspection};
+use flexarm::written::{message, one_line};
+use flexarm::{Caveat, Finding, Inspection, gathered};
 
-pub(crate) fn table(header: &[&str]) -> Table {
-    let mut table = Table::new();
+use crate::args::Cli;
+
+/// Longest name in a table (characters).
+const LONGEST_NAME: usize = 60;
+
+/// A table whose cells a terminal can show.
+pub(crate) struct TextTable {
+    table: Table,
+    shortens: bool,
+}
+
+impl Deref for TextTable {
+    type Target = Table;
+    fn deref(&self) -> &Table {
+        &self.table
+    }
+}
+
+impl DerefMut for TextTable {
+    fn deref_mut(&mut self) -> &mut Table {
+        &mut self.table
+    }
+}
+
+impl TextTable {
+    /// Adds a row; names that are too long for a table are shortened.
+    pub(crate) fn add_row<C: ToString>(&mut self, cells: impl IntoIterator<Item = C>) {
+        let cells: Vec<String> = cells.into_iter().map(|cell| self.cell(&cell.to_string())).collect();
+        self.table.add_row(cells);
+    }
+
+    /// Names of the columns.
+    pub(crate) fn set_header<C: ToString>(&mut self, cells: impl IntoIterator<Item = C>) {
+        let cells: Vec<String> = cells.into_iter().map(|cell| self.cell(&cell.to_string())).collect();
+        self.table.set_header(cells);
+    }
+
+    fn cell(&mut self, text: &str) -> String {
+        let text = one_line(text);
+        let word = |word: &str| match word.char_indices().nth(LONGEST_NAME) {
+            Some((cut, _)) => format!("{}…", &word[..cut]),
+            None => word.to_owned(),
+        };
+        let short = text.split(' ').map(word).collect::<Vec<_>>().join(" ");
+        self.shortens |= short != text;
+        short
+    }
+}
+
+pub(crate) fn table(header: &[&str]) -> TextTable {
+    let mut table = TextTable { table: Table::new(), shortens: false };
     table.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Dynamic);
     if !header.is_empty() {
         table.set_header(header);
@@ -14,9 +66,13 @@ pub(crate) fn table(header: &[&str]) -> Table {
 }
 
 /// The table without the blanks that pad its last column.
-pub(crate) fn lines(table: &Table) -> String {
-    table.to_string().lines().map(|l| l.trim_end().to_owned() + "\n").collect()
+pub(crate) fn lines(table: &TextTable) -> String {
+    let rows: String = table.to_string().lines().map(|l| l.trim_end().to_owned() + "\n").collect();
+    if table.shortens { rows + SHORTENED } else { rows }
 }
+
+/// Where names are whole.
+pub(crate) const SHORTENED: &str = "names that end in … are shortened: --json has them whole\n";
 
 fn limit(x: Option<f64>) -> String {
     x.map_or_else(|| "-".into(), |x| format!("{x:.4}"))
@@ -121,8 +177,8 @@ pub(crate) fn inspection(i: &Inspection) -> String {
         "TCP on {}: position {:.6?} m, quaternion wxyz {:.6?}\n",
         i.tcp.link, i.tcp.position_m, i.tcp.quaternion_wxyz
     );
-    for w in &i.warnings {
-        out += &format!("warning: {w}\n");
+    for warning in gathered(&i.warnings) {
+        out += &format!("warning: {}\n", message(&warning));
     }
     out
 }
@@ -132,11 +188,14 @@ pub(crate) fn findings(findings: &[Finding]) -> String {
     if findings.is_empty() {
         return "nothing found\n".into();
     }
+    let line = |f: &Finding| format!("{}[{}] {}: {}", f.severity, f.code, f.location, f.message);
+    let lines: Vec<String> = findings.iter().map(line).collect();
     let mut out = String::new();
-    for f in findings {
-        out += &format!("{}[{}] {}: {}\n", f.severity, f.code, f.location, f.message);
-        if !f.help.is_empty() {
-            out += &format!("    help: {}\n", f.help);
+    for told in gathered(&lines) {
+        out += &format!("{}\n", message(&told));
+        let first = lines.iter().position(|line| told.starts_with(line.as_str()));
+        if let Some(help) = first.map(|k| &findings[k].help).filter(|help| !help.is_empty()) {
+            out += &format!("    help: {}\n", message(help));
         }
     }
     let count = |severity: &str| findings.iter().filter(|f| f.severity == severity).count();
@@ -250,8 +309,8 @@ pub(crate) fn listing(l: &MeshListing) -> String {
     if !l.interfaces.is_empty() {
         out += &sets("interfaces", &l.interfaces);
     }
-    for warning in &l.warnings {
-        out += &format!("warning: {warning}\n");
+    for warning in gathered(&l.warnings) {
+        out += &format!("warning: {}\n", message(&warning));
     }
     out
 }
@@ -271,5 +330,33 @@ fn sets(title: &str, sets: &[SetListing]) -> String {
 /// A warning on standard error.
 pub(crate) fn warning(text: &str) {
     let yellow = anstyle::AnsiColor::Yellow.on_default().bold();
-    anstream::eprintln!("{yellow}warning:{yellow:#} {text}");
+    anstream::eprintln!("{yellow}warning:{yellow:#} {}", message(text));
+}
+
+/// An error on standard error, or another line that begins with a word of its own.
+pub(crate) fn complaint(word: &str, text: &str) {
+    eprintln!("{word}: {}", message(text));
+}
+
+/// Warnings on standard error, those of one kind as one, unless nobody wants to see them.
+pub(crate) fn warnings(cli: &Cli, texts: &[String]) {
+    if !cli.quiet {
+        gathered(texts).iter().for_each(|text| warning(text));
+    }
+}
+
+/// The same of caveats. What the description of the robot has is told in full by `check` and `new`, here in one line.
+pub(crate) fn caveats(cli: &Cli, caveats: &[Caveat]) {
+    let (of_description, own): (Vec<&Caveat>, Vec<&Caveat>) =
+        caveats.iter().filter(|caveat| caveat.warns()).partition(|caveat| caveat.of_description);
+    let mut texts: Vec<String> = own.into_iter().map(|caveat| caveat.message.clone()).collect();
+    match of_description.as_slice() {
+        [] => {}
+        [one] => texts.insert(0, one.message.clone()),
+        [first, others @ ..] => {
+            let text = format!("{} (and {} more of the description: flexarm check)", first.message, others.len());
+            texts.insert(0, text);
+        }
+    }
+    warnings(cli, &texts);
 }

@@ -37,11 +37,7 @@ pub(crate) fn run(cli: &Cli, args: &ReduceArgs) -> Result<ExitCode, Failure> {
     let result = flexarm::reduce::reduce(&job, &options, outputs.as_ref(), &mut |step| steps.show(step));
     steps.clear();
     let summary = result?;
-    if !cli.quiet {
-        for warning in &summary.warnings {
-            eprintln!("warning: {warning}");
-        }
-    }
+    print::warnings(cli, &summary.warnings);
     answer(cli, || to_json(&summary), || print::reduction(&summary));
     Ok(ExitCode::SUCCESS)
 }

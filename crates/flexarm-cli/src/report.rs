@@ -35,9 +35,7 @@ pub(crate) struct ReportArgs {
 pub(crate) fn run(cli: &Cli, args: &ReportArgs) -> Result<ExitCode, Failure> {
     let options = ReportOptions { output: args.output.clone(), figures: args.figures, overwrite: args.force };
     let files = flexarm::report(&args.recordings, &options)?;
-    if !cli.quiet {
-        files.warnings.iter().for_each(|warning| crate::print::warning(warning));
-    }
+    crate::print::warnings(cli, &files.warnings);
     crate::answer(cli, || crate::to_json(&files), || text(&files));
     Ok(ExitCode::SUCCESS)
 }

@@ -11,7 +11,7 @@ use flexarm::{Motion, Robot, RunOptions, Scenario};
 use crate::args::{Cli, ModellingArgs, RobotArgs};
 use crate::failure::Failure;
 use crate::motion::MotionInputArgs;
-use crate::print::{lines, table, warning};
+use crate::print::{lines, table};
 use crate::{answer, load_options, shipped, to_json, values};
 
 const EXAMPLES: &str = "\
@@ -71,9 +71,7 @@ pub(crate) fn run(cli: &Cli, args: &SensitivityArgs) -> Result<ExitCode, Failure
     if args.at.is_some() {
         let at = values::joint_values(args.at.as_deref(), &robot)?;
         let found = pose_sensitivity(&robot, args.modelling.modelling(), at.as_deref(), &args.by)?;
-        if !cli.quiet {
-            found.caveats.iter().for_each(|caveat| warning(&caveat.message));
-        }
+        crate::print::caveats(cli, &found.caveats);
         answer(cli, || to_json(&found), || pose_text(&found));
         return Ok(ExitCode::SUCCESS);
     }
@@ -99,9 +97,7 @@ pub(crate) fn run(cli: &Cli, args: &SensitivityArgs) -> Result<ExitCode, Failure
         overwrite: args.force,
     };
     let found = sensitivity(&robot, scenario, &request)?;
-    if !cli.quiet {
-        found.caveats.iter().for_each(|caveat| warning(&caveat.message));
-    }
+    crate::print::caveats(cli, &found.caveats);
     answer(cli, || to_json(&found), || text(&found));
     Ok(ExitCode::SUCCESS)
 }
@@ -147,7 +143,7 @@ fn value(value: f64, unit: &str) -> String {
 }
 
 /// The table with numbers to the right.
-fn right(t: &mut comfy_table::Table) -> String {
+fn right(t: &mut crate::print::TextTable) -> String {
     for column in t.column_iter_mut().skip(1) {
         column.set_cell_alignment(CellAlignment::Right);
     }

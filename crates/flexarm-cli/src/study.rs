@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::ffi::OsString;
 
 use clap::{CommandFactory, FromArgMatches};
+use flexarm::{Caveat, Summary};
 
 use crate::args::{Cli, Command, RunArgs};
 use crate::failure::Failure;
@@ -20,6 +21,18 @@ const MOST_OTHERS: usize = 50;
 /// Options that belong to the study as a whole.
 const SHARED: [&str; 10] =
     ["with", "output", "force", "no-files", "magnify", "json", "quiet", "figures", "parquet", "also"];
+
+/// The caveats of all runs, each once: those of the other runs with their labels.
+pub(crate) fn caveats(summary: &Summary) -> Vec<Caveat> {
+    let mut all = summary.caveats.clone();
+    for other in &summary.with {
+        let is_new = |caveat: &&Caveat| !all.iter().any(|known| known.message.ends_with(&caveat.message));
+        let new: Vec<Caveat> = other.caveats.iter().filter(is_new).cloned().collect();
+        let label = other.label.as_deref().unwrap_or_default();
+        all.extend(new.into_iter().map(|c| Caveat { message: format!("{label}: {}", c.message), ..c }));
+    }
+    all
+}
 
 /// The runs of a study, the one that was asked for first. `line` is the command line as given.
 pub(crate) fn parts<'a>(main: &'a RunArgs, line: &[OsString]) -> Result<Vec<Part<'a>>, Failure> {

@@ -4,7 +4,10 @@
 
 use anstyle::{AnsiColor, Style};
 use comfy_table::Table;
+use flexarm::written::one_line;
 use flexarm::{Figure, Files, Holds, RecordingFormat, STUDY_NOTE, Summary, Weight, figure_groups, study_rows};
+
+use crate::print::SHORTENED;
 
 /// Columns where the terminal does not say how many it has.
 const USUAL_WIDTH: usize = 80;
@@ -31,13 +34,17 @@ pub(crate) fn terminal_width() -> usize {
 /// The figures of a run in so many columns.
 pub(crate) fn summary(summary: &Summary, width: usize) -> String {
     let width = width.max(LEAST_WIDTH);
-    let (robot, trajectory, links) = (&summary.robot, &summary.trajectory, &summary.links_model);
+    let (robot, trajectory, links) =
+        (one_line(&summary.robot), one_line(&summary.trajectory), one_line(&summary.links_model));
     let mut out = String::new();
     for line in wrapped(&summary.headline, width) {
         out += &format!("{HEADLINE}{line}{HEADLINE:#}\n");
     }
     out += &format!("{HEADING}{robot} on {trajectory}{HEADING:#}, {links} links\n");
-    let groups = figure_groups(summary);
+    let mut groups = figure_groups(summary);
+    for row in groups.iter_mut().flat_map(|group| &mut group.rows) {
+        (row.name, row.value, row.note) = (one_line(&row.name), one_line(&row.value), one_line(&row.note));
+    }
     let all = || groups.iter().flat_map(|group| &group.rows);
     let widest = |of: fn(&Figure) -> &str| all().map(|row| columns(of(row))).max().unwrap_or(0);
     let (names, values, units) = (widest(|row| &row.name), widest(|row| &row.value), widest(|row| row.unit));
@@ -90,17 +97,18 @@ fn files(f: &Files) -> String {
         out += &format!("\n{HEADING}files{HEADING:#}\n");
     }
     for (what, path) in files {
-        out += &format!("  {what:<7}  {path}\n");
+        out += &format!("  {what:<7}  {}\n", one_line(path));
     }
     if let Some(path) = f.study.as_deref().or(f.recordings.get(RecordingFormat::Rrd)) {
-        out += &format!("  look:    flexarm view {path}\n");
+        out += &format!("  look:    flexarm view {}\n", one_line(path));
     }
     out
 }
 
 /// The runs of a study side by side.
 fn study(summary: &Summary, width: usize) -> String {
-    let rows = study_rows(summary);
+    let rows: Vec<Vec<String>> =
+        study_rows(summary).iter().map(|row| row.iter().map(|cell| one_line(cell)).collect()).collect();
     if rows.is_empty() {
         return String::new();
     }
@@ -171,6 +179,9 @@ fn turned(rows: &[Vec<String>], width: usize) -> String {
         let room = width - columns(&number);
         out += &format!("{number}{}\n", shortened(name, room));
     }
+    if names.iter().enumerate().any(|(k, name)| columns(name) + columns(&format!("  ({})  ", k + 1)) > width) {
+        out += &wrapped(SHORTENED, width).iter().map(|line| format!("{line}\n")).collect::<String>();
+    }
     out
 }
 
@@ -189,6 +200,7 @@ fn columns(text: &str) -> usize {
 
 /// Lines of at most `width` columns, broken at blanks.
 fn wrapped(text: &str, width: usize) -> Vec<String> {
+    let text = one_line(text);
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
         match lines.last_mut() {

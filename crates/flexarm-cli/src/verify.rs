@@ -61,7 +61,7 @@ pub(crate) fn run(cli: &Cli, args: &VerifyArgs) -> Result<ExitCode, Failure> {
     bar.clear();
     let verification = match result {
         Err(flexarm_verify::Error::Library(Error::Interrupted { .. })) => {
-            eprintln!("error: stopped; nothing was written");
+            crate::print::complaint("error", "stopped; nothing was written");
             return Ok(ExitCode::from(1));
         }
         other => other?,

@@ -11,6 +11,7 @@ use flexarm::Error;
 
 use crate::args::Cli;
 use crate::failure::Failure;
+use crate::print::{complaint, warning};
 use crate::{answer, to_json};
 
 /// Version of the viewer that this program writes `.rrd` files for.
@@ -42,11 +43,11 @@ pub(crate) fn run(cli: &Cli, args: &ViewArgs) -> Result<ExitCode, Failure> {
                 )));
             };
             if kind == "rrd" && !viewer.version.starts_with(&format!("{WRITTEN_FOR}.")) && !cli.quiet {
-                eprintln!(
-                    "warning: .rrd files are written for Rerun {WRITTEN_FOR}, the viewer here is {}: if it cannot show the file, \
+                warning(&format!(
+                    ".rrd files are written for Rerun {WRITTEN_FOR}, the viewer here is {}: if it cannot show the file, \
                      `pip install rerun-sdk=={WANTED}` or view the .mcap recording",
                     viewer.version
-                );
+                ));
             }
             Ok(show(cli, &file, &viewer, args.wait))
         }
@@ -208,7 +209,7 @@ fn browse(cli: &Cli, file: &Path) -> ExitCode {
 }
 
 fn failed(message: &str) -> ExitCode {
-    eprintln!("error: {message}");
+    complaint("error", message);
     ExitCode::from(1)
 }
 

@@ -6,7 +6,7 @@
 use std::fmt::Write as _;
 
 use crate::palette::{self, Ground};
-use crate::svg::escaped;
+use flexarm_settings::written::markup;
 
 /// Letters.
 const FONT: &str = "font-family=\"system-ui, sans-serif\"";
@@ -130,7 +130,7 @@ fn shown(tick: f64, (low, high): (f64, f64)) -> String {
 }
 
 fn text(out: &mut String, (x, y): (f64, f64), font: u32, anchor: &str, words: &str) {
-    let words = escaped(words);
+    let words = markup(words);
     let _ = writeln!(
         out,
         "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{font}\" text-anchor=\"{anchor}\" {FONT} fill=\"#1c2530\">{words}</text>"
@@ -139,7 +139,7 @@ fn text(out: &mut String, (x, y): (f64, f64), font: u32, anchor: &str, words: &s
 
 /// Words that go up.
 fn upright(out: &mut String, (x, y): (f64, f64), font: u32, words: &str) {
-    let words = escaped(words);
+    let words = markup(words);
     let _ = writeln!(
         out,
         "<text transform=\"translate({x:.1} {y:.1}) rotate(-90)\" font-size=\"{font}\" text-anchor=\"middle\" {FONT} fill=\"#1c2530\">{words}</text>"
@@ -196,7 +196,7 @@ impl HeatMap<'_> {
                 "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"{fill}\"><title>{}</title></rect>",
                 cell.0 + 0.3,
                 cell.1 + 0.3,
-                escaped(&format!("{}, {}: {value}", self.x[column], self.y[row]))
+                markup(&format!("{}, {}: {value}", self.x[column], self.y[row]))
             );
             if cell.0 >= 44.0 && cell.1 >= 16.0 {
                 let ink = if part < 0.5 { "#fff" } else { "#1c2530" };

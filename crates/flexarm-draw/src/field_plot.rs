@@ -6,7 +6,7 @@
 use std::fmt::Write as _;
 
 use crate::palette::{hex, magnitude};
-use crate::svg::escaped;
+use flexarm_settings::written::markup;
 
 /// Most cells along an axis of the picture.
 const MOST_CELLS: usize = 120;
@@ -60,7 +60,7 @@ impl FieldPlot<'_> {
              font-family=\"system-ui, sans-serif\" font-size=\"11\" fill=\"#1c2530\">\n<text x=\"{:.1}\" y=\"15\" font-size=\"12\" \
              font-weight=\"600\">{}</text>\n",
             ROOM[0],
-            escaped(self.title)
+            markup(self.title)
         );
         self.cells(&mut svg, field, low, high);
         self.axes(&mut svg, field);
@@ -168,9 +168,9 @@ impl FieldPlot<'_> {
              text-anchor=\"middle\">{}</text>",
             left + 0.5 * field[0],
             bottom + 32.0,
-            escaped(self.labels[0]),
+            markup(self.labels[0]),
             top + 0.5 * field[1],
-            escaped(self.labels[1])
+            markup(self.labels[1])
         );
     }
 
@@ -191,7 +191,7 @@ impl FieldPlot<'_> {
                 "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"8\" fill=\"#fff\" stroke=\"#1c2530\"/><text x=\"{x:.1}\" y=\"{:.1}\" \
                  text-anchor=\"middle\" font-weight=\"700\">{}</text>",
                 y + 4.0,
-                escaped(letter)
+                markup(letter)
             );
         }
     }
@@ -215,7 +215,7 @@ fn scale_bar(svg: &mut String, field: [f64; 2], low: f64, high: f64, label: &str
         let value = number_of_three_digits(low + share * (high - low));
         let _ = writeln!(svg, "<text x=\"{:.1}\" y=\"{y:.1}\">{value}</text>", left + 16.0);
     }
-    let _ = writeln!(svg, "<text x=\"{left:.1}\" y=\"{:.1}\">{}</text>", ROOM[1] - 8.0, escaped(label));
+    let _ = writeln!(svg, "<text x=\"{left:.1}\" y=\"{:.1}\">{}</text>", ROOM[1] - 8.0, markup(label));
 }
 
 /// Round numbers within a range.

@@ -37,7 +37,6 @@ mod magnify;
 pub mod mesh_picture;
 pub mod palette;
 mod plot;
-mod svg;
 
 #[cfg(feature = "png")]
 pub use arm_picture::{ArmPicture, ArmPictureError, ArmSide, arm_color, arm_picture, arm_pictures, arm_png, arm_sheet};

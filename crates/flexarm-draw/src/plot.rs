@@ -228,7 +228,8 @@ fn plot(what: &LinePlot<'_>, bands: &[(f64, f64)], style: &Style) -> Result<Stri
             (format!("width=\"{width}\" height=\"{height}\""), format!("width=\"{mm}mm\" height=\"{high:.2}mm\""));
         text = text.replacen(&old, &new, 1);
     }
-    Ok(text)
+    // The drawing library escapes markup, not control characters.
+    Ok(flexarm_settings::written::visible(&text))
 }
 
 /// Room for the title and the notes below it.

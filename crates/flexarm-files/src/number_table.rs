@@ -5,6 +5,8 @@
 
 use std::path::Path;
 
+use flexarm_settings::written::csv_fields;
+
 use crate::{FileError, read_text};
 
 /// A table of numbers.
@@ -36,7 +38,7 @@ impl NumberTable {
             lines.by_ref().find(|(_, line)| counts(line)).ok_or("the table is empty: expected a header")?;
         let separator = [';', '\t'].into_iter().find(|c| header.contains(*c)).unwrap_or(',');
         let cells = |line: &str| -> Vec<String> {
-            line.split(separator).map(|cell| cell.trim().trim_matches('"').trim().to_owned()).collect()
+            csv_fields(line, |c| c == separator, false).iter().map(|cell| cell.trim().to_owned()).collect()
         };
         let names = cells(header);
         for (k, name) in names.iter().enumerate() {

@@ -4,6 +4,8 @@ use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::Path;
 
+use flexarm_settings::written::csv_field;
+
 use crate::create::FlushClock;
 use crate::file_recorder::{FileRecorder, OpenFile};
 use crate::number_text::push_number;
@@ -55,10 +57,10 @@ impl Lines {
         Self { file, written: 0, waiting: Vec::new(), behind: WrittenBehind::default() }
     }
 
-    fn add_names(&mut self, names: &[String]) -> csv::Result<()> {
-        let mut writer = csv::Writer::from_writer(&mut self.waiting);
-        writer.write_record(names)?;
-        Ok(writer.flush()?)
+    fn add_names(&mut self, names: &[String]) {
+        let fields: Vec<String> = names.iter().map(|name| csv_field(name)).collect();
+        self.waiting.extend_from_slice(fields.join(",").as_bytes());
+        self.waiting.push(b'\n');
     }
 
     /// A line of numbers: none of them needs quotes.
@@ -102,7 +104,7 @@ impl Drop for Lines {
 impl OpenFile for CsvFile {
     fn begin(path: &Path, options: CreateOptions, header: &RunHeader) -> Result<Self, LogError> {
         let mut lines = Lines::new(options.create(path)?);
-        lines.add_names(&table::columns(header)).map_err(csv_error(path, "write the column names"))?;
+        lines.add_names(&table::columns(header));
         lines.flush().map_err(LogError::io(path, "write the column names"))?;
         let flush = options.flush_clock(path);
         Ok(Self { lines: Some(lines), shape: Shape::of(header), flush, row: Vec::new() })
@@ -137,15 +139,5 @@ impl CsvFile {
             self.lines = None;
         }
         written
-    }
-}
-
-fn csv_error(path: &Path, action: &'static str) -> impl FnOnce(csv::Error) -> LogError {
-    move |error| {
-        let cause = error.to_string();
-        match error.into_kind() {
-            csv::ErrorKind::Io(source) => LogError::io(path, action)(source),
-            _ => LogError::Format { path: path.to_owned(), action, cause },
-        }
     }
 }

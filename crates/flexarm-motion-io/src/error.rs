@@ -100,8 +100,8 @@ pub enum Problem {
     },
     /// An array that the printing program has shortened.
     #[error(
-        "an array ends with \"...\": it was shortened when it was printed; print it whole (ros2 topic echo with the option \
-         full-length)"
+        "an array ends with \"...\": it was shortened when it was printed; print it whole, with \
+         ros2 topic echo --full-length"
     )]
     ShortenedArray,
     /// A key that must be there.

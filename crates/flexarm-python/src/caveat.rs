@@ -1,6 +1,6 @@
 //! Caveats: what is probably wrong with an input, or limits the worth of a result, as warnings of their own class.
 
-use flexarm::Caveat;
+use flexarm::{Caveat, gathered, written};
 use pyo3::call::PyCallArgs;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -20,7 +20,7 @@ pub(crate) fn list<'py>(py: Python<'py>, caveats: &[Caveat]) -> PyResult<Bound<'
         fields.set_item("unit", &caveat.unit)?;
         fields.set_item("likely", &caveat.likely)?;
         fields.set_item("help", &caveat.help)?;
-        class.call((&caveat.message,), Some(&fields))
+        class.call((written::message(&caveat.message),), Some(&fields))
     };
     PyList::new(py, caveats.iter().map(instance).collect::<PyResult<Vec<_>>>()?)
 }
@@ -37,10 +37,22 @@ pub(crate) fn tell(py: Python<'_>, caveats: &[Caveat]) -> PyResult<()> {
     let warn = py.import("warnings")?.getattr("warn")?;
     let level = PyDict::new(py);
     level.set_item("stacklevel", 1)?;
+    // Those of one kind are one warning, with the fields of the first.
+    let texts: Vec<String> = told.iter().map(|caveat| caveat.message.clone()).collect();
+    let of = |text: String| {
+        let first = told.iter().find(|caveat| text.starts_with(&caveat.message));
+        Caveat { message: text, ..first.cloned().unwrap_or_default() }
+    };
+    let told: Vec<Caveat> = gathered(&texts).into_iter().map(of).collect();
     for caveat in list(py, &told)? {
         warn.call((caveat,), Some(&level))?;
     }
     Ok(())
+}
+
+/// Sentences as they may be logged: those of one kind as one, without characters that a terminal obeys.
+pub(crate) fn sentences(texts: &[String]) -> Vec<String> {
+    gathered(texts).iter().map(|text| written::message(text)).collect()
 }
 
 /// Says something through `logging`, by a function of `flexarm._say`.

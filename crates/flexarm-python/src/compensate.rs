@@ -69,7 +69,7 @@ impl PyCompensated {
     }
 
     fn __repr__(&self) -> String {
-        format!("<Compensated {}>", self.headline)
+        format!("<Compensated {}>", flexarm::written::one_line(&self.headline))
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {

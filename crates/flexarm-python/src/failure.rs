@@ -59,7 +59,8 @@ pub(crate) fn exception(error: Error) -> PyErr {
 pub(crate) fn raised(py: Python<'_>, class: &str, message: String) -> PyErr {
     let made = || -> PyResult<PyErr> {
         let class = py.import("flexarm.errors")?.getattr(class)?.cast_into::<PyType>()?;
-        Ok(PyErr::from_type(class, message))
+        // Python prints what it does not catch as it is.
+        Ok(PyErr::from_type(class, flexarm::written::message(&message)))
     };
     made().unwrap_or_else(|error| error)
 }

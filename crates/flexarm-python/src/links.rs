@@ -204,6 +204,6 @@ pub(crate) fn export_link<'py>(
     let units = units.parse().map_err(|error| PyValueError::new_err(format!("units: {error}")))?;
     let job = ExportJob { link, format, units, nodes: nodes.unwrap_or_default(), folder: output, overwrite };
     let summary = stoppable(py, move |_| export(&job))?.or_raise()?;
-    caveat::say(py, "warnings", (summary.warnings.clone(),))?;
+    caveat::say(py, "warnings", (caveat::sentences(&summary.warnings),))?;
     caveat::answer(py, &summary, &[])
 }

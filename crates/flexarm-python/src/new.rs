@@ -2,11 +2,13 @@
 
 use std::path::PathBuf;
 
-use flexarm::{NewOptions, ReadOptions, new_robot as make};
+use flexarm::written::message;
+use flexarm::{Finding, NewOptions, ReadOptions, new_robot as make};
 use pyo3::prelude::*;
 
 use crate::caveat;
 use crate::failure::OrRaise;
+use crate::robot::estimate;
 use crate::values::{plain, texts};
 
 /// Makes a robot file with first guesses, and a sample motion, of a URDF or xacro file.
@@ -22,6 +24,10 @@ use crate::values::{plain, texts};
 ///     Joints that the motion moves.
 /// payload : float, optional
 ///     Mass at the tool (kg); 0 for none.
+/// inertia_from_density : float, optional
+///     Density (kg/m³) of links without a mass, or with one that only holds a place.
+/// inertia_from_total_mass : float, optional
+///     Mass (kg) of all these links together.
 /// overwrite : bool, default False
 ///
 /// Returns
@@ -29,7 +35,8 @@ use crate::values::{plain, texts};
 /// dict
 ///     Files, chain and every assumption, as ``flexarm new --json``.
 #[pyfunction]
-#[pyo3(signature = (urdf, folder, *, base=None, tool=None, joints=None, payload=None, overwrite=false))]
+#[pyo3(signature = (urdf, folder, *, base=None, tool=None, joints=None, payload=None,
+                    inertia_from_density=None, inertia_from_total_mass=None, overwrite=false))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments")]
 pub(crate) fn new_robot<'py>(
     py: Python<'py>,
@@ -39,13 +46,23 @@ pub(crate) fn new_robot<'py>(
     tool: Option<String>,
     #[pyo3(from_py_with = texts)] joints: Option<Vec<String>>,
     payload: Option<f64>,
+    inertia_from_density: Option<f64>,
+    inertia_from_total_mass: Option<f64>,
     overwrite: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
     crate::command::name_keywords();
-    let read = ReadOptions { search_paths: flexarm::search_paths_from_environment(), ..ReadOptions::default() };
+    let read = ReadOptions {
+        search_paths: flexarm::search_paths_from_environment(),
+        inertia_from_mesh: estimate(inertia_from_density, inertia_from_total_mass)?,
+        ..ReadOptions::default()
+    };
     let options = NewOptions { base, tool, joints, payload_kg: payload, urdf: read };
     let made = py.detach(|| make(&urdf, &folder, overwrite, &options)).or_raise()?;
-    let doubtful: Vec<_> = made.findings.iter().filter(|finding| finding.severity != "note").collect();
+    let shown = |finding: &Finding| {
+        let [location, message] = [&finding.location, &finding.message].map(|text| message(text));
+        Finding { location, message, ..finding.clone() }
+    };
+    let doubtful: Vec<_> = made.findings.iter().filter(|finding| finding.severity != "note").map(shown).collect();
     caveat::say(py, "doubts", (plain(py, &doubtful)?,))?;
     caveat::answer(py, &made, &[])
 }

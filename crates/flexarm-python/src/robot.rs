@@ -34,6 +34,15 @@ pub(crate) struct PyRobot {
     again: (&'static str, Py<PyAny>),
 }
 
+/// How missing inertias are estimated.
+pub(crate) fn estimate(density: Option<f64>, total_mass: Option<f64>) -> PyResult<Option<InertiaEstimate>> {
+    Ok(match (density, total_mass) {
+        (Some(density), _) => Some(InertiaEstimate::Density(positive("inertia_from_density", density)?)),
+        (None, Some(mass)) => Some(InertiaEstimate::TotalMass(positive("inertia_from_total_mass", mass)?)),
+        (None, None) => None,
+    })
+}
+
 /// Loads a robot.
 ///
 /// Parameters
@@ -84,11 +93,7 @@ pub(crate) fn load(
     let given = robot.map_or(Ok(PathBuf::from("kr210")), |given| path("robot", given))?;
     let found = shipped(&given)?;
     let choices = PyDict::new(py);
-    let estimate = match (inertia_from_density, inertia_from_total_mass) {
-        (Some(density), _) => Some(InertiaEstimate::Density(positive("inertia_from_density", density)?)),
-        (None, Some(mass)) => Some(InertiaEstimate::TotalMass(positive("inertia_from_total_mass", mass)?)),
-        (None, None) => None,
-    };
+    let estimate = estimate(inertia_from_density, inertia_from_total_mass)?;
     let mut urdf = ReadOptions {
         search_paths: flexarm::search_paths_from_environment(),
         inertia_from_mesh: estimate,

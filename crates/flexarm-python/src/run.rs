@@ -276,7 +276,7 @@ impl PyRun {
     }
 
     fn __repr__(&self) -> String {
-        format!("<Run {}>", self.headline)
+        format!("<Run {}>", flexarm::written::one_line(&self.headline))
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {

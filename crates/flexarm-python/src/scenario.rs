@@ -71,7 +71,7 @@ impl PyLoad {
     }
 
     fn __repr__(&self) -> String {
-        format!("<Load {}>", self.text)
+        format!("<Load {}>", flexarm::written::one_line(&self.text))
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {

@@ -71,6 +71,9 @@ pub struct Caveat {
     /// Settings of the call whose change may mend it, as far as it is one of them.
     #[serde(skip)]
     pub settings: Vec<Setting>,
+    /// Whether it is about the robot's description (URDF), which is the same in every run.
+    #[serde(skip)]
+    pub of_description: bool,
 }
 
 impl CaveatKind {
@@ -105,6 +108,7 @@ impl CaveatKind {
             likely: String::new(),
             help: self.help.into(),
             settings,
+            of_description: false,
         }
     }
 

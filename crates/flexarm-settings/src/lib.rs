@@ -1,6 +1,7 @@
 //! What errors and caveats are made of: the settings that they speak of, as values that each face names in its own words
 //! ([`Setting`]); the [`Caveat`], which compares a value with a yardstick; whom an error is to blame on ([`Fault`]); ranges of
-//! physical quantities ([`Quantity`]); messages of the reader of TOML without names of types ([`without_types`]).
+//! physical quantities ([`Quantity`]); messages of the reader of TOML without names of types
+//! ([`without_types`]); foreign text as each kind of output may hold it ([`written`]).
 //!
 //! An error that says "try a smaller step" means a field of a struct to a Rust program, a keyword argument to a Python one
 //! and a flag to somebody at a terminal. Errors and caveats therefore carry a [`Setting`], and its name is asked for when
@@ -20,14 +21,17 @@
 
 pub mod caveat;
 mod fault;
+mod gathered;
 mod quantity;
 mod toml_message;
+pub mod written;
 
 use std::fmt;
 use std::sync::OnceLock;
 
 pub use caveat::Caveat;
 pub use fault::Fault;
+pub use gathered::gathered;
 pub use quantity::{OutOfRange, Quantity};
 pub use toml_message::without_types;
 

@@ -2,6 +2,8 @@
 
 use std::io::Write;
 
+use flexarm_settings::written::csv_field;
+
 use crate::error::TrajectoryError;
 use crate::trajectory::Trajectory;
 
@@ -26,7 +28,7 @@ impl Trajectory {
         header.extend(self.joints().iter().cloned());
         header.extend(self.joints().iter().map(|joint| format!("{joint}.vel")));
         header.extend(self.joints().iter().map(|joint| format!("{joint}.acc")));
-        writeln!(out, "{}", header.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(","))?;
+        writeln!(out, "{}", header.iter().map(|name| csv_field(name)).collect::<Vec<_>>().join(","))?;
 
         let n = self.joints().len();
         let (mut q, mut qdot, mut qddot) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
@@ -50,12 +52,4 @@ impl Trajectory {
 fn number(value: f64) -> String {
     let magnitude = value.abs();
     if magnitude == 0.0 || (1e-4..1e15).contains(&magnitude) { format!("{value}") } else { format!("{value:e}") }
-}
-
-/// Quotes a name that holds a separator or starts like a comment.
-fn quoted(name: &str) -> String {
-    if name.contains([',', '"', '\n', '\r']) || name.starts_with('#') {
-        return format!("\"{}\"", name.replace('"', "\"\""));
-    }
-    name.to_owned()
 }

@@ -34,7 +34,9 @@ pub(crate) fn link_inertias(
 ) -> Vec<Option<LinkInertia>> {
     let mut inertias: Vec<Option<LinkInertia>> =
         robot.links.iter().map(|l| l.inertial.as_ref().map(in_link_axes)).collect();
-    check_waived_names(robot, options, report);
+    let unknown = "the inertia check is waived for";
+    check_names(robot, &options.waive, unknown, "waived-unknown-link", report);
+    check_names(robot, &options.discard, "the inertia is discarded of", "discarded-unknown-link", report);
     let failures = match options.inertia_from_mesh {
         Some(estimate) => fill_from_shapes(robot, bodies, shapes, estimate, &mut inertias, report),
         None => vec![None; robot.links.len()],
@@ -90,12 +92,13 @@ fn in_link_axes(raw: &RawInertial) -> LinkInertia {
     }
 }
 
-fn check_waived_names(robot: &RawRobot, options: &ReadOptions, report: &mut Report) {
-    for name in options.waive.iter().filter(|name| robot.links.iter().all(|l| l.name != **name)) {
-        let message = format!("the inertia check is waived for link {name:?}, which does not exist");
+/// Warns of names that no link has.
+fn check_names(robot: &RawRobot, names: &[String], what: &str, code: &'static str, report: &mut Report) {
+    for name in names.iter().filter(|name| robot.links.iter().all(|l| l.name != **name)) {
+        let message = format!("{what} link {name:?}, which does not exist");
         let help = crate::spelling::closest(name, robot.links.iter().map(|l| l.name.as_str()));
         let help = help.map_or_else(String::new, |meant| format!("did you mean {meant:?}?"));
-        report.warning(&robot.place, "waived-unknown-link", message, help);
+        report.warning(&robot.place, code, message, help);
     }
 }
 
@@ -275,7 +278,7 @@ fn fill_from_shapes(
     }
 
     // The base is filled too, so that a total mass can be the one of the data sheet.
-    let empty = bodies.iter().filter(|b| b.members.iter().all(|&(i, _)| robot.links[i].inertial.is_none()));
+    let empty = bodies_without(robot, bodies);
     let (mut filled, mut shapeless): (Vec<(usize, SpatialInertia)>, Vec<usize>) = (Vec::new(), Vec::new());
     for i in empty.flat_map(|b| b.members.iter().map(|m| m.0)) {
         let link = &robot.links[i];
@@ -305,9 +308,16 @@ fn fill_from_shapes(
         }
     }
 
+    let by_length = filled.is_empty() && matches!(estimate, InertiaEstimate::TotalMass(_));
+    if by_length {
+        let links = bodies_without(robot, bodies).flat_map(|b| b.members.iter().map(|m| m.0));
+        filled = links.filter_map(|i| Some((i, rod(robot, i)?))).collect();
+        filled.iter().for_each(|(i, _)| failures[*i] = None);
+    }
     if filled.is_empty() {
         shapeless.iter().for_each(|&i| failures[i] = Some("there is no shape".to_owned()));
     }
+    // Of rods the volume is the length.
     let volume: f64 = filled.iter().map(|(_, M)| M.mass).sum();
     let density = match estimate {
         InertiaEstimate::Density(density) => density,
@@ -317,14 +327,35 @@ fn fill_from_shapes(
         let inertia =
             LinkInertia { mass: M_L.mass * density, com: M_L.com(), inertia_com: M_L.inertia_com() * density };
         let link = &robot.links[i];
-        let message = format!(
-            "link {:?}: mass {:.4} kg and inertia are estimated from its geometry at {density:.0} kg/m^3",
-            link.name, inertia.mass
-        );
+        let from = match by_length {
+            true => "its length, as a rod".to_owned(),
+            false => format!("its geometry at {density:.0} kg/m^3"),
+        };
+        let message =
+            format!("link {:?}: mass {:.4} kg and inertia are estimated from {from}", link.name, inertia.mass);
         report.warning(&link.place, "estimated-inertia", message, "replace by measured or CAD values where known");
         inertias[i] = Some(inertia);
     }
     failures
+}
+
+/// Bodies of which no link has an `<inertial>`.
+fn bodies_without<'a>(robot: &'a RawRobot, bodies: &'a [Body]) -> impl Iterator<Item = &'a Body> {
+    bodies.iter().filter(|b| b.members.iter().all(|&(i, _)| robot.links[i].inertial.is_none()))
+}
+
+/// Diameter of a rod over its length.
+const ROD: f64 = 0.2;
+
+/// A link as a rod from its frame to its farthest joint, of the mass 1 kg/m; `None` for a link without length.
+fn rod(robot: &RawRobot, link: usize) -> Option<SpatialInertia> {
+    let ends = robot.joints.iter().filter(|j| j.parent == robot.links[link].name).map(|j| j.X_PJ.translation.vector);
+    let end = ends.max_by(|a, b| a.norm().total_cmp(&b.norm())).filter(|end| end.norm() > 1e-3)?;
+    let (length, along) = (end.norm(), end.normalize());
+    let (across, about) = (length.powi(3) / 12.0 * (1.0 + 0.75 * ROD * ROD), length.powi(3) * ROD * ROD / 8.0);
+    let axis = along * along.transpose();
+    let inertia = (Matrix3::identity() - axis) * across + axis * about;
+    Some(SpatialInertia::from_com(length, &(end * 0.5), &inertia))
 }
 
 fn unit_density(p: &MassProperties) -> SpatialInertia {

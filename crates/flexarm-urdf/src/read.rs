@@ -28,6 +28,8 @@ pub struct ReadOptions {
     /// Links whose inertia may be rank deficient or break the triangle inequality, as the rotor-only first
     /// link of the Manutec r3 does. Negative moments are never waived.
     pub waive: Vec<String>,
+    /// Links whose `<inertial>` counts as not written: masses that only hold a place.
+    pub discard: Vec<String>,
     /// Read the mesh files, to check them and to compare inertias with them. Off, files are only found.
     pub inspect_meshes: bool,
     /// What to do with the up axis of COLLADA meshes.
@@ -43,6 +45,7 @@ impl Default for ReadOptions {
             search_paths: Vec::new(),
             inertia_from_mesh: None,
             waive: Vec::new(),
+            discard: Vec::new(),
             inspect_meshes: true,
             up_axis: UpAxis::Declared,
             arguments: Vec::new(),
@@ -50,7 +53,8 @@ impl Default for ReadOptions {
     }
 }
 
-/// Masses for bodies without `<inertial>`, from the volume of their visuals taken as homogeneous and solid.
+/// Masses for bodies without `<inertial>`, from the volume of their visuals taken as homogeneous and solid. Where no link has
+/// a visual, a total mass is spread by the lengths of the links, each a rod.
 ///
 /// Bodies count as a whole: where one link of several fixed to each other has an `<inertial>`, nothing is added.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -224,6 +228,9 @@ fn parse_expanded(
     let robot = raw.map(|mut raw| {
         raw.idle_macros = idle_macros.to_vec();
         joints::fix_still_followers(&mut raw, report);
+        for link in raw.links.iter_mut().filter(|link| options.discard.contains(&link.name)) {
+            link.inertial = None;
+        }
         assemble(&raw, text, resolver, options, report)
     });
     match (robot, &document) {

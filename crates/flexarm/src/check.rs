@@ -123,7 +123,7 @@ pub fn check_with_motion(
     };
     findings.extend(robot.urdf.warnings.iter().map(Finding::from));
     let file = robot.path.clone();
-    let own = robot.caveats().into_iter().filter(|caveat| !caveat.location.contains(".urdf:"));
+    let own = robot.caveats().into_iter().filter(|caveat| !caveat.of_description);
     findings.extend(own.map(|caveat| Finding::caveat(&file, caveat)));
     let motion = match (trajectory, robot.default_trajectory.as_deref()) {
         (None, Some(own)) if !own.is_file() => {

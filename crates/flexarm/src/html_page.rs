@@ -1,4 +1,6 @@
-//! What pages without scripts have in common: how they begin, and letters that HTML has for itself.
+//! How pages without scripts begin.
+
+use flexarm_settings::written::markup;
 
 /// How the pages look.
 const STYLE: &str = "\
@@ -14,26 +16,10 @@ pre { background: #f3f5f8; padding: .7rem; overflow-x: auto }
 /// * `title`: plain text.
 /// * `style`: what the page has beside the common style.
 pub(crate) fn opening(title: &str, style: &str) -> String {
-    let title = escaped(title);
+    let title = markup(title);
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n<meta name=\"generator\" content=\"flexarm {}\">\n\
          <title>{title}</title>\n<style>{STYLE}{style}</style></head>\n<body>\n<h1>{title}</h1>\n",
         env!("CARGO_PKG_VERSION")
     )
-}
-
-/// Text as it may stand in an element or between the quotes of an attribute.
-pub(crate) fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out += "&amp;",
-            '<' => out += "&lt;",
-            '>' => out += "&gt;",
-            '"' => out += "&quot;",
-            '\'' => out += "&#39;",
-            c => out.push(c),
-        }
-    }
-    out
 }

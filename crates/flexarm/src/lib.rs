@@ -175,7 +175,7 @@ pub use flexarm_log::{
 };
 pub use flexarm_motion_io::MotionError;
 pub use flexarm_path::{PathError, PlannedMove, Slowed, SlowedBy};
-pub use flexarm_settings::{Names, Setting, name_settings};
+pub use flexarm_settings::{Names, Setting, gathered, name_settings, written};
 pub use flexarm_stepping::{
     AlphaSettings, Asked, ConstraintForm, InertiaChange, Linear, Load, LoadAxes, OperatingPoint, PoseAnswer,
     ReferenceMethod, ReferenceSettings, STEPPERS, SpookPreset, SpookSettings, Start, StepError, StepRule, StepperEntry,

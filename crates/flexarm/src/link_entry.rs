@@ -238,10 +238,17 @@ fn beam_link(
             return Err(fail(format!("theory {other:?} is not known; use \"timoshenko\" or \"euler-bernoulli\"")));
         }
     };
-    let axis = X_LB.translation.vector;
+    let [from, to] = beam.ends.map_or([Vector3::zeros(), X_LB.translation.vector], |ends| ends.map(Vector3::from));
+    let axis = to - from;
     let length = axis.norm();
-    if length < 1e-6 {
-        return Err(fail("its distal joint lies at the link's origin: a beam needs a length".into()));
+    if !(length.is_finite() && length >= 1e-6) {
+        let text = match beam.ends {
+            Some(_) => "its ends lie at one place: a beam needs a length",
+            None => {
+                "its distal joint lies at the link's origin: a beam needs a length, or ends = [[x, y, z], [x, y, z]]"
+            }
+        };
+        return Err(fail(text.into()));
     }
     // Any direction across the beam will do if none is asked for: the axis that it is farthest from.
     let y_axis = beam.y_axis.map(Vector3::from).unwrap_or_else(|| {
@@ -260,7 +267,7 @@ fn beam_link(
         Some(other) => return Err(fail(format!("parts {other:?} are not known; use \"from-link\" or \"uniform\""))),
     };
     let mut link = BeamLink::new(name, section, material, length)
-        .along(axis, y_axis, beam.roll, beam.offset.into())
+        .along(axis, y_axis, beam.roll, from + Vector3::from(beam.offset))
         .map_err(|e| fail(e.to_string()))?;
     link.X_LB = X_LB;
     link.theory = theory;

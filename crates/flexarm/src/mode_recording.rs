@@ -14,6 +14,7 @@ use crate::options::Outputs;
 use crate::posed::Posed;
 use crate::record::{link_frames, recorders, robot_header};
 use crate::robot::Robot;
+use flexarm_settings::written::markdown;
 
 /// Swings per second on the screen, whatever the frequency of the mode.
 const SHOWN_HZ: f64 = 1.0;
@@ -113,6 +114,7 @@ fn name(k: usize, mode: &DampedMode) -> String {
 
 /// The modes as a table of Markdown.
 fn list(robot: &str, shown: &[DampedMode], start: impl Fn(usize) -> f64) -> String {
+    let robot = markdown(robot);
     let mut text = format!(
         "# Modes of {robot}\n\nShapes have no size: each is drawn as large as can be seen and swings once a second, whatever its \
          frequency. The ghost is the rigid robot.\n\n| mode | frequency | damping | shown from |\n| --- | --- | --- | --- |\n"

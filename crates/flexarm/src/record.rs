@@ -15,6 +15,7 @@ use crate::options::{Outputs, RunOptions};
 use crate::robot::Robot;
 use crate::scenario::Scenario;
 use crate::summary::Files;
+use flexarm_settings::written::{markdown, markdown_code, markdown_row};
 
 /// Recorders of a run with the names of their files.
 pub(crate) struct Recordings {
@@ -385,18 +386,18 @@ fn description(
     frequencies: &[String],
 ) -> String {
     let mut text = format!(
-        "# {} on {}\n\nFlexible arm (solid) against its rigid twin (ghost), TCP `{}`.\n\n| | |\n|---|---|\n\
+        "# {} on {}\n\nFlexible arm (solid) against its rigid twin (ghost), TCP {}.\n\n| | |\n|---|---|\n\
          | duration | {:.3} s |\n| stepper | {}, step {} s |\n| links | {} |\n",
-        robot.name,
-        motion.name,
-        robot.tcp.0,
+        markdown(&robot.name),
+        markdown(&motion.name),
+        markdown_code(&robot.tcp.0),
         motion.trajectory.duration(),
         options.stepper.name(),
         options.step_s,
         links_model,
     );
     for f in robot.flexible.iter().map(|f| &f.flexible) {
-        text += &format!("| flexible link | {}: {} |\n", f.link, f.reduced.provenance.method);
+        text += &markdown_row(&["flexible link", &format!("{}: {}", f.link, f.reduced.provenance.method)]);
     }
     if !frequencies.is_empty() {
         text += &format!("| first frequencies | {} Hz |\n", frequencies[..frequencies.len().min(3)].join(", "));

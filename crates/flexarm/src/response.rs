@@ -7,6 +7,7 @@ use flexarm_analysis::{
 };
 use flexarm_draw::{CurveLook, LinePlot, Panel, PlotCurve, PlotError};
 use flexarm_files::{check_free, write_all};
+use flexarm_settings::written::csv_field;
 use flexarm_stepping::Linear;
 use nalgebra::{Complex, DMatrix, Vector6};
 use serde::Serialize;
@@ -395,7 +396,9 @@ fn csv(response: &Response) -> String {
     let mut text = "frequency_hz".to_owned();
     for c in &response.curves {
         let unit = c.unit.replace('/', "_per_");
-        text += &format!(",{}_to_{}_{unit},{}_to_{}_phase_rad", c.input, c.output, c.input, c.output);
+        for what in [unit.as_str(), "phase_rad"] {
+            text += &format!(",{}", csv_field(&format!("{}_to_{}_{what}", c.input, c.output)));
+        }
     }
     text.push('\n');
     for (k, hz) in response.frequency_hz.iter().enumerate() {

@@ -191,6 +191,7 @@ impl Robot {
         let mut urdf_options = options.urdf.clone();
         urdf_options.packages.extend(file.packages.iter().map(|(name, to)| (name.clone(), folder.join(to))));
         urdf_options.waive.extend(file.waive_inertia.iter().cloned());
+        urdf_options.discard.extend(file.discard_inertia.iter().cloned());
         for (name, value) in &file.args {
             let given = urdf_options.arguments.iter().any(|(given, _)| given == name);
             let value = argument_text(name, value, &source)?;
@@ -231,6 +232,9 @@ impl Robot {
         }
         for (joint, lead) in &file.lead {
             keep(make_helical(&mut rigid, joint, lead, source).map_err(Error::from), &mut faults);
+        }
+        for (joint, limit) in &file.effort_limit {
+            keep(limit_effort(&mut rigid, joint, limit, source).map_err(Error::from), &mut faults);
         }
         let tcp = keep(tcp_of(file, source, &urdf, options), &mut faults);
         // `robot.toml`, `.` and links to folders have no name to be read off the path.
@@ -360,7 +364,8 @@ impl Robot {
     /// Hangs the payload on its link, else on the file's TCP link, whatever other frame the user looks at.
     fn add_payload(&mut self, entry: &Spanned<PayloadEntry>, tcp_link: &str, source: &Source) -> Result<(), Error> {
         let payload = entry.get_ref();
-        check_finite("payload com", &payload.com, entry.span(), source)?;
+        let com = payload.com.unwrap_or_default();
+        check_finite("payload com", &com, entry.span(), source)?;
         check_finite("payload inertia", &payload.inertia, entry.span(), source)?;
         let link = payload.link.as_ref().map_or_else(|| tcp_link.to_owned(), |l| l.get_ref().clone());
         if self.rigid.link(&link).is_none() {
@@ -378,6 +383,11 @@ impl Robot {
             self.written.push(none.as_note());
             return Ok(());
         }
+        if payload.com.is_none() {
+            let message =
+                "payload has no com: its centre of mass in axes of the link, such as com = [0.0, 0.0, 0.1], in m";
+            return Err(source.error(entry.span(), message).into());
+        }
         let [xx, yy, zz, xy, xz, yz] = payload.inertia;
         let inertia_com = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
         if inertia_com.symmetric_eigenvalues().min() < -1e-9 * inertia_com.norm() {
@@ -387,7 +397,7 @@ impl Robot {
         // Its frame is at its centre of mass: a cut through the link then leaves it on the side where it is.
         let inertia = LinkInertia { mass, com: Vector3::zeros(), inertia_com };
         self.rigid.links.push(Link { name: PAYLOAD_LINK.into(), inertia: Some(inertia) });
-        let joint = Joint::new("__payload_joint", JointKind::Fixed, link, PAYLOAD_LINK, pose(payload.com, [0.0; 3]));
+        let joint = Joint::new("__payload_joint", JointKind::Fixed, link, PAYLOAD_LINK, pose(com, [0.0; 3]));
         self.rigid.joints.push(joint);
         Ok(())
     }
@@ -436,7 +446,9 @@ impl Robot {
         let of_urdf = |text: &&String| self.urdf.warnings_only().any(|w| **text == told(w));
         let own = self.warnings.iter().filter(|text| !of_urdf(text));
         let own = own.map(|text| Caveat::said("flexible-link", &file, text, "compare both sources"));
+        let of_description = |caveat| Caveat { of_description: true, ..caveat };
         let urdf = self.urdf.warnings_only().map(|w| Caveat::said(w.code, &w.location, told(w), &w.help));
+        let urdf = urdf.map(of_description);
         let mut caveats: Vec<Caveat> = own.chain(urdf).chain(self.written.iter().cloned()).collect();
         caveats.extend(caveat::parts::of_robot(self));
         caveats.extend(self.flexible.iter().flat_map(caveat::links::of_link));
@@ -527,6 +539,25 @@ fn make_helical(
     }
     if let JointKind::Revolute(axis) | JointKind::Continuous(axis) = joint.kind {
         joint.kind = JointKind::Helical { axis, pitch: lead / std::f64::consts::TAU };
+    }
+    Ok(())
+}
+
+/// Gives a joint another effort limit than the URDF's (N m or N).
+fn limit_effort(
+    mechanism: &mut Mechanism,
+    name: &str,
+    limit: &Spanned<f64>,
+    source: &Source,
+) -> Result<(), RobotFileError> {
+    let fail = |message: String| source.error(limit.span(), format!("effort_limit of joint {name:?}: {message}"));
+    let is_free = |joint: &Joint| joint.kind.degrees_of_freedom() == 1;
+    let known: Vec<String> = mechanism.joints.iter().filter(|j| is_free(j)).map(|j| j.name.clone()).collect();
+    let joint = mechanism.joints.iter_mut().find(|j| j.name == name && is_free(j));
+    let joint = joint.ok_or_else(|| fail(format!("the robot has no such joint that moves; it has {known:?}")))?;
+    match *limit.get_ref() {
+        effort if effort > 0.0 => joint.limits.effort = effort,
+        effort => return Err(fail(format!("is {effort}, expected a positive torque in N m (or force in N), or inf"))),
     }
     Ok(())
 }

@@ -48,6 +48,9 @@ pub(crate) struct RobotFile {
     /// Links whose inertia may be one that no body has (published data sometimes do).
     #[serde(default)]
     pub waive_inertia: Vec<String>,
+    /// Links whose `<inertial>` counts as not written: masses that only hold a place.
+    #[serde(default)]
+    pub discard_inertia: Vec<String>,
     /// Density for links without `<inertial>` (kg/m³): masses from their meshes.
     pub inertia_from_density: Option<Spanned<f64>>,
     /// Mass of all links without `<inertial>` together (kg), distributed by volume.
@@ -55,6 +58,9 @@ pub(crate) struct RobotFile {
     /// Where joints stay that a motion does not name (rad or m).
     #[serde(default)]
     pub hold: std::collections::BTreeMap<String, Spanned<f64>>,
+    /// Effort limits in the place of the URDF's (N m or N); infinite where none is known.
+    #[serde(default)]
+    pub effort_limit: std::collections::BTreeMap<String, Spanned<f64>>,
     /// Joints that slide as they turn: how far in a turn (m), right-handed threads positive.
     #[serde(default)]
     pub lead: std::collections::BTreeMap<String, Spanned<f64>>,
@@ -102,8 +108,8 @@ pub(crate) struct PayloadEntry {
     pub link: Option<Spanned<String>>,
     /// Mass (kg).
     pub mass: Spanned<f64>,
-    /// Centre of mass in link axes (m).
-    pub com: [f64; 3],
+    /// Centre of mass in link axes (m); must be there unless the mass is 0.
+    pub com: Option<[f64; 3]>,
     /// `ixx iyy izz ixy ixz iyz` about the centre of mass (kg m²).
     #[serde(default)]
     pub inertia: [f64; 6],

@@ -14,6 +14,7 @@ use crate::robot::Robot;
 use crate::run::{Progress, Together, run_traced};
 use crate::scenario::Scenario;
 use crate::summary::{DifferenceFigures, Summary, TcpFigures};
+use flexarm_settings::written::{markdown, markdown_row};
 
 /// One run of a study.
 #[derive(Debug)]
@@ -269,7 +270,7 @@ pub const STUDY_NOTE: &str = "static: part of the peak that the arm has standing
 
 #[cfg(feature = "rerun")]
 fn study_markdown(summary: &Summary) -> String {
-    format!("# Study of {}\n\n", summary.robot) + &table(summary)
+    format!("# Study of {}\n\n", markdown(&summary.robot)) + &table(summary)
 }
 
 /// The runs side by side as a Markdown table.
@@ -277,15 +278,16 @@ pub(crate) fn table(summary: &Summary) -> String {
     let mut page = String::new();
     for (k, row) in study_rows(summary).iter().enumerate() {
         // Times of this machine stay out of recordings.
-        let cells: Vec<String> = row[..row.len() - 1].iter().map(|cell| cell.replace('|', "\\|")).collect();
-        page += &format!("| {} |\n", cells.join(" | "));
+        let cells = &row[..row.len() - 1];
+        page += &markdown_row(cells);
         if k == 0 {
             page += &format!("|{}\n", " --- |".repeat(cells.len()));
         }
     }
     page += &format!("\n{STUDY_NOTE}.\n");
     for run in std::iter::once(summary).chain(&summary.with).filter(|run| !run.headline.is_empty()) {
-        page += &format!("\n* {}: {}", run.label.as_deref().unwrap_or_default(), run.headline);
+        let label = run.label.as_deref().unwrap_or_default();
+        page += &format!("\n* {}: {}", markdown(label), markdown(&run.headline));
     }
     page + "\n"
 }

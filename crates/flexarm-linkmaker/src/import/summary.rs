@@ -5,12 +5,12 @@ use std::fmt::Write as _;
 use flexarm_fem::matrix_link::MatrixReduction;
 use flexarm_fem::reduction::Superelement;
 use flexarm_fem::{Doubt, GateLimits, ModalLink, RigidPart};
-use flexarm_settings::Caveat;
+use flexarm_settings::{Caveat, written};
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 use serde::Serialize;
 
 use super::SECOND_ORDER_UNKNOWN;
-use crate::reduce::{ModalFigures, ReportTable, coarse, doubted, modal_table};
+use crate::reduce::{ModalFigures, ReportTable, coarse, doubted, modal_table, warning_list};
 
 /// Answer of `flexarm import`.
 #[derive(Clone, Debug, Serialize)]
@@ -291,26 +291,18 @@ pub fn tables(summary: &ImportSummary) -> Vec<ReportTable> {
 pub fn markdown(summary: &ImportSummary) -> String {
     let mut page = format!(
         "# Link {}\n\n{}: {}, {}, {} rows; {}\n",
-        summary.link,
-        summary.sources.join(", "),
+        written::markdown(&summary.link),
+        written::markdown(&summary.sources.join(", ")),
         summary.format,
-        summary.units,
+        written::markdown(&summary.units),
         summary.rows,
-        summary.method
+        written::markdown(&summary.method)
     );
     for table in tables(summary) {
-        let _ = writeln!(page, "\n## {}\n\n| {} |", table.title, table.header.join(" | "));
-        let _ = writeln!(page, "| {} |", vec!["---"; table.header.len()].join(" | "));
-        for row in &table.rows {
-            let _ = writeln!(page, "| {} |", row.join(" | "));
-        }
+        let _ = writeln!(page, "\n## {}\n", table.title);
+        page += &table.markdown();
     }
-    if !summary.warnings.is_empty() {
-        page += "\n## Warnings\n\n";
-        for warning in &summary.warnings {
-            let _ = writeln!(page, "- {warning}");
-        }
-    }
+    page += &warning_list(&summary.warnings);
     page
 }
 

@@ -51,6 +51,7 @@ pub use flexarm_fem::reduction::Tie;
 pub use flexarm_fem::{NodeSelector, UnitSystem as Units};
 pub use job::{FrameEntry, InterfaceEntry, ReduceJob, UrdfEntry};
 pub use listing::{MeshListing, RegionListing, SetListing};
+pub(crate) use report::warning_list;
 pub use report::{ReportTable, headline, markdown, modal_table, tables};
 pub use summary::{
     ChainFigures, CheckFigures, InterfaceFigures, MaterialFigures, ModalFigures, ModeFigures, PartFigures,

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use flexarm_fem::MeshGate;
 use flexarm_fem::order_check::OrderCheck;
+use flexarm_settings::{gathered, written};
 
 use super::summary::{ModalFigures, ModeFigures, ReduceSummary};
 
@@ -24,6 +25,13 @@ impl ReportTable {
     pub(crate) fn new(title: &'static str, header: &[&str], rows: Vec<Vec<String>>) -> Self {
         let header = header.iter().map(|name| (*name).to_owned()).collect();
         Self { title, header, rows, page_only: false }
+    }
+
+    /// The table in Markdown.
+    pub(crate) fn markdown(&self) -> String {
+        let rule = vec!["---"; self.header.len()];
+        let rows: String = self.rows.iter().map(|cells| written::markdown_row(cells)).collect();
+        written::markdown_row(&self.header) + &written::markdown_row(&rule) + &rows
     }
 
     pub(crate) fn on_page(self) -> Self {
@@ -66,28 +74,27 @@ pub fn modal_table(modal: &ModalFigures) -> ReportTable {
 
 /// The figures as a page of Markdown.
 pub fn markdown(summary: &ReduceSummary) -> String {
-    let mut page = format!("# Link {}\n\n{}\n", summary.link, headline(summary));
+    let headline: Vec<String> = headline(summary).lines().map(written::markdown).collect();
+    let mut page = format!("# Link {}\n\n{}\n", written::markdown(&summary.link), headline.join("\n"));
     for table in tables(summary) {
         let _ = writeln!(page, "\n## {}\n", sentence(table.title));
-        let mut row = |cells: &[String]| {
-            let cells: Vec<String> = cells.iter().map(|cell| cell.replace('|', "\\|")).collect();
-            let _ = writeln!(page, "| {} |", cells.join(" | "));
-        };
-        row(&table.header);
-        row(&vec!["---".to_owned(); table.header.len()]);
-        table.rows.iter().for_each(|cells| row(cells));
+        page += &table.markdown();
     }
     for path in &summary.files.pictures {
         let name = std::path::Path::new(path).file_name().unwrap_or_default().to_string_lossy();
         let _ = writeln!(page, "\n![{name}]({name})");
     }
-    if !summary.warnings.is_empty() {
-        page += "\n## Warnings\n\n";
-        for warning in &summary.warnings {
-            let _ = writeln!(page, "- {warning}");
-        }
+    page + &warning_list(&summary.warnings)
+}
+
+/// Warnings as a section of Markdown; empty if there are none.
+pub(crate) fn warning_list(warnings: &[String]) -> String {
+    if warnings.is_empty() {
+        return String::new();
     }
-    page
+    let items = gathered(warnings).into_iter().map(|warning| format!("- {}\n", written::markdown(&warning)));
+    let items: String = items.collect();
+    format!("\n## Warnings\n\n{items}")
 }
 
 /// What was reduced, in two lines.

@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use super::frames::is_magnified;
 use crate::RunHeader;
 use flexarm_draw::palette::{self, Ground, Rgb, hex};
+use flexarm_settings::written::markup;
 
 /// A plot: its title, and its curves.
 struct Plot {
@@ -149,13 +150,13 @@ pub fn plotjuggler_layout(header: &RunHeader) -> String {
     for pair in plots.chunks(2) {
         let area = |plot: &Plot| {
             let curves = plot.curves.iter().map(|curve| {
-                let name = escaped(&format!("{}{}", curve.topic, curve.plotjuggler));
+                let name = markup(&format!("{}{}", curve.topic, curve.plotjuggler));
                 format!("       <curve name=\"{name}\" color=\"{}\"/>\n", hex(curve.color))
             });
             format!(
                 "     <DockArea name=\"{}\">\n      <plot mode=\"TimeSeries\" style=\"Lines\" flip_x=\"false\" flip_y=\"false\">\n\
                  {}      </plot>\n     </DockArea>\n",
-                escaped(plot.title),
+                markup(plot.title),
                 curves.collect::<String>()
             )
         };
@@ -164,7 +165,7 @@ pub fn plotjuggler_layout(header: &RunHeader) -> String {
         tabs += &format!(
             "  <Tab tab_name=\"{}\" containers=\"1\">\n   <Container>\n    <DockSplitter orientation=\"-\" sizes=\"{sizes}\" \
              count=\"{count}\">\n{areas}    </DockSplitter>\n   </Container>\n  </Tab>\n",
-            escaped(pair[0].title)
+            markup(pair[0].title)
         );
     }
     format!(
@@ -172,8 +173,4 @@ pub fn plotjuggler_layout(header: &RunHeader) -> String {
          <currentTabIndex index=\"0\"/>\n </tabbed_widget>\n <use_relative_time_offset enabled=\"1\"/>\n \
          <Plugins/>\n <customMathEquations/>\n <snippets/>\n</root>\n"
     )
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

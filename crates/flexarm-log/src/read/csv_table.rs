@@ -4,6 +4,8 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
+use flexarm_settings::written::csv_text;
+
 use super::{broken_end, not_a_recording, stem};
 use crate::table::{self, TableLayout};
 use crate::{LogError, RunHeader, RunResult, RunSource, Sample};
@@ -19,7 +21,7 @@ impl CsvRun {
     pub(crate) fn open(path: &Path) -> Result<Self, LogError> {
         let mut reader = rows(path)?;
         let names = reader.headers().map_err(|error| broken(path, &error))?;
-        let names: Vec<String> = names.iter().map(|name| name.trim().to_owned()).collect();
+        let names: Vec<String> = names.iter().map(|name| csv_text(name.trim()).to_owned()).collect();
         let mut layout = TableLayout::of_names(&names).map_err(|(f, e)| not_a_recording(path, f, e))?;
 
         layout.header.robot = stem(path);

@@ -2226,6 +2226,8 @@ class NewLink(TypedDict):
     """Direction of the section's y in link axes."""
     offset: list[float] | None
     """From the line between the joints to the beam, link axes."""
+    ends: list[list[float]] | None
+    """Where the beam itself begins and ends, link axes; null from the link's frame to the distal joint."""
     taper: float | None
     """Largest over smallest outer width along the beam."""
     open_cuts: float | None

@@ -1,5 +1,7 @@
 //! Lines, separators and numbers of tables: what is between the fields, and whether decimals are behind points or commas.
 
+use flexarm_settings::written::csv_fields;
+
 /// What separates the fields of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Separator {
@@ -35,39 +37,7 @@ impl Separator {
     /// The fields of a line, without the quotes around them; a quote within quotes is doubled.
     pub(super) fn split(self, line: &str) -> Vec<String> {
         let line = if self == Self::Spaces { line.trim() } else { line };
-        let (mut fields, mut field) = (Vec::new(), String::new());
-        let (mut quoted, mut was_quoted, mut gap) = (false, false, false);
-        let mut letters = line.chars().peekable();
-        let close = |field: &mut String, was_quoted: &mut bool| {
-            let text = if *was_quoted { field.clone() } else { field.trim().to_owned() };
-            field.clear();
-            *was_quoted = false;
-            text
-        };
-        while let Some(letter) = letters.next() {
-            if quoted {
-                match letter {
-                    '"' if letters.next_if_eq(&'"').is_some() => field.push('"'),
-                    '"' => quoted = false,
-                    other => field.push(other),
-                }
-                continue;
-            }
-            if self.is(letter) {
-                if !(self == Self::Spaces && gap) {
-                    fields.push(close(&mut field, &mut was_quoted));
-                }
-                gap = true;
-                continue;
-            }
-            gap = false;
-            match letter {
-                '"' if field.trim().is_empty() => (field, quoted, was_quoted) = (String::new(), true, true),
-                other => field.push(other),
-            }
-        }
-        fields.push(close(&mut field, &mut was_quoted));
-        fields
+        csv_fields(line, |letter| self.is(letter), self == Self::Spaces)
     }
 }
 

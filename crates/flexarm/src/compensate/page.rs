@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use flexarm_draw::{CurveLook, LinePlot, Panel, PlotCurve};
 
 use super::{Compensation, ErrorFigures};
-use crate::html_page::{escaped, opening};
+use crate::html_page::opening;
+use flexarm_settings::written::markup;
 
 /// The page.
 pub(super) fn html(answer: &Compensation) -> String {
@@ -20,13 +21,13 @@ pub(super) fn html(answer: &Compensation) -> String {
         answer.cutoff_hz.map(|hz| format!(", corrected up to {hz:.1} Hz")).unwrap_or_default()
     );
     for caveat in &answer.caveats {
-        let _ = writeln!(page, "<p class=\"no\">{}</p>", escaped(&caveat.message));
+        let _ = writeln!(page, "<p class=\"no\">{}</p>", markup(&caveat.message));
     }
     page += &curves(answer);
     page += "<h2>On other plants</h2>\n<table><tr><th>plant</th><th>peak before (mm)</th><th>after</th><th>RMS before</th><th>after</th><th>RMS taken away</th></tr>\n";
     page += &row("as given", &answer.before, &answer.after);
     for plant in &answer.plants {
-        page += &row(&escaped(&plant.plant), &plant.before, &plant.after);
+        page += &row(&markup(&plant.plant), &plant.before, &plant.after);
     }
     page += "</table>\n";
     if answer.plants.iter().any(|plant| plant.after.rms_m > plant.before.rms_m) {
@@ -38,7 +39,7 @@ pub(super) fn html(answer: &Compensation) -> String {
         let _ = writeln!(
             page,
             "<tr><td>{}</td><td>{:.3e}</td><td>{:.4}</td></tr>",
-            escaped(&change.joint),
+            markup(&change.joint),
             change.largest,
             change.largest.to_degrees()
         );
@@ -87,7 +88,7 @@ fn limits(answer: &Compensation) -> String {
         let _ = writeln!(
             text,
             "<tr><td>{}</td><td>{}</td><td>{:.4}</td><td>{:.4}</td><td>{:.3}</td></tr>",
-            escaped(&limit.joint),
+            markup(&limit.joint),
             limit.kind,
             limit.value,
             limit.limit,

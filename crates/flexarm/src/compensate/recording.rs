@@ -15,6 +15,7 @@ use crate::magnification::Expected;
 use crate::options::RunOptions;
 use crate::run::{Together, run_traced};
 use crate::scenario::Scenario;
+use flexarm_settings::written::markdown;
 
 /// Samples of the recording per second.
 const RECORDED_HZ: f64 = 200.0;
@@ -51,8 +52,8 @@ pub(super) fn record(
         "# {} on {}\n\nDistance of the tool from where the rigid arm has it on the motion that was asked for.\n\n\
          | | peak | RMS | at the end |\n| --- | --- | --- | --- |\n\
          | before | {:.4} mm | {:.4} mm | {:.4} mm |\n| after | {:.4} mm | {:.4} mm | {:.4} mm |\n",
-        answer.motion,
-        answer.robot,
+        markdown(&answer.motion),
+        markdown(&answer.robot),
         mm(answer.before.peak_m),
         mm(answer.before.rms_m),
         mm(answer.before.end_m),

@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use flexarm_draw::{CurveLook, LinePlot, Panel, PlotCurve};
 
 use super::{Compared, Identification};
-use crate::html_page::{escaped, opening};
+use crate::html_page::opening;
+use flexarm_settings::written::markup;
 
 /// The page.
 pub(super) fn html(answer: &Identification) -> String {
@@ -16,11 +17,11 @@ pub(super) fn html(answer: &Identification) -> String {
         "<p>{} readings with {} numbers from {}.</p>",
         answer.readings,
         answer.numbers,
-        escaped(&answer.measurements)
+        markup(&answer.measurements)
     );
     page += &headline(answer);
     for caveat in &answer.caveats {
-        let _ = writeln!(page, "<p class=\"no\">{}</p>", escaped(&caveat.message));
+        let _ = writeln!(page, "<p class=\"no\">{}</p>", markup(&caveat.message));
     }
     page += &parameters(answer);
     page += &suspicious(answer);
@@ -74,17 +75,17 @@ fn parameters(answer: &Identification) -> String {
         let _ = writeln!(
             out,
             "<tr{class}><td>{}</td><td>{}</td><td>{value}</td><td>{}</td><td>{} to {}</td><td>{}</td></tr>",
-            escaped(&p.name),
+            markup(&p.name),
             number(p.initial),
             number(p.std),
             number(p.interval[0]),
             number(p.interval[1]),
-            escaped(&p.unit)
+            markup(&p.unit)
         );
     }
     out += "</table>\n";
     for combination in &answer.untold {
-        let parts: Vec<String> = combination.iter().map(|w| format!("{:+.2} {}", w.weight, escaped(&w.name))).collect();
+        let parts: Vec<String> = combination.iter().map(|w| format!("{:+.2} {}", w.weight, markup(&w.name))).collect();
         let _ = writeln!(out, "<p class=\"note\">Not told by the readings: {}</p>", parts.join(" "));
     }
     out
@@ -101,7 +102,7 @@ fn suspicious(answer: &Identification) -> String {
         let _ = writeln!(
             out,
             "<tr><td>{}</td><td>{}</td><td>{}</td><td>{:.1}</td></tr>",
-            escaped(&s.reading),
+            markup(&s.reading),
             number(s.measured),
             number(s.expected),
             s.normalised
@@ -142,7 +143,7 @@ fn correlation(answer: &Identification) -> String {
     }
     out += "</tr>\n";
     for (k, (p, row)) in answer.parameters.iter().zip(&answer.correlation).enumerate() {
-        let _ = write!(out, "<tr><td>{} {}</td>", k + 1, escaped(&p.name));
+        let _ = write!(out, "<tr><td>{} {}</td>", k + 1, markup(&p.name));
         for c in row {
             let color = if *c >= 0.0 { "47, 111, 179" } else { "194, 89, 34" };
             let _ = write!(out, "<td style=\"background: rgba({color}, {:.2})\">{c:.2}</td>", 0.75 * c.abs());

@@ -7,6 +7,7 @@ use flexarm_identify::{
     Candidate, Component, LoadCase, Parameter, Plan, PlanOptions, Plant, Reading, ReadingKind, Row, plan,
 };
 use flexarm_kinematics::Wrench;
+use flexarm_settings::written::csv_field;
 use nalgebra::Vector3;
 use serde::Serialize;
 
@@ -388,7 +389,8 @@ fn to_fill_in(answer: &MeasurementPlan, request: &PlanRequest, slides: &[bool]) 
     let lever = if levers { ",ax,ay,az" } else { "" };
     let point = if points { ",px,py,pz" } else { "" };
     let read = if gauges { ",ux,uy,uz,d" } else { ",dx,dy,dz" };
-    let mut out = format!("{},fx,fy,fz{lever}{point}{read}\n", answer.joints.join(","));
+    let joints: Vec<String> = answer.joints.iter().map(|joint| csv_field(joint)).collect();
+    let mut out = format!("{},fx,fy,fz{lever}{point}{read}\n", joints.join(","));
     for pose in &answer.poses {
         let of = |(q, slides): (&f64, &bool)| format!("{:.4}", if *slides { 1e3 * q } else { q.to_degrees() });
         let joints: Vec<String> = pose.joints.iter().zip(slides).map(of).collect();

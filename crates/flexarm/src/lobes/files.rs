@@ -9,7 +9,8 @@ use flexarm_files::write_all;
 use super::tool_file::CuttingTool;
 use super::{CutRun, LobePoint, Lobes, LobesFiles};
 use crate::error::Error;
-use crate::html_page::{escaped, opening};
+use crate::html_page::opening;
+use flexarm_settings::written::markup;
 
 /// Files in the output folder.
 pub(super) const NAMES: [&str; 4] = ["lobes.csv", "lobes.svg", "lobes.html", "lobes.json"];
@@ -170,7 +171,7 @@ fn html(answer: &Lobes, picture: Option<&str>) -> String {
         ),
     };
     for caveat in &answer.caveats {
-        let _ = writeln!(page, "<p class=\"no\">{}</p>", escaped(&caveat.message));
+        let _ = writeln!(page, "<p class=\"no\">{}</p>", markup(&caveat.message));
     }
     page += picture.unwrap_or_default();
     page += "<h2>Poses</h2>\n<table><tr><th>time (s)</th><th>lowest limit (mm)</th><th>at (1/min)</th>\

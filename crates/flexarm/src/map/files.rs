@@ -95,8 +95,10 @@ fn write_table(map: &Map, path: &Path, overwrite: bool) -> Result<(), Error> {
 fn write_table(map: &Map, path: &Path, _: bool) -> Result<(), Error> {
     use std::fmt::Write as _;
 
+    use flexarm_settings::written::csv_field;
+
     let MapTable { columns, .. } = &map.table;
-    let mut text = columns.iter().map(|column| column.name.as_str()).collect::<Vec<_>>().join(",") + "\n";
+    let mut text = columns.iter().map(|column| csv_field(&column.name)).collect::<Vec<_>>().join(",") + "\n";
     for k in 0..map.table.rows() {
         for (i, value) in map.table.row(k).iter().enumerate() {
             let _ = write!(text, "{}{value}", if i == 0 { "" } else { "," });

@@ -7,7 +7,8 @@ use flexarm_draw::FieldPlot;
 use super::recording::{readable, scale, shown};
 use super::region::Grid;
 use super::{Map, MapPose};
-use crate::html_page::{escaped, opening};
+use crate::html_page::opening;
+use flexarm_settings::written::markup;
 
 /// Bars of a histogram.
 const BARS: usize = 40;
@@ -15,9 +16,9 @@ const BARS: usize = 40;
 /// The page.
 pub(super) fn html(map: &Map, grid: Option<&Grid>) -> String {
     let mut page = opening(&format!("Map of {}", map.robot), "body { max-width: 78rem }\n");
-    let _ = writeln!(page, "<p>{}</p>", escaped(&in_short(map)));
+    let _ = writeln!(page, "<p>{}</p>", markup(&in_short(map)));
     for caveat in &map.caveats {
-        let _ = writeln!(page, "<p class=\"no\">{}</p>", escaped(&caveat.message));
+        let _ = writeln!(page, "<p class=\"no\">{}</p>", markup(&caveat.message));
     }
     if let Some(placement) = &map.placement {
         let (factor, unit) = readable(&map.by);
@@ -28,7 +29,7 @@ pub(super) fn html(map: &Map, grid: Option<&Grid>) -> String {
             "<h2>Where to put the workpiece</h2>\n<p>Centre at <b>{centre} m</b> (from {low} to {high} m, {} places): there {} is nowhere \
              worse than <b>{:.4} {unit}</b>. It is outlined in the slices.</p>",
             placement.points,
-            escaped(&map.by),
+            markup(&map.by),
             factor * placement.worst
         );
     }
@@ -50,7 +51,7 @@ pub(super) fn html(map: &Map, grid: Option<&Grid>) -> String {
     for (what, file) in [("Every pose", &map.files.table), ("Recording", &map.files.rrd)] {
         if let Some(file) = file {
             let name = file.rsplit(['/', '\\']).next().unwrap_or(file);
-            let _ = write!(page, " {what}: {}.", escaped(name));
+            let _ = write!(page, " {what}: {}.", markup(name));
         }
     }
     page + "</p>\n</body></html>\n"
@@ -85,12 +86,8 @@ fn quantities(map: &Map) -> String {
         let (factor, unit) = readable(&column.name);
         let at = |part: &str| spread.quantiles.get(part).copied().unwrap_or(f64::NAN);
         let values = [spread.min, at("0.05"), at("0.5"), at("0.95"), spread.max];
-        let _ = write!(
-            table,
-            "<tr><td title=\"{}\">{}</td><td>{unit}</td>",
-            escaped(&column.meaning),
-            escaped(&column.name)
-        );
+        let _ =
+            write!(table, "<tr><td title=\"{}\">{}</td><td>{unit}</td>", markup(&column.meaning), markup(&column.name));
         for value in values {
             let _ = write!(table, "<td>{:.4}</td>", factor * value);
         }
@@ -106,12 +103,12 @@ fn poses(map: &Map) -> String {
     };
     row("place (m)", &|pose| pose.place_m.map(|x| format!("{x:.3}")).join(", "));
     for (k, joint) in map.joints.iter().enumerate() {
-        row(&escaped(joint), &|pose| format!("{:.4}", pose.q[k]));
+        row(&markup(joint), &|pose| format!("{:.4}", pose.q[k]));
     }
     for column in map.table.columns.iter().filter(|column| column.quantity) {
         let (factor, unit) = readable(&column.name);
         let name =
-            format!("{} {}", escaped(&column.name), if unit.is_empty() { String::new() } else { format!("({unit})") });
+            format!("{} {}", markup(&column.name), if unit.is_empty() { String::new() } else { format!("({unit})") });
         row(&name, &|pose| format!("{:.4}", factor * pose.quantities.get(&column.name).copied().unwrap_or(f64::NAN)));
     }
     table + "</table>\n"
@@ -123,7 +120,7 @@ fn slices(map: &Map, grid: &Grid, column: usize) -> String {
     let (factor, unit) = readable(&map.table.columns[column].name);
     let [low, high] = scale(&values).map(|x| factor * x);
     let centre = grid.index(map.best_place());
-    let mut row = format!("<h3>{}</h3>\n<div class=\"row\">\n", escaped(&map.table.columns[column].name));
+    let mut row = format!("<h3>{}</h3>\n<div class=\"row\">\n", markup(&map.table.columns[column].name));
     for (across, along, up) in [(1, 0, 2), (0, 1, 2), (2, 0, 1)] {
         let at = grid.place(map.best_place())[across];
         let axis = ["x", "y", "z"];
@@ -186,7 +183,7 @@ fn histogram(map: &Map, column: usize) -> String {
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 400 170\" width=\"400\" font-family=\"system-ui, sans-serif\" \
          font-size=\"11\" fill=\"#1c2530\">\n<text x=\"20\" y=\"15\" font-weight=\"600\">{} ({unit})</text>\n",
-        escaped(name)
+        markup(name)
     );
     for (k, n) in bars.iter().enumerate() {
         let h = SIZE[1] * *n as f64 / most;

@@ -15,6 +15,7 @@ use crate::arm::Arm;
 use crate::error::Error;
 use crate::record::{link_frames, robot_header};
 use crate::robot::Robot;
+use flexarm_settings::written::markdown;
 
 /// Most points of a view; of larger maps every so many-th.
 const MOST_POINTS: usize = 300_000;
@@ -128,7 +129,7 @@ pub(super) fn shown(map: &Map) -> Vec<usize> {
 }
 
 fn text(map: &Map) -> String {
-    let mut text = format!("# {}: {} of {} places are reached\n\n", map.robot, map.reachable, map.points);
+    let mut text = format!("# {}: {} of {} places are reached\n\n", markdown(&map.robot), map.reachable, map.points);
     text += "Dark is little, light is much. The colours go from the lowest to the 98th percent of the values.\n\n";
     text += "| view | least | median | most |\n| --- | --- | --- | --- |\n";
     for k in shown(map) {
@@ -137,6 +138,7 @@ fn text(map: &Map) -> String {
         let (factor, unit) = readable(name);
         let median = spread.quantiles.get("0.5").copied().unwrap_or(f64::NAN);
         let [low, middle, high] = [spread.min, median, spread.max].map(|x| factor * x);
+        let name = markdown(name);
         text += &format!("| {name} | {low:.4} {unit} | {middle:.4} {unit} | {high:.4} {unit} |\n");
     }
     if let Some(placement) = &map.placement {

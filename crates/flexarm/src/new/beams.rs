@@ -7,6 +7,8 @@ use flexarm_urdf::{CrossSection, TriangleMesh, cross_section};
 use nalgebra::{Matrix2, Matrix3, Rotation2, Rotation3, Translation3, Vector2, Vector3};
 use serde::Serialize;
 
+use super::ends;
+
 /// Cuts along the whole mesh.
 const CUTS: usize = 48;
 /// Places along the beam at which bending is looked at.
@@ -48,6 +50,8 @@ pub(crate) struct BeamSection {
     pub(crate) y_axis: [f64; 3],
     /// From the line between the joints to the centroid, in link axes (m).
     pub(crate) offset: [f64; 3],
+    /// Where the beam itself begins and ends, link axes (m); none from the link's frame to the next joint.
+    pub(crate) ends: Option<[[f64; 3]; 2]>,
     /// Largest over smallest outer width along the beam.
     pub(crate) taper: f64,
     /// Part of the cuts whose outline was not closed.
@@ -56,6 +60,8 @@ pub(crate) struct BeamSection {
 
 /// What is known of a link that may be a beam.
 pub(crate) struct Candidate<'a> {
+    /// The joint that carries it.
+    pub(crate) proximal: Option<&'a Joint>,
     /// The joint at its far end.
     pub(crate) distal: &'a Joint,
     pub(crate) inertia: Option<LinkInertia>,
@@ -65,18 +71,49 @@ pub(crate) struct Candidate<'a> {
     pub(crate) arm: f64,
 }
 
-/// A section for the link, or in words why there is none.
+/// A section for the link, or in words why there is none. Where its shape does not lie between its frames, that of the body
+/// that shape and joint axes tell.
 pub(crate) fn propose(link: &Candidate<'_>) -> Result<BeamSection, String> {
-    let axis = link.distal.X_PJ.translation.vector;
+    let reason = match between(link, [Vector3::zeros(), link.distal.X_PJ.translation.vector]) {
+        Ok(section) => return Ok(section),
+        Err(NoBeam::Else(reason)) => return Err(reason),
+        Err(NoBeam::NotThere(reason)) => reason,
+    };
+    let Some(ends) = ends::of(link) else { return Err(reason) };
+    let mut section = between(link, ends).map_err(|_| reason)?;
+    section.ends = Some(ends.map(|end| (end + Vector3::from(section.offset)).into()));
+    section.offset = [0.0; 3];
+    Ok(section)
+}
+
+/// Why there is no beam between two points.
+enum NoBeam {
+    /// There is hardly any way or no shape between them.
+    NotThere(String),
+    /// Another reason.
+    Else(String),
+}
+
+impl From<String> for NoBeam {
+    fn from(reason: String) -> Self {
+        Self::Else(reason)
+    }
+}
+
+/// A section for the part of the link between two points, link axes.
+fn between(link: &Candidate<'_>, [from, to]: [Vector3<f64>; 2]) -> Result<BeamSection, NoBeam> {
+    let axis = to - from;
     let length = axis.norm();
     if length < SHARE * link.arm || length < 1e-3 {
-        return Err(format!("short: {:.0} mm of the arm's {:.0} mm", 1e3 * length, 1e3 * link.arm));
+        return Err(NoBeam::NotThere(format!("short: {:.0} mm of the arm's {:.0} mm", 1e3 * length, 1e3 * link.arm)));
     }
-    let Some(inertia) = link.inertia.filter(|i| i.mass > 0.0) else { return Err("its mass is not known".into()) };
+    let Some(inertia) = link.inertia.filter(|i| i.mass > 0.0) else {
+        return Err(NoBeam::Else("its mass is not known".into()));
+    };
     if link.meshes.is_empty() {
-        return Err("it has no shape that can be read".into());
+        return Err(NoBeam::Else("it has no shape that can be read".into()));
     }
-    let cuts = Cuts::of(link.meshes, &axis)?;
+    let cuts = Cuts::of(link.meshes, &from, &axis)?;
     let along = cuts.along(length);
     let aside = cuts.centroid(length).norm();
     if along < ALONG || aside > BESIDE * length {
@@ -85,29 +122,30 @@ pub(crate) fn propose(link: &Candidate<'_>) -> Result<BeamSection, String> {
         } else {
             format!("lies {:.0} mm beside it", 1e3 * aside)
         };
-        return Err(format!(
+        return Err(NoBeam::NotThere(format!(
             "from its frame to joint {:?} its shape {where_is_it}: the frames of the file do not run along the link",
             link.distal.name
-        ));
+        )));
     }
     let shape = if cuts.is_round(length) { Shape::Tube } else { Shape::Box };
     let turn = if shape == Shape::Box { cuts.principal_turn(length) } else { 0.0 };
     let outlines = cuts.outlines(turn, shape);
     let thick = weighted(&outlines, length, |o| o.width.max(o.height));
     if length < SLENDER * thick {
-        return Err(format!("stout: {:.0} mm long, {:.0} mm thick", 1e3 * length, 1e3 * thick));
+        return Err(format!("stout: {:.0} mm long, {:.0} mm thick", 1e3 * length, 1e3 * thick).into());
     }
     let (material, wall) = wall(&outlines, shape, inertia.mass)?;
     let mut section = equivalent(&outlines, shape, length, wall);
     section.material = material;
     if section.taper > TAPER {
-        return Err(format!("its width varies by a factor of {:.1} between the joints: no beam", section.taper));
+        let taper = section.taper;
+        return Err(format!("its width varies by a factor of {taper:.1} between the joints: no beam").into());
     }
     let density = MATERIALS.iter().find(|m| m.0 == material).map_or(2700.0, |m| m.1);
     let whole = shell(&outlines, shape, wall);
     let own = shell_between(&outlines, shape, length, wall);
     if own < OWN * whole {
-        return Err(format!("only {:.0} % of its mass lies between the joints", 100.0 * own / whole));
+        return Err(format!("only {:.0} % of its mass lies between the joints", 100.0 * own / whole).into());
     }
     section.wall_of_half = section.wall.and_then(|_| wall_for(&outlines, shape, 0.5 * inertia.mass / density));
     let R_LS = cuts.X_LS.rotation * Rotation3::from_axis_angle(&Vector3::x_axis(), turn);
@@ -122,7 +160,7 @@ pub(crate) fn propose(link: &Candidate<'_>) -> Result<BeamSection, String> {
 
 /// The outlines of a link across the line to its distal joint.
 struct Cuts {
-    /// Section frame at the link's origin.
+    /// Section frame at the beginning of the beam.
     X_LS: Pose,
     /// Where along x (m), and what is there; at equal distances over the whole mesh.
     sections: Vec<(f64, Option<CrossSection>)>,
@@ -146,13 +184,13 @@ struct Outline {
 }
 
 impl Cuts {
-    fn of(meshes: &[TriangleMesh], axis: &Vector3<f64>) -> Result<Self, String> {
+    fn of(meshes: &[TriangleMesh], from: &Vector3<f64>, axis: &Vector3<f64>) -> Result<Self, String> {
         let x = axis.normalize();
         let across = Vector3::ith(axis.abs().imin(), 1.0);
         let y = (across - x * x.dot(&across)).normalize();
         let R_LS = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, y, x.cross(&y)]));
-        let X_LS = Pose::from_parts(Translation3::identity(), R_LS);
-        let along = |p: &[f32; 3]| Vector3::from(p.map(f64::from)).dot(&x);
+        let X_LS = Pose::from_parts(Translation3::from(*from), R_LS);
+        let along = |p: &[f32; 3]| (Vector3::from(p.map(f64::from)) - from).dot(&x);
         let places = || meshes.iter().flat_map(|m| &m.positions).map(along);
         let (low, high) = (places().fold(f64::INFINITY, f64::min), places().fold(f64::NEG_INFINITY, f64::max));
         if high - low < 1e-4 {
@@ -375,6 +413,7 @@ fn equivalent(outlines: &[Outline], shape: Shape, length: f64, wall: f64) -> Bea
         material: "aluminium",
         y_axis: [0.0, 1.0, 0.0],
         offset: [0.0; 3],
+        ends: None,
         taper,
         open: 0.0,
     }
@@ -391,6 +430,7 @@ mod tests {
         let distal = Joint::new("elbow", JointKind::Fixed, "arm", "next", X_LB);
         let inertia = LinkInertia { mass, com: Vector3::zeros(), inertia_com: Matrix3::identity() };
         propose(&Candidate {
+            proximal: None,
             distal: &distal,
             inertia: Some(inertia),
             meshes,

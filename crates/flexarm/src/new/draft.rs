@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use flexarm_kinematics::{Data, Joint, Mechanism, Model, forward_kinematics};
+use flexarm_kinematics::{Data, Joint, Link, Mechanism, Model, forward_kinematics};
 use flexarm_settings::Setting;
 use flexarm_urdf::{Geometry, ReadOptions, TriangleMesh, UrdfError, UrdfRobot, Visual, read_urdf};
 use nalgebra::{DVector, Vector3};
@@ -57,6 +57,8 @@ pub(crate) struct Draft {
     pub(crate) urdf: UrdfRobot,
     pub(crate) chain: Chain,
     pub(crate) waived: Vec<String>,
+    /// Links whose masses only held a place and were estimated instead.
+    pub(crate) discarded: Vec<String>,
     pub(crate) estimate: Option<flexarm_urdf::InertiaEstimate>,
     /// Masses were to be estimated, but no link lacks one.
     pub(crate) idle_estimate: bool,
@@ -79,7 +81,14 @@ impl Draft {
         if let Some(found) = options.payload_kg.filter(|kg| !(kg.is_finite() && *kg >= 0.0)) {
             return Err(NewError::Payload { found }.into());
         }
-        let (urdf, waived) = read(path, &options.urdf)?;
+        let (mut urdf, mut waived) = read(path, &options.urdf)?;
+        let placeholders = placeholders(&urdf.mechanism);
+        let mut discarded = Vec::new();
+        if options.urdf.inertia_from_mesh.is_some() && !placeholders.is_empty() {
+            discarded = placeholders;
+            let read_options = ReadOptions { discard: discarded.clone(), ..options.urdf.clone() };
+            (urdf, waived) = read(path, &read_options)?;
+        }
         let mechanism = &urdf.mechanism;
         let chain = chain::find(mechanism, options)?;
         let name = if mechanism.name.trim().is_empty() { "robot".to_owned() } else { mechanism.name.clone() };
@@ -121,6 +130,7 @@ impl Draft {
             name,
             chain,
             waived,
+            discarded,
             estimate: options.urdf.inertia_from_mesh.filter(|_| estimated),
             idle_estimate: options.urdf.inertia_from_mesh.is_some() && !estimated,
             moving_mass,
@@ -201,6 +211,22 @@ fn read(path: &Path, options: &ReadOptions) -> Result<(UrdfRobot, Vec<String>), 
     Ok((read_urdf(path, &again)?, waived))
 }
 
+/// Part of the links with a mass that must have the same one for it to be a placeholder.
+const ALIKE: f64 = 0.7;
+
+/// Links with one mass that most links have: it holds the place of others.
+fn placeholders(mechanism: &Mechanism) -> Vec<String> {
+    let with = |link: &Link| Some((link.name.clone(), link.inertia?.mass)).filter(|(_, mass)| *mass > 0.0);
+    let with: Vec<(String, f64)> = mechanism.links.iter().filter_map(with).collect();
+    let alike = |mass: f64| with.iter().filter(move |(_, other)| (other - mass).abs() < 1e-9 * mass);
+    let Some(most) = with.iter().map(|(_, mass)| *mass).max_by_key(|mass| alike(*mass).count()) else {
+        return Vec::new();
+    };
+    let names: Vec<String> = alike(most).map(|(name, _)| name.clone()).collect();
+    let many = names.len() > 3 && names.len() as f64 >= ALIKE * with.len() as f64;
+    if many { names } else { Vec::new() }
+}
+
 /// Mass of all links that the joints of the arm carry (kg).
 fn mass_after(mechanism: &Mechanism, chain: &Chain) -> f64 {
     let above: HashMap<&str, usize> = mechanism.joints.iter().enumerate().map(|(k, j)| (j.child.as_str(), k)).collect();
@@ -262,12 +288,20 @@ fn joints(model: &Model, mechanism: &Mechanism, chain: &Chain, workspace: &Works
         Some(DraftJoint { joint, speed, speed_assumed, effort_fault, weight, needed, rated: 0.0, gear: None })
     };
     let mut joints: Vec<DraftJoint> = chain.joints.iter().filter_map(of).collect();
-    // One number for all that is too weak for some was never meant.
+    // One number for all that is wrong for some was never meant.
     let same = |j: &DraftJoint| j.joint.limits.effort == joints[0].joint.limits.effort;
     let weak = |j: &DraftJoint| j.joint.limits.effort < j.weight;
-    if joints.len() > 2 && joints.iter().all(same) && joints.iter().any(weak) {
-        let fault = "is the same for all joints and below what the arm needs to hold itself";
-        joints.iter_mut().for_each(|j| j.effort_fault = Some(fault));
+    if joints.len() > 2 && joints.iter().all(same) {
+        let (weak, faulty) = (joints.iter().any(weak), joints.iter().any(|j| j.effort_fault.is_some()));
+        let too_little = "is the same for all joints and below what the arm needs to hold itself";
+        let too_much = "is the same for all joints and far above what some of them can need";
+        for joint in &mut joints {
+            joint.effort_fault = match joint.effort_fault {
+                _ if weak => Some(too_little),
+                None if faulty => Some(too_much),
+                own => own,
+            };
+        }
     }
     for joint in &mut joints {
         joint.rated = match joint.effort_fault {
@@ -305,17 +339,20 @@ fn links(urdf: &UrdfRobot, chain: &Chain) -> Vec<DraftLink> {
     let mut found = Vec::new();
     for &k in &chain.path[first.min(chain.path.len())..] {
         let distal = joint(k);
-        // Frames at one place are no links of an arm.
-        if distal.X_PJ.translation.vector.norm() < 1e-6 {
-            continue;
-        }
         let inertia = mechanism.link(&distal.parent).and_then(|l| l.inertia);
         let (meshes, of_collisions) = shapes(urdf, &distal.parent);
-        let section = beams::propose(&beams::Candidate { distal, inertia, meshes: &meshes, arm });
+        let proximal = mechanism.joints.iter().find(|j| j.child == distal.parent);
+        let section = beams::propose(&beams::Candidate { proximal, distal, inertia, meshes: &meshes, arm });
+        let ends = section.as_ref().ok().and_then(|section| section.ends);
+        let length = ends.map_or(distal.X_PJ.translation.vector, |[from, to]| Vector3::from(to) - Vector3::from(from));
+        // Frames at one place are no links of an arm.
+        if length.norm() < 1e-6 {
+            continue;
+        }
         found.push(DraftLink {
             link: distal.parent.clone(),
             distal: distal.name.clone(),
-            length: distal.X_PJ.translation.vector.norm(),
+            length: length.norm(),
             mass: inertia.map(|i| i.mass),
             section,
             uniform: false,
@@ -411,15 +448,19 @@ fn assumptions(draft: &Draft) -> Vec<Assumption> {
 /// Masses that look like no masses of this arm.
 fn masses(draft: &Draft, list: &mut Vec<Assumption>) {
     let own: f64 = draft.urdf.mechanism.links.iter().filter_map(|l| l.inertia).map(|i| i.mass).sum();
+    let which = match draft.discarded.is_empty() {
+        true => "links without <inertial>",
+        false => "links without <inertial> or with a mass that only held a place",
+    };
     match draft.estimate {
         Some(flexarm_urdf::InertiaEstimate::TotalMass(mass)) => {
             let text = format!(
-                "links without <inertial> have {mass} kg together, spread by the volume of their meshes; all links together {own:.1} kg"
+                "{which} have {mass} kg together, spread by the volumes of their meshes or by their lengths; all links together {own:.1} kg"
             );
             list.push(assumption("masses", text, "replace by those of the maker"));
         }
         Some(flexarm_urdf::InertiaEstimate::Density(density)) => {
-            let text = format!("links without <inertial> are solid with {density} kg/m³");
+            let text = format!("{which} are solid with {density} kg/m³");
             list.push(assumption("masses", text, "replace by those of the maker"));
         }
         None => {}
@@ -434,15 +475,17 @@ fn masses(draft: &Draft, list: &mut Vec<Assumption>) {
             "take <inertial> out of the description if its masses are not to be trusted",
         ));
     }
-    let with: Vec<f64> =
-        draft.urdf.mechanism.links.iter().filter_map(|l| l.inertia).map(|i| i.mass).filter(|m| *m > 0.0).collect();
-    if with.len() > 3 && with.iter().all(|m| (m - with[0]).abs() < 1e-9 * with[0]) {
-        let text = format!(
-            "all {} links have {} kg: this looks like a number that holds the place of others",
-            with.len(),
-            with[0]
+    let alike = placeholders(&draft.urdf.mechanism);
+    let mass = alike.first().and_then(|name| draft.urdf.mechanism.link(name)?.inertia).map_or(0.0, |i| i.mass);
+    if !alike.is_empty() && draft.discarded.is_empty() {
+        let text =
+            format!("{} links have {mass} kg each: this number only holds the place of their masses", alike.len());
+        let mend = format!(
+            "{} KG spreads the mass of the arm over these links, by the volumes of their meshes or by their lengths; best the \
+             masses of the maker",
+            Setting::InertiaFromTotalMass
         );
-        list.push(assumption("masses", text, "write the masses of the maker into the description"));
+        list.push(assumption("masses", text, &mend));
     }
     let missing = draft.urdf.warnings.iter().filter(|w| matches!(w.code, "missing-inertial" | "zero-mass"));
     for finding in missing {

@@ -142,6 +142,8 @@ impl Workspace {
 pub(crate) fn effort_fault(effort: f64, weight: f64, needed: f64, floor: f64) -> Option<&'static str> {
     if !effort.is_finite() {
         Some("has none")
+    } else if effort <= 0.0 {
+        Some("is zero")
     } else if effort < weight {
         Some("is below what the arm needs to hold itself")
     } else if effort > SENSELESS * needed.max(floor) {

@@ -16,6 +16,7 @@
 mod beams;
 mod chain;
 mod draft;
+mod ends;
 mod gears;
 mod loads;
 mod place;

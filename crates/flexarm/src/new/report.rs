@@ -103,7 +103,7 @@ pub struct NewLink {
     pub name: String,
     /// Joint at its far end.
     pub distal: String,
-    /// From its frame to that joint.
+    /// From its frame to that joint, or of its body where the frames do not run along it.
     pub length: f64,
     /// Mass (kg).
     pub mass: Option<f64>,
@@ -123,6 +123,8 @@ pub struct NewLink {
     pub y_axis: Option<[f64; 3]>,
     /// From the line between the joints to the beam, link axes.
     pub offset: Option<[f64; 3]>,
+    /// Where the beam itself begins and ends, link axes; null from the link's frame to the distal joint.
+    pub ends: Option<[[f64; 3]; 2]>,
     /// Largest over smallest outer width along the beam.
     pub taper: Option<f64>,
     /// Part of the cuts through the mesh whose outline was not closed: there its convex hull counts.
@@ -256,6 +258,7 @@ fn of_link(link: &super::draft::DraftLink) -> NewLink {
             material: Some(s.material),
             y_axis: Some(s.y_axis),
             offset: Some(s.offset),
+            ends: s.ends,
             taper: Some(s.taper),
             open_cuts: Some(s.open),
             assumed: true,

@@ -2,19 +2,19 @@
 
 use std::fmt::Write;
 
+use flexarm_settings::written::{markdown, markdown_code, one_line as inline};
+
 use super::beams::BeamSection;
 use super::draft::{Draft, DraftLink};
 use super::place::Placed;
+
+/// No joint of an arm has a higher effort limit (N m).
+const MOST_EFFORT: f64 = 1e6;
 
 /// A text as TOML writes it, also as a key.
 fn quoted(text: &str) -> String {
     // JSON escapes are TOML's, but for one character.
     serde_json::to_string(text).unwrap_or_default().replace('\u{7f}', "\\u007F")
-}
-
-/// A name within a comment: on one line.
-fn inline(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }
 
 /// A number with three digits that count, as the decimal nearest to them.
@@ -92,6 +92,12 @@ fn head(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Result {
         writeln!(t, "\n# Moments of inertia such as no body has, taken as they are: correct them in the description.")?;
         writeln!(t, "waive_inertia = [{}]", names.join(", "))?;
     }
+    efforts(t, draft)?;
+    if !draft.discarded.is_empty() {
+        let names: Vec<String> = draft.discarded.iter().map(|n| quoted(n)).collect();
+        writeln!(t, "\n# One mass for all links only holds the place of others: it does not count.")?;
+        writeln!(t, "discard_inertia = [{}]", names.join(", "))?;
+    }
     match draft.estimate {
         Some(flexarm_urdf::InertiaEstimate::TotalMass(mass)) => {
             writeln!(
@@ -151,6 +157,24 @@ fn head(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Result {
     Ok(())
 }
 
+/// Effort limits of the description that make no sense.
+fn efforts(t: &mut String, draft: &Draft) -> std::fmt::Result {
+    let of_arm = draft.joints.iter().filter(|j| j.effort_fault.is_some()).map(|j| &j.joint);
+    let is_senseless = |effort: f64| effort <= 0.0 || effort > MOST_EFFORT;
+    let held = draft.chain.held.iter().map(|&(k, _)| &draft.urdf.mechanism.joints[k]);
+    let held = held.filter(|joint| is_senseless(joint.limits.effort));
+    let named: Vec<String> = of_arm
+        .chain(held)
+        .filter(|joint| joint.limits.effort.is_finite())
+        .map(|joint| format!("{} = inf", quoted(&joint.name)))
+        .collect();
+    if named.is_empty() {
+        return Ok(());
+    }
+    writeln!(t, "\n# The effort limits of these joints make no sense in the description: none is known (N m).")?;
+    writeln!(t, "effort_limit = {{ {} }}", named.join(", "))
+}
+
 fn links(t: &mut String, draft: &Draft, beams: &[&DraftLink]) -> std::fmt::Result {
     writeln!(
         t,
@@ -166,6 +190,12 @@ fn links(t: &mut String, draft: &Draft, beams: &[&DraftLink]) -> std::fmt::Resul
             link.mass.unwrap_or(0.0),
             section_words(s)
         )?;
+        if s.ends.is_some() {
+            writeln!(
+                t,
+                "# The frames of the description do not run along it: ends are those of its shape between the joint axes."
+            )?;
+        }
         if link.of_collisions {
             writeln!(t, "# The outline is that of the shapes for collisions, which are often larger.")?;
         }
@@ -194,6 +224,10 @@ fn links(t: &mut String, draft: &Draft, beams: &[&DraftLink]) -> std::fmt::Resul
         writeln!(t, "damping = {{ modal = 0.03 }}   # ASSUMED: 3 % of critical, as joined structures have")?;
         let mut beam = format!("section = {:?}, {}, material = {:?}", s.section, beam_keys(s, s.wall), s.material);
         let _ = write!(beam, ", y_axis = {}", vector(&s.y_axis, 6));
+        if let Some(ends) = &s.ends {
+            let [from, to] = ends.map(|end| vector(&end, 5));
+            let _ = write!(beam, ", ends = [{from}, {to}]");
+        }
         if s.offset != [0.0; 3] {
             let _ = write!(beam, ", offset = {}", vector(&s.offset, 5));
         }
@@ -316,7 +350,7 @@ pub(crate) fn readme(draft: &Draft, placed: &Placed) -> String {
 
 fn write_readme(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Result {
     let joint = |k: &usize| &draft.urdf.mechanism.joints[*k];
-    writeln!(t, "# {}\n\nMade by `flexarm new`; {}.\n", inline(&draft.name), inline(&placed.words))?;
+    writeln!(t, "# {}\n\nMade by `flexarm new`; {}.\n", markdown(&draft.name), markdown(&placed.words))?;
     writeln!(
         t,
         "```sh\nflexarm compare .            # the arm beside its rigid twin on motion.toml\nflexarm check .              # what is wrong or doubtful"
@@ -324,18 +358,18 @@ fn write_readme(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Res
     writeln!(t, "flexarm motion motion.toml . # the motion against the limits\n```\n\n## Found\n")?;
     writeln!(
         t,
-        "* The arm begins at `{}` and ends at the tool `{}`, {:.2} m from its first joint at most in the poses that were looked at.",
-        inline(&draft.chain.base),
-        inline(&draft.chain.tool),
+        "* The arm begins at {} and ends at the tool {}, {:.2} m from its first joint at most in the poses that were looked at.",
+        markdown_code(&draft.chain.base),
+        markdown_code(&draft.chain.tool),
         draft.reach
     )?;
-    let names: Vec<String> = draft.joints.iter().map(|j| format!("`{}`", inline(&j.joint.name))).collect();
+    let names: Vec<String> = draft.joints.iter().map(|j| markdown_code(&j.joint.name)).collect();
     writeln!(t, "* Its joints: {}.", names.join(", "))?;
-    let links: Vec<String> = draft.chain.path.iter().map(|k| format!("`{}`", inline(&joint(k).child))).collect();
+    let links: Vec<String> = draft.chain.path.iter().map(|k| markdown_code(&joint(k).child)).collect();
     writeln!(t, "* Its links after the base: {}.", links.join(", "))?;
     writeln!(t, "* They weigh {:.2} kg together, without payload.", draft.moving_mass)?;
     for (joint, at, why) in &draft.held {
-        writeln!(t, "* `{}` is held at {at}: {why}.", inline(joint))?;
+        writeln!(t, "* {} is held at {at}: {why}.", markdown_code(joint))?;
     }
     writeln!(
         t,
@@ -349,7 +383,8 @@ fn write_readme(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Res
         let (k, range) = j.gear.as_ref().map_or(("none".into(), "".into()), |g| {
             (format!("{:.3e}", g.stiffness), format!("{:.1e} to {:.1e}", g.low, g.high))
         });
-        writeln!(t, "| `{}` | {effort} | {:.1} | {:.1} | {k} | {range} |", inline(&j.joint.name), j.weight, j.needed)?;
+        let name = markdown_code(&j.joint.name);
+        writeln!(t, "| {name} | {effort} | {:.1} | {:.1} | {k} | {range} |", j.weight, j.needed)?;
     }
     writeln!(
         t,
@@ -358,18 +393,18 @@ fn write_readme(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Res
     for link in &draft.links {
         let section = match &link.section {
             Ok(section) => section_words(section),
-            Err(reason) => format!("none: {}", inline(reason)),
+            Err(reason) => format!("none: {}", markdown(reason)),
         };
         let mass = link.mass.map_or("not known".into(), |m| format!("{m:.2}"));
-        writeln!(t, "| `{}` | {:.0} | {mass} | {section} |", inline(&link.link), 1e3 * link.length)?;
+        writeln!(t, "| {} | {:.0} | {mass} | {section} |", markdown_code(&link.link), 1e3 * link.length)?;
     }
     writeln!(t, "\n## Assumed\n")?;
     for a in &draft.assumptions {
-        writeln!(t, "* {}: {}. Better: {}.", inline(&a.about), inline(&a.text), inline(&a.mend))?;
+        writeln!(t, "* {}: {}. Better: {}.", markdown(&a.about), markdown(&a.text), markdown(&a.mend))?;
     }
     writeln!(t, "\n## What to ask of the maker, or to measure\n")?;
     for question in &draft.questions {
-        writeln!(t, "* {}.", inline(question))?;
+        writeln!(t, "* {}.", markdown(question))?;
     }
     Ok(())
 }

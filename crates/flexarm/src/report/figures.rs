@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use flexarm_draw::{CurveLook, Panel, PlotCurve, paper_plot};
 use flexarm_files::{file_stem, write_all};
 use flexarm_log::{EventKind, Trace};
+use flexarm_settings::written::csv_field;
 
 use super::curves::{Kind, Plot, PlotView, plots};
 use super::picture::printed;
@@ -77,10 +78,7 @@ fn svg(plot: &Plot, view: &PlotView, bands: &[(f64, f64)]) -> Result<String, fle
 /// The data of a plot: a column per curve, units in the names; sets of curves with axes of their own beside each other.
 fn csv(plot: &Plot, view: &PlotView) -> String {
     let plain = |unit: &str| unit.replace('°', "deg").replace(' ', "_");
-    let name = |text: &str, unit: &str| {
-        let name = format!("{}_{}", text.replace(' ', "_"), plain(unit));
-        if name.contains([',', '"', '\n']) { format!("\"{}\"", name.replace('"', "\"\"")) } else { name }
-    };
+    let name = |text: &str, unit: &str| csv_field(&format!("{}_{}", text.replace(' ', "_"), plain(unit)));
     let several = view.tables.len() > 1;
     let (mut heads, mut columns): (Vec<String>, Vec<&[f64]>) = (Vec::new(), Vec::new());
     for table in &view.tables {

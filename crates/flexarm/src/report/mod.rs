@@ -14,6 +14,8 @@ use std::fmt::Write as _;
 
 use flexarm_files::write_all;
 use flexarm_log::Trace;
+use flexarm_settings::gathered;
+use flexarm_settings::written::{markdown as markdown_text, markdown_row};
 
 use crate::error::Error;
 use crate::options::Outputs;
@@ -68,13 +70,13 @@ pub(crate) fn timeless_rows(summary: &Summary) -> Vec<(String, String)> {
 
 /// The summary as a page of Markdown.
 pub fn markdown(summary: &Summary) -> String {
-    let mut page = format!("# {} on {}\n\n", summary.robot, summary.trajectory);
+    let mut page = format!("# {} on {}\n\n", markdown_text(&summary.robot), markdown_text(&summary.trajectory));
     if !summary.headline.is_empty() {
-        let _ = writeln!(page, "{}\n", summary.headline);
+        let _ = writeln!(page, "{}\n", markdown_text(&summary.headline));
     }
     page += "| figure | value |\n| --- | --- |\n";
     for (name, value) in rows(summary) {
-        let _ = writeln!(page, "| {name} | {value} |");
+        page += &markdown_row(&[name, value]);
     }
     if !summary.with.is_empty() {
         page += "\n## Runs of the study\n\n";
@@ -82,8 +84,8 @@ pub fn markdown(summary: &Summary) -> String {
     }
     if !summary.warnings.is_empty() {
         page += "\n## Warnings\n\n";
-        for warning in &summary.warnings {
-            let _ = writeln!(page, "- {warning}");
+        for warning in gathered(&summary.warnings) {
+            let _ = writeln!(page, "- {}", markdown_text(&warning));
         }
     }
     page

@@ -10,7 +10,8 @@ use flexarm_study::main_effect;
 use super::Sweep;
 use super::file::Values;
 use super::results::{Columns, SweepSummary};
-use crate::html_page::{escaped, opening};
+use crate::html_page::opening;
+use flexarm_settings::written::markup;
 
 /// Results that have pictures of their own.
 const MOST_METRICS: usize = 4;
@@ -35,11 +36,11 @@ impl Sweep {
             summary.done,
             summary.runs,
             summary.failed,
-            escaped(&self.file.robot.text),
-            escaped(&self.parameters().join(", "))
+            markup(&self.file.robot.text),
+            markup(&self.parameters().join(", "))
         );
         for failure in &summary.failures {
-            let (runs, first, reason) = (failure.runs, failure.first, escaped(&failure.reason));
+            let (runs, first, reason) = (failure.runs, failure.first, markup(&failure.reason));
             let _ = writeln!(page, "<p class=\"no\">{runs} runs failed, first run {first}: {reason}</p>");
         }
         page += &search(summary);
@@ -145,8 +146,8 @@ impl Sweep {
         let mut out = format!(
             "<div>{}</div>\n<table><tr><th>run</th><th>{}</th><th>{}</th></tr>\n",
             plot.svg(),
-            escaped(&pareto.metrics[0]),
-            escaped(&pareto.metrics[1])
+            markup(&pareto.metrics[0]),
+            markup(&pareto.metrics[1])
         );
         let every = pareto.runs.len().div_ceil(12).max(1);
         for run in pareto.runs.iter().step_by(every) {
@@ -215,7 +216,7 @@ fn figures(summary: &SweepSummary) -> String {
         let _ = writeln!(
             out,
             "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
-            escaped(&metric.name),
+            markup(&metric.name),
             metric.count,
             cell(metric.min),
             quantile(0),
@@ -234,21 +235,21 @@ fn best(summary: &SweepSummary) -> String {
     let mut out = format!(
         "<h2>Best run</h2>\n<p>Run {} has the least {}: <b>{}</b>.</p>\n<table><tr><th>parameter</th><th>value</th></tr>\n",
         best.run,
-        escaped(&best.metric),
+        markup(&best.metric),
         number(best.value)
     );
     for (name, value) in &best.parameters {
-        let value = value.number().map_or_else(|| escaped(&value.to_string()), number);
-        let _ = writeln!(out, "<tr><td>{}</td><td>{value}</td></tr>", escaped(name));
+        let value = value.number().map_or_else(|| markup(&value.to_string()), number);
+        let _ = writeln!(out, "<tr><td>{}</td><td>{value}</td></tr>", markup(name));
     }
     out += "</table>\n<table><tr><th>metric</th><th>value</th></tr>\n";
     for (name, value) in &best.metrics {
         let _ =
-            writeln!(out, "<tr><td>{}</td><td>{}</td></tr>", escaped(name), value.map_or_else(|| "-".into(), number));
+            writeln!(out, "<tr><td>{}</td><td>{}</td></tr>", markup(name), value.map_or_else(|| "-".into(), number));
     }
     out += "</table>\n";
     if let Some(command) = &best.command {
-        let _ = writeln!(out, "<p>Again, with recordings and report:</p>\n<pre>{}</pre>", escaped(command));
+        let _ = writeln!(out, "<p>Again, with recordings and report:</p>\n<pre>{}</pre>", markup(command));
     }
     out
 }
@@ -262,7 +263,7 @@ fn search(summary: &SweepSummary) -> String {
     });
     let constraints = match found.constraints.is_empty() {
         true => String::new(),
-        false => format!(" under {}", escaped(&found.constraints.join(", "))),
+        false => format!(" under {}", markup(&found.constraints.join(", "))),
     };
     let end = match (found.kept, found.settled) {
         (false, _) => "no run kept what must hold",
@@ -271,7 +272,7 @@ fn search(summary: &SweepSummary) -> String {
     };
     let mut out = format!(
         "<h2>Least {}{constraints}</h2>\n<p>{} generations, {end}.{start}</p>\n",
-        escaped(&found.metric),
+        markup(&found.metric),
         found.generations
     );
     let known = found.progress.iter().enumerate().filter_map(|(k, value)| Some(((k + 1) as f64, (*value)?)));

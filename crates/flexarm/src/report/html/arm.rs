@@ -9,8 +9,8 @@ use flexarm_log::RunHeader;
 use super::ReportRun;
 use super::figures::lies_on_twin;
 use super::number::{number, short};
-use crate::html_page::escaped;
 use crate::report::picture::{pictures, scale_colors};
+use flexarm_settings::written::markup;
 
 /// Width of the pictures of the arm (pixels): more than the page shows, whose two pictures stand beside each other.
 const PICTURE_WIDTH: usize = 810;
@@ -32,7 +32,7 @@ pub(super) fn arm_pictures(runs: &[ReportRun<'_>]) -> String {
             None
         };
         if let Some(why) = none {
-            let _ = writeln!(out, "<p class=\"note\">{}{why}</p>", escaped(&who));
+            let _ = writeln!(out, "<p class=\"note\">{}{why}</p>", markup(&who));
             continue;
         }
         out += "<div class=\"pictures\">\n";
@@ -47,7 +47,7 @@ pub(super) fn arm_pictures(runs: &[ReportRun<'_>]) -> String {
             match picture.drawn {
                 Ok((png, axes)) => {
                     let data = base64::engine::general_purpose::STANDARD.encode(png);
-                    let caption = escaped(&caption);
+                    let caption = markup(&caption);
                     let _ = writeln!(
                         out,
                         "<figure><div class=\"arm\"><img alt=\"{caption}\" src=\"data:image/png;base64,{data}\">{}</div>\
@@ -56,7 +56,7 @@ pub(super) fn arm_pictures(runs: &[ReportRun<'_>]) -> String {
                     );
                 }
                 Err(why) => {
-                    let _ = writeln!(out, "<p class=\"note\">{}</p>", escaped(&why));
+                    let _ = writeln!(out, "<p class=\"note\">{}</p>", markup(&why));
                 }
             }
         }

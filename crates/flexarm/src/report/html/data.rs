@@ -5,8 +5,8 @@ use flexarm_log::EventKind;
 use super::ReportRun;
 use super::figures::lies_on_twin;
 use super::number::{push_short, short};
-use crate::html_page::escaped;
 use crate::report::curves::{Kind, Plot, overlays};
+use flexarm_settings::written::markup;
 
 /// What of the samples the plots do not show, if there is something.
 pub(super) fn thinning(runs: &[ReportRun<'_>], drawn: &[Vec<Plot>]) -> String {
@@ -21,7 +21,7 @@ pub(super) fn thinning(runs: &[ReportRun<'_>], drawn: &[Vec<Plot>]) -> String {
     }
     for run in runs.iter().filter(|run| run.trace.samples_per_block() > 1) {
         let (size, all) = (run.trace.samples_per_block(), run.trace.samples());
-        let label = escaped(run.label);
+        let label = markup(run.label);
         sentences.push(format!(
             "{label}: curves are the smallest and the largest value of each {size} of the run's {all} samples."
         ));

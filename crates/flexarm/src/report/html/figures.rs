@@ -7,8 +7,8 @@ use flexarm_draw::palette;
 use super::number::{fixed, number};
 use super::tables::STABILISATION;
 use super::{ReportRun, method};
-use crate::html_page::escaped;
 use crate::summary::{EnergyFigures, Summary, TcpFigures};
+use flexarm_settings::written::markup;
 
 /// Errors below this are rounding (m).
 const NOTHING_M: f64 = 1e-12;
@@ -32,7 +32,7 @@ pub(super) fn tiles(run: &ReportRun<'_>) -> String {
         let _ = writeln!(
             out,
             "<div class=\"{class}\"><h2>{name}</h2><p class=\"value\">{value}<small>{unit}</small></p><p>{}</p></div>",
-            escaped(&note)
+            markup(&note)
         );
     };
     if let Some(tcp) = &s.tcp {
@@ -134,13 +134,13 @@ pub(super) fn comparison(runs: &[ReportRun<'_>]) -> String {
             .to_owned();
     for (k, run) in runs.iter().enumerate() {
         let color = k % palette::SERIES_LENGTH;
-        let label = escaped(run.label);
+        let label = markup(run.label);
         let _ =
             write!(out, "<th class=\"number\"><i class=\"key\" style=\"background:var(--c{color})\"></i>{label}</th>");
     }
     out += "</tr></thead><tbody>";
     let row = |name: &str, unit: &str, cells: Vec<String>| {
-        let cells: String = cells.iter().map(|cell| format!("<td class=\"number\">{}</td>", escaped(cell))).collect();
+        let cells: String = cells.iter().map(|cell| format!("<td class=\"number\">{}</td>", markup(cell))).collect();
         format!("<tr><th>{name}</th><td>{unit}</td>{cells}</tr>")
     };
     for (name, unit, value) in COMPARED {

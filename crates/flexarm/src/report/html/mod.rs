@@ -21,9 +21,10 @@ use self::figures::{comparison, tiles};
 use self::number::number;
 use self::tables::{iso_table, parts_tables, stops_table, tool_path};
 use super::curves::{Plot, plots};
-use crate::html_page::escaped;
 use crate::stepper_settings::SettingValue;
 use crate::summary::Summary;
+use flexarm_settings::gathered;
+use flexarm_settings::written::markup;
 
 const STYLE: &str = include_str!("../../../assets/report.css");
 
@@ -68,7 +69,7 @@ pub fn html(runs: &[ReportRun<'_>]) -> String {
          <meta name=\"generator\" content=\"flexarm {}\">\n<title>{}</title>\n\
          <style>\n{UPLOT_STYLE}\n{}{STYLE}</style>\n</head>\n<body>\n",
         env!("CARGO_PKG_VERSION"),
-        escaped(&title),
+        markup(&title),
         colors()
     );
     // The arm is drawn while the plots are written.
@@ -121,7 +122,7 @@ fn body(main: &ReportRun<'_>, runs: &[ReportRun<'_>], arm: &str, thinning: &str)
     body += "<section id=\"plots\"><noscript><p>The plots need JavaScript.</p></noscript></section>\n";
     body += thinning;
     body += &iso_table(runs);
-    let of = if runs.len() > 1 { format!(" of {}", escaped(main.label)) } else { String::new() };
+    let of = if runs.len() > 1 { format!(" of {}", markup(main.label)) } else { String::new() };
     body += &stops_table(main.summary, &of);
     body += &parts_tables(main.summary, &of);
     let inputs: String = runs.iter().map(|run| inputs(run, runs.len() > 1)).collect();
@@ -149,13 +150,13 @@ fn heading(title: &str, runs: &[ReportRun<'_>], body: &str) -> String {
         facts.extend(method(s, "step "));
     }
     facts.push(format!("flexarm {}", env!("CARGO_PKG_VERSION")));
-    let facts: Vec<String> = facts.iter().map(|fact| format!("<span>{}</span>", escaped(fact))).collect();
+    let facts: Vec<String> = facts.iter().map(|fact| format!("<span>{}</span>", markup(fact))).collect();
     // Names of runs are escaped: none can look like a place.
     let there = PLACES.iter().filter(|(_, id)| body.contains(&format!("id=\"{id}\"")));
     let links: String = there.map(|(name, id)| format!("<a href=\"#{id}\">{name}</a>")).collect();
     format!(
         "<header>\n<h1>{}</h1>\n{}<p class=\"facts\">{}</p>\n<nav>{links}</nav>\n</header>\n",
-        escaped(title),
+        markup(title),
         headlines(runs),
         facts.join("")
     )
@@ -165,7 +166,7 @@ fn heading(title: &str, runs: &[ReportRun<'_>], body: &str) -> String {
 fn headlines(runs: &[ReportRun<'_>]) -> String {
     let line = |run: &ReportRun<'_>| {
         let who = if runs.len() > 1 { format!("{}: ", run.label) } else { String::new() };
-        format!("<p class=\"headline\">{}</p>\n", escaped(&(who + &run.summary.headline)))
+        format!("<p class=\"headline\">{}</p>\n", markup(&(who + &run.summary.headline)))
     };
     runs.iter().filter(|run| !run.summary.headline.is_empty()).map(line).collect()
 }
@@ -181,18 +182,18 @@ fn method(s: &Summary, before: &str) -> Option<String> {
 /// Why a run stopped, and its warnings.
 fn troubles(run: &ReportRun<'_>, named: bool) -> String {
     let s = run.summary;
-    let who = if named { format!("{}: ", escaped(run.label)) } else { String::new() };
+    let who = if named { format!("{}: ", markup(run.label)) } else { String::new() };
     let mut out = String::new();
     if s.computed {
         let why =
             "The recording holds no result: the figures of the tool are computed from its curves, others are missing.";
         let _ = writeln!(out, "<p class=\"block note\"><strong>{who}End not known.</strong> {why}</p>");
     } else if s.end != "complete" {
-        let _ = writeln!(out, "<p class=\"stopped\"><strong>{who}Stopped early.</strong> {}</p>", escaped(&s.end));
+        let _ = writeln!(out, "<p class=\"stopped\"><strong>{who}Stopped early.</strong> {}</p>", markup(&s.end));
     }
     if !s.warnings.is_empty() {
         let plural = if s.warnings.len() == 1 { "warning" } else { "warnings" };
-        let items: String = s.warnings.iter().map(|w| format!("<li>{}</li>", escaped(w))).collect();
+        let items: String = gathered(&s.warnings).iter().map(|w| format!("<li>{}</li>", markup(w))).collect();
         let count = s.warnings.len();
         let _ = writeln!(
             out,
@@ -204,14 +205,14 @@ fn troubles(run: &ReportRun<'_>, named: bool) -> String {
 
 fn inputs(run: &ReportRun<'_>, named: bool) -> String {
     let (s, header) = (run.summary, &run.trace.header);
-    let who = if named { format!(" of {}", escaped(run.label)) } else { String::new() };
+    let who = if named { format!(" of {}", markup(run.label)) } else { String::new() };
     let mut out = String::new();
     let mut group = |title: &str, rows: &[(String, String)]| {
         let rows: String = (rows.iter().filter(|(_, value)| !value.is_empty()))
-            .map(|(key, value)| format!("<dt>{}</dt><dd>{}</dd>", escaped(key), escaped(value)))
+            .map(|(key, value)| format!("<dt>{}</dt><dd>{}</dd>", markup(key), markup(value)))
             .collect();
         if !rows.is_empty() {
-            let _ = writeln!(out, "<div><h3>{}</h3><dl>{rows}</dl></div>", escaped(title));
+            let _ = writeln!(out, "<div><h3>{}</h3><dl>{rows}</dl></div>", markup(title));
         }
     };
     for (title, rows) in &header.metadata {
@@ -254,7 +255,7 @@ fn timings(runs: &[ReportRun<'_>]) -> String {
     let text = |run: &ReportRun<'_>| {
         let s = run.summary;
         let who = if runs.len() > 1 { format!("{}: ", run.label) } else { String::new() };
-        escaped(&format!(
+        markup(&format!(
             "{who}{:.2} s simulated in {:.2} s ({:.0} times real time), {:.1} ms processor time per simulated second.",
             s.duration_s,
             s.wall_s,

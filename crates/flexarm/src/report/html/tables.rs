@@ -7,10 +7,10 @@ use base64::Engine as _;
 use super::ReportRun;
 use super::figures::{moving, within, without_number};
 use super::number::number;
-use crate::html_page::escaped;
 use crate::monitor::tool_path::PathMoveFigures;
 use crate::report::path_plan::path_plan;
 use crate::summary::Summary;
+use flexarm_settings::written::markup;
 
 /// Most moves of the tool in the table of the page.
 const MOST_MOVES: usize = 200;
@@ -119,7 +119,7 @@ pub(super) fn iso_table(runs: &[ReportRun<'_>]) -> String {
                    not thirty measured cycles.</p>\n<div class=\"scroll\"><table><thead><tr><th>figure</th><th>meaning</th>"
         .to_owned();
     for run in runs {
-        let name = if runs.len() > 1 { escaped(run.label) } else { "value".into() };
+        let name = if runs.len() > 1 { markup(run.label) } else { "value".into() };
         let _ = write!(out, "<th class=\"number\">{name}</th>");
     }
     out += "<th>unit</th></tr></thead><tbody>";
@@ -154,15 +154,15 @@ fn table(title: &str, head: &[&str], rows: &[Vec<String>]) -> String {
     };
     let class = |column: usize| if is_number(column) { " class=\"number\"" } else { "" };
     let heads: String =
-        head.iter().enumerate().map(|(k, name)| format!("<th{}>{}</th>", class(k), escaped(name))).collect();
+        head.iter().enumerate().map(|(k, name)| format!("<th{}>{}</th>", class(k), markup(name))).collect();
     let mut out = format!(
         "<section class=\"block\"><h2>{title}</h2><div class=\"scroll\"><table><thead><tr>{heads}</tr></thead><tbody>"
     );
     for row in rows {
         let cells: String = (row.iter().enumerate().skip(1))
-            .map(|(k, cell)| format!("<td{}>{}</td>", class(k), escaped(cell)))
+            .map(|(k, cell)| format!("<td{}>{}</td>", class(k), markup(cell)))
             .collect();
-        let _ = write!(out, "<tr><th>{}</th>{cells}</tr>", escaped(&row[0]));
+        let _ = write!(out, "<tr><th>{}</th>{cells}</tr>", markup(&row[0]));
     }
     out + "</tbody></table></div></section>\n"
 }

@@ -1,0 +1,89 @@
+//! Many sentences of one kind as one.
+
+/// From so many sentences of one kind on, they are one.
+const MANY: usize = 3;
+/// Most places that are named.
+const NAMED: usize = 3;
+
+/// Sentences for a person: those that differ only in names and numbers are the first of them with the count and the first few
+/// names of the others. Each sentence counts once.
+pub fn gathered(texts: &[String]) -> Vec<String> {
+    let mut groups: Vec<(String, Vec<&String>)> = Vec::new();
+    for text in texts {
+        let kind = kind(text);
+        match groups.iter_mut().find(|(known, _)| *known == kind) {
+            Some((_, group)) if group.contains(&text) => {}
+            Some((_, group)) => group.push(text),
+            None => groups.push((kind, vec![text])),
+        }
+    }
+    let told = |(_, group): (String, Vec<&String>)| match group.as_slice() {
+        [first, others @ ..] if group.len() >= MANY => {
+            let named: Vec<&str> = others.iter().take(NAMED).filter_map(|other| difference(first, other)).collect();
+            let more = if others.len() > named.len() && !named.is_empty() { ", ..." } else { "" };
+            let colon = if named.is_empty() { "" } else { ": " };
+            vec![format!("{first} (and {} more of this kind{colon}{}{more})", others.len(), named.join(", "))]
+        }
+        few => few.iter().map(|text| (*text).clone()).collect(),
+    };
+    groups.into_iter().flat_map(told).collect()
+}
+
+/// The sentence without its quoted names and its numbers.
+fn kind(text: &str) -> String {
+    let mut kind = String::with_capacity(text.len());
+    for (k, part) in text.split('"').enumerate() {
+        if k % 2 == 1 {
+            kind.push('"');
+            continue;
+        }
+        // Digits, and what belongs to a number: a point, an exponent, a sign.
+        let mut in_number = false;
+        let mut letters = part.chars().peekable();
+        while let Some(c) = letters.next() {
+            let goes_on =
+                in_number && (matches!(c, '.' | 'e' | '-' | '+')) && letters.peek().is_some_and(char::is_ascii_digit)
+                    || in_number && c == 'e' && letters.peek() == Some(&'-');
+            if c.is_ascii_digit() || goes_on {
+                if !in_number {
+                    kind.push('#');
+                }
+                in_number = true;
+            } else {
+                in_number = false;
+                kind.push(c);
+            }
+        }
+    }
+    kind
+}
+
+/// The first quoted name of `other` that `first` has otherwise, else the first word.
+fn difference<'a>(first: &str, other: &'a str) -> Option<&'a str> {
+    let quoted = |text: &'a str| text.split('"').skip(1).step_by(2);
+    let mut names = first.split('"').skip(1).step_by(2).zip(quoted(other));
+    let name = names.find(|(a, b)| a != b).map(|(_, name)| name);
+    name.or_else(|| {
+        let mut words = first.split_whitespace().zip(other.split_whitespace());
+        words.find(|(a, b)| a != b).map(|(_, word)| word.trim_end_matches([':', ',']))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn twelve_sentences_of_one_kind_are_one_with_the_count_and_others_stay() {
+        let mass = |k: usize| format!("arm.urdf:{}: link \"link_{k}\" weighs {:.2e} kg", 10 * k, 1e-3 * k as f64);
+        let mut texts: Vec<String> = (1..=12).map(mass).collect();
+        texts.insert(5, "the payload is a point".into());
+        texts.push(mass(3));
+        let told = gathered(&texts);
+        let expected = format!("{} (and 11 more of this kind: link_2, link_3, link_4, ...)", mass(1));
+        assert_eq!(told, [expected, "the payload is a point".into()]);
+        assert_eq!(gathered(&texts[..2]), texts[..2]);
+        let bare: Vec<String> = ["a", "b", "c"].map(|name| format!("{name} is far")).into();
+        assert_eq!(gathered(&bare), bare, "names that are not quoted are other words");
+    }
+}

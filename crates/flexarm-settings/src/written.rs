@@ -1,0 +1,287 @@
+//! Foreign text, such as names of joints and cells of files, as each kind of output may hold it: one function per kind.
+//!
+//! JSON and TOML are not here: their writers escape by themselves.
+//!
+//! ```
+//! use flexarm_settings::written;
+//!
+//! let name = "\u{1b}[31m=<b>|";
+//! assert_eq!(written::one_line(name), r"\u{1b}[31m=<b>|");
+//! assert_eq!(written::markup(name), r"\u{1b}[31m=&lt;b&gt;|");
+//! assert_eq!(written::csv_field("=1+1"), "\"'=1+1\"");
+//! ```
+
+/// Longest quoted text that a message repeats (characters).
+const LONGEST_QUOTE: usize = 300;
+/// Longest line of a message (characters).
+const LONGEST_LINE: usize = 8000;
+
+/// Whether a terminal obeys the character instead of showing it, or a reader cannot see it: control characters, those that turn
+/// the direction of writing, and those that end a line elsewhere than the eye sees it.
+fn is_hidden(c: char) -> bool {
+    c.is_control()
+        || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}')
+}
+
+fn shown(text: &str, keeps: &[char], push: impl Fn(&mut String, char)) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match is_hidden(c) && !keeps.contains(&c) {
+            true => out += &c.escape_unicode().to_string(),
+            false => push(&mut out, c),
+        }
+    }
+    out
+}
+
+/// Text for a terminal or a plain file: characters that nobody sees are shown as `\u{1b}`, lines stay.
+pub fn visible(text: &str) -> String {
+    shown(text, &['\n', '\t'], String::push)
+}
+
+/// The same on one line, for cells of tables and comments.
+pub fn one_line(text: &str) -> String {
+    visible(text).replace(['\n', '\t'], " ")
+}
+
+/// A message for a terminal: [`visible`], quoted texts and lines of a length that a person reads.
+pub fn message(text: &str) -> String {
+    let lines = text.split('\n').map(|line| {
+        let line = with_short_quotes(&visible(line));
+        shortened(&line, LONGEST_LINE)
+    });
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+/// The text in at most about so many characters, with its whole length where it is cut.
+pub fn shortened(text: &str, most: usize) -> String {
+    match text.char_indices().nth(most) {
+        Some((cut, _)) => format!("{}... ({} characters)", &text[..cut], text.chars().count()),
+        None => text.to_owned(),
+    }
+}
+
+/// Shortens what stands between quotes, and words without a blank.
+fn with_short_quotes(text: &str) -> String {
+    let mut out = String::with_capacity(text.len().min(2 * LONGEST_LINE));
+    let mut rest = text;
+    while let Some(first) = rest.chars().next() {
+        let quote = (matches!(first, '"' | '`')).then_some(first);
+        let end = match quote {
+            Some(quote) => end_of_quote(rest, quote),
+            None => rest.find([' ', '"', '`']).map_or(rest.len(), |at| at.max(1)),
+        };
+        let (piece, after) = rest.split_at(end);
+        let close = quote.filter(|quote| piece.len() > 1 && piece.ends_with(*quote));
+        match piece.char_indices().nth(LONGEST_QUOTE) {
+            Some((cut, _)) => {
+                out += &piece[..cut];
+                out += "...";
+                out.extend(close);
+                out += &format!(" ({} characters)", piece.chars().count() - 2 * usize::from(close.is_some()));
+            }
+            None => out += piece,
+        }
+        rest = after;
+    }
+    out
+}
+
+/// Where a quoted text ends that begins with `quote`; after the quote itself where it is not closed.
+fn end_of_quote(text: &str, quote: char) -> usize {
+    let mut escaped = false;
+    for (at, c) in text.char_indices().skip(1) {
+        match c {
+            _ if escaped => escaped = false,
+            '\\' if quote == '"' => escaped = true,
+            c if c == quote => return at + 1,
+            _ => {}
+        }
+    }
+    1
+}
+
+/// Text within an element or an attribute of HTML, SVG and XML.
+pub fn markup(text: &str) -> String {
+    shown(text, &['\n', '\t'], |out, c| match c {
+        '&' => out.push_str("&amp;"),
+        '<' => out.push_str("&lt;"),
+        '>' => out.push_str("&gt;"),
+        '"' => out.push_str("&quot;"),
+        '\'' => out.push_str("&#39;"),
+        c => out.push(c),
+    })
+}
+
+/// Text within a paragraph, a list or a table of Markdown, on one line: no HTML, no links, no emphasis, no end of a cell.
+pub fn markdown(text: &str) -> String {
+    let text = one_line(text);
+    let letters: Vec<char> = text.chars().collect();
+    let is_word = |at: Option<usize>| at.and_then(|at| letters.get(at)).is_some_and(|c| c.is_alphanumeric());
+    let next_is = |k: usize, of: &str| letters.get(k + 1).is_some_and(|c| of.contains(*c));
+    let mut out = String::with_capacity(text.len());
+    for (k, &c) in letters.iter().enumerate() {
+        match c {
+            // The beginnings of tags and of entities; a mark with a blank behind it is only a mark.
+            '<' if is_word(Some(k + 1)) || next_is(k, "/!?") => out += "&lt;",
+            '&' if is_word(Some(k + 1)) || next_is(k, "#") => out += "&amp;",
+            ']' if next_is(k, "([:") => out.extend(['\\', c]),
+            '\\' | '`' | '*' | '|' | '~' | '$' => out.extend(['\\', c]),
+            // Underscores within words are letters.
+            '_' if !(is_word(k.checked_sub(1)) && is_word(Some(k + 1))) => out.extend(['\\', c]),
+            // Marks that begin a heading, a quotation or a list.
+            '#' | '>' if k == 0 => out.extend(['\\', c]),
+            '-' | '+' if k == 0 && next_is(k, " ") => out.extend(['\\', c]),
+            c => out.push(c),
+        }
+    }
+    out
+}
+
+/// A row of a table of Markdown, with the end of its line.
+pub fn markdown_row(cells: &[impl AsRef<str>]) -> String {
+    let cells: Vec<String> = cells.iter().map(|cell| markdown(cell.as_ref())).collect();
+    format!("| {} |\n", cells.join(" | "))
+}
+
+/// A name as code within Markdown; one that code cannot hold as plain text.
+pub fn markdown_code(name: &str) -> String {
+    match name.contains(['`', '|']) || name.trim().is_empty() {
+        true => markdown(name),
+        false => format!("`{}`", one_line(name)),
+    }
+}
+
+/// Whether a spreadsheet would calculate a cell with this text.
+fn is_formula(text: &str) -> bool {
+    text.trim_start_matches('\'').starts_with(['=', '+', '-', '@', '\t', '\r', '\n', '＝', '＋', '－', '＠'])
+}
+
+/// A text as a field of a table with commas, semicolons or tabs: quoted where it must be. One that a spreadsheet would take for
+/// a formula begins with an apostrophe, which [`csv_fields`] takes off again.
+pub fn csv_field(text: &str) -> String {
+    if is_formula(text) {
+        return format!("\"'{}\"", text.replace('"', "\"\""));
+    }
+    let is_plain = !text.contains([',', ';', '\t', '"', '\n', '\r']) && !text.starts_with('#') && text.trim() == text;
+    if is_plain { text.to_owned() } else { format!("\"{}\"", text.replace('"', "\"\"")) }
+}
+
+/// The text of a field that [`csv_field`] wrote, without its quotes.
+pub fn csv_text(field: &str) -> &str {
+    field.strip_prefix('\'').filter(|text| is_formula(text)).unwrap_or(field)
+}
+
+/// The fields of a line of a table, without the quotes around them; a quote within quotes is doubled.
+///
+/// * `runs`: whether several separators after each other are one.
+pub fn csv_fields(line: &str, is_separator: impl Fn(char) -> bool, runs: bool) -> Vec<String> {
+    let (mut fields, mut field) = (Vec::new(), String::new());
+    let (mut quoted, mut was_quoted, mut gap) = (false, false, false);
+    let mut letters = line.chars().peekable();
+    let close = |field: &mut String, was_quoted: &mut bool| {
+        let text = if *was_quoted { csv_text(field) } else { field.trim() }.to_owned();
+        field.clear();
+        *was_quoted = false;
+        text
+    };
+    while let Some(letter) = letters.next() {
+        if quoted {
+            match letter {
+                '"' if letters.next_if_eq(&'"').is_some() => field.push('"'),
+                '"' => quoted = false,
+                other => field.push(other),
+            }
+            continue;
+        }
+        if is_separator(letter) {
+            if !(runs && gap) {
+                fields.push(close(&mut field, &mut was_quoted));
+            }
+            gap = true;
+            continue;
+        }
+        gap = false;
+        match letter {
+            '"' if field.trim().is_empty() => (field, quoted, was_quoted) = (String::new(), true, true),
+            other => field.push(other),
+        }
+    }
+    fields.push(close(&mut field, &mut was_quoted));
+    fields
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NAMES: [&str; 14] = [
+        "joint_1",
+        "=cmd|' /C calc'!A0",
+        "+1",
+        "-a",
+        "@SUM(A1)",
+        "\tx",
+        "\rx",
+        "'=x",
+        "''@x",
+        "'plain'",
+        "a,b;c",
+        "say \"x\"",
+        "# no comment",
+        " padded ",
+    ];
+
+    #[test]
+    fn no_kind_of_output_holds_a_character_that_a_terminal_obeys() {
+        let all: String = (0..=0x9fu32).chain([0x202e, 0x2028, 0x2066, 0xfeff]).filter_map(char::from_u32).collect();
+        for (kind, text) in [
+            ("terminal", visible(&all)),
+            ("message", message(&all)),
+            ("line", one_line(&all)),
+            ("markup", markup(&all)),
+            ("markdown", markdown(&all)),
+        ] {
+            let obeyed = text.chars().find(|c| is_hidden(*c) && !"\n\t".contains(*c));
+            assert_eq!(obeyed, None, "{kind}");
+        }
+        assert_eq!(visible("\u{1b}[31mred\u{9b}1m\n"), "\\u{1b}[31mred\\u{9b}1m\n");
+        assert!(!one_line("a\nerror: b").contains('\n'));
+    }
+
+    #[test]
+    fn a_long_quotation_is_cut_with_its_length_and_the_rest_of_the_message_stays() {
+        for cell in ["x".repeat(1_000_000), "ab ".repeat(400_000)] {
+            let said = message(&format!("motion.csv:2: found {cell:?}, expected a number; it is {cell}"));
+            assert!(said.chars().count() < LONGEST_LINE + 100, "{}", said.len());
+            let count = cell.chars().count();
+            assert!(said.contains(&format!("...\" ({count} characters), expected a number")), "{said:.500}");
+        }
+        let short = "a \"quoted \\\" text\" and `one`, it's left as it is";
+        assert_eq!(message(short), short);
+    }
+
+    #[test]
+    fn a_field_is_read_back_as_it_was_and_no_spreadsheet_calculates_it() {
+        for name in NAMES {
+            let field = csv_field(name);
+            let shown = field.trim_matches('"');
+            assert!(!shown.starts_with(['=', '+', '-', '@', '\t', '\r']), "{field}");
+            let line = format!("time,{field},x");
+            assert_eq!(csv_fields(&line, |c| c == ',', false), ["time", name, "x"]);
+        }
+        // Numbers of other programs are no texts of this one.
+        assert_eq!(csv_fields("-1.5,'+2,\"-3\"", |c| c == ',', false), ["-1.5", "'+2", "-3"]);
+    }
+
+    #[test]
+    fn markdown_shows_a_name_as_it_is() {
+        assert_eq!(markdown("<script>alert(1)</script> &lt;"), "&lt;script>alert(1)&lt;/script> &amp;lt;");
+        assert_eq!(markdown("a | b"), "a \\| b");
+        assert_eq!(markdown("![x](http://y)"), "![x\\](http://y)");
+        assert_eq!(markdown("# joint_1\n* next"), "\\# joint_1 \\* next");
+        assert_eq!(markdown("_a_ -1.5 < 2, mass [kg]"), "\\_a\\_ -1.5 < 2, mass [kg]");
+        assert_eq!(markdown_code("joint_1"), "`joint_1`");
+        assert_eq!(markdown_code("a`<b>"), "a\\`&lt;b>");
+    }
+}

@@ -1,0 +1,97 @@
+//! Where a link's own body begins and ends between its two joints, where the frames of the file lie elsewhere.
+//!
+//! A frame may sit anywhere on the axis of its joint, and in many descriptions it sits at the far end of the link. The body
+//! lies along the mesh's longest principal axis. A joint whose axis crosses it is where the axis comes nearest; one that turns
+//! about it is at the end of the mesh on its side.
+
+use flexarm_kinematics::{Joint, JointKind};
+use flexarm_urdf::TriangleMesh;
+use nalgebra::{Matrix3, Vector3};
+
+use super::beams::Candidate;
+
+/// Cosine between a joint axis and the body from which on the joint turns about the body.
+const ALONG: f64 = 0.9;
+
+/// Both ends of the body, the proximal one first, link axes; `None` where shape and joints do not tell them.
+pub(crate) fn of(link: &Candidate<'_>) -> Option<[Vector3<f64>; 2]> {
+    let (middle, along) = principal_axis(link.meshes)?;
+    let places = || link.meshes.iter().flat_map(|m| &m.positions).map(|p| (vector(p) - middle).dot(&along));
+    let (low, high) = (places().fold(f64::INFINITY, f64::min), places().fold(f64::NEG_INFINITY, f64::max));
+    let X_LB = &link.distal.X_PJ;
+    let own = link.proximal.and_then(axis);
+    let next = axis(link.distal).map(|axis| X_LB.rotation * axis);
+    let place = |point: Vector3<f64>, axis: Option<Vector3<f64>>| Place::of(point - middle, axis, &along);
+    let [a, b] = [place(Vector3::zeros(), own), place(X_LB.translation.vector, next)];
+    let nearer = |s: f64| if s - low < high - s { low } else { high };
+    let farther = |s: f64| if s - low < high - s { high } else { low };
+    let [a, b] = match (a, b) {
+        (Place::Across(a), Place::Across(b)) => [a, b],
+        (Place::Across(a), Place::Along(_)) => [a, farther(a)],
+        (Place::Along(_), Place::Across(b)) => [farther(b), b],
+        // A straight tube between two rolls: the frames say which end is which.
+        (Place::Along(a), Place::Along(b)) if a < b => [low, high],
+        (Place::Along(a), Place::Along(b)) if a > b => [high, low],
+        (Place::Along(a), Place::Along(_)) => [farther(a), nearer(a)],
+    };
+    Some([a, b].map(|s| middle + along * s.clamp(low, high)))
+}
+
+/// Where a joint is along the body (m).
+enum Place {
+    /// Its axis crosses the body there.
+    Across(f64),
+    /// It turns about the body; its frame is there.
+    Along(f64),
+}
+
+impl Place {
+    /// * `point`: on the axis of the joint, seen from the middle of the body.
+    fn of(point: Vector3<f64>, axis: Option<Vector3<f64>>, along: &Vector3<f64>) -> Self {
+        let s = point.dot(along);
+        let Some(axis) = axis else { return Self::Across(s) };
+        let cosine = axis.dot(along);
+        if cosine.abs() > ALONG {
+            return Self::Along(s);
+        }
+        // The point of the body nearest to the axis.
+        Self::Across((s - point.dot(&axis) * cosine) / (1.0 - cosine * cosine))
+    }
+}
+
+/// Axis about which a joint turns, in its own axes.
+fn axis(joint: &Joint) -> Option<Vector3<f64>> {
+    match joint.kind {
+        JointKind::Revolute(axis) | JointKind::Continuous(axis) | JointKind::Prismatic(axis) => Some(axis.into_inner()),
+        _ => None,
+    }
+}
+
+fn vector(p: &[f32; 3]) -> Vector3<f64> {
+    Vector3::from(p.map(f64::from))
+}
+
+/// Centroid and longest principal axis of the surfaces.
+fn principal_axis(meshes: &[TriangleMesh]) -> Option<(Vector3<f64>, Vector3<f64>)> {
+    let (mut area, mut first, mut second) = (0.0, Vector3::zeros(), Matrix3::zeros());
+    for mesh in meshes {
+        for corners in &mesh.triangles {
+            let corner = |k: usize| mesh.positions.get(corners[k] as usize).map(vector);
+            let (Some(a), Some(b), Some(c)) = (corner(0), corner(1), corner(2)) else { continue };
+            let own = 0.5 * (b - a).cross(&(c - a)).norm();
+            let sum = a + b + c;
+            area += own;
+            first += sum * (own / 3.0);
+            // The integral of r rᵀ over a triangle.
+            let corners = a * a.transpose() + b * b.transpose() + c * c.transpose();
+            second += (corners + sum * sum.transpose()) * (own / 12.0);
+        }
+    }
+    if !(area > 0.0 && area.is_finite()) {
+        return None;
+    }
+    let middle = first / area;
+    let spread = (second / area - middle * middle.transpose()).symmetric_eigen();
+    let along = spread.eigenvectors.column(spread.eigenvalues.imax()).into_owned();
+    Some((middle, along.normalize()))
+}
