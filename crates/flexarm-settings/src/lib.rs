@@ -49,6 +49,8 @@ pub enum Setting {
     Links,
     /// Factor by which deflections are drawn.
     Magnification,
+    /// Band around the error at rest in which the tool counts as settled (m).
+    SettlingBand,
     /// Run although joint limits are passed.
     IgnoreLimits,
     /// Time within which corners of a motion are rounded (s).
@@ -171,7 +173,7 @@ pub enum Setting {
 
 impl Setting {
     /// Every setting.
-    pub const ALL: [Self; 59] = [
+    pub const ALL: [Self; 60] = [
         Self::Step,
         Self::LogRate,
         Self::Stepper,
@@ -180,6 +182,7 @@ impl Setting {
         Self::Start,
         Self::Links,
         Self::Magnification,
+        Self::SettlingBand,
         Self::IgnoreLimits,
         Self::RoundCorners,
         Self::Variant,
@@ -244,6 +247,7 @@ impl Setting {
             Self::Start => "start",
             Self::Links => "links",
             Self::Magnification => "magnification",
+            Self::SettlingBand => "settling_band_m",
             Self::IgnoreLimits => "ignore_limits",
             Self::RoundCorners => "with_rounded_corners",
             Self::Variant => "variants",

@@ -1712,6 +1712,8 @@ class ReduceFiles(TypedDict):
 
     flex: str | None
     """The link file, for `reduced = "..."` of a robot file."""
+    entry: str | None
+    """The entry of a robot file that uses it, as TOML."""
     job: str | None
     """The job, complete, to run again."""
     summary: str | None
@@ -1842,6 +1844,8 @@ class ImportFiles(TypedDict):
 
     flex: str | None
     """The link file, for `reduced = "..."` of a robot file."""
+    entry: str | None
+    """The entry of a robot file that uses it, as TOML."""
     summary: str | None
     """These figures."""
     report: str | None

@@ -254,6 +254,7 @@ pub fn map(
     let table = MapTable { columns: layout.columns.clone(), values: std::mem::take(&mut taken.rows) };
     let mut found = summed_up(robot, &arm, request, table, &taken, by, grid.as_ref(), rotations.len())?;
     found.caveats.extend(caveats);
+    found.caveats.extend(caveat::validity::outside_limits(actuated, &near).filter(|_| request.at.is_some()));
     found.caveats.extend(validity(robot, request, &found));
     found.warnings = caveat::warnings(&found.caveats);
     found.wall_s = begun.elapsed().as_secs_f64();
