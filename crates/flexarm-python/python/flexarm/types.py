@@ -174,9 +174,9 @@ class ShareFigures(TypedDict):
     name: str
     """Name of the link or joint."""
     kind: str
-    """link, gearbox, servo or mounting."""
+    """link, gearbox, servo, mounting or stepper."""
     along_m: float
-    """Part of the error along its direction, first order (m): all shares together make the error."""
+    """Part of the error along its direction (m): all shares together make the error."""
 
 
 class HoldFigures(TypedDict):

@@ -35,7 +35,7 @@ pub(super) fn part_shares(summary: &Summary) -> Vec<PartShare<'_>> {
         let share = known(&link.name, &[headline::LINK, headline::MOUNTING]);
         PartShare {
             name: &link.name,
-            kind: share.map_or(headline::LINK, |share| &share.kind),
+            kind: share.map_or(headline::LINK, |share| share.kind.as_str()),
             at_peak_m: share.map(|share| share.along_m),
             largest_m: Some(link.peak_contribution_m),
             part: Part::Link(link),
