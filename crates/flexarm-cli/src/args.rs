@@ -180,9 +180,9 @@ pub(crate) struct RunArgs {
     /// Time stepper
     #[arg(long, help_heading = "Stepper", value_name = "NAME", value_parser = stepper_words(), default_value = STEPPERS[0].name)]
     pub(crate) stepper: &'static StepperEntry,
-    /// Step of the stepper (s)
-    #[arg(long, help_heading = "Stepper", value_name = "SECONDS", default_value_t = 1e-3, allow_hyphen_values = true)]
-    pub(crate) step: f64,
+    /// Step of the stepper (s) [default: the stepper's own]
+    #[arg(long, help_heading = "Stepper", value_name = "SECONDS", allow_hyphen_values = true)]
+    pub(crate) step: Option<f64>,
     #[command(flatten)]
     pub(crate) modelling: ModellingArgs,
     #[command(flatten)]
@@ -319,7 +319,8 @@ pub(crate) struct CheckArgs {
 
 /// Words and help of the registry of steppers.
 fn stepper_words() -> impl TypedValueParser<Value = &'static StepperEntry> {
-    let words = STEPPERS.map(|entry| PossibleValue::new(entry.name).help(entry.help).aliases(entry.aliases));
+    let help = |entry: &StepperEntry| format!("{}; step {} ms", entry.help, 1e3 * entry.default_step_s);
+    let words = STEPPERS.map(|entry| PossibleValue::new(entry.name).help(help(entry)).aliases(entry.aliases));
     PossibleValuesParser::new(words).map(|word| {
         let named = |entry: &&StepperEntry| entry.name == word || entry.aliases.contains(&word.as_str());
         STEPPERS.into_iter().find(named).expect("the parser lets no other word pass")

@@ -17,6 +17,7 @@ fn flag(setting: Setting) -> &'static str {
         Setting::Magnification => "--magnify",
         Setting::IgnoreLimits => "--ignore-limits",
         Setting::RoundCorners => "--round-corners",
+        Setting::SettlingBand => "--settling-band",
         Setting::Variant => "--with",
         Setting::Output => "-o",
         Setting::Overwrite => "--force",

@@ -260,7 +260,7 @@ fn run_options(args: &RunArgs, with_twin: bool) -> RunOptions {
     };
     RunOptions {
         stepper: (args.stepper.with)(&stepper_options),
-        step_s: args.step,
+        step_s: args.step.unwrap_or(args.stepper.default_step_s),
         modelling: args.modelling.modelling(),
         log_rate_hz: args.log_rate,
         ignore_limits: args.ignore_limits,

@@ -233,8 +233,8 @@ pub(crate) fn reduction(summary: &ReduceSummary) -> String {
     for path in &f.pictures {
         out += &format!("picture  {path}\n");
     }
-    if let Some(path) = &f.flex {
-        out += &format!("use:     reduced = \"{path}\" under [[flexible_link]] of a robot.toml\n");
+    if let Some(entry) = &f.entry {
+        out += &format!("\nto be pasted into a robot file:\n{entry}");
     }
     out
 }
@@ -263,8 +263,8 @@ pub(crate) fn imported(summary: &flexarm::import::ImportSummary) -> String {
             out += &format!("{what:<8} {path}\n");
         }
     }
-    if let Some(path) = &f.flex {
-        out += &format!("use:     reduced = \"{path}\" under [[flexible_link]] of a robot.toml\n");
+    if let Some(entry) = &f.entry {
+        out += &format!("\nto be pasted into a robot file:\n{entry}");
     }
     out
 }

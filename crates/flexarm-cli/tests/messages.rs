@@ -110,7 +110,7 @@ fn caveats_of_a_run_name_the_flags_in_every_place() {
         assert!(energy.ends_with(end), "{energy}");
     }
     let coarse = place.flexarm(&[&COMPARE[..], &["--force", "--step", "0.02", "--log-rate", "50"]].concat());
-    coarse.says(&["steps per period of the first mode are coarse: lower --step\n"]);
+    coarse.says(&["as the steps are long for this method: lower --step or choose another --stepper"]);
     place.write(
         "loads.toml",
         "format = 1\n[[load]]\nkind = \"sine\"\nframe = \"tcp\"\nforce = [9.0, 0.0, 0.0]\nfrequency = 500.0\n",

@@ -328,6 +328,34 @@ mod a_run {
         place.refused(&alone, &["interface \"B\"", "--urdf"]);
     }
 
+    /// Truth: the program itself, which reads what it told to paste.
+    #[test]
+    fn what_it_prints_for_a_robot_file_can_be_pasted_into_one_anywhere() {
+        let place = place();
+        let of_robot: Vec<&str> =
+            SOUND[..10].iter().copied().chain(["--urdf", "beam.urdf", "--link", "bar", "-o", "result"]).collect();
+        let answer = place.flexarm(&of_robot);
+        let (_, entry) = answer.out.split_once("to be pasted into a robot file:\n").unwrap();
+        assert!(entry.contains("link = \"bar\"\ndistal = \"weld\"\n"), "{entry}");
+        place.write("robots/mine/robot.toml", format!("format = 1\nurdf = \"../../beam.urdf\"\n\n{entry}"));
+        let found = place.json(&["inspect", "robots/mine"]);
+        assert_eq!(found["flexible_links"][0]["name"], "bar");
+        // Without a robot the name is the link file's, and the joint is left to the reader.
+        let answer = place.flexarm(&[&SOUND[..], &["--flex", "bar.flex", "--name", "bar"]].concat());
+        let (_, entry) = answer.out.split_once("to be pasted into a robot file:\n").unwrap();
+        place.write("robots/mine/robot.toml", format!("format = 1\nurdf = \"../../beam.urdf\"\n\n{entry}"));
+        assert_eq!(place.json(&["inspect", "robots/mine"])["flexible_links"][0]["name"], "bar");
+    }
+
+    #[test]
+    fn without_kept_modes_no_column_is_called_craig_bampton() {
+        let place = place();
+        let text = |modes: &str| place.flexarm(&[&SOUND[..], &["--modes", modes, "--no-files"]].concat()).out;
+        let (none, some) = (text("0"), text("4"));
+        assert!(!none.to_lowercase().contains("craig") && none.contains("Guyan"), "{none}");
+        assert!(some.contains("Craig-Bampton"), "{some}");
+    }
+
     #[test]
     fn writes_the_link_where_a_robot_wants_it_and_overwrites_only_when_told() {
         let place = place();

@@ -539,7 +539,7 @@ fn directions(side: ArmSide, rigid: &TwinSample) -> (Vector3<f64>, Vector3<f64>)
     }
 }
 
-/// The path of the tool.
+/// The error of the tool: from where the rigid arm has it to where the flexible one has it.
 fn arrow(image: &mut Image, view: &View, unit: f64, from: &Vector3<f64>, to: &Vector3<f64>) {
     let [a, b] = [view.project(from), view.project(to)].map(|[x, y, _]| [x, y]);
     if (b[0] - a[0]).hypot(b[1] - a[1]) > 2.0 * unit {
@@ -592,7 +592,7 @@ fn legend(image: &mut Image, view: &View, unit: f64, header: &RunHeader, factor:
     image.text("rigid arm", [x + 1.5 * swatch, y], Align::Left, text(13.0));
     let next = x + 1.5 * swatch + text_width("rigid arm", text(13.0)) + 1.6 * swatch;
     image.arrow([next, y - 4.0 * unit], [next + 24.0 * unit, y - 4.0 * unit], 3.0 * unit, ARROW);
-    image.text("path of the tool", [next + 32.0 * unit, y], Align::Left, text(13.0));
+    image.text("TCP error", [next + 32.0 * unit, y], Align::Left, text(13.0));
 }
 
 /// A number without needless digits.

@@ -95,6 +95,13 @@ pub fn series(number: usize, ground: Ground) -> Rgb {
     }
 }
 
+/// Shade of [`series`] for one of the six components of the thing with this number: displacements, then rotations, darker
+/// from one to the next.
+#[must_use]
+pub fn component(number: usize, component: usize, ground: Ground) -> Rgb {
+    mix(series(number, ground), [0; 3], 0.11 * (component % 6) as f64)
+}
+
 /// Colour of the rigid twin and of its curves.
 #[must_use]
 pub fn rigid(ground: Ground) -> Rgb {

@@ -39,6 +39,21 @@ pub enum CurveLook {
     Marked,
     /// In the colour of the axis x (0), y (1) or z (2).
     Axis(usize),
+    /// In the colour of the link, spring or joint of this number.
+    Part(usize),
+    /// Dashed, in the grey of the rigid twin.
+    Rigid,
+}
+
+impl CurveLook {
+    fn is_dashed(self) -> bool {
+        matches!(self, Self::Dashed | Self::Rigid)
+    }
+
+    /// Whether its colour is the next one in the order of the plot.
+    fn is_counted(self) -> bool {
+        matches!(self, Self::Plain | Self::Dashed | Self::Dots | Self::Marked)
+    }
 }
 
 /// A curve.
@@ -304,12 +319,13 @@ fn equally_long((x, y): (Range<f64>, Range<f64>), style: &Style) -> (Range<f64>,
 /// Colour and width of a curve; those of one name look the same in all panels.
 fn look_of(curve: &PlotCurve, all: &[&PlotCurve], style: &Style) -> ShapeStyle {
     let color = |[red, green, blue]: Rgb| RGBColor(red, green, blue);
-    let counted = |look: CurveLook| !matches!(look, CurveLook::Total | CurveLook::Axis(_));
     match curve.look {
         CurveLook::Total => BLACK.stroke_width(style.stroke + style.stroke / 3),
         CurveLook::Axis(k) => color(palette::axis(k, Ground::Paper)).stroke_width(style.stroke),
+        CurveLook::Part(k) => color(palette::series(k, Ground::Paper)).stroke_width(style.stroke),
+        CurveLook::Rigid => color(palette::rigid(Ground::Paper)).stroke_width(style.stroke),
         _ => {
-            let place = all.iter().filter(|known| counted(known.look)).position(|known| known.name == curve.name);
+            let place = all.iter().filter(|known| known.look.is_counted()).position(|known| known.name == curve.name);
             color(palette::series(place.unwrap_or(0), Ground::Paper)).stroke_width(style.stroke)
         }
     }
@@ -363,7 +379,7 @@ fn draw_legend(
                     strip.draw(&dot).map_err(fault)?;
                     vec![]
                 }
-                CurveLook::Dashed => vec![(from, from + cut), (to - cut, to)],
+                look if look.is_dashed() => vec![(from, from + cut), (to - cut, to)],
                 _ => vec![(from, to)],
             };
             for (a, b) in lines {
@@ -425,7 +441,7 @@ impl Frame<'_> {
         self.draw_marks(&mut chart)?;
         for (curve, points) in self.panel.curves.iter().zip(self.points) {
             let look = look_of(curve, self.all, style);
-            if curve.look == CurveLook::Dashed {
+            if curve.look.is_dashed() {
                 let (dash, gap) = (6 * style.stroke, 4 * style.stroke);
                 let dashes = DashedLineSeries::new(points.iter().copied(), dash, gap, look);
                 chart.draw_series(dashes).map_err(fault)?;

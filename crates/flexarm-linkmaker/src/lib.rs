@@ -59,6 +59,7 @@ pub mod export;
 pub mod import;
 mod material_entry;
 pub mod reduce;
+mod robot_entry;
 mod stamp;
 
 pub use error::{ImportError, JobError, LinkError};

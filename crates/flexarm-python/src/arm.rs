@@ -102,8 +102,14 @@ fn is_one(runs: &Bound<'_, PyAny>) -> bool {
 }
 
 /// Options of a run that are the same for one and for many.
-fn run_options(step: f64, stepper_word: Option<&str>, options: Option<&Bound<'_, PyDict>>) -> PyResult<RunOptions> {
-    Ok(RunOptions { step_s: step, stepper: stepper(stepper_word, options)?, ..RunOptions::default() })
+fn run_options(
+    step: Option<f64>,
+    stepper_word: Option<&str>,
+    options: Option<&Bound<'_, PyDict>>,
+) -> PyResult<RunOptions> {
+    let stepper = stepper(stepper_word, options)?;
+    let step_s = step.unwrap_or(stepper.entry().default_step_s);
+    Ok(RunOptions { step_s, stepper, ..RunOptions::default() })
 }
 
 /// Where recordings go, and which.
@@ -185,8 +191,8 @@ impl PyArm {
     /// ----------
     /// motion : Motion, Scenario, str or os.PathLike, optional
     ///     Where the joints go: a file, the name of a shipped motion, or the robot's own motion without it.
-    /// step : float, default 1e-3
-    ///     Time step (s).
+    /// step : float, optional
+    ///     Time step (s), without it that of the stepper: 1e-3, of spook and rk4 1e-4.
     /// stepper : str, default "generalized-alpha"
     ///     Or ``"spook"``, ``"rk4"``, ``"reference"``, ``"sdirk3"``, ``"extrapolated-alpha"``.
     /// stepper_options : dict, optional
@@ -219,7 +225,7 @@ impl PyArm {
     /// Returns
     /// -------
     /// Run
-    #[pyo3(signature = (motion=None, *, step=1e-3, stepper=None, stepper_options=None, loads=None, payloads=None, start=None,
+    #[pyo3(signature = (motion=None, *, step=None, stepper=None, stepper_options=None, loads=None, payloads=None, start=None,
                         log_rate=None, twin=true, ignore_limits=false, settling_band=1e-4, output=None, overwrite=false,
                         formats=None, figures=false, magnify=None, observer=None, progress=None))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments")]
@@ -227,7 +233,7 @@ impl PyArm {
         &self,
         py: Python<'_>,
         motion: Option<&Bound<'_, PyAny>>,
-        step: f64,
+        step: Option<f64>,
         stepper: Option<&str>,
         stepper_options: Option<&Bound<'_, PyDict>>,
         loads: Option<&Bound<'_, PyAny>>,
@@ -286,14 +292,14 @@ impl PyArm {
     /// Returns
     /// -------
     /// list of Run
-    #[pyo3(signature = (runs, *, step=1e-3, stepper=None, stepper_options=None, log_rate=None, twin=true,
+    #[pyo3(signature = (runs, *, step=None, stepper=None, stepper_options=None, log_rate=None, twin=true,
                         ignore_limits=false, settling_band=1e-4, errors="raise"))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments")]
     fn simulate_batch<'py>(
         &self,
         py: Python<'py>,
         runs: &Bound<'py, PyAny>,
-        step: f64,
+        step: Option<f64>,
         stepper: Option<&str>,
         stepper_options: Option<&Bound<'_, PyDict>>,
         log_rate: Option<f64>,
@@ -363,7 +369,7 @@ impl PyArm {
     /// >>> found.peak.shape, bool(np.all(np.diff(found.peak) < 0))
     /// ((5,), True)
     #[pyo3(signature = (runs=None, *, stiffness=None, damping=None, time_scale=None, payload_mass=None, payload_com=None,
-                        payload_inertia=None, step=1e-3, stepper=None, stepper_options=None, ignore_limits=false,
+                        payload_inertia=None, step=None, stepper=None, stepper_options=None, ignore_limits=false,
                         samples=false, errors="raise"))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments")]
     fn deflections(
@@ -376,7 +382,7 @@ impl PyArm {
         payload_mass: Option<&Bound<'_, PyAny>>,
         payload_com: Option<&Bound<'_, PyAny>>,
         payload_inertia: Option<&Bound<'_, PyAny>>,
-        step: f64,
+        step: Option<f64>,
         stepper: Option<&str>,
         stepper_options: Option<&Bound<'_, PyDict>>,
         ignore_limits: bool,
@@ -393,9 +399,10 @@ impl PyArm {
         let given = Parameters { stiffness, damping, time_scale, mass, com, inertia };
         let variations = variations(robot, scenarios, &given)?;
         let options = RunOptions { ignore_limits, ..run_options(step, stepper, stepper_options)? };
+        let step_s = options.step_s;
         let arm = self.arm.clone();
         let found = stoppable(py, move |stop| arm.deflections_until(&variations, &options, samples, stop))?;
-        PyDeflections::of(found, raises, step)
+        PyDeflections::of(found, raises, step_s)
     }
 
     /// Static equilibrium under weight and a wrench at the tool, drives locked, with compliance and natural frequencies.
@@ -534,20 +541,20 @@ impl PyArm {
     ///     Joints (rad or m); zero without it.
     /// period : float, default 1e-3
     ///     Control period (s), a whole number of steps.
-    /// step : float, default 1e-3
-    ///     Time step (s).
+    /// step : float, optional
+    ///     Time step (s), without it that of the stepper: 1e-3, of spook and rk4 1e-4.
     /// stepper, stepper_options
     ///     As for :meth:`simulate`.
     ///
     /// Returns
     /// -------
     /// Live
-    #[pyo3(signature = (q=None, *, period=1e-3, step=1e-3, stepper=None, stepper_options=None))]
+    #[pyo3(signature = (q=None, *, period=1e-3, step=None, stepper=None, stepper_options=None))]
     fn live(
         &self,
         q: Option<&Bound<'_, PyAny>>,
         period: f64,
-        step: f64,
+        step: Option<f64>,
         stepper: Option<&str>,
         stepper_options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<PyLive> {

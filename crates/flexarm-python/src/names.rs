@@ -12,6 +12,7 @@ fn keyword(setting: Setting) -> &'static str {
         Setting::Stepper => "stepper",
         Setting::Tolerance => "stepper_options={\"rtol\": ...}",
         Setting::ReferenceMethod => "stepper_options={\"method\": ...}",
+        Setting::SettlingBand => "settling_band",
         Setting::RoundCorners => "round_corners",
         Setting::Magnification => "magnify",
         Setting::Variant => "runs",

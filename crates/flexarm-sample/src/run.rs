@@ -65,6 +65,24 @@ pub struct RunHeader {
     pub volume: Option<[[f64; 3]; 2]>,
 }
 
+impl RunHeader {
+    /// Number of the colour that a link, spring or joint has in all plots of the run: contributors are counted first, then
+    /// springs and joints of other names.
+    #[must_use]
+    pub fn color_number(&self, name: &str) -> usize {
+        let mut known: Vec<&String> = Vec::new();
+        for other in self.contributors.iter().chain(&self.elements).chain(&self.joints) {
+            if other == name {
+                break;
+            }
+            if !known.contains(&other) {
+                known.push(other);
+            }
+        }
+        known.len()
+    }
+}
+
 /// The name of what is shown from an instant on.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Caption {

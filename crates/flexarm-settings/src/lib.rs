@@ -55,6 +55,8 @@ pub enum Setting {
     Links,
     /// Factor by which deflections are drawn.
     Magnification,
+    /// Band around the error at rest in which the tool counts as settled (m).
+    SettlingBand,
     /// Run although joint limits are passed.
     IgnoreLimits,
     /// Time within which corners of a motion are rounded (s).
@@ -177,7 +179,7 @@ pub enum Setting {
 
 impl Setting {
     /// Every setting.
-    pub const ALL: [Self; 59] = [
+    pub const ALL: [Self; 60] = [
         Self::Step,
         Self::LogRate,
         Self::Stepper,
@@ -186,6 +188,7 @@ impl Setting {
         Self::Start,
         Self::Links,
         Self::Magnification,
+        Self::SettlingBand,
         Self::IgnoreLimits,
         Self::RoundCorners,
         Self::Variant,
@@ -250,6 +253,7 @@ impl Setting {
             Self::Start => "start",
             Self::Links => "links",
             Self::Magnification => "magnification",
+            Self::SettlingBand => "settling_band_m",
             Self::IgnoreLimits => "ignore_limits",
             Self::RoundCorners => "with_rounded_corners",
             Self::Variant => "variants",

@@ -217,6 +217,13 @@ pub struct Servo {
 }
 
 impl FlexibleArm {
+    /// Damping ratio of the first mode; 0 if nothing swings.
+    pub fn first_damping_ratio(&self) -> f64 {
+        let Some(omega) = self.modes.omega.first() else { return 0.0 };
+        let shape = self.modes.shapes.column(0);
+        shape.dot(&(&self.D * shape)) / (2.0 * omega)
+    }
+
     /// Puts springs on the elastic groups of a model.
     ///
     /// `springs` lists name, stiffness and damping in the order of `model.elastic()`. The modal damping

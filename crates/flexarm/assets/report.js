@@ -171,9 +171,9 @@
     const series = curves.map((curve, k) => {
       const total = curve.kind === "total";
       const layer = several ? layers[Math.min(k, layers.length - 1)] : null;
-      // Axes and the rigid twin have colours of their own; all else is counted.
+      // Axes, the rigid twin, and links, springs and joints have colours of their own; all else is counted.
       const own = { total: look.ink, dashed: look.rigid, x: look.x, y: look.y, z: look.z }[curve.kind];
-      const color = own || look.c[next++ % look.c.length];
+      const color = own || look.c[(curve.color ?? next++) % look.c.length];
       return {
         label: curve.name, stroke: color, width: layer ? layer[0] : total ? 1.8 : 1.4, spanGaps: several, points: { show: false },
         dash: layer ? layer[1] : curve.kind === "dashed" ? [6, 4] : undefined, value: (u, v) => shown(v),

@@ -28,15 +28,15 @@ impl Bending {
     }
 }
 
-/// What one link, one gearbox or the servos have in the largest TCP error.
+/// What one link, one gearbox, the servos or the stepper have in the largest TCP error.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct ShareFigures {
     /// Name of the link or joint.
     pub name: String,
-    /// link, gearbox, servo or mounting.
+    /// link, gearbox, servo, mounting or stepper.
     pub kind: String,
-    /// Part of the error along its direction, first order (m): all shares together make the error.
+    /// Part of the error along its direction (m): all shares together make the error.
     pub along_m: f64,
 }
 
@@ -48,6 +48,8 @@ pub(crate) const GEARBOX: &str = "gearbox";
 pub(crate) const MOUNTING: &str = "mounting";
 /// Kind of what servos leave of the way to go.
 pub(crate) const SERVO: &str = "servo";
+/// Kind of what joints drift apart in the steps of a stepper in maximal coordinates.
+pub(crate) const STEPPER: &str = "stepper";
 
 /// The line for a run; `by_choice`: the robot has something that bends, and this run has it rigid.
 pub(crate) fn headline(summary: &Summary, by_choice: bool) -> String {
@@ -94,8 +96,27 @@ fn what_bends(bends: &Bending) -> String {
 }
 
 /// Digits behind the point with which a length shows three figures.
-fn digits(size_mm: f64) -> usize {
+pub(crate) fn digits(size_mm: f64) -> usize {
     if size_mm > 0.0 { (2.0 - size_mm.log10().floor()).clamp(1.0, 9.0) as usize } else { 2 }
+}
+
+/// The parts of a whole as numbers with so many digits behind the point that add up to the rounded whole.
+///
+/// Each is rounded down or up, those with the largest remainders up. Parts that do not make the whole, to rounding, are
+/// rounded each by itself.
+pub(crate) fn rounded(parts: &[f64], whole: f64, digits: usize) -> Vec<String> {
+    let unit = 10f64.powi(-(digits as i32));
+    let mut units: Vec<f64> = parts.iter().map(|part| (part / unit).floor()).collect();
+    let missing = (whole / unit).round() - units.iter().sum::<f64>();
+    if (0.0..=parts.len() as f64).contains(&missing) {
+        let mut order: Vec<usize> = (0..parts.len()).collect();
+        order.sort_by(|&a, &b| (parts[b] / unit - units[b]).total_cmp(&(parts[a] / unit - units[a])));
+        order.into_iter().take(missing as usize).for_each(|k| units[k] += 1.0);
+    } else {
+        units = parts.iter().map(|part| (part / unit).round()).collect();
+    }
+    // Nothing is gained by -0.
+    units.iter().map(|units| format!("{:.digits$}", units * unit + 0.0)).collect()
 }
 
 fn parts(tcp: &TcpFigures) -> String {
@@ -104,8 +125,9 @@ fn parts(tcp: &TcpFigures) -> String {
     let peak = format!("{} mm", mm(tcp.peak_m));
     match (tcp.static_at_peak_m, tcp.dynamic_at_peak_m, tcp.dynamic_peak_m) {
         (Some(at_rest), Some(moving), Some(most)) => {
-            let sign = if moving < 0.0 { '-' } else { '+' };
-            format!("{peak} = {} static {sign} {} in motion (up to {})", mm(at_rest), mm(moving.abs()), mm(most))
+            let parts = rounded(&[1e3 * at_rest, 1e3 * moving], 1e3 * tcp.peak_m, digits);
+            let (sign, moving) = parts[1].strip_prefix('-').map_or(('+', parts[1].as_str()), |size| ('-', size));
+            format!("{peak} = {} static {sign} {moving} in motion (up to {})", parts[0], mm(most))
         }
         _ => format!("{peak} (static part not known: the arm has no equilibrium somewhere on its way)"),
     }
@@ -119,27 +141,49 @@ fn across(path: &PathFigures) -> String {
     format!("{peak} mm across the path, {left} with the workpiece set where the tool is; ")
 }
 
+/// Kinds of shares with their words, in the order in which they are told.
+const GROUPS: [(&str, &str); 5] = [
+    (LINK, "links"),
+    (GEARBOX, "gearboxes"),
+    (MOUNTING, "mounting"),
+    (SERVO, "following error of the servos"),
+    (STEPPER, "joints that drift apart, as the step is long"),
+];
+
 fn shares(tcp: &TcpFigures) -> String {
     let digits = digits(1e3 * tcp.peak_m);
     let most = tcp.shares_at_peak.iter().max_by(|a, b| a.along_m.abs().total_cmp(&b.along_m.abs()));
-    let group = |kind: &str, word: &str| {
-        let of_kind: Vec<&ShareFigures> = tcp.shares_at_peak.iter().filter(|share| share.kind == kind).collect();
-        let sum: f64 = of_kind.iter().map(|share| share.along_m).sum();
-        let most = match (of_kind.len(), most.filter(|most| most.kind == kind && kind != SERVO && kind != MOUNTING)) {
-            (0, _) => return None,
-            (1, Some(most)) => format!(" ({})", most.name),
-            (_, Some(most)) => format!(" ({} most)", most.name),
-            _ => String::new(),
-        };
-        // Nothing is gained by -0.
-        let sum = format!("{:.digits$}", 1e3 * sum + 0.0);
-        Some(format!("{word} {sum}{most}"))
-    };
-    let groups = [
-        group(LINK, "links"),
-        group(GEARBOX, "gearboxes"),
-        group(MOUNTING, "mounting"),
-        group(SERVO, "following error of the servos"),
-    ];
-    groups.into_iter().flatten().collect::<Vec<_>>().join(", ")
+    let of_kind = |kind: &str| tcp.shares_at_peak.iter().filter(move |share| share.kind == kind).collect::<Vec<_>>();
+    let groups = GROUPS.map(|(kind, word)| (kind, word, of_kind(kind)));
+    let groups: Vec<_> = groups.into_iter().filter(|(.., shares)| !shares.is_empty()).collect();
+    let sums: Vec<f64> =
+        groups.iter().map(|(.., shares)| 1e3 * shares.iter().map(|share| share.along_m).sum::<f64>()).collect();
+    let told = groups.iter().zip(rounded(&sums, 1e3 * tcp.peak_m, digits));
+    let told = told.filter(|((kind, ..), sum)| *kind != STEPPER || sum.contains(|c: char| c.is_ascii_digit() && c != '0'));
+    let told = told.map(|((kind, word, shares), sum)| {
+        let most = most.filter(|most| most.kind == *kind && [LINK, GEARBOX].contains(kind));
+        let most = most.map_or_else(String::new, |most| match shares.len() {
+            1 => format!(" ({})", most.name),
+            _ => format!(" ({} most)", most.name),
+        });
+        format!("{word} {sum}{most}")
+    });
+    told.collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Truth: sums of the printed numbers.
+    #[test]
+    fn rounded_parts_add_up_to_the_rounded_whole() {
+        assert_eq!(rounded(&[1.414, 4.606], 6.02, 2), ["1.41", "4.61"]);
+        assert_eq!(rounded(&[1.4157, 4.6051], 6.0208, 2), ["1.42", "4.60"]);
+        assert_eq!(rounded(&[-0.126, 1.135], 1.009, 2), ["-0.13", "1.14"]);
+        assert_eq!(rounded(&[-0.001, 1.0], 0.999, 2), ["0.00", "1.00"]);
+        // What is no sum is not made one.
+        assert_eq!(rounded(&[1.0, 2.0], 5.0, 1), ["1.0", "2.0"]);
+        assert!(rounded(&[], 1.0, 2).is_empty());
+    }
 }

@@ -9,6 +9,7 @@ use nalgebra::{DMatrix, Matrix6xX, UnitQuaternion};
 use serde::Serialize;
 
 use crate::balancer::{self, BalancerInfo};
+use crate::caveat::validity;
 use crate::error::{Error, PoseError, ValueError};
 use crate::loops::{self, LoopInfo};
 use crate::mounting::RobotMounting;
@@ -199,12 +200,7 @@ pub fn inspect(robot: &Robot, at: Option<&[f64]>, velocity: Option<&[f64]>) -> R
     let names: Vec<&str> = model.coordinates().iter().map(|c| c.joint.as_str()).collect();
     let (q, v) = (joint_values(at, &names)?, joint_values(velocity, &names)?);
     let mut warnings = crate::caveat::warnings(&robot.caveats());
-    for (c, q) in model.coordinates().iter().zip(&q) {
-        if *q < c.limits.lower || *q > c.limits.upper {
-            let (lower, upper) = (c.limits.lower, c.limits.upper);
-            warnings.push(format!("joint {:?} at {q} is outside its limits {lower} to {upper}", c.joint));
-        }
-    }
+    warnings.extend(validity::outside_limits(model.coordinates(), &q).map(|caveat| caveat.message));
     let mut state = State::zeros(&model);
     state.q.copy_from_slice(&q);
     state.qdot.copy_from_slice(&v);

@@ -1,8 +1,9 @@
 //! How much larger than life a recording shows deflections, decided before the run.
 
 use flexarm_kinematics::{Frame, frame_jacobian};
+use flexarm_log::Trace;
 use flexarm_stepping::{FlexibleArm, LoadAxes, Start};
-use nalgebra::{Matrix6xX, Vector6};
+use nalgebra::{Matrix6xX, Vector3, Vector6};
 
 use crate::twin::RigidTwin;
 
@@ -37,6 +38,8 @@ impl Expected {
         let mut twin = RigidTwin::new(arm);
         let mut J = Matrix6xX::zeros(arm.model.nv());
         let mut expected = Self::default();
+        // A start from undeformed springs doubles everything, below.
+        let sudden = if start == Start::Undeformed { 1.0 } else { SUDDEN };
         // What acts for a short time only acts on the arm as its mean over half a period of the first mode.
         let window = 0.5 / arm.modes.frequencies_hz().first().copied().unwrap_or(f64::INFINITY).max(1e-3);
         let jumps = arm.load_jumps().map(|t| t + 0.5 * window).take(INSTANTS as usize);
@@ -56,7 +59,7 @@ impl Expected {
                     let (force, torque) = (turn(now.force), turn(now.torque));
                     F += Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z) / f64::from(PIECES);
                 }
-                twin.data.tau -= J.tr_mul(&F);
+                twin.data.tau -= J.tr_mul(&F) * sudden;
             }
             let mut moved = Vector6::zeros();
             for element in &arm.elements {
@@ -81,7 +84,7 @@ impl Expected {
                 }
             }
         }
-        if start == Start::Undeformed || !arm.loads.is_empty() {
+        if start == Start::Undeformed {
             expected.tool_m *= SUDDEN;
             expected.turn_rad *= SUDDEN;
         }
@@ -114,7 +117,17 @@ impl Expected {
 
     /// Deviation for the last colour of the scale (m).
     pub(crate) fn color_scale_m(&self) -> f64 {
-        round_up(self.tool_m)
+        end_of_scale(self.tool_m)
+    }
+}
+
+/// Has the scale of colours of pictures end with the largest TCP error of runs that are shown together: before a run it is a guess.
+pub(crate) fn fit_color_scale<'a>(traces: impl IntoIterator<Item = &'a mut Trace>) {
+    let mut traces: Vec<&mut Trace> = traces.into_iter().filter(|trace| trace.header.color_scale_m > 0.0).collect();
+    let peak_m = |trace: &&mut Trace| Vector3::from_row_slice(&trace.peak.error_world[..3]).norm();
+    let largest = end_of_scale(traces.iter().map(peak_m).fold(0.0, f64::max));
+    if largest > 0.0 {
+        traces.iter_mut().for_each(|trace| trace.header.color_scale_m = largest);
     }
 }
 
@@ -124,13 +137,23 @@ fn round_down(x: f64) -> f64 {
     [5.0, 2.0, 1.0].into_iter().map(|k| k * decade).find(|y| *y <= x * (1.0 + 1e-9)).unwrap_or(decade)
 }
 
+/// A round number that is not smaller, and larger by at most a third; 0 of 0.
+fn end_of_scale(x: f64) -> f64 {
+    next_of(&[1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0], x)
+}
+
 /// The next of 1, 2, 5 times a power of ten that is not smaller; 0 of 0.
 pub(crate) fn round_up(x: f64) -> f64 {
+    next_of(&[1.0, 2.0, 5.0, 10.0], x)
+}
+
+/// The next of these times a power of ten that is not smaller; 0 of 0.
+fn next_of(steps: &[f64], x: f64) -> f64 {
     if !(x > 0.0 && x.is_finite()) {
         return 0.0;
     }
     let decade = 10f64.powf(x.log10().floor());
-    [1.0, 2.0, 5.0, 10.0].into_iter().map(|k| k * decade).find(|y| *y >= x * (1.0 - 1e-9)).unwrap_or(10.0 * decade)
+    steps.iter().map(|k| k * decade).find(|y| *y >= x * (1.0 - 1e-9)).unwrap_or(10.0 * decade)
 }
 
 #[cfg(test)]
@@ -145,5 +168,6 @@ mod tests {
         assert_eq!(expected(1.0, 0.1).magnification(), 1.0);
         assert_eq!(expected(0.0, 0.0).magnification(), 0.0);
         assert_eq!([1.4e-3, 2e-3, 0.6].map(round_up).map(|x| (x * 1e6).round()), [2e3, 2e3, 1e6]);
+        assert_eq!([1.4e-3, 6.01e-3, 0.0].map(end_of_scale).map(|x| (x * 1e6).round()), [1.5e3, 8e3, 0.0]);
     }
 }

@@ -107,9 +107,10 @@ pub struct RunOptions {
 
 impl Default for RunOptions {
     fn default() -> Self {
+        let stepper = StepperKind::default();
         Self {
-            stepper: StepperKind::default(),
-            step_s: 1e-3,
+            stepper,
+            step_s: stepper.entry().default_step_s,
             modelling: Modelling::default(),
             log_rate_hz: 500.0,
             ignore_limits: false,

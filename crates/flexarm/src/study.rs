@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use flexarm_log::{Recorder, RecordingFormat, Trace, TraceRow};
 
 use crate::error::{Error, StudyError};
-use crate::magnification::Expected;
+use crate::magnification::{Expected, fit_color_scale};
 use crate::options::{Outputs, RunOptions};
 use crate::prepare::checked;
 use crate::record::{files_of_a_run, refuse_to_overwrite};
@@ -94,6 +94,7 @@ pub fn compare_study(
     if let Some(path) = recording.finish(&summary)? {
         summary.files.study = Some(path.display().to_string());
     }
+    fit_color_scale(traces.iter_mut().map(|(_, trace)| trace));
     if let Some(outputs) = outputs {
         crate::report::write_study(outputs, &summary, &traces)?;
     }
@@ -128,11 +129,23 @@ fn folders(variants: &[Variant]) -> Result<Vec<String>, StudyError> {
     Ok(names)
 }
 
-/// How far the tool of a run is from that of the first, at the first's times; `None` for motions of other lengths.
+/// Whether two runs are of one robot: of one name and with the same joints, or with their rigid tools in the same places.
+/// Differences between other runs say nothing.
+pub(crate) fn of_one_robot(first: &Trace, other: &Trace) -> bool {
+    let (a, b) = (&first.header, &other.header);
+    let one_name = a.robot == b.robot || a.robot.is_empty() || b.robot.is_empty();
+    (one_name && a.joints == b.joints) || on_one_motion(first, other)
+}
+
+/// How far the tool of a run is from that of the first, at the first's times; `None` for motions of other lengths and for
+/// other robots.
 ///
 /// On one motion the places of the rigid tools are the same, so the errors are compared: they are small, and so is what is
 /// lost between the samples. Otherwise the places are.
 pub(crate) fn difference(first: &Trace, other: &Trace) -> Option<DifferenceFigures> {
+    if !of_one_robot(first, other) {
+        return None;
+    }
     let (end, other_end) = (first.rows.last()?.time_s, other.rows.last()?.time_s);
     // The last step may pass the end of the motion.
     let slack = first.header.step_s.max(other.header.step_s).max(1e-6 * end.max(1.0));
@@ -266,7 +279,7 @@ pub fn study_rows(summary: &Summary) -> Vec<Vec<String>> {
 /// What the columns of [`study_rows`] mean that do not say it themselves.
 pub const STUDY_NOTE: &str = "static: part of the peak that the arm has standing still there; in motion: largest part that its motion adds; \
      settling: at the stop that takes longest; apart: largest distance of the flexible TCP from that of the first run at the same time, and that over the \
-     first run's largest TCP error";
+     first run's largest TCP error; neither is told between different robots";
 
 #[cfg(feature = "rerun")]
 fn study_markdown(summary: &Summary) -> String {

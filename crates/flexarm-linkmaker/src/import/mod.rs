@@ -41,6 +41,7 @@ use flexarm_files::{check_free, file_stem, write_all};
 use flexarm_settings::{Caller, Setting};
 use nalgebra::{DMatrix, Rotation3, Translation3, Vector3};
 
+use crate::robot_entry::robot_entry;
 use crate::{ImportError, LinkError, stamp};
 use summary::Parts;
 
@@ -499,7 +500,8 @@ impl Targets {
 
     fn write(&self, flex: &str, summary: &mut ImportSummary) -> Result<(), LinkError> {
         let text = |path: &PathBuf| Some(path.display().to_string());
-        summary.files.flex = self.flex.as_ref().or(self.folder.as_ref().map(|f| &f[0])).and_then(text);
+        let link_file = self.flex.as_ref().or(self.folder.as_ref().map(|f| &f[0]));
+        summary.files.flex = link_file.and_then(text);
         let mut contents = Vec::new();
         if let Some([link, figures, report]) = &self.folder {
             summary.files.summary = text(figures);
@@ -511,6 +513,9 @@ impl Targets {
         }
         contents.extend(self.flex.iter().map(|path| (path.clone(), flex.to_owned())));
         check_free(&self.all(), self.overwrite)?;
-        Ok(write_all(&contents)?)
+        write_all(&contents)?;
+        // Not in the files, which are the same wherever they are made.
+        summary.files.entry = link_file.map(|flex| robot_entry(flex, &summary.link, None));
+        Ok(())
     }
 }

@@ -115,6 +115,8 @@ pub struct ImportChecks {
 pub struct ImportFiles {
     /// The link file, for `reduced = "..."` of a robot file.
     pub flex: Option<String>,
+    /// The entry of a robot file that uses it, as TOML.
+    pub entry: Option<String>,
     /// These figures.
     pub summary: Option<String>,
     /// These figures for people.

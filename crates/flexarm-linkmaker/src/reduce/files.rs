@@ -36,6 +36,11 @@ pub(super) struct Folder {
 }
 
 impl Paths {
+    /// The link file: where it was asked for, or in the folder.
+    pub(super) fn flex(&self) -> Option<&Path> {
+        self.flex.as_deref().or(self.folder.as_ref().map(|folder| folder.flex.as_path()))
+    }
+
     /// # Errors
     /// [`FileError::Taken`] for what is there already, [`FileError::Unusable`] for a folder in the place of a file.
     pub(super) fn new(outputs: &ReduceOutputs, link: &str) -> Result<Self, FileError> {

@@ -40,6 +40,7 @@ use flexarm_fem::{UnitSystem, reduce_mesh, write_flex};
 use flexarm_settings::caveat;
 use flexarm_spatial::Pose;
 
+use crate::robot_entry::robot_entry;
 use crate::{JobError, LinkError};
 use files::Paths;
 use interfaces::Place;
@@ -150,6 +151,10 @@ impl Reduction {
         if let Some(paths) = paths {
             let pictures = if paths.folder.is_some() { pictures(&file.mesh, &plan, &reduction)? } else { Vec::new() };
             write(&job, &paths, &write_flex(&reduction.link), &pictures, &mut summary)?;
+            // Not in the files, which are the same wherever they are made.
+            let distal = robot.and_then(UrdfLink::distal_joint);
+            let link = robot.map_or(&summary.link, |robot| &robot.name);
+            summary.files.entry = paths.flex().map(|flex| robot_entry(flex, link, distal));
         }
         Ok(summary)
     }
@@ -261,7 +266,7 @@ fn write(
     summary: &mut ReduceSummary,
 ) -> Result<(), LinkError> {
     let text = |path: &std::path::Path| Some(path.display().to_string());
-    summary.files.flex = paths.flex.as_deref().or(paths.folder.as_ref().map(|f| f.flex.as_path())).and_then(text);
+    summary.files.flex = paths.flex().and_then(text);
     let (mut job_text, mut json, mut page) = (String::new(), String::new(), String::new());
     if let Some(folder) = &paths.folder {
         summary.files.job = text(&folder.job);

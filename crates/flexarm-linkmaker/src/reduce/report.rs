@@ -227,16 +227,17 @@ fn frequencies(summary: &ReduceSummary) -> ReportTable {
         Some((hz, error)) => format!("{hz:.2} ({:+.2} %)", if error.abs() < 5e-5 { 0.0 } else { 100.0 * error }),
         None => "-".into(),
     };
-    let mut header = vec!["mode".to_owned(), "mesh".into(), "Craig-Bampton".into(), "Guyan".into(), "two parts".into()];
+    // Without kept modes there is only the static reduction.
+    let kept = !summary.fixed_interface_hz.is_empty();
+    let mut header = vec!["mode".to_owned(), "mesh".into()];
+    header.extend(kept.then(|| "Craig-Bampton".to_owned()));
+    header.extend(["Guyan".to_owned(), "two parts".into()]);
     header.extend(summary.chains.iter().map(|chain| format!("{} parts", chain.parts)));
     let row = |(k, mode): (usize, &ModeFigures)| {
-        let mut cells = vec![
-            (k + 1).to_string(),
-            format!("{:.2}", mode.mesh_hz),
-            percent(mode.reduced_hz, mode.reduced_error),
-            percent(mode.guyan_hz, mode.guyan_error),
-            percent(mode.lumped_hz, mode.lumped_error),
-        ];
+        let mut cells = vec![(k + 1).to_string(), format!("{:.2}", mode.mesh_hz)];
+        cells.extend(kept.then(|| percent(mode.reduced_hz, mode.reduced_error)));
+        cells.push(percent(mode.guyan_hz, mode.guyan_error));
+        cells.push(percent(mode.lumped_hz, mode.lumped_error));
         cells.extend(summary.chains.iter().map(|chain| {
             let hz = chain.frequencies_hz.get(k).copied();
             percent(hz, hz.map(|hz| hz / mode.mesh_hz - 1.0))

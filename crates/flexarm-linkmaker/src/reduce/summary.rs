@@ -92,6 +92,8 @@ pub struct ReduceSummary {
 pub struct ReduceFiles {
     /// The link file, for `reduced = "..."` of a robot file.
     pub flex: Option<String>,
+    /// The entry of a robot file that uses it, as TOML.
+    pub entry: Option<String>,
     /// The job, complete, to run again.
     pub job: Option<String>,
     /// These figures.

@@ -31,6 +31,12 @@ pub struct LinkJoint {
 }
 
 impl UrdfLink {
+    /// Name of the joint at B.
+    pub(super) fn distal_joint(&self) -> Option<&str> {
+        let at_b = |joint: &&LinkJoint| joint.leads_on && joint.X_LJ == self.X_LB;
+        self.joints.iter().find(at_b).map(|joint| joint.name.as_str())
+    }
+
     /// What the link weighs beyond its mesh, as two halves along the line from A to B, link axes.
     pub(super) fn rest(&self, mesh: &RigidPart, along: &Vector3<f64>) -> Result<[RigidPart; 2], String> {
         let Some(whole) = &self.inertia else {

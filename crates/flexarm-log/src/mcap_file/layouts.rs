@@ -56,12 +56,12 @@ fn plots(header: &RunHeader) -> Vec<Plot> {
     if !header.elements.is_empty() {
         let parts = ["x", "y", "z", "rx", "ry", "rz"];
         let names = header.elements.iter().flat_map(|name| parts.map(|part| format!("{name}/{part}")));
-        let color = |k| palette::series(k, GROUND);
+        let color = |k: usize| palette::component(header.color_number(&header.elements[k / 6]), k % 6, GROUND);
         let curves = names.enumerate().map(|(k, name)| joint("/elastic/joint_states", k, &name, "position", color(k)));
         plots.push(Plot { title: "Deflections [m, rad]", curves: curves.collect() });
     }
     for (title, part) in [("Joint efforts [N m, N]", "effort"), ("Joint positions [rad, m]", "position")] {
-        let color = |k| palette::series(k, GROUND);
+        let color = |k: usize| palette::series(header.color_number(&header.joints[k]), GROUND);
         let joints = header.joints.iter().enumerate();
         let curves = joints.map(|(k, name)| joint("/joint_states", k, name, part, color(k))).collect();
         plots.push(Plot { title, curves });

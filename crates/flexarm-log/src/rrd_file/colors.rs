@@ -21,7 +21,12 @@ pub(crate) fn series(number: usize) -> Color {
     opaque(palette::series(number, Ground::Dark))
 }
 
-/// The same, fainter: what belongs to the rigid twin.
+/// One of the six components of what has this number.
+pub(crate) fn component(number: usize, component: usize) -> Color {
+    opaque(palette::component(number, component, Ground::Dark))
+}
+
+/// A run, link, drive or joint by its number, fainter: what belongs to the rigid twin.
 pub(crate) fn faint(number: usize) -> Color {
     opaque(palette::mix(palette::series(number, Ground::Dark), [0; 3], 0.45))
 }

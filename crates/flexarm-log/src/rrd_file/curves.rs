@@ -3,7 +3,7 @@
 use crate::rerun::{Chunk, TimeColumn};
 use crate::rerun::{Color, EntityPath};
 
-use super::colors::{axis, faint, series, total};
+use super::colors::{axis, component, faint, series, total};
 use super::path;
 use super::stream::{Ids, Put, StreamError};
 use super::tracks::{ScalarTrack, Seen};
@@ -44,17 +44,20 @@ impl Curves {
             tracks.push(curve("tcp_error_rotation", "z", "about z [mrad]", axis(2)));
         }
         let joints = &header.joints;
-        tracks.push(counted(at(&["joints", "position"]), joints.clone(), &series));
-        tracks.push(counted(at(&["joints", "velocity"]), joints.clone(), &series));
-        tracks.push(counted(at(&["joints", "effort", "flexible"]), joints.clone(), &series));
+        let of_joint = |k: usize| series(header.color_number(&joints[k]));
+        tracks.push(counted(at(&["joints", "position"]), joints.clone(), &of_joint));
+        tracks.push(counted(at(&["joints", "velocity"]), joints.clone(), &of_joint));
+        tracks.push(counted(at(&["joints", "effort", "flexible"]), joints.clone(), &of_joint));
         if header.has_rigid {
             let names = joints.iter().map(|joint| format!("{joint} (rigid)")).collect();
-            tracks.push(counted(at(&["joints", "effort", "rigid"]), names, &faint));
+            let of_twin = |k: usize| faint(header.color_number(&joints[k]));
+            tracks.push(counted(at(&["joints", "effort", "rigid"]), names, &of_twin));
         }
-        for (number, element) in header.elements.iter().enumerate() {
+        for element in &header.elements {
             let names = |parts: [&str; 6]| parts.map(|part| format!("{element} {part}")).to_vec();
             // All elements are in one plot.
-            let color = |part: usize| series(6 * number + part);
+            let number = header.color_number(element);
+            let color = |part: usize| component(number, part);
             let deflections = names(["x [mm]", "y [mm]", "z [mm]", "rx [mrad]", "ry [mrad]", "rz [mrad]"]);
             tracks.push(counted(at(&["elastic", element]), deflections, &color));
             let loads = names(["Fx [N]", "Fy [N]", "Fz [N]", "Mx [N m]", "My [N m]", "Mz [N m]"]);

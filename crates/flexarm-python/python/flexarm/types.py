@@ -174,9 +174,9 @@ class ShareFigures(TypedDict):
     name: str
     """Name of the link or joint."""
     kind: str
-    """link, gearbox, servo or mounting."""
+    """link, gearbox, servo, mounting or stepper."""
     along_m: float
-    """Part of the error along its direction, first order (m): all shares together make the error."""
+    """Part of the error along its direction (m): all shares together make the error."""
 
 
 class HoldFigures(TypedDict):
@@ -1712,6 +1712,8 @@ class ReduceFiles(TypedDict):
 
     flex: str | None
     """The link file, for `reduced = "..."` of a robot file."""
+    entry: str | None
+    """The entry of a robot file that uses it, as TOML."""
     job: str | None
     """The job, complete, to run again."""
     summary: str | None
@@ -1842,6 +1844,8 @@ class ImportFiles(TypedDict):
 
     flex: str | None
     """The link file, for `reduced = "..."` of a robot file."""
+    entry: str | None
+    """The entry of a robot file that uses it, as TOML."""
     summary: str | None
     """These figures."""
     report: str | None

@@ -30,6 +30,7 @@ pub(super) static ENTRY: StepperEntry = StepperEntry {
     aliases: &["extrapolated"],
     help: "Generalised-alpha with the step and its half, extrapolated: third order and more, for errors below 0.01 %",
     steps: StepRule::AnyLength,
+    default_step_s: 1e-3,
     order: 3,
     maximal: false,
     allocates: false,

@@ -46,6 +46,7 @@ pub(super) static ENTRY: StepperEntry = StepperEntry {
     aliases: &[],
     help: "Error control instead of a fixed step, for converged results",
     steps: StepRule::ByErrorControl,
+    default_step_s: 1e-3,
     order: 0,
     maximal: false,
     allocates: true,

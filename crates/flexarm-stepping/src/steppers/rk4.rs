@@ -20,6 +20,7 @@ pub(super) static ENTRY: StepperEntry = StepperEntry {
     aliases: &[],
     help: "Explicit, fourth order; small steps only",
     steps: StepRule::UpToTheStabilityLimit,
+    default_step_s: 1e-4,
     order: 4,
     maximal: false,
     allocates: false,

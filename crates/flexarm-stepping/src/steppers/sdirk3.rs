@@ -45,6 +45,7 @@ pub(super) static ENTRY: StepperEntry = StepperEntry {
     aliases: &[],
     help: "Implicit, third order, L-stable: modes too fast for the step are gone after it",
     steps: StepRule::AnyLength,
+    default_step_s: 1e-3,
     order: 3,
     maximal: false,
     allocates: false,

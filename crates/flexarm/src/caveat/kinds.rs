@@ -49,9 +49,32 @@ pub(crate) const FEW_SAMPLES: CaveatKind = CaveatKind::warning(
 /// Few steps.
 pub(crate) const COARSE_STEP: CaveatKind = CaveatKind::warning(
     "coarse-step",
-    "{value} steps per period of the first mode are coarse: lower {step_s}",
-    "",
-    "twenty steps per period or more follow it",
+    "a swing of the first mode comes out {value} % off within one period, as the steps are long for this method: lower {step_s} \
+     or choose another {stepper}",
+    "%",
+    "compare with half the step",
+);
+/// Joints that drift apart in maximal coordinates.
+pub(crate) const JOINT_DRIFT: CaveatKind = CaveatKind::warning(
+    "joint-drift",
+    "joints drift apart in {where}: {value} % of the largest TCP error is theirs and no deflection: lower {step_s}",
+    "%",
+    "the drift falls with the square of the step",
+);
+/// A settling band in other units.
+pub(crate) const WIDE_BAND: CaveatKind = CaveatKind::warning(
+    "wide-band",
+    "the settling band of {value} m is wide for a robot: give {settling_band_m} in m",
+    "m",
+    "robots are specified to settle within 0.01 to 1 mm",
+);
+/// A settling band as wide as the error.
+pub(crate) const BAND_BEYOND_ERROR: CaveatKind = CaveatKind::warning(
+    "band-beyond-error",
+    "the settling band of {value} m is wider than the largest TCP error of {yardstick} m: the tool counts as settled at all times; \
+     narrow {settling_band_m}",
+    "m",
+    "a tenth of the error shows when the ringing is over",
 );
 /// Energy.
 pub(crate) const ENERGY_OPEN: CaveatKind = CaveatKind::warning(
@@ -74,6 +97,13 @@ pub(crate) const OUTSIDE_LIMITS: CaveatKind = CaveatKind::warning(
     "{where} at {value} is outside its limits",
     "rad",
     "choose a pose that the robot can take",
+);
+/// A joint without limits at many turns.
+pub(crate) const MANY_TURNS: CaveatKind = CaveatKind::warning(
+    "many-turns",
+    "{where} at {value} rad is turned further than twice around ({yardstick} rad)",
+    "rad",
+    "give the pose in rad",
 );
 
 // What the files say of the robot.

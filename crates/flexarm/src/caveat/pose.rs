@@ -75,8 +75,7 @@ impl Standing<'_> {
         } else if hz * extent > SOUND {
             caveats.push(kinds::FAST_MODE.found("the arm", hz, SOUND / extent));
         }
-        let shape = modes.shapes.column(0);
-        let ratio = shape.dot(&(&self.arm.D * shape)) / (2.0 * omega);
+        let ratio = self.arm.first_damping_ratio();
         if ratio > DAMPED[0] {
             let caveat = kinds::DAMPED_MODE.found("the first mode", ratio, 1.0);
             caveats.push(if ratio > DAMPED[1] { caveat } else { caveat.as_note() });

@@ -1,7 +1,11 @@
 //! Whether the models hold: deflections, strains, forces of drives, sampling. For runs, statics and `check` alike.
 
-use flexarm_kinematics::Coordinate;
+use std::f64::consts::TAU;
 
+use flexarm_kinematics::Coordinate;
+use flexarm_stepping::{StepperKind, error_of_a_period};
+
+use super::slip::{self, slip};
 use super::{Caveat, CaveatKind, kinds};
 
 /// Largest elastic rotation for which the linear elastic model is taken to hold (rad).
@@ -12,8 +16,12 @@ const STRAIN_LIMIT: f64 = 1e-3;
 const IMBALANCE_LIMIT: f64 = 0.02;
 /// Fewest samples in a period of the first mode.
 const SAMPLES_PER_PERIOD: f64 = 10.0;
-/// Fewest steps in a period of the first mode.
-const STEPS_PER_PERIOD: f64 = 20.0;
+/// Largest error of a swing of the first mode within a period, over its amplitude.
+const PERIOD_ERROR: f64 = 0.05;
+/// Largest part of the TCP error that joints may drift apart.
+const DRIFT: f64 = 0.01;
+/// Wider settling bands are slips (m).
+const WIDE_BAND: f64 = 0.01;
 
 /// A flexible link whose far end turned by so much (rad), with so much engineering strain.
 pub(crate) fn link(name: &str, rotation: f64, strain: f64) -> impl Iterator<Item = Caveat> {
@@ -35,25 +43,64 @@ pub(crate) fn efforts<'a>(
     coordinates.iter().zip(needed).filter(over).map(told)
 }
 
-/// Joints outside their range at a pose.
+/// A limited joint further than this outside its range may have been given in degrees: times its limit, and at least (rad).
+const LIKE_DEGREES: (f64, f64) = (1.25, std::f64::consts::PI);
+/// A joint without limits that turns further than this may have been (rad): two turns.
+const MANY_TURNS: f64 = 4.0 * std::f64::consts::PI;
+
+/// Whether the value of a joint that turns was probably meant in degrees: in degrees it lies in the range, in radians far
+/// outside.
+fn like_degrees(c: &Coordinate, q: f64) -> bool {
+    let (lower, upper) = (c.limits.lower, c.limits.upper);
+    let limit = if q < 0.0 { lower } else { upper };
+    let far = if limit.is_finite() { (LIKE_DEGREES.0 * limit.abs()).max(LIKE_DEGREES.1) } else { MANY_TURNS };
+    c.kind != "prismatic" && q.abs() > far && (lower..=upper).contains(&q.to_radians())
+}
+
+/// Joints outside their range at a pose, and joints without a range at many turns.
 pub(crate) fn outside_limits<'a>(coordinates: &'a [Coordinate], q: &'a [f64]) -> impl Iterator<Item = Caveat> + 'a {
-    let outside = |(c, q): &(&Coordinate, &f64)| **q < c.limits.lower || **q > c.limits.upper;
-    coordinates.iter().zip(q).filter(outside).map(|(c, q)| {
+    coordinates.iter().zip(q).filter_map(|(c, q)| {
         let (lower, upper) = (c.limits.lower, c.limits.upper);
-        let limit = if *q < lower { lower } else { upper };
-        let mut caveat = kinds::OUTSIDE_LIMITS.found(format!("joint {:?}", c.joint), *q, limit);
-        caveat.message += &format!(" {lower} to {upper}");
-        caveat
+        let joint = format!("joint {:?}", c.joint);
+        let degrees =
+            if like_degrees(c, *q) { format!("degrees? {q}deg is {:.4} rad", q.to_radians()) } else { String::new() };
+        if *q < lower || *q > upper {
+            let mut caveat = kinds::OUTSIDE_LIMITS.found(joint, *q, if *q < lower { lower } else { upper });
+            caveat.message += &format!(" {lower} to {upper}");
+            Some(caveat.likely(degrees))
+        } else if !degrees.is_empty() {
+            Some(kinds::MANY_TURNS.found(joint, *q, MANY_TURNS).likely(degrees))
+        } else {
+            None
+        }
     })
 }
 
-/// Steps and samples against the first mode (Hz).
-pub(crate) fn sampling(first_hz: f64, step_s: f64, logged_hz: f64) -> impl Iterator<Item = Caveat> {
-    let few = logged_hz < SAMPLES_PER_PERIOD * first_hz;
-    let steps = 1.0 / (step_s * first_hz);
-    let coarse = steps < STEPS_PER_PERIOD;
-    let few = few.then(|| kinds::FEW_SAMPLES.found("run", logged_hz, first_hz));
-    few.into_iter().chain(coarse.then(|| kinds::COARSE_STEP.found("run", steps, STEPS_PER_PERIOD)))
+/// Samples against the first mode (Hz).
+pub(crate) fn sampling(first_hz: f64, logged_hz: f64) -> Option<Caveat> {
+    (logged_hz < SAMPLES_PER_PERIOD * first_hz).then(|| kinds::FEW_SAMPLES.found("run", logged_hz, first_hz))
+}
+
+/// Steps (s) against the first mode (Hz, damping ratio), by what the stepper makes of an oscillation like it.
+pub(crate) fn step(kind: StepperKind, step_s: f64, first_hz: f64, ratio: f64) -> Option<Caveat> {
+    // What hardly swings has no period.
+    let error = if ratio < 0.9 { error_of_a_period(kind, step_s * TAU * first_hz, ratio) } else { 0.0 };
+    (error > PERIOD_ERROR).then(|| kinds::COARSE_STEP.found("run", 100.0 * error, 100.0 * PERIOD_ERROR))
+}
+
+/// What the steps of a stepper in maximal coordinates leave of its joints, as a part of the largest TCP error.
+pub(crate) fn drift(stepper: &str, part: f64) -> Option<Caveat> {
+    (part > DRIFT).then(|| kinds::JOINT_DRIFT.found(format!("the steps of {stepper}"), 100.0 * part, 100.0 * DRIFT))
+}
+
+/// A settling band (m) against what robots are specified by and against the largest TCP error (m). The usual band is only noted.
+pub(crate) fn band(band_m: f64, peak_m: f64, usual_m: f64) -> Option<Caveat> {
+    let likely = || slip(band_m, &(1e-6..=WIDE_BAND), slip::LENGTH, 1.0);
+    if band_m > WIDE_BAND {
+        return Some(kinds::WIDE_BAND.found("run", band_m, WIDE_BAND).likely(likely()));
+    }
+    let beyond = kinds::BAND_BEYOND_ERROR.found("run", band_m, peak_m);
+    (peak_m > 0.0 && band_m > peak_m).then(|| if band_m == usual_m { beyond.as_note() } else { beyond })
 }
 
 /// Gap of the energy balance, as a part of the energy in it.

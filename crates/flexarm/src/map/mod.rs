@@ -259,6 +259,7 @@ pub fn map(
     found.caveats.extend(caveats);
     found.caveats.extend(one_place(&found));
     found.caveats.extend(request.tool.iter().flat_map(caveat::tool::of_tool));
+    found.caveats.extend(caveat::validity::outside_limits(actuated, &near).filter(|_| request.at.is_some()));
     found.caveats.extend(validity(robot, request, &found));
     found.warnings = caveat::warnings(&found.caveats);
     found.wall_s = begun.elapsed().as_secs_f64();

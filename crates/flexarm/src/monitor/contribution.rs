@@ -5,7 +5,7 @@
 //! ```
 
 use flexarm_analysis::{ContributionPeak, ContributionPeaks};
-use flexarm_stepping::{FlexibleArm, Observation};
+use flexarm_stepping::{ElasticElement, FlexibleArm, Observation};
 use nalgebra::Vector6;
 
 use crate::flexible::{FlexibleRobot, Owner};
@@ -50,6 +50,12 @@ impl Contributions {
         for (place, displacement) in self.moved.iter().enumerate() {
             self.peaks.add(place, seen.t, displacement);
         }
+    }
+
+    /// Place of the one to whom a coordinate belongs; motors are with what servos leave.
+    pub(crate) fn place_of(&self, coordinate: usize, arm: &FlexibleArm) -> usize {
+        let within = |e: &ElasticElement| (e.coordinate..e.coordinate + e.size).contains(&coordinate);
+        arm.elements.iter().position(within).map_or(self.moved.len() - 1, |k| self.places[k])
     }
 
     /// Displacements of the tool at the last sample (m, rad, world axes).

@@ -11,6 +11,7 @@ use serde::Serialize;
 use super::{ReportRun, figures, html};
 use crate::convert::{no_sample, read_run, same_file};
 use crate::error::{Error, RecordingError};
+use crate::magnification::fit_color_scale;
 use crate::stepper_settings::{SettingValue, StepperSettings};
 use crate::summary::{StepperFigures, Summary, TcpFigures};
 
@@ -80,7 +81,8 @@ pub fn report(recordings: &[PathBuf], options: &ReportOptions) -> Result<ReportF
     let folder = page.with_file_name(crate::record::FIGURES_FOLDER);
     check_places(&inputs, &page, &folder, options)?;
 
-    let runs = read_all(&inputs, &mut warnings)?;
+    let mut runs = read_all(&inputs, &mut warnings)?;
+    fit_color_scale(runs.iter_mut().map(|(.., trace)| trace));
     let reports: Vec<ReportRun<'_>> =
         runs.iter().map(|(label, summary, trace)| ReportRun { label, summary, trace }).collect();
     write_all(&[(page.clone(), html(&reports))])?;

@@ -75,10 +75,18 @@ pub(super) enum Kind {
     Plain,
     /// The size of others.
     Total,
-    /// What others are compared with.
+    /// The rigid twin, with which others are compared.
     Dashed,
     /// Along the axis x (0), y (1) or z (2) of the world: in its colour.
     Axis(usize),
+    /// Of a link, spring or joint with the colour of this number.
+    Part(usize),
+}
+
+impl Kind {
+    fn of(trace: &Trace, name: &str) -> Self {
+        Self::Part(trace.header.color_number(name))
+    }
 }
 
 impl Table {
@@ -318,7 +326,8 @@ fn contributions(trace: &Trace) -> Option<Plot> {
         return None;
     }
     let view = |name: &str, of: &dyn Fn(usize) -> CurveQuantity| {
-        let curves = names.iter().enumerate().map(|(k, name)| curve(trace, name.clone(), Kind::Plain, 1e3, of(k)));
+        let curves =
+            names.iter().enumerate().map(|(k, name)| curve(trace, name.clone(), Kind::of(trace, name), 1e3, of(k)));
         let table = Table::new(trace.curve_times(), curves.collect(), MOST_POINTS);
         PlotView { name: name.into(), tables: vec![table], ..PlotView::default() }
     };
@@ -342,7 +351,8 @@ fn elements(summary: &Summary, trace: &Trace) -> Vec<Plot> {
         return Vec::new();
     }
     let make = |plot: Plot, scale: f64, size: fn(usize) -> CurveQuantity, part: fn(usize, usize) -> CurveQuantity| {
-        let sizes = names.iter().enumerate().map(|(k, name)| curve(trace, name.clone(), Kind::Plain, scale, size(k)));
+        let sizes = names.iter().enumerate();
+        let sizes = sizes.map(|(k, name)| curve(trace, name.clone(), Kind::of(trace, name), scale, size(k)));
         let table = Table::new(trace.curve_times(), sizes.collect(), MOST_POINTS);
         let mut views = vec![PlotView { name: "all, size".into(), tables: vec![table], ..PlotView::default() }];
         for (k, name) in names.iter().enumerate() {
@@ -402,11 +412,11 @@ fn slides(trace: &Trace, joint: usize) -> bool {
 fn torques(trace: &Trace) -> Plot {
     let names = &trace.header.joints;
     let all = names.iter().enumerate();
-    let all = all.map(|(k, name)| curve(trace, name.clone(), Kind::Plain, 1.0, CurveQuantity::Effort(k)));
+    let all = all.map(|(k, name)| curve(trace, name.clone(), Kind::of(trace, name), 1.0, CurveQuantity::Effort(k)));
     let table = Table::new(trace.curve_times(), all.collect(), MOST_POINTS);
     let mut views = vec![PlotView { name: "all, flexible".into(), tables: vec![table], ..PlotView::default() }];
     for (k, name) in names.iter().enumerate() {
-        let mut curves = vec![curve(trace, "flexible", Kind::Plain, 1.0, CurveQuantity::Effort(k))];
+        let mut curves = vec![curve(trace, "flexible", Kind::of(trace, name), 1.0, CurveQuantity::Effort(k))];
         if trace.header.has_rigid {
             curves.push(curve(trace, "rigid", Kind::Dashed, 1.0, CurveQuantity::RigidEffort(k)));
         }
@@ -432,8 +442,9 @@ fn joints(trace: &Trace) -> Vec<Plot> {
     let make = |sliding: bool| {
         let names = trace.header.joints.iter().enumerate().filter(|(k, _)| slides(trace, *k) == sliding);
         let scale = if sliding { 1e3 } else { 1f64.to_degrees() };
-        let curves: Vec<Curve> =
-            names.map(|(k, name)| curve(trace, name.clone(), Kind::Plain, scale, CurveQuantity::Joint(k))).collect();
+        let of_joint =
+            |(k, name): (usize, &String)| curve(trace, name.clone(), Kind::of(trace, name), scale, CurveQuantity::Joint(k));
+        let curves: Vec<Curve> = names.map(of_joint).collect();
         let (id, title) =
             if sliding { ("slides", "Positions of sliding joints") } else { ("joints", "Joint positions") };
         (!curves.is_empty()).then(|| Plot {

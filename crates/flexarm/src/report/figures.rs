@@ -63,8 +63,9 @@ fn svg(plot: &Plot, view: &PlotView, bands: &[(f64, f64)]) -> Result<String, fle
             look: match curve.kind {
                 Kind::Plain => CurveLook::Plain,
                 Kind::Total => CurveLook::Total,
-                Kind::Dashed => CurveLook::Dashed,
+                Kind::Dashed => CurveLook::Rigid,
                 Kind::Axis(k) => CurveLook::Axis(k),
+                Kind::Part(k) => CurveLook::Part(k),
             },
             x: table.x.clone(),
             y: curve.y.clone(),

@@ -9,6 +9,7 @@ mod figures;
 mod html;
 mod path_plan;
 mod picture;
+mod shares;
 
 use std::fmt::Write as _;
 
@@ -18,10 +19,13 @@ use flexarm_settings::gathered;
 use flexarm_settings::written::{markdown as markdown_text, markdown_row};
 
 use crate::error::Error;
+use crate::headline::{self, rounded};
 use crate::options::Outputs;
 use crate::record::FIGURES_FOLDER;
 use crate::settling::within;
 use crate::summary::Summary;
+
+use self::shares::{Part, part_shares, share_numbers};
 
 pub use again::{ReportFiles, ReportOptions, report};
 pub use html::{ReportRun, html};
@@ -157,8 +161,11 @@ pub fn figure_groups(summary: &Summary) -> Vec<FigureGroup> {
     groups.into_iter().filter(|group| !group.rows.is_empty()).collect()
 }
 
+/// Digits behind the point of lengths in mm.
+const MM_DIGITS: usize = 4;
+
 fn mm(x: f64) -> String {
-    format!("{:.4}", 1e3 * x)
+    format!("{:.MM_DIGITS$}", 1e3 * x)
 }
 
 fn tool_figures(summary: &Summary) -> Vec<Figure> {
@@ -173,9 +180,11 @@ fn tool_figures(summary: &Summary) -> Vec<Figure> {
     if let (Some(at_rest), Some(moving), Some(most), Some(t)) =
         (tcp.static_at_peak_m, tcp.dynamic_at_peak_m, tcp.dynamic_peak_m, tcp.t_dynamic_peak_s)
     {
-        rows.push(Figure::new("static part of the peak", mm(at_rest), "mm", "what it would be standing still there"));
+        let parts = rounded(&[1e3 * at_rest, 1e3 * moving], 1e3 * tcp.peak_m, MM_DIGITS);
+        let note = "what it would be standing still there";
+        rows.push(Figure::new("static part of the peak", parts[0].clone(), "mm", note));
         let note = format!("up to {} mm at {t:.3} s", mm(most));
-        rows.push(Figure::new("part of the peak in motion", mm(moving), "mm", note));
+        rows.push(Figure::new("part of the peak in motion", parts[1].clone(), "mm", note));
     }
     rows.push(Figure::new("RMS TCP error", mm(tcp.rms_m), "mm", ""));
     let [along, normal, binormal] = tcp.path_peak_m;
@@ -215,14 +224,29 @@ fn tool_figures(summary: &Summary) -> Vec<Figure> {
 
 fn part_figures(summary: &Summary) -> Vec<Figure> {
     let mut rows = Vec::new();
-    for link in &summary.links {
-        let (strain, turn) = (link.engineering_strain, mm(link.peak_rotation_rad));
-        let note = format!("of TCP motion; strain {strain:.1e}, bends by {turn} mrad");
-        rows.push(Figure::new(format!("link {}", link.name), mm(link.peak_contribution_m), "mm", note));
-    }
-    for drive in &summary.elastic_drives {
-        let note = format!("of TCP motion; gives way by {} mrad", mm(drive.peak_deflection_rad));
-        rows.push(Figure::new(format!("drive {}", drive.joint), mm(drive.peak_contribution_m), "mm", note));
+    let shares = part_shares(summary);
+    let numbers = share_numbers(summary, &shares, MM_DIGITS);
+    for (share, number) in shares.iter().zip(numbers) {
+        let (name, turns) = match share.part {
+            Part::Link(link) => {
+                let (strain, turn) = (link.engineering_strain, mm(link.peak_rotation_rad));
+                (format!("link {}", share.name), format!("; strain {strain:.1e}, bends by {turn} mrad"))
+            }
+            Part::Drive(drive) => {
+                let turns = format!("; gives way by {} mrad", mm(drive.peak_deflection_rad));
+                (format!("drive {}", share.name), turns)
+            }
+            Part::None if share.kind == headline::STEPPER => ("joints drifting apart".to_owned(), String::new()),
+            Part::None => (share.name.to_owned(), String::new()),
+        };
+        let largest = share.largest_m.map(mm).unwrap_or_default();
+        rows.push(match number {
+            Some(at_peak) if share.largest_m.is_some() => {
+                Figure::new(name, at_peak, "mm", format!("of the peak; at most {largest} mm{turns}"))
+            }
+            Some(at_peak) => Figure::new(name, at_peak, "mm", "of the peak"),
+            None => Figure::new(name, largest, "mm", format!("of TCP motion{turns}")),
+        });
     }
     if let Some(first) = summary.frequencies_hz.first() {
         let others: Vec<String> = summary.frequencies_hz.iter().skip(1).take(3).map(|f| format!("{f:.2}")).collect();

@@ -5,13 +5,13 @@ use flexarm_kinematics::{Frame, State, forward_kinematics};
 use flexarm_log::Event;
 use flexarm_stepping::{FlexibleArm, StepRule, StepperKind};
 use flexarm_trajectory::LimitViolation;
-use nalgebra::Vector3;
 
 use super::{Run, Wanted, moves};
 use crate::caveat::pose::Standing;
 use crate::caveat::{Caveat, drives, kinds, validity};
 use crate::flexible::Owner;
 use crate::headline::{self, Bending, ShareFigures};
+use crate::options::RunOptions;
 use crate::summary::{CURVE_PIECES, DriveFigures, LinkFigures, StepperFigures, Summary, TcpFigures};
 
 /// Steps in a period of a gear's ripple with which a step of second order meets its amplitude within a few per cent.
@@ -50,11 +50,11 @@ impl Run<'_> {
             motors: self.motors.clone(),
             moves_s: moves(self.motion).iter().map(|&(start, end)| [start, end]).collect(),
             error_curve: self.monitors.tool.result().largest_errors(CURVE_PIECES),
-            caveats: self.caveats(&links, sag_m, robot_caveats),
             links,
             elastic_drives,
             ..Summary::default()
         };
+        summary.caveats = self.caveats(&summary, sag_m, robot_caveats);
         summary.headline = headline::headline(&summary, by_choice);
         let events = if self.wanted == Wanted::Curves { self.events(metrics) } else { Vec::new() };
         (summary, events)
@@ -98,19 +98,26 @@ impl Run<'_> {
 
     /// What each contributor has in the largest error, along its direction.
     fn shares_at_peak(&self) -> Vec<ShareFigures> {
-        let peak = &self.trace.peak;
-        let error = Vector3::from_row_slice(&peak.error_world[..3]);
-        let along = error.try_normalize(0.0).unwrap_or_default();
-        let shares = self.contributors.iter().zip(&peak.contributions).map(|(who, moved)| ShareFigures {
+        let (along, rest) = self.at_peak.along(&self.tcp);
+        let mut places = vec![0.0; self.monitors.contributions.moved().len()];
+        for (k, along) in along.iter().enumerate() {
+            places[self.monitors.contributions.place_of(k, &self.arm)] += along;
+        }
+        let shares = self.contributors.iter().map(|who| ShareFigures {
             name: who.name.clone(),
             kind: who.kind.into(),
-            along_m: along.dot(&Vector3::from(*moved)),
+            along_m: places[who.place],
         });
-        shares.collect()
+        let of_stepper = self.options.stepper.entry().maximal.then(|| ShareFigures {
+            name: self.options.stepper.name().into(),
+            kind: headline::STEPPER.into(),
+            along_m: rest,
+        });
+        shares.chain(of_stepper).collect()
     }
 
     /// What is probably wrong with the input, and whether the models held in what was seen so far.
-    fn caveats(&self, links: &[LinkFigures], sag_m: f64, mut caveats: Vec<Caveat>) -> Vec<Caveat> {
+    fn caveats(&self, summary: &Summary, sag_m: f64, mut caveats: Vec<Caveat>) -> Vec<Caveat> {
         caveats.extend(self.flexible.caveats());
         caveats.extend(self.motion.caveats());
         caveats.extend(crate::caveat::loops::of_motion(&self.motion.trajectory, &self.flexible.rigid));
@@ -121,10 +128,18 @@ impl Run<'_> {
         caveats.extend(Standing { robot, flexible, arm, elastic, sag_m }.caveats());
         caveats.extend(self.drive_caveats());
         if let Some(first) = arm.modes.frequencies_hz().first() {
-            let logged_hz = 1.0 / (self.every as f64 * self.options.step_s);
-            caveats.extend(validity::sampling(*first, self.options.step_s, logged_hz));
+            let RunOptions { stepper, step_s, .. } = *self.options;
+            caveats.extend(validity::sampling(*first, 1.0 / (self.every as f64 * step_s)));
+            caveats.extend(validity::step(stepper, step_s, *first, arm.first_damping_ratio()));
         }
-        for link in links {
+        if let Some(tcp) = summary.tcp.as_ref() {
+            let of_stepper = tcp.shares_at_peak.iter().filter(|share| share.kind == headline::STEPPER);
+            caveats.extend(of_stepper.filter_map(|s| validity::drift(&s.name, s.along_m.abs() / tcp.peak_m)));
+            let usual_m = RunOptions::default().settling_band_m;
+            let stops = !tcp.holds.is_empty();
+            caveats.extend(validity::band(self.options.settling_band_m, tcp.peak_m, usual_m).filter(|_| stops));
+        }
+        for link in &summary.links {
             caveats.extend(validity::link(&link.name, link.peak_rotation_rad, link.engineering_strain));
         }
         caveats.extend(validity::energy(self.monitors.energy.result().imbalance));

@@ -6,6 +6,7 @@
 mod events;
 mod figures;
 mod sampler;
+mod shares;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -21,7 +22,7 @@ use crate::caveat::{self, Caveat};
 use crate::error::Error;
 use crate::flexible::{FlexibleRobot, Owner};
 use crate::headline;
-use crate::magnification::Expected;
+use crate::magnification::{Expected, fit_color_scale};
 use crate::monitor::Monitors;
 use crate::monitor::tool::ToolMonitor;
 use crate::motion::Motion;
@@ -30,6 +31,7 @@ use crate::prepare::{Checked, Prepared, checked};
 use crate::record::{header, link_frames, names_of_signals, ordered_links, recorders, signals, write_layouts};
 use crate::robot::Robot;
 use crate::run::sampler::Sampler;
+use crate::run::shares::AtPeak;
 use crate::scenario::Scenario;
 use crate::static_part::StaticPart;
 use crate::summary::{Files, Summary};
@@ -170,6 +172,7 @@ pub(crate) fn run_traced(
         // How far things are shown enlarged is asked by nobody but recordings.
         _ => Expected::default(),
     };
+    let shares_scale = together.expected.is_some();
     let expected = together.expected.unwrap_or_else(own);
     let mut run = Run::new(robot, &scenario.motion, options, &flexible, arm, stepper, wanted);
     let mut files = recorders(outputs, !together.recorders.is_empty())?;
@@ -196,6 +199,9 @@ pub(crate) fn run_traced(
         None => Trace::new(head),
     };
     let end = run.go(&mut files.set, outputs.is_some(), progress, together.observer);
+    if !shares_scale {
+        fit_color_scale([&mut run.trace]);
+    }
 
     let robot_caveats = together.robot_caveats.map_or_else(|| robot.caveats(), |known| known.to_vec());
     let (mut summary, mut events) = run.summary(robot_caveats);
@@ -291,6 +297,7 @@ struct Run<'a> {
     trace: Trace,
     bends: Vec<BendInfo>,
     contributors: Vec<Contributor>,
+    at_peak: AtPeak,
     /// Largest torque per motor that moves several joints.
     motors: std::collections::BTreeMap<String, f64>,
     wanted: Wanted,
@@ -334,6 +341,7 @@ impl<'a> Run<'a> {
             trace: Trace::default(),
             bends,
             contributors: contributors(robot, flexible, &arm),
+            at_peak: AtPeak::default(),
             motors: Default::default(),
             wanted,
             every,
@@ -393,6 +401,7 @@ impl<'a> Run<'a> {
             }
         }
         let tool = self.monitors.update(&self.seen, &self.twin, &self.arm, &self.tcp);
+        self.at_peak.update(&tool.error, &self.seen, &self.twin);
         let sample = &mut self.sample;
         sample.error_world = tool.error;
         if self.wanted > Wanted::Figures {

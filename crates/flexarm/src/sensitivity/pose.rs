@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Matrix6, Vector3};
 use serde::Serialize;
 
 use crate::arm::Arm;
-use crate::caveat::Caveat;
+use crate::caveat::{Caveat, validity};
 use crate::error::{Error, ValueError};
 use crate::identify::Parameter;
 use crate::inspect::joint_values;
@@ -167,7 +167,9 @@ fn slopes(
         compliance: rows(&C, 1.0),
         frequencies_hz: frequencies.hz.clone(),
         parameters: all.into_iter().enumerate().map(of).chain(of_tools).collect(),
-        caveats: arm.robot_caveats().to_vec(),
+        caveats: validity::outside_limits(arm.flexible().rigid.coordinates(), &at)
+            .chain(arm.robot_caveats().iter().cloned())
+            .collect(),
         joints,
         at,
     })

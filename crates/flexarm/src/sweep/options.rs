@@ -28,6 +28,8 @@ const KEYS: [&str; 15] = [
 #[derive(Clone, Debug)]
 pub(super) struct StudyOptions {
     stepper: usize,
+    /// The stepper's own without it (s).
+    step_s: Option<f64>,
     settings: StepperOptions,
     run: RunOptions,
     pub(super) start: Start,
@@ -38,14 +40,16 @@ pub(super) struct StudyOptions {
 impl Default for StudyOptions {
     fn default() -> Self {
         let (settings, run, start) = (StepperOptions::default(), RunOptions::default(), Start::default());
-        Self { stepper: 0, settings, run, start, round_corners: None }
+        Self { stepper: 0, step_s: None, settings, run, start, round_corners: None }
     }
 }
 
 impl StudyOptions {
     /// What a run takes.
     pub(super) fn run(&self) -> RunOptions {
-        RunOptions { stepper: (STEPPERS[self.stepper].with)(&self.settings), ..self.run.clone() }
+        let entry = STEPPERS[self.stepper];
+        let step_s = self.step_s.unwrap_or(entry.default_step_s);
+        RunOptions { stepper: (entry.with)(&self.settings), step_s, ..self.run.clone() }
     }
 
     /// Sets an option.
@@ -54,7 +58,7 @@ impl StudyOptions {
     /// A sentence: an option that is not known, a value of another kind.
     pub(super) fn set(&mut self, key: &str, value: &ParameterValue) -> Result<(), String> {
         match key {
-            "step" => self.run.step_s = number(key, value)?,
+            "step" => self.step_s = Some(number(key, value)?),
             "log_rate" => self.run.log_rate_hz = number(key, value)?,
             "settling_band" => self.run.settling_band_m = number(key, value)?,
             "rho_inf" => self.settings.alpha.rho = number(key, value)?,

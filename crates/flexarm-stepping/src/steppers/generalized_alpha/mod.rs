@@ -58,6 +58,7 @@ pub(super) static ENTRY: StepperEntry = StepperEntry {
     aliases: &["generalised-alpha"],
     help: "Implicit, second order, damps what is too fast for the step; for all models",
     steps: StepRule::AnyLength,
+    default_step_s: 1e-3,
     order: 2,
     maximal: false,
     allocates: false,

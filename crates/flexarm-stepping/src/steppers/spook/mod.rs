@@ -51,6 +51,7 @@ pub(super) static ENTRY: StepperEntry = StepperEntry {
     aliases: &[],
     help: "Bodies with compliant constraints, first order; lumped links without motors",
     steps: StepRule::AnyLength,
+    default_step_s: 1e-4,
     order: 1,
     maximal: true,
     allocates: false,

@@ -93,7 +93,7 @@ fn picture_key(header: &RunHeader) -> String {
         _ => format!("Deflections magnified {} times", number(factor, 3)),
     };
     let mut out = format!(
-        "<div class=\"key-of-arm\"><p>{how}. <i class=\"ghost\"></i>rigid arm, <i class=\"way\"></i>path of the tool.</p>"
+        "<div class=\"key-of-arm\"><p>{how}. <i class=\"ghost\"></i>rigid arm, <i class=\"way\"></i>TCP error, from the rigid tool to the flexible one.</p>"
     );
     let colors: Vec<String> = scale_colors().into_iter().map(hex).collect();
     if header.color_scale_m > 0.0 && !colors.is_empty() {

@@ -75,13 +75,17 @@ fn json_plot(plot: &Plot) -> String {
         let tables = view.tables.iter().map(|table| {
             let curves = table.curves.iter().map(|curve| {
                 let kind = match curve.kind {
-                    Kind::Plain => "",
+                    Kind::Plain | Kind::Part(_) => "",
                     Kind::Total => "total",
                     Kind::Dashed => "dashed",
                     Kind::Axis(k) => ["x", "y", "z"][k % 3],
                 };
+                let color = match curve.kind {
+                    Kind::Part(number) => format!("\"color\":{number},"),
+                    _ => String::new(),
+                };
                 let name = json_text(&curve.name);
-                format!("{{\"name\":{name},\"kind\":\"{kind}\",\"y\":[{}]}}", numbers(&curve.y, 5))
+                format!("{{\"name\":{name},\"kind\":\"{kind}\",{color}\"y\":[{}]}}", numbers(&curve.y, 5))
             });
             let curves = curves.collect::<Vec<_>>().join(",");
             format!("{{\"x\":[{}],\"curves\":[{curves}]}}", numbers(&table.x, 7))

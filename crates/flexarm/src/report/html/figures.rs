@@ -7,6 +7,7 @@ use flexarm_draw::palette;
 use super::number::{fixed, number};
 use super::tables::STABILISATION;
 use super::{ReportRun, method};
+use crate::study::of_one_robot;
 use crate::summary::{EnergyFigures, Summary, TcpFigures};
 use flexarm_settings::written::markup;
 
@@ -143,13 +144,14 @@ pub(super) fn comparison(runs: &[ReportRun<'_>]) -> String {
         let cells: String = cells.iter().map(|cell| format!("<td class=\"number\">{}</td>", markup(cell))).collect();
         format!("<tr><th>{name}</th><td>{unit}</td>{cells}</tr>")
     };
+    let one_robot: Vec<bool> = runs.iter().map(|run| of_one_robot(runs[0].trace, run.trace)).collect();
     for (name, unit, value) in COMPARED {
         let values: Vec<Option<f64>> = runs.iter().map(|run| value(run.summary)).collect();
         let base = values[0];
         let relative = RELATIVE.contains(&unit) && name != APART;
         let cell = |(k, v): (usize, &Option<f64>)| match (v, base) {
             (None, _) => without_number(runs[k].summary, name),
-            (Some(v), Some(base)) if k > 0 && relative && base.abs() > 1e3 * NOTHING_M => {
+            (Some(v), Some(base)) if k > 0 && relative && one_robot[k] && base.abs() > 1e3 * NOTHING_M => {
                 let change = format!("{:+.1}", 100.0 * (v / base - 1.0));
                 format!("{} ({} %)", number(*v, 5), if change == "-0.0" { "+0.0" } else { &change })
             }
@@ -169,6 +171,15 @@ pub(super) fn comparison(runs: &[ReportRun<'_>]) -> String {
         true => " Apart: largest distance of the flexible TCP from that of the first run at the same time.",
         false => "",
     };
-    out += "</tbody></table></div><p class=\"note\">In brackets: against the first run.";
+    out += "</tbody></table></div><p class=\"note\">";
+    if one_robot.iter().skip(1).any(|one| *one) {
+        out += "In brackets: against the first run.";
+    }
+    let others = runs.iter().zip(&one_robot).filter(|(_, one)| !**one).map(|(run, _)| escaped(run.label));
+    let others: Vec<String> = others.collect();
+    if !others.is_empty() {
+        let (first, others) = (escaped(runs[0].label), others.join(", "));
+        let _ = write!(out, " Another robot than that of {first}, so that no differences are told: {others}.");
+    }
     out + apart + "</p></section>\n"
 }

@@ -7,8 +7,10 @@ use base64::Engine as _;
 use super::ReportRun;
 use super::figures::{moving, within, without_number};
 use super::number::number;
+use crate::headline;
 use crate::monitor::tool_path::PathMoveFigures;
 use crate::report::path_plan::path_plan;
+use crate::report::shares::{Part, part_shares, share_numbers};
 use crate::summary::Summary;
 use flexarm_settings::written::markup;
 
@@ -201,19 +203,33 @@ pub(super) fn stops_table(s: &Summary, of: &str) -> String {
 }
 
 pub(super) fn parts_tables(s: &Summary, of: &str) -> String {
-    let row = |kind: &str, name: &str, share: f64, turn: f64, strain: Option<f64>| {
-        let strain = strain.map_or_else(|| "–".into(), |x| number(x, 3));
-        vec![name.to_owned(), kind.to_owned(), number(1e3 * share, 4), number(1e3 * turn, 4), strain]
-    };
-    let links = s
-        .links
-        .iter()
-        .map(|l| row("link", &l.name, l.peak_contribution_m, l.peak_rotation_rad, Some(l.engineering_strain)));
-    let drives =
-        s.elastic_drives.iter().map(|d| row("drive", &d.joint, d.peak_contribution_m, d.peak_deflection_rad, None));
-    let rows: Vec<_> = links.chain(drives).collect();
-    let head =
-        ["name", "kind", "largest share of TCP error (mm)", "largest rotation (mrad)", "change of length (relative)"];
+    let shares = part_shares(s);
+    let peak_mm = s.tcp.as_ref().map_or(0.0, |tcp| 1e3 * tcp.peak_m);
+    // One more than the headline has.
+    let digits = headline::digits(peak_mm) + 1;
+    let none = || "–".to_owned();
+    let rows = shares.iter().zip(share_numbers(s, &shares, digits)).map(|(share, at_peak)| {
+        let (turn, strain) = match share.part {
+            Part::Link(link) => (number(1e3 * link.peak_rotation_rad, 4), number(link.engineering_strain, 3)),
+            Part::Drive(drive) => (number(1e3 * drive.peak_deflection_rad, 4), none()),
+            Part::None => (none(), none()),
+        };
+        let largest = share.largest_m.map_or_else(none, |x| number(1e3 * x, 4));
+        vec![share.name.to_owned(), share.kind.to_owned(), at_peak.unwrap_or_else(none), largest, turn, strain]
+    });
+    let mut rows: Vec<_> = rows.collect();
+    if shares.iter().any(|share| share.at_peak_m.is_some()) {
+        let peak = format!("{peak_mm:.digits$}");
+        rows.push(vec!["together".to_owned(), "peak".to_owned(), peak, none(), none(), none()]);
+    }
+    let head = [
+        "name",
+        "kind",
+        "share of the peak (mm)",
+        "largest by itself (mm)",
+        "largest rotation (mrad)",
+        "change of length (relative)",
+    ];
     let mut out = table(&format!("Flexible links and drives{of}"), &head, &rows);
 
     let forces: Vec<_> = s.drives.iter().map(|(joint, peak)| vec![joint.clone(), number(*peak, 5)]).collect();
