@@ -14,6 +14,8 @@ pub(crate) enum Failure {
     InStudy { label: String, source: Box<Failure> },
     /// What the library says.
     Library(flexarm::Error),
+    /// What it says of a file of measurements, or of what is in it.
+    Measurements(flexarm::Error),
     /// What the case studies say.
     Verify(flexarm_verify::Error),
 }
@@ -44,7 +46,7 @@ impl std::fmt::Display for Failure {
         match self {
             Self::Usage(text) => f.write_str(text),
             Self::InStudy { label, source } => write!(f, "run {label:?} of the study: {source}"),
-            Self::Library(error) => error.fmt(f),
+            Self::Library(error) | Self::Measurements(error) => error.fmt(f),
             Self::Verify(error) => error.fmt(f),
         }
     }
@@ -55,7 +57,7 @@ impl std::error::Error for Failure {
         match self {
             Self::Usage(_) => None,
             Self::InStudy { source, .. } => Some(source),
-            Self::Library(error) => error.source(),
+            Self::Library(error) | Self::Measurements(error) => error.source(),
             Self::Verify(error) => error.source(),
         }
     }
@@ -67,7 +69,7 @@ impl Failure {
         let fault = match self {
             Self::Usage(_) => Fault::Input,
             Self::InStudy { source, .. } => return source.exit_code(),
-            Self::Library(error) => error.fault(),
+            Self::Library(error) | Self::Measurements(error) => error.fault(),
             Self::Verify(error) => error.fault(),
         };
         ExitCode::from(match fault {
@@ -98,6 +100,8 @@ impl Failure {
         match self {
             Self::InStudy { source, .. } => source.page(),
             Self::Library(error) => page_of(error),
+            Self::Measurements(flexarm::Error::RobotFile(_) | flexarm::Error::File { .. }) => Some("measurements"),
+            Self::Measurements(_) => None,
             Self::Usage(_) | Self::Verify(_) => None,
         }
     }

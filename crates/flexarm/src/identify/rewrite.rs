@@ -52,12 +52,19 @@ pub(super) fn rewritten(
                 replace(old, rounded(parameter.value, parameter.std));
                 told.push((format!("link {link}"), parameter));
             }
-            Written::GearboxDamping { joint } => {
+            Written::GearboxDamping { joint, entry } => {
                 let drive = named(&mut file, "drive", "joint", joint)?;
                 let gearbox = drive.get_mut("gearbox").and_then(Item::as_table_like_mut);
                 let damping = gearbox.and_then(|gearbox| gearbox.get_mut("damping")).and_then(Item::as_value_mut);
                 let damping = damping.ok_or_else(|| format!("the drive of joint {joint:?} has no gearbox.damping"))?;
-                put_damping(damping, parameter);
+                match (damping, entry) {
+                    (Value::Array(list), Some(k)) => {
+                        let old = list.get_mut(*k);
+                        let old = old.ok_or_else(|| format!("gearbox.damping of {joint:?} has no entry {k}"))?;
+                        replace(old, rounded(parameter.value, parameter.std));
+                    }
+                    (damping, _) => put_damping(damping, parameter),
+                }
                 told.push((format!("drive of {joint}"), parameter));
             }
             Written::LinkDamping { link } => {
@@ -109,7 +116,11 @@ fn comments(told: &[(String, &Found)]) -> String {
     let mut out = String::from("# Identified by flexarm identify: value, standard deviation, value before.\n");
     for (_, p) in told {
         let Found { name, unit, value, std, initial, .. } = p;
-        out += &format!("#   {name} = {} +- {} {unit}, was {initial}\n", rounded(*value, *std), rounded(*std, *std));
+        let deviation = match std.is_finite() {
+            true => format!("+- {} {unit}", rounded(*std, *std)),
+            false => format!("{unit} (the fit does not meet the readings: no deviation)"),
+        };
+        out += &format!("#   {name} = {} {deviation}, was {initial}\n", rounded(*value, *std));
     }
     out + "\n"
 }
