@@ -61,13 +61,14 @@ impl EncoderFigures {
             noise_rms,
             // One run is taken as two halves.
             steps_s: if steps_s.len() == 1 { vec![steps_s[0]; gear.curves.len()] } else { steps_s.to_vec() },
-            curves: gear.curves,
+
             joint: joint.to_owned(),
             stiffness: gear.stiffness,
             std: gear.std_ln * gear.stiffness.abs(),
             delay_s: gear.delay_s,
             r2: gear.r2,
             told: gear.is_told(),
+            curves: gear.curves,
             unseen_r2: gear.unseen_r2,
             without_each: gear.without_each,
             deflection_rms: gear.deflection_rms,
