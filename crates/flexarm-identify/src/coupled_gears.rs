@@ -3,7 +3,8 @@
 //! ```text
 //! C q_m - q_link = C diag(c) Cᵀ τ:     row i:  Σ_k c_k C_ik (Cᵀ τ)_k + d_i q̇_i + offset of the run
 //! ```
-//! with the compliance `c_k` of each motor's spring behind its gear and a delay `d_i` of each link's encoder: what one link shows is a
+//! with the compliance `c_k` of each motor's spring behind its gear and a delay `d_i` of each link's encoder (and, not written out, damping in
+//! proportion to what each link shows): what one link shows is a
 //! combination of springs, and one encoder may tell several of them. Deviations and what counts as told as for a single gear
 //! ([`crate::gear_stiffness`]), of each spring beside what the others do.
 
@@ -16,6 +17,8 @@ pub struct CoupledOutput {
     pub deflection: Vec<f64>,
     /// Speed of the joint (rad/s).
     pub rate: Vec<f64>,
+    /// Rate of the deflection (rad/s); zeros for gears without damping.
+    pub deflection_rate: Vec<f64>,
     /// Of each spring its part of the deflection per compliance: `C_ik (Cᵀ τ)_k` (N m).
     pub torques: Vec<Vec<f64>>,
     /// The same of signals without the noise of the encoders ([`crate::GearRun::instrument`]).
@@ -84,6 +87,7 @@ fn split(run: &[CoupledOutput]) -> [Vec<CoupledOutput>; 2] {
         let of = |output: &CoupledOutput| CoupledOutput {
             deflection: cut(&output.deflection),
             rate: cut(&output.rate),
+            deflection_rate: cut(&output.deflection_rate),
             torques: output.torques.iter().map(cut).collect(),
             instruments: output.instruments.iter().map(cut).collect(),
         };
@@ -96,13 +100,14 @@ fn split(run: &[CoupledOutput]) -> [Vec<CoupledOutput>; 2] {
 struct Fit {
     compliance: Vec<f64>,
     delay: Vec<f64>,
+    damping_s: Vec<f64>,
 }
 
 impl Fit {
     /// Least squares with an offset for each encoder of each run, without one block.
     fn of(runs: &[Vec<CoupledOutput>], some: &[usize], without: Option<(usize, usize)>) -> Option<Self> {
         let (outputs, motors) = (runs[0].len(), runs[0][0].torques.len());
-        let mut sums = Normal::new(motors + outputs);
+        let mut sums = Normal::new(motors + 2 * outputs);
         for &k in some {
             let left_out = |i: &usize| without.is_some_and(|(r, first)| r == k && (first..first + BLOCK).contains(i));
             let kept: Vec<usize> = (0..runs[k][0].deflection.len()).filter(|i| !left_out(i)).collect();
@@ -112,19 +117,22 @@ impl Fit {
                 let rate = centred(&output.rate, &kept);
                 let mut columns: Vec<(usize, &[f64], &[f64])> =
                     x.iter().zip(&z).enumerate().map(|(k, (x, z))| (k, &x[..], &z[..])).collect();
+                let yielding = centred(&output.deflection_rate, &kept);
                 columns.push((motors + number, &rate, &rate));
+                columns.push((motors + outputs + number, &yielding, &yielding));
                 sums.add(&columns, &centred(&output.deflection, &kept));
             }
         }
         let mut values = sums.solved(motors)?;
-        let delay = values.split_off(motors);
-        Some(Self { compliance: values, delay })
+        let mut delay = values.split_off(motors);
+        let damping_s = delay.split_off(outputs).iter().map(|x| -x).collect();
+        Some(Self { compliance: values, delay, damping_s })
     }
 
     /// Of a run, over the encoders that show a spring: what that spring does by the readings without the others, and by its torque.
     fn curves(&self, run: &[CoupledOutput], motor: usize) -> [Vec<f64>; 2] {
         let (mut measured, mut expected) = (Vec::new(), Vec::new());
-        for (output, delay) in run.iter().zip(&self.delay) {
+        for ((output, delay), damping_s) in run.iter().zip(&self.delay).zip(&self.damping_s) {
             if output.torques[motor].iter().all(|torque| *torque == 0.0) {
                 continue;
             }
@@ -134,6 +142,7 @@ impl Fit {
                 rest.iter_mut().zip(centred(x, &kept)).for_each(|(rest, x)| *rest -= factor * x);
             };
             take(&output.rate, *delay);
+            take(&output.deflection_rate, -damping_s);
             let others = output.torques.iter().zip(&self.compliance).enumerate().filter(|(k, _)| *k != motor);
             others.for_each(|(_, (torque, c))| take(torque, *c));
             measured.extend(rest);
@@ -168,7 +177,7 @@ mod tests {
             let error = |s: usize| noise * (17.0 * t(s) * (1.0 + 0.1 * seed + 0.3 * i as f64)).sin();
             let spring = |s: usize| (0..3).map(|k| torques[k][s] / STIFFNESS[k]).sum::<f64>();
             let deflection = (0..2500).map(|s| spring(s) + DELAY[i] * rate[s] + 1e-3 * seed + error(s)).collect();
-            CoupledOutput { deflection, rate, instruments: torques.clone(), torques }
+            CoupledOutput { deflection, rate, deflection_rate: vec![0.0; 2500], instruments: torques.clone(), torques }
         };
         (0..3).map(output).collect()
     }
@@ -194,9 +203,9 @@ mod tests {
     fn a_single_gear_comes_out_as_by_itself() {
         let runs: Vec<_> = [0.0, 1.0, 2.0].map(|seed| vec![run(seed, 1e-5).swap_remove(0)]).to_vec();
         let only = |run: &Vec<CoupledOutput>| {
-            let CoupledOutput { deflection, rate, torques, .. } = run[0].clone();
+            let CoupledOutput { deflection, rate, deflection_rate, torques, .. } = run[0].clone();
             let torques = vec![torques[0].clone()];
-            vec![CoupledOutput { deflection, rate, instruments: torques.clone(), torques }]
+            vec![CoupledOutput { deflection, rate, deflection_rate, instruments: torques.clone(), torques }]
         };
         let runs: Vec<_> = runs.iter().map(only).collect();
         let plain: Vec<GearRun> = runs
@@ -206,6 +215,7 @@ mod tests {
                 torque: run[0].torques[0].clone(),
                 instrument: run[0].torques[0].clone(),
                 rate: run[0].rate.clone(),
+                deflection_rate: vec![0.0; 2500],
             })
             .collect();
         let (a, b) = (&coupled_gear_stiffness(&runs).unwrap()[0], gear_stiffness(&plain).unwrap());

@@ -1,9 +1,10 @@
 //! Stiffness of a gear from the positions of its motor and of the link behind it, recorded while the robot moves.
 //!
 //! ```text
-//! motor - link = c τ + d q̇ + offset of the run
+//! δ = motor - link = c τ - T dδ/dt + d q̇ + offset of the run
 //! ```
-//! with the compliance c, the torque τ through the gear, and a delay d between the two instruments. The torque follows from the link's
+//! with the compliance c, the torque τ through the gear, the time T = damping / stiffness of the gear, and a delay d between the two
+//! instruments. The torque follows from the link's
 //! motion or from a sensor. The noise of the link's encoder is in the deflection and, through its second derivative, in the torque; a
 //! plain least-squares fit would take the one for the cause of the other. So both are compared by a third signal without that noise
 //! (instrumental variables): the torque that the motor's motion would need.
@@ -24,6 +25,8 @@ pub struct GearRun {
     pub instrument: Vec<f64>,
     /// Speed of the joint (rad/s).
     pub rate: Vec<f64>,
+    /// Rate of the deflection (rad/s); zeros for a gear without damping.
+    pub deflection_rate: Vec<f64>,
 }
 
 /// What recordings tell of a gear.
@@ -123,7 +126,8 @@ fn split(run: &GearRun) -> [GearRun; 2] {
         deflection: run.deflection[range.clone()].to_vec(),
         torque: run.torque[range.clone()].to_vec(),
         instrument: run.instrument[range.clone()].to_vec(),
-        rate: run.rate[range].to_vec(),
+        rate: run.rate[range.clone()].to_vec(),
+        deflection_rate: run.deflection_rate[range].to_vec(),
     };
     [part(0..middle), part(middle..run.deflection.len())]
 }
@@ -181,32 +185,35 @@ impl Normal {
 /// Smallest singular value of scaled columns that are told apart.
 const DEPENDENT: f64 = 1e-9;
 
-/// Compliance and delay of some runs.
+/// Compliance, delay and time of damping of some runs.
 struct Fit {
     compliance: f64,
     delay: f64,
+    damping_s: f64,
 }
 
 impl Fit {
     /// Least squares with an offset for each run, without one block.
     fn of(runs: &[GearRun], some: &[usize], without: Option<(usize, usize)>) -> Option<Self> {
-        let mut sums = Normal::new(2);
+        let mut sums = Normal::new(3);
         for &k in some {
             let run = &runs[k];
             let left_out = |i: &usize| without.is_some_and(|(r, first)| r == k && (first..first + BLOCK).contains(i));
             let kept: Vec<usize> = (0..run.deflection.len()).filter(|i| !left_out(i)).collect();
-            let [y, t, z, v] = [&run.deflection, &run.torque, &run.instrument, &run.rate].map(|x| centred(x, &kept));
-            sums.add(&[(0, &t, &z), (1, &v, &v)], &y);
+            let of = |x: &[f64]| centred(x, &kept);
+            let [y, t, z, v] = [&run.deflection, &run.torque, &run.instrument, &run.rate].map(|x| of(x));
+            let w = of(&run.deflection_rate);
+            sums.add(&[(0, &t, &z), (1, &v, &v), (2, &w, &w)], &y);
         }
         let found = sums.solved(1)?;
-        Some(Self { compliance: found[0], delay: found[1] })
+        Some(Self { compliance: found[0], delay: found[1], damping_s: -found[2] })
     }
 
-    /// Of a run: the deflection without offset and delay, and what the torque makes of it.
+    /// Of a run: the deflection without offset, delay and damping, and what the torque makes of it.
     fn curves(&self, run: &GearRun) -> [Vec<f64>; 2] {
         let kept: Vec<usize> = (0..run.deflection.len()).collect();
-        let [y, t, v] = [&run.deflection, &run.torque, &run.rate].map(|x| centred(x, &kept));
-        let measured = y.iter().zip(&v).map(|(y, v)| y - self.delay * v).collect();
+        let [y, t, v, w] = [&run.deflection, &run.torque, &run.rate, &run.deflection_rate].map(|x| centred(x, &kept));
+        let measured = (0..y.len()).map(|k| y[k] - self.delay * v[k] + self.damping_s * w[k]).collect();
         [measured, t.iter().map(|t| self.compliance * t).collect()]
     }
 
@@ -237,7 +244,7 @@ mod tests {
         let rate: Vec<f64> = (0..n).map(|k| 0.4 * (1.3 * t(k) + 2.0 * seed).cos()).collect();
         let error = |k: usize| noise * (17.0 * t(k) * (1.0 + 0.1 * seed)).sin();
         let deflection = (0..n).map(|k| torque[k] / stiffness + 3e-3 * rate[k] + 1e-3 * seed + error(k)).collect();
-        GearRun { deflection, instrument: torque.clone(), torque, rate }
+        GearRun { deflection_rate: vec![0.0; n], deflection, instrument: torque.clone(), torque, rate }
     }
 
     /// Truth: the stiffness from which the deflection was made. The link's encoder has noise about 5 Hz, which its second derivative

@@ -140,7 +140,8 @@ fn every_row_of_every_kind_of_reading_has_the_derivatives_of_its_residual() {
         axes.iter().map(|d| Row { of: Component::Along(*d), value: 1e-3, std: 1e-4 }).collect();
     rows.extend(axes.iter().map(|d| Row { of: Component::About(*d), value: 1e-3, std: 1e-4 }));
     for instrument in [0, 1] {
-        let seen = axes.iter().flat_map(|d| [Component::AlongSeen(instrument, *d), Component::AboutSeen(instrument, *d)]);
+        let seen =
+            axes.iter().flat_map(|d| [Component::AlongSeen(instrument, *d), Component::AboutSeen(instrument, *d)]);
         rows.extend(seen.map(|of| Row { of, value: 1e-3, std: 1e-4 }));
     }
     let point = Vector3::new(-0.1, 0.2, 0.3);
@@ -158,7 +159,8 @@ fn every_row_of_every_kind_of_reading_has_the_derivatives_of_its_residual() {
         std: Vector3::new(1e-4, 2e-4, 3e-4),
     };
     let X = Pose::from_parts(Translation3::new(3.0, 1.0, -0.5), Rotation3::from_euler_angles(0.4, -0.2, 2.2));
-    let near = X * Pose::from_parts(Translation3::new(0.01, 0.0, -0.02), Rotation3::from_euler_angles(0.02, 0.1, -0.03));
+    let near =
+        X * Pose::from_parts(Translation3::new(0.01, 0.0, -0.02), Rotation3::from_euler_angles(0.02, 0.1, -0.03));
     let stands = |instrument, std| ReadingKind::InstrumentAt { instrument, value: near, std, std_rotation: 1e-3 };
     let hz = vec![Row { of: 0, value: 2.0, std: 0.1 }, Row { of: 2, value: 5.0, std: 0.1 }];
     let kinds = [

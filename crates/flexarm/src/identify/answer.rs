@@ -240,7 +240,9 @@ fn described(input: &MeasurementInput, found: &Identified) -> Vec<String> {
         });
         match &input.measurements.instruments[k] {
             Instrument::Axes(_) => {
-                format!("Instrument {name}: its axes are found to be turned by {turn} degrees (roll, pitch, yaw){said}.")
+                format!(
+                    "Instrument {name}: its axes are found to be turned by {turn} degrees (roll, pitch, yaw){said}."
+                )
             }
             given => {
                 let how = if matches!(given, Instrument::Known(_)) { "given" } else { "found" };
@@ -252,7 +254,9 @@ fn described(input: &MeasurementInput, found: &Identified) -> Vec<String> {
     let targets = input.targets.iter().enumerate().map(|(k, name)| {
         let how = if matches!(input.measurements.targets[k], Target::Known(_)) { "given" } else { "found" };
         let said = deviation(&|kind| match kind {
-            ReadingKind::TargetAt { target, std, .. } if *target == k => Some(format!(", known to {:.3} mm", 1e3 * std)),
+            ReadingKind::TargetAt { target, std, .. } if *target == k => {
+                Some(format!(", known to {:.3} mm", 1e3 * std))
+            }
             _ => None,
         });
         format!("Target {name}: at {} from the TCP in its axes ({how}){said}.", millimetres(&found.targets[k]))

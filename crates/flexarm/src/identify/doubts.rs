@@ -82,9 +82,10 @@ pub(super) fn encoder_caveats(encoders: &[EncoderFigures]) -> impl Iterator<Item
     let odd = move |gear: &&EncoderFigures| {
         gear.told && gear.rest_rms > noises * gear.noise_rms && gear.rest_rms > part * gear.deflection_rms
     };
-    encoders.iter().filter(odd).map(|gear| {
-        kinds::ENCODER_REST.found(format!("encoders of {}", gear.joint), gear.rest_rms, gear.noise_rms)
-    })
+    encoders
+        .iter()
+        .filter(odd)
+        .map(|gear| kinds::ENCODER_REST.found(format!("encoders of {}", gear.joint), gear.rest_rms, gear.noise_rms))
 }
 
 /// Displacements under forces, or under masses, that are as much larger or smaller than the robot's as a kilogram weighs.
@@ -106,7 +107,8 @@ pub(super) fn load_caveats(plant: &Plant, input: &MeasurementInput) -> Result<Ve
         // Rotations of instruments are fitted; the size of a displacement does not depend on them.
         let predicted = arm.predicted(&DVector::zeros(some.own_unknowns()))?;
         let deviations: Vec<f64> = some.readings.iter().flat_map(Reading::deviations).collect();
-        let size = |values: &[f64]| values.iter().zip(&deviations).map(|(x, std)| (x / std).powi(2)).sum::<f64>().sqrt();
+        let size =
+            |values: &[f64]| values.iter().zip(&deviations).map(|(x, std)| (x / std).powi(2)).sum::<f64>().sqrt();
         let ratio = size(&arm.observed()) / size(&predicted);
         if !ratio.is_finite() || (1.0 / LOAD_RATIO..=LOAD_RATIO).contains(&ratio) {
             continue;

@@ -186,8 +186,9 @@ fn told_of_coupled(
         let one = |i: &usize| {
             let mut gear = run.gear(places[*i])?;
             let part_of = |torque: &[Vec<f64>], motor: usize| -> Vec<f64> {
-                let of =
-                    |s: usize| places.iter().enumerate().map(|(j, k)| coupling.C[(j, motor)] * torque[*k][s]).sum::<f64>();
+                let of = |s: usize| {
+                    places.iter().enumerate().map(|(j, k)| coupling.C[(j, motor)] * torque[*k][s]).sum::<f64>()
+                };
                 run.seen.clone().map(|s| coupling.C[(*i, motor)] * of(s)).collect()
             };
             let part = |motor: usize| part_of(&run.torque, motor);
@@ -198,7 +199,13 @@ fn told_of_coupled(
             }
             let torques = unknown.iter().map(|(motor, _)| part(*motor)).collect();
             let instruments = unknown.iter().map(|(motor, _)| part_of(&run.instrument, *motor)).collect();
-            Some(CoupledOutput { deflection: gear.deflection, rate: gear.rate, torques, instruments })
+            Some(CoupledOutput {
+                deflection: gear.deflection,
+                rate: gear.rate,
+                deflection_rate: gear.deflection_rate,
+                torques,
+                instruments,
+            })
         };
         seen.iter().map(one).collect()
     };
@@ -276,9 +283,12 @@ impl<'a> Smooth<'a> {
     fn gear(&self, joint: usize) -> Option<GearRun> {
         let link = self.recording.link[joint].as_ref()?;
         let cut = |x: &[f64]| x[self.seen.clone()].to_vec();
-        let deflection: Vec<f64> = self.recording.motor[joint].iter().zip(link).map(|(motor, link)| motor - link).collect();
+        let deflection: Vec<f64> =
+            self.recording.motor[joint].iter().zip(link).map(|(motor, link)| motor - link).collect();
+        let deflection = self.low.of(&self.low.of(&deflection));
         Some(GearRun {
-            deflection: cut(&self.low.of(&self.low.of(&deflection))),
+            deflection_rate: cut(&derivatives(&deflection, self.recording.step_s)[0]),
+            deflection: cut(&deflection),
             torque: cut(&self.torque[joint]),
             instrument: cut(&self.instrument[joint]),
             rate: cut(&self.rate[joint]),
@@ -322,8 +332,7 @@ fn derivatives(x: &[f64], step_s: f64) -> [Vec<f64>; 2] {
     let at = |i: usize, by: isize| x[i.saturating_add_signed(by).min(x.len() - 1)];
     let n = 0..x.len();
     let first = |i| (8.0 * (at(i, 1) - at(i, -1)) - (at(i, 2) - at(i, -2))) / (12.0 * step_s);
-    let second = |i| {
-        (16.0 * (at(i, 1) + at(i, -1)) - (at(i, 2) + at(i, -2)) - 30.0 * at(i, 0)) / (12.0 * step_s * step_s)
-    };
+    let second =
+        |i| (16.0 * (at(i, 1) + at(i, -1)) - (at(i, 2) + at(i, -2)) - 30.0 * at(i, 0)) / (12.0 * step_s * step_s);
     [n.clone().map(first).collect(), n.map(second).collect()]
 }

@@ -22,11 +22,11 @@ use std::path::{Path, PathBuf};
 
 use flexarm_files::{check_free, write_all};
 pub use flexarm_identify::{
-    Answer, Candidate, Component, CoupledOutput, Effect, Form, Found, GearEstimate, GearRun, HeldOut, Identified,
-    IdentifyError, IdentifyOptions, Instrument, LoadCase, Loss, MeasuredArm, MeasuredResponse, MeasuredShape,
-    Measurements, NoAnswer, Parameter, Place, Plan, PlanOptions, Plant, Probe, Reading, ReadingKind, ResponseSlopes,
-    Row, Search, Structure, StructureSlopes, Target, compliance_slopes, coupled_gear_stiffness, frequency_slopes,
-    FoundSlip, Slip, gear_stiffness, identify, likely_slip, plan, structure_slopes, tool_slopes,
+    Answer, Candidate, Component, CoupledOutput, Effect, Form, Found, FoundSlip, GearEstimate, GearRun, HeldOut,
+    Identified, IdentifyError, IdentifyOptions, Instrument, LoadCase, Loss, MeasuredArm, MeasuredResponse,
+    MeasuredShape, Measurements, NoAnswer, Parameter, Place, Plan, PlanOptions, Plant, Probe, Reading, ReadingKind,
+    ResponseSlopes, Row, Search, Slip, Structure, StructureSlopes, Target, compliance_slopes, coupled_gear_stiffness,
+    frequency_slopes, gear_stiffness, identify, likely_slip, plan, structure_slopes, tool_slopes,
 };
 
 use self::answer::answer;
@@ -44,8 +44,8 @@ use crate::options::Modelling;
 use crate::robot::Robot;
 
 pub use self::answer::{
-    Compared, FittedParameter, FoundFrame, FoundPoint, HeldOutFigures, Identification, Residual, ResponseCurves, ShapeFigures,
-    Suspicious, Weight,
+    Compared, FittedParameter, FoundFrame, FoundPoint, HeldOutFigures, Identification, Residual, ResponseCurves,
+    ShapeFigures, Suspicious, Weight,
 };
 pub use self::encoders::EncoderFigures;
 pub use self::error::IdentifyFileError;

@@ -141,7 +141,8 @@ fn residuals(kind: &str, unit: &str, of: &[&Compared]) -> String {
 fn response_plot(response: &ResponseCurves) -> String {
     let looks = [CurveLook::Dots, CurveLook::Dashed, CurveLook::Plain];
     let curves = ["measured", "model before", "model after"].into_iter().zip(looks).zip(&response.magnitude);
-    let curves = curves.map(|((name, look), y)| PlotCurve { name: name.into(), look, x: response.hz.clone(), y: y.clone() });
+    let curves =
+        curves.map(|((name, look), y)| PlotCurve { name: name.into(), look, x: response.hz.clone(), y: y.clone() });
     let label = format!("magnitude ({})", response.unit);
     let panel = Panel { label, logarithmic: true, legend: true, curves: curves.collect() };
     picture(&format!("Response: {}", response.name), "frequency (Hz)", &[panel])

@@ -42,7 +42,8 @@ pub(in crate::identify) struct LoadEntry {
 
 /// Columns of loads in tables.
 pub(super) const LOAD_COLUMNS: [&str; 19] = [
-    "fx", "fy", "fz", "mx", "my", "mz", "ax", "ay", "az", "mass", "cx", "cy", "cz", "ixx", "iyy", "izz", "ixy", "ixz", "iyz",
+    "fx", "fy", "fz", "mx", "my", "mz", "ax", "ay", "az", "mass", "cx", "cy", "cz", "ixx", "iyy", "izz", "ixy", "ixz",
+    "iyz",
 ];
 
 /// A row of a table, by the names of its columns.

@@ -68,9 +68,8 @@ struct Said {
 }
 
 /// Columns of a table beside joints and loads.
-const COLUMNS: [&str; 15] = [
-    "px", "py", "pz", "dx", "dy", "dz", "rx", "ry", "rz", "d", "ux", "uy", "uz", "std", "std_rotation",
-];
+const COLUMNS: [&str; 15] =
+    ["px", "py", "pz", "dx", "dy", "dz", "rx", "ry", "rz", "d", "ux", "uy", "uz", "std", "std_rotation"];
 
 impl Reader<'_> {
     pub(super) fn displacement(&mut self, number: usize, entry: &Spanned<DisplacementEntry>) -> Result<(), Error> {
@@ -129,7 +128,8 @@ impl Reader<'_> {
         let Said { name, q, load, point, value, direction, rotation, std, std_rotation } = said;
         let mut rows = Vec::new();
         let sigma = self.std(std.as_ref(), self.units.length)?;
-        let instrument = e.instrument.as_ref().map(|name| self.chosen("instrument", Some(name), &self.instruments, &span));
+        let instrument =
+            e.instrument.as_ref().map(|name| self.chosen("instrument", Some(name), &self.instruments, &span));
         let instrument = instrument.transpose()?;
         let along = |d: Vector3<f64>| instrument.map_or(Component::Along(d), |k| Component::AlongSeen(k, d));
         let about = |d: Vector3<f64>| instrument.map_or(Component::About(d), |k| Component::AboutSeen(k, d));
@@ -149,9 +149,11 @@ impl Reader<'_> {
                 let text = "three numbers are along x, y and z: leave direction out";
                 return Err(self.error(direction.span(), text));
             }
-            (Some(Measured::Three(d)), None) => rows.extend(axes.iter().zip(d).filter_map(|(axis, d)| {
-                Some(Row { of: along(*axis), value: d? * self.units.length, std: sigma })
-            })),
+            (Some(Measured::Three(d)), None) => rows.extend(
+                axes.iter()
+                    .zip(d)
+                    .filter_map(|(axis, d)| Some(Row { of: along(*axis), value: d? * self.units.length, std: sigma })),
+            ),
             (None, _) if rotation.is_some() => {}
             (None, _) => {
                 return Err(self.error(span, format!("{name}: nothing was measured: add value = [dx, dy, dz]")));
@@ -164,9 +166,11 @@ impl Reader<'_> {
                 return Err(self.error(span, text));
             }
             let sigma = self.std(std_rotation.as_ref(), self.units.angle)?;
-            rows.extend(axes.iter().zip(turn).filter_map(|(axis, d)| {
-                Some(Row { of: about(*axis), value: d? * self.units.angle, std: sigma })
-            }));
+            rows.extend(
+                axes.iter()
+                    .zip(turn)
+                    .filter_map(|(axis, d)| Some(Row { of: about(*axis), value: d? * self.units.angle, std: sigma })),
+            );
         }
         if let Some(bad) = rows.iter().find(|row| !row.value.is_finite()) {
             return Err(self.error(span, format!("{name}: found {}, expected a finite number", bad.value)));

@@ -47,7 +47,8 @@ impl Reader<'_> {
             }
             let deviation = std.as_ref().or(std_rotation.as_ref());
             if let (Some(std), None, None) = (deviation, xyz, rpy) {
-                let text = format!("instrument {name:?} is unknown, and has a deviation: give xyz and rpy, or leave it out");
+                let text =
+                    format!("instrument {name:?} is unknown, and has a deviation: give xyz and rpy, or leave it out");
                 return Err(self.error(std.span(), text));
             }
             let [r, p, y] = rpy.unwrap_or_default().map(|angle| angle * self.units.angle);

@@ -35,7 +35,9 @@ impl Reader<'_> {
             return Err(self.error(e.hz.span(), "hz takes positive frequencies"));
         }
         if let (Some(_), Some(relative)) = (&e.std, &e.std_relative) {
-            return Err(self.error(relative.span(), "std (Hz) and std_relative (part of each frequency): keep one of them"));
+            return Err(
+                self.error(relative.span(), "std (Hz) and std_relative (part of each frequency): keep one of them")
+            );
         }
         let (std, relative) = (self.std(e.std.as_ref(), 1.0)?, self.std(e.std_relative.as_ref(), 1.0)?);
         let of = |f: f64| if e.std_relative.is_some() { relative * f } else { std };
