@@ -464,7 +464,7 @@ fn told(
     parameters: &[Parameter],
     measurements: &Measurements,
     options: &IdentifyOptions,
-    solution: Solution,
+    mut solution: Solution,
     before: Vec<f64>,
     held_out: Option<HeldOut>,
 ) -> Identified {
@@ -510,6 +510,7 @@ fn told(
         .collect();
     let mut suspicious: Vec<usize> = (0..normalised.len()).filter(|k| normalised[*k].abs() > SUSPICIOUS).collect();
     suspicious.sort_by(|a, b| normalised[*b].abs().total_cmp(&normalised[*a].abs()));
+    solution.converged &= fits;
     let own = &solution.unknowns.as_slice()[p..];
     let instruments = (0..measurements.instruments.len()).map(|k| measurements.instrument(k, own).0).collect();
     let targets = (0..measurements.targets.len()).map(|k| measurements.target(k, own).0).collect();

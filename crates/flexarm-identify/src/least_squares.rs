@@ -100,7 +100,7 @@ pub struct Solution {
     pub freedom: usize,
     /// Iterations of both phases.
     pub iterations: usize,
-    /// Whether the last step was below the tolerance.
+    /// Whether the last step was below the tolerance; of an identification also that the fit meets the readings.
     pub converged: bool,
 }
 

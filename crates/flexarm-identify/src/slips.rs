@@ -39,8 +39,9 @@ pub struct FoundSlip {
 
 /// Smallest rest, over the displacements, that calls for a slip; of places over their spread.
 const REST: [f64; 2] = [0.25, 0.1];
-/// A mended slip leaves this part of the rest at most.
+/// A mended slip leaves this part of the rest at most, and so much of the displacements, of the places' spread.
 const MENDED: f64 = 1.0 / 3.0;
+const LEFT: [f64; 2] = [0.15, 0.05];
 /// Readings that are looked at.
 const MOST_READINGS: usize = 16;
 /// Rounds of compliances and rotation.
@@ -61,15 +62,15 @@ pub fn likely_slip(
         ReadingKind::Displacement { rows, .. } => rows.iter().all(|row| matches!(row.of, Component::Along(_))),
         _ => false,
     });
-    let found = (!springs.is_empty() && moved.rows() >= 2 * springs.len()).then(|| {
+    let found = (!springs.is_empty() && moved.rows() >= 3 * springs.len()).then(|| {
         let rest = |order: &[usize]| Some(Moved::of(plant, &springs, &ordered(&moved, order))?.rest());
         let whole = moved.readings.iter().all(|reading| reading.rows() == 3);
         let axes = || Moved::of(plant, &springs, &moved).filter(|_| whole)?.turned();
-        among(rest, axes, slides, REST[0])
+        among(rest, axes, slides, 0)
     });
     let placed = some_of(measurements, |kind| matches!(kind, ReadingKind::Place { .. }));
     let rest = |order: &[usize]| place_rest(plant, &ordered(&placed, order));
-    found.flatten().or_else(|| among(rest, || None, slides, REST[1]))
+    found.flatten().or_else(|| among(rest, || None, slides, 1))
 }
 
 /// Some readings, evenly from all of them; instruments at the world's origin, targets where they are guessed.
@@ -94,20 +95,20 @@ fn ordered(measurements: &Measurements, order: &[usize]) -> Measurements {
     other
 }
 
-/// The best slip of those that leave little of a rest which calls for one.
+/// The best slip of those that leave little of a rest which calls for one; `kind`: 0 for displacements, 1 for places.
 fn among(
     rest: impl Fn(&[usize]) -> Option<f64>,
     axes: impl Fn() -> Option<(Rotation3<f64>, f64)>,
     slides: &[bool],
-    least: f64,
+    kind: usize,
 ) -> Option<FoundSlip> {
     let as_said: Vec<usize> = (0..slides.len()).collect();
-    let before = rest(&as_said).filter(|rest| *rest > least)?;
+    let before = rest(&as_said).filter(|rest| *rest > REST[kind])?;
     let order = best_order(&rest, as_said, before, slides);
     let axes = axes().map(|(R, rest)| (Slip::Axes(R), rest));
     let found = [Some((Slip::Order(order.0), order.1)), axes].into_iter().flatten();
     let (slip, rest_mended) = found.min_by(|a, b| a.1.total_cmp(&b.1))?;
-    (rest_mended < MENDED * before).then_some(FoundSlip { slip, rest: before, rest_mended })
+    (rest_mended < (MENDED * before).min(LEFT[kind])).then_some(FoundSlip { slip, rest: before, rest_mended })
 }
 
 /// The order of joints that leaves least: from the order as it is, the reverse and the shifts by exchanges as long as one pays.

@@ -57,7 +57,7 @@ pub struct Identification {
     pub targets: Vec<FoundPoint>,
     /// Iterations.
     pub iterations: usize,
-    /// Whether the search ended by itself.
+    /// Whether the search ended by itself, at a fit that meets the readings.
     pub converged: bool,
     /// The new robot file.
     pub file: Option<String>,

@@ -54,7 +54,7 @@ pub(super) fn caveats(found: &Identified) -> Vec<Caveat> {
         );
         caveats.push(Caveat::said("over-fitted", "measurements", text, "fit fewer parameters or measure more poses"));
     }
-    if !found.solution.converged {
+    if !found.solution.converged && found.misfit.is_none() {
         let text = "the search did not settle: take the values with care";
         caveats.push(Caveat::said("not-converged", "measurements", text, "a better first guess helps"));
     }

@@ -97,12 +97,12 @@ impl Reader<'_> {
             let std_turn = std_rotation.as_ref().map(|std| self.std(Some(std), self.units.angle)).transpose()?;
             let unknown = if placed[k] { Instrument::Unknown(said) } else { Instrument::Axes(said.rotation) };
             let deviations = match (known, std_place, std_turn) {
-                (false, ..) => None,
+                (false, None, None) => None,
                 (true, None, None) => continue,
                 (true, Some(_), None) if !placed[k] => continue,
                 (true, place, Some(turn)) if place.is_some() || !placed[k] => Some((place.filter(|_| placed[k]), turn)),
                 _ => {
-                    let text = format!("instrument {name:?}: std and std_rotation are needed together");
+                    let text = format!("instrument {name:?}: xyz, std and std_rotation are needed together");
                     return Err(self.error(entry.span(), text));
                 }
             };
