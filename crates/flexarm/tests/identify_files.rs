@@ -261,7 +261,7 @@ fn a_target_that_is_known_with_a_deviation_is_found_between_what_is_said_and_wha
         .enumerate()
         .map(|(k, q)| {
             let wrench = Wrench::new(Vector3::new(0.0, 0.0, -2000.0 * (k % 2) as f64), Vector3::zeros());
-            (q, LoadCase { wrench, ..LoadCase::none() })
+            (q, LoadCase { wrench, at: Vector3::new(0.4, 0.0, 0.0), ..LoadCase::none() })
         })
         .collect();
     let shown = place.shown(&loads, Some(target));
@@ -274,7 +274,7 @@ fn a_target_that_is_known_with_a_deviation_is_found_between_what_is_said_and_wha
     let job = |std: &str| {
         format!(
             "format = 1\n[instrument.t]\nxyz = [0, 0, 0]\nrpy = [0, 0, 0]\nstd = 1e-3\nstd_rotation = 1e-3\n[target.b]\nxyz = [0.301, 0.05, 0.03]\n\
-             {std}\n[[place]]\nfile = \"places.csv\"\nstd = 3e-5\n"
+             {std}\n[[place]]\nfile = \"places.csv\"\nload = {{ at = [0.4, 0, 0] }}\nstd = 3e-5\n"
         )
     };
     let found = place.identify(&job("std = 1e-3")).unwrap();
@@ -291,10 +291,10 @@ fn plans_and_identifications_tell_what_check_tells_of_the_robot() {
     let mut place = Place::new("check");
     let urdf = place.robot.urdf_path.canonicalize().unwrap();
     let text = std::fs::read_to_string(&place.robot.path).unwrap();
-    // A payload in grams.
+    // A payload of thirteen times the robot's mass.
     let text = text.replace("\"kr210_identified.urdf\"", &format!("{urdf:?}"));
     let text: String = text.lines().filter(|l| !l.starts_with("default_")).fold(String::new(), |all, l| all + l + "\n");
-    let text = text + "\n[payload]\nlink = \"tool0\"\nmass = 150000.0\ncom = [0.1, 0.0, 0.2]\n";
+    let text = text + "\n[payload]\nlink = \"tool0\"\nmass = 12000.0\ncom = [0.1, 0.0, 0.2]\n";
     std::fs::write(place.folder.join("robot.toml"), text).unwrap();
     place.robot = Robot::load(&place.folder).unwrap();
     let findings = flexarm::check(&place.folder, None, &flexarm::LoadOptions::default());
