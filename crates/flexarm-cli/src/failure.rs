@@ -109,7 +109,11 @@ fn page_of(error: &flexarm::Error) -> Option<&'static str> {
     match error {
         flexarm::Error::InStudy { source, .. } => page_of(source),
         flexarm::Error::Trajectory(TrajectoryError::File(_)) | flexarm::Error::Motion(_) => Some("motion"),
-        flexarm::Error::RobotFile(fault) if fault.message.contains("unknown field") => Some(fault.page),
+        flexarm::Error::RobotFile(fault)
+            if fault.message.contains("unknown field") || matches!(fault.page, "measurements" | "tool") =>
+        {
+            Some(fault.page)
+        }
         _ => None,
     }
 }

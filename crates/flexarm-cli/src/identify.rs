@@ -133,6 +133,9 @@ fn plan(cli: &Cli, args: &IdentifyArgs, robot: &Robot, count: usize) -> Result<E
         request.forces = forces;
     }
     let found = plan_measurements(robot, &request)?;
+    if !cli.quiet {
+        found.warnings.iter().for_each(|text| warning(text));
+    }
     answer(cli, || to_json(&found), || plan_text(&found));
     Ok(ExitCode::SUCCESS)
 }
@@ -153,10 +156,11 @@ fn text(found: &Identification) -> String {
     let mut t = table(&["parameter", "before", "value", "std", "", "unit"]);
     for p in &found.parameters {
         let (value, part) = match p.identifiable {
+            true if p.std.is_nan() => (number(p.value), "no fit".to_owned()),
             true => (number(p.value), part_of(p.std, p.value, p.initial)),
             false => ("not told".to_owned(), String::new()),
         };
-        t.add_row(vec![p.name.clone(), number(p.initial), value, number(p.std), part, p.unit.clone()]);
+        t.add_row(vec![p.name.clone(), number(p.initial), value, deviation(p.std), part, p.unit.clone()]);
     }
     for k in 1..5 {
         if let Some(column) = t.column_mut(k) {
@@ -180,13 +184,14 @@ fn text(found: &Identification) -> String {
     for gear in &found.encoders {
         let unseen: Vec<String> = gear.unseen_r2.iter().map(|r2| format!("{r2:.2}")).collect();
         out += &format!(
-            "encoders of {}: {} +- {}, late by {:.1} ms, rest {:.1} of {:.1} urad, R2 of unseen runs {}{}\n",
+            "encoders of {}: {} +- {}, late by {:.1} ms, rest {:.1} of {:.1} urad (noise {:.1}), R2 of unseen runs {}{}\n",
             gear.joint,
             number(gear.stiffness),
             number(gear.std),
             1e3 * gear.delay_s,
             1e6 * gear.rest_rms,
             1e6 * gear.deflection_rms,
+            1e6 * gear.noise_rms,
             unseen.join(", "),
             if gear.told { "" } else { ": not told" }
         );
@@ -217,6 +222,9 @@ fn text(found: &Identification) -> String {
     for point in &found.targets {
         let [x, y, z] = point.xyz;
         out += &format!("target {} is at {x:.5}, {y:.5}, {z:.5} m on the tool\n", point.name);
+    }
+    for caveat in found.caveats.iter().filter(|caveat| !caveat.warns()) {
+        out += &format!("note: {}\n", caveat.message);
     }
     for (what, file) in [("robot", &found.file), ("page", &found.page)] {
         if let Some(file) = file {
@@ -280,6 +288,11 @@ fn number(x: f64) -> String {
         }
         _ => format!("{x:.3e}"),
     }
+}
+
+/// A deviation, if there is one.
+fn deviation(std: f64) -> String {
+    if std.is_nan() { "-".to_owned() } else { number(std) }
 }
 
 /// A deviation as a part of a value; none of what counts from zero, such as the place of the tool.

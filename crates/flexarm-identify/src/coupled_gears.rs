@@ -3,13 +3,12 @@
 //! ```text
 //! C q_m - q_link = C diag(c) Cᵀ τ:     row i:  Σ_k c_k C_ik (Cᵀ τ)_k + d_i q̇_i + offset of the run
 //! ```
-//! with the compliance `c_k` of each motor's spring behind its gear and a delay `d_i` of each link's encoder: what one link shows is a
+//! with the compliance `c_k` of each motor's spring behind its gear and a delay `d_i` of each link's encoder (and, not written out, damping in
+//! proportion to what each link shows): what one link shows is a
 //! combination of springs, and one encoder may tell several of them. Deviations and what counts as told as for a single gear
 //! ([`crate::gear_stiffness`]), of each spring beside what the others do.
 
-use nalgebra::{DMatrix, DVector};
-
-use crate::encoders::{BLOCK, GearEstimate, centred};
+use crate::encoders::{BLOCK, GearEstimate, Normal, centred, jackknife, squares};
 
 /// One link's encoder in a recording, evenly sampled, all filtered alike.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,8 +17,12 @@ pub struct CoupledOutput {
     pub deflection: Vec<f64>,
     /// Speed of the joint (rad/s).
     pub rate: Vec<f64>,
+    /// Rate of the deflection (rad/s); zeros for gears without damping.
+    pub deflection_rate: Vec<f64>,
     /// Of each spring its part of the deflection per compliance: `C_ik (Cᵀ τ)_k` (N m).
     pub torques: Vec<Vec<f64>>,
+    /// The same of signals without the noise of the encoders ([`crate::GearRun::instrument`]).
+    pub instruments: Vec<Vec<f64>>,
 }
 
 /// Finds the stiffness of each spring from all recordings of the same encoders; one recording is taken as two halves.
@@ -46,21 +49,22 @@ pub fn coupled_gear_stiffness(runs: &[Vec<CoupledOutput>]) -> Option<Vec<GearEst
     let others = |run: usize| all.iter().copied().filter(|k| *k != run).collect::<Vec<_>>();
     let without: Vec<Fit> = all.iter().map(|run| Fit::of(runs, &others(*run), None)).collect::<Option<_>>()?;
     let of = |motor: usize| {
-        let n = left.len() as f64;
-        let mean = left.iter().map(|fit| fit.compliance[motor]).sum::<f64>() / n;
-        let variance = (n - 1.0) / n * left.iter().map(|fit| (fit.compliance[motor] - mean).powi(2)).sum::<f64>();
-        let unseen = runs.iter().zip(&without).map(|(run, fit)| fit.left_of(run, motor));
-        let sums = runs.iter().map(|run| fit.left_of(run, motor)).fold([0.0; 3], |a, b| [0, 1, 2].map(|k| a[k] + b[k]));
+        let scatter = |fits: &[Fit]| jackknife(&fits.iter().map(|fit| fit.compliance[motor]).collect::<Vec<_>>());
+        let unseen = runs.iter().zip(&without).map(|(run, fit)| squares(&fit.curves(run, motor)));
+        let curves: Vec<_> = runs.iter().map(|run| fit.curves(run, motor)).collect();
+        let sums = curves.iter().map(squares).fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
+        let count = curves.iter().map(|[measured, _]| measured.len()).sum::<usize>() as f64;
         let compliance = fit.compliance[motor];
         GearEstimate {
             stiffness: 1.0 / compliance,
-            std_ln: variance.sqrt() / compliance.abs(),
+            std_ln: scatter(&left).max(scatter(&without)) / compliance.abs(),
             delay_s: fit.delay[seen_most(runs, motor)],
-            r2: 1.0 - sums[0] / sums[1],
-            unseen_r2: unseen.map(|[rest, whole, _]| 1.0 - rest / whole).collect(),
+            r2: 1.0 - sums.0 / sums.1,
+            unseen_r2: unseen.map(|(rest, whole)| 1.0 - rest / whole).collect(),
             without_each: without.iter().map(|fit| 1.0 / fit.compliance[motor]).collect(),
-            rest_rms: (sums[0] / sums[2]).sqrt(),
-            deflection_rms: (sums[1] / sums[2]).sqrt(),
+            rest_rms: (sums.0 / count).sqrt(),
+            deflection_rms: (sums.1 / count).sqrt(),
+            curves,
         }
     };
     Some((0..first.torques.len()).map(of).collect())
@@ -83,7 +87,9 @@ fn split(run: &[CoupledOutput]) -> [Vec<CoupledOutput>; 2] {
         let of = |output: &CoupledOutput| CoupledOutput {
             deflection: cut(&output.deflection),
             rate: cut(&output.rate),
+            deflection_rate: cut(&output.deflection_rate),
             torques: output.torques.iter().map(cut).collect(),
+            instruments: output.instruments.iter().map(cut).collect(),
         };
         run.iter().map(of).collect()
     };
@@ -94,50 +100,39 @@ fn split(run: &[CoupledOutput]) -> [Vec<CoupledOutput>; 2] {
 struct Fit {
     compliance: Vec<f64>,
     delay: Vec<f64>,
+    damping_s: Vec<f64>,
 }
 
 impl Fit {
     /// Least squares with an offset for each encoder of each run, without one block.
     fn of(runs: &[Vec<CoupledOutput>], some: &[usize], without: Option<(usize, usize)>) -> Option<Self> {
         let (outputs, motors) = (runs[0].len(), runs[0][0].torques.len());
-        let size = motors + outputs;
-        let (mut normal, mut right) = (DMatrix::<f64>::zeros(size, size), DVector::<f64>::zeros(size));
+        let mut sums = Normal::new(motors + 2 * outputs);
         for &k in some {
             let left_out = |i: &usize| without.is_some_and(|(r, first)| r == k && (first..first + BLOCK).contains(i));
             let kept: Vec<usize> = (0..runs[k][0].deflection.len()).filter(|i| !left_out(i)).collect();
             for (number, output) in runs[k].iter().enumerate() {
-                let y = centred(&output.deflection, &kept);
-                let mut columns: Vec<(usize, Vec<f64>)> =
-                    output.torques.iter().map(|torque| centred(torque, &kept)).enumerate().collect();
-                columns.push((motors + number, centred(&output.rate, &kept)));
-                for (a, x) in &columns {
-                    right[*a] += x.iter().zip(&y).map(|(x, y)| x * y).sum::<f64>();
-                    for (b, z) in &columns {
-                        normal[(*a, *b)] += x.iter().zip(z).map(|(x, z)| x * z).sum::<f64>();
-                    }
-                }
+                let all = |signals: &[Vec<f64>]| signals.iter().map(|x| centred(x, &kept)).collect::<Vec<_>>();
+                let (x, z) = (all(&output.torques), all(&output.instruments));
+                let rate = centred(&output.rate, &kept);
+                let mut columns: Vec<(usize, &[f64], &[f64])> =
+                    x.iter().zip(&z).enumerate().map(|(k, (x, z))| (k, &x[..], &z[..])).collect();
+                let yielding = centred(&output.deflection_rate, &kept);
+                columns.push((motors + number, &rate, &rate));
+                columns.push((motors + outputs + number, &yielding, &yielding));
+                sums.add(&columns, &centred(&output.deflection, &kept));
             }
         }
-        let scale: Vec<f64> = (0..size).map(|k| f64::sqrt(normal[(k, k)])).collect();
-        if scale[..motors].iter().any(|scale| scale.is_nan() || *scale <= 0.0) {
-            return None;
-        }
-        // A joint that stands still has no delay to be told.
-        let told: Vec<usize> = (0..size).filter(|k| scale[*k] > 0.0).collect();
-        let unit = DMatrix::from_fn(told.len(), told.len(), |i, j| {
-            normal[(told[i], told[j])] / (scale[told[i]] * scale[told[j]])
-        });
-        let found = unit.cholesky()?.solve(&DVector::from_fn(told.len(), |i, _| right[told[i]] / scale[told[i]]));
-        let mut values = vec![0.0; size];
-        told.iter().zip(found.iter()).for_each(|(k, x)| values[*k] = x / scale[*k]);
-        let delay = values.split_off(motors);
-        Some(Self { compliance: values, delay })
+        let mut values = sums.solved(motors)?;
+        let mut delay = values.split_off(motors);
+        let damping_s = delay.split_off(outputs).iter().map(|x| -x).collect();
+        Some(Self { compliance: values, delay, damping_s })
     }
 
-    /// Sums of squares of a run over the encoders that show a spring: what is left, the same without that spring, how many samples.
-    fn left_of(&self, run: &[CoupledOutput], motor: usize) -> [f64; 3] {
-        let mut sums = [0.0; 3];
-        for (output, delay) in run.iter().zip(&self.delay) {
+    /// Of a run, over the encoders that show a spring: what that spring does by the readings without the others, and by its torque.
+    fn curves(&self, run: &[CoupledOutput], motor: usize) -> [Vec<f64>; 2] {
+        let (mut measured, mut expected) = (Vec::new(), Vec::new());
+        for ((output, delay), damping_s) in run.iter().zip(&self.delay).zip(&self.damping_s) {
             if output.torques[motor].iter().all(|torque| *torque == 0.0) {
                 continue;
             }
@@ -147,15 +142,14 @@ impl Fit {
                 rest.iter_mut().zip(centred(x, &kept)).for_each(|(rest, x)| *rest -= factor * x);
             };
             take(&output.rate, *delay);
-            output.torques.iter().zip(&self.compliance).for_each(|(torque, c)| take(torque, *c));
-            let own = centred(&output.torques[motor], &kept);
-            for (rest, torque) in rest.iter().zip(own) {
-                sums[0] += rest * rest;
-                sums[1] += (rest + self.compliance[motor] * torque).powi(2);
-                sums[2] += 1.0;
-            }
+            take(&output.deflection_rate, -damping_s);
+            let others = output.torques.iter().zip(&self.compliance).enumerate().filter(|(k, _)| *k != motor);
+            others.for_each(|(_, (torque, c))| take(torque, *c));
+            measured.extend(rest);
+            expected
+                .extend(centred(&output.torques[motor], &kept).iter().map(|torque| self.compliance[motor] * torque));
         }
-        sums
+        [measured, expected]
     }
 }
 
@@ -183,7 +177,7 @@ mod tests {
             let error = |s: usize| noise * (17.0 * t(s) * (1.0 + 0.1 * seed + 0.3 * i as f64)).sin();
             let spring = |s: usize| (0..3).map(|k| torques[k][s] / STIFFNESS[k]).sum::<f64>();
             let deflection = (0..2500).map(|s| spring(s) + DELAY[i] * rate[s] + 1e-3 * seed + error(s)).collect();
-            CoupledOutput { deflection, rate, torques }
+            CoupledOutput { deflection, rate, deflection_rate: vec![0.0; 2500], instruments: torques.clone(), torques }
         };
         (0..3).map(output).collect()
     }
@@ -209,8 +203,9 @@ mod tests {
     fn a_single_gear_comes_out_as_by_itself() {
         let runs: Vec<_> = [0.0, 1.0, 2.0].map(|seed| vec![run(seed, 1e-5).swap_remove(0)]).to_vec();
         let only = |run: &Vec<CoupledOutput>| {
-            let CoupledOutput { deflection, rate, torques } = run[0].clone();
-            vec![CoupledOutput { deflection, rate, torques: vec![torques[0].clone()] }]
+            let CoupledOutput { deflection, rate, deflection_rate, torques, .. } = run[0].clone();
+            let torques = vec![torques[0].clone()];
+            vec![CoupledOutput { deflection, rate, deflection_rate, instruments: torques.clone(), torques }]
         };
         let runs: Vec<_> = runs.iter().map(only).collect();
         let plain: Vec<GearRun> = runs
@@ -218,7 +213,9 @@ mod tests {
             .map(|run| GearRun {
                 deflection: run[0].deflection.clone(),
                 torque: run[0].torques[0].clone(),
+                instrument: run[0].torques[0].clone(),
                 rate: run[0].rate.clone(),
+                deflection_rate: vec![0.0; 2500],
             })
             .collect();
         let (a, b) = (&coupled_gear_stiffness(&runs).unwrap()[0], gear_stiffness(&plain).unwrap());
@@ -233,6 +230,7 @@ mod tests {
         for run in &mut runs {
             run.truncate(1);
             run[0].torques = vec![run[0].torques[0].clone(); 2];
+            run[0].instruments = run[0].torques.clone();
         }
         assert!(coupled_gear_stiffness(&runs).is_none());
     }

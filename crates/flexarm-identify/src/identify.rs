@@ -6,12 +6,18 @@ use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Translation3, Vector3};
 use crate::least_squares::{Residuals, Search, Solution, SolveError, solve};
 use crate::measurement::{MeasuredArm, NoAnswer};
 use crate::parameter::{Parameter, Plant};
-use crate::reading::{Instrument, Measurements, ReadingKind, Target};
+use crate::reading::{Component, Instrument, Measurements, Reading, ReadingKind, Target};
 
 /// A residual over its own standard deviation beyond which a reading is named.
 const SUSPICIOUS: f64 = 4.0;
 /// One-sided normal quantile at which the scatter is said to be larger than declared: one in a thousand.
 const MISFIT_QUANTILE: f64 = 3.09;
+/// Most rounds in which an unknown scatter is found.
+const SCATTER_ROUNDS: usize = 6;
+/// Starts of a search that may end in a false minimum.
+const STARTS: usize = 12;
+/// A scatter so many times as large as declared is no fit: its deviations would say nothing.
+const NO_FIT: f64 = 2.0;
 /// Part of a parameter that may lie in directions that are not identified.
 const UNTOLD: f64 = 0.05;
 
@@ -43,9 +49,9 @@ pub struct Found {
     pub initial: f64,
     /// Now; the initial value where the readings say nothing.
     pub value: f64,
-    /// Standard deviation; the prior's where the readings say nothing.
+    /// Standard deviation; not a number where the readings say nothing or the fit does not meet them.
     pub std: f64,
-    /// Where it lies in 95 of 100 cases.
+    /// Where it lies in 95 of 100 cases; not numbers where there is no deviation.
     pub interval: [f64; 2],
     /// Whether the readings tell it.
     pub identifiable: bool,
@@ -113,6 +119,17 @@ pub enum IdentifyError {
         /// Places.
         places: usize,
     },
+    /// An instrument of whose axes too little is seen.
+    #[error(
+        "instrument {instrument}: its axes follow from displacements with all three components along at least two directions, found \
+         {displacements}; add such readings, or say how it is turned"
+    )]
+    Axes {
+        /// Its number.
+        instrument: usize,
+        /// Displacements.
+        displacements: usize,
+    },
     /// The arm has no answer.
     #[error(transparent)]
     Model(#[from] NoAnswer),
@@ -151,23 +168,62 @@ pub fn identify(
     if rows == 0 || parameters.is_empty() {
         return Err(IdentifyError::Nothing { parameters: parameters.len(), rows });
     }
-    let measurements = &placed(plant, measurements)?;
-    let before = initial_residuals(plant, measurements, options)?;
-    let solution = fitted(plant, parameters, measurements, options, None)?;
-    let held_out = held_out(plant, parameters, measurements, options, &solution, &before)?;
-    if !options.deviations_known && solution.freedom == 0 {
-        return Err(IdentifyError::NoScatter { rows });
+    let mut measurements = placed(plant, measurements)?;
+    let scatter = if options.deviations_known { 1.0 } else { scatter(plant, parameters, &measurements, options)? };
+    measurements.readings.iter_mut().for_each(|reading| reading.scale_deviations(scatter));
+    let before = initial_residuals(plant, &measurements, options)?;
+    let solution = searched(plant, parameters, &measurements, options)?;
+    let held_out = held_out(plant, parameters, &measurements, options, &solution, &before)?;
+    let mut found = told(parameters, &measurements, options, solution, before, held_out);
+    // In units of the deviations that were given.
+    found.solution.residuals *= scatter;
+    found.before.iter_mut().for_each(|r| *r *= scatter);
+    if let Some(held) = &mut found.held_out {
+        held.residuals.iter_mut().for_each(|r| *r *= scatter);
+        (held.rms, held.rms_initial) = (held.rms * scatter, held.rms_initial * scatter);
     }
-    let found = told(parameters, measurements, options, solution, before, held_out);
-    let numbers = |p: &Found| [p.value, p.std, p.interval[0], p.interval[1]];
-    match found.parameters.iter().flat_map(numbers).all(f64::is_finite) {
+    let sound = |p: &Found| p.value.is_finite() && (p.std.is_nan() || p.interval.iter().all(|x| x.is_finite()));
+    match found.parameters.iter().all(sound) {
         true => Ok(found),
         false => Err(IdentifyError::NotFinite),
     }
 }
 
+/// How many times larger than the given deviations the readings scatter about the fit, where only the ratios of these count. It begins
+/// with the scatter about the arm as it is, so that losses and what is identified have a measure from the start.
+fn scatter(
+    plant: &Plant,
+    parameters: &[Parameter],
+    measurements: &Measurements,
+    options: &IdentifyOptions,
+) -> Result<f64, IdentifyError> {
+    let rms = |values: &[f64]| (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt();
+    let observed = MeasuredArm { plant, parameters: &[], measurements }.observed();
+    let deviations = measurements.readings.iter().flat_map(Reading::deviations);
+    let sizes: Vec<f64> = observed.iter().zip(deviations).map(|(x, std)| x / std).collect();
+    let first = rms(&initial_residuals(plant, measurements, options)?).max(1e-9 * rms(&sizes));
+    let first = if first > 0.0 { first } else { 1.0 };
+    let mut scatter = first;
+    for _ in 0..SCATTER_ROUNDS {
+        let mut scaled = measurements.clone();
+        scaled.readings.iter_mut().for_each(|reading| reading.scale_deviations(scatter));
+        let solution = searched(plant, parameters, &scaled, options)?;
+        if solution.freedom == 0 {
+            return Err(IdentifyError::NoScatter { rows: measurements.rows() });
+        }
+        let next = (scatter * solution.scale.sqrt()).max(1e-6 * first);
+        let settled = (next / scatter).ln().abs() < 0.01;
+        scatter = next;
+        if settled {
+            break;
+        }
+    }
+    Ok(scatter)
+}
+
+/// What is known before. A prior weaker than the reference does not count: the readings alone make a parameter identifiable.
 fn priors(parameters: &[Parameter]) -> Vec<f64> {
-    parameters.iter().map(|parameter| parameter.prior).collect()
+    parameters.iter().map(|parameter| parameter.prior.min(parameter.reference())).collect()
 }
 
 fn fitted(
@@ -186,57 +242,150 @@ fn fitted(
     })
 }
 
+/// The fit of all readings. Frequency responses have minima that are none where resonances of the model lie on others of the arm: they
+/// are fitted by their logarithm first, and from several starts as long as the scatter is not that declared.
+fn searched(
+    plant: &Plant,
+    parameters: &[Parameter],
+    measurements: &Measurements,
+    options: &IdentifyOptions,
+) -> Result<Solution, IdentifyError> {
+    let vibrates = |reading: &Reading| matches!(reading.kind, ReadingKind::Response(_));
+    if !measurements.readings.iter().any(vibrates) {
+        return fitted(plant, parameters, measurements, options, None);
+    }
+    let logarithmic = measurements.logarithmic();
+    let from = |start: &DVector<f64>| -> Result<Solution, IdentifyError> {
+        let begin = match &logarithmic {
+            Some(smooth) => fitted(plant, parameters, smooth, options, Some(start))?.unknowns,
+            None => start.clone(),
+        };
+        fitted(plant, parameters, measurements, options, Some(&begin))
+    };
+    let zeros = DVector::zeros(parameters.len() + measurements.own_unknowns());
+    let mut best = from(&zeros);
+    for number in 0..STARTS {
+        if options.deviations_known && best.as_ref().is_ok_and(|best| !misfits(best)) {
+            break;
+        }
+        let mut start = zeros.clone();
+        for (k, parameter) in parameters.iter().enumerate() {
+            start[k] = spread(number, k) * parameter.reference();
+        }
+        let other = from(&start);
+        let better = match (&other, &best) {
+            (Ok(other), Ok(best)) => other.cost < best.cost,
+            (Ok(_), Err(_)) => true,
+            _ => false,
+        };
+        if better {
+            best = other;
+        }
+    }
+    best
+}
+
+/// A number between -1.5 and 1.5 for a start and a coordinate: the additive recurrence of roots of primes.
+fn spread(start: usize, coordinate: usize) -> f64 {
+    const PRIMES: [f64; 12] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0, 37.0];
+    let root = PRIMES[coordinate % PRIMES.len()].sqrt() * (1 + coordinate / PRIMES.len()) as f64;
+    3.0 * (root * (start + 1) as f64).fract() - 1.5
+}
+
+/// Whether residuals scatter more than chance does.
+fn misfits(solution: &Solution) -> bool {
+    solution.freedom > 0 && solution.scale > chi_square_bound(solution.freedom)
+}
+
 /// What an unknown of the measurements is.
 fn own_name(measurements: &Measurements, number: usize) -> String {
-    let unknown = |i: &&(usize, &Instrument)| matches!(i.1, Instrument::Unknown(_));
-    let instruments: Vec<usize> =
-        measurements.instruments.iter().enumerate().filter(|i| unknown(&i)).map(|i| i.0).collect();
-    match instruments.get(number / 6) {
-        Some(k) => format!("where instrument {k} stands"),
-        None => "where a target is on the tool".to_owned(),
+    let mut first = 0;
+    for (k, instrument) in measurements.instruments.iter().enumerate() {
+        first += instrument.unknowns();
+        if number < first {
+            return match instrument {
+                Instrument::Axes(_) => format!("how instrument {k} is turned"),
+                _ => format!("where instrument {k} stands"),
+            };
+        }
     }
+    "where a target is on the tool".to_owned()
 }
 
 /// The measurements with unknown instruments where they fit best to the arm as it is known.
 fn placed(plant: &Plant, measurements: &Measurements) -> Result<Measurements, IdentifyError> {
     let mut placed = measurements.clone();
     for number in 0..measurements.instruments.len() {
-        if !matches!(measurements.instruments[number], Instrument::Unknown(_)) {
-            continue;
-        }
-        // In world axes: the instrument as if it stood there.
-        let mut seen = measurements.of_readings(
-            |k| matches!(measurements.readings[k].kind, ReadingKind::Place { instrument, .. } if instrument == number),
-        );
-        seen.instruments.iter_mut().for_each(|i| *i = Instrument::Known(Pose::identity()));
-        seen.targets.iter_mut().for_each(|t| {
-            if let Target::Unknown(guess) = t {
-                *t = Target::Known(*guess);
-            }
-        });
-        let arm = MeasuredArm { plant, parameters: &[], measurements: &seen };
-        let world = points(&arm.predicted(&DVector::zeros(0))?);
-        let Some(X_IW) = rigid_fit(&world, &points(&arm.observed())) else {
-            return Err(IdentifyError::Instrument { instrument: number, places: world.len() });
+        let of_it = |kind: &ReadingKind| match kind {
+            ReadingKind::InstrumentAt { instrument, .. } => *instrument == number,
+            _ => false,
         };
-        placed.instruments[number] = Instrument::Unknown(X_IW);
+        let said = measurements.readings.iter().any(|reading| of_it(&reading.kind));
+        match measurements.instruments[number] {
+            Instrument::Unknown(_) if !said => {
+                let seen =
+                    |kind: &ReadingKind| matches!(kind, ReadingKind::Place { instrument, .. } if *instrument == number);
+                let (world, own) = both_points(plant, measurements, seen)?;
+                let too_few = || IdentifyError::Instrument { instrument: number, places: world.len() };
+                placed.instruments[number] = Instrument::Unknown(rigid_fit(&world, &own).ok_or_else(too_few)?);
+            }
+            Instrument::Axes(_) if !said => {
+                let seen = |kind: &ReadingKind| seen_in_axes(kind, number);
+                let (world, own) = both_points(plant, measurements, seen)?;
+                let too_few = || IdentifyError::Axes { instrument: number, displacements: world.len() };
+                placed.instruments[number] = Instrument::Axes(rotation_fit(&world, &own).ok_or_else(too_few)?);
+            }
+            _ => {}
+        }
     }
     Ok(placed)
 }
 
-fn points(values: &[f64]) -> Vec<Vector3<f64>> {
+/// Whether a reading is a displacement of which all three components were seen in the axes of an instrument, and nothing else.
+fn seen_in_axes(kind: &ReadingKind, instrument: usize) -> bool {
+    let ReadingKind::Displacement { rows, .. } = kind else { return false };
+    let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+    rows.len() == 3 && rows.iter().zip(axes).all(|(row, axis)| row.of == Component::AlongSeen(instrument, axis))
+}
+
+/// Vectors of some readings as the arm as it is known has them in the world, and as they were seen.
+fn both_points(
+    plant: &Plant,
+    measurements: &Measurements,
+    some: impl Fn(&ReadingKind) -> bool,
+) -> Result<(Vec<Vector3<f64>>, Vec<Vector3<f64>>), IdentifyError> {
+    // In world axes: the instrument as if it stood there.
+    let mut seen = measurements.of_readings(|k| some(&measurements.readings[k].kind));
+    seen.instruments.iter_mut().for_each(|i| *i = Instrument::Known(Pose::identity()));
+    seen.targets.iter_mut().for_each(|t| {
+        if let Target::Unknown(guess) = t {
+            *t = Target::Known(*guess);
+        }
+    });
+    let arm = MeasuredArm { plant, parameters: &[], measurements: &seen };
+    Ok((points(&arm.predicted(&DVector::zeros(0))?), points(&arm.observed())))
+}
+
+pub(crate) fn points(values: &[f64]) -> Vec<Vector3<f64>> {
     values.chunks_exact(3).map(Vector3::from_column_slice).collect()
 }
 
 /// Rotation and translation that bring points onto others with the least sum of squares (Arun, Huang and Blostein 1987).
-fn rigid_fit(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Pose> {
+pub(crate) fn rigid_fit(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Pose> {
     let n = from.len();
     if n < 3 {
         return None;
     }
     let middle = |points: &[Vector3<f64>]| points.iter().sum::<Vector3<f64>>() / n as f64;
     let (a, b) = (middle(from), middle(to));
-    let H: Matrix3<f64> = from.iter().zip(to).map(|(p, q)| (p - a) * (q - b).transpose()).sum();
+    let less = |points: &[Vector3<f64>], middle| points.iter().map(|p| p - middle).collect::<Vec<_>>();
+    let R = rotation_fit(&less(from, a), &less(to, b))?;
+    Some(Pose::from_parts(Translation3::from(b - R * a), R))
+}
+
+/// Rotation that brings vectors onto others with the least sum of squares; none where all are along one line.
+pub(crate) fn rotation_fit(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Rotation3<f64>> {
+    let H: Matrix3<f64> = from.iter().zip(to).map(|(p, q)| p * q.transpose()).sum();
     if !H.norm_squared().is_finite() {
         return None;
     }
@@ -251,8 +400,7 @@ fn rigid_fit(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Pose> {
     let mut turn = Matrix3::identity();
     let smallest = svd.singular_values.imin();
     turn[(smallest, smallest)] = (Vt.transpose() * U.transpose()).determinant().signum();
-    let R = Rotation3::from_matrix_unchecked(Vt.transpose() * turn * U.transpose());
-    Some(Pose::from_parts(Translation3::from(b - R * a), R))
+    Some(Rotation3::from_matrix_unchecked(Vt.transpose() * turn * U.transpose()))
 }
 
 /// Standard residuals of the arm as it is known, unknowns of the measurements fitted.
@@ -316,30 +464,29 @@ fn told(
     parameters: &[Parameter],
     measurements: &Measurements,
     options: &IdentifyOptions,
-    solution: Solution,
+    mut solution: Solution,
     before: Vec<f64>,
     held_out: Option<HeldOut>,
 ) -> Identified {
     let p = parameters.len();
-    let misfit =
-        (options.deviations_known && solution.freedom > 0 && solution.scale > chi_square_bound(solution.freedom))
-            .then(|| solution.scale.sqrt());
+    let misfit = (options.deviations_known && misfits(&solution)).then(|| solution.scale.sqrt());
     let scatter = match options.deviations_known {
         true => misfit.unwrap_or(1.0),
         false if solution.freedom > 0 => solution.scale.sqrt(),
         false => f64::INFINITY,
     };
+    let fits = misfit.is_none_or(|factor| factor <= NO_FIT);
     let V = solution.directions.columns(0, solution.identified);
     let share = |k: usize| 1.0 - V.row(k).norm_squared();
     let found = parameters.iter().enumerate().map(|(k, parameter)| {
         let identifiable = share(k) <= UNTOLD;
         let spread = solution.covariance[(k, k)].sqrt();
-        let (x, std) = (solution.unknowns[k], if identifiable { spread * scatter } else { spread });
+        let (x, std) = (solution.unknowns[k], if identifiable && fits { spread * scatter } else { f64::NAN });
         Found {
             name: parameter.name.clone(),
             unit: parameter.unit.clone(),
             initial: parameter.initial,
-            value: parameter.value(x),
+            value: if identifiable { parameter.value(x) } else { parameter.initial },
             std: parameter.deviation(x, std),
             interval: parameter.interval(x, std, 1.96),
             identifiable,
@@ -363,6 +510,7 @@ fn told(
         .collect();
     let mut suspicious: Vec<usize> = (0..normalised.len()).filter(|k| normalised[*k].abs() > SUSPICIOUS).collect();
     suspicious.sort_by(|a, b| normalised[*b].abs().total_cmp(&normalised[*a].abs()));
+    solution.converged &= fits;
     let own = &solution.unknowns.as_slice()[p..];
     let instruments = (0..measurements.instruments.len()).map(|k| measurements.instrument(k, own).0).collect();
     let targets = (0..measurements.targets.len()).map(|k| measurements.target(k, own).0).collect();

@@ -92,13 +92,15 @@ pub struct Solution {
     pub gains: Vec<f64>,
     /// How many of the directions are identified.
     pub identified: usize,
-    /// Sum of the weighted squares over the degrees of freedom, `Σ w r² / (m - n)`.
+    /// Square of the residuals' scale, `Σ r² / (m - n)` where their square counts; else robust, so that a few outliers leave it.
     pub scale: f64,
+    /// Twice the cost of the residuals under the loss.
+    pub cost: f64,
     /// m - n.
     pub freedom: usize,
     /// Iterations of both phases.
     pub iterations: usize,
-    /// Whether the last step was below the tolerance.
+    /// Whether the last step was below the tolerance; of an identification also that the fit meets the readings.
     pub converged: bool,
 }
 
@@ -145,7 +147,7 @@ pub fn solve<P: Residuals>(
     let basis = known.basis(&prior, n);
     let mut found = descend(problem, &basis, begin, None, search)?;
     found.iterations += held.iterations;
-    Ok(finish(found, known, &basis, &prior))
+    Ok(finish(found, known, &basis, &prior, search.loss))
 }
 
 /// Where a descent ended.
@@ -326,7 +328,7 @@ fn orthonormal(A: &DMatrix<f64>) -> Result<DMatrix<f64>, usize> {
     Ok(Q)
 }
 
-fn finish(found: Descent, known: Known, basis: &DMatrix<f64>, prior: &DVector<f64>) -> Solution {
+fn finish(found: Descent, known: Known, basis: &DMatrix<f64>, prior: &DVector<f64>, loss: Loss) -> Solution {
     let (m, p) = (found.residuals.len(), prior.len());
     let columns = basis.ncols();
     let root = found.weights.map(f64::sqrt);
@@ -350,8 +352,9 @@ fn finish(found: Descent, known: Known, basis: &DMatrix<f64>, prior: &DVector<f6
         (row * &inverse * row.transpose())[(0, 0)].clamp(0.0, 1.0)
     });
     let freedom = m.saturating_sub(columns);
-    let sum: f64 = found.residuals.iter().zip(found.weights.iter()).map(|(r, w)| w * r * r).sum();
     Solution {
+        scale: scale(found.residuals.as_slice(), freedom, loss),
+        cost: found.residuals.iter().map(|r| loss.cost(*r)).sum(),
         unknowns: found.unknowns,
         residuals: found.residuals,
         weights: found.weights,
@@ -360,11 +363,32 @@ fn finish(found: Descent, known: Known, basis: &DMatrix<f64>, prior: &DVector<f6
         directions: known.directions,
         gains: known.gains,
         identified: known.identified,
-        scale: if freedom > 0 { sum / freedom as f64 } else { f64::NAN },
         freedom,
         iterations: found.iterations,
         converged: found.converged,
     }
+}
+
+/// Residuals beyond so many times their scale count as if they were there.
+const CLIPPED: f64 = 2.5;
+/// Mean of `min(z², CLIPPED²)` over normal numbers z.
+const CLIPPED_MEAN: f64 = 0.977_56;
+
+/// Square of the scale s of residuals, not a number without degrees of freedom. Robust (Huber's second proposal):
+/// `Σ min(r²/s², CLIPPED²) = CLIPPED_MEAN (m - n)`.
+pub(crate) fn scale(residuals: &[f64], freedom: usize, loss: Loss) -> f64 {
+    if freedom == 0 {
+        return f64::NAN;
+    }
+    let mut square = residuals.iter().map(|r| r * r).sum::<f64>() / freedom as f64;
+    if loss == Loss::Square {
+        return square;
+    }
+    for _ in 0..100 {
+        let sum: f64 = residuals.iter().map(|r| (r * r).min(CLIPPED * CLIPPED * square)).sum();
+        square = sum / (CLIPPED_MEAN * freedom as f64);
+    }
+    square
 }
 
 #[cfg(test)]
@@ -412,6 +436,22 @@ mod tests {
         assert!((found.unknowns[3] - 4.0).abs() < 1e-8, "{}", found.unknowns[3]);
         assert_eq!((found.identified, found.unknowns[2]), (2, 0.0));
         assert!((found.covariance[(2, 2)].sqrt() - 0.7).abs() < 1e-12, "its deviation is the prior's");
+    }
+
+    /// Truth: quantiles of the normal distribution, whose scale is 1; two of 402 numbers are a hundred.
+    #[test]
+    fn two_wild_residuals_leave_the_scale_where_it_was() {
+        let mut residuals: Vec<f64> = Vec::new();
+        for k in 0..400 {
+            // Box and Muller's transform of a regular grid.
+            let (u, v) = ((f64::from(k % 20) + 0.5) / 20.0, (f64::from(k / 20) + 0.5) / 20.0);
+            residuals.push((-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos());
+        }
+        let clean = scale(&residuals, 400, Loss::Huber(2.5));
+        residuals.extend([100.0, -100.0]);
+        let [robust, plain] = [Loss::Huber(2.5), Loss::Square].map(|loss| scale(&residuals, 402, loss));
+        assert!((clean - 1.0).abs() < 0.05, "{clean}"); // measured: 0.02
+        assert!((robust - clean).abs() < 0.05 && plain > 40.0, "{robust} {plain}"); // measured: 0.03
     }
 
     #[test]

@@ -19,6 +19,7 @@ mod plan;
 mod reading;
 mod response;
 mod sensitivity;
+mod slips;
 mod trajectory;
 
 pub use coupled_gears::{CoupledOutput, coupled_gear_stiffness};
@@ -34,4 +35,5 @@ pub use reading::{
 };
 pub use response::{Answer, Probe, ResponseSlopes, Structure, StructureSlopes, structure_slopes};
 pub use sensitivity::{FrequencySlopes, compliance_slopes, frequency_slopes, tool_slopes};
+pub use slips::{FoundSlip, Slip, likely_slip};
 pub use trajectory::{RunParameter, error_slopes};

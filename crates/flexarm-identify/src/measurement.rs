@@ -166,6 +166,12 @@ impl MeasuredArm<'_> {
                 ReadingKind::Displacement { rows, .. } => rows.iter().map(|row| row.value).collect(),
                 ReadingKind::Place { value, .. } => value.iter().copied().collect(),
                 ReadingKind::Known { value, .. } => vec![*value],
+                ReadingKind::TargetAt { value, .. } => value.iter().copied().collect(),
+                ReadingKind::InstrumentAt { value, std, .. } => {
+                    let place =
+                        std.map_or(Vec::new(), |_| value.inverse().translation.vector.iter().copied().collect());
+                    place.into_iter().chain([0.0; 3]).collect()
+                }
                 ReadingKind::Frequencies { rows, .. } => rows.iter().map(|row| row.value).collect(),
                 ReadingKind::Response(response) => {
                     (0..response.points.len()).flat_map(|k| response.numbers(k, response.points[k].1)).collect()
@@ -210,7 +216,7 @@ impl MeasuredArm<'_> {
         let named = |source| NoAnswer { reading: reading.name.clone(), source };
         match &reading.kind {
             ReadingKind::Displacement { before, after, point, rows } => {
-                displacement(rooms, &reading.q, [before, after], point, rows, slopes, own.len()).map_err(named)
+                self.displacement(rooms, &reading.q, [before, after], point, rows, own, slopes).map_err(named)
             }
             ReadingKind::Place { load, target, instrument, .. } => {
                 let at = rooms.at_rest(&reading.q, load, slopes).map_err(named)?;
@@ -223,6 +229,15 @@ impl MeasuredArm<'_> {
                 let columns = if slopes { self.parameters.len() + own.len() } else { 0 };
                 let slope = |_, j: usize| f64::from(u8::from(Some(j) == number));
                 Ok(Block { values: vec![value], slopes: DMatrix::from_fn(1, columns, slope) })
+            }
+            ReadingKind::TargetAt { target, .. } => {
+                let (p_T, first) = self.measurements.target(*target, own);
+                let column = |i: usize| first.map(|first| first + i);
+                let slopes = self.of_own(3, own.len(), slopes, |i, j| f64::from(u8::from(column(i) == Some(j))));
+                Ok(Block { values: p_T.iter().copied().collect(), slopes })
+            }
+            ReadingKind::InstrumentAt { instrument, value, std, .. } => {
+                Ok(self.instrument_at(*instrument, value, std.is_some(), own, slopes))
             }
             ReadingKind::Frequencies { load, rows } => {
                 let plant = rooms.loaded(&load.carried);
@@ -244,6 +259,42 @@ impl MeasuredArm<'_> {
         let p = self.parameters.len();
         let columns = if slopes { p + own } else { 0 };
         DMatrix::from_fn(rows, columns, |i, j| if j < p { slope(i, j) } else { 0.0 })
+    }
+
+    /// Derivatives by what belongs to the measurements beside zeros for the arm's parameters.
+    fn of_own(&self, rows: usize, own: usize, slopes: bool, slope: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
+        let p = self.parameters.len();
+        let columns = if slopes { p + own } else { 0 };
+        DMatrix::from_fn(rows, columns, |i, j| if j < p { 0.0 } else { slope(i, j - p) })
+    }
+
+    /// Place of an instrument in the world if it counts, and by which rotation vector (its axes) it is turned from `X`.
+    fn instrument_at(&self, number: usize, X: &Pose, placed: bool, own: &[f64], slopes: bool) -> Block {
+        let (X_IW, place, turn) = self.measurements.instrument(number, own);
+        let X_WI = X_IW.inverse();
+        let turned = rotation_vector((X_IW.rotation * X.rotation.inverse()).matrix());
+        let seen = placed.then_some(X_WI.translation.vector);
+        let values: Vec<f64> = seen.iter().flat_map(|p| p.iter().copied()).chain(turned.iter().copied()).collect();
+        let mut by_own = DMatrix::zeros(values.len(), own.len());
+        let rows = values.len() - 3;
+        if let Some(first) = turn {
+            let v = Vector3::new(own[first], own[first + 1], own[first + 2]);
+            let (rates, back) = (left_jacobian(&v), left_jacobian(&turned).try_inverse());
+            let back = back.unwrap_or_else(nalgebra::Matrix3::identity);
+            for k in 0..3 {
+                let w: Vector3<f64> = rates.column(k).into_owned();
+                by_own.view_mut((rows, first + k), (3, 1)).copy_from(&(back * w));
+                if placed {
+                    let moved = X_WI.rotation * w.cross(&X_IW.translation.vector);
+                    by_own.view_mut((0, first + k), (3, 1)).copy_from(&moved);
+                }
+            }
+        }
+        if let (Some(first), true) = (place, placed) {
+            by_own.view_mut((0, first), (3, 3)).copy_from(&(-X_WI.rotation.matrix()));
+        }
+        let slopes = self.of_own(values.len(), own.len(), slopes, |i, j| by_own[(i, j)]);
+        Block { values, slopes }
     }
 
     fn response(
@@ -303,20 +354,21 @@ impl MeasuredArm<'_> {
     /// A target seen from an instrument.
     fn place(&self, at: &AtRest, target: usize, instrument: usize, own: &[f64]) -> Block {
         let p = self.parameters.len();
-        let (X_IW, six) = self.measurements.instrument(instrument, own);
+        let (X_IW, place, turn) = self.measurements.instrument(instrument, own);
         let (p_T, three) = self.measurements.target(target, own);
         let seen = X_IW.rotation * at.point(&p_T);
         let values = (seen + X_IW.translation.vector).iter().copied().collect();
         let Some(moved) = at.point_slopes(&p_T) else { return Block { values, slopes: DMatrix::zeros(3, 0) } };
         let mut slopes = DMatrix::zeros(3, p + own.len());
         slopes.columns_mut(0, p).copy_from(&(X_IW.rotation * moved));
-        if let Some(first) = six {
+        if let Some(first) = place {
             slopes.view_mut((0, p + first), (3, 3)).fill_with_identity();
+        }
+        if let Some(first) = turn {
             // The increments are of a rotation vector: its rate map to the angular velocity on the left.
-            let v = Vector3::new(own[first + 3], own[first + 4], own[first + 5]);
+            let rates = left_jacobian(&Vector3::new(own[first], own[first + 1], own[first + 2]));
             for k in 0..3 {
-                let w = left_jacobian(&v).column(k).into_owned();
-                slopes.view_mut((0, p + first + 3 + k), (3, 1)).copy_from(&w.cross(&seen));
+                slopes.view_mut((0, p + first + k), (3, 1)).copy_from(&rates.column(k).cross(&seen));
             }
         }
         if let Some(first) = three {
@@ -354,43 +406,59 @@ fn left_jacobian(v: &Vector3<f64>) -> nalgebra::Matrix3<f64> {
     nalgebra::Matrix3::identity() + K * a + K * K * b
 }
 
-fn displacement(
-    rooms: &mut Workspaces<'_>,
-    q: &[f64],
-    loads: [&LoadCase; 2],
-    point: &Vector3<f64>,
-    rows: &[Row<Component>],
-    slopes: bool,
-    own: usize,
-) -> Result<Block, StepError> {
-    let before = rooms.at_rest(q, loads[0], slopes)?;
-    let after = rooms.at_rest(q, loads[1], slopes)?;
-    let moved = after.point(point) - before.point(point);
-    let turn = after.X_WT.rotation * before.X_WT.rotation.inverse();
-    let turned = rotation_vector(turn.matrix());
-    let value = |row: &Row<Component>| match row.of {
-        Component::Along(d) => d.dot(&moved),
-        Component::About(d) => d.dot(&turned),
-    };
-    let values = rows.iter().map(value).collect();
-    let (Some(a), Some(b)) = (after.point_slopes(point), before.point_slopes(point)) else {
-        return Ok(Block { values, slopes: DMatrix::zeros(rows.len(), 0) });
-    };
-    let (Some(wa), Some(wb)) = (&after.turns, &before.turns) else {
-        return Ok(Block { values, slopes: DMatrix::zeros(rows.len(), 0) });
-    };
-    // Rotation from before to after: its angular velocity is wa - R wb, its vector's rate the inverse of the rate map.
-    let rate = left_jacobian(&turned).try_inverse().unwrap_or_else(nalgebra::Matrix3::identity);
-    let mut all = DMatrix::zeros(rows.len(), a.ncols() + own);
-    for (i, row) in rows.iter().enumerate() {
-        for k in 0..a.ncols() {
-            all[(i, k)] = match row.of {
-                Component::Along(d) => d.dot(&(a.column(k) - b.column(k))),
-                Component::About(d) => d.dot(&(rate * (wa.column(k) - turn * wb.column(k)))),
-            };
+impl MeasuredArm<'_> {
+    #[expect(clippy::too_many_arguments, reason = "what a displacement is made of")]
+    fn displacement(
+        &self,
+        rooms: &mut Workspaces<'_>,
+        q: &[f64],
+        loads: [&LoadCase; 2],
+        point: &Vector3<f64>,
+        rows: &[Row<Component>],
+        own: &[f64],
+        slopes: bool,
+    ) -> Result<Block, StepError> {
+        let before = rooms.at_rest(q, loads[0], slopes)?;
+        let after = rooms.at_rest(q, loads[1], slopes)?;
+        let moved = after.point(point) - before.point(point);
+        let turn = after.X_WT.rotation * before.X_WT.rotation.inverse();
+        let turned = rotation_vector(turn.matrix());
+        // In world axes; of an instrument's axes by the world in them.
+        let seen_from = |instrument: Option<usize>| instrument.map(|k| self.measurements.instrument(k, own));
+        let world = |row: &Row<Component>| {
+            let (d, instrument, about) = row.of.parts();
+            (seen_from(instrument).map_or(d, |(X_IW, ..)| X_IW.rotation.inverse() * d), about)
+        };
+        let value = |row: &Row<Component>| match world(row) {
+            (d, false) => d.dot(&moved),
+            (d, true) => d.dot(&turned),
+        };
+        let values = rows.iter().map(value).collect();
+        let none = |values| Ok(Block { values, slopes: DMatrix::zeros(rows.len(), 0) });
+        let (Some(a), Some(b)) = (after.point_slopes(point), before.point_slopes(point)) else { return none(values) };
+        let (Some(wa), Some(wb)) = (&after.turns, &before.turns) else { return none(values) };
+        // Rotation from before to after: its angular velocity is wa - R wb, its vector's rate the inverse of the rate map.
+        let rate = left_jacobian(&turned).try_inverse().unwrap_or_else(nalgebra::Matrix3::identity);
+        let p = a.ncols();
+        let mut all = DMatrix::zeros(rows.len(), p + own.len());
+        for (i, row) in rows.iter().enumerate() {
+            let (d, about) = world(row);
+            for k in 0..p {
+                all[(i, k)] = match about {
+                    false => d.dot(&(a.column(k) - b.column(k))),
+                    true => d.dot(&(rate * (wa.column(k) - turn * wb.column(k)))),
+                };
+            }
+            let (d, instrument, _) = row.of.parts();
+            let Some((X_IW, _, Some(first))) = seen_from(instrument) else { continue };
+            let seen = X_IW.rotation * if about { turned } else { moved };
+            let rates = left_jacobian(&Vector3::new(own[first], own[first + 1], own[first + 2]));
+            for k in 0..3 {
+                all[(i, p + first + k)] = d.dot(&rates.column(k).cross(&seen));
+            }
         }
+        Ok(Block { values, slopes: all })
     }
-    Ok(Block { values, slopes: all })
 }
 
 impl Residuals for MeasuredArm<'_> {

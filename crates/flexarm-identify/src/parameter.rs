@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use flexarm_kinematics::{Frame, Model, Pose, SpatialInertia};
-use flexarm_stepping::{FlexibleArm, GearCoupling, Held, Spring, StepError};
+use flexarm_stepping::{Damping, FlexibleArm, GearCoupling, Held, Spring, StepError};
 use nalgebra::{DMatrix, Matrix3, Rotation3, Translation3, Vector3};
 
 /// An arm before anything is measured: tree, springs in coordinate order, tool.
@@ -54,6 +54,13 @@ pub enum Effect {
     Tool(usize),
     /// Factor on the damping of springs, whatever describes it.
     Damping(Vec<usize>),
+    /// Factor on the damper of one coordinate of a spring.
+    Damper {
+        /// Number of the spring.
+        spring: usize,
+        /// One of its coordinates, from 0.
+        coordinate: usize,
+    },
     /// Mass (kg) on a body with inertia in proportion: `per_kg` about Bo, B axes.
     Mass {
         /// The body.
@@ -81,7 +88,18 @@ pub struct Parameter {
 impl Parameter {
     /// Whether the search goes along its logarithm, so that it stays positive.
     pub fn is_logarithmic(&self) -> bool {
-        matches!(self.effect, Effect::Stiffness(_) | Effect::Damping(_))
+        matches!(self.effect, Effect::Stiffness(_) | Effect::Damping(_) | Effect::Damper { .. })
+    }
+
+    /// Standard deviation of the search's coordinate that the readings must reach for the parameter to be told, whatever its prior
+    /// is; the default of a prior.
+    pub fn reference(&self) -> f64 {
+        match &self.effect {
+            Effect::Stiffness(_) | Effect::Damping(_) | Effect::Damper { .. } => std::f64::consts::LN_2,
+            Effect::Entry { size, .. } => 0.5 * size,
+            Effect::Tool(_) => 0.01,
+            Effect::Mass { .. } => (0.5 * self.initial.abs()).max(1.0),
+        }
     }
 
     /// Value at a coordinate of the search, which is 0 at the initial value.
@@ -116,6 +134,11 @@ impl Plant {
                     for spring in springs {
                         let spring = &mut plant.springs[*spring];
                         spring.damping = spring.damping.scaled(x.exp());
+                    }
+                }
+                Effect::Damper { spring, coordinate } => {
+                    if let Damping::Dampers(d) = &mut plant.springs[*spring].damping {
+                        d[*coordinate] *= x.exp();
                     }
                 }
                 Effect::Entry { spring, row, column, factor, .. } => {

@@ -47,6 +47,22 @@ pub enum Component {
     Along(Vector3<f64>),
     /// Rotation about a direction, world axes.
     About(Vector3<f64>),
+    /// Along a direction in the axes of an instrument, by its number.
+    AlongSeen(usize, Vector3<f64>),
+    /// Rotation about a direction in the axes of an instrument.
+    AboutSeen(usize, Vector3<f64>),
+}
+
+impl Component {
+    /// Its direction, the instrument in whose axes it is (else those of the world), and whether it is a rotation.
+    pub fn parts(&self) -> (Vector3<f64>, Option<usize>, bool) {
+        match *self {
+            Self::Along(d) => (d, None, false),
+            Self::About(d) => (d, None, true),
+            Self::AlongSeen(instrument, d) => (d, Some(instrument), false),
+            Self::AboutSeen(instrument, d) => (d, Some(instrument), true),
+        }
+    }
 }
 
 /// One thing measured at a pose.
@@ -180,6 +196,26 @@ pub enum ReadingKind {
         /// Standard deviation of that.
         std: f64,
     },
+    /// Where a target is known to be, with a deviation.
+    TargetAt {
+        /// Number of the target.
+        target: usize,
+        /// Place, tool axes (m).
+        value: Vector3<f64>,
+        /// Standard deviation of each component (m).
+        std: f64,
+    },
+    /// How an instrument is known to stand, with deviations: the first guess of it, which must be unknown.
+    InstrumentAt {
+        /// Number of the instrument.
+        instrument: usize,
+        /// The world in its axes.
+        value: Pose,
+        /// Standard deviation of each component of its place, none where only its axes count (m).
+        std: Option<f64>,
+        /// Standard deviation of the rotation about each axis (rad).
+        std_rotation: f64,
+    },
     /// Natural frequencies, drives locked.
     Frequencies {
         /// What the tool carries; a wrench does not count.
@@ -200,9 +236,29 @@ impl Reading {
             ReadingKind::Displacement { rows, .. } => rows.len(),
             ReadingKind::Place { .. } => 3,
             ReadingKind::Known { .. } => 1,
+            ReadingKind::TargetAt { .. } => 3,
+            ReadingKind::InstrumentAt { std, .. } => 3 + 3 * usize::from(std.is_some()),
             ReadingKind::Frequencies { rows, .. } => rows.len(),
             ReadingKind::Response(response) => 2 * response.points.len(),
             ReadingKind::Shape(shape) => shape.probes.len(),
+        }
+    }
+
+    /// All standard deviations so many times as large.
+    pub(crate) fn scale_deviations(&mut self, factor: f64) {
+        match &mut self.kind {
+            ReadingKind::Displacement { rows, .. } => rows.iter_mut().for_each(|row| row.std *= factor),
+            ReadingKind::Place { std, .. } => *std *= factor,
+            ReadingKind::Known { std, .. } | ReadingKind::TargetAt { std, .. } => *std *= factor,
+            ReadingKind::InstrumentAt { std, std_rotation, .. } => {
+                *std = std.map(|std| std * factor);
+                *std_rotation *= factor;
+            }
+            ReadingKind::Frequencies { rows, .. } => rows.iter_mut().for_each(|row| row.std *= factor),
+            ReadingKind::Response(response) => {
+                response.points.iter_mut().for_each(|(.., std)| *std = std.map(|std| std * factor));
+            }
+            ReadingKind::Shape(shape) => shape.std *= factor,
         }
     }
 
@@ -212,6 +268,10 @@ impl Reading {
             ReadingKind::Displacement { rows, .. } => rows.iter().map(|row| row.std).collect(),
             ReadingKind::Place { std, .. } => std.iter().copied().collect(),
             ReadingKind::Known { std, .. } => vec![*std],
+            ReadingKind::TargetAt { std, .. } => vec![*std; 3],
+            ReadingKind::InstrumentAt { std, std_rotation, .. } => {
+                std.map_or(Vec::new(), |std| vec![std; 3]).into_iter().chain([*std_rotation; 3]).collect()
+            }
             ReadingKind::Frequencies { rows, .. } => rows.iter().map(|row| row.std).collect(),
             ReadingKind::Response(response) => response.points.iter().flat_map(|(.., std)| *std).collect(),
             ReadingKind::Shape(shape) => vec![shape.std; shape.probes.len()],
@@ -235,6 +295,19 @@ pub enum Instrument {
     Known(Pose),
     /// Unknown; a guess.
     Unknown(Pose),
+    /// Only its axes count, and are unknown; a guess.
+    Axes(Rotation3<f64>),
+}
+
+impl Instrument {
+    /// How many unknowns it has.
+    pub fn unknowns(&self) -> usize {
+        match self {
+            Self::Known(_) => 0,
+            Self::Unknown(_) => 6,
+            Self::Axes(_) => 3,
+        }
+    }
 }
 
 /// Readings, and what belongs to them.
@@ -249,11 +322,14 @@ pub struct Measurements {
 }
 
 impl Measurements {
-    /// How many unknowns belong to the measurements: six per unknown instrument, then three per unknown target.
+    /// How many unknowns belong to the measurements: those of the instruments, then three per unknown target.
     pub fn own_unknowns(&self) -> usize {
-        let instruments = self.instruments.iter().filter(|i| matches!(i, Instrument::Unknown(_))).count();
         let targets = self.targets.iter().filter(|t| matches!(t, Target::Unknown(_))).count();
-        6 * instruments + 3 * targets
+        self.of_instruments() + 3 * targets
+    }
+
+    fn of_instruments(&self) -> usize {
+        self.instruments.iter().map(Instrument::unknowns).sum()
     }
 
     /// How many numbers were read.
@@ -268,31 +344,49 @@ impl Measurements {
         Self { readings, ..self.clone() }
     }
 
-    /// The world in the axes of an instrument, and where in `own` its six unknowns begin.
-    pub(crate) fn instrument(&self, number: usize, own: &[f64]) -> (Pose, Option<usize>) {
-        let before = self.instruments[..number].iter().filter(|i| matches!(i, Instrument::Unknown(_))).count();
+    /// The same with the logarithm of responses in the place of their real and imaginary parts; none if there are no such.
+    pub(crate) fn logarithmic(&self) -> Option<Self> {
+        let mut all = self.clone();
+        let mut some = false;
+        for reading in &mut all.readings {
+            let ReadingKind::Response(response) = &mut reading.kind else { continue };
+            if response.form == Form::Complex {
+                (some, response.form) = (true, Form::Logarithmic);
+                // A deviation as a part of the value; of a value in the noise next to nothing is known.
+                let part = |value: &Complex<f64>, std: &[f64; 2]| std.map(|std| (std / value.norm()).min(10.0));
+                response.points.retain(|(_, value, _)| value.norm() > 0.0);
+                response.points.iter_mut().for_each(|(_, value, std)| *std = part(value, std));
+            }
+        }
+        some.then_some(all)
+    }
+
+    /// The world in the axes of an instrument, and where in `own` the unknowns of its place and of its rotation begin.
+    pub(crate) fn instrument(&self, number: usize, own: &[f64]) -> (Pose, Option<usize>, Option<usize>) {
+        let first = self.instruments[..number].iter().map(Instrument::unknowns).sum();
+        let v = |at: usize| Vector3::new(own[at], own[at + 1], own[at + 2]);
         match self.instruments[number] {
-            Instrument::Known(X) => (X, None),
+            Instrument::Known(X) => (X, None, None),
             Instrument::Unknown(X) => {
-                let at = 6 * before;
-                let v = |k: usize| Vector3::new(own[at + k], own[at + k + 1], own[at + k + 2]);
                 let moved = Pose {
-                    rotation: Rotation3::new(v(3)) * X.rotation,
-                    translation: Translation3::from(X.translation.vector + v(0)),
+                    rotation: Rotation3::new(v(first + 3)) * X.rotation,
+                    translation: Translation3::from(X.translation.vector + v(first)),
                 };
-                (moved, Some(at))
+                (moved, Some(first), Some(first + 3))
+            }
+            Instrument::Axes(R) => {
+                (Pose::from_parts(Translation3::identity(), Rotation3::new(v(first)) * R), None, Some(first))
             }
         }
     }
 
     /// A target on the tool, and where in `own` its three unknowns begin.
     pub(crate) fn target(&self, number: usize, own: &[f64]) -> (Vector3<f64>, Option<usize>) {
-        let instruments = self.instruments.iter().filter(|i| matches!(i, Instrument::Unknown(_))).count();
         let before = self.targets[..number].iter().filter(|t| matches!(t, Target::Unknown(_))).count();
         match self.targets[number] {
             Target::Known(p) => (p, None),
             Target::Unknown(p) => {
-                let at = 6 * instruments + 3 * before;
+                let at = self.of_instruments() + 3 * before;
                 (p + Vector3::new(own[at], own[at + 1], own[at + 2]), Some(at))
             }
         }

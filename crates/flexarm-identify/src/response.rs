@@ -174,6 +174,8 @@ struct SpringSlope {
     damping: Damping,
     /// Change of the damping's own numbers: so many times themselves.
     more: f64,
+    /// The same of one damper.
+    damper: Option<usize>,
 }
 
 impl Damped<'_> {
@@ -196,11 +198,21 @@ impl Damped<'_> {
                     block += (&s.dK + &s.K * s.more) * b;
                     block += (dM + M * s.more) * a;
                 }
-                Damping::Dampers(d) => (0..size.min(6)).for_each(|c| block[(c, c)] += s.more * d[c]),
+                Damping::Dampers(d) => (0..size.min(6)).for_each(|c| {
+                    block[(c, c)] += d[c] * if s.damper == Some(c) { 1.0 } else { s.more };
+                }),
             }
         }
         // Of coupled gears each motor's damper is in the damping of several joints.
-        let Effect::Damping(dampers) = effect else { return dD };
+        let one;
+        let dampers = match effect {
+            Effect::Damping(dampers) => &dampers[..],
+            Effect::Damper { spring, .. } => {
+                one = [*spring];
+                &one
+            }
+            _ => return dD,
+        };
         for (places, coupled) in dampers.iter().filter_map(|spring| self.arm.coupled_damping_slope(*spring)) {
             for (a, i) in places.iter().enumerate() {
                 places.iter().enumerate().for_each(|(b, j)| dD[(*i, *j)] += coupled[(a, b)]);
@@ -212,7 +224,7 @@ impl Damped<'_> {
     fn springs(&self, effect: &Effect) -> Vec<SpringSlope> {
         let of = |(number, e): (usize, &flexarm_stepping::ElasticElement)| {
             let mut dK = DMatrix::zeros(e.size, e.size);
-            let mut more = 0.0;
+            let (mut more, mut damper) = (0.0, None);
             match effect {
                 Effect::Stiffness(places) => {
                     for place in places {
@@ -234,9 +246,14 @@ impl Damped<'_> {
                     let own = springs.contains(&number) && self.arm.coupled_damping_slope(number).is_none();
                     more = f64::from(u8::from(own));
                 }
+                Effect::Damper { spring, coordinate } => {
+                    let own = *spring == number && self.arm.coupled_damping_slope(number).is_none();
+                    damper = own.then_some(*coordinate);
+                }
                 Effect::Entry { .. } | Effect::Tool(_) | Effect::Mass { .. } => {}
             }
-            SpringSlope { first: self.arm.offset(e), size: e.size, K: e.K.clone(), dK, damping: e.damping, more }
+            let first = self.arm.offset(e);
+            SpringSlope { first, size: e.size, K: e.K.clone(), dK, damping: e.damping, more, damper }
         };
         self.arm.elements.iter().enumerate().map(of).collect()
     }

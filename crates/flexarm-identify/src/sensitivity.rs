@@ -52,7 +52,7 @@ pub(crate) fn force_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) ->
                 }
             }
             // What a tool carries and where it is loaded is known to the measurement.
-            Effect::Damping(_) | Effect::Tool(_) => {}
+            Effect::Damping(_) | Effect::Damper { .. } | Effect::Tool(_) => {}
             Effect::Mass { body, per_kg } => {
                 // Forces are linear in a mass: a difference of any size is exact.
                 let (mut with, mut without) = (DVector::zeros(n), DVector::zeros(n));
@@ -258,7 +258,7 @@ pub(crate) fn explicit(
             dK.view_mut((first, first), (size, size)).copy_from(&entry_slope(size, *row, *column, *factor));
             (dK, DMatrix::zeros(n, n))
         }
-        Effect::Damping(_) | Effect::Tool(_) => (DMatrix::zeros(n, n), DMatrix::zeros(n, n)),
+        Effect::Damping(_) | Effect::Damper { .. } | Effect::Tool(_) => (DMatrix::zeros(n, n), DMatrix::zeros(n, n)),
         Effect::Mass { body, per_kg } => {
             let heavier = Tangents::at(&carrying(arm, *body, per_kg), tool, F_T_W, q);
             (heavier.K - &here.K, heavier.M - &here.M)

@@ -132,7 +132,7 @@ fn direction(arm: &FlexibleArm, parameter: &RunParameter) -> Direction {
             }
             Effect::Tool(axis @ 0..3) => direction.tool = Vector3::ith(*axis, 1.0),
             // A tool that is turned in its place is off by the same angle.
-            Effect::Damping(_) | Effect::Tool(_) => {}
+            Effect::Damping(_) | Effect::Damper { .. } | Effect::Tool(_) => {}
             Effect::Mass { body, per_kg } => direction.inertias.push((*body, *per_kg)),
         },
         RunParameter::Joint(k) => {

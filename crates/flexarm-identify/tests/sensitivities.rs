@@ -139,6 +139,11 @@ fn every_row_of_every_kind_of_reading_has_the_derivatives_of_its_residual() {
     let mut rows: Vec<Row<Component>> =
         axes.iter().map(|d| Row { of: Component::Along(*d), value: 1e-3, std: 1e-4 }).collect();
     rows.extend(axes.iter().map(|d| Row { of: Component::About(*d), value: 1e-3, std: 1e-4 }));
+    for instrument in [0, 1] {
+        let seen =
+            axes.iter().flat_map(|d| [Component::AlongSeen(instrument, *d), Component::AboutSeen(instrument, *d)]);
+        rows.extend(seen.map(|of| Row { of, value: 1e-3, std: 1e-4 }));
+    }
     let point = Vector3::new(-0.1, 0.2, 0.3);
     let moved = |before: &LoadCase, after: &LoadCase| ReadingKind::Displacement {
         before: before.clone(),
@@ -153,6 +158,10 @@ fn every_row_of_every_kind_of_reading_has_the_derivatives_of_its_residual() {
         value: Vector3::new(0.3, 0.1, 2.0),
         std: Vector3::new(1e-4, 2e-4, 3e-4),
     };
+    let X = Pose::from_parts(Translation3::new(3.0, 1.0, -0.5), Rotation3::from_euler_angles(0.4, -0.2, 2.2));
+    let near =
+        X * Pose::from_parts(Translation3::new(0.01, 0.0, -0.02), Rotation3::from_euler_angles(0.02, 0.1, -0.03));
+    let stands = |instrument, std| ReadingKind::InstrumentAt { instrument, value: near, std, std_rotation: 1e-3 };
     let hz = vec![Row { of: 0, value: 2.0, std: 0.1 }, Row { of: 2, value: 5.0, std: 0.1 }];
     let kinds = [
         moved(&LoadCase::none(), &pull),
@@ -160,17 +169,19 @@ fn every_row_of_every_kind_of_reading_has_the_derivatives_of_its_residual() {
         place(0),
         place(1),
         ReadingKind::Frequencies { load: heavy.clone(), rows: hz },
+        ReadingKind::TargetAt { target: 1, value: Vector3::new(0.0, 0.1, 0.2), std: 1e-3 },
+        stands(0, Some(1e-3)),
+        stands(1, None),
     ];
     let readings = kinds.map(|kind| Reading { name: "a".into(), q: POSE.to_vec(), kind }).to_vec();
-    let X = Pose::from_parts(Translation3::new(3.0, 1.0, -0.5), Rotation3::from_euler_angles(0.4, -0.2, 2.2));
     let measurements = Measurements {
         readings,
         targets: vec![Target::Known(point), Target::Unknown(Vector3::new(0.0, 0.1, 0.1))],
-        instruments: vec![Instrument::Unknown(X)],
+        instruments: vec![Instrument::Unknown(X), Instrument::Axes(X.rotation.inverse())],
     };
     let arm = MeasuredArm { plant: &plant, parameters: &parameters, measurements: &measurements };
     let mut at = DVector::zeros(parameters.len() + measurements.own_unknowns());
-    assert_eq!(at.len(), 5 + 6 + 3);
+    assert_eq!(at.len(), 5 + 6 + 3 + 3);
     for (k, x) in at.iter_mut().enumerate() {
         *x = 0.05 * (k as f64 + 1.0).sin();
     }
@@ -255,6 +266,26 @@ fn responses_and_shapes_change_with_each_parameter_as_differences_say() {
         eprintln!("{}: shape {error:.1e} of {:.1e}", parameter.name, truth.amax());
         assert!(error < 1e-8, "{}: {error:e}", parameter.name);
     }
+}
+
+#[test]
+fn a_response_changes_with_one_damper_of_six_as_differences_say() {
+    let mut plant = plant();
+    plant.springs[0].damping = Damping::Dampers([900.0, 700.0, 800.0, 60.0, 90.0, 40.0]);
+    let effect = Effect::Damper { spring: 0, coordinate: 4 };
+    let parameter = Parameter { name: "about y".into(), unit: "N m s/rad".into(), initial: 90.0, prior: 0.7, effect };
+    let probes = probes(&plant);
+    let omega = [3.0, 9.0, 25.0, 60.0];
+    let response = |plant: &Plant, parameters: &[Parameter]| {
+        structure_slopes(plant, parameters, &POSE, &probes).unwrap().response(0, 1, Answer::Mobility, &omega).unwrap()
+    };
+    let split = |H: &[nalgebra::Complex<f64>]| DVector::from_iterator(2 * H.len(), H.iter().flat_map(|h| [h.re, h.im]));
+    let own = response(&plant, std::slice::from_ref(&parameter)).slopes.column(0).into_owned();
+    let changed = |x: f64| split(&response(&plant.with(std::slice::from_ref(&parameter), &[x]), &[]).values);
+    let truth = richardson(0.02, changed);
+    let error = (split(own.as_slice()) - &truth).amax() / truth.amax();
+    eprintln!("{error:.1e} of {:.1e}", truth.amax());
+    assert!(error < 1e-8, "{error:e}");
 }
 
 #[test]

@@ -126,5 +126,5 @@ pub(crate) fn plan_measurements<'py>(
     };
     let robot = robot.get().robot.clone();
     let found = stoppable(py, move |_| plan(&robot, &request))?.or_raise()?;
-    caveat::answer(py, &found, &[])
+    caveat::answer(py, &found, &found.caveats)
 }

@@ -222,6 +222,17 @@ fn check_flexible(robot: &Robot, motion: Option<&Motion>, findings: &mut Vec<Fin
     }
 }
 
+/// What [`check()`] says of a robot without a motion: of its file, its links and drives, and of the arm in the middle of its joint ranges.
+pub(crate) fn caveats_of(robot: &Robot, modelling: Modelling) -> Vec<Caveat> {
+    let held = Pose::of(robot, None).and_then(|pose| Posed::held(robot, &modelling, pose.at));
+    let Ok(mut posed) = held else { return robot.caveats() };
+    let mut caveats = std::mem::take(&mut posed.caveats);
+    if let Ok(linear) = posed.linear(&Vector6::zeros()) {
+        caveats.extend(posed.validity(robot, &linear));
+    }
+    caveat::once_each(caveats)
+}
+
 /// Links that are asked to stiffen by load and cannot.
 fn check_geometric(robot: &Robot, findings: &mut Vec<Finding>) {
     for link in robot.flexible.iter().filter(|link| link.choices.geometric) {

@@ -293,3 +293,68 @@ fn shapes_of_modes_tell_how_stiffness_is_shared() {
         assert!((p.value / (p.initial * factor) - 1.0).abs() < 1e-5, "{}", p.name);
     }
 }
+
+/// Truth: the dampers of the arm that is hit, each changed by a factor of its own. One factor for all six would put the part of one
+/// damper into the others.
+#[test]
+fn dampers_of_a_gearbox_of_six_come_back_one_by_one() {
+    let place = Place::new("dampers");
+    let home = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/kr210_identified").canonicalize().unwrap();
+    let text = std::fs::read_to_string(home.join("robot.toml")).unwrap();
+    let urdf = home.join("kr210_identified.urdf");
+    let six =
+        "gearbox = { stiffness = [2e8, 2e8, 4e8, 6e6, 8e6, 3376721.9], damping = [2e5, 2e5, 4e5, 6e3, 8e3, 4481.0] }";
+    let text = text
+        .replace("\"kr210_identified.urdf\"", &format!("{urdf:?}"))
+        .replace("gearbox = { stiffness = 3376721.9, damping = 4481.0 }", six)
+        .lines()
+        .filter(|line| !line.starts_with("default_trajectory"))
+        .fold(String::new(), |all, line| all + line + "\n");
+    place.write("robot.toml", text);
+    let robot = Robot::load(&place.0).unwrap();
+    let arm = robot.flexible(Modelling::default()).unwrap();
+    let name = |k: usize| format!("drive.joint_2.gearbox.damping[{k}]");
+    let dampers: Vec<Parameter> =
+        (0..6).map(|k| arm.parameters().into_iter().find(|p| p.name == name(k)).unwrap()).collect();
+    let factors = [1.0, 1.0, 1.0, 1.6, 0.6, 1.3];
+    let plant = arm.plant().with(&dampers, &factors.map(f64::ln));
+    let hz: Vec<f64> = (0..80).map(|k| 3.0 + 0.5 * f64::from(k)).collect();
+    let omega: Vec<f64> = hz.iter().map(|hz| TAU * hz).collect();
+    let mut job = "format = 1\nfit = [\"drive.joint_2.gearbox.damping\"]\n".to_owned();
+    for (axis, direction) in [("x", Vector3::x()), ("y", Vector3::y()), ("z", Vector3::z())] {
+        let probe = Probe { frame: plant.tool.clone(), direction };
+        let found = structure_slopes(&plant, &[], &POSE, &[probe.clone(), probe]).unwrap();
+        let values = found.response(0, 1, Answer::Accelerance, &omega).unwrap().values;
+        place.write(&format!("{axis}.csv"), table(&hz, &values, 1.0));
+        job += &format!(
+            "[[response]]\nfile = \"{axis}.csv\"\njoints = {POSE:?}\nwatched_direction = \"{axis}\"\nhit_direction = \"{axis}\"\n\
+             unit = \"m/s2/N\"\nstd = 0.01\n"
+        );
+    }
+    let path = place.write("measurements.toml", job);
+    let output = Some(place.0.join("out"));
+    let found = identify_robot(&robot, &path, &IdentifyRequest { output, ..IdentifyRequest::default() }).unwrap();
+    assert_eq!(found.parameters.len(), 6);
+    let mut told = 0;
+    for ((p, before), factor) in found.parameters.iter().zip(&dampers).zip(factors) {
+        assert_eq!(p.name, before.name);
+        let off = p.value / (before.initial * factor) - 1.0;
+        eprintln!("{}: {off:.1e}, told {}", p.name, p.identifiable);
+        if p.identifiable {
+            told += 1;
+            assert!(off.abs() < 1e-2, "{}: {off:e}", p.name);
+        } else {
+            assert_eq!(p.value, p.initial);
+        }
+    }
+    assert!(told >= 3, "{told}");
+    let again = Robot::load(place.0.join("out")).unwrap().flexible(Modelling::default()).unwrap();
+    for (p, found) in
+        again.parameters().iter().filter(|p| p.name.starts_with("drive.joint_2.gearbox.damping")).zip(&found.parameters)
+    {
+        assert!((p.initial / found.value - 1.0).abs() < 1e-2, "{}", p.name);
+    }
+    // The page draws the curves.
+    let page = std::fs::read_to_string(found.page.unwrap()).unwrap();
+    assert_eq!(page.matches("<h2>Response: ").count(), 3);
+}

@@ -68,7 +68,7 @@ fn the_error_of_kr210_depends_on_its_numbers_as_differences_of_runs_say() {
         // What dampers do is small, and needs a longer way out of the rounding.
         let h = match &parameter.effect {
             Effect::Stiffness(_) => 0.004,
-            Effect::Damping(_) => 0.1,
+            Effect::Damping(_) | Effect::Damper { .. } => 0.1,
             Effect::Mass { .. } => 0.5,
             Effect::Entry { .. } | Effect::Tool(_) => unreachable!("named above are others"),
         };

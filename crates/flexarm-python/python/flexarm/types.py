@@ -1060,9 +1060,9 @@ class FittedParameter(TypedDict):
     value: float
     """Now; the initial value where the readings say nothing."""
     std: float
-    """Standard deviation."""
+    """Standard deviation; not a number (null in JSON) where the readings do not tell it or the fit does not meet them."""
     interval: list[float]
-    """Where it lies in 95 of 100 cases."""
+    """Where it lies in 95 of 100 cases; not numbers (nulls) without a deviation."""
     identifiable: bool
     """Whether the readings tell it."""
 
@@ -1121,6 +1121,8 @@ class EncoderFigures(TypedDict):
     """RMS of the deflection without offsets and delay (rad, m)."""
     rest_rms: float
     """RMS of what is left of it."""
+    noise_rms: float
+    """RMS of the noise of both instruments below `below`, from the noise that is faster (rad, m)."""
     told: bool
     """Whether the recordings tell the gear: most of an unseen run follows, and no run decides alone."""
 
@@ -1215,7 +1217,9 @@ class Identification(TypedDict):
     page: str | None
     """The page."""
     caveats: list[CaveatDict]
-    """What is doubtful."""
+    """What is doubtful, of the robot as well."""
+    warnings: list[str]
+    """The sentences of the caveats that warn."""
 
 
 class PlannedReading(TypedDict):
@@ -1269,6 +1273,10 @@ class MeasurementPlan(TypedDict):
     """The files to fill in."""
     table: str | None
     """The table among them."""
+    caveats: list[CaveatDict]
+    """What is doubtful of the robot, as `check` says it."""
+    warnings: list[str]
+    """The sentences of those that warn."""
 
 
 class _LobePoint(TypedDict):

@@ -592,3 +592,19 @@ pub(crate) const LOG_RATE: CaveatKind = CaveatKind::warning(
     "1/s",
     "lower the step or the log rate",
 );
+/// Displacements of another size than the robot's.
+pub(crate) const LOAD_UNIT: CaveatKind = CaveatKind::warning(
+    "load-unit",
+    "displacements under {where} are {value} times those of the robot as it is, beyond {yardstick} times either way: loads or the first \
+     guess of the stiffnesses are wrong",
+    "",
+    "force is in the file's unit of force, mass in kg: a weight of 100 kg is mass = 100, or a force of 981 N",
+);
+/// Encoders whose rest is no noise.
+pub(crate) const ENCODER_REST: CaveatKind = CaveatKind::warning(
+    "encoder-rest",
+    "{where}: {value} rad (or m) of the deflection do not follow from the torque, the instruments' noise is {yardstick}: the stiffness \
+     may be off by more than its deviation",
+    "rad",
+    "give the measured torque, lower `below`, or look at friction, masses, errors of the transmission and neighbouring links that bend",
+);

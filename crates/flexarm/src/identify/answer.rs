@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use flexarm_identify::{
-    Component, Form, Identified, Instrument, MeasuredArm, Measurements, Parameter, Plant, Reading, ReadingKind, Target,
+    Form, Identified, Instrument, MeasuredArm, Measurements, Parameter, Plant, Reading, ReadingKind, Target,
 };
 use flexarm_kinematics::Pose;
 use nalgebra::{DVector, Vector3};
@@ -57,14 +57,22 @@ pub struct Identification {
     pub targets: Vec<FoundPoint>,
     /// Iterations.
     pub iterations: usize,
-    /// Whether the search ended by itself.
+    /// Whether the search ended by itself, at a fit that meets the readings.
     pub converged: bool,
     /// The new robot file.
     pub file: Option<String>,
     /// The page.
     pub page: Option<String>,
-    /// What is doubtful.
+    /// What is doubtful, of the robot as well.
     pub caveats: Vec<Caveat>,
+    /// The sentences of the caveats that warn.
+    pub warnings: Vec<String>,
+    /// Instruments and targets: what each is.
+    #[serde(skip)]
+    pub frames: Vec<String>,
+    /// Frequency responses: measured, expected before and after.
+    #[serde(skip)]
+    pub responses: Vec<ResponseCurves>,
     /// Each number: measured, expected before and after.
     #[serde(skip)]
     pub compared: Vec<Compared>,
@@ -81,9 +89,9 @@ pub struct FittedParameter {
     pub initial: f64,
     /// Now; the initial value where the readings say nothing.
     pub value: f64,
-    /// Standard deviation.
+    /// Standard deviation; not a number (null in JSON) where the readings do not tell it or the fit does not meet them.
     pub std: f64,
-    /// Where it lies in 95 of 100 cases.
+    /// Where it lies in 95 of 100 cases; not numbers (nulls) without a deviation.
     pub interval: [f64; 2],
     /// Whether the readings tell it.
     pub identifiable: bool,
@@ -175,6 +183,8 @@ pub struct Compared {
     pub name: String,
     /// Its unit.
     pub unit: &'static str,
+    /// Kind of its reading.
+    pub kind: &'static str,
     /// Measured.
     pub measured: f64,
     /// Expected of the robot file as it is.
@@ -183,6 +193,100 @@ pub struct Compared {
     pub after: f64,
     /// Its deviation.
     pub std: f64,
+}
+
+/// A frequency response by its magnitude.
+#[derive(Clone, Debug)]
+pub struct ResponseCurves {
+    /// Which reading.
+    pub name: String,
+    /// Unit of the magnitudes.
+    pub unit: &'static str,
+    /// Frequencies (Hz).
+    pub hz: Vec<f64>,
+    /// Measured, expected of the robot file as it is, expected with what was found.
+    pub magnitude: [Vec<f64>; 3],
+}
+
+/// Kind of a reading, for people.
+fn kind_of(reading: &Reading) -> &'static str {
+    match reading.kind {
+        ReadingKind::Displacement { .. } => "displacements",
+        ReadingKind::Place { .. } => "places",
+        ReadingKind::Known { .. } => "encoders",
+        ReadingKind::TargetAt { .. } | ReadingKind::InstrumentAt { .. } => "targets and instruments",
+        ReadingKind::Frequencies { .. } => "frequencies",
+        ReadingKind::Response(_) => "responses",
+        ReadingKind::Shape(_) => "mode shapes",
+    }
+}
+
+/// What each instrument and target is, in a sentence.
+fn described(input: &MeasurementInput, found: &Identified) -> Vec<String> {
+    let millimetres = |v: &Vector3<f64>| format!("{:.3}, {:.3}, {:.3} mm", 1e3 * v.x, 1e3 * v.y, 1e3 * v.z);
+    let deviation = |of: &dyn Fn(&ReadingKind) -> Option<String>| {
+        input.measurements.readings.iter().find_map(|reading| of(&reading.kind)).unwrap_or_default()
+    };
+    let instruments = input.instruments.iter().enumerate().map(|(k, name)| {
+        let X_WI = found.instruments[k].inverse();
+        let (r, p, y) = X_WI.rotation.euler_angles();
+        let turn = [r, p, y].map(|x| format!("{:.4}", x.to_degrees())).join(", ");
+        let said = deviation(&|kind| match kind {
+            ReadingKind::InstrumentAt { instrument, std, std_rotation, .. } if *instrument == k => {
+                let place = std.map(|std| format!("{:.3} mm and ", 1e3 * std)).unwrap_or_default();
+                Some(format!(", known to {place}{:.3} mrad", 1e3 * std_rotation))
+            }
+            _ => None,
+        });
+        match &input.measurements.instruments[k] {
+            Instrument::Axes(_) => {
+                format!(
+                    "Instrument {name}: its axes are found to be turned by {turn} degrees (roll, pitch, yaw){said}."
+                )
+            }
+            given => {
+                let how = if matches!(given, Instrument::Known(_)) { "given" } else { "found" };
+                let at = millimetres(&X_WI.translation.vector);
+                format!("Instrument {name}: stands at {at} in the world, turned by {turn} degrees ({how}){said}.")
+            }
+        }
+    });
+    let targets = input.targets.iter().enumerate().map(|(k, name)| {
+        let how = if matches!(input.measurements.targets[k], Target::Known(_)) { "given" } else { "found" };
+        let said = deviation(&|kind| match kind {
+            ReadingKind::TargetAt { target, std, .. } if *target == k => {
+                Some(format!(", known to {:.3} mm", 1e3 * std))
+            }
+            _ => None,
+        });
+        format!("Target {name}: at {} from the TCP in its axes ({how}){said}.", millimetres(&found.targets[k]))
+    });
+    instruments.chain(targets).collect()
+}
+
+/// Magnitudes of the responses, from the numbers that were compared.
+fn responses(measurements: &Measurements, compared: &[Compared]) -> Vec<ResponseCurves> {
+    let mut first = 0;
+    let mut all = Vec::new();
+    for reading in &measurements.readings {
+        let own = &compared[first..][..reading.rows()];
+        first += own.len();
+        let ReadingKind::Response(response) = &reading.kind else { continue };
+        let magnitude = |value: fn(&Compared) -> f64| -> Vec<f64> {
+            let of = |pair: &[Compared]| match response.form {
+                Form::Logarithmic => value(&pair[0]).exp(),
+                Form::Complex => value(&pair[0]).hypot(value(&pair[1])),
+            };
+            own.chunks_exact(2).map(of).collect()
+        };
+        all.push(ResponseCurves {
+            name: reading.name.clone(),
+            unit: response.answer.unit(),
+            hz: response.points.iter().map(|(omega, ..)| omega / std::f64::consts::TAU).collect(),
+            magnitude: [magnitude(|c| c.measured), magnitude(|c| c.before), magnitude(|c| c.after)],
+        });
+    }
+    all
 }
 
 /// Unit of each number, and its name within the reading.
@@ -194,10 +298,19 @@ fn numbers(measurements: &Measurements) -> Vec<(String, &'static str)> {
     let mut all = Vec::new();
     for reading in &measurements.readings {
         match &reading.kind {
-            ReadingKind::Displacement { rows, .. } => all.extend(rows.iter().map(|row| match &row.of {
-                Component::Along(d) => (format!("{}, {}", reading.name, axis(d)), "m"),
-                Component::About(d) => (format!("{}, about {}", reading.name, axis(d)), "rad"),
+            ReadingKind::Displacement { rows, .. } => all.extend(rows.iter().map(|row| match row.of.parts() {
+                (d, _, false) => (format!("{}, {}", reading.name, axis(&d)), "m"),
+                (d, _, true) => (format!("{}, about {}", reading.name, axis(&d)), "rad"),
             })),
+            ReadingKind::TargetAt { .. } => {
+                all.extend(["x", "y", "z"].map(|axis| (format!("{}, {axis}", reading.name), "m")));
+            }
+            ReadingKind::InstrumentAt { std, .. } => {
+                if std.is_some() {
+                    all.extend(["x", "y", "z"].map(|axis| (format!("{}, {axis}", reading.name), "m")));
+                }
+                all.extend(["x", "y", "z"].map(|axis| (format!("{}, about {axis}", reading.name), "rad")));
+            }
             ReadingKind::Place { .. } => {
                 all.extend(["x", "y", "z"].map(|axis| (format!("{}, {axis}", reading.name), "m")));
             }
@@ -245,10 +358,12 @@ pub(super) fn answer(
     let in_unit = |r: f64, k: usize| if one_unit { r * deviations[k] } else { r };
     let of = |residuals: &[f64]| rms(residuals.iter().enumerate().map(|(k, r)| in_unit(*r, k)));
     let residuals = found.solution.residuals.as_slice();
+    let kinds: Vec<&str> = measurements.readings.iter().flat_map(|r| vec![kind_of(r); r.rows()]).collect();
     let compared: Vec<Compared> = (0..names.len())
         .map(|k| Compared {
             name: names[k].0.clone(),
             unit: names[k].1,
+            kind: kinds[k],
             measured: observed[k],
             before: observed[k] + found.before[k] * deviations[k],
             after: observed[k] + residuals[k] * deviations[k],
@@ -301,6 +416,9 @@ pub(super) fn answer(
         file: None,
         page: None,
         caveats: caveats(found),
+        warnings: Vec::new(),
+        frames: described(input, found),
+        responses: responses(measurements, &compared),
         compared,
     })
 }
@@ -327,7 +445,7 @@ fn shapes(
 
 fn frames(input: &MeasurementInput, found: &Identified) -> Vec<FoundFrame> {
     let all = input.instruments.iter().zip(&found.instruments).zip(&input.measurements.instruments);
-    let unknown = all.filter(|(_, given)| matches!(given, Instrument::Unknown(_)));
+    let unknown = all.filter(|(_, given)| !matches!(given, Instrument::Known(_)));
     let frame = |((name, X_IW), _): ((&String, &Pose), _)| {
         let X_WI = X_IW.inverse();
         let (roll, pitch, yaw) = X_WI.rotation.euler_angles();

@@ -35,7 +35,7 @@ pub(super) fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Res
         (false, _) => fit.iter().any(|p| parameters::asks_for(p, name)),
         (true, false) => input.fit.iter().any(|(p, _)| parameters::asks_for(p, name)),
         // Masses, dampings and single directions of links are asked for by name.
-        (true, true) => name != "payload.mass" && !name.ends_with(".damping") && parameters::asks_for("*", name),
+        (true, true) => name != "payload.mass" && !parameters::is_damping(name) && parameters::asks_for("*", name),
     };
     let kept = |name: &str| input.keep.iter().any(|(p, _)| parameters::fits(p, name));
     let mut chosen: Vec<_> = all.clone();

@@ -1,11 +1,20 @@
 //! What is doubtful of an identification.
 
-use flexarm_identify::{Identified, ReadingKind};
+use flexarm_identify::{Identified, MeasuredArm, NoAnswer, Plant, Reading, ReadingKind};
+use nalgebra::DVector;
 
 use super::answer::{Identification, rms};
+use super::encoders::EncoderFigures;
 use super::file::MeasurementInput;
-use crate::caveat::Caveat;
+use crate::caveat::{Caveat, kinds};
 use crate::robot::Robot;
+
+/// Displacements so many times larger or smaller than the robot's are no guess of a stiffness.
+const LOAD_RATIO: f64 = 5.0;
+/// Weight of a kilogram (N).
+const WEIGHT: f64 = 9.81;
+/// A rest of encoders over their noise, and over the deflection, that is told.
+const ENCODER_REST: (f64, f64) = (3.0, 0.02);
 
 /// Scatter of places about the rigid robot, over their spread, beyond which frames or joints do not fit.
 const FRAME_RATIO: f64 = 0.05;
@@ -13,9 +22,13 @@ const FRAME_RATIO: f64 = 0.05;
 pub(super) fn caveats(found: &Identified) -> Vec<Caveat> {
     let mut caveats = Vec::new();
     if let Some(factor) = found.misfit {
+        let results = match found.parameters.iter().all(|p| p.std.is_nan()) {
+            true => "the fit does not meet the readings, and its results have no deviations",
+            false => "the deviations of the results are enlarged by that",
+        };
         let text = format!(
             "the readings scatter {factor:.1} times as much as their deviations say: the model lacks something that gives way, \
-             loads or frames are wrong, or the deviations are too small; the deviations of the results are enlarged by that"
+             loads or frames are wrong, or the deviations are too small; {results}"
         );
         caveats.push(Caveat::said(
             "misfit",
@@ -41,7 +54,7 @@ pub(super) fn caveats(found: &Identified) -> Vec<Caveat> {
         );
         caveats.push(Caveat::said("over-fitted", "measurements", text, "fit fewer parameters or measure more poses"));
     }
-    if !found.solution.converged {
+    if !found.solution.converged && found.misfit.is_none() {
         let text = "the search did not settle: take the values with care";
         caveats.push(Caveat::said("not-converged", "measurements", text, "a better first guess helps"));
     }
@@ -63,12 +76,57 @@ pub(super) fn gear_caveat(robot: &Robot) -> Option<Caveat> {
     })
 }
 
+/// Encoders whose rest is more than the noise of the instruments.
+pub(super) fn encoder_caveats(encoders: &[EncoderFigures]) -> impl Iterator<Item = Caveat> + '_ {
+    let (noises, part) = ENCODER_REST;
+    let odd = move |gear: &&EncoderFigures| {
+        gear.told && gear.rest_rms > noises * gear.noise_rms && gear.rest_rms > part * gear.deflection_rms
+    };
+    encoders
+        .iter()
+        .filter(odd)
+        .map(|gear| kinds::ENCODER_REST.found(format!("encoders of {}", gear.joint), gear.rest_rms, gear.noise_rms))
+}
+
+/// Displacements under forces, or under masses, that are as much larger or smaller than the robot's as a kilogram weighs.
+pub(super) fn load_caveats(plant: &Plant, input: &MeasurementInput) -> Result<Vec<Caveat>, NoAnswer> {
+    let mut caveats = Vec::new();
+    for (what, slip, pulls) in [("forces", "kg given as N", true), ("masses", "N given as kg", false)] {
+        let some = input.measurements.of_readings(|k| match &input.measurements.readings[k].kind {
+            ReadingKind::Displacement { before, after, .. } => {
+                let forces = before.wrench != after.wrench;
+                let masses = before.carried != after.carried;
+                forces != masses && forces == pulls
+            }
+            _ => false,
+        });
+        if some.readings.is_empty() {
+            continue;
+        }
+        let arm = MeasuredArm { plant, parameters: &[], measurements: &some };
+        // Rotations of instruments are fitted; the size of a displacement does not depend on them.
+        let predicted = arm.predicted(&DVector::zeros(some.own_unknowns()))?;
+        let deviations: Vec<f64> = some.readings.iter().flat_map(Reading::deviations).collect();
+        let size =
+            |values: &[f64]| values.iter().zip(&deviations).map(|(x, std)| (x / std).powi(2)).sum::<f64>().sqrt();
+        let ratio = size(&arm.observed()) / size(&predicted);
+        if !ratio.is_finite() || (1.0 / LOAD_RATIO..=LOAD_RATIO).contains(&ratio) {
+            continue;
+        }
+        let mended = if pulls { ratio / WEIGHT } else { ratio * WEIGHT };
+        let likely = match (0.4..=2.5).contains(&mended) {
+            true => format!("about {WEIGHT} times too {}: {slip}?", if pulls { "large" } else { "small" }),
+            false => String::new(),
+        };
+        caveats.push(kinds::LOAD_UNIT.found(what, ratio, LOAD_RATIO).likely(likely));
+    }
+    Ok(caveats)
+}
+
 /// Places that no placement of the instrument brings near those of the robot.
-pub(super) fn frame_caveat(input: &MeasurementInput, answer: &Identification) -> Option<Caveat> {
-    let places = |k: &usize| answer.compared[*k].unit == "m";
-    let has_places = input.measurements.readings.iter().any(|r| matches!(r.kind, ReadingKind::Place { .. }));
-    let metres: Vec<usize> = (0..answer.compared.len()).filter(places).collect();
-    if !has_places || metres.is_empty() {
+pub(super) fn frame_caveat(answer: &Identification) -> Option<Caveat> {
+    let metres: Vec<usize> = (0..answer.compared.len()).filter(|k| answer.compared[*k].kind == "places").collect();
+    if metres.is_empty() {
         return None;
     }
     let measured: Vec<f64> = metres.iter().map(|k| answer.compared[*k].measured).collect();

@@ -1,6 +1,7 @@
-//! Gears from recorded positions of motors and links: torques of the rigid robot along the motion, filters, the fit's reading.
+//! Gears from recorded positions of motors and links: torques of the rigid robot along the motion of its links, filters, the fit's
+//! reading.
 
-use flexarm_analysis::signal::{LowPass, derivative};
+use flexarm_analysis::signal::LowPass;
 use flexarm_identify::{
     CoupledOutput, GearEstimate, GearRun, Parameter, Reading, ReadingKind, coupled_gear_stiffness, gear_stiffness,
 };
@@ -36,6 +37,14 @@ pub struct EncoderFigures {
     pub deflection_rms: f64,
     /// RMS of what is left of it.
     pub rest_rms: f64,
+    /// RMS of the noise of both instruments below `below`, from the noise that is faster (rad, m).
+    pub noise_rms: f64,
+    /// Time between samples of each run, or half of one (s).
+    #[serde(skip)]
+    pub steps_s: Vec<f64>,
+    /// Of each run the deflection without offset and delay, and what the torque makes of it (rad, m).
+    #[serde(skip)]
+    pub curves: Vec<[Vec<f64>; 2]>,
     /// Whether the recordings tell the gear: most of an unseen run follows, and no run decides alone.
     pub told: bool,
     /// The parameter that it is.
@@ -47,14 +56,19 @@ pub struct EncoderFigures {
 }
 
 impl EncoderFigures {
-    fn of(joint: &str, gear: GearEstimate, parameter: &Parameter) -> Self {
+    fn of(joint: &str, gear: GearEstimate, parameter: &Parameter, noise_rms: f64, steps_s: &[f64]) -> Self {
         Self {
+            noise_rms,
+            // One run is taken as two halves.
+            steps_s: if steps_s.len() == 1 { vec![steps_s[0]; gear.curves.len()] } else { steps_s.to_vec() },
+
             joint: joint.to_owned(),
             stiffness: gear.stiffness,
             std: gear.std_ln * gear.stiffness.abs(),
             delay_s: gear.delay_s,
             r2: gear.r2,
             told: gear.is_told(),
+            curves: gear.curves,
             unseen_r2: gear.unseen_r2,
             without_each: gear.without_each,
             deflection_rms: gear.deflection_rms,
@@ -90,8 +104,7 @@ pub(super) fn told(arm: &Arm, input: &MeasurementInput, chosen: &[Candidate]) ->
         if is_coupled(joint) {
             continue;
         }
-        let own: Vec<GearRun> =
-            runs.iter().zip(&input.recordings).filter_map(|(run, recording)| run.gear(recording, k)).collect();
+        let own: Vec<GearRun> = runs.iter().filter_map(|run| run.gear(k)).collect();
         if own.is_empty() {
             continue;
         }
@@ -104,15 +117,26 @@ pub(super) fn told(arm: &Arm, input: &MeasurementInput, chosen: &[Candidate]) ->
                 format!("joint {joint:?}: the recordings are too short (2 s at least), or its torque does not change");
             return Err(RobotFileError { message: text, ..first.place.clone() }.into());
         };
-        found.push(EncoderFigures::of(joint, gear, parameter));
+        found.push(EncoderFigures::of(joint, gear, parameter, noise(&runs, k), &steps(&runs, k)));
     }
     if let Some(coupling) = coupling {
-        let recorded = Recorded { runs: &runs, recordings: &input.recordings, joints: &joints };
+        let recorded = Recorded { runs: &runs, joints: &joints };
         let all = candidates(arm.robot(), arm.flexible());
         let fail = |message: String| RobotFileError { message, ..first.place.clone() };
         found.extend(told_of_coupled(&recorded, coupling, chosen, &all).map_err(fail)?);
     }
     Ok(found)
+}
+
+/// Steps of the recordings that have an encoder behind a gear (s).
+fn steps(runs: &[Smooth<'_>], joint: usize) -> Vec<f64> {
+    runs.iter().filter(|run| run.recording.link[joint].is_some()).map(|run| run.recording.step_s).collect()
+}
+
+/// RMS of the noise of the instruments of a gear in the band that is kept.
+fn noise(runs: &[Smooth<'_>], joint: usize) -> f64 {
+    let squares: Vec<f64> = runs.iter().filter_map(|run| run.noise_square(joint)).collect();
+    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }
 
 /// The one stiffness of a joint's gearbox.
@@ -123,8 +147,7 @@ fn gearbox_of<'a>(of: &'a [Candidate], joint: &str) -> Option<&'a Parameter> {
 
 /// Recordings in the robot's order of joints.
 struct Recorded<'a> {
-    runs: &'a [Smooth],
-    recordings: &'a [EncoderRecording],
+    runs: &'a [Smooth<'a>],
     joints: &'a [String],
 }
 
@@ -135,15 +158,15 @@ fn told_of_coupled(
     chosen: &[Candidate],
     all: &[Candidate],
 ) -> Result<Vec<EncoderFigures>, String> {
-    let Recorded { runs, recordings, joints } = recorded;
+    let Recorded { runs, joints } = recorded;
     let place = |joint: &String| joints.iter().position(|own| own == joint);
     let places: Vec<usize> = coupling.joints.iter().filter_map(place).collect();
-    let has = |recording: &EncoderRecording, k: usize| recording.link[places[k]].is_some();
-    let seen: Vec<usize> = (0..places.len()).filter(|k| recordings.iter().any(|r| has(r, *k))).collect();
+    let has = |run: &Smooth<'_>, k: usize| run.recording.link[places[k]].is_some();
+    let seen: Vec<usize> = (0..places.len()).filter(|k| runs.iter().any(|r| has(r, *k))).collect();
     if seen.is_empty() {
         return Ok(Vec::new());
     }
-    if let Some(k) = seen.iter().find(|k| !recordings.iter().all(|r| has(r, **k))) {
+    if let Some(k) = seen.iter().find(|k| !runs.iter().all(|r| has(r, **k))) {
         let joint = &coupling.joints[*k];
         return Err(format!(
             "joint {joint:?} has coupled gears and an encoder in some recordings only: give it in all of them"
@@ -159,26 +182,34 @@ fn told_of_coupled(
         return Err(format!("joints {names:?} have encoders, but none of the gearboxes that they show is to be found"));
     }
     let is_unknown = |motor: usize| unknown.iter().any(|(own, _)| *own == motor);
-    let outputs = |(run, recording): (&Smooth, &EncoderRecording)| -> Option<Vec<CoupledOutput>> {
+    let outputs = |run: &Smooth<'_>| -> Option<Vec<CoupledOutput>> {
         let one = |i: &usize| {
-            let mut gear = run.gear(recording, places[*i])?;
-            let part = |motor: usize| -> Vec<f64> {
+            let mut gear = run.gear(places[*i])?;
+            let part_of = |torque: &[Vec<f64>], motor: usize| -> Vec<f64> {
                 let of = |s: usize| {
-                    places.iter().enumerate().map(|(j, k)| coupling.C[(j, motor)] * run.torque[*k][s]).sum::<f64>()
+                    places.iter().enumerate().map(|(j, k)| coupling.C[(j, motor)] * torque[*k][s]).sum::<f64>()
                 };
                 run.seen.clone().map(|s| coupling.C[(*i, motor)] * of(s)).collect()
             };
+            let part = |motor: usize| part_of(&run.torque, motor);
             for motor in (0..places.len()).filter(|motor| !is_unknown(*motor)) {
                 // A gear that is kept deflects by what the robot file says; a rigid one does not.
                 let Some(known) = gearbox_of(all, &coupling.joints[motor]) else { continue };
                 gear.deflection.iter_mut().zip(part(motor)).for_each(|(d, torque)| *d -= torque / known.initial);
             }
             let torques = unknown.iter().map(|(motor, _)| part(*motor)).collect();
-            Some(CoupledOutput { deflection: gear.deflection, rate: gear.rate, torques })
+            let instruments = unknown.iter().map(|(motor, _)| part_of(&run.instrument, *motor)).collect();
+            Some(CoupledOutput {
+                deflection: gear.deflection,
+                rate: gear.rate,
+                deflection_rate: gear.deflection_rate,
+                torques,
+                instruments,
+            })
         };
         seen.iter().map(one).collect()
     };
-    let all_runs: Vec<Vec<CoupledOutput>> = runs.iter().zip(*recordings).filter_map(outputs).collect();
+    let all_runs: Vec<Vec<CoupledOutput>> = runs.iter().filter_map(outputs).collect();
     let names = || unknown.iter().map(|(motor, _)| &coupling.joints[*motor]).collect::<Vec<_>>();
     let gears = coupled_gear_stiffness(&all_runs).ok_or_else(|| {
         format!(
@@ -187,10 +218,13 @@ fn told_of_coupled(
             names()
         )
     })?;
-    let figures = unknown.iter().zip(gears);
-    Ok(figures
-        .map(|((motor, parameter), gear)| EncoderFigures::of(&coupling.joints[*motor], gear, parameter))
-        .collect())
+    let squares = seen.iter().map(|k| noise(runs, places[*k]).powi(2));
+    let noise = (squares.sum::<f64>() / seen.len() as f64).sqrt();
+    let steps = steps(runs, places[seen[0]]);
+    let figure = |((motor, parameter), gear): (&(usize, &Parameter), GearEstimate)| {
+        EncoderFigures::of(&coupling.joints[*motor], gear, parameter, noise, &steps)
+    };
+    Ok(unknown.iter().zip(gears).map(figure).collect())
 }
 
 /// The rigid robot without its rotors: what goes through the gears.
@@ -200,17 +234,20 @@ fn link_side(robot: &Mechanism) -> Result<Model, flexarm_kinematics::ModelError>
     Model::new(&mechanism)
 }
 
-/// A recording without what is fast, with the torques through the gears.
-struct Smooth {
-    motor: Vec<Vec<f64>>,
+/// A recording without what is fast, with the torques through the gears. What is compared has passed the filter twice: the torque
+/// of a filtered motion is filtered again, as its products of rates are fast.
+struct Smooth<'a> {
+    recording: &'a EncoderRecording,
     rate: Vec<Vec<f64>>,
     torque: Vec<Vec<f64>>,
+    /// The torque that the motors' motion would need, which has no part in the noise of the links' encoders; or the measured one.
+    instrument: Vec<Vec<f64>>,
     low: LowPass,
     seen: std::ops::Range<usize>,
 }
 
-impl Smooth {
-    fn of(recording: &EncoderRecording, model: &Model) -> Result<Self, Error> {
+impl<'a> Smooth<'a> {
+    fn of(recording: &'a EncoderRecording, model: &Model) -> Result<Self, Error> {
         let EncoderRecording { step_s, below_hz, edge_s, .. } = *recording;
         let n = recording.motor[0].len();
         let edge = (edge_s / step_s).round() as usize;
@@ -223,28 +260,79 @@ impl Smooth {
         }
         let low = LowPass::new(below_hz, 1.0 / step_s);
         let motor: Vec<Vec<f64>> = recording.motor.iter().map(|q| low.of(q)).collect();
-        let rate: Vec<Vec<f64>> = motor.iter().map(|q| derivative(q, step_s)).collect();
-        let acceleration: Vec<Vec<f64>> = rate.iter().map(|v| derivative(v, step_s)).collect();
-        let m = motor.len();
-        let (mut data, mut state, mut qddot) = (Data::new(model), State::zeros(model), DVector::zeros(m));
-        let mut torque = vec![Vec::with_capacity(n); m];
-        for i in 0..n {
-            for k in 0..m {
-                state.q[k] = motor[k][i];
-                state.qdot[k] = rate[k][i];
-                qddot[k] = acceleration[k][i];
-            }
-            inverse_dynamics(model, &mut data, &state, &qddot);
-            (0..m).for_each(|k| torque[k].push(data.tau[k]));
-        }
-        let torque = torque.iter().map(|tau| low.of(tau)).collect();
-        Ok(Self { motor, rate, torque, low, seen: edge..n - edge - 1 })
+        // A link is where its encoder says, but for the offset between the two instruments.
+        let link = motor.iter().zip(&recording.link).map(|(motor, link)| {
+            let Some(link) = link else { return motor.clone() };
+            let link = low.of(link);
+            let offset = motor.iter().zip(&link).map(|(motor, link)| motor - link).sum::<f64>() / n as f64;
+            link.iter().map(|link| link + offset).collect()
+        });
+        let link: Vec<Vec<f64>> = link.collect();
+        let smoothed = |torque: Vec<Vec<f64>>| -> Vec<Vec<f64>> {
+            let measured = |(computed, own): (Vec<f64>, &Option<Vec<f64>>)| match own {
+                Some(own) => low.of(&low.of(own)),
+                None => low.of(&computed),
+            };
+            torque.into_iter().zip(&recording.torque).map(measured).collect()
+        };
+        let [torque, instrument] = [&link, &motor].map(|motion| smoothed(torques(model, motion, step_s)));
+        let rate = link.iter().map(|q| low.of(&derivatives(q, step_s)[0])).collect();
+        Ok(Self { recording, rate, torque, instrument, low, seen: edge..n - edge - 1 })
     }
 
-    fn gear(&self, recording: &EncoderRecording, joint: usize) -> Option<GearRun> {
-        let link = self.low.of(recording.link[joint].as_ref()?);
+    fn gear(&self, joint: usize) -> Option<GearRun> {
+        let link = self.recording.link[joint].as_ref()?;
         let cut = |x: &[f64]| x[self.seen.clone()].to_vec();
-        let deflection: Vec<f64> = self.motor[joint].iter().zip(&link).map(|(motor, link)| motor - link).collect();
-        Some(GearRun { deflection: cut(&deflection), torque: cut(&self.torque[joint]), rate: cut(&self.rate[joint]) })
+        let deflection: Vec<f64> =
+            self.recording.motor[joint].iter().zip(link).map(|(motor, link)| motor - link).collect();
+        let deflection = self.low.of(&self.low.of(&deflection));
+        Some(GearRun {
+            deflection_rate: cut(&derivatives(&deflection, self.recording.step_s)[0]),
+            deflection: cut(&deflection),
+            torque: cut(&self.torque[joint]),
+            instrument: cut(&self.instrument[joint]),
+            rate: cut(&self.rate[joint]),
+        })
     }
+
+    /// Mean square of what white noise of the two instruments leaves in the band. Fifth differences show it: what is as slow as an
+    /// arm moves and swings is hardly in them.
+    fn noise_square(&self, joint: usize) -> Option<f64> {
+        let link = self.recording.link[joint].as_ref()?;
+        let mut x: Vec<f64> = self.recording.motor[joint].iter().zip(link).map(|(motor, link)| motor - link).collect();
+        for _ in 0..5 {
+            x = x.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        }
+        // The sum of the squares of the binomial coefficients.
+        let white = x.iter().map(|x| x * x).sum::<f64>() / (252.0 * x.len().max(1) as f64);
+        Some(white * (2.0 * self.recording.below_hz * self.recording.step_s).min(1.0))
+    }
+}
+
+/// Torques of the rigid robot along a motion, a list per joint.
+fn torques(model: &Model, motion: &[Vec<f64>], step_s: f64) -> Vec<Vec<f64>> {
+    let (m, n) = (motion.len(), motion[0].len());
+    let rates: Vec<[Vec<f64>; 2]> = motion.iter().map(|q| derivatives(q, step_s)).collect();
+    let (mut data, mut state, mut qddot) = (Data::new(model), State::zeros(model), DVector::zeros(m));
+    let mut torque = vec![Vec::with_capacity(n); m];
+    for i in 0..n {
+        for k in 0..m {
+            state.q[k] = motion[k][i];
+            state.qdot[k] = rates[k][0][i];
+            qddot[k] = rates[k][1][i];
+        }
+        inverse_dynamics(model, &mut data, &state, &qddot);
+        (0..m).for_each(|k| torque[k].push(data.tau[k]));
+    }
+    torque
+}
+
+/// First and second derivative by central differences of fourth order; at the ends the signal stands still.
+fn derivatives(x: &[f64], step_s: f64) -> [Vec<f64>; 2] {
+    let at = |i: usize, by: isize| x[i.saturating_add_signed(by).min(x.len() - 1)];
+    let n = 0..x.len();
+    let first = |i| (8.0 * (at(i, 1) - at(i, -1)) - (at(i, 2) - at(i, -2))) / (12.0 * step_s);
+    let second =
+        |i| (16.0 * (at(i, 1) + at(i, -1)) - (at(i, 2) + at(i, -2)) - 30.0 * at(i, 0)) / (12.0 * step_s * step_s);
+    [n.clone().map(first).collect(), n.map(second).collect()]
 }

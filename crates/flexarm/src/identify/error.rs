@@ -1,6 +1,6 @@
 //! Why measurements tell nothing.
 
-use flexarm_identify::IdentifyError;
+use flexarm_identify::{FoundSlip, IdentifyError, Slip};
 
 use super::file::MeasurementInput;
 use crate::error::Error;
@@ -104,9 +104,58 @@ pub enum IdentifyFileError {
         /// Joints.
         joints: Vec<String>,
     },
+    /// Joint values in another order.
+    #[error(
+        "the readings do not fit the robot's joints in their order {joints:?} ({:.0} % of them is left without a cause), but they do if the \
+         values are those of {likely:?} ({:.0} %): is the order of `joints`, or are the names of the columns, another one?",
+        100.0 * rest, 100.0 * mended
+    )]
+    JointOrder {
+        /// The robot's joints.
+        joints: Vec<String>,
+        /// Whose values they seem to be, in this order.
+        likely: Vec<String>,
+        /// Part of the readings that nothing explains.
+        rest: f64,
+        /// The same in the other order.
+        mended: f64,
+    },
+    /// Displacements in other axes.
+    #[error(
+        "the displacements do not fit the robot in world axes ({:.0} % of them is left without a cause), but they do in axes that are \
+         turned by rpy = [{:.1}, {:.1}, {:.1}] degrees ({:.0} %): are they in the axes of the instrument? Then add an instrument, \
+         [instrument.NAME], and instrument = \"NAME\" to [[displacement]]: with rpy as it stands, or without, and its axes are found",
+        100.0 * rest, rpy_deg[0], rpy_deg[1], rpy_deg[2], 100.0 * mended
+    )]
+    Axes {
+        /// Roll, pitch and yaw of the axes in the world (degrees).
+        rpy_deg: [f64; 3],
+        /// Part of the displacements that nothing explains.
+        rest: f64,
+        /// The same in the other axes.
+        mended: f64,
+    },
     /// No fit.
     #[error("{0}")]
     Fit(String),
+}
+
+/// A slip that explains what the arm does not.
+pub(super) fn of_slip(found: FoundSlip, joints: &[(String, bool)]) -> Error {
+    let FoundSlip { slip, rest, rest_mended: mended } = found;
+    let joints: Vec<String> = joints.iter().map(|(name, _)| name.clone()).collect();
+    match slip {
+        Slip::Order(order) => {
+            // The value of joint k stands at place order[k].
+            let mut likely = joints.clone();
+            order.iter().zip(&joints).for_each(|(place, joint)| likely[*place].clone_from(joint));
+            IdentifyFileError::JointOrder { joints, likely, rest, mended }.into()
+        }
+        Slip::Axes(R_WI) => {
+            let (r, p, y) = R_WI.euler_angles();
+            IdentifyFileError::Axes { rpy_deg: [r, p, y].map(f64::to_degrees), rest, mended }.into()
+        }
+    }
 }
 
 /// The fit's error with the names of instruments.
@@ -116,6 +165,7 @@ pub(super) fn of_names(input: &MeasurementInput) -> impl Fn(IdentifyError) -> Er
         let named = input.instruments.iter().enumerate().fold(text, |text, (k, name)| {
             text.replace(&format!("instrument {k}:"), &format!("instrument {name:?}:"))
                 .replace(&format!("where instrument {k} stands"), &format!("where instrument {name:?} stands"))
+                .replace(&format!("how instrument {k} is turned"), &format!("how instrument {name:?} is turned"))
         });
         IdentifyFileError::Fit(named).into()
     }

@@ -22,28 +22,30 @@ use std::path::{Path, PathBuf};
 
 use flexarm_files::{check_free, write_all};
 pub use flexarm_identify::{
-    Answer, Candidate, Component, CoupledOutput, Effect, Form, Found, GearEstimate, GearRun, HeldOut, Identified,
-    IdentifyError, IdentifyOptions, Instrument, LoadCase, Loss, MeasuredArm, MeasuredResponse, MeasuredShape,
-    Measurements, NoAnswer, Parameter, Place, Plan, PlanOptions, Plant, Probe, Reading, ReadingKind, ResponseSlopes,
-    Row, Search, Structure, StructureSlopes, Target, compliance_slopes, coupled_gear_stiffness, frequency_slopes,
-    gear_stiffness, identify, plan, structure_slopes, tool_slopes,
+    Answer, Candidate, Component, CoupledOutput, Effect, Form, Found, FoundSlip, GearEstimate, GearRun, HeldOut,
+    Identified, IdentifyError, IdentifyOptions, Instrument, LoadCase, Loss, MeasuredArm, MeasuredResponse,
+    MeasuredShape, Measurements, NoAnswer, Parameter, Place, Plan, PlanOptions, Plant, Probe, Reading, ReadingKind,
+    ResponseSlopes, Row, Search, Slip, Structure, StructureSlopes, Target, compliance_slopes, coupled_gear_stiffness,
+    frequency_slopes, gear_stiffness, identify, likely_slip, plan, structure_slopes, tool_slopes,
 };
 
 use self::answer::answer;
 use self::choose::{check_tool, chosen};
-use self::doubts::{frame_caveat, gear_caveat};
-use self::error::of_names;
+use self::doubts::{encoder_caveats, frame_caveat, gear_caveat, load_caveats};
+use self::error::{of_names, of_slip};
 use self::file::{Cell, MeasurementInput};
 use self::parameters::Written;
 use self::units::{check_modes, check_units};
 use crate::arm::Arm;
+use crate::caveat::warnings;
+use crate::check;
 use crate::error::Error;
 use crate::options::Modelling;
 use crate::robot::Robot;
 
 pub use self::answer::{
-    Compared, FittedParameter, FoundFrame, FoundPoint, HeldOutFigures, Identification, Residual, ShapeFigures,
-    Suspicious, Weight,
+    Compared, FittedParameter, FoundFrame, FoundPoint, HeldOutFigures, Identification, Residual, ResponseCurves,
+    ShapeFigures, Suspicious, Weight,
 };
 pub use self::encoders::EncoderFigures;
 pub use self::error::IdentifyFileError;
@@ -127,6 +129,10 @@ pub fn identify_robot(robot: &Robot, measurements: &Path, request: &IdentifyRequ
     check_modes(&plant, &input)?;
     check_units(&plant, &input)?;
     let parameters: Vec<Parameter> = chosen.iter().map(|c| c.parameter.clone()).collect();
+    let slides: Vec<bool> = joints.iter().map(|(_, slides)| *slides).collect();
+    if let Some(slip) = likely_slip(&plant, &parameters, &input.measurements, &slides) {
+        return Err(of_slip(slip, &joints));
+    }
     let options = IdentifyOptions {
         search: Search { loss: input.loss, ..Search::default() },
         deviations_known: input.deviations_known,
@@ -134,8 +140,13 @@ pub fn identify_robot(robot: &Robot, measurements: &Path, request: &IdentifyRequ
     };
     let found = identify(&plant, &parameters, &input.measurements, &options).map_err(of_names(&input))?;
     let mut answer = answer(robot, measurements, &plant, &parameters, &input, &found)?;
-    answer.caveats.extend(frame_caveat(&input, &answer));
+    answer.caveats.extend(frame_caveat(&answer));
     answer.caveats.extend(gear_caveat(robot));
+    answer.caveats.extend(encoder_caveats(&encoders));
+    let failed = |error: NoAnswer| IdentifyFileError::Fit(error.to_string());
+    answer.caveats.extend(load_caveats(&plant, &input).map_err(failed)?);
+    answer.caveats.extend(check::caveats_of(robot, request.modelling));
+    answer.warnings = warnings(&answer.caveats);
     answer.encoders = encoders;
     if let Some(targets) = targets {
         targets.write(robot, &chosen, &found, &mut answer)?;

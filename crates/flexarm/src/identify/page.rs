@@ -1,12 +1,16 @@
-//! The page of an identification: what was found, residuals, correlation, expected against measured; one file without scripts.
+//! The page of an identification: what was found, instruments and targets, residuals, curves of responses and encoders against the
+//! model, correlation; one file without scripts.
 
 use std::fmt::Write as _;
 
 use flexarm_draw::{CurveLook, LinePlot, Panel, PlotCurve};
 
-use super::{Compared, Identification};
+use super::{Compared, EncoderFigures, Identification, ResponseCurves};
 use crate::html_page::opening;
 use flexarm_settings::written::markup;
+
+/// Most samples of a recording in a picture.
+const MOST_SAMPLES: usize = 1500;
 
 /// The page.
 pub(super) fn html(answer: &Identification) -> String {
@@ -24,13 +28,22 @@ pub(super) fn html(answer: &Identification) -> String {
         let _ = writeln!(page, "<p class=\"no\">{}</p>", markup(&caveat.message));
     }
     page += &parameters(answer);
+    if !answer.frames.is_empty() {
+        page += "<h2>Instruments and targets</h2>\n";
+        answer.frames.iter().for_each(|text| page += &format!("<p>{}</p>\n", markup(text)));
+    }
     page += &suspicious(answer);
-    for unit in ["m", "rad", "Hz", "ln", "1", "m/N", "m/(s N)", "m/(s2 N)"] {
-        let of: Vec<&Compared> = answer.compared.iter().filter(|c| c.unit == unit).collect();
-        if !of.is_empty() {
-            page += &plots(unit, &of);
+    let mut drawn: Vec<(&str, &str)> = Vec::new();
+    for c in &answer.compared {
+        if !drawn.contains(&(c.kind, c.unit)) {
+            drawn.push((c.kind, c.unit));
+            let of: Vec<&Compared> =
+                answer.compared.iter().filter(|other| (other.kind, other.unit) == (c.kind, c.unit)).collect();
+            page += &residuals(c.kind, c.unit, &of);
         }
     }
+    answer.responses.iter().for_each(|response| page += &response_plot(response));
+    answer.encoders.iter().for_each(|gear| page += &encoder_plot(gear));
     page += &correlation(answer);
     page + "</body></html>\n"
 }
@@ -74,12 +87,11 @@ fn parameters(answer: &Identification) -> String {
         };
         let _ = writeln!(
             out,
-            "<tr{class}><td>{}</td><td>{}</td><td>{value}</td><td>{}</td><td>{} to {}</td><td>{}</td></tr>",
+            "<tr{class}><td>{}</td><td>{}</td><td>{value}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
             markup(&p.name),
             number(p.initial),
             number(p.std),
-            number(p.interval[0]),
-            number(p.interval[1]),
+            interval(p.interval),
             markup(&p.unit)
         );
     }
@@ -111,29 +123,56 @@ fn suspicious(answer: &Identification) -> String {
     out + "</table>\n"
 }
 
-fn plots(unit: &'static str, of: &[&Compared]) -> String {
+/// Residuals of one kind of readings, before and after.
+fn residuals(kind: &str, unit: &str, of: &[&Compared]) -> String {
     let (name, factor) = readable(unit);
     let x: Vec<f64> = (1..=of.len()).map(|k| k as f64).collect();
-    let curve = |label: &str, y: Vec<f64>| PlotCurve { name: label.into(), look: CurveLook::Dots, x: x.clone(), y };
-    let residual =
-        |value: fn(&Compared) -> f64| of.iter().map(|c| factor * (c.measured - value(c))).collect::<Vec<_>>();
-    let panel = |label: String, curves| Panel { label, logarithmic: false, legend: true, curves };
-    let panels = [
-        panel(
-            format!("residual ({name})"),
-            vec![curve("before", residual(|c| c.before)), curve("after", residual(|c| c.after))],
-        ),
-        panel(
-            format!("measured and expected ({name})"),
-            vec![
-                curve("measured", of.iter().map(|c| factor * c.measured).collect()),
-                curve("expected", of.iter().map(|c| factor * c.after).collect()),
-            ],
-        ),
-    ];
-    let title = format!("Numbers in {name}");
-    let plot = LinePlot { title: &title, x_label: "number of the reading", panels: &panels, ..LinePlot::default() };
-    plot.svg().map(|svg| format!("<h2>{title}</h2>\n{svg}\n")).unwrap_or_default()
+    let curve = |label: &str, value: fn(&Compared) -> f64| PlotCurve {
+        name: label.into(),
+        look: CurveLook::Dots,
+        x: x.clone(),
+        y: of.iter().map(|c| factor * (c.measured - value(c))).collect(),
+    };
+    let curves = vec![curve("before", |c| c.before), curve("after", |c| c.after)];
+    let panel = Panel { label: format!("residual ({name})"), logarithmic: false, legend: true, curves };
+    picture(&format!("Residuals of {kind} ({name})"), "number", &[panel])
+}
+
+/// Magnitude of a frequency response: measured, and of the model before and after.
+fn response_plot(response: &ResponseCurves) -> String {
+    let looks = [CurveLook::Dots, CurveLook::Dashed, CurveLook::Plain];
+    let curves = ["measured", "model before", "model after"].into_iter().zip(looks).zip(&response.magnitude);
+    let curves =
+        curves.map(|((name, look), y)| PlotCurve { name: name.into(), look, x: response.hz.clone(), y: y.clone() });
+    let label = format!("magnitude ({})", response.unit);
+    let panel = Panel { label, logarithmic: true, legend: true, curves: curves.collect() };
+    picture(&format!("Response: {}", response.name), "frequency (Hz)", &[panel])
+}
+
+/// Deflection of a gear over time: measured, and what its torque says.
+fn encoder_plot(gear: &EncoderFigures) -> String {
+    let panel = |(number, ([measured, expected], step_s)): (usize, (&[Vec<f64>; 2], &f64))| {
+        let every = measured.len().div_ceil(MOST_SAMPLES).max(1);
+        let curve = |name: &str, look, y: &[f64]| PlotCurve {
+            name: name.into(),
+            look,
+            x: (0..y.len()).step_by(every).map(|k| step_s * k as f64).collect(),
+            y: y.iter().step_by(every).map(|y| 1e3 * y).collect(),
+        };
+        let curves = vec![
+            curve("measured", CurveLook::Dots, measured),
+            curve("torque over stiffness", CurveLook::Plain, expected),
+        ];
+        Panel { label: format!("run {} (1e-3 rad, m)", number + 1), logarithmic: false, legend: number == 0, curves }
+    };
+    let panels: Vec<Panel> = gear.curves.iter().zip(&gear.steps_s).enumerate().map(panel).collect();
+    picture(&format!("Deflection of the gear of {}", gear.joint), "time (s)", &panels)
+}
+
+/// A heading with its picture; nothing if nothing finite is to be drawn.
+fn picture(title: &str, x_label: &str, panels: &[Panel]) -> String {
+    let plot = LinePlot { title, x_label, panels, ..LinePlot::default() };
+    plot.svg().map(|svg| format!("<h2>{}</h2>\n{svg}\n", markup(title))).unwrap_or_default()
 }
 
 fn correlation(answer: &Identification) -> String {
@@ -153,9 +192,14 @@ fn correlation(answer: &Identification) -> String {
     out + "</table>\n"
 }
 
+fn interval([low, high]: [f64; 2]) -> String {
+    if low.is_nan() { "-".into() } else { format!("{} to {}", number(low), number(high)) }
+}
+
 /// A number with the digits that a person reads.
 fn number(x: f64) -> String {
     match x.abs() {
+        a if a.is_nan() => "-".into(),
         0.0 => "0".into(),
         a if (1e-3..1e5).contains(&a) => {
             let digits = (3 - a.log10().floor() as i32).clamp(0, 6) as usize;

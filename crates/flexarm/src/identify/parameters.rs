@@ -9,7 +9,8 @@
 //! | `link.LINK.stiffness[i][j]` | an entry of the 6x6 of a lumped link in two parts, and its mirror image (N/m, N, N m/rad) |
 //! | `tcp.x`, `.y`, `.z`, `.rx`, `.ry`, `.rz` | the tool moved and turned about its own axes (m, rad) |
 //! | `mounting.stiffness[k]` | one of six springs under the base, from 0 |
-//! | `drive.JOINT.gearbox.damping` | its damping, if the file has it (N m s/rad, N s/m; a factor on lists) |
+//! | `drive.JOINT.gearbox.damping` | its damping, if the file has it (N m s/rad, N s/m) |
+//! | `drive.JOINT.gearbox.damping[k]` | one of three or six, from 0 |
 //! | `link.LINK.damping` | modal ratio, `stiffness_beta` (s), or a factor on `rayleigh` |
 //! | `payload.mass` | kg, at its centre of mass |
 
@@ -23,16 +24,6 @@ use crate::flexible::{FlexibleRobot, Owner, RobotLink};
 use crate::mounting::RobotMounting;
 use crate::robot::{PAYLOAD_LINK, Robot};
 
-/// Standard deviation of a stiffness before anything is measured: a factor.
-pub(crate) const UNCERTAINTY: f64 = 2.0;
-/// Of a payload's mass: this part of it, and kg at least.
-const PAYLOAD_UNCERTAINTY: (f64, f64) = (0.5, 1.0);
-
-/// Of an entry of a matrix, over the root of its diagonal entries.
-const ENTRY_UNCERTAINTY: f64 = 0.5;
-/// Of the place of a tool (m) and its attitude (rad).
-const TOOL_UNCERTAINTY: f64 = 0.01;
-
 /// Key of what is only fitted if it is named: its directions together are the whole of a link's stiffness.
 const DIRECTIONS: &str = "stiffness_factors";
 
@@ -41,8 +32,8 @@ const DIRECTIONS: &str = "stiffness_factors";
 pub(crate) enum Written {
     /// `[[drive]]` of the joint: the stiffness of its gearbox, or one of its entries.
     Gearbox { joint: String, entry: Option<usize> },
-    /// `[[drive]]` of the joint: the damping of its gearbox.
-    GearboxDamping { joint: String },
+    /// `[[drive]]` of the joint: the damping of its gearbox, or one of its entries.
+    GearboxDamping { joint: String, entry: Option<usize> },
     /// `[[flexible_link]]` of the link: its damping.
     LinkDamping { link: String },
     /// `[[flexible_link]]` of the link: its `stiffness_factor`.
@@ -81,22 +72,7 @@ pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candida
         }
         let slides = flexible.model.coordinates().iter().any(|c| c.joint == drive.joint && c.kind == "prismatic");
         found.extend(gearbox_parameters(&drive.joint, &gearbox.stiffness, &springs, slides));
-        let dampers = damping.dampers.as_ref().filter(|d| d.iter().any(|d| *d > 0.0));
-        if let Some(dampers) = dampers {
-            let name = format!("drive.{}.gearbox.damping", drive.joint);
-            let (unit, initial) = match (&dampers[..], slides) {
-                ([one], false) => ("N m s/rad", *one),
-                ([one], true) => ("N s/m", *one),
-                _ => ("1", 1.0),
-            };
-            found.push(damping_of(
-                name,
-                unit,
-                initial,
-                &springs,
-                Written::GearboxDamping { joint: drive.joint.clone() },
-            ));
-        }
+        found.extend(gearbox_damping(&drive.joint, damping.dampers.as_deref().unwrap_or_default(), &springs, slides));
     }
     for (number, span) in flexible.spans.iter().enumerate() {
         let springs = of(Owner::Link(number));
@@ -123,16 +99,15 @@ pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candida
         };
         if initial > 0.0 {
             let name = format!("link.{}.damping", span.link);
-            found.push(damping_of(name, unit, initial, &springs, Written::LinkDamping { link: span.link.clone() }));
+            let written = Written::LinkDamping { link: span.link.clone() };
+            found.push(Candidate::new(name, unit, initial, Effect::Damping(springs.clone()), written));
         }
     }
     if let Some(frame) = flexible.model.frame(PAYLOAD_LINK) {
         let mass = robot.rigid.link(PAYLOAD_LINK).and_then(|link| link.inertia).map_or(0.0, |inertia| inertia.mass);
         let per_kg = SpatialInertia::from_com(1.0, &Vector3::zeros(), &Matrix3::zeros()).at_parent(&frame.X_BF);
-        let prior = (PAYLOAD_UNCERTAINTY.0 * mass).max(PAYLOAD_UNCERTAINTY.1);
         let effect = Effect::Mass { body: frame.body, per_kg };
-        let parameter = Parameter { name: "payload.mass".into(), unit: "kg".into(), initial: mass, prior, effect };
-        found.push(Candidate { parameter, written: Written::Payload });
+        found.push(Candidate::new("payload.mass".into(), "kg", mass, effect, Written::Payload));
     }
     if !found.is_empty() {
         found.extend(tool_parameters());
@@ -140,15 +115,35 @@ pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candida
     found
 }
 
-fn stiffness(name: String, unit: &str, initial: f64, places: Vec<Place>, written: Written) -> Candidate {
-    let effect = Effect::Stiffness(places);
-    let parameter = Parameter { name, unit: unit.into(), initial, prior: UNCERTAINTY.ln(), effect };
-    Candidate { parameter, written }
+impl Candidate {
+    fn new(name: String, unit: &str, initial: f64, effect: Effect, written: Written) -> Self {
+        let mut parameter = Parameter { name, unit: unit.into(), initial, prior: 1.0, effect };
+        parameter.prior = parameter.reference();
+        Self { parameter, written }
+    }
 }
 
-fn damping_of(name: String, unit: &str, initial: f64, springs: &[usize], written: Written) -> Candidate {
-    let effect = Effect::Damping(springs.to_vec());
-    Candidate { parameter: Parameter { name, unit: unit.into(), initial, prior: UNCERTAINTY.ln(), effect }, written }
+fn stiffness(name: String, unit: &str, initial: f64, places: Vec<Place>, written: Written) -> Candidate {
+    Candidate::new(name, unit, initial, Effect::Stiffness(places), written)
+}
+
+/// The dampers of a gearbox, one by one; those that are zero are none.
+fn gearbox_damping(joint: &str, dampers: &[f64], springs: &[usize], slides: bool) -> Vec<Candidate> {
+    let name = format!("drive.{joint}.gearbox.damping");
+    let damper = |(k, initial): (usize, &f64)| {
+        let (spring, coordinate) = if springs.len() > 1 { (springs[k], 0) } else { (springs[0], k) };
+        let (name, entry, moves) = match dampers {
+            [_] => (name.clone(), None, slides),
+            list => (format!("{name}[{k}]"), Some(k), list.len() == 6 && k < 3),
+        };
+        let unit = if moves { "N s/m" } else { "N m s/rad" };
+        let effect = match dampers {
+            [_] => Effect::Damping(vec![spring]),
+            _ => Effect::Damper { spring, coordinate },
+        };
+        Candidate::new(name, unit, *initial, effect, Written::GearboxDamping { joint: joint.to_owned(), entry })
+    };
+    dampers.iter().enumerate().filter(|(_, d)| **d > 0.0).map(damper).collect()
 }
 
 /// The six directions of a lumped link's springs, in all of them alike.
@@ -182,14 +177,8 @@ fn link_entries(link: &RobotLink, spring: usize, flexible: &FlexibleRobot) -> Ve
         };
         let size = (K[(row, row)] * K[(column, column)]).sqrt();
         let effect = Effect::Entry { spring, row, column, factor: factor(row, column), size };
-        let parameter = Parameter {
-            name: format!("link.{name}.stiffness[{row}][{column}]"),
-            unit: unit.into(),
-            initial: K[(row, column)],
-            prior: ENTRY_UNCERTAINTY * size,
-            effect,
-        };
-        Candidate { parameter, written: Written::LinkEntry { link: name.clone(), row, column, K: Box::new(K) } }
+        let written = Written::LinkEntry { link: name.clone(), row, column, K: Box::new(K) };
+        Candidate::new(format!("link.{name}.stiffness[{row}][{column}]"), unit, K[(row, column)], effect, written)
     };
     (0..6).flat_map(|row| (row..6).map(move |column| (row, column))).map(|(row, column)| entry(row, column)).collect()
 }
@@ -197,10 +186,8 @@ fn link_entries(link: &RobotLink, spring: usize, flexible: &FlexibleRobot) -> Ve
 /// The tool moved and turned about its own axes.
 fn tool_parameters() -> impl Iterator<Item = Candidate> {
     ["x", "y", "z", "rx", "ry", "rz"].into_iter().enumerate().map(|(axis, name)| {
-        let unit = if axis < 3 { "m" } else { "rad" }.to_owned();
-        let effect = Effect::Tool(axis);
-        let parameter = Parameter { name: format!("tcp.{name}"), unit, initial: 0.0, prior: TOOL_UNCERTAINTY, effect };
-        Candidate { parameter, written: Written::Tool { axis } }
+        let unit = if axis < 3 { "m" } else { "rad" };
+        Candidate::new(format!("tcp.{name}"), unit, 0.0, Effect::Tool(axis), Written::Tool { axis })
     })
 }
 
@@ -283,6 +270,17 @@ pub(crate) fn is_tool(name: &str) -> bool {
     name.starts_with("tcp.")
 }
 
+/// Whether it is a damping: of a gearbox, one of its dampers, of a link.
+pub(crate) fn is_damping(name: &str) -> bool {
+    name.split('[').next().is_some_and(|name| name.ends_with(".damping"))
+}
+
+/// One of a gearbox's dampers by the name of all of them.
+fn all_dampers(name: &str) -> Option<&str> {
+    let whole = name.split('[').next()?;
+    (whole.ends_with(".gearbox.damping") && whole != name).then_some(whole)
+}
+
 /// An entry of a matrix by the name of its mirror image.
 fn mirrored(name: &str) -> Option<String> {
     let (head, indices) = name.strip_suffix(']')?.split_once(".stiffness[")?;
@@ -295,9 +293,11 @@ pub(crate) fn is_direction(name: &str) -> bool {
     name.starts_with("link.") && name.contains(DIRECTIONS)
 }
 
-/// Whether a name, or that of the mirrored entry, fits a pattern in which * stands for anything.
+/// Whether a name, that of the mirrored entry, or that of all dampers of a gearbox, fits a pattern in which * stands for anything.
 pub(crate) fn fits(pattern: &str, name: &str) -> bool {
-    matches(pattern, name) || mirrored(name).is_some_and(|name| matches(pattern, &name))
+    matches(pattern, name)
+        || mirrored(name).is_some_and(|name| matches(pattern, &name))
+        || all_dampers(name).is_some_and(|name| matches(pattern, name))
 }
 
 fn matches(pattern: &str, name: &str) -> bool {

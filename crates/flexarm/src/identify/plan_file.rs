@@ -14,6 +14,8 @@ use serde::Serialize;
 use super::parameters;
 use super::{IdentifyFileError, joints_of};
 use crate::arm::Arm;
+use crate::caveat::{Caveat, warnings};
+use crate::check;
 use crate::error::Error;
 use crate::options::Modelling;
 use crate::robot::Robot;
@@ -97,6 +99,10 @@ pub struct MeasurementPlan {
     pub file: Option<String>,
     /// The table among them.
     pub table: Option<String>,
+    /// What is doubtful of the robot, as `check` says it.
+    pub caveats: Vec<Caveat>,
+    /// The sentences of those that warn.
+    pub warnings: Vec<String>,
 }
 
 /// A pose and a load.
@@ -228,7 +234,10 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
         return Err(IdentifyFileError::Fit(text).into());
     }
     let first = plan(&plant, &fitted, &candidates[..request.count.min(candidates.len())], &options).map_err(failed)?;
+    let caveats = check::caveats_of(robot, request.modelling);
     let mut answer = MeasurementPlan {
+        warnings: warnings(&caveats),
+        caveats,
         robot: robot.name.clone(),
         poses: planned(&plant, &candidates, &best, &setups)?,
         joints,

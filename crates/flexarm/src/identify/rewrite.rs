@@ -52,12 +52,8 @@ pub(super) fn rewritten(
                 replace(old, rounded(parameter.value, parameter.std));
                 told.push((format!("link {link}"), parameter));
             }
-            Written::GearboxDamping { joint } => {
-                let drive = named(&mut file, "drive", "joint", joint)?;
-                let gearbox = drive.get_mut("gearbox").and_then(Item::as_table_like_mut);
-                let damping = gearbox.and_then(|gearbox| gearbox.get_mut("damping")).and_then(Item::as_value_mut);
-                let damping = damping.ok_or_else(|| format!("the drive of joint {joint:?} has no gearbox.damping"))?;
-                put_damping(damping, parameter);
+            Written::GearboxDamping { joint, entry } => {
+                put_gear_damping(named(&mut file, "drive", "joint", joint)?, joint, *entry, parameter)?;
                 told.push((format!("drive of {joint}"), parameter));
             }
             Written::LinkDamping { link } => {
@@ -109,7 +105,11 @@ fn comments(told: &[(String, &Found)]) -> String {
     let mut out = String::from("# Identified by flexarm identify: value, standard deviation, value before.\n");
     for (_, p) in told {
         let Found { name, unit, value, std, initial, .. } = p;
-        out += &format!("#   {name} = {} +- {} {unit}, was {initial}\n", rounded(*value, *std), rounded(*std, *std));
+        let deviation = match std.is_finite() {
+            true => format!("+- {} {unit}", rounded(*std, *std)),
+            false => format!("{unit} (the fit does not meet the readings: no deviation)"),
+        };
+        out += &format!("#   {name} = {} {deviation}, was {initial}\n", rounded(*value, *std));
     }
     out + "\n"
 }
@@ -210,6 +210,21 @@ fn put_tool(file: &mut DocumentMut, found: &[(Found, Written)], tool: (&str, &Po
     if part(3) != Vector3::zeros() {
         let (roll, pitch, yaw) = X_LT.rotation.euler_angles();
         entry.insert("rpy", toml_edit::value(list([roll, pitch, yaw])));
+    }
+    Ok(())
+}
+
+/// The damping of a gearbox, or one entry of it.
+fn put_gear_damping(drive: &mut dyn TableLike, joint: &str, entry: Option<usize>, found: &Found) -> Result<(), String> {
+    let gearbox = drive.get_mut("gearbox").and_then(Item::as_table_like_mut);
+    let damping = gearbox.and_then(|gearbox| gearbox.get_mut("damping")).and_then(Item::as_value_mut);
+    let damping = damping.ok_or_else(|| format!("the drive of joint {joint:?} has no gearbox.damping"))?;
+    match (damping, entry) {
+        (Value::Array(list), Some(k)) => {
+            let old = list.get_mut(k).ok_or_else(|| format!("gearbox.damping of {joint:?} has no entry {k}"))?;
+            replace(old, rounded(found.value, found.std));
+        }
+        (damping, _) => put_damping(damping, found),
     }
     Ok(())
 }

@@ -75,7 +75,7 @@ pub fn pose_sensitivity(
     let names: Vec<&str> = joints.iter().map(String::as_str).collect();
     let at = joint_values(at, &names)?;
     let all: Vec<Parameter> = arm.numbers(parameters);
-    let still = |parameter: &Parameter| !matches!(parameter.effect, Effect::Damping(_));
+    let still = |parameter: &Parameter| !matches!(parameter.effect, Effect::Damping(_) | Effect::Damper { .. });
     let all = all.into_iter().filter(still).map(Asked::Arm).chain((0..3).map(Asked::Tool)).collect();
     slopes(robot, &arm, joints, at, chosen(all, parameters, Asked::name)?)
 }

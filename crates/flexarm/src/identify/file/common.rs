@@ -35,7 +35,16 @@ pub(in crate::identify) struct LoadEntry {
     mass: f64,
     #[serde(default)]
     com: [f64; 3],
+    /// `ixx iyy izz ixy ixz iyz` about the centre of mass, axes of the tool (kg m²).
+    #[serde(default)]
+    inertia: [f64; 6],
 }
+
+/// Columns of loads in tables.
+pub(super) const LOAD_COLUMNS: [&str; 19] = [
+    "fx", "fy", "fz", "mx", "my", "mz", "ax", "ay", "az", "mass", "cx", "cy", "cz", "ixx", "iyy", "izz", "ixy", "ixz",
+    "iyz",
+];
 
 /// A row of a table, by the names of its columns.
 pub(super) struct TableRow<'a> {
@@ -49,20 +58,21 @@ impl TableRow<'_> {
         (!value.is_nan()).then_some(value)
     }
 
-    /// Three components, those without a column zero.
+    /// Components of which some have a column, those without zero.
     ///
     /// # Errors
     /// The name of a column that is there and has no value in this row.
-    pub(super) fn three(&self, names: [&str; 3]) -> Result<Option<[f64; 3]>, String> {
+    pub(super) fn all<const N: usize>(&self, names: [&str; N]) -> Result<Option<[f64; N]>, String> {
         if names.iter().all(|name| self.table.column(name).is_none()) {
             return Ok(None);
         }
-        let value = |name: &str| match self.table.column(name) {
-            None => Ok(0.0),
-            Some(_) => self.get(name).ok_or_else(|| name.to_owned()),
-        };
-        let [x, y, z] = names.map(value);
-        Ok(Some([x?, y?, z?]))
+        let mut values = [0.0; N];
+        for (value, name) in values.iter_mut().zip(names) {
+            if self.table.column(name).is_some() {
+                *value = self.get(name).ok_or_else(|| name.to_owned())?;
+            }
+        }
+        Ok(Some(values))
     }
 
     /// Three components, those that are filled in.
@@ -119,18 +129,33 @@ impl Reader<'_> {
 
     /// A load in SI units.
     pub(in crate::identify) fn load(&self, load: &LoadEntry, span: &Range<usize>) -> Result<LoadCase, Error> {
-        let LoadEntry { force, torque, at, mass, com } = *load;
-        let all = [&force[..], &torque, &at, &[mass], &com].concat();
+        let LoadEntry { force, torque, at, mass, com, inertia } = *load;
+        let all = [&force[..], &torque, &at, &[mass], &com, &inertia].concat();
         if let Some(bad) = all.iter().find(|x| !x.is_finite()) {
             return Err(self.error(span.clone(), format!("a load has the entry {bad}, expected finite numbers")));
         }
         if mass < 0.0 {
             return Err(self.error(span.clone(), format!("a load has a mass of {mass} kg, expected 0 or more")));
         }
+        let [xx, yy, zz, xy, xz, yz] = inertia;
+        let about_com = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+        let moments = about_com.symmetric_eigenvalues();
+        let (largest, sum) = (moments.max(), moments.sum());
+        if moments.min() < -1e-9 * largest.abs() || largest > (sum - largest) * (1.0 + 1e-6) + 1e-12 {
+            let text = format!(
+                "a load has the principal moments of inertia {:.4?} kg m2, which no body has: none is negative, none larger than the sum \
+                 of the two others",
+                moments.as_slice()
+            );
+            return Err(self.error(span.clone(), text));
+        }
+        if mass == 0.0 && inertia != [0.0; 6] {
+            return Err(self.error(span.clone(), "a load has an inertia and no mass: give both"));
+        }
         let Units { length, force: newton, .. } = self.units;
         // Moments in the units of force and length.
         let wrench = Wrench::new(Vector3::from(force) * newton, Vector3::from(torque) * newton * length);
-        let carried = SpatialInertia::from_com(mass, &(Vector3::from(com) * length), &Matrix3::zeros());
+        let carried = SpatialInertia::from_com(mass, &(Vector3::from(com) * length), &about_com);
         Ok(LoadCase { wrench, at: Vector3::from(at) * length, carried })
     }
 
@@ -198,10 +223,13 @@ impl Reader<'_> {
             None => load.mass,
             Some(_) => row.get("mass").ok_or_else(|| empty("mass".into()))?,
         };
-        let force = row.three(["fx", "fy", "fz"]).map_err(empty)?.unwrap_or(load.force);
-        let torque = row.three(["mx", "my", "mz"]).map_err(empty)?.unwrap_or(load.torque);
-        let at = row.three(["ax", "ay", "az"]).map_err(empty)?.unwrap_or(load.at);
-        Ok(LoadEntry { force, torque, at, mass, ..load })
+        let force = row.all(["fx", "fy", "fz"]).map_err(empty)?.unwrap_or(load.force);
+        let torque = row.all(["mx", "my", "mz"]).map_err(empty)?.unwrap_or(load.torque);
+        let at = row.all(["ax", "ay", "az"]).map_err(empty)?.unwrap_or(load.at);
+        let com = row.all(["cx", "cy", "cz"]).map_err(empty)?.unwrap_or(load.com);
+        let moments = ["ixx", "iyy", "izz", "ixy", "ixz", "iyz"];
+        let inertia = row.all(moments).map_err(empty)?.unwrap_or(load.inertia);
+        Ok(LoadEntry { force, torque, at, mass, com, inertia })
     }
 
     /// The direction of the gauge of a row that has one read.
@@ -214,7 +242,7 @@ impl Reader<'_> {
             return Ok(None);
         }
         let empty = |name: String| self.empty(row, file, &name);
-        let direction = row.three(["ux", "uy", "uz"]).map_err(empty)?;
+        let direction = row.all(["ux", "uy", "uz"]).map_err(empty)?;
         Ok(direction.map(|direction| Spanned::new(file.span(), direction)))
     }
 }

@@ -8,7 +8,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::Reader;
-use super::common::{Joints, LoadEntry, TableRow};
+use super::common::{Joints, LOAD_COLUMNS, LoadEntry, TableRow};
 use crate::error::Error;
 
 #[derive(Debug, Deserialize)]
@@ -23,6 +23,8 @@ pub(super) struct DisplacementEntry {
     #[serde(default)]
     point: [f64; 3],
     direction: Option<Spanned<[f64; 3]>>,
+    /// In whose axes directions, values and rotations are; the world's without.
+    instrument: Option<Spanned<String>>,
     value: Option<Spanned<Value>>,
     rotation: Option<[f64; 3]>,
     std: Option<Spanned<f64>>,
@@ -65,40 +67,16 @@ struct Said {
     std_rotation: Option<Spanned<f64>>,
 }
 
-const DISPLACEMENT_COLUMNS: [&str; 25] = [
-    "fx",
-    "fy",
-    "fz",
-    "mx",
-    "my",
-    "mz",
-    "ax",
-    "ay",
-    "az",
-    "px",
-    "py",
-    "pz",
-    "mass",
-    "dx",
-    "dy",
-    "dz",
-    "rx",
-    "ry",
-    "rz",
-    "d",
-    "ux",
-    "uy",
-    "uz",
-    "std",
-    "std_rotation",
-];
+/// Columns of a table beside joints and loads.
+const COLUMNS: [&str; 15] =
+    ["px", "py", "pz", "dx", "dy", "dz", "rx", "ry", "rz", "d", "ux", "uy", "uz", "std", "std_rotation"];
 
 impl Reader<'_> {
     pub(super) fn displacement(&mut self, number: usize, entry: &Spanned<DisplacementEntry>) -> Result<(), Error> {
         let e = entry.get_ref();
         match (&e.file, &e.joints) {
             (Some(file), None) => {
-                let table = self.table(file, &DISPLACEMENT_COLUMNS)?;
+                let table = self.table(file, &[&LOAD_COLUMNS[..], &COLUMNS].concat())?;
                 for row in 0..table.rows.len() {
                     let at = TableRow { table: &table, row };
                     let name = format!("{} line {}", file.get_ref().display(), table.lines[row]);
@@ -118,7 +96,7 @@ impl Reader<'_> {
                     let rotation = at.filled(["rx", "ry", "rz"]);
                     let direction = self.table_direction(&at, file)?.or_else(|| e.direction.clone());
                     let point =
-                        at.three(["px", "py", "pz"]).map_err(|name| self.empty(&at, file, &name))?.unwrap_or(e.point);
+                        at.all(["px", "py", "pz"]).map_err(|name| self.empty(&at, file, &name))?.unwrap_or(e.point);
                     let said = Said { name, q, load, point, value, direction, rotation, std, std_rotation };
                     self.moved(entry, said)?;
                 }
@@ -150,25 +128,32 @@ impl Reader<'_> {
         let Said { name, q, load, point, value, direction, rotation, std, std_rotation } = said;
         let mut rows = Vec::new();
         let sigma = self.std(std.as_ref(), self.units.length)?;
+        let instrument =
+            e.instrument.as_ref().map(|name| self.chosen("instrument", Some(name), &self.instruments, &span));
+        let instrument = instrument.transpose()?;
+        let along = |d: Vector3<f64>| instrument.map_or(Component::Along(d), |k| Component::AlongSeen(k, d));
+        let about = |d: Vector3<f64>| instrument.map_or(Component::About(d), |k| Component::AboutSeen(k, d));
         let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
         match (value, &direction) {
-            (Some(Measured::One(d)), Some(direction)) => {
-                let along = Vector3::from(*direction.get_ref());
-                let along = along.try_normalize(1e-9).filter(|v| v.iter().all(|x| x.is_finite()));
-                let along = along.ok_or_else(|| self.error(direction.span(), "direction has no length"))?;
-                rows.push(Row { of: Component::Along(along), value: d * self.units.length, std: sigma });
+            (Some(Measured::One(value)), Some(direction)) => {
+                let d = Vector3::from(*direction.get_ref());
+                let d = d.try_normalize(1e-9).filter(|v| v.iter().all(|x| x.is_finite()));
+                let d = d.ok_or_else(|| self.error(direction.span(), "direction has no length"))?;
+                rows.push(Row { of: along(d), value: value * self.units.length, std: sigma });
             }
             (Some(Measured::One(_)), None) => {
-                let text = "one number is measured along a direction: add direction = [x, y, z] in world axes";
+                let text = "one number is measured along a direction: add direction = [x, y, z] in world axes, or in those of its instrument";
                 return Err(self.error(span, text));
             }
             (Some(Measured::Three(_)), Some(direction)) => {
                 let text = "three numbers are along x, y and z: leave direction out";
                 return Err(self.error(direction.span(), text));
             }
-            (Some(Measured::Three(d)), None) => rows.extend(axes.iter().zip(d).filter_map(|(axis, d)| {
-                Some(Row { of: Component::Along(*axis), value: d? * self.units.length, std: sigma })
-            })),
+            (Some(Measured::Three(d)), None) => rows.extend(
+                axes.iter()
+                    .zip(d)
+                    .filter_map(|(axis, d)| Some(Row { of: along(*axis), value: d? * self.units.length, std: sigma })),
+            ),
             (None, _) if rotation.is_some() => {}
             (None, _) => {
                 return Err(self.error(span, format!("{name}: nothing was measured: add value = [dx, dy, dz]")));
@@ -181,9 +166,11 @@ impl Reader<'_> {
                 return Err(self.error(span, text));
             }
             let sigma = self.std(std_rotation.as_ref(), self.units.angle)?;
-            rows.extend(axes.iter().zip(turn).filter_map(|(axis, d)| {
-                Some(Row { of: Component::About(*axis), value: d? * self.units.angle, std: sigma })
-            }));
+            rows.extend(
+                axes.iter()
+                    .zip(turn)
+                    .filter_map(|(axis, d)| Some(Row { of: about(*axis), value: d? * self.units.angle, std: sigma })),
+            );
         }
         if let Some(bad) = rows.iter().find(|row| !row.value.is_finite()) {
             return Err(self.error(span, format!("{name}: found {}, expected a finite number", bad.value)));

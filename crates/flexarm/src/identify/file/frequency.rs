@@ -17,6 +17,8 @@ pub(super) struct FrequencyEntry {
     hz: Spanned<Vec<f64>>,
     modes: Option<Spanned<Vec<usize>>>,
     std: Option<Spanned<f64>>,
+    /// Deviation as a part of each frequency.
+    std_relative: Option<Spanned<f64>>,
 }
 
 impl Reader<'_> {
@@ -32,11 +34,17 @@ impl Reader<'_> {
         if hz.is_empty() || hz.iter().any(|f| !(f.is_finite() && *f > 0.0)) {
             return Err(self.error(e.hz.span(), "hz takes positive frequencies"));
         }
-        let std = self.std(e.std.as_ref(), 1.0)?;
-        let rows = hz.iter().zip(modes).map(|(f, mode)| Row { of: mode - 1, value: *f, std }).collect();
+        if let (Some(_), Some(relative)) = (&e.std, &e.std_relative) {
+            return Err(
+                self.error(relative.span(), "std (Hz) and std_relative (part of each frequency): keep one of them")
+            );
+        }
+        let (std, relative) = (self.std(e.std.as_ref(), 1.0)?, self.std(e.std_relative.as_ref(), 1.0)?);
+        let of = |f: f64| if e.std_relative.is_some() { relative * f } else { std };
+        let rows = hz.iter().zip(modes).map(|(f, mode)| Row { of: mode - 1, value: *f, std: of(*f) }).collect();
         let kind = ReadingKind::Frequencies { load: self.load(&e.load, &span)?, rows };
         let q = self.joints(&e.joints)?;
-        self.given.push(("frequency", e.std.is_some(), span));
+        self.given.push(("frequency", e.std.is_some() || e.std_relative.is_some(), span));
         self.measurements.readings.push(Reading { name: format!("frequency {}", number + 1), q, kind });
         Ok(())
     }

@@ -2,6 +2,7 @@
 
 mod common;
 mod displacement;
+mod frame;
 mod frequency;
 mod place;
 mod recording;
@@ -11,13 +12,12 @@ use std::ops::Range;
 use std::path::Path;
 
 use flexarm_files::read_text;
-use flexarm_identify::{Instrument, Loss, Measurements, ReadingKind, Target};
-use flexarm_kinematics::Pose;
-use nalgebra::{Rotation3, Translation3, Vector3};
+use flexarm_identify::{Loss, Measurements};
 use serde::Deserialize;
 use toml::Spanned;
 
 use self::displacement::DisplacementEntry;
+use self::frame::{InstrumentEntry, TargetEntry};
 use self::frequency::FrequencyEntry;
 use self::place::PlaceEntry;
 use self::recording::EncodersEntry;
@@ -73,22 +73,6 @@ struct MeasurementFile {
 struct ParameterEntry {
     name: Spanned<String>,
     uncertainty: Spanned<f64>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct InstrumentEntry {
-    xyz: Option<[f64; 3]>,
-    #[serde(default)]
-    rpy: [f64; 3],
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct TargetEntry {
-    xyz: [f64; 3],
-    #[serde(default)]
-    unknown: bool,
 }
 
 /// What the file says, in SI units.
@@ -158,7 +142,7 @@ pub(super) fn read(path: &Path, cell: &Cell<'_>) -> Result<MeasurementInput, Err
         measurements: Measurements::default(),
         given: Vec::new(),
     };
-    reader.frames(&file)?;
+    reader.frames(&file.instrument, &file.target)?;
     for (k, entry) in file.displacement.iter().enumerate() {
         reader.displacement(k, entry)?;
     }
@@ -174,7 +158,7 @@ pub(super) fn read(path: &Path, cell: &Cell<'_>) -> Result<MeasurementInput, Err
     for (k, entry) in file.shape.iter().enumerate() {
         reader.shape(&file.node, k, entry)?;
     }
-    reader.drop_unused();
+    reader.settle_frames(&file.instrument, &file.target)?;
     let recordings = file.encoders.iter().map(|entry| reader.encoders(entry)).collect::<Result<Vec<_>, Error>>()?;
     let deviations_known = reader.deviations(!recordings.is_empty())?;
     let told =
@@ -245,59 +229,6 @@ pub(super) struct Reader<'a> {
 impl Reader<'_> {
     pub(super) fn error(&self, span: Range<usize>, message: impl Into<String>) -> Error {
         self.source.error(span, message).into()
-    }
-
-    fn frames(&mut self, file: &MeasurementFile) -> Result<(), Error> {
-        let finite = |values: &[f64], span: Range<usize>| match values.iter().find(|x| !x.is_finite()) {
-            Some(bad) => Err(self.source.error(span, format!("found {bad}, expected finite numbers"))),
-            None => Ok(()),
-        };
-        let (mut instruments, mut targets) = (Vec::new(), Vec::new());
-        for (name, entry) in &file.instrument {
-            let InstrumentEntry { xyz, rpy } = entry.get_ref();
-            let all: Vec<f64> = xyz.iter().flatten().chain(rpy).copied().collect();
-            finite(&all, entry.span())?;
-            let instrument = match xyz {
-                None => Instrument::Unknown(Pose::identity()),
-                Some(xyz) => {
-                    let [r, p, y] = rpy.map(|angle| angle * self.units.angle);
-                    let at = Vector3::from(*xyz) * self.units.length;
-                    let X_WI = Pose::from_parts(Translation3::from(at), Rotation3::from_euler_angles(r, p, y));
-                    Instrument::Known(X_WI.inverse())
-                }
-            };
-            instruments.push((name.clone(), instrument));
-        }
-        for (name, entry) in &file.target {
-            let TargetEntry { xyz, unknown } = entry.get_ref();
-            finite(xyz, entry.span())?;
-            let p = Vector3::from(*xyz) * self.units.length;
-            targets.push((name.clone(), if *unknown { Target::Unknown(p) } else { Target::Known(p) }));
-        }
-        (self.instruments, self.measurements.instruments) = instruments.into_iter().unzip();
-        (self.targets, self.measurements.targets) = targets.into_iter().unzip();
-        Ok(())
-    }
-
-    /// Instruments and targets that no place names are no unknowns.
-    fn drop_unused(&mut self) {
-        let (mut seen, mut hit) = (Vec::new(), Vec::new());
-        for reading in &self.measurements.readings {
-            if let ReadingKind::Place { instrument, target, .. } = &reading.kind {
-                seen.push(*instrument);
-                hit.push(*target);
-            }
-        }
-        for (k, instrument) in self.measurements.instruments.iter_mut().enumerate() {
-            if !seen.contains(&k) {
-                *instrument = Instrument::Known(Pose::identity());
-            }
-        }
-        for (k, target) in self.measurements.targets.iter_mut().enumerate() {
-            if let (false, Target::Unknown(p)) = (hit.contains(&k), *target) {
-                *target = Target::Known(p);
-            }
-        }
     }
 
     /// Whether deviations are given: by all readings or by none, and by all where kinds are mixed.

@@ -9,7 +9,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::Reader;
-use super::common::{Joints, LoadEntry, TableRow};
+use super::common::{Joints, LOAD_COLUMNS, LoadEntry, TableRow};
 use crate::error::Error;
 
 #[derive(Debug, Deserialize)]
@@ -25,7 +25,8 @@ pub(super) struct PlaceEntry {
     std: Option<Spanned<f64>>,
 }
 
-const PLACE_COLUMNS: [&str; 14] = ["fx", "fy", "fz", "mx", "my", "mz", "ax", "ay", "az", "mass", "x", "y", "z", "std"];
+/// Columns of a table beside joints and loads.
+const COLUMNS: [&str; 4] = ["x", "y", "z", "std"];
 
 impl Reader<'_> {
     pub(super) fn place(&mut self, number: usize, entry: &Spanned<PlaceEntry>) -> Result<(), Error> {
@@ -49,7 +50,7 @@ impl Reader<'_> {
         };
         match (&e.file, &e.joints, e.value) {
             (Some(file), None, None) => {
-                let table = self.table(file, &PLACE_COLUMNS)?;
+                let table = self.table(file, &[&LOAD_COLUMNS[..], &COLUMNS].concat())?;
                 for row in 0..table.rows.len() {
                     let at = TableRow { table: &table, row };
                     let name = format!("{} line {}", file.get_ref().display(), table.lines[row]);
@@ -73,7 +74,7 @@ impl Reader<'_> {
     }
 
     /// Number of a named instrument or target; the only one without a name.
-    fn chosen(
+    pub(super) fn chosen(
         &self,
         what: &str,
         given: Option<&Spanned<String>>,

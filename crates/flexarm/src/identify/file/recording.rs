@@ -8,7 +8,7 @@ use flexarm_files::NumberTable;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::Reader;
+use super::{Reader, Units};
 use crate::error::Error;
 use crate::robot_file::RobotFileError;
 
@@ -23,6 +23,8 @@ pub(super) struct EncodersEntry {
     motor: Spanned<BTreeMap<String, String>>,
     /// Columns of the encoders behind the gears, of some joints.
     link: Spanned<BTreeMap<String, String>>,
+    /// Columns of the torques through the gears, on the side of the links, of some joints.
+    torque: Option<Spanned<BTreeMap<String, String>>>,
     /// Of coupled gears: whether the columns of motors are those of the motors behind their gears or what the controller makes of them.
     positions: Option<Spanned<String>>,
     below: Option<Spanned<f64>>,
@@ -38,6 +40,8 @@ pub(in crate::identify) struct EncoderRecording {
     pub(in crate::identify) motor: Vec<Vec<f64>>,
     /// Of the joints that have one.
     pub(in crate::identify) link: Vec<Option<Vec<f64>>>,
+    /// Torque through the gear where it was measured (N m or N).
+    pub(in crate::identify) torque: Vec<Option<Vec<f64>>>,
     /// Both are compared up to here (Hz).
     pub(in crate::identify) below_hz: f64,
     /// Left out at both ends (s).
@@ -80,7 +84,11 @@ impl Reader<'_> {
                 format!("the times of {} are not evenly spaced, or fewer than three", path.display()),
             )
         })?;
-        let of = |map: &Spanned<BTreeMap<String, String>>, needed: bool| -> Result<Vec<Option<Vec<f64>>>, Error> {
+        let Units { length, angle, force } = self.units;
+        let of = |map: &Spanned<BTreeMap<String, String>>,
+                  needed: bool,
+                  units: [f64; 2]|
+         -> Result<Vec<Option<Vec<f64>>>, Error> {
             let names: Vec<&str> = self.cell.joints.iter().map(|(name, _)| name.as_str()).collect();
             if let Some(stray) = map.get_ref().keys().find(|name| !names.contains(&name.as_str())) {
                 return Err(
@@ -89,7 +97,7 @@ impl Reader<'_> {
             }
             let one = |(name, slides): &(String, bool)| match map.get_ref().get(name) {
                 Some(own) => {
-                    let factor = if *slides { self.units.length } else { self.units.angle };
+                    let factor = units[usize::from(*slides)];
                     Ok(Some(column(own, map.span())?.into_iter().map(|x| x * factor).collect()))
                 }
                 None if needed => {
@@ -104,17 +112,22 @@ impl Reader<'_> {
             Some(x) if x.get_ref().is_finite() && *x.get_ref() >= 0.0 => Ok(*x.get_ref()),
             Some(x) => Err(self.error(x.span(), format!("{what} is {}, expected a number of 0 or above", x.get_ref()))),
         };
-        let link = of(&e.link, false)?;
+        let link = of(&e.link, false, [angle, length])?;
         if link.iter().all(Option::is_none) {
             return Err(self.error(e.link.span(), "no joint has an encoder behind its gear"));
         }
-        let mut motor: Vec<Vec<f64>> = of(&e.motor, true)?.into_iter().flatten().collect();
+        let mut motor: Vec<Vec<f64>> = of(&e.motor, true, [angle, length])?.into_iter().flatten().collect();
         self.behind_coupling(e, &mut motor)?;
+        let torque = match &e.torque {
+            Some(torque) => of(torque, false, [force * length, force])?,
+            None => vec![None; motor.len()],
+        };
         Ok(EncoderRecording {
             place: self.source.error(entry.span(), ""),
             step_s,
             motor,
             link,
+            torque,
             below_hz: positive(&e.below, "below", BELOW_HZ)?,
             edge_s: positive(&e.edge, "edge", EDGE_S)?,
         })

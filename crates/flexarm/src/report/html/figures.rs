@@ -175,10 +175,10 @@ pub(super) fn comparison(runs: &[ReportRun<'_>]) -> String {
     if one_robot.iter().skip(1).any(|one| *one) {
         out += "In brackets: against the first run.";
     }
-    let others = runs.iter().zip(&one_robot).filter(|(_, one)| !**one).map(|(run, _)| escaped(run.label));
+    let others = runs.iter().zip(&one_robot).filter(|(_, one)| !**one).map(|(run, _)| markup(run.label));
     let others: Vec<String> = others.collect();
     if !others.is_empty() {
-        let (first, others) = (escaped(runs[0].label), others.join(", "));
+        let (first, others) = (markup(runs[0].label), others.join(", "));
         let _ = write!(out, " Another robot than that of {first}, so that no differences are told: {others}.");
     }
     out + apart + "</p></section>\n"
