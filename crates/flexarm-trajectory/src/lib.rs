@@ -54,6 +54,7 @@ pub mod csv_file;
 mod csv_write;
 mod error;
 mod file;
+mod gap;
 mod leg;
 mod limits;
 mod peak;

@@ -4,6 +4,9 @@
 
 use flexarm_settings::Setting;
 
+use crate::polynomial::FARTHEST;
+use crate::trajectory::LONGEST;
+
 /// What is wrong in a file, and how to mend it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -259,8 +262,11 @@ pub enum Problem {
     /// The plan is wrong.
     #[error(transparent)]
     Plan(PlanError),
-    /// Values or times are too extreme for polynomials in f64.
-    #[error("joint {joint:?}: values or times are too extreme to be represented; check the units of the file")]
+    /// Values or times are beyond any motion, or too extreme for polynomials in f64.
+    #[error(
+        "joint {joint:?}: values or times are too extreme (a motion has {FARTHEST:e} rad or m and {LONGEST:e} s at most); check the \
+         units of the file"
+    )]
     OutOfRange {
         /// Joint name.
         joint: String,

@@ -59,7 +59,8 @@ impl Trajectory {
     pub fn parse_toml(text: &str, origin: &str, limits: &[(&str, JointLimits)]) -> Result<Self, TrajectoryError> {
         let fail = |offset: Option<usize>, problem: Problem| {
             let (line, column) = offset.map(|offset| place(text, offset)).unzip();
-            TrajectoryError::from(Box::new(FileError { origin: origin.to_owned(), line, column, problem }))
+            let (origin, more_lines) = (origin.to_owned(), Vec::new());
+            TrajectoryError::from(Box::new(FileError { origin, line, column, problem, more_lines }))
         };
         let unread = |error: toml::de::Error| {
             let message = flexarm_settings::without_types(error.message());

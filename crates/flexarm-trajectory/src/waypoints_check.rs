@@ -8,12 +8,17 @@ use toml::Spanned;
 
 use crate::limits::JointLimits;
 use crate::plan::{MotionLimits, Plan, PlannedMove, Profile};
+use crate::polynomial::FARTHEST;
 use crate::problem::Problem;
-use crate::trajectory::ToldUnit;
+use crate::trajectory::{LONGEST, ToldUnit};
 use crate::waypoints_toml::{FileToml, MoveToml, ProfileToml, Values};
 
 /// Rounding of trapezoids when the file does not say.
 const DEFAULT_ROUNDING: f64 = 0.1;
+
+/// What is expected of numbers, and of positions.
+const FINITE: &str = "finite numbers";
+const IN_RANGE: &str = "positions up to 1e9";
 
 /// A problem and the byte at which it stands.
 pub(crate) struct Located {
@@ -133,7 +138,10 @@ impl Context<'_> {
     /// A value for every joint, in SI.
     fn full(&self, values: &Spanned<Values>, key: &'static str) -> Result<Vec<f64>, Located> {
         match values.get_ref() {
-            Values::List(list) => self.list(list, values.span(), key),
+            Values::List(list) => match list.iter().find(|value| value.is_finite() && value.abs() > FARTHEST) {
+                Some(value) => Err(bad_value(values.span(), key, value, IN_RANGE)),
+                None => self.list(list, values.span(), key),
+            },
             _ => Err(bad_value(values.span(), key, "not a list", "a list with one number per joint")),
         }
     }
@@ -144,7 +152,7 @@ impl Context<'_> {
             return Err(located(span, Problem::ListLength { key: key.to_owned(), found, expected }));
         }
         match list.iter().find(|value| !value.is_finite()) {
-            Some(value) => Err(bad_value(span, key, value, "finite numbers")),
+            Some(value) => Err(bad_value(span, key, value, FINITE)),
             None => Ok(list.iter().zip(&self.scales).map(|(value, scale)| value * scale).collect()),
         }
     }
@@ -159,8 +167,8 @@ impl Context<'_> {
             let Some(i) = self.joints.iter().position(|joint| joint == name.get_ref()) else {
                 return Err(unknown_joint(name, "to", &self.joints));
             };
-            if !value.is_finite() {
-                return Err(bad_value(name.span(), "to", value, "finite numbers"));
+            if !(value.abs() <= FARTHEST) {
+                return Err(bad_value(name.span(), "to", value, if value.is_finite() { IN_RANGE } else { FINITE }));
             }
             goal[i] = value * self.scales[i];
         }
@@ -226,9 +234,12 @@ impl Context<'_> {
         let to = self.goal(&entry.to, here)?;
         let via = entry.via.iter().map(|point| self.full(point, "via")).collect::<Result<_, _>>()?;
         let duration = positive(&entry.duration, "duration")?;
+        if let Some(value) = entry.duration.as_ref().filter(|value| *value.get_ref() > LONGEST) {
+            return Err(bad_value(value.span(), "duration", value.get_ref(), "1e7 s at most"));
+        }
         let hold = match &entry.hold {
-            Some(hold) if !(*hold.get_ref() >= 0.0 && hold.get_ref().is_finite()) => {
-                return Err(bad_value(hold.span(), "hold", hold.get_ref(), "zero or positive, in s"));
+            Some(hold) if !(0.0..=LONGEST).contains(hold.get_ref()) => {
+                return Err(bad_value(hold.span(), "hold", hold.get_ref(), "zero or positive, in s, 1e7 at most"));
             }
             hold => hold.as_ref().map_or(0.0, |hold| *hold.get_ref()),
         };

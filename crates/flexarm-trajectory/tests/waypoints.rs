@@ -156,6 +156,19 @@ fn each_fault_of_a_file_is_named_with_its_place() {
 }
 
 #[test]
+fn numbers_beyond_any_motion_are_refused_with_their_place() {
+    for (moves, key) in [
+        ("to = [1, 2]\nduration = 1e300", "`duration` is 1"),
+        ("to = [1, 2]\nduration = 1\nhold = 1e8", "`hold` is 100000000"),
+        ("to = [1e12, 2]\nduration = 1", "`to` is 1000000000000"),
+        ("to = { b = 1e12 }\nduration = 1", "`to` is 1000000000000"),
+    ] {
+        let fault = fault(&format!("{HEAD}[[move]]\n{moves}"));
+        assert!(fault.line.is_some() && fault.to_string().contains(key), "{fault}");
+    }
+}
+
+#[test]
 fn a_message_tells_place_finding_and_remedy_in_one_line() {
     let message = fault(&HEAD.replace("\"deg\"", "\"degrees\"")).to_string();
     // The first thing wrong here is that no move follows.
