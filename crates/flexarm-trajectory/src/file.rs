@@ -101,6 +101,8 @@ fn windows_1252(bytes: &[u8]) -> Option<String> {
     let error = std::str::from_utf8(bytes).err()?;
     let letter = |byte: &u8| match *byte {
         byte @ 0x80..=0x9f => SPECIAL.chars().nth(usize::from(byte - 0x80)).filter(|letter| *letter != '\0'),
+        // Bytes that are no text have it more often than texts.
+        0xff => None,
         byte => Some(char::from(byte)).filter(|letter| !letter.is_control() || letter.is_ascii_whitespace()),
     };
     if bytes[..error.valid_up_to()].is_ascii() { bytes.iter().map(letter).collect() } else { None }

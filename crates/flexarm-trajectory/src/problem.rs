@@ -383,7 +383,8 @@ pub enum PlanError {
     },
     /// Points on the way with another profile than the quintic.
     #[error(
-        "move {number} passes points on the way, which only the quintic can; set `profile = \"quintic\"` in this move or drop `via`"
+        "move {number} passes points on the way, which only the quintic and the optimal law can; set `profile = \"quintic\"` in this \
+         move or drop `via`"
     )]
     ViaNeedsQuintic {
         /// Number of the move.

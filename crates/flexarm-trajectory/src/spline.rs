@@ -321,6 +321,11 @@ enum End {
     Free,
 }
 
+/// First and second derivative at the knots of the natural cubic spline.
+pub(crate) fn natural_spline(t: &[f64], q: &[f64]) -> Vec<[f64; 2]> {
+    cubic_spline(t, q, End::Natural, End::Natural)
+}
+
 /// Velocity and acceleration at the knots of the cubic spline.
 ///
 /// Unknown are the accelerations `M`; the rows are the usual ones,

@@ -16,10 +16,6 @@ use crate::waypoints_toml::{FileToml, MoveToml, ProfileToml, Values};
 /// Rounding of trapezoids when the file does not say.
 const DEFAULT_ROUNDING: f64 = 0.1;
 
-/// What is expected of numbers, and of positions.
-const FINITE: &str = "finite numbers";
-const IN_RANGE: &str = "positions up to 1e9";
-
 /// A problem and the byte at which it stands.
 pub(crate) struct Located {
     pub(crate) offset: Option<usize>,
@@ -138,12 +134,19 @@ impl Context<'_> {
     /// A value for every joint, in SI.
     fn full(&self, values: &Spanned<Values>, key: &'static str) -> Result<Vec<f64>, Located> {
         match values.get_ref() {
-            Values::List(list) => match list.iter().find(|value| value.is_finite() && value.abs() > FARTHEST) {
-                Some(value) => Err(bad_value(values.span(), key, value, IN_RANGE)),
-                None => self.list(list, values.span(), key),
-            },
+            Values::List(list) => {
+                let positions = self.list(list, values.span(), key)?;
+                match positions.iter().position(|position| position.abs() > FARTHEST) {
+                    Some(joint) => Err(self.out_of_range(values.span(), joint)),
+                    None => Ok(positions),
+                }
+            }
             _ => Err(bad_value(values.span(), key, "not a list", "a list with one number per joint")),
         }
+    }
+
+    fn out_of_range(&self, span: Range<usize>, joint: usize) -> Located {
+        located(span, Problem::OutOfRange { joint: self.joints[joint].clone() })
     }
 
     fn list(&self, list: &[f64], span: Range<usize>, key: &'static str) -> Result<Vec<f64>, Located> {
@@ -152,7 +155,7 @@ impl Context<'_> {
             return Err(located(span, Problem::ListLength { key: key.to_owned(), found, expected }));
         }
         match list.iter().find(|value| !value.is_finite()) {
-            Some(value) => Err(bad_value(span, key, value, FINITE)),
+            Some(value) => Err(bad_value(span, key, value, "finite numbers")),
             None => Ok(list.iter().zip(&self.scales).map(|(value, scale)| value * scale).collect()),
         }
     }
@@ -167,10 +170,13 @@ impl Context<'_> {
             let Some(i) = self.joints.iter().position(|joint| joint == name.get_ref()) else {
                 return Err(unknown_joint(name, "to", &self.joints));
             };
-            if !(value.abs() <= FARTHEST) {
-                return Err(bad_value(name.span(), "to", value, if value.is_finite() { IN_RANGE } else { FINITE }));
+            if !value.is_finite() {
+                return Err(bad_value(name.span(), "to", value, "finite numbers"));
             }
             goal[i] = value * self.scales[i];
+            if goal[i].abs() > FARTHEST {
+                return Err(self.out_of_range(name.span(), i));
+            }
         }
         Ok(goal)
     }
@@ -256,6 +262,7 @@ impl Context<'_> {
             None | Some(ProfileToml::Quintic) => Profile::Quintic,
             Some(ProfileToml::Trapezoid) => Profile::Trapezoid { rounding },
             Some(ProfileToml::SCurve) => Profile::SCurve,
+            Some(ProfileToml::Optimal) => Profile::Optimal,
         };
         let synchronised = entry.synchronised.or(file.synchronised).unwrap_or(true);
         let limits = self.limits_of_move(entry, robot_limits)?;
