@@ -45,7 +45,7 @@ impl PathPoint {
     /// What holds between two points at a part of their distance.
     fn between(here: &Self, next: &Self, part: f64) -> Self {
         let s = here.s + part * (next.s - here.s);
-        Self { s, x_max: x_between(here.x_max, next.x_max, part), bounds: bounds_between(here, next, part).collect() }
+        Self { s, x_max: between(here.x_max, next.x_max, part), bounds: bounds_between(here, next, part).collect() }
     }
 
     /// By how much a squared speed and an acceleration pass what holds between two points: the greatest ratio, of 1 or less if
@@ -61,15 +61,9 @@ impl PathPoint {
                 0.0
             }
         };
-        let speed = x / x_between(here.x_max, next.x_max, part);
+        let speed = x / between(here.x_max, next.x_max, part);
         bounds_between(here, next, part).map(ratio).fold(speed, f64::max)
     }
-}
-
-/// The square of the speed that lies between two speeds as their inverses do: those are what the path makes of the speed of a
-/// joint.
-fn x_between(from: f64, to: f64, part: f64) -> f64 {
-    (1.0 / from.sqrt() + part * (1.0 / to.sqrt() - 1.0 / from.sqrt())).powi(-2)
 }
 
 fn between(from: f64, to: f64, part: f64) -> f64 {
