@@ -125,8 +125,13 @@ pub enum Problem {
         expected: &'static str,
     },
     /// Values that are not one per joint.
-    #[error("`{key}` has {found} values for {expected} joints; expected one for each name{hint}")]
+    #[error(
+        "`{key}` has {found} values for {expected} joints; expected one for each name{hint}{}",
+        point.map_or_else(String::new, |point| format!(" (point {point})"))
+    )]
     Lengths {
+        /// Number of the point of a trajectory, from 1.
+        point: Option<usize>,
         /// The key.
         key: String,
         /// Values found.

@@ -22,6 +22,8 @@ pub(crate) struct State {
     pub(crate) acceleration: Vec<f64>,
     /// What the values are: `position`, `reference`, ...
     pub(crate) of: &'static str,
+    /// Line of the message in a text; 0 in a bag.
+    pub(crate) line: u32,
 }
 
 /// A point of a trajectory; values of the joints of its trajectory.
@@ -137,9 +139,12 @@ fn points(node: &Node, names: &Node, list: &Node) -> Result<Points, Trouble> {
             velocity: rates(item, "velocities")?,
             acceleration: rates(item, "accelerations")?,
         };
-        check_lengths(item, joints.len(), &[("positions", &point.position, true)])?;
-        let optional = [("velocities", &point.velocity, false), ("accelerations", &point.acceleration, false)];
-        check_lengths(item, joints.len(), &optional)?;
+        let columns = [
+            ("positions", &point.position, true),
+            ("velocities", &point.velocity, false),
+            ("accelerations", &point.acceleration, false),
+        ];
+        check_lengths(item, i + 1, joints.len(), &columns)?;
         if let Some(k) = point.position.iter().position(|value| !value.is_finite()) {
             let (joint, value) = (joints[k].to_string(), point.position[k]);
             return Err(Trouble::at(item.line, Problem::NotFinite { joint, point: i + 1, value }));
@@ -167,6 +172,7 @@ fn state(node: &Node, names: &Node, values: &Node, of: &'static str) -> Result<S
         velocity: rates(values, velocity)?,
         acceleration: rates(values, acceleration)?,
         of,
+        line: node.line,
     })
 }
 
@@ -179,7 +185,8 @@ impl State {
     pub(crate) fn check(&mut self) -> Result<bool, Trouble> {
         let (found, expected) = (self.position.len(), self.joints.len());
         if found != 0 && found != expected {
-            return Err(Trouble::new(Problem::Lengths { key: "position".to_owned(), found, expected, hint: "" }));
+            let (key, hint, point) = ("position".to_owned(), "", None);
+            return Err(Trouble::at(self.line, Problem::Lengths { key, found, expected, hint, point }));
         }
         let mut is_odd = false;
         for rates in [&mut self.velocity, &mut self.acceleration] {
@@ -192,11 +199,12 @@ impl State {
     }
 }
 
-fn check_lengths(item: &Node, joints: usize, columns: &[(&str, &Vec<f64>, bool)]) -> Result<(), Trouble> {
+fn check_lengths(item: &Node, point: usize, joints: usize, columns: &[(&str, &Vec<f64>, bool)]) -> Result<(), Trouble> {
     for (key, values, needed) in columns {
         if values.len() != joints && (*needed || !values.is_empty()) {
             let hint = if values.is_empty() { ": a trajectory without positions is not read" } else { "" };
-            let problem = Problem::Lengths { key: (*key).to_owned(), found: values.len(), expected: joints, hint };
+            let (key, found) = ((*key).to_owned(), values.len());
+            let problem = Problem::Lengths { key, found, expected: joints, hint, point: Some(point) };
             return Err(Trouble::at(item.line, problem));
         }
     }

@@ -4,82 +4,77 @@ use crate::route::Route;
 use crate::schedule::SLACK;
 use crate::time_law::{Law, LawError, PathPoint, least_time};
 
-/// Attempts to bring an averaged law below its limits by local slowing, before all of it is slowed.
+/// A law that is faster by less than this part of its time is no better.
+const NEAR: f64 = 1e-4;
+/// Most attempts to find a better one.
 const ATTEMPTS: usize = 12;
 /// Widest jerk window that is tried, as a multiple of the one asked for.
 const WIDEST: f64 = 200.0;
 
-/// A smoothed law that keeps all bounds, and by how much it must be slowed as a whole.
+/// A smoothed law, and by how much it must be slowed as a whole to keep all bounds.
+///
+/// Where the average passes a bound, the law before it is slowed; where it does not reach one any more, the law becomes faster
+/// again. Of all laws on the way the one of the least time is taken.
+///
+/// * `points`: what holds along the route.
 pub(crate) fn kept(points: &[PathPoint], route: &Route, rise: f64) -> Result<(Law, f64), LawError> {
-    let mut points = points.to_vec();
-    let limits: Vec<PathPoint> = points.clone();
     let s: Vec<f64> = points.iter().map(|point| point.s).collect();
+    let mut slowed = points.to_vec();
     let mut window = rise;
+    let mut best: Option<(Law, f64)> = None;
+    let mut vain = 0;
     for _ in 0..ATTEMPTS {
-        let x = least_time(&points)?;
-        let law = Law::new(&s, &x).smoothed(window);
+        let x = least_time(&slowed)?;
+        let raw = Law::new(&s, &x);
+        let law = raw.clone().smoothed(window);
         let worst_jerk = path_jerk(&law, route);
-        let excess = excesses(&law, &limits);
-        let most = excess.iter().fold(1.0, |most: f64, (_, ratio)| most.max(*ratio));
-        if worst_jerk <= 1.0 + SLACK && most <= 1.0 + SLACK {
-            return Ok((law, 1.0));
+        let ratios = ratios(&law, points);
+        let most = ratios.iter().fold(1.0, |most: f64, (_, ratio)| most.max(*ratio));
+        let slowing = most.sqrt().max(worst_jerk.cbrt());
+        let duration = law.duration() * slowing;
+        let before = best.as_ref().map_or(f64::INFINITY, |(law, slowing)| law.duration() * slowing);
+        vain = if duration < before * (1.0 - NEAR) { 0 } else { vain + 1 };
+        if duration < before {
+            best = Some((law, slowing));
         }
-        if worst_jerk > 1.0 + SLACK && window < WIDEST * rise {
-            window *= worst_jerk.min(4.0);
+        let widen = worst_jerk > 1.0 + SLACK && window < WIDEST * rise;
+        if !widen && (vain > 1 || slowing == 1.0 && slowed == points) {
+            break;
         }
-        // Slower where the average took in faster neighbours.
-        let times = Law::new(&s, &x);
-        let mut slower = x.clone();
-        for (t, ratio) in excess {
-            let [from, to] = [t - window, t].map(|t| times.at(t).s);
+        // The greatest ratio of all averages that a point is in.
+        let mut reached = vec![0.0f64; s.len()];
+        for (t, ratio) in ratios {
+            let [from, to] = [t - window, t].map(|t| raw.at(t).s);
             let first = s.partition_point(|s| *s < from).saturating_sub(1);
             let last = s.partition_point(|s| *s <= to).min(s.len() - 1);
-            for k in first..=last {
-                slower[k] = f64::min(slower[k], x[k] / (ratio * (1.0 + 0.2 * SLACK)));
+            reached[first..=last].iter_mut().for_each(|reached| *reached = reached.max(ratio));
+        }
+        for k in 0..s.len() {
+            let (cap, most) = (slowed[k].x_max, points[k].x_max);
+            if reached[k] > 1.0 {
+                slowed[k].x_max = cap.min(x[k] / reached[k]);
+            } else if cap < most && x[k] > cap * (1.0 - NEAR) {
+                slowed[k].x_max = most.min(cap / reached[k].max(0.5).sqrt());
             }
         }
-        for (point, (slower, x)) in points.iter_mut().zip(slower.iter().zip(&x)) {
-            if slower < x {
-                point.x_max = point.x_max.min(*slower);
-            }
+        if widen {
+            window *= worst_jerk.min(4.0);
         }
     }
-    let x = least_time(&points)?;
-    let law = Law::new(&s, &x).smoothed(window);
-    let most = excesses(&law, &limits).iter().fold(path_jerk(&law, route).powf(2.0 / 3.0), |most, (_, r)| most.max(*r));
-    Ok((law, most.max(1.0).sqrt()))
+    best.ok_or(LawError::Points(points.len()))
 }
 
-/// Moments at which an averaged law passes a limit, with the ratio by which squared speeds are too large.
-fn excesses(law: &Law, limits: &[PathPoint]) -> Vec<(f64, f64)> {
-    let mut found = Vec::new();
+/// Moments of an averaged law with the ratios of its squared speeds to the greatest that the bounds allow.
+fn ratios(law: &Law, points: &[PathPoint]) -> Vec<(f64, f64)> {
     let knots = law.knots();
     let middles = knots.windows(2).map(|pair| 0.5 * (pair[0] + pair[1]));
-    for t in knots.iter().copied().chain(middles) {
+    let ratio = |t: f64| {
         let at = law.at(t);
-        let (x, u) = (at.v * at.v, at.a);
-        let last = limits.len() - 1;
-        let k = limits.partition_point(|point| point.s <= at.s).clamp(1, last) - 1;
-        let ratio = |point: &PathPoint| {
-            let by_bounds = point.bounds.iter().map(|bound| {
-                let value = bound.a * u + bound.b * x;
-                if value > 0.0 {
-                    value / bound.high
-                } else if value < 0.0 {
-                    value / bound.low
-                } else {
-                    0.0
-                }
-            });
-            by_bounds.fold(x / point.x_max, f64::max)
-        };
-        // Between two points the wider of the two bounds: at a step of the program both are right.
-        let least = ratio(&limits[k]).min(ratio(&limits[k + 1]));
-        if least > 1.0 + SLACK {
-            found.push((t, least));
-        }
-    }
-    found
+        let k = points.partition_point(|point| point.s <= at.s).clamp(1, points.len() - 1) - 1;
+        let (here, next) = (&points[k], &points[k + 1]);
+        (t, PathPoint::passed(here, next, (at.s - here.s) / (next.s - here.s), at.v * at.v, at.a))
+    };
+    knots.iter().copied().chain(middles).map(ratio).collect()
 }
 
 /// Greatest jerk along the path of the tool over the programmed one; 0 where none is programmed.

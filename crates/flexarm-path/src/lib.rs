@@ -8,12 +8,10 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test stops at the first failure"))]
 
 mod averaged;
-mod barrier;
 mod branch;
 mod curve;
 mod follow;
 mod jerk_bounded;
-pub mod jerk_law;
 mod legs;
 mod limits;
 mod plan;
@@ -22,7 +20,8 @@ mod range;
 mod route;
 mod schedule;
 mod targets;
-pub mod time_law;
+
+pub use flexarm_trajectory::{jerk_law, time_law};
 
 pub use curve::{ArcError, TURN_LENGTH, ToolCurve, ToolJet};
 pub use follow::{Blocked, Follower, GuidedJoint, JointJet, ToolWay, coordinates_of};

@@ -1,13 +1,22 @@
 //! What holds at the stations of a route: bounds of joints, torques and the tool, and which of them slows a move.
 
 use flexarm_kinematics::{Data, State, inverse_dynamics};
-use nalgebra::{DVector, Vector6};
+use nalgebra::{DVector, Vector3, Vector6};
 
 use crate::curve::ToolJet;
 use crate::jerk_law::{JerkBound, Place};
 use crate::plan::{JointBounds, ProgramArm, SlowedBy};
 use crate::route::{Piece, Route, Station};
-use crate::time_law::{Bound, PathPoint};
+use crate::time_law::{Bound, Law, PathPoint};
+
+/// Points along a route of few stations, and least and most of them for each station.
+const POINTS: usize = 2000;
+const LEAST_PARTS: usize = 2;
+const MOST_PARTS: usize = 8;
+/// Parts of the time between two knots of a law at which its limits are looked at.
+const CHECKED: [f64; 4] = [0.0, 0.25, 0.5, 0.75];
+/// A limit is near from this part of it on, in squared speeds.
+const NEAR: f64 = 0.98;
 
 /// What limits the speed at a station beyond the program, with the greatest squared speed.
 #[derive(Debug, Clone)]
@@ -77,6 +86,46 @@ impl<'a> Limits<'a> {
         Limited { points, programmed, caps }
     }
 
+    /// The points of all stations with more between them, so that short routes have many.
+    pub(crate) fn divided(&mut self, stations: &[PathPoint]) -> Vec<PathPoint> {
+        let parts = (POINTS / stations.len()).clamp(LEAST_PARTS, MOST_PARTS);
+        let mut points = Vec::with_capacity(parts * stations.len());
+        for (k, pair) in stations.windows(2).enumerate() {
+            points.push(pair[0].clone());
+            for i in 1..parts {
+                let s = pair[0].s + (pair[1].s - pair[0].s) * i as f64 / parts as f64;
+                let Place { x_max, bounds, .. } = self.at(k, s);
+                points.push(PathPoint { s, x_max, bounds });
+            }
+        }
+        points.extend(stations.last().cloned());
+        points
+    }
+
+    /// By how much a law must be slower to keep all limits at its knots and between them; 1 or more.
+    ///
+    /// * `points`: what holds along the route. Where they differ little from each other, or are far from being reached, the limits
+    ///   between them are not looked at.
+    pub(crate) fn slowing(&mut self, law: &Law, points: &[PathPoint]) -> f64 {
+        let stations: Vec<f64> = self.route.stations.iter().map(|station| station.s).collect();
+        let mut most: f64 = 1.0;
+        for pair in law.knots().windows(2) {
+            for part in CHECKED {
+                let at = law.at(pair[0] + part * (pair[1] - pair[0]));
+                let k = points.partition_point(|point| point.s <= at.s).clamp(1, points.len() - 1) - 1;
+                let (here, next) = (&points[k], &points[k + 1]);
+                let near = PathPoint::passed(here, next, (at.s - here.s) / (next.s - here.s), at.v * at.v, at.a);
+                if near < NEAR || here.x_max == next.x_max && near <= at.v * at.v / here.x_max {
+                    most = most.max(if near < NEAR { 1.0 } else { near.sqrt() });
+                    continue;
+                }
+                let k = stations.partition_point(|s| *s <= at.s).clamp(1, stations.len() - 1) - 1;
+                most = most.max(self.at(k, at.s).slowing(&at)[0]);
+            }
+        }
+        most
+    }
+
     /// What holds at a parameter of the interval between station `k` and the next.
     pub(crate) fn at(&mut self, k: usize, s: f64) -> Place {
         let piece = &self.route.pieces[self.route.pieces.partition_point(|piece| piece.stations[1] <= k)];
@@ -105,7 +154,10 @@ impl<'a> Limits<'a> {
         }
         if let Some([V, A]) = &there.tool {
             at.tool(V, A, piece);
-            if let (Some(most), Some(_)) = (piece.speed.linear_m_s3, self.rise) {
+            let most = self.rise.and_then(|rise| {
+                piece.speed.linear_m_s3.or_else(|| piece.speed.linear_m_s2.map(|acceleration| acceleration / rise))
+            });
+            if let Some(most) = most {
                 at.jerks.push(JerkBound { a: 1.0, b: 0.0, c: 0.0, most });
             }
         }
@@ -142,9 +194,6 @@ impl AtStation<'_> {
     }
 
     fn joint(&mut self, d: f64, dd: f64, bounds: &JointBounds, piece: &Piece, name: &dyn Fn() -> String) {
-        if d == 0.0 && dd == 0.0 {
-            return;
-        }
         let speed = &piece.speed;
         let is_joint_move = piece.tool.is_empty();
         let part = |fraction: Option<f64>| if is_joint_move { fraction.unwrap_or(1.0).min(1.0) } else { 1.0 };
@@ -183,15 +232,20 @@ impl AtStation<'_> {
 
     fn tool(&mut self, V: &Vector6<f64>, A: &Vector6<f64>, piece: &Piece) {
         let speed = &piece.speed;
-        let (v, w) = (V.fixed_rows::<3>(0), V.fixed_rows::<3>(3));
-        let (dv, dw) = (A.fixed_rows::<3>(0), A.fixed_rows::<3>(3));
+        let three = |six: &Vector6<f64>, row: usize| Vector3::new(six[row], six[row + 1], six[row + 2]);
+        let (v, w, dv, dw) = (three(V, 0), three(V, 3), three(A, 0), three(A, 3));
+        // A list of bounds has the same length at all stations of a piece.
+        let along = |v: &Vector3<f64>, dv: &Vector3<f64>, most: f64| match v.norm() {
+            norm if norm > 1e-9 => Bound { a: norm, b: v.dot(dv) / norm, low: -most, high: most },
+            _ => Bound { a: 0.0, b: 0.0, low: -most, high: most },
+        };
+        self.point.bounds.extend(speed.linear_m_s2.map(|most| along(&v, &dv, most)));
+        self.point.bounds.extend(speed.angular_rad_s2.map(|most| along(&w, &dw, most)));
         if v.norm() > 1e-9 {
             if let Some(most) = speed.linear_m_s {
                 self.program((most / v.norm()).powi(2));
             }
             if let Some(most) = speed.linear_m_s2 {
-                let along = v.dot(&dv) / v.norm();
-                self.point.bounds.push(Bound { a: v.norm(), b: along, low: -most, high: most });
                 let across = (dv - v * (v.dot(&dv) / v.norm_squared())).norm();
                 if across > 0.0 {
                     self.limit(most / across, || SlowedBy::PathAcceleration);
@@ -207,10 +261,6 @@ impl AtStation<'_> {
                 } else {
                     self.program(x);
                 }
-            }
-            if let Some(most) = speed.angular_rad_s2 {
-                let along = w.dot(&dw) / w.norm();
-                self.point.bounds.push(Bound { a: w.norm(), b: along, low: -most, high: most });
             }
         }
     }

@@ -340,8 +340,8 @@ fn plan_holding(
             knots.push(Knot::rest(now, q));
         }
         for route in Route::all(&mut legs, legs_here, &mut stops)? {
-            let schedule = Schedule::new(&route, arm, options)?;
-            schedule.write(now, &mut knots, &mut moves);
+            let mut schedule = Schedule::new(&route, arm, options)?;
+            schedule.write_within(arm, now, &mut knots, &mut moves)?;
             now += schedule.duration();
         }
     }
@@ -367,6 +367,11 @@ fn trajectory(model: &Model, mut knots: Vec<Knot>) -> Result<Trajectory, Traject
             (knot.q[k], knot.v[k], knot.before[k], knot.after[k]) = (q, 0.0, 0.0, 0.0);
         }
     }
+    through(model, &knots)
+}
+
+/// The quintics through knots.
+pub(crate) fn through(model: &Model, knots: &[Knot]) -> Result<Trajectory, TrajectoryError> {
     let times: Vec<f64> = knots.iter().map(|knot| knot.t).collect();
     let joint = |k: usize| JointKnots {
         name: model.coordinates()[k].joint.clone(),

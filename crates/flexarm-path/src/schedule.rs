@@ -1,17 +1,20 @@
 //! A route over time: its time law, the knots of the joints' curves, and what became of its moves.
 
+use flexarm_trajectory::{JointPeak, TrajectoryError};
 use nalgebra::DVector;
 
 use crate::averaged::kept;
 use crate::follow::JointJet;
 use crate::jerk_bounded::{JerkBounded, has_jerks};
 use crate::limits::{Cap, Limited, Limits};
-use crate::plan::{PathError, PathOptions, PlannedMove, ProgramArm, Slowed, SlowedBy};
+use crate::plan::{JointBounds, PathError, PathOptions, PlannedMove, ProgramArm, Slowed, SlowedBy, through};
 use crate::route::{Route, Station, between};
 use crate::time_law::{Law, LawError, Progress};
 
 /// Limits count as kept up to this part.
 pub(crate) const SLACK: f64 = 1e-3;
+/// Attempts to slow a route until its curves keep the limits of the joints.
+const ROUNDS: usize = 4;
 /// A place is slowed by a limit where its speed is within this part of it.
 const AT_LIMIT: f64 = 0.02;
 /// A jerk slows a place where it is nearer to its bound than this part.
@@ -100,9 +103,14 @@ impl<'r> Schedule<'r> {
             return Err(fail(format!("accelerations rise in {} s: give a positive time", options.rise_s)));
         }
         let rise = has_jerks(arm).then_some(options.rise_s);
-        let Limited { points, programmed, caps } = Limits::new(route, arm, rise).at_stations();
+        let mut limits = Limits::new(route, arm, rise);
+        let Limited { points, programmed, caps } = limits.at_stations();
+        let points = if rise.is_none() { limits.divided(&points) } else { points };
         let law = match rise {
-            None => kept(&points, route, options.rise_s).map(|(law, stretch)| (Timing::Averaged(law), stretch)),
+            None => kept(&points, route, options.rise_s).map(|(law, stretch)| {
+                let slowing = limits.slowing(&law, &points).max(stretch);
+                (Timing::Averaged(law), slowing)
+            }),
             Some(rise) => JerkBounded::new(&points, route, arm, rise).map(|law| (Timing::Bounded(law), 1.0)),
         };
         let law = law.map_err(|error| match error {
@@ -142,6 +150,31 @@ impl<'r> Schedule<'r> {
 
     pub(crate) fn duration(&self) -> f64 {
         self.law.duration() * self.stretch
+    }
+
+    /// As [`Self::write`], slowed so that the curves through the knots keep the speeds and accelerations of the joints.
+    pub(crate) fn write_within(
+        &mut self,
+        arm: &ProgramArm<'_>,
+        now: f64,
+        knots: &mut Vec<Knot>,
+        moves: &mut Vec<PlannedMove>,
+    ) -> Result<(), TrajectoryError> {
+        let before = (knots.len(), moves.len());
+        for _ in 0..ROUNDS {
+            self.write(now, knots, moves);
+            let slowing = slowing(&knots[before.0..], arm)?;
+            if slowing <= 1.0 {
+                break;
+            }
+            self.stretch *= slowing * (1.0 + f64::EPSILON);
+            knots.truncate(before.0);
+            moves.truncate(before.1);
+        }
+        if knots.len() == before.0 {
+            self.write(now, knots, moves);
+        }
+        Ok(())
     }
 
     /// Parameter with derivatives at a time of this route.
@@ -397,6 +430,16 @@ impl<'r> Schedule<'r> {
         let v = self.progress(t)[1];
         (v * v > cap.x * (1.0 - 4.0 * AT_LIMIT)).then(|| ((cap.x / programmed).sqrt(), cap.by.clone()))
     }
+}
+
+/// By how much the quintics through knots must be slower to keep the speeds and accelerations of the joints; 1 if they do.
+fn slowing(knots: &[Knot], arm: &ProgramArm<'_>) -> Result<f64, TrajectoryError> {
+    let peaks = through(arm.model, knots)?.peak();
+    let ratio = |(peak, bounds): (&JointPeak, &JointBounds)| {
+        let speed = peak.velocity.value.abs() / bounds.velocity;
+        speed.max((peak.acceleration.value.abs() / bounds.acceleration).sqrt())
+    };
+    Ok(peaks.iter().zip(&arm.bounds).map(ratio).fold(1.0, f64::max))
 }
 
 fn push(knots: &mut Vec<Knot>, now: f64, knot: Knot) {

@@ -20,7 +20,7 @@
 
 use crate::error::{FileError, TrajectoryError};
 use crate::problem::{Problem, SampleError};
-use crate::spline::{JointSamples, Samples};
+use crate::spline::{JointSamples, Samples, not_increasing};
 use crate::trajectory::{ToldUnit, Trajectory};
 use crate::warning::Warning;
 
@@ -39,9 +39,9 @@ impl Trajectory {
     /// [`TrajectoryError::File`] with the line, the number of the column where it matters, what was found and how to
     /// mend it.
     pub fn parse_csv(text: &str, origin: &str) -> Result<Self, TrajectoryError> {
-        parse(text.trim_start_matches('\u{feff}')).map_err(|Located { line, column, problem }| {
+        parse(text.trim_start_matches('\u{feff}')).map_err(|Located { line, column, problem, more_lines }| {
             let (origin, problem) = (origin.to_owned(), *problem);
-            Box::new(FileError { origin, line, column, problem }).into()
+            Box::new(FileError { origin, line, column, problem, more_lines }).into()
         })
     }
 }
@@ -51,14 +51,16 @@ struct Located {
     line: Option<usize>,
     column: Option<usize>,
     problem: Box<Problem>,
+    /// Further lines with something wrong.
+    more_lines: Vec<usize>,
 }
 
 fn located(line: usize, column: Option<usize>, problem: Problem) -> Located {
-    Located { line: Some(line), column, problem: Box::new(problem) }
+    Located { line: Some(line), column, problem: Box::new(problem), more_lines: Vec::new() }
 }
 
 fn nowhere(problem: Problem) -> Located {
-    Located { line: None, column: None, problem: Box::new(problem) }
+    Located { line: None, column: None, problem: Box::new(problem), more_lines: Vec::new() }
 }
 
 /// What a column holds.
@@ -80,6 +82,7 @@ fn parse(text: &str) -> Result<Trajectory, Located> {
         .from_reader(text.as_bytes());
     let mut header: Option<Header> = None;
     let mut rows: Vec<(usize, Vec<f64>)> = Vec::new();
+    let (mut repeated, mut wrong): (usize, Option<Located>) = (0, None);
     for record in reader.records() {
         // The text is UTF-8 and rows may differ in length, so the reader has nothing left to complain about.
         let record = record.map_err(|_| nowhere(Problem::NotUtf8))?;
@@ -92,8 +95,16 @@ fn parse(text: &str) -> Result<Trajectory, Located> {
             Some(header) if rows.len() >= MOST_NUMBERS / header.columns.len() => {
                 return Err(located(line, None, Problem::TooManyNumbers { most: MOST_NUMBERS }));
             }
-            Some(header) => rows.push((line, numbers(&record, line, &header.columns)?)),
+            Some(header) => match (numbers(&record, line, &header.columns), &mut wrong) {
+                (Ok(row), _) if rows.last().is_some_and(|(_, last)| *last == row) => repeated += 1,
+                (Ok(row), _) => rows.push((line, row)),
+                (Err(_), Some(first)) => first.more_lines.push(line),
+                (Err(error), None) => wrong = Some(error),
+            },
         }
+    }
+    if let Some(wrong) = wrong {
+        return Err(wrong);
     }
     let Some(header) = header else {
         return Err(nowhere(Problem::Empty));
@@ -102,7 +113,8 @@ fn parse(text: &str) -> Result<Trajectory, Located> {
     let samples = assemble(&header, &rows, &units)?;
     let trajectory = samples.interpolate().map_err(|error| placed(error, &samples, &header, &rows))?;
     let told = samples.joints.iter().filter_map(|joint| units.told(&joint.name)).collect();
-    Ok(with_doubts(trajectory, &samples, &units).with_told_units(told))
+    let trajectory = with_doubts(trajectory, &samples, &units).with_told_units(told);
+    Ok(if repeated > 0 { trajectory.with_note(Warning::RepeatedRows { count: repeated }) } else { trajectory })
 }
 
 /// Line of a record, from 1. The position that the reader gives lies before the blank and comment lines that it
@@ -207,14 +219,18 @@ fn assemble(header: &Header, rows: &[(usize, Vec<f64>)], units: &Units) -> Resul
 fn placed(error: TrajectoryError, samples: &Samples, header: &Header, rows: &[(usize, Vec<f64>)]) -> Located {
     match error {
         TrajectoryError::Samples(error) => {
+            let mut more_lines = Vec::new();
             let (line, column) = match &error {
-                SampleError::TimeNotIncreasing { row, .. } => (rows[*row].0, header.find("time", Quantity::Time)),
+                SampleError::TimeNotIncreasing { row, .. } => {
+                    more_lines.extend(not_increasing(&samples.times).filter(|k| k != row).map(|row| rows[row].0));
+                    (rows[*row].0, header.find("time", Quantity::Time))
+                }
                 SampleError::AccelerationWithoutVelocity { joint } => {
                     (header.line, header.find(joint, Quantity::Acceleration))
                 }
                 _ => (header.line, None),
             };
-            located(line, column.map(|i| i + 1), Problem::Samples(error))
+            Located { more_lines, ..located(line, column.map(|i| i + 1), Problem::Samples(error)) }
         }
         TrajectoryError::OutOfRange { joint, time_s } => {
             let row = samples.times.iter().position(|t| t - samples.times[0] >= time_s).unwrap_or(0);

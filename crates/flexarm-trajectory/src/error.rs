@@ -7,7 +7,9 @@ use std::fmt;
 use std::io;
 use std::path::PathBuf;
 
+use crate::polynomial::FARTHEST;
 use crate::problem::{PlanError, Problem, SampleError, list};
+use crate::trajectory::LONGEST;
 
 /// Why there is no trajectory.
 #[derive(Debug, thiserror::Error)]
@@ -55,9 +57,10 @@ pub enum TrajectoryError {
         /// Joints that were asked for.
         want: Vec<String>,
     },
-    /// Values or times are too extreme for polynomials in f64.
+    /// Values or times are beyond any motion, or too extreme for polynomials in f64.
     #[error(
-        "joint {joint:?}, t = {time_s:e} s: values or times are too extreme to be represented; check the units of the file"
+        "joint {joint:?}, t = {time_s:e} s: values or times are too extreme (a motion has {FARTHEST:e} rad or m and {LONGEST:e} s at \
+         most); check the units of the file"
     )]
     OutOfRange {
         /// Joint name.
@@ -120,7 +123,12 @@ pub struct FileError {
     pub column: Option<usize>,
     /// What is wrong.
     pub problem: Problem,
+    /// Further lines with something wrong, ascending.
+    pub more_lines: Vec<usize>,
 }
+
+/// So many further lines are named.
+const NAMED: usize = 10;
 
 impl fmt::Display for FileError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -131,7 +139,15 @@ impl fmt::Display for FileError {
         if let Some(column) = self.column {
             write!(f, ", column {column}")?;
         }
-        write!(f, ": {}", self.problem)
+        write!(f, ": {}", self.problem)?;
+        let named: Vec<String> = self.more_lines.iter().take(NAMED).map(usize::to_string).collect();
+        let count = self.more_lines.len();
+        match count {
+            0 => Ok(()),
+            1 => write!(f, " (line {} is wrong, too)", named[0]),
+            _ if count > NAMED => write!(f, " ({count} more lines are wrong: {}, ...)", named.join(", ")),
+            _ => write!(f, " ({count} more lines are wrong: {})", named.join(", ")),
+        }
     }
 }
 

@@ -68,30 +68,51 @@ pub fn text_of_file(path: &Path) -> Result<String, TrajectoryError> {
     text_of_bytes(bytes_of_file(path)?, &path.display().to_string())
 }
 
-/// The text of a file: UTF-8, or UTF-16 where the file begins with its mark, as spreadsheets write it.
+/// The text of a file: UTF-8; UTF-16 where the file begins with its mark, as spreadsheets write it; or Windows-1252.
 ///
 /// * `origin`: file name for messages.
 ///
 /// # Errors
-/// [`TrajectoryError::File`] with the line of what is neither.
+/// [`TrajectoryError::File`] with the line of what is none of them.
 pub fn text_of_bytes(bytes: Vec<u8>, origin: &str) -> Result<String, TrajectoryError> {
     let word: fn([u8; 2]) -> u16 = match bytes.get(..2) {
         Some([0xFF, 0xFE]) => u16::from_le_bytes,
         Some([0xFE, 0xFF]) => u16::from_be_bytes,
-        _ => return Ok(text_of(bytes, origin)?),
+        _ => {
+            return match windows_1252(&bytes) {
+                Some(text) => Ok(text),
+                None => Ok(text_of(bytes, origin)?),
+            };
+        }
     };
     let words = bytes[2..].chunks_exact(2).map(|pair| word([pair[0], pair[1]]));
     let text: Result<String, _> = char::decode_utf16(words).collect();
     text.map_err(|_| {
         let origin = origin.to_owned();
-        Box::new(FileError { origin, line: None, column: None, problem: Problem::NotUtf8 }).into()
+        Box::new(FileError { origin, line: None, column: None, problem: Problem::NotUtf8, more_lines: Vec::new() })
+            .into()
     })
+}
+
+/// The text of bytes that are not UTF-8 from the first special letter on, without control characters.
+fn windows_1252(bytes: &[u8]) -> Option<String> {
+    /// Letters of the bytes 0x80 to 0x9f; 0 where there is none.
+    const SPECIAL: &str = "€\0‚ƒ„…†‡ˆ‰Š‹Œ\0Ž\0\0‘’“”•–—˜™š›œ\0žŸ";
+    let error = std::str::from_utf8(bytes).err()?;
+    let letter = |byte: &u8| match *byte {
+        byte @ 0x80..=0x9f => SPECIAL.chars().nth(usize::from(byte - 0x80)).filter(|letter| *letter != '\0'),
+        // Bytes that are no text have it more often than texts.
+        0xff => None,
+        byte => Some(char::from(byte)).filter(|letter| !letter.is_control() || letter.is_ascii_whitespace()),
+    };
+    if bytes[..error.valid_up_to()].is_ascii() { bytes.iter().map(letter).collect() } else { None }
 }
 
 fn text_of(bytes: Vec<u8>, origin: &str) -> Result<String, Box<FileError>> {
     String::from_utf8(bytes).map_err(|error| {
         let good = &error.as_bytes()[..error.utf8_error().valid_up_to()];
         let line = 1 + good.iter().filter(|&&byte| byte == b'\n').count();
-        Box::new(FileError { origin: origin.to_owned(), line: Some(line), column: None, problem: Problem::NotUtf8 })
+        let (origin, problem, more_lines) = (origin.to_owned(), Problem::NotUtf8, Vec::new());
+        Box::new(FileError { origin, line: Some(line), column: None, problem, more_lines })
     })
 }

@@ -2,6 +2,7 @@
 //!
 //! Start at [`Leg::curves`]: unit shapes (`shape`, or `via` through points on the way) times the way of each joint.
 
+use crate::optimal::JointPath;
 use crate::plan::{MotionLimits, PlannedMove, Profile};
 use crate::polynomial::Piece;
 use crate::problem::PlanError;
@@ -24,6 +25,9 @@ impl Leg<'_> {
     /// The curve of every joint from time 0 of the move, and how long the move takes. A joint that stays has a
     /// curve without pieces; one that arrives early has a curve that ends early.
     pub(crate) fn curves(&self) -> Result<(Vec<Curve>, f64), PlanError> {
+        if self.planned.profile == Profile::Optimal {
+            return self.fastest_curves();
+        }
         if !self.planned.via.is_empty() {
             return self.curves_through_points();
         }
@@ -71,7 +75,7 @@ impl Leg<'_> {
     fn shape_lasting(&self, duration: f64, limits: &ShapeLimits) -> Curve {
         let ShapeLimits { acceleration, jerk, .. } = *limits;
         match self.planned.profile {
-            Profile::Quintic => shape::quintic(duration),
+            Profile::Quintic | Profile::Optimal => shape::quintic(duration),
             Profile::Trapezoid { rounding } => Phases::trapezoid_in(duration, acceleration, rounding)
                 .unwrap_or_else(|| Phases::trapezoid_default(duration, rounding))
                 .curve(),
@@ -87,7 +91,9 @@ impl Leg<'_> {
     fn fastest_shape(&self, moving: &[usize], limits: &ShapeLimits) -> Result<Curve, PlanError> {
         self.require("velocity", moving, |limits| limits.velocity)?;
         match self.planned.profile {
-            Profile::Quintic => Ok(shape::quintic(shape::duration_for_peaks(shape::quintic_peaks(), limits))),
+            Profile::Quintic | Profile::Optimal => {
+                Ok(shape::quintic(shape::duration_for_peaks(shape::quintic_peaks(), limits)))
+            }
             Profile::Trapezoid { rounding } => {
                 self.require("acceleration", moving, |limits| limits.acceleration)?;
                 Ok(Phases::trapezoid(limits, rounding).curve())
@@ -118,22 +124,13 @@ impl Leg<'_> {
         if planned.profile != Profile::Quintic {
             return Err(PlanError::ViaNeedsQuintic { number });
         }
-        let mut points: Vec<&[f64]> = vec![self.from];
-        points.extend(planned.via.iter().map(Vec::as_slice));
-        points.push(&planned.to);
-        let n = self.joints.len();
-        let moving: Vec<usize> = (0..n).filter(|&i| points.iter().any(|point| point[i] != self.from[i])).collect();
-
-        // A unit of way is what the speed limit allows in a unit of time, where all limits are known.
-        let speed = |i: usize| planned.limits[i].velocity;
-        let weighted = moving.iter().all(|&i| speed(i).is_finite());
-        let weights: Vec<f64> = (0..n).map(|i| if weighted && speed(i).is_finite() { speed(i) } else { 1.0 }).collect();
+        let (points, weights, moving) = self.points();
         let u = via::passing_times(&points, &weights).map_err(|via| PlanError::RepeatedPoint { number, via })?;
         let unit_curve = |i: usize| {
             let q: Vec<f64> = points.iter().map(|point| point[i]).collect();
             Curve { knots: u.clone(), pieces: via::rest_to_rest_spline(&u, &q) }
         };
-        let unit: Vec<Curve> = (0..n).map(unit_curve).collect();
+        let unit: Vec<Curve> = (0..self.joints.len()).map(unit_curve).collect();
 
         let duration = match planned.duration {
             Some(duration) => duration,
@@ -149,6 +146,37 @@ impl Leg<'_> {
         Ok((unit.iter().map(|curve| curve.stretched(duration)).collect(), duration))
     }
 
+    /// All points from start to goal, what counts as one unit of way of each joint, and the joints that move.
+    fn points(&self) -> (Vec<&[f64]>, Vec<f64>, Vec<usize>) {
+        let mut points: Vec<&[f64]> = vec![self.from];
+        points.extend(self.planned.via.iter().map(Vec::as_slice));
+        points.push(&self.planned.to);
+        let n = self.joints.len();
+        let moving: Vec<usize> = (0..n).filter(|&i| points.iter().any(|point| point[i] != self.from[i])).collect();
+        // A unit of way is what the speed limit allows in a unit of time, where all limits are known.
+        let speed = |i: usize| self.planned.limits[i].velocity;
+        let weighted = moving.iter().all(|&i| speed(i).is_finite());
+        let weights = (0..n).map(|i| if weighted && speed(i).is_finite() { speed(i) } else { 1.0 }).collect();
+        (points, weights, moving)
+    }
+
+    /// A move along the spline through all points in the least time, or slower if a duration is given.
+    fn fastest_curves(&self) -> Result<(Vec<Curve>, f64), PlanError> {
+        let Self { number, planned, .. } = *self;
+        let (points, weights, moving) = self.points();
+        if moving.is_empty() {
+            let stay = Curve { knots: vec![0.0], pieces: Vec::new() };
+            return Ok((vec![stay; self.joints.len()], planned.duration.unwrap_or(0.0)));
+        }
+        self.require("velocity", &moving, |limits| limits.velocity)?;
+        self.require("acceleration", &moving, |limits| limits.acceleration)?;
+        let path = JointPath::new(&points, &weights, &planned.limits);
+        let curves = path.map_err(|via| PlanError::RepeatedPoint { number, via })?.fastest();
+        let least = curves.iter().filter_map(|curve| curve.knots.last()).fold(0.0, |end: f64, t| end.max(*t));
+        let duration = planned.duration.unwrap_or(least);
+        Ok((curves.iter().map(|curve| curve.stretched(duration / least)).collect(), duration))
+    }
+
     /// Acceleration and jerk limits that a given duration does not leave room for.
     pub(crate) fn warnings(&self, curves: &[Curve]) -> Vec<Warning> {
         let mut warnings = Vec::new();
@@ -157,8 +185,8 @@ impl Leg<'_> {
         }
         for ((curve, limits), joint) in curves.iter().zip(&self.planned.limits).zip(self.joints) {
             let [_, acceleration, jerk] = curve.peaks();
-            // The jerk limit shapes S-curves; the other profiles do not promise it.
-            let is_jerk_limited = self.planned.profile == Profile::SCurve;
+            // The jerk limit shapes S-curves and optimal moves; the other profiles do not promise it.
+            let is_jerk_limited = matches!(self.planned.profile, Profile::SCurve | Profile::Optimal);
             let jerk = if is_jerk_limited { jerk } else { 0.0 };
             let checks = [("acceleration", acceleration, limits.acceleration), ("jerk", jerk, limits.jerk)];
             for (quantity, value, limit) in checks {
@@ -199,7 +227,7 @@ impl Curve {
     }
 
     /// The same values in `stretch` times the time.
-    fn stretched(&self, stretch: f64) -> Self {
+    pub(crate) fn stretched(&self, stretch: f64) -> Self {
         let pieces = self.pieces.iter().map(|piece| piece.mapped(0.0, 1.0, stretch)).collect();
         Self { knots: self.knots.iter().map(|knot| knot * stretch).collect(), pieces }
     }

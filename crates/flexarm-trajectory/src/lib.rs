@@ -37,6 +37,7 @@
 //!
 //! Where to look:
 //!
+//! * least times: [`time_law`], and [`jerk_law`] within jerks;
 //! * mathematics: [`Trajectory`] (sampling, time scaling, moves and holds), [`Plan`] (quintic, trapezoid and
 //!   S-curve moves, points passed on the way), [`Samples`] (splines through sampled joint values),
 //!   [`JointPeak`], [`LimitViolation`];
@@ -48,14 +49,18 @@
 //! Not here: robots, links and inverse kinematics; a trajectory knows its joints by name only.
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test"))]
 
+mod barrier;
 mod column_map;
 mod corner;
 pub mod csv_file;
 mod csv_write;
 mod error;
 mod file;
+mod gap;
+pub mod jerk_law;
 mod leg;
 mod limits;
+mod optimal;
 mod peak;
 mod plan;
 mod polynomial;
@@ -65,6 +70,7 @@ mod samples_toml;
 mod shape;
 mod spline;
 pub mod table;
+pub mod time_law;
 mod trajectory;
 mod via;
 mod warning;

@@ -29,6 +29,9 @@ pub enum Profile {
     },
     /// Ramp, cruise, ramp with limited jerk: seven phases.
     SCurve,
+    /// The least time along the spline through the points on the way, within speeds, accelerations and jerks. A joint without
+    /// a limit of its jerk takes 0.05 s or more to reach its acceleration.
+    Optimal,
 }
 
 /// Limits that shape the moves of one joint; infinite when there is none.
@@ -52,7 +55,7 @@ impl MotionLimits {
 pub struct PlannedMove {
     /// Goal of every joint, rad or m.
     pub to: Vec<f64>,
-    /// Points passed without a stop (quintic only), each with a value for every joint.
+    /// Points passed without a stop (quintic and optimal only), each with a value for every joint.
     pub via: Vec<Vec<f64>>,
     /// Duration in s; `None` is as fast as the limits allow.
     pub duration: Option<f64>,

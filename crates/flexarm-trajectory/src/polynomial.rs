@@ -8,6 +8,9 @@
 
 use std::ops::Deref;
 
+/// Greatest distance of a joint from 0, rad or m: a spindle turns so far in a day.
+pub(crate) const FARTHEST: f64 = 1e9;
+
 /// Where a quantity is least and where it is greatest within a piece, as `(τ, value)`.
 pub(crate) type Range = [(f64, f64); 2];
 
@@ -59,9 +62,10 @@ impl Piece {
         Self { width: self.width * stretch, c }
     }
 
-    /// Are width and all coefficients finite, and the width positive?
+    /// Are width and all coefficients finite, the width positive, and the values no farther from 0 than [`FARTHEST`]?
     pub(crate) fn is_sound(&self) -> bool {
-        self.width > 0.0 && self.width.is_finite() && self.c.iter().all(|c| c.is_finite())
+        let finite = self.width.is_finite() && self.c.iter().all(|c| c.is_finite());
+        self.width > 0.0 && finite && self.c[0].abs() + self.excursion_bound() <= FARTHEST
     }
 
     /// Does it stay exactly where it starts?

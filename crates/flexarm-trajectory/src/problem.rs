@@ -4,6 +4,9 @@
 
 use flexarm_settings::Setting;
 
+use crate::polynomial::FARTHEST;
+use crate::trajectory::LONGEST;
+
 /// What is wrong in a file, and how to mend it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -259,8 +262,11 @@ pub enum Problem {
     /// The plan is wrong.
     #[error(transparent)]
     Plan(PlanError),
-    /// Values or times are too extreme for polynomials in f64.
-    #[error("joint {joint:?}: values or times are too extreme to be represented; check the units of the file")]
+    /// Values or times are beyond any motion, or too extreme for polynomials in f64.
+    #[error(
+        "joint {joint:?}: values or times are too extreme (a motion has {FARTHEST:e} rad or m and {LONGEST:e} s at most); check the \
+         units of the file"
+    )]
     OutOfRange {
         /// Joint name.
         joint: String,
@@ -377,7 +383,8 @@ pub enum PlanError {
     },
     /// Points on the way with another profile than the quintic.
     #[error(
-        "move {number} passes points on the way, which only the quintic can; set `profile = \"quintic\"` in this move or drop `via`"
+        "move {number} passes points on the way, which only the quintic and the optimal law can; set `profile = \"quintic\"` in this \
+         move or drop `via`"
     )]
     ViaNeedsQuintic {
         /// Number of the move.

@@ -23,6 +23,7 @@
 
 use crate::corner::{Corner, corners};
 use crate::error::TrajectoryError;
+use crate::gap::gaps;
 use crate::polynomial::Piece;
 use crate::problem::SampleError;
 use crate::trajectory::{Curve, Trajectory};
@@ -52,6 +53,16 @@ pub struct JointSamples {
     pub acceleration: Option<Vec<f64>>,
 }
 
+/// Rows whose time does not follow the latest one before.
+pub(crate) fn not_increasing(times: &[f64]) -> impl Iterator<Item = usize> {
+    let mut latest = f64::NEG_INFINITY;
+    times.iter().enumerate().filter_map(move |(row, time)| {
+        let follows = *time > latest;
+        latest = latest.max(*time);
+        (!follows).then_some(row)
+    })
+}
+
 impl Samples {
     /// The trajectory through the samples; the module page says how.
     ///
@@ -65,7 +76,8 @@ impl Samples {
         let curve = |joint: &JointSamples| joint.curve(&knots);
         let curves = self.joints.iter().map(curve).collect();
         let names = self.joints.iter().map(|joint| joint.name.clone()).collect();
-        Trajectory::from_curves(names, curves, knots[knots.len() - 1], Vec::new())
+        let notes = gaps(&knots, &self.joints).into_iter().collect();
+        Trajectory::from_curves(names, curves, knots[knots.len() - 1], notes)
     }
 
     /// Checks everything that [`Samples::interpolate`] relies on.
@@ -307,6 +319,11 @@ enum End {
     Natural,
     /// With the acceleration of the next knot.
     Free,
+}
+
+/// First and second derivative at the knots of the natural cubic spline.
+pub(crate) fn natural_spline(t: &[f64], q: &[f64]) -> Vec<[f64; 2]> {
+    cubic_spline(t, q, End::Natural, End::Natural)
 }
 
 /// Velocity and acceleration at the knots of the cubic spline.

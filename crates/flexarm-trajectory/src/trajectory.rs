@@ -11,6 +11,9 @@ use crate::warning::{QUIET_SPEED, Warning};
 /// A joint that moves less than this within a piece, in rad or m, is at rest there.
 const REST: f64 = 1e-9;
 
+/// Greatest duration of a motion, s: four months.
+pub(crate) const LONGEST: f64 = 1e7;
+
 /// Joint positions, velocities and accelerations as functions of time, from `t = 0` to [`Trajectory::duration`].
 ///
 /// Position, velocity and acceleration are continuous everywhere, with three exceptions, each of which shows in
@@ -70,8 +73,8 @@ impl Trajectory {
     /// All curves must cover `0..duration`.
     ///
     /// # Errors
-    /// [`TrajectoryError::OutOfRange`] when a coefficient or a time is not finite, or a piece shorter than the rounding
-    /// of its time: values and times are too extreme for f64.
+    /// [`TrajectoryError::OutOfRange`] when a coefficient or a time is not finite or beyond any motion, or a piece shorter than
+    /// the rounding of its time.
     pub(crate) fn from_curves(
         joints: Vec<String>,
         curves: Vec<Curve>,
@@ -85,8 +88,8 @@ impl Trajectory {
             let spans = curve.knots.windows(2).zip(&curve.pieces);
             let mut sound = spans
                 .map(|(knot, piece)| piece.is_sound() && (knot[1] - knot[0] - piece.width).abs() <= 1e-6 * piece.width);
-            if curve.pieces.is_empty() || !duration.is_finite() {
-                return Err(TrajectoryError::OutOfRange { joint: joint.clone(), time_s: duration });
+            if curve.pieces.is_empty() || duration.is_nan() || duration > LONGEST {
+                return Err(TrajectoryError::OutOfRange { joint: joint.clone(), time_s: duration.min(LONGEST) });
             }
             if let Some(i) = sound.position(|is_sound| !is_sound) {
                 return Err(TrajectoryError::OutOfRange { joint: joint.clone(), time_s: curve.knots[i] });
@@ -235,7 +238,9 @@ impl Trajectory {
                 joints.push(joint.clone());
                 curves.push(curve.within(*start, duration));
             }
-            notes.extend(part.notes.iter().cloned());
+            for note in &part.notes {
+                add_note(&mut notes, note.clone().at_times(*start, 1.0));
+            }
         }
         if joints.is_empty() {
             return Err(SampleError::NoJoint.into());
@@ -258,7 +263,8 @@ impl Trajectory {
         };
         let curves = self.curves.iter().map(stretch).collect();
         // What the planner said about times and limits holds for the unscaled motion only.
-        let notes = self.notes.iter().filter(|note| !note.depends_on_time()).cloned().collect();
+        let notes = self.notes.iter().filter(|note| !note.depends_on_time());
+        let notes = notes.map(|note| note.clone().at_times(0.0, factor)).collect();
         Self::from_curves(self.joints.clone(), curves, self.duration * factor, notes)
     }
 
@@ -357,7 +363,8 @@ impl Trajectory {
             return Ok(());
         };
         let problem = Problem::UnitOfJoint { joint: joint.clone(), is_length: *is_length };
-        Err(Box::new(FileError { origin: origin.to_owned(), line: Some(*line), column: None, problem }).into())
+        let (origin, more_lines) = (origin.to_owned(), Vec::new());
+        Err(Box::new(FileError { origin, line: Some(*line), column: None, problem, more_lines }).into())
     }
 
     pub(crate) fn with_told_units(self, told: Vec<ToldUnit>) -> Self {
@@ -369,6 +376,23 @@ impl Trajectory {
         self.notes.push(note);
         self
     }
+}
+
+/// Adds a note; a gap that is there already takes the joints of the new one.
+fn add_note(notes: &mut Vec<Warning>, note: Warning) {
+    if let Warning::Gaps { joints, sample, from_s, to_s, .. } = &note {
+        let same = notes.iter_mut().find_map(|other| match other {
+            Warning::Gaps { joints, sample: k, from_s: from, to_s: to, .. } => {
+                (sample == k && from_s == from && to_s == to).then_some(joints)
+            }
+            _ => None,
+        });
+        if let Some(known) = same {
+            known.extend(joints.iter().cloned());
+            return;
+        }
+    }
+    notes.push(note);
 }
 
 impl Curve {

@@ -80,6 +80,21 @@ pub enum Warning {
         /// How many.
         count: usize,
     },
+    /// Samples are missing in data that are otherwise sampled evenly.
+    Gaps {
+        /// Joints that are sampled.
+        joints: Vec<String>,
+        /// How many gaps there are.
+        count: usize,
+        /// Number of the sample before the longest, counted from 1.
+        sample: usize,
+        /// Start of the longest, s.
+        from_s: f64,
+        /// End of the longest, s.
+        to_s: f64,
+        /// The usual time between two samples, s.
+        usual_s: f64,
+    },
     /// The last row of a table is not whole.
     CutRow {
         /// Its line.
@@ -159,6 +174,17 @@ impl fmt::Display for Warning {
             Self::RepeatedRows { count } => {
                 write!(f, "{count} rows repeat the one before, time and all, and are left out")
             }
+            Self::Gaps { joints, count, sample, from_s, to_s, usual_s } => {
+                let more = if *count > 1 { format!(", the longest of {count} gaps") } else { String::new() };
+                write!(
+                    f,
+                    "no sample of {} for {:.4} s, from t = {from_s:.4} s to {to_s:.4} s (samples {sample} and {}){more}; the usual step \
+                     is {usual_s:.4} s: what the joints do there is a guess; record the motion again, or cut it there",
+                    some(joints),
+                    to_s - from_s,
+                    sample + 1
+                )
+            }
             Self::CutRow { line } => {
                 write!(f, "the last row (line {line}) is not whole and is left out: the file was cut off")
             }
@@ -192,6 +218,14 @@ impl Warning {
     /// Does a change of speed make this warning wrong?
     pub(crate) fn depends_on_time(&self) -> bool {
         matches!(self, Self::ShorterThanLimitsAllow { .. })
+    }
+
+    /// The same of a motion whose times are `start + factor t`.
+    pub(crate) fn at_times(mut self, start: f64, factor: f64) -> Self {
+        if let Self::Gaps { from_s, to_s, usual_s, .. } = &mut self {
+            (*from_s, *to_s, *usual_s) = (start + factor * *from_s, start + factor * *to_s, factor * *usual_s);
+        }
+        self
     }
 
     /// What the curve of one joint gives rise to.

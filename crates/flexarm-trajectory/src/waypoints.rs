@@ -8,7 +8,7 @@
 //! start = [0.0, 0.0, 0.0]
 //!
 //! # These six may be set again within a [[move]].
-//! profile = "quintic"          # quintic (default), trapezoid, s-curve
+//! profile = "quintic"          # quintic (default), trapezoid, s-curve, optimal; `law` is another name of the key
 //! synchronised = true          # default; false: each joint as fast as its own limits allow
 //! speed = 0.5                  # fraction of the velocity limits used by moves without a duration; default 1
 //! acceleration = [2.0, 300.0, 300.0]  # for trapezoid and s-curve; one number, or one per joint
@@ -21,7 +21,7 @@
 //!
 //! [[move]]
 //! to = [0.2, 60.0, 30.0]       # or some joints only: to = { joint_2 = 30.0 }
-//! via = [[0.1, 30.0, 20.0]]    # optional: points passed without a stop; quintic only
+//! via = [[0.1, 30.0, 20.0]]    # optional: points passed without a stop; quintic and optimal only
 //! duration = 1.2               # s; may be left out where velocity limits are known
 //! hold = 0.8                   # s of rest afterwards; default 0
 //! ```
@@ -34,6 +34,9 @@
 //! velocity, acceleration, jerk and snap, at rest at both ends. The points are passed when a straight quintic
 //! would have covered the same fraction of the way; all joints start and stop together. Points on the straight
 //! line from start to goal therefore change nothing.
+//!
+//! An optimal move is run in the least time along the natural cubic spline through its points, within speeds, accelerations and
+//! jerks ([`crate::jerk_law`]).
 //!
 //! A motion that is not made of moves has `[samples]` in their place ([`Trajectory::to_samples_toml`] writes them).
 //!
@@ -59,7 +62,8 @@ impl Trajectory {
     pub fn parse_toml(text: &str, origin: &str, limits: &[(&str, JointLimits)]) -> Result<Self, TrajectoryError> {
         let fail = |offset: Option<usize>, problem: Problem| {
             let (line, column) = offset.map(|offset| place(text, offset)).unzip();
-            TrajectoryError::from(Box::new(FileError { origin: origin.to_owned(), line, column, problem }))
+            let (origin, more_lines) = (origin.to_owned(), Vec::new());
+            TrajectoryError::from(Box::new(FileError { origin, line, column, problem, more_lines }))
         };
         let unread = |error: toml::de::Error| {
             let message = flexarm_settings::without_types(error.message());

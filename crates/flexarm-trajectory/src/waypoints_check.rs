@@ -8,8 +8,9 @@ use toml::Spanned;
 
 use crate::limits::JointLimits;
 use crate::plan::{MotionLimits, Plan, PlannedMove, Profile};
+use crate::polynomial::FARTHEST;
 use crate::problem::Problem;
-use crate::trajectory::ToldUnit;
+use crate::trajectory::{LONGEST, ToldUnit};
 use crate::waypoints_toml::{FileToml, MoveToml, ProfileToml, Values};
 
 /// Rounding of trapezoids when the file does not say.
@@ -133,9 +134,19 @@ impl Context<'_> {
     /// A value for every joint, in SI.
     fn full(&self, values: &Spanned<Values>, key: &'static str) -> Result<Vec<f64>, Located> {
         match values.get_ref() {
-            Values::List(list) => self.list(list, values.span(), key),
+            Values::List(list) => {
+                let positions = self.list(list, values.span(), key)?;
+                match positions.iter().position(|position| position.abs() > FARTHEST) {
+                    Some(joint) => Err(self.out_of_range(values.span(), joint)),
+                    None => Ok(positions),
+                }
+            }
             _ => Err(bad_value(values.span(), key, "not a list", "a list with one number per joint")),
         }
+    }
+
+    fn out_of_range(&self, span: Range<usize>, joint: usize) -> Located {
+        located(span, Problem::OutOfRange { joint: self.joints[joint].clone() })
     }
 
     fn list(&self, list: &[f64], span: Range<usize>, key: &'static str) -> Result<Vec<f64>, Located> {
@@ -163,6 +174,9 @@ impl Context<'_> {
                 return Err(bad_value(name.span(), "to", value, "finite numbers"));
             }
             goal[i] = value * self.scales[i];
+            if goal[i].abs() > FARTHEST {
+                return Err(self.out_of_range(name.span(), i));
+            }
         }
         Ok(goal)
     }
@@ -226,9 +240,12 @@ impl Context<'_> {
         let to = self.goal(&entry.to, here)?;
         let via = entry.via.iter().map(|point| self.full(point, "via")).collect::<Result<_, _>>()?;
         let duration = positive(&entry.duration, "duration")?;
+        if let Some(value) = entry.duration.as_ref().filter(|value| *value.get_ref() > LONGEST) {
+            return Err(bad_value(value.span(), "duration", value.get_ref(), "1e7 s at most"));
+        }
         let hold = match &entry.hold {
-            Some(hold) if !(*hold.get_ref() >= 0.0 && hold.get_ref().is_finite()) => {
-                return Err(bad_value(hold.span(), "hold", hold.get_ref(), "zero or positive, in s"));
+            Some(hold) if !(0.0..=LONGEST).contains(hold.get_ref()) => {
+                return Err(bad_value(hold.span(), "hold", hold.get_ref(), "zero or positive, in s, 1e7 at most"));
             }
             hold => hold.as_ref().map_or(0.0, |hold| *hold.get_ref()),
         };
@@ -245,6 +262,7 @@ impl Context<'_> {
             None | Some(ProfileToml::Quintic) => Profile::Quintic,
             Some(ProfileToml::Trapezoid) => Profile::Trapezoid { rounding },
             Some(ProfileToml::SCurve) => Profile::SCurve,
+            Some(ProfileToml::Optimal) => Profile::Optimal,
         };
         let synchronised = entry.synchronised.or(file.synchronised).unwrap_or(true);
         let limits = self.limits_of_move(entry, robot_limits)?;

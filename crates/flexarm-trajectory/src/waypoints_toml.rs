@@ -20,6 +20,7 @@ pub(crate) struct FileToml {
     pub(crate) metres: Vec<Spanned<String>>,
     pub(crate) joints: Spanned<Vec<Spanned<String>>>,
     pub(crate) start: Spanned<Values>,
+    #[serde(alias = "law")]
     pub(crate) profile: Option<ProfileToml>,
     pub(crate) synchronised: Option<bool>,
     pub(crate) speed: Option<Spanned<f64>>,
@@ -41,6 +42,7 @@ pub(crate) struct MoveToml {
     pub(crate) via: Vec<Spanned<Values>>,
     pub(crate) duration: Option<Spanned<f64>>,
     pub(crate) hold: Option<Spanned<f64>>,
+    #[serde(alias = "law")]
     pub(crate) profile: Option<ProfileToml>,
     pub(crate) synchronised: Option<bool>,
     pub(crate) speed: Option<Spanned<f64>>,
@@ -65,6 +67,7 @@ pub(crate) enum ProfileToml {
     Quintic,
     Trapezoid,
     SCurve,
+    Optimal,
 }
 
 /// One number for all joints, a list with one per joint, or a table with some of them.

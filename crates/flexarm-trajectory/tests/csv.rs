@@ -201,6 +201,60 @@ fn a_message_tells_place_finding_and_remedy_in_one_line() {
     assert_eq!(message, truth);
 }
 
+/// Truth: rows that were taken out of a record at 50 Hz.
+#[test]
+fn a_gap_in_evenly_sampled_rows_is_told_with_its_place_and_length() {
+    let row = |k: u32| format!("{},{}\n", 0.02 * f64::from(k), (0.02 * f64::from(k)).sin());
+    let rows = |keep: fn(u32) -> bool| (0..200).filter(|k| keep(*k)).map(row).collect::<String>();
+    let gaps = |text: &str| -> Vec<String> {
+        let warnings = parse(&format!("# unit: rad\ntime,q\n{text}")).warnings();
+        warnings.iter().filter(|w| matches!(w, Warning::Gaps { .. })).map(Warning::to_string).collect()
+    };
+    assert_eq!(gaps(&rows(|_| true)), [] as [&str; 0]);
+    let found = gaps(&rows(|k| !(101..121).contains(&k)));
+    let truth = "no sample of \"q\" for 0.4200 s, from t = 2.0000 s to 2.4200 s (samples 101 and 102); the usual step is 0.0200 s";
+    assert!(found.len() == 1 && found[0].starts_with(truth), "{found:?}");
+    let found = gaps(&rows(|k| !(30..34).contains(&k) && !(101..121).contains(&k)));
+    assert!(found.len() == 1 && found[0].contains("the longest of 2 gaps"), "{found:?}");
+    // Slower by half, the gap lasts twice as long.
+    let text = format!("# unit: rad\ntime,q\n{}", rows(|k| !(101..121).contains(&k)));
+    let slow = parse(&text).scaled(2.0).unwrap().warnings();
+    assert!(slow.iter().any(|w| w.to_string().contains("from t = 4.0000 s to 4.8400 s")), "{slow:?}");
+}
+
+#[test]
+fn rows_that_repeat_the_one_before_are_left_out_and_counted() {
+    let motion = parse("# unit: rad\ntime,q\n0,0\n1,0\n1,0\n1,0\n2,1\n3,1\n");
+    assert!(motion.warnings().contains(&Warning::RepeatedRows { count: 2 }));
+    let plain = parse("# unit: rad\ntime,q\n0,0\n1,0\n2,1\n3,1\n");
+    assert_eq!(at(&motion, 1.4), at(&plain, 1.4));
+}
+
+#[test]
+fn every_bad_line_is_named_up_to_ten() {
+    let message = problem("time,q\n0,0\n1,x\n2,0\n3\n4,0\n5,y\n").to_string();
+    let truth = "arm.csv, line 3, column 2: ";
+    assert!(message.starts_with(truth) && message.ends_with(" (2 more lines are wrong: 5, 7)"), "{message}");
+    let message = problem("time,q\n0,0\n1,x\n2,x\n").to_string();
+    assert!(message.ends_with(" (line 4 is wrong, too)"), "{message}");
+    let many: String = (0..40).map(|k| format!("{k},?\n")).collect();
+    let message = problem(&format!("time,q\n{many}")).to_string();
+    assert!(message.ends_with(" (39 more lines are wrong: 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, ...)"), "{message}");
+    let message = problem("time,q\n0,0\n1,1\n1,2\n2,3\n0.5,4\n1.5,5\n3,6\n").to_string();
+    assert!(message.starts_with("arm.csv, line 4, column 1: time 1 s does not follow 1 s"), "{message}");
+    assert!(message.ends_with(" (2 more lines are wrong: 6, 7)"), "{message}");
+}
+
+#[test]
+fn times_and_positions_beyond_any_motion_are_refused_with_their_line() {
+    for (text, line) in [("0,0\n1,1\n1e300,2\n", 4), ("0,0\n1,1\n2e7,2\n", 4), ("0,0\n1,1e12\n2,0\n", 2)] {
+        let error = problem(&format!("time,q\n{text}"));
+        assert!(matches!(error.problem, Problem::OutOfRange { .. }), "{error}");
+        assert_eq!(error.line, Some(line), "{error}");
+        assert!(error.to_string().contains("1e9 rad or m and 1e7 s at most"), "{error}");
+    }
+}
+
 proptest! {
     /// A plan written at a rate that meets its knots comes back as the same curve.
     #[test]

@@ -310,6 +310,39 @@ fn a_table_in_utf_16_as_spreadsheets_write_it_is_text() {
     assert!(matches!(text_of_bytes(vec![b'a', 0xFF], "u"), Err(TrajectoryError::File(_))));
 }
 
+/// Truth: the same table in UTF-8.
+#[test]
+fn a_table_in_the_letters_of_old_windows_is_text() {
+    let text = "# Prüfstand – Lauf 1 (€)\nZeit[s];A1 [°]\n0,0;0,0\n1,0;90,0\n2,0;0,0\n";
+    let byte = |letter: char| match letter {
+        '–' => 0x96,
+        '€' => 0x80,
+        letter => u8::try_from(u32::from(letter)).unwrap(),
+    };
+    let old: Vec<u8> = text.chars().map(byte).collect();
+    assert_eq!(text_of_bytes(old, "t").unwrap(), text);
+    // Neither bytes of no letter nor UTF-8 with a broken letter.
+    let damaged = [&b"A1 [\xc2\xb0], \xb0\n"[..], b"A1, \x81\n", b"A1, \xb0\x00\n"];
+    for bytes in damaged {
+        assert!(text_of_bytes(bytes.to_vec(), "t").unwrap_err().to_string().contains("not UTF-8"), "{bytes:?}");
+    }
+    let request = TableRequest::default();
+    let (motion, _) = Trajectory::parse_table(text, "t", &request).unwrap();
+    let (mut q, mut v, mut a) = ([0.0], [0.0], [0.0]);
+    motion.sample(1.0, &mut q, &mut v, &mut a);
+    assert!((q[0] - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
+}
+
+#[test]
+fn every_bad_line_of_a_table_is_named() {
+    let text = "t[s];a[rad]\n0;0\n1;x\n2;0\n3;y;4\n4;0\n";
+    let message = Trajectory::parse_table(text, "t", &TableRequest::default()).unwrap_err().to_string();
+    assert!(message.starts_with("t, line 3, column 2: ") && message.ends_with(" (line 5 is wrong, too)"), "{message}");
+    let text = "t[s];a[rad]\n0;0\n1;1\n1;2\n2;0\n1;1\n";
+    let message = Trajectory::parse_table(text, "t", &TableRequest::default()).unwrap_err().to_string();
+    assert!(message.starts_with("t, line 4, column 1: ") && message.ends_with(" (line 6 is wrong, too)"), "{message}");
+}
+
 #[test]
 fn joints_of_parts_that_begin_later_are_held_before_and_after() {
     let part = |name: &str| Trajectory::parse_csv(&format!("time,{name},{name}.vel\n0,1,0\n1,2,0\n"), "p").unwrap();

@@ -155,6 +155,72 @@ fn each_fault_of_a_file_is_named_with_its_place() {
     assert!(matches!(fault(&text).problem, Problem::OutOfRange { .. }));
 }
 
+/// Truth by hand: one joint as an S-curve of seven phases, v/a + a/j + L/v; two of which one is always the slower.
+#[test]
+fn an_optimal_move_takes_the_least_time_of_its_limits() {
+    let head = "format = 1\nunit = \"rad\"\njoints = [\"a\", \"b\"]\nstart = [0, 0]\n\
+                [limits]\na = { velocity = 2.0, acceleration = 8.0, jerk = 80.0 }\n\
+                b = { velocity = 9.0, acceleration = 99.0, jerk = 999.0 }\n";
+    for (key, via) in [("profile", ""), ("law", "via = [[0.5, 0.25], [1.1, 0.55]]\n")] {
+        let motion = parse(&format!("{head}[[move]]\n{key} = \"optimal\"\n{via}to = [3.0, 1.5]\n"));
+        let late = motion.duration() / (2.0 / 8.0 + 8.0 / 80.0 + 3.0 / 2.0) - 1.0;
+        assert!((0.0..1e-3).contains(&late), "{via:?} {late:.1e}"); // measured 1.6e-4
+        let peak = &motion.peak()[0];
+        assert!(peak.velocity.value <= 2.0 * (1.0 + 1e-12) && peak.acceleration.value.abs() <= 8.0 * (1.0 + 1e-12));
+        assert!(peak.jerk.value.abs() <= 80.0 * (1.0 + 1e-9), "{}", peak.jerk.value);
+    }
+}
+
+/// Truth: the points, the limits, and the quintic through the same points, which is slower.
+#[test]
+fn an_optimal_move_passes_its_points_within_all_limits_and_before_the_quintic_does() {
+    let head = "format = 1\nunit = \"deg\"\njoints = [\"a\", \"b\", \"c\"]\nstart = [0, 0, 5]\nspeed = 0.8\n\
+                [limits]\na = { velocity = 100, acceleration = 400, jerk = 4000 }\n\
+                b = { velocity = 80, acceleration = 300 }\nc = { velocity = 50, acceleration = 500, jerk = 9000 }\n";
+    let via = "via = [[30, 20, 5], [60, -10, 5], [40, -40, 5], [10, -20, 5]]\nto = [0, 0, 5]\n";
+    let motion = parse(&format!("{head}[[move]]\nlaw = \"optimal\"\n{via}hold = 0.5\n"));
+    let quintic = parse(&format!("{head}[[move]]\n{via}hold = 0.5\n"));
+    // measured 3.088 s and 5.772 s
+    assert!(motion.duration() < 0.8 * quintic.duration(), "{} {}", motion.duration(), quintic.duration());
+    let n = 20_000;
+    let at = |k: usize| position(&motion, motion.duration() * k as f64 / n as f64);
+    for point in [[30.0f64, 20.0], [60.0, -10.0], [40.0, -40.0], [10.0, -20.0], [0.0, 0.0]] {
+        let away = |q: Vec<f64>| (q[0] - point[0].to_radians()).hypot(q[1] - point[1].to_radians());
+        let nearest = (0..=n).map(|k| away(at(k))).fold(f64::INFINITY, f64::min);
+        assert!(nearest < 1e-4, "{point:?} {nearest:.1e}");
+    }
+    let deg = f64::to_radians(1.0);
+    for (peak, limit) in motion.peak().iter().zip([[80.0, 400.0, 4000.0], [64.0, 300.0, 6000.0]]) {
+        let [v, a, j] = limit.map(|limit| limit * deg * (1.0 + 1e-9));
+        assert!(peak.velocity.value.abs() <= v && peak.acceleration.value.abs() <= a, "{peak:?}");
+        assert!(peak.jerk.value.abs() <= j && peak.acceleration_jump.value.abs() < 1e-6, "{peak:?}");
+    }
+    assert_eq!(motion.warnings(), []);
+    // Twice the time, the same path.
+    let slow = parse(&format!("{head}[[move]]\nlaw = \"optimal\"\n{via}duration = 5.0\n"));
+    assert_eq!(slow.duration(), 5.0);
+    // A duration that is too short is told, an acceleration that is not known is asked for.
+    let short = parse(&format!("{head}[[move]]\nlaw = \"optimal\"\n{via}duration = 0.5\n"));
+    assert!(short.warnings().iter().any(|warning| warning.to_string().contains("move 1: the given duration takes")));
+    let fault = fault(&format!(
+        "{HEAD}[limits]\na = {{ velocity = 1 }}\nb = {{ velocity = 1 }}\n[[move]]\nlaw = \"optimal\"\nto = [1, 2]\n"
+    ));
+    assert!(fault.to_string().contains("the acceleration limit of joint \"a\" is not known"), "{fault}");
+}
+
+#[test]
+fn numbers_beyond_any_motion_are_refused_with_their_place() {
+    for (moves, key) in [
+        ("to = [1, 2]\nduration = 1e300", "`duration` is 1"),
+        ("to = [1, 2]\nduration = 1\nhold = 1e8", "`hold` is 100000000"),
+        ("to = [1e12, 2]\nduration = 1", "joint \"a\": values or times are too extreme"),
+        ("to = { b = 1e12 }\nduration = 1", "joint \"b\": values or times are too extreme"),
+    ] {
+        let fault = fault(&format!("{HEAD}[[move]]\n{moves}"));
+        assert!(fault.line.is_some() && fault.to_string().contains(key), "{fault}");
+    }
+}
+
 #[test]
 fn a_message_tells_place_finding_and_remedy_in_one_line() {
     let message = fault(&HEAD.replace("\"deg\"", "\"degrees\"")).to_string();

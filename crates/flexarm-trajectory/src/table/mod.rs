@@ -22,7 +22,7 @@ use self::header::{Meaning, Measure, Unit, meaning, name_and_unit, unit};
 use crate::column_map::ColumnMap;
 use crate::error::{FileError, TrajectoryError};
 use crate::problem::{Problem, SampleError};
-use crate::spline::{JointSamples, Samples};
+use crate::spline::{JointSamples, Samples, not_increasing};
 use crate::trajectory::Trajectory;
 use crate::warning::Warning;
 
@@ -82,8 +82,9 @@ impl Trajectory {
             return own.map(|own| (own, TableInfo { format: "CSV samples".to_owned(), rows })).map_err(decimal_commas);
         }
         let read = table.as_mut().map_err(|problem| problem.take());
-        read.and_then(|table| table.read(request)).map_err(|Located { line, column, problem }| {
-            Box::new(FileError { origin: origin.to_owned(), line, column, problem: *problem }).into()
+        read.and_then(|table| table.read(request)).map_err(|Located { line, column, problem, more_lines }| {
+            let (origin, problem) = (origin.to_owned(), *problem);
+            Box::new(FileError { origin, line, column, problem, more_lines }).into()
         })
     }
 }
@@ -104,26 +105,28 @@ struct Located {
     line: Option<usize>,
     column: Option<usize>,
     problem: Box<Problem>,
+    /// Further lines with something wrong.
+    more_lines: Vec<usize>,
 }
 
 impl Located {
     /// The problem, to be passed on.
     fn take(&mut self) -> Self {
         let problem = std::mem::replace(&mut self.problem, Box::new(Problem::Empty));
-        Self { line: self.line, column: self.column, problem }
+        Self { line: self.line, column: self.column, problem, more_lines: Vec::new() }
     }
 }
 
 fn at(line: usize, problem: Problem) -> Located {
-    Located { line: Some(line), column: None, problem: Box::new(problem) }
+    Located { line: Some(line), column: None, problem: Box::new(problem), more_lines: Vec::new() }
 }
 
 fn at_field(line: usize, column: usize, problem: Problem) -> Located {
-    Located { line: Some(line), column: Some(column + 1), problem: Box::new(problem) }
+    Located { column: Some(column + 1), ..at(line, problem) }
 }
 
 fn nowhere(problem: Problem) -> Located {
-    Located { line: None, column: None, problem: Box::new(problem) }
+    Located { line: None, column: None, problem: Box::new(problem), more_lines: Vec::new() }
 }
 
 /// The lines of a table.
@@ -652,56 +655,40 @@ struct Rows {
     clock: bool,
 }
 
+/// First lines with a decimal point and with a decimal comma.
+#[derive(Default)]
+struct Decimals {
+    point: Option<usize>,
+    comma: Option<usize>,
+}
+
 impl Table<'_> {
     fn rows(&self, layout: &Layout) -> Result<Rows, Located> {
         let mut rows = Rows { values: vec![Vec::new(); layout.used.len()], ..Rows::default() };
-        let (mut point, mut comma): (Option<usize>, Option<usize>) = (None, None);
-        let width = self.names.len();
+        let mut decimals = Decimals::default();
+        let mut wrong: Option<Located> = None;
         let last = self.lines.last().map_or(0, |(line, _)| *line);
         let mut row = vec![0.0; layout.used.len()];
         for &(line, text) in &self.lines {
-            let mut fields = self.separator.split(text);
-            // A separator at the end of the line makes an empty field more.
-            if fields.len() == width + 1 && fields.last().is_some_and(String::is_empty) {
-                fields.pop();
+            let fields = self.fields(text);
+            if line == last && !self.ends_whole && fields.len() < self.names.len() {
+                rows.cut = true;
+                break;
             }
-            if fields.len() != width {
-                let (found, expected) = (fields.len(), width);
-                if line == last && !self.ends_whole && found < expected {
-                    rows.cut = true;
-                    break;
+            let time = match (self.row(line, &fields, layout, &mut row, &mut decimals), &mut wrong) {
+                (Ok((time, clock)), _) => {
+                    rows.clock |= clock;
+                    time
                 }
-                return Err(at(
-                    line,
-                    match self.separator {
-                        Separator::Comma if found == 2 * expected => Problem::DecimalCommas { found, expected },
-                        _ => Problem::Ragged { found, expected },
-                    },
-                ));
-            }
-            let mut value = |place: usize| -> Result<f64, Located> {
-                let field = &fields[place];
-                let (value, decimal) = number(field).ok_or_else(|| {
-                    let (column, found) = (self.shown(place), field.chars().take(40).collect());
-                    at_field(line, place, Problem::NotANumber { column, found })
-                })?;
-                match decimal {
-                    Decimal::None => {}
-                    Decimal::Point => point = point.or(Some(line)),
-                    Decimal::Comma => comma = comma.or(Some(line)),
+                (Err(_), Some(first)) => {
+                    first.more_lines.push(line);
+                    continue;
                 }
-                Ok(value)
+                (Err(error), None) => {
+                    wrong = Some(error);
+                    continue;
+                }
             };
-            let time = match clock_time(&fields[layout.time]) {
-                Some(clock) => {
-                    rows.clock = true;
-                    Time { value: clock as f64 / 1e12, exact: Some(clock) }
-                }
-                None => Time { value: value(layout.time)?, exact: exact(&fields[layout.time]) },
-            };
-            for (slot, used) in row.iter_mut().zip(&layout.used) {
-                *slot = used.scale * value(used.place)?;
-            }
             let is_same = |(values, value): (&Vec<f64>, &f64)| values.last() == Some(value);
             if rows.times.last().is_some_and(|last| time.since(*last) == 0.0)
                 && rows.values.iter().zip(&row).all(is_same)
@@ -716,11 +703,65 @@ impl Table<'_> {
             rows.times.push(time);
             rows.values.iter_mut().zip(&row).for_each(|(values, value)| values.push(*value));
         }
-        if let (Some(point), Some(comma)) = (point, comma) {
+        if let Some(wrong) = wrong {
+            return Err(wrong);
+        }
+        if let (Some(point), Some(comma)) = (decimals.point, decimals.comma) {
             return Err(at(point.max(comma), Problem::MixedDecimals { point, comma }));
         }
-        rows.comma = comma.is_some();
+        rows.comma = decimals.comma.is_some();
         Ok(rows)
+    }
+
+    /// The fields of a line of numbers.
+    fn fields(&self, text: &str) -> Vec<String> {
+        let mut fields = self.separator.split(text);
+        // A separator at the end of the line makes an empty field more.
+        if fields.len() == self.names.len() + 1 && fields.last().is_some_and(String::is_empty) {
+            fields.pop();
+        }
+        fields
+    }
+
+    /// Reads the values of a line in the order of the layout. Returns its time, and whether that is a time of day.
+    fn row(
+        &self,
+        line: usize,
+        fields: &[String],
+        layout: &Layout,
+        row: &mut [f64],
+        decimals: &mut Decimals,
+    ) -> Result<(Time, bool), Located> {
+        let (found, expected) = (fields.len(), self.names.len());
+        if found != expected {
+            let problem = match self.separator {
+                Separator::Comma if found == 2 * expected => Problem::DecimalCommas { found, expected },
+                _ => Problem::Ragged { found, expected },
+            };
+            return Err(at(line, problem));
+        }
+        let mut value = |place: usize| -> Result<f64, Located> {
+            let field = &fields[place];
+            let (value, decimal) = number(field).ok_or_else(|| {
+                let (column, found) = (self.shown(place), field.chars().take(40).collect());
+                at_field(line, place, Problem::NotANumber { column, found })
+            })?;
+            match decimal {
+                Decimal::None => {}
+                Decimal::Point => decimals.point = decimals.point.or(Some(line)),
+                Decimal::Comma => decimals.comma = decimals.comma.or(Some(line)),
+            }
+            Ok(value)
+        };
+        let clock = clock_time(&fields[layout.time]);
+        let time = match clock {
+            Some(clock) => Time { value: clock as f64 / 1e12, exact: Some(clock) },
+            None => Time { value: value(layout.time)?, exact: exact(&fields[layout.time]) },
+        };
+        for (slot, used) in row.iter_mut().zip(&layout.used) {
+            *slot = used.scale * value(used.place)?;
+        }
+        Ok((time, clock.is_some()))
     }
 
     /// Angles that are too large for radians, in a table that does not state its unit.
@@ -756,7 +797,10 @@ impl Table<'_> {
         match error {
             TrajectoryError::Samples(error) => match &error {
                 SampleError::TimeNotIncreasing { row, .. } => {
-                    at_field(rows.lines[*row], layout.time, Problem::Samples(error))
+                    let first = rows.times.first().copied().unwrap_or_default();
+                    let times: Vec<f64> = rows.times.iter().map(|time| time.since(first)).collect();
+                    let more_lines = not_increasing(&times).filter(|k| k != row).map(|row| rows.lines[row]).collect();
+                    Located { more_lines, ..at_field(rows.lines[*row], layout.time, Problem::Samples(error)) }
                 }
                 _ => at(self.header_line, Problem::Samples(error)),
             },

@@ -18,6 +18,7 @@
 //! switches cost falls with the square of the distance of the nodes.
 //!
 //! Start at [`QuinticLaw::improved`]. Not here: which bounds a path has, how nodes are chosen.
+#![allow(non_snake_case, reason = "letters of the formulas")]
 
 use crate::barrier;
 use crate::time_law::{Bound, Law, Progress};

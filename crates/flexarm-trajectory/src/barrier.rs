@@ -1,4 +1,5 @@
 //! The convex programs of [`crate::jerk_law`]: a cubic spline of least time within its bounds, by an interior-point method.
+#![allow(non_snake_case, reason = "letters of the formulas")]
 
 use crate::jerk_law::{Place, QuinticLaw};
 use crate::time_law::Progress;
