@@ -344,6 +344,8 @@ pub(crate) enum PageName {
     Measurements,
     /// Cutting tools, for flexarm lobes (.toml)
     Tool,
+    /// Lists of poses, for flexarm map (.toml)
+    Map,
     /// Studies of many runs, for flexarm sweep (.toml)
     Study,
     #[value(help = formats::help_page())]
@@ -362,6 +364,7 @@ impl PageName {
             Self::Loads => include_str!("../../../docs/loads.md"),
             Self::Measurements => include_str!("../../../docs/identify.md"),
             Self::Tool => include_str!("../../../docs/lobes.md"),
+            Self::Map => include_str!("../../../docs/map.md"),
             Self::Study => include_str!("../../../docs/sweep.md"),
             Self::Recordings => include_str!("../../../docs/recordings.md"),
             Self::Flex => include_str!("../../flexarm-fem/src/flex_file/format.md"),

@@ -71,7 +71,7 @@ impl List<'_> {
 
     fn of_toml(&self, path: &Path) -> Result<Vec<Vec<f64>>, Error> {
         let text = read_text(path)?;
-        let source = Source::new(path, &text);
+        let source = Source::new(path, &text, "map");
         let file: PosesFile = parsed(&text, &source, &[], |file: &PosesFile| &file.format)?;
         let degrees = match file.angles.as_ref().map(|word| (word.get_ref().as_str(), word.span())) {
             None | Some(("rad", _)) => false,
