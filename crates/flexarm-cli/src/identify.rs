@@ -133,9 +133,7 @@ fn plan(cli: &Cli, args: &IdentifyArgs, robot: &Robot, count: usize) -> Result<E
         request.forces = forces;
     }
     let found = plan_measurements(robot, &request)?;
-    if !cli.quiet {
-        found.warnings.iter().for_each(|text| warning(text));
-    }
+    crate::print::warnings(cli, &found.warnings);
     answer(cli, || to_json(&found), || plan_text(&found));
     Ok(ExitCode::SUCCESS)
 }
