@@ -14,7 +14,7 @@ use flexarm_testkit::Draw;
 use nalgebra::{DVector, UnitQuaternion};
 
 /// A KUKA arm whose joints are the axes of its controller.
-fn model() -> Model {
+fn model() -> std::sync::Arc<Model> {
     let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../robots/kr210");
     Robot::load(root).unwrap().rigid_model().unwrap()
 }

@@ -283,9 +283,9 @@ fn two_halves_of_a_circle_with_one_orientation_leave_the_tool_as_it_stands_in_ev
         let (from, to) = (arcs[0].span_s[0], arcs[arcs.len() - 1].span_s[1]);
         let down = Rotation3::from_axis_angle(&Vector3::y_axis(), std::f64::consts::PI);
         let (mut turned, mut off, mut farthest) = (0.0f64, 0.0f64, 0.0f64);
-        for (t, X) in poses(&model, &motion, 4000).iter().filter(|(t, _)| *t >= from + 1e-9 && *t <= to) {
-            turned = turned.max((X.rotation.inverse() * down).angle());
-            let flange = X * nalgebra::Point3::new(0.0, 0.0, -0.35);
+        for (t, pose) in poses(&model, &motion, 4000).iter().filter(|(t, _)| *t >= from + 1e-9 && *t <= to) {
+            turned = turned.max((pose.rotation.inverse() * down).angle());
+            let flange = pose * nalgebra::Point3::new(0.0, 0.0, -0.35);
             off = off.max(((flange - nalgebra::Point3::new(1.6, 0.0, 1.2)).norm() - 0.1).abs());
             farthest = farthest.max((flange - nalgebra::Point3::new(1.7, 0.0, 1.2)).norm());
             assert!(t.is_finite());
@@ -349,7 +349,7 @@ fn the_first_rapid_from_joint_values_is_a_line_where_rapids_have_a_speed() {
     );
     let motion = load(&robot, "part.toml", &text).unwrap();
     std::fs::remove_dir_all(folder).unwrap();
-    let places: Vec<Vector3<f64>> = poses(&model, &motion, 2000).iter().map(|(_, X)| X.translation.vector).collect();
+    let places: Vec<Vector3<f64>> = poses(&model, &motion, 2000).iter().map(|(_, pose)| pose.translation.vector).collect();
     let corners = [places[0], Vector3::new(1.6, 0.3, 1.2), Vector3::new(1.7, 0.3, 1.2)];
     let off = places.iter().map(|p| from_polyline(p, &corners)).fold(0.0, f64::max);
     assert!(off < 1e-6, "{off:.1e} m from the lines");
