@@ -169,10 +169,16 @@ pub fn identify(
         return Err(IdentifyError::Nothing { parameters: parameters.len(), rows });
     }
     let mut measurements = placed(plant, measurements)?;
-    let scatter = if options.deviations_known { 1.0 } else { scatter(plant, parameters, &measurements, options)? };
+    let (scatter, begin) = match options.deviations_known {
+        true => (1.0, None),
+        false => scatter(plant, parameters, &measurements, options).map(|(scatter, at)| (scatter, Some(at)))?,
+    };
     measurements.readings.iter_mut().for_each(|reading| reading.scale_deviations(scatter));
     let before = initial_residuals(plant, &measurements, options)?;
-    let solution = searched(plant, parameters, &measurements, options)?;
+    let solution = match begin {
+        Some(begin) => fitted(plant, parameters, &measurements, options, Some(&begin))?,
+        None => searched(plant, parameters, &measurements, options)?,
+    };
     let held_out = held_out(plant, parameters, &measurements, options, &solution, &before)?;
     let mut found = told(parameters, &measurements, options, solution, before, held_out);
     // In units of the deviations that were given.
@@ -189,14 +195,15 @@ pub fn identify(
     }
 }
 
-/// How many times larger than the given deviations the readings scatter about the fit, where only the ratios of these count. It begins
-/// with the scatter about the arm as it is, so that losses and what is identified have a measure from the start.
+/// Returns how many times larger than the given deviations the readings scatter about the fit, where only the ratios of deviations are
+/// known, and where the search ended. It begins with the scatter about the arm as it is, so that losses and what is identified have a
+/// measure from the start.
 fn scatter(
     plant: &Plant,
     parameters: &[Parameter],
     measurements: &Measurements,
     options: &IdentifyOptions,
-) -> Result<f64, IdentifyError> {
+) -> Result<(f64, DVector<f64>), IdentifyError> {
     let rms = |values: &[f64]| (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt();
     let observed = MeasuredArm { plant, parameters: &[], measurements }.observed();
     let deviations = measurements.readings.iter().flat_map(Reading::deviations);
@@ -204,21 +211,25 @@ fn scatter(
     let first = rms(&initial_residuals(plant, measurements, options)?).max(1e-9 * rms(&sizes));
     let first = if first > 0.0 { first } else { 1.0 };
     let mut scatter = first;
+    let mut at: Option<DVector<f64>> = None;
     for _ in 0..SCATTER_ROUNDS {
         let mut scaled = measurements.clone();
         scaled.readings.iter_mut().for_each(|reading| reading.scale_deviations(scatter));
-        let solution = searched(plant, parameters, &scaled, options)?;
+        let solution = match &at {
+            Some(at) => fitted(plant, parameters, &scaled, options, Some(at))?,
+            None => searched(plant, parameters, &scaled, options)?,
+        };
         if solution.freedom == 0 {
             return Err(IdentifyError::NoScatter { rows: measurements.rows() });
         }
         let next = (scatter * solution.scale.sqrt()).max(1e-6 * first);
         let settled = (next / scatter).ln().abs() < 0.01;
-        scatter = next;
+        (scatter, at) = (next, Some(solution.unknowns));
         if settled {
             break;
         }
     }
-    Ok(scatter)
+    Ok((scatter, at.unwrap_or_else(|| DVector::zeros(parameters.len() + measurements.own_unknowns()))))
 }
 
 /// What is known before. A prior weaker than the reference does not count: the readings alone make a parameter identifiable.

@@ -242,6 +242,11 @@ fn a_plan_tells_more_than_as_many_poses_as_they_come_and_its_table_is_read_when_
     for (found, promised) in found.parameters.iter().zip(&plan.parameters) {
         // The file has four digits of a degree; what was measured is what was expected.
         assert!((found.value / found.initial - 1.0).abs() < 1e-3, "{}", found.name);
+        // At the TCP the axes of the forearm and of the flange are nearly one.
+        if !found.identifiable {
+            assert!(found.std.is_nan() && promised.std > 0.3 * promised.initial, "{}", found.name);
+            continue;
+        }
         let ratio = found.std / promised.std;
         // The plan counts what is known before, a factor of two, also of parameters that go along with this one; the fit does not.
         assert!((0.99..1.5).contains(&ratio), "{}: {ratio}", found.name); // measured: 1.0 to 1.3

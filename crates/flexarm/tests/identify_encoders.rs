@@ -68,7 +68,7 @@ fn record(robot: &Robot, folder: &Path) {
             write!(text, "{t}").unwrap();
             (0..6).for_each(|k| write!(text, ",{}", noisy(link[6 * i + k] - six(&deflection, k))).unwrap());
             (0..6).for_each(|k| write!(text, ",{}", noisy(link[6 * i + k])).unwrap());
-            (0..6).for_each(|k| write!(text, ",{}", -six(&load, k)).unwrap());
+            (0..6).for_each(|k| write!(text, ",{}", six(&load, k)).unwrap());
             text.push('\n');
         }
         std::fs::write(folder.join(format!("run_{number}.csv")), text).unwrap();

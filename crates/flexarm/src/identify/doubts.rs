@@ -13,8 +13,8 @@ use crate::robot::Robot;
 const LOAD_RATIO: f64 = 5.0;
 /// Weight of a kilogram (N).
 const WEIGHT: f64 = 9.81;
-/// A rest of encoders over their noise, and over the deflection, that is told.
-const ENCODER_REST: (f64, f64) = (3.0, 0.02);
+/// A rest of encoders over their noise that is told.
+const ENCODER_REST: f64 = 2.0;
 
 /// Scatter of places about the rigid robot, over their spread, beyond which frames or joints do not fit.
 const FRAME_RATIO: f64 = 0.05;
@@ -76,16 +76,18 @@ pub(super) fn gear_caveat(robot: &Robot) -> Option<Caveat> {
     })
 }
 
-/// Encoders whose rest is more than the noise of the instruments.
+/// Encoders whose rest is more than the noise of the instruments, and as a part of the deflection more than the deviation of the
+/// stiffness.
 pub(super) fn encoder_caveats(encoders: &[EncoderFigures]) -> impl Iterator<Item = Caveat> + '_ {
-    let (noises, part) = ENCODER_REST;
-    let odd = move |gear: &&EncoderFigures| {
-        gear.told && gear.rest_rms > noises * gear.noise_rms && gear.rest_rms > part * gear.deflection_rms
+    let odd = |gear: &&EncoderFigures| {
+        let more = (gear.rest_rms.powi(2) - gear.noise_rms.powi(2)).max(0.0).sqrt();
+        let matters = more / gear.deflection_rms > gear.std / gear.stiffness;
+        gear.told && matters && gear.rest_rms > ENCODER_REST * gear.noise_rms
     };
-    encoders
-        .iter()
-        .filter(odd)
-        .map(|gear| kinds::ENCODER_REST.found(format!("encoders of {}", gear.joint), gear.rest_rms, gear.noise_rms))
+    let told = |gear: &EncoderFigures| {
+        kinds::ENCODER_REST.found(format!("encoders of {}", gear.joint), gear.rest_rms, gear.noise_rms)
+    };
+    encoders.iter().filter(odd).map(told)
 }
 
 /// Displacements under forces, or under masses, that are as much larger or smaller than the robot's as a kilogram weighs.

@@ -95,10 +95,13 @@ pub(super) fn told(arm: &Arm, input: &MeasurementInput, chosen: &[Candidate]) ->
     let model =
         link_side(&arm.robot().rigid).map_err(|source| Error::Model { path: arm.robot().urdf_path.clone(), source })?;
     let joints: Vec<String> = arm.joints().map(str::to_owned).collect();
-    let runs =
-        input.recordings.iter().map(|recording| Smooth::of(recording, &model)).collect::<Result<Vec<_>, Error>>()?;
     let coupling = arm.robot().coupling();
     let is_coupled = |joint: &String| coupling.is_some_and(|coupling| coupling.joints.contains(joint));
+    let all = candidates(arm.robot(), arm.flexible());
+    let filed = |joint: &String| gearbox_of(&all, joint).filter(|_| !is_coupled(joint)).map(|p| p.initial);
+    let filed: Vec<Option<f64>> = joints.iter().map(filed).collect();
+    let runs = input.recordings.iter().map(|recording| Smooth::of(recording, &model, &filed));
+    let runs = runs.collect::<Result<Vec<_>, Error>>()?;
     let mut found = Vec::new();
     for (k, joint) in joints.iter().enumerate() {
         if is_coupled(joint) {
@@ -121,7 +124,6 @@ pub(super) fn told(arm: &Arm, input: &MeasurementInput, chosen: &[Candidate]) ->
     }
     if let Some(coupling) = coupling {
         let recorded = Recorded { runs: &runs, joints: &joints };
-        let all = candidates(arm.robot(), arm.flexible());
         let fail = |message: String| RobotFileError { message, ..first.place.clone() };
         found.extend(told_of_coupled(&recorded, coupling, chosen, &all).map_err(fail)?);
     }
@@ -247,7 +249,8 @@ struct Smooth<'a> {
 }
 
 impl<'a> Smooth<'a> {
-    fn of(recording: &'a EncoderRecording, model: &Model) -> Result<Self, Error> {
+    /// * `filed`: stiffness of each joint's gearbox in the robot file.
+    fn of(recording: &'a EncoderRecording, model: &Model, filed: &[Option<f64>]) -> Result<Self, Error> {
         let EncoderRecording { step_s, below_hz, edge_s, .. } = *recording;
         let n = recording.motor[0].len();
         let edge = (edge_s / step_s).round() as usize;
@@ -267,7 +270,15 @@ impl<'a> Smooth<'a> {
             let offset = motor.iter().zip(&link).map(|(motor, link)| motor - link).sum::<f64>() / n as f64;
             link.iter().map(|link| link + offset).collect()
         });
-        let link: Vec<Vec<f64>> = link.collect();
+        let mut link: Vec<Vec<f64>> = link.collect();
+        // A gear without an encoder gives way as the robot file says.
+        let rough = torques(model, &link, step_s);
+        for (k, stiffness) in filed.iter().enumerate() {
+            if let (Some(stiffness), None) = (stiffness, &recording.link[k]) {
+                let twist = low.of(&rough[k]);
+                link[k].iter_mut().zip(twist).for_each(|(link, torque)| *link -= torque / stiffness);
+            }
+        }
         let smoothed = |torque: Vec<Vec<f64>>| -> Vec<Vec<f64>> {
             let measured = |(computed, own): (Vec<f64>, &Option<Vec<f64>>)| match own {
                 Some(own) => low.of(&low.of(own)),
@@ -276,7 +287,7 @@ impl<'a> Smooth<'a> {
             torque.into_iter().zip(&recording.torque).map(measured).collect()
         };
         let [torque, instrument] = [&link, &motor].map(|motion| smoothed(torques(model, motion, step_s)));
-        let rate = link.iter().map(|q| low.of(&derivatives(q, step_s)[0])).collect();
+        let rate = motor.iter().map(|q| low.of(&derivatives(q, step_s)[0])).collect();
         Ok(Self { recording, rate, torque, instrument, low, seen: edge..n - edge - 1 })
     }
 
