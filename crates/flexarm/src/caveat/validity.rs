@@ -2,6 +2,7 @@
 
 use flexarm_kinematics::Coordinate;
 
+use super::slip::slip;
 use super::{Caveat, CaveatKind, kinds};
 
 /// Largest elastic rotation for which the linear elastic model is taken to hold (rad).
@@ -14,6 +15,10 @@ const IMBALANCE_LIMIT: f64 = 0.02;
 const SAMPLES_PER_PERIOD: f64 = 10.0;
 /// Fewest steps in a period of the first mode.
 const STEPS_PER_PERIOD: f64 = 20.0;
+/// Steps in a period of the first mode below which it is not seen at all: a slip is likely.
+const SKIPPED: f64 = 2.0;
+/// Fewest steps in the longest move.
+const STEPS_PER_MOVE: f64 = 50.0;
 
 /// A flexible link whose far end turned by so much (rad), with so much engineering strain.
 pub(crate) fn link(name: &str, rotation: f64, strain: f64) -> impl Iterator<Item = Caveat> {
@@ -53,7 +58,21 @@ pub(crate) fn sampling(first_hz: f64, step_s: f64, logged_hz: f64) -> impl Itera
     let steps = 1.0 / (step_s * first_hz);
     let coarse = steps < STEPS_PER_PERIOD;
     let few = few.then(|| kinds::FEW_SAMPLES.found("run", logged_hz, first_hz));
-    few.into_iter().chain(coarse.then(|| kinds::COARSE_STEP.found("run", steps, STEPS_PER_PERIOD)))
+    let likely =
+        if steps < SKIPPED { milliseconds(step_s, 1.0 / (STEPS_PER_PERIOD * first_hz)) } else { String::new() };
+    few.into_iter().chain(coarse.then(|| kinds::COARSE_STEP.found("run", steps, STEPS_PER_PERIOD).likely(likely)))
+}
+
+/// A step that cuts even the longest move of a motion into few parts.
+pub(crate) fn step(step_s: f64, moves_s: impl Iterator<Item = f64>) -> Option<Caveat> {
+    let most = moves_s.fold(0.0, f64::max) / STEPS_PER_MOVE;
+    (most > 0.0 && step_s > most * (1.0 + 1e-9))
+        .then(|| kinds::LONG_STEP.found("run", step_s, most).likely(milliseconds(step_s, most)))
+}
+
+/// Whether a step in s was meant in ms.
+fn milliseconds(step_s: f64, most: f64) -> String {
+    slip(step_s, &(1e-6..=most), &[(1e3, "milliseconds")], 1.0)
 }
 
 /// Gap of the energy balance, as a part of the energy in it.
