@@ -58,7 +58,13 @@ THERE = {("Summary", "tcp")}
 PLAIN = {"f64": "float", "f32": "float", "bool": "bool", "String": "str", "str": "str", "PathBuf": "str", "char": "str"}
 PLAIN |= {f"{sign}{bits}": "int" for sign in "iu" for bits in ["8", "16", "32", "64", "size"]}
 #: Types that serialise as text or as any value.
-OPAQUE = {"Severity": "Literal['warning', 'note']", "ParameterValue": "float | str | bool", "Value": "Any"}
+OPAQUE = {
+    "Severity": "Literal['warning', 'note']",
+    "Better": "Literal['lower', 'higher']",
+    "Role": "Literal['value', 'factor', 'offset']",
+    "ParameterValue": "float | str | bool",
+    "Value": "Any",
+}
 
 
 class Struct:

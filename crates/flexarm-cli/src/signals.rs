@@ -5,8 +5,10 @@
 //! (`nohup`, a job in the background) stays ignored.
 
 use std::ops::ControlFlow;
+use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
@@ -33,6 +35,52 @@ pub(crate) fn stop_when_asked() -> impl FnMut() -> ControlFlow<()> {
         }
         if asked.load(Ordering::SeqCst) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
+}
+
+/// Ends the process if a command does not stop by itself soon after it was asked to; see [`end_if_not_stopped`].
+pub(crate) struct Watch(Arc<AtomicBool>);
+
+impl Watch {
+    /// The command has come to its end: whoever asks this first has the last word.
+    fn is_first(over: &AtomicBool) -> bool {
+        !over.swap(true, Ordering::SeqCst)
+    }
+}
+
+impl Drop for Watch {
+    fn drop(&mut self) {
+        // The process is being ended: there is nothing left to say.
+        while !Self::is_first(&self.0) {
+            std::thread::sleep(PATIENCE);
+        }
+    }
+}
+
+/// How long a command may take to stop by itself, and how often it is looked whether it was asked to.
+const PATIENCE: Duration = Duration::from_millis(300);
+const LOOK: Duration = Duration::from_millis(20);
+
+/// Watches a command whose files are whole at any time: if it was asked to stop and has not after [`PATIENCE`], the process ends
+/// with what `last_words` returns. The watch ends with what is returned.
+pub(crate) fn end_if_not_stopped(last_words: impl Fn() -> ExitCode + Send + 'static) -> Watch {
+    let over = Arc::new(AtomicBool::new(false));
+    let watched = over.clone();
+    let mut asked = stop_when_asked();
+    let _ = asked(); // from here on
+    std::thread::spawn(move || {
+        while asked().is_continue() {
+            if watched.load(Ordering::SeqCst) {
+                return;
+            }
+            std::thread::sleep(LOOK);
+        }
+        std::thread::sleep(PATIENCE);
+        if Watch::is_first(&watched) {
+            let code = last_words();
+            std::process::exit(i32::from(code != ExitCode::SUCCESS));
+        }
+    });
+    Watch(over)
 }
 
 /// Ctrl-C, a polite kill, and a terminal that closes, as far as they are not ignored.

@@ -97,6 +97,153 @@ fn a_study_that_is_stopped_or_killed_goes_on_and_makes_the_same_bytes() {
     assert_eq!(place.read("out/runs.parquet"), place.read("whole/runs.parquet"));
 }
 
+/// Truth: a run of which the program is in the middle gives no answer anywhere, and is run when the study goes on.
+#[cfg(unix)]
+#[test]
+fn a_study_stops_within_half_a_second_in_the_middle_of_a_run_which_does_not_count() {
+    // Without and with the whole summary of a run: the two ways in which runs are run.
+    for (name, metric) in [("quick", "tcp.peak_m"), ("whole", "tcp.overshoot_m")] {
+        let place = Place::new();
+        let study = format!(
+            "format = 1\nrobot = \"robot.toml\"\nmotion = \"swing.toml\"\nmetrics = [\"{metric}\"]\n[options]\nstep = 4e-7\nlog_rate = 100.0\n\
+             [[parameter]]\npath = \"motion.speed\"\nvalues = [0.5, 1.0]\n"
+        );
+        place.write("study.toml", &study);
+        let arguments = ["sweep", "study.toml", "-o", "out", "--json", "--threads", "2"];
+        for signal in [common::stop_signal(), "-TERM"] {
+            // A busy machine may need another go.
+            let stopped = (0..3).map(|_| {
+                let mut command = place.command(&arguments);
+                let child = command.stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::piped()).spawn();
+                let mut child = child.unwrap();
+                std::thread::sleep(Duration::from_millis(700));
+                assert!(child.try_wait().unwrap().is_none(), "{name}: it ended before it could be stopped");
+                let kill = std::process::Command::new("kill").args([signal, &child.id().to_string()]).status();
+                assert!(kill.unwrap().success());
+                let begun = Instant::now();
+                child.wait().unwrap();
+                let took = begun.elapsed();
+                (took, common::Answer::of(child.wait_with_output().unwrap()))
+            });
+            let stopped: Vec<_> = stopped
+                .scan(true, |goes_on, (took, answer)| {
+                    let again = std::mem::replace(goes_on, took > Duration::from_millis(500));
+                    again.then_some((took, answer))
+                })
+                .collect();
+            let (took, answer) = &stopped[stopped.len() - 1];
+            assert!(*took < Duration::from_millis(500), "{name}, {signal}: {took:?}");
+            assert_eq!((answer.code, answer.out.as_str()), (1, ""), "{name}: {}", answer.err);
+            answer.says(&["stopped after 0 of 2 runs", "goes on from there"]);
+            assert!(!place.path("out/runs.parquet").exists() && !place.path("out/sweep.json").exists());
+            assert_eq!(place.read("out/parts/1-of-1.journal"), b"", "{name}");
+        }
+        place.write("study.toml", common::with(&study, "step = 4e-7", "step = 1e-3"));
+        let found = place.json(&["sweep", "study.toml", "-o", "out", "--force"]);
+        assert_eq!((found["done"].as_u64(), found["failed"].as_u64()), (Some(2), Some(0)));
+    }
+}
+
+/// Truth: the first frequency of the beam depends on its width, and not on how fast it is swung.
+#[test]
+fn a_parameter_without_effect_is_not_named_with_twenty_draws() {
+    let place = place();
+    let mut named = 0;
+    for seed in 0..6 {
+        let study =
+            common::with(STUDY, "from = 0.5\nto = 1.0\ncount = 8", "distribution = \"uniform\"\nlow = 0.5\nhigh = 1.0");
+        place.write("study.toml", common::with(&study, "count = 25", &format!("count = 20\nseed = {seed}")));
+        let out = format!("out{seed}");
+        let found = place.json(&["sweep", "study.toml", "-o", &out]);
+        let f1 = &found["metrics"][1];
+        assert_eq!(f1["matters"][0], "link.bar.beam.width", "{f1}");
+        named += usize::from(f1["matters"].as_array().unwrap().len() > 1);
+        let chance = f1["chance"].as_f64().unwrap();
+        assert!((0.46..0.47).contains(&chance), "{chance}");
+        let page = place.text(&format!("{out}/report.html"));
+        assert!(
+            page.contains("f1_hz: link.bar.beam.width. Not told from chance: motion.speed (which may explain"),
+            "{page}"
+        );
+    }
+    assert_eq!(named, 0); // 0.06 expected
+}
+
+/// Truth: frequencies are better if higher, whatever stands first.
+#[test]
+fn the_best_run_and_the_front_have_high_frequencies_and_small_errors() {
+    let place = place();
+    let study = common::with(STUDY, "[\"peak_mm", "[\"f1_hz = frequencies_hz.0\", \"peak_mm");
+    let study = common::with(&study, ", \"f1_hz = frequencies_hz.0\"]", "]");
+    place.write("study.toml", &study);
+    let found = place.json(&["sweep", "study.toml", "-o", "out"]);
+    let highest = &found["metrics"][0]["max"];
+    assert_eq!((&found["best"]["value"], &found["best"]["better"]), (highest, &serde_json::json!("higher")));
+    assert_eq!(found["pareto"]["better"], serde_json::json!(["higher", "lower"]));
+    let last = found["pareto"]["runs"].as_array().unwrap().last().unwrap();
+    let first = &found["pareto"]["runs"][0];
+    assert_eq!(first["values"][0], *highest);
+    // From the highest frequency on each has less of both.
+    assert!(last["values"][0].as_f64() <= first["values"][0].as_f64());
+    assert!(last["values"][1].as_f64() <= first["values"][1].as_f64());
+    // The study has the last word.
+    place.write("study.toml", study + "\n[better]\nf1_hz = \"lower\"\n");
+    let found = place.json(&["sweep", "study.toml", "-o", "low"]);
+    assert_eq!(found["best"]["value"], found["metrics"][0]["min"]);
+    place.write("study.toml", STUDY.to_owned() + "\n[better]\nf2 = \"lower\"\n");
+    place.refused(&["sweep", "study.toml", "-o", "x"], &["\"f2\" is no metric"]);
+    place.write("study.toml", STUDY.to_owned() + "\n[better]\nf1_hz = \"more\"\n");
+    place.refused(&["sweep", "study.toml", "-o", "x"], &["f1_hz", "\"more\"", "\"lower\" or \"higher\""]);
+}
+
+/// Truth: what `compare` warns of each run by itself.
+#[test]
+fn what_compare_warns_of_runs_is_said_once_with_their_number() {
+    let place = place();
+    for (name, metrics) in [("quick", "tcp.peak_m"), ("whole", "tcp.overshoot_m")] {
+        let study = format!(
+            "format = 1\nrobot = \"robot.toml\"\nmotion = \"swing.toml\"\nmetrics = [\"{metrics}\"]\n[options]\nstep = 0.001\n\
+             [[parameter]]\npath = \"gravity[2]\"\nvalues = [-9.81, -98.1, -98.5]\n\
+             [[parameter]]\npath = \"options.step\"\nvalues = [0.001, 0.1]\n"
+        );
+        place.write("study.toml", study);
+        let found = place.json(&["sweep", "study.toml", "-o", name]);
+        let caveats = found["caveats"].as_array().unwrap();
+        let of = |code: &str| {
+            caveats.iter().find(|c| c["code"] == code).unwrap_or_else(|| panic!("{name}: no {code} in {caveats:?}"))
+        };
+        let gravity = of("gravity");
+        assert_eq!(
+            (gravity["runs"].as_u64(), gravity["worst_run"].as_u64(), gravity["value"].as_f64()),
+            (Some(4), Some(4), Some(98.5))
+        );
+        assert_eq!(gravity["likely"], "about 10 times: the decimal point?");
+        let step = of("long-step");
+        assert_eq!((step["runs"].as_u64(), step["value"].as_f64()), (Some(3), Some(0.1)));
+        assert_eq!(step["likely"], "about 100 times: milliseconds?".replace("100 ", "1000 "));
+        let warnings = found["warnings"].as_array().unwrap();
+        assert!(
+            warnings.iter().any(|text| text.as_str().unwrap().ends_with("(4 of 6 runs; worst in run 4)")),
+            "{warnings:?}"
+        );
+        // By `compare`, run by run.
+        for (run, (gravity, step)) in [("-98.1", "0.1"), ("-9.81", "0.001")].into_iter().enumerate() {
+            place.write("own.toml", common::with(common::ROBOT, "-9.81", gravity));
+            let own = place.json(&["compare", "own.toml", "swing.toml", "--step", step, "--no-files"]);
+            for caveat in own["caveats"].as_array().unwrap() {
+                assert!(
+                    caveats.iter().any(|c| c["code"] == caveat["code"]),
+                    "{name} {run}: {caveat} is not in {caveats:?}"
+                );
+            }
+        }
+        // They are there when nothing is left to run, on the page and on standard error.
+        let again = place.flexarm(&["sweep", "study.toml", "-o", name]);
+        again.says(&["gravity is 98.5", "4 of 6 runs"]);
+        assert!(place.text(&format!("{name}/report.html")).contains("gravity is 98.5"));
+    }
+}
+
 #[cfg(unix)]
 #[test]
 fn a_disk_that_is_full_stops_the_study_with_a_word_and_loses_no_run() {

@@ -146,6 +146,41 @@ fn upright(out: &mut String, (x, y): (f64, f64), font: u32, words: &str) {
     );
 }
 
+/// Distance of two lines of a label.
+const LEADING: f64 = 14.0;
+/// Height of a panel of effects.
+const PANEL: f64 = 134.0;
+
+/// A label in lines of at most `most` letters, broken behind points, underscores and blanks where that is possible. No letter is left
+/// out: names that differ in one letter must not look the same.
+fn wrapped(label: &str, most: usize) -> Vec<String> {
+    let most = most.max(8);
+    let mut lines: Vec<Vec<char>> = vec![Vec::new()];
+    for piece in label.split_inclusive(['.', '_', ' ', '-', '[']) {
+        let piece: Vec<char> = piece.chars().collect();
+        let last = lines.len() - 1;
+        match lines[last].len() + piece.len() <= most {
+            true => lines[last].extend(piece),
+            false => lines.extend(piece.chunks(most).map(<[char]>::to_vec)),
+        }
+    }
+    lines.into_iter().filter(|line| !line.is_empty()).map(String::from_iter).collect()
+}
+
+/// Lines below each other, the first at the place.
+fn text_lines(out: &mut String, (x, y): (f64, f64), font: u32, lines: &[String]) {
+    for (k, line) in lines.iter().enumerate() {
+        text(out, (x, y + LEADING * k as f64), font, "middle", line);
+    }
+}
+
+/// Lines that go up, the first at the place and the others to its right.
+fn upright_lines(out: &mut String, (x, y): (f64, f64), font: u32, lines: &[String]) {
+    for (k, line) in lines.iter().enumerate() {
+        upright(out, (x + LEADING * k as f64, y), font, line);
+    }
+}
+
 fn polyline(out: &mut String, ink: &str, points: impl Iterator<Item = (f64, f64)>) {
     let line: Vec<String> = points.map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
     let _ =
@@ -178,9 +213,10 @@ impl HeatMap<'_> {
     /// The picture, with a number in each cell if there is room.
     pub fn svg(&self) -> String {
         let (columns, rows) = (self.x.len().max(1), self.y.len().max(1));
-        let cell = ((560.0 / columns as f64).clamp(14.0, 96.0), (360.0 / rows as f64).clamp(12.0, 48.0));
-        let (left, top) = (110.0, 34.0);
+        let cell = ((560.0 / columns as f64).clamp(14.0, 96.0), (360.0 / rows as f64).clamp(12.0, 120.0));
         let (width, height) = (cell.0 * columns as f64, cell.1 * rows as f64);
+        let y_label = wrapped(self.y_label, (height / 7.5) as usize);
+        let (left, top) = (92.0 + LEADING * y_label.len() as f64, 34.0);
         let finite = || self.values.iter().copied().filter(|x| x.is_finite());
         let (low, high) = (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));
         let mut out = String::new();
@@ -216,10 +252,12 @@ impl HeatMap<'_> {
         for (k, name) in self.y.iter().enumerate().step_by(every) {
             text(&mut out, (left - 6.0, top + height - cell.1 * (k as f64 + 0.5) + 4.0), 12, "end", name);
         }
-        text(&mut out, (left + 0.5 * width, top + height + 36.0), 13, "middle", self.x_label);
-        upright(&mut out, (18.0, top + 0.5 * height), 13, self.y_label);
+        let x_label = wrapped(self.x_label, ((width + 120.0) / 7.5) as usize);
+        text_lines(&mut out, (left + 0.5 * width, top + height + 36.0), 13, &x_label);
+        upright_lines(&mut out, (18.0, top + 0.5 * height), 13, &y_label);
         legend(&mut out, (left + width + 24.0, top), height, (low, high));
-        picture(left + width + 130.0, top + height + 48.0, &out)
+        let wide = (left + width + 130.0).max(left + 8.5 * self.title.chars().count() as f64);
+        picture(wide, top + height + 33.0 + LEADING * x_label.len() as f64, &out)
     }
 }
 
@@ -241,7 +279,13 @@ fn legend(out: &mut String, (x, y): (f64, f64), height: f64, (low, high): (f64, 
 /// Main effects in rows of panels, one row per result; panels of a row share their vertical scale.
 pub fn effects(rows: &[Vec<EffectPanel<'_>>]) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0).max(1);
-    let (width, height) = ((900.0 / columns as f64).clamp(150.0, 320.0), 190.0);
+    let width = (900.0 / columns as f64).clamp(150.0, 320.0);
+    let panels = || rows.iter().flatten();
+    let below = |panel: &EffectPanel<'_>| wrapped(panel.x_label, (width / 6.5) as usize);
+    let beside = |panel: &EffectPanel<'_>| wrapped(panel.y_label, (PANEL / 6.5) as usize);
+    let most_below = panels().map(|panel| below(panel).len()).max().unwrap_or(1);
+    let most_beside = panels().map(|panel| beside(panel).len()).max().unwrap_or(1);
+    let (left, height) = (48.0 + LEADING * most_beside as f64, PANEL + 42.0 + LEADING * most_below as f64);
     let ink = palette::hex(palette::series(0, Ground::Paper));
     let mut out = String::new();
     for (row, panels) in rows.iter().enumerate() {
@@ -249,10 +293,10 @@ pub fn effects(rows: &[Vec<EffectPanel<'_>>]) -> String {
         let y = range(all);
         for (column, panel) in panels.iter().enumerate() {
             let frame = Frame {
-                left: 62.0 + width * column as f64,
+                left: left + width * column as f64,
                 top: 12.0 + height * row as f64,
                 width: width - 66.0,
-                height: height - 56.0,
+                height: PANEL,
                 x: range(panel.points.iter().map(|p| p[0])),
                 y,
             };
@@ -266,26 +310,22 @@ pub fn effects(rows: &[Vec<EffectPanel<'_>>]) -> String {
                     "<path d=\"M{x:.1} {low:.1}V{high:.1}\" stroke=\"{ink}\"/><circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"2.5\" fill=\"{ink}\"/>"
                 );
             }
-            text(
-                &mut out,
-                (frame.left + 0.5 * frame.width, frame.top + frame.height + 32.0),
-                11,
-                "middle",
-                &shortened(panel.x_label, (width / 6.5) as usize),
-            );
+            let middle = frame.left + 0.5 * frame.width;
+            text_lines(&mut out, (middle, frame.top + frame.height + 32.0), 11, &below(panel));
             if column == 0 {
-                upright(&mut out, (12.0, frame.top + 0.5 * frame.height), 11, panel.y_label);
+                upright_lines(&mut out, (12.0, frame.top + 0.5 * frame.height), 11, &beside(panel));
             }
         }
     }
-    picture(width * columns as f64 + 34.0, height * rows.len().max(1) as f64 + 8.0, &out)
+    picture(left + width * columns as f64 - 28.0, height * rows.len().max(1) as f64 + 8.0, &out)
 }
 
 /// Pairs of bars with intervals.
 ///
 /// * `names`: of both.
 pub fn bar_pairs(title: &str, names: [&str; 2], pairs: &[BarPair<'_>]) -> String {
-    let (left, step) = (230.0, 40.0);
+    let longest = pairs.iter().map(|pair| pair.name.chars().count()).max().unwrap_or(0);
+    let (left, step) = ((7.0 * longest as f64 + 20.0).max(230.0), 40.0);
     let (width, top) = (480.0, 52.0);
     let high = pairs.iter().flat_map(|pair| pair.values.iter().map(|v| v[2])).fold(1.0, f64::max);
     let low = pairs.iter().flat_map(|pair| pair.values.iter().map(|v| v[1])).fold(0.0, f64::min);
@@ -402,7 +442,7 @@ pub fn scatter_matrix(columns: &[(&str, &[f64])]) -> String {
                 }
                 std::cmp::Ordering::Equal => {
                     histogram(&mut out, &frame, x);
-                    text(&mut out, (middle.0, top + 14.0), 11, "middle", &shortened(name, (cell / 6.0) as usize));
+                    text_lines(&mut out, (middle.0, top + 14.0), 11, &wrapped(name, (cell / 6.5) as usize));
                 }
                 std::cmp::Ordering::Greater => {
                     let rank = rank_correlation(x, y);
@@ -416,15 +456,6 @@ pub fn scatter_matrix(columns: &[(&str, &[f64])]) -> String {
         }
     }
     picture(left + cell * n as f64 + 8.0, top + cell * n as f64 + 8.0, &out)
-}
-
-fn shortened(name: &str, most: usize) -> String {
-    let count = name.chars().count();
-    match count > most {
-        // The end tells more than the beginning.
-        true => "..".to_owned() + &name.chars().skip(count - most + 2).collect::<String>(),
-        false => name.to_owned(),
-    }
 }
 
 fn histogram(out: &mut String, frame: &Frame, values: &[f64]) {
@@ -493,6 +524,35 @@ mod tests {
         assert_eq!(ticks((30.0, 210.0), 4), [50.0, 100.0, 150.0, 200.0]);
         assert_eq!(ticks((2.0, 2.0), 4), [2.0]);
         assert_eq!((shown(0.6000000000000001, (0.0, 1.0)), shown(50.0, (30.0, 210.0))), ("0.6".into(), "50".into()));
+    }
+
+    /// The letters of all texts of a picture, one after the other.
+    fn texts(svg: &str) -> String {
+        svg.split("</text>").filter_map(|part| part.rsplit_once('>')).map(|(_, words)| words).collect()
+    }
+
+    #[test]
+    fn names_that_end_alike_stay_apart_in_every_chart() {
+        let names: Vec<String> =
+            (1..=6).map(|k| format!("drive.joint_{k}.gearbox.stiffness (% of the file)")).collect();
+        let points = vec![[1.0, 2.0, 0.1], [2.0, 3.0, 0.1]];
+        let y_label = "links.link_2.peak_contribution_m / links.link_3.peak_contribution_m";
+        let panel = |name| EffectPanel { x_label: name, y_label, points: points.clone() };
+        let panels = names.iter().map(|name| panel(name)).collect();
+        let values = [1.0, 2.0];
+        let columns: Vec<(&str, &[f64])> = names.iter().map(|name| (name.as_str(), &values[..])).collect();
+        let bar = |name| BarPair { name, values: [[0.5, 0.4, 0.6]; 2] };
+        let bars: Vec<BarPair<'_>> = names.iter().map(|name| bar(name)).collect();
+        let charts = [effects(&[panels]), scatter_matrix(&columns), bar_pairs("t", ["a", "b"], &bars)];
+        for (svg, name) in charts.iter().flat_map(|svg| names.iter().map(move |name| (svg, name))) {
+            assert!(texts(svg).contains(name.as_str()), "{name} is not whole in {}", texts(svg));
+        }
+        assert!(texts(&charts[0]).contains(y_label));
+        let cells = ["1", "2"].map(str::to_owned);
+        let map = HeatMap { title: "t", x_label: &names[0], y_label, x: &cells, y: &cells, values: &[1.0; 4] }.svg();
+        assert!(texts(&map).contains(y_label) && texts(&map).contains(names[0].as_str()));
+        assert_eq!(wrapped("drive.joint_2.gearbox", 10), ["drive.", "joint_2.", "gearbox"]);
+        assert_eq!(wrapped("abcdefghijklmnop", 8), ["abcdefgh", "ijklmnop"]);
     }
 
     #[test]

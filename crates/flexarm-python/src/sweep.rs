@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use flexarm::Caveat;
 use flexarm::sweep::{Finders, Shard, Sweep, SweepRequest};
 use pyo3::prelude::*;
 
@@ -70,5 +71,7 @@ pub(crate) fn sweep<'py>(
     {
         close.call0()?;
     }
-    caveat::answer(py, &result?.or_raise()?, &[])
+    let found = result?.or_raise()?;
+    let caveats: Vec<Caveat> = found.caveats.iter().map(|figures| figures.caveat.clone()).collect();
+    caveat::answer(py, &found, &caveats)
 }

@@ -1,8 +1,8 @@
 //! Designs of studies, and what their results tell: pure functions on numbers.
 //!
 //! A study tries many points of a cube: [`Sample`] (random, Latin hypercube, Sobol, Saltelli) or a full grid ([`grid_levels`]); a
-//! [`Distribution`] makes values of coordinates. Of the results [`main_effect`], [`sobol_indices`], [`spread`] and [`pareto_front`]
-//! say what matters; [`LeastSearch`] goes for the least of one of them within bounds.
+//! [`Distribution`] makes values of coordinates. Of the results [`main_effect`], [`beyond_chance`], [`sobol_indices`], [`spread`]
+//! and [`pareto_front`] say what matters; [`LeastSearch`] goes for the least of one of them within bounds.
 //!
 //! ```
 //! use flexarm_study::{Distribution, Sample, SampleMethod, sobol_indices};
@@ -19,6 +19,7 @@
 //! Everything depends on its seed alone: any point can be had by its number on any machine. Not here: what is run, files.
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
+mod chance;
 mod distribution;
 mod effects;
 mod indices;
@@ -28,8 +29,9 @@ mod sample;
 mod search;
 mod sobol;
 
+pub use chance::{BeyondChance, beyond_chance};
 pub use distribution::{Distribution, normal_quantile};
-pub use effects::{EffectGroup, MainEffect, Spread, main_effect, pareto_front, spread};
+pub use effects::{EffectGroup, Grouping, MainEffect, Spread, main_effect, pareto_front, spread};
 pub use indices::{SobolIndex, sobol_indices};
 pub use random::uniform;
 pub use sample::{Sample, SampleMethod, grid_levels};

@@ -107,30 +107,9 @@ impl Posed {
         data.X_WF(&self.tool)
     }
 
-    /// Engineering strain of each flexible link, and how far its far end has turned (rad), with all coordinates at `q`.
-    pub(crate) fn strains(&self, q: &DVector<f64>) -> Vec<(f64, f64)> {
-        let model = &self.arm.model;
-        let (mut data, straight) = self.undeformed();
-        let mut ends = |q: &DVector<f64>| -> Vec<Pose> {
-            forward_kinematics(model, &mut data, q);
-            let pose = |link: &str, X: &Pose| data.X_WF(model.frame(link).expect("a link of the substitution")) * *X;
-            let spans = self.flexible.spans.iter();
-            spans.map(|s| pose(&s.link, &s.X_LA).inverse() * pose(&s.distal_link, &s.X_DB)).collect()
-        };
-        let (bent, straight) = (ends(q), ends(&straight.q));
-        let pairs = self.flexible.spans.iter().zip(bent.iter().zip(&straight));
-        pairs
-            .map(|(span, (bent, straight))| {
-                let change = bent.translation.vector.norm() - span.length;
-                let strain = engineering_strain(change, span.length).map_or(0.0, f64::abs);
-                (strain, rotation_vector((straight.rotation.inverse() * bent.rotation).matrix()).norm())
-            })
-            .collect()
-    }
-
     /// Whether the models hold at an equilibrium: deflections of links, forces of drives.
     pub(crate) fn validity(&self, robot: &Robot, linear: &Linear) -> Vec<Caveat> {
-        let links = self.flexible.spans.iter().zip(self.strains(&linear.q));
+        let links = self.flexible.spans.iter().zip(strains(&self.flexible, &self.arm, &linear.q));
         let links = links.flat_map(|(span, (strain, rotation))| validity::link(&span.link, rotation, strain));
         let holding = linear.holding.as_slice();
         let efforts = validity::efforts(&kinds::HOLDING, self.arm.model.coordinates(), holding);
@@ -147,11 +126,36 @@ impl Posed {
 
     /// Joints at the pose, elastic coordinates zero.
     pub(crate) fn undeformed(&self) -> (Data, State) {
-        let model = &self.arm.model;
-        let mut state = State::zeros(model);
-        self.arm.prescribed_state(0.0, &mut state, &mut DVector::zeros(model.nv()));
-        (Data::new(model), state)
+        undeformed(&self.arm)
     }
+}
+
+/// Joints where the motion begins, elastic coordinates zero.
+fn undeformed(arm: &FlexibleArm) -> (Data, State) {
+    let mut state = State::zeros(&arm.model);
+    arm.prescribed_state(0.0, &mut state, &mut DVector::zeros(arm.model.nv()));
+    (Data::new(&arm.model), state)
+}
+
+/// Engineering strain of each flexible link, and how far its far end has turned (rad), with all coordinates at `q`.
+pub(crate) fn strains(flexible: &FlexibleRobot, arm: &FlexibleArm, q: &DVector<f64>) -> Vec<(f64, f64)> {
+    let model = &arm.model;
+    let (mut data, straight) = undeformed(arm);
+    let mut ends = |q: &DVector<f64>| -> Vec<Pose> {
+        forward_kinematics(model, &mut data, q);
+        let pose = |link: &str, X: &Pose| data.X_WF(model.frame(link).expect("a link of the substitution")) * *X;
+        let spans = flexible.spans.iter();
+        spans.map(|s| pose(&s.link, &s.X_LA).inverse() * pose(&s.distal_link, &s.X_DB)).collect()
+    };
+    let (bent, straight) = (ends(q), ends(&straight.q));
+    let pairs = flexible.spans.iter().zip(bent.iter().zip(&straight));
+    pairs
+        .map(|(span, (bent, straight))| {
+            let change = bent.translation.vector.norm() - span.length;
+            let strain = engineering_strain(change, span.length).map_or(0.0, f64::abs);
+            (strain, rotation_vector((straight.rotation.inverse() * bent.rotation).matrix()).norm())
+        })
+        .collect()
 }
 
 impl Arm {

@@ -7,7 +7,7 @@ use flexarm_stepping::{FlexibleArm, Load, PrescribedMotion, StepError, StepRule,
 
 use crate::balancer;
 use crate::caveat::size::Size;
-use crate::caveat::{self, Caveat, kinds};
+use crate::caveat::{self, Caveat};
 use crate::error::{Error, ValueError};
 use crate::flexible::FlexibleRobot;
 use crate::loads_file::EXPRESSION_PERIOD;
@@ -80,10 +80,7 @@ pub(crate) fn checked(
         None => flexible.arm(motion.prescribed()),
     };
     let arm = arm.map_err(|error| flexible.explained(error))?;
-    let (arm, mut load_caveats) = loaded(robot, scenario, options, arm)?;
-    if options.log_rate_hz * options.step_s > 1.0 + 1e-9 && options.log_rate_hz != RunOptions::default().log_rate_hz {
-        load_caveats.push(kinds::LOG_RATE.found("run", options.log_rate_hz, 1.0 / options.step_s));
-    }
+    let (arm, load_caveats) = loaded(robot, scenario, options, arm)?;
     let arm = Arc::new(arm);
     let stepper = new_stepper(options.stepper, arm.clone(), options.step_s, scenario.start)
         .map_err(|error| flexible.explained(error))?;

@@ -204,6 +204,17 @@ fn links(texts: &Texts) -> Vec<Value> {
     texts.robot.get("flexible_link").and_then(Value::as_array).cloned().unwrap_or_default()
 }
 
+/// Multiplies the stiffness of one gear of an arm that has five, that of the last joint but one.
+fn one_gear(factor: f64) -> Change {
+    Box::new(move |texts| {
+        let drives = texts.robot.get_mut("drive").and_then(Value::as_array_mut);
+        let gears = drives.into_iter().flatten().filter_map(|drive| drive.get_mut("gearbox")?.get_mut("stiffness"));
+        let mut gears: Vec<&mut Value> = gears.collect();
+        let place = gears.len().checked_sub(2).filter(|_| gears.len() >= 5);
+        place.map(|place| times(gears[place], factor)).is_some()
+    })
+}
+
 /// A change of robots without links from meshes, whose masses and lengths are their own.
 fn without_meshes(change: Change) -> Change {
     Box::new(move |texts| !links(texts).iter().any(|link| link.get("reduced").is_some()) && change(texts))
@@ -285,6 +296,11 @@ fn slips() -> Vec<(&'static str, Change, &'static [&'static str])> {
         ("effort limits in N mm", urdf("limit", "effort", 1e3), &["effort-limit"]),
         ("effort limits in kN m", urdf("limit", "effort", 1e-3), &["effort", "motion-effort"]),
         ("payload of 15 t", set("payload", "{ mass = 15000.0, com = [0.0, 0.0, 0.1] }"), &["payload-mass", "effort"]),
+        (
+            "payload of 7.5 kg in g",
+            set("payload", "{ mass = 7500.0, com = [0.0, 0.0, 0.1] }"),
+            &["payload-mass", "effort"],
+        ),
         ("payload in mm", set("payload", "{ mass = 1.0, com = [0.0, 0.0, 250.0] }"), &["far"]),
         (
             "payload inertia of no body",
@@ -297,6 +313,7 @@ fn slips() -> Vec<(&'static str, Change, &'static [&'static str])> {
             &["payload-inertia"],
         ),
         ("gravity of 1 m/s2", set("gravity", "[0.0, 0.0, -1.0]"), &["gravity"]),
+        ("gravity of 98.1 m/s2", set("gravity", "[0.0, 0.0, -98.1]"), &["gravity"]),
         ("gravity in mm/s2", set("gravity", "[0.0, 0.0, -9810.0]"), &["gravity"]),
         ("modulus in MPa", material("{ E = 70e3, nu = 0.33, rho = 2700.0 }"), &["modulus", "no-equilibrium"]),
         ("modulus in GPa", material("{ E = 70.0, nu = 0.33, rho = 2700.0 }"), &["modulus", "no-equilibrium"]),
@@ -316,6 +333,7 @@ fn slips() -> Vec<(&'static str, Change, &'static [&'static str])> {
         ("channels that bend across their webs", channels(), &["shear-centre"]),
         ("roll in degrees", set("flexible_link.*.beam.roll", "90.0"), &["angle"]),
         ("gears in N m/deg", key("drive.*.gearbox.stiffness", 1.0 / deg), soft),
+        ("one gear in N m/deg", one_gear(1.0 / deg), &["gear-stiffness"]),
         ("gears in kN m/rad", key("drive.*.gearbox.stiffness", 1e-3), soft),
         ("gears in N mm/rad", key("drive.*.gearbox.stiffness", 1e3), &["gear-stiffness", "first-frequency"]),
         ("gear damping 1000 times", key("drive.*.gearbox.damping", 1e3), &["creep", "damped-mode"]),
@@ -354,6 +372,8 @@ fn harmless() -> Vec<(&'static str, Change)> {
         ("half the payload", key("payload.mass", 0.5)),
         ("a tenth of the payload", key("payload.mass", 0.1)),
         ("gears half as stiff", key("drive.*.gearbox.stiffness", 0.5)),
+        ("one gear half as stiff", one_gear(0.5)),
+        ("one gear twice as stiff", one_gear(2.0)),
         ("gears half as stiff again", key("drive.*.gearbox.stiffness", 1.5)),
         ("gears twice as stiff", key("drive.*.gearbox.stiffness", 2.0)),
         ("gear damping half", key("drive.*.gearbox.damping", 0.5)),

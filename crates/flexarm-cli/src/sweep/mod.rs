@@ -5,17 +5,20 @@ mod plan;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::{Args, Subcommand};
 use comfy_table::CellAlignment;
 use flexarm::sweep::{
-    Finders, MetricFigures, MinimiseRequest, ParameterValue, Replay, Shard, Sweep, SweepRequest, SweepSummary, merge,
+    Finders, MetricFigures, MinimiseRequest, ParameterRole, ParameterValue, Replay, Shard, Sweep, SweepError,
+    SweepRequest, SweepSummary, merge,
 };
 
 use self::plan::PlanArgs;
 use crate::args::Cli;
 use crate::failure::Failure;
-use crate::print::{lines, table};
+use crate::print::{lines, table, warning};
 use crate::{Bar, answer, shipped, signals, to_json};
 
 const EXAMPLES: &str = "\
@@ -109,6 +112,7 @@ pub(crate) fn run(cli: &Cli, args: &SweepArgs) -> Result<ExitCode, Failure> {
             let sweep = Sweep::load(&args.study, &FINDERS)?;
             let output = args.output.clone().unwrap_or_else(|| args.folders[0].clone());
             let summary = merge(&sweep, &args.folders, &output, args.force, Some(command))?;
+            warn(cli, &summary);
             answer(cli, || to_json(&summary), || text(&summary));
             Ok(ExitCode::SUCCESS)
         }
@@ -129,7 +133,18 @@ fn sweep(cli: &Cli, args: &SweepRunArgs, study: &Path) -> Result<ExitCode, Failu
     };
     let mut stop = signals::stop_when_asked();
     let mut bar = Bar::new(cli);
+    // Every run that is over is in a file: nothing is lost if the process ends in the middle of another one.
+    let counts = Arc::new([AtomicUsize::new(0), AtomicUsize::new(0)]);
+    let (seen, folder) = (counts.clone(), request.output.clone());
+    let watch = signals::end_if_not_stopped(move || {
+        let [done, runs] = [0, 1].map(|k| seen[k].load(Ordering::Relaxed));
+        let stopped = SweepError::Stopped { done, runs, folder: folder.clone() };
+        let failure = Failure::from(flexarm::Error::from(stopped));
+        failure.print();
+        failure.exit_code()
+    });
     let mut progress = |done: usize, all: usize| -> ControlFlow<()> {
+        counts.iter().zip([done, all]).for_each(|(count, n)| count.store(n, Ordering::Relaxed));
         bar.show_as(done as f64, all as f64, || format!("{done} of {all} runs"));
         stop()
     };
@@ -144,11 +159,19 @@ fn sweep(cli: &Cli, args: &SweepRunArgs, study: &Path) -> Result<ExitCode, Failu
             sweep.minimise(&request, &search, &mut progress)
         }
     };
+    drop(watch);
     bar.clear();
     let summary = result?;
+    warn(cli, &summary);
     answer(cli, || to_json(&summary), || text(&summary));
     // Some runs of a study may fail; a study of which nothing is left has.
     Ok(if summary.failed > 0 && summary.done == 0 { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+fn warn(cli: &Cli, summary: &SweepSummary) {
+    if !cli.quiet {
+        summary.warnings.iter().for_each(|text| warning(text));
+    }
 }
 
 /// The command that runs the files of a run.
@@ -227,9 +250,17 @@ fn text(found: &SweepSummary) -> String {
         );
     }
     if let Some(best) = &found.best {
-        out += &format!("\nbest: run {}, {} {}\n", best.run, best.metric, number(Some(best.value)));
+        let (most, value) = (best.better.most(), number(Some(best.value)));
+        out += &format!("\nbest: run {}, {most} {} {value}\n", best.run, best.metric);
         for (name, value) in &best.parameters {
-            out += &format!("    {name} = {value}\n");
+            let role = found.parameters.iter().find(|parameter| parameter.name == *name).map(|p| p.role);
+            out += &match (role, value.number()) {
+                (Some(ParameterRole::Factor), Some(x)) => {
+                    format!("    {name} = {} % of the file\n", number(Some(100.0 * x)))
+                }
+                (Some(ParameterRole::Offset), Some(x)) => format!("    {name} = the file {x:+}\n"),
+                _ => format!("    {name} = {value}\n"),
+            };
         }
     }
     for failure in &found.failures {
@@ -248,11 +279,16 @@ fn text(found: &SweepSummary) -> String {
     out
 }
 
-/// The parameter that makes most of a metric's variance.
+/// The parameter that makes most of a metric's variance, as far as that is told from chance.
 fn strongest(metric: &MetricFigures) -> String {
-    let shares = metric.shares.iter().filter_map(|(name, share)| Some((name, (*share)?)));
-    let most = shares.max_by(|a, b| a.1.total_cmp(&b.1));
-    most.map_or_else(String::new, |(name, share)| format!("{name} ({:.0} %)", 100.0 * share))
+    match (metric.matters.first(), metric.std) {
+        (Some(name), _) => {
+            let share = metric.shares.get(name).copied().flatten().unwrap_or(f64::NAN);
+            format!("{name} ({:.0} %)", 100.0 * share)
+        }
+        (None, Some(std)) if std > 0.0 && metric.chance.is_some() => "nothing that stands out of chance".into(),
+        _ => String::new(),
+    }
 }
 
 /// A number with the digits that a person reads.

@@ -14,6 +14,7 @@ __all__ = [
     "Bending",
     "BestRun",
     "CaveatDict",
+    "CaveatFigures",
     "ChainFigures",
     "CheckFigures",
     "Compensation",
@@ -1376,7 +1377,10 @@ class Lobes(TypedDict):
     """What is probably wrong with the input, or limits the worth of the result."""
 
 
-class ParameterFigures(TypedDict):
+_ParameterFiguresAs = TypedDict("_ParameterFiguresAs", {"as": "Literal['value', 'factor', 'offset']"}, total=True)
+
+
+class ParameterFigures(_ParameterFiguresAs):
     """A parameter."""
 
     name: str
@@ -1419,6 +1423,12 @@ class MetricFigures(TypedDict):
     """Quantiles 0.05, 0.5 and 0.95."""
     shares: dict[str, float | None]
     """Part of its variance that each parameter makes by itself (correlation ratio); null of words and where nothing varies."""
+    matters: list[str]
+    """The parameters that matter, the strongest first: listed ones with an effect, and drawn ones whose effect stands out of chance."""
+    chance: float | None
+    """Part of the scatter of the draws that the strongest of the drawn parameters would have by chance in 1 of 100 studies; null where nothing is drawn."""
+    better: Literal['lower', 'higher'] | None
+    """What is better of it; null if neither the study nor its expression nor its name tells."""
     sobol: list[IndexFigures]
     """Sobol indices of the parameters that were drawn by Saltelli's design; empty otherwise."""
 
@@ -1448,12 +1458,14 @@ class Replay(TypedDict):
 
 
 class BestRun(TypedDict):
-    """The run with the least of a metric."""
+    """The best run by a metric."""
 
     run: int
     """Its number."""
     metric: str
-    """What is least in it."""
+    """What is least or highest in it."""
+    better: Literal['lower', 'higher']
+    """Which of both: lower where it is not known what is better."""
     value: float
     """How much that is."""
     parameters: dict[str, float | str | bool]
@@ -1479,7 +1491,9 @@ class ParetoFigures(TypedDict):
     """Runs that no other beats in two metrics."""
 
     metrics: list[str]
-    """Both, each better if less."""
+    """Both."""
+    better: list[Literal['lower', 'higher']]
+    """What is better of each: lower where that is not known."""
     runs: list[ParetoRun]
     """By the first metric."""
 
@@ -1503,6 +1517,33 @@ class MinimiseFigures(TypedDict):
     """Whether that keeps the constraints."""
     progress: list[float | None]
     """Least value so far that keeps the constraints, after each generation; null before there is one."""
+
+
+class CaveatFigures(TypedDict):
+    """A caveat, and the runs that it concerns. It is that of the run in which it is worst."""
+
+    severity: Literal['warning', 'note']
+    """How much it weighs."""
+    code: str
+    """Short, stable name of its kind."""
+    where: str
+    """What it is about: a link, a joint, the payload, a file."""
+    message: str
+    """All of it in one sentence."""
+    value: float | None
+    """What was found."""
+    yardstick: float | None
+    """What it is compared with."""
+    unit: str
+    """Unit of both."""
+    likely: str
+    """The slip that would explain it, such as "about 1000 times: millimetres?"; empty if none does."""
+    help: str
+    """What to look at, or how to mend it."""
+    runs: int
+    """Runs of which it is said."""
+    worst_run: int
+    """The run with the worst value."""
 
 
 class SweepSummary(TypedDict):
@@ -1533,11 +1574,15 @@ class SweepSummary(TypedDict):
     failures: list[FailureFigures]
     """Why runs failed, the most frequent first."""
     best: BestRun | None
-    """The run with the least of what is to be least; null if none was done."""
+    """The best run; null if none was done."""
     pareto: ParetoFigures | None
     """The runs that no other beats in two metrics; null with one metric."""
     minimise: MinimiseFigures | None
     """How the search went, if one was made."""
+    warnings: list[str]
+    """The sentences of the caveats that warn, each once, with the number of runs that it concerns."""
+    caveats: list[CaveatFigures]
+    """What `check` and `compare` would say of the runs, each caveat once with its worst value, warnings first."""
     doubles: int
     """Runs that several shards had, with the same result; they count once."""
 

@@ -19,6 +19,9 @@ const TURNED: [f64; 2] = [0.01, 0.08];
 const TURNED_WEAK: [f64; 2] = [0.3, 3.0];
 /// A note this many times beyond its yardstick names the slip too.
 const HINTED: f64 = 3.0;
+/// Rotation of a strong gear over the median of the other strong gears of its robot: the gears of shipped robots have up to 7.5, and
+/// one of them in N m/deg has 15 at least.
+const ODD: f64 = 12.0;
 /// The same of gears that are too stiff: note, warning.
 const RIGID: [f64; 2] = [1e-4, 1e-5];
 /// Elastic rotation of gears under weight: note, warning; strong drives, weak ones (rad).
@@ -71,7 +74,7 @@ pub(crate) fn of_drives(drives: &[Drive], mechanism: &Mechanism, rigid: &Model) 
         }
         caveats.extend(servo(drive));
         if !slides && drive.kind != DriveKind::Prescribed {
-            caveats.extend(gear(drive, effort));
+            caveats.extend(gear(drive, effort, others_turn(drive, drives, mechanism)));
             caveats.extend(errors(drive));
         }
     }
@@ -94,8 +97,21 @@ fn stiffness(drive: &Drive) -> Option<(f64, Option<f64>)> {
     }
 }
 
-/// Stiffness, damping and play of a gearbox.
-fn gear(drive: &Drive, effort: f64) -> Vec<Caveat> {
+/// Median rotation under their effort limits of the other strong gears (rad); none of a weak one, or without two others.
+fn others_turn(drive: &Drive, drives: &[Drive], mechanism: &Mechanism) -> Option<f64> {
+    let turns = |drive: &Drive| {
+        let joint = mechanism.joints.iter().find(|j| j.name == drive.joint && !j.kind.slides())?;
+        let effort = joint.limits.effort;
+        (effort.is_finite() && effort > STRONG).then_some(effort / stiffness(drive)?.0)
+    };
+    turns(drive)?;
+    let mut others: Vec<f64> = drives.iter().filter(|other| other.joint != drive.joint).filter_map(turns).collect();
+    others.sort_by(f64::total_cmp);
+    (others.len() >= 2).then(|| 0.5 * (others[others.len() / 2] + others[(others.len() - 1) / 2]))
+}
+
+/// Stiffness, damping and play of a gearbox; `others`: what the other gears of the robot turn by.
+fn gear(drive: &Drive, effort: f64, others: Option<f64>) -> Vec<Caveat> {
     let (Some((k, along)), Some((_, gear))) = (stiffness(drive), &drive.gearbox) else { return Vec::new() };
     let mut caveats = Vec::new();
     let turned = effort / k;
@@ -104,6 +120,7 @@ fn gear(drive: &Drive, effort: f64) -> Vec<Caveat> {
     let factors: Vec<slip::Factor> = slip::TURNING.iter().map(|(f, words)| (1.0 / f, *words)).collect();
     let likely = || slip(turned, &sound, &factors, 1.0);
     if effort.is_finite() && turned > unusual {
+        let wrong = if others.is_some_and(|others| turned > ODD * others) { unusual } else { wrong };
         let hinted = turned > wrong || (effort > STRONG && turned > HINTED * unusual);
         let caveat = kinds::GEAR_SOFT.found(name(drive), turned, unusual);
         let caveat = if hinted { caveat.likely(likely()) } else { caveat };

@@ -76,6 +76,13 @@ pub(crate) const BAND_BEYOND_ERROR: CaveatKind = CaveatKind::warning(
     "m",
     "a tenth of the error shows when the ringing is over",
 );
+/// A step that is long for the motion.
+pub(crate) const LONG_STEP: CaveatKind = CaveatKind::warning(
+    "long-step",
+    "the step of the {where} is {value} s, a fiftieth of its longest move is {yardstick} s: lower {step_s}",
+    "s",
+    "the step is in s: 1 ms is 0.001",
+);
 /// Energy.
 pub(crate) const ENERGY_OPEN: CaveatKind = CaveatKind::warning(
     "energy-open",

@@ -9,7 +9,7 @@ use super::{Caveat, kinds};
 use crate::robot::{PAYLOAD_LINK, Robot};
 
 /// A tool or payload this many times the robot's size away, and this far at least (m), is not held by it.
-const FAR: (f64, f64) = (3.0, 2.0);
+const FAR: (f64, f64) = (1.5, 2.0);
 /// Arms longer than this have not been built (m): concrete pumps reach 70 m.
 const LONGEST: f64 = 100.0;
 /// A joint this many times farther from its parent than all others of the chain together.
@@ -19,7 +19,7 @@ const OSMIUM: f64 = 22_600.0;
 /// Largest angle that anyone writes into a file in rad: a turn.
 const TURN: f64 = std::f64::consts::TAU;
 /// Payload over mass of the robot: heavier than that is not lifted, unusual.
-const PAYLOAD_SHARE: (f64, f64) = (10.0, 3.0);
+const PAYLOAD_SHARE: (f64, f64) = (3.0, 1.0);
 /// The same in orbit: the arm of the space shuttle moved 70 times its mass.
 const WEIGHTLESS: f64 = 30.0;
 /// Payloads above this are no points (kg).
@@ -126,7 +126,9 @@ pub(crate) fn gravity(g: &Vector3<f64>) -> Option<Caveat> {
         }
         Some((_, words)) => Some(kinds::GRAVITY.found("gravity", size, 9.81).likely(*words).as_note()),
         None => {
-            let factors = &[(1e2, "cm/s2"), (1e3, "mm/s2"), (0.10197, "in g")];
+            let digit = "the decimal point";
+            let factors =
+                &[(1e2, "cm/s2"), (1e3, "mm/s2"), (0.10197, "in g"), (3.2808, "ft/s2"), (10.0, digit), (0.1, digit)];
             Some(kinds::GRAVITY.found("gravity", size, 9.81).likely(slip(size, &(9.7..=9.9), factors, 1.0)))
         }
     }

@@ -22,6 +22,8 @@ const PERIOD_ERROR: f64 = 0.05;
 const DRIFT: f64 = 0.01;
 /// Wider settling bands are slips (m).
 const WIDE_BAND: f64 = 0.01;
+/// Fewest steps in the longest move.
+const STEPS_PER_MOVE: f64 = 50.0;
 
 /// A flexible link whose far end turned by so much (rad), with so much engineering strain.
 pub(crate) fn link(name: &str, rotation: f64, strain: f64) -> impl Iterator<Item = Caveat> {
@@ -101,6 +103,14 @@ pub(crate) fn band(band_m: f64, peak_m: f64, usual_m: f64) -> Option<Caveat> {
     }
     let beyond = kinds::BAND_BEYOND_ERROR.found("run", band_m, peak_m);
     (peak_m > 0.0 && band_m > peak_m).then(|| if band_m == usual_m { beyond.as_note() } else { beyond })
+}
+
+/// A step that cuts even the longest move of a motion into few parts.
+pub(crate) fn long_step(step_s: f64, moves_s: impl Iterator<Item = f64>) -> Option<Caveat> {
+    let most = moves_s.fold(0.0, f64::max) / STEPS_PER_MOVE;
+    let likely = || slip(step_s, &(1e-6..=most), &[(1e3, "milliseconds")], 1.0);
+    (most > 0.0 && step_s > most * (1.0 + 1e-9))
+        .then(|| kinds::LONG_STEP.found("run", step_s, most).likely(likely()))
 }
 
 /// Gap of the energy balance, as a part of the energy in it.

@@ -3,19 +3,16 @@
 use flexarm_analysis::TcpMetrics;
 use flexarm_kinematics::{Frame, State, forward_kinematics};
 use flexarm_log::Event;
-use flexarm_stepping::{FlexibleArm, StepRule, StepperKind};
-use flexarm_trajectory::LimitViolation;
+use flexarm_stepping::FlexibleArm;
+use nalgebra::Vector3;
 
+use super::before::BeforeRun;
 use super::{Run, Wanted, moves};
-use crate::caveat::pose::Standing;
 use crate::caveat::{Caveat, drives, kinds, validity};
 use crate::flexible::Owner;
 use crate::headline::{self, Bending, ShareFigures};
 use crate::options::RunOptions;
 use crate::summary::{CURVE_PIECES, DriveFigures, LinkFigures, StepperFigures, Summary, TcpFigures};
-
-/// Steps in a period of a gear's ripple with which a step of second order meets its amplitude within a few per cent.
-const RIPPLE_STEPS: f64 = 12.0;
 
 impl Run<'_> {
     /// Figures of what was seen so far; `robot_caveats` stand before those of the run.
@@ -118,20 +115,10 @@ impl Run<'_> {
 
     /// What is probably wrong with the input, and whether the models held in what was seen so far.
     fn caveats(&self, summary: &Summary, sag_m: f64, mut caveats: Vec<Caveat>) -> Vec<Caveat> {
-        caveats.extend(self.flexible.caveats());
-        caveats.extend(self.motion.caveats());
-        caveats.extend(crate::caveat::loops::of_motion(&self.motion.trajectory, &self.flexible.rigid));
-        let passed = |v: &LimitViolation| Caveat::said("joint-limit", &v.joint, format!("joint limit: {v}"), "");
-        caveats.extend(self.motion.violations.iter().map(passed));
-        let (arm, flexible, robot) = (&self.arm, self.flexible, self.robot);
-        let elastic = arm.modes.equilibrium.as_slice();
-        caveats.extend(Standing { robot, flexible, arm, elastic, sag_m }.caveats());
+        let (robot, flexible, arm, motion, options) =
+            (self.robot, self.flexible, &*self.arm, self.motion, self.options);
+        caveats.extend(BeforeRun { robot, flexible, arm, motion, options }.caveats(sag_m));
         caveats.extend(self.drive_caveats());
-        if let Some(first) = arm.modes.frequencies_hz().first() {
-            let RunOptions { stepper, step_s, .. } = *self.options;
-            caveats.extend(validity::sampling(*first, 1.0 / (self.every as f64 * step_s)));
-            caveats.extend(validity::step(stepper, step_s, *first, arm.first_damping_ratio()));
-        }
         if let Some(tcp) = summary.tcp.as_ref() {
             let of_stepper = tcp.shares_at_peak.iter().filter(|share| share.kind == headline::STEPPER);
             caveats.extend(of_stepper.filter_map(|s| validity::drift(&s.name, s.along_m.abs() / tcp.peak_m)));
@@ -144,7 +131,6 @@ impl Run<'_> {
         }
         caveats.extend(validity::energy(self.monitors.energy.result().imbalance));
         caveats.extend(self.effort_caveats());
-        caveats.extend(self.method_caveats());
         caveats
     }
 
@@ -171,53 +157,6 @@ impl Run<'_> {
         for (c, load) in coordinates.iter().zip(loads).filter(|(_, load)| load.at_limit > 0) {
             let share = 100.0 * load.at_limit as f64 / self.monitors.tool.result().len() as f64;
             caveats.push(kinds::SERVO_LIMIT.found(format!("joint {:?}", c.joint), share, 0.0));
-        }
-        caveats
-    }
-
-    /// Ripple of a gear that is faster than the steps follow, at the largest speed of a thousand instants of the motion.
-    fn ripple_caveat(&self) -> Option<Caveat> {
-        let (model, duration) = (&self.arm.model, self.motion.trajectory.duration());
-        if self.arm.transmission.is_empty() || self.options.stepper.entry().steps == StepRule::ByErrorControl {
-            return None;
-        }
-        let mut state = State::zeros(model);
-        let mut fastest = vec![0.0f64; model.n_actuated()];
-        for k in 0..=1000 {
-            self.arm.prescribed_state(
-                duration * f64::from(k) * 1e-3,
-                &mut state,
-                &mut nalgebra::DVector::zeros(model.nv()),
-            );
-            fastest.iter_mut().zip(state.qdot.iter()).for_each(|(most, rate)| *most = most.max(rate.abs()));
-        }
-        let rates = self
-            .arm
-            .transmission
-            .iter()
-            .flat_map(|error| error.harmonics.iter().map(|h| (error.motor, h.cycles * fastest[error.motor])));
-        let (motor, rate) = rates.max_by(|a, b| a.1.total_cmp(&b.1))?;
-        let steps = std::f64::consts::TAU / (rate * self.options.step_s);
-        let joint = format!("joint {:?}", model.coordinates()[motor].joint);
-        (steps < RIPPLE_STEPS).then(|| kinds::RIPPLE_STEP.found(joint, steps, RIPPLE_STEPS))
-    }
-
-    /// What stepper and start make of the run.
-    fn method_caveats(&self) -> Vec<Caveat> {
-        let mut caveats = Vec::new();
-        if matches!(self.options.stepper, StepperKind::Spook(_)) && !self.arm.proportional {
-            let betas: Vec<String> = self.arm.tau.iter().map(|b| format!("{b:.2e}")).collect();
-            let message = format!(
-                "spook damps each spring in proportion to its stiffness: modal damping became D = beta K with beta = {} s, \
-                 exact for the first mode",
-                betas.join(", ")
-            );
-            caveats.push(Caveat::said("spook-damping", "run", message, ""));
-        }
-        caveats.extend(self.ripple_caveat());
-        if self.motion.trajectory.initial_speed() > 1e-6 {
-            let message = "the motion starts at speed: the first ringing is an artefact of the sudden start";
-            caveats.push(Caveat::said("starts-moving", "run", message, ""));
         }
         caveats
     }

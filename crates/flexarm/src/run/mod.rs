@@ -3,6 +3,7 @@
 //! The loop is [`Run::go`]: the stepper steps, the twin stands beside it, [`Monitors`] watch, and a sample goes to recorders,
 //! curves and observer. Figures of what was seen are in `figures`, what happened when in `events`.
 
+mod before;
 mod events;
 mod figures;
 mod sampler;
@@ -37,6 +38,7 @@ use crate::static_part::StaticPart;
 use crate::summary::{Files, Summary};
 use crate::twin::RigidTwin;
 
+pub(crate) use before::BeforeRun;
 pub(crate) use figures::static_sag;
 
 /// What servos leave of the way to go, among the contributors to the TCP error.

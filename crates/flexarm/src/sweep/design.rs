@@ -7,6 +7,7 @@ use flexarm_study::{Sample, grid_levels};
 
 use super::file::{ParameterEntry, Role, StudyFile, Values};
 use super::metric::{Formula, Vocabulary};
+use super::store::CAVEATS;
 use super::value::ParameterValue;
 use crate::robot_file::RobotFileError;
 
@@ -48,6 +49,11 @@ impl Column {
         Self { name, paths, role, values, bounds, place, linked }
     }
 
+    /// Whether it is linked by this word.
+    pub(super) fn is_linked_by(&self, word: &str) -> bool {
+        self.linked.as_deref() == Some(word)
+    }
+
     /// Whether its values are numbers.
     pub(super) fn is_numeric(&self) -> bool {
         match &self.values {
@@ -64,7 +70,7 @@ impl Design {
         let fail = |place: &RobotFileError, message: String| RobotFileError { message, ..place.clone() };
         for (k, column) in columns.iter().enumerate() {
             let taken = columns[..k].iter().any(|other| other.name == column.name);
-            if taken || ["run", "status", "reason"].contains(&column.name.as_str()) {
+            if taken || ["run", "status", "reason", CAVEATS].contains(&column.name.as_str()) {
                 let message =
                     format!("the name {:?} is taken: give the parameter another one with name = \"...\"", column.name);
                 return Err(fail(&column.place, message));
@@ -129,6 +135,11 @@ impl Design {
     /// Points of the grid; a run's is its number over the drawn ones.
     pub(super) fn grid_points(&self) -> usize {
         self.sizes.iter().product()
+    }
+
+    /// The directions of the grid: the columns of each, and how many values it has.
+    pub(super) fn directions(&self) -> impl DoubleEndedIterator<Item = (&[usize], usize)> {
+        self.directions.iter().map(Vec::as_slice).zip(self.sizes.iter().copied())
     }
 
     /// Columns that are drawn.

@@ -11,12 +11,14 @@ use flexarm_stepping::{Batch, BatchRun, Start, ToolDeflection};
 
 use super::Sweep;
 use super::metric::{self, Facts, Quick, SummaryFacts};
+use super::told::{Told, told};
 use super::value::ParameterValue;
 use super::workshop::Ready;
+use crate::caveat::Caveat;
 use crate::error::Error;
 use crate::options::RunOptions;
 use crate::prepare::{loaded, runnable};
-use crate::run::{Together, Wanted, run_traced, static_sag, steps_per_sample};
+use crate::run::{BeforeRun, Together, Wanted, run_traced, static_sag, steps_per_sample};
 use crate::{balancer, loops};
 
 /// What a run gave.
@@ -25,14 +27,20 @@ pub(super) struct Answer {
     pub(super) run: usize,
     /// Values of the metrics, or why there are none.
     pub(super) result: Result<Vec<f64>, String>,
+    /// What is to be said of it.
+    pub(super) told: Told,
 }
 
 /// Values of the metrics, and by how much each constraint is passed.
 pub(super) type Judgement = (Vec<f64>, Vec<f64>);
 
+/// Gets of each run its place among the points, what it gave, and what is to be said of it.
+pub(super) type Tell<'a> = dyn FnMut(usize, Result<Judgement, Error>, Told) + 'a;
+
 /// A run of the quick way.
 struct QuickRun {
     place: usize,
+    told: Told,
     run: BatchRun,
     tool: flexarm_kinematics::Frame,
     start: Start,
@@ -100,9 +108,9 @@ impl Sweep {
     pub(super) fn evaluate(&self, runs: &[usize], stop: &AtomicBool, tell: &mut dyn FnMut(Answer)) {
         let points: Vec<(usize, Vec<ParameterValue>)> =
             runs.iter().map(|run| (*run, self.design.values(*run))).collect();
-        self.evaluate_points(&points, stop, &mut |place, result| {
+        self.evaluate_points(&points, stop, &mut |place, result, told| {
             let result = result.map(|(metrics, _)| metrics).map_err(|error| self.workshop.reason(&error));
-            tell(Answer { run: points[place].0, result });
+            tell(Answer { run: points[place].0, result, told });
         });
     }
 
@@ -111,7 +119,7 @@ impl Sweep {
         &self,
         points: &[(usize, Vec<ParameterValue>)],
         stop: &AtomicBool,
-        tell: &mut dyn FnMut(usize, Result<Judgement, Error>),
+        tell: &mut Tell<'_>,
     ) {
         let answered = |place: usize, facts: &dyn Facts| {
             let values = metric::values(&self.metrics, &points[place].1, facts);
@@ -123,9 +131,10 @@ impl Sweep {
                 if stop.load(Ordering::Relaxed) {
                     return;
                 }
-                match self.whole(values, stop) {
+                let mut caveats = Vec::new();
+                match self.whole(values, stop, &mut caveats) {
                     Err(Error::Interrupted { .. }) => return,
-                    result => tell(place, result.map(|facts| answered(place, &facts))),
+                    result => tell(place, result.map(|facts| answered(place, &facts)), self.told(caveats)),
                 }
             }
             return;
@@ -135,9 +144,12 @@ impl Sweep {
             if stop.load(Ordering::Relaxed) {
                 return;
             }
-            match self.quick_run(place, values) {
-                Ok(run) => going.push(run),
-                Err(error) => tell(place, Err(error)),
+            let mut caveats = Vec::new();
+            let run = self.quick_run(place, values, &mut caveats);
+            let told = self.told(caveats);
+            match run {
+                Ok(run) => going.push(QuickRun { told, ..run }),
+                Err(error) => tell(place, Err(error), told),
             }
         }
         // Side by side go runs that last about equally long.
@@ -158,46 +170,67 @@ impl Sweep {
                 let runs: Vec<BatchRun> = few.iter().map(|run| run.run.clone()).collect();
                 for (own, result) in few.iter().zip(batch.run(&runs)) {
                     let result = result.map_err(|error| own.flexible.explained(error));
-                    tell(own.place, result.map(|d| answered(own.place, &own.facts.clone().of(&d, &own.options))));
+                    let result = result.map(|d| answered(own.place, &own.facts.clone().of(&d, &own.options)));
+                    tell(own.place, result, own.told.clone());
                 }
             }
         }
     }
 
-    /// A run with its summary.
-    fn whole(&self, values: &[ParameterValue], stop: &AtomicBool) -> Result<SummaryFacts, Error> {
+    /// What is to be said of a run, as it is kept.
+    fn told(&self, caveats: Vec<Caveat>) -> Told {
+        told(caveats, &|text| self.workshop.plain(text))
+    }
+
+    /// A run with its summary. `caveats` gets what is to be said of it, also if it fails.
+    fn whole(
+        &self,
+        values: &[ParameterValue],
+        stop: &AtomicBool,
+        caveats: &mut Vec<Caveat>,
+    ) -> Result<SummaryFacts, Error> {
         let Ready { built, scenario, options } = self.workshop.ready(values)?;
+        caveats.extend_from_slice(&built.caveats);
         let together = Together {
             wanted: Wanted::Figures,
             prepared: Some(&built.prepared),
-            robot_caveats: Some(Arc::from([])),
+            robot_caveats: Some(built.caveats.clone()),
             ..Together::default()
         };
         let mut go_on =
             |_, _| if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
         let (summary, _) = run_traced(&built.robot, &scenario, &options, None, together, &mut go_on)?;
+        caveats.clone_from(&summary.caveats);
         let summary = serde_json::to_value(&summary).unwrap_or_default();
         Ok(SummaryFacts { summary, mass_kg: built.mass_kg })
     }
 
-    /// A run ready to go side by side with others.
-    fn quick_run(&self, place: usize, values: &[ParameterValue]) -> Result<QuickRun, Error> {
+    /// A run ready to go side by side with others. `caveats` gets what is to be said of it as far as that can be told before its
+    /// first step, also if it fails.
+    fn quick_run(&self, place: usize, values: &[ParameterValue], caveats: &mut Vec<Caveat>) -> Result<QuickRun, Error> {
         let Ready { built, scenario, options } = self.workshop.ready(values)?;
+        caveats.extend_from_slice(&built.caveats);
         runnable(&scenario.motion, &options)?;
         let flexible = &built.prepared.flexible;
         loops::along_motion(&flexible.rigid, &scenario.motion.trajectory)?;
         balancer::check_motion(&flexible.rigid, &scenario.motion.trajectory)?;
         let arm = built.prepared.arm(scenario.motion.prescribed()).map_err(|error| flexible.explained(error))?;
-        let (arm, _) = loaded(&built.robot, &scenario, &options, arm)?;
+        let (arm, of_loads) = loaded(&built.robot, &scenario, &options, arm)?;
         let facts = QuickFacts {
             sag_m: static_sag(&arm, &flexible.tcp),
             hz: arm.modes.frequencies_hz(),
             mass_kg: built.mass_kg,
             ..QuickFacts::default()
         };
+        let before =
+            BeforeRun { robot: &built.robot, flexible, arm: &arm, motion: &scenario.motion, options: &options };
+        caveats.extend(before.caveats(facts.sag_m));
+        caveats.extend(before.at_rest());
+        caveats.extend(before.of_rigid_motion());
+        caveats.extend(of_loads);
         let run = BatchRun { arm, duration_s: scenario.duration_s() };
-        let (tool, flexible) = (flexible.tcp.clone(), flexible.clone());
-        Ok(QuickRun { place, run, tool, start: scenario.start, options, facts, flexible })
+        let (tool, flexible, start) = (flexible.tcp.clone(), flexible.clone(), scenario.start);
+        Ok(QuickRun { place, told: None, run, tool, start, options, facts, flexible })
     }
 }
 

@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 
 use flexarm_files::read_text;
 use flexarm_study::{Distribution, SampleMethod};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
+use super::direction::Better;
 use super::value::ParameterValue;
 use crate::error::Error;
 use crate::robot_file::{RobotFileError, Source};
@@ -32,6 +33,8 @@ struct StudyToml {
     parameter: Vec<Spanned<ParameterToml>>,
     sample: Option<Spanned<SampleToml>>,
     metrics: Option<Vec<Spanned<String>>>,
+    #[serde(default)]
+    better: BTreeMap<String, Spanned<String>>,
     best: Option<Spanned<String>>,
     pareto: Option<Spanned<[String; 2]>>,
     minimise: Option<Spanned<MinimiseToml>>,
@@ -87,8 +90,9 @@ struct MinimiseToml {
 }
 
 /// What a value does to what the file says.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Role {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Role {
     /// Takes its place.
     Value,
     /// Multiplies it.
@@ -160,11 +164,15 @@ pub(super) struct StudyFile {
     pub(super) seed: u64,
     pub(super) sample_place: RobotFileError,
     pub(super) metrics: Vec<Placed>,
+    /// What is better of a metric, by its name.
+    pub(super) better: Vec<(String, Better, RobotFileError)>,
     pub(super) best: Option<Placed>,
     pub(super) pareto: Option<([String; 2], RobotFileError)>,
     pub(super) minimise: Option<MinimiseEntry>,
 }
 
+/// What the columns of a table of runs are linked by.
+pub(super) const TABLE: &str = "the table of runs";
 /// Values of a range that does not say how many.
 const USUAL_STEPS: usize = 5;
 /// Most levels of a parameter, and points of a sample.
@@ -205,11 +213,25 @@ pub(super) fn read(path: &Path) -> Result<StudyFile, Error> {
         seed,
         sample_place,
         metrics: file.metrics.iter().flatten().map(placed).collect(),
+        better: file.better.iter().map(|(name, word)| better(name, word, &source)).collect::<Result<_, _>>()?,
         best: file.best.as_ref().map(placed),
         pareto: file.pareto.as_ref().map(|pair| (pair.get_ref().clone(), source.error(pair.span(), ""))),
         minimise: file.minimise.as_ref().map(|entry| minimise(entry, &source)).transpose()?,
         text,
     })
+}
+
+fn better(
+    name: &str,
+    word: &Spanned<String>,
+    source: &Source,
+) -> Result<(String, Better, RobotFileError), RobotFileError> {
+    let place = source.error(word.span(), "");
+    let message = || format!("better: {name:?} is {:?}, expected \"lower\" or \"higher\"", word.get_ref());
+    match Better::from_word(word.get_ref()) {
+        Some(better) => Ok((name.to_owned(), better, place)),
+        None => Err(RobotFileError { message: message(), ..place }),
+    }
 }
 
 fn option(
@@ -468,7 +490,7 @@ fn table_of_runs(path: &Path, place: &RobotFileError) -> Result<Vec<ParameterEnt
             paths: vec![name.clone()],
             role: Role::Value,
             each: false,
-            linked: Some("the table of runs".into()),
+            linked: Some(TABLE.into()),
             values: Values::Levels(levels),
             bounds: None,
             place: place.clone(),

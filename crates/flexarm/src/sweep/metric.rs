@@ -3,6 +3,7 @@
 use exmex::{Express, FlatEx, FloatOpsFactory, MakeOperators};
 use serde_json::Value;
 
+use super::direction::{self, Better};
 use super::path::near;
 use super::value::ParameterValue;
 
@@ -43,6 +44,8 @@ pub(super) struct Metric {
     pub(super) name: String,
     /// As written.
     pub(super) text: String,
+    /// What is better of it, if that is known.
+    pub(super) better: Option<Better>,
     formula: Formula,
 }
 
@@ -120,7 +123,8 @@ impl Metric {
             return Err(format!("metric {text:?}: the name {name:?} is taken: give it another one"));
         }
         let formula = Formula::parse(expression, known)?;
-        Ok(Self { name: name.to_owned(), text: text.trim().to_owned(), formula })
+        let better = formula.better(known).or_else(|| direction::of_name(name));
+        Ok(Self { name: name.to_owned(), text: text.trim().to_owned(), better, formula })
     }
 
     /// Whether a run needs no whole summary for it.
@@ -142,6 +146,17 @@ impl Formula {
     pub(super) fn parse(text: &str, known: &Vocabulary<'_>) -> Result<Self, String> {
         let (expression, variables) = expression_of(text, known)?;
         Ok(Self { expression, variables })
+    }
+
+    /// What is better of it, by the numbers that it is made of.
+    fn better(&self, known: &Vocabulary<'_>) -> Option<Better> {
+        let of = |variable: &Variable| match variable {
+            Variable::Parameter(column) => direction::of_name(known.parameters[*column].as_deref()?),
+            Variable::Metric(number) => known.metrics[*number].better,
+            Variable::Fact(path, _) => direction::of_fact(path),
+        };
+        let variables: Vec<Option<Better>> = self.variables.iter().map(of).collect();
+        direction::of_expression(&self.expression, &variables)
     }
 
     /// Its value where it speaks of parameters alone.
@@ -403,6 +418,27 @@ mod tests {
         assert_eq!(value("robot.mass_kg / payload.mass").unwrap(), 2.0);
         assert_eq!(value("b = {links.link_2.peak_contribution_m} * 2").unwrap(), 2e-3);
         assert!(value("tcp.settling_s").unwrap().is_nan() && value("1 / (payload.mass - 50)").unwrap().is_nan());
+    }
+
+    #[test]
+    fn frequencies_and_what_falls_with_an_error_are_better_if_higher() {
+        let (summary, parameters) = (summary(), [Some("payload.mass".to_owned()), Some("wall".to_owned())]);
+        let mut metrics: Vec<Metric> = Vec::new();
+        for (text, better) in [
+            ("frequencies_hz.0", Some(Better::Higher)),
+            ("peak_mm = 1e3 * tcp.peak_m", Some(Better::Lower)),
+            ("margin_mm = 6 - peak_mm", Some(Better::Higher)),
+            ("k = 9.81 * payload.mass / tcp.peak_m", Some(Better::Higher)),
+            ("life_h = 2e4 * (300 / drives.joint_1)^3", Some(Better::Higher)),
+            ("off = abs(frequencies_hz.0 - 12)", None),
+            ("stiffness = wall^3", Some(Better::Higher)),
+            ("x = 2 * wall", None),
+        ] {
+            let metric =
+                Metric::parse(text, &Vocabulary { parameters: &parameters, metrics: &metrics, summary: &summary });
+            metrics.push(metric.unwrap());
+            assert_eq!(metrics[metrics.len() - 1].better, better, "{text}");
+        }
     }
 
     #[test]

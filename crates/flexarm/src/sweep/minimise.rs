@@ -8,6 +8,7 @@ use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Instant;
@@ -16,12 +17,14 @@ use flexarm_log::CreateOptions;
 use flexarm_study::{Judged, LeastSearch};
 use serde::{Deserialize, Serialize};
 
+use super::direction::Better;
 use super::error::SweepError;
-use super::evaluate::Answer;
+use super::evaluate::{Answer, Judgement};
 use super::file::{Role, Values};
 use super::metric::{Constraint, Vocabulary};
 use super::results::SweepSummary;
 use super::store::{Manifest, RUNS, STUDY, known_manifest};
+use super::told::Told;
 use super::value::ParameterValue;
 use super::{LOOK, PAGE, Sweep, SweepProgress, SweepRequest, fingerprint, table};
 use crate::error::Error;
@@ -66,12 +69,17 @@ pub struct MinimiseFigures {
     pub progress: Vec<Option<f64>>,
 }
 
-/// A line of the journal: values of the parameters that are looked for, then metrics and violations, or a reason.
+/// A line of the journal: values of the parameters that are looked for, then metrics and violations, or a reason; caveats.
 #[derive(Serialize, Deserialize)]
-struct Line(Vec<f64>, Option<String>, Vec<Option<f64>>, Vec<Option<f64>>);
+struct Line(Vec<f64>, Option<String>, Vec<Option<f64>>, Vec<Option<f64>>, #[serde(default)] Option<String>);
 
-/// Metrics and violations, or why there are none.
-type Outcome = Result<(Vec<f64>, Vec<f64>), String>;
+/// What a run gave.
+#[derive(Clone)]
+struct Outcome {
+    /// Metrics and violations, or why there are none.
+    result: Result<Judgement, String>,
+    told: Told,
+}
 
 /// A parameter that is looked for.
 struct Varied {
@@ -88,7 +96,7 @@ struct Tried {
 }
 
 fn judged(outcome: &Outcome, goal: usize) -> Judged {
-    match outcome {
+    match &outcome.result {
         Ok((metrics, passed)) => Judged { value: metrics[goal], violation: passed.iter().sum() },
         Err(_) => Judged { value: f64::NAN, violation: f64::NAN },
     }
@@ -119,9 +127,10 @@ impl Journal {
         let mut known = HashMap::new();
         let mut whole = 0;
         for line in text.split_inclusive(|byte| *byte == b'\n').filter(|line| line.ends_with(b"\n")) {
-            let Ok(Line(values, reason, metrics, passed)) = serde_json::from_slice(line) else { break };
+            let Ok(Line(values, reason, metrics, passed, told)) = serde_json::from_slice(line) else { break };
             let number = |list: Vec<Option<f64>>| list.into_iter().map(|x| x.unwrap_or(f64::NAN)).collect::<Vec<f64>>();
-            known.insert(key(&values), reason.map_or_else(|| Ok((number(metrics), number(passed))), Err));
+            let result = reason.map_or_else(|| Ok((number(metrics), number(passed))), Err);
+            known.insert(key(&values), Outcome { result, told: told.map(Arc::from) });
             whole += line.len() as u64;
         }
         let file = OpenOptions::new().create(true).truncate(false).write(true).open(&path).map_err(failed)?;
@@ -132,9 +141,10 @@ impl Journal {
 
     fn keep(&mut self, values: &[f64], outcome: &Outcome) -> Result<(), Error> {
         let list = |list: &[f64]| list.iter().map(|x| x.is_finite().then_some(*x)).collect();
-        let line = match outcome {
-            Ok((metrics, passed)) => Line(values.to_vec(), None, list(metrics), list(passed)),
-            Err(reason) => Line(values.to_vec(), Some(reason.clone()), Vec::new(), Vec::new()),
+        let told = outcome.told.as_deref().map(str::to_owned);
+        let line = match &outcome.result {
+            Ok((metrics, passed)) => Line(values.to_vec(), None, list(metrics), list(passed), told),
+            Err(reason) => Line(values.to_vec(), Some(reason.clone()), Vec::new(), Vec::new(), told),
         };
         let text = serde_json::to_string(&line).expect("plain numbers and strings") + "\n";
         self.file.write_all(text.as_bytes()).map_err(|source| Error::Write { path: self.path.clone(), source })?;
@@ -297,8 +307,9 @@ impl Sweep {
                             break;
                         }
                         let some = &todo[start..(start + few).min(todo.len())];
-                        self.evaluate_points(some, stop, &mut |place, result| {
-                            let _ = tell.send((some[place].0, result.map_err(|error| self.workshop.reason(&error))));
+                        self.evaluate_points(some, stop, &mut |place, result, told| {
+                            let result = result.map_err(|error| self.workshop.reason(&error));
+                            let _ = tell.send((some[place].0, Outcome { result, told }));
                         });
                     }
                 });
@@ -367,17 +378,18 @@ impl Sweep {
         let folder = &request.output;
         let answer = |(run, outcome): (usize, &Outcome)| Answer {
             run,
-            result: outcome.as_ref().map(|(metrics, _)| metrics.clone()).map_err(Clone::clone),
+            result: outcome.result.as_ref().map(|(metrics, _)| metrics.clone()).map_err(Clone::clone),
+            told: outcome.told.clone(),
         };
         let answers: Vec<Answer> = tried.outcomes.iter().enumerate().map(answer).collect();
         let path = folder.join(RUNS);
         let all = self.table_of(&answers, &tried.values, manifest);
         table::write(&path, &all, CreateOptions::default().with_overwrite(true))?;
         let pairs: Vec<(&Answer, Vec<ParameterValue>)> = answers.iter().zip(tried.values.iter().cloned()).collect();
-        let (mut summary, columns) = self.summary_of(&pairs, 0);
+        let (mut summary, columns) = self.summary_of(&pairs, false);
         summary.runs = answers.len();
         let best = tried.best(goal);
-        summary.best = best.map(|k| self.best_of(&answers[k], &tried.values[k], goal));
+        summary.best = best.map(|k| self.best_of(&answers[k], &tried.values[k], goal, Better::Lower));
         if let (Some(best), Some(k)) = (&mut summary.best, best) {
             let replay = self.write_replay(&tried.values[k], &folder.join("best"))?;
             best.command = request.command.map(|command| command(&replay));

@@ -8,6 +8,7 @@
 //! ([`crate::compare_study`]).
 
 mod design;
+mod direction;
 mod error;
 mod evaluate;
 mod file;
@@ -16,11 +17,14 @@ mod minimise;
 mod options;
 mod page;
 mod path;
+mod ranking;
+mod recent;
 mod replay;
 mod results;
 mod store;
 mod table;
 mod target;
+mod told;
 mod value;
 mod workshop;
 
@@ -46,13 +50,16 @@ use crate::robot::Robot;
 use crate::robot_file::RobotFileError;
 use crate::summary::{DriveFigures, LinkFigures, Summary, TcpFigures};
 
+pub use self::direction::Better;
 pub use self::error::SweepError;
+pub use self::file::Role as ParameterRole;
 pub use self::minimise::{MinimiseFigures, MinimiseRequest};
 pub use self::replay::Replay;
 pub use self::results::{
     BestRun, FailureFigures, IndexFigures, MetricFigures, ParameterFigures, ParetoFigures, ParetoRun, SweepSummary,
 };
 pub use self::store::Shard;
+pub use self::told::CaveatFigures;
 pub use self::value::ParameterValue;
 
 /// What is asked of each run where the study does not say.
@@ -140,7 +147,9 @@ impl Sweep {
         let asked = file.metrics.iter().map(|metric| (metric.text.clone(), metric.place.clone()));
         for (text, place) in usual.into_iter().flatten().chain(asked) {
             let known = Vocabulary { parameters: &parameters, metrics: &metrics, summary: &summary };
-            let metric = Metric::parse(&text, &known).map_err(|message| RobotFileError { message, ..place })?;
+            let mut metric = Metric::parse(&text, &known).map_err(|message| RobotFileError { message, ..place })?;
+            let said = file.better.iter().find(|(name, ..)| *name == metric.name);
+            metric.better = said.map(|(_, better, _)| *better).or(metric.better);
             metrics.push(metric);
         }
         let known = Vocabulary { parameters: &parameters, metrics: &metrics, summary: &summary };
@@ -209,7 +218,8 @@ impl Sweep {
         let threads = request.threads.unwrap_or_else(rayon::current_num_threads).max(1);
         let mut shown = |done: usize| progress(before + done, all);
         let mut new = Vec::new();
-        let ended = self.run_all(&todo, threads, &mut shown, &mut |answer| {
+        let ended = self.run_all(&todo, threads, &mut shown, &mut |mut answer| {
+            collected.share(&mut answer);
             new.push(answer.clone());
             store.keep(answer, self)
         });
@@ -397,11 +407,12 @@ pub fn write_files(files: &[(PathBuf, String)], overwrite: bool) -> Result<(), E
     Ok(flexarm_files::write_all(files)?)
 }
 
-/// What the study calls best or a front must be metrics.
+/// What the study calls best, better or a front must be metrics.
 fn check_names(file: &StudyFile, metrics: &[Metric]) -> Result<(), RobotFileError> {
     let best = file.best.iter().map(|best| (&best.text, &best.place));
     let pareto = file.pareto.iter().flat_map(|(pair, place)| pair.iter().map(move |name| (name, place)));
-    for (name, place) in best.chain(pareto) {
+    let better = file.better.iter().map(|(name, _, place)| (name, place));
+    for (name, place) in best.chain(pareto).chain(better) {
         if !metrics.iter().any(|metric| metric.name == *name) {
             let known: Vec<&str> = metrics.iter().map(|metric| metric.name.as_str()).collect();
             let message = format!("{name:?} is no metric of the study; they are {}", known.join(", "));

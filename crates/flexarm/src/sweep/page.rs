@@ -5,10 +5,10 @@ use std::fmt::Write as _;
 
 use flexarm_draw::charts::{BarPair, EffectPanel, HeatMap, ScatterPlot, bar_pairs, effects, scatter_matrix};
 use flexarm_draw::{CurveLook, LinePlot, Panel, PlotCurve};
-use flexarm_study::main_effect;
 
 use super::Sweep;
-use super::file::Values;
+use super::file::Role;
+use super::ranking::Ranking;
 use super::results::{Columns, SweepSummary};
 use crate::html_page::opening;
 use flexarm_settings::written::markup;
@@ -22,7 +22,7 @@ const MOST_POINTS: usize = 1500;
 /// Panels in a row of effects.
 const MOST_PANELS: usize = 6;
 /// Values of a parameter that each have a row or column of a heat map.
-const MOST_CELLS: usize = 24;
+const MOST_CELLS: usize = 40;
 /// Rows or columns of others.
 const BINS: usize = 10;
 
@@ -43,37 +43,79 @@ impl Sweep {
             let (runs, first, reason) = (failure.runs, failure.first, markup(&failure.reason));
             let _ = writeln!(page, "<p class=\"no\">{runs} runs failed, first run {first}: {reason}</p>");
         }
+        for warning in &summary.warnings {
+            let _ = writeln!(page, "<p class=\"no\">Warning: {}</p>", markup(warning));
+        }
         page += &search(summary);
         page += &figures(summary);
-        page += &best(summary);
-        page += &self.heat_maps(columns);
-        page += &self.main_effects(columns);
+        page += &self.best_run(summary);
+        let rankings = self.rankings(columns);
+        page += &self.who_matters(&rankings);
+        page += &self.heat_maps(columns, &rankings);
+        page += &self.main_effects(columns, &rankings);
         page += &sensitivities(summary);
         page += &self.pareto_plot(summary, columns);
-        page += &self.matrix(columns);
+        page += &self.matrix(columns, rankings.first());
         page + "</body></html>\n"
     }
 
-    /// Numeric parameters that vary, those that make most of the first result's variance first.
-    fn strongest(&self, columns: &Columns, metric: usize) -> Vec<(usize, f64)> {
-        let share = |(k, x): (usize, &Option<Vec<f64>>)| {
-            // What follows from others shows what they show.
-            let follows = matches!(self.design.columns[k].values, Values::Derived(_));
-            let effect = main_effect(x.as_ref().filter(|_| !follows)?, &columns.metrics[metric])?;
-            Some((k, effect.share))
-        };
-        let mut found: Vec<(usize, f64)> = columns.parameters.iter().enumerate().filter_map(share).collect();
-        found.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        found
+    /// A parameter with what its numbers are, and by how much they are multiplied to be shown.
+    fn shown(&self, parameter: usize) -> (String, f64) {
+        let column = &self.design.columns[parameter];
+        match column.role {
+            Role::Value => (column.name.clone(), 1.0),
+            Role::Factor => (format!("{} (% of the file)", column.name), 100.0),
+            Role::Offset => (format!("{} (added to the file)", column.name), 1.0),
+        }
     }
 
-    fn heat_maps(&self, columns: &Columns) -> String {
+    /// The numbers of a parameter as they are shown.
+    fn shown_values(&self, parameter: usize, columns: &Columns) -> Option<Vec<f64>> {
+        let factor = self.shown(parameter).1;
+        Some(columns.parameters[parameter].as_ref()?.iter().map(|x| x * factor).collect())
+    }
+
+    /// The rankings of the metrics that have pictures.
+    fn rankings(&self, columns: &Columns) -> Vec<Ranking> {
+        (0..self.metrics.len().min(MOST_METRICS)).map(|metric| self.ranking(columns, metric)).collect()
+    }
+
+    /// What is said of the parameters before any picture: who matters, and who cannot be told from chance.
+    fn who_matters(&self, rankings: &[Ranking]) -> String {
+        let names = |list: &mut dyn Iterator<Item = usize>| {
+            list.map(|p| markup(&self.design.columns[p].name)).collect::<Vec<_>>().join(", ")
+        };
         let mut out = String::new();
-        for (k, metric) in self.metrics.iter().enumerate().take(MOST_METRICS) {
-            let strongest = self.strongest(columns, k);
-            let [(a, _), (b, _), ..] = strongest[..] else { continue };
-            let (Some(x), Some(y)) = (&columns.parameters[a], &columns.parameters[b]) else { continue };
-            let ((x_names, x_cells), (y_names, y_cells)) = (cells(x), cells(y));
+        for (metric, ranking) in self.metrics.iter().zip(rankings) {
+            let all = ranking.matter.len() + ranking.untold.len();
+            if all == 0 {
+                continue;
+            }
+            let name = markup(&metric.name);
+            let _ = match ranking.matter.is_empty() {
+                true => write!(out, "<p>{name}: no parameter stands out."),
+                false => write!(out, "<p>{name}: {}.", names(&mut ranking.matter.iter().map(|(p, _)| *p))),
+            };
+            if let Some(chance) = ranking.chance.filter(|_| !ranking.untold.is_empty()) {
+                let untold = names(&mut ranking.untold.iter().copied());
+                let reach = match chance < 1.0 {
+                    true => format!("which may explain {:.0} % of the scatter of so few draws", 100.0 * chance),
+                    false => "the draws are too few to tell any effect".to_owned(),
+                };
+                let _ = write!(out, " Not told from chance: {untold} ({reach}; more draws show smaller effects).");
+            }
+            out += "</p>\n";
+        }
+        headed("Parameters that matter, the strongest first", out)
+    }
+
+    fn heat_maps(&self, columns: &Columns, rankings: &[Ranking]) -> String {
+        let mut out = String::new();
+        let mut axes = Axes::default();
+        for (k, (metric, ranking)) in self.metrics.iter().zip(rankings).enumerate() {
+            let Some((a, b)) = axes.pair(&ranking.matter) else { continue };
+            let (Some(x), Some(y)) = (self.shown_values(a, columns), self.shown_values(b, columns)) else { continue };
+            let ((x_names, x_cells), (y_names, y_cells)) = (cells(&x), cells(&y));
             let mut sums = vec![(0.0, 0usize); x_names.len() * y_names.len()];
             for (row, value) in columns.metrics[k].iter().enumerate().filter(|(_, value)| value.is_finite()) {
                 let (Some(x), Some(y)) = (x_cells[row], y_cells[row]) else { continue };
@@ -90,32 +132,27 @@ impl Sweep {
             };
             let map = HeatMap {
                 title: &title,
-                x_label: &self.design.columns[a].name,
-                y_label: &self.design.columns[b].name,
+                x_label: &self.shown(a).0,
+                y_label: &self.shown(b).0,
                 x: &x_names,
                 y: &y_names,
                 values: &values,
             };
             let _ = writeln!(out, "<div>{}</div>", map.svg());
         }
-        headed("Heat maps of the two parameters that matter most", out)
+        headed("Heat maps of parameters that matter", out)
     }
 
-    fn main_effects(&self, columns: &Columns) -> String {
+    fn main_effects(&self, columns: &Columns, rankings: &[Ranking]) -> String {
+        let labels: Vec<String> = (0..self.design.columns.len()).map(|p| self.shown(p).0).collect();
         let mut rows = Vec::new();
-        for (k, metric) in self.metrics.iter().enumerate().take(MOST_METRICS) {
-            let mut panels = Vec::new();
-            for (p, _) in self.strongest(columns, k).into_iter().take(MOST_PANELS) {
-                let Some(effect) = columns.parameters[p].as_ref().and_then(|x| main_effect(x, &columns.metrics[k]))
-                else {
-                    continue;
-                };
-                panels.push(EffectPanel {
-                    x_label: &self.design.columns[p].name,
-                    y_label: &metric.name,
-                    points: effect.groups.iter().map(|g| [g.x, g.mean, g.std_error]).collect(),
-                });
-            }
+        for (k, (metric, ranking)) in self.metrics.iter().zip(rankings).enumerate() {
+            let panel = |(p, _): &(usize, f64)| {
+                let (effect, factor) = (self.effect(*p, k, columns)?, self.shown(*p).1);
+                let points = effect.groups.iter().map(|g| [factor * g.x, g.mean, g.std_error]).collect();
+                Some(EffectPanel { x_label: &labels[*p], y_label: &metric.name, points })
+            };
+            let panels: Vec<EffectPanel<'_>> = ranking.matter.iter().take(MOST_PANELS).filter_map(panel).collect();
             if !panels.is_empty() {
                 rows.push(panels);
             }
@@ -136,13 +173,8 @@ impl Sweep {
             let row = columns.runs.iter().position(|run| *run == best.run)?;
             Some([columns.metrics[a][row], columns.metrics[b][row]])
         });
-        let plot = ScatterPlot {
-            x_label: &pareto.metrics[0],
-            y_label: &pareto.metrics[1],
-            points: &points,
-            front: &front,
-            best,
-        };
+        let label = |k: usize| format!("{} ({} is better)", pareto.metrics[k], pareto.better[k].word());
+        let plot = ScatterPlot { x_label: &label(0), y_label: &label(1), points: &points, front: &front, best };
         let mut out = format!(
             "<div>{}</div>\n<table><tr><th>run</th><th>{}</th><th>{}</th></tr>\n",
             plot.svg(),
@@ -160,29 +192,82 @@ impl Sweep {
             );
         }
         out += "</table>\n";
-        headed("Pareto front: no other run is lower in both", out)
+        let assumed = [a, b].into_iter().filter(|k| self.metrics[*k].better.is_none());
+        for name in assumed.map(|k| &self.metrics[k].name) {
+            let name = markup(name);
+            let _ = writeln!(out, "<p>{name} is taken to be better if lower: better in the study says otherwise.</p>");
+        }
+        headed("Pareto front: no other run is better in both", out)
     }
 
-    fn matrix(&self, columns: &Columns) -> String {
+    fn best_run(&self, summary: &SweepSummary) -> String {
+        let Some(best) = &summary.best else { return String::new() };
+        let mut out = format!(
+            "<h2>Best run</h2>\n<p>Run {} has the {} {}: <b>{}</b>.</p>\n<table><tr><th>parameter</th><th>value</th></tr>\n",
+            best.run,
+            best.better.most(),
+            markup(&best.metric),
+            number(best.value)
+        );
+        for (p, column) in self.design.columns.iter().enumerate() {
+            let Some(value) = best.parameters.get(&column.name) else { continue };
+            let (name, factor) = self.shown(p);
+            let value = value.number().map_or_else(|| markup(&value.to_string()), |x| number(factor * x));
+            let _ = writeln!(out, "<tr><td>{}</td><td>{value}</td></tr>", markup(&name));
+        }
+        out += "</table>\n<table><tr><th>metric</th><th>value</th></tr>\n";
+        for (name, value) in &best.metrics {
+            let value = value.map_or_else(|| "-".into(), number);
+            let _ = writeln!(out, "<tr><td>{}</td><td>{value}</td></tr>", markup(name));
+        }
+        out += "</table>\n";
+        if let Some(command) = &best.command {
+            let _ = writeln!(out, "<p>Again, with recordings and report:</p>\n<pre>{}</pre>", markup(command));
+        }
+        out
+    }
+
+    fn matrix(&self, columns: &Columns, ranking: Option<&Ranking>) -> String {
         let every = columns.runs.len().div_ceil(MOST_POINTS).max(1);
         let thinned = |values: &[f64]| -> Vec<f64> { values.iter().copied().step_by(every).collect() };
         let metrics = self.metrics.len().min(MOST_METRICS);
-        let strongest = if metrics > 0 { self.strongest(columns, 0) } else { Vec::new() };
-        let mut named: Vec<(&str, Vec<f64>)> = Vec::new();
-        for (p, _) in strongest.into_iter().take(MOST_COLUMNS - metrics) {
-            if let Some(x) = &columns.parameters[p] {
-                named.push((&self.design.columns[p].name, thinned(x)));
+        let ranked = ranking.map(|r| r.matter.iter().map(|(p, _)| *p).chain(r.untold.iter().copied()));
+        let mut named: Vec<(String, Vec<f64>)> = Vec::new();
+        for p in ranked.into_iter().flatten().take(MOST_COLUMNS - metrics) {
+            if let Some(x) = self.shown_values(p, columns) {
+                named.push((self.shown(p).0, thinned(&x)));
             }
         }
         for k in 0..metrics {
-            named.push((&self.metrics[k].name, thinned(&columns.metrics[k])));
+            named.push((self.metrics[k].name.clone(), thinned(&columns.metrics[k])));
         }
         if named.len() < 2 {
             return String::new();
         }
-        let columns: Vec<(&str, &[f64])> = named.iter().map(|(name, values)| (*name, &values[..])).collect();
+        let columns: Vec<(&str, &[f64])> = named.iter().map(|(name, values)| (&name[..], &values[..])).collect();
         let what = "Scatter matrix (above the diagonal the correlation of the ranks)";
         headed(what, format!("<div>{}</div>\n", scatter_matrix(&columns)))
+    }
+}
+
+/// Which axis each parameter has in the heat maps of a page: the same one in all of them.
+#[derive(Debug, Default)]
+struct Axes {
+    to_the_right: Vec<usize>,
+    upwards: Vec<usize>,
+}
+
+impl Axes {
+    /// The strongest parameter and the next one that can have the other axis: what goes to the right, and what goes up.
+    fn pair(&mut self, ranked: &[(usize, f64)]) -> Option<(usize, usize)> {
+        let (first, rest) = ranked.split_first()?;
+        let goes_up = self.upwards.contains(&first.0);
+        let taken = if goes_up { &self.upwards } else { &self.to_the_right };
+        let second = rest.iter().map(|(p, _)| *p).find(|p| !taken.contains(p))?;
+        let (x, y) = if goes_up { (second, first.0) } else { (first.0, second) };
+        self.to_the_right.push(x);
+        self.upwards.push(y);
+        Some((x, y))
     }
 }
 
@@ -228,30 +313,6 @@ fn figures(summary: &SweepSummary) -> String {
         );
     }
     out + "</table>\n"
-}
-
-fn best(summary: &SweepSummary) -> String {
-    let Some(best) = &summary.best else { return String::new() };
-    let mut out = format!(
-        "<h2>Best run</h2>\n<p>Run {} has the least {}: <b>{}</b>.</p>\n<table><tr><th>parameter</th><th>value</th></tr>\n",
-        best.run,
-        markup(&best.metric),
-        number(best.value)
-    );
-    for (name, value) in &best.parameters {
-        let value = value.number().map_or_else(|| markup(&value.to_string()), number);
-        let _ = writeln!(out, "<tr><td>{}</td><td>{value}</td></tr>", markup(name));
-    }
-    out += "</table>\n<table><tr><th>metric</th><th>value</th></tr>\n";
-    for (name, value) in &best.metrics {
-        let _ =
-            writeln!(out, "<tr><td>{}</td><td>{}</td></tr>", markup(name), value.map_or_else(|| "-".into(), number));
-    }
-    out += "</table>\n";
-    if let Some(command) = &best.command {
-        let _ = writeln!(out, "<p>Again, with recordings and report:</p>\n<pre>{}</pre>", markup(command));
-    }
-    out
 }
 
 /// How a search went.
@@ -326,5 +387,23 @@ fn number(x: f64) -> String {
             if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
         }
         _ => format!("{x:.4e}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parameter_keeps_its_axis_in_all_heat_maps() {
+        let mut axes = Axes::default();
+        let mut pair = |ranked: &[usize]| axes.pair(&ranked.iter().map(|p| (*p, 1.0)).collect::<Vec<_>>());
+        assert_eq!(pair(&[0, 1, 2]), Some((0, 1)));
+        assert_eq!(pair(&[1, 0, 2]), Some((0, 1)));
+        assert_eq!(pair(&[1, 2]), Some((2, 1)));
+        // 2 and 0 both go to the right: the next one goes up.
+        assert_eq!(pair(&[2, 0, 1]), Some((2, 1)));
+        assert_eq!(pair(&[0, 2]), None);
+        assert_eq!(pair(&[3]), None);
     }
 }

@@ -2,14 +2,17 @@
 
 use std::collections::BTreeMap;
 
-use flexarm_study::{SampleMethod, main_effect, pareto_front, sobol_indices, spread};
+use flexarm_study::{SampleMethod, pareto_front, sobol_indices, spread};
 use serde::Serialize;
 
 use super::Sweep;
+use super::direction::Better;
 use super::evaluate::Answer;
+use super::file::Role;
 use super::minimise::MinimiseFigures;
 use super::replay::Replay;
 use super::store::Collected;
+use super::told::{self, CaveatFigures};
 use super::value::ParameterValue;
 
 /// Answer of `flexarm sweep`.
@@ -39,12 +42,16 @@ pub struct SweepSummary {
     pub metrics: Vec<MetricFigures>,
     /// Why runs failed, the most frequent first.
     pub failures: Vec<FailureFigures>,
-    /// The run with the least of what is to be least; null if none was done.
+    /// The best run; null if none was done.
     pub best: Option<BestRun>,
     /// The runs that no other beats in two metrics; null with one metric.
     pub pareto: Option<ParetoFigures>,
     /// How the search went, if one was made.
     pub minimise: Option<MinimiseFigures>,
+    /// The sentences of the caveats that warn, each once, with the number of runs that it concerns.
+    pub warnings: Vec<String>,
+    /// What `check` and `compare` would say of the runs, each caveat once with its worst value, warnings first.
+    pub caveats: Vec<CaveatFigures>,
     /// Runs that several shards had, with the same result; they count once.
     pub doubles: usize,
 }
@@ -56,6 +63,9 @@ pub struct ParameterFigures {
     pub name: String,
     /// Least and largest value; null of words.
     pub range: Option<[f64; 2]>,
+    /// What its values do to those of the files: `value`, `factor` or `offset`.
+    #[serde(rename = "as")]
+    pub role: Role,
 }
 
 /// A metric over all runs that were done.
@@ -77,6 +87,13 @@ pub struct MetricFigures {
     pub quantiles: Option<[f64; 3]>,
     /// Part of its variance that each parameter makes by itself (correlation ratio); null of words and where nothing varies.
     pub shares: BTreeMap<String, Option<f64>>,
+    /// The parameters that matter, the strongest first: listed ones with an effect, and drawn ones whose effect stands out of chance.
+    pub matters: Vec<String>,
+    /// Part of the scatter of the draws that the strongest of the drawn parameters would have by chance in 1 of 100 studies; null
+    /// where nothing is drawn.
+    pub chance: Option<f64>,
+    /// What is better of it; null if neither the study nor its expression nor its name tells.
+    pub better: Option<Better>,
     /// Sobol indices of the parameters that were drawn by Saltelli's design; empty otherwise.
     pub sobol: Vec<IndexFigures>,
 }
@@ -96,13 +113,15 @@ pub struct IndexFigures {
     pub total_interval: [f64; 2],
 }
 
-/// The run with the least of a metric.
+/// The best run by a metric.
 #[derive(Clone, Debug, Serialize)]
 pub struct BestRun {
     /// Its number.
     pub run: usize,
-    /// What is least in it.
+    /// What is least or highest in it.
     pub metric: String,
+    /// Which of both: lower where it is not known what is better.
+    pub better: Better,
     /// How much that is.
     pub value: f64,
     /// Values of its parameters.
@@ -118,8 +137,10 @@ pub struct BestRun {
 /// Runs that no other beats in two metrics.
 #[derive(Clone, Debug, Serialize)]
 pub struct ParetoFigures {
-    /// Both, each better if less.
+    /// Both.
     pub metrics: [String; 2],
+    /// What is better of each: lower where that is not known.
+    pub better: [Better; 2],
     /// By the first metric.
     pub runs: Vec<ParetoRun>,
 }
@@ -148,6 +169,8 @@ pub struct FailureFigures {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Columns {
     pub(super) runs: Vec<usize>,
+    /// Whether the runs are those of the design, not of a search.
+    pub(super) of_design: bool,
     /// Of numeric parameters.
     pub(super) parameters: Vec<Option<Vec<f64>>>,
     pub(super) metrics: Vec<Vec<f64>>,
@@ -158,7 +181,7 @@ const MOST_REASONS: usize = 10;
 
 impl Sweep {
     /// Results as columns.
-    pub(super) fn columns(&self, answers: &[(&Answer, Vec<ParameterValue>)]) -> Columns {
+    fn columns(&self, answers: &[(&Answer, Vec<ParameterValue>)], of_design: bool) -> Columns {
         let number = |value: &ParameterValue| value.number().unwrap_or(f64::NAN);
         let parameter = |k: usize| {
             let numeric = self.design.columns[k].is_numeric();
@@ -171,6 +194,7 @@ impl Sweep {
         };
         Columns {
             runs: answers.iter().map(|(answer, _)| answer.run).collect(),
+            of_design,
             parameters: (0..self.design.columns.len()).map(parameter).collect(),
             metrics: (0..self.metrics.len()).map(metric).collect(),
         }
@@ -180,17 +204,19 @@ impl Sweep {
     pub(super) fn summary(&self, collected: &Collected) -> (SweepSummary, Columns) {
         let answers: Vec<(&Answer, Vec<ParameterValue>)> =
             collected.answers.values().map(|(answer, _)| (answer, self.design.values(answer.run))).collect();
-        self.summary_of(&answers, collected.doubles)
+        let (summary, columns) = self.summary_of(&answers, true);
+        (SweepSummary { doubles: collected.doubles, ..summary }, columns)
     }
 
-    /// Figures of runs with these values of the parameters.
+    /// Figures of runs with these values of the parameters; whether they are those of the design.
     pub(super) fn summary_of(
         &self,
         answers: &[(&Answer, Vec<ParameterValue>)],
-        doubles: usize,
+        of_design: bool,
     ) -> (SweepSummary, Columns) {
-        let columns = self.columns(answers);
+        let columns = self.columns(answers, of_design);
         let failed = answers.iter().filter(|(answer, _)| answer.result.is_err()).count();
+        let caveats = told::figures(answers.iter().map(|(answer, _)| *answer));
         let summary = SweepSummary {
             study: self.file.name.clone(),
             runs: self.runs(),
@@ -199,7 +225,8 @@ impl Sweep {
             parameters: self.parameter_figures(&columns),
             metrics: self.metric_figures(&columns),
             failures: failures(answers),
-            doubles,
+            warnings: told::warnings(&caveats, answers.len()),
+            caveats,
             best: self.best(answers, &columns),
             pareto: self.pareto(&columns),
             ..SweepSummary::default()
@@ -207,8 +234,8 @@ impl Sweep {
         (summary, columns)
     }
 
-    /// The place of the metric that is to be least.
-    pub(super) fn goal(&self) -> usize {
+    /// The place of the metric by which a run is the best.
+    fn goal(&self) -> usize {
         let named = self.file.best.as_ref().and_then(|best| self.metrics.iter().position(|m| m.name == best.text));
         named.unwrap_or(0)
     }
@@ -216,13 +243,20 @@ impl Sweep {
     fn best(&self, answers: &[(&Answer, Vec<ParameterValue>)], columns: &Columns) -> Option<BestRun> {
         let goal = self.goal();
         let values = columns.metrics.get(goal)?;
+        let better = self.better(goal);
         let finite = values.iter().enumerate().filter(|(_, value)| value.is_finite());
-        let (row, _) = finite.min_by(|a, b| a.1.total_cmp(b.1).then(a.0.cmp(&b.0)))?;
-        Some(self.best_of(answers[row].0, &answers[row].1, goal))
+        let finite = finite.map(|(row, value)| (row, better.as_cost(*value)));
+        let (row, _) = finite.min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)))?;
+        Some(self.best_of(answers[row].0, &answers[row].1, goal, better))
+    }
+
+    /// What is taken to be better of a metric.
+    pub(super) fn better(&self, metric: usize) -> Better {
+        self.metrics[metric].better.unwrap_or(Better::Lower)
     }
 
     /// A run as the best one.
-    pub(super) fn best_of(&self, answer: &Answer, values: &[ParameterValue], goal: usize) -> BestRun {
+    pub(super) fn best_of(&self, answer: &Answer, values: &[ParameterValue], goal: usize, better: Better) -> BestRun {
         let empty = Vec::new();
         let results = answer.result.as_ref().unwrap_or(&empty);
         let parameters = self.design.columns.iter().zip(values);
@@ -232,6 +266,7 @@ impl Sweep {
         BestRun {
             run: answer.run,
             metric: self.metrics[goal].name.clone(),
+            better,
             value: results.get(goal).copied().unwrap_or(f64::NAN),
             parameters: parameters.map(|(column, value)| (column.name.clone(), value.clone())).collect(),
             metrics: self.metrics.iter().enumerate().map(metric).collect(),
@@ -249,24 +284,22 @@ impl Sweep {
         };
         let (x, y) = (&columns.metrics[a], &columns.metrics[b]);
         let run = |row: usize| ParetoRun { run: columns.runs[row], values: [x[row], y[row]] };
-        let runs: Vec<ParetoRun> = pareto_front(x, y).into_iter().map(run).collect();
+        let better = [a, b].map(|k| self.better(k));
+        let costs = |values: &[f64], k: usize| values.iter().map(|x| better[k].as_cost(*x)).collect::<Vec<f64>>();
+        let runs: Vec<ParetoRun> = pareto_front(&costs(x, 0), &costs(y, 1)).into_iter().map(run).collect();
         let metrics = [a, b].map(|k| self.metrics[k].name.clone());
-        (!runs.is_empty()).then_some(ParetoFigures { metrics, runs })
+        (!runs.is_empty()).then_some(ParetoFigures { metrics, better, runs })
     }
 
     /// Sobol indices of a metric; with a grid besides, of what scatters about the mean at each of its points.
-    fn indices(&self, values: &[f64], runs: &[usize]) -> Vec<IndexFigures> {
+    fn indices(&self, values: &[f64], columns: &Columns) -> Vec<IndexFigures> {
         let drawn = self.design.drawn();
-        if self.file.method != SampleMethod::Saltelli || drawn.is_empty() {
+        if self.file.method != SampleMethod::Saltelli || drawn.is_empty() || !columns.of_design {
             return Vec::new();
         }
         // What is not there, or failed, is missing in its place.
         let mut whole = vec![f64::NAN; self.runs()];
-        // The runs of a search are none of the design.
-        if runs.iter().any(|run| *run >= whole.len()) {
-            return Vec::new();
-        }
-        runs.iter().zip(values).for_each(|(run, value)| whole[*run] = *value);
+        columns.runs.iter().zip(values).for_each(|(run, value)| whole[*run] = *value);
         // What the grid makes is not what scatters.
         let points = self.runs() / self.design.grid_points().max(1);
         for point in whole.chunks_mut(points.max(1)) {
@@ -288,6 +321,7 @@ impl Sweep {
         let of = |(k, values): (usize, &Option<Vec<f64>>)| ParameterFigures {
             name: self.design.columns[k].name.clone(),
             range: values.as_ref().and_then(|values| spread(values)).map(|spread| [spread.min, spread.max]),
+            role: self.design.columns[k].role,
         };
         columns.parameters.iter().enumerate().map(of).collect()
     }
@@ -295,10 +329,9 @@ impl Sweep {
     fn metric_figures(&self, columns: &Columns) -> Vec<MetricFigures> {
         let of = |(k, values): (usize, &Vec<f64>)| {
             let spread = spread(values);
-            let share = |(p, x): (usize, &Option<Vec<f64>>)| {
-                let effect = x.as_ref().and_then(|x| main_effect(x, values));
-                (self.design.columns[p].name.clone(), effect.map(|effect| effect.share))
-            };
+            let name = |p: usize| self.design.columns[p].name.clone();
+            let share = |p: usize| (name(p), self.effect(p, k, columns).map(|effect| effect.share));
+            let ranking = self.ranking(columns, k);
             MetricFigures {
                 name: self.metrics[k].name.clone(),
                 count: spread.map_or(0, |spread| spread.count),
@@ -307,8 +340,11 @@ impl Sweep {
                 mean: spread.map(|spread| spread.mean),
                 std: spread.map(|spread| spread.std),
                 quantiles: spread.map(|spread| spread.quantiles),
-                shares: columns.parameters.iter().enumerate().map(share).collect(),
-                sobol: self.indices(values, &columns.runs),
+                shares: (0..columns.parameters.len()).map(share).collect(),
+                matters: ranking.matter.iter().map(|(p, _)| name(*p)).collect(),
+                chance: ranking.chance,
+                better: self.metrics[k].better,
+                sobol: self.indices(values, columns),
             }
         };
         columns.metrics.iter().enumerate().map(of).collect()

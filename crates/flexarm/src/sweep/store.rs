@@ -9,10 +9,11 @@
 //! A journal whose last line was cut is read up to there. Parts come into being under another name. The bytes of `runs.parquet` are
 //! those of its rows: who computed them, in how many shards and in which order does not show.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use flexarm_files::{read_text, write_all};
@@ -30,6 +31,8 @@ use crate::error::Error;
 pub(super) const STUDY: &str = "study.json";
 /// The table of all runs.
 pub(super) const RUNS: &str = "runs.parquet";
+/// The column of what is to be said of each run.
+pub(super) const CAVEATS: &str = "caveats";
 /// Folder of the parts.
 const PARTS: &str = "parts";
 /// Lines of a journal that become a part.
@@ -112,14 +115,26 @@ pub(super) struct Collected {
     pub(super) doubles: usize,
     /// Into how many shards the parts were cut.
     pub(super) shards: Option<usize>,
+    /// What is said of runs: each text once.
+    texts: HashSet<Arc<str>>,
 }
 
-/// A line of a journal.
+/// A line of a journal: run, reason, metrics, caveats.
 #[derive(Serialize, Deserialize)]
-struct Line(usize, Option<String>, Vec<Option<f64>>);
+struct Line(usize, Option<String>, Vec<Option<f64>>, #[serde(default)] Option<String>);
 
 impl Collected {
-    fn add(&mut self, answer: Answer, file: usize) -> Result<(), SweepError> {
+    /// Has an answer share its caveats with those of which the same is said.
+    pub(super) fn share(&mut self, answer: &mut Answer) {
+        let Some(text) = &answer.told else { return };
+        match self.texts.get(text) {
+            Some(known) => answer.told = Some(known.clone()),
+            None => _ = self.texts.insert(text.clone()),
+        }
+    }
+
+    fn add(&mut self, mut answer: Answer, file: usize) -> Result<(), SweepError> {
+        self.share(&mut answer);
         match self.answers.get(&answer.run) {
             None => {
                 self.answers.insert(answer.run, (answer, file));
@@ -193,6 +208,10 @@ impl Collected {
         let Some(DataValues::Text(reasons)) = table.column("reason") else {
             return Err(broken("has no column \"reason\"".into()).into());
         };
+        let caveats = match table.column(CAVEATS) {
+            Some(DataValues::Text(texts)) => texts.as_slice(),
+            _ => return Err(broken(format!("has no column {CAVEATS:?}")).into()),
+        };
         self.files.push(path.to_owned());
         let file = self.files.len() - 1;
         for (row, run) in runs.iter().enumerate() {
@@ -202,7 +221,8 @@ impl Collected {
             };
             let run = usize::try_from(*run).ok().filter(|run| *run < manifest.runs);
             let run = run.ok_or_else(|| broken(format!("has a run that is not from 0 to {}", manifest.runs - 1)))?;
-            self.add(Answer { run, result }, file)?;
+            let told = caveats[row].as_deref().map(Arc::from);
+            self.add(Answer { run, result, told }, file)?;
         }
         Ok(())
     }
@@ -273,12 +293,12 @@ fn read_journal(path: &Path, manifest: &Manifest) -> Result<(Vec<Answer>, u64), 
                 answers.len() + 1
             ),
         };
-        let Line(run, reason, metrics) = serde_json::from_slice(line).map_err(|_| broken())?;
+        let Line(run, reason, metrics, told) = serde_json::from_slice(line).map_err(|_| broken())?;
         if run >= manifest.runs || reason.is_none() && metrics.len() != manifest.metrics.len() {
             return Err(broken().into());
         }
         let numbers = metrics.into_iter().map(|x| x.unwrap_or(f64::NAN)).collect();
-        answers.push(Answer { run, result: reason.map_or(Ok(numbers), Err) });
+        answers.push(Answer { run, result: reason.map_or(Ok(numbers), Err), told: told.map(Arc::from) });
         whole += line.len() as u64;
     }
     Ok((answers, whole))
@@ -355,7 +375,8 @@ impl Store {
             Ok(values) => (None, values.iter().map(|x| x.is_finite().then_some(*x)).collect()),
             Err(reason) => (Some(reason.clone()), Vec::new()),
         };
-        let line = serde_json::to_string(&Line(answer.run, reason, metrics)).expect("plain numbers and strings") + "\n";
+        let line = Line(answer.run, reason, metrics, answer.told.as_deref().map(str::to_owned));
+        let line = serde_json::to_string(&line).expect("plain numbers and strings") + "\n";
         let failed = |source| Error::Write { path: self.journal_path.clone(), source };
         self.journal.write_all(line.as_bytes()).map_err(failed)?;
         if self.synced.elapsed() > SYNC {
@@ -474,6 +495,8 @@ impl Sweep {
         }
         let reasons = answers.iter().map(|answer| answer.result.as_ref().err().cloned()).collect();
         columns.push(DataColumn::new("reason", DataValues::Text(reasons)));
+        let told = answers.iter().map(|answer| answer.told.as_deref().map(str::to_owned)).collect();
+        columns.push(DataColumn::new(CAVEATS, DataValues::Text(told)));
         let metrics: Vec<String> = self.metrics.iter().map(|metric| metric.text.clone()).collect();
         let texts = [
             ("flexarm.study", manifest.study.clone()),

@@ -14,9 +14,11 @@ use super::design::Column;
 use super::file::{Role, StudyFile};
 use super::options::StudyOptions;
 use super::path::{Segment, places, segments};
+use super::recent::Recent;
 use super::target::{Edit, Target, Which, edits};
 use super::value::ParameterValue;
 use super::{Finders, fingerprint};
+use crate::caveat::Caveat;
 use crate::error::Error;
 use crate::file_cache::FileCache;
 use crate::flexible::FlexibleRobot;
@@ -30,8 +32,6 @@ use crate::robot::{LoadOptions, Robot};
 use crate::robot_file::RobotFileError;
 use crate::scenario::Scenario;
 
-/// Arms and motions that are kept for the next runs.
-const KEPT: usize = 64;
 /// Keys of a robot file that a motion of joints does not depend on.
 const NOT_OF_THE_MOTION: [&str; 7] =
     ["payload", "flexible_link", "drive", "gravity", "mounting", "balancer", "coupling"];
@@ -51,6 +51,8 @@ pub(super) struct Built {
     pub(super) prepared: Prepared,
     /// All links without the payload (kg).
     pub(super) mass_kg: f64,
+    /// [`Robot::caveats`].
+    pub(super) caveats: Arc<[Caveat]>,
 }
 
 /// A run that can go.
@@ -79,28 +81,6 @@ struct Chosen {
     options: StudyOptions,
     given: Vec<(String, ParameterValue)>,
     speed: Option<f64>,
-}
-
-/// Values by their keys, the latest last.
-struct Recent<T>(Mutex<Vec<(String, T)>>);
-
-impl<T: Clone> Recent<T> {
-    fn get(&self, key: &str) -> Option<T> {
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let place = kept.iter().rposition(|(known, _)| known == key)?;
-        let found = kept.remove(place);
-        let value = found.1.clone();
-        kept.push(found);
-        Some(value)
-    }
-
-    fn put(&self, key: String, value: T) {
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if kept.len() >= KEPT {
-            kept.remove(0);
-        }
-        kept.push((key, value));
-    }
 }
 
 /// Makes runs ready.
@@ -148,8 +128,8 @@ impl Workshop {
             given_options: file.options.iter().map(|(key, value, _)| (key.clone(), value.clone())).collect(),
             targets: Vec::new(),
             roles: Vec::new(),
-            arms: Recent(Mutex::default()),
-            motions: Recent(Mutex::default()),
+            arms: Recent::default(),
+            motions: Recent::default(),
             reduced: Mutex::default(),
             links_folder: PathBuf::from("links"),
         };
@@ -192,7 +172,12 @@ impl Workshop {
 
     /// Why a run failed, with files by their names: where they are differs from machine to machine.
     pub(super) fn reason(&self, error: &Error) -> String {
-        self.texts.keys().fold(error.to_string(), |text, path| {
+        self.plain(error.to_string())
+    }
+
+    /// A text with files by their names.
+    pub(super) fn plain(&self, text: String) -> String {
+        self.texts.keys().fold(text, |text, path| {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
             text.replace(&path.display().to_string(), &name)
         })
@@ -550,7 +535,8 @@ impl Workshop {
         let robot = self.robot_of(path, text)?;
         let flexible = robot.modelled(&modelling)?;
         let mass_kg = mass(&robot, &flexible);
-        let built = Arc::new(Built { robot, prepared: Prepared::new(flexible), mass_kg });
+        let caveats = robot.caveats().into();
+        let built = Arc::new(Built { robot, prepared: Prepared::new(flexible), mass_kg, caveats });
         self.arms.put(key, built.clone());
         Ok(built)
     }
