@@ -202,7 +202,7 @@ pub(crate) fn run(cli: &Cli, args: &CompensateArgs) -> Result<ExitCode, Failure>
     }
     let found = compensate_motion(&robot, scenario, &request)?;
     if !cli.quiet {
-        found.caveats.iter().for_each(|caveat| warning(&caveat.message));
+        found.warnings.iter().for_each(|text| warning(text));
     }
     answer(cli, || to_json(&found), || text(&found));
     Ok(ExitCode::SUCCESS)

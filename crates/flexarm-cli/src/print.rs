@@ -121,9 +121,6 @@ pub(crate) fn inspection(i: &Inspection) -> String {
         "TCP on {}: position {:.6?} m, quaternion wxyz {:.6?}\n",
         i.tcp.link, i.tcp.position_m, i.tcp.quaternion_wxyz
     );
-    for w in &i.warnings {
-        out += &format!("warning: {w}\n");
-    }
     out
 }
 

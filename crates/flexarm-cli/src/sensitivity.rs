@@ -72,7 +72,7 @@ pub(crate) fn run(cli: &Cli, args: &SensitivityArgs) -> Result<ExitCode, Failure
         let at = values::joint_values(args.at.as_deref(), &robot)?;
         let found = pose_sensitivity(&robot, args.modelling.modelling(), at.as_deref(), &args.by)?;
         if !cli.quiet {
-            found.caveats.iter().for_each(|caveat| warning(&caveat.message));
+            found.warnings.iter().for_each(|text| warning(text));
         }
         answer(cli, || to_json(&found), || pose_text(&found));
         return Ok(ExitCode::SUCCESS);
@@ -100,7 +100,7 @@ pub(crate) fn run(cli: &Cli, args: &SensitivityArgs) -> Result<ExitCode, Failure
     };
     let found = sensitivity(&robot, scenario, &request)?;
     if !cli.quiet {
-        found.caveats.iter().for_each(|caveat| warning(&caveat.message));
+        found.warnings.iter().for_each(|text| warning(text));
     }
     answer(cli, || to_json(&found), || text(&found));
     Ok(ExitCode::SUCCESS)

@@ -60,6 +60,7 @@ pub mod import;
 mod material_entry;
 pub mod reduce;
 mod stamp;
+pub mod yardsticks;
 
 pub use error::{ImportError, JobError, LinkError};
 pub use material_entry::{MaterialConstants, MaterialEntry};

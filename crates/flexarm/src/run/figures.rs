@@ -4,12 +4,11 @@ use flexarm_analysis::TcpMetrics;
 use flexarm_kinematics::{Frame, State, forward_kinematics};
 use flexarm_log::Event;
 use flexarm_stepping::{FlexibleArm, StepRule, StepperKind};
-use flexarm_trajectory::LimitViolation;
 use nalgebra::Vector3;
 
 use super::{Run, Wanted, moves};
 use crate::caveat::pose::Standing;
-use crate::caveat::{Caveat, drives, kinds, validity};
+use crate::caveat::{Caveat, drives, kinds, told, validity};
 use crate::flexible::Owner;
 use crate::headline::{self, Bending, ShareFigures};
 use crate::summary::{CURVE_PIECES, DriveFigures, LinkFigures, StepperFigures, Summary, TcpFigures};
@@ -111,12 +110,9 @@ impl Run<'_> {
 
     /// What is probably wrong with the input, and whether the models held in what was seen so far.
     fn caveats(&self, links: &[LinkFigures], sag_m: f64, mut caveats: Vec<Caveat>) -> Vec<Caveat> {
-        caveats.extend(self.flexible.caveats());
-        caveats.extend(self.motion.caveats());
-        caveats.extend(crate::caveat::loops::of_motion(&self.motion.trajectory, &self.flexible.rigid));
-        let passed = |v: &LimitViolation| Caveat::said("joint-limit", &v.joint, format!("joint limit: {v}"), "");
-        caveats.extend(self.motion.violations.iter().map(passed));
         let (arm, flexible, robot) = (&self.arm, self.flexible, self.robot);
+        caveats = told::of_model(robot, flexible, Some(&caveats));
+        caveats.extend(told::of_motion(self.motion, &flexible.rigid));
         let elastic = arm.modes.equilibrium.as_slice();
         caveats.extend(Standing { robot, flexible, arm, elastic, sag_m }.caveats());
         caveats.extend(self.drive_caveats());
