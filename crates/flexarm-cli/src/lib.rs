@@ -347,6 +347,9 @@ fn inspect(cli: &Cli, args: &InspectArgs) -> Result<ExitCode, Failure> {
     let robot = Robot::load_with(&shipped::robot(Some(&args.robot))?, &load_options(&args.load)?)?;
     let values = |text: &Option<String>| values::joint_values(text.as_deref(), &robot);
     let inspection = flexarm::inspect(&robot, values(&args.at)?.as_deref(), values(&args.velocity)?.as_deref())?;
+    if !cli.quiet {
+        inspection.warnings.iter().for_each(|text| print::warning(text));
+    }
     answer(cli, || to_json(&inspection), || print::inspection(&inspection));
     Ok(ExitCode::SUCCESS)
 }

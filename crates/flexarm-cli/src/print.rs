@@ -177,9 +177,6 @@ pub(crate) fn inspection(i: &Inspection) -> String {
         "TCP on {}: position {:.6?} m, quaternion wxyz {:.6?}\n",
         i.tcp.link, i.tcp.position_m, i.tcp.quaternion_wxyz
     );
-    for warning in gathered(&i.warnings) {
-        out += &format!("warning: {}\n", message(&warning));
-    }
     out
 }
 

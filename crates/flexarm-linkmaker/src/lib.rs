@@ -61,6 +61,7 @@ mod material_entry;
 pub mod reduce;
 mod robot_entry;
 mod stamp;
+pub mod yardsticks;
 
 pub use error::{ImportError, JobError, LinkError};
 pub use material_entry::{MaterialConstants, MaterialEntry};

@@ -92,12 +92,7 @@ fn numbers_beyond_what_a_robot_can_do_are_refused_with_their_place() {
             "a.src:3:1: `PTP {X 1e308",
             "a coordinate of the target is 1e305",
         ),
-        (
-            "a.src",
-            krl("PTP {A1 -1e308}"),
-            "a.src:3:1",
-            "an axis value is -1.745329251994329",
-        ),
+        ("a.src", krl("PTP {A1 -1e308}"), "a.src:3:1", "an axis value is -1.745329251994329"),
         ("a.src", krl("LIN {X 1e308*1e308,Y 0,Z 0,A 0,B 0,C 0}"), "a.src:3", "expected -10000 to 10000"),
         ("a.src", krl("$VEL.CP=1e-300\nLIN {X 0,Y 0,Z 0,A 0,B 0,C 0}"), "a.src:4", "the speed of the path is 1e-300"),
         (

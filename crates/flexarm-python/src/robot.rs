@@ -357,7 +357,8 @@ impl PyRobot {
             value.map(|value| Ok(numbers(name, value, &[(n, "joints")], false)?.values().to_vec())).transpose()
         };
         let (q, velocity) = (one("q", q)?, one("velocity", velocity)?);
-        plain(py, &flexarm::inspect(&self.robot, q.as_deref(), velocity.as_deref()).or_raise()?)
+        let found = flexarm::inspect(&self.robot, q.as_deref(), velocity.as_deref()).or_raise()?;
+        caveat::answer(py, &found, &found.caveats)
     }
 
     /// Keys, folder, text of the URDF and choices at loading, for `flexarm.RobotBuilder`.

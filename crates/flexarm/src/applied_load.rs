@@ -4,6 +4,7 @@ use flexarm_kinematics::{Frame, Model, Wrench};
 use flexarm_settings::Quantity;
 use flexarm_stepping::{Load, TimedWrench};
 
+use crate::caveat::Caveat;
 use crate::error::{Error, LoadError};
 use crate::loads_file::Written;
 use crate::robot::TCP_FRAME;
@@ -17,6 +18,8 @@ pub struct AppliedLoad {
     pub wrench: TimedWrench,
     /// When it begins (s), if it has a beginning.
     pub start_s: Option<f64>,
+    /// What is doubtful of how it is written.
+    pub(crate) doubts: Vec<Caveat>,
     /// Where it is written, if a file was read.
     pub(crate) written: Option<Written>,
 }
@@ -24,7 +27,7 @@ pub struct AppliedLoad {
 impl AppliedLoad {
     /// A wrench at the origin of a frame: `tcp`, or a link that moves.
     pub fn new(frame: &str, wrench: TimedWrench) -> Self {
-        Self { frame: frame.to_owned(), wrench, start_s: None, written: None }
+        Self { frame: frame.to_owned(), wrench, start_s: None, doubts: Vec::new(), written: None }
     }
 
     /// The same, known to begin then (s): a load that begins after the run is told as a caveat.

@@ -10,7 +10,7 @@ use flexarm_log::{Columns, RunHeader, Sample};
 use flexarm_stepping::{Held, OperatingPoint};
 use rayon::prelude::*;
 
-use crate::caveat::Caveat;
+use crate::caveat::{Caveat, Use, told};
 use crate::error::Error;
 use crate::flexible::FlexibleRobot;
 use crate::options::{Modelling, Outputs, RunOptions};
@@ -94,8 +94,13 @@ impl Arm {
     }
 
     /// [`Robot::caveats`], found once.
-    pub(crate) fn robot_caveats(&self) -> &[Caveat] {
-        &self.caveats
+    pub(crate) fn robot_caveats(&self) -> Arc<[Caveat]> {
+        self.caveats.clone()
+    }
+
+    /// Everything that is to be said of the robot as it is modelled, and of what a command does with it.
+    pub(crate) fn told(&self, used: Use<'_>) -> Vec<Caveat> {
+        told(&self.robot, &self.shared(), Some(&self.caveats), used)
     }
 
     /// How its links and drives are modelled.

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use flexarm_settings::Setting;
 use flexarm_trajectory::{FileError, PlanError, Problem, TrajectoryError};
 use flexarm_urdf::{Finding as UrdfFinding, Severity};
 use nalgebra::Vector6;
@@ -10,14 +9,15 @@ use serde::Serialize;
 
 use crate::balancer;
 use crate::caveat::motion::of_motion;
-use crate::caveat::size::{Size, middle};
+use crate::caveat::size::Size;
+use crate::caveat::told::standing_pose;
 use crate::caveat::{self, Caveat};
 use crate::drive_entry::DriveKind;
 use crate::error::Error;
 use crate::loops;
 use crate::motion::Motion;
 use crate::motion_formats::{self, MotionFile, MotionOptions};
-use crate::options::{LinkModel, Modelling};
+use crate::options::Modelling;
 use crate::posed::Posed;
 use crate::robot::{LoadOptions, Robot};
 use crate::scenario::Scenario;
@@ -66,10 +66,6 @@ impl Finding {
         let Caveat { code, message, value, yardstick, unit, likely, help, .. } = caveat;
         let message = message.strip_prefix(&prefix).map_or(message.clone(), str::to_owned);
         Self { severity, code, location: file.display().to_string(), message, help, value, yardstick, unit, likely }
-    }
-
-    fn warning(code: &str, location: String, message: String, help: &str) -> Self {
-        Self { severity: "warning", code: code.into(), location, message, help: help.into(), ..Self::default() }
     }
 }
 
@@ -201,16 +197,18 @@ fn check_flexible(robot: &Robot, motion: Option<&Motion>, findings: &mut Vec<Fin
         let help = "add [[flexible_link]] or [[drive]] entries to a robot.toml".into();
         findings.push(Finding { help, ..Finding::note("no-flexible-link", file.clone(), message.into()) });
     }
-    check_geometric(robot, findings);
-    let held = Pose::of(robot, motion);
-    let posed = held.as_ref().map_err(|e| e.to_string()).and_then(|pose| {
-        let posed = Posed::held(robot, &Modelling::default(), pose.at.clone()).map_err(|e| e.to_string())?;
-        let linear = posed.linear(&Vector6::zeros()).map_err(|e| e.to_string())?;
-        Ok((posed, linear, &pose.words))
+    let posed = standing_pose(robot, motion).and_then(|at| {
+        let posed = Posed::held(robot, &Modelling::default(), at)?;
+        let linear = posed.linear(&Vector6::zeros())?;
+        Ok((posed, linear))
     });
     match posed {
         Err(error) => findings.push(Finding::error("no-equilibrium", file, &error)),
-        Ok((posed, linear, words)) => {
+        Ok((posed, linear)) => {
+            let words = motion.map_or_else(
+                || "in the middle of the joint ranges".to_owned(),
+                |motion| format!("at the start of {}", motion.name),
+            );
             let hz = posed.arm.modes.frequencies_hz();
             if !hz.is_empty() {
                 let message = format!("first frequencies {words} {:.2?} Hz", &hz[..hz.len().min(4)]);
@@ -219,58 +217,6 @@ fn check_flexible(robot: &Robot, motion: Option<&Motion>, findings: &mut Vec<Fin
             let told = posed.flexible.caveats().into_iter().chain(posed.validity(robot, &linear));
             findings.extend(told.map(|caveat| Finding::caveat(&robot.path, caveat)));
         }
-    }
-}
-
-/// What [`check()`] says of a robot without a motion: of its file, its links and drives, and of the arm in the middle of its joint ranges.
-pub(crate) fn caveats_of(robot: &Robot, modelling: Modelling) -> Vec<Caveat> {
-    let held = Pose::of(robot, None).and_then(|pose| Posed::held(robot, &modelling, pose.at));
-    let Ok(mut posed) = held else { return robot.caveats() };
-    let mut caveats = std::mem::take(&mut posed.caveats);
-    if let Ok(linear) = posed.linear(&Vector6::zeros()) {
-        caveats.extend(posed.validity(robot, &linear));
-    }
-    caveat::once_each(caveats)
-}
-
-/// Links that are asked to stiffen by load and cannot.
-fn check_geometric(robot: &Robot, findings: &mut Vec<Finding>) {
-    for link in robot.flexible.iter().filter(|link| link.choices.geometric) {
-        let name = &link.flexible.link;
-        let (message, help) = match (link.choices.model, link.has_geometric()) {
-            (_, false) => (
-                format!(
-                    "link {name:?}: geometric_stiffening is asked for, but its .flex file has no stiffness by load"
-                ),
-                format!("make it with flexarm reduce {}", Setting::Geometric),
-            ),
-            (LinkModel::Modal, true) => continue,
-            (_, true) => (
-                format!("link {name:?}: geometric_stiffening only counts for model = \"modal\""),
-                format!("add model = \"modal\", or run with {} modal", Setting::Links),
-            ),
-        };
-        findings.push(Finding::warning("geometric-stiffening", robot.path.display().to_string(), message, &help));
-    }
-}
-
-/// Where a robot is held to look at it.
-struct Pose {
-    at: Vec<f64>,
-    words: String,
-}
-
-impl Pose {
-    /// Where the motion begins, else in the middle of the joint ranges.
-    fn of(robot: &Robot, motion: Option<&Motion>) -> Result<Self, Error> {
-        let model = robot.rigid_model()?;
-        let mut at: Vec<f64> = model.coordinates().iter().map(|c| middle(c.limits.lower, c.limits.upper)).collect();
-        let Some(motion) = motion else {
-            return Ok(Self { at, words: "in the middle of the joint ranges".into() });
-        };
-        let n = at.len();
-        motion.trajectory.sample(0.0, &mut at, &mut vec![0.0; n], &mut vec![0.0; n]);
-        Ok(Self { at, words: format!("at the start of {}", motion.name) })
     }
 }
 

@@ -87,7 +87,7 @@ pub(crate) enum Asked {
 
 impl RobotLink {
     /// A spring of its lumped models with the factors.
-    fn scaled(&self, K: &Matrix6<f64>) -> Matrix6<f64> {
+    pub(crate) fn scaled(&self, K: &Matrix6<f64>) -> Matrix6<f64> {
         let root = self.stiffness_factors.map(f64::sqrt);
         let K = self.stiffness.as_ref().unwrap_or(K);
         Matrix6::from_fn(|i, j| root[i] * K[(i, j)] * root[j]) * self.stiffness_factor

@@ -1,5 +1,7 @@
 //! What was loaded, and its kinematics and dynamics at one pose.
 
+use std::sync::Arc;
+
 use flexarm_flexlink::LinkForm;
 use flexarm_kinematics::{
     Data, State, forward_kinematics_velocity, frame_jacobian, gravity_forces, mass_matrix, nonlinear_effects,
@@ -9,7 +11,7 @@ use nalgebra::{DMatrix, Matrix6xX, UnitQuaternion};
 use serde::Serialize;
 
 use crate::balancer::{self, BalancerInfo};
-use crate::caveat::validity;
+use crate::caveat::{self, Caveat, Use, told};
 use crate::error::{Error, PoseError, ValueError};
 use crate::loops::{self, LoopInfo};
 use crate::mounting::RobotMounting;
@@ -58,8 +60,10 @@ pub struct Inspection {
     pub loops: Vec<LoopInfo>,
     /// Total mass (kg), payload and base included.
     pub mass_kg: f64,
-    /// Things worth telling.
+    /// What the caveats warn of, as sentences.
     pub warnings: Vec<String>,
+    /// What is probably wrong with the input.
+    pub caveats: Vec<Caveat>,
 }
 
 /// A movable joint; limits are null where there are none.
@@ -199,8 +203,6 @@ pub fn inspect(robot: &Robot, at: Option<&[f64]>, velocity: Option<&[f64]>) -> R
     let model = robot.rigid_model()?;
     let names: Vec<&str> = model.coordinates().iter().map(|c| c.joint.as_str()).collect();
     let (q, v) = (joint_values(at, &names)?, joint_values(velocity, &names)?);
-    let mut warnings = crate::caveat::warnings(&robot.caveats());
-    warnings.extend(validity::outside_limits(model.coordinates(), &q).map(|caveat| caveat.message));
     let mut state = State::zeros(&model);
     state.q.copy_from_slice(&q);
     state.qdot.copy_from_slice(&v);
@@ -236,8 +238,8 @@ pub fn inspect(robot: &Robot, at: Option<&[f64]>, velocity: Option<&[f64]>) -> R
         });
         LinkInfo { name: l.name.clone(), mass_kg, com_m, inertia }
     });
-    let flexible = robot.flexible_robot()?;
-    warnings.extend(flexible.caveats().into_iter().map(|caveat| caveat.message));
+    let flexible = Arc::new(robot.flexible_robot()?);
+    let caveats = told(robot, &flexible, None, Use::Held(&q, &[0.0; 6]));
     let forms = robot.flexible.iter().map(|link| robot.form_of(link, &Modelling::default()).map(|(form, _)| form));
     let forms = forms.collect::<Result<Vec<_>, _>>()?;
     let flexible_links = flexible.spans.iter().zip(&robot.flexible).zip(&forms).map(|((span, link), form)| {
@@ -280,6 +282,7 @@ pub fn inspect(robot: &Robot, at: Option<&[f64]>, velocity: Option<&[f64]>) -> R
         balancers: balancer::at_pose(&model, &state.q),
         loops: loops::at_pose(&model, &state.q),
         mass_kg: robot.rigid.links.iter().filter_map(|l| l.inertia).map(|i| i.mass).fold(0.0, |sum, mass| sum + mass),
-        warnings,
+        warnings: caveat::warnings(&caveats),
+        caveats,
     })
 }

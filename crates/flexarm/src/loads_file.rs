@@ -18,6 +18,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use crate::applied_load::AppliedLoad;
+use crate::caveat::{self, Caveat};
 use crate::error::{Error, LoadError};
 use crate::load_jumps::jumps_of;
 use crate::payload::PayloadChange;
@@ -186,7 +187,7 @@ fn load(entry: &Spanned<LoadEntry>, folder: &Path, duration: f64, source: &Sourc
     let written = Written::new(source, entry.span(), e.frame.as_ref().map(Spanned::span), None);
     let load =
         AppliedLoad::new(name, TimedWrench { axes, value, jumps, stops: Vec::new(), period }).starting_at(e.start);
-    Ok(AppliedLoad { written: Some(written), ..load })
+    Ok(AppliedLoad { written: Some(written), doubts: doubts(e), ..load })
 }
 
 fn axes(entry: &Spanned<LoadEntry>, source: &Source) -> Result<LoadAxes, RobotFileError> {
@@ -199,6 +200,36 @@ fn axes(entry: &Spanned<LoadEntry>, source: &Source) -> Result<LoadAxes, RobotFi
             Err(source.error(span_or(axes, entry), message))
         }
     }
+}
+
+/// Angles that look like degrees: the phase of a sine, arguments of sin and cos in expressions.
+fn doubts(e: &LoadEntry) -> Vec<Caveat> {
+    let parts = [&e.fx, &e.fy, &e.fz, &e.tx, &e.ty, &e.tz];
+    let sines = parts.into_iter().flatten().flat_map(|text| sines(text.get_ref()));
+    let doubtful = sines.filter_map(|(text, rate, phase)| caveat::loads::of_sine(&text, rate, phase));
+    caveat::loads::of_phase(e.phase).into_iter().chain(doubtful).collect()
+}
+
+/// Sines and cosines of an expression whose argument is linear in t: text, rate (1/s) and value at zero.
+fn sines(text: &str) -> Vec<(String, f64, f64)> {
+    let starts = ["sin", "cos"].into_iter().flat_map(|name| text.match_indices(name).map(|(at, _)| at));
+    let one = |at: usize| {
+        let open = at + 3 + text[at + 3..].find(|c: char| !c.is_whitespace())?;
+        let mut depth = 0;
+        let close = text[open..].char_indices().find_map(|(k, c)| {
+            depth += i32::from(c == '(') - i32::from(c == ')');
+            (depth <= 0).then_some(open + k)
+        })?;
+        let argument: FlatEx<f64> = exmex::parse(text.get(open + 1..close)?).ok()?;
+        if argument.var_names() != ["t"] {
+            return None;
+        }
+        let value = |t: f64| argument.eval(&[t]).ok().filter(|x| x.is_finite());
+        let [a, b, c] = [value(0.0)?, value(1.0)?, value(2.0)?];
+        let linear = (c - 2.0 * b + a).abs() <= 1e-9 * (a.abs() + b.abs() + c.abs());
+        linear.then(|| (text[at..=close].to_owned(), b - a, a))
+    };
+    starts.filter_map(one).collect()
 }
 
 /// When a load ends at the latest, and when the file says that it does (s).

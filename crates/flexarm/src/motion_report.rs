@@ -231,8 +231,9 @@ fn on_robot(path: &Path, robot: &Robot, options: &MotionOptions) -> Result<(Moti
     let actuated = &model.coordinates()[..model.n_actuated()];
     crate::loops::along_motion(&model, &trajectory)?;
     let torques = torques(&trajectory, &model);
-    let along = caveat::motion::of_motion(&motion.name, &trajectory, &model);
-    let caveats: Vec<caveat::Caveat> = motion.caveats().into_iter().chain(along).collect();
+    let mut caveats = caveat::told::of_robot(robot)?;
+    let violations = |caveat: &caveat::Caveat| caveat.code == "joint-limit"; // told as `violations`
+    caveats.extend(caveat::told::of_motion(&motion, &model).into_iter().filter(|caveat| !violations(caveat)));
     let (warnings, notes) = told(&caveats, Vec::new());
 
     let limit = |x: f64| x.is_finite().then_some(x);

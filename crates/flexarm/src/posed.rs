@@ -11,7 +11,7 @@ use nalgebra::{DVector, Vector6};
 use crate::arm::Arm;
 use crate::balancer;
 use crate::caveat::pose::Standing;
-use crate::caveat::{Caveat, kinds, validity};
+use crate::caveat::{Caveat, kinds, once_each, told, validity};
 use crate::error::{Error, PoseError, ValueError};
 use crate::flexible::FlexibleRobot;
 use crate::inspect::joint_values;
@@ -30,7 +30,8 @@ pub(crate) struct Posed {
     pub(crate) prismatic: Vec<bool>,
     /// Where they are.
     pub(crate) at: Vec<f64>,
-    pub(crate) caveats: Vec<Caveat>,
+    /// [`Robot::caveats`], if they are known.
+    of_robot: Option<Arc<[Caveat]>>,
 }
 
 /// A step error of a command that takes no step.
@@ -49,7 +50,7 @@ impl Posed {
 
     /// `at` in coordinate order (rad or m).
     pub(crate) fn held(robot: &Robot, modelling: &Modelling, at: Vec<f64>) -> Result<Self, Error> {
-        Self::of(Arc::new(robot.modelled(modelling)?), robot.caveats(), at)
+        Self::with(Arc::new(robot.modelled(modelling)?), at)
     }
 
     /// An arm, its links and drives in place already; `at`: all actuated joints (rad or m), zero without it.
@@ -57,19 +58,34 @@ impl Posed {
         let flexible = arm.shared();
         let names: Vec<&str> = flexible.rigid.coordinates().iter().map(|c| c.joint.as_str()).collect();
         let at = joint_values(at, &names)?;
-        Self::of(flexible, arm.robot_caveats().to_vec(), at)
+        Ok(Self { of_robot: Some(arm.robot_caveats()), ..Self::with(flexible, at)? })
     }
 
-    /// `caveats`: those of the robot.
-    fn of(flexible: Arc<FlexibleRobot>, mut caveats: Vec<Caveat>, at: Vec<f64>) -> Result<Self, Error> {
+    /// A robot whose links and drives are in place; `at` in coordinate order (rad or m).
+    pub(crate) fn with(flexible: Arc<FlexibleRobot>, at: Vec<f64>) -> Result<Self, Error> {
         loops::check_pose(&flexible.rigid, &mut Data::new(&flexible.rigid), &DVector::from_column_slice(&at))?;
         balancer::check_pose(&flexible.rigid, &mut Data::new(&flexible.rigid), &DVector::from_column_slice(&at))?;
         let model = flexible.model.clone();
         let actuated = &model.coordinates()[..model.n_actuated()];
         let joints: Vec<String> = actuated.iter().map(|c| c.joint.clone()).collect();
-        caveats.extend(validity::outside_limits(actuated, &at));
-        caveats.extend(flexible.caveats());
-        if flexible.springs.is_empty() {
+        let prismatic = actuated.iter().map(|c| c.kind == "prismatic").collect();
+        let arm = flexible.arm(Arc::new(Held(at.clone()))).map_err(|error| flexible.explained(error))?;
+        Ok(Self { tool: flexible.tcp.clone(), flexible, arm, joints, prismatic, at, of_robot: None })
+    }
+
+    /// What is to be said of the robot and of the equilibrium that it is in, under a wrench on the tool (world axes).
+    pub(crate) fn told(&self, robot: &Robot, linear: &Linear, wrench: &[f64; 6]) -> Vec<Caveat> {
+        let mut caveats = told::of_model(robot, &self.flexible, self.of_robot.as_deref());
+        caveats.extend(told::at_rest(robot, self, linear, wrench));
+        once_each(caveats)
+    }
+
+    /// Whether the pose is within the joint ranges, and whether anything yields.
+    pub(crate) fn caveats(&self) -> Vec<Caveat> {
+        let model = &self.arm.model;
+        let mut caveats: Vec<Caveat> =
+            validity::outside_limits(&model.coordinates()[..model.n_actuated()], &self.at).collect();
+        if self.flexible.springs.is_empty() {
             let message = "the robot has no flexible link and no elastic drive: it does not yield and does not vibrate";
             caveats.push(Caveat::said(
                 "nothing-yields",
@@ -78,9 +94,7 @@ impl Posed {
                 "add [[flexible_link]] or [[drive]] entries",
             ));
         }
-        let prismatic = actuated.iter().map(|c| c.kind == "prismatic").collect();
-        let arm = flexible.arm(Arc::new(Held(at.clone()))).map_err(|error| flexible.explained(error))?;
-        Ok(Self { tool: flexible.tcp.clone(), flexible, arm, joints, prismatic, at, caveats })
+        caveats
     }
 
     /// The linear structure about the equilibrium under weight and a wrench at the TCP (world axes).
@@ -117,7 +131,7 @@ impl Posed {
     }
 
     /// What the arm does at rest.
-    pub(crate) fn standing(&self, robot: &Robot, linear: &Linear) -> Vec<Caveat> {
+    fn standing(&self, robot: &Robot, linear: &Linear) -> Vec<Caveat> {
         let moved = linear.X_WT.translation.vector - self.rigid_tool().translation.vector;
         let elastic = &linear.q.as_slice()[self.arm.model.n_actuated()..];
         let (flexible, arm) = (&self.flexible, &self.arm);

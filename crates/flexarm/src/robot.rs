@@ -451,7 +451,8 @@ impl Robot {
         let urdf = urdf.map(of_description);
         let mut caveats: Vec<Caveat> = own.chain(urdf).chain(self.written.iter().cloned()).collect();
         caveats.extend(caveat::parts::of_robot(self));
-        caveats.extend(self.flexible.iter().flat_map(caveat::links::of_link));
+        let inertia = |link: &RobotLink| self.urdf.mechanism.link(&link.flexible.link).and_then(|own| own.inertia);
+        caveats.extend(self.flexible.iter().flat_map(|link| caveat::links::of_link(link, inertia(link).as_ref())));
         caveats.extend(caveat::links::of_mounting(self));
         if let Ok(rigid) = self.rigid_model() {
             caveats.extend(caveat::drives::of_drives(&self.drives, &self.rigid, &rigid));

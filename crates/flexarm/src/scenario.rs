@@ -11,7 +11,7 @@ use flexarm_stepping::{InertiaChange, Load, Start};
 
 use crate::applied_load::AppliedLoad;
 use crate::caveat::size::Size;
-use crate::caveat::{Caveat, parts};
+use crate::caveat::{Caveat, chain, loads, parts};
 use crate::error::Error;
 use crate::loads_file::read_loads;
 use crate::motion::Motion;
@@ -107,6 +107,12 @@ impl Scenario {
         let mut acting = Disturbances::default();
         for load in &self.loads {
             acting.loads.push(load.on(model, duration)?);
+            acting.caveats.extend(load.doubts.iter().cloned());
+            // A table, samples or an impulse; other loads may go on for as long as they like.
+            if load.wrench.jumps.len() > 2 {
+                let last = load.wrench.jumps.iter().fold(0.0, |last: f64, t| last.max(*t));
+                acting.caveats.extend(loads::of_end(last, duration));
+            }
             if let Some(start) = load.start_s.filter(|start| *start >= duration) {
                 let text = format!("a load starts at {start} s, the run ends at {duration} s: it does nothing");
                 acting.caveats.push(Caveat::said("no-effect", "loads", text, "move it into the run"));
@@ -122,6 +128,9 @@ impl Scenario {
             let at = payload.at_s;
             let what = format!("the payload from {at} s on");
             acting.caveats.extend(parts::payload(&what, &payload.carried, &size, weighs));
+            if let Some(link) = payload.link.as_ref().filter(|_| payload.carried.mass > 0.0) {
+                acting.caveats.extend(chain::of_payload(robot, &size, &what, link));
+            }
             if at > duration {
                 let text = format!("the payload changes at {at} s, the run ends at {duration} s: it stays as it is");
                 acting.caveats.push(Caveat::said("no-effect", "loads", text, "move it into the run"));

@@ -145,7 +145,6 @@ fn statics_at(
     frame_jacobian(model, &data, &posed.tool, &mut J);
     let ne = model.n_elastic();
     let J = J.columns(model.nv() - ne, ne);
-    let mut caveats = posed.caveats.clone();
     let (springs, energies) = posed.arm.springs_at_rest(&loaded.q);
     let mut elements = Vec::new();
     for ((name, range), energy_j) in loaded.elements.iter().zip(energies) {
@@ -163,7 +162,7 @@ fn statics_at(
             deflection: deflection.as_slice().to_vec(),
         });
     }
-    caveats.extend(posed.validity(robot, &loaded));
+    let caveats = posed.told(robot, &loaded, &wrench);
     let [x, y, z, rx, ry, rz] = displacement;
     let [sx, sy, sz, srx, sry, srz] = sag;
     let mut statics = Statics {

@@ -255,6 +255,55 @@ fn balanced(text: &'static str) -> Change {
     })
 }
 
+/// A lumped link alone takes factors by direction.
+fn lumped(change: Change) -> Change {
+    Box::new(move |texts| links(texts).iter().all(|link| link.get("reduced").is_none()) && change(texts))
+}
+
+/// A change of robots whose links are beams and nothing else: mass and inertia are those of the section.
+fn bare(change: Change) -> Change {
+    Box::new(move |texts| texts.urdf.contains("beam_1") && change(texts))
+}
+
+/// The name of the n-th link of the arms that number them.
+fn link_n(texts: &Texts, n: usize) -> Option<String> {
+    let names = if n == 0 { vec!["base_link".to_owned(), "base".to_owned()] } else { vec![format!("link_{n}")] };
+    let six = texts.urdf.contains("name=\"link_6\"");
+    names.into_iter().find(|name| six && texts.urdf.contains(&format!("<link name=\"{name}\"")))
+}
+
+/// The TCP on the n-th link.
+fn tcp_on(n: usize) -> Change {
+    Box::new(move |texts| {
+        let Some(link) = link_n(texts, n) else { return false };
+        let tcp = texts.robot.get_mut("tcp").and_then(Value::as_table_mut);
+        tcp.is_some_and(|tcp| tcp.insert("link".into(), link.into()).is_some())
+    })
+}
+
+/// The payload on the n-th link, where there is one.
+fn payload_on(n: usize) -> Change {
+    Box::new(move |texts| {
+        let Some(link) = link_n(texts, n) else { return false };
+        let payload = texts.robot.get_mut("payload").and_then(Value::as_table_mut);
+        payload.is_some_and(|payload| payload.insert("link".into(), link.into()).is_some())
+    })
+}
+
+/// The n-th of six drives without its gearbox, where all six have one.
+fn without_gear(n: usize) -> Change {
+    Box::new(move |texts| {
+        let drives = texts.robot.get_mut("drive").and_then(Value::as_array_mut);
+        drives.is_some_and(|drives| {
+            let all =
+                drives.len() == 6 && drives.iter().take(n + 1).all(|drive| drive["kind"].as_str() == Some("gearbox"));
+            let Some(drive) = drives.get_mut(n).and_then(Value::as_table_mut).filter(|_| all) else { return false };
+            drive.insert("kind".into(), "prescribed".into());
+            drive.remove("gearbox").is_some()
+        })
+    })
+}
+
 fn inertia(factor: f64) -> Change {
     Box::new(move |texts| {
         for name in ["ixx", "iyy", "izz", "ixy", "ixz", "iyz"] {
@@ -264,7 +313,7 @@ fn inertia(factor: f64) -> Change {
     })
 }
 
-const ROBOTS: [&str; 11] = [
+const ROBOTS: [&str; 15] = [
     "kr210/robot.toml",
     "kr210/links.toml",
     "kr210/drives.toml",
@@ -274,6 +323,10 @@ const ROBOTS: [&str; 11] = [
     "manutec_r3/robot.toml",
     "reference_arm/robot.toml",
     "one_beam/robot.toml",
+    "three_beams/robot.toml",
+    "lower_arm/robot.toml",
+    "palletiser/robot.toml",
+    "kr300/robot.toml",
     "abb_three_mass/robot.toml",
     "abb_three_mass/torque.toml",
 ];
@@ -353,6 +406,36 @@ fn slips() -> Vec<(&'static str, Change, &'static [&'static str])> {
             &["balancer-strong"],
         ),
         ("a counterbalance with a tenth of its volume", balanced(CRAMPED), &["balancer-room"]),
+        ("tcp on the base", tcp_on(0), &["tcp-link"]),
+        ("tcp on the elbow", tcp_on(3), &["tcp-link"]),
+        ("tcp before the last joint", tcp_on(5), &["tcp-link"]),
+        ("payload on the elbow", payload_on(3), &["payload-link"]),
+        ("first drive rigid", without_gear(0), &["stiff-joint"]),
+        ("second drive rigid", without_gear(1), &["stiff-joint"]),
+        ("last drive rigid", without_gear(5), &["stiff-joint"]),
+        ("links 100 times as stiff", set("flexible_link.*.stiffness_factor", "100.0"), &["link-stiffness"]),
+        ("links a hundredth as stiff", set("flexible_link.*.stiffness_factor", "0.01"), &["link-stiffness"]),
+        (
+            "one direction of the links 50 times",
+            lumped(set("flexible_link.0.stiffness_factors", "[1, 1, 1, 1, 50, 1]")),
+            &["link-stiffness"],
+        ),
+        ("links without damping", set("flexible_link.*.damping", "{ modal = 0.0 }"), &["no-damping"]),
+        ("stiffness_beta of 0", set("flexible_link.*.damping", "{ stiffness_beta = 0.0 }"), &["no-damping"]),
+        ("gears without damping", set("drive.*.gearbox.damping", "0.0"), &["no-damping"]),
+        ("walls a tenth", key("flexible_link.*.beam.wall", 0.1), &["wall"]),
+        ("radius for diameter", key("flexible_link.*.beam.outer_diameter", 0.5), &["section-size"]),
+        (
+            "half the width and height",
+            bare(both(key("flexible_link.0.beam.width", 0.5), key("flexible_link.0.beam.height", 0.5))),
+            &["section-size"],
+        ),
+        ("counterbalance on the other side", key("balancer.0.from.xyz", -1.0), &["balancer-side"]),
+        (
+            "counterbalance with the sense of a load",
+            balanced("[{ joint = \"joint_2\", sine = { torque = -4000.0, zero = 0.0 } }]"),
+            &["balancer-side"],
+        ),
         ("servo far too stiff", torque(true, set("drive.0.servo", "{ velocity_gain = 1e4 }")), &["velocity-gain"]),
     ]
 }
@@ -397,6 +480,11 @@ fn harmless() -> Vec<(&'static str, Change)> {
         ("tool turned by a right angle", set("tcp.rpy", "[0.0, 1.5707963, 0.0]")),
         ("a torsion spring", balanced("[{ joint = \"joint_2\", spring = { rate = 900.0, free_angle = -1.0 } }]")),
         ("a gas spring", balanced(GAS_SPRING)),
+        ("links a half stiffer by measurement", set("flexible_link.*.stiffness_factor", "1.5")),
+        ("links half as stiff by measurement", set("flexible_link.*.stiffness_factor", "0.5")),
+        ("wrist left rigid", both(without_gear(5), both(without_gear(4), without_gear(3)))),
+        ("a payload of the tool's link, named", payload_on(6)),
+        ("counterbalance of half its pressure", key("balancer.0.gas.pressure", 0.5)),
         ("rotors twice", key("drive.*.motor_inertia", 2.0)),
         ("effort limits 1.5 times", urdf("limit", "effort", 1.5)),
         ("effort limits twice", urdf("limit", "effort", 2.0)),
@@ -463,7 +551,8 @@ fn slips_are_told_and_plausible_robots_are_not() {
 #[test]
 fn the_page_lists_the_catalogue() {
     let page = std::fs::read_to_string(project("docs/caveats.md")).unwrap();
-    let source = std::fs::read_to_string(project("crates/flexarm/src/caveat/kinds.rs")).unwrap();
+    let read = |name: &str| std::fs::read_to_string(project("crates/flexarm/src/caveat").join(name)).unwrap();
+    let source = read("kinds.rs") + &read("kinds_of_use.rs");
     let codes = source.split("CaveatKind::").skip(1).filter_map(|rest| rest.split_once("(\n").map(|(_, rest)| rest));
     let codes: Vec<&str> =
         codes.map(|rest| rest.trim_start().trim_start_matches('"').split('"').next().unwrap()).collect();

@@ -73,7 +73,8 @@ fn check(name: &str, summary: &Summary) {
     assert!(off < 1e-6, "{name}: {sum:e} of {:e}", tcp.peak_m);
     let groups = figure_groups(summary);
     let rows = groups.iter().flat_map(|group| &group.rows);
-    let shares = rows.filter(|row| row.note.starts_with("of the peak") && row.unit == "mm" && !row.name.contains("static"));
+    let shares =
+        rows.filter(|row| row.note.starts_with("of the peak") && row.unit == "mm" && !row.name.contains("static"));
     let printed: f64 = shares.map(|row| row.value.parse::<f64>().unwrap()).sum();
     let peak = (1e7 * tcp.peak_m).round() * 1e-4;
     assert!((printed - peak).abs() < 1e-6, "{name}: printed {printed} of {peak} mm");
@@ -81,7 +82,8 @@ fn check(name: &str, summary: &Summary) {
     let (parts, shares) = summary.headline.split_once(';').unwrap();
     let parts = numbers(parts);
     assert!((parts[0] - parts[1] - parts[2]).abs() < 1e-9, "{}", summary.headline);
-    let told = shares.split(", ").filter_map(|group| group.split(" (").next()?.split(' ').next_back()?.parse::<f64>().ok());
+    let told =
+        shares.split(", ").filter_map(|group| group.split(" (").next()?.split(' ').next_back()?.parse::<f64>().ok());
     assert!((told.sum::<f64>() - parts[0]).abs() < 1e-9, "{}", summary.headline);
 }
 
@@ -133,7 +135,13 @@ fn steps_that_lose_part_of_the_largest_error_are_told_and_default_steps_are_not(
                 let options = RunOptions { step_s, log_rate_hz: 1000.0, ..with(entry.name) };
                 let Ok(summary) = run(&robot, &motion, &options) else { continue };
                 let (off, caveat) = ((peak(&summary) / truth - 1.0).abs(), of_steps(&summary));
-                eprintln!("{name:<10} {:<18} {:>5.1} ms: {:.1e} {}", entry.name, 1e3 * step_s, off, if caveat { "told" } else { "" });
+                eprintln!(
+                    "{name:<10} {:<18} {:>5.1} ms: {:.1e} {}",
+                    entry.name,
+                    1e3 * step_s,
+                    off,
+                    if caveat { "told" } else { "" }
+                );
                 told += usize::from(caveat);
                 assert!(times > 1.0 || !caveat && off < 0.01, "{name}, {}: {off:e}, {:?}", entry.name, codes(&summary));
                 assert!(caveat || off < 0.05, "{name}, {} at {step_s} s: {off:e}", entry.name);
@@ -171,7 +179,8 @@ fn settling_bands_that_say_nothing_are_told() {
 fn a_pose_in_degrees_is_asked_about_wherever_a_pose_is_given() {
     let (robot, _) = load("kr210");
     let asked = |warnings: &[String]| warnings.iter().filter(|warning| warning.contains("deg is")).count();
-    let (degrees, radians) = ([0.0, -60.0, 60.0, 0.0, 30.0, 0.0], [0.0, -60.0, 60.0, 0.0, 30.0, 0.0].map(f64::to_radians));
+    let (degrees, radians) =
+        ([0.0, -60.0, 60.0, 0.0, 30.0, 0.0], [0.0, -60.0, 60.0, 0.0, 30.0, 0.0].map(f64::to_radians));
     for (pose, count) in [(degrees, 3), (radians, 0)] {
         assert_eq!(asked(&inspect(&robot, Some(&pose), None).unwrap().warnings), count);
         assert_eq!(asked(&statics(&robot, &Modelling::default(), Some(&pose), [0.0; 6]).unwrap().warnings), count);

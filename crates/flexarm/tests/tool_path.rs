@@ -349,7 +349,8 @@ fn the_first_rapid_from_joint_values_is_a_line_where_rapids_have_a_speed() {
     );
     let motion = load(&robot, "part.toml", &text).unwrap();
     std::fs::remove_dir_all(folder).unwrap();
-    let places: Vec<Vector3<f64>> = poses(&model, &motion, 2000).iter().map(|(_, pose)| pose.translation.vector).collect();
+    let places: Vec<Vector3<f64>> =
+        poses(&model, &motion, 2000).iter().map(|(_, pose)| pose.translation.vector).collect();
     let corners = [places[0], Vector3::new(1.6, 0.3, 1.2), Vector3::new(1.7, 0.3, 1.2)];
     let off = places.iter().map(|p| from_polyline(p, &corners)).fold(0.0, f64::max);
     assert!(off < 1e-6, "{off:.1e} m from the lines");

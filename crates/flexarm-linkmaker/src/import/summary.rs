@@ -155,6 +155,7 @@ impl ImportSummary {
             let sentence = format!("the mass matrix holds {:.6}, {:.6}, {:.6} kg along x, y, z", m[0], m[1], m[2]);
             all.push(Doubt::found("mass", error, MASS_ERROR, sentence));
         }
+        all.extend(crate::yardsticks::of_link(link, whole));
         let first = held_frequencies_hz.first().zip(lumped_frequencies_hz.first());
         all.extend(coarse("the matrices", first.map(|(hz, lumped)| lumped / hz - 1.0), None));
         let details = link.details.as_deref();

@@ -15,6 +15,7 @@ use super::interfaces::Chosen;
 use super::job::ReduceJob;
 use super::prepare::quadrature_name;
 use super::words::described;
+use crate::yardsticks;
 
 /// Answer of `flexarm reduce`.
 #[derive(Clone, Debug, Serialize)]
@@ -375,7 +376,8 @@ pub(super) fn summary_of(
     let modes: Vec<_> = gate.map_or_else(Vec::new, |gate| gate.modes.iter().map(ModeFigures::from).collect());
     let coarse =
         modes.first().map_or_else(Vec::new, |first| coarse("the mesh", first.lumped_error, first.reduced_error));
-    let doubts = reduction.doubts.iter().cloned().chain(coarse);
+    let own = yardsticks::of_link(link, &reduction.whole);
+    let doubts = reduction.doubts.iter().cloned().chain(coarse).chain(own).chain(spreads(chosen));
     let caveats: Vec<Caveat> = doubts.map(|doubt| doubted(&link.name, doubt)).collect();
     let kept = reduction.fixed_modes.len();
     let factor = reduction.solver.factor;
@@ -426,6 +428,17 @@ pub(super) fn summary_of(
         caveats,
         files: ReduceFiles::default(),
     }
+}
+
+/// Interfaces that take much of the link between the two that are farthest apart.
+fn spreads(chosen: &[Chosen]) -> Vec<Doubt> {
+    let place = |one: &Chosen| one.interface.X_LI.translation.vector;
+    let pairs = chosen.iter().enumerate().flat_map(|(k, a)| chosen[..k].iter().map(move |b| place(a) - place(b)));
+    let Some(line) = pairs.max_by(|a, b| a.norm().total_cmp(&b.norm())) else { return Vec::new() };
+    let length = line.norm();
+    // Of a box of nodes the extent along the line; its edges are along the axes.
+    let along = |one: &Chosen| one.extent.dot(&(line / length).abs());
+    chosen.iter().filter_map(|one| yardsticks::of_interface(&one.interface.name, along(one), length)).collect()
 }
 
 /// Errors of the first frequency beyond which a model is called too coarse.

@@ -955,6 +955,8 @@ class Compensation(TypedDict):
     """The robot program with corrected targets, of motions that were read from one (KRL, RAPID)."""
     page: str | None
     """The page."""
+    warnings: list[str]
+    """What the caveats warn of, as sentences."""
     caveats: list[CaveatDict]
     """What is doubtful."""
 
@@ -1005,6 +1007,8 @@ class Sensitivity(TypedDict):
     """One per number of the robot, its tool and its motion; what the RMS depends on most comes first."""
     table: str | None
     """Error and derivatives over time."""
+    warnings: list[str]
+    """What the caveats warn of, as sentences."""
     caveats: list[CaveatDict]
     """What is doubtful."""
 
@@ -1045,6 +1049,8 @@ class PoseSensitivity(TypedDict):
     """Natural frequencies (Hz)."""
     parameters: list[PoseParameter]
     """One per number of the robot."""
+    warnings: list[str]
+    """What the caveats warn of, as sentences."""
     caveats: list[CaveatDict]
     """What is doubtful."""
 
@@ -2178,7 +2184,9 @@ class _Inspection(TypedDict):
     mass_kg: float
     """Total mass (kg), payload and base included."""
     warnings: list[str]
-    """Things worth telling."""
+    """What the caveats warn of, as sentences."""
+    caveats: list[CaveatDict]
+    """What is probably wrong with the input."""
 
 
 class Inspection(_Inspection, total=False):

@@ -90,7 +90,8 @@ mod tests {
             assert!((found / shift - 1.0).abs() < 0.2, "{y}: {found:.3e}, {shift:.3e}");
         }
         let y = 1.0f64;
-        let (loss, phase) = (1.0 - (1.0 - y.powi(6) / 72.0 + y.powi(8) / 576.0).sqrt().powf(TAU / y), TAU * y.powi(4) / 120.0);
+        let (loss, phase) =
+            (1.0 - (1.0 - y.powi(6) / 72.0 + y.powi(8) / 576.0).sqrt().powf(TAU / y), TAU * y.powi(4) / 120.0);
         let found = error_of_a_period(kind("rk4"), y, 0.0);
         assert!((0.5..2.0).contains(&(found / loss.hypot(phase))), "{found:.3e}, {loss:.3e}, {phase:.3e}");
     }

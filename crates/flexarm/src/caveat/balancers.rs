@@ -9,6 +9,8 @@ use super::{Caveat, kinds};
 
 /// Largest torque of a balancer over the largest torque of weight: note, warning.
 const STRONG: [f64; 2] = [3.0, 10.0];
+/// Torque of its joint with a balancer over that without it (RMS).
+const RAISED: f64 = 1.1;
 /// The same of one that carries nothing.
 const WEAK: f64 = 1e-3;
 
@@ -36,13 +38,17 @@ pub(crate) fn of_balancers(mechanism: &Mechanism, rigid: &Model) -> Vec<Caveat> 
             }
             _ => {}
         }
-        let torque = own_torque(mechanism, &bare, k);
+        let alone = alone(mechanism, &bare, k);
+        let torque = alone.torque;
         if weight > 0.0 && torque > STRONG[0] * weight {
             let caveat = kinds::BALANCER_STRONG.found(&name, torque, STRONG[0] * weight);
             let likely = slip(torque, &(0.01 * weight..=STRONG[0] * weight), EFFORT, 1.0);
             caveats.push(if torque > STRONG[1] * weight { caveat.likely(likely) } else { caveat.as_note() });
         } else if torque < WEAK * weight {
             caveats.push(kinds::BALANCER_WEAK.found(&name, torque, WEAK * weight));
+        }
+        if weight > 0.0 && alone.with > RAISED * alone.without {
+            caveats.push(kinds::BALANCER_SIDE.found(&name, alone.with, alone.without).likely("on the wrong side?"));
         }
     }
     caveats
@@ -64,14 +70,32 @@ fn lengths(model: &Model, number: usize) -> Lengths {
     })
 }
 
-/// Largest torque that one balancer alone puts on a joint where it has room (N m or N).
-fn own_torque(mechanism: &Mechanism, bare: &Model, number: usize) -> f64 {
+/// What one balancer does to the joint on which it acts most, over poses spread over the joint ranges (N m or N).
+struct Alone {
+    /// Largest torque of its own.
+    torque: f64,
+    /// RMS torque that holds the arm with it.
+    with: f64,
+    /// The same without any balancer.
+    without: f64,
+}
+
+fn alone(mechanism: &Mechanism, bare: &Model, number: usize) -> Alone {
+    let mut found = Alone { torque: 0.0, with: 0.0, without: 0.0 };
     let alone = Mechanism { balancers: vec![mechanism.balancers[number].clone()], ..mechanism.clone() };
-    let Ok(alone) = Model::new(&alone) else { return 0.0 };
-    let (mut with, mut without) = (Data::new(&alone), Data::new(bare));
-    let torque = |q: DVector<f64>| {
-        let torque = (gravity_forces(&alone, &mut with, &q) - gravity_forces(bare, &mut without, &q)).amax();
-        if torque.is_finite() { torque } else { 0.0 }
+    let Ok(alone) = Model::new(&alone) else { return found };
+    let (mut data, mut data_bare) = (Data::new(&alone), Data::new(bare));
+    let mut torques = |q: DVector<f64>| {
+        (gravity_forces(&alone, &mut data, &q).clone(), gravity_forces(bare, &mut data_bare, &q).clone())
     };
-    spread_poses(bare).map(torque).fold(0.0, f64::max)
+    // Where its gas has no room there is no torque.
+    let all: Vec<_> =
+        spread_poses(bare).map(&mut torques).filter(|(with, _)| with.iter().all(|x| x.is_finite())).collect();
+    let own = |k: usize| all.iter().map(|(with, without)| (with[k] - without[k]).abs()).fold(0.0, f64::max);
+    let Some(joint) = (0..bare.nv()).max_by(|a, b| own(*a).total_cmp(&own(*b))) else { return found };
+    found.torque = own(joint);
+    let rms = |squares: f64| (squares / all.len().max(1) as f64).sqrt();
+    found.with = rms(all.iter().map(|(with, _)| with[joint].powi(2)).sum());
+    found.without = rms(all.iter().map(|(_, without)| without[joint].powi(2)).sum());
+    found
 }

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use flexarm_flexlink::GearStiffness;
 use flexarm_kinematics::{Mechanism, Model};
 
-use super::links::CREEP;
+use super::links::{CREEP, USUAL_DAMPING};
 use super::size::inertia_moved;
 use super::slip::{self, slip};
 use super::{Caveat, kinds};
@@ -135,6 +135,9 @@ fn gear(drive: &Drive, effort: f64, others: Option<f64>) -> Vec<Caveat> {
         let caveat = kinds::LEVER.found(name(drive), lever, end);
         let factors = &[(1e3, "translations in kN/m or N/mm"), (1.0 / 57.3, "rotations per degree")];
         caveats.extend((!LEVER.contains(&lever)).then(|| caveat.likely(slip(lever, &LEVER, factors, 0.5))));
+    }
+    if gear.dampers.as_ref().is_some_and(|dampers| dampers.iter().all(|damper| *damper == 0.0)) {
+        caveats.push(kinds::NO_DAMPING.found(name(drive), 0.0, USUAL_DAMPING));
     }
     let relaxation = gear.dampers.iter().flatten().map(|d| d / k).fold(0.0, f64::max);
     if gear.dampers.as_ref().is_some_and(|d| d.len() == 1) && relaxation > CREEP {

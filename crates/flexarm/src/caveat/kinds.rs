@@ -1,6 +1,7 @@
 //! The catalogue of caveats: code, sentence, unit and help. `docs/caveats.md` tells the source of each yardstick.
 
 use super::CaveatKind;
+pub(crate) use super::kinds_of_use::*;
 
 /// Far end of a flexible link turned beyond small rotations.
 pub(crate) const LARGE_DEFORMATION: CaveatKind = CaveatKind::warning(
@@ -299,7 +300,79 @@ pub(crate) const TIP_ACCELERATION: CaveatKind = CaveatKind::warning(
     "limits of a URDF are in N m and N; too small a mass has the same effect",
 );
 
+/// A TCP that nothing moves.
+pub(crate) const TCP_FIXED: CaveatKind = CaveatKind::warning(
+    "tcp-link",
+    "{where}: {value} of {yardstick} joints move it",
+    "",
+    "the TCP is on the last link of the arm, such as tool0 or flange",
+);
+/// A TCP behind which the arm goes on.
+pub(crate) const TCP_INSIDE: CaveatKind = CaveatKind::warning(
+    "tcp-link",
+    "{where}: the arm goes on {value} m behind it, of {yardstick} m in all",
+    "m",
+    "the TCP is on the last link of the arm, such as tool0 or flange",
+);
+/// A payload that nothing moves.
+pub(crate) const PAYLOAD_FIXED: CaveatKind = CaveatKind::warning(
+    "payload-link",
+    "{where}: {value} of {yardstick} joints move it",
+    "",
+    "the payload is on the link of the TCP, where it is without link",
+);
+/// A payload behind which the arm goes on.
+pub(crate) const PAYLOAD_INSIDE: CaveatKind = CaveatKind::warning(
+    "payload-link",
+    "{where}: the arm goes on {value} m behind it, of {yardstick} m in all",
+    "m",
+    "the payload is on the link of the TCP, where it is without link",
+);
+
 // Links that bend.
+
+/// Stiffness in place of that of the source.
+pub(crate) const LINK_STIFFNESS: CaveatKind = CaveatKind::warning(
+    "link-stiffness",
+    "the stiffness given for {where} is {value} times that of its beam or .flex file in one direction, measured links stay within {yardstick} times",
+    "",
+    "stiffness is the 6x6 of the spring between the two parts (N/m, N, N m/rad), as flexarm inspect shows it",
+);
+/// Stiffness without coupling.
+pub(crate) const LINK_COUPLING: CaveatKind = CaveatKind::warning(
+    "link-stiffness",
+    "the stiffness given for {where} has no coupling terms, its beam or .flex file has some of {value} of the diagonal (told above {yardstick})",
+    "",
+    "give all 36 numbers of the spring between the two parts, as flexarm inspect shows them",
+);
+/// Stiffness against mass.
+pub(crate) const LINK_SOUND: CaveatKind = CaveatKind::warning(
+    "link-stiffness",
+    "by stiffness and mass of {where} sound runs along it with {value} m/s, along links of robots with 300 to 6000 m/s (told beyond {yardstick})",
+    "m/s",
+    "no material is stiffer for its mass: check units of stiffness (N/m, N m/rad) and mass (kg)",
+);
+/// Walls.
+pub(crate) const WALL: CaveatKind = CaveatKind::warning(
+    "wall",
+    "the wall of {where} is {value} of its width, walls of arms are more than {yardstick}",
+    "",
+    "thinner walls buckle before they bear anything; wall is in m",
+);
+/// Outer size of a section against the inertia of the link.
+pub(crate) const SECTION_SIZE: CaveatKind = CaveatKind::warning(
+    "section-size",
+    "the section of {where} has a radius of gyration of {value} m about the beam, the link's own inertia has {yardstick} m",
+    "m",
+    "outer_diameter, width and height are outer sizes, not radii or halves",
+);
+/// No damping at all.
+pub(crate) const NO_DAMPING: CaveatKind = CaveatKind::warning(
+    "no-damping",
+    "{where} has a damping of {value}: what swings goes on for ever (jointed structures have {yardstick} of critical)",
+    "",
+    "leave damping out for 3 per cent",
+);
 
 /// Young's modulus.
 pub(crate) const MODULUS: CaveatKind = CaveatKind::warning(
@@ -447,6 +520,14 @@ pub(crate) const VELOCITY_GAIN: CaveatKind = CaveatKind::warning(
     "lower it, sample faster, or give motor_inertia",
 );
 
+/// A joint that does not yield among ones that do.
+pub(crate) const STIFF_JOINT: CaveatKind = CaveatKind::warning(
+    "stiff-joint",
+    "{where} does not yield, {value} of {yardstick} joints of the arm do",
+    "",
+    "give its drive a gearbox with its stiffness; leaving out the last joints of a wrist is usual",
+);
+
 // The arm at rest.
 
 /// Deflection of a gear.
@@ -492,113 +573,8 @@ pub(crate) const DAMPED_MODE: CaveatKind = CaveatKind::warning(
     "arms have 0.01 to 0.1: check damping of links and gearboxes",
 );
 
-// Motions, loads, sampling.
+// Identification.
 
-/// Effort along a motion.
-pub(crate) const MOTION_EFFORT: CaveatKind = CaveatKind::warning(
-    "motion-effort",
-    "{where} needs up to {value} N m (or N) along the motion, its limit is {yardstick}",
-    "N m",
-    "slow the motion down; check masses, payload, unit and time of the motion",
-);
-/// A balancer that carries far more than the arm weighs.
-pub(crate) const BALANCER_STRONG: CaveatKind = CaveatKind::warning(
-    "balancer-strong",
-    "{where} puts up to {value} N m (or N) on a joint, told above three times what the weight of the arm does ({yardstick})",
-    "N m",
-    "a balancer carries about what the arm weighs: check rate, pressure, area and ends (N/m, Pa, m2, m)",
-);
-/// A balancer that carries nothing.
-pub(crate) const BALANCER_WEAK: CaveatKind = CaveatKind::note(
-    "balancer-weak",
-    "{where} puts at most {value} N m (or N) on a joint, told below a thousandth of what the weight of the arm does ({yardstick})",
-    "N m",
-    "check its ends and its force: units are m, N/m and Pa",
-);
-/// A gas that has no room in a part of the joint ranges.
-pub(crate) const BALANCER_ROOM: CaveatKind = CaveatKind::warning(
-    "balancer-room",
-    "{where} gets {value} m long within the joint ranges, its gas has room up to {yardstick} m: poses beyond are refused",
-    "m",
-    "check ends, volume, area and the length to which they belong, or the joint ranges",
-);
-/// A curve that does not cover what is asked of it.
-pub(crate) const BALANCER_CURVE: CaveatKind = CaveatKind::note(
-    "balancer-curve",
-    "{where} is at {value} within the joint ranges, its curve ends at {yardstick}: it goes straight on from there",
-    "",
-    "add points, in m or rad",
-);
-/// A loop that was assembled elsewhere than told.
-pub(crate) const LOOP_ASSEMBLED: CaveatKind = CaveatKind::warning(
-    "loop-assembled",
-    "{where} closes with its dependent joints {value} rad or m from where it is told to be assembled (told above {yardstick})",
-    "rad or m",
-    "check the points of pin and eye and the lengths of the bars, or give the values in at",
-);
-/// Poses within the joint ranges in which a loop does not close.
-pub(crate) const LOOP_RANGE: CaveatKind = CaveatKind::warning(
-    "loop-range",
-    "{where} does not close in {value} % of the poses within the ranges of the driving joints (told above {yardstick} %): such poses are refused",
-    "%",
-    "limits of the driving joints say where they may be each for itself; check the lengths of the bars",
-);
-/// A small transmission angle within the joint ranges.
-pub(crate) const LOOP_REACH: CaveatKind = CaveatKind::warning(
-    "loop-transmission",
-    "{where} has transmission angles down to {value} deg within the joint ranges (told below {yardstick})",
-    "deg",
-    "limits of the dependent joints keep poses out that the machine does not reach",
-);
-/// A small transmission angle along a motion.
-pub(crate) const LOOP_TRANSMISSION: CaveatKind = CaveatKind::warning(
-    "loop-transmission",
-    "{where} comes to a transmission angle of {value} deg along the motion (told below {yardstick}): forces in its bars grow as 1/sin of it",
-    "deg",
-    "keep the motion away from the dead point, where the bars lie in a line",
-);
-/// A dependent joint beyond its limit.
-pub(crate) const LOOP_LIMIT: CaveatKind = CaveatKind::warning(
-    "loop-limit",
-    "{where}, which follows from a loop, comes to {value} along the motion, its limit is {yardstick}",
-    "",
-    "keep the driving joints nearer to each other, or correct the limit of the URDF",
-);
-/// A motion much slower than the robot.
-pub(crate) const SLOW_MOTION: CaveatKind = CaveatKind::note(
-    "slow-motion",
-    "{where} never uses more than {value} of a joint's speed limit (told below {yardstick})",
-    "",
-    "times are in s",
-);
-/// A motion that hardly moves.
-pub(crate) const SMALL_MOTION: CaveatKind = CaveatKind::note(
-    "small-motion",
-    "{where} turns no joint by more than {value} rad (told below {yardstick})",
-    "rad",
-    "is the unit of the angles right?",
-);
-/// A load against what the arm weighs and drives.
-pub(crate) const LOAD: CaveatKind = CaveatKind::warning(
-    "load",
-    "{where} is {value} N, the arm with its payload weighs {yardstick} N on earth",
-    "N",
-    "forces are in N, moments in N m",
-);
-/// A moment against what the drives have.
-pub(crate) const MOMENT: CaveatKind = CaveatKind::warning(
-    "load",
-    "{where} is {value} N m, what the arm weighs makes {yardstick} N m at its full length",
-    "N m",
-    "forces are in N, moments in N m",
-);
-/// More samples than steps.
-pub(crate) const LOG_RATE: CaveatKind = CaveatKind::warning(
-    "log-rate",
-    "{value} samples a second are asked for, there are {yardstick} steps a second: every step is logged, no more",
-    "1/s",
-    "lower the step or the log rate",
-);
 /// Displacements of another size than the robot's.
 pub(crate) const LOAD_UNIT: CaveatKind = CaveatKind::warning(
     "load-unit",

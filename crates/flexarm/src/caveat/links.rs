@@ -3,12 +3,15 @@
 use std::ops::RangeInclusive;
 
 use flexarm_fem::{Bar, BeamLink, Material, Section};
+use flexarm_kinematics::LinkInertia;
+use flexarm_settings::Setting;
 use flexarm_stepping::Damping;
 
 use super::slip::{self, slip};
 use super::{Caveat, CaveatKind, kinds};
 use crate::flexible::RobotLink;
 use crate::mounting::RobotMounting;
+use crate::options::LinkModel;
 use crate::robot::Robot;
 
 /// Young's modulus from polymers to diamond (Pa).
@@ -25,6 +28,11 @@ const SLENDER: RangeInclusive<f64> = 5e-4..=1.0;
 const TORSION: RangeInclusive<f64> = 1e-3..=1e3;
 /// What an eccentric shear centre may add to the bending of a tip.
 const TWIST: f64 = 0.01;
+/// Wall over width (diameter) of a hollow section: note, warning. Eurocode 3 (EN 1993-1-1, table 5.2) has flat walls buckle
+/// before they yield below 1/42, round ones below 1/90.
+const THIN: [f64; 2] = [1.0 / 42.0, 1.0 / 90.0];
+/// Damping that is taken where none is given.
+pub(super) const USUAL_DAMPING: f64 = 0.03;
 /// Mass of the link over that of its section.
 const MASS: RangeInclusive<f64> = 0.02..=50.0;
 /// Damping ratios of joined structures are at most this.
@@ -32,8 +40,8 @@ const RATIO: f64 = 0.2;
 /// `D = beta K` with a larger beta creeps (s).
 pub(crate) const CREEP: f64 = 0.05;
 
-/// All of them about a link.
-pub(crate) fn of_link(link: &RobotLink) -> Vec<Caveat> {
+/// All of them about a link. `own`: its inertia by the URDF.
+pub(crate) fn of_link(link: &RobotLink, own: Option<&LinkInertia>) -> Vec<Caveat> {
     let name = format!("link {:?}", link.flexible.link);
     let mut caveats: Vec<Caveat> = damping(&name, &link.damping).into_iter().collect();
     if let Some(beam) = &link.beam {
@@ -41,8 +49,28 @@ pub(crate) fn of_link(link: &RobotLink) -> Vec<Caveat> {
             caveats.extend(material(&name, &beam.material));
         }
         caveats.extend(section(&name, beam));
+        caveats.extend(sizes(&name, beam, own));
     }
+    caveats.extend(geometric(&name, link));
+    caveats.extend(super::stiffness::of_stiffness(&name, link));
     caveats
+}
+
+/// A link that is asked to stiffen by load and cannot.
+fn geometric(name: &str, link: &RobotLink) -> Option<Caveat> {
+    let (message, help) = match (link.choices.model, link.has_geometric()) {
+        _ if !link.choices.geometric => return None,
+        (_, false) => (
+            format!("{name}: geometric_stiffening is asked for, but its .flex file has no stiffness by load"),
+            format!("make it with flexarm reduce {}", Setting::Geometric),
+        ),
+        (LinkModel::Modal, true) => return None,
+        (_, true) => (
+            format!("{name}: geometric_stiffening only counts for model = \"modal\""),
+            format!("add model = \"modal\", or run with {} modal", Setting::Links),
+        ),
+    };
+    Some(Caveat::said("geometric-stiffening", name, message, &help))
 }
 
 /// Sink (m) of a base under the weight of the whole robot, and tilt (rad) under that weight at a lever of 1 m: cast pedestals
@@ -136,9 +164,50 @@ fn shear_centre(name: &str, beam: &BeamLink, bar: &Bar) -> Option<Caveat> {
     (e > most).then(|| kinds::SHEAR_CENTRE.found(name, e, most))
 }
 
+/// A wall that is far too thin for its width, and an outer size that is half or twice what the link's inertia tells.
+fn sizes(name: &str, beam: &BeamLink, own: Option<&LinkInertia>) -> Vec<Caveat> {
+    let mut caveats = Vec::new();
+    let (width, wall) = match beam.section {
+        Section::Box { width, height, wall } => (width.min(height), wall),
+        Section::Tube { outer_diameter, wall } => (outer_diameter, wall),
+        _ => (0.0, f64::INFINITY),
+    };
+    if wall < THIN[0] * width {
+        let caveat = kinds::WALL.found(name, wall / width, THIN[0]);
+        let likely = || slip(wall / width, &(THIN[0]..=0.3), &[(0.1, "a digit"), (1e-3, "metres for mm")], 1.0);
+        caveats.push(if wall < THIN[1] * width { caveat.likely(likely()) } else { caveat.as_note() });
+    }
+    let (Some(own), Ok(bar)) = (own.filter(|own| own.mass > 0.0), beam.section.bar(&beam.material)) else {
+        return caveats;
+    };
+    if beam.section.largest_size().is_none() {
+        return caveats;
+    }
+    // Of a link that is the beam and nothing else, both its mass and its inertia tell the size.
+    let axis = beam.X_LB.translation.vector.normalize();
+    let of_link = (axis.dot(&(own.inertia_com * axis)) / own.mass).sqrt();
+    let of_section = ((bar.EI_y + bar.EI_z) / bar.EA).sqrt();
+    let (size, mass) = (of_link / of_section, own.mass / (bar.mass_per_length * beam.length));
+    // A wall that stays as it is makes the mass go with the size, a solid section with its square.
+    let fits = |factor: f64| {
+        let power = mass.ln() / factor.ln();
+        (size / factor - 1.0).abs() < 0.15 && (0.85..=2.3).contains(&power)
+    };
+    let words = match () {
+        () if fits(2.0) => "about 2 times too small: a radius for a diameter?",
+        () if fits(0.5) => "about 2 times: twice the size?",
+        () => return caveats,
+    };
+    caveats.push(kinds::SECTION_SIZE.found(name, of_section, of_link).likely(words));
+    caveats
+}
+
 /// Damping as it is written; what it does to the first mode is looked at where the arm stands.
 fn damping(name: &str, damping: &Damping) -> Option<Caveat> {
     match damping {
+        Damping::Modal(0.0) | Damping::StiffnessProportional(0.0) | Damping::Rayleigh(0.0, 0.0) => {
+            Some(kinds::NO_DAMPING.found(name, 0.0, USUAL_DAMPING))
+        }
         Damping::Modal(ratio) if *ratio > RATIO => {
             let likely = slip(*ratio, &(1e-3..=0.1), &[(100.0, "per cent"), (10.0, "a digit")], 1.0);
             Some(kinds::DAMPING_RATIO.found(name, *ratio, RATIO).likely(likely))

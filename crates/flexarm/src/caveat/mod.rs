@@ -1,26 +1,32 @@
 //! Caveats about robots and runs: what is probably wrong with an input, or limits the worth of a result, as values.
 //!
-//! Runs, statics, modes, responses and `check` find them in the same functions, so that all say the same; the sentence is
-//! made in one place ([`CaveatKind::found`]). Start at [`kinds`], the catalogue; `docs/caveats.md` lists it with the source
-//! of each yardstick.
+//! Every command that uses a robot says the same of it ([`told()`]); runs and statics add what they find themselves. Each
+//! sentence is made in one place ([`CaveatKind::found`]). Start at [`kinds`], the catalogue; `docs/caveats.md` lists it with
+//! the source of each yardstick.
 //!
 //! Not here: what makes a model impossible. That is an [`crate::Error`].
 
 pub(crate) mod balancers;
+pub(crate) mod chain;
 pub(crate) mod drives;
 pub(crate) mod kinds;
+mod kinds_of_use;
 pub(crate) mod links;
+pub(crate) mod loads;
 pub(crate) mod loops;
 pub(crate) mod motion;
 pub(crate) mod parts;
 pub(crate) mod pose;
 pub(crate) mod size;
 pub(crate) mod slip;
+pub(crate) mod stiffness;
+pub(crate) mod told;
 pub(crate) mod tool;
 pub(crate) mod validity;
 
 pub use flexarm_settings::caveat::{Caveat, Severity};
 pub(crate) use flexarm_settings::caveat::{CaveatKind, once_each, warnings};
+pub(crate) use told::{Use, told};
 
 #[cfg(test)]
 mod tests {

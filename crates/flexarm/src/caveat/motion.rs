@@ -78,7 +78,6 @@ pub(crate) fn degrees(violations: &[LimitViolation], model: &Model) -> &'static 
 
 /// Largest force and moment of the loads of a run, against weight and size of the arm with its payload.
 pub(crate) fn of_loads(loads: &[Load], duration: f64, size: &Size) -> Vec<Caveat> {
-    let weight = EARTH * size.mass;
     let mut caveats = Vec::new();
     for load in loads {
         let even = (0..=TIMES).map(|i| duration * i as f64 / TIMES as f64);
@@ -88,14 +87,26 @@ pub(crate) fn of_loads(loads: &[Load], duration: f64, size: &Size) -> Vec<Caveat
             force = force.max(wrench.force.norm());
             moment = moment.max(wrench.torque.norm());
         }
-        let judged = |kind: &super::CaveatKind, what: &str, value: f64, yardstick: f64| {
-            let caveat = kind.found(what, value, yardstick);
-            let likely = slip(value, &(0.0..=HEAVY[0] * yardstick), slip::EFFORT, 1.0);
-            let caveat = if value > HEAVY[1] * yardstick { caveat.likely(likely) } else { caveat.as_note() };
-            (yardstick > 0.0 && value > HEAVY[0] * yardstick).then_some(caveat)
-        };
-        caveats.extend(judged(&kinds::LOAD, "a force on the arm", force, weight));
-        caveats.extend(judged(&kinds::MOMENT, "a moment on the arm", moment, weight * size.extent));
+        caveats.extend(heavy(force, moment, size));
     }
     caveats
+}
+
+/// A constant wrench on the tool, against weight and size of the arm with its payload.
+pub(crate) fn of_wrench(wrench: &[f64; 6], size: &Size) -> Vec<Caveat> {
+    let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
+    heavy(norm(&wrench[..3]), norm(&wrench[3..]), size)
+}
+
+/// A force (N) and a moment (N m) that are far more than the arm weighs.
+fn heavy(force: f64, moment: f64, size: &Size) -> Vec<Caveat> {
+    let judged = |kind: &super::CaveatKind, what: &str, value: f64, yardstick: f64| {
+        let caveat = kind.found(what, value, yardstick);
+        let likely = slip(value, &(0.0..=HEAVY[0] * yardstick), slip::EFFORT, 1.0);
+        let caveat = if value > HEAVY[1] * yardstick { caveat.likely(likely) } else { caveat.as_note() };
+        (yardstick > 0.0 && value > HEAVY[0] * yardstick).then_some(caveat)
+    };
+    let weight = EARTH * size.mass;
+    let force = judged(&kinds::LOAD, "a force on the arm", force, weight);
+    force.into_iter().chain(judged(&kinds::MOMENT, "a moment on the arm", moment, weight * size.extent)).collect()
 }

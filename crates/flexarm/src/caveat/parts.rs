@@ -1,6 +1,7 @@
 //! What the files say of tool, payload, gravity, masses and limits, against the size of the robot itself.
 
 use flexarm_kinematics::{Joint, Link, LinkInertia, Mechanism, Model};
+use flexarm_linkmaker::yardsticks::OSMIUM;
 use nalgebra::Vector3;
 
 use super::size::{Size, gyration, inertia_moved, least_density, weight_carried};
@@ -14,8 +15,6 @@ const FAR: (f64, f64) = (1.5, 2.0);
 const LONGEST: f64 = 100.0;
 /// A joint this many times farther from its parent than all others of the chain together.
 const ODD_DISTANCE: f64 = 20.0;
-/// Density of osmium (kg/m³): nothing is heavier.
-const OSMIUM: f64 = 22_600.0;
 /// Largest angle that anyone writes into a file in rad: a turn.
 const TURN: f64 = std::f64::consts::TAU;
 /// Payload over mass of the robot: heavier than that is not lifted, unusual.
@@ -48,6 +47,7 @@ pub(crate) fn of_robot(robot: &Robot) -> Vec<Caveat> {
         let weighs = robot.rigid.gravity.norm() > 0.0;
         caveats.extend(payload("the payload", &carried, &size, weighs));
     }
+    caveats.extend(super::chain::of_chain(robot, &size));
     caveats.extend(joint_limits(mechanism, &size));
     if let Ok(model) = robot.rigid_model() {
         caveats.extend(strong_drives(&model, &size));

@@ -59,11 +59,9 @@ pub(crate) fn gyration(inertia: &LinkInertia) -> f64 {
     (largest.max(0.0) / inertia.mass).sqrt()
 }
 
-/// Density that a body of this mass and inertia has at least (kg/m³): of all bodies of one volume the ball has the least
-/// moments, `tr(I) / 2 = 3/5 m R²`.
+/// Density that a body of this mass and inertia has at least (kg/m³).
 pub(crate) fn least_density(inertia: &LinkInertia) -> f64 {
-    let squared = inertia.inertia_com.trace() / (2.0 * inertia.mass) * 5.0 / 3.0;
-    inertia.mass / (4.0 / 3.0 * std::f64::consts::PI * squared.max(0.0).powf(1.5))
+    flexarm_linkmaker::yardsticks::least_density(inertia.mass, &inertia.inertia_com)
 }
 
 /// Largest torque of weight and balancers that each joint of the rigid robot carries in poses spread over the joint ranges (N m or N).
@@ -114,28 +112,4 @@ pub(crate) fn halton(mut index: u32, coordinate: usize) -> f64 {
         index /= base;
     }
     value
-}
-
-#[cfg(test)]
-mod tests {
-    use nalgebra::{Matrix3, Vector3};
-
-    use super::*;
-
-    /// Truth: a ball of steel, and a rod of the same mass, which only looks lighter.
-    #[test]
-    fn no_body_is_lighter_than_the_ball_of_its_inertia() {
-        let (density, radius) = (7850.0, 0.1f64);
-        let mass = density * 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3);
-        let ball = 0.4 * mass * radius * radius;
-        let inertia = |moments: [f64; 3]| LinkInertia {
-            mass,
-            com: Vector3::zeros(),
-            inertia_com: Matrix3::from_diagonal(&Vector3::from(moments)),
-        };
-        let found = least_density(&inertia([ball; 3]));
-        assert!((found / density - 1.0).abs() < 1e-12, "{found}");
-        let rod = mass * 1.0 / 12.0;
-        assert!(least_density(&inertia([0.01 * rod, rod, rod])) < 0.1 * density);
-    }
 }

@@ -109,8 +109,7 @@ pub(crate) fn band(band_m: f64, peak_m: f64, usual_m: f64) -> Option<Caveat> {
 pub(crate) fn long_step(step_s: f64, moves_s: impl Iterator<Item = f64>) -> Option<Caveat> {
     let most = moves_s.fold(0.0, f64::max) / STEPS_PER_MOVE;
     let likely = || slip(step_s, &(1e-6..=most), &[(1e3, "milliseconds")], 1.0);
-    (most > 0.0 && step_s > most * (1.0 + 1e-9))
-        .then(|| kinds::LONG_STEP.found("run", step_s, most).likely(likely()))
+    (most > 0.0 && step_s > most * (1.0 + 1e-9)).then(|| kinds::LONG_STEP.found("run", step_s, most).likely(likely()))
 }
 
 /// Gap of the energy balance, as a part of the energy in it.

@@ -27,7 +27,7 @@ use flexarm_trajectory::Trajectory;
 use serde::Serialize;
 
 use crate::arm::Arm;
-use crate::caveat::Caveat;
+use crate::caveat::{Caveat, Use, once_each, warnings};
 use crate::error::Error;
 use crate::motion::Motion;
 use crate::motion_report::MotionViolation;
@@ -178,6 +178,8 @@ pub struct Compensation {
     pub program: Option<ProgramFigures>,
     /// The page.
     pub page: Option<String>,
+    /// What the caveats warn of, as sentences.
+    pub warnings: Vec<String>,
     /// What is doubtful.
     pub caveats: Vec<Caveat>,
     /// The commands, for programs in the process.
@@ -238,7 +240,10 @@ pub fn compensate_motion_until(
     let arm = robot.flexible(request.run.modelling)?;
     check(&scenario, request, &arm)?;
     let (mut answer, found) = limits::kept(robot, &arm, &scenario, request, stop)?;
+    answer.caveats.extend(arm.told(Use::Along(&scenario)));
+    answer.caveats = once_each(std::mem::take(&mut answer.caveats));
     let program = files.program(robot, &arm, &scenario, request, &mut answer);
+    answer.warnings = warnings(&answer.caveats);
     files.write(&mut answer, &arm, &found, program, request)?;
     Ok(answer)
 }
@@ -304,6 +309,7 @@ fn attempt(
         recording: None,
         program: None,
         page: None,
+        warnings: Vec::new(),
         caveats: Vec::new(),
         trajectory: found.motion.trajectory.clone(),
         curves: curves.collect(),

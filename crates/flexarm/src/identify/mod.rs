@@ -37,8 +37,7 @@ use self::file::{Cell, MeasurementInput};
 use self::parameters::Written;
 use self::units::{check_modes, check_units};
 use crate::arm::Arm;
-use crate::caveat::warnings;
-use crate::check;
+use crate::caveat::{Use, warnings};
 use crate::error::Error;
 use crate::options::Modelling;
 use crate::robot::Robot;
@@ -145,7 +144,7 @@ pub fn identify_robot(robot: &Robot, measurements: &Path, request: &IdentifyRequ
     answer.caveats.extend(encoder_caveats(&encoders));
     let failed = |error: NoAnswer| IdentifyFileError::Fit(error.to_string());
     answer.caveats.extend(load_caveats(&plant, &input).map_err(failed)?);
-    answer.caveats.extend(check::caveats_of(robot, request.modelling));
+    answer.caveats.extend(arm.told(Use::Any));
     answer.warnings = warnings(&answer.caveats);
     answer.encoders = encoders;
     if let Some(targets) = targets {

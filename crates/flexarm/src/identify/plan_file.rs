@@ -14,8 +14,7 @@ use serde::Serialize;
 use super::parameters;
 use super::{IdentifyFileError, joints_of};
 use crate::arm::Arm;
-use crate::caveat::{Caveat, warnings};
-use crate::check;
+use crate::caveat::{Caveat, Use, warnings};
 use crate::error::Error;
 use crate::options::Modelling;
 use crate::robot::Robot;
@@ -234,7 +233,7 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
         return Err(IdentifyFileError::Fit(text).into());
     }
     let first = plan(&plant, &fitted, &candidates[..request.count.min(candidates.len())], &options).map_err(failed)?;
-    let caveats = check::caveats_of(robot, request.modelling);
+    let caveats = arm.told(Use::Any);
     let mut answer = MeasurementPlan {
         warnings: warnings(&caveats),
         caveats,

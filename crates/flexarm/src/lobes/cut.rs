@@ -161,7 +161,7 @@ pub fn cut(robot: &Robot, tool: &CuttingTool, at: Option<&[f64]>, request: &CutR
     answer.limit_m = limit.as_ref().map(|limit| limit.depth);
     answer.limit_hz = limit.map(|limit| limit.chatter_hz);
     answer.curves = curves;
-    answer.caveats = place.caveats;
+    answer.caveats = place.told(robot);
     answer.caveats.extend(caveat::tool::of_tool(tool));
     answer.warnings = caveat::warnings(&answer.caveats);
     if let Some(paths) = paths {
@@ -190,7 +190,7 @@ fn run(
         Wrench::new(F, n.tip.cross(&F))
     };
     let duration = h * (cut.steps * cut.teeth) as f64;
-    let pose = [place.at.clone(), place.at.clone()].concat();
+    let pose = [place.pose(), place.pose()].concat();
     let motion = Motion::from_samples(&[0.0, duration], &pose, robot)?;
     let scenario = Scenario::new(motion).with_load(AppliedLoad::new("tcp", TimedWrench::new(wrench)));
     let options = RunOptions {

@@ -19,7 +19,7 @@ use flexarm_settings::Quantity;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::caveat::{self, Caveat};
+use crate::caveat::{self, Caveat, told};
 use crate::error::{Error, ValueError};
 use crate::motion::Motion;
 use crate::options::Modelling;
@@ -261,6 +261,11 @@ pub fn lobes(
     let mut answer = assembled(robot, tool, &places, &all, deepest_m);
     answer.method = if zero_order { "zero-order" } else { "floquet" };
     answer.left_out = left_out;
+    if let CuttingPlace::Along(motion, _) = place {
+        answer.caveats = told::of_motion(motion, &*robot.rigid_model()?);
+    }
+    answer.caveats.extend(places.iter().flat_map(|place| place.told(robot)));
+    answer.caveats = caveat::once_each(std::mem::take(&mut answer.caveats));
     answer.caveats.extend(caveat::tool::of_tool(tool));
     if tool.measured.is_some() && !request.zero_order {
         let message = "the tool has a measured response: the limits are those of the zero-order solution, which does not see period doubling";
@@ -373,7 +378,7 @@ fn assembled(robot: &Robot, tool: &CuttingTool, places: &[Place], all: &[LobePoi
     let poses = places.iter().enumerate().map(|(k, place)| {
         let low = lowest(of_pose(k));
         PoseLobes {
-            at: place.at.clone(),
+            at: place.pose().to_vec(),
             time_s: place.time_s,
             feed: place.feed.into(),
             axis: place.axis.into(),
@@ -392,7 +397,7 @@ fn assembled(robot: &Robot, tool: &CuttingTool, places: &[Place], all: &[LobePoi
     Lobes {
         robot: robot.name.clone(),
         tool: tool.name.clone(),
-        joints: places.first().map_or_else(Vec::new, |place| place.joints.clone()),
+        joints: places.first().map_or_else(Vec::new, |place| place.joints().to_vec()),
         method: "",
         deepest_m,
         stable_below_m: low.as_ref().and_then(|p| p.depth_m),
@@ -406,6 +411,6 @@ fn assembled(robot: &Robot, tool: &CuttingTool, places: &[Place], all: &[LobePoi
         file: None,
         files: LobesFiles::default(),
         warnings: Vec::new(),
-        caveats: places.first().map_or_else(Vec::new, |place| place.caveats.clone()),
+        caveats: Vec::new(),
     }
 }

@@ -1,6 +1,7 @@
 //! Arm and tool as the cutter feels them at one pose: poles in the axes of the cut, or a measured response beside those of the arm.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use flexarm_chatter::{Mode, Structure};
 use flexarm_kinematics::{Data, forward_kinematics};
@@ -31,9 +32,8 @@ const TOLD: usize = 6;
 
 /// One pose with the axes of the cut: x along the feed, z from the tip to the spindle.
 pub(super) struct Place {
-    pub(super) joints: Vec<String>,
-    slides: Vec<bool>,
-    pub(super) at: Vec<f64>,
+    posed: Posed,
+    linear: Linear,
     pub(super) time_s: Option<f64>,
     /// World axes.
     pub(super) feed: Vector3<f64>,
@@ -47,7 +47,6 @@ pub(super) struct Place {
     measured: Option<(MeasuredResponse, Matrix3<f64>)>,
     /// Angular frequencies at which the response is worth knowing, rad/s.
     pub(super) band: Vec<f64>,
-    pub(super) caveats: Vec<Caveat>,
 }
 
 impl Place {
@@ -58,7 +57,7 @@ impl Place {
         tool: &CuttingTool,
         at: Option<&[f64]>,
     ) -> Result<Self, Error> {
-        Self::new(robot, Posed::new(robot, modelling, at)?, tool, None, None)
+        Self::new(Posed::new(robot, modelling, at)?, tool, None, None)
     }
 
     /// Along a motion, evenly in time, where the tool moves across its axis; and how many places were left out.
@@ -88,6 +87,7 @@ impl Place {
             let X_WT = data.X_WF(&frame);
             (X_WT.transform_point(&tool.tip.into()).coords, tool.axis.in_world(&X_WT.rotation))
         };
+        let flexible = Arc::new(robot.modelled(modelling)?);
         let (mut places, mut left_out) = (Vec::new(), 0);
         for k in 0..n {
             let t = trajectory.duration() * (k as f64 + 0.5) / n as f64;
@@ -98,19 +98,13 @@ impl Place {
                 left_out += 1;
                 continue;
             }
-            let posed = Posed::held(robot, modelling, sample(t))?;
-            places.push(Self::new(robot, posed, tool, Some(t), Some(velocity / velocity.norm()))?);
+            let posed = Posed::with(flexible.clone(), sample(t))?;
+            places.push(Self::new(posed, tool, Some(t), Some(velocity / velocity.norm()))?);
         }
         if places.is_empty() { Err(LobesError::NoFeed.into()) } else { Ok((places, left_out)) }
     }
 
-    fn new(
-        robot: &Robot,
-        posed: Posed,
-        tool: &CuttingTool,
-        time_s: Option<f64>,
-        along: Option<Vector3<f64>>,
-    ) -> Result<Self, Error> {
+    fn new(posed: Posed, tool: &CuttingTool, time_s: Option<f64>, along: Option<Vector3<f64>>) -> Result<Self, Error> {
         let linear = posed.linear(&Vector6::zeros())?;
         let R_WT = linear.X_WT.rotation;
         let axis = tool.axis.in_world(&R_WT);
@@ -129,8 +123,6 @@ impl Place {
             return Err(LobesError::NothingYields.into());
         }
         let measured = tool.measured.clone().map(|m| (m, R_WC.transpose() * R_WT.into_inner()));
-        let mut caveats: Vec<Caveat> = posed.caveats.clone();
-        caveats.extend(posed.standing(robot, &linear));
         let mut place = Self {
             feed: R_WC.column(0).into(),
             axis,
@@ -138,11 +130,9 @@ impl Place {
             structure,
             measured,
             band: Vec::new(),
-            caveats,
             time_s,
-            joints: posed.joints,
-            slides: posed.prismatic,
-            at: posed.at,
+            posed,
+            linear,
         };
         place.band = place.frequencies();
         Ok(place)
@@ -193,7 +183,22 @@ impl Place {
 
     /// The pose in words.
     pub(super) fn words(&self) -> String {
-        pose_in_words(&self.joints, &self.at, &self.slides)
+        pose_in_words(&self.posed.joints, &self.posed.at, &self.posed.prismatic)
+    }
+
+    /// Actuated joints.
+    pub(super) fn joints(&self) -> &[String] {
+        &self.posed.joints
+    }
+
+    /// Their values (rad or m).
+    pub(super) fn pose(&self) -> &[f64] {
+        &self.posed.at
+    }
+
+    /// What is to be said of the robot and of its pose.
+    pub(super) fn told(&self, robot: &Robot) -> Vec<Caveat> {
+        self.posed.told(robot, &self.linear, &[0.0; 6])
     }
 }
 

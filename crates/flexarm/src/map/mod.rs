@@ -55,12 +55,15 @@ use self::finder::Finder;
 use self::region::{MOST_QUERIES, round_number};
 use self::take::{Choice, Places, PoseOf, Taken, take};
 use crate::arm::Arm;
-use crate::caveat::{self, Caveat};
+use crate::caveat::motion::of_wrench;
+use crate::caveat::size::Size;
+use crate::caveat::{self, Caveat, Use};
 use crate::error::Error;
 use crate::inspect::joint_values;
 use crate::lobes::{CuttingTool, lowest_limit};
 use crate::options::Modelling;
 use crate::robot::{Robot, tcp_frame};
+use crate::scenario::Scenario;
 
 /// Poses that are tried to find out how far the arm reaches.
 const REACH_POSES: usize = 20_000;
@@ -464,8 +467,11 @@ fn summed_up(
         .into());
     };
     let joints: Vec<String> = arm.joints().map(str::to_owned).collect();
-    let mut caveats = robot.caveats();
-    caveats.extend(arm.flexible().caveats());
+    let mut caveats = match &request.region {
+        MapRegion::Along { motion, .. } => arm.told(Use::Along(&Scenario::new((**motion).clone()))),
+        _ => arm.told(Use::Any),
+    };
+    caveats.extend(of_wrench(&request.wrench, &Size::of(&robot.rigid)));
     if let Some(first) = &taken.first_failure {
         let message = format!(
             "{} of {} poses have no equilibrium and are left out; at the first: {first}",

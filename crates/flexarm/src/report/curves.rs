@@ -442,8 +442,9 @@ fn joints(trace: &Trace) -> Vec<Plot> {
     let make = |sliding: bool| {
         let names = trace.header.joints.iter().enumerate().filter(|(k, _)| slides(trace, *k) == sliding);
         let scale = if sliding { 1e3 } else { 1f64.to_degrees() };
-        let of_joint =
-            |(k, name): (usize, &String)| curve(trace, name.clone(), Kind::of(trace, name), scale, CurveQuantity::Joint(k));
+        let of_joint = |(k, name): (usize, &String)| {
+            curve(trace, name.clone(), Kind::of(trace, name), scale, CurveQuantity::Joint(k))
+        };
         let curves: Vec<Curve> = names.map(of_joint).collect();
         let (id, title) =
             if sliding { ("slides", "Positions of sliding joints") } else { ("joints", "Joint positions") };

@@ -2,12 +2,11 @@
 
 use flexarm_kinematics::State;
 use flexarm_stepping::{FlexibleArm, StepRule, StepperKind};
-use flexarm_trajectory::LimitViolation;
 use nalgebra::DVector;
 
 use super::steps_per_sample;
 use crate::caveat::pose::Standing;
-use crate::caveat::{Caveat, Severity, kinds, loops, motion, validity};
+use crate::caveat::{Caveat, Severity, kinds, told, validity};
 use crate::flexible::FlexibleRobot;
 use crate::motion::Motion;
 use crate::options::RunOptions;
@@ -33,10 +32,7 @@ impl BeforeRun<'_> {
     pub(crate) fn caveats(&self, sag_m: f64) -> Vec<Caveat> {
         let Self { robot, flexible, arm, motion, options } = *self;
         let mut caveats = flexible.caveats();
-        caveats.extend(motion.caveats());
-        caveats.extend(loops::of_motion(&motion.trajectory, &flexible.rigid));
-        let passed = |v: &LimitViolation| Caveat::said("joint-limit", &v.joint, format!("joint limit: {v}"), "");
-        caveats.extend(motion.violations.iter().map(passed));
+        caveats.extend(told::of_motion(motion, &flexible.rigid));
         let elastic = arm.modes.equilibrium.as_slice();
         caveats.extend(Standing { robot, flexible, arm, elastic, sag_m }.caveats());
         if let Some(first) = arm.modes.frequencies_hz().first() {
@@ -59,8 +55,18 @@ impl BeforeRun<'_> {
         caveats
     }
 
-    /// Links that bend too far at rest. A run has the largest of all its samples instead.
-    pub(crate) fn at_rest(&self) -> Vec<Caveat> {
+    /// As [`Self::caveats`], for a study that keeps no samples: links are looked at where they rest, and torques of the rigid
+    /// robot beyond a limit warn.
+    pub(crate) fn caveats_of_study(&self, sag_m: f64) -> Vec<Caveat> {
+        let warns = |caveat: Caveat| match caveat.code == kinds::MOTION_EFFORT.code {
+            true => Caveat { severity: Severity::Warning, ..caveat },
+            false => caveat,
+        };
+        self.caveats(sag_m).into_iter().map(warns).chain(self.links_at_rest()).collect()
+    }
+
+    /// Links that bend too far at rest.
+    fn links_at_rest(&self) -> Vec<Caveat> {
         let (arm, model) = (self.arm, &self.arm.model);
         let mut state = State::zeros(model);
         arm.prescribed_state(0.0, &mut state, &mut DVector::zeros(model.nv()));
@@ -68,16 +74,6 @@ impl BeforeRun<'_> {
         state.q.rows_mut(n, model.nv() - n).copy_from(&arm.modes.equilibrium);
         let links = self.flexible.spans.iter().zip(strains(self.flexible, arm, &state.q));
         links.flat_map(|(span, (strain, rotation))| validity::link(&span.link, rotation, strain)).collect()
-    }
-
-    /// What the rigid robot needs and uses along the motion. Torques beyond a limit warn: a run would tell those of the flexible robot.
-    pub(crate) fn of_rigid_motion(&self) -> Vec<Caveat> {
-        let found = motion::of_motion(&self.motion.name, &self.motion.trajectory, &self.flexible.rigid);
-        let warns = |caveat: Caveat| match caveat.code == kinds::MOTION_EFFORT.code {
-            true => Caveat { severity: Severity::Warning, ..caveat },
-            false => caveat,
-        };
-        found.into_iter().map(warns).collect()
     }
 
     /// Damping that a stepper cannot take as it is.

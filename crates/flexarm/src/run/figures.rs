@@ -4,7 +4,6 @@ use flexarm_analysis::TcpMetrics;
 use flexarm_kinematics::{Frame, State, forward_kinematics};
 use flexarm_log::Event;
 use flexarm_stepping::FlexibleArm;
-use nalgebra::Vector3;
 
 use super::before::BeforeRun;
 use super::{Run, Wanted, moves};

@@ -16,7 +16,7 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use crate::arm::Arm;
-use crate::caveat::Caveat;
+use crate::caveat::{Caveat, Use, once_each, warnings};
 use crate::error::{Error, ValueError};
 use crate::identify::parameters::{asks_for, fits};
 use crate::options::RunOptions;
@@ -67,6 +67,8 @@ pub struct Sensitivity {
     pub parameters: Vec<ParameterSensitivity>,
     /// Error and derivatives over time.
     pub table: Option<String>,
+    /// What the caveats warn of, as sentences.
+    pub warnings: Vec<String>,
     /// What is doubtful.
     pub caveats: Vec<Caveat>,
 }
@@ -209,7 +211,8 @@ pub fn sensitivity(
     let named = chosen(arm.run_parameters(&scenario, &request.parameters)?, &request.parameters, |own| &own.name)?;
     let parameters: Vec<RunParameter> = named.iter().map(|own| own.parameter.clone()).collect();
     let (found, mut caveats) = arm.error_slopes_told(&scenario, &request.run, &parameters, request.table.is_some())?;
-    caveats.extend_from_slice(arm.robot_caveats());
+    caveats.extend(arm.told(Use::Along(&scenario)));
+    let caveats = once_each(caveats);
     if let Some(path) = &request.table {
         write_all(&[(path.clone(), table(&named, &found))])?;
     }
@@ -238,6 +241,7 @@ pub fn sensitivity(
         rms_rad: rotation.rms,
         parameters,
         table: request.table.as_ref().map(|path| path.display().to_string()),
+        warnings: warnings(&caveats),
         caveats,
     })
 }

@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Matrix6, Vector3};
 use serde::Serialize;
 
 use crate::arm::Arm;
-use crate::caveat::{Caveat, validity};
+use crate::caveat::{Caveat, Use, warnings};
 use crate::error::{Error, ValueError};
 use crate::identify::Parameter;
 use crate::inspect::joint_values;
@@ -30,6 +30,8 @@ pub struct PoseSensitivity {
     pub frequencies_hz: Vec<f64>,
     /// One per number of the robot.
     pub parameters: Vec<PoseParameter>,
+    /// What the caveats warn of, as sentences.
+    pub warnings: Vec<String>,
     /// What is doubtful.
     pub caveats: Vec<Caveat>,
 }
@@ -162,14 +164,14 @@ fn slopes(
         Asked::Arm(_) => None,
         Asked::Tool(axis) => Some(of_tool(*axis, &point.tcp_pose(), &C, modes)),
     });
+    let caveats = arm.told(Use::Held(&at, &[0.0; 6]));
     Ok(PoseSensitivity {
         robot: robot.name.clone(),
         compliance: rows(&C, 1.0),
         frequencies_hz: frequencies.hz.clone(),
         parameters: all.into_iter().enumerate().map(of).chain(of_tools).collect(),
-        caveats: validity::outside_limits(arm.flexible().rigid.coordinates(), &at)
-            .chain(arm.robot_caveats().iter().cloned())
-            .collect(),
+        warnings: warnings(&caveats),
+        caveats,
         joints,
         at,
     })

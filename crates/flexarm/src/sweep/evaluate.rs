@@ -224,9 +224,7 @@ impl Sweep {
         };
         let before =
             BeforeRun { robot: &built.robot, flexible, arm: &arm, motion: &scenario.motion, options: &options };
-        caveats.extend(before.caveats(facts.sag_m));
-        caveats.extend(before.at_rest());
-        caveats.extend(before.of_rigid_motion());
+        caveats.extend(before.caveats_of_study(facts.sag_m));
         caveats.extend(of_loads);
         let run = BatchRun { arm, duration_s: scenario.duration_s() };
         let (tool, flexible, start) = (flexible.tcp.clone(), flexible.clone(), scenario.start);

@@ -1,0 +1,120 @@
+//! Where tool and payload sit on the chain of links, and which joints of it yield.
+
+use flexarm_kinematics::{Joint, Mechanism};
+
+use super::size::Size;
+use super::{Caveat, CaveatKind, kinds};
+use crate::robot::{PAYLOAD_LINK, Robot};
+
+/// Joints of fingers have less range than this, joints of arms more (rad).
+const HALF_TURN: f64 = 3.0;
+/// Part of the arm's reach and of its mass behind a link from which on it is no gripper.
+const ARM_LIKE: f64 = 0.2;
+/// Joints of an arm in which one that does not yield is odd.
+const FEWEST: usize = 3;
+
+/// All of them about a loaded robot.
+pub(crate) fn of_chain(robot: &Robot, size: &Size) -> Vec<Caveat> {
+    let mut caveats: Vec<Caveat> =
+        of_place(robot, size, "the TCP", &robot.tcp.0, [&kinds::TCP_FIXED, &kinds::TCP_INSIDE]).into_iter().collect();
+    if let Some(joint) = robot.rigid.joints.iter().find(|joint| joint.child == PAYLOAD_LINK) {
+        caveats.extend(of_payload(robot, size, "the payload", &joint.parent));
+    }
+    caveats.extend(stiff_joints(robot));
+    caveats
+}
+
+/// A payload on a link behind which the arm goes on.
+pub(crate) fn of_payload(robot: &Robot, size: &Size, what: &str, link: &str) -> Option<Caveat> {
+    of_place(robot, size, what, link, [&kinds::PAYLOAD_FIXED, &kinds::PAYLOAD_INSIDE])
+}
+
+/// Something that belongs to the end of the arm, on a link. Kinds: where no joint moves the link, where the arm goes on behind it.
+fn of_place(robot: &Robot, size: &Size, what: &str, link: &str, [fixed, inside]: [&CaveatKind; 2]) -> Option<Caveat> {
+    let mechanism = &robot.urdf.mechanism;
+    let location = format!("{what} on link {link:?}");
+    let body = carrier(mechanism, link);
+    let behind = Behind::of(robot, size, body);
+    let moves = |joint: &&Joint| moves(robot, joint);
+    if !mechanism.joints.iter().any(|joint| joint.child == body) {
+        let all = mechanism.joints.iter().filter(moves).count();
+        return (all > 0).then(|| fixed.found(location, 0.0, all as f64));
+    }
+    behind.is_arm.then(|| inside.found(location, behind.reach, size.extent))
+}
+
+/// Whether a joint moves by itself: not fixed, not held, not following another one.
+fn moves(robot: &Robot, joint: &Joint) -> bool {
+    joint.kind.degrees_of_freedom() > 0
+        && joint.mimic.is_none()
+        && joint.limits.upper > joint.limits.lower
+        && !robot.hold.iter().any(|(held, _)| *held == joint.name)
+}
+
+/// The link of the same body that is nearest to the base.
+fn carrier<'m>(mechanism: &'m Mechanism, link: &'m str) -> &'m str {
+    let parent = |link: &str| mechanism.joints.iter().find(|joint| joint.child == link);
+    let mut body = link;
+    while let Some(joint) = parent(body).filter(|joint| joint.kind.degrees_of_freedom() == 0) {
+        body = &joint.parent;
+    }
+    body
+}
+
+/// What is behind a body, seen from the base.
+struct Behind {
+    /// How far it reaches from there (m).
+    reach: f64,
+    /// Whether it is a part of the arm, and no gripper.
+    is_arm: bool,
+}
+
+impl Behind {
+    fn of(robot: &Robot, size: &Size, body: &str) -> Self {
+        let mechanism = &robot.urdf.mechanism;
+        // Links with whether a joint that moves is between them and the body.
+        let mut open = vec![(body, false)];
+        let (mut reach, mut mass, mut turns) = (0.0f64, 0.0, false);
+        while let Some((link, moved)) = open.pop() {
+            if moved {
+                let inertia = mechanism.link(link).and_then(|link| link.inertia).filter(|inertia| inertia.mass > 0.0);
+                reach = reach.max(size.at(link) - size.at(body) + inertia.map_or(0.0, |inertia| inertia.com.norm()));
+                mass += inertia.map_or(0.0, |inertia| inertia.mass);
+            }
+            for joint in mechanism.child_joints(link) {
+                let moves = moves(robot, joint);
+                let range = joint.limits.upper - joint.limits.lower;
+                turns |= moves && joint.kind.turns() && range > HALF_TURN;
+                open.push((&joint.child, moved || moves));
+            }
+        }
+        let large = reach > ARM_LIKE * size.extent || mass > ARM_LIKE * size.mass;
+        Self { reach, is_arm: turns || large }
+    }
+}
+
+/// Joints that do not yield where almost all others of the arm do, or with ones that yield on both sides.
+fn stiff_joints(robot: &Robot) -> Vec<Caveat> {
+    let yields = |joint: &Joint| robot.drives.iter().any(|d| d.joint == joint.name && d.gearbox.is_some());
+    let mechanism = &robot.urdf.mechanism;
+    // From the TCP to the base.
+    let mut chain: Vec<(&Joint, bool)> = Vec::new();
+    let mut link = robot.tcp.0.as_str();
+    while let Some(joint) = mechanism.joints.iter().find(|joint| joint.child == link) {
+        if moves(robot, joint) && joint.kind.turns() {
+            chain.push((joint, yields(joint)));
+        }
+        link = &joint.parent;
+    }
+    let elastic = chain.iter().filter(|(_, yields)| *yields).count();
+    let stiff = chain.len() - elastic;
+    if chain.len() < FEWEST || stiff == 0 || stiff >= elastic {
+        return Vec::new();
+    }
+    // Leaving out the last joints of a wrist is usual.
+    let outermost = chain.iter().position(|(_, yields)| *yields).unwrap_or(0);
+    let odd = chain.iter().enumerate().rev().filter(|(k, (_, yields))| !yields && (*k > outermost || stiff == 1));
+    let told =
+        |joint: &Joint| kinds::STIFF_JOINT.found(format!("joint {:?}", joint.name), elastic as f64, chain.len() as f64);
+    odd.map(|(_, (joint, _))| told(joint)).collect()
+}
