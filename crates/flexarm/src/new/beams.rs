@@ -80,7 +80,10 @@ pub(crate) fn propose(link: &Candidate<'_>) -> Result<BeamSection, String> {
         Err(NoBeam::NotThere(reason)) => reason,
     };
     let Some(ends) = ends::of(link) else { return Err(reason) };
-    let mut section = between(link, ends).map_err(|_| reason)?;
+    let mut section = between(link, ends).map_err(|why| match why {
+        NoBeam::Else(own) => format!("its shape between the joint axes: {own}"),
+        NoBeam::NotThere(_) => reason,
+    })?;
     section.ends = Some(ends.map(|end| (end + Vector3::from(section.offset)).into()));
     section.offset = [0.0; 3];
     Ok(section)

@@ -1,8 +1,8 @@
 //! Where a link's own body begins and ends between its two joints, where the frames of the file lie elsewhere.
 //!
 //! A frame may sit anywhere on the axis of its joint, and in many descriptions it sits at the far end of the link. The body
-//! lies along the mesh's longest principal axis. A joint whose axis crosses it is where the axis comes nearest; one that turns
-//! about it is at the end of the mesh on its side.
+//! lies along the mesh's longest principal axis; where a joint turns about that axis, more or less, along the axis of the
+//! joint. A joint whose axis crosses the body is where it comes nearest; one that turns about it is at the end of the mesh.
 
 use flexarm_kinematics::{Joint, JointKind};
 use flexarm_urdf::TriangleMesh;
@@ -10,19 +10,22 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::beams::Candidate;
 
-/// Cosine between a joint axis and the body from which on the joint turns about the body.
-const ALONG: f64 = 0.9;
+/// Cosine between a joint axis and the body from which on the joint turns about the body: 45 degrees. Housings of the next
+/// joint tilt the principal axis by 30.
+const ALONG: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// Both ends of the body, the proximal one first, link axes; `None` where shape and joints do not tell them.
 pub(crate) fn of(link: &Candidate<'_>) -> Option<[Vector3<f64>; 2]> {
     let (middle, along) = principal_axis(link.meshes)?;
-    let places = || link.meshes.iter().flat_map(|m| &m.positions).map(|p| (vector(p) - middle).dot(&along));
-    let (low, high) = (places().fold(f64::INFINITY, f64::min), places().fold(f64::NEG_INFINITY, f64::max));
     let X_LB = &link.distal.X_PJ;
     let own = link.proximal.and_then(axis);
     let next = axis(link.distal).map(|axis| X_LB.rotation * axis);
-    let place = |point: Vector3<f64>, axis: Option<Vector3<f64>>| Place::of(point - middle, axis, &along);
-    let [a, b] = [place(Vector3::zeros(), own), place(X_LB.translation.vector, next)];
+    let joints = [(Vector3::zeros(), own), (X_LB.translation.vector, next)];
+    let rolls = joints.iter().find_map(|(at, axis)| Some((*at, axis.filter(|axis| axis.dot(&along).abs() > ALONG)?)));
+    let (middle, along) = rolls.map_or((middle, along), |(at, axis)| (at + axis * axis.dot(&(middle - at)), axis));
+    let places = || link.meshes.iter().flat_map(|m| &m.positions).map(|p| (vector(p) - middle).dot(&along));
+    let (low, high) = (places().fold(f64::INFINITY, f64::min), places().fold(f64::NEG_INFINITY, f64::max));
+    let [a, b] = joints.map(|(at, axis)| Place::of(at - middle, axis, &along));
     let nearer = |s: f64| if s - low < high - s { low } else { high };
     let farther = |s: f64| if s - low < high - s { high } else { low };
     let [a, b] = match (a, b) {

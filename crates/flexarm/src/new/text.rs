@@ -160,10 +160,12 @@ fn head(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Result {
 /// Effort limits of the description that make no sense.
 fn efforts(t: &mut String, draft: &Draft) -> std::fmt::Result {
     let of_arm = draft.joints.iter().filter(|j| j.effort_fault.is_some()).map(|j| &j.joint);
-    let is_senseless = |effort: f64| effort <= 0.0 || effort > MOST_EFFORT;
+    let known = |effort: f64| of_arm.clone().any(|joint| joint.limits.effort == effort);
+    let is_senseless = |effort: f64| effort <= 0.0 || effort > MOST_EFFORT || known(effort);
     let held = draft.chain.held.iter().map(|&(k, _)| &draft.urdf.mechanism.joints[k]);
     let held = held.filter(|joint| is_senseless(joint.limits.effort));
     let named: Vec<String> = of_arm
+        .clone()
         .chain(held)
         .filter(|joint| joint.limits.effort.is_finite())
         .map(|joint| format!("{} = inf", quoted(&joint.name)))
