@@ -390,8 +390,27 @@ fn natural_second_derivatives(p: &[Vector3<f64>], h: &[f64]) -> Vec<Vector3<f64>
     second
 }
 
-/// Numbers of a move that must be positive.
+/// Greatest distance of a target and greatest value of a joint, m and rad.
+const FARTHEST: f64 = 1e6;
+/// Greatest angle of an arc, rad: 1000 turns.
+const MOST_TURNS: f64 = 1e3 * std::f64::consts::TAU;
+
+/// Numbers of a move that must be positive, and those that must be finite and within a range.
 fn check(of: &Move) -> Result<(), PathError> {
+    let within = |what: &'static str, value: f64, most: f64| match value.abs() <= most {
+        true => Ok(()),
+        false => Err(PathError::Range { line: of.line, statement: of.statement.clone(), what, value, most }),
+    };
+    match &of.to {
+        Target::Joints(values) => values.iter().try_for_each(|q| within("a joint value (rad or m)", *q, FARTHEST))?,
+        Target::Pose { X_BT, .. } => {
+            within("the distance of the target (m)", X_BT.translation.vector.norm(), FARTHEST)?
+        }
+    }
+    if let MoveKind::Arc { via, angle, .. } = &of.kind {
+        within("the distance of the point on the way (m)", via.norm(), FARTHEST)?;
+        within("the angle of the arc (rad)", angle.unwrap_or(0.0), MOST_TURNS)?;
+    }
     let speed = &of.speed;
     let blend = match of.blend {
         Blend::Distance(value) | Blend::Fraction(value) | Blend::Velocity(value) | Blend::Orientation(value)

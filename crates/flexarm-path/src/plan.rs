@@ -2,7 +2,7 @@
 
 use flexarm_kinematics::{ControllerAxes, Frame, Model, NullSpaceRule};
 use flexarm_spatial::Pose;
-use flexarm_trajectory::{JointKnots, Trajectory, TrajectoryError};
+use flexarm_trajectory::{JointKnots, LONGEST, Trajectory, TrajectoryError};
 use nalgebra::DVector;
 
 use crate::curve::ArcError;
@@ -264,6 +264,22 @@ pub enum PathError {
         /// The number.
         value: f64,
     },
+    /// A number beyond any motion.
+    #[error(
+        "line {line}: {statement}: {what} is {value}: it must be a finite number of {most} at most; check its unit"
+    )]
+    Range {
+        /// Line.
+        line: usize,
+        /// Statement.
+        statement: String,
+        /// Of what.
+        what: &'static str,
+        /// The number.
+        value: f64,
+        /// The greatest magnitude.
+        most: f64,
+    },
     /// The time law.
     #[error("line {line}: {statement}: {why}")]
     Law {
@@ -317,6 +333,10 @@ fn plan_holding(
             if !(*seconds >= 0.0 && seconds.is_finite()) {
                 let (line, what) = (*line, "a dwell");
                 return Err(PathError::Value { line, statement: String::new(), what, value: *seconds });
+            }
+            if *seconds > LONGEST {
+                let (line, statement, what) = (*line, "dwell".to_owned(), "the time in s");
+                return Err(PathError::Range { line, statement, what, value: *seconds, most: LONGEST });
             }
             if !start.known {
                 waiting += seconds;
