@@ -307,6 +307,26 @@ fn publishers_of_different_joints_on_one_topic_keep_their_own_times() {
     assert_eq!(motion.dropped, ["finger"]);
 }
 
+/// Truth: the messages that were left out.
+#[test]
+fn a_gap_between_messages_is_told_once_with_all_its_joints() {
+    let message = |k: i64| {
+        let q = (0.02 * k as f64).sin();
+        state(T0 + 20_000_000 * k, &[("joint_1", q, None), ("joint_2", -q, None)])
+    };
+    let gaps = |kept: &dyn Fn(&i64) -> bool| -> Vec<String> {
+        let text: String = (0..200).filter(kept).map(message).collect();
+        let motion = read_text(&text, "t", &ROBOT).unwrap();
+        let warnings = motion.trajectory.warnings().into_iter().map(|warning| warning.to_string());
+        warnings.filter(|warning| warning.starts_with("no sample of")).collect()
+    };
+    assert_eq!(gaps(&|_| true), [] as [&str; 0]);
+    let found = gaps(&|k| !(101..121).contains(k));
+    let truth =
+        "no sample of \"joint_1\", \"joint_2\" for 0.4200 s, from t = 2.0000 s to 2.4200 s (samples 101 and 102)";
+    assert!(found.len() == 1 && found[0].starts_with(truth), "{found:?}");
+}
+
 #[test]
 fn velocities_that_are_no_numbers_or_not_those_of_the_positions_are_not_used_and_told() {
     let wave = |k: i64| (0.2 * (k as f64) * 0.02 * std::f64::consts::PI).sin();
@@ -448,6 +468,16 @@ fn what_is_wrong_with_a_text_is_told_with_its_line() {
         (
             &format!("{points}- positions: [0.0]\n  time_from_start: 0.0\n"),
             "t, line 3: `positions` has 1 values for 2 joints; expected one for each name",
+        ),
+        (
+            &format!(
+                "{points}- {{positions: [0, 0], time_from_start: 0.0}}\n- {{positions: [0, 1, 2], time_from_start: 1.0}}\n"
+            ),
+            "t, line 4: `positions` has 3 values for 2 joints; expected one for each name (point 2)",
+        ),
+        (
+            "name: [joint_1]\nposition: [0.0, 1.0]\n",
+            "t, line 1: `position` has 2 values for 1 joints; expected one for each name",
         ),
         (
             &format!("{points}- positions: []\n  velocities: [1, 1]\n  time_from_start: 0.0\n"),

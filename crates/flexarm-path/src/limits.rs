@@ -115,12 +115,14 @@ impl<'a> Limits<'a> {
                 let k = points.partition_point(|point| point.s <= at.s).clamp(1, points.len() - 1) - 1;
                 let (here, next) = (&points[k], &points[k + 1]);
                 let near = PathPoint::passed(here, next, (at.s - here.s) / (next.s - here.s), at.v * at.v, at.a);
-                if near < NEAR || here.x_max == next.x_max && near <= at.v * at.v / here.x_max {
-                    most = most.max(if near < NEAR { 1.0 } else { near.sqrt() });
-                    continue;
-                }
-                let k = stations.partition_point(|s| *s <= at.s).clamp(1, stations.len() - 1) - 1;
-                most = most.max(self.at(k, at.s).slowing(&at)[0]);
+                let is_even = here.x_max == next.x_max && near <= at.v * at.v / here.x_max;
+                let slowing = if near < NEAR || is_even {
+                    near.sqrt()
+                } else {
+                    let k = stations.partition_point(|s| *s <= at.s).clamp(1, stations.len() - 1) - 1;
+                    self.at(k, at.s).slowing(&at)[0]
+                };
+                most = most.max(slowing);
             }
         }
         most

@@ -1,6 +1,6 @@
 //! A route over time: its time law, the knots of the joints' curves, and what became of its moves.
 
-use flexarm_trajectory::{JointPeak, TrajectoryError};
+use flexarm_trajectory::{JointPeak, LONGEST, TrajectoryError};
 use nalgebra::DVector;
 
 use crate::averaged::kept;
@@ -13,6 +13,10 @@ use crate::time_law::{Law, LawError, Progress};
 
 /// Limits count as kept up to this part.
 pub(crate) const SLACK: f64 = 1e-3;
+/// Joints keep their limits to this part of them: less than what checks allow.
+const ROUNDING: f64 = 1e-10;
+/// Shorter averages drown in rounding, s.
+const SHORTEST_RISE: f64 = 1e-5;
 /// Attempts to slow a route until its curves keep the limits of the joints.
 const ROUNDS: usize = 4;
 /// A place is slowed by a limit where its speed is within this part of it.
@@ -99,8 +103,11 @@ impl<'r> Schedule<'r> {
             let of = &route.legs[0].of;
             PathError::Law { line: of.line, statement: of.statement.clone(), why }
         };
-        if !(options.rise_s > 0.0 && options.rise_s.is_finite()) {
-            return Err(fail(format!("accelerations rise in {} s: give a positive time", options.rise_s)));
+        if !(SHORTEST_RISE..=LONGEST).contains(&options.rise_s) {
+            return Err(fail(format!(
+                "accelerations rise in {} s: give a time of {SHORTEST_RISE} s or more",
+                options.rise_s
+            )));
         }
         let rise = has_jerks(arm).then_some(options.rise_s);
         let mut limits = Limits::new(route, arm, rise);
@@ -164,7 +171,7 @@ impl<'r> Schedule<'r> {
         for _ in 0..ROUNDS {
             self.write(now, knots, moves);
             let slowing = slowing(&knots[before.0..], arm)?;
-            if slowing <= 1.0 {
+            if slowing <= 1.0 + ROUNDING {
                 break;
             }
             self.stretch *= slowing * (1.0 + f64::EPSILON);

@@ -389,6 +389,28 @@ fn a_program_that_begins_with_a_line_or_leaves_the_reach_is_refused_with_its_lin
 }
 
 #[test]
+fn numbers_beyond_any_motion_are_refused_before_work_begins() {
+    let cell = Cell::new();
+    let X = cell.pose(&START);
+    let run = |item| plan(&program(vec![joints(&START), item]), &cell.arm(), &PathOptions::default()).unwrap_err();
+    let via = X.translation.vector + Vector3::new(0.0, 0.1, 0.1);
+    let arc = MoveKind::Arc { via, via_rotation: None, angle: Some(1e9), turns_with_path: false };
+    for item in [
+        joints(&[1e300, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        joints(&[f64::NAN, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        to(MoveKind::Line, pose(shifted(&X, [0.0, 1e300, 0.0])), feed(0.2), Blend::Stop),
+        to(arc, pose(shifted(&X, [0.0, 0.2, 0.0])), feed(0.2), Blend::Stop),
+        Item::Dwell { line: 1, seconds: 1e300 },
+    ] {
+        let error = run(item);
+        assert!(matches!(error, PathError::Value { line: 1, .. }), "{error}");
+    }
+    // A speed at which the motion takes longer than any.
+    let slow = to(MoveKind::Line, pose(shifted(&X, [0.0, 0.1, 0.0])), feed(1e-12), Blend::Stop);
+    assert!(matches!(run(slow), PathError::Trajectory(_) | PathError::Law { .. } | PathError::Value { .. }));
+}
+
+#[test]
 fn a_dwell_before_the_first_target_is_one_at_that_target() {
     let cell = Cell::new();
     let target = shifted(&cell.pose(&START), [0.0, 0.1, 0.0]);

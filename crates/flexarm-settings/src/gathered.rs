@@ -41,8 +41,9 @@ fn kind(text: &str) -> String {
         let mut in_number = false;
         let mut letters = part.chars().peekable();
         while let Some(c) = letters.next() {
-            let goes_on = in_number && (matches!(c, '.' | 'e' | '-' | '+')) && letters.peek().is_some_and(char::is_ascii_digit)
-                || in_number && c == 'e' && letters.peek() == Some(&'-');
+            let goes_on =
+                in_number && (matches!(c, '.' | 'e' | '-' | '+')) && letters.peek().is_some_and(char::is_ascii_digit)
+                    || in_number && c == 'e' && letters.peek() == Some(&'-');
             if c.is_ascii_digit() || goes_on {
                 if !in_number {
                     kind.push('#');

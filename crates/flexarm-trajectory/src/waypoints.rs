@@ -7,8 +7,8 @@
 //! joints = ["rail", "joint_1", "joint_2"]
 //! start = [0.0, 0.0, 0.0]
 //!
-//! # These six may be set again within a [[move]].
-//! profile = "quintic"          # quintic (default), trapezoid, s-curve, optimal; `law` is another name of the key
+//! # These six and `law = "optimal"` may be set again within a [[move]].
+//! profile = "quintic"          # quintic (default), trapezoid, s-curve
 //! synchronised = true          # default; false: each joint as fast as its own limits allow
 //! speed = 0.5                  # fraction of the velocity limits used by moves without a duration; default 1
 //! acceleration = [2.0, 300.0, 300.0]  # for trapezoid and s-curve; one number, or one per joint
@@ -35,7 +35,7 @@
 //! would have covered the same fraction of the way; all joints start and stop together. Points on the straight
 //! line from start to goal therefore change nothing.
 //!
-//! An optimal move is run in the least time along the natural cubic spline through its points, within speeds, accelerations and
+//! A move with `law = "optimal"` in the place of a profile is run in the least time along the natural cubic spline through its points, within speeds, accelerations and
 //! jerks ([`crate::jerk_law`]).
 //!
 //! A motion that is not made of moves has `[samples]` in their place ([`Trajectory::to_samples_toml`] writes them).

@@ -11,7 +11,7 @@ use crate::plan::{MotionLimits, Plan, PlannedMove, Profile};
 use crate::polynomial::FARTHEST;
 use crate::problem::Problem;
 use crate::trajectory::{LONGEST, ToldUnit};
-use crate::waypoints_toml::{FileToml, MoveToml, ProfileToml, Values};
+use crate::waypoints_toml::{FileToml, LawToml, MoveToml, ProfileToml, Values};
 
 /// Rounding of trapezoids when the file does not say.
 const DEFAULT_ROUNDING: f64 = 0.1;
@@ -258,11 +258,12 @@ impl Context<'_> {
             }
             value => value.map_or(DEFAULT_ROUNDING, |value| *value.get_ref()),
         };
+        let law = entry.law.or(file.law.filter(|_| entry.profile.is_none()));
         let profile = match entry.profile.or(file.profile) {
+            _ if matches!(law, Some(LawToml::Optimal)) => Profile::Optimal,
             None | Some(ProfileToml::Quintic) => Profile::Quintic,
             Some(ProfileToml::Trapezoid) => Profile::Trapezoid { rounding },
             Some(ProfileToml::SCurve) => Profile::SCurve,
-            Some(ProfileToml::Optimal) => Profile::Optimal,
         };
         let synchronised = entry.synchronised.or(file.synchronised).unwrap_or(true);
         let limits = self.limits_of_move(entry, robot_limits)?;

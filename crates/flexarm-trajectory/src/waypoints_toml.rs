@@ -20,7 +20,7 @@ pub(crate) struct FileToml {
     pub(crate) metres: Vec<Spanned<String>>,
     pub(crate) joints: Spanned<Vec<Spanned<String>>>,
     pub(crate) start: Spanned<Values>,
-    #[serde(alias = "law")]
+    pub(crate) law: Option<LawToml>,
     pub(crate) profile: Option<ProfileToml>,
     pub(crate) synchronised: Option<bool>,
     pub(crate) speed: Option<Spanned<f64>>,
@@ -42,7 +42,7 @@ pub(crate) struct MoveToml {
     pub(crate) via: Vec<Spanned<Values>>,
     pub(crate) duration: Option<Spanned<f64>>,
     pub(crate) hold: Option<Spanned<f64>>,
-    #[serde(alias = "law")]
+    pub(crate) law: Option<LawToml>,
     pub(crate) profile: Option<ProfileToml>,
     pub(crate) synchronised: Option<bool>,
     pub(crate) speed: Option<Spanned<f64>>,
@@ -60,6 +60,13 @@ pub(crate) struct LimitsToml {
     pub(crate) jerk: Option<Spanned<f64>>,
 }
 
+/// Name of a law, in the place of a profile.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum LawToml {
+    Optimal,
+}
+
 /// Name of a profile.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -67,7 +74,6 @@ pub(crate) enum ProfileToml {
     Quintic,
     Trapezoid,
     SCurve,
-    Optimal,
 }
 
 /// One number for all joints, a list with one per joint, or a table with some of them.

@@ -161,8 +161,8 @@ fn an_optimal_move_takes_the_least_time_of_its_limits() {
     let head = "format = 1\nunit = \"rad\"\njoints = [\"a\", \"b\"]\nstart = [0, 0]\n\
                 [limits]\na = { velocity = 2.0, acceleration = 8.0, jerk = 80.0 }\n\
                 b = { velocity = 9.0, acceleration = 99.0, jerk = 999.0 }\n";
-    for (key, via) in [("profile", ""), ("law", "via = [[0.5, 0.25], [1.1, 0.55]]\n")] {
-        let motion = parse(&format!("{head}[[move]]\n{key} = \"optimal\"\n{via}to = [3.0, 1.5]\n"));
+    for via in ["", "via = [[0.5, 0.25], [1.1, 0.55]]\n"] {
+        let motion = parse(&format!("{head}[[move]]\nlaw = \"optimal\"\n{via}to = [3.0, 1.5]\n"));
         let late = motion.duration() / (2.0 / 8.0 + 8.0 / 80.0 + 3.0 / 2.0) - 1.0;
         assert!((0.0..1e-3).contains(&late), "{via:?} {late:.1e}"); // measured 1.6e-4
         let peak = &motion.peak()[0];

@@ -331,7 +331,8 @@ fn fill_from_shapes(
             true => "its length, as a rod".to_owned(),
             false => format!("its geometry at {density:.0} kg/m^3"),
         };
-        let message = format!("link {:?}: mass {:.4} kg and inertia are estimated from {from}", link.name, inertia.mass);
+        let message =
+            format!("link {:?}: mass {:.4} kg and inertia are estimated from {from}", link.name, inertia.mass);
         report.warning(&link.place, "estimated-inertia", message, "replace by measured or CAD values where known");
         inertias[i] = Some(inertia);
     }
