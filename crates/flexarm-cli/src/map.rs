@@ -6,8 +6,8 @@ use std::process::ExitCode;
 use clap::{Args, ValueEnum};
 use comfy_table::CellAlignment;
 use flexarm::map::{
-    JointRange, KeptPoses, Map, MapPose, MapRegion, MapRequest, ToolDirections, WorkspaceGrid, map, read_poses,
-    readable_quantity,
+    JointRange, KeptPoses, Map, MapPose, MapRegion, MapRequest, ToolDirections, WorkspaceGrid, map, quantity_text,
+    read_poses, readable_quantity,
 };
 use flexarm::reduce::numbers;
 use flexarm::{Motion, Robot};
@@ -260,12 +260,12 @@ fn text(map: &Map) -> String {
     let mut t = table(&["", "unit", "least", "5 %", "median", "95 %", "most", "best pose", "worst pose"]);
     for column in map.table.columns.iter().filter(|column| column.quantity) {
         let Some(spread) = map.quantities.get(&column.name) else { continue };
-        let (factor, unit) = readable_quantity(&column.name);
+        let unit = readable_quantity(&column.name).1;
         let at = |part: &str| spread.quantiles.get(part).copied().unwrap_or(f64::NAN);
         let pose = |pose: &MapPose| pose.quantities.get(&column.name).copied().unwrap_or(f64::NAN);
         let numbers = [spread.min, at("0.05"), at("0.5"), at("0.95"), spread.max, pose(&map.best), pose(&map.worst)];
         let mut row = vec![column.name.clone(), unit.to_owned()];
-        row.extend(numbers.map(|x| format!("{:.4}", factor * x)));
+        row.extend(numbers.map(|x| quantity_text(&column.name, x)));
         t.add_row(row);
     }
     for k in 2..t.column_count() {
@@ -281,11 +281,11 @@ fn text(map: &Map) -> String {
         out += &format!("  {name:<5} at {place} m, joints {}\n", joints.join(", "));
     }
     if let Some(placement) = &map.placement {
-        let (factor, unit) = readable_quantity(&map.by);
+        let unit = readable_quantity(&map.by).1;
         let centre = placement.centre_m.map(|x| format!("{x:.3}")).join(", ");
         out += &format!(
-            "workpiece: centre best at {centre} m, worst in it {:.4} {unit} ({} places)\n",
-            factor * placement.worst,
+            "workpiece: centre best at {centre} m, worst in it {} {unit} ({} places)\n",
+            quantity_text(&map.by, placement.worst),
             placement.points
         );
     }

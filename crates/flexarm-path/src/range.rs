@@ -1,6 +1,7 @@
 //! Numbers of a program are finite and inside of what a robot can do, which bounds the work of planning.
 
 use flexarm_spatial::Pose;
+use flexarm_trajectory::LONGEST;
 
 use crate::program::{Blend, Configuration, Item, Move, MoveKind, Target};
 
@@ -8,8 +9,6 @@ use crate::program::{Blend, Configuration, Item, Move, MoveKind, Target};
 const FARTHEST: f64 = 1e4;
 /// Smallest and largest speed, acceleration, jerk, and part of them (SI units).
 const RATES: [f64; 2] = [1e-6, 1e12];
-/// Longest time (s).
-const LONGEST: f64 = 1e7;
 
 /// A number of a program that is outside of its range.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]

@@ -88,5 +88,5 @@ pub use plan::{MotionLimits, Plan, PlannedMove, Profile};
 pub use problem::{PlanError, Problem, SampleError};
 pub use spline::{JointKnots, JointSamples, Samples};
 pub use table::{KnownJoint, TableInfo, TableRequest};
-pub use trajectory::{Move, Trajectory, VelocityJump};
+pub use trajectory::{LONGEST, Move, Trajectory, VelocityJump};
 pub use warning::Warning;

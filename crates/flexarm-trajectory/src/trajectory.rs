@@ -12,7 +12,7 @@ use crate::warning::{QUIET_SPEED, Warning};
 const REST: f64 = 1e-9;
 
 /// Greatest duration of a motion, s: four months.
-pub(crate) const LONGEST: f64 = 1e7;
+pub const LONGEST: f64 = 1e7;
 
 /// Joint positions, velocities and accelerations as functions of time, from `t = 0` to [`Trajectory::duration`].
 ///

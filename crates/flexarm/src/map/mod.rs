@@ -45,7 +45,7 @@ pub use columns::MapColumn;
 pub use error::MapError;
 pub use placement::Placement;
 pub use poses::read_poses;
-pub use recording::readable as readable_quantity;
+pub use recording::{quantity_text, readable as readable_quantity};
 pub use region::{Grid, JointRange, MOST_PLACES, MapRegion, ToolDirections, WorkspaceGrid};
 pub use table::{MapPose, MapTable, QUANTILES, Spread};
 

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use flexarm_draw::FieldPlot;
 
-use super::recording::{readable, scale, shown};
+use super::recording::{quantity_text, readable, scale, shown};
 use super::region::Grid;
 use super::{Map, MapPose};
 use crate::html_page::opening;
@@ -21,16 +21,16 @@ pub(super) fn html(map: &Map, grid: Option<&Grid>) -> String {
         let _ = writeln!(page, "<p class=\"no\">{}</p>", markup(&caveat.message));
     }
     if let Some(placement) = &map.placement {
-        let (factor, unit) = readable(&map.by);
+        let unit = readable(&map.by).1;
         let [low, high] = [placement.lower_m, placement.upper_m].map(|c| c.map(|x| format!("{x:.3}")).join(", "));
         let centre = placement.centre_m.map(|x| format!("{x:.3}")).join(", ");
         let _ = writeln!(
             page,
             "<h2>Where to put the workpiece</h2>\n<p>Centre at <b>{centre} m</b> (from {low} to {high} m, {} places): there {} is nowhere \
-             worse than <b>{:.4} {unit}</b>. It is outlined in the slices.</p>",
+             worse than <b>{} {unit}</b>. It is outlined in the slices.</p>",
             placement.points,
             markup(&map.by),
-            factor * placement.worst
+            quantity_text(&map.by, placement.worst)
         );
     }
     if let Some(grid) = grid {
@@ -83,13 +83,13 @@ fn quantities(map: &Map) -> String {
         .to_owned();
     for column in map.table.columns.iter().filter(|column| column.quantity) {
         let Some(spread) = map.quantities.get(&column.name) else { continue };
-        let (factor, unit) = readable(&column.name);
+        let unit = readable(&column.name).1;
         let at = |part: &str| spread.quantiles.get(part).copied().unwrap_or(f64::NAN);
         let values = [spread.min, at("0.05"), at("0.5"), at("0.95"), spread.max];
         let _ =
             write!(table, "<tr><td title=\"{}\">{}</td><td>{unit}</td>", markup(&column.meaning), markup(&column.name));
         for value in values {
-            let _ = write!(table, "<td>{:.4}</td>", factor * value);
+            let _ = write!(table, "<td>{}</td>", quantity_text(&column.name, value));
         }
         table += "</tr>\n";
     }
@@ -106,10 +106,11 @@ fn poses(map: &Map) -> String {
         row(&markup(joint), &|pose| format!("{:.4}", pose.q[k]));
     }
     for column in map.table.columns.iter().filter(|column| column.quantity) {
-        let (factor, unit) = readable(&column.name);
+        let unit = readable(&column.name).1;
         let name =
             format!("{} {}", markup(&column.name), if unit.is_empty() { String::new() } else { format!("({unit})") });
-        row(&name, &|pose| format!("{:.4}", factor * pose.quantities.get(&column.name).copied().unwrap_or(f64::NAN)));
+        let value = |pose: &MapPose| pose.quantities.get(&column.name).copied().unwrap_or(f64::NAN);
+        row(&name, &|pose| quantity_text(&column.name, value(pose)));
     }
     table + "</table>\n"
 }

@@ -13,6 +13,7 @@ use super::region::Grid;
 use super::{Map, MapPose, MapRequest, columns};
 use crate::arm::Arm;
 use crate::error::Error;
+use crate::lobes::rounded_down;
 use crate::record::{link_frames, robot_header};
 use crate::robot::Robot;
 use flexarm_settings::written::markdown;
@@ -49,8 +50,7 @@ pub(super) fn write(
         .iter()
         .enumerate()
         .map(|(k, (name, pose))| {
-            let (factor, unit) = readable(&map.by);
-            let text = format!("{name}: {} {:.4} {unit}", map.by, factor * pose.value);
+            let text = format!("{name}: {} {} {}", map.by, quantity_text(&map.by, pose.value), readable(&map.by).1);
             Caption { from_s: k as f64 * SHOWN_S, text }
         })
         .collect();
@@ -114,6 +114,12 @@ pub fn readable(name: &str) -> (f64, &'static str) {
     found.map_or((1.0, ""), |(_, factor, unit)| (*factor, *unit))
 }
 
+/// A quantity as people read it, in the unit of [`readable`]; limits of depth are rounded down.
+pub fn quantity_text(name: &str, value: f64) -> String {
+    let shown = readable(name).0 * value;
+    if name == "depth_m" { rounded_down(shown, 4) } else { format!("{shown:.4}") }
+}
+
 /// Quantities that have a view of their own, the one that poses are compared by first.
 pub(super) fn shown(map: &Map) -> Vec<usize> {
     let wanted = [map.by.as_str(), "compliance_worst_m_per_n", "sag_m", "error_m", "frequency_1_hz"];
@@ -135,19 +141,17 @@ fn text(map: &Map) -> String {
     for k in shown(map) {
         let name = &map.table.columns[k].name;
         let Some(spread) = map.quantities.get(name) else { continue };
-        let (factor, unit) = readable(name);
+        let unit = readable(name).1;
         let median = spread.quantiles.get("0.5").copied().unwrap_or(f64::NAN);
-        let [low, middle, high] = [spread.min, median, spread.max].map(|x| factor * x);
+        let [low, middle, high] = [spread.min, median, spread.max].map(|x| quantity_text(name, x));
         let name = markdown(name);
-        text += &format!("| {name} | {low:.4} {unit} | {middle:.4} {unit} | {high:.4} {unit} |\n");
+        text += &format!("| {name} | {low} {unit} | {middle} {unit} | {high} {unit} |\n");
     }
     if let Some(placement) = &map.placement {
-        let (factor, unit) = readable(&map.by);
+        let (worst, unit) = (quantity_text(&map.by, placement.worst), readable(&map.by).1);
         let [x, y, z] = placement.centre_m;
-        text += &format!(
-            "\nBest place of the workpiece: centre {x:.3}, {y:.3}, {z:.3} m; worst in it {:.4} {unit}.\n",
-            factor * placement.worst
-        );
+        text +=
+            &format!("\nBest place of the workpiece: centre {x:.3}, {y:.3}, {z:.3} m; worst in it {worst} {unit}.\n");
     }
     text
 }
