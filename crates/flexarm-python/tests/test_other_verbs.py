@@ -164,6 +164,18 @@ def test_a_map_is_that_of_the_command_line_and_of_statics(kr210: flexarm.Robot, 
     assert arm.statics(ours.worst["q"]).frequencies[0] == ours.worst["quantities"]["frequency_1_hz"]
 
 
+def test_a_map_of_poses_has_the_compliance_of_statics(kr210: flexarm.Robot, arm: flexarm.Arm) -> None:
+    poses = np.array([[0.1, -1.0, 1.5, 0.3, 0.7, 0.2], [-0.4, -0.8, 1.2, 0.0, -0.5, 0.9]])
+    found = flexarm.map(kr210, poses=poses)
+    names = [name for name in found.meanings if name.startswith("c_")]
+    assert len(names) == 36
+    for k, pose in enumerate(poses):
+        matrix = np.array([found[name][k] for name in names]).reshape(6, 6)
+        assert np.array_equal(matrix, arm.statics(pose).compliance)
+    with pytest.raises(ValueError, match="exclude each other"):
+        flexarm.map(kr210, poses=poses, along="pick_and_place")
+
+
 def test_a_compensation_takes_loads_and_limits_and_writes_other_files(kr210: flexarm.Robot, tmp_path: Path) -> None:
     wrench = [300.0, 0.0, -200.0, 0.0, 0.0, 0.0]
     load = flexarm.Load.during(wrench, 0.0, 10.0)

@@ -733,3 +733,28 @@ fn a_load_that_is_no_number_stops_the_run() {
         assert!(matches!(end, Some(StepError::Diverged { .. })), "{}: {end:?}", kind.name());
     }
 }
+
+/// Two links whose rotors couple more inertia than they have: `[[1.6, 0.8 + 100], [0.8 + 100, 0.8]]` is indefinite.
+#[test]
+fn a_mass_matrix_that_is_not_positive_definite_stops_a_run_with_its_time() {
+    let mut two = rotor(None, 0.0);
+    let second = two.links[1].clone();
+    two.links.push(Link { name: "second".into(), ..second });
+    let z = Vector3::z_axis();
+    two.joints.push(Joint::new("second_axis", JointKind::Continuous(z), "body", "second", Pose::identity()));
+    two.rotor_couplings.push(RotorCoupling { joints: ["axis".into(), "second_axis".into()], inertia: 100.0 });
+    let rigid = Arc::new(Model::new(&two).expect("a tree"));
+    let axes = (0..2).map(|coordinate| ServoAxis { coordinate, ..IDLE }).collect();
+    let arm = arm(&two, None, Arc::new(Held(vec![0.1, 0.2])));
+    let arm = arm.with_servo(Servo { sample_s: 1e-3, axes, rigid }).expect("valid");
+    for kind in [ALPHA, StepperKind::Rk4, StepperKind::Sdirk3, reference(1e-6)] {
+        let started = new_stepper(kind, arm.clone(), 1e-3, Start::Undeformed);
+        let error = started.and_then(|mut stepper| stepper.step().map(|_| ())).expect_err("no mass matrix");
+        let told = error.to_string();
+        assert!(
+            told.contains("mass matrix at t = 0.0") && told.contains("positive definite"),
+            "{}: {told}",
+            kind.name()
+        );
+    }
+}
