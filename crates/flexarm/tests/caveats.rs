@@ -433,7 +433,7 @@ fn slips() -> Vec<(&'static str, Change, &'static [&'static str])> {
         ("counterbalance on the other side", key("balancer.0.from.xyz", -1.0), &["balancer-side"]),
         (
             "counterbalance with the sense of a load",
-            balanced("[{ joint = \"joint_2\", sine = { torque = -4000.0, zero = 0.0 } }]"),
+            balanced("[{ joint = \"joint_2\", sine = { torque = -4000.0, zero = 1.5708 } }]"),
             &["balancer-side"],
         ),
         ("servo far too stiff", torque(true, set("drive.0.servo", "{ velocity_gain = 1e4 }")), &["velocity-gain"]),
@@ -510,7 +510,9 @@ fn slips_are_told_and_plausible_robots_are_not() {
     for name in ROBOTS {
         let place = Place::new(name);
         let shipped = place.told(&place.texts);
-        assert!(shipped[0].is_empty(), "{name} as shipped: {shipped:?}");
+        if !shipped[0].is_empty() {
+            false_alarms.push(format!("{name} as shipped: {shipped:?}"));
+        }
         for (what, change, codes) in slips() {
             let mut texts = place.texts.clone();
             if !change(&mut texts) {
@@ -541,6 +543,7 @@ fn slips_are_told_and_plausible_robots_are_not() {
     }
     let told = made - missed.len();
     println!("told {told} of {made} slips, {} false alarms in {tried} harmless changes", false_alarms.len());
+    missed.iter().for_each(|missed| println!("missed: {missed}"));
     assert_eq!(false_alarms, [""; 0]);
     // Its numbers are those of the motor's side, where gears are softer by the ratio squared.
     assert!(missed.iter().all(|m| m.starts_with("abb_three_mass/") && m.contains("gears in N mm/rad")), "{missed:#?}");
@@ -571,6 +574,10 @@ fn the_page_lists_the_catalogue() {
             "second-order-unknown",
             "euler-chain",
             "held-joints",
+            // Of crates/flexarm-linkmaker.
+            "link-sound",
+            "link-density",
+            "interface-size",
             // Of crates/flexarm-motion-io.
             "motion-topic",
             "motion-messages",

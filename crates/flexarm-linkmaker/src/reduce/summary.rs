@@ -377,7 +377,8 @@ pub(super) fn summary_of(
     let coarse =
         modes.first().map_or_else(Vec::new, |first| coarse("the mesh", first.lumped_error, first.reduced_error));
     let own = yardsticks::of_link(link, &reduction.whole);
-    let doubts = reduction.doubts.iter().cloned().chain(coarse).chain(own).chain(spreads(chosen));
+    let doubts =
+        reduction.doubts.iter().cloned().chain(coarse).chain(own).chain(spreads(chosen, file.mesh.nodes.len()));
     let caveats: Vec<Caveat> = doubts.map(|doubt| doubted(&link.name, doubt)).collect();
     let kept = reduction.fixed_modes.len();
     let factor = reduction.solver.factor;
@@ -430,15 +431,17 @@ pub(super) fn summary_of(
     }
 }
 
-/// Interfaces that take much of the link between the two that are farthest apart.
-fn spreads(chosen: &[Chosen]) -> Vec<Doubt> {
+/// Interfaces that take much of the link between the two that are farthest apart; `nodes`: of the mesh.
+fn spreads(chosen: &[Chosen], nodes: usize) -> Vec<Doubt> {
     let place = |one: &Chosen| one.interface.X_LI.translation.vector;
     let pairs = chosen.iter().enumerate().flat_map(|(k, a)| chosen[..k].iter().map(move |b| place(a) - place(b)));
     let Some(line) = pairs.max_by(|a, b| a.norm().total_cmp(&b.norm())) else { return Vec::new() };
     let length = line.norm();
     // Of a box of nodes the extent along the line; its edges are along the axes.
     let along = |one: &Chosen| one.extent.dot(&(line / length).abs());
-    chosen.iter().filter_map(|one| yardsticks::of_interface(&one.interface.name, along(one), length)).collect()
+    let share = |one: &Chosen| one.interface.nodes.len() as f64 / nodes as f64;
+    let judged = |one: &Chosen| yardsticks::of_interface(&one.interface.name, along(one) / length, share(one));
+    chosen.iter().filter_map(judged).collect()
 }
 
 /// Errors of the first frequency beyond which a model is called too coarse.

@@ -4,6 +4,7 @@ use flexarm_kinematics::{Joint, Mechanism};
 
 use super::size::Size;
 use super::{Caveat, CaveatKind, kinds};
+use crate::drive_entry::{Drive, DriveKind};
 use crate::robot::{PAYLOAD_LINK, Robot};
 
 /// Joints of fingers have less range than this, joints of arms more (rad).
@@ -34,21 +35,20 @@ fn of_place(robot: &Robot, size: &Size, what: &str, link: &str, [fixed, inside]:
     let mechanism = &robot.urdf.mechanism;
     let location = format!("{what} on link {link:?}");
     let body = carrier(mechanism, link);
-    let behind = Behind::of(robot, size, body);
-    let moves = |joint: &&Joint| moves(robot, joint);
+    let moving = moving(robot);
     if !mechanism.joints.iter().any(|joint| joint.child == body) {
-        let all = mechanism.joints.iter().filter(moves).count();
-        return (all > 0).then(|| fixed.found(location, 0.0, all as f64));
+        return (!moving.is_empty()).then(|| fixed.found(location, 0.0, moving.len() as f64));
     }
+    let behind = Behind::of(mechanism, &moving, size, body);
     behind.is_arm.then(|| inside.found(location, behind.reach, size.extent))
 }
 
-/// Whether a joint moves by itself: not fixed, not held, not following another one.
-fn moves(robot: &Robot, joint: &Joint) -> bool {
-    joint.kind.degrees_of_freedom() > 0
-        && joint.mimic.is_none()
-        && joint.limits.upper > joint.limits.lower
-        && !robot.hold.iter().any(|(held, _)| *held == joint.name)
+/// Joints that move by themselves: not fixed, not held, not following others.
+fn moving(robot: &Robot) -> Vec<String> {
+    let Ok(model) = robot.rigid_model() else { return Vec::new() };
+    let held = |name: &str| robot.hold.iter().any(|(held, _)| held == name);
+    let moves = model.coordinates().iter().filter(|c| c.limits.upper > c.limits.lower && !held(&c.joint));
+    moves.map(|c| c.joint.clone()).collect()
 }
 
 /// The link of the same body that is nearest to the base.
@@ -70,8 +70,7 @@ struct Behind {
 }
 
 impl Behind {
-    fn of(robot: &Robot, size: &Size, body: &str) -> Self {
-        let mechanism = &robot.urdf.mechanism;
+    fn of(mechanism: &Mechanism, moving: &[String], size: &Size, body: &str) -> Self {
         // Links with whether a joint that moves is between them and the body.
         let mut open = vec![(body, false)];
         let (mut reach, mut mass, mut turns) = (0.0f64, 0.0, false);
@@ -82,7 +81,7 @@ impl Behind {
                 mass += inertia.map_or(0.0, |inertia| inertia.mass);
             }
             for joint in mechanism.child_joints(link) {
-                let moves = moves(robot, joint);
+                let moves = moving.contains(&joint.name);
                 let range = joint.limits.upper - joint.limits.lower;
                 turns |= moves && joint.kind.turns() && range > HALF_TURN;
                 open.push((&joint.child, moved || moves));
@@ -95,13 +94,14 @@ impl Behind {
 
 /// Joints that do not yield where almost all others of the arm do, or with ones that yield on both sides.
 fn stiff_joints(robot: &Robot) -> Vec<Caveat> {
-    let yields = |joint: &Joint| robot.drives.iter().any(|d| d.joint == joint.name && d.gearbox.is_some());
-    let mechanism = &robot.urdf.mechanism;
+    let elastic = |drive: &Drive| drive.kind != DriveKind::Prescribed && drive.gearbox.is_some();
+    let yields = |joint: &Joint| robot.drives.iter().any(|drive| drive.joint == joint.name && elastic(drive));
+    let (mechanism, moving) = (&robot.urdf.mechanism, moving(robot));
     // From the TCP to the base.
     let mut chain: Vec<(&Joint, bool)> = Vec::new();
     let mut link = robot.tcp.0.as_str();
     while let Some(joint) = mechanism.joints.iter().find(|joint| joint.child == link) {
-        if moves(robot, joint) && joint.kind.turns() {
+        if moving.contains(&joint.name) && joint.kind.turns() {
             chain.push((joint, yields(joint)));
         }
         link = &joint.parent;
