@@ -38,6 +38,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use flexarm_kinematics::{Data, Model, forward_kinematics};
+use flexarm_settings::Quantity;
 use nalgebra::DVector;
 use serde::Serialize;
 
@@ -56,10 +57,11 @@ use self::region::{MOST_QUERIES, round_number};
 use self::take::{Choice, Places, PoseOf, Taken, take};
 use crate::arm::Arm;
 use crate::caveat::{self, Caveat};
-use crate::error::Error;
+use crate::error::{Error, ValueError};
 use crate::inspect::joint_values;
 use crate::lobes::{CuttingTool, lowest_limit};
 use crate::options::Modelling;
+use crate::posed::check_wrench;
 use crate::robot::{Robot, tcp_frame};
 
 /// Poses that are tried to find out how far the arm reaches.
@@ -222,6 +224,7 @@ pub fn map(
 ) -> Result<Map, Error> {
     let begun = Instant::now();
     let paths = request.output.as_deref().map(|folder| files::places(folder, request.overwrite)).transpose()?;
+    check_wrench(&request.wrench)?;
     let arm = robot.flexible(request.modelling)?;
     let at = arm.operating_point()?;
     let model = &*arm.flexible().rigid;
@@ -376,6 +379,7 @@ fn joint_region<'m>(ranges: &'m [JointRange], model: &Model, near: &[f64]) -> Re
         if !first.is_finite() || !last.is_finite() || *points == 0 {
             return Err(MapError::JointRange { joint: joint.clone(), range: range.range, points: *points }.into());
         }
+        Quantity::JOINT.check_all(&format!("joint {joint:?}"), &range.range).map_err(ValueError::from)?;
         let limits = actuated[k].limits;
         if first.min(*last) < limits.lower || first.max(*last) > limits.upper {
             let (lower, upper) = (limits.lower, limits.upper);
