@@ -155,7 +155,7 @@ fn a_search_up_to_a_depth_finds_the_same_limit_with_less_work() {
             work = [work[0] + all, work[1] + few];
         }
     }
-    println!("{work:?} responses");
+    eprintln!("{work:?} responses");
     assert!(10 * work[1] < 7 * work[0], "{work:?}"); // measured 0.57
 }
 
@@ -178,7 +178,7 @@ fn the_work_of_a_limit_does_not_grow_with_the_damping() {
         };
         let band = structure.frequencies();
         let found = zero_order_limit(&response, &cutter, 6000.0 * TAU / 60.0, &band, 0.02);
-        println!("damping {damping}, {stiffness:e} N/m: {} responses, {found:?}", calls.get());
+        eprintln!("damping {damping}, {stiffness:e} N/m: {} responses, {found:?}", calls.get());
         assert!(found.is_ok() && calls.get() < 5000, "{} {found:?}", calls.get()); // measured 2223
         let slow = zero_order_limit(&response, &cutter, 1e-6 * TAU / 60.0, &band, 1.0);
         assert!(matches!(slow, Ok(None) | Err(ChatterError::TooSlow { .. })), "{slow:?}");

@@ -39,6 +39,13 @@ pub(crate) fn failed(source: StepError) -> Error {
     Error::Step { source, partial: false }
 }
 
+/// Checks force and moment on the tool, six numbers.
+pub(crate) fn check_wrench(wrench: &[f64]) -> Result<(), ValueError> {
+    let force = Quantity::FORCE.check_all("the force at the tool", wrench.iter().take(3));
+    let torque = Quantity::TORQUE.check_all("the torque at the tool", wrench.iter().skip(3));
+    Ok(force.and(torque)?)
+}
+
 impl Posed {
     /// `at`: all actuated joints (rad or m), zero without it.
     pub(crate) fn new(robot: &Robot, modelling: &Modelling, at: Option<&[f64]>) -> Result<Self, Error> {
@@ -100,8 +107,7 @@ impl Posed {
     /// The linear structure about the equilibrium under weight and a wrench at the TCP (world axes).
     pub(crate) fn linear(&self, wrench: &Vector6<f64>) -> Result<Linear, Error> {
         let F = Wrench::new(wrench.fixed_rows::<3>(0).into(), wrench.fixed_rows::<3>(3).into());
-        Quantity::FORCE.check_all("the force at the tool", &F.force).map_err(ValueError::from)?;
-        Quantity::TORQUE.check_all("the torque at the tool", &F.torque).map_err(ValueError::from)?;
+        check_wrench(wrench.as_slice())?;
         linearise(&self.arm, &self.tool, &F, 0.0).map_err(|error| self.flexible.explained(error))
     }
 

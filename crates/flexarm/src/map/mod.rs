@@ -38,6 +38,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use flexarm_kinematics::{Data, Model, forward_kinematics};
+use flexarm_settings::Quantity;
 use nalgebra::DVector;
 use serde::Serialize;
 
@@ -58,10 +59,11 @@ use crate::arm::Arm;
 use crate::caveat::motion::of_wrench;
 use crate::caveat::size::Size;
 use crate::caveat::{self, Caveat, Use};
-use crate::error::Error;
+use crate::error::{Error, ValueError};
 use crate::inspect::joint_values;
 use crate::lobes::{CuttingTool, lowest_limit};
 use crate::options::Modelling;
+use crate::posed::check_wrench;
 use crate::robot::{Robot, tcp_frame};
 use crate::scenario::Scenario;
 
@@ -225,6 +227,7 @@ pub fn map(
 ) -> Result<Map, Error> {
     let begun = Instant::now();
     let paths = request.output.as_deref().map(|folder| files::places(folder, request.overwrite)).transpose()?;
+    check_wrench(&request.wrench)?;
     let arm = robot.flexible(request.modelling)?;
     let at = arm.operating_point()?;
     let model = &*arm.flexible().rigid;
@@ -380,6 +383,7 @@ fn joint_region<'m>(ranges: &'m [JointRange], model: &Model, near: &[f64]) -> Re
         if !first.is_finite() || !last.is_finite() || *points == 0 {
             return Err(MapError::JointRange { joint: joint.clone(), range: range.range, points: *points }.into());
         }
+        Quantity::JOINT.check_all(&format!("joint {joint:?}"), &range.range).map_err(ValueError::from)?;
         let limits = actuated[k].limits;
         if first.min(*last) < limits.lower || first.max(*last) > limits.upper {
             let (lower, upper) = (limits.lower, limits.upper);
