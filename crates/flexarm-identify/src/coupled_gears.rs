@@ -8,7 +8,7 @@
 //! combination of springs, and one encoder may tell several of them. Deviations and what counts as told as for a single gear
 //! ([`crate::gear_stiffness`]), of each spring beside what the others do.
 
-use crate::encoders::{BLOCK, GearEstimate, Normal, centred, jackknife, squares};
+use crate::encoders::{BLOCK, GearEstimate, Normal, centred, damping_time, jackknife, squares};
 
 /// One link's encoder in a recording, evenly sampled, all filtered alike.
 #[derive(Clone, Debug, PartialEq)]
@@ -107,7 +107,7 @@ impl Fit {
     /// Least squares with an offset for each encoder of each run, without one block.
     fn of(runs: &[Vec<CoupledOutput>], some: &[usize], without: Option<(usize, usize)>) -> Option<Self> {
         let (outputs, motors) = (runs[0].len(), runs[0][0].torques.len());
-        let mut sums = Normal::new(motors + 2 * outputs);
+        let mut sums = Normal::new(motors + outputs);
         for &k in some {
             let left_out = |i: &usize| without.is_some_and(|(r, first)| r == k && (first..first + BLOCK).contains(i));
             let kept: Vec<usize> = (0..runs[k][0].deflection.len()).filter(|i| !left_out(i)).collect();
@@ -117,37 +117,48 @@ impl Fit {
                 let rate = centred(&output.rate, &kept);
                 let mut columns: Vec<(usize, &[f64], &[f64])> =
                     x.iter().zip(&z).enumerate().map(|(k, (x, z))| (k, &x[..], &z[..])).collect();
-                let yielding = centred(&output.deflection_rate, &kept);
                 columns.push((motors + number, &rate, &rate));
-                columns.push((motors + outputs + number, &yielding, &yielding));
                 sums.add(&columns, &centred(&output.deflection, &kept));
             }
         }
         let mut values = sums.solved(motors)?;
-        let mut delay = values.split_off(motors);
-        let damping_s = delay.split_off(outputs).iter().map(|x| -x).collect();
-        Some(Self { compliance: values, delay, damping_s })
+        let delay = values.split_off(motors);
+        let mut fit = Self { compliance: values, delay, damping_s: vec![0.0; outputs] };
+        fit.damping_s = (0..outputs)
+            .map(|number| {
+                let of =
+                    some.iter().map(|&k| (fit.rest(&runs[k][number], number), &runs[k][number].deflection_rate[..]));
+                damping_time(of)
+            })
+            .collect();
+        Some(fit)
+    }
+
+    /// What is left of the deflection of an encoder.
+    fn rest(&self, output: &CoupledOutput, number: usize) -> Vec<f64> {
+        let kept: Vec<usize> = (0..output.deflection.len()).collect();
+        let mut rest = centred(&output.deflection, &kept);
+        let mut take = |x: &[f64], factor: f64| {
+            rest.iter_mut().zip(centred(x, &kept)).for_each(|(rest, x)| *rest -= factor * x);
+        };
+        take(&output.rate, self.delay[number]);
+        take(&output.deflection_rate, -self.damping_s[number]);
+        output.torques.iter().zip(&self.compliance).for_each(|(torque, c)| take(torque, *c));
+        rest
     }
 
     /// Of a run, over the encoders that show a spring: what that spring does by the readings without the others, and by its torque.
     fn curves(&self, run: &[CoupledOutput], motor: usize) -> [Vec<f64>; 2] {
         let (mut measured, mut expected) = (Vec::new(), Vec::new());
-        for ((output, delay), damping_s) in run.iter().zip(&self.delay).zip(&self.damping_s) {
+        for (number, output) in run.iter().enumerate() {
             if output.torques[motor].iter().all(|torque| *torque == 0.0) {
                 continue;
             }
             let kept: Vec<usize> = (0..output.deflection.len()).collect();
-            let mut rest = centred(&output.deflection, &kept);
-            let mut take = |x: &[f64], factor: f64| {
-                rest.iter_mut().zip(centred(x, &kept)).for_each(|(rest, x)| *rest -= factor * x);
-            };
-            take(&output.rate, *delay);
-            take(&output.deflection_rate, -damping_s);
-            let others = output.torques.iter().zip(&self.compliance).enumerate().filter(|(k, _)| *k != motor);
-            others.for_each(|(_, (torque, c))| take(torque, *c));
-            measured.extend(rest);
-            expected
-                .extend(centred(&output.torques[motor], &kept).iter().map(|torque| self.compliance[motor] * torque));
+            let own = centred(&output.torques[motor], &kept).into_iter().map(|torque| self.compliance[motor] * torque);
+            let own: Vec<f64> = own.collect();
+            measured.extend(self.rest(output, number).iter().zip(&own).map(|(rest, own)| rest + own));
+            expected.extend(own);
         }
         [measured, expected]
     }

@@ -195,18 +195,27 @@ struct Fit {
 impl Fit {
     /// Least squares with an offset for each run, without one block.
     fn of(runs: &[GearRun], some: &[usize], without: Option<(usize, usize)>) -> Option<Self> {
-        let mut sums = Normal::new(3);
-        for &k in some {
-            let run = &runs[k];
-            let left_out = |i: &usize| without.is_some_and(|(r, first)| r == k && (first..first + BLOCK).contains(i));
-            let kept: Vec<usize> = (0..run.deflection.len()).filter(|i| !left_out(i)).collect();
-            let of = |x: &[f64]| centred(x, &kept);
-            let [y, t, z, v] = [&run.deflection, &run.torque, &run.instrument, &run.rate].map(|x| of(x));
-            let w = of(&run.deflection_rate);
-            sums.add(&[(0, &t, &z), (1, &v, &v), (2, &w, &w)], &y);
-        }
+        let centred_runs: Vec<[Vec<f64>; 5]> = some
+            .iter()
+            .map(|&k| {
+                let run = &runs[k];
+                let left_out =
+                    |i: &usize| without.is_some_and(|(r, first)| r == k && (first..first + BLOCK).contains(i));
+                let kept: Vec<usize> = (0..run.deflection.len()).filter(|i| !left_out(i)).collect();
+                let all = [&run.deflection, &run.torque, &run.instrument, &run.rate, &run.deflection_rate];
+                all.map(|x| centred(x, &kept))
+            })
+            .collect();
+        let mut sums = Normal::new(2);
+        centred_runs.iter().for_each(|[y, t, z, v, _]| sums.add(&[(0, t, z), (1, v, v)], y));
         let found = sums.solved(1)?;
-        Some(Self { compliance: found[0], delay: found[1], damping_s: -found[2] })
+        let (compliance, delay) = (found[0], found[1]);
+        // Of what is left: friction, which jumps where the torque is largest, would pass for damping and change the compliance.
+        let damping = centred_runs.iter().map(|[y, t, _, v, w]| {
+            let rest: Vec<f64> = (0..y.len()).map(|k| y[k] - compliance * t[k] - delay * v[k]).collect();
+            (rest, &w[..])
+        });
+        Some(Self { compliance, delay, damping_s: damping_time(damping) })
     }
 
     /// Of a run: the deflection without offset, delay and damping, and what the torque makes of it.
@@ -221,6 +230,14 @@ impl Fit {
     fn left_of(&self, run: &GearRun) -> (f64, f64) {
         squares(&self.curves(run))
     }
+}
+
+/// Time T of a rest that is `-T` times a rate; 0 where nothing gives way.
+pub(crate) fn damping_time<'a>(of: impl Iterator<Item = (Vec<f64>, &'a [f64])>) -> f64 {
+    let sums = of.fold((0.0, 0.0), |sums, (rest, rate)| {
+        rest.iter().zip(rate).fold(sums, |(a, b), (r, w)| (a + r * w, b + w * w))
+    });
+    if sums.1 > 0.0 { -sums.0 / sums.1 } else { 0.0 }
 }
 
 /// Sums of squares of what is left of a measured curve, and of all of it.

@@ -14,7 +14,7 @@ const LOAD_RATIO: f64 = 5.0;
 /// Weight of a kilogram (N).
 const WEIGHT: f64 = 9.81;
 /// A rest of encoders over their noise that is told.
-const ENCODER_REST: f64 = 2.0;
+const ENCODER_REST: f64 = 1.5;
 
 /// Scatter of places about the rigid robot, over their spread, beyond which frames or joints do not fit.
 const FRAME_RATIO: f64 = 0.05;
