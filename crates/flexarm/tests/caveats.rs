@@ -304,6 +304,11 @@ fn without_gear(n: usize) -> Change {
     })
 }
 
+/// A change of robots without a counterbalance, which is made for its weight and its mounting.
+fn unbalanced(change: Change) -> Change {
+    Box::new(move |texts| !texts.robot.contains_key("balancer") && change(texts))
+}
+
 fn inertia(factor: f64) -> Change {
     Box::new(move |texts| {
         for name in ["ixx", "iyy", "izz", "ixy", "ixz", "iyz"] {
@@ -471,10 +476,10 @@ fn harmless() -> Vec<(&'static str, Change)> {
         ("ten per cent of damping", set("flexible_link.*.damping", "{ modal = 0.1 }")),
         ("damping of 1e-4 s", set("flexible_link.*.damping", "{ stiffness_beta = 1e-4 }")),
         ("modal links", without_from_link(set("flexible_link.*.model", "\"modal\""))),
-        ("on a ceiling", set("gravity", "[0.0, 0.0, 9.81]")),
-        ("on a wall", set("gravity", "[9.81, 0.0, 0.0]")),
-        ("on a slope", set("gravity", "[0.0, -6.937, -6.937]")),
-        ("on the moon", set("gravity", "[0.0, 0.0, -1.62]")),
+        ("on a ceiling", unbalanced(set("gravity", "[0.0, 0.0, 9.81]"))),
+        ("on a wall", unbalanced(set("gravity", "[9.81, 0.0, 0.0]"))),
+        ("on a slope", unbalanced(set("gravity", "[0.0, -6.937, -6.937]"))),
+        ("on the moon", unbalanced(set("gravity", "[0.0, 0.0, -1.62]"))),
         ("in orbit", set("gravity", "[0.0, 0.0, 0.0]")),
         ("another tool", set("tcp.xyz", "[0.0, 0.1, 0.6]")),
         ("tool turned by a right angle", set("tcp.rpy", "[0.0, 1.5707963, 0.0]")),

@@ -73,7 +73,7 @@ impl Behind {
     fn of(mechanism: &Mechanism, moving: &[String], size: &Size, body: &str) -> Self {
         // Links with whether a joint that moves is between them and the body.
         let mut open = vec![(body, false)];
-        let (mut reach, mut mass, mut turns) = (0.0f64, 0.0, false);
+        let (mut reach, mut mass, mut turns, mut branches) = (0.0f64, 0.0, false, 0);
         while let Some((link, moved)) = open.pop() {
             if moved {
                 let inertia = mechanism.link(link).and_then(|link| link.inertia).filter(|inertia| inertia.mass > 0.0);
@@ -84,11 +84,13 @@ impl Behind {
                 let moves = moving.contains(&joint.name);
                 let range = joint.limits.upper - joint.limits.lower;
                 turns |= moves && joint.kind.turns() && range > HALF_TURN;
+                branches += usize::from(moves && !moved);
                 open.push((&joint.child, moved || moves));
             }
         }
         let large = reach > ARM_LIKE * size.extent || mass > ARM_LIKE * size.mass;
-        Self { reach, is_arm: turns || large }
+        // Hands have several fingers.
+        Self { reach, is_arm: large || (turns && branches == 1) }
     }
 }
 
