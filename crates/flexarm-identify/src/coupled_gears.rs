@@ -3,8 +3,8 @@
 //! ```text
 //! C q_m - q_link = C diag(c) Cᵀ τ:     row i:  Σ_k c_k C_ik (Cᵀ τ)_k + d_i q̇_i + offset of the run
 //! ```
-//! with the compliance `c_k` of each motor's spring behind its gear and a delay `d_i` of each link's encoder (and, not written out, damping in
-//! proportion to what each link shows): what one link shows is a
+//! with the compliance `c_k` of each motor's spring behind its gear and a delay `d_i` of each link's encoder (and, fitted to the rest, damping in
+//! proportion to the rate of what each link shows): what one link shows is a
 //! combination of springs, and one encoder may tell several of them. Deviations and what counts as told as for a single gear
 //! ([`crate::gear_stiffness`]), of each spring beside what the others do.
 

@@ -4,7 +4,7 @@
 //! δ = motor - link = c τ - T dδ/dt + d q̇ + offset of the run
 //! ```
 //! with the compliance c, the torque τ through the gear, the time T = damping / stiffness of the gear, and a delay d between the two
-//! instruments. The torque follows from the link's
+//! instruments. T is fitted to what the others leave. The torque follows from the link's
 //! motion or from a sensor. The noise of the link's encoder is in the deflection and, through its second derivative, in the torque; a
 //! plain least-squares fit would take the one for the cause of the other. So both are compared by a third signal without that noise
 //! (instrumental variables): the torque that the motor's motion would need.

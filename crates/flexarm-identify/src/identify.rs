@@ -490,8 +490,9 @@ fn told(
     let V = solution.directions.columns(0, solution.identified);
     let share = |k: usize| 1.0 - V.row(k).norm_squared();
     let found = parameters.iter().enumerate().map(|(k, parameter)| {
-        let identifiable = share(k) <= UNTOLD;
         let spread = solution.covariance[(k, k)].sqrt();
+        // Directions are judged where the prior holds them; where the search ends they may be known less.
+        let identifiable = share(k) <= UNTOLD && spread <= parameter.reference();
         let (x, std) = (solution.unknowns[k], if identifiable && fits { spread * scatter } else { f64::NAN });
         Found {
             name: parameter.name.clone(),

@@ -114,7 +114,9 @@ fn gears_of_a_swinging_arm_come_out_from_the_motion_of_its_links_and_from_measur
                 1e6 * gear.noise_rms,
                 gear.r2
             );
-            assert!(gear.told && off.abs() < 5e-3, "{name}, {}: {off:e}", gear.joint);
+            // Measured: 2.7e-3 and 2.1 deviations, with measured torques 1.2e-3 and 0.8 deviations.
+            let deviations = (off * initial / gear.std).abs();
+            assert!(gear.told && off.abs() < 5e-3 && deviations < 4.0, "{name}, {}: {off:e}", gear.joint);
             // White noise of two encoders, of which the band of 12 of 250 Hz is left.
             let noise = gear.noise_rms / (2f64.sqrt() * NOISE * (12f64 / 250.0).sqrt());
             assert!((0.7..1.4).contains(&noise), "noise {noise}");

@@ -305,3 +305,27 @@ fn plans_and_identifications_tell_what_check_tells_of_the_robot() {
     assert!(plan.caveats.iter().any(|caveat| caveat.code == "payload-mass"), "{:?}", plan.caveats);
     assert!(plan.warnings.iter().any(|text| text.contains("payload")), "{:?}", plan.warnings);
 }
+
+/// Two dial gauge readings of 1 mm where the robot file expects half of it. With this prior the third gear was claimed to be found with
+/// a deviation of 247 %.
+#[test]
+fn what_the_readings_know_less_than_within_a_factor_of_two_is_not_claimed() {
+    let place = Place::new("gauge");
+    let reading = |q2: f64| {
+        format!(
+            "[[displacement]]\njoints = [0, {q2}, 1.2, 0, 0.3, 0]\nload = {{ force = [0, 0, -500] }}\ndirection = [0, 0, 1]\n\
+             value = -0.001\nstd = 3e-5\n"
+        )
+    };
+    let found = place.identify(&format!("format = 1\nuncertainty = 1000\n{}{}", reading(-0.9), reading(-0.7))).unwrap();
+    for p in &found.parameters {
+        eprintln!("{}: {:.3e} +- {:.1e}, told {}", p.name, p.value, p.std, p.identifiable);
+        match p.identifiable {
+            true => assert!(p.std / p.value <= 2f64.ln(), "{p:?}"),
+            false => assert!(p.value == p.initial && p.std.is_nan(), "{p:?}"),
+        }
+    }
+    let json = serde_json::to_value(&found).unwrap();
+    let third = &json["parameters"][2];
+    assert!(third["std"].is_null() && third["identifiable"] == false && third["value"] == third["initial"], "{third}");
+}

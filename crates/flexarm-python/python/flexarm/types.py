@@ -1218,7 +1218,7 @@ class Identification(TypedDict):
     iterations: int
     """Iterations."""
     converged: bool
-    """Whether the search ended by itself."""
+    """Whether the search ended by itself, at a fit that meets the readings."""
     file: str | None
     """The new robot file."""
     page: str | None
