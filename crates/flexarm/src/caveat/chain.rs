@@ -109,14 +109,14 @@ fn stiff_joints(robot: &Robot) -> Vec<Caveat> {
         link = &joint.parent;
     }
     let elastic = chain.iter().filter(|(_, yields)| *yields).count();
-    let stiff = chain.len() - elastic;
-    if chain.len() < FEWEST || stiff == 0 || stiff >= elastic {
+    // Leaving out the last joints of a wrist is usual, unless it is one alone.
+    let outermost = chain.iter().position(|(_, yields)| *yields).unwrap_or(0);
+    let first = if outermost == 1 { 0 } else { outermost };
+    let odd: Vec<&Joint> = chain[first..].iter().rev().filter(|(_, yields)| !yields).map(|(joint, _)| *joint).collect();
+    if chain.len() < FEWEST || odd.len() >= elastic {
         return Vec::new();
     }
-    // Leaving out the last joints of a wrist is usual.
-    let outermost = chain.iter().position(|(_, yields)| *yields).unwrap_or(0);
-    let odd = chain.iter().enumerate().rev().filter(|(k, (_, yields))| !yields && (*k > outermost || stiff == 1));
-    let told =
-        |joint: &Joint| kinds::STIFF_JOINT.found(format!("joint {:?}", joint.name), elastic as f64, chain.len() as f64);
-    odd.map(|(_, (joint, _))| told(joint)).collect()
+    let all = chain.len() as f64;
+    let told = |joint: &Joint| kinds::STIFF_JOINT.found(format!("joint {:?}", joint.name), elastic as f64, all);
+    odd.into_iter().map(told).collect()
 }
