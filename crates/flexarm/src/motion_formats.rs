@@ -153,16 +153,14 @@ fn unreadable(path: &Path, source: std::io::Error) -> Error {
     flexarm_trajectory::TrajectoryError::Read { path: path.to_owned(), source }.into()
 }
 
-/// The text at the beginning of a file, up to the first byte that is none; a mark of UTF-16 is followed.
+/// The text at the beginning of a file, up to the first byte that is none.
 fn start_as_text(bytes: &[u8]) -> String {
-    if bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]) {
-        let whole = bytes[..bytes.len() - bytes.len() % 2].to_vec();
-        return flexarm_trajectory::text_of_bytes(whole, "").unwrap_or_default();
-    }
-    let text = match std::str::from_utf8(bytes) {
-        Ok(text) => text,
-        Err(error) => std::str::from_utf8(&bytes[..error.valid_up_to()]).unwrap_or_default(),
-    };
+    let is_utf16 = bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]);
+    let whole = &bytes[..bytes.len() - usize::from(is_utf16) * (bytes.len() % 2)];
+    let text = flexarm_trajectory::text_of_bytes(whole.to_vec(), "").unwrap_or_else(|_| {
+        let end = std::str::from_utf8(bytes).map_or_else(|error| error.valid_up_to(), str::len);
+        String::from_utf8_lossy(&bytes[..if is_utf16 { 0 } else { end }]).into_owned()
+    });
     text.trim_start_matches('\u{feff}').to_owned()
 }
 

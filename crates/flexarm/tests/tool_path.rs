@@ -118,6 +118,49 @@ fn a_program_of_the_controller_moves_as_the_path_file_that_says_the_same() {
     assert!(apart.fold(0.0, f64::max) < 1e-9);
 }
 
+/// A line past the singular pose of the wrist, where joint 4 would need more than its speed. Truth: the limits as runs check them.
+#[test]
+fn a_line_past_a_singular_pose_of_the_wrist_keeps_the_limits_that_runs_check() {
+    let robot = kr210();
+    for offset in [10, 20, 40] {
+        let motion = load(
+            &robot,
+            "singular.toml",
+            &format!(
+                "format = 1\n[path]\nlengths = \"mm\"\nangles = \"deg\"\nspeed = 800.0\nacceleration = 4000.0\n\
+                 [[move]]\njoint_to = [1800, {offset}, 2000]\nrpy = [0, 90, 0]\nnear = [0, -60, 60, 0, 10, 0]\n\
+                 [[move]]\nline = [1800, {offset}, 1300]\n"
+            ),
+        );
+        let motion = motion.unwrap();
+        assert!(motion.violations.is_empty(), "{offset} mm: {:?}", motion.violations);
+        let slowed = motion.tool_path.as_ref().and_then(|path| path.moves[0].slowed.as_ref());
+        assert!(slowed.is_some_and(|slowed| slowed.part < 0.5), "{offset} mm: {slowed:?}");
+    }
+}
+
+/// Truth: the same table in UTF-8, and the samples that were left out.
+#[test]
+fn a_table_in_the_letters_of_old_windows_is_recognised_and_its_gap_is_told() {
+    let robot = kr210();
+    let rows = (0..200).filter(|k| !(101..121).contains(k));
+    let row = |k: i32| format!("{:.3};{:.6}\n", 0.02 * f64::from(k), (0.02 * f64::from(k)).sin()).replace('.', ",");
+    let text = format!("# Prüfstand\nZeit[s];joint_a1 [°]\n{}", rows.map(row).collect::<String>());
+    let joint = robot.rigid_model().unwrap().coordinates()[0].joint.clone();
+    let text = text.replace("joint_a1", &joint);
+    let folder = folder("windows");
+    let old: Vec<u8> = text.chars().map(|letter| u8::try_from(u32::from(letter)).unwrap()).collect();
+    let read = |name: &str, bytes: &[u8]| {
+        std::fs::write(folder.join(name), bytes).unwrap();
+        Motion::load(folder.join(name), &robot).unwrap()
+    };
+    let (old, new) = (read("old.txt", &old), read("new.txt", text.as_bytes()));
+    std::fs::remove_dir_all(&folder).unwrap();
+    assert_eq!(old.trajectory, new.trajectory);
+    let told = old.caveats().iter().any(|caveat| caveat.message.contains("0.4200 s, from t = 2.0000 s to 2.4200 s"));
+    assert!(told, "{:?}", old.caveats());
+}
+
 #[test]
 fn standard_motions_stay_in_their_cube_and_rest_where_they_should() {
     let robot = kr210();
