@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 
 use flexarm::{
     LoadOptions, Modelling, Motion, ReportRun, Robot, RunOptions, STEPPERS, StepRule, StepperOptions, Summary, Trace,
-    figure_groups, html, inspect, pose_sensitivity, simulate, simulate_traced, statics,
+    figure_groups, html, inspect, sensitivity::pose_sensitivity, simulate, simulate_traced, statics,
 };
 use serde_json::Value;
 
-/// Every robot file of the repository with a motion of its own, and two motions that show more of the large arm.
+/// Robot files of the repository with a motion of their own.
 const SHIPPED: [&str; 17] = [
     "abb_three_mass",
     "abb_three_mass/torque.toml",
@@ -63,14 +63,13 @@ fn numbers(text: &str) -> Vec<f64> {
     text.split(|c: char| !(c.is_ascii_digit() || c == '.' || c == '-')).filter_map(|word| word.parse().ok()).collect()
 }
 
-/// Truth: the sum of the shares is the error, to the rounding of its quadrature (measured at most ...), and the printed shares
-/// of the table add up to the printed peak.
+/// Truth: the sum of the shares is the error (measured 1e-12, of quadrature), and printed shares add up to the printed peak.
 fn check(name: &str, summary: &Summary) {
     let tcp = summary.tcp.as_ref().unwrap();
     let sum: f64 = tcp.shares_at_peak.iter().map(|share| share.along_m).sum();
     let off = (sum / tcp.peak_m - 1.0).abs();
     eprintln!("{name}: peak {:.4e} m, shares off by {off:.1e}", tcp.peak_m);
-    assert!(off < 1e-6, "{name}: {sum:e} of {:e}", tcp.peak_m);
+    assert!(off < 1e-9, "{name}: {sum:e} of {:e}", tcp.peak_m);
     let groups = figure_groups(summary);
     let rows = groups.iter().flat_map(|group| &group.rows);
     let shares =
@@ -80,8 +79,9 @@ fn check(name: &str, summary: &Summary) {
     assert!((printed - peak).abs() < 1e-6, "{name}: printed {printed} of {peak} mm");
     // The headline: peak = static + in motion; links, gearboxes, ...
     let (parts, shares) = summary.headline.split_once(';').unwrap();
+    let sign = if parts.contains("static - ") { -1.0 } else { 1.0 };
     let parts = numbers(parts);
-    assert!((parts[0] - parts[1] - parts[2]).abs() < 1e-9, "{}", summary.headline);
+    assert!((parts[0] - parts[1] - sign * parts[2]).abs() < 1e-9, "{}", summary.headline);
     let told =
         shares.split(", ").filter_map(|group| group.split(" (").next()?.split(' ').next_back()?.parse::<f64>().ok());
     assert!((told.sum::<f64>() - parts[0]).abs() < 1e-9, "{}", summary.headline);
@@ -121,8 +121,8 @@ fn peak(summary: &Summary) -> f64 {
     summary.tcp.as_ref().unwrap().peak_m
 }
 
-/// Truth: SDIRK at 0.1 ms. The default step of every stepper follows the shipped robots, and longer ones lose no more than
-/// this without a caveat.
+/// Truth: SDIRK at 0.1 ms. With its default step every stepper is off by at most 1.6e-3 (SPOOK on the cast link), and what is
+/// not told is off by at most 1.0e-2 (SPOOK at 1 ms on one beam).
 #[test]
 fn steps_that_lose_part_of_the_largest_error_are_told_and_default_steps_are_not() {
     let mut told = 0;
@@ -143,8 +143,8 @@ fn steps_that_lose_part_of_the_largest_error_are_told_and_default_steps_are_not(
                     if caveat { "told" } else { "" }
                 );
                 told += usize::from(caveat);
-                assert!(times > 1.0 || !caveat && off < 0.01, "{name}, {}: {off:e}, {:?}", entry.name, codes(&summary));
-                assert!(caveat || off < 0.05, "{name}, {} at {step_s} s: {off:e}", entry.name);
+                assert!(times > 1.0 || !caveat && off < 5e-3, "{name}, {}: {off:e}, {:?}", entry.name, codes(&summary));
+                assert!(caveat || off < 0.02, "{name}, {} at {step_s} s: {off:e}", entry.name);
             }
         }
     }
