@@ -83,7 +83,7 @@ mod tests {
     /// Truth: a bar of steel, `EA/l` along it and `12 EI/l³` across: `√(E/rho)`.
     #[test]
     fn sound_runs_along_a_bar_as_in_its_material() {
-        let (E, rho, l, a) = (210e9, 7850.0, 0.8, 0.05f64);
+        let (E, rho, l, a) = (210e9f64, 7850.0f64, 0.8f64, 0.05f64);
         let (EA, EI) = (E * a * a, E * a.powi(4) / 12.0);
         let across = 12.0 * EI / l.powi(3);
         let K = Matrix6::from_diagonal(&[EA / l, across, across, EI / l, EI / l, EI / l].into());
