@@ -220,7 +220,7 @@ fn what_compare_warns_of_runs_is_said_once_with_their_number() {
         assert_eq!(gravity["likely"], "about 10 times: the decimal point?");
         let step = of("long-step");
         assert_eq!((step["runs"].as_u64(), step["value"].as_f64()), (Some(3), Some(0.1)));
-        assert_eq!(step["likely"], "about 100 times: milliseconds?".replace("100 ", "1000 "));
+        assert_eq!(step["likely"], "about 1000 times: milliseconds?");
         let warnings = found["warnings"].as_array().unwrap();
         assert!(
             warnings.iter().any(|text| text.as_str().unwrap().ends_with("(4 of 6 runs; worst in run 4)")),
@@ -230,7 +230,8 @@ fn what_compare_warns_of_runs_is_said_once_with_their_number() {
         for (run, (gravity, step)) in [("-98.1", "0.1"), ("-9.81", "0.001")].into_iter().enumerate() {
             place.write("own.toml", common::with(common::ROBOT, "-9.81", gravity));
             let own = place.json(&["compare", "own.toml", "swing.toml", "--step", step, "--no-files"]);
-            for caveat in own["caveats"].as_array().unwrap() {
+            // Only the samples of a run show its energy.
+            for caveat in own["caveats"].as_array().unwrap().iter().filter(|caveat| caveat["code"] != "energy-open") {
                 assert!(
                     caveats.iter().any(|c| c["code"] == caveat["code"]),
                     "{name} {run}: {caveat} is not in {caveats:?}"

@@ -120,7 +120,7 @@ fn numbers_beyond_what_a_robot_can_do_are_refused_with_their_place() {
             "a.mod",
             rapid(&format!("MoveJ {},v5,fine,tool0;", pose("500", "[4294967296,0,0,0]"))),
             "a.mod:3:",
-            "expected quarter turns",
+            "a whole number is expected, found 4294967296",
         ),
         ("a.script", script("movej([1e308,0,0,0,0,0])"), "a.script:3:1", "an axis value is 1e308"),
         ("a.script", script("movel(p[1e308,0,0,0,0,0])"), "a.script:3:1", "a coordinate of the target is 1e308"),

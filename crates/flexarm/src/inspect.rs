@@ -239,7 +239,9 @@ pub fn inspect(robot: &Robot, at: Option<&[f64]>, velocity: Option<&[f64]>) -> R
         LinkInfo { name: l.name.clone(), mass_kg, com_m, inertia }
     });
     let flexible = Arc::new(robot.flexible_robot()?);
-    let caveats = told(robot, &flexible, None, Use::Held(&q, &[0.0; 6]));
+    // What is inspected is the rigid robot, which yields nowhere.
+    let mut caveats = told(robot, &flexible, None, Use::Held(&q, &[0.0; 6]));
+    caveats.retain(|caveat| caveat.code != "nothing-yields");
     let forms = robot.flexible.iter().map(|link| robot.form_of(link, &Modelling::default()).map(|(form, _)| form));
     let forms = forms.collect::<Result<Vec<_>, _>>()?;
     let flexible_links = flexible.spans.iter().zip(&robot.flexible).zip(&forms).map(|((span, link), form)| {

@@ -85,9 +85,12 @@ pub(crate) fn outside(text: &str, ranges: Ranges) -> Option<(Range<usize>, Strin
     first(text, &|name, number| if number.is_finite() { check(name, number, ranges) } else { Ok(number) })
 }
 
-/// The first number that is not finite, likewise: of keys that say themselves what they expect it is refused before.
+/// The first number that is not finite, likewise: of keys that say themselves what they expect it is refused before. An effort
+/// limit of `inf` is none.
 pub(crate) fn not_finite(text: &str) -> Option<(Range<usize>, String)> {
-    first(text, &|name, number| if number.is_finite() { Ok(number) } else { check(name, number, &[]) })
+    let unlimited = |name: &str, number: f64| number == f64::INFINITY && name.starts_with("effort_limit.");
+    let finite = |name: &str, number: f64| number.is_finite() || unlimited(name, number);
+    first(text, &|name, number| if finite(name, number) { Ok(number) } else { check(name, number, &[]) })
 }
 
 type Check<'a> = &'a dyn Fn(&str, f64) -> Result<f64, OutOfRange>;

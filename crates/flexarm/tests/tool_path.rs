@@ -297,7 +297,7 @@ fn jerks_of_joints_hold_in_a_path_file_and_in_a_program_and_are_shown_with_their
     assert!(by_jerk, "{said:?}");
     let wrong = path.replacen("jerk = 1500", "jerk = 0", 1);
     let error = load(&robot, "path.toml", &wrong).unwrap_err().to_string();
-    assert!(error.contains("path.toml:") && error.contains("jerk of joint \"") && error.contains("is 0,"), "{error}");
+    assert!(error.contains("path.toml:") && error.contains("jerk of joint \"") && error.contains("is 0.0,"), "{error}");
     std::fs::remove_dir_all(folder).unwrap();
 }
 

@@ -19,9 +19,9 @@ const TURNED: [f64; 2] = [0.01, 0.08];
 const TURNED_WEAK: [f64; 2] = [0.3, 3.0];
 /// A note this many times beyond its yardstick names the slip too.
 const HINTED: f64 = 3.0;
-/// Rotation of a strong gear over the median of the other strong gears of its robot: the gears of shipped robots have up to 7.5, and
-/// one of them in N m/deg has 15 at least.
-const ODD: f64 = 12.0;
+/// Rotation of a strong gear over the median of the other strong gears of its robot: gears of shipped robots have up to 7.5, one
+/// of them half as stiff up to 15, and most of them in N m/deg more than that.
+const ODD: f64 = 16.0;
 /// The same of gears that are too stiff: note, warning.
 const RIGID: [f64; 2] = [1e-4, 1e-5];
 /// Elastic rotation of gears under weight: note, warning; strong drives, weak ones (rad).
