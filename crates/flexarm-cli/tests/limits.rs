@@ -193,7 +193,11 @@ fn answers_that_overflow_are_refused() {
     let place = Place::new();
     let heavy = with(&with(URDF, "mass value=\"1.728\"", "mass value=\"1e308\""), "xyz=\"0.4 0 0\"", "xyz=\"4e3 0 0\"");
     place.write("heavy.urdf", heavy);
-    refused_at_once(&place, &["inspect", "heavy.urdf", "--json"], &["heavy.urdf", "\"bar\"", "1e308 kg", "at most 1e7 kg"]);
+    refused_at_once(
+        &place,
+        &["inspect", "heavy.urdf", "--json"],
+        &["heavy.urdf", "\"bar\"", "1e308 kg", "at most 1e7 kg"],
+    );
     place.write("robot.toml", with(ROBOT, "-9.81", "-1e308"));
     let answer = place.flexarm(&["statics", "robot.toml", "--json"]);
     assert!(answer.code != 0 && answer.out.is_empty() && !answer.err.is_empty(), "{answer:?}");

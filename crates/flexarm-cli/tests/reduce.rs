@@ -344,7 +344,8 @@ mod a_run {
         let found = place.json(&["inspect", "robots/mine"]);
         assert_eq!(found["flexible_links"][0]["name"], "bar");
         // Without a robot the name is the link file's, and the joint is left to the reader.
-        let answer = place.flexarm(&[&SOUND[..], &["--flex", "bar.flex", "--name", "bar"]].concat());
+        let far_end = "B=800,0,0";
+        let answer = place.flexarm(&[&SOUND[..13], &[far_end, "--flex", "bar.flex", "--name", "bar"]].concat());
         let (_, entry) = answer.out.split_once("to be pasted into a robot file:\n").unwrap();
         place.write("robots/mine/robot.toml", format!("format = 1\nurdf = \"../../beam.urdf\"\n\n{entry}"));
         assert_eq!(place.json(&["inspect", "robots/mine"])["flexible_links"][0]["name"], "bar");

@@ -206,9 +206,11 @@ fn a_study_that_was_stopped_goes_on_and_runs_nothing_twice() {
     // As if the program had been killed while it wrote a line: the part goes back into a journal that is cut.
     let part = DataTable::read(&output.join("parts/1-of-1-0.parquet")).unwrap();
     let Some(DataValues::Whole(numbers_of_runs)) = part.column("run") else { panic!("runs") };
+    let Some(DataValues::Text(caveats)) = part.column("caveats") else { panic!("caveats") };
     let line = |row: usize| {
         let [peak, per_kg] = ["tcp.peak_m", "per_kg"].map(|name| numbers(&part, name)[row]);
-        format!("[{},null,[{peak:?},{per_kg:?}]]\n", numbers_of_runs[row])
+        let caveats = serde_json::to_string(&caveats[row]).unwrap();
+        format!("[{},null,[{peak:?},{per_kg:?}],{caveats}]\n", numbers_of_runs[row])
     };
     let journal: String = (0..done).map(line).collect();
     std::fs::remove_file(output.join("parts/1-of-1-0.parquet")).unwrap();

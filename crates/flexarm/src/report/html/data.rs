@@ -58,8 +58,11 @@ pub(super) fn data(runs: &[ReportRun<'_>], drawn: &[Vec<Plot>]) -> String {
     json.replace('<', "\\u003c")
 }
 
+/// Text as JSON, with escapes for the control characters that JSON leaves as they are.
 fn json_text(text: &str) -> String {
-    serde_json::to_string(text).expect("text is JSON")
+    let json = serde_json::to_string(text).expect("text is JSON");
+    let escaped = |c: char| if c.is_control() { format!("\\u{:04x}", u32::from(c)) } else { c.to_string() };
+    json.chars().map(escaped).collect()
 }
 
 fn json_plot(plot: &Plot) -> String {
