@@ -553,8 +553,14 @@ fn slips_are_told_and_plausible_robots_are_not() {
     missed.iter().for_each(|missed| println!("missed: {missed}"));
     assert_eq!(false_alarms, [""; 0]);
     // Gears of the arm seen from the motor are softer by the ratio squared; a tool of 10 m is within three times the reach of the
-    // large arm.
-    let known = [("abb_three_mass/", "gears in N mm/rad"), ("kr300/", "tcp in cm")];
+    // large arm. The fifth gear of kr210 turns a quarter of what the others turn under their torques: in N m/deg it turns 14.7
+    // times as far as they do, and a gear of kr500 that is half as stiff, which is plausible, 15 times.
+    let known = [
+        ("abb_three_mass/", "gears in N mm/rad"),
+        ("kr300/", "tcp in cm"),
+        ("kr210/", "one gear in N m/deg"),
+        ("kr210_identified/", "one gear in N m/deg"),
+    ];
     let is_known =
         |missed: &String| known.iter().any(|(robot, what)| missed.starts_with(robot) && missed.contains(what));
     assert!(missed.iter().all(is_known), "{missed:#?}");

@@ -80,9 +80,11 @@ fn coupling(K: &Matrix6<f64>) -> f64 {
 /// Speed of sound along the link by its stiffness and mass.
 fn sound(name: &str, link: &RobotLink) -> Option<Caveat> {
     let reduced = &link.flexible.reduced;
-    let length = (reduced.X_LB.translation.vector - reduced.X_LA.translation.vector).norm();
+    let apart = (reduced.X_LB.translation.vector - reduced.X_LA.translation.vector).norm();
+    // The interfaces of a beam are the frames of joints, which may coincide.
+    let length = link.beam.as_ref().map_or(apart, |beam| beam.length);
     let mass = reduced.proximal.mass + reduced.distal.mass;
-    let speed = sound_speed(&link.scaled(&reduced.split.K_S), length, mass)?;
+    let speed = sound_speed(&link.scaled(&reduced.split.K_S), length, mass).filter(|speed| *speed > 0.0)?;
     let (least, most) = (SLOWEST, *SOUND.end());
     let caveat = || kinds::LINK_SOUND.found(name, speed, if speed < least { least } else { most });
     let words = &[(1e-3, "stiffness in kN/m, or mass in g"), (1e3, "stiffness in mN/m, or mass in t")];
