@@ -8,7 +8,6 @@ use flexarm_settings::written::csv_field;
 
 use crate::create::FlushClock;
 use crate::file_recorder::{FileRecorder, OpenFile};
-use crate::number_text::push_number;
 use crate::shape::Shape;
 use crate::table;
 use crate::written_behind::WrittenBehind;
@@ -63,13 +62,13 @@ impl Lines {
         self.waiting.push(b'\n');
     }
 
-    /// A line of numbers: none of them needs quotes.
+    /// Adds a line of numbers, each as the shortest text that reads back as the same number.
     fn add_numbers(&mut self, row: &[f64]) {
         for (k, value) in row.iter().enumerate() {
             if k > 0 {
                 self.waiting.push(b',');
             }
-            push_number(&mut self.waiting, *value);
+            self.waiting.extend_from_slice(zmij::Buffer::new().format(*value).as_bytes());
         }
         self.waiting.push(b'\n');
     }

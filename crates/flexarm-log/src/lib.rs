@@ -57,7 +57,6 @@ mod formats;
 #[cfg(feature = "mcap")]
 mod mcap_file;
 mod multi;
-mod number_text;
 #[cfg(feature = "parquet")]
 mod parquet_file;
 #[cfg(any(test, feature = "rerun"))]
@@ -67,14 +66,12 @@ mod poses;
 mod read;
 mod record;
 #[cfg(feature = "rerun")]
-mod rerun;
-#[cfg(feature = "rerun")]
 mod rrd_file;
 #[cfg(any(feature = "mcap", feature = "described-tables", feature = "rerun"))]
 mod run_json;
 mod shape;
 mod table;
-#[cfg(any(feature = "mcap", feature = "rerun"))]
+#[cfg(feature = "mcap")]
 mod tail_file;
 mod threads;
 mod trace;

@@ -16,28 +16,12 @@ pub fn closest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         if candidate.chars().count().abs_diff(length) > allowed {
             continue;
         }
-        let distance = edit_distance(&name.to_lowercase(), &candidate.to_lowercase());
+        let distance = strsim::levenshtein(&name.to_lowercase(), &candidate.to_lowercase());
         if distance <= allowed && best.is_none_or(|(d, _)| distance < d) {
             best = Some((distance, candidate));
         }
     }
     best.map(|(_, candidate)| candidate.to_owned())
-}
-
-/// Number of insertions, deletions and substitutions between two words (Levenshtein).
-fn edit_distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, ca) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, cb) in b.iter().enumerate() {
-            let substitution = diagonal + usize::from(ca != *cb);
-            diagonal = row[j + 1];
-            row[j + 1] = substitution.min(row[j] + 1).min(diagonal + 1);
-        }
-    }
-    row[b.len()]
 }
 
 #[cfg(test)]
@@ -50,6 +34,5 @@ mod tests {
         assert_eq!(closest("base_lnik", links).as_deref(), Some("base_link"));
         assert_eq!(closest("Link_1", links).as_deref(), Some("link_1"));
         assert_eq!(closest("gripper", links), None);
-        assert_eq!(edit_distance("kitten", "sitting"), 3);
     }
 }

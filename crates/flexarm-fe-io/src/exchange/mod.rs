@@ -35,6 +35,7 @@ mod cards;
 mod diagnose;
 mod dmig;
 mod error;
+#[cfg(feature = "hdf5")]
 mod exudyn;
 mod fortran;
 mod harwell_boeing;

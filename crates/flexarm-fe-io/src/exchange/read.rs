@@ -11,9 +11,7 @@ use super::matrix::{DofLabel, ImportedMatrices, LabelledMatrix, Storage, reorder
 use super::recognise::{MatrixFormat, recognise};
 use super::sidecar::Sidecar;
 use super::text::{LARGEST_UNPACKED, Text, unpack};
-use super::{
-    abaqus_text, dmig, exudyn, harwell_boeing, matrix_market, op4_binary, op4_text, sidecar, simscape, user_element,
-};
+use super::{abaqus_text, dmig, harwell_boeing, matrix_market, op4_binary, op4_text, sidecar, simscape, user_element};
 use flexarm_fem::input::read_file;
 
 /// What a matrix is.
@@ -312,8 +310,15 @@ fn parse_file(file: &InputFile, found: &mut Found) -> Result<(), ExchangeError> 
         MatrixFormat::Op4Text => several(op4_text::parse(text)?),
         MatrixFormat::Op4Binary => several(op4_binary::parse(&bytes, origin)?),
         MatrixFormat::HarwellBoeing => one(harwell_boeing::parse(text)?),
+        #[cfg(not(feature = "hdf5"))]
         MatrixFormat::ExudynHdf5 => {
-            let exudyn = exudyn::parse(&bytes, origin)?;
+            let (found, expected) = ("HDF5", "a format that this build reads");
+            let help = "build flexarm with --features hdf5, or install the Python package, which reads it";
+            return Err(Place::file(origin).fail(ExchangeErrorKind::Syntax, "file", found, expected, help));
+        }
+        #[cfg(feature = "hdf5")]
+        MatrixFormat::ExudynHdf5 => {
+            let exudyn = super::exudyn::parse(&bytes, origin)?;
             found.positions.extend(exudyn.positions);
             found.node_sets.extend(exudyn.node_sets);
             vec![(Some(MatrixRole::Stiffness), exudyn.stiffness), (Some(MatrixRole::Mass), exudyn.mass)]

@@ -146,6 +146,7 @@ fn samples_that_are_cut_or_changed_do_not_panic() {
     }
 }
 
+#[cfg(feature = "hdf5")]
 /// Bytes of the HDF5 sample among zeros, where sizes and addresses stand.
 #[test]
 #[ignore = "two and a half minutes; run after an update of hdf5-pure"]

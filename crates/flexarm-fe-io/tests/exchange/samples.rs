@@ -121,6 +121,7 @@ fn craig_bampton_matrices_keep_their_modes_and_pass_the_gate() {
     }
 }
 
+#[cfg(feature = "hdf5")]
 #[test]
 fn the_full_model_of_exudyn_is_read_with_positions_and_node_sets() {
     let Some(folder) = samples() else { return };

@@ -7,7 +7,6 @@ use nalgebra::Vector3;
 use super::selector::NodeSelector;
 use super::surface::skin;
 use super::{ElementKind, Mesh};
-use crate::spelling::distance;
 
 /// Tolerance of places where none is given, as a part of the diagonal of the mesh.
 const TOLERANCE: f64 = 1e-6;
@@ -182,7 +181,7 @@ impl Chooser<'_> {
         if sets.is_empty() {
             return format!("{remark}the mesh has no node sets: choose by place, such as plane(0,0,0; 1,0,0)");
         }
-        sets.sort_by_cached_key(|(set, size)| (distance(&lower, &set.to_lowercase()), Reverse(*size)));
+        sets.sort_by_cached_key(|(set, size)| (strsim::levenshtein(&lower, &set.to_lowercase()), Reverse(*size)));
         let shown: Vec<String> = sets.iter().take(MOST).map(|(set, size)| format!("{set:?} ({size} nodes)")).collect();
         let more = sets.len().saturating_sub(MOST);
         let rest = if more > 0 { format!(" and {more} more") } else { String::new() };

@@ -8,7 +8,7 @@
 //! | MCAP | everything; numbers exactly, poses of links to 1e-13 (they are stored as quaternions from link to link) |
 //! | Parquet, Arrow | the numbers of the columns exactly; names, set-up, result and events; no poses of links, no velocities |
 //! | CSV | the numbers of the columns exactly (times to 1 ns once they went through MCAP); no poses, velocities, result, nor names of robot and trajectory |
-//! | .rrd | the error to rounding (it is stored in mm); other curves and poses, these as `f32`, at the rate of the pictures, interpolated between them |
+//! | .rrd | nothing: it is for viewing |
 
 #[cfg(feature = "arrow")]
 mod arrow_file;
@@ -37,17 +37,20 @@ pub enum RecordingFormat {
     Arrow,
 }
 
-/// The module of a format, if this build has its feature: its recorder and its reader.
+/// The module of a format, if this build has its feature: its recorder and, where it is read back, its reader.
 macro_rules! code {
+    ($recorder:ty) => {
+        Some(Code { recorder: |path, options| Box::new(<$recorder>::create(path, options)), reader: None })
+    };
     ($recorder:ty, $reader:ty) => {
         Some(Code {
             recorder: |path, options| Box::new(<$recorder>::create(path, options)),
-            reader: |path| Ok(Box::new(<$reader>::open(path)?)),
+            reader: Some(|path| Ok(Box::new(<$reader>::open(path)?))),
         })
     };
-    ($feature:literal, $recorder:ty, $reader:ty) => {{
+    ($feature:literal, $($types:ty),+) => {{
         #[cfg(feature = $feature)]
-        let code = code!($recorder, $reader);
+        let code = code!($($types),+);
         #[cfg(not(feature = $feature))]
         let code = None;
         code
@@ -84,7 +87,7 @@ const FORMATS: &[FormatInfo] = &[
         survives_a_kill: true,
         most_samples: None,
         latest_s: Some(i64::MAX as f64 * 1e-9),
-        code: code!("rerun", crate::RrdRecorder, crate::read::RrdRun),
+        code: code!("rerun", crate::RrdRecorder),
     },
     FormatInfo {
         format: RecordingFormat::Csv,
@@ -187,7 +190,8 @@ impl Holds {
 #[derive(Clone, Copy, Debug)]
 struct Code {
     recorder: fn(PathBuf, CreateOptions) -> Box<dyn Recorder>,
-    reader: fn(&Path) -> Result<Box<dyn RunSource>, LogError>,
+    /// None for formats that are only written.
+    reader: Option<fn(&Path) -> Result<Box<dyn RunSource>, LogError>>,
 }
 
 impl RecordingFormat {
@@ -228,15 +232,21 @@ impl RecordingFormat {
         FORMATS.iter().find(has).map(|info| info.format)
     }
 
-    /// The formats that hold most come first.
+    /// Returns the formats that are read back; those that hold most come first.
     #[must_use]
-    pub fn by_content() -> Vec<Self> {
-        let mut all = Self::ALL.to_vec();
-        all.sort_by_key(|format| format.info().holds);
-        all
+    pub fn read_back() -> Vec<Self> {
+        let mut formats: Vec<Self> = Self::ALL.into_iter().filter(|format| format.is_read_back()).collect();
+        formats.sort_by_key(|format| format.info().holds);
+        formats
     }
 
-    /// Whether this build can read and write it.
+    /// Whether recordings of this format are read back; others are for viewing.
+    #[must_use]
+    pub fn is_read_back(self) -> bool {
+        self.info().holds != Holds::Pictures
+    }
+
+    /// Whether this build can write it and, where it is read back, read it.
     #[must_use]
     pub fn is_built_in(self) -> bool {
         self.info().code.is_some()
@@ -263,11 +273,6 @@ impl RecordingFormat {
             (true, false) => table::unknown(header),
             _ => Vec::new(),
         };
-        if here == Holds::Pictures && !there.is_table() {
-            lost.push(format!(
-                "{self} files hold no joint values of the rigid twin: NaN; poses of links are those of the last picture"
-            ));
-        }
         if there == Holds::Pictures && !here.is_table() {
             lost.push(format!("{to} files hold poses in single precision, at most 200 a second"));
         }

@@ -11,12 +11,18 @@ use crate::{LogError, RunSource};
 /// Opens a recording of flexarm and reads what it says about the run as a whole.
 ///
 /// # Errors
-/// [`LogError::Io`] if it cannot be read, [`LogError::NotARecording`] if it is something else, or of a format that this
-/// build has no feature for.
+/// [`LogError::Io`] if it cannot be read, [`LogError::NotARecording`] if it is something else, of a format that is only
+/// written, or of one that this build has no feature for.
 pub fn open_recording(path: &Path, format: RecordingFormat) -> Result<Box<dyn RunSource>, LogError> {
     check_kind(path, format)?;
     match format.info().code {
-        Some(code) => (code.reader)(path),
+        Some(super::Code { reader: Some(reader), .. }) => reader(path),
+        Some(_) => Err(LogError::NotARecording {
+            path: path.to_owned(),
+            found: format!("a file in the format {format}, which is for viewing"),
+            expected: "a recording in a format that is read back: MCAP, Parquet, Arrow or CSV".into(),
+            mend: "give run.mcap of the same run".into(),
+        }),
         None => Err(LogError::NotARecording {
             path: path.to_owned(),
             found: format!("a file in the format {format}"),

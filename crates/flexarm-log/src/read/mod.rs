@@ -12,13 +12,7 @@ mod csv_table;
 mod mcap_run;
 #[cfg(feature = "parquet")]
 pub(crate) mod parquet_table;
-#[cfg(feature = "rerun")]
-mod rrd_messages;
-#[cfg(feature = "rerun")]
-mod rrd_run;
-#[cfg(feature = "rerun")]
-mod rrd_track;
-#[cfg(any(feature = "mcap", feature = "described-tables", feature = "rerun"))]
+#[cfg(any(feature = "mcap", feature = "described-tables"))]
 pub(crate) mod wall;
 
 use std::path::{Path, PathBuf};
@@ -28,8 +22,6 @@ pub(crate) use self::csv_table::CsvRun;
 pub(crate) use self::mcap_run::McapRun;
 #[cfg(feature = "parquet")]
 pub(crate) use self::parquet_table::ParquetRun;
-#[cfg(feature = "rerun")]
-pub(crate) use self::rrd_run::RrdRun;
 use crate::LogError;
 
 /// A refusal in one's own words.
@@ -57,7 +49,7 @@ pub(crate) fn stem(path: &Path) -> String {
 
 /// Time (s) and number of steps of a stamp. Stamps are whole nanoseconds; where the step is known, the time is that
 /// multiple of it to the last bit.
-#[cfg(any(feature = "mcap", feature = "rerun"))]
+#[cfg(feature = "mcap")]
 fn exact_time(time_ns: u64, step_s: f64) -> (f64, u64) {
     let time_s = time_ns as f64 / 1e9;
     let step = (time_s / step_s).round();

@@ -1,6 +1,6 @@
 //! Colours of a recording: those of [`palette`] on a dark ground, and the scale for distances.
 
-use crate::rerun::{Color, Rgba32};
+use rerun::{Color, Rgba32};
 
 use flexarm_draw::palette::{self, Ground, Rgb};
 

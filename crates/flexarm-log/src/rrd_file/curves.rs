@@ -1,11 +1,10 @@
 //! The curves of a run: which plots there are and what goes into them.
 
-use crate::rerun::{Chunk, TimeColumn};
-use crate::rerun::{Color, EntityPath};
+use rerun::{Color, EntityPath, TimeColumn};
 
 use super::colors::{axis, component, faint, series, total};
 use super::path;
-use super::stream::{Ids, Put, StreamError};
+use super::stream::{Result, RrdStream};
 use super::tracks::{ScalarTrack, Seen};
 use crate::poses::size;
 use crate::{RunHeader, Sample};
@@ -126,36 +125,19 @@ impl Curves {
     }
 
     /// Names and colours.
-    pub(crate) fn styles(&self, ids: &mut Ids) -> Result<Vec<Chunk>, StreamError> {
-        self.error.iter().chain(&self.causes).map(|track| track.style(ids)).collect()
+    pub(crate) fn styles(&self, stream: &RrdStream) -> Result<()> {
+        self.error.iter().chain(&self.causes).try_for_each(|track| track.style(stream))
     }
 
-    /// Chunks of the rows of the error that wait.
-    pub(crate) fn error_rows(&self, ids: &mut Ids, times: &[TimeColumn], put: &mut Put<'_>) -> Result<(), StreamError> {
-        self.error.iter().try_for_each(|track| put(track.chunk(ids, times)?))
-    }
-
-    /// Chunks of the rows of all else that wait.
-    pub(crate) fn cause_rows(
-        &self,
-        ids: &mut Ids,
-        pose_times: &[TimeColumn],
-        put: &mut Put<'_>,
-    ) -> Result<(), StreamError> {
-        self.causes.iter().filter(|track| track.waiting()).try_for_each(|track| put(track.chunk(ids, pose_times)?))
+    /// Writes the rows that wait and forgets them.
+    pub(crate) fn send(&mut self, stream: &RrdStream, times: &[TimeColumn], pose_times: &[TimeColumn]) -> Result<()> {
+        self.error.iter_mut().try_for_each(|track| track.send(stream, times))?;
+        self.causes.iter_mut().try_for_each(|track| track.send(stream, pose_times))
     }
 
     /// Where each group of curves is, how high and low it goes, and its names.
     pub(crate) fn seen(&self) -> impl Iterator<Item = Seen> + '_ {
         self.error.iter().chain(&self.causes).map(ScalarTrack::seen)
-    }
-
-    pub(crate) fn clear_errors(&mut self) {
-        self.error.iter_mut().for_each(ScalarTrack::clear);
-    }
-
-    pub(crate) fn clear_causes(&mut self) {
-        self.causes.iter_mut().for_each(ScalarTrack::clear);
     }
 }
 

@@ -1,18 +1,18 @@
 //! What the viewer shows when it opens a recording: the robots on the left, plots and text on the right.
 //!
-//! Written as the entities of a blueprint store, not with the `rerun` crate's builder, which draws the names of
-//! its parts by chance and cannot set a plot's legend.
+//! Written as the entities of a blueprint: the builder of the SDK (`rerun::blueprint`) cannot set the eye and the
+//! background of a 3D view, the legend and the axis of a plot, and the columns of a log.
 
-use crate::rerun::{AsComponents, EntityPath};
-use re_sdk_types::blueprint::archetypes::{
+use rerun::external::re_sdk_types::blueprint::archetypes::{
     Background, ContainerBlueprint, EyeControls3D, PanelBlueprint, PlotLegend, ScalarAxis, TextLogColumns, TimeAxis,
     TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint,
 };
-use re_sdk_types::blueprint::components::{
+use rerun::external::re_sdk_types::blueprint::components::{
     BackgroundKind, ColumnShare, ContainerKind, Corner2D, LinkAxis, LoopMode, PanelState, PlayState, RowShare,
     TimelineName,
 };
-use re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
+use rerun::external::re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
+use rerun::{AsComponents, EntityPath};
 
 use super::eye::Eye;
 use super::tracks::Seen;
@@ -127,7 +127,7 @@ struct Layout {
 
 /// A part that has its place in the blueprint.
 struct Placed {
-    id: crate::rerun::datatypes::Uuid,
+    id: rerun::datatypes::Uuid,
     path: String,
 }
 
@@ -205,6 +205,6 @@ impl Layout {
         bytes[15] = self.parts;
         let hex: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
         let uuid = [&hex[..8], &hex[8..12], &hex[12..16], &hex[16..20], &hex[20..]].join("-");
-        Placed { id: crate::rerun::datatypes::Uuid { bytes }, path: format!("{kind}/{uuid}") }
+        Placed { id: rerun::datatypes::Uuid { bytes }, path: format!("{kind}/{uuid}") }
     }
 }

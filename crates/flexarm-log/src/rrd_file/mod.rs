@@ -2,10 +2,9 @@
 //!
 //! Start at [`RrdRecorder`] for one run and [`RrdStudy`] for several in one view. [`run`] holds what a run shows, made of
 //! [`robot`]s and [`curves`]; [`tracks`] holds rows until they are worth a chunk; [`window`] says what the viewer
-//! shows, [`layout`] writes that down; [`stream`] writes the file. All knowledge of the `rerun` crate, which breaks about
-//! monthly, is in this module.
+//! shows, [`layout`] writes that down; [`stream`] writes the file. Only this module names the `rerun` crate, which breaks
+//! about monthly.
 
-mod chunk_list;
 mod colors;
 mod curves;
 mod eye;
@@ -18,16 +17,13 @@ mod study;
 pub(crate) mod tracks;
 mod window;
 
-use std::fs::File;
 use std::path::Path;
 
-use crate::rerun::Chunk;
-use crate::rerun::{EntityPath, StoreId, TextDocument, TimePoint, Timeline, ViewCoordinates};
-use re_log_types::StoreKind;
+use rerun::{EntityPath, TextDocument, ViewCoordinates};
 
 use self::layout::{Part, PlotPlace};
-use self::run::{Rows, RunTracks, Seat};
-use self::stream::{Ids, RrdStream, StreamError};
+use self::run::{RunTracks, Seat};
+use self::stream::{Result, RrdStream, StreamError};
 use self::tracks::{SIM_TIME, Seen};
 use crate::create::FlushClock;
 use crate::file_recorder::{FileRecorder, OpenFile};
@@ -36,18 +32,12 @@ use crate::{CreateOptions, LogError, RunHeader, RunResult, Sample};
 
 pub use self::study::{RrdStudy, StudySeat};
 
-/// Where the header is for readers of flexarm, as JSON.
-pub(crate) const RUN_ENTITY: [&str; 2] = ["recording", "run.json"];
-/// Where the result is.
-pub(crate) const RESULT_ENTITY: [&str; 2] = ["recording", "result.json"];
-
-/// Samples of a chunk: enough for compression, few enough for quick reading.
-const CHUNK_ROWS: usize = 1024;
-/// So many times rows are committed before the run is a long one, and samples and poses of its chunks from then on. The list of
-/// all chunks is in memory until the file ends; rows that wait are, too.
-const SHORT_COMMITS: usize = 16;
-const LONG_CHUNK_ROWS: usize = 8 * CHUNK_ROWS;
-const LONG_CHUNK_POSES: usize = 4 * CHUNK_ROWS;
+/// Samples whose rows are written together, and fewer after which they are written because time has passed: enough for
+/// compression, few enough for quick reading.
+const CHUNK_ROWS: [usize; 2] = [1024, 128];
+/// The same of a long run, which is one with more than so many writings: the SDK keeps a list of all chunks in memory.
+const LONG_CHUNK_ROWS: [usize; 2] = [8 * 1024, 1024];
+const SHORT_WRITINGS: usize = 16;
 
 /// Writes a run as a Rerun recording.
 ///
@@ -69,7 +59,6 @@ const LONG_CHUNK_POSES: usize = 4 * CHUNK_ROWS;
 /// | `/caption`, `/<robot>/caption` | in a recording of modes: name and frequency of the one that swings; such a recording has no curves |
 /// | `/scenery/<view>/<name>` | what stands still around the robot, such as the points of a map |
 /// | `/events` | moves, largest error, settling, limits |
-/// | `/recording/run.json`, `/recording/result.json` | header and result for readers of flexarm |
 /// | `/summary`, `/urdf` | result and set-up, and the robot's description, as text |
 ///
 /// Errors and deflections are in millimetres and milliradians because people read them here; the other formats
@@ -77,16 +66,15 @@ const LONG_CHUNK_POSES: usize = 4 * CHUNK_ROWS;
 /// precision, which is all the viewer has: that is 1e-6 m on an arm of a few metres. A bent surface is written whenever a
 /// corner has moved by 0.1 mm (by a 1500th of the scene on the magnified arm); what is rigid with its ends always.
 ///
-/// Timelines: `sim_time` (a duration) and `step`. Nothing in the file depends on the clock: the recording's
-/// identifier is a hash of the header, rows are numbered in order.
+/// Timelines: `sim_time` (a duration) and `step`. The identifier of the recording is a hash of the header. Equal runs give
+/// equal entities, times and values; how rows are grouped into chunks, and the identifiers of these, differ.
 pub type RrdRecorder = FileRecorder<RrdFile>;
 
 impl OpenFile for RrdFile {
-    fn begin(path: &Path, options: CreateOptions, header: &RunHeader) -> Result<Self, LogError> {
-        let file = options.create(path)?;
-        let clock = options.flush_clock(path);
-        let open = || -> Result<Self, StreamError> {
-            let mut store = Store::new(file, content_hash(header, &[]), clock)?;
+    fn begin(path: &Path, options: CreateOptions, header: &RunHeader) -> std::result::Result<Self, LogError> {
+        options.create(path)?;
+        let open = || -> Result<Self> {
+            let mut store = Store::new(path, content_hash(header, &[]), options)?;
             store.describe(header, &Seat::Alone)?;
             let run = RunWriter::begin(&mut store, header, Seat::Alone, &[])?;
             Ok(Self { store, run, closed: false })
@@ -94,7 +82,7 @@ impl OpenFile for RrdFile {
         open().map_err(stream_error(path, "write the description of the run"))
     }
 
-    fn record(&mut self, path: &Path, sample: &Sample) -> Result<(), LogError> {
+    fn record(&mut self, path: &Path, sample: &Sample) -> std::result::Result<(), LogError> {
         self.run.record(&mut self.store, path, sample)
     }
 
@@ -102,7 +90,7 @@ impl OpenFile for RrdFile {
         self.run.tracks.keep(sample);
     }
 
-    fn finish(&mut self, path: &Path, result: &RunResult) -> Result<(), LogError> {
+    fn finish(&mut self, path: &Path, result: &RunResult) -> std::result::Result<(), LogError> {
         self.end(result).map_err(stream_error(path, "write the result and the index"))
     }
 }
@@ -115,16 +103,14 @@ pub struct RrdFile {
 }
 
 impl RrdFile {
-    /// The last rows, the result, the layout and the index.
-    fn end(&mut self, result: &RunResult) -> Result<(), StreamError> {
+    /// Writes the last rows, the result, the layout and the index.
+    fn end(&mut self, result: &RunResult) -> Result<()> {
         self.closed = true;
         self.run.finish(&mut self.store, result)?;
         if !result.figures.is_empty() {
             let text = summary(&self.run.header.description, result);
-            self.store.constant(&path(["summary"]), &TextDocument::from_markdown(text))?;
+            self.store.stream.constant(&path(["summary"]), &TextDocument::from_markdown(text))?;
         }
-        let result = crate::run_json::write_result(result);
-        self.store.constant(&path(RESULT_ENTITY), &TextDocument::new(result))?;
         self.store.finish()
     }
 }
@@ -141,8 +127,6 @@ impl Drop for RrdFile {
 /// A recording in its file.
 pub(crate) struct Store {
     stream: RrdStream,
-    recording: StoreId,
-    blueprint: StoreId,
     flush: FlushClock,
     /// Plots of the layout, once it is written, and the curves of all runs that are finished.
     plots: Vec<PlotPlace>,
@@ -150,62 +134,36 @@ pub(crate) struct Store {
 }
 
 impl Store {
-    fn new(file: File, hash: u64, flush: FlushClock) -> Result<Self, StreamError> {
-        let id = format!("flexarm-{hash:016x}");
-        let blueprint = StoreId::new(StoreKind::Blueprint, "flexarm", format!("{id}-layout"));
-        let recording = StoreId::new(StoreKind::Recording, "flexarm", id);
-        let mut stream = RrdStream::new(file)?;
-        stream.open_store(&recording)?;
-        Ok(Self { stream, recording, blueprint, flush, plots: Vec::new(), seen: Vec::new() })
+    fn new(path: &Path, hash: u64, options: CreateOptions) -> Result<Self> {
+        let stream = RrdStream::create(path, &format!("flexarm-{hash:016x}"))?;
+        Ok(Self { stream, flush: options.flush_clock(path), plots: Vec::new(), seen: Vec::new() })
     }
 
-    /// What is said once about a recording.
-    fn describe(&mut self, header: &RunHeader, seat: &Seat) -> Result<(), StreamError> {
-        let name = match (seat, header.trajectory.is_empty()) {
+    /// Writes what is said once about a recording.
+    fn describe(&self, header: &RunHeader, seat: &Seat) -> Result<()> {
+        let stream = &self.stream;
+        stream.name(&match (seat, header.trajectory.is_empty()) {
             (Seat::InStudy(..), _) => format!("study of {}", header.robot),
             (Seat::Alone, true) => header.robot.clone(),
             (Seat::Alone, false) => format!("{}: {}", header.robot, header.trajectory),
-        };
-        self.constant(&EntityPath::properties(), &crate::rerun::RecordingInfo::new().with_name(name))?;
-        self.constant(&EntityPath::root(), &ViewCoordinates::RIGHT_HAND_Z_UP())?;
+        })?;
+        stream.constant(&EntityPath::root(), &ViewCoordinates::RIGHT_HAND_Z_UP())?;
         let text = summary(&header.description, &RunResult::default());
-        self.constant(&path(["summary"]), &TextDocument::from_markdown(text))?;
-        if let Seat::Alone = seat {
-            self.constant(&path(RUN_ENTITY), &TextDocument::new(crate::run_json::write(header, false)))?;
+        stream.constant(&path(["summary"]), &TextDocument::from_markdown(text))?;
+        if header.urdf.is_empty() {
+            return Ok(());
         }
-        if !header.urdf.is_empty() {
-            self.constant(
-                &path(["urdf"]),
-                &TextDocument::new(header.urdf.as_str()).with_media_type("application/xml"),
-            )?;
-        }
-        Ok(())
-    }
-
-    fn constant(&mut self, at: &EntityPath, what: &dyn crate::rerun::AsComponents) -> Result<(), StreamError> {
-        let chunk = self.stream.ids().constant(at, what)?;
-        self.stream.append(&self.recording, &chunk)
+        let urdf = TextDocument::new(header.urdf.as_str()).with_media_type("application/xml");
+        stream.constant(&path(["urdf"]), &urdf)
     }
 
     /// Gives the plots room for their curves and for the names of these, now that all are known, and ends the file.
-    fn finish(&mut self) -> Result<(), StreamError> {
+    fn finish(&mut self) -> Result<()> {
         let rooms = layout::rooms(&self.plots, &self.seen);
         if !rooms.is_empty() {
-            let when = TimePoint::default().with(Timeline::new_sequence("blueprint"), 1);
-            let blueprint = self.blueprint.clone();
-            for (at, what) in rooms {
-                let chunk = self.stream.ids().single(&at, &when, what.as_ref())?;
-                self.stream.append(&blueprint, &chunk)?;
-            }
-            // A viewer that has shown the layout takes it again.
-            self.stream.activate(&blueprint)?;
+            self.stream.show(&rooms, 1)?;
         }
         self.stream.finish()
-    }
-
-    fn append_all(&mut self, ids: Ids, chunks: &[Chunk]) -> Result<(), StreamError> {
-        *self.stream.ids() = ids;
-        chunks.iter().try_for_each(|chunk| self.stream.append(&self.recording, chunk))
     }
 }
 
@@ -214,29 +172,25 @@ pub(crate) struct RunWriter {
     header: RunHeader,
     shape: Shape,
     tracks: RunTracks,
-    commits: usize,
+    writings: usize,
     /// The layout, until it is written: with the first sample, which shows where the robot is.
     layout: Option<Part>,
     tools_due: bool,
 }
 
 impl RunWriter {
-    fn begin(store: &mut Store, header: &RunHeader, seat: Seat, labels: &[String]) -> Result<Self, StreamError> {
-        let mut ids = *store.stream.ids();
-        let (tracks, fixed) = RunTracks::new(header, &seat, &mut ids)?;
-        store.append_all(ids, &fixed)?;
-        for scenery in &header.scenery {
-            scenery::write(store, scenery)?;
-        }
-        store.stream.set_tail(&store.recording, |_| Ok(()))?;
+    fn begin(store: &mut Store, header: &RunHeader, seat: Seat, labels: &[String]) -> Result<Self> {
+        let tracks = RunTracks::new(header, &seat, &store.stream)?;
+        header.scenery.iter().try_for_each(|scenery| scenery::write(&store.stream, scenery))?;
+        store.stream.flush()?;
         let has_layout = matches!(seat, Seat::Alone | Seat::InStudy(0, _));
         let layout = has_layout.then(|| window::window(header, &seat, labels));
         // Surfaces and files are in the recording now.
         let header = RunHeader { meshes: Vec::new(), attachments: Vec::new(), urdf: String::new(), ..header.clone() };
-        Ok(Self { shape: Shape::of(&header), header, tracks, commits: 0, layout, tools_due: true })
+        Ok(Self { shape: Shape::of(&header), header, tracks, writings: 0, layout, tools_due: true })
     }
 
-    fn record(&mut self, store: &mut Store, file: &Path, sample: &Sample) -> Result<(), LogError> {
+    fn record(&mut self, store: &mut Store, file: &Path, sample: &Sample) -> std::result::Result<(), LogError> {
         self.shape.check(file, sample)?;
         let time_ns = (sample.time_s * 1e9).round();
         if !(0.0..i64::MAX as f64).contains(&time_ns) {
@@ -246,90 +200,43 @@ impl RunWriter {
         self.sample(store, time_ns as i64, sample).map_err(stream_error(file, "write a sample"))
     }
 
-    fn sample(&mut self, store: &mut Store, time_ns: i64, sample: &Sample) -> Result<(), StreamError> {
+    fn sample(&mut self, store: &mut Store, time_ns: i64, sample: &Sample) -> Result<()> {
         self.layout(store, Some(sample))?;
         if std::mem::take(&mut self.tools_due) {
-            let mut ids = *store.stream.ids();
-            let tools = self.tracks.tools(&self.header, sample, &mut ids)?;
-            store.append_all(ids, &tools)?;
+            self.tracks.tools(&self.header, sample, &store.stream)?;
         }
         self.tracks.push((time_ns, i64::try_from(sample.step).unwrap_or(i64::MAX)), sample);
-        let [samples, poses] = self.tracks.waiting();
-        if self.commits < SHORT_COMMITS {
-            if samples >= CHUNK_ROWS {
-                self.commit(store, Rows::All)?;
-            }
+        let [full, worth] = if self.writings < SHORT_WRITINGS { CHUNK_ROWS } else { LONG_CHUNK_ROWS };
+        let (waiting, due) = (self.tracks.waiting(), store.flush.due());
+        if waiting >= full || due && waiting >= worth {
+            self.writings += 1;
+            self.tracks.send(&store.stream)?;
         } else {
-            if samples >= LONG_CHUNK_ROWS {
-                self.commit(store, Rows::OfSamples)?;
-            }
-            if poses >= LONG_CHUNK_POSES {
-                self.commit(store, Rows::OfCauses)?;
-            }
-            let Store { stream, recording, .. } = store;
-            let mut ids = *stream.ids();
-            self.tracks.take_full(LONG_CHUNK_POSES, &mut ids, &mut |chunk| stream.append(recording, &chunk))?;
-            *stream.ids() = ids;
+            self.tracks.send_large(&store.stream)?;
         }
-        if !store.flush.due() {
-            store.stream.relieve()?;
-        } else {
-            // The rows that wait, and the ways so far, as a provisional end.
-            let mut ids = *store.stream.ids();
-            store.stream.set_tail(&store.recording, |put| {
-                self.tracks.rows(Rows::All, &mut ids, put)?;
-                self.tracks.ways(&mut ids)?.into_iter().try_for_each(put)
-            })?;
+        if due {
+            store.stream.flush()?;
             store.flush.done();
         }
         Ok(())
     }
 
-    fn commit(&mut self, store: &mut Store, which: Rows) -> Result<(), StreamError> {
-        let Store { stream, recording, .. } = store;
-        let mut ids = *stream.ids();
-        let is_long = self.commits >= SHORT_COMMITS;
-        let mut put = |chunk: Chunk| {
-            stream.append(recording, &chunk)?;
-            // The last rows of a long run are many.
-            if is_long { stream.relieve() } else { Ok(()) }
-        };
-        if which == Rows::All {
-            self.tracks.take_drawn(&mut ids, &mut put)?;
-        }
-        self.tracks.rows(which, &mut ids, &mut put)?;
-        *stream.ids() = ids;
-        self.tracks.clear(which);
-        self.commits += 1;
-        Ok(())
-    }
-
     /// Writes the layout if that has not happened yet, with the robot of this sample in the picture.
-    fn layout(&mut self, store: &mut Store, first: Option<&Sample>) -> Result<(), StreamError> {
+    fn layout(&mut self, store: &mut Store, first: Option<&Sample>) -> Result<()> {
         let Some(window) = self.layout.take() else { return Ok(()) };
-        let eye = eye::eye(&self.header, first);
-        let when = TimePoint::default().with(Timeline::new_sequence("blueprint"), 0);
-        let blueprint = store.blueprint.clone();
-        store.stream.open_store(&blueprint)?;
-        let (entities, plots) = layout::entities(&window, SIM_TIME, eye);
+        let (entities, plots) = layout::entities(&window, SIM_TIME, eye::eye(&self.header, first));
         store.plots = plots;
-        for (at, what) in entities {
-            let chunk = store.stream.ids().single(&at, &when, what.as_ref())?;
-            store.stream.append(&blueprint, &chunk)?;
-        }
-        store.stream.activate(&blueprint)
+        store.stream.show(&entities, 0)
     }
 
-    /// Writes what waits, the ways and the marks.
-    fn finish(&mut self, store: &mut Store, result: &RunResult) -> Result<(), StreamError> {
+    /// Writes what waits, the paths and the marks.
+    fn finish(&mut self, store: &mut Store, result: &RunResult) -> Result<()> {
         self.layout(store, None)?;
         self.tracks.close();
-        self.commit(store, Rows::All)?;
+        self.tracks.send(&store.stream)?;
         store.seen.extend(self.tracks.seen());
-        let mut ids = *store.stream.ids();
-        let mut chunks = self.tracks.ways(&mut ids)?;
-        chunks.extend(self.tracks.marks(&mut ids, result)?);
-        store.append_all(ids, &chunks)
+        self.tracks.ways(&store.stream)?;
+        self.tracks.marks(&store.stream, result)
     }
 }
 

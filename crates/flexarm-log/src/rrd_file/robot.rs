@@ -1,13 +1,12 @@
 //! One of the robots of a recording: rigid twin, flexible arm, or the flexible arm with its deflections magnified.
 
-use crate::rerun::Chunk;
-use crate::rerun::components::MeshFaceRendering;
-use crate::rerun::{AlbedoFactor, Color, EntityPath, LineStrips3D, Mesh3D, Rgba32, TransformAxes3D};
 use flexarm_kinematics::{Pose, rotation_vector};
 use nalgebra::{Point3, Vector3};
+use rerun::components::MeshFaceRendering;
+use rerun::{AlbedoFactor, Color, EntityPath, LineStrips3D, Mesh3D, Radius, Rgba32, TransformAxes3D};
 
 use super::colors::{self, ColorScale};
-use super::stream::{Ids, Put, StreamError};
+use super::stream::{Result, RrdStream};
 use super::tracks::{Instant, PoseTrack, ShapeTrack, SkeletonTrack, TintTrack, Track, point};
 use super::{link_part, path};
 use crate::{LinkMesh, RunHeader, Sample, TwinSample};
@@ -73,8 +72,8 @@ struct BentTracks {
 const TINTS: usize = 32;
 
 impl RobotTracks {
-    /// The tracks of a robot, and what never changes about it.
-    pub(crate) fn new(header: &RunHeader, look: Look, ids: &mut Ids) -> Result<(Self, Vec<Chunk>), StreamError> {
+    /// Returns the tracks of a robot; writes what never changes about it.
+    pub(crate) fn new(header: &RunHeader, look: Look, stream: &RrdStream) -> Result<Self> {
         let at = |what: &str| look.root.join(&path([what]));
         let pairs = header.links.iter().enumerate();
         let pairs = pairs.filter_map(|(child, link)| Some((child, link.parent?))).collect();
@@ -96,27 +95,20 @@ impl RobotTracks {
             skeleton: header.meshes.is_empty().then(|| SkeletonTrack::new(at("skeleton"), line_color, pairs)),
             look,
         };
-        let mut fixed = Vec::new();
         for mesh in &header.meshes {
-            robot.surface(header, mesh, ids, &mut fixed)?;
+            robot.surface(header, mesh, stream)?;
         }
         if let Some(skeleton) = &robot.skeleton {
-            fixed.push(skeleton.style(ids)?);
+            skeleton.style(stream)?;
         }
         const AXIS_LENGTH_M: f32 = 0.15;
         if !matches!(robot.look.paint, Paint::Ghost) {
-            fixed.push(ids.constant(&robot.look.root.join(&path(["tcp"])), &TransformAxes3D::new(AXIS_LENGTH_M))?);
+            stream.constant(&robot.look.root.join(&path(["tcp"])), &TransformAxes3D::new(AXIS_LENGTH_M))?;
         }
-        Ok((robot, fixed))
+        Ok(robot)
     }
 
-    fn surface(
-        &mut self,
-        header: &RunHeader,
-        mesh: &LinkMesh,
-        ids: &mut Ids,
-        fixed: &mut Vec<Chunk>,
-    ) -> Result<(), StreamError> {
+    fn surface(&mut self, header: &RunHeader, mesh: &LinkMesh, stream: &RrdStream) -> Result<()> {
         let entity = self.look.root.join(&path([&link_part(&header.links[mesh.link].name), &mesh.name]));
         let mut first = 0;
         for bend in &header.bends {
@@ -131,7 +123,7 @@ impl RobotTracks {
             }
             let (middle_at, far_at) = (entity.join(&path(["bending"])), entity.join(&path(["far"])));
             if !near.triangles.is_empty() {
-                fixed.push(ids.constant(&entity, &self.painted(&near))?);
+                stream.constant(&entity, &self.painted(&near))?;
                 self.tint(mesh.link, &near, entity);
             }
             // The corners of the part that bends come with time.
@@ -139,10 +131,10 @@ impl RobotTracks {
             let line = middle.line();
             let place = |p: &[f32; 3]| line.place(&Vector3::from(p.map(f64::from))) / line.length();
             let along = middle.mesh.positions.iter().map(|p| place(p) as f32);
-            fixed.push(ids.constant(&middle_at, &self.strip(&middle.mesh, TINTS, along))?);
+            stream.constant(&middle_at, &self.strip(&middle.mesh, TINTS, along))?;
             let far_surface = far_at.join(&path(["surface"]));
             if !far.triangles.is_empty() {
-                fixed.push(ids.constant(&far_surface, &self.painted(&far))?);
+                stream.constant(&far_surface, &self.painted(&far))?;
             }
             let tinted = matches!(self.look.paint, Paint::Deviation(_));
             let tint = tinted.then(|| (TintTrack::new(middle_at), TintTrack::new(far_surface)));
@@ -158,7 +150,7 @@ impl RobotTracks {
             });
             return Ok(());
         }
-        fixed.push(ids.constant(&entity, &self.painted(mesh))?);
+        stream.constant(&entity, &self.painted(mesh))?;
         self.tint(mesh.link, mesh, entity);
         Ok(())
     }
@@ -209,20 +201,19 @@ impl RobotTracks {
     }
 
     /// The tool as a line from the frame that carries it to the tool centre point: most robot files have no mesh for it.
-    pub(crate) fn tool(&self, X_TL: &Pose, ids: &mut Ids) -> Result<Option<Chunk>, StreamError> {
+    pub(crate) fn tool(&self, X_TL: &Pose, stream: &RrdStream) -> Result<()> {
         const SHORTEST_M: f64 = 0.01;
         if X_TL.translation.vector.norm() < SHORTEST_M {
-            return Ok(None);
+            return Ok(());
         }
         let color = match self.look.paint {
             Paint::Ghost => Color(colors::ghost()),
             Paint::Plain(color) => color,
             Paint::Own | Paint::Deviation(_) => colors::total(),
         };
-        let line = LineStrips3D::new([[point(X_TL), [0.0; 3]]])
-            .with_colors([color])
-            .with_radii([crate::rerun::Radius::new_ui_points(2.5)]);
-        ids.constant(&self.look.root.join(&path(["tcp", "tool"])), &line).map(Some)
+        let line =
+            LineStrips3D::new([[point(X_TL), [0.0; 3]]]).with_colors([color]).with_radii([Radius::new_ui_points(2.5)]);
+        stream.constant(&self.look.root.join(&path(["tcp", "tool"])), &line)
     }
 
     /// Adds an instant. `twin` is what is drawn; `sample` says how far places really are from the rigid twin.
@@ -243,21 +234,6 @@ impl RobotTracks {
         for bent in &mut self.bent {
             bent.push(when, twin, sample, &self.look);
         }
-    }
-
-    fn tracks(&self) -> impl Iterator<Item = &dyn Track> {
-        let bent = self.bent.iter().flat_map(|bent| {
-            let tints = bent.tint.iter().flat_map(|(middle, far)| [middle as &dyn Track, far]);
-            [&bent.shape as &dyn Track, &bent.far].into_iter().chain(tints)
-        });
-        let links = self.links.iter().map(|(_, track)| track).chain([&self.tcp]).map(|track| track as &dyn Track);
-        let tints = self.tints.iter().map(|(_, _, track)| track as &dyn Track);
-        links.chain(bent).chain(tints).chain(self.skeleton.as_ref().map(|track| track as &dyn Track))
-    }
-
-    /// Chunks of the rows that wait.
-    pub(crate) fn rows(&self, ids: &mut Ids, put: &mut Put<'_>) -> Result<(), StreamError> {
-        self.tracks().try_for_each(|track| track.chunk(ids)?.map_or(Ok(()), &mut *put))
     }
 
     pub(crate) fn tracks_mut(&mut self) -> impl Iterator<Item = &mut dyn Track> {

@@ -1,9 +1,8 @@
 //! One run in a recording: its robots, ways of the tool, curves and events.
 
-use crate::rerun::Chunk;
-use crate::rerun::{
-    Color, EntityPath, LineStrip3D, LineStrips3D, Points3D, Scalars, SeriesPoints, TextDocument, TextLog, TimeColumn,
-    TimePoint, Timeline,
+use rerun::{
+    Color, EntityPath, LineStrip3D, LineStrips3D, Points3D, Radius, Scalars, SeriesPoints, TextDocument, TextLog,
+    TimeColumn, TimePoint, Timeline,
 };
 
 use super::colors::{self, ColorScale};
@@ -11,7 +10,7 @@ use super::curves::Curves;
 use super::eye::{Eye, eye};
 use super::path;
 use super::robot::{Look, Paint, RobotTracks};
-use super::stream::{Ids, Put, StreamError};
+use super::stream::{Result, RrdStream};
 use super::tracks::{ArrowTrack, Instant, PathTrack, SIM_TIME, Seen, Times, Track, point};
 use crate::plot_room::Envelope;
 use crate::poses::{PoseClock, Shown, size};
@@ -44,26 +43,6 @@ impl Seat {
     }
 }
 
-/// Which of the rows that wait.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Rows {
-    /// Those that come with every sample: curves of the error.
-    OfSamples,
-    /// All other curves, which come with poses.
-    OfCauses,
-    All,
-}
-
-impl Rows {
-    fn of_samples(self) -> bool {
-        self != Self::OfCauses
-    }
-
-    fn of_causes(self) -> bool {
-        self != Self::OfSamples
-    }
-}
-
 /// A robot with the way of its tool.
 struct Drawn {
     robot: Option<RobotTracks>,
@@ -77,8 +56,6 @@ pub(crate) struct RunTracks {
     /// Of every sample, and of those in which the robots are drawn.
     times: Times,
     pose_times: Times,
-    /// Rows at which each track of [`RunTracks::drawn_mut`] becomes a chunk; nothing in a short run.
-    room: Vec<usize>,
     flexible: Drawn,
     rigid: Option<Drawn>,
     magnified: Option<Drawn>,
@@ -137,8 +114,8 @@ fn magnified_paint(seat: &Seat, scale: ColorScale) -> Paint {
 }
 
 impl RunTracks {
-    /// The tracks of a run, and what never changes about it.
-    pub(crate) fn new(header: &RunHeader, seat: &Seat, ids: &mut Ids) -> Result<(Self, Vec<Chunk>), StreamError> {
+    /// Returns the tracks of a run; writes what never changes about it.
+    pub(crate) fn new(header: &RunHeader, seat: &Seat, stream: &RrdStream) -> Result<Self> {
         let root = seat.root(header);
         let at = |what: &str| root.join(&path([what]));
         let way = |who: &str| PathTrack::new(root.join(&path(["path", who])));
@@ -147,23 +124,20 @@ impl RunTracks {
         let first = matches!(seat, Seat::Alone | Seat::InStudy(0, _));
         let Fineness { pixel_m, true_tolerance_m, quantum_m } = Fineness::of(header);
 
-        let mut fixed = Vec::new();
-        let mut robot = |name: &str, paint: Paint, bends: bool, tolerance_m: f64, quantum_m: f32, ids: &mut Ids| {
+        let robot = |name: &str, paint: Paint, bends: bool, tolerance_m: f64, quantum_m: f32| {
             // At true scale bending is hardly seen; a surface for every picture would be wasted.
             let every_ns = if quantum_m > 0.0 { 10_000_000 } else { 100_000_000 };
             let look = Look { root: at(name), paint, bends, tolerance_m, every_ns, quantum_m };
-            let (robot, own) = RobotTracks::new(header, look, ids)?;
-            fixed.extend(own);
-            Ok::<_, StreamError>(Some(robot))
+            RobotTracks::new(header, look, stream).map(Some)
         };
         let with_magnified = header.has_rigid && header.magnification > 0.0;
         let flexible = Drawn {
             robot: match alone || !with_magnified {
                 // Deflections that are drawn as they are and coloured are large ones: modes.
                 true if header.has_rigid && !with_magnified && header.color_scale_m > 0.0 => {
-                    robot("flexible", Paint::Deviation(scale), true, pixel_m, quantum_m, ids)?
+                    robot("flexible", Paint::Deviation(scale), true, pixel_m, quantum_m)?
                 }
-                true => robot("flexible", Paint::Own, true, true_tolerance_m, 0.0, ids)?,
+                true => robot("flexible", Paint::Own, true, true_tolerance_m, 0.0)?,
                 false => None,
             },
             way: way("flexible"),
@@ -173,7 +147,7 @@ impl RunTracks {
             false => None,
             true => Some(Drawn {
                 robot: match first {
-                    true => robot("rigid", Paint::Ghost, false, 0.0, 0.0, ids)?,
+                    true => robot("rigid", Paint::Ghost, false, 0.0, 0.0)?,
                     false => None,
                 },
                 way: way("rigid"),
@@ -183,13 +157,13 @@ impl RunTracks {
         let magnified = match with_magnified {
             false => None,
             true => {
-                let robot = robot("magnified", magnified_paint(seat, scale), true, pixel_m, quantum_m, ids)?;
+                let robot = robot("magnified", magnified_paint(seat, scale), true, pixel_m, quantum_m)?;
                 Some(Drawn { robot, way: way("magnified"), way_color: seat.color() })
             }
         };
         let arrow = with_magnified.then(|| ArrowTrack::new(root.join(&path(["magnified", "error"]))));
         if let Some(arrow) = &arrow {
-            fixed.push(arrow.style(ids, seat.color().unwrap_or_else(colors::total))?);
+            arrow.style(stream, seat.color().unwrap_or_else(colors::total))?;
         }
         let plots = path(["plots"]);
         let shapes = !header.captions.is_empty();
@@ -201,13 +175,12 @@ impl RunTracks {
             _ => None,
         };
         for curves in curves.iter().chain(&study_curves) {
-            fixed.extend(curves.styles(ids)?);
+            curves.styles(stream)?;
         }
-        let run = Self {
+        Ok(Self {
             root,
             times: Times::default(),
             pose_times: Times::default(),
-            room: Vec::new(),
             flexible,
             rigid,
             magnified,
@@ -223,50 +196,47 @@ impl RunTracks {
             undrawn: None,
             last: Sample::default(),
             peak: None,
-        };
-        Ok((run, fixed))
+        })
     }
 
-    /// What is known of the robots with the first sample: their tools, and where the scale of their colours stands.
-    pub(crate) fn tools(&self, header: &RunHeader, first: &Sample, ids: &mut Ids) -> Result<Vec<Chunk>, StreamError> {
-        let mut chunks = self.tool_lines(header, first, ids)?;
+    /// Writes what is known of the robots with the first sample: their tools, and where the scale of their colours stands.
+    pub(crate) fn tools(&self, header: &RunHeader, first: &Sample, stream: &RrdStream) -> Result<()> {
+        self.captions(header, first, stream)?;
+        self.tool_lines(header, first, stream)?;
         let colored = std::iter::once(&self.flexible).chain(&self.magnified).filter_map(|drawn| drawn.robot.as_ref());
         // Shapes of modes have no size: their colours are no millimetres.
         let mut colored = colored.filter(|robot| robot.is_colored() && header.captions.is_empty());
         if let (Some(robot), Some(eye)) = (colored.next_back(), eye(header, Some(first))) {
-            chunks.extend(color_bar(robot.root(), self.scale, &eye, ids)?);
+            color_bar(robot.root(), self.scale, &eye, stream)?;
         }
-        Ok(chunks)
+        Ok(())
     }
 
-    fn tool_lines(&self, header: &RunHeader, first: &Sample, ids: &mut Ids) -> Result<Vec<Chunk>, StreamError> {
-        let captions = self.captions(header, first, ids)?;
-        let Some(link) = header.links.iter().position(|link| link.name == header.tcp) else { return Ok(captions) };
+    fn tool_lines(&self, header: &RunHeader, first: &Sample, stream: &RrdStream) -> Result<()> {
+        let Some(link) = header.links.iter().position(|link| link.name == header.tcp) else { return Ok(()) };
         let X_TL = first.flexible.X_WT.inv_mul(&first.flexible.X_WL[link]);
         let drawn = std::iter::once(&self.flexible).chain(&self.rigid).chain(&self.magnified);
-        let lines = drawn.filter_map(|drawn| drawn.robot.as_ref()).map(|robot| robot.tool(&X_TL, ids));
-        captions.into_iter().map(Ok).chain(lines.filter_map(Result::transpose)).collect()
+        drawn.filter_map(|drawn| drawn.robot.as_ref()).try_for_each(|robot| robot.tool(&X_TL, stream))
     }
 
     /// Names of what is shown: beside the tool, and as a text of their own.
-    fn captions(&self, header: &RunHeader, first: &Sample, ids: &mut Ids) -> Result<Vec<Chunk>, StreamError> {
-        let mut chunks = Vec::new();
+    fn captions(&self, header: &RunHeader, first: &Sample, stream: &RrdStream) -> Result<()> {
         for caption in &header.captions {
             let step = (caption.from_s * header.log_rate_hz).round() as i64;
             let when = instant(((caption.from_s * 1e9).round() as i64, step));
             let label = Points3D::new([point(&first.rigid.X_WT)])
-                .with_radii([crate::rerun::Radius::new_ui_points(2.0)])
+                .with_radii([Radius::new_ui_points(2.0)])
                 .with_colors([colors::total()])
                 .with_labels([caption.text.as_str()])
                 .with_show_labels(true);
             // Where poses change with the captions, the scenery names the places.
             if header.scenery.is_empty() {
-                chunks.push(ids.single(&self.root.join(&path(["caption"])), &when, &label)?);
+                stream.single(&self.root.join(&path(["caption"])), &when, &label)?;
             }
             let text = TextDocument::from_markdown(format!("# {}", caption.text));
-            chunks.push(ids.single(&path(["caption"]), &when, &text)?);
+            stream.single(&path(["caption"]), &when, &text)?;
         }
-        Ok(chunks)
+        Ok(())
     }
 
     /// Adds an instant.
@@ -348,30 +318,25 @@ impl RunTracks {
         seen
     }
 
-    /// Samples whose rows wait, and poses.
-    pub(crate) fn waiting(&self) -> [usize; 2] {
-        [self.times.rows(), self.pose_times.rows()]
+    /// Number of samples whose rows wait.
+    pub(crate) fn waiting(&self) -> usize {
+        self.times.rows()
     }
 
-    /// Chunks of the rows that wait.
-    pub(crate) fn rows(&self, which: Rows, ids: &mut Ids, put: &mut Put<'_>) -> Result<(), StreamError> {
-        let curves = || self.curves.iter().chain(&self.study_curves);
-        if which == Rows::All {
-            let drawn = std::iter::once(&self.flexible).chain(&self.rigid).chain(&self.magnified);
-            drawn.filter_map(|drawn| drawn.robot.as_ref()).try_for_each(|robot| robot.rows(ids, put))?;
-            if let Some(arrow) = self.arrow.as_ref().map(|arrow| arrow.chunk(ids)).transpose()?.flatten() {
-                put(arrow)?;
-            }
-        }
-        if which.of_causes() && self.pose_times.rows() > 0 {
-            let times = self.pose_times.columns();
-            curves().try_for_each(|curves| curves.cause_rows(ids, &times, put))?;
-        }
-        if which.of_samples() && self.times.rows() > 0 {
-            let times = self.times.columns();
-            curves().try_for_each(|curves| curves.error_rows(ids, &times, put))?;
-        }
+    /// Writes the rows that wait and forgets them.
+    pub(crate) fn send(&mut self, stream: &RrdStream) -> Result<()> {
+        self.drawn_mut().try_for_each(|track| track.send(stream))?;
+        let (times, pose_times) = (self.times.columns(), self.pose_times.columns());
+        let mut curves = self.curves.iter_mut().chain(&mut self.study_curves);
+        curves.try_for_each(|curves| curves.send(stream, &times, &pose_times))?;
+        self.times.clear();
+        self.pose_times.clear();
         Ok(())
+    }
+
+    /// Writes the rows of those tracks that take much memory.
+    pub(crate) fn send_large(&mut self, stream: &RrdStream) -> Result<()> {
+        self.drawn_mut().filter(|track| track.is_large()).try_for_each(|track| track.send(stream))
     }
 
     /// Tracks of the robots and of the arrow.
@@ -381,103 +346,49 @@ impl RunTracks {
         robots.chain(self.arrow.as_mut().map(|arrow| arrow as &mut dyn Track))
     }
 
-    /// Chunks of the robots' tracks with so many rows, or with large ones; forgets these rows. Each track has its turn: the
-    /// first chunks are shorter, one a little longer than the other, so that about half of the rows wait, and few chunks
-    /// at once.
-    pub(crate) fn take_full(&mut self, rows: usize, ids: &mut Ids, put: &mut Put<'_>) -> Result<(), StreamError> {
-        let mut room = std::mem::take(&mut self.room);
-        if room.is_empty() {
-            let count = self.drawn_mut().count();
-            room = (1..=count).map(|k| (rows * k).div_ceil(count)).collect();
-        }
-        for (track, room) in self.drawn_mut().zip(&mut room) {
-            if track.waiting() >= *room || track.is_large() {
-                track.chunk(ids)?.map_or(Ok(()), &mut *put)?;
-                track.clear();
-                *room = rows;
-            }
-        }
-        self.room = room;
-        Ok(())
-    }
-
-    /// Chunks of all rows of the robots' tracks; forgets each track's as they are put.
-    pub(crate) fn take_drawn(&mut self, ids: &mut Ids, put: &mut Put<'_>) -> Result<(), StreamError> {
-        for track in self.drawn_mut() {
-            track.chunk(ids)?.map_or(Ok(()), &mut *put)?;
-            track.clear();
-        }
-        Ok(())
-    }
-
-    /// Forgets rows that wait; they have been written.
-    pub(crate) fn clear(&mut self, which: Rows) {
-        if which.of_samples() {
-            self.times.clear();
-        }
-        if which.of_causes() {
-            self.pose_times.clear();
-        }
-        if which == Rows::All {
-            self.drawn_mut().for_each(Track::clear);
-        }
-        for curves in self.curves.iter_mut().chain(&mut self.study_curves) {
-            if which.of_samples() {
-                curves.clear_errors();
-            }
-            if which.of_causes() {
-                curves.clear_causes();
-            }
-        }
-    }
-
-    /// The ways of the tool so far.
-    pub(crate) fn ways(&self, ids: &mut Ids) -> Result<Vec<Chunk>, StreamError> {
-        let mut chunks = Vec::new();
+    /// Writes the paths of the TCP.
+    pub(crate) fn ways(&self, stream: &RrdStream) -> Result<()> {
         if self.shapes {
-            return Ok(chunks);
+            return Ok(());
         }
-        for drawn in std::iter::once(&self.flexible).chain(&self.rigid).chain(&self.magnified) {
-            chunks.push(match drawn.way_color {
-                Some(color) => drawn.way.line(ids, color)?,
-                None => drawn.way.colored(ids, |error| self.scale.color(error))?,
-            });
-        }
-        Ok(chunks)
+        let mut drawn = std::iter::once(&self.flexible).chain(&self.rigid).chain(&self.magnified);
+        drawn.try_for_each(|drawn| match drawn.way_color {
+            Some(color) => drawn.way.line(stream, color),
+            None => drawn.way.colored(stream, |error| self.scale.color(error)),
+        })
     }
 
     /// The largest error as a mark on the way and in the plot, and what happened when.
-    pub(crate) fn marks(&self, ids: &mut Ids, result: &RunResult) -> Result<Vec<Chunk>, StreamError> {
-        let mut chunks = Vec::new();
+    pub(crate) fn marks(&self, stream: &RrdStream, result: &RunResult) -> Result<()> {
         if let Some((error, when, place)) = &self.peak {
             let label = peak_label(*error, *when);
             let mark = Points3D::new([*place])
-                .with_radii([crate::rerun::Radius::new_ui_points(5.0)])
+                .with_radii([Radius::new_ui_points(5.0)])
                 .with_colors([Color::from_rgb(255, 255, 255)])
                 .with_labels([label.as_str()])
                 .with_show_labels(false);
-            chunks.push(ids.constant(&self.root.join(&path(["path", "peak"])), &mark)?);
+            stream.constant(&self.root.join(&path(["path", "peak"])), &mark)?;
             if self.curves.is_some() {
                 let at = path(["plots", "tcp_error", "peak"]);
                 let style = SeriesPoints::new()
                     .with_names([label.as_str()])
                     .with_colors([Color::from_rgb(255, 255, 255)])
                     .with_marker_sizes([5.0_f32]);
-                chunks.push(ids.constant(&at, &style)?);
-                chunks.push(ids.single(&at, &instant(*when), &Scalars::single(1e3 * error))?);
+                stream.constant(&at, &style)?;
+                stream.single(&at, &instant(*when), &Scalars::single(1e3 * error))?;
             }
         }
         if self.curves.is_some() {
-            chunks.extend(events(&result.events, ids)?);
+            events(&result.events, stream)?;
         }
-        Ok(chunks)
+        Ok(())
     }
 }
 
-/// What happened when, as one chunk.
-fn events(events: &[Event], ids: &mut Ids) -> Result<Option<Chunk>, StreamError> {
+/// Writes what happened when.
+fn events(events: &[Event], stream: &RrdStream) -> Result<()> {
     if events.is_empty() {
-        return Ok(None);
+        return Ok(());
     }
     let level = |event: &Event| match event.kind {
         EventKind::Stopped => "ERROR",
@@ -489,7 +400,7 @@ fn events(events: &[Event], ids: &mut Ids) -> Result<Option<Chunk>, StreamError>
         .with_many_text(events.iter().map(|event| event.text.as_str()))
         .with_many_level(events.iter().map(level));
     let times = [TimeColumn::new_duration_nanos(SIM_TIME, times)];
-    ids.columns(&path(["events"]), &times, texts.columns_of_unit_batches()?).map(Some)
+    stream.columns(&path(["events"]), times, texts.columns_of_unit_batches()?)
 }
 
 fn peak_label(error_m: f64, (nanoseconds, _): Instant) -> String {
@@ -497,7 +408,7 @@ fn peak_label(error_m: f64, (nanoseconds, _): Instant) -> String {
 }
 
 /// The scale of the colours, upright beside the robot as it is seen at first, with its numbers.
-fn color_bar(root: &EntityPath, scale: ColorScale, eye: &Eye, ids: &mut Ids) -> Result<Vec<Chunk>, StreamError> {
+fn color_bar(root: &EntityPath, scale: ColorScale, eye: &Eye, stream: &RrdStream) -> Result<()> {
     let [foot, head] = eye.beside();
     let at = |share: f64| [0, 1, 2].map(|c| (foot[c] + (head[c] - foot[c]) * share) as f32);
     let steps = ColorScale::STEPS;
@@ -506,17 +417,18 @@ fn color_bar(root: &EntityPath, scale: ColorScale, eye: &Eye, ids: &mut Ids) -> 
     let color = |k: u32| scale.color(scale.full_m * (f64::from(k) + 0.5) / f64::from(steps));
     let bar = LineStrips3D::new((0..steps).map(piece))
         .with_colors((0..steps).map(color))
-        .with_radii([crate::rerun::Radius::new_ui_points(5.0)]);
+        .with_radii([Radius::new_ui_points(5.0)]);
     // Tenths of micrometres are enough, and rounding is not shown.
     let mm = |share: f64| (1e7 * scale.full_m * share).round() / 1e4;
     let labels = [format!("{}", mm(0.0)), format!("{} mm", mm(0.5)), format!("{} mm off the rigid arm", mm(1.0))];
     let numbers = Points3D::new([0.0, 0.5, 1.0].map(at))
-        .with_radii([crate::rerun::Radius::new_ui_points(1.0)])
+        .with_radii([Radius::new_ui_points(1.0)])
         .with_colors([colors::total()])
         .with_labels(labels.iter().map(String::as_str))
         .with_show_labels(true);
     let place = |what: &str| root.join(&path(["color_scale", what]));
-    Ok(vec![ids.constant(&place("bar"), &bar)?, ids.constant(&place("numbers"), &numbers)?])
+    stream.constant(&place("bar"), &bar)?;
+    stream.constant(&place("numbers"), &numbers)
 }
 
 fn instant((nanoseconds, step): Instant) -> TimePoint {

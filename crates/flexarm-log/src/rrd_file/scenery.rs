@@ -1,13 +1,13 @@
 //! What stands still around a robot: points, surfaces and ellipsoids of a map, a view for each group.
 
-use crate::rerun::{
+use crate::{RunHeader, Scenery, SceneryForm};
+use rerun::{
     AlbedoFactor, AsComponents, Boxes3D, Color, Ellipsoids3D, EntityPath, Mesh3D, Points3D, Quaternion, Radius, Rgba32,
 };
-use crate::{RunHeader, Scenery, SceneryForm};
 
 use super::layout::Part;
-use super::stream::StreamError;
-use super::{Store, path};
+use super::path;
+use super::stream::{Result, RrdStream};
 
 const ROOT: &str = "scenery";
 /// Folder of what all views show.
@@ -31,9 +31,9 @@ pub(super) fn window(header: &RunHeader, robot: &EntityPath) -> Part {
 }
 
 /// Writes a thing that stands still.
-pub(super) fn write(store: &mut Store, scenery: &Scenery) -> Result<(), StreamError> {
+pub(super) fn write(stream: &RrdStream, scenery: &Scenery) -> Result<()> {
     let view = if scenery.view.is_empty() { EVERYWHERE } else { &scenery.view };
-    store.constant(&path([ROOT, view, &scenery.name]), &*archetype(&scenery.form))
+    stream.constant(&path([ROOT, view, &scenery.name]), &*archetype(&scenery.form))
 }
 
 fn archetype(form: &SceneryForm) -> Box<dyn AsComponents> {
@@ -57,7 +57,7 @@ fn archetype(form: &SceneryForm) -> Box<dyn AsComponents> {
             Ellipsoids3D::from_centers_and_half_sizes(places.iter().copied(), half_axes_m.iter().copied())
                 .with_quaternions(quaternions.iter().map(|q| Quaternion::from_xyzw(*q)))
                 .with_colors(colors.iter().map(color))
-                .with_fill_mode(crate::rerun::components::FillMode::Solid),
+                .with_fill_mode(rerun::components::FillMode::Solid),
         ),
         SceneryForm::Box { corners, color: own } => {
             let [low, high] = corners;

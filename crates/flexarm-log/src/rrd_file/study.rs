@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crate::rerun::TextDocument;
+use rerun::TextDocument;
 
 use super::run::Seat;
 use super::{RunWriter, Store, content_hash, path, stream_error};
@@ -49,7 +49,7 @@ impl RrdStudy {
     pub fn finish(self, text: &str) -> Result<(), LogError> {
         let Some(mut store) = lock(&self.store).take() else { return Err(LogError::not_open(&self.path, "finish")) };
         let mut close = || {
-            store.constant(&path(["summary"]), &TextDocument::from_markdown(text))?;
+            store.stream.constant(&path(["summary"]), &TextDocument::from_markdown(text))?;
             store.finish()
         };
         close().map_err(stream_error(&self.path, "write the result and the index"))
@@ -90,9 +90,9 @@ impl Recorder for StudySeat {
         let mut shared = lock(&self.store);
         let error = stream_error(&self.path, "write the description of the run");
         if shared.is_none() {
-            let file = self.options.create(&self.path)?;
-            let open = Store::new(file, content_hash(header, &self.labels), self.options.flush_clock(&self.path))
-                .and_then(|mut store| store.describe(header, &self.seat).map(|()| store));
+            self.options.create(&self.path)?;
+            let open = Store::new(&self.path, content_hash(header, &self.labels), self.options)
+                .and_then(|store| store.describe(header, &self.seat).map(|()| store));
             *shared = Some(open.map_err(stream_error(&self.path, "write the description of the study"))?);
         }
         let Some(store) = shared.as_mut() else { return Err(LogError::not_open(&self.path, "begin")) };
@@ -118,8 +118,7 @@ impl Recorder for StudySeat {
         match (shared.as_mut(), self.run.take()) {
             (Some(store), Some(mut run)) => {
                 // Into the file at once: the next run may take long, or fail.
-                let written =
-                    run.finish(store, result).and_then(|()| store.stream.set_tail(&store.recording, |_| Ok(())));
+                let written = run.finish(store, result).and_then(|()| store.stream.flush());
                 written.map_err(stream_error(&self.path, "write the end of a run"))
             }
             _ => Err(LogError::not_open(&self.path, "finish")),

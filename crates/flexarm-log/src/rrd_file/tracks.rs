@@ -1,21 +1,18 @@
 //! Rows that wait to be written as columns: one track for each entity that changes with time.
 
-use crate::rerun::components::{ImageBuffer, ImageFormat};
-use crate::rerun::{
-    Arrows3D, Color, EntityPath, LineStrip3D, LineStrips3D, Mesh3D, Quaternion, Scalars, SeriesLines, TimePoint,
-    Transform3D,
-};
-use crate::rerun::{Chunk, TimeColumn};
 use flexarm_kinematics::Pose;
 use nalgebra::UnitQuaternion;
+use rerun::components::{ImageBuffer, ImageFormat};
+use rerun::{
+    Arrows3D, Color, EntityPath, LineStrip3D, LineStrips3D, Mesh3D, Quaternion, Radius, Scalars, SeriesLines,
+    TimeColumn, Transform3D,
+};
 
-use super::stream::{Ids, StreamError};
+use super::stream::{Result, RrdStream};
 use crate::plot_room::Envelope;
 
 /// Name of the timeline of simulated time.
 pub(crate) const SIM_TIME: &str = "sim_time";
-
-type Chunks = Result<Option<Chunk>, StreamError>;
 
 /// An instant: simulated time (ns), step.
 pub(crate) type Instant = (i64, i64);
@@ -51,19 +48,13 @@ impl Times {
 
 /// A track with times of its own: rows only where something changes.
 pub(crate) trait Track {
-    /// How many rows wait.
-    fn waiting(&self) -> usize;
-
     /// Whether the rows that wait are worth a chunk by their size.
     fn is_large(&self) -> bool {
         false
     }
 
-    /// The rows that wait, if any.
-    fn chunk(&self, ids: &mut Ids) -> Chunks;
-
-    /// Forgets them; they have been written. Their memory is given back: tracks do not have many rows at the same time.
-    fn clear(&mut self);
+    /// Writes the rows that wait, if any, and forgets them.
+    fn send(&mut self, stream: &RrdStream) -> Result<()>;
 }
 
 /// A moving frame. Instants at which it has not moved are left out.
@@ -95,24 +86,18 @@ impl PoseTrack {
 }
 
 impl Track for PoseTrack {
-    fn waiting(&self) -> usize {
-        self.times.rows()
-    }
-
-    fn chunk(&self, ids: &mut Ids) -> Chunks {
+    fn send(&mut self, stream: &RrdStream) -> Result<()> {
         if self.times.rows() == 0 {
-            return Ok(None);
+            return Ok(());
         }
         let transform = Transform3D::update_fields()
             .with_many_translation(self.translations.iter().copied())
             .with_many_quaternion(self.quaternions.iter().copied());
-        ids.columns(&self.path, &self.times.columns(), transform.columns_of_unit_batches()?).map(Some)
-    }
-
-    fn clear(&mut self) {
+        stream.columns(&self.path, self.times.columns(), transform.columns_of_unit_batches()?)?;
         self.times.clear();
         self.translations = Vec::new();
         self.quaternions = Vec::new();
+        Ok(())
     }
 }
 
@@ -149,22 +134,16 @@ impl TintTrack {
 }
 
 impl Track for TintTrack {
-    fn waiting(&self) -> usize {
-        self.times.rows()
-    }
-
-    fn chunk(&self, ids: &mut Ids) -> Chunks {
+    fn send(&mut self, stream: &RrdStream) -> Result<()> {
         if self.times.rows() == 0 {
-            return Ok(None);
+            return Ok(());
         }
         let strips = self.strips.chunks_exact(self.last.len()).map(|strip| ImageBuffer(strip.to_vec().into()));
         let mesh = Mesh3D::update_fields().with_many_albedo_texture_buffer(strips);
-        ids.columns(&self.path, &self.times.columns(), mesh.columns_of_unit_batches()?).map(Some)
-    }
-
-    fn clear(&mut self) {
+        stream.columns(&self.path, self.times.columns(), mesh.columns_of_unit_batches()?)?;
         self.times.clear();
         self.strips = Vec::new();
+        Ok(())
     }
 }
 
@@ -189,28 +168,22 @@ impl ShapeTrack {
 }
 
 impl Track for ShapeTrack {
-    fn waiting(&self) -> usize {
-        self.times.rows()
-    }
-
     fn is_large(&self) -> bool {
         const LARGE: usize = 1 << 20;
         size_of_val(self.positions.as_slice()) > LARGE
     }
 
-    fn chunk(&self, ids: &mut Ids) -> Chunks {
+    fn send(&mut self, stream: &RrdStream) -> Result<()> {
         let rows = self.times.rows();
         if rows == 0 {
-            return Ok(None);
+            return Ok(());
         }
         let lengths = std::iter::repeat_n(self.corners, rows);
         let mesh = Mesh3D::update_fields().with_vertex_positions(self.positions.iter().copied());
-        ids.columns(&self.path, &self.times.columns(), mesh.columns(lengths)?).map(Some)
-    }
-
-    fn clear(&mut self) {
+        stream.columns(&self.path, self.times.columns(), mesh.columns(lengths)?)?;
         self.times.clear();
         self.positions = Vec::new();
+        Ok(())
     }
 }
 
@@ -237,35 +210,29 @@ impl ArrowTrack {
     }
 
     /// Colour and width.
-    pub(crate) fn style(&self, ids: &mut Ids, color: Color) -> Result<Chunk, StreamError> {
+    pub(crate) fn style(&self, stream: &RrdStream, color: Color) -> Result<()> {
         let style = Arrows3D::update_fields()
             .with_colors([color])
-            .with_radii([crate::rerun::Radius::new_ui_points(3.0)])
+            .with_radii([Radius::new_ui_points(3.0)])
             .with_show_labels(true);
-        ids.single(&self.path, &TimePoint::default(), &style)
+        stream.constant(&self.path, &style)
     }
 }
 
 impl Track for ArrowTrack {
-    fn waiting(&self) -> usize {
-        self.times.rows()
-    }
-
-    fn chunk(&self, ids: &mut Ids) -> Chunks {
+    fn send(&mut self, stream: &RrdStream) -> Result<()> {
         if self.times.rows() == 0 {
-            return Ok(None);
+            return Ok(());
         }
         let arrows = Arrows3D::update_fields()
             .with_origins(self.arrows.iter().map(|(origin, _)| *origin))
             .with_vectors(self.arrows.iter().map(|(_, vector)| *vector))
             .with_labels(self.labels.iter().map(String::as_str));
-        ids.columns(&self.path, &self.times.columns(), arrows.columns_of_unit_batches()?).map(Some)
-    }
-
-    fn clear(&mut self) {
+        stream.columns(&self.path, self.times.columns(), arrows.columns_of_unit_batches()?)?;
         self.times.clear();
         self.arrows = Vec::new();
         self.labels = Vec::new();
+        Ok(())
     }
 }
 
@@ -296,31 +263,24 @@ impl SkeletonTrack {
     }
 
     /// Colour and width of the lines.
-    pub(crate) fn style(&self, ids: &mut Ids) -> Result<Chunk, StreamError> {
-        let style = LineStrips3D::update_fields()
-            .with_colors([self.color])
-            .with_radii([crate::rerun::Radius::new_ui_points(Self::RADIUS)]);
-        ids.single(&self.path, &TimePoint::default(), &style)
+    pub(crate) fn style(&self, stream: &RrdStream) -> Result<()> {
+        let style =
+            LineStrips3D::update_fields().with_colors([self.color]).with_radii([Radius::new_ui_points(Self::RADIUS)]);
+        stream.constant(&self.path, &style)
     }
 }
 
 impl Track for SkeletonTrack {
-    fn waiting(&self) -> usize {
-        self.times.rows()
-    }
-
-    fn chunk(&self, ids: &mut Ids) -> Chunks {
+    fn send(&mut self, stream: &RrdStream) -> Result<()> {
         if self.times.rows() == 0 || self.pairs.is_empty() {
-            return Ok(None);
+            return Ok(());
         }
         let lengths = std::iter::repeat_n(self.pairs.len(), self.times.rows());
         let lines = LineStrips3D::update_fields().with_strips(self.lines.iter().cloned());
-        ids.columns(&self.path, &self.times.columns(), lines.columns(lengths)?).map(Some)
-    }
-
-    fn clear(&mut self) {
+        stream.columns(&self.path, self.times.columns(), lines.columns(lengths)?)?;
         self.times.clear();
         self.lines = Vec::new();
+        Ok(())
     }
 }
 
@@ -361,33 +321,29 @@ impl ScalarTrack {
         debug_assert!(self.values.len().is_multiple_of(self.names.len().max(1)), "{}: a value per curve", self.path);
     }
 
-    pub(crate) fn clear(&mut self) {
-        self.values = Vec::new();
-    }
-
-    /// Whether there are rows that have not been written.
-    pub(crate) fn waiting(&self) -> bool {
-        !self.values.is_empty()
-    }
-
     pub(crate) fn seen(&self) -> Seen {
         let names = self.names.iter().map(|name| name.chars().count()).collect();
         Seen { path: self.path.clone(), envelope: self.envelope.clone(), names }
     }
 
     /// Names and colours of the curves.
-    pub(crate) fn style(&self, ids: &mut Ids) -> Result<Chunk, StreamError> {
+    pub(crate) fn style(&self, stream: &RrdStream) -> Result<()> {
         let mut lines = SeriesLines::new().with_names(self.names.iter().map(String::as_str));
         if !self.colors.is_empty() {
             lines = lines.with_colors(self.colors.iter().copied());
         }
-        ids.single(&self.path, &TimePoint::default(), &lines)
+        stream.constant(&self.path, &lines)
     }
 
-    pub(crate) fn chunk(&self, ids: &mut Ids, times: &[TimeColumn]) -> Result<Chunk, StreamError> {
+    /// Writes the rows that wait, at these times, and forgets them.
+    pub(crate) fn send(&mut self, stream: &RrdStream, times: &[TimeColumn]) -> Result<()> {
+        if self.values.is_empty() {
+            return Ok(());
+        }
         let width = self.names.len();
         let lengths = std::iter::repeat_n(width, self.values.len() / width.max(1));
-        ids.columns(&self.path, times, Scalars::new(self.values.iter().copied()).columns(lengths)?)
+        let values = Scalars::new(std::mem::take(&mut self.values));
+        stream.columns(&self.path, times.iter().cloned(), values.columns(lengths)?)
     }
 }
 
@@ -429,13 +385,13 @@ impl PathTrack {
     }
 
     /// The whole line in one colour.
-    pub(crate) fn line(&self, ids: &mut Ids, color: Color) -> Result<Chunk, StreamError> {
+    pub(crate) fn line(&self, stream: &RrdStream, color: Color) -> Result<()> {
         let line = LineStrip3D::from_iter(self.points.iter().map(|(point, _)| *point));
-        self.strips(ids, [line], [color])
+        self.strips(stream, [line], [color])
     }
 
     /// The line in pieces, each in the colour of its largest value.
-    pub(crate) fn colored(&self, ids: &mut Ids, color: impl Fn(f64) -> Color) -> Result<Chunk, StreamError> {
+    pub(crate) fn colored(&self, stream: &RrdStream, color: impl Fn(f64) -> Color) -> Result<()> {
         let size = self.points.len().div_ceil(Self::PIECES).max(1);
         // A piece ends where the next begins.
         let piece = |k: usize| &self.points[k * size..((k + 1) * size + 1).min(self.points.len())];
@@ -446,19 +402,17 @@ impl PathTrack {
                 (LineStrip3D::from_iter(piece.iter().map(|(point, _)| *point)), color(largest))
             })
             .unzip();
-        self.strips(ids, lines, colors)
+        self.strips(stream, lines, colors)
     }
 
     fn strips(
         &self,
-        ids: &mut Ids,
+        stream: &RrdStream,
         lines: impl IntoIterator<Item = LineStrip3D>,
         colors: impl IntoIterator<Item = Color>,
-    ) -> Result<Chunk, StreamError> {
-        let strips = LineStrips3D::new(lines)
-            .with_colors(colors)
-            .with_radii([crate::rerun::Radius::new_ui_points(Self::RADIUS)]);
-        ids.single(&self.path, &TimePoint::default(), &strips)
+    ) -> Result<()> {
+        let strips = LineStrips3D::new(lines).with_colors(colors).with_radii([Radius::new_ui_points(Self::RADIUS)]);
+        stream.constant(&self.path, &strips)
     }
 }
 

@@ -1,6 +1,6 @@
 //! What the viewer shows of a run, or of several: robots on the left, plots and text on the right.
 
-use crate::rerun::EntityPath;
+use rerun::EntityPath;
 
 use super::layout::Part;
 use super::run::Seat;

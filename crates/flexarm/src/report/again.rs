@@ -164,7 +164,7 @@ fn recording(path: &Path) -> Result<PathBuf, Error> {
     match in_folder(path) {
         Some(path) => Ok(path),
         None => {
-            let names: Vec<_> = RecordingFormat::by_content().iter().map(|format| format.info().file_name).collect();
+            let names: Vec<_> = RecordingFormat::read_back().iter().map(|format| format.info().file_name).collect();
             fail(format!("the folder has no recording: expected one of {}", names.join(", ")))
         }
     }
@@ -172,7 +172,7 @@ fn recording(path: &Path) -> Result<PathBuf, Error> {
 
 /// The recording in the folder of a run that holds most.
 fn in_folder(folder: &Path) -> Option<PathBuf> {
-    let there: Vec<(RecordingFormat, PathBuf)> = RecordingFormat::by_content()
+    let there: Vec<(RecordingFormat, PathBuf)> = RecordingFormat::read_back()
         .into_iter()
         .map(|format| (format, folder.join(format.info().file_name)))
         .filter(|(_, path)| path.is_file())
