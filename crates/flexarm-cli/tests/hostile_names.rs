@@ -83,9 +83,9 @@ fn names_of_a_robot_are_shown_and_not_obeyed_in_every_file_of_a_run() {
     }
     assert!(seen >= 4, "{seen} files");
     // The program reads its own table again.
-    let again = place.flexarm(&["report", "out/run.csv", "-o", "again"]);
+    let again = place.flexarm(&["report", "out/run.csv", "-o", "again.html"]);
     assert_eq!(again.code, 0, "{}", again.err);
-    let again = std::fs::read_to_string(place.path("again/report.html")).unwrap();
+    let again = std::fs::read_to_string(place.path("again.html")).unwrap();
     assert!(again.contains("=1+1|") && !again.contains("&#39;=1+1") && !again.contains("'=1+1"));
 }
 

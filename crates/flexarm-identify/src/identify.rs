@@ -336,13 +336,13 @@ fn placed(plant: &Plant, measurements: &Measurements) -> Result<Measurements, Id
             Instrument::Unknown(_) if !said => {
                 let seen =
                     |kind: &ReadingKind| matches!(kind, ReadingKind::Place { instrument, .. } if *instrument == number);
-                let (world, own) = both_points(plant, measurements, seen)?;
+                let [world, own] = both_points(plant, measurements, seen)?;
                 let too_few = || IdentifyError::Instrument { instrument: number, places: world.len() };
                 placed.instruments[number] = Instrument::Unknown(rigid_fit(&world, &own).ok_or_else(too_few)?);
             }
             Instrument::Axes(_) if !said => {
                 let seen = |kind: &ReadingKind| seen_in_axes(kind, number);
-                let (world, own) = both_points(plant, measurements, seen)?;
+                let [world, own] = both_points(plant, measurements, seen)?;
                 let too_few = || IdentifyError::Axes { instrument: number, displacements: world.len() };
                 placed.instruments[number] = Instrument::Axes(rotation_fit(&world, &own).ok_or_else(too_few)?);
             }
@@ -364,7 +364,7 @@ fn both_points(
     plant: &Plant,
     measurements: &Measurements,
     some: impl Fn(&ReadingKind) -> bool,
-) -> Result<(Vec<Vector3<f64>>, Vec<Vector3<f64>>), IdentifyError> {
+) -> Result<[Vec<Vector3<f64>>; 2], IdentifyError> {
     // In world axes: the instrument as if it stood there.
     let mut seen = measurements.of_readings(|k| some(&measurements.readings[k].kind));
     seen.instruments.iter_mut().for_each(|i| *i = Instrument::Known(Pose::identity()));
@@ -374,7 +374,7 @@ fn both_points(
         }
     });
     let arm = MeasuredArm { plant, parameters: &[], measurements: &seen };
-    Ok((points(&arm.predicted(&DVector::zeros(0))?), points(&arm.observed())))
+    Ok([points(&arm.predicted(&DVector::zeros(0))?), points(&arm.observed())])
 }
 
 pub(crate) fn points(values: &[f64]) -> Vec<Vector3<f64>> {

@@ -254,15 +254,13 @@ impl AtStation<'_> {
                 }
             }
         }
-        if w.norm() > 1e-9 {
-            if let Some(most) = speed.angular_rad_s {
-                let x = (most / w.norm()).powi(2);
-                // Where the tool travels as well, turning slows the path; where it only turns, it is what was programmed.
-                if v.norm() > 1e-9 && speed.linear_m_s.is_some() {
-                    self.limit(x, || SlowedBy::Turning);
-                } else {
-                    self.program(x);
-                }
+        if let Some(most) = speed.angular_rad_s.filter(|_| w.norm() > 1e-9) {
+            let x = (most / w.norm()).powi(2);
+            // Where the tool travels as well, turning slows the path; where it only turns, it is what was programmed.
+            if v.norm() > 1e-9 && speed.linear_m_s.is_some() {
+                self.limit(x, || SlowedBy::Turning);
+            } else {
+                self.program(x);
             }
         }
     }

@@ -55,7 +55,7 @@ pub enum Error {
         /// The URDF.
         path: PathBuf,
         /// Why.
-        source: flexarm_kinematics::ModelError,
+        source: Box<flexarm_kinematics::ModelError>,
     },
     /// A reduced-link file.
     #[error(transparent)]

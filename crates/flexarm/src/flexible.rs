@@ -411,7 +411,7 @@ impl Robot {
         let gears = insert_gearboxes(&mut substituted.mechanism, &gearboxes).map_err(ModellingError::from)?;
         let mounted = self.insert_springs(&mut substituted, modelling)?;
         let model = Model::new(&substituted.mechanism)
-            .map_err(|source| Error::Model { path: self.urdf_path.clone(), source })?;
+            .map_err(|source| Error::Model { path: self.urdf_path.clone(), source: Box::new(source) })?;
 
         let mut owned = self.lumped_springs(&substituted);
         owned.extend(self.modal_springs(&links, &substituted));

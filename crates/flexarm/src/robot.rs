@@ -472,7 +472,9 @@ impl Robot {
             return Ok(model.clone());
         }
         let model = Model::new(&self.rigid);
-        let model = model.map(Arc::new).map_err(|source| Error::Model { path: self.urdf_path.clone(), source })?;
+        let model = model
+            .map(Arc::new)
+            .map_err(|source| Error::Model { path: self.urdf_path.clone(), source: Box::new(source) })?;
         *kept = Some((self.rigid.clone(), model.clone()));
         Ok(model)
     }

@@ -102,7 +102,7 @@ fn every_command_with_a_pose_says_of_a_robot_what_check_says() {
     };
     let found = map(&robot, &request, &mut |_, _| std::ops::ControlFlow::Continue(())).unwrap();
     says("map", &found.caveats, &found.warnings);
-    let tool = CuttingTool::load(&project("robots/tools/endmill_20mm.toml")).unwrap().at_speeds(vec![8000.0]);
+    let tool = CuttingTool::load(project("robots/tools/endmill_20mm.toml")).unwrap().at_speeds(vec![8000.0]);
     let request = LobesRequest { zero_order: true, ..LobesRequest::default() };
     let found = lobes(&robot, &tool, &CuttingPlace::At(Some(&POSE)), &request, &|_, _| true).unwrap();
     says("lobes", &found.caveats, &found.warnings);

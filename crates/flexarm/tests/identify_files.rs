@@ -29,6 +29,9 @@ struct Place {
     parameters: Vec<Parameter>,
 }
 
+/// Poses with the load that pulls there.
+type Loads = Vec<(Vec<f64>, LoadCase)>;
+
 impl Drop for Place {
     fn drop(&mut self) {
         let _gone = std::fs::remove_dir_all(&self.folder);
@@ -90,8 +93,8 @@ impl Place {
         values.chunks_exact(3).map(|d| [0, 1, 2].map(|k| d[k] + NOISE * self.normal())).collect()
     }
 
-    fn pulls(&mut self, count: usize) -> (Vec<(Vec<f64>, LoadCase)>, Vec<[f64; 3]>) {
-        let loads: Vec<(Vec<f64>, LoadCase)> = self
+    fn pulls(&mut self, count: usize) -> (Loads, Vec<[f64; 3]>) {
+        let loads: Loads = self
             .poses(count)
             .into_iter()
             .enumerate()

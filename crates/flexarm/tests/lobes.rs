@@ -380,7 +380,7 @@ fn what_no_tool_has_is_refused_and_what_few_have_is_told_with_its_slip() {
         let found = at(&kr210(), &tool, &[0.0, -1.0, 1.6, 0.0, 0.9, 0.0], &rigid);
         let caveat = found.caveats.iter().find(|caveat| caveat.code == code).unwrap();
         assert!(caveat.likely.contains(slip) && caveat.value.is_some(), "{caveat:?}");
-        assert!(found.warnings.iter().any(|text| *text == caveat.message));
+        assert!(found.warnings.contains(&caveat.message));
     }
     let usual =
         at(&kr210(), &folder.tool(&good).unwrap().at_speeds(vec![6000.0]), &[0.0, -1.0, 1.6, 0.0, 0.9, 0.0], &rigid);

@@ -22,6 +22,9 @@ use super::registers::clear_upper_halves;
 use super::symmetric::SparseSymmetric;
 use super::triangular::{self, Columns};
 
+/// Alignment of what faer works on (bytes).
+const ALIGNED: usize = 64;
+
 /// How many threads a factorisation may use; solves take one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Threads(pub usize);
@@ -217,12 +220,14 @@ fn factorise(
     let entries = supernodes.len_val();
     let out_of_memory = NotPositiveDefinite::OutOfMemory { entries };
     let mut values = Vec::new();
-    values.try_reserve_exact(entries).map_err(|_| out_of_memory)?;
-    values.resize(entries, 0.0);
+    values.try_reserve_exact(entries + ALIGNED / size_of::<f64>()).map_err(|_| out_of_memory)?;
+    values.resize(values.capacity(), 0.0);
+    // The order in which faer sums depends on the address.
+    let start = values.as_ptr().align_offset(ALIGNED);
     let scratch = factorize_supernodal_numeric_llt_scratch::<u32, f64>(supernodes, threads.par(), Spec::default());
     let mut memory = MemBuffer::try_new(scratch).map_err(|_| out_of_memory)?;
     let factor = factorize_supernodal_numeric_llt(
-        &mut values,
+        &mut values[start..start + entries],
         K.as_ref(),
         LltRegularization::default(),
         supernodes,
@@ -231,8 +236,11 @@ fn factorise(
         Spec::default(),
     );
     clear_upper_halves();
+    let factor = factor.map(drop);
+    values.copy_within(start..start + entries, 0);
+    values.truncate(entries);
     match factor {
-        Ok(_) => Ok(Columns::of_blocks(supernodes, values)),
+        Ok(()) => Ok(Columns::of_blocks(supernodes, values)),
         // faer counts from 0 in some of its kernels and from 1 in others.
         Err(LltError::NonPositivePivot { index }) => {
             Err(NotPositiveDefinite::Pivot { unknown: index.min(K.ncols() - 1) })

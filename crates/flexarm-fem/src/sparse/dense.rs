@@ -4,7 +4,7 @@ use faer::diag::Diag;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::evd::{ComputeEigenvectors, self_adjoint_evd, self_adjoint_evd_scratch};
 use faer::linalg::matmul::matmul;
-use faer::{Accum, MatMut, MatRef, Par, Spec};
+use faer::{Accum, Mat, MatMut, MatRef, Par, Spec};
 use nalgebra::DMatrix;
 
 use super::registers::clear_upper_halves;
@@ -34,18 +34,20 @@ pub(crate) fn add_product(C: &mut DMatrix<f64>, factor: f64, A: &DMatrix<f64>, B
 
 /// Eigenvalues, ascending, and eigenvectors of a symmetric matrix; `None` if it is not finite.
 ///
-/// On one thread: faer's own default is as many as there are cores, and each number of them sums in another order.
+/// On one thread and in faer's own memory: the order in which faer sums depends on the number of threads, which is the number
+/// of cores by default, and on the address.
 pub(super) fn symmetric_eigen(A: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
     let n = A.nrows();
-    let (mut values, mut vectors) = (Diag::zeros(n), DMatrix::zeros(n, n));
+    let (mut values, mut vectors) = (Diag::zeros(n), Mat::<f64>::zeros(n, n));
     let scratch = self_adjoint_evd_scratch::<f64>(n, ComputeEigenvectors::Yes, Par::Seq, Spec::default());
     let mut memory = MemBuffer::try_new(scratch).ok()?;
     let stack = MemStack::new(&mut memory);
-    let to = Some(view_mut(&mut vectors));
+    let to = Some(vectors.as_mut());
     let found = self_adjoint_evd(view(A), values.as_mut(), to, Par::Seq, stack, Spec::default());
     clear_upper_halves();
     found.ok()?;
     let values: Vec<f64> = (0..n).map(|k| values[k]).collect();
+    let vectors = DMatrix::from_fn(n, n, |i, j| vectors[(i, j)]);
     values.iter().all(|x| x.is_finite()).then_some((values, vectors))
 }
 

@@ -170,7 +170,7 @@ class StepperFigures(_StepperFigures, total=False):
 
 
 class ShareFigures(TypedDict):
-    """What one link, one gearbox or the servos have in the largest TCP error."""
+    """What one link, one gearbox, the servos or the stepper have in the largest TCP error."""
 
     name: str
     """Name of the link or joint."""
@@ -2272,7 +2272,7 @@ class NewLink(TypedDict):
     distal: str
     """Joint at its far end."""
     length: float
-    """From its frame to that joint."""
+    """From its frame to that joint, or of its body where the frames do not run along it."""
     mass: float | None
     """Mass (kg)."""
     section: str | None

@@ -92,8 +92,8 @@ impl EncoderFigures {
 /// Each gear with an encoder behind it.
 pub(super) fn told(arm: &Arm, input: &MeasurementInput, chosen: &[Candidate]) -> Result<Vec<EncoderFigures>, Error> {
     let Some(first) = input.recordings.first() else { return Ok(Vec::new()) };
-    let model =
-        link_side(&arm.robot().rigid).map_err(|source| Error::Model { path: arm.robot().urdf_path.clone(), source })?;
+    let model = link_side(&arm.robot().rigid)
+        .map_err(|source| Error::Model { path: arm.robot().urdf_path.clone(), source: Box::new(source) })?;
     let joints: Vec<String> = arm.joints().map(str::to_owned).collect();
     let coupling = arm.robot().coupling();
     let is_coupled = |joint: &String| coupling.is_some_and(|coupling| coupling.joints.contains(joint));

@@ -94,7 +94,7 @@ impl Draft {
         let name = if mechanism.name.trim().is_empty() { "robot".to_owned() } else { mechanism.name.clone() };
         let model = |payload: Option<Cube>| {
             let loaded = loads::loaded(mechanism, &chain.tool, payload);
-            Model::new(&loaded).map_err(|source| Error::Model { path: path.to_owned(), source })
+            Model::new(&loaded).map_err(|source| Error::Model { path: path.to_owned(), source: Box::new(source) })
         };
         let bare = model(None)?;
         let moving_mass = mass_after(mechanism, &chain);
