@@ -46,12 +46,6 @@ impl TailFile {
         self.written + self.pending.len() as u64
     }
 
-    /// Number of committed bytes that are not in the file yet.
-    #[cfg(feature = "mcap")]
-    pub(crate) fn pending(&self) -> usize {
-        self.pending.len()
-    }
-
     /// Whether so much is held back that a new tail should be set even before its time.
     pub(crate) fn is_full(&self) -> bool {
         self.pending.len() > ((self.written / 4) as usize).clamp(LEAST_PENDING, PENDING_LIMIT)
