@@ -18,8 +18,9 @@ fn place() -> Place {
     place
 }
 
-/// Returns the last time in any whole chunk of a file, since the start of the run (s), and whether the file ends with a whole
-/// record or its closing mark. A chunk record begins with the first and last time of its messages.
+/// Returns the last time in any whole chunk of a file, since the start of the run (s), and whether
+/// the file ends with a whole record or its closing mark. A chunk record begins with the first and
+/// last time of its messages.
 fn last_time(file: &[u8]) -> (Option<f64>, bool) {
     const CHUNK: u8 = 0x06;
     const MAGIC: &[u8] = b"\x89MCAP0\r\n";
@@ -36,8 +37,9 @@ fn last_time(file: &[u8]) -> (Option<f64>, bool) {
     (last.map(|nanoseconds| (nanoseconds - 946_684_800_000_000_000) as f64 * 1e-9), rest.is_empty() || rest == MAGIC)
 }
 
-/// Truth: the promise of the recorders, at most the last moment is lost: of an MCAP a chunk, which is half a second of the
-/// motion. What was in the file a second before the kill cannot be all that is left, because the run went on in that second.
+/// Truth: the promise of the recorders, at most the last moment is lost: of an MCAP a chunk, which
+/// is half a second of the motion. What was in the file a second before the kill cannot be all that
+/// is left, because the run went on in that second.
 #[test]
 fn a_killed_run_leaves_recordings_up_to_the_last_moment() {
     let place = place();

@@ -12,8 +12,8 @@ use crate::LogError;
 pub struct CreateOptions {
     /// Replace an existing file; otherwise `begin` returns [`LogError::Exists`]. Default `false`.
     pub overwrite: bool,
-    /// Longest wall time between two flushes while samples arrive: what a killed run may lose. Default 0.5 s. An MCAP is
-    /// written chunk by chunk instead, whatever the wall time.
+    /// Longest wall time between two flushes while samples arrive: what a killed run may lose.
+    /// Default 0.5 s. An MCAP is written chunk by chunk instead, whatever the wall time.
     pub flush_every: Duration,
 }
 

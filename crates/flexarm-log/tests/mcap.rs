@@ -526,7 +526,8 @@ fn samples_left(file: &[u8]) -> usize {
     stream.map_while(Result::ok).filter(|message| message.channel.topic == "/solver").count()
 }
 
-/// What a kill leaves is what is in the file at that moment: whole chunks, of all samples but those of the last half second.
+/// What a kill leaves is what is in the file at that moment: whole chunks, of all samples but those
+/// of the last half second.
 #[test]
 fn a_killed_run_keeps_every_sample_up_to_its_last_chunk() {
     let path = synthetic::scratch("killed.mcap");
@@ -536,7 +537,8 @@ fn a_killed_run_keeps_every_sample_up_to_its_last_chunk() {
         recorder.record(&synthetic::sample(step)).unwrap();
         if step % 37 == 0 {
             let file = std::fs::read(&path).unwrap();
-            // Readers without an index, the ones of others too, meet no broken record and whole samples only.
+            // Readers without an index, the ones of others too, meet no broken record and whole
+            // samples only.
             let stream = MessageStream::new_with_options(&file, Options::IgnoreEndMagic.into()).unwrap();
             let all: Vec<_> = stream.map(Result::unwrap).collect();
             let count = |topic: &str| all.iter().filter(|message| message.channel.topic == topic).count() as u64;

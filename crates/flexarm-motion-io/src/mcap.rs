@@ -1,7 +1,8 @@
 //! Messages of an MCAP file, record by record from its beginning: the index at its end is not needed, so a file that is cut
 //! off is read up to its last whole chunk.
 //!
-//! The `mcap` crate walks over the records and unpacks chunks; three kinds of records matter here (schema, channel, message).
+//! The `mcap` crate walks over the records and unpacks chunks; three kinds of records matter here
+//! (schema, channel, message).
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -21,7 +22,8 @@ use crate::{MessageMotion, Request};
 /// First bytes of an MCAP file.
 pub const MCAP_MAGIC: &[u8] = mcap::MAGIC;
 
-/// Most bytes of a record, or of what a chunk unpacks to: the library takes memory for a chunk before it unpacks it.
+/// Most bytes of a record, or of what a chunk unpacks to: the library takes memory for a chunk
+/// before it unpacks it.
 const MOST_BYTES: usize = 256 << 20;
 /// Bytes that are read at once, however long a record claims to be.
 const READ_BYTES: usize = 64 << 10;
@@ -44,7 +46,7 @@ pub(crate) fn collect_file(path: &Path, into: &mut Collector<'_>) -> Result<Opti
 pub(crate) fn collect(mut file: impl Read, into: &mut Collector<'_>) -> Result<Option<String>, Trouble> {
     let options = LinearReaderOptions::default()
         .with_skip_end_magic(true)
-        .with_prevalidate_chunk_crcs(true) // a damaged chunk gives nothing, rather than some messages and then an error
+        .with_prevalidate_chunk_crcs(true) // a damaged chunk gives nothing
         .with_record_length_limit(MOST_BYTES);
     let mut reader = LinearReader::new_with_options(options);
     reader.add_decompressor(Lz4::default()).expect("it has a name");
@@ -173,7 +175,8 @@ fn number(rest: &mut &[u8]) -> Option<u16> {
     Some(u16::from_le_bytes(*bytes))
 }
 
-/// Takes a text off a record. The library's own parser takes memory for its length before it looks whether it is there.
+/// Takes a text off a record. The library's own parser takes memory for its length before it looks
+/// whether it is there.
 fn text(rest: &mut &[u8]) -> Option<String> {
     let (length, behind) = rest.split_first_chunk()?;
     let (bytes, behind) = behind.split_at_checked(u32::from_le_bytes(*length) as usize)?;

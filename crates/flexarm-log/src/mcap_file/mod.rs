@@ -1,8 +1,9 @@
 //! A run as an MCAP file of ROS 2 messages, for Foxglove, PlotJuggler, Rerun and ROS itself.
 //!
-//! Profile `ros2`: CDR messages, their definitions embedded, `offered_qos_profiles` on every channel. Chunks of whole samples,
-//! about 1 MiB or half a simulated second, compressed with zstd, are in the file once they are closed: up to there readers
-//! that need no index read what a killed run leaves. The `mcap` crate writes them ([`output`]).
+//! Profile `ros2`: CDR messages, their definitions embedded, `offered_qos_profiles` on every
+//! channel. Chunks of whole samples, about 1 MiB or half a simulated second, compressed with zstd,
+//! are in the file once they are closed: up to there readers that need no index read what a killed
+//! run leaves. The `mcap` crate writes them ([`output`]).
 //!
 //! Start at [`McapRecorder`]; topics are in [`channels`], messages in [`messages`] and [`cdr`], coordinate frames in
 //! [`frames`], what viewers draw in [`markers`].

@@ -1,5 +1,5 @@
-//! The file itself: the writer of the format's library, chunks that end where the data says so, and a sink that has only whole
-//! records.
+//! The file itself: the writer of the format's library, chunks that end where the data says so, and
+//! a sink that has only whole records.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -13,11 +13,13 @@ use super::cdr::Cdr;
 use super::messages::Stamp;
 use crate::written_behind::WrittenBehind;
 
-/// A chunk is closed when its messages have so many bytes, or span so much simulated time (ns): what a killed run loses.
+/// A chunk is closed when its messages have so many bytes, or span so much simulated time (ns):
+/// what a killed run loses.
 const CHUNK_BYTES: usize = 1 << 20;
 const CHUNK_NS: u64 = 500_000_000;
 
-/// Level of zstd. On chunks of runs level 1 takes half the time of level 3, which is zstd's own choice, and 2 % more room.
+/// Level of zstd. On chunks of runs level 1 takes half the time of level 3, which is zstd's own
+/// choice, and 2 % more room.
 const COMPRESSION: u32 = 1;
 
 /// Memory that is used again for the next message, or the next chunk in the file.
@@ -75,13 +77,15 @@ impl Output {
         self.writer.write_to_known_channel(&header, self.cdr.bytes()).map_err(io_error)
     }
 
-    /// Returns whether the chunk is large or long enough to be closed. Only the messages decide, never the clock.
+    /// Returns whether the chunk is large or long enough to be closed. Only the messages decide,
+    /// never the clock.
     pub(crate) fn is_full(&self, now: Stamp) -> bool {
         let begun = self.begun.unwrap_or(now);
         self.held >= CHUNK_BYTES || now.0.saturating_sub(begun.0) >= CHUNK_NS
     }
 
-    /// Closes the chunk and brings everything so far into the file. After an error the file is what it was before.
+    /// Closes the chunk and brings everything so far into the file. After an error the file is what
+    /// it was before.
     pub(crate) fn flush(&mut self) -> io::Result<()> {
         self.writer.flush().map_err(io_error)?;
         (self.held, self.begun) = (0, None);
@@ -122,7 +126,8 @@ fn io_error(error: McapError) -> io::Error {
     }
 }
 
-/// Holds what the library writes until it asks for a flush, which it does behind whole records only.
+/// Holds what the library writes until it asks for a flush, which it does behind whole records
+/// only.
 struct WholeRecords {
     file: File,
     waiting: Vec<u8>,
