@@ -82,8 +82,9 @@ fn on_a_disk_that_fills_up_all_recordings_reach_about_as_far() {
     for name in recordings() {
         let summary = place.json(&["convert", &format!("left/{name}"), &format!("{name}.csv")]);
         let reached = last_time(&place.text(&format!("{name}.csv")));
-        // Measured: MCAP and table both end at 0.864 s. Flushes are 64 samples apart.
-        assert!(reached > table - 0.2, "{name} reaches {reached} s, the table {table} s");
+        // Flushes are 64 samples apart; an MCAP has whole chunks, of half a second at most.
+        let behind = if name == "run.mcap" { 0.7 } else { 0.2 };
+        assert!(reached > table - behind, "{name} reaches {reached} s, the table {table} s");
         // Of a file whose end had no room; one that was closed in time is whole.
         assert!(summary["warnings"].as_array().unwrap().len() <= 1, "{summary}");
     }

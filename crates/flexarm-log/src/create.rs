@@ -12,7 +12,8 @@ use crate::LogError;
 pub struct CreateOptions {
     /// Replace an existing file; otherwise `begin` returns [`LogError::Exists`]. Default `false`.
     pub overwrite: bool,
-    /// Longest wall time between two flushes while samples arrive: what a killed run may lose. Default 0.5 s.
+    /// Longest wall time between two flushes while samples arrive: what a killed run may lose.
+    /// Default 0.5 s. An MCAP is written chunk by chunk instead, whatever the wall time.
     pub flush_every: Duration,
 }
 
@@ -83,7 +84,7 @@ const SCARCE_EVERY: u32 = 64;
 /// Longest time between two flushes: clocks do not hold all that a duration does.
 const NEVER: Duration = Duration::from_secs(10 * 365 * 24 * 3600);
 /// Part of its time that a run spends on flushes at most.
-#[cfg(any(feature = "mcap", feature = "rerun"))]
+#[cfg(feature = "rerun")]
 const LARGEST_SHARE: u32 = 20;
 
 /// When the next flush is due. It decides when bytes reach the disk, never which bytes.
@@ -118,7 +119,7 @@ impl FlushClock {
 
     /// To be told when a flush is over whose cost grows with the file: the next one waits so long that all of them take
     /// only a small part of the run.
-    #[cfg(any(feature = "mcap", feature = "rerun"))]
+    #[cfg(feature = "rerun")]
     pub(crate) fn done(&mut self) {
         // Who asks for no pause gets none.
         if !self.every.is_zero() {

@@ -11,8 +11,9 @@
 //! What all recorders promise:
 //! * a file is created by [`Recorder::begin`] and replaces an existing one only if told to
 //!   ([`CreateOptions::overwrite`]);
-//! * a killed run loses at most the last moment ([`CreateOptions::flush_every`]), and what is left can be read;
-//!   the exceptions ([`FormatInfo::survives_a_kill`]) come into being under another name and are there whole or not at all;
+//! * a killed run loses at most the last moment ([`CreateOptions::flush_every`], of an MCAP its last
+//!   chunk), and what is left can be read; the exceptions ([`FormatInfo::survives_a_kill`]) come into
+//!   being under another name and are there whole or not at all;
 //! * the same samples give the same bytes, on any day and at any speed: nothing in a file depends on the clock.
 //!
 //! Not here: what the numbers mean (`flexarm-analysis`), running the simulation (`flexarm`).
@@ -71,8 +72,6 @@ mod rrd_file;
 mod run_json;
 mod shape;
 mod table;
-#[cfg(feature = "mcap")]
-mod tail_file;
 mod threads;
 mod trace;
 mod trace_blocks;

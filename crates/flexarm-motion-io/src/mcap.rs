@@ -1,29 +1,32 @@
 //! Messages of an MCAP file, record by record from its beginning: the index at its end is not needed, so a file that is cut
-//! off is read up to there.
+//! off is read up to its last whole chunk.
 //!
-//! Three of the records matter here (schema, channel, message) and the chunk around them. Lengths are held against what is
-//! there before anything is taken for them.
+//! The `mcap` crate walks over the records and unpacks chunks; three kinds of records matter here
+//! (schema, channel, message).
 
 use std::collections::HashMap;
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{Cursor, ErrorKind, Read};
 use std::path::Path;
 
+use lz4_flex::frame::FrameDecoder;
+use mcap::records::{Record, op};
+use mcap::sans_io::decompressor::{DecompressResult, Decompressor};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::{McapError, McapResult};
+
 use crate::collect::Collector;
-use crate::error::{MotionError, Problem, Trouble};
-use crate::unpack::{MOST_BYTES, Packing, unpacked};
+use crate::error::{MotionError, Trouble};
 use crate::{MessageMotion, Request};
 
 /// First bytes of an MCAP file.
-pub const MCAP_MAGIC: &[u8] = b"\x89MCAP0\r\n";
+pub const MCAP_MAGIC: &[u8] = mcap::MAGIC;
 
-/// Kinds of records.
-const FOOTER: u8 = 0x02;
-const SCHEMA: u8 = 0x03;
-const CHANNEL: u8 = 0x04;
-const MESSAGE: u8 = 0x05;
-const CHUNK: u8 = 0x06;
-const DATA_END: u8 = 0x0F;
+/// Most bytes of a record, or of what a chunk unpacks to: the library takes memory for a chunk
+/// before it unpacks it.
+const MOST_BYTES: usize = 256 << 20;
+/// Bytes that are read at once, however long a record claims to be.
+const READ_BYTES: usize = 64 << 10;
 
 /// Reads an MCAP file.
 ///
@@ -36,61 +39,85 @@ pub fn read_mcap(path: &Path, request: &Request<'_>) -> Result<MessageMotion, Mo
 
 pub(crate) fn collect_file(path: &Path, into: &mut Collector<'_>) -> Result<Option<String>, MotionError> {
     let failed = |source| MotionError::Read { path: path.to_owned(), source };
-    collect(BufReader::new(File::open(path).map_err(failed)?), into)
-        .map_err(|trouble| trouble.of(&path.display().to_string()))
+    collect(File::open(path).map_err(failed)?, into).map_err(|trouble| trouble.of(&path.display().to_string()))
 }
 
-/// Collects the messages of a file; why it ends before its end, if it does.
+/// Collects the messages of a file. Returns why it ends before its end, if it does.
 pub(crate) fn collect(mut file: impl Read, into: &mut Collector<'_>) -> Result<Option<String>, Trouble> {
-    let container = |what: String| Trouble::new(Problem::Container { container: "MCAP file", what });
-    let mut magic = [0; 8];
-    if file.read_exact(&mut magic).is_err() || magic != MCAP_MAGIC {
-        return Err(container("it does not begin as one".to_owned()));
-    }
+    let options = LinearReaderOptions::default()
+        .with_skip_end_magic(true)
+        .with_prevalidate_chunk_crcs(true) // a damaged chunk gives nothing
+        .with_record_length_limit(MOST_BYTES);
+    let mut reader = LinearReader::new_with_options(options);
+    reader.add_decompressor(Lz4::default()).expect("it has a name");
     let mut known = Known::default();
-    loop {
-        let mut head = [0; 9];
-        if let Err(error) = file.read_exact(&mut head) {
-            return Ok(Some(cut(&error)));
-        }
-        let (kind, length) = (head[0], u64::from_le_bytes(head[1..].try_into().unwrap_or_default()));
-        match kind {
-            DATA_END | FOOTER => return Ok(None),
-            SCHEMA | CHANNEL | MESSAGE | CHUNK => {}
-            _ => {
-                // What says nothing here, such as an index or an attachment.
-                match std::io::copy(&mut (&mut file).take(length), &mut std::io::sink()) {
-                    Ok(skipped) if skipped == length => continue,
-                    Ok(_) => return Ok(Some("its end is missing".to_owned())),
-                    Err(error) => return Ok(Some(cut(&error))),
+    while let Some(event) = reader.next_event() {
+        let cut = match event {
+            Ok(LinearReadEvent::ReadRequest(_)) => match file.read(reader.insert(READ_BYTES)) {
+                Ok(read) => {
+                    reader.notify_read(read);
+                    None
                 }
-            }
-        }
-        let mut body = Vec::new();
-        let read = (&mut file).take(length.min(MOST_BYTES)).read_to_end(&mut body);
-        let is_whole = body.len() as u64 == length;
-        if let Err(error) = read {
-            return Ok(Some(cut(&error)));
-        }
-        if length > MOST_BYTES && body.len() as u64 == MOST_BYTES {
-            return Err(container(format!("a record of {length} bytes, at most {MOST_BYTES} are read at once")));
-        }
-        // A chunk that is cut off still has the messages before the cut.
-        let broken = match kind {
-            CHUNK => known.chunk(&body, into)?,
-            _ if is_whole => known.record(kind, &body, into)?,
-            _ => None,
+                Err(error) if error.kind() == ErrorKind::Interrupted => None,
+                Err(error) => Some(format!("it cannot be read on ({error})")),
+            },
+            Ok(LinearReadEvent::Record { opcode: op::DATA_END, .. }) => return Ok(None),
+            Ok(LinearReadEvent::Record { opcode, data }) => known.record(opcode, data, into)?,
+            Err(error) => Some(in_words(error)),
         };
-        if broken.is_some() || !is_whole {
-            return Ok(broken.or_else(|| Some("its end is missing".to_owned())));
+        if cut.is_some() {
+            return Ok(cut);
         }
+    }
+    Ok(Some("its end is missing".to_owned()))
+}
+
+/// Returns why a file is read no further.
+fn in_words(error: McapError) -> String {
+    match error {
+        McapError::UnexpectedEof | McapError::UnexpectedEoc => "its end is missing".to_owned(),
+        McapError::BadChunkCrc { .. } => "a checksum does not fit".to_owned(),
+        McapError::RecordTooLarge { len: length, .. } | McapError::ChunkTooLarge(length) => {
+            format!("a record or chunk is to have {length} bytes, at most {MOST_BYTES} are read at once")
+        }
+        McapError::UnsupportedCompression(other) => {
+            format!("a chunk is packed by {other:?}; read are zstd, lz4 and none")
+        }
+        McapError::DecompressionError(what) => format!("what is packed in it is damaged or not whole ({what})"),
+        other => format!("damaged: {other}"),
     }
 }
 
-fn cut(error: &std::io::Error) -> String {
-    match error.kind() {
-        std::io::ErrorKind::UnexpectedEof => "its end is missing".to_owned(),
-        _ => format!("it cannot be read on ({error})"),
+/// Unpacks chunks that are packed by lz4.
+struct Lz4(FrameDecoder<Cursor<Vec<u8>>>);
+
+impl Default for Lz4 {
+    fn default() -> Self {
+        Self(FrameDecoder::new(Cursor::default()))
+    }
+}
+
+impl Decompressor for Lz4 {
+    fn name(&self) -> &'static str {
+        "lz4"
+    }
+
+    /// Asks for the whole chunk: the decoder cannot go on where its input ended.
+    fn next_read_size(&self) -> usize {
+        usize::MAX
+    }
+
+    fn decompress(&mut self, packed: &[u8], records: &mut [u8]) -> McapResult<DecompressResult> {
+        if !packed.is_empty() {
+            self.0 = FrameDecoder::new(Cursor::new(packed.to_vec()));
+        }
+        let wrote = self.0.read(records).map_err(|error| McapError::DecompressionError(error.to_string()))?;
+        Ok(DecompressResult { consumed: packed.len(), wrote })
+    }
+
+    fn reset(&mut self) -> McapResult<()> {
+        *self = Self::default();
+        Ok(())
     }
 }
 
@@ -98,142 +125,61 @@ fn cut(error: &std::io::Error) -> String {
 #[derive(Default)]
 struct Known {
     /// Name, encoding and text of each schema.
-    schemas: HashMap<u16, (String, String, String)>,
+    schemas: HashMap<u16, [String; 3]>,
     /// Number of the topic of each channel.
     channels: HashMap<u16, usize>,
 }
 
 impl Known {
-    /// The records of a chunk, as far as it goes.
-    fn chunk(&mut self, body: &[u8], into: &mut Collector<'_>) -> Result<Option<String>, Trouble> {
-        let head = || {
-            let mut rest = body.get(24..)?;
-            let _crc: [u8; 4] = take(&mut rest)?;
-            let packing = text(&mut rest)?;
-            let _length: [u8; 8] = take(&mut rest)?;
-            Some((packing, rest))
-        };
-        let Some((packing, packed)) = head() else { return Ok(Some("its end is missing".to_owned())) };
-        let crc = body.get(24..28).and_then(|bytes| bytes.try_into().ok()).map_or(0, u32::from_le_bytes);
-        let (records, broken) = match packing.as_str() {
-            "" => (packed.to_vec(), None),
-            "zstd" => unpacked(Packing::Zstd, packed),
-            "lz4" => unpacked(Packing::Lz4, packed),
-            other => {
-                let what = format!("a chunk is packed by {other:?}; read are zstd, lz4 and none");
-                return Err(Trouble::new(Problem::Container { container: "MCAP file", what }));
-            }
-        };
-        let size = body.get(16..24).and_then(|bytes| bytes.try_into().ok()).map_or(0, u64::from_le_bytes);
-        if broken.is_none() && records.len() as u64 == size && crc != 0 && crc32(&records) != crc {
-            return Ok(Some("a checksum does not fit".to_owned()));
-        }
-        let mut rest = &records[..];
-        while !rest.is_empty() {
-            let record = || {
-                let (kind, behind) = rest.split_first()?;
-                let (length, behind) = behind.split_first_chunk::<8>()?;
-                let (record, behind) = behind.split_at_checked(usize::try_from(u64::from_le_bytes(*length)).ok()?)?;
-                Some((*kind, record, behind))
-            };
-            let Some((kind, record, behind)) = record() else {
-                return Ok(broken.or_else(|| Some("its end is missing".to_owned())));
-            };
-            if let Some(broken) = self.record(kind, record, into)? {
-                return Ok(Some(broken));
-            }
-            rest = behind;
-        }
-        Ok(broken)
-    }
-
-    /// A record outside of or in a chunk; what is wrong with it, if anything.
+    /// Takes a record. Returns what is wrong with it, if anything.
     fn record(&mut self, kind: u8, body: &[u8], into: &mut Collector<'_>) -> Result<Option<String>, Trouble> {
-        let mut rest = body;
         let done = match kind {
-            SCHEMA => self.schema(&mut rest),
-            CHANNEL => self.channel(&mut rest, into),
-            MESSAGE => {
-                let head = || {
-                    let channel = u16::from_le_bytes(take(&mut rest)?);
-                    let _sequence: [u8; 4] = take(&mut rest)?;
-                    let log = u64::from_le_bytes(take(&mut rest)?);
-                    let _published: [u8; 8] = take(&mut rest)?;
-                    Some((channel, log))
-                };
-                let mut head = head;
-                match head() {
-                    None => None,
-                    Some((channel, log)) => {
-                        if let Some(&topic) = self.channels.get(&channel) {
-                            into.bytes(topic, i64::try_from(log).unwrap_or(i64::MAX), rest)?;
-                        }
-                        Some(())
-                    }
+            op::SCHEMA => self.schema(body),
+            op::CHANNEL => self.channel(body, into),
+            op::MESSAGE => {
+                let Ok(Record::Message { header, data }) = mcap::parse_record(kind, body) else { return Ok(damaged()) };
+                if let Some(&topic) = self.channels.get(&header.channel_id) {
+                    into.bytes(topic, i64::try_from(header.log_time).unwrap_or(i64::MAX), &data)?;
                 }
+                Some(())
             }
             _ => Some(()),
         };
-        Ok(done.is_none().then(|| "damaged: a record ends within a value".to_owned()))
+        Ok(if done.is_none() { damaged() } else { None })
     }
 
-    fn schema(&mut self, rest: &mut &[u8]) -> Option<()> {
-        let id = u16::from_le_bytes(take(rest)?);
-        let (name, encoding, definition) = (text(rest)?, text(rest)?, text(rest)?);
-        self.schemas.insert(id, (name, encoding, definition));
+    fn schema(&mut self, mut rest: &[u8]) -> Option<()> {
+        let id = number(&mut rest)?;
+        self.schemas.insert(id, [text(&mut rest)?, text(&mut rest)?, text(&mut rest)?]);
         Some(())
     }
 
-    fn channel(&mut self, rest: &mut &[u8], into: &mut Collector<'_>) -> Option<()> {
-        let id = u16::from_le_bytes(take(rest)?);
-        let schema = u16::from_le_bytes(take(rest)?);
-        let (topic, encoding) = (text(rest)?, text(rest)?);
-        let (message, how, definition) =
-            self.schemas.get(&schema).map_or(("", "", ""), |(name, how, text)| (name, how, text));
+    fn channel(&mut self, mut rest: &[u8], into: &mut Collector<'_>) -> Option<()> {
+        let (id, schema) = (number(&mut rest)?, number(&mut rest)?);
+        let (topic, encoding) = (text(&mut rest)?, text(&mut rest)?);
+        let [message, how, definition] =
+            self.schemas.get(&schema).map_or([""; 3], |s| s.each_ref().map(String::as_str));
         let definition = Some(definition).filter(|_| how == "ros2msg" || how == "ros1msg");
         self.channels.insert(id, into.topic(&topic, message, &encoding, definition));
         Some(())
     }
 }
 
-fn take<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
-    let (bytes, behind) = rest.split_first_chunk::<N>()?;
-    *rest = behind;
-    Some(*bytes)
+fn damaged() -> Option<String> {
+    Some("damaged: a record ends within a value".to_owned())
 }
 
+fn number(rest: &mut &[u8]) -> Option<u16> {
+    let (bytes, behind) = rest.split_first_chunk()?;
+    *rest = behind;
+    Some(u16::from_le_bytes(*bytes))
+}
+
+/// Takes a text off a record. The library's own parser takes memory for its length before it looks
+/// whether it is there.
 fn text(rest: &mut &[u8]) -> Option<String> {
-    let length = u32::from_le_bytes(take(rest)?) as usize;
-    let (bytes, behind) = rest.split_at_checked(length)?;
+    let (length, behind) = rest.split_first_chunk()?;
+    let (bytes, behind) = behind.split_at_checked(u32::from_le_bytes(*length) as usize)?;
     *rest = behind;
     Some(String::from_utf8_lossy(bytes).into_owned())
-}
-
-/// The checksum of chunks (CRC-32 of IEEE 802.3), eight bits at a time.
-fn crc32(bytes: &[u8]) -> u32 {
-    const TABLE: [u32; 256] = {
-        let mut table = [0; 256];
-        let mut i = 0;
-        while i < 256 {
-            let (mut value, mut bit) = (i as u32, 0);
-            while bit < 8 {
-                value = if value & 1 == 1 { 0xEDB8_8320 ^ (value >> 1) } else { value >> 1 };
-                bit += 1;
-            }
-            table[i] = value;
-            i += 1;
-        }
-        table
-    };
-    !bytes.iter().fold(!0, |crc, &byte| TABLE[((crc ^ u32::from(byte)) & 0xFF) as usize] ^ (crc >> 8))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_checksum_of_the_nine_digits_is_the_one_of_the_standard() {
-        assert_eq!(crc32(b"123456789"), 0xCBF4_3926);
-    }
 }

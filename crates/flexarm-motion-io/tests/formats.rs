@@ -569,6 +569,37 @@ fn what_is_wrong_with_a_bag_is_told() {
     assert!(found.starts_with("cannot read motion "), "{found}");
 }
 
+/// Sizes that nobody has: nothing is taken for them, and what is wrong is told.
+#[test]
+fn sizes_that_a_bag_makes_up_are_refused() {
+    let place = std::env::temp_dir().join(format!("flexarm-motion-sizes-{}", std::process::id()));
+    std::fs::create_dir_all(&place).unwrap();
+    let record = |kind: u8, length: u64, body: &[u8]| [&[kind][..], &length.to_le_bytes(), body].concat();
+    let chunk = |packing: &str, size: u64, packed: &[u8]| {
+        let name = [&(packing.len() as u32).to_le_bytes(), packing.as_bytes()].concat();
+        let sizes = [&size.to_le_bytes()[..], &1_u32.to_le_bytes()].concat();
+        let body = [&[0; 16][..], &sizes, &name, &(packed.len() as u64).to_le_bytes(), packed].concat();
+        record(6, body.len() as u64, &body)
+    };
+    let long_text = [&[1, 0][..], &u32::MAX.to_le_bytes(), b"pkg"].concat();
+    let cases = [
+        (record(5, 1 << 50, b"bytes"), "to have 1125899906842624 bytes, at most 268435456 are read at once"),
+        (record(5, 200 << 20, b"bytes"), "its end is missing"),
+        (record(3, long_text.len() as u64, &long_text), "a record ends within a value"),
+        (chunk("zstd", 1 << 40, b"bytes"), "to have 1099511627776 bytes, at most 268435456 are read at once"),
+        (chunk("lz4", 1 << 20, b"bytes"), "what is packed in it is damaged or not whole"),
+        (chunk("zstd", 1 << 20, b"bytes"), "what is packed in it is damaged or not whole"),
+        (chunk("brotli", 1 << 20, b"bytes"), "a chunk is packed by \"brotli\"; read are zstd, lz4 and none"),
+    ];
+    for (bytes, expected) in cases {
+        let path = place.join("made_up.mcap");
+        std::fs::write(&path, [b"\x89MCAP0\r\n", &bytes[..]].concat()).unwrap();
+        let found = refusal(read_mcap(&path, &ROBOT));
+        assert!(found.contains(expected) && found.contains("no motion before"), "{expected}: {found}");
+    }
+    std::fs::remove_dir_all(&place).unwrap();
+}
+
 #[test]
 fn bytes_changed_anywhere_in_a_bag_end_in_a_motion_or_an_error() {
     let place = std::env::temp_dir().join(format!("flexarm-motion-bytes-{}", std::process::id()));

@@ -37,13 +37,6 @@ impl Cdr {
         self
     }
 
-    /// Any bytes instead of a message.
-    #[cfg(test)]
-    pub(crate) fn raw(&mut self, bytes: &[u8]) {
-        self.bytes.clear();
-        self.bytes.extend_from_slice(bytes);
-    }
-
     /// `bool`, `byte` and `uint8`.
     pub(crate) fn u8(&mut self, value: u8) -> &mut Self {
         self.bytes.push(value);

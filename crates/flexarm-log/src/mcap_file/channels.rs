@@ -5,6 +5,7 @@
 //! plot.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::io;
 
 use super::definitions::schema_text;
 use super::frames::is_magnified;
@@ -63,7 +64,7 @@ pub(crate) struct ElasticChannels {
 
 impl Channels {
     /// Adds all topics of a run to the file.
-    pub(crate) fn add(output: &mut Output, header: &RunHeader) -> Self {
+    pub(crate) fn add(output: &mut Output, header: &RunHeader) -> io::Result<Self> {
         let mut add = |topic: &str, kind: &str, note: &str| add_channel(output, topic, kind, note);
         const ARRAY: &str = "std_msgs/Float64MultiArray";
         const JOINTS: &str = "sensor_msgs/JointState";
@@ -73,30 +74,30 @@ impl Channels {
 
         let robot_description = match header.urdf.is_empty() {
             true => None,
-            false => Some(add("/robot_description", "std_msgs/String", "URDF as read")),
+            false => Some(add("/robot_description", "std_msgs/String", "URDF as read")?),
         };
         let trees = "flexible robot with stations along its bent links; rigid twin below rigid/; magnified arm below magnified/";
-        let tf = add("/tf", "tf2_msgs/TFMessage", trees);
-        let tf_static = add("/tf_static", "tf2_msgs/TFMessage", "base and fixed links, once");
-        let joint_states = add("/joint_states", JOINTS, "flexible robot; effort is what the drives must supply");
-        let tcp_flexible = add("/tcp/flexible", POSE, "tool centre point of the flexible robot");
+        let tf = add("/tf", "tf2_msgs/TFMessage", trees)?;
+        let tf_static = add("/tf_static", "tf2_msgs/TFMessage", "base and fixed links, once")?;
+        let joint_states = add("/joint_states", JOINTS, "flexible robot; effort is what the drives must supply")?;
+        let tcp_flexible = add("/tcp/flexible", POSE, "tool centre point of the flexible robot")?;
         let rigid = match header.has_rigid {
             false => None,
             true => Some(RigidChannels {
-                joint_states: add("/rigid/joint_states", JOINTS, "rigid twin; effort is what the drives must supply"),
-                tcp: add("/tcp/rigid", POSE, "tool centre point of the rigid twin"),
+                joint_states: add("/rigid/joint_states", JOINTS, "rigid twin; effort is what the drives must supply")?,
+                tcp: add("/tcp/rigid", POSE, "tool centre point of the rigid twin")?,
                 error: add(
                     "/tcp/error",
                     TWIST,
                     "not a velocity: TCP error, flexible minus rigid, world axes; linear = translation [m], angular = rotation vector [rad]",
-                ),
-                error_plot: add("/deviation/tcp", ARRAY, "translation of /tcp/error, for plotting"),
+                )?,
+                error_plot: add("/deviation/tcp", ARRAY, "translation of /tcp/error, for plotting")?,
                 error_path: add(
                     "/tcp/error_path",
                     TWIST,
                     "not a velocity: TCP error, flexible minus rigid, along tangent, normal and binormal of the rigid path; linear = translation [m], angular = rotation vector [rad]",
-                ),
-                error_path_plot: add("/deviation/tcp_path", ARRAY, "translation of /tcp/error_path, for plotting"),
+                )?,
+                error_path_plot: add("/deviation/tcp_path", ARRAY, "translation of /tcp/error_path, for plotting")?,
             }),
         };
         let mut elastic = Vec::new();
@@ -106,44 +107,42 @@ impl Channels {
             );
             let deflection = format!("not a velocity: deflection of {element}, axes of the proximal face [m, rad]");
             elastic.push(ElasticChannels {
-                load: add(&format!("/elastic/{name}"), "geometry_msgs/WrenchStamped", &load),
-                deflection: add(&format!("/elastic/{name}/deflection"), TWIST, &deflection),
+                load: add(&format!("/elastic/{name}"), "geometry_msgs/WrenchStamped", &load)?,
+                deflection: add(&format!("/elastic/{name}/deflection"), TWIST, &deflection)?,
             });
         }
         let mut add_if = |wanted: bool, topic: &str, kind: &str, note: &str| match wanted {
-            true => Some(add(topic, kind, note)),
-            false => None,
+            true => add(topic, kind, note).map(Some),
+            false => Ok(None),
         };
-        let some = |channel: Option<u16>| channel.expect("was wanted");
         let elastic_joint_states = add_if(
             !header.elements.is_empty(),
             "/elastic/joint_states",
             JOINTS,
             "all elastic elements by name: position = deflection [m, rad], effort = load on the distal part [N, N m], axes of \
              the proximal face",
-        );
+        )?;
         let what = "static part of /tcp/error: the TCP error if the arm stood still where it is, world axes [m]";
-        let static_error = add_if(header.has_rigid && header.has_static, "/tcp/static_error", ARRAY, what);
+        let static_error = add_if(header.has_rigid && header.has_static, "/tcp/static_error", ARRAY, what)?;
         let contributions = add_if(
             !header.contributors.is_empty(),
             "/tcp/contributions",
             ARRAY,
             "displacement of the TCP that each flexible link or drive causes alone, world axes [m]",
-        );
-        let solver = some(add_if(true, "/solver", ARRAY, "stepper"));
-        let energy = some(add_if(true, "/energy", ARRAY, "energies of the flexible robot [J]"));
-        let what = "what happened when; name = kind; written at the end of the run, with the times of the events";
-        let events = some(add_if(true, "/events", "rcl_interfaces/Log", what));
+        )?;
         let what = "surfaces of the links in their frames: flexible as in the URDF, rigid twin as a ghost, magnified arm in blue";
-        let surfaces = add_if(!header.meshes.is_empty(), "/markers", MARKERS, what);
-        let what = "paths of the tool so far, each second";
-        let paths = some(add_if(true, "/markers/path", MARKERS, what));
+        let surfaces = add_if(!header.meshes.is_empty(), "/markers", MARKERS, what)?;
         let factor = header.magnification;
         let what = format!("TCP error from the rigid tool on, drawn {factor} times");
-        let error = add_if(is_magnified(header), "/markers/error", MARKERS, &what);
+        let error = add_if(is_magnified(header), "/markers/error", MARKERS, &what)?;
+        let solver = add("/solver", ARRAY, "stepper")?;
+        let energy = add("/energy", ARRAY, "energies of the flexible robot [J]")?;
+        let what = "what happened when; name = kind; written at the end of the run, with the times of the events";
+        let events = add("/events", "rcl_interfaces/Log", what)?;
+        let paths = add("/markers/path", MARKERS, "paths of the tool so far, each second")?;
         let markers = MarkerChannels { surfaces, paths, error };
 
-        Self {
+        Ok(Self {
             robot_description,
             tf,
             tf_static,
@@ -158,11 +157,11 @@ impl Channels {
             energy,
             events,
             markers,
-        }
+        })
     }
 }
 
-fn add_channel(output: &mut Output, topic: &str, kind: &str, note: &str) -> u16 {
+fn add_channel(output: &mut Output, topic: &str, kind: &str, note: &str) -> io::Result<u16> {
     // ROS 2 names a type package/msg/Type in the file and package/Type inside definitions.
     let name = kind.replacen('/', "/msg/", 1);
     let latched = ["/robot_description", "/tf_static", "/markers", "/markers/path"].contains(&topic);

@@ -1,27 +1,24 @@
 //! A run as an MCAP file of ROS 2 messages, for Foxglove, PlotJuggler, Rerun and ROS itself.
 //!
-//! Profile `ros2`: CDR messages, their definitions embedded, `offered_qos_profiles` on every channel. Chunks of
-//! at most 1 MiB (2 in a long file), compressed with zstd, are closed where the data says so; between two chunks the open one is
-//! in the file as a provisional chunk with a provisional index ([`index`], [`crate::tail_file`]), so that what a
-//! killed run leaves is a whole MCAP file.
+//! Profile `ros2`: CDR messages, their definitions embedded, `offered_qos_profiles` on every
+//! channel. Chunks of whole samples, about 1 MiB or half a simulated second, compressed with zstd,
+//! are in the file once they are closed: up to there readers that need no index read what a killed
+//! run leaves. The `mcap` crate writes them ([`output`]).
 //!
 //! Start at [`McapRecorder`]; topics are in [`channels`], messages in [`messages`] and [`cdr`], coordinate frames in
-//! [`frames`], what viewers draw in [`markers`], chunks in [`output`].
+//! [`frames`], what viewers draw in [`markers`].
 
 mod beat;
 mod bent;
 mod cdr;
 pub(crate) mod channels;
-mod chunk;
 mod definitions;
 mod frames;
-mod index;
 pub(crate) mod layouts;
 mod markers;
 mod mesh_files;
 mod messages;
 mod output;
-mod records;
 
 use std::fs::File;
 use std::io;
@@ -34,7 +31,6 @@ use self::markers::{MovingMarkers, SurfaceFrames};
 use self::mesh_files::mesh_files;
 use self::messages::{JointNames, Level, Stamp};
 use self::output::Output;
-use crate::create::FlushClock;
 use crate::file_recorder::{FileRecorder, OpenFile};
 use crate::shape::Shape;
 use crate::{CreateOptions, EventKind, LogError, RunHeader, RunResult, START_NS, Sample, TwinSample};
@@ -94,7 +90,7 @@ impl OpenFile for McapFile {
         let meshes = mesh_files(header)?;
         let file = options.create(path)?;
         let error = LogError::io(path, "write the description of the run");
-        let mut open = Self::new(file, header, start, options.flush_clock(path)).map_err(error)?;
+        let mut open = Self::new(file, header, start).map_err(error)?;
         let error = LogError::io(path, "write the description of the run");
         open.describe(header, &meshes).map_err(error)?;
         Ok(open)
@@ -104,9 +100,8 @@ impl OpenFile for McapFile {
         let stamp = stamp(path, self.start.0, sample.time_s)?;
         self.shape.check(path, sample)?;
         self.sample(stamp, sample).map_err(LogError::io(path, "write a sample"))?;
-        if self.flush.due() || self.output.is_full() {
+        if self.output.is_full(stamp) {
             self.output.flush().map_err(LogError::io(path, "write samples"))?;
-            self.flush.done();
         }
         Ok(())
     }
@@ -135,7 +130,6 @@ pub struct McapFile {
     deflections: JointNames,
     /// Label of the contributions.
     contributions: String,
-    flush: FlushClock,
     start: Stamp,
     last: Stamp,
     samples: u32,
@@ -151,9 +145,9 @@ pub struct McapFile {
 }
 
 impl McapFile {
-    fn new(file: File, header: &RunHeader, start: Stamp, flush: FlushClock) -> io::Result<Self> {
+    fn new(file: File, header: &RunHeader, start: Stamp) -> io::Result<Self> {
         let mut output = Output::new(file)?;
-        let channels = Channels::add(&mut output, header);
+        let channels = Channels::add(&mut output, header)?;
         let parts = |names: &[String], parts: &[&str], joint: &str| -> Vec<String> {
             names.iter().flat_map(|name| parts.iter().map(move |part| format!("{name}{joint}{part}"))).collect()
         };
@@ -167,7 +161,6 @@ impl McapFile {
             elements: header.elements.clone(),
             deflections: JointNames::new(&parts(&header.elements, &["x", "y", "z", "rx", "ry", "rz"], "/")),
             contributions: parts(&header.contributors, &["x [m]", "y [m]", "z [m]"], " ").join(","),
-            flush,
             start,
             last: start,
             samples: 0,
@@ -191,7 +184,6 @@ impl McapFile {
             let surfaces = markers::surfaces(header, &frames);
             output.send(channel, 0, start, |cdr| messages::markers(cdr, start, &surfaces))?;
         }
-        output.close_chunk()?;
 
         let recording = [
             ("robot", header.robot.clone()),
@@ -351,7 +343,7 @@ impl McapFile {
         self.last_frames()?;
         self.paths()?;
         // In a chunk of their own: their times span the run, those of the chunk before need not.
-        self.output.close_chunk()?;
+        self.output.flush()?;
         for ((event, stamp), sequence) in result.events.iter().zip(event_times).zip(0..) {
             let level = match event.kind {
                 EventKind::Stopped => Level::Error,
