@@ -205,7 +205,7 @@ fn a_sid_and_an_exudyn_model_are_beams_too() {
     if let Some(path) = sample("formats/exudyn_femInterface_beam.hdf5.gz") {
         let path = path.to_str().unwrap();
         if cfg!(not(feature = "hdf5")) {
-            place.refused(&["import", path, "--units", "m-kg-s"], &["--features hdf5"]);
+            place.refused(&["import", path, "--units", "m-kg-s"], &["feature hdf5"]);
             return;
         }
         place.refused(&["import", path, "--units", "m-kg-s"], &["set:NAME", "plane("]);

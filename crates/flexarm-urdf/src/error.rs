@@ -142,6 +142,9 @@ pub enum Problem {
     /// More links or joints than any robot has.
     #[error("the robot has {found} links and joints, at most {most} are read")]
     TooManyElements { found: usize, most: usize },
+    /// A robot that `urdf_rs` refuses, though no fault was found.
+    #[error("urdf-rs does not read this robot: {reason}")]
+    NotRead { reason: String },
     /// A robot without any link.
     #[error("the robot {robot:?} has no <link>{}", macros_text(idle_macros))]
     NoLink { robot: String, idle_macros: Vec<String> },
@@ -230,6 +233,7 @@ impl Problem {
             Self::NotUtf8 { .. } => "not-utf8",
             Self::Malformed { .. } => "malformed-xml",
             Self::NotUrdf { .. } => "not-urdf",
+            Self::NotRead { .. } => "not-read",
             Self::NoLink { .. } => "no-link",
             Self::TooManyElements { .. } => "too-many-elements",
             Self::MissingElement { .. } => "missing-element",
@@ -269,6 +273,7 @@ impl Problem {
                 "COLLADA" => "this is a mesh; give the URDF that refers to it".into(),
                 _ => "give a URDF file".into(),
             },
+            Self::NotRead { .. } => "please report it with the file; do names hold unusual characters?".into(),
             Self::NoLink { idle_macros, .. } if !idle_macros.is_empty() => {
                 let calls = idle_macros.iter().take(3).map(|name| format!("<xacro:{name} .../>"));
                 let calls = calls.collect::<Vec<_>>().join(", ");

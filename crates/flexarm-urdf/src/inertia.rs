@@ -183,7 +183,7 @@ fn check_body(
     options: &ReadOptions,
     report: &mut Report,
 ) -> Option<(Place, Problem)> {
-    let joint = body.moved_by.map(|j| robot.joints[j].name.clone())?;
+    let joint = body.moved_by.map(|j| robot.joints[j].urdf.name.clone())?;
     let root = &robot.links[body.root];
     let link = root.name.clone();
     let lumped = || body.members[1..].iter().map(|&(i, _)| robot.links[i].name.clone()).collect();
@@ -349,7 +349,8 @@ const ROD: f64 = 0.2;
 
 /// A link as a rod from its frame to its farthest joint, of the mass 1 kg/m; `None` for a link without length.
 fn rod(robot: &RawRobot, link: usize) -> Option<SpatialInertia> {
-    let ends = robot.joints.iter().filter(|j| j.parent == robot.links[link].name).map(|j| j.X_PJ.translation.vector);
+    let ends =
+        robot.joints.iter().filter(|j| j.urdf.parent.link == robot.links[link].name).map(|j| j.X_PJ.translation.vector);
     let end = ends.max_by(|a, b| a.norm().total_cmp(&b.norm())).filter(|end| end.norm() > 1e-3)?;
     let (length, along) = (end.norm(), end.normalize());
     let (across, about) = (length.powi(3) / 12.0 * (1.0 + 0.75 * ROD * ROD), length.powi(3) * ROD * ROD / 8.0);

@@ -4,9 +4,11 @@ use std::collections::HashMap;
 
 use flexarm_kinematics::{Joint, JointKind, Limits, Mimic, Pose};
 use nalgebra::{Rotation3, Translation3, Unit, Vector3};
+use urdf_rs::JointType;
 
 use crate::error::Problem;
-use crate::raw::{RawJoint, RawKind, RawLimit, RawRobot};
+use crate::finding::Place;
+use crate::raw::{RawJoint, RawRobot};
 use crate::report::Report;
 use crate::spelling::closest;
 
@@ -16,33 +18,32 @@ const UNIT_TOLERANCE: f64 = 1e-4;
 /// Takes `<mimic>` from joints that cannot move, and fixes joints that follow one which cannot: their value is constant.
 pub(crate) fn fix_still_followers(robot: &mut RawRobot, report: &mut Report) {
     let mut still: HashMap<String, f64> =
-        robot.joints.iter().filter(|j| j.kind == RawKind::Fixed).map(|j| (j.name.clone(), 0.0)).collect();
-    for joint in robot.joints.iter_mut().filter(|j| j.kind == RawKind::Fixed) {
-        if let Some(mimic) = joint.mimic.take() {
-            let message = format!("joint {:?} is fixed: its <mimic> is ignored", joint.name);
-            report.warning(&mimic.place, "mimic-fixed", message, "remove <mimic>, or let the joint move");
+        robot.joints.iter().filter(|j| j.is_fixed()).map(|j| (j.urdf.name.clone(), 0.0)).collect();
+    for joint in robot.joints.iter_mut().filter(|j| j.is_fixed()) {
+        if joint.urdf.mimic.take().is_some() {
+            let message = format!("joint {:?} is fixed: its <mimic> is ignored", joint.urdf.name);
+            report.warning(&joint.mimic, "mimic-fixed", message, "remove <mimic>, or let the joint move");
         }
     }
     // each round fixes the followers of what the round before has fixed
     loop {
-        let follows = |j: &&mut RawJoint| j.mimic.as_ref().is_some_and(|m| still.contains_key(&m.joint));
+        let follows = |j: &&mut RawJoint| j.urdf.mimic.as_ref().is_some_and(|m| still.contains_key(&m.joint));
         let Some(joint) = robot.joints.iter_mut().find(follows) else { return };
-        let Some(mimic) = joint.mimic.take() else { return };
+        let Some(mimic) = joint.urdf.mimic.take().map(follower) else { return };
         let value = mimic.ratio * still.get(&mimic.joint).copied().unwrap_or(0.0) + mimic.offset;
-        let axis = joint.axis.as_ref().map_or(Vector3::x(), |(axis, _)| *axis);
-        if let Some(axis) = Unit::try_new(axis, 1e-12) {
-            joint.X_PJ *= match joint.kind {
-                RawKind::Prismatic => {
+        if let Some(axis) = Unit::try_new(Vector3::from(*joint.urdf.axis.xyz), 1e-12) {
+            joint.X_PJ *= match joint.urdf.joint_type {
+                JointType::Prismatic => {
                     Pose::from_parts(Translation3::from(axis.into_inner() * value), Rotation3::identity())
                 }
                 _ => Pose::from_parts(Translation3::identity(), Rotation3::from_axis_angle(&axis, value)),
             };
         }
         let message =
-            format!("joint {:?} follows {:?}, which is fixed: it is fixed at {value}", joint.name, mimic.joint);
-        report.warning(&mimic.place, "mimic-fixed", message, "remove <mimic>, or let the leader move");
-        joint.kind = RawKind::Fixed;
-        still.insert(joint.name.clone(), value);
+            format!("joint {:?} follows {:?}, which is fixed: it is fixed at {value}", joint.urdf.name, mimic.joint);
+        report.warning(&joint.mimic, "mimic-fixed", message, "remove <mimic>, or let the leader move");
+        joint.urdf.joint_type = JointType::Fixed;
+        still.insert(joint.urdf.name.clone(), value);
     }
 }
 
@@ -51,42 +52,53 @@ pub(crate) fn convert_joints(robot: &RawRobot, report: &mut Report) -> Vec<Joint
     let faults = report.issues.len();
     check_mimics(robot, report);
     let sound_mimics = report.issues.len() == faults;
-    let mut joints: Vec<Joint> = robot.joints.iter().map(|joint| convert(joint, robot.open_limits, report)).collect();
+    let mut joints: Vec<Joint> = robot.joints.iter().map(|joint| convert(joint, report)).collect();
     if sound_mimics {
         join_mimic_chains(&mut joints);
     }
     joints
 }
 
-fn convert(raw: &RawJoint, open_limits: bool, report: &mut Report) -> Joint {
-    let mut joint = Joint::new(&raw.name, JointKind::Fixed, &raw.parent, &raw.child, raw.X_PJ);
-    match raw.kind {
-        RawKind::Fixed | RawKind::Other => return joint,
-        RawKind::Revolute => joint.kind = JointKind::Revolute(axis(raw, report)),
-        RawKind::Continuous => joint.kind = JointKind::Continuous(axis(raw, report)),
-        RawKind::Prismatic => joint.kind = JointKind::Prismatic(axis(raw, report)),
-    }
-    joint.limits = match &raw.limit {
-        Some(limit) => limits(raw, limit, open_limits, report),
-        None if raw.kind == RawKind::Continuous => Limits::NONE,
-        None => {
-            let problem = Problem::MissingLimit { joint: raw.name.clone(), kind: raw.kind.name() };
-            report.error(&raw.place, problem);
-            Limits::NONE
+fn convert(raw: &RawJoint, report: &mut Report) -> Joint {
+    let urdf = &raw.urdf;
+    let mut joint = Joint::new(&urdf.name, JointKind::Fixed, &urdf.parent.link, &urdf.child.link, raw.X_PJ);
+    let kind = match urdf.joint_type {
+        JointType::Revolute => {
+            joint.kind = JointKind::Revolute(axis(raw, report));
+            "revolute"
         }
+        JointType::Prismatic => {
+            joint.kind = JointKind::Prismatic(axis(raw, report));
+            "prismatic"
+        }
+        JointType::Continuous => {
+            joint.kind = JointKind::Continuous(axis(raw, report));
+            "continuous"
+        }
+        // The lint reports the other types.
+        _ => return joint,
     };
-    joint.mimic = raw.mimic.as_ref().map(|m| Mimic { joint: m.joint.clone(), ratio: m.ratio, offset: m.offset });
+    match &raw.limit {
+        Some(place) => joint.limits = limits(raw, place, report),
+        None if kind == "continuous" => {}
+        None => report.error(&raw.place, Problem::MissingLimit { joint: urdf.name.clone(), kind }),
+    }
+    joint.mimic = urdf.mimic.clone().map(follower);
     joint
 }
 
+fn follower(urdf: urdf_rs::Mimic) -> Mimic {
+    Mimic { joint: urdf.joint, ratio: urdf.multiplier.unwrap_or(1.0), offset: urdf.offset.unwrap_or(0.0) }
+}
+
 fn axis(raw: &RawJoint, report: &mut Report) -> Unit<Vector3<f64>> {
-    let name = &raw.name;
-    let Some((axis, place)) = &raw.axis else {
+    let name = &raw.urdf.name;
+    let Some(place) = &raw.axis else {
         let message = format!("joint {name:?} has no <axis>; by URDF's rule that is x");
         report.note(&raw.place, "default-axis", message, "write the axis");
         return Vector3::x_axis();
     };
-    let Some((unit, norm)) = Unit::try_new_and_get(*axis, 1e-12) else {
+    let Some((unit, norm)) = Unit::try_new_and_get(Vector3::from(*raw.urdf.axis.xyz), 1e-12) else {
         if !raw.faulty {
             report.error(place, Problem::ZeroAxis { joint: name.clone() });
         }
@@ -99,29 +111,27 @@ fn axis(raw: &RawJoint, report: &mut Report) -> Unit<Vector3<f64>> {
     unit
 }
 
-fn limits(raw: &RawJoint, limit: &RawLimit, open_limits: bool, report: &mut Report) -> Limits {
-    let name = &raw.name;
+fn limits(raw: &RawJoint, place: &Place, report: &mut Report) -> Limits {
+    let (name, limit) = (&raw.urdf.name, &raw.urdf.limit);
     let mut limits = Limits::NONE;
-    if raw.kind != RawKind::Continuous {
-        let (low, high) = if open_limits { (f64::NEG_INFINITY, f64::INFINITY) } else { (0.0, 0.0) };
-        limits.lower = limit.lower.unwrap_or(low);
-        limits.upper = limit.upper.unwrap_or(high);
+    if raw.urdf.joint_type != JointType::Continuous {
+        limits.lower = limit.lower;
+        limits.upper = limit.upper;
         if limits.lower > limits.upper {
             let (joint, lower, upper) = (name.clone(), limits.lower, limits.upper);
-            report.error(&limit.place, Problem::LimitsReversed { joint, lower, upper });
+            report.error(place, Problem::LimitsReversed { joint, lower, upper });
         } else if limits.lower == limits.upper && !raw.faulty {
             let message = format!("joint {name:?} cannot move: both limits are {}", limits.lower);
-            report.warning(&limit.place, "no-range", message, "give lower and upper, or make the joint fixed");
+            report.warning(place, "no-range", message, "give lower and upper, or make the joint fixed");
         }
     }
-    let mut magnitude = |attribute: &'static str, code: &'static str, value: Option<f64>| {
-        let value = value.unwrap_or(0.0);
+    let mut magnitude = |attribute: &'static str, code: &'static str, value: f64| {
         if value < 0.0 {
             let joint = name.clone();
-            report.error(&limit.place, Problem::NegativeLimit { joint, attribute, value });
+            report.error(place, Problem::NegativeLimit { joint, attribute, value });
         } else if value == 0.0 {
             let message = format!("joint {name:?}: the {attribute} limit is 0, which is taken for unknown (no limit)");
-            report.note(&limit.place, code, message, "write the limit if it is known");
+            report.note(place, code, message, "write the limit if it is known");
         }
         if value > 0.0 { value } else { f64::INFINITY }
     };
@@ -147,35 +157,36 @@ fn join_mimic_chains(joints: &mut [Joint]) {
 
 /// Followers need a leader that exists and moves; a circle of followers has none.
 fn check_mimics(robot: &RawRobot, report: &mut Report) {
-    let joints: HashMap<&str, &RawJoint> = robot.joints.iter().map(|j| (j.name.as_str(), j)).collect();
+    let joints: HashMap<&str, &RawJoint> = robot.joints.iter().map(|j| (j.urdf.name.as_str(), j)).collect();
     let mut in_reported_circle: Vec<&str> = Vec::new();
     for joint in &robot.joints {
-        let Some(mimic) = &joint.mimic else { continue };
+        // an empty name was already reported as a missing attribute
+        let Some(mimic) = joint.urdf.mimic.as_ref().filter(|m| !m.joint.is_empty()) else { continue };
         let Some(leader) = joints.get(mimic.joint.as_str()) else {
             let problem = Problem::UnknownMimic {
-                joint: joint.name.clone(),
+                joint: joint.urdf.name.clone(),
                 leader: mimic.joint.clone(),
-                closest: closest(&mimic.joint, robot.joints.iter().map(|j| j.name.as_str())),
+                closest: closest(&mimic.joint, robot.joints.iter().map(|j| j.urdf.name.as_str())),
             };
-            report.error(&mimic.place, problem);
+            report.error(&joint.mimic, problem);
             continue;
         };
-        if in_reported_circle.contains(&joint.name.as_str()) {
+        if in_reported_circle.contains(&joint.urdf.name.as_str()) {
             continue;
         }
-        let mut circle = vec![joint.name.as_str()];
+        let mut circle = vec![joint.urdf.name.as_str()];
         let mut at = *leader;
-        while let Some(next) = &at.mimic {
-            if let Some(start) = circle.iter().position(|n| *n == at.name) {
+        while let Some(next) = &at.urdf.mimic {
+            if let Some(start) = circle.iter().position(|n| *n == at.urdf.name) {
                 // a follower of the circle that is not in it is no second fault
                 if start == 0 {
                     let joints = circle.iter().map(|n| (*n).to_owned()).collect();
-                    report.error(&mimic.place, Problem::MimicCycle { joints });
+                    report.error(&joint.mimic, Problem::MimicCycle { joints });
                     in_reported_circle.extend(&circle);
                 }
                 break;
             }
-            circle.push(&at.name);
+            circle.push(&at.urdf.name);
             let Some(leader) = joints.get(next.joint.as_str()) else { break };
             at = leader;
         }

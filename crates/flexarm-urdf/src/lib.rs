@@ -46,18 +46,17 @@
 #![allow(non_snake_case, reason = "monogram notation: X_PJ, R_LI, T_VG")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test stops at what it did not expect"))]
 
-mod document;
 mod error;
 mod finding;
 mod geometry;
 mod inertia;
 mod joints;
+mod lint;
 pub mod mesh;
 mod raw;
 mod read;
 mod report;
 mod resolve;
-mod second_reader;
 mod shapes;
 mod spelling;
 mod tcp;

@@ -1,23 +1,30 @@
-//! A URDF as written: elements with their places, nothing concluded yet.
+//! Turns the values of `urdf_rs` into frames and matrices, and joins them with the marks of the
+//! lint. Start at [`read_robot`].
+//!
+//! Not here: conclusions from the values ([`crate::joints`], [`crate::inertia`], [`crate::shapes`]).
 
 use std::collections::HashMap;
 
 use flexarm_kinematics::Pose;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Rotation3, Translation3};
+use roxmltree::Node;
+use urdf_rs::JointType;
 
+use crate::error::Problem;
 use crate::finding::Place;
+use crate::lint::{JointMarks, Mark, Plain, lint};
+use crate::read::Transmission;
+use crate::report::Report;
+use crate::xml::Lines;
 
-/// A URDF as written.
 pub(crate) struct RawRobot {
     pub(crate) name: String,
     pub(crate) place: Place,
-    /// Limits that are not written are infinite (URDF 1.2 and later), not zero.
-    pub(crate) open_limits: bool,
     /// Macros of a file that calls none of them.
     pub(crate) idle_macros: Vec<String>,
     pub(crate) links: Vec<RawLink>,
     pub(crate) joints: Vec<RawJoint>,
-    pub(crate) transmissions: Vec<RawTransmission>,
+    pub(crate) transmissions: Vec<Transmission>,
     /// Colours by material name.
     pub(crate) materials: HashMap<String, [f32; 4]>,
 }
@@ -43,76 +50,104 @@ pub(crate) struct RawInertial {
 
 pub(crate) struct RawVisual {
     pub(crate) place: Place,
-    pub(crate) name: Option<String>,
     pub(crate) X_LV: Pose,
-    pub(crate) geometry: RawGeometry,
-    pub(crate) material: Option<String>,
-    pub(crate) color: Option<[f32; 4]>,
-}
-
-pub(crate) enum RawGeometry {
-    Mesh { uri: String, scale: Vector3<f64> },
-    Box { size: Vector3<f64> },
-    Cylinder { radius: f64, length: f64 },
-    Sphere { radius: f64 },
+    /// A collision is one without material.
+    pub(crate) urdf: urdf_rs::Visual,
 }
 
 pub(crate) struct RawJoint {
-    pub(crate) name: String,
-    pub(crate) place: Place,
-    pub(crate) kind: RawKind,
-    pub(crate) parent: String,
-    pub(crate) child: String,
+    pub(crate) urdf: urdf_rs::Joint,
     pub(crate) X_PJ: Pose,
-    pub(crate) axis: Option<(Vector3<f64>, Place)>,
-    pub(crate) limit: Option<RawLimit>,
-    pub(crate) mimic: Option<RawMimic>,
-    pub(crate) damping: f64,
-    pub(crate) friction: f64,
+    pub(crate) place: Place,
+    /// Place of `<axis>`; `None` where it is missing and `urdf` has the default.
+    pub(crate) axis: Option<Place>,
+    /// Place of `<limit>`; `None` where it is missing and `urdf` has zeros.
+    pub(crate) limit: Option<Place>,
+    /// Place of `<mimic>`, or of the joint if there is none.
+    pub(crate) mimic: Place,
     /// Some part could not be read: no further checks.
     pub(crate) faulty: bool,
 }
 
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) enum RawKind {
-    Fixed,
-    Revolute,
-    Continuous,
-    Prismatic,
-    /// Not known or not supported, and reported.
-    Other,
+impl RawJoint {
+    pub(crate) fn is_fixed(&self) -> bool {
+        self.urdf.joint_type == JointType::Fixed
+    }
 }
 
-impl RawKind {
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Fixed => "fixed",
-            Self::Revolute => "revolute",
-            Self::Continuous => "continuous",
-            Self::Prismatic => "prismatic",
-            Self::Other => "unsupported",
+/// Reads everything below `<robot>`. Returns `None` if `urdf_rs` was not asked or refuses the text.
+pub(crate) fn read_robot(root: Node<'_, '_>, lines: &Lines<'_>, report: &mut Report) -> Option<RawRobot> {
+    let plain = lint(root, lines, report)?;
+    let fits = |urdf: &urdf_rs::Robot| urdf.links.len() == plain.links.len() && urdf.joints.len() == plain.joints.len();
+    match urdf_rs::read_from_string(&plain.text) {
+        Ok(urdf) if fits(&urdf) => return Some(RawRobot::new(urdf, plain)),
+        Ok(_) => report.error(&plain.place, Problem::NotRead { reason: "it sees other links and joints".to_owned() }),
+        Err(error) => report.error(&plain.place, Problem::NotRead { reason: error.to_string() }),
+    }
+    None
+}
+
+impl RawRobot {
+    fn new(urdf: urdf_rs::Robot, plain: Plain) -> Self {
+        // A material may also be defined once inside a visual and used by name elsewhere.
+        let of_visuals = urdf.links.iter().flat_map(|l| &l.visual).filter_map(|v| v.material.as_ref()).rev();
+        let all = of_visuals.chain(&urdf.materials);
+        let materials = all.filter_map(|m| Some((m.name.clone(), color(m)?))).collect();
+        let links = urdf.links.into_iter().zip(plain.links).map(|(urdf, marks)| {
+            let collision = |c: urdf_rs::Collision| {
+                let urdf_rs::Collision { name, origin, geometry } = c;
+                urdf_rs::Visual { name, origin, geometry, material: None }
+            };
+            RawLink {
+                name: urdf.name,
+                place: marks.place,
+                inertial: marks.inertial.map(|mark| RawInertial::new(&urdf.inertial, mark)),
+                visuals: shapes(urdf.visual.into_iter(), marks.visuals),
+                collisions: shapes(urdf.collision.into_iter().map(collision), marks.collisions),
+            }
+        });
+        let joints = urdf.joints.into_iter().zip(plain.joints).map(|(urdf, marks)| {
+            let JointMarks { joint, axis, limit, mimic } = marks;
+            let (X_PJ, mimic) = (pose(&urdf.origin, &joint), mimic.unwrap_or_else(|| joint.place.clone()));
+            RawJoint { urdf, X_PJ, place: joint.place, axis, limit, mimic, faulty: joint.faulty }
+        });
+        Self {
+            name: urdf.name,
+            place: plain.place,
+            idle_macros: Vec::new(),
+            links: links.collect(),
+            joints: joints.collect(),
+            transmissions: plain.transmissions,
+            materials,
         }
     }
 }
 
-/// `None` where the attribute is missing.
-pub(crate) struct RawLimit {
-    pub(crate) place: Place,
-    pub(crate) lower: Option<f64>,
-    pub(crate) upper: Option<f64>,
-    pub(crate) effort: Option<f64>,
-    pub(crate) velocity: Option<f64>,
+impl RawInertial {
+    fn new(urdf: &urdf_rs::Inertial, mark: Mark) -> Self {
+        let i = &urdf.inertia;
+        let inertia_I = Matrix3::new(i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz);
+        let X_LI = pose(&urdf.origin, &mark);
+        Self { X_LI, mass: urdf.mass.value, inertia_I, place: mark.place, faulty: mark.faulty }
+    }
 }
 
-pub(crate) struct RawMimic {
-    pub(crate) place: Place,
-    pub(crate) joint: String,
-    pub(crate) ratio: f64,
-    pub(crate) offset: f64,
+fn shapes(urdf: impl Iterator<Item = urdf_rs::Visual>, marks: Vec<Mark>) -> Vec<RawVisual> {
+    urdf.zip(marks).map(|(urdf, mark)| RawVisual { X_LV: pose(&urdf.origin, &mark), place: mark.place, urdf }).collect()
 }
 
-pub(crate) struct RawTransmission {
-    pub(crate) name: String,
-    pub(crate) joints: Vec<String>,
-    pub(crate) reduction: Option<f64>,
+/// Returns the pose of `<origin xyz rpy>`: R = Rz(yaw) Ry(pitch) Rx(roll).
+fn pose(origin: &urdf_rs::Pose, mark: &Mark) -> Pose {
+    let [roll, pitch, yaw] = *origin.rpy;
+    let rotation = match mark.quaternion {
+        Some(quaternion) => quaternion.to_rotation_matrix(),
+        None => Rotation3::from_euler_angles(roll, pitch, yaw),
+    };
+    let [x, y, z] = *origin.xyz;
+    Pose::from_parts(Translation3::new(x, y, z), rotation)
+}
+
+/// Returns the colour of a material, each part from 0 to 1.
+pub(crate) fn color(material: &urdf_rs::Material) -> Option<[f32; 4]> {
+    material.color.as_ref().map(|color| color.rgba.map(|v| v.clamp(0.0, 1.0) as f32))
 }

@@ -4,16 +4,15 @@ use std::path::{Path, PathBuf};
 
 use flexarm_kinematics::{Link, Mechanism};
 
-use crate::document::read_document;
 use crate::error::UrdfError;
 use crate::finding::{Finding, Severity};
 use crate::geometry::Visual;
 use crate::mesh::UpAxis;
-use crate::raw::{RawKind, RawRobot};
+use crate::raw::{RawRobot, read_robot};
 use crate::report::Report;
 use crate::resolve::Resolver;
 use crate::tcp::tcp_candidates;
-use crate::{inertia, joints, second_reader, shapes, tree, xacro, xml};
+use crate::{inertia, joints, shapes, tree, xacro, xml};
 
 /// How to read. `ReadOptions::default()` reads files as they are and looks into meshes.
 #[derive(Clone, Debug)]
@@ -167,9 +166,6 @@ fn all_findings((result, report): (Result<UrdfRobot, UrdfError>, Report)) -> Vec
 /// A description larger than this is refused (bytes): those of real robots have up to one megabyte.
 const LARGEST: u64 = 64 << 20;
 
-/// Elements nested deeper are left to the readers that can stand it.
-const MAX_DEPTH: usize = 64;
-
 fn resolver<'a>(path: &Path, options: &'a ReadOptions) -> Resolver<'a> {
     let folder = path.parent().map(Path::to_owned).unwrap_or_default();
     Resolver { folder, packages: &options.packages, search_paths: &options.search_paths }
@@ -224,7 +220,7 @@ fn parse_expanded(
     report: &mut Report,
 ) -> Result<UrdfRobot, UrdfError> {
     let document = xml::parse(text, &lines).map_err(|issue| report.issues.push(*issue)).ok();
-    let raw = document.as_ref().and_then(|document| read_document(document.root_element(), &lines, report));
+    let raw = document.as_ref().and_then(|document| read_robot(document.root_element(), &lines, report));
     let robot = raw.map(|mut raw| {
         raw.idle_macros = idle_macros.to_vec();
         joints::fix_still_followers(&mut raw, report);
@@ -233,13 +229,8 @@ fn parse_expanded(
         }
         assemble(&raw, text, resolver, options, report)
     });
-    match (robot, &document) {
-        (Some(mut robot), Some(document)) if report.issues.is_empty() => {
-            // it recurses, and would overflow the stack
-            if !document.descendants().any(|n| n.ancestors().nth(MAX_DEPTH).is_some()) {
-                let place = lines.place(0);
-                second_reader::ask(text, document.root_element(), &robot.mechanism, &place, report);
-            }
+    match robot {
+        Some(mut robot) if report.issues.is_empty() => {
             robot.warnings = report.remarks();
             Ok(robot)
         }
@@ -276,7 +267,7 @@ fn assemble(
         raw.links.iter().zip(inertias).map(|(link, inertia)| Link { name: link.name.clone(), inertia }).collect();
 
     let tcp_candidates = tcp_candidates(&mechanism).into_iter().map(str::to_owned).collect();
-    let moving = raw.joints.iter().filter(|j| j.kind != RawKind::Fixed);
+    let moving = raw.joints.iter().filter(|j| !j.is_fixed());
     UrdfRobot {
         text: text.to_owned(),
         mesh_files: resolver.mesh_files(text),
@@ -285,13 +276,12 @@ fn assemble(
         tcp_candidates,
         warnings: Vec::new(),
         dynamics: moving
-            .map(|j| JointDynamics { joint: j.name.clone(), damping: j.damping, friction: j.friction })
+            .map(|j| {
+                let (damping, friction) = j.urdf.dynamics.as_ref().map_or((0.0, 0.0), |d| (d.damping, d.friction));
+                JointDynamics { joint: j.urdf.name.clone(), damping, friction }
+            })
             .collect(),
-        transmissions: raw
-            .transmissions
-            .iter()
-            .map(|t| Transmission { name: t.name.clone(), joints: t.joints.clone(), reduction: t.reduction })
-            .collect(),
+        transmissions: raw.transmissions.clone(),
         mechanism,
     }
 }

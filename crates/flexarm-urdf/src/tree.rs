@@ -8,7 +8,7 @@ use std::collections::{HashMap, HashSet};
 use flexarm_kinematics::Pose;
 
 use crate::error::Problem;
-use crate::raw::{RawJoint, RawKind, RawRobot};
+use crate::raw::{RawJoint, RawRobot};
 use crate::report::Report;
 use crate::spelling::closest;
 
@@ -27,10 +27,10 @@ pub(crate) fn check_names(robot: &RawRobot, report: &mut Report) {
     }
     let mut first: HashMap<&str, u32> = HashMap::new();
     for joint in &robot.joints {
-        if let Some(&first_line) = first.get(joint.name.as_str()) {
-            report.error(&joint.place, Problem::DuplicateJoint { joint: joint.name.clone(), first_line });
+        if let Some(&first_line) = first.get(joint.urdf.name.as_str()) {
+            report.error(&joint.place, Problem::DuplicateJoint { joint: joint.urdf.name.clone(), first_line });
         }
-        first.entry(&joint.name).or_insert(joint.place.line);
+        first.entry(&joint.urdf.name).or_insert(joint.place.line);
     }
 }
 
@@ -40,33 +40,36 @@ pub(crate) fn check_tree(robot: &RawRobot, report: &mut Report) {
     let names: HashSet<&str> = robot.links.iter().map(|l| l.name.as_str()).collect();
     let mut parent_joint: HashMap<&str, &RawJoint> = HashMap::new();
     for joint in &robot.joints {
-        for (role, link) in [("parent", &joint.parent), ("child", &joint.child)] {
+        for (role, link) in [("parent", &joint.urdf.parent.link), ("child", &joint.urdf.child.link)] {
             // an empty name was already reported as a missing element
             if !link.is_empty() && !names.contains(link.as_str()) {
-                let (joint_name, link) = (joint.name.clone(), link.clone());
+                let (joint_name, link) = (joint.urdf.name.clone(), link.clone());
                 let closest = closest(&link, robot.links.iter().map(|l| l.name.as_str()));
                 report.error(&joint.place, Problem::UnknownLink { joint: joint_name, role, link, closest });
             }
         }
-        if joint.child.is_empty() {
+        let child = &joint.urdf.child.link;
+        if child.is_empty() {
             continue;
         }
-        if let Some(first) = parent_joint.get(joint.child.as_str()) {
+        if let Some(first) = parent_joint.get(child.as_str()) {
             let problem = Problem::TwoParents {
-                link: joint.child.clone(),
-                first: first.name.clone(),
+                link: child.clone(),
+                first: first.urdf.name.clone(),
                 first_line: first.place.line,
-                second: joint.name.clone(),
+                second: joint.urdf.name.clone(),
             };
             report.error(&joint.place, problem);
         } else {
-            parent_joint.insert(&joint.child, joint);
+            parent_joint.insert(child, joint);
         }
     }
     report_cycles(robot, &parent_joint, report);
 
     // A broken joint leaves parts behind; they are no second fault.
-    if report.issues.len() > faults || robot.joints.iter().any(|j| j.parent.is_empty() || j.child.is_empty()) {
+    if report.issues.len() > faults
+        || robot.joints.iter().any(|j| j.urdf.parent.link.is_empty() || j.urdf.child.link.is_empty())
+    {
         return;
     }
     let roots: Vec<_> = robot.links.iter().filter(|l| !parent_joint.contains_key(l.name.as_str())).collect();
@@ -89,17 +92,17 @@ fn report_cycles(robot: &RawRobot, parent_joint: &HashMap<&str, &RawJoint>, repo
                 break;
             }
             if let Some(&start) = on_path.get(at) {
-                let mut joints: Vec<String> = path[start..].iter().map(|j| j.name.clone()).collect();
+                let mut joints: Vec<String> = path[start..].iter().map(|j| j.urdf.name.clone()).collect();
                 joints.reverse();
                 if !reported.contains(&at) {
                     report.error(&joint.place, Problem::Cycle { joints });
                 }
-                reported.extend(path[start..].iter().map(|j| j.child.as_str()));
+                reported.extend(path[start..].iter().map(|j| j.urdf.child.link.as_str()));
                 break;
             }
             on_path.insert(at, path.len());
             path.push(joint);
-            at = &joint.parent;
+            at = &joint.urdf.parent.link;
         }
         settled.extend(on_path.into_keys());
     }
@@ -121,7 +124,9 @@ pub(crate) fn moving_bodies(robot: &RawRobot) -> Vec<Body> {
     let mut children: Vec<Vec<usize>> = vec![Vec::new(); robot.links.len()];
     let mut has_parent = vec![false; robot.links.len()];
     for (j, joint) in robot.joints.iter().enumerate() {
-        if let (Some(&p), Some(&c)) = (index.get(joint.parent.as_str()), index.get(joint.child.as_str())) {
+        if let (Some(&p), Some(&c)) =
+            (index.get(joint.urdf.parent.link.as_str()), index.get(joint.urdf.child.link.as_str()))
+        {
             children[p].push(j);
             has_parent[c] = true;
         }
@@ -136,8 +141,8 @@ pub(crate) fn moving_bodies(robot: &RawRobot) -> Vec<Body> {
             let (link, X_RL) = members[at];
             for &j in &children[link] {
                 let joint = &robot.joints[j];
-                let child = index[joint.child.as_str()];
-                if joint.kind == RawKind::Fixed {
+                let child = index[joint.urdf.child.link.as_str()];
+                if joint.is_fixed() {
                     members.push((child, X_RL * joint.X_PJ));
                 } else {
                     pending.push((child, Some(j)));

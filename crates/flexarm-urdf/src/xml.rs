@@ -62,9 +62,29 @@ pub(crate) fn decode(bytes: Vec<u8>, file: &Path) -> Result<String, Box<Issue>> 
     Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
 }
 
-/// The tree of the text, or the first place where it is not XML.
+/// Most attributes of an element, and most declarations of name spaces in a text: parsers compare
+/// each with each. Real descriptions have up to a hundred and a dozen.
+const MOST_ATTRIBUTES: usize = 500;
+
+/// Returns the tree of the text, or the first place where it is not XML. Counts attributes before
+/// any parser sees them.
 pub(crate) fn parse<'t>(text: &'t str, lines: &Lines<'_>) -> Result<Document<'t>, Box<Issue>> {
+    if let Some((at, what)) = crowded(text) {
+        return Err(Box::new(issue(lines.place(at), format!("more than {MOST_ATTRIBUTES} {what}"), "fewer")));
+    }
     Document::parse(text).map_err(|error| Box::new(describe(text, lines, &error)))
+}
+
+/// Returns where there are too many attributes or name spaces, and which of them.
+fn crowded(text: &str) -> Option<(usize, &'static str)> {
+    if let Some((at, _)) = text.match_indices("xmlns").nth(MOST_ATTRIBUTES) {
+        return Some((at, "declared name spaces"));
+    }
+    // Parsers go no further than a '<' within a tag.
+    let elements = tags(text).filter_map(|(at, tag, _)| Some((at, tag[1..].split('<').next()?)));
+    let mut elements = elements.filter(|(_, tag)| !tag.starts_with(['!', '?']));
+    let crowded = elements.find(|(_, tag)| tag.match_indices('=').nth(MOST_ATTRIBUTES).is_some());
+    crowded.map(|(at, _)| (at, "attributes in one element"))
 }
 
 fn describe(text: &str, lines: &Lines<'_>, error: &Error) -> Issue {
@@ -145,11 +165,32 @@ enum Open<'t> {
     InsideTag(&'t str, usize),
 }
 
-/// What is still open where the text ends; a forgiving scan of tags, comments and CDATA.
+/// Returns what is still open where the text ends.
 fn innermost_open(text: &str) -> Open<'_> {
     let mut stack: Vec<(&str, usize)> = Vec::new();
+    for (start, tag, whole) in tags(text) {
+        let name_end = tag[1..]
+            .find(|c: char| c.is_whitespace() || c == '>' || c == '<' || (c == '/' && !tag.starts_with("</")))
+            .map_or(tag.len(), |i| i + 1);
+        let name = tag[1..name_end].trim_start_matches('/');
+        if !whole {
+            return Open::InsideTag(name, start);
+        }
+        if tag.starts_with("</") {
+            stack.pop();
+        } else if !tag.starts_with("<!") && !tag.starts_with("<?") && !tag.ends_with("/>") {
+            stack.push((name, start));
+        }
+    }
+    stack.pop().map_or(Open::Nothing, |(name, at)| Open::Element(name, at))
+}
+
+/// Returns the tags, comments, CDATA and the like of a text: offset, text, and whether the end is
+/// there. The scan forgives what is not well-formed.
+fn tags(text: &str) -> impl Iterator<Item = (usize, &str, bool)> {
     let mut at = 0;
-    while let Some(start) = text[at..].find('<').map(|i| at + i) {
+    std::iter::from_fn(move || {
+        let start = at + text[at..].find('<')?;
         let rest = &text[start..];
         let (skip, close) = if rest.starts_with("<!--") {
             (4, "-->")
@@ -160,21 +201,10 @@ fn innermost_open(text: &str) -> Open<'_> {
         } else {
             (1, ">")
         };
-        let name_end = rest[1..]
-            .find(|c: char| c.is_whitespace() || c == '>' || c == '<' || (c == '/' && !rest.starts_with("</")))
-            .map_or(rest.len(), |i| i + 1);
-        let name = rest[1..name_end].trim_start_matches('/');
-        let Some(end) = tag_end(rest, skip, close) else { return Open::InsideTag(name, start) };
-        if close == ">" && !rest.starts_with("<!") {
-            if rest.starts_with("</") {
-                stack.pop();
-            } else if !rest[..end].ends_with("/>") {
-                stack.push((name, start));
-            }
-        }
-        at = start + end;
-    }
-    stack.pop().map_or(Open::Nothing, |(name, at)| Open::Element(name, at))
+        let end = tag_end(rest, skip, close);
+        at = end.map_or(text.len(), |end| start + end);
+        Some((start, &text[start..at], end.is_some()))
+    })
 }
 
 /// Length of the tag at the start of `rest`, quotes respected.
@@ -192,4 +222,24 @@ fn tag_end(rest: &str, skip: usize, close: &str) -> Option<usize> {
         }
     }
     None
+}
+
+/// Returns text as it is written in XML.
+pub(crate) fn escaped(text: &str, in_attribute: bool) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\n' | '\t' if in_attribute => out.push_str(&format!("&#{};", u32::from(c))),
+            '\r' => out.push_str("&#13;"),
+            // what XML has no way to write
+            c if c < ' ' && c != '\n' && c != '\t' => out.push(' '),
+            '\u{fffe}' | '\u{ffff}' => out.push(' '),
+            c => out.push(c),
+        }
+    }
+    out
 }

@@ -115,6 +115,8 @@ fn missing_parts_are_named() {
     );
     let no_parent = with_joint("<joint name='j' type='continuous'><child link='arm'/></joint>");
     assert_code(&no_parent, 4, "missing-element");
+    let empty = "<joint name='j' type='continuous'><parent link=''/><child link='arm'/></joint>";
+    assert_code(&with_joint(empty), 4, "missing-attribute");
     assert_code(&robot(&["<link name='a'><visual><geometry/></visual></link>"]), 2, "missing-element");
     assert_code(
         &with_joint("<joint name='j'><parent link='base'/><child link='arm'/></joint>"),

@@ -179,9 +179,9 @@ fn visuals_have_pose_shape_and_colour() {
     assert!(visuals.iter().all(|v| !v.geometry.triangles().unwrap().triangles.is_empty()));
 }
 
-/// Second algorithm: `urdf_rs` reads the same numbers.
+/// Truth: what `urdf_rs` reads from the file itself. The reader hands it a text made from the file.
 #[test]
-fn urdf_rs_reads_the_same_robot() {
+fn the_numbers_are_those_that_urdf_rs_reads() {
     let text = arm();
     let (ours, theirs) = (read(&text).mechanism, urdf_rs::read_from_string(&text).unwrap());
     for (a, b) in ours.links.iter().zip(&theirs.links) {

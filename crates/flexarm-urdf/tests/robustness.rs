@@ -3,8 +3,8 @@
 
 mod common;
 
-use common::{TestFolder, hinge, link, robot};
-use flexarm_urdf::{ReadOptions, UrdfError, check_urdf_text, parse_urdf, read_urdf};
+use common::{TestFolder, hinge, link, problem, robot};
+use flexarm_urdf::{Finding, ReadOptions, UrdfError, check_urdf_text, parse_urdf, read_urdf};
 use proptest::prelude::*;
 
 fn sound() -> String {
@@ -43,6 +43,33 @@ fn deep_nesting_is_no_danger() {
     let deep = format!("<gazebo>{}{}</gazebo>", "<a>".repeat(depth), "</a>".repeat(depth));
     let text = robot(&[&link("base"), &deep]);
     assert!(parse_urdf(&text, "r.urdf", &ReadOptions::default()).is_ok());
+    // The same within URDF: the parsers of `urdf_rs` recurse, and never see this.
+    for tag in ["link", "visual", "geometry", "joint", "material"] {
+        let (start, end) = (format!("<{tag} name='a'>").repeat(depth), format!("</{tag}>").repeat(depth));
+        let _ = parse_urdf(&robot(&[&link("base"), &start, &end]), "r.urdf", &ReadOptions::default());
+    }
+}
+
+/// Parsers compare each attribute and each name space with each: 60 000 take minutes.
+#[test]
+fn crowds_of_attributes_are_refused_before_they_are_read() {
+    let many = |what: &str| (0..60_000).map(|i| what.replace('#', &i.to_string())).collect::<String>();
+    let attributes = format!("<link name='b'{}/>", many(" a#='0'"));
+    let nested = format!("<gazebo>{}{}</gazebo>", many("<a xmlns:n#='#'>"), "</a>".repeat(60_000));
+    for (crowd, what) in [(&attributes, "more than 500 attributes"), (&nested, "more than 500 declared name spaces")] {
+        let start = std::time::Instant::now();
+        let (line, fault) = problem(&robot(&[&link("a"), crowd]));
+        assert!(line == 3 && fault.to_string().contains(what), "{line}: {fault}");
+        // measured: 1 ms
+        assert!(start.elapsed().as_secs() < 2, "{:?}", start.elapsed());
+    }
+}
+
+/// Returns all findings. `urdf_rs` refuses nothing that is handed to it.
+fn check(text: &str, options: &ReadOptions) -> Vec<Finding> {
+    let findings = check_urdf_text(text, "r.urdf", options);
+    assert!(findings.iter().all(|f| f.code != "not-read"), "{findings:?}");
+    findings
 }
 
 proptest! {
@@ -50,7 +77,7 @@ proptest! {
 
     #[test]
     fn no_text_panics(text in "\\PC{0,300}") {
-        let _ = check_urdf_text(&text, "r.urdf", &ReadOptions::default());
+        check(&text, &ReadOptions::default());
     }
 
     #[test]
@@ -63,7 +90,7 @@ proptest! {
             characters[at] = c;
         }
         let text: String = characters.into_iter().collect();
-        let _ = check_urdf_text(&text, "r.urdf", &ReadOptions::default());
+        check(&text, &ReadOptions::default());
     }
 
     /// Elements in any order, cyclic, repeated, with any numbers: reported or read, and never in doubt.
@@ -85,7 +112,7 @@ proptest! {
             inertia_from_mesh: estimate.then_some(flexarm_urdf::InertiaEstimate::TotalMass(1.0)),
             ..ReadOptions::default()
         };
-        let findings = check_urdf_text(&text, "r.urdf", &options);
+        let findings = check(&text, &options);
         let errors = findings.iter().any(|f| f.severity == flexarm_urdf::Severity::Error);
         prop_assert_eq!(errors, parse_urdf(&text, "r.urdf", &options).is_err());
     }

@@ -313,7 +313,7 @@ fn parse_file(file: &InputFile, found: &mut Found) -> Result<(), ExchangeError> 
         #[cfg(not(feature = "hdf5"))]
         MatrixFormat::ExudynHdf5 => {
             let (found, expected) = ("HDF5", "a format that this build reads");
-            let help = "build flexarm with --features hdf5, or install the Python package, which reads it";
+            let help = "build flexarm with the feature hdf5, or install the Python package, which reads it";
             return Err(Place::file(origin).fail(ExchangeErrorKind::Syntax, "file", found, expected, help));
         }
         #[cfg(feature = "hdf5")]

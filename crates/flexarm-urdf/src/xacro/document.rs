@@ -150,10 +150,10 @@ impl Written {
 fn write_element(element: &Element, namespaces: &[(String, String)], depth: usize, out: &mut Written) {
     let mut tag = format!("<{}", element.name);
     for (name, value) in element.attributes.iter().chain(namespaces) {
-        tag.push_str(&format!(" {name}=\"{}\"", escaped(value, true)));
+        tag.push_str(&format!(" {name}=\"{}\"", xml::escaped(value, true)));
     }
     let words = |node: &Node| match node {
-        Node::Text(words) | Node::Literal(words) if !words.trim().is_empty() => Some(escaped(words, false)),
+        Node::Text(words) | Node::Literal(words) if !words.trim().is_empty() => Some(xml::escaped(words, false)),
         _ => None,
     };
     let has_content = element.children.iter().any(|node| matches!(node, Node::Element(_)) || words(node).is_some());
@@ -175,23 +175,4 @@ fn write_element(element: &Element, namespaces: &[(String, String)], depth: usiz
         }
     }
     out.line(depth, &format!("</{}>", element.name), &element.at);
-}
-
-fn escaped(text: &str, in_attribute: bool) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\n' | '\t' if in_attribute => out.push_str(&format!("&#{};", u32::from(c))),
-            '\r' => out.push_str("&#13;"),
-            // what XML has no way to write
-            c if c < ' ' && c != '\n' && c != '\t' => out.push(' '),
-            '\u{fffe}' | '\u{ffff}' => out.push(' '),
-            c => out.push(c),
-        }
-    }
-    out
 }
