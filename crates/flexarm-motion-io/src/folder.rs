@@ -88,6 +88,17 @@ fn stem(file: &Path) -> String {
     }
 }
 
+/// First bytes of a SQLite file.
+pub const SQLITE_MAGIC: &[u8] = b"SQLite format 3\0";
+
+/// Reads a SQLite file of rosbag2.
+///
+/// # Errors
+/// As [`crate::read_mcap`]; [`Problem::NotRead`] without the feature `sqlite`.
+pub fn read_db3(path: &Path, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
+    read_files(&[path.to_owned()], path, request)
+}
+
 /// Reads the files of a bag as one.
 ///
 /// * `bag`: what is spoken of in messages.
@@ -102,7 +113,7 @@ pub(crate) fn read_files(files: &[PathBuf], bag: &Path, request: &Request<'_>) -
         opened.map_err(|source| MotionError::Read { path: file.clone(), source })?;
         let ended = if head.starts_with(mcap::MCAP_MAGIC) {
             mcap::collect_file(file, &mut collector)?
-        } else if head.starts_with(sqlite::SQLITE_MAGIC) {
+        } else if head.starts_with(SQLITE_MAGIC) {
             format = "SQLite bag";
             sqlite::collect_file(file, &mut collector)?
         } else if head.starts_with(rosbag::ROSBAG_MAGIC) {

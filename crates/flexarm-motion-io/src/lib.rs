@@ -42,6 +42,7 @@ mod folder;
 mod mcap;
 mod message;
 mod rosbag;
+#[cfg_attr(not(feature = "sqlite"), path = "no_sqlite.rs")]
 mod sqlite;
 mod text;
 mod unpack;
@@ -51,9 +52,9 @@ mod yaml;
 
 pub use error::{MotionError, Place, Problem};
 pub use folder::read_folder;
+pub use folder::{SQLITE_MAGIC, read_db3};
 pub use mcap::{MCAP_MAGIC, read_mcap};
 pub use rosbag::{ROSBAG_MAGIC, read_rosbag};
-pub use sqlite::{SQLITE_MAGIC, read_db3};
 pub use text::{looks_like_messages, read_text};
 pub use unpack::{ZSTD_MAGIC, read_packed};
 pub use write::{TextFormat, write_joint_trajectory};

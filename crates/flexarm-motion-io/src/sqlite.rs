@@ -11,18 +11,6 @@ use rusqlite::{Connection, OpenFlags};
 use crate::collect::Collector;
 use crate::error::{MotionError, Problem, Trouble};
 use crate::unpack::{Packing, ZSTD_MAGIC, unpacked};
-use crate::{MessageMotion, Request};
-
-/// First bytes of a SQLite file.
-pub const SQLITE_MAGIC: &[u8] = b"SQLite format 3\0";
-
-/// Reads a SQLite file of rosbag2.
-///
-/// # Errors
-/// As [`crate::read_mcap`].
-pub fn read_db3(path: &Path, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
-    crate::folder::read_files(&[path.to_owned()], path, request)
-}
 
 pub(crate) fn collect_file(path: &Path, into: &mut Collector<'_>) -> Result<Option<String>, MotionError> {
     let origin = path.display().to_string();

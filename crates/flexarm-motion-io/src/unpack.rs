@@ -4,7 +4,7 @@ use std::io::{BufReader, Read};
 use std::path::Path;
 
 use crate::error::{MotionError, Problem, Trouble};
-use crate::{MessageMotion, Request, mcap, sqlite};
+use crate::{MessageMotion, Request, mcap};
 
 /// First bytes of what zstd has packed.
 pub const ZSTD_MAGIC: &[u8] = &[0x28, 0xB5, 0x2F, 0xFD];
@@ -75,7 +75,7 @@ pub(crate) fn look_inside(path: &Path) -> Result<Inside, MotionError> {
         return Ok(Inside::Mcap(Box::new(whole)));
     }
     let origin = path.display().to_string();
-    if !head.starts_with(sqlite::SQLITE_MAGIC) {
+    if !head.starts_with(crate::SQLITE_MAGIC) {
         let what =
             "what is packed in it is neither MCAP nor a database of rosbag2; unpack it to see what it is".to_owned();
         return Err(Trouble::new(Problem::NotRead { what }).of(&origin));

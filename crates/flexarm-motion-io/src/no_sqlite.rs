@@ -1,0 +1,20 @@
+//! In place of the reader of SQLite files where the feature `sqlite` is off.
+
+use std::path::Path;
+
+use crate::collect::Collector;
+use crate::error::{MotionError, Problem, Trouble};
+
+pub(crate) fn collect_file(path: &Path, _: &mut Collector<'_>) -> Result<Option<String>, MotionError> {
+    Err(refused().of(&path.display().to_string()))
+}
+
+pub(crate) fn collect_bytes(_: Vec<u8>, _: &mut Collector<'_>) -> Result<Option<String>, Trouble> {
+    Err(refused())
+}
+
+fn refused() -> Trouble {
+    let what = "it is a SQLite bag, which this build does not read: build flexarm with the feature sqlite, install the Python \
+                package, which reads it, or make an MCAP of it with ros2 bag convert";
+    Trouble::new(Problem::NotRead { what: what.to_owned() })
+}
