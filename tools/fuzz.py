@@ -1010,7 +1010,7 @@ def made_targets(run, folder):
         command = ["import", *given, *units, *words, "--no-files", "--json"]
         targets.append(Target(f"matrix-{change}", change, files, [command]))
     run(["compare", "robot.toml", "motion.toml", "-o", "run", "--log-rate", "50", "--parquet", "--also", "arrow", "--quiet"], ["compare", "robot.toml", "motion.toml", "-o", "run", "--log-rate", "50", "--quiet"])
-    for name in ("run.csv", "run.mcap", "run.parquet", "run.arrow", "run.rrd"):
+    for name in ("run.csv", "run.mcap", "run.parquet", "run.arrow"):
         path = folder / "run" / name
         if not path.exists():
             print(f"left out: recordings {name} (this build writes none)")
