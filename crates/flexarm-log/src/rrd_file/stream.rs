@@ -106,10 +106,11 @@ impl RrdStream {
     /// Writes the index and closes the file.
     pub(crate) fn finish(&self) -> Result<()> {
         self.flush()?;
-        let before = self.path.metadata()?.len();
+        let length = || self.path.metadata().ok().map(|file| file.len());
+        let before = length();
         self.recording.disconnect();
-        // The SDK does not say whether the index was written. It is never empty.
-        match self.path.metadata()?.len() > before {
+        // The SDK does not say whether the index was written. It is never empty; a file that was removed has no length.
+        match length().is_none_or(|length| Some(length) > before) {
             true => Ok(()),
             false => Err(self.broken(&"the index is missing").into()),
         }
