@@ -14,7 +14,8 @@
 //! * a killed run loses at most the last moment ([`CreateOptions::flush_every`], of an MCAP its last
 //!   chunk), and what is left can be read; the exceptions ([`FormatInfo::survives_a_kill`]) come into
 //!   being under another name and are there whole or not at all;
-//! * the same samples give the same bytes, on any day and at any speed: nothing in a file depends on the clock.
+//! * the same samples give the same bytes, on any day and at any speed: nothing in a file depends on the clock. An
+//!   `.rrd` has the same content: Rerun's SDK draws identifiers of chunks from clock and chance.
 //!
 //! Not here: what the numbers mean (`flexarm-analysis`), running the simulation (`flexarm`).
 //!
@@ -68,7 +69,7 @@ mod read;
 mod record;
 #[cfg(feature = "rerun")]
 mod rrd_file;
-#[cfg(any(feature = "mcap", feature = "described-tables", feature = "rerun"))]
+#[cfg(any(feature = "mcap", feature = "described-tables"))]
 mod run_json;
 mod shape;
 mod table;
