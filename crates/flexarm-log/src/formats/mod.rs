@@ -186,12 +186,14 @@ impl Holds {
     }
 }
 
+type Reader = fn(&Path) -> Result<Box<dyn RunSource>, LogError>;
+
 /// How files of a format are opened.
 #[derive(Clone, Copy, Debug)]
 struct Code {
     recorder: fn(PathBuf, CreateOptions) -> Box<dyn Recorder>,
     /// None for formats that are only written.
-    reader: Option<fn(&Path) -> Result<Box<dyn RunSource>, LogError>>,
+    reader: Option<Reader>,
 }
 
 impl RecordingFormat {
