@@ -260,4 +260,8 @@ def test_caveats_are_warnings_of_their_own_class(kr210: flexarm.Robot) -> None:
     assert caught[0].filename == __file__
     told = [caveat for caveat in run.caveats if caveat.severity == "warning"]
     assert told and all(caveat.message and caveat.code for caveat in told)
-    assert [str(warning.message) for warning in caught] == [caveat.message for caveat in told]
+    # Warnings of one kind are one, with the number of the others.
+    messages = [caveat.message for caveat in told]
+    firsts = [str(warning.message).split(" (and ")[0] for warning in caught]
+    assert set(firsts) <= set(messages) and len(caught) < len(messages)
+    assert {caveat.code for caveat in told} == {caveat.code for caveat in told if caveat.message in firsts}
