@@ -15,6 +15,7 @@ pub(crate) const MOST_BYTES: u64 = 1 << 30;
 pub(crate) fn unpacked(packing: Packing, bytes: &[u8]) -> (Vec<u8>, Option<String>) {
     let mut out = Vec::new();
     let result = match packing {
+        #[cfg(feature = "sqlite")]
         Packing::Zstd => {
             zstd::stream::read::Decoder::new(bytes).and_then(|unpack| unpack.take(MOST_BYTES + 1).read_to_end(&mut out))
         }
@@ -33,6 +34,7 @@ pub(crate) fn unpacked(packing: Packing, bytes: &[u8]) -> (Vec<u8>, Option<Strin
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Packing {
     Bzip2,
+    #[cfg(feature = "sqlite")]
     Zstd,
     Lz4,
 }
