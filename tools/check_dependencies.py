@@ -42,6 +42,7 @@ FLAG = re.compile(r"(?<![\w-])--[a-z][a-z-]*|(?<![\w/-])-o(?![\w-])")
 FACE_WORDS = re.compile(r"\b(?:command line|exit code|terminal|stdout|stderr)\b")
 ALLOWED = {  # file: what it may have (a pattern of the hit), and why
     "crates/flexarm-fe-io/src/mesh/read.rs": (r"-o", "tells how to call another program, Gmsh"),
+    "crates/flexarm-motion-io/src/error.rs": (r"--full-length", "tells how to call another program, ROS 2"),
     "crates/flexarm-urdf/src/resolve.rs": (r"std::env", "search_paths_from_environment, which the caller may use or not"),
     "crates/flexarm-urdf/src/xacro/substitution.rs": (r"std::env|env::var|env::current", "xacro's own $(env NAME), $(optenv NAME) and $(cwd)"),
     "crates/flexarm/src/report/html/figures.rs": (r"--c", "a custom property of a style sheet"),

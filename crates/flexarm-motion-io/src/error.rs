@@ -99,7 +99,9 @@ pub enum Problem {
         found: String,
     },
     /// An array that the printing program has shortened.
-    #[error("an array ends with \"...\": it was shortened when it was printed; print it whole (ros2 topic echo -f)")]
+    #[error(
+        "an array ends with \"...\": it was shortened when it was printed; print it whole (ros2 topic echo --full-length)"
+    )]
     ShortenedArray,
     /// A key that must be there.
     #[error("{of} has no `{key}`; {expected}")]

@@ -22,7 +22,7 @@ use crate::{MessageMotion, Request};
 /// First bytes of an MCAP file.
 pub const MCAP_MAGIC: &[u8] = mcap::MAGIC;
 
-/// Most bytes of a record, or of what a chunk unpacks to: the library takes memory for a chunk
+/// Maximum size of a record, or of an unpacked chunk, in bytes: the library takes memory for a chunk
 /// before it unpacks it.
 const MOST_BYTES: usize = 256 << 20;
 /// Bytes that are read at once, however long a record claims to be.

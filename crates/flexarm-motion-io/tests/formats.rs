@@ -499,7 +499,7 @@ fn what_is_wrong_with_a_text_is_told_with_its_line() {
         ),
         (
             &format!("{points}- {{positions: [0, 0, '...'], time_from_start: 1.0}}\n"),
-            "t, line 3: an array ends with \"...\": it was shortened when it was printed; print it whole (ros2 topic echo -f)",
+            "t, line 3: an array ends with \"...\": it was shortened when it was printed; print it whole (ros2 topic echo --full-length)",
         ),
         (
             &format!("{points}- {{positions: [0, zero], time_from_start: 1.0}}\n"),

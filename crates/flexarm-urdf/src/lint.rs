@@ -2,7 +2,7 @@
 //!
 //! Start at [`lint`]. The values of a robot come from `urdf_rs`. It drops words of a vector that are
 //! no numbers, takes a missing `<inertial>` for zeros, stops at the first fault and knows no lines.
-//! The lint tells such faults with their places. It then writes a [`Plain`] text with the elements
+//! The lint reports such faults with their places. It then writes a [`Plain`] text with the elements
 //! and attributes that a mechanism needs, as they stand in the file, without prefixes and with the
 //! first of each element that may stand once. This has three reasons:
 //!
@@ -34,7 +34,7 @@ use crate::report::Report;
 use crate::spelling::closest;
 use crate::xml::{Lines, escaped};
 
-/// Most links and joints of a robot: checks compare each with each.
+/// Maximum number of links and joints of a robot: checks compare each with each.
 const MOST_ELEMENTS: usize = 4000;
 
 const JOINT_TYPES: [&str; 7] = ["fixed", "revolute", "continuous", "prismatic", "floating", "planar", "spherical"];
@@ -78,7 +78,7 @@ pub(crate) struct Plain {
     pub(crate) transmissions: Vec<Transmission>,
 }
 
-/// What the tree says of an element that may have an `<origin>`.
+/// An element that may have an `<origin>`, as the tree has it.
 pub(crate) struct Mark {
     pub(crate) place: Place,
     /// The rotation of `<origin>` where no `rpy` gives it: from a quaternion, or the identity
@@ -88,7 +88,7 @@ pub(crate) struct Mark {
     pub(crate) faulty: bool,
 }
 
-/// What the tree says of a link; `None` stands for an element that is not there.
+/// Elements of a link in the tree; `None` stands for an element that is not there.
 pub(crate) struct LinkMarks {
     pub(crate) place: Place,
     pub(crate) inertial: Option<Mark>,
@@ -96,7 +96,7 @@ pub(crate) struct LinkMarks {
     pub(crate) collisions: Vec<Mark>,
 }
 
-/// What the tree says of a joint; `None` stands for an element that is not there.
+/// Elements of a joint in the tree; `None` stands for an element that is not there.
 pub(crate) struct JointMarks {
     pub(crate) joint: Mark,
     pub(crate) axis: Option<Place>,
@@ -104,7 +104,7 @@ pub(crate) struct JointMarks {
     pub(crate) mimic: Option<Place>,
 }
 
-/// What an attribute holds.
+/// Kind of value of an attribute.
 #[derive(Clone, Copy)]
 enum Kind {
     Text,
@@ -149,7 +149,7 @@ impl Kind {
     }
 }
 
-/// What to do where an attribute is missing.
+/// Consequence of a missing attribute.
 #[derive(Clone, Copy)]
 enum Missing {
     Fault,
@@ -195,7 +195,7 @@ struct Lint<'a, 't> {
     quaternions: bool,
     /// Limits that are not written are infinite (URDF 1.2 and later), not zero.
     open_limits: bool,
-    /// How messages name the robot, link or joint that is looked at.
+    /// Name of the current robot, link or joint in messages.
     owner: String,
     /// The plain text.
     text: String,
@@ -571,7 +571,7 @@ mod tests {
 </robot>
 "#;
 
-    /// What `urdf_rs` refuses, and robots are written with.
+    /// Truth: faults that real robots have and `urdf_rs` refuses.
     #[test]
     fn what_urdf_rs_would_refuse_is_made_plain() {
         for (from, to) in [

@@ -62,8 +62,8 @@ pub(crate) fn decode(bytes: Vec<u8>, file: &Path) -> Result<String, Box<Issue>> 
     Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
 }
 
-/// Most attributes of an element, and most declarations of name spaces in a text: parsers compare
-/// each with each. Real descriptions have up to a hundred and a dozen.
+/// Maximum number of attributes of an element, and of declarations of name spaces in a text:
+/// parsers compare each with each. Real descriptions have up to a hundred and a dozen.
 const MOST_ATTRIBUTES: usize = 500;
 
 /// Returns the tree of the text, or the first place where it is not XML. Counts attributes before

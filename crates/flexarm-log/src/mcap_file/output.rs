@@ -114,7 +114,7 @@ impl Output {
         if std::mem::replace(&mut self.finished, true) {
             return Ok(());
         }
-        // Where there is no room for the index, the chunk stays.
+        // Flushed first: the chunk stays if there is no room for the index.
         self.writer.flush().and_then(|()| self.writer.finish()).map(drop).map_err(io_error)
     }
 }
@@ -150,7 +150,7 @@ impl Write for WholeRecords {
     /// Writes what waits. If that fails (full disk), it waits on, and the file has nothing of it.
     fn flush(&mut self) -> io::Result<()> {
         if let Err(error) = self.file.write_all(&self.waiting) {
-            // Should this fail too, the first error is the one to tell.
+            // An error of the restoration is ignored: the first one is returned.
             let _ = self.file.set_len(self.written).and_then(|()| self.file.seek(SeekFrom::Start(self.written)));
             return Err(error);
         }
