@@ -7,7 +7,9 @@
 //! A and B are the two points of a base, AB_i is A with coordinate i of B; V is the variance of f over all A and B.
 //! Source: [Saltelli 2010], table 2, (b) and (f).
 
-use crate::random::below;
+use rand::RngExt;
+
+use crate::random::stream;
 
 /// How much of the variance a parameter makes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,8 +43,9 @@ pub fn sobol_indices(y: &[f64], dimensions: usize, seed: u64) -> Option<Vec<Sobo
     let all: Vec<usize> = (0..sound.len()).collect();
     let found = estimate(&sound, &all, dimensions)?;
     let mut drawn: Vec<Vec<[f64; 2]>> = vec![Vec::with_capacity(DRAWS); dimensions];
-    for draw in 0..DRAWS {
-        let rows: Vec<usize> = (0..sound.len()).map(|k| below(sound.len(), seed, draw as u64, k as u64)).collect();
+    let mut numbers = stream(seed, 0);
+    for _ in 0..DRAWS {
+        let rows: Vec<usize> = all.iter().map(|_| numbers.random_range(0..sound.len())).collect();
         // A draw without variance says nothing.
         let Some(again) = estimate(&sound, &rows, dimensions) else { continue };
         drawn.iter_mut().zip(again).for_each(|(list, pair)| list.push(pair));

@@ -23,17 +23,14 @@ mod chance;
 mod distribution;
 mod effects;
 mod indices;
-mod joe_kuo;
 mod random;
 mod sample;
 mod search;
 mod sobol;
 
 pub use chance::{BeyondChance, beyond_chance};
-pub use distribution::{Distribution, normal_quantile};
+pub use distribution::Distribution;
 pub use effects::{EffectGroup, Grouping, MainEffect, Spread, main_effect, pareto_front, spread};
 pub use indices::{SobolIndex, sobol_indices};
-pub use random::uniform;
 pub use sample::{Sample, SampleMethod, grid_levels};
 pub use search::{Judged, LeastSearch};
-pub use sobol::SobolSequence;

@@ -1,7 +1,9 @@
 //! Designs: which points of a cube are tried. Each point can be had by its number alone.
 
-use crate::random::{permutation, uniform};
-use crate::sobol::SobolSequence;
+use rand::seq::SliceRandom;
+
+use crate::random::{stream, uniform};
+use crate::sobol;
 
 /// How the points are chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -10,7 +12,7 @@ pub enum SampleMethod {
     Random,
     /// Of n intervals of each coordinate every one is met once.
     LatinHypercube,
-    /// Sobol's sequence with its digits shifted.
+    /// Sobol's sequence with its digits shifted, otherwise for each 65536 points.
     Sobol,
     /// Saltelli's design for [`crate::sobol_indices`]: two points of Sobol's sequence, and the first with one coordinate after the
     /// other from the second.
@@ -30,8 +32,8 @@ impl SampleMethod {
     pub fn most_dimensions(self) -> usize {
         match self {
             Self::Random | Self::LatinHypercube => usize::MAX,
-            Self::Sobol => SobolSequence::MOST_DIMENSIONS,
-            Self::Saltelli => SobolSequence::MOST_DIMENSIONS / 2,
+            Self::Sobol => sobol::MOST_DIMENSIONS,
+            Self::Saltelli => sobol::MOST_DIMENSIONS / 2,
         }
     }
 }
@@ -45,7 +47,6 @@ pub struct Sample {
     seed: u64,
     /// Which interval each point takes, by dimension.
     order: Vec<Vec<usize>>,
-    sequence: Option<SobolSequence>,
 }
 
 impl Sample {
@@ -56,18 +57,16 @@ impl Sample {
         if dimensions > method.most_dimensions() {
             return None;
         }
+        let shuffled = |d: usize| {
+            let mut order: Vec<usize> = (0..count).collect();
+            order.shuffle(&mut stream(seed, 2 * d as u64 + 1));
+            order
+        };
         let order = match method {
-            SampleMethod::LatinHypercube => {
-                (0..dimensions).map(|d| permutation(count, seed, 2 * d as u64 + 1)).collect()
-            }
+            SampleMethod::LatinHypercube => (0..dimensions).map(shuffled).collect(),
             _ => Vec::new(),
         };
-        let sequence = match method {
-            SampleMethod::Sobol => SobolSequence::shifted(dimensions, seed),
-            SampleMethod::Saltelli => SobolSequence::shifted(2 * dimensions, seed),
-            _ => None,
-        };
-        Some(Self { method, dimensions, count, seed, order, sequence })
+        Some(Self { method, dimensions, count, seed, order })
     }
 
     /// How many points there are.
@@ -81,26 +80,19 @@ impl Sample {
     /// A coordinate of a point, between 0 and 1, neither of them.
     pub fn coordinate(&self, point: usize, dimension: usize) -> f64 {
         let own = || uniform(self.seed, 2 * dimension as u64, point as u64);
-        match (self.method, &self.sequence) {
-            (SampleMethod::LatinHypercube, _) => {
-                (self.order[dimension][point] as f64 + own()) / self.count.max(1) as f64
-            }
-            (SampleMethod::Sobol, Some(sequence)) => inside(sequence.coordinate(point as u64, dimension)),
-            (SampleMethod::Saltelli, Some(sequence)) => {
+        match self.method {
+            SampleMethod::Random => own(),
+            SampleMethod::LatinHypercube => (self.order[dimension][point] as f64 + own()) / self.count.max(1) as f64,
+            SampleMethod::Sobol => sobol::shifted(point, dimension, self.seed),
+            SampleMethod::Saltelli => {
                 let (base, place) = (point / (self.dimensions + 2), point % (self.dimensions + 2));
                 // A, B, then A with one coordinate of B.
                 let from_b = place == 1 || place == dimension + 2;
                 let column = dimension + if from_b { self.dimensions } else { 0 };
-                inside(sequence.coordinate(base as u64, column))
+                sobol::shifted(base, column, self.seed)
             }
-            _ => own(),
         }
     }
-}
-
-/// The middle of the interval that the digits leave.
-fn inside(x: f64) -> f64 {
-    x + (0.5f64).powi(53)
 }
 
 /// The levels of the `point`-th point of a full grid, the last parameter changing fastest.

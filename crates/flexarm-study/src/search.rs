@@ -8,9 +8,11 @@
 //! while most points violate them and falls while none does.
 
 use nalgebra::{DMatrix, DVector};
+use rand::RngExt;
+use rand::distr::Open01;
 
 use crate::distribution::normal_quantile;
-use crate::random::uniform;
+use crate::random::stream;
 
 /// What a point gave.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -89,8 +91,8 @@ impl LeastSearch {
         let root = self.root();
         let size = Self::size(n);
         let point = |k: usize| {
-            let stream = self.generation * size as u64 + k as u64;
-            let normal = DVector::from_fn(n, |c, _| normal_quantile(uniform(self.seed, stream, c as u64)));
+            let mut numbers = stream(self.seed, self.generation * size as u64 + k as u64);
+            let normal = DVector::from_fn(n, |_, _| normal_quantile(numbers.sample(Open01)));
             let step = if self.generation == 0 && k == 0 { DVector::zeros(n) } else { &root * normal * self.sigma };
             (&self.mean + step).map(|x| x.clamp(0.0, 1.0))
         };

@@ -1,89 +1,40 @@
 //! Sobol's sequence: points that fill a cube evenly, in any number.
 //!
-//! ```text
-//! v_k = m_k 2^(52-k),   m_k = 2 a_1 m_(k-1) ^ 4 a_2 m_(k-2) ^ ... ^ 2^s m_(k-s) ^ m_(k-s)        (1)
-//! x_i = xor of v_k over the ones of gray(i) = i ^ (i >> 1)                                       (2)
-//! ```
-//! Source: [Bratley and Fox 1988] for the method, [Joe and Kuo 2008] for the numbers.
+//! Source: [Joe and Kuo 2008].
 
-use crate::joe_kuo::{DIMENSIONS, POLYNOMIALS};
-use crate::random::bits;
+use rand::Rng;
+use sobol_burley::parts::sobol_rev;
 
-/// Digits of a coordinate, in base 2.
-const DIGITS: usize = 52;
+use crate::random::stream;
 
-/// The sequence in some dimensions, its digits shifted at random so that no coordinate is 0.
-#[derive(Clone, Debug)]
-pub struct SobolSequence {
-    /// Direction numbers of each dimension.
-    directions: Vec<[u64; DIGITS]>,
-    /// What each dimension's digits are exclusively or-ed with.
-    shifts: Vec<u64>,
+/// Maximum number of dimensions.
+pub(crate) const MOST_DIMENSIONS: usize = sobol_burley::NUM_DIMENSIONS as usize;
+/// Binary digits of the number of points, after which the sequence starts again with another shift.
+const BLOCK: u32 = 16;
+
+/// Returns a coordinate of the sequence as it is in books: its 32 binary digits after the point.
+fn digits(point: u32, dimension: usize) -> u32 {
+    let gray = point ^ (point >> 1);
+    sobol_rev(gray.reverse_bits(), dimension as u32).reverse_bits()
 }
 
-impl SobolSequence {
-    /// Most dimensions of the sequence.
-    pub const MOST_DIMENSIONS: usize = DIMENSIONS;
-
-    /// The sequence with its digits shifted; none for more dimensions than [`SobolSequence::MOST_DIMENSIONS`].
-    ///
-    /// A shift keeps how even the points are: every interval of length 2^-k has as many of 2^m points as before.
-    pub fn shifted(dimensions: usize, seed: u64) -> Option<Self> {
-        let plain = Self::plain(dimensions)?;
-        let shift = |dimension: usize| bits(seed, dimension as u64, 0) >> (64 - DIGITS);
-        Some(Self { shifts: (0..dimensions).map(shift).collect(), ..plain })
-    }
-
-    /// The sequence as it is in books, which begins at the origin.
-    pub fn plain(dimensions: usize) -> Option<Self> {
-        if dimensions > DIMENSIONS {
-            return None;
-        }
-        let directions = (0..dimensions).map(directions).collect();
-        Some(Self { directions, shifts: vec![0; dimensions] })
-    }
-
-    /// Coordinate of a point in [0, 1).
-    pub fn coordinate(&self, point: u64, dimension: usize) -> f64 {
-        let gray = point ^ (point >> 1);
-        let mut x = self.shifts[dimension];
-        for (k, v) in self.directions[dimension].iter().enumerate() {
-            if gray >> k & 1 == 1 {
-                x ^= v;
-            }
-        }
-        x as f64 * (0.5f64).powi(DIGITS as i32)
-    }
-}
-
-/// Direction numbers of a dimension, equation (1).
-fn directions(dimension: usize) -> [u64; DIGITS] {
-    let mut v = [0u64; DIGITS];
-    let Some((polynomial, first)) = dimension.checked_sub(1).map(|k| POLYNOMIALS[k]) else {
-        // The first dimension is van der Corput's sequence.
-        return std::array::from_fn(|k| 1 << (DIGITS - 1 - k));
-    };
-    let s = first.len();
-    for k in 0..DIGITS {
-        v[k] = match first.get(k) {
-            Some(m) => u64::from(*m) << (DIGITS - 1 - k),
-            None => {
-                let mut x = v[k - s] ^ (v[k - s] >> s);
-                for j in 1..s {
-                    if polynomial >> (s - j) & 1 == 1 {
-                        x ^= v[k - j];
-                    }
-                }
-                x
-            }
-        };
-    }
-    v
+/// Returns a coordinate with its digits shifted at random, between 0 and 1, neither of them.
+///
+/// A shift keeps how even the points are: every interval of length 2^-k has as many of 2^m points as before.
+pub(crate) fn shifted(point: usize, dimension: usize, seed: u64) -> f64 {
+    let mut shifts = stream(seed, dimension as u64);
+    shifts.set_word_pos((point >> BLOCK) as u128);
+    let point = point & ((1 << BLOCK) - 1);
+    (f64::from(digits(point as u32, dimension) ^ shifts.next_u32()) + 0.5) / 2f64.powi(32)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn plain(point: u32, dimension: usize) -> f64 {
+        f64::from(digits(point, dimension)) / 2f64.powi(32)
+    }
 
     /// Truth: the first points as scipy 1.17.1's `qmc.Sobol(scramble=False)` prints them, with the same direction numbers.
     #[test]
@@ -98,24 +49,21 @@ mod tests {
             [0.625, 0.125, 0.875, 0.625],
             [0.125, 0.625, 0.375, 0.125],
         ];
-        let sequence = SobolSequence::plain(4).unwrap();
         for (i, point) in expected.iter().enumerate() {
-            let found: [f64; 4] = std::array::from_fn(|d| sequence.coordinate(i as u64, d));
+            let found: [f64; 4] = std::array::from_fn(|d| plain(i as u32, d));
             assert_eq!(found, *point, "point {i}");
         }
     }
 
-    /// Truth: the same program, far out in the sequence and in its last dimensions.
+    /// Truth: the same program, far out in the sequence and in high dimensions.
     #[test]
     fn points_far_out_and_in_high_dimensions_are_those_of_joe_and_kuo() {
-        let sequence = SobolSequence::plain(128).unwrap();
         for (point, dimension, expected) in FAR {
-            assert_eq!(sequence.coordinate(point, dimension), expected, "point {point}, dimension {dimension}");
+            assert_eq!(plain(point, dimension), expected, "point {point}, dimension {dimension}");
         }
-        assert!(SobolSequence::plain(129).is_none());
     }
 
-    const FAR: [(u64, usize, f64); 9] = [
+    const FAR: [(u32, usize, f64); 9] = [
         (1000, 1, 0.0966796875),
         (1000, 2, 0.5185546875),
         (4999, 7, 0.9783935546875),
@@ -127,16 +75,17 @@ mod tests {
         (17, 127, 0.84375),
     ];
 
-    /// Truth: the definition of a (0, m, 1)-net: each of 2^m intervals holds one of 2^m points, shifted or not, in every dimension.
+    /// Truth: the definition of a (0, m, 1)-net: each of 2^m intervals holds one of 2^m points, in every dimension and block.
     #[test]
     fn every_interval_holds_one_point() {
-        for seed in 0..4 {
-            let sequence = SobolSequence::shifted(128, seed).unwrap();
-            for dimension in 0..128 {
+        for (seed, first) in [(0, 0), (1, 0), (0, 3 << BLOCK)] {
+            for dimension in 0..MOST_DIMENSIONS {
                 let mut seen = [false; 256];
-                (0..256).for_each(|i| seen[(256.0 * sequence.coordinate(i, dimension)) as usize] = true);
+                (0..256).for_each(|i| seen[(256.0 * shifted(first + i, dimension, seed)) as usize] = true);
                 assert!(seen.iter().all(|s| *s), "dimension {dimension}");
             }
         }
+        // Blocks are not the same points again.
+        assert_ne!(shifted(5, 2, 0), shifted((1 << BLOCK) + 5, 2, 0));
     }
 }
