@@ -5,7 +5,7 @@
 //!
 //! ```text
 //! R^2 = |Q^T r|^2 / |r|^2                            part that the orthonormal columns Q (q of them) explain of the residuals r   (1)
-//! R^2 ~ Beta(q/2, (d - q)/2)                         for random r with d degrees of freedom: the F test of a regression           (2)
+//! R^2 ~ Beta(q/2, (d - q)/2)                         for random r with d degrees of freedom                                       (2)
 //! ```
 //! The columns of a parameter are polynomials of its ranks. Parameters are taken one after the other, the strongest first (forward
 //! selection): what a stronger one explains is no scatter in which a weaker one is lost.
@@ -75,7 +75,8 @@ pub fn beyond_chance(columns: &[Vec<f64>], y: &[f64]) -> BeyondChance {
     found
 }
 
-/// Returns the part of the variance that the strongest of so many parameters reaches by chance with probability [`LEVEL`], by (2).
+/// Returns the part of the variance that the strongest of so many parameters without effect exceeds
+/// with probability [`LEVEL`], by (2), which is the F test of a regression.
 fn threshold(terms: usize, freedom: usize, parameters: usize) -> f64 {
     if freedom <= terms {
         return 1.0;

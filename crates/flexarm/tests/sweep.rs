@@ -188,6 +188,34 @@ fn shards_that_are_missing_twice_there_or_of_another_study_are_told() {
     std::fs::remove_dir_all(&place).unwrap();
 }
 
+/// Truth: a folder whose points another program drew must not get points of this one beside them.
+#[test]
+fn a_study_whose_points_were_drawn_differently_is_not_resumed() {
+    let place = folder("drawn");
+    let text = format!("{REFERENCE}{SCATTER}");
+    let request = request(place.join("out"));
+    study(&place, &text).unwrap().run(&request, &mut go_on).unwrap();
+    let manifest = place.join("out/study.json");
+    let known: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&manifest).unwrap()).unwrap();
+    let is_drawn = |input: &serde_json::Value| input[0] == "the drawn points";
+    for (forget, said) in [(false, "the content of the drawn points"), (true, "the drawn points, which only one has")] {
+        let mut other = known.clone();
+        other["fingerprint"] = "0".into();
+        let inputs = other["inputs"].as_array_mut().unwrap();
+        let drawn = inputs.iter().position(is_drawn).unwrap();
+        if forget {
+            inputs.remove(drawn);
+        } else {
+            inputs[drawn][1] = "0".into();
+        }
+        std::fs::write(&manifest, other.to_string()).unwrap();
+        let refused = study(&place, &text).unwrap().run(&request, &mut go_on).unwrap_err();
+        assert!(matches!(&refused, Error::Sweep(SweepError::Foreign { .. })), "{refused}");
+        assert!(refused.to_string().contains(said), "{refused}");
+    }
+    std::fs::remove_dir_all(&place).unwrap();
+}
+
 /// Truth: the table of a study that nobody stopped.
 #[test]
 fn a_study_that_was_stopped_goes_on_and_runs_nothing_twice() {

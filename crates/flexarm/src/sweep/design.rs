@@ -147,6 +147,15 @@ impl Design {
         &self.drawn
     }
 
+    /// Returns the coordinates of the first, the middle and the last drawn point; the bits are the same on
+    /// every machine. They differ between programs that draw differently. Empty if nothing is drawn.
+    pub(super) fn drawn_coordinates(&self) -> Vec<f64> {
+        let points = self.sample.points();
+        let places = [0, points / 2, points.saturating_sub(1)];
+        let dimensions = 0..self.drawn.len();
+        places.iter().flat_map(|point| dimensions.clone().map(|d| self.sample.coordinate(*point, d))).collect()
+    }
+
     /// The values of a run, in the order of the columns.
     pub(super) fn values(&self, run: usize) -> Vec<ParameterValue> {
         let points = self.runs / self.grid_points().max(1);

@@ -64,6 +64,8 @@ pub use self::value::ParameterValue;
 
 /// What is asked of each run where the study does not say.
 const USUAL_METRICS: [&str; 4] = ["tcp.peak_m", "tcp.rms_m", "tcp.end_m", "tcp.static_sag_m"];
+/// The input that stands for how points are drawn.
+const DRAWN_POINTS: &str = "the drawn points";
 /// The page of a study.
 const PAGE: &str = "report.html";
 /// Runs that a thread takes at a time where four go side by side.
@@ -340,6 +342,11 @@ impl Sweep {
             fingerprint(self.file.text.as_bytes()),
         )];
         inputs.extend(self.workshop.inputs());
+        let drawn = self.design.drawn_coordinates();
+        if !drawn.is_empty() {
+            let bytes: Vec<u8> = drawn.iter().flat_map(|coordinate| coordinate.to_le_bytes()).collect();
+            inputs.push((DRAWN_POINTS.into(), fingerprint(&bytes)));
+        }
         let mut manifest = Manifest {
             format: 1,
             fingerprint: String::new(),

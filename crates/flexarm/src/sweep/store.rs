@@ -51,7 +51,7 @@ pub(super) struct Manifest {
     pub(super) runs: usize,
     pub(super) parameters: Vec<String>,
     pub(super) metrics: Vec<String>,
-    /// The files that it was made of, with a fingerprint of each.
+    /// The files that it was made of and some drawn points, with a fingerprint of each.
     pub(super) inputs: Vec<(String, String)>,
     /// Where the file of the study was.
     pub(super) file: String,
@@ -71,6 +71,9 @@ impl Manifest {
                 _ => {}
             }
         }
+        let is_new = |name: &String| self.inputs.iter().all(|(known, _)| known != name);
+        let new = other.inputs.iter().map(|(name, _)| name).filter(|name| is_new(name));
+        told.extend(new.map(|name| format!("{name}, which only one has")));
         if self.flexarm != other.flexarm {
             told.push(format!("versions {} and {} of the program", self.flexarm, other.flexarm));
         }
