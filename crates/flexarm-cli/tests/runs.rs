@@ -666,6 +666,7 @@ mod stopped {
         assert_eq!((answer.code, answer.out.as_str()), (1, ""), "{}", answer.err);
         answer.says(&["stopped at t = ", "readable"]);
         let (stop, last) = (time_in(&answer.err), readable(&place));
-        assert!((stop - last).abs() < 1e-3, "stopped at {stop}, logged to {last}");
+        // A sample every millisecond; the message rounds the time to a millisecond too.
+        assert!((stop - last).abs() < 1.6e-3, "stopped at {stop}, logged to {last}");
     }
 }
