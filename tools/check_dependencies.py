@@ -27,7 +27,7 @@ LINES = ["packages", "faces", "proof", "facade", "edges", "results", "motion", "
 FACES = ("packages", "faces")  # what people hold: words, signals, the end of the process
 INNER = ["results", "motion", "links", "base", "words", "algebra"]
 OWNERS = {  # outside crate: lines that may name it
-    **dict.fromkeys(["rerun", "mcap", "parquet", "arrow-array", "arrow-ipc", "arrow-schema", "rustix", "zstd", "lz4_flex", "bzip2", "rusqlite",
+    **dict.fromkeys(["rerun", "mcap", "re_cdr", "parquet", "arrow-array", "arrow-ipc", "arrow-schema", "rustix", "zstd", "lz4_flex", "bzip2", "rusqlite",
                      "urdf-rs", "saphyr-parser"], ["edges"]),
     **dict.fromkeys(["png", "plotters", "rand", "sobol_burley", "statrs"], ["results"]), "hdf5-pure": ["links"], "diffsol": ["motion"],
     **dict.fromkeys(["faer", "metis-sys"], ["base"]), "toml_edit": ["facade"],

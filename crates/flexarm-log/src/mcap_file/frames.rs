@@ -4,8 +4,7 @@ use flexarm_kinematics::Pose;
 
 use super::beat::Beat;
 use super::bent::BentLink;
-use super::cdr::Cdr;
-use super::messages::{self, Stamp, Transform};
+use super::messages::Transform;
 use crate::poses::{PoseClock, Shown};
 use crate::{LinkInfo, RunHeader, Sample, TwinSample};
 use flexarm_draw::Magnifier;
@@ -141,10 +140,9 @@ impl Frames {
         }
     }
 
-    /// What writes the frames of the last sample, once, if it was not one for poses.
-    pub(crate) fn close(&mut self) -> Option<impl FnOnce(&mut Cdr, Stamp)> {
-        let this = std::mem::take(&mut self.kept).then_some(&*self);
-        this.map(|this| move |cdr: &mut Cdr, stamp| this.write(cdr, stamp, &this.unshown, Moving::Yes))
+    /// Returns the transforms of the last sample, once, if it was not one for poses.
+    pub(crate) fn close(&mut self) -> Option<Vec<Transform<'_>>> {
+        std::mem::take(&mut self.kept).then(|| self.transforms(&self.unshown, Moving::Yes))
     }
 
     /// Whether this sample is one for a picture.
@@ -157,8 +155,8 @@ impl Frames {
         (self.due && self.magnifier.is_some()).then_some(&self.magnified)
     }
 
-    /// Writes the transforms of the frames that move, or of those that do not.
-    pub(crate) fn write(&self, cdr: &mut Cdr, stamp: Stamp, sample: &Sample, moving: Moving) {
+    /// Returns the transforms of the frames that move, or of those that do not.
+    pub(crate) fn transforms(&self, sample: &Sample, moving: Moving) -> Vec<Transform<'_>> {
         let mut transforms = Vec::with_capacity(3 * self.links.len());
         self.tree(&mut transforms, &sample.flexible, moving, Tree::Flexible);
         if self.has_rigid {
@@ -182,7 +180,7 @@ impl Frames {
                 transforms.extend(slabs.map(|(X_PC, child)| Transform { parent, child, X_PC, coarse: true }));
             }
         }
-        messages::transforms(cdr, stamp, &transforms);
+        transforms
     }
 
     fn tree<'a>(&'a self, transforms: &mut Vec<Transform<'a>>, twin: &TwinSample, moving: Moving, tree: Tree) {

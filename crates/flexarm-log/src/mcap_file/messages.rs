@@ -1,9 +1,40 @@
-//! The ROS 2 messages of a recording, written field by field.
+//! The ROS 2 messages of a recording, and their bytes: plain CDR, little endian [OMG DDSI-RTPS 2.5, section 10].
+//!
+//! CDR has values and no names, so a message is a tuple of its fields, in the order of its definition.
+
+use std::io;
 
 use flexarm_kinematics::Pose;
 use nalgebra::UnitQuaternion;
+use re_cdr::{CdrSerializer, LittleEndian};
+use serde::{Deserialize, Serialize};
 
-use super::cdr::Cdr;
+/// Encapsulation header: CDR, little endian, no options.
+const ENCAPSULATION: [u8; 4] = [0x00, 0x01, 0x00, 0x00];
+
+/// Replaces `bytes` by those of a message.
+pub(crate) fn encode(message: impl Serialize, bytes: &mut Vec<u8>) -> io::Result<()> {
+    bytes.clear();
+    bytes.extend(ENCAPSULATION);
+    message.serialize(&mut CdrSerializer::<LittleEndian>::new(bytes)).map_err(io::Error::other)
+}
+
+/// Returns the fields at the beginning of a message; `None` if its bytes are not these.
+pub(crate) fn decode<'m, T: Deserialize<'m>>(bytes: &'m [u8]) -> Option<T> {
+    let (fields, _) = re_cdr::from_bytes::<T, LittleEndian>(bytes.strip_prefix(&ENCAPSULATION)?).ok()?;
+    Some(fields)
+}
+
+/// `builtin_interfaces/Time`: s, ns.
+pub(crate) type Time = (u32, u32);
+/// `std_msgs/Header`: time, frame.
+pub(crate) type Header<'a> = (Time, &'a str);
+/// `tf2_msgs/TFMessage`: header, frame, translation and quaternion x, y, z, w.
+pub(crate) type Transforms<'a> = Vec<(Header<'a>, &'a str, [f64; 7])>;
+/// `sensor_msgs/JointState`: header, names, positions, velocities, efforts.
+pub(crate) type JointState<'a> = (Header<'a>, Vec<&'a str>, Vec<f64>, Vec<f64>, Vec<f64>);
+/// `std_msgs/Float64MultiArray`: dimensions (label, size, stride), offset, values.
+pub(crate) type LabelledArray<'a> = (Vec<(&'a str, u32, u32)>, u32, Vec<f64>);
 
 /// Time of a message since the epoch of the recording's clock (ns); at most [`Stamp::MAX`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,6 +43,11 @@ pub(crate) struct Stamp(pub(crate) u64);
 impl Stamp {
     /// Largest time of `builtin_interfaces/Time`, whose seconds are an `int32`.
     pub(crate) const MAX: u64 = i32::MAX as u64 * 1_000_000_000;
+
+    fn time(self) -> Time {
+        let seconds = u32::try_from(self.0 / 1_000_000_000).expect("a stamp is at most Stamp::MAX");
+        (seconds, (self.0 % 1_000_000_000) as u32)
+    }
 }
 
 /// A coordinate frame and the one it is given in.
@@ -23,88 +59,42 @@ pub(crate) struct Transform<'a> {
     pub(crate) coarse: bool,
 }
 
-/// `builtin_interfaces/Time`.
-fn time(cdr: &mut Cdr, stamp: Stamp) {
-    let (seconds, nanoseconds) = (stamp.0 / 1_000_000_000, stamp.0 % 1_000_000_000);
-    cdr.i32(i32::try_from(seconds).expect("a stamp is at most Stamp::MAX"));
-    cdr.u32(nanoseconds as u32);
-}
-
-fn header(cdr: &mut Cdr, stamp: Stamp, frame_id: &str) {
-    time(cdr, stamp);
-    cdr.string(frame_id);
-}
-
 /// Translation, then quaternion x, y, z, w: the order of both `Pose` and `Transform`.
-fn pose(cdr: &mut Cdr, X: &Pose) {
-    let rotation = UnitQuaternion::from_rotation_matrix(&X.rotation);
-    cdr.f64s(X.translation.vector.as_slice()).f64s(rotation.coords.as_slice());
-}
-
-/// The same with the precision of `f32`.
-fn coarse_pose(cdr: &mut Cdr, X: &Pose) {
-    let rotation = UnitQuaternion::from_rotation_matrix(&X.rotation);
-    for value in X.translation.vector.iter().chain(rotation.coords.iter()) {
-        cdr.f64(f64::from(*value as f32));
-    }
-}
-
-/// `std_msgs/String`.
-pub(crate) fn string(cdr: &mut Cdr, text: &str) {
-    cdr.start().string(text);
+fn pose(X: &Pose) -> [f64; 7] {
+    let [x, y, z] = X.translation.vector.into();
+    let [qx, qy, qz, qw] = UnitQuaternion::from_rotation_matrix(&X.rotation).coords.into();
+    [x, y, z, qx, qy, qz, qw]
 }
 
 /// `tf2_msgs/TFMessage`.
-pub(crate) fn transforms(cdr: &mut Cdr, stamp: Stamp, transforms: &[Transform<'_>]) {
-    cdr.start().length(transforms.len());
-    for transform in transforms {
-        header(cdr, stamp, transform.parent);
-        cdr.string(transform.child);
-        match transform.coarse {
-            false => pose(cdr, &transform.X_PC),
-            true => coarse_pose(cdr, &transform.X_PC),
-        }
-    }
-}
-
-/// What is the same in all messages of some joints: frame and names, as they follow the time.
-pub(crate) struct JointNames(Vec<u8>);
-
-impl JointNames {
-    pub(crate) fn new(names: &[String]) -> Self {
-        let mut cdr = Cdr::default();
-        time(cdr.start(), Stamp(0));
-        let before = cdr.bytes().len();
-        cdr.string("").string_sequence(names);
-        Self(cdr.bytes()[before..].to_vec())
-    }
+pub(crate) fn transforms<'a>(stamp: Stamp, transforms: &[Transform<'a>]) -> Transforms<'a> {
+    let message = |transform: &Transform<'a>| {
+        let fine = pose(&transform.X_PC);
+        let pose = if transform.coarse { fine.map(|value| f64::from(value as f32)) } else { fine };
+        ((stamp.time(), transform.parent), transform.child, pose)
+    };
+    transforms.iter().map(message).collect()
 }
 
 /// `sensor_msgs/JointState` with positions, velocities and efforts.
-pub(crate) fn joint_state(cdr: &mut Cdr, stamp: Stamp, names: &JointNames, values: [&[f64]; 3]) {
-    time(cdr.start(), stamp);
-    cdr.made(&names.0);
-    for values in values {
-        cdr.f64_sequence(values);
-    }
+pub(crate) fn joint_state(stamp: Stamp, names: &[String], [q, qdot, effort]: [&[f64]; 3]) -> impl Serialize {
+    ((stamp.time(), ""), names, q, qdot, effort)
 }
 
 /// `geometry_msgs/PoseStamped`.
-pub(crate) fn pose_stamped(cdr: &mut Cdr, stamp: Stamp, frame_id: &str, X: &Pose) {
-    header(cdr.start(), stamp, frame_id);
-    pose(cdr, X);
+pub(crate) fn pose_stamped(stamp: Stamp, frame: &str, X: &Pose) -> impl Serialize {
+    ((stamp.time(), frame), pose(X))
 }
 
 /// `geometry_msgs/TwistStamped` or `WrenchStamped`: two vectors, linear first.
-pub(crate) fn six_vector_stamped(cdr: &mut Cdr, stamp: Stamp, frame_id: &str, values: &[f64; 6]) {
-    header(cdr.start(), stamp, frame_id);
-    cdr.f64s(values);
+pub(crate) fn six_vector_stamped(stamp: Stamp, frame: &str, values: &[f64; 6]) -> impl Serialize {
+    ((stamp.time(), frame), values)
 }
 
 /// `std_msgs/Float64MultiArray` with one dimension, labelled with the names of the entries.
-pub(crate) fn labelled_array(cdr: &mut Cdr, labels: &str, values: &[f64]) {
-    cdr.start().length(1).string(labels).length(values.len()).length(values.len());
-    cdr.u32(0).f64_sequence(values);
+pub(crate) fn labelled_array(labels: &str, values: &[f64]) -> impl Serialize {
+    let size = u32::try_from(values.len()).expect("a list of a recording has fewer than 2^32 entries");
+    ([(labels, size, size)].to_vec(), 0_u32, values)
 }
 
 /// How bad an event is, in the words of `rcl_interfaces/Log`.
@@ -116,11 +106,9 @@ pub(crate) enum Level {
     Error = 40,
 }
 
-/// `rcl_interfaces/Log`.
-pub(crate) fn log(cdr: &mut Cdr, stamp: Stamp, level: Level, name: &str, text: &str) {
-    time(cdr.start(), stamp);
-    cdr.u8(level as u8).string(name).string(text);
-    cdr.string("").string("").u32(0); // file, function, line
+/// `rcl_interfaces/Log`; file, function and line of a program are empty.
+pub(crate) fn log(stamp: Stamp, level: Level, name: &str, text: &str) -> impl Serialize {
+    (stamp.time(), level as u8, name, text, "", "", 0_u32)
 }
 
 /// Kinds of `visualization_msgs/Marker` in use.
@@ -151,27 +139,60 @@ pub(crate) struct Marker<'a> {
     pub(crate) text: String,
 }
 
-/// `visualization_msgs/MarkerArray`: all markers move with their frames.
-pub(crate) fn markers(cdr: &mut Cdr, stamp: Stamp, markers: &[Marker<'_>]) {
+/// `visualization_msgs/MarkerArray`: all markers move with their frames, for ever.
+pub(crate) fn markers<'a>(stamp: Stamp, markers: &'a [Marker<'a>]) -> impl Serialize {
     const ADD: i32 = 0;
-    cdr.start().length(markers.len());
-    for marker in markers {
-        header(cdr, stamp, marker.frame);
-        cdr.string(marker.namespace).i32(i32::try_from(marker.id).expect("a robot has fewer than 2^31 meshes"));
-        cdr.i32(marker.kind as i32).i32(ADD);
-        cdr.f64s(&marker.place).f64s(&[0.0, 0.0, 0.0, 1.0]).f64s(&marker.scale);
-        for part in marker.color {
-            cdr.f32(part);
-        }
-        cdr.i32(0).u32(0); // lifetime: for ever
-        cdr.u8(1); // locked to its frame
-        cdr.length(marker.points.len());
-        for point in &marker.points {
-            cdr.f64s(&point.map(f64::from));
-        }
-        cdr.length(0).string(""); // colours of points, texture
-        cdr.i32(0).u32(0).string("").string("").length(0); // image of the texture: header, format, data
-        cdr.length(0).string(&marker.text); // coordinates on the texture
-        cdr.string("").string("").length(0).u8(0); // mesh resource, mesh file, its materials
+    const NO_LIST: u32 = 0;
+    const NO_TIME: Time = (0, 0);
+    let message = |marker: &'a Marker<'a>| {
+        let id = i32::try_from(marker.id).expect("a robot has fewer than 2^31 meshes");
+        let what = ((stamp.time(), marker.frame), marker.namespace, id, marker.kind as i32, ADD);
+        let pose = (marker.place, [0.0, 0.0, 0.0, 1.0]);
+        let is_locked_to_frame = true;
+        let points: Vec<[f64; 3]> = marker.points.iter().map(|point| point.map(f64::from)).collect();
+        // Colours of points; resource and image of the texture; coordinates on it.
+        let texture = (NO_LIST, "", (NO_TIME, "", "", NO_LIST), NO_LIST);
+        // Resource; name and content of the file; whether its materials are used.
+        let mesh = ("", ("", NO_LIST), false);
+        (
+            what,
+            pose,
+            marker.scale,
+            marker.color,
+            NO_TIME,
+            is_locked_to_frame,
+            points,
+            texture,
+            marker.text.as_str(),
+            mesh,
+        )
+    };
+    markers.iter().map(message).collect::<Vec<_>>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Truth: worked out by hand from the alignment rule.
+    #[test]
+    fn values_start_at_multiples_of_their_size() {
+        let expected: Vec<u8> = [
+            vec![0, 1, 0, 0],                   // encapsulation, not counted
+            vec![7, 0, 0, 0],                   // at 0
+            vec![3, 0, 0, 0, b'a', b'b', 0],    // at 4: length with the zero
+            vec![0],                            // padding to 12
+            vec![1, 0, 0, 0],                   // at 12: count
+            vec![0, 0, 0, 0, 0, 0, 0xf0, 0x3f], // at 16: 1.0
+        ]
+        .concat();
+        let mut bytes = Vec::new();
+        encode((7_u32, "ab", &[1.0_f64][..]), &mut bytes).unwrap();
+        assert_eq!(bytes, expected);
+        assert_eq!(decode(&bytes), Some((7_u32, "ab", vec![1.0_f64])));
+
+        // An empty sequence ends after its count: no padding for elements that are not there.
+        encode(Vec::<f64>::new(), &mut bytes).unwrap();
+        assert_eq!(bytes, [0, 1, 0, 0, 0, 0, 0, 0]);
     }
 }

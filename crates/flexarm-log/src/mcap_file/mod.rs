@@ -5,31 +5,31 @@
 //! are in the file once they are closed: up to there readers that need no index read what a killed
 //! run leaves. The `mcap` crate writes them ([`output`]).
 //!
-//! Start at [`McapRecorder`]; topics are in [`channels`], messages in [`messages`] and [`cdr`], coordinate frames in
-//! [`frames`], what viewers draw in [`markers`].
+//! Start at [`McapRecorder`]; topics are in [`channels`], messages in [`messages`], coordinate frames in [`frames`], what
+//! viewers draw in [`markers`].
 
 mod beat;
 mod bent;
-mod cdr;
 pub(crate) mod channels;
 mod definitions;
 mod frames;
 pub(crate) mod layouts;
 mod markers;
 mod mesh_files;
-mod messages;
+pub(crate) mod messages;
 mod output;
 
 use std::fs::File;
 use std::io;
 use std::path::Path;
 
-use self::cdr::Cdr;
+use serde::Serialize;
+
 use self::channels::Channels;
 use self::frames::{Frames, Moving, WORLD};
 use self::markers::{MovingMarkers, SurfaceFrames};
 use self::mesh_files::mesh_files;
-use self::messages::{JointNames, Level, Stamp};
+use self::messages::{Level, Stamp};
 use self::output::Output;
 use crate::file_recorder::{FileRecorder, OpenFile};
 use crate::shape::Shape;
@@ -124,10 +124,10 @@ pub struct McapFile {
     shape: Shape,
     frames: Frames,
     markers: MovingMarkers,
-    joints: JointNames,
+    joints: Vec<String>,
     elements: Vec<String>,
     /// `<element>/x` and so on.
-    deflections: JointNames,
+    deflections: Vec<String>,
     /// Label of the contributions.
     contributions: String,
     start: Stamp,
@@ -157,9 +157,9 @@ impl McapFile {
             shape: Shape::of(header),
             frames: Frames::of(header),
             markers: MovingMarkers::new(header),
-            joints: JointNames::new(&header.joints),
+            joints: header.joints.clone(),
             elements: header.elements.clone(),
-            deflections: JointNames::new(&parts(&header.elements, &["x", "y", "z", "rx", "ry", "rz"], "/")),
+            deflections: parts(&header.elements, &["x", "y", "z", "rx", "ry", "rz"], "/"),
             contributions: parts(&header.contributors, &["x [m]", "y [m]", "z [m]"], " ").join(","),
             start,
             last: start,
@@ -177,12 +177,12 @@ impl McapFile {
     fn describe(&mut self, header: &RunHeader, meshes: &[crate::Attachment]) -> io::Result<()> {
         let (start, output) = (self.start, &mut self.output);
         if let Some(channel) = self.channels.robot_description {
-            output.send(channel, 0, start, |cdr| messages::string(cdr, &header.urdf))?;
+            output.send(channel, 0, start, &header.urdf)?;
         }
         if let Some(channel) = self.channels.markers.surfaces {
             let frames = SurfaceFrames::of(header);
             let surfaces = markers::surfaces(header, &frames);
-            output.send(channel, 0, start, |cdr| messages::markers(cdr, start, &surfaces))?;
+            output.send(channel, 0, start, messages::markers(start, &surfaces))?;
         }
 
         let recording = [
@@ -219,34 +219,34 @@ impl McapFile {
         // Frames. What does not move is known only with the first sample.
         let shown = self.frames.advance(since_start, sample);
         if self.samples == 0 {
-            let write = |cdr: &mut Cdr| self.frames.write(cdr, stamp, sample, Moving::No);
-            self.output.send(self.channels.tf_static, 0, stamp, write)?;
+            let fixed = messages::transforms(stamp, &self.frames.transforms(sample, Moving::No));
+            self.output.send(self.channels.tf_static, 0, stamp, fixed)?;
         }
         if shown {
-            let write = |cdr: &mut Cdr| self.frames.write(cdr, stamp, sample, Moving::Yes);
-            self.output.send(self.channels.tf, self.poses, stamp, write)?;
+            let moving = messages::transforms(stamp, &self.frames.transforms(sample, Moving::Yes));
+            self.output.send(self.channels.tf, self.poses, stamp, moving)?;
             self.poses = self.poses.wrapping_add(1);
         }
 
         // Joints and tool centre point of either robot.
         self.joint_states(self.channels.joint_states, stamp, &sample.flexible)?;
         let tool = &sample.flexible.X_WT;
-        self.send(self.channels.tcp_flexible, stamp, |cdr| messages::pose_stamped(cdr, stamp, WORLD, tool))?;
+        self.send(self.channels.tcp_flexible, stamp, messages::pose_stamped(stamp, WORLD, tool))?;
         if let Some((channels, rigid)) = rigid {
             self.joint_states(channels.joint_states, stamp, rigid)?;
-            self.send(channels.tcp, stamp, |cdr| messages::pose_stamped(cdr, stamp, WORLD, &rigid.X_WT))?;
+            self.send(channels.tcp, stamp, messages::pose_stamped(stamp, WORLD, &rigid.X_WT))?;
             self.error(stamp, channels.error, channels.error_plot, "x [m],y [m],z [m],norm [m]", &sample.error_world)?;
             let axes = "tangential [m],normal [m],binormal [m],norm [m]";
             self.error(stamp, channels.error_path, channels.error_path_plot, axes, &sample.error_path)?;
         }
         if let Some(channel) = self.channels.static_error {
-            let write = |cdr: &mut Cdr| messages::labelled_array(cdr, "x [m],y [m],z [m]", &sample.static_m);
-            self.output.send(channel, self.samples, stamp, write)?;
+            let message = messages::labelled_array("x [m],y [m],z [m]", &sample.static_m);
+            self.output.send(channel, self.samples, stamp, message)?;
         }
         if let Some(channel) = self.channels.contributions {
             let shares = sample.contributions.as_flattened();
-            let write = |cdr: &mut Cdr| messages::labelled_array(cdr, &self.contributions, shares);
-            self.output.send(channel, self.samples, stamp, write)?;
+            let message = messages::labelled_array(&self.contributions, shares);
+            self.output.send(channel, self.samples, stamp, message)?;
         }
 
         self.elastic(stamp, sample)?;
@@ -255,9 +255,9 @@ impl McapFile {
         let energy = &sample.energy;
         let energies = [energy.kinetic, energy.potential, energy.elastic];
         let labels = "kinetic [J],potential [J],elastic [J]";
-        self.send(self.channels.energy, stamp, |cdr| messages::labelled_array(cdr, labels, &energies))?;
+        self.send(self.channels.energy, stamp, messages::labelled_array(labels, &energies))?;
         let labels = "iterations,residual";
-        self.send(self.channels.solver, stamp, |cdr| messages::labelled_array(cdr, labels, &sample.solver))?;
+        self.send(self.channels.solver, stamp, messages::labelled_array(labels, &sample.solver))?;
 
         // Pictures.
         let (paths, error) = self.markers.advance(since_start, sample, self.frames.magnified());
@@ -267,7 +267,7 @@ impl McapFile {
         }
         if let Some(channel) = self.channels.markers.error.filter(|_| error) {
             let arrow = self.markers.error(sample);
-            self.output.send(channel, self.errors, stamp, |cdr| messages::markers(cdr, stamp, &arrow))?;
+            self.output.send(channel, self.errors, stamp, messages::markers(stamp, &arrow))?;
             self.errors = self.errors.wrapping_add(1);
         }
 
@@ -276,13 +276,13 @@ impl McapFile {
     }
 
     /// A message of a topic that has one of each sample.
-    fn send(&mut self, channel: u16, stamp: Stamp, write: impl FnOnce(&mut Cdr)) -> io::Result<()> {
-        self.output.send(channel, self.samples, stamp, write)
+    fn send(&mut self, channel: u16, stamp: Stamp, message: impl Serialize) -> io::Result<()> {
+        self.output.send(channel, self.samples, stamp, message)
     }
 
     fn joint_states(&mut self, channel: u16, stamp: Stamp, twin: &TwinSample) -> io::Result<()> {
         let values = [&twin.q, &twin.qdot, &twin.effort].map(Vec::as_slice);
-        self.output.send(channel, self.samples, stamp, |cdr| messages::joint_state(cdr, stamp, &self.joints, values))
+        self.output.send(channel, self.samples, stamp, messages::joint_state(stamp, &self.joints, values))
     }
 
     /// Deflections and loads: all by name with each sample, and one topic pair per element for what draws them.
@@ -293,15 +293,15 @@ impl McapFile {
             self.values.extend(sample.elastic.iter().flat_map(|element| element.load));
             let (deflections, loads) = self.values.split_at(self.values.len() / 2);
             let values = [deflections, &[], loads];
-            let write = |cdr: &mut Cdr| messages::joint_state(cdr, stamp, &self.deflections, values);
-            self.output.send(channel, self.samples, stamp, write)?;
+            let message = messages::joint_state(stamp, &self.deflections, values);
+            self.output.send(channel, self.samples, stamp, message)?;
         }
         if self.frames.is_pictured() {
             for (index, element) in sample.elastic.iter().enumerate() {
                 let (channels, name) = (self.channels.elastic[index], &self.elements[index]);
-                let load = |cdr: &mut Cdr| messages::six_vector_stamped(cdr, stamp, name, &element.load);
+                let load = messages::six_vector_stamped(stamp, name, &element.load);
                 self.output.send(channels.load, self.pictures, stamp, load)?;
-                let deflection = |cdr: &mut Cdr| messages::six_vector_stamped(cdr, stamp, name, &element.deflection);
+                let deflection = messages::six_vector_stamped(stamp, name, &element.deflection);
                 self.output.send(channels.deflection, self.pictures, stamp, deflection)?;
             }
             self.pictures = self.pictures.wrapping_add(1);
@@ -311,10 +311,10 @@ impl McapFile {
 
     /// An error as a six-vector, and its translation with the norm as plain numbers.
     fn error(&mut self, stamp: Stamp, vector: u16, plot: u16, axes: &str, error: &[f64; 6]) -> io::Result<()> {
-        self.send(vector, stamp, |cdr| messages::six_vector_stamped(cdr, stamp, WORLD, error))?;
+        self.send(vector, stamp, messages::six_vector_stamped(stamp, WORLD, error))?;
         let [x, y, z, ..] = *error;
         let norm = (x * x + y * y + z * z).sqrt();
-        self.send(plot, stamp, |cdr| messages::labelled_array(cdr, axes, &[x, y, z, norm]))
+        self.send(plot, stamp, messages::labelled_array(axes, &[x, y, z, norm]))
     }
 
     /// The paths up to the last sample, unless they are in the file already.
@@ -325,7 +325,7 @@ impl McapFile {
             return Ok(());
         }
         let channel = self.channels.markers.paths;
-        self.output.send(channel, self.paths, stamp, |cdr| messages::markers(cdr, stamp, &paths))?;
+        self.output.send(channel, self.paths, stamp, messages::markers(stamp, &paths))?;
         self.paths = self.paths.wrapping_add(1);
         self.paths_at = Some(stamp);
         Ok(())
@@ -333,9 +333,9 @@ impl McapFile {
 
     /// The frames of the last sample, unless they are in the file already.
     fn last_frames(&mut self) -> io::Result<()> {
-        let Some(write) = self.frames.close() else { return Ok(()) };
-        let stamp = self.last;
-        self.output.send(self.channels.tf, self.poses, stamp, |cdr| write(cdr, stamp))
+        let Some(transforms) = self.frames.close() else { return Ok(()) };
+        let message = messages::transforms(self.last, &transforms);
+        self.output.send(self.channels.tf, self.poses, self.last, message)
     }
 
     /// The last frames and paths, the events, the result and the index.
@@ -350,8 +350,8 @@ impl McapFile {
                 EventKind::Limit => Level::Warn,
                 _ => Level::Info,
             };
-            let write = |cdr: &mut Cdr| messages::log(cdr, *stamp, level, event.kind.word(), &event.text);
-            self.output.send(self.channels.events, sequence, *stamp, write)?;
+            let message = messages::log(*stamp, level, event.kind.word(), &event.text);
+            self.output.send(self.channels.events, sequence, *stamp, message)?;
         }
         self.output.metadata("flexarm.result", result.figures.iter().cloned())?;
         for file in [crate::run_json::result_file(result)].iter().chain(&result.attachments) {

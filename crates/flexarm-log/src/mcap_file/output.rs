@@ -8,9 +8,9 @@ use std::io::{self, Seek, SeekFrom, Write};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{McapError, WriteOptions, Writer};
+use serde::Serialize;
 
-use super::cdr::Cdr;
-use super::messages::Stamp;
+use super::messages::{Stamp, encode};
 use crate::written_behind::WrittenBehind;
 
 /// A chunk is closed when its messages have so many bytes, or span so much simulated time (ns):
@@ -32,7 +32,8 @@ pub(crate) struct Output {
     /// Bytes of the messages in the open chunk, and the time of the first.
     held: usize,
     begun: Option<Stamp>,
-    cdr: Cdr,
+    /// Bytes of the last message; the memory is used again.
+    message: Vec<u8>,
     /// The library must not be called any more.
     finished: bool,
 }
@@ -47,7 +48,7 @@ impl Output {
             .compression_level(COMPRESSION)
             .compression_threads(0);
         let writer = options.create(NoSeek::new(WholeRecords::new(file))).map_err(io_error)?;
-        Ok(Self { writer, held: 0, begun: None, cdr: Cdr::default(), finished: false })
+        Ok(Self { writer, held: 0, begun: None, message: Vec::new(), finished: false })
     }
 
     /// Adds a topic of ROS 2 messages; returns its number.
@@ -68,13 +69,13 @@ impl Output {
         channel: u16,
         sequence: u32,
         stamp: Stamp,
-        write: impl FnOnce(&mut Cdr),
+        message: impl Serialize,
     ) -> io::Result<()> {
-        write(&mut self.cdr);
-        self.held += self.cdr.bytes().len();
+        encode(message, &mut self.message)?;
+        self.held += self.message.len();
         self.begun.get_or_insert(stamp);
         let header = MessageHeader { channel_id: channel, sequence, log_time: stamp.0, publish_time: stamp.0 };
-        self.writer.write_to_known_channel(&header, self.cdr.bytes()).map_err(io_error)
+        self.writer.write_to_known_channel(&header, &self.message).map_err(io_error)
     }
 
     /// Returns whether the chunk is large or long enough to be closed. Only the messages decide,
@@ -89,7 +90,8 @@ impl Output {
     pub(crate) fn flush(&mut self) -> io::Result<()> {
         self.writer.flush().map_err(io_error)?;
         (self.held, self.begun) = (0, None);
-        self.cdr.shrink_to(KEPT_MESSAGE);
+        self.message.clear();
+        self.message.shrink_to(KEPT_MESSAGE);
         Ok(())
     }
 

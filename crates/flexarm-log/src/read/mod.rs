@@ -5,8 +5,6 @@
 //! A file that a killed run left, or a copy that broke off, is read up to its break; [`crate::RunSource::warnings`] says so.
 //! What a format does not hold is not made up: numbers are NaN, lists empty, and [`crate::RunSource::missing`] lists it.
 
-#[cfg(feature = "mcap")]
-mod cdr;
 mod csv_table;
 #[cfg(feature = "mcap")]
 mod mcap_run;

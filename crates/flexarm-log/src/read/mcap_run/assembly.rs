@@ -6,7 +6,7 @@ use mcap::records::Record;
 
 use super::frames::{Frames, pose};
 use crate::mcap_file::channels::topic_names;
-use crate::read::cdr::CdrReader;
+use crate::mcap_file::messages::{Header, JointState, LabelledArray, Time, decode};
 use crate::read::exact_time;
 use crate::{Event, EventKind, RunHeader, Sample, TwinSample};
 
@@ -160,24 +160,20 @@ impl Assembly {
 
     /// Puts a message's numbers into their places; `None` if it is not what its topic says.
     fn message(&mut self, topic: Topic, data: &[u8]) -> Option<()> {
-        let mut cdr = CdrReader::new(data)?;
         let sample = &mut self.sample;
         match topic {
-            Topic::Frames | Topic::FixedFrames => self.frames.take(&mut cdr)?,
-            Topic::Joints => joint_state(&mut cdr, self.joints, &mut sample.flexible)?,
-            Topic::RigidJoints => joint_state(&mut cdr, self.joints, &mut sample.rigid)?,
+            Topic::Frames | Topic::FixedFrames => self.frames.take(decode(data)?),
+            Topic::Joints => joint_state(data, self.joints, &mut sample.flexible)?,
+            Topic::RigidJoints => joint_state(data, self.joints, &mut sample.rigid)?,
             Topic::Tool | Topic::RigidTool => {
-                cdr.header()?;
                 let twin = if topic == Topic::Tool { &mut sample.flexible } else { &mut sample.rigid };
-                twin.X_WT = pose(cdr.f64s()?);
+                let (_, X_WT): (Header<'_>, _) = decode(data)?;
+                twin.X_WT = pose(X_WT);
             }
-            Topic::Error | Topic::PathError => {
-                cdr.header()?;
-                let error = if topic == Topic::Error { &mut sample.error_world } else { &mut sample.error_path };
-                *error = cdr.f64s()?;
-            }
+            Topic::Error => sample.error_world = six_vector(data)?,
+            Topic::PathError => sample.error_path = six_vector(data)?,
             Topic::Elastic => {
-                let [deflections, velocities, loads] = joint_values(&mut cdr)?;
+                let (_, _, deflections, velocities, loads): JointState<'_> = decode(data)?;
                 let whole = |values: &[f64]| values.len() == 6 * sample.elastic.len();
                 if !(whole(&deflections) && velocities.is_empty() && whole(&loads)) {
                     return None;
@@ -187,54 +183,41 @@ impl Assembly {
                     (element.deflection, element.load) = (*deflection, *load);
                 }
             }
-            Topic::Load(k) => {
-                cdr.header()?;
-                sample.elastic[k].load = cdr.f64s()?;
-            }
+            Topic::Load(k) => sample.elastic[k].load = six_vector(data)?,
             Topic::Deflection(k) => {
                 // Older files have an array with names.
-                let array = cdr.labelled_array().and_then(|(_, values)| values.try_into().ok());
-                let stamped = || {
-                    let mut cdr = CdrReader::new(data)?;
-                    cdr.header()?;
-                    cdr.f64s()
-                };
-                sample.elastic[k].deflection = array.or_else(stamped)?;
+                let array = array(data).and_then(|values| values.try_into().ok());
+                sample.elastic[k].deflection = array.or_else(|| six_vector(data))?;
             }
-            Topic::StaticError => sample.static_m = cdr.labelled_array()?.1.try_into().ok()?,
+            Topic::StaticError => sample.static_m = array(data)?.try_into().ok()?,
             Topic::Contributions => {
-                let (_, values) = cdr.labelled_array()?;
-                sample.contributions = values.chunks_exact(3).map(|part| [part[0], part[1], part[2]]).collect();
+                sample.contributions = array(data)?.chunks_exact(3).map(|part| [part[0], part[1], part[2]]).collect();
             }
             Topic::Energy => {
-                let (_, values) = cdr.labelled_array()?;
-                let [kinetic, potential, elastic] = values.try_into().ok()?;
+                let [kinetic, potential, elastic] = array(data)?.try_into().ok()?;
                 sample.energy = crate::EnergySample { kinetic, potential, elastic };
             }
-            Topic::Solver => sample.solver = cdr.labelled_array()?.1.try_into().ok()?,
+            Topic::Solver => sample.solver = array(data)?.try_into().ok()?,
             Topic::Events => {
-                let time_s = cdr.time()?.saturating_sub(self.epoch_ns) as f64 / 1e9;
-                cdr.u8()?;
-                let kind = EventKind::from_word(cdr.string()?);
-                let text = cdr.string()?.to_owned();
-                self.events.extend(kind.map(|kind| Event { time_s, kind, text }));
+                let ((seconds, nanoseconds), _, kind, text): (Time, u8, &str, String) = decode(data)?;
+                let time_ns = u64::from(seconds) * 1_000_000_000 + u64::from(nanoseconds);
+                let time_s = time_ns.saturating_sub(self.epoch_ns) as f64 / 1e9;
+                self.events.extend(EventKind::from_word(kind).map(|kind| Event { time_s, kind, text }));
             }
         }
         Some(())
     }
 }
 
-fn joint_state(cdr: &mut CdrReader<'_>, joints: usize, twin: &mut TwinSample) -> Option<()> {
-    [twin.q, twin.qdot, twin.effort] = joint_values(cdr)?;
+fn joint_state(data: &[u8], joints: usize, twin: &mut TwinSample) -> Option<()> {
+    (_, _, twin.q, twin.qdot, twin.effort) = decode::<JointState<'_>>(data)?;
     [&twin.q, &twin.qdot, &twin.effort].iter().all(|values| values.len() == joints).then_some(())
 }
 
-/// Positions, velocities and efforts of a `sensor_msgs/JointState`.
-fn joint_values(cdr: &mut CdrReader<'_>) -> Option<[Vec<f64>; 3]> {
-    cdr.header()?;
-    let names = cdr.u32()?;
-    for _ in 0..names {
-        cdr.string()?;
-    }
-    Some([cdr.f64_sequence()?, cdr.f64_sequence()?, cdr.f64_sequence()?])
+fn six_vector(data: &[u8]) -> Option<[f64; 6]> {
+    decode(data).map(|(_, values): (Header<'_>, _)| values)
+}
+
+fn array(data: &[u8]) -> Option<Vec<f64>> {
+    decode(data).map(|(_, _, values): LabelledArray<'_>| values)
 }

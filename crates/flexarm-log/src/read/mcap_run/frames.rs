@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use flexarm_kinematics::Pose;
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 
-use crate::read::cdr::CdrReader;
+use crate::mcap_file::messages::Transforms;
 use crate::{RunHeader, Sample};
 
 /// Translation, then quaternion x, y, z, w.
@@ -60,12 +60,9 @@ impl Frames {
         }
     }
 
-    /// `tf2_msgs/TFMessage`.
-    pub(super) fn take(&mut self, cdr: &mut CdrReader<'_>) -> Option<()> {
-        for _ in 0..cdr.u32()? {
-            cdr.header()?;
-            let child = cdr.string()?;
-            let X = pose(cdr.f64s()?);
+    pub(super) fn take(&mut self, transforms: Transforms<'_>) {
+        for (_, child, X) in transforms {
+            let X = pose(X);
             match self.places.get(child) {
                 Some(&Place::Link { twin, link }) => self.X_PL[twin][link] = X,
                 Some(&Place::Station(k)) => {
@@ -75,7 +72,6 @@ impl Frames {
                 None => {} // of another tree, made for pictures
             }
         }
-        Some(())
     }
 
     /// Poses in the world from the last transforms.
