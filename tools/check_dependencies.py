@@ -28,9 +28,9 @@ FACES = ("packages", "faces")  # what people hold: words, signals, the end of th
 INNER = ["results", "motion", "links", "base", "words", "algebra"]
 OWNERS = {  # outside crate: lines that may name it
     **dict.fromkeys(["rerun", "mcap", "re_cdr", "parquet", "arrow-array", "arrow-ipc", "arrow-schema", "rustix", "zstd", "lz4_flex", "bzip2", "rusqlite",
-                     "urdf-rs", "saphyr-parser"], ["edges"]),
+                     "urdf-rs"], ["edges"]),
     **dict.fromkeys(["png", "plotters", "rand", "sobol_burley", "statrs"], ["results"]), "hdf5-pure": ["links"], "diffsol": ["motion"],
-    **dict.fromkeys(["faer", "metis-sys"], ["base"]), "toml_edit": ["facade"],
+    **dict.fromkeys(["faer", "metis-sys", "saphyr-parser"], ["base"]), "toml_edit": ["facade"],
     **dict.fromkeys(["signal-hook", "clap", "clap_complete", "clap_mangen", "indicatif"], ["faces"]),
     **dict.fromkeys(["pyo3", "pyo3-build-config", "numpy"], ["packages"]),
 }
@@ -67,7 +67,7 @@ MUST_NOT_KNOW = {  # crate: what its code must not have, and what it is; imports
                          (r"\bflexarm_(?!programs\b|path\b|spatial\b|files\b)\w+", "more than programs")],
     "flexarm-draw": [(r"\bflexarm_log\b|\bRecorder\b", "files of recordings"), (r"\bflexarm_(?:stepping|analysis)\b", "what numbers mean")],
     "flexarm-trajectory": [(r"\b(?:Robot|Mechanism|inverse_kinematics)\b", "robots and inverse kinematics")],
-    "flexarm-motion-io": [(r"\b(?:Robot|Mechanism|Model)\b", "robots"), (r"\bflexarm_(?!motion_io\b|trajectory\b|settings\b)\w+", "more than trajectories")],
+    "flexarm-motion-io": [(r"\b(?:Robot|Mechanism|Model)\b", "robots"), (r"\bflexarm_(?!motion_io\b|trajectory\b|files\b|settings\b)\w+", "more than trajectories")],
     "flexarm-flexlink": [FILES],
     "flexarm-identify": [FILES, (r"\b(?:Robot|Trajectory)\b", "robots by name and motion"),
                          (r"\bflexarm_(?!identify\b|stepping\b|kinematics\b|testkit\b)\w+", "more than arms at rest")],

@@ -68,12 +68,6 @@ pub enum Problem {
         /// What the parser says.
         message: String,
     },
-    /// Nested deeper than any message.
-    #[error("collections are nested more than {most} deep; expected messages of ROS")]
-    TooDeep {
-        /// How deep is read.
-        most: usize,
-    },
     /// More numbers than are kept in memory.
     #[error("more than {most} numbers, which is more than is read; cut the recording, or leave out samples")]
     TooManyNumbers {

@@ -1,18 +1,17 @@
 //! YAML files of `xacro.load_yaml`, with the scalars of PyYAML (YAML 1.1: `on` is true, `1e3` without a dot is text).
 
-use std::collections::HashMap;
 use std::rc::Rc;
 
-use saphyr_parser::{Event, Parser, ScalarStyle, Tag};
+use flexarm_files::{YamlError, YamlNode, YamlValue, read_yaml};
 
 use super::Interpreter;
 use super::expression::Trouble;
 use super::expression::unique;
-use super::expression::value::{Value, lookup};
+use super::expression::value::{Value, float_of, lookup};
 use super::scope::Table;
 
-/// Collections nested deeper are refused.
-const MOST_NESTED: usize = 60;
+/// Maximum number of values of a file, those behind aliases counted each time.
+const MOST_VALUES: usize = 1_000_000;
 /// Tags that multiply by a unit: to rad and to m.
 const UNITS: [(&str, f64); 6] = [
     ("radians", 1.0),
@@ -37,136 +36,80 @@ impl Interpreter<'_> {
     }
 
     fn yaml(&mut self, text: &str) -> Result<Value, Trouble> {
-        let mut builder = Builder { open: Vec::new(), anchors: HashMap::new(), root: None };
-        for event in Parser::new_from_str(text) {
-            let (event, span) = event.map_err(|error| Trouble::new(format!("it is not YAML: {error}")))?;
-            let line = span.start.line();
-            self.charge(64)?;
-            builder.take(self, event).map_err(|trouble| trouble.within(format!("line {line}")))?;
+        let mut root = None;
+        read_yaml(text, MOST_VALUES, |node| {
+            if root.is_some() {
+                return Err(Trouble::new("a second document, expected one"));
+            }
+            root = Some(self.value(node)?);
+            Ok(())
+        })?;
+        Ok(root.unwrap_or(Value::None))
+    }
+
+    fn value(&mut self, YamlNode { line, value }: YamlNode<'_>) -> Result<Value, Trouble> {
+        self.charge(64)?;
+        let within = |trouble: Trouble| trouble.within(format!("line {line}"));
+        match value {
+            YamlValue::Scalar { text, is_plain: true, tag: None } => Ok(plain(&text)),
+            YamlValue::Scalar { text, tag: None, .. } => Ok(Value::text(&text)),
+            YamlValue::Scalar { text, tag: Some(tag), .. } => self.tagged(&text, &tag).map_err(within),
+            YamlValue::List(items) => {
+                items.into_iter().map(|item| self.value(item)).collect::<Result<_, _>>().map(Value::list)
+            }
+            YamlValue::Map(items) => {
+                let values = items.into_iter().map(|item| self.value(item)).collect::<Result<Vec<_>, _>>()?;
+                self.dictionary(values).map_err(within)
+            }
         }
-        Ok(builder.root.unwrap_or(Value::None))
+    }
+
+    /// A dictionary of keys and values by turns. What `<<` brings stands before the rest.
+    fn dictionary(&mut self, values: Vec<Value>) -> Result<Value, Trouble> {
+        let (mut pairs, mut merged) = (Vec::new(), Vec::new());
+        let mut values = values.into_iter();
+        while let (Some(key), Some(value)) = (values.next(), values.next()) {
+            if !matches!(&key, Value::Str(name) if &**name == "<<") {
+                pairs.push((key, value));
+                continue;
+            }
+            let sources = if let Value::List(items) = &value { items.to_vec() } else { vec![value] };
+            for source in sources {
+                let Value::Dict(items) = source else { return Err(Trouble::new("<< needs a dictionary")) };
+                self.charge(64 * items.len() * (1 + merged.len() / 8))?;
+                let new: Vec<_> = items.iter().filter(|(k, _)| lookup(&merged, k).is_none()).cloned().collect();
+                merged.extend(new);
+            }
+        }
+        merged.extend(pairs);
+        // Each key is looked for among the ones before.
+        self.charge(merged.len() * merged.len() / 2)?;
+        Ok(Value::Dict(Rc::new(unique(merged))))
+    }
+
+    fn tagged(&mut self, text: &str, tag: &str) -> Result<Value, Trouble> {
+        if let Some((_, factor)) = UNITS.iter().find(|(unit, _)| *unit == tag) {
+            let value = self.expression(text, &Table::root())?;
+            let number = match &value {
+                Value::Str(text) => float_of(text),
+                value => value.as_float(),
+            };
+            let number =
+                number.ok_or_else(|| Trouble::new(format!("!{tag} needs a number, found {}", value.repr())))?;
+            return Ok(Value::Float(number * factor));
+        }
+        match tag {
+            "str" | "!" => Ok(Value::text(text)),
+            "float" => float_of(text).map(Value::Float).ok_or_else(|| Trouble::new(format!("{text:?} is no number"))),
+            "int" | "bool" | "null" => Ok(plain(text)),
+            other => Err(Trouble::new(format!("the tag {other:?} is not known"))),
+        }
     }
 }
 
-/// Collections whose end has not come.
-enum Open {
-    List(Vec<Value>),
-    /// With the key whose value is awaited, and what `<<` brings.
-    Dict {
-        pairs: Vec<(Value, Value)>,
-        key: Option<Value>,
-        merged: Vec<(Value, Value)>,
-    },
-}
-
-struct Builder {
-    open: Vec<(Open, usize)>,
-    anchors: HashMap<usize, Value>,
-    root: Option<Value>,
-}
-
-impl Builder {
-    fn take(&mut self, interpreter: &mut Interpreter<'_>, event: Event<'_>) -> Result<(), Trouble> {
-        match event {
-            Event::Scalar(text, style, anchor, tag) => {
-                let value = scalar(interpreter, &text, style, tag.as_deref())?;
-                interpreter.charge(value.size())?;
-                self.put(interpreter, value, anchor)
-            }
-            Event::Alias(anchor) => {
-                let value = self.anchors.get(&anchor).cloned();
-                let value = value.ok_or_else(|| Trouble::new("an alias stands inside of what it names"))?;
-                interpreter.charge(value.size())?;
-                self.put(interpreter, value, 0)
-            }
-            Event::SequenceStart(anchor, _) => self.begin(Open::List(Vec::new()), anchor),
-            Event::MappingStart(anchor, _) => {
-                self.begin(Open::Dict { pairs: Vec::new(), key: None, merged: Vec::new() }, anchor)
-            }
-            Event::SequenceEnd | Event::MappingEnd => {
-                let Some((open, anchor)) = self.open.pop() else { return Ok(()) };
-                let value = match open {
-                    Open::List(items) => Value::list(items),
-                    Open::Dict { pairs, merged, .. } if merged.is_empty() => Value::Dict(Rc::new(pairs)),
-                    Open::Dict { pairs, mut merged, .. } => {
-                        interpreter.charge(merged.len() * pairs.len())?;
-                        merged.extend(pairs);
-                        Value::Dict(Rc::new(unique(merged)))
-                    }
-                };
-                self.put(interpreter, value, anchor)
-            }
-            Event::DocumentStart(_) if self.root.is_some() => Err(Trouble::new("a second document, expected one")),
-            _ => Ok(()),
-        }
-    }
-
-    fn begin(&mut self, open: Open, anchor: usize) -> Result<(), Trouble> {
-        self.open.push((open, anchor));
-        if self.open.len() > MOST_NESTED {
-            return Err(Trouble::new(format!("it is nested more than {MOST_NESTED} deep")));
-        }
-        Ok(())
-    }
-
-    fn put(&mut self, interpreter: &mut Interpreter<'_>, value: Value, anchor: usize) -> Result<(), Trouble> {
-        if anchor > 0 {
-            self.anchors.insert(anchor, value.clone());
-        }
-        match self.open.last_mut() {
-            None => self.root = Some(value),
-            Some((Open::List(items), _)) => items.push(value),
-            Some((Open::Dict { pairs, key, merged }, _)) => match key.take() {
-                None => *key = Some(value),
-                Some(Value::Str(name)) if &*name == "<<" => {
-                    let sources = if let Value::List(items) = &value { items.to_vec() } else { vec![value] };
-                    for source in sources {
-                        let Value::Dict(items) = source else { return Err(Trouble::new("<< needs a dictionary")) };
-                        interpreter.charge(64 * items.len() * (1 + merged.len() / 8))?;
-                        let new: Vec<_> = items.iter().filter(|(k, _)| lookup(merged, k).is_none()).cloned().collect();
-                        merged.extend(new);
-                    }
-                }
-                Some(name) => {
-                    // each key is looked for among the ones before
-                    interpreter.charge(64 + pairs.len())?;
-                    match pairs.iter_mut().find(|(k, _)| k.equals(&name)) {
-                        Some(slot) => slot.1 = value,
-                        None => pairs.push((name, value)),
-                    }
-                }
-            },
-        }
-        Ok(())
-    }
-}
-
-fn scalar(
-    interpreter: &mut Interpreter<'_>,
-    text: &str,
-    style: ScalarStyle,
-    tag: Option<&Tag>,
-) -> Result<Value, Trouble> {
-    let Some(tag) = tag else {
-        return Ok(if style == ScalarStyle::Plain { plain(text) } else { Value::text(text) });
-    };
-    let name = tag.suffix.as_str();
-    if let Some((_, factor)) = UNITS.iter().find(|(unit, _)| *unit == name) {
-        let value = interpreter.expression(text, &Table::root())?;
-        let number = match &value {
-            Value::Str(text) => super::expression::value::float_of(text),
-            value => value.as_float(),
-        };
-        let number = number.ok_or_else(|| Trouble::new(format!("!{name} needs a number, found {}", value.repr())))?;
-        return Ok(Value::Float(number * factor));
-    }
-    let number =
-        |value: Option<f64>| value.map(Value::Float).ok_or_else(|| Trouble::new(format!("{text:?} is no number")));
-    match name {
-        "str" | "!" => Ok(Value::text(text)),
-        "float" => number(super::expression::value::float_of(text)),
-        "int" | "bool" | "null" => Ok(plain(text)),
-        other => Err(Trouble::new(format!("the tag {other:?} is not known"))),
+impl From<YamlError> for Trouble {
+    fn from(YamlError { line, message }: YamlError) -> Self {
+        Self::new(format!("line {line}: it is not YAML: {message}"))
     }
 }
 

@@ -1,0 +1,162 @@
+//! YAML, of which JSON is a part, as trees of texts. What a text means is the matter of who reads it.
+
+use std::borrow::Cow;
+use std::collections::HashMap;
+
+use saphyr_parser::{Event, Parser, ScalarStyle};
+
+/// Collections nested deeper are refused.
+const MOST_NESTED: usize = 40;
+
+/// A text or a collection.
+#[derive(Clone, Debug)]
+pub struct YamlNode<'t> {
+    /// Line, from 1.
+    pub line: usize,
+    /// What it is.
+    pub value: YamlValue<'t>,
+}
+
+/// What a node is.
+#[derive(Clone, Debug)]
+pub enum YamlValue<'t> {
+    /// A text that may mean a number.
+    Scalar {
+        /// The text, without its quotes.
+        text: Cow<'t, str>,
+        /// Whether it stands without quotes.
+        is_plain: bool,
+        /// Its tag, without the marks in front: `degrees` of `!degrees`.
+        tag: Option<String>,
+    },
+    /// A list.
+    List(Vec<YamlNode<'t>>),
+    /// Keys and values by turns, as they stand in the text.
+    Map(Vec<YamlNode<'t>>),
+}
+
+/// What is wrong with a text.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct YamlError {
+    /// Line, from 1.
+    pub line: usize,
+    /// What is wrong, as the end of a sentence.
+    pub message: String,
+}
+
+/// A node, what it is known by, how large it is and how deep it is nested.
+#[derive(Clone)]
+struct Counted<'t> {
+    node: YamlNode<'t>,
+    anchor: usize,
+    size: usize,
+    height: usize,
+}
+
+/// Calls `take` with the root of each document, one after another.
+///
+/// * `most`: Maximum number of nodes. Those behind anchors and aliases count again, 32 letters as a node more.
+///
+/// # Errors
+/// [`YamlError`] for what is not YAML, has more nodes or is nested more than 40 deep; and what `take` returns.
+pub fn read_yaml<'t, E: From<YamlError>>(
+    text: &'t str,
+    most: usize,
+    mut take: impl FnMut(YamlNode<'t>) -> Result<(), E>,
+) -> Result<(), E> {
+    let (mut open, mut anchors, mut count) = (Vec::<Counted<'_>>::new(), HashMap::<usize, Counted<'_>>::new(), 0);
+    for event in Parser::new_from_str(text) {
+        let (event, span) = event.map_err(|error| {
+            let (line, column) = (error.marker().line(), error.marker().col() + 1);
+            YamlError { line, message: format!("{}, column {column}", error.info()) }
+        })?;
+        let line = span.start.line();
+        let fail = |message: String| E::from(YamlError { line, message });
+        let new = |value, anchor| Counted { node: YamlNode { line, value }, anchor, size: 1, height: 0 };
+        let mut done = None;
+        match event {
+            Event::Scalar(text, style, anchor, tag) => {
+                let (is_plain, tag) = (style == ScalarStyle::Plain, tag.map(|tag| tag.suffix.clone()));
+                let size = 1 + text.len() / 32;
+                count += size;
+                done = Some(Counted { size, ..new(YamlValue::Scalar { text, is_plain, tag }, anchor) });
+            }
+            Event::SequenceStart(anchor, _) => open.push(new(YamlValue::List(Vec::new()), anchor)),
+            Event::MappingStart(anchor, _) => open.push(new(YamlValue::Map(Vec::new()), anchor)),
+            Event::SequenceEnd | Event::MappingEnd => {
+                count += 1;
+                done = open.pop();
+            }
+            Event::Alias(anchor) => {
+                let named = anchors.get(&anchor);
+                let named = named.ok_or_else(|| fail("an alias stands inside of what it names".to_owned()))?;
+                count += named.size;
+                done = Some(Counted { anchor: 0, ..named.clone() });
+            }
+            Event::DocumentEnd => anchors.clear(),
+            _ => {}
+        }
+        if open.len() + done.as_ref().map_or(0, |done| done.height) > MOST_NESTED {
+            return Err(fail(format!("collections are nested more than {MOST_NESTED} deep")));
+        }
+        let Some(done) = done else { continue };
+        if done.anchor > 0 {
+            count += done.size;
+            anchors.insert(done.anchor, done.clone());
+        }
+        if count > most {
+            return Err(fail(format!("more than {most} numbers and texts")));
+        }
+        match open.last_mut() {
+            None => take(done.node)?,
+            Some(outer) => {
+                outer.size += done.size;
+                outer.height = outer.height.max(done.height + 1);
+                if let YamlValue::List(items) | YamlValue::Map(items) = &mut outer.node.value {
+                    items.push(done.node);
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fails(text: &str, most: usize) -> YamlError {
+        read_yaml(text, most, |_| Ok::<(), YamlError>(())).unwrap_err()
+    }
+
+    #[test]
+    fn a_document_is_a_tree_of_texts_with_their_lines() {
+        let mut roots = Vec::new();
+        read_yaml("a: &x [1, \"2\"]\nb: *x\n---\n!degrees 3\n", 20, |root| {
+            roots.push(root);
+            Ok::<(), YamlError>(())
+        })
+        .unwrap();
+        let YamlValue::Map(items) = &roots[0].value else { panic!("{roots:?}") };
+        assert_eq!(items.iter().map(|item| item.line).collect::<Vec<_>>(), [1, 1, 2, 1]);
+        let YamlValue::List(copied) = &items[3].value else { panic!("{items:?}") };
+        assert!(matches!(&copied[0].value, YamlValue::Scalar { text, is_plain: true, tag: None } if text == "1"));
+        assert!(matches!(&copied[1].value, YamlValue::Scalar { text, is_plain: false, .. } if text == "2"));
+        assert!(matches!(&roots[1].value, YamlValue::Scalar { tag: Some(tag), .. } if tag == "degrees"));
+    }
+
+    #[test]
+    fn what_lies_behind_aliases_is_counted_and_as_deep_as_it_would_be_written() {
+        let chain = |links: usize| {
+            let links = (1..=links).map(|k| format!("a{k}: &a{k} [*a{}]\n", k - 1));
+            format!("a0: &a0 x\n{}", links.collect::<String>())
+        };
+        // The dictionary is one level more.
+        assert!(read_yaml(&chain(MOST_NESTED - 1), 10_000, |_| Ok::<(), YamlError>(())).is_ok());
+        let deep = fails(&chain(MOST_NESTED), 10_000);
+        assert_eq!((deep.line, deep.message.contains("nested more than 40 deep")), (41, true), "{deep:?}");
+        assert!(fails(&chain(30), 200).message.contains("more than 200 numbers"));
+        assert!(fails("a: &a [*a]", 100).message.contains("an alias stands inside"));
+        assert_eq!(fails("a: [1, 2\nb: }", 100).line, 2);
+    }
+}
