@@ -3,14 +3,15 @@
 //! ```text
 //! min over a of  max over k of  w_k |r_k|,    r_k = Σ a_i exp(λ_k (Δ - t_i)),    a_i >= 0,  Σ a_i = 1,  0 <= t_i <= Δ
 //! ```
-//! with modes λ, each at some frequencies of its band. The problem is convex: cones on a grid of times t_i, solved by Newton's method
-//! on a logarithmic barrier [Boyd & Vandenberghe 2004, section 11.3] with `-log(t² - w²|r|²)` for each mode and frequency and
-//! `-log a_i` for each copy. The grid is then drawn closer about the copies that were found. Parts that are not negative keep the shaped
-//! motion within the ranges and below the speeds of the motion itself.
+//! with modes λ, each at some frequencies of its band. On a grid of times t_i the problem is one of second-order cones, one for each
+//! mode and frequency [Boyd & Vandenberghe 2004, section 4.4.2]; Clarabel solves it. The grid is then drawn closer about the copies
+//! that were found. Parts that are not negative keep the shaped motion within the ranges and below the speeds of the motion itself.
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Cholesky, Complex, DMatrix, DVector, Dyn};
+use clarabel::algebra::CscMatrix;
+use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
+use nalgebra::Complex;
 
 use crate::shaping::Shaper;
 
@@ -60,6 +61,12 @@ pub enum ShaperError {
         /// Most.
         most: f64,
     },
+    /// The solver finds no least value.
+    #[error("no shaper is found for a delay of {delay_s} s: ask for another delay, or for fewer modes")]
+    Unsolved {
+        /// Asked for (s).
+        delay_s: f64,
+    },
 }
 
 /// Times of the grid in a period of the quickest mode.
@@ -74,8 +81,10 @@ const WIDEST: f64 = 0.5;
 const NO_COPY: f64 = 1e-6;
 /// How often the grid is drawn closer, how many times each, and so many of the old steps to both sides.
 const CLOSER: (usize, i32) = (3, 8);
-/// Distance from the least value, over the vibration without a shaper, at which the search ends.
-const GAP: f64 = 1e-8;
+/// What is left counts as nothing below this part of the vibration without a shaper.
+const NOTHING: f64 = 1e-7;
+/// Distance from the least value, over the vibration without a shaper, at which the solver ends.
+const GAP: f64 = 1e-10;
 
 impl Shaper {
     /// The shaper that leaves least of several modes at a delay after the end of the motion.
@@ -92,19 +101,21 @@ impl Shaper {
         let mut step = 0.5 * delay_s / half as f64;
         let mut times: Vec<f64> = (0..=2 * half).map(|k| step * k as f64).collect();
         let size = modes.iter().map(|mode| mode.vibration).fold(0.0, f64::max);
-        let mut best: Option<(f64, Shaper)> = None;
+        let left = |shaper: &Shaper| {
+            let of = |mode: &ShapedMode, f: f64| mode.vibration * shaper.residual_at(f * mode.hz, mode.ratio, delay_s);
+            modes.iter().flat_map(|mode| within(band).into_iter().map(move |f| of(mode, f))).fold(0.0, f64::max)
+        };
+        let mut best: Option<OptimalShaper> = None;
         for _ in 0..=CLOSER.0 {
-            let (left, parts) = Cones::of(modes, band, delay_s, size, &times).least();
+            let Some(copies) = least(modes, band, delay_s, size, &times) else { break };
+            let whole = Shaper { copies };
             // Many shapers leave nothing: the one in their middle, as it is.
-            let many = left < 10.0 * GAP;
-            let shaper = if many {
-                Shaper { copies: times.into_iter().zip(parts).collect() }
-            } else {
-                gathered(&times, &parts, step)
-            };
+            let many = left(&whole) < NOTHING * size;
+            let shaper = if many { whole } else { gathered(&whole.copies, step) }.without_nothing();
             let around: Vec<f64> = shaper.copies.iter().map(|(t, _)| *t).collect();
-            if best.as_ref().is_none_or(|(least, _)| left < *least) {
-                best = Some((left, shaper));
+            let found = OptimalShaper { left: left(&shaper), shaper };
+            if best.as_ref().is_none_or(|best| found.left < best.left) {
+                best = Some(found);
             }
             if many {
                 break;
@@ -116,13 +127,7 @@ impl Shaper {
             times.sort_by(f64::total_cmp);
             times.dedup_by(|a, b| (*a - *b).abs() < 0.01 * step);
         }
-        let shaper = best.map_or_else(|| Shaper { copies: vec![(0.0, 1.0)] }, |(_, shaper)| shaper.without_nothing());
-        let left = |mode: &ShapedMode| {
-            let at = |f: f64| mode.vibration * shaper.residual_at(f * mode.hz, mode.ratio, delay_s);
-            within(band).into_iter().map(at).fold(0.0, f64::max)
-        };
-        let left = modes.iter().map(left).fold(0.0, f64::max);
-        Ok(OptimalShaper { shaper, left })
+        best.ok_or(ShaperError::Unsolved { delay_s })
     }
 }
 
@@ -164,22 +169,22 @@ pub(crate) fn within(band: f64) -> Vec<f64> {
 }
 
 /// One copy for each summit of the parts: neighbours on the grid are one that lies between them.
-fn gathered(times: &[f64], parts: &[f64], step: f64) -> Shaper {
+fn gathered(grid: &[(f64, f64)], step: f64) -> Shaper {
     let mut copies: Vec<(f64, f64)> = Vec::new();
     let mut falls = false;
-    for k in 0..times.len() {
-        let apart = k == 0 || times[k] - times[k - 1] > 1.5 * step;
-        let rises = k > 0 && parts[k] > parts[k - 1];
-        if apart || (falls && rises) {
-            copies.push((times[k], parts[k]));
-            falls = false;
-            continue;
-        }
-        falls |= !rises;
-        if let Some((t, part)) = copies.last_mut() {
-            let sum = *part + parts[k];
-            *t += (times[k] - *t) * parts[k] / sum;
-            *part = sum;
+    for (k, &(time, part)) in grid.iter().enumerate() {
+        let apart = k == 0 || time - grid[k - 1].0 > 1.5 * step;
+        let rises = k > 0 && part > grid[k - 1].1;
+        match copies.last_mut() {
+            Some((t, sum)) if !(apart || falls && rises) => {
+                falls |= !rises;
+                *sum += part;
+                *t += (time - *t) * part / *sum;
+            }
+            _ => {
+                copies.push((time, part));
+                falls = false;
+            }
         }
     }
     Shaper { copies }
@@ -194,134 +199,38 @@ impl Shaper {
     }
 }
 
-/// The problem on a grid: rows of real and imaginary parts of each r_k, over the vibration without a shaper.
-struct Cones {
-    rows: DMatrix<f64>,
-}
-
-/// A point inside all cones, and what the barrier is there.
-struct Inside {
-    a: DVector<f64>,
-    t: f64,
-    /// Real and imaginary parts.
-    r: DVector<f64>,
-}
-
-impl Inside {
-    /// `t² - |r_k|²`; none if one is not positive.
-    fn slacks(&self) -> Option<DVector<f64>> {
-        let slack = |k: usize| self.t * self.t - self.r[2 * k].powi(2) - self.r[2 * k + 1].powi(2);
-        let slacks = DVector::from_fn(self.r.len() / 2, |k, _| slack(k));
-        (self.t > 0.0 && slacks.iter().chain(&self.a).all(|x| *x > 0.0)).then_some(slacks)
-    }
-
-    /// `weight t - Σ log`.
-    fn barrier(&self, weight: f64) -> Option<f64> {
-        let slacks = self.slacks()?;
-        Some(weight * self.t - slacks.iter().chain(&self.a).map(|x| x.ln()).sum::<f64>())
-    }
-}
-
-impl Cones {
-    fn of(modes: &[ShapedMode], band: f64, delay_s: f64, size: f64, times: &[f64]) -> Self {
-        let each = modes.iter().flat_map(|mode| within(band).into_iter().map(move |f| (mode, TAU * f * mode.hz)));
-        let each: Vec<(&ShapedMode, f64)> = each.collect();
-        let mut rows = DMatrix::zeros(2 * each.len(), times.len());
-        for (k, (mode, omega)) in each.into_iter().enumerate() {
-            let lambda = Complex::new(-mode.ratio * omega, omega * (1.0 - mode.ratio * mode.ratio).sqrt());
-            for (i, t) in times.iter().enumerate() {
-                let left = (lambda * (delay_s - t)).exp() * (mode.vibration / size);
-                (rows[(2 * k, i)], rows[(2 * k + 1, i)]) = (left.re, left.im);
-            }
+/// Returns the copies on a grid of times that leave least; none if the solver finds no least value.
+///
+/// ```text
+/// min t    Σ a_i = 1,   a_i >= 0,   t >= w_k |r_k| / size
+/// ```
+fn least(modes: &[ShapedMode], band: f64, delay_s: f64, size: f64, times: &[f64]) -> Option<Vec<(f64, f64)>> {
+    // Clarabel's form: b - A x is in the cones, with x the parts and t.
+    let n = times.len();
+    let mut cones = vec![SupportedConeT::ZeroConeT(1), SupportedConeT::NonnegativeConeT(n)];
+    let mut A: Vec<(usize, usize, f64)> = (0..n).flat_map(|i| [(0, i, 1.0), (1 + i, i, -1.0)]).collect();
+    let mut rows = 1 + n;
+    for (mode, f) in modes.iter().flat_map(|mode| within(band).into_iter().map(move |f| (mode, f))) {
+        let omega = TAU * f * mode.hz;
+        let lambda = Complex::new(-mode.ratio * omega, omega * (1.0 - mode.ratio * mode.ratio).sqrt());
+        A.push((rows, n, -1.0));
+        for (i, t) in times.iter().enumerate() {
+            let left = (lambda * (delay_s - t)).exp() * (mode.vibration / size);
+            A.extend([(rows + 1, i, -left.re), (rows + 2, i, -left.im)]);
         }
-        Self { rows }
+        cones.push(SupportedConeT::SecondOrderConeT(3));
+        rows += 3;
     }
-
-    /// The least value and its parts.
-    fn least(&self) -> (f64, Vec<f64>) {
-        let (cones, n) = (self.rows.nrows() / 2, self.rows.ncols());
-        let a = DVector::from_element(n, 1.0 / n as f64);
-        let r = &self.rows * &a;
-        let mut at = Inside { t: 2.0 * r.amax() + 1.0, a, r };
-        let terms = (2 * cones + n) as f64;
-        let mut weight = 1.0;
-        loop {
-            self.centre(&mut at, weight);
-            if terms / weight < GAP {
-                break;
-            }
-            weight *= 8.0;
-        }
-        let left = (0..cones).map(|k| at.r[2 * k].hypot(at.r[2 * k + 1])).fold(0.0, f64::max);
-        (left, at.a.as_slice().to_vec())
-    }
-
-    /// Newton's method on the barrier at a weight of t, the sum of the parts kept.
-    fn centre(&self, at: &mut Inside, weight: f64) {
-        for _ in 0..40 {
-            let (Some(slacks), Some(here)) = (at.slacks(), at.barrier(weight)) else { return };
-            let Some((step, step_t, decrement)) = self.newton(at, &slacks, weight) else { return };
-            if decrement < 1e-9 {
-                return;
-            }
-            let moved = &self.rows * &step;
-            // Close to the centre a whole step is right, and what it gains is less than rounding.
-            let sure = decrement < 0.1;
-            let mut part = 1.0;
-            let next = loop {
-                let trial = Inside { a: &at.a + &step * part, t: at.t + step_t * part, r: &at.r + &moved * part };
-                if trial.barrier(weight).is_some_and(|there| sure || there <= here - 0.1 * part * decrement) {
-                    break Some(trial);
-                }
-                part *= 0.5;
-                if part < 1e-10 {
-                    break None;
-                }
-            };
-            let Some(next) = next else { return };
-            let sum = next.a.sum();
-            *at = Inside { a: next.a / sum, t: next.t, r: next.r / sum };
-        }
-    }
-
-    /// Step of the parts and of t, and the square of Newton's decrement. Unknowns are scaled by the point, so that the matrix is
-    /// one more than what the cones add.
-    fn newton(&self, at: &Inside, slacks: &DVector<f64>, weight: f64) -> Option<(DVector<f64>, f64, f64)> {
-        let (n, rows) = (at.a.len(), self.rows.nrows());
-        let mut scaled = self.rows.clone();
-        scaled.column_iter_mut().zip(&at.a).for_each(|(mut column, a)| column *= *a);
-        // Of each cone: s = t² - r², -log s has the gradient 2 (r, -t)/s and the second derivative below.
-        let mut by_rows = DMatrix::zeros(rows, n);
-        let mut gradient = DVector::from_element(n + 1, -1.0);
-        let mut H = DMatrix::identity(n + 1, n + 1);
-        let (mut of_t, mut across) = (0.0, DVector::zeros(n));
-        gradient[n] = weight * at.t;
-        for k in 0..rows / 2 {
-            let (s, u, v) = (slacks[k], at.r[2 * k], at.r[2 * k + 1]);
-            let (U, V) = (scaled.row(2 * k), scaled.row(2 * k + 1));
-            let along = U * u + V * v;
-            by_rows.set_row(2 * k, &(U * (2.0 / s) + &along * (4.0 * u / (s * s))));
-            by_rows.set_row(2 * k + 1, &(V * (2.0 / s) + &along * (4.0 * v / (s * s))));
-            let along = along.transpose();
-            gradient.rows_mut(0, n).axpy(2.0 / s, &along, 1.0);
-            gradient[n] -= 2.0 * at.t * at.t / s;
-            across.axpy(-4.0 * at.t * at.t / (s * s), &along, 1.0);
-            of_t += at.t * at.t * (4.0 * at.t * at.t / (s * s) - 2.0 / s);
-        }
-        let mut block = H.view_mut((0, 0), (n, n));
-        block += scaled.tr_mul(&by_rows);
-        H.view_mut((0, n), (n, 1)).copy_from(&across);
-        H.view_mut((n, 0), (1, n)).copy_from(&across.transpose());
-        H[(n, n)] = of_t;
-        let H: Cholesky<f64, Dyn> = Cholesky::new(H)?;
-        // The sum of the parts stays: Σ a_i d_i = 0.
-        let mut kept = DVector::zeros(n + 1);
-        kept.rows_mut(0, n).copy_from(&at.a);
-        let (free, by_sum) = (H.solve(&gradient), H.solve(&kept));
-        let step = &by_sum * (kept.dot(&free) / kept.dot(&by_sum)) - free;
-        let decrement = -gradient.dot(&step);
-        Some((at.a.component_mul(&step.rows(0, n)), at.t * step[n], decrement))
-    }
+    let (I, (J, V)) = A.into_iter().map(|(i, j, x)| (i, (j, x))).unzip();
+    let A = CscMatrix::new_from_triplets(rows, n + 1, I, J, V);
+    let (mut b, mut q) = (vec![0.0; rows], vec![0.0; n + 1]);
+    (b[0], q[n]) = (1.0, 1.0);
+    let settings = DefaultSettings { verbose: false, tol_gap_abs: GAP, tol_gap_rel: GAP, ..DefaultSettings::default() };
+    let mut solver = DefaultSolver::new(&CscMatrix::zeros((n + 1, n + 1)), &q, &A, &b, &cones, settings).ok()?;
+    solver.solve();
+    let solved = matches!(solver.solution.status, SolverStatus::Solved | SolverStatus::AlmostSolved);
+    // The slacks of the parts are the parts, and never negative.
+    solved.then(|| times.iter().copied().zip(solver.solution.s[1..].iter().copied()).collect())
 }
 
 #[cfg(test)]
