@@ -270,11 +270,8 @@ impl Known {
             return Err(SolveError::NotFinite);
         }
         let svd = A.svd(false, true);
-        let mut order: Vec<usize> = (0..p).collect();
-        order.sort_by(|a, b| svd.singular_values[*b].total_cmp(&svd.singular_values[*a]));
-        let gains: Vec<f64> = order.iter().map(|k| svd.singular_values[*k]).collect();
-        let rows = svd.v_t.unwrap_or_else(|| DMatrix::identity(p, p));
-        let directions = DMatrix::from_fn(p, p, |i, j| rows[(order[j], i)]);
+        let gains = svd.singular_values.as_slice().to_vec();
+        let directions = svd.v_t.map_or_else(|| DMatrix::identity(p, p), |rows| rows.transpose());
         let identified = gains.iter().take_while(|gain| **gain > IDENTIFIED).count();
         Ok(Self { directions, gains, identified })
     }
@@ -309,23 +306,9 @@ impl Known {
 
 /// Orthonormal columns that span those of a matrix; the number of a column that depends on those before.
 fn orthonormal(A: &DMatrix<f64>) -> Result<DMatrix<f64>, usize> {
-    let mut Q = A.clone();
-    for k in 0..A.ncols() {
-        let size = A.column(k).norm();
-        for _ in 0..2 {
-            for j in 0..k {
-                let along = Q.column(j).dot(&Q.column(k));
-                let other = Q.column(j).into_owned();
-                Q.column_mut(k).axpy(-along, &other, 1.0);
-            }
-        }
-        let left = Q.column(k).norm();
-        if left.is_nan() || left <= DEPENDENT * size || size == 0.0 {
-            return Err(k);
-        }
-        Q.column_mut(k).scale_mut(1.0 / left);
-    }
-    Ok(Q)
+    let (Q, R) = A.clone().qr().unpack();
+    let is_own = |k: usize| R.get((k, k)).is_some_and(|left| *left > DEPENDENT * A.column(k).norm());
+    (0..A.ncols()).find(|k| !is_own(*k)).map_or(Ok(Q), Err)
 }
 
 fn finish(found: Descent, known: Known, basis: &DMatrix<f64>, prior: &DVector<f64>, loss: Loss) -> Solution {
@@ -414,6 +397,19 @@ mod tests {
             }
             Ok(DVector::from_fn(self.t.len(), |i, _| a * (-b * self.t[i]).exp() + c - self.y[i]))
         }
+    }
+
+    /// Truth: the third column is the sum of the first two.
+    #[test]
+    fn the_first_column_that_depends_on_those_before_it_is_named() {
+        let A = DMatrix::from_row_slice(4, 4, &[1., 2., 3., 0., 0., 1., 1., 5., 2., 0., 2., 1., 1., 1., 2., 0.]);
+        assert_eq!(orthonormal(&A), Err(2));
+        let known = A.remove_column(2);
+        let Q = orthonormal(&known).unwrap();
+        assert!((Q.tr_mul(&Q) - DMatrix::identity(3, 3)).norm() < 1e-14);
+        assert!((&Q * Q.tr_mul(&known) - &known).norm() < 1e-13);
+        assert_eq!(orthonormal(&known.remove_rows(0, 2)), Err(2), "more columns than rows");
+        assert_eq!(orthonormal(&DMatrix::zeros(3, 1)), Err(0));
     }
 
     /// Its square is beyond the largest number.
