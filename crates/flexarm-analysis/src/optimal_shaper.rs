@@ -3,9 +3,10 @@
 //! ```text
 //! min over a of  max over k of  w_k |r_k|,    r_k = Σ a_i exp(λ_k (Δ - t_i)),    a_i >= 0,  Σ a_i = 1,  0 <= t_i <= Δ
 //! ```
-//! with modes λ, each at some frequencies of its band. On a grid of times t_i the problem is one of second-order cones, one for each
-//! mode and frequency [Boyd & Vandenberghe 2004, section 4.4.2]; Clarabel solves it. The grid is then drawn closer about the copies
-//! that were found. Parts that are not negative keep the shaped motion within the ranges and below the speeds of the motion itself.
+//! with modes λ, each at some frequencies of its band. On a grid of times t_i the problem is one of second-order
+//! cones, one for each mode and frequency [Boyd & Vandenberghe 2004, section 4.4.2]; Clarabel solves it. The grid is
+//! then drawn closer about the copies that were found. Parts that are not negative keep the shaped motion within the
+//! ranges and below the speeds of the motion itself.
 
 use std::f64::consts::TAU;
 
@@ -81,7 +82,7 @@ const WIDEST: f64 = 0.5;
 const NO_COPY: f64 = 1e-6;
 /// How often the grid is drawn closer, how many times each, and so many of the old steps to both sides.
 const CLOSER: (usize, i32) = (3, 8);
-/// What is left counts as nothing below this part of the vibration without a shaper.
+/// Vibration that counts as nothing, over the one without a shaper.
 const NOTHING: f64 = 1e-7;
 /// Distance from the least value, over the vibration without a shaper, at which the solver ends.
 const GAP: f64 = 1e-10;
