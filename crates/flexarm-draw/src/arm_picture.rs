@@ -2,15 +2,16 @@
 //!
 //! The rigid twin is light grey with an outline, the flexible arm is magnified by [`RunHeader::magnification`]; colours
 //! show the true deviation, from 0 to [`RunHeader::color_scale_m`]. An arrow leads from the rigid tool centre point to
-//! the magnified one. Links without surfaces are drawn as rods. Start at [`arm_picture`] for pages, which say beside the
+//! the magnified one. Links without surfaces are drawn as rods. Start at [`arm_pictures`] for pages, which say beside the
 //! picture what is in it, and at [`arm_png`] for a picture that says so itself; [`arm_sheet`] has both sides beside each
 //! other under a heading.
 
 use flexarm_spatial::Pose;
 use nalgebra::{Matrix2x3, Matrix3, Point3, SymmetricEigen, Vector3};
+use rayon::prelude::*;
 
 use crate::mesh_picture::draw::{Align, Style, text_width};
-use crate::mesh_picture::scene::{Layer, Paint, Scene, corner_normals};
+use crate::mesh_picture::scene::{Layer, Paint, Scene};
 use crate::mesh_picture::{Image, Rgb, View, color};
 use crate::{BentMesh, Magnifier, stations_in_link};
 use flexarm_sample::{BendInfo, LinkMesh, RunHeader, Sample, TwinSample};
@@ -76,7 +77,7 @@ pub struct ArmPicture {
     pub axes: [[f64; 2]; 3],
 }
 
-/// Rigid twin and magnified flexible arm for a page that explains them: no scale, no axes, no ground.
+/// Rigid twin and magnified flexible arm from several sides, for a page that explains them: no scale, no axes, no ground.
 ///
 /// * `size`: width and height, pixels.
 ///
@@ -84,42 +85,14 @@ pub struct ArmPicture {
 ///
 /// # Errors
 /// [`ArmPictureError`].
-pub fn arm_picture(
+pub fn arm_pictures(
     header: &RunHeader,
     sample: &Sample,
-    side: ArmSide,
+    sides: &[ArmSide],
     size: [usize; 2],
-) -> Result<ArmPicture, ArmPictureError> {
-    Stage::new(header, sample)?.picture(side, size)
-}
-
-/// As [`arm_picture`], from several sides.
-///
-/// * `at_once`: each on a thread of its own, which takes so many times the memory; otherwise one after another.
-///
-/// # Errors
-/// [`ArmPictureError`].
-pub fn arm_pictures<const N: usize>(
-    header: &RunHeader,
-    sample: &Sample,
-    sides: [ArmSide; N],
-    size: [usize; 2],
-    at_once: bool,
-) -> Result<[ArmPicture; N], ArmPictureError> {
-    let stage = &Stage::new(header, sample)?;
-    let one_by_one = || sides.map(|side| stage.picture(side, size));
-    let on_threads = || {
-        std::thread::scope(|scope| {
-            let threads = sides.map(|side| scope.spawn(move || stage.picture(side, size)));
-            threads.map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
-        })
-    };
-    let drawn = if at_once { on_threads() } else { one_by_one() };
-    let mut pictures = Vec::with_capacity(N);
-    for picture in drawn {
-        pictures.push(picture?);
-    }
-    Ok(pictures.try_into().unwrap_or_else(|_| unreachable!("a picture of each side")))
+) -> Result<Vec<ArmPicture>, ArmPictureError> {
+    let stage = Stage::new(header, sample)?;
+    sides.par_iter().map(|side| stage.picture(*side, size)).collect()
 }
 
 /// The arm as a PNG picture on white with a scale of its colours: rigid twin and magnified flexible arm.
@@ -197,9 +170,9 @@ impl Stage {
         let bodies = bodies(header, sample);
         let magnifier = Magnifier::new(header);
         let magnified = magnifier.magnified(sample);
-        let rigid = Skin::rigid(&bodies, &sample.rigid).with_normals();
+        let rigid = Skin::rigid(&bodies, &sample.rigid);
         let real = Skin::bent(&bodies, header, &sample.flexible);
-        let shown = Skin::bent(&bodies, header, &magnified).with_normals();
+        let shown = Skin::bent(&bodies, header, &magnified);
         if rigid.triangles.is_empty() {
             return Err(ArmPictureError::Nothing);
         }
@@ -230,60 +203,45 @@ impl Stage {
         View::fit(toward, right, points, [margin, margin, width as f64 - 2.0 * margin, height as f64 - margin - foot])
     }
 
-    /// See [`arm_picture`].
+    /// See [`arm_pictures`].
     fn picture(&self, side: ArmSide, size: [usize; 2]) -> Result<ArmPicture, ArmPictureError> {
         let unit = size[0] as f64 / NOMINAL_WIDTH;
         let view = self.view(side, size, [26.0 * unit, 26.0 * unit], None);
-        let layers = self.layers(&view, size);
-        let [white, black] = [[255; 3], [0; 3]].map(|ground| {
-            let mut image = layers.on(ground, size);
-            arrow(&mut image, &view, unit, &self.tool, &self.moved);
-            image
-        });
-        let png = without_ground(&white, &black).to_png_quickly().map_err(ArmPictureError::Encode)?;
+        let mut image = Image::see_through(size[0], size[1]);
+        self.draw(&view, &mut image);
+        arrow(&mut image, &view, unit, &self.tool, &self.moved);
+        let png = image.to_png_quickly().map_err(ArmPictureError::Encode)?;
         Ok(ArmPicture { png, axes: [0, 1, 2].map(|k| [view.right[k], view.up[k]]) })
     }
 
-    /// Both arms.
-    fn layers(&self, view: &View, [width, height]: [usize; 2]) -> Layers {
+    /// Draws both arms.
+    fn draw(&self, view: &View, image: &mut Image) {
         let count = self.rigid.triangles.len();
         let (colors, bright) = (vec![[GHOST; 2]; count], vec![false; count]);
-        let side_of = vec![-1.0; self.rigid.positions.len()];
-        let paint = Paint::Faces { colors: &colors, bright: &bright, side: &side_of };
-        let ghost = Scene { positions: &self.rigid.positions, triangles: &self.rigid.triangles, paint, marks: &[] };
-        let ghost = Layer::new(&ghost, &self.rigid.normals, view, width, height);
-        let paint = Paint::Magnitude { values: &self.values, peak: 1.0 };
-        let flexible = Scene { positions: &self.shown.positions, triangles: &self.shown.triangles, paint, marks: &[] };
-        Layers { ghost, flexible: Layer::new(&flexible, &self.shown.normals, view, width, height) }
+        let side = vec![-1.0; self.rigid.positions.len()];
+        let paint = Paint::Faces { colors: &colors, bright: &bright, side: &side };
+        let layer = |skin: &Skin, paint| {
+            let scene = Scene { positions: &skin.positions, triangles: &skin.triangles, paint, marks: &[] };
+            Layer::new(&scene, view, image.width, image.height)
+        };
+        let ghost = layer(&self.rigid, paint);
+        let flexible = layer(&self.shown, Paint::Magnitude { values: &self.values, peak: 1.0 });
+        ghost.lay_over(image, 1.0 - GHOST_FADE as f32);
+        flexible.lay_over(image, 1.0);
+        ghost.outline().for_each(|(x, y, share)| image.blend(x, y, GHOST_LINE, 0.8 * share));
     }
 
     /// On white, with everything that is to be known.
     fn explained(&self, side: ArmSide, size: [usize; 2], header: &RunHeader, around: Option<&Ellipsoid>) -> Image {
         let unit = size[0] as f64 / NOMINAL_WIDTH;
         let view = self.view(side, size, [26.0 * unit, 78.0 * unit], around);
-        let mut image = self.layers(&view, size).on(color::PAPER, size);
+        let mut image = Image::new(size[0], size[1], color::PAPER);
+        self.draw(&view, &mut image);
         if let Some(ellipsoid) = around {
             ellipsoid.draw(&mut image, &view, unit, &self.moved);
         }
         arrow(&mut image, &view, unit, &self.tool, &self.moved);
         legend(&mut image, &view, unit, header, self.factor);
-        image
-    }
-}
-
-/// Both arms from one side, on no ground yet.
-struct Layers {
-    ghost: Layer,
-    flexible: Layer,
-}
-
-impl Layers {
-    /// Both arms on a ground of one colour.
-    fn on(&self, ground: Rgb, [width, height]: [usize; 2]) -> Image {
-        let mut image = Image::new(width, height, ground);
-        self.ghost.lay_faintly_over(&mut image, GHOST_FADE as f32);
-        self.flexible.lay_over(&mut image);
-        self.ghost.outline(|x, y, share| image.blend(x, y, GHOST_LINE, 0.8 * share));
         image
     }
 }
@@ -304,30 +262,6 @@ fn check(header: &RunHeader, sample: &Sample) -> Result<(), ArmPictureError> {
         }
     }
     Ok(())
-}
-
-/// The same picture on white and on black, without its ground.
-fn without_ground(white: &Image, black: &Image) -> Image {
-    let mut image = black.clone();
-    for (pixel, white) in image.rgba.chunks_exact_mut(4).zip(white.rgba.chunks_exact(4)) {
-        // Most of a picture is ground, and of the rest most covers it.
-        if pixel[..3] == [0; 3] && white[..3] == [255; 3] {
-            pixel[3] = 0;
-            continue;
-        }
-        if pixel[..3] == white[..3] {
-            pixel[3] = 255;
-            continue;
-        }
-        // What shines through is what differs, alike in all colours but for rounding.
-        let through = (0..3).map(|c| f64::from(white[c].saturating_sub(pixel[c]))).sum::<f64>() / (3.0 * 255.0);
-        let covered = 1.0 - through;
-        for part in &mut pixel[..3] {
-            *part = if covered > 0.0 { (f64::from(*part) / covered).round().min(255.0) as u8 } else { 0 };
-        }
-        pixel[3] = (255.0 * covered).round() as u8;
-    }
-    image
 }
 
 /// Places to which one force of any direction moves the tool.
@@ -485,15 +419,9 @@ fn rod(link: usize, from: &Vector3<f64>, to: &Vector3<f64>, radius: f64) -> Opti
 struct Skin {
     positions: Vec<Vector3<f64>>,
     triangles: Vec<[u32; 3]>,
-    /// At the corners of each triangle; of skins that are drawn.
-    normals: Vec<[Vector3<f64>; 3]>,
 }
 
 impl Skin {
-    fn with_normals(self) -> Self {
-        Self { normals: corner_normals(&self.positions, &self.triangles), ..self }
-    }
-
     fn rigid(bodies: &[Body], twin: &TwinSample) -> Self {
         let mut skin = Self::default();
         for body in bodies {
@@ -647,10 +575,6 @@ mod tests {
         for side in [ArmSide::Side, ArmSide::Oblique] {
             let png = arm_png(&header, &sample, side, size).unwrap();
             assert_eq!(png, arm_png(&header, &sample, side, size).unwrap(), "the same bytes");
-            let [beside_another, _] = arm_pictures(&header, &sample, [side, ArmSide::Side], size, true).unwrap();
-            let [one_by_one, _] = arm_pictures(&header, &sample, [side, ArmSide::Side], size, false).unwrap();
-            assert_eq!(one_by_one.png, beside_another.png);
-            assert_eq!(beside_another, arm_picture(&header, &sample, side, size).unwrap());
             let pixels = decoded(&png);
             let count = |near: Rgb, within: i32| {
                 let close = |p: &&Rgb| (0..3).all(|k| (i32::from(p[k]) - i32::from(near[k])).abs() <= within);
@@ -669,7 +593,7 @@ mod tests {
     fn a_picture_without_ground_is_the_same_on_white_and_shows_dark_paper_where_there_is_no_arm() {
         let (header, sample) = arm();
         let size = [450, 350];
-        let picture = arm_picture(&header, &sample, ArmSide::Oblique, size).unwrap();
+        let picture = arm_pictures(&header, &sample, &[ArmSide::Oblique], size).unwrap().remove(0);
         let pixels = rgba(&picture.png);
         assert!(pixels.iter().filter(|p| p[3] == 0).count() > pixels.len() / 2, "most of it is ground");
         assert!(pixels.iter().filter(|p| p[3] == 255).count() > 1000, "the arm covers");
@@ -677,7 +601,8 @@ mod tests {
         let stage = Stage::new(&header, &sample).unwrap();
         let view = stage.view(ArmSide::Oblique, size, [13.0, 13.0], None);
         for ground in [[255; 3], [27, 31, 38]] {
-            let mut truth = stage.layers(&view, size).on(ground, size);
+            let mut truth = Image::new(size[0], size[1], ground);
+            stage.draw(&view, &mut truth);
             arrow(&mut truth, &view, 0.5, &stage.tool, &stage.moved);
             let worst = pixels.iter().zip(truth.rgba.chunks_exact(4)).flat_map(|(p, truth)| {
                 let laid = |c: usize| {

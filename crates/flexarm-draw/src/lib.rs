@@ -1,7 +1,7 @@
 //! How an arm, a mesh and curves are drawn.
 //!
 //! What recordings, markers and pictures show alike is decided here once: [`Magnifier`] enlarges deflections, [`BendLine`]
-//! and [`BentMesh`] bend surfaces, [`palette`] has the colours. Pictures need no graphics card: `arm_picture`, `arm_png` and
+//! and [`BentMesh`] bend surfaces, [`palette`] has the colours. Pictures need no graphics card: `arm_pictures`, `arm_png` and
 //! `arm_sheet` draw an arm at one instant, `mesh_picture` the sheets of a mesh reduction (feature `png`), [`LinePlot`] curves
 //! as SVG.
 //!
@@ -39,7 +39,7 @@ pub mod palette;
 mod plot;
 
 #[cfg(feature = "png")]
-pub use arm_picture::{ArmPicture, ArmPictureError, ArmSide, arm_color, arm_picture, arm_pictures, arm_png, arm_sheet};
+pub use arm_picture::{ArmPicture, ArmPictureError, ArmSide, arm_color, arm_pictures, arm_png, arm_sheet};
 pub use bend::{BendLine, BentMesh, BentPieces};
 pub use field_plot::FieldPlot;
 pub use magnify::{Magnifier, stations_in_link};

@@ -1,6 +1,7 @@
 //! The sheets on which one sees how the link bends: six unit loads at B, and modes with A held.
 
 use nalgebra::{Point3, Vector3, Vector6};
+use rayon::prelude::*;
 
 use super::color;
 use super::draw::{Align, Style};
@@ -127,9 +128,9 @@ fn draw(pictures: &MeshPictures<'_>, title: &str, remark: &str, panels: Vec<Pane
     let columns = if extent(flat.right) > LONG * extent(flat.up) { 2 } else { 3 };
     let rows = PANELS / columns;
     let (width, height) = (WIDTH / columns, (HEIGHT - HEAD) / rows);
-    for (number, panel) in panels.iter().enumerate() {
-        let (left, top) = (number % columns * width, HEAD + number / columns * height);
-        sheet.paste(&panel.draw(pictures, toward, [width, height]), left, top);
+    let drawn: Vec<Image> = panels.par_iter().map(|panel| panel.draw(pictures, toward, [width, height])).collect();
+    for (number, panel) in drawn.iter().enumerate() {
+        sheet.paste(panel, number % columns * width, HEAD + number / columns * height);
     }
     for column in 1..columns {
         sheet.fill((column * width) as f64, HEAD as f64, 1.0, (HEIGHT - HEAD) as f64, color::RULE);

@@ -21,6 +21,11 @@ impl Image {
         Self { width, height, rgba: [r, g, b, 255].repeat(width * height) }
     }
 
+    /// An image with nothing on it: it is seen through.
+    pub fn see_through(width: usize, height: usize) -> Self {
+        Self { width, height, rgba: vec![0; 4 * width * height] }
+    }
+
     /// Colour of a pixel; black outside.
     pub fn pixel(&self, x: usize, y: usize) -> Rgb {
         let at = 4 * (y * self.width + x);
@@ -30,23 +35,19 @@ impl Image {
         }
     }
 
-    /// Gives a pixel a colour. Outside nothing happens.
-    pub fn set(&mut self, x: usize, y: usize, color: Rgb) {
-        if x < self.width && y < self.height {
-            let at = 4 * (y * self.width + x);
-            self.rgba[at..at + 3].copy_from_slice(&color);
-        }
-    }
-
     /// Lays `color` over a pixel; `alpha` 1 covers it. Outside nothing happens.
     pub fn blend(&mut self, x: usize, y: usize, color: Rgb, alpha: f32) {
         if x >= self.width || y >= self.height {
             return;
         }
-        let at = 4 * (y * self.width + x);
-        for (old, new) in self.rgba[at..at + 3].iter_mut().zip(color) {
-            let mixed = f32::from(*old) + (f32::from(new) - f32::from(*old)) * alpha;
-            *old = (f64::from(mixed) + 0.5) as u8; // the nearest, without a call
+        let [old @ .., opacity] = &mut self.rgba.as_chunks_mut::<4>().0[y * self.width + x];
+        let ground = f32::from(*opacity) / 255.0 * (1.0 - alpha);
+        let whole = alpha + ground;
+        if whole > 0.0 {
+            for (old, new) in old.iter_mut().zip(color) {
+                *old = ((f32::from(new) * alpha + f32::from(*old) * ground) / whole).round() as u8;
+            }
+            *opacity = (255.0 * whole).round() as u8;
         }
     }
 

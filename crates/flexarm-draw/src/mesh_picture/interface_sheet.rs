@@ -1,6 +1,7 @@
 //! The sheet on which one sees what was tied and where the link is cut.
 
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 use flexarm_fem::reduction::{Interface, Tie};
 
@@ -35,11 +36,13 @@ pub(super) fn draw(pictures: &MeshPictures<'_>) -> Image {
     let sides = [(first, "seen from"), (-first, "the other side, from"), (-axes.across, "edge on, from")];
     let content = Content::new(pictures, &tied);
     let (width, height) = (WIDTH - LEGEND, (HEIGHT - HEAD) / sides.len());
-    for (row, (toward, title)) in sides.into_iter().enumerate() {
-        let title = format!("{title} {}", side_name(&toward));
-        let is_last = row + 1 == sides.len();
-        let panel = content.panel(pictures, &toward, [width, height], &title, is_last);
-        sheet.paste(&panel, 0, HEAD + row * height);
+    let panel = |(row, (toward, title)): (usize, &(Vector3<f64>, &str))| {
+        let (title, is_last) = (format!("{title} {}", side_name(toward)), row + 1 == sides.len());
+        content.panel(pictures, toward, [width, height], &title, is_last)
+    };
+    let panels: Vec<Image> = sides.par_iter().enumerate().map(panel).collect();
+    for (row, panel) in panels.iter().enumerate() {
+        sheet.paste(panel, 0, HEAD + row * height);
         if row > 0 {
             sheet.fill(0.0, (HEAD + row * height) as f64, width as f64, 1.0, color::RULE);
         }

@@ -3,26 +3,21 @@
 //! Parallel projection, depth buffer, soft light from the upper left, four samples per pixel.
 //! Start at [`render`]. Not here: what the triangles are.
 
-use std::ops::Range;
-
 use nalgebra::Vector3;
 
 use super::color;
 use super::draw::cover_line;
 use super::image::{Image, Rgb};
-use super::raster::{Facet, Linear, Nearest, Spans};
-pub use super::topology::corner_normals;
+use super::raster::cover;
+use super::topology::corner_normals;
 use super::view::View;
 
 /// Samples per pixel in each direction.
 const FINE: usize = 2;
-/// Samples per pixel.
-const SAMPLES: u16 = (FINE * FINE) as u16;
 /// A step in depth that gets an outline, as a share of the size of the scene.
 const OUTLINE: f64 = 0.02;
 /// How much ink an outline has.
 const OUTLINE_INK: f64 = 0.65;
-const INK_PART: u64 = (OUTLINE_INK * 256.0 + 0.5) as u64;
 /// What lies on the surface is lifted towards the viewer by this share of the size of the scene.
 const LIFT: f64 = 0.004;
 
@@ -100,12 +95,7 @@ pub struct Scene<'a> {
 
 /// Draws a scene.
 pub fn render(scene: &Scene<'_>, view: &View, width: usize, height: usize) -> Image {
-    render_over(scene, view, &Image::new(width, height, color::PAPER))
-}
-
-/// Draws a scene over what is on an image already.
-pub fn render_over(scene: &Scene<'_>, view: &View, under: &Image) -> Image {
-    let mut canvas = Canvas::new(scene, view, under);
+    let mut canvas = Canvas::new(scene, view, [width, height]);
     for mark in scene.marks {
         canvas.mark(mark);
     }
@@ -115,262 +105,48 @@ pub fn render_over(scene: &Scene<'_>, view: &View, under: &Image) -> Image {
 /// The triangles of a scene as they cover what is under them: drawn once, laid over any ground.
 pub struct Layer {
     width: usize,
-    /// What of each pixel is covered, packed; nothing takes no memory.
-    pixels: Vec<Packed>,
-    /// Pixels of each row outside of which there is nothing.
-    touched: Vec<Range<usize>>,
+    pixels: Vec<Cover>,
 }
 
-/// What covers a pixel: sum of the colours of its covered samples, their number, and how many of them the outline runs over.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// What covers a pixel.
 struct Cover {
-    sum: [u16; 3],
-    count: u8,
-    lines: u8,
-}
-
-/// A sample in a number: its colour in three parts of 16 bits, 1 if it is covered, 1 if the outline runs there. Sums of four of
-/// them, and products of colours with 256, do not run into each other.
-type Packed = u64;
-const COVERED: Packed = 1 << 8;
-const LINE: Packed = 1;
-
-const fn packed([r, g, b]: Rgb) -> Packed {
-    (r as u64) << 48 | (g as u64) << 32 | (b as u64) << 16
-}
-
-/// One packed colour into the other, in 256 parts.
-fn mixed(from: Packed, to: Packed, part: u64) -> Packed {
-    (from * (256 - part) + to * part) >> 8 & packed([255; 3])
-}
-
-impl Cover {
-    fn unpacked(pixel: Packed) -> Self {
-        let sum = [(pixel >> 48) as u16, (pixel >> 32) as u16, (pixel >> 16) as u16];
-        Self { sum, count: (pixel >> 8) as u8, lines: pixel as u8 }
-    }
-
-    /// Mean of the samples, with the ground where they do not cover it.
-    fn over(self, ground: Rgb) -> Rgb {
-        let open = SAMPLES - u16::from(self.count);
-        let part = |c: usize| ((self.sum[c] + open * u16::from(ground[c])) / SAMPLES) as u8;
-        [part(0), part(1), part(2)]
-    }
-
-    /// How much of the pixel the outline covers.
-    fn outline(self) -> f32 {
-        let (paper, ink) =
-            (u16::from(color::PAPER[0]), u16::from(color::mix(color::PAPER, color::INK, OUTLINE_INK)[0]));
-        let lines = u16::from(self.lines);
-        let mean = (lines * ink + (SAMPLES - lines) * paper) / SAMPLES;
-        f32::from(paper - mean) / f32::from(paper - ink)
-    }
+    /// Mean of the samples that are covered.
+    color: Rgb,
+    /// Share of the samples that are covered, and of those that the outline runs over.
+    share: f32,
+    outline: f32,
 }
 
 impl Layer {
-    /// Draws the triangles; marks are left out. `normals`: of the corners of each triangle ([`corner_normals`]).
-    pub fn new(scene: &Scene<'_>, normals: &[[Vector3<f64>; 3]], view: &View, width: usize, height: usize) -> Self {
-        let mut layer = Self { width, pixels: vec![0; width * height], touched: vec![0..0; height] };
-        Samples::new(scene, view, [width, height]).each_row(scene, normals, |columns, y, _, samples| {
-            let (y, columns) = (y / FINE, columns.start / FINE..columns.end / FINE);
-            let (row, touched) = (&mut layer.pixels[y * width..][..width], &mut layer.touched[y]);
-            let [before, behind] = match touched.end == 0 {
-                true => [columns.clone(), columns.end..columns.end],
-                false => [columns.start.min(touched.start)..touched.start, touched.end..columns.end.max(touched.end)],
-            };
-            *touched = before.start..behind.end;
-            // Memory that was never written is not read: that would be two faults a page.
-            row[before].fill(0);
-            row[behind].fill(0);
-            for (pixel, samples) in row[columns].iter_mut().zip(samples.as_chunks::<FINE>().0) {
-                *pixel += samples.iter().sum::<Packed>();
+    /// Draws the triangles; marks are left out.
+    pub fn new(scene: &Scene<'_>, view: &View, width: usize, height: usize) -> Self {
+        let canvas = Canvas::new(scene, view, [width, height]);
+        let cover = |pixel: usize| {
+            let samples = canvas.samples_of(pixel);
+            let covered = samples.iter().filter(|at| canvas.depths[**at] > NOTHING);
+            let share = |count: usize| count as f32 / samples.len() as f32;
+            Cover {
+                color: mean(covered.clone().map(|at| canvas.colors[*at])),
+                share: share(covered.count()),
+                outline: share(samples.iter().filter(|at| canvas.outline[**at]).count()),
             }
-        });
-        layer
-    }
-
-    /// Calls with each pixel that is covered, at least in part.
-    fn each(&self, mut call: impl FnMut(usize, usize, Cover)) {
-        for (y, columns) in self.touched.iter().enumerate() {
-            for x in columns.clone() {
-                match self.pixels[y * self.width + x] {
-                    0 => {}
-                    pixel => call(x, y, Cover::unpacked(pixel)),
-                }
-            }
-        }
-    }
-
-    /// Lays it over an image of its size: then that is what [`render_over`] draws, without marks.
-    pub fn lay_over(&self, image: &mut Image) {
-        self.each(|x, y, cover| image.set(x, y, cover.over(image.pixel(x, y))));
-    }
-
-    /// As [`Layer::lay_over`], and of what has changed colour takes a share away again.
-    pub fn lay_faintly_over(&self, image: &mut Image, faded: f32) {
-        self.each(|x, y, cover| {
-            let ground = image.pixel(x, y);
-            let color = cover.over(ground);
-            if color != ground {
-                image.set(x, y, color);
-                image.blend(x, y, ground, faded);
-            }
-        });
-    }
-
-    /// Where the outline of the triangles runs: pixels with how much of them it covers.
-    pub fn outline(&self, mut call: impl FnMut(usize, usize, f32)) {
-        self.each(|x, y, cover| {
-            if cover.lines > 0 {
-                call(x, y, cover.outline());
-            }
-        });
-    }
-}
-
-/// The triangles of a scene at the samples of a picture.
-struct Samples {
-    view: View,
-    projected: Vec<[f64; 3]>,
-    width: usize,
-    height: usize,
-    /// Size of the scene, samples.
-    size: f64,
-}
-
-impl Samples {
-    /// For an image of this size, pixels.
-    fn new(scene: &Scene<'_>, view: &View, size: [usize; 2]) -> Self {
-        let [width, height] = size.map(|pixels| FINE * pixels);
-        let fine = FINE as f64;
-        let view = View { scale: view.scale * fine, origin: view.origin.map(|x| x * fine), ..*view };
-        let used = scene.triangles.as_flattened().iter().map(|v| scene.positions[*v as usize]);
-        let limits = used.fold(None, |limits: Option<(Vector3<f64>, Vector3<f64>)>, p| {
-            Some(limits.map_or((p, p), |(low, high)| (low.inf(&p), high.sup(&p))))
-        });
-        let size = limits.map_or(0.0, |(low, high)| (high - low).norm()) * view.scale;
-        let projected: Vec<[f64; 3]> = scene.positions.iter().map(|p| view.project(p)).collect();
-        Self { view, projected, width, height, size }
-    }
-
-    /// Calls with each row in which samples are covered: columns of whole pixels, the row, depths, and samples, 0 where there is
-    /// nothing.
-    ///
-    /// The outline of the body and of its limbs runs where it goes down a long way behind a sample's neighbours; it is in the
-    /// colour.
-    fn each_row(
-        &self,
-        scene: &Scene<'_>,
-        normals: &[[Vector3<f64>; 3]],
-        mut call: impl FnMut(Range<usize>, usize, &[f32], &[Packed]),
-    ) {
-        let step = (OUTLINE * self.size) as f32;
-        let scale: Vec<Packed> = match scene.paint {
-            Paint::Magnitude { .. } => {
-                (0..=SCALE_STEPS).map(|k| packed(color::magnitude(f64::from(k) / SCALE_END))).collect()
-            }
-            Paint::Faces { .. } => Vec::new(),
         };
-        // Each row meets mostly the triangles of the row above it.
-        let mut faces = vec![(usize::MAX, Face::default()); FACES.min(scene.triangles.len())];
-        let (mut lowest, mut samples) = (Vec::new(), Vec::new());
-        let corners = |number: usize| scene.triangles[number].map(|v| self.projected[v as usize]);
-        Nearest::each_row([self.width, self.height], scene.triangles.len(), corners, |nearest, y| {
-            let Range { start, end } = nearest.columns(y);
-            let columns = start / FINE * FINE..end.next_multiple_of(FINE);
-            nearest.lowest_beside(columns.clone(), y, &mut lowest);
-            samples.clear();
-            samples.resize(columns.len(), 0);
-            let (depths, numbers) = nearest.at(columns.clone(), y);
-            let mut end = 0;
-            for run in numbers.chunk_by(|a, b| a == b) {
-                let mut begin = end;
-                end += run.len();
-                // Where there is nothing, the number is one of before.
-                let Some(open) = depths[begin..end].iter().position(|depth| *depth > Nearest::NOTHING) else {
-                    continue;
-                };
-                begin += open;
-                let number = run[0] as usize;
-                let slot = number % faces.len();
-                let near = [columns.start + begin, y];
-                if faces[slot].0 != number {
-                    faces[slot] = (number, self.face(scene, normals, number, near));
-                }
-                let light = faces[slot].1.along(near);
-                let run = samples[begin..end].iter_mut().zip(&depths[begin..end]).zip(&lowest[begin..end]);
-                let run = run.map(|((sample, depth), lowest)| (sample, *depth, *lowest < *depth - step));
-                match scene.paint {
-                    Paint::Faces { colors, .. } => {
-                        let own = colors[number].map(packed);
-                        light_up(run, light, |place| own[usize::from(place > 0.0)]);
-                    }
-                    Paint::Magnitude { .. } => {
-                        light_up(run, light, |place| scale[(place.clamp(0.0, SCALE_END) + 0.5) as u32 as usize]);
-                    }
-                }
-            }
-            call(columns, y, depths, &samples);
-        });
+        Self { width, pixels: (0..width * height).map(cover).collect() }
     }
 
-    /// `near`: a sample in the triangle.
-    fn face(&self, scene: &Scene<'_>, normals: &[[Vector3<f64>; 3]], number: usize, near: [usize; 2]) -> Face {
-        let View { right, up, toward, .. } = self.view;
-        let corners = scene.triangles[number].map(|v| v as usize);
-        let light = normals[number].map(|n| brightness(right.dot(&n), up.dot(&n), toward.dot(&n)));
-        let (place, light) = match scene.paint {
-            Paint::Faces { bright, side, .. } if bright[number] => {
-                (corners.map(|v| side[v]), light.map(|light| 0.68 + 0.32 * light))
-            }
-            Paint::Faces { side, .. } => (corners.map(|v| side[v]), light),
-            Paint::Magnitude { values, peak } => (corners.map(|v| SCALE_END * (values[v] / peak)), light),
-        };
-        let facet = Facet::new(corners.map(|v| self.projected[v]), near).unwrap_or_default();
-        Face { first: near.map(|n| n as f64), place: facet.mean(place), light: facet.mean(light) }
+    fn pixels(&self) -> impl Iterator<Item = (usize, usize, &Cover)> {
+        let covered = self.pixels.iter().enumerate().filter(|(_, cover)| cover.share > 0.0);
+        covered.map(|(k, cover)| (k % self.width, k / self.width, cover))
     }
-}
 
-/// Colours samples of one triangle.
-///
-/// * `run`: each of them, with its depth and whether the outline runs there.
-/// * `light`: place and light of each.
-/// * `own`: colour at a place.
-fn light_up<'a>(
-    run: impl Iterator<Item = (&'a mut Packed, f32, bool)>,
-    [place, light]: [impl Iterator<Item = f64>; 2],
-    own: impl Fn(f64) -> Packed,
-) {
-    for (((sample, depth, line), place), light) in run.zip(place).zip(light) {
-        if depth > Nearest::NOTHING {
-            let color = lit(own(place), light);
-            *sample = COVERED | if line { mixed(color, packed(color::INK), INK_PART) | LINE } else { color };
-        }
+    /// Lays it over an image of its size. At an opacity of 1 that is what [`render`] draws without marks, on any ground.
+    pub fn lay_over(&self, image: &mut Image, opacity: f32) {
+        self.pixels().for_each(|(x, y, cover)| image.blend(x, y, cover.color, opacity * cover.share));
     }
-}
 
-/// Steps of the scale of colours: finer than what a channel of a colour can tell.
-const SCALE_STEPS: u32 = 2048;
-const SCALE_END: f64 = SCALE_STEPS as f64;
-
-/// Triangles that are known at a time, each in the place of its number.
-const FACES: usize = 4096;
-
-/// What is to be known of a triangle to colour its samples.
-#[derive(Clone, Copy, Default)]
-struct Face {
-    /// Sample from which columns and rows are counted.
-    first: [f64; 2],
-    /// On the scale of colours, in its steps, or on which side of a border, and the light.
-    place: Linear,
-    light: Linear,
-}
-
-impl Face {
-    /// Place and light at a sample and those that follow it in its row.
-    fn along(&self, [x, y]: [usize; 2]) -> [impl Iterator<Item = f64>; 2] {
-        let (column, row) = (x as f64 - self.first[0], y as f64 - self.first[1]);
-        [self.place, self.light].map(|number| number.along(column, row))
+    /// Pixels that the outline of the triangles covers, and how much of them.
+    pub fn outline(&self) -> impl Iterator<Item = (usize, usize, f32)> {
+        self.pixels().map(|(x, y, cover)| (x, y, cover.outline)).filter(|(.., share)| *share > 0.0)
     }
 }
 
@@ -380,29 +156,82 @@ struct Canvas {
     width: usize,
     height: usize,
     colors: Vec<Rgb>,
-    /// Nearness to the viewer, samples; minus infinity where there is nothing.
+    /// Nearness to the viewer, samples; [`NOTHING`] where there is nothing.
     depths: Vec<f32>,
+    /// Samples over which the outline of the body and of its limbs runs.
+    outline: Vec<bool>,
     /// Size of the scene, samples.
     size: f64,
 }
 
+/// Depth where there is nothing.
+const NOTHING: f32 = f32::NEG_INFINITY;
+
 impl Canvas {
-    /// The triangles of a scene over an image.
-    fn new(scene: &Scene<'_>, view: &View, under: &Image) -> Self {
-        let [width, height] = [under.width, under.height].map(|pixels| FINE * pixels);
-        let ground = |at: usize| under.pixel(at % width / FINE, at / width / FINE);
-        let mut colors: Vec<Rgb> = (0..width * height).map(ground).collect();
-        let mut depths = vec![f32::NEG_INFINITY; width * height];
-        let samples = Samples::new(scene, view, [under.width, under.height]);
+    /// Draws the triangles on paper, for an image of this size.
+    fn new(scene: &Scene<'_>, view: &View, size: [usize; 2]) -> Self {
+        let [width, height] = size.map(|pixels| FINE * pixels);
+        let fine = FINE as f64;
+        let view = View { scale: view.scale * fine, origin: view.origin.map(|x| x * fine), ..*view };
+        let used = scene.triangles.as_flattened().iter().map(|v| scene.positions[*v as usize]);
+        let limits = used.fold(None, |limits: Option<(Vector3<f64>, Vector3<f64>)>, p| {
+            Some(limits.map_or((p, p), |(low, high)| (low.inf(&p), high.sup(&p))))
+        });
+        let size = limits.map_or(0.0, |(low, high)| (high - low).norm()) * view.scale;
+        let count = width * height;
+        let (colors, depths, outline) = (vec![color::PAPER; count], vec![NOTHING; count], vec![false; count]);
+        let mut canvas = Self { view, width, height, colors, depths, outline, size };
         let normals = corner_normals(scene.positions, scene.triangles);
-        samples.each_row(scene, &normals, |columns, y, nearest, samples| {
-            let at = y * width + columns.start..y * width + columns.end;
-            depths[at.clone()].copy_from_slice(nearest);
-            for (color, sample) in colors[at].iter_mut().zip(samples).filter(|(_, sample)| **sample != 0) {
-                *color = Cover::unpacked(*sample).sum.map(|part| part as u8);
+        for (number, normals) in normals.iter().enumerate() {
+            canvas.triangle(scene, number, normals);
+        }
+        canvas.draw_outline();
+        canvas
+    }
+
+    /// Of two triangles that are equally near the first counts.
+    fn triangle(&mut self, scene: &Scene<'_>, number: usize, normals: &[Vector3<f64>; 3]) {
+        let View { right, up, toward, .. } = self.view;
+        let vertices = scene.triangles[number].map(|v| v as usize);
+        let corners = vertices.map(|v| self.view.project(&scene.positions[v]));
+        let light = normals.map(|n| brightness(right.dot(&n), up.dot(&n), toward.dot(&n)));
+        cover(corners, [self.width, self.height], |x, y, weights| {
+            let mean =
+                |values: [f64; 3]| -> f64 { values.iter().zip(weights).map(|(value, weight)| value * weight).sum() };
+            let (at, depth) = (y * self.width + x, mean(corners.map(|p| p[2])) as f32);
+            if depth > self.depths[at] {
+                let light = mean(light);
+                self.depths[at] = depth;
+                self.colors[at] = match scene.paint {
+                    Paint::Faces { colors, bright, side } => {
+                        let color = colors[number][usize::from(mean(vertices.map(|v| side[v])) > 0.0)];
+                        lit(color, if bright[number] { 0.68 + 0.32 * light } else { light })
+                    }
+                    Paint::Magnitude { values, peak } => {
+                        lit(color::magnitude(mean(vertices.map(|v| values[v])) / peak), light)
+                    }
+                };
             }
         });
-        Self { view: samples.view, width, height, colors, depths, size: samples.size }
+    }
+
+    /// The outline runs where it goes down a long way behind a sample one or two samples on in any direction.
+    fn draw_outline(&mut self) {
+        let step = (OUTLINE * self.size) as f32;
+        for (x, y) in (0..self.height).flat_map(|y| (0..self.width).map(move |x| (x, y))) {
+            let at = y * self.width + x;
+            let falls = |other: usize| self.depths[other] < self.depths[at] - step;
+            let is_edge = [1, 2].into_iter().any(|k| {
+                (x >= k && falls(at - k))
+                    || (x + k < self.width && falls(at + k))
+                    || (y >= k && falls(at - k * self.width))
+                    || (y + k < self.height && falls(at + k * self.width))
+            });
+            self.outline[at] = is_edge;
+            if is_edge {
+                self.colors[at] = color::mix(self.colors[at], color::INK, OUTLINE_INK);
+            }
+        }
     }
 
     fn mark(&mut self, mark: &Mark) {
@@ -423,22 +252,17 @@ impl Canvas {
             }
             Mark::Polygon { corners, color, alpha } => {
                 let projected: Vec<_> = corners.iter().map(|p| self.view.project(p)).collect();
-                let mut touched = Vec::new();
+                let mut shares = vec![0.0; self.depths.len()];
                 for k in 2..projected.len() {
                     let corners = [projected[0], projected[k - 1], projected[k]];
-                    let Some(spans) = Spans::new(corners, self.width, &(0..self.height)) else { continue };
-                    for (y, (columns, depths)) in spans.rows.clone().filter_map(|y| Some((y, spans.at(y)?))) {
-                        for (x, depth) in columns.zip(depths) {
-                            let at = y * self.width + x;
-                            touched.push((at, alpha[usize::from(!self.in_front(at, depth))]));
-                        }
-                    }
+                    cover(corners, [self.width, self.height], |x, y, weights| {
+                        let depth = corners.iter().zip(weights).map(|(p, weight)| weight * p[2]).sum();
+                        let at = y * self.width + x;
+                        shares[at] = alpha[usize::from(!self.in_front(at, depth))];
+                    });
                 }
-                // Triangles share samples on their common side.
-                touched.sort_unstable_by_key(|(at, _)| *at);
-                touched.dedup_by_key(|(at, _)| *at);
-                for (at, alpha) in touched {
-                    self.colors[at] = color::mix(self.colors[at], *color, alpha);
+                for (old, share) in self.colors.iter_mut().zip(shares).filter(|(_, share)| *share > 0.0) {
+                    *old = color::mix(*old, *color, share);
                 }
             }
         }
@@ -468,14 +292,18 @@ impl Canvas {
     /// Mean of the samples of each pixel.
     fn image(&self) -> Image {
         let mut image = Image::new(self.width / FINE, self.height / FINE, color::PAPER);
-        for (number, pixel) in image.rgba.chunks_exact_mut(4).enumerate() {
-            let samples = self.samples_of(number).map(|at| self.colors[at]);
-            for (channel, out) in pixel.iter_mut().take(3).enumerate() {
-                *out = (samples.map(|color| usize::from(color[channel])).iter().sum::<usize>() / samples.len()) as u8;
-            }
+        for pixel in 0..image.width * image.height {
+            let color = mean(self.samples_of(pixel).into_iter().map(|at| self.colors[at]));
+            image.rgba[4 * pixel..][..3].copy_from_slice(&color);
         }
         image
     }
+}
+
+/// Black for no colours.
+fn mean(colors: impl Iterator<Item = Rgb> + Clone) -> Rgb {
+    let count = colors.clone().count().max(1);
+    [0, 1, 2].map(|c| (colors.clone().map(|color| usize::from(color[c])).sum::<usize>() / count) as u8)
 }
 
 /// Light on a wall by its normal in axes of the picture: a key light from the upper left, one from the viewer.
@@ -486,33 +314,7 @@ fn brightness(right: f64, up: f64, toward: f64) -> f64 {
     0.62 + 0.34 * key + 0.12 * toward.abs()
 }
 
-/// A packed colour under light; more than full light whitens.
-fn lit(color: Packed, light: f64) -> Packed {
-    match (256.0 * light + 0.5) as u32 {
-        part @ 0..=256 => mixed(0, color, part.into()),
-        part => mixed(color, packed([255; 3]), u64::from(part - 256).min(256)),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Truth: each channel by itself, times the light, or as far towards white as the light is above 1.
-    #[test]
-    fn light_on_a_packed_colour_is_that_on_each_channel_within_one_step() {
-        let mut largest = 0.0_f64;
-        for (c, k) in (0..=255_u8).flat_map(|c| (0..=1100).map(move |k| (c, k))) {
-            let light = f64::from(k) / 1000.0;
-            let truth = match light <= 1.0 {
-                true => f64::from(c) * light,
-                false => f64::from(c) + (255.0 - f64::from(c)) * (light - 1.0),
-            };
-            let own = [c, 255 - c, c / 2];
-            let sum = Cover::unpacked(COVERED | lit(packed(own), light)).sum;
-            largest = largest.max((f64::from(sum[0]) - truth).abs());
-            assert!(sum.iter().all(|part| *part <= 255));
-        }
-        assert!(largest < 1.5, "{largest}"); // rounded down, light in steps of 1/256; measured 1.463
-    }
+/// A colour under light; more than full light whitens.
+fn lit(color: Rgb, light: f64) -> Rgb {
+    if light <= 1.0 { color::mix([0; 3], color, light) } else { color::mix(color, [255; 3], light - 1.0) }
 }

@@ -17,7 +17,7 @@ pub(super) fn triangle_normals(positions: &[Vector3<f64>], triangles: &[[u32; 3]
 }
 
 /// Normals at the corners of triangles: the mean of the triangles around that belong to the same wall.
-pub fn corner_normals(positions: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Vec<[Vector3<f64>; 3]> {
+pub(super) fn corner_normals(positions: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Vec<[Vector3<f64>; 3]> {
     let normals = triangle_normals(positions, triangles);
     let mut starts = vec![0_u32; positions.len() + 1];
     for vertex in triangles.as_flattened() {

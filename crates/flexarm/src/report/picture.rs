@@ -22,9 +22,7 @@ pub(super) fn pictures(trace: &Trace, width: usize) -> Vec<Picture> {
     use flexarm_draw::{ArmSide, arm_pictures};
     let titles = ["From the side", "From the front and above"];
     let (sides, size) = ([ArmSide::Side, ArmSide::Oblique], [width, height(width)]);
-    // A long run has taken its memory; what a second thread would save is nothing to it.
-    let at_once = trace.samples_per_block() == 1;
-    match arm_pictures(&trace.header, &trace.peak, sides, size, at_once) {
+    match arm_pictures(&trace.header, &trace.peak, &sides, size) {
         Ok(drawn) => {
             let pictures = titles.into_iter().zip(drawn);
             pictures.map(|(title, p)| Picture { title, drawn: Ok((p.png, p.axes)) }).collect()
