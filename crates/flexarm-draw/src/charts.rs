@@ -1,34 +1,16 @@
-//! Charts of studies as SVG: heat maps, main effects, bars with intervals, scatter plots alone and as a matrix.
+//! Charts of studies as SVG: main effects, bars with intervals, histograms, scatter plots alone and as a matrix.
 //!
-//! Plain numbers and names in, the text of a picture out; pixels of the browser. Nothing depends on fonts, files or the clock.
-//! Not here: curves over time ([`crate::LinePlot`]).
+//! Plain numbers and names in, the text of a picture out; pixels of the browser.
+//! Not here: curves over time ([`crate::LinePlot`]), numbers over a plane ([`crate::FieldPlot`]).
 
-use std::fmt::Write as _;
+use std::cmp::Ordering;
+use std::ops::Range;
+
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use crate::palette::{self, Ground};
-use flexarm_settings::written::markup;
-
-/// Letters.
-const FONT: &str = "font-family=\"system-ui, sans-serif\"";
-/// Frames and ticks.
-const LINE: &str = "#8c929c";
-
-/// A value for each pair of two parameters.
-#[derive(Clone, Debug, Default)]
-pub struct HeatMap<'a> {
-    /// What the colours are.
-    pub title: &'a str,
-    /// What goes to the right.
-    pub x_label: &'a str,
-    /// What goes up.
-    pub y_label: &'a str,
-    /// Names of the columns.
-    pub x: &'a [String],
-    /// Names of the rows, from below.
-    pub y: &'a [String],
-    /// Row after row from below; NaN where there is none.
-    pub values: &'a [f64],
-}
+use crate::plot::{Area, Axes, MARK, PlotError, axes, ink, picture};
 
 /// Means of a result over groups of a parameter.
 #[derive(Clone, Debug, Default)]
@@ -65,95 +47,19 @@ pub struct ScatterPlot<'a> {
     pub best: Option<[f64; 2]>,
 }
 
-/// A frame with its scales.
-struct Frame {
-    left: f64,
-    top: f64,
-    width: f64,
-    height: f64,
-    x: (f64, f64),
-    y: (f64, f64),
-}
-
-impl Frame {
-    fn at(&self, x: f64, y: f64) -> (f64, f64) {
-        let part = |v: f64, (low, high): (f64, f64)| if high > low { (v - low) / (high - low) } else { 0.5 };
-        (self.left + self.width * part(x, self.x), self.top + self.height * (1.0 - part(y, self.y)))
-    }
-
-    /// The box, ticks and their numbers.
-    fn draw(&self, out: &mut String, font: u32) {
-        let Self { left, top, width, height, .. } = self;
-        let _ = writeln!(
-            out,
-            "<rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{width:.1}\" height=\"{height:.1}\" fill=\"none\" stroke=\"{LINE}\"/>"
-        );
-        for tick in ticks(self.x, ((width / 60.0) as usize).max(3)) {
-            let (x, bottom) = (self.at(tick, self.y.0).0, top + height);
-            let y = bottom + 4.0;
-            let _ = writeln!(out, "<path d=\"M{x:.1} {bottom:.1}V{y:.1}\" stroke=\"{LINE}\"/>");
-            text(out, (x, bottom + 5.0 + f64::from(font)), font, "middle", &shown(tick, self.x));
-        }
-        for tick in ticks(self.y, ((height / 40.0) as usize).max(3)) {
-            let (y, x) = (self.at(self.x.0, tick).1, left - 4.0);
-            let _ = writeln!(out, "<path d=\"M{left:.1} {y:.1}H{x:.1}\" stroke=\"{LINE}\"/>");
-            text(out, (left - 6.0, y + 0.35 * f64::from(font)), font, "end", &shown(tick, self.y));
-        }
-    }
-}
-
-/// Round numbers within a range, about so many.
-fn ticks((low, high): (f64, f64), most: usize) -> Vec<f64> {
-    let span = high - low;
-    if !(span > 0.0 && span.is_finite()) {
-        return vec![low];
-    }
-    let rough = span / most.clamp(2, 10) as f64;
-    let power = 10f64.powf(rough.log10().floor());
-    let step = [1.0, 2.0, 2.5, 5.0, 10.0].into_iter().map(|s| s * power).find(|s| *s >= rough).unwrap_or(10.0 * power);
-    let first = (low / step).ceil() as i64;
-    (first..).map(|k| k as f64 * step).take_while(|t| *t <= high + 1e-9 * span).take(20).collect()
-}
-
-/// A tick with the digits that its range needs.
-fn shown(tick: f64, (low, high): (f64, f64)) -> String {
-    let most = low.abs().max(high.abs());
-    if tick == 0.0 || tick.abs() < 1e-12 * most {
-        return "0".into();
-    }
-    if !(1e-3..1e5).contains(&most) {
-        return format!("{tick:.1e}");
-    }
-    let digits = (2 - (high - low).max(1e-9 * most).log10().floor() as i32).clamp(0, 6) as usize;
-    let text = format!("{tick:.digits$}");
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
-}
-
-fn text(out: &mut String, (x, y): (f64, f64), font: u32, anchor: &str, words: &str) {
-    let words = markup(words);
-    let _ = writeln!(
-        out,
-        "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{font}\" text-anchor=\"{anchor}\" {FONT} fill=\"#1c2530\">{words}</text>"
-    );
-}
-
-/// Words that go up.
-fn upright(out: &mut String, (x, y): (f64, f64), font: u32, words: &str) {
-    let words = markup(words);
-    let _ = writeln!(
-        out,
-        "<text transform=\"translate({x:.1} {y:.1}) rotate(-90)\" font-size=\"{font}\" text-anchor=\"middle\" {FONT} fill=\"#1c2530\">{words}</text>"
-    );
-}
-
 /// Distance of two lines of a label.
-const LEADING: f64 = 14.0;
+pub(crate) const LEADING: u32 = 14;
 /// Height of a panel of effects.
-const PANEL: f64 = 134.0;
+const PANEL: u32 = 134;
+/// Room for numbers at the left and below.
+const ROOM: [u32; 2] = [52, 22];
+/// Bars of a histogram behind a name.
+const BINS: usize = 14;
+const BIN: RGBColor = RGBColor(201, 214, 228);
 
-/// A label in lines of at most `most` letters, broken behind points, underscores and blanks where that is possible. No letter is left
-/// out: names that differ in one letter must not look the same.
-fn wrapped(label: &str, most: usize) -> Vec<String> {
+/// A label in lines of at most `most` letters, broken behind points, underscores and blanks where that is possible. No letter
+/// is left out: names that differ in one letter must not look the same.
+pub(crate) fn wrapped(label: &str, most: usize) -> Vec<String> {
     let most = most.max(8);
     let mut lines: Vec<Vec<char>> = vec![Vec::new()];
     for piece in label.split_inclusive(['.', '_', ' ', '-', '[']) {
@@ -167,313 +73,211 @@ fn wrapped(label: &str, most: usize) -> Vec<String> {
     lines.into_iter().filter(|line| !line.is_empty()).map(String::from_iter).collect()
 }
 
-/// Lines below each other, the first at the place.
-fn text_lines(out: &mut String, (x, y): (f64, f64), font: u32, lines: &[String]) {
-    for (k, line) in lines.iter().enumerate() {
-        text(out, (x, y + LEADING * k as f64), font, "middle", line);
+/// Lines around a place, below each other; or upwards and to the right of each other.
+pub(crate) fn draw_lines(
+    area: &Area<'_>,
+    (x, y): (u32, u32),
+    lines: &[String],
+    upright: bool,
+) -> Result<(), PlotError> {
+    let style = TextStyle::from(("sans-serif", 14)).pos(Pos::new(HPos::Center, VPos::Top));
+    let style = if upright { style.transform(FontTransform::Rotate270) } else { style };
+    for (line, k) in lines.iter().zip(0..) {
+        let (right, down) = if upright { (LEADING * k, 0) } else { (0, LEADING * k) };
+        area.draw(&Text::new(line.as_str(), ((x + right) as i32, (y + down) as i32), style.clone()))?;
     }
-}
-
-/// Lines that go up, the first at the place and the others to its right.
-fn upright_lines(out: &mut String, (x, y): (f64, f64), font: u32, lines: &[String]) {
-    for (k, line) in lines.iter().enumerate() {
-        upright(out, (x + LEADING * k as f64, y), font, line);
-    }
-}
-
-fn polyline(out: &mut String, ink: &str, points: impl Iterator<Item = (f64, f64)>) {
-    let line: Vec<String> = points.map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
-    let _ =
-        writeln!(out, "<polyline points=\"{}\" fill=\"none\" stroke=\"{ink}\" stroke-width=\"1.5\"/>", line.join(" "));
-}
-
-fn picture(width: f64, height: f64, inside: &str) -> String {
-    format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" viewBox=\"0 0 {width:.0} {height:.0}\">\n\
-         <rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n{inside}</svg>\n"
-    )
+    Ok(())
 }
 
 /// Least and largest of the finite numbers, with some room.
-fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
+pub(crate) fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
     let (low, high) = values
         .filter(|x| x.is_finite())
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
     if low > high {
-        return (0.0, 1.0);
+        return 0.0..1.0;
     }
-    let room = match high > low {
-        true => 0.05 * (high - low),
-        false => 0.5 * low.abs().max(1e-12),
-    };
-    (low - room, high + room)
-}
-
-impl HeatMap<'_> {
-    /// The picture, with a number in each cell if there is room.
-    pub fn svg(&self) -> String {
-        let (columns, rows) = (self.x.len().max(1), self.y.len().max(1));
-        let cell = ((560.0 / columns as f64).clamp(14.0, 96.0), (360.0 / rows as f64).clamp(12.0, 120.0));
-        let (width, height) = (cell.0 * columns as f64, cell.1 * rows as f64);
-        let y_label = wrapped(self.y_label, (height / 7.5) as usize);
-        let (left, top) = (92.0 + LEADING * y_label.len() as f64, 34.0);
-        let finite = || self.values.iter().copied().filter(|x| x.is_finite());
-        let (low, high) = (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));
-        let mut out = String::new();
-        text(&mut out, (left, 20.0), 15, "start", self.title);
-        for (k, value) in self.values.iter().enumerate().filter(|(_, value)| value.is_finite()) {
-            let (column, row) = (k % columns, k / columns);
-            let (x, y) = (left + cell.0 * column as f64, top + height - cell.1 * (row + 1) as f64);
-            let part = if high > low { (value - low) / (high - low) } else { 0.5 };
-            let fill = palette::hex(palette::magnitude(part));
-            let number = shown(*value, (low, high));
-            let _ = writeln!(
-                out,
-                "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"{fill}\"><title>{}</title></rect>",
-                cell.0 + 0.3,
-                cell.1 + 0.3,
-                markup(&format!("{}, {}: {value}", self.x[column], self.y[row]))
-            );
-            if cell.0 >= 44.0 && cell.1 >= 16.0 {
-                let ink = if part < 0.5 { "#fff" } else { "#1c2530" };
-                let (x, y) = (x + 0.5 * cell.0, y + 0.5 * cell.1 + 4.0);
-                let _ = writeln!(
-                    out,
-                    "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"11\" text-anchor=\"middle\" {FONT} fill=\"{ink}\">{number}</text>"
-                );
-            }
-        }
-        // Not more names than have room.
-        let every = (44.0 / cell.0).ceil().max(1.0) as usize;
-        for (k, name) in self.x.iter().enumerate().step_by(every) {
-            text(&mut out, (left + cell.0 * (k as f64 + 0.5), top + height + 16.0), 12, "middle", name);
-        }
-        let every = (14.0 / cell.1).ceil().max(1.0) as usize;
-        for (k, name) in self.y.iter().enumerate().step_by(every) {
-            text(&mut out, (left - 6.0, top + height - cell.1 * (k as f64 + 0.5) + 4.0), 12, "end", name);
-        }
-        let x_label = wrapped(self.x_label, ((width + 120.0) / 7.5) as usize);
-        text_lines(&mut out, (left + 0.5 * width, top + height + 36.0), 13, &x_label);
-        upright_lines(&mut out, (18.0, top + 0.5 * height), 13, &y_label);
-        legend(&mut out, (left + width + 24.0, top), height, (low, high));
-        let wide = (left + width + 130.0).max(left + 8.5 * self.title.chars().count() as f64);
-        picture(wide, top + height + 33.0 + LEADING * x_label.len() as f64, &out)
-    }
-}
-
-/// The scale with its ends.
-fn legend(out: &mut String, (x, y): (f64, f64), height: f64, (low, high): (f64, f64)) {
-    const STEPS: usize = 48;
-    for k in 0..STEPS {
-        let part = k as f64 / (STEPS - 1) as f64;
-        let fill = palette::hex(palette::magnitude(part));
-        let (top, step) = (y + height * (1.0 - (k + 1) as f64 / STEPS as f64), height / STEPS as f64 + 0.5);
-        let _ = writeln!(out, "<rect x=\"{x:.1}\" y=\"{top:.1}\" width=\"14\" height=\"{step:.1}\" fill=\"{fill}\"/>");
-    }
-    for tick in ticks((low, high), (height / 40.0) as usize) {
-        let part = if high > low { (tick - low) / (high - low) } else { 0.5 };
-        text(out, (x + 20.0, y + height * (1.0 - part) + 4.0), 12, "start", &shown(tick, (low, high)));
-    }
+    let (span, size) = (high - low, low.abs().max(high.abs()).max(1e-12));
+    let room = if span > 1e-9 * size { 0.05 * span } else { 0.5 * size };
+    low - room..high + room
 }
 
 /// Main effects in rows of panels, one row per result; panels of a row share their vertical scale.
 pub fn effects(rows: &[Vec<EffectPanel<'_>>]) -> String {
-    let columns = rows.iter().map(Vec::len).max().unwrap_or(0).max(1);
-    let width = (900.0 / columns as f64).clamp(150.0, 320.0);
-    let panels = || rows.iter().flatten();
-    let below = |panel: &EffectPanel<'_>| wrapped(panel.x_label, (width / 6.5) as usize);
-    let beside = |panel: &EffectPanel<'_>| wrapped(panel.y_label, (PANEL / 6.5) as usize);
-    let most_below = panels().map(|panel| below(panel).len()).max().unwrap_or(1);
-    let most_beside = panels().map(|panel| beside(panel).len()).max().unwrap_or(1);
-    let (left, height) = (48.0 + LEADING * most_beside as f64, PANEL + 42.0 + LEADING * most_below as f64);
-    let ink = palette::hex(palette::series(0, Ground::Paper));
-    let mut out = String::new();
-    for (row, panels) in rows.iter().enumerate() {
-        let all = panels.iter().flat_map(|panel| panel.points.iter().flat_map(|p| [p[1] - p[2], p[1] + p[2]]));
-        let y = range(all);
-        for (column, panel) in panels.iter().enumerate() {
-            let frame = Frame {
-                left: left + width * column as f64,
-                top: 12.0 + height * row as f64,
-                width: width - 66.0,
-                height: PANEL,
-                x: range(panel.points.iter().map(|p| p[0])),
-                y,
-            };
-            frame.draw(&mut out, 10);
-            polyline(&mut out, &ink, panel.points.iter().map(|p| frame.at(p[0], p[1])));
-            for [x, mean, error] in &panel.points {
-                let ((x, y), low, high) =
-                    (frame.at(*x, *mean), frame.at(*x, mean - error).1, frame.at(*x, mean + error).1);
-                let _ = writeln!(
-                    out,
-                    "<path d=\"M{x:.1} {low:.1}V{high:.1}\" stroke=\"{ink}\"/><circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"2.5\" fill=\"{ink}\"/>"
-                );
-            }
-            let middle = frame.left + 0.5 * frame.width;
-            text_lines(&mut out, (middle, frame.top + frame.height + 32.0), 11, &below(panel));
-            if column == 0 {
-                upright_lines(&mut out, (12.0, frame.top + 0.5 * frame.height), 11, &beside(panel));
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0).max(1) as u32;
+    let width = (900 / columns).clamp(150, 320);
+    let below = |panel: &EffectPanel<'_>| wrapped(panel.x_label, (width / 7) as usize);
+    let beside = |panel: &EffectPanel<'_>| wrapped(panel.y_label, (PANEL / 7) as usize);
+    let most = |lines: &dyn Fn(&EffectPanel<'_>) -> Vec<String>| {
+        LEADING * rows.iter().flatten().map(|panel| lines(panel).len()).max().unwrap_or(1) as u32
+    };
+    let (left, height) = (most(&beside) + 4, 12 + PANEL + ROOM[1] + most(&below));
+    let color = ink(palette::series(0, Ground::Paper));
+    let draw = |area: &Area<'_>| {
+        for (row, panels) in (0..).zip(rows) {
+            let top = 12 + height * row;
+            let y = range(panels.iter().flat_map(|panel| panel.points.iter().flat_map(|p| [p[1] - p[2], p[1] + p[2]])));
+            for (column, panel) in (0..).zip(panels) {
+                let part = area.clone().shrink((left + width * column, top), (width - 14, PANEL + ROOM[1]));
+                let x = range(panel.points.iter().map(|p| p[0]));
+                let mut chart = axes(&part, Axes { ranges: [x, y.clone()], room: ROOM, ..Axes::default() })?;
+                let points = panel.points.iter().filter(|p| p.iter().all(|x| x.is_finite()));
+                chart.draw_series(LineSeries::new(points.clone().map(|p| (p[0], p[1])), color.stroke_width(2)))?;
+                let interval = |[x, mean, error]: &[f64; 3]| {
+                    ErrorBar::new_vertical(*x, mean - error, *mean, mean + error, color.filled(), 6)
+                };
+                chart.draw_series(points.map(interval))?;
+                let middle = left + width * column + (width - 14) / 2;
+                draw_lines(area, (middle, top + PANEL + ROOM[1]), &below(panel), false)?;
+                if column == 0 {
+                    draw_lines(area, (0, top + PANEL / 2), &beside(panel), true)?;
+                }
             }
         }
-    }
-    picture(left + width * columns as f64 - 28.0, height * rows.len().max(1) as f64 + 8.0, &out)
+        Ok(())
+    };
+    // Writing to a text does not fail; nor below.
+    picture((left + width * columns, height * (rows.len() as u32).max(1)), draw).unwrap_or_default()
 }
 
 /// Pairs of bars with intervals.
 ///
 /// * `names`: of both.
 pub fn bar_pairs(title: &str, names: [&str; 2], pairs: &[BarPair<'_>]) -> String {
-    let longest = pairs.iter().map(|pair| pair.name.chars().count()).max().unwrap_or(0);
-    let (left, step) = ((7.0 * longest as f64 + 20.0).max(230.0), 40.0);
-    let (width, top) = (480.0, 52.0);
-    let high = pairs.iter().flat_map(|pair| pair.values.iter().map(|v| v[2])).fold(1.0, f64::max);
-    let low = pairs.iter().flat_map(|pair| pair.values.iter().map(|v| v[1])).fold(0.0, f64::min);
-    let height = step * pairs.len() as f64;
-    let frame = Frame { left, top, width, height, x: (low, high), y: (0.0, 1.0) };
-    let inks = [0, 1].map(|k| palette::hex(palette::series(k, Ground::Paper)));
-    let mut out = String::new();
-    text(&mut out, (12.0, 20.0), 15, "start", title);
-    for (k, name) in names.iter().enumerate() {
-        let x = left + 150.0 * k as f64;
-        let _ = writeln!(out, "<rect x=\"{x:.1}\" y=\"30\" width=\"14\" height=\"12\" fill=\"{}\"/>", inks[k]);
-        text(&mut out, (x + 20.0, 41.0), 12, "start", name);
-    }
-    for (row, pair) in pairs.iter().enumerate() {
-        let y = top + step * row as f64;
-        text(&mut out, (left - 8.0, y + 0.5 * step + 4.0), 12, "end", pair.name);
-        for (k, [value, from, to]) in pair.values.iter().enumerate() {
-            let y = y + 5.0 + 15.0 * k as f64;
-            let (zero, end) = (frame.at(0.0, 0.0).0, frame.at(*value, 0.0).0);
-            let (x, wide) = (zero.min(end), (end - zero).abs());
-            let (from, to, middle) = (frame.at(*from, 0.0).0, frame.at(*to, 0.0).0, y + 6.5);
-            let _ = writeln!(
-                out,
-                "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{wide:.1}\" height=\"13\" fill=\"{}\" fill-opacity=\"0.75\"/>\
-                 <path d=\"M{from:.1} {middle:.1}H{to:.1}M{from:.1} {:.1}v6M{to:.1} {:.1}v6\" stroke=\"#1c2530\"/>",
-                inks[k],
-                middle - 3.0,
-                middle - 3.0
-            );
+    let labels: Vec<String> = pairs.iter().map(|pair| pair.name.to_owned()).collect();
+    let longest = labels.iter().map(|name| name.chars().count()).max().unwrap_or(0);
+    let (left, top, width) = ((7 * longest as u32 + 20).max(230), 52, 480);
+    let height = 40 * pairs.len().max(1) as u32;
+    let high = pairs.iter().flat_map(|pair| pair.values.map(|v| v[2])).fold(1.0, f64::max);
+    let low = pairs.iter().flat_map(|pair| pair.values.map(|v| v[1])).fold(0.0, f64::min);
+    let inks = [0, 1].map(|k| ink(palette::series(k, Ground::Paper)));
+    let draw = |area: &Area<'_>| {
+        area.draw(&Text::new(title, (12, 6), ("sans-serif", 18)))?;
+        for ((name, ink), x) in names.into_iter().zip(inks).zip([left as i32, left as i32 + 150]) {
+            area.draw(&Rectangle::new([(x, 30), (x + 14, 42)], ink.filled()))?;
+            area.draw(&Text::new(name, (x + 20, 30), ("sans-serif", 15)))?;
         }
-    }
-    for tick in ticks((low, high), 6) {
-        let x = frame.at(tick, 0.0).0;
-        let _ = writeln!(
-            out,
-            "<path d=\"M{x:.1} {top:.1}V{:.1}\" stroke=\"{LINE}\" stroke-opacity=\"0.4\"/>",
-            top + height
-        );
-        text(&mut out, (x, top + height + 16.0), 11, "middle", &shown(tick, (low, high)));
-    }
-    picture(left + width + 30.0, top + height + 28.0, &out)
+        // The first pair is at the top.
+        let ranges = [low..high, pairs.len().max(1) as f64 - 0.5..-0.5];
+        let part = area.clone().shrink((0, top), (left + width, height + ROOM[1]));
+        let mut chart = axes(&part, Axes { ranges, room: [left, ROOM[1]], names: [None, Some(&labels)] })?;
+        for (row, pair) in pairs.iter().enumerate() {
+            for ((k, [value, from, to]), ink) in pair.values.into_iter().enumerate().zip(inks) {
+                let y = row as f64 + 0.375 * (k as f64 - 0.5);
+                let bar = Rectangle::new([(0.0, y - 0.165), (value, y + 0.165)], ink.mix(0.75).filled());
+                chart.draw_series([bar])?;
+                chart.draw_series([ErrorBar::new_horizontal(y, from, value, to, BLACK.filled(), 6)])?;
+            }
+        }
+        Ok(())
+    };
+    picture((left + width + 30, top + height + ROOM[1] + 6), draw).unwrap_or_default()
 }
 
 impl ScatterPlot<'_> {
     /// The picture.
     pub fn svg(&self) -> String {
+        self.draw().unwrap_or_default()
+    }
+
+    fn draw(&self) -> Result<String, PlotError> {
         let all = || self.points.iter().chain(self.front);
-        let frame = Frame {
-            left: 84.0,
-            top: 14.0,
-            width: 620.0,
-            height: 360.0,
-            x: range(all().map(|p| p[0])),
-            y: range(all().map(|p| p[1])),
-        };
-        let [grey, ink] = [palette::rigid(Ground::Paper), palette::series(1, Ground::Paper)].map(palette::hex);
-        let mut out = String::new();
-        frame.draw(&mut out, 11);
-        dots(&mut out, &frame, self.points, 2.2, &grey, 0.5);
-        polyline(&mut out, &ink, self.front.iter().map(|p| frame.at(p[0], p[1])));
-        dots(&mut out, &frame, self.front, 3.5, &ink, 1.0);
-        if let Some(best) = self.best {
-            let (x, y) = frame.at(best[0], best[1]);
-            let _ = writeln!(
-                out,
-                "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"8\" fill=\"none\" stroke=\"#1c2530\" stroke-width=\"2\"/>"
-            );
-        }
-        text(&mut out, (frame.left + 0.5 * frame.width, frame.top + frame.height + 36.0), 13, "middle", self.x_label);
-        upright(&mut out, (18.0, frame.top + 0.5 * frame.height), 13, self.y_label);
-        picture(730.0, 424.0, &out)
+        let ranges = [range(all().map(|p| p[0])), range(all().map(|p| p[1]))];
+        let [grey, color] = [palette::rigid(Ground::Paper), palette::series(1, Ground::Paper)].map(ink);
+        picture((730, 420), |area| {
+            let part = area.clone().shrink((22, 14), (690, 382));
+            let mut chart = axes(&part, Axes { ranges, room: ROOM, ..Axes::default() })?;
+            chart.draw_series(dots(self.points, 2, grey.mix(0.5).filled()))?;
+            chart.draw_series(LineSeries::new(finite(self.front), color.stroke_width(2)))?;
+            chart.draw_series(dots(self.front, 4, color.filled()))?;
+            chart.draw_series(self.best.map(|best| Circle::new((best[0], best[1]), 8, BLACK.stroke_width(2))))?;
+            draw_lines(area, (393, 398), &[self.x_label.to_owned()], false)?;
+            draw_lines(area, (4, 194), &[self.y_label.to_owned()], true)
+        })
     }
 }
 
-fn dots(out: &mut String, frame: &Frame, points: &[[f64; 2]], radius: f64, ink: &str, opacity: f64) {
-    let _ = writeln!(out, "<g fill=\"{ink}\" fill-opacity=\"{opacity}\">");
-    for [x, y] in points.iter().filter(|p| p.iter().all(|x| x.is_finite())) {
-        let (x, y) = frame.at(*x, *y);
-        let _ = writeln!(out, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\"/>");
-    }
-    out.push_str("</g>\n");
+fn finite(points: &[[f64; 2]]) -> impl Iterator<Item = (f64, f64)> {
+    points.iter().filter(|p| p.iter().all(|x| x.is_finite())).map(|p| (p[0], p[1]))
+}
+
+fn dots(points: &[[f64; 2]], radius: u32, style: ShapeStyle) -> impl Iterator<Item = Circle<(f64, f64), u32>> {
+    finite(points).map(move |point| Circle::new(point, radius, style))
 }
 
 /// Every column over every other one: points below the diagonal, the correlation of the ranks above it, counts on it.
 ///
 /// * `columns`: name and values, equally many.
 pub fn scatter_matrix(columns: &[(&str, &[f64])]) -> String {
-    let n = columns.len().max(1);
-    let cell = (900.0 / n as f64).clamp(70.0, 170.0);
-    let (left, top) = (16.0, 8.0);
-    let ranges: Vec<(f64, f64)> = columns.iter().map(|(_, values)| range(values.iter().copied())).collect();
-    let ink = palette::hex(palette::series(0, Ground::Paper));
-    let mut out = String::new();
-    for (row, (_, y)) in columns.iter().enumerate() {
-        for (column, (name, x)) in columns.iter().enumerate() {
-            let frame = Frame {
-                left: left + cell * column as f64,
-                top: top + cell * row as f64,
-                width: cell - 4.0,
-                height: cell - 4.0,
-                x: ranges[column],
-                y: ranges[row],
-            };
-            let Frame { left, top, width, height, .. } = frame;
-            let _ = writeln!(
-                out,
-                "<rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{width:.1}\" height=\"{height:.1}\" fill=\"none\" stroke=\"#d8dee6\"/>"
-            );
-            let middle = (left + 0.5 * width, top + 0.5 * height);
-            match column.cmp(&row) {
-                std::cmp::Ordering::Less => {
-                    let points: Vec<[f64; 2]> = x.iter().zip(*y).map(|(x, y)| [*x, *y]).collect();
-                    dots(&mut out, &frame, &points, 1.3, &ink, 0.45);
-                }
-                std::cmp::Ordering::Equal => {
-                    histogram(&mut out, &frame, x);
-                    text_lines(&mut out, (middle.0, top + 14.0), 11, &wrapped(name, (cell / 6.5) as usize));
-                }
-                std::cmp::Ordering::Greater => {
-                    let rank = rank_correlation(x, y);
-                    if rank.is_finite() {
-                        let size = 10 + (10.0 * rank.abs()) as u32;
-                        let place = (middle.0, middle.1 + 0.35 * f64::from(size));
-                        text(&mut out, place, size, "middle", &format!("{rank:.2}"));
+    let n = columns.len().max(1) as u32;
+    let cell = (900 / n).clamp(70, 170);
+    let color = ink(palette::series(0, Ground::Paper));
+    let draw = |area: &Area<'_>| {
+        for (row, (_, y)) in columns.iter().enumerate() {
+            for (column, (name, x)) in columns.iter().enumerate() {
+                let [left, top] = [column, row].map(|k| 8 + cell * k as u32);
+                let part = area.clone().shrink((left, top), (cell - 4, cell - 4));
+                let middle = (cell / 2) as i32 - 2;
+                match column.cmp(&row) {
+                    Ordering::Less => {
+                        let ranges = (range(x.iter().copied()), range(y.iter().copied()));
+                        let mut chart = ChartBuilder::on(&part).build_cartesian_2d(ranges.0, ranges.1)?;
+                        let points: Vec<[f64; 2]> = x.iter().zip(*y).map(|(x, y)| [*x, *y]).collect();
+                        chart.draw_series(dots(&points, 1, color.mix(0.6).filled()))?;
+                    }
+                    Ordering::Equal => {
+                        let (range, bars) = (range(x.iter().copied()), bars(x, range(x.iter().copied()), BINS));
+                        let most = bars.iter().map(|[_, (_, count)]| *count).fold(1.0, f64::max);
+                        let mut chart = ChartBuilder::on(&part).build_cartesian_2d(range, 0.0..most / 0.75)?;
+                        chart.draw_series(bars.into_iter().map(|bar| Rectangle::new(bar, BIN.filled())))?;
+                        draw_lines(&part, (cell / 2 - 2, 4), &wrapped(name, (cell / 7) as usize), false)?;
+                    }
+                    Ordering::Greater => {
+                        let rank = rank_correlation(x, y);
+                        let font = ("sans-serif", 12 + (12.0 * rank.abs()) as i32).into_font();
+                        let style = TextStyle::from(font).pos(Pos::new(HPos::Center, VPos::Center));
+                        let number = if rank.is_finite() { format!("{rank:.2}") } else { String::new() };
+                        part.draw(&Text::new(number, (middle, middle), style))?;
                     }
                 }
+                let end = (cell - 5) as i32;
+                part.draw(&Rectangle::new([(0, 0), (end, end)], MARK.mix(0.4)))?;
             }
         }
-    }
-    picture(left + cell * n as f64 + 8.0, top + cell * n as f64 + 8.0, &out)
+        Ok(())
+    };
+    picture((cell * n + 12, cell * n + 12), draw).unwrap_or_default()
 }
 
-fn histogram(out: &mut String, frame: &Frame, values: &[f64]) {
-    const BINS: usize = 14;
-    let mut counts = [0usize; BINS];
-    let (low, high) = frame.x;
+/// How many of some numbers are in which stretch; empty if none is finite.
+///
+/// * `label`: what they are.
+pub fn histogram(label: &str, values: &[f64], bins: usize) -> String {
+    if !values.iter().any(|x| x.is_finite()) {
+        return String::new();
+    }
+    let range = range(values.iter().copied());
+    let bars = bars(values, range.clone(), bins);
+    let most = bars.iter().map(|[_, (_, count)]| *count).fold(1.0, f64::max);
+    let draw = |area: &Area<'_>| {
+        let part = area.clone().shrink((0, 8), (400, 120 + ROOM[1]));
+        let mut chart = axes(&part, Axes { ranges: [range, 0.0..most], room: ROOM, ..Axes::default() })?;
+        let color = ink(palette::series(0, Ground::Paper));
+        chart.draw_series(bars.into_iter().map(|bar| Rectangle::new(bar, color.filled())))?;
+        draw_lines(area, (226, 130 + ROOM[1]), &[label.to_owned()], false)
+    };
+    picture((420, 150 + ROOM[1]), draw).unwrap_or_default()
+}
+
+/// Two corners of each bar: from where to where numbers are counted, and how many there are.
+fn bars(values: &[f64], range: Range<f64>, bins: usize) -> Vec<[(f64, f64); 2]> {
+    let width = (range.end - range.start) / bins as f64;
+    let mut counts = vec![0_usize; bins];
     for x in values.iter().filter(|x| x.is_finite()) {
-        counts[(((x - low) / (high - low).max(f64::MIN_POSITIVE) * BINS as f64) as usize).min(BINS - 1)] += 1;
+        counts[(((x - range.start) / width) as usize).min(bins - 1)] += 1;
     }
-    let most = counts.iter().copied().max().unwrap_or(0).max(1) as f64;
-    for (k, count) in counts.iter().enumerate() {
-        let (wide, high) = (frame.width / BINS as f64, 0.75 * frame.height * *count as f64 / most);
-        let (x, y) = (frame.left + wide * k as f64, frame.top + frame.height - high);
-        let _ = writeln!(
-            out,
-            "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{wide:.1}\" height=\"{high:.1}\" fill=\"#c9d6e4\"/>"
-        );
-    }
+    let edge = |k: usize| range.start + width * k as f64;
+    counts.iter().enumerate().map(|(k, count)| [(edge(k), 0.0), (edge(k + 1), *count as f64)]).collect()
 }
 
 /// Correlation of the ranks (Spearman); NaN where one of both does not vary.
@@ -506,6 +310,7 @@ fn ranks(values: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::FieldPlot;
 
     /// Truth: Spearman's coefficient of a rising curve is 1, of a falling one -1; 1, 2, 3, 4 against 2, 1, 4, 3 by the formula
     /// 1 - 6 sum d^2 / (n (n^2 - 1)) = 0.6.
@@ -518,17 +323,12 @@ mod tests {
         assert!(rank_correlation(&x, &[1.0; 4]).is_nan());
     }
 
-    #[test]
-    fn ticks_are_round_numbers_within_the_range() {
-        assert_eq!(ticks((0.0, 1.0), 5), [0.0, 0.2, 0.4, 0.6000000000000001, 0.8, 1.0]);
-        assert_eq!(ticks((30.0, 210.0), 4), [50.0, 100.0, 150.0, 200.0]);
-        assert_eq!(ticks((2.0, 2.0), 4), [2.0]);
-        assert_eq!((shown(0.6000000000000001, (0.0, 1.0)), shown(50.0, (30.0, 210.0))), ("0.6".into(), "50".into()));
-    }
-
     /// The letters of all texts of a picture, one after the other.
     fn texts(svg: &str) -> String {
-        svg.split("</text>").filter_map(|part| part.rsplit_once('>')).map(|(_, words)| words).collect()
+        svg.split("</text>")
+            .filter_map(|part| part.rsplit_once('>'))
+            .map(|(_, words)| words.trim_matches('\n'))
+            .collect()
     }
 
     #[test]
@@ -549,17 +349,31 @@ mod tests {
         }
         assert!(texts(&charts[0]).contains(y_label));
         let cells = ["1", "2"].map(str::to_owned);
-        let map = HeatMap { title: "t", x_label: &names[0], y_label, x: &cells, y: &cells, values: &[1.0; 4] }.svg();
+        let map = FieldPlot {
+            labels: [&names[0], y_label],
+            names: Some([&cells; 2]),
+            values: &[1.0; 4],
+            ..FieldPlot::default()
+        };
+        let map = map.svg();
         assert!(texts(&map).contains(y_label) && texts(&map).contains(names[0].as_str()));
         assert_eq!(wrapped("drive.joint_2.gearbox", 10), ["drive.", "joint_2.", "gearbox"]);
         assert_eq!(wrapped("abcdefghijklmnop", 8), ["abcdefgh", "ijklmnop"]);
     }
 
+    /// Truth: counted by hand; the range is wider than the numbers by a twentieth on both sides.
+    #[test]
+    fn bars_count_every_finite_number_once() {
+        let values = [0.0, 1.0, 1.0, 4.0, f64::NAN, 10.0];
+        let heights: Vec<f64> =
+            bars(&values, range(values.into_iter()), 3).iter().map(|[_, (_, count)]| *count).collect();
+        assert_eq!(heights, [3.0, 1.0, 1.0]);
+    }
+
     #[test]
     fn charts_of_nothing_and_of_what_does_not_vary_are_pictures_without_nan() {
         let names = ["a <b>".to_owned(), "c".to_owned()];
-        let map =
-            HeatMap { title: "t", x_label: "x", y_label: "y", x: &names, y: &names[..1], values: &[1.0, f64::NAN] };
+        let map = FieldPlot { names: Some([&names, &names[..1]]), values: &[1.0, f64::NAN], ..FieldPlot::default() };
         let panel = EffectPanel { x_label: "x", y_label: "y", points: vec![[1.0, 2.0, 0.0]] };
         let pair = BarPair { name: "p", values: [[0.5, 0.4, 0.6], [0.7, 0.6, 0.9]] };
         let plot = ScatterPlot {
@@ -577,6 +391,7 @@ mod tests {
             matrix,
             effects(&[]),
             scatter_matrix(&[]),
+            histogram("h", &[2.0, f64::NAN, 2.0], 5),
         ] {
             assert!(
                 svg.starts_with("<svg") && svg.ends_with("</svg>\n") && !svg.contains("NaN") && !svg.contains("inf"),

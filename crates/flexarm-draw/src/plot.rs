@@ -1,12 +1,14 @@
 //! Curves over a common axis as a picture (SVG): panels one above the other with a legend.
 //!
-//! The one module that names `plotters`, with its SVG backend alone: no fonts, no files, no clock. Start at
-//! [`LinePlot`] for the screen, [`paper_plot`] for a column of a paper.
+//! Start at [`LinePlot`] for the screen, [`paper_plot`] for a column of a paper. Pictures are drawn by `plotters` with its SVG
+//! backend alone: no fonts, no files, no clock. What all of them share is here: [`picture`], [`axes`], [`plain`].
 
 use std::ops::Range;
 
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
+use plotters::coord::types::RangedCoordf64;
+use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
 
 use crate::palette::{self, Ground, Rgb};
@@ -14,7 +16,7 @@ use crate::palette::{self, Ground, Rgb};
 /// Decades that a logarithmic panel shows at most below its highest value.
 const MOST_DECADES: f64 = 1e8;
 /// Marks across a panel.
-const MARK: RGBColor = RGBColor(140, 146, 156);
+pub(crate) const MARK: RGBColor = RGBColor(140, 146, 156);
 /// Behind stretches that are to be seen as one, such as moves.
 const BAND: RGBColor = RGBColor(234, 241, 247);
 
@@ -22,6 +24,12 @@ const BAND: RGBColor = RGBColor(234, 241, 247);
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no plot: {0}")]
 pub struct PlotError(String);
+
+impl<E: std::error::Error + Send + Sync> From<DrawingAreaErrorKind<E>> for PlotError {
+    fn from(error: DrawingAreaErrorKind<E>) -> Self {
+        Self(error.to_string())
+    }
+}
 
 /// How a curve is drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -199,8 +207,70 @@ pub fn plan_plot(x_label: &str, panel: &Panel) -> Result<String, PlotError> {
     plot(&LinePlot { x_label, panels: std::slice::from_ref(panel), ..LinePlot::default() }, &[], &PLAN)
 }
 
+/// A picture or a part of it.
+pub(crate) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+/// The text of an SVG file: a picture on white of so many pixels.
+pub(crate) fn picture(
+    size: (u32, u32),
+    draw: impl FnOnce(&Area<'_>) -> Result<(), PlotError>,
+) -> Result<String, PlotError> {
+    let mut text = String::new();
+    let area = SVGBackend::with_string(&mut text, size).into_drawing_area();
+    area.fill(&WHITE)?;
+    draw(&area)?;
+    area.present()?;
+    drop(area);
+    // What has no stroke needs no width of one: pages with many dots are smaller by a third.
+    let text = text.replace(" stroke=\"none\" stroke-width=\"1\"", "");
+    // The drawing library escapes markup, not control characters.
+    Ok(flexarm_settings::written::visible(&text))
+}
+
+/// Axes of a chart.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Axes<'a> {
+    /// From left to right and from below; from above if the end is the smaller number.
+    pub(crate) ranges: [Range<f64>; 2],
+    /// Room for numbers at the left and below (pixels).
+    pub(crate) room: [u32; 2],
+    /// What stands at 0, 1, 2, ... instead of numbers.
+    pub(crate) names: [Option<&'a [String]>; 2],
+}
+
+/// A chart with its axes, and lines across at their numbers.
+pub(crate) fn axes<'a, 'b>(
+    area: &Area<'b>,
+    Axes { ranges: [x, y], room: [left, below], names }: Axes<'_>,
+) -> Result<Chart<'a, 'b, RangedCoordf64, RangedCoordf64>, PlotError> {
+    let (width, height) = area.dim_in_pixel();
+    let mut chart = ChartBuilder::on(area).y_label_area_size(left).x_label_area_size(below).build_cartesian_2d(x, y)?;
+    let at = |k: usize, x: f64| match names[k] {
+        None => plain(x),
+        Some(names) if (x - x.round()).abs() < 1e-6 => names.get(x.round() as usize).cloned().unwrap_or_default(),
+        Some(_) => String::new(),
+    };
+    // Not more than have room.
+    let most = |k: usize, room: usize| match names[k] {
+        None => (room / 40).max(3),
+        Some(names) => (room / [44, 14][k]).clamp(1, names.len().max(1)),
+    };
+    chart
+        .configure_mesh()
+        .label_style(("sans-serif", 13))
+        .axis_style(MARK)
+        .light_line_style(TRANSPARENT)
+        .set_all_tick_mark_size(3)
+        .x_labels(most(0, (width - left) as usize))
+        .y_labels(most(1, (height - below) as usize))
+        .x_label_formatter(&|x| at(0, *x))
+        .y_label_formatter(&|y| at(1, *y))
+        .draw()?;
+    Ok(chart)
+}
+
 fn plot(what: &LinePlot<'_>, bands: &[(f64, f64)], style: &Style) -> Result<String, PlotError> {
-    let (mut text, panels) = (String::new(), what.panels);
+    let panels = what.panels;
     let mut curves: Vec<&PlotCurve> = Vec::new();
     for curve in panels.iter().flat_map(|panel| &panel.curves) {
         if !curves.iter().any(|known| known.name == curve.name) {
@@ -212,9 +282,7 @@ fn plot(what: &LinePlot<'_>, bands: &[(f64, f64)], style: &Style) -> Result<Stri
     let above_legend = heading_height(what, style);
     let above = above_legend + if legend.is_empty() { 0 } else { row * legend.len() as u32 + style.margin };
     let (width, height) = (style.panel.0, style.panel.1 * panels.len().max(1) as u32 + above);
-    {
-        let area = SVGBackend::with_string(&mut text, (width, height)).into_drawing_area();
-        area.fill(&WHITE).map_err(fault)?;
+    let mut text = picture((width, height), |area| {
         let (strip, area) = area.split_vertically(above);
         let (heading, strip) = strip.split_vertically(above_legend);
         draw_heading(&heading, what, style)?;
@@ -235,16 +303,15 @@ fn plot(what: &LinePlot<'_>, bands: &[(f64, f64)], style: &Style) -> Result<Stri
                 (false, false) => frame.draw(&part, x, y),
             }?;
         }
-        area.present().map_err(fault)?;
-    }
+        Ok(())
+    })?;
     if let Some(mm) = style.width_mm {
         let high = mm * f64::from(height) / f64::from(width);
         let (old, new) =
             (format!("width=\"{width}\" height=\"{height}\""), format!("width=\"{mm}mm\" height=\"{high:.2}mm\""));
         text = text.replacen(&old, &new, 1);
     }
-    // The drawing library escapes markup, not control characters.
-    Ok(flexarm_settings::written::visible(&text))
+    Ok(text)
 }
 
 /// Room for the title and the notes below it.
@@ -255,27 +322,19 @@ fn heading_height(what: &LinePlot<'_>, style: &Style) -> u32 {
     }
 }
 
-fn draw_heading(
-    area: &DrawingArea<SVGBackend<'_>, Shift>,
-    what: &LinePlot<'_>,
-    style: &Style,
-) -> Result<(), PlotError> {
+fn draw_heading(area: &Area<'_>, what: &LinePlot<'_>, style: &Style) -> Result<(), PlotError> {
     if heading_height(what, style) == 0 {
         return Ok(());
     }
     let (x, mut y) = ((style.y_area + style.margin) as i32, style.margin as i32);
     let title = ("sans-serif", style.title as i32).into_font().style(FontStyle::Bold);
-    area.draw(&Text::new(what.title, (x, y), title)).map_err(fault)?;
+    area.draw(&Text::new(what.title, (x, y), title))?;
     y += style.title as i32 * 3 / 2;
     for note in what.notes {
-        area.draw(&Text::new(note.as_str(), (x, y), ("sans-serif", style.legend_font as i32))).map_err(fault)?;
+        area.draw(&Text::new(note.as_str(), (x, y), ("sans-serif", style.legend_font as i32)))?;
         y += style.legend_font as i32 * 3 / 2;
     }
     Ok(())
-}
-
-fn fault(error: impl std::fmt::Display) -> PlotError {
-    PlotError(error.to_string())
 }
 
 /// The points of each curve that can be drawn.
@@ -316,17 +375,21 @@ fn equally_long((x, y): (Range<f64>, Range<f64>), style: &Style) -> (Range<f64>,
     (around(x, wide), around(y, high))
 }
 
+/// A colour of the palette.
+pub(crate) fn ink([red, green, blue]: Rgb) -> RGBColor {
+    RGBColor(red, green, blue)
+}
+
 /// Colour and width of a curve; those of one name look the same in all panels.
 fn look_of(curve: &PlotCurve, all: &[&PlotCurve], style: &Style) -> ShapeStyle {
-    let color = |[red, green, blue]: Rgb| RGBColor(red, green, blue);
     match curve.look {
         CurveLook::Total => BLACK.stroke_width(style.stroke + style.stroke / 3),
-        CurveLook::Axis(k) => color(palette::axis(k, Ground::Paper)).stroke_width(style.stroke),
-        CurveLook::Part(k) => color(palette::series(k, Ground::Paper)).stroke_width(style.stroke),
-        CurveLook::Rigid => color(palette::rigid(Ground::Paper)).stroke_width(style.stroke),
+        CurveLook::Axis(k) => ink(palette::axis(k, Ground::Paper)).stroke_width(style.stroke),
+        CurveLook::Part(k) => ink(palette::series(k, Ground::Paper)).stroke_width(style.stroke),
+        CurveLook::Rigid => ink(palette::rigid(Ground::Paper)).stroke_width(style.stroke),
         _ => {
             let place = all.iter().filter(|known| known.look.is_counted()).position(|known| known.name == curve.name);
-            color(palette::series(place.unwrap_or(0), Ground::Paper)).stroke_width(style.stroke)
+            ink(palette::series(place.unwrap_or(0), Ground::Paper)).stroke_width(style.stroke)
         }
     }
 }
@@ -361,7 +424,7 @@ fn swatch(style: &Style) -> u32 {
 }
 
 fn draw_legend(
-    strip: &DrawingArea<SVGBackend<'_>, Shift>,
+    strip: &Area<'_>,
     rows: &[Vec<(usize, u32)>],
     curves: &[&PlotCurve],
     style: &Style,
@@ -376,17 +439,17 @@ fn draw_legend(
             let lines = match curve.look {
                 CurveLook::Dots => {
                     let dot = Circle::new(((from + to) / 2, middle), dot_radius(style), look.filled());
-                    strip.draw(&dot).map_err(fault)?;
+                    strip.draw(&dot)?;
                     vec![]
                 }
                 look if look.is_dashed() => vec![(from, from + cut), (to - cut, to)],
                 _ => vec![(from, to)],
             };
             for (a, b) in lines {
-                strip.draw(&PathElement::new([(a, middle), (b, middle)], look)).map_err(fault)?;
+                strip.draw(&PathElement::new([(a, middle), (b, middle)], look))?;
             }
             let place = (x + swatch(style) as i32 - font / 6, y);
-            strip.draw(&Text::new(curve.name.clone(), place, ("sans-serif", font))).map_err(fault)?;
+            strip.draw(&Text::new(curve.name.clone(), place, ("sans-serif", font)))?;
         }
     }
     Ok(())
@@ -407,7 +470,7 @@ struct Frame<'a> {
 }
 
 impl Frame<'_> {
-    fn draw<X, Y>(&self, area: &DrawingArea<SVGBackend<'_>, Shift>, x: X, y: Y) -> Result<(), PlotError>
+    fn draw<X, Y>(&self, area: &Area<'_>, x: X, y: Y) -> Result<(), PlotError>
     where
         X: AsRangedCoord<Value = f64>,
         Y: AsRangedCoord<Value = f64>,
@@ -421,11 +484,11 @@ impl Frame<'_> {
             .margin_right(2 * style.margin)
             .x_label_area_size(style.x_area)
             .y_label_area_size(style.y_area);
-        let mut chart = chart.build_cartesian_2d(x, y).map_err(fault)?;
+        let mut chart = chart.build_cartesian_2d(x, y)?;
         let (across, up) = &self.ranges;
         let bands = self.bands.iter().filter(|(from, to)| *to > across.start && *from < across.end);
         let corners = |(from, to): &(f64, f64)| [(from.max(across.start), up.start), (to.min(across.end), up.end)];
-        chart.draw_series(bands.map(|band| Rectangle::new(corners(band), BAND.filled()))).map_err(fault)?;
+        chart.draw_series(bands.map(|band| Rectangle::new(corners(band), BAND.filled())))?;
         chart
             .configure_mesh()
             .x_desc(self.x_label)
@@ -436,21 +499,20 @@ impl Frame<'_> {
             .y_max_light_lines(4)
             .x_label_formatter(&|x| plain(*x))
             .y_label_formatter(&|y| plain(*y))
-            .draw()
-            .map_err(fault)?;
+            .draw()?;
         self.draw_marks(&mut chart)?;
         for (curve, points) in self.panel.curves.iter().zip(self.points) {
             let look = look_of(curve, self.all, style);
             if curve.look.is_dashed() {
                 let (dash, gap) = (6 * style.stroke, 4 * style.stroke);
                 let dashes = DashedLineSeries::new(points.iter().copied(), dash, gap, look);
-                chart.draw_series(dashes).map_err(fault)?;
+                chart.draw_series(dashes)?;
             } else if curve.look != CurveLook::Dots {
-                chart.draw_series(LineSeries::new(points.iter().copied(), look)).map_err(fault)?;
+                chart.draw_series(LineSeries::new(points.iter().copied(), look))?;
             }
             if matches!(curve.look, CurveLook::Dots | CurveLook::Marked) {
                 let dots = points.iter().map(|point| Circle::new(*point, dot_radius(style), look.filled()));
-                chart.draw_series(dots).map_err(fault)?;
+                chart.draw_series(dots)?;
             }
         }
         Ok(())
@@ -468,12 +530,12 @@ impl Frame<'_> {
         for (x, name) in self.marks.iter().filter(|(x, _)| across.contains(x)) {
             let line = [(*x, up.start), (*x, up.end)];
             let (dash, gap) = (2 * style.stroke, 2 * style.stroke);
-            chart.draw_series(DashedLineSeries::new(line, dash, gap, MARK.stroke_width(1))).map_err(fault)?;
+            chart.draw_series(DashedLineSeries::new(line, dash, gap, MARK.stroke_width(1)))?;
             let (left, _) = chart.backend_coord(&(*x, up.end));
             if self.named && left >= free {
                 let look = ("sans-serif", font).into_font().color(&MARK);
                 let text = EmptyElement::at((*x, up.end)) + Text::new(name.clone(), (3, 2), look);
-                chart.draw_series(std::iter::once(text)).map_err(fault)?;
+                chart.draw_series(std::iter::once(text))?;
                 free = left + 6 + name.chars().count() as i32 * font * 6 / 10;
             }
         }
@@ -482,16 +544,21 @@ impl Frame<'_> {
 }
 
 /// A chart of `plotters` as SVG.
-type Chart<'a, 'b, X, Y> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<X, Y>>;
+pub(crate) type Chart<'a, 'b, X, Y> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<X, Y>>;
 
 /// Short form of a number on an axis.
-fn plain(x: f64) -> String {
-    if x != 0.0 && !(1e-2..1e5).contains(&x.abs()) {
+pub(crate) fn plain(x: f64) -> String {
+    match x.abs() {
         // Rounding residues of the axis are zeros.
-        if x.abs() < 1e-12 { "0".into() } else { format!("{x:.0e}") }
-    } else {
-        format!("{}", (x * 1e4).round() / 1e4)
+        size if size < 1e-12 => "0".into(),
+        size if (1e-2..1e5).contains(&size) => format!("{}", (x * 1e4).round() / 1e4),
+        _ => format!("{:e}", three_digits(x)),
     }
+}
+
+/// The nearest number of three digits.
+pub(crate) fn three_digits(x: f64) -> f64 {
+    format!("{x:.2e}").parse().unwrap_or(x)
 }
 
 #[cfg(test)]
@@ -539,6 +606,13 @@ mod tests {
         let curves = vec![PlotCurve { x: vec![0.0, 1.0, 0.0], y: vec![0.0, 1.0, 2.0], ..curve("path", &[]) }];
         let panel = Panel { label: "y (mm)".into(), logarithmic: false, legend: true, curves };
         assert!(plan_plot("x (mm)", &panel).unwrap().contains("y (mm)"));
+    }
+
+    #[test]
+    fn numbers_on_axes_are_short_and_differ_where_they_do() {
+        let texts = [0.6000000000000001, 50.0, -0.0, 0.0025, 3.2e-4, 1e-3, 250_000.0].map(plain);
+        assert_eq!(texts, ["0.6", "50", "0", "2.5e-3", "3.2e-4", "1e-3", "2.5e5"]);
+        assert_eq!([0.012_345, 1234.5].map(three_digits), [0.0123, 1230.0]);
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use flexarm_draw::FieldPlot;
+use flexarm_draw::charts::histogram;
 
 use super::recording::{quantity_text, readable, scale, shown};
 use super::region::Grid;
@@ -45,7 +46,7 @@ pub(super) fn html(map: &Map, grid: Option<&Grid>) -> String {
     page += &poses(map);
     page += "<h2>How values are spread</h2>\n<div class=\"row\">\n";
     for column in shown(map) {
-        page += &histogram(map, column);
+        page += &spread(map, column);
     }
     page += "</div>\n<p class=\"note\">Drives locked, small vibrations, no collisions looked for.";
     for (what, file) in [("Every pose", &map.files.table), ("Recording", &map.files.rrd)] {
@@ -161,6 +162,7 @@ fn slices(map: &Map, grid: &Grid, column: usize) -> String {
             equal: true,
             outlines: &outlines,
             marks: &marks,
+            names: None,
         }
         .svg();
     }
@@ -168,37 +170,9 @@ fn slices(map: &Map, grid: &Grid, column: usize) -> String {
 }
 
 /// How many poses have which value.
-fn histogram(map: &Map, column: usize) -> String {
-    const SIZE: [f64; 2] = [360.0, 120.0];
+fn spread(map: &Map, column: usize) -> String {
     let name = &map.table.columns[column].name;
     let (factor, unit) = readable(name);
-    let values: Vec<f64> = map.table.at(column).into_iter().filter(|x| x.is_finite()).map(|x| factor * x).collect();
-    let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
-    if values.is_empty() {
-        return String::new();
-    }
-    let width = if high > low { (high - low) / BARS as f64 } else { 1.0 };
-    let mut bars = [0_usize; BARS];
-    values.iter().for_each(|x| bars[(((x - low) / width) as usize).min(BARS - 1)] += 1);
-    let most = bars.iter().copied().max().unwrap_or(1).max(1) as f64;
-    let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 400 170\" width=\"400\" font-family=\"system-ui, sans-serif\" \
-         font-size=\"11\" fill=\"#1c2530\">\n<text x=\"20\" y=\"15\" font-weight=\"600\">{} ({unit})</text>\n",
-        markup(name)
-    );
-    for (k, n) in bars.iter().enumerate() {
-        let h = SIZE[1] * *n as f64 / most;
-        let (x, w) = (20.0 + SIZE[0] * k as f64 / BARS as f64, SIZE[0] / BARS as f64 - 1.0);
-        let _ = writeln!(
-            svg,
-            "<rect x=\"{x:.1}\" y=\"{:.1}\" width=\"{w:.1}\" height=\"{h:.1}\" fill=\"#2a6fdb\"/>",
-            24.0 + SIZE[1] - h
-        );
-    }
-    for (share, anchor) in [(0.0, "start"), (0.5, "middle"), (1.0, "end")] {
-        let x = 20.0 + SIZE[0] * share;
-        let value = low + share * (high - low);
-        let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"160\" text-anchor=\"{anchor}\">{value:.4}</text>");
-    }
-    svg + "</svg>\n"
+    let values: Vec<f64> = map.table.at(column).into_iter().map(|x| factor * x).collect();
+    histogram(&format!("{name} ({unit})"), &values, BARS)
 }

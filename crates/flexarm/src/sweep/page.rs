@@ -3,8 +3,8 @@
 
 use std::fmt::Write as _;
 
-use flexarm_draw::charts::{BarPair, EffectPanel, HeatMap, ScatterPlot, bar_pairs, effects, scatter_matrix};
-use flexarm_draw::{CurveLook, LinePlot, Panel, PlotCurve};
+use flexarm_draw::charts::{BarPair, EffectPanel, ScatterPlot, bar_pairs, effects, scatter_matrix};
+use flexarm_draw::{CurveLook, FieldPlot, LinePlot, Panel, PlotCurve};
 
 use super::Sweep;
 use super::file::Role;
@@ -17,8 +17,9 @@ use flexarm_settings::written::markup;
 const MOST_METRICS: usize = 4;
 /// Columns of the scatter matrix.
 const MOST_COLUMNS: usize = 8;
-/// Points of a scatter plot.
+/// Points of a scatter plot, and of each in the scatter matrix.
 const MOST_POINTS: usize = 1500;
+const MOST_IN_MATRIX: usize = 1000;
 /// Panels in a row of effects.
 const MOST_PANELS: usize = 6;
 /// Values of a parameter that each have a row or column of a heat map.
@@ -130,13 +131,12 @@ impl Sweep {
             } else {
                 metric.name.clone()
             };
-            let map = HeatMap {
+            let map = FieldPlot {
                 title: &title,
-                x_label: &self.shown(a).0,
-                y_label: &self.shown(b).0,
-                x: &x_names,
-                y: &y_names,
+                labels: [&self.shown(a).0, &self.shown(b).0],
+                names: Some([&x_names, &y_names]),
                 values: &values,
+                ..FieldPlot::default()
             };
             let _ = writeln!(out, "<div>{}</div>", map.svg());
         }
@@ -228,7 +228,7 @@ impl Sweep {
     }
 
     fn matrix(&self, columns: &Columns, ranking: Option<&Ranking>) -> String {
-        let every = columns.runs.len().div_ceil(MOST_POINTS).max(1);
+        let every = columns.runs.len().div_ceil(MOST_IN_MATRIX).max(1);
         let thinned = |values: &[f64]| -> Vec<f64> { values.iter().copied().step_by(every).collect() };
         let metrics = self.metrics.len().min(MOST_METRICS);
         let ranked = ranking.map(|r| r.matter.iter().map(|(p, _)| *p).chain(r.untold.iter().copied()));
