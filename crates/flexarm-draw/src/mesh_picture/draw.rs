@@ -1,12 +1,13 @@
 //! Drawing on an image: lines, text, boxes. Edges are smooth by their share of each pixel.
 
-use super::font;
+use noto_sans_mono_bitmap::{FontWeight, RasterHeight, RasterizedChar, get_raster, get_raster_width};
+
 use super::image::{Image, Rgb};
 
-/// Height of a capital over the size of the text.
-const CAPITAL: f64 = 0.72;
-/// Glyphs are narrower than their square grid.
-const NARROW: f64 = 0.9;
+/// Text of any size is scaled from this raster: its height over the size of the text, and its row of the base line.
+const RASTER: RasterHeight = RasterHeight::Size32;
+const RASTER_HEIGHT: f64 = 1.2;
+const BASE: f64 = 25.0;
 
 /// Calls with every pixel that a line of round ends covers: `(x, y, place along the line from 0 to 1, share)`.
 pub(super) fn cover_line(
@@ -82,15 +83,32 @@ impl Style {
         Self { halo: Some(color), ..self }
     }
 
-    fn unit(self) -> f64 {
-        self.size * CAPITAL / font::CAPITAL
+    fn weight(self) -> FontWeight {
+        if self.bold { FontWeight::Bold } else { FontWeight::Regular }
+    }
+
+    /// Pixels of the image per pixel of the raster.
+    fn scale(self) -> f64 {
+        self.size * RASTER_HEIGHT / RASTER.val() as f64
     }
 }
 
 /// Width of a line of text, pixels.
 pub(crate) fn text_width(text: &str, style: Style) -> f64 {
-    let units: f64 = text.chars().map(font::advance).sum();
-    (units - font::GAP).max(0.0) * style.unit() * NARROW
+    (text.chars().count() * get_raster_width(style.weight(), RASTER)) as f64 * style.scale()
+}
+
+/// How much ink is at a place of a glyph, from 0 to 1; linear between the middles of pixels.
+fn ink(glyph: &RasterizedChar, x: f64, y: f64) -> f64 {
+    let (x, y) = (x - 0.5, y - 0.5);
+    let part = |dx: f64, dy: f64| {
+        let (column, row) = (x.floor() + dx, y.floor() + dy);
+        let weight = (1.0 - (x - column).abs()) * (1.0 - (y - row).abs());
+        let is_inside = column >= 0.0 && row >= 0.0;
+        let pixel = is_inside.then(|| glyph.pixel(column as usize, row as usize)).flatten();
+        weight * f64::from(pixel.unwrap_or(0)) / 255.0
+    };
+    part(0.0, 0.0) + part(1.0, 0.0) + part(0.0, 1.0) + part(1.0, 1.0)
 }
 
 /// Text in lines of at most `width` pixels, broken at spaces.
@@ -132,27 +150,39 @@ impl Image {
             Align::Middle => x - text_width(text, style) / 2.0,
             Align::Right => x - text_width(text, style),
         };
-        let unit = style.unit();
-        let width = style.size * if style.bold { 0.125 } else { 0.082 };
         if let Some(halo) = style.halo {
-            self.strokes(text, [start, y], unit, width + 0.28 * style.size, halo);
+            self.each_inked(text, [start, y], style, |image, [x, y], ink| {
+                let at = [x as f64 + 0.5, y as f64 + 0.5];
+                image.line(at, at, 0.28 * style.size, halo, ink);
+            });
         }
-        self.strokes(text, [start, y], unit, width, style.color);
+        self.each_inked(text, [start, y], style, |image, [x, y], ink| image.blend(x, y, style.color, ink as f32));
     }
 
-    fn strokes(&mut self, text: &str, [mut x, y]: [f64; 2], unit: f64, width: f64, color: Rgb) {
-        for glyph in text.chars() {
-            let place = |(u, v): (f64, f64)| [x + u * unit * NARROW, y - (v - font::BASE) * unit];
-            for line in font::polylines(glyph).filter(|_| glyph != ' ') {
-                let points: Vec<_> = line.into_iter().map(place).collect();
-                if let [point] = points[..] {
-                    self.line(point, point, width * 1.2, color, 1.0);
-                }
-                for pair in points.windows(2) {
-                    self.line(pair[0], pair[1], width, color, 1.0);
+    /// Calls with each pixel that text covers, and how much of it.
+    fn each_inked(
+        &mut self,
+        text: &str,
+        [x, y]: [f64; 2],
+        style: Style,
+        mut call: impl FnMut(&mut Self, [usize; 2], f64),
+    ) {
+        let scale = style.scale();
+        let step = get_raster_width(style.weight(), RASTER) as f64 * scale;
+        let (first, top) = (x.round(), (y - BASE * scale).round());
+        for (k, letter) in text.chars().enumerate() {
+            let raster = |letter| get_raster(letter, style.weight(), RASTER);
+            let Some(glyph) = raster(letter).or_else(|| raster('?')) else { continue };
+            let left = first + k as f64 * step;
+            for y in top.max(0.0) as usize..(top + scale * glyph.height() as f64).max(0.0).ceil() as usize {
+                for x in left.max(0.0) as usize..(left + step).max(0.0).ceil() as usize {
+                    let place = [(x as f64 + 0.5 - left) / scale, (y as f64 + 0.5 - top) / scale];
+                    let ink = ink(&glyph, place[0], place[1]);
+                    if ink > 0.0 {
+                        call(self, [x, y], ink);
+                    }
                 }
             }
-            x += font::advance(glyph) * unit * NARROW;
         }
     }
 

@@ -16,7 +16,6 @@
 pub mod color;
 mod deflection_sheet;
 pub(crate) mod draw;
-mod font;
 mod image;
 mod interface_sheet;
 mod legend;
