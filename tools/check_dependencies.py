@@ -29,7 +29,7 @@ INNER = ["results", "motion", "links", "base", "words", "algebra"]
 OWNERS = {  # outside crate: lines that may name it
     **dict.fromkeys(["rerun", "mcap", "re_cdr", "parquet", "arrow-array", "arrow-ipc", "arrow-schema", "rustix", "zstd", "lz4_flex", "bzip2", "rusqlite",
                      "urdf-rs"], ["edges"]),
-    **dict.fromkeys(["png", "plotters", "clarabel", "rand", "sobol_burley", "statrs"], ["results"]), "hdf5-pure": ["links"], "diffsol": ["motion"],
+    **dict.fromkeys(["png", "plotters", "noto-sans-mono-bitmap", "clarabel", "rand", "sobol_burley", "statrs"], ["results"]), "hdf5-pure": ["links"], "diffsol": ["motion"],
     **dict.fromkeys(["faer", "metis-sys", "saphyr-parser"], ["base"]), "toml_edit": ["facade"],
     **dict.fromkeys(["signal-hook", "clap", "clap_complete", "clap_mangen", "indicatif"], ["faces"]),
     **dict.fromkeys(["pyo3", "pyo3-build-config", "numpy"], ["packages"]),

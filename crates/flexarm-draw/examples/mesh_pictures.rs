@@ -1,4 +1,4 @@
-//! Pictures of the reduction of a mesh file: `cargo run --release -p flexarm-log --no-default-features
+//! Pictures of the reduction of a mesh file: `cargo run --release -p flexarm-draw
 //! --features png --example mesh_pictures -- MESH OUT SET_A x,y,z SET_B x,y,z`.
 //!
 //! The mesh is in SI units and has its material; both node sets are tied rigidly to frames at the given points.

@@ -77,7 +77,8 @@ pub struct ArmPicture {
     pub axes: [[f64; 2]; 3],
 }
 
-/// Rigid twin and magnified flexible arm from several sides, for a page that explains them: no scale, no axes, no ground.
+/// Rigid twin and magnified flexible arm from several sides, for a page that explains them: no
+/// scale, no axes, no ground.
 ///
 /// * `size`: width and height, pixels.
 ///
@@ -536,7 +537,8 @@ mod tests {
     use flexarm_sample::LinkInfo;
     use nalgebra::{Rotation3, Translation3};
 
-    /// An arm without surfaces: base, upright link, arm that reaches out along x and is turned so that its tool sags by 2 mm.
+    /// An arm without surfaces: base, upright link, arm that reaches out along x and is turned so
+    /// that its tool sags by 2 mm.
     fn arm() -> (RunHeader, Sample) {
         let link = |name: &str, parent| LinkInfo { name: name.into(), parent, fixed: false };
         let header = RunHeader {

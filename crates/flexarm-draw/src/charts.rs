@@ -1,4 +1,5 @@
-//! Charts of studies as SVG: main effects, bars with intervals, histograms, scatter plots alone and as a matrix.
+//! Charts of studies as SVG: main effects, bars with intervals, histograms, scatter plots alone and
+//! as a matrix.
 //!
 //! Plain numbers and names in, the text of a picture out; pixels of the browser.
 //! Not here: curves over time ([`crate::LinePlot`]), numbers over a plane ([`crate::FieldPlot`]).
@@ -57,8 +58,8 @@ const ROOM: [u32; 2] = [52, 22];
 const BINS: usize = 14;
 const BIN: RGBColor = RGBColor(201, 214, 228);
 
-/// A label in lines of at most `most` letters, broken behind points, underscores and blanks where that is possible. No letter
-/// is left out: names that differ in one letter must not look the same.
+/// Returns a label in lines of at most `most` letters, broken behind points, underscores and blanks
+/// where that is possible. No letter is left out: names that differ in one letter stay different.
 pub(crate) fn wrapped(label: &str, most: usize) -> Vec<String> {
     let most = most.max(8);
     let mut lines: Vec<Vec<char>> = vec![Vec::new()];
@@ -249,9 +250,9 @@ pub fn scatter_matrix(columns: &[(&str, &[f64])]) -> String {
     picture((cell * n + 12, cell * n + 12), draw).unwrap_or_default()
 }
 
-/// How many of some numbers are in which stretch; empty if none is finite.
+/// A histogram; empty if no number is finite.
 ///
-/// * `label`: what they are.
+/// * `label`: name and unit of the numbers.
 pub fn histogram(label: &str, values: &[f64], bins: usize) -> String {
     if !values.iter().any(|x| x.is_finite()) {
         return String::new();
@@ -269,7 +270,7 @@ pub fn histogram(label: &str, values: &[f64], bins: usize) -> String {
     picture((420, 150 + ROOM[1]), draw).unwrap_or_default()
 }
 
-/// Two corners of each bar: from where to where numbers are counted, and how many there are.
+/// Returns two opposite corners of each bar of a histogram.
 fn bars(values: &[f64], range: Range<f64>, bins: usize) -> Vec<[(f64, f64); 2]> {
     let width = (range.end - range.start) / bins as f64;
     let mut counts = vec![0_usize; bins];

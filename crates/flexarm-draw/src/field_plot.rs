@@ -47,7 +47,8 @@ pub struct FieldPlot<'a> {
     pub outlines: &'a [[[f64; 2]; 2]],
     /// Places to be marked, each with a letter.
     pub marks: &'a [([f64; 2], &'a str)],
-    /// Names of the columns and rows, in place of ranges and count. Numbers are written into cells where there is room.
+    /// Names of the columns and rows, in place of ranges and count. Numbers are written into cells
+    /// where there is room.
     pub names: Option<[&'a [String]; 2]>,
 }
 
@@ -98,7 +99,7 @@ impl FieldPlot<'_> {
         let x_label = wrapped(self.labels[0], (width + RIGHT) as usize / 7);
         let y_label = wrapped(self.labels[1], (height + FOOT) as usize / 7);
         let left = 52 + LEADING * y_label.len() as u32;
-        // The scale stands beside the title, too.
+        // A long title does not reach into the scale.
         let right = left + width.max(8 * self.title.chars().count() as u32) + 14;
         let size = (right + RIGHT, TOP + height.max(80) + FOOT + LEADING * x_label.len() as u32 + 8);
         picture(size, |area| {
@@ -173,7 +174,7 @@ impl FieldPlot<'_> {
     }
 }
 
-/// Where on the scale a number is; none for NaN.
+/// Returns the shade of a number; none for NaN.
 fn shade(value: f64, [low, high]: [f64; 2]) -> Option<u8> {
     let share = if high > low { (value - low) / (high - low) } else { 0.5 };
     value.is_finite().then(|| (share.clamp(0.0, 1.0) * f64::from(SHADES)).round() as u8)

@@ -1,7 +1,8 @@
 //! Curves over a common axis as a picture (SVG): panels one above the other with a legend.
 //!
-//! Start at [`LinePlot`] for the screen, [`paper_plot`] for a column of a paper. Pictures are drawn by `plotters` with its SVG
-//! backend alone: no fonts, no files, no clock. What all of them share is here: [`picture`], [`axes`], [`plain`].
+//! Start at [`LinePlot`] for the screen, [`paper_plot`] for a column of a paper. `plotters` draws
+//! all SVG pictures of the crate, with its SVG backend alone: no fonts, no files, no clock. They
+//! share [`picture`], [`axes`] and [`plain`].
 
 use std::ops::Range;
 
@@ -221,7 +222,7 @@ pub(crate) fn picture(
     draw(&area)?;
     area.present()?;
     drop(area);
-    // What has no stroke needs no width of one: pages with many dots are smaller by a third.
+    // The width of an absent stroke is left out: pages with many dots are smaller by a third.
     let text = text.replace(" stroke=\"none\" stroke-width=\"1\"", "");
     // The drawing library escapes markup, not control characters.
     Ok(flexarm_settings::written::visible(&text))
@@ -234,7 +235,7 @@ pub(crate) struct Axes<'a> {
     pub(crate) ranges: [Range<f64>; 2],
     /// Room for numbers at the left and below (pixels).
     pub(crate) room: [u32; 2],
-    /// What stands at 0, 1, 2, ... instead of numbers.
+    /// Names at 0, 1, 2, ... in place of numbers.
     pub(crate) names: [Option<&'a [String]>; 2],
 }
 

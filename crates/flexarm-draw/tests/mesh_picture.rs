@@ -20,8 +20,8 @@ use flexarm_fem::{
 };
 use nalgebra::Vector3;
 
-/// Truth: the scene on paper, and four samples a pixel: ground shines through in quarters. Thin and large triangles, some of
-/// them partly outside.
+/// Truth: the scene on paper, and four samples a pixel: ground shines through in quarters. Thin and
+/// large triangles, some of them partly outside.
 #[test]
 fn a_layer_lies_over_any_ground_as_the_scene_does() {
     let mut seed = 7_u64;

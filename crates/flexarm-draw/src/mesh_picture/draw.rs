@@ -4,7 +4,8 @@ use noto_sans_mono_bitmap::{FontWeight, RasterHeight, RasterizedChar, get_raster
 
 use super::image::{Image, Rgb};
 
-/// Text of any size is scaled from this raster: its height over the size of the text, and its row of the base line.
+/// Text of any size is scaled from this raster. Below: its height over the size of the text, and
+/// its row of the base line.
 const RASTER: RasterHeight = RasterHeight::Size32;
 const RASTER_HEIGHT: f64 = 1.2;
 const BASE: f64 = 25.0;
@@ -98,7 +99,7 @@ pub(crate) fn text_width(text: &str, style: Style) -> f64 {
     (text.chars().count() * get_raster_width(style.weight(), RASTER)) as f64 * style.scale()
 }
 
-/// How much ink is at a place of a glyph, from 0 to 1; linear between the middles of pixels.
+/// Returns the ink at a place of a glyph, from 0 to 1, linear between the middles of pixels.
 fn ink(glyph: &RasterizedChar, x: f64, y: f64) -> f64 {
     let (x, y) = (x - 0.5, y - 0.5);
     let part = |dx: f64, dy: f64| {

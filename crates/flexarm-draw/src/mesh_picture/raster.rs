@@ -3,10 +3,11 @@
 /// A sample belongs to a triangle if none of its weights is below minus this.
 const EDGE: f64 = 1e-9;
 
-/// Calls with each sample that a triangle covers: column, row and the weights of the corners. A weight is 1 at its own
-/// corner and 0 on the side across. A triangle without area covers nothing.
+/// Calls with each sample that a triangle covers: column, row and the weights of the corners. A
+/// weight is 1 at its own corner and 0 on the side across. A triangle without area covers nothing.
 ///
-/// * `corners`: column and row in samples, and a depth, which is not used. The middle of the first sample is at (0.5, 0.5).
+/// * `corners`: column and row in samples, and a depth, which is not used. The middle of the first
+///   sample is at (0.5, 0.5).
 /// * `size`: columns and rows of the picture.
 pub(super) fn cover([a, b, c]: [[f64; 3]; 3], size: [usize; 2], mut call: impl FnMut(usize, usize, [f64; 3])) {
     let range = |k: usize| {
@@ -33,8 +34,8 @@ pub(super) fn cover([a, b, c]: [[f64; 3]; 3], size: [usize; 2], mut call: impl F
 mod tests {
     use super::*;
 
-    /// Truth: the weighted corners are the sample; by the theorem of Pick a triangle of area 6 with 8 samples on its sides has
-    /// 3 inside.
+    /// Truth: the weighted corners are the sample; by the theorem of Pick a triangle of area 6 with
+    /// 8 samples on its sides has 3 inside.
     #[test]
     fn a_triangle_covers_the_samples_inside_and_on_its_sides_wherever_it_lies() {
         let size = [8, 6];

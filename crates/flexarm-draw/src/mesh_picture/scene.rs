@@ -139,7 +139,8 @@ impl Layer {
         covered.map(|(k, cover)| (k % self.width, k / self.width, cover))
     }
 
-    /// Lays it over an image of its size. At an opacity of 1 that is what [`render`] draws without marks, on any ground.
+    /// Lays it over an image of its size. At an opacity of 1 that is what [`render`] draws without
+    /// marks, on any ground.
     pub fn lay_over(&self, image: &mut Image, opacity: f32) {
         self.pixels().for_each(|(x, y, cover)| image.blend(x, y, cover.color, opacity * cover.share));
     }
@@ -215,7 +216,8 @@ impl Canvas {
         });
     }
 
-    /// The outline runs where it goes down a long way behind a sample one or two samples on in any direction.
+    /// The outline runs where it goes down a long way behind a sample one or two samples on in any
+    /// direction.
     fn draw_outline(&mut self) {
         let step = (OUTLINE * self.size) as f32;
         for (x, y) in (0..self.height).flat_map(|y| (0..self.width).map(move |x| (x, y))) {
