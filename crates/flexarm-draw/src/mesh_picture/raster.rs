@@ -10,22 +10,38 @@ const EDGE: f64 = 1e-9;
 ///   sample is at (0.5, 0.5).
 /// * `size`: columns and rows of the picture.
 pub(super) fn cover([a, b, c]: [[f64; 3]; 3], size: [usize; 2], mut call: impl FnMut(usize, usize, [f64; 3])) {
-    let range = |k: usize| {
-        let (low, high) = (a[k].min(b[k]).min(c[k]), a[k].max(b[k]).max(c[k]));
-        low.max(0.0) as usize..(high.max(0.0).ceil() as usize).min(size[k])
-    };
-    let double_area = |p: [f64; 3], q: [f64; 3], x: f64, y: f64| (p[0] - x) * (q[1] - y) - (p[1] - y) * (q[0] - x);
-    let whole = double_area(b, c, a[0], a[1]);
+    let (ab, ac) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
+    let whole = ab[0] * ac[1] - ab[1] * ac[0];
     if whole == 0.0 {
         return;
     }
-    for row in range(1) {
-        for column in range(0) {
-            let (x, y) = (column as f64 + 0.5, row as f64 + 0.5);
-            let weights = [(b, c), (c, a), (a, b)].map(|(p, q)| double_area(p, q, x, y) / whole);
-            if weights.iter().all(|weight| *weight >= -EDGE) {
-                call(column, row, weights);
+    // Change of the weights per column and per row.
+    let (b_slope, c_slope) = ([ac[1] / whole, -ac[0] / whole], [-ab[1] / whole, ab[0] / whole]);
+    let per_column = [-b_slope[0] - c_slope[0], b_slope[0], c_slope[0]];
+    let weights_at = |x: f64, y: f64| {
+        let (x, y) = (x - a[0], y - a[1]);
+        let (b, c) = (b_slope[0] * x + b_slope[1] * y, c_slope[0] * x + c_slope[1] * y);
+        [1.0 - b - c, b, c]
+    };
+    let middles = |low: f64, high: f64, count: usize| {
+        (low - 0.5).ceil().max(0.0) as usize..((high + 0.5).floor().max(0.0) as usize).min(count)
+    };
+    for row in middles(a[1].min(b[1]).min(c[1]), a[1].max(b[1]).max(c[1]), size[1]) {
+        let y = row as f64 + 0.5;
+        // Each side bounds the columns of the row on its left or on its right.
+        let (mut low, mut high) = (0.0_f64, size[0] as f64);
+        for (weight, slope) in weights_at(0.0, y).into_iter().zip(per_column) {
+            let bound = (-EDGE - weight) / slope;
+            if slope > 0.0 {
+                low = low.max(bound);
+            } else if slope < 0.0 {
+                high = high.min(bound);
+            } else if weight < -EDGE {
+                high = -1.0;
             }
+        }
+        for column in middles(low, high, size[0]) {
+            call(column, row, weights_at(column as f64 + 0.5, y));
         }
     }
 }

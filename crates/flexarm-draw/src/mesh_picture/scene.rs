@@ -222,6 +222,9 @@ impl Canvas {
         let step = (OUTLINE * self.size) as f32;
         for (x, y) in (0..self.height).flat_map(|y| (0..self.width).map(move |x| (x, y))) {
             let at = y * self.width + x;
+            if self.depths[at] == NOTHING {
+                continue;
+            }
             let falls = |other: usize| self.depths[other] < self.depths[at] - step;
             let is_edge = [1, 2].into_iter().any(|k| {
                 (x >= k && falls(at - k))
