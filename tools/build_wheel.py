@@ -25,7 +25,7 @@ import zipfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-PACKAGE = ROOT / "crates/flexarm-python"
+PACKAGE = ROOT / "crates/faces/flexarm-python"
 MOST_BYTES = 30e6
 MATURIN = "maturin>=1.13,<2"
 #: Of the Linuxes that a wheel for all of them still runs on.
@@ -89,9 +89,9 @@ def sdist(out):
         # Tests and their data are not built.
         for part in [".ci", "tests/golden", "tests/verification", "docs/images", "docs/verification"]:
             shutil.rmtree(folder / part, ignore_errors=True)
-        text = (folder / "crates/flexarm-python/pyproject.toml").read_text()
-        text = text.replace('readme = "README.md"', 'readme = "crates/flexarm-python/README.md"')
-        text = text.replace('python-source = "python"', 'python-source = "crates/flexarm-python/python"\nmanifest-path = "crates/flexarm-python/Cargo.toml"')
+        text = (folder / "crates/faces/flexarm-python/pyproject.toml").read_text()
+        text = text.replace('readme = "README.md"', 'readme = "crates/faces/flexarm-python/README.md"')
+        text = text.replace('python-source = "python"', 'python-source = "crates/faces/flexarm-python/python"\nmanifest-path = "crates/faces/flexarm-python/Cargo.toml"')
         (folder / "pyproject.toml").write_text(text)
         about = tomllib.loads(text)["project"]
         (folder / "PKG-INFO").write_text(

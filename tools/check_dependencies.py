@@ -41,16 +41,16 @@ EXIT = re.compile(r"\bprocess::(?:exit|abort|ExitCode)\b|\bExitCode\b|\bexit_cod
 FLAG = re.compile(r"(?<![\w-])--[a-z][a-z-]*|(?<![\w/-])-o(?![\w-])")
 FACE_WORDS = re.compile(r"\b(?:command line|exit code|terminal|stdout|stderr)\b")
 ALLOWED = {  # file: what it may have (a pattern of the hit), and why
-    "crates/flexarm-fe-io/src/mesh/read.rs": (r"-o", "tells how to call another program, Gmsh"),
-    "crates/flexarm-motion-io/src/error.rs": (r"--full-length", "tells how to call another program, ROS 2"),
-    "crates/flexarm-urdf/src/resolve.rs": (r"std::env", "search_paths_from_environment, which the caller may use or not"),
-    "crates/flexarm-urdf/src/xacro/substitution.rs": (r"std::env|env::var|env::current", "xacro's own $(env NAME), $(optenv NAME) and $(cwd)"),
-    "crates/flexarm/src/report/html/figures.rs": (r"--c", "a custom property of a style sheet"),
-    "crates/flexarm-verify/src/files.rs": (r"--force|--check|-o", "the page tells how it is written, and is compared letter by letter"),
-    "crates/flexarm-verify/src/one_beam/page.rs": (r"--[a-z-]+|-o", "the page tells how a figure is had by hand"),
-    "crates/flexarm-verify/src/three_beams/page.rs": (r"--[a-z-]+|-o", "the page tells how a figure is had by hand"),
-    "crates/flexarm-verify/src/lower_arm/page.rs": (r"--[a-z-]+|-o", "the page tells how a figure is had by hand"),
-    "crates/flexarm-verify/src/manipulator/page.rs": (r"--[a-z-]+|-o", "the page tells how a figure is had by hand"),
+    "crates/links/flexarm-fe-io/src/mesh/read.rs": (r"-o", "tells how to call another program, Gmsh"),
+    "crates/motion/flexarm-motion-io/src/error.rs": (r"--full-length", "tells how to call another program, ROS 2"),
+    "crates/robot/flexarm-urdf/src/resolve.rs": (r"std::env", "search_paths_from_environment, which the caller may use or not"),
+    "crates/robot/flexarm-urdf/src/xacro/substitution.rs": (r"std::env|env::var|env::current", "xacro's own $(env NAME), $(optenv NAME) and $(cwd)"),
+    "crates/faces/flexarm/src/report/html/figures.rs": (r"--c", "a custom property of a style sheet"),
+    "crates/proof/flexarm-verify/src/files.rs": (r"--force|--check|-o", "the page tells how it is written, and is compared letter by letter"),
+    "crates/proof/flexarm-verify/src/one_beam/page.rs": (r"--[a-z-]+|-o", "the page tells how a figure is had by hand"),
+    "crates/proof/flexarm-verify/src/three_beams/page.rs": (r"--[a-z-]+|-o", "the page tells how a figure is had by hand"),
+    "crates/proof/flexarm-verify/src/lower_arm/page.rs": (r"--[a-z-]+|-o", "the page tells how a figure is had by hand"),
+    "crates/proof/flexarm-verify/src/manipulator/page.rs": (r"--[a-z-]+|-o", "the page tells how a figure is had by hand"),
 }
 FILES = (r"\bstd::(?:fs|path)\b|\bPathBuf\b|\bFile::open\b", "files")
 MUST_NOT_KNOW = {  # crate: what its code must not have, and what it is; imports of other crates are the manifest's matter
@@ -323,7 +323,7 @@ def self_test():
         ("a clock in the facade", source("facade", "let t = Instant::now();"), None),
         ("the environment in the facade", source("facade", "let x = std::env::var(y);"), "reads the environment"),
         ("the environment in a face", source("faces", "let x = std::env::args();"), None),
-        ("the environment where it is allowed", check_source("flexarm-urdf", "edges", "crates/flexarm-urdf/src/resolve.rs", ".filter_map(std::env::var_os)"), None),
+        ("the environment where it is allowed", check_source("flexarm-urdf", "edges", "crates/robot/flexarm-urdf/src/resolve.rs", ".filter_map(std::env::var_os)"), None),
         ("a flag in a text", source("facade", 'f("ok");\ng("use --step, or so");'), "c.rs:2: c names the flag --step"),
         ("a flag in a text of many lines", source("base", 'f("a \\\n  b (--step)");'), "names the flag --step"),
         ("a flag in a raw text", source("base", 'f(r#"say "--step""#);'), "names the flag --step"),
@@ -331,8 +331,8 @@ def self_test():
         ("a short flag", source("edges", 'f("choose another with -o");'), "names the flag -o"),
         ("a flag in a face", source("faces", 'f("use --step");'), None),
         ("a flag in a comment, a dash, an axis, a difference", source("facade", '// use --step\nf("a -- b, well-known, not along -z");\nlet x = a --b;'), None),
-        ("a flag of another program", check_source("flexarm-fem", "base", "crates/flexarm-fe-io/src/mesh/read.rs", 'f("gmsh -o OUT");'), None),
-        ("its own flag there", check_source("flexarm-fem", "base", "crates/flexarm-fe-io/src/mesh/read.rs", 'f("gmsh --force");'), "names the flag --force"),
+        ("a flag of another program", check_source("flexarm-fem", "base", "crates/links/flexarm-fe-io/src/mesh/read.rs", 'f("gmsh -o OUT");'), None),
+        ("its own flag there", check_source("flexarm-fem", "base", "crates/links/flexarm-fe-io/src/mesh/read.rs", 'f("gmsh --force");'), "names the flag --force"),
         ("a flag after a quoted quote and a lifetime", source("facade", "fn f<'a>(x: &'a str) -> char { '\"' }\ng(\"--step\");"), "c.rs:2: c names the flag --step"),
         ("a flag in a test", source("facade", 'fn f() {}\n#[cfg(test)]\nmod tests { fn g() { h("--step"); } }'), None),
         ("a word of a terminal", source("facade", 'f("the command line says");'), "speaks of the command line"),

@@ -946,7 +946,7 @@ def own_targets():
         Target("mesh-inp", "bar.inp", {"bar.inp": deck}, [["reduce", "bar.inp", *seats, *reduce], ["reduce", "bar.inp", "--list", "--json"]]),
         Target("mesh-gz", "bar.inp.gz", {"bar.inp.gz": gzip.compress(deck.encode(), mtime=0)}, [["reduce", "bar.inp.gz", *seats, *reduce]]),
     ]
-    data = ROOT / "crates/flexarm-fe-io/tests/data"
+    data = ROOT / "crates/links/flexarm-fe-io/tests/data"
     for kind in ("v22_ascii", "v22_binary", "v41_ascii", "v41_binary"):
         name = f"three_blocks_{kind}.msh"
         targets.append(Target(f"mesh-msh-{kind}", name, {name: (data / name).read_bytes()}, [["reduce", name, "--list", "--json"]]))
@@ -957,7 +957,7 @@ def own_targets():
     for name, content in (("mesh.stl", stl_binary()), ("text.stl", stl_text()), ("mesh.obj", obj()), ("mesh.dae", collada()), ("mesh.gltf", gltf()), ("mesh.glb", glb())):
         files = {"beam.urdf": with_visual(f'<mesh filename="{name}"/>'), name: content}
         targets.append(Target(f"visual-{name}", name, files, [["check", "beam.urdf", "--json"], ["inspect", "beam.urdf", "--json", "--inertia-from-density", "1000"]]))
-    motions = ROOT / "crates/flexarm-motion-io/tests/data"
+    motions = ROOT / "crates/motion/flexarm-motion-io/tests/data"
     for name in ("plan.yaml", "display.yaml", "echo.yaml", "plan.json", "states_plain.mcap", "states_lz4.mcap", "states_zstd.mcap", "states_ros1.mcap", "states.bag", "states_bz2.bag", "states_lz4.bag", "nested_plan.mcap", "old.db3",
                  "bag_messages_packed/bag_messages_packed.db3", "bag_file_packed/bag_file_packed.db3.zstd"):
         own = Path(name).name

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes crates/flexarm-fe-io/tests/data/three_blocks.*: one small mesh in every layout that Gmsh writes.
+"""Makes crates/links/flexarm-fe-io/tests/data/three_blocks.*: one small mesh in every layout that Gmsh writes.
 
 Three separate blocks of 1 x 1 x 1 m side by side along x, second order, straight edges: tetrahedra
 (`tets`, x = 0 to 1), hexahedra (`hexes`, x = 2 to 3) and wedges (`wedges`, x = 4 to 5). Groups: the
@@ -12,7 +12,7 @@ import pathlib
 
 import gmsh
 
-FOLDER = pathlib.Path(__file__).resolve().parent.parent / "crates/flexarm-fe-io/tests/data"
+FOLDER = pathlib.Path(__file__).resolve().parent.parent / "crates/links/flexarm-fe-io/tests/data"
 
 
 def block(x, size, recombine=False, layers=0):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Small motions in the formats of other programs, for crates/flexarm-motion-io/tests.
+"""Small motions in the formats of other programs, for crates/motion/flexarm-motion-io/tests.
 
     pip install rosbags==0.11.9 mcap==1.6.0 lz4==4.4.5 zstandard==0.25.0 PyYAML==6.0.3
     python3 tools/make_motion_fixtures.py
@@ -22,7 +22,7 @@ from rosbags.rosbag1 import Writer as Rosbag1Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-FOLDER = Path(__file__).resolve().parent.parent / "crates/flexarm-motion-io/tests/data"
+FOLDER = Path(__file__).resolve().parent.parent / "crates/motion/flexarm-motion-io/tests/data"
 JOINTS = ["joint_1", "joint_2"]
 STEP_NS = 20_000_000
 COUNT = 26

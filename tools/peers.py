@@ -6,7 +6,7 @@
 
 The robot is robots/reference_arm (18 coordinates, 12 of them elastic) on its motion of 4 s. The error is the largest distance of the
 tool from tests/golden/reference_arm_mid.csv over the peak deflection, every 4 ms. Ours thrice: a run of an arm that is built (set-up of
-the run, steps, a sample at its start and its end: crates/flexarm/examples/prepared_runs.rs), the same with 100 samples a second beside the
+the run, steps, a sample at its start and its end: crates/faces/flexarm/examples/prepared_runs.rs), the same with 100 samples a second beside the
 rigid twin, and the whole process `flexarm compare --no-files`; the others: the call that steps, without set-up. CPU time of one thread,
 all lines in turn, the smallest of --repeat runs.
 

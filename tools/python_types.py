@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Types of the dictionaries that the Python package returns, made of the structs that `--json` is made of. Plain Python 3.
 
-    python3 tools/python_types.py            writes crates/flexarm-python/python/flexarm/types.py
+    python3 tools/python_types.py            writes crates/faces/flexarm-python/python/flexarm/types.py
     python3 tools/python_types.py --check    says whether it is what would be written
 
 It reads the `#[derive(Serialize)]` structs of the library with their documentation and their serde attributes; what a struct
@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-TARGET = ROOT / "crates/flexarm-python/python/flexarm/types.py"
+TARGET = ROOT / "crates/faces/flexarm-python/python/flexarm/types.py"
 CRATES = ["flexarm", "flexarm-linkmaker", "flexarm-settings"]
 #: Answers: struct, its file, and the name of its type in Python.
 ROOTS = [
@@ -76,7 +76,7 @@ def structs():
     """All structs that are serialised, by name."""
     found = {}
     for crate in CRATES:
-        for file in sorted((ROOT / "crates" / crate / "src").rglob("*.rs")):
+        for file in sorted(ROOT.glob(f"crates/*/{crate}/src/**/*.rs")):
             text = file.read_text()
             pattern = r"((?:^[ \t]*///[^\n]*\n)*)((?:^[ \t]*#\[[^\n]*\n)+)^pub(?:\([a-z]+\))? struct (\w+)(?:<[^>]*>)? \{\n(.*?)^\}"
             for doc, attributes, name, body in re.findall(pattern, text, re.M | re.S):
@@ -163,7 +163,7 @@ class Types:
 
     def text(self):
         for struct, file, name in ROOTS:
-            path = ROOT / "crates" / file
+            path = next(ROOT.glob(f"crates/*/{file}"))
             self.typed(self.struct(struct, path), name)
         out = [HEAD.format(names="\n".join(f'    "{name}",' for name in sorted(self.names.values())))]
         for name, doc, fields in self.order:

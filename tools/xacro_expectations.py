@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What ROS's xacro makes of the files in crates/flexarm-urdf/tests/data/xacro, written beside them as NAME.expected.xml.
+"""What ROS's xacro makes of the files in crates/robot/flexarm-urdf/tests/data/xacro, written beside them as NAME.expected.xml.
 
 Needs xacro from PyPI (2.1.1 was used, with PyYAML 6.0.3): python3 tools/xacro_expectations.py
 The package test_parts, which one file asks for, is that folder itself; its path is written as PACKAGE.
@@ -8,7 +8,7 @@ import sys
 import types
 from pathlib import Path
 
-FOLDER = Path(__file__).resolve().parent.parent / "crates/flexarm-urdf/tests/data/xacro"
+FOLDER = Path(__file__).resolve().parent.parent / "crates/robot/flexarm-urdf/tests/data/xacro"
 
 packages = types.ModuleType("ament_index_python.packages")
 packages.get_package_share_directory = lambda name: {"test_parts": str(FOLDER)}[name]

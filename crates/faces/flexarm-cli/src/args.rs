@@ -1,0 +1,421 @@
+//! The command line: words, defaults and help texts.
+
+use std::path::PathBuf;
+
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use flexarm::{DriveModel, LinkModel, Modelling, RecordingFormat, STEPPERS, StepperEntry};
+
+use crate::compensate::CompensateArgs;
+use crate::convert::ConvertArgs;
+use crate::exchange_args::{ExportArgs, ImportArgs};
+use crate::formats;
+use crate::identify::IdentifyArgs;
+use crate::later::Later;
+use crate::lobes::LobesArgs;
+use crate::map::MapArgs;
+use crate::motion::{MotionArgs, MotionInputArgs};
+use crate::new::NewArgs;
+use crate::posed_args::{ModesArgs, ResponseArgs, StaticsArgs};
+use crate::reduce_args::ReduceArgs;
+use crate::report::ReportArgs;
+use crate::sensitivity::SensitivityArgs;
+use crate::sweep::SweepArgs;
+use crate::verify::VerifyArgs;
+use crate::view::ViewArgs;
+
+/// How far is a robot's tool from where the rigid model puts it, because its links bend?
+#[derive(Debug, Parser)]
+#[command(name = "flexarm", version, arg_required_else_help = true)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+    /// Print one JSON object on standard output and nothing else
+    #[arg(long, global = true, help_heading = "Terminal")]
+    pub(crate) json: bool,
+    /// No progress bar and no messages but errors
+    #[arg(long, short, global = true, help_heading = "Terminal")]
+    pub(crate) quiet: bool,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Run the flexible robot beside its rigid twin, log both, measure the TCP error
+    ///
+    /// Without arguments: the shipped industrial arm on its pick-and-place cycle.
+    Compare(Later<RunArgs>),
+    /// Run one model along a trajectory and log it
+    Run(Later<RunArgs>),
+    /// Show what was loaded, and kinematics and dynamics at a pose
+    Inspect(Later<InspectArgs>),
+    /// Look for everything that is wrong with a robot and a trajectory
+    Check(Later<CheckArgs>),
+    /// Make a robot file, a sample motion and the first run of a URDF or xacro file
+    New(Later<NewArgs>),
+    /// Show what is in a motion, against the limits of a robot, and write it in other formats
+    Motion(Later<MotionArgs>),
+    /// Find a robot's stiffness from measurements, and the poses that are worth measuring
+    Identify(Later<IdentifyArgs>),
+    /// Find the motion with which the flexible arm's tool follows the rigid one's, and judge it on other plants
+    Compensate(Later<CompensateArgs>),
+    /// How the tool's error along a motion depends on every number of the robot: derivatives of one run, for all at once
+    Sensitivity(Later<SensitivityArgs>),
+    /// Sag, stiffness and frequencies over the workspace, over joints or along a motion, and where to put a workpiece
+    Map(Later<MapArgs>),
+    /// Run a study: many runs with other payloads, stiffness, speeds, options; tables, sensitivities, shards
+    Sweep(Box<SweepArgs>),
+    /// Equilibrium under weight and load at a pose, and the compliance of the TCP
+    Statics(Later<StaticsArgs>),
+    /// Natural frequencies, damping and shapes at a pose, drives locked
+    Modes(Later<ModesArgs>),
+    /// Frequency response of the TCP to forces on it and to motions of joints
+    Response(Later<ResponseArgs>),
+    /// Limits of depth beyond which a cutting tool on the arm chatters, over the spindle speed
+    Lobes(Later<LobesArgs>),
+    /// Make the HTML report of recorded runs
+    Report(Later<ReportArgs>),
+    #[command(about = formats::about_convert())]
+    Convert(Later<ConvertArgs>),
+    /// Make a flexible link of a finite element mesh, with its checks
+    Reduce(Later<ReduceArgs>),
+    /// Make a flexible link of matrices from another FE program
+    Import(Later<ImportArgs>),
+    /// Write the matrices of a flexible link for another FE program
+    Export(Later<ExportArgs>),
+    /// Run the case studies against their truths and write the page of the results
+    Verify(Later<VerifyArgs>),
+    /// Open a recording in the Rerun viewer
+    View(Later<ViewArgs>),
+    /// Print the page of a file format: keys, units, defaults, examples
+    Format {
+        /// Which file
+        #[arg(value_enum)]
+        page: PageName,
+    },
+    /// Print a shell completion script
+    Completions {
+        /// Shell to complete for
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page (roff)
+    Man,
+}
+
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Robot")]
+pub(crate) struct RobotArgs {
+    /// Frame to use as TCP instead of the robot file's
+    #[arg(long, value_name = "FRAME")]
+    pub(crate) tcp: Option<String>,
+    /// Where package://NAME/ leads (may be repeated)
+    #[arg(long = "package", hide_short_help = true, value_name = "NAME=FOLDER")]
+    pub(crate) packages: Vec<String>,
+    /// Argument of a xacro file, before those of the robot file (may be repeated)
+    #[arg(long = "arg", value_name = "NAME=VALUE")]
+    pub(crate) arguments: Vec<String>,
+    /// Link whose inertia may be one that no body has (may be repeated)
+    #[arg(long, value_name = "LINK")]
+    pub(crate) waive_inertia: Vec<String>,
+    /// Estimate missing inertias from the meshes with this density (kg/m^3)
+    #[arg(
+        long,
+        hide_short_help = true,
+        value_name = "KG_PER_M3",
+        conflicts_with = "inertia_from_total_mass",
+        allow_hyphen_values = true
+    )]
+    pub(crate) inertia_from_density: Option<f64>,
+    /// Estimate missing inertias from the meshes, all together of this mass (kg)
+    #[arg(long, hide_short_help = true, value_name = "KG", allow_hyphen_values = true)]
+    pub(crate) inertia_from_total_mass: Option<f64>,
+}
+
+/// How links and drives are modelled.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Models")]
+pub(crate) struct ModellingArgs {
+    /// Model of the links [default: as the robot file says]
+    #[arg(long, value_parser = word_of(&LinkModel::WORDS))]
+    pub(crate) links: Option<LinkModel>,
+    /// Model of the drives [default: as the robot file says]
+    #[arg(long, value_parser = word_of(&DriveModel::WORDS))]
+    pub(crate) drives: Option<DriveModel>,
+    /// Rigid parts of every lumped link, instead of the robot file's
+    #[arg(long, value_name = "N", hide_short_help = true, value_parser = clap::value_parser!(u32).range(2..))]
+    pub(crate) segments: Option<u32>,
+    /// Fixed-interface modes of every modal link, instead of the robot file's
+    #[arg(long, value_name = "N", hide_short_help = true)]
+    pub(crate) modes: Option<u32>,
+}
+
+/// One of the words of a list of the facade, each with what it means.
+fn word_of<T: Copy + Send + Sync + 'static>(
+    words: &'static [(&'static str, T, &'static str)],
+) -> impl TypedValueParser<Value = T> {
+    let known = words.iter().map(|(word, _, means)| PossibleValue::new(*word).help(*means));
+    PossibleValuesParser::new(known).try_map(|given| {
+        let found = words.iter().find(|(word, ..)| *word == given).map(|(_, value, _)| *value);
+        found.ok_or_else(|| format!("{given:?} is not known"))
+    })
+}
+
+impl ModellingArgs {
+    pub(crate) fn modelling(&self) -> Modelling {
+        Modelling {
+            links: self.links.unwrap_or_default(),
+            drives: self.drives.unwrap_or_default(),
+            segments: self.segments.map(|n| n as usize),
+            modes: self.modes.map(|n| n as usize),
+        }
+    }
+}
+
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "All options, by groups: --help")]
+pub(crate) struct RunArgs {
+    /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot [default: kr210]
+    pub(crate) robot: Option<PathBuf>,
+    /// Motion of any format (flexarm format motion), or the name of a shipped one [default: the robot's own]
+    pub(crate) trajectory: Option<PathBuf>,
+    /// Time stepper
+    #[arg(long, help_heading = "Stepper", value_name = "NAME", value_parser = stepper_words(), default_value = STEPPERS[0].name)]
+    pub(crate) stepper: &'static StepperEntry,
+    /// Step of the stepper (s) [default: the stepper's own]
+    #[arg(long, help_heading = "Stepper", value_name = "SECONDS", allow_hyphen_values = true)]
+    pub(crate) step: Option<f64>,
+    #[command(flatten)]
+    pub(crate) modelling: ModellingArgs,
+    #[command(flatten)]
+    pub(crate) load: RobotArgs,
+    #[command(flatten)]
+    pub(crate) motion: MotionInputArgs,
+    /// Round corners of the trajectory, where a velocity jumps, by blends that last this long (s)
+    #[arg(long, help_heading = "Models", hide_short_help = true, value_name = "SECONDS", allow_hyphen_values = true)]
+    pub(crate) round_corners: Option<f64>,
+    /// File with loads and changes of payload during the run (.toml; flexarm format loads)
+    #[arg(long, help_heading = "Models", value_name = "FILE")]
+    pub(crate) loads: Option<PathBuf>,
+    /// Logged samples per second
+    #[arg(
+        long,
+        help_heading = "Results",
+        hide_short_help = true,
+        value_name = "HZ",
+        default_value_t = 500.0,
+        allow_hyphen_values = true
+    )]
+    pub(crate) log_rate: f64,
+    /// How the run starts
+    #[arg(long, help_heading = "Models", hide_short_help = true, value_enum, default_value_t = StartName::Equilibrium)]
+    pub(crate) from_rest: StartName,
+    /// Spectral radius of generalized-alpha: 1 damps nothing, 0 damps the highest modes at once
+    #[arg(
+        long,
+        help_heading = "Stepper",
+        hide_short_help = true,
+        value_name = "RHO",
+        default_value_t = 0.9,
+        allow_hyphen_values = true
+    )]
+    pub(crate) rho_inf: f64,
+    /// Plain generalized-alpha, without the correction of its leading frequency error
+    #[arg(long, help_heading = "Stepper", hide_short_help = true)]
+    pub(crate) no_dispersion_correction: bool,
+    /// Constraint form of spook
+    #[arg(long, help_heading = "Stepper", hide_short_help = true, value_enum, default_value_t = FormName::Local)]
+    pub(crate) spook_form: FormName,
+    /// Preset of spook: exact formulas, or those of the method's source
+    #[arg(long, help_heading = "Stepper", hide_short_help = true, value_enum, default_value_t = PresetName::Exact)]
+    pub(crate) spook_preset: PresetName,
+    /// Relative tolerance of reference, which chooses its steps by error control; --step is then the distance of the points
+    #[arg(
+        long,
+        help_heading = "Stepper",
+        hide_short_help = true,
+        value_name = "RTOL",
+        default_value_t = 1e-9,
+        allow_hyphen_values = true
+    )]
+    pub(crate) rtol: f64,
+    /// Method of reference
+    #[arg(long, help_heading = "Stepper", hide_short_help = true, value_enum, default_value_t = MethodName::Bdf)]
+    pub(crate) reference_method: MethodName,
+    /// Band around the final TCP error for the settling time (m)
+    #[arg(
+        long,
+        help_heading = "Results",
+        hide_short_help = true,
+        value_name = "METRES",
+        default_value_t = 1e-4,
+        allow_hyphen_values = true
+    )]
+    pub(crate) settling_band: f64,
+    /// One more run beside this one, with some options changed: links=modal, or stepper=spook,step=5e-4,name=spook, or
+    /// robot=..., trajectory=... (may be repeated; compare only)
+    #[arg(long, help_heading = "Results", value_name = "KEY=VALUE,...")]
+    pub(crate) with: Vec<String>,
+    /// Factor by which recordings and pictures show deflections [default: so that they are seen]
+    #[arg(long, help_heading = "Results", hide_short_help = true, value_name = "FACTOR", allow_hyphen_values = true)]
+    pub(crate) magnify: Option<f64>,
+    /// When the run begins in recordings whose times have a date (MCAP), as seconds since 1970 [default: 946684800, the
+    /// first of January 2000, so that equal runs are equal files]
+    #[arg(long, value_name = "now|SECONDS", value_parser = parse_start_time, allow_hyphen_values = true)]
+    pub(crate) start_time: Option<u64>,
+    /// Write the mesh files into the robot description of the MCAP, so that it has its shapes on any machine (Foxglove
+    /// draws them; Rerun and RViz want files)
+    #[arg(long)]
+    pub(crate) embed_meshes: bool,
+    /// Output folder [default: a new one in out/]
+    #[arg(short, long, help_heading = "Files", value_name = "FOLDER")]
+    pub(crate) output: Option<PathBuf>,
+    /// Overwrite what is in the output folder
+    #[arg(long, help_heading = "Files")]
+    pub(crate) force: bool,
+    /// Write a folder "figures" for papers too: plots as SVG with their data as CSV, pictures of the arm as PNG
+    #[arg(long, help_heading = "Files", hide_short_help = true)]
+    pub(crate) figures: bool,
+    /// Write the table as Parquet too (run.parquet); not readable before the run ends
+    #[arg(long, help_heading = "Files", hide_short_help = true, conflicts_with = "no_files")]
+    pub(crate) parquet: bool,
+    /// Write the run in this format too (may be repeated)
+    #[arg(long, help_heading = "Files", hide_short_help = true, value_name = "FORMAT", conflicts_with = "no_files", value_parser = formats::also())]
+    pub(crate) also: Vec<RecordingFormat>,
+    /// Write nothing, only print the figures
+    #[arg(long, help_heading = "Files", conflicts_with_all = ["output", "force", "figures"])]
+    pub(crate) no_files: bool,
+    /// Run although the trajectory passes joint limits
+    #[arg(long, help_heading = "Models", hide_short_help = true)]
+    pub(crate) ignore_limits: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct InspectArgs {
+    /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot
+    pub(crate) robot: PathBuf,
+    /// Joint values in coordinate order, or name=value pairs (rad or m; 30deg for degrees)
+    #[arg(long, value_name = "Q1,Q2,...", allow_hyphen_values = true)]
+    pub(crate) at: Option<String>,
+    /// Joint velocities, likewise (rad/s, m/s)
+    #[arg(long, value_name = "V1,V2,...", allow_hyphen_values = true)]
+    pub(crate) velocity: Option<String>,
+    #[command(flatten)]
+    pub(crate) load: RobotArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CheckArgs {
+    /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot
+    pub(crate) robot: PathBuf,
+    /// Trajectory to check against the robot's limits
+    pub(crate) trajectory: Option<PathBuf>,
+    /// File of loads during the trajectory to check as well
+    #[arg(long, value_name = "FILE")]
+    pub(crate) loads: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) motion: MotionInputArgs,
+    #[command(flatten)]
+    pub(crate) load: RobotArgs,
+}
+
+/// Words and help of the registry of steppers.
+fn stepper_words() -> impl TypedValueParser<Value = &'static StepperEntry> {
+    let help = |entry: &StepperEntry| format!("{}; step {} ms", entry.help, 1e3 * entry.default_step_s);
+    let words = STEPPERS.map(|entry| PossibleValue::new(entry.name).help(help(entry)).aliases(entry.aliases));
+    PossibleValuesParser::new(words).map(|word| {
+        let named = |entry: &&StepperEntry| entry.name == word || entry.aliases.contains(&word.as_str());
+        STEPPERS.into_iter().find(named).expect("the parser lets no other word pass")
+    })
+}
+
+/// Pages of file formats.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PageName {
+    /// robot.toml: tool, payload, links that bend, drives
+    Robot,
+    /// Motions: waypoints, samples and tables, messages and bags of ROS
+    Motion,
+    /// Motions told by the path of the tool, standard motions (.toml)
+    Path,
+    /// Robot programs: KUKA KRL, ABB RAPID, URScript, G-code
+    Program,
+    /// What acts on the arm during a run (.toml)
+    Loads,
+    /// What was measured at a robot, for flexarm identify (.toml)
+    Measurements,
+    /// Cutting tools, for flexarm lobes (.toml)
+    Tool,
+    /// Lists of poses, for flexarm map (.toml)
+    Map,
+    /// Studies of many runs, for flexarm sweep (.toml)
+    Study,
+    #[value(help = formats::help_page())]
+    Recordings,
+    /// Reduced links (.flex)
+    Flex,
+}
+
+impl PageName {
+    pub(crate) fn text(self) -> &'static str {
+        match self {
+            Self::Robot => include_str!("../../../../docs/robot-file.md"),
+            Self::Motion => include_str!("../../../../docs/motions.md"),
+            Self::Path => include_str!("../../../../docs/paths.md"),
+            Self::Program => include_str!("../../../../docs/programs.md"),
+            Self::Loads => include_str!("../../../../docs/loads.md"),
+            Self::Measurements => include_str!("../../../../docs/identify.md"),
+            Self::Tool => include_str!("../../../../docs/lobes.md"),
+            Self::Map => include_str!("../../../../docs/map.md"),
+            Self::Study => include_str!("../../../../docs/sweep.md"),
+            Self::Recordings => include_str!("../../../../docs/recordings.md"),
+            Self::Flex => include_str!("../../../links/flexarm-fem/src/flex_file/format.md"),
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum StartName {
+    /// The springs carry the weight
+    Equilibrium,
+    /// The springs are relaxed: the arm falls into its sag and rings
+    Undeformed,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FormName {
+    /// Relative motion in the proximal frame
+    Local,
+    /// Relative motion in world axes
+    Global,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PresetName {
+    /// Physical damping time
+    Exact,
+    /// Damping time of two steps
+    Source,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum MethodName {
+    /// Implicit, order 1 to 5: well damped high modes
+    Bdf,
+    /// Implicit, order 3: lightly damped modes in the kHz, loose tolerances
+    Esdirk34,
+    /// Explicit, order 5: no stiff modes
+    Tsit45,
+}
+
+/// A time as nanoseconds since 1970; ROS has no later ones than in 2038.
+fn parse_start_time(text: &str) -> Result<u64, String> {
+    const LATEST_S: f64 = i32::MAX as f64;
+    if text == "now" {
+        let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
+        return Ok(u64::try_from(since.as_nanos()).unwrap_or(u64::MAX));
+    }
+    let seconds: f64 = text.parse().map_err(|_| format!("expected now or seconds since 1970, found {text:?}"))?;
+    if !(0.0..=LATEST_S).contains(&seconds) {
+        return Err(format!("expected seconds from 0 (1970) to {LATEST_S} (2038), found {seconds}"));
+    }
+    Ok((seconds * 1e9).round() as u64)
+}

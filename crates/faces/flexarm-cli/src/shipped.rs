@@ -1,0 +1,176 @@
+//! Where shipped robots and trajectories are found: by path, or by name in the folders that come with the program.
+
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use flexarm::{Error, closest};
+
+use crate::failure::Failure;
+
+/// A folder that the process brought along.
+static BROUGHT: OnceLock<PathBuf> = OnceLock::new();
+
+/// Names it; the first call counts.
+pub(crate) fn ship_from(folder: PathBuf) {
+    let _ = BROUGHT.set(folder);
+}
+
+/// Folders that may hold `robots/` and `trajectories/`: here, what the process brought, beside the program, and where it was
+/// built.
+fn roots() -> Vec<PathBuf> {
+    let mut roots = vec![PathBuf::from(".")];
+    roots.extend(BROUGHT.get().cloned());
+    if let Some(folder) = std::env::current_exe().ok().as_deref().and_then(Path::parent) {
+        roots.push(folder.join("../share/flexarm"));
+    }
+    roots.extend(Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).map(Path::to_owned));
+    roots
+}
+
+/// The path itself if it exists, else `<root>/<folder>/<name>` with one of the endings.
+pub(crate) fn find(given: &Path, folder: &str, endings: &[&str]) -> PathBuf {
+    let is_name = given.components().count() == 1;
+    if given.exists() || !is_name {
+        return given.to_owned();
+    }
+    let name = given.to_string_lossy();
+    roots()
+        .iter()
+        .flat_map(|root| endings.iter().map(|e| root.join(folder).join(format!("{name}{e}"))).collect::<Vec<_>>())
+        .find(|path| path.exists())
+        .unwrap_or_else(|| given.to_owned())
+}
+
+/// A robot by path, name, or place below the folder of the shipped ones (`kr210/beams.toml`), for files that name robots.
+pub(crate) fn robot_file(given: &Path) -> PathBuf {
+    let found = robot(Some(given)).unwrap_or_else(|_| given.to_owned());
+    if found.exists() {
+        return found;
+    }
+    roots().iter().map(|root| root.join("robots").join(given)).find(|path| path.exists()).unwrap_or(found)
+}
+
+/// A robot by path or name.
+///
+/// # Errors
+/// A name that no robot has, with the ones that there are.
+pub(crate) fn robot(given: Option<&Path>) -> Result<PathBuf, Error> {
+    let given = given.unwrap_or(Path::new("kr210"));
+    let path = find(given, "robots", &["/robot.toml"]);
+    if path.exists() || given.components().count() != 1 || given.extension().is_some() {
+        return Ok(path);
+    }
+    let folders =
+        roots().into_iter().flat_map(|root| std::fs::read_dir(root.join("robots")).into_iter().flatten().flatten());
+    let whole = folders.filter(|entry| entry.path().join("robot.toml").is_file());
+    let mut names: Vec<String> = whole.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names.dedup();
+    let meant = closest(&given.to_string_lossy(), names.iter().map(String::as_str));
+    let meant = meant.map_or_else(String::new, |name| format!("did you mean {name:?}? "));
+    let what = format!(
+        "there is no such file and no shipped robot of this name; {meant}shipped are {}; or give a robot.toml, a folder \
+         with one, or a .urdf or .xacro file",
+        names.join(", ")
+    );
+    Err(Error::File { path, what })
+}
+
+/// A trajectory by path or name.
+pub(crate) fn trajectory(given: &Path) -> PathBuf {
+    find(given, "trajectories", &["", ".toml", ".csv"])
+}
+
+/// A cutting tool by path or name.
+///
+/// # Errors
+/// A name that no tool has, with the ones that there are.
+pub(crate) fn tool(given: &Path) -> Result<PathBuf, Failure> {
+    let path = find(given, "robots/tools", &[".toml"]);
+    if path.exists() || given.components().count() != 1 || given.extension().is_some() {
+        return Ok(path);
+    }
+    let files = |root: PathBuf| std::fs::read_dir(root.join("robots/tools")).into_iter().flatten().flatten();
+    let tools = roots().into_iter().flat_map(files).map(|entry| entry.path());
+    let tools = tools.filter(|path| path.extension().is_some_and(|ending| ending == "toml"));
+    let mut names: Vec<String> = tools.filter_map(|p| Some(p.file_stem()?.to_string_lossy().into_owned())).collect();
+    names.sort();
+    names.dedup();
+    let what = format!("there is no such file and no shipped tool of this name; shipped are {}", names.join(", "));
+    Err(Error::File { path, what }.into())
+}
+
+/// Where a command puts its files: the folder that was asked for, else a new one that no other run can have.
+pub(crate) enum OutputFolder {
+    None,
+    Asked(PathBuf),
+    New(NewFolder),
+}
+
+/// A folder `out/<stem>-<n>` that was made just now. It goes away again if nothing was put into it.
+pub(crate) struct NewFolder {
+    path: PathBuf,
+    /// Whether `out` itself is new.
+    with_parent: bool,
+}
+
+impl OutputFolder {
+    /// The folder asked for, or a new one named after `stem`, or none if no files are wanted.
+    ///
+    /// # Errors
+    /// [`Error::Write`] if a new one cannot be made.
+    pub(crate) fn of(asked: Option<&Path>, stem: &str, wanted: bool) -> Result<Self, Failure> {
+        match asked {
+            _ if !wanted => Ok(Self::None),
+            Some(folder) => Ok(Self::Asked(folder.to_owned())),
+            None => NewFolder::create(stem).map(Self::New),
+        }
+    }
+
+    pub(crate) fn path(&self) -> Option<PathBuf> {
+        match self {
+            Self::None => None,
+            Self::Asked(path) => Some(path.clone()),
+            Self::New(new) => Some(new.path.clone()),
+        }
+    }
+}
+
+impl NewFolder {
+    /// Takes the first number that is free. To make a folder and to find it free are one step, so runs that start at the
+    /// same time get different ones.
+    fn create(stem: &str) -> Result<Self, Failure> {
+        let clean: String =
+            stem.chars().map(|c| if c.is_alphanumeric() || c == '-' || c == '_' { c } else { '_' }).collect();
+        let out = Path::new("out");
+        let with_parent = !out.exists();
+        let mut number = 1_u64;
+        loop {
+            std::fs::create_dir_all(out).map_err(|source| Error::Write { path: out.to_owned(), source })?;
+            let path = out.join(format!("{clean}-{number:03}"));
+            match std::fs::create_dir(&path) {
+                Ok(()) => return Ok(Self { path, with_parent }),
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => number += 1,
+                // Another run has just removed `out`, which it had made and not used.
+                Err(error) if error.kind() == ErrorKind::NotFound && !out.exists() => {}
+                Err(source) => return Err(Error::Write { path, source }.into()),
+            }
+        }
+    }
+}
+
+impl Drop for NewFolder {
+    /// Only empty folders can be removed so.
+    fn drop(&mut self) {
+        if std::fs::remove_dir(&self.path).is_ok() && self.with_parent {
+            let _ = std::fs::remove_dir("out");
+        }
+    }
+}
+
+/// The folder with `robots` and `tests`: the first root that has both, else where the program was built.
+pub(crate) fn checkout() -> PathBuf {
+    let has_both = |root: &PathBuf| root.join("robots").is_dir() && root.join("tests/verification").is_dir();
+    roots().into_iter().find(has_both).unwrap_or_else(|| PathBuf::from("."))
+}

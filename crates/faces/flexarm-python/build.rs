@@ -1,0 +1,35 @@
+//! Puts what the wheel brings along, robots, trajectories and licences, where maturin finds it, and links as extension modules do.
+
+use std::path::Path;
+use std::{env, fs, io};
+
+fn main() -> io::Result<()> {
+    pyo3_build_config::add_extension_module_link_args();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).expect("the workspace");
+    let share = Path::new(&env::var_os("OUT_DIR").expect("cargo sets it")).join("share");
+    if share.exists() {
+        fs::remove_dir_all(&share)?; // what is gone there must go here
+    }
+    for folder in ["robots", "trajectories"] {
+        println!("cargo::rerun-if-changed={}", root.join(folder).display());
+        copy(&root.join(folder), &share.join(folder))?;
+    }
+    for licence in ["LICENSE-APACHE", "LICENSE-MIT"] {
+        fs::copy(root.join(licence), share.join(licence))?;
+    }
+    Ok(())
+}
+
+fn copy(from: &Path, to: &Path) -> io::Result<()> {
+    fs::create_dir_all(to)?;
+    for entry in fs::read_dir(from)? {
+        let entry = entry?;
+        // Meshes of links that are reduced already are for those who have the sources.
+        if from.ends_with("fe") && entry.file_name().to_string_lossy().ends_with(".msh.gz") {
+            continue;
+        }
+        let to = to.join(entry.file_name());
+        if entry.file_type()?.is_dir() { copy(&entry.path(), &to)? } else { fs::copy(entry.path(), &to).map(drop)? }
+    }
+    Ok(())
+}

@@ -1,0 +1,45 @@
+//! An observer of one's own that ends the run: when the tool has stood still long enough, there is nothing left to see.
+//! `cargo run --release -p flexarm --no-default-features --example stop_at_rest`
+//!
+//! The observer is shown every logged sample while the run goes on and keeps what it wants of it, here one number.
+#![allow(clippy::print_stdout, reason = "an example shows its answer")]
+
+use std::ops::ControlFlow;
+
+use flexarm::{Error, Modelling, Motion, Robot, RunOptions, Sample};
+
+/// The tool stands still when it is this near to where it comes to rest (m), for so long (s).
+const NEAR_M: f64 = 2e-4;
+const LONG_S: f64 = 0.25;
+
+/// Distance of the tool from where the arm would have it at rest (m): what its motion alone causes.
+fn ringing_m(sample: &Sample) -> f64 {
+    let part = |c: usize| sample.error_world[c] - sample.static_m[c];
+    (part(0).powi(2) + part(1).powi(2) + part(2).powi(2)).sqrt()
+}
+
+fn main() -> Result<(), Error> {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).expect("the checkout");
+    let robot = Robot::load(root.join("robots/kr210"))?;
+    let motion = Motion::load(root.join("trajectories/point_to_point.toml"), &robot)?;
+    let arm = robot.flexible(Modelling::default())?;
+    let (moves, whole) = (motion.trajectory.moves(), motion.trajectory.duration());
+    let end_of_move = moves.last().map_or(0.0, |last| last.end);
+
+    let (mut largest_m, mut restless_s) = (0.0_f64, 0.0);
+    let run = arm.simulate_with(&motion, &RunOptions::default(), None, &mut |sample| {
+        largest_m = largest_m.max(ringing_m(sample));
+        if ringing_m(sample) > NEAR_M || sample.time_s < end_of_move {
+            restless_s = sample.time_s;
+        }
+        if sample.time_s - restless_s < LONG_S { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    });
+    match run {
+        Err(Error::Interrupted { t, .. }) => println!("stopped at {t:.3} s of {whole} s"),
+        Err(other) => return Err(other),
+        Ok(_) => println!("the tool did not come to rest in {whole} s"),
+    }
+    println!("the motion shook the tool by {:.3} mm at most", 1e3 * largest_m);
+    println!("it came within {:.2} mm of its place {:.3} s after the move", 1e3 * NEAR_M, restless_s - end_of_move);
+    Ok(())
+}

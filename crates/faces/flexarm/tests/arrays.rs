@@ -1,0 +1,220 @@
+//! What programs that bring arrays rest on: answers of an arm whose links are in place, recursions on rows, arms that are
+//! commanded while they move, work that is stopped.
+#![allow(non_snake_case, reason = "the letters of the matrices")]
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+#![allow(clippy::print_stdout, reason = "measured errors beside their bounds")]
+
+use std::collections::BTreeSet;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use flexarm::{
+    Arm, DriveModel, Error, LinkModel, Modelling, Motion, Outputs, RecordingFormat, Recursions, ResponseRequest, Robot,
+    RunOptions, Scenario, Variation, Wrench, flat_columns,
+};
+
+const POSE: [f64; 6] = [0.0, -1.2, 1.5, 0.0, 0.4, 0.0];
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).unwrap().to_owned()
+}
+
+fn robot(name: &str) -> Robot {
+    Robot::load(root().join("robots").join(name)).unwrap()
+}
+
+fn json(value: &impl serde::Serialize) -> String {
+    serde_json::to_string(value).unwrap()
+}
+
+/// Numbers between -1 and 1 that fill the interval evenly.
+fn numbers(n: usize, seed: f64) -> Vec<f64> {
+    (0..n).map(|k| 2.0 * (seed * (k + 1) as f64).fract() - 1.0).collect()
+}
+
+#[test]
+fn an_arm_answers_as_the_robot_that_is_substituted_for_each_question() {
+    let robot = robot("kr210");
+    let modelling = Modelling { links: LinkModel::Modal, drives: DriveModel::Elastic, ..Modelling::default() };
+    let arm = robot.flexible(modelling).unwrap();
+    let wrench = [10.0, 0.0, -500.0, 0.0, 1.0, 0.0];
+    let statics = flexarm::statics(&robot, &modelling, Some(&POSE), wrench).unwrap();
+    assert_eq!(json(&arm.statics(Some(&POSE), wrench).unwrap()), json(&statics));
+    let modes = flexarm::modes(&robot, &modelling, Some(&POSE), 5).unwrap();
+    assert_eq!(json(&arm.modes(Some(&POSE), 5).unwrap()), json(&modes));
+    let request = ResponseRequest { points: 20, ..ResponseRequest::default() };
+    let response = flexarm::response(&robot, &modelling, Some(&POSE), &request, None).unwrap();
+    assert_eq!(json(&arm.response(Some(&POSE), &request).unwrap()), json(&response));
+
+    let linear = arm.linearise(Some(&POSE), wrench).unwrap();
+    let C = linear.compliance().unwrap();
+    let difference = (0..36).map(|k| (C[(k / 6, k % 6)] - statics.compliance[k / 6][k % 6]).abs()).fold(0.0, f64::max);
+    assert!(difference <= 1e-12 * C.amax(), "{difference:e}");
+    assert!(matches!(arm.statics(Some(&[0.0; 5]), wrench), Err(Error::Pose(_))));
+}
+
+/// Rows of the recursions, one by one and all at once.
+fn check_rows(recursions: &Recursions) {
+    let (n, m) = (recursions.model().nv(), 600);
+    let [q, v, a] = [0.618, 0.324, 0.755].map(|seed| numbers(m * n, seed));
+    let q: Vec<f64> = q.iter().map(|x| 0.1 * x).collect();
+    let [mut tau, mut bias, mut back] = [(); 3].map(|()| vec![0.0; m * n]);
+    let mut M = vec![0.0; m * n * n];
+    recursions.inverse_dynamics(&q, &v, &a, &mut tau).unwrap();
+    recursions.nonlinear_effects(&q, &v, &mut bias).unwrap();
+    recursions.mass_matrix(&q, &mut M).unwrap();
+    recursions.forward_dynamics(&q, &v, &tau, &mut back).unwrap();
+    for k in [0, 63, 64, 599] {
+        let row = k * n..(k + 1) * n;
+        let mut alone = vec![0.0; n];
+        recursions.inverse_dynamics(&q[row.clone()], &v[row.clone()], &a[row.clone()], &mut alone).unwrap();
+        assert_eq!(alone, tau[row.clone()], "row {k} has the bits of the row alone");
+        let scale = tau[row.clone()].iter().map(|x| x.abs()).fold(1.0, f64::max);
+        for i in 0..n {
+            let Ma: f64 = (0..n).map(|j| M[k * n * n + i * n + j] * a[k * n + j]).sum();
+            assert!((Ma + bias[k * n + i] - tau[k * n + i]).abs() <= 1e-11 * scale, "tau = M a + bias");
+            assert!((back[k * n + i] - a[k * n + i]).abs() <= 1e-6, "forward dynamics undo the inverse");
+        }
+    }
+    let frame = recursions.frame("tcp").unwrap();
+    let (mut J, mut X, mut ahead) = (vec![0.0; 6 * n], vec![0.0; 16], vec![0.0; 16]);
+    recursions.jacobian(&q[..n], &frame, &mut J).unwrap();
+    recursions.pose(&q[..n], &frame, &mut X).unwrap();
+    let (h, mut moved) = (1e-7, q[..n].to_vec());
+    moved[0] += h;
+    recursions.pose(&moved, &frame, &mut ahead).unwrap();
+    for i in 0..3 {
+        let slope = (ahead[4 * i + 3] - X[4 * i + 3]) / h;
+        assert!((slope - J[i * n]).abs() <= 1e-5, "the Jacobian is the slope of the pose: {slope} and {}", J[i * n]);
+    }
+    assert!(matches!(recursions.inverse_dynamics(&q, &v[1..], &a, &mut tau), Err(Error::Pose(_))));
+    assert!(matches!(recursions.frame("no_link"), Err(Error::Load(_))));
+}
+
+#[test]
+fn rows_of_the_recursions_have_the_bits_of_each_alone_and_fit_each_other() {
+    check_rows(&robot("kr210").recursions().unwrap());
+    check_rows(&robot("reference_arm").flexible(Modelling::default()).unwrap().recursions());
+    check_rows(&robot("palletiser").recursions().unwrap());
+}
+
+/// Largest distance between the tool of an arm that is given a motion as targets, with their velocities or without, and that of
+/// the run along it, over the run's largest error.
+fn off(arm: &Arm, motion: &Motion, period_s: f64, with_velocities: bool) -> f64 {
+    let options = RunOptions { log_rate_hz: 1.0 / period_s, ..RunOptions::default() };
+    let run = arm.simulate(motion, &options).unwrap();
+    let n = motion.trajectory.joints().len();
+    let [mut q, mut v, mut a] = [(); 3].map(|()| vec![0.0; n]);
+    motion.trajectory.sample(0.0, &mut q, &mut v, &mut a);
+    let mut live = arm.live(Some(&q), period_s, &options).unwrap();
+    let place = run.values("tcp_position");
+    let mut largest = 0.0_f64;
+    for (k, t) in run.time_s().iter().enumerate().skip(1) {
+        motion.trajectory.sample(*t, &mut q, &mut v, &mut a);
+        live.step(&q, with_velocities.then_some(&v), &Wrench::zeros()).unwrap();
+        let tool = live.tcp_pose().translation.vector;
+        let distance = (0..3).map(|c| (tool[c] - place[3 * k + c]).powi(2)).sum::<f64>().sqrt();
+        largest = largest.max(distance);
+    }
+    let error = run.error_world_m().chunks(3).map(|e| (e[0] * e[0] + e[1] * e[1] + e[2] * e[2]).sqrt());
+    largest / error.fold(0.0, f64::max)
+}
+
+#[test]
+fn an_arm_that_is_commanded_along_a_motion_goes_where_the_run_goes() {
+    let robot = robot("kr210");
+    let arm = robot.flexible(Modelling::default()).unwrap();
+    let motion = Motion::load(root().join("trajectories/point_to_point.toml"), &robot).unwrap();
+    // Cubics between targets are not the quintics of the motion.
+    let (fine, coarse) = (off(&arm, &motion, 1e-3, true), off(&arm, &motion, 0.05, true));
+    println!("off by {fine:.1e} of the error at 1 kHz, {coarse:.1e} at 20 Hz");
+    assert!(fine <= 2e-5 && coarse <= 0.02, "{fine:e}, {coarse:e}");
+    assert!(coarse > 4.0 * fine, "shorter periods are closer: {fine:e}, {coarse:e}");
+
+    // Without velocities accelerations are a period late.
+    let (fine, coarse) = (off(&arm, &motion, 1e-3, false), off(&arm, &motion, 4e-3, false));
+    println!("without velocities {fine:.1e} at 1 kHz, {coarse:.1e} at 250 Hz");
+    assert!(fine <= 2e-2 && coarse <= 8e-2, "{fine:e}, {coarse:e}");
+    let servo = Modelling { drives: DriveModel::Servo, ..Modelling::default() };
+    let (robot, name) = (self::robot("reference_arm"), "trajectories/reference_arm.toml");
+    let motion = Motion::load(root().join(name), &robot).unwrap();
+    let arm = robot.flexible(servo).unwrap();
+    let (told, late) = (off(&arm, &motion, 1e-3, true), off(&arm, &motion, 1e-3, false));
+    println!("servos {told:.1e}, without velocities {late:.1e}");
+    assert!(told <= 1e-3 && late <= 0.3, "{told:e}, {late:e}");
+}
+
+#[test]
+fn a_live_arm_refuses_what_makes_no_sense_and_starts_again() {
+    let arm = robot("reference_arm").flexible(Modelling { drives: DriveModel::Servo, ..Modelling::default() }).unwrap();
+    let options = RunOptions::default();
+    assert!(matches!(arm.live(None, 1.5e-3, &options), Err(Error::Value(_))));
+    assert!(matches!(arm.live(Some(&[0.0; 3]), 1e-3, &options), Err(Error::Pose(_))));
+    let mut live = arm.live(None, 2e-3, &options).unwrap();
+    assert!(matches!(live.step(&[f64::NAN; 6], None, &Wrench::zeros()), Err(Error::Pose(_))));
+    let begin = live.tcp_pose();
+    for k in 1..=50 {
+        live.step(&[1e-3 * f64::from(k); 6], None, &Wrench::zeros()).unwrap();
+    }
+    assert!((live.time_s() - 0.1).abs() < 1e-12);
+    assert!(live.position()[0] > 0.0 && live.position()[0] < 0.05, "servos lag: {}", live.position()[0]);
+    live.reset(None).unwrap();
+    assert_eq!((live.time_s(), live.tcp_pose()), (0.0, begin));
+}
+
+#[test]
+fn work_stops_when_it_is_told_to() {
+    let robot = robot("kr210");
+    let arm = robot.flexible(Modelling::default()).unwrap();
+    let poses = POSE.repeat(4000);
+    let asked = AtomicUsize::new(0);
+    let stop = || asked.fetch_add(1, Ordering::Relaxed) >= 2;
+    let stopped = arm.operating_points_until(&poses, &Wrench::zeros(), &stop);
+    assert!(matches!(stopped, Err(Error::Interrupted { .. })));
+    assert!(asked.load(Ordering::Relaxed) < 10, "it asks for every piece and begins none after that");
+
+    let motion = Motion::load(root().join("trajectories/point_to_point.toml"), &robot).unwrap();
+    let options = RunOptions::default();
+    let scenarios = vec![Scenario::new(motion.clone()); 3];
+    let runs = arm.simulate_batch_until(&scenarios, &options, &|| true);
+    assert!(runs.iter().all(|run| matches!(run, Err(Error::Interrupted { .. }))));
+    let variations = vec![Variation::new(&motion); 3];
+    let runs = arm.deflections_until(&variations, &options, false, &|| true);
+    assert!(runs.iter().all(|run| matches!(run, Err(Error::Interrupted { .. }))));
+
+    let half = 0.5 * motion.trajectory.duration();
+    let mut progress = |t: f64, _: f64| if t < half { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
+    let run = arm.simulate_watched(&motion, &options, None, None, &mut progress);
+    assert!(matches!(run, Err(Error::Interrupted { t, .. }) if t >= half && t < half + 0.1));
+}
+
+#[test]
+fn columns_in_memory_are_the_table_of_the_csv() {
+    for name in ["kr210", "palletiser", "one_beam"] {
+        let robot = robot(name);
+        let motion = Motion::load(robot.default_trajectory.as_ref().unwrap(), &robot).unwrap();
+        let folder = std::env::temp_dir().join(format!("flexarm-arrays-{}-{name}", std::process::id()));
+        let outputs = Outputs {
+            recordings: BTreeSet::from([RecordingFormat::Csv]),
+            overwrite: true,
+            ..Outputs::everything(&folder)
+        };
+        let options = RunOptions { log_rate_hz: 50.0, ..RunOptions::default() };
+        let arm = robot.flexible(Modelling::default()).unwrap();
+        let mut progress = |_: f64, _: f64| ControlFlow::Continue(());
+        let run = arm.simulate_watched(&motion, &options, Some(&outputs), None, &mut progress).unwrap();
+        let text = std::fs::read_to_string(folder.join("run.csv")).unwrap();
+        std::fs::remove_dir_all(&folder).unwrap();
+        let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+        let columns = flat_columns(&run.columns);
+        let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(lines.next().unwrap().split(',').collect::<Vec<_>>(), names);
+        for (row, line) in lines.enumerate() {
+            for (value, (name, numbers)) in line.split(',').zip(&columns) {
+                assert_eq!(value.parse::<f64>().unwrap(), numbers[row], "{name}, row {row}");
+            }
+        }
+        assert!(columns.iter().all(|(_, numbers)| numbers.len() == run.columns.rows()));
+    }
+}

@@ -1,0 +1,111 @@
+//! Errors as a program meets them: the cause as a variant with its numbers, the setting that mends it as a value, and a
+//! sentence in the library's own names.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+
+use std::path::{Path, PathBuf};
+
+use flexarm::reduce::{ReduceJob, ReduceOptions, UrdfEntry, reduce};
+use flexarm::{
+    AppliedLoad, ConstraintForm, Error, Fault, JobError, LinkError, LinkModel, LoadError, Modelling, ModellingError,
+    Motion, PoseError, ResponseRequest, Robot, RunOptions, Setting, SpookPreset, SpookSettings, StepError, StepperKind,
+    ValueError, Wrench,
+};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..")
+}
+
+fn beam() -> (Robot, Motion) {
+    let robot = Robot::load(root().join("robots/one_beam")).unwrap();
+    let motion = Motion::from_samples(&[0.0, 1.0], &[0.0, 0.0], &robot).unwrap();
+    (robot, motion)
+}
+
+/// What a run with these options ends with.
+fn refused(modelling: Modelling, change: impl FnOnce(&mut RunOptions)) -> Error {
+    let (robot, motion) = beam();
+    let mut options = RunOptions { modelling, ..RunOptions::default() };
+    change(&mut options);
+    robot.flexible(modelling).and_then(|arm| arm.simulate(&motion, &options)).map(drop).expect_err("it is refused")
+}
+
+#[test]
+fn a_number_that_makes_no_sense_is_a_value_with_what_is_expected() {
+    let error = refused(Modelling::default(), |options| options.step_s = 2.0);
+    assert!(
+        matches!(error, Error::Value(ValueError::StepBeyondMotion { step_s, duration_s }) if (step_s, duration_s) == (2.0, 1.0))
+    );
+    assert_eq!(error.to_string(), "the step (step_s 2 s) is longer than the motion (1 s)");
+    assert_eq!(error.fault(), Fault::Input);
+    let error = refused(Modelling::default(), |options| options.log_rate_hz = -1.0);
+    assert!(matches!(error, Error::Value(ValueError::LogRate(hz)) if hz == -1.0));
+    let error = refused(Modelling::default(), |options| options.magnification = Some(1e9));
+    assert!(
+        matches!(error, Error::Value(ValueError::MagnificationRange { found, most, .. }) if (found, most) == (1e9, 1e6))
+    );
+}
+
+#[test]
+fn an_unstable_step_tells_the_largest_stable_one_and_what_to_set() {
+    let error = refused(Modelling::default(), |options| (options.stepper, options.step_s) = (StepperKind::Rk4, 0.01));
+    assert_eq!(error.fault(), Fault::Input);
+    let Error::Step { source, partial: false } = error else { panic!("{error}") };
+    assert_eq!(source.settings(), [Setting::Step, Setting::Stepper]);
+    let StepError::UnstableStep { h, highest_hz, largest_s, .. } = source else { panic!("{source}") };
+    // The stability limit of RK4 on the imaginary axis, 2 sqrt(2), with room for damping.
+    assert!(h == 0.01 && largest_s < 2.9 / (std::f64::consts::TAU * highest_hz), "{h} {highest_hz} {largest_s}");
+}
+
+#[test]
+fn a_model_that_no_link_has_is_told_with_the_count_that_was_asked_for() {
+    let modal = Modelling { links: LinkModel::Modal, ..Modelling::default() };
+    let error = refused(Modelling { segments: Some(3), ..modal }, |_| {});
+    assert!(matches!(error, Error::Modelling(ModellingError::NoLumpedLink { segments: 3, .. })), "{error}");
+    assert!(error.to_string().ends_with(": add links lumped"), "{error}");
+    let spook = SpookSettings { form: ConstraintForm::Local, preset: SpookPreset::Exact };
+    let error = refused(modal, |options| options.stepper = StepperKind::Spook(spook));
+    assert!(matches!(error, Error::Step { source: StepError::ModalLinks, .. }), "{error}");
+    assert_eq!(error.fault(), Fault::Input);
+}
+
+#[test]
+fn poses_loads_and_responses_name_joint_frame_and_bound() {
+    let (robot, _) = beam();
+    let modelling = Modelling::default();
+    let joints = robot.rigid_model().unwrap().n_actuated();
+    let error = flexarm::modes(&robot, &modelling, Some(&vec![0.0; joints + 1]), 3).unwrap_err();
+    assert!(
+        matches!(&error, Error::Pose(PoseError::Count { found, joints: known }) if *found == joints + 1 && known.len() == joints)
+    );
+    let error = flexarm::modes(&robot, &modelling, Some(&vec![f64::NAN; joints]), 3).unwrap_err();
+    assert!(matches!(error, Error::Pose(PoseError::NotFinite { value, .. }) if value.is_nan()));
+    let error = AppliedLoad::sampled("tcp", &[0.0, 0.0], &[Wrench::zeros(), Wrench::zeros()]).err().unwrap();
+    assert!(matches!(error, Error::Load(LoadError::Samples { times: 2, wrenches: 2 })));
+    let request = ResponseRequest { points: 1, ..ResponseRequest::default() };
+    let error = flexarm::response(&robot, &modelling, None, &request, None).unwrap_err();
+    assert!(matches!(error, Error::Value(ValueError::Points { found: 1, least: 2, most: 100_000 })), "{error}");
+    assert_eq!(error.to_string(), "points must lie between 2 and 100000, found 1");
+}
+
+#[test]
+fn what_the_link_maker_finds_has_one_place_beside_what_the_rest_finds() {
+    let options = ReduceOptions::default();
+    let refused = |job: &ReduceJob| reduce(job, &options, None, &mut |_| {}).unwrap_err();
+    // Files are files, whoever looks for them.
+    let error = Error::from(ReduceJob::load(Path::new("no_such_mesh.msh")).unwrap_err());
+    assert!(matches!(&error, Error::File { path, .. } if path == Path::new("no_such_mesh.msh")), "{error}");
+    // A number of a job is the link maker's own.
+    let mesh = root().join("crates/links/flexarm-fe-io/tests/data/three_blocks_v41_ascii.msh");
+    let error = refused(&ReduceJob { modes: Some(2000), ..ReduceJob::for_mesh(&mesh) });
+    assert!(
+        matches!(error, Error::Link(LinkError::Job(JobError::TooManyModes { found: 2000, most: 1000 }))),
+        "{error}"
+    );
+    assert_eq!(error.to_string(), "modes 2000: at most 1000 can be kept");
+    // The robot of a job is read by the facade.
+    let urdf =
+        UrdfEntry { file: root().join("robots/kr210/no_such.urdf"), link: "link_2".into(), ..UrdfEntry::default() };
+    let error = refused(&ReduceJob { urdf: Some(urdf), ..ReduceJob::for_mesh(&mesh) });
+    assert!(matches!(error, Error::Urdf(_)), "{error}");
+    assert_eq!(error.fault(), Fault::Input);
+}

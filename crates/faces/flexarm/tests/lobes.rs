@@ -1,0 +1,400 @@
+//! Chatter of a tool on an arm: classical cases through the facade, an independent solution at three poses, runs that chatter.
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stderr,
+    reason = "a failed unwrap fails the test; measured numbers are shown with --nocapture"
+)]
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use flexarm::lobes::{CutRequest, CuttingPlace, CuttingTool, Lobes, LobesRequest, cut, lobes, rounded_down};
+use flexarm::{DriveModel, Error, LinkModel, Modelling, Motion, Robot};
+use serde_json::Value;
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).unwrap().to_owned()
+}
+
+fn golden(name: &str) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(root().join("tests/golden").join(name)).unwrap()).unwrap()
+}
+
+fn kr210() -> Robot {
+    Robot::load(root().join("robots/kr210")).unwrap()
+}
+
+fn shipped(tool: &str) -> CuttingTool {
+    CuttingTool::load(root().join("robots/tools").join(format!("{tool}.toml"))).unwrap()
+}
+
+/// A folder of its own, gone when dropped.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("flexarm-lobes-{name}-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&path);
+        std::fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    fn tool(&self, text: &str) -> Result<CuttingTool, Error> {
+        let path = self.0.join("tool.toml");
+        std::fs::write(&path, text).unwrap();
+        CuttingTool::load(path)
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+fn rigid() -> Modelling {
+    Modelling { links: LinkModel::Rigid, drives: DriveModel::Rigid, ..Modelling::default() }
+}
+
+fn at(robot: &Robot, tool: &CuttingTool, pose: &[f64], request: &LobesRequest) -> Lobes {
+    lobes(robot, tool, &CuttingPlace::At(Some(pose)), request, &|_, _| true).unwrap()
+}
+
+/// The tool of a classical case: its modes along the feed (x of the TCP) and across it. The axis of the cut is the tool's, turned: y of
+/// the cut is `z × x` with z from the tip to the spindle, so minus y of the TCP.
+fn classical(case: &Value) -> String {
+    let number = |key: &str| case[key].as_f64().unwrap();
+    let mut text = format!(
+        "format = 1\nlengths = \"mm\"\nangles = \"deg\"\npressures = \"N/mm2\"\ndeepest = {}\n[cutter]\nteeth = {}\ndiameter = 20.0\n\
+         coefficients = {{ tangential = {}, radial = {} }}\n[engagement]\nkind = \"angles\"\nentry = {}\nexit = {}\n[tool]\nfeed = [1.0, 0.0, 0.0]\n",
+        1e3 * number("searched_to_m"),
+        case["teeth"],
+        1e-6 * number("Kt_Pa"),
+        1e-6 * number("Kn_Pa"),
+        number("entry_rad").to_degrees(),
+        number("exit_rad").to_degrees()
+    );
+    let rpm: Vec<String> = case["rows"].as_array().unwrap().iter().step_by(5).map(|r| r[0].to_string()).collect();
+    let _ = writeln!(text, "[spindle]\nrpm = [{}]", rpm.join(", "));
+    for mode in case["modes"].as_array().unwrap() {
+        let direction = if mode["axis"] == "x" { "[1.0, 0.0, 0.0]" } else { "[0.0, -1.0, 0.0]" };
+        let _ = writeln!(
+            text,
+            "[[mode]]\ndirection = {direction}\nfrequency = {}\ndamping = {}\nmass = {}",
+            mode["frequency_Hz"], mode["damping_ratio"], mode["mass_kg"]
+        );
+    }
+    text
+}
+
+/// Truth: limits of another program (0.2 %). The arm is rigid, the tool is the structure: units, axes and files are on the way.
+#[test]
+fn a_tool_on_a_rigid_arm_has_the_limits_of_the_classical_cases() {
+    let (robot, folder) = (kr210(), Folder::new("classical"));
+    let request = LobesRequest { modelling: rigid(), ..LobesRequest::default() };
+    let mut worst: f64 = 0.0;
+    for (name, case) in golden("milling_lobes.json")["cases"].as_object().unwrap() {
+        let tool = folder.tool(&classical(case)).unwrap();
+        let found = at(&robot, &tool, &[0.1, -1.0, 1.5, 0.3, 0.7, 0.2], &request);
+        for (point, row) in found.points.iter().zip(case["rows"].as_array().unwrap().iter().step_by(5)) {
+            assert_eq!(point.spindle_rpm, row[0].as_f64().unwrap());
+            assert_eq!(point.depth_m.is_some(), row[1].is_number(), "{name} at {}", point.spindle_rpm);
+            if let Some(depth) = point.depth_m {
+                worst = worst.max((depth / row[1].as_f64().unwrap() - 1.0).abs());
+                assert_eq!(point.kind.unwrap(), row[2]);
+            }
+        }
+    }
+    eprintln!("largest difference {:.3} %", 100.0 * worst);
+    // measured 0.10 %
+    assert!(worst < 0.005, "{worst}");
+}
+
+/// Truth: the multi-frequency solution of the exported frequency response, by a script that knows no modes and no steps.
+#[test]
+fn limits_follow_the_pose_as_the_exported_response_says() {
+    let (robot, golden) = (kr210(), golden("kr210_lobes.json"));
+    let mut worst: f64 = 0.0;
+    for case in golden["cases"].as_array().unwrap() {
+        let pose: Vec<f64> = case["at"].as_array().unwrap().iter().map(|q| q.as_f64().unwrap()).collect();
+        let rows = case["rows"].as_array().unwrap();
+        let rpm = rows.iter().map(|r| r[0].as_f64().unwrap()).collect();
+        let tool = shipped(case["tool"].as_str().unwrap()).at_speeds(rpm);
+        let found = at(&robot, &tool, &pose, &LobesRequest::default());
+        for (point, row) in found.points.iter().zip(rows) {
+            let (depth, truth) = (point.depth_m.unwrap(), row[1].as_f64().unwrap());
+            eprintln!(
+                "{:.0} 1/min: {:.4} mm, {:.4} mm, {:.1} Hz",
+                point.spindle_rpm,
+                1e3 * depth,
+                1e3 * truth,
+                point.chatter_hz.unwrap()
+            );
+            worst = worst.max((depth / truth - 1.0).abs());
+        }
+    }
+    eprintln!("largest difference {worst:.1e}");
+    // measured 2.8e-5: to 9e-5 the truth had settled
+    assert!(worst < 3e-4, "{worst:.1e}");
+}
+
+/// A measured response of a mode, finely sampled, is that mode: the same zero-order limits; and it says that it has no others.
+#[test]
+fn a_measured_response_gives_the_zero_order_limits_of_its_mode() {
+    let (robot, folder) = (kr210(), Folder::new("measured"));
+    let head = "format = 1\nlengths = \"mm\"\nangles = \"deg\"\npressures = \"N/mm2\"\ndeepest = 30.0\n[cutter]\nteeth = 3\ndiameter = 20.0\nhelix = 30.0\n\
+                coefficients = { tangential = 800.0, radial = 250.0 }\n[engagement]\nkind = \"down\"\nae = 5.0\n[spindle]\nrpm = [3000, 6000, 9000, 12000]\n";
+    let modal =
+        format!("{head}[[mode]]\ndirection = \"radial\"\nfrequency = 1200.0\ndamping = 0.03\nstiffness = 1.5e7\n");
+    let mut csv = String::from("frequency_hz,xx_re,xx_im,yy_re,yy_im\n");
+    for k in 1..8000 {
+        let hz = 0.5 * f64::from(k);
+        let r = hz / 1200.0;
+        let (re, im) = (1.5e7 * (1.0 - r * r), 1.5e7 * 0.06 * r);
+        let g = [re / (re * re + im * im), -im / (re * re + im * im)];
+        let _ = writeln!(csv, "{hz},{},{},{},{}", g[0], g[1], g[0], g[1]);
+    }
+    std::fs::write(folder.0.join("frf.csv"), csv).unwrap();
+    let measured = format!("{head}[measured]\nfile = \"frf.csv\"\n");
+    let pose = [0.0, -1.0, 1.6, 0.0, 0.9, 0.0];
+    let zero_order = LobesRequest { zero_order: true, ..LobesRequest::default() };
+    let modal = at(&robot, &folder.tool(&modal).unwrap(), &pose, &zero_order);
+    let measured = folder.tool(&measured).unwrap();
+    let found = at(&robot, &measured, &pose, &LobesRequest::default());
+    assert_eq!(found.method, "zero-order");
+    assert!(found.caveats.iter().any(|c| c.code == "zero-order"), "{:?}", found.warnings);
+    let mut worst: f64 = 0.0;
+    for (a, b) in modal.points.iter().zip(&found.points) {
+        worst = worst.max((a.depth_m.unwrap() / b.depth_m.unwrap() - 1.0).abs());
+    }
+    eprintln!("largest difference {worst:.1e}");
+    // measured 8e-6: linear between samples of 0.5 Hz
+    assert!(worst < 1e-3, "{worst:.1e}");
+    let ranges = LobesRequest { ranges: true, ..LobesRequest::default() };
+    let refused = lobes(&robot, &measured, &CuttingPlace::At(Some(&pose)), &ranges, &|_, _| true).unwrap_err();
+    assert!(refused.to_string().contains("zero-order"), "{refused}");
+}
+
+/// Identity: the limit along a motion is the smallest of those at its places, each with its feed along the motion.
+#[test]
+fn along_a_motion_the_limit_is_the_smallest_of_its_places() {
+    let robot = kr210();
+    let motion = Motion::load(root().join("trajectories/milling_square.toml"), &robot).unwrap();
+    let folder = Folder::new("along");
+    let text = std::fs::read_to_string(root().join("robots/tools/face_mill_63mm.toml")).unwrap();
+    assert!(!text.contains("\nfeed = "), "the tool says no feed: it is along the motion");
+    let tool = folder.tool(&text).unwrap().at_speeds(vec![2000.0, 5000.0]);
+    let request = LobesRequest::default();
+    let found = lobes(&robot, &tool, &CuttingPlace::Along(&motion, 8), &request, &|_, _| true).unwrap();
+    assert!(found.poses.len() >= 4 && found.poses.len() + found.left_out == 8, "{}", found.poses.len());
+    for (k, point) in found.points.iter().enumerate() {
+        let smallest = found.poses.iter().filter_map(|p| p.depth_m[k]).fold(f64::INFINITY, f64::min);
+        assert_eq!(point.depth_m, Some(smallest));
+        assert_eq!(found.poses[point.pose].depth_m[k], Some(smallest));
+    }
+    // The square's sides go along x and y of the world.
+    for pose in &found.poses {
+        let largest = pose.feed.iter().fold(0.0_f64, |top, x| top.max(x.abs()));
+        assert!(largest > 0.99 || pose.feed[2].abs() < 0.02, "{:?}", pose.feed);
+    }
+    // The same at one of its places, with that feed given.
+    let pose = &found.poses[0];
+    let [x, y, z] = pose.feed;
+    let given = text.replace("[tool]\n", &format!("[tool]\nfeed = [{x}, {y}, {z}]\nfeed_axes = \"world\"\n"));
+    let given = folder.tool(&given).unwrap().at_speeds(vec![2000.0, 5000.0]);
+    let one = at(&robot, &given, &pose.at, &request);
+    for (k, point) in one.points.iter().enumerate() {
+        let difference = (point.depth_m.unwrap() / pose.depth_m[k].unwrap() - 1.0).abs();
+        assert!(difference < 1e-6, "{difference:.1e}");
+    }
+}
+
+/// The arm as it moves, not linearised, with teeth that leave the work: chatters above the limit, at its frequency, and not below.
+#[test]
+fn a_cut_chatters_above_the_limit_and_not_below() {
+    let robot = kr210();
+    let pose = [0.0, -1.0, 1.6, 0.0, 0.9, 0.0];
+    // At the first speed the arm itself chatters, at the second the tool on it.
+    for (rpm, chatter_below_hz) in [(1500.0, 60.0), (4000.0, 2000.0)] {
+        let tool = shipped("face_mill_63mm");
+        let request = LobesRequest::default();
+        let limit = at(&robot, &tool.clone().at_speeds(vec![rpm]), &pose, &request).points[0].clone();
+        let depth = limit.depth_m.unwrap();
+        assert!(limit.chatter_hz.unwrap() < chatter_below_hz);
+        let follow = |factor: f64| {
+            let request = CutRequest {
+                modelling: Modelling::default(),
+                spindle_rpm: rpm,
+                depth_m: factor * depth,
+                seconds: None,
+                steps: 60,
+                output: None,
+                overwrite: false,
+            };
+            cut(&robot, &tool, Some(&pose), &request).unwrap()
+        };
+        let (below, above) = (follow(0.8), follow(1.2));
+        for run in [&below, &above] {
+            eprintln!(
+                "{rpm} 1/min, {:.3} mm of {:.3}: multiplier {:.5}, {} in {:.1} s, scatter {:.2e} m, {:?} Hz (limit {:.1} Hz)",
+                1e3 * run.depth_m,
+                1e3 * depth,
+                run.multiplier,
+                if run.chatters { "chatters" } else { "quiet" },
+                run.seconds,
+                run.scatter_m,
+                run.swing_hz,
+                limit.chatter_hz.unwrap()
+            );
+        }
+        assert!(!below.chatters && below.multiplier < 1.0);
+        assert!(above.chatters && above.multiplier > 1.0);
+        assert!(above.scatter_m > 20.0 * below.scatter_m);
+    }
+}
+
+/// What people get wrong, with the place and how to mend it.
+#[test]
+fn a_wrong_tool_is_told_with_its_place() {
+    let folder = Folder::new("wrong");
+    let good = std::fs::read_to_string(root().join("robots/tools/endmill_20mm.toml")).unwrap();
+    folder.tool(&good).unwrap();
+    let cases = [
+        ("format = 1\n", "format = 2\n", "this program reads format 1"),
+        ("pressures = \"N/mm2\"", "pressures = \"bar\"", "use one of"),
+        ("pressures = \"N/mm2\"", "pressures = \"N/m2\"", "is the unit right"),
+        ("teeth = 3", "teeth = 0", "expected 1 to 1000"),
+        ("diameter = 20.0", "diameter = -20.0", "expected a positive number"),
+        ("helix = 30.0", "helix = 95.0", "expected 0 to 80"),
+        ("kind = \"down\"", "kind = \"sideways\"", "use \"up\", \"down\""),
+        ("ae = 5.0", "ae = 25.0", "above 0 to 1"),
+        ("ae = 5.0", "ap = 5.0", "unknown field"),
+        ("from = 2000.0", "from = 20000.0", "expected a range"),
+        ("axis = [0.0, 0.0, 1.0]", "axis = [0.0, 0.0, 0.0]", "not all zero"),
+        ("direction = \"radial\"", "direction = \"sideways\"", "use \"radial\""),
+        ("stiffness = 1.5e7", "stiffness = 1.5e7\nmass = 2.0", "not both"),
+        ("damping = 0.03", "damping = 0.0", "expected a positive number"),
+        ("[[mode]]", "[measured]\nfile = \"none.csv\"\n[[mode]]", "not both"),
+    ];
+    for (old, new, words) in cases {
+        assert!(good.contains(old), "{old}");
+        let error = folder.tool(&good.replace(old, new)).map(|_| ()).unwrap_err().to_string();
+        assert!(error.contains(words) && error.contains("tool.toml:"), "{new}: {error}");
+    }
+    let robot = kr210();
+    let fails = |text: &str, modelling: Modelling| {
+        let request = LobesRequest { modelling, ..LobesRequest::default() };
+        lobes(&robot, &folder.tool(text).unwrap(), &CuttingPlace::At(None), &request, &|_, _| true)
+            .unwrap_err()
+            .to_string()
+    };
+    let along = good.replace("feed = [1.0, 0.0, 0.0]", "feed = [0.0, 0.0, 1.0]");
+    assert!(fails(&along, Modelling::default()).contains("along the tool's axis"));
+    let bare = &good[..good.find("[[mode]]").unwrap()];
+    assert!(fails(bare, rigid()).contains("nothing yields"));
+    let stopped = lobes(
+        &robot,
+        &folder.tool(&good).unwrap(),
+        &CuttingPlace::At(None),
+        &LobesRequest { zero_order: true, ..LobesRequest::default() },
+        &|_, _| false,
+    );
+    assert!(matches!(stopped, Err(Error::Interrupted { .. })));
+}
+
+/// Files are whole, read back, and not overwritten unless asked.
+#[test]
+fn table_diagram_page_and_figures_are_written_together() {
+    let (robot, folder) = (kr210(), Folder::new("files"));
+    let tool = shipped("endmill_20mm").at_speeds((6..14).map(|k| 1000.0 * f64::from(k)).collect());
+    let request = LobesRequest { zero_order: true, output: Some(folder.0.join("out")), ..LobesRequest::default() };
+    let found = at(&robot, &tool, &[0.0, -1.0, 1.6, 0.0, 0.9, 0.0], &request);
+    let csv = std::fs::read_to_string(found.file.as_ref().unwrap()).unwrap();
+    let depth: f64 = csv.lines().nth(3).unwrap().split(',').nth(1).unwrap().parse().unwrap();
+    assert_eq!(Some(depth), found.points[2].depth_m);
+    let json: Value =
+        serde_json::from_str(&std::fs::read_to_string(found.files.json.as_ref().unwrap()).unwrap()).unwrap();
+    assert_eq!(json["points"][2]["depth_m"].as_f64(), found.points[2].depth_m);
+    assert!(std::fs::read_to_string(found.files.plot.as_ref().unwrap()).unwrap().contains("depth of cut"));
+    assert!(std::fs::read_to_string(found.files.page.as_ref().unwrap()).unwrap().contains("<svg"));
+    let place = CuttingPlace::At(None);
+    assert!(matches!(lobes(&robot, &tool, &place, &request, &|_, _| true), Err(Error::Taken { .. })));
+}
+
+/// Truth: the same direction in other axes. The tool's axis at the pose is known from a run with the axes of the TCP.
+#[test]
+fn a_tool_axis_in_world_axes_is_the_same_axis() {
+    let (robot, folder) = (kr210(), Folder::new("axis"));
+    let pose = [0.2, -1.0, 1.6, 0.4, 0.9, -0.3];
+    let text = std::fs::read_to_string(root().join("robots/tools/face_mill_63mm.toml")).unwrap();
+    let request = LobesRequest { zero_order: true, ..LobesRequest::default() };
+    let own = folder.tool(&text).unwrap().at_speeds(vec![2000.0, 5000.0]);
+    let found = at(&robot, &own, &pose, &request);
+    let ([x, y, z], [fx, fy, fz]) = (found.poses[0].axis, found.poses[0].feed);
+    let lines = text
+        .lines()
+        .filter(|line| !line.starts_with("axis") && !line.starts_with("feed =") && !line.starts_with("feed_axes"));
+    let world = lines.collect::<Vec<_>>().join("\n").replace(
+        "[tool]",
+        &format!(
+            "[tool]\naxis = [{x}, {y}, {z}]\naxis_axes = \"world\"\nfeed = [{fx}, {fy}, {fz}]\nfeed_axes = \"world\"\n#"
+        ),
+    );
+    let world = folder.tool(&world).unwrap().at_speeds(vec![2000.0, 5000.0]);
+    for (a, b) in at(&robot, &world, &pose, &request).points.iter().zip(&found.points) {
+        let (a, b) = (a.depth_m.unwrap(), b.depth_m.unwrap());
+        assert!((a / b - 1.0).abs() < 1e-9, "{a} {b}");
+    }
+    let alone = folder.tool(&text.replace("axis = [0.0, 0.0, 1.0]", "axis_axes = \"world\"")).map(|_| ());
+    let error = alone.unwrap_err().to_string();
+    assert!(error.contains("axis_axes") && error.contains("tool.toml:"), "{error}");
+}
+
+#[test]
+fn what_no_tool_has_is_refused_and_what_few_have_is_told_with_its_slip() {
+    let folder = Folder::new("slips");
+    let good = std::fs::read_to_string(root().join("robots/tools/endmill_20mm.toml")).unwrap();
+    for (old, new, words) in [
+        ("damping = 0.03", "damping = 30000.0", "damping is 30000"),
+        ("damping = 0.03", "damping = nan", "finite"),
+        ("stiffness = 1.5e7", "stiffness = 1e300", "stiffness is 1e300"),
+        ("frequency = 1200.0", "frequency = 1e-300", "frequency is"),
+        ("frequency = 1200.0", "frequency = 1e12", "frequency is"),
+        ("diameter = 20.0", "diameter = 20000.0", "diameter is 20 m"),
+        ("deepest = 20.0", "deepest = 1e40", "deepest is"),
+        ("to = 18000.0", "to = 1e12", "to is 1e12 1/min"),
+        ("feed_per_tooth = 0.1", "feed_per_tooth = 1e40", "feed_per_tooth is"),
+    ] {
+        assert!(good.contains(old), "{old}");
+        let error = folder.tool(&good.replace(old, new)).map(|_| ()).unwrap_err().to_string();
+        assert!(error.contains(words) && error.contains("tool.toml:"), "{new}: {error}");
+    }
+    let rigid = LobesRequest { modelling: rigid(), zero_order: true, ..LobesRequest::default() };
+    for (old, new, code, slip) in [
+        ("damping = 0.03", "damping = 3.0", "tool-damping", "per cent"),
+        ("stiffness = 1.5e7", "stiffness = 15.0", "tool-stiffness", "N/um"),
+        ("frequency = 1200.0", "frequency = 1.2", "tool-frequency", "kHz"),
+        ("diameter = 20.0", "diameter = 600.0", "tool-diameter", ""),
+    ] {
+        let tool = folder.tool(&good.replace(old, new)).unwrap().at_speeds(vec![6000.0]);
+        let found = at(&kr210(), &tool, &[0.0, -1.0, 1.6, 0.0, 0.9, 0.0], &rigid);
+        let caveat = found.caveats.iter().find(|caveat| caveat.code == code).unwrap();
+        assert!(caveat.likely.contains(slip) && caveat.value.is_some(), "{caveat:?}");
+        assert!(found.warnings.contains(&caveat.message));
+    }
+    let usual =
+        at(&kr210(), &folder.tool(&good).unwrap().at_speeds(vec![6000.0]), &[0.0, -1.0, 1.6, 0.0, 0.9, 0.0], &rigid);
+    assert!(!usual.caveats.iter().any(|caveat| caveat.code.starts_with("tool-")), "{:?}", usual.caveats);
+}
+
+#[test]
+fn a_limit_for_people_is_never_above_the_limit() {
+    assert_eq!(rounded_down(0.02974, 3), "0.029");
+    assert_eq!(rounded_down(2.0, 3), "2.000");
+    assert_eq!(rounded_down(0.000_297, 3), "0.00029");
+    for k in 1..20_000 {
+        let x = 1.7e-5 * f64::from(k);
+        let shown: f64 = rounded_down(x, 3).parse().unwrap();
+        assert!(shown <= x && x - shown < 1.001e-3 && shown > 0.9 * x, "{x} {shown}");
+    }
+}

@@ -1,0 +1,50 @@
+//! What must not allocate, counted. A test program of its own: the counter sees every thread.
+#![allow(unsafe_code, reason = "an allocator is unsafe by its trait")]
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use flexarm::{LinkModel, Modelling, Robot, Wrench};
+
+struct Counting;
+
+static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
+
+// SAFETY: all calls go to the system's allocator as they are.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+#[test]
+fn poses_after_the_first_do_not_allocate() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..");
+    let robot = Robot::load(root.join("robots/kr210")).unwrap();
+    for links in [LinkModel::Lumped, LinkModel::Modal] {
+        let arm = robot.flexible(Modelling { links, ..Modelling::default() }).unwrap();
+        let mut at = arm.operating_point().unwrap();
+        let mut sum = 0.0;
+        let mut visit = |k: u32| {
+            let a = 0.1 * f64::from(k);
+            let load = Wrench::new([0.0, 10.0 * a, -50.0].into(), [a, 0.0, 0.0].into());
+            at.solve(&[a, -1.0 - 0.1 * a, 1.0 + 0.1 * a, 0.0, 0.5, a], &load).unwrap();
+            sum +=
+                at.compliance()[(2, 2)] + at.frequencies_hz()[0] + at.jacobian()[(0, 0)] + at.tcp_pose().translation.x;
+        };
+        visit(0);
+        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        (1..10).for_each(&mut visit);
+        assert_eq!(ALLOCATIONS.load(Ordering::Relaxed) - before, 0, "{links:?}");
+        assert!(sum.is_finite());
+    }
+}

@@ -1,0 +1,99 @@
+//! A quick subset of the case studies: every claim holds, and the same command gives the same bytes.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use flexarm_verify::bench::Bench;
+use flexarm_verify::{Verification, case_names, verify};
+
+fn bench() -> Bench {
+    Bench { root: Path::new(env!("CARGO_MANIFEST_DIR")).join("../../.."), quick: true }
+}
+
+fn quick(names: &[&str]) -> Verification {
+    let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
+    verify(&bench(), &names, &mut |_, _| ControlFlow::Continue(())).expect("the checkout has what the cases need")
+}
+
+/// Truths: those of the claims themselves (closed forms, CalculiX, NGSolve, Pinocchio, the stepper with error control).
+#[test]
+fn every_claim_of_the_quick_cases_holds() {
+    let found = quick(&[]);
+    let broken: Vec<String> = found
+        .cases
+        .iter()
+        .flat_map(|case| case.claims())
+        .filter(|claim| !claim.holds)
+        .map(|claim| format!("{}: {} {}", claim.text, claim.found(), claim.limit()))
+        .collect();
+    assert!(found.passed && broken.is_empty(), "{broken:#?}");
+    // Nothing was left out whole.
+    assert_eq!(found.cases.len(), case_names().len());
+    assert!(found.cases.iter().all(|case| case.claims().count() >= 3));
+}
+
+#[test]
+fn the_same_case_gives_the_same_bytes() {
+    let [a, b] = [(); 2].map(|()| quick(&["one-beam"]));
+    assert_eq!(a.page(), b.page());
+    assert_eq!(a.json(), b.json());
+    assert_eq!(a.pictures().expect("drawn"), b.pictures().expect("drawn"));
+}
+
+/// A stiffness that is wrong by 1e-5 must not pass: the claims can fail.
+#[test]
+fn a_link_that_is_slightly_wrong_breaks_claims() {
+    let folder = std::env::temp_dir().join(format!("flexarm-verify-{}", std::process::id()));
+    copy(&bench().root.join("robots/one_beam"), &folder.join("robots/one_beam"));
+    copy(&bench().root.join("tests/verification"), &folder.join("tests/verification"));
+    let file = folder.join("robots/one_beam/robot.toml");
+    let text = std::fs::read_to_string(&file).expect("copied");
+    assert!(text.contains("height = 0.04,"));
+    std::fs::write(&file, text.replace("height = 0.04,", "height = 0.0400002,")).expect("written");
+    let wrong = Bench { root: folder.clone(), quick: true };
+    let found = verify(&wrong, &["one-beam".to_owned()], &mut |_, _| ControlFlow::Continue(())).expect("runs");
+    let broken = found.cases[0].claims().filter(|claim| !claim.holds && claim.text.starts_with("end loads")).count();
+    assert!(!found.passed && broken >= 5, "{broken} claims broke");
+    std::fs::remove_dir_all(&folder).expect("removed");
+}
+
+fn copy(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).expect("made");
+    for entry in std::fs::read_dir(from).expect("there") {
+        let path = entry.expect("readable").path();
+        let target = to.join(path.file_name().expect("named"));
+        if path.is_dir() {
+            copy(&path, &target);
+        } else {
+            std::fs::copy(&path, &target).expect("copied");
+        }
+    }
+}
+
+/// Shares grow from 0 to at most 1, and a break ends the run.
+#[test]
+fn a_run_tells_how_far_it_is_and_can_be_stopped() {
+    let mut shares: Vec<(f64, String)> = Vec::new();
+    let found = verify(&bench(), &["one-beam".into(), "manipulator".into()], &mut |share, name| {
+        shares.push((share, name.to_owned()));
+        ControlFlow::Continue(())
+    });
+    assert!(found.expect("runs").passed);
+    assert!(shares.windows(2).all(|pair| pair[0].0 <= pair[1].0 + 1e-12) && shares[0].0 == 0.0);
+    let last = &shares[shares.len() - 2];
+    assert!(last.1 == "manipulator" && (0.5..=1.0).contains(&last.0), "{last:?}");
+    let stopped = verify(&bench(), &["manipulator".into()], &mut |share, _| {
+        if share > 0.01 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    assert!(matches!(stopped, Err(flexarm_verify::Error::Library(flexarm::Error::Interrupted { .. }))));
+}
+
+#[test]
+fn unknown_cases_and_missing_files_are_named() {
+    let mut go = |_: f64, _: &str| ControlFlow::Continue(());
+    let error = verify(&bench(), &["no-beam".to_owned()], &mut go).expect_err("unknown").to_string();
+    assert!(error.contains("no-beam") && error.contains("one-beam") && error.contains("manipulator"), "{error}");
+    let nowhere = Bench { root: "/nowhere".into(), quick: true };
+    let error = verify(&nowhere, &["one-beam".to_owned()], &mut go).expect_err("missing").to_string();
+    assert!(error.contains("/nowhere/robots/one_beam/robot.toml"), "{error}");
+}

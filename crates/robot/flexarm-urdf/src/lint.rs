@@ -1,0 +1,614 @@
+//! Finds what is wrong or doubtful in the tree of a URDF, and writes the text that `urdf_rs` reads.
+//!
+//! Start at [`lint`]. The values of a robot come from `urdf_rs`. It drops words of a vector that are
+//! no numbers, takes a missing `<inertial>` for zeros, stops at the first fault and knows no lines.
+//! The lint reports such faults with their places. It then writes a [`Plain`] text with the elements
+//! and attributes that a mechanism needs, as they stand in the file, without prefixes and with the
+//! first of each element that may stand once. This has three reasons:
+//!
+//! * The parsers of `urdf_rs` recurse, and overflow the stack in a file of 100,000 nested elements.
+//!   The plain text is five elements deep and has at most [`MOST_ELEMENTS`] links and joints,
+//!   whatever the file holds.
+//! * All faults come at once: zeros stand for what is missing or wrong, and `urdf_rs` reads on.
+//! * `urdf_rs` refuses robots that are in use: a `<limit>` without velocity, an `<axis>` without
+//!   `xyz`, a `<material>` without name, a `<color>` without `rgba`, an unknown shape, a second
+//!   `<origin>`, an `<inertial>` between visuals, a `<safety_controller>` without `k_velocity`. The
+//!   plain text has the default or leaves the element out. A `<collision>` with a fault is left out.
+//!
+//! The model takes four things from the tree, for which `urdf_rs::Robot` has no place: where an
+//! element stands and whether it is there ([`Mark`]), the transmissions, the version (a bound that
+//! URDF 1.2 leaves open is written as infinite, as `urdf_rs` does itself), and `quat_xyzw`, which
+//! `urdf_rs` turns into angles that are wrong by up to 0.3 degrees near a pitch of 90.
+//!
+//! Not here: what follows from the values ([`crate::raw`] and beyond).
+
+use std::fmt::Write as _;
+
+use nalgebra::{Quaternion, UnitQuaternion};
+use roxmltree::Node;
+
+use crate::error::Problem;
+use crate::finding::Place;
+use crate::read::Transmission;
+use crate::report::Report;
+use crate::spelling::closest;
+use crate::xml::{Lines, escaped};
+
+/// Maximum number of links and joints of a robot: checks compare each with each.
+const MOST_ELEMENTS: usize = 4000;
+
+const JOINT_TYPES: [&str; 7] = ["fixed", "revolute", "continuous", "prismatic", "floating", "planar", "spherical"];
+/// Children of `<robot>`, `<link>` and `<joint>` that are URDF or a well-known extension.
+const ROBOT_CHILDREN: [&str; 12] = [
+    "link",
+    "joint",
+    "material",
+    "transmission",
+    "gazebo",
+    "ros2_control",
+    "sensor",
+    "gripper",
+    "mujoco",
+    "plugin",
+    "loop_joint",
+    "verbose",
+];
+const LINK_CHILDREN: [&str; 8] =
+    ["inertial", "visual", "collision", "contact", "self_collision_checking", "sensor", "gazebo", "material"];
+const JOINT_CHILDREN: [&str; 11] = [
+    "origin",
+    "parent",
+    "child",
+    "axis",
+    "limit",
+    "mimic",
+    "dynamics",
+    "calibration",
+    "safety_controller",
+    "physics",
+    "hardwareInterface",
+];
+
+/// The text for `urdf_rs`, and a mark for each of its links and joints, in the same order.
+pub(crate) struct Plain {
+    pub(crate) text: String,
+    pub(crate) place: Place,
+    pub(crate) links: Vec<LinkMarks>,
+    pub(crate) joints: Vec<JointMarks>,
+    pub(crate) transmissions: Vec<Transmission>,
+}
+
+/// An element that may have an `<origin>`, as the tree has it.
+pub(crate) struct Mark {
+    pub(crate) place: Place,
+    /// The rotation of `<origin>` where no `rpy` gives it: from a quaternion, or the identity
+    /// where there is no origin.
+    pub(crate) quaternion: Option<UnitQuaternion<f64>>,
+    /// Some part could not be read: no further checks.
+    pub(crate) faulty: bool,
+}
+
+/// Elements of a link in the tree; `None` stands for an element that is not there.
+pub(crate) struct LinkMarks {
+    pub(crate) place: Place,
+    pub(crate) inertial: Option<Mark>,
+    pub(crate) visuals: Vec<Mark>,
+    pub(crate) collisions: Vec<Mark>,
+}
+
+/// Elements of a joint in the tree; `None` stands for an element that is not there.
+pub(crate) struct JointMarks {
+    pub(crate) joint: Mark,
+    pub(crate) axis: Option<Place>,
+    pub(crate) limit: Option<Place>,
+    pub(crate) mimic: Option<Place>,
+}
+
+/// Kind of value of an attribute.
+#[derive(Clone, Copy)]
+enum Kind {
+    Text,
+    /// Text that is not empty.
+    Name,
+    /// So many finite numbers.
+    Numbers(usize),
+    /// A number that may be infinite.
+    Bound,
+}
+
+impl Kind {
+    /// Returns the numbers in a value, or `None` if the value is not of this kind.
+    fn numbers(self, value: &str) -> Option<Vec<f64>> {
+        let number = |word: &str| word.parse::<f64>().ok().filter(|x| x.is_finite());
+        match self {
+            Self::Text | Self::Name => Some(Vec::new()),
+            Self::Numbers(n) => {
+                value.split_whitespace().map(number).collect::<Option<Vec<f64>>>().filter(|v| v.len() == n)
+            }
+            Self::Bound => value.trim().parse().ok().filter(|x: &f64| !x.is_nan()).map(|x| vec![x]),
+        }
+    }
+
+    fn expected(self) -> &'static str {
+        match self {
+            Self::Text | Self::Name => "a name",
+            Self::Numbers(1) => "a finite number",
+            Self::Numbers(4) => "four numbers from 0 to 1",
+            Self::Numbers(_) => "three finite numbers",
+            Self::Bound => "a number",
+        }
+    }
+
+    /// Returns what stands for a value that is missing or wrong.
+    fn zero(self) -> &'static str {
+        match self {
+            Self::Text | Self::Name => "",
+            Self::Numbers(n) => &"0 0 0 0"[..2 * n - 1],
+            Self::Bound => "0",
+        }
+    }
+}
+
+/// Consequence of a missing attribute.
+#[derive(Clone, Copy)]
+enum Missing {
+    Fault,
+    LeftOut,
+    As(&'static str),
+}
+use Kind::{Bound, Name, Numbers, Text};
+use Missing::{As, Fault, LeftOut};
+
+type Attribute = (&'static str, Kind, Missing);
+
+/// Reports the faults of everything below `<robot>`. Returns `None` if the root is another element,
+/// or has too many links and joints.
+pub(crate) fn lint(root: Node<'_, '_>, lines: &Lines<'_>, report: &mut Report) -> Option<Plain> {
+    let place = lines.of(root);
+    if root.tag_name().name() != "robot" {
+        report.error(&place, Problem::NotUrdf { root: root.tag_name().name().to_owned() });
+        return None;
+    }
+    let found = elements(root).filter(|n| matches!(n.tag_name().name(), "link" | "joint")).count();
+    if found > MOST_ELEMENTS {
+        report.error(&place, Problem::TooManyElements { found, most: MOST_ELEMENTS });
+        return None;
+    }
+    let version = version(root);
+    let (quaternions, open_limits) = (version >= (1, 1), version >= (1, 2));
+    let lint = Lint { lines, report, quaternions, open_limits, owner: "the robot".to_owned(), text: String::new() };
+    Some(lint.robot(root, place))
+}
+
+/// The `version` attribute; URDF without one is 1.0.
+fn version(root: Node<'_, '_>) -> (u32, u32) {
+    root.attribute("version")
+        .and_then(|v| v.trim().split_once('.'))
+        .and_then(|(major, minor)| Some((major.parse().ok()?, minor.parse().ok()?)))
+        .unwrap_or((1, 0))
+}
+
+struct Lint<'a, 't> {
+    lines: &'a Lines<'t>,
+    report: &'a mut Report,
+    /// `quat_xyzw` counts (URDF 1.1 and later).
+    quaternions: bool,
+    /// Limits that are not written are infinite (URDF 1.2 and later), not zero.
+    open_limits: bool,
+    /// Name of the current robot, link or joint in messages.
+    owner: String,
+    /// The plain text.
+    text: String,
+}
+
+impl Lint<'_, '_> {
+    fn robot(mut self, root: Node<'_, '_>, place: Place) -> Plain {
+        let (mut links, mut joints, mut transmissions) = (Vec::new(), Vec::new(), Vec::new());
+        let name = root.attribute("name").unwrap_or("");
+        if name.is_empty() {
+            let message = "the robot has no name".to_owned();
+            self.report.warning(&place, "no-robot-name", message, "write <robot name=\"...\">");
+        }
+        self.start("robot", &[("name", name)]);
+        for node in elements(root) {
+            match node.tag_name().name() {
+                "link" => links.extend(self.link(node)),
+                "joint" => joints.extend(self.joint(node)),
+                "transmission" => transmissions.push(transmission(node)),
+                "material" => self.material(node),
+                _ => self.known_element(node, &ROBOT_CHILDREN),
+            }
+            self.owner.replace_range(.., "the robot");
+        }
+        self.end("robot");
+        Plain { text: self.text, place, links, joints, transmissions }
+    }
+
+    fn link(&mut self, node: Node<'_, '_>) -> Option<LinkMarks> {
+        let name = self.name(node)?;
+        self.start("link", &[("name", name)]);
+        let all = |name: &'static str| elements(node).filter(move |n| n.tag_name().name() == name);
+        // An element between visuals would make two lists of them, which `urdf_rs` refuses.
+        let inertial = all("inertial").next().map(|n| self.inertial(n));
+        if let Some(second) = all("inertial").nth(1) {
+            let message = format!("{} has a second <inertial>, which is ignored", self.owner);
+            self.report.warning(&self.lines.of(second), "second-inertial", message, "remove one of them");
+        }
+        let visuals = all("visual").filter_map(|n| self.shape(n)).collect();
+        let heard = std::mem::take(self.report);
+        let collisions = all("collision").filter_map(|n| self.shape(n)).collect();
+        *self.report = heard;
+        elements(node).for_each(|n| self.known_element(n, &LINK_CHILDREN));
+        self.end("link");
+        Some(LinkMarks { place: self.lines.of(node), inertial, visuals, collisions })
+    }
+
+    fn inertial(&mut self, node: Node<'_, '_>) -> Mark {
+        let faults = self.report.issues.len();
+        self.start("inertial", &[]);
+        let quaternion = self.origin(node);
+        self.child(node, "mass", true, &[("value", Numbers(1), Fault)]);
+        let moment = |name| (name, Numbers(1), Fault);
+        self.child(node, "inertia", true, &["ixx", "ixy", "ixz", "iyy", "iyz", "izz"].map(moment));
+        self.end("inertial");
+        Mark { place: self.lines.of(node), quaternion, faulty: self.report.issues.len() > faults }
+    }
+
+    /// Writes a `<visual>` or `<collision>`. Leaves out one that cannot be drawn, and a collision
+    /// with any fault.
+    fn shape(&mut self, node: Node<'_, '_>) -> Option<Mark> {
+        let (faults, start, tag) = (self.report.issues.len(), self.text.len(), node.tag_name().name());
+        let name = node.attribute("name").map(|name| ("name", name));
+        self.start(tag, name.as_slice());
+        let quaternion = self.origin(node);
+        let drawn = self.geometry(node);
+        if let Some(material) = named(node, "material") {
+            self.material(material);
+        }
+        self.end(tag);
+        let mark = Mark { place: self.lines.of(node), quaternion, faulty: self.report.issues.len() > faults };
+        if !drawn || (mark.faulty && tag == "collision") {
+            self.text.truncate(start);
+            return None;
+        }
+        Some(mark)
+    }
+
+    /// Writes `<geometry>`; returns whether it can be drawn.
+    fn geometry(&mut self, node: Node<'_, '_>) -> bool {
+        let Some(geometry) = self.needed(node, "geometry") else { return false };
+        let Some(shape) = elements(geometry).next() else {
+            let owner = format!("{}, <geometry>", self.owner);
+            self.report.error(&self.lines.of(geometry), Problem::MissingElement { owner, element: "mesh" });
+            return false;
+        };
+        let kind = shape.tag_name().name();
+        let attributes: &[Attribute] = match kind {
+            "mesh" => &[("filename", Text, Fault), ("scale", Numbers(3), LeftOut)],
+            "box" => &[("size", Numbers(3), Fault)],
+            "cylinder" => &[("radius", Numbers(1), Fault), ("length", Numbers(1), Fault)],
+            "sphere" => &[("radius", Numbers(1), Fault)],
+            _ => {
+                let message = format!("{}, <{kind}>: this shape is not drawn", self.owner);
+                let help = "shapes are mesh, box, cylinder and sphere";
+                self.report.warning(&self.lines.of(shape), "unknown-shape", message, help);
+                return false;
+            }
+        };
+        let faults = self.report.issues.len();
+        self.start("geometry", &[]);
+        let numbers = self.element(shape, &format!("{}, <{kind}>", self.owner), attributes);
+        self.end("geometry");
+        // The sign of a scale mirrors.
+        let extent = |x: &f64| if kind == "mesh" { x.abs() } else { *x };
+        if numbers.iter().any(|x| extent(x) <= 0.0) {
+            let message = format!("{}, <{kind}> has no extent and is not drawn", self.owner);
+            self.report.warning(&self.lines.of(shape), "empty-shape", message, "give positive dimensions in metres");
+            return false;
+        }
+        self.report.issues.len() == faults
+    }
+
+    fn material(&mut self, node: Node<'_, '_>) {
+        let (name, color) = (node.attribute("name"), named(node, "color").filter(|color| color.has_attribute("rgba")));
+        if name.is_none() && color.is_none() {
+            return;
+        }
+        self.start("material", &[("name", name.unwrap_or(""))]);
+        if color.is_some() {
+            self.child(node, "color", false, &[("rgba", Numbers(4), LeftOut)]);
+        }
+        self.end("material");
+    }
+
+    fn joint(&mut self, node: Node<'_, '_>) -> Option<JointMarks> {
+        let faults = self.report.issues.len();
+        let name = self.name(node)?;
+        elements(node).for_each(|n| self.known_element(n, &JOINT_CHILDREN));
+        let kind = self.joint_type(node, name);
+        self.start("joint", &[("name", name), ("type", kind)]);
+        self.child(node, "parent", true, &[("link", Name, Fault)]);
+        self.child(node, "child", true, &[("link", Name, Fault)]);
+        let quaternion = self.origin(node);
+        let axis = self.child(node, "axis", false, &[("xyz", Numbers(3), As("1 0 0"))]);
+        let (lower, upper) = if self.open_limits { ("-inf", "inf") } else { ("0", "0") };
+        let bound = |name, missing| (name, Bound, As(missing));
+        let limits = [bound("lower", lower), bound("upper", upper), bound("effort", "0"), bound("velocity", "0")];
+        let limit = self.child(node, "limit", false, &limits);
+        let factors = [("joint", Name, Fault), ("multiplier", Numbers(1), LeftOut), ("offset", Numbers(1), LeftOut)];
+        let mimic = self.child(node, "mimic", false, &factors);
+        let dynamics = [("damping", Numbers(1), LeftOut), ("friction", Numbers(1), LeftOut)];
+        self.child(node, "dynamics", false, &dynamics);
+        self.end("joint");
+        let faulty = self.report.issues.len() > faults;
+        let joint = Mark { place: self.lines.of(node), quaternion, faulty };
+        Some(JointMarks { joint, axis, limit, mimic })
+    }
+
+    /// Returns the type for `urdf_rs`. "floating" stands for all that are not supported.
+    fn joint_type<'n>(&mut self, node: Node<'n, '_>, name: &str) -> &'n str {
+        let owner = format!("{}, <joint>", self.owner);
+        let Some(found) = self.required(node, &owner, "type", Text) else { return "floating" };
+        let joint = name.to_owned();
+        let problem = match found {
+            "fixed" | "revolute" | "continuous" | "prismatic" => return found,
+            kind if JOINT_TYPES.contains(&kind) => Problem::UnsupportedJoint { joint, kind: kind.to_owned() },
+            _ => Problem::UnknownJointType { joint, found: found.to_owned(), closest: closest(found, JOINT_TYPES) },
+        };
+        self.report.error(&self.lines.of(node), problem);
+        "floating"
+    }
+
+    /// Writes `<origin>`; returns its rotation if no `rpy` gives it.
+    fn origin(&mut self, node: Node<'_, '_>) -> Option<UnitQuaternion<f64>> {
+        // Three angles of zero give a matrix with a negative zero; this is the identity.
+        let Some(origin) = named(node, "origin") else { return Some(UnitQuaternion::identity()) };
+        let place = self.lines.of(origin);
+        let owner = format!("{}, <origin>", self.outer(node));
+        if let Some(found) = origin.attribute("quat_xyzw").filter(|_| self.quaternions) {
+            self.element(origin, &owner, &[("xyz", Numbers(3), LeftOut)]);
+            let Some(q) = Numbers(4).numbers(found) else {
+                let (attribute, found, expected) = ("quat_xyzw", found.to_owned(), "four numbers");
+                self.report.error(&place, Problem::NotANumber { owner, attribute, found, expected });
+                return None;
+            };
+            let q = UnitQuaternion::try_new(Quaternion::new(q[3], q[0], q[1], q[2]), 1e-12);
+            return Some(q.unwrap_or_default());
+        }
+        self.element(origin, &owner, &[("xyz", Numbers(3), LeftOut), ("rpy", Numbers(3), LeftOut)]);
+        let rpy = origin.attribute("rpy").and_then(|rpy| Numbers(3).numbers(rpy)).unwrap_or_default();
+        let largest = rpy.iter().fold(0.0, |largest: f64, angle| largest.max(angle.abs()));
+        if largest > std::f64::consts::TAU + 1e-6 {
+            let message = format!("{owner}: an angle of {largest} rad is more than a turn (about 57 times: degrees?)");
+            self.report.warning(&place, "angle", message, "angles of a URDF are in rad");
+        }
+        None
+    }
+
+    /// Writes the first child of this name and returns its place. Writes one that must be there
+    /// with zeros if it is missing.
+    fn child(&mut self, node: Node<'_, '_>, name: &'static str, must: bool, attributes: &[Attribute]) -> Option<Place> {
+        let found = if must { self.needed(node, name) } else { named(node, name) };
+        if let Some(child) = found {
+            self.element(child, &format!("{}, <{name}>", self.owner), attributes);
+        } else if must {
+            let zeros: Vec<_> = attributes.iter().map(|(name, kind, _)| (*name, kind.zero())).collect();
+            self.start(name, &zeros);
+            self.end(name);
+        }
+        found.map(|child| self.lines.of(child))
+    }
+
+    /// Writes an element with these attributes. Returns the numbers that could be read.
+    fn element(&mut self, node: Node<'_, '_>, owner: &str, attributes: &[Attribute]) -> Vec<f64> {
+        let (mut all, mut written) = (Vec::new(), Vec::new());
+        for &(attribute, kind, missing) in attributes {
+            let found = match missing {
+                Fault => self.required(node, owner, attribute, kind),
+                LeftOut | As(_) => node.attribute(attribute),
+            };
+            let value = match (found, missing) {
+                (Some(found), _) => match kind.numbers(found) {
+                    Some(numbers) => {
+                        all.extend(numbers);
+                        found
+                    }
+                    None => {
+                        let (owner, found, expected) = (owner.to_owned(), found.to_owned(), kind.expected());
+                        let problem = Problem::NotANumber { owner, attribute, found, expected };
+                        self.report.error(&self.lines.of(node), problem);
+                        kind.zero()
+                    }
+                },
+                (None, LeftOut) => continue,
+                (None, As(value)) => value,
+                (None, Fault) => kind.zero(),
+            };
+            written.push((attribute, value));
+        }
+        self.start(node.tag_name().name(), &written);
+        self.end(node.tag_name().name());
+        all
+    }
+
+    fn start(&mut self, element: &str, attributes: &[(&str, &str)]) {
+        let _ = write!(self.text, "<{element}");
+        for (name, value) in attributes {
+            let _ = write!(self.text, " {name}=\"{}\"", escaped(value, true));
+        }
+        self.text.push('>');
+    }
+
+    fn end(&mut self, element: &str) {
+        let _ = write!(self.text, "</{element}>");
+    }
+
+    /// Returns the name of a link or joint, which later messages mention.
+    fn name<'n>(&mut self, node: Node<'n, '_>) -> Option<&'n str> {
+        let tag = node.tag_name().name();
+        let name = self.required(node, &format!("<{tag}>"), "name", Name)?;
+        self.owner = format!("{tag} {name:?}");
+        Some(name)
+    }
+
+    /// Returns how messages name the element around another one.
+    fn outer(&self, node: Node<'_, '_>) -> String {
+        match node.tag_name().name() {
+            "link" | "joint" => self.owner.clone(),
+            tag => format!("{}, <{tag}>", self.owner),
+        }
+    }
+
+    /// Returns a child element; reports a fault if it is missing.
+    fn needed<'n, 'i>(&mut self, node: Node<'n, 'i>, element: &'static str) -> Option<Node<'n, 'i>> {
+        let child = named(node, element);
+        if child.is_none() {
+            let owner = self.outer(node);
+            self.report.error(&self.lines.of(node), Problem::MissingElement { owner, element });
+        }
+        child
+    }
+
+    /// Returns an attribute; reports a fault if it is missing.
+    fn required<'n>(
+        &mut self,
+        node: Node<'n, '_>,
+        owner: &str,
+        attribute: &'static str,
+        kind: Kind,
+    ) -> Option<&'n str> {
+        let value = node.attribute(attribute).filter(|value| !matches!(kind, Name) || !value.trim().is_empty());
+        if value.is_none() {
+            let problem = Problem::MissingAttribute { owner: owner.to_owned(), attribute };
+            self.report.error(&self.lines.of(node), problem);
+        }
+        value
+    }
+
+    /// Warns of an element that is neither URDF nor a known extension: it is probably misspelt.
+    fn known_element(&mut self, node: Node<'_, '_>, known: &[&'static str]) {
+        let name = node.tag_name().name();
+        if node.tag_name().namespace().is_some() || known.contains(&name) {
+            return;
+        }
+        let help = match closest(name, known.iter().copied()) {
+            Some(meant) => format!("did you mean <{meant}>?"),
+            None => format!("remove it, or use one of {}", known.join(", ")),
+        };
+        let message = format!("{}: the element <{name}> is not URDF and is ignored", self.owner);
+        self.report.warning(&self.lines.of(node), "unknown-element", message, help);
+    }
+}
+
+fn transmission(node: Node<'_, '_>) -> Transmission {
+    let joints = elements(node).filter(|n| n.tag_name().name() == "joint");
+    let reduction = node.descendants().find(|n| n.tag_name().name() == "mechanicalReduction");
+    Transmission {
+        name: node.attribute("name").unwrap_or("").to_owned(),
+        joints: joints.filter_map(|j| j.attribute("name")).map(str::to_owned).collect(),
+        reduction: reduction.and_then(|r| r.text()).and_then(|t| t.trim().parse().ok()),
+    }
+}
+
+fn elements<'a, 'i>(node: Node<'a, 'i>) -> impl Iterator<Item = Node<'a, 'i>> {
+    node.children().filter(Node::is_element)
+}
+
+fn named<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Option<Node<'a, 'i>> {
+    elements(node).find(|n| n.tag_name().name() == name)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use roxmltree::Document;
+
+    use super::*;
+
+    fn plain(text: &str) -> (String, Report) {
+        let (document, mut report) = (Document::parse(text).unwrap(), Report::default());
+        let plain = lint(document.root_element(), &Lines::new(Path::new("r.urdf"), text), &mut report).unwrap();
+        (plain.text, report)
+    }
+
+    fn read(text: &str) -> Result<String, String> {
+        urdf_rs::read_from_string(text).map(|robot| format!("{robot:?}")).map_err(|e| e.to_string())
+    }
+
+    /// Truth: what `urdf_rs` makes of the file itself.
+    #[test]
+    fn nothing_that_urdf_rs_reads_is_lost() {
+        let robots = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../robots");
+        let folders = std::fs::read_dir(robots).unwrap().flatten();
+        let files = folders.flat_map(|folder| std::fs::read_dir(folder.path()).into_iter().flatten().flatten());
+        let paths = files.map(|file| file.path()).filter(|path| path.extension().is_some_and(|e| e == "urdf"));
+        let texts: Vec<String> = paths.map(|path| std::fs::read_to_string(path).unwrap()).collect();
+        assert!(texts.len() >= 10, "{}", texts.len());
+        for text in texts.iter().map(String::as_str).chain([WHOLE]) {
+            assert_eq!(read(&plain(text).0).unwrap(), read(text).unwrap());
+        }
+    }
+
+    const WHOLE: &str = r#"<?xml version="1.0"?>
+<robot name="r">
+  <material name="grey"><color rgba="0.5 0.5 0.5 1"/></material>
+  <link name="a &lt;'1'&gt; &amp; &quot;&#xe9;&quot;"/>
+  <link name=" b ">
+    <inertial><origin xyz="0 0 1" rpy="0 1e-3 0"/><mass value=" 0.1"/><inertia ixx="1" ixy="2" ixz="3" iyy="4" iyz="5" izz="6"/></inertial>
+    <visual name="v"><origin xyz="0.1 .2 3."/><geometry><box size="1 2 3"/></geometry><material name="grey"/></visual>
+    <visual><geometry><mesh filename=" package://r/b.stl" scale="1 -1 1"/></geometry></visual>
+    <collision><geometry><cylinder radius="1" length="2"/></geometry></collision>
+    <collision name="c"><origin rpy="0 0 1"/><geometry><sphere radius="1"/></geometry></collision>
+  </link>
+  <joint name="ab" type="revolute">
+    <parent link="a &lt;'1'&gt; &amp; &quot;&#xe9;&quot;"/><child link=" b "/><origin xyz="0 0 1" rpy="0 0 0"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="inf" effort="10" velocity="2"/><dynamics damping="1" friction="2"/>
+  </joint>
+  <joint name="bc" type="prismatic">
+    <parent link=" b "/><child link="c"/><limit velocity="1"/><mimic joint="ab" multiplier="2" offset="0.1"/>
+  </joint>
+</robot>
+"#;
+
+    /// Truth: faults that real robots have and `urdf_rs` refuses.
+    #[test]
+    fn what_urdf_rs_would_refuse_is_made_plain() {
+        for (from, to) in [
+            ("<limit velocity=\"1\"/>", "<limit/>"),
+            ("<axis xyz=\"0 0 1\"/>", "<axis/>"),
+            ("<axis xyz=\"0 0 1\"/>", "<axis xyz=\"0 0 1\"/><axis xyz=\"1 0 0\"/>"),
+            ("<material name=\"grey\"/>", "<material><color rgba=\"1 0 0 1\"/></material>"),
+            ("<material name=\"grey\"/>", "<material name=\"grey\"><color/></material>"),
+            ("<box size=\"1 2 3\"/>", "<cone/>"),
+            ("<sphere radius=\"1\"/>", "<sphere/>"),
+            ("<sphere radius=\"1\"/>", ""),
+            ("<visual name=\"v\">", "<visual><geometry><sphere radius=\"1\"/></geometry></visual><inertial/><visual>"),
+            ("<dynamics", "<safety_controller/><dynamics"),
+        ] {
+            let text = WHOLE.replacen(from, to, 1);
+            assert!(text != WHOLE && read(&text).is_err(), "{from} {to}");
+            let (plain, report) = plain(&text);
+            assert!(report.issues.is_empty() && read(&plain).is_ok(), "{from} {to}: {plain}");
+        }
+    }
+
+    /// The plain text has no extensions, and zeros where there are faults.
+    #[test]
+    fn the_text_is_shallow_and_whole_whatever_is_wrong() {
+        let deep =
+            format!("<link name='a'>{}{}</link>", "<visual><origin>".repeat(500), "</origin></visual>".repeat(500));
+        let extensions = "<x:link xmlns:x='x' name='b' x:name='c'/><gazebo><link name='d'/></gazebo>";
+        let joint = "<joint name='j'><child/><axis xyz='x'/><mimic/></joint>";
+        let (text, report) = plain(&format!("<robot>{deep}{extensions}{joint}</robot>"));
+        assert_eq!(
+            text,
+            "<robot name=\"\"><link name=\"a\"></link><link name=\"b\"></link><joint name=\"j\" type=\"floating\">\
+             <parent link=\"\"></parent><child link=\"\"></child><axis xyz=\"0 0 0\"></axis><mimic joint=\"\"></mimic>\
+             </joint></robot>"
+        );
+        assert!(read(&text).is_ok());
+        // geometry, type, parent, link of the child, axis, joint of the mimic
+        assert_eq!(report.issues.len(), 6);
+    }
+}

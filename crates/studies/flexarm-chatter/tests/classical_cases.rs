@@ -1,0 +1,187 @@
+//! Six classical cases, 41 spindle speeds each, against the limits of another program (`tests/golden/milling_lobes.json`, good to 0.2 %).
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stderr,
+    reason = "a failed unwrap fails the test; measured numbers are shown with --nocapture"
+)]
+
+use std::f64::consts::TAU;
+
+use flexarm_chatter::{
+    ChatterError, Coefficients, Cutter, Engagement, Kind, LimitOptions, Mode, Structure, limit_of_depth,
+    zero_order_limit,
+};
+use nalgebra::Vector3;
+use serde_json::Value;
+
+struct Case {
+    name: String,
+    structure: Structure,
+    cutter: Cutter,
+    deepest: f64,
+    rows: Vec<Row>,
+}
+
+/// Speed (1/min), and depth (m), kind and frequency (Hz) where there is a limit.
+type Row = (f64, Option<(f64, Kind, f64)>);
+
+fn cases() -> Vec<Case> {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../tests/golden/milling_lobes.json");
+    let file: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+    file["cases"].as_object().unwrap().iter().map(|(name, case)| read(name, case)).collect()
+}
+
+fn read(name: &str, case: &Value) -> Case {
+    let number = |key: &str| case[key].as_f64().unwrap();
+    let mode = |m: &Value| {
+        let axis = if m["axis"] == "x" { Vector3::x() } else { Vector3::y() };
+        Mode {
+            angular_frequency: TAU * m["frequency_Hz"].as_f64().unwrap(),
+            damping_ratio: m["damping_ratio"].as_f64().unwrap(),
+            shape: axis / m["mass_kg"].as_f64().unwrap().sqrt(),
+        }
+    };
+    let modes: Vec<Mode> = case["modes"].as_array().unwrap().iter().map(mode).collect();
+    let coefficients = Coefficients { tangential: number("Kt_Pa"), radial: number("Kn_Pa"), axial: 0.0 };
+    let engagement = Engagement { entry: number("entry_rad"), exit: number("exit_rad") };
+    let row = |r: &Value| {
+        let kind = if r[2] == "flip" { Kind::Flip } else { Kind::Hopf };
+        (r[0].as_f64().unwrap(), r[1].as_f64().map(|depth| (depth, kind, r[3].as_f64().unwrap())))
+    };
+    Case {
+        name: name.to_owned(),
+        structure: Structure::from_modes(&modes).unwrap(),
+        cutter: Cutter::straight(case["teeth"].as_u64().unwrap() as usize, coefficients, engagement),
+        deepest: number("searched_to_m"),
+        rows: case["rows"].as_array().unwrap().iter().map(row).collect(),
+    }
+}
+
+/// Truth: the limits of another program with another method, to 0.2 %; required within 0.5 %.
+#[test]
+fn every_limit_of_the_classical_cases_is_met() {
+    let mut worst: f64 = 0.0;
+    for case in cases() {
+        let (mut far, mut beside, mut largest) = (0.0_f64, 0.0_f64, 0);
+        for (rpm, expected) in &case.rows {
+            let found =
+                limit_of_depth(&case.structure, &case.cutter, rpm * TAU / 60.0, &LimitOptions::to(case.deepest))
+                    .unwrap();
+            let Some((depth, kind, hz)) = *expected else {
+                assert!(found.is_none(), "{} at {rpm} rpm: {found:?}, expected none", case.name);
+                continue;
+            };
+            let found = found.unwrap_or_else(|| panic!("{} at {rpm} rpm: none, expected {depth}", case.name));
+            far = far.max((found.depth / depth - 1.0).abs());
+            beside = beside.max((found.multiplier_hz - hz).abs());
+            largest = largest.max(found.unknowns);
+            assert_eq!(found.kind, kind, "{} at {rpm} rpm", case.name);
+            assert!(found.change <= 1e-3, "{} at {rpm} rpm: {:.1e}", case.name, found.change);
+        }
+        eprintln!("{}: {:.3} %, {beside:.3} Hz, {largest} unknowns", case.name, 100.0 * far);
+        // measured 0.06 Hz
+        assert!(beside < 0.3, "{}: {beside}", case.name);
+        worst = worst.max(far);
+    }
+    // measured 0.11 %
+    assert!(worst < 0.005, "{worst}");
+}
+
+/// Convergence: the tolerance of 1e-3 is met by far, against elements halved until nothing moves by 1e-7.
+#[test]
+fn limits_asked_for_more_exactly_move_less_than_their_tolerance() {
+    let mut worst: f64 = 0.0;
+    for case in cases() {
+        for (rpm, _) in case.rows.iter().step_by(8) {
+            let spindle = rpm * TAU / 60.0;
+            let options = LimitOptions::to(case.deepest);
+            let usual = limit_of_depth(&case.structure, &case.cutter, spindle, &options).unwrap();
+            let options = LimitOptions { tolerance: 1e-7, ..options };
+            let exact = limit_of_depth(&case.structure, &case.cutter, spindle, &options).unwrap();
+            let (Some(usual), Some(exact)) = (usual, exact) else { continue };
+            worst = worst.max((usual.depth / exact.depth - 1.0).abs());
+        }
+    }
+    eprintln!("largest difference {worst:.1e}");
+    // measured 8e-8: elements are of high order, one halving too many costs little
+    assert!(worst < 1e-5, "{worst:.1e}");
+}
+
+/// The zero-order solution is another algorithm: near in a slot of two modes, blind to period doubling at low immersion.
+#[test]
+fn the_zero_order_solution_is_near_in_slots_and_misses_flips() {
+    for case in cases() {
+        let band = case.structure.frequencies();
+        let response = |w: f64| case.structure.frequency_response(w);
+        let mut ratios = Vec::new();
+        for (rpm, expected) in &case.rows {
+            let found = zero_order_limit(&response, &case.cutter, rpm * TAU / 60.0, &band, f64::INFINITY).unwrap();
+            if let (Some(found), Some((depth, kind, _))) = (found, expected) {
+                ratios.push((found.depth / depth, *kind));
+            }
+        }
+        let far = |kind: Kind| {
+            let of: Vec<f64> = ratios.iter().filter(|r| r.1 == kind).map(|r| (r.0 - 1.0).abs()).collect();
+            of.iter().sum::<f64>() / of.len().max(1) as f64
+        };
+        eprintln!("{}: mean distance {:.3} (Hopf), {:.3} (flip)", case.name, far(Kind::Hopf), far(Kind::Flip));
+        if case.name == "two_dof_slotting" {
+            assert!(far(Kind::Hopf) < 0.05, "{}", far(Kind::Hopf));
+        }
+        if case.name == "one_dof_down_0p05" {
+            assert!(far(Kind::Flip) > 0.5, "{}", far(Kind::Flip));
+        }
+    }
+}
+
+/// Truth: the search over the whole band. Up to a depth the limit is the same or none, and where nothing chatters nothing is searched.
+#[test]
+fn a_search_up_to_a_depth_finds_the_same_limit_with_less_work() {
+    let mut work = [0, 0];
+    for case in cases() {
+        let band = case.structure.frequencies();
+        for (rpm, _) in &case.rows {
+            let found = [f64::INFINITY, 5e-4].map(|deepest| {
+                let calls = std::cell::Cell::new(0);
+                let response = |w: f64| {
+                    calls.set(calls.get() + 1);
+                    case.structure.frequency_response(w)
+                };
+                let found = zero_order_limit(&response, &case.cutter, rpm * TAU / 60.0, &band, deepest).unwrap();
+                (found, calls.get())
+            });
+            let [(whole, all), (shallow, few)] = found;
+            assert_eq!(whole.filter(|limit| limit.depth <= 5e-4), shallow, "{rpm} 1/min");
+            work = [work[0] + all, work[1] + few];
+        }
+    }
+    eprintln!("{work:?} responses");
+    assert!(10 * work[1] < 7 * work[0], "{work:?}"); // measured 0.57
+}
+
+/// A mode damped to 30000 times critical has poles from 2e-5 to 6e4 times its frequency: 23 million points of the whole band. Where the
+/// teeth are so slow that the resonance alone takes too many, the search is refused.
+#[test]
+fn the_work_of_a_limit_does_not_grow_with_the_damping() {
+    let cutter = Cutter::straight(3, Coefficients { tangential: 8e8, radial: 2.5e8, axial: 0.0 }, Engagement::slot());
+    let mode = |damping_ratio: f64, stiffness: f64| {
+        let omega = TAU * 1200.0;
+        let shape = nalgebra::Vector3::x() * omega / stiffness.sqrt();
+        let mode = |shape| Mode { angular_frequency: omega, damping_ratio, shape };
+        Structure::from_modes(&[mode(shape), mode(nalgebra::Vector3::y() * omega / stiffness.sqrt())]).unwrap()
+    };
+    for (damping, stiffness) in [(0.03, 1.5e7), (3.0, 1.5e7), (30_000.0, 1.5e7), (30_000.0, 1e2), (100.0, 1.0)] {
+        let (structure, calls) = (mode(damping, stiffness), std::cell::Cell::new(0_u64));
+        let response = |w: f64| {
+            calls.set(calls.get() + 1);
+            structure.frequency_response(w)
+        };
+        let band = structure.frequencies();
+        let found = zero_order_limit(&response, &cutter, 6000.0 * TAU / 60.0, &band, 0.02);
+        eprintln!("damping {damping}, {stiffness:e} N/m: {} responses, {found:?}", calls.get());
+        assert!(found.is_ok() && calls.get() < 5000, "{} {found:?}", calls.get()); // measured 2223
+        let slow = zero_order_limit(&response, &cutter, 1e-6 * TAU / 60.0, &band, 1.0);
+        assert!(matches!(slow, Ok(None) | Err(ChatterError::TooSlow { .. })), "{slow:?}");
+        assert!(calls.get() < 800_000, "{}", calls.get());
+    }
+}
