@@ -591,7 +591,7 @@ fn the_page_lists_the_catalogue() {
             "second-order-unknown",
             "euler-chain",
             "held-joints",
-            // Of crates/studies/flexarm-linkmaker.
+            // Of crates/run/flexarm-linkmaker.
             "link-sound",
             "link-density",
             "interface-size",

@@ -183,7 +183,7 @@ const ROBOT: [&str; 9] = [
     "crates/faces/flexarm/src/gear_entry.rs",
     "crates/faces/flexarm/src/mounting.rs",
     "crates/faces/flexarm/src/loop_entry.rs",
-    "crates/studies/flexarm-linkmaker/src/material_entry.rs",
+    "crates/run/flexarm-linkmaker/src/material_entry.rs",
 ];
 
 const LOADS: [&str; 1] = ["crates/faces/flexarm/src/loads_file.rs"];
