@@ -10,7 +10,7 @@ use flexarm::sweep::{Finders, Shard, Sweep, SweepError, SweepRequest, merge};
 use flexarm::{DataTable, DataValues, Error, Modelling, Motion, Robot, RunOptions, Scenario, modes, statics};
 
 fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap().to_owned()
+    Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).unwrap().to_owned()
 }
 
 const FINDERS: Finders = Finders {
