@@ -43,122 +43,26 @@
 
 mod applied_load;
 mod arm;
-mod balancer;
-mod balancer_entry;
-mod beam_entry;
-mod bends;
-mod caveat;
-mod check;
-pub mod compensate;
-mod controller_entry;
-mod convert;
-mod deflections;
-mod drive_entry;
-mod error;
-mod file_cache;
-mod flexible;
-mod gear_entry;
-mod headline;
-mod html_page;
-pub mod identify;
-mod inspect;
-mod link_entry;
-mod live;
-mod load_jumps;
-mod loads_file;
-pub mod lobes;
-mod loop_entry;
-mod loops;
-mod magnification;
-pub mod map;
-mod mode_recording;
-mod modes;
-mod monitor;
-mod motion;
-mod motion_formats;
-mod motion_report;
-mod mounting;
-pub mod new;
-mod operating_points;
-mod options;
-mod payload;
-mod posed;
-mod prepare;
-mod ranges;
-mod record;
-mod recursions;
-pub mod reduce;
-mod report;
-mod response;
-mod robot;
-mod robot_file;
-mod run;
-mod scenario;
-pub mod sensitivity;
-mod servo_gains;
-mod settling;
-mod static_part;
-mod statics;
-mod statics_picture;
-mod stepper_settings;
-mod study;
-mod summary;
-pub mod sweep;
-mod toml_file;
-mod tool_path;
-mod twin;
 
-pub use applied_load::AppliedLoad;
-pub use arm::{Arm, Run, SampleObserver};
-pub use balancer::{BalancerEnds, BalancerInfo, RobotBalancer};
-pub use bends::Bend;
-pub use caveat::{Caveat, Severity};
-pub use check::{Finding, check, check_with_loads, check_with_motion};
-pub use convert::{ConvertOptions, ConvertSummary, convert, convert_until, parse_recording_format, read_run};
-pub use deflections::Variation;
-pub use drive_entry::{Drive, DriveKind};
-pub use error::{
-    BalancerError, ChannelError, Error, Fault, LoadError, LoopError, ModellingError, PayloadError, PoseError,
-    RecordingError, StudyError, ValueError,
-};
-pub use flexible::{FlexibleRobot, LinkChoices, Owner, RobotLink};
-pub use gear_entry::{GearHysteresis, RobotCoupling};
-pub use headline::{Bending, ShareFigures};
-pub use inspect::{CouplingInfo, FlexibleInfo, Inspection, JointInfo, LinkInfo, MountingInfo, TcpInfo, inspect};
-pub use live::Live;
-pub use loops::{DependentInfo, LoopInfo, RobotLoop};
-pub use mode_recording::{ModeMovie, record_modes};
-pub use modes::{ModeFigures, ModeTable, modes};
-pub use monitor::tool_path::{PathFigures, PathMoveFigures};
-pub use motion::{HeldJoint, Motion};
-pub use motion_formats::MotionOptions;
-pub use motion_report::{MotionCurve, MotionFiles, MotionPeak, MotionReport, MotionViolation, motion_report};
-pub use mounting::RobotMounting;
-pub use new::{NewError, NewOptions, NewRobot, new_robot};
-pub use operating_points::OperatingPoints;
-pub use options::{DriveModel, LinkModel, Modelling, Outputs, RunOptions};
-pub use payload::PayloadChange;
-pub use recursions::Recursions;
-pub use report::{
-    Figure, FigureGroup, ReportFiles, ReportOptions, ReportRun, Weight, figure_groups, html, markdown, report, rows,
-};
-pub use response::{
-    PeakFigures, Response, ResponseCurve, ResponseFiles, ResponseOutputs, ResponseRequest, readable_unit, response,
-};
-pub use robot::{LoadOptions, Robot, TCP_FRAME};
-pub use robot_file::RobotFileError;
-pub use run::{Progress, simulate, simulate_modelled, simulate_traced};
-pub use scenario::{Disturbances, Scenario};
-pub use settling::Settling;
-pub use statics::{ElementStatics, Statics, record_statics, statics};
-pub use statics_picture::{StaticsFiles, StaticsOutputs};
-pub use stepper_settings::{SettingValue, StepperSettings};
-pub use study::{STUDY_NOTE, Variant, compare_study, study_rows};
-pub use summary::{
-    CURVE_PIECES, DifferenceFigures, Files, HoldFigures, LinkFigures, PoseFigures, RecordingFiles, StepperFigures,
-    Summary, TcpFigures,
-};
-pub use tool_path::ToolPath;
+#[doc(inline)]
+pub use flexarm_chatter as lobes;
+#[doc(inline)]
+pub use flexarm_compensate as compensate;
+#[doc(inline)]
+pub use flexarm_identify as identify;
+#[doc(inline)]
+pub use flexarm_map as map;
+#[doc(inline)]
+pub use flexarm_new as new;
+#[doc(inline)]
+pub use flexarm_run::reduce;
+#[doc(inline)]
+pub use flexarm_sensitivity as sensitivity;
+#[doc(inline)]
+pub use flexarm_sweep as sweep;
+
+pub use flexarm_new::{NewError, NewOptions, NewRobot, new_robot};
+pub use flexarm_run::{AppliedLoad, Arm, BalancerEnds, BalancerError, BalancerInfo, Bend, Bending, CURVE_PIECES, Caveat, ChannelError, ConvertOptions, ConvertSummary, CouplingInfo, DependentInfo, DifferenceFigures, Disturbances, Drive, DriveKind, DriveModel, ElementStatics, Error, Fault, Figure, FigureGroup, Files, Finding, FlexibleInfo, FlexibleRobot, GearHysteresis, HeldJoint, HoldFigures, Inspection, JointInfo, LinkChoices, LinkFigures, LinkInfo, LinkModel, Live, LoadError, LoadOptions, LoopError, LoopInfo, ModeFigures, ModeMovie, ModeTable, Modelling, ModellingError, Motion, MotionCurve, MotionFiles, MotionOptions, MotionPeak, MotionReport, MotionViolation, MountingInfo, OperatingPoints, Outputs, Owner, PathFigures, PathMoveFigures, PayloadChange, PayloadError, PeakFigures, PoseError, PoseFigures, Progress, RecordingError, RecordingFiles, Recursions, ReportFiles, ReportOptions, ReportRun, Response, ResponseCurve, ResponseFiles, ResponseOutputs, ResponseRequest, Robot, RobotBalancer, RobotCoupling, RobotFileError, RobotLink, RobotLoop, RobotMounting, Run, RunOptions, STUDY_NOTE, SampleObserver, Scenario, SettingValue, Settling, Severity, ShareFigures, Statics, StaticsFiles, StaticsOutputs, StepperFigures, StepperSettings, StudyError, Summary, TCP_FRAME, TcpFigures, TcpInfo, ToolPath, ValueError, Variant, Variation, Weight, check, check_with_loads, check_with_motion, compare_study, convert, convert_until, figure_groups, html, inspect, markdown, modes, motion_report, parse_recording_format, read_run, readable_unit, record_modes, record_statics, report, response, rows, simulate, simulate_modelled, simulate_traced, statics, study_rows};
 
 pub use flexarm_analysis::{Quantity, Spacing};
 pub use flexarm_files::{FileError, writing_unless};

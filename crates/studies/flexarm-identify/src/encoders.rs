@@ -1,305 +1,349 @@
-//! Stiffness of a gear from the positions of its motor and of the link behind it, recorded while the robot moves.
-//!
-//! ```text
-//! δ = motor - link = c τ - T dδ/dt + d q̇ + offset of the run
-//! ```
-//! with the compliance c, the torque τ through the gear, the time T = damping / stiffness of the gear, and a delay d between the two
-//! instruments. T is fitted to what the others leave. The torque follows from the link's
-//! motion or from a sensor. The noise of the link's encoder is in the deflection and, through its second derivative, in the torque; a
-//! plain least-squares fit would take the one for the cause of the other. So both are compared by a third signal without that noise
-//! (instrumental variables): the torque that the motor's motion would need.
-//! Samples of a recording are not independent: deviations are those of a jackknife over blocks of time. Whether the gear is told at
-//! all is asked of runs, or halves of one run, that the fit has not seen. Not here: torques, filters.
+//! Gears from recorded positions of motors and links: torques of the rigid robot along the motion of its links, filters, the fit's
+//! reading.
 
-use nalgebra::{DMatrix, DVector};
+use flexarm_analysis::signal::LowPass;
+use crate::estimation::{
+    CoupledOutput, GearEstimate, GearRun, Parameter, Reading, ReadingKind, coupled_gear_stiffness, gear_stiffness,
+};
+use flexarm_kinematics::{Data, Mechanism, Model, State, inverse_dynamics};
+use nalgebra::DVector;
+use serde::Serialize;
 
-/// One recording of one gear, evenly sampled, all filtered alike.
-#[derive(Clone, Debug, PartialEq)]
-pub struct GearRun {
-    /// Motor (over the ratio) less link (rad).
-    pub deflection: Vec<f64>,
-    /// Through the gear, on the link's side (N m).
-    pub torque: Vec<f64>,
-    /// A signal that goes along with the torque and has no part in the noise of the link's encoder (N m); the torque itself if it is
-    /// measured.
-    pub instrument: Vec<f64>,
-    /// Speed of the joint (rad/s).
-    pub rate: Vec<f64>,
-    /// Rate of the deflection (rad/s); zeros for a gear without damping.
-    pub deflection_rate: Vec<f64>,
-}
+use super::file::{EncoderRecording, MeasurementInput};
+use super::parameters::{Candidate, Written, candidates};
+use flexarm_run::Arm;
+use flexarm_run::Error;
+use flexarm_run::RobotCoupling;
+use flexarm_run::RobotFileError;
 
-/// What recordings tell of a gear.
-#[derive(Clone, Debug, PartialEq)]
-pub struct GearEstimate {
-    /// N m/rad; not a positive number where the deflection does not follow the torque.
+/// What recordings tell of a gear. SI units.
+#[derive(Clone, Debug, Serialize)]
+pub struct EncoderFigures {
+    /// Joint.
+    pub joint: String,
+    /// Stiffness (N m/rad, N/m).
     pub stiffness: f64,
-    /// Standard deviation of its logarithm.
-    pub std_ln: f64,
-    /// By how much the link's instrument is late (s).
+    /// Its standard deviation, by leaving out seconds of the recordings.
+    pub std: f64,
+    /// By how much the link's encoder is late (s).
     pub delay_s: f64,
     /// Share of the deflection, without offsets and delay, that the torque explains.
     pub r2: f64,
-    /// The same of each run, with stiffness and delay of the others.
+    /// The same of each run by the others (of each half, with one run).
     pub unseen_r2: Vec<f64>,
     /// Stiffness without each run.
     pub without_each: Vec<f64>,
-    /// What is left of the deflection (rad, RMS).
-    pub rest_rms: f64,
-    /// Deflection without offsets and delay (rad, RMS).
+    /// RMS of the deflection without offsets and delay (rad, m).
     pub deflection_rms: f64,
-    /// Of each run, or half of one: the deflection without offset and delay, and what the torque makes of the gear (rad).
+    /// RMS of what is left of it.
+    pub rest_rms: f64,
+    /// RMS of the noise of both instruments below `below`, from the noise that is faster (rad, m).
+    pub noise_rms: f64,
+    /// Time between samples of each run, or half of one (s).
+    #[serde(skip)]
+    pub steps_s: Vec<f64>,
+    /// Of each run the deflection without offset and delay, and what the torque makes of it (rad, m).
+    #[serde(skip)]
     pub curves: Vec<[Vec<f64>; 2]>,
+    /// Whether the recordings tell the gear: most of an unseen run follows, and no run decides alone.
+    pub told: bool,
+    /// The parameter that it is.
+    #[serde(skip)]
+    parameter: String,
+    /// Its first guess.
+    #[serde(skip)]
+    initial: f64,
 }
 
-impl GearEstimate {
-    /// Whether the recordings tell the stiffness: most of a run that was not seen follows from it, and it does not depend on one run.
-    pub fn is_told(&self) -> bool {
-        let sound = |x: &f64| x.is_finite() && *x > 0.0;
-        let mut unseen = self.unseen_r2.clone();
-        unseen.sort_by(f64::total_cmp);
-        let middle = unseen.get(unseen.len() / 2).copied().unwrap_or(f64::NAN);
-        let same = |x: &f64| sound(x) && (x / self.stiffness).ln().abs() < 0.5;
-        sound(&self.stiffness) && middle > 0.3 && self.without_each.iter().all(same) && self.std_ln < 0.5
-    }
-}
+impl EncoderFigures {
+    fn of(joint: &str, gear: GearEstimate, parameter: &Parameter, noise_rms: f64, steps_s: &[f64]) -> Self {
+        Self {
+            noise_rms,
+            // One run is taken as two halves.
+            steps_s: if steps_s.len() == 1 { vec![steps_s[0]; gear.curves.len()] } else { steps_s.to_vec() },
 
-/// Samples of one block of the jackknife.
-pub(crate) const BLOCK: usize = 250;
-
-/// Finds the stiffness of a gear from all its runs; one run is taken as two halves.
-///
-/// None for less than two blocks of samples, or torques that do not change.
-pub fn gear_stiffness(runs: &[GearRun]) -> Option<GearEstimate> {
-    let halves;
-    let runs = match runs {
-        [one] => {
-            halves = split(one);
-            &halves[..]
-        }
-        runs => runs,
-    };
-    if runs.is_empty() || runs.iter().map(|run| run.deflection.len()).sum::<usize>() < 2 * BLOCK {
-        return None;
-    }
-    let all: Vec<usize> = (0..runs.len()).collect();
-    let fit = Fit::of(runs, &all, None)?;
-    let blocks: Vec<(usize, usize)> =
-        all.iter().flat_map(|run| (0..runs[*run].deflection.len() / BLOCK).map(move |k| (*run, k * BLOCK))).collect();
-    let left: Vec<f64> =
-        blocks.iter().filter_map(|block| Fit::of(runs, &all, Some(*block))).map(|fit| fit.compliance).collect();
-    let (mut unseen_r2, mut without_each) = (Vec::new(), Vec::new());
-    for run in &all {
-        let others: Vec<usize> = all.iter().copied().filter(|k| k != run).collect();
-        let other = Fit::of(runs, &others, None)?;
-        without_each.push(1.0 / other.compliance);
-        let (rest, whole) = other.left_of(&runs[*run]);
-        unseen_r2.push(1.0 - rest / whole);
-    }
-    let apart: Vec<f64> = without_each.iter().map(|stiffness: &f64| 1.0 / stiffness).collect();
-    let curves: Vec<_> = runs.iter().map(|run| fit.curves(run)).collect();
-    let sums = curves.iter().map(squares).fold((0.0, 0.0), |(a, b), (rest, whole)| (a + rest, b + whole));
-    let count = runs.iter().map(|run| run.deflection.len()).sum::<usize>() as f64;
-    Some(GearEstimate {
-        stiffness: 1.0 / fit.compliance,
-        std_ln: jackknife(&left).max(jackknife(&apart)) / fit.compliance.abs(),
-        delay_s: fit.delay,
-        r2: 1.0 - sums.0 / sums.1,
-        unseen_r2,
-        without_each,
-        rest_rms: (sums.0 / count).sqrt(),
-        deflection_rms: (sums.1 / count).sqrt(),
-        curves,
-    })
-}
-
-/// Standard deviation of an estimate from its values without one part of the data each.
-pub(crate) fn jackknife(without: &[f64]) -> f64 {
-    let n = without.len() as f64;
-    let mean = without.iter().sum::<f64>() / n;
-    ((n - 1.0) / n * without.iter().map(|x| (x - mean).powi(2)).sum::<f64>()).sqrt()
-}
-
-fn split(run: &GearRun) -> [GearRun; 2] {
-    let middle = run.deflection.len() / 2;
-    let part = |range: std::ops::Range<usize>| GearRun {
-        deflection: run.deflection[range.clone()].to_vec(),
-        torque: run.torque[range.clone()].to_vec(),
-        instrument: run.instrument[range.clone()].to_vec(),
-        rate: run.rate[range.clone()].to_vec(),
-        deflection_rate: run.deflection_rate[range].to_vec(),
-    };
-    [part(0..middle), part(middle..run.deflection.len())]
-}
-
-/// Sums of a linear fit by instrumental variables: `Zᵀ X a = Zᵀ y`.
-pub(crate) struct Normal {
-    zx: DMatrix<f64>,
-    zy: DVector<f64>,
-    /// Squares of the columns of X and Z.
-    sizes: [DVector<f64>; 2],
-}
-
-impl Normal {
-    pub(crate) fn new(n: usize) -> Self {
-        let zeros = || DVector::zeros(n);
-        Self { zx: DMatrix::zeros(n, n), zy: zeros(), sizes: [zeros(), zeros()] }
-    }
-
-    /// Adds samples: of each column its number, X and Z.
-    pub(crate) fn add(&mut self, columns: &[(usize, &[f64], &[f64])], y: &[f64]) {
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        for (a, x, z) in columns {
-            self.sizes[0][*a] += dot(x, x);
-            self.sizes[1][*a] += dot(z, z);
-            self.zy[*a] += dot(z, y);
-            for (b, x, _) in columns {
-                self.zx[(*a, *b)] += dot(z, x);
-            }
+            joint: joint.to_owned(),
+            stiffness: gear.stiffness,
+            std: gear.std_ln * gear.stiffness.abs(),
+            delay_s: gear.delay_s,
+            r2: gear.r2,
+            told: gear.is_told(),
+            curves: gear.curves,
+            unseen_r2: gear.unseen_r2,
+            without_each: gear.without_each,
+            deflection_rms: gear.deflection_rms,
+            rest_rms: gear.rest_rms,
+            parameter: parameter.name.clone(),
+            initial: parameter.initial,
         }
     }
 
-    /// The coefficients; columns from `needed` on that are zero have none. None if the others cannot be told apart.
-    pub(crate) fn solved(&self, needed: usize) -> Option<Vec<f64>> {
-        let n = self.zy.len();
-        let scales = self.sizes.each_ref().map(|sizes| sizes.map(f64::sqrt));
-        let told: Vec<usize> = (0..n).filter(|k| scales.iter().all(|scale| scale[*k] > 0.0)).collect();
-        if (0..needed).any(|k| !told.contains(&k)) {
-            return None;
-        }
-        let unit = DMatrix::from_fn(told.len(), told.len(), |i, j| {
-            self.zx[(told[i], told[j])] / (scales[1][told[i]] * scales[0][told[j]])
-        });
-        let right = DVector::from_fn(told.len(), |i, _| self.zy[told[i]] / scales[1][told[i]]);
-        let svd = unit.svd(true, true);
-        if svd.singular_values.min() <= DEPENDENT {
-            return None;
-        }
-        let found = svd.solve(&right, 0.0).ok()?;
-        let mut values = vec![0.0; n];
-        told.iter().zip(found.iter()).for_each(|(k, x)| values[*k] = x / scales[0][*k]);
-        Some(values)
-    }
-}
-
-/// Smallest singular value of scaled columns that are told apart.
-const DEPENDENT: f64 = 1e-9;
-
-/// Compliance, delay and time of damping of some runs.
-struct Fit {
-    compliance: f64,
-    delay: f64,
-    damping_s: f64,
-}
-
-impl Fit {
-    /// Least squares with an offset for each run, without one block.
-    fn of(runs: &[GearRun], some: &[usize], without: Option<(usize, usize)>) -> Option<Self> {
-        let centred_runs: Vec<[Vec<f64>; 5]> = some
-            .iter()
-            .map(|&k| {
-                let run = &runs[k];
-                let left_out =
-                    |i: &usize| without.is_some_and(|(r, first)| r == k && (first..first + BLOCK).contains(i));
-                let kept: Vec<usize> = (0..run.deflection.len()).filter(|i| !left_out(i)).collect();
-                let all = [&run.deflection, &run.torque, &run.instrument, &run.rate, &run.deflection_rate];
-                all.map(|x| centred(x, &kept))
-            })
-            .collect();
-        let mut sums = Normal::new(2);
-        centred_runs.iter().for_each(|[y, t, z, v, _]| sums.add(&[(0, t, z), (1, v, v)], y));
-        let found = sums.solved(1)?;
-        let (compliance, delay) = (found[0], found[1]);
-        // Of what is left: friction, which jumps where the torque is largest, would pass for damping and change the compliance.
-        let damping = centred_runs.iter().map(|[y, t, _, v, w]| {
-            let rest: Vec<f64> = (0..y.len()).map(|k| y[k] - compliance * t[k] - delay * v[k]).collect();
-            (rest, &w[..])
-        });
-        Some(Self { compliance, delay, damping_s: damping_time(damping) })
-    }
-
-    /// Of a run: the deflection without offset, delay and damping, and what the torque makes of it.
-    fn curves(&self, run: &GearRun) -> [Vec<f64>; 2] {
-        let kept: Vec<usize> = (0..run.deflection.len()).collect();
-        let [y, t, v, w] = [&run.deflection, &run.torque, &run.rate, &run.deflection_rate].map(|x| centred(x, &kept));
-        let measured = (0..y.len()).map(|k| y[k] - self.delay * v[k] + self.damping_s * w[k]).collect();
-        [measured, t.iter().map(|t| self.compliance * t).collect()]
-    }
-
-    /// Sums of squares of a run: what is left, and without the torque, offset free.
-    fn left_of(&self, run: &GearRun) -> (f64, f64) {
-        squares(&self.curves(run))
-    }
-}
-
-/// Time T of a rest that is `-T` times a rate; 0 where nothing gives way.
-pub(crate) fn damping_time<'a>(of: impl Iterator<Item = (Vec<f64>, &'a [f64])>) -> f64 {
-    let sums = of.fold((0.0, 0.0), |sums, (rest, rate)| {
-        rest.iter().zip(rate).fold(sums, |(a, b), (r, w)| (a + r * w, b + w * w))
-    });
-    if sums.1 > 0.0 { -sums.0 / sums.1 } else { 0.0 }
-}
-
-/// Sums of squares of what is left of a measured curve, and of all of it.
-pub(crate) fn squares([measured, expected]: &[Vec<f64>; 2]) -> (f64, f64) {
-    measured.iter().zip(expected).fold((0.0, 0.0), |(rest, whole), (y, c)| (rest + (y - c).powi(2), whole + y * y))
-}
-
-pub(crate) fn centred(x: &[f64], kept: &[usize]) -> Vec<f64> {
-    let mean = kept.iter().map(|i| x[*i]).sum::<f64>() / kept.len().max(1) as f64;
-    kept.iter().map(|i| x[*i] - mean).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn run(seed: f64, noise: f64, stiffness: f64) -> GearRun {
-        let n = 2500;
-        let t = |k: usize| 0.004 * k as f64;
-        let torque: Vec<f64> = (0..n).map(|k| 900.0 * (0.9 * t(k) + seed).sin() + 400.0 * (2.3 * t(k)).cos()).collect();
-        let rate: Vec<f64> = (0..n).map(|k| 0.4 * (1.3 * t(k) + 2.0 * seed).cos()).collect();
-        let error = |k: usize| noise * (17.0 * t(k) * (1.0 + 0.1 * seed)).sin();
-        let deflection = (0..n).map(|k| torque[k] / stiffness + 3e-3 * rate[k] + 1e-3 * seed + error(k)).collect();
-        GearRun { deflection_rate: vec![0.0; n], deflection, instrument: torque.clone(), torque, rate }
-    }
-
-    /// Truth: the stiffness from which the deflection was made. The link's encoder has noise about 5 Hz, which its second derivative
-    /// carries into the torque of 400 kg m².
-    #[test]
-    fn noise_of_the_link_encoder_that_is_in_deflection_and_torque_does_not_pass_for_a_spring() {
-        let noisy = |seed: f64| {
-            let mut run = run(seed, 0.0, 8e6);
-            for k in 0..run.torque.len() {
-                let (t, w) = (0.004 * k as f64, 31.0 + 0.3 * seed);
-                let noise = 4e-4 * (w * t + 3.0 * (0.37 * t).sin()).sin();
-                run.deflection[k] -= noise;
-                run.torque[k] -= 400.0 * w * w * noise;
-            }
-            run
+    /// The reading for the fit, if the recordings tell the gear.
+    pub(super) fn reading(&self) -> Option<Reading> {
+        let kind = ReadingKind::Known {
+            parameter: self.parameter.clone(),
+            value: (self.stiffness / self.initial).ln(),
+            std: self.std / self.stiffness,
         };
-        let runs = [0.0, 1.0, 2.0].map(noisy);
-        let found = gear_stiffness(&runs).unwrap();
-        let plain = runs.clone().map(|run| GearRun { instrument: run.torque.clone(), ..run });
-        let plain = gear_stiffness(&plain).unwrap();
-        let [found, plain] = [&found, &plain].map(|gear| gear.stiffness / 8e6 - 1.0);
-        assert!(found.abs() < 0.03 && plain.abs() > 0.2, "{found} {plain}"); // measured: 0.019, 0.32
+        self.told.then(|| Reading { name: format!("encoders of {}", self.joint), q: Vec::new(), kind })
+    }
+}
+
+/// Each gear with an encoder behind it.
+pub(super) fn told(arm: &Arm, input: &MeasurementInput, chosen: &[Candidate]) -> Result<Vec<EncoderFigures>, Error> {
+    let Some(first) = input.recordings.first() else { return Ok(Vec::new()) };
+    let model = link_side(&arm.robot().rigid)
+        .map_err(|source| Error::Model { path: arm.robot().urdf_path.clone(), source: Box::new(source) })?;
+    let joints: Vec<String> = arm.joints().map(str::to_owned).collect();
+    let coupling = arm.robot().coupling();
+    let is_coupled = |joint: &String| coupling.is_some_and(|coupling| coupling.joints.contains(joint));
+    let all = candidates(arm.robot(), arm.flexible());
+    let filed = |joint: &String| gearbox_of(&all, joint).filter(|_| !is_coupled(joint)).map(|p| p.initial);
+    let filed: Vec<Option<f64>> = joints.iter().map(filed).collect();
+    let runs = input.recordings.iter().map(|recording| Smooth::of(recording, &model, &filed));
+    let runs = runs.collect::<Result<Vec<_>, Error>>()?;
+    let mut found = Vec::new();
+    for (k, joint) in joints.iter().enumerate() {
+        if is_coupled(joint) {
+            continue;
+        }
+        let own: Vec<GearRun> = runs.iter().filter_map(|run| run.gear(k)).collect();
+        if own.is_empty() {
+            continue;
+        }
+        let Some(parameter) = gearbox_of(chosen, joint) else {
+            let text = format!("joint {joint:?} has an encoder, but no gearbox with one stiffness that is to be found");
+            return Err(RobotFileError { message: text, ..first.place.clone() }.into());
+        };
+        let Some(gear) = gear_stiffness(&own) else {
+            let text =
+                format!("joint {joint:?}: the recordings are too short (2 s at least), or its torque does not change");
+            return Err(RobotFileError { message: text, ..first.place.clone() }.into());
+        };
+        found.push(EncoderFigures::of(joint, gear, parameter, noise(&runs, k), &steps(&runs, k)));
+    }
+    if let Some(coupling) = coupling {
+        let recorded = Recorded { runs: &runs, joints: &joints };
+        let fail = |message: String| RobotFileError { message, ..first.place.clone() };
+        found.extend(told_of_coupled(&recorded, coupling, chosen, &all).map_err(fail)?);
+    }
+    Ok(found)
+}
+
+/// Steps of the recordings that have an encoder behind a gear (s).
+fn steps(runs: &[Smooth<'_>], joint: usize) -> Vec<f64> {
+    runs.iter().filter(|run| run.recording.link[joint].is_some()).map(|run| run.recording.step_s).collect()
+}
+
+/// RMS of the noise of the instruments of a gear in the band that is kept.
+fn noise(runs: &[Smooth<'_>], joint: usize) -> f64 {
+    let squares: Vec<f64> = runs.iter().filter_map(|run| run.noise_square(joint)).collect();
+    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+}
+
+/// The one stiffness of a joint's gearbox.
+fn gearbox_of<'a>(of: &'a [Candidate], joint: &str) -> Option<&'a Parameter> {
+    let is_it = |c: &&Candidate| matches!(&c.written, Written::Gearbox { joint: own, entry: None } if own == joint);
+    of.iter().find(is_it).map(|c| &c.parameter)
+}
+
+/// Recordings in the robot's order of joints.
+struct Recorded<'a> {
+    runs: &'a [Smooth<'a>],
+    joints: &'a [String],
+}
+
+/// Springs of motors that move several joints. Those that are not to be found have the stiffness of the robot file.
+fn told_of_coupled(
+    recorded: &Recorded<'_>,
+    coupling: &RobotCoupling,
+    chosen: &[Candidate],
+    all: &[Candidate],
+) -> Result<Vec<EncoderFigures>, String> {
+    let Recorded { runs, joints } = recorded;
+    let place = |joint: &String| joints.iter().position(|own| own == joint);
+    let places: Vec<usize> = coupling.joints.iter().filter_map(place).collect();
+    let has = |run: &Smooth<'_>, k: usize| run.recording.link[places[k]].is_some();
+    let seen: Vec<usize> = (0..places.len()).filter(|k| runs.iter().any(|r| has(r, *k))).collect();
+    if seen.is_empty() {
+        return Ok(Vec::new());
+    }
+    if let Some(k) = seen.iter().find(|k| !runs.iter().all(|r| has(r, **k))) {
+        let joint = &coupling.joints[*k];
+        return Err(format!(
+            "joint {joint:?} has coupled gears and an encoder in some recordings only: give it in all of them"
+        ));
+    }
+    let shown = |motor: &usize| seen.iter().any(|i| coupling.C[(*i, *motor)] != 0.0);
+    let unknown: Vec<(usize, &Parameter)> = (0..places.len())
+        .filter(shown)
+        .filter_map(|motor| Some((motor, gearbox_of(chosen, &coupling.joints[motor])?)))
+        .collect();
+    if unknown.is_empty() {
+        let names: Vec<&String> = seen.iter().map(|k| &coupling.joints[*k]).collect();
+        return Err(format!("joints {names:?} have encoders, but none of the gearboxes that they show is to be found"));
+    }
+    let is_unknown = |motor: usize| unknown.iter().any(|(own, _)| *own == motor);
+    let outputs = |run: &Smooth<'_>| -> Option<Vec<CoupledOutput>> {
+        let one = |i: &usize| {
+            let mut gear = run.gear(places[*i])?;
+            let part_of = |torque: &[Vec<f64>], motor: usize| -> Vec<f64> {
+                let of = |s: usize| {
+                    places.iter().enumerate().map(|(j, k)| coupling.C[(j, motor)] * torque[*k][s]).sum::<f64>()
+                };
+                run.seen.clone().map(|s| coupling.C[(*i, motor)] * of(s)).collect()
+            };
+            let part = |motor: usize| part_of(&run.torque, motor);
+            for motor in (0..places.len()).filter(|motor| !is_unknown(*motor)) {
+                // A gear that is kept deflects by what the robot file says; a rigid one does not.
+                let Some(known) = gearbox_of(all, &coupling.joints[motor]) else { continue };
+                gear.deflection.iter_mut().zip(part(motor)).for_each(|(d, torque)| *d -= torque / known.initial);
+            }
+            let torques = unknown.iter().map(|(motor, _)| part(*motor)).collect();
+            let instruments = unknown.iter().map(|(motor, _)| part_of(&run.instrument, *motor)).collect();
+            Some(CoupledOutput {
+                deflection: gear.deflection,
+                rate: gear.rate,
+                deflection_rate: gear.deflection_rate,
+                torques,
+                instruments,
+            })
+        };
+        seen.iter().map(one).collect()
+    };
+    let all_runs: Vec<Vec<CoupledOutput>> = runs.iter().filter_map(outputs).collect();
+    let names = || unknown.iter().map(|(motor, _)| &coupling.joints[*motor]).collect::<Vec<_>>();
+    let gears = coupled_gear_stiffness(&all_runs).ok_or_else(|| {
+        format!(
+            "the recordings do not tell the coupled gears of {:?} apart: too short (2 s at least), torques that do not change or go together; \
+             record more encoders, or keep some of these stiffnesses",
+            names()
+        )
+    })?;
+    let squares = seen.iter().map(|k| noise(runs, places[*k]).powi(2));
+    let noise = (squares.sum::<f64>() / seen.len() as f64).sqrt();
+    let steps = steps(runs, places[seen[0]]);
+    let figure = |((motor, parameter), gear): (&(usize, &Parameter), GearEstimate)| {
+        EncoderFigures::of(&coupling.joints[*motor], gear, parameter, noise, &steps)
+    };
+    Ok(unknown.iter().zip(gears).map(figure).collect())
+}
+
+/// The rigid robot without its rotors: what goes through the gears.
+fn link_side(robot: &Mechanism) -> Result<Model, flexarm_kinematics::ModelError> {
+    let mut mechanism = robot.clone();
+    mechanism.joints.iter_mut().for_each(|joint| joint.armature = 0.0);
+    Model::new(&mechanism)
+}
+
+/// A recording without what is fast, with the torques through the gears. What is compared has passed the filter twice: the torque
+/// of a filtered motion is filtered again, as its products of rates are fast.
+struct Smooth<'a> {
+    recording: &'a EncoderRecording,
+    rate: Vec<Vec<f64>>,
+    torque: Vec<Vec<f64>>,
+    /// The torque that the motors' motion would need, which has no part in the noise of the links' encoders; or the measured one.
+    instrument: Vec<Vec<f64>>,
+    low: LowPass,
+    seen: std::ops::Range<usize>,
+}
+
+impl<'a> Smooth<'a> {
+    /// * `filed`: stiffness of each joint's gearbox in the robot file.
+    fn of(recording: &'a EncoderRecording, model: &Model, filed: &[Option<f64>]) -> Result<Self, Error> {
+        let EncoderRecording { step_s, below_hz, edge_s, .. } = *recording;
+        let n = recording.motor[0].len();
+        let edge = (edge_s / step_s).round() as usize;
+        if below_hz <= 0.0 || below_hz >= 0.4 / step_s || n < 2 * edge + 3 {
+            let text = format!(
+                "{n} samples of {step_s} s: below = {below_hz} Hz must lie under two fifths of the sampling rate, and something must be \
+                 left between the edges of {edge_s} s"
+            );
+            return Err(RobotFileError { message: text, ..recording.place.clone() }.into());
+        }
+        let low = LowPass::new(below_hz, 1.0 / step_s);
+        let motor: Vec<Vec<f64>> = recording.motor.iter().map(|q| low.of(q)).collect();
+        // A link is where its encoder says, but for the offset between the two instruments.
+        let link = motor.iter().zip(&recording.link).map(|(motor, link)| {
+            let Some(link) = link else { return motor.clone() };
+            let link = low.of(link);
+            let offset = motor.iter().zip(&link).map(|(motor, link)| motor - link).sum::<f64>() / n as f64;
+            link.iter().map(|link| link + offset).collect()
+        });
+        let mut link: Vec<Vec<f64>> = link.collect();
+        // A gear without an encoder gives way as the robot file says.
+        let rough = torques(model, &link, step_s);
+        for (k, stiffness) in filed.iter().enumerate() {
+            if let (Some(stiffness), None) = (stiffness, &recording.link[k]) {
+                let twist = low.of(&rough[k]);
+                link[k].iter_mut().zip(twist).for_each(|(link, torque)| *link -= torque / stiffness);
+            }
+        }
+        let smoothed = |torque: Vec<Vec<f64>>| -> Vec<Vec<f64>> {
+            let measured = |(computed, own): (Vec<f64>, &Option<Vec<f64>>)| match own {
+                Some(own) => low.of(&low.of(own)),
+                None => low.of(&computed),
+            };
+            torque.into_iter().zip(&recording.torque).map(measured).collect()
+        };
+        let [torque, instrument] = [&link, &motor].map(|motion| smoothed(torques(model, motion, step_s)));
+        let rate = motor.iter().map(|q| low.of(&derivatives(q, step_s)[0])).collect();
+        Ok(Self { recording, rate, torque, instrument, low, seen: edge..n - edge - 1 })
     }
 
-    #[test]
-    fn a_gear_is_found_with_its_delay_whatever_the_offsets_of_the_runs() {
-        let runs: Vec<GearRun> = [0.0, 1.0, 2.0].map(|seed| run(seed, 0.0, 8e6)).to_vec();
-        let found = gear_stiffness(&runs).unwrap();
-        assert!((found.stiffness / 8e6 - 1.0).abs() < 1e-10 && (found.delay_s - 3e-3).abs() < 1e-12, "{found:?}");
-        assert!(found.is_told() && found.r2 > 1.0 - 1e-12 && found.unseen_r2.iter().all(|r2| *r2 > 1.0 - 1e-12));
-        // One run is held against itself by halves.
-        assert!(gear_stiffness(&runs[..1]).unwrap().is_told());
+    fn gear(&self, joint: usize) -> Option<GearRun> {
+        let link = self.recording.link[joint].as_ref()?;
+        let cut = |x: &[f64]| x[self.seen.clone()].to_vec();
+        let deflection: Vec<f64> =
+            self.recording.motor[joint].iter().zip(link).map(|(motor, link)| motor - link).collect();
+        let deflection = self.low.of(&self.low.of(&deflection));
+        Some(GearRun {
+            deflection_rate: cut(&derivatives(&deflection, self.recording.step_s)[0]),
+            deflection: cut(&deflection),
+            torque: cut(&self.torque[joint]),
+            instrument: cut(&self.instrument[joint]),
+            rate: cut(&self.rate[joint]),
+        })
     }
 
-    #[test]
-    fn a_deflection_below_the_error_of_the_encoder_is_not_told() {
-        let runs: Vec<GearRun> = [0.0, 1.0, 2.0].map(|seed| run(seed, 4e-4, 4e7)).to_vec();
-        let found = gear_stiffness(&runs).unwrap();
-        assert!(!found.is_told(), "{found:?}");
+    /// Mean square of what white noise of the two instruments leaves in the band. Fifth differences show it: what is as slow as an
+    /// arm moves and swings is hardly in them.
+    fn noise_square(&self, joint: usize) -> Option<f64> {
+        let link = self.recording.link[joint].as_ref()?;
+        let mut x: Vec<f64> = self.recording.motor[joint].iter().zip(link).map(|(motor, link)| motor - link).collect();
+        for _ in 0..5 {
+            x = x.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        }
+        // The sum of the squares of the binomial coefficients.
+        let white = x.iter().map(|x| x * x).sum::<f64>() / (252.0 * x.len().max(1) as f64);
+        Some(white * (2.0 * self.recording.below_hz * self.recording.step_s).min(1.0))
     }
+}
+
+/// Torques of the rigid robot along a motion, a list per joint.
+fn torques(model: &Model, motion: &[Vec<f64>], step_s: f64) -> Vec<Vec<f64>> {
+    let (m, n) = (motion.len(), motion[0].len());
+    let rates: Vec<[Vec<f64>; 2]> = motion.iter().map(|q| derivatives(q, step_s)).collect();
+    let (mut data, mut state, mut qddot) = (Data::new(model), State::zeros(model), DVector::zeros(m));
+    let mut torque = vec![Vec::with_capacity(n); m];
+    for i in 0..n {
+        for k in 0..m {
+            state.q[k] = motion[k][i];
+            state.qdot[k] = rates[k][0][i];
+            qddot[k] = rates[k][1][i];
+        }
+        inverse_dynamics(model, &mut data, &state, &qddot);
+        (0..m).for_each(|k| torque[k].push(data.tau[k]));
+    }
+    torque
+}
+
+/// First and second derivative by central differences of fourth order; at the ends the signal stands still.
+fn derivatives(x: &[f64], step_s: f64) -> [Vec<f64>; 2] {
+    let at = |i: usize, by: isize| x[i.saturating_add_signed(by).min(x.len() - 1)];
+    let n = 0..x.len();
+    let first = |i| (8.0 * (at(i, 1) - at(i, -1)) - (at(i, 2) - at(i, -2))) / (12.0 * step_s);
+    let second =
+        |i| (16.0 * (at(i, 1) + at(i, -1)) - (at(i, 2) + at(i, -2)) - 30.0 * at(i, 0)) / (12.0 * step_s * step_s);
+    [n.clone().map(first).collect(), n.map(second).collect()]
 }

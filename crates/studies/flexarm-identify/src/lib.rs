@@ -1,39 +1,198 @@
-//! Parameters of flexible arms from measurements, with their uncertainties.
+//! Parameters of a robot file from measurements at the robot, and poses that are worth measuring.
 //!
-//! A [`Plant`] is an arm as it is known, [`Parameter`]s say what of it is unknown, [`Measurements`] what was read at the robot.
-//! [`MeasuredArm`] puts them together; [`identify`] finds the parameters, says which of them the readings tell and how well, and
-//! which readings argue against the model. [`plan`] chooses poses and loads that are worth measuring. Derivatives are in closed
-//! form ([`tool_slopes`], [`compliance_slopes`], [`frequency_slopes`], [`structure_slopes`], and [`error_slopes`] along a motion).
-//!
-//! Not here: files, units, robots by name (the facade).
-#![allow(non_snake_case, reason = "monogram notation: X_WT, J; see docs/references.md")]
-#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
+//! [`identify_robot`] reads a file of measurements (`docs/identify.md`), finds what they tell of the robot file's numbers and says
+//! how well; [`plan_measurements`] chooses poses. What they are made of takes and gives values and is passed on here:
+//! [`identify`], [`plan`], [`MeasuredArm`].
 
-mod coupled_gears;
+mod answer;
+mod choose;
+mod doubts;
 mod encoders;
-mod identify;
-mod least_squares;
-mod measurement;
-mod parameter;
-mod plan;
-mod reading;
-mod response;
-mod sensitivity;
-mod slips;
-mod trajectory;
+mod error;
+mod file;
+mod page;
+pub(crate) mod parameters;
+mod plan_file;
+mod response_file;
+pub(crate) mod rewrite;
+mod uff;
+mod units;
 
-pub use coupled_gears::{CoupledOutput, coupled_gear_stiffness};
-pub use encoders::{GearEstimate, GearRun, gear_stiffness};
-pub use identify::{Found, HeldOut, Identified, IdentifyError, IdentifyOptions, identify};
-pub use least_squares::{Loss, Residuals, Search, Solution, SolveError, solve};
-pub use measurement::{MeasuredArm, NoAnswer};
-pub use parameter::{Effect, Parameter, Place, Plant};
-pub use plan::{Candidate, Plan, PlanOptions, plan};
-pub use reading::{
-    Component, Form, Instrument, LoadCase, MeasuredResponse, MeasuredShape, Measurements, Reading, ReadingKind, Row,
-    Target,
+use std::path::{Path, PathBuf};
+
+use flexarm_files::{check_free, write_all};
+pub use crate::estimation::{
+    Answer, Candidate, Component, CoupledOutput, Effect, Form, Found, FoundSlip, GearEstimate, GearRun, HeldOut,
+    Identified, IdentifyError, IdentifyOptions, Instrument, LoadCase, Loss, MeasuredArm, MeasuredResponse,
+    MeasuredShape, Measurements, NoAnswer, Parameter, Place, Plan, PlanOptions, Plant, Probe, Reading, ReadingKind,
+    ResponseSlopes, Row, Search, Slip, Structure, StructureSlopes, Target, compliance_slopes, coupled_gear_stiffness,
+    frequency_slopes, gear_stiffness, identify, likely_slip, plan, structure_slopes, tool_slopes,
 };
-pub use response::{Answer, Probe, ResponseSlopes, Structure, StructureSlopes, structure_slopes};
-pub use sensitivity::{FrequencySlopes, compliance_slopes, frequency_slopes, tool_slopes};
-pub use slips::{FoundSlip, Slip, likely_slip};
-pub use trajectory::{RunParameter, error_slopes};
+
+use self::answer::answer;
+use self::choose::{check_tool, chosen};
+use self::doubts::{encoder_caveats, frame_caveat, gear_caveat, load_caveats};
+use self::error::{of_names, of_slip};
+use self::file::{Cell, MeasurementInput};
+use self::parameters::Written;
+use self::units::{check_modes, check_units};
+use flexarm_run::Arm;
+use flexarm_run::caveat::Use;
+use flexarm_run::caveat::warnings;
+use flexarm_run::Error;
+use flexarm_run::Modelling;
+use flexarm_run::Robot;
+
+pub use self::answer::{
+    Compared, FittedParameter, FoundFrame, FoundPoint, HeldOutFigures, Identification, Residual, ResponseCurves,
+    ShapeFigures, Suspicious, Weight,
+};
+pub use self::encoders::EncoderFigures;
+pub use self::error::IdentifyFileError;
+pub use self::plan_file::{MeasurementPlan, PlanRequest, PlannedReading, plan_measurements};
+
+impl Arm {
+    /// The arm as the identification takes it: tree, springs, tool.
+    pub fn plant(&self) -> Plant {
+        parameters::plant(self.flexible())
+    }
+
+    /// What of the robot file can be identified on this arm, by the names that files and `--fit` use.
+    pub fn parameters(&self) -> Vec<Parameter> {
+        let special =
+            |name: &str| parameters::is_direction(name) || parameters::is_entry(name) || parameters::is_tool(name);
+        self.candidates_that(|name| !special(name))
+    }
+
+    /// The six directions of each lumped link's springs, `link.LINK.stiffness_factors[k]`: together they are the link's stiffness, which
+    /// [`Arm::parameters`] has as a whole.
+    pub fn link_directions(&self) -> Vec<Parameter> {
+        self.candidates_that(parameters::is_direction)
+    }
+
+    /// The 21 entries of the 6x6 of each lumped link in two parts, `link.LINK.stiffness[i][j]` with i up to j: not to be taken beside the
+    /// link's factors.
+    pub fn link_entries(&self) -> Vec<Parameter> {
+        self.candidates_that(parameters::is_entry)
+    }
+
+    /// The place and the attitude of the tool, `tcp.x` to `tcp.rz`: moved and turned about its own axes (m, rad).
+    pub fn tool_parameters(&self) -> Vec<Parameter> {
+        self.candidates_that(parameters::is_tool)
+    }
+
+    fn candidates_that(&self, wanted: impl Fn(&str) -> bool) -> Vec<Parameter> {
+        let all = parameters::candidates(self.robot(), self.flexible()).into_iter();
+        all.map(|c| c.parameter).filter(|parameter| wanted(&parameter.name)).collect()
+    }
+}
+
+/// What is asked of [`identify_robot`].
+#[derive(Clone, Debug, Default)]
+pub struct IdentifyRequest {
+    /// How links and drives are modelled.
+    pub modelling: Modelling,
+    /// Names of what is unknown, * for anything, in the place of those in the file.
+    pub fit: Vec<String>,
+    /// Folder of the new robot file and the page; nothing is written without it.
+    pub output: Option<PathBuf>,
+    /// Overwrite what is there.
+    pub overwrite: bool,
+}
+
+/// Finds what measurements tell of a robot's numbers, and writes a robot file with them.
+///
+/// # Errors
+/// [`Error::RobotFile`] with line and column for what is wrong in the file, [`Error::File`] for its tables; [`Error::Identify`]
+/// where the measurements cannot be met: units, frames, rank; [`Error::Taken`], [`Error::Write`].
+pub fn identify_robot(robot: &Robot, measurements: &Path, request: &IdentifyRequest) -> Result<Identification, Error> {
+    let arm = robot.flexible(request.modelling)?;
+    if parameters::candidates(robot, arm.flexible()).is_empty() {
+        return Err(IdentifyFileError::NothingGives.into());
+    }
+    let joints = joints_of(&arm);
+    let mut input = file::read(measurements, &Cell { joints: &joints, arm: &arm })?;
+    let chosen = chosen(&arm, &input, &request.fit)?;
+    let encoders = encoders::told(&arm, &input, &chosen)?;
+    input.measurements.readings.extend(encoders.iter().filter_map(EncoderFigures::reading));
+    if input.measurements.readings.is_empty() {
+        return Err(
+            IdentifyFileError::NoGear { joints: encoders.iter().map(|gear| gear.joint.clone()).collect() }.into()
+        );
+    }
+    let targets = match &request.output {
+        Some(folder) => Some(Targets::in_folder(folder, request.overwrite)?),
+        None => None,
+    };
+    check_tool(robot, &chosen, &input)?;
+    let plant = arm.plant();
+    check_modes(&plant, &input)?;
+    check_units(&plant, &input)?;
+    let parameters: Vec<Parameter> = chosen.iter().map(|c| c.parameter.clone()).collect();
+    let slides: Vec<bool> = joints.iter().map(|(_, slides)| *slides).collect();
+    if let Some(slip) = likely_slip(&plant, &parameters, &input.measurements, &slides) {
+        return Err(of_slip(slip, &joints));
+    }
+    let options = IdentifyOptions {
+        search: Search { loss: input.loss, ..Search::default() },
+        deviations_known: input.deviations_known,
+        ..IdentifyOptions::default()
+    };
+    let found = identify(&plant, &parameters, &input.measurements, &options).map_err(of_names(&input))?;
+    let mut answer = answer(robot, measurements, &plant, &parameters, &input, &found)?;
+    answer.caveats.extend(frame_caveat(&answer));
+    answer.caveats.extend(gear_caveat(robot));
+    answer.caveats.extend(encoder_caveats(&encoders));
+    let failed = |error: NoAnswer| IdentifyFileError::Fit(error.to_string());
+    answer.caveats.extend(load_caveats(&plant, &input).map_err(failed)?);
+    answer.caveats.extend(arm.told(Use::Any));
+    answer.warnings = warnings(&answer.caveats);
+    answer.encoders = encoders;
+    if let Some(targets) = targets {
+        targets.write(robot, &chosen, &found, &mut answer)?;
+    }
+    Ok(answer)
+}
+
+/// Actuated joints in coordinate order, and whether they slide.
+fn joints_of(arm: &Arm) -> Vec<(String, bool)> {
+    let model = &arm.flexible().model;
+    let actuated = &model.coordinates()[..model.n_actuated()];
+    actuated.iter().map(|c| (c.joint.clone(), c.kind == "prismatic")).collect()
+}
+
+/// Files of an answer.
+struct Targets {
+    robot: PathBuf,
+    page: PathBuf,
+}
+
+impl Targets {
+    fn in_folder(folder: &Path, overwrite: bool) -> Result<Self, Error> {
+        let targets = Self { robot: folder.join("robot.toml"), page: folder.join("identification.html") };
+        check_free(&[targets.robot.clone(), targets.page.clone()], overwrite)?;
+        Ok(targets)
+    }
+
+    fn write(
+        self,
+        robot: &Robot,
+        chosen: &[parameters::Candidate],
+        found: &Identified,
+        answer: &mut Identification,
+    ) -> Result<(), Error> {
+        let told = found.parameters.iter().zip(chosen).filter(|(p, _)| p.identifiable);
+        let told: Vec<(Found, Written)> = told.map(|(p, c)| (p.clone(), c.written.clone())).collect();
+        let text = flexarm_files::read_text(&robot.path)?;
+        let home = robot.path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = self.robot.parent().unwrap_or(Path::new("."));
+        // The place of the new file must be there for paths as seen from it.
+        std::fs::create_dir_all(folder).map_err(|source| Error::Write { path: folder.to_owned(), source })?;
+        let new = rewrite::rewritten(&text, &told, robot.tcp(), home, folder)
+            .map_err(|what| Error::File { path: robot.path.clone(), what })?;
+        (answer.file, answer.page) = (Some(self.robot.display().to_string()), Some(self.page.display().to_string()));
+        let page = page::html(answer);
+        write_all(&[(self.robot, new), (self.page, page)])?;
+        Ok(())
+    }
+}

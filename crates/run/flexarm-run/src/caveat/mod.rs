@@ -1,0 +1,47 @@
+//! Caveats about robots and runs: what is probably wrong with an input, or limits the worth of a result, as values.
+//!
+//! Every command that uses a robot says the same of it ([`told()`]); runs and statics add what they find themselves. Each
+//! sentence is made in one place ([`CaveatKind::found`]). Start at [`kinds`], the catalogue; `docs/caveats.md` lists it with
+//! the source of each yardstick.
+//!
+//! Not here: what makes a model impossible. That is an [`crate::Error`].
+
+pub(crate) mod balancers;
+pub(crate) mod chain;
+pub(crate) mod drives;
+pub mod kinds;
+mod kinds_of_use;
+pub(crate) mod links;
+pub(crate) mod loads;
+pub(crate) mod loops;
+pub mod motion;
+pub(crate) mod parts;
+pub(crate) mod pose;
+pub mod size;
+pub(crate) mod slip;
+pub(crate) mod stiffness;
+pub mod told;
+pub(crate) mod validity;
+
+pub use flexarm_settings::caveat::{Caveat, Severity};
+pub use flexarm_settings::caveat::{CaveatKind, once_each, warnings};
+pub use told::{Use, told};
+
+#[cfg(test)]
+mod tests {
+    use flexarm_settings::Setting;
+
+    use super::kinds;
+
+    #[test]
+    fn a_caveat_carries_the_settings_that_mend_it_as_values_and_names_them() {
+        let caveat = kinds::FEW_SAMPLES.found("run", 20.0, 12.5);
+        assert_eq!(caveat.settings, [Setting::Step, Setting::LogRate]);
+        let advice = format!("raise {} or lower {}", Setting::LogRate, Setting::Step);
+        assert!(caveat.message.ends_with(&advice), "{}", caveat.message);
+        assert!(!caveat.message.contains(['{', '}']), "{}", caveat.message);
+        // The values are for programs in the process; files and texts hold the sentence.
+        assert!(serde_json::to_value(&caveat).unwrap().get("settings").is_none());
+        assert!(kinds::EFFORT.found("joint 1", 3.0, 2.0).settings.is_empty());
+    }
+}

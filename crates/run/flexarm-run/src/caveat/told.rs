@@ -1,0 +1,109 @@
+//! What every command says of the robot, motion and loads that it is given.
+
+use std::sync::Arc;
+
+use flexarm_kinematics::Model;
+use flexarm_stepping::Linear;
+use flexarm_trajectory::LimitViolation;
+use nalgebra::Vector6;
+
+use super::size::{Size, middle};
+use super::{Caveat, motion, once_each};
+use crate::error::Error;
+use crate::flexible::FlexibleRobot;
+use crate::motion::Motion;
+use crate::posed::Posed;
+use crate::robot::Robot;
+use crate::scenario::Scenario;
+
+/// What a command does with a robot.
+#[derive(Clone, Copy)]
+pub enum Use<'a> {
+    /// Holds it at a pose (rad or m) with a wrench on the tool (world axes; N, N m).
+    Held(&'a [f64], &'a [f64; 6]),
+    /// Moves it along a motion with its loads.
+    Along(&'a Scenario),
+    /// Neither: the robot is looked at where its own motion begins, else in the middle of its joint ranges.
+    Any,
+}
+
+/// All caveats about a robot as it is modelled and about what a command does with it, each once.
+///
+/// * `of_robot`: [`Robot::caveats`], if they are known.
+pub fn told(
+    robot: &Robot,
+    flexible: &Arc<FlexibleRobot>,
+    of_robot: Option<&[Caveat]>,
+    used: Use<'_>,
+) -> Vec<Caveat> {
+    let mut caveats = of_model(robot, flexible, of_robot);
+    let (pose, wrench) = match used {
+        Use::Held(at, wrench) => (Ok(at.to_vec()), *wrench),
+        Use::Along(scenario) => {
+            caveats.extend(of_motion(&scenario.motion, &flexible.rigid));
+            caveats.extend(of_scenario(robot, scenario, flexible));
+            (standing_pose(robot, Some(&scenario.motion)), [0.0; 6])
+        }
+        Use::Any => {
+            let own = robot.default_trajectory.as_deref().and_then(|path| Motion::load(path, robot).ok());
+            (standing_pose(robot, own.as_ref()), [0.0; 6])
+        }
+    };
+    let standing = pose.and_then(|at| {
+        let posed = Posed::with(flexible.clone(), at)?;
+        let linear = posed.linear(&Vector6::from(wrench))?;
+        Ok(at_rest(robot, &posed, &linear, &wrench))
+    });
+    caveats.extend(standing.unwrap_or_else(|error| {
+        vec![Caveat::said("no-equilibrium", "robot", error.to_string(), "check stiffness, masses and units")]
+    }));
+    once_each(caveats)
+}
+
+/// As [`told()`], of a robot as its file models it, for commands that compute nothing of its links and drives.
+pub(crate) fn of_robot(robot: &Robot) -> Result<Vec<Caveat>, Error> {
+    Ok(told(robot, &Arc::new(robot.flexible_robot()?), None, Use::Any))
+}
+
+/// Of the files of a robot, and of its links and drives as they are modelled.
+pub(crate) fn of_model(robot: &Robot, flexible: &FlexibleRobot, of_robot: Option<&[Caveat]>) -> Vec<Caveat> {
+    let mut caveats = of_robot.map_or_else(|| robot.caveats(), <[Caveat]>::to_vec);
+    caveats.extend(flexible.caveats());
+    caveats
+}
+
+/// Of a motion on a robot.
+pub(crate) fn of_motion(motion: &Motion, rigid: &Model) -> Vec<Caveat> {
+    let mut caveats = motion.caveats();
+    let passed = |v: &LimitViolation| Caveat::said("joint-limit", &v.joint, format!("joint limit: {v}"), "");
+    caveats.extend(motion.violations.iter().map(passed));
+    caveats.extend(motion::of_motion(&motion.name, &motion.trajectory, rigid));
+    caveats
+}
+
+/// Of the loads and payloads of a scenario. Those that do not fit the robot are an error of the command.
+fn of_scenario(robot: &Robot, scenario: &Scenario, flexible: &FlexibleRobot) -> Vec<Caveat> {
+    let Ok(acting) = scenario.acting_on(robot, &flexible.model) else { return Vec::new() };
+    let loads = motion::of_loads(&acting.loads, scenario.duration_s(), &Size::of(&robot.rigid));
+    acting.caveats.into_iter().chain(loads).collect()
+}
+
+/// Of the arm at rest at a pose, under a wrench on the tool.
+pub(crate) fn at_rest(robot: &Robot, posed: &Posed, linear: &Linear, wrench: &[f64; 6]) -> Vec<Caveat> {
+    let mut caveats = posed.caveats();
+    caveats.extend(motion::of_wrench(wrench, &Size::of(&robot.rigid)));
+    caveats.extend(posed.validity(robot, linear));
+    caveats
+}
+
+/// Where a robot stands to be looked at: where the motion begins, else in the middle of its joint ranges (rad or m).
+pub(crate) fn standing_pose(robot: &Robot, motion: Option<&Motion>) -> Result<Vec<f64>, Error> {
+    let model = robot.rigid_model()?;
+    let actuated = &model.coordinates()[..model.n_actuated()];
+    let mut at: Vec<f64> = actuated.iter().map(|c| middle(c.limits.lower, c.limits.upper)).collect();
+    if let Some(motion) = motion {
+        let n = at.len();
+        motion.trajectory.sample(0.0, &mut at, &mut vec![0.0; n], &mut vec![0.0; n]);
+    }
+    Ok(at)
+}

@@ -1,0 +1,51 @@
+//! Files that robots are made of, read once: for programs that make many robots of nearly the same file.
+//!
+//! A file that changes while a cache lives is not read again.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use flexarm_fem::{ReducedLink, read_flex};
+use flexarm_urdf::{ReadOptions, UrdfRobot, read_urdf};
+
+use crate::error::Error;
+
+/// What was read.
+#[derive(Debug, Default)]
+pub struct FileCache {
+    /// By path and options.
+    urdfs: Mutex<HashMap<(PathBuf, String), Arc<UrdfRobot>>>,
+    links: Mutex<HashMap<PathBuf, Arc<ReducedLink>>>,
+}
+
+impl FileCache {
+    /// A description.
+    ///
+    /// # Errors
+    /// As [`read_urdf`].
+    pub(crate) fn urdf(&self, path: &Path, options: &ReadOptions) -> Result<UrdfRobot, Error> {
+        let key = (path.to_owned(), format!("{options:?}"));
+        let known = self.urdfs.lock().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();
+        if let Some(known) = known {
+            return Ok((*known).clone());
+        }
+        let read = Arc::new(read_urdf(path, options)?);
+        self.urdfs.lock().unwrap_or_else(PoisonError::into_inner).insert(key, read.clone());
+        Ok((*read).clone())
+    }
+
+    /// A reduced link.
+    ///
+    /// # Errors
+    /// As [`read_flex`].
+    pub(crate) fn flex(&self, path: &Path) -> Result<ReducedLink, Error> {
+        let known = self.links.lock().unwrap_or_else(PoisonError::into_inner).get(path).cloned();
+        if let Some(known) = known {
+            return Ok((*known).clone());
+        }
+        let read = Arc::new(read_flex(path).map_err(Box::new)?);
+        self.links.lock().unwrap_or_else(PoisonError::into_inner).insert(path.to_owned(), read.clone());
+        Ok((*read).clone())
+    }
+}

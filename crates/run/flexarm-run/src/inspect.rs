@@ -1,0 +1,290 @@
+//! What was loaded, and its kinematics and dynamics at one pose.
+
+use std::sync::Arc;
+
+use flexarm_flexlink::LinkForm;
+use flexarm_kinematics::{
+    Data, State, forward_kinematics_velocity, frame_jacobian, gravity_forces, mass_matrix, nonlinear_effects,
+};
+use flexarm_settings::Quantity;
+use nalgebra::{DMatrix, Matrix6xX, UnitQuaternion};
+use serde::Serialize;
+
+use crate::balancer::{self, BalancerInfo};
+use crate::caveat::{self, Caveat, Use, told};
+use crate::error::{Error, PoseError, ValueError};
+use crate::loops::{self, LoopInfo};
+use crate::mounting::RobotMounting;
+use crate::options::Modelling;
+use crate::posed::all_finite;
+use crate::robot::{Robot, tcp_frame};
+
+/// Answer of `flexarm inspect`. SI units; the Jacobian's rows are linear first, world axes, at the TCP.
+#[derive(Clone, Debug, Serialize)]
+pub struct Inspection {
+    /// Name of the robot.
+    pub robot: String,
+    /// Movable joints, in coordinate order.
+    pub joints: Vec<JointInfo>,
+    /// Links with their mass properties.
+    pub links: Vec<LinkInfo>,
+    /// Flexible links.
+    pub flexible_links: Vec<FlexibleInfo>,
+    /// Springs under the base; a beam or a mesh there is one of the flexible links.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mounting: Option<MountingInfo>,
+    /// Motors that move several joints.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coupling: Option<CouplingInfo>,
+    /// Tool centre point at the pose.
+    pub tcp: TcpInfo,
+    /// Pose asked for, in the order of `joints`.
+    pub q: Vec<f64>,
+    /// Velocity asked for.
+    pub velocity: Vec<f64>,
+    /// 6 rows × one column per joint.
+    pub jacobian: Vec<Vec<f64>>,
+    /// Of the rigid robot with its payload.
+    pub mass_matrix: Vec<Vec<f64>>,
+    /// Forces that hold the pose, against gravity and balancers.
+    pub gravity_torque: Vec<f64>,
+    /// `τ = M q̈ + bias`: gravity with centrifugal and Coriolis forces.
+    pub bias: Vec<f64>,
+    /// `bias - gravity_torque`.
+    pub coriolis: Vec<f64>,
+    /// Balancers at the pose; `gravity_torque` and `bias` have them in.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub balancers: Vec<BalancerInfo>,
+    /// Closed loops at the pose; their dependent joints are none of `joints`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub loops: Vec<LoopInfo>,
+    /// Total mass (kg), payload and base included.
+    pub mass_kg: f64,
+    /// What the caveats warn of, as sentences.
+    pub warnings: Vec<String>,
+    /// What is probably wrong with the input.
+    pub caveats: Vec<Caveat>,
+}
+
+/// A movable joint; limits are null where there are none.
+#[derive(Clone, Debug, Serialize)]
+pub struct JointInfo {
+    /// Name.
+    pub name: String,
+    /// revolute, continuous, prismatic.
+    #[serde(rename = "type")]
+    pub kind: &'static str,
+    /// Lowest position (rad or m).
+    pub lower: Option<f64>,
+    /// Highest position (rad or m).
+    pub upper: Option<f64>,
+    /// Highest speed.
+    pub velocity: Option<f64>,
+    /// Highest force.
+    pub effort: Option<f64>,
+}
+
+/// A link.
+#[derive(Clone, Debug, Serialize)]
+pub struct LinkInfo {
+    /// Name.
+    pub name: String,
+    /// Mass (kg); 0 for a mere frame.
+    pub mass_kg: f64,
+    /// Centre of mass in link axes (m).
+    pub com_m: [f64; 3],
+    /// `ixx iyy izz ixy ixz iyz` about the centre of mass, link axes (kg m²).
+    pub inertia: [f64; 6],
+}
+
+/// A flexible link.
+#[derive(Clone, Debug, Serialize)]
+pub struct FlexibleInfo {
+    /// Name.
+    pub name: String,
+    /// Where its stiffness comes from.
+    pub method: String,
+    /// Distance of the interfaces (m).
+    pub length_m: f64,
+    /// Masses of the two parts (kg).
+    pub parts_kg: Vec<f64>,
+    /// Stiffness at the split, 6×6, linear first.
+    pub stiffness: Vec<Vec<f64>>,
+    /// lumped or modal.
+    pub model: &'static str,
+    /// How many elastic coordinates it has.
+    pub coordinates: usize,
+    /// Of a modal link: natural frequencies with A held, all of them (Hz).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub modal_frequencies_hz: Option<Vec<f64>>,
+}
+
+/// Motors that move several joints.
+#[derive(Clone, Debug, Serialize)]
+pub struct CouplingInfo {
+    /// The joints.
+    pub joints: Vec<String>,
+    /// C of `q_joints = C q_motors`, motors behind their gears.
+    pub matrix: Vec<Vec<f64>>,
+}
+
+/// Springs under the base.
+#[derive(Clone, Debug, Serialize)]
+pub struct MountingInfo {
+    /// Name.
+    pub name: String,
+    /// Where they are, in the base link (m).
+    pub position_m: [f64; 3],
+    /// Their axes in the base link, w first.
+    pub quaternion_wxyz: [f64; 4],
+    /// Stiffness in their axes, 6×6, linear first.
+    pub stiffness: Vec<Vec<f64>>,
+    /// What rides on them beside the base (kg).
+    pub mass_kg: f64,
+}
+
+impl MountingInfo {
+    fn of(mounting: &RobotMounting) -> Option<Self> {
+        let RobotMounting::Springs { springs, .. } = mounting else { return None };
+        let attitude = UnitQuaternion::from_rotation_matrix(&springs.X_BS.rotation);
+        Some(Self {
+            name: springs.name.clone(),
+            position_m: springs.X_BS.translation.vector.into(),
+            quaternion_wxyz: [attitude.w, attitude.i, attitude.j, attitude.k],
+            stiffness: springs.K_S.row_iter().map(|row| row.iter().copied().collect()).collect(),
+            mass_kg: springs.inertia.map_or(0.0, |inertia| inertia.mass),
+        })
+    }
+}
+
+/// Pose of the tool centre point in the world.
+#[derive(Clone, Debug, Serialize)]
+pub struct TcpInfo {
+    /// Link that carries it.
+    pub link: String,
+    /// Position (m).
+    pub position_m: [f64; 3],
+    /// Attitude, w first.
+    pub quaternion_wxyz: [f64; 4],
+}
+
+fn finite(x: f64) -> Option<f64> {
+    x.is_finite().then_some(x)
+}
+
+fn rows(M: &DMatrix<f64>) -> Vec<Vec<f64>> {
+    M.row_iter().map(|r| r.iter().copied().collect()).collect()
+}
+
+/// Values of all actuated joints; zeros without any.
+///
+/// # Errors
+/// [`Error::Pose`] for another number of them, and for values that are no finite numbers.
+pub fn joint_values(values: Option<&[f64]>, joints: &[&str]) -> Result<Vec<f64>, Error> {
+    let Some(values) = values else { return Ok(vec![0.0; joints.len()]) };
+    if values.len() != joints.len() {
+        let joints = joints.iter().map(|joint| (*joint).to_owned()).collect();
+        return Err(PoseError::Count { found: values.len(), joints }.into());
+    }
+    match values.iter().zip(joints).find(|(value, _)| !value.is_finite()) {
+        Some((value, joint)) => Err(PoseError::NotFinite { joint: (*joint).to_owned(), value: *value }.into()),
+        None => {
+            let named = |(value, joint): (&f64, &&str)| Quantity::JOINT.check(&format!("joint {joint:?}"), *value);
+            Ok(values.iter().zip(joints).map(named).collect::<Result<_, _>>().map_err(ValueError::from)?)
+        }
+    }
+}
+
+/// The rigid robot (with payload) at a pose; `at` (rad or m) and `velocity` of all actuated joints, zero without.
+///
+/// # Errors
+/// [`Error::Pose`] for joint values that do not fit.
+pub fn inspect(robot: &Robot, at: Option<&[f64]>, velocity: Option<&[f64]>) -> Result<Inspection, Error> {
+    let model = robot.rigid_model()?;
+    let names: Vec<&str> = model.coordinates().iter().map(|c| c.joint.as_str()).collect();
+    let (q, v) = (joint_values(at, &names)?, joint_values(velocity, &names)?);
+    let mut state = State::zeros(&model);
+    state.q.copy_from_slice(&q);
+    state.qdot.copy_from_slice(&v);
+
+    let mut data = Data::new(&model);
+    loops::check_pose(&model, &mut data, &state.q)?;
+    balancer::check_pose(&model, &mut data, &state.q)?;
+    let M = mass_matrix(&model, &mut data, &state.q).clone();
+    let gravity = gravity_forces(&model, &mut data, &state.q).clone();
+    let bias = nonlinear_effects(&model, &mut data, &state).clone();
+    forward_kinematics_velocity(&model, &mut data, &state);
+    let tcp = tcp_frame(&model);
+    let mut J = Matrix6xX::zeros(model.nv());
+    frame_jacobian(&model, &data, &tcp, &mut J);
+    let X = data.X_WF(&tcp);
+    let attitude = UnitQuaternion::from_rotation_matrix(&X.rotation);
+    all_finite("the place of the TCP and its Jacobian", X.translation.vector.iter().chain(&J))?;
+    all_finite("the mass matrix and the torques", M.iter().chain(&gravity).chain(&bias))?;
+
+    let joints = model.coordinates().iter().map(|c| JointInfo {
+        name: c.joint.clone(),
+        kind: c.kind,
+        lower: finite(c.limits.lower),
+        upper: finite(c.limits.upper),
+        velocity: finite(c.limits.velocity),
+        effort: finite(c.limits.effort),
+    });
+    let links = robot.urdf.mechanism.links.iter().map(|l| {
+        let zero = ([0.0; 3], [0.0; 6], 0.0);
+        let (com_m, inertia, mass_kg) = l.inertia.map_or(zero, |i| {
+            let I = i.inertia_com;
+            (i.com.into(), [I[(0, 0)], I[(1, 1)], I[(2, 2)], I[(0, 1)], I[(0, 2)], I[(1, 2)]], i.mass)
+        });
+        LinkInfo { name: l.name.clone(), mass_kg, com_m, inertia }
+    });
+    let flexible = Arc::new(robot.flexible_robot()?);
+    // What is inspected is the rigid robot, which yields nowhere.
+    let mut caveats = told(robot, &flexible, None, Use::Held(&q, &[0.0; 6]));
+    caveats.retain(|caveat| caveat.code != "nothing-yields");
+    let forms = robot.flexible.iter().map(|link| robot.form_of(link, &Modelling::default()).map(|(form, _)| form));
+    let forms = forms.collect::<Result<Vec<_>, _>>()?;
+    let flexible_links = flexible.spans.iter().zip(&robot.flexible).zip(&forms).map(|((span, link), form)| {
+        let K = link.flexible.reduced.split.K_S;
+        let (coordinates, modal_frequencies_hz) = match form {
+            LinkForm::TwoParts => (6, None),
+            LinkForm::Chain(chain) => (6 * chain.joints.len(), None),
+            LinkForm::Modal(modal) => (modal.coordinates(), Some(modal.held_frequencies_hz())),
+        };
+        FlexibleInfo {
+            model: form.name(),
+            coordinates,
+            modal_frequencies_hz,
+            name: span.link.clone(),
+            method: link.flexible.reduced.provenance.method.clone(),
+            length_m: span.length,
+            parts_kg: span.part_masses.clone(),
+            stiffness: rows(&DMatrix::from_iterator(6, 6, K.iter().copied())),
+        }
+    });
+    Ok(Inspection {
+        robot: robot.name.clone(),
+        joints: joints.collect(),
+        links: links.collect(),
+        flexible_links: flexible_links.collect(),
+        coupling: robot.coupling.as_ref().map(|c| CouplingInfo { joints: c.joints.clone(), matrix: rows(&c.C) }),
+        mounting: robot.mounting.as_ref().and_then(MountingInfo::of),
+        tcp: TcpInfo {
+            link: robot.tcp.0.clone(),
+            position_m: X.translation.vector.into(),
+            quaternion_wxyz: [attitude.w, attitude.i, attitude.j, attitude.k],
+        },
+        q,
+        velocity: v,
+        jacobian: J.row_iter().map(|r| r.iter().copied().collect()).collect(),
+        mass_matrix: rows(&M),
+        coriolis: (&bias - &gravity).as_slice().to_vec(),
+        gravity_torque: gravity.as_slice().to_vec(),
+        bias: bias.as_slice().to_vec(),
+        balancers: balancer::at_pose(&model, &state.q),
+        loops: loops::at_pose(&model, &state.q),
+        mass_kg: robot.rigid.links.iter().filter_map(|l| l.inertia).map(|i| i.mass).fold(0.0, |sum, mass| sum + mass),
+        warnings: caveat::warnings(&caveats),
+        caveats,
+    })
+}

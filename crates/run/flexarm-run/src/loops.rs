@@ -1,0 +1,261 @@
+//! Closed loops as values: the pins that close the bars of a robot, where they can be, and how well they hand on force.
+
+use flexarm_kinematics::{
+    Data, Joint, JointKind, Link, LoopClosure, Mechanism, Model, ModelError, Pose, forward_kinematics,
+};
+use flexarm_trajectory::Trajectory;
+use nalgebra::{DVector, Rotation3, Unit, Vector3};
+use serde::Serialize;
+
+use crate::caveat::size::spread_poses;
+use crate::error::LoopError;
+use crate::robot::Robot;
+
+/// A loop to put on a robot ([`Robot::with_loops`]): a pin on one link goes through an eye of another one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RobotLoop {
+    /// Unique name.
+    pub name: String,
+    /// Link that carries the pin, and a point on its axis in link axes (m).
+    pub pin: (String, [f64; 3]),
+    /// Axis of the pin in axes of that link; that of the first dependent joint that turns if not given.
+    pub axis: Option<[f64; 3]>,
+    /// Link that has the eye, and its place in link axes (m).
+    pub eye: (String, [f64; 3]),
+    /// The two joints of the loop that follow from the others.
+    pub dependent: [String; 2],
+    /// Joint values near which it is assembled (rad or m); 0 for joints that are not named.
+    pub at: Vec<(String, f64)>,
+}
+
+/// A loop at a pose.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LoopInfo {
+    /// Name.
+    pub name: String,
+    /// The joints that follow from it.
+    pub dependent: Vec<DependentInfo>,
+    /// Transmission angle (rad, at most a right angle).
+    pub transmission_angle: f64,
+    /// The smallest one in poses spread over the joint ranges, without those that limits of dependent joints exclude.
+    pub smallest_transmission_angle: Option<f64>,
+}
+
+/// A dependent joint.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DependentInfo {
+    /// Name.
+    pub name: String,
+    /// revolute, continuous, prismatic.
+    #[serde(rename = "type")]
+    pub kind: &'static str,
+    /// Lowest position (rad or m).
+    pub lower: Option<f64>,
+    /// Highest position (rad or m).
+    pub upper: Option<f64>,
+    /// Where it is (rad or m).
+    pub q: f64,
+}
+
+impl Robot {
+    /// The same robot with closed loops more.
+    ///
+    /// # Errors
+    /// [`LoopError`]: links and joints that are not there, numbers that are none, a name that is taken, loops that are not planar, do
+    /// not close or are at a dead point where they are assembled, and joints that have a drive.
+    pub fn with_loops(mut self, loops: Vec<RobotLoop>) -> Result<Self, LoopError> {
+        for own in loops {
+            self.add_loop(own)?;
+        }
+        if let Some(drive) = self.drives.iter().find(|drive| owner(&self.rigid, &drive.joint).is_some()) {
+            let name = owner(&self.rigid, &drive.joint).unwrap_or_default().to_owned();
+            return Err(LoopError::Driven { name, joint: drive.joint.clone() });
+        }
+        self.check_loops()?;
+        Ok(self)
+    }
+
+    /// Frames for pin and eye: fixed to their links, so that a link that bends carries each on the part where it is.
+    pub(crate) fn add_loop(&mut self, own: RobotLoop) -> Result<(), LoopError> {
+        let RobotLoop { name, pin, axis, eye, dependent, at } = own;
+        if self.rigid.loops.iter().any(|other| other.name == name) {
+            return Err(LoopError::Twice { name });
+        }
+        for (link, place) in [&pin, &eye] {
+            if self.rigid.link(link).is_none() {
+                let known = self.rigid.links.iter().map(|l| l.name.clone()).filter(|l| !l.starts_with("__")).collect();
+                return Err(LoopError::UnknownLink { name, link: link.clone(), known });
+            }
+            if let Some(value) = place.iter().find(|x| !x.is_finite()) {
+                return Err(LoopError::NotFinite { name, what: format!("its point on link {link:?}"), value: *value });
+            }
+        }
+        let axis = match axis {
+            None => axis_of_joint(&self.rigid, &pin.0, &dependent)
+                .ok_or_else(|| LoopError::NoAxis { name: name.clone() })?,
+            Some(axis) => Unit::try_new(Vector3::from(axis), 1e-9)
+                .filter(|axis| axis.iter().all(|x| x.is_finite()))
+                .ok_or_else(|| LoopError::BadAxis { name: name.clone(), axis })?,
+        };
+        let frames = ["pin", "eye"].map(|end| format!("__loop_{name}_{end}"));
+        for ((link, place), frame) in [pin, eye].into_iter().zip(&frames) {
+            let X = Pose::from_parts(Vector3::from(place).into(), Rotation3::identity());
+            self.rigid.joints.push(Joint::new(format!("{frame}_joint"), JointKind::Fixed, link, frame, X));
+            self.rigid.links.push(Link { name: frame.clone(), inertia: None });
+        }
+        let [pin, eye] = frames;
+        self.rigid.loops.push(LoopClosure { name, pin, axis, eye, dependent, at });
+        Ok(())
+    }
+
+    /// Whether all loops close.
+    pub(crate) fn check_loops(&self) -> Result<(), LoopError> {
+        match Model::new(&self.rigid) {
+            Err(ModelError::BadLoop { name, what }) => Err(LoopError::Unfit { name, what }),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The loop that a joint follows from.
+pub(crate) fn owner<'m>(mechanism: &'m Mechanism, joint: &str) -> Option<&'m str> {
+    mechanism.loops.iter().find(|l| l.dependent.iter().any(|d| d == joint)).map(|l| l.name.as_str())
+}
+
+/// Axis of the first of the joints that turns, in axes of a link, all joints at zero.
+fn axis_of_joint(mechanism: &Mechanism, link: &str, joints: &[String; 2]) -> Option<Unit<Vector3<f64>>> {
+    let turning = joints.iter().filter_map(|name| mechanism.joint(name)).find(|joint| joint.kind.turns())?;
+    let axis = turning.kind.axis_motion()?.axis();
+    let at = rotation_at_zero(mechanism, &turning.child)?;
+    let link = rotation_at_zero(mechanism, link)?;
+    Unit::try_new(link.inverse() * (at * axis), 1e-9)
+}
+
+/// Attitude of a link with all joints at zero; none where the joints make no tree.
+fn rotation_at_zero(mechanism: &Mechanism, link: &str) -> Option<Rotation3<f64>> {
+    let (mut at, mut R) = (link, Rotation3::identity());
+    for _ in 0..=mechanism.joints.len() {
+        match mechanism.joints.iter().find(|joint| joint.child == at) {
+            Some(joint) => (at, R) = (&joint.parent, joint.X_PJ.rotation * R),
+            None => return Some(R),
+        }
+    }
+    None
+}
+
+fn finite(x: f64) -> Option<f64> {
+    x.is_finite().then_some(x)
+}
+
+/// Loops of the rigid robot at joint values (rad or m).
+pub(crate) fn at_pose(model: &Model, q: &DVector<f64>) -> Vec<LoopInfo> {
+    if model.loops().is_empty() {
+        return Vec::new();
+    }
+    let mut data = Data::new(model);
+    forward_kinematics(model, &mut data, q);
+    let smallest = over_ranges(model).smallest;
+    let joint = |k: usize| {
+        let c = &model.dependent()[k];
+        let (lower, upper) = (finite(c.limits.lower), finite(c.limits.upper));
+        DependentInfo { name: c.joint.clone(), kind: c.kind, lower, upper, q: data.dependent_values()[k] }
+    };
+    let info = |(k, own): (usize, &flexarm_kinematics::PlacedLoop)| LoopInfo {
+        name: own.name.clone(),
+        dependent: vec![joint(2 * k), joint(2 * k + 1)],
+        transmission_angle: data.transmission_angles()[k],
+        smallest_transmission_angle: finite(smallest[k]),
+    };
+    model.loops().iter().enumerate().map(info).collect()
+}
+
+/// What the loops do in poses spread over the joint ranges.
+pub(crate) struct OverRanges {
+    /// Smallest transmission angle of each loop (rad), infinite if there was no pose.
+    pub(crate) smallest: Vec<f64>,
+    /// Parts of the poses in which each does not close.
+    pub(crate) open: Vec<f64>,
+}
+
+/// Poses that a limit of a dependent joint excludes do not count.
+pub(crate) fn over_ranges(model: &Model) -> OverRanges {
+    let (n, mut data) = (model.loops().len(), Data::new(model));
+    let (mut smallest, mut open, mut poses) = (vec![f64::INFINITY; n], vec![0.0; n], 0.0);
+    for q in spread_poses(model) {
+        forward_kinematics(model, &mut data, &q);
+        poses += 1.0;
+        if let Some(k) = data.open_loop() {
+            open[k] += 1.0;
+            continue;
+        }
+        let values = model.dependent().iter().zip(data.dependent_values());
+        if values.into_iter().any(|(c, q)| *q < c.limits.lower || *q > c.limits.upper) {
+            continue;
+        }
+        smallest.iter_mut().zip(data.transmission_angles()).for_each(|(least, angle)| *least = least.min(*angle));
+    }
+    open.iter_mut().for_each(|open| *open /= poses);
+    OverRanges { smallest, open }
+}
+
+/// The first loop that does not close at these joint values (rad or m).
+///
+/// # Errors
+/// [`LoopError::Open`].
+pub(crate) fn check_pose(model: &Model, data: &mut Data, q: &DVector<f64>) -> Result<(), LoopError> {
+    if model.loops().is_empty() {
+        return Ok(());
+    }
+    forward_kinematics(model, data, q);
+    data.open_loop().map_or(Ok(()), |k| Err(LoopError::Open { name: model.loops()[k].name.clone() }))
+}
+
+/// Times at which a motion is looked at.
+const TIMES: usize = 1000;
+
+/// What the loops do along a motion of the rigid robot.
+pub(crate) struct AlongMotion {
+    /// Smallest transmission angle of each loop (rad), and when (s).
+    pub(crate) smallest: Vec<(f64, f64)>,
+    /// Lowest and highest value of each dependent joint (rad or m).
+    pub(crate) range: Vec<[f64; 2]>,
+}
+
+/// Follows a motion; loops must close and may not pass a dead point, where the bars could go on in two ways.
+///
+/// # Errors
+/// [`LoopError::AlongMotion`].
+pub fn along_motion(model: &Model, trajectory: &Trajectory) -> Result<AlongMotion, LoopError> {
+    let (n, loops) = (model.nv(), model.loops().len());
+    let mut seen = AlongMotion {
+        smallest: vec![(f64::INFINITY, 0.0); loops],
+        range: vec![[f64::INFINITY, f64::NEG_INFINITY]; model.dependent().len()],
+    };
+    if loops == 0 {
+        return Ok(seen);
+    }
+    let (mut data, mut q, mut v, mut a) = (Data::new(model), DVector::zeros(n), vec![0.0; n], vec![0.0; n]);
+    // Angles of the last two times.
+    let mut before: Vec<[f64; 2]> = vec![[f64::NAN; 2]; loops];
+    for i in 0..=TIMES {
+        let t = trajectory.duration() * i as f64 / TIMES as f64;
+        trajectory.sample(t, q.as_mut_slice(), &mut v, &mut a);
+        let at = |source| LoopError::AlongMotion { t, source: Box::new(source) };
+        check_pose(model, &mut data, &q).map_err(at)?;
+        for (k, angle) in data.transmission_angles().iter().copied().enumerate() {
+            // An angle that would have come below zero and rises again has been there.
+            let [last_but_one, last] = before[k];
+            if 2.0 * last - last_but_one <= 0.0 && angle > 0.0 && last < 0.2 {
+                return Err(at(LoopError::DeadPoint { name: model.loops()[k].name.clone() }));
+            }
+            before[k] = [last, angle];
+            if angle < seen.smallest[k].0 {
+                seen.smallest[k] = (angle, t);
+            }
+        }
+        for ([low, high], value) in seen.range.iter_mut().zip(data.dependent_values()) {
+            (*low, *high) = (low.min(*value), high.max(*value));
+        }
+    }
+    Ok(seen)
+}

@@ -1,0 +1,281 @@
+//! Trajectories for a robot: joints in coordinate order, checked against its limits.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use flexarm_kinematics::{Coordinate, Model};
+use flexarm_stepping::PrescribedMotion;
+use flexarm_trajectory::{JointLimits, JointSamples, KnownJoint, LimitViolation, Samples, Trajectory};
+
+use crate::caveat::{self, Caveat};
+use crate::error::{Error, PoseError, ValueError};
+use crate::motion_formats::{self, MotionFile, MotionOptions, ReadMotion, refuse_dependent, unknown_joints};
+use crate::robot::Robot;
+use crate::tool_path::{Cell, ToolPath};
+
+/// A trajectory whose joints are the model's actuated coordinates.
+#[derive(Clone, Debug)]
+pub struct Motion {
+    /// Name for logs.
+    pub name: String,
+    /// The file.
+    pub path: PathBuf,
+    /// The curves, in coordinate order.
+    pub trajectory: Arc<Trajectory>,
+    /// Limits that it passes.
+    pub violations: Vec<LimitViolation>,
+    /// The slip that would explain positions beyond their limits; empty if none would.
+    pub likely: &'static str,
+    /// Things worth telling.
+    pub warnings: Vec<String>,
+    /// Joints that the file does not name.
+    pub held: Vec<HeldJoint>,
+    /// What became of each move, of a motion that is told by the path of the tool.
+    pub tool_path: Option<Arc<ToolPath>>,
+    /// What the file is, in words; empty for a motion that was made.
+    pub format: String,
+    /// The topic of a bag.
+    pub topic: Option<String>,
+    /// Rows, messages or points of the file; none for waypoints.
+    pub samples: Option<usize>,
+    /// Joints of messages that the robot does not have; they are left out.
+    pub dropped: Vec<String>,
+    /// What was chosen, assumed and left out when the file was read.
+    pub notes: Vec<Caveat>,
+}
+
+/// A joint that a motion does not name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeldJoint {
+    /// Its name.
+    pub joint: String,
+    /// Where it stays, rad or m.
+    pub at: f64,
+    /// Whether the robot file says so.
+    pub told: bool,
+}
+
+struct Along(Arc<Trajectory>);
+
+impl PrescribedMotion for Along {
+    fn sample(&self, t: f64, q: &mut [f64], qdot: &mut [f64], qddot: &mut [f64]) {
+        self.0.sample(t, q, qdot, qddot);
+    }
+
+    fn velocity_jumps(&self) -> Vec<f64> {
+        let mut times: Vec<f64> = self.0.velocity_jumps().iter().map(|jump| jump.time_s).collect();
+        times.dedup();
+        times
+    }
+}
+
+/// Positions and speeds that the joints may have.
+pub fn limits(model: &Model) -> Vec<JointLimits> {
+    let actuated = &model.coordinates()[..model.n_actuated()];
+    let limits = actuated.iter().map(|c| JointLimits {
+        lower: c.limits.lower,
+        upper: c.limits.upper,
+        velocity: c.limits.velocity,
+        acceleration: None,
+    });
+    limits.collect()
+}
+
+impl Motion {
+    /// Reads a motion file for a robot, of any format that `docs/motions.md` has. A joint that it does not name stays where
+    /// the robot file says, else at zero, or at the limit nearest to it.
+    ///
+    /// # Errors
+    /// [`Error::File`], [`Error::Trajectory`] or [`Error::Motion`]: format, units, times, joints that the robot does not have;
+    /// [`Error::Model`].
+    pub fn load(path: impl AsRef<Path>, robot: &Robot) -> Result<Self, Error> {
+        Self::load_with(path, robot, &MotionOptions::default())
+    }
+
+    /// As [`Motion::load`], with the topic of a bag or the columns of a table told.
+    ///
+    /// # Errors
+    /// As [`Motion::load`], and for a topic or columns that are not there.
+    pub fn load_with(path: impl AsRef<Path>, robot: &Robot, options: &MotionOptions) -> Result<Self, Error> {
+        Self::load_text(path.as_ref(), None, robot, options)
+    }
+
+    /// As [`Motion::load_with`], with a text in the place of the one that the file has, if it is waypoints or a path of the tool.
+    pub(crate) fn load_text(
+        path: &Path,
+        text: Option<&str>,
+        robot: &Robot,
+        options: &MotionOptions,
+    ) -> Result<Self, Error> {
+        let model = robot.rigid_model()?;
+        let Robot { hold, controller, .. } = robot;
+        Self::read(path, &Cell { model: &model, tcp_link: Some(&robot.tcp.0), hold, controller }, options, text)
+    }
+
+    /// As [`Motion::load`], for a model alone.
+    ///
+    /// # Errors
+    /// As [`Motion::load`].
+    pub fn load_for(path: &Path, model: &Model) -> Result<Self, Error> {
+        Self::read(path, &Cell { model, tcp_link: None, hold: &[], controller: &[] }, &MotionOptions::default(), None)
+    }
+
+    /// The motion through sampled positions, by a spline as through the rows of a CSV file.
+    ///
+    /// * `t`: n times (s), increasing; the first becomes 0.
+    /// * `q`: n rows of all actuated joints in coordinate order, one after the other (rad or m).
+    ///
+    /// # Errors
+    /// [`Error::Pose`] for another number of values, [`Error::Trajectory`] for values that are no numbers or times that do
+    /// not increase; [`Error::Model`].
+    pub fn from_samples(t: &[f64], q: &[f64], robot: &Robot) -> Result<Self, Error> {
+        let model = robot.rigid_model()?;
+        let actuated = &model.coordinates()[..model.n_actuated()];
+        let n = actuated.len();
+        if q.len() != n * t.len() {
+            let (found, times) = (q.len(), t.len());
+            return Err(PoseError::Samples { found, times, joints: n }.into());
+        }
+        let column = |k: usize| q.iter().skip(k).step_by(n.max(1)).copied().collect();
+        let joint = |(k, c): (usize, &Coordinate)| JointSamples {
+            name: c.joint.clone(),
+            position: column(k),
+            ..JointSamples::default()
+        };
+        let samples = Samples { times: t.to_vec(), joints: actuated.iter().enumerate().map(joint).collect() };
+        Self::along(samples.interpolate()?, "samples", robot)
+    }
+
+    /// A motion along a trajectory that was made, not read: splines, plans of moves.
+    ///
+    /// * `name`: for logs and messages.
+    ///
+    /// # Errors
+    /// [`Error::File`] for joints that the robot does not have; [`Error::Model`].
+    pub fn along(trajectory: Trajectory, name: &str, robot: &Robot) -> Result<Self, Error> {
+        Self::of(trajectory, Path::new(name), &*robot.rigid_model()?, &robot.hold)
+    }
+
+    fn read(path: &Path, cell: &Cell<'_>, options: &MotionOptions, text: Option<&str>) -> Result<Self, Error> {
+        let Cell { model, hold, .. } = *cell;
+        let actuated = &model.coordinates()[..model.n_actuated()];
+        let named: Vec<(&str, JointLimits)> = actuated.iter().map(|c| c.joint.as_str()).zip(limits(model)).collect();
+        let joints: Vec<KnownJoint<'_>> =
+            actuated.iter().map(|c| KnownJoint { name: &c.joint, is_prismatic: c.kind == "prismatic" }).collect();
+        let file = MotionFile { path, joints: Some(&joints), limits: &named, options, cell: Some(cell), text };
+        let read = motion_formats::read(&file)?;
+        let ReadMotion { trajectory, format, topic, samples, dropped, caveats, tool_path } = read;
+        trajectory.check_units(&path.display().to_string(), &joints)?;
+        let motion = Self::of(trajectory, path, model, hold)?;
+        Ok(Self { format, topic, samples, dropped, notes: caveats, tool_path: tool_path.map(Arc::new), ..motion })
+    }
+
+    fn of(trajectory: Trajectory, path: &Path, model: &Model, hold: &[(String, f64)]) -> Result<Self, Error> {
+        let actuated = &model.coordinates()[..model.n_actuated()];
+        let limits = limits(model);
+        let names: Vec<&str> = actuated.iter().map(|c| c.joint.as_str()).collect();
+        let warnings = warnings(&trajectory, path);
+        let dependent: Vec<&str> = model.dependent().iter().map(|c| c.joint.as_str()).collect();
+        check_joints(path, trajectory.joints(), &names, &dependent)?;
+        let still = actuated.iter().filter(|c| !trajectory.joints().contains(&c.joint));
+        let place = |c: &Coordinate| {
+            let told = hold.iter().find(|(joint, _)| *joint == c.joint).map(|(_, value)| *value);
+            let at = told.unwrap_or(0.0f64.max(c.limits.lower).min(c.limits.upper));
+            HeldJoint { joint: c.joint.clone(), at, told: told.is_some() }
+        };
+        let held: Vec<HeldJoint> = still.map(place).collect();
+        let named_held: Vec<(&str, f64)> = held.iter().map(|held| (held.joint.as_str(), held.at)).collect();
+        let trajectory = trajectory.with_held_joints(&named_held)?;
+        let trajectory = trajectory
+            .with_joint_order(&names)
+            .map_err(|e| Error::File { path: path.to_owned(), what: e.to_string() })?;
+        let violations = trajectory.check_limits(&limits);
+        let likely = caveat::motion::degrees(&violations, model);
+        let name = path.file_stem().map_or_else(|| "trajectory".into(), |s| s.to_string_lossy().into_owned());
+        let (path, trajectory) = (path.to_owned(), Arc::new(trajectory));
+        let made = (String::new(), None, None, Vec::new(), Vec::new());
+        let (format, topic, samples, dropped, notes) = made;
+        Ok(Self {
+            name,
+            path,
+            trajectory,
+            violations,
+            likely,
+            warnings,
+            held,
+            format,
+            topic,
+            samples,
+            dropped,
+            notes,
+            tool_path: None,
+        })
+    }
+
+    /// The same motion in `factor` times the time, rests too.
+    ///
+    /// # Errors
+    /// [`Error::Trajectory`] unless `factor` is positive, and if numbers become too extreme.
+    pub fn scaled(self, factor: f64, model: &Model) -> Result<Self, Error> {
+        let trajectory = self.trajectory.scaled(factor)?;
+        let warnings = warnings(&trajectory, &self.path);
+        let limits = limits(model);
+        let violations = trajectory.check_limits(&limits);
+        let likely = caveat::motion::degrees(&violations, model);
+        // What was planned of each move holds at its own speed.
+        Ok(Self { trajectory: Arc::new(trajectory), violations, likely, warnings, tool_path: None, ..self })
+    }
+
+    /// The same motion with each corner, where a velocity jumps, replaced by a blend that lasts `seconds`.
+    ///
+    /// # Errors
+    /// [`Error::Value`] unless `seconds` is positive, [`Error::Trajectory`] if numbers become too extreme.
+    pub fn with_rounded_corners(self, seconds: f64, model: &Model) -> Result<Self, Error> {
+        if !(seconds > 0.0 && seconds.is_finite()) {
+            return Err(ValueError::CornerTime(seconds).into());
+        }
+        let trajectory = self.trajectory.with_rounded_corners(seconds)?;
+        let warnings = warnings(&trajectory, &self.path);
+        let violations = trajectory.check_limits(&limits(model));
+        Ok(Self { trajectory: Arc::new(trajectory), violations, warnings, ..self })
+    }
+
+    /// What is worth knowing about it.
+    pub fn caveats(&self) -> Vec<Caveat> {
+        let file = self.path.display().to_string();
+        let told = self.warnings.iter().map(|text| Caveat::said("trajectory", &file, text, ""));
+        self.notes.iter().cloned().chain(told).chain(self.held_note()).collect()
+    }
+
+    /// Which joints stay where, if the file does not name all: a note where the robot file says so, else a warning.
+    fn held_note(&self) -> Vec<Caveat> {
+        let (told, assumed): (Vec<&HeldJoint>, Vec<&HeldJoint>) = self.held.iter().partition(|held| held.told);
+        let file = self.path.display().to_string();
+        let said = |held: &[&HeldJoint], end: &str| {
+            let places: Vec<String> = held.iter().map(|held| format!("{:?} at {}", held.joint, held.at)).collect();
+            let places = places.join(", ");
+            let message = format!("{file}: joints that the motion does not name are held: {places}{end}");
+            Caveat::said("held-joints", &file, message, "name them in the motion to move them")
+        };
+        let assumed =
+            (!assumed.is_empty()).then(|| said(&assumed, " ([hold] in the robot file says where, in rad or m)"));
+        let told = (!told.is_empty()).then(|| said(&told, "").as_note());
+        assumed.into_iter().chain(told).collect()
+    }
+
+    /// For steppers.
+    pub fn prescribed(&self) -> Arc<dyn PrescribedMotion> {
+        Arc::new(Along(self.trajectory.clone()))
+    }
+}
+
+/// A motion must move joints that there are, and at least one of them.
+fn check_joints(path: &Path, moved: &[String], joints: &[&str], dependent: &[&str]) -> Result<(), Error> {
+    refuse_dependent(path, moved, joints, dependent)?;
+    let unknown: Vec<String> = moved.iter().filter(|name| !joints.contains(&name.as_str())).cloned().collect();
+    if unknown.is_empty() { Ok(()) } else { Err(unknown_joints(path, &unknown, joints)) }
+}
+
+fn warnings(trajectory: &Trajectory, path: &Path) -> Vec<String> {
+    trajectory.warnings().iter().map(|w| format!("{}: {w}", path.display())).collect()
+}

@@ -1,0 +1,209 @@
+//! A robot held at a pose: what statics, modes and frequency response begin with.
+
+use std::sync::Arc;
+
+use flexarm_analysis::engineering_strain;
+use flexarm_kinematics::{Data, Frame, Pose, State, Wrench, forward_kinematics, rotation_vector};
+use flexarm_settings::Quantity;
+use flexarm_stepping::{FlexibleArm, Held, Linear, OperatingPoint, StepError, linearise};
+use nalgebra::{DVector, Vector6};
+
+use crate::arm::Arm;
+use crate::balancer;
+use crate::caveat::pose::Standing;
+use crate::caveat::{Caveat, kinds, once_each, told, validity};
+use crate::error::{Error, PoseError, ValueError};
+use crate::flexible::FlexibleRobot;
+use crate::inspect::joint_values;
+use crate::loops;
+use crate::options::Modelling;
+use crate::robot::Robot;
+
+/// Flexible arm with its drives locked at a pose.
+pub struct Posed {
+    pub(crate) flexible: Arc<FlexibleRobot>,
+    pub(crate) arm: FlexibleArm,
+    pub(crate) tool: Frame,
+    /// Actuated joints, in coordinate order.
+    pub(crate) joints: Vec<String>,
+    /// Which of them slide.
+    pub(crate) prismatic: Vec<bool>,
+    /// Where they are.
+    pub(crate) at: Vec<f64>,
+    /// [`Robot::caveats`], if they are known.
+    of_robot: Option<Arc<[Caveat]>>,
+}
+
+/// A step error of a command that takes no step.
+pub(crate) fn failed(source: StepError) -> Error {
+    Error::Step { source, partial: false }
+}
+
+/// Checks force and moment on the tool, six numbers.
+pub fn check_wrench(wrench: &[f64]) -> Result<(), ValueError> {
+    let force = Quantity::FORCE.check_all("the force at the tool", wrench.iter().take(3));
+    let torque = Quantity::TORQUE.check_all("the torque at the tool", wrench.iter().skip(3));
+    Ok(force.and(torque)?)
+}
+
+impl Posed {
+    /// `at`: all actuated joints (rad or m), zero without it.
+    pub(crate) fn new(robot: &Robot, modelling: &Modelling, at: Option<&[f64]>) -> Result<Self, Error> {
+        let model = robot.rigid_model()?;
+        let names: Vec<&str> = model.coordinates().iter().map(|c| c.joint.as_str()).collect();
+        let at = joint_values(at, &names)?;
+        Self::held(robot, modelling, at)
+    }
+
+    /// `at` in coordinate order (rad or m).
+    pub(crate) fn held(robot: &Robot, modelling: &Modelling, at: Vec<f64>) -> Result<Self, Error> {
+        Self::with(Arc::new(robot.modelled(modelling)?), at)
+    }
+
+    /// An arm, its links and drives in place already; `at`: all actuated joints (rad or m), zero without it.
+    pub(crate) fn on(arm: &Arm, at: Option<&[f64]>) -> Result<Self, Error> {
+        let flexible = arm.shared();
+        let names: Vec<&str> = flexible.rigid.coordinates().iter().map(|c| c.joint.as_str()).collect();
+        let at = joint_values(at, &names)?;
+        Ok(Self { of_robot: Some(arm.robot_caveats()), ..Self::with(flexible, at)? })
+    }
+
+    /// A robot whose links and drives are in place; `at` in coordinate order (rad or m).
+    pub(crate) fn with(flexible: Arc<FlexibleRobot>, at: Vec<f64>) -> Result<Self, Error> {
+        loops::check_pose(&flexible.rigid, &mut Data::new(&flexible.rigid), &DVector::from_column_slice(&at))?;
+        balancer::check_pose(&flexible.rigid, &mut Data::new(&flexible.rigid), &DVector::from_column_slice(&at))?;
+        let model = flexible.model.clone();
+        let actuated = &model.coordinates()[..model.n_actuated()];
+        let joints: Vec<String> = actuated.iter().map(|c| c.joint.clone()).collect();
+        let prismatic = actuated.iter().map(|c| c.kind == "prismatic").collect();
+        let arm = flexible.arm(Arc::new(Held(at.clone()))).map_err(|error| flexible.explained(error))?;
+        Ok(Self { tool: flexible.tcp.clone(), flexible, arm, joints, prismatic, at, of_robot: None })
+    }
+
+    /// What is to be said of the robot and of the equilibrium that it is in, under a wrench on the tool (world axes).
+    pub(crate) fn told(&self, robot: &Robot, linear: &Linear, wrench: &[f64; 6]) -> Vec<Caveat> {
+        let mut caveats = told::of_model(robot, &self.flexible, self.of_robot.as_deref());
+        caveats.extend(told::at_rest(robot, self, linear, wrench));
+        once_each(caveats)
+    }
+
+    /// Whether the pose is within the joint ranges, and whether anything yields.
+    pub(crate) fn caveats(&self) -> Vec<Caveat> {
+        let model = &self.arm.model;
+        let mut caveats: Vec<Caveat> =
+            validity::outside_limits(&model.coordinates()[..model.n_actuated()], &self.at).collect();
+        if self.flexible.springs.is_empty() {
+            let message = "the robot has no flexible link and no elastic drive: it does not yield and does not vibrate";
+            caveats.push(Caveat::said(
+                "nothing-yields",
+                "robot",
+                message,
+                "add [[flexible_link]] or [[drive]] entries",
+            ));
+        }
+        caveats
+    }
+
+    /// The linear structure about the equilibrium under weight and a wrench at the TCP (world axes).
+    pub(crate) fn linear(&self, wrench: &Vector6<f64>) -> Result<Linear, Error> {
+        let F = Wrench::new(wrench.fixed_rows::<3>(0).into(), wrench.fixed_rows::<3>(3).into());
+        check_wrench(wrench.as_slice())?;
+        linearise(&self.arm, &self.tool, &F, 0.0).map_err(|error| self.flexible.explained(error))
+    }
+
+    /// The equilibrium under weight and a wrench at the TCP (world axes), as maps take it.
+    pub(crate) fn operating_point(&self, wrench: &[f64; 6]) -> Result<OperatingPoint, Error> {
+        let [fx, fy, fz, tx, ty, tz] = *wrench;
+        let mut at = OperatingPoint::new(self.arm.clone(), self.tool.clone());
+        let F = Wrench::new([fx, fy, fz].into(), [tx, ty, tz].into());
+        at.solve(&self.at, &F).map_err(|error| self.flexible.explained(error))?;
+        Ok(at)
+    }
+
+    /// The tool with every elastic coordinate at zero.
+    pub(crate) fn rigid_tool(&self) -> Pose {
+        let (mut data, state) = self.undeformed();
+        forward_kinematics(&self.arm.model, &mut data, &state.q);
+        data.X_WF(&self.tool)
+    }
+
+    /// Whether the models hold at an equilibrium: deflections of links, forces of drives.
+    pub(crate) fn validity(&self, robot: &Robot, linear: &Linear) -> Vec<Caveat> {
+        let links = self.flexible.spans.iter().zip(strains(&self.flexible, &self.arm, &linear.q));
+        let links = links.flat_map(|(span, (strain, rotation))| validity::link(&span.link, rotation, strain));
+        let holding = linear.holding.as_slice();
+        let efforts = validity::efforts(&kinds::HOLDING, self.arm.model.coordinates(), holding);
+        links.chain(efforts).chain(self.standing(robot, linear)).collect()
+    }
+
+    /// What the arm does at rest.
+    fn standing(&self, robot: &Robot, linear: &Linear) -> Vec<Caveat> {
+        let moved = linear.X_WT.translation.vector - self.rigid_tool().translation.vector;
+        let elastic = &linear.q.as_slice()[self.arm.model.n_actuated()..];
+        let (flexible, arm) = (&self.flexible, &self.arm);
+        Standing { robot, flexible, arm, elastic, sag_m: moved.norm() }.caveats()
+    }
+
+    /// Joints at the pose, elastic coordinates zero.
+    pub(crate) fn undeformed(&self) -> (Data, State) {
+        undeformed(&self.arm)
+    }
+}
+
+/// Joints where the motion begins, elastic coordinates zero.
+fn undeformed(arm: &FlexibleArm) -> (Data, State) {
+    let mut state = State::zeros(&arm.model);
+    arm.prescribed_state(0.0, &mut state, &mut DVector::zeros(arm.model.nv()));
+    (Data::new(&arm.model), state)
+}
+
+/// Engineering strain of each flexible link, and how far its far end has turned (rad), with all coordinates at `q`.
+pub(crate) fn strains(flexible: &FlexibleRobot, arm: &FlexibleArm, q: &DVector<f64>) -> Vec<(f64, f64)> {
+    let model = &arm.model;
+    let (mut data, straight) = undeformed(arm);
+    let mut ends = |q: &DVector<f64>| -> Vec<Pose> {
+        forward_kinematics(model, &mut data, q);
+        let pose = |link: &str, X: &Pose| data.X_WF(model.frame(link).expect("a link of the substitution")) * *X;
+        let spans = flexible.spans.iter();
+        spans.map(|s| pose(&s.link, &s.X_LA).inverse() * pose(&s.distal_link, &s.X_DB)).collect()
+    };
+    let (bent, straight) = (ends(q), ends(&straight.q));
+    let pairs = flexible.spans.iter().zip(bent.iter().zip(&straight));
+    pairs
+        .map(|(span, (bent, straight))| {
+            let change = bent.translation.vector.norm() - span.length;
+            let strain = engineering_strain(change, span.length).map_or(0.0, f64::abs);
+            (strain, rotation_vector((straight.rotation.inverse() * bent.rotation).matrix()).norm())
+        })
+        .collect()
+}
+
+impl Arm {
+    /// Mass, damping and stiffness about the equilibrium at a pose under weight and a wrench at the tool, and how the tool
+    /// follows the free coordinates.
+    ///
+    /// * `at`: all actuated joints (rad or m), zero without it.
+    /// * `wrench`: force and moment on the tool at its origin, world axes (N, N m).
+    ///
+    /// # Errors
+    /// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] where there is no equilibrium.
+    pub fn linearise(&self, at: Option<&[f64]>, wrench: [f64; 6]) -> Result<Linear, Error> {
+        Posed::on(self, at)?.linear(&wrench.into())
+    }
+}
+
+/// [`StepError`] of what a linear structure offers.
+pub(crate) fn step_error(source: StepError) -> Error {
+    failed(source)
+}
+
+/// Figures of an answer, which must be numbers.
+///
+/// # Errors
+/// [`Error::Pose`]: masses, lengths or joint values of 1e200 overflow on the way.
+pub(crate) fn all_finite<'a>(what: &str, values: impl IntoIterator<Item = &'a f64>) -> Result<(), Error> {
+    match values.into_iter().all(|x| x.is_finite()) {
+        true => Ok(()),
+        false => Err(PoseError::Overflow { what: what.to_owned() }.into()),
+    }
+}

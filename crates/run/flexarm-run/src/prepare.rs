@@ -1,0 +1,187 @@
+//! Everything about a run that can be told before its first step.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use flexarm_settings::Setting;
+use flexarm_stepping::{FlexibleArm, Load, PrescribedMotion, StepError, StepRule, Stepper, new_stepper};
+
+use crate::balancer;
+use crate::caveat::size::Size;
+use crate::caveat::{self, Caveat};
+use crate::error::{Error, ValueError};
+use crate::flexible::FlexibleRobot;
+use crate::loads_file::EXPRESSION_PERIOD;
+use crate::loops;
+use crate::magnification::Expected;
+use crate::motion::Motion;
+use crate::options::RunOptions;
+use crate::robot::Robot;
+use crate::scenario::Scenario;
+
+/// A robot that is modelled already.
+pub struct Prepared {
+    pub(crate) flexible: Arc<FlexibleRobot>,
+    /// Where the last motion began, and the arm in equilibrium there: modes and damping depend on nothing else of a motion.
+    start: Mutex<Option<(Vec<f64>, Arc<FlexibleArm>)>>,
+}
+
+impl Prepared {
+    pub(crate) fn new(flexible: FlexibleRobot) -> Self {
+        Self { flexible: Arc::new(flexible), start: Mutex::new(None) }
+    }
+
+    /// As [`FlexibleRobot::arm`], found again for a motion that begins where the last one did.
+    pub(crate) fn arm(&self, motion: Arc<dyn PrescribedMotion>) -> Result<FlexibleArm, StepError> {
+        let n = self.flexible.model.n_actuated();
+        let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        motion.sample(0.0, &mut q, &mut v, &mut a);
+        let known = self.start.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if let Some((_, arm)) = known.filter(|(start, _)| *start == q) {
+            return Ok(arm.along(motion));
+        }
+        let arm = self.flexible.arm(motion)?;
+        *self.start.lock().unwrap_or_else(PoisonError::into_inner) = Some((q, Arc::new(arm.clone())));
+        Ok(arm)
+    }
+}
+
+/// A run whose input makes sense.
+pub(crate) struct Checked {
+    pub(crate) flexible: Arc<FlexibleRobot>,
+    pub(crate) arm: Arc<FlexibleArm>,
+    pub(crate) stepper: Box<dyn Stepper>,
+    pub(crate) load_caveats: Vec<Caveat>,
+}
+
+impl Checked {
+    /// Deflections that the run will have, roughly.
+    pub(crate) fn expected(&self, scenario: &Scenario) -> Expected {
+        Expected::of(&self.arm, &self.flexible.tcp, scenario.duration_s(), scenario.start)
+    }
+}
+
+/// Everything about the input of a run that can be told before the first step. `prepared`: the robot as the options model it.
+pub fn checked(
+    robot: &Robot,
+    scenario: &Scenario,
+    options: &RunOptions,
+    prepared: Option<&Prepared>,
+) -> Result<Checked, Error> {
+    let motion = &scenario.motion;
+    runnable(motion, options)?;
+    let flexible = match prepared {
+        Some(prepared) => prepared.flexible.clone(),
+        None => Arc::new(robot.modelled(&options.modelling)?),
+    };
+    loops::along_motion(&flexible.rigid, &motion.trajectory)?;
+    balancer::check_motion(&flexible.rigid, &motion.trajectory)?;
+    let arm = match prepared {
+        Some(prepared) => prepared.arm(motion.prescribed()),
+        None => flexible.arm(motion.prescribed()),
+    };
+    let arm = arm.map_err(|error| flexible.explained(error))?;
+    let (arm, load_caveats) = loaded(robot, scenario, options, arm)?;
+    let arm = Arc::new(arm);
+    let stepper = new_stepper(options.stepper, arm.clone(), options.step_s, scenario.start)
+        .map_err(|error| flexible.explained(error))?;
+    Ok(Checked { flexible, arm, stepper, load_caveats })
+}
+
+/// Whether a motion keeps the joints' limits, and the options make sense with it.
+pub fn runnable(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
+    if !motion.violations.is_empty() && !options.ignore_limits {
+        let mut violations: Vec<String> = motion.violations.iter().map(ToString::to_string).collect();
+        if let Some(first) = violations.first_mut().filter(|_| !motion.likely.is_empty()) {
+            *first += &format!(" ({})", motion.likely);
+        }
+        return Err(Error::Limits { path: motion.path.clone(), violations });
+    }
+    check_options(motion, options)
+}
+
+/// The arm with the loads and payloads of a scenario, and what is to be said of them.
+pub fn loaded(
+    robot: &Robot,
+    scenario: &Scenario,
+    options: &RunOptions,
+    mut arm: FlexibleArm,
+) -> Result<(FlexibleArm, Vec<Caveat>), Error> {
+    let failed = |source: StepError| Error::Step { source, partial: false };
+    let mut load_caveats = Vec::new();
+    if !scenario.loads.is_empty() || !scenario.payloads.is_empty() {
+        let duration = scenario.duration_s();
+        let mut acting = scenario.acting_on(robot, &arm.model)?;
+        load_caveats = acting.caveats;
+        load_caveats.extend(caveat::motion::of_loads(&acting.loads, duration, &Size::of(&robot.rigid)));
+        if options.stepper.entry().steps != StepRule::ByErrorControl {
+            acting.loads.iter_mut().for_each(|load| stop_within(load, options.step_s));
+            load_caveats.extend(fast_loads(&acting.loads, options.step_s));
+        }
+        arm = arm.with_inertia_changes(acting.changes).map_err(failed)?;
+        arm = arm.with_timed_loads(acting.loads).map_err(failed)?;
+    }
+    Ok((arm, load_caveats))
+}
+
+/// Most steps of a run: some hours.
+const MOST_STEPS: f64 = 1e9;
+/// Factors by which deflections can be shown.
+const MAGNIFICATIONS: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
+
+/// Numbers must make sense, and step and duration make a run that comes to an end.
+fn check_options(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
+    let positive =
+        |x: f64, otherwise: fn(f64) -> ValueError| if x.is_finite() && x > 0.0 { Ok(()) } else { Err(otherwise(x)) };
+    positive(options.step_s, ValueError::Step)?;
+    positive(options.log_rate_hz, ValueError::LogRate)?;
+    positive(options.settling_band_m, ValueError::SettlingBand)?;
+    positive(options.magnification.unwrap_or(1.0), ValueError::Magnification)?;
+    if let Some(factor) = options.magnification.filter(|factor| !MAGNIFICATIONS.contains(factor)) {
+        let (least, most) = (*MAGNIFICATIONS.start(), *MAGNIFICATIONS.end());
+        return Err(ValueError::MagnificationRange { found: factor, least, most }.into());
+    }
+    let duration = motion.trajectory.duration();
+    let (step_s, duration_s) = (options.step_s, duration);
+    if step_s > duration_s {
+        return Err(ValueError::StepBeyondMotion { step_s, duration_s }.into());
+    }
+    if duration_s / step_s > MOST_STEPS {
+        return Err(ValueError::TooManySteps { step_s, duration_s, most: MOST_STEPS }.into());
+    }
+    Ok(())
+}
+
+/// Steps that a period of a load must last to be met well.
+const STEPS_PER_LOAD: f64 = 8.0;
+
+/// Steps that a short load is cut into: the trapezoidal rule has half a sine to 0.14 %.
+const STEPS_OF_SHORT_LOAD: u32 = 24;
+
+/// Bends at which steps end within it; there may be as many as a table has rows.
+const MOST_BENDS: usize = 100;
+
+/// Has steps end within a load that lasts so few of them that it would not act as the file says.
+fn stop_within(load: &mut Load, h: f64) {
+    let (first, last) = load.wrench.jumps.iter().fold((f64::INFINITY, 0.0f64), |(a, b), t| (a.min(*t), b.max(*t)));
+    let lasts = last - first;
+    if lasts > 0.0 && lasts < f64::from(STEPS_OF_SHORT_LOAD) * h {
+        let inner = (0..=STEPS_OF_SHORT_LOAD).map(|k| first + lasts * f64::from(k) / f64::from(STEPS_OF_SHORT_LOAD));
+        let bends = load.wrench.jumps.iter().copied().take(MOST_BENDS);
+        load.wrench.stops = inner.chain(bends).collect();
+    }
+}
+
+/// Loads that swing so fast that they do not act as the file says.
+fn fast_loads(loads: &[Load], h: f64) -> Vec<Caveat> {
+    let fast = |load: &Load| {
+        let period = load.wrench.period;
+        let steps = period / h;
+        (period != EXPRESSION_PERIOD && steps < STEPS_PER_LOAD).then(|| {
+            let hz = 1.0 / period;
+            let step = Setting::Step;
+            format!("a load of {hz:.1} Hz has {steps:.1} steps per period: it does not act as written; lower {step}")
+        })
+    };
+    let told = |text: String| Caveat::said("short-load", "loads", text, "lower the step").mended_by(&[Setting::Step]);
+    loads.iter().filter_map(|load| fast(load).map(told)).collect()
+}

@@ -1,0 +1,113 @@
+//! What can be said of a run before its first step, for single runs and for studies of many.
+
+use flexarm_kinematics::State;
+use flexarm_stepping::{FlexibleArm, StepRule, StepperKind};
+use nalgebra::DVector;
+
+use super::steps_per_sample;
+use crate::caveat::pose::Standing;
+use crate::caveat::{Caveat, Severity, kinds, told, validity};
+use crate::flexible::FlexibleRobot;
+use crate::motion::Motion;
+use crate::options::RunOptions;
+use crate::posed::strains;
+use crate::robot::Robot;
+
+/// Steps in a period of a gear's ripple with which a step of second order meets its amplitude within a few per cent.
+const RIPPLE_STEPS: f64 = 12.0;
+
+/// A run that is ready to go.
+pub struct BeforeRun<'a> {
+    pub(crate) robot: &'a Robot,
+    pub(crate) flexible: &'a FlexibleRobot,
+    pub(crate) arm: &'a FlexibleArm,
+    pub(crate) motion: &'a Motion,
+    pub(crate) options: &'a RunOptions,
+}
+
+impl BeforeRun<'_> {
+    /// Caveats about the models of the links, the motion, the arm at rest where it begins, steps and stepper.
+    ///
+    /// * `sag_m`: how far the TCP is off at rest (m).
+    pub(crate) fn caveats(&self, sag_m: f64) -> Vec<Caveat> {
+        let Self { robot, flexible, arm, motion, options } = *self;
+        let mut caveats = flexible.caveats();
+        caveats.extend(told::of_motion(motion, &flexible.rigid));
+        let elastic = arm.modes.equilibrium.as_slice();
+        caveats.extend(Standing { robot, flexible, arm, elastic, sag_m }.caveats());
+        if let Some(first) = arm.modes.frequencies_hz().first() {
+            let logged_hz = 1.0 / (steps_per_sample(options) as f64 * options.step_s);
+            caveats.extend(validity::sampling(*first, logged_hz));
+            caveats.extend(validity::step(options.stepper, options.step_s, *first, arm.first_damping_ratio()));
+        }
+        let moves = motion.trajectory.moves();
+        caveats.extend(validity::long_step(options.step_s, moves.iter().map(|m| m.end - m.start)));
+        if options.log_rate_hz * options.step_s > 1.0 + 1e-9 && options.log_rate_hz != RunOptions::default().log_rate_hz
+        {
+            caveats.push(kinds::LOG_RATE.found("run", options.log_rate_hz, 1.0 / options.step_s));
+        }
+        caveats.extend(self.spook());
+        caveats.extend(self.ripple());
+        if motion.trajectory.initial_speed() > 1e-6 {
+            let message = "the motion starts at speed: the first ringing is an artefact of the sudden start";
+            caveats.push(Caveat::said("starts-moving", "run", message, ""));
+        }
+        caveats
+    }
+
+    /// As [`Self::caveats`], for a study that keeps no samples: links are looked at where they rest, and torques of the rigid
+    /// robot beyond a limit warn.
+    pub(crate) fn caveats_of_study(&self, sag_m: f64) -> Vec<Caveat> {
+        let warns = |caveat: Caveat| match caveat.code == kinds::MOTION_EFFORT.code {
+            true => Caveat { severity: Severity::Warning, ..caveat },
+            false => caveat,
+        };
+        self.caveats(sag_m).into_iter().map(warns).chain(self.links_at_rest()).collect()
+    }
+
+    /// Links that bend too far at rest.
+    fn links_at_rest(&self) -> Vec<Caveat> {
+        let (arm, model) = (self.arm, &self.arm.model);
+        let mut state = State::zeros(model);
+        arm.prescribed_state(0.0, &mut state, &mut DVector::zeros(model.nv()));
+        let n = model.n_actuated();
+        state.q.rows_mut(n, model.nv() - n).copy_from(&arm.modes.equilibrium);
+        let links = self.flexible.spans.iter().zip(strains(self.flexible, arm, &state.q));
+        links.flat_map(|(span, (strain, rotation))| validity::link(&span.link, rotation, strain)).collect()
+    }
+
+    /// Damping that a stepper cannot take as it is.
+    fn spook(&self) -> Option<Caveat> {
+        let changes = matches!(self.options.stepper, StepperKind::Spook(_)) && !self.arm.proportional;
+        changes.then(|| {
+            let betas: Vec<String> = self.arm.tau.iter().map(|b| format!("{b:.2e}")).collect();
+            let message = format!(
+                "spook damps each spring in proportion to its stiffness: modal damping became D = beta K with beta = {} s, \
+                 exact for the first mode",
+                betas.join(", ")
+            );
+            Caveat::said("spook-damping", "run", message, "")
+        })
+    }
+
+    /// Ripple of a gear that is faster than the steps follow, at the largest speed of a thousand instants of the motion.
+    fn ripple(&self) -> Option<Caveat> {
+        let (arm, model, duration) = (self.arm, &self.arm.model, self.motion.trajectory.duration());
+        if arm.transmission.is_empty() || self.options.stepper.entry().steps == StepRule::ByErrorControl {
+            return None;
+        }
+        let mut state = State::zeros(model);
+        let mut fastest = vec![0.0f64; model.n_actuated()];
+        for k in 0..=1000 {
+            arm.prescribed_state(duration * f64::from(k) * 1e-3, &mut state, &mut DVector::zeros(model.nv()));
+            fastest.iter_mut().zip(state.qdot.iter()).for_each(|(most, rate)| *most = most.max(rate.abs()));
+        }
+        let harmonics =
+            arm.transmission.iter().flat_map(|error| error.harmonics.iter().map(move |h| (error.motor, h.cycles)));
+        let rates = harmonics.map(|(motor, cycles)| (motor, cycles * fastest[motor]));
+        let (motor, rate) = rates.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let steps = std::f64::consts::TAU / (rate * self.options.step_s);
+        let joint = format!("joint {:?}", model.coordinates()[motor].joint);
+        (steps < RIPPLE_STEPS).then(|| kinds::RIPPLE_STEP.found(joint, steps, RIPPLE_STEPS))
+    }
+}

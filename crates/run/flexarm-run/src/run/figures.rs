@@ -1,0 +1,175 @@
+//! The figures of a run, from what its monitors have seen, and whether its models held.
+
+use flexarm_analysis::TcpMetrics;
+use flexarm_kinematics::{Frame, State, forward_kinematics};
+use flexarm_log::Event;
+use flexarm_stepping::FlexibleArm;
+
+use super::before::BeforeRun;
+use super::{Run, Wanted, moves};
+use crate::caveat::{Caveat, drives, kinds, validity};
+use crate::flexible::Owner;
+use crate::headline::{self, Bending, ShareFigures};
+use crate::options::RunOptions;
+use crate::summary::{CURVE_PIECES, DriveFigures, LinkFigures, StepperFigures, Summary, TcpFigures};
+
+impl Run<'_> {
+    /// Figures of what was seen so far; `robot_caveats` stand before those of the run.
+    pub(super) fn summary(&self, robot_caveats: Vec<Caveat>) -> (Summary, Vec<Event>) {
+        // A run that stopped at once has nothing to measure.
+        let metrics = self.monitors.tool.result().metrics().ok();
+        let metrics = metrics.as_ref().filter(|_| self.options.with_twin);
+        let (links, elastic_drives) = (self.link_figures(), self.drive_figures());
+        let sag_m = static_sag(&self.arm, &self.tcp);
+        let robot = self.robot;
+        let by_choice = !robot.flexible.is_empty()
+            || robot.is_mounted()
+            || robot.drives.iter().any(|drive| drive.gearbox.is_some());
+        let coordinates = self.arm.model.coordinates().iter();
+        let peaks = coordinates.zip(self.monitors.drive_loads.result());
+        let mut summary = Summary {
+            bends: Bending {
+                links: links.iter().map(|link| link.name.clone()).filter(|name| !robot.stands_on(name)).collect(),
+                gearboxes: elastic_drives.iter().map(|drive| drive.joint.clone()).collect(),
+                mounting: links.iter().map(|link| link.name.clone()).find(|name| robot.stands_on(name)),
+            },
+            robot: robot.name.clone(),
+            trajectory: self.motion.name.clone(),
+            links_model: self.flexible.links_model().into(),
+            duration_s: self.monitors.tool.result().last_time_s().unwrap_or(0.0),
+            stepper: StepperFigures::new(self.options, self.stepper.counts()),
+            tcp: metrics.map(|m| self.tool_figures(m, sag_m)),
+            path: metrics.and_then(|_| self.monitors.tool_path.as_ref()?.result()),
+            frequencies_hz: self.arm.modes.frequencies_hz(),
+            energy: self.monitors.energy.result(),
+            drives: peaks.map(|(c, load)| (c.joint.clone(), load.peak)).collect(),
+            motors: self.motors.clone(),
+            moves_s: moves(self.motion).iter().map(|&(start, end)| [start, end]).collect(),
+            error_curve: self.monitors.tool.result().largest_errors(CURVE_PIECES),
+            links,
+            elastic_drives,
+            ..Summary::default()
+        };
+        summary.caveats = self.caveats(&summary, sag_m, robot_caveats);
+        summary.headline = headline::headline(&summary, by_choice);
+        let events = if self.wanted == Wanted::Curves { self.events(metrics) } else { Vec::new() };
+        (summary, events)
+    }
+
+    fn link_figures(&self) -> Vec<LinkFigures> {
+        let seen = self.monitors.contributions.result().iter().zip(self.monitors.strains.result());
+        let figures = self.flexible.spans.iter().zip(seen).map(|(span, (moved, strained))| LinkFigures {
+            name: span.link.clone(),
+            peak_contribution_m: moved.peak_m,
+            engineering_strain: strained.strain,
+            peak_rotation_rad: strained.rotation,
+        });
+        figures.collect()
+    }
+
+    fn drive_figures(&self) -> Vec<DriveFigures> {
+        let moved = &self.monitors.contributions.result()[self.flexible.spans.len()..];
+        let seen = moved.iter().zip(self.monitors.deflections.result());
+        let drives = self.robot.drives.iter().zip(seen).enumerate();
+        let elastic = drives.filter(|(k, _)| self.flexible.owners.contains(&Owner::Drive(*k)));
+        let figures = elastic.map(|(_, (drive, (moved, deflection)))| DriveFigures {
+            joint: drive.joint.clone(),
+            peak_contribution_m: moved.peak_m,
+            peak_deflection_rad: *deflection,
+        });
+        figures.collect()
+    }
+
+    fn tool_figures(&self, metrics: &TcpMetrics, static_sag_m: f64) -> TcpFigures {
+        let figures = TcpFigures {
+            static_sag_m,
+            shares_at_peak: self.shares_at_peak(),
+            ..TcpFigures::from(metrics).with_band(self.options.settling_band_m)
+        };
+        match self.monitors.tool.result().parts() {
+            Ok(parts) => figures.with_parts(&parts),
+            Err(_) => figures,
+        }
+    }
+
+    /// What each contributor has in the largest error, along its direction.
+    fn shares_at_peak(&self) -> Vec<ShareFigures> {
+        let (along, rest) = self.at_peak.along(&self.tcp);
+        let mut places = vec![0.0; self.monitors.contributions.moved().len()];
+        for (k, along) in along.iter().enumerate() {
+            places[self.monitors.contributions.place_of(k, &self.arm)] += along;
+        }
+        let shares = self.contributors.iter().map(|who| ShareFigures {
+            name: who.name.clone(),
+            kind: who.kind.into(),
+            along_m: places[who.place],
+        });
+        let of_stepper = self.options.stepper.entry().maximal.then(|| ShareFigures {
+            name: self.options.stepper.name().into(),
+            kind: headline::STEPPER.into(),
+            along_m: rest,
+        });
+        shares.chain(of_stepper).collect()
+    }
+
+    /// What is probably wrong with the input, and whether the models held in what was seen so far.
+    fn caveats(&self, summary: &Summary, sag_m: f64, mut caveats: Vec<Caveat>) -> Vec<Caveat> {
+        let (robot, flexible, arm, motion, options) =
+            (self.robot, self.flexible, &*self.arm, self.motion, self.options);
+        caveats.extend(BeforeRun { robot, flexible, arm, motion, options }.caveats(sag_m));
+        caveats.extend(self.drive_caveats());
+        if let Some(tcp) = summary.tcp.as_ref() {
+            let of_stepper = tcp.shares_at_peak.iter().filter(|share| share.kind == headline::STEPPER);
+            caveats.extend(of_stepper.filter_map(|s| validity::drift(&s.name, s.along_m.abs() / tcp.peak_m)));
+            let usual_m = RunOptions::default().settling_band_m;
+            let stops = !tcp.holds.is_empty();
+            caveats.extend(validity::band(self.options.settling_band_m, tcp.peak_m, usual_m).filter(|_| stops));
+        }
+        for link in &summary.links {
+            caveats.extend(validity::link(&link.name, link.peak_rotation_rad, link.engineering_strain));
+        }
+        caveats.extend(validity::energy(self.monitors.energy.result().imbalance));
+        caveats.extend(self.effort_caveats());
+        caveats
+    }
+
+    /// How far gearboxes give way.
+    fn drive_caveats(&self) -> Vec<Caveat> {
+        let coordinates = self.arm.model.coordinates();
+        let drives = self.robot.drives.iter().zip(self.monitors.deflections.result()).enumerate();
+        let elastic = drives.filter(|(k, _)| self.flexible.owners.contains(&Owner::Drive(*k)));
+        let found = elastic.flat_map(|(_, (drive, give))| {
+            let joint = coordinates.iter().find(|c| c.joint == drive.joint);
+            let slides = joint.is_some_and(|c| c.kind == "prismatic");
+            let [turned, moved] = if slides { [0.0, *give] } else { [*give, 0.0] };
+            let effort = joint.map_or(f64::INFINITY, |c| c.limits.effort);
+            drives::give(drive, effort, (turned - drive.backlash).max(0.0), moved, 2.0)
+        });
+        found.collect()
+    }
+
+    /// Forces of drives against their limits.
+    fn effort_caveats(&self) -> Vec<Caveat> {
+        let (coordinates, loads) = (self.arm.model.coordinates(), self.monitors.drive_loads.result());
+        let peaks: Vec<f64> = loads.iter().map(|load| load.peak).collect();
+        let mut caveats: Vec<Caveat> = validity::efforts(&kinds::EFFORT, coordinates, &peaks).collect();
+        for (c, load) in coordinates.iter().zip(loads).filter(|(_, load)| load.at_limit > 0) {
+            let share = 100.0 * load.at_limit as f64 / self.monitors.tool.result().len() as f64;
+            caveats.push(kinds::SERVO_LIMIT.found(format!("joint {:?}", c.joint), share, 0.0));
+        }
+        caveats
+    }
+}
+
+/// TCP error with the drives at rest in their first position, also for runs that start undeformed (m).
+pub fn static_sag(arm: &FlexibleArm, tcp: &Frame) -> f64 {
+    let model = &arm.model;
+    let (mut data, mut state) = (arm.lend_data(), State::zeros(model));
+    arm.prescribed_state(0.0, &mut state, &mut nalgebra::DVector::zeros(model.nv()));
+    forward_kinematics(model, &mut data, &state.q);
+    let rigid = data.X_WF(tcp).translation.vector;
+    let n = model.n_actuated();
+    state.q.rows_mut(n, model.nv() - n).copy_from(&arm.modes.equilibrium);
+    forward_kinematics(model, &mut data, &state.q);
+    (data.X_WF(tcp).translation.vector - rigid).norm()
+}

@@ -1,0 +1,42 @@
+//! Our own TOML files: each begins with `format = 1`, and what is wrong in it is told with its place.
+
+use flexarm_files::Source;
+use serde::de::DeserializeOwned;
+use toml::Spanned;
+
+use crate::ranges::{Ranges, not_finite, outside};
+use crate::robot_file::RobotFileError;
+
+/// The content of a file.
+///
+/// * `ranges`: of its numbers.
+/// * `format`: where its version stands.
+///
+/// # Errors
+/// [`RobotFileError`] with line and column for anything that is not the format.
+pub fn parsed<T: DeserializeOwned>(
+    text: &str,
+    source: &Source,
+    ranges: Ranges,
+    format: impl Fn(&T) -> &Spanned<i64>,
+) -> Result<T, RobotFileError> {
+    let file: T = toml::from_str(text).map_err(|error| {
+        let hint = match error.message().contains("missing field `format`") {
+            true => ": add format = 1 as the first line",
+            false => "",
+        };
+        source.unread(error.span(), &format!("{}{hint}", error.message().trim()))
+    })?;
+    let version = format(&file);
+    if *version.get_ref() != 1 {
+        let found = version.get_ref();
+        let message = format!("format is {found}, this program reads format 1: change it or update flexarm");
+        return Err(source.error(version.span(), message));
+    }
+    // Files with ranges of their own say for each key what it is; the others are only read here.
+    let unknown = if ranges.is_empty() { not_finite(text) } else { None };
+    match outside(text, ranges).or(unknown) {
+        Some((span, message)) => Err(source.error(span, message)),
+        None => Ok(file),
+    }
+}

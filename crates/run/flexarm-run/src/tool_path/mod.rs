@@ -1,0 +1,274 @@
+//! Motions told by the path of the tool: a program of moves and a robot become joints over time.
+//!
+//! `file` reads our own path files; robot programs come as a [`Program`] from elsewhere. Both end in [`ToolPath::plan`].
+
+mod file;
+mod program;
+mod standard;
+
+use std::path::Path;
+
+use flexarm_kinematics::{Frame, Model, Pose};
+use flexarm_path::program::{Note, Program};
+use flexarm_path::{
+    ControllerAxis, JointBounds, PathOptions, PlannedMove, ProgramArm, Slowed, SlowedBy, coordinates_of, plan,
+};
+use flexarm_trajectory::Trajectory;
+use nalgebra::DVector;
+
+use crate::caveat::Caveat;
+use crate::controller_entry::RobotAxis;
+use crate::error::Error;
+use crate::robot::tcp_frame;
+
+pub(crate) use file::{is_path_file, read_path_file};
+pub use program::program_text;
+pub(crate) use program::read_robot_program;
+
+/// A joint reaches its top speed in this time where nothing is known of its acceleration, s.
+const TO_TOP_SPEED: f64 = 0.4;
+/// Acceleration of a joint whose speed is not limited either, rad/s² or m/s².
+const ACCELERATION: f64 = 10.0;
+/// Least singular value below which a path passes near a singular pose, m/rad.
+const NEAR_SINGULAR: f64 = 0.02;
+/// Notes of one kind that are told one by one.
+const TOLD: usize = 4;
+/// The link that ROS gives the axes of the controller's flange, and the one of its base.
+const FLANGE: &str = "tool0";
+const BASE: &str = "base";
+
+/// A motion of the tool with what became of each move.
+#[derive(Debug, Clone)]
+pub struct ToolPath {
+    /// Move by move.
+    pub moves: Vec<PlannedMove>,
+    /// The file.
+    pub(crate) file: String,
+    /// Bounds of jerks that the motion keeps, by joint, rad/s³ or m/s³.
+    pub(crate) jerks: Vec<(String, f64)>,
+    /// Things worth telling.
+    pub(crate) warnings: Vec<String>,
+    /// Things that may be known anyway.
+    pub(crate) notes: Vec<String>,
+}
+
+/// What is known of the robot beside its model.
+#[derive(Clone, Copy)]
+pub struct Cell<'a> {
+    pub(crate) model: &'a Model,
+    /// Link that carries the tool centre point.
+    pub(crate) tcp_link: Option<&'a str>,
+    /// Joints that stay, and where.
+    pub(crate) hold: &'a [(String, f64)],
+    /// Axes that the controller counts otherwise than the joints.
+    pub(crate) controller: &'a [RobotAxis],
+}
+
+/// What was taken of the robot for want of better knowledge, as sentences.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Assumed {
+    /// Where tools stand; of no account where a path has none of its own.
+    pub(crate) flange: Option<String>,
+    pub(crate) accelerations: Option<String>,
+}
+
+impl Assumed {
+    pub(crate) fn warnings(self) -> Vec<String> {
+        self.flange.into_iter().chain(self.accelerations).collect()
+    }
+}
+
+/// Changes to what the robot's description says of its joints.
+#[derive(Debug, Clone, Default)]
+pub struct Overrides {
+    pub(crate) velocities: Vec<Option<f64>>,
+    pub(crate) accelerations: Vec<Option<f64>>,
+    pub(crate) jerks: Vec<Option<f64>>,
+    pub(crate) torques: Vec<Option<f64>>,
+}
+
+impl<'a> Cell<'a> {
+    /// The flange of the controller, the robot's own tool on it, and a note if a link had to be chosen.
+    fn flange(&self) -> (Frame, Pose, Option<String>) {
+        let tcp = tcp_frame(self.model);
+        let named = |name: &str| self.model.frame(name).filter(|frame| frame.body == tcp.body).cloned();
+        let (flange, note) = match (named(FLANGE), self.tcp_link.and_then(named)) {
+            (Some(flange), _) => (flange, None),
+            (None, Some(link)) => {
+                let note = format!(
+                    "tools of the program are taken to stand on link {:?}: the robot has no link {FLANGE:?}",
+                    link.name
+                );
+                (link, Some(note))
+            }
+            (None, None) => {
+                (tcp.clone(), Some("tools of the program are taken to stand on the tool centre point".to_owned()))
+            }
+        };
+        let X_FT = flange.X_BF.inverse() * tcp.X_BF;
+        (flange, X_FT, note)
+    }
+
+    /// Where the controller's world stands in that of the model: its link `base`, if that does not move.
+    fn world(&self) -> Pose {
+        let base = self.model.frame(BASE).filter(|frame| frame.body == 0);
+        base.map_or_else(Pose::identity, |frame| frame.X_BF)
+    }
+
+    /// All coordinates before the program.
+    fn rest(&self) -> DVector<f64> {
+        let coordinates = self.model.coordinates();
+        DVector::from_fn(self.model.nv(), |k, _| {
+            let c = &coordinates[k];
+            let told = self.hold.iter().find(|(joint, _)| *joint == c.joint).map(|(_, value)| *value);
+            told.unwrap_or(0.0f64.max(c.limits.lower).min(c.limits.upper))
+        })
+    }
+
+    /// How the controller counts these axes; empty where it counts the joints.
+    pub(crate) fn controller_axes(&self, axes: &[usize]) -> Vec<ControllerAxis> {
+        let place = |joint: &str| axes.iter().position(|&k| self.model.coordinates()[k].joint == joint);
+        let axis = |&k: &usize| {
+            let told = self.controller.iter().find(|axis| axis.joint == self.model.coordinates()[k].joint);
+            told.map_or(ControllerAxis::SAME, |told| {
+                let relative = told.relative.as_ref();
+                let relative = relative.and_then(|(joint, factor)| Some((place(joint)?, *factor)));
+                ControllerAxis { sense: told.sense, zero: told.zero, relative }
+            })
+        };
+        if self.controller.is_empty() { Vec::new() } else { axes.iter().map(axis).collect() }
+    }
+
+    /// The arm as the program's controller sees it.
+    pub(crate) fn arm(&self, overrides: &Overrides) -> (ProgramArm<'a>, Assumed) {
+        let (flange, X_FT, flange_note) = self.flange();
+        let mut assumed = false;
+        let of = |list: &[Option<f64>], k: usize| list.get(k).copied().flatten();
+        let bounds = (0..self.model.nv())
+            .map(|k| {
+                let velocity = of(&overrides.velocities, k).unwrap_or(self.model.coordinates()[k].limits.velocity);
+                let velocity = if velocity > 0.0 { velocity } else { f64::INFINITY };
+                let acceleration = of(&overrides.accelerations, k).unwrap_or_else(|| {
+                    assumed = true;
+                    if velocity.is_finite() { velocity / TO_TOP_SPEED } else { ACCELERATION }
+                });
+                let (torque, jerk) = (of(&overrides.torques, k), of(&overrides.jerks, k));
+                JointBounds { velocity, acceleration, torque, jerk }
+            })
+            .collect();
+        let accelerations = assumed.then(|| {
+            format!(
+                "accelerations of the joints are not known: each is taken to reach its top speed in {TO_TOP_SPEED} s ([limits] of a \
+                 path file tells them)"
+            )
+        });
+        let axes = coordinates_of(self.model, &tcp_frame(self.model));
+        let (X_MW, rest) = (self.world(), self.rest());
+        let controller = Vec::new();
+        let arm =
+            ProgramArm { model: self.model, flange, X_FT, X_MW, axes, controller, bounds, rest, starts_at_rest: false };
+        (arm, Assumed { flange: flange_note, accelerations })
+    }
+}
+
+impl ToolPath {
+    /// Joints over time for a program; `warnings` are what was found before.
+    pub(crate) fn plan(
+        file: &Path,
+        program: &Program,
+        arm: &ProgramArm<'_>,
+        options: &PathOptions,
+        mut warnings: Vec<String>,
+    ) -> Result<(Trajectory, Self), Error> {
+        let planned = plan(program, arm, options).map_err(|source| {
+            let notes = program.notes.iter().take(TOLD).map(noted).collect();
+            Error::Path { path: file.to_owned(), source: Box::new(source), notes }
+        })?;
+        let stops = planned.stops.iter().map(|(line, why)| format!("line {line}: no blend: {why}")).collect();
+        warnings.extend(first_of(stops));
+        let held = planned.held.join(", ");
+        if !held.is_empty() {
+            let what = match options.rule {
+                None => "stay while the tool follows its path (redundancy of a path file chooses otherwise)",
+                Some(_) => "move by themselves, towards the posture that is asked for",
+            };
+            warnings.push(format!("the arm has more joints than the path needs: {held} {what}"));
+        }
+        warnings.extend(tool_warning(program, arm));
+        let slowed = planned.moves.iter().filter_map(|of| of.slowed.as_ref().map(|slowed| slowed_warning(of, slowed)));
+        warnings.extend(first_of(slowed.collect()));
+        let near = planned.moves.iter().filter_map(|of| {
+            let (sigma, t) = of.least_sigma.filter(|(sigma, _)| *sigma < NEAR_SINGULAR)?;
+            Some(format!(
+                "line {}: {}: passes near a singular pose at {t:.3} s (least singular value {sigma:.1e} m/rad): joints move fast \
+                 for little of the tool",
+                of.line, of.statement
+            ))
+        });
+        warnings.extend(first_of(near.collect()));
+        let notes = program.notes.iter().map(noted).collect();
+        let jerk = |(k, bounds): (usize, &JointBounds)| Some((arm.model.coordinates()[k].joint.clone(), bounds.jerk?));
+        let jerks = arm.bounds.iter().enumerate().filter_map(jerk).collect();
+        let file = file.display().to_string();
+        Ok((planned.trajectory, Self { moves: planned.moves, file, jerks, warnings, notes }))
+    }
+
+    /// Bound of a joint's jerk, rad/s³ or m/s³, if one was told.
+    pub(crate) fn jerk_of(&self, joint: &str) -> Option<f64> {
+        self.jerks.iter().find(|(name, _)| name == joint).map(|(_, jerk)| *jerk)
+    }
+
+    /// What is worth knowing.
+    pub(crate) fn caveats(&self) -> Vec<Caveat> {
+        let said = |text: &String| Caveat::said("tool-path", &self.file, format!("{}: {text}", self.file), "");
+        let notes = self.notes.iter().map(|text| said(text).as_note());
+        self.warnings.iter().map(said).chain(notes).collect()
+    }
+}
+
+fn noted(note: &Note) -> String {
+    let place = note.line.map_or_else(String::new, |line| format!("line {line}: "));
+    format!("{place}{}", note.text)
+}
+
+/// The first few of a list, and how many are left out.
+fn first_of(mut notes: Vec<String>) -> Vec<String> {
+    let more = notes.len().saturating_sub(TOLD);
+    if more > 0 {
+        notes.truncate(TOLD);
+        notes.push(format!("and {more} more like the last"));
+    }
+    notes
+}
+
+/// A tool of the program that is not the robot's: the error is measured at the robot's.
+fn tool_warning(program: &Program, arm: &ProgramArm<'_>) -> Option<String> {
+    use flexarm_path::program::Item;
+    let other = program.items.iter().find_map(|item| match item {
+        Item::Move(of) => {
+            let X_FT = of.X_FT?;
+            let apart = (X_FT.translation.vector - arm.X_FT.translation.vector).norm();
+            (apart > 1e-6).then_some((of.line, apart))
+        }
+        Item::Dwell { .. } => None,
+    })?;
+    Some(format!(
+        "line {}: the program's tool ends {:.1} mm from the robot's tool centre point: the program's follows the path, the error \
+         is measured at the robot's (tcp of the robot file)",
+        other.0,
+        other.1 * 1e3
+    ))
+}
+
+fn slowed_warning(of: &PlannedMove, slowed: &Slowed) -> String {
+    let by = match &slowed.by {
+        SlowedBy::JointSpeed(joint) => format!("the speed of joint {joint:?}"),
+        SlowedBy::JointAcceleration(joint) => format!("the acceleration of joint {joint:?}"),
+        SlowedBy::JointJerk(joint) => format!("the jerk of joint {joint:?}"),
+        SlowedBy::JointTorque(joint) => format!("the torque of joint {joint:?}"),
+        SlowedBy::Turning => "the turning of the tool".to_owned(),
+        SlowedBy::PathAcceleration => "the acceleration across the path".to_owned(),
+    };
+    let (line, statement, t, part) = (of.line, &of.statement, slowed.time_s, 100.0 * slowed.part);
+    format!("line {line}: {statement}: slowed to {part:.0} % of its speed at {t:.3} s by {by}")
+}

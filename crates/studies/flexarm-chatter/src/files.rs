@@ -1,0 +1,263 @@
+//! What `flexarm lobes` writes: table, diagram, page, figures.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use flexarm_draw::{CurveLook, LinePlot, Panel, PlotCurve, PlotError};
+use flexarm_files::write_all;
+
+use super::tool_file::CuttingTool;
+use super::{CutRun, LobePoint, Lobes, LobesFiles};
+use flexarm_run::Error;
+use flexarm_run::html_page::opening;
+use flexarm_settings::written::markup;
+
+/// Files in the output folder.
+pub(super) const NAMES: [&str; 4] = ["lobes.csv", "lobes.svg", "lobes.html", "lobes.json"];
+/// Files of a cut over time.
+pub(super) const CUT_NAMES: [&str; 3] = ["cut.csv", "cut.svg", "cut.json"];
+/// Points of a curve that a picture can show.
+const SHOWN: usize = 4000;
+/// Limits, and frequencies, further apart than this are drawn over a logarithmic axis.
+const WIDE: f64 = 40.0;
+/// Poses that are drawn one by one.
+const DRAWN: usize = 8;
+
+pub(super) fn save(answer: &mut Lobes, tool: &CuttingTool, paths: [PathBuf; 4]) -> Result<(), Error> {
+    let text = |k: usize| Some(paths[k].display().to_string());
+    let picture = plot(answer, tool).ok();
+    answer.files = LobesFiles { csv: text(0), plot: picture.as_ref().and(text(1)), page: text(2), json: text(3) };
+    answer.file = text(0);
+    let json = serde_json::to_string_pretty(answer).expect("plain numbers and strings") + "\n";
+    let page = html(answer, picture.as_deref());
+    let contents = [Some(csv(answer)), picture, Some(page), Some(json)];
+    let files = paths.into_iter().zip(contents).filter_map(|(path, content)| Some((path, content?)));
+    Ok(write_all(&files.collect::<Vec<_>>())?)
+}
+
+/// A positive number with this many digits behind the point, or as many as show two that count, never above the number itself: what is
+/// called safe below a limit is safe.
+pub fn rounded_down(x: f64, digits: usize) -> String {
+    let needed = if x > 0.0 { (1.0 - x.log10().floor()).clamp(0.0, 12.0) as usize } else { 0 };
+    let digits = digits.max(needed);
+    let text = format!("{x:.digits$}");
+    match text.parse::<f64>() {
+        Ok(rounded) if rounded > x => format!("{:.digits$}", rounded - 0.1_f64.powi(digits as i32)),
+        _ => text,
+    }
+}
+
+fn cell(x: Option<f64>) -> String {
+    x.map_or_else(String::new, |x| x.to_string())
+}
+
+fn csv(answer: &Lobes) -> String {
+    let mut text = String::from("spindle_rpm,depth_m,chatter_hz,kind,zero_order_depth_m,pose\n");
+    for p in &answer.points {
+        let kind = p.kind.unwrap_or("");
+        let (depth, hz, zero) = (cell(p.depth_m), cell(p.chatter_hz), cell(p.zero_order_depth_m));
+        let _ = writeln!(text, "{},{depth},{hz},{kind},{zero},{}", p.spindle_rpm, p.pose);
+    }
+    text
+}
+
+/// Depth and chatter frequency over the spindle speed.
+fn plot(answer: &Lobes, tool: &CuttingTool) -> Result<String, PlotError> {
+    let rpm = |p: &LobePoint| p.spindle_rpm;
+    let depths = |f: &dyn Fn(&LobePoint) -> Option<f64>| -> Vec<f64> {
+        answer.points.iter().map(|p| f(p).map_or(f64::NAN, |d| 1e3 * d)).collect()
+    };
+    let x: Vec<f64> = answer.points.iter().map(rpm).collect();
+    let limit = depths(&|p| p.depth_m);
+    let mut curves = Vec::new();
+    if answer.poses.len() > 1 && answer.poses.len() <= DRAWN {
+        for (k, pose) in answer.poses.iter().enumerate() {
+            let y: Vec<f64> = pose.depth_m.iter().map(|d| d.map_or(f64::NAN, |d| 1e3 * d)).collect();
+            let name = pose.time_s.map_or_else(|| format!("pose {k}"), |t| format!("at {t:.2} s"));
+            curves.extend(stretches(&name, CurveLook::Plain, &x, &y));
+        }
+    }
+    curves.extend(stretches("limit of depth", CurveLook::Total, &x, &limit));
+    if answer.method == "floquet" {
+        curves.extend(stretches("zero-order solution", CurveLook::Dashed, &x, &depths(&|p| p.zero_order_depth_m)));
+    }
+    let finite = || limit.iter().copied().filter(|d| d.is_finite());
+    let logarithmic = finite().fold(0.0, f64::max) > WIDE * finite().fold(f64::INFINITY, f64::min);
+    let chatter = |kind: &str, name: &str| {
+        let of: Vec<&LobePoint> = answer.points.iter().filter(|p| p.kind == Some(kind)).collect();
+        PlotCurve {
+            name: name.to_owned(),
+            look: CurveLook::Dots,
+            x: of.iter().map(|p| p.spindle_rpm).collect(),
+            y: of.iter().map(|p| p.chatter_hz.unwrap_or(f64::NAN)).collect(),
+        }
+    };
+    let chatter = [chatter("hopf", "chatter"), chatter("flip", "chatter, period doubled")];
+    let hz = || chatter.iter().flat_map(|c| c.y.iter().copied());
+    let far_apart = hz().fold(0.0, f64::max) > WIDE * hz().fold(f64::INFINITY, f64::min);
+    let panels = [
+        Panel { label: "depth of cut [mm]".into(), logarithmic, legend: true, curves },
+        Panel {
+            label: "chatter [Hz]".into(),
+            logarithmic: far_apart,
+            legend: true,
+            curves: chatter.into_iter().filter(|c| !c.x.is_empty()).collect(),
+        },
+    ];
+    let title = format!("{}: limits of depth of {}", answer.robot, answer.tool);
+    LinePlot {
+        title: &title,
+        notes: &notes(answer, tool),
+        x_label: "spindle speed [1/min]",
+        panels: &panels,
+        ..LinePlot::default()
+    }
+    .svg()
+}
+
+/// A curve with gaps where there is no limit: one of the same name per stretch.
+fn stretches(name: &str, look: CurveLook, x: &[f64], y: &[f64]) -> Vec<PlotCurve> {
+    let mut curves: Vec<PlotCurve> = Vec::new();
+    let mut open = false;
+    for (x, y) in x.iter().zip(y) {
+        if y.is_finite() && !open {
+            curves.push(PlotCurve { name: name.to_owned(), look, ..PlotCurve::default() });
+        }
+        open = y.is_finite();
+        if let Some(curve) = curves.last_mut().filter(|_| open) {
+            curve.x.push(*x);
+            curve.y.push(*y);
+        }
+    }
+    curves
+}
+
+fn notes(answer: &Lobes, tool: &CuttingTool) -> Vec<String> {
+    let e = tool.cutter.engagement;
+    let cut = format!(
+        "{} teeth, {:.1} mm, cutting from {:.0}° to {:.0}°",
+        tool.cutter.teeth,
+        1e3 * tool.cutter.diameter,
+        e.entry.to_degrees(),
+        e.exit.to_degrees()
+    );
+    let stable = answer.stable_below_m.map_or_else(
+        || format!("stable at every speed up to {} mm", rounded_down(1e3 * answer.deepest_m, 2)),
+        |depth| format!("stable at every speed below {} mm", rounded_down(1e3 * depth, 3)),
+    );
+    let n = answer.poses.len();
+    let place = if n > 1 {
+        format!("the lowest limit over {n} places of the motion")
+    } else {
+        format!("at {}", answer.pose_in_words)
+    };
+    vec![cut, place, stable]
+}
+
+fn html(answer: &Lobes, picture: Option<&str>) -> String {
+    let mut page = opening(&format!("Chatter of {} on {}", answer.tool, answer.robot), "");
+    let _ = match (answer.stable_below_m, answer.stable_below_at_rpm) {
+        (Some(depth), Some(rpm)) => writeln!(
+            page,
+            "<p>Stable at every speed below <b>{} mm</b> (at {rpm:.0} 1/min); deepest at <b>{:.0} 1/min</b>: {} mm.</p>",
+            rounded_down(1e3 * depth, 3),
+            answer.best_rpm,
+            rounded_down(1e3 * answer.best_depth_m, 3)
+        ),
+        _ => writeln!(
+            page,
+            "<p>No chatter up to {} mm at any of the speeds.</p>",
+            rounded_down(1e3 * answer.deepest_m, 2)
+        ),
+    };
+    for caveat in &answer.caveats {
+        let _ = writeln!(page, "<p class=\"no\">{}</p>", markup(&caveat.message));
+    }
+    page += picture.unwrap_or_default();
+    page += "<h2>Poses</h2>\n<table><tr><th>time (s)</th><th>lowest limit (mm)</th><th>at (1/min)</th>\
+             <th>along the feed (&micro;m/N)</th><th>across</th><th>along the tool</th><th>first frequencies (Hz)</th></tr>\n";
+    for pose in &answer.poses {
+        let number = |x: Option<f64>, scale: f64, digits: usize| {
+            x.map_or_else(|| "-".into(), |x| format!("{:.digits$}", scale * x))
+        };
+        let hz: Vec<String> = pose.frequencies_hz.iter().take(3).map(|f| format!("{f:.1}")).collect();
+        let [x, y, z] = pose.compliance.map(|c| format!("{:.3}", 1e6 * c));
+        let _ = writeln!(
+            page,
+            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{x}</td><td>{y}</td><td>{z}</td><td>{}</td></tr>",
+            number(pose.time_s, 1.0, 2),
+            pose.stable_below_m.map_or_else(|| "-".into(), |depth| rounded_down(1e3 * depth, 3)),
+            number(pose.stable_below_at_rpm, 1.0, 0),
+            hz.join(", ")
+        );
+    }
+    page += "</table>\n<p>Linear about the pose, drives held: play and friction of gears, damping by the flank of the tooth at low speed and what bends \
+             in the workpiece are not in it.</p>\n</body></html>\n";
+    page
+}
+
+pub(super) fn save_cut(answer: &mut CutRun, paths: [PathBuf; 3]) -> Result<(), Error> {
+    let picture = cut_plot(answer).ok();
+    answer.file = Some(paths[0].display().to_string());
+    answer.plot = picture.as_ref().map(|_| paths[1].display().to_string());
+    let json = serde_json::to_string_pretty(answer).expect("plain numbers and strings") + "\n";
+    let contents = [Some(cut_csv(answer)), picture, Some(json)];
+    let files = paths.into_iter().zip(contents).filter_map(|(path, content)| Some((path, content?)));
+    Ok(write_all(&files.collect::<Vec<_>>())?)
+}
+
+fn cut_csv(answer: &CutRun) -> String {
+    let mut text = String::from("time_s,x_m,y_m,z_m,fx_n,fy_n,fz_n,chip_m\n");
+    let c = &answer.curves;
+    for (((t, u), F), chip) in c.time.iter().zip(&c.displacement).zip(&c.force).zip(&c.chip) {
+        let _ = writeln!(text, "{t},{},{},{},{},{},{},{chip}", u.x, u.y, u.z, F.x, F.y, F.z);
+    }
+    text
+}
+
+/// Displacement over the whole run, the force at its end.
+fn cut_plot(answer: &CutRun) -> Result<String, PlotError> {
+    let c = &answer.curves;
+    // Of each piece the smallest and the largest value.
+    let every = (2 * c.time.len() / SHOWN).max(1);
+    let swing = |f: &dyn Fn(usize) -> f64| -> (Vec<f64>, Vec<f64>) {
+        let all: Vec<usize> = (0..c.time.len()).collect();
+        let ends = all.chunks(every).flat_map(|piece| {
+            let by = |a: &&usize, b: &&usize| f(**a).total_cmp(&f(**b));
+            let (low, high) = (piece.iter().min_by(by), piece.iter().max_by(by));
+            let mut ends: Vec<usize> = low.into_iter().chain(high).copied().collect();
+            ends.sort_unstable();
+            ends
+        });
+        ends.map(|k| (c.time[k], f(k))).unzip()
+    };
+    let curve = |name: &str, axis: usize, f: &dyn Fn(usize) -> f64| {
+        let (x, y) = swing(f);
+        PlotCurve { name: name.into(), look: CurveLook::Axis(axis), x, y }
+    };
+    let names = ["along the feed", "across", "along the tool"];
+    let panel = |label: &str, legend: bool, f: &dyn Fn(usize, usize) -> f64| Panel {
+        label: label.into(),
+        logarithmic: false,
+        legend,
+        curves: (0..3).map(|axis| curve(names[axis], axis, &|k| f(k, axis))).collect(),
+    };
+    let panels = [
+        panel("displacement of the tip [mm]", true, &|k, axis| 1e3 * c.displacement[k][axis]),
+        panel("force on the tool [N]", false, &|k, axis| c.force[k][axis]),
+    ];
+    let limit = answer
+        .limit_m
+        .map_or_else(|| "no limit".to_owned(), |limit| format!("limit {} mm", rounded_down(1e3 * limit, 3)));
+    let verdict = if answer.chatters { "chatters" } else { "does not chatter" };
+    let title = format!(
+        "{} on {}: {:.0} 1/min, {:.3} mm {verdict}",
+        answer.tool,
+        answer.robot,
+        answer.spindle_rpm,
+        1e3 * answer.depth_m
+    );
+    let notes =
+        [format!("{limit}; from tooth to tooth the tip differs by {:.2e} mm at the end", 1e3 * answer.scatter_m)];
+    LinePlot { title: &title, notes: &notes, x_label: "time [s]", panels: &panels, ..LinePlot::default() }.svg()
+}

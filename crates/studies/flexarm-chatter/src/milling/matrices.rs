@@ -1,0 +1,190 @@
+//! A structure from its matrices, with any damping.
+//!
+//! ```text
+//! M x'' + D x' + K x = Jᵀ F      u = J x
+//! ```
+//! In the coordinates of the undamped modes, `x = Φ η`, with `z = (Ω η, η')`, the first-order matrix is as large as the highest frequency
+//! and not as its square. Its right and left eigenvectors give the poles; what they promise is checked on the frequency response.
+
+use nalgebra::{Cholesky, Complex, DMatrix, Matrix3, Matrix3xX, Schur, SymmetricEigen, Vector3};
+
+use crate::milling::error::ChatterError;
+use crate::milling::structure::{Pole, Structure};
+
+/// Accepted relative difference of the frequency response.
+const ALLOWED: f64 = 1e-6;
+/// Imaginary parts below this part of the largest eigenvalue are rounding.
+const REAL: f64 = 1e-11;
+
+impl Structure {
+    /// From mass, damping and stiffness matrix and the tip's Jacobian.
+    ///
+    /// * `M`, `D`, `K`: n×n; `M` positive definite, the symmetric part of `K` too; `D` any that takes energy out. SI units.
+    /// * `J`: 3×n, velocity of the tip per rate of the coordinates, in the axes of the cut.
+    ///
+    /// # Errors
+    /// [`ChatterError::Size`], [`ChatterError::NotFinite`], [`ChatterError::NotPositiveDefinite`], [`ChatterError::Undamped`] for a mode
+    /// that does not decay, [`ChatterError::NotConverged`]; [`ChatterError::NotModal`] for two modes that are the same one.
+    pub fn from_matrices(
+        M: &DMatrix<f64>,
+        D: &DMatrix<f64>,
+        K: &DMatrix<f64>,
+        J: &Matrix3xX<f64>,
+    ) -> Result<Self, ChatterError> {
+        let n = M.nrows();
+        check(M, D, K, J)?;
+        if n == 0 {
+            return Self::from_poles(Vec::new());
+        }
+        let (omega, Phi) = undamped(M, K)?;
+        let (D_eta, K_eta, J_eta) = (Phi.tr_mul(&(D * &Phi)), Phi.tr_mul(&(K * &Phi)), J * &Phi);
+        let A = DMatrix::from_fn(2 * n, 2 * n, |i, j| match (i < n, j < n) {
+            (true, true) => 0.0,
+            (true, false) => {
+                if i == j - n {
+                    omega[i]
+                } else {
+                    0.0
+                }
+            }
+            (false, true) => -K_eta[(i - n, j)] / omega[j],
+            (false, false) => -D_eta[(i - n, j - n)],
+        });
+        let (values, right) = eigenvectors(&A)?;
+        let left =
+            right.clone().try_inverse().ok_or(ChatterError::NotModal { found: f64::INFINITY, allowed: ALLOWED })?;
+
+        let scale = values.iter().map(|x| x.norm()).fold(0.0, f64::max);
+        let mut poles = Vec::new();
+        for (k, value) in values.iter().enumerate() {
+            let value = if value.im.abs() <= REAL * scale { Complex::new(value.re, 0.0) } else { *value };
+            if value.im < 0.0 {
+                continue;
+            }
+            let mut pole = Pole { value, input: Vector3::zeros(), output: Vector3::zeros() };
+            for j in 0..n {
+                pole.output += J_eta.column(j).map(|x| right[(j, k)] * (x / omega[j]));
+                pole.input += J_eta.column(j).map(|x| left[(k, n + j)] * x);
+            }
+            if value.im == 0.0 {
+                real_residue(&mut pole);
+            }
+            poles.push(pole);
+        }
+        let structure = Self::from_poles(poles)?;
+        structure.check_response(&omega, |w| response(M, D, K, J, w))?;
+        Ok(structure)
+    }
+
+    /// The poles must have the response of the matrices, at and between the modes.
+    fn check_response(
+        &self,
+        omega: &[f64],
+        truth: impl Fn(f64) -> Option<Matrix3<Complex<f64>>>,
+    ) -> Result<(), ChatterError> {
+        let at = omega.iter().flat_map(|w| [0.7 * w, *w]);
+        for w in at {
+            let Some(G) = truth(w) else { continue };
+            let found = (self.frequency_response(w) - G).norm() / G.norm().max(f64::MIN_POSITIVE);
+            if found > ALLOWED && G.norm() > 0.0 {
+                return Err(ChatterError::NotModal { found, allowed: ALLOWED });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn check(M: &DMatrix<f64>, D: &DMatrix<f64>, K: &DMatrix<f64>, J: &Matrix3xX<f64>) -> Result<(), ChatterError> {
+    let n = M.nrows();
+    for (what, matrix) in [("mass matrix", M), ("damping matrix", D), ("stiffness matrix", K)] {
+        if matrix.shape() != (n, n) {
+            return Err(ChatterError::Size { what, found: matrix.shape(), expected: (n, n) });
+        }
+        if matrix.iter().any(|x| !x.is_finite()) {
+            return Err(ChatterError::NotFinite { what });
+        }
+    }
+    if J.ncols() != n {
+        return Err(ChatterError::Size { what: "Jacobian of the tip", found: J.shape(), expected: (3, n) });
+    }
+    if J.iter().any(|x| !x.is_finite()) {
+        return Err(ChatterError::NotFinite { what: "Jacobian of the tip" });
+    }
+    Ok(())
+}
+
+/// Frequencies (rad/s) and mass-normalised shapes of the symmetric part.
+fn undamped(M: &DMatrix<f64>, K: &DMatrix<f64>) -> Result<(Vec<f64>, DMatrix<f64>), ChatterError> {
+    let mass = Cholesky::new((M + M.transpose()) * 0.5);
+    let mass = mass.ok_or(ChatterError::NotPositiveDefinite { what: "mass matrix" })?;
+    let stiffness = Cholesky::new((K + K.transpose()) * 0.5);
+    let stiffness = stiffness.ok_or(ChatterError::NotPositiveDefinite { what: "stiffness matrix" })?;
+    // Eigenvalues 1/ω² of L^-1 M L^-T with K = L Lᵀ: the low modes, which move the tip most, are the largest.
+    let singular = || ChatterError::NotPositiveDefinite { what: "stiffness matrix" };
+    let (L, half) = (stiffness.l(), mass.l());
+    let X = L.solve_lower_triangular(&half).ok_or_else(singular)?;
+    let eigen = SymmetricEigen::new(&X * X.transpose());
+    if eigen.eigenvalues.min() <= 0.0 {
+        return Err(ChatterError::NotPositiveDefinite { what: "mass matrix" });
+    }
+    let mut Phi = eigen.eigenvectors;
+    L.tr_solve_lower_triangular_mut(&mut Phi);
+    for (mut column, value) in Phi.column_iter_mut().zip(&eigen.eigenvalues) {
+        column /= value.sqrt();
+    }
+    Ok((eigen.eigenvalues.iter().map(|x| 1.0 / x.sqrt()).collect(), Phi))
+}
+
+/// Eigenvalues, and in columns their vectors.
+type Eigenvectors = (Vec<Complex<f64>>, DMatrix<Complex<f64>>);
+
+/// All eigenvalues and, in columns, eigenvectors of a real matrix, by its complex Schur form.
+fn eigenvectors(A: &DMatrix<f64>) -> Result<Eigenvectors, ChatterError> {
+    let n = A.nrows();
+    let complex = A.map(|x| Complex::new(x, 0.0));
+    let schur = Schur::try_new(complex, f64::EPSILON, 400 * n);
+    let (Q, T) = schur.ok_or(ChatterError::NotConverged { what: "the structure" })?.unpack();
+    let least = f64::EPSILON * A.norm();
+    let mut Y = DMatrix::<Complex<f64>>::zeros(n, n);
+    for k in 0..n {
+        Y[(k, k)] = Complex::new(1.0, 0.0);
+        for i in (0..k).rev() {
+            let sum: Complex<f64> = (i + 1..=k).map(|j| T[(i, j)] * Y[(j, k)]).sum();
+            let gap = T[(i, i)] - T[(k, k)];
+            // Equal eigenvalues without coupling have any vector of their common space.
+            let gap = if gap.norm() < least { Complex::new(least, 0.0) } else { gap };
+            Y[(i, k)] = -sum / gap;
+        }
+    }
+    let mut right = Q * Y;
+    for mut column in right.column_iter_mut() {
+        let size = column.norm();
+        column /= Complex::new(size, 0.0);
+    }
+    Ok(((0..n).map(|k| T[(k, k)]).collect(), right))
+}
+
+/// The product `o lᵀ` of a real pole is real; so are then its factors, but for a phase that they share.
+fn real_residue(pole: &mut Pole) {
+    let largest = pole.input.iter().copied().max_by(|a, b| a.norm_sqr().total_cmp(&b.norm_sqr())).unwrap_or_default();
+    if largest.norm() > 0.0 {
+        let phase = largest / largest.norm();
+        pole.input = pole.input.map(|x| Complex::new((x / phase).re, 0.0));
+        pole.output = pole.output.map(|x| Complex::new((x * phase).re, 0.0));
+    }
+}
+
+/// `J (K + i ω D - ω² M)^-1 Jᵀ`.
+fn response(
+    M: &DMatrix<f64>,
+    D: &DMatrix<f64>,
+    K: &DMatrix<f64>,
+    J: &Matrix3xX<f64>,
+    w: f64,
+) -> Option<Matrix3<Complex<f64>>> {
+    let complex = |x: f64| Complex::new(x, 0.0);
+    let dynamic = (K - M * (w * w)).zip_map(D, |k, d| Complex::new(k, w * d));
+    let X = dynamic.lu().solve(&J.transpose().map(complex))?;
+    let G = J.map(complex) * X;
+    Some(Matrix3::from_fn(|i, j| G[(i, j)]))
+}

@@ -1,0 +1,42 @@
+//! Stability of milling with a structure that yields.
+//!
+//! A tooth cuts what the last one left. Where the structure swings between them, the chip is thicker or thinner, the force follows, and
+//! above a depth of cut the swing grows: chatter. [`Structure`] says how the tool's tip yields, [`Cutter`] what cuts;
+//! [`limit_of_depth`] finds the depth at a spindle speed from the Floquet multipliers of a tooth period, [`zero_order_limit`] from the
+//! mean force alone [Altintas & Budak 1995], and [`simulate`] cuts step by step, with teeth that leave the work.
+//!
+//! ```
+//! use flexarm_chatter::{Coefficients, Cutter, Engagement, LimitOptions, Mode, Structure, limit_of_depth};
+//! use nalgebra::Vector3;
+//! use std::f64::consts::TAU;
+//!
+//! let mode = Mode { angular_frequency: TAU * 922.0, damping_ratio: 0.011, shape: Vector3::x() / 0.03993_f64.sqrt() };
+//! let structure = Structure::from_modes(&[mode])?;
+//! let aluminium = Coefficients { tangential: 6e8, radial: 2e8, axial: 0.0 };
+//! let cutter = Cutter::straight(2, aluminium, Engagement::slot());
+//! let limit = limit_of_depth(&structure, &cutter, TAU * 5000.0 / 60.0, &LimitOptions::to(0.012))?.expect("it chatters");
+//! assert!((1e3 * limit.depth - 0.4086).abs() < 5e-4); // mm
+//! # Ok::<(), flexarm_chatter::ChatterError>(())
+//! ```
+//!
+//! Not here: robots, poses, tools by name, files and units (the facade).
+#![allow(non_snake_case, reason = "letters of the equations: M, D, K, G, H; see docs/references.md")]
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests"))]
+
+mod cutter;
+mod error;
+mod leading;
+mod limit;
+mod matrices;
+mod moments;
+mod period;
+mod simulation;
+mod structure;
+mod zero_order;
+
+pub use cutter::{Coefficients, Cutter, Engagement};
+pub use error::ChatterError;
+pub use limit::{Kind, Limit, LimitOptions, leading_multiplier, limit_of_depth, unstable_ranges};
+pub use simulation::{Cut, ForcedMotion, RegenerativeCut, Simulated, simulate};
+pub use structure::{Mode, Pole, Structure};
+pub use zero_order::{ZeroOrderLimit, zero_order_limit};

@@ -1,0 +1,332 @@
+//! One tooth period as a linear map: the state of the structure and what the last tooth left, to the same a period later.
+//!
+//! ```text
+//! z' = Λ z + l F(t)      F = -Σ_k P_k(t) (w_k(t) - w_k(t - T))      w_k = N_k(t)ᵀ u(t)
+//! ```
+//! The period is cut where teeth enter or leave. While none cuts the structure moves freely, without error. The rest is divided into
+//! elements: within one the force is the polynomial through its values at the Gauss nodes, and the poles answer it exactly. The unknowns
+//! are the chip thicknesses at the nodes, so that their number depends on how long and how fast something cuts, not on the structure.
+//!
+//! In the order of the error this is a semi-discretisation [Insperger & Stépán 2004] of all of the force, a full one [Ding 2010], with elements of sixth order in place of steps of the first.
+
+use nalgebra::{Complex, DMatrix, Matrix3, Vector3};
+
+use crate::milling::cutter::{Cutter, Regeneration};
+use crate::milling::moments::{Moments, NODES, RULE};
+use crate::milling::structure::Structure;
+
+/// A tooth period with its division.
+pub(crate) struct Period<'a> {
+    structure: &'a Structure,
+    cutter: &'a Cutter,
+    /// Spindle speed, rad/s.
+    spindle: f64,
+    /// Longest element, s.
+    longest: f64,
+    /// Where the division does not depend on the depth: made once.
+    straight: Option<Vec<Stretch>>,
+}
+
+/// Elements of equal length, or free motion.
+struct Stretch {
+    /// Cutter angle where it starts, rad.
+    start: f64,
+    /// Length of an element, s.
+    length: f64,
+    /// How many; without cutting one.
+    elements: usize,
+    motion: Motion,
+}
+
+enum Motion {
+    Free(Vec<Complex<f64>>),
+    Cutting(Box<Answers>),
+}
+
+/// How the structure answers within an element.
+struct Answers {
+    /// `e^{λ h}`, by pole.
+    decay: Vec<Complex<f64>>,
+    /// Displacement at a node per state at the start, 3×nz.
+    to_nodes: Vec<DMatrix<f64>>,
+    /// Displacement at node i per force at node j, m/N.
+    gains: Vec<[Matrix3<f64>; NODES]>,
+    /// State at the end per force at node j, nz×3.
+    to_end: Vec<DMatrix<f64>>,
+}
+
+/// Where something is cut, for what is read from an eigenvector.
+pub(crate) struct CutNode {
+    /// Time since the start of the period, s.
+    pub(crate) time: f64,
+    /// Weight of its time in an integral over the period, s.
+    pub(crate) weight: f64,
+    /// Where its chips start among the unknowns, and what they do.
+    pub(crate) first: usize,
+    pub(crate) regeneration: Regeneration,
+}
+
+impl<'a> Period<'a> {
+    pub(crate) fn new(structure: &'a Structure, cutter: &'a Cutter, spindle: f64, longest: f64) -> Self {
+        let mut period = Self { structure, cutter, spindle, longest, straight: None };
+        if cutter.is_straight() {
+            period.straight = Some(period.stretches(1.0));
+        }
+        period
+    }
+
+    /// Calls with the stretches for a depth.
+    fn with_stretches<T>(&self, depth: f64, run: impl FnOnce(&[Stretch]) -> T) -> T {
+        match &self.straight {
+            Some(stretches) => run(stretches),
+            None => run(&self.stretches(depth)),
+        }
+    }
+
+    fn stretches(&self, depth: f64) -> Vec<Stretch> {
+        let events = self.cutter.events(depth);
+        let stretch = |ends: &[f64]| {
+            let (start, duration) = (ends[0], (ends[1] - ends[0]) / self.spindle);
+            if self.cutter.force_matrix(0.5 * (ends[0] + ends[1]), depth).amax() == 0.0 {
+                let decay = self.structure.poles().iter().map(|p| (p.value * duration).exp()).collect();
+                return Stretch { start, length: duration, elements: 1, motion: Motion::Free(decay) };
+            }
+            let elements = (duration / self.longest * (1.0 - 1e-9)).ceil().max(1.0) as usize;
+            let length = duration / elements as f64;
+            Stretch { start, length, elements, motion: Motion::Cutting(Box::new(self.answers(length))) }
+        };
+        events.windows(2).map(stretch).collect()
+    }
+
+    fn answers(&self, h: f64) -> Answers {
+        let (poles, nz) = (self.structure.poles(), self.structure.n_states());
+        let mut answers = Answers {
+            decay: Vec::with_capacity(poles.len()),
+            to_nodes: vec![DMatrix::zeros(3, nz); NODES],
+            gains: vec![[Matrix3::zeros(); NODES]; NODES],
+            to_end: vec![DMatrix::zeros(nz, 3); NODES],
+        };
+        let mut row = 0;
+        for pole in poles {
+            let Moments { decay, integrals } = RULE.moments(pole.value * h);
+            let (reading, pair) = (pole.reading(), pole.n_states() == 2);
+            for i in 0..NODES {
+                let shown = reading * decay[i];
+                answers.to_nodes[i].set_column(row, &shown.map(|x| x.re));
+                if pair {
+                    answers.to_nodes[i].set_column(row + 1, &shown.map(|x| -x.im));
+                }
+                for (gain, integral) in answers.gains[i].iter_mut().zip(&integrals[i]) {
+                    *gain += (reading * (integral * h) * pole.input.transpose()).map(|x| x.re);
+                }
+                let moved = pole.input.transpose() * (integrals[NODES][i] * h);
+                answers.to_end[i].set_row(row, &moved.map(|x| x.re));
+                if pair {
+                    answers.to_end[i].set_row(row + 1, &moved.map(|x| x.im));
+                }
+            }
+            answers.decay.push(decay[NODES]);
+            row += pole.n_states();
+        }
+        answers
+    }
+
+    /// A depth below which the mean force makes nothing chatter, at any speed: `|b (1 - e^{-i ω T})| = 1/|λ|` with an eigenvalue of `G H`.
+    pub(crate) fn zero_order_bound(&self) -> f64 {
+        let H = self.cutter.mean_force_matrix().map(|x| Complex::new(x, 0.0));
+        let size = |w: &f64| (self.structure.frequency_response(*w) * H).norm();
+        let largest = self.structure.frequencies().iter().map(size).fold(0.0, f64::max);
+        0.5 / largest.max(f64::MIN_POSITIVE)
+    }
+
+    /// Size of the map.
+    pub(crate) fn unknowns(&self, depth: f64) -> usize {
+        let chips = self.with_stretches(depth, |stretches| {
+            let cutting = |s: &&Stretch| matches!(s.motion, Motion::Cutting(_));
+            let pairs = |s: &Stretch| {
+                let middle = s.start + 0.5 * s.length * self.spindle * s.elements as f64;
+                s.elements * NODES * self.cutter.regeneration(middle, depth).pairs.len()
+            };
+            stretches.iter().filter(cutting).map(pairs).sum::<usize>()
+        });
+        self.structure.n_states() + chips
+    }
+
+    /// The map over one period at a depth.
+    pub(crate) fn at(&self, depth: f64) -> PeriodMap {
+        self.with_stretches(depth, |stretches| {
+            let mut first = self.structure.n_states();
+            let mut pieces = Vec::new();
+            for (stretch, cuts) in stretches.iter().zip(self.regenerations(stretches, depth)) {
+                match &stretch.motion {
+                    Motion::Free(decay) => pieces.push(Piece::Free(self.rotations(decay))),
+                    Motion::Cutting(answers) => {
+                        let decay = self.rotations(&answers.decay);
+                        for nodes in &cuts {
+                            let element = self.element(answers, nodes, first, &decay);
+                            first += element.chips.nrows();
+                            pieces.push(Piece::Cutting(element));
+                        }
+                    }
+                }
+            }
+            PeriodMap { n_states: self.structure.n_states(), size: first, pieces }
+        })
+    }
+
+    /// What cuts at the nodes, by stretch and element.
+    fn regenerations(&self, stretches: &[Stretch], depth: f64) -> Vec<Vec<Vec<Regeneration>>> {
+        let at = |s: &Stretch, e: usize, x: f64| {
+            self.cutter.regeneration(s.start + (e as f64 + x) * s.length * self.spindle, depth)
+        };
+        let element = |s: &Stretch, e: usize| RULE.nodes.iter().map(|x| at(s, e, *x)).collect();
+        let all = |s: &Stretch| match s.motion {
+            Motion::Free(_) => Vec::new(),
+            Motion::Cutting(_) => (0..s.elements).map(|e| element(s, e)).collect(),
+        };
+        stretches.iter().map(all).collect()
+    }
+
+    /// One element: its chips from the state at its start and the chips of the last tooth, then the state at its end.
+    fn element(&self, answers: &Answers, nodes: &[Regeneration], first: usize, decay: &[Rotation]) -> Element {
+        let nz = self.structure.n_states();
+        let pairs: Vec<(usize, Vector3<f64>, Vector3<f64>)> = nodes
+            .iter()
+            .enumerate()
+            .flat_map(|(i, r)| r.pairs.iter().map(move |(push, chip)| (i, *push, *chip)))
+            .collect();
+        let n = pairs.len();
+        // w = S z - Z (w - w_old): (1 + Z) w = S z + Z w_old.
+        let mut S = DMatrix::zeros(n, nz);
+        for (row, (i, _, chip)) in pairs.iter().enumerate() {
+            S.set_row(row, &(chip.transpose() * &answers.to_nodes[*i]));
+        }
+        let mut Z = DMatrix::from_fn(n, n, |row, column| {
+            let ((i, _, chip), (j, push, _)) = (&pairs[row], &pairs[column]);
+            chip.dot(&(answers.gains[*i][*j] * push))
+        });
+        let left = (DMatrix::identity(n, n) + &Z).lu();
+        let solved = left.solve_mut(&mut S) && left.solve_mut(&mut Z);
+        debug_assert!(solved, "an element so short that its own force cannot make the system singular");
+
+        let mut to_end = DMatrix::zeros(nz, n);
+        for (column, (j, push, _)) in pairs.iter().enumerate() {
+            to_end.set_column(column, &(&answers.to_end[*j] * push));
+        }
+        Element { first, decay: decay.to_vec(), chips: S, old: Z, to_end }
+    }
+
+    /// Free motion of the states with `e^{λ h}`.
+    fn rotations(&self, decay: &[Complex<f64>]) -> Vec<Rotation> {
+        let poles = self.structure.poles().iter().zip(decay);
+        poles.map(|(pole, e)| Rotation { pair: pole.n_states() == 2, by: *e }).collect()
+    }
+
+    /// The nodes at which something is cut, in the order of the unknowns.
+    pub(crate) fn cut_nodes(&self, depth: f64) -> Vec<CutNode> {
+        self.with_stretches(depth, |stretches| {
+            let mut nodes = Vec::new();
+            let mut first = self.structure.n_states();
+            for (stretch, elements) in stretches.iter().zip(self.regenerations(stretches, depth)) {
+                for (e, element) in elements.into_iter().enumerate() {
+                    for (i, regeneration) in element.into_iter().enumerate() {
+                        let time = stretch.start / self.spindle + (e as f64 + RULE.nodes[i]) * stretch.length;
+                        let n = regeneration.pairs.len();
+                        nodes.push(CutNode { time, weight: RULE.weights[i] * stretch.length, first, regeneration });
+                        first += n;
+                    }
+                }
+            }
+            nodes
+        })
+    }
+}
+
+/// Free motion of one pole.
+#[derive(Clone, Copy)]
+struct Rotation {
+    pair: bool,
+    by: Complex<f64>,
+}
+
+/// An element at a depth.
+struct Element {
+    /// Where its chips start among the unknowns.
+    first: usize,
+    decay: Vec<Rotation>,
+    /// Chips per state at the start, n×nz.
+    chips: DMatrix<f64>,
+    /// Chips per chip of the last tooth, n×n.
+    old: DMatrix<f64>,
+    /// State at the end per change of the chips, its sign turned, nz×n.
+    to_end: DMatrix<f64>,
+}
+
+enum Piece {
+    Free(Vec<Rotation>),
+    Cutting(Element),
+}
+
+/// States and chips of the last tooth to the same a period later.
+pub(crate) struct PeriodMap {
+    n_states: usize,
+    size: usize,
+    pieces: Vec<Piece>,
+}
+
+impl PeriodMap {
+    /// Number of states of the structure.
+    pub(crate) fn n_states(&self) -> usize {
+        self.n_states
+    }
+
+    /// Number of states and chips.
+    pub(crate) fn size(&self) -> usize {
+        self.size
+    }
+
+    /// The images of vectors, column by column.
+    pub(crate) fn apply(&self, from: &DMatrix<f64>, to: &mut DMatrix<f64>) {
+        let mut state = from.rows(0, self.n_states).into_owned();
+        for piece in &self.pieces {
+            match piece {
+                Piece::Free(decay) => rotate(&mut state, decay),
+                Piece::Cutting(element) => {
+                    let n = element.chips.nrows();
+                    let old = from.rows(element.first, n);
+                    let mut chips = &element.chips * &state;
+                    chips.gemm(1.0, &element.old, &old, 1.0);
+                    to.rows_mut(element.first, n).copy_from(&chips);
+                    // The force goes with the change from tooth to tooth.
+                    chips -= old;
+                    rotate(&mut state, &element.decay);
+                    state.gemm(-1.0, &element.to_end, &chips, 1.0);
+                }
+            }
+        }
+        to.rows_mut(0, self.n_states).copy_from(&state);
+    }
+
+    /// As a matrix.
+    pub(crate) fn matrix(&self) -> DMatrix<f64> {
+        let mut map = DMatrix::zeros(self.size, self.size);
+        self.apply(&DMatrix::identity(self.size, self.size), &mut map);
+        map
+    }
+}
+
+fn rotate(state: &mut DMatrix<f64>, rotations: &[Rotation]) {
+    for mut column in state.column_iter_mut() {
+        let mut row = 0;
+        for Rotation { pair, by } in rotations {
+            if *pair {
+                let z = Complex::new(column[row], column[row + 1]) * by;
+                (column[row], column[row + 1]) = (z.re, z.im);
+                row += 2;
+            } else {
+                column[row] *= by.re;
+                row += 1;
+            }
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! What yields: the motion of the tool's tip under a force on it, as a sum of poles.
+//!
+//! ```text
+//! z_r' = λ_r z_r + l_rᵀ F        u = Σ 2 Re(o_r z_r)  (pairs)  + Σ o_r z_r  (real poles)
+//! ```
+//! Any linear structure without repeated defective poles is of this form: modes with damping ratios, or `M`, `D`, `K` with any damping
+//! ([`crate::milling::poles_of_matrices`]). Structures in series, such as a tool on a flange, are the poles of both.
+
+use nalgebra::{Complex, Matrix3, Vector3};
+
+use crate::milling::error::ChatterError;
+
+/// An eigenvalue of the structure with what excites it and what it moves. One above the real axis stands for a conjugate pair.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pole {
+    /// `λ`, 1/s, negative real part, not below the real axis.
+    pub value: Complex<f64>,
+    /// `l`, per newton along x, y, z.
+    pub input: Vector3<Complex<f64>>,
+    /// `o`, metres along x, y, z; only products `o lᵀ` mean something.
+    pub output: Vector3<Complex<f64>>,
+}
+
+/// A real mode: `q'' + 2 ζ ω q' + ω² q = φᵀ F`, `u = φ q`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mode {
+    /// `ω` without damping, rad/s.
+    pub angular_frequency: f64,
+    /// `ζ`, above 0; 1 and more do not oscillate.
+    pub damping_ratio: f64,
+    /// `φ` at the tip along x, y, z, mass-normalised, kg^-1/2.
+    pub shape: Vector3<f64>,
+}
+
+/// Linear structure as the cutter feels it: poles, displacements in m, forces in N.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Structure {
+    poles: Vec<Pole>,
+}
+
+/// Two equal real poles have no such form; they are moved apart by this part of themselves, which the square of it changes.
+const APART: f64 = 1e-6;
+
+impl Structure {
+    /// From its poles.
+    ///
+    /// # Errors
+    /// [`ChatterError::NotFinite`]; [`ChatterError::Undamped`] for a pole that does not decay, whose limit of depth is zero.
+    pub fn from_poles(poles: Vec<Pole>) -> Result<Self, ChatterError> {
+        for pole in &poles {
+            let numbers = pole.input.iter().chain(pole.output.iter()).chain([&pole.value]);
+            if numbers.into_iter().any(|x| !(x.re.is_finite() && x.im.is_finite())) {
+                return Err(ChatterError::NotFinite { what: "a pole" });
+            }
+            if pole.value.re >= 0.0 {
+                let damping_ratio = -pole.value.re / pole.value.norm().max(f64::MIN_POSITIVE);
+                return Err(ChatterError::Undamped { rad_per_s: pole.value.norm(), damping_ratio });
+            }
+        }
+        Ok(Self { poles })
+    }
+
+    /// From real modes.
+    ///
+    /// # Errors
+    /// As [`Structure::from_poles`].
+    pub fn from_modes(modes: &[Mode]) -> Result<Self, ChatterError> {
+        let mut poles = Vec::new();
+        for mode in modes {
+            let (omega, shape) = (mode.angular_frequency, mode.shape.map(|x| Complex::new(x, 0.0)));
+            let zeta = if (mode.damping_ratio - 1.0).abs() < APART { 1.0 - APART } else { mode.damping_ratio };
+            if omega <= 0.0 {
+                return Err(ChatterError::Undamped { rad_per_s: omega, damping_ratio: zeta });
+            }
+            // 1 / (s² + 2 ζ ω s + ω²) in partial fractions.
+            let root = Complex::new(zeta * zeta - 1.0, 0.0).sqrt() * omega;
+            let pole = |value: Complex<f64>, other: Complex<f64>| Pole {
+                value,
+                input: shape,
+                output: shape / (value - other),
+            };
+            let (upper, lower) = (root - zeta * omega, -root - zeta * omega);
+            poles.push(pole(upper, lower));
+            if upper.im == 0.0 {
+                poles.push(pole(lower, upper));
+            }
+        }
+        Self::from_poles(poles)
+    }
+
+    /// Both under the same force, their displacements added: a tool that yields on a flange that does.
+    #[must_use]
+    pub fn in_series(mut self, other: &Self) -> Self {
+        self.poles.extend_from_slice(&other.poles);
+        self
+    }
+
+    /// The same in other axes, `u_new = R u`.
+    #[must_use]
+    pub fn rotated(mut self, R: &Matrix3<f64>) -> Self {
+        let R = R.map(|x| Complex::new(x, 0.0));
+        for pole in &mut self.poles {
+            pole.input = R * pole.input;
+            pole.output = R * pole.output;
+        }
+        self
+    }
+
+    /// All poles.
+    pub fn poles(&self) -> &[Pole] {
+        &self.poles
+    }
+
+    /// Frequency response of the tip, `u = G(i ω) F`, m/N, 3×3.
+    pub fn frequency_response(&self, omega: f64) -> Matrix3<Complex<f64>> {
+        let s = Complex::new(0.0, omega);
+        let mut G = Matrix3::zeros();
+        for pole in &self.poles {
+            G += pole.output * pole.input.transpose() / (s - pole.value);
+            if pole.value.im > 0.0 {
+                G += pole.output.conjugate() * pole.input.adjoint() / (s - pole.value.conj());
+            }
+        }
+        G
+    }
+
+    /// Number of real states: two per pair, one per real pole.
+    pub(crate) fn n_states(&self) -> usize {
+        self.poles.iter().map(Pole::n_states).sum()
+    }
+}
+
+impl Pole {
+    pub(crate) fn n_states(&self) -> usize {
+        if self.value.im > 0.0 { 2 } else { 1 }
+    }
+
+    /// What its state contributes to the displacement, per unit of it.
+    pub(crate) fn reading(&self) -> Vector3<Complex<f64>> {
+        if self.value.im > 0.0 { self.output * Complex::new(2.0, 0.0) } else { self.output }
+    }
+
+    /// Compliance at its resonance, m/N.
+    pub(crate) fn peak(&self) -> f64 {
+        self.output.norm() * self.input.norm() / self.value.re.abs()
+    }
+}

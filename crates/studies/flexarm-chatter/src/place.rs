@@ -1,0 +1,250 @@
+//! Arm and tool as the cutter feels them at one pose: poles in the axes of the cut, or a measured response beside those of the arm.
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use crate::milling::{Mode, Structure};
+use flexarm_kinematics::{Data, forward_kinematics};
+use flexarm_stepping::Linear;
+use nalgebra::{Complex, DVector, Matrix3, Matrix3xX, Vector3, Vector6};
+
+use super::LobesError;
+use super::measured::MeasuredResponse;
+use super::tool_file::{CuttingTool, ToolDirection};
+use flexarm_run::Caveat;
+use flexarm_run::Error;
+use flexarm_run::Motion;
+use flexarm_run::Modelling;
+use flexarm_run::posed::Posed;
+use flexarm_run::response::pose_in_words;
+use flexarm_run::Robot;
+use flexarm_run::TCP_FRAME;
+
+/// Fewest places along a motion.
+const LEAST_PLACES: usize = 2;
+/// A tool slower than this stands still (m/s).
+const STANDS: f64 = 1e-5;
+/// A feed nearer to the tool's axis than this (sine of the angle) is along it.
+const ALONG_AXIS: f64 = 0.05;
+/// Difference of times for the direction of the feed (s).
+const INSTANT: f64 = 1e-4;
+/// Natural frequencies that are told.
+const TOLD: usize = 6;
+
+/// One pose with the axes of the cut: x along the feed, z from the tip to the spindle.
+pub(super) struct Place {
+    posed: Posed,
+    linear: Linear,
+    pub(super) time_s: Option<f64>,
+    /// World axes.
+    pub(super) feed: Vector3<f64>,
+    /// From the spindle to the tip, world axes.
+    pub(super) axis: Vector3<f64>,
+    /// TCP to world.
+    R_WT: Matrix3<f64>,
+    /// Arm and modes of the tool, in the axes of the cut.
+    pub(super) structure: Structure,
+    /// The tool's, if it is measured.
+    measured: Option<(MeasuredResponse, Matrix3<f64>)>,
+    /// Angular frequencies at which the response is worth knowing, rad/s.
+    pub(super) band: Vec<f64>,
+}
+
+impl Place {
+    /// At a pose.
+    pub(super) fn at(
+        robot: &Robot,
+        modelling: &Modelling,
+        tool: &CuttingTool,
+        at: Option<&[f64]>,
+    ) -> Result<Self, Error> {
+        Self::new(Posed::new(robot, modelling, at)?, tool, None, None)
+    }
+
+    /// Along a motion, evenly in time, where the tool moves across its axis; and how many places were left out.
+    pub(super) fn along(
+        robot: &Robot,
+        modelling: &Modelling,
+        tool: &CuttingTool,
+        motion: &Motion,
+        n: usize,
+    ) -> Result<(Vec<Self>, usize), Error> {
+        if n < LEAST_PLACES {
+            return Err(LobesError::Places { found: n, least: LEAST_PLACES }.into());
+        }
+        let model = robot.rigid_model()?;
+        let names: Vec<&str> = model.coordinates().iter().map(|c| c.joint.as_str()).collect();
+        let trajectory = motion.trajectory.with_joint_order(&names)?;
+        let frame = model.frame(TCP_FRAME).expect("the TCP of the model").clone();
+        let mut data = Data::new(&model);
+        let sample = |t: f64| {
+            let mut q = vec![0.0; names.len()];
+            let (mut qdot, mut qddot) = (q.clone(), q.clone());
+            trajectory.sample(t, &mut q, &mut qdot, &mut qddot);
+            q
+        };
+        let mut tip = |t: f64| {
+            forward_kinematics(&model, &mut data, &DVector::from_vec(sample(t)));
+            let X_WT = data.X_WF(&frame);
+            (X_WT.transform_point(&tool.tip.into()).coords, tool.axis.in_world(&X_WT.rotation))
+        };
+        let flexible = Arc::new(robot.modelled(modelling)?);
+        let (mut places, mut left_out) = (Vec::new(), 0);
+        for k in 0..n {
+            let t = trajectory.duration() * (k as f64 + 0.5) / n as f64;
+            let ((before, _), (after, axis)) = (tip(t - INSTANT), tip(t + INSTANT));
+            let velocity = (after - before) / (2.0 * INSTANT);
+            let across = velocity.cross(&axis).norm();
+            if velocity.norm() < STANDS || across < ALONG_AXIS * velocity.norm() {
+                left_out += 1;
+                continue;
+            }
+            let posed = Posed::with(flexible.clone(), sample(t))?;
+            places.push(Self::new(posed, tool, Some(t), Some(velocity / velocity.norm()))?);
+        }
+        if places.is_empty() { Err(LobesError::NoFeed.into()) } else { Ok((places, left_out)) }
+    }
+
+    fn new(posed: Posed, tool: &CuttingTool, time_s: Option<f64>, along: Option<Vector3<f64>>) -> Result<Self, Error> {
+        let linear = posed.linear(&Vector6::zeros())?;
+        let R_WT = linear.X_WT.rotation;
+        let axis = tool.axis.in_world(&R_WT);
+        let feed = match (tool.feed, along) {
+            (Some(feed), _) => feed.in_world(&R_WT),
+            (None, Some(along)) => along,
+            // Any direction across the tool: the x axis of the TCP, or y where that is the tool's.
+            (None, None) if (R_WT.inverse() * axis).x.abs() < 0.9 => R_WT * Vector3::x(),
+            (None, None) => R_WT * Vector3::y(),
+        };
+        let R_WC = cutting_axes(&feed, &axis)?;
+        let structure = structure(&linear, tool, R_WC.transpose(), &R_WT.into_inner()).map_err(|source| {
+            LobesError::Chatter { place: pose_in_words(&posed.joints, &posed.at, &posed.prismatic), source }
+        })?;
+        if structure.poles().is_empty() && tool.measured.is_none() {
+            return Err(LobesError::NothingYields.into());
+        }
+        let measured = tool.measured.clone().map(|m| (m, R_WC.transpose() * R_WT.into_inner()));
+        let mut place = Self {
+            feed: R_WC.column(0).into(),
+            axis,
+            R_WT: R_WT.into_inner(),
+            structure,
+            measured,
+            band: Vec::new(),
+            time_s,
+            posed,
+            linear,
+        };
+        place.band = place.frequencies();
+        Ok(place)
+    }
+
+    /// Displacement of the tip per force on it, axes of the cut, m/N.
+    pub(super) fn response(&self, omega: f64) -> Matrix3<Complex<f64>> {
+        let mut G = self.structure.frequency_response(omega);
+        if let Some((measured, R)) = &self.measured {
+            let R = R.map(|x| Complex::new(x, 0.0));
+            G += R * measured.at(omega) * R.transpose();
+        }
+        G
+    }
+
+    /// Where the response is looked at: about the poles, and at measured frequencies, not beyond the highest of these.
+    fn frequencies(&self) -> Vec<f64> {
+        let mut band = self.structure.frequencies();
+        if let Some((measured, _)) = &self.measured {
+            let highest = measured.omega[measured.omega.len() - 1];
+            band.extend(&measured.omega);
+            band.retain(|w| *w <= highest);
+            band.sort_by(f64::total_cmp);
+            band.dedup();
+        }
+        band
+    }
+
+    pub(super) fn frequencies_hz(&self) -> Vec<f64> {
+        let oscillate = self.structure.poles().iter().filter(|p| p.value.im > 0.0);
+        let mut hz: Vec<f64> = oscillate.map(|p| p.value.norm() / TAU).collect();
+        hz.sort_by(f64::total_cmp);
+        hz.truncate(TOLD);
+        hz
+    }
+
+    /// Axes of the cut as columns, world axes.
+    pub(super) fn axes_of_cut(&self) -> Matrix3<f64> {
+        let z = -self.axis;
+        Matrix3::from_columns(&[self.feed, z.cross(&self.feed), z])
+    }
+
+    /// The tool's own modes alone, axes of the cut.
+    pub(super) fn tool_structure(&self, tool: &CuttingTool) -> Structure {
+        let modes = tool_modes(tool, &(self.axes_of_cut().transpose() * self.R_WT));
+        Structure::from_modes(&modes).expect("as they were when the place was made")
+    }
+
+    /// The pose in words.
+    pub(super) fn words(&self) -> String {
+        pose_in_words(&self.posed.joints, &self.posed.at, &self.posed.prismatic)
+    }
+
+    /// Actuated joints.
+    pub(super) fn joints(&self) -> &[String] {
+        &self.posed.joints
+    }
+
+    /// Their values (rad or m).
+    pub(super) fn pose(&self) -> &[f64] {
+        &self.posed.at
+    }
+
+    /// What is to be said of the robot and of its pose.
+    pub(super) fn told(&self, robot: &Robot) -> Vec<Caveat> {
+        self.posed.told(robot, &self.linear, &[0.0; 6])
+    }
+}
+
+/// Axes of the cut as columns: x along the feed, z from the tip to the spindle.
+fn cutting_axes(feed: &Vector3<f64>, axis: &Vector3<f64>) -> Result<Matrix3<f64>, LobesError> {
+    let z = -axis;
+    let across = feed - z * z.dot(feed);
+    if across.norm() < ALONG_AXIS * feed.norm() {
+        return Err(LobesError::FeedAlongAxis);
+    }
+    let x = across.normalize();
+    Ok(Matrix3::from_columns(&[x, z.cross(&x), z]))
+}
+
+/// Arm and tool in series. `R_CW`: world to axes of the cut; `R_WT`: TCP to world.
+fn structure(
+    linear: &Linear,
+    tool: &CuttingTool,
+    R_CW: Matrix3<f64>,
+    R_WT: &Matrix3<f64>,
+) -> Result<Structure, crate::milling::ChatterError> {
+    // Velocity of the tip: that of the TCP and its rotation.
+    let tip = R_WT * tool.tip;
+    let mut J = Matrix3xX::zeros(linear.J.ncols());
+    for (mut column, twist) in J.column_iter_mut().zip(linear.J.column_iter()) {
+        let (v, w): (Vector3<f64>, Vector3<f64>) = (twist.fixed_rows::<3>(0).into(), twist.fixed_rows::<3>(3).into());
+        column.copy_from(&(R_CW * (v + w.cross(&tip))));
+    }
+    let arm = Structure::from_matrices(&linear.M, &linear.D, &linear.K, &J)?;
+    Ok(arm.in_series(&Structure::from_modes(&tool_modes(tool, &(R_CW * R_WT)))?))
+}
+
+/// The tool's own modes in the axes of the cut. `R_CT`: from those of the TCP.
+fn tool_modes(tool: &CuttingTool, R_CT: &Matrix3<f64>) -> Vec<Mode> {
+    let modes = tool.modes.iter().flat_map(|mode| {
+        let directions = match mode.direction {
+            ToolDirection::Radial => vec![Vector3::x(), Vector3::y()],
+            ToolDirection::Axial => vec![Vector3::z()],
+            ToolDirection::Along(direction) => vec![R_CT * direction],
+        };
+        directions.into_iter().map(|direction| Mode {
+            angular_frequency: mode.omega,
+            damping_ratio: mode.damping_ratio,
+            shape: direction / mode.mass.sqrt(),
+        })
+    });
+    modes.collect()
+}

@@ -1,0 +1,132 @@
+//! What is doubtful of a compensation.
+
+use flexarm_trajectory::Extreme;
+
+use super::job::{Commands, Discarded};
+use super::{Compensation, limits};
+use flexarm_run::Arm;
+use flexarm_run::Caveat;
+use flexarm_run::MotionViolation;
+use flexarm_run::Robot;
+
+/// More than this part of the peak left on the model is explained, if it is mostly quick: by more than the second.
+const ENOUGH_LEFT: f64 = 0.01;
+const MOSTLY: f64 = 0.5;
+/// A servo that gives this part of its largest torque gives all of it.
+const AT_LIMIT: f64 = 1.0 - 1e-9;
+
+/// Where the joints cannot correct everything that is asked for.
+fn singular_caveat((t_s, directions): (f64, usize), asked: usize) -> Option<Caveat> {
+    (directions < asked).then(|| {
+        let text = format!(
+            "at {t_s:.2} s the joints move the tool in {directions} of the {asked} directions asked for (a singular pose, or too few joints): \
+             the others are corrected little or not at all there"
+        );
+        Caveat::said("singular", "compensation", text, "ask for fewer components, or begin and pass elsewhere")
+    })
+}
+
+/// Why more than a hundredth of the peak is left on the model, where the motion is too quick.
+fn quick_caveat(answer: &Compensation, quicker: f64) -> Option<Caveat> {
+    let (first, hz) = (answer.model_peaks_m.first()?, answer.cutoff_hz?);
+    let least = answer.model_peaks_m.iter().copied().fold(f64::INFINITY, f64::min);
+    (answer.iterations > 0 && least > ENOUGH_LEFT * first && quicker > MOSTLY).then(|| {
+        let text = format!(
+            "{:.1} % of the peak is left on the model itself; {:.0} % of that, by its RMS, is quicker than {hz:.1} Hz, above which the arm is not inverted",
+            100.0 * least / first,
+            100.0 * quicker
+        );
+        Caveat::said("too-quick", "compensation", text, "give the motion more time or smoother accelerations")
+    })
+}
+
+/// Iterations that made the error on the model larger, with the frequency up to which the kept ones correct.
+fn discarded_caveat(answer: &Compensation, discarded: &[Discarded]) -> Option<Caveat> {
+    let each = |of: &Discarded| match of.growth.is_finite() {
+        true => {
+            format!("iteration {} (up to {:.1} Hz) made it {:.3} times as large", of.iteration, of.cutoff_hz, of.growth)
+        }
+        false => format!("iteration {} (up to {:.1} Hz) diverged", of.iteration, of.cutoff_hz),
+    };
+    let named: Vec<String> = discarded.iter().map(each).collect();
+    let kept = match (answer.iterations, answer.cutoff_hz) {
+        (0, _) | (_, None) => "no iteration is kept".to_owned(),
+        (kept, Some(hz)) => format!("{kept} kept, corrected up to {hz:.1} Hz"),
+    };
+    (!named.is_empty()).then(|| {
+        let text =
+            format!("iterations that enlarge the RMS error on the model are discarded: {}; {kept}", named.join(", "));
+        let caveat = Caveat::said(
+            "discarded",
+            "compensation",
+            text,
+            "choose a lower cutoff, or give links and gearboxes their damping",
+        );
+        if answer.iterations > 0 { caveat.as_note() } else { caveat }
+    })
+}
+
+/// Servos of the plant that give all they have: what they lack, no command gives them.
+pub(super) fn of_servos(plant: &Arm, efforts: &[Extreme]) -> Option<Caveat> {
+    let joints: Vec<&str> = plant.joints().collect();
+    let at_limit = plant.flexible().servo_limits().filter_map(|(k, limit)| {
+        let worst = efforts.get(k).filter(|worst| worst.value.abs() >= AT_LIMIT * limit)?;
+        Some(format!("{} ({limit:.1} N m or N at {:.3} s)", joints.get(k)?, worst.time_s))
+    });
+    let named: Vec<String> = at_limit.collect();
+    (!named.is_empty()).then(|| {
+        let text =
+            format!("servos are at their torque limits: {}: what they lack there is not corrected", named.join(", "));
+        Caveat::said("servo-limit", "compensation", text, "slow the motion down where it is quickest")
+    })
+}
+
+/// What is doubtful of an answer.
+///
+/// * `own`: limits that the motion passes by itself; `asked`: how many components of the tool count.
+pub(super) fn of(
+    answer: &Compensation,
+    own: &[MotionViolation],
+    robot: &Robot,
+    found: &Commands,
+    asked: usize,
+) -> Vec<Caveat> {
+    let mut caveats = Vec::new();
+    let worse: Vec<&str> = limits::worse(&answer.limits, own).map(|limit| limit.message.as_str()).collect();
+    if !worse.is_empty() {
+        let text = format!("the new commands pass limits that the motion keeps: {}", worse.join("; "));
+        caveats.push(Caveat::said("limits", "compensation", text, "slow the motion down a little"));
+    }
+    let untold: Vec<&str> = robot
+        .drives
+        .iter()
+        .filter(|d| d.backlash > 0.0 || d.friction != flexarm_stepping::Friction::NONE)
+        .map(|d| d.joint.as_str())
+        .collect();
+    if !untold.is_empty() {
+        let text = format!(
+            "play and friction of {} are not taken away: what they leave depends on the way the joint came",
+            untold.join(", ")
+        );
+        caveats.push(Caveat::said("play", "compensation", text, "come to every point from the same side").as_note());
+    }
+    // Shaping alone, with the peak of the start and no other, is not meant to.
+    let corrected = answer.model_peaks_m.len() != 1;
+    if corrected && answer.after.peak_m > 0.5 * answer.before.peak_m {
+        let text = format!(
+            "less than half of the error is taken away on the plant ({:.3} of {:.3} mm left)",
+            1e3 * answer.after.peak_m,
+            1e3 * answer.before.peak_m
+        );
+        caveats.push(Caveat::said(
+            "little-gained",
+            "compensation",
+            text,
+            "the model is not that of the plant, or the motion is too quick for it",
+        ));
+    }
+    caveats.extend(discarded_caveat(answer, &found.discarded));
+    caveats.extend(quick_caveat(answer, found.quicker));
+    caveats.extend(found.fewest.and_then(|fewest| singular_caveat(fewest, asked)));
+    caveats
+}

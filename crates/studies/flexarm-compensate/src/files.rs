@@ -1,0 +1,135 @@
+//! Files of a compensation: the new motion, the page, the recording of the arm before and after.
+
+use std::path::PathBuf;
+
+use flexarm_files::{check_free, write_all};
+
+use super::program::{self, Corrected, ProgramFigures};
+use super::{CompensateRequest, Compensation, Found, SAMPLE_S, page};
+use flexarm_run::Arm;
+use flexarm_run::Caveat;
+use flexarm_run::Error;
+use flexarm_run::Motion;
+use flexarm_run::motion_report::check_motion_outputs;
+use flexarm_run::motion_report::motion_texts;
+use flexarm_run::Robot;
+use flexarm_run::Scenario;
+
+/// A corrected program meets its targets within the digits that are written (m).
+const WRITTEN_WITHIN_M: f64 = 1e-6;
+
+/// Where everything goes.
+pub(super) struct Files {
+    /// New motion and page.
+    folder: Option<[PathBuf; 2]>,
+    recording: Option<PathBuf>,
+    /// The program of the motion, and the output folder.
+    program: Option<[PathBuf; 2]>,
+}
+
+impl Files {
+    /// Refuses names that cannot be written before anything is computed.
+    pub(super) fn of(motion: &Motion, request: &CompensateRequest) -> Result<Self, Error> {
+        check_motion_outputs(&request.motions)?;
+        let in_folder = |name: &str| request.output.as_ref().map(|folder| folder.join(name));
+        let folder = in_folder("compensated.csv").zip(in_folder("compensation.html")).map(|(csv, page)| [csv, page]);
+        let recording = in_folder("compensation.rrd").filter(|_| cfg!(feature = "rerun") && request.recording);
+        let program = request.output.as_ref().filter(|_| program::is_program(motion));
+        let program = program.map(|folder| [motion.path.clone(), folder.clone()]);
+        let own = program.iter().map(|[file, folder]| program::in_folder(folder, file));
+        let mut all: Vec<PathBuf> =
+            folder.iter().flatten().chain(&request.motions).chain(&recording).cloned().collect();
+        all.extend(own);
+        check_free(&all, request.overwrite)?;
+        Ok(Self { folder, recording, program })
+    }
+
+    /// The corrected program; what keeps it from being made is a caveat.
+    pub(super) fn program(
+        &self,
+        robot: &Robot,
+        arm: &Arm,
+        scenario: &Scenario,
+        request: &CompensateRequest,
+        answer: &mut Compensation,
+    ) -> Option<Corrected> {
+        let place = self.program.as_ref()?;
+        let mut said = |text: String, help: &str| {
+            answer.caveats.push(Caveat::said("program", "compensation", text, help));
+        };
+        let (corrected, uncovered) = match program::corrected(robot, arm, scenario, request, place) {
+            Ok(found) => found,
+            Err(error) => {
+                said(format!("the program was not corrected: {error}"), "use the motion instead");
+                return None;
+            }
+        };
+        let ProgramFigures { targets, corrected: done, left, residual_m, .. } = &corrected.figures;
+        if let (true, Some(first)) = (done < targets, left.first()) {
+            let text = format!(
+                "{} of {targets} targets of the program stay as they were, the first in line {} ({}): {}",
+                targets - done,
+                first.line,
+                first.statement,
+                first.why
+            );
+            said(text, "write targets as literals");
+        }
+        if *residual_m > WRITTEN_WITHIN_M {
+            let text = format!("the corrected program misses a target by {:.4} mm", 1e3 * residual_m);
+            said(text, "a move depends on a target that was not corrected");
+        }
+        uncovered.into_iter().for_each(|text| said(text, "use the motion instead where that matters"));
+        Some(corrected)
+    }
+
+    /// Writes them, and their names into the answer.
+    pub(super) fn write(
+        &self,
+        answer: &mut Compensation,
+        arm: &Arm,
+        found: &Found,
+        program: Option<Corrected>,
+        request: &CompensateRequest,
+    ) -> Result<(), Error> {
+        let shown = |path: &PathBuf| path.display().to_string();
+        let trajectory = answer.trajectory.clone();
+        let mut files = motion_texts(&request.motions, &trajectory, 1.0 / SAMPLE_S)?;
+        answer.files = request.motions.iter().map(shown).collect();
+        answer.recording = self.recording.as_ref().map(shown);
+        if let Some(Corrected { figures, files: texts }) = program {
+            let names: Vec<PathBuf> = texts.iter().map(|(file, _)| file.clone()).collect();
+            check_free(&names, request.overwrite)?;
+            self.refuse_the_program_itself(&names)?;
+            answer.program = Some(figures);
+            files.extend(texts);
+        }
+        if let Some([csv, html]) = &self.folder {
+            (answer.file, answer.page) = (Some(shown(csv)), Some(shown(html)));
+            files.extend(motion_texts(std::slice::from_ref(csv), &trajectory, 1.0 / SAMPLE_S)?);
+            files.push((html.clone(), page::html(answer).into_bytes()));
+        }
+        write_all(&files)?;
+        #[cfg(feature = "rerun")]
+        if let Some(path) = &self.recording {
+            super::recording::record(path, answer, arm, found, request)?;
+        }
+        #[cfg(not(feature = "rerun"))]
+        let _ = (arm, found);
+        Ok(())
+    }
+
+    /// Nobody loses the program that was corrected, whatever may be overwritten.
+    fn refuse_the_program_itself(&self, names: &[PathBuf]) -> Result<(), Error> {
+        let Some([program, _]) = &self.program else { return Ok(()) };
+        let home = program.parent().and_then(|folder| folder.canonicalize().ok());
+        let lost = |name: &&PathBuf| home.is_some() && name.parent().and_then(|f| f.canonicalize().ok()) == home;
+        match names.iter().find(lost) {
+            Some(name) => {
+                let what = "this is the program that is corrected: choose another output folder".into();
+                Err(Error::File { path: name.clone(), what })
+            }
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,446 @@
+//! A motion on the model, and the commands with which its tool is where it should be.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use flexarm_analysis::{Inversion, Node, NodeServo};
+use flexarm_kinematics::{Data, Pose, Wrench, forward_kinematics, rotation_vector};
+use flexarm_stepping::{FlexibleArm, Friction, Held, Servo, ServoAxis, TimedWrench, linearise, static_targets};
+use flexarm_trajectory::{Extreme, JointKnots, Trajectory};
+use nalgebra::{DMatrix, DVector, Quaternion, Rotation3, Translation3, UnitQuaternion};
+use rayon::prelude::*;
+
+use super::{CompensateError, CompensateRequest, Stop};
+use flexarm_run::AppliedLoad;
+use flexarm_run::Arm;
+use flexarm_run::Error;
+use flexarm_run::Motion;
+use flexarm_run::RunOptions;
+use flexarm_run::prepare::loaded;
+use flexarm_run::robot::tcp_frame;
+use flexarm_run::Scenario;
+
+/// Time between two nodes at which the arm is linearised (s).
+const NODE_S: f64 = 0.02;
+/// Part of a sample by which logged times may differ from those that are asked for.
+const LOGGED_WITHIN: f64 = 1e-3;
+/// Values of a load of which a mean is made.
+const PIECES: u32 = 64;
+/// Windows of a rest over which a load is looked at, at most.
+const LONGEST_REST: f64 = 500.0;
+/// An iteration that leaves more than this part of the one before is the last.
+const SETTLED: f64 = 0.9;
+/// Speeds below this are rest (rad/s or m/s).
+const REST: f64 = 1e-6;
+/// Least part of the peak below which nothing more is asked for.
+const ENOUGH: f64 = 1e-5;
+
+/// A motion on the model, with the poses that its tool should have.
+pub(super) struct Job<'a> {
+    arm: &'a Arm,
+    request: &'a CompensateRequest,
+    /// The motion with what acts along it.
+    scenario: &'a Scenario,
+    motion: &'a Motion,
+    /// Times of samples (s).
+    pub(super) times: Vec<f64>,
+    /// Joints at these times, m×N.
+    q: DMatrix<f64>,
+    /// The rigid arm's tool at these times.
+    wanted: Vec<Pose>,
+    pub(super) rows: Vec<usize>,
+    stop: Stop<'a>,
+}
+
+/// What a run showed.
+pub(super) struct Seen {
+    /// Displacement of the tool from where it should be, 6×N, world axes.
+    pub(super) error: DMatrix<f64>,
+    /// Largest torque or force of each drive.
+    pub(super) efforts: Vec<Extreme>,
+}
+
+/// Commands as they were found.
+pub(super) struct Commands {
+    pub(super) motion: Motion,
+    /// Change of the joints, m×N.
+    pub(super) change: DMatrix<f64>,
+    pub(super) peaks: Vec<f64>,
+    pub(super) kept: usize,
+    pub(super) cutoff_hz: Option<f64>,
+    /// When the joints move the tool in fewest directions (s), and in how many.
+    pub(super) fewest: Option<(f64, usize)>,
+    /// Part of what is left on the model, by its RMS, that is quicker than the cutoff.
+    pub(super) quicker: f64,
+    /// Iterations that made the error larger.
+    pub(super) discarded: Vec<Discarded>,
+}
+
+/// An iteration that made the error larger.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Discarded {
+    /// Its number, from 1.
+    pub(super) iteration: usize,
+    /// Highest frequency that it corrected (Hz).
+    pub(super) cutoff_hz: f64,
+    /// RMS error after it over that before it; NaN if the run diverged.
+    pub(super) growth: f64,
+}
+
+impl<'a> Job<'a> {
+    pub(super) fn new(
+        arm: &'a Arm,
+        scenario: &'a Scenario,
+        request: &'a CompensateRequest,
+        stop: Stop<'a>,
+    ) -> Result<Self, Error> {
+        let motion = &scenario.motion;
+        let model = arm.robot().rigid_model()?;
+        // Whole numbers of steps, so that the run is logged at just these times; the last lies at the end or a little beyond, where
+        // the joints are held.
+        let step = request.run.step_s;
+        let spacing = step * (super::SAMPLE_S / step).round().max(1.0);
+        let n = ((motion.trajectory.duration() / spacing - 1e-6).ceil() as usize).max(8);
+        let times: Vec<f64> = (0..=n).map(|k| spacing * k as f64).collect();
+        let m = model.n_actuated();
+        let (frame, mut data) = (tcp_frame(&model), Data::new(&model));
+        let mut q = DMatrix::zeros(m, times.len());
+        let mut wanted = Vec::with_capacity(times.len());
+        let (mut at, mut v, mut a) = (DVector::zeros(m), vec![0.0; m], vec![0.0; m]);
+        for (k, t) in times.iter().enumerate() {
+            motion.trajectory.sample(*t, at.as_mut_slice(), &mut v, &mut a);
+            forward_kinematics(&model, &mut data, &at);
+            wanted.push(data.X_WF(&frame));
+            q.set_column(k, &at);
+        }
+        let rows = (0..6).filter(|k| request.components[*k]).collect();
+        Ok(Self { arm, request, scenario, motion, times, q, wanted, rows, stop })
+    }
+
+    /// Goes on unless somebody wants it to stop; `t_s`: how far it is.
+    fn go_on(&self, t_s: f64) -> Result<(), Error> {
+        match (self.stop)() {
+            true => Err(Error::Interrupted { t: t_s, partial: false }),
+            false => Ok(()),
+        }
+    }
+
+    pub(super) fn step_s(&self) -> f64 {
+        self.times[1]
+    }
+
+    /// The motion with changed joints.
+    fn moved(&self, change: &DMatrix<f64>) -> Result<Motion, Error> {
+        self.moved_and_held(change, 0)
+    }
+
+    /// The same, held at its end for so many samples more.
+    fn moved_and_held(&self, change: &DMatrix<f64>, beyond: usize) -> Result<Motion, Error> {
+        let (m, h, last) = (self.q.nrows(), self.step_s(), self.times.len() - 1);
+        let of = |k: usize, i: i64| change[(k, i.clamp(0, last as i64) as usize)];
+        let mut reference = vec![Vec::with_capacity(last + 1); m];
+        let (mut q, mut v, mut a) = (vec![0.0; m], vec![0.0; m], vec![0.0; m]);
+        let times = self.times_and(beyond);
+        for t in &times {
+            self.motion.trajectory.sample(*t, &mut q, &mut v, &mut a);
+            (0..m).for_each(|k| reference[k].push([q[k], v[k], a[k]]));
+        }
+        let joint = |k: usize| {
+            let mut knots = JointKnots { name: self.motion.trajectory.joints()[k].clone(), ..JointKnots::default() };
+            for (i, [q, v, a]) in reference[k].iter().enumerate() {
+                let i = i as i64;
+                // At rest at both ends.
+                let inner = i > 0 && i < last as i64;
+                let rate = (8.0 * (of(k, i + 1) - of(k, i - 1)) - (of(k, i + 2) - of(k, i - 2))) / (12.0 * h);
+                let acceleration =
+                    (16.0 * (of(k, i + 1) + of(k, i - 1)) - (of(k, i + 2) + of(k, i - 2)) - 30.0 * of(k, i))
+                        / (12.0 * h * h);
+                let (rate, acceleration) = if inner { (rate, acceleration) } else { (0.0, 0.0) };
+                knots.position.push(q + of(k, i));
+                knots.velocity.push(v + rate);
+                knots.acceleration.push([a + acceleration; 2]);
+            }
+            knots
+        };
+        let joints: Vec<JointKnots> = (0..m).map(joint).collect();
+        let trajectory = Trajectory::through_knots(&times, &joints)?;
+        Motion::along(trajectory, &format!("{}_compensated", self.motion.name), self.arm.robot())
+    }
+
+    /// The times of this job and so many more.
+    fn times_and(&self, beyond: usize) -> Vec<f64> {
+        let further = (0..beyond).map(|k| self.step_s() * (self.times.len() + k) as f64);
+        self.times.iter().copied().chain(further).collect()
+    }
+
+    /// The motion as it is, at the times of this job.
+    pub(super) fn as_it_is(&self) -> Result<Motion, Error> {
+        self.moved(&DMatrix::zeros(self.q.nrows(), self.q.ncols()))
+    }
+
+    /// Run of a motion on an arm, with the loads of the scenario.
+    pub(super) fn seen(&self, arm: &Arm, run: &RunOptions, motion: &Motion) -> Result<Seen, Error> {
+        self.seen_until(arm, run, motion, 0)
+    }
+
+    /// The same, of a motion that is held at its end for so many samples more.
+    fn seen_until(&self, arm: &Arm, run: &RunOptions, motion: &Motion, beyond: usize) -> Result<Seen, Error> {
+        let options =
+            RunOptions { log_rate_hz: 1.0 / self.step_s(), with_twin: false, ignore_limits: true, ..run.clone() };
+        let mut progress = |_, _| if (self.stop)() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+        let run = arm.simulate_watched(self.along(motion), &options, None, None, &mut progress)?;
+        let (t, p, r) = (run.time_s(), run.values("tcp_position"), run.values("tcp_quaternion_wxyz"));
+        let times = self.times_and(beyond);
+        let mut error = DMatrix::zeros(6, times.len());
+        for (k, time) in times.iter().enumerate() {
+            let row = t.partition_point(|x| *x < time - 0.5 * self.step_s()).min(t.len() - 1);
+            let off = (t[row] - time).abs();
+            if off > LOGGED_WITHIN * self.step_s() {
+                return Err(CompensateError::Logged { t_s: *time, off_s: off }.into());
+            }
+            let place = Translation3::new(p[3 * row], p[3 * row + 1], p[3 * row + 2]);
+            let turn = Quaternion::new(r[4 * row], r[4 * row + 1], r[4 * row + 2], r[4 * row + 3]);
+            let turn: Rotation3<f64> = UnitQuaternion::from_quaternion(turn).to_rotation_matrix();
+            let wanted = &self.wanted[k.min(self.wanted.len() - 1)];
+            let moved = place.vector - wanted.translation.vector;
+            let turned = rotation_vector((turn * wanted.rotation.inverse()).matrix());
+            error.fixed_view_mut::<3, 1>(0, k).copy_from(&moved);
+            error.fixed_view_mut::<3, 1>(3, k).copy_from(&turned);
+        }
+        let (m, effort) = (self.q.nrows(), run.values("effort"));
+        let worst = |k: usize| {
+            let zero = Extreme { time_s: 0.0, value: 0.0 };
+            t.iter().zip(effort.iter().skip(k).step_by(m)).fold(zero, |worst, (&time_s, &value)| {
+                if value.abs() > worst.value.abs() { Extreme { time_s, value } } else { worst }
+            })
+        };
+        Ok(Seen { error, efforts: (0..m).map(worst).collect() })
+    }
+
+    /// Error of the tool on the model with changed joints, and what it is when they are held at the end for so many samples more.
+    fn error(&self, change: &DMatrix<f64>, beyond: usize) -> Result<DMatrix<f64>, Error> {
+        let motion = self.moved_and_held(change, beyond)?;
+        Ok(self.seen_until(self.arm, &self.request.run, &motion, beyond)?.error)
+    }
+
+    /// A motion with the loads, payloads and start of the scenario.
+    pub(super) fn along(&self, motion: &Motion) -> Scenario {
+        Scenario { motion: motion.clone(), ..self.scenario.clone() }
+    }
+
+    /// The arm linearised along the motion.
+    fn inversion(&self) -> Result<Inversion, Error> {
+        let duration = self.motion.trajectory.duration();
+        let count = ((duration / NODE_S).ceil() as usize).max(1);
+        let spacing = duration / count as f64;
+        let start = self.at_start()?;
+        let node = |k: usize| {
+            self.go_on(spacing * k as f64)?;
+            self.node(&start, spacing * k as f64)
+        };
+        let nodes = (0..=count).into_par_iter().map(node).collect::<Result<Vec<Node>, Error>>()?;
+        let inversion = Inversion::new(&nodes, spacing).map_err(CompensateError::from)?;
+        Ok(match self.request.cutoff_hz {
+            Some(hz) => inversion.below(hz),
+            None => inversion,
+        })
+    }
+
+    /// The arm held where the motion begins: gains of servos and dampings of a run are those of its start.
+    fn at_start(&self) -> Result<FlexibleArm, Error> {
+        let flexible = self.arm.flexible();
+        let held = Held(self.q.column(0).iter().copied().collect());
+        let arm = flexible.arm(Arc::new(held)).map_err(|error| flexible.explained(error))?;
+        let mut axes = arm.servo.iter().flat_map(|servo| &servo.axes);
+        match axes.find(|axis| axis.position_gain * axis.velocity_gain <= 0.0) {
+            Some(axis) => {
+                let joint = self.motion.trajectory.joints()[axis.coordinate].clone();
+                Err(CompensateError::NothingHolds { joint }.into())
+            }
+            None => Ok(arm),
+        }
+    }
+
+    /// The arm linearised at a time of the motion, motors of servos free.
+    fn node(&self, start: &FlexibleArm, t: f64) -> Result<Node, Error> {
+        let (flexible, m) = (self.arm.flexible(), self.q.nrows());
+        let (mut q, mut v, mut a) = (vec![0.0; m], vec![0.0; m], vec![0.0; m]);
+        self.motion.trajectory.sample(t, &mut q, &mut v, &mut a);
+        let servo = start.servo.as_ref().map(|servo| controllers(servo, &q, &start.friction));
+        let arm = start.along(Arc::new(Held(q))).with_servo_opened();
+        let at = linearise(&arm, &flexible.tcp, &Wrench::zeros(), 0.0).map_err(|error| flexible.explained(error))?;
+        let rows =
+            |M: &nalgebra::Matrix6xX<f64>| DMatrix::from_fn(self.rows.len(), M.ncols(), |i, j| M[(self.rows[i], j)]);
+        let (J, J_a) = (rows(&at.J), rows(&at.J_a));
+        Ok(Node { M: at.M, D: at.D, K: at.K, M_a: at.M_a, D_a: at.D_a, K_a: at.K_a, J, J_a, servo })
+    }
+
+    /// Whether all joints rest where the motion ends.
+    fn ends_at_rest(&self) -> bool {
+        let m = self.q.nrows();
+        let (mut q, mut v, mut a) = (vec![0.0; m], vec![0.0; m], vec![0.0; m]);
+        self.motion.trajectory.sample(self.motion.trajectory.duration(), &mut q, &mut v, &mut a);
+        v.iter().all(|v| v.abs() < REST)
+    }
+
+    /// Samples for which the motion is held at its end, so that the inverse sees how the tool swings on there. None with loads, which
+    /// are known up to the end only, and none where the joints do not come to rest.
+    fn samples_beyond(&self, inversion: &Inversion) -> usize {
+        match self.scenario.loads.is_empty() && self.ends_at_rest() {
+            true => (inversion.edge_s() / self.step_s()).ceil() as usize,
+            false => 0,
+        }
+    }
+
+    /// Corrects the commands by the inverse of the arm until the error settles. An iteration that makes the error larger is
+    /// discarded, and the next one corrects up to half the frequency.
+    pub(super) fn dynamic(&self) -> Result<Commands, Error> {
+        let mut inversion = self.inversion()?;
+        let (m, N) = self.q.shape();
+        let within = |error: &DMatrix<f64>| error.columns(0, N).into_owned();
+        let size = |error: &DMatrix<f64>| error.select_rows(&self.rows).norm();
+        let mut beyond = self.samples_beyond(&inversion);
+        let mut whole = self.error(&DMatrix::zeros(m, N), beyond)?;
+        let mut error = within(&whole);
+        let mut best = Commands {
+            motion: self.motion.clone(),
+            change: DMatrix::zeros(m, N),
+            peaks: vec![peak(&error)],
+            kept: 0,
+            cutoff_hz: Some(inversion.cutoff_hz()),
+            fewest: inversion.fewest_directions(),
+            quicker: 0.0,
+            discarded: Vec::new(),
+        };
+        let first = size(&error);
+        let mut least = first;
+        for iteration in 1..=self.request.iterations {
+            let y = -whole.select_rows(&self.rows);
+            let change = &best.change + inversion.commands(&y, self.step_s()).columns(0, N);
+            let next = self.error(&change, beyond)?;
+            let left = size(&within(&next));
+            best.peaks.push(peak(&within(&next)));
+            if left.is_nan() || left > least / SETTLED {
+                let cutoff_hz = inversion.cutoff_hz();
+                best.discarded.push(Discarded { iteration, cutoff_hz, growth: left / least });
+                inversion = inversion.below(0.5 * cutoff_hz);
+                beyond = self.samples_beyond(&inversion);
+                whole = self.error(&best.change, beyond)?;
+                continue;
+            }
+            if left >= least {
+                break;
+            }
+            let settled = left > SETTLED * least || left < ENOUGH * first;
+            (least, best.motion, best.change) = (left, self.moved(&change)?, change);
+            best.kept += 1;
+            best.cutoff_hz = Some(inversion.cutoff_hz());
+            error = within(&next);
+            whole = next;
+            if settled {
+                break;
+            }
+        }
+        let left_over = error.select_rows(&self.rows);
+        best.quicker =
+            inversion.quicker_than_cutoff(&left_over, self.step_s()).norm() / left_over.norm().max(f64::MIN_POSITIVE);
+        Ok(best)
+    }
+
+    /// Each node at rest, a spline between them.
+    pub(super) fn at_rest(&self) -> Result<Commands, Error> {
+        let (m, N) = self.q.shape();
+        let (flexible, arm) = (self.arm.flexible(), self.at_start()?);
+        let end = self.scenario.duration_s();
+        let loads = self.scenario.loads.iter().map(|load| averaged(load, end, |_| None)).collect();
+        let scenario = Scenario { loads, ..self.scenario.clone() };
+        let (arm, _) = loaded(self.arm.robot(), &scenario, &self.request.run, arm)?;
+        let every = ((NODE_S / self.step_s()).round() as usize).max(1);
+        let nodes: Vec<usize> = (0..N - 1).step_by(every).chain([N - 1]).collect();
+        let one = |k: &usize| {
+            self.go_on(self.times[*k])?;
+            let q: Vec<f64> = self.q.column(*k).iter().copied().collect();
+            let found =
+                static_targets(&arm, &flexible.tcp, &q, &Wrench::zeros(), self.times[*k], &self.request.components);
+            let found = found.map_err(|source| CompensateError::Target { t_s: self.times[*k], source })?;
+            Ok::<_, Error>(DVector::from_iterator(m, found.q.iter().zip(&q).map(|(new, old)| new - old)))
+        };
+        let found: Vec<DVector<f64>> = nodes.par_iter().map(one).collect::<Result<_, Error>>()?;
+        let mut change = DMatrix::zeros(m, N);
+        for k in 0..N {
+            let i = nodes.partition_point(|node| *node <= k).clamp(1, nodes.len() - 1);
+            let (a, b) = (nodes[i - 1], nodes[i]);
+            let s = (k - a) as f64 / (b - a) as f64;
+            let slope = |i: usize| match i {
+                0 => DVector::zeros(m),
+                i if i + 1 >= nodes.len() => DVector::zeros(m),
+                i => (&found[i + 1] - &found[i - 1]) / (nodes[i + 1] - nodes[i - 1]) as f64,
+            };
+            let (m0, m1) = (slope(i - 1) * (b - a) as f64, slope(i) * (b - a) as f64);
+            let (p0, p1) = (&found[i - 1], &found[i]);
+            let (s2, s3) = (s * s, s * s * s);
+            let value = p0 * (2.0 * s3 - 3.0 * s2 + 1.0)
+                + m0 * (s3 - 2.0 * s2 + s)
+                + p1 * (3.0 * s2 - 2.0 * s3)
+                + m1 * (s3 - s2);
+            change.set_column(k, &value);
+        }
+        let motion = self.moved(&change)?;
+        let peaks = vec![peak(&self.error(&DMatrix::zeros(m, N), 0)?), peak(&self.error(&change, 0)?)];
+        Ok(Commands {
+            motion,
+            change,
+            peaks,
+            kept: 1,
+            cutoff_hz: None,
+            fewest: None,
+            quicker: 0.0,
+            discarded: Vec::new(),
+        })
+    }
+}
+
+/// Servos about a pose, linear.
+fn controllers(servo: &Servo, q: &[f64], friction: &[Friction]) -> NodeServo {
+    let of = |value: fn(&ServoAxis) -> f64| DVector::from_iterator(servo.axes.len(), servo.axes.iter().map(value));
+    NodeServo {
+        axes: servo.axes.iter().map(|axis| axis.coordinate).collect(),
+        stiffness: of(|axis| axis.velocity_gain * axis.position_gain + axis.integral_gain),
+        damping: of(|axis| axis.velocity_gain),
+        integral: of(|axis| axis.integral_gain * axis.position_gain),
+        ahead: servo.fed_forward(q, friction),
+    }
+}
+
+/// A load as its mean about each moment, over a node or whole periods: what is quicker moves no arm at rest. Where the arm rests longer
+/// the mean is over its rest; nothing before the motion and behind its end (s) counts.
+pub(super) fn averaged(
+    load: &AppliedLoad,
+    end: f64,
+    rest: impl Fn(f64) -> Option<[f64; 2]> + Send + Sync + 'static,
+) -> AppliedLoad {
+    let wrench = load.wrench.clone();
+    let period = wrench.period;
+    let window = if period > 0.0 && period < NODE_S { period * (NODE_S / period).ceil() } else { NODE_S };
+    let mean = TimedWrench::new({
+        let wrench = wrench.clone();
+        move |t| {
+            let [from, to] = rest(t).filter(|[from, to]| to - from > window).unwrap_or_else(|| {
+                let from = (t - 0.5 * window).min(end - window).max(0.0);
+                [from, from + window]
+            });
+            let pieces = PIECES * ((to - from) / window).ceil().clamp(1.0, LONGEST_REST) as u32;
+            let at = |k: u32| from + (to - from) * (f64::from(k) + 0.5) / f64::from(pieces);
+            (0..pieces).fold(Wrench::zeros(), |sum, k| sum + wrench.at(at(k)) * (1.0 / f64::from(pieces)))
+        }
+    });
+    AppliedLoad { wrench: mean.in_axes(wrench.axes), ..load.clone() }
+}
+
+pub(super) fn distances(error: &DMatrix<f64>) -> Vec<f64> {
+    error.column_iter().map(|e| e.rows(0, 3).norm()).collect()
+}
+
+fn peak(error: &DMatrix<f64>) -> f64 {
+    distances(error).into_iter().fold(0.0, f64::max)
+}

@@ -1,0 +1,117 @@
+//! Commands judged on a plant: the model itself, another robot, plants that are off.
+
+use flexarm_flexlink::GearStiffness;
+use flexarm_trajectory::Extreme;
+use rayon::prelude::*;
+
+use super::job::{Job, Seen, distances};
+use super::{CompensateError, CompensateRequest, ErrorFigures, PlantFigures};
+use flexarm_run::Arm;
+use flexarm_run::Error;
+use flexarm_run::Motion;
+use flexarm_run::DriveModel;
+use flexarm_run::LinkModel;
+use flexarm_run::Modelling;
+use flexarm_run::RunOptions;
+use flexarm_run::Robot;
+
+/// What a plant made of commands.
+pub(super) struct Judged {
+    pub(super) figures: ErrorFigures,
+    /// Distance of the tool at each sample (m).
+    pub(super) distance: Vec<f64>,
+    /// Largest torque or force of each drive.
+    pub(super) efforts: Vec<Extreme>,
+}
+
+/// A plant on which commands are judged.
+pub(super) struct Judge {
+    pub(super) arm: Arm,
+    pub(super) run: RunOptions,
+}
+
+impl Judge {
+    /// Another robot with the same joints, if one is asked for, or the arm itself.
+    pub(super) fn of(request: &CompensateRequest, arm: &Arm) -> Result<Self, Error> {
+        let Some((_, plant)) = &request.plant else {
+            return Ok(Self { arm: arm.clone(), run: request.run.clone() });
+        };
+        let judge = Self { arm: plant.flexible(Modelling::default())?, run: request.run.clone() };
+        let names = |arm: &Arm| arm.joints().map(str::to_owned).collect::<Vec<_>>();
+        let (found, expected) = (names(&judge.arm), names(arm));
+        if found != expected {
+            return Err(CompensateError::OtherJoints { found, expected }.into());
+        }
+        Ok(judge)
+    }
+
+    pub(super) fn figures(&self, job: &Job<'_>, motion: &Motion) -> Result<Judged, Error> {
+        let Seen { error, efforts } = job.seen(&self.arm, &self.run, motion)?;
+        let distance = distances(&error);
+        let turns = error.column_iter().map(|e| e.rows(3, 3).norm()).fold(0.0, f64::max);
+        let figures = ErrorFigures {
+            peak_m: distance.iter().copied().fold(0.0, f64::max),
+            rms_m: (distance.iter().map(|d| d * d).sum::<f64>() / distance.len() as f64).sqrt(),
+            peak_rad: turns,
+            end_m: distance.last().copied().unwrap_or(0.0),
+        };
+        Ok(Judged { figures, distance, efforts })
+    }
+}
+
+/// The robot with all stiffness and damping so many times as large.
+fn changed(robot: &Robot, stiffness: f64, damping: f64) -> Robot {
+    let mut changed = robot.clone();
+    for drive in &mut changed.drives {
+        if let Some((gearbox, gear)) = &mut drive.gearbox {
+            gearbox.stiffness = match &gearbox.stiffness {
+                GearStiffness::Axis(k) => GearStiffness::Axis(stiffness * k),
+                GearStiffness::Tilting(k) => GearStiffness::Tilting(k.map(|k| stiffness * k)),
+                GearStiffness::Full(K) => GearStiffness::Full(K * stiffness),
+            };
+            gear.curve = gear.curve.as_ref().map(|curve| curve.scaled(stiffness));
+            gear.dampers = gear.dampers.as_ref().map(|d| d.iter().map(|d| damping * d).collect());
+        }
+    }
+    for link in &mut changed.flexible {
+        link.stiffness_factor *= stiffness;
+        link.damping = link.damping.scaled(damping);
+    }
+    changed
+}
+
+/// The commands on plants that are off.
+pub(super) fn sweep(
+    robot: &Robot,
+    request: &CompensateRequest,
+    job: &Job<'_>,
+    arm: &Arm,
+    found: &Motion,
+) -> Result<Vec<PlantFigures>, Error> {
+    let modelling = request.run.modelling;
+    let mut plants: Vec<(String, Robot, Modelling)> = vec![
+        ("stiffness 30 % lower".into(), changed(robot, 0.7, 1.0), modelling),
+        ("stiffness 30 % higher".into(), changed(robot, 1.3, 1.0), modelling),
+        ("damping halved".into(), changed(robot, 1.0, 0.5), modelling),
+    ];
+    let links = !arm.flexible().spans.is_empty();
+    if links && arm.flexible().springs.len() > arm.flexible().spans.len() {
+        plants.push((
+            "drives alone give way".into(),
+            robot.clone(),
+            Modelling { links: LinkModel::Rigid, ..modelling },
+        ));
+        plants.push((
+            "links alone give way".into(),
+            robot.clone(),
+            Modelling { drives: DriveModel::Rigid, ..modelling },
+        ));
+    }
+    let as_it_is = job.as_it_is()?;
+    let judged = plants.into_par_iter().map(|(plant, robot, modelling)| {
+        let judge = Judge { arm: robot.flexible(modelling)?, run: RunOptions { modelling, ..request.run.clone() } };
+        let (before, after) = (judge.figures(job, &as_it_is)?.figures, judge.figures(job, found)?.figures);
+        Ok(PlantFigures { plant, before, after })
+    });
+    judged.collect()
+}

@@ -1,0 +1,138 @@
+//! The page of a compensation: error before and after over time, on other plants, changes of the joints; one file without scripts.
+
+use std::fmt::Write as _;
+
+use flexarm_draw::{CurveLook, LinePlot, Panel, PlotCurve};
+
+use super::{Compensation, ErrorFigures};
+use flexarm_run::html_page::opening;
+use flexarm_settings::written::markup;
+
+/// The page.
+pub(super) fn html(answer: &Compensation) -> String {
+    let mut page = opening(&format!("Compensation of {} on {}", answer.motion, answer.robot), "");
+    let _ = writeln!(
+        page,
+        "<p>Largest distance of the tool from the rigid arm's: {:.4} mm before, <b>{:.4} mm</b> after ({} method, {} iterations{}).</p>",
+        1e3 * answer.before.peak_m,
+        1e3 * answer.after.peak_m,
+        answer.method,
+        answer.iterations,
+        answer.cutoff_hz.map(|hz| format!(", corrected up to {hz:.1} Hz")).unwrap_or_default()
+    );
+    for caveat in &answer.caveats {
+        let _ = writeln!(page, "<p class=\"no\">{}</p>", markup(&caveat.message));
+    }
+    page += &curves(answer);
+    page += "<h2>On other plants</h2>\n<table><tr><th>plant</th><th>peak before (mm)</th><th>after</th><th>RMS before</th><th>after</th><th>RMS taken away</th></tr>\n";
+    page += &row("as given", &answer.before, &answer.after);
+    for plant in &answer.plants {
+        page += &row(&markup(&plant.plant), &plant.before, &plant.after);
+    }
+    page += "</table>\n";
+    if answer.plants.iter().any(|plant| plant.after.rms_m > plant.before.rms_m) {
+        page +=
+            "<p>Where the error becomes larger, the commands correct a deflection that this plant does not have.</p>\n";
+    }
+    page += "<h2>Largest change of each joint</h2>\n<table><tr><th>joint</th><th>rad or m</th><th>deg</th></tr>\n";
+    for change in &answer.changes {
+        let _ = writeln!(
+            page,
+            "<tr><td>{}</td><td>{:.3e}</td><td>{:.4}</td></tr>",
+            markup(&change.joint),
+            change.largest,
+            change.largest.to_degrees()
+        );
+    }
+    page += "</table>\n";
+    page += &shaper(answer);
+    page += &limits(answer);
+    page += "<p>Not taken away: noise, play and hysteresis of gears, what is quicker than the cutoff, and what the model does not know.</p>\n";
+    page + "</body></html>\n"
+}
+
+/// What the motion would make swing at its end, and what its shaper leaves.
+fn shaper(answer: &Compensation) -> String {
+    let Some(shaper) = &answer.shaper else { return String::new() };
+    let mut text = format!(
+        "<h2>Shaper</h2>\n<p>{}, {} copies, {:.4} s longer. Forecast of how far the tool swings behind the motion:</p>\n\
+         <table><tr><th>mode (Hz)</th><th>damping ratio</th><th>as it is (mm)</th><th>shaped (mm)</th></tr>\n",
+        shaper.kind,
+        shaper.copies.len(),
+        answer.shaper_delay_s
+    );
+    for mode in &shaper.modes {
+        let _ = writeln!(
+            text,
+            "<tr><td>{:.3}</td><td>{:.4}</td><td>{:.4}</td><td>{:.4}</td></tr>",
+            mode.frequency_hz,
+            mode.damping_ratio,
+            1e3 * mode.before_m,
+            1e3 * mode.after_m
+        );
+    }
+    text + "</table>\n"
+}
+
+/// Limits that are passed, and how much slower the motion is for their sake.
+fn limits(answer: &Compensation) -> String {
+    let mut text = String::from("<h2>Limits of the joints</h2>\n");
+    if answer.slowed > 1.0 {
+        let _ = writeln!(text, "<p>The motion takes {:.4} times as long, so that limits are kept.</p>", answer.slowed);
+    }
+    if answer.limits.is_empty() {
+        return text + "<p>All are kept.</p>\n";
+    }
+    text += "<table><tr><th>joint</th><th>of</th><th>value</th><th>limit</th><th>time (s)</th></tr>\n";
+    for limit in &answer.limits {
+        let _ = writeln!(
+            text,
+            "<tr><td>{}</td><td>{}</td><td>{:.4}</td><td>{:.4}</td><td>{:.3}</td></tr>",
+            markup(&limit.joint),
+            limit.kind,
+            limit.value,
+            limit.limit,
+            limit.time_s
+        );
+    }
+    text + "</table>\n"
+}
+
+fn row(name: &str, before: &ErrorFigures, after: &ErrorFigures) -> String {
+    format!(
+        "<tr><td>{name}</td><td>{:.4}</td><td>{:.4}</td><td>{:.4}</td><td>{:.4}</td><td>{}</td></tr>\n",
+        1e3 * before.peak_m,
+        1e3 * after.peak_m,
+        1e3 * before.rms_m,
+        1e3 * after.rms_m,
+        before.reduction_to(after)
+    )
+}
+
+fn curves(answer: &Compensation) -> String {
+    // As many points as the picture can show.
+    let every = (answer.curves.len() / 1500).max(1);
+    let column = |k: usize, factor: f64| -> Vec<f64> {
+        answer
+            .curves
+            .chunks(every)
+            .map(|c| factor * if k == 0 { c[0][0] } else { c.iter().map(|row| row[k]).fold(0.0, f64::max) })
+            .collect()
+    };
+    let curve =
+        |name: &str, look, k: usize| PlotCurve { name: name.into(), look, x: column(0, 1.0), y: column(k, 1e3) };
+    let panel = |label: &str, logarithmic| Panel {
+        label: label.into(),
+        logarithmic,
+        legend: true,
+        curves: vec![curve("before", CurveLook::Plain, 1), curve("after", CurveLook::Plain, 2)],
+    };
+    let panels = [panel("distance of the tool (mm)", false), panel("the same, logarithmic (mm)", true)];
+    let plot = LinePlot {
+        title: "The tool from where the rigid arm has it",
+        x_label: "time (s)",
+        panels: &panels,
+        ..LinePlot::default()
+    };
+    plot.svg().unwrap_or_default()
+}

@@ -1,0 +1,394 @@
+//! A robot program whose targets are corrected for what the arm gives way at rest: the same statements with other numbers.
+//!
+//! Each literal target is replaced by the one that the controller, which knows a rigid arm, must be told so that the flexible tool
+//! is at the old one, under the mean of the loads that act while it rests there. What was written is read again and held against the
+//! equilibria.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use flexarm_kinematics::{
+    Data, Frame, IkOptions, Pose, Wrench, forward_kinematics, inverse_kinematics, rotation_vector,
+};
+use flexarm_path::program::{Item, Move, MoveKind, Target};
+use flexarm_path::{PathOptions, ProgramArm, base_of, target_at, target_joints, tool_of};
+use flexarm_programs::{NewTarget, ProgramText};
+use flexarm_stepping::{FlexibleArm, Held, InertiaChange, linearise, static_targets};
+use nalgebra::{DVector, Translation3, Vector3, Vector6};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::CompensateRequest;
+use super::job::averaged;
+use flexarm_run::AppliedLoad;
+use flexarm_run::Arm;
+use flexarm_run::Error;
+use flexarm_run::Motion;
+use flexarm_run::Robot;
+use flexarm_run::Scenario;
+use flexarm_run::tool_path::Cell;
+use flexarm_run::tool_path::Overrides;
+use flexarm_run::tool_path::program_text;
+
+/// Folder of the corrected program in the output folder.
+pub(super) const FOLDER: &str = "program";
+/// Moves that are named one by one.
+const NAMED: usize = 20;
+
+/// Moments of a rest at which its loads are looked at.
+const LOOKS: u32 = 200;
+/// Loads that differ from their mean by more than this part of their largest change at a rest.
+const CHANGES: f64 = 0.1;
+
+/// What became of the targets of a robot program.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct ProgramFigures {
+    /// The corrected program, and data lists that changed with it.
+    pub files: Vec<String>,
+    /// Targets that moves end at; dwells and arcs of a told angle have none.
+    pub targets: usize,
+    /// How many of them were replaced.
+    pub corrected: usize,
+    /// At how many of them loads act, or another payload hangs than at the start.
+    pub loaded: usize,
+    /// Largest distance of the flexible tool from its target at rest, with the program as it was (m).
+    pub before_m: f64,
+    /// The same of the replaced ones, with the program as it was written and read again (m).
+    pub residual_m: f64,
+    /// Largest rotation there (rad).
+    pub residual_rad: f64,
+    /// Those that stay as they were, the first of them.
+    pub left: Vec<LeftTarget>,
+}
+
+/// A target that stays as it was.
+#[derive(Clone, Debug, Serialize)]
+pub struct LeftTarget {
+    /// Line of the move.
+    pub line: usize,
+    /// The move.
+    pub statement: String,
+    /// Why.
+    pub why: String,
+    /// Distance of the flexible tool from its target at rest (m).
+    pub residual_m: f64,
+}
+
+/// A corrected program before it is written.
+pub(super) struct Corrected {
+    pub(super) figures: ProgramFigures,
+    pub(super) files: Vec<(PathBuf, Vec<u8>)>,
+}
+
+/// Whether a motion was read from a program whose targets can be replaced.
+pub(super) fn is_program(motion: &Motion) -> bool {
+    ["KRL", "RAPID"]
+        .iter()
+        .any(|language| motion.format.starts_with("robot program") && motion.format.contains(language))
+}
+
+/// A program as its controller understands it.
+struct Understood {
+    text: ProgramText,
+    /// Joints at the target of each item.
+    places: Vec<Option<DVector<f64>>>,
+}
+
+/// A move with a target, and when the arm is there.
+struct Stop<'a> {
+    /// Number of its item.
+    item: usize,
+    of: &'a Move,
+    q: &'a DVector<f64>,
+    /// From the arrival until the next move begins (s); a moment where the tool passes by.
+    rest_s: [f64; 2],
+}
+
+/// The program of a motion with corrected targets, and what is not covered, as sentences.
+///
+/// * `[path, folder]`: the program, and the output folder.
+pub(super) fn corrected(
+    robot: &Robot,
+    arm: &Arm,
+    scenario: &Scenario,
+    request: &CompensateRequest,
+    [path, folder]: &[PathBuf; 2],
+) -> Result<(Corrected, Vec<String>), Error> {
+    let model = robot.rigid_model()?;
+    let cell = Cell { model: &model, tcp_link: Some(&robot.tcp.0), hold: &robot.hold, controller: &robot.controller };
+    let (mut controller, _) = cell.arm(&Overrides::default());
+    controller.controller = cell.controller_axes(&controller.axes);
+    let understood = |bytes: &[u8], others: Vec<(PathBuf, Vec<u8>)>| -> Result<Understood, Error> {
+        let text = program_text(path, bytes, &controller, others)?;
+        let places = target_joints(&text.program, &controller, &PathOptions::default());
+        let told = |source| Error::Path { path: path.clone(), source: Box::new(source), notes: Vec::new() };
+        Ok(Understood { places: places.map_err(told)?, text })
+    };
+    let old = understood(&flexarm_trajectory::bytes_of_file(path)?, Vec::new())?;
+    let stops = stops(&old, scenario);
+    let rests = stops.iter().map(|stop| stop.rest_s).collect();
+    let rest = AtRest::new(arm, &controller, scenario, request, rests)?;
+
+    let found: Vec<Result<Told, String>> = stops.par_iter().map(|stop| rest.target(stop)).collect();
+    let mut left: Vec<(usize, String)> = Vec::new();
+    let mut targets = Vec::new();
+    for (stop, found) in stops.iter().zip(found) {
+        match found {
+            Ok((target, via)) => targets.push((stop.item, target, via)),
+            Err(why) => left.push((stop.item, why)),
+        }
+    }
+    let loaded = if rest.is_loaded() { " under the loads there" } else { "" };
+    let name = plain(&robot.name);
+    let comment = format!("targets corrected by flexarm for {name}: the arm gives way at rest{loaded}");
+    let rewritten = old.text.rewritten(&targets, &comment);
+    left.extend(rewritten.left.iter().map(|(k, why)| (*k, (*why).to_owned())));
+
+    // What was written, as the controller will understand it.
+    let [(_, main), others @ ..] = &rewritten.files[..] else {
+        return Err(Error::File { path: path.clone(), what: "the program has no text".into() });
+    };
+    let again = understood(main, others.to_vec())?;
+    let judged =
+        judged(&rest, &stops, &again.places, &left).map_err(|what| Error::File { path: path.clone(), what })?;
+    let figures = ProgramFigures {
+        files: rewritten.files.iter().map(|(file, _)| in_folder(folder, file).display().to_string()).collect(),
+        corrected: rewritten.replaced.len(),
+        ..judged
+    };
+    let uncovered = uncovered(&rest, &stops, scenario);
+    let files = rewritten.files.into_iter().map(|(file, bytes)| (in_folder(folder, &file), bytes)).collect();
+    Ok((Corrected { figures, files }, uncovered))
+}
+
+/// Moves with targets, and when the motion is there: the planned moves in the same order; one without a leg of its own finds the arm
+/// there already.
+fn stops<'a>(program: &'a Understood, scenario: &Scenario) -> Vec<Stop<'a>> {
+    let planned = scenario.motion.tool_path.as_ref().map_or(&[][..], |path| &path.moves[..]);
+    let mut next = 0;
+    let mut now = [0.0; 2];
+    let mut stops = Vec::new();
+    for (item, (what, q)) in program.text.program.items.iter().zip(&program.places).enumerate() {
+        let (Item::Move(of), Some(q)) = (what, q) else { continue };
+        let leg = planned.get(next).filter(|leg| leg.line == of.line && leg.statement == of.statement);
+        if let Some(leg) = leg {
+            next += 1;
+            let end = planned.get(next).map_or_else(|| scenario.duration_s(), |leg| leg.span_s[0]);
+            now = if leg.blend_m > 0.0 { [leg.span_s[1]; 2] } else { [leg.span_s[1], end.max(leg.span_s[1])] };
+        }
+        stops.push(Stop { item, of, q, rest_s: now });
+    }
+    stops
+}
+
+/// What targets leave, before and after.
+fn judged(
+    rest: &AtRest<'_>,
+    stops: &[Stop<'_>],
+    again: &[Option<DVector<f64>>],
+    left: &[(usize, String)],
+) -> Result<ProgramFigures, String> {
+    let off = |stop: &Stop<'_>| {
+        let now = again.get(stop.item).and_then(Option::as_ref).ok_or("the corrected program has other moves")?;
+        Ok([rest.off(stop, stop.q)?, rest.off(stop, now)?])
+    };
+    let off: Vec<[Vector6<f64>; 2]> = stops.par_iter().map(off).collect::<Result<_, String>>()?;
+    let loaded = stops.iter().filter(|stop| rest.acts(stop.rest_s)).count();
+    let mut figures = ProgramFigures { targets: stops.len(), loaded, ..ProgramFigures::default() };
+    let size = |v: &Vector6<f64>, first: usize| v.fixed_rows::<3>(first).norm();
+    for (stop, [before, after]) in stops.iter().zip(off) {
+        figures.before_m = figures.before_m.max(size(&before, 0));
+        match left.iter().find(|(left, _)| *left == stop.item) {
+            None => {
+                figures.residual_m = figures.residual_m.max(size(&after, 0));
+                figures.residual_rad = figures.residual_rad.max(size(&after, 3));
+            }
+            Some((_, why)) if figures.left.len() < NAMED => figures.left.push(LeftTarget {
+                line: stop.of.line,
+                statement: stop.of.statement.clone(),
+                why: why.clone(),
+                residual_m: size(&after, 0),
+            }),
+            Some(_) => {}
+        }
+    }
+    Ok(figures)
+}
+
+/// What of loads and servos the targets do not cover, as sentences.
+fn uncovered(rest: &AtRest<'_>, stops: &[Stop<'_>], scenario: &Scenario) -> Vec<String> {
+    let mut told = Vec::new();
+    if rest.sags {
+        told.push("servos without an integral sag into their gains: targets of the program leave that out".to_owned());
+    }
+    if !rest.is_loaded() {
+        return told;
+    }
+    if scenario.motion.tool_path.is_none() {
+        told.push("when the motion is at its targets is not known: the loads are those of the start".to_owned());
+    }
+    told.push(
+        "loads between the targets are not in the program: each target has those that act while the arm is there"
+            .to_owned(),
+    );
+    let passed = stops.iter().filter(|stop| stop.rest_s[1] <= stop.rest_s[0] && rest.acts(stop.rest_s)).count();
+    if passed > 0 {
+        told.push(format!("targets that are passed without a rest: {passed}; the loads there are those of the moment"));
+    }
+    let changing = stops.iter().filter_map(|stop| Some((rest.change(stop.rest_s)?, stop.of.line)));
+    let changing: Vec<(f64, usize)> = changing.filter(|(change, _)| *change > CHANGES).collect();
+    if let Some((worst, line)) = changing.iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
+        told.push(format!(
+            "at {} targets the loads change while the arm is there, most in line {line} (by {:.0} % of their largest to one side): their mean is corrected",
+            changing.len(),
+            100.0 * worst
+        ));
+    }
+    told
+}
+
+/// Where a file of the program goes.
+pub(super) fn in_folder(folder: &Path, file: &Path) -> PathBuf {
+    folder.join(FOLDER).join(file.file_name().unwrap_or_default())
+}
+
+/// Letters that every controller takes.
+fn plain(name: &str) -> String {
+    name.chars().map(|c| if c.is_ascii_graphic() || c == ' ' { c } else { '_' }).collect()
+}
+
+/// What a program must say in the place of a target, and of an auxiliary point.
+type Told = (NewTarget, Option<Vector3<f64>>);
+
+/// The arm at rest, as its controller and as the world sees it.
+struct AtRest<'a> {
+    arm: &'a ProgramArm<'a>,
+    /// Motors held, under the mean of each load over the rest at a time.
+    held: FlexibleArm,
+    /// Payloads, by time.
+    changes: Vec<InertiaChange>,
+    tcp: Frame,
+    components: [bool; 6],
+    /// Loads as they are.
+    loads: Vec<AppliedLoad>,
+    /// Some servo has no integral.
+    sags: bool,
+}
+
+impl<'a> AtRest<'a> {
+    fn new(
+        arm: &Arm,
+        controller: &'a ProgramArm<'a>,
+        scenario: &Scenario,
+        request: &CompensateRequest,
+        rests: Vec<[f64; 2]>,
+    ) -> Result<Self, Error> {
+        let flexible = arm.flexible();
+        let held = Held(vec![0.0; controller.model.n_actuated()]);
+        let held = flexible.arm(Arc::new(held)).map_err(|error| flexible.explained(error))?;
+        let sags = held.servo.iter().flat_map(|servo| &servo.axes).any(|axis| axis.integral_gain <= 0.0);
+        let rests: Arc<[[f64; 2]]> = rests.into();
+        let mean = |load: &AppliedLoad| {
+            let rests = rests.clone();
+            averaged(load, scenario.duration_s(), move |t| {
+                rests.get(rests.partition_point(|rest| rest[0] < t)).filter(|rest| rest[0] == t).copied()
+            })
+        };
+        let loads = scenario.loads.iter().map(mean).collect();
+        let acting = Scenario { loads, ..scenario.clone() }.acting_on(arm.robot(), &held.model)?;
+        let held = held.with_motors_held();
+        let held = held.with_timed_loads(acting.loads).map_err(|error| flexible.explained(error))?;
+        let (tcp, loads) = (flexible.tcp.clone(), scenario.loads.clone());
+        Ok(Self { arm: controller, held, changes: acting.changes, tcp, components: request.components, loads, sags })
+    }
+
+    fn is_loaded(&self) -> bool {
+        !(self.loads.is_empty() && self.changes.is_empty())
+    }
+
+    /// Forces of all loads at samples of a rest (or at its moment).
+    fn samples(&self, [from, to]: [f64; 2]) -> impl Iterator<Item = Vec<Wrench>> {
+        let at = move |k: u32| from + (to - from) * (f64::from(k) + 0.5) / f64::from(LOOKS);
+        (0..LOOKS).map(move |k| self.loads.iter().map(|load| load.wrench.at(at(k))).collect())
+    }
+
+    /// Whether a load or another payload acts at a rest.
+    fn acts(&self, rest_s: [f64; 2]) -> bool {
+        let pulls = |load: &Wrench| load.force.norm() + load.torque.norm() > 0.0;
+        self.changes.iter().any(|change| change.t <= rest_s[0])
+            || self.samples(rest_s).any(|loads| loads.iter().any(pulls))
+    }
+
+    /// How far loads are from their mean at a rest, over their largest size; none where nothing acts.
+    fn change(&self, rest_s: [f64; 2]) -> Option<f64> {
+        let all: Vec<Vec<Wrench>> = self.samples(rest_s).collect();
+        let each = (0..self.loads.len()).filter_map(|k| {
+            let mean = all.iter().fold(Wrench::zeros(), |sum, F| sum + F[k] * (1.0 / f64::from(LOOKS)));
+            let largest = all.iter().map(|F| F[k].force.norm()).fold(0.0, f64::max);
+            let off = all.iter().map(|F| (F[k].force - mean.force).norm()).fold(0.0, f64::max);
+            (largest > 0.0).then(|| off / largest)
+        });
+        each.reduce(f64::max)
+    }
+
+    /// The arm with what it carries at a time.
+    fn carrying(&self, t: f64) -> FlexibleArm {
+        let due = self.changes.iter().take_while(|change| change.t <= t);
+        due.fold(self.held.clone(), |arm, change| arm.with_inertia(change.body, change.inertia))
+    }
+
+    /// The tool of a move on the flexible arm.
+    fn tool(&self, of: &Move) -> Frame {
+        let X_FT = of.X_FT.unwrap_or(self.arm.X_FT);
+        Frame { X_BF: self.tcp.X_BF * self.arm.X_FT.inverse() * X_FT, ..self.tcp.clone() }
+    }
+
+    fn rigid(&self, of: &Move, q: &DVector<f64>) -> Pose {
+        let mut data = Data::new(self.arm.model);
+        forward_kinematics(self.arm.model, &mut data, q);
+        data.X_WF(&tool_of(self.arm, of))
+    }
+
+    /// Joints with which the flexible tool is where the rigid one is at `q`.
+    fn joints(&self, stop: &Stop<'_>, q: &DVector<f64>) -> Result<DVector<f64>, String> {
+        let m = self.arm.model.n_actuated();
+        let (own, t) = (&q.as_slice()[..m], stop.rest_s[0]);
+        let (arm, tool) = (self.carrying(t), self.tool(stop.of));
+        let found = static_targets(&arm, &tool, own, &Wrench::zeros(), t, &self.components);
+        let mut new = q.clone();
+        new.rows_mut(0, m).copy_from_slice(&found.map_err(|error| error.to_string())?.q);
+        Ok(new)
+    }
+
+    /// What the program must say in the place of a target, and of an auxiliary point.
+    fn target(&self, stop: &Stop<'_>) -> Result<Told, String> {
+        let (of, q) = (stop.of, stop.q);
+        let target = match target_at(self.arm, of, &self.joints(stop, q)?) {
+            Target::Joints(values) => NewTarget::Joints(values),
+            Target::Pose { X_BT, configuration } => NewTarget::Pose { X_BT, configuration },
+        };
+        let MoveKind::Arc { via, .. } = &of.kind else { return Ok((target, None)) };
+        // The arm at the auxiliary point, turned as at the end: what it gives way hardly depends on that.
+        let X_MB = base_of(self.arm, of);
+        let at = X_MB * nalgebra::Point3::from(*via);
+        let X = Pose::from_parts(Translation3::from(at.coords), self.rigid(of, q).rotation);
+        let (model, frame) = (self.arm.model, tool_of(self.arm, of));
+        let q_via = inverse_kinematics(model, &mut Data::new(model), &frame, &X, q, &IkOptions::default());
+        let q_via = q_via.map_err(|error| format!("its auxiliary point is not reached: {error}"))?;
+        let moved = self.rigid(of, &self.joints(stop, &q_via)?).translation.vector;
+        Ok((target, Some((X_MB.inverse() * nalgebra::Point3::from(moved)).coords)))
+    }
+
+    /// Displacement of the flexible tool at joints from where the rigid one is at the joints that were meant.
+    fn off(&self, stop: &Stop<'_>, q: &DVector<f64>) -> Result<Vector6<f64>, String> {
+        let m = self.arm.model.n_actuated();
+        let t = stop.rest_s[0];
+        let held = self.carrying(t).along(Arc::new(Held(q.as_slice()[..m].to_vec())));
+        let at = linearise(&held, &self.tool(stop.of), &Wrench::zeros(), t).map_err(|error| error.to_string())?;
+        let wanted = self.rigid(stop.of, stop.q);
+        let p = at.X_WT.translation.vector - wanted.translation.vector;
+        let r = rotation_vector((at.X_WT.rotation * wanted.rotation.inverse()).matrix());
+        let all = Vector6::new(p.x, p.y, p.z, r.x, r.y, r.z);
+        Ok(Vector6::from_fn(|k, _| if self.components[k] { all[k] } else { 0.0 }))
+    }
+}

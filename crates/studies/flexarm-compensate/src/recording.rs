@@ -1,0 +1,139 @@
+//! The recording of an arm before and after its compensation.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use flexarm_analysis::{PathFrame, tcp_error};
+use flexarm_log::{LogError, Recorder, RunHeader, RunResult, Sample, TwinSample};
+use nalgebra::Vector3;
+
+use super::{CompensateRequest, Compensation, Found};
+use flexarm_run::Arm;
+use flexarm_run::Error;
+use flexarm_run::magnification::Expected;
+use flexarm_run::RunOptions;
+use flexarm_run::run::Together;
+use flexarm_run::run::run_traced;
+use flexarm_run::Scenario;
+use flexarm_settings::written::markdown;
+
+/// Samples of the recording per second.
+const RECORDED_HZ: f64 = 200.0;
+
+/// The arm before and after, over each other, beside the rigid arm on the motion that was asked for.
+pub(super) fn record(
+    path: &Path,
+    answer: &Compensation,
+    arm: &Arm,
+    found: &Found,
+    request: &CompensateRequest,
+) -> Result<(), Error> {
+    let options = flexarm_log::CreateOptions::default().with_overwrite(request.overwrite);
+    let study = flexarm_log::RrdStudy::create(path, options, vec!["before".into(), "after".into()]);
+    let run = RunOptions {
+        modelling: *arm.modelling(),
+        log_rate_hz: RECORDED_HZ,
+        ignore_limits: true,
+        ..request.run.clone()
+    };
+    let wanted = Arc::new(Mutex::new(Vec::new()));
+    let mut expected: Option<Expected> = None;
+    for (number, motion) in [&found.scenario.motion, &found.motion].into_iter().enumerate() {
+        let scenario = Scenario { motion: motion.clone(), ..found.scenario.clone() };
+        let checked = flexarm_run::prepare::checked(arm.robot(), &scenario, &run, None)?;
+        let expected = *expected.get_or_insert_with(|| checked.expected(&scenario));
+        let recorder = Against::new(Box::new(study.seat(number)), wanted.clone(), number == 0);
+        let together =
+            Together { recorders: vec![Box::new(recorder)], expected: Some(expected), ..Together::default() };
+        run_traced(arm.robot(), &scenario, &run, None, together, &mut |_, _| ControlFlow::Continue(()))?;
+    }
+    let mm = |x: f64| 1e3 * x;
+    study.finish(&format!(
+        "# {} on {}\n\nDistance of the tool from where the rigid arm has it on the motion that was asked for.\n\n\
+         | | peak | RMS | at the end |\n| --- | --- | --- | --- |\n\
+         | before | {:.4} mm | {:.4} mm | {:.4} mm |\n| after | {:.4} mm | {:.4} mm | {:.4} mm |\n",
+        markdown(&answer.motion),
+        markdown(&answer.robot),
+        mm(answer.before.peak_m),
+        mm(answer.before.rms_m),
+        mm(answer.before.end_m),
+        mm(answer.after.peak_m),
+        mm(answer.after.rms_m),
+        mm(answer.after.end_m)
+    ))?;
+    Ok(())
+}
+
+/// A recorder that shows the rigid arm of the first run in all runs, and errors from it: new commands move the rigid arm as
+/// well, and that is not where the tool should be.
+struct Against {
+    inner: Box<dyn Recorder>,
+    wanted: Arc<Mutex<Vec<TwinSample>>>,
+    first: bool,
+    at: usize,
+    frame: Option<PathFrame>,
+    interval_s: f64,
+}
+
+impl Against {
+    fn new(inner: Box<dyn Recorder>, wanted: Arc<Mutex<Vec<TwinSample>>>, first: bool) -> Self {
+        Self { inner, wanted, first, at: 0, frame: None, interval_s: 1.0 / RECORDED_HZ }
+    }
+
+    /// The rigid arm as it should be, and the tool against it.
+    fn changed(&mut self, sample: &Sample) -> Sample {
+        let wanted = self.wanted.lock().unwrap_or_else(PoisonError::into_inner);
+        let place = |k: usize| wanted[k.min(wanted.len() - 1)].X_WT.translation.vector;
+        let speed = |k: usize| (place(k + 1) - place(k.saturating_sub(1))) / (2.0 * self.interval_s);
+        let frame = self.frame.unwrap_or_else(|| {
+            PathFrame::before((0..wanted.len()).map(|k| {
+                let bend = place(k + 1) - 2.0 * place(k) + place(k.saturating_sub(1));
+                [speed(k), bend / (self.interval_s * self.interval_s)]
+            }))
+        });
+        let frame = frame.next(&speed(self.at));
+        self.frame = Some(frame);
+        let rigid = wanted[self.at.min(wanted.len() - 1)].clone();
+        let [x, y, z, rx, ry, rz] = tcp_error(&rigid.X_WT, &sample.flexible.X_WT);
+        let [along, normal, binormal] = frame.components(&Vector3::new(x, y, z));
+        let [r_along, r_normal, r_binormal] = frame.components(&Vector3::new(rx, ry, rz));
+        Sample {
+            error_world: [x, y, z, rx, ry, rz],
+            error_path: [along, normal, binormal, r_along, r_normal, r_binormal],
+            static_m: [f64::NAN; 3],
+            rigid,
+            ..sample.clone()
+        }
+    }
+}
+
+impl Recorder for Against {
+    fn check(&self) -> Result<(), LogError> {
+        self.inner.check()
+    }
+
+    fn begin(&mut self, header: &RunHeader) -> Result<(), LogError> {
+        self.interval_s = 1.0 / header.log_rate_hz;
+        self.inner.begin(header)
+    }
+
+    fn record(&mut self, sample: &Sample) -> Result<(), LogError> {
+        if self.first {
+            self.wanted.lock().unwrap_or_else(PoisonError::into_inner).push(sample.rigid.clone());
+            return self.inner.record(sample);
+        }
+        let changed = self.changed(sample);
+        self.at += 1;
+        self.inner.record(&changed)
+    }
+
+    fn finish(&mut self, result: &RunResult) -> Result<(), LogError> {
+        // Figures of the later runs are about where their own commands have the rigid arm.
+        if self.first { self.inner.finish(result) } else { self.inner.finish(&RunResult::default()) }
+    }
+
+    fn path(&self) -> &Path {
+        self.inner.path()
+    }
+}

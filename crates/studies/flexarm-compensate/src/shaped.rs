@@ -1,0 +1,201 @@
+//! A motion through an input shaper.
+
+use std::sync::Arc;
+
+use flexarm_analysis::{DampedMode, Node, ShapedMode, Shaper, ShaperKind, damped_modes, vibration_left};
+use flexarm_kinematics::Wrench;
+use flexarm_stepping::{FlexibleArm, Held, linearise};
+use flexarm_trajectory::{JointKnots, Trajectory};
+use nalgebra::DMatrix;
+use serde::Serialize;
+
+use super::{CompensateError, SAMPLE_S};
+use flexarm_run::Arm;
+use flexarm_run::Error;
+use flexarm_run::Motion;
+use flexarm_run::Scenario;
+
+/// Damping ratio beyond which a mode hardly swings.
+const SWINGS: f64 = 0.4;
+/// Commands with less than this part of their largest acceleration are at rest.
+const RESTS: f64 = 1e-9;
+/// Modes with less than this part of the largest vibration are left alone.
+const SMALL: f64 = 1e-3;
+/// Most modes, and most periods of one in a delay.
+const MOST: (usize, f64) = (8, 20.0);
+/// Factors on frequencies at which the spectrum of a motion is looked at, in parts of the band.
+const IN_BAND: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
+
+/// Which input shaper.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shaping {
+    /// In closed form, against the first mode at the end of the motion.
+    Mode(ShaperKind),
+    /// What leaves least of all modes at the end of the motion within a delay.
+    Optimal {
+        /// At most so much longer (s); a period of the first mode without.
+        delay_s: Option<f64>,
+        /// Part by which each frequency may be off to either side.
+        band: f64,
+    },
+}
+
+impl Shaping {
+    /// Part by which frequencies may be off unless it is told.
+    pub const BAND: f64 = 0.1;
+}
+
+impl From<ShaperKind> for Shaping {
+    fn from(kind: ShaperKind) -> Self {
+        Self::Mode(kind)
+    }
+}
+
+/// A shaper as it was used.
+#[derive(Clone, Debug, Serialize)]
+pub struct ShaperFigures {
+    /// `zv`, `zvd` or `optimal`.
+    pub kind: &'static str,
+    /// Delay (s) and part of each copy of the motion.
+    pub copies: Vec<[f64; 2]>,
+    /// Modes at the end of the motion that it was made against, the one that would swing most first.
+    pub modes: Vec<ShapedModeFigures>,
+}
+
+/// A mode and what a shaper leaves of it.
+#[derive(Clone, Debug, Serialize)]
+pub struct ShapedModeFigures {
+    /// Natural frequency (Hz).
+    pub frequency_hz: f64,
+    /// Damping ratio.
+    pub damping_ratio: f64,
+    /// Oscillation of the tool that the motion would leave, the largest within the band of the frequency (m).
+    pub before_m: f64,
+    /// The same with the shaper.
+    pub after_m: f64,
+}
+
+/// The motion of a scenario through a shaper.
+pub(super) fn shaped(arm: &Arm, scenario: &Scenario, shaping: Shaping) -> Result<(Motion, ShaperFigures), Error> {
+    let motion = &scenario.motion;
+    let end = AtEnd::of(arm, scenario)?;
+    let Some(first) = end.modes.first() else { return Err(CompensateError::NothingYields.into()) };
+    let (hz, ratio) = (first.frequency_hz(), first.damping_ratio());
+    let (kind, shaper, band, modes) = match shaping {
+        Shaping::Mode(kind) => {
+            let name = if kind == ShaperKind::Zv { "zv" } else { "zvd" };
+            (name, Shaper::new(kind, hz, ratio), 0.0, end.vibrations(0.0, f64::INFINITY))
+        }
+        Shaping::Optimal { delay_s, band } => {
+            let delay_s = delay_s.unwrap_or_else(|| 1.0 / first.damped_frequency_hz());
+            let modes = end.vibrations(band, MOST.1 / delay_s);
+            let found = Shaper::optimal(&modes, delay_s, band).map_err(CompensateError::from)?;
+            ("optimal", found.shaper, band, modes)
+        }
+    };
+    let left = |mode: &ShapedMode| {
+        let at = |part: &f64| shaper.residual((1.0 + band * part) * mode.hz, mode.ratio);
+        ShapedModeFigures {
+            frequency_hz: mode.hz,
+            damping_ratio: mode.ratio,
+            before_m: mode.vibration,
+            after_m: mode.vibration * IN_BAND.iter().map(at).fold(0.0, f64::max),
+        }
+    };
+    let figures = ShaperFigures {
+        kind,
+        copies: shaper.copies.iter().map(|(delay, part)| [*delay, *part]).collect(),
+        modes: modes.iter().map(left).collect(),
+    };
+    let trajectory = through(&shaper, &motion.trajectory)?;
+    Ok((Motion::along(trajectory, &format!("{}_shaped", motion.name), arm.robot())?, figures))
+}
+
+/// A motion as the sum of its copies.
+fn through(shaper: &Shaper, motion: &Trajectory) -> Result<Trajectory, Error> {
+    let m = motion.joints().len();
+    let (mut q, mut v, mut a) = (vec![0.0; m], vec![0.0; m], vec![0.0; m]);
+    let total = motion.duration() + shaper.delay_s();
+    let n = (total / SAMPLE_S).ceil() as usize;
+    let times: Vec<f64> = (0..=n).map(|k| total * k as f64 / n as f64).collect();
+    let mut joints: Vec<JointKnots> =
+        motion.joints().iter().map(|name| JointKnots { name: name.clone(), ..JointKnots::default() }).collect();
+    for t in &times {
+        let mut sum = vec![[0.0; 3]; m];
+        for (delay, part) in &shaper.copies {
+            motion.sample(t - delay, &mut q, &mut v, &mut a);
+            for k in 0..m {
+                sum[k][0] += part * q[k];
+                sum[k][1] += part * v[k];
+                sum[k][2] += part * a[k];
+            }
+        }
+        for (joint, [q, v, a]) in joints.iter_mut().zip(sum) {
+            joint.position.push(q);
+            joint.velocity.push(v);
+            joint.acceleration.push([a; 2]);
+        }
+    }
+    Ok(Trajectory::through_knots(&times, &joints)?)
+}
+
+/// The arm as a structure at the end of a motion, under its servos and with what it carries there.
+struct AtEnd {
+    node: Node,
+    /// Those that swing, by frequency.
+    modes: Vec<DampedMode>,
+    /// Accelerations of the motion until it comes to rest, m×N.
+    accelerations: DMatrix<f64>,
+    step_s: f64,
+}
+
+impl AtEnd {
+    fn of(arm: &Arm, scenario: &Scenario) -> Result<Self, Error> {
+        let (flexible, motion) = (arm.flexible(), &scenario.motion.trajectory);
+        let (m, duration) = (motion.joints().len(), motion.duration());
+        let count = (duration / SAMPLE_S).ceil().max(1.0) as usize;
+        let step_s = duration / count as f64;
+        let mut accelerations = DMatrix::zeros(m, count + 1);
+        let (mut q, mut v, mut a) = (vec![0.0; m], vec![0.0; m], vec![0.0; m]);
+        let start = {
+            motion.sample(0.0, &mut q, &mut v, &mut a);
+            flexible.arm(Arc::new(Held(q.clone()))).map_err(|error| flexible.explained(error))?
+        };
+        for (k, mut column) in accelerations.column_iter_mut().enumerate() {
+            motion.sample(step_s * k as f64, &mut q, &mut v, &mut a);
+            column.copy_from_slice(&a);
+        }
+        // Up to where the commands come to rest: what swings then is what is to be small.
+        let moving = accelerations.column_iter().rposition(|column| column.amax() > RESTS * accelerations.amax());
+        let accelerations = accelerations.columns(0, (moving.unwrap_or(0) + 2).min(count + 1)).into_owned();
+        // Gains of servos and dampings are those of the start, as in a run.
+        let mut held: FlexibleArm = start.along(Arc::new(Held(q)));
+        for change in scenario.acting_on(arm.robot(), &held.model)?.changes {
+            held = held.with_inertia(change.body, change.inertia);
+        }
+        let at = linearise(&held, &flexible.tcp, &Wrench::zeros(), 0.0).map_err(|error| flexible.explained(error))?;
+        let symmetric = (&at.K + at.K.transpose()) * 0.5;
+        let modes = damped_modes(&at.M, &at.D, &symmetric).map_err(CompensateError::from)?;
+        let swings = |mode: &DampedMode| mode.eigenvalue.im > 0.0 && (0.0..SWINGS).contains(&mode.damping_ratio());
+        let six = |A: &nalgebra::Matrix6xX<f64>| DMatrix::from_fn(6, A.ncols(), |i, j| A[(i, j)]);
+        let (J, J_a) = (six(&at.J), six(&at.J_a));
+        let node = Node { M: at.M, D: at.D, K: at.K, M_a: at.M_a, D_a: at.D_a, K_a: at.K_a, J, J_a, servo: None };
+        Ok(Self { node, modes: modes.into_iter().filter(swings).collect(), accelerations, step_s })
+    }
+
+    /// Modes that the motion makes swing, up to a frequency, the first in any case, the largest first.
+    fn vibrations(&self, band: f64, up_to_hz: f64) -> Vec<ShapedMode> {
+        let of = |mode: &DampedMode| {
+            let at = |part: &f64| vibration_left(&self.node, mode, &self.accelerations, self.step_s, 1.0 + band * part);
+            let vibration = IN_BAND.iter().map(at).fold(f64::MIN_POSITIVE, f64::max);
+            ShapedMode { hz: mode.frequency_hz(), ratio: mode.damping_ratio(), vibration }
+        };
+        let near = self.modes.iter().enumerate().filter(|(k, mode)| *k == 0 || mode.frequency_hz() <= up_to_hz);
+        let mut all: Vec<ShapedMode> = near.map(|(_, mode)| of(mode)).collect();
+        all.sort_by(|a, b| b.vibration.total_cmp(&a.vibration));
+        let most = all.first().map_or(0.0, |mode| mode.vibration);
+        all.retain(|mode| mode.vibration >= SMALL * most);
+        all.truncate(MOST.0);
+        all
+    }
+}

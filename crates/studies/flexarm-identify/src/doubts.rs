@@ -1,0 +1,147 @@
+//! What is doubtful of an identification.
+
+use crate::estimation::{Identified, MeasuredArm, NoAnswer, Plant, Reading, ReadingKind};
+use nalgebra::DVector;
+
+use super::answer::{Identification, rms};
+use super::encoders::EncoderFigures;
+use super::file::MeasurementInput;
+use flexarm_run::Caveat;
+use flexarm_run::caveat::kinds;
+use flexarm_run::Robot;
+
+/// Displacements so many times larger or smaller than the robot's are no guess of a stiffness.
+const LOAD_RATIO: f64 = 5.0;
+/// Weight of a kilogram (N).
+const WEIGHT: f64 = 9.81;
+/// A rest of encoders over their noise that is told.
+const ENCODER_REST: f64 = 1.5;
+
+/// Scatter of places about the rigid robot, over their spread, beyond which frames or joints do not fit.
+const FRAME_RATIO: f64 = 0.05;
+
+pub(super) fn caveats(found: &Identified) -> Vec<Caveat> {
+    let mut caveats = Vec::new();
+    if let Some(factor) = found.misfit {
+        let results = match found.parameters.iter().all(|p| p.std.is_nan()) {
+            true => "the fit does not meet the readings, and its results have no deviations",
+            false => "the deviations of the results are enlarged by that",
+        };
+        let text = format!(
+            "the readings scatter {factor:.1} times as much as their deviations say: the model lacks something that gives way, \
+             loads or frames are wrong, or the deviations are too small; {results}"
+        );
+        caveats.push(Caveat::said(
+            "misfit",
+            "measurements",
+            text,
+            "free more parameters, look at the largest residuals",
+        ));
+    }
+    for parameter in found.parameters.iter().filter(|p| !p.identifiable) {
+        let text = format!("{} does not follow from these readings: it stays where it was", parameter.name);
+        caveats.push(Caveat::said(
+            "not-identifiable",
+            "measurements",
+            text,
+            "measure where it counts: a plan says where",
+        ));
+    }
+    if let Some(held) = found.held_out.as_ref().filter(|held| held.rms > held.rms_initial) {
+        let text = format!(
+            "readings that the fit had not seen are met worse than with the robot file as it is ({:.2} against {:.2} deviations): \
+             there are too many parameters for these readings",
+            held.rms, held.rms_initial
+        );
+        caveats.push(Caveat::said("over-fitted", "measurements", text, "fit fewer parameters or measure more poses"));
+    }
+    if !found.solution.converged && found.misfit.is_none() {
+        let text = "the search did not settle: take the values with care";
+        caveats.push(Caveat::said("not-converged", "measurements", text, "a better first guess helps"));
+    }
+    caveats
+}
+
+/// Laws of gears that the readings are met without.
+pub(super) fn gear_caveat(robot: &Robot) -> Option<Caveat> {
+    let has = |drive: &&flexarm_run::Drive| {
+        drive.gearbox.as_ref().is_some_and(|(_, gear)| gear.hysteresis.is_some() || !gear.transmission.is_empty())
+    };
+    let joints: Vec<&str> = robot.drives.iter().filter(has).map(|drive| drive.joint.as_str()).collect();
+    (!joints.is_empty()).then(|| {
+        let text = format!(
+            "hysteresis and transmission errors of {} are not in the fit: gears are springs there",
+            joints.join(", ")
+        );
+        Caveat::said("gear-laws", "measurements", text, "load from the same side every time").as_note()
+    })
+}
+
+/// Encoders whose rest is more than the noise of the instruments, and as a part of the deflection more than the deviation of the
+/// stiffness.
+pub(super) fn encoder_caveats(encoders: &[EncoderFigures]) -> impl Iterator<Item = Caveat> + '_ {
+    let odd = |gear: &&EncoderFigures| {
+        let more = (gear.rest_rms.powi(2) - gear.noise_rms.powi(2)).max(0.0).sqrt();
+        let matters = more / gear.deflection_rms > gear.std / gear.stiffness;
+        gear.told && matters && gear.rest_rms > ENCODER_REST * gear.noise_rms
+    };
+    let told = |gear: &EncoderFigures| {
+        kinds::ENCODER_REST.found(format!("encoders of {}", gear.joint), gear.rest_rms, gear.noise_rms)
+    };
+    encoders.iter().filter(odd).map(told)
+}
+
+/// Displacements under forces, or under masses, that are as much larger or smaller than the robot's as a kilogram weighs.
+pub(super) fn load_caveats(plant: &Plant, input: &MeasurementInput) -> Result<Vec<Caveat>, NoAnswer> {
+    let mut caveats = Vec::new();
+    for (what, slip, pulls) in [("forces", "kg given as N", true), ("masses", "N given as kg", false)] {
+        let some = input.measurements.of_readings(|k| match &input.measurements.readings[k].kind {
+            ReadingKind::Displacement { before, after, .. } => {
+                let forces = before.wrench != after.wrench;
+                let masses = before.carried != after.carried;
+                forces != masses && forces == pulls
+            }
+            _ => false,
+        });
+        if some.readings.is_empty() {
+            continue;
+        }
+        let arm = MeasuredArm { plant, parameters: &[], measurements: &some };
+        // Rotations of instruments are fitted; the size of a displacement does not depend on them.
+        let predicted = arm.predicted(&DVector::zeros(some.own_unknowns()))?;
+        let deviations: Vec<f64> = some.readings.iter().flat_map(Reading::deviations).collect();
+        let size =
+            |values: &[f64]| values.iter().zip(&deviations).map(|(x, std)| (x / std).powi(2)).sum::<f64>().sqrt();
+        let ratio = size(&arm.observed()) / size(&predicted);
+        if !ratio.is_finite() || (1.0 / LOAD_RATIO..=LOAD_RATIO).contains(&ratio) {
+            continue;
+        }
+        let mended = if pulls { ratio / WEIGHT } else { ratio * WEIGHT };
+        let likely = match (0.4..=2.5).contains(&mended) {
+            true => format!("about {WEIGHT} times too {}: {slip}?", if pulls { "large" } else { "small" }),
+            false => String::new(),
+        };
+        caveats.push(kinds::LOAD_UNIT.found(what, ratio, LOAD_RATIO).likely(likely));
+    }
+    Ok(caveats)
+}
+
+/// Places that no placement of the instrument brings near those of the robot.
+pub(super) fn frame_caveat(answer: &Identification) -> Option<Caveat> {
+    let metres: Vec<usize> = (0..answer.compared.len()).filter(|k| answer.compared[*k].kind == "places").collect();
+    if metres.is_empty() {
+        return None;
+    }
+    let measured: Vec<f64> = metres.iter().map(|k| answer.compared[*k].measured).collect();
+    let mean = measured.iter().sum::<f64>() / measured.len() as f64;
+    let spread = rms(measured.iter().map(|x| x - mean));
+    let left = rms(metres.iter().map(|k| answer.compared[*k].after - answer.compared[*k].measured));
+    (left > FRAME_RATIO * spread).then(|| {
+        let text = format!(
+            "the places are {:.1} mm (RMS) from those of the robot wherever the instrument stands: joint values, their order, senses or \
+             units, or the targets are not those of this robot",
+            1e3 * left
+        );
+        Caveat::said("frames", "measurements", text, "compare one pose by hand with what the robot model says (inspect)")
+    })
+}

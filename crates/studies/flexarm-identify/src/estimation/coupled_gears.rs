@@ -1,0 +1,248 @@
+//! Stiffness of gears that move several joints, from the positions of the motors and of the links behind them.
+//!
+//! ```text
+//! C q_m - q_link = C diag(c) Cᵀ τ:     row i:  Σ_k c_k C_ik (Cᵀ τ)_k + d_i q̇_i + offset of the run
+//! ```
+//! with the compliance `c_k` of each motor's spring behind its gear and a delay `d_i` of each link's encoder (and, fitted to the rest, damping in
+//! proportion to the rate of what each link shows): what one link shows is a
+//! combination of springs, and one encoder may tell several of them. Deviations and what counts as told as for a single gear
+//! ([`crate::estimation::gear_stiffness`]), of each spring beside what the others do.
+
+use crate::estimation::encoders::{BLOCK, GearEstimate, Normal, centred, damping_time, jackknife, squares};
+
+/// One link's encoder in a recording, evenly sampled, all filtered alike.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CoupledOutput {
+    /// Where the motors say that the joint is, less the link (rad).
+    pub deflection: Vec<f64>,
+    /// Speed of the joint (rad/s).
+    pub rate: Vec<f64>,
+    /// Rate of the deflection (rad/s); zeros for gears without damping.
+    pub deflection_rate: Vec<f64>,
+    /// Of each spring its part of the deflection per compliance: `C_ik (Cᵀ τ)_k` (N m).
+    pub torques: Vec<Vec<f64>>,
+    /// The same of signals without the noise of the encoders ([`crate::estimation::GearRun::instrument`]).
+    pub instruments: Vec<Vec<f64>>,
+}
+
+/// Finds the stiffness of each spring from all recordings of the same encoders; one recording is taken as two halves.
+///
+/// None for less than two blocks of samples, or springs that these encoders do not tell apart.
+pub fn coupled_gear_stiffness(runs: &[Vec<CoupledOutput>]) -> Option<Vec<GearEstimate>> {
+    let halves;
+    let runs = match runs {
+        [one] => {
+            halves = split(one);
+            &halves[..]
+        }
+        runs => runs,
+    };
+    let first = runs.first()?.first()?;
+    let length = |run: &[CoupledOutput]| run.first().map_or(0, |output| output.deflection.len());
+    if runs.iter().map(|run| length(run)).sum::<usize>() < 2 * BLOCK {
+        return None;
+    }
+    let all: Vec<usize> = (0..runs.len()).collect();
+    let fit = Fit::of(runs, &all, None)?;
+    let blocks = all.iter().flat_map(|run| (0..length(&runs[*run]) / BLOCK).map(move |k| (*run, k * BLOCK)));
+    let left: Vec<Fit> = blocks.filter_map(|block| Fit::of(runs, &all, Some(block))).collect();
+    let others = |run: usize| all.iter().copied().filter(|k| *k != run).collect::<Vec<_>>();
+    let without: Vec<Fit> = all.iter().map(|run| Fit::of(runs, &others(*run), None)).collect::<Option<_>>()?;
+    let of = |motor: usize| {
+        let scatter = |fits: &[Fit]| jackknife(&fits.iter().map(|fit| fit.compliance[motor]).collect::<Vec<_>>());
+        let unseen = runs.iter().zip(&without).map(|(run, fit)| squares(&fit.curves(run, motor)));
+        let curves: Vec<_> = runs.iter().map(|run| fit.curves(run, motor)).collect();
+        let sums = curves.iter().map(squares).fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
+        let count = curves.iter().map(|[measured, _]| measured.len()).sum::<usize>() as f64;
+        let compliance = fit.compliance[motor];
+        GearEstimate {
+            stiffness: 1.0 / compliance,
+            std_ln: scatter(&left).max(scatter(&without)) / compliance.abs(),
+            delay_s: fit.delay[seen_most(runs, motor)],
+            r2: 1.0 - sums.0 / sums.1,
+            unseen_r2: unseen.map(|(rest, whole)| 1.0 - rest / whole).collect(),
+            without_each: without.iter().map(|fit| 1.0 / fit.compliance[motor]).collect(),
+            rest_rms: (sums.0 / count).sqrt(),
+            deflection_rms: (sums.1 / count).sqrt(),
+            curves,
+        }
+    };
+    Some((0..first.torques.len()).map(of).collect())
+}
+
+/// The encoder that shows most of a spring.
+fn seen_most(runs: &[Vec<CoupledOutput>], motor: usize) -> usize {
+    let size = |output: usize| {
+        runs.iter().flat_map(|run| &run[output].torques[motor]).map(|torque| torque * torque).sum::<f64>()
+    };
+    (0..runs[0].len()).max_by(|a, b| size(*a).total_cmp(&size(*b))).unwrap_or(0)
+}
+
+fn split(run: &[CoupledOutput]) -> [Vec<CoupledOutput>; 2] {
+    let half = |second: bool| {
+        let cut = |x: &Vec<f64>| {
+            let (a, b) = x.split_at(x.len() / 2);
+            if second { b.to_vec() } else { a.to_vec() }
+        };
+        let of = |output: &CoupledOutput| CoupledOutput {
+            deflection: cut(&output.deflection),
+            rate: cut(&output.rate),
+            deflection_rate: cut(&output.deflection_rate),
+            torques: output.torques.iter().map(cut).collect(),
+            instruments: output.instruments.iter().map(cut).collect(),
+        };
+        run.iter().map(of).collect()
+    };
+    [half(false), half(true)]
+}
+
+/// Compliance of each spring, delay of each encoder.
+struct Fit {
+    compliance: Vec<f64>,
+    delay: Vec<f64>,
+    damping_s: Vec<f64>,
+}
+
+impl Fit {
+    /// Least squares with an offset for each encoder of each run, without one block.
+    fn of(runs: &[Vec<CoupledOutput>], some: &[usize], without: Option<(usize, usize)>) -> Option<Self> {
+        let (outputs, motors) = (runs[0].len(), runs[0][0].torques.len());
+        let mut sums = Normal::new(motors + outputs);
+        for &k in some {
+            let left_out = |i: &usize| without.is_some_and(|(r, first)| r == k && (first..first + BLOCK).contains(i));
+            let kept: Vec<usize> = (0..runs[k][0].deflection.len()).filter(|i| !left_out(i)).collect();
+            for (number, output) in runs[k].iter().enumerate() {
+                let all = |signals: &[Vec<f64>]| signals.iter().map(|x| centred(x, &kept)).collect::<Vec<_>>();
+                let (x, z) = (all(&output.torques), all(&output.instruments));
+                let rate = centred(&output.rate, &kept);
+                let mut columns: Vec<(usize, &[f64], &[f64])> =
+                    x.iter().zip(&z).enumerate().map(|(k, (x, z))| (k, &x[..], &z[..])).collect();
+                columns.push((motors + number, &rate, &rate));
+                sums.add(&columns, &centred(&output.deflection, &kept));
+            }
+        }
+        let mut values = sums.solved(motors)?;
+        let delay = values.split_off(motors);
+        let mut fit = Self { compliance: values, delay, damping_s: vec![0.0; outputs] };
+        fit.damping_s = (0..outputs)
+            .map(|number| {
+                let of =
+                    some.iter().map(|&k| (fit.rest(&runs[k][number], number), &runs[k][number].deflection_rate[..]));
+                damping_time(of)
+            })
+            .collect();
+        Some(fit)
+    }
+
+    /// What is left of the deflection of an encoder.
+    fn rest(&self, output: &CoupledOutput, number: usize) -> Vec<f64> {
+        let kept: Vec<usize> = (0..output.deflection.len()).collect();
+        let mut rest = centred(&output.deflection, &kept);
+        let mut take = |x: &[f64], factor: f64| {
+            rest.iter_mut().zip(centred(x, &kept)).for_each(|(rest, x)| *rest -= factor * x);
+        };
+        take(&output.rate, self.delay[number]);
+        take(&output.deflection_rate, -self.damping_s[number]);
+        output.torques.iter().zip(&self.compliance).for_each(|(torque, c)| take(torque, *c));
+        rest
+    }
+
+    /// Of a run, over the encoders that show a spring: what that spring does by the readings without the others, and by its torque.
+    fn curves(&self, run: &[CoupledOutput], motor: usize) -> [Vec<f64>; 2] {
+        let (mut measured, mut expected) = (Vec::new(), Vec::new());
+        for (number, output) in run.iter().enumerate() {
+            if output.torques[motor].iter().all(|torque| *torque == 0.0) {
+                continue;
+            }
+            let kept: Vec<usize> = (0..output.deflection.len()).collect();
+            let own = centred(&output.torques[motor], &kept).into_iter().map(|torque| self.compliance[motor] * torque);
+            let own: Vec<f64> = own.collect();
+            measured.extend(self.rest(output, number).iter().zip(&own).map(|(rest, own)| rest + own));
+            expected.extend(own);
+        }
+        [measured, expected]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimation::{GearRun, gear_stiffness};
+
+    const C: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [-0.2, 1.0, 0.0], [0.4, -0.3, 1.0]];
+    const STIFFNESS: [f64; 3] = [2e6, 9e5, 4e5];
+    const DELAY: [f64; 3] = [3e-3, -1e-3, 2e-3];
+
+    fn run(seed: f64, noise: f64) -> Vec<CoupledOutput> {
+        let t = |k: usize| 0.004 * k as f64;
+        let tau: Vec<Vec<f64>> = (0..3)
+            .map(|j| {
+                let f = 0.9 + 0.37 * j as f64;
+                (0..2500).map(|k| 900.0 * (f * t(k) + seed).sin() + 400.0 * (2.3 * f * t(k) + j as f64).cos()).collect()
+            })
+            .collect();
+        let motor = |k: usize, i: usize| (0..3).map(|j| C[j][k] * tau[j][i]).sum::<f64>();
+        let output = |i: usize| {
+            let rate: Vec<f64> = (0..2500).map(|k| 0.4 * ((1.3 + 0.2 * i as f64) * t(k) + 2.0 * seed).cos()).collect();
+            let torques: Vec<Vec<f64>> = (0..3).map(|k| (0..2500).map(|s| C[i][k] * motor(k, s)).collect()).collect();
+            let error = |s: usize| noise * (17.0 * t(s) * (1.0 + 0.1 * seed + 0.3 * i as f64)).sin();
+            let spring = |s: usize| (0..3).map(|k| torques[k][s] / STIFFNESS[k]).sum::<f64>();
+            let deflection = (0..2500).map(|s| spring(s) + DELAY[i] * rate[s] + 1e-3 * seed + error(s)).collect();
+            CoupledOutput { deflection, rate, deflection_rate: vec![0.0; 2500], instruments: torques.clone(), torques }
+        };
+        (0..3).map(output).collect()
+    }
+
+    #[test]
+    fn springs_of_coupled_motors_are_found_from_all_encoders_and_from_the_last_one_alone() {
+        let runs: Vec<_> = [0.0, 1.0, 2.0].map(|seed| run(seed, 0.0)).to_vec();
+        let last: Vec<_> = runs.iter().map(|run| run[2..].to_vec()).collect();
+        for runs in [&runs[..], &runs[..1], &last[..]] {
+            let found = coupled_gear_stiffness(runs).unwrap();
+            for (gear, truth) in found.iter().zip(STIFFNESS) {
+                let error = (gear.stiffness / truth - 1.0).abs();
+                // Measured: 1e-12 and less.
+                assert!(error < 1e-9 && gear.is_told() && gear.r2 > 1.0 - 1e-12, "{gear:?}");
+            }
+        }
+        // Without noise the delays come out too; the first spring is seen most by its own encoder.
+        let found = coupled_gear_stiffness(&runs).unwrap();
+        assert!((found[0].delay_s - DELAY[0]).abs() < 1e-10 && (found[2].delay_s - DELAY[2]).abs() < 1e-10);
+    }
+
+    #[test]
+    fn a_single_gear_comes_out_as_by_itself() {
+        let runs: Vec<_> = [0.0, 1.0, 2.0].map(|seed| vec![run(seed, 1e-5).swap_remove(0)]).to_vec();
+        let only = |run: &Vec<CoupledOutput>| {
+            let CoupledOutput { deflection, rate, deflection_rate, torques, .. } = run[0].clone();
+            let torques = vec![torques[0].clone()];
+            vec![CoupledOutput { deflection, rate, deflection_rate, instruments: torques.clone(), torques }]
+        };
+        let runs: Vec<_> = runs.iter().map(only).collect();
+        let plain: Vec<GearRun> = runs
+            .iter()
+            .map(|run| GearRun {
+                deflection: run[0].deflection.clone(),
+                torque: run[0].torques[0].clone(),
+                instrument: run[0].torques[0].clone(),
+                rate: run[0].rate.clone(),
+                deflection_rate: vec![0.0; 2500],
+            })
+            .collect();
+        let (a, b) = (&coupled_gear_stiffness(&runs).unwrap()[0], gear_stiffness(&plain).unwrap());
+        assert!((a.stiffness / b.stiffness - 1.0).abs() < 1e-12 && (a.std_ln / b.std_ln - 1.0).abs() < 1e-9);
+        assert!((a.r2 - b.r2).abs() < 1e-12 && (a.unseen_r2[1] - b.unseen_r2[1]).abs() < 1e-12);
+    }
+
+    #[test]
+    fn springs_that_the_encoders_do_not_tell_apart_are_not_made_up() {
+        let mut runs: Vec<_> = [0.0, 1.0].map(|seed| run(seed, 0.0)).to_vec();
+        // Two springs with the same torque in one encoder.
+        for run in &mut runs {
+            run.truncate(1);
+            run[0].torques = vec![run[0].torques[0].clone(); 2];
+            run[0].instruments = run[0].torques.clone();
+        }
+        assert!(coupled_gear_stiffness(&runs).is_none());
+    }
+}

@@ -1,0 +1,491 @@
+//! What an arm with given parameters would have shown of what was measured.
+//!
+//! A reading is one thing done at the robot: a displacement between two loads at a pose, a place in the axes of an instrument, the
+//! natural frequencies of a hammer test. Each becomes rows: residual over standard deviation, and its derivatives by the
+//! parameters and by the unknowns that belong to the measurement (where the instrument stands, where the target is on the tool).
+
+use std::borrow::Cow;
+
+use flexarm_kinematics::{Frame, Pose, SpatialInertia, rotation_vector};
+use flexarm_stepping::{OperatingPoint, StepError};
+use nalgebra::{DMatrix, DVector, Matrix3xX, Rotation3, Translation3, Vector3};
+
+use crate::estimation::least_squares::Residuals;
+use crate::estimation::parameter::{Effect, Parameter, Plant, carried_along, tool_shift};
+use crate::estimation::reading::{Component, LoadCase, MeasuredResponse, MeasuredShape, Measurements, Reading, ReadingKind, Row};
+use crate::estimation::response::structure_slopes;
+use crate::estimation::sensitivity::{frequency_slopes, tool_slopes};
+
+/// An arm with unknown parameters under measurements.
+pub struct MeasuredArm<'a> {
+    /// The arm as it is known.
+    pub plant: &'a Plant,
+    /// What is unknown of it.
+    pub parameters: &'a [Parameter],
+    /// What was read.
+    pub measurements: &'a Measurements,
+}
+
+/// A reading for which the arm has no answer.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{reading}: {source}")]
+pub struct NoAnswer {
+    /// Name of the reading.
+    pub reading: String,
+    /// Why.
+    pub source: StepError,
+}
+
+/// Derivatives of three numbers or less: rows by unknowns.
+struct Block {
+    values: Vec<f64>,
+    slopes: DMatrix<f64>,
+}
+
+/// Tool at rest at a pose: where a point of it is, and how it moves with the parameters.
+struct AtRest {
+    X_WT: Pose,
+    /// At the tool's origin.
+    slopes: Option<Matrix3xX<f64>>,
+    turns: Option<Matrix3xX<f64>>,
+}
+
+impl AtRest {
+    fn point(&self, p_T: &Vector3<f64>) -> Vector3<f64> {
+        self.X_WT.translation.vector + self.X_WT.rotation * p_T
+    }
+
+    fn point_slopes(&self, p_T: &Vector3<f64>) -> Option<Matrix3xX<f64>> {
+        let arm = self.X_WT.rotation * p_T;
+        let (slopes, turns) = (self.slopes.as_ref()?, self.turns.as_ref()?);
+        let mut moved = slopes.clone();
+        for (mut to, w) in moved.column_iter_mut().zip(turns.column_iter()) {
+            to += w.cross(&arm);
+        }
+        Some(moved)
+    }
+}
+
+/// Workspaces of the loads met so far.
+struct Workspaces<'a> {
+    plant: Plant,
+    parameters: &'a [Parameter],
+    /// Coordinates of the parameters.
+    x: Vec<f64>,
+    known: Vec<(Vector3<f64>, SpatialInertia, OperatingPoint)>,
+}
+
+impl<'a> Workspaces<'a> {
+    /// The tool at rest at a pose under a load.
+    fn at_rest(&mut self, q: &[f64], load: &LoadCase, slopes: bool) -> Result<AtRest, StepError> {
+        let known = self.known.iter().position(|(at, carried, _)| *at == load.at && *carried == load.carried);
+        let number = match known {
+            Some(number) => number,
+            None => {
+                let tool = &self.plant.tool;
+                let X = Pose::from_parts(Translation3::from(load.at), Rotation3::identity());
+                let frame = Frame { name: tool.name.clone(), body: tool.body, X_BF: tool.X_BF * X };
+                let arm = self.loaded(&load.carried).held(q)?;
+                self.known.push((load.at, load.carried, OperatingPoint::new(arm, frame)));
+                self.known.len() - 1
+            }
+        };
+        let parameters = if slopes { self.under(&load.carried) } else { Cow::Borrowed(&[][..]) };
+        let turn = tool_shift(self.parameters, &self.x).1;
+        let at = &mut self.known[number].2;
+        at.solve(q, &load.wrench)?;
+        let X = Pose::from_parts(Translation3::from(-load.at), Rotation3::identity());
+        let X_WT = at.tcp_pose() * X;
+        if !slopes {
+            return Ok(AtRest { X_WT, slopes: None, turns: None });
+        }
+        let mut V = tool_slopes(at, &parameters)?;
+        let arm = X_WT.rotation * load.at;
+        let tools: Vec<(usize, [Vector3<f64>; 2])> = tool_twists(self.parameters, &X_WT.rotation, &turn).collect();
+        if !tools.is_empty() {
+            // A force that moves along has another moment.
+            let C = at.compliance();
+            for (k, [v, w]) in &tools {
+                let moment = (v + w.cross(&arm)).cross(&load.wrench.force);
+                V.column_mut(*k).gemv(1.0, &C.fixed_columns::<3>(3), &moment, 1.0);
+            }
+        }
+        let mut turns = V.fixed_rows::<3>(3).into_owned();
+        let mut moved = V.fixed_rows::<3>(0).into_owned();
+        for (mut to, w) in moved.column_iter_mut().zip(turns.column_iter()) {
+            // From where the load acts to the tool's origin.
+            to -= w.cross(&arm);
+        }
+        for (k, [v, w]) in tools {
+            moved.column_mut(k).axpy(1.0, &v, 1.0);
+            turns.column_mut(k).axpy(1.0, &w, 1.0);
+        }
+        Ok(AtRest { X_WT, slopes: Some(moved), turns: Some(turns) })
+    }
+
+    /// The parameters as they act on an arm that carries this at its tool: moving the tool moves that mass.
+    fn under(&self, carried: &SpatialInertia) -> Cow<'a, [Parameter]> {
+        if !self.parameters.iter().any(|p| matches!(p.effect, Effect::Tool(_))) {
+            return Cow::Borrowed(self.parameters);
+        }
+        let (body, X_BF) = (self.plant.tool.body, self.plant.tool.X_BF);
+        let I = carried.at_parent(&X_BF);
+        let mut all = self.parameters.to_vec();
+        for (k, [v, w]) in tool_twists(self.parameters, &X_BF.rotation, &tool_shift(self.parameters, &self.x).1) {
+            let per_kg = carried_along(&I, &X_BF.translation.vector, &v, &w);
+            all[k].effect = Effect::Mass { body, per_kg };
+        }
+        Cow::Owned(all)
+    }
+
+    fn loaded(&self, carried: &SpatialInertia) -> Plant {
+        let tool = &self.plant.tool;
+        self.plant.carrying(tool.body, &carried.at_parent(&tool.X_BF))
+    }
+}
+
+impl MeasuredArm<'_> {
+    /// What each reading would have shown, in its own units, reading after reading.
+    ///
+    /// # Errors
+    /// [`NoAnswer`].
+    pub fn predicted(&self, unknowns: &DVector<f64>) -> Result<Vec<f64>, NoAnswer> {
+        let mut rooms = self.rooms(unknowns);
+        let own = &unknowns.as_slice()[self.parameters.len()..];
+        let mut values = Vec::new();
+        for reading in &self.measurements.readings {
+            values.extend(self.block(&mut rooms, reading, own, false)?.values);
+        }
+        Ok(values)
+    }
+
+    /// What was read, in the same order.
+    pub fn observed(&self) -> Vec<f64> {
+        let of = |reading: &Reading| -> Vec<f64> {
+            match &reading.kind {
+                ReadingKind::Displacement { rows, .. } => rows.iter().map(|row| row.value).collect(),
+                ReadingKind::Place { value, .. } => value.iter().copied().collect(),
+                ReadingKind::Known { value, .. } => vec![*value],
+                ReadingKind::TargetAt { value, .. } => value.iter().copied().collect(),
+                ReadingKind::InstrumentAt { value, std, .. } => {
+                    let place =
+                        std.map_or(Vec::new(), |_| value.inverse().translation.vector.iter().copied().collect());
+                    place.into_iter().chain([0.0; 3]).collect()
+                }
+                ReadingKind::Frequencies { rows, .. } => rows.iter().map(|row| row.value).collect(),
+                ReadingKind::Response(response) => {
+                    (0..response.points.len()).flat_map(|k| response.numbers(k, response.points[k].1)).collect()
+                }
+                ReadingKind::Shape(shape) => shape.unit().iter().copied().collect(),
+            }
+        };
+        self.measurements.readings.iter().flat_map(of).collect()
+    }
+
+    /// Of each measured shape its reading's number, the mode of the arm that is most like it (from 0), and how much: the modal assurance
+    /// criterion, from 0 to 1.
+    ///
+    /// # Errors
+    /// [`NoAnswer`].
+    pub fn assurances(&self, unknowns: &DVector<f64>) -> Result<Vec<(usize, usize, f64)>, NoAnswer> {
+        let rooms = self.rooms(unknowns);
+        let mut all = Vec::new();
+        for (number, reading) in self.measurements.readings.iter().enumerate() {
+            let ReadingKind::Shape(shape) = &reading.kind else { continue };
+            let plant = rooms.loaded(&shape.load.carried);
+            let found = structure_slopes(&plant, &[], &reading.q, &shape.probes);
+            let found = found.map_err(|source| NoAnswer { reading: reading.name.clone(), source })?;
+            all.extend(shape.likeliest(&found).map(|(mode, assurance, _)| (number, mode, assurance)));
+        }
+        Ok(all)
+    }
+
+    fn rooms(&self, unknowns: &DVector<f64>) -> Workspaces<'_> {
+        let x = unknowns.as_slice()[..self.parameters.len()].to_vec();
+        Workspaces { plant: self.plant.with(self.parameters, &x), parameters: self.parameters, x, known: Vec::new() }
+    }
+
+    /// Numbers of a reading, with their derivatives by all unknowns if asked for.
+    fn block(
+        &self,
+        rooms: &mut Workspaces<'_>,
+        reading: &Reading,
+        own: &[f64],
+        slopes: bool,
+    ) -> Result<Block, NoAnswer> {
+        let named = |source| NoAnswer { reading: reading.name.clone(), source };
+        match &reading.kind {
+            ReadingKind::Displacement { before, after, point, rows } => {
+                self.displacement(rooms, &reading.q, [before, after], point, rows, own, slopes).map_err(named)
+            }
+            ReadingKind::Place { load, target, instrument, .. } => {
+                let at = rooms.at_rest(&reading.q, load, slopes).map_err(named)?;
+                Ok(self.place(&at, *target, *instrument, own))
+            }
+            ReadingKind::Known { parameter, .. } => {
+                // One that is not fitted stays at zero.
+                let number = self.parameters.iter().position(|p| p.name == *parameter);
+                let value = number.map_or(0.0, |k| rooms.x[k]);
+                let columns = if slopes { self.parameters.len() + own.len() } else { 0 };
+                let slope = |_, j: usize| f64::from(u8::from(Some(j) == number));
+                Ok(Block { values: vec![value], slopes: DMatrix::from_fn(1, columns, slope) })
+            }
+            ReadingKind::TargetAt { target, .. } => {
+                let (p_T, first) = self.measurements.target(*target, own);
+                let column = |i: usize| first.map(|first| first + i);
+                let slopes = self.of_own(3, own.len(), slopes, |i, j| f64::from(u8::from(column(i) == Some(j))));
+                Ok(Block { values: p_T.iter().copied().collect(), slopes })
+            }
+            ReadingKind::InstrumentAt { instrument, value, std, .. } => {
+                Ok(self.instrument_at(*instrument, value, std.is_some(), own, slopes))
+            }
+            ReadingKind::Frequencies { load, rows } => {
+                let plant = rooms.loaded(&load.carried);
+                let parameters = if slopes { rooms.under(&load.carried) } else { Cow::Borrowed(&[][..]) };
+                let found = frequency_slopes(&plant, &parameters, &reading.q).map_err(named)?;
+                let values = rows.iter().map(|row| found.hz.get(row.of).copied().unwrap_or(f64::NAN)).collect();
+                let slopes = self.with_own(rows.len(), own.len(), slopes, |i, j| found.slopes[(rows[i].of, j)]);
+                Ok(Block { values, slopes })
+            }
+            ReadingKind::Response(measured) => {
+                self.response(rooms, &reading.q, measured, own.len(), slopes).map_err(named)
+            }
+            ReadingKind::Shape(measured) => self.shape(rooms, &reading.q, measured, own.len(), slopes).map_err(named),
+        }
+    }
+
+    /// Derivatives by the arm's parameters beside zeros for what belongs to the measurements.
+    fn with_own(&self, rows: usize, own: usize, slopes: bool, slope: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
+        let p = self.parameters.len();
+        let columns = if slopes { p + own } else { 0 };
+        DMatrix::from_fn(rows, columns, |i, j| if j < p { slope(i, j) } else { 0.0 })
+    }
+
+    /// Derivatives by what belongs to the measurements beside zeros for the arm's parameters.
+    fn of_own(&self, rows: usize, own: usize, slopes: bool, slope: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
+        let p = self.parameters.len();
+        let columns = if slopes { p + own } else { 0 };
+        DMatrix::from_fn(rows, columns, |i, j| if j < p { 0.0 } else { slope(i, j - p) })
+    }
+
+    /// Place of an instrument in the world if it counts, and by which rotation vector (its axes) it is turned from `X`.
+    fn instrument_at(&self, number: usize, X: &Pose, placed: bool, own: &[f64], slopes: bool) -> Block {
+        let (X_IW, place, turn) = self.measurements.instrument(number, own);
+        let X_WI = X_IW.inverse();
+        let turned = rotation_vector((X_IW.rotation * X.rotation.inverse()).matrix());
+        let seen = placed.then_some(X_WI.translation.vector);
+        let values: Vec<f64> = seen.iter().flat_map(|p| p.iter().copied()).chain(turned.iter().copied()).collect();
+        let mut by_own = DMatrix::zeros(values.len(), own.len());
+        let rows = values.len() - 3;
+        if let Some(first) = turn {
+            let v = Vector3::new(own[first], own[first + 1], own[first + 2]);
+            let (rates, back) = (left_jacobian(&v), left_jacobian(&turned).try_inverse());
+            let back = back.unwrap_or_else(nalgebra::Matrix3::identity);
+            for k in 0..3 {
+                let w: Vector3<f64> = rates.column(k).into_owned();
+                by_own.view_mut((rows, first + k), (3, 1)).copy_from(&(back * w));
+                if placed {
+                    let moved = X_WI.rotation * w.cross(&X_IW.translation.vector);
+                    by_own.view_mut((0, first + k), (3, 1)).copy_from(&moved);
+                }
+            }
+        }
+        if let (Some(first), true) = (place, placed) {
+            by_own.view_mut((0, first), (3, 3)).copy_from(&(-X_WI.rotation.matrix()));
+        }
+        let slopes = self.of_own(values.len(), own.len(), slopes, |i, j| by_own[(i, j)]);
+        Block { values, slopes }
+    }
+
+    fn response(
+        &self,
+        rooms: &Workspaces<'_>,
+        q: &[f64],
+        measured: &MeasuredResponse,
+        own: usize,
+        slopes: bool,
+    ) -> Result<Block, StepError> {
+        let plant = rooms.loaded(&measured.load.carried);
+        let parameters = if slopes { rooms.under(&measured.load.carried) } else { Cow::Borrowed(&[][..]) };
+        let probes = [measured.watched.clone(), measured.hit.clone()];
+        let omega: Vec<f64> = measured.points.iter().map(|(omega, ..)| *omega).collect();
+        let found = structure_slopes(&plant, &parameters, q, &probes)?.response(0, 1, measured.answer, &omega)?;
+        let values = found.values.iter().enumerate().flat_map(|(k, value)| measured.numbers(k, *value)).collect();
+        let slope = |i: usize, j: usize| {
+            let k = i / 2;
+            measured.number_slopes(found.values[k], found.slopes[(k, j)])[i % 2]
+        };
+        Ok(Block { values, slopes: self.with_own(2 * omega.len(), own, slopes, slope) })
+    }
+
+    fn shape(
+        &self,
+        rooms: &Workspaces<'_>,
+        q: &[f64],
+        measured: &MeasuredShape,
+        own: usize,
+        slopes: bool,
+    ) -> Result<Block, StepError> {
+        let plant = rooms.loaded(&measured.load.carried);
+        let parameters = if slopes { rooms.under(&measured.load.carried) } else { Cow::Borrowed(&[][..]) };
+        let found = structure_slopes(&plant, &parameters, q, &measured.probes)?;
+        let none = || StepError::Singular { matrix: "mode shapes at the measured points (they do not move)", t: 0.0 };
+        let (mode, _, seen) = measured.likeliest(&found).ok_or_else(none)?;
+        let all = found.shape_slopes(mode);
+        let changes: Vec<DVector<f64>> = (0..parameters.len())
+            .map(|p| {
+                let raw = |shape: &DVector<f64>| {
+                    DVector::from_iterator(seen.len(), found.structure.rows.iter().map(|row| (row * shape)[0]))
+                };
+                let phi = found.shapes.column(mode).into_owned();
+                let turned = found.slopes[p].rows.iter().map(|row| (row * &phi)[0]);
+                let change = raw(&all[p]) + DVector::from_iterator(seen.len(), turned);
+                let amplitude = raw(&phi);
+                // Of a vector of unit length, across it.
+                let sign = amplitude.dot(&seen).signum();
+                let change = change * (sign / amplitude.norm());
+                &change - &seen * seen.dot(&change)
+            })
+            .collect();
+        let slopes = self.with_own(seen.len(), own, slopes, |i, j| changes[j][i]);
+        Ok(Block { values: seen.iter().copied().collect(), slopes })
+    }
+
+    /// A target seen from an instrument.
+    fn place(&self, at: &AtRest, target: usize, instrument: usize, own: &[f64]) -> Block {
+        let p = self.parameters.len();
+        let (X_IW, place, turn) = self.measurements.instrument(instrument, own);
+        let (p_T, three) = self.measurements.target(target, own);
+        let seen = X_IW.rotation * at.point(&p_T);
+        let values = (seen + X_IW.translation.vector).iter().copied().collect();
+        let Some(moved) = at.point_slopes(&p_T) else { return Block { values, slopes: DMatrix::zeros(3, 0) } };
+        let mut slopes = DMatrix::zeros(3, p + own.len());
+        slopes.columns_mut(0, p).copy_from(&(X_IW.rotation * moved));
+        if let Some(first) = place {
+            slopes.view_mut((0, p + first), (3, 3)).fill_with_identity();
+        }
+        if let Some(first) = turn {
+            // The increments are of a rotation vector: its rate map to the angular velocity on the left.
+            let rates = left_jacobian(&Vector3::new(own[first], own[first + 1], own[first + 2]));
+            for k in 0..3 {
+                slopes.view_mut((0, p + first + k), (3, 1)).copy_from(&rates.column(k).cross(&seen));
+            }
+        }
+        if let Some(first) = three {
+            slopes.view_mut((0, p + first), (3, 3)).copy_from(&(X_IW.rotation * at.X_WT.rotation).into_inner());
+        }
+        Block { values, slopes }
+    }
+}
+
+/// Velocity at the tool's origin and angular velocity per unit of each parameter that moves the tool, by its number.
+///
+/// * `R`: rotation of the tool as it is now, in the axes asked for; `turn`: by which of that it is turned from its own axes.
+fn tool_twists<'a>(
+    parameters: &'a [Parameter],
+    R: &Rotation3<f64>,
+    turn: &Vector3<f64>,
+) -> impl Iterator<Item = (usize, [Vector3<f64>; 2])> + use<'a> {
+    let before = R * Rotation3::new(*turn).inverse();
+    let rates = before * left_jacobian(turn);
+    parameters.iter().enumerate().filter_map(move |(k, parameter)| match parameter.effect {
+        Effect::Tool(axis @ 0..3) => Some((k, [before * Vector3::ith(axis, 1.0), Vector3::zeros()])),
+        Effect::Tool(axis) => Some((k, [Vector3::zeros(), rates.column(axis - 3).into_owned()])),
+        _ => None,
+    })
+}
+
+/// Angular velocity (fixed axes) per rate of a rotation vector.
+fn left_jacobian(v: &Vector3<f64>) -> nalgebra::Matrix3<f64> {
+    let angle = v.norm();
+    let K = v.cross_matrix();
+    let (a, b) = match angle < 1e-4 {
+        true => (0.5 - angle * angle / 24.0, 1.0 / 6.0 - angle * angle / 120.0),
+        false => ((1.0 - angle.cos()) / (angle * angle), (angle - angle.sin()) / angle.powi(3)),
+    };
+    nalgebra::Matrix3::identity() + K * a + K * K * b
+}
+
+impl MeasuredArm<'_> {
+    #[expect(clippy::too_many_arguments, reason = "what a displacement is made of")]
+    fn displacement(
+        &self,
+        rooms: &mut Workspaces<'_>,
+        q: &[f64],
+        loads: [&LoadCase; 2],
+        point: &Vector3<f64>,
+        rows: &[Row<Component>],
+        own: &[f64],
+        slopes: bool,
+    ) -> Result<Block, StepError> {
+        let before = rooms.at_rest(q, loads[0], slopes)?;
+        let after = rooms.at_rest(q, loads[1], slopes)?;
+        let moved = after.point(point) - before.point(point);
+        let turn = after.X_WT.rotation * before.X_WT.rotation.inverse();
+        let turned = rotation_vector(turn.matrix());
+        // In world axes; of an instrument's axes by the world in them.
+        let seen_from = |instrument: Option<usize>| instrument.map(|k| self.measurements.instrument(k, own));
+        let world = |row: &Row<Component>| {
+            let (d, instrument, about) = row.of.parts();
+            (seen_from(instrument).map_or(d, |(X_IW, ..)| X_IW.rotation.inverse() * d), about)
+        };
+        let value = |row: &Row<Component>| match world(row) {
+            (d, false) => d.dot(&moved),
+            (d, true) => d.dot(&turned),
+        };
+        let values = rows.iter().map(value).collect();
+        let none = |values| Ok(Block { values, slopes: DMatrix::zeros(rows.len(), 0) });
+        let (Some(a), Some(b)) = (after.point_slopes(point), before.point_slopes(point)) else { return none(values) };
+        let (Some(wa), Some(wb)) = (&after.turns, &before.turns) else { return none(values) };
+        // Rotation from before to after: its angular velocity is wa - R wb, its vector's rate the inverse of the rate map.
+        let rate = left_jacobian(&turned).try_inverse().unwrap_or_else(nalgebra::Matrix3::identity);
+        let p = a.ncols();
+        let mut all = DMatrix::zeros(rows.len(), p + own.len());
+        for (i, row) in rows.iter().enumerate() {
+            let (d, about) = world(row);
+            for k in 0..p {
+                all[(i, k)] = match about {
+                    false => d.dot(&(a.column(k) - b.column(k))),
+                    true => d.dot(&(rate * (wa.column(k) - turn * wb.column(k)))),
+                };
+            }
+            let (d, instrument, _) = row.of.parts();
+            let Some((X_IW, _, Some(first))) = seen_from(instrument) else { continue };
+            let seen = X_IW.rotation * if about { turned } else { moved };
+            let rates = left_jacobian(&Vector3::new(own[first], own[first + 1], own[first + 2]));
+            for k in 0..3 {
+                all[(i, p + first + k)] = d.dot(&rates.column(k).cross(&seen));
+            }
+        }
+        Ok(Block { values, slopes: all })
+    }
+}
+
+impl Residuals for MeasuredArm<'_> {
+    type Error = NoAnswer;
+
+    fn evaluate(&self, unknowns: &DVector<f64>, J: Option<&mut DMatrix<f64>>) -> Result<DVector<f64>, NoAnswer> {
+        let own = &unknowns.as_slice()[self.parameters.len()..];
+        let mut rooms = self.rooms(unknowns);
+        let m = self.measurements.rows();
+        let mut residuals = DVector::zeros(m);
+        let observed = self.observed();
+        let slopes = J.is_some();
+        let mut all = DMatrix::zeros(if slopes { m } else { 0 }, unknowns.len());
+        let mut first = 0;
+        for reading in &self.measurements.readings {
+            let block = self.block(&mut rooms, reading, own, slopes)?;
+            for (i, (value, std)) in block.values.iter().zip(reading.deviations()).enumerate() {
+                residuals[first + i] = (value - observed[first + i]) / std;
+                if slopes {
+                    all.row_mut(first + i).copy_from(&(block.slopes.row(i) / std));
+                }
+            }
+            first += block.values.len();
+        }
+        if let Some(J) = J {
+            *J = all;
+        }
+        Ok(residuals)
+    }
+}

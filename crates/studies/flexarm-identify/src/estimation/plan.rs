@@ -1,0 +1,167 @@
+//! Poses and loads that are worth measuring.
+//!
+//! Of many candidates those are taken whose readings together tell the parameters best: the largest determinant of the
+//! information (D-optimal), or the smallest variance of what the parameters will be used for. First one after another, the best
+//! next one each time, then by exchange as long as an exchange pays (Fedorov). The prior's information counts from the start.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use crate::estimation::least_squares::Residuals;
+use crate::estimation::measurement::{MeasuredArm, NoAnswer};
+use crate::estimation::parameter::{Parameter, Plant};
+use crate::estimation::reading::{Measurements, Reading};
+
+/// Something that could be measured: a reading with the deviations expected of it; its values do not count.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Candidate(pub Reading);
+
+/// What is asked of a plan.
+#[derive(Clone, Debug, Default)]
+pub struct PlanOptions {
+    /// How many readings.
+    pub count: usize,
+    /// Readings whose predicted numbers should be as sure as possible, the unit of each by its deviation; the determinant without.
+    pub purpose: Vec<Reading>,
+    /// Whether a candidate may be taken more than once.
+    pub repeat: bool,
+}
+
+/// What should be measured.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Numbers of the candidates, in the order in which they were found worth it.
+    pub chosen: Vec<usize>,
+    /// Standard deviation to expect of each parameter's coordinate.
+    pub deviations: Vec<f64>,
+    /// Logarithm of the determinant of the information over that of the prior alone.
+    pub gain: f64,
+    /// Standard deviation of each number of the purpose, in its own unit.
+    pub purpose: Vec<f64>,
+}
+
+/// Most rounds of exchange.
+const ROUNDS: usize = 20;
+
+/// Rows of one reading over the prior's deviations.
+fn rows_of(plant: &Plant, parameters: &[Parameter], reading: &Reading) -> Result<DMatrix<f64>, NoAnswer> {
+    let one = Measurements { readings: vec![reading.clone()], ..Measurements::default() };
+    let arm = MeasuredArm { plant, parameters, measurements: &one };
+    let mut J = DMatrix::zeros(0, 0);
+    arm.evaluate(&DVector::zeros(parameters.len()), Some(&mut J))?;
+    for (k, parameter) in parameters.iter().enumerate() {
+        J.column_mut(k).scale_mut(parameter.prior);
+    }
+    Ok(J)
+}
+
+/// Chooses readings among candidates.
+///
+/// Candidates for which the arm has no answer are passed over.
+///
+/// # Errors
+/// [`NoAnswer`] for a reading of the purpose.
+pub fn plan(
+    plant: &Plant,
+    parameters: &[Parameter],
+    candidates: &[Candidate],
+    options: &PlanOptions,
+) -> Result<Plan, NoAnswer> {
+    let p = parameters.len();
+    let rows: Vec<Option<DMatrix<f64>>> = candidates
+        .iter()
+        .map(|candidate| rows_of(plant, parameters, &candidate.0).ok().filter(|J| J.iter().all(|x| x.is_finite())))
+        .collect();
+    let purpose =
+        options.purpose.iter().map(|reading| rows_of(plant, parameters, reading)).collect::<Result<Vec<_>, _>>()?;
+    let mut search = Choice { rows: &rows, purpose: &purpose, repeat: options.repeat, chosen: Vec::new() };
+    let mut information = DMatrix::identity(p, p);
+    while search.chosen.len() < options.count {
+        let Some(best) = search.best(&information) else { break };
+        search.add(&mut information, best, 1.0);
+        search.chosen.push(best);
+    }
+    search.exchange(&mut information);
+    let inverse = inverse_of(&information);
+    let deviations = (0..p).map(|k| parameters[k].prior * inverse[(k, k)].sqrt()).collect();
+    let deviation_of = |J: &DMatrix<f64>, i: usize| (J.row(i) * &inverse * J.row(i).transpose())[(0, 0)].sqrt();
+    let purpose = options.purpose.iter().zip(&purpose).flat_map(|(reading, J)| {
+        let units = reading.deviations();
+        (0..J.nrows()).map(|i| units[i] * deviation_of(J, i)).collect::<Vec<_>>()
+    });
+    Ok(Plan { deviations, gain: log_determinant(&information), purpose: purpose.collect(), chosen: search.chosen })
+}
+
+fn inverse_of(information: &DMatrix<f64>) -> DMatrix<f64> {
+    // The prior's identity is in it: positive definite.
+    Cholesky::new(information.clone())
+        .map_or_else(|| DMatrix::identity(information.nrows(), information.nrows()), |f| f.inverse())
+}
+
+fn log_determinant(information: &DMatrix<f64>) -> f64 {
+    Cholesky::new(information.clone()).map_or(f64::NEG_INFINITY, |f| 2.0 * f.l_dirty().diagonal().map(f64::ln).sum())
+}
+
+struct Choice<'a> {
+    rows: &'a [Option<DMatrix<f64>>],
+    purpose: &'a [DMatrix<f64>],
+    repeat: bool,
+    chosen: Vec<usize>,
+}
+
+impl Choice<'_> {
+    fn add(&self, information: &mut DMatrix<f64>, candidate: usize, sign: f64) {
+        if let Some(J) = &self.rows[candidate] {
+            *information += J.tr_mul(J) * sign;
+        }
+    }
+
+    /// What is to be small.
+    fn cost(&self, information: &DMatrix<f64>) -> f64 {
+        if self.purpose.is_empty() {
+            return -log_determinant(information);
+        }
+        let inverse = inverse_of(information);
+        self.purpose.iter().map(|J| (J * &inverse).component_mul(J).sum()).sum()
+    }
+
+    /// The candidate that makes the information best.
+    fn best(&self, information: &DMatrix<f64>) -> Option<usize> {
+        let mut best: Option<(usize, f64)> = None;
+        for number in 0..self.rows.len() {
+            if self.rows[number].is_none() || (!self.repeat && self.chosen.contains(&number)) {
+                continue;
+            }
+            let mut with = information.clone();
+            self.add(&mut with, number, 1.0);
+            let cost = self.cost(&with);
+            if best.is_none_or(|(_, least)| cost < least) {
+                best = Some((number, cost));
+            }
+        }
+        best.map(|(number, _)| number)
+    }
+
+    /// Each chosen one against all others, as long as it pays.
+    fn exchange(&mut self, information: &mut DMatrix<f64>) {
+        for _ in 0..ROUNDS {
+            let mut paid = false;
+            for place in 0..self.chosen.len() {
+                let old = self.chosen[place];
+                let now = self.cost(information);
+                let mut without = information.clone();
+                self.add(&mut without, old, -1.0);
+                let Some(new) = self.best(&without) else { continue };
+                let mut with = without.clone();
+                self.add(&mut with, new, 1.0);
+                if new != old && self.cost(&with) < now - 1e-9 * now.abs().max(1.0) {
+                    self.chosen[place] = new;
+                    *information = with;
+                    paid = true;
+                }
+            }
+            if !paid {
+                return;
+            }
+        }
+    }
+}

@@ -1,0 +1,371 @@
+//! Frequency responses of a held arm, and how they change with its parameters.
+//!
+//! ```text
+//! H(ω) = (iω)^s cᵀ Z^-1 b,     Z = K + iωD - ω²M
+//! dH   = (iω)^s [ dcᵀ Z^-1 b + cᵀ Z^-1 db - (Z^-T c)ᵀ dZ Z^-1 b ]
+//! ```
+//! with b and c the Jacobians of the excited and of the watched point along their directions, about the equilibrium under weight,
+//! drives locked. Modal damping follows the modes: its change has those of their shapes,
+//!
+//! ```text
+//! dφ_j = Σ_i a_ij φ_i,     a_ij = φ_iᵀ(dK - ω_j² dM)φ_j / (ω_j² - ω_i²),     a_jj = -φ_jᵀ dM φ_j / 2
+//! ```
+//! Start at [`structure_slopes`].
+
+use flexarm_kinematics::{Frame, Wrench};
+use flexarm_stepping::{Damping, FlexibleArm, OperatingPoint, StepError, Tangents};
+use nalgebra::{Complex, DMatrix, DVector, RowDVector, Vector3};
+
+use crate::estimation::parameter::{Effect, Parameter, Plant, entry_slope, slope_of};
+use crate::estimation::sensitivity::{along, eigen, explicit, force_slopes};
+
+/// Squares of two frequencies nearer than this part of each other belong to modes whose shapes are not determined.
+const SAME_FREQUENCY: f64 = 1e-9;
+
+/// A point of the arm and a direction, of a force or of an accelerometer.
+#[derive(Clone, Debug)]
+pub struct Probe {
+    /// The point: origin of a frame on a body.
+    pub frame: Frame,
+    /// Direction of unit length, world axes.
+    pub direction: Vector3<f64>,
+}
+
+impl PartialEq for Probe {
+    /// The same point and direction, whatever the frame is called.
+    fn eq(&self, other: &Self) -> bool {
+        let place = |probe: &Self| (probe.frame.body, probe.frame.X_BF, probe.direction);
+        place(self) == place(other)
+    }
+}
+
+/// What of the watched point is measured per newton.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Answer {
+    /// Displacement (m/N).
+    Receptance,
+    /// Velocity (m/s/N).
+    Mobility,
+    /// Acceleration (m/s²/N).
+    #[default]
+    Accelerance,
+}
+
+impl Answer {
+    /// `(iω)^s`.
+    pub fn factor(self, omega: f64) -> Complex<f64> {
+        match self {
+            Self::Receptance => Complex::new(1.0, 0.0),
+            Self::Mobility => Complex::new(0.0, omega),
+            Self::Accelerance => Complex::new(-omega * omega, 0.0),
+        }
+    }
+
+    /// Unit of its magnitude.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Receptance => "m/N",
+            Self::Mobility => "m/(s N)",
+            Self::Accelerance => "m/(s2 N)",
+        }
+    }
+}
+
+/// A held arm about its equilibrium as a linear structure, n elastic coordinates.
+#[derive(Clone, Debug)]
+pub struct Structure {
+    /// Mass, n×n.
+    pub M: DMatrix<f64>,
+    /// Damping, n×n.
+    pub D: DMatrix<f64>,
+    /// Stiffness with the change of weight, n×n.
+    pub K: DMatrix<f64>,
+    /// Of each probe: how far it moves along its direction per elastic coordinate.
+    pub rows: Vec<RowDVector<f64>>,
+}
+
+/// A structure and its change per unit of each parameter's coordinate.
+#[derive(Clone, Debug)]
+pub struct StructureSlopes {
+    /// As it is.
+    pub structure: Structure,
+    /// One per parameter.
+    pub slopes: Vec<Structure>,
+    /// Squares of the natural frequencies, ascending (rad²/s²).
+    pub omega2: Vec<f64>,
+    /// Shapes with `φᵀ M φ = 1`, one column each.
+    pub shapes: DMatrix<f64>,
+}
+
+/// The linear structure of an arm held at a pose under its weight, and its derivatives by parameters.
+///
+/// * `plant`: with the parameters as they are now; `q`: actuated joints (rad or m); `probes`: points that are hit or watched.
+///
+/// Explicit parts are exact, those by the moving equilibrium central differences of fourth order along its path. Where two natural
+/// frequencies coincide, modal damping that differs between elements has no derivative.
+///
+/// # Errors
+/// As [`OperatingPoint::solve`]; [`StepError::Singular`] where a coordinate moves no mass.
+pub fn structure_slopes(
+    plant: &Plant,
+    parameters: &[Parameter],
+    q: &[f64],
+    probes: &[Probe],
+) -> Result<StructureSlopes, StepError> {
+    let none = Wrench::zeros();
+    let arm = plant.held(q)?;
+    let mut at = OperatingPoint::new(arm.clone(), plant.tool.clone());
+    at.solve(q, &none)?;
+    let forces = force_slopes(&mut at, parameters)?;
+    let q = at.coordinates().clone();
+    let here = Tangents::at(&arm, &plant.tool, &none, &q);
+    let (omega2, shapes) = eigen(&here)?;
+    let symmetric = (&here.K + here.K.transpose()) * 0.5;
+    let singular = || StepError::Singular { matrix: "static stiffness (with the effect of weight)", t: 0.0 };
+    let factor = symmetric.cholesky().ok_or_else(singular)?;
+    let damped = Damped { arm: &arm, M: &here.M, omega2: &omega2, shapes: &shapes };
+    let mut slopes = Vec::with_capacity(parameters.len());
+    for (k, parameter) in parameters.iter().enumerate() {
+        let moved = -factor.solve(&forces.column(k));
+        let change = along(&arm, &q, &moved, |q| {
+            let at = Tangents::at(&arm, &plant.tool, &none, q);
+            let rows =
+                rows(&arm, probes, q).into_iter().map(|row| DMatrix::from_row_slice(1, row.len(), row.as_slice()));
+            [at.K, at.M].into_iter().chain(rows).collect()
+        });
+        let (eK, eM) = explicit(&arm, &plant.tool, &none, &parameter.effect, &q, &here);
+        let (K, M) = (&change[0] + eK, &change[1] + eM);
+        let D = damped.slope(&parameter.effect, &K, &M);
+        let rows = change[2..].iter().map(|row| RowDVector::from_row_slice(row.as_slice())).collect();
+        slopes.push(Structure { M, D, K, rows });
+    }
+    let rows = rows(&arm, probes, &q);
+    Ok(StructureSlopes {
+        structure: Structure { M: here.M, D: arm.D.clone(), K: here.K, rows },
+        slopes,
+        omega2,
+        shapes,
+    })
+}
+
+/// Jacobian of each probe along its direction.
+fn rows(arm: &FlexibleArm, probes: &[Probe], q: &DVector<f64>) -> Vec<RowDVector<f64>> {
+    let row = |probe: &Probe| {
+        let J = Tangents::at(arm, &probe.frame, &Wrench::zeros(), q).J;
+        RowDVector::from_fn(J.ncols(), |_, j| (0..3).map(|c| probe.direction[c] * J[(c, j)]).sum())
+    };
+    probes.iter().map(row).collect()
+}
+
+/// Damping that follows modes and springs.
+pub(crate) struct Damped<'a> {
+    pub(crate) arm: &'a FlexibleArm,
+    pub(crate) M: &'a DMatrix<f64>,
+    pub(crate) omega2: &'a [f64],
+    pub(crate) shapes: &'a DMatrix<f64>,
+}
+
+/// A spring's stiffness and damping, and their change by a parameter.
+struct SpringSlope {
+    first: usize,
+    size: usize,
+    K: DMatrix<f64>,
+    dK: DMatrix<f64>,
+    damping: Damping,
+    /// Change of the damping's own numbers: so many times themselves.
+    more: f64,
+    /// The same of one damper.
+    damper: Option<usize>,
+}
+
+impl Damped<'_> {
+    /// Change of the damping matrix with that of the structure.
+    pub(crate) fn slope(&self, effect: &Effect, dK: &DMatrix<f64>, dM: &DMatrix<f64>) -> DMatrix<f64> {
+        let springs = self.springs(effect);
+        let n = dK.nrows();
+        let mut dD = DMatrix::zeros(n, n);
+        if springs.iter().any(|spring| matches!(spring.damping, Damping::Modal(zeta) if zeta != 0.0)) {
+            self.add_modal(&springs, dK, dM, &mut dD);
+        }
+        for s in &springs {
+            let (k, size) = (s.first, s.size);
+            let mut block = dD.view_mut((k, k), (size, size));
+            let (M, dM) = (self.M.view((k, k), (size, size)), dM.view((k, k), (size, size)));
+            match s.damping {
+                Damping::Modal(_) => {}
+                Damping::StiffnessProportional(b) => block += (&s.dK + &s.K * s.more) * b,
+                Damping::Rayleigh(a, b) => {
+                    block += (&s.dK + &s.K * s.more) * b;
+                    block += (dM + M * s.more) * a;
+                }
+                Damping::Dampers(d) => (0..size.min(6)).for_each(|c| {
+                    block[(c, c)] += d[c] * if s.damper == Some(c) { 1.0 } else { s.more };
+                }),
+            }
+        }
+        // Of coupled gears each motor's damper is in the damping of several joints.
+        let one;
+        let dampers = match effect {
+            Effect::Damping(dampers) => &dampers[..],
+            Effect::Damper { spring, .. } => {
+                one = [*spring];
+                &one
+            }
+            _ => return dD,
+        };
+        for (places, coupled) in dampers.iter().filter_map(|spring| self.arm.coupled_damping_slope(*spring)) {
+            for (a, i) in places.iter().enumerate() {
+                places.iter().enumerate().for_each(|(b, j)| dD[(*i, *j)] += coupled[(a, b)]);
+            }
+        }
+        dD
+    }
+
+    fn springs(&self, effect: &Effect) -> Vec<SpringSlope> {
+        let of = |(number, e): (usize, &flexarm_stepping::ElasticElement)| {
+            let mut dK = DMatrix::zeros(e.size, e.size);
+            let (mut more, mut damper) = (0.0, None);
+            match effect {
+                Effect::Stiffness(places) => {
+                    for place in places {
+                        // Of coupled gears each motor's spring is in the stiffness of several joints.
+                        match self.arm.coupled_stiffness_slope(place.spring) {
+                            Some((coupled, slope)) => {
+                                let own = coupled.iter().position(|k| *k == self.arm.offset(e));
+                                dK.iter_mut().for_each(|dK| *dK += own.map_or(0.0, |k| slope[(k, k)]));
+                            }
+                            None if place.spring == number => dK += slope_of(&e.K, place.coordinate),
+                            None => {}
+                        }
+                    }
+                }
+                Effect::Entry { spring, row, column, factor, .. } if *spring == number => {
+                    dK += entry_slope(e.size, *row, *column, *factor);
+                }
+                Effect::Damping(springs) => {
+                    let own = springs.contains(&number) && self.arm.coupled_damping_slope(number).is_none();
+                    more = f64::from(u8::from(own));
+                }
+                Effect::Damper { spring, coordinate } => {
+                    let own = *spring == number && self.arm.coupled_damping_slope(number).is_none();
+                    damper = own.then_some(*coordinate);
+                }
+                Effect::Entry { .. } | Effect::Tool(_) | Effect::Mass { .. } => {}
+            }
+            let first = self.arm.offset(e);
+            SpringSlope { first, size: e.size, K: e.K.clone(), dK, damping: e.damping, more, damper }
+        };
+        self.arm.elements.iter().enumerate().map(of).collect()
+    }
+
+    /// `D = Σ 2 ζ_j ω_j Mφ_j (Mφ_j)ᵀ` with ζ_j the mean over the springs by their strain energy.
+    fn add_modal(&self, springs: &[SpringSlope], dK: &DMatrix<f64>, dM: &DMatrix<f64>, dD: &mut DMatrix<f64>) {
+        let (S, T) = (self.shapes.tr_mul(&(dK * self.shapes)), self.shapes.tr_mul(&(dM * self.shapes)));
+        let n = self.omega2.len();
+        for j in 0..n {
+            let w2 = self.omega2[j];
+            let phi = self.shapes.column(j).into_owned();
+            let dphi = self.shapes * shape_parts(self.omega2, j, &S, &T);
+            let omega = w2.sqrt();
+            let domega = (S[(j, j)] - w2 * T[(j, j)]) / (2.0 * omega);
+            // Energies, and what of them is damped.
+            let [mut total, mut dtotal, mut lost, mut dlost] = [0.0; 4];
+            for s in springs {
+                let (x, dx) = (phi.rows(s.first, s.size), dphi.rows(s.first, s.size));
+                let energy = x.dot(&(&s.K * x));
+                let denergy = 2.0 * dx.dot(&(&s.K * x)) + x.dot(&(&s.dK * x));
+                (total, dtotal) = (total + energy, dtotal + denergy);
+                if let Damping::Modal(zeta) = s.damping {
+                    lost += zeta * energy;
+                    dlost += zeta * (denergy + s.more * energy);
+                }
+            }
+            let zeta = lost / total;
+            let dzeta = (dlost - zeta * dtotal) / total;
+            let (c, dc) = (2.0 * zeta * omega, 2.0 * (dzeta * omega + zeta * domega));
+            let v = self.M * &phi;
+            let dv = dM * &phi + self.M * &dphi;
+            dD.ger(dc, &v, &v, 1.0);
+            dD.ger(c, &dv, &v, 1.0);
+            dD.ger(c, &v, &dv, 1.0);
+        }
+    }
+}
+
+impl StructureSlopes {
+    /// Change of a mode's shape (number from 0, the lowest) per unit of each parameter's coordinate, its modal mass kept at 1.
+    pub fn shape_slopes(&self, mode: usize) -> Vec<DVector<f64>> {
+        let of = |change: &Structure| {
+            let (S, T) =
+                (self.shapes.tr_mul(&(&change.K * &self.shapes)), self.shapes.tr_mul(&(&change.M * &self.shapes)));
+            &self.shapes * shape_parts(&self.omega2, mode, &S, &T)
+        };
+        self.slopes.iter().map(of).collect()
+    }
+}
+
+/// Parts of the other shapes in the change of a mode's, from the changes of stiffness and mass in the modes.
+fn shape_parts(omega2: &[f64], j: usize, S: &DMatrix<f64>, T: &DMatrix<f64>) -> DVector<f64> {
+    let w2 = omega2[j];
+    DVector::from_fn(omega2.len(), |i, _| match w2 - omega2[i] {
+        _ if i == j => -0.5 * T[(j, j)],
+        apart if apart.abs() <= SAME_FREQUENCY * w2 => 0.0,
+        apart => (0.5 * (S[(i, j)] + S[(j, i)]) - w2 * T[(i, j)]) / apart,
+    })
+}
+
+/// The response of one probe to a force at another, at each frequency, and its derivatives.
+#[derive(Clone, Debug)]
+pub struct ResponseSlopes {
+    /// One per frequency.
+    pub values: Vec<Complex<f64>>,
+    /// A row per frequency, a column per parameter.
+    pub slopes: DMatrix<Complex<f64>>,
+}
+
+impl StructureSlopes {
+    /// `H(ω)` of the probe `watched` per newton at the probe `hit` (numbers among the probes), at `omega` (rad/s), and its
+    /// derivatives by the parameters.
+    ///
+    /// # Errors
+    /// [`StepError::Singular`] at a resonance without damping.
+    pub fn response(
+        &self,
+        watched: usize,
+        hit: usize,
+        answer: Answer,
+        omega: &[f64],
+    ) -> Result<ResponseSlopes, StepError> {
+        let s = &self.structure;
+        let complex = |row: &RowDVector<f64>| row.transpose().map(|x| Complex::new(x, 0.0));
+        let (b, c) = (complex(&s.rows[hit]), complex(&s.rows[watched]));
+        let mut found = ResponseSlopes {
+            values: Vec::with_capacity(omega.len()),
+            slopes: DMatrix::zeros(omega.len(), self.slopes.len()),
+        };
+        for (k, w) in omega.iter().enumerate() {
+            let Z = dynamic(s, *w);
+            let singular = || StepError::Singular { matrix: "dynamic stiffness (a resonance without damping)", t: 0.0 };
+            let u = Z.clone().lu().solve(&b).ok_or_else(singular)?;
+            let factor = answer.factor(*w);
+            found.values.push(factor * c.dot(&u));
+            if self.slopes.is_empty() {
+                continue;
+            }
+            let y = Z.transpose().lu().solve(&c).ok_or_else(singular)?;
+            for (p, slope) in self.slopes.iter().enumerate() {
+                let (db, dc) = (complex(&slope.rows[hit]), complex(&slope.rows[watched]));
+                found.slopes[(k, p)] = factor * (dc.dot(&u) + y.dot(&db) - y.dot(&(dynamic(slope, *w) * &u)));
+            }
+        }
+        Ok(found)
+    }
+}
+
+/// `K + iωD - ω²M`.
+fn dynamic(s: &Structure, omega: f64) -> DMatrix<Complex<f64>> {
+    let square = omega * omega;
+    DMatrix::from_fn(s.K.nrows(), s.K.ncols(), |i, j| {
+        Complex::new(s.K[(i, j)] - square * s.M[(i, j)], omega * s.D[(i, j)])
+    })
+}

@@ -1,0 +1,267 @@
+//! How an arm at rest answers to its parameters: the tool's place and the natural frequencies.
+//!
+//! ```text
+//! K e + p(e) = 0:     V_T = -J (K + dp/de)^-1 dr/dx          dω²/dx = φᵀ (dK/dx - ω² dM/dx) φ
+//! ```
+//! with r the unbalanced forces. One matrix of an operating point serves all parameters. In dK/dx and dM/dx the explicit part is
+//! exact; the part by the moving equilibrium is a central difference of fourth order of the closed tangents along de/dx.
+
+use flexarm_kinematics::{Frame, Wrench};
+use flexarm_stepping::{FlexibleArm, OperatingPoint, StepError, Tangents};
+use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, SymmetricEigen};
+
+use crate::estimation::parameter::{Effect, Parameter, Plant, entry_slope, scaled, slope_of};
+
+/// Length of the differences along the equilibrium's path, over the size of the elastic coordinates.
+const DIFFERENCE: f64 = 1e-3;
+
+/// `dr/dx`: change of the unbalanced forces on the elastic coordinates per parameter, n×p.
+pub(crate) fn force_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) -> Result<DMatrix<f64>, StepError> {
+    let n = at.deflections().len();
+    let mut slopes = DMatrix::zeros(n, parameters.len());
+    for (k, parameter) in parameters.iter().enumerate() {
+        match &parameter.effect {
+            Effect::Stiffness(places) => {
+                for place in places {
+                    let (arm, e) = (at.arm(), at.deflections());
+                    if let Some((places, dK)) = arm.coupled_stiffness_slope(place.spring) {
+                        let f = dK * DVector::from_iterator(places.len(), places.iter().map(|i| e[*i]));
+                        places.iter().zip(f.iter()).for_each(|(i, f)| slopes[(*i, k)] += f);
+                        continue;
+                    }
+                    let element = &arm.elements[place.spring];
+                    let first = arm.offset(element);
+                    // A spring of one coordinate is turned by the error of its transmission as well.
+                    let turned = arm.deflection(place.spring, e[first], at.coordinates().as_slice());
+                    let e = if element.size == 1 { &[turned] } else { &e[first..first + element.size] };
+                    let f = match &element.curve {
+                        Some(_) => element.spring_force(e),
+                        None => slope_of(&element.K, place.coordinate) * DVector::from_column_slice(e),
+                    };
+                    for (i, f) in f.iter().enumerate() {
+                        slopes[(first + i, k)] += f;
+                    }
+                }
+            }
+            Effect::Entry { spring, row, column, factor, .. } => {
+                let arm = at.arm();
+                let (first, e) = (arm.offset(&arm.elements[*spring]), at.deflections());
+                slopes[(first + row, k)] += factor * e[first + column];
+                if row != column {
+                    slopes[(first + column, k)] += factor * e[first + row];
+                }
+            }
+            // What a tool carries and where it is loaded is known to the measurement.
+            Effect::Damping(_) | Effect::Damper { .. } | Effect::Tool(_) => {}
+            Effect::Mass { body, per_kg } => {
+                // Forces are linear in a mass: a difference of any size is exact.
+                let (mut with, mut without) = (DVector::zeros(n), DVector::zeros(n));
+                let arm = at.arm().clone();
+                let heavier = carrying(&arm, *body, per_kg);
+                at.forces_of(&heavier, &mut with);
+                at.forces_of(&arm, &mut without);
+                slopes.set_column(k, &(with - without));
+            }
+        }
+    }
+    Ok(slopes)
+}
+
+/// The arm with a kilogram more.
+fn carrying(arm: &FlexibleArm, body: usize, per_kg: &flexarm_kinematics::SpatialInertia) -> FlexibleArm {
+    let mut inertia = arm.model.bodies()[body].inertia;
+    inertia += scaled(per_kg, 1.0);
+    arm.with_inertia(body, inertia)
+}
+
+/// Twist of the tool (world axes, at its point; m, rad) per unit of each parameter's coordinate, 6×p, at a pose that is solved.
+///
+/// Of [`Effect::Tool`] the part by deflection, which is zero here: loads stay where they are, and the frame itself is not moved.
+/// [`crate::estimation::MeasuredArm`] has all of it.
+///
+/// # Errors
+/// As [`OperatingPoint::solve`].
+pub fn tool_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) -> Result<Matrix6xX<f64>, StepError> {
+    let forces = force_slopes(at, parameters)?;
+    let moved = at.yielding().tr_mul(&forces);
+    Ok(Matrix6xX::from_fn(parameters.len(), |i, j| -moved[(i, j)]))
+}
+
+/// Natural frequencies of a held arm with their slopes.
+#[derive(Clone, Debug)]
+pub struct FrequencySlopes {
+    /// Frequencies, ascending (Hz).
+    pub hz: Vec<f64>,
+    /// Per unit of each parameter's coordinate: a row per frequency, a column per parameter (Hz).
+    pub slopes: DMatrix<f64>,
+}
+
+/// Natural frequencies at a pose without a wrench, and their derivatives by parameters.
+///
+/// * `plant`: with the parameters as they are now; `q`: actuated joints (rad or m).
+///
+/// Where two frequencies coincide their shapes are not determined, and neither is the derivative of each.
+///
+/// # Errors
+/// As [`OperatingPoint::solve`]; [`StepError::Singular`] where a coordinate moves no mass.
+pub fn frequency_slopes(plant: &Plant, parameters: &[Parameter], q: &[f64]) -> Result<FrequencySlopes, StepError> {
+    let arm = plant.held(q)?;
+    let none = Wrench::zeros();
+    let mut at = OperatingPoint::new(arm.clone(), plant.tool.clone());
+    at.solve(q, &none)?;
+    let forces = force_slopes(&mut at, parameters)?;
+    let here = Tangents::at(&arm, &plant.tool, &none, at.coordinates());
+    let (omega2, shapes) = eigen(&here)?;
+    let symmetric = (&here.K + here.K.transpose()) * 0.5;
+    let singular = || StepError::Singular { matrix: "static stiffness (with the effect of weight)", t: 0.0 };
+    let factor = symmetric.cholesky().ok_or_else(singular)?;
+    let mut slopes = DMatrix::zeros(omega2.len(), parameters.len());
+    for (k, parameter) in parameters.iter().enumerate() {
+        let moved = -factor.solve(&forces.column(k));
+        let change = along(&arm, at.coordinates(), &moved, |q| {
+            let at = Tangents::at(&arm, &plant.tool, &none, q);
+            vec![at.K, at.M]
+        });
+        let (eK, eM) = explicit(&arm, &plant.tool, &none, &parameter.effect, at.coordinates(), &here);
+        let (dK, dM) = (&change[0] + eK, &change[1] + eM);
+        for (i, w2) in omega2.iter().enumerate() {
+            let phi = shapes.column(i);
+            let slope = phi.dot(&(&dK * phi)) - w2 * phi.dot(&(&dM * phi));
+            slopes[(i, k)] = slope / (2.0 * w2.sqrt() * std::f64::consts::TAU);
+        }
+    }
+    Ok(FrequencySlopes { hz: omega2.iter().map(|w2| w2.sqrt() / std::f64::consts::TAU).collect(), slopes })
+}
+
+/// Squares of the natural frequencies, ascending, and shapes with `φᵀ M φ = 1`.
+pub(crate) fn eigen(at: &Tangents) -> Result<(Vec<f64>, DMatrix<f64>), StepError> {
+    let singular = |matrix| StepError::Singular { matrix, t: 0.0 };
+    let K = (&at.K + at.K.transpose()) * 0.5;
+    let L = K.cholesky().ok_or_else(|| singular("static stiffness (with the effect of weight)"))?.unpack();
+    let lower = |B: &DMatrix<f64>| L.solve_lower_triangular(B).ok_or_else(|| singular("stiffness factor"));
+    let A = lower(&lower(&at.M)?.transpose())?;
+    let eigen = SymmetricEigen::new((&A + A.transpose()) * 0.5);
+    let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
+    order.sort_by(|i, j| eigen.eigenvalues[*j].total_cmp(&eigen.eigenvalues[*i]));
+    let mut shapes = DMatrix::zeros(order.len(), order.len());
+    let mut omega2 = Vec::with_capacity(order.len());
+    for (column, k) in order.into_iter().enumerate() {
+        let value = eigen.eigenvalues[k];
+        if value.is_nan() || value <= 0.0 {
+            return Err(singular("mass matrix of the elastic coordinates"));
+        }
+        // K φ = ω² M φ with φ = L^-T y, and φᵀ M φ = yᵀ A y = value.
+        let y = eigen.eigenvectors.column(k).into_owned();
+        let phi = L.tr_solve_lower_triangular(&y).ok_or_else(|| singular("stiffness factor"))? / value.sqrt();
+        shapes.set_column(column, &phi);
+        omega2.push(1.0 / value);
+    }
+    Ok((omega2, shapes))
+}
+
+/// Change of matrices that depend on the coordinates as the elastic ones move by `de` per unit.
+pub(crate) fn along(
+    arm: &FlexibleArm,
+    q: &DVector<f64>,
+    de: &DVector<f64>,
+    look: impl Fn(&DVector<f64>) -> Vec<DMatrix<f64>>,
+) -> Vec<DMatrix<f64>> {
+    let mut dq = DVector::zeros(q.len());
+    dq.rows_mut(arm.model.n_actuated(), de.len()).copy_from(de);
+    along_coordinates(q, &dq, look)
+}
+
+/// As [`along`], as all coordinates move by `dq` per unit: central differences of fourth order.
+pub(crate) fn along_coordinates(
+    q: &DVector<f64>,
+    dq: &DVector<f64>,
+    look: impl Fn(&DVector<f64>) -> Vec<DMatrix<f64>>,
+) -> Vec<DMatrix<f64>> {
+    let size = dq.amax();
+    if size == 0.0 {
+        return look(q).into_iter().map(|here| here * 0.0).collect();
+    }
+    let h = DIFFERENCE / size;
+    let shifted = |steps: f64| look(&(q + dq * (steps * h)));
+    let [a, b, c, d] = [-2.0, -1.0, 1.0, 2.0].map(shifted);
+    (0..a.len()).map(|k| ((&c[k] - &b[k]) * 8.0 - (&d[k] - &a[k])) / (12.0 * h)).collect()
+}
+
+/// Derivatives of the Cartesian compliance of the tool, drives locked, at a pose that is solved: one 6×6 per parameter, per unit of
+/// its coordinate (m/N, rad/N; m/(N m), rad/(N m)).
+///
+/// * `F_T_W`: the wrench with which it was solved.
+///
+/// # Errors
+/// [`StepError::Singular`] where a motion has no stiffness.
+pub fn compliance_slopes(
+    at: &mut OperatingPoint,
+    F_T_W: &Wrench,
+    parameters: &[Parameter],
+) -> Result<Vec<Matrix6<f64>>, StepError> {
+    let forces = force_slopes(at, parameters)?;
+    let (arm, tool, q) = (at.arm().clone(), at.tool().clone(), at.coordinates().clone());
+    let here = Tangents::at(&arm, &tool, F_T_W, &q);
+    let singular = || StepError::Singular { matrix: "static stiffness (with the effect of weight and load)", t: 0.0 };
+    let solve = |K: &DMatrix<f64>, B: &DMatrix<f64>| K.clone().lu().solve(B).ok_or_else(singular);
+    let J = DMatrix::from_fn(6, here.J.ncols(), |i, j| here.J[(i, j)]);
+    let (U, Y) = (solve(&here.K, &J.transpose())?, solve(&here.K.transpose(), &J.transpose())?);
+    let look = |q: &DVector<f64>| {
+        let at = Tangents::at(&arm, &tool, F_T_W, q);
+        vec![DMatrix::from_fn(6, at.J.ncols(), |i, j| at.J[(i, j)]), at.K]
+    };
+    let mut found = Vec::with_capacity(parameters.len());
+    for (k, parameter) in parameters.iter().enumerate() {
+        let moved = -solve(&here.K, &forces.columns(k, 1).into_owned())?.column(0);
+        let change = along(&arm, &q, &moved, look);
+        let (eK, _) = explicit(&arm, &tool, F_T_W, &parameter.effect, &q, &here);
+        let dC = &change[0] * &U + Y.tr_mul(&change[0].transpose()) - Y.tr_mul(&((&change[1] + eK) * &U));
+        found.push(Matrix6::from_fn(|i, j| dC[(i, j)]));
+    }
+    Ok(found)
+}
+
+/// Change of stiffness and mass by the parameter itself.
+pub(crate) fn explicit(
+    arm: &FlexibleArm,
+    tool: &Frame,
+    F_T_W: &Wrench,
+    effect: &Effect,
+    q: &DVector<f64>,
+    here: &Tangents,
+) -> (DMatrix<f64>, DMatrix<f64>) {
+    let n = here.K.nrows();
+    match effect {
+        Effect::Stiffness(places) => {
+            let mut dK = DMatrix::zeros(n, n);
+            for place in places {
+                if let Some((places, coupled)) = arm.coupled_stiffness_slope(place.spring) {
+                    for (a, i) in places.iter().enumerate() {
+                        places.iter().enumerate().for_each(|(b, j)| dK[(*i, *j)] += coupled[(a, b)]);
+                    }
+                    continue;
+                }
+                let element = &arm.elements[place.spring];
+                let (first, size) = (arm.offset(element), element.size);
+                let mut block = dK.view_mut((first, first), (size, size));
+                match arm.vibration_slope(place.spring, q.as_slice()) {
+                    Some(slope) => block[(0, 0)] += slope,
+                    None => block += slope_of(&element.K, place.coordinate),
+                }
+            }
+            (dK, DMatrix::zeros(n, n))
+        }
+        Effect::Entry { spring, row, column, factor, .. } => {
+            let element = &arm.elements[*spring];
+            let (first, size) = (arm.offset(element), element.size);
+            let mut dK = DMatrix::zeros(n, n);
+            dK.view_mut((first, first), (size, size)).copy_from(&entry_slope(size, *row, *column, *factor));
+            (dK, DMatrix::zeros(n, n))
+        }
+        Effect::Damping(_) | Effect::Damper { .. } | Effect::Tool(_) => (DMatrix::zeros(n, n), DMatrix::zeros(n, n)),
+        Effect::Mass { body, per_kg } => {
+            let heavier = Tangents::at(&carrying(arm, *body, per_kg), tool, F_T_W, q);
+            (heavier.K - &here.K, heavier.M - &here.M)
+        }
+    }
+}

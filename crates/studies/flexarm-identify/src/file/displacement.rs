@@ -1,0 +1,189 @@
+//! Displacements from one load to another.
+
+use std::path::PathBuf;
+
+use crate::estimation::{Component, Reading, ReadingKind, Row};
+use nalgebra::Vector3;
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::Reader;
+use super::common::{Joints, LOAD_COLUMNS, LoadEntry, TableRow};
+use flexarm_run::Error;
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct DisplacementEntry {
+    file: Option<Spanned<PathBuf>>,
+    joints: Option<Spanned<Joints>>,
+    #[serde(default)]
+    load: LoadEntry,
+    #[serde(default)]
+    before: LoadEntry,
+    #[serde(default)]
+    point: [f64; 3],
+    direction: Option<Spanned<[f64; 3]>>,
+    /// In whose axes directions, values and rotations are; the world's without.
+    instrument: Option<Spanned<String>>,
+    value: Option<Spanned<Value>>,
+    rotation: Option<[f64; 3]>,
+    std: Option<Spanned<f64>>,
+    std_rotation: Option<Spanned<f64>>,
+}
+
+#[derive(Debug, Deserialize, Clone, Copy)]
+#[serde(untagged, expecting = "expected a number along direction, or a list of three")]
+enum Value {
+    One(f64),
+    Three([f64; 3]),
+}
+
+impl Value {
+    fn read(self) -> Measured {
+        match self {
+            Self::One(d) => Measured::One(d),
+            Self::Three(d) => Measured::Three(d.map(Some)),
+        }
+    }
+}
+
+/// A displacement as it was read: along a direction, or the components that were.
+#[derive(Debug, Clone, Copy)]
+enum Measured {
+    One(f64),
+    Three([Option<f64>; 3]),
+}
+
+/// A displacement before its units.
+struct Said {
+    name: String,
+    q: Vec<f64>,
+    load: LoadEntry,
+    point: [f64; 3],
+    value: Option<Measured>,
+    direction: Option<Spanned<[f64; 3]>>,
+    rotation: Option<[Option<f64>; 3]>,
+    std: Option<Spanned<f64>>,
+    std_rotation: Option<Spanned<f64>>,
+}
+
+/// Columns of a table beside joints and loads.
+const COLUMNS: [&str; 15] =
+    ["px", "py", "pz", "dx", "dy", "dz", "rx", "ry", "rz", "d", "ux", "uy", "uz", "std", "std_rotation"];
+
+impl Reader<'_> {
+    pub(super) fn displacement(&mut self, number: usize, entry: &Spanned<DisplacementEntry>) -> Result<(), Error> {
+        let e = entry.get_ref();
+        match (&e.file, &e.joints) {
+            (Some(file), None) => {
+                let table = self.table(file, &[&LOAD_COLUMNS[..], &COLUMNS].concat())?;
+                for row in 0..table.rows.len() {
+                    let at = TableRow { table: &table, row };
+                    let name = format!("{} line {}", file.get_ref().display(), table.lines[row]);
+                    let load = self.with_columns(e.load, &at, file)?;
+                    let value = match (at.get("d"), at.filled(["dx", "dy", "dz"])) {
+                        (Some(d), None) => Some(Measured::One(d)),
+                        (None, three) => three.map(Measured::Three),
+                        (Some(_), Some(_)) => {
+                            let text = "a row has d and dx, dy, dz: keep one of them";
+                            return Err(self.error(file.span(), text));
+                        }
+                    };
+                    let spanned = |x: f64| Spanned::new(file.span(), x);
+                    let std = at.get("std").map(spanned).or_else(|| e.std.clone());
+                    let std_rotation = at.get("std_rotation").map(spanned).or_else(|| e.std_rotation.clone());
+                    let q = self.table_joints(&at, file.span())?;
+                    let rotation = at.filled(["rx", "ry", "rz"]);
+                    let direction = self.table_direction(&at, file)?.or_else(|| e.direction.clone());
+                    let point =
+                        at.all(["px", "py", "pz"]).map_err(|name| self.empty(&at, file, &name))?.unwrap_or(e.point);
+                    let said = Said { name, q, load, point, value, direction, rotation, std, std_rotation };
+                    self.moved(entry, said)?;
+                }
+                Ok(())
+            }
+            (None, Some(joints)) => {
+                let said = Said {
+                    name: format!("displacement {}", number + 1),
+                    q: self.joints(joints)?,
+                    load: e.load,
+                    point: e.point,
+                    value: e.value.as_ref().map(|value| value.get_ref().read()),
+                    direction: e.direction.clone(),
+                    rotation: e.rotation.map(|turn| turn.map(Some)),
+                    std: e.std.clone(),
+                    std_rotation: e.std_rotation.clone(),
+                };
+                self.moved(entry, said)
+            }
+            _ => {
+                Err(self.error(entry.span(), "a displacement needs joints = [...] and value, or file = \"table.csv\""))
+            }
+        }
+    }
+
+    /// One displacement.
+    fn moved(&mut self, entry: &Spanned<DisplacementEntry>, said: Said) -> Result<(), Error> {
+        let (e, span) = (entry.get_ref(), entry.span());
+        let Said { name, q, load, point, value, direction, rotation, std, std_rotation } = said;
+        let mut rows = Vec::new();
+        let sigma = self.std(std.as_ref(), self.units.length)?;
+        let instrument =
+            e.instrument.as_ref().map(|name| self.chosen("instrument", Some(name), &self.instruments, &span));
+        let instrument = instrument.transpose()?;
+        let along = |d: Vector3<f64>| instrument.map_or(Component::Along(d), |k| Component::AlongSeen(k, d));
+        let about = |d: Vector3<f64>| instrument.map_or(Component::About(d), |k| Component::AboutSeen(k, d));
+        let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+        match (value, &direction) {
+            (Some(Measured::One(value)), Some(direction)) => {
+                let d = Vector3::from(*direction.get_ref());
+                let d = d.try_normalize(1e-9).filter(|v| v.iter().all(|x| x.is_finite()));
+                let d = d.ok_or_else(|| self.error(direction.span(), "direction has no length"))?;
+                rows.push(Row { of: along(d), value: value * self.units.length, std: sigma });
+            }
+            (Some(Measured::One(_)), None) => {
+                let text = "one number is measured along a direction: add direction = [x, y, z] in world axes, or in those of its instrument";
+                return Err(self.error(span, text));
+            }
+            (Some(Measured::Three(_)), Some(direction)) => {
+                let text = "three numbers are along x, y and z: leave direction out";
+                return Err(self.error(direction.span(), text));
+            }
+            (Some(Measured::Three(d)), None) => rows.extend(
+                axes.iter()
+                    .zip(d)
+                    .filter_map(|(axis, d)| Some(Row { of: along(*axis), value: d? * self.units.length, std: sigma })),
+            ),
+            (None, _) if rotation.is_some() => {}
+            (None, _) => {
+                return Err(self.error(span, format!("{name}: nothing was measured: add value = [dx, dy, dz]")));
+            }
+        }
+        if let Some(turn) = rotation {
+            let given = std_rotation.is_some();
+            if given != std.is_some() && value.is_some() {
+                let text = "displacements and rotations have units of their own: give std and std_rotation";
+                return Err(self.error(span, text));
+            }
+            let sigma = self.std(std_rotation.as_ref(), self.units.angle)?;
+            rows.extend(
+                axes.iter()
+                    .zip(turn)
+                    .filter_map(|(axis, d)| Some(Row { of: about(*axis), value: d? * self.units.angle, std: sigma })),
+            );
+        }
+        if let Some(bad) = rows.iter().find(|row| !row.value.is_finite()) {
+            return Err(self.error(span, format!("{name}: found {}, expected a finite number", bad.value)));
+        }
+        let (before, after) = (self.load(&e.before, &span)?, self.load(&load, &span)?);
+        if before == after {
+            return Err(self.error(span, format!("{name}: the loads before and after are the same: nothing moves")));
+        }
+        let point = Vector3::from(point) * self.units.length;
+        let kind = ReadingKind::Displacement { before, after, point, rows };
+        let what = if rotation.is_some() { "displacement and rotation" } else { "displacement" };
+        self.given.push((what, std.is_some() || (value.is_none() && std_rotation.is_some()), span));
+        self.measurements.readings.push(Reading { name, q, kind });
+        Ok(())
+    }
+}

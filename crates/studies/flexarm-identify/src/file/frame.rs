@@ -1,0 +1,134 @@
+//! Instruments and targets: where they are, how well that is known, what of it counts.
+
+use std::collections::BTreeMap;
+
+use crate::estimation::{Instrument, Reading, ReadingKind, Target};
+use flexarm_kinematics::Pose;
+use nalgebra::{Rotation3, Translation3, Vector3};
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::Reader;
+use flexarm_run::Error;
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct InstrumentEntry {
+    xyz: Option<[f64; 3]>,
+    rpy: Option<[f64; 3]>,
+    /// Deviation of each component of `xyz`.
+    std: Option<Spanned<f64>>,
+    /// Deviation of the rotation about each axis.
+    std_rotation: Option<Spanned<f64>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct TargetEntry {
+    xyz: [f64; 3],
+    #[serde(default)]
+    unknown: bool,
+    /// Deviation of each component.
+    std: Option<Spanned<f64>>,
+}
+
+impl Reader<'_> {
+    /// Names of instruments and targets, and where they are said to be.
+    pub(super) fn frames(
+        &mut self,
+        instruments: &BTreeMap<String, Spanned<InstrumentEntry>>,
+        targets: &BTreeMap<String, Spanned<TargetEntry>>,
+    ) -> Result<(), Error> {
+        for (name, entry) in instruments {
+            let InstrumentEntry { xyz, rpy, std, std_rotation } = entry.get_ref();
+            let all = xyz.iter().chain(rpy).flatten();
+            if let Some(bad) = all.copied().find(|x| !x.is_finite()) {
+                return Err(self.error(entry.span(), format!("found {bad}, expected finite numbers")));
+            }
+            let deviation = std.as_ref().or(std_rotation.as_ref());
+            if let (Some(std), None, None) = (deviation, xyz, rpy) {
+                let text =
+                    format!("instrument {name:?} is unknown, and has a deviation: give xyz and rpy, or leave it out");
+                return Err(self.error(std.span(), text));
+            }
+            let [r, p, y] = rpy.unwrap_or_default().map(|angle| angle * self.units.angle);
+            let at = Vector3::from(xyz.unwrap_or_default()) * self.units.length;
+            let X_WI = Pose::from_parts(Translation3::from(at), Rotation3::from_euler_angles(r, p, y));
+            self.instruments.push(name.clone());
+            self.measurements.instruments.push(Instrument::Known(X_WI.inverse()));
+        }
+        for (name, entry) in targets {
+            let TargetEntry { xyz, unknown, std } = entry.get_ref();
+            if let Some(bad) = xyz.iter().find(|x| !x.is_finite()) {
+                return Err(self.error(entry.span(), format!("found {bad}, expected finite numbers")));
+            }
+            if let (true, Some(std)) = (*unknown, std) {
+                let text = format!("target {name:?} is unknown, and has a deviation: keep one of them");
+                return Err(self.error(std.span(), text));
+            }
+            self.targets.push(name.clone());
+            self.measurements.targets.push(Target::Known(Vector3::from(*xyz) * self.units.length));
+        }
+        Ok(())
+    }
+
+    /// What of instruments and targets is unknown, by the readings that use them.
+    pub(super) fn settle_frames(
+        &mut self,
+        instruments: &BTreeMap<String, Spanned<InstrumentEntry>>,
+        targets: &BTreeMap<String, Spanned<TargetEntry>>,
+    ) -> Result<(), Error> {
+        let n = (instruments.len(), targets.len());
+        let (mut placed, mut turned, mut hit) = (vec![false; n.0], vec![false; n.0], vec![false; n.1]);
+        for reading in &self.measurements.readings {
+            match &reading.kind {
+                ReadingKind::Place { instrument, target, .. } => (placed[*instrument], hit[*target]) = (true, true),
+                ReadingKind::Displacement { rows, .. } => {
+                    rows.iter().filter_map(|row| row.of.parts().1).for_each(|k| turned[k] = true);
+                }
+                _ => {}
+            }
+        }
+        for (k, (name, entry)) in instruments.iter().enumerate().filter(|(k, _)| placed[*k] || turned[*k]) {
+            let InstrumentEntry { xyz, rpy, std, std_rotation } = entry.get_ref();
+            let Instrument::Known(said) = self.measurements.instruments[k] else { continue };
+            let known = xyz.is_some() || (!placed[k] && rpy.is_some());
+            let std_place = std.as_ref().map(|std| self.std(Some(std), self.units.length)).transpose()?;
+            let std_turn = std_rotation.as_ref().map(|std| self.std(Some(std), self.units.angle)).transpose()?;
+            let unknown = if placed[k] { Instrument::Unknown(said) } else { Instrument::Axes(said.rotation) };
+            let deviations = match (known, std_place, std_turn) {
+                (false, None, None) => None,
+                (true, None, None) => continue,
+                (true, Some(_), None) if !placed[k] => continue,
+                (true, place, Some(turn)) if place.is_some() || !placed[k] => Some((place.filter(|_| placed[k]), turn)),
+                _ => {
+                    let text = format!("instrument {name:?}: xyz, std and std_rotation are needed together");
+                    return Err(self.error(entry.span(), text));
+                }
+            };
+            self.measurements.instruments[k] = unknown;
+            if let Some((std, std_rotation)) = deviations {
+                let kind = ReadingKind::InstrumentAt { instrument: k, value: said, std, std_rotation };
+                self.known("instrument", name, kind, entry.span());
+            }
+        }
+        for (k, (name, entry)) in targets.iter().enumerate().filter(|(k, _)| hit[*k]) {
+            let TargetEntry { unknown, std, .. } = entry.get_ref();
+            let Target::Known(value) = self.measurements.targets[k] else { continue };
+            if *unknown || std.is_some() {
+                self.measurements.targets[k] = Target::Unknown(value);
+            }
+            if let Some(std) = std {
+                let std = self.std(Some(std), self.units.length)?;
+                self.known("target", name, ReadingKind::TargetAt { target: k, value, std }, entry.span());
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes what is known of a frame as a reading.
+    fn known(&mut self, what: &'static str, name: &str, kind: ReadingKind, span: std::ops::Range<usize>) {
+        self.given.push((what, true, span));
+        self.measurements.readings.push(Reading { name: format!("{what} {name}"), q: Vec::new(), kind });
+    }
+}

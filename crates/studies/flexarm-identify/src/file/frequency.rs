@@ -1,0 +1,51 @@
+//! Natural frequencies at a pose.
+
+use crate::estimation::{Reading, ReadingKind, Row};
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::Reader;
+use super::common::{Joints, LoadEntry};
+use flexarm_run::Error;
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FrequencyEntry {
+    joints: Spanned<Joints>,
+    #[serde(default)]
+    load: LoadEntry,
+    hz: Spanned<Vec<f64>>,
+    modes: Option<Spanned<Vec<usize>>>,
+    std: Option<Spanned<f64>>,
+    /// Deviation as a part of each frequency.
+    std_relative: Option<Spanned<f64>>,
+}
+
+impl Reader<'_> {
+    pub(super) fn frequency(&mut self, number: usize, entry: &Spanned<FrequencyEntry>) -> Result<(), Error> {
+        let (e, span) = (entry.get_ref(), entry.span());
+        let hz = e.hz.get_ref();
+        let modes: Vec<usize> = e.modes.as_ref().map_or_else(|| (1..=hz.len()).collect(), |m| m.get_ref().clone());
+        if modes.len() != hz.len() || modes.contains(&0) {
+            let at = e.modes.as_ref().map_or(span, Spanned::span);
+            let message = format!("modes = {modes:?} for {} frequencies: one number each, 1 is the lowest", hz.len());
+            return Err(self.error(at, message));
+        }
+        if hz.is_empty() || hz.iter().any(|f| !(f.is_finite() && *f > 0.0)) {
+            return Err(self.error(e.hz.span(), "hz takes positive frequencies"));
+        }
+        if let (Some(_), Some(relative)) = (&e.std, &e.std_relative) {
+            return Err(
+                self.error(relative.span(), "std (Hz) and std_relative (part of each frequency): keep one of them")
+            );
+        }
+        let (std, relative) = (self.std(e.std.as_ref(), 1.0)?, self.std(e.std_relative.as_ref(), 1.0)?);
+        let of = |f: f64| if e.std_relative.is_some() { relative * f } else { std };
+        let rows = hz.iter().zip(modes).map(|(f, mode)| Row { of: mode - 1, value: *f, std: of(*f) }).collect();
+        let kind = ReadingKind::Frequencies { load: self.load(&e.load, &span)?, rows };
+        let q = self.joints(&e.joints)?;
+        self.given.push(("frequency", e.std.is_some() || e.std_relative.is_some(), span));
+        self.measurements.readings.push(Reading { name: format!("frequency {}", number + 1), q, kind });
+        Ok(())
+    }
+}

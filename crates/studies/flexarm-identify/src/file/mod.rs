@@ -1,0 +1,263 @@
+//! The file of measurements (`docs/identify.md`): readings one by one or as tables, units, what is unknown.
+
+mod common;
+mod displacement;
+mod frame;
+mod frequency;
+mod place;
+mod recording;
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::Path;
+
+use flexarm_files::read_text;
+use crate::estimation::{Loss, Measurements};
+use serde::Deserialize;
+use toml::Spanned;
+
+use self::displacement::DisplacementEntry;
+use self::frame::{InstrumentEntry, TargetEntry};
+use self::frequency::FrequencyEntry;
+use self::place::PlaceEntry;
+use self::recording::EncodersEntry;
+use super::response_file::{NodeEntry, ResponseEntry, ShapeEntry};
+use flexarm_run::Arm;
+use flexarm_run::Error;
+use flexarm_run::RobotFileError;
+use flexarm_run::robot_file::Source;
+use flexarm_run::toml_file::parsed;
+
+pub(super) use self::common::{Joints, LoadEntry};
+pub(super) use self::recording::EncoderRecording;
+
+/// The file as written.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MeasurementFile {
+    format: Spanned<i64>,
+    length: Option<Spanned<String>>,
+    angle: Option<Spanned<String>>,
+    force: Option<Spanned<String>>,
+    loss: Option<Spanned<String>>,
+    #[serde(default)]
+    fit: Vec<Spanned<String>>,
+    #[serde(default)]
+    keep: Vec<Spanned<String>>,
+    uncertainty: Option<Spanned<f64>>,
+    #[serde(default)]
+    parameter: Vec<ParameterEntry>,
+    #[serde(default)]
+    instrument: BTreeMap<String, Spanned<InstrumentEntry>>,
+    #[serde(default)]
+    target: BTreeMap<String, Spanned<TargetEntry>>,
+    #[serde(default)]
+    displacement: Vec<Spanned<DisplacementEntry>>,
+    #[serde(default)]
+    place: Vec<Spanned<PlaceEntry>>,
+    #[serde(default)]
+    frequency: Vec<Spanned<FrequencyEntry>>,
+    #[serde(default)]
+    encoders: Vec<Spanned<EncodersEntry>>,
+    /// Points of the arm that are hit or watched.
+    #[serde(default)]
+    node: BTreeMap<String, Spanned<NodeEntry>>,
+    #[serde(default)]
+    response: Vec<Spanned<ResponseEntry>>,
+    #[serde(default)]
+    shape: Vec<Spanned<ShapeEntry>>,
+}
+
+/// What is known of one parameter before.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ParameterEntry {
+    name: Spanned<String>,
+    uncertainty: Spanned<f64>,
+}
+
+/// What the file says, in SI units.
+#[derive(Debug)]
+pub(super) struct MeasurementInput {
+    pub(super) measurements: Measurements,
+    pub(super) recordings: Vec<EncoderRecording>,
+    pub(super) instruments: Vec<String>,
+    pub(super) targets: Vec<String>,
+    /// Patterns of names of what is unknown, with their places; empty: all stiffnesses.
+    pub(super) fit: Vec<(String, RobotFileError)>,
+    pub(super) keep: Vec<(String, RobotFileError)>,
+    pub(super) uncertainty: Option<f64>,
+    /// Name, uncertainty, place.
+    pub(super) known: Vec<(String, f64, RobotFileError)>,
+    pub(super) loss: Loss,
+    /// Whether deviations are given.
+    pub(super) deviations_known: bool,
+    /// Name of the unit of length, for words about it.
+    pub(super) length: &'static str,
+    pub(super) length_m: f64,
+    pub(super) angle_rad: f64,
+}
+
+/// Factors of the units of a file.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Units {
+    pub(super) length: f64,
+    pub(super) angle: f64,
+    force: f64,
+}
+
+const LENGTHS: [(&str, f64); 3] = [("m", 1.0), ("mm", 1e-3), ("um", 1e-6)];
+const ANGLES: [(&str, f64); 3] = [("rad", 1.0), ("deg", std::f64::consts::PI / 180.0), ("mrad", 1e-3)];
+const FORCES: [(&str, f64); 2] = [("N", 1.0), ("kN", 1e3)];
+
+/// What the robot is asked while its measurements are read.
+pub(super) struct Cell<'a> {
+    /// Actuated joints in coordinate order, and whether they slide.
+    pub(super) joints: &'a [(String, bool)],
+    /// The arm that is measured.
+    pub(super) arm: &'a Arm,
+}
+
+/// Reads a file.
+///
+/// # Errors
+/// [`Error`] with file, place, what was found and what was expected.
+pub(super) fn read(path: &Path, cell: &Cell<'_>) -> Result<MeasurementInput, Error> {
+    let text = read_text(path)?;
+    let source = Source::new(path, &text, "measurements");
+    let file: MeasurementFile = parsed(&text, &source, &[], |file: &MeasurementFile| &file.format)?;
+    let (length, length_m) = unit("length", &file.length, &LENGTHS, &source)?;
+    let units = Units {
+        length: length_m,
+        angle: unit("angle", &file.angle, &ANGLES, &source)?.1,
+        force: unit("force", &file.force, &FORCES, &source)?.1,
+    };
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let mut reader = Reader {
+        cell,
+        source: &source,
+        folder,
+        units,
+        instruments: Vec::new(),
+        targets: Vec::new(),
+        measurements: Measurements::default(),
+        given: Vec::new(),
+    };
+    reader.frames(&file.instrument, &file.target)?;
+    for (k, entry) in file.displacement.iter().enumerate() {
+        reader.displacement(k, entry)?;
+    }
+    for (k, entry) in file.place.iter().enumerate() {
+        reader.place(k, entry)?;
+    }
+    for (k, entry) in file.frequency.iter().enumerate() {
+        reader.frequency(k, entry)?;
+    }
+    for entry in &file.response {
+        reader.response(&file.node, entry)?;
+    }
+    for (k, entry) in file.shape.iter().enumerate() {
+        reader.shape(&file.node, k, entry)?;
+    }
+    reader.settle_frames(&file.instrument, &file.target)?;
+    let recordings = file.encoders.iter().map(|entry| reader.encoders(entry)).collect::<Result<Vec<_>, Error>>()?;
+    let deviations_known = reader.deviations(!recordings.is_empty())?;
+    let told =
+        |list: &[Spanned<String>]| list.iter().map(|p| (p.get_ref().clone(), source.error(p.span(), ""))).collect();
+    let positive = |value: &Spanned<f64>, least: f64| match *value.get_ref() {
+        x if x.is_finite() && x > least => Ok(x),
+        x => Err(source.error(value.span(), format!("uncertainty is {x}, expected a number above {least}"))),
+    };
+    let known = file.parameter.iter().map(|entry| {
+        let place = source.error(entry.name.span(), "");
+        Ok((entry.name.get_ref().clone(), positive(&entry.uncertainty, 0.0)?, place))
+    });
+    Ok(MeasurementInput {
+        instruments: reader.instruments,
+        targets: reader.targets,
+        measurements: reader.measurements,
+        recordings,
+        fit: told(&file.fit),
+        keep: told(&file.keep),
+        uncertainty: file.uncertainty.as_ref().map(|value| positive(value, 1.0)).transpose()?,
+        known: known.collect::<Result<_, RobotFileError>>()?,
+        loss: loss(&file.loss, &source)?,
+        deviations_known,
+        length,
+        length_m,
+        angle_rad: units.angle,
+    })
+}
+
+fn unit(
+    key: &str,
+    given: &Option<Spanned<String>>,
+    known: &[(&'static str, f64)],
+    source: &Source,
+) -> Result<(&'static str, f64), RobotFileError> {
+    let Some(word) = given else { return Ok(known[0]) };
+    known.iter().find(|(name, _)| name == word.get_ref()).copied().ok_or_else(|| {
+        let names: Vec<&str> = known.iter().map(|(name, _)| *name).collect();
+        source.error(word.span(), format!("{key} = {:?} is not known; use one of {names:?}", word.get_ref()))
+    })
+}
+
+fn loss(given: &Option<Spanned<String>>, source: &Source) -> Result<Loss, RobotFileError> {
+    match given.as_ref().map(|word| word.get_ref().as_str()) {
+        None | Some("huber") => Ok(Loss::Huber(2.5)),
+        Some("square") => Ok(Loss::Square),
+        Some("cauchy") => Ok(Loss::Cauchy(2.5)),
+        Some(other) => {
+            let span = given.as_ref().map_or(0..0, Spanned::span);
+            Err(source.error(span, format!("loss = {other:?} is not known; use \"huber\", \"square\" or \"cauchy\"")))
+        }
+    }
+}
+
+/// Readings being collected.
+pub(super) struct Reader<'a> {
+    pub(super) cell: &'a Cell<'a>,
+    source: &'a Source,
+    pub(super) folder: &'a Path,
+    pub(super) units: Units,
+    instruments: Vec<String>,
+    targets: Vec<String>,
+    pub(super) measurements: Measurements,
+    /// Of each reading: what was measured in, whether a deviation is given, where.
+    pub(super) given: Vec<(&'static str, bool, Range<usize>)>,
+}
+
+impl Reader<'_> {
+    pub(super) fn error(&self, span: Range<usize>, message: impl Into<String>) -> Error {
+        self.source.error(span, message).into()
+    }
+
+    /// Whether deviations are given: by all readings or by none, and by all where kinds are mixed.
+    fn deviations(&self, recordings: bool) -> Result<bool, Error> {
+        let Some(first) = self.given.first() else {
+            if recordings {
+                return Ok(true);
+            }
+            let text = "there is no reading: add [[displacement]], [[place]], [[frequency]], [[response]], [[shape]] or [[encoders]]";
+            return Err(self.error(0..0, text));
+        };
+        if self.given.iter().all(|(_, given, _)| *given) {
+            return Ok(true);
+        }
+        let mixed = self.given.iter().find(|(kind, given, _)| *kind != first.0 || *given != first.1);
+        match mixed {
+            // Beside recordings, which have deviations of their own.
+            None if recordings => {
+                Err(self.error(first.2.clone(), "std is missing: readings beside [[encoders]] need one"))
+            }
+            None if first.0 == "displacement and rotation" => {
+                Err(self.error(first.2.clone(), "displacements and rotations together need std and std_rotation"))
+            }
+            None => Ok(false),
+            Some((_, _, span)) => {
+                let text = "std is missing: readings of several kinds, or some with a std, all need one";
+                Err(self.error(span.clone(), text))
+            }
+        }
+    }
+}

@@ -1,0 +1,98 @@
+//! Places of targets on the tool in the axes of an instrument.
+
+use std::ops::Range;
+use std::path::PathBuf;
+
+use crate::estimation::{Reading, ReadingKind};
+use nalgebra::Vector3;
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::Reader;
+use super::common::{Joints, LOAD_COLUMNS, LoadEntry, TableRow};
+use flexarm_run::Error;
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PlaceEntry {
+    file: Option<Spanned<PathBuf>>,
+    joints: Option<Spanned<Joints>>,
+    instrument: Option<Spanned<String>>,
+    target: Option<Spanned<String>>,
+    #[serde(default)]
+    load: LoadEntry,
+    value: Option<[f64; 3]>,
+    std: Option<Spanned<f64>>,
+}
+
+/// Columns of a table beside joints and loads.
+const COLUMNS: [&str; 4] = ["x", "y", "z", "std"];
+
+impl Reader<'_> {
+    pub(super) fn place(&mut self, number: usize, entry: &Spanned<PlaceEntry>) -> Result<(), Error> {
+        let (e, span) = (entry.get_ref(), entry.span());
+        let instrument = self.chosen("instrument", e.instrument.as_ref(), &self.instruments, &span)?;
+        let target = self.chosen("target", e.target.as_ref(), &self.targets, &span)?;
+        let one = |reader: &mut Self, name, q, load: LoadEntry, value: [f64; 3], std: Option<Spanned<f64>>| {
+            if let Some(bad) = value.iter().find(|x| !x.is_finite()) {
+                return Err(reader.error(span.clone(), format!("{name}: found {bad}, expected finite numbers")));
+            }
+            let kind = ReadingKind::Place {
+                load: reader.load(&load, &span)?,
+                target,
+                instrument,
+                value: Vector3::from(value) * reader.units.length,
+                std: Vector3::repeat(reader.std(std.as_ref(), reader.units.length)?),
+            };
+            reader.given.push(("place", std.is_some(), span.clone()));
+            reader.measurements.readings.push(Reading { name, q, kind });
+            Ok(())
+        };
+        match (&e.file, &e.joints, e.value) {
+            (Some(file), None, None) => {
+                let table = self.table(file, &[&LOAD_COLUMNS[..], &COLUMNS].concat())?;
+                for row in 0..table.rows.len() {
+                    let at = TableRow { table: &table, row };
+                    let name = format!("{} line {}", file.get_ref().display(), table.lines[row]);
+                    let value =
+                        at.filled(["x", "y", "z"]).and_then(|[x, y, z]| Some([x?, y?, z?])).ok_or_else(|| {
+                            self.error(file.span(), format!("{name}: a place needs x, y and z in every row"))
+                        })?;
+                    let std = at.get("std").map(|x| Spanned::new(file.span(), x)).or_else(|| e.std.clone());
+                    let q = self.table_joints(&at, file.span())?;
+                    let load = self.with_columns(e.load, &at, file)?;
+                    one(self, name, q, load, value, std)?;
+                }
+                Ok(())
+            }
+            (None, Some(joints), Some(value)) => {
+                let q = self.joints(joints)?;
+                one(self, format!("place {}", number + 1), q, e.load, value, e.std.clone())
+            }
+            _ => Err(self.error(span, "a place needs joints = [...] and value = [x, y, z], or file = \"table.csv\"")),
+        }
+    }
+
+    /// Number of a named instrument or target; the only one without a name.
+    pub(super) fn chosen(
+        &self,
+        what: &str,
+        given: Option<&Spanned<String>>,
+        known: &[String],
+        span: &Range<usize>,
+    ) -> Result<usize, Error> {
+        match given {
+            Some(name) => known.iter().position(|k| k == name.get_ref()).ok_or_else(|| {
+                let message = format!("there is no [{what}.{}]; there are {known:?}", name.get_ref());
+                self.error(name.span(), message)
+            }),
+            None if known.len() == 1 => Ok(0),
+            None => {
+                let help =
+                    if known.is_empty() { format!("add [{what}.NAME]") } else { format!("choose one of {known:?}") };
+                Err(self
+                    .error(span.clone(), format!("a place needs an {what}: {help}").replace("an target", "a target")))
+            }
+        }
+    }
+}

@@ -1,0 +1,178 @@
+//! Recordings of motors and links over time.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::PathBuf;
+
+use flexarm_files::NumberTable;
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::{Reader, Units};
+use flexarm_run::Error;
+use flexarm_run::RobotFileError;
+
+/// Positions of motors and links over time.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct EncodersEntry {
+    file: Spanned<PathBuf>,
+    /// Column of the time (s).
+    time: Spanned<String>,
+    /// Columns of the motors, over their ratios, of all joints.
+    motor: Spanned<BTreeMap<String, String>>,
+    /// Columns of the encoders behind the gears, of some joints.
+    link: Spanned<BTreeMap<String, String>>,
+    /// Columns of the torques through the gears, on the side of the links, of some joints.
+    torque: Option<Spanned<BTreeMap<String, String>>>,
+    /// Of coupled gears: whether the columns of motors are those of the motors behind their gears or what the controller makes of them.
+    positions: Option<Spanned<String>>,
+    below: Option<Spanned<f64>>,
+    edge: Option<Spanned<f64>>,
+}
+
+/// A recording of motors and links, in SI units and the robot's order.
+#[derive(Debug)]
+pub(in flexarm_run::identify) struct EncoderRecording {
+    pub(in flexarm_run::identify) place: RobotFileError,
+    pub(in flexarm_run::identify) step_s: f64,
+    /// One list per joint (rad or m): where the motors say that it is.
+    pub(in flexarm_run::identify) motor: Vec<Vec<f64>>,
+    /// Of the joints that have one.
+    pub(in flexarm_run::identify) link: Vec<Option<Vec<f64>>>,
+    /// Torque through the gear where it was measured (N m or N).
+    pub(in flexarm_run::identify) torque: Vec<Option<Vec<f64>>>,
+    /// Both are compared up to here (Hz).
+    pub(in flexarm_run::identify) below_hz: f64,
+    /// Left out at both ends (s).
+    pub(in flexarm_run::identify) edge_s: f64,
+}
+
+/// What is faster than this is left out of recordings unless they say otherwise (Hz).
+const BELOW_HZ: f64 = 12.0;
+/// So much is left out at both ends of a recording (s).
+const EDGE_S: f64 = 0.4;
+/// Times may be off an even step by this part of it.
+const UNEVEN: f64 = 0.01;
+
+impl Reader<'_> {
+    pub(super) fn encoders(&self, entry: &Spanned<EncodersEntry>) -> Result<EncoderRecording, Error> {
+        let e = entry.get_ref();
+        let path = self.folder.join(e.file.get_ref());
+        if !path.is_file() {
+            let message = format!("file = {:?}: there is no file {}", e.file.get_ref(), path.display());
+            return Err(self.error(e.file.span(), message));
+        }
+        let table = NumberTable::read(&path)?;
+        let column = |name: &str, span: Range<usize>| -> Result<Vec<f64>, Error> {
+            let k = table.column(name).ok_or_else(|| {
+                self.error(span.clone(), format!("{} has no column {name:?}; it has {:?}", path.display(), table.names))
+            })?;
+            let values: Vec<f64> = table.rows.iter().map(|row| row[k]).collect();
+            match values.iter().position(|x| !x.is_finite()) {
+                Some(row) => {
+                    let line = table.lines[row];
+                    Err(self.error(span, format!("{} line {line}: column {name:?} is empty", path.display())))
+                }
+                None => Ok(values),
+            }
+        };
+        let time = column(e.time.get_ref(), e.time.span())?;
+        let step_s = even_step(&time).ok_or_else(|| {
+            self.error(
+                e.time.span(),
+                format!("the times of {} are not evenly spaced, or fewer than three", path.display()),
+            )
+        })?;
+        let Units { length, angle, force } = self.units;
+        let of = |map: &Spanned<BTreeMap<String, String>>,
+                  needed: bool,
+                  units: [f64; 2]|
+         -> Result<Vec<Option<Vec<f64>>>, Error> {
+            let names: Vec<&str> = self.cell.joints.iter().map(|(name, _)| name.as_str()).collect();
+            if let Some(stray) = map.get_ref().keys().find(|name| !names.contains(&name.as_str())) {
+                return Err(
+                    self.error(map.span(), format!("the robot has no joint {stray:?}; its joints are {names:?}"))
+                );
+            }
+            let one = |(name, slides): &(String, bool)| match map.get_ref().get(name) {
+                Some(own) => {
+                    let factor = units[usize::from(*slides)];
+                    Ok(Some(column(own, map.span())?.into_iter().map(|x| x * factor).collect()))
+                }
+                None if needed => {
+                    Err(self.error(map.span(), format!("joint {name:?} has no column: the torques need all joints")))
+                }
+                None => Ok(None),
+            };
+            self.cell.joints.iter().map(one).collect()
+        };
+        let positive = |value: &Option<Spanned<f64>>, what: &str, default: f64| match value {
+            None => Ok(default),
+            Some(x) if x.get_ref().is_finite() && *x.get_ref() >= 0.0 => Ok(*x.get_ref()),
+            Some(x) => Err(self.error(x.span(), format!("{what} is {}, expected a number of 0 or above", x.get_ref()))),
+        };
+        let link = of(&e.link, false, [angle, length])?;
+        if link.iter().all(Option::is_none) {
+            return Err(self.error(e.link.span(), "no joint has an encoder behind its gear"));
+        }
+        let mut motor: Vec<Vec<f64>> = of(&e.motor, true, [angle, length])?.into_iter().flatten().collect();
+        self.behind_coupling(e, &mut motor)?;
+        let torque = match &e.torque {
+            Some(torque) => of(torque, false, [force * length, force])?,
+            None => vec![None; motor.len()],
+        };
+        Ok(EncoderRecording {
+            place: self.source.error(entry.span(), ""),
+            step_s,
+            motor,
+            link,
+            torque,
+            below_hz: positive(&e.below, "below", BELOW_HZ)?,
+            edge_s: positive(&e.edge, "edge", EDGE_S)?,
+        })
+    }
+}
+
+/// The step of evenly spaced times (s).
+fn even_step(time: &[f64]) -> Option<f64> {
+    let n = time.len();
+    if n < 3 {
+        return None;
+    }
+    let step = (time[n - 1] - time[0]) / (n - 1) as f64;
+    let even = time.windows(2).all(|pair| (pair[1] - pair[0] - step).abs() <= UNEVEN * step);
+    (step > 0.0 && even).then_some(step)
+}
+
+impl Reader<'_> {
+    /// Joints from motors that move several of them, `q = C q_m`; joints that the controller has made of them stay.
+    fn behind_coupling(&self, e: &EncodersEntry, motor: &mut [Vec<f64>]) -> Result<(), Error> {
+        let Some(coupling) = self.cell.arm.robot().coupling() else { return Ok(()) };
+        match e.positions.as_ref().map(|word| (word.get_ref().as_str(), word.span())) {
+            Some(("joints", _)) => return Ok(()),
+            Some(("motors", _)) => {}
+            Some((other, span)) => {
+                let text = format!("positions = {other:?} is not known; use \"motors\" or \"joints\"");
+                return Err(self.error(span, text));
+            }
+            None => {
+                let text = format!(
+                    "the gears of {:?} are coupled: say whether motor has the angles of the motors behind their gears (positions = \"motors\") \
+                     or the joints that the controller makes of them (positions = \"joints\")",
+                    coupling.joints
+                );
+                return Err(self.error(e.motor.span(), text));
+            }
+        }
+        let place = |joint: &String| self.cell.joints.iter().position(|(name, _)| name == joint);
+        let places: Vec<usize> = coupling.joints.iter().filter_map(place).collect();
+        let before: Vec<Vec<f64>> = places.iter().map(|k| motor[*k].clone()).collect();
+        for (i, joint) in places.iter().enumerate() {
+            for (sample, to) in motor[*joint].iter_mut().enumerate() {
+                *to = before.iter().enumerate().map(|(k, q)| coupling.C[(i, k)] * q[sample]).sum();
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,335 @@
+//! What of a robot file can be identified: its numbers by name, what each does to the arm, and where it is written.
+//!
+//! | name | what |
+//! | --- | --- |
+//! | `drive.JOINT.gearbox.stiffness` | a gearbox with one stiffness (N m/rad, N/m of a joint that slides) |
+//! | `drive.JOINT.gearbox.stiffness[k]` | one of three or six, from 0 |
+//! | `link.LINK.stiffness_factor` | all of a flexible link's stiffness, as a factor |
+//! | `link.LINK.stiffness_factors[k]` | one of the six directions of a lumped link's springs, as a factor, from 0 |
+//! | `link.LINK.stiffness[i][j]` | an entry of the 6x6 of a lumped link in two parts, and its mirror image (N/m, N, N m/rad) |
+//! | `tcp.x`, `.y`, `.z`, `.rx`, `.ry`, `.rz` | the tool moved and turned about its own axes (m, rad) |
+//! | `mounting.stiffness[k]` | one of six springs under the base, from 0 |
+//! | `drive.JOINT.gearbox.damping` | its damping, if the file has it (N m s/rad, N s/m) |
+//! | `drive.JOINT.gearbox.damping[k]` | one of three or six, from 0 |
+//! | `link.LINK.damping` | modal ratio, `stiffness_beta` (s), or a factor on `rayleigh` |
+//! | `payload.mass` | kg, at its centre of mass |
+
+use flexarm_flexlink::GearStiffness;
+use crate::estimation::{Effect, Parameter, Place, Plant};
+use flexarm_kinematics::SpatialInertia;
+use flexarm_stepping::Damping;
+use nalgebra::{Matrix3, Matrix6, Vector3};
+
+use flexarm_run::FlexibleRobot;
+use flexarm_run::Owner;
+use flexarm_run::RobotLink;
+use flexarm_run::RobotMounting;
+use flexarm_run::robot::PAYLOAD_LINK;
+use flexarm_run::Robot;
+
+/// Key of what is only fitted if it is named: its directions together are the whole of a link's stiffness.
+const DIRECTIONS: &str = "stiffness_factors";
+
+/// Where a parameter is written in the robot file.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Written {
+    /// `[[drive]]` of the joint: the stiffness of its gearbox, or one of its entries.
+    Gearbox { joint: String, entry: Option<usize> },
+    /// `[[drive]]` of the joint: the damping of its gearbox, or one of its entries.
+    GearboxDamping { joint: String, entry: Option<usize> },
+    /// `[[flexible_link]]` of the link: its damping.
+    LinkDamping { link: String },
+    /// `[[flexible_link]]` of the link: its `stiffness_factor`.
+    Link { link: String },
+    /// The same: one of its `stiffness_factors`.
+    LinkDirection { link: String, entry: usize },
+    /// The same: an entry of its `stiffness`, which is this if the file has none.
+    LinkEntry { link: String, row: usize, column: usize, K: Box<Matrix6<f64>> },
+    /// `tcp`: x, y, z, rx, ry, rz.
+    Tool { axis: usize },
+    /// `mounting.stiffness`, one of six.
+    Mounting { entry: usize },
+    /// `payload.mass`.
+    Payload,
+}
+
+/// A parameter and where it stands.
+#[derive(Clone, Debug)]
+pub(crate) struct Candidate {
+    pub(crate) parameter: Parameter,
+    pub(crate) written: Written,
+}
+
+/// All parameters of an arm, in the order of drives, links, payload.
+pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candidate> {
+    let of = |owner: Owner| -> Vec<usize> {
+        flexible.owners.iter().enumerate().filter(|(_, o)| **o == owner).map(|(k, _)| k).collect()
+    };
+    let mut found = Vec::new();
+    for (number, drive) in robot.drives.iter().enumerate() {
+        let springs = of(Owner::Drive(number));
+        let Some((gearbox, damping)) = drive.gearbox.as_ref().filter(|_| !springs.is_empty()) else { continue };
+        // A curve of points has no one stiffness; a play has.
+        if damping.curve.is_some() && drive.backlash == 0.0 {
+            continue;
+        }
+        let slides = flexible.model.coordinates().iter().any(|c| c.joint == drive.joint && c.kind == "prismatic");
+        found.extend(gearbox_parameters(&drive.joint, &gearbox.stiffness, &springs, slides));
+        found.extend(gearbox_damping(&drive.joint, damping.dampers.as_deref().unwrap_or_default(), &springs, slides));
+    }
+    for (number, span) in flexible.spans.iter().enumerate() {
+        let springs = of(Owner::Link(number));
+        if robot.stands_on(&span.link) {
+            found.extend(mounting_parameters(robot, &springs));
+            continue;
+        }
+        let Some(link) = robot.flexible.iter().find(|link| link.flexible.link == span.link) else { continue };
+        let places = springs.iter().map(|spring| Place { spring: *spring, coordinate: None }).collect();
+        let name = format!("link.{}.stiffness_factor", span.link);
+        let written = Written::Link { link: span.link.clone() };
+        found.push(stiffness(name, "1", link.stiffness_factor, places, written));
+        let groups = flexible.model.elastic();
+        if springs.iter().all(|spring| groups[*spring].size == 6 && !groups[*spring].modal) {
+            found.extend(link_directions(&span.link, &link.stiffness_factors, &springs));
+        }
+        if let ([spring], true) = (&springs[..], link.flexible.coupling) {
+            found.extend(link_entries(link, *spring, flexible));
+        }
+        let (unit, initial) = match link.damping {
+            Damping::Modal(zeta) => ("1", zeta),
+            Damping::StiffnessProportional(beta) => ("s", beta),
+            _ => ("1", 1.0),
+        };
+        if initial > 0.0 {
+            let name = format!("link.{}.damping", span.link);
+            let written = Written::LinkDamping { link: span.link.clone() };
+            found.push(Candidate::new(name, unit, initial, Effect::Damping(springs.clone()), written));
+        }
+    }
+    if let Some(frame) = flexible.model.frame(PAYLOAD_LINK) {
+        let mass = robot.rigid.link(PAYLOAD_LINK).and_then(|link| link.inertia).map_or(0.0, |inertia| inertia.mass);
+        let per_kg = SpatialInertia::from_com(1.0, &Vector3::zeros(), &Matrix3::zeros()).at_parent(&frame.X_BF);
+        let effect = Effect::Mass { body: frame.body, per_kg };
+        found.push(Candidate::new("payload.mass".into(), "kg", mass, effect, Written::Payload));
+    }
+    if !found.is_empty() {
+        found.extend(tool_parameters());
+    }
+    found
+}
+
+impl Candidate {
+    fn new(name: String, unit: &str, initial: f64, effect: Effect, written: Written) -> Self {
+        let mut parameter = Parameter { name, unit: unit.into(), initial, prior: 1.0, effect };
+        parameter.prior = parameter.reference();
+        Self { parameter, written }
+    }
+}
+
+fn stiffness(name: String, unit: &str, initial: f64, places: Vec<Place>, written: Written) -> Candidate {
+    Candidate::new(name, unit, initial, Effect::Stiffness(places), written)
+}
+
+/// The dampers of a gearbox, one by one; those that are zero are none.
+fn gearbox_damping(joint: &str, dampers: &[f64], springs: &[usize], slides: bool) -> Vec<Candidate> {
+    let name = format!("drive.{joint}.gearbox.damping");
+    let damper = |(k, initial): (usize, &f64)| {
+        let (spring, coordinate) = if springs.len() > 1 { (springs[k], 0) } else { (springs[0], k) };
+        let (name, entry, moves) = match dampers {
+            [_] => (name.clone(), None, slides),
+            list => (format!("{name}[{k}]"), Some(k), list.len() == 6 && k < 3),
+        };
+        let unit = if moves { "N s/m" } else { "N m s/rad" };
+        let effect = match dampers {
+            [_] => Effect::Damping(vec![spring]),
+            _ => Effect::Damper { spring, coordinate },
+        };
+        Candidate::new(name, unit, *initial, effect, Written::GearboxDamping { joint: joint.to_owned(), entry })
+    };
+    dampers.iter().enumerate().filter(|(_, d)| **d > 0.0).map(damper).collect()
+}
+
+/// The six directions of a lumped link's springs, in all of them alike.
+fn link_directions<'a>(
+    link: &'a str,
+    factors: &'a [f64; 6],
+    springs: &'a [usize],
+) -> impl Iterator<Item = Candidate> + 'a {
+    factors.iter().enumerate().map(move |(entry, factor)| {
+        let places = springs.iter().map(|spring| Place { spring: *spring, coordinate: Some(entry) }).collect();
+        let written = Written::LinkDirection { link: link.to_owned(), entry };
+        stiffness(format!("link.{link}.{DIRECTIONS}[{entry}]"), "1", *factor, places, written)
+    })
+}
+
+/// Entries of the 6x6 of a link that is one spring between two rigid parts, in the matrix before its factors.
+fn link_entries(link: &RobotLink, spring: usize, flexible: &FlexibleRobot) -> Vec<Candidate> {
+    let group = &flexible.model.elastic()[spring];
+    if group.size != 6 || group.modal {
+        return Vec::new();
+    }
+    let root = link.stiffness_factors.map(f64::sqrt);
+    let factor = |i: usize, j: usize| link.stiffness_factor * root[i] * root[j];
+    let K = Matrix6::from_fn(|i, j| flexible.springs[spring].K[(i, j)] / factor(i, j));
+    let name = &link.flexible.link;
+    let entry = |row: usize, column: usize| {
+        let unit = match (row < 3, column < 3) {
+            (true, true) => "N/m",
+            (false, false) => "N m/rad",
+            _ => "N",
+        };
+        let size = (K[(row, row)] * K[(column, column)]).sqrt();
+        let effect = Effect::Entry { spring, row, column, factor: factor(row, column), size };
+        let written = Written::LinkEntry { link: name.clone(), row, column, K: Box::new(K) };
+        Candidate::new(format!("link.{name}.stiffness[{row}][{column}]"), unit, K[(row, column)], effect, written)
+    };
+    (0..6).flat_map(|row| (row..6).map(move |column| (row, column))).map(|(row, column)| entry(row, column)).collect()
+}
+
+/// The tool moved and turned about its own axes.
+fn tool_parameters() -> impl Iterator<Item = Candidate> {
+    ["x", "y", "z", "rx", "ry", "rz"].into_iter().enumerate().map(|(axis, name)| {
+        let unit = if axis < 3 { "m" } else { "rad" };
+        Candidate::new(format!("tcp.{name}"), unit, 0.0, Effect::Tool(axis), Written::Tool { axis })
+    })
+}
+
+fn gearbox_parameters(joint: &str, K: &GearStiffness, springs: &[usize], slides: bool) -> Vec<Candidate> {
+    let name = format!("drive.{joint}.gearbox.stiffness");
+    let about = if slides { "N/m" } else { "N m/rad" };
+    let written = |entry| Written::Gearbox { joint: joint.to_owned(), entry };
+    let whole = |spring| vec![Place { spring, coordinate: None }];
+    match (K, springs) {
+        (GearStiffness::Axis(k), [spring]) => vec![stiffness(name, about, *k, whole(*spring), written(None))],
+        (GearStiffness::Tilting(k), [_, _, _]) => {
+            let each = springs.iter().zip(k).enumerate();
+            each.map(|(i, (s, k))| stiffness(format!("{name}[{i}]"), "N m/rad", *k, whole(*s), written(Some(i))))
+                .collect()
+        }
+        (GearStiffness::Full(K), [spring]) if is_diagonal(K) => {
+            let entry = |i: usize| {
+                let unit = if i < 3 { "N/m" } else { "N m/rad" };
+                let place = vec![Place { spring: *spring, coordinate: Some(i) }];
+                stiffness(format!("{name}[{i}]"), unit, K[(i, i)], place, written(Some(i)))
+            };
+            (0..6).map(entry).collect()
+        }
+        // A full matrix: all of it by a factor.
+        _ => {
+            let places = springs.iter().map(|spring| Place { spring: *spring, coordinate: None }).collect();
+            vec![stiffness(name, "1", 1.0, places, written(None))]
+        }
+    }
+}
+
+/// Six springs under the base that are not coupled, one by one; a beam or a mesh there has no numbers of its own in the robot file.
+fn mounting_parameters(robot: &Robot, springs: &[usize]) -> Vec<Candidate> {
+    let (Some(RobotMounting::Springs { springs: mounting, .. }), [spring]) = (&robot.mounting, springs) else {
+        return Vec::new();
+    };
+    if !is_diagonal(&mounting.K_S) {
+        return Vec::new();
+    }
+    let entry = |i: usize| {
+        let unit = if i < 3 { "N/m" } else { "N m/rad" };
+        let place = vec![Place { spring: *spring, coordinate: Some(i) }];
+        stiffness(format!("mounting.stiffness[{i}]"), unit, mounting.K_S[(i, i)], place, Written::Mounting { entry: i })
+    };
+    (0..6).map(entry).collect()
+}
+
+fn is_diagonal(K: &nalgebra::Matrix6<f64>) -> bool {
+    (0..6).all(|i| (0..6).all(|j| i == j || K[(i, j)] == 0.0))
+}
+
+/// The arm as the identification takes it.
+pub(crate) fn plant(flexible: &FlexibleRobot) -> Plant {
+    Plant {
+        model: flexible.model.clone(),
+        springs: flexible.springs.clone(),
+        tool: flexible.tcp.clone(),
+        coupling: flexible.gears.coupling.clone(),
+    }
+}
+
+/// Whether a pattern asks for a parameter to be fitted.
+pub(crate) fn asks_for(pattern: &str, name: &str) -> bool {
+    let by_name = match name {
+        _ if is_direction(name) => pattern.contains(DIRECTIONS),
+        _ if is_entry(name) => pattern.contains("]["),
+        _ if is_tool(name) => pattern.starts_with("tcp"),
+        _ => true,
+    };
+    by_name && fits(pattern, name)
+}
+
+/// Whether it is an entry of a link's matrix.
+pub(crate) fn is_entry(name: &str) -> bool {
+    name.starts_with("link.") && name.contains("][")
+}
+
+/// Whether it is the place or the attitude of the tool.
+pub(crate) fn is_tool(name: &str) -> bool {
+    name.starts_with("tcp.")
+}
+
+/// Whether it is a damping: of a gearbox, one of its dampers, of a link.
+pub(crate) fn is_damping(name: &str) -> bool {
+    name.split('[').next().is_some_and(|name| name.ends_with(".damping"))
+}
+
+/// One of a gearbox's dampers by the name of all of them.
+fn all_dampers(name: &str) -> Option<&str> {
+    let whole = name.split('[').next()?;
+    (whole.ends_with(".gearbox.damping") && whole != name).then_some(whole)
+}
+
+/// An entry of a matrix by the name of its mirror image.
+fn mirrored(name: &str) -> Option<String> {
+    let (head, indices) = name.strip_suffix(']')?.split_once(".stiffness[")?;
+    let (row, column) = indices.split_once("][")?;
+    Some(format!("{head}.stiffness[{column}][{row}]"))
+}
+
+/// Whether it is one direction of a link's springs.
+pub(crate) fn is_direction(name: &str) -> bool {
+    name.starts_with("link.") && name.contains(DIRECTIONS)
+}
+
+/// Whether a name, that of the mirrored entry, or that of all dampers of a gearbox, fits a pattern in which * stands for anything.
+pub(crate) fn fits(pattern: &str, name: &str) -> bool {
+    matches(pattern, name)
+        || mirrored(name).is_some_and(|name| matches(pattern, &name))
+        || all_dampers(name).is_some_and(|name| matches(pattern, name))
+}
+
+fn matches(pattern: &str, name: &str) -> bool {
+    match pattern.split_once('*') {
+        None => pattern == name,
+        Some((before, after)) => {
+            let Some(rest) = name.strip_prefix(before) else { return false };
+            rest.char_indices().map(|(k, _)| &rest[k..]).chain([""]).any(|rest| matches(after, rest))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{asks_for, fits};
+
+    #[test]
+    fn an_entry_has_two_names_and_is_asked_for_by_its_indices_alone() {
+        let name = "link.arm.stiffness[1][5]";
+        assert!(fits("link.arm.stiffness[5][1]", name) && asks_for("link.*.stiffness[*][*]", name));
+        assert!(!asks_for("*", name) && !asks_for("link.*stiffness*", name));
+        assert!(asks_for("tcp.*", "tcp.rx") && !asks_for("*", "tcp.x"));
+    }
+
+    #[test]
+    fn a_star_stands_for_anything_in_a_name() {
+        assert!(fits("drive.*.gearbox.stiffness", "drive.joint_2.gearbox.stiffness"));
+        assert!(fits("*", "payload.mass") && fits("link.*", "link.a.stiffness_factor"));
+        assert!(!fits("drive.*", "payload.mass") && !fits("payload", "payload.mass"));
+        assert!(fits("*stiffness*", "drive.a.gearbox.stiffness[2]"));
+    }
+}

@@ -1,0 +1,421 @@
+//! Poses and loads that are worth measuring on a robot, and the files to fill in.
+
+use std::path::{Path, PathBuf};
+
+use flexarm_files::{NumberTable, check_free, write_all};
+use crate::estimation::{
+    Candidate, Component, LoadCase, Parameter, Plan, PlanOptions, Plant, Reading, ReadingKind, Row, plan,
+};
+use flexarm_kinematics::Wrench;
+use flexarm_settings::written::csv_field;
+use nalgebra::Vector3;
+use serde::Serialize;
+
+use super::parameters;
+use super::{IdentifyFileError, joints_of};
+use flexarm_run::Arm;
+use flexarm_run::Caveat;
+use flexarm_run::caveat::Use;
+use flexarm_run::caveat::warnings;
+use flexarm_run::Error;
+use flexarm_run::Modelling;
+use flexarm_run::Robot;
+
+/// Poses among which a plan chooses, unless they are given.
+const CANDIDATES: usize = 400;
+/// Joints without limits turn as far as this to each side (rad), and slide (m).
+const WITHOUT_LIMITS: f64 = std::f64::consts::PI;
+/// Part of each joint's range that is used.
+const RANGE: f64 = 0.9;
+
+/// What is asked of [`plan_measurements`].
+#[derive(Clone, Debug)]
+pub struct PlanRequest {
+    /// How links and drives are modelled.
+    pub modelling: Modelling,
+    /// Names of what is to be found, * for anything; all stiffnesses without.
+    pub fit: Vec<String>,
+    /// How many readings.
+    pub count: usize,
+    /// Forces on the tool among which the plan chooses, world axes (N).
+    pub forces: Vec<[f64; 3]>,
+    /// Points of the tool at which a force may act, tool axes (m); the TCP where it is empty. About an axis through the point nothing turns.
+    pub levers: Vec<[f64; 3]>,
+    /// Points of the tool that may be watched, tool axes (m); the TCP where it is empty.
+    pub points: Vec<[f64; 3]>,
+    /// Directions along which a gauge may stand, world axes; all three numbers of the displacement are read where it is empty.
+    pub directions: Vec<[f64; 3]>,
+    /// Deviation of a measured displacement (m).
+    pub std_m: f64,
+    /// A table of poses (a column per joint) among which is chosen: those that are reachable and free; rad or m.
+    pub poses: Option<PathBuf>,
+    /// A table of poses where the work will be done: the plan makes the tool's error there sure under the first force.
+    pub work: Option<PathBuf>,
+    /// Folder of the files to fill in; nothing is written without it.
+    pub output: Option<PathBuf>,
+    /// Overwrite what is there.
+    pub overwrite: bool,
+}
+
+impl PlanRequest {
+    /// So many readings under 500 N down and to both sides, measured to 0.03 mm.
+    pub fn new(count: usize) -> Self {
+        let forces = vec![[0.0, 0.0, -500.0], [500.0, 0.0, 0.0], [0.0, 500.0, 0.0]];
+        Self {
+            modelling: Modelling::default(),
+            fit: Vec::new(),
+            count,
+            forces,
+            levers: Vec::new(),
+            points: Vec::new(),
+            directions: Vec::new(),
+            std_m: 3e-5,
+            poses: None,
+            work: None,
+            output: None,
+            overwrite: false,
+        }
+    }
+}
+
+/// Answer of `flexarm identify --plan N`.
+#[derive(Clone, Debug, Serialize)]
+pub struct MeasurementPlan {
+    /// The robot.
+    pub robot: String,
+    /// Joints, in the order of the poses.
+    pub joints: Vec<String>,
+    /// What to measure, the most telling first.
+    pub poses: Vec<PlannedReading>,
+    /// What to expect of each parameter.
+    pub parameters: Vec<ExpectedParameter>,
+    /// Deviation of the tool's displacement where the work is done, largest over these poses and axes (m); null without them.
+    pub work_std_m: Option<f64>,
+    /// How much more the plan tells than the same number of the candidates as they come: half the logarithm of the ratio of the
+    /// determinants, over the number of parameters; 0.69 is half the deviation.
+    pub gain_over_first: f64,
+    /// How many poses were candidates.
+    pub candidates: usize,
+    /// The files to fill in.
+    pub file: Option<String>,
+    /// The table among them.
+    pub table: Option<String>,
+    /// What is doubtful of the robot, as `check` says it.
+    pub caveats: Vec<Caveat>,
+    /// The sentences of those that warn.
+    pub warnings: Vec<String>,
+}
+
+/// A pose and a load.
+#[derive(Clone, Debug, Serialize)]
+pub struct PlannedReading {
+    /// Joints (rad or m).
+    pub joints: Vec<f64>,
+    /// Force on the tool, world axes (N).
+    pub force: [f64; 3],
+    /// Where it acts, tool axes (m).
+    pub at: [f64; 3],
+    /// What is watched, tool axes (m).
+    pub point: [f64; 3],
+    /// Direction of the gauge, world axes; null where all three numbers are read.
+    pub direction: Option<[f64; 3]>,
+    /// Displacement of the point to expect with the robot file as it is (m).
+    pub expected_m: [f64; 3],
+}
+
+/// What may be done at a pose.
+#[derive(Clone, Copy, Debug)]
+struct Setup {
+    /// World axes (N).
+    force: [f64; 3],
+    /// Tool axes (m).
+    at: [f64; 3],
+    /// Tool axes (m).
+    point: [f64; 3],
+    /// Of unit length, world axes.
+    direction: Option<[f64; 3]>,
+}
+
+impl PlanRequest {
+    /// Every force at every lever, each point seen along every direction.
+    fn setups(&self) -> Vec<Setup> {
+        let or_tcp = |points: &[[f64; 3]]| if points.is_empty() { vec![[0.0; 3]] } else { points.to_vec() };
+        let unit = |d: &[f64; 3]| Some(Vector3::from(*d).normalize().into());
+        let directions =
+            if self.directions.is_empty() { vec![None] } else { self.directions.iter().map(unit).collect() };
+        let mut all = Vec::new();
+        for at in or_tcp(&self.levers) {
+            for point in or_tcp(&self.points) {
+                for direction in &directions {
+                    let of = |force: &[f64; 3]| Setup { force: *force, at, point, direction: *direction };
+                    all.extend(self.forces.iter().map(of));
+                }
+            }
+        }
+        all
+    }
+
+    /// What makes no plan, as a sentence.
+    fn fault(&self) -> Option<String> {
+        if self.count == 0 || self.forces.is_empty() || !(self.std_m > 0.0 && self.std_m.is_finite()) {
+            return Some("a plan needs at least one reading, one force and a positive deviation".into());
+        }
+        for (what, rows) in
+            [("force", &self.forces), ("lever", &self.levers), ("point", &self.points), ("direction", &self.directions)]
+        {
+            if let Some(bad) = rows.iter().flatten().find(|x| !x.is_finite()) {
+                return Some(format!("a {what} has the entry {bad}, expected finite numbers"));
+            }
+        }
+        if let Some(force) = self.forces.iter().find(|force| Vector3::from(**force).norm() < 1e-9) {
+            return Some(format!(
+                "the force {force:?} is zero: nothing moves under it; give some of its numbers a size (N)"
+            ));
+        }
+        let none = self.directions.iter().find(|d| Vector3::from(**d).norm() < 1e-9);
+        none.map(|d| format!("the direction {d:?} of a gauge has no length"))
+    }
+}
+
+/// What to expect of a parameter.
+#[derive(Clone, Debug, Serialize)]
+pub struct ExpectedParameter {
+    /// Its name.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// Now.
+    pub initial: f64,
+    /// Standard deviation after the measurement.
+    pub std: f64,
+}
+
+/// Chooses poses and loads at which displacements of the tool tell the robot's parameters best.
+///
+/// # Errors
+/// [`Error::File`] for a table that has no such poses, [`Error::Identify`] where there is nothing to find, [`Error::Taken`],
+/// [`Error::Write`].
+pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<MeasurementPlan, Error> {
+    let arm = robot.flexible(request.modelling)?;
+    let (joints, slides): (Vec<String>, Vec<bool>) = joints_of(&arm).into_iter().unzip();
+    if let Some(text) = request.fault() {
+        return Err(IdentifyFileError::Fit(text).into());
+    }
+    if arm.flexible().springs.is_empty() {
+        return Err(IdentifyFileError::NothingGives.into());
+    }
+    let targets =
+        request.output.as_ref().map(|folder| [folder.join("measurements.toml"), folder.join("displacements.csv")]);
+    if let Some(targets) = &targets {
+        check_free(targets, request.overwrite)?;
+    }
+    let fitted = super::chosen(&arm, &nothing_measured(), &request.fit)?;
+    let fitted: Vec<_> = fitted.into_iter().map(|candidate: parameters::Candidate| candidate.parameter).collect();
+    let poses = match &request.poses {
+        Some(path) => poses_of(path, &joints)?,
+        None => spread_poses(&arm),
+    };
+    let setups = request.setups();
+    let reading = |q: &Vec<f64>, setup: &Setup| displacement(q, setup, request.std_m);
+    let candidates: Vec<Candidate> =
+        poses.iter().flat_map(|q| setups.iter().map(move |setup| Candidate(reading(q, setup)))).collect();
+    let purpose: Vec<Reading> = match &request.work {
+        Some(path) => {
+            let work = Setup { force: request.forces[0], at: [0.0; 3], point: [0.0; 3], direction: None };
+            poses_of(path, &joints)?.iter().map(|q| reading(q, &work)).collect()
+        }
+        None => Vec::new(),
+    };
+    let plant = arm.plant();
+    let options = PlanOptions { count: request.count, purpose, repeat: false };
+    let failed = |error: crate::estimation::NoAnswer| IdentifyFileError::Fit(error.to_string());
+    let best = plan(&plant, &fitted, &candidates, &options).map_err(failed)?;
+    if best.chosen.len() < request.count {
+        let text = format!("only {} of {} readings are possible at these poses", best.chosen.len(), request.count);
+        return Err(IdentifyFileError::Fit(text).into());
+    }
+    let first = plan(&plant, &fitted, &candidates[..request.count.min(candidates.len())], &options).map_err(failed)?;
+    let caveats = arm.told(Use::Any);
+    let mut answer = MeasurementPlan {
+        warnings: warnings(&caveats),
+        caveats,
+        robot: robot.name.clone(),
+        poses: planned(&plant, &candidates, &best, &setups)?,
+        joints,
+        parameters: fitted.iter().zip(&best.deviations).map(expected).collect(),
+        work_std_m: best.purpose.iter().copied().reduce(f64::max),
+        gain_over_first: 0.5 * (best.gain - first.gain) / fitted.len() as f64,
+        candidates: poses.len(),
+        file: None,
+        table: None,
+    };
+    if let Some([file, table]) = targets {
+        let texts = [(file.clone(), job(&answer, request)), (table.clone(), to_fill_in(&answer, request, &slides))];
+        write_all(&texts)?;
+        (answer.file, answer.table) = (Some(file.display().to_string()), Some(table.display().to_string()));
+    }
+    Ok(answer)
+}
+
+fn expected((parameter, std): (&Parameter, &f64)) -> ExpectedParameter {
+    ExpectedParameter {
+        name: parameter.name.clone(),
+        unit: parameter.unit.clone(),
+        initial: parameter.initial,
+        std: parameter.deviation(0.0, *std),
+    }
+}
+
+fn nothing_measured() -> super::MeasurementInput {
+    super::MeasurementInput {
+        measurements: crate::estimation::Measurements::default(),
+        recordings: Vec::new(),
+        instruments: Vec::new(),
+        targets: Vec::new(),
+        fit: Vec::new(),
+        keep: Vec::new(),
+        uncertainty: None,
+        known: Vec::new(),
+        loss: crate::estimation::Loss::Square,
+        deviations_known: true,
+        length: "m",
+        angle_rad: 1.0,
+        length_m: 1.0,
+    }
+}
+
+fn displacement(q: &[f64], setup: &Setup, std: f64) -> Reading {
+    let wrench = Wrench::new(Vector3::from(setup.force), Vector3::zeros());
+    let all = [Vector3::x(), Vector3::y(), Vector3::z()];
+    let axes = setup.direction.map_or_else(|| all.to_vec(), |direction| vec![Vector3::from(direction)]);
+    let kind = ReadingKind::Displacement {
+        before: LoadCase::none(),
+        after: LoadCase { wrench, at: Vector3::from(setup.at), ..LoadCase::none() },
+        point: Vector3::from(setup.point),
+        rows: axes.into_iter().map(|d| Row { of: Component::Along(d), value: 0.0, std }).collect(),
+    };
+    Reading { name: format!("pose {q:?}"), q: q.to_vec(), kind }
+}
+
+/// Poses spread over the joint ranges: Halton's points.
+fn spread_poses(arm: &Arm) -> Vec<Vec<f64>> {
+    const PRIMES: [u32; 16] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53];
+    let model = &arm.flexible().model;
+    let ranges: Vec<(f64, f64)> = model.coordinates()[..model.n_actuated()]
+        .iter()
+        .map(|c| {
+            let bound = |x: f64, other: f64| if x.is_finite() { x } else { other };
+            let (a, b) = (bound(c.limits.lower, -WITHOUT_LIMITS), bound(c.limits.upper, WITHOUT_LIMITS));
+            let (middle, half) = (0.5 * (a + b), 0.5 * RANGE * (b - a));
+            (middle - half, middle + half)
+        })
+        .collect();
+    let radical = |mut k: u32, base: u32| {
+        let (mut value, mut part) = (0.0, 1.0 / f64::from(base));
+        while k > 0 {
+            value += part * f64::from(k % base);
+            k /= base;
+            part /= f64::from(base);
+        }
+        value
+    };
+    let pose = |k: u32| {
+        let each = ranges.iter().enumerate().map(|(j, (a, b))| a + (b - a) * radical(k + 20, PRIMES[j % PRIMES.len()]));
+        each.collect()
+    };
+    (1..=CANDIDATES as u32).map(pose).collect()
+}
+
+/// Poses of a table with a column per joint.
+fn poses_of(path: &Path, joints: &[String]) -> Result<Vec<Vec<f64>>, Error> {
+    let table = NumberTable::read(path)?;
+    let fail = |what: String| Error::File { path: path.to_owned(), what };
+    let columns = joints.iter().map(|joint| {
+        table
+            .column(joint)
+            .ok_or_else(|| fail(format!("there is no column for joint {joint:?}; found {:?}", table.names)))
+    });
+    let columns = columns.collect::<Result<Vec<_>, _>>()?;
+    let row = |(number, row): (usize, &Vec<f64>)| -> Result<Vec<f64>, Error> {
+        let q: Vec<f64> = columns.iter().map(|k| row[*k]).collect();
+        match q.iter().all(|x| x.is_finite()) {
+            true => Ok(q),
+            false => Err(fail(format!("line {}: a joint has no value", table.lines[number]))),
+        }
+    };
+    let poses = table.rows.iter().enumerate().map(row).collect::<Result<Vec<_>, _>>()?;
+    if poses.is_empty() {
+        return Err(fail("the table has no poses".into()));
+    }
+    Ok(poses)
+}
+
+fn planned(
+    plant: &Plant,
+    candidates: &[Candidate],
+    best: &Plan,
+    setups: &[Setup],
+) -> Result<Vec<PlannedReading>, Error> {
+    let one = |number: &usize| {
+        let setup = setups[number % setups.len()];
+        let q = candidates[*number].0.q.clone();
+        let reading = displacement(&q, &Setup { direction: None, ..setup }, 1.0);
+        let measurements = crate::estimation::Measurements { readings: vec![reading], ..Default::default() };
+        let arm = crate::estimation::MeasuredArm { plant, parameters: &[], measurements: &measurements };
+        let moved = arm.predicted(&nalgebra::DVector::zeros(0)).map_err(|e| IdentifyFileError::Fit(e.to_string()))?;
+        let Setup { force, at, point, direction } = setup;
+        Ok(PlannedReading { joints: q, force, at, point, direction, expected_m: [moved[0], moved[1], moved[2]] })
+    };
+    best.chosen.iter().map(one).collect()
+}
+
+/// A file of measurements that names the table.
+fn job(answer: &MeasurementPlan, request: &PlanRequest) -> String {
+    let fit = match request.fit.is_empty() {
+        true => String::new(),
+        false => format!("fit = {:?}\n", request.fit),
+    };
+    let (read, how) = match request.directions.is_empty() {
+        true => ("dx, dy, dz", "world axes"),
+        false => ("d", "along ux, uy, uz, world axes"),
+    };
+    let what = if request.points.is_empty() { "the TCP" } else { "the point px, py, pz (mm, tool axes)" };
+    let lever = if request.levers.is_empty() { "" } else { ", which acts at ax, ay, az (mm, tool axes)" };
+    format!(
+        "# Measurements of {}: {} readings, planned by flexarm identify.\n\
+         # Fill in {read} of displacements.csv (mm, {how}): how far {what} moves from no load to the force{lever}.\n\
+         # Then: flexarm identify ROBOT measurements.toml\n\
+         format = 1\nlength = \"mm\"\nangle = \"deg\"\n{fit}\n[[displacement]]\nfile = \"displacements.csv\"\nstd = {}\n",
+        answer.robot,
+        answer.poses.len(),
+        1e3 * request.std_m
+    )
+}
+
+/// The table with empty cells.
+fn to_fill_in(answer: &MeasurementPlan, request: &PlanRequest, slides: &[bool]) -> String {
+    let (levers, gauges) = (!request.levers.is_empty(), !request.directions.is_empty());
+    let points = !request.points.is_empty();
+    let lever = if levers { ",ax,ay,az" } else { "" };
+    let point = if points { ",px,py,pz" } else { "" };
+    let read = if gauges { ",ux,uy,uz,d" } else { ",dx,dy,dz" };
+    let joints: Vec<String> = answer.joints.iter().map(|joint| csv_field(joint)).collect();
+    let mut out = format!("{},fx,fy,fz{lever}{point}{read}\n", joints.join(","));
+    for pose in &answer.poses {
+        let of = |(q, slides): (&f64, &bool)| format!("{:.4}", if *slides { 1e3 * q } else { q.to_degrees() });
+        let joints: Vec<String> = pose.joints.iter().zip(slides).map(of).collect();
+        let three = |[x, y, z]: [f64; 3]| format!(",{x},{y},{z}");
+        out += &format!("{}{}", joints.join(","), three(pose.force));
+        if levers {
+            out += &three(pose.at.map(|x| 1e3 * x));
+        }
+        if points {
+            out += &three(pose.point.map(|x| 1e3 * x));
+        }
+        out += &match pose.direction {
+            Some(direction) => three(direction) + ",\n",
+            None => ",,,\n".to_owned(),
+        };
+    }
+    out
+}

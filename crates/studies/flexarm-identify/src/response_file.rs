@@ -1,0 +1,406 @@
+//! Frequency responses and mode shapes in a file of measurements: points of the arm, tables and universal files, units.
+
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use flexarm_files::NumberTable;
+use crate::estimation::{Answer, Form, MeasuredResponse, MeasuredShape, Probe, Reading, ReadingKind};
+use flexarm_kinematics::{Data, Frame, Pose, forward_kinematics};
+use nalgebra::{Complex, DVector, Rotation3, Translation3, Vector3};
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::file::{Joints, LoadEntry, Reader};
+use super::uff::{UffFunction, read_functions};
+use flexarm_run::Error;
+
+/// Largest universal file that is read (bytes).
+const LARGEST: u64 = 1 << 30;
+/// Most points of one response.
+const MOST_POINTS: usize = 20_000;
+/// Acceleration of falling, of which accelerometers speak (m/s²).
+const GRAVITY: f64 = 9.80665;
+
+/// A point of the arm.
+#[derive(Debug, Deserialize, Clone)]
+#[serde(deny_unknown_fields)]
+pub(super) struct NodeEntry {
+    /// A link; the tool without.
+    link: Option<Spanned<String>>,
+    #[serde(default)]
+    xyz: [f64; 3],
+    /// Axes of its directions: world or frame.
+    axes: Option<Spanned<String>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ResponseEntry {
+    file: Spanned<PathBuf>,
+    joints: Spanned<Joints>,
+    #[serde(default)]
+    load: LoadEntry,
+    /// Nodes and directions, of tables.
+    watched: Option<Spanned<String>>,
+    watched_direction: Option<Spanned<Direction>>,
+    hit: Option<Spanned<String>>,
+    hit_direction: Option<Spanned<Direction>>,
+    unit: Option<Spanned<String>>,
+    form: Option<Spanned<String>>,
+    from: Option<Spanned<f64>>,
+    to: Option<Spanned<f64>>,
+    every: Option<Spanned<usize>>,
+    std: Option<Spanned<f64>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ShapeEntry {
+    joints: Spanned<Joints>,
+    #[serde(default)]
+    load: LoadEntry,
+    nodes: Spanned<Vec<String>>,
+    directions: Spanned<Vec<Direction>>,
+    amplitudes: Spanned<Vec<f64>>,
+    std: Option<Spanned<f64>>,
+}
+
+/// `x`, `-y`, or three numbers.
+#[derive(Debug, Deserialize, Clone)]
+#[serde(untagged, expecting = "expected \"x\", \"-y\" and so on, or a list of three numbers")]
+enum Direction {
+    Word(String),
+    Vector([f64; 3]),
+}
+
+impl Direction {
+    fn vector(&self) -> Option<Vector3<f64>> {
+        let v = match self {
+            Self::Vector(v) => Vector3::from(*v),
+            Self::Word(word) => {
+                let (sign, axis) = match word.trim().strip_prefix('-') {
+                    Some(axis) => (-1.0, axis),
+                    None => (1.0, word.trim().trim_start_matches('+')),
+                };
+                let k = ["x", "y", "z"].iter().position(|known| axis.eq_ignore_ascii_case(known))?;
+                Vector3::ith(k, sign)
+            }
+        };
+        v.try_normalize(1e-9).filter(|v| v.iter().all(|x| x.is_finite()))
+    }
+}
+
+/// What is measured in, by name: the answer, and how many SI units it is.
+const UNITS: [(&str, Answer, f64); 11] = [
+    ("m/N", Answer::Receptance, 1.0),
+    ("mm/N", Answer::Receptance, 1e-3),
+    ("um/N", Answer::Receptance, 1e-6),
+    ("m/s/N", Answer::Mobility, 1.0),
+    ("mm/s/N", Answer::Mobility, 1e-3),
+    ("m/s2/N", Answer::Accelerance, 1.0),
+    ("mm/s2/N", Answer::Accelerance, 1e-3),
+    ("g/N", Answer::Accelerance, GRAVITY),
+    ("m/s^2/N", Answer::Accelerance, 1.0),
+    ("mm/s^2/N", Answer::Accelerance, 1e-3),
+    ("mm/kN", Answer::Receptance, 1e-6),
+];
+
+/// Hz, value in SI units, and its deviation where the file has one.
+type Point = (f64, Complex<f64>, Option<f64>);
+
+/// A response before its points of the arm are known.
+struct Curve {
+    name: String,
+    watched: (Option<String>, Vector3<f64>),
+    hit: (Option<String>, Vector3<f64>),
+    answer: Answer,
+    values: Vec<Point>,
+}
+
+impl Reader<'_> {
+    /// Responses of one file at a pose.
+    pub(super) fn response(
+        &mut self,
+        nodes: &BTreeMap<String, Spanned<NodeEntry>>,
+        entry: &Spanned<ResponseEntry>,
+    ) -> Result<(), Error> {
+        let (e, span) = (entry.get_ref(), entry.span());
+        let path = self.folder.join(e.file.get_ref());
+        if !path.is_file() {
+            let message = format!("file = {:?}: there is no file {}", e.file.get_ref(), path.display());
+            return Err(self.error(e.file.span(), message));
+        }
+        let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
+        let curves = match ending.as_str() {
+            "uff" | "unv" | "ufb" | "bunv" => self.universal(&path, e)?,
+            _ => vec![self.curve(&path, e)?],
+        };
+        let form = match e.form.as_ref().map(|word| (word.get_ref().as_str(), word.span())) {
+            None | Some(("log", _)) => Form::Logarithmic,
+            Some(("complex", _)) => Form::Complex,
+            Some((other, at)) => {
+                return Err(self.error(at, format!("form = {other:?} is not known; use \"log\" or \"complex\"")));
+            }
+        };
+        let (q, load) = (self.joints(&e.joints)?, self.load(&e.load, &span)?);
+        let own = self.std(e.std.as_ref(), 1.0)?;
+        for curve in curves {
+            let kept = self.kept(&curve, e)?;
+            let columns = kept.iter().all(|(.., std)| std.is_some());
+            if e.std.is_some() && columns {
+                return Err(self
+                    .error(span.clone(), format!("{}: std stands in the table and here: leave one out", curve.name)));
+            }
+            let point = |(hz, value, std): &Point| {
+                let std = std.unwrap_or(own);
+                (TAU * hz, *value, [std, std])
+            };
+            let kind = ReadingKind::Response(MeasuredResponse {
+                load: load.clone(),
+                watched: self.probe(nodes, &curve.watched, &q, &span)?,
+                hit: self.probe(nodes, &curve.hit, &q, &span)?,
+                answer: curve.answer,
+                form,
+                points: kept.iter().map(point).collect(),
+            });
+            self.given.push(("response", e.std.is_some() || columns, span.clone()));
+            self.measurements.readings.push(Reading { name: curve.name, q: q.clone(), kind });
+        }
+        Ok(())
+    }
+
+    /// The points within the range that is asked for.
+    fn kept(&self, curve: &Curve, e: &ResponseEntry) -> Result<Vec<Point>, Error> {
+        let bound = |given: &Option<Spanned<f64>>, otherwise: f64| given.as_ref().map_or(otherwise, |x| *x.get_ref());
+        let (from, to) = (bound(&e.from, 0.0), bound(&e.to, f64::INFINITY));
+        let every = e.every.as_ref().map_or(1, |n| *n.get_ref()).max(1);
+        // At rest nothing accelerates, and a logarithm needs a size.
+        let counts = |(hz, value, _): &&Point| *hz > 0.0 && *hz >= from && *hz <= to && value.norm() > 0.0;
+        let kept: Vec<_> = curve.values.iter().filter(counts).step_by(every).copied().collect();
+        match kept.len() {
+            0 => Err(self.error(
+                e.file.span(),
+                format!("{}: no value from {from} to {to} Hz is above zero: look at from and to", curve.name),
+            )),
+            n if n > MOST_POINTS => Err(self.error(
+                e.file.span(),
+                format!("{}: {n} frequencies, at most {MOST_POINTS} are taken: use from, to and every", curve.name),
+            )),
+            _ => Ok(kept),
+        }
+    }
+
+    /// Answer and factor of a unit.
+    fn unit(&self, unit: &Spanned<String>) -> Result<(Answer, f64), Error> {
+        let found = UNITS.iter().find(|(name, ..)| name == unit.get_ref());
+        found.map(|(_, answer, factor)| (*answer, *factor)).ok_or_else(|| {
+            let names: Vec<&str> = UNITS.iter().map(|(name, ..)| *name).collect();
+            self.error(unit.span(), format!("unit = {:?} is not known; use one of {names:?}", unit.get_ref()))
+        })
+    }
+
+    /// A response from a table.
+    fn curve(&self, path: &Path, e: &ResponseEntry) -> Result<Curve, Error> {
+        let table = NumberTable::read(path)?;
+        let fail = |what: String| Error::File { path: path.to_owned(), what };
+        let known = ["hz", "re", "im", "magnitude", "phase", "std"];
+        if let Some(stray) = table.names.iter().find(|name| !known.contains(&name.as_str())) {
+            return Err(fail(format!(
+                "column {stray:?} is not known; expected hz, re and im or magnitude and phase, and std"
+            )));
+        }
+        let column = |name: &str| table.column(name);
+        let hz = column("hz").ok_or_else(|| fail("there is no column hz".into()))?;
+        let pair = match (column("re"), column("im"), column("magnitude"), column("phase")) {
+            (Some(re), Some(im), None, None) => (re, im, false),
+            (None, None, Some(size), Some(phase)) => (size, phase, true),
+            _ => return Err(fail("expected the columns re and im, or magnitude and phase".into())),
+        };
+        let Some(unit) = &e.unit else {
+            return Err(
+                self.error(e.file.span(), "a table needs unit = \"m/s2/N\" or another: what was measured per force")
+            );
+        };
+        let (answer, factor) = self.unit(unit)?;
+        let mut values = Vec::with_capacity(table.rows.len());
+        for (row, line) in table.rows.iter().zip(&table.lines) {
+            let (f, a, b) = (row[hz], row[pair.0], row[pair.1]);
+            let std = column("std").map(|k| row[k]);
+            let bad = |x: f64| !x.is_finite();
+            if bad(f) || bad(a) || bad(b) || f < 0.0 || std.is_some_and(|std| bad(std) || std <= 0.0) {
+                return Err(fail(format!("line {line}: expected numbers, hz of 0 or above and std above 0")));
+            }
+            let value = if pair.2 { Complex::from_polar(a, b * self.units.angle) } else { Complex::new(a, b) };
+            values.push((f, value * factor, std));
+        }
+        let of = |node: &Option<Spanned<String>>, direction: &Option<Spanned<Direction>>, what: &str| {
+            let Some(direction) = direction else {
+                return Err(self.error(e.file.span(), format!("a table needs {what}_direction = \"x\" or another")));
+            };
+            let vector = direction.get_ref().vector().ok_or_else(|| {
+                self.error(direction.span(), "a direction is \"x\", \"-y\" and so on, or three numbers with a length")
+            })?;
+            Ok((node.as_ref().map(|node| node.get_ref().clone()), vector))
+        };
+        Ok(Curve {
+            name: e.file.get_ref().display().to_string(),
+            watched: of(&e.watched, &e.watched_direction, "watched")?,
+            hit: of(&e.hit, &e.hit_direction, "hit")?,
+            answer,
+            values,
+        })
+    }
+
+    /// Responses of a universal file.
+    fn universal(&self, path: &Path, e: &ResponseEntry) -> Result<Vec<Curve>, Error> {
+        let fail = |what: String| Error::File { path: path.to_owned(), what };
+        let size = path.metadata().map_or(0, |there| there.len());
+        if size > LARGEST {
+            return Err(fail(format!("{size} bytes, at most {LARGEST} are read")));
+        }
+        let bytes = std::fs::read(path).map_err(|error| fail(error.to_string()))?;
+        let told = [&e.watched, &e.hit].into_iter().flatten().next();
+        if let Some(node) = told {
+            return Err(
+                self.error(node.span(), "a universal file tells nodes and directions itself: leave them out here")
+            );
+        }
+        let functions = read_functions(&bytes).map_err(&fail)?;
+        let one = |function: &UffFunction| {
+            let name = format!("{} line {}", e.file.get_ref().display(), function.line);
+            let (answer, factor) = match &e.unit {
+                Some(unit) => self.unit(unit)?,
+                None => unit_of(function).ok_or_else(|| {
+                    let what = &function.unit;
+                    self.error(
+                        e.file.span(),
+                        format!("{name}: the file does not say what was measured (label {what:?}): add unit = \"m/s2/N\" or another"),
+                    )
+                })?,
+            };
+            let direction = |code: i64| match code {
+                1..=3 => Ok(Vector3::ith(code as usize - 1, 1.0)),
+                -3..=-1 => Ok(Vector3::ith(code.unsigned_abs() as usize - 1, -1.0)),
+                _ => Err(fail(format!("line {}: direction {code}; 1 to 3 and -1 to -3 are x, y, z", function.line))),
+            };
+            let place = |(node, code): (i64, i64)| Ok::<_, Error>((Some(node.to_string()), direction(code)?));
+            Ok(Curve {
+                name,
+                watched: place(function.response)?,
+                hit: place(function.reference)?,
+                answer,
+                values: function.values.iter().map(|(hz, value)| (*hz, value * factor, None)).collect(),
+            })
+        };
+        functions.iter().map(one).collect()
+    }
+
+    /// A mode's shape.
+    pub(super) fn shape(
+        &mut self,
+        nodes: &BTreeMap<String, Spanned<NodeEntry>>,
+        number: usize,
+        entry: &Spanned<ShapeEntry>,
+    ) -> Result<(), Error> {
+        let (e, span) = (entry.get_ref(), entry.span());
+        let (names, directions, amplitudes) = (e.nodes.get_ref(), e.directions.get_ref(), e.amplitudes.get_ref());
+        if names.len() != directions.len() || names.len() != amplitudes.len() || names.len() < 2 {
+            let (a, b, c) = (names.len(), directions.len(), amplitudes.len());
+            let text = format!("{a} nodes, {b} directions, {c} amplitudes: expected as many of each, two at least");
+            return Err(self.error(span, text));
+        }
+        let amplitudes = DVector::from_column_slice(amplitudes);
+        if !(amplitudes.norm().is_finite() && amplitudes.norm() > 0.0) {
+            return Err(self.error(e.amplitudes.span(), "amplitudes are finite numbers, not all zero"));
+        }
+        let q = self.joints(&e.joints)?;
+        let probe = |(name, direction): (&String, &Direction)| {
+            let vector = direction.vector().ok_or_else(|| {
+                self.error(
+                    e.directions.span(),
+                    "a direction is \"x\", \"-y\" and so on, or three numbers with a length",
+                )
+            })?;
+            self.probe(nodes, &(Some(name.clone()), vector), &q, &span)
+        };
+        let probes = names.iter().zip(directions).map(probe).collect::<Result<Vec<Probe>, Error>>()?;
+        let (std, load) = (self.std(e.std.as_ref(), 1.0)?, self.load(&e.load, &span)?);
+        let kind = ReadingKind::Shape(MeasuredShape { load, probes, amplitudes, std });
+        self.given.push(("shape", e.std.is_some(), span));
+        self.measurements.readings.push(Reading { name: format!("shape {}", number + 1), q, kind });
+        Ok(())
+    }
+
+    /// A point of the arm and a direction, world axes at the pose.
+    fn probe(
+        &self,
+        nodes: &BTreeMap<String, Spanned<NodeEntry>>,
+        (name, direction): &(Option<String>, Vector3<f64>),
+        q: &[f64],
+        span: &Range<usize>,
+    ) -> Result<Probe, Error> {
+        let flexible = self.cell.arm.flexible();
+        let tool = || flexible.tcp.clone();
+        let Some(name) = name else { return Ok(Probe { frame: tool(), direction: *direction }) };
+        let node = nodes.get(name).ok_or_else(|| {
+            let known: Vec<&String> = nodes.keys().collect();
+            self.error(
+                span.clone(),
+                format!("there is no [node.{name}]; there are {known:?}: add it with link and xyz"),
+            )
+        })?;
+        let NodeEntry { link, xyz, axes } = node.get_ref();
+        let frame = match link {
+            None => tool(),
+            Some(link) => {
+                flexible.model.frame(link.get_ref()).filter(|frame| frame.body > 0).cloned().ok_or_else(|| {
+                    let known: Vec<&str> = flexarm_run::applied_load::moving_links(&flexible.model);
+                    self.error(
+                        link.span(),
+                        format!("the robot has no moving link {:?}; it has {known:?}", link.get_ref()),
+                    )
+                })?
+            }
+        };
+        if xyz.iter().any(|x| !x.is_finite()) {
+            return Err(self.error(node.span(), "xyz takes finite numbers"));
+        }
+        let at = Translation3::from(Vector3::from(*xyz) * self.units.length);
+        let frame = Frame { X_BF: frame.X_BF * Pose::from_parts(at, Rotation3::identity()), ..frame };
+        let direction = match axes.as_ref().map(|word| (word.get_ref().as_str(), word.span())) {
+            None | Some(("world", _)) => *direction,
+            Some(("frame", _)) => {
+                let mut all = DVector::zeros(flexible.model.nv());
+                all.rows_mut(0, q.len()).copy_from_slice(q);
+                let mut data = Data::new(&flexible.model);
+                forward_kinematics(&flexible.model, &mut data, &all);
+                data.X_WF(&frame).rotation * direction
+            }
+            Some((other, at)) => {
+                return Err(self.error(at, format!("axes = {other:?} is not known; use \"world\" or \"frame\"")));
+            }
+        };
+        Ok(Probe { frame, direction })
+    }
+}
+
+/// What a function of a universal file is in: by its label, else by the file's units and its kind.
+fn unit_of(function: &UffFunction) -> Option<(Answer, f64)> {
+    let label = function.unit.replace([' ', '^'], "").to_lowercase();
+    let label = label.split("/n").next().unwrap_or_default();
+    let answer = match function.ordinate {
+        8 => Answer::Receptance,
+        11 => Answer::Mobility,
+        12 => Answer::Accelerance,
+        _ => return None,
+    };
+    let known = match (label, answer) {
+        ("m", Answer::Receptance) | ("m/s", Answer::Mobility) | ("m/s2", Answer::Accelerance) => Some(1.0),
+        ("mm", Answer::Receptance) | ("mm/s", Answer::Mobility) | ("mm/s2", Answer::Accelerance) => Some(1e-3),
+        ("g", Answer::Accelerance) => Some(GRAVITY),
+        _ => None,
+    };
+    known.or(function.per_si.map(|[length, force]| force / length)).map(|factor| (answer, factor))
+}

@@ -1,0 +1,324 @@
+//! The robot file with identified numbers in the places of the old ones; everything else stays as it was written.
+
+use std::path::Path;
+
+use crate::estimation::Found;
+use flexarm_kinematics::Pose;
+use nalgebra::{Matrix6, Rotation3, Translation3, Vector3};
+use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, TableLike, Value};
+
+use super::parameters::Written;
+
+/// The text of the robot file with other values; each with its standard deviation as a comment.
+///
+/// * `tool`: link of the tool and its pose in the link, as it was; `home`: folder of the old file, `to`: of the new one; paths in the file are rewritten if they differ.
+///
+/// # Errors
+/// A sentence about what was not found where it should be.
+pub(super) fn rewritten(
+    text: &str,
+    found: &[(Found, Written)],
+    tool: (&str, &Pose),
+    home: &Path,
+    to: &Path,
+) -> Result<String, String> {
+    let mut file: DocumentMut = text.parse().map_err(|error: toml_edit::TomlError| error.to_string())?;
+    let mut told: Vec<(String, &Found)> = Vec::new();
+    for (parameter, written) in found {
+        match written {
+            Written::Gearbox { joint, entry } => {
+                let drive = named(&mut file, "drive", "joint", joint)?;
+                let gearbox = drive.get_mut("gearbox").and_then(Item::as_table_like_mut);
+                let stiffness = gearbox.and_then(|gearbox| gearbox.get_mut("stiffness"));
+                let stiffness =
+                    stiffness.ok_or_else(|| format!("the drive of joint {joint:?} has no gearbox.stiffness"))?;
+                put_stiffness(stiffness, *entry, parameter)?;
+                told.push((format!("drive of {joint}"), parameter));
+            }
+            Written::Link { link } => {
+                let entry = named(&mut file, "flexible_link", "link", link)?;
+                entry.insert("stiffness_factor", toml_edit::value(rounded(parameter.value, parameter.std)));
+                told.push((format!("link {link}"), parameter));
+            }
+            Written::LinkDirection { link, entry: number } => {
+                let entry = named(&mut file, "flexible_link", "link", link)?;
+                if entry.get("stiffness_factors").is_none() {
+                    let ones: toml_edit::Array = [1.0; 6].into_iter().collect();
+                    entry.insert("stiffness_factors", toml_edit::value(ones));
+                }
+                let factors = entry.get_mut("stiffness_factors").and_then(Item::as_array_mut);
+                let old = factors.and_then(|factors| factors.get_mut(*number));
+                let old = old.ok_or_else(|| format!("link {link:?} has no stiffness_factors[{number}]"))?;
+                replace(old, rounded(parameter.value, parameter.std));
+                told.push((format!("link {link}"), parameter));
+            }
+            Written::GearboxDamping { joint, entry } => {
+                put_gear_damping(named(&mut file, "drive", "joint", joint)?, joint, *entry, parameter)?;
+                told.push((format!("drive of {joint}"), parameter));
+            }
+            Written::LinkDamping { link } => {
+                let entry = named(&mut file, "flexible_link", "link", link)?;
+                let damping = entry.get_mut("damping").and_then(Item::as_table_like_mut);
+                match damping.and_then(|damping| damping.iter_mut().next().map(|(_, value)| value)) {
+                    Some(value) => {
+                        let value =
+                            value.as_value_mut().ok_or_else(|| format!("the damping of link {link:?} is no number"))?;
+                        put_damping(value, parameter);
+                    }
+                    None => {
+                        let mut modal = toml_edit::InlineTable::new();
+                        modal.insert("modal", rounded(parameter.value, parameter.std).into());
+                        entry.insert("damping", toml_edit::value(modal));
+                    }
+                }
+                told.push((format!("link {link}"), parameter));
+            }
+            Written::LinkEntry { link, row, column, K } => {
+                let entry = named(&mut file, "flexible_link", "link", link)?;
+                put_entry(entry, (*row, *column), K, rounded(parameter.value, parameter.std))
+                    .ok_or_else(|| format!("the stiffness of link {link:?} is no 6x6 matrix"))?;
+                told.push((format!("link {link}"), parameter));
+            }
+            Written::Tool { .. } => told.push(("tcp".into(), parameter)),
+            Written::Mounting { entry } => {
+                let mounting = file.get_mut("mounting").and_then(Item::as_table_like_mut);
+                let stiffness = mounting.and_then(|mounting| mounting.get_mut("stiffness"));
+                put_stiffness(stiffness.ok_or("there is no mounting.stiffness")?, Some(*entry), parameter)?;
+                told.push(("mounting".into(), parameter));
+            }
+            Written::Payload => {
+                let payload = file.get_mut("payload").and_then(Item::as_table_like_mut).ok_or("there is no payload")?;
+                payload.insert("mass", toml_edit::value(rounded(parameter.value, parameter.std)));
+                told.push(("payload".into(), parameter));
+            }
+        }
+    }
+    put_tool(&mut file, found, tool)?;
+    if home != to {
+        moved_paths(&mut file, home, to);
+    }
+    Ok(comments(&told) + &file.to_string())
+}
+
+/// What was found, before the first line of the file.
+fn comments(told: &[(String, &Found)]) -> String {
+    let mut out = String::from("# Identified by flexarm identify: value, standard deviation, value before.\n");
+    for (_, p) in told {
+        let Found { name, unit, value, std, initial, .. } = p;
+        let deviation = match std.is_finite() {
+            true => format!("+- {} {unit}", rounded(*std, *std)),
+            false => format!("{unit} (the fit does not meet the readings: no deviation)"),
+        };
+        out += &format!("#   {name} = {} {deviation}, was {initial}\n", rounded(*value, *std));
+    }
+    out + "\n"
+}
+
+/// A value with two digits beyond its deviation's first.
+fn rounded(value: f64, std: f64) -> f64 {
+    if !(std > 0.0 && std.is_finite() && value.is_finite()) {
+        return value;
+    }
+    let place = std.log10().floor() as i32 - 2;
+    let text = match place {
+        0.. => {
+            let unit = 10f64.powi(place);
+            format!("{}", (value / unit).round() * unit)
+        }
+        _ => format!("{value:.*}", place.unsigned_abs() as usize),
+    };
+    text.parse().unwrap_or(value)
+}
+
+/// The entry of an array of tables with a name.
+fn named<'a>(file: &'a mut DocumentMut, list: &str, key: &str, name: &str) -> Result<&'a mut dyn TableLike, String> {
+    let missing = || format!("there is no [[{list}]] with {key} = {name:?}");
+    let is_it = |table: &dyn TableLike| table.get(key).and_then(Item::as_str) == Some(name);
+    match file.get_mut(list) {
+        Some(Item::ArrayOfTables(tables)) => tables
+            .iter_mut()
+            .find(|table| is_it(*table as &Table))
+            .map(|table| table as &mut dyn TableLike)
+            .ok_or_else(missing),
+        Some(Item::Value(Value::Array(values))) => values
+            .iter_mut()
+            .filter_map(Value::as_inline_table_mut)
+            .find(|table| is_it(*table as &toml_edit::InlineTable))
+            .map(|table| table as &mut dyn TableLike)
+            .ok_or_else(missing),
+        _ => Err(missing()),
+    }
+}
+
+fn put_stiffness(item: &mut Item, entry: Option<usize>, found: &Found) -> Result<(), String> {
+    let Some(value) = item.as_value_mut() else { return Err("gearbox.stiffness is not a number or a list".into()) };
+    let number = rounded(found.value, found.std);
+    match (value, entry) {
+        (Value::Array(list), Some(k)) => {
+            let old = list.get_mut(k).ok_or_else(|| format!("gearbox.stiffness has no entry {k}"))?;
+            replace(old, number);
+        }
+        // A full matrix: every entry by the factor.
+        (Value::Array(rows), None) => {
+            for cell in rows.iter_mut().filter_map(Value::as_array_mut).flat_map(toml_edit::Array::iter_mut) {
+                let old = cell.as_float().or_else(|| cell.as_integer().map(|n| n as f64)).unwrap_or(0.0);
+                replace(cell, old * found.value);
+            }
+        }
+        (value, _) => replace(value, number),
+    }
+    Ok(())
+}
+
+/// An entry and its mirror image in the `stiffness` of a link, which is `K` where the file has none.
+fn put_entry(link: &mut dyn TableLike, place: (usize, usize), K: &Matrix6<f64>, number: f64) -> Option<()> {
+    if link.get("stiffness").is_none() {
+        let mut rows: Array = (0..6).map(|i| (0..6).map(|j| K[(i, j)]).collect::<Array>()).collect();
+        rows.iter_mut().for_each(|row| row.decor_mut().set_prefix("\n    "));
+        rows.set_trailing_comma(true);
+        rows.set_trailing("\n");
+        link.insert("stiffness", toml_edit::value(rows));
+    }
+    let rows = link.get_mut("stiffness").and_then(Item::as_array_mut)?;
+    for (i, j) in [place, (place.1, place.0)] {
+        replace(rows.get_mut(i)?.as_array_mut()?.get_mut(j)?, number);
+    }
+    Some(())
+}
+
+/// The place of the tool, moved and turned about its own axes by what was found of it.
+fn put_tool(file: &mut DocumentMut, found: &[(Found, Written)], tool: (&str, &Pose)) -> Result<(), String> {
+    let mut shift = [0.0; 6];
+    for (parameter, written) in found {
+        if let Written::Tool { axis } = written {
+            shift[*axis] = parameter.value;
+        }
+    }
+    if shift == [0.0; 6] {
+        return Ok(());
+    }
+    let part = |first: usize| Vector3::new(shift[first], shift[first + 1], shift[first + 2]);
+    let X_LT = tool.1 * Pose::from_parts(Translation3::from(part(0)), Rotation3::new(part(3)));
+    if file.get("tcp").is_none() {
+        let link = [("link", Value::from(tool.0))].into_iter().collect::<InlineTable>();
+        file.insert("tcp", toml_edit::value(link));
+    }
+    let entry = file.get_mut("tcp").and_then(Item::as_table_like_mut).ok_or("tcp is no table")?;
+    // Tenths of micrometres and of microradians.
+    let list = |values: [f64; 3]| values.map(|x| (x * 1e7).round() / 1e7).into_iter().collect::<Array>();
+    entry.insert("xyz", toml_edit::value(list(X_LT.translation.vector.into())));
+    if part(3) != Vector3::zeros() {
+        let (roll, pitch, yaw) = X_LT.rotation.euler_angles();
+        entry.insert("rpy", toml_edit::value(list([roll, pitch, yaw])));
+    }
+    Ok(())
+}
+
+/// The damping of a gearbox, or one entry of it.
+fn put_gear_damping(drive: &mut dyn TableLike, joint: &str, entry: Option<usize>, found: &Found) -> Result<(), String> {
+    let gearbox = drive.get_mut("gearbox").and_then(Item::as_table_like_mut);
+    let damping = gearbox.and_then(|gearbox| gearbox.get_mut("damping")).and_then(Item::as_value_mut);
+    let damping = damping.ok_or_else(|| format!("the drive of joint {joint:?} has no gearbox.damping"))?;
+    match (damping, entry) {
+        (Value::Array(list), Some(k)) => {
+            let old = list.get_mut(k).ok_or_else(|| format!("gearbox.damping of {joint:?} has no entry {k}"))?;
+            replace(old, rounded(found.value, found.std));
+        }
+        (damping, _) => put_damping(damping, found),
+    }
+    Ok(())
+}
+
+/// A number by the new one; of a list every entry by how many times as large it is.
+fn put_damping(item: &mut Value, found: &Found) {
+    let factor = found.value / found.initial;
+    match item {
+        Value::Array(list) if list.len() == 1 => {
+            list.iter_mut().for_each(|cell| replace(cell, rounded(found.value, found.std)));
+        }
+        Value::Array(list) => {
+            for cell in list.iter_mut() {
+                let old = cell.as_float().or_else(|| cell.as_integer().map(|n| n as f64)).unwrap_or(0.0);
+                replace(cell, old * factor);
+            }
+        }
+        number => replace(number, rounded(found.value, found.std)),
+    }
+}
+
+/// Another number with the spaces and comments of the old one.
+fn replace(old: &mut Value, number: f64) {
+    let decor = old.decor().clone();
+    *old = Value::from(number);
+    *old.decor_mut() = decor;
+}
+
+/// Relative paths, which count from the folder of the file, from another folder.
+pub(crate) fn moved_paths(file: &mut DocumentMut, home: &Path, to: &Path) {
+    let moved = |text: &str| -> Option<String> {
+        let path = Path::new(text);
+        path.is_relative().then(|| relative(&home.join(path), to).display().to_string().replace('\\', "/"))
+    };
+    let change = |item: Option<&mut Item>| {
+        let Some(value) = item.and_then(Item::as_value_mut) else { return };
+        if let Some(new) = value.as_str().and_then(moved) {
+            let decor = value.decor().clone();
+            *value = Value::from(new);
+            *value.decor_mut() = decor;
+        }
+    };
+    change(file.get_mut("urdf"));
+    change(file.get_mut("default_trajectory"));
+    if let Some(packages) = file.get_mut("packages").and_then(Item::as_table_like_mut) {
+        packages.iter_mut().for_each(|(_, item)| change(Some(item)));
+    }
+    if let Some(Item::ArrayOfTables(links)) = file.get_mut("flexible_link") {
+        links.iter_mut().for_each(|link| change(link.get_mut("reduced")));
+    }
+}
+
+/// A path as seen from a folder.
+fn relative(path: &Path, from: &Path) -> std::path::PathBuf {
+    let real =
+        |path: &Path| path.canonicalize().unwrap_or_else(|_| std::path::absolute(path).unwrap_or_else(|_| path.into()));
+    let (path, from) = (real(path), real(from));
+    let shared = path.components().zip(from.components()).take_while(|(a, b)| a == b).count();
+    if shared == 0 {
+        return path;
+    }
+    let up = from.components().skip(shared).map(|_| std::path::Component::ParentDir);
+    up.chain(path.components().skip(shared)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(name: &str, initial: f64, value: f64, std: f64) -> Found {
+        let (name, unit) = (name.to_owned(), "N m/rad".to_owned());
+        Found { name, unit, initial, value, std, interval: [0.0, 0.0], identifiable: true }
+    }
+
+    #[test]
+    fn numbers_are_changed_in_their_places_and_nothing_else_is() {
+        let text = "format = 1 # version\nurdf = \"a.urdf\"\n\n[[drive]]\njoint = \"j1\"\nkind = \"gearbox\"\n\
+                    gearbox = { stiffness = 1.0e6, damping = 3.0 } # maker\n\n[[drive]]\njoint = \"j2\"\nkind = \"gearbox\"\n\
+                    [drive.gearbox]\nstiffness = [1.0, 2.0, 3.0] # three\n\n[[flexible_link]]\nlink = \"arm\" # bends\n";
+        let gear = |joint: &str, entry| Written::Gearbox { joint: joint.into(), entry };
+        let all = [
+            (found("a", 1e6, 1.234567e6, 2.0e3), gear("j1", None)),
+            (found("b", 2.0, 2.51234, 0.02), gear("j2", Some(1))),
+            (found("c", 1.0, 0.87654321, 0.01), Written::Link { link: "arm".into() }),
+            (found("d", 1.0, 1.2345, 0.01), Written::LinkDirection { link: "arm".into(), entry: 4 }),
+        ];
+        let here = Path::new(".");
+        let new = rewritten(text, &all, ("tool", &Pose::identity()), here, here).unwrap();
+        let (comments, body) = new.split_once("\n\n").unwrap();
+        assert!(comments.contains("a = 1234570 +- 2000 N m/rad, was 1000000"), "{comments}");
+        let expected = text
+            .replace("1.0e6", "1234570.0")
+            .replace("[1.0, 2.0, 3.0]", "[1.0, 2.5123, 3.0]")
+            .replace("link = \"arm\" # bends\n", "link = \"arm\" # bends\nstiffness_factor = 0.8765\nstiffness_factors = [1.0, 1.0, 1.0, 1.0, 1.2345, 1.0]\n");
+        assert_eq!(body, expected);
+    }
+}

@@ -1,0 +1,93 @@
+//! Measurements against the arm as it is known: modes that it does not have, units.
+
+use crate::estimation::{
+    Form, Instrument, MeasuredArm, MeasuredResponse, Measurements, Plant, Reading, ReadingKind, Target,
+};
+use flexarm_kinematics::Pose;
+use nalgebra::{DVector, Vector3};
+
+use super::error::IdentifyFileError;
+use super::file::MeasurementInput;
+use flexarm_run::Error;
+
+/// Beyond this ratio of measured to expected size the units are wrong, not the robot.
+const UNIT_RATIO: f64 = 100.0;
+
+/// Modes beyond those that the model has.
+pub(super) fn check_modes(plant: &Plant, input: &MeasurementInput) -> Result<(), Error> {
+    let modes = plant.model.n_elastic();
+    for reading in &input.measurements.readings {
+        let ReadingKind::Frequencies { rows, .. } = &reading.kind else { continue };
+        if let Some(row) = rows.iter().find(|row| row.of >= modes) {
+            let reading = reading.name.clone();
+            return Err(IdentifyFileError::NoMode { reading, mode: row.of + 1, modes }.into());
+        }
+    }
+    Ok(())
+}
+
+/// Displacements and distances against those of the robot as it is: a thousandfold is a unit.
+pub(super) fn check_units(plant: &Plant, input: &MeasurementInput) -> Result<(), Error> {
+    let of = |kind: fn(&ReadingKind) -> bool| {
+        let mut some = input.measurements.of_readings(|k| kind(&input.measurements.readings[k].kind));
+        some.instruments.iter_mut().for_each(|i| *i = Instrument::Known(Pose::identity()));
+        some.targets.iter_mut().for_each(|t| {
+            if let Target::Unknown(guess) = t {
+                *t = Target::Known(*guess);
+            }
+        });
+        some
+    };
+    let both = |some: &Measurements| -> Result<(Vec<f64>, Vec<f64>), Error> {
+        let arm = MeasuredArm { plant, parameters: &[], measurements: some };
+        let expected = arm.predicted(&DVector::zeros(0)).map_err(|e| IdentifyFileError::Fit(e.to_string()))?;
+        Ok((arm.observed(), expected))
+    };
+    let norm = |values: &[f64]| values.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let moved = of(|kind| matches!(kind, ReadingKind::Displacement { .. }));
+    let (measured, expected) = both(&moved)?;
+    told_ratio("displacements", norm(&measured), norm(&expected), input)?;
+    let (measured, expected) = both(&of(|kind| matches!(kind, ReadingKind::Place { .. })))?;
+    let spread = |values: &[f64]| {
+        let points: Vec<Vector3<f64>> = values.chunks_exact(3).map(Vector3::from_column_slice).collect();
+        let middle = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
+        points.iter().map(|p| (p - middle).norm_squared()).sum::<f64>().sqrt()
+    };
+    told_ratio("distances between places", spread(&measured), spread(&expected), input)?;
+    for reading in &input.measurements.readings {
+        let ReadingKind::Response(response) = &reading.kind else { continue };
+        let plain = MeasuredResponse { form: Form::Logarithmic, ..response.clone() };
+        let reading = Reading { kind: ReadingKind::Response(plain), ..reading.clone() };
+        let one = Measurements { readings: vec![reading.clone()], ..Measurements::default() };
+        let (measured, expected) = both(&one)?;
+        let off: f64 = measured.iter().zip(&expected).step_by(2).map(|(a, b)| a - b).sum();
+        let ratio = (off / response.points.len() as f64).exp();
+        if expected.iter().any(|x| !x.is_finite()) {
+            return Err(IdentifyFileError::Still { reading: reading.name }.into());
+        }
+        if !(1.0 / UNIT_RATIO..=UNIT_RATIO).contains(&ratio) {
+            return Err(IdentifyFileError::ResponseUnits { reading: reading.name, ratio }.into());
+        }
+    }
+    Ok(())
+}
+
+fn told_ratio(what: &'static str, measured: f64, expected: f64, input: &MeasurementInput) -> Result<(), Error> {
+    if measured == 0.0 || expected == 0.0 {
+        return Ok(());
+    }
+    let ratio = measured / expected;
+    if (1.0 / UNIT_RATIO..=UNIT_RATIO).contains(&ratio) {
+        return Ok(());
+    }
+    let units = [("m", 1.0), ("mm", 1e-3), ("um", 1e-6)];
+    let better = units.iter().find(|(_, size)| {
+        let other = ratio * size / input.length_m;
+        *size != input.length_m && (0.1..=10.0).contains(&other)
+    });
+    let help = match better {
+        Some((name, _)) => format!("with length = {name:?} they would be of the same size"),
+        None => "look at units, loads and the first guess of the stiffness".into(),
+    };
+    Err(IdentifyFileError::Units { what, ratio, length: input.length, help }.into())
+}

@@ -1,0 +1,194 @@
+//! What a map says of each pose: names, units and order of its columns, and which way is better.
+
+use flexarm_stepping::FlexibleArm;
+
+use super::MapError;
+use flexarm_chatter::CuttingTool;
+
+/// Most natural frequencies of a map.
+pub(super) const MOST_FREQUENCIES: usize = 12;
+
+/// A column of a map.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MapColumn {
+    /// Its name, which ends in its unit.
+    pub name: String,
+    /// What it says, in a few words.
+    pub meaning: String,
+    /// Whether it is an answer; else it says where the pose is.
+    pub quantity: bool,
+    /// Whether more is better, as for frequencies.
+    pub more_is_better: bool,
+}
+
+impl MapColumn {
+    /// What is to be small: the value, or less it where more is better; infinite where there is none.
+    pub(super) fn cost(&self, value: f64) -> f64 {
+        match self.more_is_better {
+            _ if !value.is_finite() => f64::INFINITY,
+            true => -value,
+            false => value,
+        }
+    }
+}
+
+/// The one that costs least, of equals the first; what costs infinitely much does not count.
+pub(super) fn cheapest(count: usize, cost: impl Fn(usize) -> f64) -> Option<usize> {
+    (0..count).filter(|&k| cost(k).is_finite()).min_by(|&a, &b| cost(a).total_cmp(&cost(b)))
+}
+
+/// The columns of a row, in order.
+#[derive(Clone, Debug)]
+pub(super) struct Layout {
+    pub(super) columns: Vec<MapColumn>,
+    pub(super) joints: usize,
+    pub(super) frequencies: usize,
+    pub(super) loaded: bool,
+    pub(super) cuts: bool,
+    /// Whether the compliance is told in full.
+    pub(super) matrix: bool,
+    /// Elastic elements: their coordinates after the joints.
+    pub(super) elements: Vec<std::ops::Range<usize>>,
+}
+
+/// Columns before the joints: place of the rigid tool, number of the place or instant, of the tool's direction, of the branch.
+pub(super) const HEAD: [(&str, &str); 6] = [
+    ("x_m", "place of the rigid arm's tool, world"),
+    ("y_m", "place of the rigid arm's tool, world"),
+    ("z_m", "place of the rigid arm's tool, world"),
+    ("place", "number of the place, x first, or of the instant"),
+    ("direction", "number of the tool's direction"),
+    ("branch", "number of the solution of the inverse kinematics"),
+];
+
+/// Which of them is the number of the place.
+pub(super) const PLACE: usize = 3;
+
+impl Layout {
+    /// * `joints`: names, and whether they slide.
+    /// * `loaded`: whether a wrench acts besides weight.
+    /// * `tool`: one that cuts.
+    /// * `matrix`: whether the compliance is told in full.
+    pub(super) fn new(
+        arm: &FlexibleArm,
+        joints: &[(String, bool)],
+        loaded: bool,
+        frequencies: usize,
+        tool: Option<&CuttingTool>,
+        matrix: bool,
+    ) -> Self {
+        let elastic = arm.n_elastic_coordinates();
+        let frequencies = frequencies.min(elastic).min(MOST_FREQUENCIES);
+        let mut columns: Vec<MapColumn> = HEAD.iter().map(|(name, meaning)| place(name, meaning)).collect();
+        columns.extend(joints.iter().map(|(joint, slides)| {
+            place(&format!("{joint}_{}", if *slides { "m" } else { "rad" }), "where the joint is")
+        }));
+        columns.extend(displacement("sag", "from the rigid tool to the flexible one under weight"));
+        if loaded {
+            columns.extend(displacement("error", "the same under weight and the load"));
+            columns.push(less("load_m", "how far the load moves the tool"));
+        }
+        for (axis, name) in ["compliance_x_m_per_n", "compliance_y_m_per_n", "compliance_z_m_per_n"].iter().enumerate()
+        {
+            columns.push(less(name, &format!("displacement along {} per force along it", ["x", "y", "z"][axis])));
+        }
+        for pair in ["xy", "xz", "yz"] {
+            let (along, by) = pair.split_at(1);
+            let meaning = format!("displacement along {along} per force along {by}, mean with the reverse");
+            columns.push(place(&format!("compliance_{pair}_m_per_n"), &meaning));
+        }
+        columns.push(less("compliance_worst_m_per_n", "largest displacement per force, over all directions"));
+        for name in ["worst_x", "worst_y", "worst_z"] {
+            columns.push(place(name, "direction of that force, world"));
+        }
+        columns.push(less("rotation_worst_rad_per_nm", "largest rotation per moment, over all directions"));
+        if matrix {
+            columns.extend(full_compliance());
+        }
+        for k in 1..=frequencies {
+            let column = less(&format!("frequency_{k}_hz"), "natural frequency under weight, undamped, drives locked");
+            columns.push(MapColumn { more_is_better: true, ..column });
+        }
+        if let Some(tool) = tool {
+            let rpm: Vec<String> = tool.rpm.iter().map(f64::to_string).collect();
+            let (rpm, most) = (rpm.join(", "), tool.deepest);
+            let meaning =
+                format!("depth of cut above which {} chatters at {rpm} 1/min; {most} where it does not", tool.name);
+            columns.push(MapColumn { more_is_better: true, ..less("depth_m", &meaning) });
+        }
+        let whole = if loaded { "error" } else { "sag" };
+        for element in &arm.elements {
+            let meaning = format!("part of it in the {whole}, along the {whole}, first order");
+            columns.push(MapColumn { quantity: true, ..place(&format!("share_{}", element.name), &meaning) });
+        }
+        let range = |first: usize, size: usize| first..first + size;
+        let elements = arm.elements.iter().map(|element| range(arm.offset(element), element.size)).collect();
+        Self { columns, joints: joints.len(), frequencies, loaded, cuts: tool.is_some(), matrix, elements }
+    }
+
+    pub(super) fn width(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// The column by which poses are compared.
+    ///
+    /// # Errors
+    /// [`MapError::Quantity`].
+    pub(super) fn compared_by(&self, name: Option<&str>) -> Result<usize, MapError> {
+        let usual = match (self.cuts, self.loaded) {
+            (true, _) => "depth_m",
+            (false, true) => "error_m",
+            (false, false) => "compliance_worst_m_per_n",
+        };
+        let wanted = name.unwrap_or(usual);
+        self.columns.iter().position(|c| c.quantity && c.name == wanted).ok_or_else(|| MapError::Quantity {
+            found: wanted.to_owned(),
+            known: self.columns.iter().filter(|c| c.quantity).map(|c| c.name.clone()).collect(),
+        })
+    }
+}
+
+fn place(name: &str, meaning: &str) -> MapColumn {
+    MapColumn { name: name.to_owned(), meaning: meaning.to_owned(), quantity: false, more_is_better: false }
+}
+
+fn less(name: &str, meaning: &str) -> MapColumn {
+    MapColumn { quantity: true, ..place(name, meaning) }
+}
+
+/// Row after row of the 6x6 compliance: displacement and rotation per force and moment.
+fn full_compliance() -> Vec<MapColumn> {
+    let moved = [("x", "m"), ("y", "m"), ("z", "m"), ("rx", "rad"), ("ry", "rad"), ("rz", "rad")];
+    let pushed = [("fx", "n"), ("fy", "n"), ("fz", "n"), ("tx", "nm"), ("ty", "nm"), ("tz", "nm")];
+    let entry = |(row, unit): (&str, &str), (column, per): (&str, &str)| {
+        let meaning = format!("entry of the 6x6 compliance: {row} of the tool per {column} on it, world axes");
+        place(&format!("c_{row}_{column}_{unit}_per_{per}"), &meaning)
+    };
+    moved.iter().flat_map(|row| pushed.iter().map(move |column| entry(*row, *column))).collect()
+}
+
+/// Components, size, and angle.
+fn displacement(what: &str, meaning: &str) -> Vec<MapColumn> {
+    let mut columns: Vec<MapColumn> =
+        ["x", "y", "z"].iter().map(|axis| place(&format!("{what}_{axis}_m"), meaning)).collect();
+    columns.push(less(&format!("{what}_m"), meaning));
+    columns.push(less(&format!("{what}_rad"), &format!("{meaning}: angle")));
+    columns
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pose_without_an_answer_is_neither_the_best_nor_the_worst() {
+        let less = less("sag_m", "");
+        let more = MapColumn { more_is_better: true, ..less.clone() };
+        let values = [f64::NAN, 3.0, -f64::NAN, 5.0, f64::INFINITY, 1.0, 5.0, f64::NEG_INFINITY, 1.0];
+        for (column, best, worst) in [(less, 5, 3), (more, 3, 5)] {
+            assert_eq!(cheapest(values.len(), |k| column.cost(values[k])), Some(best));
+            assert_eq!(cheapest(values.len(), |k| -column.cost(values[k])), Some(worst));
+            assert_eq!(cheapest(1, |k| column.cost(values[k])), None);
+        }
+    }
+}

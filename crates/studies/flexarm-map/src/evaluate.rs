@@ -1,0 +1,204 @@
+//! Poses of a map: equilibrium, compliance, frequencies and shares of each as a row of numbers.
+
+use flexarm_analysis::tcp_error;
+use flexarm_kinematics::Wrench;
+use flexarm_stepping::{Asked, OperatingPoint, PoseAnswer};
+use nalgebra::{Matrix3, Matrix6, Vector3};
+
+use super::columns::{HEAD, Layout, MOST_FREQUENCIES};
+use flexarm_run::Error;
+use flexarm_chatter::{CuttingTool, lowest_limit};
+use flexarm_run::Modelling;
+use flexarm_run::posed;
+use flexarm_run::Robot;
+
+/// Where a pose is in the map.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seat {
+    pub(super) place: usize,
+    pub(super) direction: usize,
+    pub(super) branch: usize,
+}
+
+/// What weight alone does at a pose.
+#[derive(Clone, Copy)]
+struct Weighed {
+    sag: [f64; 6],
+    hz: [f64; MOST_FREQUENCIES],
+}
+
+impl Weighed {
+    fn new(found: &PoseAnswer, layout: &Layout) -> Self {
+        let mut hz = [f64::NAN; MOST_FREQUENCIES];
+        hz[..layout.frequencies].copy_from_slice(&found.frequencies_hz[..layout.frequencies]);
+        Self { sag: tcp_error(&found.rigid_tcp_pose, &found.tcp_pose), hz }
+    }
+}
+
+/// Answers many poses at a time.
+#[derive(Clone)]
+pub(super) struct Evaluator<'a> {
+    at: OperatingPoint,
+    layout: &'a Layout,
+    wrench: Wrench,
+    cut: Option<Cut<'a>>,
+}
+
+/// A tool that cuts, on an arm.
+#[derive(Clone, Copy)]
+pub(super) struct Cut<'a> {
+    pub(super) robot: &'a Robot,
+    pub(super) modelling: &'a Modelling,
+    pub(super) tool: &'a CuttingTool,
+    pub(super) zero_order: bool,
+}
+
+impl Cut<'_> {
+    fn lowest_limit(&self, q: &[f64]) -> Result<f64, Error> {
+        lowest_limit(self.robot, self.modelling, self.tool, self.zero_order, q)
+    }
+}
+
+impl<'a> Evaluator<'a> {
+    pub(super) fn new(at: OperatingPoint, layout: &'a Layout, wrench: [f64; 6], cut: Option<Cut<'a>>) -> Self {
+        let [fx, fy, fz, tx, ty, tz] = wrench;
+        Self { at, layout, wrench: Wrench::new(Vector3::new(fx, fy, fz), Vector3::new(tx, ty, tz)), cut }
+    }
+
+    /// Whether a pose takes so long that few should be taken between two looks at whether to go on.
+    pub(super) fn is_slow(&self) -> bool {
+        self.cut.is_some()
+    }
+
+    /// Appends a row for each pose that has an answer, in order; what the others have instead goes to `failed`, in order too.
+    ///
+    /// * `poses`: actuated joints in coordinate order (rad or m), pose after pose.
+    /// * `seats`: one for each pose.
+    pub(super) fn push(&mut self, poses: &[f64], seats: &[Seat], rows: &mut Vec<f64>, mut failed: impl FnMut(Error)) {
+        let Self { at, layout, wrench, cut } = self;
+        let (joints, loaded) = (layout.joints, layout.loaded);
+        let mut push = |k: usize, weighed: &Weighed, found: &PoseAnswer| -> Result<(), Error> {
+            let q = &poses[k * joints..][..joints];
+            let depth = cut.map(|cut| cut.lowest_limit(q)).transpose()?;
+            push_row(layout, q, seats[k], weighed, found, depth, rows);
+            Ok(())
+        };
+        // Frequencies are those under weight alone, compliance and shares those under the load.
+        let under_weight = Asked { frequencies: layout.frequencies > 0, compliance: !loaded, jacobian: !loaded };
+        if !loaded {
+            return at.solve_each(poses, &Wrench::zeros(), under_weight, |k, answer| match answer {
+                Ok(found) => push(k, &Weighed::new(found, layout), found).unwrap_or_else(&mut failed),
+                Err(error) => failed(posed::failed(error)),
+            });
+        }
+        let mut weighed = Vec::with_capacity(seats.len());
+        at.solve_each(poses, &Wrench::zeros(), under_weight, |_, answer| {
+            weighed.push(answer.map(|found| Weighed::new(found, layout)));
+        });
+        let under_load = Asked { frequencies: false, compliance: true, jacobian: true };
+        let mut weighed = weighed.into_iter();
+        at.solve_each(poses, wrench, under_load, |k, answer| match (weighed.next(), answer) {
+            (Some(Ok(weighed)), Ok(found)) => push(k, &weighed, found).unwrap_or_else(&mut failed),
+            (Some(Err(error)), _) | (_, Err(error)) => failed(posed::failed(error)),
+            (None, Ok(_)) => {}
+        });
+    }
+}
+
+fn push_row(
+    layout: &Layout,
+    q: &[f64],
+    seat: Seat,
+    weighed: &Weighed,
+    found: &PoseAnswer,
+    depth: Option<f64>,
+    rows: &mut Vec<f64>,
+) {
+    rows.extend(found.rigid_tcp_pose.translation.vector.iter());
+    rows.extend([seat.place as f64, seat.direction as f64, seat.branch as f64]);
+    debug_assert_eq!(HEAD.len(), 6);
+    rows.extend(q);
+    let sag = &weighed.sag;
+    push_displacement(sag, rows);
+    let mut moved = *sag;
+    if layout.loaded {
+        moved = tcp_error(&found.rigid_tcp_pose, &found.tcp_pose);
+        push_displacement(&moved, rows);
+        rows.push(size(&[moved[0] - sag[0], moved[1] - sag[1], moved[2] - sag[2]]));
+    }
+    push_compliance(&found.compliance, rows);
+    if layout.matrix {
+        rows.extend(found.compliance.transpose().iter());
+    }
+    rows.extend(&weighed.hz[..layout.frequencies]);
+    rows.extend(depth);
+    push_shares(layout, &moved, found, rows);
+}
+
+/// Part of each element in the displacement of the tool: `J_e δ_e` along it, over its size.
+fn push_shares(layout: &Layout, moved: &[f64; 6], found: &PoseAnswer, rows: &mut Vec<f64>) {
+    let d = Vector3::new(moved[0], moved[1], moved[2]);
+    let whole = d.norm_squared();
+    let (J, e) = (&found.jacobian, &found.deflections);
+    for range in &layout.elements {
+        let mut along = 0.0;
+        for k in range.clone() {
+            along += J.column(k).fixed_rows::<3>(0).dot(&d) * e[k];
+        }
+        rows.push(if whole > 0.0 { along / whole } else { f64::NAN });
+    }
+}
+
+fn size(v: &[f64]) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+fn push_displacement(moved: &[f64; 6], rows: &mut Vec<f64>) {
+    rows.extend(&moved[..3]);
+    rows.push(size(&moved[..3]));
+    rows.push(size(&moved[3..]));
+}
+
+fn push_compliance(C: &Matrix6<f64>, rows: &mut Vec<f64>) {
+    rows.extend([C[(0, 0)], C[(1, 1)], C[(2, 2)]]);
+    rows.extend([(0, 1), (0, 2), (1, 2)].map(|(i, j)| 0.5 * (C[(i, j)] + C[(j, i)])));
+    let (worst, direction) = largest_gain(&C.fixed_view::<3, 3>(0, 0).into_owned());
+    rows.push(worst);
+    rows.extend(direction.iter());
+    rows.push(largest_gain(&C.fixed_view::<3, 3>(3, 3).into_owned()).0);
+}
+
+/// Largest singular value of a matrix and the direction that it belongs to; its largest component is positive.
+fn largest_gain(C: &Matrix3<f64>) -> (f64, Vector3<f64>) {
+    // Compliances are 1e-9 or so: their squares lose nothing once they are scaled.
+    let scale = C.amax();
+    if !(scale.is_finite() && scale > 0.0) {
+        return (if scale == 0.0 { 0.0 } else { f64::NAN }, Vector3::zeros());
+    }
+    let S = C / scale;
+    let eigen = (S.transpose() * S).symmetric_eigen();
+    let (k, square) = eigen.eigenvalues.argmax();
+    let v = eigen.eigenvectors.column(k).into_owned();
+    let v = v * v[v.iamax()].signum();
+    (scale * square.max(0.0).sqrt(), v)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Rotation3, matrix};
+
+    /// Truth: `C = R diag(3, 1, 2) Rᵀ` has the largest gain 3 along the first column of R; of `u vᵀ` it is `|u| |v|` along v.
+    #[test]
+    fn the_worst_direction_is_that_of_the_largest_singular_value() {
+        let R = Rotation3::from_euler_angles(0.3, -1.1, 2.0).into_inner();
+        let (gain, v) = largest_gain(&(R * Matrix3::from_diagonal(&Vector3::new(3e-7, 1e-7, 2e-7)) * R.transpose()));
+        assert!((gain / 3e-7 - 1.0).abs() < 1e-14, "{gain}");
+        assert!(v.cross(&R.column(0)).norm() < 1e-13);
+        let (u, w) = (matrix![1.0; -2.0; 0.5], matrix![0.2; 0.1; -0.7]);
+        let (gain, v) = largest_gain(&(u * w.transpose()));
+        assert!((gain / (u.norm() * w.norm()) - 1.0).abs() < 1e-14);
+        assert!(v.cross(&w.normalize()).norm() < 1e-13 && v[v.iamax()] > 0.0);
+        assert_eq!(largest_gain(&Matrix3::zeros()).0, 0.0);
+    }
+}

@@ -1,0 +1,577 @@
+//! Maps of the workspace: sag, compliance, frequencies and error under load at any number of poses.
+//!
+//! [`map()`] goes through places of the tool, joint values or a motion ([`MapRegion`]) and returns a [`Map`]: figures, the best
+//! and the worst pose, and every pose as a row of a [`MapTable`].
+//!
+//! ```no_run
+//! use flexarm::Robot;
+//! use flexarm::map::{JointRange, MapRegion, MapRequest, map};
+//!
+//! let robot = Robot::load("robots/kr210")?;
+//! let joint = |joint: &str, range| JointRange { joint: joint.into(), range, points: 50 };
+//! let region = MapRegion::Joints(vec![joint("joint_2", [-1.8, 0.0]), joint("joint_3", [0.0, 2.0])]);
+//! let found = map(&robot, &MapRequest { region, ..MapRequest::default() }, &mut |_, _| std::ops::ControlFlow::Continue(()))?;
+//! println!("softest with the joints at {:?}", found.worst.q);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! At each pose the answers are those of [`flexarm_run::statics()`] and [`flexarm_run::modes()`], to the last bit. Drives are locked.
+//! Collisions are not looked for.
+
+mod columns;
+mod error;
+mod evaluate;
+mod files;
+mod finder;
+mod iso_surface;
+mod page;
+mod placement;
+mod poses;
+mod recording;
+mod region;
+mod table;
+mod take;
+
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::time::Instant;
+
+use flexarm_kinematics::{Data, Model, forward_kinematics};
+use flexarm_settings::Quantity;
+use nalgebra::DVector;
+use serde::Serialize;
+
+pub use columns::MapColumn;
+pub use error::MapError;
+pub use placement::Placement;
+pub use poses::read_poses;
+pub use recording::{quantity_text, readable as readable_quantity};
+pub use region::{Grid, JointRange, MOST_PLACES, MapRegion, ToolDirections, WorkspaceGrid};
+pub use table::{MapPose, MapTable, QUANTILES, Spread};
+
+use self::columns::Layout;
+use self::evaluate::{Cut, Evaluator};
+use self::finder::Finder;
+use self::region::{MOST_QUERIES, round_number};
+use self::take::{Choice, Places, PoseOf, Taken, take};
+use flexarm_run::Arm;
+use flexarm_run::caveat::motion::of_wrench;
+use flexarm_run::caveat::size::Size;
+use flexarm_run::caveat;
+use flexarm_run::Caveat;
+use flexarm_run::caveat::Use;
+use flexarm_run::Error;
+use flexarm_run::ValueError;
+use flexarm_run::inspect::joint_values;
+use flexarm_chatter::{CuttingTool, lowest_limit};
+use flexarm_run::Modelling;
+use flexarm_run::posed::check_wrench;
+use flexarm_run::Robot;
+use flexarm_run::robot::tcp_frame;
+use flexarm_run::Scenario;
+
+/// Poses that are tried to find out how far the arm reaches.
+const REACH_POSES: usize = 20_000;
+/// Places along the longest edge of a box whose spacing is not told; fewer for arms whose inverse kinematics is a search.
+const USUAL_PLACES: f64 = 32.0;
+const FEW_PLACES: f64 = 10.0;
+
+/// Which poses of a place are kept, of all directions of the tool and branches of the inverse kinematics.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum KeptPoses {
+    /// The best one.
+    #[default]
+    Best,
+    /// The worst one.
+    Worst,
+    /// All.
+    All,
+}
+
+/// What is asked of [`map()`].
+#[derive(Clone, Debug, Default)]
+pub struct MapRequest {
+    /// How links and drives are modelled.
+    pub modelling: Modelling,
+    /// Where.
+    pub region: MapRegion,
+    /// Where joints stay that the map does not move, and what branches are near to (rad or m); zero, or the nearest value within
+    /// the limits, without it.
+    pub at: Option<Vec<f64>>,
+    /// Force and moment on the tool besides weight, world axes (N, N m).
+    pub wrench: [f64; 6],
+    /// A tool that cuts, at its spindle speeds: the lowest limit of depth of each pose becomes a quantity.
+    pub tool: Option<CuttingTool>,
+    /// Limits of depth by the mean cutting force alone (zero-order solution): ten times as quick, blind to period doubling.
+    pub zero_order: bool,
+    /// How many natural frequencies; three without it.
+    pub frequencies: Option<usize>,
+    /// Which poses of a place are kept.
+    pub keep: KeptPoses,
+    /// Quantity by which poses are compared: unless told the limit of depth of a tool, or the error under the load, or the worst
+    /// compliance without either.
+    pub by: Option<String>,
+    /// Edges of a workpiece that is to be placed (m, along world axes).
+    pub workpiece_m: Option<[f64; 3]>,
+    /// Folder of the files; nothing is written without it.
+    pub output: Option<PathBuf>,
+    /// Overwrite what is there.
+    pub overwrite: bool,
+}
+
+/// Written files.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct MapFiles {
+    /// Every pose.
+    pub table: Option<String>,
+    /// The page.
+    pub page: Option<String>,
+    /// The recording for the viewer.
+    pub rrd: Option<String>,
+    /// The figures.
+    pub json: Option<String>,
+}
+
+/// Answer of `flexarm map`. SI units, world axes, at the TCP.
+#[derive(Clone, Debug, Serialize)]
+pub struct Map {
+    /// Name of the robot.
+    pub robot: String,
+    /// Link that carries the TCP.
+    pub tcp: String,
+    /// Joints in coordinate order.
+    pub joints: Vec<String>,
+    /// Places, or poses in joints, that were asked for.
+    pub points: usize,
+    /// Those of them with at least one pose within the limits that carries its weight.
+    pub reachable: usize,
+    /// Poses that were answered; more than places where several directions or branches count.
+    pub poses: usize,
+    /// Poses without an equilibrium.
+    pub failed: usize,
+    /// The grid, of a map over places.
+    pub grid: Option<GridFigures>,
+    /// Force (N) and moment (N m) on the TCP, besides weight.
+    pub wrench: [f64; 6],
+    /// Quantity by which best and worst are meant.
+    pub by: String,
+    /// How each quantity is spread over the rows.
+    pub quantities: BTreeMap<String, Spread>,
+    /// The worst pose.
+    pub worst: MapPose,
+    /// The best pose.
+    pub best: MapPose,
+    /// Where the workpiece is best put; null without one, or if none of its places fits.
+    pub placement: Option<Placement>,
+    /// How long it took (s).
+    pub wall_s: f64,
+    /// The table of all poses.
+    pub file: Option<String>,
+    /// Written files.
+    pub files: MapFiles,
+    /// What the caveats warn of, as sentences.
+    pub warnings: Vec<String>,
+    /// What is probably wrong with the input, or limits the worth of the result.
+    pub caveats: Vec<Caveat>,
+    /// Every pose.
+    #[serde(skip)]
+    pub table: MapTable,
+}
+
+impl Map {
+    /// Number of the place of the best pose.
+    fn best_place(&self) -> usize {
+        let place = columns::HEAD.iter().position(|(name, _)| *name == "place").unwrap_or_default();
+        self.table.row(self.best.row)[place] as usize
+    }
+
+    /// A quantity per place of the grid, of the pose that a person would choose there; NaN where the tool does not come.
+    fn by_place(&self, column: usize, grid: &Grid) -> Vec<f64> {
+        let place = columns::HEAD.iter().position(|(name, _)| *name == "place").unwrap_or_default();
+        let by = self.table.columns.iter().position(|column| column.name == self.by).unwrap_or(column);
+        let mut chosen = vec![(f64::INFINITY, f64::NAN); grid.places()];
+        for k in 0..self.table.rows() {
+            let row = self.table.row(k);
+            let (slot, cost) = (&mut chosen[row[place] as usize], self.table.cost(by, row[by]));
+            if cost < slot.0 {
+                *slot = (cost, row[column]);
+            }
+        }
+        chosen.into_iter().map(|(_, value)| value).collect()
+    }
+}
+
+/// The grid of a map.
+#[derive(Clone, Debug, Serialize)]
+pub struct GridFigures {
+    /// First place (m).
+    pub lower_m: [f64; 3],
+    /// Last place (m).
+    pub upper_m: [f64; 3],
+    /// Distance of places (m).
+    pub spacing_m: f64,
+    /// Number of places along x, y and z.
+    pub count: [usize; 3],
+    /// Directions of the tool at each.
+    pub directions: usize,
+}
+
+/// Takes a map.
+///
+/// `go_on` is shown how many of how many places are done, and may break off.
+///
+/// # Errors
+/// [`Error::Map`] for what cannot be mapped, [`Error::Pose`] for joint values that do not fit, [`Error::Step`] for springs that
+/// hold nothing, [`Error::File`] and [`Error::Write`] for files.
+pub fn map(
+    robot: &Robot,
+    request: &MapRequest,
+    go_on: &mut dyn FnMut(f64, f64) -> ControlFlow<()>,
+) -> Result<Map, Error> {
+    let begun = Instant::now();
+    let paths = request.output.as_deref().map(|folder| files::places(folder, request.overwrite)).transpose()?;
+    check_wrench(&request.wrench)?;
+    let arm = robot.flexible(request.modelling)?;
+    let at = arm.operating_point()?;
+    let model = &*arm.flexible().rigid;
+    let actuated = &model.coordinates()[..model.n_actuated()];
+    let joints: Vec<(String, bool)> = actuated.iter().map(|c| (c.joint.clone(), c.kind == "prismatic")).collect();
+    let loaded = request.wrench != [0.0; 6];
+    let (frequencies, listed) = (request.frequencies.unwrap_or(3), matches!(request.region, MapRegion::Poses(_)));
+    let layout = Layout::new(at.arm(), &joints, loaded, frequencies, request.tool.as_ref(), listed);
+    let by = layout.compared_by(request.by.as_deref())?;
+    let near = home(model, request.at.as_deref())?;
+    if let Some(tool) = &request.tool
+        && let Err(error @ Error::Lobes(_)) = lowest_limit(robot, &request.modelling, tool, request.zero_order, &near)
+    {
+        // What is wrong with tool or robot is so everywhere.
+        return Err(error);
+    }
+    let cut = request.tool.as_ref().map(|tool| Cut {
+        robot,
+        modelling: &request.modelling,
+        tool,
+        zero_order: request.zero_order,
+    });
+    let evaluator = Evaluator::new(at, &layout, request.wrench, cut);
+    let choice = Choice { layout: &layout, keep: request.keep, by };
+
+    let rotations = match &request.region {
+        MapRegion::Workspace(workspace) => workspace.tool.rotations()?,
+        _ => Vec::new(),
+    };
+    let (places, caveats) = region_of(request, model, &near, &rotations)?;
+    let mut taken = take(&places.as_places(&rotations), &evaluator, &choice, go_on)?;
+    let grid = places.grid();
+    let table = MapTable { columns: layout.columns.clone(), values: std::mem::take(&mut taken.rows) };
+    let mut found = summed_up(robot, &arm, request, table, &taken, by, grid.as_ref(), rotations.len())?;
+    found.caveats.extend(caveats);
+    found.caveats.extend(one_place(&found));
+    found.caveats.extend(request.tool.iter().flat_map(flexarm_chatter::of_tool));
+    found.caveats.extend(caveat::validity::outside_limits(actuated, &near).filter(|_| request.at.is_some()));
+    found.caveats.extend(validity(robot, request, &found));
+    found.warnings = caveat::warnings(&found.caveats);
+    found.wall_s = begun.elapsed().as_secs_f64();
+    if let Some(paths) = paths {
+        files::save(&mut found, &paths, robot, request, &arm, grid.as_ref())?;
+    }
+    Ok(found)
+}
+
+/// What a region comes to.
+enum Region<'m> {
+    Grid(Grid, Box<Finder<'m>>, f64),
+    Poses(usize, Box<PoseOf<'m>>),
+}
+
+impl<'m> Region<'m> {
+    fn as_places<'a>(&'a self, rotations: &'a [nalgebra::Rotation3<f64>]) -> Places<'a>
+    where
+        'm: 'a,
+    {
+        match self {
+            Self::Grid(grid, finder, keep_out_m) => {
+                Places::Grid { grid: *grid, rotations, finder, keep_out_m: *keep_out_m }
+            }
+            Self::Poses(count, values) => Places::Joints { count: *count, values: &**values },
+        }
+    }
+
+    fn grid(&self) -> Option<Grid> {
+        match self {
+            Self::Grid(grid, ..) => Some(*grid),
+            Self::Poses(..) => None,
+        }
+    }
+}
+
+/// Checks the region and says what there is to go through.
+fn region_of<'m>(
+    request: &'m MapRequest,
+    model: &'m Model,
+    near: &[f64],
+    rotations: &[nalgebra::Rotation3<f64>],
+) -> Result<(Region<'m>, Vec<Caveat>), Error> {
+    if let Some(edges) = request.workpiece_m {
+        if !edges.iter().all(|edge| edge.is_finite() && *edge >= 0.0) {
+            return Err(MapError::Workpiece { found: edges }.into());
+        }
+        if !matches!(request.region, MapRegion::Workspace(_)) {
+            return Err(MapError::WorkpieceWithoutGrid.into());
+        }
+    }
+    match &request.region {
+        MapRegion::Workspace(workspace) => {
+            let found = workspace.keep_out_m;
+            if !(found.is_finite() && found >= 0.0) {
+                return Err(MapError::KeepOut { found }.into());
+            }
+            let mut finder = Finder::new(model, tcp_frame(model), near.to_vec());
+            let joints = finder.joints();
+            if joints < 6 {
+                return Err(MapError::TooFewJoints { joints }.into());
+            }
+            let mut caveats = Vec::new();
+            if !finder.is_closed() {
+                let message = "the arm has no inverse kinematics in closed form: poses are found by search, which takes long \
+                               and may miss branches, and places at the border";
+                caveats.push(Caveat::said("searched-poses", "map", message, "map it over joint values"));
+            }
+            let bounds = workspace.bounds.unwrap_or_else(|| reach(model));
+            let edge = (0..3).map(|c| bounds[1][c] - bounds[0][c]).fold(0.0, f64::max);
+            let usual = if finder.is_closed() && rotations.len() < 10 { USUAL_PLACES } else { FEW_PLACES };
+            let spacing = workspace.spacing_m.unwrap_or_else(|| round_number(edge.max(1e-3) / usual));
+            let grid = Grid::within(bounds, spacing)?;
+            let queries = grid.places() as f64 * rotations.len() as f64;
+            if queries > MOST_QUERIES {
+                return Err(MapError::TooManyDirections { found: queries, most: MOST_QUERIES }.into());
+            }
+            Ok((Region::Grid(grid, Box::new(finder), workspace.keep_out_m), caveats))
+        }
+        MapRegion::Joints(ranges) => joint_region(ranges, model, near),
+        MapRegion::Poses(poses) => poses::region(poses, model),
+        MapRegion::Along { motion, points } => {
+            if !(1..=MOST_PLACES).contains(points) {
+                return Err(MapError::Instants.into());
+            }
+            let (n, trajectory, points) = (near.len(), &motion.trajectory, *points);
+            let end = trajectory.duration();
+            let values = move |k: usize, q: &mut Vec<f64>| {
+                let t = if points == 1 { 0.0 } else { end * k as f64 / (points - 1) as f64 };
+                q.resize(n, 0.0);
+                let (mut v, mut a) = (vec![0.0; n], vec![0.0; n]);
+                trajectory.sample(t, q, &mut v, &mut a);
+            };
+            Ok((Region::Poses(points, Box::new(values)), Vec::new()))
+        }
+    }
+}
+
+/// The product of joint values, the first joint quickest.
+fn joint_region<'m>(ranges: &'m [JointRange], model: &Model, near: &[f64]) -> Result<(Region<'m>, Vec<Caveat>), Error> {
+    let actuated = &model.coordinates()[..model.n_actuated()];
+    if ranges.is_empty() {
+        return Err(MapError::NoJoints.into());
+    }
+    let (mut numbers, mut caveats, mut poses) = (Vec::new(), Vec::new(), 1.0);
+    for range in ranges {
+        let JointRange { joint, range: [first, last], points } = range;
+        let k = actuated.iter().position(|c| c.joint == *joint).ok_or_else(|| MapError::Joint {
+            found: joint.clone(),
+            known: actuated.iter().map(|c| c.joint.clone()).collect(),
+        })?;
+        if numbers.contains(&k) {
+            return Err(MapError::JointTwice(joint.clone()).into());
+        }
+        if !first.is_finite() || !last.is_finite() || *points == 0 {
+            return Err(MapError::JointRange { joint: joint.clone(), range: range.range, points: *points }.into());
+        }
+        Quantity::JOINT.check_all(&format!("joint {joint:?}"), &range.range).map_err(ValueError::from)?;
+        let limits = actuated[k].limits;
+        if first.min(*last) < limits.lower || first.max(*last) > limits.upper {
+            let (lower, upper) = (limits.lower, limits.upper);
+            let message = format!("the map takes joint {joint:?} beyond its limits {lower} to {upper}");
+            caveats.push(Caveat::said("outside-limits", joint, message, "take less of the joint"));
+        }
+        numbers.push(k);
+        poses *= *points as f64;
+    }
+    if poses > MOST_PLACES as f64 {
+        return Err(MapError::TooMany { places: poses, most: MOST_PLACES }.into());
+    }
+    let near = near.to_vec();
+    let values = move |pose: usize, q: &mut Vec<f64>| {
+        q.extend_from_slice(&near);
+        let mut rest = pose;
+        for (&k, range) in numbers.iter().zip(ranges) {
+            q[k] = range.value(rest % range.points);
+            rest /= range.points;
+        }
+    };
+    Ok((Region::Poses(poses as usize, Box::new(values)), caveats))
+}
+
+/// Where joints are that are not told: as given, or zero within their limits.
+fn home(model: &Model, at: Option<&[f64]>) -> Result<Vec<f64>, Error> {
+    let actuated = &model.coordinates()[..model.n_actuated()];
+    let names: Vec<&str> = actuated.iter().map(|c| c.joint.as_str()).collect();
+    if at.is_some() {
+        return joint_values(at, &names);
+    }
+    Ok(actuated.iter().map(|c| 0.0_f64.max(c.limits.lower).min(c.limits.upper)).collect())
+}
+
+/// Box around the places that the tool reaches with its joints within their limits, with some room: of many poses.
+fn reach(model: &Model) -> [[f64; 3]; 2] {
+    const PRIMES: [f64; 10] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0];
+    let tool = tcp_frame(model);
+    let actuated = &model.coordinates()[..model.n_actuated()];
+    let range = |k: usize| {
+        let limits = actuated[k].limits;
+        let (lower, upper) = (limits.lower.max(-std::f64::consts::PI), limits.upper.min(std::f64::consts::PI));
+        if lower < upper { (lower, upper) } else { (limits.lower, limits.upper) }
+    };
+    let (mut data, mut q) = (Data::new(model), DVector::zeros(model.nv()));
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for pose in 0..REACH_POSES {
+        for k in 0..actuated.len() {
+            let (lower, upper) = range(k);
+            // Kronecker's sequence by roots of primes.
+            q[k] = lower
+                + (upper - lower) * (0.5 + PRIMES[k % PRIMES.len()].sqrt() * (pose * (1 + k / 10)) as f64).fract();
+        }
+        forward_kinematics(model, &mut data, &q);
+        let place = data.X_WF(&tool).translation.vector;
+        for c in 0..3 {
+            low[c] = low[c].min(place[c]);
+            high[c] = high[c].max(place[c]);
+        }
+    }
+    let room = [0, 1, 2].map(|c| 0.02 * (high[c] - low[c]));
+    [[0, 1, 2].map(|c| low[c] - room[c]), [0, 1, 2].map(|c| high[c] + room[c])]
+}
+
+/// Figures of the rows.
+#[allow(clippy::too_many_arguments, reason = "called once, to keep the caller short")]
+fn summed_up(
+    robot: &Robot,
+    arm: &Arm,
+    request: &MapRequest,
+    table: MapTable,
+    taken: &Taken,
+    by: usize,
+    grid: Option<&Grid>,
+    directions: usize,
+) -> Result<Map, Error> {
+    let points = grid.map_or(taken.poses, Grid::places);
+    let Some((best, worst)) = table.extremes(by) else {
+        return Err(match (&request.region, &taken.first_failure) {
+            _ if table.rows() > 0 => MapError::NothingToCompare { by: table.columns[by].name.clone() },
+            (_, Some(first)) => MapError::NoEquilibrium { poses: taken.poses, first: first.clone() },
+            (MapRegion::Workspace(w), None) => MapError::OutOfReach { places: points, axis: w.tool.axis },
+            (_, None) => MapError::Instants,
+        }
+        .into());
+    };
+    let joints: Vec<String> = arm.joints().map(str::to_owned).collect();
+    let mut caveats = match &request.region {
+        MapRegion::Along { motion, .. } => arm.told(Use::Along(&Scenario::new((**motion).clone()))),
+        _ => arm.told(Use::Any),
+    };
+    caveats.extend(of_wrench(&request.wrench, &Size::of(&robot.rigid)));
+    if let Some(first) = &taken.first_failure {
+        let message = format!(
+            "{} of {} poses have no equilibrium and are left out; at the first: {first}",
+            taken.failed, taken.poses
+        );
+        caveats.push(Caveat::said("no-equilibrium", "map", message, "look at one of them with statics"));
+    }
+    let mut placement = None;
+    if let (Some(edges), Some(grid)) = (request.workpiece_m, grid) {
+        placement = placement::best_box(grid, &cost_by_place(&table, grid, by), edges).map(|mut found| {
+            if table.columns[by].more_is_better {
+                found.worst = -found.worst;
+            }
+            found
+        });
+        if placement.is_none() {
+            let message =
+                format!("no place of the grid holds the workpiece of {edges:?} m with every place in it within reach");
+            caveats.push(Caveat::said(
+                "no-placement",
+                "map",
+                message,
+                "take a smaller workpiece or more directions of the tool",
+            ));
+        }
+    }
+    Ok(Map {
+        robot: robot.name.clone(),
+        tcp: robot.tcp.0.clone(),
+        points,
+        reachable: taken.reachable,
+        poses: taken.poses - taken.failed,
+        failed: taken.failed,
+        grid: grid.map(|grid| GridFigures {
+            lower_m: grid.lower,
+            upper_m: grid.place(grid.places() - 1),
+            spacing_m: grid.spacing_m,
+            count: grid.count,
+            directions,
+        }),
+        wrench: request.wrench,
+        by: table.columns[by].name.clone(),
+        quantities: table.spreads().into_iter().collect(),
+        worst: MapPose::of(&table, worst, joints.len(), by),
+        best: MapPose::of(&table, best, joints.len(), by),
+        placement,
+        joints,
+        wall_s: 0.0,
+        file: None,
+        files: MapFiles::default(),
+        warnings: Vec::new(),
+        caveats,
+        table,
+    })
+}
+
+/// What each place costs: of its poses the best one, as a person would choose it; the worst one if that is kept.
+fn cost_by_place(table: &MapTable, grid: &Grid, by: usize) -> Vec<f64> {
+    let place = columns::HEAD.iter().position(|(name, _)| *name == "place").unwrap_or_default();
+    let mut cost = vec![f64::INFINITY; grid.places()];
+    for k in 0..table.rows() {
+        let row = table.row(k);
+        let slot = &mut cost[row[place] as usize];
+        *slot = slot.min(table.cost(by, row[by]));
+    }
+    cost
+}
+
+/// A map of one place compares nothing.
+fn one_place(found: &Map) -> Option<Caveat> {
+    let message = match (found.reachable, found.points) {
+        (1, 1) => "the map has one place: its best and its worst pose say nothing of the workspace".to_owned(),
+        (1, points) => {
+            format!("the tool reaches one place of {points}: best and worst pose say nothing of the workspace")
+        }
+        _ => return None,
+    };
+    let help =
+        "take more places: a larger box, a smaller spacing or more values of the joints; statics answers one pose";
+    Some(Caveat::said("one-place", "map", message, help))
+}
+
+/// What is doubtful about the worst pose: the elements there are bent most.
+fn validity(robot: &Robot, request: &MapRequest, found: &Map) -> Vec<Caveat> {
+    let Ok(worst) = flexarm_run::statics(robot, &request.modelling, Some(&found.worst.q), request.wrench) else {
+        return Vec::new();
+    };
+    let known = &found.caveats;
+    let new = worst.caveats.into_iter().filter(|caveat| !known.contains(caveat));
+    new.map(|mut caveat| {
+        caveat.message = format!("at the worst pose: {}", caveat.message);
+        caveat
+    })
+    .collect()
+}

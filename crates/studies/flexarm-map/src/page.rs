@@ -1,0 +1,178 @@
+//! The page of a map: slices, histograms, the best and the worst pose, the best place of a workpiece; one file without scripts.
+
+use std::fmt::Write as _;
+
+use flexarm_draw::FieldPlot;
+use flexarm_draw::charts::histogram;
+
+use super::recording::{quantity_text, readable, scale, shown};
+use super::region::Grid;
+use super::{Map, MapPose};
+use flexarm_run::html_page::opening;
+use flexarm_settings::written::markup;
+
+/// Bars of a histogram.
+const BARS: usize = 40;
+
+/// The page.
+pub(super) fn html(map: &Map, grid: Option<&Grid>) -> String {
+    let mut page = opening(&format!("Map of {}", map.robot), "body { max-width: 78rem }\n");
+    let _ = writeln!(page, "<p>{}</p>", markup(&in_short(map)));
+    for caveat in &map.caveats {
+        let _ = writeln!(page, "<p class=\"no\">{}</p>", markup(&caveat.message));
+    }
+    if let Some(placement) = &map.placement {
+        let unit = readable(&map.by).1;
+        let [low, high] = [placement.lower_m, placement.upper_m].map(|c| c.map(|x| format!("{x:.3}")).join(", "));
+        let centre = placement.centre_m.map(|x| format!("{x:.3}")).join(", ");
+        let _ = writeln!(
+            page,
+            "<h2>Where to put the workpiece</h2>\n<p>Centre at <b>{centre} m</b> (from {low} to {high} m, {} places): there {} is nowhere \
+             worse than <b>{} {unit}</b>. It is outlined in the slices.</p>",
+            placement.points,
+            markup(&map.by),
+            quantity_text(&map.by, placement.worst)
+        );
+    }
+    if let Some(grid) = grid {
+        page += "<h2>Slices through the best place</h2>\n<p class=\"note\">B is the best, W the worst place, as far as they lie in the \
+                 plane. White is not reached. The scale ends at the 98th percent of all values.</p>\n";
+        for column in shown(map) {
+            page += &slices(map, grid, column);
+        }
+    }
+    page += &quantities(map);
+    page += "<h2>Best and worst pose</h2>\n";
+    page += &poses(map);
+    page += "<h2>How values are spread</h2>\n<div class=\"row\">\n";
+    for column in shown(map) {
+        page += &spread(map, column);
+    }
+    page += "</div>\n<p class=\"note\">Drives locked, small vibrations, no collisions looked for.";
+    for (what, file) in [("Every pose", &map.files.table), ("Recording", &map.files.rrd)] {
+        if let Some(file) = file {
+            let name = file.rsplit(['/', '\\']).next().unwrap_or(file);
+            let _ = write!(page, " {what}: {}.", markup(name));
+        }
+    }
+    page + "</p>\n</body></html>\n"
+}
+
+/// What the map is, in a sentence or two.
+fn in_short(map: &Map) -> String {
+    let mut text = match &map.grid {
+        Some(grid) => format!(
+            "{} of {} places within reach, {} mm apart, with {} direction{} of the tool; {} poses.",
+            map.reachable,
+            map.points,
+            (1e3 * grid.spacing_m * 1e3).round() / 1e3,
+            grid.directions,
+            if grid.directions == 1 { "" } else { "s" },
+            map.poses
+        ),
+        None => format!("{} poses.", map.poses),
+    };
+    if map.wrench != [0.0; 6] {
+        let [fx, fy, fz, tx, ty, tz] = map.wrench;
+        let _ = write!(text, " Load on the tool: {fx}, {fy}, {fz} N and {tx}, {ty}, {tz} N m (world).");
+    }
+    text + &format!(" Best and worst by {}.", map.by)
+}
+
+fn quantities(map: &Map) -> String {
+    let mut table = "<h2>Quantities</h2>\n<table><tr><th></th><th></th><th>least</th><th>5 %</th><th>median</th><th>95 %</th><th>most</th></tr>\n"
+        .to_owned();
+    for column in map.table.columns.iter().filter(|column| column.quantity) {
+        let Some(spread) = map.quantities.get(&column.name) else { continue };
+        let unit = readable(&column.name).1;
+        let at = |part: &str| spread.quantiles.get(part).copied().unwrap_or(f64::NAN);
+        let values = [spread.min, at("0.05"), at("0.5"), at("0.95"), spread.max];
+        let _ =
+            write!(table, "<tr><td title=\"{}\">{}</td><td>{unit}</td>", markup(&column.meaning), markup(&column.name));
+        for value in values {
+            let _ = write!(table, "<td>{}</td>", quantity_text(&column.name, value));
+        }
+        table += "</tr>\n";
+    }
+    table + "</table>\n"
+}
+
+fn poses(map: &Map) -> String {
+    let mut table = "<table><tr><th></th><th>best</th><th>worst</th></tr>\n".to_owned();
+    let mut row = |name: &str, value: &dyn Fn(&MapPose) -> String| {
+        let _ = writeln!(table, "<tr><td>{name}</td><td>{}</td><td>{}</td></tr>", value(&map.best), value(&map.worst));
+    };
+    row("place (m)", &|pose| pose.place_m.map(|x| format!("{x:.3}")).join(", "));
+    for (k, joint) in map.joints.iter().enumerate() {
+        row(&markup(joint), &|pose| format!("{:.4}", pose.q[k]));
+    }
+    for column in map.table.columns.iter().filter(|column| column.quantity) {
+        let unit = readable(&column.name).1;
+        let name =
+            format!("{} {}", markup(&column.name), if unit.is_empty() { String::new() } else { format!("({unit})") });
+        let value = |pose: &MapPose| pose.quantities.get(&column.name).copied().unwrap_or(f64::NAN);
+        row(&name, &|pose| quantity_text(&column.name, value(pose)));
+    }
+    table + "</table>\n"
+}
+
+/// The three planes through the best place.
+fn slices(map: &Map, grid: &Grid, column: usize) -> String {
+    let values = map.by_place(column, grid);
+    let (factor, unit) = readable(&map.table.columns[column].name);
+    let [low, high] = scale(&values).map(|x| factor * x);
+    let centre = grid.index(map.best_place());
+    let mut row = format!("<h3>{}</h3>\n<div class=\"row\">\n", markup(&map.table.columns[column].name));
+    for (across, along, up) in [(1, 0, 2), (0, 1, 2), (2, 0, 1)] {
+        let at = grid.place(map.best_place())[across];
+        let axis = ["x", "y", "z"];
+        let title = format!("{} = {at:.3} m", axis[across]);
+        let count = [grid.count[along], grid.count[up]];
+        let mut plane = Vec::with_capacity(count[0] * count[1]);
+        for j in 0..count[1] {
+            for i in 0..count[0] {
+                let mut index = centre;
+                (index[along], index[up]) = (i, j);
+                plane.push(factor * values[index[0] + grid.count[0] * (index[1] + grid.count[1] * index[2])]);
+            }
+        }
+        let range = |c: usize| [grid.lower[c], grid.lower[c] + grid.spacing_m * (grid.count[c] - 1) as f64];
+        let within = |place: &[f64; 3]| (place[across] - at).abs() < 0.5 * grid.spacing_m;
+        let marked = [(&map.best.place_m, "B"), (&map.worst.place_m, "W")];
+        let marks: Vec<([f64; 2], &str)> = marked
+            .iter()
+            .filter(|(place, _)| within(place))
+            .map(|(place, letter)| ([place[along], place[up]], *letter))
+            .collect();
+        let outlines: Vec<[[f64; 2]; 2]> = map
+            .placement
+            .iter()
+            .filter(|p| p.lower_m[across] <= at + 1e-9 && at - 1e-9 <= p.upper_m[across])
+            .map(|p| [[p.lower_m[along], p.lower_m[up]], [p.upper_m[along], p.upper_m[up]]])
+            .collect();
+        let labels = [format!("{} (m)", axis[along]), format!("{} (m)", axis[up])];
+        row += &FieldPlot {
+            title: &title,
+            labels: [&labels[0], &labels[1]],
+            ranges: [range(along), range(up)],
+            count,
+            values: &plane,
+            value_label: unit,
+            scale: Some([low, high]),
+            equal: true,
+            outlines: &outlines,
+            marks: &marks,
+            names: None,
+        }
+        .svg();
+    }
+    row + "</div>\n"
+}
+
+/// How many poses have which value.
+fn spread(map: &Map, column: usize) -> String {
+    let name = &map.table.columns[column].name;
+    let (factor, unit) = readable(name);
+    let values: Vec<f64> = map.table.at(column).into_iter().map(|x| factor * x).collect();
+    histogram(&format!("{name} ({unit})"), &values, BARS)
+}

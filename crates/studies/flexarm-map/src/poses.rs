@@ -1,0 +1,152 @@
+//! Poses of a map that are listed in a file.
+
+use std::path::Path;
+
+use flexarm_files::{NumberTable, read_text};
+use flexarm_kinematics::Model;
+use flexarm_settings::Quantity;
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::region::MOST_PLACES;
+use super::{MapError, Region};
+use flexarm_run::Caveat;
+use flexarm_run::Error;
+use flexarm_run::inspect::joint_values;
+use flexarm_run::Robot;
+use flexarm_run::robot_file::Source;
+use flexarm_run::toml_file::parsed;
+
+/// A list of poses as written.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PosesFile {
+    format: Spanned<i64>,
+    /// rad or deg.
+    angles: Option<Spanned<String>>,
+    /// Names of the columns; all actuated joints in coordinate order without it.
+    joints: Option<Spanned<Vec<String>>>,
+    poses: Vec<Spanned<Vec<f64>>>,
+}
+
+/// Reads poses from a file: all actuated joints in coordinate order (rad or m), pose after pose.
+///
+/// A table has a column for each joint, of its name, or with the unit at the end (`_rad`, `_m`, `_deg`). A `.toml` file has
+/// `format = 1`, `poses = [[...], ...]`, and may have `joints = [...]` and `angles = "deg"`.
+///
+/// * `at`: where joints stay that the file does not name; zero without it.
+///
+/// # Errors
+/// [`Error::RobotFile`] or [`Error::File`] with the place of what is wrong.
+pub fn read_poses(path: impl AsRef<Path>, robot: &Robot, at: Option<&[f64]>) -> Result<Vec<Vec<f64>>, Error> {
+    let (path, model) = (path.as_ref(), robot.rigid_model()?);
+    let actuated = &model.coordinates()[..model.n_actuated()];
+    let joints: Vec<(&str, bool)> = actuated.iter().map(|c| (c.joint.as_str(), c.kind == "prismatic")).collect();
+    let names: Vec<&str> = joints.iter().map(|(name, _)| *name).collect();
+    let home = joint_values(at, &names)?;
+    let list = List { joints: &joints, home };
+    match path.extension().is_some_and(|end| end == "toml") {
+        true => list.of_toml(path),
+        false => list.of_table(path),
+    }
+}
+
+/// What a list needs of the robot.
+struct List<'a> {
+    /// Names, and whether they slide.
+    joints: &'a [(&'a str, bool)],
+    home: Vec<f64>,
+}
+
+impl List<'_> {
+    fn of_table(&self, path: &Path) -> Result<Vec<Vec<f64>>, Error> {
+        let fail = |what: String| Error::File { path: path.to_owned(), what };
+        let table = NumberTable::read(path)?;
+        let columns = table.names.iter().map(|name| self.column(name)).collect::<Result<Vec<_>, _>>().map_err(fail)?;
+        let pose = |(row, line): (&Vec<f64>, &usize)| {
+            self.pose(row, &columns).map_err(|what| fail(format!("line {line}: {what}")))
+        };
+        self.some(table.rows.iter().zip(&table.lines).map(pose).collect::<Result<_, _>>()?).map_err(fail)
+    }
+
+    fn of_toml(&self, path: &Path) -> Result<Vec<Vec<f64>>, Error> {
+        let text = read_text(path)?;
+        let source = Source::new(path, &text, "map");
+        let file: PosesFile = parsed(&text, &source, &[], |file: &PosesFile| &file.format)?;
+        let degrees = match file.angles.as_ref().map(|word| (word.get_ref().as_str(), word.span())) {
+            None | Some(("rad", _)) => false,
+            Some(("deg", _)) => true,
+            Some((other, span)) => {
+                let message = format!("angles = {other:?} is not known; use \"rad\" or \"deg\"");
+                return Err(source.error(span, message).into());
+            }
+        };
+        let mut columns = match &file.joints {
+            None => (0..self.joints.len()).map(|k| (k, 1.0)).collect(),
+            Some(names) => {
+                let columns = names.get_ref().iter().map(|name| self.column(name)).collect::<Result<Vec<_>, _>>();
+                columns.map_err(|what| source.error(names.span(), what))?
+            }
+        };
+        for (_, factor) in columns.iter_mut().filter(|(k, _)| degrees && !self.joints[*k].1) {
+            *factor = 1.0_f64.to_radians();
+        }
+        let pose =
+            |row: &Spanned<Vec<f64>>| self.pose(row.get_ref(), &columns).map_err(|what| source.error(row.span(), what));
+        let poses = file.poses.iter().map(pose).collect::<Result<_, _>>()?;
+        self.some(poses).map_err(|what| Error::File { path: path.to_owned(), what })
+    }
+
+    /// Number of the joint of a column, and its unit in rad or m.
+    fn column(&self, name: &str) -> Result<(usize, f64), String> {
+        let joint = |(k, (joint, slides)): (usize, &(&str, bool))| match (name.strip_prefix(joint)?, slides) {
+            ("", _) | ("_rad", false) | ("_m", true) => Some((k, 1.0)),
+            ("_deg", false) => Some((k, 1.0_f64.to_radians())),
+            _ => None,
+        };
+        self.joints.iter().enumerate().find_map(joint).ok_or_else(|| {
+            let known: Vec<&str> = self.joints.iter().map(|(name, _)| *name).collect();
+            format!("column {name:?} is no joint of the robot; its joints are {known:?}, with _deg after the name for degrees")
+        })
+    }
+
+    fn pose(&self, row: &[f64], columns: &[(usize, f64)]) -> Result<Vec<f64>, String> {
+        if row.len() != columns.len() {
+            return Err(format!("a pose has {} values, expected {}", row.len(), columns.len()));
+        }
+        let mut pose = self.home.clone();
+        for (value, (k, unit)) in row.iter().zip(columns) {
+            let name = format!("joint {:?}", self.joints[*k].0);
+            pose[*k] = Quantity::JOINT.check(&name, unit * value).map_err(|outside| outside.to_string())?;
+        }
+        Ok(pose)
+    }
+
+    fn some(&self, poses: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, String> {
+        if poses.is_empty() { Err("there is no pose: expected a row of joint values".into()) } else { Ok(poses) }
+    }
+}
+
+/// Checks the poses and says what there is to go through.
+pub(super) fn region<'m>(poses: &'m [Vec<f64>], model: &Model) -> Result<(Region<'m>, Vec<Caveat>), Error> {
+    let actuated = &model.coordinates()[..model.n_actuated()];
+    let names: Vec<&str> = actuated.iter().map(|c| c.joint.as_str()).collect();
+    if !(1..=MOST_PLACES).contains(&poses.len()) {
+        return Err(MapError::Poses { found: poses.len() }.into());
+    }
+    let mut caveats = Vec::new();
+    for (k, c) in actuated.iter().enumerate() {
+        let outside = |pose: &&Vec<f64>| pose.get(k).is_some_and(|q| *q < c.limits.lower || *q > c.limits.upper);
+        let count = poses.iter().filter(outside).count();
+        if count > 0 {
+            let (lower, upper) = (c.limits.lower, c.limits.upper);
+            let message = format!("{count} poses take joint {:?} beyond its limits {lower} to {upper}", c.joint);
+            caveats.push(Caveat::said("outside-limits", &c.joint, message, "check the units of the list"));
+        }
+    }
+    for pose in poses {
+        joint_values(Some(pose), &names)?;
+    }
+    let values = move |k: usize, q: &mut Vec<f64>| q.extend_from_slice(&poses[k]);
+    Ok((Region::Poses(poses.len(), Box::new(values)), caveats))
+}

@@ -1,0 +1,252 @@
+//! Where a map is taken: places of the tool on a grid, values of joints, or a motion; and the ways the tool may point.
+
+use flexarm_kinematics::Pose;
+use nalgebra::{Matrix3, Rotation3, Translation3, Unit, Vector3};
+
+use super::MapError;
+
+/// Most places and most rows of a map: what is held in memory, about 300 bytes each.
+pub const MOST_PLACES: usize = 5_000_000;
+/// Most places times directions: what somebody would wait for.
+pub(super) const MOST_QUERIES: f64 = 1e8;
+/// Golden angle (rad): directions of a cone lie on its spiral.
+const GOLDEN_RAD: f64 = 2.399_963_229_728_653;
+
+/// Where a map is taken.
+#[derive(Clone, Debug)]
+pub enum MapRegion {
+    /// On a grid of places of the tool, by inverse kinematics.
+    Workspace(WorkspaceGrid),
+    /// On a grid of joint values; joints that are not named stay where [`super::MapRequest::at`] says.
+    Joints(Vec<JointRange>),
+    /// At poses that are listed: all actuated joints in coordinate order (rad or m). The table has the 6x6 compliance of each.
+    Poses(Vec<Vec<f64>>),
+    /// At equal distances of time along a motion.
+    Along {
+        /// The motion.
+        motion: Box<flexarm_run::Motion>,
+        /// How many instants, both ends among them.
+        points: usize,
+    },
+}
+
+impl Default for MapRegion {
+    fn default() -> Self {
+        Self::Workspace(WorkspaceGrid::default())
+    }
+}
+
+/// A box of places in the world.
+#[derive(Clone, Debug, Default)]
+pub struct WorkspaceGrid {
+    /// Lowest and highest corner (m); all that the arm can reach without it.
+    pub bounds: Option<[[f64; 3]; 2]>,
+    /// Distance of the places (m); about a thirtieth of the longest edge without it.
+    pub spacing_m: Option<f64>,
+    /// Places nearer to the upright line (world z) through the first joint than this do not count (m): the arm itself is there.
+    pub keep_out_m: f64,
+    /// How the tool may point.
+    pub tool: ToolDirections,
+}
+
+/// Orientations of the tool that count at a place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ToolDirections {
+    /// Where the z axis of the tool points in the world, of any length.
+    pub axis: [f64; 3],
+    /// Rotation of the tool about that axis (rad): at 0 its x axis lies in the plane of that axis and world x, on the side of x.
+    pub roll_rad: f64,
+    /// Half angle of a cone about the axis within which the tool may tilt (rad).
+    pub cone_rad: f64,
+    /// Directions in the cone, the axis among them.
+    pub tilts: usize,
+    /// Rotations about the axis, evenly over a turn.
+    pub rolls: usize,
+}
+
+impl Default for ToolDirections {
+    fn default() -> Self {
+        Self { axis: [0.0, 0.0, -1.0], roll_rad: 0.0, cone_rad: 0.0, tilts: 1, rolls: 1 }
+    }
+}
+
+impl ToolDirections {
+    /// Rotations of the tool in the world: tilts, and within each the rolls.
+    ///
+    /// # Errors
+    /// [`MapError::ToolAxis`], [`MapError::Cone`].
+    pub fn rotations(&self) -> Result<Vec<Rotation3<f64>>, MapError> {
+        let axis = Unit::try_new(Vector3::from(self.axis), 1e-12).filter(|axis| axis.iter().all(|x| x.is_finite()));
+        let axis = axis.ok_or(MapError::ToolAxis { found: self.axis })?;
+        let cone = self.cone_rad;
+        if !(0.0..=std::f64::consts::PI).contains(&cone) || self.tilts == 0 || self.rolls == 0 {
+            return Err(MapError::Cone { half_angle_rad: cone, tilts: self.tilts, rolls: self.rolls });
+        }
+        if !self.roll_rad.is_finite() || self.tilts.saturating_mul(self.rolls) > 10_000 {
+            return Err(MapError::Cone { half_angle_rad: cone, tilts: self.tilts, rolls: self.rolls });
+        }
+        let straight = upright(&axis);
+        let mut rotations = Vec::new();
+        for tilt in 0..self.tilts {
+            // Evenly over the cap of the sphere, from the axis to the rim.
+            let part = if self.tilts == 1 { 0.0 } else { tilt as f64 / (self.tilts - 1) as f64 };
+            let angle = (1.0 - part * (1.0 - cone.cos())).clamp(-1.0, 1.0).acos();
+            let about = GOLDEN_RAD * tilt as f64;
+            let across = Unit::new_normalize(straight * Vector3::new(about.cos(), about.sin(), 0.0));
+            let tilted = Rotation3::from_axis_angle(&across, angle) * straight;
+            for roll in 0..self.rolls {
+                let turn = self.roll_rad + std::f64::consts::TAU * roll as f64 / self.rolls as f64;
+                rotations.push(tilted * Rotation3::from_axis_angle(&Vector3::z_axis(), turn));
+            }
+        }
+        Ok(rotations)
+    }
+}
+
+/// The rotation whose z axis is `axis` and whose x axis is as near as can be to world x.
+fn upright(axis: &Unit<Vector3<f64>>) -> Rotation3<f64> {
+    let near = if axis.x.abs() < 0.999 { Vector3::x() } else { -Vector3::z() * axis.x.signum() };
+    let x = (near - axis.into_inner() * axis.dot(&near)).normalize();
+    Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, axis.cross(&x), axis.into_inner()]))
+}
+
+/// Values of a joint.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointRange {
+    /// Its name.
+    pub joint: String,
+    /// First and last value (rad or m).
+    pub range: [f64; 2],
+    /// How many values, both ends among them; one is the middle.
+    pub points: usize,
+}
+
+impl JointRange {
+    /// Value of that number.
+    pub(super) fn value(&self, k: usize) -> f64 {
+        let [first, last] = self.range;
+        match self.points {
+            1 => 0.5 * (first + last),
+            n => first + (last - first) * k as f64 / (n - 1) as f64,
+        }
+    }
+}
+
+/// Places on a regular grid, x first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grid {
+    /// First place (m).
+    pub lower: [f64; 3],
+    /// Distance of the places (m).
+    pub spacing_m: f64,
+    /// Number of places along x, y and z.
+    pub count: [usize; 3],
+}
+
+impl Grid {
+    /// The grid within a box, in its middle.
+    ///
+    /// # Errors
+    /// [`MapError::Bounds`], [`MapError::Spacing`], [`MapError::TooMany`].
+    pub(super) fn within([lower, upper]: [[f64; 3]; 2], spacing_m: f64) -> Result<Self, MapError> {
+        let sound = (0..3).all(|c| lower[c].is_finite() && upper[c].is_finite() && lower[c] <= upper[c]);
+        if !sound {
+            return Err(MapError::Bounds { lower, upper });
+        }
+        if !(spacing_m.is_finite() && spacing_m > 0.0) {
+            return Err(MapError::Spacing { found: spacing_m });
+        }
+        // An edge that is a multiple of the spacing has both its ends.
+        let steps = [0, 1, 2].map(|c| ((upper[c] - lower[c]) / spacing_m + 1e-9).floor());
+        let places = steps.iter().map(|n| n + 1.0).product::<f64>();
+        if places > MOST_PLACES as f64 {
+            return Err(MapError::TooMany { places, most: MOST_PLACES });
+        }
+        let first = |c: usize| lower[c] + 0.5 * (upper[c] - lower[c] - steps[c] * spacing_m).max(0.0);
+        Ok(Self { lower: [first(0), first(1), first(2)], spacing_m, count: steps.map(|n| n as usize + 1) })
+    }
+
+    /// Number of places.
+    pub fn places(&self) -> usize {
+        self.count.iter().product()
+    }
+
+    /// Numbers along x, y and z of a place.
+    pub fn index(&self, place: usize) -> [usize; 3] {
+        let [nx, ny, _] = self.count;
+        [place % nx, place / nx % ny, place / (nx * ny)]
+    }
+
+    /// A place (m, world).
+    pub fn place(&self, place: usize) -> [f64; 3] {
+        let k = self.index(place);
+        [0, 1, 2].map(|c| self.lower[c] + self.spacing_m * k[c] as f64)
+    }
+}
+
+/// The pose of a tool.
+pub(super) fn pose_at(place: [f64; 3], rotation: &Rotation3<f64>) -> Pose {
+    Pose::from_parts(Translation3::from(Vector3::from(place)), *rotation)
+}
+
+/// A round number near `x`: 1, 2 or 5 times a power of ten.
+pub(super) fn round_number(x: f64) -> f64 {
+    let power = 10_f64.powf(x.log10().floor());
+    let factors = [1.0, 2.0, 5.0, 10.0].into_iter();
+    let nearest = factors.min_by(|a, b| (x / power - a).abs().total_cmp(&(x / power - b).abs()));
+    power * nearest.unwrap_or(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_grid_of_a_box_of_whole_spacings_has_both_its_ends() {
+        let grid = Grid::within([[-1.0, 0.0, 0.5], [1.0, 0.3, 0.5]], 0.1).unwrap();
+        assert_eq!(grid.count, [21, 4, 1]);
+        assert_eq!(grid.place(0), [-1.0, 0.0, 0.5]);
+        let last = grid.place(grid.places() - 1);
+        assert!((last[0] - 1.0).abs() < 1e-12 && (last[1] - 0.3).abs() < 1e-12 && last[2] == 0.5);
+        assert_eq!(grid.index(21 * 4 - 1), [20, 3, 0]);
+    }
+
+    /// Truth: the directions of a cap are even if as much of its area lies within each as its number says,
+    /// `1 - cos(angle) = part (1 - cos(cone))`.
+    #[test]
+    fn directions_of_a_cone_lie_evenly_within_it() {
+        let cone = 0.6;
+        let tool = ToolDirections { axis: [0.3, -0.2, -2.0], cone_rad: cone, tilts: 50, ..ToolDirections::default() };
+        let rotations = tool.rotations().unwrap();
+        let axis = Vector3::from(tool.axis).normalize();
+        let mut mean = Vector3::zeros();
+        for (k, R) in rotations.iter().enumerate() {
+            assert!((R.matrix() * R.matrix().transpose() - Matrix3::identity()).amax() < 1e-14);
+            assert!((R.matrix().determinant() - 1.0).abs() < 1e-14);
+            let z = R * Vector3::z();
+            let share = (1.0 - z.dot(&axis)) / (1.0 - cone.cos());
+            assert!((share - k as f64 / 49.0).abs() < 1e-12, "{share}");
+            mean += z / 50.0;
+        }
+        // The centre of a cap is at (1 + cos)/2 on its axis.
+        let centre = axis * 0.5 * (1.0 + cone.cos());
+        assert!((mean - centre).norm() < 0.02, "{}", (mean - centre).norm());
+    }
+
+    #[test]
+    fn a_tool_that_points_down_has_its_x_axis_along_world_x() {
+        let R = ToolDirections::default().rotations().unwrap()[0];
+        assert!((R * Vector3::z() + Vector3::z()).norm() < 1e-15);
+        assert!((R * Vector3::x() - Vector3::x()).norm() < 1e-15);
+        let R = ToolDirections { axis: [1.0, 0.0, 0.0], ..ToolDirections::default() }.rotations().unwrap()[0];
+        assert!((R * Vector3::z() - Vector3::x()).norm() < 1e-15);
+        assert!((R.matrix().determinant() - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn numbers_are_rounded_to_one_two_and_five() {
+        for (x, round) in [(0.093, 0.1), (0.17, 0.2), (0.04, 0.05), (3.4, 2.0), (8.0, 10.0)] {
+            assert!((round_number(x) / round - 1.0).abs() < 1e-12, "{x}: {}", round_number(x));
+        }
+    }
+}

@@ -1,0 +1,535 @@
+//! What is found out about a robot, and what is assumed, before anything is written.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use flexarm_kinematics::{Data, Joint, Link, Mechanism, Model, forward_kinematics};
+use flexarm_settings::Setting;
+use flexarm_urdf::{Geometry, ReadOptions, TriangleMesh, UrdfError, UrdfRobot, Visual, read_urdf};
+use nalgebra::{DVector, Vector3};
+
+use super::beams::{self, BeamSection};
+use super::chain::{self, Chain};
+use super::gears::{self, GearClass};
+use super::loads::{self, Cube, Workspace};
+use super::place::Placed;
+use super::report::{Assumption, assumption};
+use super::sample::{self, Axis, SampleMotion};
+use super::{NewError, NewOptions, text};
+use flexarm_run::Error;
+use flexarm_run::file_cache::FileCache;
+use flexarm_run::LoadOptions;
+use flexarm_run::Robot;
+use flexarm_run::robot_file::parse_robot_file;
+
+/// A link of the arm: its section, or why it has none.
+#[derive(Clone, Debug)]
+pub(crate) struct DraftLink {
+    pub(crate) link: String,
+    pub(crate) distal: String,
+    pub(crate) length: f64,
+    pub(crate) mass: Option<f64>,
+    pub(crate) section: Result<BeamSection, String>,
+    /// The own inertia of the link cannot be cut in two.
+    pub(crate) uniform: bool,
+    /// Its shapes are those for collisions.
+    pub(crate) of_collisions: bool,
+}
+
+/// A joint of the arm with its drive.
+#[derive(Clone, Debug)]
+pub(crate) struct DraftJoint {
+    pub(crate) joint: Joint,
+    pub(crate) speed: f64,
+    pub(crate) speed_assumed: bool,
+    /// What is wrong with its effort limit, if anything.
+    pub(crate) effort_fault: Option<&'static str>,
+    pub(crate) weight: f64,
+    pub(crate) needed: f64,
+    /// Rated torque that its reducer is taken for (N m), and the class.
+    pub(crate) rated: f64,
+    pub(crate) gear: Option<GearClass>,
+}
+
+/// All of it.
+#[derive(Clone, Debug)]
+pub(crate) struct Draft {
+    pub(crate) name: String,
+    pub(crate) urdf: UrdfRobot,
+    pub(crate) chain: Chain,
+    pub(crate) waived: Vec<String>,
+    /// Links whose masses only held a place and were estimated instead.
+    pub(crate) discarded: Vec<String>,
+    pub(crate) estimate: Option<flexarm_urdf::InertiaEstimate>,
+    /// Masses were to be estimated, but no link lacks one.
+    pub(crate) idle_estimate: bool,
+    pub(crate) moving_mass: f64,
+    /// Largest distance of the tool from the base in the poses looked at (m).
+    pub(crate) reach: f64,
+    pub(crate) payload: Cube,
+    pub(crate) payload_known: bool,
+    pub(crate) held: Vec<(String, f64, &'static str)>,
+    pub(crate) joints: Vec<DraftJoint>,
+    pub(crate) links: Vec<DraftLink>,
+    pub(crate) motion: SampleMotion,
+    pub(crate) assumptions: Vec<Assumption>,
+    /// What the maker is to be asked for.
+    pub(crate) questions: Vec<String>,
+}
+
+impl Draft {
+    pub(crate) fn of(path: &Path, options: &NewOptions) -> Result<Self, Error> {
+        if let Some(found) = options.payload_kg.filter(|kg| !(kg.is_finite() && *kg >= 0.0)) {
+            return Err(NewError::Payload { found }.into());
+        }
+        let (mut urdf, mut waived) = read(path, &options.urdf)?;
+        let placeholders = placeholders(&urdf.mechanism);
+        let mut discarded = Vec::new();
+        if options.urdf.inertia_from_mesh.is_some() && !placeholders.is_empty() {
+            discarded = placeholders;
+            let read_options = ReadOptions { discard: discarded.clone(), ..options.urdf.clone() };
+            (urdf, waived) = read(path, &read_options)?;
+        }
+        let mechanism = &urdf.mechanism;
+        let chain = chain::find(mechanism, options)?;
+        let name = if mechanism.name.trim().is_empty() { "robot".to_owned() } else { mechanism.name.clone() };
+        let model = |payload: Option<Cube>| {
+            let loaded = loads::loaded(mechanism, &chain.tool, payload);
+            Model::new(&loaded).map_err(|source| Error::Model { path: path.to_owned(), source: Box::new(source) })
+        };
+        let bare = model(None)?;
+        let moving_mass = mass_after(mechanism, &chain);
+        if moving_mass <= 0.0 {
+            let links = mechanism.links.iter().filter(|l| l.inertia.is_none_or(|i| i.mass <= 0.0)).count();
+            return Err(NewError::NoMass { links }.into());
+        }
+        let held: Vec<(String, f64, &'static str)> = chain
+            .held
+            .iter()
+            .map(|&(k, why)| {
+                let joint = &mechanism.joints[k];
+                (joint.name.clone(), 0.0f64.clamp(joint.limits.lower, joint.limits.upper), why)
+            })
+            .collect();
+        let ranges = ranges(&bare, mechanism, &chain, &held);
+        let payload_known = options.payload_kg.is_some();
+        let payload = match options.payload_kg {
+            Some(mass) => mass,
+            None => guess(&bare, &model(Some(Cube::of(1.0)))?, &ranges, moving_mass),
+        };
+        let payload = Cube::of(payload);
+        let model = model((payload.mass > 0.0).then_some(payload))?;
+        let workspace = Workspace::of(&model, &ranges);
+        let reach = reach(&model, &workspace, mechanism, &chain);
+        let floor = loads::wrist_torque(payload.mass, moving_mass, reach);
+        let joints = joints(&model, mechanism, &chain, &workspace, floor);
+        let axes: Vec<Axis> = joints.iter().filter_map(|j| axis(j, &model, &ranges)).collect();
+        let motion = sample::sample_motion(&model, &workspace, &axes);
+        let links = links(&urdf, &chain);
+        let estimated = urdf.warnings.iter().any(|w| w.code == "estimated-inertia");
+        let mut draft = Self {
+            name,
+            chain,
+            waived,
+            discarded,
+            estimate: options.urdf.inertia_from_mesh.filter(|_| estimated),
+            idle_estimate: options.urdf.inertia_from_mesh.is_some() && !estimated,
+            moving_mass,
+            reach,
+            payload,
+            payload_known,
+            held,
+            joints,
+            links,
+            motion,
+            assumptions: Vec::new(),
+            questions: Vec::new(),
+            urdf,
+        };
+        draft.assumptions = assumptions(&draft);
+        draft.questions = questions(&draft);
+        Ok(draft)
+    }
+
+    /// Links that are proposed to bend.
+    pub(crate) fn beams_with_sections(&self) -> Vec<&DraftLink> {
+        self.links.iter().filter(|link| link.section.is_ok()).collect()
+    }
+
+    /// Tries each beam in the robot file that is to be written: one whose link cannot be cut gets the mass of a uniform beam,
+    /// one that cannot be put in place at all is left out, with the reason.
+    pub(crate) fn settle(&mut self, placed: &Placed, _options: &NewOptions) -> Result<(), Error> {
+        let loads = |draft: &Self, beams: &[&DraftLink]| {
+            let text = text::robot_file(draft, placed, beams);
+            let (file, source) = parse_robot_file(&text, &placed.robot_path)?;
+            let options = LoadOptions::default();
+            let urdf_path = placed.robot_path.with_file_name(&placed.reference);
+            Robot::of_file(
+                &placed.robot_path,
+                urdf_path,
+                draft.urdf.clone(),
+                &file,
+                &source,
+                &options,
+                &FileCache::default(),
+            )
+        };
+        loads(self, &[])?;
+        for k in 0..self.links.len() {
+            if self.links[k].section.is_err() {
+                continue;
+            }
+            let Err(_) = loads(self, &[&self.links[k]]) else { continue };
+            self.links[k].uniform = true;
+            if let Err(error) = loads(self, &[&self.links[k]]) {
+                let reason = error.to_string();
+                self.links[k].section = Err(format!("it cannot be put in place: {reason}"));
+            }
+        }
+        self.assumptions = assumptions(self);
+        self.questions = questions(self);
+        Ok(())
+    }
+}
+
+/// Reads the description. Inertias that no body can have keep it from nothing: they are taken as they are, and told.
+fn read(path: &Path, options: &ReadOptions) -> Result<(UrdfRobot, Vec<String>), Error> {
+    let error = match read_urdf(path, options) {
+        Ok(urdf) => return Ok((urdf, Vec::new())),
+        Err(error) => error,
+    };
+    let UrdfError::Invalid { issues } = &error else { return Err(error.into()) };
+    let waived: Option<Vec<String>> = issues
+        .iter()
+        .map(|issue| match &issue.problem {
+            flexarm_urdf::Problem::TriangleInequality { link, .. } => Some(link.clone()),
+            _ => None,
+        })
+        .collect();
+    let Some(waived) = waived else { return Err(error.into()) };
+    let mut again = options.clone();
+    again.waive.extend(waived.iter().cloned());
+    Ok((read_urdf(path, &again)?, waived))
+}
+
+/// Part of the links with a mass that must have the same one for it to be a placeholder.
+const ALIKE: f64 = 0.7;
+
+/// Links with one mass that most links have: it holds the place of others.
+fn placeholders(mechanism: &Mechanism) -> Vec<String> {
+    let with = |link: &Link| Some((link.name.clone(), link.inertia?.mass)).filter(|(_, mass)| *mass > 0.0);
+    let with: Vec<(String, f64)> = mechanism.links.iter().filter_map(with).collect();
+    let alike = |mass: f64| with.iter().filter(move |(_, other)| (other - mass).abs() < 1e-9 * mass);
+    let Some(most) = with.iter().map(|(_, mass)| *mass).max_by_key(|mass| alike(*mass).count()) else {
+        return Vec::new();
+    };
+    let names: Vec<String> = alike(most).map(|(name, _)| name.clone()).collect();
+    let many = names.len() > 3 && names.len() as f64 >= ALIKE * with.len() as f64;
+    if many { names } else { Vec::new() }
+}
+
+/// Mass of all links that the joints of the arm carry (kg).
+fn mass_after(mechanism: &Mechanism, chain: &Chain) -> f64 {
+    let above: HashMap<&str, usize> = mechanism.joints.iter().enumerate().map(|(k, j)| (j.child.as_str(), k)).collect();
+    let is_moved = |link: &str| {
+        let mut at = link;
+        for _ in 0..=mechanism.joints.len() {
+            match above.get(at) {
+                Some(k) if chain.joints.contains(k) => return true,
+                Some(k) => at = &mechanism.joints[*k].parent,
+                None => return false,
+            }
+        }
+        false
+    };
+    mechanism.links.iter().filter(|l| is_moved(&l.name)).filter_map(|l| l.inertia).map(|i| i.mass).sum()
+}
+
+/// Where each coordinate is looked at; those that are held have one value.
+fn ranges(model: &Model, mechanism: &Mechanism, chain: &Chain, held: &[(String, f64, &'static str)]) -> Vec<[f64; 2]> {
+    let range = |name: &str| {
+        let joint = chain.joints.iter().map(|&k| &mechanism.joints[k]).find(|j| j.name == name);
+        let at = held.iter().find(|(joint, ..)| joint == name).map_or(0.0, |(_, at, _)| *at);
+        joint.map_or([at, at], loads::range)
+    };
+    model.coordinates().iter().map(|c| range(&c.joint)).collect()
+}
+
+fn guess(bare: &Model, with_one_kg: &Model, ranges: &[[f64; 2]], mass: f64) -> f64 {
+    let (without, with) = (Workspace::of(bare, ranges), Workspace::of(with_one_kg, ranges));
+    let joint = |&k: &usize| {
+        let effort = bare.coordinates()[k].limits.effort;
+        (effort, without.weight[k], with.weight[k] - without.weight[k])
+    };
+    let joints: Vec<_> = without.moved.iter().map(joint).collect();
+    loads::guessed_payload(mass, &joints)
+}
+
+/// How far the tool comes from the first joint of the arm (m).
+fn reach(model: &Model, workspace: &Workspace, mechanism: &Mechanism, chain: &Chain) -> f64 {
+    let Some(frame) = model.frame(&mechanism.joints[chain.joints[0]].child) else { return 0.0 };
+    let mut data = Data::new(model);
+    let distance = |q: &DVector<f64>, tool: &Vector3<f64>, data: &mut Data| {
+        forward_kinematics(model, data, q);
+        (tool - data.X_WF(frame).translation.vector).norm()
+    };
+    workspace.poses.iter().map(|pose| distance(&pose.q, &pose.tool, &mut data)).fold(0.0, f64::max)
+}
+
+/// * `floor`: torque that a joint of this arm has at least (N m).
+fn joints(model: &Model, mechanism: &Mechanism, chain: &Chain, workspace: &Workspace, floor: f64) -> Vec<DraftJoint> {
+    let of = |&place: &usize| {
+        let joint = &mechanism.joints[place];
+        let k = model.coordinates().iter().position(|c| c.joint == joint.name)?;
+        let (speed, speed_assumed) = sample::speed_of(joint);
+        let weight = workspace.weight[k];
+        let needed = workspace.needed(k, speed.min(4.0));
+        let effort_fault = loads::effort_fault(joint.limits.effort, weight, needed, floor);
+        let joint = joint.clone();
+        Some(DraftJoint { joint, speed, speed_assumed, effort_fault, weight, needed, rated: 0.0, gear: None })
+    };
+    let mut joints: Vec<DraftJoint> = chain.joints.iter().filter_map(of).collect();
+    // One number for all that is wrong for some was never meant.
+    let same = |j: &DraftJoint| j.joint.limits.effort == joints[0].joint.limits.effort;
+    let weak = |j: &DraftJoint| j.joint.limits.effort < j.weight;
+    if joints.len() > 2 && joints.iter().all(same) {
+        let (weak, faulty) = (joints.iter().any(weak), joints.iter().any(|j| j.effort_fault.is_some()));
+        let too_little = "is the same for all joints and below what the arm needs to hold itself";
+        let too_much = "is the same for all joints and far above what some of them can need";
+        for joint in &mut joints {
+            joint.effort_fault = match joint.effort_fault {
+                _ if weak => Some(too_little),
+                None if faulty => Some(too_much),
+                own => own,
+            };
+        }
+    }
+    for joint in &mut joints {
+        joint.rated = match joint.effort_fault {
+            None => joint.joint.limits.effort / gears::PEAK_OVER_RATED,
+            // Weight may last, speeding up does not.
+            Some(_) => (joint.needed / gears::PEAK_OVER_RATED).max(joint.weight.max(floor) / 1.5),
+        };
+        joint.gear = (!joint.joint.kind.slides() && joint.rated > 1e-6).then(|| gears::class(joint.rated));
+    }
+    joints
+}
+
+fn axis(joint: &DraftJoint, model: &Model, ranges: &[[f64; 2]]) -> Option<Axis> {
+    let k = model.coordinates().iter().position(|c| c.joint == joint.joint.name)?;
+    let full = ranges[k];
+    // What is not crossed within some seconds is not crossed.
+    let (middle, half) =
+        (0.5 * (full[0] + full[1]), (0.5 * (full[1] - full[0])).min(sample::LONGEST_WAY * joint.speed));
+    Some(Axis {
+        k,
+        slides: joint.joint.kind.slides(),
+        full,
+        range: [middle - half, middle + half],
+        speed: joint.speed,
+        effort: if joint.effort_fault.is_some() { f64::INFINITY } else { joint.joint.limits.effort },
+    })
+}
+
+/// All links between the first moving joint and the tool, with their sections.
+fn links(urdf: &UrdfRobot, chain: &Chain) -> Vec<DraftLink> {
+    let mechanism = &urdf.mechanism;
+    let joint = |k: usize| &mechanism.joints[k];
+    let first = chain.path.iter().position(|k| chain.joints.contains(k)).map_or(chain.path.len(), |p| p + 1);
+    let arm: f64 = chain.path.iter().map(|&k| joint(k).X_PJ.translation.vector.norm()).sum();
+    let mut found = Vec::new();
+    for &k in &chain.path[first.min(chain.path.len())..] {
+        let distal = joint(k);
+        let inertia = mechanism.link(&distal.parent).and_then(|l| l.inertia);
+        let (meshes, of_collisions) = shapes(urdf, &distal.parent);
+        let proximal = mechanism.joints.iter().find(|j| j.child == distal.parent);
+        let section = beams::propose(&beams::Candidate { proximal, distal, inertia, meshes: &meshes, arm });
+        let ends = section.as_ref().ok().and_then(|section| section.ends);
+        let length = ends.map_or(distal.X_PJ.translation.vector, |[from, to]| Vector3::from(to) - Vector3::from(from));
+        // Frames at one place are no links of an arm.
+        if length.norm() < 1e-6 {
+            continue;
+        }
+        found.push(DraftLink {
+            link: distal.parent.clone(),
+            distal: distal.name.clone(),
+            length: length.norm(),
+            mass: inertia.map(|i| i.mass),
+            section,
+            uniform: false,
+            of_collisions,
+        });
+    }
+    // One link bends between two joints only: the longest of its ways.
+    let mut kept: Vec<DraftLink> = Vec::new();
+    for link in found {
+        if let Some(other) = kept.iter_mut().find(|other| other.link == link.link) {
+            if link.length > other.length {
+                *other = link;
+            }
+        } else {
+            kept.push(link);
+        }
+    }
+    kept
+}
+
+/// What a link looks like, in its axes; its shapes for collisions where it has no others that can be read.
+fn shapes(urdf: &UrdfRobot, link: &str) -> (Vec<TriangleMesh>, bool) {
+    let read = |visuals: &[Visual]| -> Vec<TriangleMesh> {
+        let own = visuals.iter().filter(|v| v.link == link);
+        own.filter(|v| !matches!(v.geometry, Geometry::Mesh { path: None, .. }))
+            .filter_map(|v| Some(v.geometry.triangles().ok()?.transformed(&v.X_LV)))
+            .collect()
+    };
+    let seen = read(&urdf.visuals);
+    if seen.is_empty() { (read(&urdf.collisions), true) } else { (seen, false) }
+}
+
+fn assumptions(draft: &Draft) -> Vec<Assumption> {
+    let mut list = Vec::new();
+    for choice in &draft.chain.choices {
+        list.push(assumption("the arm", choice.clone(), &format!("{} LINK chooses another one", Setting::Tool)));
+    }
+    for link in &draft.waived {
+        let text = "its moments of inertia are such as no body has (the largest is above the sum of the others); taken as they are";
+        list.push(assumption(&format!("link {link:?}"), text.into(), "correct them in the description"));
+    }
+    masses(draft, &mut list);
+    if !draft.payload_known && draft.payload.mass == 0.0 {
+        let text = "none: the effort limits leave no room for one".to_owned();
+        list.push(assumption("payload", text, &format!("{} KG, or payload in robot.toml", Setting::Payload)));
+    }
+    if !draft.payload_known && draft.payload.mass > 0.0 {
+        let text = format!(
+            "{} kg, at most 15 % of what moves ({:.1} kg) and what the effort limits carry, a cube of aluminium at the tool",
+            draft.payload.mass, draft.moving_mass
+        );
+        list.push(assumption("payload", text, &format!("{} KG, or payload in robot.toml", Setting::Payload)));
+    }
+    for joint in &draft.joints {
+        let name = format!("joint {:?}", joint.joint.name);
+        if joint.speed_assumed {
+            let unit = if joint.joint.kind.slides() { "m/s" } else { "rad/s" };
+            let text = format!("its speed limit is not known; the sample motion takes {} {unit}", joint.speed);
+            list.push(assumption(&name, text, "write it into the description, or [limits] of motion.toml"));
+        }
+        if let Some(gear) = &joint.gear {
+            let of = match joint.effort_fault {
+                None => format!("its effort limit {:.4} N m", joint.joint.limits.effort),
+                Some(why) => format!(
+                    "what the arm needs, {:.0} N m of weight and {:.0} N m in motion, for its effort limit {why}",
+                    joint.weight, joint.needed
+                ),
+            };
+            let text = format!(
+                "its reducer has {:.3e} N m/rad ({:.1e} to {:.1e}), that of a class of {:.0} N m rated torque from {of}",
+                gear.stiffness, gear.low, gear.high, joint.rated
+            );
+            list.push(assumption(&name, text, "ask the maker for its torsional stiffness, or measure it"));
+        }
+    }
+    for link in &draft.links {
+        if let Ok(section) = &link.section {
+            let text = format!(
+                "it bends as a {}, all of its {:.2} kg being wall of {}",
+                text::section_words(section),
+                link.mass.unwrap_or(0.0),
+                section.material
+            );
+            list.push(assumption(&format!("link {:?}", link.link), text, "flexarm reduce with a mesh of the casting"));
+        }
+    }
+    for note in &draft.motion.notes {
+        list.push(assumption("the sample motion", note.clone(), "check the effort limits of the description"));
+    }
+    list
+}
+
+/// Masses that look like no masses of this arm.
+fn masses(draft: &Draft, list: &mut Vec<Assumption>) {
+    let own: f64 = draft.urdf.mechanism.links.iter().filter_map(|l| l.inertia).map(|i| i.mass).sum();
+    let which = match draft.discarded.is_empty() {
+        true => "links without <inertial>",
+        false => "links without <inertial> or with a mass that only held a place",
+    };
+    match draft.estimate {
+        Some(flexarm_urdf::InertiaEstimate::TotalMass(mass)) => {
+            let text = format!(
+                "{which} have {mass} kg together, spread by the volumes of their meshes or by their lengths; all links together {own:.1} kg"
+            );
+            list.push(assumption("masses", text, "replace by those of the maker"));
+        }
+        Some(flexarm_urdf::InertiaEstimate::Density(density)) => {
+            let text = format!("{which} are solid with {density} kg/m³");
+            list.push(assumption("masses", text, "replace by those of the maker"));
+        }
+        None => {}
+    }
+    if draft.idle_estimate {
+        let text = format!(
+            "no link lacks a mass, so none was estimated: those of the description count, {own:.1} kg together"
+        );
+        list.push(assumption(
+            "masses",
+            text,
+            "take <inertial> out of the description if its masses are not to be trusted",
+        ));
+    }
+    let alike = placeholders(&draft.urdf.mechanism);
+    let mass = alike.first().and_then(|name| draft.urdf.mechanism.link(name)?.inertia).map_or(0.0, |i| i.mass);
+    if !alike.is_empty() && draft.discarded.is_empty() {
+        let text =
+            format!("{} links have {mass} kg each: this number only holds the place of their masses", alike.len());
+        let mend = format!(
+            "{} KG spreads the mass of the arm over these links, by the volumes of their meshes or by their lengths; best the \
+             masses of the maker",
+            Setting::InertiaFromTotalMass
+        );
+        list.push(assumption("masses", text, &mend));
+    }
+    let missing = draft.urdf.warnings.iter().filter(|w| matches!(w.code, "missing-inertial" | "zero-mass"));
+    for finding in missing {
+        list.push(assumption(
+            "masses",
+            finding.message.clone(),
+            &format!("{} KG or {} KG_PER_M3 estimate them", Setting::InertiaFromTotalMass, Setting::InertiaFromDensity),
+        ));
+    }
+}
+
+fn questions(draft: &Draft) -> Vec<String> {
+    let mut list = Vec::new();
+    let turning: Vec<&str> = draft.joints.iter().filter(|j| j.gear.is_some()).map(|j| j.joint.name.as_str()).collect();
+    if !turning.is_empty() {
+        list.push(format!(
+            "torsional stiffness of the reducers of {}, in N m/rad at the output (or N m per minute of arc: times 3438); ask \
+             for the type of reducer if nothing else: its catalogue has the number",
+            turning.join(", ")
+        ));
+    }
+    if !draft.payload_known {
+        list.push("mass, centre of mass and inertia of what the tool carries".into());
+    }
+    for link in draft.beams_with_sections() {
+        list.push(format!(
+            "link {:?}: wall thickness and material of the casting, and how much of its mass is casting (motors and gears \
+             do not stiffen it); best a CAD model to be meshed",
+            link.link
+        ));
+    }
+    let unsure: Vec<&str> =
+        draft.joints.iter().filter(|j| j.effort_fault.is_some()).map(|j| j.joint.name.as_str()).collect();
+    if !unsure.is_empty() {
+        list.push(format!("largest torque of {}", unsure.join(", ")));
+    }
+    let slow: Vec<&str> = draft.joints.iter().filter(|j| j.speed_assumed).map(|j| j.joint.name.as_str()).collect();
+    if !slow.is_empty() {
+        list.push(format!("largest speed of {}", slow.join(", ")));
+    }
+    if draft.estimate.is_some() || draft.assumptions.iter().any(|a| a.about == "masses") {
+        list.push("mass, centre of mass and inertia of each link".into());
+    }
+    list.push("the sag of the tool under a known weight hung on it, in one or two poses: with it the numbers above can be judged".into());
+    list
+}

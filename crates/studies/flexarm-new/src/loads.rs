@@ -1,0 +1,200 @@
+//! What the joints have to carry and to move: torques of weight and of speeding up, over the whole workspace.
+
+use flexarm_kinematics::{
+    Data, Joint, JointKind, Link, LinkInertia, Mechanism, Model, Pose, forward_kinematics, gravity_forces, mass_matrix,
+};
+use nalgebra::{DVector, Matrix3, Translation3, Vector3};
+
+use flexarm_run::caveat::size::halton;
+
+/// Poses at which torques are looked at.
+const POSES: u32 = 400;
+/// Time in which a joint comes to its full speed (s), where nothing is known.
+pub(crate) const SPEED_UP: f64 = 0.35;
+/// Payload over moving mass of arms: 0.15 to 0.2 of heavy ones and cobots alike.
+const PAYLOAD_SHARE: f64 = 0.15;
+/// Density of a payload that nobody knows (kg/m³): aluminium.
+const PAYLOAD_DENSITY: f64 = 2700.0;
+/// Part of an effort limit that the weight alone may take up.
+const WEIGHT_SHARE: f64 = 0.8;
+/// An effort limit this many times what the arm needs is no property of its drive.
+const SENSELESS: f64 = 25.0;
+
+/// Range in which a coordinate is moved: its limits, at most so much to each side of the value nearest to zero.
+pub(crate) fn range(joint: &Joint) -> [f64; 2] {
+    let most = if joint.kind.slides() { 1.0 } else { 2.1 };
+    let (lower, upper) = (joint.limits.lower, joint.limits.upper);
+    if upper - lower <= 2.0 * most {
+        return [lower, upper];
+    }
+    let middle = 0.0f64.clamp(lower + most, upper - most);
+    [middle - most, middle + most]
+}
+
+/// A payload as a cube of aluminium at the tool.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Cube {
+    pub(crate) mass: f64,
+    /// Length of an edge (m).
+    pub(crate) edge: f64,
+}
+
+impl Cube {
+    pub(crate) fn of(mass: f64) -> Self {
+        Self { mass, edge: (mass / PAYLOAD_DENSITY).cbrt() }
+    }
+
+    pub(crate) fn moment(&self) -> f64 {
+        self.mass * self.edge * self.edge / 6.0
+    }
+}
+
+/// The robot with a frame and a load at its tool.
+pub(crate) fn loaded(mechanism: &Mechanism, tool: &str, payload: Option<Cube>) -> Mechanism {
+    let mut loaded = mechanism.clone();
+    let inertia = payload.map(|cube| LinkInertia {
+        mass: cube.mass,
+        com: Vector3::zeros(),
+        inertia_com: Matrix3::identity() * cube.moment(),
+    });
+    loaded.links.push(Link { name: TOOL.into(), inertia });
+    loaded.joints.push(Joint::new(
+        "__new_tool_joint",
+        JointKind::Fixed,
+        tool,
+        TOOL,
+        Pose::from(Translation3::identity()),
+    ));
+    loaded
+}
+
+/// Name of the frame that [`loaded`] adds.
+pub(crate) const TOOL: &str = "__new_tool";
+
+/// Poses of the arm, held joints where they stay, and what its joints carry in them.
+pub(crate) struct Workspace {
+    /// Coordinates that the arm moves.
+    pub(crate) moved: Vec<usize>,
+    pub(crate) poses: Vec<Posed>,
+    /// Largest torque of weight per coordinate (N m or N).
+    pub(crate) weight: Vec<f64>,
+    /// Largest inertia per coordinate (kg m² or kg).
+    pub(crate) inertia: Vec<f64>,
+}
+
+/// A pose, where the tool is in it, how low the arm comes, and the torques of weight.
+#[derive(Clone, Debug)]
+pub(crate) struct Posed {
+    pub(crate) q: DVector<f64>,
+    pub(crate) tool: Vector3<f64>,
+    /// Height of the lowest moving frame (m).
+    pub(crate) lowest: f64,
+    pub(crate) weight: Vec<f64>,
+}
+
+/// One pose with all that is to be known of it.
+pub(crate) fn posed(model: &Model, data: &mut Data, q: DVector<f64>) -> Posed {
+    let weight = gravity_forces(model, data, &q).abs().as_slice().to_vec();
+    forward_kinematics(model, data, &q);
+    let heights = model.frames().iter().map(|frame| data.X_WF(frame).translation.vector.z);
+    let lowest = heights.fold(f64::INFINITY, f64::min);
+    let tool = model.frame(TOOL).map_or_else(Vector3::zeros, |frame| data.X_WF(frame).translation.vector);
+    Posed { q, tool, lowest, weight }
+}
+
+impl Workspace {
+    /// * `ranges`: of each coordinate; held ones have one value.
+    pub(crate) fn of(model: &Model, ranges: &[[f64; 2]]) -> Self {
+        let n = model.nv();
+        let moved: Vec<usize> = (0..n).filter(|&k| ranges[k][0] < ranges[k][1]).collect();
+        let place = |pose: u32, k: usize| {
+            let rank = moved.iter().position(|&m| m == k);
+            let [low, high] = ranges[k];
+            rank.map_or(low, |rank| low + (high - low) * halton(pose, rank))
+        };
+        let mut data = Data::new(model);
+        let mut workspace =
+            Self { moved: moved.clone(), poses: Vec::new(), weight: vec![0.0; n], inertia: vec![0.0; n] };
+        for pose in 1..=POSES {
+            let q = DVector::from_fn(n, |k, _| place(pose, k));
+            let M = mass_matrix(model, &mut data, &q);
+            for k in 0..n {
+                workspace.inertia[k] = workspace.inertia[k].max(M[(k, k)]);
+            }
+            let posed = posed(model, &mut data, q);
+            for k in 0..n {
+                workspace.weight[k] = workspace.weight[k].max(posed.weight[k]);
+            }
+            workspace.poses.push(posed);
+        }
+        workspace
+    }
+
+    /// Torque of weight and of coming to full speed together (N m or N).
+    pub(crate) fn needed(&self, k: usize, speed: f64) -> f64 {
+        self.weight[k] + self.inertia[k] * speed / SPEED_UP
+    }
+}
+
+/// What is wrong with an effort limit, in words.
+///
+/// * `floor`: what a joint of this arm has at least.
+pub(crate) fn effort_fault(effort: f64, weight: f64, needed: f64, floor: f64) -> Option<&'static str> {
+    if !effort.is_finite() {
+        Some("has none")
+    } else if effort <= 0.0 {
+        Some("is zero")
+    } else if effort < weight {
+        Some("is below what the arm needs to hold itself")
+    } else if effort > SENSELESS * needed.max(floor) {
+        Some("is far above what the arm can need")
+    } else {
+        None
+    }
+}
+
+/// Torque of a payload that sits a fifth of the reach beside an axis (N m): wrists are made for so much. Where nothing is
+/// carried, for a twentieth of the mass that moves.
+pub(crate) fn wrist_torque(payload: f64, moving_mass: f64, reach: f64) -> f64 {
+    9.81 * payload.max(0.05 * moving_mass) * 0.2 * reach
+}
+
+/// A payload from the arm's own mass, rounded to a number that data sheets have, and no more than the effort limits carry.
+///
+/// * `joints`: effort limit, weight without payload, and how much of it comes with each kg (N m per kg).
+pub(crate) fn guessed_payload(mass: f64, joints: &[(f64, f64, f64)]) -> f64 {
+    let mut most = PAYLOAD_SHARE * mass;
+    for &(effort, weight, per_kg) in joints {
+        if effort.is_finite() && effort > weight && effort < SENSELESS * weight.max(1e-3) && per_kg > 1e-6 {
+            most = most.min((WEIGHT_SHARE * effort - weight).max(0.0) / per_kg);
+        }
+    }
+    rounded_down(most)
+}
+
+/// 1, 1.5, 2, 3, 5, 7 and powers of ten.
+fn rounded_down(value: f64) -> f64 {
+    if value < 1e-3 {
+        return 0.0;
+    }
+    let power = 10f64.powf(value.log10().floor());
+    let steps = [1.0, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0];
+    let step = steps.into_iter().rev().find(|s| s * power <= value * (1.0 + 1e-9)).unwrap_or(1.0);
+    (step * power * 1e6).round() / 1e6
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_guessed_payload_is_a_share_of_the_mass_that_the_effort_limits_carry() {
+        assert_eq!(guessed_payload(1000.0, &[]), 150.0);
+        // 0.8 * 1000 - 600 = 200 N m are left, 20 N m per kg.
+        assert_eq!(guessed_payload(1000.0, &[(1000.0, 600.0, 20.0)]), 10.0);
+        // A limit that the arm itself passes says nothing.
+        assert_eq!(guessed_payload(1000.0, &[(500.0, 600.0, 20.0)]), 150.0);
+        assert_eq!(guessed_payload(20.6, &[]), 3.0);
+        assert_eq!(guessed_payload(0.0, &[]), 0.0);
+    }
+}

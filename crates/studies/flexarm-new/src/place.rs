@@ -1,0 +1,185 @@
+//! Where the description is: referred to where it lies beside the new folder, else copied with its meshes.
+
+use std::collections::BTreeMap;
+use std::path::{Component, Path, PathBuf};
+
+use super::draft::Draft;
+use super::{NewError, NewOptions};
+use flexarm_run::Error;
+
+/// How the new robot file comes to its description.
+#[derive(Clone, Debug)]
+pub(crate) struct Placed {
+    /// `urdf` of the robot file.
+    pub(crate) reference: String,
+    /// The robot file itself, for messages.
+    pub(crate) robot_path: PathBuf,
+    /// `packages` and `args` of the robot file.
+    pub(crate) packages: Vec<(String, String)>,
+    pub(crate) arguments: Vec<(String, String)>,
+    /// What is copied.
+    pub(crate) files: Vec<(PathBuf, Vec<u8>)>,
+    /// All of it in words.
+    pub(crate) words: String,
+}
+
+/// Says so for files that are robots in other formats, or no robots.
+///
+/// # Errors
+/// [`NewError::OtherFormat`].
+pub(crate) fn refuse_other_formats(path: &Path) -> Result<(), Error> {
+    let is = |what, help: &str| {
+        let help = help.to_owned();
+        Err(NewError::OtherFormat { path: path.display().to_string(), what, help }.into())
+    };
+    if path.is_dir() {
+        let mut found: Vec<String> = std::fs::read_dir(path)
+            .into_iter()
+            .flatten()
+            .flatten()
+            .map(|entry| entry.file_name().to_string_lossy().into_owned())
+            .filter(|name| name.ends_with(".urdf") || name.ends_with(".xacro"))
+            .collect();
+        found.sort();
+        let help = if found.is_empty() {
+            "give the file itself".to_owned()
+        } else {
+            format!("give one of {}", found.join(", "))
+        };
+        return is("a folder", &help);
+    }
+    if !path.is_file() {
+        let what = "there is no such file; give a .urdf or .xacro file".into();
+        return Err(Error::File { path: path.to_owned(), what });
+    }
+    let head = {
+        use std::io::Read;
+        let mut head = Vec::new();
+        let file = std::fs::File::open(path).map_err(|e| Error::File { path: path.to_owned(), what: e.to_string() })?;
+        file.take(4096)
+            .read_to_end(&mut head)
+            .map_err(|e| Error::File { path: path.to_owned(), what: e.to_string() })?;
+        head
+    };
+    let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let text = String::from_utf8_lossy(&head);
+    let root = |name: &str| text.contains(&format!("<{name} ")) || text.contains(&format!("<{name}>"));
+    let usd = "export it as URDF from the program it was made with (Isaac Sim has an exporter to URDF)";
+    match ending.as_str() {
+        _ if head.starts_with(b"PXR-USDC") || head.starts_with(b"#usda") || ending == "usdz" => is("a USD file", usd),
+        "toml" => is("a robot file already", "run it with flexarm compare, or give the description it refers to"),
+        "stl" | "dae" | "obj" | "glb" | "gltf" | "step" | "stp" => {
+            is("a mesh or drawing", "give the URDF that refers to it; for one link alone: flexarm reduce")
+        }
+        _ if root("sdf") && !root("robot") => {
+            is("an SDF file", "export the robot as URDF; SDF that came from a URDF: give that one")
+        }
+        _ if root("mujoco") && !root("robot") => {
+            is("an MJCF file of MuJoCo", "give the URDF it was made from, or convert it (mjcf2urdf)")
+        }
+        _ => Ok(()),
+    }
+}
+
+/// From a folder to a file by a relative path; both absolute.
+fn relative(from: &Path, to: &Path) -> Option<String> {
+    let (from, to): (Vec<_>, Vec<_>) = (from.components().collect(), to.components().collect());
+    let common = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
+    let down = to[common..].iter().map(|c| match c {
+        Component::Normal(name) => name.to_str().map(str::to_owned),
+        _ => None,
+    });
+    let parts =
+        std::iter::repeat_n(Some("..".to_owned()), from.len() - common).chain(down).collect::<Option<Vec<_>>>()?;
+    Some(parts.join("/"))
+}
+
+/// The path without links and dots; of a folder that is not there yet, that of the part which is.
+fn real(path: &Path) -> Option<PathBuf> {
+    let whole = std::path::absolute(path).ok()?;
+    let there = whole.ancestors().find(|above| above.exists())?;
+    let rest = whole.strip_prefix(there).ok()?;
+    let real = there.canonicalize().ok()?;
+    Some(if rest.as_os_str().is_empty() { real } else { real.join(rest) })
+}
+
+/// Refers to a description in the new folder, in the one above or in one beside it; copies any other.
+pub(crate) fn place(draft: &Draft, urdf: &Path, folder: &Path, options: &NewOptions) -> Result<Placed, Error> {
+    let robot_path = folder.join("robot.toml");
+    if let (Some(out), Some(file)) = (real(folder), real(urdf))
+        && let Some(home) = file.parent()
+        && (home == out || out.parent() == Some(home) || (out.parent().is_some() && out.parent() == home.parent()))
+        && out.parent().and_then(Path::parent).is_some()
+        && let Some(reference) = relative(&out, &file)
+    {
+        let packages = options.urdf.packages.iter().map(|(name, to)| {
+            let to = real(to).unwrap_or_else(|| to.clone());
+            let path = relative(&out, &to).filter(|_| to.is_absolute());
+            (name.clone(), path.unwrap_or_else(|| to.display().to_string()))
+        });
+        return Ok(Placed {
+            words: format!("the description stays where it is: urdf = {reference:?}, relative to this folder"),
+            reference,
+            robot_path,
+            packages: packages.collect(),
+            arguments: options.urdf.arguments.clone(),
+            files: Vec::new(),
+        });
+    }
+    copied(draft, urdf, folder, robot_path)
+}
+
+/// The description, expanded if it was xacro, with the meshes that it names and paths relative to it.
+fn copied(draft: &Draft, urdf: &Path, folder: &Path, robot_path: PathBuf) -> Result<Placed, Error> {
+    let name = format!("{}.urdf", flexarm_files::file_stem(&draft.name));
+    let mut names: BTreeMap<String, PathBuf> = BTreeMap::new();
+    let mut files = Vec::new();
+    let mut text = draft.urdf.text.clone();
+    let mut meshes = 0;
+    for (reference, path) in &draft.urdf.mesh_files {
+        let own = path.file_name().map_or_else(|| "mesh".into(), |n| flexarm_files::file_stem(&n.to_string_lossy()));
+        let mut new = own.clone();
+        let mut number = 1;
+        while names.get(&new).is_some_and(|other| other != path) {
+            number += 1;
+            new = format!("{number}_{own}");
+        }
+        for quote in ['"', '\''] {
+            text = text.replace(&format!("{quote}{reference}{quote}"), &format!("{quote}meshes/{new}{quote}"));
+        }
+        if names.insert(new.clone(), path.clone()).is_none() {
+            let bytes = |path: &Path| {
+                std::fs::read(path)
+                    .map_err(|e| Error::File { path: path.to_owned(), what: format!("cannot be read: {e}") })
+            };
+            files.push((folder.join("meshes").join(&new), bytes(path)?));
+            meshes += 1;
+            // Materials and buffers that the mesh names lie beside it.
+            for beside in ["mtl", "bin"].map(|ending| path.with_extension(ending)).into_iter().filter(|p| p.is_file()) {
+                let own = beside.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+                if names.insert(own.clone(), beside.clone()).is_none() {
+                    files.push((folder.join("meshes").join(own), bytes(&beside)?));
+                }
+            }
+        }
+    }
+    files.push((folder.join(&name), text.into_bytes()));
+    let words = format!(
+        "the description was copied from {} with {meshes} meshes, all paths relative: the folder can be moved",
+        urdf.display()
+    );
+    Ok(Placed { reference: name, robot_path, packages: Vec::new(), arguments: Vec::new(), files, words })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn relative_paths_lead_up_to_what_both_have_and_down_again() {
+        let of = |from: &str, to: &str| relative(from.as_ref(), to.as_ref());
+        assert_eq!(of("/a/b", "/a/b/x.urdf").as_deref(), Some("x.urdf"));
+        assert_eq!(of("/a/new", "/a/urdf/x.urdf").as_deref(), Some("../urdf/x.urdf"));
+        assert_eq!(of("/a/b/new", "/a/x.urdf").as_deref(), Some("../../x.urdf"));
+    }
+}

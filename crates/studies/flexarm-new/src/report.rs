@@ -1,0 +1,283 @@
+//! What was made, for programs: SI units, angles in rad.
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::draft::Draft;
+use super::place::Placed;
+use flexarm_run::Finding;
+use flexarm_run::MotionPeak;
+use flexarm_run::MotionReport;
+use flexarm_run::Summary;
+
+/// Answer of `flexarm new`.
+#[derive(Debug, Serialize)]
+pub struct NewRobot {
+    /// The robot file.
+    pub robot: String,
+    /// The sample motion.
+    pub motion: String,
+    /// The description that the robot file refers to.
+    pub urdf: String,
+    /// Name of the robot.
+    pub name: String,
+    /// Whether the description was copied, and from where, in words.
+    pub placed: String,
+    /// Link at which the arm begins.
+    pub base: String,
+    /// Link that is the tool.
+    pub tool: String,
+    /// Links from the base to the tool.
+    pub chain: Vec<String>,
+    /// Joints of the arm, in the order of the description.
+    pub joints: Vec<NewJoint>,
+    /// Joints that stay where they are.
+    pub held: Vec<NewHeld>,
+    /// Links of the arm, with a section where one is proposed.
+    pub links: Vec<NewLink>,
+    /// Proposed drives.
+    pub drives: Vec<NewDrive>,
+    /// What the tool carries.
+    pub payload: NewPayload,
+    /// Largest distance of the tool from the first joint in the poses that were looked at (m).
+    pub reach_m: f64,
+    /// Mass that the joints of the arm move, without payload (kg).
+    pub moving_mass_kg: f64,
+    /// Everything that was assumed.
+    pub assumptions: Vec<Assumption>,
+    /// What to ask of the maker, or to measure.
+    pub questions: Vec<String>,
+    /// How long the sample motion takes (s).
+    pub duration_s: f64,
+    /// Its largest values against the limits.
+    pub peaks: Vec<MotionPeak>,
+    /// Limits that it passes, in words: those of effort that the arm cannot keep at all.
+    pub violations: Vec<String>,
+    /// What `check` finds in the result.
+    pub findings: Vec<Finding>,
+    /// Files that were written.
+    pub files: Vec<String>,
+    /// The first run, if there was one.
+    pub summary: Option<Box<Summary>>,
+}
+
+/// A joint of the arm; limits are null where there are none.
+#[derive(Clone, Debug, Serialize)]
+pub struct NewJoint {
+    /// Its name.
+    pub name: String,
+    /// Word of the URDF for its kind.
+    #[serde(rename = "type")]
+    pub kind: &'static str,
+    /// Least position (rad or m).
+    pub lower: Option<f64>,
+    /// Greatest position.
+    pub upper: Option<f64>,
+    /// Speed limit (rad/s or m/s).
+    pub velocity: Option<f64>,
+    /// Effort limit of the description (N m or N).
+    pub effort: Option<f64>,
+    /// What is wrong with the effort limit, in words; null if nothing.
+    pub effort_fault: Option<&'static str>,
+    /// Largest torque of weight over the workspace, with payload (N m or N).
+    pub weight_torque: f64,
+    /// The same with that of coming to full speed in 0.35 s.
+    pub needed_torque: f64,
+}
+
+/// A joint that is held.
+#[derive(Clone, Debug, Serialize)]
+pub struct NewHeld {
+    /// Its name.
+    pub joint: String,
+    /// Where (rad or m).
+    pub at: f64,
+    /// Why.
+    pub why: &'static str,
+}
+
+/// A link of the arm. Lengths in m.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct NewLink {
+    /// Its name.
+    pub name: String,
+    /// Joint at its far end.
+    pub distal: String,
+    /// From its frame to that joint, or of its body where the frames do not run along it.
+    pub length: f64,
+    /// Mass (kg).
+    pub mass: Option<f64>,
+    /// `box`, `tube`, `rectangle`, `circle`; null if none is proposed.
+    pub section: Option<&'static str>,
+    /// Along y of the section; the diameter of round ones.
+    pub width: Option<f64>,
+    /// Along z of the section.
+    pub height: Option<f64>,
+    /// Thickness of the wall; null for solid ones.
+    pub wall: Option<f64>,
+    /// Thickness if only half of the mass is wall.
+    pub wall_of_half_mass: Option<f64>,
+    /// Name of the material.
+    pub material: Option<&'static str>,
+    /// Direction of the section's y in link axes.
+    pub y_axis: Option<[f64; 3]>,
+    /// From the line between the joints to the beam, link axes.
+    pub offset: Option<[f64; 3]>,
+    /// Where the beam itself begins and ends, link axes; null from the link's frame to the distal joint.
+    pub ends: Option<[[f64; 3]; 2]>,
+    /// Largest over smallest outer width along the beam.
+    pub taper: Option<f64>,
+    /// Part of the cuts through the mesh whose outline was not closed: there its convex hull counts.
+    pub open_cuts: Option<f64>,
+    /// Why no section is proposed.
+    pub reason: Option<String>,
+    /// Whether section and material are assumed: always, where there are some.
+    pub assumed: bool,
+}
+
+/// A drive that is proposed.
+#[derive(Clone, Debug, Serialize)]
+pub struct NewDrive {
+    /// Its joint.
+    pub joint: String,
+    /// Torsional stiffness at the joint (N m/rad).
+    pub stiffness: f64,
+    /// Lowest that the class shows.
+    pub low: f64,
+    /// Highest that the class shows.
+    pub high: f64,
+    /// Rated torque of the class (N m).
+    pub rated_torque: f64,
+    /// Damping ratio.
+    pub damping_ratio: f64,
+    /// Where the stiffness and its range come from.
+    pub source: String,
+    /// Always.
+    pub assumed: bool,
+}
+
+/// What the tool carries.
+#[derive(Clone, Debug, Serialize)]
+pub struct NewPayload {
+    /// Mass (kg).
+    pub mass: f64,
+    /// Moment of inertia about each axis (kg m²).
+    pub inertia: f64,
+    /// Whether the mass is assumed.
+    pub assumed: bool,
+}
+
+/// Something that was assumed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Assumption {
+    /// What it is about: a joint, a link, the payload.
+    pub about: String,
+    /// What was assumed.
+    pub text: String,
+    /// How to know better.
+    pub mend: String,
+}
+
+pub(crate) fn assumption(about: &str, text: String, mend: &str) -> Assumption {
+    Assumption { about: about.to_owned(), text, mend: mend.to_owned() }
+}
+
+fn finite(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}
+
+pub(crate) fn of(
+    draft: &Draft,
+    placed: &Placed,
+    files: &[PathBuf],
+    folder: &Path,
+    motion: MotionReport,
+    findings: Vec<Finding>,
+) -> NewRobot {
+    let shown = |path: PathBuf| path.display().to_string();
+    let joint = |k: &usize| &draft.urdf.mechanism.joints[*k];
+    let mut chain = vec![draft.chain.base.clone()];
+    chain.extend(draft.chain.path.iter().map(|k| joint(k).child.clone()));
+    NewRobot {
+        robot: shown(folder.join("robot.toml")),
+        motion: shown(folder.join("motion.toml")),
+        urdf: shown(folder.join(&placed.reference)),
+        name: draft.name.clone(),
+        placed: placed.words.clone(),
+        base: draft.chain.base.clone(),
+        tool: draft.chain.tool.clone(),
+        chain,
+        joints: draft.joints.iter().map(of_joint).collect(),
+        held: draft.held.iter().map(|(joint, at, why)| NewHeld { joint: joint.clone(), at: *at, why }).collect(),
+        links: draft.links.iter().map(of_link).collect(),
+        drives: draft.joints.iter().filter_map(of_drive).collect(),
+        payload: NewPayload {
+            mass: draft.payload.mass,
+            inertia: draft.payload.moment(),
+            assumed: !draft.payload_known,
+        },
+        reach_m: draft.reach,
+        moving_mass_kg: draft.moving_mass,
+        assumptions: draft.assumptions.clone(),
+        questions: draft.questions.clone(),
+        duration_s: motion.duration_s,
+        peaks: motion.peaks,
+        violations: motion.violations.into_iter().map(|v| v.message).collect(),
+        findings,
+        files: files.iter().map(|path| path.display().to_string()).collect(),
+        summary: None,
+    }
+}
+
+fn of_joint(joint: &super::draft::DraftJoint) -> NewJoint {
+    let limits = &joint.joint.limits;
+    NewJoint {
+        name: joint.joint.name.clone(),
+        kind: joint.joint.kind.name(),
+        lower: finite(limits.lower),
+        upper: finite(limits.upper),
+        velocity: finite(limits.velocity),
+        effort: finite(limits.effort),
+        effort_fault: joint.effort_fault,
+        weight_torque: joint.weight,
+        needed_torque: joint.needed,
+    }
+}
+
+fn of_link(link: &super::draft::DraftLink) -> NewLink {
+    let (name, distal) = (link.link.clone(), link.distal.clone());
+    let plain = NewLink { name, distal, length: link.length, mass: link.mass, ..NewLink::default() };
+    match &link.section {
+        Err(reason) => NewLink { reason: Some(reason.clone()), ..plain },
+        Ok(s) => NewLink {
+            section: Some(s.section),
+            width: Some(s.width),
+            height: Some(s.height),
+            wall: s.wall,
+            wall_of_half_mass: s.wall_of_half,
+            material: Some(s.material),
+            y_axis: Some(s.y_axis),
+            offset: Some(s.offset),
+            ends: s.ends,
+            taper: Some(s.taper),
+            open_cuts: Some(s.open),
+            assumed: true,
+            ..plain
+        },
+    }
+}
+
+fn of_drive(joint: &super::draft::DraftJoint) -> Option<NewDrive> {
+    let gear = joint.gear.as_ref()?;
+    Some(NewDrive {
+        joint: joint.joint.name.clone(),
+        stiffness: super::text::three_digits(gear.stiffness),
+        low: gear.low,
+        high: gear.high,
+        rated_torque: joint.rated,
+        damping_ratio: 0.03,
+        source: gear.source.clone(),
+        assumed: true,
+    })
+}

@@ -1,0 +1,160 @@
+//! What is differentiated of joints under servos beside the rest: friction, gains, and what controllers know of the arm.
+
+use flexarm_identify::{Effect, RunParameter};
+use flexarm_kinematics::{Model, SpatialInertia};
+use flexarm_stepping::{AxisSlope, FlexibleArm, Friction, RunSlopes, ServoAxis};
+use nalgebra::DVector;
+
+use super::Named;
+use flexarm_run::Arm;
+use flexarm_run::Caveat;
+use flexarm_run::Error;
+use flexarm_run::robot::PAYLOAD_LINK;
+use flexarm_run::Scenario;
+
+/// Changes over which the gains that follow a mass (kg) or a joint (rad or m) are differenced: they are smooth, and nothing else is in it.
+const MASS_STEP: f64 = 0.02;
+const JOINT_STEP: f64 = 2e-3;
+
+impl Arm {
+    /// Adds friction and gains of the joints under servos, and to masses and motions what the controllers make of them.
+    pub(super) fn add_controllers(&self, scenario: &Scenario, all: &mut Vec<Named>) -> Result<(), Error> {
+        let flexible = self.flexible();
+        if !flexible.has_servo() {
+            return Ok(());
+        }
+        let arm = flexible.arm(scenario.motion.prescribed()).map_err(|error| flexible.explained(error))?;
+        let n = arm.model.n_actuated();
+        let mut start = DVector::zeros(n);
+        let (mut rates, mut accelerations) = (vec![0.0; n], vec![0.0; n]);
+        arm.motion.sample(0.0, start.as_mut_slice(), &mut rates, &mut accelerations);
+        for named in &mut *all {
+            self.follow(named, &start);
+        }
+        let Some(servo) = &arm.servo else { return Ok(()) };
+        for (number, axis) in servo.axes.iter().enumerate() {
+            let joint = &arm.model.coordinates()[axis.coordinate];
+            let slides = joint.kind == "prismatic";
+            all.extend(friction_of(&arm, axis.coordinate, &joint.joint, slides));
+            all.extend(gains_of(axis, number, &joint.joint, slides));
+        }
+        Ok(())
+    }
+
+    /// Makes of a mass or a motion one of which the controllers know: the rigid robot carries the mass too, and gains that the robot file
+    /// leaves out fit the inertia at the start.
+    fn follow(&self, named: &mut Named, start: &DVector<f64>) {
+        let flexible = self.flexible();
+        let (mut fed_forward, gains) = (
+            Vec::new(),
+            match &named.parameter {
+                RunParameter::Arm(parameter) => {
+                    let Effect::Mass { body, per_kg } = &parameter.effect else { return };
+                    let own = rigid_mass(&flexible.rigid);
+                    flexible.gain_slopes(MASS_STEP, |kg| {
+                        let rigid = own.map_or_else(
+                            || (*flexible.rigid).clone(),
+                            |(k, own)| carrying(&flexible.rigid, k, &own, kg),
+                        );
+                        (carrying(&flexible.model, *body, per_kg, kg), rigid, start.clone())
+                    })
+                }
+                RunParameter::Joint(k) => flexible.gain_slopes(JOINT_STEP, |shift| {
+                    let mut at = start.clone();
+                    at[*k] += shift;
+                    ((*flexible.model).clone(), (*flexible.rigid).clone(), at)
+                }),
+                _ => return,
+            },
+        );
+        if matches!(named.parameter, RunParameter::Arm(_)) {
+            fed_forward.extend(rigid_mass(&flexible.rigid));
+        }
+        let parameter = Box::new(named.parameter.clone());
+        named.parameter = RunParameter::Followed { parameter, fed_forward, gains };
+    }
+
+    /// Servos that were at their limits in a run that was differentiated.
+    pub(super) fn limited(&self, found: &RunSlopes) -> Vec<Caveat> {
+        let joints: Vec<&str> = self.joints().collect();
+        let told = |own: &flexarm_stepping::TorqueLimited| {
+            let joint = joints[own.coordinate];
+            let text = format!(
+                "the servo of joint {joint:?} is at its torque limit in {} samples, first at {:.4} s: the derivatives hold as long as the same \
+                 samples are; where another one is, its integral steps",
+                own.samples, own.first_s
+            );
+            Caveat::said("servo-limit", format!("joint {joint:?}"), text, "slow the motion down where it is quickest")
+        };
+        found.limited.iter().map(told).collect()
+    }
+}
+
+/// A kilogram at the payload of the rigid robot, and its body.
+fn rigid_mass(rigid: &Model) -> Option<(usize, SpatialInertia)> {
+    let frame = rigid.frame(PAYLOAD_LINK)?;
+    let point = SpatialInertia { mass: 1.0, ..SpatialInertia::zeros() };
+    Some((frame.body, point.at_parent(&frame.X_BF)))
+}
+
+/// A model with so many kilograms more.
+fn carrying(model: &Model, body: usize, per_kg: &SpatialInertia, kg: f64) -> Model {
+    let mut inertia = model.bodies()[body].inertia;
+    inertia += SpatialInertia {
+        mass: kg * per_kg.mass,
+        first_moment: kg * per_kg.first_moment,
+        rotational: kg * per_kg.rotational,
+    };
+    model.with_inertia(body, inertia)
+}
+
+/// Numbers of the friction of a joint that are not zero, each per hundredth of itself.
+fn friction_of(arm: &FlexibleArm, coordinate: usize, joint: &str, slides: bool) -> Vec<Named> {
+    let Some(law) = arm.friction.get(coordinate) else { return Vec::new() };
+    let [torque, damping, speed] = if slides { ["N", "N s/m", "m/s"] } else { ["N m", "N m s/rad", "rad/s"] };
+    let none = Friction { viscous: 0.0, coulomb: 0.0, stribeck: 0.0, stribeck_velocity: 0.0, regularisation: 0.0 };
+    let mut found = Vec::new();
+    let mut add = |key: &str, unit: &str, value: f64, by: Friction, acts: bool| {
+        if value != 0.0 && acts {
+            found.push(Named {
+                name: format!("drive.{joint}.friction.{key}"),
+                unit: unit.into(),
+                value,
+                per: "1 %",
+                scale: 0.01,
+                parameter: RunParameter::Friction(coordinate, by),
+            });
+        }
+    };
+    let dry = law.coulomb != 0.0 || law.stribeck != 0.0;
+    add("viscous", damping, law.viscous, Friction { viscous: law.viscous, ..none }, true);
+    add("coulomb", torque, law.coulomb, Friction { coulomb: law.coulomb, ..none }, true);
+    add("stribeck", torque, law.stribeck, Friction { stribeck: law.stribeck, ..none }, true);
+    let by = Friction { stribeck_velocity: law.stribeck_velocity, ..none };
+    add("stribeck_velocity", speed, law.stribeck_velocity, by, law.stribeck != 0.0);
+    let by = Friction { regularisation: law.regularisation, ..none };
+    add("regularisation", speed, law.regularisation, by, dry);
+    found
+}
+
+/// Gains of a servo that are not zero, and what it feeds forward, each per hundredth of itself.
+fn gains_of(axis: &ServoAxis, number: usize, joint: &str, slides: bool) -> Vec<Named> {
+    let (damping, stiffness) = if slides { ("N s/m", "N/m") } else { ("N m s/rad", "N m/rad") };
+    let ahead = f64::from(u8::from(axis.feed_forward));
+    let none = AxisSlope::default();
+    let all = [
+        ("position_gain", "1/s", axis.position_gain, AxisSlope { position_gain: axis.position_gain, ..none }),
+        ("velocity_gain", damping, axis.velocity_gain, AxisSlope { velocity_gain: axis.velocity_gain, ..none }),
+        ("integral_gain", stiffness, axis.integral_gain, AxisSlope { integral_gain: axis.integral_gain, ..none }),
+        ("feed_forward", "1", ahead, AxisSlope { feed_forward: ahead, ..none }),
+    ];
+    let named = |(key, unit, value, by): (&str, &str, f64, AxisSlope)| Named {
+        name: format!("drive.{joint}.servo.{key}"),
+        unit: unit.into(),
+        value,
+        per: "1 %",
+        scale: 0.01,
+        parameter: RunParameter::Servo(number, by),
+    };
+    all.into_iter().filter(|(_, _, value, _)| *value != 0.0).map(named).collect()
+}

@@ -1,0 +1,294 @@
+//! How the tool's error along a motion depends on every number of the robot: derivatives of the whole run, exact, for all of them at once.
+//!
+//! Start at [`sensitivity`], or at [`Arm::error_slopes`] for numbers alone; [`pose_sensitivity`] answers for a pose.
+
+mod controllers;
+mod pose;
+
+use std::path::PathBuf;
+
+use flexarm_files::{check_free, write_all};
+pub use flexarm_identify::RunParameter;
+use flexarm_identify::{Effect, Parameter, error_slopes};
+pub use flexarm_stepping::{ErrorSlopes, RunSlopes};
+use flexarm_stepping::{SlopesRequest, StepError, StepperKind};
+use nalgebra::Vector3;
+use serde::Serialize;
+
+use flexarm_run::Arm;
+use flexarm_run::Caveat;
+use flexarm_run::caveat::Use;
+use flexarm_run::caveat::once_each;
+use flexarm_run::caveat::warnings;
+use flexarm_run::Error;
+use flexarm_run::ValueError;
+use flexarm_identify::parameters::{asks_for, fits};
+use flexarm_run::RunOptions;
+use flexarm_run::prepare::loaded;
+use flexarm_run::prepare::runnable;
+use flexarm_run::Robot;
+use flexarm_run::Scenario;
+
+pub use pose::{PoseParameter, PoseSensitivity, pose_sensitivity};
+
+/// Times nearer to the start than this are it (s).
+const SAME_TIME: f64 = 1e-9;
+
+/// What is asked of [`sensitivity`].
+#[derive(Clone, Debug, Default)]
+pub struct SensitivityRequest {
+    /// How the run goes: modelling, generalised-alpha and its step, limits. Rates and pictures do not count.
+    pub run: RunOptions,
+    /// Names of what the error is differentiated by, * for anything; all without any.
+    pub parameters: Vec<String>,
+    /// Table of the error and its derivatives over time (CSV).
+    pub table: Option<PathBuf>,
+    /// Overwrite what is there.
+    pub overwrite: bool,
+}
+
+/// Answer of `flexarm sensitivity`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Sensitivity {
+    /// The robot.
+    pub robot: String,
+    /// The motion.
+    pub motion: String,
+    /// Step (s), and how many.
+    pub step_s: f64,
+    /// Steps taken.
+    pub steps: u64,
+    /// Largest distance of the tool from the rigid one's (m).
+    pub peak_m: f64,
+    /// When (s).
+    pub t_peak_s: f64,
+    /// Root of its mean square (m).
+    pub rms_m: f64,
+    /// Largest angle (rad).
+    pub peak_rad: f64,
+    /// Root of its mean square (rad).
+    pub rms_rad: f64,
+    /// One per number of the robot, its tool and its motion; what the RMS depends on most comes first.
+    pub parameters: Vec<ParameterSensitivity>,
+    /// Error and derivatives over time.
+    pub table: Option<String>,
+    /// What the caveats warn of, as sentences.
+    pub warnings: Vec<String>,
+    /// What is doubtful.
+    pub caveats: Vec<Caveat>,
+}
+
+/// What a change of one number does to the error.
+#[derive(Clone, Debug, Serialize)]
+pub struct ParameterSensitivity {
+    /// By the names of the robot file, of joints under servos `drive.JOINT.servo.` with their gains and `drive.JOINT.friction.` too;
+    /// `motion.JOINT` for a shift of a joint, `tcp.x`, `.y` and `.z` for the place of the tool in its own axes.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// Its value; 0 of a shift, 1 of what a servo feeds forward.
+    pub value: f64,
+    /// Of which change of it the following are the effect: `1 %`, `1 % of the root of K_ii K_jj`, `1 kg`, `1 mrad` or `1 mm`. They are derivatives, times that.
+    pub per: &'static str,
+    /// Of the largest distance, at the time where it is (m).
+    pub peak_m: f64,
+    /// Of the RMS distance (m).
+    pub rms_m: f64,
+    /// Of the largest angle (rad).
+    pub peak_rad: f64,
+    /// Of the RMS angle (rad).
+    pub rms_rad: f64,
+}
+
+/// A parameter with its name, and the change by which it is told.
+struct Named {
+    name: String,
+    unit: String,
+    value: f64,
+    per: &'static str,
+    scale: f64,
+    parameter: RunParameter,
+}
+
+impl Arm {
+    /// Error of the tool along a run and its derivatives by parameters, side by side. No other stepper than generalised-alpha; iterations go on
+    /// to the end, so that the run is a smooth function of all that goes into it.
+    ///
+    /// Cost: of kr210 (18 elastic coordinates) about ten ordinary runs, and a quarter of one for each parameter. With closed loops or links in
+    /// modes a hundred runs and more.
+    ///
+    /// # Errors
+    /// As [`flexarm_run::simulate`]; [`Error::Step`] where the arm has what is not differentiated (links that stiffen under load, motions
+    /// whose velocity jumps under servos).
+    pub fn error_slopes(
+        &self,
+        scenario: impl Into<Scenario>,
+        options: &RunOptions,
+        parameters: &[RunParameter],
+        keep_samples: bool,
+    ) -> Result<RunSlopes, Error> {
+        self.error_slopes_told(&scenario.into(), options, parameters, keep_samples).map(|(found, _)| found)
+    }
+
+    fn error_slopes_told(
+        &self,
+        scenario: &Scenario,
+        options: &RunOptions,
+        parameters: &[RunParameter],
+        keep_samples: bool,
+    ) -> Result<(RunSlopes, Vec<Caveat>), Error> {
+        let StepperKind::GeneralizedAlpha(settings) = options.stepper else {
+            let what = "another stepper than generalised-alpha";
+            let source = StepError::NoSlopes { what, mend: "take the default one" };
+            return Err(Error::Step { source, partial: false });
+        };
+        runnable(&scenario.motion, options)?;
+        let flexible = self.flexible();
+        if flexible.springs.is_empty() && !flexible.has_servo() {
+            return Err(ValueError::NothingYields.into());
+        }
+        flexarm_run::loops::along_motion(&flexible.rigid, &scenario.motion.trajectory)?;
+        let explained = |error| flexible.explained(error);
+        let arm = flexible.arm(scenario.motion.prescribed()).map_err(explained)?;
+        let (arm, mut caveats) = loaded(self.robot(), scenario, options, arm)?;
+        let request = SlopesRequest {
+            settings,
+            step_s: options.step_s,
+            duration_s: scenario.duration_s(),
+            start: scenario.start,
+            tool: flexible.tcp.clone(),
+            keep_samples,
+        };
+        let found = error_slopes(&arm, parameters, &request).map_err(explained)?;
+        caveats.extend(self.limited(&found));
+        Ok((found, caveats))
+    }
+
+    /// Numbers of the arm by which is differentiated: entries of matrices, of which there are many, only by their names.
+    fn numbers(&self, asked: &[String]) -> Vec<Parameter> {
+        let entries = self.link_entries().into_iter();
+        let entries = entries.filter(|own| asked.iter().any(|pattern| asks_for(pattern, &own.name)));
+        self.parameters().into_iter().chain(self.link_directions()).chain(entries).collect()
+    }
+
+    /// All numbers by which the error along a motion is differentiated.
+    fn run_parameters(&self, scenario: &Scenario, asked: &[String]) -> Result<Vec<Named>, Error> {
+        let of_arm = |parameter: Parameter| {
+            let (per, scale) = change_of(&parameter);
+            let Parameter { name, unit, initial: value, .. } = parameter.clone();
+            Named { name, unit, value, per, scale, parameter: RunParameter::Arm(parameter) }
+        };
+        // What another payload takes the place of at the start does nothing.
+        let gone = scenario.payloads.iter().any(|payload| payload.at_s <= SAME_TIME);
+        let there = |own: &Parameter| !(gone && matches!(own.effect, Effect::Mass { .. }));
+        let mut all: Vec<Named> = self.numbers(asked).into_iter().filter(there).map(of_arm).collect();
+        let model = &self.flexible().model;
+        for (k, coordinate) in model.coordinates()[..model.n_actuated()].iter().enumerate() {
+            let slides = coordinate.kind == "prismatic";
+            let (unit, per) = if slides { ("m", "1 mm") } else { ("rad", "1 mrad") };
+            let name = format!("motion.{}", coordinate.joint);
+            let parameter = RunParameter::Joint(k);
+            all.push(Named { name, unit: unit.into(), value: 0.0, per, scale: 1e-3, parameter });
+        }
+        for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
+            let (name, unit) = (format!("tcp.{axis}"), "m".into());
+            let parameter = RunParameter::Tool(Vector3::ith(k, 1.0));
+            all.push(Named { name, unit, value: 0.0, per: "1 mm", scale: 1e-3, parameter });
+        }
+        self.add_controllers(scenario, &mut all)?;
+        Ok(all)
+    }
+}
+
+/// How the tool's error along a motion depends on every number of the robot: stiffness and damping of gearboxes and links, masses, the tool's
+/// place, the joints of the motion; of joints under servos their friction and gains.
+///
+/// # Errors
+/// As [`Arm::error_slopes`]; [`Error::Value`] for a name that fits nothing, [`Error::File`] and [`Error::Write`] for the table.
+pub fn sensitivity(
+    robot: &Robot,
+    scenario: impl Into<Scenario>,
+    request: &SensitivityRequest,
+) -> Result<Sensitivity, Error> {
+    let scenario = scenario.into();
+    check_free(request.table.as_slice(), request.overwrite)?;
+    let arm = robot.flexible(request.run.modelling)?;
+    let named = chosen(arm.run_parameters(&scenario, &request.parameters)?, &request.parameters, |own| &own.name)?;
+    let parameters: Vec<RunParameter> = named.iter().map(|own| own.parameter.clone()).collect();
+    let (found, mut caveats) = arm.error_slopes_told(&scenario, &request.run, &parameters, request.table.is_some())?;
+    caveats.extend(arm.told(Use::Along(&scenario)));
+    let caveats = once_each(caveats);
+    if let Some(path) = &request.table {
+        write_all(&[(path.clone(), table(&named, &found))])?;
+    }
+    let (position, rotation) = (&found.position, &found.rotation);
+    let of = |(k, own): (usize, Named)| ParameterSensitivity {
+        name: own.name,
+        unit: own.unit,
+        value: own.value,
+        per: own.per,
+        peak_m: position.peak_slopes[k] * own.scale,
+        rms_m: position.rms_slopes[k] * own.scale,
+        peak_rad: rotation.peak_slopes[k] * own.scale,
+        rms_rad: rotation.rms_slopes[k] * own.scale,
+    };
+    let mut parameters: Vec<ParameterSensitivity> = named.into_iter().enumerate().map(of).collect();
+    parameters.sort_by(|a, b| b.rms_m.abs().total_cmp(&a.rms_m.abs()));
+    Ok(Sensitivity {
+        robot: robot.name.clone(),
+        motion: scenario.motion.path.display().to_string(),
+        step_s: request.run.step_s,
+        steps: found.steps,
+        peak_m: position.peak,
+        t_peak_s: position.t_peak_s,
+        rms_m: position.rms,
+        peak_rad: rotation.peak,
+        rms_rad: rotation.rms,
+        parameters,
+        table: request.table.as_ref().map(|path| path.display().to_string()),
+        warnings: warnings(&caveats),
+        caveats,
+    })
+}
+
+/// Those of these names, all without any.
+fn chosen<T>(mut all: Vec<T>, patterns: &[String], name: impl Fn(&T) -> &str) -> Result<Vec<T>, Error> {
+    for pattern in patterns {
+        if !all.iter().any(|own| fits(pattern, name(own))) {
+            let names = all.iter().map(|own| name(own).to_owned()).collect();
+            return Err(ValueError::NoParameter { pattern: pattern.clone(), names }.into());
+        }
+    }
+    all.retain(|own| patterns.is_empty() || patterns.iter().any(|pattern| fits(pattern, name(own))));
+    Ok(all)
+}
+
+/// The change by which a parameter of the arm is told, as words and in its coordinate of the search.
+fn change_of(parameter: &Parameter) -> (&'static str, f64) {
+    match parameter.effect {
+        Effect::Entry { size, .. } => ("1 % of the root of K_ii K_jj", 0.01 * size),
+        _ if parameter.is_logarithmic() => ("1 %", 0.01),
+        _ => ("1 kg", 1.0),
+    }
+}
+
+/// Error and derivatives after every step: six columns of each, world axes, m and rad, for the changes by which parameters are told.
+fn table(named: &[Named], found: &RunSlopes) -> String {
+    const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
+    let mut text = String::from("time_s");
+    let names = std::iter::once("error").chain(named.iter().map(|own| own.name.as_str()));
+    for name in names {
+        AXES.iter().for_each(|axis| text += &format!(",{name}.{axis}"));
+    }
+    text.push('\n');
+    for (k, (t, error)) in found.times_s.iter().zip(&found.errors).enumerate() {
+        text += &format!("{t}");
+        error.iter().for_each(|x| text += &format!(",{x:e}"));
+        let slopes = &found.slopes[k * named.len()..][..named.len()];
+        for (own, slope) in named.iter().zip(slopes) {
+            slope.iter().for_each(|x| text += &format!(",{:e}", x * own.scale));
+        }
+        text.push('\n');
+    }
+    text
+}

@@ -1,0 +1,181 @@
+//! What the numbers of the robot do to the tool at rest, its compliance and the natural frequencies at a pose.
+
+use flexarm_identify::{Effect, compliance_slopes, frequency_slopes, tool_slopes};
+use flexarm_kinematics::{Pose, Wrench};
+use nalgebra::{Matrix3, Matrix6, Vector3};
+use serde::Serialize;
+
+use flexarm_run::Arm;
+use flexarm_run::Caveat;
+use flexarm_run::caveat::Use;
+use flexarm_run::caveat::warnings;
+use flexarm_run::Error;
+use flexarm_run::ValueError;
+use flexarm_identify::Parameter;
+use flexarm_run::inspect::joint_values;
+use flexarm_run::Modelling;
+use flexarm_run::Robot;
+
+use super::{change_of, chosen};
+
+/// Answer of `flexarm sensitivity --at`: drives locked, world axes, under the robot's own weight.
+#[derive(Clone, Debug, Serialize)]
+pub struct PoseSensitivity {
+    /// The robot.
+    pub robot: String,
+    /// Joints, in coordinate order.
+    pub joints: Vec<String>,
+    /// Where they are held (rad or m).
+    pub at: Vec<f64>,
+    /// Compliance of the tool, displacement (m, rad) per force (N) and moment (N m), 6×6.
+    pub compliance: [[f64; 6]; 6],
+    /// Natural frequencies (Hz).
+    pub frequencies_hz: Vec<f64>,
+    /// One per number of the robot.
+    pub parameters: Vec<PoseParameter>,
+    /// What the caveats warn of, as sentences.
+    pub warnings: Vec<String>,
+    /// What is doubtful.
+    pub caveats: Vec<Caveat>,
+}
+
+/// What a change of one number does.
+#[derive(Clone, Debug, Serialize)]
+pub struct PoseParameter {
+    /// By the names of the robot file; `tcp.x`, `.y` and `.z` for the place of the tool in its own axes.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// Its value.
+    pub value: f64,
+    /// Of which change of it the following are the effect: `1 %`, `1 % of the root of K_ii K_jj`, `1 kg` or `1 mm`. They are derivatives, times that.
+    pub per: &'static str,
+    /// Of the tool's place (m).
+    pub tcp_m: [f64; 3],
+    /// Of its attitude, a rotation vector (rad).
+    pub tcp_rad: [f64; 3],
+    /// Of the compliance.
+    pub compliance: [[f64; 6]; 6],
+    /// Of the natural frequencies (Hz).
+    pub frequencies_hz: Vec<f64>,
+}
+
+/// What the numbers of the robot do at a pose: tool at rest under the arm's weight, its compliance, natural frequencies; drives locked.
+///
+/// * `at`: all actuated joints (rad or m), zero without it; `parameters`: names, * for anything, all without any.
+///
+/// # Errors
+/// [`Error::Value`] for a name that fits nothing, [`Error::Step`] where there is no equilibrium.
+pub fn pose_sensitivity(
+    robot: &Robot,
+    modelling: Modelling,
+    at: Option<&[f64]>,
+    parameters: &[String],
+) -> Result<PoseSensitivity, Error> {
+    let arm = robot.flexible(modelling)?;
+    if arm.flexible().springs.is_empty() {
+        return Err(ValueError::NothingYields.into());
+    }
+    let joints: Vec<String> = arm.joints().map(str::to_owned).collect();
+    let names: Vec<&str> = joints.iter().map(String::as_str).collect();
+    let at = joint_values(at, &names)?;
+    let all: Vec<Parameter> = arm.numbers(parameters);
+    let still = |parameter: &Parameter| !matches!(parameter.effect, Effect::Damping(_) | Effect::Damper { .. });
+    let all = all.into_iter().filter(still).map(Asked::Arm).chain((0..3).map(Asked::Tool)).collect();
+    slopes(robot, &arm, joints, at, chosen(all, parameters, Asked::name)?)
+}
+
+/// What is asked for.
+enum Asked {
+    Arm(Parameter),
+    /// The tool's point along one of its axes.
+    Tool(usize),
+}
+
+impl Asked {
+    fn name(&self) -> &str {
+        match self {
+            Self::Arm(parameter) => &parameter.name,
+            Self::Tool(axis) => ["tcp.x", "tcp.y", "tcp.z"][*axis],
+        }
+    }
+}
+
+/// What moving the tool's point by 1 mm along one of its axes does, with `a` that axis in the world. The arm stands as it does:
+///
+/// ```text
+/// J' = X' J,   C' = X' C + C X'ᵀ,   X' = [0 -[a]x; 0 0]
+/// ```
+fn of_tool(axis: usize, X_WT: &Pose, C: &Matrix6<f64>, modes: usize) -> PoseParameter {
+    let a: Vector3<f64> = 1e-3 * (X_WT.rotation * Vector3::ith(axis, 1.0));
+    let mut moved = Matrix6::zeros();
+    let turned: Matrix3<f64> = -a.cross_matrix();
+    moved.fixed_view_mut::<3, 3>(0, 3).copy_from(&turned);
+    let half = moved * C;
+    PoseParameter {
+        name: Asked::Tool(axis).name().to_owned(),
+        unit: "m".to_owned(),
+        value: 0.0,
+        per: "1 mm",
+        tcp_m: a.into(),
+        tcp_rad: [0.0; 3],
+        compliance: rows(&(half + half.transpose()), 1.0),
+        frequencies_hz: vec![0.0; modes],
+    }
+}
+
+fn rows(C: &Matrix6<f64>, scale: f64) -> [[f64; 6]; 6] {
+    std::array::from_fn(|i| std::array::from_fn(|j| scale * C[(i, j)]))
+}
+
+fn slopes(
+    robot: &Robot,
+    arm: &Arm,
+    joints: Vec<String>,
+    at: Vec<f64>,
+    asked: Vec<Asked>,
+) -> Result<PoseSensitivity, Error> {
+    let explained = |error| arm.flexible().explained(error);
+    let none = Wrench::zeros();
+    let mut point = arm.operating_point()?;
+    point.solve(&at, &none).map_err(explained)?;
+    let of_arm = |asked: &Asked| match asked {
+        Asked::Arm(parameter) => Some(parameter.clone()),
+        Asked::Tool(_) => None,
+    };
+    let all: Vec<Parameter> = asked.iter().filter_map(of_arm).collect();
+    let tool = tool_slopes(&mut point, &all).map_err(explained)?;
+    let compliance = compliance_slopes(&mut point, &none, &all).map_err(explained)?;
+    let frequencies = frequency_slopes(&arm.plant(), &all, &at).map_err(explained)?;
+    let of = |(k, parameter): (usize, Parameter)| {
+        let (per, scale) = change_of(&parameter);
+        let moved = |first: usize| std::array::from_fn(|i| scale * tool[(first + i, k)]);
+        PoseParameter {
+            per,
+            tcp_m: moved(0),
+            tcp_rad: moved(3),
+            compliance: rows(&compliance[k], scale),
+            frequencies_hz: frequencies.slopes.column(k).iter().map(|slope| scale * slope).collect(),
+            name: parameter.name,
+            unit: parameter.unit,
+            value: parameter.initial,
+        }
+    };
+    let C = point.compliance();
+    let modes = frequencies.hz.len();
+    let of_tools = asked.iter().filter_map(|asked| match asked {
+        Asked::Arm(_) => None,
+        Asked::Tool(axis) => Some(of_tool(*axis, &point.tcp_pose(), &C, modes)),
+    });
+    let caveats = arm.told(Use::Held(&at, &[0.0; 6]));
+    Ok(PoseSensitivity {
+        robot: robot.name.clone(),
+        compliance: rows(&C, 1.0),
+        frequencies_hz: frequencies.hz.clone(),
+        parameters: all.into_iter().enumerate().map(of).chain(of_tools).collect(),
+        warnings: warnings(&caveats),
+        caveats,
+        joints,
+        at,
+    })
+}

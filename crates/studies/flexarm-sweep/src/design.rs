@@ -1,0 +1,214 @@
+//! The runs of a study: which values the parameters have in each, by its number.
+//!
+//! Parameters with listed values make a full grid, the last one changing fastest; those of one `linked` word go along together.
+//! Parameters with a distribution are drawn together, and every point of the grid gets the same draws.
+
+use crate::statistics::{Sample, grid_levels};
+
+use super::file::{ParameterEntry, Role, StudyFile, Values};
+use super::metric::{Formula, Vocabulary};
+use super::store::CAVEATS;
+use super::value::ParameterValue;
+use flexarm_run::RobotFileError;
+
+/// A parameter that has a column.
+#[derive(Clone, Debug)]
+pub(super) struct Column {
+    pub(super) name: String,
+    pub(super) paths: Vec<String>,
+    pub(super) role: Role,
+    pub(super) values: Values,
+    pub(super) bounds: Option<(f64, f64)>,
+    pub(super) place: RobotFileError,
+    /// What it is linked to.
+    linked: Option<String>,
+}
+
+/// Which columns have which values in a run.
+#[derive(Clone, Debug)]
+pub(super) struct Design {
+    pub(super) columns: Vec<Column>,
+    /// Sizes of the grid, and the columns of each of its directions.
+    sizes: Vec<usize>,
+    directions: Vec<Vec<usize>>,
+    /// Columns that are drawn.
+    drawn: Vec<usize>,
+    /// Columns that follow from others.
+    derived: Vec<(usize, Formula)>,
+    sample: Sample,
+    runs: usize,
+}
+
+/// Most runs of a study.
+const MOST_RUNS: u64 = 5_000_000;
+
+impl Column {
+    /// The column of an entry, with its own name or that of its path.
+    pub(super) fn of(entry: &ParameterEntry, name: String, paths: Vec<String>) -> Self {
+        let ParameterEntry { role, values, bounds, place, linked, .. } = entry.clone();
+        Self { name, paths, role, values, bounds, place, linked }
+    }
+
+    /// Whether it is linked by this word.
+    pub(super) fn is_linked_by(&self, word: &str) -> bool {
+        self.linked.as_deref() == Some(word)
+    }
+
+    /// Whether its values are numbers.
+    pub(super) fn is_numeric(&self) -> bool {
+        match &self.values {
+            Values::Levels(list) | Values::Choice(list) => list.iter().all(|value| value.number().is_some()),
+            Values::Spread(_) | Values::Derived(_) => true,
+        }
+    }
+}
+
+impl Design {
+    /// # Errors
+    /// With the place in the study: linked parameters of different lengths, too many runs or drawn parameters, names twice.
+    pub(super) fn new(columns: Vec<Column>, file: &StudyFile) -> Result<Self, RobotFileError> {
+        let fail = |place: &RobotFileError, message: String| RobotFileError { message, ..place.clone() };
+        for (k, column) in columns.iter().enumerate() {
+            let taken = columns[..k].iter().any(|other| other.name == column.name);
+            if taken || ["run", "status", "reason", CAVEATS].contains(&column.name.as_str()) {
+                let message =
+                    format!("the name {:?} is taken: give the parameter another one with name = \"...\"", column.name);
+                return Err(fail(&column.place, message));
+            }
+        }
+        let (mut sizes, mut directions, mut drawn) = (Vec::new(), Vec::<Vec<usize>>::new(), Vec::new());
+        for (k, column) in columns.iter().enumerate() {
+            let levels = match &column.values {
+                Values::Levels(levels) => levels,
+                Values::Derived(_) => continue,
+                Values::Spread(_) | Values::Choice(_) => {
+                    drawn.push(k);
+                    continue;
+                }
+            };
+            let is_its =
+                |direction: &Vec<usize>| column.linked.is_some() && columns[direction[0]].linked == column.linked;
+            match directions.iter().position(is_its) {
+                None => {
+                    sizes.push(levels.len());
+                    directions.push(vec![k]);
+                }
+                Some(known) if sizes[known] == levels.len() => directions[known].push(k),
+                Some(known) => {
+                    let (first, n) = (&columns[directions[known][0]].name, sizes[known]);
+                    let message = format!(
+                        "{:?} has {} values and is linked to {first:?}, which has {n}",
+                        column.name,
+                        levels.len()
+                    );
+                    return Err(fail(&column.place, message));
+                }
+            }
+        }
+        let derived = derived(&columns)?;
+        let sample = Sample::new(file.method, drawn.len(), file.count, file.seed).ok_or_else(|| {
+            let most = file.method.most_dimensions();
+            let message = format!(
+                "{} parameters are drawn, this method takes {most}: use latin-hypercube or random",
+                drawn.len()
+            );
+            fail(&file.sample_place, message)
+        })?;
+        let points = if drawn.is_empty() { 1 } else { sample.points() };
+        let runs =
+            sizes.iter().try_fold(points as u64, |all, n| all.checked_mul(*n as u64)).filter(|n| *n <= MOST_RUNS);
+        let Some(runs) = runs else {
+            let place = columns.first().map_or(&file.sample_place, |column| &column.place);
+            return Err(fail(
+                place,
+                format!("the study has more than {MOST_RUNS} runs: fewer values, or a sample instead of a grid"),
+            ));
+        };
+        Ok(Self { columns, sizes, directions, drawn, derived, sample, runs: runs as usize })
+    }
+
+    /// Number of runs.
+    pub(super) fn runs(&self) -> usize {
+        self.runs
+    }
+
+    /// Points of the grid; a run's is its number over the drawn ones.
+    pub(super) fn grid_points(&self) -> usize {
+        self.sizes.iter().product()
+    }
+
+    /// The directions of the grid: the columns of each, and how many values it has.
+    pub(super) fn directions(&self) -> impl DoubleEndedIterator<Item = (&[usize], usize)> {
+        self.directions.iter().map(Vec::as_slice).zip(self.sizes.iter().copied())
+    }
+
+    /// Columns that are drawn.
+    pub(super) fn drawn(&self) -> &[usize] {
+        &self.drawn
+    }
+
+    /// Returns the coordinates of the first, the middle and the last drawn point; the bits are the same on
+    /// every machine. They differ between programs that draw differently. Empty if nothing is drawn.
+    pub(super) fn drawn_coordinates(&self) -> Vec<f64> {
+        let points = self.sample.points();
+        let places = [0, points / 2, points.saturating_sub(1)];
+        let dimensions = 0..self.drawn.len();
+        places.iter().flat_map(|point| dimensions.clone().map(|d| self.sample.coordinate(*point, d))).collect()
+    }
+
+    /// The values of a run, in the order of the columns.
+    pub(super) fn values(&self, run: usize) -> Vec<ParameterValue> {
+        let points = self.runs / self.grid_points().max(1);
+        let (grid, point) = (run / points.max(1), run % points.max(1));
+        let levels = grid_levels(grid, &self.sizes);
+        let mut values = vec![ParameterValue::Whole(0); self.columns.len()];
+        for (direction, level) in self.directions.iter().zip(levels) {
+            for column in direction {
+                if let Values::Levels(list) = &self.columns[*column].values {
+                    values[*column] = list[level].clone();
+                }
+            }
+        }
+        for (dimension, column) in self.drawn.iter().enumerate() {
+            let u = self.sample.coordinate(point, dimension);
+            values[*column] = match &self.columns[*column].values {
+                Values::Spread(distribution) => ParameterValue::Number(distribution.quantile(u)),
+                Values::Choice(list) => list[((u * list.len() as f64) as usize).min(list.len() - 1)].clone(),
+                Values::Levels(_) | Values::Derived(_) => continue,
+            };
+        }
+        self.derive(&mut values);
+        values
+    }
+
+    /// Puts in what follows from the other values.
+    pub(super) fn derive(&self, values: &mut [ParameterValue]) {
+        for (column, formula) in &self.derived {
+            values[*column] = ParameterValue::Number(formula.of_parameters(values));
+        }
+    }
+}
+
+/// Columns that follow from those before them.
+fn derived(columns: &[Column]) -> Result<Vec<(usize, Formula)>, RobotFileError> {
+    let mut found = Vec::new();
+    for (k, column) in columns.iter().enumerate() {
+        let Values::Derived(text) = &column.values else { continue };
+        let fail = |message: String| RobotFileError {
+            message: format!("parameter {:?}: {message}", column.name),
+            ..column.place.clone()
+        };
+        let known = |(other, column): (usize, &Column)| {
+            let is_known = column.is_numeric() && (other < k || !matches!(column.values, Values::Derived(_)));
+            (is_known && other != k).then(|| column.name.clone())
+        };
+        let parameters: Vec<Option<String>> = columns.iter().enumerate().map(known).collect();
+        let vocabulary = Vocabulary { parameters: &parameters, metrics: &[], summary: &serde_json::Value::Null };
+        let formula = Formula::parse(text, &vocabulary).map_err(fail)?;
+        if !formula.is_of_parameters() {
+            return Err(fail(format!("expression {text:?}: only parameters before it are known here")));
+        }
+        found.push((k, formula));
+    }
+    Ok(found)
+}

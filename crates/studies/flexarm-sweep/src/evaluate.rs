@@ -1,0 +1,251 @@
+//! Runs of a study, some at a time, with what was asked of each.
+//!
+//! Where nothing is asked but how far the tool is off, how long that takes and the frequencies at the start, four runs go side by
+//! side ([`flexarm_stepping::Batch`]); else each has its whole summary. Which way a study goes depends on its metrics alone.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use flexarm_stepping::{Batch, BatchRun, Start, ToolDeflection};
+
+use super::Sweep;
+use super::metric::{self, Facts, Quick, SummaryFacts};
+use super::told::{Told, told};
+use super::value::ParameterValue;
+use super::workshop::Ready;
+use flexarm_run::Caveat;
+use flexarm_run::Error;
+use flexarm_run::RunOptions;
+use flexarm_run::prepare::loaded;
+use flexarm_run::prepare::runnable;
+use flexarm_run::run::BeforeRun;
+use flexarm_run::run::Together;
+use flexarm_run::run::Wanted;
+use flexarm_run::run::run_traced;
+use flexarm_run::run::static_sag;
+use flexarm_run::run::steps_per_sample;
+use flexarm_run::balancer;
+use flexarm_run::loops;
+
+/// What a run gave.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Answer {
+    pub(super) run: usize,
+    /// Values of the metrics, or why there are none.
+    pub(super) result: Result<Vec<f64>, String>,
+    /// What is to be said of it.
+    pub(super) told: Told,
+}
+
+/// Values of the metrics, and by how much each constraint is passed.
+pub(super) type Judgement = (Vec<f64>, Vec<f64>);
+
+/// Gets of each run its place among the points, what it gave, and what is to be said of it.
+pub(super) type Tell<'a> = dyn FnMut(usize, Result<Judgement, Error>, Told) + 'a;
+
+/// A run of the quick way.
+struct QuickRun {
+    place: usize,
+    told: Told,
+    run: BatchRun,
+    tool: flexarm_kinematics::Frame,
+    start: Start,
+    options: RunOptions,
+    facts: QuickFacts,
+    flexible: Arc<flexarm_run::FlexibleRobot>,
+}
+
+/// Facts without a summary.
+#[derive(Clone, Debug, Default)]
+struct QuickFacts {
+    peak_m: f64,
+    t_peak_s: f64,
+    rms_m: f64,
+    end_m: f64,
+    sag_m: f64,
+    duration_s: f64,
+    hz: Vec<f64>,
+    mass_kg: f64,
+}
+
+impl Facts for QuickFacts {
+    fn number(&self, _: &[String], quick: Option<Quick>) -> f64 {
+        match quick {
+            Some(Quick::Peak) => self.peak_m,
+            Some(Quick::PeakTime) => self.t_peak_s,
+            Some(Quick::Rms) => self.rms_m,
+            Some(Quick::End) => self.end_m,
+            Some(Quick::Sag) => self.sag_m,
+            Some(Quick::Duration) => self.duration_s,
+            Some(Quick::Frequency(number)) => self.hz.get(number).copied().unwrap_or(f64::NAN),
+            Some(Quick::Mass) => self.mass_kg,
+            None => f64::NAN,
+        }
+    }
+}
+
+impl QuickFacts {
+    /// With the figures of the samples that a run would log, by the sums of its summary.
+    fn of(self, deflection: &ToolDeflection, options: &RunOptions) -> Self {
+        let every = steps_per_sample(options);
+        let mut facts = Self { duration_s: deflection.steps as f64 * options.step_s, ..self };
+        let (mut area, mut before) = (0.0, None::<(f64, f64)>);
+        for (step, error) in deflection.samples_m.iter().enumerate() {
+            if !(step as u64).is_multiple_of(every) && step as u64 != deflection.steps {
+                continue;
+            }
+            let (t, square) = (step as f64 * options.step_s, error.iter().map(|x| x * x).sum::<f64>());
+            let size = square.sqrt();
+            if before.is_none() || size > facts.peak_m {
+                (facts.peak_m, facts.t_peak_s) = (size, t);
+            }
+            if let Some((last, other)) = before {
+                area += 0.5 * (other + square) * (t - last);
+            }
+            (before, facts.end_m) = (Some((t, square)), size);
+        }
+        facts.rms_m = if facts.duration_s > 0.0 { (area / facts.duration_s).sqrt() } else { facts.end_m };
+        facts
+    }
+}
+
+impl Sweep {
+    /// Some runs, one group after the other; `tell` gets each answer as soon as it is there.
+    pub(super) fn evaluate(&self, runs: &[usize], stop: &AtomicBool, tell: &mut dyn FnMut(Answer)) {
+        let points: Vec<(usize, Vec<ParameterValue>)> =
+            runs.iter().map(|run| (*run, self.design.values(*run))).collect();
+        self.evaluate_points(&points, stop, &mut |place, result, told| {
+            let result = result.map(|(metrics, _)| metrics).map_err(|error| self.workshop.reason(&error));
+            tell(Answer { run: points[place].0, result, told });
+        });
+    }
+
+    /// Runs with these values of the parameters; what each gave, and by how much it passes each constraint of the study.
+    pub(super) fn evaluate_points(
+        &self,
+        points: &[(usize, Vec<ParameterValue>)],
+        stop: &AtomicBool,
+        tell: &mut Tell<'_>,
+    ) {
+        let answered = |place: usize, facts: &dyn Facts| {
+            let values = metric::values(&self.metrics, &points[place].1, facts);
+            let passed = self.constraints.iter().map(|c| c.violation(&points[place].1, &values, facts)).collect();
+            (values, passed)
+        };
+        if !self.quick {
+            for (place, (_, values)) in points.iter().enumerate() {
+                if stop.load(Ordering::Relaxed) {
+                    return;
+                }
+                let mut caveats = Vec::new();
+                match self.whole(values, stop, &mut caveats) {
+                    Err(Error::Interrupted { .. }) => return,
+                    result => tell(place, result.map(|facts| answered(place, &facts)), self.told(caveats)),
+                }
+            }
+            return;
+        }
+        let mut going: Vec<QuickRun> = Vec::new();
+        for (place, (_, values)) in points.iter().enumerate() {
+            if stop.load(Ordering::Relaxed) {
+                return;
+            }
+            let mut caveats = Vec::new();
+            let run = self.quick_run(place, values, &mut caveats);
+            let told = self.told(caveats);
+            match run {
+                Ok(run) => going.push(QuickRun { told, ..run }),
+                Err(error) => tell(place, Err(error), told),
+            }
+        }
+        // Side by side go runs that last about equally long.
+        going.sort_by(|a, b| a.run.duration_s.total_cmp(&b.run.duration_s).then(a.place.cmp(&b.place)));
+        for group in going.chunk_by(QuickRun::goes_with) {
+            for few in group.chunks(Batch::most_side_by_side()) {
+                if stop.load(Ordering::Relaxed) {
+                    return;
+                }
+                let Some(first) = few.first() else { continue };
+                let batch = Batch {
+                    step_s: first.options.step_s,
+                    stepper: first.options.stepper,
+                    start: first.start,
+                    tool: first.tool.clone(),
+                    keep_samples: true,
+                };
+                let runs: Vec<BatchRun> = few.iter().map(|run| run.run.clone()).collect();
+                for (own, result) in few.iter().zip(batch.run(&runs)) {
+                    let result = result.map_err(|error| own.flexible.explained(error));
+                    let result = result.map(|d| answered(own.place, &own.facts.clone().of(&d, &own.options)));
+                    tell(own.place, result, own.told.clone());
+                }
+            }
+        }
+    }
+
+    /// What is to be said of a run, as it is kept.
+    fn told(&self, caveats: Vec<Caveat>) -> Told {
+        told(caveats, &|text| self.workshop.plain(text))
+    }
+
+    /// A run with its summary. `caveats` gets what is to be said of it, also if it fails.
+    fn whole(
+        &self,
+        values: &[ParameterValue],
+        stop: &AtomicBool,
+        caveats: &mut Vec<Caveat>,
+    ) -> Result<SummaryFacts, Error> {
+        let Ready { built, scenario, options } = self.workshop.ready(values)?;
+        caveats.extend_from_slice(&built.caveats);
+        let together = Together {
+            wanted: Wanted::Figures,
+            prepared: Some(&built.prepared),
+            robot_caveats: Some(built.caveats.clone()),
+            ..Together::default()
+        };
+        let mut go_on =
+            |_, _| if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+        let (summary, _) = run_traced(&built.robot, &scenario, &options, None, together, &mut go_on)?;
+        caveats.clone_from(&summary.caveats);
+        let summary = serde_json::to_value(&summary).unwrap_or_default();
+        Ok(SummaryFacts { summary, mass_kg: built.mass_kg })
+    }
+
+    /// A run ready to go side by side with others. `caveats` gets what is to be said of it as far as that can be told before its
+    /// first step, also if it fails.
+    fn quick_run(&self, place: usize, values: &[ParameterValue], caveats: &mut Vec<Caveat>) -> Result<QuickRun, Error> {
+        let Ready { built, scenario, options } = self.workshop.ready(values)?;
+        caveats.extend_from_slice(&built.caveats);
+        runnable(&scenario.motion, &options)?;
+        let flexible = &built.prepared.flexible;
+        loops::along_motion(&flexible.rigid, &scenario.motion.trajectory)?;
+        balancer::check_motion(&flexible.rigid, &scenario.motion.trajectory)?;
+        let arm = built.prepared.arm(scenario.motion.prescribed()).map_err(|error| flexible.explained(error))?;
+        let (arm, of_loads) = loaded(&built.robot, &scenario, &options, arm)?;
+        let facts = QuickFacts {
+            sag_m: static_sag(&arm, &flexible.tcp),
+            hz: arm.modes.frequencies_hz(),
+            mass_kg: built.mass_kg,
+            ..QuickFacts::default()
+        };
+        let before =
+            BeforeRun { robot: &built.robot, flexible, arm: &arm, motion: &scenario.motion, options: &options };
+        caveats.extend(before.caveats_of_study(facts.sag_m));
+        caveats.extend(of_loads);
+        let run = BatchRun { arm, duration_s: scenario.duration_s() };
+        let (tool, flexible, start) = (flexible.tcp.clone(), flexible.clone(), scenario.start);
+        Ok(QuickRun { place, told: None, run, tool, start, options, facts, flexible })
+    }
+}
+
+impl QuickRun {
+    /// Whether two runs have the same steps, start and tool.
+    fn goes_with(&self, other: &Self) -> bool {
+        self.options.stepper == other.options.stepper
+            && self.options.step_s == other.options.step_s
+            && self.start == other.start
+            && self.tool.body == other.tool.body
+            && self.tool.X_BF == other.tool.X_BF
+    }
+}

@@ -1,0 +1,501 @@
+//! The file of a study (`docs/sweep.md`): what is varied, how, and what is asked of each run. Only what can be told without the
+//! robot is checked here.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use flexarm_files::read_text;
+use crate::statistics::{Distribution, SampleMethod};
+use serde::{Deserialize, Serialize};
+use toml::Spanned;
+
+use super::direction::Better;
+use super::value::ParameterValue;
+use flexarm_run::Error;
+use flexarm_run::RobotFileError;
+use flexarm_run::robot_file::Source;
+use flexarm_run::toml_file::parsed;
+
+/// The file as written.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StudyToml {
+    format: Spanned<i64>,
+    name: Option<Spanned<String>>,
+    robot: Spanned<String>,
+    motion: Option<Spanned<String>>,
+    loads: Option<Spanned<String>>,
+    runs: Option<Spanned<PathBuf>>,
+    #[serde(default)]
+    options: BTreeMap<String, Spanned<toml::Value>>,
+    #[serde(default)]
+    reduce: BTreeMap<String, Spanned<PathBuf>>,
+    #[serde(default)]
+    parameter: Vec<Spanned<ParameterToml>>,
+    sample: Option<Spanned<SampleToml>>,
+    metrics: Option<Vec<Spanned<String>>>,
+    #[serde(default)]
+    better: BTreeMap<String, Spanned<String>>,
+    best: Option<Spanned<String>>,
+    pareto: Option<Spanned<[String; 2]>>,
+    minimise: Option<Spanned<MinimiseToml>>,
+}
+
+/// What is varied.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ParameterToml {
+    path: Option<Spanned<String>>,
+    #[serde(default)]
+    paths: Vec<Spanned<String>>,
+    name: Option<Spanned<String>>,
+    #[serde(rename = "as")]
+    role: Option<Spanned<String>>,
+    #[serde(default)]
+    each: bool,
+    linked: Option<String>,
+    expression: Option<String>,
+    values: Option<Spanned<Vec<toml::Value>>>,
+    from: Option<f64>,
+    to: Option<f64>,
+    count: Option<Spanned<i64>>,
+    spacing: Option<Spanned<String>>,
+    distribution: Option<Spanned<String>>,
+    low: Option<f64>,
+    high: Option<f64>,
+    mean: Option<f64>,
+    std: Option<f64>,
+    median: Option<f64>,
+    sigma: Option<f64>,
+    mode: Option<f64>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SampleToml {
+    method: Option<Spanned<String>>,
+    count: Spanned<i64>,
+    #[serde(default)]
+    seed: u64,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MinimiseToml {
+    metric: Spanned<String>,
+    #[serde(default)]
+    constraints: Vec<Spanned<String>>,
+    runs: Option<Spanned<i64>>,
+    #[serde(default)]
+    seed: u64,
+}
+
+/// What a value does to what the file says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Role {
+    /// Takes its place.
+    Value,
+    /// Multiplies it.
+    Factor,
+    /// Is added to it.
+    Offset,
+}
+
+/// The values of a parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Values {
+    /// All of them in turn.
+    Levels(Vec<ParameterValue>),
+    /// Drawn from a distribution.
+    Spread(Distribution),
+    /// Drawn from a list, each as likely as the others.
+    Choice(Vec<ParameterValue>),
+    /// From the other parameters.
+    Derived(String),
+}
+
+/// A parameter as the file has it, with its place for messages.
+#[derive(Clone, Debug)]
+pub(super) struct ParameterEntry {
+    pub(super) name: Option<String>,
+    pub(super) paths: Vec<String>,
+    pub(super) role: Role,
+    /// Whether every place that its paths lead to gets a value of its own.
+    pub(super) each: bool,
+    /// Parameters of one word go along together.
+    pub(super) linked: Option<String>,
+    pub(super) values: Values,
+    /// Least and largest value, where a search goes.
+    pub(super) bounds: Option<(f64, f64)>,
+    pub(super) place: RobotFileError,
+}
+
+/// A text with its place.
+#[derive(Clone, Debug)]
+pub(super) struct Placed {
+    pub(super) text: String,
+    pub(super) place: RobotFileError,
+}
+
+/// What is to be least.
+#[derive(Clone, Debug)]
+pub(super) struct MinimiseEntry {
+    pub(super) metric: Placed,
+    pub(super) constraints: Vec<Placed>,
+    pub(super) runs: Option<usize>,
+    pub(super) seed: u64,
+}
+
+/// The file, checked.
+#[derive(Clone, Debug)]
+pub(super) struct StudyFile {
+    pub(super) path: PathBuf,
+    pub(super) text: String,
+    pub(super) name: String,
+    pub(super) robot: Placed,
+    pub(super) motion: Option<Placed>,
+    pub(super) loads: Option<Placed>,
+    pub(super) options: Vec<(String, ParameterValue, RobotFileError)>,
+    /// Jobs by which links are reduced again.
+    pub(super) reduce: Vec<(String, PathBuf, RobotFileError)>,
+    pub(super) parameters: Vec<ParameterEntry>,
+    pub(super) method: SampleMethod,
+    pub(super) count: usize,
+    pub(super) seed: u64,
+    pub(super) sample_place: RobotFileError,
+    pub(super) metrics: Vec<Placed>,
+    /// What is better of a metric, by its name.
+    pub(super) better: Vec<(String, Better, RobotFileError)>,
+    pub(super) best: Option<Placed>,
+    pub(super) pareto: Option<([String; 2], RobotFileError)>,
+    pub(super) minimise: Option<MinimiseEntry>,
+}
+
+/// What the columns of a table of runs are linked by.
+pub(super) const TABLE: &str = "the table of runs";
+/// Values of a range that does not say how many.
+const USUAL_STEPS: usize = 5;
+/// Most levels of a parameter, and points of a sample.
+const MOST_VALUES: i64 = 1_000_000;
+
+/// Reads the file of a study.
+///
+/// # Errors
+/// [`Error::File`], [`Error::RobotFile`] with line and column.
+pub(super) fn read(path: &Path) -> Result<StudyFile, Error> {
+    let text = read_text(path)?;
+    let source = Source::new(path, &text, "study");
+    let file: StudyToml = parsed(&text, &source, &[], |file: &StudyToml| &file.format)?;
+    let placed = |text: &Spanned<String>| Placed { text: text.get_ref().clone(), place: source.error(text.span(), "") };
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let mut parameters =
+        file.parameter.iter().map(|entry| parameter(entry, &source)).collect::<Result<Vec<_>, RobotFileError>>()?;
+    if let Some(table) = &file.runs {
+        parameters.extend(table_of_runs(&folder.join(table.get_ref()), &source.error(table.span(), ""))?);
+    }
+    let drawn = parameters.iter().any(|p| matches!(p.values, Values::Spread(_) | Values::Choice(_)));
+    let (method, count, seed, sample_place) = sample(file.sample.as_ref(), drawn, &source)?;
+    let options = file.options.iter().map(|(key, value)| option(key, value, &source)).collect::<Result<_, _>>()?;
+    let reduce =
+        file.reduce.iter().map(|(link, job)| (link.clone(), folder.join(job.get_ref()), source.error(job.span(), "")));
+    let stem = path.file_stem().map_or_else(|| "study".into(), |stem| stem.to_string_lossy().into_owned());
+    Ok(StudyFile {
+        path: path.to_owned(),
+        name: file.name.as_ref().map_or(stem, |name| name.get_ref().clone()),
+        robot: placed(&file.robot),
+        motion: file.motion.as_ref().map(placed),
+        loads: file.loads.as_ref().map(placed),
+        options,
+        reduce: reduce.collect(),
+        parameters,
+        method,
+        count,
+        seed,
+        sample_place,
+        metrics: file.metrics.iter().flatten().map(placed).collect(),
+        better: file.better.iter().map(|(name, word)| better(name, word, &source)).collect::<Result<_, _>>()?,
+        best: file.best.as_ref().map(placed),
+        pareto: file.pareto.as_ref().map(|pair| (pair.get_ref().clone(), source.error(pair.span(), ""))),
+        minimise: file.minimise.as_ref().map(|entry| minimise(entry, &source)).transpose()?,
+        text,
+    })
+}
+
+fn better(
+    name: &str,
+    word: &Spanned<String>,
+    source: &Source,
+) -> Result<(String, Better, RobotFileError), RobotFileError> {
+    let place = source.error(word.span(), "");
+    let message = || format!("better: {name:?} is {:?}, expected \"lower\" or \"higher\"", word.get_ref());
+    match Better::from_word(word.get_ref()) {
+        Some(better) => Ok((name.to_owned(), better, place)),
+        None => Err(RobotFileError { message: message(), ..place }),
+    }
+}
+
+fn option(
+    key: &str,
+    value: &Spanned<toml::Value>,
+    source: &Source,
+) -> Result<(String, ParameterValue, RobotFileError), RobotFileError> {
+    let place = source.error(value.span(), "");
+    match ParameterValue::of(value.get_ref()) {
+        Some(known) => Ok((key.to_owned(), known, place)),
+        None => {
+            let found = value.get_ref().type_str();
+            let message = format!("options.{key} is a {found}, expected a number, a word, true or false");
+            Err(RobotFileError { message, ..place })
+        }
+    }
+}
+
+fn sample(
+    entry: Option<&Spanned<SampleToml>>,
+    drawn: bool,
+    source: &Source,
+) -> Result<(SampleMethod, usize, u64, RobotFileError), RobotFileError> {
+    let Some(entry) = entry else {
+        if drawn {
+            let message =
+                "a parameter has a distribution: say how many points are drawn, [sample] with count = 100 for instance";
+            return Err(source.error(0..0, message));
+        }
+        return Ok((SampleMethod::Random, 1, 0, source.error(0..0, "")));
+    };
+    if !drawn {
+        let message = "[sample] has nothing to draw: no parameter has a distribution";
+        return Err(source.error(entry.span(), message));
+    }
+    let sample = entry.get_ref();
+    let method = match &sample.method {
+        None => SampleMethod::LatinHypercube,
+        Some(word) => {
+            let known = SampleMethod::WORDS.iter().find(|(known, ..)| known == word.get_ref());
+            known.map(|(_, method, _)| *method).ok_or_else(|| {
+                let words = SampleMethod::WORDS.map(|(word, ..)| word).join(", ");
+                source.error(word.span(), format!("method {:?} is not known; use {words}", word.get_ref()))
+            })?
+        }
+    };
+    let count = count(&sample.count, "count", 1, source)?;
+    Ok((method, count, sample.seed, source.error(entry.span(), "")))
+}
+
+fn count(value: &Spanned<i64>, what: &str, least: i64, source: &Source) -> Result<usize, RobotFileError> {
+    match *value.get_ref() {
+        n if (least..=MOST_VALUES).contains(&n) => Ok(n as usize),
+        n => {
+            let message = format!("{what} = {n}: expected a whole number from {least} to {MOST_VALUES}");
+            Err(source.error(value.span(), message))
+        }
+    }
+}
+
+fn minimise(entry: &Spanned<MinimiseToml>, source: &Source) -> Result<MinimiseEntry, RobotFileError> {
+    let own = entry.get_ref();
+    let placed = |text: &Spanned<String>| Placed { text: text.get_ref().clone(), place: source.error(text.span(), "") };
+    Ok(MinimiseEntry {
+        metric: placed(&own.metric),
+        constraints: own.constraints.iter().map(placed).collect(),
+        runs: own.runs.as_ref().map(|runs| count(runs, "runs", 1, source)).transpose()?,
+        seed: own.seed,
+    })
+}
+
+fn parameter(entry: &Spanned<ParameterToml>, source: &Source) -> Result<ParameterEntry, RobotFileError> {
+    let own = entry.get_ref();
+    let fail = |message: String| source.error(entry.span(), message);
+    let paths: Vec<String> = own.path.iter().chain(&own.paths).map(|path| path.get_ref().clone()).collect();
+    let Some(first) = paths.first() else {
+        return Err(fail("a parameter needs a path, such as \"payload.mass\", or paths = [...]".into()));
+    };
+    let fail = |message: String| source.error(entry.span(), format!("parameter {first:?}: {message}"));
+    let role = match own.role.as_ref().map(|role| role.get_ref().as_str()) {
+        None | Some("value") => Role::Value,
+        Some("factor") => Role::Factor,
+        Some("offset") => Role::Offset,
+        Some(other) => {
+            return Err(fail(format!("as = {other:?} is not known; use \"value\", \"factor\" or \"offset\"")));
+        }
+    };
+    let (values, bounds) = values(own, source, &fail)?;
+    let Placed { place, .. } = Placed { text: String::new(), place: source.error(entry.span(), "") };
+    if own.each && own.name.is_some() {
+        return Err(fail(
+            "each = true makes several parameters, which have the names of their places: leave name out".into(),
+        ));
+    }
+    if own.linked.is_some() && !matches!(values, Values::Levels(_)) {
+        return Err(fail("linked is for values that are listed; give several paths to draw one value for all".into()));
+    }
+    let (each, linked) = (own.each, own.linked.clone());
+    let name = own.name.as_ref().map(|name| name.get_ref().clone());
+    Ok(ParameterEntry { name, paths, role, each, linked, values, bounds, place })
+}
+
+/// Values of a parameter, and its bounds.
+fn values(
+    own: &ParameterToml,
+    source: &Source,
+    fail: &dyn Fn(String) -> RobotFileError,
+) -> Result<(Values, Option<(f64, f64)>), RobotFileError> {
+    const ONE: &str = "give it one of values = [...], from and to, distribution = \"...\" or expression = \"...\"";
+    let has_range = own.from.is_some() || own.to.is_some() || own.count.is_some();
+    if let Some(expression) = &own.expression {
+        return match own.values.is_none() && !has_range && own.distribution.is_none() {
+            true => Ok((Values::Derived(expression.clone()), None)),
+            false => Err(fail(ONE.into())),
+        };
+    }
+    match (&own.values, has_range, &own.distribution) {
+        (Some(list), false, word) => {
+            let known: Option<Vec<ParameterValue>> = list.get_ref().iter().map(ParameterValue::of).collect();
+            let known = known.filter(|known| !known.is_empty()).ok_or_else(|| {
+                source.error(
+                    list.span(),
+                    "values: expected a list of finite numbers, of words or files, or of true and false",
+                )
+            })?;
+            match word.as_ref().map(|word| word.get_ref().as_str()) {
+                None => Ok((Values::Levels(known), None)),
+                Some("choice") => Ok((Values::Choice(known), None)),
+                Some(other) => Err(fail(format!("distribution = {other:?} takes no values; \"choice\" does"))),
+            }
+        }
+        (None, true, None) => range(own, source, fail),
+        (None, false, Some(word)) => {
+            let distribution = distribution(own, word.get_ref(), fail)?;
+            Ok((Values::Spread(distribution), distribution.bounds()))
+        }
+        _ => Err(fail(ONE.into())),
+    }
+}
+
+/// Steps from one number to another.
+fn range(
+    own: &ParameterToml,
+    source: &Source,
+    fail: &dyn Fn(String) -> RobotFileError,
+) -> Result<(Values, Option<(f64, f64)>), RobotFileError> {
+    let (Some(from), Some(to)) = (own.from, own.to) else {
+        return Err(fail("a range needs from = ... and to = ...".into()));
+    };
+    let logarithmic = match own.spacing.as_ref().map(|word| word.get_ref().as_str()) {
+        None | Some("linear") => false,
+        Some("log") => true,
+        Some(other) => return Err(fail(format!("spacing = {other:?} is not known; use \"linear\" or \"log\""))),
+    };
+    if !(from.is_finite() && to.is_finite()) || logarithmic && !(from > 0.0 && to > 0.0) {
+        let expected = if logarithmic { "positive numbers for spacing = \"log\"" } else { "finite numbers" };
+        return Err(fail(format!("from = {from}, to = {to}: expected {expected}")));
+    }
+    let steps = match &own.count {
+        Some(steps) => count(steps, "count", 1, source)?,
+        None => USUAL_STEPS,
+    };
+    let at = |k: usize| {
+        let part = if steps > 1 { k as f64 / (steps - 1) as f64 } else { 0.0 };
+        match (k + 1 == steps && steps > 1, logarithmic) {
+            (true, _) => to,
+            (false, true) => from * (to / from).powf(part),
+            (false, false) => from + (to - from) * part,
+        }
+    };
+    let levels = (0..steps).map(|k| ParameterValue::Number(at(k))).collect();
+    Ok((Values::Levels(levels), Some((from.min(to), from.max(to)))))
+}
+
+fn distribution(
+    own: &ParameterToml,
+    word: &str,
+    fail: &dyn Fn(String) -> RobotFileError,
+) -> Result<Distribution, RobotFileError> {
+    let numbers = [
+        ("low", own.low),
+        ("high", own.high),
+        ("mean", own.mean),
+        ("std", own.std),
+        ("median", own.median),
+        ("sigma", own.sigma),
+        ("mode", own.mode),
+    ];
+    let taken: &[&str] = match word {
+        "uniform" | "log-uniform" => &["low", "high"],
+        "normal" => &["mean", "std"],
+        "lognormal" => &["median", "sigma"],
+        "triangular" => &["low", "mode", "high"],
+        "choice" => return Err(fail("distribution = \"choice\" needs values = [...]".into())),
+        other => {
+            let words = "uniform, log-uniform, normal, lognormal, triangular or choice";
+            return Err(fail(format!("distribution {other:?} is not known; use {words}")));
+        }
+    };
+    if let Some((key, _)) = numbers.iter().find(|(key, value)| value.is_some() && !taken.contains(key)) {
+        return Err(fail(format!("distribution = {word:?} does not take {key}; it takes {}", taken.join(", "))));
+    }
+    let number = |key: &str| match numbers.iter().find(|(known, _)| *known == key) {
+        Some((_, Some(x))) if x.is_finite() => Ok(*x),
+        Some((_, Some(x))) => Err(fail(format!("{key} = {x}: expected a finite number"))),
+        _ => Err(fail(format!("distribution = {word:?} needs {key} = ..."))),
+    };
+    let ordered = |low: f64, high: f64| match low < high {
+        true => Ok(()),
+        false => Err(fail(format!("low = {low} must lie below high = {high}"))),
+    };
+    let positive = |what: &str, x: f64| match x > 0.0 {
+        true => Ok(x),
+        false => Err(fail(format!("{what} = {x}: expected a positive number"))),
+    };
+    Ok(match word {
+        "uniform" | "log-uniform" => {
+            let (low, high) = (number("low")?, number("high")?);
+            ordered(low, high)?;
+            match word {
+                "uniform" => Distribution::Uniform { low, high },
+                _ => Distribution::LogUniform { low: positive("low", low)?, high },
+            }
+        }
+        "normal" => Distribution::Normal { mean: number("mean")?, std: positive("std", number("std")?)? },
+        "lognormal" => Distribution::LogNormal {
+            median: positive("median", number("median")?)?,
+            sigma: positive("sigma", number("sigma")?)?,
+        },
+        _ => {
+            let (low, mode, high) = (number("low")?, number("mode")?, number("high")?);
+            ordered(low, high)?;
+            if !(low..=high).contains(&mode) {
+                return Err(fail(format!("mode = {mode} must lie between low = {low} and high = {high}")));
+            }
+            Distribution::Triangular { low, mode, high }
+        }
+    })
+}
+
+/// A table of runs: a column for each parameter, named by its path, a row for each run.
+fn table_of_runs(path: &Path, place: &RobotFileError) -> Result<Vec<ParameterEntry>, Error> {
+    let table = flexarm_files::NumberTable::read(path)?;
+    let fail = |what: String| Error::File { path: path.to_owned(), what };
+    if table.rows.is_empty() {
+        return Err(fail("the table has no rows: one for each run is expected".into()));
+    }
+    let column = |(k, name): (usize, &String)| {
+        let value = |(row, line): (&Vec<f64>, &usize)| match row[k].is_nan() {
+            true => Err(fail(format!("line {line}, column {name:?}: the cell is empty, a number is expected"))),
+            false => Ok(ParameterValue::Number(row[k])),
+        };
+        let levels = table.rows.iter().zip(&table.lines).map(value).collect::<Result<Vec<_>, Error>>()?;
+        Ok(ParameterEntry {
+            name: None,
+            paths: vec![name.clone()],
+            role: Role::Value,
+            each: false,
+            linked: Some(TABLE.into()),
+            values: Values::Levels(levels),
+            bounds: None,
+            place: place.clone(),
+        })
+    };
+    table.names.iter().enumerate().map(column).collect()
+}

@@ -1,0 +1,483 @@
+//! Studies: many runs of one robot with other numbers in its files, on all cores or anywhere, and what they tell.
+//!
+//! `docs/sweep.md` describes the file of a study. [`Sweep::load`] reads and checks it, [`Sweep::run`] runs what is not done yet in a
+//! folder or in a shard of it, [`merge`] joins folders of shards, [`Sweep::minimise`] looks for the least of a metric. Runs have numbers
+//! from 0; a number alone says what a run is, on any machine.
+//!
+//! Not here: points of designs and what results tell as mathematics (`flexarm-study`); a few runs with their curves over each other
+//! ([`flexarm_run::compare_study`]).
+
+mod design;
+mod direction;
+mod error;
+mod evaluate;
+mod file;
+mod metric;
+mod minimise;
+mod options;
+mod page;
+mod path;
+mod ranking;
+mod recent;
+mod replay;
+mod results;
+mod store;
+mod table;
+mod target;
+mod told;
+mod value;
+mod workshop;
+
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+use flexarm_log::CreateOptions;
+
+use self::design::{Column, Design};
+use self::evaluate::Answer;
+use self::file::StudyFile;
+use self::metric::{Constraint, Metric, Vocabulary};
+use self::store::{Collected, Manifest, RUNS, Store, known_manifest};
+use self::workshop::Workshop;
+use flexarm_run::Error;
+use flexarm_run::FlexibleRobot;
+use flexarm_run::PathFigures;
+use flexarm_run::Robot;
+use flexarm_run::RobotFileError;
+use flexarm_run::summary::DriveFigures;
+use flexarm_run::LinkFigures;
+use flexarm_run::Summary;
+use flexarm_run::TcpFigures;
+
+pub use self::direction::Better;
+pub use self::error::SweepError;
+pub use self::file::Role as ParameterRole;
+pub use self::minimise::{MinimiseFigures, MinimiseRequest};
+pub use self::replay::Replay;
+pub use self::results::{
+    BestRun, FailureFigures, IndexFigures, MetricFigures, ParameterFigures, ParetoFigures, ParetoRun, SweepSummary,
+};
+pub use self::store::Shard;
+pub use self::told::CaveatFigures;
+pub use self::value::ParameterValue;
+
+/// What is asked of each run where the study does not say.
+const USUAL_METRICS: [&str; 4] = ["tcp.peak_m", "tcp.rms_m", "tcp.end_m", "tcp.static_sag_m"];
+/// The input that stands for how points are drawn.
+const DRAWN_POINTS: &str = "the drawn points";
+/// The page of a study.
+const PAGE: &str = "report.html";
+/// Runs that a thread takes at a time where four go side by side.
+const WINDOW: usize = 64;
+/// Between two looks at the wish to stop.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// How a study finds robots and motions that it calls by a name.
+#[derive(Clone, Copy, Debug)]
+pub struct Finders {
+    /// A robot file.
+    pub robot: fn(&Path) -> PathBuf,
+    /// A motion or a file of loads.
+    pub motion: fn(&Path) -> PathBuf,
+}
+
+impl Default for Finders {
+    /// Names are paths.
+    fn default() -> Self {
+        Self { robot: Path::to_path_buf, motion: Path::to_path_buf }
+    }
+}
+
+/// A study, checked.
+pub struct Sweep {
+    file: StudyFile,
+    design: Design,
+    workshop: Workshop,
+    metrics: Vec<Metric>,
+    constraints: Vec<Constraint>,
+    /// Whether no run needs its whole summary.
+    quick: bool,
+    /// A summary with all names that a run has.
+    vocabulary: serde_json::Value,
+}
+
+/// How a study is run.
+#[derive(Clone, Debug)]
+pub struct SweepRequest {
+    /// Folder of the results; runs that are there already are not run again.
+    pub output: PathBuf,
+    /// Replace results of another study.
+    pub overwrite: bool,
+    /// The part of the runs that is run.
+    pub shard: Shard,
+    /// Threads; as many as there are cores without it.
+    pub threads: Option<usize>,
+    /// How a run of these files is asked for, in the words of the face.
+    pub command: Option<fn(&Replay) -> String>,
+}
+
+/// Runs that are over, and all.
+pub type SweepProgress<'a> = dyn FnMut(usize, usize) -> ControlFlow<()> + 'a;
+
+impl Sweep {
+    /// Reads and checks a study and all files that it names.
+    ///
+    /// # Errors
+    /// [`Error::RobotFile`] with line and column of what is wrong in the study: paths that lead nowhere, metrics that no run has,
+    /// files that are not there; what is wrong with the robot.
+    pub fn load(path: &Path, finders: &Finders) -> Result<Self, Error> {
+        let file = file::read(path)?;
+        let mut workshop = Workshop::new(&file, finders)?;
+        let columns = columns(&file, &workshop)?;
+        workshop.vary(&columns, &file, finders)?;
+        let design = Design::new(columns, &file)?;
+        let robot = workshop.base_robot()?;
+        let flexible = robot.modelled(&workshop.base_modelling())?;
+        let summary = serde_json::to_value(skeleton(&robot, &flexible)).unwrap_or_default();
+        let parameters = parameter_names(&design);
+        let mut metrics: Vec<Metric> = Vec::new();
+        let usual = file.metrics.is_empty().then(|| {
+            let frequency = (!flexible.springs.is_empty()).then_some("f1_hz = frequencies_hz.0");
+            let place = file.robot.place.clone();
+            USUAL_METRICS
+                .into_iter()
+                .chain(frequency)
+                .map(move |text| (text.to_owned(), place.clone()))
+                .collect::<Vec<_>>()
+        });
+        let asked = file.metrics.iter().map(|metric| (metric.text.clone(), metric.place.clone()));
+        for (text, place) in usual.into_iter().flatten().chain(asked) {
+            let known = Vocabulary { parameters: &parameters, metrics: &metrics, summary: &summary };
+            let mut metric = Metric::parse(&text, &known).map_err(|message| RobotFileError { message, ..place })?;
+            let said = file.better.iter().find(|(name, ..)| *name == metric.name);
+            metric.better = said.map(|(_, better, _)| *better).or(metric.better);
+            metrics.push(metric);
+        }
+        let known = Vocabulary { parameters: &parameters, metrics: &metrics, summary: &summary };
+        let mut constraints = Vec::new();
+        for text in file.minimise.iter().flat_map(|entry| &entry.constraints) {
+            let fail = |message| RobotFileError { message, ..text.place.clone() };
+            constraints.push(Constraint::parse(&text.text, &known).map_err(fail)?);
+        }
+        check_names(&file, &metrics)?;
+        table::check()?;
+        let quick = metrics.iter().all(Metric::is_quick) && constraints.iter().all(Constraint::is_quick);
+        Ok(Self { file, design, workshop, metrics, constraints, quick, vocabulary: summary })
+    }
+
+    /// Name of the study: that of its file if it has none of its own.
+    pub fn name(&self) -> &str {
+        &self.file.name
+    }
+
+    /// Number of runs.
+    pub fn runs(&self) -> usize {
+        self.design.runs()
+    }
+
+    /// Names of the parameters.
+    pub fn parameters(&self) -> Vec<&str> {
+        self.design.columns.iter().map(|column| column.name.as_str()).collect()
+    }
+
+    /// Names of the metrics.
+    pub fn metrics(&self) -> Vec<&str> {
+        self.metrics.iter().map(|metric| metric.name.as_str()).collect()
+    }
+
+    /// Names of the parameters that are numbers.
+    fn parameter_names(&self) -> Vec<Option<String>> {
+        parameter_names(&self.design)
+    }
+
+    /// Values of the parameters in a run, in their order.
+    pub fn values(&self, run: usize) -> Vec<ParameterValue> {
+        self.design.values(run)
+    }
+
+    /// Runs what is not done yet of a shard; if that is all of the study, makes the table of all runs.
+    ///
+    /// A run that fails is a row with its reason.
+    ///
+    /// # Errors
+    /// [`SweepError`]: a folder of another study, another process at the same shard, [`SweepError::Stopped`] if `progress` breaks
+    /// off; [`Error::Write`]: what was done up to there is kept.
+    pub fn run(&mut self, request: &SweepRequest, progress: &mut SweepProgress<'_>) -> Result<SweepSummary, Error> {
+        let (started, cpu) = (Instant::now(), cpu_time::ProcessTime::now());
+        let SweepRequest { output, shard, .. } = request;
+        let runs = self.runs();
+        if shard.number == 0 || shard.number > shard.of || shard.of > runs {
+            return Err(SweepError::Shard { number: shard.number, of: shard.of, runs }.into());
+        }
+        let manifest = self.manifest();
+        self.workshop.put_links_into(output);
+        let (mut store, mut collected) = Store::open(output, manifest.clone(), *shard, request.overwrite)?;
+        let todo: Vec<usize> =
+            (0..runs).filter(|run| shard.has(*run) && !collected.answers.contains_key(run)).collect();
+        let all = (0..runs).filter(|run| shard.has(*run)).count();
+        let before = all - todo.len();
+        let threads = request.threads.unwrap_or_else(rayon::current_num_threads).max(1);
+        let mut shown = |done: usize| progress(before + done, all);
+        let mut new = Vec::new();
+        let ended = self.run_all(&todo, threads, &mut shown, &mut |mut answer| {
+            collected.share(&mut answer);
+            new.push(answer.clone());
+            store.keep(answer, self)
+        });
+        // Whatever ended it: what is there becomes a part, if the disk has room.
+        let rolled = store.roll(self);
+        let is_whole = ended?;
+        rolled?;
+        for answer in new {
+            collected.answers.insert(answer.run, (answer, 0));
+        }
+        if !is_whole {
+            let done = collected.answers.len();
+            return Err(SweepError::Stopped { done, runs, folder: output.clone() }.into());
+        }
+        let spent = || (started.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
+        if *shard != Shard::ALL {
+            let (summary, _) = self.summary(&collected);
+            let (wall_s, cpu_s) = spent();
+            let shard = Some(format!("{}/{}", shard.number, shard.of));
+            return Ok(SweepSummary { shard, wall_s, cpu_s, file: output.display().to_string(), ..summary });
+        }
+        let path = self.write_all_runs(&collected, &manifest, output)?;
+        store.remove_parts();
+        self.finish(&collected, &path, output, request.command, &spent)
+    }
+
+    /// Summary, page and the best run of a study that is whole.
+    fn finish(
+        &self,
+        collected: &Collected,
+        table: &Path,
+        folder: &Path,
+        command: Option<fn(&Replay) -> String>,
+        spent: &dyn Fn() -> (f64, f64),
+    ) -> Result<SweepSummary, Error> {
+        let (mut summary, columns) = self.summary(collected);
+        if let Some(best) = &mut summary.best {
+            let replay = self.write_replay(&self.design.values(best.run), &folder.join("best"))?;
+            best.command = command.map(|command| command(&replay));
+            best.files = Some(replay);
+        }
+        summary.file = table.display().to_string();
+        let page = folder.join(PAGE);
+        summary.page = Some(page.display().to_string());
+        (summary.wall_s, summary.cpu_s) = spent();
+        let json = serde_json::to_string_pretty(&summary).expect("plain numbers and strings") + "\n";
+        flexarm_files::write_all(&[(page, self.page(&summary, &columns)), (folder.join("sweep.json"), json)])?;
+        Ok(summary)
+    }
+
+    /// Runs on several threads; whether all were run.
+    fn run_all(
+        &self,
+        todo: &[usize],
+        threads: usize,
+        progress: &mut dyn FnMut(usize) -> ControlFlow<()>,
+        keep: &mut dyn FnMut(Answer) -> Result<(), Error>,
+    ) -> Result<bool, Error> {
+        let (stop, next) = (AtomicBool::new(false), AtomicUsize::new(0));
+        let window = if self.quick { (todo.len() / (8 * threads)).clamp(4, WINDOW) } else { 1 };
+        let (tell, told) = channel();
+        let mut done = 0;
+        let mut failed = None;
+        std::thread::scope(|scope| {
+            for _ in 0..threads {
+                let (tell, stop, next) = (tell.clone(), &stop, &next);
+                scope.spawn(move || {
+                    loop {
+                        let start = next.fetch_add(window, Ordering::Relaxed);
+                        if start >= todo.len() || stop.load(Ordering::Relaxed) {
+                            break;
+                        }
+                        let few = &todo[start..(start + window).min(todo.len())];
+                        self.evaluate(few, stop, &mut |answer| {
+                            let _ = tell.send(answer); // who hears nothing any more has stopped
+                        });
+                    }
+                });
+            }
+            drop(tell);
+            loop {
+                match told.recv_timeout(LOOK) {
+                    Ok(answer) if failed.is_none() => match keep(answer) {
+                        Ok(()) => done += 1,
+                        Err(error) => {
+                            failed = Some(error);
+                            stop.store(true, Ordering::Relaxed);
+                        }
+                    },
+                    Ok(_) | Err(RecvTimeoutError::Timeout) => {}
+                    Err(RecvTimeoutError::Disconnected) => break,
+                }
+                if progress(done).is_break() {
+                    stop.store(true, Ordering::Relaxed);
+                }
+            }
+        });
+        match failed {
+            Some(error) => Err(error),
+            None => Ok(done == todo.len()),
+        }
+    }
+
+    /// The table of all runs.
+    fn write_all_runs(&self, collected: &Collected, manifest: &Manifest, folder: &Path) -> Result<PathBuf, Error> {
+        if let Some(missing) = collected.missing(self.runs()) {
+            return Err(missing.into());
+        }
+        let answers: Vec<Answer> = collected.answers.values().map(|(answer, _)| answer.clone()).collect();
+        let path = folder.join(RUNS);
+        table::write(&path, &self.table(&answers, manifest), CreateOptions::default().with_overwrite(true))?;
+        Ok(path)
+    }
+
+    fn manifest(&self) -> Manifest {
+        let mut inputs = vec![(
+            self.file.path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            fingerprint(self.file.text.as_bytes()),
+        )];
+        inputs.extend(self.workshop.inputs());
+        let drawn = self.design.drawn_coordinates();
+        if !drawn.is_empty() {
+            let bytes: Vec<u8> = drawn.iter().flat_map(|coordinate| coordinate.to_le_bytes()).collect();
+            inputs.push((DRAWN_POINTS.into(), fingerprint(&bytes)));
+        }
+        let mut manifest = Manifest {
+            format: 1,
+            fingerprint: String::new(),
+            study: self.file.name.clone(),
+            flexarm: env!("CARGO_PKG_VERSION").into(),
+            runs: self.runs(),
+            parameters: self.parameters().into_iter().map(str::to_owned).collect(),
+            metrics: self.metrics().into_iter().map(str::to_owned).collect(),
+            inputs,
+            file: String::new(),
+        };
+        manifest.fingerprint = fingerprint(serde_json::to_string(&manifest).unwrap_or_default().as_bytes());
+        let file = std::path::absolute(&self.file.path).unwrap_or_else(|_| self.file.path.clone());
+        Manifest { file: file.display().to_string(), ..manifest }
+    }
+}
+
+/// Joins the results of shards: all runs of all folders in one table.
+///
+/// * `output`: folder of the table; that of the first folder without it.
+///
+/// # Errors
+/// [`SweepError`]: runs that are missing, runs that are there twice with different results, folders of other studies.
+pub fn merge(
+    study: &Sweep,
+    folders: &[PathBuf],
+    output: &Path,
+    overwrite: bool,
+    command: Option<fn(&Replay) -> String>,
+) -> Result<SweepSummary, Error> {
+    let (started, cpu) = (Instant::now(), cpu_time::ProcessTime::now());
+    let manifest = study.manifest();
+    let mut collected = Collected::default();
+    let mut first: Option<&PathBuf> = None;
+    for folder in folders {
+        let known = known_manifest(folder)?.ok_or_else(|| SweepError::NoStudy { folder: folder.clone() })?;
+        if known.fingerprint != manifest.fingerprint {
+            let differs = known.differs(&manifest);
+            let first = first.cloned().unwrap_or_else(|| study.file.path.clone());
+            return Err(SweepError::ForeignShard { folder: folder.clone(), first, differs }.into());
+        }
+        first.get_or_insert(folder);
+        collected.read(folder, &manifest)?;
+    }
+    let path = output.join(RUNS);
+    if path.exists() && !overwrite && !folders.iter().any(|folder| folder == output) {
+        return Err(Error::Taken { path, place: "folder", movable: true });
+    }
+    std::fs::create_dir_all(output).map_err(|source| Error::Write { path: output.to_owned(), source })?;
+    let path = study.write_all_runs(&collected, &manifest, output)?;
+    if known_manifest(output)?.is_none() {
+        let text = serde_json::to_string_pretty(&manifest).expect("plain numbers and strings") + "\n";
+        flexarm_files::write_all(&[(output.join(store::STUDY), text)])?;
+    }
+    study.finish(&collected, &path, output, command, &|| (started.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64()))
+}
+
+/// Writes the files of a plan.
+///
+/// # Errors
+/// [`Error::Taken`], [`Error::Write`].
+pub fn write_files(files: &[(PathBuf, String)], overwrite: bool) -> Result<(), Error> {
+    let paths: Vec<PathBuf> = files.iter().map(|(path, _)| path.clone()).collect();
+    flexarm_files::check_free(&paths, overwrite)?;
+    Ok(flexarm_files::write_all(files)?)
+}
+
+/// What the study calls best, better or a front must be metrics.
+fn check_names(file: &StudyFile, metrics: &[Metric]) -> Result<(), RobotFileError> {
+    let best = file.best.iter().map(|best| (&best.text, &best.place));
+    let pareto = file.pareto.iter().flat_map(|(pair, place)| pair.iter().map(move |name| (name, place)));
+    let better = file.better.iter().map(|(name, _, place)| (name, place));
+    for (name, place) in best.chain(pareto).chain(better) {
+        if !metrics.iter().any(|metric| metric.name == *name) {
+            let known: Vec<&str> = metrics.iter().map(|metric| metric.name.as_str()).collect();
+            let message = format!("{name:?} is no metric of the study; they are {}", known.join(", "));
+            return Err(RobotFileError { message, ..place.clone() });
+        }
+    }
+    Ok(())
+}
+
+/// The columns of the parameters; one for each place where that is asked for.
+fn columns(file: &StudyFile, workshop: &Workshop) -> Result<Vec<Column>, RobotFileError> {
+    let mut columns = Vec::new();
+    for entry in &file.parameters {
+        if !entry.each {
+            let name = entry.name.clone().unwrap_or_else(|| entry.paths[0].clone());
+            columns.push(Column::of(entry, name, entry.paths.clone()));
+            continue;
+        }
+        for path in &entry.paths {
+            let fail =
+                |message: String| RobotFileError { message: format!("parameter {message}"), ..entry.place.clone() };
+            let places = workshop.expanded(path).map_err(fail)?;
+            if places.is_empty() {
+                return Err(fail(format!("{path:?} leads nowhere")));
+            }
+            columns.extend(places.into_iter().map(|place| Column::of(entry, place.clone(), vec![place])));
+        }
+    }
+    Ok(columns)
+}
+
+fn parameter_names(design: &Design) -> Vec<Option<String>> {
+    design.columns.iter().map(|column| column.is_numeric().then(|| column.name.clone())).collect()
+}
+
+/// A summary with all names that a run of the robot has.
+fn skeleton(robot: &Robot, flexible: &FlexibleRobot) -> Summary {
+    let links = flexible.spans.iter().map(|span| LinkFigures { name: span.link.clone(), ..LinkFigures::default() });
+    let elastic = robot.drives.iter().filter(|drive| drive.gearbox.is_some());
+    let elastic = elastic.map(|drive| DriveFigures { joint: drive.joint.clone(), ..DriveFigures::default() });
+    let drives: BTreeMap<String, f64> =
+        flexible.model.coordinates().iter().map(|coordinate| (coordinate.joint.clone(), 0.0)).collect();
+    Summary {
+        tcp: Some(TcpFigures::default()),
+        path: Some(PathFigures::default()),
+        links: links.collect(),
+        elastic_drives: elastic.collect(),
+        frequencies_hz: vec![0.0; flexible.model.nv() - flexible.model.n_actuated()],
+        drives,
+        ..Summary::default()
+    }
+}
+
+/// A number for a text: the same text has the same on any machine (FNV-1a, 64 bits twice with different starts).
+fn fingerprint(bytes: &[u8]) -> String {
+    let hash = |start: u64| bytes.iter().fold(start, |h, byte| (h ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3));
+    format!("{:016x}{:016x}", hash(0xcbf2_9ce4_8422_2325), hash(0x9e37_79b9_7f4a_7c15))
+}

@@ -1,0 +1,415 @@
+//! The search for the least of a metric within the bounds of the parameters and under constraints.
+//!
+//! Runs are asked for a generation at a time ([`LeastSearch`]). Each answer stands in a journal with the values of its parameters; a
+//! search that was stopped asks for the same points again and finds them there.
+
+use std::collections::HashMap;
+use std::fs::{File, OpenOptions};
+use std::io::Write;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Instant;
+
+use flexarm_log::CreateOptions;
+use crate::statistics::{Judged, LeastSearch};
+use serde::{Deserialize, Serialize};
+
+use super::direction::Better;
+use super::error::SweepError;
+use super::evaluate::{Answer, Judgement};
+use super::file::{Role, Values};
+use super::metric::{Constraint, Vocabulary};
+use super::results::SweepSummary;
+use super::store::{Manifest, RUNS, STUDY, known_manifest};
+use super::told::Told;
+use super::value::ParameterValue;
+use super::{LOOK, PAGE, Sweep, SweepProgress, SweepRequest, fingerprint, table};
+use flexarm_run::Error;
+use flexarm_run::RobotFileError;
+
+/// Runs of a search that does not say how many.
+const USUAL_RUNS: usize = 400;
+/// The answers of a search.
+const JOURNAL: &str = "minimise.journal";
+/// Runs that a thread takes at a time.
+const FEW: usize = 4;
+
+/// What is to be least, and how long it is looked for, in the place of what the study says.
+#[derive(Clone, Debug, Default)]
+pub struct MinimiseRequest {
+    /// A metric of the study.
+    pub metric: Option<String>,
+    /// Constraints beside those of the study, such as `peak_mm <= 6`.
+    pub constraints: Vec<String>,
+    /// Most runs.
+    pub runs: Option<usize>,
+}
+
+/// How a search went.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct MinimiseFigures {
+    /// What is to be least.
+    pub metric: String,
+    /// What must hold.
+    pub constraints: Vec<String>,
+    /// Whether the best run keeps them all.
+    pub kept: bool,
+    /// Whether the search ended by itself: its points hardly differed any more.
+    pub settled: bool,
+    /// Generations.
+    pub generations: usize,
+    /// What the files give before anything is looked for; null if that run failed.
+    pub start: Option<f64>,
+    /// Whether that keeps the constraints.
+    pub start_kept: bool,
+    /// Least value so far that keeps the constraints, after each generation; null before there is one.
+    pub progress: Vec<Option<f64>>,
+}
+
+/// A line of the journal: values of the parameters that are looked for, then metrics and violations, or a reason; caveats.
+#[derive(Serialize, Deserialize)]
+struct Line(Vec<f64>, Option<String>, Vec<Option<f64>>, Vec<Option<f64>>, #[serde(default)] Option<String>);
+
+/// What a run gave.
+#[derive(Clone)]
+struct Outcome {
+    /// Metrics and violations, or why there are none.
+    result: Result<Judgement, String>,
+    told: Told,
+}
+
+/// A parameter that is looked for.
+struct Varied {
+    column: usize,
+    low: f64,
+    high: f64,
+}
+
+/// What was tried, in its order.
+#[derive(Default)]
+struct Tried {
+    values: Vec<Vec<ParameterValue>>,
+    outcomes: Vec<Outcome>,
+}
+
+fn judged(outcome: &Outcome, goal: usize) -> Judged {
+    match &outcome.result {
+        Ok((metrics, passed)) => Judged { value: metrics[goal], violation: passed.iter().sum() },
+        Err(_) => Judged { value: f64::NAN, violation: f64::NAN },
+    }
+}
+
+impl Tried {
+    /// The place of the best one.
+    fn best(&self, goal: usize) -> Option<usize> {
+        (0..self.outcomes.len()).reduce(|best, k| {
+            if judged(&self.outcomes[k], goal).beats(&judged(&self.outcomes[best], goal)) { k } else { best }
+        })
+    }
+}
+
+/// The answers so far, on the disk and by their parameters.
+struct Journal {
+    path: PathBuf,
+    file: File,
+    known: HashMap<Vec<u64>, Outcome>,
+}
+
+impl Journal {
+    fn open(folder: &Path) -> Result<Self, Error> {
+        let path = folder.join(JOURNAL);
+        let failed = |source| Error::Write { path: path.clone(), source };
+        std::fs::create_dir_all(folder).map_err(failed)?;
+        let text = std::fs::read(&path).unwrap_or_default();
+        let mut known = HashMap::new();
+        let mut whole = 0;
+        for line in text.split_inclusive(|byte| *byte == b'\n').filter(|line| line.ends_with(b"\n")) {
+            let Ok(Line(values, reason, metrics, passed, told)) = serde_json::from_slice(line) else { break };
+            let number = |list: Vec<Option<f64>>| list.into_iter().map(|x| x.unwrap_or(f64::NAN)).collect::<Vec<f64>>();
+            let result = reason.map_or_else(|| Ok((number(metrics), number(passed))), Err);
+            known.insert(key(&values), Outcome { result, told: told.map(Arc::from) });
+            whole += line.len() as u64;
+        }
+        let file = OpenOptions::new().create(true).truncate(false).write(true).open(&path).map_err(failed)?;
+        file.set_len(whole).map_err(failed)?;
+        let file = OpenOptions::new().append(true).open(&path).map_err(failed)?;
+        Ok(Self { path, file, known })
+    }
+
+    fn keep(&mut self, values: &[f64], outcome: &Outcome) -> Result<(), Error> {
+        let list = |list: &[f64]| list.iter().map(|x| x.is_finite().then_some(*x)).collect();
+        let told = outcome.told.as_deref().map(str::to_owned);
+        let line = match &outcome.result {
+            Ok((metrics, passed)) => Line(values.to_vec(), None, list(metrics), list(passed), told),
+            Err(reason) => Line(values.to_vec(), Some(reason.clone()), Vec::new(), Vec::new(), told),
+        };
+        let text = serde_json::to_string(&line).expect("plain numbers and strings") + "\n";
+        self.file.write_all(text.as_bytes()).map_err(|source| Error::Write { path: self.path.clone(), source })?;
+        self.known.insert(key(values), outcome.clone());
+        Ok(())
+    }
+}
+
+fn key(values: &[f64]) -> Vec<u64> {
+    values.iter().map(|x| x.to_bits()).collect()
+}
+
+impl Sweep {
+    /// Looks for the least of a metric: the parameters move within their bounds, [`MinimiseRequest`] and the study say what is to be
+    /// least and what must hold. The runs that were tried are written as those of a study.
+    ///
+    /// # Errors
+    /// [`SweepError::Minimise`]: nothing to be least, parameters without bounds; otherwise as [`Sweep::run`].
+    pub fn minimise(
+        &mut self,
+        request: &SweepRequest,
+        search: &MinimiseRequest,
+        progress: &mut SweepProgress<'_>,
+    ) -> Result<SweepSummary, Error> {
+        let (started, cpu) = (Instant::now(), cpu_time::ProcessTime::now());
+        let goal = self.aim(search)?;
+        let varied = self.varied()?;
+        let entry = self.file.minimise.as_ref();
+        let most = search.runs.or(entry.and_then(|entry| entry.runs)).unwrap_or(USUAL_RUNS);
+        let seed = entry.map_or(0, |entry| entry.seed);
+        let manifest = self.search_manifest(goal);
+        self.claim(request, &manifest)?;
+        self.workshop.put_links_into(&request.output);
+        let mut journal = Journal::open(&request.output)?;
+
+        let start: Vec<f64> = varied.iter().map(|v| self.start(v)).collect();
+        let mut least = LeastSearch::new(&start, seed);
+        let (mut tried, mut figures) = (Tried::default(), MinimiseFigures::default());
+        while tried.values.len() < most && !least.is_settled() {
+            let points: Vec<Vec<ParameterValue>> = least.ask().iter().map(|p| self.point(&varied, p)).collect();
+            let done = tried.values.len();
+            let mut shown = |new: usize| progress((done + new).min(most), most);
+            let outcomes = self.generation(&points, &varied, request, &mut journal, &mut shown)?;
+            let Some(outcomes) = outcomes else {
+                let folder = request.output.clone();
+                return Err(SweepError::Stopped { done: journal.known.len(), runs: most, folder }.into());
+            };
+            least.tell(&outcomes.iter().map(|outcome| judged(outcome, goal)).collect::<Vec<_>>());
+            tried.values.extend(points);
+            tried.outcomes.extend(outcomes);
+            let best = tried.best(goal).map(|k| judged(&tried.outcomes[k], goal));
+            figures.progress.push(best.filter(Judged::keeps).map(|best| best.value));
+        }
+        figures.generations = figures.progress.len();
+        figures.settled = least.is_settled();
+        let spent = || (started.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
+        self.search_summary(&tried, goal, figures, &manifest, request, &spent)
+    }
+
+    /// Takes over what is asked beside the study; the place of the metric that is to be least.
+    fn aim(&mut self, search: &MinimiseRequest) -> Result<usize, Error> {
+        let fail = |what: String| Error::from(SweepError::Minimise { what });
+        let name = (self.parameter_names(), self.metrics.clone());
+        let known = Vocabulary { parameters: &name.0, metrics: &name.1, summary: &self.vocabulary };
+        for text in &search.constraints {
+            self.constraints.push(Constraint::parse(text, &known).map_err(fail)?);
+        }
+        self.quick = self.quick && self.constraints.iter().all(Constraint::is_quick);
+        let place = |name: &str| self.metrics.iter().position(|metric| metric.name == name);
+        let names = || self.metrics().join(", ");
+        match (&search.metric, &self.file.minimise) {
+            (Some(name), _) => {
+                place(name).ok_or_else(|| fail(format!("{name:?} is no metric of the study; they are {}", names())))
+            }
+            (None, Some(entry)) => place(&entry.metric.text).ok_or_else(|| {
+                let message = format!("{:?} is no metric of the study; they are {}", entry.metric.text, names());
+                RobotFileError { message, ..entry.metric.place.clone() }.into()
+            }),
+            (None, None) => {
+                Err(fail("the study says nothing that is to be least: add [minimise] with metric = \"...\"".into()))
+            }
+        }
+    }
+
+    /// The parameters that are looked for.
+    fn varied(&self) -> Result<Vec<Varied>, Error> {
+        let mut found = Vec::new();
+        for (column, own) in self.design.columns.iter().enumerate() {
+            match (&own.values, own.bounds) {
+                (Values::Derived(_), _) => {}
+                (_, Some((low, high))) if low < high => found.push(Varied { column, low, high }),
+                _ => {
+                    let message = format!(
+                        "parameter {:?} has no bounds: a search needs from and to, or a distribution with low and high",
+                        own.name
+                    );
+                    return Err(RobotFileError { message, ..own.place.clone() }.into());
+                }
+            }
+        }
+        match found.is_empty() {
+            true => {
+                Err(SweepError::Minimise { what: "the study has no parameter that could be looked for".into() }.into())
+            }
+            false => Ok(found),
+        }
+    }
+
+    /// Where a parameter starts, as a part of its range: what the files say now, if that is within; else the middle.
+    fn start(&self, varied: &Varied) -> f64 {
+        let own = &self.design.columns[varied.column];
+        let now = self.workshop.current(varied.column).filter(|_| own.role != Role::Offset || varied.low <= 0.0);
+        now.map(|x| (x - varied.low) / (varied.high - varied.low))
+            .filter(|part| (0.0..=1.0).contains(part))
+            .unwrap_or(0.5)
+    }
+
+    /// Values of all parameters at a point of the search.
+    fn point(&self, varied: &[Varied], parts: &[f64]) -> Vec<ParameterValue> {
+        let mut values = vec![ParameterValue::Whole(0); self.design.columns.len()];
+        for (own, part) in varied.iter().zip(parts) {
+            values[own.column] = ParameterValue::Number(own.low + (own.high - own.low) * part);
+        }
+        self.design.derive(&mut values);
+        values
+    }
+
+    /// What the points of a generation give; none if the user stopped it.
+    fn generation(
+        &self,
+        points: &[Vec<ParameterValue>],
+        varied: &[Varied],
+        request: &SweepRequest,
+        journal: &mut Journal,
+        progress: &mut dyn FnMut(usize) -> ControlFlow<()>,
+    ) -> Result<Option<Vec<Outcome>>, Error> {
+        let numbers = |values: &[ParameterValue]| -> Vec<f64> {
+            varied.iter().map(|own| values[own.column].number().unwrap_or(f64::NAN)).collect()
+        };
+        let mut outcomes: Vec<Option<Outcome>> =
+            points.iter().map(|values| journal.known.get(&key(&numbers(values))).cloned()).collect();
+        let todo: Vec<(usize, Vec<ParameterValue>)> = points
+            .iter()
+            .enumerate()
+            .filter(|(k, _)| outcomes[*k].is_none())
+            .map(|(k, values)| (k, values.clone()))
+            .collect();
+        let threads = request.threads.unwrap_or_else(rayon::current_num_threads).max(1);
+        let few = todo.len().div_ceil(threads).clamp(1, FEW);
+        let (stop, next) = (AtomicBool::new(false), AtomicUsize::new(0));
+        let (tell, told) = channel();
+        let mut failed = None;
+        std::thread::scope(|scope| {
+            for _ in 0..threads {
+                let (tell, todo, stop, next) = (tell.clone(), &todo, &stop, &next);
+                scope.spawn(move || {
+                    loop {
+                        let start = next.fetch_add(few, Ordering::Relaxed);
+                        if start >= todo.len() || stop.load(Ordering::Relaxed) {
+                            break;
+                        }
+                        let some = &todo[start..(start + few).min(todo.len())];
+                        self.evaluate_points(some, stop, &mut |place, result, told| {
+                            let result = result.map_err(|error| self.workshop.reason(&error));
+                            let _ = tell.send((some[place].0, Outcome { result, told }));
+                        });
+                    }
+                });
+            }
+            drop(tell);
+            loop {
+                match told.recv_timeout(LOOK) {
+                    Ok((k, outcome)) => {
+                        if let Err(error) = journal.keep(&numbers(&points[k]), &outcome) {
+                            failed.get_or_insert(error);
+                            stop.store(true, Ordering::Relaxed);
+                        }
+                        outcomes[k] = Some(outcome);
+                    }
+                    Err(RecvTimeoutError::Timeout) => {}
+                    Err(RecvTimeoutError::Disconnected) => break,
+                }
+                if progress(outcomes.iter().flatten().count()).is_break() {
+                    stop.store(true, Ordering::Relaxed);
+                }
+            }
+        });
+        match failed {
+            Some(error) => Err(error),
+            None => Ok(outcomes.into_iter().collect()),
+        }
+    }
+
+    /// Which search a folder is of.
+    fn search_manifest(&self, goal: usize) -> Manifest {
+        let mut manifest = self.manifest();
+        let constraints: Vec<&str> = self.constraints.iter().map(|c| c.text.as_str()).collect();
+        let text = format!("{} minimise {} {}", manifest.fingerprint, self.metrics[goal].text, constraints.join("; "));
+        manifest.fingerprint = fingerprint(text.as_bytes());
+        manifest.inputs.push(("what is to be least and must hold".into(), fingerprint(text.as_bytes())));
+        manifest
+    }
+
+    /// Takes a folder for this search.
+    fn claim(&self, request: &SweepRequest, manifest: &Manifest) -> Result<(), Error> {
+        let folder = &request.output;
+        if let Some(known) = known_manifest(folder)?
+            && known.fingerprint != manifest.fingerprint
+        {
+            if !request.overwrite {
+                let differs = known.differs(manifest);
+                return Err(SweepError::Foreign { folder: folder.clone(), differs }.into());
+            }
+            super::store::clear(folder)?;
+            let _ = std::fs::remove_file(folder.join(JOURNAL));
+        }
+        let text = serde_json::to_string_pretty(manifest).expect("plain numbers and strings") + "\n";
+        Ok(flexarm_files::write_all(&[(folder.join(STUDY), text)])?)
+    }
+
+    /// Table, page and figures of what was tried.
+    fn search_summary(
+        &self,
+        tried: &Tried,
+        goal: usize,
+        figures: MinimiseFigures,
+        manifest: &Manifest,
+        request: &SweepRequest,
+        spent: &dyn Fn() -> (f64, f64),
+    ) -> Result<SweepSummary, Error> {
+        let folder = &request.output;
+        let answer = |(run, outcome): (usize, &Outcome)| Answer {
+            run,
+            result: outcome.result.as_ref().map(|(metrics, _)| metrics.clone()).map_err(Clone::clone),
+            told: outcome.told.clone(),
+        };
+        let answers: Vec<Answer> = tried.outcomes.iter().enumerate().map(answer).collect();
+        let path = folder.join(RUNS);
+        let all = self.table_of(&answers, &tried.values, manifest);
+        table::write(&path, &all, CreateOptions::default().with_overwrite(true))?;
+        let pairs: Vec<(&Answer, Vec<ParameterValue>)> = answers.iter().zip(tried.values.iter().cloned()).collect();
+        let (mut summary, columns) = self.summary_of(&pairs, false);
+        summary.runs = answers.len();
+        let best = tried.best(goal);
+        summary.best = best.map(|k| self.best_of(&answers[k], &tried.values[k], goal, Better::Lower));
+        if let (Some(best), Some(k)) = (&mut summary.best, best) {
+            let replay = self.write_replay(&tried.values[k], &folder.join("best"))?;
+            best.command = request.command.map(|command| command(&replay));
+            best.files = Some(replay);
+        }
+        let first = tried.outcomes.first().map(|outcome| judged(outcome, goal));
+        summary.minimise = Some(MinimiseFigures {
+            metric: self.metrics[goal].name.clone(),
+            constraints: self.constraints.iter().map(|c| c.text.clone()).collect(),
+            kept: best.is_some_and(|k| judged(&tried.outcomes[k], goal).keeps()),
+            start: first.map(|first| first.value).filter(|value| value.is_finite()),
+            start_kept: first.is_some_and(|first| first.keeps()),
+            ..figures
+        });
+        summary.file = path.display().to_string();
+        let page = folder.join(PAGE);
+        summary.page = Some(page.display().to_string());
+        (summary.wall_s, summary.cpu_s) = spent();
+        let json = serde_json::to_string_pretty(&summary).expect("plain numbers and strings") + "\n";
+        flexarm_files::write_all(&[(page, self.page(&summary, &columns)), (folder.join("sweep.json"), json)])?;
+        Ok(summary)
+    }
+}

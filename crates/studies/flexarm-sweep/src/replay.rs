@@ -1,0 +1,171 @@
+//! A run of a study as files that can be run by themselves.
+
+use std::path::{Path, PathBuf};
+
+use flexarm_files::write_all;
+use toml_edit::{DocumentMut, Item, Value};
+
+use super::Sweep;
+use super::value::ParameterValue;
+use super::workshop::RunFiles;
+use flexarm_run::Error;
+use flexarm_identify::rewrite::moved_paths;
+use flexarm_run::Motion;
+use flexarm_run::MotionOptions;
+
+/// Rows per second of a motion that is no waypoints (Hz).
+const ROWS_HZ: f64 = 1000.0;
+
+/// The files of a run, and its options; a face makes a command of them.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Replay {
+    /// Robot file.
+    pub robot: String,
+    /// Motion; none where the robot file names it.
+    pub motion: Option<String>,
+    /// Loads.
+    pub loads: Option<String>,
+    /// Options by their words.
+    pub options: Vec<(String, ParameterValue)>,
+}
+
+impl Sweep {
+    /// Writes the files of a run with these values, as a person would write them: those that differ from what is there.
+    ///
+    /// # Errors
+    /// [`Error::Write`], [`Error::Taken`]; what keeps the run from going.
+    pub(super) fn write_replay(&self, values: &[ParameterValue], folder: &Path) -> Result<Replay, Error> {
+        let (files, ..) = self.workshop.run_files(values)?;
+        let mut written: Vec<(PathBuf, Vec<u8>)> = Vec::new();
+        let robot = put(&mut written, folder, "robot.toml", &files.robot.0, Some(&files.robot.1), &|text| {
+            moved(text, &files.robot.0, folder)
+        });
+        let motion = match (&files.motion, files.speed.filter(|speed| *speed != 1.0)) {
+            (None, _) => None,
+            (Some((path, text)), None) => {
+                Some(put(&mut written, folder, "motion.toml", path, text.as_deref(), &str::to_owned))
+            }
+            (Some((path, _)), Some(speed)) => Some(self.faster(&files, path, speed, folder, &mut written)?),
+        };
+        let loads = files.loads.as_ref().map(|(path, text)| {
+            put(&mut written, folder, "loads.toml", path, Some(text), &|text| with_whole_files(text, path))
+        });
+        write_all(&written)?;
+        Ok(Replay { robot, motion, loads, options: files.options })
+    }
+
+    /// The motion at another speed: waypoints with other durations where all of them have one, else a table.
+    fn faster(
+        &self,
+        files: &RunFiles,
+        path: &Path,
+        speed: f64,
+        folder: &Path,
+        written: &mut Vec<(PathBuf, Vec<u8>)>,
+    ) -> Result<String, Error> {
+        let (_, text) = files.motion.as_ref().map_or((path, None), |(path, text)| (path.as_path(), text.clone()));
+        let text = text.unwrap_or_else(|| flexarm_files::read_text(path).unwrap_or_default());
+        if let Some(faster) = faster_waypoints(&text, speed) {
+            let place = folder.join("motion.toml");
+            written.push((place.clone(), faster.into_bytes()));
+            return Ok(place.display().to_string());
+        }
+        let robot = flexarm_run::Robot::load(&files.robot.0)?;
+        let motion = Motion::load_text(path, Some(&text), &robot, &MotionOptions::default())?;
+        let trajectory = motion.trajectory.scaled(1.0 / speed)?;
+        let mut table = Vec::new();
+        trajectory.to_csv(ROWS_HZ, &mut table)?;
+        let place = folder.join("motion.csv");
+        written.push((place.clone(), table));
+        Ok(place.display().to_string())
+    }
+}
+
+/// The path of a file of the run: that of the original if nothing was changed in it.
+fn put(
+    written: &mut Vec<(PathBuf, Vec<u8>)>,
+    folder: &Path,
+    name: &str,
+    original: &Path,
+    text: Option<&str>,
+    change: &dyn Fn(&str) -> String,
+) -> String {
+    let old = flexarm_files::read_text(original).ok();
+    match text.filter(|text| old.as_deref() != Some(*text)) {
+        None => original.display().to_string(),
+        Some(text) => {
+            let place = folder.join(name);
+            written.push((place.clone(), change(text).into_bytes()));
+            place.display().to_string()
+        }
+    }
+}
+
+/// A robot file for another folder.
+fn moved(text: &str, home: &Path, to: &Path) -> String {
+    let Ok(mut file) = text.parse::<DocumentMut>() else { return text.to_owned() };
+    moved_paths(&mut file, home.parent().unwrap_or(Path::new(".")), to);
+    file.to_string()
+}
+
+/// Loads whose tables are named from the root.
+fn with_whole_files(text: &str, home: &Path) -> String {
+    let Ok(mut file) = text.parse::<DocumentMut>() else { return text.to_owned() };
+    let folder = home.parent().unwrap_or(Path::new("."));
+    if let Some(Item::ArrayOfTables(loads)) = file.get_mut("load") {
+        for load in loads.iter_mut() {
+            let Some(table) = load.get("file").and_then(Item::as_str).map(|table| folder.join(table)) else { continue };
+            let whole = std::path::absolute(&table).unwrap_or(table);
+            load.insert("file", toml_edit::value(whole.display().to_string()));
+        }
+    }
+    file.to_string()
+}
+
+/// Waypoints that are run through faster; none unless every move has a duration.
+fn faster_waypoints(text: &str, speed: f64) -> Option<String> {
+    let mut file: DocumentMut = text.parse().ok()?;
+    let Item::ArrayOfTables(moves) = file.get_mut("move")? else { return None };
+    let number = |item: &Item| item.as_float().or_else(|| item.as_integer().map(|n| n as f64));
+    for entry in moves.iter_mut() {
+        let duration = number(entry.get("duration")?)?;
+        // A ramp in the time that limits allow does not become faster with the rest.
+        if entry.get("profile").is_some_and(|profile| profile.as_str() != Some("quintic")) {
+            return None;
+        }
+        put_number(entry.get_mut("duration")?, duration / speed);
+        if let Some(hold) = entry.get("hold").and_then(number) {
+            put_number(entry.get_mut("hold")?, hold / speed);
+        }
+    }
+    if file.get("profile").is_some_and(|profile| profile.as_str() != Some("quintic")) {
+        return None;
+    }
+    Some(file.to_string())
+}
+
+fn put_number(item: &mut Item, number: f64) {
+    if let Some(old) = item.as_value_mut() {
+        let decor = old.decor().clone();
+        *old = Value::from(number);
+        *old.decor_mut() = decor;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn waypoints_become_faster_with_their_rests_and_their_comments_stay() {
+        let text = "start = [0.0] # s\n[[move]]\nto = [1.0]\nduration = 2.0 # d\nhold = 1\n[[move]]\nto = [0.0]\nduration = 1.0\n";
+        let expected = text
+            .replace("2.0 #", "4.0 #")
+            .replace("hold = 1\n", "hold = 2.0\n")
+            .replace("duration = 1.0", "duration = 2.0");
+        assert_eq!(faster_waypoints(text, 0.5).unwrap(), expected);
+        assert_eq!(faster_waypoints("profile = \"trapezoid\"\n[[move]]\nduration = 1.0\n", 0.5), None);
+        assert_eq!(faster_waypoints("[[move]]\nto = [1.0]\n", 0.5), None);
+        assert_eq!(faster_waypoints("[path]\n", 0.5), None);
+    }
+}

@@ -1,0 +1,368 @@
+//! What a study tells: figures of its metrics, failures, the best run.
+
+use std::collections::BTreeMap;
+
+use crate::statistics::{SampleMethod, pareto_front, sobol_indices, spread};
+use serde::Serialize;
+
+use super::Sweep;
+use super::direction::Better;
+use super::evaluate::Answer;
+use super::file::Role;
+use super::minimise::MinimiseFigures;
+use super::replay::Replay;
+use super::store::Collected;
+use super::told::{self, CaveatFigures};
+use super::value::ParameterValue;
+
+/// Answer of `flexarm sweep`.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct SweepSummary {
+    /// Name of the study.
+    pub study: String,
+    /// Runs of the study.
+    pub runs: usize,
+    /// Runs that gave a result.
+    pub done: usize,
+    /// Runs that failed.
+    pub failed: usize,
+    /// The part of the runs that was run, as `number/of`; null for all.
+    pub shard: Option<String>,
+    /// Wall-clock time (s).
+    pub wall_s: f64,
+    /// Processor time, all threads (s).
+    pub cpu_s: f64,
+    /// The table of all runs, or the folder of a shard.
+    pub file: String,
+    /// The page.
+    pub page: Option<String>,
+    /// What is varied.
+    pub parameters: Vec<ParameterFigures>,
+    /// What came out.
+    pub metrics: Vec<MetricFigures>,
+    /// Why runs failed, the most frequent first.
+    pub failures: Vec<FailureFigures>,
+    /// The best run; null if none was done.
+    pub best: Option<BestRun>,
+    /// The runs that no other beats in two metrics; null with one metric.
+    pub pareto: Option<ParetoFigures>,
+    /// How the search went, if one was made.
+    pub minimise: Option<MinimiseFigures>,
+    /// The sentences of the caveats that warn, each once, with the number of runs that it concerns.
+    pub warnings: Vec<String>,
+    /// What `check` and `compare` would say of the runs, each caveat once with its worst value, warnings first.
+    pub caveats: Vec<CaveatFigures>,
+    /// Runs that several shards had, with the same result; they count once.
+    pub doubles: usize,
+}
+
+/// A parameter.
+#[derive(Clone, Debug, Serialize)]
+pub struct ParameterFigures {
+    /// Its name.
+    pub name: String,
+    /// Least and largest value; null of words.
+    pub range: Option<[f64; 2]>,
+    /// What its values do to those of the files: `value`, `factor` or `offset`.
+    #[serde(rename = "as")]
+    pub role: Role,
+}
+
+/// A metric over all runs that were done.
+#[derive(Clone, Debug, Serialize)]
+pub struct MetricFigures {
+    /// Its name.
+    pub name: String,
+    /// Runs that have it.
+    pub count: usize,
+    /// Least.
+    pub min: Option<f64>,
+    /// Largest.
+    pub max: Option<f64>,
+    /// Mean.
+    pub mean: Option<f64>,
+    /// Standard deviation.
+    pub std: Option<f64>,
+    /// Quantiles 0.05, 0.5 and 0.95.
+    pub quantiles: Option<[f64; 3]>,
+    /// Part of its variance that each parameter makes by itself (correlation ratio); null of words and where nothing varies.
+    pub shares: BTreeMap<String, Option<f64>>,
+    /// The parameters that matter, the strongest first: listed ones with an effect, and drawn ones whose effect stands out of chance.
+    pub matters: Vec<String>,
+    /// Part of the scatter of the draws that the strongest of the drawn parameters would have by chance in 1 of 100 studies; null
+    /// where nothing is drawn.
+    pub chance: Option<f64>,
+    /// What is better of it; null if neither the study nor its expression nor its name tells.
+    pub better: Option<Better>,
+    /// Sobol indices of the parameters that were drawn by Saltelli's design; empty otherwise.
+    pub sobol: Vec<IndexFigures>,
+}
+
+/// Sobol indices of a parameter.
+#[derive(Clone, Debug, Serialize)]
+pub struct IndexFigures {
+    /// The parameter.
+    pub parameter: String,
+    /// Part of the variance that it makes by itself.
+    pub first: f64,
+    /// Where that lies in 95 of 100 cases.
+    pub first_interval: [f64; 2],
+    /// Part that it makes with others too.
+    pub total: f64,
+    /// Likewise.
+    pub total_interval: [f64; 2],
+}
+
+/// The best run by a metric.
+#[derive(Clone, Debug, Serialize)]
+pub struct BestRun {
+    /// Its number.
+    pub run: usize,
+    /// What is least or highest in it.
+    pub metric: String,
+    /// Which of both: lower where it is not known what is better.
+    pub better: Better,
+    /// How much that is.
+    pub value: f64,
+    /// Values of its parameters.
+    pub parameters: BTreeMap<String, ParameterValue>,
+    /// Its metrics.
+    pub metrics: BTreeMap<String, Option<f64>>,
+    /// Its files, ready to be run; null where none are written.
+    pub files: Option<Replay>,
+    /// The command that runs it.
+    pub command: Option<String>,
+}
+
+/// Runs that no other beats in two metrics.
+#[derive(Clone, Debug, Serialize)]
+pub struct ParetoFigures {
+    /// Both.
+    pub metrics: [String; 2],
+    /// What is better of each: lower where that is not known.
+    pub better: [Better; 2],
+    /// By the first metric.
+    pub runs: Vec<ParetoRun>,
+}
+
+/// A run of the front.
+#[derive(Clone, Debug, Serialize)]
+pub struct ParetoRun {
+    /// Its number.
+    pub run: usize,
+    /// Both metrics.
+    pub values: [f64; 2],
+}
+
+/// A reason why runs failed.
+#[derive(Clone, Debug, Serialize)]
+pub struct FailureFigures {
+    /// The reason.
+    pub reason: String,
+    /// Runs.
+    pub runs: usize,
+    /// The first of them.
+    pub first: usize,
+}
+
+/// Results as columns: one value per run that is over, in the order of the runs.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Columns {
+    pub(super) runs: Vec<usize>,
+    /// Whether the runs are those of the design, not of a search.
+    pub(super) of_design: bool,
+    /// Of numeric parameters.
+    pub(super) parameters: Vec<Option<Vec<f64>>>,
+    pub(super) metrics: Vec<Vec<f64>>,
+}
+
+/// Reasons that are told.
+const MOST_REASONS: usize = 10;
+
+impl Sweep {
+    /// Results as columns.
+    fn columns(&self, answers: &[(&Answer, Vec<ParameterValue>)], of_design: bool) -> Columns {
+        let number = |value: &ParameterValue| value.number().unwrap_or(f64::NAN);
+        let parameter = |k: usize| {
+            let numeric = self.design.columns[k].is_numeric();
+            numeric.then(|| answers.iter().map(|(_, values)| number(&values[k])).collect())
+        };
+        let metric = |k: usize| {
+            let value =
+                |(answer, _): &(&Answer, Vec<ParameterValue>)| answer.result.as_ref().map_or(f64::NAN, |m| m[k]);
+            answers.iter().map(value).collect()
+        };
+        Columns {
+            runs: answers.iter().map(|(answer, _)| answer.run).collect(),
+            of_design,
+            parameters: (0..self.design.columns.len()).map(parameter).collect(),
+            metrics: (0..self.metrics.len()).map(metric).collect(),
+        }
+    }
+
+    /// Figures of what is there, and the results as columns.
+    pub(super) fn summary(&self, collected: &Collected) -> (SweepSummary, Columns) {
+        let answers: Vec<(&Answer, Vec<ParameterValue>)> =
+            collected.answers.values().map(|(answer, _)| (answer, self.design.values(answer.run))).collect();
+        let (summary, columns) = self.summary_of(&answers, true);
+        (SweepSummary { doubles: collected.doubles, ..summary }, columns)
+    }
+
+    /// Figures of runs with these values of the parameters; whether they are those of the design.
+    pub(super) fn summary_of(
+        &self,
+        answers: &[(&Answer, Vec<ParameterValue>)],
+        of_design: bool,
+    ) -> (SweepSummary, Columns) {
+        let columns = self.columns(answers, of_design);
+        let failed = answers.iter().filter(|(answer, _)| answer.result.is_err()).count();
+        let caveats = told::figures(answers.iter().map(|(answer, _)| *answer));
+        let summary = SweepSummary {
+            study: self.file.name.clone(),
+            runs: self.runs(),
+            done: answers.len() - failed,
+            failed,
+            parameters: self.parameter_figures(&columns),
+            metrics: self.metric_figures(&columns),
+            failures: failures(answers),
+            warnings: told::warnings(&caveats, answers.len()),
+            caveats,
+            best: self.best(answers, &columns),
+            pareto: self.pareto(&columns),
+            ..SweepSummary::default()
+        };
+        (summary, columns)
+    }
+
+    /// The place of the metric by which a run is the best.
+    fn goal(&self) -> usize {
+        let named = self.file.best.as_ref().and_then(|best| self.metrics.iter().position(|m| m.name == best.text));
+        named.unwrap_or(0)
+    }
+
+    fn best(&self, answers: &[(&Answer, Vec<ParameterValue>)], columns: &Columns) -> Option<BestRun> {
+        let goal = self.goal();
+        let values = columns.metrics.get(goal)?;
+        let better = self.better(goal);
+        let finite = values.iter().enumerate().filter(|(_, value)| value.is_finite());
+        let finite = finite.map(|(row, value)| (row, better.as_cost(*value)));
+        let (row, _) = finite.min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)))?;
+        Some(self.best_of(answers[row].0, &answers[row].1, goal, better))
+    }
+
+    /// What is taken to be better of a metric.
+    pub(super) fn better(&self, metric: usize) -> Better {
+        self.metrics[metric].better.unwrap_or(Better::Lower)
+    }
+
+    /// A run as the best one.
+    pub(super) fn best_of(&self, answer: &Answer, values: &[ParameterValue], goal: usize, better: Better) -> BestRun {
+        let empty = Vec::new();
+        let results = answer.result.as_ref().unwrap_or(&empty);
+        let parameters = self.design.columns.iter().zip(values);
+        let metric = |(k, metric): (usize, &super::metric::Metric)| {
+            (metric.name.clone(), results.get(k).copied().filter(|x| x.is_finite()))
+        };
+        BestRun {
+            run: answer.run,
+            metric: self.metrics[goal].name.clone(),
+            better,
+            value: results.get(goal).copied().unwrap_or(f64::NAN),
+            parameters: parameters.map(|(column, value)| (column.name.clone(), value.clone())).collect(),
+            metrics: self.metrics.iter().enumerate().map(metric).collect(),
+            files: None,
+            command: None,
+        }
+    }
+
+    fn pareto(&self, columns: &Columns) -> Option<ParetoFigures> {
+        let place = |name: &String| self.metrics.iter().position(|metric| metric.name == *name);
+        let (a, b) = match &self.file.pareto {
+            Some(([a, b], _)) => (place(a)?, place(b)?),
+            None if self.metrics.len() >= 2 => (0, 1),
+            None => return None,
+        };
+        let (x, y) = (&columns.metrics[a], &columns.metrics[b]);
+        let run = |row: usize| ParetoRun { run: columns.runs[row], values: [x[row], y[row]] };
+        let better = [a, b].map(|k| self.better(k));
+        let costs = |values: &[f64], k: usize| values.iter().map(|x| better[k].as_cost(*x)).collect::<Vec<f64>>();
+        let runs: Vec<ParetoRun> = pareto_front(&costs(x, 0), &costs(y, 1)).into_iter().map(run).collect();
+        let metrics = [a, b].map(|k| self.metrics[k].name.clone());
+        (!runs.is_empty()).then_some(ParetoFigures { metrics, better, runs })
+    }
+
+    /// Sobol indices of a metric; with a grid besides, of what scatters about the mean at each of its points.
+    fn indices(&self, values: &[f64], columns: &Columns) -> Vec<IndexFigures> {
+        let drawn = self.design.drawn();
+        if self.file.method != SampleMethod::Saltelli || drawn.is_empty() || !columns.of_design {
+            return Vec::new();
+        }
+        // What is not there, or failed, is missing in its place.
+        let mut whole = vec![f64::NAN; self.runs()];
+        columns.runs.iter().zip(values).for_each(|(run, value)| whole[*run] = *value);
+        // What the grid makes is not what scatters.
+        let points = self.runs() / self.design.grid_points().max(1);
+        for point in whole.chunks_mut(points.max(1)) {
+            let mean = spread(point).map_or(0.0, |spread| spread.mean);
+            point.iter_mut().for_each(|value| *value -= mean);
+        }
+        let found = sobol_indices(&whole, drawn.len(), self.file.seed).unwrap_or_default();
+        let index = |(column, index): (&usize, crate::statistics::SobolIndex)| IndexFigures {
+            parameter: self.design.columns[*column].name.clone(),
+            first: index.first,
+            first_interval: index.first_interval,
+            total: index.total,
+            total_interval: index.total_interval,
+        };
+        drawn.iter().zip(found).map(index).collect()
+    }
+
+    fn parameter_figures(&self, columns: &Columns) -> Vec<ParameterFigures> {
+        let of = |(k, values): (usize, &Option<Vec<f64>>)| ParameterFigures {
+            name: self.design.columns[k].name.clone(),
+            range: values.as_ref().and_then(|values| spread(values)).map(|spread| [spread.min, spread.max]),
+            role: self.design.columns[k].role,
+        };
+        columns.parameters.iter().enumerate().map(of).collect()
+    }
+
+    fn metric_figures(&self, columns: &Columns) -> Vec<MetricFigures> {
+        let of = |(k, values): (usize, &Vec<f64>)| {
+            let spread = spread(values);
+            let name = |p: usize| self.design.columns[p].name.clone();
+            let share = |p: usize| (name(p), self.effect(p, k, columns).map(|effect| effect.share));
+            let ranking = self.ranking(columns, k);
+            MetricFigures {
+                name: self.metrics[k].name.clone(),
+                count: spread.map_or(0, |spread| spread.count),
+                min: spread.map(|spread| spread.min),
+                max: spread.map(|spread| spread.max),
+                mean: spread.map(|spread| spread.mean),
+                std: spread.map(|spread| spread.std),
+                quantiles: spread.map(|spread| spread.quantiles),
+                shares: (0..columns.parameters.len()).map(share).collect(),
+                matters: ranking.matter.iter().map(|(p, _)| name(*p)).collect(),
+                chance: ranking.chance,
+                better: self.metrics[k].better,
+                sobol: self.indices(values, columns),
+            }
+        };
+        columns.metrics.iter().enumerate().map(of).collect()
+    }
+}
+
+fn failures(answers: &[(&Answer, Vec<ParameterValue>)]) -> Vec<FailureFigures> {
+    let mut found: Vec<FailureFigures> = Vec::new();
+    let mut places: BTreeMap<&str, usize> = BTreeMap::new();
+    for (answer, _) in answers {
+        let Err(reason) = &answer.result else { continue };
+        let place = *places.entry(reason).or_insert_with(|| {
+            found.push(FailureFigures { reason: reason.clone(), runs: 0, first: answer.run });
+            found.len() - 1
+        });
+        found[place].runs += 1;
+    }
+    found.sort_by(|a, b| b.runs.cmp(&a.runs).then(a.first.cmp(&b.first)));
+    found.truncate(MOST_REASONS);
+    found
+}

@@ -1,0 +1,285 @@
+//! The least of a function within a box and under constraints, from its values alone: covariance matrix adaptation (CMA-ES).
+//!
+//! A generation is asked for, its points are tried by the caller, in any order and on any number of machines, and told. Of the
+//! crates there are, `argmin` has no such method and `cmaes` (still since 2023, with a linear algebra of its own version) wants to
+//! call the function itself and knows no constraints; here generations go out as a whole.
+//!
+//! Source: [Hansen 2016], with its default numbers. Constraints are a penalty in proportion to their violation, whose weight grows
+//! while most points violate them and falls while none does.
+
+use nalgebra::{DMatrix, DVector};
+use rand::RngExt;
+use rand::distr::Open01;
+
+use crate::statistics::distribution::normal_quantile;
+use crate::statistics::random::stream;
+
+/// What a point gave.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Judged {
+    /// What is to be least; NaN of a point that could not be tried.
+    pub value: f64,
+    /// How far it is from keeping the constraints: 0 if it does, else the sum of the relative violations.
+    pub violation: f64,
+}
+
+impl Judged {
+    /// Whether it keeps the constraints.
+    pub fn keeps(&self) -> bool {
+        self.value.is_finite() && self.violation <= 0.0
+    }
+
+    /// Whether it is better: keeping the constraints first, then less violation, then the value.
+    pub fn beats(&self, other: &Self) -> bool {
+        let key = |j: &Self| match j.value.is_finite() && j.violation.is_finite() {
+            false => (2, 0.0, 0.0),
+            true if j.keeps() => (0, 0.0, j.value),
+            true => (1, j.violation, j.value),
+        };
+        let (a, b) = (key(self), key(other));
+        a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.total_cmp(&b.2)).is_lt()
+    }
+}
+
+/// A search in the unit cube.
+#[derive(Clone, Debug)]
+pub struct LeastSearch {
+    seed: u64,
+    generation: u64,
+    mean: DVector<f64>,
+    sigma: f64,
+    covariance: DMatrix<f64>,
+    path_sigma: DVector<f64>,
+    path_covariance: DVector<f64>,
+    /// Weight of violations; none before the first generation is told.
+    penalty: Option<f64>,
+    /// The generation that is out.
+    points: Vec<DVector<f64>>,
+}
+
+/// Step at the start, of the cube's side.
+const FIRST_STEP: f64 = 0.3;
+/// A search whose points differ by less ends, of the cube's side.
+const NOTHING: f64 = 1e-7;
+
+impl LeastSearch {
+    /// A search from a point.
+    pub fn new(start: &[f64], seed: u64) -> Self {
+        let n = start.len();
+        Self {
+            seed,
+            generation: 0,
+            mean: DVector::from_row_slice(start),
+            sigma: FIRST_STEP,
+            covariance: DMatrix::identity(n, n),
+            path_sigma: DVector::zeros(n),
+            path_covariance: DVector::zeros(n),
+            penalty: None,
+            points: Vec::new(),
+        }
+    }
+
+    /// Points of a generation: a multiple of four.
+    pub fn size(dimensions: usize) -> usize {
+        let usual = 4 + (3.0 * (dimensions.max(1) as f64).ln()) as usize;
+        usual.max(8).next_multiple_of(4)
+    }
+
+    /// The next generation, in the cube. The first point of all is the start.
+    pub fn ask(&mut self) -> Vec<Vec<f64>> {
+        let n = self.mean.len();
+        let root = self.root();
+        let size = Self::size(n);
+        let point = |k: usize| {
+            let mut numbers = stream(self.seed, self.generation * size as u64 + k as u64);
+            let normal = DVector::from_fn(n, |_, _| normal_quantile(numbers.sample(Open01)));
+            let step = if self.generation == 0 && k == 0 { DVector::zeros(n) } else { &root * normal * self.sigma };
+            (&self.mean + step).map(|x| x.clamp(0.0, 1.0))
+        };
+        self.points = (0..size).map(point).collect();
+        self.points.iter().map(|p| p.as_slice().to_vec()).collect()
+    }
+
+    /// What the points that were asked for gave, in their order.
+    pub fn tell(&mut self, judged: &[Judged]) {
+        let n = self.mean.len() as f64;
+        let order = self.ranked(judged);
+        let mu = self.points.len() / 2;
+        let weights: Vec<f64> = (0..mu).map(|k| (mu as f64 + 0.5).ln() - (k as f64 + 1.0).ln()).collect();
+        let sum: f64 = weights.iter().sum();
+        let weights: Vec<f64> = weights.iter().map(|w| w / sum).collect();
+        let effective = 1.0 / weights.iter().map(|w| w * w).sum::<f64>();
+
+        let old = self.mean.clone();
+        let steps: Vec<DVector<f64>> = order[..mu].iter().map(|k| (&self.points[*k] - &old) / self.sigma).collect();
+        let step = steps.iter().zip(&weights).fold(DVector::zeros(old.len()), |sum, (y, w)| sum + y * *w);
+        self.mean = &old + &step * self.sigma;
+
+        // Both paths, then matrix and step: [Hansen 2016], figure 6.
+        let c_sigma = (effective + 2.0) / (n + effective + 5.0);
+        let d_sigma = 1.0 + 2.0 * (((effective - 1.0) / (n + 1.0)).sqrt() - 1.0).max(0.0) + c_sigma;
+        let c_c = (4.0 + effective / n) / (n + 4.0 + 2.0 * effective / n);
+        let c_1 = 2.0 / ((n + 1.3).powi(2) + effective);
+        let c_mu = (1.0 - c_1).min(2.0 * (effective - 2.0 + 1.0 / effective) / ((n + 2.0).powi(2) + effective));
+        let expected = n.sqrt() * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n));
+
+        let whitened = self.inverse_root() * &step;
+        self.path_sigma =
+            &self.path_sigma * (1.0 - c_sigma) + whitened * (c_sigma * (2.0 - c_sigma) * effective).sqrt();
+        self.generation += 1;
+        let settled = (1.0 - (1.0 - c_sigma).powi(2 * self.generation.min(1 << 20) as i32)).sqrt();
+        let goes_on = self.path_sigma.norm() / settled < (1.4 + 2.0 / (n + 1.0)) * expected;
+        let on = if goes_on { 1.0 } else { 0.0 };
+        self.path_covariance =
+            &self.path_covariance * (1.0 - c_c) + step * (on * (c_c * (2.0 - c_c) * effective).sqrt());
+        let rank_mu = steps
+            .iter()
+            .zip(&weights)
+            .fold(DMatrix::zeros(old.len(), old.len()), |sum, (y, w)| sum + y * y.transpose() * *w);
+        let kept = 1.0 - c_1 - c_mu + (1.0 - on) * c_1 * c_c * (2.0 - c_c);
+        self.covariance =
+            &self.covariance * kept + &self.path_covariance * self.path_covariance.transpose() * c_1 + rank_mu * c_mu;
+        self.sigma *= (c_sigma / d_sigma * (self.path_sigma.norm() / expected - 1.0)).min(1.0).exp();
+        self.sigma = self.sigma.min(FIRST_STEP);
+    }
+
+    /// Whether its points hardly differ any more.
+    pub fn is_settled(&self) -> bool {
+        let widest = self.covariance.diagonal().iter().fold(0.0f64, |most, c| most.max(*c));
+        self.sigma * widest.sqrt() < NOTHING
+    }
+
+    /// Points from the best to the worst: the value with the penalty, points that could not be tried last.
+    fn ranked(&mut self, judged: &[Judged]) -> Vec<usize> {
+        let tried: Vec<&Judged> = judged.iter().filter(|j| j.value.is_finite() && j.violation.is_finite()).collect();
+        let violating = tried.iter().filter(|j| !j.keeps()).count();
+        let penalty = match self.penalty {
+            None => {
+                let range = |f: fn(&Judged) -> f64| {
+                    let all = || tried.iter().map(|j| f(j));
+                    all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min)
+                };
+                let (value, violation) = (range(|j| j.value), range(|j| j.violation));
+                if violation > 0.0 && value > 0.0 { 2.0 * value / violation } else { 0.0 }
+            }
+            // Before anything was violated there was nothing to compare with.
+            Some(0.0) if violating > 0 => {
+                tried.iter().map(|j| j.value.abs()).fold(0.0, f64::max)
+                    / tried.iter().map(|j| j.violation).fold(f64::MIN_POSITIVE, f64::max)
+            }
+            Some(weight) if 2 * violating > tried.len() => weight * 1.5,
+            Some(weight) if violating == 0 => weight / 1.2,
+            Some(weight) => weight,
+        };
+        self.penalty = Some(penalty);
+        let cost = |k: usize| match judged[k].value.is_finite() && judged[k].violation.is_finite() {
+            true => judged[k].value + penalty * judged[k].violation,
+            false => f64::INFINITY,
+        };
+        let mut order: Vec<usize> = (0..judged.len().min(self.points.len())).collect();
+        order.sort_by(|a, b| cost(*a).total_cmp(&cost(*b)).then(a.cmp(b)));
+        order
+    }
+
+    /// A root of the covariance.
+    fn root(&self) -> DMatrix<f64> {
+        self.spectral(f64::sqrt)
+    }
+
+    fn inverse_root(&self) -> DMatrix<f64> {
+        self.spectral(|x| 1.0 / x.sqrt())
+    }
+
+    fn spectral(&self, f: fn(f64) -> f64) -> DMatrix<f64> {
+        let eigen = self.covariance.clone().symmetric_eigen();
+        let diagonal = eigen.eigenvalues.map(|x| f(x.max(1e-20)));
+        &eigen.eigenvectors * DMatrix::from_diagonal(&diagonal) * eigen.eigenvectors.transpose()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Best point and how many were tried.
+    fn least(start: &[f64], most: usize, f: impl Fn(&[f64]) -> Judged) -> (Vec<f64>, Judged, usize) {
+        let mut search = LeastSearch::new(start, 1);
+        let mut best: Option<(Vec<f64>, Judged)> = None;
+        let mut tried = 0;
+        while tried < most && !search.is_settled() {
+            let points = search.ask();
+            let judged: Vec<Judged> = points.iter().map(|p| f(p)).collect();
+            for (p, j) in points.into_iter().zip(&judged) {
+                if best.as_ref().is_none_or(|(_, known)| j.beats(known)) {
+                    best = Some((p, *j));
+                }
+            }
+            tried += judged.len();
+            search.tell(&judged);
+        }
+        let (point, judged) = best.unwrap();
+        (point, judged, tried)
+    }
+
+    fn free(value: f64) -> Judged {
+        Judged { value, violation: 0.0 }
+    }
+
+    /// Truth: the least is where it was put.
+    #[test]
+    fn a_long_valley_that_lies_across_the_axes_is_followed_to_its_lowest_point() {
+        let f = |x: &[f64]| {
+            let (a, b) = (x[0] - 0.3, x[1] - 0.7);
+            free((a + b).powi(2) + 1e4 * (a - b).powi(2) + (x[2] - 0.5).powi(2))
+        };
+        let (x, judged, tried) = least(&[0.9, 0.1, 0.9], 3000, f);
+        assert!((x[0] - 0.3).abs() < 1e-5 && (x[1] - 0.7).abs() < 1e-5, "{x:?} after {tried}");
+        assert!(judged.value < 1e-9);
+    }
+
+    /// Truth: the least mass of two walls with a compliance kept, min a + 2 b under 1/a + 1/b <= c, is at a = sqrt(2) b,
+    /// b = (1 + 1/sqrt(2)) / c.
+    #[test]
+    fn two_walls_are_as_thin_as_the_compliance_allows() {
+        let c = 6.0;
+        let f = |x: &[f64]| {
+            let (a, b) = (0.1 + 0.9 * x[0], 0.1 + 0.9 * x[1]);
+            Judged { value: a + 2.0 * b, violation: ((1.0 / a + 1.0 / b) / c - 1.0).max(0.0) }
+        };
+        let b = (1.0 + 0.5f64.sqrt()) / c;
+        let expected = (2.0f64.sqrt() + 2.0) * b;
+        for start in [[1.0, 1.0], [0.05, 0.05], [0.5, 0.9]] {
+            let (x, judged, tried) = least(&start, 600, f);
+            assert!(judged.keeps(), "{x:?}");
+            // measured 1e-7
+            assert!(judged.value / expected - 1.0 < 1e-4, "{} {expected} after {tried}", judged.value);
+        }
+    }
+
+    /// Truth: the corner of the box.
+    #[test]
+    fn a_least_in_a_corner_is_met_exactly_and_one_parameter_is_enough() {
+        let (x, ..) = least(&[0.5, 0.5], 800, |x| free(x[0] - x[1]));
+        assert_eq!(x, [0.0, 1.0]);
+        let (x, ..) = least(&[0.2], 400, |x| free((x[0] - 0.77).powi(2)));
+        assert!((x[0] - 0.77).abs() < 1e-5, "{x:?}");
+    }
+
+    #[test]
+    fn points_that_cannot_be_tried_are_the_worst_of_all() {
+        let f = |x: &[f64]| free(if x[0] > 0.6 { f64::NAN } else { -x[0] });
+        let (x, judged, _) = least(&[0.3], 600, f);
+        assert!((x[0] - 0.6).abs() < 1e-4 && judged.keeps(), "{x:?}");
+        let failed = Judged { value: f64::NAN, violation: 0.0 };
+        let off = Judged { value: 1.0, violation: 0.5 };
+        assert!(off.beats(&failed) && free(5.0).beats(&off) && !failed.beats(&failed));
+    }
+
+    /// A search is the same on every machine and in every company.
+    #[test]
+    fn the_same_seed_asks_for_the_same_points() {
+        let ask = |seed| LeastSearch::new(&[0.5, 0.5], seed).ask();
+        assert_eq!(ask(3), ask(3));
+        assert_ne!(ask(3), ask(4));
+    }
+}

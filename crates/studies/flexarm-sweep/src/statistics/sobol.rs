@@ -1,0 +1,91 @@
+//! Sobol's sequence: points that fill a cube evenly, in any number.
+//!
+//! Source: [Joe and Kuo 2008].
+
+use rand::Rng;
+use sobol_burley::parts::sobol_rev;
+
+use crate::statistics::random::stream;
+
+/// Maximum number of dimensions.
+pub(crate) const MOST_DIMENSIONS: usize = sobol_burley::NUM_DIMENSIONS as usize;
+/// Binary digits of the number of points, after which the sequence starts again with another shift.
+const BLOCK: u32 = 16;
+
+/// Returns a coordinate of the sequence as it is in books: its 32 binary digits after the point.
+fn digits(point: u32, dimension: usize) -> u32 {
+    let gray = point ^ (point >> 1);
+    sobol_rev(gray.reverse_bits(), dimension as u32).reverse_bits()
+}
+
+/// Returns a coordinate with its digits shifted at random, between 0 and 1, neither of them.
+///
+/// A shift keeps how even the points are: every interval of length 2^-k has as many of 2^m points as before.
+pub(crate) fn shifted(point: usize, dimension: usize, seed: u64) -> f64 {
+    let mut shifts = stream(seed, dimension as u64);
+    shifts.set_word_pos((point >> BLOCK) as u128);
+    let point = point & ((1 << BLOCK) - 1);
+    (f64::from(digits(point as u32, dimension) ^ shifts.next_u32()) + 0.5) / 2f64.powi(32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plain(point: u32, dimension: usize) -> f64 {
+        f64::from(digits(point, dimension)) / 2f64.powi(32)
+    }
+
+    /// Truth: the first points as scipy 1.17.1's `qmc.Sobol(scramble=False)` prints them, with the same direction numbers.
+    #[test]
+    fn the_first_points_are_those_of_joe_and_kuo() {
+        let expected = [
+            [0.0, 0.0, 0.0, 0.0],
+            [0.5, 0.5, 0.5, 0.5],
+            [0.75, 0.25, 0.25, 0.25],
+            [0.25, 0.75, 0.75, 0.75],
+            [0.375, 0.375, 0.625, 0.875],
+            [0.875, 0.875, 0.125, 0.375],
+            [0.625, 0.125, 0.875, 0.625],
+            [0.125, 0.625, 0.375, 0.125],
+        ];
+        for (i, point) in expected.iter().enumerate() {
+            let found: [f64; 4] = std::array::from_fn(|d| plain(i as u32, d));
+            assert_eq!(found, *point, "point {i}");
+        }
+    }
+
+    /// Truth: the same program, far out in the sequence and in high dimensions.
+    #[test]
+    fn points_far_out_and_in_high_dimensions_are_those_of_joe_and_kuo() {
+        for (point, dimension, expected) in FAR {
+            assert_eq!(plain(point, dimension), expected, "point {point}, dimension {dimension}");
+        }
+    }
+
+    const FAR: [(u32, usize, f64); 9] = [
+        (1000, 1, 0.0966796875),
+        (1000, 2, 0.5185546875),
+        (4999, 7, 0.9783935546875),
+        (4999, 20, 0.1090087890625),
+        (3333, 63, 0.939208984375),
+        (4096, 100, 0.2669677734375),
+        (4999, 126, 0.6051025390625),
+        (4999, 127, 0.1827392578125),
+        (17, 127, 0.84375),
+    ];
+
+    /// Truth: the definition of a (0, m, 1)-net: each of 2^m intervals holds one of 2^m points, in every dimension and block.
+    #[test]
+    fn every_interval_holds_one_point() {
+        for (seed, first) in [(0, 0), (1, 0), (0, 3 << BLOCK)] {
+            for dimension in 0..MOST_DIMENSIONS {
+                let mut seen = [false; 256];
+                (0..256).for_each(|i| seen[(256.0 * shifted(first + i, dimension, seed)) as usize] = true);
+                assert!(seen.iter().all(|s| *s), "dimension {dimension}");
+            }
+        }
+        // Blocks are not the same points again.
+        assert_ne!(shifted(5, 2, 0), shifted((1 << BLOCK) + 5, 2, 0));
+    }
+}

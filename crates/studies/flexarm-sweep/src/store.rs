@@ -1,0 +1,512 @@
+//! The folder of a study: what was computed so far, in files that survive whatever ends the program.
+//!
+//! ```text
+//! study.json              which study it is: its runs, columns and the files that it was made of
+//! parts/1-of-4.journal    a line for each run that is over, written at once
+//! parts/1-of-4-0.parquet  the same as a table, when the journal has become long or the shard is over
+//! runs.parquet            all runs by number, when none is missing; parts are then gone
+//! ```
+//! A journal whose last line was cut is read up to there. Parts come into being under another name. The bytes of `runs.parquet` are
+//! those of its rows: who computed them, in how many shards and in which order does not show.
+
+use std::collections::{BTreeMap, HashSet};
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use flexarm_files::{read_text, write_all};
+use flexarm_log::{CreateOptions, DataColumn, DataTable, DataValues, LogError};
+use serde::{Deserialize, Serialize};
+
+use super::Sweep;
+use super::error::SweepError;
+use super::evaluate::Answer;
+use super::table;
+use super::value::ParameterValue;
+use flexarm_run::Error;
+
+/// The file that says which study a folder is of.
+pub(super) const STUDY: &str = "study.json";
+/// The table of all runs.
+pub(super) const RUNS: &str = "runs.parquet";
+/// The column of what is to be said of each run.
+pub(super) const CAVEATS: &str = "caveats";
+/// Folder of the parts.
+const PARTS: &str = "parts";
+/// Lines of a journal that become a part.
+const ROLL: usize = 20_000;
+/// Longest time between two waits for the disk.
+const SYNC: Duration = Duration::from_secs(2);
+
+/// Which study a folder is of.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Manifest {
+    pub(super) format: u32,
+    pub(super) fingerprint: String,
+    pub(super) study: String,
+    /// Version of the program.
+    pub(super) flexarm: String,
+    pub(super) runs: usize,
+    pub(super) parameters: Vec<String>,
+    pub(super) metrics: Vec<String>,
+    /// The files that it was made of and some drawn points, with a fingerprint of each.
+    pub(super) inputs: Vec<(String, String)>,
+    /// Where the file of the study was.
+    pub(super) file: String,
+}
+
+impl Manifest {
+    /// What differs from another study, in words.
+    pub(super) fn differs(&self, other: &Self) -> String {
+        let mut told = Vec::new();
+        if self.runs != other.runs {
+            told.push(format!("{} runs and {}", self.runs, other.runs));
+        }
+        for (name, print) in &self.inputs {
+            match other.inputs.iter().find(|(known, _)| known == name) {
+                Some((_, known)) if known != print => told.push(format!("the content of {name}")),
+                None => told.push(format!("{name}, which only one has")),
+                _ => {}
+            }
+        }
+        let is_new = |name: &String| self.inputs.iter().all(|(known, _)| known != name);
+        let new = other.inputs.iter().map(|(name, _)| name).filter(|name| is_new(name));
+        told.extend(new.map(|name| format!("{name}, which only one has")));
+        if self.flexarm != other.flexarm {
+            told.push(format!("versions {} and {} of the program", self.flexarm, other.flexarm));
+        }
+        if told.is_empty() {
+            told.push("the names of its files".into());
+        }
+        told.join(", ")
+    }
+}
+
+/// A part of the runs: those whose number leaves `number - 1` when divided by `of`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    /// From 1.
+    pub number: usize,
+    /// How many there are.
+    pub of: usize,
+}
+
+impl Shard {
+    /// All runs.
+    pub const ALL: Self = Self { number: 1, of: 1 };
+
+    /// Whether a run belongs to it.
+    pub fn has(self, run: usize) -> bool {
+        run % self.of == self.number - 1
+    }
+
+    fn stem(self) -> String {
+        format!("{}-of-{}", self.number, self.of)
+    }
+}
+
+/// What a folder has.
+#[derive(Debug, Default)]
+pub(super) struct Collected {
+    /// By run, with the file that it was found in.
+    pub(super) answers: BTreeMap<usize, (Answer, usize)>,
+    /// Files, for messages.
+    files: Vec<PathBuf>,
+    /// Runs that were found more than once, with the same result.
+    pub(super) doubles: usize,
+    /// Into how many shards the parts were cut.
+    pub(super) shards: Option<usize>,
+    /// What is said of runs: each text once.
+    texts: HashSet<Arc<str>>,
+}
+
+/// A line of a journal: run, reason, metrics, caveats.
+#[derive(Serialize, Deserialize)]
+struct Line(usize, Option<String>, Vec<Option<f64>>, #[serde(default)] Option<String>);
+
+impl Collected {
+    /// Has an answer share its caveats with those of which the same is said.
+    pub(super) fn share(&mut self, answer: &mut Answer) {
+        let Some(text) = &answer.told else { return };
+        match self.texts.get(text) {
+            Some(known) => answer.told = Some(known.clone()),
+            None => _ = self.texts.insert(text.clone()),
+        }
+    }
+
+    fn add(&mut self, mut answer: Answer, file: usize) -> Result<(), SweepError> {
+        self.share(&mut answer);
+        match self.answers.get(&answer.run) {
+            None => {
+                self.answers.insert(answer.run, (answer, file));
+            }
+            Some((known, first)) if !same(known, &answer) => {
+                let (first, second) = (self.files[*first].clone(), self.files[file].clone());
+                return Err(SweepError::Twice { run: answer.run, first, second });
+            }
+            Some(_) => self.doubles += 1,
+        }
+        Ok(())
+    }
+
+    /// Adds all that a folder has: parts, journals, the table of all runs.
+    ///
+    /// # Errors
+    /// [`SweepError::Twice`], [`SweepError::Broken`], what the system says.
+    pub(super) fn read(&mut self, folder: &Path, manifest: &Manifest) -> Result<(), Error> {
+        let whole = folder.join(RUNS);
+        if whole.is_file() {
+            self.read_table(&whole, manifest)?;
+        }
+        let mut names: Vec<PathBuf> = match std::fs::read_dir(folder.join(PARTS)) {
+            Ok(entries) => entries.flatten().map(|entry| entry.path()).collect(),
+            Err(_) => Vec::new(),
+        };
+        names.sort();
+        for path in names {
+            match path.extension().and_then(|ending| ending.to_str()) {
+                Some("parquet") => self.read_table(&path, manifest)?,
+                Some("journal") => {
+                    let (answers, _) = read_journal(&path, manifest)?;
+                    self.files.push(path.clone());
+                    let file = self.files.len() - 1;
+                    let before = self.doubles;
+                    answers.into_iter().try_for_each(|answer| self.add(answer, file))?;
+                    // A journal that became a part before it was emptied says the same once more.
+                    self.doubles = before;
+                }
+                _ => continue,
+            }
+            let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            let of = stem.split('-').nth(2).and_then(|of| of.parse().ok());
+            self.shards = of.filter(|of| *of > 1).or(self.shards);
+        }
+        Ok(())
+    }
+
+    fn read_table(&mut self, path: &Path, manifest: &Manifest) -> Result<(), Error> {
+        let broken = |what: String| SweepError::Broken { path: path.to_owned(), what };
+        let table = table::read(path).map_err(|error| match error {
+            Error::Log(LogError::NotARecording { found, .. }) => {
+                broken(format!("found {found}: remove the file, its runs are then run again")).into()
+            }
+            other => other,
+        })?;
+        let print = table.texts.iter().find(|(key, _)| key == "flexarm.fingerprint").map(|(_, print)| print.as_str());
+        if print != Some(&manifest.fingerprint) {
+            return Err(broken("is of another study; take it out of the folder".into()).into());
+        }
+        let Some(DataValues::Whole(runs)) = table.column("run") else {
+            return Err(broken("has no column \"run\"".into()).into());
+        };
+        let mut metrics = Vec::new();
+        for name in &manifest.metrics {
+            match table.column(name) {
+                Some(DataValues::Number(values)) => metrics.push(values),
+                _ => return Err(broken(format!("has no column {name:?} of numbers")).into()),
+            }
+        }
+        let Some(DataValues::Text(reasons)) = table.column("reason") else {
+            return Err(broken("has no column \"reason\"".into()).into());
+        };
+        let caveats = match table.column(CAVEATS) {
+            Some(DataValues::Text(texts)) => texts.as_slice(),
+            _ => return Err(broken(format!("has no column {CAVEATS:?}")).into()),
+        };
+        self.files.push(path.to_owned());
+        let file = self.files.len() - 1;
+        for (row, run) in runs.iter().enumerate() {
+            let result = match &reasons[row] {
+                Some(reason) => Err(reason.clone()),
+                None => Ok(metrics.iter().map(|values| values[row]).collect()),
+            };
+            let run = usize::try_from(*run).ok().filter(|run| *run < manifest.runs);
+            let run = run.ok_or_else(|| broken(format!("has a run that is not from 0 to {}", manifest.runs - 1)))?;
+            let told = caveats[row].as_deref().map(Arc::from);
+            self.add(Answer { run, result, told }, file)?;
+        }
+        Ok(())
+    }
+
+    /// The runs that are missing, in words; none if all are there.
+    pub(super) fn missing(&self, runs: usize) -> Option<SweepError> {
+        let missing = runs - self.answers.len();
+        if missing == 0 {
+            return None;
+        }
+        let mut which = String::new();
+        if let Some(of) = self.shards {
+            let (mut lacking, mut all) = (vec![0usize; of], vec![0usize; of]);
+            for run in 0..runs {
+                all[run % of] += 1;
+                lacking[run % of] += usize::from(!self.answers.contains_key(&run));
+            }
+            let told = |k: usize| match lacking[k] == all[k] {
+                true => format!("shard {}/{of} (all {})", k + 1, all[k]),
+                false => format!("shard {}/{of} ({} of {})", k + 1, lacking[k], all[k]),
+            };
+            let lacking: Vec<String> = (0..of).filter(|k| lacking[*k] > 0).map(told).collect();
+            which = shortened(&lacking);
+        }
+        if which.is_empty() {
+            let first: Vec<String> =
+                (0..runs).filter(|run| !self.answers.contains_key(run)).take(6).map(|run| run.to_string()).collect();
+            which = format!("run {}", shortened(&first));
+        }
+        Some(SweepError::Missing { missing, runs, which, shards: self.shards })
+    }
+}
+
+/// A list, cut after a few.
+fn shortened(list: &[String]) -> String {
+    const MOST: usize = 5;
+    match list.len() > MOST {
+        true => format!("{} and {} more", list[..MOST].join(", "), list.len() - MOST),
+        false => list.join(", "),
+    }
+}
+
+/// Whether two answers to one run are the same, to the last bit.
+fn same(a: &Answer, b: &Answer) -> bool {
+    match (&a.result, &b.result) {
+        (Ok(a), Ok(b)) => {
+            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan())
+        }
+        (Err(a), Err(b)) => a == b,
+        _ => false,
+    }
+}
+
+/// The answers of a journal, and how many bytes of it are whole lines.
+fn read_journal(path: &Path, manifest: &Manifest) -> Result<(Vec<Answer>, u64), Error> {
+    let bytes = std::fs::read(path)
+        .map_err(|error| Error::File { path: path.into(), what: format!("cannot be read: {error}") })?;
+    let mut answers = Vec::new();
+    let mut whole = 0;
+    for line in bytes.split_inclusive(|byte| *byte == b'\n') {
+        if line.last() != Some(&b'\n') {
+            break; // cut while it was written
+        }
+        let broken = || SweepError::Broken {
+            path: path.to_owned(),
+            what: format!(
+                "line {} is not as a run was written; remove the line, or the file to run its part again",
+                answers.len() + 1
+            ),
+        };
+        let Line(run, reason, metrics, told) = serde_json::from_slice(line).map_err(|_| broken())?;
+        if run >= manifest.runs || reason.is_none() && metrics.len() != manifest.metrics.len() {
+            return Err(broken().into());
+        }
+        let numbers = metrics.into_iter().map(|x| x.unwrap_or(f64::NAN)).collect();
+        answers.push(Answer { run, result: reason.map_or(Ok(numbers), Err), told: told.map(Arc::from) });
+        whole += line.len() as u64;
+    }
+    Ok((answers, whole))
+}
+
+/// The folder of a study that is being run.
+#[derive(Debug)]
+pub(super) struct Store {
+    pub(super) folder: PathBuf,
+    manifest: Manifest,
+    shard: Shard,
+    journal: File,
+    journal_path: PathBuf,
+    /// What the journal holds.
+    held: Vec<Answer>,
+    synced: Instant,
+}
+
+impl Store {
+    /// Opens the folder of a study for a shard, and reads what is there.
+    ///
+    /// # Errors
+    /// [`SweepError::Foreign`], [`SweepError::Running`], [`SweepError::Broken`]; what the system says.
+    pub(super) fn open(
+        folder: &Path,
+        manifest: Manifest,
+        shard: Shard,
+        overwrite: bool,
+    ) -> Result<(Self, Collected), Error> {
+        let write = |path: &Path| {
+            let path = path.to_owned();
+            move |source: std::io::Error| Error::Write { path, source }
+        };
+        if let Some(known) = known_manifest(folder)? {
+            if known.fingerprint != manifest.fingerprint {
+                if !overwrite {
+                    let differs = known.differs(&manifest);
+                    return Err(SweepError::Foreign { folder: folder.to_owned(), differs }.into());
+                }
+                clear(folder)?;
+            }
+        } else if folder.join(RUNS).exists() || folder.join(PARTS).exists() {
+            let what = "is there without study.json: choose another folder".into();
+            return Err(SweepError::Broken { path: folder.join(RUNS), what }.into());
+        }
+        let parts = folder.join(PARTS);
+        std::fs::create_dir_all(&parts).map_err(write(&parts))?;
+        let text = serde_json::to_string_pretty(&manifest).expect("plain numbers and strings") + "\n";
+        if known_manifest(folder)?.is_none() {
+            write_all(&[(folder.join(STUDY), text)])?;
+        }
+        let journal_path = parts.join(format!("{}.journal", shard.stem()));
+        let journal = OpenOptions::new().create(true).truncate(false).write(true).open(&journal_path);
+        let mut journal = journal.map_err(write(&journal_path))?;
+        match journal.try_lock() {
+            Err(TryLockError::WouldBlock) => return Err(SweepError::Running { path: journal_path }.into()),
+            // Where files have no locks, two processes are the user's to avoid.
+            Ok(()) | Err(TryLockError::Error(_)) => {}
+        }
+        let (held, whole) = read_journal(&journal_path, &manifest)?;
+        journal.set_len(whole).and_then(|()| journal.seek(SeekFrom::End(0))).map_err(write(&journal_path))?;
+        let mut collected = Collected::default();
+        collected.read(folder, &manifest)?;
+        let folder = folder.to_owned();
+        Ok((Self { folder, manifest, shard, journal, journal_path, held, synced: Instant::now() }, collected))
+    }
+
+    /// Keeps the answer to a run; it is there whatever ends the program after this.
+    ///
+    /// # Errors
+    /// [`Error::Write`]: a full disk, for instance; what was kept before stays.
+    pub(super) fn keep(&mut self, answer: Answer, sweep: &Sweep) -> Result<(), Error> {
+        let (reason, metrics) = match &answer.result {
+            Ok(values) => (None, values.iter().map(|x| x.is_finite().then_some(*x)).collect()),
+            Err(reason) => (Some(reason.clone()), Vec::new()),
+        };
+        let line = Line(answer.run, reason, metrics, answer.told.as_deref().map(str::to_owned));
+        let line = serde_json::to_string(&line).expect("plain numbers and strings") + "\n";
+        let failed = |source| Error::Write { path: self.journal_path.clone(), source };
+        self.journal.write_all(line.as_bytes()).map_err(failed)?;
+        if self.synced.elapsed() > SYNC {
+            self.journal.sync_data().map_err(failed)?;
+            self.synced = Instant::now();
+        }
+        self.held.push(answer);
+        if self.held.len() >= ROLL {
+            self.roll(sweep)?;
+        }
+        Ok(())
+    }
+
+    /// Makes a part of the journal.
+    ///
+    /// # Errors
+    /// As [`Store::keep`].
+    pub(super) fn roll(&mut self, sweep: &Sweep) -> Result<(), Error> {
+        let failed = |source| Error::Write { path: self.journal_path.clone(), source };
+        if self.held.is_empty() {
+            return Ok(());
+        }
+        let parts = self.folder.join(PARTS);
+        let name = |k: usize| parts.join(format!("{}-{k}.parquet", self.shard.stem()));
+        let number = (0..).find(|k| !name(*k).exists()).unwrap_or(0);
+        self.held.sort_by_key(|answer| answer.run);
+        self.held.dedup_by_key(|answer| answer.run);
+        table::write(&name(number), &sweep.table(&self.held, &self.manifest), CreateOptions::default())?;
+        // The same runs are twice there until now, never nowhere.
+        self.journal.set_len(0).and_then(|()| self.journal.seek(SeekFrom::Start(0))).map_err(failed)?;
+        self.journal.sync_data().map_err(failed)?;
+        self.held.clear();
+        Ok(())
+    }
+
+    /// Removes parts that a table of all runs has made superfluous.
+    pub(super) fn remove_parts(self) {
+        let parts = self.folder.join(PARTS);
+        drop(self.journal);
+        // What cannot be removed says the same as the table.
+        let _ = std::fs::remove_dir_all(parts);
+    }
+}
+
+/// The study that a folder is of.
+///
+/// # Errors
+/// [`SweepError::Broken`].
+pub(super) fn known_manifest(folder: &Path) -> Result<Option<Manifest>, Error> {
+    let path = folder.join(STUDY);
+    if !path.exists() {
+        return Ok(None);
+    }
+    let broken = |what: String| SweepError::Broken { path: path.clone(), what };
+    let manifest: Manifest = serde_json::from_str(&read_text(&path)?).map_err(|error| {
+        broken(format!("is not as a study wrote it ({error}): remove the folder, or choose another one"))
+    })?;
+    if manifest.format != 1 {
+        return Err(broken(format!("is of format {}, this program reads format 1", manifest.format)).into());
+    }
+    Ok(Some(manifest))
+}
+
+/// Removes the results of a study, and nothing else.
+pub(super) fn clear(folder: &Path) -> Result<(), Error> {
+    for name in [RUNS, STUDY, "sweep.json", "report.html"] {
+        let path = folder.join(name);
+        if path.exists() {
+            std::fs::remove_file(&path).map_err(|source| Error::Write { path, source })?;
+        }
+    }
+    let parts = folder.join(PARTS);
+    if parts.exists() {
+        std::fs::remove_dir_all(&parts).map_err(|source| Error::Write { path: parts, source })?;
+    }
+    Ok(())
+}
+
+impl Sweep {
+    /// The table of some runs, in their order.
+    pub(super) fn table(&self, answers: &[Answer], manifest: &Manifest) -> DataTable {
+        let values: Vec<Vec<ParameterValue>> = answers.iter().map(|answer| self.design.values(answer.run)).collect();
+        self.table_of(answers, &values, manifest)
+    }
+
+    /// The table of runs with these values of the parameters.
+    pub(super) fn table_of(
+        &self,
+        answers: &[Answer],
+        values: &[Vec<ParameterValue>],
+        manifest: &Manifest,
+    ) -> DataTable {
+        let mut columns = vec![
+            DataColumn::new("run", DataValues::Whole(answers.iter().map(|answer| answer.run as i64).collect())),
+            DataColumn::new(
+                "status",
+                DataValues::Text(
+                    answers
+                        .iter()
+                        .map(|answer| Some(if answer.result.is_ok() { "done" } else { "failed" }.to_owned()))
+                        .collect(),
+                ),
+            ),
+        ];
+        for (k, column) in self.design.columns.iter().enumerate() {
+            let own = values.iter().map(|values| &values[k]);
+            let values = match column.is_numeric() {
+                true => DataValues::Number(own.map(|value| value.number().unwrap_or(f64::NAN)).collect()),
+                false => DataValues::Text(own.map(|value| Some(value.to_string())).collect()),
+            };
+            columns.push(DataColumn::new(&column.name, values));
+        }
+        for (k, metric) in self.metrics.iter().enumerate() {
+            let own = answers.iter().map(|answer| answer.result.as_ref().map_or(f64::NAN, |values| values[k]));
+            columns.push(DataColumn::new(&metric.name, DataValues::Number(own.collect())));
+        }
+        let reasons = answers.iter().map(|answer| answer.result.as_ref().err().cloned()).collect();
+        columns.push(DataColumn::new("reason", DataValues::Text(reasons)));
+        let told = answers.iter().map(|answer| answer.told.as_deref().map(str::to_owned)).collect();
+        columns.push(DataColumn::new(CAVEATS, DataValues::Text(told)));
+        let metrics: Vec<String> = self.metrics.iter().map(|metric| metric.text.clone()).collect();
+        let texts = [
+            ("flexarm.study", manifest.study.clone()),
+            ("flexarm.fingerprint", manifest.fingerprint.clone()),
+            ("flexarm.parameters", serde_json::to_string(&manifest.parameters).unwrap_or_default()),
+            ("flexarm.metrics", serde_json::to_string(&metrics).unwrap_or_default()),
+        ];
+        DataTable { columns, texts: texts.map(|(key, text)| (key.to_owned(), text)).into() }
+    }
+}
