@@ -14,27 +14,28 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 TARGET = ROOT / "crates/faces/flexarm-python/python/flexarm/types.py"
-CRATES = ["flexarm", "flexarm-linkmaker", "flexarm-settings"]
+CRATES = ["flexarm-run", "flexarm-linkmaker", "flexarm-settings", *(f"flexarm-{study}" for study in (
+    "chatter", "compensate", "identify", "map", "new", "sensitivity", "sweep"))]
 #: Answers: struct, its file, and the name of its type in Python.
 ROOTS = [
-    ("Summary", "flexarm/src/summary.rs", "RunSummary"),
-    ("Statics", "flexarm/src/statics.rs", "StaticsDetails"),
-    ("ModeTable", "flexarm/src/modes.rs", "ModesSummary"),
-    ("Response", "flexarm/src/response.rs", "ResponseSummary"),
-    ("Map", "flexarm/src/map/mod.rs", "MapSummary"),
-    ("Compensation", "flexarm/src/compensate/mod.rs", "Compensation"),
-    ("Sensitivity", "flexarm/src/sensitivity/mod.rs", "Sensitivity"),
-    ("PoseSensitivity", "flexarm/src/sensitivity/pose.rs", "PoseSensitivity"),
-    ("Identification", "flexarm/src/identify/answer.rs", "Identification"),
-    ("MeasurementPlan", "flexarm/src/identify/plan_file.rs", "MeasurementPlan"),
-    ("Lobes", "flexarm/src/lobes/mod.rs", "Lobes"),
-    ("SweepSummary", "flexarm/src/sweep/results.rs", "SweepSummary"),
+    ("Summary", "flexarm-run/src/summary.rs", "RunSummary"),
+    ("Statics", "flexarm-run/src/statics.rs", "StaticsDetails"),
+    ("ModeTable", "flexarm-run/src/modes.rs", "ModesSummary"),
+    ("Response", "flexarm-run/src/response.rs", "ResponseSummary"),
+    ("Map", "flexarm-map/src/lib.rs", "MapSummary"),
+    ("Compensation", "flexarm-compensate/src/lib.rs", "Compensation"),
+    ("Sensitivity", "flexarm-sensitivity/src/lib.rs", "Sensitivity"),
+    ("PoseSensitivity", "flexarm-sensitivity/src/pose.rs", "PoseSensitivity"),
+    ("Identification", "flexarm-identify/src/answer.rs", "Identification"),
+    ("MeasurementPlan", "flexarm-identify/src/plan_file.rs", "MeasurementPlan"),
+    ("Lobes", "flexarm-chatter/src/lib.rs", "Lobes"),
+    ("SweepSummary", "flexarm-sweep/src/results.rs", "SweepSummary"),
     ("ReduceSummary", "flexarm-linkmaker/src/reduce/summary.rs", "ReduceSummary"),
     ("ImportSummary", "flexarm-linkmaker/src/import/summary.rs", "ImportSummary"),
     ("ExportSummary", "flexarm-linkmaker/src/export.rs", "ExportSummary"),
-    ("Inspection", "flexarm/src/inspect.rs", "Inspection"),
-    ("Finding", "flexarm/src/check.rs", "Finding"),
-    ("NewRobot", "flexarm/src/new/report.rs", "NewRobot"),
+    ("Inspection", "flexarm-run/src/inspect.rs", "Inspection"),
+    ("Finding", "flexarm-run/src/check.rs", "Finding"),
+    ("NewRobot", "flexarm-new/src/report.rs", "NewRobot"),
 ]
 #: Names of Python's for structs whose own say too little outside their module.
 NAMES = {"Caveat": "CaveatDict", "Files": "RunFiles"}

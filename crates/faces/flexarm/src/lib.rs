@@ -41,8 +41,6 @@
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
-mod applied_load;
-mod arm;
 
 #[doc(inline)]
 pub use flexarm_chatter as lobes;

@@ -571,7 +571,7 @@ fn slips_are_told_and_plausible_robots_are_not() {
 #[test]
 fn the_page_lists_the_catalogue() {
     let page = std::fs::read_to_string(project("docs/caveats.md")).unwrap();
-    let read = |name: &str| std::fs::read_to_string(project("crates/faces/flexarm/src/caveat").join(name)).unwrap();
+    let read = |name: &str| std::fs::read_to_string(project("crates/run/flexarm-run/src/caveat").join(name)).unwrap();
     let source = read("kinds.rs") + &read("kinds_of_use.rs");
     let codes = source.split("CaveatKind::").skip(1).filter_map(|rest| rest.split_once("(\n").map(|(_, rest)| rest));
     let codes: Vec<&str> =

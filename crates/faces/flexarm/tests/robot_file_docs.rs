@@ -175,18 +175,18 @@ fn keys(sources: &[&str]) -> BTreeMap<String, BTreeSet<String>> {
 }
 
 const ROBOT: [&str; 9] = [
-    "crates/faces/flexarm/src/robot_file.rs",
-    "crates/faces/flexarm/src/balancer_entry.rs",
-    "crates/faces/flexarm/src/controller_entry.rs",
-    "crates/faces/flexarm/src/beam_entry.rs",
-    "crates/faces/flexarm/src/drive_entry.rs",
-    "crates/faces/flexarm/src/gear_entry.rs",
-    "crates/faces/flexarm/src/mounting.rs",
-    "crates/faces/flexarm/src/loop_entry.rs",
+    "crates/run/flexarm-run/src/robot_file.rs",
+    "crates/run/flexarm-run/src/balancer_entry.rs",
+    "crates/run/flexarm-run/src/controller_entry.rs",
+    "crates/run/flexarm-run/src/beam_entry.rs",
+    "crates/run/flexarm-run/src/drive_entry.rs",
+    "crates/run/flexarm-run/src/gear_entry.rs",
+    "crates/run/flexarm-run/src/mounting.rs",
+    "crates/run/flexarm-run/src/loop_entry.rs",
     "crates/run/flexarm-linkmaker/src/material_entry.rs",
 ];
 
-const LOADS: [&str; 1] = ["crates/faces/flexarm/src/loads_file.rs"];
+const LOADS: [&str; 1] = ["crates/run/flexarm-run/src/loads_file.rs"];
 const MOTION: [&str; 2] =
     ["crates/motion/flexarm-trajectory/src/waypoints_toml.rs", "crates/motion/flexarm-trajectory/src/samples_toml.rs"];
 
