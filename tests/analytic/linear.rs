@@ -7,7 +7,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use flexarm::{LoadOptions, Modelling, Motion, ResponseRequest, Robot, RunOptions, modes, response, simulate, statics};
+use flexarm::{LoadOptions, Modelling, Motion, ResponseRequest, Robot, RunOptions, modes, response, statics};
 use flexarm_analysis::{Taper, strongest_line};
 use flexarm_kinematics::{Data, Frame, Model, State, Wrench, forward_kinematics, mass_matrix};
 use flexarm_stepping::*;
@@ -61,8 +61,8 @@ fn modes_of_the_industrial_arm_are_those_that_compare_reports() {
     let (mut q, mut v, mut a) = ([0.0; 6], [0.0; 6], [0.0; 6]);
     motion.trajectory.sample(0.0, &mut q, &mut v, &mut a);
     let options = RunOptions { log_rate_hz: 100.0, step_s: 0.01, ..RunOptions::default() };
-    let summary = simulate(&robot, &motion, &options, None, &mut |_, _| ControlFlow::Continue(()));
-    let reported = summary.expect("runs").frequencies_hz;
+    let arm = robot.flexible(options.modelling).expect("a model");
+    let reported = arm.simulate(&motion, &options).expect("runs").summary.frequencies_hz;
     let found = modes(&robot, &Modelling::default(), Some(q.as_slice()), 100).expect("an equilibrium");
     assert_eq!((found.total, found.frequencies_hz.len()), (12, reported.len()));
     let mut worst = 0.0f64;

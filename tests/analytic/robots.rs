@@ -7,7 +7,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use flexarm::{
-    LinkModel, LoadOptions, Modelling, Motion, Outputs, RecordingFormat, Robot, RunOptions, Summary, simulate,
+    Keep, LinkModel, LoadOptions, Modelling, Motion, Outputs, RecordingFormat, Robot, RunOptions, RunRequest, Summary,
 };
 
 fn root() -> PathBuf {
@@ -26,8 +26,9 @@ fn run(robot: &str, trajectory: &str, options: &RunOptions) -> (Summary, HashMap
     let unique = format!("flexarm-robots-{}-{}-{trajectory}-{}", std::process::id(), robot.name, options.log_rate_hz);
     let folder = std::env::temp_dir().join(unique);
     let outputs = Outputs { recordings: [RecordingFormat::Csv].into(), ..Outputs::everything(&folder) };
-    let summary = simulate(&robot, &motion, options, Some(&outputs), &mut |_, _| ControlFlow::Continue(()));
-    let summary = summary.expect("runs");
+    let arm = robot.flexible(options.modelling).expect("a model");
+    let request = RunRequest { outputs: Some(&outputs), ..RunRequest::keeping(Keep::Figures) };
+    let summary = arm.simulate_with(&motion, options, request).expect("runs").summary;
     let text = std::fs::read_to_string(folder.join("run.csv")).expect("the table");
     std::fs::remove_dir_all(&folder).expect("our own folder");
     let mut lines = text.lines();
@@ -127,8 +128,8 @@ fn steppers_agree_on_the_shipped_arm() {
         let robot = load("kr210");
         let path = root().join("trajectories/point_to_point.toml");
         let motion = Motion::load_for(&path, &robot.rigid_model().expect("a tree")).expect("sound");
-        let summary = simulate(&robot, &motion, &options, None, &mut |_, _| ControlFlow::Continue(())).expect("runs");
-        summary.tcp.expect("compared").peak_m
+        let arm = robot.flexible(options.modelling).expect("a model");
+        arm.simulate(&motion, &options).expect("runs").summary.tcp.expect("compared").peak_m
     };
     let reference = peak(StepperKind::Rk4, 5e-5);
     let alpha = peak(RunOptions::default().stepper, 1e-3) / reference - 1.0;

@@ -329,12 +329,19 @@ fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool, line: &[OsString]) -> Re
         stop()
     };
     let as_filed = as_filed.pop().filter(|_| options.modelling == Modelling::default());
-    let result = match (variants.len(), as_filed) {
-        (1, Some(flexible)) => {
-            flexarm::simulate_modelled(robot, flexible, scenario, options, outputs.as_ref(), &mut progress)
-        }
-        (1, None) => flexarm::simulate(robot, scenario, options, outputs.as_ref(), &mut progress),
-        _ => flexarm::compare_study(&variants, outputs.as_ref(), &mut progress).map(|(summary, _)| summary),
+    let result = if variants.len() == 1 {
+        let arm = match as_filed {
+            Some(flexible) => Ok(Arm::new(robot.clone(), options.modelling, flexible)),
+            None => robot.flexible(options.modelling),
+        };
+        let request = RunRequest {
+            outputs: outputs.as_ref(),
+            progress: Some(&mut progress),
+            ..RunRequest::keeping(Keep::Figures)
+        };
+        arm.and_then(|arm| arm.simulate_with(scenario, options, request)).map(|run| run.summary)
+    } else {
+        flexarm::compare_study(&variants, outputs.as_ref(), &mut progress).map(|(summary, _)| summary)
     };
     bar.clear();
     let summary = result?;

@@ -127,9 +127,14 @@ fn first_run(cli: &Cli, made: &NewRobot, folder: &Path, overwrite: bool) -> Resu
         bar.show(t, total);
         stop()
     };
-    let result = flexarm::simulate(&robot, Scenario::from(&motion), &options, Some(&outputs), &mut progress);
+    let request = RunRequest {
+        outputs: Some(&outputs),
+        progress: Some(&mut progress),
+        ..RunRequest::keeping(Keep::Figures)
+    };
+    let result = robot.flexible(options.modelling).and_then(|arm| arm.simulate_with(&motion, &options, request));
     bar.clear();
-    Ok(result?)
+    Ok(result?.summary)
 }
 
 fn text(made: &NewRobot) -> String {

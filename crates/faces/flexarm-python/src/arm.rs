@@ -319,7 +319,7 @@ impl PyArm {
             ..options
         };
         let arm = self.arm.clone();
-        let found = stoppable(py, move |stop| arm.simulate_batch_until(&scenarios, &options, stop))?;
+        let found = stoppable(py, move |stop| arm.simulate_batch(&scenarios, &options, stop))?;
         let list = PyList::empty(py);
         for result in found {
             match result {
@@ -401,7 +401,7 @@ impl PyArm {
         let options = RunOptions { ignore_limits, ..run_options(step, stepper, stepper_options)? };
         let step_s = options.step_s;
         let arm = self.arm.clone();
-        let found = stoppable(py, move |stop| arm.deflections_until(&variations, &options, samples, stop))?;
+        let found = stoppable(py, move |stop| arm.deflections(&variations, &options, samples, stop))?;
         PyDeflections::of(found, raises, step_s)
     }
 
@@ -612,7 +612,8 @@ impl PyArm {
         });
         let result = py.detach(|| {
             let show = show.as_mut().map(|show| show as &mut dyn FnMut(&flexarm::Sample) -> std::ops::ControlFlow<()>);
-            self.arm.simulate_watched(scenario, options, outputs, show, &mut look)
+            let request = RunRequest { outputs, observer: show, progress: Some(&mut look), ..RunRequest::default() };
+            self.arm.simulate_with(scenario, options, request)
         });
         drop(show);
         let mut watch = watch.into_inner().unwrap_or_else(PoisonError::into_inner);

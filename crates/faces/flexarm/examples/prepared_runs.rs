@@ -26,6 +26,10 @@ fn cost(mut run: impl FnMut() -> Result<(), Error>) -> Result<f64, Error> {
     Ok(least)
 }
 
+fn figures(arm: &Arm, motion: &Motion, options: &RunOptions) -> Result<(), Error> {
+    arm.simulate_with(motion, options, RunRequest::keeping(Keep::Figures)).map(drop)
+}
+
 fn columns(arm: &Arm, motion: &Motion, options: &RunOptions) -> Result<f64, Error> {
     cost(|| arm.simulate(motion, options).map(drop))
 }
@@ -56,7 +60,7 @@ fn lines(root: &Path, wanted: &[String]) -> Result<(), Error> {
                 let mut spent = [0.0; 2];
                 for (spent, log_rate_hz) in spent.iter_mut().zip([1.0 / duration, 100.0]) {
                     let options = RunOptions { log_rate_hz, ..options.clone() };
-                    *spent = 1e3 * cost(|| arm.simulate_summary(&motion, &options).map(drop))? / duration;
+                    *spent = 1e3 * cost(|| figures(&arm, &motion, &options))? / duration;
                 }
                 println!("{line} {:.4} {:.4}", spent[0], spent[1]);
             }

@@ -27,13 +27,15 @@ fn main() -> Result<(), Error> {
     let end_of_move = moves.last().map_or(0.0, |last| last.end);
 
     let (mut largest_m, mut restless_s) = (0.0_f64, 0.0);
-    let run = arm.simulate_with(&motion, &RunOptions::default(), None, &mut |sample| {
+    let mut observer = |sample: &Sample| {
         largest_m = largest_m.max(ringing_m(sample));
         if ringing_m(sample) > NEAR_M || sample.time_s < end_of_move {
             restless_s = sample.time_s;
         }
         if sample.time_s - restless_s < LONG_S { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
-    });
+    };
+    let request = RunRequest { observer: Some(&mut observer), ..RunRequest::default() };
+    let run = arm.simulate_with(&motion, &RunOptions::default(), request);
     match run {
         Err(Error::Interrupted { t, .. }) => println!("stopped at {t:.3} s of {whole} s"),
         Err(other) => return Err(other),

@@ -6,7 +6,7 @@ use std::error::Error;
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use flexarm::{LinkModel, LoadOptions, Modelling, Motion, ReportRun, Robot, RunOptions, html, simulate_traced};
+use flexarm::{Keep, LinkModel, LoadOptions, Modelling, Motion, ReportRun, Robot, RunOptions, RunRequest, html};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let path = std::env::args().nth(1).ok_or("give the file to write")?;
@@ -22,7 +22,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut runs = Vec::new();
     for (label, modelling) in choices {
         let options = RunOptions { modelling, ..RunOptions::default() };
-        runs.push((label, simulate_traced(&robot, &motion, &options, None, &mut |_, _| ControlFlow::Continue(()))?));
+        let run = robot.flexible(modelling)?.simulate_with(&motion, &options, RunRequest::keeping(Keep::Curves))?;
+        runs.push((label, (run.summary, run.trace)));
     }
     let report: Vec<ReportRun<'_>> =
         runs.iter().map(|(label, (summary, trace))| ReportRun { label, summary, trace }).collect();

@@ -177,15 +177,15 @@ fn work_stops_when_it_is_told_to() {
     let motion = Motion::load(root().join("trajectories/point_to_point.toml"), &robot).unwrap();
     let options = RunOptions::default();
     let scenarios = vec![Scenario::new(motion.clone()); 3];
-    let runs = arm.simulate_batch_until(&scenarios, &options, &|| true);
+    let runs = arm.simulate_batch(&scenarios, &options, &|| true);
     assert!(runs.iter().all(|run| matches!(run, Err(Error::Interrupted { .. }))));
     let variations = vec![Variation::new(&motion); 3];
-    let runs = arm.deflections_until(&variations, &options, false, &|| true);
+    let runs = arm.deflections(&variations, &options, false, &|| true);
     assert!(runs.iter().all(|run| matches!(run, Err(Error::Interrupted { .. }))));
 
     let half = 0.5 * motion.trajectory.duration();
     let mut progress = |t: f64, _: f64| if t < half { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
-    let run = arm.simulate_watched(&motion, &options, None, None, &mut progress);
+    let run = arm.simulate_with(&motion, &options, RunRequest { progress: Some(&mut progress), ..RunRequest::default() });
     assert!(matches!(run, Err(Error::Interrupted { t, .. }) if t >= half && t < half + 0.1));
 }
 
@@ -202,8 +202,8 @@ fn columns_in_memory_are_the_table_of_the_csv() {
         };
         let options = RunOptions { log_rate_hz: 50.0, ..RunOptions::default() };
         let arm = robot.flexible(Modelling::default()).unwrap();
-        let mut progress = |_: f64, _: f64| ControlFlow::Continue(());
-        let run = arm.simulate_watched(&motion, &options, Some(&outputs), None, &mut progress).unwrap();
+        let request = RunRequest { outputs: Some(&outputs), ..RunRequest::default() };
+        let run = arm.simulate_with(&motion, &options, request).unwrap();
         let text = std::fs::read_to_string(folder.join("run.csv")).unwrap();
         std::fs::remove_dir_all(&folder).unwrap();
         let mut lines = text.lines().filter(|line| !line.starts_with('#'));

@@ -96,7 +96,7 @@ fn runs_on_all_cores_are_those_of_one_thread() {
     let scenarios: Vec<Scenario> = (0..3).map(|_| Scenario::from(&motion)).collect();
     let options = RunOptions { step_s: 10e-3, ..RunOptions::default() };
     let alone = arm.simulate(&motion, &options).unwrap();
-    for run in with_threads(3, || arm.simulate_batch(&scenarios, &options)) {
+    for run in with_threads(3, || arm.simulate_batch(&scenarios, &options, &|| false)) {
         let run = run.unwrap();
         assert_eq!(bits(run.error_world_m()), bits(alone.error_world_m()));
         assert_eq!(run.summary.headline, alone.summary.headline);
@@ -132,7 +132,7 @@ fn deflections_of_a_study_are_those_of_whole_runs() {
     let (robot, arm) = kr210();
     let options = RunOptions { step_s: 5e-3, log_rate_hz: 200.0, ..RunOptions::default() };
     let runs = study(&robot);
-    let found = arm.deflections(&runs, &options, true);
+    let found = arm.deflections(&runs, &options, true, &|| false);
     for (k, (run, found)) in
         runs.iter().zip(found).enumerate().filter(|(_, (run, _))| (run.stiffness, run.damping) == (1.0, 1.0))
     {
@@ -154,7 +154,7 @@ fn deflections_do_not_depend_on_company_order_or_threads() {
     let options = RunOptions { step_s: 5e-3, ..RunOptions::default() };
     let runs = study(&robot);
     let all = |runs: &[Variation], threads: usize| -> Vec<ToolDeflection> {
-        let found = with_threads(threads, || arm.deflections(runs, &options, true));
+        let found = with_threads(threads, || arm.deflections(runs, &options, true, &|| false));
         found.into_iter().map(Result::unwrap).collect()
     };
     let one = all(&runs, 1);
@@ -175,16 +175,16 @@ fn a_bad_run_is_refused_in_its_place() {
     let options = RunOptions { step_s: 10e-3, ..RunOptions::default() };
     let mut runs = study(&robot)[..3].to_vec();
     runs[1] = runs[1].clone().with_stiffness(-1.0);
-    let found = arm.deflections(&runs, &options, false);
+    let found = arm.deflections(&runs, &options, false, &|| false);
     assert!(found[0].is_ok() && found[2].is_ok());
     let error = found[1].as_ref().unwrap_err().to_string();
     assert!(error.contains("factor of the stiffness") && error.contains("-1"), "{error}");
     let sdirk = RunOptions { stepper: StepperKind::Sdirk3, ..options.clone() };
-    let third = arm.deflections(&runs[..1], &sdirk, false)[0].as_ref().unwrap().peak_m;
+    let third = arm.deflections(&runs[..1], &sdirk, false, &|| false)[0].as_ref().unwrap().peak_m;
     let second = found[0].as_ref().unwrap().peak_m;
     assert!(third != second && (third / second - 1.0).abs() < 0.05, "{third} {second}");
     let rigid =
         Modelling { links: flexarm::LinkModel::Rigid, drives: flexarm::DriveModel::Rigid, ..Modelling::default() };
-    let rigid = robot.flexible(rigid).unwrap().deflections(&runs[..1], &options, false);
+    let rigid = robot.flexible(rigid).unwrap().deflections(&runs[..1], &options, false, &|| false);
     assert_eq!(rigid[0].as_ref().unwrap().peak_m, 0.0);
 }

@@ -10,7 +10,7 @@ use flexarm::map::{JointRange, MapRegion, MapRequest, map};
 use flexarm::sensitivity::{SensitivityRequest, pose_sensitivity, sensitivity};
 use flexarm::{
     Caveat, LoadOptions, Modelling, Motion, MotionOptions, ResponseRequest, Robot, RunOptions, Scenario,
-    check_with_loads, inspect, modes, motion_report, response, simulate, statics,
+    check_with_loads, inspect, modes, motion_report, response, statics,
 };
 
 fn project(path: &str) -> PathBuf {
@@ -143,7 +143,7 @@ fn every_command_with_a_motion_says_of_it_and_of_its_loads_what_check_says() {
         assert_eq!(warnings.len(), caveats.iter().filter(|c| c.warns()).count(), "{what}");
     };
     let run = RunOptions { step_s: 0.004, ..RunOptions::default() };
-    let found = simulate(&robot, &scenario, &run, None, &mut |_, _| std::ops::ControlFlow::Continue(())).unwrap();
+    let found = robot.flexible(run.modelling).unwrap().simulate(&scenario, &run).unwrap().summary;
     says("compare", &found.caveats, &found.warnings);
     let request = SensitivityRequest {
         parameters: vec!["payload.mass".into()],

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use flexarm::{
     ConvertOptions, Error, LinkModel, LoadOptions, Modelling, Motion, Outputs, RecordingFormat, Robot, RunOptions,
-    Summary, Variant, compare_study, convert_until, simulate_traced,
+    Summary, Variant, compare_study, convert_until,
 };
 use flexarm_log::{Trace, TraceRow};
 
@@ -19,7 +19,10 @@ fn variant(label: &str, robot: &str, trajectory: &str, options: RunOptions) -> V
 
 fn run(robot: &str, trajectory: &str, outputs: Option<&Outputs>) -> (Summary, Trace) {
     let v = variant("", robot, trajectory, RunOptions::default());
-    simulate_traced(&v.robot, &v.scenario, &v.options, outputs, &mut |_, _| ControlFlow::Continue(())).unwrap()
+    let arm = v.robot.flexible(v.options.modelling).unwrap();
+    let request = RunRequest { outputs, ..RunRequest::keeping(Keep::Curves) };
+    let run = arm.simulate_with(&v.scenario, &v.options, request).unwrap();
+    (run.summary, run.trace)
 }
 
 /// Truth: the recorded parts of the error. The beam swings in a plane and sags out of it: nothing is normal to its path.

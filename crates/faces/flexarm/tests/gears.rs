@@ -111,7 +111,7 @@ fn the_ripple_of_a_gear_is_where_the_robot_file_puts_it() {
     }
     let options = RunOptions { step_s: 2.5e-4, ..RunOptions::default() };
     let alone = arm.simulate(&motion, &options).unwrap().summary.tcp.unwrap().peak_m;
-    for found in arm.deflections(&vec![Variation::new(&motion); 4], &options, false) {
+    for found in arm.deflections(&vec![Variation::new(&motion); 4], &options, false, &|| false) {
         assert!((found.unwrap().peak_m / alone - 1.0).abs() < 1e-3);
     }
     let spook =

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use flexarm::{
     DriveModel, LinkModel, LoadOptions, Modelling, Motion, Robot, RunOptions, Settling, Summary, Trace, Variant,
-    compare_study, simulate_traced, statics, study_rows,
+    compare_study, statics, study_rows,
 };
 use nalgebra::Vector3;
 
@@ -25,7 +25,9 @@ fn motion(robot: &Robot, trajectory: &str) -> Motion {
 
 fn run(robot: &Robot, trajectory: &str, options: &RunOptions) -> (Summary, Trace) {
     let motion = motion(robot, trajectory);
-    simulate_traced(robot, &motion, options, None, &mut |_, _| ControlFlow::Continue(())).unwrap()
+    let arm = robot.flexible(options.modelling).unwrap();
+    let run = arm.simulate_with(&motion, options, RunRequest::keeping(Keep::Curves)).unwrap();
+    (run.summary, run.trace)
 }
 
 /// Truth: `statics` at the poses of the motion, which finds each equilibrium from nothing. Measured 3e-8 of the largest

@@ -36,8 +36,8 @@ fn a_run_by_values_is_the_run_by_files() {
     let arm = robot.flexible(Modelling::default()).unwrap();
     let options = RunOptions::default();
     let run = arm.simulate(&motion, &options).unwrap();
-    let by_files = flexarm::simulate(&robot, &motion, &options, None, &mut |_, _| ControlFlow::Continue(())).unwrap();
-    assert_eq!(run.summary.tcp, by_files.tcp);
+    let curves = arm.simulate_with(&motion, &options, RunRequest::keeping(Keep::Curves)).unwrap().summary;
+    assert_eq!(run.summary.tcp, curves.tcp);
     // The figures are the same whatever else of a run is wanted.
     let timeless = |mut summary: flexarm::Summary| {
         (summary.wall_s, summary.cpu_s) = (0.0, 0.0);
@@ -47,9 +47,9 @@ fn a_run_by_values_is_the_run_by_files() {
     let figures = timeless(run.summary.clone());
     for _ in 0..2 {
         // The second finds the arm in equilibrium where the first left it.
-        assert_eq!(timeless(arm.simulate_summary(&motion, &options).unwrap()), figures);
+        assert_eq!(timeless(arm.simulate_with(&motion, &options, RunRequest::keeping(Keep::Figures)).unwrap().summary), figures);
     }
-    assert_eq!(timeless(by_files), figures);
+    assert_eq!(timeless(curves), figures);
 
     let (t, e) = (run.time_s(), run.error_world_m());
     assert_eq!((t.len(), e.len()), (5001, 3 * 5001));
@@ -151,16 +151,17 @@ fn an_observer_sees_every_sample_and_can_stop_the_run() {
     let motion = Motion::load(root().join("trajectories/beam_swing.toml"), &robot).unwrap();
     let arm = robot.flexible(Modelling::default()).unwrap();
     let mut seen = 0;
-    let run = arm
-        .simulate_with(&motion, &RunOptions::default(), None, &mut |_| {
-            seen += 1;
-            ControlFlow::Continue(())
-        })
-        .unwrap();
+    let mut count = |_: &Sample| {
+        seen += 1;
+        ControlFlow::Continue(())
+    };
+    let request = RunRequest { observer: Some(&mut count), ..RunRequest::default() };
+    let run = arm.simulate_with(&motion, &RunOptions::default(), request).unwrap();
     assert_eq!(seen, run.columns.rows());
-    let stopped = arm.simulate_with(&motion, &RunOptions::default(), None, &mut |sample| {
-        if sample.time_s > 0.1 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    });
+    let mut until =
+        |sample: &Sample| if sample.time_s > 0.1 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+    let request = RunRequest { observer: Some(&mut until), ..RunRequest::default() };
+    let stopped = arm.simulate_with(&motion, &RunOptions::default(), request);
     assert!(matches!(stopped, Err(Error::Interrupted { t, .. }) if (t - 0.102).abs() < 1e-9), "{:?}", stopped.err());
 }
 

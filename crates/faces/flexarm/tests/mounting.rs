@@ -296,7 +296,7 @@ fn every_stepper_swings_on_the_mounting_as_the_reference_does() {
 
     let options = RunOptions::default();
     let alone = arm.simulate(&motion, &options).unwrap().summary.tcp.unwrap();
-    let all = arm.deflections(&vec![Variation::new(&motion); 4], &options, false);
+    let all = arm.deflections(&vec![Variation::new(&motion); 4], &options, false, &|| false);
     for found in all {
         let found = found.unwrap();
         assert!((found.peak_m / alone.peak_m - 1.0).abs() < 1e-12, "{} {}", found.peak_m, alone.peak_m);

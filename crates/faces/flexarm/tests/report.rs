@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 
 use flexarm::{
     DifferenceFigures, DriveModel, LinkModel, LoadOptions, Modelling, Motion, Outputs, ReportRun, Robot, RunOptions,
-    Summary, html, markdown, simulate_traced,
+    Summary, html, markdown,
 };
 use flexarm_log::Trace;
 
@@ -19,7 +19,9 @@ fn run(robot: &str, trajectory: &str, options: &RunOptions, outputs: Option<&Out
     let robot = Robot::load_with(&root.join("robots").join(robot), &LoadOptions::default()).unwrap();
     let model = robot.rigid_model().unwrap();
     let motion = Motion::load_for(&root.join("trajectories").join(trajectory), &model).unwrap();
-    simulate_traced(&robot, &motion, options, outputs, &mut |_, _| ControlFlow::Continue(())).unwrap()
+    let arm = robot.flexible(options.modelling).unwrap();
+    let run = arm.simulate_with(&motion, options, RunRequest { outputs, ..RunRequest::keeping(Keep::Curves) }).unwrap();
+    (run.summary, run.trace)
 }
 
 /// The shipped arm on its cycle, run once for all tests.
@@ -358,8 +360,9 @@ fn the_files_of_a_run_are_written_and_not_overwritten() {
         let robot = Robot::load_with(&root.join("robots/one_beam"), &LoadOptions::default()).unwrap();
         let motion =
             Motion::load_for(&root.join("trajectories/beam_swing.toml"), &robot.rigid_model().unwrap()).unwrap();
-        let go = &mut |_, _| ControlFlow::Continue(());
-        let error = simulate_traced(&robot, &motion, &RunOptions::default(), Some(&outputs), go).unwrap_err();
+        let arm = robot.flexible(Modelling::default()).unwrap();
+        let request = RunRequest { outputs: Some(&outputs), ..RunRequest::default() };
+        let error = arm.simulate_with(&motion, &RunOptions::default(), request).unwrap_err();
         assert!(error.to_string().contains(name), "{error}");
         assert_eq!(std::fs::read_to_string(other.0.join(name)).unwrap(), "mine");
     }

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use flexarm::{
     LoadOptions, Modelling, Motion, ReportRun, Robot, RunOptions, STEPPERS, StepRule, StepperOptions, Summary, Trace,
-    figure_groups, html, inspect, sensitivity::pose_sensitivity, simulate, simulate_traced, statics,
+    figure_groups, html, inspect, sensitivity::pose_sensitivity, statics,
 };
 use serde_json::Value;
 
@@ -45,7 +45,8 @@ fn load(name: &str) -> (Robot, Motion) {
 }
 
 fn run(robot: &Robot, motion: &Motion, options: &RunOptions) -> Result<Summary, flexarm::Error> {
-    simulate(robot, motion, options, None, &mut |_, _| ControlFlow::Continue(()))
+    let run = robot.flexible(options.modelling)?.simulate_with(motion, options, RunRequest::keeping(Keep::Figures))?;
+    Ok(run.summary)
 }
 
 /// The stepper with its own step.
@@ -198,7 +199,9 @@ fn a_pose_in_degrees_is_asked_about_wherever_a_pose_is_given() {
 fn traced(name: &str) -> (Summary, Trace) {
     let (robot, motion) = load(name);
     let options = RunOptions::default();
-    simulate_traced(&robot, &motion, &options, None, &mut |_, _| ControlFlow::Continue(())).unwrap()
+    let arm = robot.flexible(options.modelling).unwrap();
+    let run = arm.simulate_with(&motion, &options, RunRequest::keeping(Keep::Curves)).unwrap();
+    (run.summary, run.trace)
 }
 
 #[test]

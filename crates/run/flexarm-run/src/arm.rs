@@ -4,19 +4,18 @@
 //! threads. Each query takes numbers and a workspace of its own.
 
 use std::ops::ControlFlow;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
-use flexarm_log::{Columns, RunHeader, Sample};
-use flexarm_stepping::{Held, OperatingPoint};
+use flexarm_log::{Columns, Trace};
+use flexarm_stepping::{FlexibleArm, Held, OperatingPoint};
 use rayon::prelude::*;
 
 use crate::caveat::{Caveat, Use, told};
 use crate::error::Error;
 use crate::flexible::FlexibleRobot;
-use crate::options::{Modelling, Outputs, RunOptions};
-use crate::prepare::Prepared;
+use crate::options::{Modelling, RunOptions};
 use crate::robot::Robot;
-use crate::run::{Observer, Progress, Together, Wanted, run_traced};
+use crate::run::{self, RunRequest};
 use crate::scenario::Scenario;
 use crate::summary::Summary;
 
@@ -25,26 +24,22 @@ use crate::summary::Summary;
 pub struct Arm {
     robot: Arc<Robot>,
     modelling: Modelling,
-    prepared: Arc<Prepared>,
+    flexible: Arc<FlexibleRobot>,
     /// [`Robot::caveats`].
     caveats: Arc<[Caveat]>,
+    /// Joint values at which the last motion began, and the arm in equilibrium there.
+    pub(crate) last_start: Arc<Mutex<Option<(Vec<f64>, Arc<FlexibleArm>)>>>,
 }
 
-/// What a run gives: figures, and every logged sample as columns.
+/// What a run gives.
 #[derive(Clone, Debug)]
 pub struct Run {
     /// The figures, as in `summary.json`.
     pub summary: Summary,
-    /// The signals.
+    /// The signals; empty unless the request keeps [`Keep::Columns`](crate::Keep::Columns).
     pub columns: Columns,
-}
-
-/// Called with each logged sample; breaking off stops the run.
-pub type SampleObserver<'a> = dyn FnMut(&Sample) -> ControlFlow<()> + 'a;
-
-/// Nobody breaks off.
-fn to_the_end(_t: f64, _total: f64) -> ControlFlow<()> {
-    ControlFlow::Continue(())
+    /// The curves, thinned if the run is long; empty unless the request keeps [`Keep::Curves`](crate::Keep::Curves) or writes recordings.
+    pub trace: Trace,
 }
 
 impl Run {
@@ -65,163 +60,93 @@ impl Run {
 }
 
 impl Robot {
-    /// The robot with its links and drives modelled as asked for.
+    /// Returns the robot with its links and drives modelled as asked for.
     ///
     /// Cost: reading of modes, substitution; milliseconds.
     ///
     /// # Errors
     /// [`Error::Modelling`] if a link or drive has no such model, [`Error::Model`] if the result is no tree.
     pub fn flexible(&self, modelling: Modelling) -> Result<Arm, Error> {
-        let prepared = Arc::new(Prepared::new(self.modelled(&modelling)?));
-        Ok(Arm { robot: Arc::new(self.clone()), modelling, prepared, caveats: self.caveats().into() })
+        Ok(Arm::new(self.clone(), modelling, self.modelled(&modelling)?))
     }
 }
 
 impl Arm {
-    /// The robot that it was made of.
+    /// Returns the arm of a robot that is modelled already.
+    ///
+    /// * `flexible`: result of [`Robot::modelled`] with the same `modelling`.
+    pub fn new(robot: Robot, modelling: Modelling, flexible: FlexibleRobot) -> Self {
+        let caveats = robot.caveats().into();
+        Self { robot: Arc::new(robot), modelling, flexible: Arc::new(flexible), caveats, last_start: Arc::default() }
+    }
+
+    /// Returns the robot that the arm was made of.
     pub fn robot(&self) -> &Robot {
         &self.robot
     }
 
-    /// Tree, springs and drives.
+    /// Returns tree, springs and drives.
     pub fn flexible(&self) -> &FlexibleRobot {
-        &self.prepared.flexible
+        &self.flexible
     }
 
     /// As [`Arm::flexible`], shared.
-    pub(crate) fn shared(&self) -> Arc<FlexibleRobot> {
-        self.prepared.flexible.clone()
+    pub fn shared(&self) -> Arc<FlexibleRobot> {
+        self.flexible.clone()
     }
 
-    /// [`Robot::caveats`], found once.
-    pub(crate) fn robot_caveats(&self) -> Arc<[Caveat]> {
+    /// Returns [`Robot::caveats`], found once.
+    pub fn robot_caveats(&self) -> Arc<[Caveat]> {
         self.caveats.clone()
     }
 
-    /// Everything that is to be said of the robot as it is modelled, and of what a command does with it.
-    pub(crate) fn told(&self, used: Use<'_>) -> Vec<Caveat> {
+    /// Returns the caveats of the robot as it is modelled, and of what a command does with it.
+    pub fn told(&self, used: Use<'_>) -> Vec<Caveat> {
         told(&self.robot, &self.shared(), Some(&self.caveats), used)
     }
 
-    /// How its links and drives are modelled.
+    /// Returns how links and drives are modelled.
     pub fn modelling(&self) -> &Modelling {
         &self.modelling
     }
 
-    /// Actuated joints, in the order in which poses and motions have them.
+    /// Returns the actuated joints, in the order of poses and motions.
     pub fn joints(&self) -> impl Iterator<Item = &str> {
         let model = &self.flexible().model;
         model.coordinates()[..model.n_actuated()].iter().map(|coordinate| coordinate.joint.as_str())
     }
 
-    /// Runs a motion (`&motion`), or a motion with loads, payloads and a start of its own (`&scenario`); the options' own
-    /// modelling does not count.
+    /// Runs a motion (`&motion`), or a motion with loads, payloads and a start of its own (`&scenario`), and returns
+    /// figures and columns. The modelling of `options` is not used.
     ///
     /// # Errors
-    /// As [`crate::simulate`].
+    /// [`Error`]; [`Error::fault`] says whether input or run is to blame.
     pub fn simulate(&self, scenario: impl Into<Scenario>, options: &RunOptions) -> Result<Run, Error> {
-        let mut go_on = |_: &Sample| ControlFlow::Continue(());
-        self.run(&scenario.into(), options, None, Wanted::Columns, &mut go_on, &mut to_the_end)
+        self.simulate_with(scenario, options, RunRequest::default())
     }
 
-    /// As [`Arm::simulate`], the figures alone: for studies of many runs of which nobody looks at the signals.
+    /// As [`Arm::simulate`], with recordings, an observer, progress or less to keep as `request` says.
+    ///
+    /// Everything about the input is checked before the first file is made. If the run stops early, the recordings are
+    /// closed so that every reader takes them.
     ///
     /// # Errors
-    /// As [`crate::simulate`].
-    pub fn simulate_summary(&self, scenario: impl Into<Scenario>, options: &RunOptions) -> Result<Summary, Error> {
-        let options = RunOptions { modelling: self.modelling, ..options.clone() };
-        self.traced(&scenario.into(), &options, None, Wanted::Figures, None, &mut to_the_end)
-    }
-
-    /// As [`Arm::simulate`], writes recordings if asked to, and shows each logged sample to `observer`, which may break off.
-    ///
-    /// # Errors
-    /// As [`crate::simulate`]; [`Error::Interrupted`] if the observer breaks off.
+    /// As [`Arm::simulate`]; [`Error::Interrupted`] if observer or progress break off.
     pub fn simulate_with(
         &self,
         scenario: impl Into<Scenario>,
         options: &RunOptions,
-        outputs: Option<&Outputs>,
-        observer: &mut dyn FnMut(&Sample) -> ControlFlow<()>,
-    ) -> Result<Run, Error> {
-        self.simulate_watched(scenario, options, outputs, Some(observer), &mut to_the_end)
-    }
-
-    /// As [`Arm::simulate_with`], and tells `progress` how far it is, which may break off too; without an observer, samples
-    /// are made as far as columns and recordings need them.
-    ///
-    /// # Errors
-    /// As [`Arm::simulate_with`].
-    pub fn simulate_watched(
-        &self,
-        scenario: impl Into<Scenario>,
-        options: &RunOptions,
-        outputs: Option<&Outputs>,
-        observer: Option<&mut SampleObserver<'_>>,
-        progress: &mut Progress<'_>,
-    ) -> Result<Run, Error> {
-        // What things look like is asked by nobody but recordings.
-        let wanted = match (outputs.is_some(), observer.is_some()) {
-            (true, _) => Wanted::Curves,
-            (false, true) => Wanted::Samples,
-            (false, false) => Wanted::Columns,
-        };
-        let mut go_on = |_: &Sample| ControlFlow::Continue(());
-        self.run(&scenario.into(), options, outputs, wanted, observer.unwrap_or(&mut go_on), progress)
-    }
-
-    /// A run with its columns.
-    fn run(
-        &self,
-        scenario: &Scenario,
-        options: &RunOptions,
-        outputs: Option<&Outputs>,
-        wanted: Wanted,
-        observer: &mut dyn FnMut(&Sample) -> ControlFlow<()>,
-        progress: &mut Progress<'_>,
+        request: RunRequest<'_>,
     ) -> Result<Run, Error> {
         let options = RunOptions { modelling: self.modelling, ..options.clone() };
-        let mut columns = Columns::default();
-        let mut watch = |header: &RunHeader, sample: &Sample| {
-            if columns.rows() == 0 {
-                columns = Columns::new(header);
-            }
-            columns.push(sample);
-            observer(sample)
-        };
-        let summary = self.traced(scenario, &options, outputs, wanted, Some(&mut watch), progress)?;
-        Ok(Run { summary, columns })
+        run::simulate(self, &scenario.into(), &options, request)
     }
 
-    /// A run with all that is known of the arm; `options` with the arm's own modelling.
-    fn traced<'a>(
-        &'a self,
-        scenario: &Scenario,
-        options: &RunOptions,
-        outputs: Option<&Outputs>,
-        wanted: Wanted,
-        observer: Option<&'a mut Observer<'a>>,
-        progress: &mut Progress<'_>,
-    ) -> Result<Summary, Error> {
-        let together = Together {
-            observer,
-            prepared: Some(&self.prepared),
-            wanted,
-            robot_caveats: Some(self.caveats.clone()),
-            ..Together::default()
-        };
-        run_traced(&self.robot, scenario, options, outputs, together, progress).map(|(summary, _)| summary)
-    }
-
-    /// Runs all scenarios, on all cores; each is the same to the last bit as by [`Arm::simulate`], for every number of threads.
+    /// Runs all scenarios on all cores; each has the bits of [`Arm::simulate`], for every number of threads. As soon as
+    /// `stop` returns true, runs that are not done end with [`Error::Interrupted`].
     ///
     /// Threads are those of `rayon`'s pool. A run that fails does not stop the others.
-    pub fn simulate_batch(&self, scenarios: &[Scenario], options: &RunOptions) -> Vec<Result<Run, Error>> {
-        self.simulate_batch_until(scenarios, options, &|| false)
-    }
-
-    /// As [`Arm::simulate_batch`]; as soon as `stop` says so, runs that are not done end with [`Error::Interrupted`].
-    pub fn simulate_batch_until(
+    pub fn simulate_batch(
         &self,
         scenarios: &[Scenario],
         options: &RunOptions,
@@ -229,7 +154,7 @@ impl Arm {
     ) -> Vec<Result<Run, Error>> {
         let one = |scenario| {
             let progress = &mut |_, _| if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
-            self.simulate_watched(scenario, options, None, None, progress)
+            self.simulate_with(scenario, options, RunRequest { progress: Some(progress), ..RunRequest::default() })
         };
         scenarios.par_iter().map(one).collect()
     }

@@ -49,21 +49,12 @@ impl Arm {
     /// joints, whatever their inertias, stiffness, damping and motion) go four at a time through the vector instructions of
     /// processors with AVX2, eight at a time through those of AVX-512; loads, torque-driven joints, curved springs, motions with corners and other steppers than
     /// generalised-alpha take a run out of that. The numbers are the same to the last bit in any company, order and number of
-    /// threads. A run that fails does not stop the others.
+    /// threads. A run that fails does not stop the others. As soon as `stop` returns true, runs that have not begun end with
+    /// [`Error::Interrupted`].
     ///
     /// # Errors
-    /// Of each run its own: as [`crate::simulate`]; [`ValueError::Factor`] unless both factors are positive.
+    /// Of each run its own: as [`Arm::simulate`]; [`ValueError::Factor`] unless both factors are positive.
     pub fn deflections(
-        &self,
-        runs: &[Variation],
-        options: &RunOptions,
-        keep_samples: bool,
-    ) -> Vec<Result<ToolDeflection, Error>> {
-        self.deflections_until(runs, options, keep_samples, &|| false)
-    }
-
-    /// As [`Arm::deflections`]; as soon as `stop` says so, runs that have not begun end with [`Error::Interrupted`].
-    pub fn deflections_until(
         &self,
         runs: &[Variation],
         options: &RunOptions,

@@ -21,7 +21,7 @@
 //! payloads besides, and returns a [`Run`] with figures and columns; [`Arm::operating_point`] answers statics, compliance and
 //! frequencies at thousands of poses without allocation.
 //!
-//! [`simulate`] writes recordings and a report as well. [`inspect()`] and [`check()`] look at what was loaded; [`statics()`],
+//! [`Arm::simulate_with`] writes recordings and a report as well. [`inspect()`] and [`check()`] look at what was loaded; [`statics()`],
 //! [`modes()`] and [`response()`] answer one pose in full; [`mod@reduce`] makes a flexible link of a mesh.
 //!
 //! Examples, in rising order (`cargo run --release -p flexarm --no-default-features --example NAME`):
@@ -102,7 +102,7 @@ pub mod tool_path;
 mod twin;
 
 pub use applied_load::AppliedLoad;
-pub use arm::{Arm, Run, SampleObserver};
+pub use arm::{Arm, Run};
 pub use balancer::{BalancerEnds, BalancerInfo, RobotBalancer};
 pub use bends::Bend;
 pub use caveat::{Caveat, Severity};
@@ -139,7 +139,7 @@ pub use response::{
 };
 pub use robot::{LoadOptions, Robot, TCP_FRAME};
 pub use robot_file::RobotFileError;
-pub use run::{Progress, simulate, simulate_modelled, simulate_traced};
+pub use run::{Keep, Progress, RunRequest, SampleObserver};
 pub use scenario::{Disturbances, Scenario};
 pub use settling::Settling;
 pub use statics::{ElementStatics, Statics, record_statics, statics};

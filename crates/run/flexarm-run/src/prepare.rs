@@ -1,15 +1,15 @@
-//! Everything about a run that can be told before its first step.
+//! The input of a run, checked before its first step.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, PoisonError};
 
 use flexarm_settings::Setting;
 use flexarm_stepping::{FlexibleArm, Load, PrescribedMotion, StepError, StepRule, Stepper, new_stepper};
 
+use crate::arm::Arm;
 use crate::balancer;
 use crate::caveat::size::Size;
 use crate::caveat::{self, Caveat};
 use crate::error::{Error, ValueError};
-use crate::flexible::FlexibleRobot;
 use crate::loads_file::EXPRESSION_PERIOD;
 use crate::loops;
 use crate::magnification::Expected;
@@ -18,73 +18,59 @@ use crate::options::RunOptions;
 use crate::robot::Robot;
 use crate::scenario::Scenario;
 
-/// A robot that is modelled already.
-pub struct Prepared {
-    pub(crate) flexible: Arc<FlexibleRobot>,
-    /// Where the last motion began, and the arm in equilibrium there: modes and damping depend on nothing else of a motion.
-    start: Mutex<Option<(Vec<f64>, Arc<FlexibleArm>)>>,
-}
-
-impl Prepared {
-    pub(crate) fn new(flexible: FlexibleRobot) -> Self {
-        Self { flexible: Arc::new(flexible), start: Mutex::new(None) }
-    }
-
-    /// As [`FlexibleRobot::arm`], found again for a motion that begins where the last one did.
-    pub(crate) fn arm(&self, motion: Arc<dyn PrescribedMotion>) -> Result<FlexibleArm, StepError> {
-        let n = self.flexible.model.n_actuated();
-        let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-        motion.sample(0.0, &mut q, &mut v, &mut a);
-        let known = self.start.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        if let Some((_, arm)) = known.filter(|(start, _)| *start == q) {
-            return Ok(arm.along(motion));
-        }
-        let arm = self.flexible.arm(motion)?;
-        *self.start.lock().unwrap_or_else(PoisonError::into_inner) = Some((q, Arc::new(arm.clone())));
-        Ok(arm)
-    }
-}
-
 /// A run whose input makes sense.
 pub(crate) struct Checked {
-    pub(crate) flexible: Arc<FlexibleRobot>,
     pub(crate) arm: Arc<FlexibleArm>,
     pub(crate) stepper: Box<dyn Stepper>,
     pub(crate) load_caveats: Vec<Caveat>,
 }
 
-impl Checked {
-    /// Deflections that the run will have, roughly.
-    pub(crate) fn expected(&self, scenario: &Scenario) -> Expected {
-        Expected::of(&self.arm, &self.flexible.tcp, scenario.duration_s(), scenario.start)
+impl Arm {
+    /// Returns the arm at the start of a scenario, with its loads and payloads, and the caveats of the loads.
+    ///
+    /// # Errors
+    /// Everything about the input that can be found before a stepper is made.
+    pub fn at_start(&self, scenario: &Scenario, options: &RunOptions) -> Result<(FlexibleArm, Vec<Caveat>), Error> {
+        let (motion, flexible) = (&scenario.motion, self.flexible());
+        runnable(motion, options)?;
+        loops::along_motion(&flexible.rigid, &motion.trajectory)?;
+        balancer::check_motion(&flexible.rigid, &motion.trajectory)?;
+        let arm = self.in_equilibrium(motion.prescribed()).map_err(|error| flexible.explained(error))?;
+        loaded(self.robot(), scenario, options, arm)
     }
-}
 
-/// Everything about the input of a run that can be told before the first step. `prepared`: the robot as the options model it.
-pub fn checked(
-    robot: &Robot,
-    scenario: &Scenario,
-    options: &RunOptions,
-    prepared: Option<&Prepared>,
-) -> Result<Checked, Error> {
-    let motion = &scenario.motion;
-    runnable(motion, options)?;
-    let flexible = match prepared {
-        Some(prepared) => prepared.flexible.clone(),
-        None => Arc::new(robot.modelled(&options.modelling)?),
-    };
-    loops::along_motion(&flexible.rigid, &motion.trajectory)?;
-    balancer::check_motion(&flexible.rigid, &motion.trajectory)?;
-    let arm = match prepared {
-        Some(prepared) => prepared.arm(motion.prescribed()),
-        None => flexible.arm(motion.prescribed()),
-    };
-    let arm = arm.map_err(|error| flexible.explained(error))?;
-    let (arm, load_caveats) = loaded(robot, scenario, options, arm)?;
-    let arm = Arc::new(arm);
-    let stepper = new_stepper(options.stepper, arm.clone(), options.step_s, scenario.start)
-        .map_err(|error| flexible.explained(error))?;
-    Ok(Checked { flexible, arm, stepper, load_caveats })
+    /// As [`FlexibleRobot::arm`](crate::FlexibleRobot::arm). The last one is kept for motions that begin at the same joint
+    /// values: modes and damping depend on nothing else of a motion.
+    fn in_equilibrium(&self, motion: Arc<dyn PrescribedMotion>) -> Result<FlexibleArm, StepError> {
+        let n = self.flexible().model.n_actuated();
+        let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        motion.sample(0.0, &mut q, &mut v, &mut a);
+        let known = self.last_start.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if let Some((_, arm)) = known.filter(|(start, _)| *start == q) {
+            return Ok(arm.along(motion));
+        }
+        let arm = self.flexible().arm(motion)?;
+        *self.last_start.lock().unwrap_or_else(PoisonError::into_inner) = Some((q, Arc::new(arm.clone())));
+        Ok(arm)
+    }
+
+    /// Checks everything about the input of a run and makes its stepper.
+    pub(crate) fn checked(&self, scenario: &Scenario, options: &RunOptions) -> Result<Checked, Error> {
+        let (arm, load_caveats) = self.at_start(scenario, options)?;
+        let arm = Arc::new(arm);
+        let stepper = new_stepper(options.stepper, arm.clone(), options.step_s, scenario.start)
+            .map_err(|error| self.flexible().explained(error))?;
+        Ok(Checked { arm, stepper, load_caveats })
+    }
+
+    /// Returns an estimate of the deflections of a run.
+    ///
+    /// # Errors
+    /// As [`Arm::simulate`], as far as they are known before the first step.
+    pub fn expected(&self, scenario: &Scenario, options: &RunOptions) -> Result<Expected, Error> {
+        let arm = self.checked(scenario, options)?.arm;
+        Ok(Expected::of(&arm, &self.flexible().tcp, scenario.duration_s(), scenario.start))
+    }
 }
 
 /// Whether a motion keeps the joints' limits, and the options make sense with it.

@@ -97,7 +97,7 @@ impl Robot {
     }
 
     /// As [`Robot::load_with`], with its links and drives modelled as the file says ([`Robot::flexible_robot`]): to check a robot is
-    /// to do that, and a run needs not do it again ([`crate::simulate_modelled`]).
+    /// to do that, and [`Arm::new`](crate::Arm::new) takes its result.
     ///
     /// # Errors
     /// As [`Robot::load`].

@@ -8,10 +8,10 @@ use flexarm_log::{Recorder, RecordingFormat, Trace, TraceRow};
 use crate::error::{Error, StudyError};
 use crate::magnification::{Expected, fit_color_scale};
 use crate::options::{Outputs, RunOptions};
-use crate::prepare::checked;
+use crate::arm::Run;
 use crate::record::{files_of_a_run, refuse_to_overwrite};
 use crate::robot::Robot;
-use crate::run::{Progress, Together, run_traced};
+use crate::run::{Keep, Progress, RunRequest};
 use crate::scenario::Scenario;
 use crate::summary::{DifferenceFigures, Summary, TcpFigures};
 use flexarm_settings::written::{markdown, markdown_row};
@@ -31,12 +31,12 @@ pub struct Variant {
 
 /// Runs all variants, the first being the one the others are compared with.
 ///
-/// The first run's files are those of [`crate::simulate`]; each of the others has a folder of its own below. All together
+/// The first run's files are those of [`Arm::simulate_with`](crate::Arm::simulate_with); each of the others has a folder of its own below. All together
 /// are in `study.rrd` and in the report. The answer is the first run's summary with the others in
 /// [`Summary::with`].
 ///
 /// # Errors
-/// As [`crate::simulate`], with the label of the run that failed; [`Error::Study`] for labels that are not distinct.
+/// As [`Arm::simulate_with`](crate::Arm::simulate_with), with the label of the run that failed; [`Error::Study`] for labels that are not distinct.
 pub fn compare_study(
     variants: &[Variant],
     outputs: Option<&Outputs>,
@@ -63,26 +63,31 @@ pub fn compare_study(
         move |error: Error| Error::InStudy { label: label.clone(), source: Box::new(error) }
     };
     // Minutes of running are not spent before something that could be told at once.
-    let mut expected = Expected::default();
+    let (mut expected, mut arms) = (Expected::default(), Vec::new());
     for (number, variant) in variants.iter().enumerate() {
-        let run = checked(&variant.robot, &variant.scenario, &variant.options, None).map_err(named(number))?;
-        expected = expected.or(run.expected(&variant.scenario));
+        let arm = variant.robot.flexible(variant.options.modelling).map_err(named(number))?;
+        expected = expected.or(arm.expected(&variant.scenario, &variant.options).map_err(named(number))?);
+        arms.push(arm);
         own_outputs(number).as_ref().map_or(Ok(()), refuse_to_overwrite)?;
     }
     let recording = StudyRecording::new(variants, outputs)?;
     let mut summaries = Vec::new();
     let mut traces: Vec<(String, Trace)> = Vec::new();
-    for (number, variant) in variants.iter().enumerate() {
+    for (number, (variant, arm)) in variants.iter().zip(&arms).enumerate() {
         let own = own_outputs(number);
         if number > 0 {
             options = RunOptions { magnification: main.options.magnification, ..variant.options.clone() };
         }
         // All arms are magnified and coloured alike, or they could not be compared by eye.
-        let recorders = recording.seat(number).into_iter().collect();
-        let together = Together { recorders, expected: Some(expected), ..Together::default() };
-        let mut shown = |t: f64, _: f64| progress(before + t, total);
-        let run = run_traced(&variant.robot, &variant.scenario, &options, own.as_ref(), together, &mut shown);
-        let (mut summary, trace) = run.map_err(named(number))?;
+        let request = RunRequest {
+            outputs: own.as_ref(),
+            progress: Some(&mut |t: f64, _: f64| progress(before + t, total)),
+            recorders: recording.seat(number).into_iter().collect(),
+            expected: Some(expected),
+            ..RunRequest::keeping(Keep::Curves)
+        };
+        let run = arm.simulate_with(&variant.scenario, &options, request);
+        let Run { mut summary, trace, .. } = run.map_err(named(number))?;
         before += variant.scenario.duration_s();
         summary.label = Some(variant.label.clone());
         summary.difference = traces.first().and_then(|(_, first)| difference(first, &trace));

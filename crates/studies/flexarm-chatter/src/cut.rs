@@ -205,11 +205,13 @@ fn run(
     };
     let mut follower = Follower::new(tool, place, work, next, h);
     let arm = robot.flexible(request.modelling)?;
-    arm.simulate_with(&scenario, &options, None, &mut |sample| {
+    let mut observer = |sample: &Sample| {
         let X_WT = &sample.flexible.X_WT;
         follower.see(sample.time_s, X_WT.translation.vector, X_WT.rotation * tool.tip);
         ControlFlow::Continue(())
-    })?;
+    };
+    let request = RunRequest { observer: Some(&mut observer), ..RunRequest::keeping(Keep::Figures) };
+    arm.simulate_with(&scenario, &options, request)?;
     Ok(follower.curves)
 }
 

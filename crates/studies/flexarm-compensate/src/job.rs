@@ -188,7 +188,8 @@ impl<'a> Job<'a> {
         let options =
             RunOptions { log_rate_hz: 1.0 / self.step_s(), with_twin: false, ignore_limits: true, ..run.clone() };
         let mut progress = |_, _| if (self.stop)() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
-        let run = arm.simulate_watched(self.along(motion), &options, None, None, &mut progress)?;
+        let request = RunRequest { progress: Some(&mut progress), ..RunRequest::default() };
+        let run = arm.simulate_with(self.along(motion), &options, request)?;
         let (t, p, r) = (run.time_s(), run.values("tcp_position"), run.values("tcp_quaternion_wxyz"));
         let times = self.times_and(beyond);
         let mut error = DMatrix::zeros(6, times.len());

@@ -1,6 +1,5 @@
 //! The recording of an arm before and after its compensation.
 
-use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -13,8 +12,7 @@ use flexarm_run::Arm;
 use flexarm_run::Error;
 use flexarm_run::magnification::Expected;
 use flexarm_run::RunOptions;
-use flexarm_run::run::Together;
-use flexarm_run::run::run_traced;
+use flexarm_run::{Keep, RunRequest};
 use flexarm_run::Scenario;
 use flexarm_settings::written::markdown;
 
@@ -32,7 +30,6 @@ pub(super) fn record(
     let options = flexarm_log::CreateOptions::default().with_overwrite(request.overwrite);
     let study = flexarm_log::RrdStudy::create(path, options, vec!["before".into(), "after".into()]);
     let run = RunOptions {
-        modelling: *arm.modelling(),
         log_rate_hz: RECORDED_HZ,
         ignore_limits: true,
         ..request.run.clone()
@@ -41,12 +38,15 @@ pub(super) fn record(
     let mut expected: Option<Expected> = None;
     for (number, motion) in [&found.scenario.motion, &found.motion].into_iter().enumerate() {
         let scenario = Scenario { motion: motion.clone(), ..found.scenario.clone() };
-        let checked = flexarm_run::prepare::checked(arm.robot(), &scenario, &run, None)?;
-        let expected = *expected.get_or_insert_with(|| checked.expected(&scenario));
+        let own = arm.expected(&scenario, &run)?;
+        let expected = *expected.get_or_insert(own);
         let recorder = Against::new(Box::new(study.seat(number)), wanted.clone(), number == 0);
-        let together =
-            Together { recorders: vec![Box::new(recorder)], expected: Some(expected), ..Together::default() };
-        run_traced(arm.robot(), &scenario, &run, None, together, &mut |_, _| ControlFlow::Continue(()))?;
+        let request = RunRequest {
+            recorders: vec![Box::new(recorder)],
+            expected: Some(expected),
+            ..RunRequest::keeping(Keep::Figures)
+        };
+        arm.simulate_with(&scenario, &run, request)?;
     }
     let mm = |x: f64| 1e3 * x;
     study.finish(&format!(

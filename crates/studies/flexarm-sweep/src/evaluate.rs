@@ -197,16 +197,11 @@ impl Sweep {
         caveats: &mut Vec<Caveat>,
     ) -> Result<SummaryFacts, Error> {
         let Ready { built, scenario, options } = self.workshop.ready(values)?;
-        caveats.extend_from_slice(&built.caveats);
-        let together = Together {
-            wanted: Wanted::Figures,
-            prepared: Some(&built.prepared),
-            robot_caveats: Some(built.caveats.clone()),
-            ..Together::default()
-        };
+        caveats.extend_from_slice(&built.arm.robot_caveats());
         let mut go_on =
             |_, _| if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
-        let (summary, _) = run_traced(&built.robot, &scenario, &options, None, together, &mut go_on)?;
+        let request = RunRequest { progress: Some(&mut go_on), ..RunRequest::keeping(Keep::Figures) };
+        let summary = built.arm.simulate_with(&scenario, &options, request)?.summary;
         caveats.clone_from(&summary.caveats);
         let summary = serde_json::to_value(&summary).unwrap_or_default();
         Ok(SummaryFacts { summary, mass_kg: built.mass_kg })
@@ -216,13 +211,9 @@ impl Sweep {
     /// first step, also if it fails.
     fn quick_run(&self, place: usize, values: &[ParameterValue], caveats: &mut Vec<Caveat>) -> Result<QuickRun, Error> {
         let Ready { built, scenario, options } = self.workshop.ready(values)?;
-        caveats.extend_from_slice(&built.caveats);
-        runnable(&scenario.motion, &options)?;
-        let flexible = &built.prepared.flexible;
-        loops::along_motion(&flexible.rigid, &scenario.motion.trajectory)?;
-        balancer::check_motion(&flexible.rigid, &scenario.motion.trajectory)?;
-        let arm = built.prepared.arm(scenario.motion.prescribed()).map_err(|error| flexible.explained(error))?;
-        let (arm, of_loads) = loaded(&built.robot, &scenario, &options, arm)?;
+        caveats.extend_from_slice(&built.arm.robot_caveats());
+        let flexible = built.arm.shared();
+        let (arm, of_loads) = built.arm.at_start(&scenario, &options)?;
         let facts = QuickFacts {
             sag_m: static_sag(&arm, &flexible.tcp),
             hz: arm.modes.frequencies_hz(),
@@ -230,11 +221,11 @@ impl Sweep {
             ..QuickFacts::default()
         };
         let before =
-            BeforeRun { robot: &built.robot, flexible, arm: &arm, motion: &scenario.motion, options: &options };
+            BeforeRun { robot: built.arm.robot(), flexible: &flexible, arm: &arm, motion: &scenario.motion, options: &options };
         caveats.extend(before.caveats_of_study(facts.sag_m));
         caveats.extend(of_loads);
         let run = BatchRun { arm, duration_s: scenario.duration_s() };
-        let (tool, flexible, start) = (flexible.tcp.clone(), flexible.clone(), scenario.start);
+        let (tool, start) = (flexible.tcp.clone(), scenario.start);
         Ok(QuickRun { place, told: None, run, tool, start, options, facts, flexible })
     }
 }

@@ -27,7 +27,7 @@ use flexarm_run::Motion;
 use flexarm_run::MotionOptions;
 use flexarm_run::Modelling;
 use flexarm_run::RunOptions;
-use flexarm_run::prepare::Prepared;
+use flexarm_run::Arm;
 use flexarm_run::reduce::ReduceJob;
 use flexarm_run::reduce::ReduceOptions;
 use flexarm_run::reduce::ReduceOutputs;
@@ -52,12 +52,9 @@ pub(super) struct TextFile {
 
 /// A robot that is modelled.
 pub(super) struct Built {
-    pub(super) robot: Robot,
-    pub(super) prepared: Prepared,
+    pub(super) arm: Arm,
     /// All links without the payload (kg).
     pub(super) mass_kg: f64,
-    /// [`Robot::caveats`].
-    pub(super) caveats: Arc<[Caveat]>,
 }
 
 /// A run that can go.
@@ -538,10 +535,9 @@ impl Workshop {
             return Ok(known);
         }
         let robot = self.robot_of(path, text)?;
-        let flexible = robot.modelled(&modelling)?;
-        let mass_kg = mass(&robot, &flexible);
-        let caveats = robot.caveats().into();
-        let built = Arc::new(Built { robot, prepared: Prepared::new(flexible), mass_kg, caveats });
+        let arm = robot.flexible(modelling)?;
+        let mass_kg = mass(&robot, arm.flexible());
+        let built = Arc::new(Built { arm, mass_kg });
         self.arms.put(key, built.clone());
         Ok(built)
     }
@@ -568,8 +564,8 @@ impl Workshop {
         if let Some(known) = self.motions.get(&key) {
             return Ok(known);
         }
-        let motion = Motion::load_text(path, text.as_deref(), &built.robot, &MotionOptions::default())?;
-        let model = &built.prepared.flexible.rigid;
+        let motion = Motion::load_text(path, text.as_deref(), built.arm.robot(), &MotionOptions::default())?;
+        let model = &built.arm.flexible().rigid;
         let motion = match round {
             Some(seconds) => motion.with_rounded_corners(seconds, model)?,
             None => motion,

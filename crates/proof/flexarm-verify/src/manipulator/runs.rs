@@ -141,7 +141,8 @@ impl<'a, 'p> Runs<'a, 'p> {
             Ok(()) => ControlFlow::Continue(()),
             Err(_) => ControlFlow::Break(()),
         };
-        let (summary, trace) = simulate_traced(robot, scenario, &options, None, &mut progress)?;
+        let request = RunRequest { progress: Some(&mut progress), ..RunRequest::keeping(Keep::Curves) };
+        let Run { summary, trace, .. } = robot.flexible(options.modelling)?.simulate_with(scenario, &options, request)?;
         self.done += weight;
         Ok(Run::new(summary, &trace))
     }

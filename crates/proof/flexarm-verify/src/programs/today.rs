@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use flexarm::{ConstraintForm, Modelling, Motion, ReferenceSettings, Robot, RunOptions, StepperKind, simulate_traced};
+use flexarm::{ConstraintForm, Keep, Modelling, Motion, ReferenceSettings, Robot, RunOptions, RunRequest, StepperKind};
 use flexarm_kinematics::ElasticAngles;
 use flexarm_stepping::Damping;
 use nalgebra::Vector3;
@@ -85,7 +85,8 @@ impl Stepped {
     ) -> Result<Self, Error> {
         let (log_rate_hz, modelling) = (SEEN_HZ, Modelling::default());
         let options = RunOptions { stepper, step_s, log_rate_hz, modelling, ..RunOptions::default() };
-        let (_, trace) = simulate_traced(robot, motion, &options, None, &mut |_, _| ControlFlow::Continue(()))?;
+        let request = RunRequest::keeping(Keep::Curves);
+        let trace = robot.flexible(options.modelling)?.simulate_with(motion, &options, request)?.trace;
         if trace.rows.len() != truth.flexible.len() {
             let (stored, run) = (truth.flexible.len(), trace.rows.len());
             let what = format!("has {stored} samples, the run {run}: not the same motion");

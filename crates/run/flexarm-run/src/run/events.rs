@@ -3,9 +3,9 @@
 use flexarm_analysis::TcpMetrics;
 use flexarm_log::{Event, EventKind};
 
-use super::Run;
+use super::RunLoop;
 
-impl Run<'_> {
+impl RunLoop<'_> {
     /// What happened when, in order of time, as far as the run came.
     pub(super) fn events(&self, metrics: Option<&TcpMetrics>) -> Vec<Event> {
         let mut events = Vec::new();

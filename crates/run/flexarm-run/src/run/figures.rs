@@ -6,14 +6,14 @@ use flexarm_log::Event;
 use flexarm_stepping::FlexibleArm;
 
 use super::before::BeforeRun;
-use super::{Run, Wanted, moves};
+use super::{Detail, RunLoop, moves};
 use crate::caveat::{Caveat, drives, kinds, validity};
 use crate::flexible::Owner;
 use crate::headline::{self, Bending, ShareFigures};
 use crate::options::RunOptions;
 use crate::summary::{CURVE_PIECES, DriveFigures, LinkFigures, StepperFigures, Summary, TcpFigures};
 
-impl Run<'_> {
+impl RunLoop<'_> {
     /// Figures of what was seen so far; `robot_caveats` stand before those of the run.
     pub(super) fn summary(&self, robot_caveats: Vec<Caveat>) -> (Summary, Vec<Event>) {
         // A run that stopped at once has nothing to measure.
@@ -52,7 +52,7 @@ impl Run<'_> {
         };
         summary.caveats = self.caveats(&summary, sag_m, robot_caveats);
         summary.headline = headline::headline(&summary, by_choice);
-        let events = if self.wanted == Wanted::Curves { self.events(metrics) } else { Vec::new() };
+        let events = if self.detail == Detail::Curves { self.events(metrics) } else { Vec::new() };
         (summary, events)
     }
 

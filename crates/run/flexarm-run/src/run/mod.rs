@@ -1,6 +1,6 @@
 //! The main job: rigid and flexible run along one motion, logged while it goes on, measured at the end.
 //!
-//! The loop is [`Run::go`]: the stepper steps, the twin stands beside it, [`Monitors`] watch, and a sample goes to recorders,
+//! The loop is [`RunLoop::go`]: the stepper steps, the twin stands beside it, [`Monitors`] watch, and a sample goes to recorders,
 //! curves and observer. Figures of what was seen are in `figures`, what happened when in `events`.
 
 mod before;
@@ -15,11 +15,12 @@ use std::time::Instant;
 
 use flexarm_analysis::{LongRecord, MetricSettings, PathFrame};
 use flexarm_kinematics::Frame;
-use flexarm_log::{Attachment, BendInfo, Event, EventKind, Recorder, RecorderSet, RunHeader, RunResult, Sample, Trace};
+use flexarm_log::{Attachment, BendInfo, Columns, Event, EventKind, Recorder, RecorderSet, RunHeader, RunResult, Sample, Trace};
 use flexarm_stepping::{FlexibleArm, Observation, Stepper};
 
+use crate::arm::{Arm, Run};
 use crate::bends::stations;
-use crate::caveat::{self, Caveat};
+use crate::caveat;
 use crate::error::Error;
 use crate::flexible::{FlexibleRobot, Owner};
 use crate::headline;
@@ -28,7 +29,7 @@ use crate::monitor::Monitors;
 use crate::monitor::tool::ToolMonitor;
 use crate::motion::Motion;
 use crate::options::{Outputs, RunOptions};
-use crate::prepare::{Checked, Prepared, checked};
+use crate::prepare::Checked;
 use crate::record::{header, link_frames, names_of_signals, ordered_links, recorders, signals, write_layouts};
 use crate::robot::Robot;
 use crate::run::sampler::Sampler;
@@ -52,138 +53,111 @@ const POLL_EVERY: usize = 2000;
 /// Most steps between two looks.
 const RAREST_POLL: usize = 64;
 
-/// Called with simulated and total time; breaking off stops the run with readable files.
+/// Called with simulated and total time (s); breaking off stops the run with readable files.
 pub type Progress<'a> = dyn FnMut(f64, f64) -> ControlFlow<()> + 'a;
 
-/// Runs a motion, or a motion with all else that happens, writes the recordings and returns the figures.
-///
-/// Everything about the input is checked before the first file is made. If the run stops early, the recordings are
-/// closed so that every reader takes them.
-///
-/// # Errors
-/// [`Error`]; see [`Error::fault`].
-pub fn simulate(
-    robot: &Robot,
-    scenario: impl Into<Scenario>,
-    options: &RunOptions,
-    outputs: Option<&Outputs>,
-    progress: &mut Progress<'_>,
-) -> Result<Summary, Error> {
-    let together = Together { wanted: Wanted::of(outputs), ..Together::default() };
-    run_traced(robot, &scenario.into(), options, outputs, together, progress).map(|(summary, _)| summary)
+/// Called with each logged sample; breaking off stops the run.
+pub type SampleObserver<'a> = dyn FnMut(&Sample) -> ControlFlow<()> + 'a;
+
+/// What a run keeps besides its figures.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Keep {
+    /// Nothing: the fastest.
+    Figures,
+    /// Every logged sample as columns.
+    #[default]
+    Columns,
+    /// The curves of the report, thinned if the run is long.
+    Curves,
 }
 
-/// As [`simulate`], of a robot that is modelled already.
-///
-/// * `flexible`: what [`Robot::modelled`] makes of the options' own modelling.
-///
-/// # Errors
-/// As [`simulate`].
-pub fn simulate_modelled(
-    robot: &Robot,
-    flexible: FlexibleRobot,
-    scenario: impl Into<Scenario>,
-    options: &RunOptions,
-    outputs: Option<&Outputs>,
-    progress: &mut Progress<'_>,
-) -> Result<Summary, Error> {
-    let prepared = Prepared::new(flexible);
-    let together = Together { wanted: Wanted::of(outputs), prepared: Some(&prepared), ..Together::default() };
-    run_traced(robot, &scenario.into(), options, outputs, together, progress).map(|(summary, _)| summary)
+/// What a run gives and who watches it.
+#[derive(Default)]
+pub struct RunRequest<'a> {
+    /// What it keeps.
+    pub keep: Keep,
+    /// Recordings and report to write.
+    pub outputs: Option<&'a Outputs>,
+    /// Called with each logged sample.
+    pub observer: Option<&'a mut SampleObserver<'a>>,
+    /// Called now and then while the run goes on.
+    pub progress: Option<&'a mut Progress<'a>>,
+    /// Recorders besides those of `outputs`.
+    pub recorders: Vec<Box<dyn Recorder>>,
+    /// Deflections of all runs that are shown together, for one magnification and colour scale.
+    pub expected: Option<Expected>,
 }
 
-/// As [`simulate`], and returns the curves of the run, which are thinned if it is long ([`Trace`]). All samples are in the
-/// recordings and in the columns of [`crate::Run`].
-///
-/// # Errors
-/// As [`simulate`].
-pub fn simulate_traced(
-    robot: &Robot,
-    scenario: impl Into<Scenario>,
-    options: &RunOptions,
-    outputs: Option<&Outputs>,
-    progress: &mut Progress<'_>,
-) -> Result<(Summary, Trace), Error> {
-    run_traced(robot, &scenario.into(), options, outputs, Together::default(), progress)
+impl RunRequest<'_> {
+    /// A run that keeps this and is watched by nobody.
+    pub fn keeping(keep: Keep) -> Self {
+        Self { keep, ..Self::default() }
+    }
 }
 
-/// Called with each logged sample of a run and what stays the same; breaking off stops it.
-pub(crate) type Observer<'a> = dyn FnMut(&RunHeader, &Sample) -> ControlFlow<()> + 'a;
-
-/// What of a run is seen by others; each level has what is before it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Wanted {
-    /// The summary alone.
+/// What is computed of a sample; each level includes those before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Detail {
+    /// What the summary needs.
     Figures,
     /// The signals of [`flexarm_log::Columns`].
     Columns,
     /// Whole samples.
     Samples,
     /// Curves, and all that recordings say of a run.
-    #[default]
     Curves,
 }
 
-impl Wanted {
-    /// Of a run that is seen by its files alone.
-    fn of(outputs: Option<&Outputs>) -> Self {
-        if outputs.is_some() { Self::Curves } else { Self::Figures }
+impl Detail {
+    fn of(request: &RunRequest<'_>) -> Self {
+        match request.keep {
+            _ if request.outputs.is_some() || !request.recorders.is_empty() => Self::Curves,
+            Keep::Curves => Self::Curves,
+            _ if request.observer.is_some() => Self::Samples,
+            Keep::Columns => Self::Columns,
+            Keep::Figures => Self::Figures,
+        }
     }
-}
-
-/// What a run shares with others that it is seen with, or gets from who prepared it.
-#[derive(Default)]
-pub struct Together<'a> {
-    /// Recorders beside those of its own outputs.
-    pub(crate) recorders: Vec<Box<dyn Recorder>>,
-    /// Deflections of all of them, for a scale in common.
-    pub(crate) expected: Option<Expected>,
-    /// What of it is seen; all if there are recorders.
-    pub(crate) wanted: Wanted,
-    /// [`Robot::caveats`], if they are known.
-    pub(crate) robot_caveats: Option<Arc<[Caveat]>>,
-    /// Who looks at the samples.
-    pub(crate) observer: Option<&'a mut Observer<'a>>,
-    /// The robot as it is to be modelled, if that has been done.
-    pub(crate) prepared: Option<&'a Prepared>,
 }
 
 /// Samples from which on a run takes a little longer at its end, for less memory.
 const LONG_RUN: u64 = 100_000;
 
-/// As [`simulate_traced`], as one of several runs.
-pub fn run_traced(
-    robot: &Robot,
+/// Runs a scenario; `options` with the arm's own modelling.
+pub(crate) fn simulate(
+    built: &Arm,
     scenario: &Scenario,
     options: &RunOptions,
-    outputs: Option<&Outputs>,
-    together: Together<'_>,
-    progress: &mut Progress<'_>,
-) -> Result<(Summary, Trace), Error> {
+    request: RunRequest<'_>,
+) -> Result<Run, Error> {
     let started = Instant::now();
     let cpu = cpu_time::ProcessTime::now();
-    let Checked { flexible, arm, stepper, load_caveats } = checked(robot, scenario, options, together.prepared)?;
+    let (robot, flexible) = (built.robot(), built.flexible());
+    let Checked { arm, stepper, load_caveats } = built.checked(scenario, options)?;
+    let detail = Detail::of(&request);
+    let RunRequest { keep, outputs, mut observer, progress, recorders: more, expected } = request;
+    let mut to_the_end = |_, _| ControlFlow::Continue(());
+    let progress = progress.unwrap_or(&mut to_the_end);
 
     // Before the first file is made, so that a stop during the preparation leaves none.
     if progress(0.0, scenario.duration_s()).is_break() {
         return Err(Error::Interrupted { t: 0.0, partial: false });
     }
-    let wanted = together.wanted;
-    let own = || match wanted {
-        Wanted::Curves => Expected::of(&arm, &flexible.tcp, scenario.duration_s(), scenario.start),
+    let own = || match detail {
+        Detail::Curves => Expected::of(&arm, &flexible.tcp, scenario.duration_s(), scenario.start),
         // How far things are shown enlarged is asked by nobody but recordings.
         _ => Expected::default(),
     };
-    let shares_scale = together.expected.is_some();
-    let expected = together.expected.unwrap_or_else(own);
-    let mut run = Run::new(robot, &scenario.motion, options, &flexible, arm, stepper, wanted);
-    let mut files = recorders(outputs, !together.recorders.is_empty())?;
-    files.set.extend(together.recorders);
-    let mut head = match wanted {
-        Wanted::Figures => RunHeader::default(),
-        Wanted::Columns => names_of_signals(robot, &run.arm),
-        Wanted::Samples => signals(robot, &run.arm),
-        Wanted::Curves => header(robot, scenario, options, &run.arm, flexible.links_model()),
+    let shares_scale = expected.is_some();
+    let expected = expected.unwrap_or_else(own);
+    let mut run = RunLoop::new(robot, &scenario.motion, options, flexible, arm, stepper, detail);
+    let mut files = recorders(outputs, !more.is_empty())?;
+    files.set.extend(more);
+    let mut head = match detail {
+        Detail::Figures => RunHeader::default(),
+        Detail::Columns => names_of_signals(robot, &run.arm),
+        Detail::Samples => signals(robot, &run.arm),
+        Detail::Curves => header(robot, scenario, options, &run.arm, flexible.links_model()),
     };
     head.has_rigid = options.with_twin;
     head.bends.clone_from(&run.bends);
@@ -195,18 +169,22 @@ pub fn run_traced(
     files.begin(&head)?;
     write_layouts(&files.names, &head)?;
     files.set.on_threads();
+    let mut columns = (keep == Keep::Columns).then(|| Columns::new(&head));
     run.trace = match outputs {
-        _ if wanted < Wanted::Curves => Trace::without_curves(head),
+        _ if detail < Detail::Curves => Trace::without_curves(head),
         Some(_) => Trace::for_page(head),
         None => Trace::new(head),
     };
-    let end = run.go(&mut files.set, outputs.is_some(), progress, together.observer);
+    let mut watch = |sample: &Sample| {
+        columns.iter_mut().for_each(|columns| columns.push(sample));
+        observer.as_mut().map_or(ControlFlow::Continue(()), |observer| observer(sample))
+    };
+    let end = run.go(&mut files.set, outputs.is_some(), progress, &mut watch);
     if !shares_scale {
         fit_color_scale([&mut run.trace]);
     }
 
-    let robot_caveats = together.robot_caveats.map_or_else(|| robot.caveats(), |known| known.to_vec());
-    let (mut summary, mut events) = run.summary(robot_caveats);
+    let (mut summary, mut events) = run.summary(built.robot_caveats().to_vec());
     if let Err(error) = &end {
         events.push(Event { time_s: run.seen.t, kind: EventKind::Stopped, text: error.to_string() });
     }
@@ -219,7 +197,7 @@ pub fn run_traced(
     summary.real_time_factor = summary.duration_s / summary.wall_s.max(1e-9);
     summary.cpu_s_per_simulated_s = summary.cpu_s / summary.duration_s.max(1e-9);
     summary.files = files.names.clone();
-    run.trace.finish(if wanted < Wanted::Curves { RunResult::default() } else { result(&summary, events) });
+    run.trace.finish(if detail < Detail::Curves { RunResult::default() } else { result(&summary, events) });
     // The page is made while the recordings are closed, of long runs afterwards: each takes memory, the page what they leave.
     files.set.begin_to_finish(&run.trace.result);
     let make_page = || outputs.map(|_| crate::report::page(&summary, &run.trace));
@@ -228,7 +206,8 @@ pub fn run_traced(
     let page = early.or_else(make_page);
     let write = |(outputs, page): (_, String)| crate::report::write(outputs, &summary, &run.trace, &page);
     let reported = closed.and_then(|()| outputs.zip(page).map_or(Ok(()), write));
-    how_it_ended(end, reported).map(|()| (summary, run.trace))
+    how_it_ended(end, reported)?;
+    Ok(Run { summary, columns: columns.unwrap_or_default(), trace: run.trace })
 }
 
 /// The error to tell, if the run or the writing of its result failed. What stopped the run is the news: after a full disk,
@@ -281,7 +260,7 @@ fn contributors(robot: &Robot, flexible: &FlexibleRobot, arm: &FlexibleArm) -> V
 }
 
 /// A run under way: the stepper with the arm, the twin beside it, and who watches.
-struct Run<'a> {
+struct RunLoop<'a> {
     robot: &'a Robot,
     motion: &'a Motion,
     options: &'a RunOptions,
@@ -302,13 +281,13 @@ struct Run<'a> {
     at_peak: AtPeak,
     /// Largest torque per motor that moves several joints.
     motors: std::collections::BTreeMap<String, f64>,
-    wanted: Wanted,
+    detail: Detail,
     /// Steps between two samples, and all.
     every: u64,
     last: u64,
 }
 
-impl<'a> Run<'a> {
+impl<'a> RunLoop<'a> {
     fn new(
         robot: &'a Robot,
         motion: &'a Motion,
@@ -316,7 +295,7 @@ impl<'a> Run<'a> {
         flexible: &'a FlexibleRobot,
         arm: Arc<FlexibleArm>,
         stepper: Box<dyn Stepper>,
-        wanted: Wanted,
+        detail: Detail,
     ) -> Self {
         let tcp = flexible.tcp.clone();
         let duration = motion.trajectory.duration();
@@ -325,7 +304,7 @@ impl<'a> Run<'a> {
         let mut twin = RigidTwin::new(&arm);
         let tool = tool_monitor(&arm, &tcp, &mut twin, motion, options, every as f64 * options.step_s);
         let (mut bends, mut places, mut frames) = Default::default();
-        if wanted >= Wanted::Samples {
+        if detail >= Detail::Samples {
             (bends, places) = stations(&flexible.bends, &arm.model, &ordered_links(robot));
             frames = link_frames(robot, &arm.model);
         }
@@ -345,7 +324,7 @@ impl<'a> Run<'a> {
             contributors: contributors(robot, flexible, &arm),
             at_peak: AtPeak::default(),
             motors: Default::default(),
-            wanted,
+            detail,
             every,
             last,
             arm,
@@ -359,7 +338,7 @@ impl<'a> Run<'a> {
         files: &mut RecorderSet,
         partial: bool,
         progress: &mut Progress<'_>,
-        mut observer: Option<&mut Observer<'_>>,
+        observer: &mut SampleObserver<'_>,
     ) -> Result<(), Error> {
         let total = self.last as f64 * self.options.step_s;
         let poll_every = (POLL_EVERY / self.arm.model.nv().max(1)).clamp(1, RAREST_POLL) as u64;
@@ -368,9 +347,7 @@ impl<'a> Run<'a> {
                 self.observe(step);
                 files.record(&self.sample)?;
                 self.trace.push(&self.sample);
-                if let Some(observer) = &mut observer
-                    && observer(&self.trace.header, &self.sample).is_break()
-                {
+                if observer(&self.sample).is_break() {
                     return Err(Error::Interrupted { t: self.stepper.time(), partial });
                 }
             }
@@ -392,8 +369,8 @@ impl<'a> Run<'a> {
             Arc::make_mut(&mut self.arm).model.clone_from(&self.seen.model);
         }
         // What its drives must supply stands in samples alone.
-        match self.wanted {
-            Wanted::Figures => self.twin.place(&self.arm, &self.tcp, self.seen.t),
+        match self.detail {
+            Detail::Figures => self.twin.place(&self.arm, &self.tcp, self.seen.t),
             _ => self.twin.update(&self.arm, &self.tcp, self.seen.t),
         }
         if self.arm.coupling.is_some() {
@@ -406,7 +383,7 @@ impl<'a> Run<'a> {
         self.at_peak.update(&tool.error, &self.seen, &self.twin);
         let sample = &mut self.sample;
         sample.error_world = tool.error;
-        if self.wanted > Wanted::Figures {
+        if self.detail > Detail::Figures {
             self.sampler.fill(sample, &self.seen, &self.twin, &tool);
             sampler::fill_elastic(sample, &self.seen, &self.arm);
         }
