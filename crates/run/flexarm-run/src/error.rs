@@ -176,7 +176,7 @@ pub enum Error {
     #[error(transparent)]
     Link(LinkError),
     /// An error of a study, or of another crate that builds on this one.
-    #[error(transparent)]
+    #[error("{0}")]
     External(Box<dyn ExternalError>),
 }
 

@@ -365,7 +365,7 @@ impl FlexibleRobot {
     }
 
     /// Coordinates of the joints driven by torque, with the largest torque of each (N m or N).
-    pub(crate) fn servo_limits(&self) -> impl Iterator<Item = (usize, f64)> {
+    pub fn servo_limits(&self) -> impl Iterator<Item = (usize, f64)> {
         self.torque.iter().map(|(coordinate, _, limit)| (*coordinate, *limit))
     }
 

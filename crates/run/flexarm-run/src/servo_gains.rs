@@ -69,7 +69,7 @@ impl FlexibleRobot {
     /// motion begins, so many times changed; about no change, per unit. None where they do not.
     ///
     /// * `step`: a change that is small.
-    pub(crate) fn gain_slopes(
+    pub fn gain_slopes(
         &self,
         step: f64,
         at: impl Fn(f64) -> (Model, Model, DVector<f64>),

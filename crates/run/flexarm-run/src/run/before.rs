@@ -57,7 +57,7 @@ impl BeforeRun<'_> {
 
     /// As [`Self::caveats`], for a study that keeps no samples: links are looked at where they rest, and torques of the rigid
     /// robot beyond a limit warn.
-    pub(crate) fn caveats_of_study(&self, sag_m: f64) -> Vec<Caveat> {
+    pub fn caveats_of_study(&self, sag_m: f64) -> Vec<Caveat> {
         let warns = |caveat: Caveat| match caveat.code == kinds::MOTION_EFFORT.code {
             true => Caveat { severity: Severity::Warning, ..caveat },
             false => caveat,
