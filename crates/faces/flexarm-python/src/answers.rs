@@ -67,16 +67,13 @@ impl PyStatics {
         })
     }
 
-    /// An array on the answer's own numbers.
-    fn array<'py>(slf: &Bound<'py, Self>, row: &[usize], values: &[f64]) -> PyResult<Bound<'py, PyAny>> {
-        let owner = slf.clone().into_any();
-        match (slf.get().rows, row) {
-            (None, &[a]) => view(owner, [a], values),
-            (None, &[a, b]) => view(owner, [a, b], values),
-            (Some(m), &[a]) => view(owner, [m, a], values),
-            (Some(m), &[a, b]) => view(owner, [m, a, b], values),
-            _ => view(owner, [values.len()], values),
-        }
+    /// Returns a view of numbers with `row` of them at each pose.
+    fn array<'py>(
+        slf: &Bound<'py, Self>,
+        row: impl Fn(&Self) -> Vec<usize>,
+        values: fn(&Self) -> &[f64],
+    ) -> PyResult<Bound<'py, PyAny>> {
+        view(slf, |own| (own.rows.into_iter().chain(row(own)).collect(), values(own)))
     }
 }
 
@@ -85,25 +82,25 @@ impl PyStatics {
     /// Place of the tool (m), (3,) or (m, 3).
     #[getter]
     fn tcp<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        Self::array(slf, &[3], &slf.get().tcp)
+        Self::array(slf, |_| vec![3], |own| &own.tcp)
     }
 
     /// The same minus that of the rigid arm (m), (3,) or (m, 3).
     #[getter]
     fn deflection<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        Self::array(slf, &[3], &slf.get().deflection)
+        Self::array(slf, |_| vec![3], |own| &own.deflection)
     }
 
     /// Displacement of the tool per wrench on it (m/N, rad/N; m/(N m), rad/(N m)), (6, 6) or (m, 6, 6).
     #[getter]
     fn compliance<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        Self::array(slf, &[6, 6], &slf.get().compliance)
+        Self::array(slf, |_| vec![6, 6], |own| &own.compliance)
     }
 
     /// Natural frequencies, ascending (Hz), (elastic,) or (m, elastic).
     #[getter]
     fn frequencies<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        Self::array(slf, &[slf.get().elastic], &slf.get().frequencies)
+        Self::array(slf, |own| vec![own.elastic], |own| &own.frequencies)
     }
 
     /// Poses without an answer, and why (list of (int, str)).
@@ -207,15 +204,13 @@ impl PyModes {
     /// Natural frequencies, ascending (Hz), (modes,).
     #[getter]
     fn frequencies<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let values = &slf.get().frequencies;
-        view(slf.clone().into_any(), [values.len()], values)
+        view(slf, |own| (vec![own.frequencies.len()], &own.frequencies))
     }
 
     /// Damping ratios, (modes,).
     #[getter]
     fn damping_ratio<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let values = &slf.get().damping_ratio;
-        view(slf.clone().into_any(), [values.len()], values)
+        view(slf, |own| (vec![own.damping_ratio.len()], &own.damping_ratio))
     }
 
     /// Motion of the tool in each mode scaled to unit modal mass, (modes, 6), complex.
@@ -228,8 +223,7 @@ impl PyModes {
     /// Share of each element in the strain energy of each mode, (modes, elements).
     #[getter]
     fn strain_energy<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let own = slf.get();
-        view(slf.clone().into_any(), [own.tcp[0].len() / 6, own.elements.len()], &own.strain_energy)
+        view(slf, |own| (vec![own.tcp[0].len() / 6, own.elements.len()], &own.strain_energy))
     }
 
     /// Names of the elements, in the order of :attr:`strain_energy` (tuple of str).
@@ -359,9 +353,8 @@ pub(crate) fn response(response: Response, request: &ResponseRequest) -> PyRespo
 
 impl PyResponse {
     /// A field of all curves, (inputs, outputs, f).
-    fn field<'py>(slf: &Bound<'py, Self>, values: &[f64]) -> PyResult<Bound<'py, PyAny>> {
-        let own = slf.get();
-        view(slf.clone().into_any(), [own.inputs.len(), own.outputs.len(), own.frequency.len()], values)
+    fn field<'py>(slf: &Bound<'py, Self>, values: fn(&Self) -> &[f64]) -> PyResult<Bound<'py, PyAny>> {
+        view(slf, |own| (vec![own.inputs.len(), own.outputs.len(), own.frequency.len()], values(own)))
     }
 }
 
@@ -370,8 +363,7 @@ impl PyResponse {
     /// Frequencies of the curves (Hz), (f,).
     #[getter]
     fn frequency<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let values = &slf.get().frequency;
-        view(slf.clone().into_any(), [values.len()], values)
+        view(slf, |own| (vec![own.frequency.len()], &own.frequency))
     }
 
     /// Inputs, in their order (tuple of str).
@@ -389,20 +381,19 @@ impl PyResponse {
     /// Amplitude of the output per amplitude of the input, (inputs, outputs, f).
     #[getter]
     fn magnitude<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        Self::field(slf, &slf.get().magnitude)
+        Self::field(slf, |own| &own.magnitude)
     }
 
     /// How far the output is ahead of the input (rad), (inputs, outputs, f).
     #[getter]
     fn phase<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        Self::field(slf, &slf.get().phase)
+        Self::field(slf, |own| &own.phase)
     }
 
     /// Natural frequencies of all modes (Hz), (modes,).
     #[getter]
     fn natural_frequencies<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let values = &slf.get().natural_frequencies;
-        view(slf.clone().into_any(), [values.len()], values)
+        view(slf, |own| (vec![own.natural_frequencies.len()], &own.natural_frequencies))
     }
 
     /// What limits the worth of the answer (list of flexarm.Caveat).

@@ -1,7 +1,7 @@
 //! Arrays of numpy: what comes in is checked and named if it is wrong, what goes out is C-contiguous and not copied.
 //!
 //! A batch has one axis more in front. Start at [`numbers`] for what comes in, [`array`] for what goes out.
-#![allow(unsafe_code, reason = "an array that borrows from its owner says nothing of lifetimes; see `view`")]
+#![allow(unsafe_code, reason = "an array of numpy that borrows from its owner has no lifetime; see `view`")]
 
 use numpy::ndarray::{Array, ArrayView, Dim, Dimension, IntoDimension, ShapeError};
 use numpy::{
@@ -9,8 +9,10 @@ use numpy::{
     PyUntypedArrayMethods,
 };
 use pyo3::exceptions::PyValueError;
+use pyo3::PyClass;
 use pyo3::intern;
 use pyo3::prelude::*;
+use pyo3::pyclass::boolean_struct::True;
 
 /// Numbers that came in, C-contiguous and finite: one row, or m of them.
 pub(crate) struct Numbers<'py> {
@@ -178,23 +180,23 @@ pub(crate) fn answer<'py>(
     }
 }
 
-/// A read-only array on numbers that `owner` has; nothing is copied, and the array keeps its owner alive.
+/// Returns a read-only array on numbers of `owner`, with their shape. Nothing is copied, and the array keeps its owner alive.
 ///
-/// `values` must belong to `owner`, which must never change or move them: owners are frozen classes whose numbers lie on the
-/// heap and are never touched again.
-pub(crate) fn view<'py, const N: usize>(
-    owner: Bound<'py, PyAny>,
-    shape: [usize; N],
-    values: &[f64],
+/// # Errors
+/// `ValueError` if the shape does not fit the numbers.
+pub(crate) fn view<'py, T>(
+    owner: &Bound<'py, T>,
+    numbers: impl for<'a> FnOnce(&'a T) -> (Vec<usize>, &'a [f64]),
 ) -> PyResult<Bound<'py, PyAny>>
 where
-    [usize; N]: IntoDimension<Dim = Dim<[usize; N]>>,
-    Dim<[usize; N]>: Dimension,
+    T: PyClass<Frozen = True> + Sync,
 {
+    let (shape, values) = numbers(owner.get());
     let wrong = |error: ShapeError| PyValueError::new_err(format!("a result has no shape {shape:?}: {error}"));
-    let view = ArrayView::from_shape(shape.into_dimension(), values).map_err(wrong)?;
-    // SAFETY: the owner is alive as long as the array, and its numbers stay where they are and what they are.
-    let array = unsafe { PyArray::borrow_from_array(&view, owner) };
+    let view = ArrayView::from_shape(shape.as_slice(), values).map_err(wrong)?;
+    // SAFETY: the numbers are borrowed from the owner for any lifetime, so they stay valid and unchanged as long as it lives: no
+    // `&mut` to a frozen class is ever given out. The array holds a reference to the owner.
+    let array = unsafe { PyArray::borrow_from_array(&view, owner.clone().into_any()) };
     array.readwrite().make_nonwriteable();
     Ok(array.into_any())
 }

@@ -53,8 +53,7 @@ impl PyCompensated {
     /// Time (s), and distance of the tool before and after (m), (n, 3).
     #[getter]
     fn curves<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let curves = &slf.get().curves;
-        view(slf.clone().into_any(), [curves.len() / 3, 3], curves)
+        view(slf, |own| (vec![own.curves.len() / 3, 3], &own.curves))
     }
 
     /// All figures (dict as ``flexarm compensate --json``).

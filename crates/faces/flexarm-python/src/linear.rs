@@ -81,8 +81,8 @@ pub(crate) fn linear(linear: &Linear) -> PyLinear {
 }
 
 impl PyLinear {
-    fn matrix<'py>(slf: &Bound<'py, Self>, matrix: &Matrix) -> PyResult<Bound<'py, PyAny>> {
-        view(slf.clone().into_any(), matrix.shape, &matrix.values)
+    fn matrix<'py>(slf: &Bound<'py, Self>, matrix: fn(&Self) -> &Matrix) -> PyResult<Bound<'py, PyAny>> {
+        view(slf, |own| (matrix(own).shape.to_vec(), &matrix(own).values))
     }
 }
 
@@ -92,63 +92,61 @@ impl PyLinear {
     /// Mass matrix, (k, k).
     #[getter]
     fn M<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        Self::matrix(slf, &slf.get().M)
+        Self::matrix(slf, |own| &own.M)
     }
 
     /// Damping matrix, (k, k).
     #[getter]
     fn D<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        Self::matrix(slf, &slf.get().D)
+        Self::matrix(slf, |own| &own.D)
     }
 
     /// Tangent stiffness: springs, change of weight and of the wrench, (k, k).
     #[getter]
     fn K<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        Self::matrix(slf, &slf.get().K)
+        Self::matrix(slf, |own| &own.K)
     }
 
     /// Twist of the tool per rate of the free coordinates, (6, k).
     #[getter]
     fn J<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        Self::matrix(slf, &slf.get().J)
+        Self::matrix(slf, |own| &own.J)
     }
 
     /// Forces on the free coordinates per acceleration of the commands, (k, n).
     #[getter]
     fn M_a<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        Self::matrix(slf, &slf.get().M_a)
+        Self::matrix(slf, |own| &own.M_a)
     }
 
     /// Forces on the free coordinates per rate of the commands, (k, n).
     #[getter]
     fn D_a<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        Self::matrix(slf, &slf.get().D_a)
+        Self::matrix(slf, |own| &own.D_a)
     }
 
     /// Forces on the free coordinates per command, (k, n).
     #[getter]
     fn K_a<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        Self::matrix(slf, &slf.get().K_a)
+        Self::matrix(slf, |own| &own.K_a)
     }
 
     /// Twist of the tool per rate of the commands, the structure not yielding, (6, n).
     #[getter]
     fn J_a<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        Self::matrix(slf, &slf.get().J_a)
+        Self::matrix(slf, |own| &own.J_a)
     }
 
     /// Free coordinates at the equilibrium, (k,).
     #[getter]
     fn equilibrium<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let values = &slf.get().equilibrium;
-        view(slf.clone().into_any(), [values.len()], values)
+        view(slf, |own| (vec![own.equilibrium.len()], &own.equilibrium))
     }
 
     /// Forces with which the drives hold the pose (N m or N), (n,).
     #[getter]
     fn holding<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let values = &slf.get().holding;
-        view(slf.clone().into_any(), [values.len()], values)
+        view(slf, |own| (vec![own.holding.len()], &own.holding))
     }
 
     /// How many of the free coordinates are joints driven by torque; they come first.
@@ -166,10 +164,13 @@ impl PyLinear {
     /// Displacement of the tool per wrench on it, motors held, (6, 6).
     #[getter]
     fn compliance<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        match &slf.get().compliance {
-            Ok(compliance) => Self::matrix(slf, compliance),
-            Err(why) => Err(raised(slf.py(), "StepError", why.clone())),
+        if let Err(why) = &slf.get().compliance {
+            return Err(raised(slf.py(), "StepError", why.clone()));
         }
+        view(slf, |own| match &own.compliance {
+            Ok(compliance) => (compliance.shape.to_vec(), &compliance.values),
+            Err(_) => (vec![0], &[]),
+        })
     }
 
     fn __repr__(&self) -> String {

@@ -7,7 +7,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
-use crate::arrays::{array, table, view};
+use crate::arrays::{array, table};
 use crate::caveat;
 use crate::failure::OrRaise;
 use crate::robot::PyRobot;
@@ -270,8 +270,8 @@ impl PyMotion {
         let module = py.import("flexarm._pickle")?;
         match &slf.get().kind {
             Kind::Samples { name, t, q, width } => {
-                let (t_array, q_array) =
-                    (view(slf.clone().into_any(), [t.len()], t)?, view(slf.clone().into_any(), [t.len(), *width], q)?);
+                let t_array = array(py, [t.len()], t.clone())?;
+                let q_array = array(py, [t.len(), *width], q.clone())?;
                 let make = module.getattr("motion_of_samples")?;
                 Ok((make, (t_array, q_array, name)).into_pyobject(py)?.into_any())
             }

@@ -61,16 +61,14 @@ impl PyRun {
     }
 
     fn array<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Option<Bound<'py, PyAny>>> {
-        let own = slf.get();
-        let Some(column) = own.columns.column(name) else { return Ok(None) };
-        let owner = slf.clone().into_any();
-        let values = &column.values;
-        Ok(Some(match *own.shape(column) {
-            [n] => view(owner, [n], values)?,
-            [n, m] => view(owner, [n, m], values)?,
-            [n, m, k] => view(owner, [n, m, k], values)?,
-            _ => return Ok(None),
-        }))
+        if slf.get().columns.column(name).is_none() {
+            return Ok(None);
+        }
+        view(slf, |own| match own.columns.column(name) {
+            Some(column) => (own.shape(column), &column.values),
+            None => (vec![0], &[]),
+        })
+        .map(Some)
     }
 
     fn signal<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyAny>> {

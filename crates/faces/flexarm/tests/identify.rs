@@ -5,10 +5,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use flexarm::identify::{
-    Component, IdentifyOptions, IdentifyRequest, LoadCase, MeasuredArm, Measurements, Parameter, PlanRequest, Plant,
-    Reading, ReadingKind, Row, identify, identify_robot, plan_measurements,
-};
+use flexarm::identify::{Component, IdentifyOptions, IdentifyRequest, LoadCase, MeasuredArm, Measurements, Parameter, PlanRequest, Plant, Reading, ReadingKind, Row, identify, identify_robot, plan_measurements, parameters, plant};
 use flexarm::{Error, Modelling, Robot, Wrench};
 use flexarm_testkit::Draw;
 use nalgebra::{DVector, Vector3};
@@ -80,7 +77,7 @@ fn with_values(of: &Measurements, values: &[f64]) -> Measurements {
 /// Truth: the made-up arm. Share of 95 % intervals that hold it, and spread of the errors over their deviations, 200 seeds.
 fn coverage(robot: &str) -> (f64, f64) {
     let arm = shipped(robot).flexible(Modelling::default()).unwrap();
-    let (plant, parameters) = (arm.plant(), stiffnesses(arm.parameters()));
+    let (plant, parameters) = (plant(&arm), stiffnesses(parameters(&arm)));
     let mut draw = Draw(2026);
     let poses = pulls(&mut draw, 24);
     let truth: Vec<f64> = (0..parameters.len()).map(|k| 0.3 * (1.7 * k as f64 + 1.0).sin()).collect();
@@ -135,8 +132,8 @@ fn measured(robot: &Robot, x: &[f64], noise: f64) -> (Measurements, Vec<f64>, Ve
     let arm = robot.flexible(Modelling::default()).unwrap();
     let mut draw = Draw(5);
     let poses = pulls(&mut draw, 12);
-    let parameters: Vec<Parameter> = stiffnesses(arm.parameters());
-    let mut values = shown(&arm.plant(), &parameters, x, &poses);
+    let parameters: Vec<Parameter> = stiffnesses(parameters(&arm));
+    let mut values = shown(&plant(&arm), &parameters, x, &poses);
     values.iter_mut().for_each(|d| *d += noise * normal(&mut draw));
     (poses, values, arm.joints().map(str::to_owned).collect())
 }
@@ -164,7 +161,7 @@ fn a_table_in_millimetres_gives_a_robot_file_that_shows_what_was_measured() {
         (robot.urdf_path.canonicalize().unwrap(), &robot.name)
     );
     let arm = new.flexible(Modelling::default()).unwrap();
-    for (p, found) in stiffnesses(arm.parameters()).iter().zip(&found.parameters) {
+    for (p, found) in stiffnesses(parameters(&arm)).iter().zip(&found.parameters) {
         let off = (p.initial - found.value).abs();
         assert!(off < 0.01 * found.std, "{}: {off}", p.name);
     }

@@ -5,7 +5,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use flexarm::identify::{IdentifyRequest, identify_robot};
+use flexarm::identify::{IdentifyRequest, identify_robot, parameters};
 use flexarm::{Modelling, Robot, Wrench};
 
 struct Place(PathBuf);
@@ -111,7 +111,7 @@ fn springs_of_coupled_motors_are_found_from_encoders_behind_the_gears() {
     let initial = |joint: &str| {
         let arm = robot.flexible(Modelling::default()).unwrap();
         let name = format!("drive.{joint}.gearbox.stiffness");
-        arm.parameters().into_iter().find(|p| p.name == name).unwrap().initial
+        parameters(&arm).into_iter().find(|p| p.name == name).unwrap().initial
     };
     let motors = "positions = \"motors\"";
     let last = "joint_6 = \"l6\"";

@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm::identify::{IdentifyRequest, identify_robot};
+use flexarm::identify::{IdentifyRequest, identify_robot, link_entries};
 use flexarm::sensitivity::pose_sensitivity;
 use flexarm::{LinkModel, Modelling, Robot, Wrench, statics};
 use nalgebra::{Matrix6, Rotation3, Translation3, Vector3};
@@ -53,7 +53,7 @@ fn with_stiffness(K: &Matrix6<f64>) -> String {
 fn matrix(robot: &Robot) -> Matrix6<f64> {
     let arm = robot.flexible(Modelling::default()).unwrap();
     let mut K = Matrix6::zeros();
-    for p in arm.link_entries().iter().filter(|p| p.name.starts_with("link.link_2.")) {
+    for p in link_entries(&arm).iter().filter(|p| p.name.starts_with("link.link_2.")) {
         let digits: Vec<usize> = p.name.chars().filter_map(|c| c.to_digit(10)).map(|d| d as usize).collect();
         let (i, j) = (digits[1], digits[2]);
         (K[(i, j)], K[(j, i)]) = (p.initial, p.initial);

@@ -6,10 +6,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use flexarm::identify::{
-    Component, Identification, IdentifyRequest, LoadCase, MeasuredArm, Measurements, Parameter, PlanRequest, Reading,
-    ReadingKind, Row, Target, identify_robot, plan_measurements,
-};
+use flexarm::identify::{Component, Identification, IdentifyRequest, LoadCase, MeasuredArm, Measurements, Parameter, PlanRequest, Reading, ReadingKind, Row, Target, identify_robot, plan_measurements, parameters, plant};
 use flexarm::{Error, Modelling, Robot, Wrench};
 use flexarm_testkit::Draw;
 use nalgebra::{DVector, Rotation3, Vector3};
@@ -44,7 +41,7 @@ impl Place {
         std::fs::create_dir_all(&folder).unwrap();
         let robot = robot();
         let arm = robot.flexible(Modelling::default()).unwrap();
-        let parameters = arm.parameters().into_iter().filter(|p| p.name.ends_with(".stiffness")).collect();
+        let parameters = parameters(&arm).into_iter().filter(|p| p.name.ends_with(".stiffness")).collect();
         Self { folder, robot, draw: Draw(9), parameters }
     }
 
@@ -88,7 +85,7 @@ impl Place {
             targets: target.map(Target::Known).into_iter().collect(),
             instruments: vec![flexarm::identify::Instrument::Known(nalgebra::IsometryMatrix3::identity())],
         };
-        let model = MeasuredArm { plant: &arm.plant(), parameters: &self.parameters, measurements: &measurements };
+        let model = MeasuredArm { plant: &plant(&arm), parameters: &self.parameters, measurements: &measurements };
         let values = model.predicted(&DVector::from_column_slice(&TRUTH)).unwrap();
         values.chunks_exact(3).map(|d| [0, 1, 2].map(|k| d[k] + NOISE * self.normal())).collect()
     }

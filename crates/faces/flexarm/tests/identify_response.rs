@@ -6,9 +6,7 @@
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
-use flexarm::identify::{
-    Answer, Identification, IdentifyRequest, Parameter, Plant, Probe, ResponseSlopes, identify_robot, structure_slopes,
-};
+use flexarm::identify::{Answer, Identification, IdentifyRequest, Parameter, Plant, Probe, ResponseSlopes, identify_robot, structure_slopes, parameters, plant};
 use flexarm::{Modelling, Robot};
 use nalgebra::{Complex, Vector3};
 
@@ -75,12 +73,12 @@ struct Test {
 impl Test {
     fn new(robot: &Robot) -> Self {
         let arm = robot.flexible(Modelling::default()).unwrap();
-        let all = arm.parameters();
+        let all = parameters(&arm);
         let changed: Vec<Parameter> =
             TRUTH.iter().map(|(name, _)| all.iter().find(|p| p.name == *name).unwrap().clone()).collect();
         let x: Vec<f64> = TRUTH.iter().map(|(_, factor)| f64::ln(*factor)).collect();
         let hz = (0..50).map(|k| 4.0 + 0.9 * f64::from(k)).collect();
-        Self { plant: arm.plant().with(&changed, &x), hz }
+        Self { plant: plant(&arm).with(&changed, &x), hz }
     }
 
     fn response(&self, watched: Vector3<f64>, hit: Vector3<f64>) -> Vec<Complex<f64>> {
@@ -260,7 +258,7 @@ fn shapes_of_modes_tell_how_stiffness_is_shared() {
     let test = Test::new(&robot);
     let place = Place::new("shapes");
     let arm = robot.flexible(Modelling::default()).unwrap();
-    let frame = |link: &str| arm.plant().model.frame(link).unwrap().clone();
+    let frame = |link: &str| plant(&arm).model.frame(link).unwrap().clone();
     let (links, axes) = (["link_3", "link_4", "link_6"], [("x", Vector3::x()), ("z", Vector3::z())]);
     let probes: Vec<Probe> =
         links.iter().flat_map(|link| axes.map(|(_, direction)| Probe { frame: frame(link), direction })).collect();
@@ -315,9 +313,9 @@ fn dampers_of_a_gearbox_of_six_come_back_one_by_one() {
     let arm = robot.flexible(Modelling::default()).unwrap();
     let name = |k: usize| format!("drive.joint_2.gearbox.damping[{k}]");
     let dampers: Vec<Parameter> =
-        (0..6).map(|k| arm.parameters().into_iter().find(|p| p.name == name(k)).unwrap()).collect();
+        (0..6).map(|k| parameters(&arm).into_iter().find(|p| p.name == name(k)).unwrap()).collect();
     let factors = [1.0, 1.0, 1.0, 1.6, 0.6, 1.3];
-    let plant = arm.plant().with(&dampers, &factors.map(f64::ln));
+    let plant = plant(&arm).with(&dampers, &factors.map(f64::ln));
     let hz: Vec<f64> = (0..80).map(|k| 3.0 + 0.5 * f64::from(k)).collect();
     let omega: Vec<f64> = hz.iter().map(|hz| TAU * hz).collect();
     let mut job = "format = 1\nfit = [\"drive.joint_2.gearbox.damping\"]\n".to_owned();
@@ -350,7 +348,7 @@ fn dampers_of_a_gearbox_of_six_come_back_one_by_one() {
     assert!(told >= 3, "{told}");
     let again = Robot::load(place.0.join("out")).unwrap().flexible(Modelling::default()).unwrap();
     for (p, found) in
-        again.parameters().iter().filter(|p| p.name.starts_with("drive.joint_2.gearbox.damping")).zip(&found.parameters)
+        parameters(&again).iter().filter(|p| p.name.starts_with("drive.joint_2.gearbox.damping")).zip(&found.parameters)
     {
         assert!((p.initial / found.value - 1.0).abs() < 1e-2, "{}", p.name);
     }

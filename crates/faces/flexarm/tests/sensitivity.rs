@@ -6,8 +6,8 @@
 use std::path::Path;
 
 use cpu_time::ThreadTime;
-use flexarm::identify::{Effect, Parameter};
-use flexarm::sensitivity::{RunParameter, SensitivityRequest, pose_sensitivity, sensitivity};
+use flexarm::identify::{Effect, Parameter, link_directions, parameters, plant};
+use flexarm::sensitivity::{RunParameter, SensitivityRequest, error_slopes, pose_sensitivity, sensitivity};
 use flexarm::{Arm, DriveModel, Modelling, Motion, Robot, RunOptions};
 use flexarm_stepping::{AlphaSettings, Batch, BatchRun, FlexibleArm, SlopesRequest, Start, run_slopes};
 
@@ -24,7 +24,7 @@ fn shipped(robot: &str, motion: &str) -> (Robot, Arm, Motion) {
 
 /// Errors of all times of a run with one parameter changed.
 fn errors(arm: &Arm, motion: &Motion, parameter: &Parameter, x: f64) -> Vec<f64> {
-    let plant = arm.plant().with(std::slice::from_ref(parameter), &[x]);
+    let plant = plant(&arm).with(std::slice::from_ref(parameter), &[x]);
     let flexible = FlexibleArm::new(plant.model, plant.springs, motion.prescribed()).unwrap();
     let request = SlopesRequest {
         settings: AlphaSettings::default(),
@@ -48,7 +48,7 @@ fn richardson(h: f64, f: impl Fn(f64) -> Vec<f64>) -> Vec<f64> {
 #[test]
 fn the_error_of_kr210_depends_on_its_numbers_as_differences_of_runs_say() {
     let (_, arm, motion) = shipped("kr210", "point_to_point");
-    let all: Vec<Parameter> = arm.parameters().into_iter().chain(arm.link_directions()).collect();
+    let all: Vec<Parameter> = parameters(&arm).into_iter().chain(link_directions(&arm)).collect();
     let of = |name: &str| all.iter().find(|p| p.name == name).unwrap_or_else(|| panic!("{name}")).clone();
     let names = [
         "drive.joint_2.gearbox.stiffness",
@@ -62,7 +62,7 @@ fn the_error_of_kr210_depends_on_its_numbers_as_differences_of_runs_say() {
         names.iter().filter(|name| all.iter().any(|p| p.name == **name)).map(|n| of(n)).collect();
     assert!(parameters.len() >= 5, "{:?}", all.iter().map(|p| &p.name).collect::<Vec<_>>());
     let asked: Vec<RunParameter> = parameters.iter().cloned().map(RunParameter::Arm).collect();
-    let found = arm.error_slopes(&motion, &RunOptions::default(), &asked, true).unwrap();
+    let found = error_slopes(&arm, &motion, &RunOptions::default(), &asked, true).unwrap();
     for (k, parameter) in parameters.iter().enumerate() {
         // In five seconds the phase of the first mode changes by 80 times as much.
         // What dampers do is small, and needs a longer way out of the rounding.
@@ -88,7 +88,7 @@ fn the_error_of_kr210_depends_on_its_numbers_as_differences_of_runs_say() {
 fn all_numbers_of_a_robot_cost_a_few_runs() {
     let (robot, arm, motion) = shipped("kr210", "pick_and_place");
     let options = RunOptions::default();
-    let plant = arm.plant();
+    let plant = plant(&arm);
     let run = BatchRun {
         arm: FlexibleArm::new(plant.model, plant.springs, motion.prescribed()).unwrap(),
         duration_s: motion.trajectory.duration(),
@@ -210,7 +210,7 @@ impl Changed {
         std::fs::write(&path, moved).unwrap();
         let robot = Robot::load(&file).unwrap();
         let motion = Motion::load(&path, &robot).unwrap();
-        let found = robot.flexible(run.modelling).unwrap().error_slopes(&motion, run, &[], true).unwrap();
+        let found = error_slopes(&robot.flexible(run.modelling).unwrap(), &motion, run, &[], true).unwrap();
         found.errors.into_iter().flatten().collect()
     }
 

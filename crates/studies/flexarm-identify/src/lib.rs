@@ -9,6 +9,7 @@ mod choose;
 mod doubts;
 mod encoders;
 mod error;
+mod estimation;
 mod file;
 mod page;
 pub(crate) mod parameters;
@@ -51,40 +52,38 @@ pub use self::encoders::EncoderFigures;
 pub use self::error::IdentifyFileError;
 pub use self::plan_file::{MeasurementPlan, PlanRequest, PlannedReading, plan_measurements};
 
-impl Arm {
-    /// The arm as the identification takes it: tree, springs, tool.
-    pub fn plant(&self) -> Plant {
-        parameters::plant(self.flexible())
-    }
+/// Returns the arm as the identification takes it: tree, springs, TCP.
+pub fn plant(arm: &Arm) -> Plant {
+    parameters::plant(arm.flexible())
+}
 
-    /// What of the robot file can be identified on this arm, by the names that files and `--fit` use.
-    pub fn parameters(&self) -> Vec<Parameter> {
-        let special =
-            |name: &str| parameters::is_direction(name) || parameters::is_entry(name) || parameters::is_tool(name);
-        self.candidates_that(|name| !special(name))
-    }
+/// Returns what can be identified on an arm, by the names that files and `--fit` use.
+pub fn parameters(arm: &Arm) -> Vec<Parameter> {
+    let special =
+        |name: &str| parameters::is_direction(name) || parameters::is_entry(name) || parameters::is_tool(name);
+    candidates_that(arm, |name| !special(name))
+}
 
-    /// The six directions of each lumped link's springs, `link.LINK.stiffness_factors[k]`: together they are the link's stiffness, which
-    /// [`Arm::parameters`] has as a whole.
-    pub fn link_directions(&self) -> Vec<Parameter> {
-        self.candidates_that(parameters::is_direction)
-    }
+/// Returns the six directions of each lumped link's springs, `link.LINK.stiffness_factors[k]`: together they are the link's
+/// stiffness, which [`parameters()`] has as a whole.
+pub fn link_directions(arm: &Arm) -> Vec<Parameter> {
+    candidates_that(arm, parameters::is_direction)
+}
 
-    /// The 21 entries of the 6x6 of each lumped link in two parts, `link.LINK.stiffness[i][j]` with i up to j: not to be taken beside the
-    /// link's factors.
-    pub fn link_entries(&self) -> Vec<Parameter> {
-        self.candidates_that(parameters::is_entry)
-    }
+/// Returns the 21 entries of the 6x6 of each lumped link in two parts, `link.LINK.stiffness[i][j]` with i up to j. They exclude
+/// the link's factors.
+pub fn link_entries(arm: &Arm) -> Vec<Parameter> {
+    candidates_that(arm, parameters::is_entry)
+}
 
-    /// The place and the attitude of the tool, `tcp.x` to `tcp.rz`: moved and turned about its own axes (m, rad).
-    pub fn tool_parameters(&self) -> Vec<Parameter> {
-        self.candidates_that(parameters::is_tool)
-    }
+/// Returns place and attitude of the TCP, `tcp.x` to `tcp.rz`: moved and turned about its own axes (m, rad).
+pub fn tcp_parameters(arm: &Arm) -> Vec<Parameter> {
+    candidates_that(arm, parameters::is_tool)
+}
 
-    fn candidates_that(&self, wanted: impl Fn(&str) -> bool) -> Vec<Parameter> {
-        let all = parameters::candidates(self.robot(), self.flexible()).into_iter();
-        all.map(|c| c.parameter).filter(|parameter| wanted(&parameter.name)).collect()
-    }
+fn candidates_that(arm: &Arm, wanted: impl Fn(&str) -> bool) -> Vec<Parameter> {
+    let all = parameters::candidates(arm.robot(), arm.flexible()).into_iter();
+    all.map(|c| c.parameter).filter(|parameter| wanted(&parameter.name)).collect()
 }
 
 /// What is asked of [`identify_robot`].
@@ -125,7 +124,7 @@ pub fn identify_robot(robot: &Robot, measurements: &Path, request: &IdentifyRequ
         None => None,
     };
     check_tool(robot, &chosen, &input)?;
-    let plant = arm.plant();
+    let plant = plant(&arm);
     check_modes(&plant, &input)?;
     check_units(&plant, &input)?;
     let parameters: Vec<Parameter> = chosen.iter().map(|c| c.parameter.clone()).collect();

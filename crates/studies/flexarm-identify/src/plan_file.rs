@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use super::parameters;
-use super::{IdentifyFileError, joints_of};
+use super::{IdentifyFileError, joints_of, plant};
 use flexarm_run::Arm;
 use flexarm_run::Caveat;
 use flexarm_run::caveat::Use;
@@ -226,7 +226,7 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
         }
         None => Vec::new(),
     };
-    let plant = arm.plant();
+    let plant = plant(&arm);
     let options = PlanOptions { count: request.count, purpose, repeat: false };
     let failed = |error: crate::estimation::NoAnswer| IdentifyFileError::Fit(error.to_string());
     let best = plan(&plant, &fitted, &candidates, &options).map_err(failed)?;

@@ -16,80 +16,77 @@ use flexarm_run::Scenario;
 const MASS_STEP: f64 = 0.02;
 const JOINT_STEP: f64 = 2e-3;
 
-impl Arm {
-    /// Adds friction and gains of the joints under servos, and to masses and motions what the controllers make of them.
-    pub(super) fn add_controllers(&self, scenario: &Scenario, all: &mut Vec<Named>) -> Result<(), Error> {
-        let flexible = self.flexible();
-        if !flexible.has_servo() {
-            return Ok(());
-        }
-        let arm = flexible.arm(scenario.motion.prescribed()).map_err(|error| flexible.explained(error))?;
-        let n = arm.model.n_actuated();
-        let mut start = DVector::zeros(n);
-        let (mut rates, mut accelerations) = (vec![0.0; n], vec![0.0; n]);
-        arm.motion.sample(0.0, start.as_mut_slice(), &mut rates, &mut accelerations);
-        for named in &mut *all {
-            self.follow(named, &start);
-        }
-        let Some(servo) = &arm.servo else { return Ok(()) };
-        for (number, axis) in servo.axes.iter().enumerate() {
-            let joint = &arm.model.coordinates()[axis.coordinate];
-            let slides = joint.kind == "prismatic";
-            all.extend(friction_of(&arm, axis.coordinate, &joint.joint, slides));
-            all.extend(gains_of(axis, number, &joint.joint, slides));
-        }
-        Ok(())
+/// Adds friction and gains of the joints under servos, and to masses and motions what the controllers make of them.
+pub(super) fn add_controllers(arm: &Arm, scenario: &Scenario, all: &mut Vec<Named>) -> Result<(), Error> {
+    let flexible = arm.flexible();
+    if !flexible.has_servo() {
+        return Ok(());
     }
-
-    /// Makes of a mass or a motion one of which the controllers know: the rigid robot carries the mass too, and gains that the robot file
-    /// leaves out fit the inertia at the start.
-    fn follow(&self, named: &mut Named, start: &DVector<f64>) {
-        let flexible = self.flexible();
-        let (mut fed_forward, gains) = (
-            Vec::new(),
-            match &named.parameter {
-                RunParameter::Arm(parameter) => {
-                    let Effect::Mass { body, per_kg } = &parameter.effect else { return };
-                    let own = rigid_mass(&flexible.rigid);
-                    flexible.gain_slopes(MASS_STEP, |kg| {
-                        let rigid = own.map_or_else(
-                            || (*flexible.rigid).clone(),
-                            |(k, own)| carrying(&flexible.rigid, k, &own, kg),
-                        );
-                        (carrying(&flexible.model, *body, per_kg, kg), rigid, start.clone())
-                    })
-                }
-                RunParameter::Joint(k) => flexible.gain_slopes(JOINT_STEP, |shift| {
-                    let mut at = start.clone();
-                    at[*k] += shift;
-                    ((*flexible.model).clone(), (*flexible.rigid).clone(), at)
-                }),
-                _ => return,
-            },
-        );
-        if matches!(named.parameter, RunParameter::Arm(_)) {
-            fed_forward.extend(rigid_mass(&flexible.rigid));
-        }
-        let parameter = Box::new(named.parameter.clone());
-        named.parameter = RunParameter::Followed { parameter, fed_forward, gains };
+    let unloaded = flexible.arm(scenario.motion.prescribed()).map_err(|error| flexible.explained(error))?;
+    let n = unloaded.model.n_actuated();
+    let mut start = DVector::zeros(n);
+    let (mut rates, mut accelerations) = (vec![0.0; n], vec![0.0; n]);
+    unloaded.motion.sample(0.0, start.as_mut_slice(), &mut rates, &mut accelerations);
+    for named in &mut *all {
+        follow(arm, named, &start);
     }
-
-    /// Servos that were at their limits in a run that was differentiated.
-    pub(super) fn limited(&self, found: &RunSlopes) -> Vec<Caveat> {
-        let joints: Vec<&str> = self.joints().collect();
-        let told = |own: &flexarm_stepping::TorqueLimited| {
-            let joint = joints[own.coordinate];
-            let text = format!(
-                "the servo of joint {joint:?} is at its torque limit in {} samples, first at {:.4} s: the derivatives hold as long as the same \
-                 samples are; where another one is, its integral steps",
-                own.samples, own.first_s
-            );
-            Caveat::said("servo-limit", format!("joint {joint:?}"), text, "slow the motion down where it is quickest")
-        };
-        found.limited.iter().map(told).collect()
+    let Some(servo) = &unloaded.servo else { return Ok(()) };
+    for (number, axis) in servo.axes.iter().enumerate() {
+        let joint = &unloaded.model.coordinates()[axis.coordinate];
+        let slides = joint.kind == "prismatic";
+        all.extend(friction_of(&unloaded, axis.coordinate, &joint.joint, slides));
+        all.extend(gains_of(axis, number, &joint.joint, slides));
     }
+    Ok(())
 }
 
+/// Makes of a mass or a motion one of which the controllers know: the rigid robot carries the mass too, and gains that the robot file
+/// leaves out fit the inertia at the start.
+fn follow(arm: &Arm, named: &mut Named, start: &DVector<f64>) {
+    let flexible = arm.flexible();
+    let (mut fed_forward, gains) = (
+        Vec::new(),
+        match &named.parameter {
+            RunParameter::Arm(parameter) => {
+                let Effect::Mass { body, per_kg } = &parameter.effect else { return };
+                let own = rigid_mass(&flexible.rigid);
+                flexible.gain_slopes(MASS_STEP, |kg| {
+                    let rigid = own.map_or_else(
+                        || (*flexible.rigid).clone(),
+                        |(k, own)| carrying(&flexible.rigid, k, &own, kg),
+                    );
+                    (carrying(&flexible.model, *body, per_kg, kg), rigid, start.clone())
+                })
+            }
+            RunParameter::Joint(k) => flexible.gain_slopes(JOINT_STEP, |shift| {
+                let mut at = start.clone();
+                at[*k] += shift;
+                ((*flexible.model).clone(), (*flexible.rigid).clone(), at)
+            }),
+            _ => return,
+        },
+    );
+    if matches!(named.parameter, RunParameter::Arm(_)) {
+        fed_forward.extend(rigid_mass(&flexible.rigid));
+    }
+    let parameter = Box::new(named.parameter.clone());
+    named.parameter = RunParameter::Followed { parameter, fed_forward, gains };
+}
+
+/// Servos that were at their limits in a run that was differentiated.
+pub(super) fn limited(arm: &Arm, found: &RunSlopes) -> Vec<Caveat> {
+    let joints: Vec<&str> = arm.joints().collect();
+    let told = |own: &flexarm_stepping::TorqueLimited| {
+        let joint = joints[own.coordinate];
+        let text = format!(
+            "the servo of joint {joint:?} is at its torque limit in {} samples, first at {:.4} s: the derivatives hold as long as the same \
+             samples are; where another one is, its integral steps",
+            own.samples, own.first_s
+        );
+        Caveat::said("servo-limit", format!("joint {joint:?}"), text, "slow the motion down where it is quickest")
+    };
+    found.limited.iter().map(told).collect()
+}
 /// A kilogram at the payload of the rigid robot, and its body.
 fn rigid_mass(rigid: &Model) -> Option<(usize, SpatialInertia)> {
     let frame = rigid.frame(PAYLOAD_LINK)?;

@@ -1,6 +1,6 @@
 //! How the tool's error along a motion depends on every number of the robot: derivatives of the whole run, exact, for all of them at once.
 //!
-//! Start at [`sensitivity`], or at [`Arm::error_slopes`] for numbers alone; [`pose_sensitivity`] answers for a pose.
+//! Start at [`sensitivity`], or at [`error_slopes`] for numbers alone; [`pose_sensitivity`] answers for a pose.
 
 mod controllers;
 mod pose;
@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 use flexarm_files::{check_free, write_all};
 pub use flexarm_identify::RunParameter;
-use flexarm_identify::{Effect, Parameter, error_slopes};
+use flexarm_identify::{Effect, Parameter, link_directions, link_entries, parameters};
 pub use flexarm_stepping::{ErrorSlopes, RunSlopes};
 use flexarm_stepping::{SlopesRequest, StepError, StepperKind};
 use nalgebra::Vector3;
@@ -110,101 +110,98 @@ struct Named {
     parameter: RunParameter,
 }
 
-impl Arm {
-    /// Error of the tool along a run and its derivatives by parameters, side by side. No other stepper than generalised-alpha; iterations go on
-    /// to the end, so that the run is a smooth function of all that goes into it.
-    ///
-    /// Cost: of kr210 (18 elastic coordinates) about ten ordinary runs, and a quarter of one for each parameter. With closed loops or links in
-    /// modes a hundred runs and more.
-    ///
-    /// # Errors
-    /// As [`flexarm_run::simulate`]; [`Error::Step`] where the arm has what is not differentiated (links that stiffen under load, motions
-    /// whose velocity jumps under servos).
-    pub fn error_slopes(
-        &self,
-        scenario: impl Into<Scenario>,
-        options: &RunOptions,
-        parameters: &[RunParameter],
-        keep_samples: bool,
-    ) -> Result<RunSlopes, Error> {
-        self.error_slopes_told(&scenario.into(), options, parameters, keep_samples).map(|(found, _)| found)
-    }
-
-    fn error_slopes_told(
-        &self,
-        scenario: &Scenario,
-        options: &RunOptions,
-        parameters: &[RunParameter],
-        keep_samples: bool,
-    ) -> Result<(RunSlopes, Vec<Caveat>), Error> {
-        let StepperKind::GeneralizedAlpha(settings) = options.stepper else {
-            let what = "another stepper than generalised-alpha";
-            let source = StepError::NoSlopes { what, mend: "take the default one" };
-            return Err(Error::Step { source, partial: false });
-        };
-        runnable(&scenario.motion, options)?;
-        let flexible = self.flexible();
-        if flexible.springs.is_empty() && !flexible.has_servo() {
-            return Err(ValueError::NothingYields.into());
-        }
-        flexarm_run::loops::along_motion(&flexible.rigid, &scenario.motion.trajectory)?;
-        let explained = |error| flexible.explained(error);
-        let arm = flexible.arm(scenario.motion.prescribed()).map_err(explained)?;
-        let (arm, mut caveats) = loaded(self.robot(), scenario, options, arm)?;
-        let request = SlopesRequest {
-            settings,
-            step_s: options.step_s,
-            duration_s: scenario.duration_s(),
-            start: scenario.start,
-            tool: flexible.tcp.clone(),
-            keep_samples,
-        };
-        let found = error_slopes(&arm, parameters, &request).map_err(explained)?;
-        caveats.extend(self.limited(&found));
-        Ok((found, caveats))
-    }
-
-    /// Numbers of the arm by which is differentiated: entries of matrices, of which there are many, only by their names.
-    fn numbers(&self, asked: &[String]) -> Vec<Parameter> {
-        let entries = self.link_entries().into_iter();
-        let entries = entries.filter(|own| asked.iter().any(|pattern| asks_for(pattern, &own.name)));
-        self.parameters().into_iter().chain(self.link_directions()).chain(entries).collect()
-    }
-
-    /// All numbers by which the error along a motion is differentiated.
-    fn run_parameters(&self, scenario: &Scenario, asked: &[String]) -> Result<Vec<Named>, Error> {
-        let of_arm = |parameter: Parameter| {
-            let (per, scale) = change_of(&parameter);
-            let Parameter { name, unit, initial: value, .. } = parameter.clone();
-            Named { name, unit, value, per, scale, parameter: RunParameter::Arm(parameter) }
-        };
-        // What another payload takes the place of at the start does nothing.
-        let gone = scenario.payloads.iter().any(|payload| payload.at_s <= SAME_TIME);
-        let there = |own: &Parameter| !(gone && matches!(own.effect, Effect::Mass { .. }));
-        let mut all: Vec<Named> = self.numbers(asked).into_iter().filter(there).map(of_arm).collect();
-        let model = &self.flexible().model;
-        for (k, coordinate) in model.coordinates()[..model.n_actuated()].iter().enumerate() {
-            let slides = coordinate.kind == "prismatic";
-            let (unit, per) = if slides { ("m", "1 mm") } else { ("rad", "1 mrad") };
-            let name = format!("motion.{}", coordinate.joint);
-            let parameter = RunParameter::Joint(k);
-            all.push(Named { name, unit: unit.into(), value: 0.0, per, scale: 1e-3, parameter });
-        }
-        for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
-            let (name, unit) = (format!("tcp.{axis}"), "m".into());
-            let parameter = RunParameter::Tool(Vector3::ith(k, 1.0));
-            all.push(Named { name, unit, value: 0.0, per: "1 mm", scale: 1e-3, parameter });
-        }
-        self.add_controllers(scenario, &mut all)?;
-        Ok(all)
-    }
+/// Error of the tool along a run and its derivatives by parameters, side by side. No other stepper than generalised-alpha; iterations go on
+/// to the end, so that the run is a smooth function of all that goes into it.
+///
+/// Cost: of kr210 (18 elastic coordinates) about ten ordinary runs, and a quarter of one for each parameter. With closed loops or links in
+/// modes a hundred runs and more.
+///
+/// # Errors
+/// As [`flexarm_run::simulate`]; [`Error::Step`] where the arm has what is not differentiated (links that stiffen under load, motions
+/// whose velocity jumps under servos).
+pub fn error_slopes(
+    arm: &Arm,
+    scenario: impl Into<Scenario>,
+    options: &RunOptions,
+    parameters: &[RunParameter],
+    keep_samples: bool,
+) -> Result<RunSlopes, Error> {
+    slopes_and_caveats(arm, &scenario.into(), options, parameters, keep_samples).map(|(found, _)| found)
 }
 
+fn slopes_and_caveats(
+    arm: &Arm,
+    scenario: &Scenario,
+    options: &RunOptions,
+    parameters: &[RunParameter],
+    keep_samples: bool,
+) -> Result<(RunSlopes, Vec<Caveat>), Error> {
+    let StepperKind::GeneralizedAlpha(settings) = options.stepper else {
+        let what = "another stepper than generalised-alpha";
+        let source = StepError::NoSlopes { what, mend: "take the default one" };
+        return Err(Error::Step { source, partial: false });
+    };
+    runnable(&scenario.motion, options)?;
+    let flexible = arm.flexible();
+    if flexible.springs.is_empty() && !flexible.has_servo() {
+        return Err(ValueError::NothingYields.into());
+    }
+    flexarm_run::loops::along_motion(&flexible.rigid, &scenario.motion.trajectory)?;
+    let explained = |error| flexible.explained(error);
+    let unloaded = flexible.arm(scenario.motion.prescribed()).map_err(explained)?;
+    let (flexible_arm, mut caveats) = loaded(arm.robot(), scenario, options, unloaded)?;
+    let request = SlopesRequest {
+        settings,
+        step_s: options.step_s,
+        duration_s: scenario.duration_s(),
+        start: scenario.start,
+        tool: flexible.tcp.clone(),
+        keep_samples,
+    };
+    let found = flexarm_identify::error_slopes(&flexible_arm, parameters, &request).map_err(explained)?;
+    caveats.extend(limited(arm, &found));
+    Ok((found, caveats))
+}
+
+/// Numbers of the arm by which is differentiated: entries of matrices, of which there are many, only by their names.
+fn numbers(arm: &Arm, asked: &[String]) -> Vec<Parameter> {
+    let entries = link_entries(arm).into_iter();
+    let entries = entries.filter(|own| asked.iter().any(|pattern| asks_for(pattern, &own.name)));
+    parameters(arm).into_iter().chain(link_directions(arm)).chain(entries).collect()
+}
+
+/// All numbers by which the error along a motion is differentiated.
+fn run_parameters(arm: &Arm, scenario: &Scenario, asked: &[String]) -> Result<Vec<Named>, Error> {
+    let of_arm = |parameter: Parameter| {
+        let (per, scale) = change_of(&parameter);
+        let Parameter { name, unit, initial: value, .. } = parameter.clone();
+        Named { name, unit, value, per, scale, parameter: RunParameter::Arm(parameter) }
+    };
+    // What another payload takes the place of at the start does nothing.
+    let gone = scenario.payloads.iter().any(|payload| payload.at_s <= SAME_TIME);
+    let there = |own: &Parameter| !(gone && matches!(own.effect, Effect::Mass { .. }));
+    let mut all: Vec<Named> = numbers(arm, asked).into_iter().filter(there).map(of_arm).collect();
+    let model = &arm.flexible().model;
+    for (k, coordinate) in model.coordinates()[..model.n_actuated()].iter().enumerate() {
+        let slides = coordinate.kind == "prismatic";
+        let (unit, per) = if slides { ("m", "1 mm") } else { ("rad", "1 mrad") };
+        let name = format!("motion.{}", coordinate.joint);
+        let parameter = RunParameter::Joint(k);
+        all.push(Named { name, unit: unit.into(), value: 0.0, per, scale: 1e-3, parameter });
+    }
+    for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
+        let (name, unit) = (format!("tcp.{axis}"), "m".into());
+        let parameter = RunParameter::Tool(Vector3::ith(k, 1.0));
+        all.push(Named { name, unit, value: 0.0, per: "1 mm", scale: 1e-3, parameter });
+    }
+    add_controllers(arm, scenario, &mut all)?;
+    Ok(all)
+}
 /// How the tool's error along a motion depends on every number of the robot: stiffness and damping of gearboxes and links, masses, the tool's
 /// place, the joints of the motion; of joints under servos their friction and gains.
 ///
 /// # Errors
-/// As [`Arm::error_slopes`]; [`Error::Value`] for a name that fits nothing, [`Error::File`] and [`Error::Write`] for the table.
+/// As [`error_slopes`]; [`Error::Value`] for a name that fits nothing, [`Error::File`] and [`Error::Write`] for the table.
 pub fn sensitivity(
     robot: &Robot,
     scenario: impl Into<Scenario>,
@@ -213,9 +210,9 @@ pub fn sensitivity(
     let scenario = scenario.into();
     check_free(request.table.as_slice(), request.overwrite)?;
     let arm = robot.flexible(request.run.modelling)?;
-    let named = chosen(arm.run_parameters(&scenario, &request.parameters)?, &request.parameters, |own| &own.name)?;
+    let named = chosen(run_parameters(&arm, &scenario, &request.parameters)?, &request.parameters, |own| &own.name)?;
     let parameters: Vec<RunParameter> = named.iter().map(|own| own.parameter.clone()).collect();
-    let (found, mut caveats) = arm.error_slopes_told(&scenario, &request.run, &parameters, request.table.is_some())?;
+    let (found, mut caveats) = slopes_and_caveats(&arm, &scenario, &request.run, &parameters, request.table.is_some())?;
     caveats.extend(arm.told(Use::Along(&scenario)));
     let caveats = once_each(caveats);
     if let Some(path) = &request.table {

@@ -1,6 +1,6 @@
 //! What the numbers of the robot do to the tool at rest, its compliance and the natural frequencies at a pose.
 
-use flexarm_identify::{Effect, compliance_slopes, frequency_slopes, tool_slopes};
+use flexarm_identify::{Effect, compliance_slopes, frequency_slopes, plant, tool_slopes};
 use flexarm_kinematics::{Pose, Wrench};
 use nalgebra::{Matrix3, Matrix6, Vector3};
 use serde::Serialize;
@@ -16,7 +16,7 @@ use flexarm_run::inspect::joint_values;
 use flexarm_run::Modelling;
 use flexarm_run::Robot;
 
-use super::{change_of, chosen};
+use super::{change_of, chosen, numbers};
 
 /// Answer of `flexarm sensitivity --at`: drives locked, world axes, under the robot's own weight.
 #[derive(Clone, Debug, Serialize)]
@@ -79,7 +79,7 @@ pub fn pose_sensitivity(
     let joints: Vec<String> = arm.joints().map(str::to_owned).collect();
     let names: Vec<&str> = joints.iter().map(String::as_str).collect();
     let at = joint_values(at, &names)?;
-    let all: Vec<Parameter> = arm.numbers(parameters);
+    let all: Vec<Parameter> = numbers(&arm, parameters);
     let still = |parameter: &Parameter| !matches!(parameter.effect, Effect::Damping(_) | Effect::Damper { .. });
     let all = all.into_iter().filter(still).map(Asked::Arm).chain((0..3).map(Asked::Tool)).collect();
     slopes(robot, &arm, joints, at, chosen(all, parameters, Asked::name)?)
@@ -146,7 +146,7 @@ fn slopes(
     let all: Vec<Parameter> = asked.iter().filter_map(of_arm).collect();
     let tool = tool_slopes(&mut point, &all).map_err(explained)?;
     let compliance = compliance_slopes(&mut point, &none, &all).map_err(explained)?;
-    let frequencies = frequency_slopes(&arm.plant(), &all, &at).map_err(explained)?;
+    let frequencies = frequency_slopes(&plant(arm), &all, &at).map_err(explained)?;
     let of = |(k, parameter): (usize, Parameter)| {
         let (per, scale) = change_of(&parameter);
         let moved = |first: usize| std::array::from_fn(|i| scale * tool[(first + i, k)]);

@@ -17,14 +17,14 @@ use flexarm_run::Error;
 /// Values of the joints: all in order, or by name.
 #[derive(Debug, Deserialize, Clone)]
 #[serde(untagged, expecting = "expected a list of joint values, or a table { joint = value }")]
-pub(in flexarm_run::identify) enum Joints {
+pub(crate) enum Joints {
     List(Vec<f64>),
     Named(BTreeMap<String, f64>),
 }
 
 #[derive(Debug, Default, Deserialize, Clone, Copy)]
 #[serde(deny_unknown_fields)]
-pub(in flexarm_run::identify) struct LoadEntry {
+pub(crate) struct LoadEntry {
     #[serde(default)]
     force: [f64; 3],
     #[serde(default)]
@@ -84,7 +84,7 @@ impl TableRow<'_> {
 
 impl Reader<'_> {
     /// Joint values of a reading in SI units.
-    pub(in flexarm_run::identify) fn joints(&self, joints: &Spanned<Joints>) -> Result<Vec<f64>, Error> {
+    pub(crate) fn joints(&self, joints: &Spanned<Joints>) -> Result<Vec<f64>, Error> {
         let known = self.cell.joints;
         let names: Vec<&str> = known.iter().map(|(name, _)| name.as_str()).collect();
         let values: Vec<f64> = match joints.get_ref() {
@@ -128,7 +128,7 @@ impl Reader<'_> {
     }
 
     /// A load in SI units.
-    pub(in flexarm_run::identify) fn load(&self, load: &LoadEntry, span: &Range<usize>) -> Result<LoadCase, Error> {
+    pub(crate) fn load(&self, load: &LoadEntry, span: &Range<usize>) -> Result<LoadCase, Error> {
         let LoadEntry { force, torque, at, mass, com, inertia } = *load;
         let all = [&force[..], &torque, &at, &[mass], &com, &inertia].concat();
         if let Some(bad) = all.iter().find(|x| !x.is_finite()) {
@@ -160,7 +160,7 @@ impl Reader<'_> {
     }
 
     /// A standard deviation in SI units; 1 where none is given.
-    pub(in flexarm_run::identify) fn std(&self, given: Option<&Spanned<f64>>, factor: f64) -> Result<f64, Error> {
+    pub(crate) fn std(&self, given: Option<&Spanned<f64>>, factor: f64) -> Result<f64, Error> {
         match given {
             None => Ok(1.0),
             Some(std) if std.get_ref().is_finite() && *std.get_ref() > 0.0 => Ok(std.get_ref() * factor),

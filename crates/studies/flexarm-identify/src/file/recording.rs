@@ -33,19 +33,19 @@ pub(super) struct EncodersEntry {
 
 /// A recording of motors and links, in SI units and the robot's order.
 #[derive(Debug)]
-pub(in flexarm_run::identify) struct EncoderRecording {
-    pub(in flexarm_run::identify) place: RobotFileError,
-    pub(in flexarm_run::identify) step_s: f64,
+pub(crate) struct EncoderRecording {
+    pub(crate) place: RobotFileError,
+    pub(crate) step_s: f64,
     /// One list per joint (rad or m): where the motors say that it is.
-    pub(in flexarm_run::identify) motor: Vec<Vec<f64>>,
+    pub(crate) motor: Vec<Vec<f64>>,
     /// Of the joints that have one.
-    pub(in flexarm_run::identify) link: Vec<Option<Vec<f64>>>,
+    pub(crate) link: Vec<Option<Vec<f64>>>,
     /// Torque through the gear where it was measured (N m or N).
-    pub(in flexarm_run::identify) torque: Vec<Option<Vec<f64>>>,
+    pub(crate) torque: Vec<Option<Vec<f64>>>,
     /// Both are compared up to here (Hz).
-    pub(in flexarm_run::identify) below_hz: f64,
+    pub(crate) below_hz: f64,
     /// Left out at both ends (s).
-    pub(in flexarm_run::identify) edge_s: f64,
+    pub(crate) edge_s: f64,
 }
 
 /// What is faster than this is left out of recordings unless they say otherwise (Hz).
