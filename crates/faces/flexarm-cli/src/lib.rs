@@ -46,9 +46,9 @@ use clap::{CommandFactory, Parser};
 use failure::Failure;
 use flexarm::written::{message, visible};
 use flexarm::{
-    AlphaSettings, ConstraintForm, FlexibleRobot, InertiaEstimate, LoadOptions, Modelling, ReadOptions,
-    ReferenceMethod, ReferenceSettings, Robot, RunOptions, Scenario, SpookPreset, SpookSettings, Start, StepperOptions,
-    Variant,
+    AlphaSettings, Arm, ConstraintForm, FlexibleRobot, InertiaEstimate, Keep, LoadOptions, Modelling, ReadOptions,
+    ReferenceMethod, ReferenceSettings, Robot, RunOptions, RunRequest, Scenario, SpookPreset, SpookSettings, Start,
+    StepperOptions, Variant,
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use shipped::OutputFolder;

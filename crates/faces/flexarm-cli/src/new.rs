@@ -7,7 +7,8 @@ use clap::Args;
 use flexarm::new::NewLink;
 use flexarm::written::visible;
 use flexarm::{
-    LoadOptions, Motion, NewOptions, NewRobot, Outputs, ReadOptions, Robot, RunOptions, Scenario, Summary, gathered,
+    Keep, LoadOptions, Motion, NewOptions, NewRobot, Outputs, ReadOptions, Robot, RunOptions, RunRequest, Scenario,
+    Summary, gathered,
 };
 
 use crate::args::{Cli, RobotArgs};
@@ -127,11 +128,8 @@ fn first_run(cli: &Cli, made: &NewRobot, folder: &Path, overwrite: bool) -> Resu
         bar.show(t, total);
         stop()
     };
-    let request = RunRequest {
-        outputs: Some(&outputs),
-        progress: Some(&mut progress),
-        ..RunRequest::keeping(Keep::Figures)
-    };
+    let request =
+        RunRequest { outputs: Some(&outputs), progress: Some(&mut progress), ..RunRequest::keeping(Keep::Figures) };
     let result = robot.flexible(options.modelling).and_then(|arm| arm.simulate_with(&motion, &options, request));
     bar.clear();
     Ok(result?.summary)

@@ -1,6 +1,9 @@
 //! Errors of the library as exceptions, by cause. The classes are Python's (`flexarm/errors.py`), for they have two parents.
 
-use flexarm::{Error, Fault};
+use flexarm::compensate::CompensateError;
+use flexarm::identify::IdentifyFileError;
+use flexarm::map::MapError;
+use flexarm::{Error, Fault, NewError};
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 
@@ -10,9 +13,7 @@ fn class(error: &Error) -> &'static str {
         Error::File { .. } | Error::Taken { .. } => "FileError",
         Error::InStudy { source, .. } => class(source),
         Error::Several(faults) => faults.first().map_or("InputError", class),
-        Error::RobotFile(_) | Error::Flex(_) | Error::New(_) | Error::NoTcp { .. } | Error::UnknownTcp { .. } => {
-            "RobotError"
-        }
+        Error::RobotFile(_) | Error::Flex(_) | Error::NoTcp { .. } | Error::UnknownTcp { .. } => "RobotError",
         Error::Urdf(_) | Error::Model { .. } => "UrdfError",
         Error::Trajectory(_) | Error::Program(_) | Error::Path { .. } | Error::Motion(_) => "MotionError",
         Error::Limits { .. } => "LimitsError",
@@ -20,14 +21,23 @@ fn class(error: &Error) -> &'static str {
         Error::Modelling(_) | Error::Balancer(_) => "ModellingError",
         Error::Pose(_) | Error::Loop(_) => "PoseError",
         Error::Load(_) => "LoadError",
-        Error::Identify(_) => "IdentifyError",
-        Error::Compensate(_) => "CompensateError",
-        Error::Map(_) => "MapError",
+        Error::External(_) => class_of_study(error),
         Error::Recording(_) => "RecordingError",
         Error::Link(_) => "LinkError",
         Error::Write { .. } | Error::Log(_) => "WriteError",
         Error::Step { .. } => "StepError",
         Error::Interrupted { .. } => "Stopped",
+        _ => "InputError",
+    }
+}
+
+/// Name of the class of a study's error.
+fn class_of_study(error: &Error) -> &'static str {
+    match error {
+        _ if error.external::<NewError>().is_some() => "RobotError",
+        _ if error.external::<IdentifyFileError>().is_some() => "IdentifyError",
+        _ if error.external::<CompensateError>().is_some() => "CompensateError",
+        _ if error.external::<MapError>().is_some() => "MapError",
         _ => "InputError",
     }
 }

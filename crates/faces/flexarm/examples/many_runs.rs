@@ -32,7 +32,8 @@ fn main() -> Result<(), Error> {
         for step_s in [5e-3, 1e-3] {
             let options = RunOptions { step_s, ..RunOptions::default() };
             let start = Instant::now();
-            let found = arm.deflections(&runs, &options, false, &|| false).into_iter().collect::<Result<Vec<_>, Error>>()?;
+            let found =
+                arm.deflections(&runs, &options, false, &|| false).into_iter().collect::<Result<Vec<_>, Error>>()?;
             let wall = start.elapsed().as_secs_f64();
             let steps: u64 = found.iter().map(|run| run.steps).sum();
             let peaks = found.iter().map(|run| 1e3 * run.peak_m);

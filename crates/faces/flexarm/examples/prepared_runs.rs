@@ -11,7 +11,9 @@
 use std::path::Path;
 
 use cpu_time::ThreadTime;
-use flexarm::{Arm, Error, Modelling, Motion, ReferenceSettings, Robot, RunOptions, STEPPERS, StepperOptions};
+use flexarm::{
+    Arm, Error, Keep, Modelling, Motion, ReferenceSettings, Robot, RunOptions, RunRequest, STEPPERS, StepperOptions,
+};
 
 const TIMES: usize = 9;
 

@@ -6,7 +6,7 @@
 
 use std::ops::ControlFlow;
 
-use flexarm::{Error, Modelling, Motion, Robot, RunOptions, Sample};
+use flexarm::{Error, Modelling, Motion, Robot, RunOptions, RunRequest, Sample};
 
 /// The tool stands still when it is this near to where it comes to rest (m), for so long (s).
 const NEAR_M: f64 = 2e-4;

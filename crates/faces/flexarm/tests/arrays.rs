@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use flexarm::{
     Arm, DriveModel, Error, LinkModel, Modelling, Motion, Outputs, RecordingFormat, Recursions, ResponseRequest, Robot,
-    RunOptions, Scenario, Variation, Wrench, flat_columns,
+    RunOptions, RunRequest, Scenario, Variation, Wrench, flat_columns,
 };
 
 const POSE: [f64; 6] = [0.0, -1.2, 1.5, 0.0, 0.4, 0.0];
@@ -185,7 +185,8 @@ fn work_stops_when_it_is_told_to() {
 
     let half = 0.5 * motion.trajectory.duration();
     let mut progress = |t: f64, _: f64| if t < half { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
-    let run = arm.simulate_with(&motion, &options, RunRequest { progress: Some(&mut progress), ..RunRequest::default() });
+    let run =
+        arm.simulate_with(&motion, &options, RunRequest { progress: Some(&mut progress), ..RunRequest::default() });
     assert!(matches!(run, Err(Error::Interrupted { t, .. }) if t >= half && t < half + 0.1));
 }
 

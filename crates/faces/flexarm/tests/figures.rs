@@ -5,8 +5,8 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use flexarm::{
-    ConvertOptions, Error, LinkModel, LoadOptions, Modelling, Motion, Outputs, RecordingFormat, Robot, RunOptions,
-    Summary, Variant, compare_study, convert_until,
+    ConvertOptions, Error, Keep, LinkModel, LoadOptions, Modelling, Motion, Outputs, RecordingFormat, Robot,
+    RunOptions, RunRequest, Summary, Variant, compare_study, convert_until,
 };
 use flexarm_log::{Trace, TraceRow};
 

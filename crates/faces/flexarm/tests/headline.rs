@@ -6,8 +6,8 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use flexarm::{
-    DriveModel, LinkModel, LoadOptions, Modelling, Motion, Robot, RunOptions, Settling, Summary, Trace, Variant,
-    compare_study, statics, study_rows,
+    DriveModel, Keep, LinkModel, LoadOptions, Modelling, Motion, Robot, RunOptions, RunRequest, Settling, Summary,
+    Trace, Variant, compare_study, statics, study_rows,
 };
 use nalgebra::Vector3;
 

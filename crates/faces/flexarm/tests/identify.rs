@@ -5,7 +5,10 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use flexarm::identify::{Component, IdentifyOptions, IdentifyRequest, LoadCase, MeasuredArm, Measurements, Parameter, PlanRequest, Plant, Reading, ReadingKind, Row, identify, identify_robot, plan_measurements, parameters, plant};
+use flexarm::identify::{
+    Component, IdentifyOptions, IdentifyRequest, LoadCase, MeasuredArm, Measurements, Parameter, PlanRequest, Plant,
+    Reading, ReadingKind, Row, identify, identify_robot, parameters, plan_measurements, plant,
+};
 use flexarm::{Error, Modelling, Robot, Wrench};
 use flexarm_testkit::Draw;
 use nalgebra::{DVector, Vector3};

@@ -6,7 +6,10 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use flexarm::identify::{Component, Identification, IdentifyRequest, LoadCase, MeasuredArm, Measurements, Parameter, PlanRequest, Reading, ReadingKind, Row, Target, identify_robot, plan_measurements, parameters, plant};
+use flexarm::identify::{
+    Component, Identification, IdentifyRequest, LoadCase, MeasuredArm, Measurements, Parameter, PlanRequest, Reading,
+    ReadingKind, Row, Target, identify_robot, parameters, plan_measurements, plant,
+};
 use flexarm::{Error, Modelling, Robot, Wrench};
 use flexarm_testkit::Draw;
 use nalgebra::{DVector, Rotation3, Vector3};

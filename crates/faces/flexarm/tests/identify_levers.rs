@@ -5,7 +5,10 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm::identify::{Component, IdentifyOptions, IdentifyRequest, LoadCase, MeasuredArm, Measurements, Parameter, PlanRequest, Reading, ReadingKind, Row, frequency_slopes, identify, identify_robot, plan_measurements, parameters, plant};
+use flexarm::identify::{
+    Component, IdentifyOptions, IdentifyRequest, LoadCase, MeasuredArm, Measurements, Parameter, PlanRequest, Reading,
+    ReadingKind, Row, frequency_slopes, identify, identify_robot, parameters, plan_measurements, plant,
+};
 use flexarm::{Modelling, Robot, Wrench};
 use nalgebra::{DVector, Vector3};
 

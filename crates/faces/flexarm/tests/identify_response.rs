@@ -6,7 +6,10 @@
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
-use flexarm::identify::{Answer, Identification, IdentifyRequest, Parameter, Plant, Probe, ResponseSlopes, identify_robot, structure_slopes, parameters, plant};
+use flexarm::identify::{
+    Answer, Identification, IdentifyRequest, Parameter, Plant, Probe, ResponseSlopes, identify_robot, parameters,
+    plant, structure_slopes,
+};
 use flexarm::{Modelling, Robot};
 use nalgebra::{Complex, Vector3};
 

@@ -7,8 +7,8 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use flexarm::{
-    AppliedLoad, Arm, DriveModel, Error, LinkModel, Modelling, Motion, PayloadChange, Robot, Run, RunOptions, Scenario,
-    Wrench,
+    AppliedLoad, Arm, DriveModel, Error, Keep, LinkModel, Modelling, Motion, PayloadChange, Robot, Run, RunOptions,
+    RunRequest, Sample, Scenario, Wrench,
 };
 use nalgebra::Vector3;
 
@@ -47,7 +47,10 @@ fn a_run_by_values_is_the_run_by_files() {
     let figures = timeless(run.summary.clone());
     for _ in 0..2 {
         // The second finds the arm in equilibrium where the first left it.
-        assert_eq!(timeless(arm.simulate_with(&motion, &options, RunRequest::keeping(Keep::Figures)).unwrap().summary), figures);
+        assert_eq!(
+            timeless(arm.simulate_with(&motion, &options, RunRequest::keeping(Keep::Figures)).unwrap().summary),
+            figures
+        );
     }
     assert_eq!(timeless(curves), figures);
 

@@ -263,9 +263,9 @@ fn an_arm_without_a_closed_form_is_searched_and_lands_on_the_grid() {
 #[test]
 fn what_cannot_be_mapped_is_refused_with_its_cause() {
     let robot = robot("kr210");
-    let error = |request: &MapRequest| match refused(&robot, request) {
-        Error::Map(error) => error,
-        other => panic!("{other}"),
+    let error = |request: &MapRequest| {
+        let error = refused(&robot, request);
+        error.external::<MapError>().unwrap_or_else(|| panic!("{error}")).clone()
     };
     assert!(matches!(error(&over(vec![joint("joint_9", [0.0, 1.0], 3)])), MapError::Joint { .. }));
     assert!(matches!(error(&over(vec![])), MapError::NoJoints));
@@ -288,7 +288,7 @@ fn what_cannot_be_mapped_is_refused_with_its_cause() {
     let stopped = map(&robot, &MapRequest::default(), &mut |_, _| ControlFlow::Break(())).unwrap_err();
     assert_eq!(stopped.fault(), Fault::Run);
     let planar = Robot::load(root().join("robots/palletiser")).unwrap();
-    assert!(matches!(refused(&planar, &MapRequest::default()), Error::Map(MapError::TooFewJoints { .. })));
+    assert!(matches!(refused(&planar, &MapRequest::default()).external(), Some(MapError::TooFewJoints { .. })));
 }
 
 fn end_mill() -> CuttingTool {
@@ -341,7 +341,7 @@ fn a_tool_that_cannot_be_judged_is_refused_before_the_map_is_taken() {
     };
     for (rpm, speed) in [(-1.0, true), (f64::NAN, true)] {
         let error = refused(&robot, &request(rpm));
-        assert_eq!(matches!(error, Error::Lobes(LobesError::Speed { .. })), speed, "{error}");
+        assert_eq!(matches!(error.external(), Some(LobesError::Speed { .. })), speed, "{error}");
     }
     // A feed along the tool, which points down there: no pose has a limit.
     let folder = std::env::temp_dir().join(format!("flexarm-map-tool-{}", std::process::id()));
@@ -354,7 +354,7 @@ fn a_tool_that_cannot_be_judged_is_refused_before_the_map_is_taken() {
     let tool = Some(CuttingTool::load(&path).unwrap().at_speeds(vec![8000.0]));
     let error = refused(&robot, &MapRequest { tool, region, ..MapRequest::default() });
     std::fs::remove_dir_all(&folder).unwrap();
-    assert!(matches!(&error, Error::Map(MapError::NothingToCompare { by }) if by == "depth_m"), "{error}");
+    assert!(matches!(error.external(), Some(MapError::NothingToCompare { by }) if by == "depth_m"), "{error}");
     assert!(error.to_string().contains("feed"), "{error}");
 }
 

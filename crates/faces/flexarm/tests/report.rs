@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use flexarm::{
-    DifferenceFigures, DriveModel, LinkModel, LoadOptions, Modelling, Motion, Outputs, ReportRun, Robot, RunOptions,
-    Summary, html, markdown,
+    DifferenceFigures, DriveModel, Keep, LinkModel, LoadOptions, Modelling, Motion, Outputs, ReportRun, Robot,
+    RunOptions, RunRequest, Summary, html, markdown,
 };
 use flexarm_log::Trace;
 

@@ -7,8 +7,8 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use flexarm::{
-    LoadOptions, Modelling, Motion, ReportRun, Robot, RunOptions, STEPPERS, StepRule, StepperOptions, Summary, Trace,
-    figure_groups, html, inspect, sensitivity::pose_sensitivity, statics,
+    Keep, LoadOptions, Modelling, Motion, ReportRun, Robot, RunOptions, RunRequest, STEPPERS, StepRule, StepperOptions,
+    Summary, Trace, figure_groups, html, inspect, sensitivity::pose_sensitivity, statics,
 };
 use serde_json::Value;
 

@@ -158,7 +158,7 @@ fn shards_that_are_missing_twice_there_or_of_another_study_are_told() {
         merge(&study(&place, &text).unwrap(), &folders, &place.join(output), false, None)
     };
     let missing = join(&["1", "3"], "a").unwrap_err();
-    assert!(matches!(&missing, Error::Sweep(SweepError::Missing { missing: 7, runs: 21, .. })), "{missing}");
+    assert!(matches!(missing.external(), Some(SweepError::Missing { missing: 7, runs: 21, .. })), "{missing}");
     assert!(missing.to_string().contains("shard 2/3 (all 7)"), "{missing}");
     assert!(!place.join("a/runs.parquet").exists());
     // The same shard twice counts once.
@@ -174,17 +174,17 @@ fn shards_that_are_missing_twice_there_or_of_another_study_are_told() {
     let request = SweepRequest { shard: Shard { number: 2, of: 3 }, ..request(place.join("other")) };
     study(&place, &other).unwrap().run(&request, &mut go_on).unwrap();
     let foreign = join(&["1", "2", "3", "other"], "c").unwrap_err();
-    assert!(matches!(&foreign, Error::Sweep(SweepError::ForeignShard { .. })), "{foreign}");
+    assert!(matches!(foreign.external(), Some(SweepError::ForeignShard { .. })), "{foreign}");
     assert!(foreign.to_string().contains("24 runs and 21"), "{foreign}");
     let into = study(&place, &text).unwrap().run(&request, &mut go_on).unwrap_err();
-    assert!(matches!(&into, Error::Sweep(SweepError::Foreign { .. })), "{into}");
+    assert!(matches!(into.external(), Some(SweepError::Foreign { .. })), "{into}");
     // A result that is not the same.
     let journal = place.join("copy/parts/2-of-3.journal");
     std::fs::write(&journal, "[1,null,[0.5,0.25]]\n").unwrap();
     let twice = join(&["1", "2", "3", "copy"], "d").unwrap_err();
-    assert!(matches!(&twice, Error::Sweep(SweepError::Twice { run: 1, .. })), "{twice}");
+    assert!(matches!(twice.external(), Some(SweepError::Twice { run: 1, .. })), "{twice}");
     let nothing = join(&["1", "nowhere"], "e").unwrap_err();
-    assert!(matches!(nothing, Error::Sweep(SweepError::NoStudy { .. })));
+    assert!(matches!(nothing.external(), Some(SweepError::NoStudy { .. })));
     std::fs::remove_dir_all(&place).unwrap();
 }
 
@@ -210,7 +210,7 @@ fn a_study_whose_points_were_drawn_differently_is_not_resumed() {
         }
         std::fs::write(&manifest, other.to_string()).unwrap();
         let refused = study(&place, &text).unwrap().run(&request, &mut go_on).unwrap_err();
-        assert!(matches!(&refused, Error::Sweep(SweepError::Foreign { .. })), "{refused}");
+        assert!(matches!(refused.external(), Some(SweepError::Foreign { .. })), "{refused}");
         assert!(refused.to_string().contains(said), "{refused}");
     }
     std::fs::remove_dir_all(&place).unwrap();
@@ -229,7 +229,8 @@ fn a_study_that_was_stopped_goes_on_and_runs_nothing_twice() {
         if done >= 5 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     let stopped = study(&place, &text).unwrap().run(&request(output.clone()), &mut stop).unwrap_err();
-    let Error::Sweep(SweepError::Stopped { done, runs: 21, .. }) = stopped else { panic!("{stopped}") };
+    let Some(SweepError::Stopped { done, runs: 21, .. }) = stopped.external() else { panic!("{stopped}") };
+    let done = *done;
     assert!((5..21).contains(&done), "{done}");
     // As if the program had been killed while it wrote a line: the part goes back into a journal that is cut.
     let part = DataTable::read(&output.join("parts/1-of-1-0.parquet")).unwrap();

@@ -28,7 +28,7 @@ pub(crate) struct ControllerAxisEntry {
 
 /// An axis of the controller: `joint = zero + sense axis + factor axis_other`.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct RobotAxis {
+pub struct RobotAxis {
     pub(crate) joint: String,
     pub(crate) sense: f64,
     pub(crate) zero: f64,

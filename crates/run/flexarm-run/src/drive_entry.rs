@@ -143,7 +143,7 @@ pub struct Drive {
     /// Spring of the gearbox.
     pub gearbox: Option<(Gearbox, GearDamping)>,
     /// Its play to each side (rad or m).
-    pub(crate) backlash: f64,
+    pub backlash: f64,
     /// Friction.
     pub friction: Friction,
     /// Its part of the transmitted torque.

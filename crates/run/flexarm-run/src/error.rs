@@ -176,7 +176,7 @@ pub enum Error {
     #[error(transparent)]
     Link(LinkError),
     /// An error of a study, or of another crate that builds on this one.
-    #[error("{0}")]
+    #[error(transparent)]
     External(Box<dyn ExternalError>),
 }
 
@@ -185,6 +185,12 @@ pub trait ExternalError: std::error::Error + Send + Sync + 'static {
     /// Returns whether the input or the run is to blame.
     fn fault(&self) -> Fault {
         Fault::Input
+    }
+}
+
+impl std::error::Error for Box<dyn ExternalError> {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        (**self).source()
     }
 }
 

@@ -293,8 +293,13 @@ impl FlexibleRobot {
         arm.with_servo(Servo { sample_s: self.sample_s(), axes, rigid: self.rigid.clone() })
     }
 
+    /// Returns the law of a motor that moves several joints, if there is one.
+    pub fn gear_coupling(&self) -> Option<&GearCoupling> {
+        self.gears.coupling.as_ref()
+    }
+
     /// An error with the links that lack inertia, if that is the reason.
-    pub(crate) fn explained(&self, source: StepError) -> Error {
+    pub fn explained(&self, source: StepError) -> Error {
         let light = match source {
             StepError::Singular { matrix: "mass matrix", .. } => self.without_inertia(),
             _ => Vec::new(),

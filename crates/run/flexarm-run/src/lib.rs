@@ -110,9 +110,9 @@ pub use check::{Finding, check, check_with_loads, check_with_motion};
 pub use convert::{ConvertOptions, ConvertSummary, convert, convert_until, parse_recording_format, read_run};
 pub use deflections::Variation;
 pub use drive_entry::{Drive, DriveKind};
-pub use error::{ExternalError, 
-    BalancerError, ChannelError, Error, Fault, LoadError, LoopError, ModellingError, PayloadError, PoseError,
-    RecordingError, StudyError, ValueError,
+pub use error::{
+    BalancerError, ChannelError, Error, ExternalError, Fault, LoadError, LoopError, ModellingError, PayloadError,
+    PoseError, RecordingError, StudyError, ValueError,
 };
 pub use flexible::{FlexibleRobot, LinkChoices, Owner, RobotLink};
 pub use gear_entry::{GearHysteresis, RobotCoupling};

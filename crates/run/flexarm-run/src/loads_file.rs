@@ -149,11 +149,7 @@ pub(crate) fn read_loads(path: &Path, duration: f64) -> Result<(Vec<AppliedLoad>
 }
 
 /// As [`read_loads`], of the text of the file.
-pub fn parse_loads(
-    text: &str,
-    path: &Path,
-    duration: f64,
-) -> Result<(Vec<AppliedLoad>, Vec<PayloadChange>), Error> {
+pub fn parse_loads(text: &str, path: &Path, duration: f64) -> Result<(Vec<AppliedLoad>, Vec<PayloadChange>), Error> {
     let source = Source::new(path, text, "loads");
     let file: LoadsFile = parsed(text, &source, OF_LOADS, |file: &LoadsFile| &file.format)?;
     let folder = path.parent().unwrap_or(Path::new("."));

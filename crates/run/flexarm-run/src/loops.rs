@@ -214,7 +214,7 @@ pub(crate) fn check_pose(model: &Model, data: &mut Data, q: &DVector<f64>) -> Re
 const TIMES: usize = 1000;
 
 /// What the loops do along a motion of the rigid robot.
-pub(crate) struct AlongMotion {
+pub struct AlongMotion {
     /// Smallest transmission angle of each loop (rad), and when (s).
     pub(crate) smallest: Vec<(f64, f64)>,
     /// Lowest and highest value of each dependent joint (rad or m).

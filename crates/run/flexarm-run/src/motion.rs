@@ -101,12 +101,7 @@ impl Motion {
     }
 
     /// As [`Motion::load_with`], with a text in the place of the one that the file has, if it is waypoints or a path of the tool.
-    pub(crate) fn load_text(
-        path: &Path,
-        text: Option<&str>,
-        robot: &Robot,
-        options: &MotionOptions,
-    ) -> Result<Self, Error> {
+    pub fn load_text(path: &Path, text: Option<&str>, robot: &Robot, options: &MotionOptions) -> Result<Self, Error> {
         let model = robot.rigid_model()?;
         let Robot { hold, controller, .. } = robot;
         Self::read(path, &Cell { model: &model, tcp_link: Some(&robot.tcp.0), hold, controller }, options, text)

@@ -334,7 +334,7 @@ impl Robot {
     }
 
     /// Whether that is the name of what the base stands on.
-    pub(crate) fn stands_on(&self, name: &str) -> bool {
+    pub fn stands_on(&self, name: &str) -> bool {
         self.mounting.as_ref().is_some_and(|mounting| mounting.name() == name)
     }
 

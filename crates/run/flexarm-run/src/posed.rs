@@ -21,21 +21,21 @@ use crate::robot::Robot;
 
 /// Flexible arm with its drives locked at a pose.
 pub struct Posed {
-    pub(crate) flexible: Arc<FlexibleRobot>,
-    pub(crate) arm: FlexibleArm,
-    pub(crate) tool: Frame,
+    pub flexible: Arc<FlexibleRobot>,
+    pub arm: FlexibleArm,
+    pub tool: Frame,
     /// Actuated joints, in coordinate order.
-    pub(crate) joints: Vec<String>,
+    pub joints: Vec<String>,
     /// Which of them slide.
-    pub(crate) prismatic: Vec<bool>,
+    pub prismatic: Vec<bool>,
     /// Where they are.
-    pub(crate) at: Vec<f64>,
+    pub at: Vec<f64>,
     /// [`Robot::caveats`], if they are known.
     of_robot: Option<Arc<[Caveat]>>,
 }
 
 /// A step error of a command that takes no step.
-pub(crate) fn failed(source: StepError) -> Error {
+pub fn failed(source: StepError) -> Error {
     Error::Step { source, partial: false }
 }
 
@@ -48,7 +48,7 @@ pub fn check_wrench(wrench: &[f64]) -> Result<(), ValueError> {
 
 impl Posed {
     /// `at`: all actuated joints (rad or m), zero without it.
-    pub(crate) fn new(robot: &Robot, modelling: &Modelling, at: Option<&[f64]>) -> Result<Self, Error> {
+    pub fn new(robot: &Robot, modelling: &Modelling, at: Option<&[f64]>) -> Result<Self, Error> {
         let model = robot.rigid_model()?;
         let names: Vec<&str> = model.coordinates().iter().map(|c| c.joint.as_str()).collect();
         let at = joint_values(at, &names)?;
@@ -56,12 +56,12 @@ impl Posed {
     }
 
     /// `at` in coordinate order (rad or m).
-    pub(crate) fn held(robot: &Robot, modelling: &Modelling, at: Vec<f64>) -> Result<Self, Error> {
+    pub fn held(robot: &Robot, modelling: &Modelling, at: Vec<f64>) -> Result<Self, Error> {
         Self::with(Arc::new(robot.modelled(modelling)?), at)
     }
 
     /// An arm, its links and drives in place already; `at`: all actuated joints (rad or m), zero without it.
-    pub(crate) fn on(arm: &Arm, at: Option<&[f64]>) -> Result<Self, Error> {
+    pub fn on(arm: &Arm, at: Option<&[f64]>) -> Result<Self, Error> {
         let flexible = arm.shared();
         let names: Vec<&str> = flexible.rigid.coordinates().iter().map(|c| c.joint.as_str()).collect();
         let at = joint_values(at, &names)?;
@@ -69,7 +69,7 @@ impl Posed {
     }
 
     /// A robot whose links and drives are in place; `at` in coordinate order (rad or m).
-    pub(crate) fn with(flexible: Arc<FlexibleRobot>, at: Vec<f64>) -> Result<Self, Error> {
+    pub fn with(flexible: Arc<FlexibleRobot>, at: Vec<f64>) -> Result<Self, Error> {
         loops::check_pose(&flexible.rigid, &mut Data::new(&flexible.rigid), &DVector::from_column_slice(&at))?;
         balancer::check_pose(&flexible.rigid, &mut Data::new(&flexible.rigid), &DVector::from_column_slice(&at))?;
         let model = flexible.model.clone();
@@ -81,14 +81,14 @@ impl Posed {
     }
 
     /// What is to be said of the robot and of the equilibrium that it is in, under a wrench on the tool (world axes).
-    pub(crate) fn told(&self, robot: &Robot, linear: &Linear, wrench: &[f64; 6]) -> Vec<Caveat> {
+    pub fn told(&self, robot: &Robot, linear: &Linear, wrench: &[f64; 6]) -> Vec<Caveat> {
         let mut caveats = told::of_model(robot, &self.flexible, self.of_robot.as_deref());
         caveats.extend(told::at_rest(robot, self, linear, wrench));
         once_each(caveats)
     }
 
     /// Whether the pose is within the joint ranges, and whether anything yields.
-    pub(crate) fn caveats(&self) -> Vec<Caveat> {
+    pub fn caveats(&self) -> Vec<Caveat> {
         let model = &self.arm.model;
         let mut caveats: Vec<Caveat> =
             validity::outside_limits(&model.coordinates()[..model.n_actuated()], &self.at).collect();
@@ -105,14 +105,14 @@ impl Posed {
     }
 
     /// The linear structure about the equilibrium under weight and a wrench at the TCP (world axes).
-    pub(crate) fn linear(&self, wrench: &Vector6<f64>) -> Result<Linear, Error> {
+    pub fn linear(&self, wrench: &Vector6<f64>) -> Result<Linear, Error> {
         let F = Wrench::new(wrench.fixed_rows::<3>(0).into(), wrench.fixed_rows::<3>(3).into());
         check_wrench(wrench.as_slice())?;
         linearise(&self.arm, &self.tool, &F, 0.0).map_err(|error| self.flexible.explained(error))
     }
 
     /// The equilibrium under weight and a wrench at the TCP (world axes), as maps take it.
-    pub(crate) fn operating_point(&self, wrench: &[f64; 6]) -> Result<OperatingPoint, Error> {
+    pub fn operating_point(&self, wrench: &[f64; 6]) -> Result<OperatingPoint, Error> {
         let [fx, fy, fz, tx, ty, tz] = *wrench;
         let mut at = OperatingPoint::new(self.arm.clone(), self.tool.clone());
         let F = Wrench::new([fx, fy, fz].into(), [tx, ty, tz].into());
@@ -121,14 +121,14 @@ impl Posed {
     }
 
     /// The tool with every elastic coordinate at zero.
-    pub(crate) fn rigid_tool(&self) -> Pose {
+    pub fn rigid_tool(&self) -> Pose {
         let (mut data, state) = self.undeformed();
         forward_kinematics(&self.arm.model, &mut data, &state.q);
         data.X_WF(&self.tool)
     }
 
     /// Whether the models hold at an equilibrium: deflections of links, forces of drives.
-    pub(crate) fn validity(&self, robot: &Robot, linear: &Linear) -> Vec<Caveat> {
+    pub fn validity(&self, robot: &Robot, linear: &Linear) -> Vec<Caveat> {
         let links = self.flexible.spans.iter().zip(strains(&self.flexible, &self.arm, &linear.q));
         let links = links.flat_map(|(span, (strain, rotation))| validity::link(&span.link, rotation, strain));
         let holding = linear.holding.as_slice();
@@ -145,7 +145,7 @@ impl Posed {
     }
 
     /// Joints at the pose, elastic coordinates zero.
-    pub(crate) fn undeformed(&self) -> (Data, State) {
+    pub fn undeformed(&self) -> (Data, State) {
         undeformed(&self.arm)
     }
 }
@@ -158,7 +158,7 @@ fn undeformed(arm: &FlexibleArm) -> (Data, State) {
 }
 
 /// Engineering strain of each flexible link, and how far its far end has turned (rad), with all coordinates at `q`.
-pub(crate) fn strains(flexible: &FlexibleRobot, arm: &FlexibleArm, q: &DVector<f64>) -> Vec<(f64, f64)> {
+pub fn strains(flexible: &FlexibleRobot, arm: &FlexibleArm, q: &DVector<f64>) -> Vec<(f64, f64)> {
     let model = &arm.model;
     let (mut data, straight) = undeformed(arm);
     let mut ends = |q: &DVector<f64>| -> Vec<Pose> {
@@ -193,7 +193,7 @@ impl Arm {
 }
 
 /// [`StepError`] of what a linear structure offers.
-pub(crate) fn step_error(source: StepError) -> Error {
+pub fn step_error(source: StepError) -> Error {
     failed(source)
 }
 
@@ -201,7 +201,7 @@ pub(crate) fn step_error(source: StepError) -> Error {
 ///
 /// # Errors
 /// [`Error::Pose`]: masses, lengths or joint values of 1e200 overflow on the way.
-pub(crate) fn all_finite<'a>(what: &str, values: impl IntoIterator<Item = &'a f64>) -> Result<(), Error> {
+pub fn all_finite<'a>(what: &str, values: impl IntoIterator<Item = &'a f64>) -> Result<(), Error> {
     match values.into_iter().all(|x| x.is_finite()) {
         true => Ok(()),
         false => Err(PoseError::Overflow { what: what.to_owned() }.into()),

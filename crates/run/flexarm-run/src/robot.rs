@@ -56,15 +56,15 @@ pub struct Robot {
     /// Flexible links.
     pub flexible: Vec<RobotLink>,
     /// What the base stands on, if it yields.
-    pub(crate) mounting: Option<RobotMounting>,
+    pub mounting: Option<RobotMounting>,
     /// Drives that the file tells about; all other joints are prescribed.
     pub drives: Vec<Drive>,
     /// Motors that move several joints.
     pub(crate) coupling: Option<RobotCoupling>,
     /// Link that carries the TCP and pose of the TCP in it.
-    pub(crate) tcp: (String, Pose),
+    pub tcp: (String, Pose),
     /// Link that was asked for as the tool in the place of the file's.
-    pub(crate) tcp_override: Option<String>,
+    pub tcp_override: Option<String>,
     /// Trajectory for runs without one.
     pub default_trajectory: Option<PathBuf>,
     /// Where joints stay that a motion does not name (rad or m).
@@ -72,7 +72,7 @@ pub struct Robot {
     /// Things worth telling.
     pub warnings: Vec<String>,
     /// Axes that its controller counts otherwise than the joints.
-    pub(crate) controller: Vec<RobotAxis>,
+    pub controller: Vec<RobotAxis>,
     /// What only the text of the file shows.
     written: Vec<Caveat>,
     /// The last tree of the rigid robot, with the mechanism that it is of.
@@ -169,7 +169,7 @@ impl Robot {
     }
 
     /// As [`Robot::from_toml`]; what the file names is read through the cache.
-    pub(crate) fn of_text(path: &Path, text: &str, options: &LoadOptions, files: &FileCache) -> Result<Self, Error> {
+    pub fn of_text(path: &Path, text: &str, options: &LoadOptions, files: &FileCache) -> Result<Self, Error> {
         Self::of_texts(path, text, None, options, files).map(|(robot, _)| robot)
     }
 
@@ -213,8 +213,23 @@ impl Robot {
         }
     }
 
+    /// Returns what the text of a robot file at `path` makes of a description that is read already, with its links and drives
+    /// modelled as the file says.
+    ///
+    /// # Errors
+    /// As [`Robot::load`].
+    pub fn with_description(
+        path: &Path,
+        text: &str,
+        urdf_path: PathBuf,
+        urdf: UrdfRobot,
+    ) -> Result<(Self, FlexibleRobot), Error> {
+        let (file, source) = parse_robot_file(text, path)?;
+        Self::of_file(path, urdf_path, urdf, &file, &source, &LoadOptions::default(), &FileCache::default())
+    }
+
     /// What a robot file makes of a description that was read for it.
-    pub(crate) fn of_file(
+    fn of_file(
         path: &Path,
         urdf_path: PathBuf,
         urdf: UrdfRobot,

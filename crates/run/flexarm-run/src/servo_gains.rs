@@ -69,11 +69,7 @@ impl FlexibleRobot {
     /// motion begins, so many times changed; about no change, per unit. None where they do not.
     ///
     /// * `step`: a change that is small.
-    pub fn gain_slopes(
-        &self,
-        step: f64,
-        at: impl Fn(f64) -> (Model, Model, DVector<f64>),
-    ) -> Vec<(usize, AxisSlope)> {
+    pub fn gain_slopes(&self, step: f64, at: impl Fn(f64) -> (Model, Model, DVector<f64>)) -> Vec<(usize, AxisSlope)> {
         let felt = |x: f64| {
             let (model, rigid, q) = at(x);
             self.inertias_felt(&model, &rigid, &q)

@@ -5,10 +5,10 @@ use std::path::PathBuf;
 
 use flexarm_log::{Recorder, RecordingFormat, Trace, TraceRow};
 
+use crate::arm::Run;
 use crate::error::{Error, StudyError};
 use crate::magnification::{Expected, fit_color_scale};
 use crate::options::{Outputs, RunOptions};
-use crate::arm::Run;
 use crate::record::{files_of_a_run, refuse_to_overwrite};
 use crate::robot::Robot;
 use crate::run::{Keep, Progress, RunRequest};

@@ -3,9 +3,11 @@
 use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 
-use super::slip::{self, Factor};
-use super::{Caveat, CaveatKind, kinds};
-use crate::lobes::CuttingTool;
+use flexarm_run::Caveat;
+use flexarm_run::caveat::slip::{self, Factor};
+use flexarm_run::caveat::{CaveatKind, kinds};
+
+use crate::CuttingTool;
 
 const DIAMETER: RangeInclusive<f64> = 1e-4..=0.5;
 const FREQUENCY: RangeInclusive<f64> = 20.0..=1e5;
@@ -17,7 +19,7 @@ const TOO_SOFT: &[Factor] = &[(1e-6, "N/um"), (1e-3, "N/mm")];
 const TOO_DAMPED: &[Factor] = &[(100.0, "per cent")];
 
 /// What of a tool is beyond what tools have.
-pub(crate) fn of_tool(tool: &CuttingTool) -> Vec<Caveat> {
+pub fn tool_caveats(tool: &CuttingTool) -> Vec<Caveat> {
     let name = format!("the tool {:?}", tool.name);
     let mut found = Vec::new();
     let mut check = |kind: &CaveatKind, whose: &str, value: f64, usual: &RangeInclusive<f64>, factors: &[Factor]| {

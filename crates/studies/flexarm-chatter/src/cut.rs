@@ -9,9 +9,7 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::milling::{
-    Cut, ForcedMotion, LimitOptions, RegenerativeCut, Simulated, leading_multiplier, limit_of_depth,
-};
+use crate::milling::{Cut, ForcedMotion, LimitOptions, RegenerativeCut, Simulated, leading_multiplier, limit_of_depth};
 use flexarm_files::check_free;
 use flexarm_kinematics::Wrench;
 use flexarm_stepping::TimedWrench;
@@ -20,16 +18,18 @@ use serde::Serialize;
 
 use super::place::Place;
 use super::tool_file::CuttingTool;
-use super::{LobesError, files};
+use super::{LobesError, caveats, files};
 use flexarm_run::AppliedLoad;
-use flexarm_run::caveat;
 use flexarm_run::Caveat;
 use flexarm_run::Error;
-use flexarm_run::Motion;
 use flexarm_run::Modelling;
-use flexarm_run::RunOptions;
+use flexarm_run::Motion;
 use flexarm_run::Robot;
+use flexarm_run::RunOptions;
+use flexarm_run::Sample;
 use flexarm_run::Scenario;
+use flexarm_run::caveat;
+use flexarm_run::{Keep, RunRequest};
 
 /// Tooth periods over which figures are taken.
 const LATE: usize = 60;
@@ -164,7 +164,7 @@ pub fn cut(robot: &Robot, tool: &CuttingTool, at: Option<&[f64]>, request: &CutR
     answer.limit_hz = limit.map(|limit| limit.chatter_hz);
     answer.curves = curves;
     answer.caveats = place.told(robot);
-    answer.caveats.extend(caveats::of_tool(tool));
+    answer.caveats.extend(caveats::tool_caveats(tool));
     answer.warnings = caveat::warnings(&answer.caveats);
     if let Some(paths) = paths {
         files::save_cut(&mut answer, paths)?;

@@ -1,11 +1,15 @@
 //! Chatter: the limits of depth of a cutting tool on the flexible arm, over the spindle speed, at a pose or along a motion.
 //!
 //! At each pose the arm is a linear structure about its equilibrium; the tool's own modes, or its measured response, are in series with it
-//! (`place.rs`). The limits are those of `flexarm-chatter`. Start at [`lobes`]. [`cut`] follows one cut over time, on the arm as it moves.
+//! (`place.rs`). The limits are those of [`milling`]. Start at [`lobes`]. [`cut`] follows one cut over time, on the arm as it moves.
+#![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
+mod caveats;
 mod cut;
 mod files;
 mod measured;
+pub mod milling;
 mod place;
 mod tool_file;
 
@@ -20,18 +24,19 @@ use flexarm_settings::Quantity;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use flexarm_run::caveat;
 use flexarm_run::Caveat;
-use flexarm_run::caveat::told;
 use flexarm_run::Error;
-use flexarm_run::ValueError;
-use flexarm_run::Motion;
 use flexarm_run::Modelling;
+use flexarm_run::Motion;
 use flexarm_run::Robot;
+use flexarm_run::ValueError;
+use flexarm_run::caveat;
+use flexarm_run::caveat::told;
 
+pub use crate::milling::{ChatterError, Simulated};
+pub use caveats::tool_caveats;
 pub use cut::{CutRequest, CutRun, cut};
 pub use files::rounded_down;
-pub use crate::milling::{ChatterError, Simulated};
 pub use tool_file::CuttingTool;
 
 use place::Place;
@@ -278,7 +283,7 @@ pub fn lobes(
     }
     answer.caveats.extend(places.iter().flat_map(|place| place.told(robot)));
     answer.caveats = caveat::once_each(std::mem::take(&mut answer.caveats));
-    answer.caveats.extend(caveats::of_tool(tool));
+    answer.caveats.extend(caveats::tool_caveats(tool));
     if tool.measured.is_some() && !request.zero_order {
         let message = "the tool has a measured response: the limits are those of the zero-order solution, which does not see period doubling";
         answer.caveats.push(Caveat::said(
@@ -356,7 +361,7 @@ fn check_deepest(depth_m: f64) -> Result<(), Error> {
 ///
 /// # Errors
 /// Those of [`lobes`] at a pose.
-pub(crate) fn lowest_limit(
+pub fn lowest_limit(
     robot: &Robot,
     modelling: &Modelling,
     tool: &CuttingTool,
@@ -365,7 +370,7 @@ pub(crate) fn lowest_limit(
 ) -> Result<f64, Error> {
     check_speeds(&tool.rpm)?;
     let place = match Place::at(robot, modelling, tool, Some(q)) {
-        Err(Error::Lobes(LobesError::FeedAlongAxis)) => return Ok(f64::NAN),
+        Err(error) if error.external() == Some(&LobesError::FeedAlongAxis) => return Ok(f64::NAN),
         other => other?,
     };
     let mut lowest = tool.deepest;

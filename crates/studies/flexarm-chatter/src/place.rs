@@ -13,12 +13,12 @@ use super::measured::MeasuredResponse;
 use super::tool_file::{CuttingTool, ToolDirection};
 use flexarm_run::Caveat;
 use flexarm_run::Error;
-use flexarm_run::Motion;
 use flexarm_run::Modelling;
-use flexarm_run::posed::Posed;
-use flexarm_run::response::pose_in_words;
+use flexarm_run::Motion;
 use flexarm_run::Robot;
 use flexarm_run::TCP_FRAME;
+use flexarm_run::posed::Posed;
+use flexarm_run::response::pose_in_words;
 
 /// Fewest places along a motion.
 const LEAST_PLACES: usize = 2;

@@ -119,12 +119,12 @@ struct MeasuredEntry {
 #[derive(Clone, Debug)]
 pub struct CuttingTool {
     /// Name of the file.
-    pub(crate) name: String,
+    pub name: String,
     pub(crate) cutter: Cutter,
     /// Spindle speeds, 1/min, ascending.
-    pub(crate) rpm: Vec<f64>,
+    pub rpm: Vec<f64>,
     /// Deepest cut that is looked at, m.
-    pub(crate) deepest: f64,
+    pub deepest: f64,
     /// From the spindle to the tip.
     pub(crate) axis: Direction,
     /// Along the feed.

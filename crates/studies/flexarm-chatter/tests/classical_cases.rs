@@ -7,7 +7,7 @@
 
 use std::f64::consts::TAU;
 
-use flexarm_chatter::{
+use flexarm_chatter::milling::{
     ChatterError, Coefficients, Cutter, Engagement, Kind, LimitOptions, Mode, Structure, limit_of_depth,
     zero_order_limit,
 };

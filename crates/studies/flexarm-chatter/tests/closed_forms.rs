@@ -8,7 +8,7 @@
 
 use std::f64::consts::{FRAC_PI_3, PI, TAU};
 
-use flexarm_chatter::{
+use flexarm_chatter::milling::{
     Coefficients, Cutter, Engagement, Kind, LimitOptions, Mode, Structure, leading_multiplier, limit_of_depth,
     unstable_ranges, zero_order_limit,
 };

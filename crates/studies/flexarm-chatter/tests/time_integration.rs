@@ -8,7 +8,7 @@
 
 use std::f64::consts::TAU;
 
-use flexarm_chatter::{
+use flexarm_chatter::milling::{
     Coefficients, Cut, Cutter, Engagement, LimitOptions, Structure, leading_multiplier, limit_of_depth, simulate,
 };
 use nalgebra::{DMatrix, DVector, Matrix3xX, Vector3};

@@ -1,7 +1,7 @@
 //! Why a motion cannot be compensated.
 
-use flexarm_run::ExternalError;
 use flexarm_analysis::{InversionError, LinearError, ShaperError};
+use flexarm_run::ExternalError;
 use flexarm_stepping::TargetError;
 
 /// Why a motion cannot be compensated.

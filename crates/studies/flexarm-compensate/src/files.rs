@@ -10,10 +10,10 @@ use flexarm_run::Arm;
 use flexarm_run::Caveat;
 use flexarm_run::Error;
 use flexarm_run::Motion;
-use flexarm_run::motion_report::check_motion_outputs;
-use flexarm_run::motion_report::motion_texts;
 use flexarm_run::Robot;
 use flexarm_run::Scenario;
+use flexarm_run::motion_report::check_motion_outputs;
+use flexarm_run::motion_report::motion_texts;
 
 /// A corrected program meets its targets within the digits that are written (m).
 const WRITTEN_WITHIN_M: f64 = 1e-6;

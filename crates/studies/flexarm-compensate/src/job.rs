@@ -15,10 +15,10 @@ use flexarm_run::AppliedLoad;
 use flexarm_run::Arm;
 use flexarm_run::Error;
 use flexarm_run::Motion;
-use flexarm_run::RunOptions;
+use flexarm_run::Scenario;
 use flexarm_run::prepare::loaded;
 use flexarm_run::robot::tcp_frame;
-use flexarm_run::Scenario;
+use flexarm_run::{RunOptions, RunRequest};
 
 /// Time between two nodes at which the arm is linearised (s).
 const NODE_S: f64 = 0.02;
@@ -435,7 +435,9 @@ pub(super) fn averaged(
             (0..pieces).fold(Wrench::zeros(), |sum, k| sum + wrench.at(at(k)) * (1.0 / f64::from(pieces)))
         }
     });
-    AppliedLoad { wrench: mean.in_axes(wrench.axes), ..load.clone() }
+    let mut averaged = load.clone();
+    averaged.wrench = mean.in_axes(wrench.axes);
+    averaged
 }
 
 pub(super) fn distances(error: &DMatrix<f64>) -> Vec<f64> {

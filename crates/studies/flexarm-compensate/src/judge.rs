@@ -7,13 +7,13 @@ use rayon::prelude::*;
 use super::job::{Job, Seen, distances};
 use super::{CompensateError, CompensateRequest, ErrorFigures, PlantFigures};
 use flexarm_run::Arm;
-use flexarm_run::Error;
-use flexarm_run::Motion;
 use flexarm_run::DriveModel;
+use flexarm_run::Error;
 use flexarm_run::LinkModel;
 use flexarm_run::Modelling;
-use flexarm_run::RunOptions;
+use flexarm_run::Motion;
 use flexarm_run::Robot;
+use flexarm_run::RunOptions;
 
 /// What a plant made of commands.
 pub(super) struct Judged {

@@ -3,6 +3,8 @@
 //! [`compensate_motion`]: the motion is run, the error of the tool is taken away through the arm linearised along the motion
 //! ([`Inversion`]), and the new motion is run again, a few times. At rest ([`Method::Static`]) each point is corrected to its
 //! equilibrium alone. [`static_targets`], [`Inversion`] and [`Shaper`] take and give values.
+#![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod caveats;
 mod error;
@@ -26,19 +28,19 @@ pub use flexarm_stepping::{StaticTargets, TargetError, static_targets};
 use flexarm_trajectory::Trajectory;
 use serde::Serialize;
 
+pub use error::CompensateError;
+use files::Files;
 use flexarm_run::Arm;
 use flexarm_run::Caveat;
-use flexarm_run::caveat::Use;
-use flexarm_run::caveat::once_each;
-use flexarm_run::caveat::warnings;
 use flexarm_run::Error;
 use flexarm_run::Motion;
 use flexarm_run::MotionViolation;
-use flexarm_run::RunOptions;
 use flexarm_run::Robot;
+use flexarm_run::RunOptions;
 use flexarm_run::Scenario;
-pub use error::CompensateError;
-use files::Files;
+use flexarm_run::caveat::Use;
+use flexarm_run::caveat::once_each;
+use flexarm_run::caveat::warnings;
 use job::Job;
 use judge::{Judge, sweep};
 pub use limits::LimitRule;

@@ -7,12 +7,12 @@ use flexarm_run::Arm;
 use flexarm_run::Caveat;
 use flexarm_run::Error;
 use flexarm_run::Motion;
-use flexarm_run::motion::limits as limits_of;
 use flexarm_run::MotionViolation;
-use flexarm_run::motion_report::of_effort;
-use flexarm_run::motion_report::of_limit;
 use flexarm_run::Robot;
 use flexarm_run::Scenario;
+use flexarm_run::motion::limits as limits_of;
+use flexarm_run::motion_report::of_effort;
+use flexarm_run::motion_report::of_limit;
 
 /// What is passed by less than this part of the limit more than by the motion itself is the motion's own.
 const SAME: f64 = 1e-3;

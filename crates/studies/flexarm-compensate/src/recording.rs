@@ -10,10 +10,10 @@ use nalgebra::Vector3;
 use super::{CompensateRequest, Compensation, Found};
 use flexarm_run::Arm;
 use flexarm_run::Error;
-use flexarm_run::magnification::Expected;
 use flexarm_run::RunOptions;
-use flexarm_run::{Keep, RunRequest};
 use flexarm_run::Scenario;
+use flexarm_run::magnification::Expected;
+use flexarm_run::{Keep, RunRequest};
 use flexarm_settings::written::markdown;
 
 /// Samples of the recording per second.
@@ -29,11 +29,7 @@ pub(super) fn record(
 ) -> Result<(), Error> {
     let options = flexarm_log::CreateOptions::default().with_overwrite(request.overwrite);
     let study = flexarm_log::RrdStudy::create(path, options, vec!["before".into(), "after".into()]);
-    let run = RunOptions {
-        log_rate_hz: RECORDED_HZ,
-        ignore_limits: true,
-        ..request.run.clone()
-    };
+    let run = RunOptions { log_rate_hz: RECORDED_HZ, ignore_limits: true, ..request.run.clone() };
     let wanted = Arc::new(Mutex::new(Vec::new()));
     let mut expected: Option<Expected> = None;
     for (number, motion) in [&found.scenario.motion, &found.motion].into_iter().enumerate() {

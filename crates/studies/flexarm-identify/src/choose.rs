@@ -8,8 +8,8 @@ use super::parameters::{self, Written};
 use flexarm_run::Arm;
 use flexarm_run::Error;
 use flexarm_run::Robot;
-use flexarm_run::TCP_FRAME;
 use flexarm_run::RobotFileError;
+use flexarm_run::TCP_FRAME;
 
 /// What the file or the request asks for, in the robot's order.
 pub(super) fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Result<Vec<parameters::Candidate>, Error> {

@@ -7,8 +7,8 @@ use super::answer::{Identification, rms};
 use super::encoders::EncoderFigures;
 use super::file::MeasurementInput;
 use flexarm_run::Caveat;
-use flexarm_run::caveat::kinds;
 use flexarm_run::Robot;
+use flexarm_run::caveat::kinds;
 
 /// Displacements so many times larger or smaller than the robot's are no guess of a stiffness.
 const LOAD_RATIO: f64 = 5.0;

@@ -1,10 +1,10 @@
 //! Gears from recorded positions of motors and links: torques of the rigid robot along the motion of its links, filters, the fit's
 //! reading.
 
-use flexarm_analysis::signal::LowPass;
 use crate::estimation::{
     CoupledOutput, GearEstimate, GearRun, Parameter, Reading, ReadingKind, coupled_gear_stiffness, gear_stiffness,
 };
+use flexarm_analysis::signal::LowPass;
 use flexarm_kinematics::{Data, Mechanism, Model, State, inverse_dynamics};
 use nalgebra::DVector;
 use serde::Serialize;

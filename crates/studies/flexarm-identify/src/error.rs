@@ -1,7 +1,7 @@
 //! Why measurements tell nothing.
 
-use flexarm_run::ExternalError;
 use crate::estimation::{FoundSlip, IdentifyError, Slip};
+use flexarm_run::ExternalError;
 
 use super::file::MeasurementInput;
 use flexarm_run::Error;

@@ -3,6 +3,8 @@
 //! [`identify_robot`] reads a file of measurements (`docs/identify.md`), finds what they tell of the robot file's numbers and says
 //! how well; [`plan_measurements`] chooses poses. What they are made of takes and gives values and is passed on here:
 //! [`identify`], [`plan`], [`MeasuredArm`].
+#![allow(non_snake_case, reason = "monogram notation: X_WT, J; see docs/references.md")]
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod answer;
 mod choose;
@@ -12,23 +14,17 @@ mod error;
 mod estimation;
 mod file;
 mod page;
-pub(crate) mod parameters;
+pub mod parameters;
 mod plan_file;
 mod response_file;
-pub(crate) mod rewrite;
+pub mod rewrite;
 mod uff;
 mod units;
 
 use std::path::{Path, PathBuf};
 
+pub use crate::estimation::*;
 use flexarm_files::{check_free, write_all};
-pub use crate::estimation::{
-    Answer, Candidate, Component, CoupledOutput, Effect, Form, Found, FoundSlip, GearEstimate, GearRun, HeldOut,
-    Identified, IdentifyError, IdentifyOptions, Instrument, LoadCase, Loss, MeasuredArm, MeasuredResponse,
-    MeasuredShape, Measurements, NoAnswer, Parameter, Place, Plan, PlanOptions, Plant, Probe, Reading, ReadingKind,
-    ResponseSlopes, Row, Search, Slip, Structure, StructureSlopes, Target, compliance_slopes, coupled_gear_stiffness,
-    frequency_slopes, gear_stiffness, identify, likely_slip, plan, structure_slopes, tool_slopes,
-};
 
 use self::answer::answer;
 use self::choose::{check_tool, chosen};
@@ -38,11 +34,11 @@ use self::file::{Cell, MeasurementInput};
 use self::parameters::Written;
 use self::units::{check_modes, check_units};
 use flexarm_run::Arm;
-use flexarm_run::caveat::Use;
-use flexarm_run::caveat::warnings;
 use flexarm_run::Error;
 use flexarm_run::Modelling;
 use flexarm_run::Robot;
+use flexarm_run::caveat::Use;
+use flexarm_run::caveat::warnings;
 
 pub use self::answer::{
     Compared, FittedParameter, FoundFrame, FoundPoint, HeldOutFigures, Identification, Residual, ResponseCurves,

@@ -14,18 +14,18 @@
 //! | `link.LINK.damping` | modal ratio, `stiffness_beta` (s), or a factor on `rayleigh` |
 //! | `payload.mass` | kg, at its centre of mass |
 
-use flexarm_flexlink::GearStiffness;
 use crate::estimation::{Effect, Parameter, Place, Plant};
+use flexarm_flexlink::GearStiffness;
 use flexarm_kinematics::SpatialInertia;
 use flexarm_stepping::Damping;
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
 use flexarm_run::FlexibleRobot;
 use flexarm_run::Owner;
+use flexarm_run::Robot;
 use flexarm_run::RobotLink;
 use flexarm_run::RobotMounting;
 use flexarm_run::robot::PAYLOAD_LINK;
-use flexarm_run::Robot;
 
 /// Key of what is only fitted if it is named: its directions together are the whole of a link's stiffness.
 const DIRECTIONS: &str = "stiffness_factors";
@@ -248,12 +248,12 @@ pub(crate) fn plant(flexible: &FlexibleRobot) -> Plant {
         model: flexible.model.clone(),
         springs: flexible.springs.clone(),
         tool: flexible.tcp.clone(),
-        coupling: flexible.gears.coupling.clone(),
+        coupling: flexible.gear_coupling().cloned(),
     }
 }
 
 /// Whether a pattern asks for a parameter to be fitted.
-pub(crate) fn asks_for(pattern: &str, name: &str) -> bool {
+pub fn asks_for(pattern: &str, name: &str) -> bool {
     let by_name = match name {
         _ if is_direction(name) => pattern.contains(DIRECTIONS),
         _ if is_entry(name) => pattern.contains("]["),
@@ -297,7 +297,7 @@ pub(crate) fn is_direction(name: &str) -> bool {
 }
 
 /// Whether a name, that of the mirrored entry, or that of all dampers of a gearbox, fits a pattern in which * stands for anything.
-pub(crate) fn fits(pattern: &str, name: &str) -> bool {
+pub fn fits(pattern: &str, name: &str) -> bool {
     matches(pattern, name)
         || mirrored(name).is_some_and(|name| matches(pattern, &name))
         || all_dampers(name).is_some_and(|name| matches(pattern, name))

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm_files::{NumberTable, check_free, write_all};
 use crate::estimation::{
     Candidate, Component, LoadCase, Parameter, Plan, PlanOptions, Plant, Reading, ReadingKind, Row, plan,
 };
+use flexarm_files::{NumberTable, check_free, write_all};
 use flexarm_kinematics::Wrench;
 use flexarm_settings::written::csv_field;
 use nalgebra::Vector3;
@@ -15,11 +15,11 @@ use super::parameters;
 use super::{IdentifyFileError, joints_of, plant};
 use flexarm_run::Arm;
 use flexarm_run::Caveat;
-use flexarm_run::caveat::Use;
-use flexarm_run::caveat::warnings;
 use flexarm_run::Error;
 use flexarm_run::Modelling;
 use flexarm_run::Robot;
+use flexarm_run::caveat::Use;
+use flexarm_run::caveat::warnings;
 
 /// Poses among which a plan chooses, unless they are given.
 const CANDIDATES: usize = 400;

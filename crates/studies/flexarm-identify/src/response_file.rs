@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use flexarm_files::NumberTable;
 use crate::estimation::{Answer, Form, MeasuredResponse, MeasuredShape, Probe, Reading, ReadingKind};
+use flexarm_files::NumberTable;
 use flexarm_kinematics::{Data, Frame, Pose, forward_kinematics};
 use nalgebra::{Complex, DVector, Rotation3, Translation3, Vector3};
 use serde::Deserialize;

@@ -254,7 +254,7 @@ fn replace(old: &mut Value, number: f64) {
 }
 
 /// Relative paths, which count from the folder of the file, from another folder.
-pub(crate) fn moved_paths(file: &mut DocumentMut, home: &Path, to: &Path) {
+pub fn moved_paths(file: &mut DocumentMut, home: &Path, to: &Path) {
     let moved = |text: &str| -> Option<String> {
         let path = Path::new(text);
         path.is_relative().then(|| relative(&home.join(path), to).display().to_string().replace('\\', "/"))

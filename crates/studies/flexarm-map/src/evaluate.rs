@@ -6,11 +6,11 @@ use flexarm_stepping::{Asked, OperatingPoint, PoseAnswer};
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
 use super::columns::{HEAD, Layout, MOST_FREQUENCIES};
-use flexarm_run::Error;
 use flexarm_chatter::{CuttingTool, lowest_limit};
+use flexarm_run::Error;
 use flexarm_run::Modelling;
-use flexarm_run::posed;
 use flexarm_run::Robot;
+use flexarm_run::posed;
 
 /// Where a pose is in the map.
 #[derive(Clone, Copy, Debug)]

@@ -4,8 +4,8 @@
 //! and the worst pose, and every pose as a row of a [`MapTable`].
 //!
 //! ```no_run
-//! use flexarm::Robot;
-//! use flexarm::map::{JointRange, MapRegion, MapRequest, map};
+//! use flexarm_run::Robot;
+//! use flexarm_map::{JointRange, MapRegion, MapRequest, map};
 //!
 //! let robot = Robot::load("robots/kr210")?;
 //! let joint = |joint: &str, range| JointRange { joint: joint.into(), range, points: 50 };
@@ -17,6 +17,8 @@
 //!
 //! At each pose the answers are those of [`flexarm_run::statics()`] and [`flexarm_run::modes()`], to the last bit. Drives are locked.
 //! Collisions are not looked for.
+#![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod columns;
 mod error;
@@ -55,21 +57,21 @@ use self::evaluate::{Cut, Evaluator};
 use self::finder::Finder;
 use self::region::{MOST_QUERIES, round_number};
 use self::take::{Choice, Places, PoseOf, Taken, take};
+use flexarm_chatter::{CuttingTool, LobesError, lowest_limit};
 use flexarm_run::Arm;
+use flexarm_run::Caveat;
+use flexarm_run::Error;
+use flexarm_run::Modelling;
+use flexarm_run::Robot;
+use flexarm_run::Scenario;
+use flexarm_run::ValueError;
+use flexarm_run::caveat;
+use flexarm_run::caveat::Use;
 use flexarm_run::caveat::motion::of_wrench;
 use flexarm_run::caveat::size::Size;
-use flexarm_run::caveat;
-use flexarm_run::Caveat;
-use flexarm_run::caveat::Use;
-use flexarm_run::Error;
-use flexarm_run::ValueError;
 use flexarm_run::inspect::joint_values;
-use flexarm_chatter::{CuttingTool, lowest_limit};
-use flexarm_run::Modelling;
 use flexarm_run::posed::check_wrench;
-use flexarm_run::Robot;
 use flexarm_run::robot::tcp_frame;
-use flexarm_run::Scenario;
 
 /// Poses that are tried to find out how far the arm reaches.
 const REACH_POSES: usize = 20_000;
@@ -243,7 +245,8 @@ pub fn map(
     let by = layout.compared_by(request.by.as_deref())?;
     let near = home(model, request.at.as_deref())?;
     if let Some(tool) = &request.tool
-        && let Err(error @ Error::Lobes(_)) = lowest_limit(robot, &request.modelling, tool, request.zero_order, &near)
+        && let Err(error) = lowest_limit(robot, &request.modelling, tool, request.zero_order, &near)
+        && error.external::<LobesError>().is_some()
     {
         // What is wrong with tool or robot is so everywhere.
         return Err(error);
@@ -268,7 +271,7 @@ pub fn map(
     let mut found = summed_up(robot, &arm, request, table, &taken, by, grid.as_ref(), rotations.len())?;
     found.caveats.extend(caveats);
     found.caveats.extend(one_place(&found));
-    found.caveats.extend(request.tool.iter().flat_map(flexarm_chatter::of_tool));
+    found.caveats.extend(request.tool.iter().flat_map(flexarm_chatter::tool_caveats));
     found.caveats.extend(caveat::validity::outside_limits(actuated, &near).filter(|_| request.at.is_some()));
     found.caveats.extend(validity(robot, request, &found));
     found.warnings = caveat::warnings(&found.caveats);

@@ -12,8 +12,8 @@ use super::region::MOST_PLACES;
 use super::{MapError, Region};
 use flexarm_run::Caveat;
 use flexarm_run::Error;
-use flexarm_run::inspect::joint_values;
 use flexarm_run::Robot;
+use flexarm_run::inspect::joint_values;
 use flexarm_run::robot_file::Source;
 use flexarm_run::toml_file::parsed;
 

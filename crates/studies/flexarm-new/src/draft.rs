@@ -17,10 +17,7 @@ use super::report::{Assumption, assumption};
 use super::sample::{self, Axis, SampleMotion};
 use super::{NewError, NewOptions, text};
 use flexarm_run::Error;
-use flexarm_run::file_cache::FileCache;
-use flexarm_run::LoadOptions;
 use flexarm_run::Robot;
-use flexarm_run::robot_file::parse_robot_file;
 
 /// A link of the arm: its section, or why it has none.
 #[derive(Clone, Debug)]
@@ -161,18 +158,8 @@ impl Draft {
     pub(crate) fn settle(&mut self, placed: &Placed, _options: &NewOptions) -> Result<(), Error> {
         let loads = |draft: &Self, beams: &[&DraftLink]| {
             let text = text::robot_file(draft, placed, beams);
-            let (file, source) = parse_robot_file(&text, &placed.robot_path)?;
-            let options = LoadOptions::default();
             let urdf_path = placed.robot_path.with_file_name(&placed.reference);
-            Robot::of_file(
-                &placed.robot_path,
-                urdf_path,
-                draft.urdf.clone(),
-                &file,
-                &source,
-                &options,
-                &FileCache::default(),
-            )
+            Robot::with_description(&placed.robot_path, &text, urdf_path, draft.urdf.clone())
         };
         loads(self, &[])?;
         for k in 0..self.links.len() {

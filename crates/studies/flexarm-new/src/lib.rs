@@ -1,17 +1,19 @@
 //! A robot file from a robot description: what can be found out is found out, what cannot is assumed and said, or asked.
 //!
 //! ```no_run
-//! use flexarm::{NewOptions, new_robot};
+//! use flexarm_new::{NewOptions, new_robot};
 //!
 //! let made = new_robot("ur10.urdf".as_ref(), "my_robot".as_ref(), false, &NewOptions::default())?;
 //! for assumption in &made.assumptions {
 //!     println!("{}: {}", assumption.about, assumption.text);
 //! }
-//! # Ok::<(), flexarm::Error>(())
+//! # Ok::<(), flexarm_run::Error>(())
 //! ```
 //!
 //! Start at [`new_robot`]. `docs/new_robot.md` has the rules and a whole run. Not here: reading the description
 //! (`flexarm-urdf`), what a robot file means ([`flexarm_run::Robot`]), the run that follows ([`flexarm_run::simulate`]).
+#![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod beams;
 mod chain;
@@ -32,8 +34,8 @@ use flexarm_urdf::ReadOptions;
 
 use flexarm_run::Error;
 use flexarm_run::Motion;
-use flexarm_run::motion_report::motion_report;
 use flexarm_run::Robot;
+use flexarm_run::motion_report::motion_report;
 
 pub use report::{Assumption, NewDrive, NewHeld, NewJoint, NewLink, NewPayload, NewRobot};
 

@@ -9,8 +9,8 @@ use super::Named;
 use flexarm_run::Arm;
 use flexarm_run::Caveat;
 use flexarm_run::Error;
-use flexarm_run::robot::PAYLOAD_LINK;
 use flexarm_run::Scenario;
+use flexarm_run::robot::PAYLOAD_LINK;
 
 /// Changes over which the gains that follow a mass (kg) or a joint (rad or m) are differenced: they are smooth, and nothing else is in it.
 const MASS_STEP: f64 = 0.02;
@@ -51,10 +51,8 @@ fn follow(arm: &Arm, named: &mut Named, start: &DVector<f64>) {
                 let Effect::Mass { body, per_kg } = &parameter.effect else { return };
                 let own = rigid_mass(&flexible.rigid);
                 flexible.gain_slopes(MASS_STEP, |kg| {
-                    let rigid = own.map_or_else(
-                        || (*flexible.rigid).clone(),
-                        |(k, own)| carrying(&flexible.rigid, k, &own, kg),
-                    );
+                    let rigid = own
+                        .map_or_else(|| (*flexible.rigid).clone(), |(k, own)| carrying(&flexible.rigid, k, &own, kg));
                     (carrying(&flexible.model, *body, per_kg, kg), rigid, start.clone())
                 })
             }

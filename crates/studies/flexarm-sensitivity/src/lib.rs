@@ -1,6 +1,8 @@
 //! How the tool's error along a motion depends on every number of the robot: derivatives of the whole run, exact, for all of them at once.
 //!
 //! Start at [`sensitivity`], or at [`error_slopes`] for numbers alone; [`pose_sensitivity`] answers for a pose.
+#![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod controllers;
 mod pose;
@@ -15,19 +17,21 @@ use flexarm_stepping::{SlopesRequest, StepError, StepperKind};
 use nalgebra::Vector3;
 use serde::Serialize;
 
+use flexarm_identify::parameters::{asks_for, fits};
 use flexarm_run::Arm;
 use flexarm_run::Caveat;
+use flexarm_run::Error;
+use flexarm_run::Robot;
+use flexarm_run::RunOptions;
+use flexarm_run::Scenario;
+use flexarm_run::ValueError;
 use flexarm_run::caveat::Use;
 use flexarm_run::caveat::once_each;
 use flexarm_run::caveat::warnings;
-use flexarm_run::Error;
-use flexarm_run::ValueError;
-use flexarm_identify::parameters::{asks_for, fits};
-use flexarm_run::RunOptions;
 use flexarm_run::prepare::loaded;
 use flexarm_run::prepare::runnable;
-use flexarm_run::Robot;
-use flexarm_run::Scenario;
+
+use controllers::{add_controllers, limited};
 
 pub use pose::{PoseParameter, PoseSensitivity, pose_sensitivity};
 

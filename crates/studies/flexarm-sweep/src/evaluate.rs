@@ -16,17 +16,14 @@ use super::value::ParameterValue;
 use super::workshop::Ready;
 use flexarm_run::Caveat;
 use flexarm_run::Error;
-use flexarm_run::RunOptions;
+use flexarm_run::balancer;
+use flexarm_run::loops;
 use flexarm_run::prepare::loaded;
 use flexarm_run::prepare::runnable;
 use flexarm_run::run::BeforeRun;
-use flexarm_run::run::Together;
-use flexarm_run::run::Wanted;
-use flexarm_run::run::run_traced;
 use flexarm_run::run::static_sag;
 use flexarm_run::run::steps_per_sample;
-use flexarm_run::balancer;
-use flexarm_run::loops;
+use flexarm_run::{Keep, RunOptions, RunRequest};
 
 /// What a run gave.
 #[derive(Clone, Debug, PartialEq)]
@@ -220,8 +217,13 @@ impl Sweep {
             mass_kg: built.mass_kg,
             ..QuickFacts::default()
         };
-        let before =
-            BeforeRun { robot: built.arm.robot(), flexible: &flexible, arm: &arm, motion: &scenario.motion, options: &options };
+        let before = BeforeRun {
+            robot: built.arm.robot(),
+            flexible: &flexible,
+            arm: &arm,
+            motion: &scenario.motion,
+            options: &options,
+        };
         caveats.extend(before.caveats_of_study(facts.sag_m));
         caveats.extend(of_loads);
         let run = BatchRun { arm, duration_s: scenario.duration_s() };

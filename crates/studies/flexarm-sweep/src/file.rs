@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use flexarm_files::read_text;
 use crate::statistics::{Distribution, SampleMethod};
+use flexarm_files::read_text;
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 

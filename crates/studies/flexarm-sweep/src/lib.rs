@@ -4,8 +4,10 @@
 //! folder or in a shard of it, [`merge`] joins folders of shards, [`Sweep::minimise`] looks for the least of a metric. Runs have numbers
 //! from 0; a number alone says what a run is, on any machine.
 //!
-//! Not here: points of designs and what results tell as mathematics (`flexarm-study`); a few runs with their curves over each other
+//! Not here: points of designs and what results tell as mathematics ([`statistics`]); a few runs with their curves over each other
 //! ([`flexarm_run::compare_study`]).
+#![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod design;
 mod direction;
@@ -21,6 +23,7 @@ mod ranking;
 mod recent;
 mod replay;
 mod results;
+pub mod statistics;
 mod store;
 mod table;
 mod target;
@@ -45,13 +48,13 @@ use self::store::{Collected, Manifest, RUNS, Store, known_manifest};
 use self::workshop::Workshop;
 use flexarm_run::Error;
 use flexarm_run::FlexibleRobot;
+use flexarm_run::LinkFigures;
 use flexarm_run::PathFigures;
 use flexarm_run::Robot;
 use flexarm_run::RobotFileError;
-use flexarm_run::summary::DriveFigures;
-use flexarm_run::LinkFigures;
 use flexarm_run::Summary;
 use flexarm_run::TcpFigures;
+use flexarm_run::summary::DriveFigures;
 
 pub use self::direction::Better;
 pub use self::error::SweepError;

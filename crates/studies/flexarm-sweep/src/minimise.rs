@@ -13,8 +13,8 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Instant;
 
-use flexarm_log::CreateOptions;
 use crate::statistics::{Judged, LeastSearch};
+use flexarm_log::CreateOptions;
 use serde::{Deserialize, Serialize};
 
 use super::direction::Better;

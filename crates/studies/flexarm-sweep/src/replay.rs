@@ -8,8 +8,8 @@ use toml_edit::{DocumentMut, Item, Value};
 use super::Sweep;
 use super::value::ParameterValue;
 use super::workshop::RunFiles;
-use flexarm_run::Error;
 use flexarm_identify::rewrite::moved_paths;
+use flexarm_run::Error;
 use flexarm_run::Motion;
 use flexarm_run::MotionOptions;
 

@@ -18,24 +18,24 @@ use super::recent::Recent;
 use super::target::{Edit, Target, Which, edits};
 use super::value::ParameterValue;
 use super::{Finders, fingerprint};
+use flexarm_run::Arm;
 use flexarm_run::Caveat;
 use flexarm_run::Error;
-use flexarm_run::file_cache::FileCache;
 use flexarm_run::FlexibleRobot;
-use flexarm_run::loads_file::parse_loads;
+use flexarm_run::LoadOptions;
+use flexarm_run::Modelling;
 use flexarm_run::Motion;
 use flexarm_run::MotionOptions;
-use flexarm_run::Modelling;
+use flexarm_run::Robot;
+use flexarm_run::RobotFileError;
 use flexarm_run::RunOptions;
-use flexarm_run::Arm;
+use flexarm_run::Scenario;
+use flexarm_run::file_cache::FileCache;
+use flexarm_run::loads_file::parse_loads;
 use flexarm_run::reduce::ReduceJob;
 use flexarm_run::reduce::ReduceOptions;
 use flexarm_run::reduce::ReduceOutputs;
 use flexarm_run::reduce::reduce;
-use flexarm_run::LoadOptions;
-use flexarm_run::Robot;
-use flexarm_run::RobotFileError;
-use flexarm_run::Scenario;
 
 /// Keys of a robot file that a motion of joints does not depend on.
 const NOT_OF_THE_MOTION: [&str; 7] =

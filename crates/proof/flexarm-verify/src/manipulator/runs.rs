@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use flexarm::{Modelling, Motion, Robot, RunOptions, Scenario, StepperKind, Summary, Trace, simulate_traced};
+use flexarm::{Keep, Modelling, Motion, Robot, RunOptions, RunRequest, Scenario, StepperKind, Summary, Trace};
 use nalgebra::Vector3;
 
 use crate::Error;
@@ -142,7 +142,8 @@ impl<'a, 'p> Runs<'a, 'p> {
             Err(_) => ControlFlow::Break(()),
         };
         let request = RunRequest { progress: Some(&mut progress), ..RunRequest::keeping(Keep::Curves) };
-        let Run { summary, trace, .. } = robot.flexible(options.modelling)?.simulate_with(scenario, &options, request)?;
+        let flexarm::Run { summary, trace, .. } =
+            robot.flexible(options.modelling)?.simulate_with(scenario, &options, request)?;
         self.done += weight;
         Ok(Run::new(summary, &trace))
     }

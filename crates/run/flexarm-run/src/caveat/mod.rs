@@ -18,10 +18,10 @@ pub mod motion;
 pub(crate) mod parts;
 pub(crate) mod pose;
 pub mod size;
-pub(crate) mod slip;
+pub mod slip;
 pub(crate) mod stiffness;
 pub mod told;
-pub(crate) mod validity;
+pub mod validity;
 
 pub use flexarm_settings::caveat::{Caveat, Severity};
 pub use flexarm_settings::caveat::{CaveatKind, once_each, warnings};

@@ -93,7 +93,7 @@ pub(crate) fn of_loads(loads: &[Load], duration: f64, size: &Size) -> Vec<Caveat
 }
 
 /// A constant wrench on the tool, against weight and size of the arm with its payload.
-pub(crate) fn of_wrench(wrench: &[f64; 6], size: &Size) -> Vec<Caveat> {
+pub fn of_wrench(wrench: &[f64; 6], size: &Size) -> Vec<Caveat> {
     let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
     heavy(norm(&wrench[..3]), norm(&wrench[3..]), size)
 }

@@ -9,7 +9,7 @@ use nalgebra::DVector;
 const POSES: u32 = 32;
 
 /// Size of a robot, without its payload and tool.
-pub(crate) struct Size {
+pub struct Size {
     /// Distance from the base along the chain, per link (m).
     distances: HashMap<String, f64>,
     /// How far its mass reaches from the base: joint distances, mass centres and radii of gyration (m).
@@ -19,7 +19,7 @@ pub(crate) struct Size {
 }
 
 impl Size {
-    pub(crate) fn of(mechanism: &Mechanism) -> Self {
+    pub fn of(mechanism: &Mechanism) -> Self {
         let mut distances = HashMap::new();
         let children: Vec<&str> = mechanism.joints.iter().map(|j| j.child.as_str()).collect();
         let base = mechanism.links.iter().find(|l| !children.contains(&l.name.as_str()));
@@ -102,7 +102,7 @@ pub(crate) fn middle(lower: f64, upper: f64) -> f64 {
 }
 
 /// Entry of Halton's sequence in the base that belongs to a coordinate, between 0 and 1.
-pub(crate) fn halton(mut index: u32, coordinate: usize) -> f64 {
+pub fn halton(mut index: u32, coordinate: usize) -> f64 {
     const PRIMES: [u32; 8] = [2, 3, 5, 7, 11, 13, 17, 19];
     let base = PRIMES[coordinate % PRIMES.len()];
     let (mut value, mut fraction) = (0.0, 1.0);

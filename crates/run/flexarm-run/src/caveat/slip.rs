@@ -3,33 +3,33 @@
 use std::ops::RangeInclusive;
 
 /// A factor by which a number is too large (below 1: too small), and the slip that makes it so.
-pub(crate) type Factor = (f64, &'static str);
+pub type Factor = (f64, &'static str);
 
 /// Degrees for radians.
-pub(crate) const DEGREES: f64 = 180.0 / std::f64::consts::PI;
+pub const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
 /// Lengths in m.
-pub(crate) const LENGTH: &[Factor] = &[(1e3, "millimetres"), (1e2, "centimetres"), (1.0 / 0.0254, "inches")];
+pub const LENGTH: &[Factor] = &[(1e3, "millimetres"), (1e2, "centimetres"), (1.0 / 0.0254, "inches")];
 /// Angles in rad.
-pub(crate) const ANGLE: &[Factor] = &[(DEGREES, "degrees"), (60.0 * DEGREES, "arc minutes")];
+pub const ANGLE: &[Factor] = &[(DEGREES, "degrees"), (60.0 * DEGREES, "arc minutes")];
 /// Masses in kg.
-pub(crate) const MASS: &[Factor] = &[(1e3, "grams"), (1e-3, "tonnes")];
+pub const MASS: &[Factor] = &[(1e3, "grams"), (1e-3, "tonnes")];
 /// Densities in kg/m³.
-pub(crate) const DENSITY: &[Factor] = &[(1e-3, "g/cm3"), (1e-12, "t/mm3"), (1e-9, "kg/mm3")];
+pub const DENSITY: &[Factor] = &[(1e-3, "g/cm3"), (1e-12, "t/mm3"), (1e-9, "kg/mm3")];
 /// Moduli in Pa.
-pub(crate) const MODULUS: &[Factor] = &[(1e-6, "MPa"), (1e-9, "GPa")];
+pub const MODULUS: &[Factor] = &[(1e-6, "MPa"), (1e-9, "GPa")];
 /// Torques in N m, forces in N.
-pub(crate) const EFFORT: &[Factor] = &[(1e3, "N mm or mN"), (1e-3, "kN m or kN")];
+pub const EFFORT: &[Factor] = &[(1e3, "N mm or mN"), (1e-3, "kN m or kN")];
 /// Rotational stiffness in N m/rad.
-pub(crate) const TURNING: &[Factor] =
+pub const TURNING: &[Factor] =
     &[(1.0 / DEGREES, "N m/deg"), (1e-3, "kN m/rad"), (1.0 / (60.0 * DEGREES), "N m/arcmin"), (1e3, "N mm/rad")];
 /// Moments of inertia in kg m².
-pub(crate) const INERTIA: &[Factor] = &[(1e4, "kg cm2"), (1e6, "kg mm2"), (1e9, "g mm2"), (1e7, "g cm2")];
+pub const INERTIA: &[Factor] = &[(1e4, "kg cm2"), (1e6, "kg mm2"), (1e9, "g mm2"), (1e7, "g cm2")];
 
 /// The first slip without which the value would lie in the range; empty if there is none.
 ///
 /// `power`: with which power of the number the value goes, such as 0.5 for a radius of gyration and its inertia.
-pub(crate) fn slip(value: f64, plausible: &RangeInclusive<f64>, factors: &[Factor], power: f64) -> String {
+pub fn slip(value: f64, plausible: &RangeInclusive<f64>, factors: &[Factor], power: f64) -> String {
     let mends = |(factor, _): &&Factor| plausible.contains(&(value / factor.powf(power)));
     factors.iter().find(mends).map(|(factor, words)| told(*factor, words)).unwrap_or_default()
 }

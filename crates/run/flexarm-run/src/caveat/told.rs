@@ -30,12 +30,7 @@ pub enum Use<'a> {
 /// All caveats about a robot as it is modelled and about what a command does with it, each once.
 ///
 /// * `of_robot`: [`Robot::caveats`], if they are known.
-pub fn told(
-    robot: &Robot,
-    flexible: &Arc<FlexibleRobot>,
-    of_robot: Option<&[Caveat]>,
-    used: Use<'_>,
-) -> Vec<Caveat> {
+pub fn told(robot: &Robot, flexible: &Arc<FlexibleRobot>, of_robot: Option<&[Caveat]>, used: Use<'_>) -> Vec<Caveat> {
     let mut caveats = of_model(robot, flexible, of_robot);
     let (pose, wrench) = match used {
         Use::Held(at, wrench) => (Ok(at.to_vec()), *wrench),
@@ -73,7 +68,7 @@ pub(crate) fn of_model(robot: &Robot, flexible: &FlexibleRobot, of_robot: Option
 }
 
 /// Of a motion on a robot.
-pub(crate) fn of_motion(motion: &Motion, rigid: &Model) -> Vec<Caveat> {
+pub fn of_motion(motion: &Motion, rigid: &Model) -> Vec<Caveat> {
     let mut caveats = motion.caveats();
     let passed = |v: &LimitViolation| Caveat::said("joint-limit", &v.joint, format!("joint limit: {v}"), "");
     caveats.extend(motion.violations.iter().map(passed));

@@ -60,7 +60,7 @@ fn like_degrees(c: &Coordinate, q: f64) -> bool {
 }
 
 /// Joints outside their range at a pose, and joints without a range at many turns.
-pub(crate) fn outside_limits<'a>(coordinates: &'a [Coordinate], q: &'a [f64]) -> impl Iterator<Item = Caveat> + 'a {
+pub fn outside_limits<'a>(coordinates: &'a [Coordinate], q: &'a [f64]) -> impl Iterator<Item = Caveat> + 'a {
     coordinates.iter().zip(q).filter_map(|(c, q)| {
         let (lower, upper) = (c.limits.lower, c.limits.upper);
         let joint = format!("joint {:?}", c.joint);

@@ -18,11 +18,16 @@ const RIPPLE_STEPS: f64 = 12.0;
 
 /// A run that is ready to go.
 pub struct BeforeRun<'a> {
-    pub(crate) robot: &'a Robot,
-    pub(crate) flexible: &'a FlexibleRobot,
-    pub(crate) arm: &'a FlexibleArm,
-    pub(crate) motion: &'a Motion,
-    pub(crate) options: &'a RunOptions,
+    /// As described.
+    pub robot: &'a Robot,
+    /// With links and drives modelled.
+    pub flexible: &'a FlexibleRobot,
+    /// At the start, with its loads.
+    pub arm: &'a FlexibleArm,
+    /// The motion.
+    pub motion: &'a Motion,
+    /// Steps and stepper.
+    pub options: &'a RunOptions,
 }
 
 impl BeforeRun<'_> {

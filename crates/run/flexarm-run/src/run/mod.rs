@@ -15,7 +15,9 @@ use std::time::Instant;
 
 use flexarm_analysis::{LongRecord, MetricSettings, PathFrame};
 use flexarm_kinematics::Frame;
-use flexarm_log::{Attachment, BendInfo, Columns, Event, EventKind, Recorder, RecorderSet, RunHeader, RunResult, Sample, Trace};
+use flexarm_log::{
+    Attachment, BendInfo, Columns, Event, EventKind, Recorder, RecorderSet, RunHeader, RunResult, Sample, Trace,
+};
 use flexarm_stepping::{FlexibleArm, Observation, Stepper};
 
 use crate::arm::{Arm, Run};

@@ -55,18 +55,19 @@ pub struct ToolPath {
 /// What is known of the robot beside its model.
 #[derive(Clone, Copy)]
 pub struct Cell<'a> {
-    pub(crate) model: &'a Model,
+    /// Rigid robot.
+    pub model: &'a Model,
     /// Link that carries the tool centre point.
-    pub(crate) tcp_link: Option<&'a str>,
+    pub tcp_link: Option<&'a str>,
     /// Joints that stay, and where.
-    pub(crate) hold: &'a [(String, f64)],
+    pub hold: &'a [(String, f64)],
     /// Axes that the controller counts otherwise than the joints.
-    pub(crate) controller: &'a [RobotAxis],
+    pub controller: &'a [RobotAxis],
 }
 
 /// What was taken of the robot for want of better knowledge, as sentences.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Assumed {
+pub struct Assumed {
     /// Where tools stand; of no account where a path has none of its own.
     pub(crate) flange: Option<String>,
     pub(crate) accelerations: Option<String>,
@@ -126,7 +127,7 @@ impl<'a> Cell<'a> {
     }
 
     /// How the controller counts these axes; empty where it counts the joints.
-    pub(crate) fn controller_axes(&self, axes: &[usize]) -> Vec<ControllerAxis> {
+    pub fn controller_axes(&self, axes: &[usize]) -> Vec<ControllerAxis> {
         let place = |joint: &str| axes.iter().position(|&k| self.model.coordinates()[k].joint == joint);
         let axis = |&k: &usize| {
             let told = self.controller.iter().find(|axis| axis.joint == self.model.coordinates()[k].joint);
@@ -140,7 +141,7 @@ impl<'a> Cell<'a> {
     }
 
     /// The arm as the program's controller sees it.
-    pub(crate) fn arm(&self, overrides: &Overrides) -> (ProgramArm<'a>, Assumed) {
+    pub fn arm(&self, overrides: &Overrides) -> (ProgramArm<'a>, Assumed) {
         let (flange, X_FT, flange_note) = self.flange();
         let mut assumed = false;
         let of = |list: &[Option<f64>], k: usize| list.get(k).copied().flatten();

@@ -6,7 +6,7 @@
 //! mean force alone [Altintas & Budak 1995], and [`simulate`] cuts step by step, with teeth that leave the work.
 //!
 //! ```
-//! use flexarm_chatter::{Coefficients, Cutter, Engagement, LimitOptions, Mode, Structure, limit_of_depth};
+//! use flexarm_chatter::milling::{Coefficients, Cutter, Engagement, LimitOptions, Mode, Structure, limit_of_depth};
 //! use nalgebra::Vector3;
 //! use std::f64::consts::TAU;
 //!
@@ -16,7 +16,7 @@
 //! let cutter = Cutter::straight(2, aluminium, Engagement::slot());
 //! let limit = limit_of_depth(&structure, &cutter, TAU * 5000.0 / 60.0, &LimitOptions::to(0.012))?.expect("it chatters");
 //! assert!((1e3 * limit.depth - 0.4086).abs() < 5e-4); // mm
-//! # Ok::<(), flexarm_chatter::ChatterError>(())
+//! # Ok::<(), flexarm_chatter::milling::ChatterError>(())
 //! ```
 //!
 //! Not here: robots, poses, tools by name, files and units (the facade).

@@ -12,7 +12,9 @@ use nalgebra::{DMatrix, DVector, Matrix3xX, Rotation3, Translation3, Vector3};
 
 use crate::estimation::least_squares::Residuals;
 use crate::estimation::parameter::{Effect, Parameter, Plant, carried_along, tool_shift};
-use crate::estimation::reading::{Component, LoadCase, MeasuredResponse, MeasuredShape, Measurements, Reading, ReadingKind, Row};
+use crate::estimation::reading::{
+    Component, LoadCase, MeasuredResponse, MeasuredShape, Measurements, Reading, ReadingKind, Row,
+};
 use crate::estimation::response::structure_slopes;
 use crate::estimation::sensitivity::{frequency_slopes, tool_slopes};
 

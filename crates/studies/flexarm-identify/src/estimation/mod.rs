@@ -6,8 +6,6 @@
 //! form ([`tool_slopes`], [`compliance_slopes`], [`frequency_slopes`], [`structure_slopes`], and [`error_slopes`] along a motion).
 //!
 //! Not here: files, units, robots by name (the facade).
-#![allow(non_snake_case, reason = "monogram notation: X_WT, J; see docs/references.md")]
-#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod coupled_gears;
 mod encoders;

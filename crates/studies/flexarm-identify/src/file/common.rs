@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::PathBuf;
 
-use flexarm_files::NumberTable;
 use crate::estimation::LoadCase;
+use flexarm_files::NumberTable;
 use flexarm_kinematics::{SpatialInertia, Wrench};
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;

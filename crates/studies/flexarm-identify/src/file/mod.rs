@@ -11,8 +11,8 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
-use flexarm_files::read_text;
 use crate::estimation::{Loss, Measurements};
+use flexarm_files::read_text;
 use serde::Deserialize;
 use toml::Spanned;
 

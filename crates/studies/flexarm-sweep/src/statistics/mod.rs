@@ -5,7 +5,7 @@
 //! and [`pareto_front`] say what matters; [`LeastSearch`] goes for the least of one of them within bounds.
 //!
 //! ```
-//! use flexarm_study::{Distribution, Sample, SampleMethod, sobol_indices};
+//! use flexarm_sweep::statistics::{Distribution, Sample, SampleMethod, sobol_indices};
 //!
 //! // Which of two springs in series makes more of the scatter of their compliance?
 //! let stiffness = [Distribution::Normal { mean: 1e6, std: 1e5 }, Distribution::Normal { mean: 2e6, std: 1e5 }];
