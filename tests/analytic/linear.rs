@@ -3,7 +3,6 @@
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
 use std::f64::consts::TAU;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

@@ -3,7 +3,6 @@
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
 use std::collections::HashMap;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use flexarm::{

@@ -7,7 +7,7 @@ use clap::Args;
 use flexarm::new::NewLink;
 use flexarm::written::visible;
 use flexarm::{
-    Keep, LoadOptions, Motion, NewOptions, NewRobot, Outputs, ReadOptions, Robot, RunOptions, RunRequest, Scenario,
+    Keep, LoadOptions, Motion, NewOptions, NewRobot, Outputs, ReadOptions, Robot, RunOptions, RunRequest,
     Summary, gathered,
 };
 

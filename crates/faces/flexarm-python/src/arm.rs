@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::{Mutex, OnceLock, PoisonError};
 
-use flexarm::{Arm, Error, OperatingPoint, Outputs, RecordingFormat, RunOptions, Scenario};
+use flexarm::{Arm, Error, OperatingPoint, Outputs, RecordingFormat, RunOptions, RunRequest, Scenario};
 use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};

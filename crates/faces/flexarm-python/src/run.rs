@@ -34,7 +34,7 @@ pub(crate) struct PyRun {
 
 impl PyRun {
     pub(crate) fn new(run: Run) -> Self {
-        let Run { summary, columns } = run;
+        let Run { summary, columns, .. } = run;
         let peak =
             summary.tcp.as_ref().map_or_else(String::new, |tcp| format!(", TCP error {:.4} mm", 1e3 * tcp.peak_m));
         let (robot, trajectory, duration) = (&summary.robot, &summary.trajectory, summary.duration_s);

@@ -3,7 +3,6 @@
 //! `cargo run -p flexarm --example study_report -- study.html`: three curves in one plot, figures side by side.
 
 use std::error::Error;
-use std::ops::ControlFlow;
 use std::path::Path;
 
 use flexarm::{Keep, LinkModel, LoadOptions, Modelling, Motion, ReportRun, Robot, RunOptions, RunRequest, html};

@@ -3,7 +3,6 @@
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use flexarm::{

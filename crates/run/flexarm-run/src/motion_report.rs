@@ -300,6 +300,7 @@ fn of_joint(peak: &JointPeak, unit: &'static str, limits: &JointLimits) -> Motio
     }
 }
 
+/// Returns a violated limit with its joint and time.
 pub fn of_limit(violation: &flexarm_trajectory::LimitViolation) -> MotionViolation {
     let kind = match violation.kind {
         LimitKind::Lower => "lower",

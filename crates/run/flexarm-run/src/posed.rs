@@ -21,8 +21,11 @@ use crate::robot::Robot;
 
 /// Flexible arm with its drives locked at a pose.
 pub struct Posed {
+    /// Links and drives as modelled.
     pub flexible: Arc<FlexibleRobot>,
+    /// The arm with its drives locked.
     pub arm: FlexibleArm,
+    /// Frame of the TCP.
     pub tool: Frame,
     /// Actuated joints, in coordinate order.
     pub joints: Vec<String>,

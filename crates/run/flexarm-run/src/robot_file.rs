@@ -174,7 +174,7 @@ pub(crate) struct DampingEntry {
 ///
 /// # Errors
 /// [`RobotFileError`] with line and column for anything that is not the format.
-pub fn parse_robot_file(text: &str, path: &Path) -> Result<(RobotFile, Source), RobotFileError> {
+pub(crate) fn parse_robot_file(text: &str, path: &Path) -> Result<(RobotFile, Source), RobotFileError> {
     let source = Source::new(path, text, "robot");
     let file: RobotFile = parsed(text, &source, OF_ROBOT, |file: &RobotFile| &file.format)?;
     Ok((file, source))

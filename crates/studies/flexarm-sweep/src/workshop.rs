@@ -19,7 +19,6 @@ use super::target::{Edit, Target, Which, edits};
 use super::value::ParameterValue;
 use super::{Finders, fingerprint};
 use flexarm_run::Arm;
-use flexarm_run::Caveat;
 use flexarm_run::Error;
 use flexarm_run::FlexibleRobot;
 use flexarm_run::LoadOptions;

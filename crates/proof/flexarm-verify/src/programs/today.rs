@@ -1,6 +1,5 @@
 //! What this build gives on this machine.
 
-use std::ops::ControlFlow;
 use std::path::Path;
 
 use flexarm::{ConstraintForm, Keep, Modelling, Motion, ReferenceSettings, Robot, RunOptions, RunRequest, StepperKind};

@@ -3,126 +3,126 @@
 use super::CaveatKind;
 
 /// Effort along a motion.
-pub const MOTION_EFFORT: CaveatKind = CaveatKind::warning(
+pub(crate) const MOTION_EFFORT: CaveatKind = CaveatKind::warning(
     "motion-effort",
     "{where} needs up to {value} N m (or N) along the motion, its limit is {yardstick}",
     "N m",
     "slow the motion down; check masses, payload, unit and time of the motion",
 );
 /// A balancer that carries far more than the arm weighs.
-pub const BALANCER_STRONG: CaveatKind = CaveatKind::warning(
+pub(crate) const BALANCER_STRONG: CaveatKind = CaveatKind::warning(
     "balancer-strong",
     "{where} puts up to {value} N m (or N) on a joint, told above three times what the weight of the arm does ({yardstick})",
     "N m",
     "a balancer carries about what the arm weighs: check rate, pressure, area and ends (N/m, Pa, m2, m)",
 );
 /// A balancer that carries nothing.
-pub const BALANCER_WEAK: CaveatKind = CaveatKind::note(
+pub(crate) const BALANCER_WEAK: CaveatKind = CaveatKind::note(
     "balancer-weak",
     "{where} puts at most {value} N m (or N) on a joint, told below a thousandth of what the weight of the arm does ({yardstick})",
     "N m",
     "check its ends and its force: units are m, N/m and Pa",
 );
 /// A gas that has no room in a part of the joint ranges.
-pub const BALANCER_ROOM: CaveatKind = CaveatKind::warning(
+pub(crate) const BALANCER_ROOM: CaveatKind = CaveatKind::warning(
     "balancer-room",
     "{where} gets {value} m long within the joint ranges, its gas has room up to {yardstick} m: poses beyond are refused",
     "m",
     "check ends, volume, area and the length to which they belong, or the joint ranges",
 );
 /// A curve that does not cover what is asked of it.
-pub const BALANCER_CURVE: CaveatKind = CaveatKind::note(
+pub(crate) const BALANCER_CURVE: CaveatKind = CaveatKind::note(
     "balancer-curve",
     "{where} is at {value} within the joint ranges, its curve ends at {yardstick}: it goes straight on from there",
     "",
     "add points, in m or rad",
 );
 /// A loop that was assembled elsewhere than told.
-pub const LOOP_ASSEMBLED: CaveatKind = CaveatKind::warning(
+pub(crate) const LOOP_ASSEMBLED: CaveatKind = CaveatKind::warning(
     "loop-assembled",
     "{where} closes with its dependent joints {value} rad or m from where it is told to be assembled (told above {yardstick})",
     "rad or m",
     "check the points of pin and eye and the lengths of the bars, or give the values in at",
 );
 /// Poses within the joint ranges in which a loop does not close.
-pub const LOOP_RANGE: CaveatKind = CaveatKind::warning(
+pub(crate) const LOOP_RANGE: CaveatKind = CaveatKind::warning(
     "loop-range",
     "{where} does not close in {value} % of the poses within the ranges of the driving joints (told above {yardstick} %): such poses are refused",
     "%",
     "limits of the driving joints say where they may be each for itself; check the lengths of the bars",
 );
 /// A small transmission angle within the joint ranges.
-pub const LOOP_REACH: CaveatKind = CaveatKind::warning(
+pub(crate) const LOOP_REACH: CaveatKind = CaveatKind::warning(
     "loop-transmission",
     "{where} has transmission angles down to {value} deg within the joint ranges (told below {yardstick})",
     "deg",
     "limits of the dependent joints keep poses out that the machine does not reach",
 );
 /// A small transmission angle along a motion.
-pub const LOOP_TRANSMISSION: CaveatKind = CaveatKind::warning(
+pub(crate) const LOOP_TRANSMISSION: CaveatKind = CaveatKind::warning(
     "loop-transmission",
     "{where} comes to a transmission angle of {value} deg along the motion (told below {yardstick}): forces in its bars grow as 1/sin of it",
     "deg",
     "keep the motion away from the dead point, where the bars lie in a line",
 );
 /// A dependent joint beyond its limit.
-pub const LOOP_LIMIT: CaveatKind = CaveatKind::warning(
+pub(crate) const LOOP_LIMIT: CaveatKind = CaveatKind::warning(
     "loop-limit",
     "{where}, which follows from a loop, comes to {value} along the motion, its limit is {yardstick}",
     "",
     "keep the driving joints nearer to each other, or correct the limit of the URDF",
 );
 /// A motion much slower than the robot.
-pub const SLOW_MOTION: CaveatKind = CaveatKind::note(
+pub(crate) const SLOW_MOTION: CaveatKind = CaveatKind::note(
     "slow-motion",
     "{where} never uses more than {value} of a joint's speed limit (told below {yardstick})",
     "",
     "times are in s",
 );
 /// A motion that hardly moves.
-pub const SMALL_MOTION: CaveatKind = CaveatKind::note(
+pub(crate) const SMALL_MOTION: CaveatKind = CaveatKind::note(
     "small-motion",
     "{where} turns no joint by more than {value} rad (told below {yardstick})",
     "rad",
     "is the unit of the angles right?",
 );
 /// A load against what the arm weighs and drives.
-pub const LOAD: CaveatKind = CaveatKind::warning(
+pub(crate) const LOAD: CaveatKind = CaveatKind::warning(
     "load",
     "{where} is {value} N, the arm with its payload weighs {yardstick} N on earth",
     "N",
     "forces are in N, moments in N m",
 );
 /// A moment against what the drives have.
-pub const MOMENT: CaveatKind = CaveatKind::warning(
+pub(crate) const MOMENT: CaveatKind = CaveatKind::warning(
     "load",
     "{where} is {value} N m, what the arm weighs makes {yardstick} N m at its full length",
     "N m",
     "forces are in N, moments in N m",
 );
 /// More samples than steps.
-pub const LOG_RATE: CaveatKind = CaveatKind::warning(
+pub(crate) const LOG_RATE: CaveatKind = CaveatKind::warning(
     "log-rate",
     "{value} samples a second are asked for, there are {yardstick} steps a second: every step is logged, no more",
     "1/s",
     "lower the step or the log rate",
 );
 /// Loads that go on long after the run.
-pub const LOAD_TIME: CaveatKind = CaveatKind::warning(
+pub(crate) const LOAD_TIME: CaveatKind = CaveatKind::warning(
     "load-time",
     "{where} goes on until {value} s, the run ends at {yardstick} s",
     "s",
     "times of loads are in s",
 );
 /// A sine of degrees.
-pub const LOAD_DEGREES: CaveatKind = CaveatKind::warning(
+pub(crate) const LOAD_DEGREES: CaveatKind = CaveatKind::warning(
     "load-degrees",
     "{where} swings with {value} Hz, with degrees it would be {yardstick} Hz",
     "Hz",
     "angles of sin and cos are in rad: write 2*pi*3*t",
 );
 /// A balancer that pulls the wrong way.
-pub const BALANCER_SIDE: CaveatKind = CaveatKind::warning(
+pub(crate) const BALANCER_SIDE: CaveatKind = CaveatKind::warning(
     "balancer-side",
     "{where}: with it the joint that it acts on needs {value} N m (or N) over the joint ranges (RMS), without it {yardstick}",
     "N m",

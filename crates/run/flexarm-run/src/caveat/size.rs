@@ -19,6 +19,7 @@ pub struct Size {
 }
 
 impl Size {
+    /// Returns the size of a mechanism at its zero pose.
     pub fn of(mechanism: &Mechanism) -> Self {
         let mut distances = HashMap::new();
         let children: Vec<&str> = mechanism.joints.iter().map(|j| j.child.as_str()).collect();
