@@ -24,7 +24,7 @@ fn shipped(robot: &str, motion: &str) -> (Robot, Arm, Motion) {
 
 /// Errors of all times of a run with one parameter changed.
 fn errors(arm: &Arm, motion: &Motion, parameter: &Parameter, x: f64) -> Vec<f64> {
-    let plant = plant(&arm).with(std::slice::from_ref(parameter), &[x]);
+    let plant = plant(arm).with(std::slice::from_ref(parameter), &[x]);
     let flexible = FlexibleArm::new(plant.model, plant.springs, motion.prescribed()).unwrap();
     let request = SlopesRequest {
         settings: AlphaSettings::default(),

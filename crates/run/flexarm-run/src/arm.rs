@@ -19,6 +19,9 @@ use crate::run::{self, RunRequest};
 use crate::scenario::Scenario;
 use crate::summary::Summary;
 
+/// Joint positions of the last start (rad or m), with the arm at rest there.
+type LastStart = Arc<Mutex<Option<(Vec<f64>, Arc<FlexibleArm>)>>>;
+
 /// A robot with its flexible links and drives in place.
 #[derive(Clone)]
 pub struct Arm {
@@ -28,7 +31,7 @@ pub struct Arm {
     /// [`Robot::caveats`].
     caveats: Arc<[Caveat]>,
     /// Joint values at which the last motion began, and the arm in equilibrium there.
-    pub(crate) last_start: Arc<Mutex<Option<(Vec<f64>, Arc<FlexibleArm>)>>>,
+    pub(crate) last_start: LastStart,
 }
 
 /// What a run gives.
