@@ -1,7 +1,7 @@
 //! A file of loads and payloads (`--loads FILE.toml`), read into the values of a [`Scenario`](crate::Scenario).
 //!
-//! A file of its own, because loads belong to a run and not to a robot. Start at [`read_loads`]. Not here: what the values
-//! do on a robot (`applied_load`, `payload`); they remember where they are written ([`Written`]), so that what is found
+//! A file of its own, because loads belong to a run and not to a robot. Start at `read_loads`. Not here: what the values
+//! do on a robot (`applied_load`, `payload`); they remember where they are written (`Written`), so that what is found
 //! wrong there is told with its place.
 
 use std::f64::consts::{PI, TAU};
@@ -148,7 +148,7 @@ pub(crate) fn read_loads(path: &Path, duration: f64) -> Result<(Vec<AppliedLoad>
     parse_loads(&read_text(path)?, path, duration)
 }
 
-/// As [`read_loads`], of the text of the file.
+/// As `read_loads`, of the text of the file.
 pub fn parse_loads(text: &str, path: &Path, duration: f64) -> Result<(Vec<AppliedLoad>, Vec<PayloadChange>), Error> {
     let source = Source::new(path, text, "loads");
     let file: LoadsFile = parsed(text, &source, OF_LOADS, |file: &LoadsFile| &file.format)?;

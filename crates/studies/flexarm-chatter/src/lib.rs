@@ -242,7 +242,7 @@ impl ExternalError for LobesError {}
 /// `go_on` is told how many of how many limits are done and may break off by `false`.
 ///
 /// # Errors
-/// [`Error::Lobes`] where nothing yields or the feed makes no sense; [`Error::Pose`], [`Error::Step`] for poses without an equilibrium;
+/// [`LobesError`] where nothing yields or the feed makes no sense; [`Error::Pose`], [`Error::Step`] for poses without an equilibrium;
 /// [`Error::Interrupted`]; errors of files.
 pub fn lobes(
     robot: &Robot,

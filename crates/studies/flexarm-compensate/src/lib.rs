@@ -218,7 +218,7 @@ pub struct PlantFigures {
 /// Finds commands for a motion, and judges them. Loads and payloads of the scenario act in all runs.
 ///
 /// # Errors
-/// [`Error::Compensate`], and as [`flexarm_run::simulate`].
+/// [`CompensateError`], and as [`flexarm_run::Arm::simulate`].
 pub fn compensate_motion(
     robot: &Robot,
     scenario: impl Into<Scenario>,

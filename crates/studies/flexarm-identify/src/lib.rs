@@ -98,7 +98,7 @@ pub struct IdentifyRequest {
 /// Finds what measurements tell of a robot's numbers, and writes a robot file with them.
 ///
 /// # Errors
-/// [`Error::RobotFile`] with line and column for what is wrong in the file, [`Error::File`] for its tables; [`Error::Identify`]
+/// [`Error::RobotFile`] with line and column for what is wrong in the file, [`Error::File`] for its tables; [`IdentifyFileError`]
 /// where the measurements cannot be met: units, frames, rank; [`Error::Taken`], [`Error::Write`].
 pub fn identify_robot(robot: &Robot, measurements: &Path, request: &IdentifyRequest) -> Result<Identification, Error> {
     let arm = robot.flexible(request.modelling)?;

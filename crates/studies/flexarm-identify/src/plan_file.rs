@@ -193,7 +193,7 @@ pub struct ExpectedParameter {
 /// Chooses poses and loads at which displacements of the tool tell the robot's parameters best.
 ///
 /// # Errors
-/// [`Error::File`] for a table that has no such poses, [`Error::Identify`] where there is nothing to find, [`Error::Taken`],
+/// [`Error::File`] for a table that has no such poses, [`IdentifyFileError`] where there is nothing to find, [`Error::Taken`],
 /// [`Error::Write`].
 pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<MeasurementPlan, Error> {
     let arm = robot.flexible(request.modelling)?;

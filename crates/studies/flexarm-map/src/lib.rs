@@ -224,7 +224,7 @@ pub struct GridFigures {
 /// `go_on` is shown how many of how many places are done, and may break off.
 ///
 /// # Errors
-/// [`Error::Map`] for what cannot be mapped, [`Error::Pose`] for joint values that do not fit, [`Error::Step`] for springs that
+/// [`MapError`] for what cannot be mapped, [`Error::Pose`] for joint values that do not fit, [`Error::Step`] for springs that
 /// hold nothing, [`Error::File`] and [`Error::Write`] for files.
 pub fn map(
     robot: &Robot,

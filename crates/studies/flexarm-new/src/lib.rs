@@ -11,7 +11,7 @@
 //! ```
 //!
 //! Start at [`new_robot`]. `docs/new_robot.md` has the rules and a whole run. Not here: reading the description
-//! (`flexarm-urdf`), what a robot file means ([`flexarm_run::Robot`]), the run that follows ([`flexarm_run::simulate`]).
+//! (`flexarm-urdf`), what a robot file means ([`flexarm_run::Robot`]), the run that follows ([`flexarm_run::Arm::simulate`]).
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
@@ -165,7 +165,7 @@ fn did_you_mean(closest: &Option<String>, what: &str, known: &[String]) -> Strin
 /// loads and checks what it wrote.
 ///
 /// # Errors
-/// [`Error::New`]: no arm in it, nothing that has a mass, names that are not there; [`Error::Urdf`] for the description;
+/// [`NewError`]: no arm in it, nothing that has a mass, names that are not there; [`Error::Urdf`] for the description;
 /// [`Error::Taken`] for files that are there if `overwrite` is not set, [`Error::Write`].
 pub fn new_robot(urdf: &Path, folder: &Path, overwrite: bool, options: &NewOptions) -> Result<NewRobot, Error> {
     place::refuse_other_formats(urdf)?;

@@ -121,7 +121,7 @@ struct Named {
 /// modes a hundred runs and more.
 ///
 /// # Errors
-/// As [`flexarm_run::simulate`]; [`Error::Step`] where the arm has what is not differentiated (links that stiffen under load, motions
+/// As [`Arm::simulate`]; [`Error::Step`] where the arm has what is not differentiated (links that stiffen under load, motions
 /// whose velocity jumps under servos).
 pub fn error_slopes(
     arm: &Arm,

@@ -60,7 +60,7 @@ impl BeforeRun<'_> {
         caveats
     }
 
-    /// As [`Self::caveats`], for a study that keeps no samples: links are looked at where they rest, and torques of the rigid
+    /// As `caveats`, for a study that keeps no samples: links are looked at where they rest, and torques of the rigid
     /// robot beyond a limit warn.
     pub fn caveats_of_study(&self, sag_m: f64) -> Vec<Caveat> {
         let warns = |caveat: Caveat| match caveat.code == kinds::MOTION_EFFORT.code {

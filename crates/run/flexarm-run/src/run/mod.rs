@@ -1,6 +1,6 @@
 //! The main job: rigid and flexible run along one motion, logged while it goes on, measured at the end.
 //!
-//! The loop is [`RunLoop::go`]: the stepper steps, the twin stands beside it, [`Monitors`] watch, and a sample goes to recorders,
+//! The loop is `RunLoop::go`: the stepper steps, the twin stands beside it, `Monitors` watch, and a sample goes to recorders,
 //! curves and observer. Figures of what was seen are in `figures`, what happened when in `events`.
 
 mod before;

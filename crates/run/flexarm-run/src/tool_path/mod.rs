@@ -1,6 +1,6 @@
 //! Motions told by the path of the tool: a program of moves and a robot become joints over time.
 //!
-//! `file` reads our own path files; robot programs come as a [`Program`] from elsewhere. Both end in [`ToolPath::plan`].
+//! `file` reads our own path files; robot programs come as a [`Program`] from elsewhere. Both end in `ToolPath::plan`.
 
 mod file;
 mod program;
