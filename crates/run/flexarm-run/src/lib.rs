@@ -1,7 +1,7 @@
 //! A described robot becomes an arm, a motion becomes a run.
 //!
 //! ```no_run
-//! use flexarm::{Modelling, Motion, Robot, RunOptions, Wrench};
+//! use flexarm_run::{Modelling, Motion, Robot, RunOptions, Wrench};
 //!
 //! let robot = Robot::load("robots/kr210")?;
 //! let motion = Motion::load("trajectories/pick_and_place.toml", &robot)?;

@@ -1,13 +1,13 @@
 //! From a mesh to a flexible link with its files: what `flexarm reduce` does.
 //!
 //! ```no_run
-//! use flexarm::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
+//! use flexarm_run::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
 //!
 //! let job = ReduceJob::load("lower_arm.reduce.toml".as_ref())?;
 //! let outputs = ReduceOutputs { folder: Some("out/lower_arm".into()), ..ReduceOutputs::default() };
 //! let summary = reduce(&job, &ReduceOptions::default(), Some(&outputs), &mut |_| {})?;
 //! println!("{:.2} kg, first frequency {:.1} Hz", summary.mass_kg, summary.frequencies_hz[0]);
-//! # Ok::<(), flexarm::Error>(())
+//! # Ok::<(), flexarm_run::Error>(())
 //! ```
 //!
 //! Not here: jobs, interfaces, figures and files (`flexarm-linkmaker`). A job may name a robot whose joints are at the

@@ -24,7 +24,7 @@ use crate::robot::Robot;
 /// values as a program.
 ///
 /// ```no_run
-/// use flexarm::{AppliedLoad, Modelling, Motion, PayloadChange, Robot, RunOptions, Scenario, Wrench};
+/// use flexarm_run::{AppliedLoad, Modelling, Motion, PayloadChange, Robot, RunOptions, Scenario, Wrench};
 ///
 /// let robot = Robot::load("robots/kr210")?;
 /// let motion = Motion::load("trajectories/pick_and_place.toml", &robot)?;
