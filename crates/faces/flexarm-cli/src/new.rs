@@ -7,8 +7,8 @@ use clap::Args;
 use flexarm::new::NewLink;
 use flexarm::written::visible;
 use flexarm::{
-    Keep, LoadOptions, Motion, NewOptions, NewRobot, Outputs, ReadOptions, Robot, RunOptions, RunRequest,
-    Summary, gathered,
+    Keep, LoadOptions, Motion, NewOptions, NewRobot, Outputs, ReadOptions, Robot, RunOptions, RunRequest, Summary,
+    gathered,
 };
 
 use crate::args::{Cli, RobotArgs};
