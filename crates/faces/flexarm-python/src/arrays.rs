@@ -180,7 +180,8 @@ pub(crate) fn answer<'py>(
     }
 }
 
-/// Returns a read-only array on numbers of `owner`, with their shape. Nothing is copied, and the array keeps its owner alive.
+/// Returns a read-only array on numbers of `owner`, with their shape. Nothing is copied; the array
+/// keeps its owner alive.
 ///
 /// # Errors
 /// `ValueError` if the shape does not fit the numbers.
@@ -194,8 +195,9 @@ where
     let (shape, values) = numbers(owner.get());
     let wrong = |error: ShapeError| PyValueError::new_err(format!("a result has no shape {shape:?}: {error}"));
     let view = ArrayView::from_shape(shape.as_slice(), values).map_err(wrong)?;
-    // SAFETY: the numbers are borrowed from the owner for any lifetime, so they stay valid and unchanged as long as it lives: no
-    // `&mut` to a frozen class is ever given out. The array holds a reference to the owner.
+    // SAFETY: the numbers are borrowed from the owner for any lifetime, so they stay valid and
+    // unchanged as long as it lives: a frozen class gives out no `&mut`. The array holds a reference
+    // to the owner.
     let array = unsafe { PyArray::borrow_from_array(&view, owner.clone().into_any()) };
     array.readwrite().make_nonwriteable();
     Ok(array.into_any())

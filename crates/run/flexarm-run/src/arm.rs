@@ -1,4 +1,4 @@
-//! A robot that bends, built once and asked often: runs with columns, operating points.
+//! A flexible robot, built once and asked often: runs with columns, operating points.
 //!
 //! [`Robot::flexible`] does what costs (substitution, modes); what it returns is immutable, `Send` and `Sync`, and shared by
 //! threads. Each query takes numbers and a workspace of its own.
@@ -34,7 +34,7 @@ pub struct Arm {
     pub(crate) last_start: LastStart,
 }
 
-/// What a run gives.
+/// Results of a run.
 #[derive(Clone, Debug)]
 pub struct Run {
     /// The figures, as in `summary.json`.

@@ -1,6 +1,6 @@
 //! The main job: rigid and flexible run along one motion, logged while it goes on, measured at the end.
 //!
-//! The loop is `RunLoop::go`: the stepper steps, the twin stands beside it, `Monitors` watch, and a sample goes to recorders,
+//! `RunLoop::go` takes the steps of the arm and of its rigid twin, updates `Monitors`, and passes samples to recorders,
 //! curves and observer. Figures of what was seen are in `figures`, what happened when in `events`.
 
 mod before;
@@ -61,7 +61,7 @@ pub type Progress<'a> = dyn FnMut(f64, f64) -> ControlFlow<()> + 'a;
 /// Called with each logged sample; breaking off stops the run.
 pub type SampleObserver<'a> = dyn FnMut(&Sample) -> ControlFlow<()> + 'a;
 
-/// What a run keeps besides its figures.
+/// Signals that a run keeps besides its figures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Keep {
     /// Nothing: the fastest.
@@ -73,10 +73,10 @@ pub enum Keep {
     Curves,
 }
 
-/// What a run gives and who watches it.
+/// Results of a run, and callbacks while it goes on.
 #[derive(Default)]
 pub struct RunRequest<'a> {
-    /// What it keeps.
+    /// Signals that are kept.
     pub keep: Keep,
     /// Recordings and report to write.
     pub outputs: Option<&'a Outputs>,
@@ -91,16 +91,16 @@ pub struct RunRequest<'a> {
 }
 
 impl RunRequest<'_> {
-    /// A run that keeps this and is watched by nobody.
+    /// Returns a request that keeps these signals, without files and callbacks.
     pub fn keeping(keep: Keep) -> Self {
         Self { keep, ..Self::default() }
     }
 }
 
-/// What is computed of a sample; each level includes those before it.
+/// Parts of a sample that are computed; each level includes those before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Detail {
-    /// What the summary needs.
+    /// Figures of the summary.
     Figures,
     /// The signals of [`flexarm_log::Columns`].
     Columns,
