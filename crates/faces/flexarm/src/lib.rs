@@ -16,15 +16,17 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Build is apart from query: [`Robot::load`] reads, [`Robot::flexible`] puts links and drives in place, and the [`Arm`] that it
-//! returns is asked with numbers, by any number of threads. [`Arm::simulate`] runs a [`Motion`], or a [`Scenario`] with loads and
-//! payloads besides, and returns a [`Run`] with figures and columns; [`Arm::operating_point`] answers statics, compliance and
-//! frequencies at thousands of poses without allocation.
+//! [`Robot::load`] reads, [`Robot::flexible`] puts links and drives in place and returns an
+//! [`Arm`], which threads may share. [`Arm::simulate`] runs a [`Motion`], or a [`Scenario`] with
+//! loads and payloads, and returns a [`Run`] with figures and columns; [`Arm::operating_point`] answers statics, compliance
+//! and frequencies at thousands of poses without allocation.
 //!
-//! [`Arm::simulate_with`] writes recordings and a report as well. [`inspect()`] and [`check()`] look at what was loaded; [`statics()`],
-//! [`modes()`] and [`response()`] answer one pose in full; [`mod@reduce`] makes a flexible link of a mesh.
+//! [`Arm::simulate_with`] writes recordings and a report as well. [`inspect()`] and [`check()`]
+//! look at what was loaded; [`statics()`], [`modes()`] and [`response()`] answer one pose in full;
+//! [`mod@reduce`] makes a flexible link of a mesh.
 //!
-//! Examples, in rising order (`cargo run --release -p flexarm --no-default-features --example NAME`):
+//! Examples, from simple to advanced
+//! (`cargo run --release -p flexarm --no-default-features --example NAME`):
 //!
 //! | name | what it shows |
 //! | --- | --- |
@@ -36,8 +38,9 @@
 //! | `sensitivity` | which number of the robot the error depends on most |
 //! | `link_models` | every link model against a reference: accuracy and cost |
 //!
-//! What goes wrong is an [`Error`] by cause with its numbers, what is doubtful a [`Caveat`]. Both carry settings that mend them
-//! as values ([`Setting`]); a face with names of its own for them gives these once ([`name_settings`]).
+//! An [`Error`] names its cause with numbers; a [`Caveat`] warns of a doubtful result. Both carry
+//! the settings that mend them as values ([`Setting`]); a face names them once
+//! ([`name_settings`]).
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 

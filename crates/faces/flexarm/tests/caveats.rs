@@ -571,8 +571,15 @@ fn slips_are_told_and_plausible_robots_are_not() {
 #[test]
 fn the_page_lists_the_catalogue() {
     let page = std::fs::read_to_string(project("docs/caveats.md")).unwrap();
-    let read = |name: &str| std::fs::read_to_string(project("crates/run/flexarm-run/src/caveat").join(name)).unwrap();
-    let source = read("kinds.rs") + &read("kinds_of_use.rs");
+    let read = |name: &str| std::fs::read_to_string(project("crates").join(name)).unwrap();
+    let source = [
+        "run/flexarm-run/src/caveat/kinds.rs",
+        "run/flexarm-run/src/caveat/kinds_of_use.rs",
+        "studies/flexarm-chatter/src/caveats.rs",
+        "studies/flexarm-identify/src/doubts.rs",
+    ]
+    .map(read)
+    .concat();
     let codes = source.split("CaveatKind::").skip(1).filter_map(|rest| rest.split_once("(\n").map(|(_, rest)| rest));
     let codes: Vec<&str> =
         codes.map(|rest| rest.trim_start().trim_start_matches('"').split('"').next().unwrap()).collect();
@@ -591,11 +598,11 @@ fn the_page_lists_the_catalogue() {
             "second-order-unknown",
             "euler-chain",
             "held-joints",
-            // Of crates/run/flexarm-linkmaker.
+            // In crates/run/flexarm-linkmaker.
             "link-sound",
             "link-density",
             "interface-size",
-            // Of crates/motion/flexarm-motion-io.
+            // In crates/motion/flexarm-motion-io.
             "motion-topic",
             "motion-messages",
             "motion-dropped-joints",

@@ -88,14 +88,9 @@ impl Arm {
         &self.robot
     }
 
-    /// Returns tree, springs and drives.
-    pub fn flexible(&self) -> &FlexibleRobot {
+    /// Returns tree, springs and drives, shared.
+    pub fn flexible(&self) -> &Arc<FlexibleRobot> {
         &self.flexible
-    }
-
-    /// As [`Arm::flexible`], shared.
-    pub fn shared(&self) -> Arc<FlexibleRobot> {
-        self.flexible.clone()
     }
 
     /// Returns [`Robot::caveats`], found once.
@@ -104,8 +99,8 @@ impl Arm {
     }
 
     /// Returns the caveats of the robot as it is modelled, and of what a command does with it.
-    pub fn told(&self, used: Use<'_>) -> Vec<Caveat> {
-        told(&self.robot, &self.shared(), Some(&self.caveats), used)
+    pub fn caveats(&self, used: Use<'_>) -> Vec<Caveat> {
+        told(&self.robot, &self.flexible, Some(&self.caveats), used)
     }
 
     /// Returns how links and drives are modelled.

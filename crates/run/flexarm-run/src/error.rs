@@ -1,7 +1,7 @@
 //! One error type for the faces: what went wrong, by cause and with the numbers, and whether the input or the run is to blame.
 //!
 //! Settings in the messages are values ([`Setting`]) that each face names in its own words
-//! ([`crate::name_settings`]). What a face makes of an error, such as the number that its process ends with, is its own.
+//! ([`flexarm_settings::name_settings`]). What a face makes of an error, such as the number that its process ends with, is its own.
 
 mod model;
 mod recording;

@@ -22,10 +22,10 @@ use crate::caveat::size::Size;
 use crate::drive_entry::{DriveKind, ServoEntry};
 use crate::error::{Error, ModellingError, PoseError};
 use crate::gear_entry::{GearLaws, RobotCoupling};
-use crate::import::SECOND_ORDER_UNKNOWN;
 use crate::mounting::RobotMounting;
 use crate::options::{DriveModel, LinkModel, Modelling};
 use crate::robot::{Robot, tcp_frame};
+use flexarm_linkmaker::import::SECOND_ORDER_UNKNOWN;
 
 /// Springs along Euler angles are not the same seen from either end: a term of third order in the bending is left, which a
 /// chain of n parts divides by n only.

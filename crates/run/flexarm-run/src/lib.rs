@@ -1,43 +1,19 @@
-//! A described robot becomes an arm, a motion becomes a run.
+//! From a robot file to a robot, an arm and a run.
 //!
 //! ```no_run
-//! use flexarm_run::{Modelling, Motion, Robot, RunOptions, Wrench};
+//! use flexarm_run::{Modelling, Motion, Robot, RunOptions};
 //!
 //! let robot = Robot::load("robots/kr210")?;
 //! let motion = Motion::load("trajectories/pick_and_place.toml", &robot)?;
-//! let arm = robot.flexible(Modelling::default())?; // substitution once
-//! let run = arm.simulate(&motion, &RunOptions::default())?;
-//! let (t, e) = (run.time_s(), run.error_world_m()); // n, and n x 3, row after row
-//! println!("{} samples, first error {:?} m", t.len(), &e[..3]);
-//!
-//! let mut at = arm.operating_point()?; // a workspace
-//! at.solve(&[0.0, -1.2, 1.5, 0.0, 0.4, 0.0], &Wrench::zeros())?;
-//! println!("{} m/N down, {} Hz", at.compliance()[(2, 2)], at.frequencies_hz()[0]);
-//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! let run = robot.flexible(Modelling::default())?.simulate(&motion, &RunOptions::default())?;
+//! println!("{}", run.summary.headline);
+//! # Ok::<(), flexarm_run::Error>(())
 //! ```
 //!
-//! Build is apart from query: [`Robot::load`] reads, [`Robot::flexible`] puts links and drives in place, and the [`Arm`] that it
-//! returns is asked with numbers, by any number of threads. [`Arm::simulate`] runs a [`Motion`], or a [`Scenario`] with loads and
-//! payloads besides, and returns a [`Run`] with figures and columns; [`Arm::operating_point`] answers statics, compliance and
-//! frequencies at thousands of poses without allocation.
-//!
-//! [`Arm::simulate_with`] writes recordings and a report as well. [`inspect()`] and [`check()`] look at what was loaded; [`statics()`],
-//! [`modes()`] and [`response()`] answer one pose in full; [`mod@reduce`] makes a flexible link of a mesh.
-//!
-//! Examples, in rising order (`cargo run --release -p flexarm --no-default-features --example NAME`):
-//!
-//! | name | what it shows |
-//! | --- | --- |
-//! | `five_lines` | load, run, print |
-//! | `operating_points` | an arm shared by threads, a workspace each: compliance and frequency at 10,000 poses |
-//! | `stop_at_rest` | an observer that looks at every sample and ends the run |
-//! | `servo_study` | a study: gains of the servos against settling time and overshoot |
-//! | `study_report` | link models compared on one page for the browser |
-//! | `sensitivity` | which number of the robot the error depends on most |
-//! | `link_models` | every link model against a reference: accuracy and cost |
-//!
-//! What goes wrong is an [`Error`] by cause with its numbers, what is doubtful a [`Caveat`]. Both carry settings that mend them
-//! as values ([`Setting`]); a face with names of its own for them gives these once ([`name_settings`]).
+//! [`Robot::load`] reads, [`Robot::flexible`] puts links and drives in place, [`Arm::simulate`]
+//! runs a [`Motion`] or a [`Scenario`]. [`statics()`], [`modes()`] and [`response()`] answer for
+//! one pose, [`Arm::operating_point`] for many; [`mod@reduce`] makes a flexible link of a mesh.
+//! Studies stand on this crate. The crate `flexarm` passes it on with them, under one name.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
@@ -151,27 +127,3 @@ pub use summary::{
     Summary, TcpFigures,
 };
 pub use tool_path::ToolPath;
-
-pub use flexarm_analysis::{Quantity, Spacing};
-pub use flexarm_files::{FileError, writing_unless};
-pub use flexarm_flexlink::Mounting;
-pub use flexarm_kinematics::{
-    BalancerCurve, BalancerCurveError, BalancerLaw, Coordinate, GasLaw, LinkInertia, Model, Pose, Wrench,
-};
-pub use flexarm_linkmaker::{ImportError, JobError, LinkError, export, import};
-#[cfg(feature = "arrow")]
-pub use flexarm_log::arrow_stream;
-pub use flexarm_log::{
-    Column, Columns, CurveQuantity, DataColumn, DataTable, DataValues, FormatInfo, Holds, RecordingFormat, Sample,
-    Trace, flat_columns,
-};
-pub use flexarm_motion_io::MotionError;
-pub use flexarm_path::{PathError, PlannedMove, Slowed, SlowedBy};
-pub use flexarm_settings::{Names, Setting, gathered, name_settings, written};
-pub use flexarm_stepping::{
-    AlphaSettings, Asked, ConstraintForm, InertiaChange, Linear, Load, LoadAxes, OperatingPoint, PoseAnswer,
-    ReferenceMethod, ReferenceSettings, STEPPERS, SpookPreset, SpookSettings, Start, StepError, StepRule, StepperEntry,
-    StepperKind, StepperOptions, StepperSetting, TimedWrench, ToolDeflection,
-};
-pub use flexarm_trajectory::{ColumnMap, ColumnMapError, Trajectory, TrajectoryError};
-pub use flexarm_urdf::{InertiaEstimate, ReadOptions, closest, search_paths_from_environment};

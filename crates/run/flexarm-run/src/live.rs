@@ -97,7 +97,7 @@ impl Arm {
         if !((1.0..1e9).contains(&steps) && (period_s / step_s - steps).abs() <= WHOLE) {
             return Err(ValueError::Period { period_s, step_s }.into());
         }
-        let flexible = self.shared();
+        let flexible = self.flexible().clone();
         let targets = Arc::new(Targets(RwLock::new(Period::at_rest(&at, period_s))));
         let push = Arc::new(RwLock::new(Wrench::zeros()));
         let arm = flexible.arm(targets.clone()).map_err(|error| flexible.explained(error))?;

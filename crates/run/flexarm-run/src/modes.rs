@@ -170,7 +170,7 @@ pub(crate) fn table(
         0 => linear.compliance().map_err(step_error)?.diagonal(),
         _ => linear.yielding_compliance().map_or_else(Vector6::zeros, |C| C.diagonal()),
     };
-    let mut caveats = posed.told(robot, linear, &[0.0; 6]);
+    let mut caveats = posed.caveats_of(robot, linear, &[0.0; 6]);
     let worst = all.iter().map(|mode| mode.residual).fold(0.0, f64::max);
     if worst > 1e-6 {
         let message = format!("a mode leaves its equation open by {worst:.1e} (relative): take the figures with care");

@@ -38,7 +38,7 @@ pub struct Posed {
 }
 
 /// A step error of a command that takes no step.
-pub fn failed(source: StepError) -> Error {
+pub fn step_error(source: StepError) -> Error {
     Error::Step { source, partial: false }
 }
 
@@ -59,13 +59,13 @@ impl Posed {
     }
 
     /// `at` in coordinate order (rad or m).
-    pub fn held(robot: &Robot, modelling: &Modelling, at: Vec<f64>) -> Result<Self, Error> {
+    pub(crate) fn held(robot: &Robot, modelling: &Modelling, at: Vec<f64>) -> Result<Self, Error> {
         Self::with(Arc::new(robot.modelled(modelling)?), at)
     }
 
     /// An arm, its links and drives in place already; `at`: all actuated joints (rad or m), zero without it.
     pub fn on(arm: &Arm, at: Option<&[f64]>) -> Result<Self, Error> {
-        let flexible = arm.shared();
+        let flexible = arm.flexible().clone();
         let names: Vec<&str> = flexible.rigid.coordinates().iter().map(|c| c.joint.as_str()).collect();
         let at = joint_values(at, &names)?;
         Ok(Self { of_robot: Some(arm.robot_caveats()), ..Self::with(flexible, at)? })
@@ -84,14 +84,14 @@ impl Posed {
     }
 
     /// What is to be said of the robot and of the equilibrium that it is in, under a wrench on the tool (world axes).
-    pub fn told(&self, robot: &Robot, linear: &Linear, wrench: &[f64; 6]) -> Vec<Caveat> {
+    pub fn caveats_of(&self, robot: &Robot, linear: &Linear, wrench: &[f64; 6]) -> Vec<Caveat> {
         let mut caveats = told::of_model(robot, &self.flexible, self.of_robot.as_deref());
         caveats.extend(told::at_rest(robot, self, linear, wrench));
         once_each(caveats)
     }
 
     /// Whether the pose is within the joint ranges, and whether anything yields.
-    pub fn caveats(&self) -> Vec<Caveat> {
+    pub(crate) fn caveats(&self) -> Vec<Caveat> {
         let model = &self.arm.model;
         let mut caveats: Vec<Caveat> =
             validity::outside_limits(&model.coordinates()[..model.n_actuated()], &self.at).collect();
@@ -115,7 +115,7 @@ impl Posed {
     }
 
     /// The equilibrium under weight and a wrench at the TCP (world axes), as maps take it.
-    pub fn operating_point(&self, wrench: &[f64; 6]) -> Result<OperatingPoint, Error> {
+    pub(crate) fn operating_point(&self, wrench: &[f64; 6]) -> Result<OperatingPoint, Error> {
         let [fx, fy, fz, tx, ty, tz] = *wrench;
         let mut at = OperatingPoint::new(self.arm.clone(), self.tool.clone());
         let F = Wrench::new([fx, fy, fz].into(), [tx, ty, tz].into());
@@ -124,14 +124,14 @@ impl Posed {
     }
 
     /// The tool with every elastic coordinate at zero.
-    pub fn rigid_tool(&self) -> Pose {
+    pub(crate) fn rigid_tool(&self) -> Pose {
         let (mut data, state) = self.undeformed();
         forward_kinematics(&self.arm.model, &mut data, &state.q);
         data.X_WF(&self.tool)
     }
 
     /// Whether the models hold at an equilibrium: deflections of links, forces of drives.
-    pub fn validity(&self, robot: &Robot, linear: &Linear) -> Vec<Caveat> {
+    pub(crate) fn validity(&self, robot: &Robot, linear: &Linear) -> Vec<Caveat> {
         let links = self.flexible.spans.iter().zip(strains(&self.flexible, &self.arm, &linear.q));
         let links = links.flat_map(|(span, (strain, rotation))| validity::link(&span.link, rotation, strain));
         let holding = linear.holding.as_slice();
@@ -148,7 +148,7 @@ impl Posed {
     }
 
     /// Joints at the pose, elastic coordinates zero.
-    pub fn undeformed(&self) -> (Data, State) {
+    pub(crate) fn undeformed(&self) -> (Data, State) {
         undeformed(&self.arm)
     }
 }
@@ -161,7 +161,7 @@ fn undeformed(arm: &FlexibleArm) -> (Data, State) {
 }
 
 /// Engineering strain of each flexible link, and how far its far end has turned (rad), with all coordinates at `q`.
-pub fn strains(flexible: &FlexibleRobot, arm: &FlexibleArm, q: &DVector<f64>) -> Vec<(f64, f64)> {
+pub(crate) fn strains(flexible: &FlexibleRobot, arm: &FlexibleArm, q: &DVector<f64>) -> Vec<(f64, f64)> {
     let model = &arm.model;
     let (mut data, straight) = undeformed(arm);
     let mut ends = |q: &DVector<f64>| -> Vec<Pose> {
@@ -195,16 +195,11 @@ impl Arm {
     }
 }
 
-/// [`StepError`] of what a linear structure offers.
-pub fn step_error(source: StepError) -> Error {
-    failed(source)
-}
-
 /// Figures of an answer, which must be numbers.
 ///
 /// # Errors
 /// [`Error::Pose`]: masses, lengths or joint values of 1e200 overflow on the way.
-pub fn all_finite<'a>(what: &str, values: impl IntoIterator<Item = &'a f64>) -> Result<(), Error> {
+pub(crate) fn all_finite<'a>(what: &str, values: impl IntoIterator<Item = &'a f64>) -> Result<(), Error> {
     match values.into_iter().all(|x| x.is_finite()) {
         true => Ok(()),
         false => Err(PoseError::Overflow { what: what.to_owned() }.into()),

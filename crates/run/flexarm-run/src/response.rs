@@ -257,7 +257,7 @@ fn response_at(
             });
         }
     }
-    let mut caveats = posed.told(robot, &linear, &[0.0; 6]);
+    let mut caveats = posed.caveats_of(robot, &linear, &[0.0; 6]);
     let within = |k: &usize| damping_ratio[*k] < UNDAMPED && (from..=to).contains(&frequencies_hz[*k]);
     if let Some(k) = (0..modes.len()).find(within) {
         let hz = frequencies_hz[k];

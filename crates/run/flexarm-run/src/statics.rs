@@ -162,7 +162,7 @@ fn statics_at(
             deflection: deflection.as_slice().to_vec(),
         });
     }
-    let caveats = posed.told(robot, &loaded, &wrench);
+    let caveats = posed.caveats_of(robot, &loaded, &wrench);
     let [x, y, z, rx, ry, rz] = displacement;
     let [sx, sy, sz, srx, sry, srz] = sag;
     let mut statics = Statics {

@@ -4,10 +4,39 @@ use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 
 use flexarm_run::Caveat;
+use flexarm_run::caveat::CaveatKind;
 use flexarm_run::caveat::slip::{self, Factor};
-use flexarm_run::caveat::{CaveatKind, kinds};
 
 use crate::CuttingTool;
+
+/// A cutter of a size that no arm carries, or finer than any.
+const TOOL_DIAMETER: CaveatKind = CaveatKind::warning(
+    "tool-diameter",
+    "the cutter of {where} has a diameter of {value} m, the usual range ends at {yardstick} m",
+    "m",
+    "check diameter and lengths of the tool's file",
+);
+/// A mode of a tool that is slower or faster than those of tools.
+const TOOL_FREQUENCY: CaveatKind = CaveatKind::warning(
+    "tool-frequency",
+    "{where} has a natural frequency of {value} Hz, the usual range of tools and spindles ends at {yardstick} Hz",
+    "Hz",
+    "frequencies of modes are in Hz",
+);
+/// A mode of a tool that is softer or stiffer than those of tools.
+const TOOL_STIFFNESS: CaveatKind = CaveatKind::warning(
+    "tool-stiffness",
+    "{where} has a stiffness of {value} N/m, the usual range of tools and spindles ends at {yardstick} N/m",
+    "N/m",
+    "the stiffness of a mode is in N/m, its mass in kg",
+);
+/// A mode of a tool that is damped as no tool is.
+const TOOL_DAMPING: CaveatKind = CaveatKind::warning(
+    "tool-damping",
+    "{where} has a damping ratio of {value}, the usual range of tools and spindles ends at {yardstick}",
+    "",
+    "damping is a ratio: 3 per cent is 0.03",
+);
 
 const DIAMETER: RangeInclusive<f64> = 1e-4..=0.5;
 const FREQUENCY: RangeInclusive<f64> = 20.0..=1e5;
@@ -28,12 +57,12 @@ pub fn tool_caveats(tool: &CuttingTool) -> Vec<Caveat> {
             found.push(kind.found(whose, value, yardstick).likely(slip::slip(value, usual, factors, 1.0)));
         }
     };
-    check(&kinds::TOOL_DIAMETER, &name, tool.cutter.diameter, &DIAMETER, slip::LENGTH);
+    check(&TOOL_DIAMETER, &name, tool.cutter.diameter, &DIAMETER, slip::LENGTH);
     for (k, mode) in tool.modes.iter().enumerate() {
         let whose = format!("mode {} of {name}", k + 1);
-        check(&kinds::TOOL_FREQUENCY, &whose, mode.omega / TAU, &FREQUENCY, TOO_FAST);
-        check(&kinds::TOOL_STIFFNESS, &whose, mode.mass * mode.omega * mode.omega, &STIFFNESS, TOO_SOFT);
-        check(&kinds::TOOL_DAMPING, &whose, mode.damping_ratio, &DAMPING, TOO_DAMPED);
+        check(&TOOL_FREQUENCY, &whose, mode.omega / TAU, &FREQUENCY, TOO_FAST);
+        check(&TOOL_STIFFNESS, &whose, mode.mass * mode.omega * mode.omega, &STIFFNESS, TOO_SOFT);
+        check(&TOOL_DAMPING, &whose, mode.damping_ratio, &DAMPING, TOO_DAMPED);
     }
     found
 }

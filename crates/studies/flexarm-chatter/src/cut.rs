@@ -26,10 +26,10 @@ use flexarm_run::Modelling;
 use flexarm_run::Motion;
 use flexarm_run::Robot;
 use flexarm_run::RunOptions;
-use flexarm_run::Sample;
 use flexarm_run::Scenario;
 use flexarm_run::caveat;
 use flexarm_run::{Keep, RunRequest};
+use flexarm_sample::Sample;
 
 /// Tooth periods over which figures are taken.
 const LATE: usize = 60;

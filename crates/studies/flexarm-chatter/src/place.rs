@@ -199,7 +199,7 @@ impl Place {
 
     /// What is to be said of the robot and of its pose.
     pub(super) fn told(&self, robot: &Robot) -> Vec<Caveat> {
-        self.posed.told(robot, &self.linear, &[0.0; 6])
+        self.posed.caveats_of(robot, &self.linear, &[0.0; 6])
     }
 }
 

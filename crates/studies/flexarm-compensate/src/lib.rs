@@ -245,7 +245,7 @@ pub fn compensate_motion_until(
     let arm = robot.flexible(request.run.modelling)?;
     check(&scenario, request, &arm)?;
     let (mut answer, found) = limits::kept(robot, &arm, &scenario, request, stop)?;
-    answer.caveats.extend(arm.told(Use::Along(&scenario)));
+    answer.caveats.extend(arm.caveats(Use::Along(&scenario)));
     answer.caveats = once_each(std::mem::take(&mut answer.caveats));
     let program = files.program(robot, &arm, &scenario, request, &mut answer);
     answer.warnings = warnings(&answer.caveats);

@@ -12,7 +12,6 @@ use flexarm_run::Arm;
 use flexarm_run::Error;
 use flexarm_run::RunOptions;
 use flexarm_run::Scenario;
-use flexarm_run::magnification::Expected;
 use flexarm_run::{Keep, RunRequest};
 use flexarm_settings::written::markdown;
 
@@ -31,11 +30,9 @@ pub(super) fn record(
     let study = flexarm_log::RrdStudy::create(path, options, vec!["before".into(), "after".into()]);
     let run = RunOptions { log_rate_hz: RECORDED_HZ, ignore_limits: true, ..request.run.clone() };
     let wanted = Arc::new(Mutex::new(Vec::new()));
-    let mut expected: Option<Expected> = None;
+    let expected = arm.expected(&found.scenario, &run)?;
     for (number, motion) in [&found.scenario.motion, &found.motion].into_iter().enumerate() {
         let scenario = Scenario { motion: motion.clone(), ..found.scenario.clone() };
-        let own = arm.expected(&scenario, &run)?;
-        let expected = *expected.get_or_insert(own);
         let recorder = Against::new(Box::new(study.seat(number)), wanted.clone(), number == 0);
         let request = RunRequest {
             recorders: vec![Box::new(recorder)],

@@ -8,7 +8,24 @@ use super::encoders::EncoderFigures;
 use super::file::MeasurementInput;
 use flexarm_run::Caveat;
 use flexarm_run::Robot;
-use flexarm_run::caveat::kinds;
+use flexarm_run::caveat::CaveatKind;
+
+/// Displacements of another size than the robot's.
+const LOAD_UNIT: CaveatKind = CaveatKind::warning(
+    "load-unit",
+    "displacements under {where} are {value} times those of the robot as it is, beyond {yardstick} times either way: loads or the first \
+     guess of the stiffnesses are wrong",
+    "",
+    "force is in the file's unit of force, mass in kg: a weight of 100 kg is mass = 100, or a force of 981 N",
+);
+/// Encoders whose rest is no noise.
+const ENCODER_RESIDUAL: CaveatKind = CaveatKind::warning(
+    "encoder-rest",
+    "{where}: {value} rad (or m) of the deflection do not follow from the torque, the instruments' noise is {yardstick}: the stiffness \
+     may be off by more than its deviation",
+    "rad",
+    "give the measured torque, lower `below`, or look at friction, masses, errors of the transmission and neighbouring links that bend",
+);
 
 /// Displacements so many times larger or smaller than the robot's are no guess of a stiffness.
 const LOAD_RATIO: f64 = 5.0;
@@ -86,7 +103,7 @@ pub(super) fn encoder_caveats(encoders: &[EncoderFigures]) -> impl Iterator<Item
         gear.told && matters && gear.rest_rms > ENCODER_REST * gear.noise_rms
     };
     let told = |gear: &EncoderFigures| {
-        kinds::ENCODER_REST.found(format!("encoders of {}", gear.joint), gear.rest_rms, gear.noise_rms)
+        ENCODER_RESIDUAL.found(format!("encoders of {}", gear.joint), gear.rest_rms, gear.noise_rms)
     };
     encoders.iter().filter(odd).map(told)
 }
@@ -121,7 +138,7 @@ pub(super) fn load_caveats(plant: &Plant, input: &MeasurementInput) -> Result<Ve
             true => format!("about {WEIGHT} times too {}: {slip}?", if pulls { "large" } else { "small" }),
             false => String::new(),
         };
-        caveats.push(kinds::LOAD_UNIT.found(what, ratio, LOAD_RATIO).likely(likely));
+        caveats.push(LOAD_UNIT.found(what, ratio, LOAD_RATIO).likely(likely));
     }
     Ok(caveats)
 }

@@ -140,7 +140,7 @@ pub fn identify_robot(robot: &Robot, measurements: &Path, request: &IdentifyRequ
     answer.caveats.extend(encoder_caveats(&encoders));
     let failed = |error: NoAnswer| IdentifyFileError::Fit(error.to_string());
     answer.caveats.extend(load_caveats(&plant, &input).map_err(failed)?);
-    answer.caveats.extend(arm.told(Use::Any));
+    answer.caveats.extend(arm.caveats(Use::Any));
     answer.warnings = warnings(&answer.caveats);
     answer.encoders = encoders;
     if let Some(targets) = targets {

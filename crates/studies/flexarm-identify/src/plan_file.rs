@@ -235,7 +235,7 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
         return Err(IdentifyFileError::Fit(text).into());
     }
     let first = plan(&plant, &fitted, &candidates[..request.count.min(candidates.len())], &options).map_err(failed)?;
-    let caveats = arm.told(Use::Any);
+    let caveats = arm.caveats(Use::Any);
     let mut answer = MeasurementPlan {
         warnings: warnings(&caveats),
         caveats,

@@ -88,7 +88,7 @@ impl<'a> Evaluator<'a> {
         if !loaded {
             return at.solve_each(poses, &Wrench::zeros(), under_weight, |k, answer| match answer {
                 Ok(found) => push(k, &Weighed::new(found, layout), found).unwrap_or_else(&mut failed),
-                Err(error) => failed(posed::failed(error)),
+                Err(error) => failed(posed::step_error(error)),
             });
         }
         let mut weighed = Vec::with_capacity(seats.len());
@@ -99,7 +99,7 @@ impl<'a> Evaluator<'a> {
         let mut weighed = weighed.into_iter();
         at.solve_each(poses, wrench, under_load, |k, answer| match (weighed.next(), answer) {
             (Some(Ok(weighed)), Ok(found)) => push(k, &weighed, found).unwrap_or_else(&mut failed),
-            (Some(Err(error)), _) | (_, Err(error)) => failed(posed::failed(error)),
+            (Some(Err(error)), _) | (_, Err(error)) => failed(posed::step_error(error)),
             (None, Ok(_)) => {}
         });
     }

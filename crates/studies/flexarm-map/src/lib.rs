@@ -479,8 +479,8 @@ fn summed_up(
     };
     let joints: Vec<String> = arm.joints().map(str::to_owned).collect();
     let mut caveats = match &request.region {
-        MapRegion::Along { motion, .. } => arm.told(Use::Along(&Scenario::new((**motion).clone()))),
-        _ => arm.told(Use::Any),
+        MapRegion::Along { motion, .. } => arm.caveats(Use::Along(&Scenario::new((**motion).clone()))),
+        _ => arm.caveats(Use::Any),
     };
     caveats.extend(of_wrench(&request.wrench, &Size::of(&robot.rigid)));
     if let Some(first) = &taken.first_failure {

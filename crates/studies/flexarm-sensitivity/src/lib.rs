@@ -217,7 +217,7 @@ pub fn sensitivity(
     let named = chosen(run_parameters(&arm, &scenario, &request.parameters)?, &request.parameters, |own| &own.name)?;
     let parameters: Vec<RunParameter> = named.iter().map(|own| own.parameter.clone()).collect();
     let (found, mut caveats) = slopes_and_caveats(&arm, &scenario, &request.run, &parameters, request.table.is_some())?;
-    caveats.extend(arm.told(Use::Along(&scenario)));
+    caveats.extend(arm.caveats(Use::Along(&scenario)));
     let caveats = once_each(caveats);
     if let Some(path) = &request.table {
         write_all(&[(path.clone(), table(&named, &found))])?;

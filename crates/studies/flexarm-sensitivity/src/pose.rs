@@ -167,7 +167,7 @@ fn slopes(
         Asked::Arm(_) => None,
         Asked::Tool(axis) => Some(of_tool(*axis, &point.tcp_pose(), &C, modes)),
     });
-    let caveats = arm.told(Use::Held(&at, &[0.0; 6]));
+    let caveats = arm.caveats(Use::Held(&at, &[0.0; 6]));
     Ok(PoseSensitivity {
         robot: robot.name.clone(),
         compliance: rows(&C, 1.0),

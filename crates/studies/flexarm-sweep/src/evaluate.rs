@@ -205,7 +205,7 @@ impl Sweep {
     fn quick_run(&self, place: usize, values: &[ParameterValue], caveats: &mut Vec<Caveat>) -> Result<QuickRun, Error> {
         let Ready { built, scenario, options } = self.workshop.ready(values)?;
         caveats.extend_from_slice(&built.arm.robot_caveats());
-        let flexible = built.arm.shared();
+        let flexible = built.arm.flexible().clone();
         let (arm, of_loads) = built.arm.at_start(&scenario, &options)?;
         let facts = QuickFacts {
             sag_m: static_sag(&arm, &flexible.tcp),

@@ -101,7 +101,12 @@ pub(super) fn warnings(caveats: &[CaveatFigures], runs: usize) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use flexarm_run::caveat::kinds;
+    use flexarm_run::caveat::CaveatKind;
+
+    const EFFORT: CaveatKind =
+        CaveatKind::warning("effort", "{where} needs {value}, its limit is {yardstick}", "N m", "");
+    const SLOW_MODE: CaveatKind = CaveatKind::warning("first-frequency", "{where}: {value}, {yardstick}", "Hz", "");
+    const SAG: CaveatKind = CaveatKind::warning("sag", "{where} sags by {value}, {yardstick}", "m", "");
 
     fn answer(run: usize, caveats: Vec<Caveat>) -> Answer {
         Answer { run, result: Ok(Vec::new()), told: told(caveats, &|text| text.replace("/home/me/", "")) }
@@ -109,15 +114,15 @@ mod tests {
 
     #[test]
     fn a_caveat_of_many_runs_is_said_once_with_its_worst_value_and_how_often() {
-        let effort = |x: f64| kinds::EFFORT.found("joint 2", x, 100.0);
-        let slow = |hz: f64| kinds::SLOW_MODE.found("the arm", hz, 3.0).as_note();
+        let effort = |x: f64| EFFORT.found("joint 2", x, 100.0);
+        let slow = |hz: f64| SLOW_MODE.found("the arm", hz, 3.0).as_note();
         let file =
             |n: u32| Caveat::said("trajectory", "/home/me/a.csv", format!("/home/me/a.csv: {n} rows repeat"), "");
         let answers = [
             answer(0, vec![effort(120.0), slow(2.0)]),
             answer(1, vec![effort(150.0), slow(1.0), file(2)]),
-            answer(2, vec![effort(130.0), kinds::SAG.found("the TCP", 0.3, 2.0)]),
-            answer(3, vec![kinds::SAG.found("the TCP", 0.5, 2.0), kinds::SAG.found("the TCP", 0.4, 2.0), file(3)]),
+            answer(2, vec![effort(130.0), SAG.found("the TCP", 0.3, 2.0)]),
+            answer(3, vec![SAG.found("the TCP", 0.5, 2.0), SAG.found("the TCP", 0.4, 2.0), file(3)]),
             answer(4, vec![]),
         ];
         let found = figures(answers.iter());
@@ -134,7 +139,7 @@ mod tests {
 
     #[test]
     fn a_warning_of_some_runs_goes_before_a_note_of_many() {
-        let sag = |x: f64| kinds::SAG.found("the TCP", x, 2.0);
+        let sag = |x: f64| SAG.found("the TCP", x, 2.0);
         let found = figures([answer(0, vec![sag(0.1).as_note()]), answer(1, vec![sag(0.3)])].iter());
         assert_eq!((found.len(), found[0].runs, found[0].worst_run, found[0].caveat.warns()), (1, 1, 1, true));
     }

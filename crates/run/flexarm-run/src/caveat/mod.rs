@@ -9,7 +9,7 @@
 pub(crate) mod balancers;
 pub(crate) mod chain;
 pub(crate) mod drives;
-pub mod kinds;
+pub(crate) mod kinds;
 mod kinds_of_use;
 pub(crate) mod links;
 pub(crate) mod loads;

@@ -6,25 +6,25 @@ use std::ops::RangeInclusive;
 pub type Factor = (f64, &'static str);
 
 /// Degrees for radians.
-pub const DEGREES: f64 = 180.0 / std::f64::consts::PI;
+pub(crate) const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
 /// Lengths in m.
 pub const LENGTH: &[Factor] = &[(1e3, "millimetres"), (1e2, "centimetres"), (1.0 / 0.0254, "inches")];
 /// Angles in rad.
-pub const ANGLE: &[Factor] = &[(DEGREES, "degrees"), (60.0 * DEGREES, "arc minutes")];
+pub(crate) const ANGLE: &[Factor] = &[(DEGREES, "degrees"), (60.0 * DEGREES, "arc minutes")];
 /// Masses in kg.
-pub const MASS: &[Factor] = &[(1e3, "grams"), (1e-3, "tonnes")];
+pub(crate) const MASS: &[Factor] = &[(1e3, "grams"), (1e-3, "tonnes")];
 /// Densities in kg/m³.
-pub const DENSITY: &[Factor] = &[(1e-3, "g/cm3"), (1e-12, "t/mm3"), (1e-9, "kg/mm3")];
+pub(crate) const DENSITY: &[Factor] = &[(1e-3, "g/cm3"), (1e-12, "t/mm3"), (1e-9, "kg/mm3")];
 /// Moduli in Pa.
-pub const MODULUS: &[Factor] = &[(1e-6, "MPa"), (1e-9, "GPa")];
+pub(crate) const MODULUS: &[Factor] = &[(1e-6, "MPa"), (1e-9, "GPa")];
 /// Torques in N m, forces in N.
-pub const EFFORT: &[Factor] = &[(1e3, "N mm or mN"), (1e-3, "kN m or kN")];
+pub(crate) const EFFORT: &[Factor] = &[(1e3, "N mm or mN"), (1e-3, "kN m or kN")];
 /// Rotational stiffness in N m/rad.
-pub const TURNING: &[Factor] =
+pub(crate) const TURNING: &[Factor] =
     &[(1.0 / DEGREES, "N m/deg"), (1e-3, "kN m/rad"), (1.0 / (60.0 * DEGREES), "N m/arcmin"), (1e3, "N mm/rad")];
 /// Moments of inertia in kg m².
-pub const INERTIA: &[Factor] = &[(1e4, "kg cm2"), (1e6, "kg mm2"), (1e9, "g mm2"), (1e7, "g cm2")];
+pub(crate) const INERTIA: &[Factor] = &[(1e4, "kg cm2"), (1e6, "kg mm2"), (1e9, "g mm2"), (1e7, "g cm2")];
 
 /// The first slip without which the value would lie in the range; empty if there is none.
 ///
