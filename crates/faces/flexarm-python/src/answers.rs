@@ -73,7 +73,7 @@ impl PyStatics {
         row: impl Fn(&Self) -> Vec<usize>,
         values: fn(&Self) -> &[f64],
     ) -> PyResult<Bound<'py, PyAny>> {
-        view(slf, |own| (own.rows.into_iter().chain(row(own)).collect(), values(own)))
+        view(slf, |own| Ok((own.rows.into_iter().chain(row(own)).collect(), values(own))))
     }
 }
 
@@ -204,13 +204,13 @@ impl PyModes {
     /// Natural frequencies, ascending (Hz), (modes,).
     #[getter]
     fn frequencies<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        view(slf, |own| (vec![own.frequencies.len()], &own.frequencies))
+        view(slf, |own| Ok((vec![own.frequencies.len()], &own.frequencies)))
     }
 
     /// Damping ratios, (modes,).
     #[getter]
     fn damping_ratio<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        view(slf, |own| (vec![own.damping_ratio.len()], &own.damping_ratio))
+        view(slf, |own| Ok((vec![own.damping_ratio.len()], &own.damping_ratio)))
     }
 
     /// Motion of the tool in each mode scaled to unit modal mass, (modes, 6), complex.
@@ -223,7 +223,7 @@ impl PyModes {
     /// Share of each element in the strain energy of each mode, (modes, elements).
     #[getter]
     fn strain_energy<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        view(slf, |own| (vec![own.tcp[0].len() / 6, own.elements.len()], &own.strain_energy))
+        view(slf, |own| Ok((vec![own.tcp[0].len() / 6, own.elements.len()], &own.strain_energy)))
     }
 
     /// Names of the elements, in the order of :attr:`strain_energy` (tuple of str).
@@ -354,7 +354,7 @@ pub(crate) fn response(response: Response, request: &ResponseRequest) -> PyRespo
 impl PyResponse {
     /// A field of all curves, (inputs, outputs, f).
     fn field<'py>(slf: &Bound<'py, Self>, values: fn(&Self) -> &[f64]) -> PyResult<Bound<'py, PyAny>> {
-        view(slf, |own| (vec![own.inputs.len(), own.outputs.len(), own.frequency.len()], values(own)))
+        view(slf, |own| Ok((vec![own.inputs.len(), own.outputs.len(), own.frequency.len()], values(own))))
     }
 }
 
@@ -363,7 +363,7 @@ impl PyResponse {
     /// Frequencies of the curves (Hz), (f,).
     #[getter]
     fn frequency<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        view(slf, |own| (vec![own.frequency.len()], &own.frequency))
+        view(slf, |own| Ok((vec![own.frequency.len()], &own.frequency)))
     }
 
     /// Inputs, in their order (tuple of str).
@@ -393,7 +393,7 @@ impl PyResponse {
     /// Natural frequencies of all modes (Hz), (modes,).
     #[getter]
     fn natural_frequencies<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        view(slf, |own| (vec![own.natural_frequencies.len()], &own.natural_frequencies))
+        view(slf, |own| Ok((vec![own.natural_frequencies.len()], &own.natural_frequencies)))
     }
 
     /// What limits the worth of the answer (list of flexarm.Caveat).

@@ -184,15 +184,15 @@ pub(crate) fn answer<'py>(
 /// keeps its owner alive.
 ///
 /// # Errors
-/// `ValueError` if the shape does not fit the numbers.
+/// What `numbers` returns; `ValueError` if the shape does not fit the numbers.
 pub(crate) fn view<'py, T>(
     owner: &Bound<'py, T>,
-    numbers: impl for<'a> FnOnce(&'a T) -> (Vec<usize>, &'a [f64]),
+    numbers: impl for<'a> FnOnce(&'a T) -> PyResult<(Vec<usize>, &'a [f64])>,
 ) -> PyResult<Bound<'py, PyAny>>
 where
     T: PyClass<Frozen = True> + Sync,
 {
-    let (shape, values) = numbers(owner.get());
+    let (shape, values) = numbers(owner.get())?;
     let wrong = |error: ShapeError| PyValueError::new_err(format!("a result has no shape {shape:?}: {error}"));
     let view = ArrayView::from_shape(shape.as_slice(), values).map_err(wrong)?;
     // SAFETY: the numbers are borrowed from the owner for any lifetime, so they stay valid and

@@ -53,7 +53,7 @@ impl PyCompensated {
     /// Time (s), and distance of the tool before and after (m), (n, 3).
     #[getter]
     fn curves<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        view(slf, |own| (vec![own.curves.len() / 3, 3], &own.curves))
+        view(slf, |own| Ok((vec![own.curves.len() / 3, 3], &own.curves)))
     }
 
     /// All figures (dict as ``flexarm compensate --json``).

@@ -170,33 +170,35 @@ impl PyDeflections {
     /// Largest distance of the tool from the rigid one (m), (m,).
     #[getter]
     fn peak<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        view(slf, |own| (vec![own.peak.len()], &own.peak))
+        view(slf, |own| Ok((vec![own.peak.len()], &own.peak)))
     }
 
     /// When (s), (m,).
     #[getter]
     fn time_of_peak<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        view(slf, |own| (vec![own.peak.len()], &own.time_of_peak))
+        view(slf, |own| Ok((vec![own.peak.len()], &own.time_of_peak)))
     }
 
     /// Root of the mean square distance (m), (m,).
     #[getter]
     fn rms<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        view(slf, |own| (vec![own.peak.len()], &own.rms))
+        view(slf, |own| Ok((vec![own.peak.len()], &own.rms)))
     }
 
     /// Flexible minus rigid at the end, world axes (m), (m, 3).
     #[getter]
     fn end<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        view(slf, |own| (vec![own.peak.len(), 3], &own.end))
+        view(slf, |own| Ok((vec![own.peak.len(), 3], &own.end)))
     }
 
     /// The same at the start and after every step, of run ``k``, (steps + 1, 3); with ``samples=True``.
     fn samples<'py>(slf: &Bound<'py, Self>, k: usize) -> PyResult<Bound<'py, PyAny>> {
-        let all = &slf.get().samples;
-        let missing = || PyIndexError::new_err(format!("there is no run {k} of {}", all.len()));
-        all.get(k).ok_or_else(missing)?;
-        view(slf, |own| (vec![own.samples[k].len() / 3, 3], &own.samples[k]))
+        view(slf, |own| {
+            let all = &own.samples;
+            let missing = || PyIndexError::new_err(format!("there is no run {k} of {}", all.len()));
+            let values = all.get(k).ok_or_else(missing)?;
+            Ok((vec![values.len() / 3, 3], values))
+        })
     }
 
     /// Time step of the samples (s).

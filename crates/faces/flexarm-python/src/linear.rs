@@ -82,7 +82,7 @@ pub(crate) fn linear(linear: &Linear) -> PyLinear {
 
 impl PyLinear {
     fn matrix<'py>(slf: &Bound<'py, Self>, matrix: fn(&Self) -> &Matrix) -> PyResult<Bound<'py, PyAny>> {
-        view(slf, |own| (matrix(own).shape.to_vec(), &matrix(own).values))
+        view(slf, |own| Ok((matrix(own).shape.to_vec(), &matrix(own).values)))
     }
 }
 
@@ -140,13 +140,13 @@ impl PyLinear {
     /// Free coordinates at the equilibrium, (k,).
     #[getter]
     fn equilibrium<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        view(slf, |own| (vec![own.equilibrium.len()], &own.equilibrium))
+        view(slf, |own| Ok((vec![own.equilibrium.len()], &own.equilibrium)))
     }
 
     /// Forces with which the drives hold the pose (N m or N), (n,).
     #[getter]
     fn holding<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        view(slf, |own| (vec![own.holding.len()], &own.holding))
+        view(slf, |own| Ok((vec![own.holding.len()], &own.holding)))
     }
 
     /// How many of the free coordinates are joints driven by torque; they come first.
@@ -164,12 +164,10 @@ impl PyLinear {
     /// Displacement of the tool per wrench on it, motors held, (6, 6).
     #[getter]
     fn compliance<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        if let Err(why) = &slf.get().compliance {
-            return Err(raised(slf.py(), "StepError", why.clone()));
-        }
-        view(slf, |own| match &own.compliance {
-            Ok(compliance) => (compliance.shape.to_vec(), &compliance.values),
-            Err(_) => (vec![0], &[]),
+        view(slf, |own| {
+            let compliance = own.compliance.as_ref();
+            let compliance = compliance.map_err(|why| raised(slf.py(), "StepError", why.clone()))?;
+            Ok((compliance.shape.to_vec(), &compliance.values))
         })
     }
 

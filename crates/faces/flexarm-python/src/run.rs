@@ -60,19 +60,20 @@ impl PyRun {
         }
     }
 
-    fn array<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Option<Bound<'py, PyAny>>> {
-        if slf.get().columns.column(name).is_none() {
-            return Ok(None);
-        }
-        view(slf, |own| match own.columns.column(name) {
-            Some(column) => (own.shape(column), &column.values),
-            None => (vec![0], &[]),
+    /// Returns a view of a column; `missing` is the error if there is none.
+    fn array<'py>(
+        slf: &Bound<'py, Self>,
+        name: &str,
+        missing: impl FnOnce(&Self) -> PyErr,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        view(slf, |own| {
+            let column = own.columns.column(name).ok_or_else(|| missing(own))?;
+            Ok((own.shape(column), &column.values))
         })
-        .map(Some)
     }
 
     fn signal<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyAny>> {
-        Self::array(slf, name)?.ok_or_else(|| {
+        Self::array(slf, name, |_| {
             PyAttributeError::new_err(format!(
                 "the run has no column {name:?}: it ran without the rigid twin (twin=False)"
             ))
@@ -202,8 +203,8 @@ impl PyRun {
     }
 
     fn __getitem__<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyAny>> {
-        Self::array(slf, name)?.ok_or_else(|| {
-            let known: Vec<&str> = slf.get().columns.columns().iter().map(|c| c.name.as_str()).collect();
+        Self::array(slf, name, |own| {
+            let known: Vec<&str> = own.columns.columns().iter().map(|c| c.name.as_str()).collect();
             PyKeyError::new_err(format!("the run has no column {name:?}; its columns are {}", known.join(", ")))
         })
     }
