@@ -1,4 +1,4 @@
-//! YAML, of which JSON is a part, as trees of texts. What a text means is the matter of who reads it.
+//! YAML, of which JSON is a part, as trees of texts. The caller interprets the texts.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -13,11 +13,11 @@ const MOST_NESTED: usize = 40;
 pub struct YamlNode<'t> {
     /// Line, from 1.
     pub line: usize,
-    /// What it is.
+    /// Text, list or map.
     pub value: YamlValue<'t>,
 }
 
-/// What a node is.
+/// Content of a node.
 #[derive(Clone, Debug)]
 pub enum YamlValue<'t> {
     /// A text that may mean a number.
@@ -35,12 +35,12 @@ pub enum YamlValue<'t> {
     Map(Vec<YamlNode<'t>>),
 }
 
-/// What is wrong with a text.
+/// Error of a text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct YamlError {
     /// Line, from 1.
     pub line: usize,
-    /// What is wrong, as the end of a sentence.
+    /// Cause, as the end of a sentence.
     pub message: String,
 }
 

@@ -27,7 +27,7 @@ pub struct EffectPanel<'a> {
 /// A pair of numbers with intervals, side by side.
 #[derive(Clone, Debug)]
 pub struct BarPair<'a> {
-    /// What they belong to.
+    /// Label of the pair.
     pub name: &'a str,
     /// Value, lower and upper end of its interval, of both.
     pub values: [[f64; 3]; 2],
@@ -36,9 +36,9 @@ pub struct BarPair<'a> {
 /// Points of two results.
 #[derive(Clone, Debug, Default)]
 pub struct ScatterPlot<'a> {
-    /// What goes to the right.
+    /// Label of the horizontal axis.
     pub x_label: &'a str,
-    /// What goes up.
+    /// Label of the vertical axis.
     pub y_label: &'a str,
     /// All points.
     pub points: &'a [[f64; 2]],
@@ -90,7 +90,7 @@ pub(crate) fn draw_lines(
     Ok(())
 }
 
-/// Least and largest of the finite numbers, with some room.
+/// Returns minimum and maximum of the finite numbers, with a margin.
 pub(crate) fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
     let (low, high) = values
         .filter(|x| x.is_finite())

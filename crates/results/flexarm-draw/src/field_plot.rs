@@ -1,7 +1,7 @@
 //! A number over a plane of cells as a picture (SVG): colours with their scale, axes, marked places.
 //!
-//! Cells of one colour that are neighbours in a row are one rectangle, and finer grids than a picture can show are thinned to
-//! the largest of what falls together: a page with many maps stays small.
+//! Neighbouring cells of one colour in a row are one rectangle. Grids finer than the picture are
+//! thinned to the maximum of the cells that coincide, so that a page with many maps stays small.
 
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -10,7 +10,7 @@ use crate::charts::{LEADING, draw_lines, range, wrapped};
 use crate::palette::magnitude;
 use crate::plot::{Area, Axes, PlotError, axes, ink, picture, plain, three_digits};
 
-/// Most cells along an axis of the picture.
+/// Maximum number of cells along an axis of the picture.
 const MOST_CELLS: usize = 120;
 /// Shades of the scale.
 const SHADES: u8 = 48;
