@@ -157,8 +157,6 @@ pub enum Setting {
     Chains,
     /// Stiffness by load is computed.
     Geometric,
-    /// Threads of a factorisation.
-    Threads,
     /// Rows or nodes of the interfaces in matrices.
     Map,
     /// File of the mass matrix.
@@ -179,7 +177,7 @@ pub enum Setting {
 
 impl Setting {
     /// Every setting.
-    pub const ALL: [Self; 60] = [
+    pub const ALL: [Self; 59] = [
         Self::Step,
         Self::LogRate,
         Self::Stepper,
@@ -232,7 +230,6 @@ impl Setting {
         Self::ModesUpTo,
         Self::Chains,
         Self::Geometric,
-        Self::Threads,
         Self::Map,
         Self::MassFile,
         Self::MatrixFormat,
@@ -297,7 +294,6 @@ impl Setting {
             Self::ModesUpTo => "modes_up_to_hz",
             Self::Chains => "chains",
             Self::Geometric => "geometric",
-            Self::Threads => "threads",
             Self::Map => "map",
             Self::MassFile => "mass_file",
             Self::MatrixFormat => "format",

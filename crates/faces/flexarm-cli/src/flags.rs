@@ -59,7 +59,6 @@ fn flag(setting: Setting) -> &'static str {
         Setting::ModesUpTo => "--modes-up-to",
         Setting::Chains => "--chains",
         Setting::Geometric => "--geometric",
-        Setting::Threads => "--threads",
         Setting::Map => "--map",
         Setting::MassFile => "--mass-file",
         Setting::MatrixFormat => "--format",

@@ -63,7 +63,6 @@ fn flags(args: &ReduceArgs) -> Result<ReduceJob, Failure> {
             OrderingName::Amd => OrderingChoice::Amd,
             OrderingName::Nested => OrderingChoice::Nested,
         }),
-        threads: args.threads,
         mesh_frame: args.mesh_frame,
         urdf: urdf.map(|(file, link)| UrdfEntry { file, link, joint: args.joint.clone(), rest: args.rest }),
         ..ReduceJob::default()

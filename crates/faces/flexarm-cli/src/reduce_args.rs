@@ -105,9 +105,6 @@ pub(crate) struct ReduceArgs {
     /// Order of elimination
     #[arg(long, value_enum, help_heading = "Reduction", hide_short_help = true)]
     pub(crate) ordering: Option<OrderingName>,
-    /// Threads of the solver [default: 1]
-    #[arg(long, value_name = "N", help_heading = "Reduction", hide_short_help = true)]
-    pub(crate) threads: Option<usize>,
     /// Name of the link [default: that of --link, or of the mesh file]
     #[arg(long, value_name = "NAME", help_heading = "Mesh")]
     pub(crate) name: Option<String>,

@@ -291,7 +291,6 @@ fn a_reduction_names_its_flags() {
             (&with(&["--modes", "5000"]), "--modes 5000: at most 1000 can be kept"),
             (&with(&["--modes-up-to", "-1"]), "--modes-up-to -1: a positive frequency in Hz is expected"),
             (&with(&["--chains", "1"]), "--chains 1: a chain has 2 to 100 parts"),
-            (&with(&["--threads", "0"]), "--threads 0: 1 to 1024 are possible"),
             (&with(&["--merge", "-1"]), "merge = -1: a distance of zero or more, in the unit of the mesh"),
         ],
     );

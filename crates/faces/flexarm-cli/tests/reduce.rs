@@ -223,7 +223,7 @@ mod a_run {
         for key in ["wall_s", "cpu_s", "dofs", "elements", "nodes"] {
             assert!(figures[key].as_f64().unwrap() > 0.0, "{key}");
         }
-        for key in ["factor_entries", "right_hand_sides", "threads"] {
+        for key in ["factor_entries", "right_hand_sides"] {
             assert!(figures["solver"][key].as_f64().unwrap() > 0.0, "{key}");
         }
         assert!(figures["phases"]["assembly_s"].as_f64().unwrap() > 0.0);
@@ -528,7 +528,6 @@ mod refused {
             (&["--modes", "3", "--modes-up-to", "100"], &["--modes-up-to"]),
             (&["--modes-up-to", "-5"], &["-5", "positive"]),
             (&["--split", "1.5"], &["1.5", "elastic-centre"]),
-            (&["--threads", "0"], &["--threads 0"]),
             (&["--tie", "loose"], &["loose", "distributing"]),
             (&["--tie", "C=rigid"], &["interface \"C\"", "no nodes"]),
             (&["--material", "RIB=steel"], &["RIB", "BODY"]),

@@ -12,7 +12,7 @@ use std::time::Instant;
 use flexarm_fe_io::mesh::{ReadOptions, read_mesh};
 use flexarm_fem::model::{AssemblyOptions, FeModel};
 use flexarm_fem::reduction::{Condensation, CondensationOptions, Interface, Tie};
-use flexarm_fem::sparse::{ModesWanted, Ordering, Threads};
+use flexarm_fem::sparse::{ModesWanted, Ordering};
 use flexarm_fem::{Material, Pose, UnitSystem};
 use nalgebra::{Rotation3, Vector3};
 
@@ -20,7 +20,6 @@ fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let units: UnitSystem = words[1].parse().unwrap();
     let modes: usize = words.get(4).map_or(20, |w| w.parse().unwrap());
-    let threads: usize = std::env::var("THREADS").map_or(1, |w| w.parse().unwrap());
     let ordering = match std::env::var("ORDERING").as_deref() {
         Ok("amd") => Ordering::MinimumDegree,
         Ok("metis") => Ordering::NestedDissection,
@@ -47,8 +46,7 @@ fn main() {
         }
     };
     let interfaces = [interface(&words[2]), interface(&words[3])];
-    let reduction =
-        Condensation::new(&model, &interfaces, CondensationOptions { ordering, threads: Threads(threads) }).unwrap();
+    let reduction = Condensation::new(&model, &interfaces, CondensationOptions { ordering }).unwrap();
     lap("factor and static shapes");
     println!("{:?}", reduction.figures());
     let (fixed, held) = reduction.fixed_and_held_modes(ModesWanted::Count(modes), 10).unwrap();

@@ -54,7 +54,7 @@ pub struct LinkPlan {
     pub interfaces: Vec<Interface>,
     /// Materials and quadrature.
     pub assembly: AssemblyOptions,
-    /// Order and threads.
+    /// Order of elimination.
     pub condensation: CondensationOptions,
     /// Fixed-interface modes to keep; a count of zero is Guyan.
     pub modes: ModesWanted,

@@ -1745,8 +1745,6 @@ class SolverFigures(TypedDict):
     """Entries of its factor."""
     ordering: str
     """amd or nested: the order that was used."""
-    threads: int
-    """Threads."""
     right_hand_sides: int
     """Right-hand sides solved in all."""
 

@@ -10,8 +10,8 @@ use super::superelement::{InterfaceFrame, Superelement};
 use crate::error::Direction;
 use crate::model::FeModel;
 use crate::sparse::{
-    Block, Cholesky, FactorFigures, Modes, ModesError, NotPositiveDefinite, Ordering, Row, Threads, WIDTH, add_product,
-    gram, grams, orthonormalising, subtract_products,
+    Block, Cholesky, FactorFigures, Modes, ModesError, NotPositiveDefinite, Ordering, Row, WIDTH, add_product, gram,
+    grams, orthonormalising, subtract_products,
 };
 
 /// A pivot this far below its diagonal entry is rounding: a mechanism that passed by its sign. Links of
@@ -27,8 +27,6 @@ const FREE: f64 = 1e-10;
 pub struct CondensationOptions {
     /// Fill-reducing order.
     pub ordering: Ordering,
-    /// Threads of factorisation and solves.
-    pub threads: Threads,
 }
 
 /// Why a model could not be reduced.
@@ -157,7 +155,7 @@ impl<'m> Condensation<'m> {
             Some(R)
         };
         let K_ii = model.K.submatrix(&solved);
-        let factor = Cholesky::new(K_ii, options.ordering, options.threads).map_err(|error| match error {
+        let factor = Cholesky::new(K_ii, options.ordering).map_err(|error| match error {
             NotPositiveDefinite::Pivot { unknown } => {
                 let (node, component) = model.dofs.node_of(solved[unknown] as usize);
                 ReductionError::Loose { node, component: crate::error::COMPONENTS[component] }

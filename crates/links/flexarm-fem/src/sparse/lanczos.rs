@@ -244,7 +244,7 @@ impl Ritz {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sparse::{Cholesky, Ordering, SparseSymmetric, Threads};
+    use crate::sparse::{Cholesky, Ordering, SparseSymmetric};
 
     /// Chain of unit masses and springs, both ends held: ω² = 4 sin²(kπ/(2(n+1))).
     fn chain(n: usize, copies: usize) -> (SparseSymmetric, Vec<f64>) {
@@ -264,7 +264,7 @@ mod tests {
     }
 
     fn modes_of(K: &SparseSymmetric, wanted: ModesWanted) -> Result<Modes, ModesError> {
-        let factor = Cholesky::new(K.clone(), Ordering::MinimumDegree, Threads(1)).unwrap();
+        let factor = Cholesky::new(K.clone(), Ordering::MinimumDegree).unwrap();
         let solve = &mut |F: &mut Block| factor.solve_block(F);
         let mass = &mut |X: &Block, Y: &mut Block| Y.clone_from(X);
         smallest_modes(&mut Pencil { rows: K.size(), dimension: K.size(), solve, mass }, wanted)
@@ -304,7 +304,7 @@ mod tests {
     #[test]
     fn a_body_without_mass_has_no_modes() {
         let (K, _) = chain(20, 1);
-        let factor = Cholesky::new(K.clone(), Ordering::MinimumDegree, Threads(1)).unwrap();
+        let factor = Cholesky::new(K.clone(), Ordering::MinimumDegree).unwrap();
         let solve = &mut |F: &mut Block| factor.solve_block(F);
         let mass = &mut |_: &Block, Y: &mut Block| *Y = Block::zeros(20, Y.width);
         let found = smallest_modes(&mut Pencil { rows: 20, dimension: 20, solve, mass }, ModesWanted::Count(3));

@@ -22,7 +22,7 @@ mod triangular;
 mod vectors;
 
 pub use block::{Block, WIDTH};
-pub use cholesky::{Cholesky, FactorFigures, NotPositiveDefinite, Threads};
+pub use cholesky::{Cholesky, FactorFigures, NotPositiveDefinite};
 pub use lanczos::{Modes, ModesError, ModesWanted, Pencil, Released, modes_of_two_supports, smallest_modes};
 pub use ordering::Ordering;
 pub use symmetric::{Pattern, SparseSymmetric};

@@ -23,9 +23,6 @@ pub enum JobError {
     /// Parts of a chain.
     #[error("{setting} {0}: a chain has 2 to 100 parts", setting = Setting::Chains)]
     ChainParts(usize),
-    /// Threads of a factorisation.
-    #[error("{setting} {0}: 1 to 1024 are possible", setting = Setting::Threads)]
-    Threads(usize),
     /// Distance within which nodes are merged, in the unit of the mesh.
     #[error("merge = {0}: a distance of zero or more, in the unit of the mesh")]
     MergeDistance(f64),

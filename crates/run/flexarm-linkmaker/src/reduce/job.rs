@@ -77,9 +77,6 @@ pub struct ReduceJob {
     /// Order of elimination.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ordering: Option<OrderingChoice>,
-    /// Threads of the solver.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub threads: Option<usize>,
     /// Pose of the mesh frame in the link frame.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh_frame: Option<FrameEntry>,
@@ -233,7 +230,6 @@ impl ReduceJob {
         put(&mut self.merge, flags.merge);
         put(&mut self.quadrature, flags.quadrature);
         put(&mut self.ordering, flags.ordering);
-        put(&mut self.threads, flags.threads);
         put(&mut self.mesh_frame, flags.mesh_frame);
         put(&mut self.urdf, flags.urdf);
         self.name_interfaces();

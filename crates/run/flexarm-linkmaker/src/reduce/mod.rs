@@ -213,10 +213,6 @@ fn with_defaults(job: &ReduceJob) -> Result<ReduceJob, JobError> {
     job.split.get_or_insert(SplitChoice::ElasticCentre);
     job.quadrature.get_or_insert(QuadratureChoice::Exact);
     job.ordering.get_or_insert(OrderingChoice::Auto);
-    let threads = *job.threads.get_or_insert(1);
-    if !(1..=1024).contains(&threads) {
-        return Err(JobError::Threads(threads));
-    }
     Ok(job)
 }
 

@@ -6,7 +6,7 @@ use flexarm_fem::element::Quadrature;
 use flexarm_fem::mesh_link::MeshLinkError;
 use flexarm_fem::model::AssemblyOptions;
 use flexarm_fem::reduction::{CondensationOptions, ReductionError, TieError};
-use flexarm_fem::sparse::{ModesWanted, Ordering, Threads};
+use flexarm_fem::sparse::{ModesWanted, Ordering};
 use flexarm_fem::{Doubt, GateLimits, LinkPlan, Material, Provenance, SplitAt, UnitSystem, mass_properties};
 use flexarm_settings::Setting;
 use flexarm_spatial::Pose;
@@ -256,7 +256,7 @@ fn plan(
         name: job.link_name(),
         interfaces: chosen.iter().map(|one| one.interface.clone()).collect(),
         assembly: AssemblyOptions::default(),
-        condensation: CondensationOptions { ordering, threads: Threads(job.threads.unwrap_or(1)) },
+        condensation: CondensationOptions { ordering },
         modes,
         split,
         chains: job.chains.clone().unwrap_or_default(),

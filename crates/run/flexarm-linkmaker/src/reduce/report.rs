@@ -270,11 +270,10 @@ fn cost(summary: &ReduceSummary) -> ReportTable {
         vec![
             "factor".into(),
             format!(
-                "{} unknowns, {:.2} million entries, order {}, {} thread(s), {} right-hand sides",
+                "{} unknowns, {:.2} million entries, order {}, {} right-hand sides",
                 s.unknowns,
                 1e-6 * s.factor_entries as f64,
                 s.ordering,
-                s.threads,
                 s.right_hand_sides
             ),
         ],

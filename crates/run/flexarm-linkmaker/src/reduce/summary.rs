@@ -306,8 +306,6 @@ pub struct SolverFigures {
     pub factor_entries: usize,
     /// amd or nested: the order that was used.
     pub ordering: &'static str,
-    /// Threads.
-    pub threads: usize,
     /// Right-hand sides solved in all.
     pub right_hand_sides: usize,
 }
@@ -418,7 +416,6 @@ pub(super) fn summary_of(
             matrix_entries: factor.matrix_entries,
             factor_entries: factor.factor_entries,
             ordering: if factor.ordering == Ordering::MinimumDegree { "amd" } else { "nested" },
-            threads: plan.condensation.threads.0,
             right_hand_sides: reduction.solves,
         },
         phases: PhaseFigures::default(),

@@ -55,9 +55,7 @@ mod tests {
     use nalgebra::DMatrix;
 
     use super::Released;
-    use crate::sparse::{
-        Block, Cholesky, ModesWanted, Ordering, Pencil, SparseSymmetric, Threads, modes_of_two_supports,
-    };
+    use crate::sparse::{Block, Cholesky, ModesWanted, Ordering, Pencil, SparseSymmetric, modes_of_two_supports};
 
     /// Truth: a chain of n unit masses and springs from a wall, its last mass held or free,
     /// ω² = 4 sin²(kπ/(2n)) and 4 sin²((2k - 1)π/(2(2n + 1))).
@@ -68,7 +66,7 @@ mod tests {
             let mut triplets: Vec<_> = (0..m as u32).map(|i| (i, i, 2.0)).collect();
             triplets.extend((1..m as u32).map(|i| (i, i - 1, -1.0)));
             let K = SparseSymmetric::from_triplets(m, &triplets);
-            let factor = Cholesky::new(K.clone(), Ordering::MinimumDegree, Threads(1)).unwrap();
+            let factor = Cholesky::new(K.clone(), Ordering::MinimumDegree).unwrap();
             let solve = &mut |F: &mut Block| {
                 let mut inner = Block { rows: F.rows[..m].to_vec(), width: F.width };
                 factor.solve_block(&mut inner);
