@@ -70,6 +70,27 @@ pub fn lanes_for(things: usize) -> usize {
     }
 }
 
+/// Loops over numbers, inlined down to them.
+pub trait Loops {
+    /// Runs them.
+    fn run(self);
+}
+
+/// Runs loops with the vector instructions that the processor has. Operations and their order are the same with and without.
+#[inline]
+pub fn quickly(loops: impl Loops) {
+    #[target_feature(enable = "avx2")]
+    fn compiled(loops: impl Loops) {
+        loops.run();
+    }
+    if is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has what `compiled` is compiled for.
+        unsafe { compiled(loops) }
+    } else {
+        loops.run();
+    }
+}
+
 /// Numbers side by side: type, lanes, register and its instructions.
 macro_rules! lanes {
     ($name:ident, $lanes:literal, $register:ident, $splat:ident, $xor:ident, $andnot:ident, $sqrt:ident, $($trait:ident $method:ident $assign:ident $assign_method:ident $instruction:ident),+) => {
@@ -232,24 +253,6 @@ lanes!(
     Mul mul MulAssign mul_assign _mm512_mul_pd,
     Div div DivAssign div_assign _mm512_div_pd
 );
-
-/// Sines and cosines of four angles (rad), as [`Real::sin_cos`] has each; only with AVX2.
-#[inline(always)]
-pub(crate) fn sin_cos_of_four(angles: __m256d) -> [__m256d; 2] {
-    let (sine, cosine) = Four(angles).sin_cos();
-    [sine.0, cosine.0]
-}
-
-/// Sines and cosines of angles (rad), as [`Real::sin_cos`] has each; only with AVX2. Angles beyond the last whole four are left.
-#[inline(always)]
-pub(crate) fn sin_cos_by_fours(angles: &[f64], sines: &mut [f64], cosines: &mut [f64]) {
-    let to = sines.chunks_exact_mut(4).zip(cosines.chunks_exact_mut(4));
-    for (angles, (sines, cosines)) in angles.chunks_exact(4).zip(to) {
-        let (sine, cosine) = Four::new([angles[0], angles[1], angles[2], angles[3]]).sin_cos();
-        sines.copy_from_slice(&sine.lanes());
-        cosines.copy_from_slice(&cosine.lanes());
-    }
-}
 
 impl Four {
     /// One bit for each lane that is below.

@@ -30,16 +30,12 @@
 mod blocks;
 #[cfg(target_arch = "x86_64")]
 pub mod lanes;
-#[cfg(target_arch = "x86_64")]
-pub mod packed;
 pub mod products;
-pub mod quickest;
 mod real;
 mod rotation;
-pub mod space;
 mod vectors;
 
 pub use blocks::{Matrix12, symmetric_part, turn6, twice};
 pub use real::{Real, sin_cos_all};
-pub use rotation::{AngleKinematics, AngleMotion, ElasticAngles, quaternion, rotation_vector};
+pub use rotation::{AngleKinematics, ElasticAngles, quaternion, rotation_vector};
 pub use vectors::{ArticulatedInertia, Pose, SpatialInertia, Twist, Wrench, adjoint, composed, skew};

@@ -9,7 +9,6 @@ use nalgebra::{Matrix3, Quaternion, Scalar, UnitQuaternion, Vector3};
 
 use crate::products::{add, add3, columns, cross, dot, mul3, scaled, scaled3};
 use crate::real::Real;
-use crate::space::Space;
 use crate::vectors::skew;
 
 /// Below this cosine the axis is taken from the symmetric part of the rotation, above from the skew part.
@@ -39,31 +38,7 @@ pub struct AngleKinematics<T: Scalar = f64> {
     pub bias: Vector3<T>,
 }
 
-/// The same, as a recursion over [`Space`] needs it.
-#[derive(Clone, Copy, Debug)]
-pub struct AngleMotion<S: Space> {
-    /// `R_PQ`.
-    pub R: S::Both,
-    /// `B`.
-    pub B: S::Both,
-    /// `dB/dt rates`.
-    pub bias: S::Vector,
-}
-
 impl ElasticAngles {
-    /// As [`ElasticAngles::kinematics`], to rounding.
-    #[inline(always)]
-    pub fn motion<S: Space>(self, angles: &S::Vector, rates: &S::Vector) -> AngleMotion<S> {
-        match self {
-            Self::RotationVector => rotation_vector_motion(angles, rates),
-            Self::EulerZyx => {
-                let [sines, cosines] = S::sin_cos(angles);
-                let kin = euler_zyx(&S::components(&sines), &S::components(&cosines), &S::components(rates));
-                AngleMotion { R: S::both(&kin.R), B: S::both(&kin.B), bias: S::vector(&kin.bias) }
-            }
-        }
-    }
-
     /// Rotation, rate map and bias at `angles` (rad) and `rates` (rad/s).
     #[inline(always)]
     pub fn kinematics<T: Real>(self, angles: &Vector3<T>, rates: &Vector3<T>) -> AngleKinematics<T> {
@@ -255,32 +230,9 @@ fn rotation_vector_kinematics<T: Real>(phi: &Vector3<T>, rates: &Vector3<T>) -> 
     AngleKinematics { R, B, bias }
 }
 
-/// `R = 1 + s [phi]x + a [phi]x²` and `B = 1 - a [phi]x + b [phi]x²` with `[phi]x² = phi phiᵀ - phi·phi 1`; bias as below.
-#[inline(always)]
-fn rotation_vector_motion<S: Space>(phi: &S::Vector, rates: &S::Vector) -> AngleMotion<S> {
-    let one = S::Real::splat(1.0);
-    let square = S::dot(phi, phi);
-    let [s, a, b, da, db] = exponential_coefficients(square);
-    let (phi_a, phi_b) = (S::scaled(phi, a), S::scaled(phi, b));
-    let R = S::dyad_both(phi, &phi_a, &S::scaled(phi, s), one - square * a);
-    let B = S::dyad_both(phi, &phi_b, &S::scaled(phi, -a), one - square * b);
-    let xdot = S::Real::splat(2.0) * S::dot(phi, rates);
-    let c = S::cross(phi, rates);
-    let first = S::add(&S::scaled(&c, -da * xdot), &S::scaled(&S::cross(phi, &c), db * xdot));
-    AngleMotion { R, B, bias: S::add(&first, &S::scaled(&S::cross(rates, &c), b)) }
-}
-
 #[inline(always)]
 fn euler_zyx_kinematics<T: Real>(angles: &Vector3<T>, rates: &Vector3<T>) -> AngleKinematics<T> {
     let ((sx, cx), (sy, cy), (sz, cz)) = (angles.x.sin_cos(), angles.y.sin_cos(), angles.z.sin_cos());
-    euler_zyx(&Vector3::new(sx, sy, sz), &Vector3::new(cx, cy, cz), rates)
-}
-
-/// From the sines and cosines of the angles.
-#[inline(always)]
-fn euler_zyx<T: Real>(sines: &Vector3<T>, cosines: &Vector3<T>, rates: &Vector3<T>) -> AngleKinematics<T> {
-    let (sx, sy, sz) = (sines.x, sines.y, sines.z);
-    let (cx, cy, cz) = (cosines.x, cosines.y, cosines.z);
     let (sysx, sycx) = (sy * sx, sy * cx);
     let R = Matrix3::new(
         cz * cy,

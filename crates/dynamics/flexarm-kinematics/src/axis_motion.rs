@@ -8,7 +8,6 @@
 use std::ops::Add;
 
 use flexarm_spatial::products::{add, add3, dot, lift, lift3, mul, scaled, scaled3};
-use flexarm_spatial::space::TurnTable;
 use flexarm_spatial::{Pose, Real, Twist, Wrench, skew};
 use nalgebra::{Matrix3, Rotation3, Vector3, Vector6};
 
@@ -170,13 +169,9 @@ impl RevoluteTable {
         Self { K0: R + R * A2, K1: R * A, K2: -(R * A2) }
     }
 
-    /// For recursions over [`flexarm_spatial::space::Space`].
-    pub(crate) fn table(&self) -> TurnTable {
-        TurnTable::new([&self.K0, &self.K1, &self.K2])
-    }
-
+    /// `R_PB` at the sine and cosine of the joint's angle.
     #[inline(always)]
-    fn at<T: Real>(&self, sine: T, cosine: T) -> Matrix3<T> {
+    pub(crate) fn at<T: Real>(&self, sine: T, cosine: T) -> Matrix3<T> {
         add3(&add3(&lift3(&self.K0), &scaled3(&lift3(&self.K1), sine)), &scaled3(&lift3(&self.K2), cosine))
     }
 }

@@ -7,15 +7,13 @@
 use std::sync::Arc;
 
 use flexarm_spatial::products::{add, lift, lift3, mul};
-use flexarm_spatial::space::Plain;
 use flexarm_spatial::{ElasticAngles, Pose, Real, SpatialInertia};
 use nalgebra::{Matrix3, Vector3};
 
-use crate::aba::Roles;
 use crate::axis_motion::AxisMotion;
 use crate::crba::composite_bodies;
 use crate::data::{Data, State, identity};
-use crate::free_forces::{Motions, PointTree};
+use crate::free_forces::FreeForces;
 use crate::kinematics::{place_bodies, tree_jacobian};
 use crate::model::{Body, Frame, JointMotion, Model};
 use crate::rnea::{at_rest, newton_euler};
@@ -23,7 +21,7 @@ use crate::static_tangent::{PointLoad, StaticTangent};
 
 /// A tree whose inertias are in the scalar of a recursion: a [`Model`], or one with several sets of them
 /// ([`LaneTree`]).
-pub(crate) trait Tree<T: Real> {
+pub trait Tree<T: Real> {
     /// Bodies and joints, alike in all lanes.
     fn model(&self) -> &Model;
 
@@ -96,24 +94,6 @@ impl<T: Real> Tree<T> for LaneTree<T> {
     }
 }
 
-/// Workspaces of [`free_forces`]; `None` of trees with balancers or bodies that bend in modes.
-#[inline(always)]
-pub fn point_tree<T: Real>(tree: &LaneTree<T>, roles: &Roles) -> Option<PointTree<Plain<T>>> {
-    PointTree::of(tree, roles)
-}
-
-/// [`crate::FreeForces::compute`] without loads.
-#[inline(always)]
-pub fn free_forces<T: Real>(points: &mut PointTree<Plain<T>>, motions: Motions<'_, T>, tau: &mut [T]) {
-    points.forces(motions, None, tau);
-}
-
-/// [`crate::FreeForces::mass`], at the poses of the last [`free_forces`].
-#[inline(always)]
-pub fn free_mass<T: Real>(points: &mut PointTree<Plain<T>>, M: &mut [T]) {
-    points.mass(M);
-}
-
 /// [`crate::inverse_dynamics`] without balancers: `data.tau` has the generalised forces.
 #[inline(always)]
 pub fn inverse_dynamics<T: Real>(tree: &LaneTree<T>, data: &mut Data<T>, state: &State<T>, qddot: &[T]) {
@@ -178,11 +158,11 @@ pub fn rigid_and_flexible<T: Real>(tree: &LaneTree<T>, data: &Data<T>, frame: &F
     )
 }
 
-/// [`rigid_and_flexible`] for the poses of the joints of the last [`free_forces`].
+/// [`rigid_and_flexible`] for the poses of the joints of the last [`FreeForces::compute`].
 #[inline(always)]
 pub fn rigid_and_flexible_of_points<T: Real>(
     tree: &LaneTree<T>,
-    points: &PointTree<Plain<T>>,
+    points: &FreeForces<T>,
     frame: &Frame,
     q: &[T],
 ) -> [Vector3<T>; 2] {

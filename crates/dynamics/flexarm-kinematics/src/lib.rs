@@ -65,11 +65,8 @@ pub use flexarm_spatial::{
 };
 
 #[cfg(target_arch = "x86_64")]
-pub use flexarm_spatial::lanes::{OverLanes, lanes_for, most_lanes, with_lanes};
-#[cfg(target_arch = "x86_64")]
-pub use flexarm_spatial::packed;
+pub use flexarm_spatial::lanes::{Loops, OverLanes, lanes_for, most_lanes, quickly, with_lanes};
 pub use flexarm_spatial::products;
-pub use flexarm_spatial::space;
 
 pub use aba::{Roles, forward_dynamics, hybrid_dynamics};
 pub use analytic_ik::{
@@ -88,7 +85,7 @@ pub use dynamic_tangent::DynamicTangent;
 pub use energy::{
     center_of_mass, kinetic_energy, kinetic_energy_of, momentum_of, potential_energy, potential_energy_of,
 };
-pub use free_forces::{BodyMotion, FreeForces, Motions, Observer, PointTree};
+pub use free_forces::{BodyMotion, FreeForces, Motions, Observer};
 pub use inverse_kinematics::{IkError, IkOptions, inverse_kinematics};
 pub use kinematics::{
     forward_kinematics, forward_kinematics_velocity, frame_jacobian, frame_jacobian_derivative, frame_twist,

@@ -230,7 +230,7 @@ impl ReducedArm {
     /// The masses of the arm's bodies have changed.
     pub(crate) fn weigh(&mut self) {
         if let Some(points) = &mut self.points {
-            points.weigh(&self.arm.model);
+            points.weigh(&*self.arm.model);
             points.keep();
         }
         if let Some(Some(observer)) = &mut self.observer {

@@ -209,7 +209,7 @@ fn carry(arm: &mut Arc<FlexibleArm>, points: &mut Option<Lent<FreeForces>>, chan
     let arm = Arc::make_mut(arm);
     arm.model = Arc::new(arm.model.with_inertia(change.body, change.inertia));
     if let Some(points) = points {
-        points.weigh(&arm.model);
+        points.weigh(&*arm.model);
         points.keep();
     }
 }

@@ -59,7 +59,7 @@ impl FlexibleArm {
         // Of the springs alone: which joints are driven by torque may change from arm to arm.
         let held = roles.free_coordinates().first().is_none_or(|first| *first >= self.model.n_actuated());
         let shelf = (held && self.workspaces.are_for(&self.model)).then_some(&self.workspaces.points);
-        Lent::from(shelf, || FreeForces::new(&self.model, roles))
+        Lent::from(shelf, || FreeForces::new(&*self.model, roles))
     }
 }
 

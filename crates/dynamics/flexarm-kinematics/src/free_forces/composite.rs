@@ -13,34 +13,36 @@
 use std::ops::Range;
 
 use flexarm_spatial::Real;
-use flexarm_spatial::space::{Fixed, Space};
-use nalgebra::Vector3;
+use flexarm_spatial::products::{
+    add, add3, column, columns, cross, dot, dyad, lift, mul, mul3, scaled, sub, tr_mul3, transposed, turn_symmetric,
+};
+use nalgebra::{Matrix3, Vector3};
 
 use super::node::{Node, NodeJoint};
-use super::{Part, PointTree};
+use super::{FreeForces, Part};
 
 /// The workspace.
 #[derive(Clone, Debug)]
-pub(super) struct Composites<S: Space> {
+pub(super) struct Composites<T: Real> {
     /// One for each node.
-    bodies: Vec<Composite<S>>,
+    bodies: Vec<Composite<T>>,
     /// Wrenches on their way inward, three columns each.
-    threes: Vec<Three<S>>,
+    threes: Vec<Three<T>>,
     /// Whether some coordinates do not meet, or meet more than once.
     sums: bool,
 }
 
 /// A body with all that it carries outward, in the common axes.
 #[derive(Clone, Debug)]
-struct Composite<S: Space> {
-    mass: S::Real,
+struct Composite<T: Real> {
+    mass: T,
     /// First moment and inertia about Bo.
-    h: S::Vector,
-    I: S::Matrix,
+    h: Vector3<T>,
+    I: Matrix3<T>,
     /// Turns vectors of the body's axes.
-    R: S::Both,
+    R: Matrix3<T>,
     /// From the parent's origin to the body's.
-    r: S::Vector,
+    r: Vector3<T>,
     /// The parent, if its wrench counts.
     parent: Option<usize>,
     /// The first of its joint's columns among the threes, if it is free.
@@ -58,17 +60,17 @@ struct Place {
 
 /// Wrenches of up to three columns whose rows in M follow each other.
 #[derive(Clone, Debug)]
-struct Three<S: Space> {
+struct Three<T: Real> {
     row: usize,
     count: usize,
     /// `Fᵀ`: a row for each of them, a column for each component.
-    force: S::Matrix,
-    torque: S::Matrix,
+    force: Matrix3<T>,
+    torque: Matrix3<T>,
 }
 
 /// Room for the columns of a joint: beside the next free one inward, if that is the last so far and both have one coordinate.
 #[inline(always)]
-fn place_columns<S: Space>(threes: &mut Vec<Three<S>>, inner: Option<Place>, row: usize, size: usize) -> Place {
+fn place_columns<T: Real>(threes: &mut Vec<Three<T>>, inner: Option<Place>, row: usize, size: usize) -> Place {
     if let (Some(inner), Some(last), 1) = (inner, threes.len().checked_sub(1), size)
         && inner.three == last
         && inner.lane + 1 == threes[last].count
@@ -79,23 +81,21 @@ fn place_columns<S: Space>(threes: &mut Vec<Three<S>>, inner: Option<Place>, row
         return Place { lane: inner.lane + 1, ..inner };
     }
     let first = Place { three: threes.len(), lane: 0 };
-    let zero = S::fixed(&Fixed::default());
-    let none = S::of_columns([zero; 3]);
     for row in (row..row + size).step_by(3) {
-        threes.push(Three { row, count: size.min(3), force: none, torque: none });
+        threes.push(Three { row, count: size.min(3), force: Matrix3::zeros(), torque: Matrix3::zeros() });
     }
     first
 }
 
-impl<S: Space> Composites<S> {
+impl<T: Real> Composites<T> {
     /// For n free coordinates.
     #[inline(always)]
-    fn new(nodes: &[Node<S>], n: usize) -> Self {
-        let real = S::Real::splat;
-        let zero = S::fixed(&Fixed::default());
+    fn new(nodes: &[Node<T>], n: usize) -> Self {
+        let real = T::splat;
+        let zero = Vector3::zeros();
         let parent = |i: usize| nodes[i].parent.filter(|parent| nodes[*parent].part == Part::Loading);
-        let mut bodies: Vec<Composite<S>> = Vec::with_capacity(nodes.len());
-        let mut threes: Vec<Three<S>> = Vec::new();
+        let mut bodies: Vec<Composite<T>> = Vec::with_capacity(nodes.len());
+        let mut threes: Vec<Three<T>> = Vec::new();
         let (mut columns, mut branches) = (0, false);
         for (i, node) in nodes.iter().enumerate() {
             let is_beside = |j: usize| j != i && nodes[j].part == Part::Loading && parent(j) == parent(i);
@@ -103,8 +103,8 @@ impl<S: Space> Composites<S> {
             let mut body = Composite {
                 mass: real(0.0),
                 h: zero,
-                I: S::of_columns([zero; 3]),
-                R: S::dyad_both(&zero, &zero, &zero, real(1.0)),
+                I: Matrix3::zeros(),
+                R: Matrix3::identity(),
                 r: zero,
                 parent: parent(i),
                 own: None,
@@ -130,7 +130,7 @@ impl<S: Space> Composites<S> {
 
     /// Own inertias, turned to the common axes.
     #[inline(always)]
-    fn begin(&mut self, nodes: &[Node<S>]) {
+    fn begin(&mut self, nodes: &[Node<T>]) {
         for (i, node) in nodes.iter().enumerate().filter(|(_, node)| node.part == Part::Loading) {
             let (inward, outward) = self.bodies.split_at_mut(i);
             let body = &mut outward[0];
@@ -139,16 +139,16 @@ impl<S: Space> Composites<S> {
                 (body.h, body.I) = (node.h, node.I);
                 continue;
             };
-            body.R = S::turned(&parent.R, &node.R);
-            body.r = S::turn(&parent.R, &node.p);
-            body.h = S::turn(&body.R, &node.h);
-            body.I = S::congruent(&body.R, &node.I);
+            body.R = mul3(&parent.R, &node.R);
+            body.r = mul(&parent.R, &node.p);
+            body.h = mul(&body.R, &node.h);
+            body.I = turn_symmetric(&body.R, &node.I);
         }
     }
 
     /// (10) and (11), column after column into M.
     #[inline(always)]
-    fn meet<const SUMS: bool>(&mut self, nodes: &[Node<S>], M: &mut Entries<'_, S::Real, SUMS>) {
+    fn meet<const SUMS: bool>(&mut self, nodes: &[Node<T>], M: &mut Entries<'_, T, SUMS>) {
         for (i, node) in nodes.iter().enumerate().filter(|(_, node)| node.part == Part::Loading).rev() {
             let (inward, outward) = self.bodies.split_at_mut(i);
             let body = &outward[0];
@@ -156,7 +156,7 @@ impl<S: Space> Composites<S> {
             if let (Some(own), Some(row)) = (body.own, node.row) {
                 let base = match &parent {
                     Some(parent) => parent.R,
-                    None => S::transposed(&node.R),
+                    None => transposed(&node.R),
                 };
                 let outward = &mut self.threes[own.three..body.threes.end];
                 match node.joint {
@@ -174,18 +174,18 @@ impl<S: Space> Composites<S> {
     }
 }
 
-impl<S: Space> Composite<S> {
+impl<T: Real> Composite<T> {
     /// A joint of one coordinate; `base` turns vectors of the parent's axes.
     #[inline(always)]
     fn single<const SUMS: bool>(
         &self,
-        node: &Node<S>,
-        base: &S::Both,
-        outward: &mut [Three<S>],
+        node: &Node<T>,
+        base: &Matrix3<T>,
+        outward: &mut [Three<T>],
         at: Column,
-        M: &mut Entries<'_, S::Real, SUMS>,
+        M: &mut Entries<'_, T, SUMS>,
     ) {
-        let ratio = S::Real::splat(node.ratio);
+        let ratio = T::splat(node.ratio);
         let (axis, along) = match &node.joint {
             NodeJoint::Turns { axis, along, .. } => (Some(axis), along.as_ref()),
             NodeJoint::Slides { along } => (None, Some(along)),
@@ -195,25 +195,24 @@ impl<S: Space> Composite<S> {
         if at.lane + 1 == own.count {
             own.clear();
         }
-        let zero = S::fixed(&Fixed::default());
+        let zero = Vector3::zeros();
         let (mut turns, mut slides) = (zero, zero);
         if let Some(axis) = axis {
-            turns = S::scaled(&S::turn(&self.R, &S::fixed(axis)), ratio);
-            own.add(at.lane, &S::cross(&turns, &self.h), &S::mul(&self.I, &turns));
+            turns = scaled(&mul(&self.R, &lift(axis)), ratio);
+            own.add(at.lane, &cross(&turns, &self.h), &mul(&self.I, &turns));
         }
         if let Some(along) = along {
-            slides = S::scaled(&S::turn(base, &S::fixed(along)), ratio);
-            own.add(at.lane, &S::scaled(&slides, self.mass), &S::cross(&self.h, &slides));
+            slides = scaled(&mul(base, &lift(along)), ratio);
+            own.add(at.lane, &scaled(&slides, self.mass), &cross(&self.h, &slides));
         }
         for (number, three) in outward.iter().enumerate() {
             let mut products = zero;
             if axis.is_some() {
-                products = S::mul(&three.torque, &turns);
+                products = mul(&three.torque, &turns);
             }
             if along.is_some() {
-                products = S::add(&products, &S::mul(&three.force, &slides));
+                products = add(&products, &mul(&three.force, &slides));
             }
-            let products = S::components(&products);
             match number {
                 0 => M.put_own(at.row, three, at.lane, &products),
                 _ => M.put_row(at.row, three, &products),
@@ -225,62 +224,59 @@ impl<S: Space> Composite<S> {
     #[inline(always)]
     fn elastic<const SUMS: bool>(
         &self,
-        node: &Node<S>,
-        base: &S::Both,
-        outward: &mut [Three<S>],
+        node: &Node<T>,
+        base: &Matrix3<T>,
+        outward: &mut [Three<T>],
         row: usize,
-        M: &mut Entries<'_, S::Real, SUMS>,
+        M: &mut Entries<'_, T, SUMS>,
     ) {
         let is_parallel = matches!(node.joint, NodeJoint::Elastic { is_parallel: true, .. });
-        let L = if is_parallel { *base } else { S::turned(base, &node.R_PJ) };
-        let B = S::turned(&self.R, &node.B);
-        let h = S::components(&self.h);
+        let L = if is_parallel { *base } else { mul3(base, &node.R_PJ) };
+        let B = mul3(&self.R, &node.B);
+        let h = &self.h;
         // m L and [h]x L, then -[h]x B and I B, by their rows.
-        let rows = [S::row(&L, 0), S::row(&L, 1), S::row(&L, 2)];
-        outward[0].force = S::of_columns([
-            S::scaled(&rows[0], self.mass),
-            S::scaled(&rows[1], self.mass),
-            S::scaled(&rows[2], self.mass),
-        ]);
-        outward[0].torque = S::of_columns(crossed::<S>(&h, &rows));
-        let rows = [S::row(&B, 0), S::row(&B, 1), S::row(&B, 2)];
-        outward[1].force = S::of_columns(crossed::<S>(&-h, &rows));
-        let [x, y, z] = S::columns(&self.I);
-        outward[1].torque = S::of_columns([S::turn_back(&B, &x), S::turn_back(&B, &y), S::turn_back(&B, &z)]);
+        let Lt = transposed(&L);
+        let rows = [column(&Lt, 0), column(&Lt, 1), column(&Lt, 2)];
+        outward[0].force =
+            columns(scaled(&rows[0], self.mass), scaled(&rows[1], self.mass), scaled(&rows[2], self.mass));
+        outward[0].torque = crossed(h, &rows);
+        let Bt = transposed(&B);
+        let rows = [column(&Bt, 0), column(&Bt, 1), column(&Bt, 2)];
+        outward[1].force = crossed(&-*h, &rows);
+        outward[1].torque = tr_mul3(&B, &self.I);
 
         // The translations meet the mass alone.
-        let zero = S::Real::splat(0.0);
+        let zero = T::splat(0.0);
         for c in 0..3 {
             let mut own = [zero; 3];
             own[c] = self.mass;
             M.put_own(row + c, &outward[0], c, &own.into());
         }
         for three in &outward[1..] {
-            M.put_three::<S>(row, three, &L, &three.force);
+            M.put_three(row, three, &L, &three.force);
         }
         let (own, others) = (&outward[1], &outward[2..]);
         for c in 0..3 {
-            M.put_own(row + 3 + c, own, c, &S::components(&S::mul(&own.torque, &S::column(&B, c))));
+            M.put_own(row + 3 + c, own, c, &mul(&own.torque, &column(&B, c)));
         }
         for three in others {
-            M.put_three::<S>(row + 3, three, &B, &three.torque);
+            M.put_three(row + 3, three, &B, &three.torque);
         }
     }
 
     /// Takes in one that sits at its r.
     #[inline(always)]
     fn take(&mut self, other: &Self) {
-        let real = S::Real::splat;
-        let zero = S::fixed(&Fixed::default());
+        let real = T::splat;
+        let zero = Vector3::zeros();
         let (r, h) = (&other.r, &other.h);
         // I + (2 r·h + m r·r) 1 - (r hᵀ + h rᵀ + m r rᵀ), with k = h + m r/2
-        let moment = S::scaled(r, other.mass);
-        let k = S::add(h, &S::scaled(&moment, real(0.5)));
-        let [back, k_back] = [S::scaled(r, real(-1.0)), S::scaled(&k, real(-1.0))];
-        let moved =
-            S::sum(&S::dyad(&back, &k, &zero, real(2.0) * S::dot(r, &k)), &S::dyad(&k_back, r, &zero, real(0.0)));
-        self.I = S::sum(&self.I, &S::sum(&other.I, &moved));
-        self.h = S::add(&self.h, &S::add(h, &moment));
+        let moment = scaled(r, other.mass);
+        let k = add(h, &scaled(&moment, real(0.5)));
+        let [back, k_back] = [scaled(r, real(-1.0)), scaled(&k, real(-1.0))];
+        let moved = add3(&dyad(&back, &k, &zero, real(2.0) * dot(r, &k)), &dyad(&k_back, r, &zero, real(0.0)));
+        self.I = add3(&self.I, &add3(&other.I, &moved));
+        self.h = add(&self.h, &add(h, &moment));
         self.mass += other.mass;
     }
 }
@@ -292,45 +288,40 @@ struct Column {
     row: usize,
 }
 
-impl<S: Space> Three<S> {
+impl<T: Real> Three<T> {
     /// No wrenches.
     #[inline(always)]
     fn clear(&mut self) {
-        let zero = S::fixed(&Fixed::default());
-        (self.force, self.torque) = (S::of_columns([zero; 3]), S::of_columns([zero; 3]));
+        (self.force, self.torque) = (Matrix3::zeros(), Matrix3::zeros());
     }
 
-    /// What a column whose wrench is zero gets.
+    /// Adds a wrench to a column.
     #[inline(always)]
-    fn add(&mut self, lane: usize, force: &S::Vector, torque: &S::Vector) {
-        const UNITS: [Fixed; 3] = [Fixed::unit(0), Fixed::unit(1), Fixed::unit(2)];
-        let unit = S::fixed(&UNITS[lane]);
+    fn add(&mut self, lane: usize, force: &Vector3<T>, torque: &Vector3<T>) {
         for (to, v) in [(&mut self.force, force), (&mut self.torque, torque)] {
-            let (v, [x, y, z]) = (S::components(v), S::columns(to));
-            *to = S::of_columns([
-                S::add(&x, &S::scaled(&unit, v.x)),
-                S::add(&y, &S::scaled(&unit, v.y)),
-                S::add(&z, &S::scaled(&unit, v.z)),
-            ]);
+            let [x, y, z] = &mut to.data.0;
+            x[lane] += v.x;
+            y[lane] += v.y;
+            z[lane] += v.z;
         }
     }
 
     /// About a point r before this one.
     #[inline(always)]
-    fn carry(&mut self, r: &S::Vector) {
-        let moved = S::of_columns(crossed::<S>(&S::components(r), &S::columns(&self.force)));
-        self.torque = S::sum(&self.torque, &moved);
+    fn carry(&mut self, r: &Vector3<T>) {
+        let components = [column(&self.force, 0), column(&self.force, 1), column(&self.force, 2)];
+        self.torque = add3(&self.torque, &crossed(r, &components));
     }
 }
 
-/// `[v]x A`, by rows.
+/// `([v]x A)ᵀ` of the rows of A.
 #[inline(always)]
-fn crossed<S: Space>(v: &Vector3<S::Real>, [x, y, z]: &[S::Vector; 3]) -> [S::Vector; 3] {
-    [
-        S::sub(&S::scaled(z, v.y), &S::scaled(y, v.z)),
-        S::sub(&S::scaled(x, v.z), &S::scaled(z, v.x)),
-        S::sub(&S::scaled(y, v.x), &S::scaled(x, v.y)),
-    ]
+fn crossed<T: Real>(v: &Vector3<T>, [x, y, z]: &[Vector3<T>; 3]) -> Matrix3<T> {
+    columns(
+        sub(&scaled(z, v.y), &scaled(y, v.z)),
+        sub(&scaled(x, v.z), &scaled(z, v.x)),
+        sub(&scaled(y, v.x), &scaled(x, v.y)),
+    )
 }
 
 /// The mass matrix that is being filled, n columns of n; zero before if it SUMS, because some coordinates do not meet, or meet more than
@@ -356,7 +347,7 @@ impl<T: Real, const SUMS: bool> Entries<'_, T, SUMS> {
 
     /// What a column meets among its own three: itself and those behind it.
     #[inline(always)]
-    fn put_own<S: Space<Real = T>>(&mut self, row: usize, three: &Three<S>, lane: usize, products: &Vector3<T>) {
+    fn put_own(&mut self, row: usize, three: &Three<T>, lane: usize, products: &Vector3<T>) {
         self.put_one(row, row, products[lane]);
         for k in lane + 1..three.count {
             self.put(row, three.row + k, products[k]);
@@ -365,7 +356,7 @@ impl<T: Real, const SUMS: bool> Entries<'_, T, SUMS> {
 
     /// What a column meets among three others.
     #[inline(always)]
-    fn put_row<S: Space<Real = T>>(&mut self, row: usize, three: &Three<S>, products: &Vector3<T>) {
+    fn put_row(&mut self, row: usize, three: &Three<T>, products: &Vector3<T>) {
         if SUMS || three.count < 3 {
             for k in 0..three.count {
                 self.put(row, three.row + k, products[k]);
@@ -379,10 +370,10 @@ impl<T: Real, const SUMS: bool> Entries<'_, T, SUMS> {
 
     /// What three columns of an elastic joint, with these axes, meet among three others.
     #[inline(always)]
-    fn put_three<S: Space<Real = T>>(&mut self, row: usize, three: &Three<S>, axes: &S::Both, wrenches: &S::Matrix) {
-        let a = S::components(&S::mul(wrenches, &S::column(axes, 0)));
-        let b = S::components(&S::mul(wrenches, &S::column(axes, 1)));
-        let c = S::components(&S::mul(wrenches, &S::column(axes, 2)));
+    fn put_three(&mut self, row: usize, three: &Three<T>, axes: &Matrix3<T>, wrenches: &Matrix3<T>) {
+        let a = mul(wrenches, &column(axes, 0));
+        let b = mul(wrenches, &column(axes, 1));
+        let c = mul(wrenches, &column(axes, 2));
         let other = three.row;
         if SUMS || three.count < 3 {
             for k in 0..three.count {
@@ -412,10 +403,14 @@ impl<T: Real, const SUMS: bool> Entries<'_, T, SUMS> {
     }
 }
 
-impl<S: Space> PointTree<S> {
-    /// Mass matrix of the free coordinates (kg, kg m, kg m²) at the poses of the last forces, column after column into M.
+impl<T: Real> FreeForces<T> {
+    /// Mass matrix of the free coordinates (kg, kg m, kg m²) at the poses of the last forces, column after column into M, both
+    /// triangles: that of [`crate::mass_matrix`], to rounding. Allocates when it is called first, and not again.
+    ///
+    /// # Source
+    /// [Featherstone 2008], section 6.2.
     #[inline(always)]
-    pub(crate) fn mass(&mut self, M: &mut [S::Real]) {
+    pub fn mass(&mut self, M: &mut [T]) {
         let (nodes, n) = (&self.nodes, M.len().isqrt());
         let composites = self.composites.get_or_insert_with(
             #[inline(always)]
@@ -423,7 +418,7 @@ impl<S: Space> PointTree<S> {
         );
         composites.begin(nodes);
         if composites.sums {
-            M.fill(S::Real::splat(0.0));
+            M.fill(T::splat(0.0));
             composites.meet(nodes, &mut Entries::<_, true> { M, n });
         } else {
             composites.meet(nodes, &mut Entries::<_, false> { M, n });
@@ -431,8 +426,15 @@ impl<S: Space> PointTree<S> {
         for &(row, coordinate, inertia) in &self.rotors {
             let column = self.nodes.iter().find(|node| node.coordinate == coordinate).and_then(|node| node.row);
             if let Some(column) = column {
-                M[column * n + row] += S::Real::splat(inertia);
+                M[column * n + row] += T::splat(inertia);
             }
         }
+    }
+
+    /// [`FreeForces::mass`] at the positions of all coordinates (rad or m).
+    #[inline(always)]
+    pub fn mass_at(&mut self, q: &[T], M: &mut [T]) {
+        self.place(q);
+        self.mass(M);
     }
 }

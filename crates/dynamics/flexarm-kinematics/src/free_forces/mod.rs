@@ -15,8 +15,8 @@
 //! wrench moves no free coordinate (all before the first spring of an arm) take part in (1) to (3) alone, those that carry no
 //! other one not even in that.
 //!
-//! Start at [`PointTree`], the recursion over any [`Space`], or at [`FreeForces`], which is it over one state in the quickest space of the
-//! processor; [`Observer`] is it for all coordinates, with poses and energies. Trees with closed loops, balancers or bodies that bend in modes are not for it.
+//! Start at [`FreeForces`]; [`Observer`] is it for all coordinates, with poses and energies. Trees with closed loops, balancers or
+//! bodies that bend in modes are not for it.
 //!
 //! Source: [Luh, Walker & Paul 1980].
 
@@ -24,9 +24,8 @@ mod composite;
 mod node;
 mod observed;
 
-use flexarm_spatial::quickest::{Kept, Make, Quickest, Work};
-use flexarm_spatial::space::{Fixed, Plain, Space};
-use flexarm_spatial::{Real, Wrench};
+use flexarm_spatial::products::{add, cross, lift, mul};
+use flexarm_spatial::{Real, Wrench, sin_cos_all};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::aba::Roles;
@@ -49,19 +48,19 @@ pub struct Motions<'a, T> {
 
 /// A tree with the workspaces of the recursion.
 #[derive(Clone, Debug)]
-pub struct PointTree<S: Space> {
+pub struct FreeForces<T: Real = f64> {
     /// All but the world, parents before children.
-    nodes: Vec<Node<S>>,
+    nodes: Vec<Node<T>>,
     /// Minus gravity.
-    up: S::Vector,
+    up: Vector3<T>,
     /// Angles of the joints that turn (rad), their sines and cosines.
-    angles: Vec<S::Real>,
-    sines: Vec<S::Real>,
-    cosines: Vec<S::Real>,
+    angles: Vec<T>,
+    sines: Vec<T>,
+    cosines: Vec<T>,
     /// Free row, coordinate and inertia of what rotors add.
     rotors: Vec<(usize, usize, f64)>,
     /// The workspace of the mass matrix, once it is asked for.
-    composites: Option<Box<Composites<S>>>,
+    composites: Option<Box<Composites<T>>>,
 }
 
 /// What (1) to (6) need of a body.
@@ -91,10 +90,10 @@ fn parts(model: &Model, roles: &Roles) -> Vec<Part> {
     parts
 }
 
-impl<S: Space> PointTree<S> {
-    /// Of a tree whose free coordinates are those of the roles; `None` of trees with closed loops, balancers or bodies that bend in modes.
+impl<T: Real> FreeForces<T> {
+    /// For the free coordinates of the roles; `None` of trees with closed loops, balancers or bodies that bend in modes.
     #[inline(always)]
-    pub(crate) fn of(tree: &impl Tree<S::Real>, roles: &Roles) -> Option<Self> {
+    pub fn new(tree: &impl Tree<T>, roles: &Roles) -> Option<Self> {
         let model = tree.model();
         if !(model.loops.is_empty() && model.balancers.is_empty() && model.modal.is_empty()) {
             return None;
@@ -113,15 +112,15 @@ impl<S: Space> PointTree<S> {
         let coupled = model.rotor_couplings.iter().flat_map(|&(a, b, inertia)| [(a, b, inertia), (b, a, inertia)]);
         let rotors = single.chain(coupled).filter_map(|(to, of, inertia)| Some((row(to)?, of, inertia))).collect();
         // Whole registers of them.
-        let together = if S::Real::LANES > 1 { 1 } else { 4 };
-        let zeros = vec![S::Real::splat(0.0); model.turning.len().next_multiple_of(together)];
-        let up = S::fixed(&Fixed::from(&-model.gravity));
+        let together = if T::LANES > 1 { 1 } else { 4 };
+        let zeros = vec![T::splat(0.0); model.turning.len().next_multiple_of(together)];
+        let up = lift(&-model.gravity);
         Some(Self { nodes, up, angles: zeros.clone(), sines: zeros.clone(), cosines: zeros, rotors, composites: None })
     }
 
-    /// Inertias of the tree, which is otherwise that of before.
+    /// Takes the inertias of a tree that is otherwise the one of before.
     #[inline(always)]
-    pub(crate) fn weigh(&mut self, tree: &impl Tree<S::Real>) {
+    pub fn weigh(&mut self, tree: &impl Tree<T>) {
         for (i, node) in self.nodes.iter_mut().enumerate() {
             node.weigh(&tree.inertia(i + 1));
         }
@@ -129,18 +128,18 @@ impl<S: Space> PointTree<S> {
 
     /// Sines and cosines of the joints that turn.
     #[inline(always)]
-    fn turn_joints(&mut self, q: &[S::Real]) {
+    fn turn_joints(&mut self, q: &[T]) {
         for node in &self.nodes {
             if let NodeJoint::Turns { turning, .. } = node.joint {
                 self.angles[turning] = node.value(q);
             }
         }
-        S::sin_cos_all(&self.angles, &mut self.sines, &mut self.cosines);
+        sin_cos_all(&self.angles, &mut self.sines, &mut self.cosines);
     }
 
     /// Poses of the bodies in their parents.
     #[inline(always)]
-    fn place(&mut self, q: &[S::Real]) {
+    fn place(&mut self, q: &[T]) {
         self.turn_joints(q);
         // Nothing is computed of rates that nobody looks at.
         let motions = Motions { q, qdot: q, qddot: q };
@@ -149,26 +148,17 @@ impl<S: Space> PointTree<S> {
         }
     }
 
-    /// Angular velocity of the world.
-    #[inline(always)]
-    fn still(&self) -> S::Vector {
-        S::scaled(&self.up, S::Real::splat(0.0))
-    }
-
-    /// Generalised forces `τ = M(q) q̈ + bias(q, q̇)` (N m or N) of the free coordinates, in their order, into `tau`.
+    /// Generalised forces `τ = M(q) q̈ + bias(q, q̇)` (N m or N) of the free coordinates, in their order, into `tau`: those of
+    /// [`crate::inverse_dynamics`], to rounding. O(n), no allocation.
     ///
     /// * `loads`: external wrench on each body at Bo, B axes, if there are any; they are subtracted.
+    ///
+    /// # Source
+    /// [Luh, Walker & Paul 1980].
     #[inline(always)]
-    pub(crate) fn forces(
-        &mut self,
-        motions: Motions<'_, S::Real>,
-        loads: Option<&[Wrench<S::Real>]>,
-        tau: &mut [S::Real],
-    ) {
+    pub fn compute(&mut self, motions: Motions<'_, T>, loads: Option<&[Wrench<T>]>, tau: &mut [T]) {
         self.turn_joints(motions.q);
-        let still = self.still();
-        let world =
-            Moving { omega: still, alpha: still, a: self.up, W: S::dyad(&still, &still, &still, S::Real::splat(0.0)) };
+        let world = Moving { omega: Vector3::zeros(), alpha: Vector3::zeros(), a: self.up, W: Matrix3::zeros() };
         let mut last = world;
         for i in 0..self.nodes.len() {
             let (inward, outward) = self.nodes.split_at_mut(i);
@@ -192,16 +182,16 @@ impl<S: Space> PointTree<S> {
         }
         self.carry_inward(tau);
         for &(row, coordinate, inertia) in &self.rotors {
-            tau[row] += S::Real::splat(inertia) * motions.qddot[coordinate];
+            tau[row] += T::splat(inertia) * motions.qddot[coordinate];
         }
     }
 
     /// (6).
     #[inline(always)]
-    fn carry_inward(&mut self, tau: &mut [S::Real]) {
-        tau.fill(S::Real::splat(0.0));
+    fn carry_inward(&mut self, tau: &mut [T]) {
+        tau.fill(T::splat(0.0));
         // What the body just done puts on the one before it, if that is its parent.
-        let none = [S::fixed(&Fixed::default()); 2];
+        let none = [Vector3::zeros(); 2];
         let mut carried = none;
         for i in (0..self.nodes.len()).rev() {
             let (inward, outward) = self.nodes.split_at_mut(i);
@@ -209,9 +199,9 @@ impl<S: Space> PointTree<S> {
             if node.part != Part::Loading {
                 continue;
             }
-            let [force, torque] = [S::add(&node.force, &carried[0]), S::add(&node.torque, &carried[1])];
+            let [force, torque] = [add(&node.force, &carried[0]), add(&node.torque, &carried[1])];
             carried = none;
-            let force = S::turn(&node.R, &force);
+            let force = mul(&node.R, &force);
             if let Some(row) = node.row {
                 let own = node.project(&force, &torque);
                 for (tau, own) in tau[row..].iter_mut().zip(own).take(node.size()) {
@@ -219,132 +209,21 @@ impl<S: Space> PointTree<S> {
                 }
             }
             let Some(number) = node.parent.filter(|parent| inward[*parent].part == Part::Loading) else { continue };
-            let torque = S::add(&S::turn(&node.R, &torque), &S::cross(&node.p, &force));
+            let torque = add(&mul(&node.R, &torque), &cross(&node.p, &force));
             if number + 1 == i {
                 carried = [force, torque];
             } else {
                 let parent = &mut inward[number];
-                parent.force = S::add(&parent.force, &force);
-                parent.torque = S::add(&parent.torque, &torque);
+                parent.force = add(&parent.force, &force);
+                parent.torque = add(&parent.torque, &torque);
             }
         }
     }
-}
 
-impl<T: Real> PointTree<Plain<T>> {
     /// Rotation of a body in its parent and place of its origin, as the last forces found them.
     #[inline(always)]
     pub(crate) fn pose(&self, body: usize) -> (&Matrix3<T>, &Vector3<T>) {
         let node = &self.nodes[body - 1];
         (&node.R, &node.p)
-    }
-}
-
-/// The recursion over one state: packed where the processor packs vectors, to the same bits.
-pub struct FreeForces(Quickest<FreeTree>);
-
-impl FreeForces {
-    /// For the free coordinates of the roles; `None` of trees with closed loops, balancers or bodies that bend in modes.
-    pub fn new(model: &Model, roles: &Roles) -> Option<Self> {
-        Some(Self(Quickest::new(Of(model, roles))?))
-    }
-
-    /// Over numbers, whatever the processor has.
-    pub fn plain(model: &Model, roles: &Roles) -> Option<Self> {
-        Some(Self(Quickest::plain(Of(model, roles))?))
-    }
-
-    /// Generalised forces `τ = M(q) q̈ + bias(q, q̇)` (N m or N) of the free coordinates, in their order, into `tau`: those of
-    /// [`crate::inverse_dynamics`], to rounding. O(n), no allocation.
-    ///
-    /// * `loads`: external wrench on each body at Bo, B axes, if there are any; they are subtracted.
-    ///
-    /// # Source
-    /// [Luh, Walker & Paul 1980].
-    #[inline]
-    pub fn compute(&mut self, motions: Motions<'_, f64>, loads: Option<&[Wrench]>, tau: &mut [f64]) {
-        self.0.run(Forces { motions, loads, tau });
-    }
-
-    /// Mass matrix of the free coordinates (kg, kg m, kg m²) at the poses of the last forces, column after column into M, both triangles:
-    /// that of [`crate::mass_matrix`], to rounding. Allocates when it is called first, and not again.
-    ///
-    /// # Source
-    /// [Featherstone 2008], section 6.2.
-    pub fn mass(&mut self, M: &mut [f64]) {
-        self.0.run(Mass { q: None, M });
-    }
-
-    /// [`FreeForces::mass`] at the positions of all coordinates (rad or m).
-    pub fn mass_at(&mut self, q: &[f64], M: &mut [f64]) {
-        self.0.run(Mass { q: Some(q), M });
-    }
-
-    /// The model has other inertias than before, and is else the same.
-    pub fn weigh(&mut self, model: &Model) {
-        self.0.run(Weigh(model));
-    }
-}
-
-/// What [`FreeForces`] keeps.
-struct FreeTree;
-
-impl Kept for FreeTree {
-    type Of<S: Space<Real = f64>> = PointTree<S>;
-}
-
-#[derive(Clone, Copy)]
-struct Of<'a>(&'a Model, &'a Roles);
-
-impl Make<FreeTree> for Of<'_> {
-    #[inline(always)]
-    fn make<S: Space<Real = f64>>(self) -> Option<PointTree<S>> {
-        PointTree::of(self.0, self.1)
-    }
-}
-
-/// See [`FreeForces::compute`].
-struct Forces<'a> {
-    motions: Motions<'a, f64>,
-    loads: Option<&'a [Wrench]>,
-    tau: &'a mut [f64],
-}
-
-impl Work<FreeTree> for Forces<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Space<Real = f64>>(self, tree: &mut PointTree<S>) {
-        tree.forces(self.motions, self.loads, self.tau);
-    }
-}
-
-/// See [`FreeForces::mass`] and [`FreeForces::mass_at`].
-struct Mass<'a> {
-    q: Option<&'a [f64]>,
-    M: &'a mut [f64],
-}
-
-impl Work<FreeTree> for Mass<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Space<Real = f64>>(self, tree: &mut PointTree<S>) {
-        if let Some(q) = self.q {
-            tree.place(q);
-        }
-        tree.mass(self.M);
-    }
-}
-
-/// See [`FreeForces::weigh`].
-struct Weigh<'a>(&'a Model);
-
-impl Work<FreeTree> for Weigh<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Space<Real = f64>>(self, tree: &mut PointTree<S>) {
-        tree.weigh(self.0);
     }
 }

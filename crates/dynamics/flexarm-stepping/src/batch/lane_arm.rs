@@ -4,12 +4,10 @@
 //! nothing happens at discrete times.
 
 use flexarm_kinematics::lanes::{
-    LaneTree, free_forces, free_mass, inverse_dynamics, mass_matrix_at_poses, point_tree, rigid_and_flexible,
-    rigid_and_flexible_of_points,
+    LaneTree, inverse_dynamics, mass_matrix_at_poses, rigid_and_flexible, rigid_and_flexible_of_points,
 };
 use flexarm_kinematics::products::sub;
-use flexarm_kinematics::space::Plain;
-use flexarm_kinematics::{Data, Frame, Motions, PointTree, Real, Roles, State};
+use flexarm_kinematics::{Data, Frame, FreeForces, Motions, Real, Roles, State};
 use nalgebra::Vector3;
 
 use crate::arm::FlexibleArm;
@@ -32,7 +30,7 @@ struct Element<T> {
 pub(super) struct LaneArm<T: Real> {
     tree: LaneTree<T>,
     /// The equations of motion of the elastic coordinates alone, where the tree is for it.
-    points: Option<PointTree<Plain<T>>>,
+    points: Option<FreeForces<T>>,
     data: Data<T>,
     state: State<T>,
     qddot: Vec<T>,
@@ -88,7 +86,7 @@ impl<T: Real> LaneArm<T> {
         let D = (!first.proportional).then(|| (0..n * n).map(|i| gather(arms, |arm| arm.D[i])).collect());
         let model = tree.model();
         Some(Self {
-            points: point_tree(&tree, &Roles::actuated_prescribed(model)),
+            points: FreeForces::new(&tree, &Roles::actuated_prescribed(model)),
             data: Data::new(model),
             state: State::zeros(model),
             qddot: vec![T::zero(); model.nv()],
@@ -145,7 +143,7 @@ impl<T: Real> LaneArm<T> {
         match &mut self.points {
             Some(points) => {
                 let (q, qdot) = (self.state.q.as_slice(), self.state.qdot.as_slice());
-                free_forces(points, Motions { q, qdot, qddot: &self.qddot }, r);
+                points.compute(Motions { q, qdot, qddot: &self.qddot }, None, r);
             }
             None => {
                 inverse_dynamics(&self.tree, &mut self.data, &self.state, &self.qddot);
@@ -176,7 +174,7 @@ impl<T: Real> LaneArm<T> {
     #[inline(always)]
     pub(super) fn mass(&mut self, M: &mut [T]) {
         if let Some(points) = &mut self.points {
-            return free_mass(points, M);
+            return points.mass(M);
         }
         mass_matrix_at_poses(&self.tree, &mut self.data);
         let (n, joints) = (self.dimension(), self.joints());

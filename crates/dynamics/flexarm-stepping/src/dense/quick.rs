@@ -15,13 +15,13 @@ pub(crate) fn quickly(loops: impl Loops) {
     #[cfg(target_arch = "x86_64")]
     {
         struct Here<L>(L);
-        impl<L: Loops> flexarm_kinematics::packed::Loops for Here<L> {
+        impl<L: Loops> flexarm_kinematics::Loops for Here<L> {
             #[inline(always)]
             fn run(self) {
                 self.0.run();
             }
         }
-        flexarm_kinematics::packed::quickly(Here(loops));
+        flexarm_kinematics::quickly(Here(loops));
     }
     #[cfg(not(target_arch = "x86_64"))]
     loops.run();
