@@ -4,7 +4,6 @@
 //! has its bits. What a [`Factor`] does is its own, for single poses and lanes alike.
 
 mod quick;
-mod sized;
 
 use flexarm_kinematics::Real;
 
@@ -13,9 +12,6 @@ pub(crate) use quick::{Loops, congruence_quickly, largest_quickly, norm, product
 /// `y = A x`.
 #[inline(always)]
 pub(crate) fn product<T: Real>(A: &[T], x: &[T], y: &mut [T]) {
-    if sized::product(A, x, y) {
-        return;
-    }
     let Some((x_0, x)) = x.split_first() else { return };
     let (first, columns) = A.split_at(y.len());
     for (y, a) in y.iter_mut().zip(first) {
@@ -35,18 +31,14 @@ pub(crate) fn add<T: Real>(A: &mut [T], B: &[T]) {
 /// `A ← A + B`, then `y = A x`: each entry is fetched once.
 #[inline(always)]
 pub(crate) fn change_and_product<T: Real>(A: &mut [T], B: &[T], x: &[T], y: &mut [T]) {
-    if !sized::change_and_product(A, B, x, y) {
-        add(A, B);
-        product(A, x, y);
-    }
+    add(A, B);
+    product(A, x, y);
 }
 
 /// `y += A x`.
 #[inline(always)]
 pub(crate) fn add_product<T: Real>(A: &[T], x: &[T], y: &mut [T]) {
-    if !sized::add_product(A, x, y) {
-        add_columns(A, x.iter().copied(), y);
-    }
+    add_columns(A, x.iter().copied(), y);
 }
 
 /// `y -= A x`.

@@ -1,7 +1,7 @@
 //! Small dense matrices and loops of single runs, with the vector instructions that the processor has. Operations and their order are the
 //! same with and without.
 
-use super::{congruence, dot, largest_of_numbers, product, sized, solve_in_place};
+use super::{congruence, dot, largest_of_numbers, product, solve_in_place};
 
 /// Loops over numbers, inlined down to them.
 pub(crate) trait Loops {
@@ -46,12 +46,7 @@ pub(crate) fn solve_quickly(A: &mut [f64], Bt: &mut [f64], n: usize) -> bool {
         #[inline(always)]
         fn run(self) {
             let Self(A, Bt, n, positive) = self;
-            *positive = match n {
-                6 => sized::solve::<6>(A, Bt),
-                12 => sized::solve::<12>(A, Bt),
-                18 => sized::solve::<18>(A, Bt),
-                _ => solve_in_place(A, Bt, n),
-            };
+            *positive = solve_in_place(A, Bt, n);
         }
     }
     let mut positive = false;
@@ -66,12 +61,7 @@ pub(crate) fn congruence_quickly(c: f64, X: &[f64], C: &[f64], n: usize, room: [
         #[inline(always)]
         fn run(self) {
             let Self(c, X, C, n, room, product) = self;
-            match n {
-                6 => sized::congruence::<6>(c, X, C, room, product),
-                12 => sized::congruence::<12>(c, X, C, room, product),
-                18 => sized::congruence::<18>(c, X, C, room, product),
-                _ => congruence(c, X, C, n, room, product),
-            }
+            congruence(c, X, C, n, room, product);
         }
     }
     quickly(Congruence(c, X, C, n, room, product));
