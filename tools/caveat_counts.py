@@ -148,7 +148,8 @@ def matrices(flexibility: bool, heavy: float) -> Slip:
                 k[across][turn] = k[turn][across] = sign * 6 * ei / length**2
         if flexibility:
             k[0][0], k[3][3] = 1 / k[0][0], 1 / k[3][3]
-        # How the far end moves as seen from the near end: u_B - u_A - theta_A x p, theta_B - theta_A.
+        # How the far end moves as seen from the near end: u_B - u_A - theta_A x p, theta_B -
+        # theta_A.
         seen = [[float(j == i + 6) - float(j == i) for j in range(12)] for i in range(6)]
         seen[1][5], seen[2][4] = -length, length
         rows = range(12)

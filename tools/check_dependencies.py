@@ -291,7 +291,8 @@ def check_workspace():
     return problems, f"{len(packages)} crates, {sources} source files"
 
 
-# ------------------------------------------------------------------------------------------ self-test
+# ------------------------------------------------------------------------------------------
+# self-test
 def self_test():
     """Every rule must speak on a workspace that breaks it, and keep silent on one that does not."""
     def package(name, *dependencies):

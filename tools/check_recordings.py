@@ -256,7 +256,8 @@ def mcap_file(report, path, rows):
                     break
             same("/tcp/contributions", shares, names)
             if seen["/tcp/error"]:
-                # To first order the shares make up the error of an arm whose drives follow; servos have an error of their own.
+                # To first order the shares make up the error of an arm whose drives follow; servos
+                # have an error of their own.
                 sums = [[math.fsum(row[c::3]) for c in range(3)] for row in shares]
                 errors = [row[:3] for row in messages["/tcp/error"]]
                 peak = max(math.hypot(*row) for row in errors)

@@ -21,7 +21,8 @@ from pathlib import Path
 
 BROWSERS = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"]
 WIDTHS = [390, 1000, 1280, 1600]
-# Pixels within the axes in the colour of a curve; grid, axes and texts have others, and marks are left out.
+# Pixels within the axes in the colour of a curve; grid, axes and texts have others, and marks are
+# left out.
 INK = """async id => {
   const drawn = () => new Promise(done => setTimeout(done, 0));
   window.flexarmBare(true);

@@ -36,7 +36,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 
-# ---------------------------------------------------------------------------------------------------------------- sound files
+# ----------------------------------------------------------------------------------------------------------------
+# sound files
 
 URDF = """<?xml version="1.0"?>
 <robot name="beam">
@@ -810,7 +811,8 @@ def coordinate(rows):
     return "".join(f"{i + 1} {j + 1} {rows[i][j]:.15e}\n" for i in range(n) for j in range(i + 1) if rows[i][j] != 0.0)
 
 
-# ------------------------------------------------------------------------------------------------------------------- targets
+# -------------------------------------------------------------------------------------------------------------------
+# targets
 
 NEW_ARM = """<?xml version="1.0"?>
 <robot name="arm">
@@ -1020,7 +1022,8 @@ def made_targets(run, folder):
     return targets
 
 
-# ----------------------------------------------------------------------------------------------------------------- mutations
+# -----------------------------------------------------------------------------------------------------------------
+# mutations
 
 NUMBERS = ["nan", "inf", "-inf", "1e308", "-1e308", "1e-308", "1e400", "-1", "0", "-0.0", "1e9", "1e-9", "1e30", "2147483647", "2147483648",
            "4294967295", "4294967296", "9223372036854775807", "9223372036854775808", "-9223372036854775808", "18446744073709551615", "0x10", "1,5", "1" * 400, ".", "1e", "true", '""']
@@ -1216,7 +1219,8 @@ def mutate_line(rng):
     return line
 
 
-# --------------------------------------------------------------------------------------------------------------- one run
+# ---------------------------------------------------------------------------------------------------------------
+# one run
 
 Result = collections.namedtuple("Result", "code signal out err seconds megabytes late stopped")
 
@@ -1228,7 +1232,8 @@ class Runner:
 
     def run(self, line, folder):
         """Runs a command with limits of memory and time; one that is late is asked to stop, then killed."""
-        # The limit of the address space is generous (threads reserve much and use little); what was used is measured.
+        # The limit of the address space is generous (threads reserve much and use little); what was
+        # used is measured.
         words = ["/bin/sh", "-c", 'ulimit -v "$0"; ulimit -c 0; ulimit -f 2000000; exec "$@"', str(4096 * self.megabytes), self.program, *line]
         with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
             begin = time.monotonic()
@@ -1275,7 +1280,8 @@ def nulls(value, key=""):
 
 # Keys that may be null with a reason that docs or comments of the summary give.
 MAY_BE_NULL = {"settling_s", "frequency_hz", "at_rest", "compliance_share[]", "overshoot", "damping", "duration_s", "first_frequency_hz", "misfit"}
-# Of new: what a link has no section for, what a description does not limit, a run that was left out (docs/new_robot.md).
+# Of new: what a link has no section for, what a description does not limit, a run that was left out
+# (docs/new_robot.md).
 NEW_MAY_BE_NULL = {"section", "width", "height", "wall", "wall_of_half_mass", "material", "y_axis", "offset", "taper", "open_cuts", "reason", "mass", "lower", "upper", "velocity", "effort", "effort_fault", "summary", "lower_limit", "upper_limit", "speed_limit", "torque_limit"}
 
 
@@ -1416,7 +1422,8 @@ class Fuzzer:
             line, data, ways = mutate_line(rng), b"", ["words"]
         else:
             sound = target.files[target.change]
-            # Of packed files the content, mostly: a changed byte of the packing is found by its checksum.
+            # Of packed files the content, mostly: a changed byte of the packing is found by its
+            # checksum.
             packed = target.change.endswith(".gz") and rng.random() < 0.7
             sound = gzip.decompress(sound) if packed else sound
             data, ways = mutate(sound if isinstance(sound, bytes) else sound.encode(), rng)

@@ -20,7 +20,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 STORE = ROOT / "docs" / "performance" / "instructions.json"
 TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
-# Part by which a count may differ from the stored one; builds of other sets of crates differ by up to 2 %.
+# Part by which a count may differ from the stored one; builds of other sets of crates differ by up
+# to 2 %.
 ALLOWED = 0.05
 # Calls of the first and the second run.
 CALLS = {"step_spook": (100, 600), "step_rk4": (100, 600)}

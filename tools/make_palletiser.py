@@ -8,7 +8,8 @@ import argparse
 import math
 from pathlib import Path
 
-# Places in the plane of the loops, x forward, z up (m), at rest: lower arm upright, upper arm horizontal.
+# Places in the plane of the loops, x forward, z up (m), at rest: lower arm upright, upper arm
+# horizontal.
 SHOULDER = (0.30, 0.81)                 # joint_2 in the column
 LOWER, UPPER = 1.28, 1.35               # lower arm, upper arm from elbow to wrist
 HAND = (0.22, -0.25)                    # flange from the wrist

@@ -15,10 +15,12 @@ import numpy as np
 ROBOTS = Path(__file__).parent.parent / "robots"
 X, Y, Z = np.eye(3)
 
-# lower arm: aluminium box, 160 mm along link x (section y), 120 mm along link y (section z), wall 10 mm
+# lower arm: aluminium box, 160 mm along link x (section y), 120 mm along link y (section z), wall
+# 10 mm
 BOX = dict(width=0.16, height=0.12, wall=0.01)
 ALUMINIUM = dict(E=70e9, nu=0.33, rho=2700.0)
-# forearm: steel tube, outer diameter 140 mm, wall 6 mm; shear factor of Cowper (1966) for a *thin* tube
+# forearm: steel tube, outer diameter 140 mm, wall 6 mm; shear factor of Cowper (1966) for a *thin*
+# tube
 RO, RI, STEEL_E, STEEL_NU = 0.070, 0.064, 210e9, 0.30
 
 VARIANTS = {   # split, offset, roll of lower arm and forearm; beta of D = beta K, about 3 % on the first mode at q = 0

@@ -48,7 +48,8 @@ EXUDYN = [("tree, generalised-alpha", [4e-3, 2e-3, 1e-3, 5e-4])]
 CLASSES = [(1e-2, 0.15), (2e-3, 0.25), (3e-4, 0.6), (1e-5, 1.5)]
 
 
-# ------------------------------------------------------------------------------------------------------- environment
+# -------------------------------------------------------------------------------------------------------
+# environment
 def inside():
     """Runs this script again with the packages, if that is needed and possible."""
     if os.environ.get("FLEXARM_PEERS") or "--draw" in sys.argv:
@@ -70,7 +71,8 @@ def inside():
     sys.exit(subprocess.run([str(python) if have else sys.executable, *sys.argv], env=environment).returncode)
 
 
-# -------------------------------------------------------------------------------------------------------------- truth
+# --------------------------------------------------------------------------------------------------------------
+# truth
 def golden():
     """Times in ms -> place of the flexible tool; peak deflection (m)."""
     places, peak = {}, 0.0
@@ -94,7 +96,8 @@ def error_of(samples):
     return error if (error := max(distances) / peak) < 1.0 else None
 
 
-# --------------------------------------------------------------------------------------------------------------- ours
+# ---------------------------------------------------------------------------------------------------------------
+# ours
 def flexarm(program, stepper, step, files=None):
     """CPU s of the whole process, user and system."""
     command = [program, "compare", str(ROOT / "robots" / "reference_arm"), "--stepper", stepper, "-q", "--json"]
@@ -128,7 +131,8 @@ def our_error(program, stepper, step):
         return error_of([(t, p) for t, *p in rows])
 
 
-# ------------------------------------------------------------------------------------------------------------ the robot
+# ------------------------------------------------------------------------------------------------------------
+# the robot
 def read_robot():
     """Bodies of the arm in a row, from the robot file as tools/robot_file.py reads it; the motion; elastic coordinates at rest."""
     sys.path.insert(0, str(ROOT / "tools"))
@@ -158,7 +162,8 @@ def read_robot():
                 gravity=arm.model.gravity.linear)
 
 
-# -------------------------------------------------------------------------------------------------------------- MuJoCo
+# --------------------------------------------------------------------------------------------------------------
+# MuJoCo
 class MuJoCo:
     """Elastic joints as three slides and three hinges with fixed tendons for the full 6x6. Motors of huge inertia carry the joints along
     the motion, MuJoCo has no prescribed ones; their set points are such that the steps of each integrator meet the motion."""
@@ -239,7 +244,8 @@ class MuJoCo:
         return spent, samples
 
 
-# -------------------------------------------------------------------------------------------------------------- Exudyn
+# --------------------------------------------------------------------------------------------------------------
+# Exudyn
 class Exudyn:
     """A kinematic tree of one-DoF joints with a stiffness on its coordinates; the motion as constraints with compiled user functions."""
 
@@ -334,7 +340,8 @@ class Exudyn:
         return lambda mbs, t, itemNumber, lOffset: function(t)
 
 
-# ------------------------------------------------------------------------------------------------------------- measure
+# -------------------------------------------------------------------------------------------------------------
+# measure
 def machine():
     cpu = next((l.split(":")[1].strip() for l in Path("/proc/cpuinfo").read_text().splitlines() if l.startswith("model name")), "") if Path("/proc/cpuinfo").exists() else ""
     return f"{cpu or platform.processor()}, {os.cpu_count()} cores, {platform.system()}"
@@ -372,7 +379,8 @@ def measure(program, example, repeat):
     return dict(date=datetime.date.today().isoformat(), machine=machine(), repeat=repeat, versions=versions, lines=lines)
 
 
-# ------------------------------------------------------------------------------------------------------------ table
+# ------------------------------------------------------------------------------------------------------------
+# table
 def fastest(lines, error, figure="cpu_ms"):
     good = [line for line in lines if line["error"] is not None and line["error"] <= error]
     return min(good, key=lambda line: line[figure], default=None)

@@ -54,7 +54,8 @@ WRITTEN = {
         ("method", "str", False, "Of the reference stepper."),
     ],
 }
-#: Fields that are there in all but the rarest answers: checkers would want them asked for each time.
+#: Fields that are there in all but the rarest answers: checkers would want them asked for each
+#: time.
 THERE = {("Summary", "tcp")}
 PLAIN = {"f64": "float", "f32": "float", "bool": "bool", "String": "str", "str": "str", "PathBuf": "str", "char": "str"}
 PLAIN |= {f"{sign}{bits}": "int" for sign in "iu" for bits in ["8", "16", "32", "64", "size"]}

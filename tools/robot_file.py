@@ -24,7 +24,8 @@ MATERIALS = {  # E in Pa, nu, rho in kg/m3
 }
 
 
-# ------------------------------------------------------------------------------------------- algebra
+# -------------------------------------------------------------------------------------------
+# algebra
 def skew(r):
     return np.array([[0, -r[2], r[1]], [r[2], 0, -r[0]], [-r[1], r[0], 0.0]])
 
@@ -53,7 +54,8 @@ def merge(bodies):
     return mass, com, sum(b[2] + about_point(b[0], b[1] - com) for b in bodies)
 
 
-# ---------------------------------------------------------------------------------------------- URDF
+# ----------------------------------------------------------------------------------------------
+# URDF
 def vector(text, default="0 0 0"):
     return np.array([float(x) for x in (text or default).split()])
 
@@ -87,7 +89,8 @@ def read_urdf(path):
     return links, joints
 
 
-# ---------------------------------------------------------------------------------------------- beam
+# ----------------------------------------------------------------------------------------------
+# beam
 def box_shear_factor(along, across, nu):
     """Cowper 1966, thin-walled box of one wall thickness; lengths of the midline along and across the force."""
     m = n = across / along
@@ -183,7 +186,8 @@ def beam_link(beam, p_AB, body):
     return K_S, split * p_AB, parts
 
 
-# ----------------------------------------------------------------------------------------------- arm
+# -----------------------------------------------------------------------------------------------
+# arm
 class Arm:
     """A robot file as a Pinocchio model; `elastic=False` gives the rigid twin."""
 

@@ -21,7 +21,8 @@ import tempfile
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-# Picture: arguments of flexarm, file in its output folder, seconds that the viewer plays before the shot.
+# Picture: arguments of flexarm, file in its output folder, seconds that the viewer plays before the
+# shot.
 RERUN = {
     "recording": (["compare"], "run.rrd", 6.5),
     "mcap": (["compare"], "run.mcap", 6.5),

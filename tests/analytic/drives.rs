@@ -1,4 +1,5 @@
-//! Robots with published joint stiffness: elastic gearboxes by file, against other tools and closed forms.
+//! Robots with published joint stiffness: elastic gearboxes by file, against other tools and closed
+//! forms.
 #![allow(non_snake_case, reason = "C: compliance")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
@@ -32,10 +33,11 @@ fn worst(found: &[f64], truth: &[f64]) -> f64 {
     found.iter().zip(truth).map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max)
 }
 
-/// KR 210 and KR 500 with identified gearboxes, with and without load, in two poses: frequencies, sag and compliance.
+/// KR 210 and KR 500 with identified gearboxes, with and without load, in two poses: frequencies,
+/// sag and compliance.
 ///
-/// Truth: Pinocchio and numpy, two ways (tools/golden_identified.py). Measured: frequencies without weight 2e-13, with it 1e-12,
-/// sag 4e-16 m, compliance 8e-16 of its diagonal.
+/// Truth: Pinocchio and numpy, two ways (tools/golden_identified.py). Measured: frequencies without
+/// weight 2e-13, with it 1e-12, sag 4e-16 m, compliance 8e-16 of its diagonal.
 #[test]
 fn identified_arms_have_the_frequencies_and_the_compliance_of_the_other_tool() {
     let data = golden("identified_arms.json");
@@ -92,10 +94,11 @@ fn along(robot: &str, trajectory: &str, curve: &str) -> (f64, f64) {
     (error, peak)
 }
 
-/// Manutec r3 on its published move and the KR 210 on a fast one, motors prescribed, gearboxes elastic.
+/// Manutec r3 on its published move and the KR 210 on a fast one, motors prescribed, gearboxes
+/// elastic.
 ///
-/// Truth: Pinocchio's recursions with DOP853 at rtol 1e-12 (tools/golden_gearboxes.py). Measured 1.3e-10 m (Manutec) and
-/// 3.8e-11 m (KR 210).
+/// Truth: Pinocchio's recursions with DOP853 at rtol 1e-12 (tools/golden_gearboxes.py). Measured
+/// 1.3e-10 m (Manutec) and 3.8e-11 m (KR 210).
 #[test]
 fn arms_with_elastic_gearboxes_move_as_the_other_tool_has_them() {
     let (manutec, peak) = along("manutec_r3", "manutec_r3.toml", "manutec_r3.csv");
@@ -108,7 +111,8 @@ fn arms_with_elastic_gearboxes_move_as_the_other_tool_has_them() {
     assert!(kr210 < 1e-9);
 }
 
-/// The three-mass arm with its motor held and free. Truth: closed form; published 4.23, 10.39 and 8.97, 11.57 Hz.
+/// The three-mass arm with its motor held and free. Truth: closed form; published 4.23, 10.39 and
+/// 8.97, 11.57 Hz.
 ///
 /// Measured 1e-14; the free motor has a rotation without frequency before its modes.
 #[test]

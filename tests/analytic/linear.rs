@@ -79,7 +79,8 @@ fn modes_of_the_industrial_arm_are_those_that_compare_reports() {
     }
 }
 
-/// Truth: `C = J K^-1 Jᵀ` of statics is the response at 0 Hz, all 36 entries, and the sag is what the steppers start from.
+/// Truth: `C = J K^-1 Jᵀ` of statics is the response at 0 Hz, all 36 entries, and the sag is what
+/// the steppers start from.
 #[test]
 fn response_at_rest_is_the_compliance() {
     let robot = load("kr210/links.toml");
@@ -103,8 +104,8 @@ fn response_at_rest_is_the_compliance() {
     assert!(worst < 1e-12); // measured 3e-16
 }
 
-/// Truth: the linear modes. The nonlinear arm is let go at rest, deflected in the shape of a mode; damping 0.2 %, 60
-/// cycles.
+/// Truth: the linear modes. The nonlinear arm is let go at rest, deflected in the shape of a mode;
+/// damping 0.2 %, 60 cycles.
 #[test]
 fn ringing_from_a_shape_has_the_frequency_of_its_mode() {
     let (arm, tool) = arm(Damping::Modal(0.002), held());
@@ -132,14 +133,16 @@ fn ringing_from_a_shape_has_the_frequency_of_its_mode() {
             alpha.step(&mut system).expect("steps");
         }
         let line = strongest_line(&times, &signal, Taper::FadeOut).expect("it rings");
-        // The record resolves 1/60 of the frequency; the peak between its lines is found far within that.
+        // The record resolves 1/60 of the frequency; the peak between its lines is found far within
+        // that.
         let error = line.hz / truth - 1.0;
         eprintln!("mode {}: {truth:.4} Hz, ringing {:.4} Hz ({error:+.1e})", j + 1, line.hz);
         assert!(error.abs() < 2e-4); // measured 5.7e-5, which is 0.2 / 60²: what the taper does
     }
 }
 
-/// Truth: the linear modes within the resolution of the record. The arm is let go from where a force of 400 N held it.
+/// Truth: the linear modes within the resolution of the record. The arm is let go from where a
+/// force of 400 N held it.
 #[test]
 fn ringing_after_release_from_a_load_has_the_frequency_of_a_mode() {
     let (arm, tool) = arm(Damping::Modal(0.01), held());
@@ -207,8 +210,8 @@ impl SecondOrderSystem for Shaken {
     }
 }
 
-/// Truth: the nonlinear arm shaken by a force at the frequency of the two highest peaks of its response until the start
-/// has died away: height and phase of the peak.
+/// Truth: the nonlinear arm shaken by a force at the frequency of the two highest peaks of its
+/// response until the start has died away: height and phase of the peak.
 #[test]
 fn a_force_at_a_resonance_shakes_the_tool_as_high_as_the_peak() {
     let robot = load("reference_arm");
@@ -255,7 +258,8 @@ fn a_force_at_a_resonance_shakes_the_tool_as_high_as_the_peak() {
     }
 }
 
-/// The same for joint 2 as the shaker, whose acceleration drives the arm and which moves the tool directly as well.
+/// The same for joint 2 as the shaker, whose acceleration drives the arm and which moves the tool
+/// directly as well.
 #[test]
 fn a_joint_at_a_resonance_shakes_the_tool_as_high_as_the_peak() {
     let robot = load("reference_arm");

@@ -41,7 +41,8 @@ fn run(robot: &str, trajectory: &str, options: &RunOptions) -> (Summary, HashMap
     (summary, table)
 }
 
-/// The reference arm from its folder meets the converged curve of the other tool (tests/golden/reference_arm_mid.csv).
+/// The reference arm from its folder meets the converged curve of the other tool
+/// (tests/golden/reference_arm_mid.csv).
 ///
 /// Measured: rigid twin 1e-11 m, the digits stored; flexible 2.6e-5 of the peak deflection at 1 ms.
 #[test]
@@ -77,9 +78,9 @@ fn reference_arm_by_file_equals_the_converged_curve() {
 
 /// One cantilever of aluminium, 20 x 40 mm: sag of its tip mass and own weight.
 ///
-/// Truth for the two-part model: the tip load's deflection F l³/(3EI) is exact; half of the beam's weight acts at the
-/// middle of the outer half and bends the spring like any load there, so the sag under own weight is 3/32 instead of
-/// 1/8 of m g l³/EI (the README of the robot has the numbers).
+/// Truth for the two-part model: the tip load's deflection F l³/(3EI) is exact; half of the beam's
+/// weight acts at the middle of the outer half and bends the spring like any load there, so the sag
+/// under own weight is 3/32 instead of 1/8 of m g l³/EI (the README of the robot has the numbers).
 #[test]
 fn one_beam_sags_as_its_two_part_model_must() {
     let (summary, _) = run("one_beam", "beam_hold.toml", &RunOptions::default());
@@ -93,8 +94,8 @@ fn one_beam_sags_as_its_two_part_model_must() {
         let stiffness = 70e9 * bh3 / 12.0;
         let tip = mass("tip") * g * l.powi(3) / (3.0 * stiffness);
         let beam = mass("beam_1") * g;
-        // outer half at 3/4 l: shear V = beam/2 and moment V l/4 about the split at l/2, carried to the tip:
-        // u_tip = V l³/(12 EI) + M/(EI/l) l/2 with the spring at mid length
+        // outer half at 3/4 l: shear V = beam/2 and moment V l/4 about the split at l/2, carried to
+        // the tip: u_tip = V l³/(12 EI) + M/(EI/l) l/2 with the spring at mid length
         let (V, M) = (0.5 * beam, 0.5 * beam * l / 4.0);
         tip + V * l.powi(3) / (12.0 * stiffness) + M * l / stiffness * 0.5 * l
     });
@@ -113,7 +114,8 @@ fn kr210_has_the_published_mass_and_a_plausible_first_frequency() {
     let (summary, table) = run("kr210/links.toml", "point_to_point.toml", &RunOptions::default());
     let f1 = summary.frequencies_hz[0];
     assert!((10.0..25.0).contains(&f1), "{f1}");
-    // Both parts of a cut link are exactly the link: the rigid twin needs the torques of the URDF's robot.
+    // Both parts of a cut link are exactly the link: the rigid twin needs the torques of the URDF's
+    // robot.
     assert!(summary.warnings.iter().all(|w| !w.contains("weigh")), "{:?}", summary.warnings);
     assert!(table["rigid_joint_2_effort"].iter().all(|t| t.is_finite()));
 }
@@ -139,10 +141,11 @@ fn steppers_agree_on_the_shipped_arm() {
     assert!(spook.abs() < 2e-2);
 }
 
-/// Three beams welded at right angles, all of them modal: a modal link on a fixed joint is a body of its own.
+/// Three beams welded at right angles, all of them modal: a modal link on a fixed joint is a body
+/// of its own.
 ///
-/// Truth: the same beams in seven parts each, which come to it with the square of their number. Measured: peak 6e-5, first
-/// four frequencies 1e-5 to 3e-4.
+/// Truth: the same beams in seven parts each, which come to it with the square of their number.
+/// Measured: peak 6e-5, first four frequencies 1e-5 to 3e-4.
 #[test]
 fn modal_links_on_fixed_corners_agree_with_many_parts() {
     let run_with = |modelling| {

@@ -1,4 +1,5 @@
-//! Closed loops against stored results of Pinocchio's constrained dynamics (tests/golden/closed_loops.json, tools/golden_loops.py).
+//! Closed loops against stored results of Pinocchio's constrained dynamics
+//! (tests/golden/closed_loops.json, tools/golden_loops.py).
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
@@ -42,8 +43,9 @@ fn closed(golden: &Value, root: &Path) -> Model {
     Model::new(&mechanism).expect("loops that close")
 }
 
-/// Truth: Pinocchio's constraintDynamics with point contacts, three loops of which two rest on one another and none is a parallelogram.
-/// Measured: accelerations 2.8e-15 of the largest, torques 1.3e-14, dependent joints 4e-15 rad, tool 3e-15 m, energies 1.2e-15.
+/// Truth: Pinocchio's constraintDynamics with point contacts, three loops of which two rest on one
+/// another and none is a parallelogram. Measured: accelerations 2.8e-15 of the largest, torques
+/// 1.3e-14, dependent joints 4e-15 rad, tool 3e-15 m, energies 1.2e-15.
 #[test]
 fn dynamics_over_three_loops_are_those_of_pinocchio() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("inside the workspace");

@@ -1,4 +1,5 @@
-//! URDF reader and recursions against stored results of Pinocchio (tests/golden/*.json, tools/golden_pinocchio.py).
+//! URDF reader and recursions against stored results of Pinocchio (tests/golden/*.json,
+//! tools/golden_pinocchio.py).
 #![allow(non_snake_case, reason = "monogram notation")]
 
 use std::path::{Path, PathBuf};

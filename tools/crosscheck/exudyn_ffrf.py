@@ -68,7 +68,8 @@ LINKS = {
 ABAQUS_ORDER = [1, 0, 2, 3, 4, 5, 7, 8, 6, 9]
 
 
-# --------------------------------------------------------------------------------------------- meshes
+# ---------------------------------------------------------------------------------------------
+# meshes
 def solid(name):
     """Box 160 x 120 mm along z, wall 10 mm; tube of 140 mm along x, wall 6 mm."""
     geometry = csg.CSGeometry()
@@ -110,7 +111,8 @@ def write_inp(path, x, elements):
         out.writelines(f"{k + 1}, " + ", ".join(str(n + 1) for n in e) + "\n" for k, e in enumerate(elements.tolist()))
 
 
-# ---------------------------------------------------------------------------------------------- Exudyn
+# ----------------------------------------------------------------------------------------------
+# Exudyn
 class ExudynLink:
     """A link's mesh in Exudyn, with K, M and modes of its own."""
 
@@ -279,7 +281,8 @@ def exudyn_modes(links, motion):
     return np.sqrt(np.abs(np.sort(values))) / (2 * math.pi)
 
 
-# --------------------------------------------------------------------------------------------- flexarm
+# ---------------------------------------------------------------------------------------------
+# flexarm
 class Program:
     def __init__(self, path, folder):
         self.path, self.folder = Path(path).resolve(), folder
@@ -349,7 +352,8 @@ damping = {{ stiffness_beta = {BETA!r} }}
                    for _ in range(repeat))
 
 
-# -------------------------------------------------------------------------------------------- the table
+# -------------------------------------------------------------------------------------------- the
+# table
 def largest(p, q):
     return np.linalg.norm(p - q, axis=1).max()
 

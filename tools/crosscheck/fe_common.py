@@ -43,7 +43,8 @@ CCX_EDGES = {"HEX20": ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (
              "TET10": ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))}
 
 
-# ------------------------------------------------------------------------------------------------ meshes
+# ------------------------------------------------------------------------------------------------
+# meshes
 def read_mesh(path, unit=1.0):
     gmsh.initialize()
     gmsh.option.setNumber("General.Terminal", 0)
@@ -77,7 +78,8 @@ def dofs(nodes):
     return (3 * np.asarray(nodes)[:, None] + np.arange(3)).ravel()
 
 
-# ---------------------------------------------------------------------------------------------- CalculiX
+# ----------------------------------------------------------------------------------------------
+# CalculiX
 def ccx_cells(mesh):
     """Node numbers (from 0) in the order of C3D20 or C3D10."""
     corners = 8 if mesh.kind == "HEX20" else 4
@@ -179,7 +181,8 @@ def ccx_numbers(dat, title):
     return [np.array(t) for t in tables]
 
 
-# ------------------------------------------------------------------------------- own assembly, NGSolve
+# ------------------------------------------------------------------------------- own assembly,
+# NGSolve
 def hex20(p):
     """Shape functions and derivatives at reference points (gmsh's order): (points, 20), (points, 20, 3)."""
     N, D = np.zeros((len(p), 20)), np.zeros((len(p), 20, 3))
@@ -357,7 +360,8 @@ REFERENCE = {4: np.array([(1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, 0)], float),
              8: (HEX_CORNERS + 1) / 2}
 
 
-# ------------------------------------------------------------------------------------------ ties, solving
+# ------------------------------------------------------------------------------------------ ties,
+# solving
 def cross(r):
     return np.array([[0, -r[2], r[1]], [r[2], 0, -r[0]], [-r[1], r[0], 0.0]])
 
@@ -373,7 +377,8 @@ def rigid(x, nodes, place):
 def mean(x, nodes, place):
     """RBE3 with equal weights: the motion (6) of a frame from the displacements of the nodes (3 n)."""
     R = rigid(x, nodes, place)
-    # Equal weights: least squares of the rigid motion, which is the mean displacement and the least-squares rotation
+    # Equal weights: least squares of the rigid motion, which is the mean displacement and the
+    # least-squares rotation
     return np.linalg.solve(R.T @ R, R.T)
 
 
@@ -425,7 +430,8 @@ class Solver:
         return np.sqrt(np.sort(value)) / (2 * np.pi)
 
 
-# ---------------------------------------------------------------------------------------------- comparing
+# ----------------------------------------------------------------------------------------------
+# comparing
 def apart(a, b):
     """Largest difference of two symmetric 6 x 6, entries over sqrt(d_i d_j)."""
     d = np.sqrt(np.abs(np.diag(b)))
@@ -466,7 +472,8 @@ def reduce(program, job, *flags):
         return LinkFile(path)
 
 
-# --------------------------------------------------------------------------------------------------- JSON
+# ---------------------------------------------------------------------------------------------------
+# JSON
 def sha256(path):
     return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 

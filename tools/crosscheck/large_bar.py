@@ -18,7 +18,8 @@ def middle(mesh):
     return np.flatnonzero(np.abs(mesh.x[:, 0] - LENGTH / 2) < 1e-9)
 
 
-# ---------------------------------------------------------------------------------------------- CalculiX
+# ----------------------------------------------------------------------------------------------
+# CalculiX
 def calculix_run(mesh, forces, known):
     """Rows of 9 numbers (u_B, rotation_B, u_mid) less those in `known` (forces x 9), as printed."""
     n = len(mesh.x)
@@ -53,7 +54,8 @@ def calculix(mesh, forces):
     return [{"force_n": force, "u_B": row[:3], "rotation_B": row[3:6], "u_mid": row[6:]} for force, row in zip(forces, first + rest)]
 
 
-# ------------------------------------------------------------------------------------------- own program
+# ------------------------------------------------------------------------------------------- own
+# program
 class Bar:
     """Residual and tangent of the bar. Unknowns: free nodes, then u_x, u_z of B and its turn about y."""
 

@@ -54,7 +54,8 @@ def distributing(mesh, K):
     far = np.argmax(np.linalg.norm(mesh.x - mesh.x[0], axis=1))
     line = mesh.x[far] - mesh.x[0]
     aside = np.argmax(np.linalg.norm(np.cross(mesh.x - mesh.x[0], line), axis=1))
-    # of the node far away the two directions most across the line, of the third the one out of their plane
+    # of the node far away the two directions most across the line, of the third the one out of
+    # their plane
     out = int(np.argmax(np.abs(np.cross(line, mesh.x[aside] - mesh.x[0]))))
     along = int(np.argmax(np.abs(line)))
     held = {0, 1, 2} | {3 * int(far) + d for d in range(3) if d != along} | {3 * int(aside) + out}

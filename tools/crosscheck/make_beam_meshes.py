@@ -21,7 +21,8 @@ HEX_EDGES = ((0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4,
 CORNERS = ((-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1), (-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1))
 
 
-# Sections: arrays (quadrilaterals, 8 nodes, 2), corners counterclockwise, then the nodes between them
+# Sections: arrays (quadrilaterals, 8 nodes, 2), corners counterclockwise, then the nodes between
+# them
 
 def grid(first, second, keep=lambda p, q: True):
     """Rectangles between the lines; `keep` says which, by the middle."""

@@ -1,4 +1,5 @@
-//! Puts what the wheel brings along, robots, trajectories and licences, where maturin finds it, and links as extension modules do.
+//! Puts what the wheel brings along, robots, trajectories and licences, where maturin finds it, and
+//! links as extension modules do.
 
 use std::path::Path;
 use std::{env, fs, io};

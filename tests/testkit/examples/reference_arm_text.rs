@@ -1,12 +1,14 @@
-//! Prints the reference arm as text, rigid (6 coordinates), flexible (18) and with three elastic joints a link (42), for programs that know
-//! no URDF with elastic joints: `cargo run --release -p flexarm-testkit --example reference_arm_text`.
+//! Prints the reference arm as text, rigid (6 coordinates), flexible (18) and with three elastic
+//! joints a link (42), for programs that know no URDF with elastic joints:
+//! `cargo run --release -p flexarm-testkit --example reference_arm_text`.
 //!
 //! A line `model NAME` starts each model; then one line per moving body, parents before children:
 //!
 //! ```text
 //! kind  parent  axis(3)  R_PJ(9, rows)  p_PJ(3)  mass  com(3)  Ixx Ixy Ixz Iyy Iyz Izz      about the com, body axes
 //! ```
-//! `kind` is revolute, prismatic or elastic; `parent` counts bodies from 1, 0 is the world. SI units.
+//! `kind` is revolute, prismatic or elastic; `parent` counts bodies from 1, 0 is the world. SI
+//! units.
 #![allow(clippy::print_stdout, reason = "printing is what this example is for")]
 #![allow(non_snake_case, reason = "monogram notation, as in the crates under test")]
 

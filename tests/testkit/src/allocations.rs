@@ -12,7 +12,8 @@ use std::cell::Cell;
 
 thread_local! {
     static COUNT: Cell<usize> = const { Cell::new(0) };
-    /// Bytes held, and the most so far: what one thread takes and another gives back is counted wrongly.
+    /// Bytes held, and the most so far: what one thread takes and another gives back is counted
+    /// wrongly.
     static HELD: Cell<isize> = const { Cell::new(0) };
     static MOST: Cell<isize> = const { Cell::new(0) };
 }

@@ -1,5 +1,5 @@
-//! An arm of three links that are chains: a slider, a chain on it, a hinge, a second chain, and a third one on a hinge in the
-//! middle of the first.
+//! An arm of three links that are chains: a slider, a chain on it, a hinge, a second chain, and a
+//! third one on a hinge in the middle of the first.
 
 use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, LinkInertia, Mechanism, Pose};
 use nalgebra::{Matrix3, Matrix6, Rotation3, Translation3, Vector3, Vector6};
@@ -13,7 +13,8 @@ pub struct ChainArm {
     pub K: Vec<Matrix6<f64>>,
 }
 
-/// Chains of so many elastic joints in each of the two links, `branch` of them in the branch (none: no branch).
+/// Chains of so many elastic joints in each of the two links, `branch` of them in the branch (none:
+/// no branch).
 pub fn chain_arm(joints: usize, branch: usize, angles: ElasticAngles) -> ChainArm {
     let mut arm = ChainArm { mechanism: Mechanism::new("chains"), K: Vec::new() };
     arm.mechanism.links.push(Link { name: "base".into(), inertia: None });

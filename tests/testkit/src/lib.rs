@@ -1,5 +1,5 @@
-//! Models that several crates' tests and benches share: random trees, the reference arm, an arm of chains, one
-//! with a closed loop.
+//! Models that several crates' tests and benches share: random trees, the reference arm, an arm of
+//! chains, one with a closed loop.
 //!
 //! Truth lives in the tests; here are only inputs. Everything is deterministic for given arguments.
 #![allow(non_snake_case, reason = "monogram notation, as in the crates under test")]

@@ -1,4 +1,5 @@
-//! A palletising arm with closed loops: the upper arm is driven by a crank and a rod, all four bars of different lengths.
+//! A palletising arm with closed loops: the upper arm is driven by a crank and a rod, all four bars
+//! of different lengths.
 
 use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, LinkInertia, LoopClosure, Mechanism, Pose};
 use nalgebra::{DMatrix, Matrix3, Matrix6, Vector3};
@@ -17,8 +18,8 @@ fn body(name: &str, mass: f64, com: [f64; 3], arms: [f64; 3]) -> Link {
     Link { name: name.into(), inertia: Some(LinkInertia { mass, com: com.into(), inertia_com }) }
 }
 
-/// `yields`: with gearboxes of the lower arm and the crank that give way about their axes, and with a lower arm and a rod that give way
-/// in six directions within the loop.
+/// `yields`: with gearboxes of the lower arm and the crank that give way about their axes, and with
+/// a lower arm and a rod that give way in six directions within the loop.
 pub fn palletising_arm(yields: bool) -> PalletisingArm {
     let mut tree = Mechanism::new("palletising arm");
     tree.links.push(Link { name: "base".into(), inertia: None });

@@ -140,7 +140,8 @@ impl Cloud {
     }
 }
 
-/// A random tree in which some links bend in modes, some joints are single springs and some have rotors.
+/// A random tree in which some links bend in modes, some joints are single springs and some have
+/// rotors.
 pub fn random_flexible_tree(seed: u64, n_joints: usize) -> Mechanism {
     let mut tree = random_tree(seed, n_joints);
     let mut draw = Draw(seed ^ 0x5EED);

@@ -1,7 +1,8 @@
 //! The reference arm: six axes, two links split at mid length into two halves with a 6×6 spring.
 //!
-//! Numbers as in the converged cross-check of `tests/golden/reference_arm_mid.csv`; all joint frames are
-//! parallel to the world at the home pose. The robot folder `robots/reference_arm` is the same arm by file.
+//! Numbers as in the converged cross-check of `tests/golden/reference_arm_mid.csv`; all joint
+//! frames are parallel to the world at the home pose. The robot folder `robots/reference_arm` is
+//! the same arm by file.
 
 use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, LinkInertia, Mechanism, Pose};
 use nalgebra::{Matrix3, Matrix6, Translation3, Vector3, Vector6};
@@ -54,7 +55,8 @@ impl Beam {
     }
 }
 
-/// The arm, variant `mid`. With `elastic = false` the halves are welded: the rigid twin with six coordinates.
+/// The arm, variant `mid`. With `elastic = false` the halves are welded: the rigid twin with six
+/// coordinates.
 pub fn reference_arm(elastic: bool) -> ReferenceArm {
     // Lower arm: aluminium box 160 x 120 mm, wall 10 mm, along z; axis 2 = link x, axis 3 = link y.
     let (b, h, t): (f64, f64, f64) = (0.120, 0.160, 0.010);
@@ -153,7 +155,8 @@ pub fn reference_arm(elastic: bool) -> ReferenceArm {
     ReferenceArm { mechanism: arm, K_S: [K_lower, K_upper], beta: 0.001_053_607_817_458_580_5 }
 }
 
-/// The arm's test motion: quintic out in 1.2 s, hold 0.8 s, back in 1.2 s, hold; q, q̇, q̈ of six joints.
+/// The arm's test motion: quintic out in 1.2 s, hold 0.8 s, back in 1.2 s, hold; q, q̇, q̈ of six
+/// joints.
 pub fn reference_motion(t: f64) -> ([f64; 6], [f64; 6], [f64; 6]) {
     let goal = [60.0f64, 30.0, -20.0, 40.0, 30.0, 90.0].map(f64::to_radians);
     let ramp = |u: f64| {
@@ -168,8 +171,8 @@ pub fn reference_motion(t: f64) -> ([f64; 6], [f64; 6], [f64; 6]) {
     (goal.map(|g| g * (a[0] - b[0])), goal.map(|g| g * (a[1] - b[1])), goal.map(|g| g * (a[2] - b[2])))
 }
 
-/// The flexible arm with each of its elastic joints as so many in a row, and a part between any two: a tree of 6 + 12 n coordinates for
-/// times and instructions.
+/// The flexible arm with each of its elastic joints as so many in a row, and a part between any
+/// two: a tree of 6 + 12 n coordinates for times and instructions.
 pub fn arm_of_parts(n: usize) -> Mechanism {
     let mut arm = reference_arm(true).mechanism;
     for joint in std::mem::take(&mut arm.joints) {

@@ -1,4 +1,5 @@
-//! Text files into memory, with the place of what is wrong in them; results onto the disk, all or none.
+//! Text files into memory, with the place of what is wrong in them; results onto the disk, all or
+//! none.
 //!
 //! ```
 //! use flexarm_files::{FileError, Source, check_free, write_all};

@@ -1,7 +1,8 @@
 //! Tables of numbers with a header: one row of names, then a number in every cell.
 //!
-//! Separated by semicolons, tabs or commas, whichever the header has; with semicolons and tabs a number may have a decimal comma.
-//! Lines that begin with # and empty ones are passed over. Not here: what the columns mean.
+//! Separated by semicolons, tabs or commas, whichever the header has; with semicolons and tabs a
+//! number may have a decimal comma. Lines that begin with # and empty ones are passed over. Not
+//! here: what the columns mean.
 
 use std::path::Path;
 
@@ -24,8 +25,9 @@ impl NumberTable {
     /// Reads a file.
     ///
     /// # Errors
-    /// [`FileError::Unusable`] if it cannot be read, has no header, names a column twice, or has a row with another number of cells or
-    /// a cell that is no number: with the line, the column and what was found.
+    /// [`FileError::Unusable`] if it cannot be read, has no header, names a column twice, or has a
+    /// row with another number of cells or a cell that is no number: with the line, the column and
+    /// what was found.
     pub fn read(path: &Path) -> Result<Self, FileError> {
         Self::parse(&read_text(path)?).map_err(|what| FileError::Unusable { path: path.to_owned(), what })
     }

@@ -12,7 +12,8 @@ thread_local! {
     static UNWANTED: RefCell<Option<Rc<dyn Fn() -> bool>>> = const { RefCell::new(None) };
 }
 
-/// Does work whose results somebody may stop waiting for: from when `unwanted` says so, [`write_all`] on this thread refuses.
+/// Does work whose results somebody may stop waiting for: from when `unwanted` says so,
+/// [`write_all`] on this thread refuses.
 ///
 /// So what was broken off leaves no files behind, wherever the work just was.
 pub fn writing_unless<T>(unwanted: impl Fn() -> bool + 'static, work: impl FnOnce() -> T) -> T {
@@ -30,7 +31,8 @@ pub fn writing_unless<T>(unwanted: impl Fn() -> bool + 'static, work: impl FnOnc
 /// Refuses places that are taken.
 ///
 /// # Errors
-/// [`FileError::Taken`], and [`FileError::Unusable`] for a folder in the place of a file or the other way round.
+/// [`FileError::Taken`], and [`FileError::Unusable`] for a folder in the place of a file or the
+/// other way round.
 pub fn check_free(paths: &[PathBuf], overwrite: bool) -> Result<(), FileError> {
     for path in paths {
         let fail = |what: &str| Err(FileError::Unusable { path: path.clone(), what: what.into() });
@@ -50,11 +52,13 @@ pub fn check_free(paths: &[PathBuf], overwrite: bool) -> Result<(), FileError> {
     Ok(())
 }
 
-/// Writes all files, each first under another name; only when all are there are they renamed, so neither a full disk nor a
-/// rename that fails leaves new files behind. Files that were overwritten before it stay as they are now.
+/// Writes all files, each first under another name; only when all are there are they renamed, so
+/// neither a full disk nor a rename that fails leaves new files behind. Files that were overwritten
+/// before it stay as they are now.
 ///
 /// # Errors
-/// [`FileError::Write`]; of the kind [`ErrorKind::Interrupted`] where nobody wants them any more ([`writing_unless`]).
+/// [`FileError::Write`]; of the kind [`ErrorKind::Interrupted`] where nobody wants them any more
+/// ([`writing_unless`]).
 pub fn write_all(files: &[(PathBuf, impl AsRef<[u8]>)]) -> Result<(), FileError> {
     let unwanted = UNWANTED.with_borrow(Clone::clone);
     if let (Some(unwanted), Some((path, _))) = (unwanted, files.first())

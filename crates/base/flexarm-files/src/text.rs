@@ -1,5 +1,5 @@
-//! Text files into memory: files only, and none larger than a person or a program writes for this purpose. What is wrong in
-//! one is said with line and column.
+//! Text files into memory: files only, and none larger than a person or a program writes for this
+//! purpose. What is wrong in one is said with line and column.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};

@@ -55,10 +55,12 @@ struct Counted<'t> {
 
 /// Calls `take` with the root of each document, one after another.
 ///
-/// * `most`: Maximum number of nodes. Those behind anchors and aliases count again, 32 letters as a node more.
+/// * `most`: Maximum number of nodes. Those behind anchors and aliases count again, 32 letters as a
+///   node more.
 ///
 /// # Errors
-/// [`YamlError`] for what is not YAML, has more nodes or is nested more than 40 deep; and what `take` returns.
+/// [`YamlError`] for what is not YAML, has more nodes or is nested more than 40 deep; and what
+/// `take` returns.
 pub fn read_yaml<'t, E: From<YamlError>>(
     text: &'t str,
     most: usize,

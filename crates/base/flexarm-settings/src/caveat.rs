@@ -1,7 +1,8 @@
 //! Caveats: what is probably wrong with an input, or limits the worth of a result, as values.
 //!
-//! A caveat compares a value with a physical yardstick. A [`CaveatKind`] is a constant of the crate that finds it; its sentence
-//! is made in one place ([`CaveatKind::found`]), so that all that find the same say the same.
+//! A caveat compares a value with a physical yardstick. A [`CaveatKind`] is a constant of the crate
+//! that finds it; its sentence is made in one place ([`CaveatKind::found`]), so that all that find
+//! the same say the same.
 //!
 //! Not here: the kinds, their yardsticks, and what makes a model impossible, which is an error.
 
@@ -37,7 +38,8 @@ pub struct CaveatKind {
     pub code: &'static str,
     /// How much it weighs, unless the finder says otherwise.
     pub severity: Severity,
-    /// One sentence with `{where}`, `{value}` and `{yardstick}` in it, and settings by their keys, such as `{step_s}`.
+    /// One sentence with `{where}`, `{value}` and `{yardstick}` in it, and settings by their keys,
+    /// such as `{step_s}`.
     pub says: &'static str,
     /// Unit of value and yardstick; empty for plain numbers.
     pub unit: &'static str,
@@ -64,7 +66,8 @@ pub struct Caveat {
     pub yardstick: Option<f64>,
     /// Unit of both.
     pub unit: String,
-    /// The slip that would explain it, such as "about 1000 times: millimetres?"; empty if none does.
+    /// The slip that would explain it, such as "about 1000 times: millimetres?"; empty if none
+    /// does.
     pub likely: String,
     /// What to look at, or how to mend it.
     pub help: String,
@@ -170,7 +173,8 @@ pub fn warnings(caveats: &[Caveat]) -> Vec<String> {
     caveats.iter().filter(|caveat| caveat.warns()).map(|caveat| caveat.message.clone()).collect()
 }
 
-/// Each caveat once: of those with the same code about the same thing the last, at the place of the first.
+/// Each caveat once: of those with the same code about the same thing the last, at the place of the
+/// first.
 pub fn once_each(caveats: Vec<Caveat>) -> Vec<Caveat> {
     let mut kept: Vec<Caveat> = Vec::with_capacity(caveats.len());
     for caveat in caveats {

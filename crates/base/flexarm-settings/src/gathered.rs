@@ -5,8 +5,8 @@ const MANY: usize = 3;
 /// Most places that are named.
 const NAMED: usize = 3;
 
-/// Sentences for a person: those that differ only in names and numbers are the first of them with the count and the first few
-/// names of the others. Each sentence counts once.
+/// Sentences for a person: those that differ only in names and numbers are the first of them with
+/// the count and the first few names of the others. Each sentence counts once.
 pub fn gathered(texts: &[String]) -> Vec<String> {
     let mut groups: Vec<(String, Vec<&String>)> = Vec::new();
     for text in texts {

@@ -1,13 +1,15 @@
-//! What errors and caveats are made of: the settings that they speak of, as values that each face names in its own words
-//! ([`Setting`]); the [`Caveat`], which compares a value with a yardstick; whom an error is to blame on ([`Fault`]); ranges of
-//! physical quantities ([`Quantity`]); messages of the reader of TOML without names of types
-//! ([`without_types`]); foreign text as each kind of output may hold it ([`written`]).
+//! What errors and caveats are made of: the settings that they speak of, as values that each face
+//! names in its own words ([`Setting`]); the [`Caveat`], which compares a value with a yardstick;
+//! whom an error is to blame on ([`Fault`]); ranges of physical quantities ([`Quantity`]); messages
+//! of the reader of TOML without names of types ([`without_types`]); foreign text as each kind of
+//! output may hold it ([`written`]).
 //!
-//! An error that says "try a smaller step" means a field of a struct to a Rust program, a keyword argument to a Python one
-//! and a flag to somebody at a terminal. Errors and caveats therefore carry a [`Setting`], and its name is asked for when
-//! the sentence is made. Without further words the names are the library's own ([`Setting::key`]); a face that calls them
-//! otherwise says so once, before anything else, with [`name_settings`]. Names are to a process what a language is: all its
-//! messages, and the files that it writes for people, use the same.
+//! An error that says "try a smaller step" means a field of a struct to a Rust program, a keyword
+//! argument to a Python one and a flag to somebody at a terminal. Errors and caveats therefore
+//! carry a [`Setting`], and its name is asked for when the sentence is made. Without further words
+//! the names are the library's own ([`Setting::key`]); a face that calls them otherwise says so
+//! once, before anything else, with [`name_settings`]. Names are to a process what a language is:
+//! all its messages, and the files that it writes for people, use the same.
 //!
 //! ```
 //! use flexarm_settings::Setting;
@@ -15,8 +17,8 @@
 //! assert_eq!(format!("try a smaller {}", Setting::Step), "try a smaller step_s");
 //! ```
 //!
-//! Not here: values, defaults and meaning of the settings, which are fields of the crate that each belongs to; the kinds of
-//! caveats and their yardsticks, which are in the crates that find them.
+//! Not here: values, defaults and meaning of the settings, which are fields of the crate that each
+//! belongs to; the kinds of caveats and their yardsticks, which are in the crates that find them.
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 pub mod caveat;
@@ -333,7 +335,8 @@ pub struct Names {
 
 static NAMES: OnceLock<Names> = OnceLock::new();
 
-/// Names the settings in all messages of this process from now on. The first call counts; whether this is it.
+/// Names the settings in all messages of this process from now on. The first call counts; whether
+/// this is it.
 pub fn name_settings(names: Names) -> bool {
     NAMES.set(names).is_ok()
 }

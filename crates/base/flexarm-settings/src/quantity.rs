@@ -1,7 +1,8 @@
 //! Sizes that the numbers of robots, tools and loads can have.
 //!
-//! The ranges are wide: a number outside of one is no robot, whatever its unit. They keep masses, lengths and stiffnesses so near to each
-//! other that matrices made of them can be factorised. What is possible but unlikely is a [`crate::Caveat`].
+//! The ranges are wide: a number outside of one is no robot, whatever its unit. They keep masses,
+//! lengths and stiffnesses so near to each other that matrices made of them can be factorised. What
+//! is possible but unlikely is a [`crate::Caveat`].
 
 use std::fmt;
 

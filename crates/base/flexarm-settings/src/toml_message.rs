@@ -1,6 +1,7 @@
 //! What a reader of TOML says, in the words of files instead of those of Rust.
 
-/// The message on one line, without names of types: `expected struct TcpEntry` names one that no user knows.
+/// The message on one line, without names of types: `expected struct TcpEntry` names one that no
+/// user knows.
 #[must_use]
 pub fn without_types(message: &str) -> String {
     const TABLE: &str = "expected a table, { key = value, ... }";

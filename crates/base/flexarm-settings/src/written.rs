@@ -1,4 +1,5 @@
-//! Foreign text, such as names of joints and cells of files, as each kind of output may hold it: one function per kind.
+//! Foreign text, such as names of joints and cells of files, as each kind of output may hold it:
+//! one function per kind.
 //!
 //! JSON and TOML are not here: their writers escape by themselves.
 //!
@@ -16,8 +17,9 @@ const LONGEST_QUOTE: usize = 300;
 /// Longest line of a message (characters).
 const LONGEST_LINE: usize = 8000;
 
-/// Whether a terminal obeys the character instead of showing it, or a reader cannot see it: control characters, those that turn
-/// the direction of writing, and those that end a line elsewhere than the eye sees it.
+/// Whether a terminal obeys the character instead of showing it, or a reader cannot see it: control
+/// characters, those that turn the direction of writing, and those that end a line elsewhere than
+/// the eye sees it.
 fn is_hidden(c: char) -> bool {
     c.is_control()
         || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}')
@@ -34,7 +36,8 @@ fn shown(text: &str, keeps: &[char], push: impl Fn(&mut String, char)) -> String
     out
 }
 
-/// Text for a terminal or a plain file: characters that nobody sees are shown as `\u{1b}`, lines stay.
+/// Text for a terminal or a plain file: characters that nobody sees are shown as `\u{1b}`, lines
+/// stay.
 pub fn visible(text: &str) -> String {
     shown(text, &['\n', '\t'], String::push)
 }
@@ -87,7 +90,8 @@ fn with_short_quotes(text: &str) -> String {
     out
 }
 
-/// Where a quoted text ends that begins with `quote`; after the quote itself where it is not closed.
+/// Where a quoted text ends that begins with `quote`; after the quote itself where it is not
+/// closed.
 fn end_of_quote(text: &str, quote: char) -> usize {
     let mut escaped = false;
     for (at, c) in text.char_indices().skip(1) {
@@ -113,7 +117,8 @@ pub fn markup(text: &str) -> String {
     })
 }
 
-/// Text within a paragraph, a list or a table of Markdown, on one line: no HTML, no links, no emphasis, no end of a cell.
+/// Text within a paragraph, a list or a table of Markdown, on one line: no HTML, no links, no
+/// emphasis, no end of a cell.
 pub fn markdown(text: &str) -> String {
     let text = one_line(text);
     let letters: Vec<char> = text.chars().collect();
@@ -157,8 +162,9 @@ fn is_formula(text: &str) -> bool {
     text.trim_start_matches('\'').starts_with(['=', '+', '-', '@', '\t', '\r', '\n', '＝', '＋', '－', '＠'])
 }
 
-/// A text as a field of a table with commas, semicolons or tabs: quoted where it must be. One that a spreadsheet would take for
-/// a formula begins with an apostrophe, which [`csv_fields`] takes off again.
+/// A text as a field of a table with commas, semicolons or tabs: quoted where it must be. One that
+/// a spreadsheet would take for a formula begins with an apostrophe, which [`csv_fields`] takes off
+/// again.
 pub fn csv_field(text: &str) -> String {
     if is_formula(text) {
         return format!("\"'{}\"", text.replace('"', "\"\""));
@@ -172,7 +178,8 @@ pub fn csv_text(field: &str) -> &str {
     field.strip_prefix('\'').filter(|text| is_formula(text)).unwrap_or(field)
 }
 
-/// The fields of a line of a table, without the quotes around them; a quote within quotes is doubled.
+/// The fields of a line of a table, without the quotes around them; a quote within quotes is
+/// doubled.
 ///
 /// * `runs`: whether several separators after each other are one.
 pub fn csv_fields(line: &str, is_separator: impl Fn(char) -> bool, runs: bool) -> Vec<String> {

@@ -1,4 +1,5 @@
-//! One process has one set of names: a test of its own, because it speaks for all tests that share its process.
+//! One process has one set of names: a test of its own, because it speaks for all tests that share
+//! its process.
 
 use flexarm_settings::{Caller, Names, Setting, name_settings};
 

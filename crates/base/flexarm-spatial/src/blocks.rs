@@ -1,4 +1,5 @@
-//! Matrices of one or two interfaces in 6×6 blocks: what a stiffness between two frames is turned and carried with.
+//! Matrices of one or two interfaces in 6×6 blocks: what a stiffness between two frames is turned
+//! and carried with.
 
 use nalgebra::{Matrix3, Matrix6, SMatrix};
 

@@ -1,8 +1,9 @@
-//! Four numbers side by side, for processors with AVX2, and eight, for those with AVX-512: the scalar of recursions over as many runs
-//! or poses at once.
+//! Four numbers side by side, for processors with AVX2, and eight, for those with AVX-512: the
+//! scalar of recursions over as many runs or poses at once.
 //!
-//! `Four` and `Eight` are [`Real`]: each lane has the bits of the same recursion over `f64`. Nobody outside can name them: they are what
-//! [`with_lanes`] hands to its work once it has seen that the processor has the instructions.
+//! `Four` and `Eight` are [`Real`]: each lane has the bits of the same recursion over `f64`. Nobody
+//! outside can name them: they are what [`with_lanes`] hands to its work once it has seen that the
+//! processor has the instructions.
 
 #![allow(unsafe_code, reason = "vector instructions, which are called where they were found to be there")]
 
@@ -18,7 +19,8 @@ use num_traits::{One, Zero};
 
 use crate::real::Real;
 
-/// Work over lanes. What it calls is inlined, down to the instructions: mark it `#[inline(always)]`.
+/// Work over lanes. What it calls is inlined, down to the instructions: mark it
+/// `#[inline(always)]`.
 pub trait OverLanes {
     /// What comes of it.
     type Output;
@@ -48,8 +50,8 @@ pub fn with_four_lanes<W: OverLanes>(work: W) -> Option<W::Output> {
     is_x86_feature_detected!("avx2").then(|| unsafe { over_four(work) })
 }
 
-/// Does the work with vector instructions, in lanes for this many things at most: the number of them is [`lanes_for`]. `None` where the
-/// processor has none.
+/// Does the work with vector instructions, in lanes for this many things at most: the number of
+/// them is [`lanes_for`]. `None` where the processor has none.
 pub fn with_lanes<W: OverLanes>(things: usize, work: W) -> Option<W::Output> {
     #[target_feature(enable = "avx512f,avx512dq")]
     fn over_eight<W: OverLanes>(work: W) -> W::Output {
@@ -62,7 +64,8 @@ pub fn with_lanes<W: OverLanes>(things: usize, work: W) -> Option<W::Output> {
     }
 }
 
-/// Lanes that [`with_lanes`] takes for so many things: eight where there are more than four of them.
+/// Lanes that [`with_lanes`] takes for so many things: eight where there are more than four of
+/// them.
 pub fn lanes_for(things: usize) -> usize {
     match most_lanes() {
         8 if things <= 4 => 4,
@@ -76,7 +79,8 @@ pub trait Loops {
     fn run(self);
 }
 
-/// Runs loops with the vector instructions that the processor has. Operations and their order are the same with and without.
+/// Runs loops with the vector instructions that the processor has. Operations and their order are
+/// the same with and without.
 #[inline]
 pub fn quickly(loops: impl Loops) {
     #[target_feature(enable = "avx2")]
@@ -312,7 +316,8 @@ mod tests {
         }
     }
 
-    /// Truth: the same over one number; both formulas of the rotation vector in one call; four and eight lanes, where the processor has them.
+    /// Truth: the same over one number; both formulas of the rotation vector in one call; four and
+    /// eight lanes, where the processor has them.
     #[test]
     fn every_lane_has_the_bits_of_a_single_number() {
         for angles in [

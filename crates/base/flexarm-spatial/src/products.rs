@@ -1,6 +1,7 @@
-//! Vectors and 3×3 matrices in the inner loops of the recursions, written out: nalgebra's general product of small matrices
-//! costs twice as many instructions, and over lanes none of its operations is sure to be inlined, which they must be
-//! ([`crate::lanes`]). The order of the sums is fixed, so results are the same on every machine.
+//! Vectors and 3×3 matrices in the inner loops of the recursions, written out: nalgebra's general
+//! product of small matrices costs twice as many instructions, and over lanes none of its
+//! operations is sure to be inlined, which they must be ([`crate::lanes`]). The order of the sums
+//! is fixed, so results are the same on every machine.
 
 use nalgebra::{Matrix3, Vector3};
 

@@ -1,11 +1,12 @@
 //! The scalar of the recursions: one number, or several side by side ([`crate::lanes`]).
 //!
-//! A recursion that is written over [`Real`] gives every lane the bits that it gives one number: all operations are rounded
-//! alike, none is contracted to a fused one, sums keep their order, and where numbers choose a formula each lane gets its own.
+//! A recursion that is written over [`Real`] gives every lane the bits that it gives one number:
+//! all operations are rounded alike, none is contracted to a fused one, sums keep their order, and
+//! where numbers choose a formula each lane gets its own.
 //!
-//! Sine and cosine are computed here, so that they too are the same on every machine: a system's library differs in the last
-//! bit from one processor to the next. Source: [Cody & Waite 1980] for the reduction; coefficients of the polynomials as in
-//! FreeBSD's `k_sin.c` and `k_cos.c`.
+//! Sine and cosine are computed here, so that they too are the same on every machine: a system's
+//! library differs in the last bit from one processor to the next. Source: [Cody & Waite 1980] for
+//! the reduction; coefficients of the polynomials as in FreeBSD's `k_sin.c` and `k_cos.c`.
 
 use std::f64::consts::FRAC_2_PI;
 use std::ops::Neg;
@@ -13,10 +14,12 @@ use std::ops::Neg;
 use nalgebra::{ClosedAddAssign, ClosedDivAssign, ClosedMulAssign, ClosedSubAssign, Scalar};
 use num_traits::{One, Zero};
 
-/// Angles up to this (rad) have sine and cosine of this module; beyond, a quarter of a million turns, of the system.
+/// Angles up to this (rad) have sine and cosine of this module; beyond, a quarter of a million
+/// turns, of the system.
 const LARGEST_ANGLE: f64 = 1.5e6;
 
-/// Up to here, less than π/4, an angle is its own rest: no quarter of a turn is taken off, and the bits are the same without.
+/// Up to here, less than π/4, an angle is its own rest: no quarter of a turn is taken off, and the
+/// bits are the same without.
 const NEAR_ZERO: f64 = 0.78;
 
 /// A real number of a recursion, or lanes of them.
@@ -75,8 +78,8 @@ pub trait Real:
     /// `yes` where `self < bound`, else `no`.
     fn pick_below(self, bound: Self, yes: Self, no: Self) -> Self;
 
-    /// What the first formula gives where `self < bound`, else what the second one gives. A formula that no lane needs is not
-    /// computed.
+    /// What the first formula gives where `self < bound`, else what the second one gives. A formula
+    /// that no lane needs is not computed.
     #[inline(always)]
     fn branch_below<const N: usize>(
         self,
@@ -301,7 +304,8 @@ mod tests {
         a.to_bits().abs_diff(b.to_bits())
     }
 
-    /// Truth: the system's functions, which are right to half a unit or a little more; measured 1 unit.
+    /// Truth: the system's functions, which are right to half a unit or a little more; measured 1
+    /// unit.
     #[test]
     fn sine_and_cosine_are_within_a_unit_of_the_last_place() {
         let quarters = (-4000..4000).map(|k| f64::from(k) * 0.25 * std::f64::consts::PI);

@@ -1,9 +1,12 @@
-//! Three angles of an elastic joint: the rotation they give, and the angular velocity of their rates.
+//! Three angles of an elastic joint: the rotation they give, and the angular velocity of their
+//! rates.
 //!
 //! Frames: P the proximal face of the joint, Q the distal one. `R_PQ = R(angles)` and the angular
-//! velocity of Q in P, in **Q axes**, is `w_PQ_Q = B(angles) d(angles)/dt`. Start at [`ElasticAngles`].
+//! velocity of Q in P, in **Q axes**, is `w_PQ_Q = B(angles) d(angles)/dt`. Start at
+//! [`ElasticAngles`].
 //!
-//! Source: [Shabana 2013], chapter 2, for Euler angles; [Bullo & Murray 1995] for the exponential map.
+//! Source: [Shabana 2013], chapter 2, for Euler angles; [Bullo & Murray 1995] for the exponential
+//! map.
 
 use nalgebra::{Matrix3, Quaternion, Scalar, UnitQuaternion, Vector3};
 
@@ -11,7 +14,8 @@ use crate::products::{add, add3, columns, cross, dot, mul3, scaled, scaled3};
 use crate::real::Real;
 use crate::vectors::skew;
 
-/// Below this cosine the axis is taken from the symmetric part of the rotation, above from the skew part.
+/// Below this cosine the axis is taken from the symmetric part of the rotation, above from the skew
+/// part.
 const NEAR_HALF_TURN: f64 = -0.9;
 
 /// Below this square of the sine a rotation vector is a series.
@@ -23,7 +27,8 @@ pub enum ElasticAngles {
     /// Rotation vector in P axes: `R = exp([phi]x)`. No singularity below a full turn.
     #[default]
     RotationVector,
-    /// `R = Rz(rz) Ry(ry) Rx(rx)`, stored as (rx, ry, rz): Z-Y-X Euler angles, equal to fixed X-Y-Z angles.
+    /// `R = Rz(rz) Ry(ry) Rx(rx)`, stored as (rx, ry, rz): Z-Y-X Euler angles, equal to fixed X-Y-Z
+    /// angles.
     EulerZyx,
 }
 
@@ -68,7 +73,8 @@ impl ElasticAngles {
                 let [_, a, b, da, db] = exponential_coefficients(dot(angles, angles));
                 let (P, Pdot) = (skew(angles), skew(rates));
                 let xdot = T::splat(2.0) * dot(angles, rates);
-                // -a' x' [phi]x - a [rates]x + b' x' [phi]x² + b ([rates]x [phi]x + [phi]x [rates]x)
+                // -a' x' [phi]x - a [rates]x + b' x' [phi]x² + b ([rates]x [phi]x + [phi]x
+                // [rates]x)
                 let first = add3(&scaled3(&P, -da * xdot), &scaled3(&Pdot, -a));
                 let second = add3(&first, &scaled3(&mul3(&P, &P), db * xdot));
                 add3(&second, &scaled3(&add3(&mul3(&Pdot, &P), &mul3(&P, &Pdot)), b))
@@ -90,7 +96,8 @@ impl ElasticAngles {
     }
 }
 
-/// Rotation vector (unit axis times angle, 0 to pi) of a rotation matrix, accurate from a picoradian to half a turn.
+/// Rotation vector (unit axis times angle, 0 to pi) of a rotation matrix, accurate from a
+/// picoradian to half a turn.
 ///
 /// ```text
 /// (R - Rᵀ)/2 = sin θ [a]x,   (R + Rᵀ)/2 = cos θ 1 + (1 - cos θ) a aᵀ
@@ -125,7 +132,8 @@ pub fn quaternion(phi: &Vector3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::new_unchecked(Quaternion::new(1.0 - x * a, vector.x, vector.y, vector.z))
 }
 
-/// Coefficients of the exponential map at `x = theta²`, with the derivatives of the last two by x: `[s, a, b, da, db]`.
+/// Coefficients of the exponential map at `x = theta²`, with the derivatives of the last two by x:
+/// `[s, a, b, da, db]`.
 ///
 /// `s = sin(theta)/theta`, `a = (1 - cos)/theta²`, `b = (theta - sin)/theta³`.
 #[inline(always)]
@@ -222,7 +230,8 @@ fn rotation_vector_kinematics<T: Real>(phi: &Vector3<T>, rates: &Vector3<T>) -> 
     let coefficients = exponential_coefficients(dot(phi, phi));
     let (R, B) = rotation_vector_pose(phi, &coefficients);
     let [_, _, b, da, db] = coefficients;
-    // bias = (dB/dt) rates = -a' x' phi×rates + b' x' phi×(phi×rates) + b (rates×(phi×rates)),  x' = 2 phi·rates
+    // bias = (dB/dt) rates = -a' x' phi×rates + b' x' phi×(phi×rates) + b (rates×(phi×rates)),  x'
+    // = 2 phi·rates
     let xdot = T::splat(2.0) * dot(phi, rates);
     let c = cross(phi, rates);
     let first = add(&scaled(&c, -da * xdot), &scaled(&cross(phi, &c), db * xdot));
@@ -319,7 +328,8 @@ mod tests {
         }
     }
 
-    /// Truth: nalgebra's quaternions, and the rotation vectors of their matrices; measured 2e-16 and 1e-16 relative.
+    /// Truth: nalgebra's quaternions, and the rotation vectors of their matrices; measured 2e-16
+    /// and 1e-16 relative.
     #[test]
     fn quaternions_are_those_of_the_rotation_vector() {
         let axis = vector![0.48, -0.6, 0.64];

@@ -1,8 +1,8 @@
 //! Spatial vectors and inertias as pairs of 3-vectors: linear part first, angular part second.
 //!
-//! Frames: A, B any two frames; `X_AB` the pose of B in A. A twist is the velocity of a frame's origin
-//! and its angular velocity; a wrench is the force through that origin and the moment about it. Start at
-//! [`Twist`] and [`adjoint`]. Not here: joints, trees.
+//! Frames: A, B any two frames; `X_AB` the pose of B in A. A twist is the velocity of a frame's
+//! origin and its angular velocity; a wrench is the force through that origin and the moment about
+//! it. Start at [`Twist`] and [`adjoint`]. Not here: joints, trees.
 //!
 //! Source: [Featherstone 2008], chapter 2, with linear and angular parts exchanged.
 
@@ -203,7 +203,8 @@ impl SpatialInertia {
         Self { mass: 0.0, first_moment: Vector3::zeros(), rotational: Matrix3::zeros() }
     }
 
-    /// From mass (kg), centre of mass `p_BoBcm_B` (m) and inertia about the centre of mass, in B axes (kg m²).
+    /// From mass (kg), centre of mass `p_BoBcm_B` (m) and inertia about the centre of mass, in B
+    /// axes (kg m²).
     pub fn from_com(mass: f64, com: &Vector3<f64>, inertia_com: &Matrix3<f64>) -> Self {
         let c = skew(com);
         Self { mass, first_moment: com * mass, rotational: inertia_com - c * c * mass }

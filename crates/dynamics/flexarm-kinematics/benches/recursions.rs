@@ -1,6 +1,8 @@
-//! What does one call of each recursion cost on the reference arm, rigid (6), flexible (18) and with three elastic joints a link (42)?
+//! What does one call of each recursion cost on the reference arm, rigid (6), flexible (18) and
+//! with three elastic joints a link (42)?
 //!
-//! `tools/pinocchio_bench.sh` has Pinocchio's C++ and the example `recursion_times` on the same models in turn.
+//! `tools/pinocchio_bench.sh` has Pinocchio's C++ and the example `recursion_times` on the same
+//! models in turn.
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 #![allow(non_snake_case, reason = "monogram notation")]
 

@@ -1,5 +1,5 @@
-//! Times of our recursions per call, in ns, as `tools/pinocchio_bench.sh` sets them beside Pinocchio's:
-//! `cargo run --release --workspace --example recursion_times`
+//! Times of our recursions per call, in ns, as `tools/pinocchio_bench.sh` sets them beside
+//! Pinocchio's: `cargo run --release --workspace --example recursion_times`
 //!
 //! 64 random states, 101 batches of 1000 calls; CSV build,model,function,minimum_ns,median_ns.
 #![allow(clippy::print_stdout, clippy::unwrap_used, non_snake_case, reason = "an example; monogram notation")]

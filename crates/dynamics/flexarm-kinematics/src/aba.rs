@@ -1,9 +1,10 @@
 //! Forward and hybrid dynamics by articulated bodies, O(n).
 //!
-//! Every joint is either free (its force is given, its acceleration wanted) or prescribed (the other way
-//! round). A free elastic joint has a square, invertible motion subspace: it passes on exactly its own
-//! wrench and no inertia, so the tree falls apart there and each piece is solved by itself. A modal body gathers what
-//! its interfaces carry into `H` over its frame and its n coordinates and eliminates the latter:
+//! Every joint is either free (its force is given, its acceleration wanted) or prescribed (the
+//! other way round). A free elastic joint has a square, invertible motion subspace: it passes on
+//! exactly its own wrench and no inertia, so the tree falls apart there and each piece is solved by
+//! itself. A modal body gathers what its interfaces carry into `H` over its frame and its n
+//! coordinates and eliminates the latter:
 //!
 //! ```text
 //! [ I_rr  H_rη ] [ A ]   [ p_r ]   [ F ]
@@ -28,7 +29,8 @@ pub struct Roles {
     pub(crate) prescribed_body: Vec<bool>,
     prescribed_modal: Vec<bool>,
     free_coordinates: Vec<usize>,
-    /// A free coordinate moves several joints, by mimicry or over closed loops: the recursion does not apply, the mass matrix does.
+    /// A free coordinate moves several joints, by mimicry or over closed loops: the recursion does
+    /// not apply, the mass matrix does.
     dense: bool,
 }
 
@@ -76,9 +78,11 @@ impl Roles {
     }
 }
 
-/// Accelerations q̈ for the generalised forces `tau` (all joints free). Fills `data.{X_PB, V, A, qddot}`.
+/// Accelerations q̈ for the generalised forces `tau` (all joints free). Fills
+/// `data.{X_PB, V, A, qddot}`.
 ///
-/// O(n), no allocation; with mimic joints O(n³) by the mass matrix. Accelerations are NaN where a mass matrix is not positive definite.
+/// O(n), no allocation; with mimic joints O(n³) by the mass matrix. Accelerations are NaN where a
+/// mass matrix is not positive definite.
 pub fn forward_dynamics<'d>(
     model: &Model,
     data: &'d mut Data,
@@ -93,9 +97,10 @@ pub fn forward_dynamics<'d>(
 
 /// Free accelerations and prescribed forces.
 ///
-/// On entry `qddot` holds the accelerations of the prescribed coordinates and `tau` the forces of the free
-/// ones; on return both are complete. External wrenches in `data.F_ext` and balancers act. Fills `data.{X_PB, V, A}`.
-/// O(n), no allocation (dense where a free coordinate is mimicked). Accelerations are NaN where a mass matrix is not positive definite.
+/// On entry `qddot` holds the accelerations of the prescribed coordinates and `tau` the forces of
+/// the free ones; on return both are complete. External wrenches in `data.F_ext` and balancers act.
+/// Fills `data.{X_PB, V, A}`. O(n), no allocation (dense where a free coordinate is mimicked).
+/// Accelerations are NaN where a mass matrix is not positive definite.
 pub fn hybrid_dynamics(
     model: &Model,
     data: &mut Data,
@@ -130,8 +135,8 @@ fn solve(model: &Model, data: &mut Data, state: &State, roles: &Roles) {
     }
 }
 
-/// Apart, so that arms without balancers have the recursion alone in their loops. What a balancer puts on its joint comes to the given forces,
-/// and off those that are asked for.
+/// Apart, so that arms without balancers have the recursion alone in their loops. What a balancer
+/// puts on its joint comes to the given forces, and off those that are asked for.
 #[inline(never)]
 fn solve_with_balancers(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], roles: &Roles) {
     with_lines(model, data, q, |data| {
@@ -141,8 +146,8 @@ fn solve_with_balancers(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64],
     });
 }
 
-/// Articulated bodies in three passes. For body B with parent P, each quantity at its own origin, in its own axes; S, V and A
-/// as in `rnea.rs`:
+/// Articulated bodies in three passes. For body B with parent P, each quantity at its own origin,
+/// in its own axes; S, V and A as in `rnea.rs`:
 ///
 /// ```text
 /// outward   V_WB = Ad_BP V_WP + S q̇                              (1)  [Featherstone 2008, Table 7.1]
@@ -285,7 +290,8 @@ fn finish_bodies(model: &Model, data: &mut Data, roles: &Roles) {
     }
 }
 
-/// Outward over a free elastic joint: the accelerations of its six coordinates and that of body i, (10).
+/// Outward over a free elastic joint: the accelerations of its six coordinates and that of body i,
+/// (10).
 #[inline(always)]
 fn free_elastic(data: &mut Data, i: usize, k: usize, A: &Twist) -> Twist {
     let A_B = solve_inertia(&data.articulated[i], &(data.F[i] - data.pA[i]));

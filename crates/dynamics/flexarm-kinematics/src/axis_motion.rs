@@ -1,9 +1,10 @@
 //! Joints of one coordinate: everything that the recursions need to know of each.
 //!
-//! The motion subspace of such a joint is a constant column in B (and in J) axes, `V_PB_B = S q̇` with `S = [l; a]`: no bias,
-//! no rate. What a recursion does with it is linear in S, so it says what a rotation and what a translation do
-//! ([`AxisMotion::linear`]), and this file says which of them a joint has. A new kind is a variant here, in
-//! [`AxisMotion::linear`] and in the two poses. Not here: elastic joints of six coordinates and interfaces (`data.rs`).
+//! The motion subspace of such a joint is a constant column in B (and in J) axes, `V_PB_B = S q̇`
+//! with `S = [l; a]`: no bias, no rate. What a recursion does with it is linear in S, so it says
+//! what a rotation and what a translation do ([`AxisMotion::linear`]), and this file says which of
+//! them a joint has. A new kind is a variant here, in [`AxisMotion::linear`] and in the two poses.
+//! Not here: elastic joints of six coordinates and interfaces (`data.rs`).
 
 use std::ops::Add;
 
@@ -11,7 +12,8 @@ use flexarm_spatial::products::{add, add3, dot, lift, lift3, mul, scaled, scaled
 use flexarm_spatial::{Pose, Real, Twist, Wrench, skew};
 use nalgebra::{Matrix3, Rotation3, Vector3, Vector6};
 
-/// Motion of a joint with one coordinate; axes are unit vectors, with the same components in J and B axes.
+/// Motion of a joint with one coordinate; axes are unit vectors, with the same components in J and
+/// B axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AxisMotion {
     /// Rotation about the axis, rad.
@@ -22,7 +24,8 @@ pub enum AxisMotion {
     Helical {
         /// The axis.
         axis: Vector3<f64>,
-        /// Translation per rad, m; the lead of the thread over 2π, positive for right-handed threads.
+        /// Translation per rad, m; the lead of the thread over 2π, positive for right-handed
+        /// threads.
         pitch: f64,
     },
 }
@@ -50,7 +53,8 @@ impl AxisMotion {
         }
     }
 
-    /// A linear map of `S`, from what it makes of a rotation about the axis and of a translation along it.
+    /// A linear map of `S`, from what it makes of a rotation about the axis and of a translation
+    /// along it.
     #[inline(always)]
     pub(crate) fn linear<R: Add<Output = R>>(
         self,
@@ -77,8 +81,8 @@ impl AxisMotion {
         }
     }
 
-    /// `X_PB` at the joint value: the same as [`Self::pose`] behind `X_PJ`, from the table of the rotation and the sine and cosine of the value (of
-    /// joints that turn).
+    /// `X_PB` at the joint value: the same as [`Self::pose`] behind `X_PJ`, from the table of the
+    /// rotation and the sine and cosine of the value (of joints that turn).
     #[inline(always)]
     pub(crate) fn place<T: Real>(
         self,
@@ -135,7 +139,8 @@ impl AxisMotion {
         )
     }
 
-    /// The coordinate of a small displacement `S q` (linear first): the inverse of [`Self::column`] on its line.
+    /// The coordinate of a small displacement `S q` (linear first): the inverse of [`Self::column`]
+    /// on its line.
     pub fn coordinate_of(self, displacement: &Vector6<f64>) -> f64 {
         let along = self.linear(
             |axis| axis.dot(&displacement.fixed_rows::<3>(3)),

@@ -1,15 +1,15 @@
 //! Balancers: forces that depend on where the arm is and on nothing else, as gravity does.
 //!
-//! A balancer acts along the line between two points of the arm, or over one joint. It has one length x and the energy U(x)
-//! of its law:
+//! A balancer acts along the line between two points of the arm, or over one joint. It has one
+//! length x and the energy U(x) of its law:
 //!
 //! ```text
 //! line:   x = |d|,  d = p_WTo - p_WFrom,  u = d/x      force on From  +T u,  on To  -T u      T = dU/dx: tension     (1)
 //!         ∂(T u)/∂d = k u uᵀ + (T/x) (1 - u uᵀ)                                               k = dT/dx              (2)
 //! joint:  x = Σ c_i q_i + x_0                           generalised force  -c_i T                                    (3)
 //! ```
-//! Laws: [`BalancerLaw`]. As part of the mechanism: [`Balancer`]. All recursions over one number know them, those of
-//! [`crate::lanes`] do not. Not here: files, friction in a cylinder, heat.
+//! Laws: [`BalancerLaw`]. As part of the mechanism: [`Balancer`]. All recursions over one number
+//! know them, those of [`crate::lanes`] do not. Not here: files, friction in a cylinder, heat.
 
 use std::collections::HashSet;
 
@@ -35,15 +35,16 @@ pub struct Balancer {
 /// Between what a balancer acts.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BalancerSpan {
-    /// Along the line between the origins of two links; frames on fixed joints follow the part of a flexible link that
-    /// carries them.
+    /// Along the line between the origins of two links; frames on fixed joints follow the part of a
+    /// flexible link that carries them.
     Points {
         /// Name of a link.
         from: String,
         /// Name of another one.
         to: String,
     },
-    /// Over a joint of one coordinate, between its two links: springs of the drive within the joint count.
+    /// Over a joint of one coordinate, between its two links: springs of the drive within the joint
+    /// count.
     Joint {
         /// Name of the joint.
         joint: String,
@@ -54,8 +55,8 @@ pub enum BalancerSpan {
 
 /// Tension over length: energy, force and rate of a balancer.
 ///
-/// x is the length of a line (m) or the value of a joint (rad or m), T its tension (N): positive draws the ends together, or the
-/// joint to lower values (N m or N).
+/// x is the length of a line (m) or the value of a joint (rad or m), T its tension (N): positive
+/// draws the ends together, or the joint to lower values (N m or N).
 #[derive(Clone, Debug, PartialEq)]
 pub enum BalancerLaw {
     /// `T = preload + rate (x - free)`.
@@ -109,7 +110,8 @@ impl GasLaw {
         if self.pulls { 1.0 - stretch } else { 1.0 + stretch }
     }
 
-    /// Length at which the gas has no room left (m); infinite (either sign) where its volume is without bounds.
+    /// Length at which the gas has no room left (m); infinite (either sign) where its volume is
+    /// without bounds.
     pub fn end(&self) -> f64 {
         let reach = if self.slope > 0.0 { 1.0 / self.slope } else { f64::INFINITY };
         if self.pulls { self.at + reach } else { self.at - reach }
@@ -183,8 +185,8 @@ impl BalancerLaw {
     }
 }
 
-/// Tension through points: piecewise cubics with a continuous slope that never leave the range of their two points
-/// [Fritsch & Butland 1984]; beyond the first and the last point straight on.
+/// Tension through points: piecewise cubics with a continuous slope that never leave the range of
+/// their two points [Fritsch & Butland 1984]; beyond the first and the last point straight on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BalancerCurve {
     x: Vec<f64>,
@@ -226,7 +228,8 @@ impl BalancerCurve {
     /// Through points (x, T).
     ///
     /// # Errors
-    /// [`BalancerCurveError`] for fewer than two points, entries that are no numbers, and x that do not rise.
+    /// [`BalancerCurveError`] for fewer than two points, entries that are no numbers, and x that do
+    /// not rise.
     pub fn new(points: &[[f64; 2]]) -> Result<Self, BalancerCurveError> {
         if points.len() < 2 {
             return Err(BalancerCurveError::TooFew { found: points.len() });
@@ -279,7 +282,8 @@ impl BalancerCurve {
     }
 }
 
-/// Slopes at the points: weighted harmonic means of the secants, zero at turning points [Fritsch & Butland 1984].
+/// Slopes at the points: weighted harmonic means of the secants, zero at turning points [Fritsch &
+/// Butland 1984].
 fn monotone_slopes(x: &[f64], T: &[f64]) -> Vec<f64> {
     let secants: Vec<f64> = (1..x.len()).map(|k| (T[k] - T[k - 1]) / (x[k] - x[k - 1])).collect();
     let inner = |k: usize| {
@@ -385,8 +389,9 @@ impl PlacedBalancer {
         }
     }
 
-    /// The wrenches that it puts on two bodies at their origins, in world axes, for a joint value or length `x`; over a joint whose
-    /// spring yields in six directions to first order in its deflection.
+    /// The wrenches that it puts on two bodies at their origins, in world axes, for a joint value
+    /// or length `x`; over a joint whose spring yields in six directions to first order in its
+    /// deflection.
     pub fn wrenches(&self, X_WB: &[Pose], x: f64) -> [(usize, Wrench); 2] {
         let at_origin = |body: usize, p_W: &Vector3<f64>, F: Vector3<f64>| {
             let arm = p_W - X_WB[body].translation.vector;
@@ -458,7 +463,8 @@ pub(crate) fn place_balancers(
     Ok(placed)
 }
 
-/// The bodies from that of the child inward to that of the joint: each turns (or slides) by its share about the joint's axis.
+/// The bodies from that of the child inward to that of the joint: each turns (or slides) by its
+/// share about the joint's axis.
 fn over_joint(bodies: &[Body], joint: &str, child: usize) -> Option<BalancerPlace> {
     let first = bodies.iter().skip(1).position(|b| b.joint == joint)? + 1;
     let JointMotion::Axis(motion) = bodies[first].motion else { return None };
@@ -510,7 +516,8 @@ pub(crate) fn energy(model: &Model, data: &Data) -> f64 {
     model.balancers.iter().zip(&data.balanced).map(|(balancer, x)| balancer.law.energy(*x)).sum()
 }
 
-/// A recursion with the balancers' lines among the external wrenches, which are the caller's again afterwards.
+/// A recursion with the balancers' lines among the external wrenches, which are the caller's again
+/// afterwards.
 pub(crate) fn with_lines(model: &Model, data: &mut Data, q: &[f64], run: impl FnOnce(&mut Data)) {
     place_bodies(model, data, q);
     measure(model, data, q);

@@ -1,8 +1,9 @@
 //! Closed chains: planar loops of links that a pin closes, as dependent joints of the tree.
 //!
-//! A pin on link A goes through an eye of link B. In the plane of the loop these are two equations, and two joints of the loop
-//! follow from them; the tree of the other coordinates is what all algorithms see. With `p_AB` the place of the eye seen from A
-//! and E the two axes of A across the pin, q the independent coordinates and q_d the dependent ones:
+//! A pin on link A goes through an eye of link B. In the plane of the loop these are two equations,
+//! and two joints of the loop follow from them; the tree of the other coordinates is what all
+//! algorithms see. With `p_AB` the place of the eye seen from A and E the two axes of A across the
+//! pin, q the independent coordinates and q_d the dependent ones:
 //!
 //! ```text
 //! c(q, q_d) = Eᵀ p_AB = 0                                                     position             (1)
@@ -11,13 +12,15 @@
 //! τ   = τ_t + Tᵀ τ_d    M = [1; T]ᵀ M_t [1; T]                                 virtual work         (4)
 //! ∂τ/∂q = [1; T]ᵀ (∂τ_t/∂q_t) [1; T] + Σ_d τ_d ∂²q_d/∂q²                       statics              (5)
 //! ```
-//! τ_t and M_t are those of the opened tree with all its coordinates, from the same recursions as everywhere. The links of a
-//! loop make a triangle of the two dependent joints and the pin, whose sides follow from the independent coordinates: (1) has two
-//! solutions in closed form, the two ways to assemble it, and which of them a loop has stays what it was where it was built. From there Newton's
-//! method on (1) brings what links bend out of the plane, and the last digits. So q_d depends on q alone, never on what was before.
+//! τ_t and M_t are those of the opened tree with all its coordinates, from the same recursions as
+//! everywhere. The links of a loop make a triangle of the two dependent joints and the pin, whose
+//! sides follow from the independent coordinates: (1) has two solutions in closed form, the two
+//! ways to assemble it, and which of them a loop has stays what it was where it was built. From
+//! there Newton's method on (1) brings what links bend out of the plane, and the last digits. So
+//! q_d depends on q alone, never on what was before.
 //!
-//! Loops may rest on each other: the dependent joints of one may be in another. They are solved one after another. Not here: where the
-//! loops of a robot file come from, springs.
+//! Loops may rest on each other: the dependent joints of one may be in another. They are solved one
+//! after another. Not here: where the loops of a robot file come from, springs.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -33,12 +36,15 @@ use crate::rnea::balanced;
 
 /// Axes that differ by more than this are not of one plane (rad).
 pub const LOOP_AXIS_TOLERANCE_RAD: f64 = 1e-6;
-/// A loop that is built with its links nearer to a line than this cannot be told from its mirror image (rad).
+/// A loop that is built with its links nearer to a line than this cannot be told from its mirror
+/// image (rad).
 const DEAD_RAD: f64 = 1e-4;
-/// Newton iterations after the closed form: one shows that it was right, elastic links take three or four.
+/// Newton iterations after the closed form: one shows that it was right, elastic links take three
+/// or four.
 const MOST_ITERATIONS: usize = 12;
 
-/// A pin that closes a chain of links in a plane: an eye on one link stays on the axis of a pin on another one.
+/// A pin that closes a chain of links in a plane: an eye on one link stays on the axis of a pin on
+/// another one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoopClosure {
     /// Unique name.
@@ -51,7 +57,8 @@ pub struct LoopClosure {
     pub eye: String,
     /// The two joints of the loop that follow from the others.
     pub dependent: [String; 2],
-    /// Joint values near which the loop is assembled (rad or m); joints that are not named are at zero.
+    /// Joint values near which the loop is assembled (rad or m); joints that are not named are at
+    /// zero.
     pub at: Vec<(String, f64)>,
 }
 
@@ -387,7 +394,8 @@ impl PlacedLoop {
         (p.xy(), size.chain([p_B.amax(), A.translation.vector.amax()]).fold(0.0, f64::max))
     }
 
-    /// `∂c/∂q`, a pair per coordinate of the tree; coordinates that do not move the loop keep what they have, which is zero.
+    /// `∂c/∂q`, a pair per coordinate of the tree; coordinates that do not move the loop keep what
+    /// they have, which is zero.
     fn jacobian(&self, model: &Model, data: &Data, X: &[Pose], J: &mut [Vector2<f64>]) {
         J.fill(Vector2::zeros());
         let (A, p_B) = self.ends_at(X);
@@ -451,8 +459,9 @@ impl PlacedLoop {
         Triangle { joints: [joint(0), joint(1)], ends: [p_A, p_B], shape: self.shape }
     }
 
-    /// Angle between what brings a force and what it turns (rad), 90 degrees at best: between the two sides that hold no driving
-    /// joint; with a joint that slides between the two ways on which the dependent joints would move the pin.
+    /// Angle between what brings a force and what it turns (rad), 90 degrees at best: between the
+    /// two sides that hold no driving joint; with a joint that slides between the two ways on which
+    /// the dependent joints would move the pin.
     fn transmission(&self, model: &Model, X: &[Pose], J: &[Vector2<f64>]) -> f64 {
         let between = |a: Vector2<f64>, b: Vector2<f64>| (a.x * b.y - a.y * b.x).abs().atan2(a.dot(&b).abs());
         if self.dependent.iter().any(|&body| model.bodies[body].slides()) {
@@ -498,10 +507,11 @@ fn wrapped(angle: f64) -> f64 {
 }
 
 impl Triangle {
-    /// What the dependent joints have to turn or slide, for one of the two roots (1 or -1); `None` where the sides do not reach.
+    /// What the dependent joints have to turn or slide, for one of the two roots (1 or -1); `None`
+    /// where the sides do not reach.
     fn solve(&self, root: f64) -> Option<[f64; 2]> {
-        // The first joint moves the first point, and all that moves the second point is the second joint; or the first joint carries
-        // the second one.
+        // The first joint moves the first point, and all that moves the second point is the second
+        // joint; or the first joint carries the second one.
         let (first, second, moved, other, carried) = match self.shape {
             Shape::OneChain { chain, inner } => (inner, 1 - inner, self.ends[chain], self.ends[1 - chain], true),
             Shape::BothChains { of_pin } => (of_pin, 1 - of_pin, self.ends[0], self.ends[1], false),
@@ -608,7 +618,8 @@ impl Data {
         self.loops.as_ref().and_then(|loops| loops.solved.open)
     }
 
-    /// Values of the dependent joints at the last coordinates (rad or m), in the order of [`Model::dependent`].
+    /// Values of the dependent joints at the last coordinates (rad or m), in the order of
+    /// [`Model::dependent`].
     pub fn dependent_values(&self) -> &[f64] {
         self.loops.as_ref().map_or(&[], |loops| &loops.q[loops.solved.nv..])
     }
@@ -778,7 +789,8 @@ impl LoopTangent {
         Self { G: DMatrix::zeros(n - first, n - first), rates: LoopRates::new(model), qdot: vec![0.0; n] }
     }
 
-    /// (5) into `to`, for the slopes of the tree in `G` and the forces `tau_d` on the dependent coordinates.
+    /// (5) into `to`, for the slopes of the tree in `G` and the forces `tau_d` on the dependent
+    /// coordinates.
     pub(crate) fn reduce(&mut self, model: &Model, data: &Data, first: usize, tau_d: &[f64], to: &mut DMatrix<f64>) {
         let Some(loops) = &data.loops else { return };
         let solved = &loops.solved;
@@ -910,7 +922,8 @@ impl<'m> LoopDraft<'m> {
         self.dependent
     }
 
-    /// In its place, with the coordinates numbered; which way it is assembled is found by [`assemble`].
+    /// In its place, with the coordinates numbered; which way it is assembled is found by
+    /// [`assemble`].
     pub(crate) fn placed(&self, bodies: &[Body], nv: usize, modal_size: impl Fn(usize) -> usize) -> PlacedLoop {
         let mut moved_by: Vec<usize> = Vec::new();
         for &i in self.chains.iter().flatten().filter(|i| !self.dependent.contains(i)) {
@@ -942,7 +955,8 @@ impl<'m> LoopDraft<'m> {
         }
     }
 
-    /// The corner of the triangle opposite to the one side with driving joints: 0 and 1 the dependent joints, 2 the pin.
+    /// The corner of the triangle opposite to the one side with driving joints: 0 and 1 the
+    /// dependent joints, 2 the pin.
     fn corner(&self, bodies: &[Body]) -> Option<usize> {
         let mut driven = [false; 3];
         for own in &self.chains {

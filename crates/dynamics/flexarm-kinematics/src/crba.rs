@@ -1,9 +1,10 @@
 //! Mass matrix by composite rigid bodies, O(n × depth).
 //!
-//! The composite inertia of everything outward of B acts on B's motion subspace; the resulting wrench,
-//! carried inward, gives one column of M. All of it is in the axes of the arm's first body, so that a wrench keeps its force on the way
-//! and only its moment changes with the point. The six columns of an elastic joint go side by side. The coordinates of a modal
-//! body are n columns more: its own `C_t` and `C_r` and what its interfaces carry. Source: [Featherstone 2008], Table 6.2.
+//! The composite inertia of everything outward of B acts on B's motion subspace; the resulting
+//! wrench, carried inward, gives one column of M. All of it is in the axes of the arm's first body,
+//! so that a wrench keeps its force on the way and only its moment changes with the point. The six
+//! columns of an elastic joint go side by side. The coordinates of a modal body are n columns more:
+//! its own `C_t` and `C_r` and what its interfaces carry. Source: [Featherstone 2008], Table 6.2.
 
 use std::ops::Add;
 
@@ -18,10 +19,11 @@ use crate::kinematics::turned;
 use crate::lanes::Tree;
 use crate::model::{Body, JointMotion, Model};
 
-/// Mass matrix `M(q)`, nv×nv, both triangles (kg, kg m, kg m²). Fills `data.{X_PB, M}`. No allocation.
+/// Mass matrix `M(q)`, nv×nv, both triangles (kg, kg m, kg m²). Fills `data.{X_PB, M}`. No
+/// allocation.
 ///
-/// Of trees without closed loops, balancers and modal bodies [`crate::FreeForces::mass_at`] has the same matrix, to rounding, in two
-/// thirds to four fifths of the time.
+/// Of trees without closed loops, balancers and modal bodies [`crate::FreeForces::mass_at`] has the
+/// same matrix, to rounding, in two thirds to four fifths of the time.
 pub fn mass_matrix<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DMatrix<f64> {
     if !model.loops.is_empty() {
         closure::place(model, data, q.as_slice());
@@ -44,7 +46,8 @@ pub fn mass_matrix_at_poses(model: &Model, data: &mut Data) {
     }
 }
 
-/// A body in the axes of the first body of its arm: those of the body that hangs on the base, or of the base if that bends.
+/// A body in the axes of the first body of its arm: those of the body that hangs on the base, or of
+/// the base if that bends.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Turned<T: Scalar> {
     /// Turns vectors of the body's axes.
@@ -279,8 +282,8 @@ fn axis_project<T: Real>(motion: &AxisMotion, S: &Twist<T>, F: &Wrench<T>) -> T 
     )
 }
 
-/// Carries the wrenches of all that is outward of body i, and its own, over to its parent and meets the parent's joint: one level
-/// for all of them at once, because they do not wait for each other.
+/// Carries the wrenches of all that is outward of body i, and its own, over to its parent and meets
+/// the parent's joint: one level for all of them at once, because they do not wait for each other.
 #[inline(always)]
 fn carry_columns<T: Real>(model: &Model, data: &mut Data<T>, i: usize) {
     let body = &model.bodies[i];

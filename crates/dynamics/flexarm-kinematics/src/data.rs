@@ -1,7 +1,8 @@
 //! State and workspaces: what changes while the model stays.
 //!
-//! [`State`] is small and copyable between steppers; [`Data`] holds results and scratch of every algorithm,
-//! sized once by [`Data::new`], so that no algorithm allocates. Threads share a `Model`, each with its own `Data`.
+//! [`State`] is small and copyable between steppers; [`Data`] holds results and scratch of every
+//! algorithm, sized once by [`Data::new`], so that no algorithm allocates. Threads share a `Model`,
+//! each with its own `Data`.
 
 use flexarm_spatial::products::{add, cross, lift, lift3, mul, mul3, tr_mul, transposed};
 use flexarm_spatial::{ArticulatedInertia, ElasticAngles, Pose, Real, SpatialInertia, Twist, Wrench, sin_cos_all};
@@ -73,7 +74,8 @@ pub struct Data<T: Scalar = f64> {
     pub(crate) U: Vec<Wrench>,
     pub(crate) inverse_d: Vec<f64>,
     pub(crate) u: Vec<f64>,
-    /// The caller's external wrenches while those of the balancers are added; none without balancers.
+    /// The caller's external wrenches while those of the balancers are added; none without
+    /// balancers.
     pub(crate) F_held: Vec<Wrench<T>>,
     /// Length or joint value of each balancer at the last poses.
     pub(crate) balanced: Vec<f64>,
@@ -260,8 +262,8 @@ pub(crate) fn rotor_energy<T: Real>(model: &Model, qdot: &[T]) -> T {
     energy
 }
 
-/// What an algorithm begins with at new coordinates: mass integrals of all modal bodies and, in one go, sines and cosines of
-/// the joints; fills `modal`, `angles`, `sines` and `cosines`.
+/// What an algorithm begins with at new coordinates: mass integrals of all modal bodies and, in one
+/// go, sines and cosines of the joints; fills `modal`, `angles`, `sines` and `cosines`.
 #[inline(always)]
 pub(crate) fn begin<T: Real>(model: &Model, data: &mut Data<T>, q: &[T]) {
     for (angle, &i) in data.angles.iter_mut().zip(&model.turning) {
@@ -274,7 +276,8 @@ pub(crate) fn begin<T: Real>(model: &Model, data: &mut Data<T>, q: &[T]) {
     }
 }
 
-/// Pose of a body behind a joint that turns it by R and shifts it by d (m), both in the joint's axes.
+/// Pose of a body behind a joint that turns it by R and shifts it by d (m), both in the joint's
+/// axes.
 #[inline(always)]
 fn place_elastic<T: Real>(X_PB: &mut Pose<T>, body: &Body, R: &Matrix3<T>, d: &Vector3<T>) {
     let p_PJ = lift(&body.X_PJ.translation.vector);

@@ -1,8 +1,9 @@
-//! How the forces of a motion change with coordinates and velocities, in closed form: `∂τ/∂q` and `∂τ/∂q̇` of
-//! [`crate::inverse_dynamics`], and `∂(M a)/∂q`.
+//! How the forces of a motion change with coordinates and velocities, in closed form: `∂τ/∂q` and
+//! `∂τ/∂q̇` of [`crate::inverse_dynamics`], and `∂(M a)/∂q`.
 //!
-//! All about the origin of the world, in its axes: `s_j` the column of coordinate j, V and A twist and spatial acceleration of the body b
-//! that it moves, those of the parent with a dash, `(S q̇)_j` the derivative of `S q̇` of an elastic joint by its own coordinate. Seen from the
+//! All about the origin of the world, in its axes: `s_j` the column of coordinate j, V and A twist
+//! and spatial acceleration of the body b that it moves, those of the parent with a dash,
+//! `(S q̇)_j` the derivative of `S q̇` of an elastic joint by its own coordinate. Seen from the
 //! bodies, all of them outward of a joint change their motion alike:
 //!
 //! ```text
@@ -10,7 +11,8 @@
 //! ψ_j = V' × s_j + (S q̇)_j,   χ_j = A' × s_j + V' × ψ_j + V × (S q̇)_j + (S q̈ + Ṡ q̇)_j
 //! δV_i = s_j δq̇_j,   δA_i = (κ_j + s_j × V_i) δq̇_j,   κ_j = V' × s_j + V × s_j + ∂(Ṡ q̇)/∂q̇_j               (2)
 //! ```
-//! The wrench on a body, `F = I A + V ×* I V`, then changes by `I χ + C ψ`, and likewise with κ and s,
+//! The wrench on a body, `F = I A + V ×* I V`, then changes by `I χ + C ψ`, and likewise with κ and
+//! s,
 //!
 //! ```text
 //! C ψ = I (ψ × V) + ψ ×* I V + V ×* I ψ                 zero for translations ψ                           (3)
@@ -21,9 +23,10 @@
 //! k outward of j, or in the same joint:   ∂τ_k/∂q_j = s_k · (I_k χ_j + C_k ψ_j) + ∂S_k/∂q_j · F           (4)
 //! k inward of j:                          ∂τ_k/∂q_j = s_k · (I_j χ_j + C_j ψ_j + s_j ×* F_j)
 //! ```
-//! Wrenches from outside and balancers are not in it: they depend on places alone ([`crate::StaticTangent::of_loads`]). Not here: closed loops and
-//! bodies that bend in modes. Source: the recursions of [Carpentier & Mansard 2018], summed up for joints whose columns depend on their
-//! coordinates.
+//! Wrenches from outside and balancers are not in it: they depend on places alone
+//! ([`crate::StaticTangent::of_loads`]). Not here: closed loops and bodies that bend in modes.
+//! Source: the recursions of [Carpentier & Mansard 2018], summed up for joints whose columns depend
+//! on their coordinates.
 
 use flexarm_spatial::{ElasticAngles, Pose, SpatialInertia, Twist, Wrench};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
@@ -31,7 +34,8 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use crate::data::{Data, ElasticSubspace, State};
 use crate::model::{JointMotion, Model};
 
-/// Step of the differences by which the second derivative of a rate map is taken (rad); it is of second order in the elastic rates.
+/// Step of the differences by which the second derivative of a rate map is taken (rad); it is of
+/// second order in the elastic rates.
 const DIFFERENCE: f64 = 1e-3;
 
 /// Derivatives of the forces of a motion, with their workspace.
@@ -101,7 +105,8 @@ impl DynamicTangent {
         Some(Self { columns, bodies: vec![Moving::still(); model.bodies.len()] })
     }
 
-    /// `∂τ/∂q` into `by_q` and `∂τ/∂q̇` into `by_rate`, nv × nv, a column per coordinate; written over all of both. No allocation.
+    /// `∂τ/∂q` into `by_q` and `∂τ/∂q̇` into `by_rate`, nv × nv, a column per coordinate; written
+    /// over all of both. No allocation.
     ///
     /// * `data`: after [`crate::inverse_dynamics`] of this motion and [`crate::world_poses`].
     ///
@@ -127,7 +132,8 @@ impl DynamicTangent {
         self.add_own_joints(model, data, state.q.as_slice(), by_q);
     }
 
-    /// `∂(M a)/∂q` for constant accelerations a without the inertia of rotors, nv × nv, written over all of `G`. No allocation.
+    /// `∂(M a)/∂q` for constant accelerations a without the inertia of rotors, nv × nv, written
+    /// over all of `G`. No allocation.
     ///
     /// * `data`: after [`crate::forward_kinematics`] at q.
     ///
@@ -153,7 +159,8 @@ impl DynamicTangent {
         self.add_own_joints(model, data, q.as_slice(), G);
     }
 
-    /// Adds to `tau` (nv) the forces that an inertia more on a body asks for in the motion that was last given.
+    /// Adds to `tau` (nv) the forces that an inertia more on a body asks for in the motion that was
+    /// last given.
     ///
     /// * `more`: about Bo, B axes; `data` as it was then.
     pub fn add_inertia_forces(
@@ -353,7 +360,8 @@ impl JointChange {
     }
 }
 
-/// Of `S q̇ = [L d'; B φ']` and `Ṡ q̇ = [L d' × w; B' φ']` with `w = B φ'`, and `∂L/∂φ_c = -[B e_c]x L`.
+/// Of `S q̇ = [L d'; B φ']` and `Ṡ q̇ = [L d' × w; B' φ']` with `w = B φ'`, and
+/// `∂L/∂φ_c = -[B e_c]x L`.
 fn joint_changes(
     angles: ElasticAngles,
     S: &ElasticSubspace,

@@ -24,8 +24,8 @@ pub fn kinetic_energy_of(model: &Model, data: &Data) -> f64 {
         + modal.map(|(entry, modal)| modal.kinetic_energy(&entry.tables, &data.V[entry.body])).sum::<f64>()
 }
 
-/// Momentum of all moving bodies about the world origin, world axes (kg m/s; kg m²/s), for the poses and twists that
-/// another algorithm left in `data.X_WB` and `data.V`.
+/// Momentum of all moving bodies about the world origin, world axes (kg m/s; kg m²/s), for the
+/// poses and twists that another algorithm left in `data.X_WB` and `data.V`.
 pub fn momentum_of(model: &Model, data: &Data) -> Wrench {
     let bodies = model.bodies.iter().zip(&data.V).zip(&data.X_WB).skip(1);
     let rigid = bodies.map(|((body, V), X)| body.inertia.mul_twist(V).at_parent(X));
@@ -35,14 +35,16 @@ pub fn momentum_of(model: &Model, data: &Data) -> Wrench {
     rigid.chain(modal).fold(Wrench::zeros(), |sum, p| sum + p)
 }
 
-/// Potential energy of gravity (J), zero at the world origin, and of the balancers; fills `data.{X_PB, X_WB}`.
+/// Potential energy of gravity (J), zero at the world origin, and of the balancers; fills
+/// `data.{X_PB, X_WB}`.
 pub fn potential_energy(model: &Model, data: &mut Data, q: &nalgebra::DVector<f64>) -> f64 {
     forward_kinematics(model, data, q);
     potential_energy_of(model, data)
 }
 
-/// Potential energy of gravity and of the balancers (J) for the poses in `data.X_WB`, the balancers' where the last of
-/// [`crate::forward_kinematics`], [`crate::inverse_dynamics`] and [`crate::hybrid_dynamics`] found them.
+/// Potential energy of gravity and of the balancers (J) for the poses in `data.X_WB`, the
+/// balancers' where the last of [`crate::forward_kinematics`], [`crate::inverse_dynamics`] and
+/// [`crate::hybrid_dynamics`] found them.
 pub fn potential_energy_of(model: &Model, data: &Data) -> f64 {
     balancer::energy(model, data) - model.gravity.dot(&first_moment(model, data))
 }

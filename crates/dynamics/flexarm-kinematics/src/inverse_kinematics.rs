@@ -1,8 +1,9 @@
-//! Inverse kinematics: joint values that bring a frame to a pose (damped least squares with limits).
+//! Inverse kinematics: joint values that bring a frame to a pose (damped least squares with
+//! limits).
 //!
-//! Levenberg-Marquardt on the pose error `[p_target - p; log(R_target Rᵀ)]` in world axes, steps clamped
-//! into the joint limits; joints that a limit holds are left out of the next step when it would push
-//! them further out. Elastic coordinates stay as they are in the start value.
+//! Levenberg-Marquardt on the pose error `[p_target - p; log(R_target Rᵀ)]` in world axes, steps
+//! clamped into the joint limits; joints that a limit holds are left out of the next step when it
+//! would push them further out. Elastic coordinates stay as they are in the start value.
 //!
 //! Source: [Nakamura & Hanafusa 1986], [Wampler 1986]; damping update as in [Marquardt 1963].
 

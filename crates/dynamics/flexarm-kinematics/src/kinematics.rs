@@ -1,7 +1,8 @@
 //! Forward kinematics, geometric Jacobian and its time derivative.
 //!
-//! Frames: W world, B a body, T any frame fixed to a body (usually the tool). `J_WT_W` maps `q̇` to the
-//! twist of T: velocity of the point To and angular velocity, both in **world axes** (rows linear first).
+//! Frames: W world, B a body, T any frame fixed to a body (usually the tool). `J_WT_W` maps `q̇` to
+//! the twist of T: velocity of the point To and angular velocity, both in **world axes** (rows
+//! linear first).
 
 use flexarm_spatial::products::{add, column, cross, lift, mul, mul3, scaled, sub};
 use flexarm_spatial::{ElasticAngles, Real, Twist};
@@ -101,8 +102,8 @@ pub fn frame_jacobian(model: &Model, data: &Data, frame: &Frame, J: &mut Matrix6
     });
 }
 
-/// [`frame_jacobian`] over any scalar; `J`: 6 × nv, column after column. Columns of coordinates beyond nv, which closed loops
-/// have, go to `beyond`.
+/// [`frame_jacobian`] over any scalar; `J`: 6 × nv, column after column. Columns of coordinates
+/// beyond nv, which closed loops have, go to `beyond`.
 #[inline(always)]
 pub(crate) fn tree_jacobian<T: Real>(
     model: &Model,
@@ -144,8 +145,8 @@ fn add_column<T: Real>(column: &Twist<T>, factor: T, to: &mut [T]) {
     }
 }
 
-/// Columns by which the joint of body i moves it, at Bo, in the axes to which R turns those of B: coordinate of the tree, linear
-/// and angular part.
+/// Columns by which the joint of body i moves it, at Bo, in the axes to which R turns those of B:
+/// coordinate of the tree, linear and angular part.
 #[inline(always)]
 pub(crate) fn joint_columns<T: Real>(
     model: &Model,
@@ -191,9 +192,11 @@ pub(crate) fn turned<T: Real>(motion: AxisMotion, R_WB: &Matrix3<T>, ratio: f64)
     )
 }
 
-/// `dJ_WT_W/dt`, 6×nv, from the last [`forward_kinematics_velocity`] at `state`; written into `Jdot`.
+/// `dJ_WT_W/dt`, 6×nv, from the last [`forward_kinematics_velocity`] at `state`; written into
+/// `Jdot`.
 ///
-/// `A_WT = J q̈ + J̇ q̇` is the acceleration of the point To and the angular acceleration, in world axes.
+/// `A_WT = J q̈ + J̇ q̇` is the acceleration of the point To and the angular acceleration, in world
+/// axes.
 ///
 /// # Panics
 /// If `Jdot` does not have nv columns.
@@ -230,8 +233,8 @@ pub fn frame_jacobian_derivative(model: &Model, data: &Data, state: &State, fram
     }
 }
 
-/// As [`joint_columns`] with the rates of the columns `[l, a, l', a']`, for a body that turns with `w_B` in the axes of the columns; `q` and `qdot` of
-/// the elastic coordinates.
+/// As [`joint_columns`] with the rates of the columns `[l, a, l', a']`, for a body that turns with
+/// `w_B` in the axes of the columns; `q` and `qdot` of the elastic coordinates.
 #[inline(always)]
 #[allow(clippy::too_many_arguments, reason = "of two callers, each with other axes")]
 pub(crate) fn joint_column_rates(

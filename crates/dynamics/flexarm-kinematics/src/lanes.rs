@@ -1,8 +1,9 @@
 //! The recursions over several runs or poses of one tree at once, in the lanes of a scalar type.
 //!
-//! Poses, speeds and inertias differ from lane to lane; bodies, joints and shapes of links are those of one [`Model`]. Every
-//! lane has the bits of the function of the same name over one number. Functions are inlined into what calls them, so that
-//! the instructions of the lanes are at hand ([`flexarm_spatial::lanes::with_lanes`]).
+//! Poses, speeds and inertias differ from lane to lane; bodies, joints and shapes of links are
+//! those of one [`Model`]. Every lane has the bits of the function of the same name over one
+//! number. Functions are inlined into what calls them, so that the instructions of the lanes are at
+//! hand ([`flexarm_spatial::lanes::with_lanes`]).
 
 use std::sync::Arc;
 
@@ -19,8 +20,8 @@ use crate::model::{Body, Frame, JointMotion, Model};
 use crate::rnea::{at_rest, newton_euler};
 use crate::static_tangent::{PointLoad, StaticTangent};
 
-/// A tree whose inertias are in the scalar of a recursion: a [`Model`], or one with several sets of them
-/// ([`LaneTree`]).
+/// A tree whose inertias are in the scalar of a recursion: a [`Model`], or one with several sets of
+/// them ([`LaneTree`]).
 pub trait Tree<T: Real> {
     /// Bodies and joints, alike in all lanes.
     fn model(&self) -> &Model;
@@ -49,7 +50,8 @@ pub struct LaneTree<T: Real> {
 }
 
 impl<T: Real> LaneTree<T> {
-    /// A tree for each lane; `None` where they differ in more than their inertias, are not as many as lanes, or have closed loops.
+    /// A tree for each lane; `None` where they differ in more than their inertias, are not as many
+    /// as lanes, or have closed loops.
     pub fn new(models: &[Arc<Model>]) -> Option<Self> {
         let first = models.first().filter(|_| models.len() == T::LANES)?;
         // Loops are closed by an iteration whose length depends on where the arm is.
@@ -146,7 +148,8 @@ pub fn static_tangent<T: Real>(
 
 /// Places of a frame's origin in the world (m): with all elastic coordinates at zero, and at `q`.
 ///
-/// For the poses of the joints that the last algorithm left in `data`, at the same joint coordinates; the elastic ones may be others.
+/// For the poses of the joints that the last algorithm left in `data`, at the same joint
+/// coordinates; the elastic ones may be others.
 #[inline(always)]
 pub fn rigid_and_flexible<T: Real>(tree: &LaneTree<T>, data: &Data<T>, frame: &Frame, q: &[T]) -> [Vector3<T>; 2] {
     places(
@@ -175,7 +178,8 @@ pub fn rigid_and_flexible_of_points<T: Real>(
     )
 }
 
-/// Both places, where a body on a joint of one coordinate has this rotation and origin in its parent.
+/// Both places, where a body on a joint of one coordinate has this rotation and origin in its
+/// parent.
 #[inline(always)]
 fn places<'a, T: Real>(
     model: &Model,

@@ -1,17 +1,19 @@
-//! Spatial algebra, the immutable tree model, and the kinematics and dynamics recursions of flexarm.
+//! Spatial algebra, the immutable tree model, and the kinematics and dynamics recursions of
+//! flexarm.
 //!
-//! A [`Mechanism`] (links and joints by name) becomes a checked [`Model`]; [`Data`] holds workspaces and
-//! results, [`State`] positions and velocities. The algorithms are free functions that bear the name of what
-//! they compute and never allocate. Joints: fixed, revolute, continuous, prismatic, and the six-DoF elastic
-//! joint of a flexible link, at one cost.
+//! A [`Mechanism`] (links and joints by name) becomes a checked [`Model`]; [`Data`] holds
+//! workspaces and results, [`State`] positions and velocities. The algorithms are free functions
+//! that bear the name of what they compute and never allocate. Joints: fixed, revolute, continuous,
+//! prismatic, and the six-DoF elastic joint of a flexible link, at one cost.
 //!
-//! Inverse kinematics: [`AnalyticArm`] gives all solutions of arms whose axes allow a closed form, [`inverse_kinematics`] one from a
-//! start, [`inverse_kinematics_from_many_starts`] those of any arm that a search finds, [`inverse_kinematics_with_rule`] the best of
-//! a redundant arm.
+//! Inverse kinematics: [`AnalyticArm`] gives all solutions of arms whose axes allow a closed form,
+//! [`inverse_kinematics`] one from a start, [`inverse_kinematics_from_many_starts`] those of any
+//! arm that a search finds, [`inverse_kinematics_with_rule`] the best of a redundant arm.
 //!
-//! Notation: `X_AB` pose of B in A; `V` twists, `F` wrenches, **linear part first**; see `docs/references.md`
-//! for the sources. Balancers ([`Balancer`]) are forces of the tree as
-//! its weight is; closed planar chains ([`LoopClosure`]) make joints follow from others. Not here: files, flexible-link stiffness, time.
+//! Notation: `X_AB` pose of B in A; `V` twists, `F` wrenches, **linear part first**; see
+//! `docs/references.md` for the sources. Balancers ([`Balancer`]) are forces of the tree as its
+//! weight is; closed planar chains ([`LoopClosure`]) make joints follow from others. Not here:
+//! files, flexible-link stiffness, time.
 //!
 //! ```
 //! use flexarm_kinematics::*;

@@ -1,9 +1,11 @@
 //! Inverse kinematics by numbers from many starts: for arms without a closed form.
 //!
-//! The starts are the caller's and points spread evenly over the ranges of the joints (an additive recurrence with the
-//! generalised golden ratio [Roberts 2018]): the same every time. What is found are solutions; **that all are found is not
-//! certain**. How often each was met ([`FoundSolution::hits`]) gives an idea: where each has several hits, one that was
-//! missed has a small region of attraction. Arms with more than six joints have families of solutions, of which these are samples.
+//! The starts are the caller's and points spread evenly over the ranges of the joints (an additive
+//! recurrence with the generalised golden ratio [Roberts 2018]): the same every time. What is found
+//! are solutions; **that all are found is not certain**. How often each was met
+//! ([`FoundSolution::hits`]) gives an idea: where each has several hits, one that was missed has a
+//! small region of attraction. Arms with more than six joints have families of solutions, of which
+//! these are samples.
 
 use std::f64::consts::{PI, TAU};
 
@@ -23,10 +25,12 @@ pub struct FoundSolution {
     pub hits: usize,
 }
 
-/// All distinct joint values within the limits that were reached from `starts` starts, the first from `q_start`.
+/// All distinct joint values within the limits that were reached from `starts` starts, the first
+/// from `q_start`.
 ///
-/// Solutions that differ by whole turns of joints are one. Coordinates that do not move the frame stay as in `q_start`
-/// (nv long, rad or m); joints without limits start within half a turn or 1 m of it.
+/// Solutions that differ by whole turns of joints are one. Coordinates that do not move the frame
+/// stay as in `q_start` (nv long, rad or m); joints without limits start within half a turn or 1 m
+/// of it.
 ///
 /// # Errors
 /// [`IkError`] of the start that came nearest, when none reaches the pose.

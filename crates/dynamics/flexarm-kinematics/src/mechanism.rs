@@ -1,8 +1,8 @@
 //! A mechanism as a user describes it: links and joints by name, fixed joints included.
 //!
-//! This is the editable form. Readers (URDF) produce it, the flexible-link substitution changes it, and
-//! [`crate::Model::new`] checks it once and turns it into the immutable tree that the recursions read.
-//! Start at [`Mechanism`]. Not here: any computation.
+//! This is the editable form. Readers (URDF) produce it, the flexible-link substitution changes it,
+//! and [`crate::Model::new`] checks it once and turns it into the immutable tree that the
+//! recursions read. Start at [`Mechanism`]. Not here: any computation.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -24,7 +24,8 @@ pub struct Mechanism {
     pub links: Vec<Link>,
     /// All joints, in the order of the source.
     pub joints: Vec<Joint>,
-    /// Links that bend in modes, by name; their mass is in the modal body, beside the link's own inertia.
+    /// Links that bend in modes, by name; their mass is in the modal body, beside the link's own
+    /// inertia.
     pub modal: Vec<(String, Arc<ModalBody>)>,
     /// Springs, gas springs and counterbalances between points of the arm or over joints.
     pub balancers: Vec<Balancer>,
@@ -34,12 +35,13 @@ pub struct Mechanism {
     pub loops: Vec<LoopClosure>,
     /// Acceleration of gravity in world (= base link) axes (m/s²).
     pub gravity: Vector3<f64>,
-    /// Joints in the order of the actuated coordinates; those that are not named follow in the order of the tree, depth first. See
-    /// [`Mechanism::keep_coordinate_order`].
+    /// Joints in the order of the actuated coordinates; those that are not named follow in the
+    /// order of the tree, depth first. See [`Mechanism::keep_coordinate_order`].
     pub coordinate_order: Vec<String>,
 }
 
-/// Inertia between two joints, of rotors that turn with both: `q̇_1 q̇_2` times this in the kinetic energy.
+/// Inertia between two joints, of rotors that turn with both: `q̇_1 q̇_2` times this in the kinetic
+/// energy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RotorCoupling {
     /// Two joints of one coordinate each.
@@ -92,7 +94,8 @@ pub struct Joint {
     pub limits: Limits,
     /// Set when this joint follows another one.
     pub mimic: Option<Mimic>,
-    /// Inertia of the rotor seen from the joint, ratio² times its own (kg m² or kg); only on one-DoF joints.
+    /// Inertia of the rotor seen from the joint, ratio² times its own (kg m² or kg); only on
+    /// one-DoF joints.
     pub armature: f64,
 }
 
@@ -127,7 +130,8 @@ pub enum JointKind {
         /// Translation per rad (m).
         pitch: f64,
     },
-    /// Interface of that number of the parent link, which must have a [`ModalBody`]: moves with its coordinates.
+    /// Interface of that number of the parent link, which must have a [`ModalBody`]: moves with its
+    /// coordinates.
     Interface(usize),
 }
 
@@ -252,8 +256,9 @@ impl Mechanism {
         }
     }
 
-    /// Keeps the order that the actuated coordinates have now, however the tree is changed afterwards: joints that move to another
-    /// link come in another place of the tree, and joint values are told by their order.
+    /// Keeps the order that the actuated coordinates have now, however the tree is changed
+    /// afterwards: joints that move to another link come in another place of the tree, and joint
+    /// values are told by their order.
     pub fn keep_coordinate_order(&mut self) {
         if !self.coordinate_order.is_empty() {
             return;

@@ -1,8 +1,9 @@
-//! A body that bends in modes: floating frame of reference with its frame at the proximal interface.
+//! A body that bends in modes: floating frame of reference with its frame at the proximal
+//! interface.
 //!
-//! A point at `s` of the undeformed body stands at `r = s + Σ φ_k(s) η_k`, body axes, with shapes that vanish where the
-//! body hangs on its parent. With a kinetic energy that is exact in η (second order included) the equations of motion
-//! need no more than mass integrals:
+//! A point at `s` of the undeformed body stands at `r = s + Σ φ_k(s) η_k`, body axes, with shapes
+//! that vanish where the body hangs on its parent. With a kinetic energy that is exact in η (second
+//! order included) the equations of motion need no more than mass integrals:
 //!
 //! ```text
 //! h   = ∫ r dm            = S + C_t η                                    (1)
@@ -16,19 +17,21 @@
 //!
 //! W = ∫ r (dr/dt)ᵀ dm = (Σ_k η̇_k Q_k)ᵀ,   g_lk = ∫ φ_l × φ_k dm;   a = v̇ + ω × v in body axes
 //! ```
-//! What turns with the sections (rotary inertia of beams) enters `J_0`, `C_r0` and `M_e` as constants.
+//! What turns with the sections (rotary inertia of beams) enters `J_0`, `C_r0` and `M_e` as
+//! constants.
 //!
-//! Of `Q_k` the symmetric part is enough, as six numbers: `axial(N_kl)` is `g_lk`, and what the skew part of W adds to T is what
-//! `ω × C_r η̇` adds.
+//! Of `Q_k` the symmetric part is enough, as six numbers: `axial(N_kl)` is `g_lk`, and what the
+//! skew part of W adds to T is what `ω × C_r η̇` adds.
 //!
-//! Start at [`ModalBody`]. Sources: [Shabana 2013], chapter 5; [Wallrapp 1994] for the set of integrals.
-//! Not here: stiffness and damping of the modes, where shapes come from.
+//! Start at [`ModalBody`]. Sources: [Shabana 2013], chapter 5; [Wallrapp 1994] for the set of
+//! integrals. Not here: stiffness and damping of the modes, where shapes come from.
 
 use flexarm_spatial::products::{add, add3, cross, dot, lift, lift3, mul, scaled, tr_mul};
 use flexarm_spatial::{Pose, Real, SpatialInertia, Twist, Wrench};
 use nalgebra::{Cholesky, DMatrix, Dyn, Matrix3, Matrix6xX, Scalar, Vector3};
 
-/// Shapes at the interfaces and mass integrals over them; n coordinates, link axes, about the link's origin. SI units.
+/// Shapes at the interfaces and mass integrals over them; n coordinates, link axes, about the
+/// link's origin. SI units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModalBody {
     /// Mass (kg).
@@ -43,7 +46,8 @@ pub struct ModalBody {
     pub C_r: Vec<Vector3<f64>>,
     /// `P_k[a,b] = ∫ s_a φ_k,b dm`.
     pub P: Vec<Matrix3<f64>>,
-    /// `N[k n + l][a,b] = ∫ φ_k,a φ_l,b dm`; empty: terms of second order in the deformation are left out.
+    /// `N[k n + l][a,b] = ∫ φ_k,a φ_l,b dm`; empty: terms of second order in the deformation are
+    /// left out.
     pub N: Vec<Matrix3<f64>>,
     /// Modal mass, n×n.
     pub M: DMatrix<f64>,
@@ -71,8 +75,8 @@ impl ModalBody {
         SpatialInertia { mass: self.mass, first_moment: self.first_moment, rotational: self.inertia }
     }
 
-    /// Mass matrix of the undeformed body: acceleration and angular acceleration of the link's origin, then the modes; (5)
-    /// at rest, (6 + n)×(6 + n).
+    /// Mass matrix of the undeformed body: acceleration and angular acceleration of the link's
+    /// origin, then the modes; (5) at rest, (6 + n)×(6 + n).
     pub fn mass_matrix(&self) -> DMatrix<f64> {
         let n = self.n();
         let mut M = DMatrix::zeros(6 + n, 6 + n);
@@ -138,8 +142,8 @@ pub(crate) struct ModalTables {
 enum Integrals {
     /// Those of a mesh.
     All(DMatrix<f64>),
-    /// Those of a beam, of whose modes each moves along one axis: row and value of what is not zero, and where each column
-    /// ends.
+    /// Those of a beam, of whose modes each moves along one axis: row and value of what is not
+    /// zero, and where each column ends.
     Few { entries: Vec<(u32, f64)>, ends: Vec<usize> },
 }
 
@@ -360,7 +364,8 @@ impl<T: Real> ModalData<T> {
         Wrench::new(force, torque)
     }
 
-    /// Mass terms of (5): adds to `f` and returns the wrench, for spatial acceleration A and `η̈` (none: zero).
+    /// Mass terms of (5): adds to `f` and returns the wrench, for spatial acceleration A and `η̈`
+    /// (none: zero).
     #[inline(always)]
     pub(crate) fn inertia_forces(
         &mut self,
@@ -429,7 +434,8 @@ impl InterfaceShape {
         }
     }
 
-    /// Column k of the motion subspace in the child's axes, for its maps L (translations) and B (rotations).
+    /// Column k of the motion subspace in the child's axes, for its maps L (translations) and B
+    /// (rotations).
     #[inline(always)]
     pub(crate) fn twist<T: Real>(&self, k: usize, L: &Matrix3<T>, B: &Matrix3<T>) -> Twist<T> {
         let c = &self.Phi.as_slice()[6 * k..6 * k + 6];

@@ -1,11 +1,13 @@
 //! The immutable tree that the recursions read: bodies in order, parents before children.
 //!
-//! Body 0 is the world (the base link and all that is fixed to it); every other body has exactly one joint
-//! to its parent. Links on fixed joints are lumped into the body that carries them and stay as named
-//! [`Frame`]s. Start at [`Model::new`]. Not here: state and results ([`crate::Data`], [`crate::State`]).
+//! Body 0 is the world (the base link and all that is fixed to it); every other body has exactly
+//! one joint to its parent. Links on fixed joints are lumped into the body that carries them and
+//! stay as named [`Frame`]s. Start at [`Model::new`]. Not here: state and results ([`crate::Data`],
+//! [`crate::State`]).
 //!
-//! Coordinates: actuated joints first (in tree order), then the elastic ones in groups, proximal to distal: six or one
-//! per elastic joint, n per modal body. [`Model::elastic`] and [`Body::coordinate`] know the offsets.
+//! Coordinates: actuated joints first (in tree order), then the elastic ones in groups, proximal to
+//! distal: six or one per elastic joint, n per modal body. [`Model::elastic`] and
+//! [`Body::coordinate`] know the offsets.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -40,7 +42,8 @@ pub struct Model {
     /// Two coordinates and the entry that rotors add to their rows and columns in the mass matrix.
     pub(crate) rotor_couplings: Vec<(usize, usize, f64)>,
     pub(crate) has_mimic: bool,
-    /// Whether entries of the mass matrix are zero or sums: branches, bodies that bend in modes, joints that mimic others.
+    /// Whether entries of the mass matrix are zero or sums: branches, bodies that bend in modes,
+    /// joints that mimic others.
     pub(crate) sums_entries: bool,
     /// Closed loops, each after those that it rests on.
     pub(crate) loops: Vec<PlacedLoop>,
@@ -48,7 +51,8 @@ pub struct Model {
     dependent: Vec<Coordinate>,
     /// Bodies on joints of one coordinate that turn.
     pub(crate) turning: Vec<usize>,
-    /// Coordinates of the joints that have one, in the order of the bodies, and the first ones of those that have six.
+    /// Coordinates of the joints that have one, in the order of the bodies, and the first ones of
+    /// those that have six.
     pub(crate) single: Vec<usize>,
     pub(crate) six: Vec<usize>,
     /// Acceleration of gravity in world axes (m/s²).
@@ -70,7 +74,8 @@ pub struct Body {
     pub inertia: SpatialInertia,
     /// What the joint lets move.
     pub motion: JointMotion,
-    /// Index of the (first) independent coordinate; from [`Model::nv`] on those that closed loops determine.
+    /// Index of the (first) independent coordinate; from [`Model::nv`] on those that closed loops
+    /// determine.
     pub coordinate: usize,
     /// Joint value = ratio × coordinate + offset; (1, 0) except for mimic joints.
     pub ratio: f64,
@@ -395,8 +400,9 @@ impl Model {
         !self.modal.is_empty()
     }
 
-    /// Modal coordinates that move no interface and are orthogonal to each other in the body's mass, as fixed-interface modes
-    /// are: the mass matrix has a constant on their diagonal and nothing between them.
+    /// Modal coordinates that move no interface and are orthogonal to each other in the body's
+    /// mass, as fixed-interface modes are: the mass matrix has a constant on their diagonal and
+    /// nothing between them.
     pub fn held_modes(&self) -> Vec<usize> {
         self.modal
             .iter()
@@ -434,8 +440,8 @@ impl Model {
         &self.loops
     }
 
-    /// The coordinates that follow from the closed loops, two per loop in the order of [`Model::loops`]; they are none of
-    /// [`Model::coordinates`].
+    /// The coordinates that follow from the closed loops, two per loop in the order of
+    /// [`Model::loops`]; they are none of [`Model::coordinates`].
     pub fn dependent(&self) -> &[Coordinate] {
         &self.dependent
     }
@@ -451,7 +457,8 @@ impl Model {
         rigid + self.modal.iter().map(|m| m.tables.shapes.mass).sum::<f64>()
     }
 
-    /// The same model with the inertia of one body replaced (about Bo, B axes), with all that is fixed to it.
+    /// The same model with the inertia of one body replaced (about Bo, B axes), with all that is
+    /// fixed to it.
     pub fn with_inertia(&self, body: usize, inertia: SpatialInertia) -> Self {
         let mut model = self.clone();
         model.bodies[body].inertia = inertia;
@@ -463,8 +470,8 @@ impl Model {
         self.rotors.iter().filter(|(k, _)| *k == coordinate).map(|(_, inertia)| inertia).sum()
     }
 
-    /// Whether the other model has the same joints, frames, modal bodies, balancers, loops and gravity, to the last bit; inertias may
-    /// differ.
+    /// Whether the other model has the same joints, frames, modal bodies, balancers, loops and
+    /// gravity, to the last bit; inertias may differ.
     pub fn is_same_tree(&self, other: &Self) -> bool {
         let body =
             |b: &Body| (b.parent, b.X_PJ, b.motion, b.coordinate, b.ratio, b.offset, b.armature, b.elastic, b.modal);
@@ -607,7 +614,8 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// The body behind a joint, which is a new one unless the joint is fixed, and the pose of the child link in it.
+    /// The body behind a joint, which is a new one unless the joint is fixed, and the pose of the
+    /// child link in it.
     fn cross(&mut self, joint: &Joint, parent: usize, body: usize, X_BL: &Pose) -> Result<(usize, Pose), ModelError> {
         if !joint.X_PJ.translation.vector.iter().chain(joint.X_PJ.rotation.matrix().iter()).all(|x| x.is_finite()) {
             return Err(ModelError::NotFinite { what: "origin", name: joint.name.clone() });
@@ -670,7 +678,8 @@ impl<'a> Builder<'a> {
         self.frames.iter().any(|f| f.body == body && f.name == *link && f.X_BF == Pose::identity())
     }
 
-    /// What gives way is solved for, so it must carry mass. A joint that is moved along a motion needs none behind it.
+    /// What gives way is solved for, so it must carry mass. A joint that is moved along a motion
+    /// needs none behind it.
     fn check_masses(&self) -> Result<(), ModelError> {
         let own = |b: &Body| b.inertia.mass + b.modal.map_or(0.0, |m| self.modal[m].tables.shapes.mass);
         let mut carried: Vec<f64> = self.bodies.iter().map(own).collect();
@@ -767,8 +776,8 @@ impl<'a> Builder<'a> {
         dependent
     }
 
-    /// Coordinates of the joints that have some of their own, and of the modal bodies: actuated ones first. Bodies that
-    /// follow from closed loops get none.
+    /// Coordinates of the joints that have some of their own, and of the modal bodies: actuated
+    /// ones first. Bodies that follow from closed loops get none.
     fn number(&mut self, dependent: &[usize]) -> Numbering {
         let mut to = Numbering { coordinates: Vec::new(), elastic: Vec::new(), n_actuated: 0 };
         let joints: HashMap<&str, &Joint> = self.children.values().flatten().map(|j| (j.name.as_str(), *j)).collect();
@@ -818,7 +827,8 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Lists the joints of one and of six coordinates, and says of each body which of them are outward.
+    /// Lists the joints of one and of six coordinates, and says of each body which of them are
+    /// outward.
     fn list_columns(&mut self) -> (Vec<usize>, Vec<usize>) {
         let (mut single, mut six) = (Vec::new(), Vec::new());
         let mut begins = vec![(0, 0)];
@@ -889,7 +899,8 @@ impl Numbering {
     }
 }
 
-/// Principal moments below minus this part of the largest are wrong, not rounded: files have six digits.
+/// Principal moments below minus this part of the largest are wrong, not rounded: files have six
+/// digits.
 const MOMENT_TOLERANCE: f64 = 1e-6;
 
 /// What a principal moment of inertia may be below zero by rounding (kg m²).
@@ -906,7 +917,8 @@ fn out_of_range(part: &'static str, name: &str, what: OutOfRange) -> ModelError 
     ModelError::OutOfRange { part, name: name.to_owned(), what }
 }
 
-/// Finite, and of a body that there can be. What stands on the base does not move: nothing follows from its inertia.
+/// Finite, and of a body that there can be. What stands on the base does not move: nothing follows
+/// from its inertia.
 fn check_inertia(link: &str, inertia: &crate::mechanism::LinkInertia, moves: bool) -> Result<(), ModelError> {
     let finite =
         inertia.mass.is_finite() && inertia.com.iter().chain(inertia.inertia_com.iter()).all(|x| x.is_finite());

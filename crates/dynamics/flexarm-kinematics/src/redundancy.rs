@@ -1,11 +1,13 @@
-//! Inverse kinematics of arms with more joints than the pose needs: a rule chooses among the family of solutions.
+//! Inverse kinematics of arms with more joints than the pose needs: a rule chooses among the family
+//! of solutions.
 //!
 //! ```text
 //! minimise ½ (q - r)ᵀ W (q - r)    subject to  X_WT(q) = X,  lower <= q <= upper
 //! ```
-//! [`inverse_kinematics`] reaches the pose; then steps within the null space of the Jacobian, each followed by a return to
-//! the pose, bring the measure down: `d = -N (Nᵀ W N)⁻¹ Nᵀ W (q - r)` with N a basis of the null space [Liégeois 1977]. Joints
-//! at a limit that a step would push out are held. What is found is a minimum next to the start.
+//! [`inverse_kinematics`] reaches the pose; then steps within the null space of the Jacobian, each
+//! followed by a return to the pose, bring the measure down: `d = -N (Nᵀ W N)⁻¹ Nᵀ W (q - r)` with
+//! N a basis of the null space [Liégeois 1977]. Joints at a limit that a step would push out are
+//! held. What is found is a minimum next to the start.
 
 use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, DVector, Matrix6xX};
@@ -21,7 +23,8 @@ use crate::model::{Frame, Model};
 pub enum NullSpaceRule {
     /// Be near to this posture (nv long, rad or m): W = 1.
     NearestTo(DVector<f64>),
-    /// Be near to the middle between limits, each joint in parts of half its range; joints without limits are free.
+    /// Be near to the middle between limits, each joint in parts of half its range; joints without
+    /// limits are free.
     AwayFromLimits,
 }
 
@@ -40,8 +43,8 @@ pub struct RuledSolution {
 
 /// Joint values that bring `frame` to `X_WT` and are, near the start, the best by the rule.
 ///
-/// Coordinates that do not move the frame stay as in `q_start` (nv long). Where the pose leaves no freedom the result is that of
-/// [`inverse_kinematics`].
+/// Coordinates that do not move the frame stay as in `q_start` (nv long). Where the pose leaves no
+/// freedom the result is that of [`inverse_kinematics`].
 ///
 /// # Errors
 /// [`IkError`] when the target is not reached within tolerance.

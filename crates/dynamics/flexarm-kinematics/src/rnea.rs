@@ -8,8 +8,9 @@
 //! Inward pass:
 //!   τ_B   = S_Bᵀ F_B,   F_P += Ad_BPᵀ F_B                  (4)
 //! ```
-//! `Ṡ_B` is the rate of S in B axes: zero for one-DoF joints, not for elastic ones. A body that bends in modes adds its
-//! own inertia forces to (3) and to the forces of its coordinates, see [`crate::ModalBody`].
+//! `Ṡ_B` is the rate of S in B axes: zero for one-DoF joints, not for elastic ones. A body that
+//! bends in modes adds its own inertia forces to (3) and to the forces of its coordinates, see
+//! [`crate::ModalBody`].
 
 use flexarm_spatial::products::{cross, lift, scaled, tr_mul};
 use flexarm_spatial::{Real, Twist, Wrench};
@@ -23,9 +24,9 @@ use crate::model::Model;
 
 /// Generalised forces `τ = M(q) q̈ + bias(q, q̇)` (N m or N) for the accelerations `qddot`.
 ///
-/// Elastic coordinates are treated like any other: their entries of τ are what the elastic joint must
-/// supply. External wrenches in `data.F_ext` and balancers are subtracted. Fills `data.{X_PB, V, A, F, tau}`; `A` has
-/// gravity subtracted. O(n), no allocation.
+/// Elastic coordinates are treated like any other: their entries of τ are what the elastic joint
+/// must supply. External wrenches in `data.F_ext` and balancers are subtracted. Fills
+/// `data.{X_PB, V, A, F, tau}`; `A` has gravity subtracted. O(n), no allocation.
 ///
 /// # Source
 /// [Featherstone 2008], Table 5.1.
@@ -43,7 +44,8 @@ pub fn inverse_dynamics<'d>(
     &data.tau
 }
 
-/// Generalised forces at zero acceleration: Coriolis, centrifugal, gravity, balancers and external loads.
+/// Generalised forces at zero acceleration: Coriolis, centrifugal, gravity, balancers and external
+/// loads.
 pub fn nonlinear_effects<'d>(model: &Model, data: &'d mut Data, state: &State) -> &'d DVector<f64> {
     let (q, qdot) = (state.q.as_slice(), state.qdot.as_slice());
     match model.loops.is_empty() {
@@ -53,7 +55,8 @@ pub fn nonlinear_effects<'d>(model: &Model, data: &'d mut Data, state: &State) -
     &data.tau
 }
 
-/// Generalised forces that hold the mechanism still at `q`, against gravity, balancers and external loads.
+/// Generalised forces that hold the mechanism still at `q`, against gravity, balancers and external
+/// loads.
 pub fn gravity_forces<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DVector<f64> {
     if model.loops.is_empty() {
         begin(model, data, q.as_slice());
@@ -64,7 +67,8 @@ pub fn gravity_forces<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -
     gravity_forces_at_poses(model, data, q)
 }
 
-/// As [`gravity_forces`], for the joint poses that [`crate::forward_kinematics`] at `q` left in `data`.
+/// As [`gravity_forces`], for the joint poses that [`crate::forward_kinematics`] at `q` left in
+/// `data`.
 pub fn gravity_forces_at_poses<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DVector<f64> {
     match (model.loops.is_empty(), model.balancers.is_empty()) {
         (true, true) => at_rest(model, data),
@@ -77,8 +81,8 @@ pub fn gravity_forces_at_poses<'d>(model: &Model, data: &'d mut Data, q: &DVecto
     &data.tau
 }
 
-/// [`newton_euler`] of a tree that stands still, for the joint poses in `data`: the same bits without everything that a
-/// velocity would make.
+/// [`newton_euler`] of a tree that stands still, for the joint poses in `data`: the same bits
+/// without everything that a velocity would make.
 #[inline(always)]
 pub(crate) fn at_rest<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>) {
     let model = tree.model();
@@ -106,7 +110,8 @@ pub(crate) fn at_rest<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>) {
     carry_inward(model, data);
 }
 
-/// [`newton_euler`] with the balancers of the model, of the tree: closed loops come around it (`closure.rs`).
+/// [`newton_euler`] with the balancers of the model, of the tree: closed loops come around it
+/// (`closure.rs`).
 #[inline(always)]
 pub(crate) fn balanced(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], qddot: Option<&[f64]>) {
     match model.balancers.is_empty() {

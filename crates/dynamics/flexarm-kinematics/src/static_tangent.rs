@@ -1,7 +1,7 @@
 //! How the forces that hold a mechanism still change with its coordinates, in closed form.
 //!
-//! All about the origin of the world, in its axes: the column of coordinate i is the twist `s_i = [v; w]` of what it moves, and
-//! `W_i = [f; n]` the weight and the loads on that.
+//! All about the origin of the world, in its axes: the column of coordinate i is the twist
+//! `s_i = [v; w]` of what it moves, and `W_i = [f; n]` the weight and the loads on that.
 //!
 //! ```text
 //! τ_i = -s_i · W_i                                                           (1)
@@ -13,19 +13,21 @@
 //!                                                   = -w_j · (v_i × f + w_i × n + Aᵀ v_i + Nᵀ w_i)   (4)
 //! in the same elastic joint besides:      -∂s_i/∂q_j · W_i                       (5)
 //! ```
-//! The coordinates of a modal body move what hangs on its interfaces as an elastic joint does, and its own centre of mass:
+//! The coordinates of a modal body move what hangs on its interfaces as an elastic joint does, and
+//! its own centre of mass:
 //!
 //! ```text
 //! τ_k = -(R C_t,k) · g,    ∂τ_k/∂q_j = ∂τ_j/∂η_k = -w_j · (R C_t,k × g)       j inward of the body      (6)
 //! ```
-//! Balancers (`balancer.rs`) act as a pair of loads that keep their direction in (2); that they turn and stretch is, with the
-//! velocity `d_i` of their one end against the other per rate of coordinate i,
+//! Balancers (`balancer.rs`) act as a pair of loads that keep their direction in (2); that they
+//! turn and stretch is, with the velocity `d_i` of their one end against the other per rate of
+//! coordinate i,
 //!
 //! ```text
 //! line:  ∂τ_i/∂q_j += d_i · K d_j        joint:  ∂τ_i/∂q_j += c_i k c_j                    (7)
 //! ```
-//! One pass over the bodies and one over the pairs of coordinates; central differences of [`crate::gravity_forces`] take 2 n
-//! passes over the bodies.
+//! One pass over the bodies and one over the pairs of coordinates; central differences of
+//! [`crate::gravity_forces`] take 2 n passes over the bodies.
 
 use flexarm_spatial::products::{add, add3, column as column_of, cross, cross3, dot, lift, mul, scaled, sub, tr_mul};
 use flexarm_spatial::{ElasticAngles, Pose, Real, Twist, Wrench};
@@ -70,7 +72,8 @@ struct Column<T: Scalar = f64> {
     /// Coordinate, from the first one of the matrix.
     k: usize,
     body: usize,
-    /// Displacement in joint axes and rates of the angles per rate of the coordinate, of joints with angles.
+    /// Displacement in joint axes and rates of the angles per rate of the coordinate, of joints
+    /// with angles.
     t: Vector3<f64>,
     phi: Vector3<f64>,
     v: Vector3<T>,
@@ -376,8 +379,9 @@ impl<T: Real> StaticTangent<T> {
 }
 
 impl StaticTangent {
-    /// `∂τ/∂q` of the forces that hold the mechanism still under weight and `loads`, without springs; (n - first)×(n - first),
-    /// written over all of `G`. Symmetric but where a load has a moment or turns with its body. No allocation.
+    /// `∂τ/∂q` of the forces that hold the mechanism still under weight and `loads`, without
+    /// springs; (n - first)×(n - first), written over all of `G`. Symmetric but where a load has a
+    /// moment or turns with its body. No allocation.
     ///
     /// * `data`: after [`crate::forward_kinematics`] at `q`.
     ///
@@ -397,7 +401,8 @@ impl StaticTangent {
         self.loops = Some(tangent);
     }
 
-    /// As [`StaticTangent::compute`], of loads and balancers alone, without the weight; of trees without closed loops and modal bodies.
+    /// As [`StaticTangent::compute`], of loads and balancers alone, without the weight; of trees
+    /// without closed loops and modal bodies.
     ///
     /// # Panics
     /// If `G` has another size.

@@ -1,4 +1,5 @@
-//! Analytic inverse kinematics against forward kinematics, against a search from many starts, and against what makers say.
+//! Analytic inverse kinematics against forward kinematics, against a search from many starts, and
+//! against what makers say.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
@@ -90,7 +91,8 @@ fn joint_values_are_found_again_from_their_pose_and_every_solution_meets_it() {
     assert!(worst_q < 3e-13 && worst_m < 1e-12 && worst_rad < 2e-13, "{worst_q:.1e} {worst_m:.1e} {worst_rad:.1e}");
 }
 
-/// Truth: another algorithm, which knows of no geometry. It finds no solution that is missing here; it may miss some itself.
+/// Truth: another algorithm, which knows of no geometry. It finds no solution that is missing here;
+/// it may miss some itself.
 #[test]
 fn a_search_from_many_starts_finds_the_same_solutions() {
     let mut draw = Draw(5);
@@ -155,14 +157,16 @@ fn labels_tell_the_solutions_of_a_pose_apart() {
     }
 }
 
-/// The answer at the edge of the workspace: one elbow where the arm is stretched, none beyond it, told by how far.
+/// The answer at the edge of the workspace: one elbow where the arm is stretched, none beyond it,
+/// told by how far.
 #[test]
 fn a_stretched_arm_has_one_elbow_and_a_pose_beyond_it_is_told_by_its_distance() {
     let model = Model::new(&irb120()).unwrap();
     let frame = model.frame("tool").unwrap().clone();
     let arm = AnalyticArm::new(&model, &frame).unwrap();
     let mut solutions = Solutions::default();
-    // Upper arm 0.27 m, forearm hypot(0.302, 0.07) m; stretched where joint 3 is at -(90° - atan2(70, 302)).
+    // Upper arm 0.27 m, forearm hypot(0.302, 0.07) m; stretched where joint 3 is at -(90° -
+    // atan2(70, 302)).
     let stretched = -FRAC_PI_2 + 0.07_f64.atan2(0.302);
     let q = [0.4, 0.7, stretched, 0.3, 0.8, -0.2];
     let X = arm.pose(&q);
@@ -205,7 +209,8 @@ fn a_straight_wrist_has_a_representative_that_keeps_its_free_joint_where_it_was(
             for bend in [0.0, 1e-11, 1e-9, 1e-7, 1e-4] {
                 q[4] = bend;
                 analytic.solve_near(&analytic.pose(&q), &q, &mut solutions);
-                // Joints on both sides of a bent wrist are as sharp as rounding over the bend, their sum is sharp.
+                // Joints on both sides of a bent wrist are as sharp as rounding over the bend,
+                // their sum is sharp.
                 let nearest = solutions.nearest(&q).unwrap();
                 let tolerance = if bend == 0.0 { 1e-9 } else { 1e-9 + 3e-13 / bend };
                 assert!(apart(&nearest.q, &q) < tolerance, "{} {bend}: {q:?} {nearest:?}", arm.name);
@@ -216,7 +221,8 @@ fn a_straight_wrist_has_a_representative_that_keeps_its_free_joint_where_it_was(
             q[4] = 0.0;
             analytic.solve(&analytic.pose(&q), &mut solutions);
             assert!(solutions.iter().any(|s| s.free && s.q[4].abs() < 1e-9), "{}: {solutions:?}", arm.name);
-            // Universal Robots' arms may not reach with joint 6 there: then it is eighths of a turn away.
+            // Universal Robots' arms may not reach with joint 6 there: then it is eighths of a turn
+            // away.
             for s in solutions.iter().filter(|s| s.free) {
                 let away = match arm.class {
                     ArmClass::SphericalWrist(_) => s.q[3],
@@ -234,7 +240,8 @@ fn a_wrist_centre_on_axis_1_leaves_joint_1_free_and_keeps_it() {
     let model = Model::new(&irb120()).unwrap();
     let arm = AnalyticArm::new(&model, model.frame("tool").unwrap()).unwrap();
     let mut solutions = Solutions::default();
-    // The wrist centre above axis 2: upper arm and forearm make a triangle, turned back by its angle at the shoulder.
+    // The wrist centre above axis 2: upper arm and forearm make a triangle, turned back by its
+    // angle at the shoulder.
     let (a, b) = (0.27_f64, 0.302_f64.hypot(0.07));
     for q3 in [-0.6_f64, 0.2, 0.9] {
         // Angle of the forearm against the upper arm: stretched at -(90° - atan2(70, 302)).
@@ -247,8 +254,8 @@ fn a_wrist_centre_on_axis_1_leaves_joint_1_free_and_keeps_it() {
     }
 }
 
-/// Truth: the closed form of the wrist centre in the plane of the arm, by the data sheet's lengths; for bit 2 what controllers
-/// recorded (next test but one).
+/// Truth: the closed form of the wrist centre in the plane of the arm, by the data sheet's lengths;
+/// for bit 2 what controllers recorded (next test but one).
 #[test]
 fn kuka_status_and_turn_are_those_of_the_controller() {
     let mut tree = kr300();
@@ -293,8 +300,9 @@ fn kuka_status_and_turn_are_those_of_the_controller() {
     assert!(behind > 200 && solved == 2000);
 }
 
-/// Status and turn of points that KUKA controllers recorded: data lists and positions in public programs of welding, milling,
-/// printing and handling cells. Bits 3 and 4 of the status say nothing of the branch.
+/// Status and turn of points that KUKA controllers recorded: data lists and positions in public
+/// programs of welding, milling, printing and handling cells. Bits 3 and 4 of the status say
+/// nothing of the branch.
 const RECORDED_BY_KUKA: [(u8, &[u8]); 5] = [
     (0, &[14]),
     (2, &[2, 3, 10, 11, 34, 35]),
@@ -303,7 +311,8 @@ const RECORDED_BY_KUKA: [(u8, &[u8]); 5] = [
     (22, &[18, 26, 27, 50]),
 ];
 
-/// Truth: the words of the same point in [`RECORDED_BY_KUKA`], of which the turn tells the signs of the axes.
+/// Truth: the words of the same point in [`RECORDED_BY_KUKA`], of which the turn tells the signs of
+/// the axes.
 #[test]
 fn the_status_of_axes_with_recorded_signs_is_the_one_that_was_recorded_with_them() {
     let model = Model::new(&kr300()).unwrap();
@@ -334,8 +343,9 @@ fn the_status_of_axes_with_recorded_signs_is_the_one_that_was_recorded_with_them
     }
 }
 
-/// Truth: positions that a controller recorded at one moment as axis values (degrees) and as a target with its confdata: arms
-/// IRB 4600-40/2.55 on gantries, from the public backup of a research cell.
+/// Truth: positions that a controller recorded at one moment as axis values (degrees) and as a
+/// target with its confdata: arms IRB 4600-40/2.55 on gantries, from the public backup of a
+/// research cell.
 #[test]
 fn the_confdata_of_recorded_axes_are_those_that_the_controller_recorded_with_them() {
     let recorded = [
@@ -370,11 +380,13 @@ fn abb_confdata_are_those_of_the_manual() {
     let mut seen = [0; 8];
     for _ in 0..3000 {
         let q: [f64; 6] = std::array::from_fn(|k| draw.between(arm.limits()[k].0, arm.limits()[k].1));
-        // Wrist centre in the plane of the arm, x ahead and z up, from axis 2; the upper arm leans ahead by axis 2.
+        // Wrist centre in the plane of the arm, x ahead and z up, from axis 2; the upper arm leans
+        // ahead by axis 2.
         let (lean, turned) = (q[1], q[1] + q[2]);
         let forearm = [0.302 * turned.cos() + 0.07 * turned.sin(), -0.302 * turned.sin() + 0.07 * turned.cos()];
         let x = 0.27 * lean.sin() + forearm[0];
-        // In front of the lower arm: on its side of the line along it, seen with the lower arm upright.
+        // In front of the lower arm: on its side of the line along it, seen with the lower arm
+        // upright.
         let ahead = forearm[0] * lean.cos() - forearm[1] * lean.sin();
         let cfx = 4 * i32::from(x < 0.0) + 2 * i32::from(ahead < 0.0) + i32::from(q[4] < 0.0);
         let quadrant = |a: f64| (a.to_degrees() / 90.0).floor() as i32;
@@ -638,7 +650,8 @@ fn the_rule_holds_joints_at_their_limits() {
     assert!(found.q[6] > q[6] + 0.2, "{found:?}");
 }
 
-/// An arm of no class: the search finds the joint values again, the same ones every time, and nothing that is no solution.
+/// An arm of no class: the search finds the joint values again, the same ones every time, and
+/// nothing that is no solution.
 #[test]
 fn a_search_from_many_starts_solves_arms_without_a_closed_form() {
     let mut draw = Draw(43);
@@ -683,7 +696,8 @@ fn a_search_from_many_starts_solves_arms_without_a_closed_form() {
     assert!(error.position_m > 40.0 && error.position_m < 50.0, "{error}");
 }
 
-/// Programs have rounded numbers: a home position with axis 5 at zero and axis 6 a hair below is still S 2, T 2.
+/// Programs have rounded numbers: a home position with axis 5 at zero and axis 6 a hair below is
+/// still S 2, T 2.
 #[test]
 fn bits_are_not_turned_by_rounding() {
     let mut tree = kr300();
@@ -705,14 +719,16 @@ fn bits_are_not_turned_by_rounding() {
         arm.solve_near(&X, &home, &mut solutions);
         let meant = Selection::Kuka { status: Some(2), turn: Some(2) };
         let chosen = arm.choose(&solutions, &meant, &axes, &home).unwrap();
-        // Joints 1 to 3 are sharp; 4 and 6 of a wrist bent by 1e-6 stand as that says, but no whole turn away.
+        // Joints 1 to 3 are sharp; 4 and 6 of a wrist bent by 1e-6 stand as that says, but no whole
+        // turn away.
         assert!((0..3).all(|k| (chosen[k] - home[k]).abs() < 1e-5), "{shift} {chosen:?}");
         assert!(chosen[4].abs() < 1e-5 && (chosen[3] + chosen[5]).abs() < 1e-5, "{chosen:?}");
     }
 }
 
-/// Where two lines become coplanar two of the equations become one: axis 6 and axis 1 (three parallel axes in the middle), axis 6
-/// and axis 4 (three at the base). At these places and next to them nothing is lost.
+/// Where two lines become coplanar two of the equations become one: axis 6 and axis 1 (three
+/// parallel axes in the middle), axis 6 and axis 4 (three at the base). At these places and next to
+/// them nothing is lost.
 #[test]
 fn positions_where_two_equations_become_one_lose_no_solution() {
     let mut tried = 0;
@@ -762,8 +778,8 @@ fn positions_where_two_equations_become_one_lose_no_solution() {
     assert!(tried > 300, "{tried}");
 }
 
-/// Calibrated arms: axes a little off those of the data sheet, but for the wrist, are solved as arms in general position, however
-/// near they are to parallel or to meeting.
+/// Calibrated arms: axes a little off those of the data sheet, but for the wrist, are solved as
+/// arms in general position, however near they are to parallel or to meeting.
 #[test]
 fn arms_just_outside_a_class_are_solved_by_the_general_one() {
     for (tilt, shift) in [(3e-5, 0.0), (1e-3, 0.0), (1e-4, 1e-3), (0.03, 0.01)] {

@@ -1,4 +1,5 @@
-//! Balancers against closed forms: a pendulum with a spring, and a hydraulic counterbalance as published.
+//! Balancers against closed forms: a pendulum with a spring, and a hydraulic counterbalance as
+//! published.
 #![allow(non_snake_case, reason = "monogram notation")]
 
 use flexarm_kinematics::*;
@@ -8,8 +9,8 @@ const MASS: f64 = 12.0;
 const LENGTH: f64 = 0.8;
 const GRAVITY: f64 = 9.81;
 
-/// A mass at the end of a rod that hangs on a hinge about y, q from straight down; an anchor D above the hinge, the spring's other end at k on
-/// the rod.
+/// A mass at the end of a rod that hangs on a hinge about y, q from straight down; an anchor D
+/// above the hinge, the spring's other end at k on the rod.
 fn pendulum(D: f64, k: f64, law: BalancerLaw) -> Model {
     let mut tree = Mechanism::new("pendulum");
     for name in ["base", "rod", "anchor", "eye"] {
@@ -30,8 +31,8 @@ fn holding(model: &Model, q: f64) -> f64 {
     gravity_forces(model, &mut Data::new(model), &DVector::from_element(1, q))[0]
 }
 
-/// Truth: the spring of a balanced lamp. With a free length of zero and c D k = m g l the rod stays wherever it is; without that it takes
-/// (m g l - c D k) sin q. Measured 3e-14 N m.
+/// Truth: the spring of a balanced lamp. With a free length of zero and c D k = m g l the rod stays
+/// wherever it is; without that it takes (m g l - c D k) sin q. Measured 3e-14 N m.
 #[test]
 fn a_spring_without_free_length_balances_the_rod_everywhere() {
     let (D, k) = (0.5, 0.3);
@@ -45,8 +46,8 @@ fn a_spring_without_free_length_balances_the_rod_everywhere() {
     }
 }
 
-/// Truth: with c D k twice what balances, hanging is unstable and standing stable: about it the rod swings with
-/// omega² = (c D k - m g l)/(m l²). The tangent gives the same; measured 2e-16.
+/// Truth: with c D k twice what balances, hanging is unstable and standing stable: about it the rod
+/// swings with omega² = (c D k - m g l)/(m l²). The tangent gives the same; measured 2e-16.
 #[test]
 fn slope_of_the_tangent_is_that_of_the_closed_form() {
     let (D, k, weight) = (0.5, 0.3, MASS * GRAVITY * LENGTH);
@@ -63,7 +64,8 @@ fn slope_of_the_tangent_is_that_of_the_closed_form() {
     }
 }
 
-/// Truth: energy of a frictionless pendulum with a spring stays what it was; RK4 at 1 ms over 5 s, measured 7e-14.
+/// Truth: energy of a frictionless pendulum with a spring stays what it was; RK4 at 1 ms over 5 s,
+/// measured 7e-14.
 #[test]
 fn a_swinging_rod_with_a_spring_keeps_its_energy() {
     let model = pendulum(0.5, 0.3, BalancerLaw::Linear { rate: 900.0, free: 0.35, preload: 40.0 });
@@ -93,8 +95,9 @@ fn a_swinging_rod_with_a_spring_keeps_its_energy() {
     assert!(state.qdot[0].abs() > 0.1 && (end - start).abs() < 1e-11 * start.abs(), "{start} {end}");
 }
 
-/// Truth: the counterbalance of a KUKA KR 300, formula and pressures read on the robot by its authors (github.com/JonasWeigand/Robot_Identification,
-/// MIT): torque h p A from the law of sines, pressure within 1.72 % of nine readings. Torque measured 4e-12 N m.
+/// Truth: the counterbalance of a KUKA KR 300, formula and pressures read on the robot by its
+/// authors (github.com/JonasWeigand/Robot_Identification, MIT): torque h p A from the law of sines,
+/// pressure within 1.72 % of nine readings. Torque measured 4e-12 N m.
 #[test]
 fn a_hydraulic_counterbalance_has_the_published_torque_and_pressure() {
     let (D, k, offset) = (0.8, 0.2, 1.658_062_789_394_613_4f64);
@@ -136,8 +139,8 @@ fn a_hydraulic_counterbalance_has_the_published_torque_and_pressure() {
     assert!((least + 3073.77).abs() < 0.05 && (most - 6179.32).abs() < 0.05, "{least} {most}");
 }
 
-/// Truth: the share of each coordinate. A torque over a joint with an elastic gearbox behind it acts on motor and spring alike, whichever way
-/// the gearbox yields.
+/// Truth: the share of each coordinate. A torque over a joint with an elastic gearbox behind it
+/// acts on motor and spring alike, whichever way the gearbox yields.
 #[test]
 fn a_torque_over_a_joint_goes_through_the_spring_of_its_gearbox() {
     for full in [false, true] {

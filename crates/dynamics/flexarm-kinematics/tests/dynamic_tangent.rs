@@ -1,4 +1,5 @@
-//! Derivatives of the forces of a motion against Richardson differences of the recursion itself, on random trees.
+//! Derivatives of the forces of a motion against Richardson differences of the recursion itself, on
+//! random trees.
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
@@ -18,7 +19,8 @@ struct Case {
     loads: Vec<Wrench>,
 }
 
-/// A random tree in motion, with balancers and wrenches that turn with the bodies on every other one.
+/// A random tree in motion, with balancers and wrenches that turn with the bodies on every other
+/// one.
 fn case(seed: u64, n_joints: usize) -> Case {
     let mut tree = random_tree(seed, n_joints);
     // Rotors, and a joint that follows another one.

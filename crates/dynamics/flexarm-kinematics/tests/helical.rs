@@ -1,4 +1,5 @@
-//! Helical joints: a nut on a spindle in closed form, and as a rotation with a translation that follows it.
+//! Helical joints: a nut on a spindle in closed form, and as a rotation with a translation that
+//! follows it.
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stderr, reason = "what was measured stands beside the bound")]
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
@@ -26,7 +27,8 @@ fn nut(pitch: f64) -> Model {
     Model::new(&tree).unwrap()
 }
 
-/// Truth: energy ½ (I_zz + m r² + m p²) q̇² + m g p q, hence q̈ = -m g p/(I_zz + m r² + m p²), at any angle and speed.
+/// Truth: energy ½ (I_zz + m r² + m p²) q̇² + m g p q, hence q̈ = -m g p/(I_zz + m r² + m p²), at
+/// any angle and speed.
 #[test]
 fn a_nut_under_gravity_turns_with_constant_acceleration() {
     let mut worst = [0.0f64; 3];
@@ -67,8 +69,8 @@ fn a_turn_advances_by_the_lead() {
     }
 }
 
-/// A chain of revolute, prismatic and helical joints; helical ones as such, or as a rotation and a translation on a massless
-/// link that follows it.
+/// A chain of revolute, prismatic and helical joints; helical ones as such, or as a rotation and a
+/// translation on a massless link that follows it.
 fn chain(seed: u64, as_pairs: bool) -> Mechanism {
     let mut draw = Draw(seed);
     let mut tree = Mechanism::new("chain");
@@ -98,7 +100,8 @@ fn chain(seed: u64, as_pairs: bool) -> Mechanism {
     tree
 }
 
-/// Second algorithm: the same mechanism with a translation that mimics a rotation, for every recursion.
+/// Second algorithm: the same mechanism with a translation that mimics a rotation, for every
+/// recursion.
 #[test]
 fn a_helical_joint_is_a_rotation_with_a_translation_that_follows() {
     let mut worst = [0.0f64; 6];

@@ -1,4 +1,5 @@
-//! Closed chains against closed forms, against the equations with multipliers, and against themselves cut elsewhere.
+//! Closed chains against closed forms, against the equations with multipliers, and against
+//! themselves cut elsewhere.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
@@ -50,7 +51,8 @@ struct Bars {
 const PARALLELOGRAM: Bars = Bars { crank: 0.4, rod: 1.2, lever: 0.4, lower: 1.2, base: [0.0, 0.0] };
 const GENERAL: Bars = Bars { crank: 0.35, rod: 1.05, lever: 0.47, lower: 1.2, base: [-0.1, 0.25] };
 
-/// Column on a turning base, lower arm, upper arm with a lever behind the elbow, crank and rod; driven are turn, lower and crank.
+/// Column on a turning base, lower arm, upper arm with a lever behind the elbow, crank and rod;
+/// driven are turn, lower and crank.
 fn palletiser(bars: Bars, cut: Cut) -> Mechanism {
     let mut tree = Mechanism::new("palletiser");
     tree.links.push(Link { name: "base".into(), inertia: None });
@@ -111,8 +113,9 @@ fn state(model: &Model, q: &[f64], qdot: &[f64]) -> State {
 const PLACES: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [0.7, 0.5, -0.2], [-1.1, -0.6, 0.4], [2.0, 0.9, 0.3]];
 const RATES: [f64; 3] = [0.8, -1.1, 1.7];
 
-/// Truth: opposite sides stay parallel. The upper arm stands as the crank does, the rod as the lower arm: the elbow is at
-/// crank - lower, the rod at lower - crank. Measured 1.1e-15 rad, 4e-15 rad/s.
+/// Truth: opposite sides stay parallel. The upper arm stands as the crank does, the rod as the
+/// lower arm: the elbow is at crank - lower, the rod at lower - crank. Measured 1.1e-15 rad, 4e-15
+/// rad/s.
 #[test]
 fn opposite_sides_of_a_parallelogram_stay_parallel() {
     for cut in [Cut::Top, Cut::TopTurned] {
@@ -128,15 +131,17 @@ fn opposite_sides_of_a_parallelogram_stay_parallel() {
             within("parallel rod", rod - (place[1] - place[2]), 4e-15);
             let rate = data.dependent_rates()[0];
             within("parallel rate", rate - (RATES[2] - RATES[1]), 1e-14);
-            // Its transmission angle is that between its sides: 90 degrees where lower and crank stand square.
+            // Its transmission angle is that between its sides: 90 degrees where lower and crank
+            // stand square.
             let square = std::f64::consts::FRAC_PI_2 - (place[2] - place[1]).abs();
             within("parallel transmission", data.transmission_angles()[0] - square, 1e-14);
         }
     }
 }
 
-/// Truth: virtual work. With weights in the upper arm alone the crank carries their whole moment about the elbow, and
-/// the lower arm carries them as if they hung on the elbow. Measured 4e-16 of the weight.
+/// Truth: virtual work. With weights in the upper arm alone the crank carries their whole moment
+/// about the elbow, and the lower arm carries them as if they hung on the elbow. Measured 4e-16 of
+/// the weight.
 #[test]
 fn the_crank_of_a_parallelogram_carries_the_moment_about_the_elbow() {
     let mut tree = palletiser(PARALLELOGRAM, Cut::Top);
@@ -149,7 +154,8 @@ fn the_crank_of_a_parallelogram_carries_the_moment_about_the_elbow() {
     for place in PLACES {
         let q = state(&model, &place, &[]).q;
         let tau = gravity_forces(&model, &mut data, &q).clone();
-        // About y a turn by q brings (x, z) to (x cos + z sin, ..): the moment of what hangs there is -m g x.
+        // About y a turn by q brings (x, z) to (x cos + z sin, ..): the moment of what hangs there
+        // is -m g x.
         let x = com[0] * place[2].cos() + com[1] * place[2].sin();
         let scale = m * g;
         within("crank torque", (tau[2] + m * g * x) / scale, 1e-14);
@@ -158,9 +164,10 @@ fn the_crank_of_a_parallelogram_carries_the_moment_about_the_elbow() {
     }
 }
 
-/// Freudenstein's equation of the four-bar with ground d, input a, coupler b, output c, angles of input and output from the
-/// ground: `K1 cos ψ - K2 cos φ + K3 = cos(φ - ψ)`, K1 = d/a, K2 = d/c, K3 = (a² - b² + c² + d²)/(2 a c).
-/// Returns ψ, ψ' and ψ'' by its closed-form root and its derivatives.
+/// Freudenstein's equation of the four-bar with ground d, input a, coupler b, output c, angles of
+/// input and output from the ground: `K1 cos ψ - K2 cos φ + K3 = cos(φ - ψ)`, K1 = d/a, K2 = d/c,
+/// K3 = (a² - b² + c² + d²)/(2 a c). Returns ψ, ψ' and ψ'' by its closed-form root and its
+/// derivatives.
 fn freudenstein([d, a, b, c]: [f64; 4], phi: f64, rate: f64, acceleration: f64, root: f64) -> [f64; 3] {
     let (k1, k2, k3) = (d / a, d / c, (a * a - b * b + c * c + d * d) / (2.0 * a * c));
     // P cos ψ + Q sin ψ = R
@@ -175,7 +182,8 @@ fn freudenstein([d, a, b, c]: [f64; 4], phi: f64, rate: f64, acceleration: f64, 
     [psi, psi_dot, -all / F_psi]
 }
 
-/// Truth: Freudenstein's equation of a general four-bar and its derivatives. Measured 9e-16 rad, 1.2e-15 rad/s, 1.9e-15 rad/s².
+/// Truth: Freudenstein's equation of a general four-bar and its derivatives. Measured 9e-16 rad,
+/// 1.2e-15 rad/s, 1.9e-15 rad/s².
 #[test]
 fn a_general_four_bar_moves_as_freudensteins_equation_says() {
     let [d, a, b, c] = [1.3, 0.4, 1.1, 0.9];
@@ -230,7 +238,8 @@ fn a_general_four_bar_moves_as_freudensteins_equation_says() {
     }
 }
 
-/// Free accelerations with Lagrange multipliers on the opened tree: `[M Cᵀ; C 0] [q̈; λ] = [τ - h; -Ċ q̇]`.
+/// Free accelerations with Lagrange multipliers on the opened tree:
+/// `[M Cᵀ; C 0] [q̈; λ] = [τ - h; -Ċ q̇]`.
 struct Multipliers {
     open: Model,
     closed: Model,
@@ -321,7 +330,8 @@ impl Multipliers {
     }
 }
 
-/// Truth: a second algorithm, Lagrange multipliers on the opened tree. Measured 7e-13 (the difference formula for Ċ).
+/// Truth: a second algorithm, Lagrange multipliers on the opened tree. Measured 7e-13 (the
+/// difference formula for Ċ).
 #[test]
 fn accelerations_are_those_with_lagrange_multipliers() {
     for bars in [PARALLELOGRAM, GENERAL] {
@@ -335,7 +345,8 @@ fn accelerations_are_those_with_lagrange_multipliers() {
     }
 }
 
-/// A lower arm, a rod and a crank that give way in six directions each, so that the loop leaves its plane.
+/// A lower arm, a rod and a crank that give way in six directions each, so that the loop leaves its
+/// plane.
 fn yielding(bars: Bars, cut: Cut) -> Mechanism {
     let mut tree = palletiser(bars, cut);
     for (link, length) in [("lower", 0.5), ("rod", 0.4)] {
@@ -351,7 +362,8 @@ fn yielding(bars: Bars, cut: Cut) -> Mechanism {
     tree
 }
 
-/// Truth: multipliers, with elastic joints inside the loop that bring pin and eye out of the plane. Measured 7e-14.
+/// Truth: multipliers, with elastic joints inside the loop that bring pin and eye out of the plane.
+/// Measured 7e-14.
 #[test]
 fn elastic_links_inside_a_loop_obey_the_multipliers_too() {
     for cut in [Cut::Top, Cut::TopTurned] {
@@ -370,7 +382,8 @@ fn elastic_links_inside_a_loop_obey_the_multipliers_too() {
     }
 }
 
-/// Identity: it is the same machine wherever the loop is opened. Torques of the drives, measured 1.1e-14 of the largest.
+/// Identity: it is the same machine wherever the loop is opened. Torques of the drives, measured
+/// 1.1e-14 of the largest.
 #[test]
 fn driving_torques_do_not_depend_on_where_a_loop_is_cut() {
     for bars in [PARALLELOGRAM, GENERAL] {
@@ -391,8 +404,9 @@ fn driving_torques_do_not_depend_on_where_a_loop_is_cut() {
     }
 }
 
-/// Identities: M is symmetric and positive definite; τ = M q̈ + h; the power of the forces is the rate of the energy (by a difference
-/// over 1e-5 s, measured 4e-11); forward and inverse dynamics undo each other.
+/// Identities: M is symmetric and positive definite; τ = M q̈ + h; the power of the forces is the
+/// rate of the energy (by a difference over 1e-5 s, measured 4e-11); forward and inverse dynamics
+/// undo each other.
 #[test]
 fn reduced_dynamics_are_consistent() {
     for tree in [palletiser(GENERAL, Cut::Top), yielding(GENERAL, Cut::Top), levelled(GENERAL, 1.3)] {
@@ -434,7 +448,8 @@ fn reduced_dynamics_are_consistent() {
     }
 }
 
-/// Truth: differences of poses, Jacobians and static forces. Measured 4e-7 (rate of the Jacobian) and 9e-9 (tangent) relative.
+/// Truth: differences of poses, Jacobians and static forces. Measured 4e-7 (rate of the Jacobian)
+/// and 9e-9 (tangent) relative.
 #[test]
 fn jacobian_its_rate_and_the_static_tangent_are_derivatives() {
     for tree in [palletiser(GENERAL, Cut::Bottom), yielding(GENERAL, Cut::Top), levelled(GENERAL, 1.3)] {
@@ -496,10 +511,12 @@ fn jacobian_its_rate_and_the_static_tangent_are_derivatives() {
     }
 }
 
-/// Truth: energy of a frictionless four-bar that swings freely stays what it was; RK4 at 0.5 ms over 1 s, measured 1.6e-13 of the swing.
+/// Truth: energy of a frictionless four-bar that swings freely stays what it was; RK4 at 0.5 ms
+/// over 1 s, measured 1.6e-13 of the swing.
 #[test]
 fn a_four_bar_pendulum_keeps_its_energy() {
-    // The upper arm hangs from the elbow with its lever square to the lower arm, far from the dead point.
+    // The upper arm hangs from the elbow with its lever square to the lower arm, far from the dead
+    // point.
     let mut tree = palletiser(PARALLELOGRAM, Cut::Top);
     tree.links.iter_mut().filter(|l| l.name == "upper").for_each(|l| *l = body("upper", 90.0, [0.1, -0.05, -0.5]));
     let start = [("lower", 2.6), ("crank", 0.3), ("elbow", -2.3), ("rod", 2.3)];
@@ -536,7 +553,8 @@ fn a_four_bar_pendulum_keeps_its_energy() {
     within("energy", (end - start) / swing, 5e-12);
 }
 
-/// A lifting arm with a cylinder: hinge at (0, 0), cylinder from (0.5, -0.3) to a lug on the arm at (0.9, 0.2).
+/// A lifting arm with a cylinder: hinge at (0, 0), cylinder from (0.5, -0.3) to a lug on the arm at
+/// (0.9, 0.2).
 fn lifted(driven: &str, cut_at_lug: bool) -> Mechanism {
     let mut tree = Mechanism::new("lift");
     tree.links.push(Link { name: "base".into(), inertia: None });
@@ -580,8 +598,9 @@ fn lifted(driven: &str, cut_at_lug: bool) -> Mechanism {
     tree
 }
 
-/// Truth: the cosine rule. A cylinder of length s between fixed points at distances a and b from the hinge holds the arm at the
-/// angle α with s² = a² + b² - 2 a b cos α; the force in it by ds/dα. Each of the three joints may drive. Measured 4e-16 rad and 6e-16 of the force.
+/// Truth: the cosine rule. A cylinder of length s between fixed points at distances a and b from
+/// the hinge holds the arm at the angle α with s² = a² + b² - 2 a b cos α; the force in it by
+/// ds/dα. Each of the three joints may drive. Measured 4e-16 rad and 6e-16 of the force.
 #[test]
 fn a_cylinder_lifts_an_arm_as_the_cosine_rule_says() {
     let (foot, lug) = (Vector2::<f64>::new(0.5, -0.3), Vector2::<f64>::new(0.9, 0.2));
@@ -606,7 +625,8 @@ fn a_cylinder_lifts_an_arm_as_the_cosine_rule_says() {
             let (force, values) = of(2, stroke);
             within("arm by the stroke", values[0] + lift, 5e-15);
             within("force in the cylinder", (force * slope + holding) / holding, 1e-14);
-            // Where the cylinder stands square to the line from hinge to foot its angle to the arm is the largest: a dead point.
+            // Where the cylinder stands square to the line from hinge to foot its angle to the arm
+            // is the largest: a dead point.
             if cut_at_lug || open.cos() > a / b {
                 let (_, values) = of(1, foot_q);
                 within("arm by the foot", values[0] + lift, 1e-13);
@@ -619,7 +639,8 @@ fn a_cylinder_lifts_an_arm_as_the_cosine_rule_says() {
     }
 }
 
-/// Two parallelograms more hold the hand level: plate at the elbow, hand at the end of the upper arm.
+/// Two parallelograms more hold the hand level: plate at the elbow, hand at the end of the upper
+/// arm.
 fn levelled(bars: Bars, hand_rod: f64) -> Mechanism {
     let mut tree = palletiser(bars, Cut::Top);
     for name in ["plate", "level_rod", "level_end", "plate_lug", "hand", "hand_rod", "hand_end", "hand_lug"] {
@@ -652,8 +673,9 @@ fn levelled(bars: Bars, hand_rod: f64) -> Mechanism {
     tree
 }
 
-/// Truth: parallelograms hand on the direction of the column: the hand stays level. And the torques come from virtual work: a weight at the
-/// hand, wherever on it, is carried as if at the hand's hinge. Measured 9e-16 and 2e-14 of the torque.
+/// Truth: parallelograms hand on the direction of the column: the hand stays level. And the torques
+/// come from virtual work: a weight at the hand, wherever on it, is carried as if at the hand's
+/// hinge. Measured 9e-16 and 2e-14 of the torque.
 #[test]
 fn two_parallelograms_keep_the_hand_level() {
     let tree = levelled(PARALLELOGRAM, 1.4);
@@ -685,7 +707,8 @@ fn two_parallelograms_keep_the_hand_level() {
     }
 }
 
-/// Truth: the loop itself. What pin and eye leave open is rounding, also where links bend out of the plane; measured 2.5e-16 m.
+/// Truth: the loop itself. What pin and eye leave open is rounding, also where links bend out of
+/// the plane; measured 2.5e-16 m.
 #[test]
 fn a_loop_closes_to_rounding_with_elastic_links() {
     let model = Model::new(&yielding(GENERAL, Cut::Top)).unwrap();

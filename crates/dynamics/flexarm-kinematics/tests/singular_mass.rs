@@ -30,7 +30,8 @@ fn two_links(coupled: f64, mass: f64) -> Result<Model, ModelError> {
     })
 }
 
-/// The mass matrix is [[2, 1 + c], [1 + c, 1]]: for c = 0.2 the truth is its inverse, for c = 100 it is indefinite.
+/// The mass matrix is [[2, 1 + c], [1 + c, 1]]: for c = 0.2 the truth is its inverse, for c = 100
+/// it is indefinite.
 #[test]
 fn a_mass_matrix_that_is_not_positive_definite_gives_no_number_and_no_panic() {
     let accelerations = |coupled: f64| {

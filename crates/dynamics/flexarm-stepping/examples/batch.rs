@@ -3,8 +3,8 @@
 //! ```text
 //! cargo run --release -p flexarm-stepping --example batch [RUNS]
 //! ```
-//! 4 s; stiffness and speed differ from run to run. CPU time of one thread, start of the runs included, all lines in turn, the
-//! smallest of five.
+//! 4 s; stiffness and speed differ from run to run. CPU time of one thread, start of the runs
+//! included, all lines in turn, the smallest of five.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "an example")]
 
 use std::sync::Arc;

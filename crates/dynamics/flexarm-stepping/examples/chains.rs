@@ -1,4 +1,5 @@
-//! What long chains cost: an arm of two links, each a chain of so many elastic joints, set-up and steps alone.
+//! What long chains cost: an arm of two links, each a chain of so many elastic joints, set-up and
+//! steps alone.
 //!
 //! ```text
 //! cargo run --release --workspace --example chains [STEPS] [JOINTS ...]

@@ -1,10 +1,11 @@
-//! What links with many modes cost: the reference arm with two modal beams of so many fixed-interface modes, steps alone.
+//! What links with many modes cost: the reference arm with two modal beams of so many
+//! fixed-interface modes, steps alone.
 //!
 //! ```text
 //! cargo run --release --workspace --example modal [STEPS] [MODES ...]
 //! ```
-//! Generalised-alpha with default settings at 1 ms, with the modes eliminated and with dense matrices; CPU time of one thread,
-//! in turn, smallest of five.
+//! Generalised-alpha with default settings at 1 ms, with the modes eliminated and with dense
+//! matrices; CPU time of one thread, in turn, smallest of five.
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "an example")]
 

@@ -3,8 +3,9 @@
 //! ```text
 //! cargo run --release -p flexarm-stepping --example work_precision
 //! ```
-//! The error is the largest distance of the tool every 0.5 ms, or after every longer step, from the reference's, over its peak deflection; CPU time of one
-//! thread, the smallest of five runs, all lines in turn.
+//! The error is the largest distance of the tool every 0.5 ms, or after every longer step, from the
+//! reference's, over its peak deflection; CPU time of one thread, the smallest of five runs, all
+//! lines in turn.
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "an example")]
 

@@ -1,9 +1,10 @@
-//! The flexible arm that every stepper gets: tree, springs, damping, drives, motion, external loads.
+//! The flexible arm that every stepper gets: tree, springs, damping, drives, motion, external
+//! loads.
 //!
 //! Immutable and shared; each stepper makes its own state from it. Start at [`FlexibleArm::new`].
 //!
-//! The free coordinates x of an arm are those of the joints that are driven by torque, then the elastic ones. All
-//! other joints are prescribed.
+//! The free coordinates x of an arm are those of the joints that are driven by torque, then the
+//! elastic ones. All other joints are prescribed.
 
 use std::sync::Arc;
 
@@ -44,8 +45,8 @@ impl From<(String, Matrix6<f64>, Damping)> for Spring {
 
 /// What loads add to the stiffness of a modal body, n×n per unit.
 ///
-/// `K + Σ α_i acceleration_i + Σ ω_i ω_j centrifugal_ij`: the body's own inertia as it is accelerated and turned,
-/// body axes. Loads of what hangs on it are in `interface`.
+/// `K + Σ α_i acceleration_i + Σ ω_i ω_j centrifugal_ij`: the body's own inertia as it is
+/// accelerated and turned, body axes. Loads of what hangs on it are in `interface`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GeometricStiffness {
     /// Per unit acceleration of the origin, gravity taken off (s²/m).
@@ -128,7 +129,8 @@ pub(crate) fn add_product(A: &DMatrix<f64>, x: &[f64], y: &mut [f64]) {
 /// Damping of an elastic element.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Damping {
-    /// Damping ratio of the arm's modes, weighted by the share of strain energy that this element has in each mode.
+    /// Damping ratio of the arm's modes, weighted by the share of strain energy that this element
+    /// has in each mode.
     Modal(f64),
     /// `D = beta K` (s).
     StiffnessProportional(f64),
@@ -171,7 +173,8 @@ pub struct FlexibleArm {
     pub elements: Vec<ElasticElement>,
     /// Damping matrix on the elastic coordinates.
     pub D: DMatrix<f64>,
-    /// `beta` per element that comes nearest to `D` (exact when stiffness-proportional), for SPOOK (s).
+    /// `beta` per element that comes nearest to `D` (exact when stiffness-proportional), for SPOOK
+    /// (s).
     pub tau: Vec<f64>,
     /// Whether `D` is block diagonal with `beta K` in the blocks.
     pub proportional: bool,
@@ -195,7 +198,8 @@ pub struct FlexibleArm {
     pub load_friction: Vec<LoadFriction>,
     /// Gears that move several joints; see [`FlexibleArm::with_coupling`].
     pub coupling: Option<GearCoupling>,
-    /// Stiffness between elastic coordinates of coupled gears: row, column, entry, which stands in the mirrored place too.
+    /// Stiffness between elastic coordinates of coupled gears: row, column, entry, which stands in
+    /// the mirrored place too.
     pub cross_stiffness: Vec<(usize, usize, f64)>,
     /// The same of their dampers.
     pub cross_damping: Vec<(usize, usize, f64)>,
@@ -226,12 +230,12 @@ impl FlexibleArm {
 
     /// Puts springs on the elastic groups of a model.
     ///
-    /// `springs` lists name, stiffness and damping in the order of `model.elastic()`. The modal damping
-    /// matrix and the modes are those of the static pose at `t = 0`.
+    /// `springs` lists name, stiffness and damping in the order of `model.elastic()`. The modal
+    /// damping matrix and the modes are those of the static pose at `t = 0`.
     ///
     /// # Errors
-    /// [`StepError::Setup`] if counts or sizes differ, [`StepError::Singular`] if a stiffness is not positive definite,
-    /// [`StepError::NoEquilibrium`] if the arm cannot carry its weight.
+    /// [`StepError::Setup`] if counts or sizes differ, [`StepError::Singular`] if a stiffness is
+    /// not positive definite, [`StepError::NoEquilibrium`] if the arm cannot carry its weight.
     pub fn new<S: Into<Spring>>(
         model: Arc<Model>,
         springs: Vec<S>,
@@ -303,7 +307,8 @@ impl FlexibleArm {
         Ok(self)
     }
 
-    /// The same arm with what it carries changing on the way; changes at 0 or before hold from the start.
+    /// The same arm with what it carries changing on the way; changes at 0 or before hold from the
+    /// start.
     ///
     /// # Errors
     /// As [`FlexibleArm::new`].
@@ -314,7 +319,8 @@ impl FlexibleArm {
         Ok(self)
     }
 
-    /// Carries out the changes that are due at the start, so that it is found in equilibrium with them.
+    /// Carries out the changes that are due at the start, so that it is found in equilibrium with
+    /// them.
     pub(crate) fn carry_from_start(&mut self) -> Result<(), StepError> {
         let due = self.inertia_changes.iter().take_while(|change| change.t <= SAME_TIME).count();
         for change in self.inertia_changes.drain(..due) {
@@ -326,8 +332,8 @@ impl FlexibleArm {
     /// The same arm with some joints driven by torque, under a controller.
     ///
     /// # Errors
-    /// [`StepError::Setup`] if the axes are not actuated coordinates, the rigid robot has not just these, or an axis without
-    /// mass behind it has no rotor.
+    /// [`StepError::Setup`] if the axes are not actuated coordinates, the rigid robot has not just
+    /// these, or an axis without mass behind it has no rotor.
     pub fn with_servo(mut self, servo: Servo) -> Result<Self, StepError> {
         let n = self.model.n_actuated();
         self.torque_driven = servo.axes.iter().map(|a| a.coordinate).collect();
@@ -368,7 +374,8 @@ impl FlexibleArm {
         Ok(self)
     }
 
-    /// The same arm with the inertia of one body replaced (about Bo, B axes); modes and damping stay as they are.
+    /// The same arm with the inertia of one body replaced (about Bo, B axes); modes and damping
+    /// stay as they are.
     #[must_use]
     pub fn with_inertia(&self, body: usize, inertia: SpatialInertia) -> Self {
         Self { model: Arc::new(self.model.with_inertia(body, inertia)), ..self.clone() }
@@ -409,7 +416,8 @@ impl FlexibleArm {
         element.coordinate - self.model.n_actuated()
     }
 
-    /// Elastic energy (J) at elastic coordinates `e`, transmission errors and what sliders lost left out.
+    /// Elastic energy (J) at elastic coordinates `e`, transmission errors and what sliders lost
+    /// left out.
     pub fn elastic_energy(&self, e: &[f64]) -> f64 {
         let own: f64 =
             self.elements.iter().map(|element| element.energy(&e[self.offset(element)..][..element.size])).sum();
@@ -446,7 +454,8 @@ impl FlexibleArm {
         }
     }
 
-    /// Modes at `t = 0` and the damping matrix that follows from them; to be called after a change by hand.
+    /// Modes at `t = 0` and the damping matrix that follows from them; to be called after a change
+    /// by hand.
     ///
     /// # Errors
     /// As [`FlexibleArm::new`].

@@ -1,7 +1,8 @@
 //! What sits in a drive: curved springs, friction, and the axis of a sampled controller.
 //!
-//! Start at [`ServoAxis`], [`Friction`] and [`TorqueCurve`]. All quantities are on the joint's side of the gear.
-//! Not here: rotors (they are in the tree), gearbox springs that are straight (they are elements of the arm).
+//! Start at [`ServoAxis`], [`Friction`] and [`TorqueCurve`]. All quantities are on the joint's side
+//! of the gear. Not here: rotors (they are in the tree), gearbox springs that are straight (they
+//! are elements of the arm).
 
 /// Torque of a spring over its deflection, by straight pieces, odd or not; the end pieces go on.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,7 +22,8 @@ impl TorqueCurve {
     /// From points (deflection, torque).
     ///
     /// # Errors
-    /// [`CurveError`] for fewer than two points, deflections that do not rise, torques that fall, or ends that are flat.
+    /// [`CurveError`] for fewer than two points, deflections that do not rise, torques that fall,
+    /// or ends that are flat.
     pub fn new(points: &[[f64; 2]]) -> Result<Self, CurveError> {
         let fail = |text: String| Err(CurveError(text));
         if points.len() < 2 {
@@ -86,7 +88,8 @@ impl TorqueCurve {
 
     /// Torque at a deflection.
     pub fn torque(&self, e: f64) -> f64 {
-        // From the inner end of the first piece, which may be long: no digits are lost beside a play.
+        // From the inner end of the first piece, which may be long: no digits are lost beside a
+        // play.
         let k = self.piece(e).max(1);
         self.y[k] + self.slope(e) * (e - self.x[k])
     }
@@ -142,7 +145,8 @@ pub struct Friction {
     pub stribeck: f64,
     /// Speed at which that has fallen to 1/e (rad/s).
     pub stribeck_velocity: f64,
-    /// Speed `v_0` over which the sign changes (rad/s): below it the joint creeps instead of sticking.
+    /// Speed `v_0` over which the sign changes (rad/s): below it the joint creeps instead of
+    /// sticking.
     pub regularisation: f64,
 }
 
@@ -176,14 +180,15 @@ impl Friction {
     }
 }
 
-/// One axis of the controller: position loop around a speed loop, sampled, with feed-forward and a torque limit.
+/// One axis of the controller: position loop around a speed loop, sampled, with feed-forward and a
+/// torque limit.
 ///
 /// ```text
 /// v_c = q̇_ref + position_gain (q_ref - q)
 /// τ   = velocity_gain (v_c - q̇) + integral_gain ∫ (v_c - q̇) dt + τ_ff        |τ| ≤ limit, held until the next sample
 /// ```
-/// q is the motor's angle seen from the joint. τ_ff is the rigid robot's torque on the reference motion, rotor and
-/// friction included. The integral stops while the torque is at its limit.
+/// q is the motor's angle seen from the joint. τ_ff is the rigid robot's torque on the reference
+/// motion, rotor and friction included. The integral stops while the torque is at its limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ServoAxis {
     /// Coordinate of the joint.

@@ -1,9 +1,10 @@
 //! Eigenvalues of small symmetric matrices in storage that the caller keeps: no allocation.
 //!
-//! Householder's reduction to a tridiagonal matrix ([Golub and Van Loan 2013], 8.3), then QL steps with squares of rotations, as
-//! in LAPACK's `dsterf`: two divisions side by side instead of a root and then a division. Eigenvalues alone; absolute errors
-//! are some units in the last place of the largest. Where eigenvectors are wanted, nalgebra has them. Of one matrix or of
-//! several side by side: each lane has the bits of its matrix alone.
+//! Householder's reduction to a tridiagonal matrix ([Golub and Van Loan 2013], 8.3), then QL steps
+//! with squares of rotations, as in LAPACK's `dsterf`: two divisions side by side instead of a root
+//! and then a division. Eigenvalues alone; absolute errors are some units in the last place of the
+//! largest. Where eigenvectors are wanted, nalgebra has them. Of one matrix or of several side by
+//! side: each lane has the bits of its matrix alone.
 
 use flexarm_kinematics::Real;
 
@@ -15,7 +16,8 @@ const MOST_STEPS: usize = 60;
 /// Squares below this are not divided by; the matrix is about one.
 const SMALLEST: f64 = 1e-280;
 
-/// Eigenvalues of the symmetric matrix `A` (n×n, column after column, lower triangle read, destroyed), unsorted, into `d` (n).
+/// Eigenvalues of the symmetric matrix `A` (n×n, column after column, lower triangle read,
+/// destroyed), unsorted, into `d` (n).
 ///
 /// * `e`: n numbers of workspace.
 ///
@@ -51,7 +53,8 @@ fn tridiagonalise<T: Real>(A: &mut [T], d: &mut [T], e: &mut [T]) {
     for k in 0..n.saturating_sub(2) {
         let (inward, B) = A.split_at_mut((k + 1) * n);
         let (v, w) = (&mut inward[k * n + k + 1..], &mut e[k + 1..]);
-        // v = x - α e_1 below the diagonal of column k; H = 1 - 2 v vᵀ / vᵀv makes it (α, 0, 0, ...).
+        // v = x - α e_1 below the diagonal of column k; H = 1 - 2 v vᵀ / vᵀv makes it (α, 0, 0,
+        // ...).
         let (norm, first) = (dot(v, v).sqrt(), v[0]);
         let alpha = first.pick_below(T::zero(), norm, -norm);
         v[0] -= alpha;
@@ -82,7 +85,8 @@ fn tridiagonalise<T: Real>(A: &mut [T], d: &mut [T], e: &mut [T]) {
     }
 }
 
-/// `w = B v` with the lower triangle of a symmetric B, whose columns begin with `above` entries that do not count.
+/// `w = B v` with the lower triangle of a symmetric B, whose columns begin with `above` entries
+/// that do not count.
 #[inline(always)]
 fn multiply<T: Real>(B: &[T], above: usize, v: &[T], w: &mut [T]) {
     w.fill(T::zero());
@@ -95,9 +99,11 @@ fn multiply<T: Real>(B: &[T], above: usize, v: &[T], w: &mut [T]) {
     }
 }
 
-/// Eigenvalues of a tridiagonal matrix with squares beside its diagonal, in place of the latter; 1 where that came to an end, else 0.
+/// Eigenvalues of a tridiagonal matrix with squares beside its diagonal, in place of the latter; 1
+/// where that came to an end, else 0.
 ///
-/// Lanes go together from eigenvalue to eigenvalue: one that has found its own waits for the others.
+/// Lanes go together from eigenvalue to eigenvalue: one that has found its own waits for the
+/// others.
 #[inline(always)]
 fn ql<T: Real>(d: &mut [T], e: &mut [T]) -> T {
     let n = d.len();
@@ -153,8 +159,8 @@ impl<T: Real> Block<T> {
     }
 }
 
-/// A QL step with Wilkinson's shift σ on the rows from l to the end of a block, from the bottom up. Of rotations by c and s the
-/// squares are enough:
+/// A QL step with Wilkinson's shift σ on the rows from l to the end of a block, from the bottom up.
+/// Of rotations by c and s the squares are enough:
 ///
 /// ```text
 /// r = p + e²,   c² = p/r,   s² = e²/r,   γ' = c² (d - σ) - s² γ,   p' = γ'²/c²
@@ -226,7 +232,8 @@ mod tests {
         });
     }
 
-    /// Truth: each matrix alone. Lanes whose blocks fall apart at other rows, at once, or that are no numbers.
+    /// Truth: each matrix alone. Lanes whose blocks fall apart at other rows, at once, or that are
+    /// no numbers.
     #[cfg(target_arch = "x86_64")]
     #[test]
     fn every_lane_has_the_bits_of_its_matrix_alone() {

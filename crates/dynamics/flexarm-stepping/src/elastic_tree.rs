@@ -1,5 +1,5 @@
-//! A flexible arm whose free coordinates are elastic joints, as matrices on a tree: a node per elastic joint, with what the
-//! prescribed joints behind it carry fixed to it.
+//! A flexible arm whose free coordinates are elastic joints, as matrices on a tree: a node per
+//! elastic joint, with what the prescribed joints behind it carry fixed to it.
 //!
 //! ```text
 //! V_B = Ad_BQ V_Q + S x'        Q: the body behind the next elastic joint inward, S the motion subspace of B's own
@@ -13,9 +13,10 @@ use crate::arm::{Damping, FlexibleArm, add_product};
 use crate::dense::{Loops, quickly};
 use crate::tree_matrix::{TreeMatrices, TreeNode};
 
-/// Fewest elastic joints for which elimination is taken instead of a dense inverse: with two, 12 coordinates, a step takes as
-/// long either way, with three 2.8 instead of 3.3 us, with five 4.0 instead of 7.5, with 64 48 instead of 1800
-/// (`examples/chains.rs`). With three a batch gains more from its lanes, whose matrices are dense.
+/// Fewest elastic joints for which elimination is taken instead of a dense inverse: with two, 12
+/// coordinates, a step takes as long either way, with three 2.8 instead of 3.3 us, with five 4.0
+/// instead of 7.5, with 64 48 instead of 1800 (`examples/chains.rs`). With three a batch gains more
+/// from its lanes, whose matrices are dense.
 const FEWEST_NODES: usize = 4;
 
 /// Where the nodes are among the bodies, and workspaces.
@@ -44,8 +45,8 @@ impl ElasticTree {
         Self::of(arm).filter(|tree| tree.len() >= FEWEST_NODES && arm.damps_by_element())
     }
 
-    /// None where a free coordinate is no elastic joint of six, where a spring is not straight, or where closed loops tie branches
-    /// of the tree together.
+    /// None where a free coordinate is no elastic joint of six, where a spring is not straight, or
+    /// where closed loops tie branches of the tree together.
     pub(crate) fn of(arm: &FlexibleArm) -> Option<Self> {
         let model = &arm.model;
         let straight = arm.elements.iter().all(|e| e.size == 6 && !e.modal && e.curve.is_none());
@@ -77,7 +78,8 @@ impl ElasticTree {
         self.joints.len()
     }
 
-    /// Inertias and motions at the poses of the last pass in `data`, which was at `state`; false at a singularity of the angles.
+    /// Inertias and motions at the poses of the last pass in `data`, which was at `state`; false at
+    /// a singularity of the angles.
     pub(crate) fn place(&mut self, model: &Model, data: &Data, state: &State, nodes: &mut Vec<TreeNode>) -> bool {
         nodes.resize_with(self.joints.len(), || TreeNode::new(None));
         let mut next = 0;
@@ -178,7 +180,8 @@ impl FlexibleArm {
         }
     }
 
-    /// Blocks of `c_D D + c_K K` and K, for straight springs of six coordinates that are damped by element.
+    /// Blocks of `c_D D + c_K K` and K, for straight springs of six coordinates that are damped by
+    /// element.
     pub(crate) fn blocks(&self, c_D: f64, c_K: f64, to: &mut TreeMatrices) {
         for (k, (node, element)) in to.nodes.iter_mut().zip(&self.elements).enumerate() {
             node.K.copy_from_slice(element.K.as_slice());

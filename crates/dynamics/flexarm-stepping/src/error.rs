@@ -3,8 +3,8 @@
 use flexarm_kinematics::{Data, Model};
 use flexarm_settings::Setting;
 
-/// A step that fails with a transmission angle below this failed because of it: the dependent joints turn a hundred times as fast as those
-/// that drive (rad).
+/// A step that fails with a transmission angle below this failed because of it: the dependent
+/// joints turn a hundred times as fast as those that drive (rad).
 pub(crate) const DEAD_POINT_RAD: f64 = 0.01;
 
 /// A step, a start or a set-up that failed; carries what is needed to understand it.

@@ -1,19 +1,22 @@
-//! What happens at discrete times: payloads, samples of the controller, jumps of loads and of prescribed velocities.
+//! What happens at discrete times: payloads, samples of the controller, jumps of loads and of
+//! prescribed velocities.
 //!
-//! Between two events everything is smooth. A step ends at each of them, wherever it lies, and what is asked for at that
-//! time belongs to the side from which it is asked ([`EventQueue::side`]). What is to come and what is over stands in one
-//! place of a run's state, the [`EventQueue`]; who else follows a run learns of it from the observation. Start at
-//! [`ReducedArm::at_time`].
+//! Between two events everything is smooth. A step ends at each of them, wherever it lies, and what
+//! is asked for at that time belongs to the side from which it is asked ([`EventQueue::side`]).
+//! What is to come and what is over stands in one place of a run's state, the [`EventQueue`]; who
+//! else follows a run learns of it from the observation. Start at [`ReducedArm::at_time`].
 //!
-//! A joint whose prescribed velocity jumps by Δv_p strikes the arm: positions stay, the free velocities take the impulse,
+//! A joint whose prescribed velocity jumps by Δv_p strikes the arm: positions stay, the free
+//! velocities take the impulse,
 //!
 //! ```text
 //! M_ff Δv_f = -M_fp Δv_p                                   springs, dampers, friction and weight are finite: no impulse
 //! ```
 //!
-//! An integrator that asks for accelerations at few times of its steps takes the impulse of a prescribed joint for
-//! `h Σ w_i a(t + c_i h)` ([`crate::Integrator::MOTION_RULE`]; at the ends alone `h (a_n + a_n+1) / 2`). Where that is not how the
-//! velocity changes, because it rises within a few samples, the step is cut ([`ReducedArm::resolved`]).
+//! An integrator that asks for accelerations at few times of its steps takes the impulse of a
+//! prescribed joint for `h Σ w_i a(t + c_i h)` ([`crate::Integrator::MOTION_RULE`]; at the ends
+//! alone `h (a_n + a_n+1) / 2`). Where that is not how the velocity changes, because it rises
+//! within a few samples, the step is cut ([`ReducedArm::resolved`]).
 //!
 //! Not here: the integrators, which are told by [`Change`] what to renew.
 
@@ -32,7 +35,8 @@ use crate::reduced::ReducedArm;
 /// Times closer than this are the same (s).
 pub(crate) const SAME_TIME: f64 = 1e-9;
 
-/// By which part of the speed a velocity may change otherwise than accelerations at the ends of a step say.
+/// By which part of the speed a velocity may change otherwise than accelerations at the ends of a
+/// step say.
 pub(crate) const IMPULSE_DEFECT: f64 = 1e-3;
 /// Speeds below this are no measure (rad/s or m/s).
 pub(crate) const SLOW: f64 = 0.01;
@@ -74,10 +78,11 @@ pub(crate) enum Change {
     Matrices,
 }
 
-/// What happens at discrete times, and how much of it is over: the part of a run's state that knows. Times nearer than
-/// [`SAME_TIME`] are one.
+/// What happens at discrete times, and how much of it is over: the part of a run's state that
+/// knows. Times nearer than [`SAME_TIME`] are one.
 pub(crate) struct EventQueue {
-    /// When loads or prescribed velocities jump, and other stops of loads, ascending, and how many of these times are over.
+    /// When loads or prescribed velocities jump, and other stops of loads, ascending, and how many
+    /// of these times are over.
     jumps: Vec<f64>,
     jumps_over: usize,
     /// Changes of inertia, by time, and how many of them have been carried out.
@@ -123,7 +128,8 @@ impl EventQueue {
         self.next_jump().map_or(after, |next| after.min(next.next_down()))
     }
 
-    /// Leaves the jumps at t behind; the times just before the first and just after the last of them.
+    /// Leaves the jumps at t behind; the times just before the first and just after the last of
+    /// them.
     pub(crate) fn pass_jumps(&mut self, t: f64) -> Option<(f64, f64)> {
         let first = self.next_jump().filter(|first| *first <= t + SAME_TIME)?;
         self.jumps_over = self.jumps.partition_point(|time| *time <= t + SAME_TIME);
@@ -145,7 +151,8 @@ impl EventQueue {
         self.changes_before(t + SAME_TIME)
     }
 
-    /// As [`EventQueue::due_change`] as far as `t` is approached from below: what happens there is still to come.
+    /// As [`EventQueue::due_change`] as far as `t` is approached from below: what happens there is
+    /// still to come.
     pub(crate) fn change_before(&mut self, t: f64) -> Option<(usize, &InertiaChange)> {
         self.changes_before((t - SAME_TIME).next_down())
     }
@@ -202,8 +209,9 @@ fn jumps_at(load: &Load, t: f64) -> bool {
 /// Damping of an arm: matrix, factors, whether they say the same.
 pub(crate) type ArmDamping = (DMatrix<f64>, Vec<f64>, bool);
 
-/// What the arm damps with after each change of inertia: a ratio of modal damping is one of the modes that the arm then
-/// has. An arm that cannot stand with its new payload keeps the damping it had.
+/// What the arm damps with after each change of inertia: a ratio of modal damping is one of the
+/// modes that the arm then has. An arm that cannot stand with its new payload keeps the damping it
+/// had.
 pub(crate) fn damping_after_changes(arm: &FlexibleArm) -> Vec<ArmDamping> {
     let mut changed = arm.clone();
     let damping = |change: &InertiaChange| {
@@ -251,8 +259,8 @@ impl ReducedArm {
         Ok(what)
     }
 
-    /// Where a step from t to `stop` has to end so that the rule of the integrator meets the impulse of the prescribed joints:
-    /// there, or before it; see the module page. No allocation.
+    /// Where a step from t to `stop` has to end so that the rule of the integrator meets the
+    /// impulse of the prescribed joints: there, or before it; see the module page. No allocation.
     pub(crate) fn resolved(&mut self, t: f64, mut stop: f64, rule: &[(f64, f64)]) -> f64 {
         if rule.is_empty() {
             return stop;
@@ -359,7 +367,8 @@ impl ReducedArm {
         for (i, &k) in self.free.iter().enumerate() {
             self.tau[k] = self.shifted[i];
         }
-        // Work: impulse times mean velocity, 1/2 (v⁺ M v⁺ - v⁻ M v⁻) = Δvᵀ M (v⁺ - Δv/2) with the velocities now in `state`.
+        // Work: impulse times mean velocity, 1/2 (v⁺ M v⁺ - v⁻ M v⁻) = Δvᵀ M (v⁺ - Δv/2) with the
+        // velocities now in `state`.
         let M = &self.data.M;
         let new = |k: usize| {
             let free = self.free.iter().position(|&l| l == k);
@@ -397,7 +406,8 @@ mod tests {
         assert_eq!(events.pass_jumps(0.6), None);
     }
 
-    /// A step that ends at an event, but for rounding, ends there: no second step of a rounding's length.
+    /// A step that ends at an event, but for rounding, ends there: no second step of a rounding's
+    /// length.
     #[test]
     fn an_event_at_the_end_of_a_step_but_for_rounding_is_at_its_end() {
         let events = queue(&[0.1 + 0.2], None);
@@ -405,7 +415,8 @@ mod tests {
         assert_eq!(events.next(0.2, 0.25), Some(0.1 + 0.2));
     }
 
-    /// Truth: a clock of 1 ms ticks 1001 times from 0 to 1 s, at times that are sums of steps and multiples of them.
+    /// Truth: a clock of 1 ms ticks 1001 times from 0 to 1 s, at times that are sums of steps and
+    /// multiples of them.
     #[test]
     fn a_controller_takes_each_sample_once() {
         for h in [1e-3, 2.5e-4] {

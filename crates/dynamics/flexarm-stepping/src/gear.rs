@@ -1,5 +1,5 @@
-//! What a gearbox does beside giving way: errors of its transmission, hysteresis, friction under load, and gears that move
-//! several joints.
+//! What a gearbox does beside giving way: errors of its transmission, hysteresis, friction under
+//! load, and gears that move several joints.
 //!
 //! ```text
 //! δ = e - ε(q_m)             ε: transmission error at the motor's coordinate; δ deflects the spring          (1)
@@ -8,11 +8,13 @@
 //! on e: F;   on q_m: -ε'(q_m) F                               so that F does the work F δ̇                     (4)
 //! θ = C^-1 q,  K = C^-T K_m C^-1,  τ_m = Cᵀ τ                 gears between motors θ and joints q = C θ       (5)
 //! ```
-//! Sliders in parallel follow Masing's rules: a branch after a reversal is the first loading curve twice as large, and the
-//! loss of a closed cycle does not depend on its speed. Start at [`TransmissionError`], [`Hysteresis`], [`GearCoupling`]
-//! and [`LoadFriction`]; [`GearState`] is what a run remembers. Not here: springs themselves (`arm`), rotors (in the tree).
+//! Sliders in parallel follow Masing's rules: a branch after a reversal is the first loading curve
+//! twice as large, and the loss of a closed cycle does not depend on its speed. Start at
+//! [`TransmissionError`], [`Hysteresis`], [`GearCoupling`] and [`LoadFriction`]; [`GearState`] is
+//! what a run remembers. Not here: springs themselves (`arm`), rotors (in the tree).
 //!
-//! Sources: [Iwan 1966] for sliders in parallel; [Tuttle & Seering 1996] for (1) with harmonics of the motor.
+//! Sources: [Iwan 1966] for sliders in parallel; [Tuttle & Seering 1996] for (1) with harmonics of
+//! the motor.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -28,7 +30,8 @@ use crate::statics::spring_forces;
 pub struct Harmonic {
     /// On the joint's side (rad or m).
     pub amplitude: f64,
-    /// Cycles in a turn of the joint, or radians of phase per radian of it; for a slide radians per metre.
+    /// Cycles in a turn of the joint, or radians of phase per radian of it; for a slide radians per
+    /// metre.
     pub cycles: f64,
     /// At joint value zero (rad).
     pub phase: f64,
@@ -72,7 +75,8 @@ pub struct Slider {
     pub reach: f64,
 }
 
-/// A gearbox whose torque depends on how its deflection came about, whatever its speed: (2) and (3) of the module page.
+/// A gearbox whose torque depends on how its deflection came about, whatever its speed: (2) and (3)
+/// of the module page.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hysteresis {
     /// Element of the gearbox's spring, of one coordinate.
@@ -84,10 +88,11 @@ pub struct Hysteresis {
 }
 
 impl Hysteresis {
-    /// Sliders that slip one after the other, evenly up to the deflection `reach`, with the torque `friction` together.
+    /// Sliders that slip one after the other, evenly up to the deflection `reach`, with the torque
+    /// `friction` together.
     ///
-    /// First loading along them is a polygon with corners on the parabola `friction (2 x - x²)`, `x = δ / reach`, of Rayleigh's
-    /// law. All arguments are positive.
+    /// First loading along them is a polygon with corners on the parabola `friction (2 x - x²)`,
+    /// `x = δ / reach`, of Rayleigh's law. All arguments are positive.
     pub fn even_sliders(friction: f64, reach: f64, count: usize) -> Vec<Slider> {
         let n = count as f64;
         // Slopes of the polygon between its corners fall by equal steps of 2 friction / (reach n).
@@ -109,7 +114,8 @@ impl Hysteresis {
         self.elastic.slope(delta) + self.sliders.iter().map(|slider| slider.stiffness).sum::<f64>()
     }
 
-    /// Loss of a closed cycle between `-amplitude` and `amplitude` (J): `4 Σ k r (amplitude - r)` over the sliders that slip.
+    /// Loss of a closed cycle between `-amplitude` and `amplitude` (J): `4 Σ k r (amplitude - r)`
+    /// over the sliders that slip.
     pub fn loss(&self, amplitude: f64) -> f64 {
         self.sliders.iter().map(|s| 4.0 * s.stiffness * s.reach * (amplitude - s.reach).max(0.0)).sum()
     }
@@ -120,7 +126,8 @@ impl Hysteresis {
 pub struct LoadFriction {
     /// Coordinate of the joint.
     pub coordinate: usize,
-    /// Element of the gearbox's spring, of one coordinate, whose torque is transmitted; without one what moves the joint.
+    /// Element of the gearbox's spring, of one coordinate, whose torque is transmitted; without one
+    /// what moves the joint.
     pub element: Option<usize>,
     /// Friction over transmitted torque.
     pub coefficient: f64,
@@ -163,7 +170,8 @@ impl GearCoupling {
         C_inverse.transpose() * DMatrix::from_diagonal(&DVector::from_column_slice(values)) * C_inverse
     }
 
-    /// Torques of the motors behind their gears, `Cᵀ τ`, for those of the joints in all coordinates.
+    /// Torques of the motors behind their gears, `Cᵀ τ`, for those of the joints in all
+    /// coordinates.
     pub fn motor_torques(&self, tau: &[f64]) -> Vec<f64> {
         let joints = DVector::from_iterator(self.coordinates.len(), self.coordinates.iter().map(|k| tau[*k]));
         self.C.tr_mul(&joints).as_slice().to_vec()
@@ -186,12 +194,12 @@ impl GearCoupling {
 }
 
 impl FlexibleArm {
-    /// The same arm with gears that move several joints: its springs, dampers and friction so far are those of the motors
-    /// behind their gears, and become those of the joints.
+    /// The same arm with gears that move several joints: its springs, dampers and friction so far
+    /// are those of the motors behind their gears, and become those of the joints.
     ///
     /// # Errors
-    /// [`StepError::Setup`] if sizes differ, springs have more than one coordinate, are curved or are missing for some of the motors, and
-    /// as [`FlexibleArm::new`].
+    /// [`StepError::Setup`] if sizes differ, springs have more than one coordinate, are curved or
+    /// are missing for some of the motors, and as [`FlexibleArm::new`].
     pub fn with_coupling(mut self, coupling: GearCoupling) -> Result<Self, StepError> {
         let n = coupling.coordinates.len();
         let single = |k: &usize| self.elements.get(*k).is_some_and(|e| e.size == 1 && e.curve.is_none());
@@ -233,8 +241,9 @@ impl FlexibleArm {
         Ok(self)
     }
 
-    /// `dK/d(ln k)` for the stiffness k of one motor's spring in coupled gears: the elastic coordinates of all of them, and the matrix over
-    /// these; none of an element whose gear moves its own joint alone.
+    /// `dK/d(ln k)` for the stiffness k of one motor's spring in coupled gears: the elastic
+    /// coordinates of all of them, and the matrix over these; none of an element whose gear moves
+    /// its own joint alone.
     pub fn coupled_stiffness_slope(&self, element: usize) -> Option<(Vec<usize>, DMatrix<f64>)> {
         let coupling = self.coupling.as_ref()?;
         let motor = coupling.elements.iter().position(|k| *k == element)?;
@@ -245,7 +254,8 @@ impl FlexibleArm {
         Some((places, row.tr_mul(&row) * own))
     }
 
-    /// `dD/d(ln d)` for the damper d of one motor in coupled gears, as [`FlexibleArm::coupled_stiffness_slope`].
+    /// `dD/d(ln d)` for the damper d of one motor in coupled gears, as
+    /// [`FlexibleArm::coupled_stiffness_slope`].
     pub fn coupled_damping_slope(&self, element: usize) -> Option<(Vec<usize>, DMatrix<f64>)> {
         let coupling = self.coupling.as_ref()?;
         let motor = coupling.elements.iter().position(|k| *k == element)?;
@@ -265,10 +275,12 @@ impl FlexibleArm {
         Some((places, row.tr_mul(&row) * own))
     }
 
-    /// The same arm with gears whose torque has a history; their elements have the curve of first loading from here on.
+    /// The same arm with gears whose torque has a history; their elements have the curve of first
+    /// loading from here on.
     ///
     /// # Errors
-    /// [`StepError::Setup`] if an element has more than one coordinate or none is there, and as [`FlexibleArm::new`].
+    /// [`StepError::Setup`] if an element has more than one coordinate or none is there, and as
+    /// [`FlexibleArm::new`].
     pub fn with_hysteresis(mut self, laws: Vec<Hysteresis>) -> Result<Self, StepError> {
         for law in &laws {
             let Some(element) = self.elements.get_mut(law.element).filter(|e| e.size == 1) else {
@@ -311,20 +323,22 @@ impl FlexibleArm {
             || self.coupling.as_ref().is_some_and(|coupling| !coupling.is_none())
     }
 
-    /// Largest torque that the friction in a gear holds (N m or N): beside it nothing smaller is out of balance.
+    /// Largest torque that the friction in a gear holds (N m or N): beside it nothing smaller is
+    /// out of balance.
     pub(crate) fn friction_of_gears(&self) -> f64 {
         let of_law = |law: &Hysteresis| law.sliders.iter().map(|s| s.stiffness * s.reach).sum::<f64>();
         self.hysteresis.iter().map(of_law).fold(0.0, f64::max)
     }
 
-    /// Deflection δ of a spring of one coordinate e (rad, m), with the joints at `q`: e less the transmission error, if there is one.
+    /// Deflection δ of a spring of one coordinate e (rad, m), with the joints at `q`: e less the
+    /// transmission error, if there is one.
     pub fn deflection(&self, element: usize, e: f64, q: &[f64]) -> f64 {
         let errors = self.transmission.iter().filter(|error| error.element == element);
         errors.fold(e, |delta, error| delta - error.at(q[error.motor]))
     }
 
-    /// Slope of a curved spring in small motions about all coordinates `q`, none of a straight one: no friction slips, and from within a
-    /// play the steepest.
+    /// Slope of a curved spring in small motions about all coordinates `q`, none of a straight one:
+    /// no friction slips, and from within a play the steepest.
     pub fn vibration_slope(&self, element: usize, q: &[f64]) -> Option<f64> {
         let own = &self.elements[element];
         let curve = own.curve.as_ref()?;
@@ -336,9 +350,11 @@ impl FlexibleArm {
         Some(if slope > 0.0 { slope } else { curve.stiffest() })
     }
 
-    /// What the springs pull with, and the energy in each element, at rest with all coordinates at `q`.
+    /// What the springs pull with, and the energy in each element, at rest with all coordinates at
+    /// `q`.
     ///
-    /// Forces over the elastic coordinates (N, N m); of coupled gears the energy is that of the joint's part, `F e / 2`.
+    /// Forces over the elastic coordinates (N, N m); of coupled gears the energy is that of the
+    /// joint's part, `F e / 2`.
     pub fn springs_at_rest(&self, q: &DVector<f64>) -> (DVector<f64>, Vec<f64>) {
         let e = q.rows(self.model.n_actuated(), self.n_elastic_coordinates()).into_owned();
         let F = spring_forces(self, q.as_slice(), &e);
@@ -363,14 +379,16 @@ impl FlexibleArm {
         }
     }
 
-    /// What transmission errors put on the motors for the forces F of the springs: adds to `tau` over all joints.
+    /// What transmission errors put on the motors for the forces F of the springs: adds to `tau`
+    /// over all joints.
     pub(crate) fn add_motor_forces(&self, q: &[f64], F: &[f64], tau: &mut [f64]) {
         for error in &self.transmission {
             tau[error.motor] -= error.slope(q[error.motor]) * F[self.offset(&self.elements[error.element])];
         }
     }
 
-    /// Friction of all actuated coordinates at these rates and transmitted torques, into `friction`.
+    /// Friction of all actuated coordinates at these rates and transmitted torques, into
+    /// `friction`.
     pub(crate) fn friction_torques(
         &self,
         rates: &[f64],
@@ -408,7 +426,8 @@ impl FlexibleArm {
         unloaded + loaded.sum::<f64>()
     }
 
-    /// The same without what grows with the transmitted torque; the slope of each motor is this or more.
+    /// The same without what grows with the transmitted torque; the slope of each motor is this or
+    /// more.
     pub(crate) fn unloaded_friction_slope(&self, row: usize, column: usize, rates: &[f64], least: f64) -> f64 {
         let own = |k: usize, rate: f64| self.friction.get(k).map_or(0.0, |f| f.slope(rate).max(least));
         let places = self.coupling.as_ref().and_then(|c| Some((c, c.place(row)?, c.place(column)?)));
@@ -557,8 +576,8 @@ impl GearState {
         energy + arm.cross_stiffness.iter().map(|&(i, j, k)| k * self.delta[i] * self.delta[j]).sum::<f64>()
     }
 
-    /// A step has ended with the joints at `q` and the elastic coordinates `e`: (3), and what the sliders lost. At the start
-    /// of a run they have followed the first loading.
+    /// A step has ended with the joints at `q` and the elastic coordinates `e`: (3), and what the
+    /// sliders lost. At the start of a run they have followed the first loading.
     pub(crate) fn settle(&mut self, arm: &FlexibleArm, q: &[f64], e: &[f64]) {
         for (law, slipped) in arm.hysteresis.iter().zip(&mut self.slipped) {
             let delta = arm.deflection(law.element, e[arm.offset(&arm.elements[law.element])], q);
@@ -611,8 +630,8 @@ impl Slipped {
 mod tests {
     use super::*;
 
-    /// Truth: Rayleigh's parabola at the corners, and the area of Masing's loop `8 ∫ f - 4 A f(A)` of first loading f by closed
-    /// forms of straight pieces.
+    /// Truth: Rayleigh's parabola at the corners, and the area of Masing's loop `8 ∫ f - 4 A f(A)`
+    /// of first loading f by closed forms of straight pieces.
     #[test]
     fn sliders_follow_rayleighs_law_and_lose_the_area_of_masings_loop() {
         let (friction, reach) = (30.0, 2e-4);
@@ -639,7 +658,8 @@ mod tests {
             let lost: f64 = [-amplitude, amplitude].iter().map(|d| slipped.advance(&eight, *d)).sum();
             assert!((lost - masing).abs() < 1e-12, "{lost} {masing}");
         }
-        // Many sliders: 2/3 κ A³ / reach with κ = 2 friction / reach, Rayleigh's loss below the reach.
+        // Many sliders: 2/3 κ A³ / reach with κ = 2 friction / reach, Rayleigh's loss below the
+        // reach.
         let (many, A) = (law(2000), 0.5 * reach);
         let rayleigh = 2.0 / 3.0 * (2.0 * friction / reach) * A.powi(3) / reach;
         assert!((many.loss(A) / rayleigh - 1.0).abs() < 1e-5, "{}", many.loss(A) / rayleigh);

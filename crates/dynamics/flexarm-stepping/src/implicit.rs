@@ -1,14 +1,17 @@
-//! What implicit integrators share: a matrix that is kept, when Newton's method ends, what becomes of a step that fails.
+//! What implicit integrators share: a matrix that is kept, when Newton's method ends, what becomes
+//! of a step that fails.
 //!
 //! ```text
 //! r(ẍ) = 0        ẍ ← ẍ - J^-1 r        J: kept until an iteration slows down
 //! ```
-//! The first correction `d = J^-1 r` is the error of an extrapolation over the step. Each iteration leaves a part ρ of the one
-//! before, as lengths of vectors; what a search may leave of the first one is a part of it ([`Newton::leaving`]). ρ is measured
-//! where two iterations are made, in every eighth step for certain (every 24th while it is small), and grows as the arm moves away from where J was taken:
-//! while it is known to be small enough, a step needs one evaluation.
+//! The first correction `d = J^-1 r` is the error of an extrapolation over the step. Each iteration
+//! leaves a part ρ of the one before, as lengths of vectors; what a search may leave of the first
+//! one is a part of it ([`Newton::leaving`]). ρ is measured where two iterations are made, in every
+//! eighth step for certain (every 24th while it is small), and grows as the arm moves away from
+//! where J was taken: while it is known to be small enough, a step needs one evaluation.
 //!
-//! A step whose iteration fails is tried again with a matrix of its start, then in halves, down to `h/64`.
+//! A step whose iteration fails is tried again with a matrix of its start, then in halves, down to
+//! `h/64`.
 
 use nalgebra::DVector;
 
@@ -22,28 +25,35 @@ use crate::system::SecondOrderSystem;
 const MAX_ITERATIONS: usize = 25;
 /// A step that fails is halved so many times before the run is given up.
 const MOST_HALVINGS: u32 = 6;
-/// A step that needed more iterations than this renews the matrix for the next one; twice as many, for itself.
+/// A step that needed more iterations than this renews the matrix for the next one; twice as many,
+/// for itself.
 const RENEW_ABOVE: usize = 4;
 /// Largest ρ of a matrix that is kept, unless told otherwise.
 const STALE: f64 = 0.03;
 /// Accepted correction over the size of the acceleration.
 const TOLERANCE: f64 = 1e-9;
-/// Part of the first correction that a search may leave unless it is told otherwise: errors that nothing damps add up.
+/// Part of the first correction that a search may leave unless it is told otherwise: errors that
+/// nothing damps add up.
 const TO_THE_END: f64 = 1e-6;
-/// Part of what may be left that ρ may be with a matrix just taken: more is no age of the matrix but something that it does not
-/// know (weight, loads, speeds), whose error has the same sign in every step and may feed a mode.
+/// Part of what may be left that ρ may be with a matrix just taken: more is no age of the matrix
+/// but something that it does not know (weight, loads, speeds), whose error has the same sign in
+/// every step and may feed a mode.
 const EXACT: f64 = 0.5;
-/// In every step whose number is a multiple of this ρ is measured anew: in all runs that go side by side at once.
+/// In every step whose number is a multiple of this ρ is measured anew: in all runs that go side by
+/// side at once.
 const MEASURED_EVERY: u64 = 8;
-/// The same while ρ is below this part of what may be left: until it has grown to that the arm moves on for a while.
+/// The same while ρ is below this part of what may be left: until it has grown to that the arm
+/// moves on for a while.
 const MEASURED_RARELY: u64 = 24;
 /// See [`MEASURED_RARELY`].
 const WELL_BELOW: f64 = 0.3;
-/// A first correction so many times as large as the largest of late comes from something new, of which ρ says nothing.
+/// A first correction so many times as large as the largest of late comes from something new, of
+/// which ρ says nothing.
 const SUDDEN: f64 = 1.2;
 /// What is left of the largest of late after each search.
 const FADING: f64 = 0.95;
-/// Corrections below this, over the size of the acceleration, are too near to rounding to measure ρ.
+/// Corrections below this, over the size of the acceleration, are too near to rounding to measure
+/// ρ.
 const MEASURABLE: f64 = 1e-9;
 /// Corrections of x below this fraction of x are rounding.
 const ROUNDING: f64 = 1e-14;
@@ -60,7 +70,8 @@ pub(crate) struct Newton {
     pub(crate) factored: bool,
     /// Whether what is remembered of the steps before is to be taken anew.
     pub(crate) fresh: bool,
-    /// Whether the next matrix continues the last one: same length of the step, same masses but for the motion.
+    /// Whether the next matrix continues the last one: same length of the step, same masses but for
+    /// the motion.
     pub(crate) same_course: bool,
     iterations: u64,
     factorisations: u64,
@@ -138,7 +149,8 @@ impl Newton {
         self.new = false;
     }
 
-    /// A step was found in so many iterations, at most `longest` of them for one set of accelerations.
+    /// A step was found in so many iterations, at most `longest` of them for one set of
+    /// accelerations.
     pub(crate) fn found(&mut self, iterations: usize, longest: usize) {
         self.iterations += iterations as u64;
         self.last_iterations += iterations;
@@ -155,7 +167,8 @@ impl Newton {
         calm && exact && !self.measuring && self.contraction <= self.left
     }
 
-    /// An iteration left this part of the one before. With the matrix of the search itself it says nothing of those to come.
+    /// An iteration left this part of the one before. With the matrix of the search itself it says
+    /// nothing of those to come.
     fn measured(&mut self, contraction: f64) {
         if !self.new {
             if self.contraction.is_infinite() {
@@ -229,7 +242,8 @@ impl Search {
     /// Counts a correction; whether it was the last one that is needed.
     ///
     /// # Errors
-    /// [`StepError::Diverged`] where values are out of all range, [`StepError::NotConverged`] after too many iterations.
+    /// [`StepError::Diverged`] where values are out of all range, [`StepError::NotConverged`] after
+    /// too many iterations.
     pub(crate) fn ends(&mut self, sizes: Sizes, newton: &mut Newton) -> Result<bool, StepError> {
         let Sizes { norm, correction, acceleration: size, place } = sizes;
         let Self { t, h, c_K, .. } = *self;

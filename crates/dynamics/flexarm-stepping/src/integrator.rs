@@ -1,6 +1,7 @@
 //! The seam between integrators and whoever steps them: a grid of times, a state, events.
 //!
-//! [`ReducedStepper`] puts any of them behind a flexible arm, once for all: its steps end at events too.
+//! [`ReducedStepper`] puts any of them behind a flexible arm, once for all: its steps end at events
+//! too.
 
 use std::sync::Arc;
 
@@ -116,12 +117,14 @@ impl Current {
     }
 }
 
-/// An integrator of second-order systems; it steps along a grid and stops between its times where it is told to.
+/// An integrator of second-order systems; it steps along a grid and stops between its times where
+/// it is told to.
 ///
 /// After an error the state is that of the last good time.
 pub trait Integrator: Send {
-    /// Where in a step it asks for prescribed accelerations, as parts of the step, and with which weights they make the
-    /// impulse. Steps are cut where this misses the change of a velocity that rises within them; empty: they are short anyway.
+    /// Where in a step it asks for prescribed accelerations, as parts of the step, and with which
+    /// weights they make the impulse. Steps are cut where this misses the change of a velocity that
+    /// rises within them; empty: they are short anyway.
     const MOTION_RULE: &'static [(f64, f64)] = &[];
 
     /// Where it is.
@@ -130,11 +133,13 @@ pub trait Integrator: Send {
     /// The same; of what an event may change, the velocities, [`Integrator::restart`] must follow.
     fn current_mut(&mut self) -> &mut Current;
 
-    /// Advances to t (s), which lies after the current time and not beyond the next multiple of the step.
+    /// Advances to t (s), which lies after the current time and not beyond the next multiple of the
+    /// step.
     ///
     /// # Errors
-    /// [`StepError::NotConverged`] or [`StepError::SolverGaveUp`] if the step has no solution that is found,
-    /// [`StepError::Diverged`] if it is out of all range, [`StepError::Singular`] if a matrix cannot be solved.
+    /// [`StepError::NotConverged`] or [`StepError::SolverGaveUp`] if the step has no solution that
+    /// is found, [`StepError::Diverged`] if it is out of all range, [`StepError::Singular`] if a
+    /// matrix cannot be solved.
     fn advance_to(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError>;
 
     /// Starts anew from the current state: to be called when a force or a velocity has jumped.
@@ -145,7 +150,8 @@ pub trait Integrator: Send {
         self.current_mut().accelerate(system)
     }
 
-    /// As [`Integrator::restart`], when masses, stiffness or damping have changed: matrices too are out of date.
+    /// As [`Integrator::restart`], when masses, stiffness or damping have changed: matrices too are
+    /// out of date.
     ///
     /// # Errors
     /// As [`Integrator::restart`].
@@ -159,7 +165,8 @@ pub trait Integrator: Send {
     /// Work so far.
     fn counts(&self) -> Counts;
 
-    /// Iterations of the last step and the relative correction with which it ended (0 where there are none).
+    /// Iterations of the last step and the relative correction with which it ended (0 where there
+    /// are none).
     fn last_iteration(&self) -> (usize, f64) {
         (0, 0.0)
     }
@@ -200,7 +207,8 @@ pub(crate) struct ReducedStepper<I> {
 }
 
 impl<I: Integrator> ReducedStepper<I> {
-    /// An arm at `t = 0` with elastic coordinates `e`, and the integrator that is made for it from positions and velocities.
+    /// An arm at `t = 0` with elastic coordinates `e`, and the integrator that is made for it from
+    /// positions and velocities.
     pub(crate) fn start(
         arm: impl Into<Arc<FlexibleArm>>,
         e: &DVector<f64>,
@@ -223,7 +231,8 @@ impl<I: Integrator> Stepper for ReducedStepper<I> {
         let Self { system, integrator } = self;
         let end = integrator.next_time();
         loop {
-            // To the next event, to the end of the step, or not so far where a prescribed velocity rises in between.
+            // To the next event, to the end of the step, or not so far where a prescribed velocity
+            // rises in between.
             let event = system.next_event(integrator.time(), end);
             let stop = event.filter(|t| *t < end).unwrap_or(end);
             let stop = system.resolved(integrator.time(), stop, I::MOTION_RULE);

@@ -1,10 +1,11 @@
-//! The matrix of Newton's method in an implicit step, `J = M + c_D D + c_K K`, in one of three ways: as its inverse, which is used
-//! dozens of times before it is renewed, and a product costs a third of two triangular solutions; or, where the coordinates
-//! sit on a tree and are many, eliminated along it ([`crate::tree_matrix`]); or, where many are modes, these first
+//! The matrix of Newton's method in an implicit step, `J = M + c_D D + c_K K`, in one of three
+//! ways: as its inverse, which is used dozens of times before it is renewed, and a product costs a
+//! third of two triangular solutions; or, where the coordinates sit on a tree and are many,
+//! eliminated along it ([`crate::tree_matrix`]); or, where many are modes, these first
 //! ([`crate::mode_matrix`]).
 //!
-//! Between [`IterationMatrix::read`] and [`IterationMatrix::invert`] a method may change a dense J ([`DenseInverse`]'s fields).
-//! Nothing here allocates after the first time.
+//! Between [`IterationMatrix::read`] and [`IterationMatrix::invert`] a method may change a dense J
+//! ([`DenseInverse`]'s fields). Nothing here allocates after the first time.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -33,7 +34,8 @@ pub(crate) enum Way {
     Modes(Box<ModeInverse>),
 }
 
-/// `(S + C)^-1 B`; as read, `S = M`, `C = c_D D + c_K K` and `B = 1`. All are n × n and symmetric but B.
+/// `(S + C)^-1 B`; as read, `S = M`, `C = c_D D + c_K K` and `B = 1`. All are n × n and symmetric
+/// but B.
 #[derive(Clone, Debug)]
 pub(crate) struct DenseInverse {
     /// M; after the inversion the factor.

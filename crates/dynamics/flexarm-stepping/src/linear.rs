@@ -1,13 +1,16 @@
-//! The arm as a linear structure about a static pose: what statics, modes and frequency response are made of.
+//! The arm as a linear structure about a static pose: what statics, modes and frequency response
+//! are made of.
 //!
 //! ```text
 //! M ẍ + D ẋ + K x = Jᵀ F - M_a q̈_a - D_a q̇_a - K_a q_a        V_T = J ẋ + J_a q̇_a
 //! ```
-//! for small motions x of the free coordinates and commands q_a of the joints about the equilibrium under weight and a
-//! constant wrench at a tool frame T. A prescribed joint is where its command is; one that is driven by torque is free, and
-//! its servo is a spring and a damper towards the command, with its feed-forward, without its sampling, its limit and its
-//! integral (which at rest holds the motor where it is commanded). Start at [`linearise`]. Everything that knows how the coordinates are laid out is
-//! in the few functions of this file. Not here: eigenvalues and frequency response (`flexarm-analysis`).
+//! for small motions x of the free coordinates and commands q_a of the joints about the equilibrium
+//! under weight and a constant wrench at a tool frame T. A prescribed joint is where its command
+//! is; one that is driven by torque is free, and its servo is a spring and a damper towards the
+//! command, with its feed-forward, without its sampling, its limit and its integral (which at rest
+//! holds the motor where it is commanded). Start at [`linearise`]. Everything that knows how the
+//! coordinates are laid out is in the few functions of this file. Not here: eigenvalues and
+//! frequency response (`flexarm-analysis`).
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -29,8 +32,8 @@ const TOLERANCE: f64 = 1e-13;
 /// Most Newton iterations.
 const MOST_ITERATIONS: usize = 30;
 
-/// Linear structure about a static pose; n free coordinates (joints driven by torque, then elastic ones), m joints.
-/// World axes, at the tool point, linear first.
+/// Linear structure about a static pose; n free coordinates (joints driven by torque, then elastic
+/// ones), m joints. World axes, at the tool point, linear first.
 #[derive(Clone, Debug)]
 pub struct Linear {
     /// Free coordinates at the equilibrium.
@@ -41,8 +44,8 @@ pub struct Linear {
     pub M: DMatrix<f64>,
     /// Damping matrix, n×n.
     pub D: DMatrix<f64>,
-    /// Tangent stiffness: springs, change of weight and of the wrench, n×n. Symmetric unless there is a constant moment,
-    /// which is not conservative.
+    /// Tangent stiffness: springs, change of weight and of the wrench, n×n. Symmetric unless there
+    /// is a constant moment, which is not conservative.
     pub K: DMatrix<f64>,
     /// How many of the free coordinates are joints driven by torque; they come first.
     pub driven: usize,
@@ -58,7 +61,8 @@ pub struct Linear {
     pub K_a: DMatrix<f64>,
     /// Twist of the tool per rate of the free coordinates, 6×n.
     pub J: Matrix6xX<f64>,
-    /// Twist of the tool per rate of the commands, the structure not yielding, 6×m; zero for joints driven by torque.
+    /// Twist of the tool per rate of the commands, the structure not yielding, 6×m; zero for joints
+    /// driven by torque.
     pub J_a: Matrix6xX<f64>,
     /// Tool in the world at the equilibrium.
     pub X_WT: Pose,
@@ -92,8 +96,8 @@ impl Linear {
 }
 
 impl Linear {
-    /// Twist of the tool at rest per change of the commands, `J_a - J K^-1 K_a`, 6×m: commands move the tool and what it gives way.
-    /// None where a motion has no stiffness.
+    /// Twist of the tool at rest per change of the commands, `J_a - J K^-1 K_a`, 6×m: commands move
+    /// the tool and what it gives way. None where a motion has no stiffness.
     pub fn command_slopes(&self) -> Option<Matrix6xX<f64>> {
         if self.K.is_empty() {
             return Some(self.J_a.clone());
@@ -101,7 +105,8 @@ impl Linear {
         Some(&self.J_a - &self.J * self.K.clone().lu().solve(&self.K_a)?)
     }
 
-    /// As [`Linear::compliance`], with motors under servos yielding like springs; none where one of them is held by nothing.
+    /// As [`Linear::compliance`], with motors under servos yielding like springs; none where one of
+    /// them is held by nothing.
     pub fn yielding_compliance(&self) -> Option<Matrix6<f64>> {
         let K = (&self.K + self.K.transpose()) * 0.5;
         let scale = K.diagonal().amax();
@@ -117,8 +122,9 @@ impl Linear {
 
 /// The arm about its equilibrium at time `t` of the motion, prescribed joints locked there.
 ///
-/// * `tool`: a frame of the arm's model; `F_T_W`: constant wrench on it, at its origin, in world axes, which stays the
-///   same and follows the point when the arm yields. The arm's own loads act as well.
+/// * `tool`: a frame of the arm's model; `F_T_W`: constant wrench on it, at its origin, in world
+///   axes, which stays the same and follows the point when the arm yields. The arm's own loads act
+///   as well.
 ///
 /// # Errors
 /// [`StepError::NoEquilibrium`], [`StepError::Singular`], [`StepError::OpenLoop`].
@@ -151,7 +157,8 @@ pub fn linearise(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, t: f64) -> Res
     let mut J = Matrix6xX::zeros(nv);
     frame_jacobian(model, &data, tool, &mut J);
 
-    // Commands move prescribed joints; those that are driven by torque hear of them by their servos alone.
+    // Commands move prescribed joints; those that are driven by torque hear of them by their servos
+    // alone.
     let (mut M_a, mut K_a) = (M.columns(0, m).select_rows(&free), slopes.columns(0, m).select_rows(&free));
     let mut J_a = J.columns(0, m).into_owned();
     for &k in &arm.torque_driven {
@@ -218,9 +225,11 @@ fn viscous(friction: &[Friction], coordinate: usize) -> f64 {
 }
 
 impl Servo {
-    /// Torques fed forward about rest at a pose, per command, its rate and its acceleration: a row per axis, a column per joint.
+    /// Torques fed forward about rest at a pose, per command, its rate and its acceleration: a row
+    /// per axis, a column per joint.
     ///
-    /// * `pose`: all actuated joints; `friction`: theirs, as in [`FlexibleArm::friction`], whose viscous part is fed forward as well.
+    /// * `pose`: all actuated joints; `friction`: theirs, as in [`FlexibleArm::friction`], whose
+    ///   viscous part is fed forward as well.
     pub fn fed_forward(&self, pose: &[f64], friction: &[Friction]) -> [DMatrix<f64>; 3] {
         let (model, m) = (&self.rigid, pose.len());
         let (mut data, pose) = (Data::new(model), DVector::from_column_slice(pose));
@@ -266,8 +275,8 @@ impl FlexibleArm {
     }
 }
 
-/// Mass, tangent stiffness and Jacobian of an arm at given coordinates, drives locked: what [`linearise`] finds at the
-/// equilibrium, anywhere.
+/// Mass, tangent stiffness and Jacobian of an arm at given coordinates, drives locked: what
+/// [`linearise`] finds at the equilibrium, anywhere.
 #[derive(Clone, Debug)]
 pub struct Tangents {
     /// Mass matrix of the elastic coordinates, n×n.
@@ -279,8 +288,8 @@ pub struct Tangents {
 }
 
 impl Tangents {
-    /// At all coordinates `q` (joints, then elastic ones), under weight, the loads of time 0 and a wrench at the tool's origin
-    /// (world axes).
+    /// At all coordinates `q` (joints, then elastic ones), under weight, the loads of time 0 and a
+    /// wrench at the tool's origin (world axes).
     pub fn at(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, q: &DVector<f64>) -> Self {
         let model = &arm.model;
         let (m, n) = (model.n_actuated(), arm.n_elastic_coordinates());
@@ -357,11 +366,13 @@ impl Statics<'_> {
             }
             let springs = with_curves(arm, &at_rest, q.as_slice(), &e);
             let tangent = &springs + self.slopes(data, &q).view((m, m), (ne, ne));
-            // Where the tangent is not positive definite its step leads uphill, to a saddle: the springs alone lead down.
+            // Where the tangent is not positive definite its step leads uphill, to a saddle: the
+            // springs alone lead down.
             let stable = ((&tangent + tangent.transpose()) * 0.5).cholesky().is_some();
             buckled |= !stable;
             let step = if stable { tangent } else { springs }.lu().solve(&r).ok_or_else(|| self.singular())?;
-            // Far from small deflections the full step may overshoot: no coordinate moves by more than 0.5.
+            // Far from small deflections the full step may overshoot: no coordinate moves by more
+            // than 0.5.
             let mut part = (0.5 / step.amax()).min(1.0);
             let mut closer = arm.hysteresis.is_empty();
             for _ in 0..MOST_HALVINGS {

@@ -1,4 +1,5 @@
-//! External loads on bodies as functions of time. Not here: files and expressions that describe them.
+//! External loads on bodies as functions of time. Not here: files and expressions that describe
+//! them.
 
 use std::fmt;
 use std::sync::Arc;
@@ -23,12 +24,14 @@ pub struct TimedWrench {
     pub axes: LoadAxes,
     /// Force (N) and moment (N m) at time t (s).
     pub value: Arc<dyn Fn(f64) -> Wrench + Send + Sync>,
-    /// Times at which it begins, ends, jumps or bends (s); the reference stepper steps over none of them.
+    /// Times at which it begins, ends, jumps or bends (s); the reference stepper steps over none of
+    /// them.
     pub jumps: Vec<f64>,
-    /// Times at which steps of given length end, beside those at which it jumps (s): what is shorter than a step would fall
-    /// between two of its ends.
+    /// Times at which steps of given length end, beside those at which it jumps (s): what is
+    /// shorter than a step would fall between two of its ends.
     pub stops: Vec<f64>,
-    /// Shortest period in it (s), infinite without one: the steps of the reference stepper stay well below.
+    /// Shortest period in it (s), infinite without one: the steps of the reference stepper stay
+    /// well below.
     pub period: f64,
 }
 

@@ -1,15 +1,17 @@
-//! Matrices of an arm with many modes that meet nobody but what carries them: eliminated one by one, so that a matrix of the
-//! few other coordinates is left.
+//! Matrices of an arm with many modes that meet nobody but what carries them: eliminated one by
+//! one, so that a matrix of the few other coordinates is left.
 //!
-//! Fixed-interface modes of a link do not move what hangs on it, are orthogonal to each other and to the link's interface motions
-//! in stiffness, and have a constant mass. With b the other coordinates and m such a mode, v its column of M,
+//! Fixed-interface modes of a link do not move what hangs on it, are orthogonal to each other and
+//! to the link's interface motions in stiffness, and have a constant mass. With b the other
+//! coordinates and m such a mode, v its column of M,
 //!
 //! ```text
 //! M = [ M_b  v ... ]     K = [ K_b     ]     C = [ C_b     ]
 //!     [ vᵀ   μ     ]         [      k  ]         [      c  ]                                   (1)
 //! ```
-//! For `J = M + C (1 + s M^-1 K)`, the matrix of generalised-alpha with its correction, `u = s M^-1 K x` stands beside x (as in
-//! [`crate::tree_matrix`], (8)), and each mode is two by two:
+//! For `J = M + C (1 + s M^-1 K)`, the matrix of generalised-alpha with its correction,
+//! `u = s M^-1 K x` stands beside x (as in [`crate::tree_matrix`], (8)), and each mode is two by
+//! two:
 //!
 //! ```text
 //! [ μ + c   c ] [ x_m ]   [ r_m - vᵀ x_b ]
@@ -18,8 +20,9 @@
 //! [ M_b + C_b - Σ a μ v vᵀ      C_b + Σ a c v vᵀ       ] [ x_b ]   [ r_b - Σ a μ v r_m  ]
 //! [ -s K_b - Σ a s k v vᵀ       M_b - Σ a (μ + c) v vᵀ ] [ u_b ] = [     - Σ a s k v r_m ]        (3)
 //! ```
-//! Without a correction s is zero, and so is u. A solution costs the number of modes times that of the others, and (3) as much for each
-//! of the others; a dense inverse would cost the square and the cube of all.
+//! Without a correction s is zero, and so is u. A solution costs the number of modes times that of
+//! the others, and (3) as much for each of the others; a dense inverse would cost the square and
+//! the cube of all.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -198,8 +201,8 @@ impl ModeInverse {
     }
 }
 
-/// Puts the inverse in the place of a matrix by Gauss and Jordan, two rows and columns at a time; false where the determinant
-/// of a pivot is not positive.
+/// Puts the inverse in the place of a matrix by Gauss and Jordan, two rows and columns at a time;
+/// false where the determinant of a pivot is not positive.
 fn invert_in_pairs(A: &mut DMatrix<f64>) -> bool {
     let n = A.nrows();
     for k in (0..n).step_by(2) {

@@ -27,7 +27,8 @@ impl Modes {
     }
 }
 
-/// Undamped modes at time `t` of the motion, about static equilibrium, with the stiffness of weight.
+/// Undamped modes at time `t` of the motion, about static equilibrium, with the stiffness of
+/// weight.
 ///
 /// # Errors
 /// [`StepError::NoEquilibrium`] or [`StepError::Singular`].
@@ -47,7 +48,8 @@ pub fn modes_at(arm: &FlexibleArm, t: f64) -> Result<Modes, StepError> {
     state.q.rows_mut(na, n).copy_from(&equilibrium);
     let M = mass_matrix(model, &mut data, &state.q).view((na, na), (n, n)).clone_owned();
 
-    // K φ = ω² M φ with K = L Lᵀ: eigenvalues 1/ω² of L^-1 M L^-T, the low modes largest and most accurate.
+    // K φ = ω² M φ with K = L Lᵀ: eigenvalues 1/ω² of L^-1 M L^-T, the low modes largest and most
+    // accurate.
     let factor = Cholesky::new(Kt.clone())
         .ok_or(StepError::Singular { matrix: "static stiffness (with the effect of weight)", t })?;
     let L = factor.l();

@@ -5,7 +5,8 @@ pub trait PrescribedMotion: Send + Sync {
     /// Writes the values at `t` (s), in coordinate order: rad or m, per s, per s².
     fn sample(&self, t: f64, q: &mut [f64], qdot: &mut [f64], qddot: &mut [f64]);
 
-    /// Times at which a velocity jumps (s): just before and after them the samples differ. One at 0 starts from rest.
+    /// Times at which a velocity jumps (s): just before and after them the samples differ. One at 0
+    /// starts from rest.
     fn velocity_jumps(&self) -> Vec<f64> {
         Vec::new()
     }

@@ -24,16 +24,18 @@ pub struct Observation {
     pub X_WB: Vec<Pose>,
     /// Forces that the drives must supply, per actuated coordinate.
     pub drive: DVector<f64>,
-    /// Generalised elastic load per element: what the spring and damper put on the distal part; of modal bodies the
-    /// forces of the first six coordinates, of single springs the first component.
+    /// Generalised elastic load per element: what the spring and damper put on the distal part; of
+    /// modal bodies the forces of the first six coordinates, of single springs the first component.
     pub load: Vec<Vector6<f64>>,
     /// Kinetic, gravitational and elastic energy (J).
     pub energy: [f64; 3],
     /// Power of the drives, of the external loads, and what dampers and friction take away (W).
     pub power: [f64; 3],
-    /// Work of the drives so far where velocities of the motion jumped (J); not in their power, which has no impulses.
+    /// Work of the drives so far where velocities of the motion jumped (J); not in their power,
+    /// which has no impulses.
     pub impulse_work: f64,
-    /// What the hysteresis of gears has taken so far (J); not in the power, for it does not depend on speed.
+    /// What the hysteresis of gears has taken so far (J); not in the power, for it does not depend
+    /// on speed.
     pub hysteresis_work: f64,
 }
 
@@ -106,8 +108,8 @@ pub(crate) fn observe_reduced(
     out.energy = [kinetic, potential, elastic];
 }
 
-/// Loads `-(K e + D ė)` of the elements, their first six components; the power that the dampers take, `ėᵀ D ė` (W), and the elastic
-/// energy (J).
+/// Loads `-(K e + D ė)` of the elements, their first six components; the power that the dampers
+/// take, `ėᵀ D ė` (W), and the elastic energy (J).
 ///
 /// * `rooms`: scratch, a number per elastic coordinate at least.
 fn element_loads(

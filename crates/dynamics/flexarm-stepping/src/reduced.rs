@@ -1,11 +1,12 @@
-//! The flexible arm in reduced coordinates: elastic ones and torque-driven joints free, the others truly prescribed.
+//! The flexible arm in reduced coordinates: elastic ones and torque-driven joints free, the others
+//! truly prescribed.
 //!
 //! ```text
 //! M_ff ẍ + h_f(q, q̇, [q̈_p, 0]) + K x + D ẋ + friction(ẋ) = τ
 //! ```
-//! The residual is one Newton-Euler pass, the acceleration one hybrid pass; mass matrix, damping and stiffness are dense in
-//! the free coordinates. Torques of a sampled controller stay constant between
-//! its samples. What happens at discrete times is in `events`. Not here: integration.
+//! The residual is one Newton-Euler pass, the acceleration one hybrid pass; mass matrix, damping
+//! and stiffness are dense in the free coordinates. Torques of a sampled controller stay constant
+//! between its samples. What happens at discrete times is in `events`. Not here: integration.
 
 use std::sync::Arc;
 
@@ -60,7 +61,8 @@ pub struct ReducedArm {
     tree: Option<ElasticTree>,
     /// The modes that are eliminated first, where they are enough.
     modes: Option<HeldModes>,
-    /// The equations of motion of the free coordinates alone, where they are enough and the tree is for it.
+    /// The equations of motion of the free coordinates alone, where they are enough and the tree is
+    /// for it.
     points: Option<Lent<FreeForces>>,
     poses: Poses,
     /// What a run is shown comes from it, if the tree is for it; made with the first observation.
@@ -88,8 +90,8 @@ pub(crate) struct HeldModes {
     K: DMatrix<f64>,
 }
 
-/// Fewest modes that are eliminated: with 16 a step takes as long either way, with 40 12 instead of 19 us, with 80 25 instead of 74
-/// (`examples/modal.rs`).
+/// Fewest modes that are eliminated: with 16 a step takes as long either way, with 40 12 instead of
+/// 19 us, with 80 25 instead of 74 (`examples/modal.rs`).
 const FEWEST_MODES: usize = 16;
 
 impl HeldModes {
@@ -166,8 +168,8 @@ impl ReducedArm {
         &self.arm
     }
 
-    /// Free coordinates and rates at `t = 0`: joints on their reference, springs at `e`, at the reference's speed. A motion
-    /// whose velocities jump at 0 starts from rest.
+    /// Free coordinates and rates at `t = 0`: joints on their reference, springs at `e`, at the
+    /// reference's speed. A motion whose velocities jump at 0 starts from rest.
     pub(crate) fn start(&mut self, e: &DVector<f64>) -> Result<(DVector<f64>, DVector<f64>), StepError> {
         let (n, driven) = (self.arm.n_free(), self.arm.torque_driven.len());
         let (mut x, mut v) = (DVector::zeros(n), DVector::zeros(n));
@@ -312,7 +314,8 @@ impl ReducedArm {
         }
     }
 
-    /// What ripple and friction add to the forces of the actuated joints in `data.tau`, in the state that was set.
+    /// What ripple and friction add to the forces of the actuated joints in `data.tau`, in the
+    /// state that was set.
     #[cold]
     fn add_gear_torques(&mut self, x: &DVector<f64>, v: &DVector<f64>) {
         let Self { arm, gears: Some(gears), state, data, qddot, .. } = self else { return };
@@ -337,8 +340,8 @@ impl ReducedArm {
         add_geometric_forces(&self.arm, &self.data, &x.as_slice()[driven..], &mut f.as_mut_slice()[driven..]);
     }
 
-    /// Full motion at `t`: poses, twists and all generalised forces; those of the actuated joints are the
-    /// torques that the drives must supply, friction included.
+    /// Full motion at `t`: poses, twists and all generalised forces; those of the actuated joints
+    /// are the torques that the drives must supply, friction included.
     pub(crate) fn evaluate(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>, a: &DVector<f64>) {
         self.set(t, x, v);
         self.set_accelerations(a);
@@ -348,7 +351,8 @@ impl ReducedArm {
         world_poses(&self.arm.model, &mut self.data);
     }
 
-    /// As [`ReducedArm::evaluate`], with the poses into `X_WB` and no twists; kinetic energy and potential energy of gravity (J).
+    /// As [`ReducedArm::evaluate`], with the poses into `X_WB` and no twists; kinetic energy and
+    /// potential energy of gravity (J).
     pub(crate) fn observe(
         &mut self,
         t: f64,
@@ -376,7 +380,8 @@ impl ReducedArm {
         energies
     }
 
-    /// What friction and gears add to the forces of the actuated joints in `data.tau`, in the state that was set.
+    /// What friction and gears add to the forces of the actuated joints in `data.tau`, in the state
+    /// that was set.
     fn add_joint_torques(&mut self, x: &DVector<f64>, v: &DVector<f64>) {
         if self.gears.is_some() {
             return self.add_gear_torques(x, v);
@@ -386,7 +391,8 @@ impl ReducedArm {
         }
     }
 
-    /// Torques that the controller holds now, in the order of [`FlexibleArm::torque_driven`]; empty without one.
+    /// Torques that the controller holds now, in the order of [`FlexibleArm::torque_driven`]; empty
+    /// without one.
     pub(crate) fn held_torques(&self) -> &[f64] {
         self.servo.as_ref().map_or(&[], |s| &s.torque)
     }
@@ -419,8 +425,8 @@ impl GeometricStiffness {
     }
 }
 
-/// Adds what the loads of the last Newton-Euler pass in `data` do to the stiffness of modal bodies; `e` and `f` are over
-/// the elastic coordinates.
+/// Adds what the loads of the last Newton-Euler pass in `data` do to the stiffness of modal bodies;
+/// `e` and `f` are over the elastic coordinates.
 pub(crate) fn add_geometric_forces(arm: &FlexibleArm, data: &Data, e: &[f64], f: &mut [f64]) {
     for element in &arm.elements {
         let Some(geometric) = &element.geometric else { continue };
@@ -462,7 +468,8 @@ fn geometric_loads<'a>(
         w.y * w.z,
     ];
     let wrenches = (0..geometric.interface.len()).flat_map(move |number| {
-        // What hangs on the interface pulls with the opposite of what it needs, in the axes of the link.
+        // What hangs on the interface pulls with the opposite of what it needs, in the axes of the
+        // link.
         let carried = arm.model.bodies().iter().enumerate().find(|(_, b)| {
             b.parent == body && matches!(b.motion, JointMotion::Interface { interface, .. } if interface == number)
         });

@@ -1,5 +1,5 @@
-//! The sampled controller of the joints that are driven by torque: what it remembers between samples. Not here: when it
-//! takes them (`events`).
+//! The sampled controller of the joints that are driven by torque: what it remembers between
+//! samples. Not here: when it takes them (`events`).
 
 use std::sync::Arc;
 
@@ -87,7 +87,8 @@ impl ServoState {
         if self.servo.axes[axis].feed_forward { self.data.tau[k] + friction } else { 0.0 }
     }
 
-    /// Fills the integrators so that the first sample gives the torques `needed`, if it finds the joints on their reference.
+    /// Fills the integrators so that the first sample gives the torques `needed`, if it finds the
+    /// joints on their reference.
     pub(crate) fn hold(&mut self, needed: &DVector<f64>) {
         for (torque, axis) in self.torque.iter_mut().zip(&self.servo.axes) {
             *torque = needed[axis.coordinate];

@@ -1,4 +1,5 @@
-//! Static equilibria along a motion: each is sought from the one before, with the stiffness that was inverted there.
+//! Static equilibria along a motion: each is sought from the one before, with the stiffness that
+//! was inverted there.
 
 use std::sync::Arc;
 
@@ -16,7 +17,8 @@ use crate::reduced::add_geometric_forces;
 use crate::statics::{add_spring_forces, static_equilibrium, tangent_stiffness, with_curves};
 use crate::workspaces::Lent;
 
-/// A correction below this part of the deflection ends the search: the next one would be ten times smaller at least.
+/// A correction below this part of the deflection ends the search: the next one would be ten times
+/// smaller at least.
 const SMALL: f64 = 1e-7;
 /// Deflections below this are none (m, rad).
 const NOTHING: f64 = 1e-15;
@@ -28,10 +30,12 @@ pub(crate) fn before(t: f64) -> f64 {
     t - 1e-12 * t.max(1.0)
 }
 
-/// The elastic coordinates of an arm that stands still wherever its motion is, for times in ascending order.
+/// The elastic coordinates of an arm that stands still wherever its motion is, for times in
+/// ascending order.
 ///
-/// The same equilibria as [`static_equilibrium`], at the price of a few evaluations of weight each: the tangent stiffness
-/// changes little along a motion, so that its inverse at one place serves many instants.
+/// The same equilibria as [`static_equilibrium`], at the price of a few evaluations of weight each:
+/// the tangent stiffness changes little along a motion, so that its inverse at one place serves
+/// many instants.
 pub struct StaticPath {
     arm: Arc<FlexibleArm>,
     events: EventQueue,
@@ -73,8 +77,9 @@ impl StaticPath {
         }
     }
 
-    /// All coordinates at time `t` (s), not before the last one asked for: drives where the motion is, springs in balance
-    /// with weight and loads. What the arm carries is what it carries from `t` on.
+    /// All coordinates at time `t` (s), not before the last one asked for: drives where the motion
+    /// is, springs in balance with weight and loads. What the arm carries is what it carries from
+    /// `t` on.
     ///
     /// # Errors
     /// As [`static_equilibrium`].
@@ -108,8 +113,8 @@ impl StaticPath {
         Ok(&self.state.q)
     }
 
-    /// How far a frame is from where it would be with all springs undeformed (m, world axes), at the coordinates of the last
-    /// time asked for.
+    /// How far a frame is from where it would be with all springs undeformed (m, world axes), at
+    /// the coordinates of the last time asked for.
     pub fn displacement(&mut self, frame: &Frame) -> Vector3<f64> {
         forward_kinematics(&self.arm.model, &mut self.data, &self.state.q);
         let yielding = self.data.X_WF(frame).translation.vector;

@@ -15,7 +15,8 @@ use crate::motion::Held;
 const TOLERANCE: f64 = 1e-12;
 /// Most Newton iterations.
 const MOST_ITERATIONS: usize = 30;
-/// Singular values below this part of the largest are directions in which the joints cannot move the tool.
+/// Singular values below this part of the largest are directions in which the joints cannot move
+/// the tool.
 const RANK: f64 = 1e-6;
 
 /// Targets at a pose.
@@ -23,7 +24,8 @@ const RANK: f64 = 1e-6;
 pub struct StaticTargets {
     /// Joint targets (rad or m).
     pub q: Vec<f64>,
-    /// Displacement of the tool from where it should be with the targets as they were: position, then rotation vector, world axes.
+    /// Displacement of the tool from where it should be with the targets as they were: position,
+    /// then rotation vector, world axes.
     pub before: Vector6<f64>,
     /// The same with the new ones, in the components asked for.
     pub after: Vector6<f64>,
@@ -65,8 +67,9 @@ pub enum TargetError {
 /// * `t`: time (s) whose loads of the arm act.
 /// * `components`: which of position and rotation (world axes) count.
 ///
-/// With fewer components than joints the joints move as little as possible. Motors under servos with an integral are where they are
-/// commanded at rest; those without sag into their gains, and are told so much more.
+/// With fewer components than joints the joints move as little as possible. Motors under servos
+/// with an integral are where they are commanded at rest; those without sag into their gains, and
+/// are told so much more.
 ///
 /// # Errors
 /// [`TargetError`].
@@ -112,7 +115,8 @@ pub fn static_targets(
     unreachable!("the loop returns at its last iteration")
 }
 
-/// Moves the targets of servos without an integral on, so that their motors hold the torques `holding` where they are.
+/// Moves the targets of servos without an integral on, so that their motors hold the torques
+/// `holding` where they are.
 fn lead(servo: &Servo, q: &mut [f64], holding: &DVector<f64>) -> Result<(), TargetError> {
     let (motors, n) = (q.to_vec(), servo.rigid.nv());
     let sagging = |axis: &&ServoAxis| axis.integral_gain * axis.position_gain == 0.0;

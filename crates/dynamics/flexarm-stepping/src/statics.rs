@@ -25,7 +25,8 @@ pub(crate) const MOST_HALVINGS: usize = 12;
 /// [`StepError::NoEquilibrium`], [`StepError::Singular`] or [`StepError::OpenLoop`].
 pub fn static_equilibrium(arm: &FlexibleArm, t: f64) -> Result<DVector<f64>, StepError> {
     let n = arm.n_elastic_coordinates();
-    // What was found with the modes is found again at once if nothing has changed since; a play is left from its middle.
+    // What was found with the modes is found again at once if nothing has changed since; a play is
+    // left from its middle.
     let straight = arm.elements.iter().all(|element| element.curve.is_none());
     let known = t == 0.0 && straight && arm.modes.equilibrium.len() == n;
     let mut e = if known { arm.modes.equilibrium.clone() } else { DVector::zeros(n) };
@@ -35,7 +36,8 @@ pub fn static_equilibrium(arm: &FlexibleArm, t: f64) -> Result<DVector<f64>, Ste
     let mut data = arm.lend_data();
     let K = arm.stiffness();
     let mut residual = f64::INFINITY;
-    // A loop's first loading may be soft, then stiff: full steps may go to and fro between its pieces.
+    // A loop's first loading may be soft, then stiff: full steps may go to and fro between its
+    // pieces.
     let most = if arm.hysteresis.is_empty() { 30 } else { 200 };
     for iteration in 0..most {
         let (g, scale) = unbalanced(arm, &mut data, t, &e);
@@ -62,7 +64,8 @@ pub fn static_equilibrium(arm: &FlexibleArm, t: f64) -> Result<DVector<f64>, Ste
         if step.amax() <= 2.0 * f64::EPSILON * e.amax() {
             return Ok(e);
         }
-        // Far from small deflections the full step may overshoot: no coordinate moves by more than 0.5.
+        // Far from small deflections the full step may overshoot: no coordinate moves by more than
+        // 0.5.
         let mut shorten = (0.5 / step.amax()).min(1.0);
         let mut closer = arm.hysteresis.is_empty();
         for _ in 0..MOST_HALVINGS {
@@ -113,8 +116,8 @@ pub(crate) fn add_spring_forces(arm: &FlexibleArm, q: &[f64], e: &[f64], f: &mut
     arm.add_cross_forces(e, f);
 }
 
-/// What holds the arm still at `q` without its springs: weight, the loads of time t, a wrench at the tool's origin (world axes),
-/// stiffness by load; all coordinates, into `p`. No allocation.
+/// What holds the arm still at `q` without its springs: weight, the loads of time t, a wrench at
+/// the tool's origin (world axes), stiffness by load; all coordinates, into `p`. No allocation.
 pub(crate) fn static_forces(
     arm: &FlexibleArm,
     tool: Option<(&Frame, &Wrench)>,
@@ -134,7 +137,8 @@ pub(crate) fn static_forces(
     add_geometric_forces(arm, data, &q.as_slice()[m..], &mut p.as_mut_slice()[m..]);
 }
 
-/// Adds a wrench at a frame's origin (world axes) to those on its body, for the poses in `data.X_WB`.
+/// Adds a wrench at a frame's origin (world axes) to those on its body, for the poses in
+/// `data.X_WB`.
 #[inline(always)]
 pub(crate) fn add_wrench<T: Real>(data: &mut Data<T>, at: &Frame, F_W: &Wrench) {
     let R_WB = data.X_WB[at.body].rotation.matrix();
@@ -157,7 +161,8 @@ fn gravity_part(arm: &FlexibleArm, data: &mut Data, t: f64, e: &DVector<f64>) ->
     g
 }
 
-/// The stiffness with curved springs at their slope; where play leaves none, the steepest slope finds the way out.
+/// The stiffness with curved springs at their slope; where play leaves none, the steepest slope
+/// finds the way out.
 pub(crate) fn with_curves(arm: &FlexibleArm, K: &DMatrix<f64>, q: &[f64], e: &DVector<f64>) -> DMatrix<f64> {
     let mut tangent = K.clone();
     for (number, element) in arm.elements.iter().enumerate() {
@@ -170,7 +175,8 @@ pub(crate) fn with_curves(arm: &FlexibleArm, K: &DMatrix<f64>, q: &[f64], e: &DV
     tangent
 }
 
-/// As [`with_curves`], for small motions about a place: there no friction slips, and sliders are springs.
+/// As [`with_curves`], for small motions about a place: there no friction slips, and sliders are
+/// springs.
 pub(crate) fn for_vibration(arm: &FlexibleArm, K: &DMatrix<f64>, q: &[f64], e: &DVector<f64>) -> DMatrix<f64> {
     let mut tangent = with_curves(arm, K, q, e);
     for law in &arm.hysteresis {
@@ -180,7 +186,8 @@ pub(crate) fn for_vibration(arm: &FlexibleArm, K: &DMatrix<f64>, q: &[f64], e: &
     tangent
 }
 
-/// Stiffness with which Newton's step out of a play ends just beyond its edge, however small the force.
+/// Stiffness with which Newton's step out of a play ends just beyond its edge, however small the
+/// force.
 fn leave_play(arm: &FlexibleArm, q: &[f64], e: &DVector<f64>, g: &DVector<f64>, K: &DMatrix<f64>) -> DMatrix<f64> {
     let mut K = K.clone();
     for (number, element) in arm.elements.iter().enumerate() {
@@ -215,8 +222,8 @@ pub(crate) fn tangent_stiffness(
 /// Step of the central differences (m, rad).
 const DIFFERENCE: f64 = 1e-6;
 
-/// Derivatives of [`static_forces`] by the coordinates, with their workspace: in closed form; by central differences where
-/// loads change the stiffness of modal bodies.
+/// Derivatives of [`static_forces`] by the coordinates, with their workspace: in closed form; by
+/// central differences where loads change the stiffness of modal bodies.
 #[derive(Clone, Debug)]
 pub(crate) struct StaticSlopes {
     /// First coordinate, 0 or that of the first spring.
@@ -246,7 +253,8 @@ impl StaticSlopes {
         }
     }
 
-    /// Into `G`, a row and a column per coordinate from the first one on; leaves `data` with the poses at `q`.
+    /// Into `G`, a row and a column per coordinate from the first one on; leaves `data` with the
+    /// poses at `q`.
     pub(crate) fn compute(
         &mut self,
         arm: &FlexibleArm,

@@ -29,8 +29,8 @@ pub trait Stepper: Send {
     /// Current time (s).
     fn time(&self) -> f64;
 
-    /// Advances by one step; on error the state stays at the last good time. No stepper allocates here but
-    /// those that say so ([`crate::StepperEntry::allocates`]).
+    /// Advances by one step; on error the state stays at the last good time. No stepper allocates
+    /// here but those that say so ([`crate::StepperEntry::allocates`]).
     ///
     /// # Errors
     /// [`StepError`] with time, step and cause.
@@ -42,7 +42,8 @@ pub trait Stepper: Send {
     /// Work so far.
     fn counts(&self) -> Counts;
 
-    /// Iterations of the last step and the relative correction it ended with (0 where there are none).
+    /// Iterations of the last step and the relative correction it ended with (0 where there are
+    /// none).
     fn last_iteration(&self) -> (usize, f64) {
         (0, 0.0)
     }

@@ -1,7 +1,8 @@
-//! Matrices that sit on a tree, and their solutions by elimination along it: O(n), instead of O(n²) with a dense inverse and
-//! O(n³) to make that.
+//! Matrices that sit on a tree, and their solutions by elimination along it: O(n), instead of O(n²)
+//! with a dense inverse and O(n³) to make that.
 //!
-//! A node has six coordinates `x_j` and moves with its parent p; damping and stiffness have a block per node:
+//! A node has six coordinates `x_j` and moves with its parent p; damping and stiffness have a block
+//! per node:
 //!
 //! ```text
 //! α_j = X_j α_p + x_j,   X_j = [A B; 0 C]                                                     (1)
@@ -21,15 +22,17 @@
 //! ```text
 //! J = M + C (1 + s M^-1 K)                                                                  (7)
 //! ```
-//! is no such matrix. But with `u = s M^-1 K x` beside x it is one of two vectors per node, to which (4) to (6) apply as they are:
+//! is no such matrix. But with `u = s M^-1 K x` beside x it is one of two vectors per node, to
+//! which (4) to (6) apply as they are:
 //!
 //! ```text
 //! [ M + C    C ] [ x ]   [ r ]
 //! [ -s K     M ] [ u ] = [ 0 ]        S_j = [ C_j C_j; -s K_j 0 ],   I and X in both rows        (8)
 //! ```
-//! and u is what a step needs besides. Coordinates that are held leave a matrix of the same kind, of determinant `det M det J > 0`,
-//! for `(1 + s K M^-1) J = M + s K + (1 + s K M^-1) C (1 + s M^-1 K)` is positive definite: no pivot of two by two vanishes, whatever
-//! the damping.
+//! and u is what a step needs besides. Coordinates that are held leave a matrix of the same kind,
+//! of determinant `det M det J > 0`, for
+//! `(1 + s K M^-1) J = M + s K + (1 + s K M^-1) C (1 + s M^-1 K)` is positive definite: no pivot of
+//! two by two vanishes, whatever the damping.
 //!
 //! Source of (4) to (6): [Featherstone 2008], Table 7.1. Not here: bodies and joints.
 
@@ -42,7 +45,8 @@ use crate::error::StepError;
 /// A node of a [`TreeMatrices`]: six coordinates.
 #[derive(Clone, Debug)]
 pub struct TreeNode {
-    /// Number of the node that it moves with, which comes before it; none if it stands on fixed ground.
+    /// Number of the node that it moves with, which comes before it; none if it stands on fixed
+    /// ground.
     pub parent: Option<usize>,
     /// `I`, symmetric, in (2) of the module page.
     pub inertia: Matrix6<f64>,
@@ -68,7 +72,8 @@ impl TreeNode {
     }
 }
 
-/// The matrices of a [`crate::SecondOrderSystem`] whose coordinates sit on a tree, six and six in the order of its nodes.
+/// The matrices of a [`crate::SecondOrderSystem`] whose coordinates sit on a tree, six and six in
+/// the order of its nodes.
 #[derive(Clone, Debug, Default)]
 pub struct TreeMatrices {
     /// Parents before children.
@@ -150,7 +155,8 @@ fn scaled<const F: usize>(x: &[Vectors<F>; F], a: &Scalars<F>) -> [Vectors<F>; F
     from_fn(|i| from_fn(|j| (0..F).fold(Vector6::zeros(), |sum, k| sum + x[i][k] * a[k][j])))
 }
 
-/// Puts the inverse in the place of a matrix, by Gauss and Jordan; false where a pivot is not positive.
+/// Puts the inverse in the place of a matrix, by Gauss and Jordan; false where a pivot is not
+/// positive.
 fn invert<const F: usize>(A: &mut Matrices<F>) -> bool {
     for k in 0..6 {
         let Some(pivot) = inverse(&entry(A, k, k)) else { return false };
@@ -430,7 +436,8 @@ mod tests {
     use proptest::prelude::*;
     use proptest::test_runner::TestRunner;
 
-    /// A random tree with branches and several roots; stiffness of very different size from node to node.
+    /// A random tree with branches and several roots; stiffness of very different size from node to
+    /// node.
     fn tree(seed: u64, count: usize) -> TreeMatrices {
         let mut draw = Draw(seed);
         let nodes = (0..count).map(|j| {
@@ -499,9 +506,10 @@ mod tests {
         result.unwrap();
     }
 
-    /// Truth: `J = M + C (1 + s M^-1 K)` dense, by LU; solution, shift, and `x + s M^-1 K x`. Damping that has nothing to do with the
-    /// stiffness, and `C = κ K` where the roots a and b are complex, equal, real, and very different (`τ = (κ/s)^1/2` of 0.02, 1, 2,
-    /// 2.1 and 50). Measured: 2e-12, 2e-12, 1e-12.
+    /// Truth: `J = M + C (1 + s M^-1 K)` dense, by LU; solution, shift, and `x + s M^-1 K x`.
+    /// Damping that has nothing to do with the stiffness, and `C = κ K` where the roots a and b are
+    /// complex, equal, real, and very different (`τ = (κ/s)^1/2` of 0.02, 1, 2, 2.1 and 50).
+    /// Measured: 2e-12, 2e-12, 1e-12.
     #[test]
     fn the_corrected_matrix_is_solved_with_one_elimination_whatever_the_damping() {
         let mut runner = TestRunner::new(ProptestConfig::with_cases(100));

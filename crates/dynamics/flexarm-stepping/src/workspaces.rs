@@ -1,8 +1,10 @@
 //! Workspaces of the recursions over one tree, handed from run to run.
 //!
-//! An arm shares them with all its copies: what a run gives back, the next one takes. New or used, the bits are the same, for a recursion
-//! writes everything that it reads. Trees whose workspaces begin where they were last (closed loops), or that are rarely run often (modal
-//! bodies, balancers), get new ones each time, and so does an arm whose masses have changed since it was made.
+//! An arm shares them with all its copies: what a run gives back, the next one takes. New or used,
+//! the bits are the same, for a recursion writes everything that it reads. Trees whose workspaces
+//! begin where they were last (closed loops), or that are rarely run often (modal bodies,
+//! balancers), get new ones each time, and so does an arm whose masses have changed since it was
+//! made.
 
 use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -40,7 +42,8 @@ impl Workspaces {
 }
 
 impl FlexibleArm {
-    /// A workspace for recursions over the tree, without external wrenches: one that a run before gave back, or a new one.
+    /// A workspace for recursions over the tree, without external wrenches: one that a run before
+    /// gave back, or a new one.
     pub fn lend_data(&self) -> Lent<Data> {
         let shelf = self.workspaces.are_for(&self.model).then_some(&self.workspaces.data);
         let mut lent = Lent::from(shelf, || Some(Data::new(&self.model))).expect("there are always new ones");

@@ -1,4 +1,5 @@
-//! Balancers in motion: every stepper against the others, statics, modes and lanes, the energy that they store.
+//! Balancers in motion: every stepper against the others, statics, modes and lanes, the energy that
+//! they store.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
@@ -14,7 +15,8 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 const POSE: [f64; 6] = [0.4, 0.5, -0.3, 0.7, 0.6, -1.2];
 
-/// The reference arm with a gas cylinder from the column to the far part of its lower arm, and torques over two joints.
+/// The reference arm with a gas cylinder from the column to the far part of its lower arm, and
+/// torques over two joints.
 fn balanced() -> Mechanism {
     let mut tree = reference_arm(true).mechanism;
     for (link, frame, place) in
@@ -73,8 +75,9 @@ fn of(word: &str) -> StepperKind {
     (entry.with)(&StepperOptions::default())
 }
 
-/// Truth: Newton's statics with the balancers in forces and tangent. Maximal coordinates know bodies and wrenches only, so SPOOK finds the same
-/// rest by another way; drift measured 9e-11 of what the balancers do to the sag.
+/// Truth: Newton's statics with the balancers in forces and tangent. Maximal coordinates know
+/// bodies and wrenches only, so SPOOK finds the same rest by another way; drift measured 9e-11 of
+/// what the balancers do to the sag.
 #[test]
 fn an_arm_with_balancers_rests_where_statics_say_in_every_stepper() {
     let held: Arc<dyn PrescribedMotion> = Arc::new(Held(POSE.to_vec()));
@@ -97,8 +100,9 @@ fn an_arm_with_balancers_rests_where_statics_say_in_every_stepper() {
     }
 }
 
-/// Truth: the reference stepper on the same equations, and for SPOOK its first order. Differences over what the balancers change (2.8 mm):
-/// measured generalised-alpha and SDIRK3 below 1e-6, RK4 1.0e-7, SPOOK 2.9e-4 at 0.2 ms and 1.1e-4 at 0.1 ms.
+/// Truth: the reference stepper on the same equations, and for SPOOK its first order. Differences
+/// over what the balancers change (2.8 mm): measured generalised-alpha and SDIRK3 below 1e-6, RK4
+/// 1.0e-7, SPOOK 2.9e-4 at 0.2 ms and 1.1e-4 at 0.1 ms.
 #[test]
 fn steppers_agree_on_an_arm_that_moves_with_balancers() {
     let arm = arm_of(&balanced(), moving(), 1e-3);
@@ -119,8 +123,8 @@ fn steppers_agree_on_an_arm_that_moves_with_balancers() {
     assert!(spook[0] < 5e-3 && spook[1] < 0.6 * spook[0], "{spook:?}");
 }
 
-/// Truth: without damping and with drives that stand still the energy of springs, weight and balancers stays; RK4 at 25 us, measured 8e-7 of
-/// what swings between them.
+/// Truth: without damping and with drives that stand still the energy of springs, weight and
+/// balancers stays; RK4 at 25 us, measured 8e-7 of what swings between them.
 #[test]
 fn a_ringing_arm_keeps_its_energy_with_balancers_in_it() {
     let arm = arm_of(&balanced(), Arc::new(Held(POSE.to_vec())), 1e-12);
@@ -138,7 +142,8 @@ fn a_ringing_arm_keeps_its_energy_with_balancers_in_it() {
     assert!(gap < 1e-5 * kinetic, "{gap} {kinetic}");
 }
 
-/// Truth: omega² = (k_s + c D k - m g l)/(m l²) of a rod that stands on a soft spring, held by a spring without free length above it.
+/// Truth: omega² = (k_s + c D k - m g l)/(m l²) of a rod that stands on a soft spring, held by a
+/// spring without free length above it.
 #[test]
 fn a_balancer_raises_the_frequency_as_the_closed_form_says() {
     let (m, l, soft, D, k, rate) = (5.0, 0.6, 40.0, 0.9, 0.4, 300.0);

@@ -85,8 +85,8 @@ fn varied() -> Vec<BatchRun> {
     variations.map(run).to_vec()
 }
 
-/// Truth: the run alone. Payload, speed, stiffness, damping and duration differ, and the last group is not full; at 20 ms all
-/// iterate to the end, at 2 ms most steps take one evaluation.
+/// Truth: the run alone. Payload, speed, stiffness, damping and duration differ, and the last group
+/// is not full; at 20 ms all iterate to the end, at 2 ms most steps take one evaluation.
 #[test]
 fn a_run_side_by_side_with_others_has_the_bits_of_the_run_alone() {
     let runs = varied();

@@ -1,4 +1,5 @@
-//! Chains of rigid parts with springs between them: how fast their deflection converges with the number of parts.
+//! Chains of rigid parts with springs between them: how fast their deflection converges with the
+//! number of parts.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 #![allow(non_snake_case, reason = "monogram notation")]
@@ -9,12 +10,14 @@ use flexarm_kinematics::*;
 use flexarm_stepping::*;
 use nalgebra::{Matrix3, Matrix6, Translation3, Vector3, Vector6};
 
-/// Length (m), mass (kg), stiffness EA, GA (N), GJ, EI about y and z (N m²) of a cantilever along x.
+/// Length (m), mass (kg), stiffness EA, GA (N), GJ, EI about y and z (N m²) of a cantilever along
+/// x.
 const LENGTH: f64 = 1.0;
 const MASS: f64 = 3.0;
 const STIFFNESS: [f64; 6] = [1e7, 1e6, 1e6, 300.0, 250.0, 500.0];
 
-/// The cantilever as n equal parts, a spring in the middle of each; a heavy ball sits beside its tip and twists it.
+/// The cantilever as n equal parts, a spring in the middle of each; a heavy ball sits beside its
+/// tip and twists it.
 fn cantilever(n: usize, angles: ElasticAngles, gravity: Vector3<f64>, aside: f64) -> FlexibleArm {
     let mut chain = Mechanism::new("cantilever");
     chain.gravity = gravity;
@@ -58,11 +61,12 @@ fn tip(n: usize, angles: ElasticAngles, gravity: Vector3<f64>, aside: f64) -> Ve
     end * nalgebra::Point3::new(0.5 * LENGTH / n as f64, 0.0, 0.0) - nalgebra::Point3::origin()
 }
 
-/// Truth: both kinds of angles have one limit, that of the rotation vectors by Richardson's extrapolation. Bent about both
-/// axes and twisted, by 37 mm, a chain with rotation vectors converges with the square of the number of parts; what Euler
-/// angles add falls with the number alone: `½ φᵀKφ` in angles about axes that turn one after the other changes in third order when the
-/// ends of the spring are exchanged, so that n springs bent by 1/n keep an error of `n · n · 1/n³`. In a plane the two are the
-/// same.
+/// Truth: both kinds of angles have one limit, that of the rotation vectors by Richardson's
+/// extrapolation. Bent about both axes and twisted, by 37 mm, a chain with rotation vectors
+/// converges with the square of the number of parts; what Euler angles add falls with the number
+/// alone: `½ φᵀKφ` in angles about axes that turn one after the other changes in third order when
+/// the ends of the spring are exchanged, so that n springs bent by 1/n keep an error of
+/// `n · n · 1/n³`. In a plane the two are the same.
 #[test]
 fn chains_converge_with_the_square_of_their_parts_unless_with_euler_angles() {
     use ElasticAngles::{EulerZyx, RotationVector};

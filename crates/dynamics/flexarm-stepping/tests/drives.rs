@@ -93,9 +93,11 @@ fn run(arm: &FlexibleArm, kind: StepperKind, h: f64, duration: f64) -> Vec<Obser
     all
 }
 
-// --- Servo -------------------------------------------------------------------------------------------------------------
+// --- Servo
+// -------------------------------------------------------------------------------------------------------------
 
-/// A pendulum driven by torque follows its reference; with the rigid robot's torque fed forward it does so far better.
+/// A pendulum driven by torque follows its reference; with the rigid robot's torque fed forward it
+/// does so far better.
 ///
 /// Measured: 6.5e-3 rad of 1.2, with feed-forward 1.6e-5, in all steppers.
 #[test]
@@ -204,10 +206,11 @@ fn sampled_controller_equals_its_discrete_loop() {
     }
 }
 
-/// A step of the reference that the torque limit cannot follow: the torque stays within, and the integral does not wind up.
+/// A step of the reference that the torque limit cannot follow: the torque stays within, and the
+/// integral does not wind up.
 ///
-/// Truth: the loop by itself, which RK4 equals to 1.4e-11. It does not overshoot, as without an integral; with one that runs
-/// on at the limit it overshoots by 1.85 rad.
+/// Truth: the loop by itself, which RK4 equals to 1.4e-11. It does not overshoot, as without an
+/// integral; with one that runs on at the limit it overshoots by 1.85 rad.
 #[test]
 fn torque_limit_saturates_without_winding_up() {
     let target = |t: f64| [if t < 0.1 - 1e-9 { 0.0 } else { 2.0 }, 0.0, 0.0];
@@ -233,11 +236,13 @@ fn torque_limit_saturates_without_winding_up() {
     assert!((rows[5000][0] - 2.0).abs() < 5e-3, "{:?}", rows[5000]);
 }
 
-// --- Friction ----------------------------------------------------------------------------------------------------------
+// --- Friction
+// ----------------------------------------------------------------------------------------------------------
 
 /// Truth: `J ω̇ = -b ω - c`: ω(t) and rest at `t = J/b ln(1 + b ω_0/c)`.
 ///
-/// Measured: speeds within 0.48 v_0 of the sharp law for `v_0` of 0.1, 0.02, 0.004 rad/s; below v_0 136, 27, 5 ms before the rest.
+/// Measured: speeds within 0.48 v_0 of the sharp law for `v_0` of 0.1, 0.02, 0.004 rad/s; below v_0
+/// 136, 27, 5 ms before the rest.
 #[test]
 fn coasting_rotor_stops_when_its_friction_says() {
     let (b, c, w0) = (0.2, 0.5, 6.0);
@@ -263,7 +268,8 @@ fn coasting_rotor_stops_when_its_friction_says() {
     }
 }
 
-// --- Gearboxes ---------------------------------------------------------------------------------------------------------
+// --- Gearboxes
+// ---------------------------------------------------------------------------------------------------------
 
 const GEAR: f64 = 900.0;
 
@@ -277,7 +283,8 @@ fn loaded(curve: Option<TorqueCurve>, moment: f64) -> FlexibleArm {
     arm.with_loads(vec![(body, Wrench::new(Vector3::zeros(), Vector3::z() * moment))]).expect("valid")
 }
 
-/// Time of the first return to rest at the start, by the rates; and the largest relative change of the energy.
+/// Time of the first return to rest at the start, by the rates; and the largest relative change of
+/// the energy.
 fn period(arm: &FlexibleArm, moment: f64, kind: StepperKind, h: f64, duration: f64) -> (f64, f64, f64) {
     let seen = run(arm, kind, h, duration);
     let mut found = f64::NAN;
@@ -294,9 +301,11 @@ fn period(arm: &FlexibleArm, moment: f64, kind: StepperKind, h: f64, duration: f
     (found, drift, top)
 }
 
-/// Truth: statics `e = ±(half + M/k)`: between the two signs of a vanishing moment lie 2 half. Measured: equal to rounding.
+/// Truth: statics `e = ±(half + M/k)`: between the two signs of a vanishing moment lie 2 half.
+/// Measured: equal to rounding.
 ///
-/// Newton crept out of the play by M/k at a time and gave up where that was less than a thirtieth of it.
+/// Newton crept out of the play by M/k at a time and gave up where that was less than a thirtieth
+/// of it.
 #[test]
 fn backlash_is_a_free_play_of_twice_its_half() {
     let half = 0.01;
@@ -310,7 +319,8 @@ fn backlash_is_a_free_play_of_twice_its_half() {
 
 /// Truth: free fall through the play, then a sine: period in closed form; energy is kept.
 ///
-/// Measured: period 3e-9 (RK4, 0.02 ms), 8e-7 (generalised-alpha, 0.1 ms), 1e-8 (reference, rtol 1e-9); energy 2e-8, 2e-6, 5e-8.
+/// Measured: period 3e-9 (RK4, 0.02 ms), 8e-7 (generalised-alpha, 0.1 ms), 1e-8 (reference, rtol
+/// 1e-9); energy 2e-8, 2e-6, 5e-8.
 #[test]
 fn body_with_backlash_bounces_in_closed_form() {
     for (half, moment) in [(0.01, 2.0), (0.05, 0.5)] {
@@ -334,8 +344,8 @@ fn body_with_backlash_bounces_in_closed_form() {
     }
 }
 
-/// Truth: `T = 2 ∫ de / sqrt(2 (M e - U(e))/J)` by the midpoint rule. Measured: RK4 1.4e-9, generalised-alpha 1.5e-6, reference
-/// stepper 3e-8.
+/// Truth: `T = 2 ∫ de / sqrt(2 (M e - U(e))/J)` by the midpoint rule. Measured: RK4 1.4e-9,
+/// generalised-alpha 1.5e-6, reference stepper 3e-8.
 #[test]
 fn period_on_a_curved_spring_is_that_of_the_quadrature() {
     let curve =
@@ -379,8 +389,9 @@ fn pulse(body: usize, peak: f64, T: f64) -> Load {
     Load::at_origin(body, TimedWrench::new(wrench))
 }
 
-/// Motor and body, free, with a spring between: after an impulse on the body the momentum is the impulse, and both swing
-/// with `ω² = k (1/J_1 + 1/J_2)`. Measured: frequency 4e-9 (generalised-alpha, 0.5 ms), 2e-11 (RK4).
+/// Motor and body, free, with a spring between: after an impulse on the body the momentum is the
+/// impulse, and both swing with `ω² = k (1/J_1 + 1/J_2)`. Measured: frequency 4e-9
+/// (generalised-alpha, 0.5 ms), 2e-11 (RK4).
 #[test]
 fn free_motor_behind_a_spring_swings_as_two_masses() {
     let (J_1, peak, T) = (0.5, 30.0, 0.02);
@@ -422,7 +433,8 @@ fn rotor_adds_to_the_torque_of_the_joint() {
     }
 }
 
-/// A light motor behind its spring swings faster than the arm with its drives locked: RK4 refuses a step that is too long for it.
+/// A light motor behind its spring swings faster than the arm with its drives locked: RK4 refuses a
+/// step that is too long for it.
 ///
 /// Truth: `h ω = 2.78` with `ω² = k (1/J_1 + 1/J_2)`.
 #[test]
@@ -445,7 +457,8 @@ fn massless_motor_before_a_spring_is_refused() {
     assert!(text.contains("motor_inertia"), "{text}");
 }
 
-// --- Loads -------------------------------------------------------------------------------------------------------------
+// --- Loads
+// -------------------------------------------------------------------------------------------------------------
 
 /// A body of 7 kg on a six-DoF spring with coupling; its tool frame is off its centre of mass.
 fn sprung_body(gravity: Vector3<f64>) -> FlexibleArm {
@@ -464,10 +477,11 @@ fn sprung_body(gravity: Vector3<f64>) -> FlexibleArm {
     FlexibleArm::new(Arc::new(Model::new(&beam).expect("a tree")), vec![spring], Arc::new(Held(vec![]))).expect("valid")
 }
 
-/// Truth: `(K + i p D - p² M)⁻¹ F` of all six coordinates, `D = 2 M + 0.001 K`, below, at and above the first modes.
+/// Truth: `(K + i p D - p² M)⁻¹ F` of all six coordinates, `D = 2 M + 0.001 K`, below, at and above
+/// the first modes.
 ///
-/// Measured, of the amplitude: RK4 7e-6 (of second order in the deflection), generalised-alpha 1.7e-4 with 200 steps a cycle,
-/// reference stepper at 1e-8 8e-5 (its smallest absolute tolerance).
+/// Measured, of the amplitude: RK4 7e-6 (of second order in the deflection), generalised-alpha
+/// 1.7e-4 with 200 steps a cycle, reference stepper at 1e-8 8e-5 (its smallest absolute tolerance).
 #[test]
 fn harmonic_force_swings_the_tip_as_the_frequency_response_says() {
     let arm = sprung_body(Vector3::zeros());
@@ -508,9 +522,11 @@ fn harmonic_force_swings_the_tip_as_the_frequency_response_says() {
     }
 }
 
-/// A short pulse of force: the momentum right after it is its integral, in world axes; the moment arm counts too.
+/// A short pulse of force: the momentum right after it is its integral, in world axes; the moment
+/// arm counts too.
 ///
-/// Measured: RK4 4e-5 (what the spring has done meanwhile), generalised-alpha 2.1e-3, the trapezoidal rule of 20 steps.
+/// Measured: RK4 4e-5 (what the spring has done meanwhile), generalised-alpha 2.1e-3, the
+/// trapezoidal rule of 20 steps.
 #[test]
 fn impulse_changes_the_momentum_by_its_integral() {
     let arm = sprung_body(Vector3::zeros());
@@ -536,7 +552,8 @@ fn impulse_changes_the_momentum_by_its_integral() {
     }
 }
 
-/// Truth: moments about the axis. A load in frame axes keeps its lever as the body turns, one in world axes does not.
+/// Truth: moments about the axis. A load in frame axes keeps its lever as the body turns, one in
+/// world axes does not.
 #[test]
 fn load_in_frame_axes_turns_along() {
     let path = || motion(|t| [2.0 * t, 2.0, 0.0]);
@@ -561,7 +578,8 @@ fn load_in_frame_axes_turns_along() {
     }
 }
 
-// --- Payloads ----------------------------------------------------------------------------------------------------------
+// --- Payloads
+// ----------------------------------------------------------------------------------------------------------
 
 /// The reference arm with rotors, which keep the sampled loops of a light wrist stable.
 fn geared(elastic: bool) -> flexarm_testkit::ReferenceArm {
@@ -587,7 +605,8 @@ fn dropping_arm(t: f64, beta: f64, motion: Arc<dyn PrescribedMotion>) -> (Flexib
     (arm, FlexibleArm::new(light, springs, motion).expect("valid"))
 }
 
-/// Truth: before the drop the static pose with the payload, at the end that without; drives and energy alike. Measured: 1e-15.
+/// Truth: before the drop the static pose with the payload, at the end that without; drives and
+/// energy alike. Measured: 1e-15.
 #[test]
 fn arm_that_drops_its_payload_comes_to_rest_in_the_new_static_pose() {
     let (arm, light) = dropping_arm(0.1, 1e-2, Arc::new(Held(vec![0.4, 0.5, -0.3, 0.7, 0.6, -1.2])));
@@ -620,7 +639,8 @@ fn arm_that_drops_its_payload_comes_to_rest_in_the_new_static_pose() {
     }
 }
 
-/// Ringing about the new static pose: the mean of an arm that is hardly damped, over many periods; measured 5.8e-4 of the jump.
+/// Ringing about the new static pose: the mean of an arm that is hardly damped, over many periods;
+/// measured 5.8e-4 of the jump.
 #[test]
 fn ringing_after_the_drop_has_the_new_static_pose_as_its_mean() {
     let (arm, light) = dropping_arm(0.05, 2e-5, Arc::new(Held(vec![0.4, 0.5, -0.3, 0.7, 0.6, -1.2])));
@@ -646,10 +666,12 @@ fn run_from(arm: &FlexibleArm, kind: StepperKind, h: f64, duration: f64) -> Vec<
     all
 }
 
-/// Samples of the servo and a drop of payload during the motion: the reference stepper, which chooses its steps, lands on
-/// them. Measured, at 1e-9 against: RK4 at 0.1 ms 3.4e-11, generalised-alpha 2.3e-6, 6.1e-7, 1.6e-7 m or rad at 1, 0.5, 0.25 ms.
+/// Samples of the servo and a drop of payload during the motion: the reference stepper, which
+/// chooses its steps, lands on them. Measured, at 1e-9 against: RK4 at 0.1 ms 3.4e-11,
+/// generalised-alpha 2.3e-6, 6.1e-7, 1.6e-7 m or rad at 1, 0.5, 0.25 ms.
 ///
-/// A sample that was a rounding later than the point at which it is taken was met twice, and the solver refused.
+/// A sample that was a rounding later than the point at which it is taken was met twice, and the
+/// solver refused.
 #[test]
 fn reference_stepper_and_generalised_alpha_agree_over_events() {
     let path: Arc<dyn PrescribedMotion> = Arc::new(MotionFn(|t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| {
@@ -693,9 +715,11 @@ fn reference_stepper_and_generalised_alpha_agree_over_events() {
     assert!(errors[0] < 5e-6 && (order - 2.0).abs() < 0.2, "{errors:?} {order}");
 }
 
-// --- What a stepper might not see --------------------------------------------------------------------------------------
+// --- What a stepper might not see
+// --------------------------------------------------------------------------------------
 
-/// A free rotor at rest: long steps see neither a short pulse, nor a sine whose periods they are multiples of.
+/// A free rotor at rest: long steps see neither a short pulse, nor a sine whose periods they are
+/// multiples of.
 ///
 /// Truth: the integral of the moment over the inertia.
 #[test]
@@ -709,7 +733,8 @@ fn the_reference_stepper_sees_short_loads_and_fast_ones() {
     let pulse = pulse.with_jumps([0.0, 0.137, 0.5, 0.863, 1.0].iter().map(|s| start + s * T).collect());
     let sine = TimedWrench::new(move |t| moment(if t >= 1.0 { 30.0 * (TAU * 50.0 * (t - 1.0)).sin() } else { 0.0 }));
     let sine = sine.with_jumps(vec![1.0]).with_period(0.02);
-    // The sine: after a whole period at rest again, on the way at most twice its amplitude over J omega.
+    // The sine: after a whole period at rest again, on the way at most twice its amplitude over J
+    // omega.
     for (wrench, truth) in [(pulse, 30.0 * T * 2.0 / PI / J), (sine, 2.0 * 30.0 / (J * TAU * 50.0))] {
         let arm = arm.clone().with_timed_loads(vec![Load::at_origin(1, wrench)]).expect("valid");
         for method in [ReferenceMethod::Bdf, ReferenceMethod::Esdirk34, ReferenceMethod::Tsit45] {
@@ -720,7 +745,8 @@ fn the_reference_stepper_sees_short_loads_and_fast_ones() {
     }
 }
 
-/// A load that is infinite at an instant ends the run; it used to go on with positions that were no numbers.
+/// A load that is infinite at an instant ends the run; it used to go on with positions that were no
+/// numbers.
 #[test]
 fn a_load_that_is_no_number_stops_the_run() {
     let arm = arm(&rotor(Some(GEAR), 0.5), Some(GEAR), Arc::new(Held(vec![0.0])));
@@ -734,7 +760,8 @@ fn a_load_that_is_no_number_stops_the_run() {
     }
 }
 
-/// Two links whose rotors couple more inertia than they have: `[[1.6, 0.8 + 100], [0.8 + 100, 0.8]]` is indefinite.
+/// Two links whose rotors couple more inertia than they have:
+/// `[[1.6, 0.8 + 100], [0.8 + 100, 0.8]]` is indefinite.
 #[test]
 fn a_mass_matrix_that_is_not_positive_definite_stops_a_run_with_its_time() {
     let mut two = rotor(None, 0.0);

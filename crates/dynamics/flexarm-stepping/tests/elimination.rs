@@ -89,8 +89,9 @@ fn far(found: &DMatrix<f64>, truth: &DMatrix<f64>) -> f64 {
     (found - truth).amax() / truth.amax()
 }
 
-/// Truth: mass matrix by composite rigid bodies, damping and stiffness as they are assembled. Bent by up to 0.5 rad, with a
-/// branch, on joints that slide and turn, both kinds of angles, dampers in proportion and not. Measured: 3e-15.
+/// Truth: mass matrix by composite rigid bodies, damping and stiffness as they are assembled. Bent
+/// by up to 0.5 rad, with a branch, on joints that slide and turn, both kinds of angles, dampers in
+/// proportion and not. Measured: 3e-15.
 #[test]
 fn an_arm_of_chains_has_on_its_tree_the_same_matrices() {
     for (joints, branch, angles) in [
@@ -127,7 +128,8 @@ fn an_arm_of_chains_has_on_its_tree_the_same_matrices() {
     }
 }
 
-/// Steps of one integrator on the arm as it is and on the dense one: largest distance over the peak, and both counts.
+/// Steps of one integrator on the arm as it is and on the dense one: largest distance over the
+/// peak, and both counts.
 fn compared<I: Integrator>(
     arm: &FlexibleArm,
     (h, steps): (f64, usize),
@@ -163,9 +165,10 @@ impl<S: SecondOrderSystem> Beginning for S {
     }
 }
 
-/// Truth: the dense matrices of the same system. Chains of 2 to 31 joints with a branch, every spectral radius, with and
-/// without correction, lightly and strongly damped (modes that swing and that creep), in proportion and not.
-/// Measured: 7e-11 at rho 0 and 31 joints, 7e-12 elsewhere; the same iterations and factorisations.
+/// Truth: the dense matrices of the same system. Chains of 2 to 31 joints with a branch, every
+/// spectral radius, with and without correction, lightly and strongly damped (modes that swing and
+/// that creep), in proportion and not. Measured: 7e-11 at rho 0 and 31 joints, 7e-12 elsewhere; the
+/// same iterations and factorisations.
 #[test]
 fn a_run_along_the_tree_is_the_dense_run() {
     let proportional: fn(f64) -> Damping = Damping::StiffnessProportional;

@@ -1,4 +1,5 @@
-//! What happens at discrete times: payloads, loads that start between steps, velocities that jump, steps that fail.
+//! What happens at discrete times: payloads, loads that start between steps, velocities that jump,
+//! steps that fail.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
@@ -17,7 +18,8 @@ fn reference() -> StepperKind {
     StepperKind::Reference(ReferenceSettings::new(1e-9))
 }
 
-/// Every stepper of the registry with its default settings; `maximal`: those in maximal coordinates too.
+/// Every stepper of the registry with its default settings; `maximal`: those in maximal coordinates
+/// too.
 fn registered(maximal: bool) -> impl Iterator<Item = StepperKind> {
     let entries = STEPPERS.into_iter().filter(move |entry| maximal || !entry.maximal);
     entries.map(|entry| (entry.with)(&StepperOptions::default()))
@@ -101,8 +103,9 @@ fn pick_up(t: f64, mass: f64, damping: Damping) -> FlexibleArm {
     arm
 }
 
-/// Truth: the closed form of a mass that is hung on a spring at rest. The time of the event is on the steps and between
-/// them. With the matrix of the empty arm the iteration of the next step diverged.
+/// Truth: the closed form of a mass that is hung on a spring at rest. The time of the event is on
+/// the steps and between them. With the matrix of the empty arm the iteration of the next step
+/// diverged.
 ///
 /// Measured, of the sag: generalised-alpha 2.5e-5, RK4 3.7e-8, reference 8.4e-8.
 #[test]
@@ -122,7 +125,8 @@ fn an_arm_that_picks_up_fifty_times_its_mass_swings_about_the_new_sag() {
     }
 }
 
-/// A payload that is there from the start is part of the equilibrium in which the run starts. Truth: `m g / K`, at rest.
+/// A payload that is there from the start is part of the equilibrium in which the run starts.
+/// Truth: `m g / K`, at rest.
 #[test]
 fn a_payload_of_time_zero_hangs_still() {
     let heavy = 7.0 * MASS;
@@ -134,7 +138,8 @@ fn a_payload_of_time_zero_hangs_still() {
     }
 }
 
-/// Truth: a ratio of modal damping is one of the modes that the arm has: 3 % after the pick-up as before.
+/// Truth: a ratio of modal damping is one of the modes that the arm has: 3 % after the pick-up as
+/// before.
 #[test]
 fn modal_damping_keeps_its_ratio_with_another_payload() {
     let (heavy, g, zeta, at) = (50.0 * MASS, 9.81, 0.03_f64, 0.1);
@@ -156,7 +161,8 @@ fn modal_damping_keeps_its_ratio_with_another_payload() {
 
 /// Truth: an oscillator under a force that begins and ends between steps.
 ///
-/// Second order in the step, 16 where the step is a quarter; before, both ends were known to a step only: first order.
+/// Second order in the step, 16 where the step is a quarter; before, both ends were known to a step
+/// only: first order.
 #[test]
 fn a_load_that_begins_and_ends_between_steps_acts_as_long_as_it_lasts() {
     let (from, to, F) = (0.01034, 0.05271, 300.0);
@@ -181,7 +187,8 @@ fn a_load_that_begins_and_ends_between_steps_acts_as_long_as_it_lasts() {
     }
 }
 
-/// Truth: the base of an oscillator at rest starts with Δv at once; e = -Δv/ω sin ω(t - t_c) for each corner, added up.
+/// Truth: the base of an oscillator at rest starts with Δv at once; e = -Δv/ω sin ω(t - t_c) for
+/// each corner, added up.
 ///
 /// Corners on the steps, between them, two in one step, and at the start.
 #[test]
@@ -211,8 +218,9 @@ fn the_base_velocity_jumps_and_the_spring_takes_the_impulse() {
     }
 }
 
-/// Truth: the base of an oscillator gets its velocity at a constant acceleration within 3 ms, between the steps, without a
-/// corner being told: `e = -a/ω² (1 - cos ω(t - t_0))` less the same from the end of the rise on.
+/// Truth: the base of an oscillator gets its velocity at a constant acceleration within 3 ms,
+/// between the steps, without a corner being told: `e = -a/ω² (1 - cos ω(t - t_0))` less the same
+/// from the end of the rise on.
 ///
 /// Measured, of the amplitude of a corner: generalised-alpha 2.6e-5 at 1 ms, 3.9e-4 at 2 ms, SDIRK3
 /// 7.2e-5 and 2.9e-3 (2.1e-2 at 1 ms without steps that are cut), RK4 1.5e-3 at 0.1 ms.
@@ -239,8 +247,8 @@ fn velocities_that_rise_within_a_few_steps_strike_as_hard_as_corners() {
     }
 }
 
-/// Truth: work of the drive in a blow is what the kinetic energy gains, `m Δv (v + Δv/2)` of the carriage alone, because
-/// the body on the spring keeps its velocity.
+/// Truth: work of the drive in a blow is what the kinetic energy gains, `m Δv (v + Δv/2)` of the
+/// carriage alone, because the body on the spring keeps its velocity.
 #[test]
 fn the_work_of_a_blow_is_the_energy_that_it_brings() {
     let motion = Corners { corners: vec![(0.0105, 0.5), (0.0305, -0.25)] };
@@ -255,8 +263,9 @@ fn the_work_of_a_blow_is_the_energy_that_it_brings() {
     }
 }
 
-/// A force that begins in the middle of a long run, a payload and a corner at one time, and a step that is longer than the
-/// time between them: every stepper comes to the same end as the one with error control.
+/// A force that begins in the middle of a long run, a payload and a corner at one time, and a step
+/// that is longer than the time between them: every stepper comes to the same end as the one with
+/// error control.
 #[test]
 fn events_at_one_time_and_events_within_one_step_are_all_met() {
     let motion = Corners { corners: vec![(0.05, 0.4), (0.0503, -0.2), (0.06, 0.0)] };
@@ -327,8 +336,9 @@ impl SecondOrderSystem for Walls {
     }
 }
 
-/// A step that ends beyond a wall has no solution that Newton finds; shorter ones have, and after the bounce the steps are
-/// whole again. Truth: energy, `v²/2 - ln(1 - x²)/2`, and the time, which stays on the steps.
+/// A step that ends beyond a wall has no solution that Newton finds; shorter ones have, and after
+/// the bounce the steps are whole again. Truth: energy, `v²/2 - ln(1 - x²)/2`, and the time, which
+/// stays on the steps.
 #[test]
 fn a_step_that_fails_is_taken_in_shorter_ones() {
     let settings = AlphaSettings { rho: 1.0, dispersion_correction: false };

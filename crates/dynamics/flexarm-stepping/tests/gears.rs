@@ -1,4 +1,5 @@
-//! Transmission errors, hysteresis, friction under load and gears that move several joints, against closed forms.
+//! Transmission errors, hysteresis, friction under load and gears that move several joints, against
+//! closed forms.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
@@ -19,7 +20,8 @@ fn reference() -> StepperKind {
     StepperKind::Reference(ReferenceSettings::new(1e-9))
 }
 
-/// Bodies one behind the other on the z axis in no gravity, a motor and a spring before each, with rotors of that armature.
+/// Bodies one behind the other on the z axis in no gravity, a motor and a spring before each, with
+/// rotors of that armature.
 fn chain(count: usize, armature: f64) -> Mechanism {
     let mut chain = Mechanism::new("chain");
     chain.gravity = Vector3::zeros();
@@ -76,7 +78,8 @@ fn run(arm: &FlexibleArm, kind: StepperKind, h: f64, duration: f64) -> Vec<Obser
     all
 }
 
-/// Gap between what went in and what is stored or lost, over what went in, drives and loads by the trapezoidal rule.
+/// Gap between what went in and what is stored or lost, over what went in, drives and loads by the
+/// trapezoidal rule.
 fn imbalance(seen: &[Observation]) -> f64 {
     let work =
         |c: usize| -> f64 { seen.windows(2).map(|w| 0.5 * (w[1].t - w[0].t) * (w[0].power[c] + w[1].power[c])).sum() };
@@ -87,7 +90,8 @@ fn imbalance(seen: &[Observation]) -> f64 {
     (work(0) + work(1) - lost - (energy(last) - energy(first))).abs() / scale
 }
 
-// --- Transmission error ------------------------------------------------------------------------------------------------
+// --- Transmission error
+// ------------------------------------------------------------------------------------------------
 
 fn ripple(cycles: f64, amplitude: f64) -> Vec<TransmissionError> {
     let harmonics = vec![
@@ -97,8 +101,8 @@ fn ripple(cycles: f64, amplitude: f64) -> Vec<TransmissionError> {
     vec![TransmissionError { element: 0, motor: 0, harmonics }]
 }
 
-/// Truth: without load the gear stands where its error is, with a torque T it gives way by T/k besides; the same in an operating
-/// point, a linear structure and along a path.
+/// Truth: without load the gear stands where its error is, with a torque T it gives way by T/k
+/// besides; the same in an operating point, a linear structure and along a path.
 #[test]
 fn at_rest_the_joint_is_off_by_the_error_of_its_gear() {
     let torque = 12.0;
@@ -125,9 +129,10 @@ fn at_rest_the_joint_is_off_by_the_error_of_its_gear() {
     }
 }
 
-/// Truth: `Y = A √((k² + (d w)²) / ((k - J w²)² + (d w)²))` for the harmonic of frequency w = cycles Ω, below, at and above the
-/// resonance of the joint; in every stepper that knows it. Measured with 50
-/// steps a period 2.6e-3 at most (generalised-alpha), 2.5e-3 (SDIRK, at resonance, which its damping takes from), 1.6e-5 (RK4), 2e-8 (reference).
+/// Truth: `Y = A √((k² + (d w)²) / ((k - J w²)² + (d w)²))` for the harmonic of frequency w =
+/// cycles Ω, below, at and above the resonance of the joint; in every stepper that knows it.
+/// Measured with 50 steps a period 2.6e-3 at most (generalised-alpha), 2.5e-3 (SDIRK, at resonance,
+/// which its damping takes from), 1.6e-5 (RK4), 2e-8 (reference).
 #[test]
 fn ripple_drives_the_joint_through_its_resonance_as_a_base_drives_an_oscillator() {
     let (d, A, cycles) = (8.0, 3e-5, 120.0);
@@ -185,8 +190,9 @@ fn coasting(tree: &Mechanism, damper: f64, speed: f64) -> FlexibleArm {
     arm(tree, damper, motion(move |t| [speed * t, speed, 0.0])).with_servo(servo).unwrap()
 }
 
-/// Truth: nothing goes in, nothing is damped: the energy of a coasting motor with its body stays, though the ripple exchanges it
-/// between them. Measured 2.0e-7 (reference), 1.3e-8 (RK4 at 0.05 ms), 5.8e-4 (SDIRK at 0.1 ms).
+/// Truth: nothing goes in, nothing is damped: the energy of a coasting motor with its body stays,
+/// though the ripple exchanges it between them. Measured 2.0e-7 (reference), 1.3e-8 (RK4 at 0.05
+/// ms), 5.8e-4 (SDIRK at 0.1 ms).
 #[test]
 fn ripple_takes_no_energy_from_a_motor_that_coasts() {
     let arm = coasting(&chain(1, 0.3), 0.0, 2.5).with_transmission_errors(ripple(100.0, 2e-3)).unwrap();
@@ -202,7 +208,8 @@ fn ripple_takes_no_energy_from_a_motor_that_coasts() {
     }
 }
 
-// --- Hysteresis --------------------------------------------------------------------------------------------------------
+// --- Hysteresis
+// --------------------------------------------------------------------------------------------------------
 
 fn law() -> Hysteresis {
     Hysteresis { element: 0, elastic: TorqueCurve::straight(K), sliders: Hysteresis::even_sliders(40.0, 4e-4, 6) }
@@ -217,8 +224,9 @@ fn swinging(amplitude: f64, hz: f64) -> FlexibleArm {
     arm.with_timed_loads(vec![Load { wrench, ..Load::constant(body, Wrench::zeros()) }]).unwrap()
 }
 
-/// Truth: the area of Masing's loop at the amplitude reached, `4 Σ k r (A - r)`, whatever the speed of the cycle, small or large
-/// amplitude, in every stepper with a fixed step; nothing at all while no slider slips. Measured 1e-4 of the loss at most.
+/// Truth: the area of Masing's loop at the amplitude reached, `4 Σ k r (A - r)`, whatever the speed
+/// of the cycle, small or large amplitude, in every stepper with a fixed step; nothing at all while
+/// no slider slips. Measured 1e-4 of the loss at most.
 #[test]
 fn a_closed_cycle_loses_the_area_of_its_loop_at_any_speed() {
     for (amplitude, hz) in [(25.0, 0.5), (25.0, 2.0), (90.0, 0.5), (90.0, 2.0), (4.0, 1.0)] {
@@ -241,8 +249,9 @@ fn a_closed_cycle_loses_the_area_of_its_loop_at_any_speed() {
     }
 }
 
-/// Truth: RK4 at 4e-6 s. The force has corners and a reversal lies within a step, so that orders fall to two and below: measured from 0.4 ms to
-/// 0.025 ms generalised-alpha 5.6e-3 to 2.1e-5 of the peak (order 2.0), SDIRK 3.5e-4 to 2.5e-6 (1.8), RK4 2.0e-4 to 2.1e-6 (1.7).
+/// Truth: RK4 at 4e-6 s. The force has corners and a reversal lies within a step, so that orders
+/// fall to two and below: measured from 0.4 ms to 0.025 ms generalised-alpha 5.6e-3 to 2.1e-5 of
+/// the peak (order 2.0), SDIRK 3.5e-4 to 2.5e-6 (1.8), RK4 2.0e-4 to 2.1e-6 (1.7).
 #[test]
 fn steppers_with_hysteresis_come_to_one_solution_as_the_step_falls() {
     let shaken = |arm: &FlexibleArm, kind: StepperKind, h: f64| -> Vec<f64> {
@@ -269,8 +278,8 @@ fn steppers_with_hysteresis_come_to_one_solution_as_the_step_falls() {
     }
 }
 
-/// Truth: for small motions no slider slips, `ω = √((k + Σ k_i) / J)`; at rest under a load the gear stands on the curve of first
-/// loading, friction (2 x - x²) at the corners of the sliders.
+/// Truth: for small motions no slider slips, `ω = √((k + Σ k_i) / J)`; at rest under a load the
+/// gear stands on the curve of first loading, friction (2 x - x²) at the corners of the sliders.
 #[test]
 fn modes_have_the_stuck_stiffness_and_statics_the_first_loading() {
     let (friction, reach) = (40.0, 4e-4);
@@ -292,10 +301,11 @@ fn modes_have_the_stuck_stiffness_and_statics_the_first_loading() {
     }
 }
 
-// --- Friction under load -----------------------------------------------------------------------------------------------
+// --- Friction under load
+// -----------------------------------------------------------------------------------------------
 
-/// Truth: a joint that turns steadily against a torque T needs `T + viscous q̇ + coulomb + c |T|`, driving or driven, through a
-/// spring or a rigid gear; the friction takes its power.
+/// Truth: a joint that turns steadily against a torque T needs `T + viscous q̇ + coulomb + c |T|`,
+/// driving or driven, through a spring or a rigid gear; the friction takes its power.
 #[test]
 fn friction_under_load_is_its_part_of_the_transmitted_torque() {
     let (speed, c) = (1.5, 0.08);
@@ -349,7 +359,8 @@ fn friction_under_load_is_its_part_of_the_transmitted_torque() {
     assert!(refused.is_err_and(|e| e.to_string().contains("gearbox")));
 }
 
-// --- Gears that move several joints ------------------------------------------------------------------------------------
+// --- Gears that move several joints
+// ------------------------------------------------------------------------------------
 
 fn coupled(C: Matrix2<f64>, elements: Vec<usize>) -> GearCoupling {
     let inverse = C.try_inverse().unwrap();
@@ -376,8 +387,8 @@ fn two(C: Option<Matrix2<f64>>) -> FlexibleArm {
     }
 }
 
-/// Truth: deflections `C K_m^-1 Cᵀ τ` under torques, and frequencies of `K φ = ω² M φ` with K = C^-T K_m C^-1 and
-/// M = [J_1 + J_2, J_2; J_2, J_2], both by hand from 2x2 matrices.
+/// Truth: deflections `C K_m^-1 Cᵀ τ` under torques, and frequencies of `K φ = ω² M φ` with K =
+/// C^-T K_m C^-1 and M = [J_1 + J_2, J_2; J_2, J_2], both by hand from 2x2 matrices.
 #[test]
 fn coupled_gears_give_way_and_swing_as_two_springs_at_the_motors() {
     let arm = two(Some(WRIST));
@@ -415,8 +426,9 @@ fn coupled_gears_give_way_and_swing_as_two_springs_at_the_motors() {
     }
 }
 
-/// Truth: the energy balance, with damping and friction at the motors; the reference stepper for all others. Identity: torques and speeds of
-/// motors and joints have one power; without coupling (C = 1) the bits are those of single gears.
+/// Truth: the energy balance, with damping and friction at the motors; the reference stepper for
+/// all others. Identity: torques and speeds of motors and joints have one power; without coupling
+/// (C = 1) the bits are those of single gears.
 #[test]
 fn a_run_with_coupled_gears_balances_and_without_coupling_has_the_same_bits() {
     let arm = two(Some(WRIST));

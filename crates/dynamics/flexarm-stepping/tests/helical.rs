@@ -52,9 +52,11 @@ fn spindle(spring: bool, motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
     FlexibleArm::new(Arc::new(Model::new(&tree).unwrap()), springs, motion).unwrap()
 }
 
-/// Truth: let go relaxed, the spring turns to φ₀ (1 - cos ωt) with φ₀ = -m g p/k and ω² = k/(I_zz + m p²); at rest it stays at φ₀.
+/// Truth: let go relaxed, the spring turns to φ₀ (1 - cos ωt) with φ₀ = -m g p/k and ω² = k/(I_zz +
+/// m p²); at rest it stays at φ₀.
 ///
-/// Measured, of the sag: generalised-alpha 6e-8, RK4 1e-9, reference 1e-7, SPOOK 5e-3; at rest 2e-10 at most.
+/// Measured, of the sag: generalised-alpha 6e-8, RK4 1e-9, reference 1e-7, SPOOK 5e-3; at rest
+/// 2e-10 at most.
 #[test]
 fn a_body_on_a_sprung_spindle_swings_about_its_sag() {
     let arm = spindle(true, Arc::new(Held(vec![0.0])));
@@ -97,8 +99,8 @@ impl PrescribedMotion for Swing {
 
 /// Truth: τ = (I_zz + m p²) q̈ + m g p, and the body rises by p q.
 ///
-/// Measured, of the largest torque: 3e-16 in reduced coordinates, 4e-4 for SPOOK, whose force is the mean of its last step; its
-/// first ten steps are left out, in which its impulses settle.
+/// Measured, of the largest torque: 3e-16 in reduced coordinates, 4e-4 for SPOOK, whose force is
+/// the mean of its last step; its first ten steps are left out, in which its impulses settle.
 #[test]
 fn a_driven_spindle_needs_the_torque_of_the_textbook() {
     let arm = spindle(false, Arc::new(Swing));

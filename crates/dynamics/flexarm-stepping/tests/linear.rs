@@ -35,9 +35,9 @@ fn moved(from: &Linear, to: &Linear) -> Vector6<f64> {
     Vector6::new(d.x, d.y, d.z, phi.x, phi.y, phi.z)
 }
 
-/// Truth: central differences of the nonlinear equilibrium over the wrench, with weight alone and under a heavy load
-/// (force and moment), on an arm twenty times as soft as the reference arm (sag 4 cm), where the change of weight and
-/// load counts.
+/// Truth: central differences of the nonlinear equilibrium over the wrench, with weight alone and
+/// under a heavy load (force and moment), on an arm twenty times as soft as the reference arm (sag
+/// 4 cm), where the change of weight and load counts.
 #[test]
 fn compliance_is_the_derivative_of_the_nonlinear_equilibrium() {
     let (arm, tool) = arm_at(&POSE, 20.0);
@@ -77,8 +77,8 @@ fn compliance_is_the_derivative_of_the_nonlinear_equilibrium() {
     }
 }
 
-/// Truth: the stepper's own static start with the wrench as a load on the tool's body. A force at To is a force at Bo
-/// with the moment of the arm that they have at the *end*.
+/// Truth: the stepper's own static start with the wrench as a load on the tool's body. A force at
+/// To is a force at Bo with the moment of the arm that they have at the *end*.
 #[test]
 fn the_equilibrium_under_a_wrench_is_that_of_the_steppers() {
     let (arm, tool) = arm_at(&POSE, 5.0);
@@ -104,7 +104,8 @@ fn the_equilibrium_under_a_wrench_is_that_of_the_steppers() {
     assert!(error < 1e-10); // measured 4e-14
 }
 
-/// Truth: modes of the arm by the other routine, and central differences of inverse dynamics over the joints.
+/// Truth: modes of the arm by the other routine, and central differences of inverse dynamics over
+/// the joints.
 #[test]
 fn matrices_are_those_of_the_modes_and_of_inverse_dynamics() {
     let (arm, tool) = arm_at(&POSE, 1.0);

@@ -1,4 +1,5 @@
-//! Arms with closed loops in motion: every stepper against the others, statics, modes, energy, servos, what is refused.
+//! Arms with closed loops in motion: every stepper against the others, statics, modes, energy,
+//! servos, what is refused.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
@@ -49,7 +50,8 @@ fn of(word: &str) -> StepperKind {
     (entry.with)(&StepperOptions::default())
 }
 
-/// What a run ends with: place of the tool, energies (kinetic, potential, elastic), forces of the drives.
+/// What a run ends with: place of the tool, energies (kinetic, potential, elastic), forces of the
+/// drives.
 fn end(arm: &FlexibleArm, kind: StepperKind, h: f64, duration: f64) -> (Vector3<f64>, f64, DVector<f64>) {
     let tool = arm.model.frame("tool").unwrap().clone();
     let mut seen = Observation::new(arm);
@@ -59,8 +61,8 @@ fn end(arm: &FlexibleArm, kind: StepperKind, h: f64, duration: f64) -> (Vector3<
     ((seen.X_WB[tool.body] * tool.X_BF).translation.vector, seen.energy[1], seen.drive.clone())
 }
 
-/// Truth: the reference stepper on the same equations. Differences over the deflection at the end of the motion: measured
-/// generalised-alpha 1.0e-6, SDIRK3 8e-7, RK4 1.1e-7.
+/// Truth: the reference stepper on the same equations. Differences over the deflection at the end
+/// of the motion: measured generalised-alpha 1.0e-6, SDIRK3 8e-7, RK4 1.1e-7.
 #[test]
 fn steppers_agree_on_an_arm_with_a_loop() {
     let arm = arm(moving(), 1e-4);
@@ -84,8 +86,8 @@ fn steppers_agree_on_an_arm_with_a_loop() {
     }
 }
 
-/// Truth: the reference stepper. SPOOK is of first order: its torques are off by half as much with half the step (1.3e-3 at 0.4 ms,
-/// 1.6e-4 at 0.05 ms), its tool by 3.7e-6 m and 1.2e-7 m.
+/// Truth: the reference stepper. SPOOK is of first order: its torques are off by half as much with
+/// half the step (1.3e-3 at 0.4 ms, 1.6e-4 at 0.05 ms), its tool by 3.7e-6 m and 1.2e-7 m.
 #[test]
 fn spook_tends_to_the_others_on_an_arm_with_a_loop() {
     let arm = arm(moving(), 1e-3);
@@ -102,8 +104,9 @@ fn spook_tends_to_the_others_on_an_arm_with_a_loop() {
     }
 }
 
-/// Truth: virtual work of springs and weight about the rigid pose. To first order of the springs' compliance the tool moves by
-/// `-J K^-1 g`, with J and g of the closed model; the deflection itself makes the rest, measured 7.7e-8 of it.
+/// Truth: virtual work of springs and weight about the rigid pose. To first order of the springs'
+/// compliance the tool moves by `-J K^-1 g`, with J and g of the closed model; the deflection
+/// itself makes the rest, measured 7.7e-8 of it.
 #[test]
 fn an_arm_with_a_loop_rests_where_virtual_work_says() {
     let mut arm = arm(Arc::new(Held(POSE.to_vec())), 1e-3);
@@ -127,7 +130,8 @@ fn an_arm_with_a_loop_rests_where_virtual_work_says() {
     assert!(off < 1e-6, "{off:e}");
 }
 
-/// Truth: differences of equilibria under small forces. Compliance of [`linearise`] and of [`OperatingPoint`], measured 1.3e-8.
+/// Truth: differences of equilibria under small forces. Compliance of [`linearise`] and of
+/// [`OperatingPoint`], measured 1.3e-8.
 #[test]
 fn compliance_over_a_loop_is_the_slope_of_the_equilibria() {
     let arm = arm(Arc::new(Held(POSE.to_vec())), 1e-3);
@@ -151,7 +155,8 @@ fn compliance_over_a_loop_is_the_slope_of_the_equilibria() {
     assert!((point.compliance() - C).amax() < 1e-9 * C.amax());
 }
 
-/// Truth: without damping and with drives that stand still the energy stays; RK4 at 10 us, measured 4.3e-11 of what swings.
+/// Truth: without damping and with drives that stand still the energy stays; RK4 at 10 us, measured
+/// 4.3e-11 of what swings.
 #[test]
 fn a_ringing_arm_with_a_loop_keeps_its_energy() {
     let arm = arm(Arc::new(Held(POSE.to_vec())), 1e-14);
@@ -169,7 +174,8 @@ fn a_ringing_arm_with_a_loop_keeps_its_energy() {
     assert!((high - low) < 1e-9 * kinetic, "{:e} {kinetic}", high - low);
 }
 
-/// Identity: `K φ = ω² M φ` with the matrices of [`linearise`] has the frequencies of the operating point.
+/// Identity: `K φ = ω² M φ` with the matrices of [`linearise`] has the frequencies of the operating
+/// point.
 #[test]
 fn frequencies_over_a_loop_agree_between_linear_structure_and_operating_point() {
     let arm = arm(Arc::new(Held(POSE.to_vec())), 1e-3);
@@ -189,7 +195,8 @@ fn frequencies_over_a_loop_agree_between_linear_structure_and_operating_point() 
     assert!(squares[0] > 0.0 && point.frequencies_hz()[0] < 60.0, "{:?}", point.frequencies_hz());
 }
 
-/// Truth: with the torques of its inverse dynamics fed forward a rigid arm stays on its motion. Sampled at 0.1 ms, measured 3.9e-6 rad and 0.34 % of the torque.
+/// Truth: with the torques of its inverse dynamics fed forward a rigid arm stays on its motion.
+/// Sampled at 0.1 ms, measured 3.9e-6 rad and 0.34 % of the torque.
 #[test]
 fn servos_drive_a_rigid_arm_with_a_loop_along_its_motion() {
     let model = Arc::new(Model::new(&palletising_arm(false).mechanism).unwrap());

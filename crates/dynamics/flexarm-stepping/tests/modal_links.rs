@@ -1,4 +1,5 @@
-//! Arms with links that bend in modes: published spin-ups, what is kept, every stepper against every other, chains.
+//! Arms with links that bend in modes: published spin-ups, what is kept, every stepper against
+//! every other, chains.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
@@ -68,7 +69,8 @@ fn run(arm: &FlexibleArm, kind: StepperKind, h: f64, start: Start, times: &[f64]
     times.iter().map(at).collect()
 }
 
-// --- Spin-up of a cantilever -------------------------------------------------------------------------------------------
+// --- Spin-up of a cantilever
+// -------------------------------------------------------------------------------------------
 
 struct Row {
     t: f64,
@@ -148,10 +150,11 @@ impl SpinUp {
 
 /// Truth: geometrically exact finite elements (`tools/golden_kane.py`).
 ///
-/// Measured errors of the tip's lag over its peak: kane 3.1e-3, kane_slow 1.7e-3, simo 1.4e-3 (0.75, 0.53 and 0.57 m); of what
-/// rings on after 15 s: 1.0e-4 m of 7.7e-3, 1.1e-4 of 8.3e-3, 7.2e-5 of 3.6e-3. The steady stretch is the linear one,
-/// `μ Ω² l³/(3 EA)`, within 3e-5, 1.4e-4, 5e-5; the exact beam's is less by the foreshortening of what rings on (0.8 %, 2.3 %,
-/// 0.07 %): second order in the deflection, no modal link of first-order shapes has it.
+/// Measured errors of the tip's lag over its peak: kane 3.1e-3, kane_slow 1.7e-3, simo 1.4e-3
+/// (0.75, 0.53 and 0.57 m); of what rings on after 15 s: 1.0e-4 m of 7.7e-3, 1.1e-4 of 8.3e-3,
+/// 7.2e-5 of 3.6e-3. The steady stretch is the linear one, `μ Ω² l³/(3 EA)`, within 3e-5, 1.4e-4,
+/// 5e-5; the exact beam's is less by the foreshortening of what rings on (0.8 %, 2.3 %, 0.07 %):
+/// second order in the deflection, no modal link of first-order shapes has it.
 #[test]
 fn stiffened_cantilever_follows_the_exact_beam_in_the_spin_up() {
     for case in spin_ups() {
@@ -178,10 +181,11 @@ fn stiffened_cantilever_follows_the_exact_beam_in_the_spin_up() {
     }
 }
 
-/// Without stiffening by load the beam softens as it turns: the linear beam of the same file, up to its divergence.
+/// Without stiffening by load the beam softens as it turns: the linear beam of the same file, up to
+/// its divergence.
 ///
-/// Measured: 3.1e-5, 8.0e-5 and 1.4e-5 m up to 2.4 m, where the exact beams lag by 0.73, 0.44 and 0.53 m. The run ends as
-/// diverged where the deflection passes 3 m.
+/// Measured: 3.1e-5, 8.0e-5 and 1.4e-5 m up to 2.4 m, where the exact beams lag by 0.73, 0.44 and
+/// 0.53 m. The run ends as diverged where the deflection passes 3 m.
 #[test]
 fn cantilever_without_stiffening_softens_as_the_linear_beam_does() {
     for case in spin_ups() {
@@ -204,17 +208,21 @@ fn cantilever_without_stiffening_softens_as_the_linear_beam_does() {
     }
 }
 
-// --- What a free body keeps --------------------------------------------------------------------------------------------
+// --- What a free body keeps
+// --------------------------------------------------------------------------------------------
 
-/// A soft beam with a mass at its tip, flying freely: three slides and three turns without torque, in no gravity.
+/// A soft beam with a mass at its tip, flying freely: three slides and three turns without torque,
+/// in no gravity.
 fn free_flyer() -> FlexibleArm {
     flyer_with_modes_turned_by(0.0)
 }
 
-/// The same with its first two modes, which have one frequency, taken in other directions by this angle.
+/// The same with its first two modes, which have one frequency, taken in other directions by this
+/// angle.
 fn flyer_with_modes_turned_by(angle: f64) -> FlexibleArm {
     let beam = BeamLink::new("beam", Section::Given(bar(1e6, 4e5, 60.0, 0.6, 3e-3)), Material::STEEL, 1.5);
-    // Five modes: with four one of two that have the same frequency would be missing, and which one is nobody's choice.
+    // Five modes: with four one of two that have the same frequency would be missing, and which one
+    // is nobody's choice.
     let modal = Arc::new(turned(beam.modal(5).expect("a beam"), [6, 7], angle));
     let mut body = Mechanism::new("flyer");
     body.gravity = Vector3::zeros();
@@ -267,7 +275,8 @@ fn flyer_with_modes_turned_by(angle: f64) -> FlexibleArm {
     arm.with_servo(servo).expect("a joint that carries a modal link needs no rotor")
 }
 
-/// A link whose coordinates k and l are turned into each other: the same deflections in other coordinates.
+/// A link whose coordinates k and l are turned into each other: the same deflections in other
+/// coordinates.
 fn turned(mut link: ModalLink, [k, l]: [usize; 2], angle: f64) -> ModalLink {
     let n = link.M.nrows();
     let (s, c) = angle.sin_cos();
@@ -338,10 +347,12 @@ fn drift_of_the_flyer(kind: StepperKind, h: f64) -> [f64; 3] {
     worst
 }
 
-/// Truth: conservation of momentum, angular momentum and energy of a body that tumbles and vibrates; it bends by 41 mm.
+/// Truth: conservation of momentum, angular momentum and energy of a body that tumbles and
+/// vibrates; it bends by 41 mm.
 ///
-/// Measured, largest of the three: RK4 at 0.04 ms 2.0e-9 (the gimbals of 1e-9 kg; energy alone 2.5e-10, with half the step
-/// 1.1e-11), reference stepper at 1e-9 2.2e-8, generalised-alpha 8.3e-4, 1.4e-4, 1.6e-5 at 1, 0.5, 0.25 ms.
+/// Measured, largest of the three: RK4 at 0.04 ms 2.0e-9 (the gimbals of 1e-9 kg; energy alone
+/// 2.5e-10, with half the step 1.1e-11), reference stepper at 1e-9 2.2e-8, generalised-alpha
+/// 8.3e-4, 1.4e-4, 1.6e-5 at 1, 0.5, 0.25 ms.
 #[test]
 fn free_flying_modal_body_keeps_momentum_and_energy() {
     let largest = |kind, h| drift_of_the_flyer(kind, h).into_iter().fold(0.0, f64::max);
@@ -356,7 +367,8 @@ fn free_flying_modal_body_keeps_momentum_and_energy() {
     assert!(errors[0] < 1e-3 && errors[2] < errors[0] / 12.0, "{errors:?}");
 }
 
-/// A heavy horizontal cantilever let go undeformed: relative energy drift over `periods` of its first mode.
+/// A heavy horizontal cantilever let go undeformed: relative energy drift over `periods` of its
+/// first mode.
 fn drift_of_the_cantilever(kind: StepperKind, steps_per_period: f64, periods: f64) -> (f64, f64) {
     let beam = BeamLink::new("beam", Section::Circle { diameter: 0.02 }, Material::STEEL, 1.5);
     let modal = Arc::new(beam.modal(1).expect("a beam"));
@@ -394,7 +406,8 @@ fn drift_of_the_cantilever(kind: StepperKind, steps_per_period: f64, periods: f6
     (size, drift)
 }
 
-/// Truth: an undamped cantilever keeps its energy. Relative to the energy of its swing, 50 steps a period, 300 periods:
+/// Truth: an undamped cantilever keeps its energy. Relative to the energy of its swing, 50 steps a
+/// period, 300 periods:
 ///
 /// | scheme | within | drifts by |
 /// | --- | --- | --- |
@@ -403,7 +416,8 @@ fn drift_of_the_cantilever(kind: StepperKind, steps_per_period: f64, periods: f6
 /// | rho 0.9 | | -1.0e-3 |
 /// | rho 0.9 with dispersion correction | | -1.1e-3 |
 ///
-/// RK4 loses 1.3e-6 in 100 periods of 1000 steps (stability asks for so many), 4.3e-8 with 2000: fifth order.
+/// RK4 loses 1.3e-6 in 100 periods of 1000 steps (stability asks for so many), 4.3e-8 with 2000:
+/// fifth order.
 #[test]
 fn undamped_vibration_keeps_its_energy_over_many_periods() {
     let (size, drift) = drift_of_the_cantilever(alpha(1.0, false), 50.0, 300.0);
@@ -419,7 +433,8 @@ fn undamped_vibration_keeps_its_energy_over_many_periods() {
     assert!(losses[0] < 3e-6 && (order - 5.0).abs() < 0.3, "{losses:?} {order}");
 }
 
-// --- Every stepper against every other ---------------------------------------------------------------------------------
+// --- Every stepper against every other
+// ---------------------------------------------------------------------------------
 
 /// Lower and upper arm of the reference arm as beams.
 fn arm_beams() -> [BeamLink; 2] {
@@ -484,9 +499,11 @@ fn distance(arm: &FlexibleArm, a: &[Observation], b: &[Observation]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (tcp(arm, a) - tcp(arm, b)).norm()).fold(0.0, f64::max)
 }
 
-/// Truth: RK4, which differs from the reference stepper at rtol 1e-10 by 9e-11 m. The TCP deflects by 2.6 mm.
+/// Truth: RK4, which differs from the reference stepper at rtol 1e-10 by 9e-11 m. The TCP deflects
+/// by 2.6 mm.
 ///
-/// Measured: generalised-alpha 3.5e-7, 8.7e-8 m at 2, 1 ms, without the dispersion correction 6.4e-6, 1.6e-6: second order.
+/// Measured: generalised-alpha 3.5e-7, 8.7e-8 m at 2, 1 ms, without the dispersion correction
+/// 6.4e-6, 1.6e-6: second order.
 #[test]
 fn steppers_agree_on_the_reference_arm_with_modal_links() {
     let options = ModalOptions { geometric: true, ..ModalOptions::default() };
@@ -525,8 +542,8 @@ fn geared_arm(motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
     arm_of(&mechanism, &springs, motion)
 }
 
-/// Truth: the reference stepper. Measured: 1.44e-5, 4.39e-6, 1.56e-6, 6.4e-7 m at 1, 0.5, 0.25, 0.125 ms, the order falls to
-/// 1.28; at rest 1e-10 of the sag of 5.5 mm.
+/// Truth: the reference stepper. Measured: 1.44e-5, 4.39e-6, 1.56e-6, 6.4e-7 m at 1, 0.5, 0.25,
+/// 0.125 ms, the order falls to 1.28; at rest 1e-10 of the sag of 5.5 mm.
 #[test]
 fn spook_with_gearboxes_converges_with_first_order_and_rests_exactly() {
     let arm = geared_arm(reference_arm_motion());
@@ -552,7 +569,8 @@ fn spook_with_gearboxes_converges_with_first_order_and_rests_exactly() {
     }
 }
 
-// --- Chains of rigid parts ---------------------------------------------------------------------------------------------
+// --- Chains of rigid parts
+// ---------------------------------------------------------------------------------------------
 
 fn chain_arm(parts: usize, motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
     let links: Vec<FlexibleLink> = arm_beams()
@@ -572,7 +590,8 @@ fn chain_arm(parts: usize, motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
     arm_of(&soft.mechanism, &springs, motion)
 }
 
-/// Truth: the modal link of 6 modes with stiffening by load. Largest error of the first four frequencies, and of the sag of the TCP:
+/// Truth: the modal link of 6 modes with stiffening by load. Largest error of the first four
+/// frequencies, and of the sag of the TCP:
 ///
 /// | parts | frequencies | sag | without stiffening |
 /// | --- | --- | --- | --- |
@@ -581,8 +600,9 @@ fn chain_arm(parts: usize, motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
 /// | 5 | 3.1e-4 | 7.3e-4 | |
 /// | 9 | 1.7e-4 | 1.2e-4 | 3.7e-4, 3.6e-4 |
 ///
-/// Second order, down to what is left: chains shorten as they bend and carry that in their mass, shapes of first order do not.
-/// It goes with the load (1.8e-4, 0.9e-4, 0.45e-4 at one, half, a quarter of gravity), as the deflection does.
+/// Second order, down to what is left: chains shorten as they bend and carry that in their mass,
+/// shapes of first order do not. It goes with the load (1.8e-4, 0.9e-4, 0.45e-4 at one, half, a
+/// quarter of gravity), as the deflection does.
 #[test]
 fn chains_of_rigid_parts_converge_to_the_modal_link() {
     let pose = || Arc::new(Held(vec![0.4, 0.7, -0.3, 0.7, 0.6, -1.2]));
@@ -611,9 +631,11 @@ fn chains_of_rigid_parts_converge_to_the_modal_link() {
     assert!(without.0 > 2.0 * nine.0 && without.1 > 2.0 * nine.1, "{without:?} {nine:?}");
 }
 
-// --- Allocations -------------------------------------------------------------------------------------------------------
+// --- Allocations
+// -------------------------------------------------------------------------------------------------------
 
-/// The reference arm with modal links that stiffen, gearboxes of one, three and six stiffnesses and sampled controllers.
+/// The reference arm with modal links that stiffen, gearboxes of one, three and six stiffnesses and
+/// sampled controllers.
 fn everything() -> FlexibleArm {
     let options = ModalOptions { geometric: true, modes: 2, ..ModalOptions::default() };
     let modals = arm_beams().map(|b| Arc::new(b.modal_with(&options).expect("a beam")));
@@ -662,7 +684,8 @@ fn everything() -> FlexibleArm {
     arm.with_servo(Servo { sample_s: 1e-3, axes: (0..6).map(axis).collect(), rigid }).expect("valid")
 }
 
-/// With modal links, gearboxes, play, friction and servos, samples included; and the two steppers agree to 1.5e-7 m or rad.
+/// With modal links, gearboxes, play, friction and servos, samples included; and the two steppers
+/// agree to 1.5e-7 m or rad.
 ///
 /// Every new factor of the corrected matrix allocated.
 #[test]
@@ -687,7 +710,8 @@ fn steps_do_not_allocate_with_modal_links_and_drives() {
     assert!(error < 5e-7, "{error}");
 }
 
-// --- Modes that are eliminated first -------------------------------------------------------------------------------------
+// --- Modes that are eliminated first
+// -------------------------------------------------------------------------------------
 
 /// The same system, which does not say which of its coordinates are modes.
 struct Dense(ReducedArm);
@@ -737,8 +761,9 @@ fn states(
     (states, alpha.counts())
 }
 
-/// Truth: the dense matrices of the same arm, inverted as a whole. The arm begins with its springs relaxed, so it rings.
-/// Measured: 5e-14 of the largest deflection, at rho 0; the same iterations and factorisations.
+/// Truth: the dense matrices of the same arm, inverted as a whole. The arm begins with its springs
+/// relaxed, so it rings. Measured: 5e-14 of the largest deflection, at rho 0; the same iterations
+/// and factorisations.
 #[test]
 fn a_run_with_its_modes_eliminated_is_the_dense_run() {
     for (modes, beta, h) in [(8, 1e-3, 1e-3), (12, 1e-5, 5e-4), (20, 1e-3, 2e-3)] {

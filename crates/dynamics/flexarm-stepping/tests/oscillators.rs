@@ -89,8 +89,9 @@ fn generalized_alpha_is_of_second_order() {
     }
 }
 
-/// The dispersion correction takes most of the second-order error away; measured 4.8e-6, 4.9e-6, 5.2e-6 at 1 ms for
-/// rho = 1, 0.9, 0.8 instead of 3.4e-4 to 3.6e-4 (a scheme that corrected x but kept the plain a had 2.0e-5 at 0.9). What is left is the damping force's share, 2 zeta of it.
+/// The dispersion correction takes most of the second-order error away; measured 4.8e-6, 4.9e-6,
+/// 5.2e-6 at 1 ms for rho = 1, 0.9, 0.8 instead of 3.4e-4 to 3.6e-4 (a scheme that corrected x but
+/// kept the plain a had 2.0e-5 at 0.9). What is left is the damping force's share, 2 zeta of it.
 #[test]
 fn dispersion_correction_cancels_the_leading_error() {
     for rho in [0.8, 0.9, 1.0] {
@@ -140,7 +141,8 @@ fn rk4_is_of_fourth_order() {
     assert!((order - 4.0).abs() < 0.1, "{order}");
 }
 
-/// Energy of an undamped oscillator: kept to rounding for rho = 1 (measured 3e-13), lost for rho < 1.
+/// Energy of an undamped oscillator: kept to rounding for rho = 1 (measured 3e-13), lost for rho <
+/// 1.
 #[test]
 fn spectral_radius_one_keeps_the_energy_and_less_loses_it() {
     let energy_after = |rho: f64| {
@@ -202,7 +204,8 @@ fn spook_on_a_linear_oscillator_is_the_known_recurrence() {
     }
 }
 
-/// Without damping its frequency error is of second order: `ω_h = (2/h) asin(hω/2 / sqrt(1 + (hω)²/4))`.
+/// Without damping its frequency error is of second order:
+/// `ω_h = (2/h) asin(hω/2 / sqrt(1 + (hω)²/4))`.
 #[test]
 fn spook_frequency_is_accurate_to_second_order() {
     let (m, k) = (3.0f64, 4e3f64);
@@ -233,8 +236,9 @@ fn spook_frequency_is_accurate_to_second_order() {
     assert!((order - 2.0).abs() < 0.1, "{order}");
 }
 
-/// Truth: a damped oscillator under a constant force, `x = F/k (1 - e^(-ζωt) (cos wt + ζω/w sin wt))`. The error of every
-/// stepper that takes the steps it is given falls at least with the power of the step that its entry says.
+/// Truth: a damped oscillator under a constant force,
+/// `x = F/k (1 - e^(-ζωt) (cos wt + ζω/w sin wt))`. The error of every stepper that takes the steps
+/// it is given falls at least with the power of the step that its entry says.
 #[test]
 fn every_stepper_is_of_the_order_that_it_states() {
     let (m, k, zeta, F, t) = (3.0f64, 4e3f64, 0.05f64, 20.0, 0.2f64);
@@ -260,7 +264,8 @@ fn every_stepper_is_of_the_order_that_it_states() {
     }
 }
 
-/// Modal damping gives every mode the ratio asked for: from the eigenvalues of the damped system; measured 1e-12.
+/// Modal damping gives every mode the ratio asked for: from the eigenvalues of the damped system;
+/// measured 1e-12.
 #[test]
 fn modal_damping_gives_every_mode_its_ratio() {
     let reference = flexarm_testkit::reference_arm(true);

@@ -64,7 +64,8 @@ fn assert_equal_alone(stiffness: f64, F: &Wrench) -> usize {
     answered
 }
 
-/// Truth: each pose alone. Under the last load the softest arm moves by metres, far from the plain way that lanes go.
+/// Truth: each pose alone. Under the last load the softest arm moves by metres, far from the plain
+/// way that lanes go.
 #[test]
 fn every_pose_among_many_has_the_bits_of_the_pose_alone() {
     let (force, moment) = (Vector3::new(20.0, -35.0, 60.0), Vector3::new(3.0, 8.0, -5.0));

@@ -9,7 +9,8 @@ use nalgebra::{DMatrix, DVector};
 
 use ReferenceMethod::{Bdf, Esdirk34, Tsit45};
 
-/// `ẍ + 2 ζ ω ẋ + ω² x = load(t)`, uncoupled; it has no matrices, the reference stepper asks for none.
+/// `ẍ + 2 ζ ω ẋ + ω² x = load(t)`, uncoupled; it has no matrices, the reference stepper asks for
+/// none.
 struct Oscillators<F> {
     omega: Vec<f64>,
     zeta: f64,
@@ -79,7 +80,8 @@ fn run<F: Fn(f64) -> f64>(
 
 const OMEGA: f64 = TAU * 10.0;
 
-/// Truth: `x = cos ω t`, ten periods. Measured, over the tolerance: BDF 12 to 170, ESDIRK 60 to 330, explicit 2 to 3.
+/// Truth: `x = cos ω t`, ten periods. Measured, over the tolerance: BDF 12 to 170, ESDIRK 60 to
+/// 330, explicit 2 to 3.
 #[test]
 fn harmonic_oscillator_keeps_its_closed_form_to_the_tolerance() {
     for method in METHODS {
@@ -108,7 +110,8 @@ fn harmonic_oscillator_keeps_its_closed_form_to_the_tolerance() {
     }
 }
 
-/// `ẍ + 2 ζ ω ẋ + ω² x = f sin p t` from rest: driven part and the free vibration that cancels it at the start.
+/// `ẍ + 2 ζ ω ẋ + ω² x = f sin p t` from rest: driven part and the free vibration that cancels it
+/// at the start.
 fn driven(t: f64, zeta: f64, f: f64, p: f64) -> [f64; 2] {
     let (a, b) = (OMEGA * OMEGA - p * p, 2.0 * zeta * OMEGA * p);
     let (s, c) = (f * a / (a * a + b * b), -f * b / (a * a + b * b));
@@ -121,7 +124,8 @@ fn driven(t: f64, zeta: f64, f: f64, p: f64) -> [f64; 2] {
     ]
 }
 
-/// Truth: the closed form above. Measured at 1e-8, over the tolerance times the amplitude: BDF 24, ESDIRK 100, explicit 0.3.
+/// Truth: the closed form above. Measured at 1e-8, over the tolerance times the amplitude: BDF 24,
+/// ESDIRK 100, explicit 0.3.
 #[test]
 fn damped_driven_oscillator_keeps_its_closed_form() {
     let (zeta, p) = (0.05, 47.0);
@@ -135,7 +139,8 @@ fn damped_driven_oscillator_keeps_its_closed_form() {
     }
 }
 
-/// Points inside the solver's steps are as good as its own: ten thousand points, hundreds to a step, against a hundred.
+/// Points inside the solver's steps are as good as its own: ten thousand points, hundreds to a
+/// step, against a hundred.
 ///
 /// Measured: the largest errors differ by 5 % at most.
 #[test]
@@ -160,11 +165,12 @@ fn after_jump(t: f64, s: f64) -> [f64; 2] {
     [1.0 - u.cos(), OMEGA * u.sin()]
 }
 
-/// Truth: the closed form above; s at a point, between points, and known to the system as the last time before the jump or
-/// as the first one after it.
+/// Truth: the closed form above; s at a point, between points, and known to the system as the last
+/// time before the jump or as the first one after it.
 ///
-/// Measured: BDF 8.2e-7 at a tolerance of 1e-8, ESDIRK 1.5e-4 at 1e-6, explicit 2.8e-8 at 1e-8, with 4 to 10 % fewer
-/// evaluations than without the restart; the error is the same, because the step control finds the jump by itself.
+/// Measured: BDF 8.2e-7 at a tolerance of 1e-8, ESDIRK 1.5e-4 at 1e-6, explicit 2.8e-8 at 1e-8,
+/// with 4 to 10 % fewer evaluations than without the restart; the error is the same, because the
+/// step control finds the jump by itself.
 #[test]
 fn restart_at_a_jump_of_the_load_keeps_the_accuracy() {
     let f = OMEGA * OMEGA;
@@ -251,8 +257,9 @@ fn restart_may_be_announced_late_and_twice() {
 
 /// A load of 20 ms after half a second of rest: no step is so long that it passes over the load.
 ///
-/// Truth: the same run of the explicit method at 1e-9 with restarts at both ends of the load. Measured: 1e-2 of the
-/// end at a tolerance of 1e-3, 5e-6 to 1e-4 at 1e-6. A longest step that was rejected once counted as a restart here.
+/// Truth: the same run of the explicit method at 1e-9 with restarts at both ends of the load.
+/// Measured: 1e-2 of the end at a tolerance of 1e-3, 5e-6 to 1e-4 at 1e-6. A longest step that was
+/// rejected once counted as a restart here.
 #[test]
 fn a_pulse_after_a_long_rest_is_seen() {
     let pulse = |t: f64| if (0.507..0.527).contains(&t) { (25.0 * TAU * (t - 0.507)).sin().powi(2) * 1e3 } else { 0.0 };
@@ -271,10 +278,12 @@ fn a_pulse_after_a_long_rest_is_seen() {
     }
 }
 
-/// What each method is for: a slow oscillator beside one of 5 kHz that hardly moves, driven for a second.
+/// What each method is for: a slow oscillator beside one of 5 kHz that hardly moves, driven for a
+/// second.
 ///
-/// Measured evaluations at 1e-6, BDF / ESDIRK / explicit: 110 700, 6 160, 134 773 with 1 % damping; 1 447, 3 802, 74 029
-/// with 90 %: only the A-stable method steps over a lightly damped fast mode, BDF over a damped one.
+/// Measured evaluations at 1e-6, BDF / ESDIRK / explicit: 110 700, 6 160, 134 773 with 1 % damping;
+/// 1 447, 3 802, 74 029 with 90 %: only the A-stable method steps over a lightly damped fast mode,
+/// BDF over a damped one.
 #[test]
 fn a_fast_mode_is_stepped_over_by_the_method_made_for_it() {
     let count = |method: ReferenceMethod, zeta: f64| {
@@ -298,7 +307,8 @@ fn a_fast_mode_is_stepped_over_by_the_method_made_for_it() {
     }
 }
 
-/// A system that fails, a system that runs away and tolerances that make no sense end with their own words.
+/// A system that fails, a system that runs away and tolerances that make no sense end with their
+/// own words.
 #[test]
 fn failures_say_what_happened() {
     struct Failing(Option<StepError>);

@@ -1,4 +1,5 @@
-//! Derivatives of whole runs: closed form of one mass, Richardson differences of runs of the reference arm.
+//! Derivatives of whole runs: closed form of one mass, Richardson differences of runs of the
+//! reference arm.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
@@ -54,7 +55,8 @@ fn fall(m: f64, k: f64, d: f64, t: f64) -> [f64; 4] {
     ]
 }
 
-/// Truth: closed form. The derivatives converge as the run itself does, with the second power of the step.
+/// Truth: closed form. The derivatives converge as the run itself does, with the second power of
+/// the step.
 #[test]
 fn a_falling_mass_depends_on_mass_spring_and_damper_as_in_closed_form() {
     let (m, k, d) = (10.0, 1.6e4, 60.0);
@@ -256,7 +258,8 @@ impl Case {
         DVector::from_iterator(6 * found.errors.len() + 4, found.errors.iter().flatten().copied().chain(figures))
     }
 
-    /// Largest error of each direction over its largest entry: along the run, and of the four figures.
+    /// Largest error of each direction over its largest entry: along the run, and of the four
+    /// figures.
     fn compare(&self, name: &str, bound: f64) {
         let arm = self.arm(What::Tool, 0.0);
         let directions = ALL.map(|what| self.direction(what));
@@ -317,7 +320,8 @@ fn loads_that_jump_and_turn_and_balancers_are_in_the_derivatives() {
     Case { tree, loaded: true, settings: AlphaSettings::default() }.compare("loads and balancers", 1e-8);
 }
 
-/// An ordinary run ends its iterations early and keeps its matrices: what that does is small beside the run, and beside its error.
+/// An ordinary run ends its iterations early and keeps its matrices: what that does is small beside
+/// the run, and beside its error.
 #[test]
 fn the_run_that_is_differentiated_is_the_ordinary_run_but_for_what_iterations_leave() {
     let case = Case { tree: reference_arm(true).mechanism, loaded: false, settings: AlphaSettings::default() };

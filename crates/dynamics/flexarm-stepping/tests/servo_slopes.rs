@@ -1,5 +1,5 @@
-//! Derivatives of runs of joints under servos, of gears with laws of their own and of payloads that change: against Richardson differences
-//! of whole runs.
+//! Derivatives of runs of joints under servos, of gears with laws of their own and of payloads that
+//! change: against Richardson differences of whole runs.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
@@ -91,7 +91,8 @@ fn inertia(mass: f64) -> LinkInertia {
     LinkInertia { mass, com: vector![0.03, -0.02, 0.25], inertia_com: moments }
 }
 
-/// About z, y, y, a motor and a gear at each; the second link bends in its middle. `factor` on all inertias and the weight.
+/// About z, y, y, a motor and a gear at each; the second link bends in its middle. `factor` on all
+/// inertias and the weight.
 fn tree(elastic: bool, factor: f64) -> Mechanism {
     let mut tree = Mechanism::new("arm");
     let link = |name: &str, inertia: Option<LinkInertia>| Link { name: name.into(), inertia };
@@ -412,7 +413,8 @@ impl Case {
             What::Integral => 300.0,
             _ => 0.02,
         };
-        // So short that no torque changes its sign and no slider or servo begins to slip or to be at its limit at another sample.
+        // So short that no torque changes its sign and no slider or servo begins to slip or to be
+        // at its limit at another sample.
         let kinked = [Gears::Hysteresis, Gears::LoadFriction].contains(&self.gears) || self.limit.is_finite();
         if kinked { 0.02 * size } else { size }
     }

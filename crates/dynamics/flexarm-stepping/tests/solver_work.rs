@@ -1,7 +1,9 @@
-//! What a run costs each stepper: steps, evaluations of the equations of motion (Newton iterations) and factorisations.
+//! What a run costs each stepper: steps, evaluations of the equations of motion (Newton iterations)
+//! and factorisations.
 //!
-//! These numbers only show change: the program itself printed them. A change that gives the same results and works twice as
-//! hard is seen here. Whoever means it writes the new numbers down; a new stepper gets a line.
+//! These numbers only show change: the program itself printed them. A change that gives the same
+//! results and works twice as hard is seen here. Whoever means it writes the new numbers down; a
+//! new stepper gets a line.
 #![allow(non_snake_case, reason = "monogram notation")]
 
 use std::sync::Arc;
@@ -10,7 +12,8 @@ use flexarm_kinematics::Model;
 use flexarm_stepping::*;
 use flexarm_testkit::{reference_arm, reference_motion};
 
-/// Stepper, step (s), then the work: steps, evaluations, factorisations. The reference takes steps of its own.
+/// Stepper, step (s), then the work: steps, evaluations, factorisations. The reference takes steps
+/// of its own.
 const WORK: [(&str, f64, [u64; 3]); 6] = [
     ("generalized-alpha", 1e-3, [500, 553, 15]),
     ("spook", 1e-3, [500, 500, 500]),
@@ -20,7 +23,8 @@ const WORK: [(&str, f64, [u64; 3]); 6] = [
     ("extrapolated-alpha", 1e-3, [500, 1860, 60]),
 ];
 
-/// Half a second of the motion of the reference arm, with default settings and modal damping of 3 %.
+/// Half a second of the motion of the reference arm, with default settings and modal damping of 3
+/// %.
 #[test]
 fn every_stepper_works_as_hard_as_it_did() {
     let reference = reference_arm(true);

@@ -53,7 +53,8 @@ fn with_the_position_alone_the_joints_move_as_little_as_they_can() {
     assert!(some.after.amax() < 1e-12 && way(&some) < way(&all), "{} {}", way(&some), way(&all));
 }
 
-/// Truth: Richardson differences of the equilibrium of [`OperatingPoint`], on an arm that sags by 4 cm under a load besides.
+/// Truth: Richardson differences of the equilibrium of [`OperatingPoint`], on an arm that sags by 4
+/// cm under a load besides.
 #[test]
 fn the_tool_at_rest_moves_with_each_command_as_its_equilibrium_does() {
     let (arm, tool) = arm(20.0);

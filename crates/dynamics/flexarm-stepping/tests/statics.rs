@@ -58,7 +58,8 @@ fn any_length() -> impl Iterator<Item = StepperKind> {
     entries.map(|entry| (entry.with)(&StepperOptions::default()))
 }
 
-/// Truth: Newton statics `K e + g(e) = 0`. Measured: generalised-alpha 2e-16 m, SPOOK 5e-13 m of 1.9 mm.
+/// Truth: Newton statics `K e + g(e) = 0`. Measured: generalised-alpha 2e-16 m, SPOOK 5e-13 m of
+/// 1.9 mm.
 #[test]
 fn static_deflection_does_not_depend_on_the_step() {
     for loaded in [false, true] {
@@ -88,7 +89,8 @@ fn static_deflection(arm: &FlexibleArm) -> f64 {
     (sagging - at(Start::Undeformed)).norm()
 }
 
-/// Started undeformed and damped to rest, every stepper finds the static pose by itself; measured 2e-12 to 4e-10.
+/// Started undeformed and damped to rest, every stepper finds the static pose by itself; measured
+/// 2e-12 to 4e-10.
 #[test]
 fn a_ringing_arm_settles_on_the_static_pose() {
     let arm = arm(2e-2, true);
@@ -102,7 +104,8 @@ fn a_ringing_arm_settles_on_the_static_pose() {
     }
 }
 
-/// The global form leaves out a moment d × f: its rest differs by the size of the deflection, not of the step.
+/// The global form leaves out a moment d × f: its rest differs by the size of the deflection, not
+/// of the step.
 #[test]
 fn global_constraints_rest_near_the_static_pose() {
     let arm = arm(2e-2, true);
@@ -115,8 +118,8 @@ fn global_constraints_rest_near_the_static_pose() {
     assert!((errors[0] - errors[1]).abs() < 1e-7);
 }
 
-/// Truth: the drives' torques at rest are the gravity torques of the sagging arm, in every stepper from the first
-/// sample on; measured 2.6e-10.
+/// Truth: the drives' torques at rest are the gravity torques of the sagging arm, in every stepper
+/// from the first sample on; measured 2.6e-10.
 #[test]
 fn drives_carry_the_weight_from_the_first_sample_on() {
     let arm = arm(1e-3, false);
@@ -141,8 +144,9 @@ fn drives_carry_the_weight_from_the_first_sample_on() {
     }
 }
 
-/// Truth: the fastest decay of an overdamped mode, `(d + sqrt(d² - 4 omega²))/2` with `d = 2 ζ omega`, against the real limit of RK4,
-/// 2.78. The damping itself, d, would refuse steps up to twice too small.
+/// Truth: the fastest decay of an overdamped mode, `(d + sqrt(d² - 4 omega²))/2` with
+/// `d = 2 ζ omega`, against the real limit of RK4, 2.78. The damping itself, d, would refuse steps
+/// up to twice too small.
 #[test]
 fn rk4_takes_steps_up_to_the_decay_of_an_overdamped_mode() {
     let undamped = arm(0.0, false);

@@ -1,4 +1,5 @@
-//! Derivatives of runs of arms with closed loops, with links in modes, and along motions with corners: against differences of whole runs.
+//! Derivatives of runs of arms with closed loops, with links in modes, and along motions with
+//! corners: against differences of whole runs.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
@@ -46,7 +47,8 @@ fn richardson(size: f64, f: impl Fn(f64) -> DVector<f64>) -> DVector<f64> {
     d(1.0) * 0.8 - d(2.0) * 0.2 + d(3.0) * (4.0 / 105.0) - d(4.0) / 280.0
 }
 
-// --- Closed loops and links in modes -----------------------------------------------------------------------------------
+// --- Closed loops and links in modes
+// -----------------------------------------------------------------------------------
 
 /// An arm whose forces are differenced: what changes is a spring, a mass, the motion, the tool.
 struct Other {
@@ -187,7 +189,8 @@ fn arms_with_closed_loops_are_differentiated() {
     }
 }
 
-/// The reference arm whose upper arm is one link, a tube of six modes; with servos a rotor on each joint.
+/// The reference arm whose upper arm is one link, a tube of six modes; with servos a rotor on each
+/// joint.
 fn modal_arm(damping: Damping, servo: bool) -> Other {
     let mut arm = reference_arm(false).mechanism;
     arm.links.retain(|link| link.name != "link4b");
@@ -224,9 +227,11 @@ fn arms_with_links_in_modes_are_differentiated() {
     }
 }
 
-// --- Corners -----------------------------------------------------------------------------------------------------------
+// --- Corners
+// -----------------------------------------------------------------------------------------------------------
 
-/// The reference arm, at rest until 0.05 s and from 0.13 s on, in between with the speeds of its motion; or moving from the start.
+/// The reference arm, at rest until 0.05 s and from 0.13 s on, in between with the speeds of its
+/// motion; or moving from the start.
 struct Corners {
     from: f64,
     stretch: f64,

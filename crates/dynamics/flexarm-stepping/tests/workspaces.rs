@@ -65,8 +65,8 @@ fn payload(arm: &FlexibleArm, t: f64) -> InertiaChange {
     InertiaChange { t, body, inertia }
 }
 
-/// Truth: the same run of an arm that has run nothing before. In between the arm runs other motions, under loads, with payloads that
-/// come before and during a run.
+/// Truth: the same run of an arm that has run nothing before. In between the arm runs other
+/// motions, under loads, with payloads that come before and during a run.
 #[test]
 fn a_run_has_the_same_bits_with_new_and_with_used_workspaces() {
     let shared = arm();
@@ -101,7 +101,8 @@ fn the_second_run_of_an_arm_takes_less_memory_than_the_first() {
     assert!(second + 50 < first, "{second} and {first} allocations");
 }
 
-/// Truth: poses with the springs bent and with the springs at zero; energy and loads by the stiffness matrix.
+/// Truth: poses with the springs bent and with the springs at zero; energy and loads by the
+/// stiffness matrix.
 #[test]
 fn displacement_energy_and_loads_are_those_of_their_definitions() {
     let arm = arm();

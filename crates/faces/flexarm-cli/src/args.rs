@@ -56,13 +56,17 @@ pub(crate) enum Command {
     Motion(Later<MotionArgs>),
     /// Find a robot's stiffness from measurements, and the poses that are worth measuring
     Identify(Later<IdentifyArgs>),
-    /// Find the motion with which the flexible arm's tool follows the rigid one's, and judge it on other plants
+    /// Find the motion with which the flexible arm's tool follows the rigid one's, and judge it on
+    /// other plants
     Compensate(Later<CompensateArgs>),
-    /// How the tool's error along a motion depends on every number of the robot: derivatives of one run, for all at once
+    /// How the tool's error along a motion depends on every number of the robot: derivatives of one
+    /// run, for all at once
     Sensitivity(Later<SensitivityArgs>),
-    /// Sag, stiffness and frequencies over the workspace, over joints or along a motion, and where to put a workpiece
+    /// Sag, stiffness and frequencies over the workspace, over joints or along a motion, and where
+    /// to put a workpiece
     Map(Later<MapArgs>),
-    /// Run a study: many runs with other payloads, stiffness, speeds, options; tables, sensitivities, shards
+    /// Run a study: many runs with other payloads, stiffness, speeds, options; tables,
+    /// sensitivities, shards
     Sweep(Box<SweepArgs>),
     /// Equilibrium under weight and load at a pose, and the compliance of the TCP
     Statics(Later<StaticsArgs>),
@@ -173,9 +177,11 @@ impl ModellingArgs {
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "All options, by groups: --help")]
 pub(crate) struct RunArgs {
-    /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot [default: kr210]
+    /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot
+    /// [default: kr210]
     pub(crate) robot: Option<PathBuf>,
-    /// Motion of any format (flexarm format motion), or the name of a shipped one [default: the robot's own]
+    /// Motion of any format (flexarm format motion), or the name of a shipped one [default: the
+    /// robot's own]
     pub(crate) trajectory: Option<PathBuf>,
     /// Time stepper
     #[arg(long, help_heading = "Stepper", value_name = "NAME", value_parser = stepper_words(), default_value = STEPPERS[0].name)]
@@ -227,7 +233,8 @@ pub(crate) struct RunArgs {
     /// Preset of spook: exact formulas, or those of the method's source
     #[arg(long, help_heading = "Stepper", hide_short_help = true, value_enum, default_value_t = PresetName::Exact)]
     pub(crate) spook_preset: PresetName,
-    /// Relative tolerance of reference, which chooses its steps by error control; --step is then the distance of the points
+    /// Relative tolerance of reference, which chooses its steps by error control; --step is then
+    /// the distance of the points
     #[arg(
         long,
         help_heading = "Stepper",
@@ -250,19 +257,20 @@ pub(crate) struct RunArgs {
         allow_hyphen_values = true
     )]
     pub(crate) settling_band: f64,
-    /// One more run beside this one, with some options changed: links=modal, or stepper=spook,step=5e-4,name=spook, or
-    /// robot=..., trajectory=... (may be repeated; compare only)
+    /// One more run beside this one, with some options changed: links=modal, or
+    /// stepper=spook,step=5e-4,name=spook, or robot=..., trajectory=... (may be repeated; compare
+    /// only)
     #[arg(long, help_heading = "Results", value_name = "KEY=VALUE,...")]
     pub(crate) with: Vec<String>,
     /// Factor by which recordings and pictures show deflections [default: so that they are seen]
     #[arg(long, help_heading = "Results", hide_short_help = true, value_name = "FACTOR", allow_hyphen_values = true)]
     pub(crate) magnify: Option<f64>,
-    /// When the run begins in recordings whose times have a date (MCAP), as seconds since 1970 [default: 946684800, the
-    /// first of January 2000, so that equal runs are equal files]
+    /// When the run begins in recordings whose times have a date (MCAP), as seconds since 1970
+    /// [default: 946684800, the first of January 2000, so that equal runs are equal files]
     #[arg(long, value_name = "now|SECONDS", value_parser = parse_start_time, allow_hyphen_values = true)]
     pub(crate) start_time: Option<u64>,
-    /// Write the mesh files into the robot description of the MCAP, so that it has its shapes on any machine (Foxglove
-    /// draws them; Rerun and RViz want files)
+    /// Write the mesh files into the robot description of the MCAP, so that it has its shapes on
+    /// any machine (Foxglove draws them; Rerun and RViz want files)
     #[arg(long)]
     pub(crate) embed_meshes: bool,
     /// Output folder [default: a new one in out/]
@@ -271,7 +279,8 @@ pub(crate) struct RunArgs {
     /// Overwrite what is in the output folder
     #[arg(long, help_heading = "Files")]
     pub(crate) force: bool,
-    /// Write a folder "figures" for papers too: plots as SVG with their data as CSV, pictures of the arm as PNG
+    /// Write a folder "figures" for papers too: plots as SVG with their data as CSV, pictures of
+    /// the arm as PNG
     #[arg(long, help_heading = "Files", hide_short_help = true)]
     pub(crate) figures: bool,
     /// Write the table as Parquet too (run.parquet); not readable before the run ends

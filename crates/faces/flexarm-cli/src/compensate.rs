@@ -43,7 +43,8 @@ pub(crate) enum ShaperName {
     Zv,
     /// Three copies: forgives a frequency that is off, takes twice as long
     Zvd,
-    /// What leaves least of all modes that the motion makes swing within --delay, their frequencies off by up to --band
+    /// What leaves least of all modes that the motion makes swing within --delay, their frequencies
+    /// off by up to --band
     Optimal,
 }
 
@@ -62,7 +63,8 @@ pub(crate) enum LimitName {
 pub(crate) struct CompensateArgs {
     /// robot.toml, a folder with one, or the name of a shipped robot
     pub(crate) robot: PathBuf,
-    /// Motion of any format (flexarm format motion), or the name of a shipped one [default: the robot's own]
+    /// Motion of any format (flexarm format motion), or the name of a shipped one [default: the
+    /// robot's own]
     pub(crate) motion: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) input: MotionInputArgs,
@@ -87,10 +89,12 @@ pub(crate) struct CompensateArgs {
     /// Part by which each frequency may be off, for the optimal shaper [default: 0.1]
     #[arg(long, value_name = "PART")]
     pub(crate) band: Option<f64>,
-    /// Loads and payloads over time (TOML, see docs/loads.md) that act on the arm: forces of a process
+    /// Loads and payloads over time (TOML, see docs/loads.md) that act on the arm: forces of a
+    /// process
     #[arg(long, value_name = "FILE")]
     pub(crate) loads: Option<PathBuf>,
-    /// What becomes of commands that pass a limit of position, speed, acceleration or torque which the motion itself keeps
+    /// What becomes of commands that pass a limit of position, speed, acceleration or torque which
+    /// the motion itself keeps
     #[arg(long, value_enum, default_value = "slow")]
     pub(crate) limits: LimitName,
     /// Greatest acceleration of each joint in order (rad/s² or m/s²) [default: not looked at]
@@ -112,8 +116,8 @@ pub(crate) struct CompensateArgs {
     /// Folder of the new motion and the page [default: a new one in out/]
     #[arg(short, long, help_heading = "Files", value_name = "FOLDER")]
     pub(crate) output: Option<PathBuf>,
-    /// Write the new motion to this file too, by its ending: .csv (samples), .toml, .yaml or .json (JointTrajectory of ROS);
-    /// may be repeated
+    /// Write the new motion to this file too, by its ending: .csv (samples), .toml, .yaml or .json
+    /// (JointTrajectory of ROS); may be repeated
     #[arg(long, help_heading = "Files", value_name = "FILE")]
     pub(crate) write: Vec<PathBuf>,
     /// No recording of the arm before and after

@@ -46,7 +46,8 @@ pub(crate) struct ImportArgs {
     /// Which rows or nodes are which interface, proximal first, such as A=1001,B=1002
     #[arg(long, value_name = "NAME=ROWS,...", help_heading = "Interfaces")]
     pub(crate) map: Option<ImportMap>,
-    /// Frame of an interface in the link frame: x,y,z or x,y,z,roll,pitch,yaw (unit of the file, rad; repeat)
+    /// Frame of an interface in the link frame: x,y,z or x,y,z,roll,pitch,yaw (unit of the file,
+    /// rad; repeat)
     #[arg(long, value_name = "NAME=PLACE", help_heading = "Interfaces")]
     pub(crate) at: Vec<FrameAt>,
     /// File of the mass, if its name does not tell
@@ -91,13 +92,15 @@ pub(crate) struct ImportArgs {
     /// Distal rigid part, likewise
     #[arg(long, value_name = "PART", value_parser = parse_part, requires = "part_a", conflicts_with = "mass", help_heading = "Mass of the link", hide_short_help = true)]
     pub(crate) part_b: Option<RigidPart>,
-    /// Where the elastic joint of the two parts sits: elastic-centre, mid, a fraction of the way from A to B, or x,y,z
+    /// Where the elastic joint of the two parts sits: elastic-centre, mid, a fraction of the way
+    /// from A to B, or x,y,z
     #[arg(long, value_name = "WHERE", value_parser = parse_split, allow_hyphen_values = true, help_heading = "Mass of the link", hide_short_help = true)]
     pub(crate) split: Option<Split>,
     /// Name of the link [default: that of the file]
     #[arg(long, value_name = "NAME", help_heading = "Files")]
     pub(crate) name: Option<String>,
-    /// Output folder for link file, figures and report [default: a new one in out/, or none with --flex]
+    /// Output folder for link file, figures and report [default: a new one in out/, or none with
+    /// --flex]
     #[arg(short, long, value_name = "FOLDER", help_heading = "Files")]
     pub(crate) output: Option<PathBuf>,
     /// Write the link file (also) here
@@ -122,7 +125,8 @@ pub(crate) struct ExportArgs {
     /// Units to write: m-kg-s (N), mm-t-s (N, MPa), ...
     #[arg(long, value_name = "LENGTH-MASS-TIME", help_heading = "Matrices")]
     pub(crate) units: UnitsOfFile,
-    /// Node numbers of the interfaces in formats that have some, proximal first [default: 1001,1002,...; 1,2,... for sid]
+    /// Node numbers of the interfaces in formats that have some, proximal first [default:
+    /// 1001,1002,...; 1,2,... for sid]
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', help_heading = "Interfaces")]
     pub(crate) nodes: Vec<i64>,
     /// Output folder [default: a new one in out/]

@@ -1,5 +1,5 @@
-//! What ends a command: an error of the library, of the case studies, or words on the command line that make no sense; its
-//! message, and the code that the process ends with.
+//! What ends a command: an error of the library, of the case studies, or words on the command line
+//! that make no sense; its message, and the code that the process ends with.
 
 use std::process::ExitCode;
 

@@ -29,12 +29,14 @@ The file of measurements: flexarm format measurements";
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct IdentifyArgs {
-    /// robot.toml, a folder with one, or the name of a shipped robot; its stiffnesses are the first guess
+    /// robot.toml, a folder with one, or the name of a shipped robot; its stiffnesses are the first
+    /// guess
     pub(crate) robot: PathBuf,
     /// What was measured (.toml)
     #[arg(required_unless_present = "plan")]
     pub(crate) measurements: Option<PathBuf>,
-    /// Find these parameters, * for anything (may be repeated) [default: those of the file, else all stiffnesses]
+    /// Find these parameters, * for anything (may be repeated) [default: those of the file, else
+    /// all stiffnesses]
     #[arg(long, value_name = "NAME")]
     pub(crate) fit: Vec<String>,
     #[command(flatten)]
@@ -44,7 +46,8 @@ pub(crate) struct IdentifyArgs {
     /// Choose N poses that tell the parameters best, instead of reading measurements
     #[arg(long, help_heading = "Plan", value_name = "N", conflicts_with = "measurements")]
     pub(crate) plan: Option<usize>,
-    /// Forces among which the plan chooses, world axes (N; may be repeated) [default: 500 N down, along x and along y]
+    /// Forces among which the plan chooses, world axes (N; may be repeated) [default: 500 N down,
+    /// along x and along y]
     #[arg(
         long = "pull",
         help_heading = "Plan",
@@ -53,19 +56,22 @@ pub(crate) struct IdentifyArgs {
         allow_hyphen_values = true
     )]
     pub(crate) forces: Vec<String>,
-    /// Points of the tool at which the forces may act, tool axes (m; may be repeated) [default: the TCP]
+    /// Points of the tool at which the forces may act, tool axes (m; may be repeated) [default: the
+    /// TCP]
     #[arg(long = "lever", help_heading = "Plan", value_name = "X,Y,Z", requires = "plan", allow_hyphen_values = true)]
     pub(crate) levers: Vec<String>,
     /// Points of the tool that may be watched, tool axes (m; may be repeated) [default: the TCP]
     #[arg(long = "point", help_heading = "Plan", value_name = "X,Y,Z", requires = "plan", allow_hyphen_values = true)]
     pub(crate) points: Vec<String>,
-    /// Directions along which a dial gauge may stand, world axes (may be repeated) [default: all three numbers are read]
+    /// Directions along which a dial gauge may stand, world axes (may be repeated) [default: all
+    /// three numbers are read]
     #[arg(long = "gauge", help_heading = "Plan", value_name = "X,Y,Z", requires = "plan", allow_hyphen_values = true)]
     pub(crate) gauges: Vec<String>,
     /// Standard deviation of a measured displacement (m)
     #[arg(long, help_heading = "Plan", value_name = "M", requires = "plan", default_value_t = 3e-5)]
     pub(crate) std: f64,
-    /// Poses among which the plan chooses (.csv, a column per joint, rad or m) [default: spread over the joint ranges]
+    /// Poses among which the plan chooses (.csv, a column per joint, rad or m) [default: spread
+    /// over the joint ranges]
     #[arg(long, help_heading = "Plan", value_name = "FILE", requires = "plan")]
     pub(crate) poses: Option<PathBuf>,
     /// Poses where the work will be done (.csv): the plan makes the tool's error there sure

@@ -1,14 +1,15 @@
 //! Arguments of a command that are told to the parser when the command is called.
 //!
-//! The flags of all commands are a thousand allocations before a line is read; those of one command are few.
+//! The flags of all commands are a thousand allocations before a line is read; those of one command
+//! are few.
 
 use std::ops::Deref;
 
 use clap::builder::Resettable;
 use clap::{ArgMatches, Args, Command, Error, FromArgMatches};
 
-/// Arguments of a subcommand without commands of its own, which completions of `help` would miss; help, errors and completions are
-/// those of `T` by itself.
+/// Arguments of a subcommand without commands of its own, which completions of `help` would miss;
+/// help, errors and completions are those of `T` by itself.
 #[derive(Debug)]
 pub(crate) struct Later<T>(pub(crate) Box<T>);
 
@@ -44,7 +45,8 @@ impl<T: FromArgMatches> FromArgMatches for Later<T> {
     }
 }
 
-/// The command with the arguments of `T`, before those that all commands share; what the command says of itself stays.
+/// The command with the arguments of `T`, before those that all commands share; what the command
+/// says of itself stays.
 fn with_arguments_of<T: Args>(command: Command) -> Command {
     let (about, long_about) = (command.get_about().cloned(), command.get_long_about().cloned());
     let shared: Vec<_> = command.get_arguments().map(|argument| argument.get_id().clone()).collect();

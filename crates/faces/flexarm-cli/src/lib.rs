@@ -1,7 +1,8 @@
-//! The `flexarm` command line: arguments, progress, tables, exit codes. The work is done by the crate `flexarm`.
+//! The `flexarm` command line: arguments, progress, tables, exit codes. The work is done by the
+//! crate `flexarm`.
 //!
-//! Start at [`run`], which the program `flexarm` and the command of the Python package call. [`shipped_robot`] and
-//! [`shipped_motion`] find by name what comes with the program.
+//! Start at [`run`], which the program `flexarm` and the command of the Python package call.
+//! [`shipped_robot`] and [`shipped_motion`] find by name what comes with the program.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing is what this face is for")]
 
 mod args;
@@ -53,10 +54,11 @@ use flexarm::{
 use indicatif::{ProgressBar, ProgressStyle};
 use shipped::OutputFolder;
 
-/// Runs a command line, the name of the program first, and says what the process should end with: 0 done, 1 the run failed,
-/// 2 bad input.
+/// Runs a command line, the name of the program first, and says what the process should end with: 0
+/// done, 1 the run failed, 2 bad input.
 ///
-/// It takes the process for its own: settings get the names of its flags in all messages, and signals end what it does.
+/// It takes the process for its own: settings get the names of its flags in all messages, and
+/// signals end what it does.
 pub fn run(line: Vec<OsString>) -> u8 {
     signals::turn_into_errors();
     flexarm::name_settings(flags::NAMES);
@@ -101,7 +103,8 @@ fn with_number_tip(mut usage: clap::Error) -> clap::Error {
     usage
 }
 
-/// Where robots and trajectories are besides: a folder with `robots/` and `trajectories/` in it. The first call counts.
+/// Where robots and trajectories are besides: a folder with `robots/` and `trajectories/` in it.
+/// The first call counts.
 pub fn ship_from(folder: PathBuf) {
     shipped::ship_from(folder);
 }
@@ -124,12 +127,14 @@ pub fn shipped_robot_file(given: &Path) -> PathBuf {
     shipped::robot_file(given)
 }
 
-/// The file of a cutting tool of a path, or of a name that is shipped; the path itself if there is none.
+/// The file of a cutting tool of a path, or of a name that is shipped; the path itself if there is
+/// none.
 pub fn shipped_tool(given: &Path) -> PathBuf {
     shipped::find(given, "robots/tools", &["", ".toml"])
 }
 
-/// Text for people or JSON for programs, without characters that a terminal obeys; a closed pipe is not an error.
+/// Text for people or JSON for programs, without characters that a terminal obeys; a closed pipe is
+/// not an error.
 fn answer(cli: &Cli, json: impl FnOnce() -> String, text: impl FnOnce() -> String) {
     answer_styled(cli, json, || visible(&text()));
 }

@@ -59,7 +59,8 @@ pub(crate) struct MapArgs {
     /// Distance of the places (m) [default: about 32 along the longest edge]
     #[arg(long, help_heading = "Where", value_name = "M", allow_hyphen_values = true)]
     pub(crate) grid: Option<f64>,
-    /// Leave out places nearer than this to the upright line through the first joint (m): the arm itself is there
+    /// Leave out places nearer than this to the upright line through the first joint (m): the arm
+    /// itself is there
     #[arg(long, help_heading = "Where", value_name = "M", default_value_t = 0.0, allow_hyphen_values = true)]
     pub(crate) keep_out: f64,
     /// Where the z axis of the tool points in the world
@@ -77,7 +78,8 @@ pub(crate) struct MapArgs {
     /// Rotations of the tool about its axis that count, evenly over a turn
     #[arg(long, help_heading = "Where", value_name = "N", default_value_t = 1)]
     pub(crate) rolls: usize,
-    /// Go through values of a joint instead of places (may be repeated; rad or m, 30deg for degrees)
+    /// Go through values of a joint instead of places (may be repeated; rad or m, 30deg for
+    /// degrees)
     #[arg(long, help_heading = "Where", value_name = "JOINT=FROM:TO:N", allow_hyphen_values = true, conflicts_with_all = ["bounds", "grid", "along"])]
     pub(crate) over: Vec<String>,
     /// Go along a motion instead of places
@@ -86,8 +88,9 @@ pub(crate) struct MapArgs {
     /// Instants of that motion
     #[arg(long, help_heading = "Where", value_name = "N", default_value_t = 1000, requires = "along")]
     pub(crate) points: usize,
-    /// Go through the poses of a file: a table with a column for each joint (_deg after its name for degrees), or a .toml file with
-    /// poses = [[...], ...]; the table of the map then has the 6x6 compliance of each
+    /// Go through the poses of a file: a table with a column for each joint (_deg after its name
+    /// for degrees), or a .toml file with poses = [[...], ...]; the table of the map then has the
+    /// 6x6 compliance of each
     #[arg(long, help_heading = "Where", value_name = "FILE", conflicts_with_all = ["bounds", "grid", "over", "along"])]
     pub(crate) poses: Option<PathBuf>,
     /// Joints that the map does not move, and near which branches are taken [default: zero]
@@ -96,7 +99,8 @@ pub(crate) struct MapArgs {
     /// Force and moment on the TCP besides weight, world axes (N, N m)
     #[arg(long, help_heading = "What", value_name = "FX,FY,FZ[,TX,TY,TZ]", allow_hyphen_values = true)]
     pub(crate) wrench: Option<String>,
-    /// A tool that cuts: how deep it may before it chatters; a .toml file, or the name of a shipped one (flexarm format tool)
+    /// A tool that cuts: how deep it may before it chatters; a .toml file, or the name of a shipped
+    /// one (flexarm format tool)
     #[arg(long, help_heading = "What", value_name = "TOOL", requires = "rpm")]
     pub(crate) tool: Option<PathBuf>,
     /// Spindle speeds of the tool, of which the lowest limit counts (1/min)
@@ -109,10 +113,12 @@ pub(crate) struct MapArgs {
         requires = "tool"
     )]
     pub(crate) rpm: Vec<f64>,
-    /// Limits of depth from the mean cutting force alone (zero-order solution): quick, blind to period doubling
+    /// Limits of depth from the mean cutting force alone (zero-order solution): quick, blind to
+    /// period doubling
     #[arg(long, help_heading = "What", requires = "tool")]
     pub(crate) zero_order: bool,
-    /// Quantity by which poses are compared [default: depth_m with a tool, error_m with a wrench, else compliance_worst_m_per_n]
+    /// Quantity by which poses are compared [default: depth_m with a tool, error_m with a wrench,
+    /// else compliance_worst_m_per_n]
     #[arg(long, help_heading = "What", value_name = "NAME")]
     pub(crate) by: Option<String>,
     /// Which of a place's poses are kept, of all directions and branches

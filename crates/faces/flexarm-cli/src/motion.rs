@@ -20,10 +20,12 @@ const LEVELS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█
 #[derive(Clone, Debug, Default, Args)]
 #[command(next_help_heading = "Motion")]
 pub(crate) struct MotionInputArgs {
-    /// Topic of a bag that holds the motion [default: the one that moves most joints of the robot, and told]
+    /// Topic of a bag that holds the motion [default: the one that moves most joints of the robot,
+    /// and told]
     #[arg(long, value_name = "TOPIC")]
     pub(crate) topic: Option<String>,
-    /// Columns of a table: t=Time[s],joint_1=A1[deg]; a column by its name, with another unit, or by number (#2[rad])
+    /// Columns of a table: t=Time[s],joint_1=A1[deg]; a column by its name, with another unit, or
+    /// by number (#2[rad])
     #[arg(long, value_name = "JOINT=COLUMN,...")]
     pub(crate) columns: Option<ColumnMap>,
 }
@@ -38,15 +40,15 @@ impl MotionInputArgs {
 pub(crate) struct MotionArgs {
     /// Motion file of any format (flexarm format motion), or the name of a shipped one
     pub(crate) motion: PathBuf,
-    /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot: its limits, its torques, the
-    /// way of its tool [default: the values of the joints alone]
+    /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot: its
+    /// limits, its torques, the way of its tool [default: the values of the joints alone]
     pub(crate) robot: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) input: MotionInputArgs,
     #[command(flatten)]
     pub(crate) load: RobotArgs,
-    /// Write the motion to this file, by its ending: .csv (samples), .toml (waypoints), .yaml or .json (JointTrajectory of
-    /// ROS), .svg (curves); may be repeated
+    /// Write the motion to this file, by its ending: .csv (samples), .toml (waypoints), .yaml or
+    /// .json (JointTrajectory of ROS), .svg (curves); may be repeated
     #[arg(short, long, help_heading = "Files", value_name = "FILE")]
     pub(crate) output: Vec<PathBuf>,
     /// Draw positions, speeds and torques over time (SVG)

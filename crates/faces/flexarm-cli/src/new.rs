@@ -20,8 +20,8 @@ use crate::{Bar, answer_styled, load_options, signals, summary_table, to_json};
 pub(crate) struct NewArgs {
     /// URDF or xacro file of the robot
     pub(crate) urdf: PathBuf,
-    /// Folder for robot.toml, motion.toml, README.md and, if it does not lie beside, a copy of the description with its meshes
-    /// [default: a folder here with the robot's name]
+    /// Folder for robot.toml, motion.toml, README.md and, if it does not lie beside, a copy of the
+    /// description with its meshes [default: a folder here with the robot's name]
     #[arg(short, long, help_heading = "Files", value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
     /// Overwrite files that are there
@@ -30,20 +30,24 @@ pub(crate) struct NewArgs {
     /// Write the files and leave the first run out
     #[arg(long, help_heading = "Files")]
     pub(crate) no_run: bool,
-    /// Link at which the arm begins [default: the first of the description]; joints before it are held
+    /// Link at which the arm begins [default: the first of the description]; joints before it are
+    /// held
     #[arg(long, help_heading = "Robot", value_name = "LINK")]
     pub(crate) base: Option<String>,
-    /// Link that is the tool [default: tool0, tcp, flange, ... at the end of the arm with most joints]
+    /// Link that is the tool [default: tool0, tcp, flange, ... at the end of the arm with most
+    /// joints]
     #[arg(long, help_heading = "Robot", value_name = "LINK", alias = "tcp")]
     pub(crate) tool: Option<String>,
-    /// Joints that the sample motion moves, with commas between; all others are held [default: those from base to tool]
+    /// Joints that the sample motion moves, with commas between; all others are held [default:
+    /// those from base to tool]
     #[arg(long, help_heading = "Robot", value_name = "JOINT,...", value_delimiter = ',')]
     pub(crate) joints: Option<Vec<String>>,
-    /// Mass that the tool carries (kg), 0 for none [default: about 15 % of the mass that moves, and said]
+    /// Mass that the tool carries (kg), 0 for none [default: about 15 % of the mass that moves, and
+    /// said]
     #[arg(long, help_heading = "Robot", value_name = "KG", allow_hyphen_values = true)]
     pub(crate) payload: Option<f64>,
-    /// Mass of the arm's links without <inertial>, or with one that only holds a place, together (kg): spread by the volumes of
-    /// their meshes or by their lengths
+    /// Mass of the arm's links without <inertial>, or with one that only holds a place, together
+    /// (kg): spread by the volumes of their meshes or by their lengths
     #[arg(
         long = "inertia-from-total-mass",
         help_heading = "Robot",
@@ -116,7 +120,8 @@ pub(crate) fn run(cli: &Cli, args: &NewArgs) -> Result<ExitCode, Failure> {
     Ok(if wrong { ExitCode::from(1) } else { ExitCode::SUCCESS })
 }
 
-/// The flexible arm beside its rigid twin on the sample motion, with a report in the folder `first_run`.
+/// The flexible arm beside its rigid twin on the sample motion, with a report in the folder
+/// `first_run`.
 fn first_run(cli: &Cli, made: &NewRobot, folder: &Path, overwrite: bool) -> Result<Summary, Failure> {
     let robot = Robot::load(&made.robot)?;
     let motion = Motion::load(&made.motion, &robot)?;

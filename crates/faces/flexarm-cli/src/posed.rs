@@ -1,4 +1,5 @@
-//! `flexarm statics`, `flexarm modes` and `flexarm response`: flags to a request, tables for people.
+//! `flexarm statics`, `flexarm modes` and `flexarm response`: flags to a request, tables for
+//! people.
 
 use std::process::ExitCode;
 

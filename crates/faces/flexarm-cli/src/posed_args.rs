@@ -23,7 +23,8 @@ Outputs: x, y, z, rx, ry, rz of the TCP (world axes).";
 pub(crate) struct PoseArgs {
     /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot
     pub(crate) robot: PathBuf,
-    /// Joint values in coordinate order, or name=value pairs (rad or m; 30deg for degrees) [default: all zero]
+    /// Joint values in coordinate order, or name=value pairs (rad or m; 30deg for degrees)
+    /// [default: all zero]
     #[arg(long, value_name = "Q1,Q2,...", allow_hyphen_values = true)]
     pub(crate) at: Option<String>,
     #[command(flatten)]
@@ -39,7 +40,8 @@ pub(crate) struct StaticsArgs {
     /// Force and moment on the TCP besides weight, world axes (N, N m)
     #[arg(long, value_name = "FX,FY,FZ[,TX,TY,TZ]", allow_hyphen_values = true)]
     pub(crate) wrench: Option<String>,
-    /// Write to this folder a picture of the arm, its deflections magnified beside the rigid arm, and the figures
+    /// Write to this folder a picture of the arm, its deflections magnified beside the rigid arm,
+    /// and the figures
     #[arg(short, long, value_name = "FOLDER")]
     pub(crate) output: Option<PathBuf>,
     /// Overwrite what is in the output folder

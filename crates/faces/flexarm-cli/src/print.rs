@@ -342,7 +342,8 @@ pub(crate) fn warnings(cli: &Cli, texts: &[String]) {
     }
 }
 
-/// The same of caveats. What the description of the robot has is told in full by `check` and `new`, here in one line.
+/// The same of caveats. What the description of the robot has is told in full by `check` and `new`,
+/// here in one line.
 pub(crate) fn caveats(cli: &Cli, caveats: &[Caveat]) {
     let (of_description, own): (Vec<&Caveat>, Vec<&Caveat>) =
         caveats.iter().filter(|caveat| caveat.warns()).partition(|caveat| caveat.of_description);

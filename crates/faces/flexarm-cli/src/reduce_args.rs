@@ -36,7 +36,8 @@ Everything can stand in a job file (TOML, with mesh = \"...\"); flags go before 
 #[derive(Debug, Args)]
 #[command(after_long_help = EXAMPLES, after_help = "More, with examples: flexarm reduce --help")]
 pub(crate) struct ReduceArgs {
-    /// Mesh (.msh of Gmsh, .inp of CalculiX or Abaqus, also .gz), or a job file (.toml with mesh = "...")
+    /// Mesh (.msh of Gmsh, .inp of CalculiX or Abaqus, also .gz), or a job file (.toml with mesh =
+    /// "...")
     #[arg(value_name = "MESH_OR_JOB")]
     pub(crate) mesh: PathBuf,
     /// Show what is in the mesh and stop: groups, node sets, regions, materials, sizes
@@ -45,20 +46,24 @@ pub(crate) struct ReduceArgs {
     /// Units of the mesh: m-kg-s (N, Pa), mm-t-s (N, MPa), in-slinch-s, ...
     #[arg(long, value_name = "LENGTH-MASS-TIME", help_heading = "Mesh")]
     pub(crate) units: Option<Units>,
-    /// steel, aluminium, cast_iron, ductile_iron or E,nu,rho in SI; of one region with REGION= (may be repeated)
+    /// steel, aluminium, cast_iron, ductile_iron or E,nu,rho in SI; of one region with REGION= (may
+    /// be repeated)
     #[arg(long = "material", value_name = "[REGION=]MATERIAL", value_parser = Named::<MaterialChoice>::parse, help_heading = "Mesh")]
     pub(crate) materials: Vec<Named<MaterialChoice>>,
-    /// Nodes of an interface, the proximal one first (repeat); named A, B, C in turn unless NAME is given
+    /// Nodes of an interface, the proximal one first (repeat); named A, B, C in turn unless NAME is
+    /// given
     #[arg(long = "interface", value_name = "[NAME=]SELECTOR", value_parser = Named::<NodeSelector>::parse, help_heading = "Interfaces")]
     pub(crate) interfaces: Vec<Named<NodeSelector>>,
-    /// Frame of an interface in the link frame: x,y,z or x,y,z,roll,pitch,yaw (unit of the mesh, rad), centroid, or
-    /// joint:NAME with --urdf (repeat)
+    /// Frame of an interface in the link frame: x,y,z or x,y,z,roll,pitch,yaw (unit of the mesh,
+    /// rad), centroid, or joint:NAME with --urdf (repeat)
     #[arg(long, value_name = "NAME=PLACE", value_parser = Named::<PlaceWord>::parse, help_heading = "Interfaces")]
     pub(crate) at: Vec<Named<PlaceWord>>,
-    /// rigid or distributing, for all interfaces or for one with NAME= (may be repeated) [default: rigid]
+    /// rigid or distributing, for all interfaces or for one with NAME= (may be repeated) [default:
+    /// rigid]
     #[arg(long = "tie", value_name = "[NAME=]TIE", value_parser = Named::<TieWord>::parse, help_heading = "Interfaces")]
     pub(crate) ties: Vec<Named<TieWord>>,
-    /// URDF or xacro whose joints are the interfaces: A at the origin of the link, B at that of the next joint
+    /// URDF or xacro whose joints are the interfaces: A at the origin of the link, B at that of the
+    /// next joint
     #[arg(long, value_name = "FILE", requires = "link", help_heading = "Mesh")]
     pub(crate) urdf: Option<PathBuf>,
     /// The link in the URDF
@@ -68,16 +73,19 @@ pub(crate) struct ReduceArgs {
     #[arg(long, value_name = "NAME", requires = "urdf", help_heading = "Mesh", hide_short_help = true)]
     pub(crate) joint: Option<String>,
 
-    /// With --urdf: what the URDF's link weighs beyond the mesh (motors, gears) rides on the two parts
+    /// With --urdf: what the URDF's link weighs beyond the mesh (motors, gears) rides on the two
+    /// parts
     #[arg(long, requires = "urdf", help_heading = "Mesh", hide_short_help = true)]
     pub(crate) rest: bool,
-    /// Pose of the mesh frame in the link frame: x,y,z or x,y,z,roll,pitch,yaw (unit of the mesh, rad)
+    /// Pose of the mesh frame in the link frame: x,y,z or x,y,z,roll,pitch,yaw (unit of the mesh,
+    /// rad)
     #[arg(long, value_name = "POSE", allow_hyphen_values = true, value_parser = parse_frame, help_heading = "Mesh", hide_short_help = true)]
     pub(crate) mesh_frame: Option<FrameEntry>,
     /// Fixed-interface modes to keep (Craig-Bampton); 0 for Guyan [default: 10]
     #[arg(long, value_name = "N", help_heading = "Reduction")]
     pub(crate) modes: Option<usize>,
-    /// Keep all fixed-interface modes up to this frequency (Hz); take twice the highest one of interest
+    /// Keep all fixed-interface modes up to this frequency (Hz); take twice the highest one of
+    /// interest
     #[arg(
         long,
         value_name = "HZ",
@@ -87,16 +95,19 @@ pub(crate) struct ReduceArgs {
         hide_short_help = true
     )]
     pub(crate) modes_up_to: Option<f64>,
-    /// Where the elastic joint of the two parts sits: elastic-centre, mid, a fraction of the way from A to B, or x,y,z
+    /// Where the elastic joint of the two parts sits: elastic-centre, mid, a fraction of the way
+    /// from A to B, or x,y,z
     #[arg(long, value_name = "WHERE", allow_hyphen_values = true, help_heading = "Reduction", hide_short_help = true)]
     pub(crate) split: Option<SplitChoice>,
     /// Numbers of parts of longer chains to store in the link, such as 3,4,8
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', help_heading = "Reduction", hide_short_help = true)]
     pub(crate) chains: Option<Vec<usize>>,
-    /// Store the stiffness by load of the modal link (12 more solves), for geometric_stiffening = true of a robot file
+    /// Store the stiffness by load of the modal link (12 more solves), for geometric_stiffening =
+    /// true of a robot file
     #[arg(long, help_heading = "Reduction", hide_short_help = true)]
     pub(crate) geometric: bool,
-    /// Make one node of nodes nearer to each other than this (unit of the mesh), to close seams and cracks
+    /// Make one node of nodes nearer to each other than this (unit of the mesh), to close seams and
+    /// cracks
     #[arg(long, value_name = "DISTANCE", allow_hyphen_values = true)]
     pub(crate) merge: Option<f64>,
     /// Integration of the elements
@@ -108,7 +119,8 @@ pub(crate) struct ReduceArgs {
     /// Name of the link [default: that of --link, or of the mesh file]
     #[arg(long, value_name = "NAME", help_heading = "Mesh")]
     pub(crate) name: Option<String>,
-    /// Output folder for link file, job, figures and report [default: a new one in out/, or none with --flex]
+    /// Output folder for link file, job, figures and report [default: a new one in out/, or none
+    /// with --flex]
     #[arg(short, long, value_name = "FOLDER", help_heading = "Files")]
     pub(crate) output: Option<PathBuf>,
     /// Write the link file (also) here

@@ -32,17 +32,17 @@ Examples:
 pub(crate) struct SensitivityArgs {
     /// robot.toml, a folder with one, or the name of a shipped robot
     pub(crate) robot: PathBuf,
-    /// Motion of any format (flexarm format motion), or the name of a shipped one [default: the robot's own]
+    /// Motion of any format (flexarm format motion), or the name of a shipped one [default: the
+    /// robot's own]
     pub(crate) motion: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) input: MotionInputArgs,
-    /// Names of what counts, * for anything: drive.joint_2.gearbox.stiffness, drive.*.friction.*, drive.*.servo.*, link.*, motion.joint_1, tcp.x
-    /// (may be repeated)
-    /// [default: all]
+    /// Names of what counts, * for anything: drive.joint_2.gearbox.stiffness, drive.*.friction.*,
+    /// drive.*.servo.*, link.*, motion.joint_1, tcp.x (may be repeated) [default: all]
     #[arg(long = "by", value_name = "NAME")]
     pub(crate) by: Vec<String>,
-    /// A pose instead of a motion: the tool at rest, its compliance, natural frequencies. Joint values in coordinate order, or name=value pairs (rad
-    /// or m; 30deg for degrees)
+    /// A pose instead of a motion: the tool at rest, its compliance, natural frequencies. Joint
+    /// values in coordinate order, or name=value pairs (rad or m; 30deg for degrees)
     #[arg(long, value_name = "Q1,Q2,...", allow_hyphen_values = true, conflicts_with_all = ["motion", "loads", "table"])]
     pub(crate) at: Option<String>,
     /// Loads and payloads over time (TOML, see docs/loads.md) that act on the arm

@@ -1,4 +1,5 @@
-//! Where shipped robots and trajectories are found: by path, or by name in the folders that come with the program.
+//! Where shipped robots and trajectories are found: by path, or by name in the folders that come
+//! with the program.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -16,8 +17,8 @@ pub(crate) fn ship_from(folder: PathBuf) {
     let _ = BROUGHT.set(folder);
 }
 
-/// Folders that may hold `robots/` and `trajectories/`: here, what the process brought, beside the program, and where it was
-/// built.
+/// Folders that may hold `robots/` and `trajectories/`: here, what the process brought, beside the
+/// program, and where it was built.
 fn roots() -> Vec<PathBuf> {
     let mut roots = vec![PathBuf::from(".")];
     roots.extend(BROUGHT.get().cloned());
@@ -42,7 +43,8 @@ pub(crate) fn find(given: &Path, folder: &str, endings: &[&str]) -> PathBuf {
         .unwrap_or_else(|| given.to_owned())
 }
 
-/// A robot by path, name, or place below the folder of the shipped ones (`kr210/beams.toml`), for files that name robots.
+/// A robot by path, name, or place below the folder of the shipped ones (`kr210/beams.toml`), for
+/// files that name robots.
 pub(crate) fn robot_file(given: &Path) -> PathBuf {
     let found = robot(Some(given)).unwrap_or_else(|_| given.to_owned());
     if found.exists() {
@@ -101,7 +103,8 @@ pub(crate) fn tool(given: &Path) -> Result<PathBuf, Failure> {
     Err(Error::File { path, what }.into())
 }
 
-/// Where a command puts its files: the folder that was asked for, else a new one that no other run can have.
+/// Where a command puts its files: the folder that was asked for, else a new one that no other run
+/// can have.
 pub(crate) enum OutputFolder {
     None,
     Asked(PathBuf),
@@ -138,8 +141,8 @@ impl OutputFolder {
 }
 
 impl NewFolder {
-    /// Takes the first number that is free. To make a folder and to find it free are one step, so runs that start at the
-    /// same time get different ones.
+    /// Takes the first number that is free. To make a folder and to find it free are one step, so
+    /// runs that start at the same time get different ones.
     fn create(stem: &str) -> Result<Self, Failure> {
         let clean: String =
             stem.chars().map(|c| if c.is_alphanumeric() || c == '-' || c == '_' { c } else { '_' }).collect();
@@ -169,7 +172,8 @@ impl Drop for NewFolder {
     }
 }
 
-/// The folder with `robots` and `tests`: the first root that has both, else where the program was built.
+/// The folder with `robots` and `tests`: the first root that has both, else where the program was
+/// built.
 pub(crate) fn checkout() -> PathBuf {
     let has_both = |root: &PathBuf| root.join("robots").is_dir() && root.join("tests/verification").is_dir();
     roots().into_iter().find(has_both).unwrap_or_else(|| PathBuf::from("."))

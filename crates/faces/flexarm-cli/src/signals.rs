@@ -1,8 +1,9 @@
 //! Signals: those that ask a command to stop, and those that must not end it without a word.
 //!
-//! Until a command looks for a wish to stop for the first time, nothing is open that must be closed, and the signals do what
-//! they always do; from then on they only leave a note, and the command stops at a place where its files are whole. What the caller has told the system to ignore
-//! (`nohup`, a job in the background) stays ignored.
+//! Until a command looks for a wish to stop for the first time, nothing is open that must be
+//! closed, and the signals do what they always do; from then on they only leave a note, and the
+//! command stops at a place where its files are whole. What the caller has told the system to
+//! ignore (`nohup`, a job in the background) stays ignored.
 
 use std::ops::ControlFlow;
 use std::process::ExitCode;
@@ -13,8 +14,8 @@ use std::time::Duration;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
-/// To be called before anything else: a file that may not grow further (`ulimit -f`) is then an error of the write, which
-/// names the file, and no longer a signal that kills the program.
+/// To be called before anything else: a file that may not grow further (`ulimit -f`) is then an
+/// error of the write, which names the file, and no longer a signal that kills the program.
 pub(crate) fn turn_into_errors() {
     #[cfg(unix)]
     {
@@ -37,7 +38,8 @@ pub(crate) fn stop_when_asked() -> impl FnMut() -> ControlFlow<()> {
     }
 }
 
-/// Ends the process if a command does not stop by itself soon after it was asked to; see [`end_if_not_stopped`].
+/// Ends the process if a command does not stop by itself soon after it was asked to; see
+/// [`end_if_not_stopped`].
 pub(crate) struct Watch(Arc<AtomicBool>);
 
 impl Watch {
@@ -56,12 +58,14 @@ impl Drop for Watch {
     }
 }
 
-/// How long a command may take to stop by itself, and how often it is looked whether it was asked to.
+/// How long a command may take to stop by itself, and how often it is looked whether it was asked
+/// to.
 const PATIENCE: Duration = Duration::from_millis(300);
 const LOOK: Duration = Duration::from_millis(20);
 
-/// Watches a command whose files are whole at any time: if it was asked to stop and has not after [`PATIENCE`], the process ends
-/// with what `last_words` returns. The watch ends with what is returned.
+/// Watches a command whose files are whole at any time: if it was asked to stop and has not after
+/// [`PATIENCE`], the process ends with what `last_words` returns. The watch ends with what is
+/// returned.
 pub(crate) fn end_if_not_stopped(last_words: impl Fn() -> ExitCode + Send + 'static) -> Watch {
     let over = Arc::new(AtomicBool::new(false));
     let watched = over.clone();
@@ -87,7 +91,8 @@ pub(crate) fn end_if_not_stopped(last_words: impl Fn() -> ExitCode + Send + 'sta
 fn signals() -> Vec<i32> {
     #[cfg(target_os = "linux")]
     let known = vec![SIGINT, SIGTERM, signal_hook::consts::SIGHUP];
-    // Where it cannot be told whether it is ignored, a terminal that closes is left alone: recordings survive being killed.
+    // Where it cannot be told whether it is ignored, a terminal that closes is left alone:
+    // recordings survive being killed.
     #[cfg(not(target_os = "linux"))]
     let known = vec![SIGINT, SIGTERM];
     let ignored = ignored();

@@ -1,6 +1,7 @@
 //! The figures of a run on a terminal: a table in groups and a small plot of the error over time.
 //!
-//! Text is styled with ANSI codes; where it does not go to a terminal they are taken out again (`main::answer`).
+//! Text is styled with ANSI codes; where it does not go to a terminal they are taken out again
+//! (`main::answer`).
 
 use anstyle::{AnsiColor, Style};
 use comfy_table::Table;
@@ -147,8 +148,8 @@ fn aligned(rows: &[Vec<String>]) -> String {
     out
 }
 
-/// A row for every figure and a column for every run, in as many tables as they need. Names too long for a column are
-/// listed below and numbered.
+/// A row for every figure and a column for every run, in as many tables as they need. Names too
+/// long for a column are listed below and numbered.
 fn turned(rows: &[Vec<String>], width: usize) -> String {
     let names: Vec<&str> = rows[1..].iter().map(|row| row[0].as_str()).collect();
     let part = |runs: &[usize], numbered: bool| {
@@ -214,7 +215,8 @@ fn wrapped(text: &str, width: usize) -> Vec<String> {
     lines
 }
 
-/// Size of the TCP error over time in braille dots, with the largest value, the span of time and the moves.
+/// Size of the TCP error over time in braille dots, with the largest value, the span of time and
+/// the moves.
 fn plot(summary: &Summary, width: usize) -> String {
     let curve = &summary.error_curve;
     let top = curve.iter().copied().filter(|e| e.is_finite()).fold(0.0, f64::max);

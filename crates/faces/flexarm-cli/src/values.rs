@@ -5,8 +5,8 @@ use flexarm::reduce::numbers;
 
 use crate::failure::Failure;
 
-/// Reads a joint vector: `v1,v2,...` in coordinate order, or `name=value,...` with the rest zero; rad or m, or degrees
-/// with the ending `deg`.
+/// Reads a joint vector: `v1,v2,...` in coordinate order, or `name=value,...` with the rest zero;
+/// rad or m, or degrees with the ending `deg`.
 ///
 /// * `joints`: names, and whether they slide.
 ///

@@ -21,7 +21,8 @@ pub(crate) struct VerifyArgs {
     /// Leave out what takes long
     #[arg(long)]
     pub(crate) quick: bool,
-    /// Folder with robots, trajectories and tests/verification [default: here, else where the program was built]
+    /// Folder with robots, trajectories and tests/verification [default: here, else where the
+    /// program was built]
     #[arg(long, value_name = "DIR")]
     pub(crate) data: Option<PathBuf>,
     /// Folder for verification.md, its pictures and verification.json [default: a new one in out]
@@ -33,7 +34,8 @@ pub(crate) struct VerifyArgs {
     /// Write no files
     #[arg(long, conflicts_with_all = ["output", "force"])]
     pub(crate) no_files: bool,
-    /// Compare with a stored page of the same cases instead of writing one; exit code 1 if it differs
+    /// Compare with a stored page of the same cases instead of writing one; exit code 1 if it
+    /// differs
     #[arg(long, value_name = "FILE", conflicts_with_all = ["output", "force"])]
     pub(crate) check: Option<PathBuf>,
 }

@@ -1,8 +1,8 @@
-//! Bad input: each kind has its own message with the place and the way to mend it, exit code 2, nothing on standard
-//! output, and no file or folder made or changed.
+//! Bad input: each kind has its own message with the place and the way to mend it, exit code 2,
+//! nothing on standard output, and no file or folder made or changed.
 //!
-//! The words that are demanded are those a user needs: which file, where in it, what was found, what is expected.
-//! Tests marked `ignore` state what is wanted and not yet so.
+//! The words that are demanded are those a user needs: which file, where in it, what was found,
+//! what is expected. Tests marked `ignore` state what is wanted and not yet so.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 mod common;
@@ -232,7 +232,8 @@ mod trajectory {
 
     #[test]
     fn toml_cut_off() {
-        // Within a string, within an array, between lines: no cut before the first whole move may pass.
+        // Within a string, within an array, between lines: no cut before the first whole move may
+        // pass.
         let end = SWING.find(".0]\nduration").unwrap();
         for length in 0..end {
             let answer = compare_motion("m.toml", &SWING[..length], &["m.toml"]);
@@ -948,7 +949,8 @@ fn a_column_that_comes_twice_is_refused_with_both_places() {
     }
 }
 
-/// A slide instead of the swing: numbers in degrees, of joints and of motions, are no places of it; and the other way round.
+/// A slide instead of the swing: numbers in degrees, of joints and of motions, are no places of it;
+/// and the other way round.
 #[test]
 fn units_that_contradict_what_a_joint_does_are_refused_wherever_it_is_told() {
     let place = Place::new();

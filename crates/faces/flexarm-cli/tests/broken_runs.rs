@@ -1,4 +1,5 @@
-//! What is left of a run that is killed, or that fills the disk: files that read up to there, and one clear message.
+//! What is left of a run that is killed, or that fills the disk: files that read up to there, and
+//! one clear message.
 #![cfg(all(unix, feature = "mcap"))]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
@@ -82,8 +83,8 @@ fn a_killed_run_leaves_recordings_up_to_the_last_moment() {
     assert!(place.text("left.html").contains("TCP error"));
 }
 
-/// The program under a limit of the size of files (in the shell's blocks of 512 or 1024 bytes), writing past which is an
-/// error as on a full disk.
+/// The program under a limit of the size of files (in the shell's blocks of 512 or 1024 bytes),
+/// writing past which is an error as on a full disk.
 fn limited(place: &Place, blocks: u32, arguments: &[&str]) -> Answer {
     let program = env!("CARGO_BIN_EXE_flexarm");
     let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" \"$@\"");

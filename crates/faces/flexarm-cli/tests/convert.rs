@@ -87,7 +87,8 @@ fn parquet_is_written_by_a_run_that_is_asked_for_it() {
     assert!(!place.path("result/run.parquet.partial").exists());
 }
 
-/// What a run does not write by itself it writes when it is asked to, and its summary names the file.
+/// What a run does not write by itself it writes when it is asked to, and its summary names the
+/// file.
 #[cfg(feature = "arrow")]
 #[test]
 fn a_run_that_is_asked_for_arrow_writes_it_and_a_report_is_made_of_it() {

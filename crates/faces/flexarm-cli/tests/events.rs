@@ -1,5 +1,5 @@
-//! Healthy runs over what happens at discrete times, the same with every stepper: payloads, corners of a motion; joint
-//! efforts of all of them.
+//! Healthy runs over what happens at discrete times, the same with every stepper: payloads, corners
+//! of a motion; joint efforts of all of them.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
@@ -30,9 +30,11 @@ fn peak_m(summary: &Value) -> f64 {
     summary["tcp"]["peak_m"].as_f64().unwrap()
 }
 
-/// The arm drops what it carries and takes it up again, 150 kg at once. Links alone, so that nobody's drives matter.
+/// The arm drops what it carries and takes it up again, 150 kg at once. Links alone, so that
+/// nobody's drives matter.
 ///
-/// Truth: the stepper with error control. Measured: 1.4922 mm in all. Generalised-alpha diverged at 4.001 s at every step.
+/// Truth: the stepper with error control. Measured: 1.4922 mm in all. Generalised-alpha diverged at
+/// 4.001 s at every step.
 #[test]
 fn an_arm_that_picks_up_its_payload_goes_on() {
     let place = Place::new();
@@ -84,10 +86,11 @@ fn corners(rate_hz: u32) -> String {
     text
 }
 
-/// Sampled at 1 kHz and at 500 Hz, by every stepper, at 1 ms, 2 ms and steps that meet no corner: one peak, to 1 %.
+/// Sampled at 1 kHz and at 500 Hz, by every stepper, at 1 ms, 2 ms and steps that meet no corner:
+/// one peak, to 1 %.
 ///
-/// Measured: 0.1329 m, 0.1327 m by generalised-alpha at 2 ms. It took accelerations at the ends of steps alone and missed the
-/// impulse: half the peak at 1 ms, three times it at 2 ms.
+/// Measured: 0.1329 m, 0.1327 m by generalised-alpha at 2 ms. It took accelerations at the ends of
+/// steps alone and missed the impulse: half the peak at 1 ms, three times it at 2 ms.
 #[test]
 fn every_stepper_takes_the_blow_of_a_corner() {
     let place = Place::new();
@@ -113,10 +116,12 @@ fn every_stepper_takes_the_blow_of_a_corner() {
     }
 }
 
-/// From rest to 2 rad/s within a few samples of 1 ms and back: no corner, and as hard a blow. Truth: RK4 in fine steps.
+/// From rest to 2 rad/s within a few samples of 1 ms and back: no corner, and as hard a blow.
+/// Truth: RK4 in fine steps.
 ///
-/// Accelerations at the ends of steps alone say another impulse: a default run had 0.034 m of 0.063 m for three samples and
-/// 15 % too little for ten. Measured with steps that are cut: within 0.33 %, 0.5 % without the dispersion correction.
+/// Accelerations at the ends of steps alone say another impulse: a default run had 0.034 m of 0.063
+/// m for three samples and 15 % too little for ten. Measured with steps that are cut: within 0.33
+/// %, 0.5 % without the dispersion correction.
 #[test]
 fn every_stepper_takes_the_blow_of_a_short_ramp() {
     let place = Place::new();
@@ -150,8 +155,9 @@ fn every_stepper_takes_the_blow_of_a_short_ramp() {
     }
 }
 
-/// A table of a slow motion with five digits, at 1 kHz: its steps are as large as the way of a sample at the ends. Truth: RK4 on
-/// the same table. Measured: within 0.41 %; with accelerations at the ends of steps alone 7 %.
+/// A table of a slow motion with five digits, at 1 kHz: its steps are as large as the way of a
+/// sample at the ends. Truth: RK4 on the same table. Measured: within 0.41 %; with accelerations at
+/// the ends of steps alone 7 %.
 #[test]
 fn a_table_of_few_digits_moves_the_arm_alike_in_every_stepper() {
     let place = Place::new();
@@ -192,8 +198,9 @@ fn corners_are_told_and_can_be_rounded() {
     place.refused(&[&line[..], &["--round-corners", "0"]].concat(), &["corners", "positive"]);
 }
 
-/// Joint efforts of the shipped arms, by a stepper whose constraint forces are the joint forces, and by one that evaluates
-/// them: of one another within 2 % of the largest. The rotor of the three-mass arm has nine tenths of them.
+/// Joint efforts of the shipped arms, by a stepper whose constraint forces are the joint forces,
+/// and by one that evaluates them: of one another within 2 % of the largest. The rotor of the
+/// three-mass arm has nine tenths of them.
 #[test]
 fn all_steppers_agree_about_joint_efforts() {
     let place = Place::new();
@@ -228,7 +235,8 @@ fn all_steppers_agree_about_joint_efforts() {
     }
 }
 
-/// A point at the end of the arm has no moments of inertia: refused by name, before anything is made.
+/// A point at the end of the arm has no moments of inertia: refused by name, before anything is
+/// made.
 #[test]
 fn spook_says_which_link_it_cannot_carry() {
     let place = Place::new();

@@ -31,7 +31,8 @@ fn sample(name: &str) -> Option<PathBuf> {
 const MASS: [&str; 6] = ["--mass", "1.728", "--com", "0.4,0,0", "--inertia", "0.0003,0.0924,0.0922,0,0,0"];
 const AT: [&str; 4] = ["--at", "A=0,0,0", "--at", "B=0.8,0,0"];
 
-/// `node,dof,node,dof,value` of the beam of the tests; `order` gives the component that stands in each row.
+/// `node,dof,node,dof,value` of the beam of the tests; `order` gives the component that stands in
+/// each row.
 fn labelled(order: [usize; 6]) -> String {
     let k = flex::stiffness_12();
     let mut text = String::new();
@@ -280,7 +281,8 @@ fn a_modal_link_survives_sid_and_the_way_back() {
             assert!(gap <= 1e-12 * size, "{name}, {mesh_units}: {gap:.1e} of {size:.1e}");
         }
     }
-    // In other axes it is the same link: same frequencies, B where it then is, and the robot refuses it only for that.
+    // In other axes it is the same link: same frequencies, B where it then is, and the robot
+    // refuses it only for that.
     let turned = ["import", "out-m-kg-s/lower_arm.SID_FEM", "--units", "m-kg-s", "--map", "A=11,B=12", "-o", "turned"];
     let turned = place.json(&[&turned[..], &["--axes-rpy", "0,0,1.5707963267948966"]].concat());
     assert!((numbers(&turned["modal"]["frequencies_hz"])[0] / 66.66771323663794 - 1.0).abs() < 1e-12);

@@ -1,4 +1,5 @@
-//! Disks that fill up, folders that go away, signals, runs at the same time: what a run leaves, and what it says.
+//! Disks that fill up, folders that go away, signals, runs at the same time: what a run leaves, and
+//! what it says.
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 #![allow(clippy::print_stderr, reason = "a test that skips says so")]
@@ -19,7 +20,8 @@ fn place() -> Place {
     place
 }
 
-/// A command of the shell in the place's folder, with the program as `$0` and its arguments as `$@`.
+/// A command of the shell in the place's folder, with the program as `$0` and its arguments as
+/// `$@`.
 fn shell(place: &Place, script: &str, arguments: &[&str]) -> Command {
     let mut command = Command::new("sh");
     command.args(["-c", script, env!("CARGO_BIN_EXE_flexarm")]).args(arguments).current_dir(place.path("."));
@@ -58,7 +60,8 @@ fn recordings() -> Vec<&'static str> {
     built.into_iter().filter_map(|(name, is_built)| is_built.then_some(name)).collect()
 }
 
-/// Truth: all recordings see the same samples. A disk in memory of 2 MB, in a name space that goes away with its shell.
+/// Truth: all recordings see the same samples. A disk in memory of 2 MB, in a name space that goes
+/// away with its shell.
 #[test]
 fn on_a_disk_that_fills_up_all_recordings_reach_about_as_far() {
     let place = place();

@@ -1,4 +1,5 @@
-//! `inspect`: keys, and numbers that hold each other up. `check`: all findings of a file, not the first.
+//! `inspect`: keys, and numbers that hold each other up. `check`: all findings of a file, not the
+//! first.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 mod common;
@@ -25,7 +26,8 @@ mod inspect {
         a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     }
 
-    /// Looking at another frame must not move the load: it once hung on whatever frame `--tcp` named.
+    /// Looking at another frame must not move the load: it once hung on whatever frame `--tcp`
+    /// named.
     #[test]
     fn another_tcp_leaves_the_payload_where_it_is() {
         let place = Place::new();
@@ -181,7 +183,8 @@ mod inspect {
         }
     }
 
-    /// Angular velocity in world axes that turns quaternion `a` into `b` in unit time, for small turns (w first).
+    /// Angular velocity in world axes that turns quaternion `a` into `b` in unit time, for small
+    /// turns (w first).
     fn turn(a: &[f64], b: &[f64]) -> [f64; 3] {
         let dot: f64 = a.iter().zip(b).map(|(x, y)| x * y).sum();
         let b: Vec<f64> = b.iter().map(|x| x * dot.signum()).collect();
@@ -234,7 +237,8 @@ mod inspect {
         let twice = at(&place, &robot, &POSE, &["--velocity", &joined(&v.map(|x| 2.0 * x))]);
         let four: Vec<f64> = coriolis.iter().map(|c| 4.0 * c).collect();
         assert!(distance(&numbers(&twice["coriolis"]), &four) < 1e-9);
-        // Coriolis forces do half of what changes the mass matrix: v'(dM/dt)v = 2 v'c, dM/dt along v by differences.
+        // Coriolis forces do half of what changes the mass matrix: v'(dM/dt)v = 2 v'c, dM/dt along
+        // v by differences.
         let h = 1e-5;
         let energy = |sign: f64| {
             let q: Vec<f64> = POSE.iter().zip(&v).map(|(q, v)| q + sign * h * v).collect();
@@ -302,7 +306,8 @@ mod inspect {
         let modal = &place.json(&["inspect", "robot.toml"])["flexible_links"][0];
         assert_eq!((&modal["model"], &modal["coordinates"]), (&"modal".into(), &9.into()));
         let hz = numbers(&modal["modal_frequencies_hz"]);
-        // Clamped beam: 1.8751² sqrt(EI/(mu l⁴))/2π with shear and rotary inertia, which a slender beam hardly feels.
+        // Clamped beam: 1.8751² sqrt(EI/(mu l⁴))/2π with shear and rotary inertia, which a slender
+        // beam hardly feels.
         let truth = 3.516 / 0.64 * (70e9 * 0.02f64.powi(2) / 12.0 / 2700.0).sqrt() / std::f64::consts::TAU;
         assert!(hz.len() == 9 && (hz[0] / truth - 1.0).abs() < 3e-3, "{hz:?} {truth}");
         let answer = place.flexarm(&["inspect", "robot.toml"]);
@@ -616,7 +621,8 @@ mod check {
     }
 }
 
-/// Stiffness and mass of the beam as CSV, six rows per end: the mass is the consistent one of Euler and Bernoulli.
+/// Stiffness and mass of the beam as CSV, six rows per end: the mass is the consistent one of Euler
+/// and Bernoulli.
 fn condensed_beam() -> [String; 2] {
     let (l, mass, w, h) = (0.8, 1.728, 0.02f64, 0.04f64);
     let mut m = vec![vec![0.0; 12]; 12];

@@ -1,5 +1,5 @@
-//! Sizes that no robot has: refused at once with the number and the limit, or worked through; never a stack that overflows, memory
-//! without end or a program that cannot be stopped.
+//! Sizes that no robot has: refused at once with the number and the limit, or worked through; never
+//! a stack that overflows, memory without end or a program that cannot be stopped.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 mod common;

@@ -1,4 +1,5 @@
-//! `statics`, `modes`, `response`, `map`: keys, numbers that hold each other up, files, and bad input.
+//! `statics`, `modes`, `response`, `map`: keys, numbers that hold each other up, files, and bad
+//! input.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 #![allow(non_snake_case, reason = "C for compliance")]
 
@@ -6,7 +7,8 @@ mod common;
 
 use common::{Place, ROBOT, Table, matrix, mcap_records, numbers, shipped_robot, with};
 
-/// The bar of the test robot: EI across in the horizontal plane and upright (aluminium, 20 x 40 mm, lying flat), 0.8 m.
+/// The bar of the test robot: EI across in the horizontal plane and upright (aluminium, 20 x 40 mm,
+/// lying flat), 0.8 m.
 const LENGTH: f64 = 0.8;
 
 mod statics {
@@ -122,9 +124,10 @@ mod statics {
         place.refused(&["statics", "robot.toml", "--tcp", "hand"], &["hand", "ball"]);
     }
 
-    /// Beyond the buckling load there is an equilibrium, but the bar does not stay there. Truth: Euler's load of a clamped
-    /// bar, `π² EI / (2l)²`; a single elastic joint buckles somewhat below it (a spring EI/l half way: `2 EI / l²`). Far
-    /// pulled, the answer is a number with a warning.
+    /// Beyond the buckling load there is an equilibrium, but the bar does not stay there. Truth:
+    /// Euler's load of a clamped bar, `π² EI / (2l)²`; a single elastic joint buckles somewhat
+    /// below it (a spring EI/l half way: `2 EI / l²`). Far pulled, the answer is a number with a
+    /// warning.
     #[test]
     fn a_load_beyond_buckling_is_no_answer() {
         let place = Place::new();
@@ -244,7 +247,8 @@ mod response {
         assert!((curves[2]["at_rest"].as_f64().unwrap() - LENGTH).abs() < 1e-3);
         let C = matrix(&place.json(&["statics", "robot.toml"])["compliance"]);
         assert!((curves[1]["at_rest"].as_f64().unwrap() / C[2][2] - 1.0).abs() < 1e-12);
-        // With one mode in the direction, the peak stands near its frequency and is 1/(2 ζ) as high as the rest.
+        // With one mode in the direction, the peak stands near its frequency and is 1/(2 ζ) as high
+        // as the rest.
         let peak = &curves[1]["peaks"][0];
         let modes = numbers(&seen["frequencies_hz"]);
         assert!(modes.iter().any(|f| (f / peak["frequency_hz"].as_f64().unwrap() - 1.0).abs() < 2e-3));
@@ -257,7 +261,8 @@ mod response {
             assert!((csv / json - 1.0).abs() < 1e-12);
         }
         let plot = place.text("bode/response.svg");
-        // What a person sees: readable units, the pose, the natural frequencies, z in the colour of z.
+        // What a person sees: readable units, the pose, the natural frequencies, z in the colour of
+        // z.
         let shown =
             ["<svg", "frequency [Hz]", "force-z to z", "magnitude [µm/N]", "magnitude [m/rad]", "at swing 0°", "f1"];
         for word in shown {

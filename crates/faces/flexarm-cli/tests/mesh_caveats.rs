@@ -1,4 +1,5 @@
-//! Meshes that outside checks found to pass without a word: what `flexarm reduce` says of them, with truths.
+//! Meshes that outside checks found to pass without a word: what `flexarm reduce` says of them,
+//! with truths.
 //!
 //! The meshes in `tests/data` are bars of 600 x 60 x 40 mm in cells of 50 x 30 x 20 mm.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
@@ -136,7 +137,8 @@ fn a_stiffness_finds_its_mass_and_two_coarse_parts_are_judged_as_in_a_reduction(
     assert!(asked.contains("B at (0.600000, 0.000000, 0.000000)"), "{asked}");
 
     let map = ["--json", "--map", "A=#1-6,B=#7-12,modal=#13-22", "--at", "A=0,0.03,0.02", "--at", "B=0.6,0.03,0.02"];
-    // The halves of the bar are as good as two parts get (+1.96 %); pieces of nine and one tenths are not.
+    // The halves of the bar are as good as two parts get (+1.96 %); pieces of nine and one tenths
+    // are not.
     let (_, said) = reduced(&place, &[&bare[..], &map].concat());
     assert!(said.contains("bar_M.mtx, found beside") && !said.contains(coarse), "{said}");
     let a = "10.1736;0.27,0.03,0.02;0.00440856,0.24857496,0.25027056,0,0,0";

@@ -1,5 +1,5 @@
-//! Messages that tell how to mend something: the library names the setting as a value, the program by its flag. One row per
-//! sentence, each as a user reads it, letter by letter.
+//! Messages that tell how to mend something: the library names the setting as a value, the program
+//! by its flag. One row per sentence, each as a user reads it, letter by letter.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 mod common;

@@ -1,4 +1,5 @@
-//! Models of links and drives, and loads during a run: what the words of the command line do, and what is refused.
+//! Models of links and drives, and loads during a run: what the words of the command line do, and
+//! what is refused.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 mod common;
@@ -7,7 +8,8 @@ use common::{Place, ROBOT, line_of, numbers, shipped_robot, shipped_trajectory, 
 use serde_json::Value;
 
 const RUN: [&str; 4] = ["compare", "robot.toml", "swing.toml", "--no-files"];
-/// Length (m), mass per length (kg/m), bending stiffness in the vertical plane and across it (N m²) of the beam; ball (kg).
+/// Length (m), mass per length (kg/m), bending stiffness in the vertical plane and across it (N m²)
+/// of the beam; ball (kg).
 const L: f64 = 0.8;
 const BALL: f64 = 0.5;
 const G: f64 = 9.81;
@@ -104,7 +106,8 @@ mod links {
 mod drives {
     use super::*;
 
-    /// Truth: the gear's spring and the bending stiffness in series under the torque of a load at rest.
+    /// Truth: the gear's spring and the bending stiffness in series under the torque of a load at
+    /// rest.
     #[test]
     fn are_rigid_or_give_way_or_follow_a_servo() {
         let [_, ei] = stiffness();
@@ -188,7 +191,8 @@ mod loads {
     }
 }
 
-/// A robot file that is refused at the line with `piece`, and the column of the value where that is known.
+/// A robot file that is refused at the line with `piece`, and the column of the value where that is
+/// known.
 fn robot_file(text: &str, piece: &str, words: &[&str]) {
     let place = Place::new();
     place.write("robot.toml", text);
@@ -283,7 +287,8 @@ mod contradictions {
         refused(&["--links", "lumped", "--modes", "3"], &["3 modes", "no link", "--links modal"]);
     }
 
-    /// Truth: behind the play a straight spring carries what the drive holds; energy is that of the straight part.
+    /// Truth: behind the play a straight spring carries what the drive holds; energy is that of the
+    /// straight part.
     #[test]
     fn statics_tell_the_load_behind_a_play() {
         let place = Place::new();
@@ -412,7 +417,8 @@ mod bad_loads_files {
     }
 }
 
-/// Truth: forward kinematics, and that an impulse of the same size moves an arm alike however short it is; 20 us steps see all of it.
+/// Truth: forward kinematics, and that an impulse of the same size moves an arm alike however short
+/// it is; 20 us steps see all of it.
 #[test]
 fn an_impulse_within_one_step_acts_as_it_does_in_fine_steps() {
     let place = Place::new();
@@ -429,8 +435,8 @@ fn an_impulse_within_one_step_acts_as_it_does_in_fine_steps() {
     }
 }
 
-/// Truth: by hand, x = cos 0.2 + 0.8 cos 1.2 and z = -sin 0.2 - 0.8 sin 1.2. The joint of the camera is on the near half of the
-/// flexible link and written behind the one at its end.
+/// Truth: by hand, x = cos 0.2 + 0.8 cos 1.2 and z = -sin 0.2 - 0.8 sin 1.2. The joint of the
+/// camera is on the near half of the flexible link and written behind the one at its end.
 #[test]
 fn joints_have_their_values_whichever_half_of_a_flexible_link_carries_them() {
     let place = Place::new();

@@ -1,4 +1,5 @@
-//! `flexarm reduce`: a small beam mesh to a link file, the keys of its figures, and every sort of bad input.
+//! `flexarm reduce`: a small beam mesh to a link file, the keys of its figures, and every sort of
+//! bad input.
 //!
 //! Reference cases are used where they are there; the tests say so where they are not.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
@@ -11,11 +12,13 @@ use std::io::Write as _;
 use common::{Place, line_of, matrix, numbers, with};
 use serde_json::Value;
 
-/// A steel beam of 600 x 60 x 40 mm along x, 6 HEX20 elements, mm: sets INTERFACE_A and INTERFACE_B at its ends.
+/// A steel beam of 600 x 60 x 40 mm along x, 6 HEX20 elements, mm: sets INTERFACE_A and INTERFACE_B
+/// at its ends.
 const LENGTH: usize = 6;
 const STEP: [f64; 3] = [100.0, 60.0, 40.0];
 
-/// Corner and mid-side nodes of the element at 0 on a grid of half elements, in the order of CalculiX.
+/// Corner and mid-side nodes of the element at 0 on a grid of half elements, in the order of
+/// CalculiX.
 const HEX20: [[usize; 3]; 20] = [
     [0, 0, 0],
     [2, 0, 0],
@@ -566,8 +569,8 @@ mod refused {
     }
 }
 
-/// The reference cases: their numbers come from CalculiX and are tested in `flexarm-fem`; here they go through the
-/// command line as a user would type it.
+/// The reference cases: their numbers come from CalculiX and are tested in `flexarm-fem`; here they
+/// go through the command line as a user would type it.
 mod reference {
     use super::*;
 

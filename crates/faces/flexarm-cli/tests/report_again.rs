@@ -46,7 +46,8 @@ fn a_table_gives_a_page_with_the_same_peak() {
     assert!(page.contains(&peak), "{peak} mm");
 }
 
-/// Truth: a table holds no moves, no energies, no stepper and no end; figures of those would be made up.
+/// Truth: a table holds no moves, no energies, no stepper and no end; figures of those would be
+/// made up.
 #[test]
 fn what_a_table_does_not_hold_is_not_a_figure_of_its_page() {
     let place = recorded(&[]);

@@ -1,4 +1,5 @@
-//! Runs that go well, and runs that stop on the way: what is printed, what is written, and that both agree.
+//! Runs that go well, and runs that stop on the way: what is printed, what is written, and that
+//! both agree.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 mod common;
@@ -263,7 +264,8 @@ mod compare {
         let sag = number(&rest["tcp"], "static_sag_m");
         near(number(&rest["tcp"], "peak_m"), sag, 1e-6);
         near(number(&fall["tcp"], "static_sag_m"), sag, 1e-9);
-        // It falls to nearly twice the sag: 3 per cent damping takes exp(-0.03 pi) = 9 per cent off the overshoot.
+        // It falls to nearly twice the sag: 3 per cent damping takes exp(-0.03 pi) = 9 per cent off
+        // the overshoot.
         near(number(&fall["tcp"], "peak_m"), sag * (1.0 + (-0.03 * std::f64::consts::PI).exp()), 0.02);
     }
 
@@ -300,7 +302,8 @@ mod run {
         assert!(table.names.contains(&"swing_position_m".to_owned()), "{:?}", table.names);
     }
 
-    /// A load beyond the cut of a flexible link bends it as much as the same load on the link after it.
+    /// A load beyond the cut of a flexible link bends it as much as the same load on the link after
+    /// it.
     #[test]
     fn payload_at_the_far_end_of_a_flexible_link_bends_it() {
         let place = Place::new();
@@ -597,7 +600,8 @@ mod stopped {
 
     #[test]
     fn by_an_explicit_step_outside_its_region() {
-        // Modal damping moves the eigenvalues; what the check of the step lets pass must still not end well.
+        // Modal damping moves the eigenvalues; what the check of the step lets pass must still not
+        // end well.
         let place = Place::new();
         place.write("robot.toml", with(ROBOT, "modal = 0.03", "modal = 0.6"));
         for step in ["2e-4", "3e-4", "3.8e-4", "5e-4"] {

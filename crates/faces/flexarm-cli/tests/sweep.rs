@@ -77,7 +77,8 @@ fn a_study_that_is_stopped_or_killed_goes_on_and_makes_the_same_bytes() {
     let started = |signal: &str, wanted: usize| {
         let journal = place.path("out/parts/1-of-1.journal");
         let lines = || std::fs::read(&journal).map_or(0, |text| text.iter().filter(|byte| **byte == b'\n').count());
-        // More than what is there: runs go side by side, and many may have been over when the one before was stopped.
+        // More than what is there: runs go side by side, and many may have been over when the one
+        // before was stopped.
         let wanted = lines() + wanted;
         let mut child = place.command(&["sweep", "study.toml", "-o", "out", "--quiet"]).spawn().unwrap();
         let begun = Instant::now();
@@ -97,7 +98,8 @@ fn a_study_that_is_stopped_or_killed_goes_on_and_makes_the_same_bytes() {
     assert_eq!(place.read("out/runs.parquet"), place.read("whole/runs.parquet"));
 }
 
-/// Truth: a run of which the program is in the middle gives no answer anywhere, and is run when the study goes on.
+/// Truth: a run of which the program is in the middle gives no answer anywhere, and is run when the
+/// study goes on.
 #[cfg(unix)]
 #[test]
 fn a_study_stops_within_half_a_second_in_the_middle_of_a_run_which_does_not_count() {

@@ -1,4 +1,5 @@
-//! `flexarm view` with viewers that are shell scripts: which one is asked, what it is given, and what is said when it fails.
+//! `flexarm view` with viewers that are shell scripts: which one is asked, what it is given, and
+//! what is said when it fails.
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 

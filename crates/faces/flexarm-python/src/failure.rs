@@ -1,4 +1,5 @@
-//! Errors of the library as exceptions, by cause. The classes are Python's (`flexarm/errors.py`), for they have two parents.
+//! Errors of the library as exceptions, by cause. The classes are Python's (`flexarm/errors.py`),
+//! for they have two parents.
 
 use flexarm::compensate::CompensateError;
 use flexarm::identify::IdentifyFileError;

@@ -65,7 +65,8 @@ def test_ctrl_c_ends_long_calls_at_once(prepare: str, call: str, tmp_path: Path)
     assert not list(tmp_path.rglob("*")), "what was broken off leaves no files"
 
 
-#: Work that is not looked into: nobody waits for it any more, and it writes nothing when it is done.
+#: Work that is not looked into: nobody waits for it any more, and it writes nothing when it is
+#: done.
 BEHIND = """
 try:
     print("go", flush=True)

@@ -93,7 +93,8 @@ def test_a_plan_of_measurements_is_that_of_the_command_line(kr210: flexarm.Robot
 
 
 def test_measurements_of_an_arm_give_its_stiffness_back(arm: flexarm.Arm, tmp_path: Path) -> None:
-    # A robot file whose second gearbox is 1.4 times too stiff, and displacements of the arm as it is.
+    # A robot file whose second gearbox is 1.4 times too stiff, and displacements of the arm as it
+    # is.
     shutil.copytree(SHARE / "robots/kr210", tmp_path / "kr210")
     file = tmp_path / "kr210/robot.toml"
     robot = tomllib.loads(file.read_text())

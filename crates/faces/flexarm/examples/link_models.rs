@@ -3,8 +3,9 @@
 //! ```text
 //! cargo run --release -p flexarm --no-default-features --example link_models [ROBOT [TRAJECTORY]]
 //! ```
-//! Truth is the modal link with 20 fixed-interface modes and stiffness by load, integrated by the reference stepper.
-//! Cost is processor time of the steps alone, the least of five runs; differences of single runs are noise.
+//! Truth is the modal link with 20 fixed-interface modes and stiffness by load, integrated by the
+//! reference stepper. Cost is processor time of the steps alone, the least of five runs;
+//! differences of single runs are noise.
 #![allow(clippy::print_stdout, clippy::unwrap_used, non_snake_case, reason = "a program for people; monogram notation")]
 
 use std::path::PathBuf;

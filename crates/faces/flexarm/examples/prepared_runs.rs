@@ -1,11 +1,13 @@
 //! What a run of an arm that is built costs, set-up and steps apart:
 //! `cargo run --release -p flexarm --no-default-features --example prepared_runs`
 //!
-//! CPU time of one thread, the smallest of nine runs. Set-up is what a run of one step at rest takes.
+//! CPU time of one thread, the smallest of nine runs. Set-up is what a run of one step at rest
+//! takes.
 //!
-//! With arguments `STEPPER:STEP ...` (the step in s; of `reference` the relative tolerance) a line for each with the CPU ms per simulated
-//! second of the reference arm: of a run with a sample at its start and its end, and of one with 100 samples a second beside the rigid twin.
-//! That is what `tools/peers.py` puts beside other programs.
+//! With arguments `STEPPER:STEP ...` (the step in s; of `reference` the relative tolerance) a line
+//! for each with the CPU ms per simulated second of the reference arm: of a run with a sample at
+//! its start and its end, and of one with 100 samples a second beside the rigid twin. That is what
+//! `tools/peers.py` puts beside other programs.
 #![allow(clippy::print_stdout, reason = "an example shows its answer")]
 
 use std::path::Path;

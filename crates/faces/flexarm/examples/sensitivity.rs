@@ -1,4 +1,5 @@
-//! Which number of the robot is worth most? Derivatives of the tool's error along a motion by all of them, in one run:
+//! Which number of the robot is worth most? Derivatives of the tool's error along a motion by all
+//! of them, in one run:
 //! `cargo run --release -p flexarm --no-default-features --example sensitivity`
 #![allow(clippy::print_stdout, reason = "an example shows its answer")]
 

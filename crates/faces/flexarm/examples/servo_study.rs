@@ -1,7 +1,9 @@
-//! Which gain of the position loops lets the tool come to rest soonest? One robot, one motion, a run per gain on all cores:
+//! Which gain of the position loops lets the tool come to rest soonest? One robot, one motion, a
+//! run per gain on all cores:
 //! `cargo run --release -p flexarm --no-default-features --example servo_study`
 //!
-//! All joints are driven by torque, their gears give way. A slow loop follows late; a quick one shakes the arm.
+//! All joints are driven by torque, their gears give way. A slow loop follows late; a quick one
+//! shakes the arm.
 #![allow(clippy::print_stdout, reason = "an example shows its answer")]
 
 use flexarm::{DriveModel, Error, Modelling, Motion, Robot, RunOptions, TcpFigures};

@@ -1,7 +1,9 @@
-//! An observer of one's own that ends the run: when the tool has stood still long enough, there is nothing left to see.
+//! An observer of one's own that ends the run: when the tool has stood still long enough, there is
+//! nothing left to see.
 //! `cargo run --release -p flexarm --no-default-features --example stop_at_rest`
 //!
-//! The observer is shown every logged sample while the run goes on and keeps what it wants of it, here one number.
+//! The observer is shown every logged sample while the run goes on and keeps what it wants of it,
+//! here one number.
 #![allow(clippy::print_stdout, reason = "an example shows its answer")]
 
 use std::ops::ControlFlow;

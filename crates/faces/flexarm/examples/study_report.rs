@@ -1,6 +1,8 @@
-//! One report of several runs: a robot with its links as lumped parts, in modes, and with links in eight parts.
+//! One report of several runs: a robot with its links as lumped parts, in modes, and with links in
+//! eight parts.
 //!
-//! `cargo run -p flexarm --example study_report -- study.html`: three curves in one plot, figures side by side.
+//! `cargo run -p flexarm --example study_report -- study.html`: three curves in one plot, figures
+//! side by side.
 
 use std::error::Error;
 use std::path::Path;

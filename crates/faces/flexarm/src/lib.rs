@@ -18,8 +18,8 @@
 //!
 //! [`Robot::load`] reads, [`Robot::flexible`] puts links and drives in place and returns an
 //! [`Arm`], which threads may share. [`Arm::simulate`] runs a [`Motion`], or a [`Scenario`] with
-//! loads and payloads, and returns a [`Run`] with figures and columns; [`Arm::operating_point`] answers statics, compliance
-//! and frequencies at thousands of poses without allocation.
+//! loads and payloads, and returns a [`Run`] with figures and columns; [`Arm::operating_point`]
+//! answers statics, compliance and frequencies at thousands of poses without allocation.
 //!
 //! [`Arm::simulate_with`] writes recordings and a report as well. [`inspect()`] and [`check()`]
 //! look at what was loaded; [`statics()`], [`modes()`] and [`response()`] answer one pose in full;

@@ -1,5 +1,5 @@
-//! What programs that bring arrays rest on: answers of an arm whose links are in place, recursions on rows, arms that are
-//! commanded while they move, work that is stopped.
+//! What programs that bring arrays rest on: answers of an arm whose links are in place, recursions
+//! on rows, arms that are commanded while they move, work that is stopped.
 #![allow(non_snake_case, reason = "the letters of the matrices")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(clippy::print_stdout, reason = "measured errors beside their bounds")]
@@ -99,8 +99,8 @@ fn rows_of_the_recursions_have_the_bits_of_each_alone_and_fit_each_other() {
     check_rows(&robot("palletiser").recursions().unwrap());
 }
 
-/// Largest distance between the tool of an arm that is given a motion as targets, with their velocities or without, and that of
-/// the run along it, over the run's largest error.
+/// Largest distance between the tool of an arm that is given a motion as targets, with their
+/// velocities or without, and that of the run along it, over the run's largest error.
 fn off(arm: &Arm, motion: &Motion, period_s: f64, with_velocities: bool) -> f64 {
     let options = RunOptions { log_rate_hz: 1.0 / period_s, ..RunOptions::default() };
     let run = arm.simulate(motion, &options).unwrap();

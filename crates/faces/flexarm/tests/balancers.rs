@@ -1,4 +1,5 @@
-//! Balancers of robot files: what they do in statics and runs, on links that bend, and what is refused with which words.
+//! Balancers of robot files: what they do in statics and runs, on links that bend, and what is
+//! refused with which words.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
@@ -13,7 +14,8 @@ fn project(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..").join(path)
 }
 
-/// Truth: the published formula of the counterbalance, pressure times area times lever, by hand at three angles of joint 2.
+/// Truth: the published formula of the counterbalance, pressure times area times lever, by hand at
+/// three angles of joint 2.
 #[test]
 fn the_counterbalance_of_the_kr300_turns_joint_2_as_its_formula_says() {
     let robot = Robot::load(project("robots/kr300")).unwrap();
@@ -52,8 +54,9 @@ fn strut(robot: &Robot, to: [f64; 3]) -> Robot {
 
 const AT: [f64; 6] = [0.0, -1.1, 1.2, 0.0, 0.4, 0.0];
 
-/// A strut at the far end of a link goes with the far end: tied to the near part it would carry the arm past the spring of the link. Truth: the
-/// compliance of the tool falls as the link's own springs are helped, in both models of the link by the same 1.1 %; measured 1.3e-4 between them.
+/// A strut at the far end of a link goes with the far end: tied to the near part it would carry the
+/// arm past the spring of the link. Truth: the compliance of the tool falls as the link's own
+/// springs are helped, in both models of the link by the same 1.1 %; measured 1.3e-4 between them.
 #[test]
 fn a_balancer_at_the_far_end_of_a_link_that_bends_holds_its_far_end() {
     let robot = Robot::load_with(&project("robots/kr210/links.toml"), &LoadOptions::default()).unwrap();
@@ -74,7 +77,8 @@ fn a_balancer_at_the_far_end_of_a_link_that_bends_holds_its_far_end() {
     assert!((near - 1.0).abs() < 1e-3, "{near}");
 }
 
-/// Energy in equals energy stored and lost, in a run with the counterbalance; SPOOK against generalised-alpha.
+/// Energy in equals energy stored and lost, in a run with the counterbalance; SPOOK against
+/// generalised-alpha.
 #[test]
 fn a_run_of_the_kr300_keeps_the_books_with_its_counterbalance() {
     let robot = Robot::load(project("robots/kr300")).unwrap();

@@ -103,7 +103,8 @@ fn runs_on_all_cores_are_those_of_one_thread() {
     }
 }
 
-/// A study of ten runs: other motions, payloads, stiffnesses, dampings; one with a load, which no lane knows.
+/// A study of ten runs: other motions, payloads, stiffnesses, dampings; one with a load, which no
+/// lane knows.
 fn study(robot: &Robot) -> Vec<Variation> {
     let motion = Motion::load(root().join("trajectories/point_to_point.toml"), robot).unwrap();
     let slower = motion.trajectory.scaled(1.5).unwrap();
@@ -126,7 +127,8 @@ fn study(robot: &Robot) -> Vec<Variation> {
     runs
 }
 
-/// Truth: the same run with all its figures; peak, time of the peak and last sample to the rounding of a distance.
+/// Truth: the same run with all its figures; peak, time of the peak and last sample to the rounding
+/// of a distance.
 #[test]
 fn deflections_of_a_study_are_those_of_whole_runs() {
     let (robot, arm) = kr210();
@@ -147,7 +149,8 @@ fn deflections_of_a_study_are_those_of_whole_runs() {
     }
 }
 
-/// Order, company and threads change no bit; the run with a load is the only one that is taken alone.
+/// Order, company and threads change no bit; the run with a load is the only one that is taken
+/// alone.
 #[test]
 fn deflections_do_not_depend_on_company_order_or_threads() {
     let (robot, arm) = kr210();
@@ -168,7 +171,8 @@ fn deflections_do_not_depend_on_company_order_or_threads() {
     assert!(one.windows(2).all(|pair| pair[0].peak_m != pair[1].peak_m), "each run is another one");
 }
 
-/// A run that cannot be is refused in its place, by name, and the others go on; other steppers give figures as well.
+/// A run that cannot be is refused in its place, by name, and the others go on; other steppers give
+/// figures as well.
 #[test]
 fn a_bad_run_is_refused_in_its_place() {
     let (robot, arm) = kr210();

@@ -1,7 +1,9 @@
-//! Slips in robot files, URDFs, motions and loads: how many are told, and that plausible changes are not.
+//! Slips in robot files, URDFs, motions and loads: how many are told, and that plausible changes
+//! are not.
 //!
-//! A mutation changes one thing in a shipped robot; `check` and `statics` then have to warn (or refuse) with the code that
-//! belongs to it. A harmless change must not add a warning to those of the robot as shipped.
+//! A mutation changes one thing in a shipped robot; `check` and `statics` then have to warn (or
+//! refuse) with the code that belongs to it. A harmless change must not add a warning to those of
+//! the robot as shipped.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 #![allow(clippy::print_stdout, reason = "the counts are what the page of caveats quotes")]
 
@@ -119,7 +121,8 @@ fn times(value: &mut Value, factor: f64) {
 
 type Change = Box<dyn Fn(&mut Texts) -> bool>;
 
-/// Multiplies the value of a key path in the robot file; `*` stands for every entry of a list. False if nothing is there.
+/// Multiplies the value of a key path in the robot file; `*` stands for every entry of a list.
+/// False if nothing is there.
 fn key(path: &'static str, factor: f64) -> Change {
     fn walk(value: &mut Value, keys: &[&str], factor: f64) -> bool {
         match (keys, value) {
@@ -240,7 +243,8 @@ fn torque(has: bool, change: Change) -> Change {
     })
 }
 
-/// A counterbalance whose gas has room for a part of the way only, and a gas spring that has enough.
+/// A counterbalance whose gas has room for a part of the way only, and a gas spring that has
+/// enough.
 const CRAMPED: &str = "[{ from = { link = \"link_1\", xyz = [-0.6, 0.0, 0.0] }, to = { link = \"link_2\", xyz = [0.0, 0.0, 0.3] }, \
                        gas = { acts = \"pull\", pressure = 2e6, volume = 1e-4, area = 1e-3, length = 0.6 } }]";
 const GAS_SPRING: &str = "[{ from = { link = \"link_1\", xyz = [-0.6, 0.0, 0.0] }, to = { link = \"link_2\", xyz = [0.0, 0.0, 0.3] }, \
@@ -260,7 +264,8 @@ fn lumped(change: Change) -> Change {
     Box::new(move |texts| links(texts).iter().all(|link| link.get("reduced").is_none()) && change(texts))
 }
 
-/// A change of robots whose links are beams and nothing else: mass and inertia are those of the section.
+/// A change of robots whose links are beams and nothing else: mass and inertia are those of the
+/// section.
 fn bare(change: Change) -> Change {
     Box::new(move |texts| texts.urdf.contains("beam_1") && change(texts))
 }
@@ -552,9 +557,10 @@ fn slips_are_told_and_plausible_robots_are_not() {
     println!("told {told} of {made} slips, {} false alarms in {tried} harmless changes", false_alarms.len());
     missed.iter().for_each(|missed| println!("missed: {missed}"));
     assert_eq!(false_alarms, [""; 0]);
-    // Gears of the arm seen from the motor are softer by the ratio squared; a tool of 10 m is within three times the reach of the
-    // large arm. The fifth gear of kr210 turns a quarter of what the others turn under their torques: in N m/deg it turns 14.7
-    // times as far as they do, and a gear of kr500 that is half as stiff, which is plausible, 15 times.
+    // Gears of the arm seen from the motor are softer by the ratio squared; a tool of 10 m is
+    // within three times the reach of the large arm. The fifth gear of kr210 turns a quarter of
+    // what the others turn under their torques: in N m/deg it turns 14.7 times as far as they do,
+    // and a gear of kr500 that is half as stiff, which is plausible, 15 times.
     let known = [
         ("abb_three_mass/", "gears in N mm/rad"),
         ("kr300/", "tcp in cm"),

@@ -45,7 +45,8 @@ fn codes(caveats: &[Caveat]) -> BTreeSet<String> {
     caveats.iter().filter(|c| c.warns() && c.code != "missing-mesh").map(|c| c.code.clone()).collect()
 }
 
-/// The KR 210 with one drive in N m/deg, without damping in the next, on a motion that is far too quick for it.
+/// The KR 210 with one drive in N m/deg, without damping in the next, on a motion that is far too
+/// quick for it.
 fn odd_robot(folder: &Folder) -> (PathBuf, PathBuf) {
     let text = std::fs::read_to_string(project("robots/kr210/drives.toml")).unwrap();
     let urdf = project("robots/kr210/kr210.urdf").canonicalize().unwrap();

@@ -1,4 +1,5 @@
-//! Motions with which the flexible tool follows the rigid one: on the model itself, on plants that are off, at rest, with shapers.
+//! Motions with which the flexible tool follows the rigid one: on the model itself, on plants that
+//! are off, at rest, with shapers.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
@@ -189,7 +190,8 @@ fn at(trajectory: &flexarm::Trajectory, t: f64) -> [f64; 6] {
     q
 }
 
-/// Truth: the equilibrium under weight and the constant part of a milling force, found at the operating point.
+/// Truth: the equilibrium under weight and the constant part of a milling force, found at the
+/// operating point.
 #[test]
 fn under_the_force_of_a_cutter_the_tool_at_rest_is_where_the_rigid_arm_has_it() {
     let (robot, motion) = shipped("kr210", "pick_and_place.toml");
@@ -315,7 +317,8 @@ const RAPID: &str = "MODULE Cut\n  CONST robtarget p1:=[[1650,0,1200],[0.7071068
     PROC main()\n  ConfL \\Off; ConfJ \\Off;\n  MoveAbsJ [[0,-70,80,0,60,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v200,fine,tool0;\n  MoveJ p1,v200,z5,tool0;\n\
       MoveL [[1600,150,1100],[0.7,0.1,0.7,0.1],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\n  ENDPROC\nENDMODULE\n";
 
-/// Truth: the equilibria at the targets of the program as it was written, read by the same reader as any program.
+/// Truth: the equilibria at the targets of the program as it was written, read by the same reader
+/// as any program.
 #[test]
 fn a_robot_program_comes_back_with_targets_at_which_the_flexible_tool_is_where_it_was_told_to_be() {
     let (robot, _) = shipped("kr210", "pick_and_place.toml");
@@ -329,7 +332,8 @@ fn a_robot_program_comes_back_with_targets_at_which_the_flexible_tool_is_where_i
             output: Some(place.0.join("out")),
             method: Method::Static,
             recording: false,
-            // The second passes near a singular pose of the wrist, where the commands of the path turn quickly.
+            // The second passes near a singular pose of the wrist, where the commands of the path
+            // turn quickly.
             limits: LimitRule::Tell,
             ..request()
         };
@@ -354,7 +358,8 @@ fn a_robot_program_comes_back_with_targets_at_which_the_flexible_tool_is_where_i
         point.solve(&end(&again), &Wrench::zeros()).unwrap();
         let left = (point.tcp_pose().translation.vector - wanted).norm();
         eprintln!("{name}: at the end {:.2e} m before, {left:.1e} m after", (sagged - wanted).norm());
-        // The relative move at the end of the first is not corrected for its own 20 mm: measured 4.0e-5 m.
+        // The relative move at the end of the first is not corrected for its own 20 mm: measured
+        // 4.0e-5 m.
         let bound = if name == "cut.src" { 1e-4 } else { 3e-7 };
         assert!(left < bound, "{left:e}");
         // A corrected program is corrected into another folder, never over itself.
@@ -393,7 +398,8 @@ fn a_compensation_that_is_stopped_leaves_nothing() {
     }
 }
 
-/// A slender arm of two joints whose gearboxes have this damping (N m s/rad), and a motion of a second with a rest behind it.
+/// A slender arm of two joints whose gearboxes have this damping (N m s/rad), and a motion of a
+/// second with a rest behind it.
 fn slender(name: &str, damping: [f64; 2]) -> (Robot, Motion) {
     let folder = Place::new(name);
     let place = &folder.0;
@@ -434,15 +440,17 @@ fn slender(name: &str, damping: [f64; 2]) -> (Robot, Motion) {
     (robot, motion)
 }
 
-/// A slender arm whose tool still swings when its motion ends; gearboxes alone yield, so that nothing but the step ends the series.
-/// Truth: joints that rested in the motion rest in the commands, after which the tool swings less everywhere.
+/// A slender arm whose tool still swings when its motion ends; gearboxes alone yield, so that
+/// nothing but the step ends the series. Truth: joints that rested in the motion rest in the
+/// commands, after which the tool swings less everywhere.
 #[test]
 fn an_arm_that_rests_at_the_end_of_its_motion_is_not_struck_there() {
     let (robot, motion) = slender("end", [60.0, 12.0]);
     let components = [true, false, true, false, false, false];
     let found = compensate_motion(&robot, &motion, &CompensateRequest { components, ..request() }).unwrap();
     told("slender", &found);
-    // Best of two iterations 0.00151 of 3.203 mm; with the error held on behind its end 0.040, and 189 rad/s² in the last 12 ms.
+    // Best of two iterations 0.00151 of 3.203 mm; with the error held on behind its end 0.040, and
+    // 189 rad/s² in the last 12 ms.
     assert!(found.after.peak_m < 1e-3 * found.before.peak_m, "{:e}", found.after.peak_m);
     let (mut q, mut v, mut a) = ([0.0; 2], [0.0; 2], [0.0; 2]);
     let largest = |a: [f64; 2]| a[0].abs().max(a[1].abs());
@@ -455,7 +463,8 @@ fn an_arm_that_rests_at_the_end_of_its_motion_is_not_struck_there() {
     assert!(at_end < 4.0, "{at_end}"); // measured 1.29
 }
 
-/// Truth: a command that has a velocity at every time has none that jumps; the arm linearised goes along every 20 ms.
+/// Truth: a command that has a velocity at every time has none that jumps; the arm linearised goes
+/// along every 20 ms.
 #[test]
 fn commands_of_a_smooth_motion_have_no_kink_where_the_arm_is_linearised_anew() {
     let (robot, motion) = shipped("kr210", "pick_and_place.toml");
@@ -467,7 +476,8 @@ fn commands_of_a_smooth_motion_have_no_kink_where_the_arm_is_linearised_anew() {
         motion.trajectory.sample(t, &mut q, &mut v, &mut b);
         a.iter().zip(&b).map(|(a, b)| a - b).collect::<Vec<f64>>()
     };
-    // What a sample of the change's acceleration has beside the mean of its neighbours, at nodes and half way between.
+    // What a sample of the change's acceleration has beside the mean of its neighbours, at nodes
+    // and half way between.
     let mut beside = |t: f64| {
         let [before, at, behind] = [change(t - 2e-3), change(t), change(t + 2e-3)];
         (0..m).map(|k| (at[k] - 0.5 * (before[k] + behind[k])).abs()).fold(0.0, f64::max)
@@ -482,7 +492,8 @@ fn commands_of_a_smooth_motion_have_no_kink_where_the_arm_is_linearised_anew() {
     assert!(at_nodes < 3.0 * between.max(1e-3), "{at_nodes} {between}"); // measured 0.0022 and 0.0013; 0.188 with a chord
 }
 
-/// Without damping the error rings on at frequencies where the inverse does not hold. Truth: the simulation.
+/// Without damping the error rings on at frequencies where the inverse does not hold. Truth: the
+/// simulation.
 #[test]
 fn an_iteration_that_enlarges_the_error_of_an_undamped_arm_is_discarded_and_the_next_one_corrects_lower_frequencies() {
     let (robot, motion) = slender("undamped", [0.0, 0.0]);
@@ -496,7 +507,8 @@ fn an_iteration_that_enlarges_the_error_of_an_undamped_arm_is_discarded_and_the_
     let discarded = found.caveats.iter().find(|caveat| caveat.code == "discarded").unwrap();
     assert!(discarded.message.contains("iteration 3 (up to 200.0 Hz) made it 19"), "{}", discarded.message);
     assert!(found.iterations < 6 && found.cutoff_hz.unwrap() < 150.0);
-    // Measured 3.1e-4 with the third and fifth iteration discarded; the first two, up to 200 Hz, leave 6.4e-4.
+    // Measured 3.1e-4 with the third and fifth iteration discarded; the first two, up to 200 Hz,
+    // leave 6.4e-4.
     assert!(found.after.rms_m < 4e-4 * found.before.rms_m, "{:e}", found.after.rms_m / found.before.rms_m);
 }
 

@@ -1,4 +1,5 @@
-//! Compensation of arms under servos, shapers of several modes, and programs whose targets are loaded.
+//! Compensation of arms under servos, shapers of several modes, and programs whose targets are
+//! loaded.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
@@ -38,8 +39,8 @@ fn told(name: &str, found: &Compensation) {
     );
 }
 
-/// Truth: the simulation itself, sampled controllers and springs in it; the rigid arm on the motion that was asked for, so that the lag
-/// of the servos counts.
+/// Truth: the simulation itself, sampled controllers and springs in it; the rigid arm on the motion
+/// that was asked for, so that the lag of the servos counts.
 #[test]
 fn targets_of_servos_leave_a_hundredth_of_the_peak_or_the_cause_is_told() {
     let (robot, motion) = shipped("kr300", "kr300.toml");
@@ -56,7 +57,8 @@ fn targets_of_servos_leave_a_hundredth_of_the_peak_or_the_cause_is_told() {
     assert!(found.caveats.iter().any(|caveat| caveat.code == "servo-limit" && caveat.message.contains("joint_2")));
 }
 
-/// Truth: the simulation; nothing fed forward and no integral, so that motors lag and sag into their gains.
+/// Truth: the simulation; nothing fed forward and no integral, so that motors lag and sag into
+/// their gains.
 #[test]
 fn servos_that_lag_and_sag_are_told_ahead_of_it() {
     let (mut robot, motion) = shipped("kr300", "kr300.toml");
@@ -112,7 +114,8 @@ fn static_targets_of_servos_leave_nothing_at_rest() {
     assert!(off <= 1e-9, "{off:e}");
 }
 
-/// Truth: swing of the simulated tool behind the motion, where the linear forecast of each mode should hold.
+/// Truth: swing of the simulated tool behind the motion, where the linear forecast of each mode
+/// should hold.
 #[test]
 fn a_shaper_of_all_modes_leaves_less_than_zv_within_the_same_delay_and_zvd_within_its_own() {
     let (robot, motion) = shipped("kr210", "point_to_point.toml");
@@ -146,7 +149,8 @@ fn a_shaper_of_all_modes_leaves_less_than_zv_within_the_same_delay_and_zvd_withi
 const KRL: &str = "&ACCESS RVP\nDEF press()\n$VEL.CP = 0.2\nPTP {A1 10, A2 -80, A3 95, A4 5, A5 50, A6 -10}\n\
     LIN {X 1600, Y 100, Z 1100, A 10, B 80, C 20}\nWAIT SEC 0.5\nLIN {X 1600, Y -100, Z 1100, A 10, B 80, C 20}\nWAIT SEC 0.4\nEND\n";
 
-/// Truth: the equilibrium under the mean of the force while the arm waits, found at the operating point.
+/// Truth: the equilibrium under the mean of the force while the arm waits, found at the operating
+/// point.
 #[test]
 fn targets_at_which_the_arm_waits_under_a_force_are_corrected_for_it() {
     let (robot, _) = shipped("kr210", "pick_and_place.toml");

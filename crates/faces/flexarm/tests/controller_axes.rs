@@ -17,8 +17,9 @@ fn flange(robot: &str, degrees: [f64; 6]) -> [f64; 3] {
     inspect(&robot, Some(&q), None).unwrap().tcp.position_m
 }
 
-/// Truth: the drawings in KUKA's data sheets. At A2 = -90 the link arm is upright, at A3 = 90 the forearm level: lengths add up by
-/// hand. Axis 1 turns clockwise as seen from above. Bound 1 um: what is left is rounding of the description.
+/// Truth: the drawings in KUKA's data sheets. At A2 = -90 the link arm is upright, at A3 = 90 the
+/// forearm level: lengths add up by hand. Axis 1 turns clockwise as seen from above. Bound 1 um:
+/// what is left is rounding of the description.
 #[test]
 fn shipped_kuka_arms_have_the_zeros_and_senses_of_their_controller() {
     let home = [0.0, -90.0, 90.0, 0.0, 0.0, 0.0];

@@ -1,5 +1,5 @@
-//! Errors as a program meets them: the cause as a variant with its numbers, the setting that mends it as a value, and a
-//! sentence in the library's own names.
+//! Errors as a program meets them: the cause as a variant with its numbers, the setting that mends
+//! it as a value, and a sentence in the library's own names.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::path::{Path, PathBuf};

@@ -25,7 +25,8 @@ fn run(robot: &str, trajectory: &str, outputs: Option<&Outputs>) -> (Summary, Tr
     (run.summary, run.trace)
 }
 
-/// Truth: the recorded parts of the error. The beam swings in a plane and sags out of it: nothing is normal to its path.
+/// Truth: the recorded parts of the error. The beam swings in a plane and sags out of it: nothing
+/// is normal to its path.
 #[test]
 fn peaks_along_the_path_axes_are_those_of_the_recorded_errors() {
     for (robot, trajectory) in [("one_beam", "beam_swing.toml"), ("kr210", "pick_and_place.toml")] {
@@ -38,7 +39,8 @@ fn peaks_along_the_path_axes_are_those_of_the_recorded_errors() {
     }
 }
 
-/// Truth: the recorded error. The tool turns by e (rad) at 1 m from the one axis, so e²/2 (m) is left of second order.
+/// Truth: the recorded error. The tool turns by e (rad) at 1 m from the one axis, so e²/2 (m) is
+/// left of second order.
 #[test]
 fn with_servos_the_contributions_still_add_up_to_the_error() {
     let (_, trace) = run("abb_three_mass/torque.toml", "three_mass.toml", None);

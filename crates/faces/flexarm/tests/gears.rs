@@ -1,4 +1,5 @@
-//! Gears of robot files beyond their stiffness: from the keys to statics, runs of every stepper, figures and caveats.
+//! Gears of robot files beyond their stiffness: from the keys to statics, runs of every stepper,
+//! figures and caveats.
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stderr, reason = "what was measured stands beside the bound")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
@@ -69,9 +70,9 @@ fn steppers() -> [(StepperKind, f64, f64); 4] {
     ]
 }
 
-/// Truth: the ripple in arc seconds at the motor's angle, beside the sag of the same gear without it, to first order (2.2e-3: the weight gives
-/// way with it); RK4 at 0.05 ms for the
-/// other steppers. A run of many is a run alone.
+/// Truth: the ripple in arc seconds at the motor's angle, beside the sag of the same gear without
+/// it, to first order (2.2e-3: the weight gives way with it); RK4 at 0.05 ms for the other
+/// steppers. A run of many is a run alone.
 #[test]
 fn the_ripple_of_a_gear_is_where_the_robot_file_puts_it() {
     let place = Place::new("ripple");
@@ -122,8 +123,8 @@ fn the_ripple_of_a_gear_is_where_the_robot_file_puts_it() {
     assert!(coarse.summary.caveats.iter().any(|c| c.code == "ripple-step"), "{:?}", coarse.summary.warnings);
 }
 
-/// The loop of a gear takes its energy in a run and stands in the balance; statics say on which branch they stand. The reference and
-/// spook say what they do not know.
+/// The loop of a gear takes its energy in a run and stands in the balance; statics say on which
+/// branch they stand. The reference and spook say what they do not know.
 #[test]
 fn the_hysteresis_of_a_gear_takes_energy_and_says_what_statics_make_of_it() {
     let place = Place::new("hysteresis");
@@ -169,8 +170,9 @@ fn the_hysteresis_of_a_gear_takes_energy_and_says_what_statics_make_of_it() {
 
 const WRIST: &str = "[coupling]\njoints = [\"joint_5\", \"joint_6\"]\nmatrix = [[1.0, 0.0], [-0.05, 1.0]]\n";
 
-/// Truth: the wrist's part of the compliance about the axes of its joints is `C K_m^-1 Cᵀ`, its rotors `C^-T J_m C^-1` on the mass matrix, its motors'
-/// torques `Cᵀ τ`; a matrix of ones on the diagonal changes nothing.
+/// Truth: the wrist's part of the compliance about the axes of its joints is `C K_m^-1 Cᵀ`, its
+/// rotors `C^-T J_m C^-1` on the mass matrix, its motors' torques `Cᵀ τ`; a matrix of ones on the
+/// diagonal changes nothing.
 #[test]
 fn a_coupled_wrist_has_springs_rotors_and_torques_at_its_motors() {
     let place = Place::new("wrist");
@@ -236,7 +238,8 @@ fn a_coupled_wrist_has_springs_rotors_and_torques_at_its_motors() {
     assert_eq!(runs[0].error_world_m(), runs[1].error_world_m());
 }
 
-/// Truth: the torques of the drive without it, plus the ratio of the transmitted torque against the motion.
+/// Truth: the torques of the drive without it, plus the ratio of the transmitted torque against the
+/// motion.
 #[test]
 fn friction_under_load_adds_its_part_of_the_torque() {
     let place = Place::new("load");

@@ -30,8 +30,8 @@ fn run(robot: &Robot, trajectory: &str, options: &RunOptions) -> (Summary, Trace
     (run.summary, run.trace)
 }
 
-/// Truth: `statics` at the poses of the motion, which finds each equilibrium from nothing. Measured 3e-8 of the largest
-/// sag within moves, where the curve is interpolated.
+/// Truth: `statics` at the poses of the motion, which finds each equilibrium from nothing. Measured
+/// 3e-8 of the largest sag within moves, where the curve is interpolated.
 #[test]
 fn the_static_part_of_a_run_is_the_sag_at_the_pose() {
     let robot = load("kr210");
@@ -115,7 +115,8 @@ fn a_robot_with_nothing_that_bends_says_so_first_and_how_to_give_it_something() 
     assert_eq!(summary.headline, "what bends: links link_2, link_3; not compared with the rigid robot");
 }
 
-/// Truth: the stops of the same run. Two of its three last half a second, in which the arm on its gearboxes does not come to rest.
+/// Truth: the stops of the same run. Two of its three last half a second, in which the arm on its
+/// gearboxes does not come to rest.
 #[test]
 fn a_stop_at_which_the_tool_does_not_settle_is_the_settling_time_of_the_run() {
     let (summary, _) = run(&load("kr210"), "pick_and_place.toml", &RunOptions::default());

@@ -1,4 +1,5 @@
-//! A SCARA whose quill moves along a thread as it turns: from the robot file to statics, runs of every stepper and recordings.
+//! A SCARA whose quill moves along a thread as it turns: from the robot file to statics, runs of
+//! every stepper and recordings.
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stderr, reason = "what was measured stands beside the bound")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
@@ -56,7 +57,8 @@ impl Drop for Place {
     }
 }
 
-/// Truth: a force F along the spindle turns its spring by F p/k and moves the tool by F p²/k along it, p the lead over 2π.
+/// Truth: a force F along the spindle turns its spring by F p/k and moves the tool by F p²/k along
+/// it, p the lead over 2π.
 #[test]
 fn a_force_along_the_spindle_turns_its_spring() {
     let place = Place::new("statics");
@@ -66,7 +68,8 @@ fn a_force_along_the_spindle_turns_its_spring() {
     let mut at = robot.flexible(modelling).unwrap().operating_point().unwrap();
     at.solve(&[0.3, -0.4, 0.1, 2.0], &Wrench::zeros()).unwrap();
     let C = at.compliance();
-    // The spring alone gives way, along S = (p a; a) moved to the tool: rank one, with 1/k in its turning block.
+    // The spring alone gives way, along S = (p a; a) moved to the tool: rank one, with 1/k in its
+    // turning block.
     let turning = C.fixed_view::<3, 3>(3, 3).into_owned();
     assert!((turning.trace() * GEAR - 1.0).abs() < 1e-9, "{}", turning.trace() * GEAR);
     let axis = turning.symmetric_eigen();
@@ -76,7 +79,8 @@ fn a_force_along_the_spindle_turns_its_spring() {
     assert!((along * GEAR / (p * p) - 1.0).abs() < 1e-8, "{along}"); // measured 1e-12
 }
 
-/// Second algorithm: all steppers against the reference, with a link that bends and a spring behind the thread.
+/// Second algorithm: all steppers against the reference, with a link that bends and a spring behind
+/// the thread.
 #[test]
 fn every_stepper_runs_a_robot_with_a_helical_joint() {
     let place = Place::new("runs");

@@ -1,4 +1,5 @@
-//! Shipped robots identified from made-up measurements: files in the units of a shop, honest deviations, new robot files.
+//! Shipped robots identified from made-up measurements: files in the units of a shop, honest
+//! deviations, new robot files.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
@@ -35,7 +36,8 @@ fn normal(draw: &mut Draw) -> f64 {
     (-2.0 * u.ln()).sqrt() * v.cos()
 }
 
-/// Pulls of 2 kN along the axes in turn on an arm of 0.4 m, at poses all over the middle of the joint ranges.
+/// Pulls of 2 kN along the axes in turn on an arm of 0.4 m, at poses all over the middle of the
+/// joint ranges.
 fn pulls(draw: &mut Draw, count: usize) -> Measurements {
     let readings = (0..count).map(|k| {
         let q = [1.5, 0.6, 0.7, 2.0, 1.2, 2.0].map(|range| range * draw.signed());
@@ -77,7 +79,8 @@ fn with_values(of: &Measurements, values: &[f64]) -> Measurements {
     read
 }
 
-/// Truth: the made-up arm. Share of 95 % intervals that hold it, and spread of the errors over their deviations, 200 seeds.
+/// Truth: the made-up arm. Share of 95 % intervals that hold it, and spread of the errors over
+/// their deviations, 200 seeds.
 fn coverage(robot: &str) -> (f64, f64) {
     let arm = shipped(robot).flexible(Modelling::default()).unwrap();
     let (plant, parameters) = (plant(&arm), stiffnesses(parameters(&arm)));
@@ -157,7 +160,8 @@ fn a_table_in_millimetres_gives_a_robot_file_that_shows_what_was_measured() {
         assert!(error < 1e-8, "{}: {error:e}", p.name); // measured: below 1e-10
     }
     assert!(found.residual.before > 1e-5 && found.residual.after < 1e-12, "{:?}", found.residual);
-    // The new file has these stiffnesses to a hundredth of their deviations, and everything else of the old one.
+    // The new file has these stiffnesses to a hundredth of their deviations, and everything else of
+    // the old one.
     let new = Robot::load(&output).unwrap();
     assert_eq!(
         (new.urdf_path.canonicalize().unwrap(), &new.name),
@@ -248,7 +252,8 @@ fn a_plan_tells_more_than_as_many_poses_as_they_come_and_its_table_is_read_when_
             continue;
         }
         let ratio = found.std / promised.std;
-        // The plan counts what is known before, a factor of two, also of parameters that go along with this one; the fit does not.
+        // The plan counts what is known before, a factor of two, also of parameters that go along
+        // with this one; the fit does not.
         assert!((0.99..1.5).contains(&ratio), "{}: {ratio}", found.name); // measured: 1.0 to 1.3
     }
     std::fs::remove_dir_all(folder).unwrap();
@@ -288,8 +293,9 @@ fn what_is_wrong_in_a_file_of_measurements_is_said_with_its_place() {
     std::fs::remove_dir_all(folder).unwrap();
 }
 
-/// Truth: `tests/verification/kr300`, three recordings of a real KUKA KR 300 (MIT licence, see the README there); the bounds are what
-/// a fit of the same kind gave elsewhere: A2 8.7e6 (without one run 8.7e6 to 8.9e6), A3 4.7e6 (4.6e6 to 5.0e6), A1 not possible.
+/// Truth: `tests/verification/kr300`, three recordings of a real KUKA KR 300 (MIT licence, see the
+/// README there); the bounds are what a fit of the same kind gave elsewhere: A2 8.7e6 (without one
+/// run 8.7e6 to 8.9e6), A3 4.7e6 (4.6e6 to 5.0e6), A1 not possible.
 #[test]
 fn a_measured_robot_tells_two_of_its_gears_and_is_silent_about_the_third() {
     let robot = shipped("kr300");
@@ -332,7 +338,8 @@ fn a_measured_robot_tells_two_of_its_gears_and_is_silent_about_the_third() {
     let [a1, a2, a3] = &found.encoders[..] else { panic!("three gears have encoders") };
     assert!(!a1.told && a2.told && a3.told);
     assert!((8.5e6..9.1e6).contains(&a2.stiffness) && (4.5e6..5.1e6).contains(&a3.stiffness));
-    // Up to 12 Hz the ripple of the encoders is left in; below 3 Hz runs that were not seen are met as well as elsewhere.
+    // Up to 12 Hz the ripple of the encoders is left in; below 3 Hz runs that were not seen are met
+    // as well as elsewhere.
     let slow = std::fs::read_to_string(folder.join("job.toml"))
         .unwrap()
         .replace("[[encoders]]\n", "[[encoders]]\nbelow = 3.0\n");

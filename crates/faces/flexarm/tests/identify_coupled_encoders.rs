@@ -19,7 +19,8 @@ impl Drop for Place {
 /// C of the wrist: joints from motors.
 const C: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [-0.2, 1.0, 0.0], [0.4, -0.3, 1.0]];
 
-/// The arm with a load beside the axis of its last joint and a coupled wrist; `factors` on the springs of its motors.
+/// The arm with a load beside the axis of its last joint and a coupled wrist; `factors` on the
+/// springs of its motors.
 fn coupled(folder: &Path, factors: [f64; 3]) -> Robot {
     let home = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../robots/kr210_identified").canonicalize().unwrap();
     let urdf = home.join("kr210_identified.urdf");
@@ -47,7 +48,8 @@ fn coupled(folder: &Path, factors: [f64; 3]) -> Robot {
     Robot::load(folder).unwrap()
 }
 
-/// Motors behind their gears, and links, of equilibria along a motion so slow that nothing but weight acts.
+/// Motors behind their gears, and links, of equilibria along a motion so slow that nothing but
+/// weight acts.
 fn recording(robot: &Robot, seed: f64) -> String {
     let arm = robot.flexible(Modelling::default()).unwrap();
     let mut at = arm.operating_point().unwrap();
@@ -94,8 +96,8 @@ fn job(place: &Path, motor: &str, link: &str, positions: &str, head: &str) -> Pa
     path
 }
 
-/// Truth: the springs of the arm whose equilibria were recorded. The torques are those at the motors' angles, which the deflection is
-/// off from: a part of itself of second order.
+/// Truth: the springs of the arm whose equilibria were recorded. The torques are those at the
+/// motors' angles, which the deflection is off from: a part of itself of second order.
 #[test]
 fn springs_of_coupled_motors_are_found_from_encoders_behind_the_gears() {
     let folder = std::env::temp_dir().join(format!("flexarm-coupled-encoders-{}", std::process::id()));

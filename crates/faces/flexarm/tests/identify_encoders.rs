@@ -91,7 +91,8 @@ fn identified(robot: &Robot, folder: &Path, extra: &str) -> Identification {
     identify_robot(robot, &folder.join("job.toml"), &IdentifyRequest::default()).unwrap()
 }
 
-/// Truth: the gearboxes of the simulated arm. From the motors' motion, which does not swing, they came out 1.2 to 5 % low.
+/// Truth: the gearboxes of the simulated arm. From the motors' motion, which does not swing, they
+/// came out 1.2 to 5 % low.
 #[test]
 fn gears_of_a_swinging_arm_come_out_from_the_motion_of_its_links_and_from_measured_torques() {
     let folder = Folder(std::env::temp_dir().join(format!("flexarm-identify-encoders-{}", std::process::id())));
@@ -124,7 +125,8 @@ fn gears_of_a_swinging_arm_come_out_from_the_motion_of_its_links_and_from_measur
     }
 }
 
-/// A payload that the robot file does not know is in no torque; the rest of the deflection shows it.
+/// A payload that the robot file does not know is in no torque; the rest of the deflection shows
+/// it.
 #[test]
 fn a_rest_that_is_larger_than_the_noise_of_the_encoders_is_told() {
     let folder = Folder(std::env::temp_dir().join(format!("flexarm-identify-rest-{}", std::process::id())));

@@ -1,4 +1,5 @@
-//! Entries of a link's matrix and the tool in files of measurements: what is found is written where it was taken from.
+//! Entries of a link's matrix and the tool in files of measurements: what is found is written where
+//! it was taken from.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
@@ -71,7 +72,8 @@ fn poses() -> Vec<[f64; 6]> {
         .collect()
 }
 
-/// Truth: a robot file with that matrix, whose equilibria are measured. Two entries are found again, written, and read again.
+/// Truth: a robot file with that matrix, whose equilibria are measured. Two entries are found
+/// again, written, and read again.
 #[test]
 fn the_coupling_of_shear_and_bending_is_found_and_written_into_the_robot_file() {
     let place = Place::new("coupling");
@@ -123,7 +125,8 @@ fn the_coupling_of_shear_and_bending_is_found_and_written_into_the_robot_file() 
     assert!(error.contains("say the same twice") && error.contains("link.link_2.stiffness_factor"), "{error}");
 }
 
-/// Truth: a robot file with another entry, by statics; the derivative of the entry as `sensitivity` has it.
+/// Truth: a robot file with another entry, by statics; the derivative of the entry as `sensitivity`
+/// has it.
 #[test]
 fn an_entry_in_the_robot_file_does_what_its_derivative_says() {
     let place = Place::new("derivative");
@@ -177,7 +180,8 @@ fn a_matrix_that_is_no_stiffness_is_refused_with_what_is_wrong() {
     assert!(error.contains("one spring between two rigid parts"), "{error}");
 }
 
-/// Truth: a robot whose tool is elsewhere, placed by its equilibria; the tool is found, written, and read again.
+/// Truth: a robot whose tool is elsewhere, placed by its equilibria; the tool is found, written,
+/// and read again.
 #[test]
 fn a_tool_that_is_elsewhere_is_found_from_places_and_written_into_the_robot_file() {
     let place = Place::new("tool");

@@ -1,4 +1,5 @@
-//! What people measure and the slips that they make: axes of instruments, loads with inertia, units of loads, joints in another order.
+//! What people measure and the slips that they make: axes of instruments, loads with inertia, units
+//! of loads, joints in another order.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
@@ -230,7 +231,8 @@ fn kilograms_given_as_newtons_and_newtons_given_as_kilograms_are_told_with_the_s
     }
 }
 
-/// Truth: frequencies of the arm itself; a load of a kilogram metre squared about its centre lowers them.
+/// Truth: frequencies of the arm itself; a load of a kilogram metre squared about its centre lowers
+/// them.
 #[test]
 fn inertia_of_loads_and_relative_deviations_of_frequencies_count() {
     let place = Place::new("hz");
@@ -309,8 +311,8 @@ fn plans_and_identifications_tell_what_check_tells_of_the_robot() {
     assert!(plan.warnings.iter().any(|text| text.contains("payload")), "{:?}", plan.warnings);
 }
 
-/// Two dial gauge readings of 1 mm where the robot file expects half of it. With this prior the third gear was claimed to be found with
-/// a deviation of 247 %.
+/// Two dial gauge readings of 1 mm where the robot file expects half of it. With this prior the
+/// third gear was claimed to be found with a deviation of 247 %.
 #[test]
 fn what_the_readings_know_less_than_within_a_factor_of_two_is_not_claimed() {
     let place = Place::new("gauge");

@@ -64,7 +64,8 @@ fn gears(all: Vec<Parameter>) -> Vec<Parameter> {
     all.into_iter().filter(|p| p.name.ends_with("gearbox.stiffness")).collect()
 }
 
-/// Truth: Richardson differences of displacements and frequencies; the made-up arm itself, measured without noise.
+/// Truth: Richardson differences of displacements and frequencies; the made-up arm itself, measured
+/// without noise.
 #[test]
 fn springs_of_coupled_motors_have_the_derivatives_of_their_arm_and_are_found_from_displacements() {
     let place = Place::new("coupled");
@@ -184,8 +185,8 @@ fn evaluated(arm: &MeasuredArm<'_>, J: &mut nalgebra::DMatrix<f64>) {
     arm.evaluate(&DVector::zeros(arm.parameters.len()), Some(J)).unwrap();
 }
 
-/// Truth: about an axis through the point where a force acts nothing turns; at a lever it does. The table that a plan writes is read
-/// again, and measurements of the arm as it is change nothing.
+/// Truth: about an axis through the point where a force acts nothing turns; at a lever it does. The
+/// table that a plan writes is read again, and measurements of the arm as it is change nothing.
 #[test]
 fn a_plan_with_levers_tells_the_last_gearbox_and_its_table_with_gauges_is_read_again() {
     let robot = Robot::load(home()).unwrap();

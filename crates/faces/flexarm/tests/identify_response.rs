@@ -1,4 +1,5 @@
-//! Stiffness and damping from hammer tests: tables and universal files, coverage of the intervals, units and places that are wrong.
+//! Stiffness and damping from hammer tests: tables and universal files, coverage of the intervals,
+//! units and places that are wrong.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
@@ -124,7 +125,8 @@ fn told(found: &Identification) -> usize {
     TRUTH.iter().map(|(name, factor)| inside(name, *factor)).sum()
 }
 
-/// Truth: the arm that was hit. Of 160 intervals chance leaves 144 to 158 with it in 99 of 100 cases.
+/// Truth: the arm that was hit. Of 160 intervals chance leaves 144 to 158 with it in 99 of 100
+/// cases.
 #[test]
 fn stiffness_and_damping_come_back_from_noisy_responses_with_intervals_that_hold_them() {
     let robot = kr210();
@@ -295,8 +297,8 @@ fn shapes_of_modes_tell_how_stiffness_is_shared() {
     }
 }
 
-/// Truth: the dampers of the arm that is hit, each changed by a factor of its own. One factor for all six would put the part of one
-/// damper into the others.
+/// Truth: the dampers of the arm that is hit, each changed by a factor of its own. One factor for
+/// all six would put the part of one damper into the others.
 #[test]
 fn dampers_of_a_gearbox_of_six_come_back_one_by_one() {
     let place = Place::new("dampers");

@@ -168,9 +168,10 @@ fn an_observer_sees_every_sample_and_can_stop_the_run() {
     assert!(matches!(stopped, Err(Error::Interrupted { t, .. }) if (t - 0.102).abs() < 1e-9), "{:?}", stopped.err());
 }
 
-/// Truth: [`flexarm::statics`] and [`flexarm::modes`], which find equilibrium and modes by other code, with an eigenvalue
-/// solver for damped modes. Every shipped robot, link model and drive, with force and moment at the tool; the three-mass arm
-/// turns by half a radian under them. Measured over 104 poses: 6e-13, 1e-10 (tangents by differences), 2e-14, 1e-13.
+/// Truth: [`flexarm::statics`] and [`flexarm::modes`], which find equilibrium and modes by other
+/// code, with an eigenvalue solver for damped modes. Every shipped robot, link model and drive,
+/// with force and moment at the tool; the three-mass arm turns by half a radian under them.
+/// Measured over 104 poses: 6e-13, 1e-10 (tangents by differences), 2e-14, 1e-13.
 #[test]
 fn operating_points_are_what_statics_and_modes_say() {
     let modellings = [

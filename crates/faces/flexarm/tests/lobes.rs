@@ -1,4 +1,5 @@
-//! Chatter of a tool on an arm: classical cases through the facade, an independent solution at three poses, runs that chatter.
+//! Chatter of a tool on an arm: classical cases through the facade, an independent solution at
+//! three poses, runs that chatter.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stderr,
@@ -60,8 +61,9 @@ fn at(robot: &Robot, tool: &CuttingTool, pose: &[f64], request: &LobesRequest) -
     lobes(robot, tool, &CuttingPlace::At(Some(pose)), request, &|_, _| true).unwrap()
 }
 
-/// The tool of a classical case: its modes along the feed (x of the TCP) and across it. The axis of the cut is the tool's, turned: y of
-/// the cut is `z × x` with z from the tip to the spindle, so minus y of the TCP.
+/// The tool of a classical case: its modes along the feed (x of the TCP) and across it. The axis of
+/// the cut is the tool's, turned: y of the cut is `z × x` with z from the tip to the spindle, so
+/// minus y of the TCP.
 fn classical(case: &Value) -> String {
     let number = |key: &str| case[key].as_f64().unwrap();
     let mut text = format!(
@@ -87,7 +89,8 @@ fn classical(case: &Value) -> String {
     text
 }
 
-/// Truth: limits of another program (0.2 %). The arm is rigid, the tool is the structure: units, axes and files are on the way.
+/// Truth: limits of another program (0.2 %). The arm is rigid, the tool is the structure: units,
+/// axes and files are on the way.
 #[test]
 fn a_tool_on_a_rigid_arm_has_the_limits_of_the_classical_cases() {
     let (robot, folder) = (kr210(), Folder::new("classical"));
@@ -110,7 +113,8 @@ fn a_tool_on_a_rigid_arm_has_the_limits_of_the_classical_cases() {
     assert!(worst < 0.005, "{worst}");
 }
 
-/// Truth: the multi-frequency solution of the exported frequency response, by a script that knows no modes and no steps.
+/// Truth: the multi-frequency solution of the exported frequency response, by a script that knows
+/// no modes and no steps.
 #[test]
 fn limits_follow_the_pose_as_the_exported_response_says() {
     let (robot, golden) = (kr210(), golden("kr210_lobes.json"));
@@ -138,7 +142,8 @@ fn limits_follow_the_pose_as_the_exported_response_says() {
     assert!(worst < 3e-4, "{worst:.1e}");
 }
 
-/// A measured response of a mode, finely sampled, is that mode: the same zero-order limits; and it says that it has no others.
+/// A measured response of a mode, finely sampled, is that mode: the same zero-order limits; and it
+/// says that it has no others.
 #[test]
 fn a_measured_response_gives_the_zero_order_limits_of_its_mode() {
     let (robot, folder) = (kr210(), Folder::new("measured"));
@@ -175,7 +180,8 @@ fn a_measured_response_gives_the_zero_order_limits_of_its_mode() {
     assert!(refused.to_string().contains("zero-order"), "{refused}");
 }
 
-/// Identity: the limit along a motion is the smallest of those at its places, each with its feed along the motion.
+/// Identity: the limit along a motion is the smallest of those at its places, each with its feed
+/// along the motion.
 #[test]
 fn along_a_motion_the_limit_is_the_smallest_of_its_places() {
     let robot = kr210();
@@ -209,7 +215,8 @@ fn along_a_motion_the_limit_is_the_smallest_of_its_places() {
     }
 }
 
-/// The arm as it moves, not linearised, with teeth that leave the work: chatters above the limit, at its frequency, and not below.
+/// The arm as it moves, not linearised, with teeth that leave the work: chatters above the limit,
+/// at its frequency, and not below.
 #[test]
 fn a_cut_chatters_above_the_limit_and_not_below() {
     let robot = kr210();
@@ -321,7 +328,8 @@ fn table_diagram_page_and_figures_are_written_together() {
     assert!(matches!(lobes(&robot, &tool, &place, &request, &|_, _| true), Err(Error::Taken { .. })));
 }
 
-/// Truth: the same direction in other axes. The tool's axis at the pose is known from a run with the axes of the TCP.
+/// Truth: the same direction in other axes. The tool's axis at the pose is known from a run with
+/// the axes of the TCP.
 #[test]
 fn a_tool_axis_in_world_axes_is_the_same_axis() {
     let (robot, folder) = (kr210(), Folder::new("axis"));

@@ -1,4 +1,5 @@
-//! Closed loops of robot files: the shipped palletiser against closed forms, its runs, and what is refused with which words.
+//! Closed loops of robot files: the shipped palletiser against closed forms, its runs, and what is
+//! refused with which words.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
@@ -25,8 +26,9 @@ fn order([turn, lower, crank, tool]: [f64; 4]) -> [f64; 4] {
     [turn, lower, tool, crank]
 }
 
-/// Truth: opposite sides stay parallel. The tool is where lower arm and upper arm bring it, each by its own driving joint, the hand stays level,
-/// and a weight at the tool is carried by virtual work. Measured 1.3e-15 m, 4e-16 and 1.9e-15 of the weight.
+/// Truth: opposite sides stay parallel. The tool is where lower arm and upper arm bring it, each by
+/// its own driving joint, the hand stays level, and a weight at the tool is carried by virtual
+/// work. Measured 1.3e-15 m, 4e-16 and 1.9e-15 of the weight.
 #[test]
 fn the_palletiser_stands_and_holds_as_its_parallelograms_say() {
     let robot = palletiser();
@@ -50,7 +52,8 @@ fn the_palletiser_stands_and_holds_as_its_parallelograms_say() {
             (0..4).map(|k| (seen.gravity_torque[k] - bare.gravity_torque[k] - held[k]).abs()).fold(0.0, f64::max);
         eprintln!("tool {off:.1e} m, tilt {:.1e}, torque {:.1e}", x.hypot(y), miss / weight);
         assert!(off < 1e-13 && x.hypot(y) < 1e-13 && miss < 1e-12 * weight, "{off:e} {x} {y} {miss:e}");
-        // The elbow turns by the difference of the two drives, the wrist takes back what the upper arm turned.
+        // The elbow turns by the difference of the two drives, the wrist takes back what the upper
+        // arm turned.
         let joint = |name: &str| seen.loops.iter().flat_map(|l| &l.dependent).find(|j| j.name == name).unwrap().q;
         assert!((joint("elbow") - (at[2] - at[1])).abs() < 1e-8, "{}", joint("elbow"));
         assert!((joint("wrist") + at[2]).abs() < 1e-8);
@@ -68,7 +71,8 @@ fn the_palletiser_as_shipped_has_no_warnings() {
     assert!(loud.is_empty(), "{loud:#?}");
 }
 
-/// Truth: the energy books close, and steppers that share nothing but the equations agree. Measured peak 3.94 mm, 2.4e-7 between them.
+/// Truth: the energy books close, and steppers that share nothing but the equations agree. Measured
+/// peak 3.94 mm, 2.4e-7 between them.
 #[test]
 fn a_run_of_the_palletiser_keeps_the_books_in_every_stepper() {
     let robot = palletiser();
@@ -92,7 +96,8 @@ fn a_run_of_the_palletiser_keeps_the_books_in_every_stepper() {
     assert!(off.abs() < 1e-2, "{off:.1e}");
 }
 
-/// Truth: one spring on the crank, virtual work: with the gearbox of joint_3 alone the tool sinks by (dz/dq)² F/k, dz/dq = 1.35 cos q3.
+/// Truth: one spring on the crank, virtual work: with the gearbox of joint_3 alone the tool sinks
+/// by (dz/dq)² F/k, dz/dq = 1.35 cos q3.
 #[test]
 fn compliance_of_the_crank_reaches_the_tool_through_the_rod() {
     let mut robot = palletiser();
@@ -111,8 +116,9 @@ fn compliance_of_the_crank_reaches_the_tool_through_the_rod() {
     }
 }
 
-/// Truth: virtual work. A rod of stiffness EA/L that alone gives way lets the tool sink by (dS/dF)² L/EA, S = F 1.35 cos q3/(0.4 sin μ) the force in it, μ the
-/// transmission angle. Measured 3e-4, 2e-4 and 1e-3 (the weight on the lever).
+/// Truth: virtual work. A rod of stiffness EA/L that alone gives way lets the tool sink by (dS/dF)²
+/// L/EA, S = F 1.35 cos q3/(0.4 sin μ) the force in it, μ the transmission angle. Measured 3e-4,
+/// 2e-4 and 1e-3 (the weight on the lever).
 #[test]
 fn a_rod_that_stretches_lets_the_tool_sink_by_the_square_of_its_lever() {
     let shipped = std::fs::read_to_string(project("robots/palletiser/robot.toml")).unwrap();

@@ -78,8 +78,8 @@ fn a_hundred_poses_of_a_map_are_those_of_statics_and_modes_to_the_last_bit() {
     }
 }
 
-/// Truth: turning the whole arm about the direction of gravity changes the direction of the sag and of the softest force,
-/// and nothing else. Joint 1 of these arms stands upright.
+/// Truth: turning the whole arm about the direction of gravity changes the direction of the sag and
+/// of the softest force, and nothing else. Joint 1 of these arms stands upright.
 #[test]
 fn turning_the_arm_about_gravity_changes_no_size() {
     for name in ["kr210", "kr210_identified"] {
@@ -174,7 +174,8 @@ fn a_map_is_the_same_bytes_on_one_thread_and_on_several() {
     assert!(one.iter().zip(&three).all(|(a, b)| a.to_bits() == b.to_bits()) && one.len() == three.len());
 }
 
-/// Truth: to first order the displacements that the elements cause add up to the whole; what is left is of second order.
+/// Truth: to first order the displacements that the elements cause add up to the whole; what is
+/// left is of second order.
 #[test]
 fn shares_of_the_elements_add_up_to_the_whole() {
     let robot = robot("kr210");
@@ -235,7 +236,8 @@ fn a_workpiece_goes_where_its_worst_place_is_best() {
     assert!(found.placement.is_none() && found.caveats.iter().any(|c| c.code == "no-placement"));
 }
 
-/// Truth: the place of the rigid tool; the arm is the shipped one with joint 5 out of square by 8 degrees, of no known class.
+/// Truth: the place of the rigid tool; the arm is the shipped one with joint 5 out of square by 8
+/// degrees, of no known class.
 #[test]
 fn an_arm_without_a_closed_form_is_searched_and_lands_on_the_grid() {
     let folder = std::env::temp_dir().join(format!("flexarm-map-{}", std::process::id()));
@@ -319,7 +321,8 @@ fn limits_of_depth_of_a_map_are_those_of_lobes_to_the_last_bit() {
     assert!(found.best.value > 1.05 * found.worst.value, "{depths:?}");
 }
 
-/// Truth: with the feed of the tool's own axes, turning the whole arm about the direction of gravity changes nothing.
+/// Truth: with the feed of the tool's own axes, turning the whole arm about the direction of
+/// gravity changes nothing.
 #[test]
 fn turning_the_arm_about_gravity_changes_no_limit_of_depth() {
     let robot = robot("kr210");

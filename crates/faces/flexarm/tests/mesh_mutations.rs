@@ -1,4 +1,5 @@
-//! Sound meshes reduce without a word, meshes with one fault each are refused or told apart: both are counted.
+//! Sound meshes reduce without a word, meshes with one fault each are refused or told apart: both
+//! are counted.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 #![allow(clippy::print_stderr, reason = "the counts are what a reader of the test wants to see")]
 
@@ -9,7 +10,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use flexarm::reduce::{At, InterfaceEntry, MaterialChoice, QuadratureChoice, ReduceJob, ReduceOptions, Tie, reduce};
 
-/// A bar of 600 x 60 x 40 mm along x as a deck of CalculiX, in memory, so that single things can be spoilt.
+/// A bar of 600 x 60 x 40 mm along x as a deck of CalculiX, in memory, so that single things can be
+/// spoilt.
 #[derive(Clone)]
 struct Bar {
     kind: &'static str,
@@ -27,7 +29,8 @@ const WEDGE_EDGES: &[[usize; 2]] = &[[0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5,
 const BRICK_EDGES: &[[usize; 2]] =
     &[[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]];
 
-/// Corners of the elements in one cell (bits 0, 1, 2 of a number: x, y, z), and their edges where these have nodes.
+/// Corners of the elements in one cell (bits 0, 1, 2 of a number: x, y, z), and their edges where
+/// these have nodes.
 fn shape(kind: &str) -> (Vec<Vec<usize>>, &'static [[usize; 2]]) {
     let tets = vec![
         vec![0, 1, 3, 7],
@@ -101,7 +104,8 @@ impl Bar {
         text
     }
 
-    /// Gives the elements that `far` chooses by the mean of their corners nodes of their own where these pass `at`.
+    /// Gives the elements that `far` chooses by the mean of their corners nodes of their own where
+    /// these pass `at`.
     fn split(&mut self, far: impl Fn([f64; 3]) -> bool, at: impl Fn(&[f64; 3]) -> bool) {
         let mean = |nodes: &[usize], bar: &Self| {
             [0, 1, 2].map(|c| nodes.iter().map(|n| bar.nodes[n][c]).sum::<f64>() / nodes.len() as f64)
@@ -162,7 +166,8 @@ fn said(deck: &str, change: impl Fn(&mut ReduceJob)) -> Vec<String> {
     let mut job = job(&path);
     change(&mut job);
     match reduce(&job, &ReduceOptions::default(), None, &mut |_| {}) {
-        // That two rigid parts are coarse for a uniform bar is true and no fault of the mesh; nor is what C3D8 is read as.
+        // That two rigid parts are coarse for a uniform bar is true and no fault of the mesh; nor
+        // is what C3D8 is read as.
         Ok(summary) => summary
             .warnings
             .into_iter()
@@ -436,7 +441,8 @@ fn the_estimate_of_the_stiffness_of_linear_elements_is_what_quadratic_ones_give(
     }
 }
 
-/// Truth: on right-angled bricks the points of CalculiX integrate stiffness and mass as exactly as the own rules do.
+/// Truth: on right-angled bricks the points of CalculiX integrate stiffness and mass as exactly as
+/// the own rules do.
 #[test]
 fn c3d8i_keeps_its_incompatible_modes_under_the_rules_of_calculix() {
     let folder = Folder::new();

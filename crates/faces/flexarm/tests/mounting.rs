@@ -1,4 +1,5 @@
-//! What the base of a robot stands on: springs, beams, walls and rails, against closed forms and between the steppers.
+//! What the base of a robot stands on: springs, beams, walls and rails, against closed forms and
+//! between the steppers.
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stderr, reason = "what was measured stands beside the bound")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
@@ -90,8 +91,9 @@ fn turned(R: &Matrix3<f64>) -> Matrix6<f64> {
     both
 }
 
-/// Truth: a rigid arm on springs moves its tool by `Ad C_S Adᵀ F`, C_S the inverse of the stiffness turned into world axes, Ad the
-/// lever from the springs to the tool. Measured 2.9e-16 of the largest compliance.
+/// Truth: a rigid arm on springs moves its tool by `Ad C_S Adᵀ F`, C_S the inverse of the stiffness
+/// turned into world axes, Ad the lever from the springs to the tool. Measured 2.9e-16 of the
+/// largest compliance.
 #[test]
 fn the_tool_of_a_rigid_arm_gives_way_by_the_compliance_of_the_springs_at_its_lever() {
     let place = Place::new("tilt");
@@ -119,8 +121,8 @@ fn the_tool_of_a_rigid_arm_gives_way_by_the_compliance_of_the_springs_at_its_lev
     );
 }
 
-/// Truth: the whole robot is one body on springs, `K φ = ω² M φ` with its mass, centre and moments about the springs summed up by
-/// Steiner's theorem. Measured 2e-15.
+/// Truth: the whole robot is one body on springs, `K φ = ω² M φ` with its mass, centre and moments
+/// about the springs summed up by Steiner's theorem. Measured 2e-15.
 #[test]
 fn the_first_frequencies_are_those_of_a_rigid_body_on_the_springs() {
     let place = Place::new("modes");
@@ -171,9 +173,10 @@ fn beam_stiffness(l: f64, EA: f64, EI: f64, GJ: f64) -> Matrix6<f64> {
     C.try_inverse().unwrap()
 }
 
-/// Identity: a beam below the base is the springs of its far end's closed-form stiffness, in both link models; so is a joint with a 6x6
-/// gearbox that stands still. Compliance, displacement and frequencies; measured
-/// 1.2e-8 for the beam in two parts, 1e-15 (frequencies 9.8e-7: its mass) in modes, the same bits for the gearbox.
+/// Identity: a beam below the base is the springs of its far end's closed-form stiffness, in both
+/// link models; so is a joint with a 6x6 gearbox that stands still. Compliance, displacement and
+/// frequencies; measured 1.2e-8 for the beam in two parts, 1e-15 (frequencies 9.8e-7: its mass) in
+/// modes, the same bits for the gearbox.
 #[test]
 fn springs_a_beam_and_a_gearbox_of_six_are_the_same_mounting() {
     let place = Place::new("identity");
@@ -223,9 +226,10 @@ fn springs_a_beam_and_a_gearbox_of_six_are_the_same_mounting() {
     compare("gearbox of six", (statics.compliance.concat(), statics.tcp_displacement_m, hz), 1e-12);
 }
 
-/// Truth, to first order: on springs at its origin a base sinks by `m g / k` along gravity and turns by the moment of the weight
-/// over the stiffness; on the ceiling and the wall as on the floor, and with the cart farther out by so much more. What is left
-/// of first order is the deflection times itself.
+/// Truth, to first order: on springs at its origin a base sinks by `m g / k` along gravity and
+/// turns by the moment of the weight over the stiffness; on the ceiling and the wall as on the
+/// floor, and with the cart farther out by so much more. What is left of first order is the
+/// deflection times itself.
 #[test]
 fn the_sag_on_floor_wall_and_ceiling_follows_the_weight_and_the_place_on_the_rail() {
     let place = Place::new("wall");
@@ -257,8 +261,9 @@ fn moving(robot: &Robot) -> Motion {
 
 const DAMPED: &str = "damping = { stiffness_beta = 2e-4 }\n";
 
-/// Truth: the reference stepper under error control; measured 5.3e-5 of the peak for generalised-alpha at 0.5 ms, 3.4e-5 SDIRK,
-/// 1.5e-7 RK4 at 0.1 ms, 5.8e-4 SPOOK at 0.1 ms. The mounting is the whole error, and by name; a run in a batch is the run alone.
+/// Truth: the reference stepper under error control; measured 5.3e-5 of the peak for
+/// generalised-alpha at 0.5 ms, 3.4e-5 SDIRK, 1.5e-7 RK4 at 0.1 ms, 5.8e-4 SPOOK at 0.1 ms. The
+/// mounting is the whole error, and by name; a run in a batch is the run alone.
 #[test]
 fn every_stepper_swings_on_the_mounting_as_the_reference_does() {
     let place = Place::new("steppers");

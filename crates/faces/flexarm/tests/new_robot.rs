@@ -1,4 +1,5 @@
-//! `new_robot`: what it makes of descriptions can be loaded, moved along and checked, whatever the description lacks.
+//! `new_robot`: what it makes of descriptions can be loaded, moved along and checked, whatever the
+//! description lacks.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(clippy::print_stdout, reason = "the measured error stands beside its bound")]
 
@@ -144,7 +145,8 @@ fn codes(made: &NewRobot) -> Vec<String> {
     bad.into_iter().map(|f| f.code).collect()
 }
 
-/// Truth: the box, its wall and its density, of which the description was made. Bound 1e-3, as written into the file.
+/// Truth: the box, its wall and its density, of which the description was made. Bound 1e-3, as
+/// written into the file.
 #[test]
 fn an_arm_of_known_sections_is_found_with_its_sections_and_is_clean() {
     let folder = Folder::new("known");
@@ -291,8 +293,8 @@ fn equal_masses(mass: f64, lengths: [f64; 5], shapes: bool) -> String {
     )
 }
 
-/// Truth: the share of each link in the volume of all boxes of one section, or in the length of all links, the base's 0.1 m
-/// included: its length over theirs.
+/// Truth: the share of each link in the volume of all boxes of one section, or in the length of all
+/// links, the base's 0.1 m included: its length over theirs.
 #[test]
 fn one_mass_for_all_links_is_told_and_a_total_mass_is_spread_by_volume_or_length() {
     let lengths = [0.2, 0.6, 0.5, 0.3, 0.1];
@@ -336,8 +338,9 @@ fn a_payload_of_nothing_needs_no_centre_of_mass_and_another_one_does() {
     assert!(error.contains("robot.toml:4:11: payload has no com"), "{error}");
 }
 
-/// Truth: the upper arm with its frames as before; the wall of the box is found again where both its frames sit at its far end,
-/// the first joint turning about it. Bound 1e-3, as written into the file.
+/// Truth: the upper arm with its frames as before; the wall of the box is found again where both
+/// its frames sit at its far end, the first joint turning about it. Bound 1e-3, as written into the
+/// file.
 #[test]
 fn a_link_whose_frames_sit_at_its_far_end_bends_as_the_same_link_with_frames_at_both_ends() {
     let (wall, w, h, length, _) = UPPER;

@@ -1,4 +1,5 @@
-//! Targets of programs, read to joints and written again, mean the same joints: with their branch of the inverse kinematics.
+//! Targets of programs, read to joints and written again, mean the same joints: with their branch
+//! of the inverse kinematics.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
@@ -39,7 +40,8 @@ fn flange(model: &Model, q: &[f64; 6]) -> Pose {
     data.X_WF(model.frame("tool0").unwrap())
 }
 
-/// Wrist centre ahead of axis 1 (m) and axis 3 beyond the stretched arm (rad), by the lengths of the arm's README.
+/// Wrist centre ahead of axis 1 (m) and axis 3 beyond the stretched arm (rad), by the lengths of
+/// the arm's README.
 fn sides(q: &[f64; 6]) -> [f64; 2] {
     let (a2, a23) = (q[1], q[1] + q[2]);
     let ahead = 0.33 + 1.15 * a2.cos() + 1.22 * a23.cos() + 0.115 * a23.sin();
@@ -108,7 +110,8 @@ fn assert_same(found: &[[f64; 6]], meant: &[[f64; 6]], bound: f64) {
     }
 }
 
-/// Truth: the axis values of which the targets were made, by closed forms of status, turn and confdata.
+/// Truth: the axis values of which the targets were made, by closed forms of status, turn and
+/// confdata.
 #[test]
 fn joints_of_a_program_come_back_from_its_targets_and_from_those_that_are_written_in_their_place() {
     let model = model();

@@ -1,4 +1,5 @@
-//! Numbers that no robot has are refused where they are given, with their place, and never end in a panic.
+//! Numbers that no robot has are refused where they are given, with their place, and never end in a
+//! panic.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::path::{Path, PathBuf};
@@ -12,7 +13,8 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).unwrap().to_owned()
 }
 
-/// Two short links on torque drives with a spring in the second gear; the second joint drives a third.
+/// Two short links on torque drives with a spring in the second gear; the second joint drives a
+/// third.
 const ARM: &str = r#"<robot name="small">
   <link name="base"/>
   <link name="a"><inertial><origin xyz="0 0 0.1"/><mass value="1.0"/>
@@ -68,7 +70,8 @@ fn a_payload_that_no_arm_carries_is_refused_with_its_unit() {
     }
 }
 
-/// The heaviest and farthest payload that is let through: a hundred million times the arm. It runs or stops with time and cause.
+/// The heaviest and farthest payload that is let through: a hundred million times the arm. It runs
+/// or stops with time and cause.
 #[test]
 fn a_run_whose_mass_matrix_cannot_be_factorised_stops_with_its_time() {
     for mimic in [false, true] {

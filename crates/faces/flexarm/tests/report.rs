@@ -1,4 +1,5 @@
-//! The report page of real runs: it loads nothing, says what the runs said, and is the same for the same run.
+//! The report page of real runs: it loads nothing, says what the runs said, and is the same for the
+//! same run.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::collections::BTreeSet;
@@ -138,7 +139,8 @@ fn x_y_and_z_have_one_colour_each_in_plots_pictures_and_figures() {
     }
 }
 
-/// Truth: the identity of net and gross work, and the energy that an arm of a tonne takes up and gives back.
+/// Truth: the identity of net and gross work, and the energy that an arm of a tonne takes up and
+/// gives back.
 #[test]
 fn work_of_the_drives_is_called_net_and_stands_beside_what_they_put_in_and_took_out() {
     let (summary, _) = arm();

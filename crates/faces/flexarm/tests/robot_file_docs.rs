@@ -1,4 +1,5 @@
-//! The pages of the robot, motion and loads files in `docs/` and their schemas: every example loads, every key is there.
+//! The pages of the robot, motion and loads files in `docs/` and their schemas: every example
+//! loads, every key is there.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -209,7 +210,8 @@ fn every_key_is_on_its_page() {
     }
 }
 
-/// Definitions of a schema by name, with the struct that each describes; the first is the whole file.
+/// Definitions of a schema by name, with the struct that each describes; the first is the whole
+/// file.
 fn same_keys(schema: &str, sources: &[&str], files: &[&str], definitions: &[(&str, &str)]) {
     let schema: serde_json::Value = serde_json::from_str(&read(schema)).unwrap();
     let properties = |node: &serde_json::Value| -> BTreeSet<String> {

@@ -1,5 +1,5 @@
-//! What a run says of itself: shares that are a sum in numbers and in print, steps that are too long, settling bands, poses in
-//! degrees, runs of different robots, colours.
+//! What a run says of itself: shares that are a sum in numbers and in print, steps that are too
+//! long, settling bands, poses in degrees, runs of different robots, colours.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
@@ -63,7 +63,8 @@ fn numbers(text: &str) -> Vec<f64> {
     text.split(|c: char| !(c.is_ascii_digit() || c == '.' || c == '-')).filter_map(|word| word.parse().ok()).collect()
 }
 
-/// Truth: the sum of the shares is the error (measured 1e-12, of quadrature), and printed shares add up to the printed peak.
+/// Truth: the sum of the shares is the error (measured 1e-12, of quadrature), and printed shares
+/// add up to the printed peak.
 fn check(name: &str, summary: &Summary) {
     let tcp = summary.tcp.as_ref().unwrap();
     let sum: f64 = tcp.shares_at_peak.iter().map(|share| share.along_m).sum();
@@ -121,8 +122,8 @@ fn peak(summary: &Summary) -> f64 {
     summary.tcp.as_ref().unwrap().peak_m
 }
 
-/// Truth: SDIRK at 0.1 ms. With its default step every stepper is off by at most 1.6e-3 (SPOOK on the cast link), and what is
-/// not told is off by at most 1.0e-2 (SPOOK at 1 ms on one beam).
+/// Truth: SDIRK at 0.1 ms. With its default step every stepper is off by at most 1.6e-3 (SPOOK on
+/// the cast link), and what is not told is off by at most 1.0e-2 (SPOOK at 1 ms on one beam).
 #[test]
 fn steps_that_lose_part_of_the_largest_error_are_told_and_default_steps_are_not() {
     let mut told = 0;

@@ -1,4 +1,5 @@
-//! Derivatives of the tool's error by the numbers of shipped robots: against Richardson differences of runs, what they cost, what is refused.
+//! Derivatives of the tool's error by the numbers of shipped robots: against Richardson differences
+//! of runs, what they cost, what is refused.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
@@ -82,8 +83,9 @@ fn the_error_of_kr210_depends_on_its_numbers_as_differences_of_runs_say() {
     }
 }
 
-/// All numbers of kr210 at once against one ordinary run; differences would take two or more runs for each. Processor time of this thread,
-/// which others on the machine do not change; measured 23 runs for 38 numbers.
+/// All numbers of kr210 at once against one ordinary run; differences would take two or more runs
+/// for each. Processor time of this thread, which others on the machine do not change; measured 23
+/// runs for 38 numbers.
 #[test]
 fn all_numbers_of_a_robot_cost_a_few_runs() {
     let (robot, arm, motion) = shipped("kr210", "pick_and_place");
@@ -187,7 +189,8 @@ struct Written<'a> {
 }
 
 impl Changed {
-    /// Errors of all times of a run, with a number of the robot file, or else of the motion file, changed by x.
+    /// Errors of all times of a run, with a number of the robot file, or else of the motion file,
+    /// changed by x.
     fn errors(&self, motion: &str, run: &RunOptions, own: Option<&Written<'_>>, x: f64) -> Vec<f64> {
         let motion = std::fs::read_to_string(place(&format!("trajectories/{motion}.toml"))).unwrap();
         let (mut robot, mut moved) = (self.text.clone(), motion);
@@ -249,8 +252,9 @@ impl Changed {
     }
 }
 
-/// Truth: differences of whole runs of the robot with other numbers in its file: under servos whose gains follow the inertia at the start
-/// where the file leaves them out, and of which one is at its torque limit for a while.
+/// Truth: differences of whole runs of the robot with other numbers in its file: under servos whose
+/// gains follow the inertia at the start where the file leaves them out, and of which one is at its
+/// torque limit for a while.
 #[test]
 fn the_error_of_manutec_r3_under_servos_depends_on_the_numbers_of_its_files() {
     let friction = "friction = { viscous = 20.0, coulomb = 30.0, stribeck = 9.0, regularisation = 0.05 }";
@@ -282,7 +286,8 @@ fn the_error_of_manutec_r3_under_servos_depends_on_the_numbers_of_its_files() {
     assert!(limited.message.contains("joint_2") && limited.message.contains("first at 1.2"), "{}", limited.message);
 }
 
-/// Truth: differences of whole runs of changed files, of an arm with closed loops and of one whose links bend in modes with modal damping.
+/// Truth: differences of whole runs of changed files, of an arm with closed loops and of one whose
+/// links bend in modes with modal damping.
 #[test]
 fn loops_and_modes_depend_on_the_numbers_of_their_files() {
     let own = |name: &'static str, text: [&'static str; 3], size: f64| Written { name, text, size };
@@ -310,7 +315,8 @@ impl Drop for Changed {
     }
 }
 
-/// Truth: the same robot with a factor in its file, against the derivative; five digits are those of the difference.
+/// Truth: the same robot with a factor in its file, against the derivative; five digits are those
+/// of the difference.
 #[test]
 fn a_factor_of_one_direction_in_the_robot_file_does_what_its_derivative_says() {
     let kr210 = Changed::new("factors");
@@ -339,8 +345,9 @@ fn a_factor_of_one_direction_in_the_robot_file_does_what_its_derivative_says() {
     assert!(error.contains("lumped link"), "{error}");
 }
 
-/// Truth: differences of the static pose of changed files. A gear is deflected by what its spring carries less the error of its
-/// transmission: a stiffness acts on that; measured 1e-9 and less of the derivative. Without the error it would be five times as large.
+/// Truth: differences of the static pose of changed files. A gear is deflected by what its spring
+/// carries less the error of its transmission: a stiffness acts on that; measured 1e-9 and less of
+/// the derivative. Without the error it would be five times as large.
 #[test]
 fn a_gear_with_ripple_gives_way_at_a_pose_by_what_its_spring_carries() {
     let (old, at) = ("gearbox = { stiffness = 352800.0, damping = 441.0 }", [0.3, -0.4, 0.5, 0.2, 0.6, 0.0]);
@@ -362,9 +369,11 @@ fn a_gear_with_ripple_gives_way_at_a_pose_by_what_its_spring_carries() {
     }
 }
 
-/// Truth: closed form. A point at r from the TCP, tool axes, moves with the tool as a rigid lever: its compliance is `X C Xᵀ` with
-/// `X = [1 -[R r]x; 0 1]`, R the tool's axes in the world, whatever the arm. The compliance of such a tool in the robot file shows whether the
-/// derivative has the right axes (other ones, or those of the flange, are far off), its first order whether it has the right sign.
+/// Truth: closed form. A point at r from the TCP, tool axes, moves with the tool as a rigid lever:
+/// its compliance is `X C Xᵀ` with `X = [1 -[R r]x; 0 1]`, R the tool's axes in the world, whatever
+/// the arm. The compliance of such a tool in the robot file shows whether the derivative has the
+/// right axes (other ones, or those of the flange, are far off), its first order whether it has the
+/// right sign.
 #[test]
 fn the_compliance_beside_the_tool_is_that_of_a_rigid_lever_in_the_tools_own_axes() {
     use nalgebra::{Matrix3, Matrix6, Rotation3, Vector3};
@@ -413,8 +422,8 @@ fn the_compliance_beside_the_tool_is_that_of_a_rigid_lever_in_the_tools_own_axes
     }
 }
 
-/// Truth: the same robot with its tool elsewhere. The compliance is a polynomial of second degree in the place of the tool, so that
-/// differences of second order are exact but for rounding.
+/// Truth: the same robot with its tool elsewhere. The compliance is a polynomial of second degree
+/// in the place of the tool, so that differences of second order are exact but for rounding.
 #[test]
 fn the_place_of_the_tool_moves_it_and_changes_its_compliance_as_another_tool_does() {
     let at = [0.3, -1.2, 1.5, 0.2, 0.4, -0.5];

@@ -1,4 +1,5 @@
-//! Studies: runs are those of files written by hand, whatever ends the program loses none, shards make the same bytes.
+//! Studies: runs are those of files written by hand, whatever ends the program loses none, shards
+//! make the same bytes.
 #![cfg(feature = "parquet")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
@@ -232,7 +233,8 @@ fn a_study_that_was_stopped_goes_on_and_runs_nothing_twice() {
     let Some(SweepError::Stopped { done, runs: 21, .. }) = stopped.external() else { panic!("{stopped}") };
     let done = *done;
     assert!((5..21).contains(&done), "{done}");
-    // As if the program had been killed while it wrote a line: the part goes back into a journal that is cut.
+    // As if the program had been killed while it wrote a line: the part goes back into a journal
+    // that is cut.
     let part = DataTable::read(&output.join("parts/1-of-1-0.parquet")).unwrap();
     let Some(DataValues::Whole(numbers_of_runs)) = part.column("run") else { panic!("runs") };
     let Some(DataValues::Text(caveats)) = part.column("caveats") else { panic!("caveats") };
@@ -311,7 +313,8 @@ fn what_is_wrong_in_a_study_is_told_with_line_and_what_is_near() {
     std::fs::remove_dir_all(&place).unwrap();
 }
 
-/// Truth: the definitions of a grid, of linked values and of a sample that every point of the grid gets.
+/// Truth: the definitions of a grid, of linked values and of a sample that every point of the grid
+/// gets.
 #[test]
 fn grids_cross_linked_values_go_along_and_samples_are_the_same_at_every_point() {
     let place = folder("design");
@@ -361,7 +364,8 @@ fn a_factor_goes_on_top_of_a_value_and_of_another_factor() {
     std::fs::remove_dir_all(&place).unwrap();
 }
 
-/// Truth: closed form: with the mass of the beam following its wall the arm weighs that much more, and nothing else does.
+/// Truth: closed form: with the mass of the beam following its wall the arm weighs that much more,
+/// and nothing else does.
 #[test]
 fn a_parameter_that_follows_from_another_changes_the_mass_of_the_arm() {
     let place = folder("derived");

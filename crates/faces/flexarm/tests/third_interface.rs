@@ -1,4 +1,5 @@
-//! Links with load on a third interface: springs between rigid parts know two, so such a link bends in modes or is refused.
+//! Links with load on a third interface: springs between rigid parts know two, so such a link bends
+//! in modes or is refused.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
@@ -13,7 +14,8 @@ use nalgebra::Matrix6xX;
 const L: f64 = 0.9;
 const TUBE: Section = Section::Tube { outer_diameter: 0.06, wall: 0.003 };
 
-/// A tube along x, clamped at its origin, with a third interface at the fraction `at`, by its exact static shapes.
+/// A tube along x, clamped at its origin, with a third interface at the fraction `at`, by its exact
+/// static shapes.
 fn branched(at: f64) -> ReducedLink {
     let mut straight = BeamLink::new("boom", TUBE, Material::STEEL, L);
     straight.theory = BeamTheory::EulerBernoulli;
@@ -33,7 +35,8 @@ fn branched(at: f64) -> ReducedLink {
     reduced
 }
 
-/// A folder with the tube on a joint, a camera of some mass (kg) on the bracket and a tool at the far end.
+/// A folder with the tube on a joint, a camera of some mass (kg) on the bracket and a tool at the
+/// far end.
 struct Place(PathBuf);
 
 impl Place {
@@ -81,8 +84,9 @@ impl Drop for Place {
     }
 }
 
-/// Truth: closed form. A camera of weight F at the distance a lowers the end by `F a² (3 l - a)/(6 EI)`; measured within 3e-7, and
-/// 1.9 times that before, with the camera riding on one of two rigid parts.
+/// Truth: closed form. A camera of weight F at the distance a lowers the end by
+/// `F a² (3 l - a)/(6 EI)`; measured within 3e-7, and 1.9 times that before, with the camera riding
+/// on one of two rigid parts.
 #[test]
 fn a_camera_on_a_third_interface_bends_the_link_as_in_closed_form_whatever_model_is_asked_for() {
     let EI = Material::STEEL.E * TUBE.properties(Material::STEEL.nu).unwrap().I_z;

@@ -1,4 +1,5 @@
-//! Motions told by the path of the tool: files, standard motions and robot programs on a shipped arm.
+//! Motions told by the path of the tool: files, standard motions and robot programs on a shipped
+//! arm.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 
 use std::path::{Path, PathBuf};
@@ -118,7 +119,8 @@ fn a_program_of_the_controller_moves_as_the_path_file_that_says_the_same() {
     assert!(apart.fold(0.0, f64::max) < 1e-9);
 }
 
-/// A line past the singular pose of the wrist, where joint 4 would need more than its speed. Truth: the limits as runs check them.
+/// A line past the singular pose of the wrist, where joint 4 would need more than its speed. Truth:
+/// the limits as runs check them.
 #[test]
 fn a_line_past_a_singular_pose_of_the_wrist_keeps_the_limits_that_runs_check() {
     let robot = kr210();
@@ -301,12 +303,14 @@ fn jerks_of_joints_hold_in_a_path_file_and_in_a_program_and_are_shown_with_their
     std::fs::remove_dir_all(folder).unwrap();
 }
 
-/// Truth: a circle by hand, and a tool that does not turn. Full circles are programmed as two halves.
+/// Truth: a circle by hand, and a tool that does not turn. Full circles are programmed as two
+/// halves.
 #[test]
 fn two_halves_of_a_circle_with_one_orientation_leave_the_tool_as_it_stands_in_every_language() {
     let robot = kr210();
     let model = robot.rigid_model().unwrap();
-    // The tool points down: turned by half a turn about y. The flange is 350 mm above the tool centre point.
+    // The tool points down: turned by half a turn about y. The flange is 350 mm above the tool
+    // centre point.
     let rapid = "MODULE m\nVAR robtarget p:=[[1700,0,1200],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\nPROC main()\n\
         ConfJ \\Off;\nConfL \\Off;\nMoveAbsJ [[0,-60,90,0,60,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v500,fine,tool0;\nMoveL p,v500,fine,tool0;\n\
         MoveC Offs(p,-100,100,0),Offs(p,-200,0,0),v200,z1,tool0;\nMoveC Offs(p,-100,-100,0),p,v200,fine,tool0;\nENDPROC\nENDMODULE\n";
@@ -333,7 +337,8 @@ fn two_halves_of_a_circle_with_one_orientation_leave_the_tool_as_it_stands_in_ev
             farthest = farthest.max((flange - nalgebra::Point3::new(1.7, 0.0, 1.2)).norm());
             assert!(t.is_finite());
         }
-        // Measured: 2e-7 rad (a quaternion of RAPID is exact; URScript's angles have nine digits), 2e-6 m in the blend.
+        // Measured: 2e-7 rad (a quaternion of RAPID is exact; URScript's angles have nine digits),
+        // 2e-6 m in the blend.
         assert!(turned < 1e-6 && off < 1e-4 && farthest > 0.1999, "{name}: {turned:.1e} rad, {off:.1e} m, {farthest}");
     }
 }

@@ -1,4 +1,5 @@
-//! What a reduction costs, phase by phase: `cargo run --release -p flexarm-fem --example reduction_cost -- MESH UNITS A B [MODES]`.
+//! What a reduction costs, phase by phase:
+//! `cargo run --release -p flexarm-fem --example reduction_cost -- MESH UNITS A B [MODES]`.
 //!
 //! `A` and `B` are node sets of the mesh; both are tied rigidly at the mean of their nodes.
 #![allow(

@@ -1,4 +1,5 @@
-//! Files of other finite element programs: meshes ([`mesh`]) and condensed or full matrices ([`exchange`]).
+//! Files of other finite element programs: meshes ([`mesh`]) and condensed or full matrices
+//! ([`exchange`]).
 //!
 //! ```
 //! use flexarm_fe_io::{ReadOptions, parse_mesh};
@@ -15,9 +16,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Everything ends in types of [`flexarm_fem`]: a [`Mesh`](flexarm_fem::Mesh) in SI, matrices over interfaces, a
-//! [`ModalLink`](flexarm_fem::ModalLink) from Standard Input Data. Packed files are unpacked no further than a real file
-//! would go.
+//! Everything ends in types of [`flexarm_fem`]: a [`Mesh`](flexarm_fem::Mesh) in SI, matrices over
+//! interfaces, a [`ModalLink`](flexarm_fem::ModalLink) from Standard Input Data. Packed files are
+//! unpacked no further than a real file would go.
 //!
 //! Not here: elements, reduction, the checks of a stiffness, the `.flex` file.
 #![allow(non_snake_case, reason = "monogram notation: X_LB is the pose of B in L, K_BB a stiffness block")]

@@ -1,4 +1,5 @@
-//! Packed files into memory, no further than a real file would go: a few kilobytes of gzip can unpack to gigabytes.
+//! Packed files into memory, no further than a real file would go: a few kilobytes of gzip can
+//! unpack to gigabytes.
 
 use std::io::Read;
 
@@ -6,7 +7,8 @@ use flate2::read::MultiGzDecoder;
 
 /// What any packed file may unpack to (bytes).
 const ALWAYS_UNPACKED: u64 = 64 << 20;
-/// Beyond that, so many times its packed size: meshes and matrices written as text pack 3 to 30 times.
+/// Beyond that, so many times its packed size: meshes and matrices written as text pack 3 to 30
+/// times.
 const LARGEST_RATIO: u64 = 50;
 
 /// Whether the bytes are packed with gzip.
@@ -54,7 +56,8 @@ pub(crate) fn unpacked(packed: &[u8], largest: u64) -> Result<Vec<u8>, NotUnpack
 /// What bytes packed with gzip hold; no more than a sound file of this size does.
 ///
 /// # Errors
-/// A sentence about what was found and expected: bytes that are not packed, cut off, or that unpack to far more than real files.
+/// A sentence about what was found and expected: bytes that are not packed, cut off, or that unpack
+/// to far more than real files.
 pub fn unpack_gzip(packed: &[u8]) -> Result<Vec<u8>, String> {
     unpacked(packed, u64::MAX).map_err(|why| format!("{}, expected {}: {}", why.found, why.expected, why.help))
 }

@@ -144,7 +144,8 @@ fn lengths_are_converted_with_the_named_units() {
     assert!(small.nodes.iter().zip(&large.nodes).all(|(a, b)| (a - b * 1e-3).norm() < 1e-18));
 }
 
-/// Rewrites the numbers of a text file of version 4.1 as bytes of either order, `size_t` of 4 or 8 bytes.
+/// Rewrites the numbers of a text file of version 4.1 as bytes of either order, `size_t` of 4 or 8
+/// bytes.
 fn as_binary(text: &[u8], big_endian: bool, size: usize) -> Vec<u8> {
     let mut words = std::str::from_utf8(text).unwrap().split_ascii_whitespace();
     let mut out = Vec::new();

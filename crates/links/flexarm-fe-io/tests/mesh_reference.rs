@@ -1,4 +1,5 @@
-//! Meshes of the reference cases, made and used by other programs; skipped where they are not at hand.
+//! Meshes of the reference cases, made and used by other programs; skipped where they are not at
+//! hand.
 
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(clippy::print_stdout, reason = "a skipped test says so")]

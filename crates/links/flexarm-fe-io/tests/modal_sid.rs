@@ -35,7 +35,8 @@ fn a_modal_link_survives_standard_input_data() {
     assert!(P < 1e-12 && N < 1e-12, "{P:.1e} {N:.1e}"); // measured 7e-17, 1.1e-15
     assert_eq!(ModalLink { P: link.P.clone(), N: link.N.clone(), ..back }, link);
 
-    // Without the blocks of its own the stiffening comes from where the standard has it, but for the centrifugal part.
+    // Without the blocks of its own the stiffening comes from where the standard has it, but for
+    // the centrifugal part.
     let mut plain = read.clone();
     plain.others.clear();
     let (standard, own) = (modal_link_from_sid("arm", &plain).unwrap().geometric.unwrap(), link.geometric.unwrap());
@@ -66,7 +67,8 @@ fn a_modal_link_survives_standard_input_data() {
     assert_eq!(modal_link_from_sid("arm", &skewed).unwrap_err().kind, ExchangeErrorKind::Defective);
 }
 
-/// Identity: metres or millimetres, it is the same body; with stiffening, without, and with terms of first order only.
+/// Identity: metres or millimetres, it is the same body; with stiffening, without, and with terms
+/// of first order only.
 #[test]
 fn a_modal_link_in_other_units_is_the_same_body() {
     let full = turned().modal_with(&ModalOptions { modes: 5, geometric: true, ..ModalOptions::default() }).unwrap();
@@ -96,7 +98,8 @@ fn a_modal_link_in_other_units_is_the_same_body() {
     }
 }
 
-/// Identity: data in a frame that drifts with the shapes, whose file says how A moves in it, give the link held at A.
+/// Identity: data in a frame that drifts with the shapes, whose file says how A moves in it, give
+/// the link held at A.
 #[test]
 fn data_in_any_frame_give_the_link_held_at_a() {
     let link = turned().modal_with(&ModalOptions { modes: 5, ..ModalOptions::default() }).unwrap();

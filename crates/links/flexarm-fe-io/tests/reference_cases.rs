@@ -172,8 +172,8 @@ fn lower_arm_equals_calculix() {
     ARM.agrees_with_calculix(1e-8); // measured 4.6e-10
 }
 
-/// Truth: frequencies of CalculiX (4-point rule) and of NGSolve (exact) on the same mesh, under three
-/// kinds of support; compliances of NGSolve.
+/// Truth: frequencies of CalculiX (4-point rule) and of NGSolve (exact) on the same mesh, under
+/// three kinds of support; compliances of NGSolve.
 #[test]
 fn frequencies_of_the_beam_are_those_of_two_other_codes() {
     let Some(path) = reference("A1_beam/beam_truth.json") else { return };

@@ -1,8 +1,8 @@
 //! Straight uniform beam in closed form: stiffness, compliance, consistent mass, mass of a piece.
 //!
 //! Beam axes E: origin at the proximal end A, x along the beam to B, y and z the principal axes of
-//! the section. Components `u_x u_y u_z theta_x theta_y theta_z`, A before B. The static matrices are
-//! exact for loads at the two ends, so one element is enough whatever the length.
+//! the section. Components `u_x u_y u_z theta_x theta_y theta_z`, A before B. The static matrices
+//! are exact for loads at the two ends, so one element is enough whatever the length.
 //!
 //! Signs: `theta_z = dv/dx` for the deflection v along y, but `theta_y = -dw/dx` for w along z.
 //!

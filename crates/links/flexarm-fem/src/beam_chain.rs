@@ -1,7 +1,8 @@
 //! A beam link as n rigid parts in series with n - 1 elastic joints, in closed form.
 //!
-//! The beam is cut into n - 1 slices of equal length; each joint stands in the middle of its slice and has the slice's
-//! stiffness, each part reaches from joint to joint. The joints add up to the whole beam for every end wrench.
+//! The beam is cut into n - 1 slices of equal length; each joint stands in the middle of its slice
+//! and has the slice's stiffness, each part reaches from joint to joint. The joints add up to the
+//! whole beam for every end wrench.
 
 use crate::beam::Beam;
 use crate::beam_link::BeamLink;
@@ -71,7 +72,8 @@ mod tests {
         assert!(link.chain(1).is_err());
     }
 
-    /// Truth: βl = 1.8751 of a slender clamped beam; the error falls with the square of the number of parts.
+    /// Truth: βl = 1.8751 of a slender clamped beam; the error falls with the square of the number
+    /// of parts.
     #[test]
     fn first_frequency_of_a_beam_chain_converges_with_second_order() {
         let section = Section::Rectangle { width: 0.02, height: 0.01 };

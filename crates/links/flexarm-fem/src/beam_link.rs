@@ -1,8 +1,9 @@
 //! A whole link as one beam: from a section, a material and a few frames to a [`ReducedLink`].
 //!
-//! The beam runs along x of its frame E from `X_LE` over `length`; rigid arms tie its two ends to the
-//! joint frames A and B, wherever they are. The link is cut at a fraction of the beam; the elastic
-//! joint sits at the same fraction of the straight line from A to B unless it is put elsewhere.
+//! The beam runs along x of its frame E from `X_LE` over `length`; rigid arms tie its two ends to
+//! the joint frames A and B, wherever they are. The link is cut at a fraction of the beam; the
+//! elastic joint sits at the same fraction of the straight line from A to B unless it is put
+//! elsewhere.
 //!
 //! ```text
 //! u_E2 = Ad_E2B u_B,    K_BB = Ad_E2Bᵀ K_E2E2 Ad_E2B        E2: distal end of the beam, beam axes

@@ -1,7 +1,7 @@
 //! A link as n rigid parts in series with n - 1 elastic joints, exact for every end wrench.
 //!
-//! With A held and the end loaded, the link's energy is `½ F_Bᵀ C_BB F_B`. The mesh knows where that
-//! energy sits: element by element it is a sum of 6×6 matrices,
+//! With A held and the end loaded, the link's energy is `½ F_Bᵀ C_BB F_B`. The mesh knows where
+//! that energy sits: element by element it is a sum of 6×6 matrices,
 //!
 //! ```text
 //! C_BB = Σ_e U_eᵀ K_e U_e,       U: displacements under the six unit wrenches at B
@@ -9,9 +9,10 @@
 //! C_k  = Ad_{SB} E_k Ad_{SB}ᵀ,   K_k = C_k⁻¹         joint k, at S_k
 //! ```
 //! so the joints add up to the whole link whatever the planes and the mesh are; for a uniform beam
-//! `C_k` is the closed form of its piece. No section is made rigid to get there: segments reduced as
-//! superelements of their own, with tied sections, do not add up: off by per cents
-//! (`segments_as_superelements_of_their_own_do_not_add_up_to_the_link` in the tests of the reduction).
+//! `C_k` is the closed form of its piece. No section is made rigid to get there: segments reduced
+//! as superelements of their own, with tied sections, do not add up: off by per cents
+//! (`segments_as_superelements_of_their_own_do_not_add_up_to_the_link` in the tests of the
+//! reduction).
 //!
 //! An element cut by a plane gives its energy to both sides by volume. The parts are cut at the
 //! joints, so each joint stands in the middle of the material that it replaces.
@@ -129,8 +130,8 @@ pub fn energy_by_slice(
 pub fn centre_of_compliance(C: &Matrix6<f64>, p_B: &Vector3<f64>) -> Option<Vector3<f64>> {
     let C_tr = C.fixed_view::<3, 3>(0, 3).into_owned();
     let C_rr = C.fixed_view::<3, 3>(3, 3).into_owned();
-    // u_S = u_B + theta x p_BS = u_B - [p]x theta: C_tr(S) = C_tr - [p]x C_rr; axial vectors of both sides:
-    // vee([p]x C_rr - C_rrᵀ [p]xᵀ ...) = (tr(C_rr) 1 - C_rr) p.
+    // u_S = u_B + theta x p_BS = u_B - [p]x theta: C_tr(S) = C_tr - [p]x C_rr; axial vectors of
+    // both sides: vee([p]x C_rr - C_rrᵀ [p]xᵀ ...) = (tr(C_rr) 1 - C_rr) p.
     let axial = |A: &Matrix3<f64>| Vector3::new(A[(2, 1)] - A[(1, 2)], A[(0, 2)] - A[(2, 0)], A[(1, 0)] - A[(0, 1)]);
     let matrix = Matrix3::identity() * C_rr.trace() - C_rr;
     matrix.try_inverse().map(|inverse| p_B + inverse * axial(&C_tr))
@@ -209,7 +210,8 @@ impl ChainSource<'_> {
 }
 
 impl Chain {
-    /// Displacement twist of each part at the link origin per joint coordinate: `xi_i = Σ_{k<i} Ad_{LS_k} d_k`.
+    /// Displacement twist of each part at the link origin per joint coordinate:
+    /// `xi_i = Σ_{k<i} Ad_{LS_k} d_k`.
     fn carries(&self) -> Vec<Matrix6<f64>> {
         self.joints.iter().map(|joint| adjoint(&joint.X_LS)).collect()
     }
@@ -227,7 +229,8 @@ impl Chain {
         Some(C)
     }
 
-    /// Stiffness and mass over the joint coordinates, A held: `K = blkdiag(K_S)`, `M = Σ J_iᵀ M_i J_i`.
+    /// Stiffness and mass over the joint coordinates, A held: `K = blkdiag(K_S)`,
+    /// `M = Σ J_iᵀ M_i J_i`.
     pub fn held_matrices(&self) -> (DMatrix<f64>, DMatrix<f64>) {
         let (n, carries) = (6 * self.joints.len(), self.carries());
         let (mut K, mut M) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));

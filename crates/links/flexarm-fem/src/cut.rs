@@ -1,12 +1,13 @@
 //! Mass properties of a mesh, whole and cut into rigid parts by planes.
 //!
-//! Start at [`cut`]; [`mass_properties`] is the case without planes, and [`volume_fractions`] the share
-//! of one element in each part. Planes are in order from the proximal to the distal end, normals point
-//! that way: plane k separates part k from part k + 1, and a point belongs to the part whose number is
-//! the number of planes it lies ahead of. Planes must not meet inside the body.
+//! Start at [`cut`]; [`mass_properties`] is the case without planes, and [`volume_fractions`] the
+//! share of one element in each part. Planes are in order from the proximal to the distal end,
+//! normals point that way: plane k separates part k from part k + 1, and a point belongs to the
+//! part whose number is the number of planes it lies ahead of. Planes must not meet inside the
+//! body.
 //!
-//! What lies ahead of each plane is integrated; a part is the difference of two of these, so that the
-//! parts add up to the whole. Mesh axes, m, kg.
+//! What lies ahead of each plane is integrated; a part is the difference of two of these, so that
+//! the parts add up to the whole. Mesh axes, m, kg.
 //!
 //! Not here: where to cut; the elastic joint between the parts ([`crate::reduced`]).
 
@@ -121,8 +122,8 @@ impl Plane {
 
 /// Mass, centre of mass and inertia of a mesh.
 ///
-/// Exact for solids, straight or curved: the integrands are polynomials and so is the rule. Beams count
-/// as lines with the mass and the rotary inertia of their section.
+/// Exact for solids, straight or curved: the integrands are polynomials and so is the rule. Beams
+/// count as lines with the mass and the rotary inertia of their section.
 ///
 /// * `densities`: one per region, kg/m³. A beam section given by its stiffness and mass per length
 ///   ([`Section::Given`](crate::Section::Given)) keeps its own mass.
@@ -136,11 +137,12 @@ pub fn mass_properties(mesh: &Mesh, densities: &[f64]) -> Result<RigidPart, CutE
 
 /// The rigid parts into which planes cut a mesh, from the proximal to the distal one.
 ///
-/// Straight tetrahedra, parallelepipeds and prisms are cut exactly, and so is any element in which the
-/// plane is plane in reference coordinates too (a cut across an extruded mesh). In other curved elements
-/// the cut face is replaced by small flat pieces, at most 1/16 of an element wide: the mass of a part is
-/// wrong by less than about 1e-6 of the mass of the elements that the plane crosses (measured 2e-7 with
-/// arcs of 45 degrees per element). The parts always add up to the mesh.
+/// Straight tetrahedra, parallelepipeds and prisms are cut exactly, and so is any element in which
+/// the plane is plane in reference coordinates too (a cut across an extruded mesh). In other curved
+/// elements the cut face is replaced by small flat pieces, at most 1/16 of an element wide: the
+/// mass of a part is wrong by less than about 1e-6 of the mass of the elements that the plane
+/// crosses (measured 2e-7 with arcs of 45 degrees per element). The parts always add up to the
+/// mesh.
 ///
 /// Beams are cut square to their axis.
 ///

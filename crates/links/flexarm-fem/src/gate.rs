@@ -1,7 +1,8 @@
 //! The gate that every stiffness matrix passes before it becomes a link.
 //!
 //! All measures are dimensionless: entries are compared with `s_i s_j`, `s_i = sqrt(k_ii)`, which
-//! changes with the units as they do, so a matrix in millimetres passes or fails like one in metres.
+//! changes with the units as they do, so a matrix in millimetres passes or fails like one in
+//! metres.
 //!
 //! ```text
 //! asymmetry            max |k_ij - k_ji| / (s_i s_j)

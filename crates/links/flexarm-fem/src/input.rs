@@ -1,4 +1,5 @@
-//! Files into memory, no further than a real file would go: a device never ends, a pipe without a writer never begins.
+//! Files into memory, no further than a real file would go: a device never ends, a pipe without a
+//! writer never begins.
 
 use std::fs::File;
 use std::io::Read;
@@ -7,7 +8,8 @@ use std::path::Path;
 /// The bytes of a file, at most `largest`.
 ///
 /// # Errors
-/// What the system says; `Other` where the path is no regular file, `FileTooLarge` where it has more bytes.
+/// What the system says; `Other` where the path is no regular file, `FileTooLarge` where it has
+/// more bytes.
 pub fn read_file(path: &Path, largest: u64) -> std::io::Result<Vec<u8>> {
     if !std::fs::metadata(path)?.is_file() {
         return Err(std::io::Error::other("this is not a file"));

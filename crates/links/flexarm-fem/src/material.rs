@@ -1,6 +1,7 @@
 //! Isotropic linear elastic materials.
 //!
-//! The presets are textbook values for a first answer; a certificate or a test of the part is better.
+//! The presets are textbook values for a first answer; a certificate or a test of the part is
+//! better.
 
 use std::ops::RangeInclusive;
 
@@ -33,10 +34,12 @@ impl Material {
     /// *Mechanics of Materials*, appendix I (E 70 to 79 GPa, nu 0.33, 2600 to 2800 kg/m³).
     pub const ALUMINIUM: Self = Self::isotropic(70e9, 0.33, 2700.0);
 
-    /// Grey cast iron of the class EN-GJL-250: EN 1561, annex (E 103 to 118 GPa, nu 0.26, 7200 kg/m³).
+    /// Grey cast iron of the class EN-GJL-250: EN 1561, annex (E 103 to 118 GPa, nu 0.26, 7200
+    /// kg/m³).
     pub const CAST_IRON: Self = Self::isotropic(110e9, 0.26, 7200.0);
 
-    /// Ductile (spheroidal) cast iron, EN-GJS-400: EN 1563, annex (E 169 GPa, nu 0.275, 7100 kg/m³).
+    /// Ductile (spheroidal) cast iron, EN-GJS-400: EN 1563, annex (E 169 GPa, nu 0.275, 7100
+    /// kg/m³).
     pub const DUCTILE_IRON: Self = Self::isotropic(169e9, 0.275, 7100.0);
 
     /// The presets by the name that files use.
@@ -47,7 +50,8 @@ impl Material {
         ("ductile_iron", Self::DUCTILE_IRON),
     ];
 
-    /// Other names of the presets, in the form of [`Self::preset`]: lower case, words joined by `_`.
+    /// Other names of the presets, in the form of [`Self::preset`]: lower case, words joined by
+    /// `_`.
     const OTHER_NAMES: [(&'static str, &'static str); 19] = [
         ("structural_steel", "steel"),
         ("carbon_steel", "steel"),
@@ -75,7 +79,8 @@ impl Material {
         Self { E, nu, rho, G: None }
     }
 
-    /// A preset by one of its names (`aluminium`, `Aluminum`, `cast iron`, ...), with the name that files use.
+    /// A preset by one of its names (`aluminium`, `Aluminum`, `cast iron`, ...), with the name that
+    /// files use.
     pub fn preset(name: &str) -> Option<(&'static str, Self)> {
         let plain = plain(name);
         let other = Self::OTHER_NAMES.iter().find(|(other, _)| *other == plain).map(|(_, name)| *name);
@@ -93,7 +98,8 @@ impl Material {
     /// [`Self::preset`], or an error that says which there are.
     ///
     /// # Errors
-    /// [`FemError::UnknownName`], with all the names there are and the one that is meant most likely.
+    /// [`FemError::UnknownName`], with all the names there are and the one that is meant most
+    /// likely.
     pub fn named(name: &str) -> Result<Self, FemError> {
         Self::preset(name).map(|(_, material)| material).ok_or_else(|| FemError::UnknownName {
             what: "material",
@@ -131,9 +137,11 @@ impl Material {
         Ok(())
     }
 
-    /// Sentences about constants that pass [`Self::check`], but that no material of a robot has: a wrong unit, most often.
+    /// Sentences about constants that pass [`Self::check`], but that no material of a robot has: a
+    /// wrong unit, most often.
     ///
-    /// * `units`: those in which they were written, so that the message shows what stands in the file.
+    /// * `units`: those in which they were written, so that the message shows what stands in the
+    ///   file.
     pub fn doubts(&self, units: &UnitSystem) -> Vec<String> {
         let mut doubts = Vec::new();
         let written = |value: f64, unit: f64| match *units == UnitSystem::SI {
@@ -199,7 +207,8 @@ const DENSITY_SLIPS: [(f64, &str); 5] = [
 
 /// The slip that explains a value, if one does.
 fn likely(value: f64, sound: &RangeInclusive<f64>, slips: &[(f64, &str)]) -> String {
-    // Metals are meant most often, so the slip that leads nearest to the middle of the range counts.
+    // Metals are meant most often, so the slip that leads nearest to the middle of the range
+    // counts.
     let middle = (sound.start() * sound.end()).sqrt();
     let explains = slips.iter().filter(|(factor, _)| sound.contains(&(value / factor)));
     let off = |factor: f64| (value / factor / middle).ln().abs();

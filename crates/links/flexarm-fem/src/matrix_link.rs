@@ -6,8 +6,8 @@
 //! ```
 //! Start at [`link_from_superelement`]; a full model goes through [`reduce_matrices`] first.
 //!
-//! A matrix says nothing about where the mass sits along the link, so the two rigid parts are given, or
-//! are the halves of the uniform bar with the same mass, centre of mass and inertia
+//! A matrix says nothing about where the mass sits along the link, so the two rigid parts are
+//! given, or are the halves of the uniform bar with the same mass, centre of mass and inertia
 //! ([`halves_of_bar`]), which is said in a warning.
 
 use flexarm_spatial::Pose;
@@ -110,7 +110,8 @@ pub fn turned(element: Superelement, R_LM: &Matrix3<f64>) -> Superelement {
 /// Makes a link of a superelement in link axes; `has_mass`: whether its mass means anything.
 ///
 /// # Errors
-/// [`MeshLinkError::Gate`] for a stiffness that fails the gate, or a mass that is missing or impossible.
+/// [`MeshLinkError::Gate`] for a stiffness that fails the gate, or a mass that is missing or
+/// impossible.
 pub fn link_from_superelement(
     element: Superelement,
     has_mass: bool,
@@ -170,8 +171,9 @@ pub fn link_from_superelement(
 /// A body as two halves along an axis: together they have its mass, centre of mass and inertia.
 ///
 /// Each half of a uniform bar of length l has its centre l/4 from the middle, where `l²/12` is the
-/// second moment of the bar along its axis over its mass. A bowed body has no such halves; those of its ellipsoid of
-/// inertia, cut across the axis, have their centres along `S a` (S: second moments, a: axis), and always exist.
+/// second moment of the bar along its axis over its mass. A bowed body has no such halves; those of
+/// its ellipsoid of inertia, cut across the axis, have their centres along `S a` (S: second
+/// moments, a: axis), and always exist.
 pub fn halves_of_bar(whole: &RigidPart, along: &Vector3<f64>) -> [RigidPart; 2] {
     let axis = along.normalize();
     // Second moment along the axis: half the trace less the moment about it.
@@ -225,7 +227,8 @@ mod tests {
         a.check("a half").unwrap();
     }
 
-    /// Truth: points on a bow, on whose chord halves of a straight bar would need mass that is not there.
+    /// Truth: points on a bow, on whose chord halves of a straight bar would need mass that is not
+    /// there.
     #[test]
     fn a_bowed_body_has_halves_too() {
         let points: Vec<Vector3<f64>> =

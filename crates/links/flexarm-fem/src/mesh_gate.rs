@@ -1,4 +1,5 @@
-//! What is checked on every reduction of a mesh, with numbers; written into the link file and the report.
+//! What is checked on every reduction of a mesh, with numbers; written into the link file and the
+//! report.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -39,7 +40,8 @@ pub struct ElementQuality {
     pub smallest_at_nodes: f64,
     /// Number in the file of the element with the smallest one at a node.
     pub worst_element: u64,
-    /// Smallest volume of an element over that of the best shape of its kind with edges of the same length; 1 is best.
+    /// Smallest volume of an element over that of the best shape of its kind with edges of the same
+    /// length; 1 is best.
     #[serde(default = "one")]
     pub smallest_fullness: f64,
     /// Number in the file of that element.
@@ -48,7 +50,8 @@ pub struct ElementQuality {
     /// Elements below [`MeshGate::SMALLEST_FULLNESS`].
     #[serde(default)]
     pub flat_elements: usize,
-    /// Largest distance of a mid-side node from the middle of its edge, over the length of the edge.
+    /// Largest distance of a mid-side node from the middle of its edge, over the length of the
+    /// edge.
     #[serde(default)]
     pub largest_offset: f64,
     /// Number in the file of the element with it.
@@ -96,16 +99,18 @@ impl ElementQuality {
     }
 }
 
-/// Volume over that of the regular shape whose edges have the same mean square along each direction of the element.
+/// Volume over that of the regular shape whose edges have the same mean square along each direction
+/// of the element.
 ///
-/// Tetrahedra are compared with the regular one (a sliver has edges and no volume); bricks and wedges, which may well be
-/// flat, with the right-angled one of their own three edge lengths.
+/// Tetrahedra are compared with the regular one (a sliver has edges and no volume); bricks and
+/// wedges, which may well be flat, with the right-angled one of their own three edge lengths.
 ///
 /// * `det`: mean of the determinant of the Jacobian, m³.
 fn fullness(kind: ElementKind, x: &[Vector3<f64>], det: f64) -> f64 {
     let length2 = |a: usize, b: usize| (x[a] - x[b]).norm_squared();
     let mean = |pairs: &[[usize; 2]]| pairs.iter().map(|[a, b]| length2(*a, *b)).sum::<f64>() / pairs.len() as f64;
-    // det J of the best shape: 6 V of the regular tetrahedron; edge products of brick (8 det = V) and wedge (2 V, t from -1 to 1).
+    // det J of the best shape: 6 V of the regular tetrahedron; edge products of brick (8 det = V)
+    // and wedge (2 V, t from -1 to 1).
     let best = match kind {
         ElementKind::Tet4 | ElementKind::Tet10 => mean(&edges(kind)[..6]).powf(1.5) / 2f64.sqrt(),
         ElementKind::Wedge6 | ElementKind::Wedge15 => {
@@ -141,7 +146,8 @@ fn largest_offset(kind: ElementKind, x: &[Vector3<f64>]) -> f64 {
 pub struct MeshGate {
     /// DoF of the mesh.
     pub dofs: usize,
-    /// `max |k_ij - k_ji| / sqrt(k_ii k_jj)` of the condensed stiffness, before it is made symmetric.
+    /// `max |k_ij - k_ji| / sqrt(k_ii k_jj)` of the condensed stiffness, before it is made
+    /// symmetric.
     pub asymmetry: f64,
     /// Largest relative force under rigid motion of all interfaces.
     pub rigid_body_residual: f64,
@@ -157,7 +163,8 @@ pub struct MeshGate {
     pub inertia_error: f64,
     /// Condition number of `K_ii`, estimated.
     pub condition: f64,
-    /// Largest residual `‖K φ - ω² M φ‖ / ‖ω² M φ‖` of the fixed-interface modes and of those with A held.
+    /// Largest residual `‖K φ - ω² M φ‖ / ‖ω² M φ‖` of the fixed-interface modes and of those with
+    /// A held.
     pub mode_residual: f64,
     /// Frequencies of the fixed-interface modes, Hz.
     pub fixed_frequencies_hz: Vec<f64>,
@@ -165,7 +172,8 @@ pub struct MeshGate {
     pub modes: Vec<ModeCheck>,
     /// Shape of the elements.
     pub quality: ElementQuality,
-    /// How much too stiff elements of first order make the link; none where there are none, or too many to tell.
+    /// How much too stiff elements of first order make the link; none where there are none, or too
+    /// many to tell.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub order: Option<OrderCheck>,
 }
@@ -175,8 +183,8 @@ impl MeshGate {
     pub const RIGID_BODY_RESIDUAL: f64 = 1e-7;
     /// The same for the relative difference of mass and inertia.
     pub const MASS_ERROR: f64 = 1e-6;
-    /// The same for the residual of a mode. The square of its frequency is off by less than the residual; in thin plates
-    /// rounding alone leaves 1e-6.
+    /// The same for the residual of a mode. The square of its frequency is off by less than the
+    /// residual; in thin plates rounding alone leaves 1e-6.
     pub const MODE_RESIDUAL: f64 = 1e-5;
     /// Jacobian at a node, over the mean of its element, below which it speaks.
     pub const SMALLEST_JACOBIAN: f64 = 0.05;
@@ -184,7 +192,8 @@ impl MeshGate {
     pub const SMALLEST_FULLNESS: f64 = 0.01;
     /// Part of the elements that may be below.
     pub const FEW_FLAT: f64 = 1e-3;
-    /// Offset of a mid-side node over the length of its edge above which it speaks: an arc of 140 degrees.
+    /// Offset of a mid-side node over the length of its edge above which it speaks: an arc of 140
+    /// degrees.
     pub const LARGEST_OFFSET: f64 = 0.35;
 
     /// What passes, but is worth a look.
@@ -257,7 +266,8 @@ mod tests {
         ElementQuality::of(mesh)
     }
 
-    /// Truth: right-angled bricks and wedges over an equilateral triangle are full, Kuhn's tetrahedra are 0.61.
+    /// Truth: right-angled bricks and wedges over an equilateral triangle are full, Kuhn's
+    /// tetrahedra are 0.61.
     #[test]
     fn the_best_shape_of_a_kind_is_full_also_where_it_is_flat() {
         for (kind, fullness) in [(ElementKind::Hex8, 1.0), (ElementKind::Hex20, 1.0), (ElementKind::Wedge6, 0.866)] {

@@ -4,8 +4,8 @@
 //! mesh --assemble--> K, M --tie, factorise--> K_g, M_g, modes --+--> ReducedLink (K_BB, two parts, chains)
 //!                                                               +--> MeshGate: what was checked, with numbers
 //! ```
-//! Start at [`reduce_mesh`]. Everything is in link axes and SI: a mesh in another frame is moved first
-//! ([`Mesh::transformed`]).
+//! Start at [`reduce_mesh`]. Everything is in link axes and SI: a mesh in another frame is moved
+//! first ([`Mesh::transformed`]).
 //!
 //! Not here: files, clocks, pictures.
 
@@ -34,7 +34,8 @@ use crate::sparse::{Modes, ModesError, ModesWanted};
 /// Where the elastic joint of the two-part link sits.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum SplitAt {
-    /// At the centre of compliance of the link, if a cut there has material on both sides; else mid length.
+    /// At the centre of compliance of the link, if a cut there has material on both sides; else mid
+    /// length.
     #[default]
     ElasticCentre,
     /// Midway between A and B.
@@ -62,10 +63,12 @@ pub struct LinkPlan {
     pub split: SplitAt,
     /// Chains to make, by their number of parts.
     pub chains: Vec<usize>,
-    /// Bodies that ride on the link without being in its mesh (motors, gears, cables), link axes; each stays
-    /// rigidly on the interface on whose side of the split its centre of mass lies, so in a chain it joins the first or last part.
+    /// Bodies that ride on the link without being in its mesh (motors, gears, cables), link axes;
+    /// each stays rigidly on the interface on whose side of the split its centre of mass lies, so
+    /// in a chain it joins the first or last part.
     pub attached: Vec<RigidPart>,
-    /// Whether the modal link gets its stiffness by initial stress; 12 more solves and a pass over all elements.
+    /// Whether the modal link gets its stiffness by initial stress; 12 more solves and a pass over
+    /// all elements.
     pub geometric: bool,
     /// Modes with A held against which the reduced models are judged.
     pub judged_modes: usize,
@@ -419,8 +422,8 @@ fn split(
     Ok((frames.with_split(Pose::translation(p_LS.x, p_LS.y, p_LS.z)), parts))
 }
 
-/// Merges bodies into the part of that interface on whose side of the split they lie: the two-part link, chains and modal links
-/// then carry them alike.
+/// Merges bodies into the part of that interface on whose side of the split they lie: the two-part
+/// link, chains and modal links then carry them alike.
 fn attach(attached: &[RigidPart], link: &mut ReducedLink, chains: &mut [Chain]) -> Result<(), FemError> {
     let (along, p_LS) = (link.p_AB(), link.split.X_LS.translation.vector);
     for body in attached {

@@ -1,4 +1,5 @@
-//! The assembled finite element model: degrees of freedom, sparse stiffness and mass of a whole mesh.
+//! The assembled finite element model: degrees of freedom, sparse stiffness and mass of a whole
+//! mesh.
 //!
 //! Nodes of solid elements have three DoF, nodes of beams six; nodes without an element have none.
 //! DoF are numbered node by node, `ux uy uz (rx ry rz)`, in mesh axes.

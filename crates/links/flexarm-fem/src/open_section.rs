@@ -1,8 +1,9 @@
 //! I-beams and channels with parallel flanges: what follows from their five lengths.
 //!
-//! Area and second moments are exact, fillets included. Torsion is that of walls with a term for each junction and each free
-//! edge; shear factors and shear centre are those of thin walls. What that is wrong by was measured against finite elements
-//! over the section (`tests/open_sections.rs`):
+//! Area and second moments are exact, fillets included. Torsion is that of walls with a term for
+//! each junction and each free edge; shear factors and shear centre are those of thin walls. What
+//! that is wrong by was measured against finite elements over the section
+//! (`tests/open_sections.rs`):
 //!
 //! | quantity | rolled profiles, webs of 0.25 to 2 flanges, fillets up to 1.5 flanges |
 //! | --- | --- |
@@ -11,7 +12,8 @@
 //! | `k_y`, force along the flanges | 22 % too soft: fillets and the width of the web count there |
 //! | shear centre | 5 % |
 //!
-//! A flange held at one end against warping is stiffer in torsion than St. Venant's `J` says: no beam here knows of that.
+//! A flange held at one end against warping is stiffer in torsion than St. Venant's `J` says: no
+//! beam here knows of that.
 //!
 //! Axes as in [`crate::Section`]: y along the flanges, z along the web.
 
@@ -66,7 +68,8 @@ impl Open {
             I_z,
             J: self.torsion(Junction::Corner),
             k_y: flange_shear_factor(b_mid, h_mid, web, flange),
-            // Two channels back to back are an I-beam of twice the width and twice the web that shears without twist.
+            // Two channels back to back are an I-beam of twice the width and twice the web that
+            // shears without twist.
             k_z: web_shear_factor(2.0 * b_mid * flange / (h_mid * web), 2.0 * b_mid / h_mid, nu),
             shear_centre_y: 0.5 * web - y_c - shear_centre(b_mid, h_mid, web, flange),
         })
@@ -93,9 +96,11 @@ impl Open {
         Ok(())
     }
 
-    /// A fillet whose corner lies at `corner` along an axis and that fills towards `side` (+1 or -1).
+    /// A fillet whose corner lies at `corner` along an axis and that fills towards `side` (+1 or
+    /// -1).
     ///
-    /// A square less the quarter of a circle: area `(1 - π/4) r²`, second moment about the corner `(1 - 5π/16) r⁴`.
+    /// A square less the quarter of a circle: area `(1 - π/4) r²`, second moment about the corner
+    /// `(1 - 5π/16) r⁴`.
     fn fillet_at(&self, corner: f64, side: f64) -> Piece {
         let r = self.fillet;
         let A = (1.0 - PI / 4.0) * r * r;
@@ -104,7 +109,8 @@ impl Open {
         Piece { A, I, at: corner + side * centroid }
     }
 
-    /// Second moment about y, with that many fillets: the outer rectangle less what is beside the web.
+    /// Second moment about y, with that many fillets: the outer rectangle less what is beside the
+    /// web.
     fn about_y(&self, fillets: f64) -> f64 {
         let Self { width: b, height: h, web, flange, .. } = *self;
         let fillet = self.fillet_at(0.5 * h - flange, -1.0);
@@ -112,7 +118,8 @@ impl Open {
             + fillets * (fillet.I + fillet.A * fillet.at * fillet.at)
     }
 
-    /// Torsion constant: strips, the material in the junctions, and what the edges of the flanges lack.
+    /// Torsion constant: strips, the material in the junctions, and what the edges of the flanges
+    /// lack.
     ///
     /// ```text
     /// J = 2/3 b t_f³ + 1/3 (h - 2 t_f) t_w³ + 2 α D⁴ - 0.420 t_f⁴       D: largest circle inscribed in a junction
@@ -180,7 +187,8 @@ fn web_shear_factor(m: f64, n: f64, nu: f64) -> f64 {
             + 5.0 * nu * n2 * (8.0 * m + 9.0 * m2))
 }
 
-/// Shear factor of a thin-walled channel under a force along the flanges, from the energy of the shear flow.
+/// Shear factor of a thin-walled channel under a force along the flanges, from the energy of the
+/// shear flow.
 ///
 /// ```text
 /// 1/(k A) = ∫ (S/I_z)² ds/t       S: first moment of what lies outward, t: thickness
@@ -199,7 +207,8 @@ fn flange_shear_factor(b: f64, h: f64, web: f64, flange: f64) -> f64 {
     I_z * I_z / (A * flow)
 }
 
-/// How far the shear centre of a thin-walled channel lies outside of its web, midlines: `3 b² t_f / (h t_w + 6 b t_f)`.
+/// How far the shear centre of a thin-walled channel lies outside of its web, midlines:
+/// `3 b² t_f / (h t_w + 6 b t_f)`.
 fn shear_centre(b: f64, h: f64, web: f64, flange: f64) -> f64 {
     3.0 * b * b * flange / (h * web + 6.0 * b * flange)
 }

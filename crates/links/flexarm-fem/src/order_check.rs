@@ -1,16 +1,16 @@
 //! How much too stiff elements of first order make a link: the same mesh, solved in second order.
 //!
-//! A tetrahedron or wedge with corner nodes alone has (nearly) constant strain and cannot bend; a link of two layers of
-//! them is several times too stiff, and no residual shows it. Here every edge gets a node in its middle and the unit
-//! loads at B are solved again in that larger space:
+//! A tetrahedron or wedge with corner nodes alone has (nearly) constant strain and cannot bend; a
+//! link of two layers of them is several times too stiff, and no residual shows it. Here every edge
+//! gets a node in its middle and the unit loads at B are solved again in that larger space:
 //!
 //! ```text
 //! u = Σ N_i u_i + Σ b_e d_e          d_e: how far the middle of edge e leaves the mean of its ends
 //! C₂ = C₁ + Fᵀ(u₂ - u₁)              compliance of B, A held; F: unit wrenches at B
 //! ```
-//! Conjugate gradients with the factor of the mesh itself and the 3×3 blocks of the edges as preconditioner: a
-//! hierarchical basis, whose condition does not grow with the mesh, so a few dozen products suffice and nothing is
-//! factorised. Edges on a rigidly tied face stay straight.
+//! Conjugate gradients with the factor of the mesh itself and the 3×3 blocks of the edges as
+//! preconditioner: a hierarchical basis, whose condition does not grow with the mesh, so a few
+//! dozen products suffice and nothing is factorised. Edges on a rigidly tied face stay straight.
 //!
 //! Start at [`check_order`]. Not here: elements of second order, whose own error stays unknown.
 //!
@@ -78,7 +78,8 @@ impl OrderCheck {
     }
 }
 
-/// Solves the unit loads again in second order; `None` where no solid is of first order, or there are too many.
+/// Solves the unit loads again in second order; `None` where no solid is of first order, or there
+/// are too many.
 ///
 /// * `U`: displacements of all DoF under six unit wrenches at B, A held.
 ///
@@ -118,7 +119,8 @@ pub fn check_order(
     Ok(is_finite.then_some(OrderCheck { compliance_ratio, steps }))
 }
 
-/// The larger space: DoF of the mesh, then three per new node, relative to the mean of the edge's ends.
+/// The larger space: DoF of the mesh, then three per new node, relative to the mean of the edge's
+/// ends.
 struct Hierarchy<'m> {
     K: &'m SparseSymmetric,
     edges: Vec<Edge>,
@@ -190,7 +192,8 @@ impl<'m> Hierarchy<'m> {
         z
     }
 
-    /// Conjugate gradients on each column by itself, until a step brings less than [`DONE`] of `energy` to all.
+    /// Conjugate gradients on each column by itself, until a step brings less than [`DONE`] of
+    /// `energy` to all.
     fn solve(
         &self,
         condensation: &Condensation<'_>,

@@ -1,4 +1,5 @@
-//! The reduced link: everything static about a link with two interfaces, in one 6×6 and two rigid parts.
+//! The reduced link: everything static about a link with two interfaces, in one 6×6 and two rigid
+//! parts.
 //!
 //! ```text
 //! F_B = K_BB u_B        wrench and displacement at Bo, link axes, A held
@@ -12,8 +13,8 @@
 //! Start at [`ReducedLink::from_matrix12`] and [`ReducedLink::from_matrix6`]; beams come from
 //! [`BeamLink`](crate::BeamLink), files from [`read_flex`](crate::read_flex).
 //!
-//! More than two interfaces, modes and chains of parts are in [`LinkDetails`]. Not here: how meshes are
-//! reduced ([`crate::mesh_link`]).
+//! More than two interfaces, modes and chains of parts are in [`LinkDetails`]. Not here: how meshes
+//! are reduced ([`crate::mesh_link`]).
 
 use flexarm_spatial::{Matrix12, Pose, adjoint, symmetric_part};
 use nalgebra::{Matrix6, Vector3};
@@ -60,8 +61,8 @@ pub struct LinkDetails {
     pub superelement: Option<Superelement>,
     /// Chains of rigid parts, by their number of parts.
     pub chains: Vec<Chain>,
-    /// Bodies that ride on the link (motors, gears): already in the two parts and in the chains, but not in the
-    /// superelement, whose mass is that of the mesh.
+    /// Bodies that ride on the link (motors, gears): already in the two parts and in the chains,
+    /// but not in the superelement, whose mass is that of the mesh.
     pub attached: Vec<RigidPart>,
     /// Shapes and mass integrals of the mesh in the frame at A, without the bodies that ride on it.
     pub modal: Option<ModalLink>,

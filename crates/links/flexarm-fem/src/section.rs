@@ -1,9 +1,11 @@
-//! Cross sections of beams and what follows from them: area, second moments, torsion, shear factors.
+//! Cross sections of beams and what follows from them: area, second moments, torsion, shear
+//! factors.
 //!
 //! Beam axes E: x along the beam, y and z in the section. `width` lies along y, `height` along z.
-//! `I_y` is the second moment *about* y (bending that deflects along z), `k_y` the shear factor for a
-//! force *along* y. y and z are principal axes and the beam axis runs through the centroid, which is also the shear centre
-//! of all shapes but the channel: see [`SectionProperties::shear_centre_y`].
+//! `I_y` is the second moment *about* y (bending that deflects along z), `k_y` the shear factor for
+//! a force *along* y. y and z are principal axes and the beam axis runs through the centroid, which
+//! is also the shear centre of all shapes but the channel: see
+//! [`SectionProperties::shear_centre_y`].
 //!
 //! Start at [`Section::bar`]; [`Section::properties`] shows the purely geometric step.
 
@@ -94,13 +96,15 @@ pub struct SectionProperties {
     pub k_y: f64,
     /// Shear factor for a force along z.
     pub k_z: f64,
-    /// Place of the shear centre along y from the centroid, m; 0 but for channels. A force along z that passes it by twists
-    /// the beam. [`crate::Beam`] bends and twists about the centroid whatever stands here: who lets a channel bend across
-    /// its web must know what that leaves out (the caveat `shear-centre` of robots).
+    /// Place of the shear centre along y from the centroid, m; 0 but for channels. A force along z
+    /// that passes it by twists the beam. [`crate::Beam`] bends and twists about the centroid
+    /// whatever stands here: who lets a channel bend across its web must know what that leaves out
+    /// (the caveat `shear-centre` of robots).
     pub shear_centre_y: f64,
 }
 
-/// Stiffness and mass of a bar per unit of its length: all that a beam needs to know of its section.
+/// Stiffness and mass of a bar per unit of its length: all that a beam needs to know of its
+/// section.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Bar {
@@ -126,15 +130,16 @@ pub struct Bar {
     pub rotary_z: f64,
 }
 
-/// The words of the shapes with the lengths that each takes, and the shape of a word: one line per shape.
+/// The words of the shapes with the lengths that each takes, and the shape of a word: one line per
+/// shape.
 macro_rules! shapes {
     ($($word:literal => $shape:ident { $($length:ident $(= $default:literal)?),+ }),+ $(,)?) => {
         /// The shapes by the word that files use, with the lengths (m) that each takes.
         pub const SHAPES: &'static [(&'static str, &'static [&'static str])] =
             &[$(($word, &[$(stringify!($length)),+])),+];
 
-        /// The shape of that word of [`Self::SHAPES`], its lengths (m) from `length`, which is given the key and what to take
-        /// where it is left out; none for another word.
+        /// The shape of that word of [`Self::SHAPES`], its lengths (m) from `length`, which is
+        /// given the key and what to take where it is left out; none for another word.
         ///
         /// # Errors
         /// The first error of `length`.
@@ -183,8 +188,8 @@ impl Section {
     /// # Source
     /// Shear factors: Cowper (1966), table 1, circle, hollow circle, rectangle; thin box: walls
     /// parallel to the force over the whole area. Torsion: rectangle by St. Venant's series
-    /// (Timoshenko & Goodier, art. 109), box by Bredt's formula on the midline of the wall. I-beam and channel:
-    /// the module `open_section` beside this one.
+    /// (Timoshenko & Goodier, art. 109), box by Bredt's formula on the midline of the wall. I-beam
+    /// and channel: the module `open_section` beside this one.
     pub fn properties(&self, nu: f64) -> Result<SectionProperties, FemError> {
         match *self {
             Self::Rectangle { width, height } => rectangle(width, height, nu),
@@ -313,10 +318,12 @@ fn hollow_box(width: f64, height: f64, wall: f64, nu: f64) -> Result<SectionProp
     })
 }
 
-/// Shear factor of a thin-walled box under a force along the walls of length `a`, midline to midline; `b` across.
+/// Shear factor of a thin-walled box under a force along the walls of length `a`, midline to
+/// midline; `b` across.
 ///
-/// All four walls shear, those across the force too: the walls along the force alone, `a/(a + b)`, are 14 to 45 % too stiff for
-/// ordinary boxes; solid elements agree with this formula to 1 % (case 2 of docs/verification.md).
+/// All four walls shear, those across the force too: the walls along the force alone, `a/(a + b)`,
+/// are 14 to 45 % too stiff for ordinary boxes; solid elements agree with this formula to 1 % (case
+/// 2 of docs/verification.md).
 ///
 /// # Source
 /// [Cowper 1966], table 1, thin-walled box, one wall thickness (`m = n = b/a`).

@@ -33,7 +33,8 @@ impl Noise {
 
 /// The unit cube in `divisions` cells, each of one brick, two wedges or six tetrahedra, one region.
 ///
-/// Corners are placed by `place(unit position)`; mid-edge nodes too if `curved`, else in the middle.
+/// Corners are placed by `place(unit position)`; mid-edge nodes too if `curved`, else in the
+/// middle.
 pub(crate) fn cube(
     kind: ElementKind,
     divisions: [usize; 3],

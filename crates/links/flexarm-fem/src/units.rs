@@ -74,7 +74,8 @@ impl std::fmt::Display for UnitSystem {
 impl std::str::FromStr for UnitSystem {
     type Err = FemError;
 
-    /// Reads `length-mass-time`: `m-kg-s` (or `SI`), `mm-t-s`, `mm-kg-ms`, `cm-g-s`, `in-slinch-s`, `ft-slug-s`, ...
+    /// Reads `length-mass-time`: `m-kg-s` (or `SI`), `mm-t-s`, `mm-kg-ms`, `cm-g-s`, `in-slinch-s`,
+    /// `ft-slug-s`, ...
     fn from_str(text: &str) -> Result<Self, FemError> {
         if text.eq_ignore_ascii_case("si") {
             return Ok(Self::SI);

@@ -191,8 +191,9 @@ fn box_of_the_lower_arm_has_its_hand_calculated_values() {
     assert_relative_eq!(s.J, 2.094_230_769_230_769e-5, max_relative = 1e-13);
 }
 
-/// Truths: two walls far apart are two strips, 10(1+nu)/(12+11nu); a square by Cowper's table, 20(1+nu)/(48+39nu); without
-/// Poisson's ratio a square is what its shear flow says, 5/12. Solid elements: 0.2797, 0.5946 for the last one.
+/// Truths: two walls far apart are two strips, 10(1+nu)/(12+11nu); a square by Cowper's table,
+/// 20(1+nu)/(48+39nu); without Poisson's ratio a square is what its shear flow says, 5/12. Solid
+/// elements: 0.2797, 0.5946 for the last one.
 #[test]
 fn all_walls_of_a_box_shear() {
     let k = |width, height, wall, nu| {

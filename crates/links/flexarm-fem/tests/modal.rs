@@ -1,4 +1,5 @@
-//! The modal link of a uniform beam against closed forms, and what does not depend on its coordinates.
+//! The modal link of a uniform beam against closed forms, and what does not depend on its
+//! coordinates.
 #![allow(non_snake_case, reason = "monogram notation, as in the crate")]
 #![allow(
     clippy::unwrap_used,
@@ -14,7 +15,8 @@ use common::{lower_arm, turned};
 use flexarm_fem::{Bar, BeamLink, BeamTheory, FemError, Material, ModalOptions, Section};
 use nalgebra::{DMatrix, Matrix6, Vector6};
 
-/// A slender uniform beam of unit length and mass, its bending stiffness 1 and 1.7, stiff in stretch and torsion.
+/// A slender uniform beam of unit length and mass, its bending stiffness 1 and 1.7, stiff in
+/// stretch and torsion.
 fn slender() -> BeamLink {
     let r2 = 1e-7;
     let bar = Bar {
@@ -39,7 +41,8 @@ fn relative(A: &Matrix6<f64>, B: &Matrix6<f64>) -> f64 {
     Matrix6::from_fn(|i, j| (A[(i, j)] - B[(i, j)]).abs() / (s[i] * s[j])).amax()
 }
 
-/// Identity: without fixed-interface modes the coordinates are the displacement of B, and K is its stiffness.
+/// Identity: without fixed-interface modes the coordinates are the displacement of B, and K is its
+/// stiffness.
 #[test]
 fn a_modal_link_without_modes_yields_as_the_reduced_link() {
     for beam in [lower_arm(), turned(), slender()] {
@@ -105,8 +108,8 @@ fn frequencies(K: &DMatrix<f64>, M: &DMatrix<f64>) -> Vec<f64> {
     all
 }
 
-/// Truth: Euler-Bernoulli, cos cosh = -1 (clamped), cos cosh = 1 (free), tan = tanh (pinned about z at A, clamped
-/// across); the first half of as many modes as are kept.
+/// Truth: Euler-Bernoulli, cos cosh = -1 (clamped), cos cosh = 1 (free), tan = tanh (pinned about z
+/// at A, clamped across); the first half of as many modes as are kept.
 #[test]
 fn frequencies_of_a_beam_are_the_closed_forms_however_its_frame_is_held() {
     let kept = 24;
@@ -236,7 +239,8 @@ fn a_truncated_link_is_the_one_with_fewer_modes() {
     assert!(matches!(many.truncated(10), Err(FemError::OutOfRange { .. })));
 }
 
-/// Truth: the sum over the static shape of a cantilever under its own weight, `w l⁴/(8 EI)` at the tip.
+/// Truth: the sum over the static shape of a cantilever under its own weight, `w l⁴/(8 EI)` at the
+/// tip.
 #[test]
 fn a_cantilever_sags_under_its_own_weight_as_the_textbook_says() {
     let link = slender().modal(6).unwrap();

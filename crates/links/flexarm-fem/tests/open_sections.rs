@@ -1,4 +1,5 @@
-//! I-beams and channels against tables of rolled profiles, finite elements over the section, and thin walls.
+//! I-beams and channels against tables of rolled profiles, finite elements over the section, and
+//! thin walls.
 #![allow(non_snake_case, reason = "monogram notation, as in the crate")]
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(clippy::print_stderr, reason = "tables of measured errors, shown with --nocapture")]
@@ -25,8 +26,9 @@ fn properties((channel, [width, height, web, flange, fillet]): Profile) -> Secti
     section.properties(0.0).unwrap()
 }
 
-/// Truth: tables of rolled profiles, cm², cm⁴ (EN 10365 as producers print it; three to four digits). `J` of the tables is by
-/// the same source with rounded fits: measured 0.9 % for IPE 200, 1 % for IPE 300, 0.1 % for UPE 200.
+/// Truth: tables of rolled profiles, cm², cm⁴ (EN 10365 as producers print it; three to four
+/// digits). `J` of the tables is by the same source with rounded fits: measured 0.9 % for IPE 200,
+/// 1 % for IPE 300, 0.1 % for UPE 200.
 #[test]
 fn rolled_profiles_have_the_values_of_their_tables() {
     for (profile, [A, I_y, I_z, J]) in [
@@ -44,9 +46,10 @@ fn rolled_profiles_have_the_values_of_their_tables() {
     assert_relative_eq!(properties(UPE_200).shear_centre_y, -54.1, max_relative = 2e-3); // measured 5e-4
 }
 
-/// Second algorithm: area, moments, torsion, shear and shear centre from finite elements over the section, without any
-/// assumption on walls. The sharp corners of cells hold a part of the difference in `J`: with cells of half the size
-/// it moves by 0.2 %. Measured: J 2.4 %, k_y 21 % and k_z 8.2 % too soft, shear centre 4.4 %.
+/// Second algorithm: area, moments, torsion, shear and shear centre from finite elements over the
+/// section, without any assumption on walls. The sharp corners of cells hold a part of the
+/// difference in `J`: with cells of half the size it moves by 0.2 %. Measured: J 2.4 %, k_y 21 %
+/// and k_z 8.2 % too soft, shear centre 4.4 %.
 #[test]
 fn sections_agree_with_finite_elements_over_them() {
     let cases: [(Profile, f64); 8] = [
@@ -97,8 +100,9 @@ fn sections_agree_with_finite_elements_over_them() {
     }
 }
 
-/// Truths of walls that get thin: `J = Σ l t³/3`; a channel of depth b and equal walls on b × 2b has its shear centre
-/// `3b/8` outside of the web; an I-beam is sheared along y in its flanges alone, 5/6 of their area.
+/// Truths of walls that get thin: `J = Σ l t³/3`; a channel of depth b and equal walls on b × 2b
+/// has its shear centre `3b/8` outside of the web; an I-beam is sheared along y in its flanges
+/// alone, 5/6 of their area.
 #[test]
 fn thin_walls_have_their_limits() {
     let (b, t) = (1.0, 1e-4);
@@ -132,7 +136,8 @@ fn impossible_profiles_name_the_length() {
     assert_eq!(refused(|l| l[4] = -1.0), "fillet radius (m)");
 }
 
-/// A section as square cells of one size: St. Venant torsion and flexure (without Poisson's ratio) by finite elements.
+/// A section as square cells of one size: St. Venant torsion and flexure (without Poisson's ratio)
+/// by finite elements.
 ///
 /// Both are `min ∫ ½ |∇φ + b|² - s φ` over the section with free edges; `τ/G = ∇φ + b`:
 ///
@@ -194,7 +199,8 @@ impl Cells {
         self.solve(|_, _| 0.0, |y, z| [-z, y]).energy
     }
 
-    /// Shear factor for a force along y (0) or z (1), and the distance of the shear centre from the centroid.
+    /// Shear factor for a force along y (0) or z (1), and the distance of the shear centre from the
+    /// centroid.
     fn flexure(&self, along: usize) -> (f64, f64) {
         let I = [self.I_z, self.I_y][along];
         let shear = self.solve(|y, z| [y, z][along] / I, |_, _| [0.0; 2]);

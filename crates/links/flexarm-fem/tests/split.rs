@@ -13,7 +13,8 @@ use flexarm_spatial::adjoint;
 use nalgebra::{Matrix6, Vector3, Vector6};
 use proptest::prelude::*;
 
-/// Truth: Euler-Bernoulli cantilever, w = F l³/(3EI), slope = F l²/(2EI), for any place of the split.
+/// Truth: Euler-Bernoulli cantilever, w = F l³/(3EI), slope = F l²/(2EI), for any place of the
+/// split.
 #[test]
 fn split_keeps_cantilever_tip_deflection() {
     let bar = Bar {
@@ -66,7 +67,8 @@ fn mid_split_agrees_with_the_numpy_implementation() {
         assert_relative_eq!(lower.distal.inertia[(i, i)], moment, max_relative = 1e-12);
     }
 
-    // The upper arm there has the thin-tube shear factor 2(1+nu)/(4+3nu); `Tube` takes the exact one.
+    // The upper arm there has the thin-tube shear factor 2(1+nu)/(4+3nu); `Tube` takes the exact
+    // one.
     let tube = Section::Tube { outer_diameter: 0.140, wall: 0.006 };
     let bar = tube.bar(&Material::STEEL).unwrap();
     let kGA = bar.EA / 2.6 * (2.6 / 4.9);

@@ -1,8 +1,9 @@
 //! Cutting a link's own mass properties in two, so that both parts together are exactly the link.
 //!
-//! For a link whose inertia is known (from its URDF) but not how it is spread: the two centres of mass are put at the
-//! middles of the two pieces of the line A-B, the masses follow from the link's centre of mass, and what remains of the
-//! inertia is shared in proportion to mass. For a uniform bar cut in the middle this is the exact answer.
+//! For a link whose inertia is known (from its URDF) but not how it is spread: the two centres of
+//! mass are put at the middles of the two pieces of the line A-B, the masses follow from the link's
+//! centre of mass, and what remains of the inertia is shared in proportion to mass. For a uniform
+//! bar cut in the middle this is the exact answer.
 
 use flexarm_fem::RigidPart;
 use flexarm_kinematics::{LinkInertia, skew};
@@ -48,7 +49,8 @@ pub enum CutError {
     },
 }
 
-/// Proximal and distal part of a link cut at `split` of the line from `p_LA` to `p_LB` (link axes) (m).
+/// Proximal and distal part of a link cut at `split` of the line from `p_LA` to `p_LB` (link axes)
+/// (m).
 ///
 /// # Errors
 /// [`CutError`] if no two bodies of this kind make up the link.
@@ -82,10 +84,12 @@ pub fn cut_inertia(
     Ok([part(0), part(1)])
 }
 
-/// The link's own mass properties spread over the parts of a chain, as [`cut_inertia`] does for two.
+/// The link's own mass properties spread over the parts of a chain, as [`cut_inertia`] does for
+/// two.
 ///
-/// Masses follow those of the chain, tilted along A-B until the centre of mass is the link's; all parts share the
-/// link's offset from the line, and what remains of the inertia is shared in proportion to mass.
+/// Masses follow those of the chain, tilted along A-B until the centre of mass is the link's; all
+/// parts share the link's offset from the line, and what remains of the inertia is shared in
+/// proportion to mass.
 ///
 /// # Errors
 /// [`CutError`] if no bodies of this kind make up the link.
@@ -152,7 +156,8 @@ mod tests {
         }
     }
 
-    /// Mass, centre of mass and inertia of both parts together are those of the link; measured 4e-16.
+    /// Mass, centre of mass and inertia of both parts together are those of the link; measured
+    /// 4e-16.
     #[test]
     fn both_parts_together_are_exactly_the_link() {
         let link = bar();

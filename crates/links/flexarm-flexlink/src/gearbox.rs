@@ -3,9 +3,10 @@
 //! ```text
 //! parent --joint (prescribed or torque)--> <joint>__motor --spring--> child
 //! ```
-//! The link between has no mass; the rotor is an armature of the motor's joint, `ratio² J`. With one stiffness the spring
-//! turns about the joint's axis; with three the bearings tilt too (extended flexible joint), as three springs about x, y,
-//! z of the joint frame; with six, or a full 6x6, it gives way in all directions. At zero deflection nothing has moved.
+//! The link between has no mass; the rotor is an armature of the motor's joint, `ratio² J`. With
+//! one stiffness the spring turns about the joint's axis; with three the bearings tilt too
+//! (extended flexible joint), as three springs about x, y, z of the joint frame; with six, or a
+//! full 6x6, it gives way in all directions. At zero deflection nothing has moved.
 
 use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, Mechanism, Pose};
 use nalgebra::{DMatrix, Matrix6, Unit, Vector3};

@@ -14,10 +14,12 @@ pub struct BranchJoint {
     pub interface: String,
 }
 
-/// Joints of the link that hang on another interface than its two ends: the nearest one to the joint's origin.
+/// Joints of the link that hang on another interface than its two ends: the nearest one to the
+/// joint's origin.
 ///
-/// Rigid parts with springs know the two ends only: what hangs elsewhere would ride rigidly on one of the parts, which can be
-/// wrong by a factor of two. Empty for links of which no other interface is known.
+/// Rigid parts with springs know the two ends only: what hangs elsewhere would ride rigidly on one
+/// of the parts, which can be wrong by a factor of two. Empty for links of which no other interface
+/// is known.
 pub fn branch_joints(mechanism: &Mechanism, link: &FlexibleLink) -> Vec<BranchJoint> {
     let others = other_interfaces(link);
     let ends = [&link.reduced.X_LA, &link.reduced.X_LB].map(|X| X.translation.vector);

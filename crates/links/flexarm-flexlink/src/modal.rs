@@ -12,7 +12,8 @@ use crate::cut::CutError;
 use crate::interfaces::nearest;
 use crate::substitute::{FlexibleLink, FlexibleSpan, Parts, Site, SubstitutionError, inertia_of, move_children};
 
-/// How near the far interface must be to the far end of the reduced link, as a fraction of its length.
+/// How near the far interface must be to the far end of the reduced link, as a fraction of its
+/// length.
 const AT_INTERFACE: f64 = 1e-6;
 
 /// The mass integrals and shapes as the tree takes them.
@@ -31,7 +32,8 @@ pub fn modal_body(link: &ModalLink) -> ModalBody {
     }
 }
 
-/// Smallest eigenvalue of a mass matrix after its diagonal is scaled to one; 0 or below: no body has it.
+/// Smallest eigenvalue of a mass matrix after its diagonal is scaled to one; 0 or below: no body
+/// has it.
 fn smallest_scaled(M: &DMatrix<f64>) -> f64 {
     let scale = M.diagonal().map(|x| 1.0 / x.max(f64::MIN_POSITIVE).sqrt());
     DMatrix::from_fn(M.nrows(), M.ncols(), |i, j| M[(i, j)] * scale[i] * scale[j]).symmetric_eigenvalues().min()
@@ -39,8 +41,9 @@ fn smallest_scaled(M: &DMatrix<f64>) -> f64 {
 
 /// Puts a modal body in the place of a link.
 ///
-/// Bodies that ride on the link stay rigidly on the interface on whose side of the cut they are. With
-/// [`Parts::FromLink`] the mass integrals of the undeformed body are made those of the mechanism's link.
+/// Bodies that ride on the link stay rigidly on the interface on whose side of the cut they are.
+/// With [`Parts::FromLink`] the mass integrals of the undeformed body are made those of the
+/// mechanism's link.
 pub(crate) fn substitute_modal(
     mechanism: &mut Mechanism,
     flexible: &FlexibleLink,

@@ -3,8 +3,9 @@
 //! ```text
 //! ground --springs at S--> <name>__top (mass that rides on them) --fixed--> base
 //! ```
-//! The ground becomes the root of the tree; at zero deflection the base is where it was, so that the axes of the world stay
-//! those of the base. Not here: a base that stands on a beam or a mesh, which is a flexible link ([`crate::substitute`]).
+//! The ground becomes the root of the tree; at zero deflection the base is where it was, so that
+//! the axes of the world stay those of the base. Not here: a base that stands on a beam or a mesh,
+//! which is a flexible link ([`crate::substitute`]).
 
 use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, LinkInertia, Mechanism, Pose};
 use nalgebra::Matrix6;
@@ -88,7 +89,8 @@ fn check_stiffness(name: &str, K: &Matrix6<f64>) -> Result<(), MountingError> {
     if asymmetry > ASYMMETRY {
         return Err(MountingError::NotSymmetric { name: name.to_owned(), found: asymmetry });
     }
-    // Forces and moments have different units: what counts is the matrix scaled to ones on its diagonal.
+    // Forces and moments have different units: what counts is the matrix scaled to ones on its
+    // diagonal.
     let diagonal = K.diagonal();
     if diagonal.min() <= 0.0 {
         return not_positive(diagonal.min());
@@ -100,7 +102,8 @@ fn check_stiffness(name: &str, K: &Matrix6<f64>) -> Result<(), MountingError> {
     }
 }
 
-/// Puts the springs between a new ground link and the base. Returns the elastic joint and where to look for its ends.
+/// Puts the springs between a new ground link and the base. Returns the elastic joint and where to
+/// look for its ends.
 ///
 /// # Errors
 /// [`MountingError`]; the mechanism is as it was then.

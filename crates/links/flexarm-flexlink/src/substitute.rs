@@ -1,4 +1,5 @@
-//! One link into two or more rigid parts with elastic joints between, or into one that bends in modes.
+//! One link into two or more rigid parts with elastic joints between, or into one that bends in
+//! modes.
 
 use std::sync::Arc;
 
@@ -16,7 +17,8 @@ use crate::modal::substitute_modal;
 pub struct FlexibleLink {
     /// Name of the link.
     pub link: String,
-    /// Name of the joint at the distal interface; found by itself if the link has one joint that leads on.
+    /// Name of the joint at the distal interface; found by itself if the link has one joint that
+    /// leads on.
     pub distal: Option<String>,
     /// Stiffness, frames and parts.
     pub reduced: ReducedLink,
@@ -65,7 +67,8 @@ impl LinkForm {
 pub enum Parts {
     /// As the reduced link says.
     Reduced,
-    /// The mechanism's own inertia of the link, cut at this fraction of the line A-B: the rigid twin is unchanged.
+    /// The mechanism's own inertia of the link, cut at this fraction of the line A-B: the rigid
+    /// twin is unchanged.
     FromLink(f64),
 }
 
@@ -206,7 +209,8 @@ const INTERFACE_TOLERANCE: f64 = 1e-6;
 /// The joint at the distal interface of a link.
 ///
 /// # Errors
-/// [`SubstitutionError::UnknownLink`], [`SubstitutionError::DistalUnclear`] or [`SubstitutionError::NotAChild`].
+/// [`SubstitutionError::UnknownLink`], [`SubstitutionError::DistalUnclear`] or
+/// [`SubstitutionError::NotAChild`].
 pub fn distal_joint<'m>(
     mechanism: &'m Mechanism,
     link: &'m str,
@@ -233,11 +237,13 @@ pub fn distal_joint<'m>(
     }
 }
 
-/// Replaces each named link by rigid parts with elastic joints `<link>__elastic`, or by a body that bends in modes.
+/// Replaces each named link by rigid parts with elastic joints `<link>__elastic`, or by a body that
+/// bends in modes.
 ///
-/// Joints of a lumped link beyond the plane through S across A-B, and always the distal joint, move to the distal part
-/// `<link>__distal`. Joints of a link that bends in modes move to the nearest of its interfaces. At zero elastic
-/// coordinates every frame is where it was, and the actuated coordinates keep their order.
+/// Joints of a lumped link beyond the plane through S across A-B, and always the distal joint, move
+/// to the distal part `<link>__distal`. Joints of a link that bends in modes move to the nearest of
+/// its interfaces. At zero elastic coordinates every frame is where it was, and the actuated
+/// coordinates keep their order.
 ///
 /// # Errors
 /// [`SubstitutionError`], naming the link.
@@ -321,7 +327,8 @@ fn insert_chain(
     parts: &[RigidPart],
 ) -> (FlexibleSpan, Vec<Spring>) {
     let name = &flexible.link;
-    // The proximal part keeps the link's frame and name, the others have their frames at the joints before them.
+    // The proximal part keeps the link's frame and name, the others have their frames at the joints
+    // before them.
     for link in mechanism.links.iter_mut().filter(|l| l.name == *name) {
         link.inertia = Some(inertia_of(&parts[0]));
     }
@@ -364,7 +371,8 @@ fn insert_chain(
     (span, springs)
 }
 
-/// Hangs the children of a link for which `moves(name, place)` holds on another one, whose pose in the link is `X_LD`.
+/// Hangs the children of a link for which `moves(name, place)` holds on another one, whose pose in
+/// the link is `X_LD`.
 pub(crate) fn move_children(
     mechanism: &mut Mechanism,
     link: &str,

@@ -90,7 +90,8 @@ fn undeflected_gearboxes_change_nothing() {
     }
 }
 
-/// The rotor sits before the spring: the mass matrix has it on the motor's row only. Truth: the armature itself.
+/// The rotor sits before the spring: the mass matrix has it on the motor's row only. Truth: the
+/// armature itself.
 #[test]
 fn rotor_stays_on_the_motor_side_of_the_spring() {
     let model = |armature: f64| {
@@ -128,8 +129,8 @@ fn tip_compliance(mechanism: &Mechanism, springs: &[GearSpring], q: [f64; 3]) ->
     (C, data.X_WF(tip), data.X_WF(motor))
 }
 
-/// Truth: `Σ u uᵀ/k` with `u = [axis × lever; axis]` for each spring, `A K⁻¹ Aᵀ` for the full one, axes of the turned
-/// joint frame; measured 3e-16 relative.
+/// Truth: `Σ u uᵀ/k` with `u = [axis × lever; axis]` for each spring, `A K⁻¹ Aᵀ` for the full one,
+/// axes of the turned joint frame; measured 3e-16 relative.
 #[test]
 fn tip_gives_way_by_lever_and_axis() {
     let q = [0.7, 0.3, -0.4];

@@ -16,7 +16,8 @@ fn inertia(mass: f64, com: Vector3<f64>, scale: f64) -> LinkInertia {
     LinkInertia { mass, com, inertia_com: I }
 }
 
-/// An oblique beam from the link's origin with its section turned, offset from the line of the joints.
+/// An oblique beam from the link's origin with its section turned, offset from the line of the
+/// joints.
 fn beam() -> BeamLink {
     let section = Section::Box { width: 0.05, height: 0.08, wall: 0.004 };
     let beam = BeamLink::new("boom", section, Material::STEEL, L);
@@ -76,7 +77,8 @@ fn flexible(modal: &Arc<ModalLink>, parts: Parts) -> FlexibleLink {
     FlexibleLink { parts, form, distal: Some("elbow".into()), ..FlexibleLink::new("boom", reduced) }
 }
 
-/// Largest differences of mass matrix, torques of a motion (velocities and accelerations included) and frames, relative.
+/// Largest differences of mass matrix, torques of a motion (velocities and accelerations included)
+/// and frames, relative.
 fn differences(rigid: &Mechanism, soft: &Mechanism) -> [f64; 3] {
     let (rigid, soft) = (Model::new(rigid).expect("a tree"), Model::new(soft).expect("a tree"));
     let (mut d1, mut d2) = (Data::new(&rigid), Data::new(&soft));
@@ -100,7 +102,8 @@ fn differences(rigid: &Mechanism, soft: &Mechanism) -> [f64; 3] {
     [(&M - M_soft).amax() / M.amax(), (&tau - tau_soft).amax() / tau.amax(), worst]
 }
 
-/// Truth: the rigid recursion with the beam's own mass properties; torques of a fast motion. Measured: 2e-16 at most.
+/// Truth: the rigid recursion with the beam's own mass properties; torques of a fast motion.
+/// Measured: 2e-16 at most.
 #[test]
 fn undeformed_robot_with_a_modal_link_is_the_rigid_robot() {
     let modal = Arc::new(beam().modal(4).expect("a beam"));
@@ -113,7 +116,8 @@ fn undeformed_robot_with_a_modal_link_is_the_rigid_robot() {
     assert_eq!(soft.spans[0].part_masses, [body.mass]);
 }
 
-/// The same where the modal link takes the mass properties of the robot's link, which are not those of the beam.
+/// The same where the modal link takes the mass properties of the robot's link, which are not those
+/// of the beam.
 #[test]
 fn undeformed_robot_keeps_the_mass_properties_of_its_own_link() {
     let modal = Arc::new(beam().modal(4).expect("a beam"));
@@ -124,7 +128,8 @@ fn undeformed_robot_keeps_the_mass_properties_of_its_own_link() {
     eprintln!("{found:?}");
     assert!(found.iter().all(|d| *d < 1e-12), "{found:?}");
 
-    // With a tenth of its inertia no body of this mass bends like the beam: its modes would move more than all of it.
+    // With a tenth of its inertia no body of this mass bends like the beam: its modes would move
+    // more than all of it.
     let light = robot(inertia(modal.mass, modal.rigid().com, 0.1));
     let error = substitute(&light, &[flexible(&modal, Parts::FromLink(0.5))]).expect_err("no such body").to_string();
     assert!(error.contains("boom") && error.contains("parts = \"uniform\""), "{error}");
@@ -180,7 +185,8 @@ fn tip_of_a_modal_cantilever_moves_as_its_reduced_stiffness_says() {
     }
 }
 
-/// A beam of Euler and Bernoulli along x with a third interface at the fraction `at`, by its exact static shapes.
+/// A beam of Euler and Bernoulli along x with a third interface at the fraction `at`, by its exact
+/// static shapes.
 fn branched(at: f64, name: &str) -> (ModalLink, ReducedLink, f64) {
     let section = Section::Tube { outer_diameter: 0.06, wall: 0.003 };
     let mut straight = BeamLink::new("boom", section, Material::STEEL, L);
@@ -210,7 +216,8 @@ fn branched(at: f64, name: &str) -> (ModalLink, ReducedLink, f64) {
     (modal, straight.reduce().expect("a beam"), EI)
 }
 
-/// Truth: `v(x) = F x² (3 l - x)/(6 EI)` and its slope under a force at the tip, at the branch and at the tip; measured 2e-16.
+/// Truth: `v(x) = F x² (3 l - x)/(6 EI)` and its slope under a force at the tip, at the branch and
+/// at the tip; measured 2e-16.
 ///
 /// The branch lies beyond the middle: a joint there must hang on its own interface, not on B.
 #[test]
@@ -263,8 +270,8 @@ fn children_of_a_branched_modal_link_hang_on_their_interfaces() {
     }
 }
 
-/// Bodies that ride on the link: near the proximal end they stay, beyond the split they move with B. Truth: the
-/// rigid robot of all, and the inertia of the two links.
+/// Bodies that ride on the link: near the proximal end they stay, beyond the split they move with
+/// B. Truth: the rigid robot of all, and the inertia of the two links.
 #[test]
 fn attached_bodies_ride_on_the_side_of_the_split_on_which_they_are() {
     let modal = Arc::new(beam().modal(3).expect("a beam"));

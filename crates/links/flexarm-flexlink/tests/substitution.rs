@@ -26,7 +26,8 @@ fn cantilever(split: f64) -> (Mechanism, FlexibleLink) {
     (arm, FlexibleLink::new("beam", beam.reduce().expect("a beam")))
 }
 
-/// Truth: F l³/(3EI), F l²/(2EI), M l²/(2EI), M l/(EI), F l/(EA), T l/(GJ) for any place of the split; measured 2e-15.
+/// Truth: F l³/(3EI), F l²/(2EI), M l²/(2EI), M l/(EI), F l/(EA), T l/(GJ) for any place of the
+/// split; measured 2e-15.
 #[test]
 fn tip_of_the_substituted_link_moves_as_the_cantilever_does() {
     let (steel, section) = (Material::STEEL, Section::Box { width: 0.05, height: 0.08, wall: 0.004 });
@@ -60,7 +61,8 @@ fn tip_of_the_substituted_link_moves_as_the_cantilever_does() {
     }
 }
 
-/// At zero elastic coordinates frames, mass matrix and gravity torques are those of the rigid robot; measured 1e-14.
+/// At zero elastic coordinates frames, mass matrix and gravity torques are those of the rigid
+/// robot; measured 1e-14.
 #[test]
 fn undeformed_robot_is_the_rigid_robot() {
     let (mut arm, mut flexible) = cantilever(0.4);
@@ -86,7 +88,8 @@ fn undeformed_robot_is_the_rigid_robot() {
     }
 }
 
-/// Dropping the coupling of a split at 0.3 of the beam makes the tip 24 % too soft; the full 6x6 gives l³/(3EI).
+/// Dropping the coupling of a split at 0.3 of the beam makes the tip 24 % too soft; the full 6x6
+/// gives l³/(3EI).
 #[test]
 fn dropped_coupling_is_wrong_by_tens_of_per_cent() {
     let (arm, flexible) = cantilever(0.3);
@@ -119,8 +122,9 @@ fn wrong_requests_are_refused_by_name() {
     assert!(twice.to_string().contains("twice"));
 }
 
-/// Truth: the rigid robot, value by value. Two joints move to the far half of the link, the two between them stay, and one of
-/// them gets a gearbox: in the tree they come in another order, as coordinates they do not. Measured 5e-15 of the largest.
+/// Truth: the rigid robot, value by value. Two joints move to the far half of the link, the two
+/// between them stay, and one of them gets a gearbox: in the tree they come in another order, as
+/// coordinates they do not. Measured 5e-15 of the largest.
 #[test]
 fn joints_keep_their_order_whichever_half_of_a_link_carries_them() {
     let (mut arm, mut flexible) = cantilever(0.5);

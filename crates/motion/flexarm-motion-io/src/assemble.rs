@@ -1,4 +1,5 @@
-//! From the messages of a topic to curves: which clock counts, what of the samples is left out, which velocities are used.
+//! From the messages of a topic to curves: which clock counts, what of the samples is left out,
+//! which velocities are used.
 
 use flexarm_settings::Caveat;
 use flexarm_trajectory::{JointSamples, SampleError, Samples, Trajectory, TrajectoryError};
@@ -13,11 +14,13 @@ const DISORDER_S: f64 = 1.0;
 const FEW: f64 = 0.01;
 /// Trajectories of one message meet within this (rad or m).
 const MEET: f64 = 1e-3;
-/// Points of trajectories that are no farther apart are at one time (s): less than a period of any controller.
+/// Points of trajectories that are no farther apart are at one time (s): less than a period of any
+/// controller.
 const SAME_TIME_S: f64 = 1e-6;
 /// A joint that is told so many of its steps later or earlier than others goes on at its speed.
 const REACH: f64 = 2.0;
-/// Velocities belong to positions whose slopes differ from them by less than this part of the slopes, and this (rad/s).
+/// Velocities belong to positions whose slopes differ from them by less than this part of the
+/// slopes, and this (rad/s).
 const BELONGS: [f64; 2] = [0.1, 0.02];
 
 /// A joint's samples, times in s since a time of all joints. Rates that are not told are NaN.
@@ -115,8 +118,9 @@ impl Line {
         (self.t[self.t.len() - 1] - self.t[0]) / (self.t.len() - 1) as f64
     }
 
-    /// Goes on at its speed to the ends of the others, where these are no farther than two of its steps: publishers of other
-    /// joints on the same topic send at other times, which is no reason to stop and start at once.
+    /// Goes on at its speed to the ends of the others, where these are no farther than two of its
+    /// steps: publishers of other joints on the same topic send at other times, which is no reason
+    /// to stop and start at once.
     fn reach(&mut self, first: f64, last: f64) {
         if self.t.len() < 2 {
             return;
@@ -161,7 +165,8 @@ fn tell_ends(lines: &[Line], first: f64, last: f64, told: &mut Told<'_>) {
     }
 }
 
-// ------------------------------------------------------------------------------------------------------------------ states
+// ------------------------------------------------------------------------------------------------------------------
+// states
 
 /// Lines of joints from their states.
 fn states(mut topic: Topic, has_clock: bool, told: &mut Told<'_>) -> Result<Vec<Line>, Trouble> {
@@ -325,7 +330,8 @@ fn clock(series: &[Series], has_clock: bool, told: &mut Told<'_>) -> Result<bool
     }
 }
 
-/// Velocities that are not the slopes of the positions are not used: drivers without them send zeros.
+/// Velocities that are not the slopes of the positions are not used: drivers without them send
+/// zeros.
 fn judge_velocities(lines: &mut [Line], told: &mut Told<'_>) {
     let (mut foreign, mut partial) = (Vec::new(), Vec::new());
     for line in lines.iter_mut().filter(|line| line.t.len() > 1) {
@@ -368,10 +374,12 @@ fn tell_partial(partial: &[String], told: &mut Told<'_>) {
     }
 }
 
-// ------------------------------------------------------------------------------------------------------------------- plans
+// -------------------------------------------------------------------------------------------------------------------
+// plans
 
-/// Lines of joints from the points of trajectories. Each message begins at its stamp, else when it was received, else when
-/// the one before is over, and takes the place of what is left of the one before.
+/// Lines of joints from the points of trajectories. Each message begins at its stamp, else when it
+/// was received, else when the one before is over, and takes the place of what is left of the one
+/// before.
 fn plans(topic: Topic, has_clock: bool, told: &mut Told<'_>) -> Result<Vec<Line>, Trouble> {
     let mut lines: Vec<Line> =
         topic.series.iter().map(|series| Line { joint: series.joint.clone(), ..Line::default() }).collect();
@@ -446,8 +454,9 @@ fn put_start(message: &Received, lines: &mut [Line], told: &mut Told<'_>) {
 }
 
 impl Line {
-    /// Makes room for a message that begins at `from`: what would come later is gone. Up to its first point the joint is where
-    /// it was going: at its end if that was reached, else on the way, between the points before and after.
+    /// Makes room for a message that begins at `from`: what would come later is gone. Up to its
+    /// first point the joint is where it was going: at its end if that was reached, else on the
+    /// way, between the points before and after.
     fn cut(&mut self, from: f64, first: Option<&Point>, column: usize) {
         let keep = self.t.partition_point(|t| *t <= from + SAME_TIME_S);
         let next = self.t.get(keep).map(|&t| (t, self.q[keep], self.v[keep], self.a[keep]));
@@ -472,7 +481,8 @@ impl Line {
             return;
         }
         let joins = first.position.get(column).is_some_and(|next| (next - q).abs() <= MEET);
-        // A hold is two steps without motion; where the message begins elsewhere at once, it goes there within the gap.
+        // A hold is two steps without motion; where the message begins elsewhere at once, it goes
+        // there within the gap.
         if first.time_s > 0.0 || joins {
             self.push(t + 0.5 * gap, q, 0.0, 0.0);
         }

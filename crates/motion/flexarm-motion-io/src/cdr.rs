@@ -1,7 +1,9 @@
-//! Bytes of a message to a tree, by its definition: CDR of either byte order as ROS 2 writes it, and the plain bytes of ROS 1.
+//! Bytes of a message to a tree, by its definition: CDR of either byte order as ROS 2 writes it,
+//! and the plain bytes of ROS 1.
 //!
-//! CDR begins with four bytes, of which the second says the byte order; numbers stand at multiples of their size, counted
-//! from behind these four. ROS 1 has little endian numbers one after another.
+//! CDR begins with four bytes, of which the second says the byte order; numbers stand at multiples
+//! of their size, counted from behind these four. ROS 1 has little endian numbers one after
+//! another.
 
 use std::rc::Rc;
 

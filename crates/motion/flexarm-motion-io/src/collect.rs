@@ -99,7 +99,8 @@ impl<'a> Collector<'a> {
         asked && topic.reader.is_some() && topic.trouble.is_none()
     }
 
-    /// Counts a message and keeps what it says. What is wrong with it is told only if its topic is the one that is taken.
+    /// Counts a message and keeps what it says. What is wrong with it is told only if its topic is
+    /// the one that is taken.
     ///
     /// # Errors
     /// [`Problem::TooManyNumbers`].
@@ -153,7 +154,8 @@ impl<'a> Collector<'a> {
     /// The topic to take, and others that could be.
     ///
     /// # Errors
-    /// [`Problem::NoTopic`], [`Problem::Topic`], what is wrong with a message of the topic, [`Problem::NoJoint`].
+    /// [`Problem::NoTopic`], [`Problem::Topic`], what is wrong with a message of the topic,
+    /// [`Problem::NoJoint`].
     pub(crate) fn choose(mut self) -> Result<(Topic, Vec<String>), Trouble> {
         let all: Vec<String> = self.topics.iter().map(Topic::described).collect();
         let readable = |topics: &[Topic]| -> Vec<String> {
@@ -176,7 +178,8 @@ impl<'a> Collector<'a> {
                 Some(_) => {}
             }
         }
-        // Of several: the one that moves most joints, then what a robot did before what it was told, then the longest.
+        // Of several: the one that moves most joints, then what a robot did before what it was
+        // told, then the longest.
         let rank = |topic: &Topic| {
             let filled = topic.series.iter().filter(|series| !series.position.is_empty()).count();
             let matched = if topic.received.is_empty() { filled } else { topic.series.len() };

@@ -1,4 +1,5 @@
-//! What a message is made of: definitions of ROS as text (`ros2msg`, `ros1msg`), and those that are known without a file.
+//! What a message is made of: definitions of ROS as text (`ros2msg`, `ros1msg`), and those that are
+//! known without a file.
 
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -49,8 +50,9 @@ pub(crate) struct Definitions {
     structs: HashMap<String, Vec<Field>>,
 }
 
-/// The types that are read where a file has no definitions. Of the state of a controller the fields up to the first point,
-/// which is the set point in all versions of the message (`desired`, later `reference`).
+/// The types that are read where a file has no definitions. Of the state of a controller the fields
+/// up to the first point, which is the set point in all versions of the message (`desired`, later
+/// `reference`).
 const KNOWN: [(&str, &str); 7] = [
     (
         "sensor_msgs/JointState",
@@ -90,7 +92,8 @@ impl Definitions {
         Some(Self { root, structs })
     }
 
-    /// The definition in a file: that of the message, and after lines of `=` those of its parts, each after `MSG: name`.
+    /// The definition in a file: that of the message, and after lines of `=` those of its parts,
+    /// each after `MSG: name`.
     pub(crate) fn parse(message: &str, text: &str) -> Self {
         let root = plain_name(message);
         let mut structs = HashMap::new();
@@ -98,7 +101,8 @@ impl Definitions {
         let mut close = |name: &str, body: &mut String| {
             let found = fields(body, package(name));
             body.clear();
-            // The first one of a name counts: a file that has the root as its own part is odd, but whole.
+            // The first one of a name counts: a file that has the root as its own part is odd, but
+            // whole.
             structs.entry(name.to_owned()).or_insert(found);
         };
         for line in text.lines() {
@@ -117,7 +121,8 @@ impl Definitions {
         Self { root, structs }
     }
 
-    /// The fields of a part. A name without a package is one of ROS's own where there is no such part.
+    /// The fields of a part. A name without a package is one of ROS's own where there is no such
+    /// part.
     pub(crate) fn fields(&self, name: &str) -> Option<&[Field]> {
         let found = self.structs.get(name).or_else(|| {
             let (_, last) = name.rsplit_once('/')?;

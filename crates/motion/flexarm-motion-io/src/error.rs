@@ -1,4 +1,5 @@
-//! Everything that can be wrong with messages and bags: where, what was found, what was expected, how to mend it.
+//! Everything that can be wrong with messages and bags: where, what was found, what was expected,
+//! how to mend it.
 
 use std::fmt;
 use std::path::PathBuf;

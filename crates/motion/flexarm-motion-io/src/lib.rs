@@ -25,11 +25,13 @@
 //! | bags of ROS 1 (`.bag`), chunks plain or packed by bzip2 or lz4 | [`read_rosbag`] | the same in the bytes of ROS 1 |
 //! | folders of rosbag2 with `metadata.yaml` | [`read_folder`] | the same; files packed as a whole (`.zstd`) too |
 //!
-//! All ends in one tree of values ([`value`]): [`yaml`] makes it of text, [`cdr`] of bytes by the definition of the message
-//! ([`definition`]); [`message`] finds motions in it, [`collect`] keeps them by topic and joint, [`assemble`] makes curves
-//! of them. Joints go by their names in every single message. [`write_joint_trajectory`] is the way back.
+//! All ends in one tree of values ([`value`]): [`yaml`] makes it of text, [`cdr`] of bytes by the
+//! definition of the message ([`definition`]); [`message`] finds motions in it, [`collect`] keeps
+//! them by topic and joint, [`assemble`] makes curves of them. Joints go by their names in every
+//! single message. [`write_joint_trajectory`] is the way back.
 //!
-//! Units: rad, rad/s, rad/s², m, s, as ROS has them. Not here: robots; which joints a robot has is told ([`Request`]).
+//! Units: rad, rad/s, rad/s², m, s, as ROS has them. Not here: robots; which joints a robot has is
+//! told ([`Request`]).
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test"))]
 #![allow(rustdoc::private_intra_doc_links, reason = "the page tells how the modules work together")]
 
@@ -80,7 +82,8 @@ pub struct MessageMotion {
     pub format: &'static str,
     /// Topic of a bag.
     pub topic: Option<String>,
-    /// Type of the messages, such as `sensor_msgs/msg/JointState`, as far as the file says it or their keys show it.
+    /// Type of the messages, such as `sensor_msgs/msg/JointState`, as far as the file says it or
+    /// their keys show it.
     pub message: String,
     /// Most samples of a joint.
     pub samples: usize,

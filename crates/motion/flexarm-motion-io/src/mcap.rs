@@ -1,5 +1,5 @@
-//! Messages of an MCAP file, record by record from its beginning: the index at its end is not needed, so a file that is cut
-//! off is read up to its last whole chunk.
+//! Messages of an MCAP file, record by record from its beginning: the index at its end is not
+//! needed, so a file that is cut off is read up to its last whole chunk.
 //!
 //! The `mcap` crate walks over the records and unpacks chunks; three kinds of records matter here
 //! (schema, channel, message).
@@ -22,8 +22,8 @@ use crate::{MessageMotion, Request};
 /// First bytes of an MCAP file.
 pub const MCAP_MAGIC: &[u8] = mcap::MAGIC;
 
-/// Maximum size of a record, or of an unpacked chunk, in bytes: the library takes memory for a chunk
-/// before it unpacks it.
+/// Maximum size of a record, or of an unpacked chunk, in bytes: the library takes memory for a
+/// chunk before it unpacks it.
 const MOST_BYTES: usize = 256 << 20;
 /// Bytes that are read at once, however long a record claims to be.
 const READ_BYTES: usize = 64 << 10;
@@ -31,8 +31,8 @@ const READ_BYTES: usize = 64 << 10;
 /// Reads an MCAP file.
 ///
 /// # Errors
-/// [`MotionError::Read`], or [`MotionError::Content`] for what is no MCAP file, a topic that is not there, messages that
-/// cannot be read, and bags without a motion of the joints that are wanted.
+/// [`MotionError::Read`], or [`MotionError::Content`] for what is no MCAP file, a topic that is not
+/// there, messages that cannot be read, and bags without a motion of the joints that are wanted.
 pub fn read_mcap(path: &Path, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
     crate::folder::read_files(&[path.to_owned()], path, request)
 }

@@ -1,4 +1,5 @@
-//! Motions in the tree of a message: trajectories of points, states of joints, states of controllers; told by their keys.
+//! Motions in the tree of a message: trajectories of points, states of joints, states of
+//! controllers; told by their keys.
 
 use std::rc::Rc;
 
@@ -50,7 +51,8 @@ pub(crate) struct Points {
 #[derive(Clone, Debug)]
 pub(crate) enum Message {
     State(State),
-    /// Trajectories that run one after another, and where the robot is before the first, as far as it is told.
+    /// Trajectories that run one after another, and where the robot is before the first, as far as
+    /// it is told.
     Trajectories(Vec<Points>, Option<State>),
 }
 
@@ -159,7 +161,8 @@ fn points(node: &Node, names: &Node, list: &Node) -> Result<Points, Trouble> {
     Ok(Points { stamp_ns: stamp_ns(node)?, joints, points: found })
 }
 
-/// Values of joints whose names stand in `names`; `values` has position and velocity, or positions and velocities.
+/// Values of joints whose names stand in `names`; `values` has position and velocity, or positions
+/// and velocities.
 fn state(node: &Node, names: &Node, values: &Node, of: &'static str) -> Result<State, Trouble> {
     let plural = matches!(of, "reference" | "desired" | "feedback" | "actual");
     let (position, velocity, acceleration) =
@@ -177,8 +180,8 @@ fn state(node: &Node, names: &Node, values: &Node, of: &'static str) -> Result<S
 }
 
 impl State {
-    /// Whether there is one position for each joint, or none at all. Velocities and accelerations of another number are
-    /// nobody's; whether there were such.
+    /// Whether there is one position for each joint, or none at all. Velocities and accelerations
+    /// of another number are nobody's; whether there were such.
     ///
     /// # Errors
     /// [`Problem::Lengths`].

@@ -1,8 +1,9 @@
-//! Messages of a bag of ROS 1 (`.bag`, format 2.0), record by record from its beginning: the index at its end is not needed, so
-//! a file that is cut off, or was never closed (`.bag.active`), is read as far as it goes.
+//! Messages of a bag of ROS 1 (`.bag`, format 2.0), record by record from its beginning: the index
+//! at its end is not needed, so a file that is cut off, or was never closed (`.bag.active`), is
+//! read as far as it goes.
 //!
-//! A record is a head of fields `name=value` and data. Four kinds matter here: the bag's own head, chunks, connections (topic, type and
-//! definition of the messages) and messages.
+//! A record is a head of fields `name=value` and data. Four kinds matter here: the bag's own head,
+//! chunks, connections (topic, type and definition of the messages) and messages.
 
 use std::collections::HashMap;
 use std::fs::File;

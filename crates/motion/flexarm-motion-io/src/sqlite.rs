@@ -1,7 +1,8 @@
-//! Messages of a SQLite file of rosbag2 (`.db3`): tables `topics` and `messages`, and since ROS 2 Iron
-//! `message_definitions`.
+//! Messages of a SQLite file of rosbag2 (`.db3`): tables `topics` and `messages`, and since ROS 2
+//! Iron `message_definitions`.
 //!
-//! The one module that names `rusqlite`. The file is opened for reading only and nothing is written beside it.
+//! The one module that names `rusqlite`. The file is opened for reading only and nothing is written
+//! beside it.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -17,7 +18,8 @@ pub(crate) fn collect_file(path: &Path, into: &mut Collector<'_>) -> Result<Opti
     let file = || {
         let mut log = path.as_os_str().to_owned();
         log.push("-wal");
-        // What a killed recorder left in its log is read with the file; without a log nothing must be made beside it.
+        // What a killed recorder left in its log is read with the file; without a log nothing must
+        // be made beside it.
         let has_log = std::fs::metadata(&log).is_ok_and(|log| log.len() > 0);
         let name: String = path.to_str()?.chars().map(escaped).collect();
         Some(format!("file:{name}?mode=ro{}", if has_log { "" } else { "&immutable=1" }))
@@ -33,7 +35,8 @@ pub(crate) fn collect_file(path: &Path, into: &mut Collector<'_>) -> Result<Opti
 
 /// A database that was unpacked into memory.
 pub(crate) fn collect_bytes(mut bytes: Vec<u8>, into: &mut Collector<'_>) -> Result<Option<String>, Trouble> {
-    // In memory there is no log beside the file: versions 2 of format (with a log) are read as version 1.
+    // In memory there is no log beside the file: versions 2 of format (with a log) are read as
+    // version 1.
     for at in [18, 19] {
         if let Some(version) = bytes.get_mut(at) {
             *version = 1;
@@ -83,7 +86,8 @@ fn collect(database: &Connection, into: &mut Collector<'_>) -> Result<Option<Str
 }
 
 fn names_of_tables(database: &Connection) -> rusqlite::Result<Vec<String>> {
-    // A file that was cut off has fewer pages than its head says. Only with this are the others read; nothing is written.
+    // A file that was cut off has fewer pages than its head says. Only with this are the others
+    // read; nothing is written.
     database.pragma_update(None, "writable_schema", true)?;
     database.pragma_update(None, "trusted_schema", false)?;
     // Views could be made to compute for ever.
@@ -103,7 +107,8 @@ fn definitions(database: &Connection) -> rusqlite::Result<HashMap<String, String
     query.query_map([], |row| Ok((row.get(0)?, row.get(1)?)))?.collect()
 }
 
-/// The messages in the order in which they were received; why the file ends before its end, if it does.
+/// The messages in the order in which they were received; why the file ends before its end, if it
+/// does.
 fn messages(
     database: &Connection,
     places: &HashMap<i64, usize>,

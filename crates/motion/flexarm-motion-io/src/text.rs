@@ -81,7 +81,8 @@ fn read(text: &str, origin: &str, request: &Request<'_>) -> Result<MessageMotion
     })?;
     let mut caveats = Vec::new();
     if let Some(trouble) = pending {
-        // What a program printed when it was stopped ends somewhere; one document alone must be whole.
+        // What a program printed when it was stopped ends somewhere; one document alone must be
+        // whole.
         if documents < 3 {
             return Err(trouble);
         }

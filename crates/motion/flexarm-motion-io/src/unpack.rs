@@ -42,7 +42,8 @@ pub(crate) enum Packing {
 /// A bag that is packed as a whole (`.mcap.zstd`, `.db3.zstd`).
 ///
 /// # Errors
-/// [`MotionError`] as [`crate::read_mcap`] and [`crate::read_db3`] have it, and for what is no bag inside.
+/// [`MotionError`] as [`crate::read_mcap`] and [`crate::read_db3`] have it, and for what is no bag
+/// inside.
 pub fn read_packed(path: &Path, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
     crate::folder::read_files(&[path.to_owned()], path, request)
 }

@@ -16,8 +16,8 @@ pub enum TextFormat {
     Json,
 }
 
-/// A motion as points with positions, velocities and accelerations in SI units: one every `1 / rate_hz` s, at whole
-/// nanoseconds, and one at the end. Numbers are written in full.
+/// A motion as points with positions, velocities and accelerations in SI units: one every
+/// `1 / rate_hz` s, at whole nanoseconds, and one at the end. Numbers are written in full.
 ///
 /// # Errors
 /// [`TrajectoryError::BadRate`].

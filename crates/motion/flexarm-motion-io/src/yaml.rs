@@ -12,7 +12,8 @@ use crate::value::{Node, Value};
 /// Maximum number of values of a text, those behind aliases counted each time.
 const MOST_VALUES: usize = 20_000_000;
 
-/// Calls `take` with each document, one after another, so that a long recording is not in memory twice.
+/// Calls `take` with each document, one after another, so that a long recording is not in memory
+/// twice.
 pub(crate) fn documents(text: &str, take: &mut dyn FnMut(Node) -> Result<(), Trouble>) -> Result<(), Trouble> {
     // Keys are few and come often.
     let mut keys = HashMap::new();

@@ -1,5 +1,5 @@
-//! One motion in every format, as the Python packages of ROS wrote it (`tools/make_motion_fixtures.py`): the same samples as
-//! those of our own CSV.
+//! One motion in every format, as the Python packages of ROS wrote it
+//! (`tools/make_motion_fixtures.py`): the same samples as those of our own CSV.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 #![allow(clippy::print_stdout, reason = "measured errors, with --nocapture")]
 
@@ -219,7 +219,8 @@ fn a_bag_that_is_cut_off_is_read_up_to_there_and_says_so() {
         std::fs::write(&path, &whole[..(part * whole.len() as f64) as usize]).unwrap();
         read_db3(&path, &ROBOT)
     };
-    // A database has its pages in any order: what is left of it is a part of the motion, or an error.
+    // A database has its pages in any order: what is left of it is a part of the motion, or an
+    // error.
     for part in [0.9, 0.8, 0.6, 0.4] {
         match cut(part) {
             Ok(motion) => assert!(motion.samples <= 26 && motion.trajectory.duration() > 0.0),
@@ -256,7 +257,8 @@ fn a_bag_that_is_cut_off_is_read_up_to_there_and_says_so() {
     std::fs::remove_dir_all(&place).unwrap();
 }
 
-// ------------------------------------------------------------------------------------------------------- what is odd, as text
+// -------------------------------------------------------------------------------------------------------
+// what is odd, as text
 
 fn state(stamp_ns: i64, joints: &[(&str, f64, Option<f64>)]) -> String {
     let list = |values: Vec<String>| format!("[{}]", values.join(", "));
@@ -301,7 +303,8 @@ fn publishers_of_different_joints_on_one_topic_keep_their_own_times() {
     assert!((motion.trajectory.duration() - 0.4).abs() < 1e-12);
     let q = at(&motion, 0.2);
     assert!((q[0] - 0.1).abs() < 1e-9 && (q[1] - 0.6).abs() < 1e-9, "{q:?}");
-    // Before its first sample, by less than two of its steps, it goes as it does then: no blow at the start.
+    // Before its first sample, by less than two of its steps, it goes as it does then: no blow at
+    // the start.
     assert!((at(&motion, 0.001)[1] - 0.998).abs() < 1e-9, "{:?}", at(&motion, 0.001));
     assert!(motion.trajectory.velocity_jumps().iter().all(|jump| jump.time_s == 0.0 || jump.time_s == 0.4));
     assert_eq!(motion.dropped, ["finger"]);
@@ -433,7 +436,8 @@ fn a_stream_of_single_points_is_the_way_through_them() {
     let mut worst = 0.0f64;
     for k in 0..990 {
         let t = 0.001 * f64::from(k);
-        // Where one comes early, the way to the point before is left a little before it; measured 5.5e-6.
+        // Where one comes early, the way to the point before is left a little before it; measured
+        // 5.5e-6.
         worst = worst.max((at(&motion, t)[0] - goal(t + 0.01)).abs());
     }
     println!("stream of points: {worst:.1e} rad");
@@ -453,7 +457,8 @@ fn a_stream_of_single_points_is_the_way_through_them() {
     assert!((motion.trajectory.duration() - 2.0).abs() < 1e-12 && (at(&motion, 2.0)[0] - 0.2).abs() < 1e-12);
 }
 
-// ------------------------------------------------------------------------------------------------------------------- refused
+// -------------------------------------------------------------------------------------------------------------------
+// refused
 
 fn refusal(result: Result<MessageMotion, MotionError>) -> String {
     result.map(|motion| motion.trajectory.duration()).unwrap_err().to_string()

@@ -13,8 +13,8 @@ const WIDEST: f64 = 200.0;
 
 /// A smoothed law, and by how much it must be slowed as a whole to keep all bounds.
 ///
-/// Where the average passes a bound, the law before it is slowed; where it does not reach one any more, the law becomes faster
-/// again. Of all laws on the way the one of the least time is taken.
+/// Where the average passes a bound, the law before it is slowed; where it does not reach one any
+/// more, the law becomes faster again. Of all laws on the way the one of the least time is taken.
 ///
 /// * `points`: what holds along the route.
 pub(crate) fn kept(points: &[PathPoint], route: &Route, rise: f64) -> Result<(Law, f64), LawError> {
@@ -64,7 +64,8 @@ pub(crate) fn kept(points: &[PathPoint], route: &Route, rise: f64) -> Result<(La
     best.ok_or(LawError::Points(points.len()))
 }
 
-/// Moments of an averaged law with the ratios of its squared speeds to the greatest that the bounds allow.
+/// Moments of an averaged law with the ratios of its squared speeds to the greatest that the bounds
+/// allow.
 fn ratios(law: &Law, points: &[PathPoint]) -> Vec<(f64, f64)> {
     let knots = law.knots();
     let middles = knots.windows(2).map(|pair| 0.5 * (pair[0] + pair[1]));

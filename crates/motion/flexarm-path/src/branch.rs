@@ -1,7 +1,7 @@
 //! Which of the inverse kinematics' solutions a target means.
 //!
-//! In closed form where the arm has one ([`AnalyticArm`]), else from many starts; the nearest to where the arm is if the
-//! target says no more.
+//! In closed form where the arm has one ([`AnalyticArm`]), else from many starts; the nearest to
+//! where the arm is if the target says no more.
 
 use flexarm_kinematics::{
     AnalyticArm, ControllerAxes, Data, Frame, IkOptions, Model, Selection, Solutions, forward_kinematics,

@@ -1,11 +1,11 @@
 //! Curves of the tool in space: position and orientation over one parameter, with two derivatives.
 //!
-//! The parameter `s` is metres along the path where the tool travels; where it only turns, an angle counts [`TURN_LENGTH`] for each
-//! radian. A [`ToolCurve`] is what a line, an arc, a blend or a piece of a spline all are: a law of the position and a law of the
-//! rotation over the same `s`.
+//! The parameter `s` is metres along the path where the tool travels; where it only turns, an angle
+//! counts [`TURN_LENGTH`] for each radian. A [`ToolCurve`] is what a line, an arc, a blend or a
+//! piece of a spline all are: a law of the position and a law of the rotation over the same `s`.
 //!
-//! Rotation vectors beyond the identity: `R = R_ref exp(phi(s))`, with the rate map of [`ElasticAngles::RotationVector`]
-//! [Bullo & Murray 1995].
+//! Rotation vectors beyond the identity: `R = R_ref exp(phi(s))`, with the rate map of
+//! [`ElasticAngles::RotationVector`] [Bullo & Murray 1995].
 
 use flexarm_spatial::{ElasticAngles, Pose, rotation_vector};
 use nalgebra::{Matrix3, Rotation3, Translation3, Vector3, Vector6};
@@ -50,7 +50,8 @@ enum Position {
 enum Rotation {
     /// `exp(w s) R0`, w in world axes.
     Even { R0: Matrix3<f64>, w: Vector3<f64> },
-    /// `exp(k s) exp(w s) R0`: evenly within axes that turn with an arc, `k` along its axis (rad/m).
+    /// `exp(k s) exp(w s) R0`: evenly within axes that turn with an arc, `k` along its axis
+    /// (rad/m).
     WithArc { R0: Matrix3<f64>, w: Vector3<f64>, k: Vector3<f64> },
     /// `R_ref exp(phi(s))`.
     Log { R_ref: Matrix3<f64>, phi: Quintic },
@@ -84,8 +85,8 @@ fn turn(R0: &Matrix3<f64>, R1: &Matrix3<f64>) -> Vector3<f64> {
     rotation_vector(&(R1 * R0.transpose()))
 }
 
-/// The same rotation, at most half a turn as `w` or the other way round, whichever has the smaller `distance`. Orientations
-/// in programs are rounded, so the other way round must be clearly nearer.
+/// The same rotation, at most half a turn as `w` or the other way round, whichever has the smaller
+/// `distance`. Orientations in programs are rounded, so the other way round must be clearly nearer.
 fn nearer_way(w: Vector3<f64>, distance: impl Fn(&Vector3<f64>) -> f64) -> Vector3<f64> {
     const CLEARLY: f64 = 0.02;
     let Some(axis) = w.try_normalize(1e-12) else { return w };
@@ -125,10 +126,12 @@ impl ToolCurve {
 
     /// The arc from `X0` through `via` to `X1`; further or less far if `angle` (rad) is given.
     ///
-    /// The orientation turns evenly in the world, or in axes that turn with the tangent, and is that of `X1` at the point of
-    /// `X1`; it passes through `via_rotation` if given. In axes that turn with the tangent there are two ways round: the tool
-    /// takes the one nearer to following the tangent or to keeping its orientation. So equal orientations at both ends of half
-    /// a circle stay as they are. An arc backwards (negative `angle`) turns the orientation backwards.
+    /// The orientation turns evenly in the world, or in axes that turn with the tangent, and is
+    /// that of `X1` at the point of `X1`; it passes through `via_rotation` if given. In axes that
+    /// turn with the tangent there are two ways round: the tool takes the one nearer to following
+    /// the tangent or to keeping its orientation. So equal orientations at both ends of half a
+    /// circle stay as they are. An arc backwards (negative `angle`) turns the orientation
+    /// backwards.
     ///
     /// # Errors
     /// [`ArcError`]: the points are no circle.
@@ -171,7 +174,8 @@ impl ToolCurve {
         Ok(Self { position, rotation, length })
     }
 
-    /// The quintic in position and rotation vector that has both jets at its ends, `length` apart in `s`.
+    /// The quintic in position and rotation vector that has both jets at its ends, `length` apart
+    /// in `s`.
     pub fn between(a: &ToolJet, b: &ToolJet, length: f64) -> Self {
         let part = |v: &Vector6<f64>, row: usize| Vector3::new(v[row], v[row + 1], v[row + 2]);
         let (Ra, Rb) = (a.X.rotation.into_inner(), b.X.rotation.into_inner());
@@ -305,7 +309,8 @@ mod tests {
             assert_derivatives(&line, 1e-7)?;
         }
 
-        /// Truth: every point is as far from the centre as the three given ones, and the target is met.
+        /// Truth: every point is as far from the centre as the three given ones, and the target is
+        /// met.
         #[test]
         fn an_arc_passes_its_three_points_at_one_distance_from_its_centre(
             a in prop::array::uniform6(-1.0..1.0f64), b in prop::array::uniform6(-1.0..1.0f64),
@@ -380,8 +385,8 @@ mod tests {
     }
 
     proptest! {
-        /// Truth: the tool keeps its orientation. Where rounded ends differ, what is turned grows by (a/2) / sin(a/2) at most, 21
-        /// at the largest angle a.
+        /// Truth: the tool keeps its orientation. Where rounded ends differ, what is turned grows
+        /// by (a/2) / sin(a/2) at most, 21 at the largest angle a.
         #[test]
         fn a_tool_that_is_told_the_same_orientation_at_both_ends_of_an_arc_does_not_turn(
             angle in prop_oneof![Just(std::f64::consts::PI), 3.1..3.2f64, 0.3..6.0f64],
@@ -418,7 +423,8 @@ mod tests {
         }
     }
 
-    /// Truth: backwards over three quarters is forwards over one: the end is the same place, turned back by three quarters.
+    /// Truth: backwards over three quarters is forwards over one: the end is the same place, turned
+    /// back by three quarters.
     #[test]
     fn an_arc_backwards_turns_the_orientation_backwards() {
         let quarter = std::f64::consts::FRAC_PI_2;

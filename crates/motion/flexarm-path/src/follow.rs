@@ -1,12 +1,14 @@
-//! Joints along a path of the tool: values and two derivatives by the parameter, by continuation from where the path begins.
+//! Joints along a path of the tool: values and two derivatives by the parameter, by continuation
+//! from where the path begins.
 //!
 //! ```text
 //! J q' = V,    J q'' = A - J' q',    V, A: derivatives of the tool's pose by s
 //! ```
-//! From one point to the next the joints are predicted by their Taylor polynomial and corrected by Newton's method; steps are
-//! halved where the two disagree, so that the branch of the inverse kinematics is kept. An arm with fewer than six joints
-//! follows paths that it can follow (least squares, and a check); of an arm with more, joints are held until six are left, or move
-//! as [`ToolWay::guided`] tells.
+//! From one point to the next the joints are predicted by their Taylor polynomial and corrected by
+//! Newton's method; steps are halved where the two disagree, so that the branch of the inverse
+//! kinematics is kept. An arm with fewer than six joints follows paths that it can follow (least
+//! squares, and a check); of an arm with more, joints are held until six are left, or move as
+//! [`ToolWay::guided`] tells.
 //!
 //! Start at [`Follower::start`], then [`Follower::advance`].
 
@@ -70,7 +72,8 @@ pub struct ToolWay {
     pub curve: Box<ToolCurve>,
     /// What follows it.
     pub frame: Frame,
-    /// Joints of a redundant arm that move along it by themselves; the others that it has too many stay.
+    /// Joints of a redundant arm that move along it by themselves; the others that it has too many
+    /// stay.
     pub guided: Vec<GuidedJoint>,
 }
 
@@ -94,7 +97,8 @@ pub struct Blocked {
     pub sigma: f64,
     /// Joint that would have to turn fastest there.
     pub joint: String,
-    /// Whether the tool could not be followed because the arm has too few joints for its orientation or position.
+    /// Whether the tool could not be followed because the arm has too few joints for its
+    /// orientation or position.
     pub too_few_joints: bool,
 }
 
@@ -122,8 +126,8 @@ pub fn coordinates_of(model: &Model, frame: &Frame) -> Vec<usize> {
 }
 
 impl<'m> Follower<'m> {
-    /// For a frame of a model, at joint values from which the joints to hold are chosen: of an arm with more than six joints,
-    /// those without which the rest moves the tool best.
+    /// For a frame of a model, at joint values from which the joints to hold are chosen: of an arm
+    /// with more than six joints, those without which the rest moves the tool best.
     ///
     /// * `q`: all independent coordinates.
     /// * `hold`: a joint that stays in any case, of an arm with more than six.
@@ -183,7 +187,8 @@ impl<'m> Follower<'m> {
         x.iter().all(|x| x.is_finite()).then_some(x)
     }
 
-    /// Joint values at which the frame has the pose, from values near by; `None` if Newton's method does not arrive.
+    /// Joint values at which the frame has the pose, from values near by; `None` if Newton's method
+    /// does not arrive.
     fn correct(&mut self, X_WT: &Pose, q: &mut DVector<f64>) -> Option<()> {
         let mut last = f64::INFINITY;
         for _ in 0..CORRECTIONS {
@@ -263,7 +268,8 @@ impl<'m> Follower<'m> {
         self.scaled(&self.active).singular_values().min()
     }
 
-    /// Values and derivatives where a way begins at `s`, from joint values that bring the tool there or near.
+    /// Values and derivatives where a way begins at `s`, from joint values that bring the tool
+    /// there or near.
     ///
     /// # Errors
     /// [`Blocked`]: the pose is not met near these values, or the arm is singular there.

@@ -1,5 +1,5 @@
-//! The least time of a route within the jerks of its joints. They bound every joint: one of which none is told raises its
-//! acceleration to its bound in a given time.
+//! The least time of a route within the jerks of its joints. They bound every joint: one of which
+//! none is told raises its acceleration to its bound in a given time.
 
 use crate::jerk_law::{QuinticLaw, least_time_with_jerks};
 use crate::limits::Limits;

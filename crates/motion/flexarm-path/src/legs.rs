@@ -15,7 +15,8 @@ const NO_WAY: f64 = 1e-12;
 /// Length that a radian counts in a joint move that does not move the tool, m.
 const JOINT_LENGTH: f64 = 0.5;
 
-/// Part of a joint's speed and acceleration that it may use for a better posture while the tool moves.
+/// Part of a joint's speed and acceleration that it may use for a better posture while the tool
+/// moves.
 const PART: f64 = 0.2;
 /// Speed of the tool where the program tells none, m/s.
 const SPEED: f64 = 0.5;
@@ -257,8 +258,9 @@ impl<'m> Legs<'m> {
         Ok(follower.advance(way, 0.0, &begun, way.curve.length())?.q)
     }
 
-    /// How the joints that are left over move along a way so that it ends as the rule of the options wants, or part of the way
-    /// there; and the joints at its end. None without a rule, or if nothing better is found.
+    /// How the joints that are left over move along a way so that it ends as the rule of the
+    /// options wants, or part of the way there; and the joints at its end. None without a rule, or
+    /// if nothing better is found.
     fn guided(
         &mut self,
         of: &Move,
@@ -292,7 +294,8 @@ impl<'m> Legs<'m> {
         None
     }
 
-    /// How far a joint may go by itself along a way without slowing the tool: a fifth of its speed and acceleration.
+    /// How far a joint may go by itself along a way without slowing the tool: a fifth of its speed
+    /// and acceleration.
     fn room(&self, of: &Move, k: usize, length: f64) -> f64 {
         // Largest derivatives of the quintic from rest to rest over its length.
         const RATE: f64 = 1.875;
@@ -329,7 +332,8 @@ impl<'m> Legs<'m> {
     }
 }
 
-/// Moves from `k` on that are knots of one spline: same tool and base kinds of moves that follow each other.
+/// Moves from `k` on that are knots of one spline: same tool and base kinds of moves that follow
+/// each other.
 pub(crate) fn spline_group(items: &[Item], k: usize) -> Vec<&Move> {
     let knot = |item: &'_ Item| matches!(item, Item::Move(of) if of.kind == MoveKind::Spline);
     let mut group: Vec<&Move> = Vec::new();
@@ -347,7 +351,8 @@ pub(crate) fn spline_group(items: &[Item], k: usize) -> Vec<&Move> {
     group
 }
 
-/// The natural cubic spline through positions over their chords, orientations with continuous rates.
+/// The natural cubic spline through positions over their chords, orientations with continuous
+/// rates.
 fn spline_curves(poses: &[Pose]) -> Vec<ToolCurve> {
     let p: Vec<Vector3<f64>> = poses.iter().map(|X| X.translation.vector).collect();
     let h: Vec<f64> = p.windows(2).map(|pair| (pair[1] - pair[0]).norm()).collect();

@@ -1,7 +1,8 @@
-//! Motions that are told by the path of a tool: a program of moves, the geometry between its targets, the joints along it,
-//! and the time law.
+//! Motions that are told by the path of a tool: a program of moves, the geometry between its
+//! targets, the joints along it, and the time law.
 //!
-//! * [`program`]: what a robot program or a motion file asks for, as values: moves, targets, frames, speeds, blends.
+//! * [`program`]: what a robot program or a motion file asks for, as values: moves, targets,
+//!   frames, speeds, blends.
 //!
 //! Not here: text of programs and files, link bending.
 #![allow(non_snake_case, reason = "monogram notation: X_WT, R_AB; see docs/references.md")]

@@ -1,4 +1,5 @@
-//! What holds at the stations of a route: bounds of joints, torques and the tool, and which of them slows a move.
+//! What holds at the stations of a route: bounds of joints, torques and the tool, and which of them
+//! slows a move.
 
 use flexarm_kinematics::{Data, State, inverse_dynamics};
 use nalgebra::{DVector, Vector3, Vector6};
@@ -37,7 +38,8 @@ pub(crate) struct Limits<'a> {
     route: &'a Route,
     arm: &'a ProgramArm<'a>,
     torques: Option<Torques>,
-    /// Accelerations of joints whose jerk is not told rise in this time, s; `None`: no jerk is looked at.
+    /// Accelerations of joints whose jerk is not told rise in this time, s; `None`: no jerk is
+    /// looked at.
     rise: Option<f64>,
 }
 
@@ -102,10 +104,11 @@ impl<'a> Limits<'a> {
         points
     }
 
-    /// By how much a law must be slower to keep all limits at its knots and between them; 1 or more.
+    /// By how much a law must be slower to keep all limits at its knots and between them; 1 or
+    /// more.
     ///
-    /// * `points`: what holds along the route. Where they differ little from each other, or are far from being reached, the limits
-    ///   between them are not looked at.
+    /// * `points`: what holds along the route. Where they differ little from each other, or are far
+    ///   from being reached, the limits between them are not looked at.
     pub(crate) fn slowing(&mut self, law: &Law, points: &[PathPoint]) -> f64 {
         let stations: Vec<f64> = self.route.stations.iter().map(|station| station.s).collect();
         let mut most: f64 = 1.0;
@@ -256,7 +259,8 @@ impl AtStation<'_> {
         }
         if let Some(most) = speed.angular_rad_s.filter(|_| w.norm() > 1e-9) {
             let x = (most / w.norm()).powi(2);
-            // Where the tool travels as well, turning slows the path; where it only turns, it is what was programmed.
+            // Where the tool travels as well, turning slows the path; where it only turns, it is
+            // what was programmed.
             if v.norm() > 1e-9 && speed.linear_m_s.is_some() {
                 self.limit(x, || SlowedBy::Turning);
             } else {

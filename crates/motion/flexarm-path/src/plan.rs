@@ -1,4 +1,5 @@
-//! From a program to joints over time: the public face of the planner, what it is told and what it tells.
+//! From a program to joints over time: the public face of the planner, what it is told and what it
+//! tells.
 
 use flexarm_kinematics::{ControllerAxes, Frame, Model, NullSpaceRule};
 use flexarm_spatial::Pose;
@@ -25,8 +26,8 @@ pub struct JointBounds {
     pub acceleration: f64,
     /// N m or N of the rigid arm, positive; `None`: not looked at.
     pub torque: Option<f64>,
-    /// rad/s³ or m/s³, positive. Where it is told of some joint, the accelerations of the others rise to their bounds in
-    /// [`PathOptions::rise_s`] or more.
+    /// rad/s³ or m/s³, positive. Where it is told of some joint, the accelerations of the others
+    /// rise to their bounds in [`PathOptions::rise_s`] or more.
     pub jerk: Option<f64>,
 }
 
@@ -39,8 +40,8 @@ pub struct PathOptions {
     pub chord_m: f64,
     /// Accelerations rise and fall in this time, s; 0: they jump.
     pub rise_s: f64,
-    /// What an arm with more joints than the path needs does with them: it moves them along towards the posture of this rule; they
-    /// stay without it.
+    /// What an arm with more joints than the path needs does with them: it moves them along towards
+    /// the posture of this rule; they stay without it.
     pub rule: Option<NullSpaceRule>,
 }
 
@@ -78,8 +79,9 @@ pub struct ProgramArm<'m> {
 /// ```text
 /// q = zero + sense a + factor a_other
 /// ```
-/// where `a` is the value of the axis and `a_other` that of an axis before it: arms whose third axis is driven by a rod count
-/// it against the horizontal and not against the link that carries it.
+/// where `a` is the value of the axis and `a_other` that of an axis before it: arms whose third
+/// axis is driven by a rod count it against the horizontal and not against the link that carries
+/// it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ControllerAxis {
     /// 1 or -1.
@@ -105,7 +107,8 @@ impl ProgramArm<'_> {
         }
     }
 
-    /// Values of the controller's axes for all coordinates: the inverse of [`ProgramArm::set_axes`].
+    /// Values of the controller's axes for all coordinates: the inverse of
+    /// [`ProgramArm::set_axes`].
     pub fn axis_values(&self, q: &DVector<f64>) -> Vec<f64> {
         let mut values: Vec<f64> = Vec::with_capacity(self.axes.len());
         for (n, &k) in self.axes.iter().enumerate() {
@@ -117,8 +120,8 @@ impl ProgramArm<'_> {
         values
     }
 
-    /// Zeros and senses of six joints, for words that speak of the controller's axes. What is measured against another axis
-    /// decides none of them.
+    /// Zeros and senses of six joints, for words that speak of the controller's axes. What is
+    /// measured against another axis decides none of them.
     pub(crate) fn controller_axes(&self, joints: [usize; 6]) -> ControllerAxes {
         let of = |k: usize| {
             let n = self.axes.iter().position(|&axis| axis == k);
@@ -296,7 +299,8 @@ pub fn plan(program: &Program, arm: &ProgramArm<'_>, options: &PathOptions) -> R
     if moving.len() != 7 {
         return plan_holding(program, arm, options, None);
     }
-    // Of seven joints one stays while the tool follows its path: the best at the start, or the first with which the path can be run.
+    // Of seven joints one stays while the tool follows its path: the best at the start, or the
+    // first with which the path can be run.
     let first = plan_holding(program, arm, options, None);
     if !matches!(first, Err(PathError::Blocked { .. })) {
         return first;
@@ -305,7 +309,8 @@ pub fn plan(program: &Program, arm: &ProgramArm<'_>, options: &PathOptions) -> R
     others.into_iter().find(Result::is_ok).unwrap_or(first)
 }
 
-/// The same with a joint that stays on paths of the tool; `None`: the one without which the rest moves the tool best.
+/// The same with a joint that stays on paths of the tool; `None`: the one without which the rest
+/// moves the tool best.
 fn plan_holding(
     program: &Program,
     arm: &ProgramArm<'_>,

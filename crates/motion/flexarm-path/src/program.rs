@@ -1,12 +1,13 @@
-//! What a robot program asks for, as values: moves one after the other, with every frame, speed and blend resolved.
+//! What a robot program asks for, as values: moves one after the other, with every frame, speed and
+//! blend resolved.
 //!
-//! A reader of some language fills a [`Program`]; nothing in it depends on the language but [`Configuration`], by which each
-//! maker of robots names the branch of the inverse kinematics.
+//! A reader of some language fills a [`Program`]; nothing in it depends on the language but
+//! [`Configuration`], by which each maker of robots names the branch of the inverse kinematics.
 //!
 //! Units: m, rad, s, m/s, rad/s, m/s², rad/s², m/s³.
 //!
-//! Frames: W world of the controller (where its robot stands, ROS's `base`), B base or work object of a move, F flange of
-//! the controller (ROS's `tool0`), T tool.
+//! Frames: W world of the controller (where its robot stands, ROS's `base`), B base or work object
+//! of a move, F flange of the controller (ROS's `tool0`), T tool.
 
 use flexarm_spatial::Pose;
 use nalgebra::Vector3;
@@ -18,7 +19,8 @@ pub struct Program {
     pub name: String,
     /// What is done, in order; loops are unrolled.
     pub items: Vec<Item>,
-    /// What a user should know: defaults that were assumed, statements that have no effect on the motion.
+    /// What a user should know: defaults that were assumed, statements that have no effect on the
+    /// motion.
     pub notes: Vec<Note>,
 }
 
@@ -72,30 +74,35 @@ pub struct Move {
 pub enum MoveKind {
     /// All joints together, straight in joint space (PTP, `MoveJ`, `movej`, G0 of a robot).
     Joint,
-    /// The tool centre point on a straight line, its orientation turned evenly about one axis (LIN, `MoveL`, `movel`, G1).
+    /// The tool centre point on a straight line, its orientation turned evenly about one axis (LIN,
+    /// `MoveL`, `movel`, G1).
     Line,
     /// On a circle through three points (CIRC, `MoveC`, `movec`, G2, G3).
     Arc {
         /// A point of the circle between the ends, in base B, m.
         via: Vector3<f64>,
-        /// Orientation at that point, which is passed through; `None`: the orientation turns evenly from end to end.
+        /// Orientation at that point, which is passed through; `None`: the orientation turns evenly
+        /// from end to end.
         via_rotation: Option<nalgebra::Rotation3<f64>>,
-        /// Angle travelled, rad, positive in the sense start, via, end; `None`: up to the target. Where it is given, the target
-        /// is a third point of the circle, and the orientation turns on evenly with the angle.
+        /// Angle travelled, rad, positive in the sense start, via, end; `None`: up to the target.
+        /// Where it is given, the target is a third point of the circle, and the orientation turns
+        /// on evenly with the angle.
         angle: Option<f64>,
-        /// Is the orientation told relative to the tangent of the circle (KUKA's `#PATH`, ABB's `\PathFrame`)? Then it goes
-        /// evenly, relative to the tangent, from that of the start to that of the target.
+        /// Is the orientation told relative to the tangent of the circle (KUKA's `#PATH`, ABB's
+        /// `\PathFrame`)? Then it goes evenly, relative to the tangent, from that of the start to
+        /// that of the target.
         turns_with_path: bool,
     },
-    /// Smoothly through the target without stopping, as a knot of a spline that neighbouring moves of this kind make together
-    /// (SPL in a SPLINE block).
+    /// Smoothly through the target without stopping, as a knot of a spline that neighbouring moves
+    /// of this kind make together (SPL in a SPLINE block).
     Spline,
 }
 
 /// Where a move ends.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Target {
-    /// Joint values, rad or m, in the controller's order (A1, A2, ...), further joints of the robot stay.
+    /// Joint values, rad or m, in the controller's order (A1, A2, ...), further joints of the robot
+    /// stay.
     Joints(Vec<f64>),
     /// Pose of the tool in base B, `X_BT`, and which of the inverse kinematics' solutions.
     Pose {
@@ -114,24 +121,25 @@ pub enum Configuration {
     Nearest,
     /// The one nearest to these joint values, rad or m.
     Near(Vec<f64>),
-    /// KUKA's status and turn. Status: bit 0 wrist centre behind axis 1, bit 1 elbow (axis 3 positive, less the angle of the
-    /// forearm's offset), bit 2 axis 5 negative; bits 3 and 4 do not name a branch. Turn: bit k set if axis k+1 is negative.
+    /// KUKA's status and turn. Status: bit 0 wrist centre behind axis 1, bit 1 elbow (axis 3
+    /// positive, less the angle of the forearm's offset), bit 2 axis 5 negative; bits 3 and 4 do
+    /// not name a branch. Turn: bit k set if axis k+1 is negative.
     Kuka {
         /// Bits of S; `None`: not told.
         status: Option<u8>,
         /// Bits of T; `None`: not told.
         turn: Option<u8>,
     },
-    /// ABB's confdata: quarter turns of axes 1, 4 and 6 (floor of the angle over 90 degrees), and the configuration number cfx
-    /// (0 to 7).
+    /// ABB's confdata: quarter turns of axes 1, 4 and 6 (floor of the angle over 90 degrees), and
+    /// the configuration number cfx (0 to 7).
     Abb {
         /// Quadrants of axes 1, 4, 6.
         quadrants: [i32; 3],
         /// `cfx`.
         cfx: i32,
     },
-    /// Words: wrist centre before or behind axis 1, elbow up or down, wrist not flipped or flipped (axis 5 negative); what is
-    /// not told is the nearest.
+    /// Words: wrist centre before or behind axis 1, elbow up or down, wrist not flipped or flipped
+    /// (axis 5 negative); what is not told is the nearest.
     Words {
         /// Wrist centre before axis 1.
         front: Option<bool>,
@@ -142,7 +150,8 @@ pub enum Configuration {
     },
 }
 
-/// How fast a move is run. What is `None` has no bound of its own: the robot's limits and the options of the time law rule.
+/// How fast a move is run. What is `None` has no bound of its own: the robot's limits and the
+/// options of the time law rule.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Speed {
     /// Tool centre point along its path, m/s; of joint moves as well.
@@ -173,16 +182,19 @@ pub enum Blend {
     /// The tool stops exactly at the target.
     #[default]
     Stop,
-    /// The corner is left out within this distance of the tool centre point from the target, m (C_DIS, zonedata, `r=`).
+    /// The corner is left out within this distance of the tool centre point from the target, m
+    /// (C_DIS, zonedata, `r=`).
     Distance(f64),
-    /// The corner is left out over this part of the shorter neighbour, 0 to 0.5 of its length (C_PTP, `APO_DIST` in percent).
+    /// The corner is left out over this part of the shorter neighbour, 0 to 0.5 of its length
+    /// (C_PTP, `APO_DIST` in percent).
     Fraction(f64),
-    /// The corner is left from where the speed would fall below this part of the programmed one while braking, 0 to 1
-    /// (C_VEL).
+    /// The corner is left from where the speed would fall below this part of the programmed one
+    /// while braking, 0 to 1 (C_VEL).
     Velocity(f64),
-    /// The corner is left out from where the orientation is within this angle of the target's, rad (C_ORI).
+    /// The corner is left out from where the orientation is within this angle of the target's, rad
+    /// (C_ORI).
     Orientation(f64),
-    /// The tool passes the target without stopping and without leaving the path (`fine` off with the tangents in line; G-code
-    /// in exact path mode).
+    /// The tool passes the target without stopping and without leaving the path (`fine` off with
+    /// the tangents in line; G-code in exact path mode).
     Pass,
 }

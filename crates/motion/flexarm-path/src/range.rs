@@ -1,4 +1,5 @@
-//! Numbers of a program are finite and inside of what a robot can do, which bounds the work of planning.
+//! Numbers of a program are finite and inside of what a robot can do, which bounds the work of
+//! planning.
 
 use flexarm_spatial::Pose;
 use flexarm_trajectory::LONGEST;

@@ -53,7 +53,8 @@ pub(crate) struct Piece {
     pub(crate) stations: [usize; 2],
     /// The tool's derivatives at the stations; empty for joint moves.
     pub(crate) tool: Vec<ToolJet>,
-    /// Way of the tool for each unit of the parameter (m/m) at the stations of a joint move whose tool has a programmed speed.
+    /// Way of the tool for each unit of the parameter (m/m) at the stations of a joint move whose
+    /// tool has a programmed speed.
     pub(crate) travel: Vec<f64>,
     /// Least singular value and its parameter from the start of the route.
     pub(crate) least_sigma: Option<(f64, f64)>,
@@ -86,7 +87,8 @@ struct Stretch {
 }
 
 impl Route {
-    /// Routes of legs between which the program does not stop; a corner that cannot be passed is a stop after all.
+    /// Routes of legs between which the program does not stop; a corner that cannot be passed is a
+    /// stop after all.
     pub(crate) fn all(
         owner: &mut Legs<'_>,
         legs: Vec<Leg>,
@@ -130,7 +132,8 @@ impl Route {
         Ok(route)
     }
 
-    /// Joints at a parameter of the interval between station `k` and the next, with their third derivative.
+    /// Joints at a parameter of the interval between station `k` and the next, with their third
+    /// derivative.
     pub(crate) fn joints(&self, k: usize, s: f64) -> (JointJet, DVector<f64>) {
         let (a, b) = (&self.stations[k], &self.stations[k + 1]);
         let from = JointJet { q: a.q.clone(), d: a.d.clone(), dd: a.after.clone() };
@@ -241,7 +244,8 @@ fn blend_reach(owner: &mut Legs<'_>, a: &Leg, b: &Leg) -> [f64; 2] {
     }
 }
 
-/// Parameter from the end (or from the start) of a leg at which the tool is `distance` from the corner.
+/// Parameter from the end (or from the start) of a leg at which the tool is `distance` from the
+/// corner.
 fn leave(owner: &mut Legs<'_>, leg: &Leg, distance: f64, at_end: bool) -> f64 {
     // A tool that only turns leaves its pose by an angle that counts as a length.
     let travels = match &leg.way {
@@ -275,7 +279,8 @@ fn from_corner(owner: &mut Legs<'_>, leg: &Leg, most: f64, at_end: bool, away: i
     first_beyond(leg.length, most, |s| away(&pose(s), &corner))
 }
 
-/// The first parameter at which `away` reaches `distance`, or `length`: a coarse search, then bisection.
+/// The first parameter at which `away` reaches `distance`, or `length`: a coarse search, then
+/// bisection.
 fn first_beyond(length: f64, distance: f64, mut away: impl FnMut(f64) -> f64) -> f64 {
     const COARSE: usize = 64;
     let Some(k) = (1..=COARSE).find(|&k| away(length * k as f64 / COARSE as f64) >= distance) else { return length };
@@ -320,7 +325,8 @@ fn stretches(owner: &mut Legs<'_>, legs: &[Leg], taken: &[[f64; 2]]) -> Result<V
     Ok(stretches)
 }
 
-/// Joints that move by themselves on a blend: between what they do at both of its ends; `corner`: joints where both ways meet.
+/// Joints that move by themselves on a blend: between what they do at both of its ends; `corner`:
+/// joints where both ways meet.
 fn guided_between(a: (&ToolWay, f64), b: (&ToolWay, f64), corner: &DVector<f64>) -> Vec<GuidedJoint> {
     let at = |(way, s): (&ToolWay, f64), k: usize| {
         let found = way.guided.iter().find(|joint| joint.k == k);
@@ -401,8 +407,8 @@ fn straight(way: &Way, [from, to]: [f64; 2], options: &PathOptions) -> Vec<(f64,
 
 type Walked = (Vec<(f64, JointJet)>, (f64, f64));
 
-/// Joints along a curve of the tool at points so near that the quintics between them keep to the curve; the least singular
-/// value with its parameter.
+/// Joints along a curve of the tool at points so near that the quintics between them keep to the
+/// curve; the least singular value with its parameter.
 fn walk(
     follower: &mut Follower<'_>,
     way: &ToolWay,

@@ -159,7 +159,8 @@ impl<'r> Schedule<'r> {
         self.law.duration() * self.stretch
     }
 
-    /// As [`Self::write`], slowed so that the curves through the knots keep the speeds and accelerations of the joints.
+    /// As [`Self::write`], slowed so that the curves through the knots keep the speeds and
+    /// accelerations of the joints.
     pub(crate) fn write_within(
         &mut self,
         arm: &ProgramArm<'_>,
@@ -331,7 +332,8 @@ impl<'r> Schedule<'r> {
         matches!(self.law, Timing::Bounded(_))
     }
 
-    /// Are the jerks of a quintic over time those along the path at a moment, where they are bounded?
+    /// Are the jerks of a quintic over time those along the path at a moment, where they are
+    /// bounded?
     fn keeps_jerk(&self, t: f64, jerk: &DVector<f64>) -> bool {
         let Timing::Bounded(bounded) = &self.law else { return true };
         let truth = self.jerks(t);
@@ -427,7 +429,8 @@ impl<'r> Schedule<'r> {
         self.time_of(self.route.stations[k].s)
     }
 
-    /// Part of the programmed speed that a limit of the robot leaves at a station, where it is at that limit.
+    /// Part of the programmed speed that a limit of the robot leaves at a station, where it is at
+    /// that limit.
     fn part(&self, k: usize, t: f64) -> Option<(f64, SlowedBy)> {
         let cap = self.caps[k].as_ref()?;
         let programmed = self.programmed[k];
@@ -439,7 +442,8 @@ impl<'r> Schedule<'r> {
     }
 }
 
-/// By how much the quintics through knots must be slower to keep the speeds and accelerations of the joints; 1 if they do.
+/// By how much the quintics through knots must be slower to keep the speeds and accelerations of
+/// the joints; 1 if they do.
 fn slowing(knots: &[Knot], arm: &ProgramArm<'_>) -> Result<f64, TrajectoryError> {
     let peaks = through(arm.model, knots)?.peak();
     let ratio = |(peak, bounds): (&JointPeak, &JointBounds)| {

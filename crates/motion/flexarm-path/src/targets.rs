@@ -8,8 +8,8 @@ use crate::legs::{Legs, Start, spline_group};
 use crate::plan::{PathError, PathOptions, ProgramArm};
 use crate::program::{Configuration, Item, Move, MoveKind, Program, Target};
 
-/// Joints at the target of each item, whether a blend lets the tool pass it or not; none of dwells, and of arcs with a told
-/// angle, which do not end at their target.
+/// Joints at the target of each item, whether a blend lets the tool pass it or not; none of dwells,
+/// and of arcs with a told angle, which do not end at their target.
 ///
 /// # Errors
 /// As [`crate::plan`].
@@ -61,7 +61,8 @@ pub fn base_of(arm: &ProgramArm<'_>, of: &Move) -> Pose {
     arm.X_MW * of.X_WB
 }
 
-/// The target with which a move ends at joint values, told as the old one is: axis values, or a pose with its branch.
+/// The target with which a move ends at joint values, told as the old one is: axis values, or a
+/// pose with its branch.
 pub fn target_at(arm: &ProgramArm<'_>, of: &Move, q: &DVector<f64>) -> Target {
     if let Target::Joints(old) = &of.to {
         let mut values = arm.axis_values(q);

@@ -1,5 +1,5 @@
-//! Least durations within joint speeds, accelerations and jerks against a nonlinear program over time
-//! (`tools/golden_jerk.py`), and without jerks against TOPP-RA (`tools/golden_toppra.py`).
+//! Least durations within joint speeds, accelerations and jerks against a nonlinear program over
+//! time (`tools/golden_jerk.py`), and without jerks against TOPP-RA (`tools/golden_toppra.py`).
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 
 use std::path::Path;
@@ -30,7 +30,8 @@ fn place(rates: &[[f64; 3]], joints: &[Joint]) -> Place {
     Place { x_max, bounds, jerks }
 }
 
-/// The least time of a path over 0 to 1 whose derivatives are told at a parameter of an interval between stations.
+/// The least time of a path over 0 to 1 whose derivatives are told at a parameter of an interval
+/// between stations.
 fn fastest(stations: &[f64], joints: &[Joint], rates: &dyn Fn(usize, f64) -> Vec<[f64; 3]>) -> QuinticLaw {
     let last = stations.len() - 2;
     let point = |(k, s): (usize, &f64)| {

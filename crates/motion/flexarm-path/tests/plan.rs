@@ -1,4 +1,5 @@
-//! Programs of moves as motions: the tool keeps to its path everywhere, and speeds and accelerations to their bounds.
+//! Programs of moves as motions: the tool keeps to its path everywhere, and speeds and
+//! accelerations to their bounds.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
@@ -212,7 +213,8 @@ fn a_line_past_a_singular_pose_keeps_the_limits_that_are_checked_with_and_withou
         ];
         arm.bounds = vec![JointBounds { velocity: 100.0, acceleration: 1e4, torque: None, jerk: None }; 6];
         let free = plan(&program(items.clone()), &arm, &PathOptions::default()).unwrap();
-        // Each joint may move at 1/2.6 of the speed that the line asks for, and at half of the acceleration.
+        // Each joint may move at 1/2.6 of the speed that the line asks for, and at half of the
+        // acceleration.
         for (bounds, peak) in arm.bounds.iter_mut().zip(free.trajectory.peak()) {
             bounds.velocity = peak.velocity.value.abs().max(0.1) / 2.6;
             bounds.acceleration = peak.acceleration.value.abs().max(1.0) / 2.0;
@@ -513,7 +515,8 @@ fn a_redundant_arm_goes_to_the_posture_of_its_rule_without_leaving_its_path() {
     let (held, guided) = (run(None), run(Some(rule.clone())));
     let samples = joints_over_time(&guided, 4001);
 
-    // Beyond the blend the tool is on its lines, and turns as without the rule, for both ways of the tool are the same.
+    // Beyond the blend the tool is on its lines, and turns as without the rule, for both ways of
+    // the tool are the same.
     let way = [X0, X1, X2].map(|X| X.translation.vector);
     let far = |p: &Vector3<f64>| (p - way[1]).norm() > 0.031;
     let (mut off, mut turned) = (0.0_f64, 0.0_f64);
@@ -551,8 +554,9 @@ fn a_redundant_arm_goes_to_the_posture_of_its_rule_without_leaving_its_path() {
     assert!(guided.trajectory.duration() < 1.02 * held.trajectory.duration());
 }
 
-/// An arm of the usual kind: upright, two parallel axes, a spherical wrist. Joint k turns about `senses[k]` times its axis and
-/// is at `zeros[k]` where that of the arm with senses 1 and zeros 0 is at zero.
+/// An arm of the usual kind: upright, two parallel axes, a spherical wrist. Joint k turns about
+/// `senses[k]` times its axis and is at `zeros[k]` where that of the arm with senses 1 and zeros 0
+/// is at zero.
 fn industrial_arm(senses: [f64; 6], zeros: [f64; 6]) -> Model {
     let mut arm = Mechanism::new("six");
     arm.links.push(Link { name: "base".into(), inertia: None });
@@ -594,8 +598,8 @@ fn arm_of<'m>(model: &'m Model, controller: Vec<ControllerAxis>) -> ProgramArm<'
     }
 }
 
-/// Truth: the same program on the arm whose joints are the axes. Off by 3.7e-8 m or rad along the whole motion, as far as the
-/// iterations of the time law go; bound 1e-6.
+/// Truth: the same program on the arm whose joints are the axes. Off by 3.7e-8 m or rad along the
+/// whole motion, as far as the iterations of the time law go; bound 1e-6.
 #[test]
 fn an_arm_with_other_zeros_and_senses_runs_a_program_as_the_arm_whose_joints_are_the_axes() {
     let (senses, zeros) = ([-1.0, 1.0, -1.0, -1.0, 1.0, -1.0], [0.4, -1.2, 1.5, 0.3, -0.2, 2.0]);
@@ -650,7 +654,8 @@ fn an_arm_with_other_zeros_and_senses_runs_a_program_as_the_arm_whose_joints_are
     }
 }
 
-/// Truth: the direction of the forearm. Where axis 3 is counted against the horizontal, axis 2 alone does not tilt it.
+/// Truth: the direction of the forearm. Where axis 3 is counted against the horizontal, axis 2
+/// alone does not tilt it.
 #[test]
 fn an_axis_that_is_counted_against_the_horizontal_keeps_the_forearm_level_while_the_one_before_moves() {
     let model = industrial_arm([1.0; 6], [0.0; 6]);
@@ -668,7 +673,8 @@ fn an_axis_that_is_counted_against_the_horizontal_keeps_the_forearm_level_while_
     assert!(tilted < 1e-12, "{tilted:.1e}");
 }
 
-/// Truth: the joints that the targets were made of, with blends, knots of a spline and coupled axes of the controller.
+/// Truth: the joints that the targets were made of, with blends, knots of a spline and coupled axes
+/// of the controller.
 #[test]
 fn joints_at_targets_are_those_that_the_targets_were_made_of_and_make_them_again() {
     let cell = Cell::new();

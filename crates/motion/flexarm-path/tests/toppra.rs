@@ -52,7 +52,8 @@ fn the_least_time_of_random_splines_is_that_of_toppra() {
     assert!(worst < 2e-3, "{worst:.1e}"); // measured 1.3e-5
 }
 
-/// Truth: the same with 4000 intervals. Bounds at both ends of 400 undivided intervals cost 0.32 to 0.68 %.
+/// Truth: the same with 4000 intervals. Bounds at both ends of 400 undivided intervals cost 0.32 to
+/// 0.68 %.
 #[test]
 fn a_coarse_grid_makes_the_least_time_no_longer() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../tests/golden/toppra.json");

@@ -1,4 +1,5 @@
-//! Robot programs as they come from controllers, read into moves: KUKA KRL, ABB RAPID, URScript and G-code.
+//! Robot programs as they come from controllers, read into moves: KUKA KRL, ABB RAPID, URScript and
+//! G-code.
 //!
 //! ```
 //! use flexarm_path::program::{Item, MoveKind};
@@ -20,10 +21,12 @@
 //! # Ok::<(), flexarm_programs::ProgramError>(())
 //! ```
 //!
-//! A reader runs the program: variables are computed, loops counted, routines called. What cannot change the motion is passed
-//! and noted; what could and is not understood is an error with file, line, column and statement. Units are converted here.
+//! A reader runs the program: variables are computed, loops counted, routines called. What cannot
+//! change the motion is passed and noted; what could and is not understood is an error with file,
+//! line, column and statement. Units are converted here.
 //!
-//! Modules: one per language, and `common` with expressions, statements and the machine that runs them.
+//! Modules: one per language, and `common` with expressions, statements and the machine that runs
+//! them.
 //!
 //! Not here: how the moves are planned ([`flexarm_path`]), what robot runs them.
 #![allow(non_snake_case, reason = "monogram notation: X_WB, X_FT, R_BT; see docs/references.md")]
@@ -76,15 +79,16 @@ pub enum ProgramError {
 
 /// The moves of a robot program.
 ///
-/// * `path`: of the file, for messages, and where its companions are ([`ReadOptions::find_companions`]).
+/// * `path`: of the file, for messages, and where its companions are
+///   ([`ReadOptions::find_companions`]).
 /// * `bytes`: what is in it, UTF-8 or Latin-1.
 ///
 /// Angles of the program are rad, lengths m, whatever its language writes.
 ///
 /// # Errors
-/// [`ProgramError::Unknown`] if no language is recognised; [`ProgramError::Statement`] at the first statement that cannot be
-/// read, that depends on what only the controller knows, or whose effect on the motion is not known here;
-/// [`ProgramError::NoMoves`] if nothing moves.
+/// [`ProgramError::Unknown`] if no language is recognised; [`ProgramError::Statement`] at the first
+/// statement that cannot be read, that depends on what only the controller knows, or whose effect
+/// on the motion is not known here; [`ProgramError::NoMoves`] if nothing moves.
 pub fn read_program(path: &Path, bytes: &[u8], options: &ReadOptions<'_>) -> Result<Program, ProgramError> {
     read_recorded(path, bytes, options).map(|(recorded, ..)| recorded.program)
 }

@@ -31,7 +31,8 @@ impl Language {
     }
 }
 
-/// Pose `X_WF` of the flange in the controller's world for joint values (rad or m); `None` if they are not as many as the robot has.
+/// Pose `X_WF` of the flange in the controller's world for joint values (rad or m); `None` if they
+/// are not as many as the robot has.
 pub type ForwardKinematics<'a> = &'a dyn Fn(&[f64]) -> Option<Pose>;
 
 /// What a reader is told beside the file; all may stay as it is.
@@ -39,16 +40,18 @@ pub type ForwardKinematics<'a> = &'a dyn Fn(&[f64]) -> Option<Pose>;
 pub struct ReadOptions<'a> {
     /// The language; `None`: recognised by the content.
     pub language: Option<Language>,
-    /// Routine with which the program starts; `None`: what the language says (`main`, the first `DEF`).
+    /// Routine with which the program starts; `None`: what the language says (`main`, the first
+    /// `DEF`).
     pub entry: Option<String>,
     /// Joint values at the start, rad or m; with them a program may begin with a line.
     pub start: Option<Vec<f64>>,
-    /// Names and values that the file leaves open, in its language: `("BASE_DATA[1]", "{X 1000, Y 0, Z 500, A 0, B 0, C 0}")`,
-    /// `("di1", "1")`.
+    /// Names and values that the file leaves open, in its language:
+    /// `("BASE_DATA[1]", "{X 1000, Y 0, Z 500, A 0, B 0, C 0}")`, `("di1", "1")`.
     pub given: Vec<(String, String)>,
     /// Further files of the program with their bytes: KUKA's `$config.dat`, other modules.
     pub companions: Vec<(PathBuf, Vec<u8>)>,
-    /// Look beside the file for what belongs to it: KUKA's `.dat`, and `.src` of routines that it calls.
+    /// Look beside the file for what belongs to it: KUKA's `.dat`, and `.src` of routines that it
+    /// calls.
     pub find_companions: bool,
     /// Waiting for the outside (`WAIT FOR`, `WaitDI`) is taken as over at once.
     pub waits_are_over: bool,
@@ -108,32 +111,33 @@ pub enum Rotary {
     /// They are refused, unless they are 0.
     #[default]
     Refused,
-    /// The tool is turned about the axes of the work frame: `R_BT = Rz(C) Ry(B) Rx(A) R`, with `R` the orientation at
-    /// A = B = C = 0.
+    /// The tool is turned about the axes of the work frame: `R_BT = Rz(C) Ry(B) Rx(A) R`, with `R`
+    /// the orientation at A = B = C = 0.
     Tilt,
 }
 
 /// What G-code leaves to the machine.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GCodeOptions {
-    /// Orientation of the tool in the work frame, `R_BT`; by itself its z axis points against the work frame's z, its x axis
-    /// along the work frame's x.
+    /// Orientation of the tool in the work frame, `R_BT`; by itself its z axis points against the
+    /// work frame's z, its x axis along the work frame's x.
     pub R_BT: Rotation3<f64>,
     /// How A, B and C are understood.
     pub rotary: Rotary,
-    /// Work frames in the controller's world, by their code: `("G54", X_WB)`; those that are not told are where the robot
-    /// stands, which is noted.
+    /// Work frames in the controller's world, by their code: `("G54", X_WB)`; those that are not
+    /// told are where the robot stands, which is noted.
     pub offsets: Vec<(String, Pose)>,
     /// Frame of the machine coordinates (G53) in the controller's world.
     pub machine: Pose,
-    /// Where the tool is in the work frame at the start, mm; coordinates that are told neither here nor in the first move are
-    /// 0, which is noted.
+    /// Where the tool is in the work frame at the start, mm; coordinates that are told neither here
+    /// nor in the first move are 0, which is noted.
     pub start_mm: Option<[f64; 3]>,
     /// Point to which G28 goes, in machine coordinates, mm; `None`: G28 is refused. G30 likewise.
     pub reference_mm: Option<[f64; 3]>,
     /// Rapids (G0) are straight lines at this speed, m/s; `None`: they are joint moves.
     pub rapid_m_s: Option<f64>,
-    /// The tool centre point is the tip of the tool, so that G43 with a tool length changes nothing. `false`: G43 is refused.
+    /// The tool centre point is the tip of the tool, so that G43 with a tool length changes
+    /// nothing. `false`: G43 is refused.
     pub tip_is_known: bool,
     /// `P` of G4 is in milliseconds, not in seconds.
     pub dwell_in_ms: bool,

@@ -1,7 +1,9 @@
-//! A program with other targets: the numbers of their literals are replaced, everything else stays as it is written.
+//! A program with other targets: the numbers of their literals are replaced, everything else stays
+//! as it is written.
 //!
-//! Start at [`read_program_text`]. A target can be replaced where it is a literal (`{X 1000, ...}`, `[[1000, ...], ...]`), in the
-//! statement or assigned to a variable that it names; what is computed, relative or indexed has no place of its own.
+//! Start at [`read_program_text`]. A target can be replaced where it is a literal (`{X 1000, ...}`,
+//! `[[1000, ...], ...]`), in the statement or assigned to a variable that it names; what is
+//! computed, relative or indexed has no place of its own.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -19,9 +21,11 @@ use crate::common::value::Value;
 use crate::common::{Span, Text};
 use crate::{Language, ProgramError, ReadOptions, krl, rapid, read_recorded};
 
-/// Digits behind the point: mm, degrees, parts of quaternions. Nothing is lost by them that a controller would notice.
+/// Digits behind the point: mm, degrees, parts of quaternions. Nothing is lost by them that a
+/// controller would notice.
 const DIGITS: [usize; 3] = [4, 6, 9];
-/// Values from several visits of one literal that differ by less than so many units of the last digit are one value.
+/// Values from several visits of one literal that differ by less than so many units of the last
+/// digit are one value.
 const SAME: f64 = 2.5;
 /// The controller's own file, which other programs use as well.
 const CONFIGURATION: &str = "$config.dat";
@@ -31,7 +35,8 @@ const CONFIGURATION: &str = "$config.dat";
 pub enum NewTarget {
     /// Values of the controller's axes (rad or m).
     Joints(Vec<f64>),
-    /// Pose `X_BT`, with the branch of the inverse kinematics; as much of the branch is written as the old target tells.
+    /// Pose `X_BT`, with the branch of the inverse kinematics; as much of the branch is written as
+    /// the old target tells.
     Pose {
         /// `X_BT`.
         X_BT: Pose,
@@ -91,8 +96,8 @@ impl ProgramText {
 
     /// The files with other targets, their lines as they were.
     ///
-    /// * `targets`: of some items (by number among those of the program) where they are to go, and auxiliary points of circles, in
-    ///   the base B (m).
+    /// * `targets`: of some items (by number among those of the program) where they are to go, and
+    ///   auxiliary points of circles, in the base B (m).
     /// * `comment`: one line for the head of each file that changes, plain letters.
     ///
     /// A literal that several moves use must become the same for all of them; otherwise it stays.
@@ -333,7 +338,8 @@ fn put(edits: &mut Edits, old: &Expr, value: f64, digits: usize) -> Result<(), &
     Ok(())
 }
 
-/// A number with so many digits, without zeros at the end; one digit stays behind the point unless none is asked for.
+/// A number with so many digits, without zeros at the end; one digit stays behind the point unless
+/// none is asked for.
 fn number(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$}");
     if digits == 0 {

@@ -1,4 +1,5 @@
-//! Whatever stands in a file: its language is recognised, no text makes a reader panic or run for ever.
+//! Whatever stands in a file: its language is recognised, no text makes a reader panic or run for
+//! ever.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 mod common;

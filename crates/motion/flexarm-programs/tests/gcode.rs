@@ -52,7 +52,8 @@ fn whole_circles_and_helices_are_arcs_that_stay_on_them() {
     assert!((via_mm(circle[1]) - Vector3::new(5.0, 45.0, -1.0)).norm() < 1e-12);
     assert!((Vector3::from(place_mm(circle[1])) - Vector3::new(0.0, 50.0, -1.0)).norm() < 1e-12);
 
-    // A helix of one turn, 2 mm down: each arc through three points is within 1 um of x = 5 - 5 cos u, z = -1 - u / pi.
+    // A helix of one turn, 2 mm down: each arc through three points is within 1 um of x = 5 - 5 cos
+    // u, z = -1 - u / pi.
     let helix = on_line(16);
     let point = |u: f64| Vector3::new(5.0 - 5.0 * u.cos(), 50.0 - 5.0 * u.sin(), -1.0 - u / std::f64::consts::PI);
     let count = helix.len();
@@ -95,14 +96,16 @@ fn planes_radii_units_and_times_follow_the_standard() {
     assert_relative_eq!(at(20).speed.linear_m_s.unwrap(), 10.0 * 0.0254 / 60.0, max_relative = 1e-15);
     assert_eq!(at(22).speed.duration_s, Some(30.0)); // G93 F2: half a minute
 
-    // G18: I and K; from z to x is counterclockwise, seen from y. A negative radius takes the longer way.
+    // G18: I and K; from z to x is counterclockwise, seen from y. A negative radius takes the
+    // longer way.
     let text =
         "G21 G61 G18 F600\nG0 X0 Y5 Z10\nG3 X10 Z0 I0 K-10\nG17\nG3 X0 Y-5 R-10\nG90.1\nG19\nG3 Y5 Z10 J-5 K10\nM2\n";
     let program = read_text("a.nc", text, &ReadOptions::default()).unwrap();
     let moves = moves(&program);
     let side = 10.0 * std::f64::consts::FRAC_1_SQRT_2;
     assert!((via_mm(moves[1]) - Vector3::new(side, 5.0, side)).norm() < 1e-12);
-    // From (10, 5) to (0, -5) with radius 10, the longer way counterclockwise: the centre is (0, 5), three quarters.
+    // From (10, 5) to (0, -5) with radius 10, the longer way counterclockwise: the centre is (0,
+    // 5), three quarters.
     assert!((via_mm(moves[2]) - Vector3::new(-side, 5.0 + side, 0.0)).norm() < 1e-12);
     // Absolute centre (y -5, z 10) of radius 10: a quarter, from (y -5, z 0) to (y 5, z 10).
     assert!((via_mm(moves[3]) - Vector3::new(0.0, -5.0 + side, 10.0 - side)).norm() < 1e-12);
@@ -135,7 +138,8 @@ fn work_frames_offsets_and_tilts_are_those_of_the_options() {
     assert_relative_eq!(place_mm(moves[5])[0], 7.0, max_relative = 1e-12);
 }
 
-/// Truth: a place of the tool at the start, which the kinematics tell; what a line leaves out stays.
+/// Truth: a place of the tool at the start, which the kinematics tell; what a line leaves out
+/// stays.
 #[test]
 fn from_joint_values_at_the_start_rapids_at_a_speed_are_lines_from_where_the_tool_is() {
     let start = at_mm(40.0, 30.0, 80.0, Rotation3::identity());

@@ -1,4 +1,5 @@
-//! KUKA KRL: values of fixtures against products of rotation matrices written out and numbers worked out by hand.
+//! KUKA KRL: values of fixtures against products of rotation matrices written out and numbers
+//! worked out by hand.
 #![allow(non_snake_case, reason = "X_WB: a pose")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
@@ -80,7 +81,8 @@ fn what_a_target_leaves_out_stays_and_relative_moves_add() {
 fn frames_are_seen_from_the_left_one_and_tool_moves_follow_the_tool() {
     let program = read("shapes.src", &ReadOptions::default());
     let moves = moves(&program);
-    // The tool points down (C = 180): -20 along its z is 20 upwards, a turn of 30 about it is -30 about the base's z.
+    // The tool points down (C = 180): -20 along its z is 20 upwards, a turn of 30 about it is -30
+    // about the base's z.
     let R = euler_product(-30.0, 0.0, 0.0) * euler_product(0.0, 0.0, 180.0);
     assert_pose(&pose(moves[9]), &at_mm(160.0, 0.0, 70.0, R));
     assert_pose(&pose(moves[10]), &at_mm(160.0, 0.0, 50.0, R)); // 20 along the tool: downwards

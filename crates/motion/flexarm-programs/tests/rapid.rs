@@ -1,4 +1,5 @@
-//! ABB RAPID: values of a fixture against rotation matrices of quaternions written out and numbers worked out by hand.
+//! ABB RAPID: values of a fixture against rotation matrices of quaternions written out and numbers
+//! worked out by hand.
 #![allow(non_snake_case, reason = "X_WB: a pose")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 

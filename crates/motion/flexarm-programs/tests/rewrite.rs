@@ -106,7 +106,8 @@ fn literals_of_krl_and_of_its_data_list_are_replaced_in_their_lines() {
         moves(&old).iter().map(|m| m.line).collect::<Vec<_>>(),
         moves(&new).iter().map(|m| m.line).collect::<Vec<_>>()
     );
-    // Coordinates that stayed are told now, because those before moved; branches that were not told are not.
+    // Coordinates that stayed are told now, because those before moved; branches that were not told
+    // are not.
     assert!(text.contains("LIN {Z 1194.0, X 1503.0, Y -3.0, A "), "{text}");
     // The auxiliary point.
     assert!(text.contains("CIRC {X 1400.0, Y 200.0, Z 1000.0}"), "{text}");

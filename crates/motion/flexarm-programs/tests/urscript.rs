@@ -1,4 +1,5 @@
-//! URScript: values of a fixture against Rodrigues' formula written out and numbers worked out by hand.
+//! URScript: values of a fixture against Rodrigues' formula written out and numbers worked out by
+//! hand.
 #![allow(non_snake_case, reason = "X_WB: a pose")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
@@ -53,7 +54,8 @@ fn an_arc_of_mode_1_turns_the_tool_with_the_circle() {
 
 #[test]
 fn functions_of_poses_follow_the_manual() {
-    // pose_add adds places and lets turns follow each other; the inverse undoes; interpolation is even.
+    // pose_add adds places and lets turns follow each other; the inverse undoes; interpolation is
+    // even.
     let text = "a = p[0.1, 0.2, 0.3, 0.4, 0, 0]\nb = p[0.01, 0.02, 0.03, 0, 0.5, 0]\nmovej(pose_add(a, b))\n\
         movel(pose_trans(pose_inv(a), pose_trans(a, b)))\nmovel(interpolate_pose(a, p[0.3, 0.2, 0.3, 1.2, 0, 0], 0.25))\n\
         r = rpy2rotvec([0.1, 0.2, 0.3])\nmovel(p[0, 0, 0.5, r[0], r[1], r[2]])\nb[2] = 0.7\nmovel(b)\nx = (2 + 4) / 3 - 5 % 3\nsleep(x + 0.5)\n\

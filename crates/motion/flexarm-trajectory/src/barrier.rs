@@ -1,4 +1,5 @@
-//! The convex programs of [`crate::jerk_law`]: a cubic spline of least time within its bounds, by an interior-point method.
+//! The convex programs of [`crate::jerk_law`]: a cubic spline of least time within its bounds, by
+//! an interior-point method.
 #![allow(non_snake_case, reason = "letters of the formulas")]
 
 use crate::jerk_law::{Place, QuinticLaw};
@@ -20,7 +21,8 @@ const PARTS: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 const GAUSS: [(f64, f64); 3] =
     [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
 
-/// Moments, speeds and accelerations at the nodes of a law that is improved, as [`QuinticLaw::improved`] tells.
+/// Moments, speeds and accelerations at the nodes of a law that is improved, as
+/// [`QuinticLaw::improved`] tells.
 pub(crate) fn improved(
     law: &QuinticLaw,
     gap: [f64; 2],
@@ -88,8 +90,8 @@ impl Spline {
         Self { knots }
     }
 
-    /// Values, halves of the first and halves of the second derivatives at `theta` of the four splines of interval `k`
-    /// [de Boor 1978].
+    /// Values, halves of the first and halves of the second derivatives at `theta` of the four
+    /// splines of interval `k` [de Boor 1978].
     fn at(&self, k: usize, theta: f64) -> [[f64; 4]; 3] {
         let (K, m) = (&self.knots, k + 3);
         // Knots under spline i of degree p.

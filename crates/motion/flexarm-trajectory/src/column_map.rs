@@ -14,8 +14,9 @@ use std::str::FromStr;
 pub struct ColumnMap {
     /// Column of the time.
     pub time: Option<String>,
-    /// Joints and their columns. Each column is the whole name in the header, the name without its unit, a name with another
-    /// unit in brackets behind it (`A1[deg]`), or a number from 1 (`#2[rad]`).
+    /// Joints and their columns. Each column is the whole name in the header, the name without its
+    /// unit, a name with another unit in brackets behind it (`A1[deg]`), or a number from 1
+    /// (`#2[rad]`).
     pub joints: Vec<(String, String)>,
 }
 

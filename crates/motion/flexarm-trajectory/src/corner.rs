@@ -1,8 +1,10 @@
-//! Corners of sampled positions: where the velocity jumps from one sample to the next, as distinct from curvature.
+//! Corners of sampled positions: where the velocity jumps from one sample to the next, as distinct
+//! from curvature.
 //!
-//! Between samples the position has the slopes s; over a sample they change by `d_i = s_i - s_(i-1)`. Smooth data share
-//! their changes among neighbours, noise and rounding change sign from sample to sample. A corner stands alone: at a
-//! sample it is in one d, between two samples in two of the same sign, whose shares tell where it lies.
+//! Between samples the position has the slopes s; over a sample they change by
+//! `d_i = s_i - s_(i-1)`. Smooth data share their changes among neighbours, noise and rounding
+//! change sign from sample to sample. A corner stands alone: at a sample it is in one d, between
+//! two samples in two of the same sign, whose shares tell where it lies.
 //!
 //! Start at [`corners`]. Not here: what a spline does with them, and velocities that a file gives.
 
@@ -13,8 +15,9 @@ const AROUND: usize = 4;
 const LEAST_AROUND: usize = 2;
 /// Smaller jumps are left to the spline, as parts of the top speed.
 const SMALLEST: f64 = 1e-4;
-/// Samples on either side over which rounded data must differ from a smooth curve, in steps of the rounding. Half a step is
-/// what rounding leaves; a corner of one step per sample leaves 3/32 of the window, 1.1 over the shorter one.
+/// Samples on either side over which rounded data must differ from a smooth curve, in steps of the
+/// rounding. Half a step is what rounding leaves; a corner of one step per sample leaves 3/32 of
+/// the window, 1.1 over the shorter one.
 const WINDOWS: [usize; 2] = [16, 12];
 const BEYOND_ROUNDING: f64 = 1.0;
 /// A corner nearer to a sample than this part of the interval is at the sample.
@@ -41,7 +44,8 @@ pub(crate) fn corners(t: &[f64], q: &[f64]) -> Vec<Corner> {
     // Accelerations at the inner samples.
     let span = |i: usize| 0.5 * (t[i + 1] - t[i - 1]);
     let change = |i: usize| slope[i] - slope[i - 1];
-    // What is ordinary around the samples `i..=j`, as an acceleration; unknown where too few samples are near.
+    // What is ordinary around the samples `i..=j`, as an acceleration; unknown where too few
+    // samples are near.
     let around = |i: usize, j: usize| {
         let (left, right) = (i.saturating_sub(AROUND).max(1)..i, j + 1..last.min(j + 1 + AROUND));
         let enough = left.len() >= LEAST_AROUND && right.len() >= LEAST_AROUND;
@@ -57,7 +61,8 @@ pub(crate) fn corners(t: &[f64], q: &[f64]) -> Vec<Corner> {
     };
 
     let resolution = resolution(q);
-    // Whether a cubic, rounded, would give the same samples: then what stands out is a step of the rounding.
+    // Whether a cubic, rounded, would give the same samples: then what stands out is a step of the
+    // rounding.
     let is_rounding = |i: usize| {
         resolution > 0.0
             && WINDOWS.iter().any(|window| {
@@ -95,8 +100,8 @@ pub(crate) fn corners(t: &[f64], q: &[f64]) -> Vec<Corner> {
     corners
 }
 
-/// The step that all positions are multiples of, but for an offset: decimals of a table, counts of an encoder. 0 when
-/// there is none that matters.
+/// The step that all positions are multiples of, but for an offset: decimals of a table, counts of
+/// an encoder. 0 when there is none that matters.
 fn resolution(q: &[f64]) -> f64 {
     let differences = || q.windows(2).map(|pair| (pair[1] - pair[0]).abs());
     let least = 1e-5 * differences().fold(0.0, f64::max);
@@ -178,7 +183,8 @@ mod tests {
         }
     }
 
-    /// Accelerations that jump, fast curvature, coarse data, rounding to five digits, noise: no corner in any of them.
+    /// Accelerations that jump, fast curvature, coarse data, rounding to five digits, noise: no
+    /// corner in any of them.
     #[test]
     fn smooth_and_rough_data_have_no_corners() {
         let trapezoid = |t: f64| if t < 0.3 { 5.0 * t * t } else { 0.45 + 3.0 * (t - 0.3) };

@@ -8,13 +8,16 @@
 //! 0.01,0.1,-0.2,10.0,-20.0
 //! ```
 //!
-//! * The first line that is neither blank nor a comment names the columns: `time` in s, one column per joint, and
-//!   optionally `<joint>.vel` and `<joint>.acc`. Columns are separated by commas and may come in any order.
-//! * Lines that start with `#` are comments. Three of them mean something: `# unit: rad` (the default) or
-//!   `# unit: deg` for all joint columns, with `deg/s` and `deg/s²` for velocities and accelerations;
-//!   `# metres: joint_x, joint_y` names prismatic joints, whose columns are in m whatever the unit; `# time: s`.
+//! * The first line that is neither blank nor a comment names the columns: `time` in s, one column
+//!   per joint, and optionally `<joint>.vel` and `<joint>.acc`. Columns are separated by commas and
+//!   may come in any order.
+//! * Lines that start with `#` are comments. Three of them mean something: `# unit: rad` (the
+//!   default) or `# unit: deg` for all joint columns, with `deg/s` and `deg/s²` for velocities and
+//!   accelerations; `# metres: joint_x, joint_y` names prismatic joints, whose columns are in m
+//!   whatever the unit; `# time: s`.
 //! * Times must increase; the first one becomes `t = 0`. Steps may vary.
-//! * Between the rows the joints follow quintic splines; [`crate::Samples::interpolate`] tells how, by what is given.
+//! * Between the rows the joints follow quintic splines; [`crate::Samples::interpolate`] tells how,
+//!   by what is given.
 //!
 //! Not here: the splines. Start at [`Trajectory::parse_csv`].
 
@@ -36,8 +39,8 @@ impl Trajectory {
     /// * `origin`: file name for messages.
     ///
     /// # Errors
-    /// [`TrajectoryError::File`] with the line, the number of the column where it matters, what was found and how to
-    /// mend it.
+    /// [`TrajectoryError::File`] with the line, the number of the column where it matters, what was
+    /// found and how to mend it.
     pub fn parse_csv(text: &str, origin: &str) -> Result<Self, TrajectoryError> {
         parse(text.trim_start_matches('\u{feff}')).map_err(|Located { line, column, problem, more_lines }| {
             let (origin, problem) = (origin.to_owned(), *problem);
@@ -84,7 +87,8 @@ fn parse(text: &str) -> Result<Trajectory, Located> {
     let mut rows: Vec<(usize, Vec<f64>)> = Vec::new();
     let (mut repeated, mut wrong): (usize, Option<Located>) = (0, None);
     for record in reader.records() {
-        // The text is UTF-8 and rows may differ in length, so the reader has nothing left to complain about.
+        // The text is UTF-8 and rows may differ in length, so the reader has nothing left to
+        // complain about.
         let record = record.map_err(|_| nowhere(Problem::NotUtf8))?;
         let line = record.position().map_or(0, |position| line_of(text, position));
         if record.iter().all(str::is_empty) && record.len() <= 1 {
@@ -117,8 +121,8 @@ fn parse(text: &str) -> Result<Trajectory, Located> {
     Ok(if repeated > 0 { trajectory.with_note(Warning::RepeatedRows { count: repeated }) } else { trajectory })
 }
 
-/// Line of a record, from 1. The position that the reader gives lies before the blank and comment lines that it
-/// skipped to get to the record.
+/// Line of a record, from 1. The position that the reader gives lies before the blank and comment
+/// lines that it skipped to get to the record.
 fn line_of(text: &str, position: &csv::Position) -> usize {
     let rest = text.get(position.byte() as usize..).unwrap_or_default();
     let skipped = rest.lines().take_while(|line| line.is_empty() || line.starts_with('#')).count();
@@ -241,7 +245,8 @@ fn placed(error: TrajectoryError, samples: &Samples, header: &Header, rows: &[(u
     }
 }
 
-/// Adds a note for each joint whose values look like degrees in a file that does not state its unit.
+/// Adds a note for each joint whose values look like degrees in a file that does not state its
+/// unit.
 fn with_doubts(trajectory: Trajectory, samples: &Samples, units: &Units) -> Trajectory {
     if units.degrees.is_some() {
         return trajectory;

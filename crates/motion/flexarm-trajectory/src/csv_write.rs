@@ -11,8 +11,9 @@ use crate::trajectory::Trajectory;
 const MOST_ROWS: f64 = 1e8;
 
 impl Trajectory {
-    /// Writes positions, velocities and accelerations in SI units: a row every `1 / rate_hz` s from `t = 0`, and one
-    /// at the end. Numbers are written in full, so that reading gives back the same values.
+    /// Writes positions, velocities and accelerations in SI units: a row every `1 / rate_hz` s from
+    /// `t = 0`, and one at the end. Numbers are written in full, so that reading gives back the
+    /// same values.
     ///
     /// # Errors
     /// [`TrajectoryError::BadRate`] or [`TrajectoryError::Write`].

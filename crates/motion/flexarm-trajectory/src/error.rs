@@ -1,7 +1,8 @@
-//! Everything that can be wrong with a trajectory: where, what was found, what was expected, how to mend it.
+//! Everything that can be wrong with a trajectory: where, what was found, what was expected, how to
+//! mend it.
 //!
-//! Each error is one line through `Display` and a plain enum for programs. A [`FileError`] adds file, line and
-//! column to a [`Problem`]; the others have no place in a file.
+//! Each error is one line through `Display` and a plain enum for programs. A [`FileError`] adds
+//! file, line and column to a [`Problem`]; the others have no place in a file.
 
 use std::fmt;
 use std::io;
@@ -80,7 +81,8 @@ pub enum TrajectoryError {
         /// What was given, s.
         seconds: f64,
     },
-    /// A sampling rate that is not positive and finite, or that would give more than 100 million rows.
+    /// A sampling rate that is not positive and finite, or that would give more than 100 million
+    /// rows.
     #[error(
         "sampling rate {rate_hz} Hz is not possible for {duration_s} s of motion; give a positive rate that makes at most 100 million rows"
     )]

@@ -16,12 +16,12 @@ impl Trajectory {
     /// Reads a trajectory file: `.csv` holds samples ([`Trajectory::parse_csv`]), `.toml` waypoints
     /// ([`Trajectory::parse_toml`]).
     ///
-    /// * `limits`: what is known about the robot's joints, by name; used by waypoints without a duration. Joints
-    ///   may be missing and need not occur in the file.
+    /// * `limits`: what is known about the robot's joints, by name; used by waypoints without a
+    ///   duration. Joints may be missing and need not occur in the file.
     ///
     /// # Errors
-    /// [`TrajectoryError::Read`], [`TrajectoryError::UnknownExtension`], or [`TrajectoryError::File`] with line and
-    /// column of what is wrong in the file.
+    /// [`TrajectoryError::Read`], [`TrajectoryError::UnknownExtension`], or
+    /// [`TrajectoryError::File`] with line and column of what is wrong in the file.
     pub fn from_path(path: &Path, limits: &[(&str, JointLimits)]) -> Result<Self, TrajectoryError> {
         let extension = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
         if extension != "csv" && extension != "toml" {
@@ -68,7 +68,8 @@ pub fn text_of_file(path: &Path) -> Result<String, TrajectoryError> {
     text_of_bytes(bytes_of_file(path)?, &path.display().to_string())
 }
 
-/// The text of a file: UTF-8; UTF-16 where the file begins with its mark, as spreadsheets write it; or Windows-1252.
+/// The text of a file: UTF-8; UTF-16 where the file begins with its mark, as spreadsheets write it;
+/// or Windows-1252.
 ///
 /// * `origin`: file name for messages.
 ///
@@ -94,7 +95,8 @@ pub fn text_of_bytes(bytes: Vec<u8>, origin: &str) -> Result<String, TrajectoryE
     })
 }
 
-/// The text of bytes that are not UTF-8 from the first special letter on, without control characters.
+/// The text of bytes that are not UTF-8 from the first special letter on, without control
+/// characters.
 fn windows_1252(bytes: &[u8]) -> Option<String> {
     /// Letters of the bytes 0x80 to 0x9f; 0 where there is none.
     const SPECIAL: &str = "€\0‚ƒ„…†‡ˆ‰Š‹Œ\0Ž\0\0‘’“”•–—˜™š›œ\0žŸ";

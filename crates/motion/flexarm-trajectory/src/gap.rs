@@ -9,14 +9,16 @@ const GAP: f64 = 4.0;
 const LEAST_STEPS: usize = 10;
 /// Longer usual steps, s, are those of waypoints and not of samples.
 const LONGEST_STEP: f64 = 0.1;
-/// Least part of the steps that is within a factor of two of their median where data are sampled evenly.
+/// Least part of the steps that is within a factor of two of their median where data are sampled
+/// evenly.
 const EVEN: f64 = 0.75;
 
 /// The gaps in samples, if they were taken evenly.
 ///
-/// The usual step is the median. Data whose steps vary by more than jitter have no usual step, and those of slow steps are
-/// waypoints. A joint that is at the same place on both sides of a long step may rest there, so that is no gap. Neither is a
-/// sample that comes late and is followed by others in quick succession: none is missing.
+/// The usual step is the median. Data whose steps vary by more than jitter have no usual step, and
+/// those of slow steps are waypoints. A joint that is at the same place on both sides of a long
+/// step may rest there, so that is no gap. Neither is a sample that comes late and is followed by
+/// others in quick succession: none is missing.
 ///
 /// * `times`: s from the first sample, increasing.
 pub(crate) fn gaps(times: &[f64], joints: &[JointSamples]) -> Option<Warning> {

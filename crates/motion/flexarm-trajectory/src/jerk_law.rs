@@ -4,17 +4,19 @@
 //! s = sigma(theta),  y = theta'^2,  u = theta'' = y_theta / 2,  w = u_theta
 //! T = int d theta / sqrt(y),   low <= a u + b y <= high,   |a w + b u + c y| <= most / sqrt(y)
 //! ```
-//! Over the parameter `s` itself (`sigma` the identity) the last bound is the jerk of a joint with `a = q'`, `b = 3 q''`,
-//! `c = q'''`. Here the parameter is the time `theta` of a law that runs the path already: then `y` is smooth and not zero, also where
-//! the path begins and ends at rest, and `y = 1` where that law cannot be improved. The bounds keep their form, with
+//! Over the parameter `s` itself (`sigma` the identity) the last bound is the jerk of a joint with
+//! `a = q'`, `b = 3 q''`, `c = q'''`. Here the parameter is the time `theta` of a law that runs the
+//! path already: then `y` is smooth and not zero, also where the path begins and ends at rest, and
+//! `y = 1` where that law cannot be improved. The bounds keep their form, with
 //!
 //! ```text
 //! a -> a v,   b -> b v^2 + 3 a v',   c -> c v^3 + b v v' + a v''      (jerk;  v = d sigma / d theta)
 //! a -> a v,   b -> b v^2 + a v'                                       (bounds that are linear)
 //! ```
-//! `1 / sqrt(y)` is convex: replaced by its tangent it is a bound that is tighter and linear, so that a convex program with ever
-//! new tangents ends at a law that cannot be improved nearby and keeps every bound on the way [Debrouwere et al. 2013]. The steps of
-//! an interior-point method take these tangents as they go. `y` is a cubic spline, so that the jerk is continuous; what its
+//! `1 / sqrt(y)` is convex: replaced by its tangent it is a bound that is tighter and linear, so
+//! that a convex program with ever new tangents ends at a law that cannot be improved nearby and
+//! keeps every bound on the way [Debrouwere et al. 2013]. The steps of an interior-point method
+//! take these tangents as they go. `y` is a cubic spline, so that the jerk is continuous; what its
 //! switches cost falls with the square of the distance of the nodes.
 //!
 //! Start at [`QuinticLaw::improved`]. Not here: which bounds a path has, how nodes are chosen.
@@ -48,7 +50,8 @@ pub struct Place {
 }
 
 impl Place {
-    /// Bounds without jerk and bounds of jerk that a run keeps if it would keep those here so many times slower.
+    /// Bounds without jerk and bounds of jerk that a run keeps if it would keep those here so many
+    /// times slower.
     #[must_use]
     pub fn drawn_in(mut self, [linear, jerk]: [f64; 2]) -> Self {
         let (second, third) = (linear * linear, jerk.powi(3));
@@ -60,9 +63,11 @@ impl Place {
         self
     }
 
-    /// Without bounds that others of the same place imply: joints that go along with one that is nearer to its bound.
+    /// Without bounds that others of the same place imply: joints that go along with one that is
+    /// nearer to its bound.
     ///
-    /// With `a = l a_m` and `|a_m u + b_m x| <= 1`, `x <= X`: `|a u + b x| <= |l| + |b - l b_m| X`; likewise for jerks.
+    /// With `a = l a_m` and `|a_m u + b_m x| <= 1`, `x <= X`: `|a u + b x| <= |l| + |b - l b_m| X`;
+    /// likewise for jerks.
     #[must_use]
     pub fn pruned(mut self) -> Self {
         let X = self.x_max;
@@ -89,7 +94,8 @@ impl Place {
         self
     }
 
-    /// By how much a run must be slower to keep the bounds without jerk and those of jerk: at most 1 where it does.
+    /// By how much a run must be slower to keep the bounds without jerk and those of jerk: at most
+    /// 1 where it does.
     pub fn slowing(&self, at: &Progress) -> [f64; 2] {
         let (x, u, third) = (at.v * at.v, at.a, at.v.powi(3));
         let linear = self.bounds.iter().map(|bound| {
@@ -104,7 +110,8 @@ impl Place {
     }
 }
 
-/// In so many parts of an interval it is looked whether bounds are kept; in the second number where one is near.
+/// In so many parts of an interval it is looked whether bounds are kept; in the second number where
+/// one is near.
 const CHECKED: [usize; 2] = [8, 32];
 /// Nearer than this part of the speed.
 const NEAR: f64 = 0.97;
@@ -113,18 +120,22 @@ const OF_RISE: f64 = 10.0;
 /// Least and most intervals of a route, stations apart.
 const LEAST: f64 = 200.0;
 const MOST: f64 = 30_000.0;
-/// Intervals are so many times longer at first; what is left to gain where each round begins and ends, of the duration.
+/// Intervals are so many times longer at first; what is left to gain where each round begins and
+/// ends, of the duration.
 const ROUNDS: [(f64, [f64; 2]); 2] = [(4.0, [0.1, 1e-3]), (1.0, [1e-2, 1e-5])];
-/// Bounds are drawn in where a run would have to be slower by more than this part to keep them, this often.
+/// Bounds are drawn in where a run would have to be slower by more than this part to keep them,
+/// this often.
 const PASSED: f64 = 1e-4;
 const DRAWN: usize = 3;
 const DRAWN_GAP: [f64; 2] = [1e-3, 1e-5];
 
 /// The least time within bounds that know the jerk; nowhere are they passed.
 ///
-/// * `law`: a law of the same path whose acceleration is continuous and whose speed is zero at both ends alone.
+/// * `law`: a law of the same path whose acceleration is continuous and whose speed is zero at both
+///   ends alone.
 /// * `stations`: parameters from start to end, at which bounds and their derivatives may jump.
-/// * `rise`: time that an acceleration takes from zero to its bound, s: where intervals must be short.
+/// * `rise`: time that an acceleration takes from zero to its bound, s: where intervals must be
+///   short.
 /// * `place`: what holds at a parameter of the interval behind station `k`.
 pub fn least_time_with_jerks(
     law: &Law,
@@ -268,8 +279,8 @@ impl QuinticLaw {
         self
     }
 
-    /// By how much the run must be slower in each interval to keep all bounds, also between the places at which
-    /// [`QuinticLaw::improved`] keeps them; 1 or less where it does.
+    /// By how much the run must be slower in each interval to keep all bounds, also between the
+    /// places at which [`QuinticLaw::improved`] keeps them; 1 or less where it does.
     ///
     /// * `place`: what holds at a parameter of interval `k`.
     pub fn slowing(&self, place: &mut dyn FnMut(usize, f64) -> Place) -> Vec<[f64; 2]> {
@@ -286,11 +297,14 @@ impl QuinticLaw {
             .collect()
     }
 
-    /// The fastest run through the same nodes with a speed that is this one's times the root of a cubic spline over its time;
-    /// this run itself need not keep its bounds. It begins and ends at rest as this one does.
+    /// The fastest run through the same nodes with a speed that is this one's times the root of a
+    /// cubic spline over its time; this run itself need not keep its bounds. It begins and ends at
+    /// rest as this one does.
     ///
-    /// * `place`: what holds at a parameter of interval `k`; a standstill must be allowed everywhere.
-    /// * `gap`: what may be left to gain, of the duration: where the search begins and where it ends.
+    /// * `place`: what holds at a parameter of interval `k`; a standstill must be allowed
+    ///   everywhere.
+    /// * `gap`: what may be left to gain, of the duration: where the search begins and where it
+    ///   ends.
     #[must_use]
     pub fn improved(&self, gap: [f64; 2], place: &mut dyn FnMut(usize, f64) -> Place) -> Self {
         let (t, v, a) = barrier::improved(self, gap, place);
@@ -317,7 +331,8 @@ fn time_of(law: &Law, s: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// One joint that is the parameter, at rest at both ends; its run as a sine, over `n` intervals.
+    /// One joint that is the parameter, at rest at both ends; its run as a sine, over `n`
+    /// intervals.
     fn sine(length: f64, n: usize) -> QuinticLaw {
         let tau = std::f64::consts::TAU;
         let mut law = QuinticLaw::default();
@@ -347,7 +362,8 @@ mod tests {
 
     #[test]
     fn a_straight_path_is_run_as_the_s_curve_of_seven_phases() {
-        // Cruise with constant accelerations; no cruise; jerk alone; no bound of the acceleration; a short rise.
+        // Cruise with constant accelerations; no cruise; jerk alone; no bound of the acceleration;
+        // a short rise.
         let cases = [
             (1.0, [0.5, 2.0, 20.0]),
             (1.0, [10.0, 2.0, 20.0]),

@@ -1,6 +1,7 @@
 //! One move of a plan, from where the move before it ended.
 //!
-//! Start at [`Leg::curves`]: unit shapes (`shape`, or `via` through points on the way) times the way of each joint.
+//! Start at [`Leg::curves`]: unit shapes (`shape`, or `via` through points on the way) times the
+//! way of each joint.
 
 use crate::optimal::JointPath;
 use crate::plan::{MotionLimits, PlannedMove, Profile};
@@ -22,8 +23,8 @@ pub(crate) struct Leg<'a> {
 }
 
 impl Leg<'_> {
-    /// The curve of every joint from time 0 of the move, and how long the move takes. A joint that stays has a
-    /// curve without pieces; one that arrives early has a curve that ends early.
+    /// The curve of every joint from time 0 of the move, and how long the move takes. A joint that
+    /// stays has a curve without pieces; one that arrives early has a curve that ends early.
     pub(crate) fn curves(&self) -> Result<(Vec<Curve>, f64), PlanError> {
         if self.planned.profile == Profile::Optimal {
             return self.fastest_curves();
@@ -87,7 +88,8 @@ impl Leg<'_> {
         }
     }
 
-    /// A move without a duration: every joint in motion needs the limits that its profile is made of.
+    /// A move without a duration: every joint in motion needs the limits that its profile is made
+    /// of.
     fn fastest_shape(&self, moving: &[usize], limits: &ShapeLimits) -> Result<Curve, PlanError> {
         self.require("velocity", moving, |limits| limits.velocity)?;
         match self.planned.profile {
@@ -146,21 +148,24 @@ impl Leg<'_> {
         Ok((unit.iter().map(|curve| curve.stretched(duration)).collect(), duration))
     }
 
-    /// All points from start to goal, what counts as one unit of way of each joint, and the joints that move.
+    /// All points from start to goal, what counts as one unit of way of each joint, and the joints
+    /// that move.
     fn points(&self) -> (Vec<&[f64]>, Vec<f64>, Vec<usize>) {
         let mut points: Vec<&[f64]> = vec![self.from];
         points.extend(self.planned.via.iter().map(Vec::as_slice));
         points.push(&self.planned.to);
         let n = self.joints.len();
         let moving: Vec<usize> = (0..n).filter(|&i| points.iter().any(|point| point[i] != self.from[i])).collect();
-        // A unit of way is what the speed limit allows in a unit of time, where all limits are known.
+        // A unit of way is what the speed limit allows in a unit of time, where all limits are
+        // known.
         let speed = |i: usize| self.planned.limits[i].velocity;
         let weighted = moving.iter().all(|&i| speed(i).is_finite());
         let weights = (0..n).map(|i| if weighted && speed(i).is_finite() { speed(i) } else { 1.0 }).collect();
         (points, weights, moving)
     }
 
-    /// A move along the spline through all points in the least time, or slower if a duration is given.
+    /// A move along the spline through all points in the least time, or slower if a duration is
+    /// given.
     fn fastest_curves(&self) -> Result<(Vec<Curve>, f64), PlanError> {
         let Self { number, planned, .. } = *self;
         let (points, weights, moving) = self.points();
@@ -185,7 +190,8 @@ impl Leg<'_> {
         }
         for ((curve, limits), joint) in curves.iter().zip(&self.planned.limits).zip(self.joints) {
             let [_, acceleration, jerk] = curve.peaks();
-            // The jerk limit shapes S-curves and optimal moves; the other profiles do not promise it.
+            // The jerk limit shapes S-curves and optimal moves; the other profiles do not promise
+            // it.
             let is_jerk_limited = matches!(self.planned.profile, Profile::SCurve | Profile::Optimal);
             let jerk = if is_jerk_limited { jerk } else { 0.0 };
             let checks = [("acceleration", acceleration, limits.acceleration), ("jerk", jerk, limits.jerk)];
@@ -201,7 +207,8 @@ impl Leg<'_> {
 }
 
 impl Curve {
-    /// Appends a part that starts at time `now`, and stays at `goal` from the end of the part until `end`.
+    /// Appends a part that starts at time `now`, and stays at `goal` from the end of the part until
+    /// `end`.
     pub(crate) fn append(&mut self, now: f64, part: &Self, end: f64, goal: f64) {
         self.pieces.extend(&part.pieces);
         self.knots.extend(part.knots[1..].iter().map(|knot| now + knot));

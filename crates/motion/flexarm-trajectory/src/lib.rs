@@ -1,7 +1,8 @@
 //! Joint trajectories `q(t), q̇(t), q̈(t)`: files, splines, point-to-point profiles, limits.
 //!
-//! A [`Trajectory`] is a set of named joints, each a piecewise polynomial of degree five or less. It is built
-//! once, from a file or a [`Plan`], and then only read: [`Trajectory::sample`] allocates nothing.
+//! A [`Trajectory`] is a set of named joints, each a piecewise polynomial of degree five or less.
+//! It is built once, from a file or a [`Plan`], and then only read: [`Trajectory::sample`]
+//! allocates nothing.
 //!
 //! ```
 //! use flexarm_trajectory::{JointLimits, Trajectory};
@@ -38,15 +39,17 @@
 //! Where to look:
 //!
 //! * least times: [`time_law`], and [`jerk_law`] within jerks;
-//! * mathematics: [`Trajectory`] (sampling, time scaling, moves and holds), [`Plan`] (quintic, trapezoid and
-//!   S-curve moves, points passed on the way), [`Samples`] (splines through sampled joint values),
-//!   [`JointPeak`], [`LimitViolation`];
+//! * mathematics: [`Trajectory`] (sampling, time scaling, moves and holds), [`Plan`] (quintic,
+//!   trapezoid and S-curve moves, points passed on the way), [`Samples`] (splines through sampled
+//!   joint values), [`JointPeak`], [`LimitViolation`];
 //! * files: [`Trajectory::from_path`], [`Trajectory::parse_csv`], [`Trajectory::parse_toml`],
-//!   [`Trajectory::to_csv`], [`Trajectory::to_waypoints_toml`], [`Trajectory::parse_table`] for tables of other programs. The module pages [`csv_file`],
-//!   [`waypoints`] and [`table`] describe the formats.
+//!   [`Trajectory::to_csv`], [`Trajectory::to_waypoints_toml`], [`Trajectory::parse_table`] for
+//!   tables of other programs. The module pages [`csv_file`], [`waypoints`] and [`table`] describe
+//!   the formats.
 //!
-//! Units: s, rad, rad/s, rad/s² (m, m/s, m/s² for a prismatic joint) everywhere except inside the files.
-//! Not here: robots, links and inverse kinematics; a trajectory knows its joints by name only.
+//! Units: s, rad, rad/s, rad/s² (m, m/s, m/s² for a prismatic joint) everywhere except inside the
+//! files. Not here: robots, links and inverse kinematics; a trajectory knows its joints by name
+//! only.
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test"))]
 
 mod barrier;

@@ -4,7 +4,8 @@ use std::fmt;
 
 use crate::trajectory::{Curve, Trajectory};
 
-/// A limit counts as passed beyond this part of its value: a move planned at the limit must not violate it.
+/// A limit counts as passed beyond this part of its value: a move planned at the limit must not
+/// violate it.
 const RELATIVE_SLACK: f64 = 1e-9;
 /// The same for limits near zero, rad or m (and their rates).
 const ABSOLUTE_SLACK: f64 = 1e-12;
@@ -82,10 +83,11 @@ impl fmt::Display for LimitViolation {
 }
 
 impl Trajectory {
-    /// Every limit that some joint passes, by joint and then in the order of [`LimitKind`]; empty when all hold.
+    /// Every limit that some joint passes, by joint and then in the order of [`LimitKind`]; empty
+    /// when all hold.
     ///
-    /// Exact extrema of the polynomials are compared, with a slack of 1e-9 relative and 1e-12 absolute, so that a
-    /// move planned at a limit keeps it.
+    /// Exact extrema of the polynomials are compared, with a slack of 1e-9 relative and 1e-12
+    /// absolute, so that a move planned at a limit keeps it.
     ///
     /// * `limits`: one entry per joint, in the order of [`Trajectory::joints`].
     ///

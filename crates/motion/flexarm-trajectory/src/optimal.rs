@@ -1,7 +1,7 @@
 //! A move along a joint spline in the least time within speeds, accelerations and jerks.
 //!
-//! The curve is the natural cubic spline through the points over the length of their chords; [`crate::jerk_law`] says how fast it
-//! is run.
+//! The curve is the natural cubic spline through the points over the length of their chords;
+//! [`crate::jerk_law`] says how fast it is run.
 
 use crate::jerk_law::{JerkBound, Place, least_time_with_jerks};
 use crate::plan::MotionLimits;

@@ -1,6 +1,7 @@
 //! Largest positions, speeds, accelerations and jerks of each joint, with their times.
 //!
-//! Exact: each comes from the roots of the next derivative of each polynomial piece, not from samples.
+//! Exact: each comes from the roots of the next derivative of each polynomial piece, not from
+//! samples.
 
 use crate::trajectory::{Curve, Trajectory};
 
@@ -26,15 +27,17 @@ pub struct JointPeak {
     pub velocity: Extreme,
     /// Acceleration of greatest magnitude, rad/s² or m/s².
     pub acceleration: Extreme,
-    /// Jerk of greatest magnitude within the pieces, rad/s³ or m/s³. A jump of the acceleration is not in it.
+    /// Jerk of greatest magnitude within the pieces, rad/s³ or m/s³. A jump of the acceleration is
+    /// not in it.
     pub jerk: Extreme,
-    /// Largest jump of the acceleration, rad/s² or m/s²: rounding only, unless a trapezoid is unrounded or the
-    /// data are sampled from something that jumps.
+    /// Largest jump of the acceleration, rad/s² or m/s²: rounding only, unless a trapezoid is
+    /// unrounded or the data are sampled from something that jumps.
     pub acceleration_jump: Extreme,
 }
 
 impl Trajectory {
-    /// The largest values of every joint, in the order of [`Trajectory::joints`]; exact up to rounding.
+    /// The largest values of every joint, in the order of [`Trajectory::joints`]; exact up to
+    /// rounding.
     pub fn peak(&self) -> Vec<JointPeak> {
         let peak = |(joint, curve): (&String, &Curve)| {
             let [lower, upper] = curve.range(0);

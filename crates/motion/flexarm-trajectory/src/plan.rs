@@ -1,15 +1,17 @@
 //! Point-to-point planning: moves with a profile and holds between them, made into a trajectory.
 //!
-//! Start at [`Plan::build`]. One move is planned in `leg`, from the unit shapes in `shape` and `via`.
+//! Start at [`Plan::build`]. One move is planned in `leg`, from the unit shapes in `shape` and
+//! `via`.
 //!
-//! **Duration given**: every joint takes it. A quintic needs nothing else. A trapezoid uses the acceleration limit
-//! in its ramps if there is one, otherwise each ramp takes a quarter of the duration; an S-curve uses acceleration
-//! and jerk limit if both are there, otherwise each ramp takes a third, a third of that for either rise. A duration
-//! too short for these limits gets the default ramps and a [`crate::Warning::ShorterThanLimitsAllow`].
+//! **Duration given**: every joint takes it. A quintic needs nothing else. A trapezoid uses the
+//! acceleration limit in its ramps if there is one, otherwise each ramp takes a quarter of the
+//! duration; an S-curve uses acceleration and jerk limit if both are there, otherwise each ramp
+//! takes a third, a third of that for either rise. A duration too short for these limits gets the
+//! default ramps and a [`crate::Warning::ShorterThanLimitsAllow`].
 //!
-//! **No duration**: the move is as fast as the limits allow. Synchronised, all joints follow one common shape (a
-//! straight line in joint space) under the strictest limits; otherwise each joint has a shape of its own and the
-//! move lasts as long as its slowest joint.
+//! **No duration**: the move is as fast as the limits allow. Synchronised, all joints follow one
+//! common shape (a straight line in joint space) under the strictest limits; otherwise each joint
+//! has a shape of its own and the move lasts as long as its slowest joint.
 
 use crate::error::TrajectoryError;
 use crate::leg::Leg;
@@ -23,14 +25,15 @@ pub enum Profile {
     Quintic,
     /// Ramp, cruise, ramp.
     Trapezoid {
-        /// Part of each ramp, 0 to 1, in which the acceleration rises and falls linearly (half of it at either
-        /// side); 0 is the plain trapezoid, whose acceleration jumps.
+        /// Part of each ramp, 0 to 1, in which the acceleration rises and falls linearly (half of
+        /// it at either side); 0 is the plain trapezoid, whose acceleration jumps.
         rounding: f64,
     },
     /// Ramp, cruise, ramp with limited jerk: seven phases.
     SCurve,
-    /// The least time along the spline through the points on the way, within speeds, accelerations and jerks. A joint without
-    /// a limit of its jerk takes 0.05 s or more to reach its acceleration.
+    /// The least time along the spline through the points on the way, within speeds, accelerations
+    /// and jerks. A joint without a limit of its jerk takes 0.05 s or more to reach its
+    /// acceleration.
     Optimal,
 }
 
@@ -63,14 +66,16 @@ pub struct PlannedMove {
     pub hold: f64,
     /// Shape of the move.
     pub profile: Profile,
-    /// Do all joints start and stop together? Matters only without a duration and without points on the way.
+    /// Do all joints start and stop together? Matters only without a duration and without points on
+    /// the way.
     pub synchronised: bool,
     /// One per joint.
     pub limits: Vec<MotionLimits>,
 }
 
 impl PlannedMove {
-    /// A quintic move to the goal within `duration` seconds, without limits, points on the way or hold.
+    /// A quintic move to the goal within `duration` seconds, without limits, points on the way or
+    /// hold.
     pub fn quintic(to: Vec<f64>, duration: f64) -> Self {
         let limits = vec![MotionLimits::UNLIMITED; to.len()];
         let (via, duration, profile) = (Vec::new(), Some(duration), Profile::Quintic);
@@ -93,8 +98,8 @@ impl Plan {
     /// The trajectory that carries out the plan; starts and ends every move at rest.
     ///
     /// # Errors
-    /// [`TrajectoryError::Plan`] when the plan contradicts itself or a limit that it needs is missing;
-    /// [`TrajectoryError::OutOfRange`] when numbers are too extreme for f64.
+    /// [`TrajectoryError::Plan`] when the plan contradicts itself or a limit that it needs is
+    /// missing; [`TrajectoryError::OutOfRange`] when numbers are too extreme for f64.
     pub fn build(&self) -> Result<Trajectory, TrajectoryError> {
         self.check()?;
         let mut curves: Vec<Curve> =

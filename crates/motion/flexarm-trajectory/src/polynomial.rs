@@ -3,8 +3,9 @@
 //! ```text
 //! q(τ) = c0 + c1 τ + c2 τ² + c3 τ³ + c4 τ⁴ + c5 τ⁵,    0 <= τ <= width,   τ in s from the start of the piece
 //! ```
-//! Start at [`Piece::hermite`]; everything else evaluates. Extrema come from the real roots of the next
-//! derivative, isolated between the roots of the derivative after that: no sampling, none is missed.
+//! Start at [`Piece::hermite`]; everything else evaluates. Extrema come from the real roots of the
+//! next derivative, isolated between the roots of the derivative after that: no sampling, none is
+//! missed.
 
 use std::ops::Deref;
 
@@ -62,7 +63,8 @@ impl Piece {
         Self { width: self.width * stretch, c }
     }
 
-    /// Are width and all coefficients finite, the width positive, and the values no farther from 0 than [`FARTHEST`]?
+    /// Are width and all coefficients finite, the width positive, and the values no farther from 0
+    /// than [`FARTHEST`]?
     pub(crate) fn is_sound(&self) -> bool {
         let finite = self.width.is_finite() && self.c.iter().all(|c| c.is_finite());
         self.width > 0.0 && finite && self.c[0].abs() + self.excursion_bound() <= FARTHEST
@@ -78,7 +80,8 @@ impl Piece {
         (1..6).map(|k| self.c[k].abs() * self.width.powi(k as i32)).sum()
     }
 
-    /// Least and greatest value of derivative `order` (0 position ... 3 jerk), exact up to rounding.
+    /// Least and greatest value of derivative `order` (0 position ... 3 jerk), exact up to
+    /// rounding.
     pub(crate) fn range(&self, order: usize) -> Range {
         let value = |u: f64| self.at(u * self.width)[order];
         let (mut least, mut greatest) = ((0.0, value(0.0)), (0.0, value(0.0)));
@@ -101,7 +104,8 @@ impl Piece {
     /// First `τ` at which derivative `order` equals `level`, if any.
     pub(crate) fn first_crossing(&self, order: usize, level: f64) -> Option<f64> {
         let mut p = self.derivative_in_u(order);
-        // The derivative with respect to u = τ / width is width^order times the one with respect to τ.
+        // The derivative with respect to u = τ / width is width^order times the one with respect to
+        // τ.
         p.all[0] -= level * self.width.powi(order as i32);
         roots_in_unit_interval(&p).first().map(|u| u * self.width)
     }
@@ -116,7 +120,8 @@ impl Piece {
     }
 }
 
-/// A few numbers, in place: coefficients of a polynomial of degree five at most, or its roots and the ends of their interval.
+/// A few numbers, in place: coefficients of a polynomial of degree five at most, or its roots and
+/// the ends of their interval.
 #[derive(Clone, Copy, Debug, Default)]
 struct Few {
     all: [f64; 12],
@@ -161,8 +166,8 @@ fn evaluate(p: &[f64], u: f64) -> f64 {
 
 /// The real roots in `0 <= u <= 1` at which `p` changes sign (or vanishes at an end), ascending.
 ///
-/// Between two neighbouring roots of `p'` the polynomial is monotone and has one root at most, so the
-/// recursion over the derivatives finds all of them.
+/// Between two neighbouring roots of `p'` the polynomial is monotone and has one root at most, so
+/// the recursion over the derivatives finds all of them.
 fn roots_in_unit_interval(p: &[f64]) -> Few {
     if p.len() < 2 {
         return Few::default();
@@ -186,7 +191,8 @@ fn roots_in_unit_interval(p: &[f64]) -> Few {
     roots
 }
 
-/// Newton's method kept inside a bracket with a change of sign; halves the bracket where Newton leaves it.
+/// Newton's method kept inside a bracket with a change of sign; halves the bracket where Newton
+/// leaves it.
 fn bracketed_root(p: &[f64], slope: &[f64], mut low: f64, mut high: f64) -> f64 {
     let rising = evaluate(p, low) < 0.0;
     let mut u = 0.5 * (low + high);

@@ -1,4 +1,5 @@
-//! What can be wrong in a file, in samples and in a plan; each says what was found, what was expected, how to mend it.
+//! What can be wrong in a file, in samples and in a plan; each says what was found, what was
+//! expected, how to mend it.
 //!
 //! The place of a problem is in [`crate::FileError`].
 

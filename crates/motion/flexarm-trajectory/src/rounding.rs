@@ -1,7 +1,8 @@
 //! Rounding of corners: a velocity that jumps becomes one that changes within a given time.
 //!
-//! Around each corner a stretch of the curve gives way to one quintic with position, velocity and acceleration of the curve
-//! at both ends. Not here: finding corners (`corner`), ends of the record at speed.
+//! Around each corner a stretch of the curve gives way to one quintic with position, velocity and
+//! acceleration of the curve at both ends. Not here: finding corners (`corner`), ends of the record
+//! at speed.
 
 use crate::error::TrajectoryError;
 use crate::polynomial::Piece;
@@ -9,13 +10,14 @@ use crate::trajectory::{Curve, Trajectory};
 use crate::warning::QUIET_SPEED;
 
 impl Trajectory {
-    /// The same motion with every corner inside it replaced by a quintic blend that lasts `seconds`, less where two
-    /// corners, or a corner and an end, are nearer than that. A joint leaves its curve by up to `|Δv| seconds / 8` and a
-    /// little more; a motion that starts or ends at speed still does.
+    /// The same motion with every corner inside it replaced by a quintic blend that lasts
+    /// `seconds`, less where two corners, or a corner and an end, are nearer than that. A joint
+    /// leaves its curve by up to `|Δv| seconds / 8` and a little more; a motion that starts or ends
+    /// at speed still does.
     ///
     /// # Errors
-    /// [`TrajectoryError::BadRounding`] unless `seconds` is positive and finite; [`TrajectoryError::OutOfRange`] when it is
-    /// so short that numbers are too extreme for f64.
+    /// [`TrajectoryError::BadRounding`] unless `seconds` is positive and finite;
+    /// [`TrajectoryError::OutOfRange`] when it is so short that numbers are too extreme for f64.
     pub fn with_rounded_corners(&self, seconds: f64) -> Result<Self, TrajectoryError> {
         if !(seconds > 0.0 && seconds.is_finite()) {
             return Err(TrajectoryError::BadRounding { seconds });

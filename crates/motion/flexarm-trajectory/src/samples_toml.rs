@@ -91,8 +91,8 @@ pub(crate) fn trajectory(file: &SamplesFileToml) -> Result<Trajectory, Located> 
 }
 
 impl Trajectory {
-    /// Writes any motion as a motion file with positions, velocities and accelerations in SI units: a row every
-    /// `1 / rate_hz` s from `t = 0`, and one at the end. Numbers are written in full.
+    /// Writes any motion as a motion file with positions, velocities and accelerations in SI units:
+    /// a row every `1 / rate_hz` s from `t = 0`, and one at the end. Numbers are written in full.
     ///
     /// # Errors
     /// [`TrajectoryError::BadRate`].

@@ -1,7 +1,8 @@
 //! Shapes of a move: how a way of length 1 is covered from rest to rest.
 //!
-//! A shape is a [`Curve`] `s(t)` from `s(0) = 0` to `s(T) = 1`; a joint that moves by `D` follows `q0 + D s(t)`.
-//! Limits are given per unit of way: a joint with velocity limit `v` that moves by `D` allows `s' <= v / |D|`.
+//! A shape is a [`Curve`] `s(t)` from `s(0) = 0` to `s(T) = 1`; a joint that moves by `D` follows
+//! `q0 + D s(t)`. Limits are given per unit of way: a joint with velocity limit `v` that moves by
+//! `D` allows `s' <= v / |D|`.
 //!
 //! ```text
 //! quintic      s(u) = u³ (10 - 15 u + 6 u²),  u = t / T;  peaks 15/8 1/T, 10/sqrt(3) 1/T², 60 1/T³
@@ -12,8 +13,9 @@
 //!              0 ┼-/          \--------\          /--     T       all of it
 //!                │                      \________/        v = 1 / (T - t_ramp),  a = v / (t_ramp - t_jerk)
 //! ```
-//! Trapezoid and S-curve are both seven-phase: a trapezoid rounds a fixed part of its ramps (`t_jerk = rounding
-//! t_ramp / 2`, none gives jumps of the acceleration), an S-curve rounds by a jerk limit (`t_jerk = a / jerk`).
+//! Trapezoid and S-curve are both seven-phase: a trapezoid rounds a fixed part of its ramps
+//! (`t_jerk = rounding t_ramp / 2`, none gives jumps of the acceleration), an S-curve rounds by a
+//! jerk limit (`t_jerk = a / jerk`).
 
 use crate::polynomial::Piece;
 use crate::trajectory::Curve;
@@ -62,7 +64,8 @@ pub(crate) fn quintic_peaks() -> [f64; 3] {
 }
 
 impl Phases {
-    /// The fastest trapezoid within velocity and (finite) acceleration limit; a triangle when the way is short.
+    /// The fastest trapezoid within velocity and (finite) acceleration limit; a triangle when the
+    /// way is short.
     pub(crate) fn trapezoid(limits: &ShapeLimits, rounding: f64) -> Self {
         // A rounded ramp reaches the speed of a plain one with this mean acceleration.
         let mean = limits.acceleration * (1.0 - rounding / 2.0);
@@ -71,8 +74,8 @@ impl Phases {
         Self { jerk: rounding * ramp / 2.0, ramp, total: ramp + 1.0 / speed }
     }
 
-    /// The trapezoid of the given duration that uses the acceleration limit, if there is one and it suffices;
-    /// `None` when even a triangle would exceed it.
+    /// The trapezoid of the given duration that uses the acceleration limit, if there is one and it
+    /// suffices; `None` when even a triangle would exceed it.
     pub(crate) fn trapezoid_in(duration: f64, acceleration: f64, rounding: f64) -> Option<Self> {
         let mean = acceleration * (1.0 - rounding / 2.0);
         // v (T - ramp) = 1 with v = mean ramp: the smaller root.
@@ -94,7 +97,8 @@ impl Phases {
         if velocity * with_cruise.ramp <= 1.0 {
             return Self { total: with_cruise.ramp + 1.0 / velocity, ..with_cruise };
         }
-        // No cruise: v ramp = 1, first as if the acceleration limit were reached, else by the jerk alone.
+        // No cruise: v ramp = 1, first as if the acceleration limit were reached, else by the jerk
+        // alone.
         let rise = a / jerk;
         let ramp = 0.5 * (rise + (rise * rise + 4.0 / a).sqrt());
         if ramp >= 2.0 * rise {
@@ -104,14 +108,16 @@ impl Phases {
         Self { jerk: rise, ramp: 2.0 * rise, total: 4.0 * rise }
     }
 
-    /// The S-curve of the given duration that uses acceleration and jerk limit; `None` when they do not suffice.
+    /// The S-curve of the given duration that uses acceleration and jerk limit; `None` when they do
+    /// not suffice.
     pub(crate) fn s_curve_in(duration: f64, acceleration: f64, jerk: f64) -> Option<Self> {
         let unlimited = ShapeLimits { velocity: f64::INFINITY, acceleration, jerk };
         let fastest = Self::s_curve(&unlimited);
         if fastest.total > duration * (1.0 + 1e-12) {
             return None;
         }
-        // The way covered, v (T - ramp(v)), grows with the cruise speed v up to that of the fastest curve.
+        // The way covered, v (T - ramp(v)), grows with the cruise speed v up to that of the fastest
+        // curve.
         let (mut low, mut high) = (0.0, 1.0 / fastest.ramp);
         for _ in 0..100 {
             let middle = 0.5 * (low + high);
@@ -147,7 +153,8 @@ impl Phases {
         let a = v / (ramp - rise);
         let j = if rise > 0.0 { a / rise } else { 0.0 };
 
-        // Each phase: its length, the acceleration at its start, its jerk. The state is carried along.
+        // Each phase: its length, the acceleration at its start, its jerk. The state is carried
+        // along.
         let (plateau, cruise) = (ramp - 2.0 * rise, total - 2.0 * ramp);
         let phases = [
             (rise, 0.0, j),

@@ -1,7 +1,8 @@
-//! Splines through sampled joint values: positions, with velocities and accelerations where they are known.
+//! Splines through sampled joint values: positions, with velocities and accelerations where they
+//! are known.
 //!
-//! Between two samples every joint follows the quintic with the position, velocity and acceleration of both, so
-//! position, velocity and acceleration are continuous. What is not given is estimated:
+//! Between two samples every joint follows the quintic with the position, velocity and acceleration
+//! of both, so position, velocity and acceleration are continuous. What is not given is estimated:
 //!
 //! | given | velocity at the samples | acceleration at the samples |
 //! | --- | --- | --- |
@@ -9,17 +10,20 @@
 //! | and velocities | given | mean of the two cubic Hermite pieces that meet there; 0 at an end at rest |
 //! | and accelerations | given | given |
 //!
-//! A cubic spline knows nothing of rest and would ring into a hold. Hence, where only positions are given, it is cut
-//! at holds: at the ends of the record one repeated position is a hold, further inside two are (a symmetric
-//! turning point repeats a position once). In a hold the joint stands still, exactly; towards it, the spline has
-//! zero velocity (clamped) and the last quintic takes the acceleration to zero. An end without a hold is natural
-//! (zero acceleration), unless the spline is slower there than 2 % of its top speed: then it is taken to be at rest
-//! as well. Otherwise the velocity jumps at that end, which [`crate::Trajectory::warnings`] tells.
+//! A cubic spline knows nothing of rest and would ring into a hold. Hence, where only positions are
+//! given, it is cut at holds: at the ends of the record one repeated position is a hold, further
+//! inside two are (a symmetric turning point repeats a position once). In a hold the joint stands
+//! still, exactly; towards it, the spline has zero velocity (clamped) and the last quintic takes
+//! the acceleration to zero. An end without a hold is natural (zero acceleration), unless the
+//! spline is slower there than 2 % of its top speed: then it is taken to be at rest as well.
+//! Otherwise the velocity jumps at that end, which [`crate::Trajectory::warnings`] tells.
 //!
-//! Nor does a spline know of corners: through positions that were sampled from a velocity that jumps, it would ring, and
-//! no stepper would see the impulse. Corners are found (`corner`), at a sample or between two, and the joint's curve is
-//! cut there: either side has its own spline with an end of constant acceleration, and the velocity jumps between them.
-//! Velocities and accelerations that are given beside a corner are not used, for they may be of either side or of neither.
+//! Nor does a spline know of corners: through positions that were sampled from a velocity that
+//! jumps, it would ring, and no stepper would see the impulse. Corners are found (`corner`), at a
+//! sample or between two, and the joint's curve is cut there: either side has its own spline with
+//! an end of constant acceleration, and the velocity jumps between them. Velocities and
+//! accelerations that are given beside a corner are not used, for they may be of either side or of
+//! neither.
 
 use crate::corner::{Corner, corners};
 use crate::error::TrajectoryError;
@@ -67,9 +71,9 @@ impl Samples {
     /// The trajectory through the samples; the module page says how.
     ///
     /// # Errors
-    /// [`TrajectoryError::Samples`] for fewer than two samples, times that do not increase, values that are not
-    /// finite, columns of another length, accelerations without velocities, repeated names; or
-    /// [`TrajectoryError::OutOfRange`] when the values are too extreme for f64.
+    /// [`TrajectoryError::Samples`] for fewer than two samples, times that do not increase, values
+    /// that are not finite, columns of another length, accelerations without velocities, repeated
+    /// names; or [`TrajectoryError::OutOfRange`] when the values are too extreme for f64.
     pub fn interpolate(&self) -> Result<Trajectory, TrajectoryError> {
         self.check()?;
         let knots: Vec<f64> = self.times.iter().map(|t| t - self.times[0]).collect();
@@ -126,8 +130,9 @@ impl Trajectory {
     /// * `times`: s, strictly increasing; the first becomes `t = 0`.
     ///
     /// # Errors
-    /// [`TrajectoryError::Samples`] for fewer than two knots, values that are not finite, columns of another length, repeated names;
-    /// [`TrajectoryError::OutOfRange`] for values too extreme for f64.
+    /// [`TrajectoryError::Samples`] for fewer than two knots, values that are not finite, columns
+    /// of another length, repeated names; [`TrajectoryError::OutOfRange`] for values too extreme
+    /// for f64.
     pub fn through_knots(times: &[f64], joints: &[JointKnots]) -> Result<Self, TrajectoryError> {
         let as_samples = |joint: &JointKnots| JointSamples {
             name: joint.name.clone(),
@@ -215,7 +220,8 @@ impl JointSamples {
             return given.into_iter().map(|rate| Rates { before: rate, after: rate }).collect();
         }
         let mut rates = rates_from_positions(knots, position, is_corner);
-        // What is given counts away from corners. Knots between the samples are corners, so the rest are the samples.
+        // What is given counts away from corners. Knots between the samples are corners, so the
+        // rest are the samples.
         let mut samples = given.into_iter();
         for i in 0..knots.len() {
             let is_sample = times.binary_search_by(|t| t.total_cmp(&knots[i])).is_ok();
@@ -269,7 +275,8 @@ fn rates_from_positions(t: &[f64], q: &[f64], is_corner: &[bool]) -> Vec<Rates> 
         while end < last && !is_hold(end) && !is_corner[end] {
             end += 1;
         }
-        // Within the record a run ends at a hold or a corner; at the ends of the record it need not.
+        // Within the record a run ends at a hold or a corner; at the ends of the record it need
+        // not.
         let kind = |k: usize, inside: bool| match (is_corner[k], inside) {
             (true, _) => End::Free,
             (false, true) => End::Clamped,

@@ -1,17 +1,18 @@
-//! How fast a path is run: the least time within bounds that are linear in the squared speed and the acceleration along it,
-//! and the same with accelerations that rise in a given time.
+//! How fast a path is run: the least time within bounds that are linear in the squared speed and
+//! the acceleration along it, and the same with accelerations that rise in a given time.
 //!
 //! ```text
 //! x = s'^2,  u = s'',     low <= a u + b x <= high at every point,   x <= x_max
 //! x(s + ds) = x + 2 u ds  between two points
 //! ```
-//! Backwards along the path the largest `x` from which the rest can be run, then forwards the largest `u` that stays below it:
-//! reachability analysis [Pham & Pham 2018]. Bounds hold at both ends of every interval, which costs time in proportion to its
-//! length: few points are therefore divided, with bounds that are linear in between. From a standstill no bound may be broken at
+//! Backwards along the path the largest `x` from which the rest can be run, then forwards the
+//! largest `u` that stays below it: reachability analysis [Pham & Pham 2018]. Bounds hold at both
+//! ends of every interval, which costs time in proportion to its length: few points are therefore
+//! divided, with bounds that are linear in between. From a standstill no bound may be broken at
 //! `x = u = 0`.
 //!
-//! [`Law::smoothed`] is the moving average of the speed over a time T: the path stays, accelerations rise and fall in T, and the
-//! run lasts T longer.
+//! [`Law::smoothed`] is the moving average of the speed over a time T: the path stays,
+//! accelerations rise and fall in T, and the run lasts T longer.
 #![allow(non_snake_case, reason = "letters of the formulas")]
 
 /// `low <= a u + b x <= high`.
@@ -29,8 +30,8 @@ pub struct Bound {
 
 /// What holds at a point of a path.
 ///
-/// Bounds of one kind have the same place in the lists of all points. A point at which other bounds begin has those of the path
-/// before it, then those of the path behind it.
+/// Bounds of one kind have the same place in the lists of all points. A point at which other bounds
+/// begin has those of the path before it, then those of the path behind it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PathPoint {
     /// Parameter of the path, ascending from point to point.
@@ -48,8 +49,8 @@ impl PathPoint {
         Self { s, x_max: between(here.x_max, next.x_max, part), bounds: bounds_between(here, next, part).collect() }
     }
 
-    /// By how much a squared speed and an acceleration pass what holds between two points: the greatest ratio, of 1 or less if
-    /// they keep it.
+    /// By how much a squared speed and an acceleration pass what holds between two points: the
+    /// greatest ratio, of 1 or less if they keep it.
     pub fn passed(here: &Self, next: &Self, part: f64, x: f64, u: f64) -> f64 {
         let ratio = |bound: Bound| {
             let value = bound.a * u + bound.b * x;
@@ -98,7 +99,8 @@ const MOST_PARTS: usize = 128;
 /// Below this part of the largest factor of `u` at a point a bound does not hold `u`.
 const NO_FACTOR: f64 = 1e-12;
 
-/// Bounds at a point and, for the interval that begins there, at its end: lines `u <= p + q x` and `u >= p + q x`.
+/// Bounds at a point and, for the interval that begins there, at its end: lines `u <= p + q x` and
+/// `u >= p + q x`.
 #[derive(Default)]
 struct Lines {
     upper: Vec<[f64; 2]>,
@@ -107,7 +109,8 @@ struct Lines {
 }
 
 impl Lines {
-    /// Lines of a point with `ds` to the next one, whose bounds hold as well; from `goal` on the rest can be run.
+    /// Lines of a point with `ds` to the next one, whose bounds hold as well; from `goal` on the
+    /// rest can be run.
     fn fill(&mut self, here: &PathPoint, next: &PathPoint, goal: f64) {
         let ds = next.s - here.s;
         self.upper.clear();
@@ -154,8 +157,8 @@ impl Lines {
         (upper, lower.unwrap_or([f64::NEG_INFINITY, 0.0]))
     }
 
-    /// Largest `x` at which some `u` is left: the gap between the lines is concave in `x`, so Newton's method from above ends
-    /// at the root after finitely many lines.
+    /// Largest `x` at which some `u` is left: the gap between the lines is concave in `x`, so
+    /// Newton's method from above ends at the root after finitely many lines.
     fn largest_x(&self) -> Option<f64> {
         let mut x = self.x_max;
         if x == f64::INFINITY {
@@ -241,7 +244,8 @@ fn least_time_at(points: &[PathPoint]) -> Result<Vec<f64>, LawError> {
     Ok(x)
 }
 
-/// A run along a path: the speed is linear in time between the points, and may be averaged over a window.
+/// A run along a path: the speed is linear in time between the points, and may be averaged over a
+/// window.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Law {
     t: Vec<f64>,
@@ -360,7 +364,8 @@ mod tests {
         assert!((triangle.duration() - 2.0).abs() < 1e-10, "{}", triangle.duration()); // measured 2.0e-12
     }
 
-    /// Truth: one joint over q = s² + s, from 0 to 2, with an acceleration of 1 at most: 2 sqrt(2), whatever s is.
+    /// Truth: one joint over q = s² + s, from 0 to 2, with an acceleration of 1 at most: 2 sqrt(2),
+    /// whatever s is.
     #[test]
     fn a_curved_parameter_changes_nothing_of_the_least_time() {
         let point = |k: usize| {
@@ -391,8 +396,9 @@ mod tests {
         }
     }
 
-    /// Truth: joints `s` and `s²/2` with accelerations of 1 and A at most. The first bound holds up to `s = A/3`, then the second
-    /// with `x = A - A³/(27 s²)`, and from where that meets `2 (1 - s)` on the first again.
+    /// Truth: joints `s` and `s²/2` with accelerations of 1 and A at most. The first bound holds up
+    /// to `s = A/3`, then the second with `x = A - A³/(27 s²)`, and from where that meets
+    /// `2 (1 - s)` on the first again.
     #[test]
     fn two_joints_switch_from_one_bound_to_the_other_where_the_closed_form_does() {
         let A: f64 = 1.2;
@@ -416,8 +422,8 @@ mod tests {
         }
     }
 
-    /// Truth: the average has the exact path length, ends T later, and its acceleration is at most that of the trapezoid and
-    /// rises at a/T.
+    /// Truth: the average has the exact path length, ends T later, and its acceleration is at most
+    /// that of the trapezoid and rises at a/T.
     #[test]
     fn a_smoothed_law_is_an_s_curve() {
         let law = timed(&straight(400, 2.0, 0.5, 1.0)).smoothed(0.1);

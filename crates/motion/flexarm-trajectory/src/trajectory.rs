@@ -1,6 +1,8 @@
-//! The trajectory itself: named piecewise polynomials, sampled, reordered, slowed down, cut into moves.
+//! The trajectory itself: named piecewise polynomials, sampled, reordered, slowed down, cut into
+//! moves.
 //!
-//! Start at [`Trajectory::sample`]. Built by [`crate::Plan`] and [`crate::Samples`], never changed afterwards.
+//! Start at [`Trajectory::sample`]. Built by [`crate::Plan`] and [`crate::Samples`], never changed
+//! afterwards.
 
 use crate::error::{FileError, TrajectoryError};
 use crate::polynomial::Piece;
@@ -14,12 +16,14 @@ const REST: f64 = 1e-9;
 /// Greatest duration of a motion, s: four months.
 pub const LONGEST: f64 = 1e7;
 
-/// Joint positions, velocities and accelerations as functions of time, from `t = 0` to [`Trajectory::duration`].
+/// Joint positions, velocities and accelerations as functions of time, from `t = 0` to
+/// [`Trajectory::duration`].
 ///
-/// Position, velocity and acceleration are continuous everywhere, with three exceptions, each of which shows in
+/// Position, velocity and acceleration are continuous everywhere, with three exceptions, each of
+/// which shows in
 /// [`Trajectory::warnings`]: an unrounded trapezoid jumps in acceleration; sampled data may start or end in
-/// motion or have corners, where the velocity jumps ([`Trajectory::velocity_jumps`]); data with velocities or
-/// accelerations of its own may do the same.
+/// motion or have corners, where the velocity jumps ([`Trajectory::velocity_jumps`]); data with
+/// velocities or accelerations of its own may do the same.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
     joints: Vec<String>,
@@ -73,8 +77,8 @@ impl Trajectory {
     /// All curves must cover `0..duration`.
     ///
     /// # Errors
-    /// [`TrajectoryError::OutOfRange`] when a coefficient or a time is not finite or beyond any motion, or a piece shorter than
-    /// the rounding of its time.
+    /// [`TrajectoryError::OutOfRange`] when a coefficient or a time is not finite or beyond any
+    /// motion, or a piece shorter than the rounding of its time.
     pub(crate) fn from_curves(
         joints: Vec<String>,
         curves: Vec<Curve>,
@@ -98,8 +102,9 @@ impl Trajectory {
         Ok(Self { joints, curves, duration, notes, told: Vec::new() })
     }
 
-    /// The curve of a joint as it is stored, for programs that keep motions: knots (s), one more than there are pieces, and of
-    /// each piece its length (s) and the coefficients of 1, τ, ... τ⁵, where τ is the time since it began.
+    /// The curve of a joint as it is stored, for programs that keep motions: knots (s), one more
+    /// than there are pieces, and of each piece its length (s) and the coefficients of 1, τ, ...
+    /// τ⁵, where τ is the time since it began.
     pub fn pieces(&self, joint: usize) -> Option<(&[f64], Vec<[f64; 7]>)> {
         let row = |piece: &Piece| std::array::from_fn(|k| if k == 0 { piece.width } else { piece.c[k - 1] });
         let curve = self.curves.get(joint)?;
@@ -135,14 +140,17 @@ impl Trajectory {
         self.duration
     }
 
-    /// Position, velocity and acceleration of every joint at time `t`, in the order of [`Trajectory::joints`].
+    /// Position, velocity and acceleration of every joint at time `t`, in the order of
+    /// [`Trajectory::joints`].
     ///
-    /// Before 0 and after the end the joints are held: constant position, zero velocity and acceleration. At a
-    /// knot where the acceleration jumps the value is the one just after it (just before it at the very end).
-    /// Nothing is allocated; the cost is one binary search per joint.
+    /// Before 0 and after the end the joints are held: constant position, zero velocity and
+    /// acceleration. At a knot where the acceleration jumps the value is the one just after it
+    /// (just before it at the very end). Nothing is allocated; the cost is one binary search per
+    /// joint.
     ///
     /// * `t`: s, not NaN.
-    /// * `q`, `qdot`, `qddot`: rad, rad/s, rad/s² (m, m/s, m/s² for a prismatic joint), one entry per joint.
+    /// * `q`, `qdot`, `qddot`: rad, rad/s, rad/s² (m, m/s, m/s² for a prismatic joint), one entry
+    ///   per joint.
     ///
     /// # Panics
     /// When a slice does not have one entry per joint.
@@ -167,8 +175,8 @@ impl Trajectory {
     /// The same motion with the joints in the order of `names`.
     ///
     /// # Errors
-    /// [`TrajectoryError::JointOrder`] unless `names` holds each joint of the trajectory exactly once; it lists
-    /// every missing and every unknown one.
+    /// [`TrajectoryError::JointOrder`] unless `names` holds each joint of the trajectory exactly
+    /// once; it lists every missing and every unknown one.
     pub fn with_joint_order(&self, names: &[&str]) -> Result<Self, TrajectoryError> {
         let place = |name: &str| self.joints.iter().position(|joint| joint == name);
         let mut repeated = names.to_vec();
@@ -198,7 +206,8 @@ impl Trajectory {
         })
     }
 
-    /// The same motion with further joints, each held where it is told (rad or m) from the start to the end.
+    /// The same motion with further joints, each held where it is told (rad or m) from the start to
+    /// the end.
     ///
     /// # Errors
     /// [`TrajectoryError::OutOfRange`] for a value that is not finite.
@@ -216,14 +225,16 @@ impl Trajectory {
         Self::from_curves(joints, curves, self.duration, self.notes.clone())
     }
 
-    /// One motion of several that move different joints, each beginning at its own time; before and after a joint is held
-    /// where its part begins and ends. What was noted of the parts holds for the whole.
+    /// One motion of several that move different joints, each beginning at its own time; before and
+    /// after a joint is held where its part begins and ends. What was noted of the parts holds for
+    /// the whole.
     ///
     /// * `parts`: when each begins (s, not negative) and what it is.
     ///
     /// # Errors
-    /// [`TrajectoryError::Samples`] for no part at all and for a joint that two parts move, [`TrajectoryError::OutOfRange`]
-    /// for a time that is not finite or negative, or that drowns a part in its rounding.
+    /// [`TrajectoryError::Samples`] for no part at all and for a joint that two parts move,
+    /// [`TrajectoryError::OutOfRange`] for a time that is not finite or negative, or that drowns a
+    /// part in its rounding.
     pub fn side_by_side(parts: &[(f64, Self)]) -> Result<Self, TrajectoryError> {
         let duration = parts.iter().map(|(start, part)| start + part.duration).fold(0.0, f64::max);
         let (mut joints, mut curves, mut notes): (Vec<String>, Vec<Curve>, Vec<Warning>) = Default::default();
@@ -268,8 +279,8 @@ impl Trajectory {
         Self::from_curves(self.joints.clone(), curves, self.duration * factor, notes)
     }
 
-    /// Where velocities jump, by time: corners of sampled data, and both ends where the motion does not start or end at
-    /// rest (before and after it the joints are held).
+    /// Where velocities jump, by time: corners of sampled data, and both ends where the motion does
+    /// not start or end at rest (before and after it the joints are held).
     pub fn velocity_jumps(&self) -> Vec<VelocityJump> {
         let of_curve = |(joint, curve): (&String, &Curve)| -> Vec<VelocityJump> {
             let jumps = curve.jumps().filter(|jump| jump.exceeds(1, QUIET_SPEED));
@@ -280,8 +291,9 @@ impl Trajectory {
         jumps
     }
 
-    /// Times at which the velocity, the acceleration or the jerk of some joint jumps, ascending: knots that a step of an
-    /// integrator should end at. Includes 0 and the end when the motion does not start or end smoothly.
+    /// Times at which the velocity, the acceleration or the jerk of some joint jumps, ascending:
+    /// knots that a step of an integrator should end at. Includes 0 and the end when the motion
+    /// does not start or end smoothly.
     pub fn kinks(&self) -> Vec<f64> {
         let mut times: Vec<f64> = self.curves.iter().flat_map(Curve::kinks).collect();
         times.sort_unstable_by(f64::total_cmp);
@@ -291,8 +303,8 @@ impl Trajectory {
 
     /// The stretches of time in which at least one joint moves, ascending and disjoint.
     ///
-    /// A joint is at rest in a piece in which it moves less than 1e-9 rad (or m). Two moves that follow each
-    /// other without a hold count as one, because nothing can settle between them.
+    /// A joint is at rest in a piece in which it moves less than 1e-9 rad (or m). Two moves that
+    /// follow each other without a hold count as one, because nothing can settle between them.
     pub fn moves(&self) -> Vec<Move> {
         let moving = |curve: &Curve| -> Vec<Move> {
             let spans = curve.knots.windows(2).map(|pair| Move { start: pair[0], end: pair[1] });
@@ -312,8 +324,9 @@ impl Trajectory {
         moves
     }
 
-    /// Time up to which every velocity is exactly zero from `t` on, s: `t` itself where a joint moves, infinity after the last
-    /// motion. Stricter than what lies between two [`Trajectory::moves`].
+    /// Time up to which every velocity is exactly zero from `t` on, s: `t` itself where a joint
+    /// moves, infinity after the last motion. Stricter than what lies between two
+    /// [`Trajectory::moves`].
     ///
     /// * `t`: s, not NaN.
     #[must_use]
@@ -324,13 +337,14 @@ impl Trajectory {
         self.curves.iter().map(|curve| curve.still_until(t)).fold(f64::INFINITY, f64::min)
     }
 
-    /// Largest speed at `t = 0` over all joints, rad/s (or m/s): by how much the velocity jumps at the start.
+    /// Largest speed at `t = 0` over all joints, rad/s (or m/s): by how much the velocity jumps at
+    /// the start.
     pub fn initial_speed(&self) -> f64 {
         self.curves.iter().map(|curve| curve.start()[1].abs()).fold(0.0, f64::max)
     }
 
-    /// Everything about this trajectory that a user should know before trusting a result: velocity jumps at the
-    /// ends, acceleration jumps, and what the file reader or the planner noticed.
+    /// Everything about this trajectory that a user should know before trusting a result: velocity
+    /// jumps at the ends, acceleration jumps, and what the file reader or the planner noticed.
     pub fn warnings(&self) -> Vec<Warning> {
         let mut warnings = self.notes.clone();
         for (joint, curve) in self.joints.iter().zip(&self.curves) {
@@ -347,14 +361,14 @@ impl Trajectory {
         &self.curves
     }
 
-    /// Checks the units that the file tells against a robot whose joints slide or turn. In a trajectory that was made of another
-    /// one they are not told any more.
+    /// Checks the units that the file tells against a robot whose joints slide or turn. In a
+    /// trajectory that was made of another one they are not told any more.
     ///
     /// * `origin`: file name for messages.
     ///
     /// # Errors
-    /// [`TrajectoryError::File`] for a joint that slides and whose numbers were read as degrees, and for one that turns and
-    /// whose numbers were read as metres.
+    /// [`TrajectoryError::File`] for a joint that slides and whose numbers were read as degrees,
+    /// and for one that turns and whose numbers were read as metres.
     pub fn check_units(&self, origin: &str, joints: &[KnownJoint<'_>]) -> Result<(), TrajectoryError> {
         let contradicts = |told: &ToldUnit| {
             joints.iter().any(|joint| joint.name == told.joint && joint.is_prismatic != told.is_length)
@@ -396,7 +410,8 @@ fn add_note(notes: &mut Vec<Warning>, note: Warning) {
 }
 
 impl Curve {
-    /// Position, velocity, acceleration and jerk at `t`, which is held within the first and last knot.
+    /// Position, velocity, acceleration and jerk at `t`, which is held within the first and last
+    /// knot.
     pub(crate) fn at(&self, t: f64) -> [f64; 4] {
         let last = self.pieces.len() - 1;
         let i = self.knots[1..=last].partition_point(|&knot| knot <= t);
@@ -454,7 +469,8 @@ impl Curve {
             let right = self.pieces.get(i);
             let before = left.map_or_else(|| held(self.start()), |piece| piece.at(piece.width));
             let after = right.map_or_else(|| held(self.end()), |piece| piece.at(0.0));
-            // Positions are known to a few units in the last place; each derivative divides that by the width.
+            // Positions are known to a few units in the last place; each derivative divides that by
+            // the width.
             let width = left.into_iter().chain(right).map(|piece| piece.width).fold(f64::INFINITY, f64::min);
             let rounding = |order: i32| 1e-13 * after[0].abs() / width.powi(order);
             Jump {
@@ -465,7 +481,8 @@ impl Curve {
         })
     }
 
-    /// Knots at which velocity, acceleration or jerk jumps by more than rounding and a millionth of its peak.
+    /// Knots at which velocity, acceleration or jerk jumps by more than rounding and a millionth of
+    /// its peak.
     fn kinks(&self) -> Vec<f64> {
         let levels = [0.0, QUIET_SPEED, 1e-6 * self.largest(2), 1e-6 * self.largest(3)];
         let kinks = self.jumps().filter(|jump| (1..4).any(|order| jump.exceeds(order, levels[order])));

@@ -1,9 +1,12 @@
-//! A move through points on the way: the smoothest curve, from rest to rest, that passes all of them.
+//! A move through points on the way: the smoothest curve, from rest to rest, that passes all of
+//! them.
 //!
-//! Between the points each joint follows a quintic; velocity, acceleration, jerk and snap are continuous at the
-//! points, velocity and acceleration vanish at both ends. Of all curves through the points this one has the least
-//! integral of the squared jerk [Flash and Hogan 1985]. Without a point on the way it is the quintic `u³ (10 - 15 u
-//! + 6 u²)`, and so it is with points on the straight line, because of the way the times are chosen:
+//! Between the points each joint follows a quintic; velocity, acceleration, jerk and snap are
+//! continuous at the points, velocity and acceleration vanish at both ends. Of all curves through
+//! the points this one has the least integral of the squared jerk [Flash and Hogan 1985]. Without a
+//! point on the way it is the quintic `u³ (10 - 15 u
+//! + 6 u²)`, and so it is with points on the straight line, because of the way the times are
+//!   chosen:
 //!
 //! ```text
 //! chord     d_i = max over joints of |Δq_j| / w_j,      w_j a velocity limit or 1
@@ -71,8 +74,8 @@ pub(crate) fn rest_to_rest_spline(u: &[f64], q: &[f64]) -> Vec<Piece> {
     let n = u.len() - 1;
     let width: Vec<f64> = u.windows(2).map(|pair| pair[1] - pair[0]).collect();
 
-    // Row of knot i: lower x[i-1] + diagonal x[i] + upper x[i+1] = rhs with x = (v, a). After elimination
-    // x[i] = g[i] - E[i] x[i+1]; at the ends x = 0.
+    // Row of knot i: lower x[i-1] + diagonal x[i] + upper x[i+1] = rhs with x = (v, a). After
+    // elimination x[i] = g[i] - E[i] x[i+1]; at the ends x = 0.
     let mut eliminated: Vec<([[f64; 2]; 2], [f64; 2])> = vec![([[0.0; 2]; 2], [0.0; 2])];
     for i in 1..n {
         let (h, k) = (width[i - 1], width[i]);

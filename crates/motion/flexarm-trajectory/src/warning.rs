@@ -11,7 +11,8 @@ pub(crate) const QUIET_SPEED: f64 = 1e-6;
 /// Jumps below this part of the peak acceleration are rounding.
 const QUIET_JUMP: f64 = 1e-6;
 
-/// Something a user should know before trusting a result; `Display` gives one line with how to mend it.
+/// Something a user should know before trusting a result; `Display` gives one line with how to mend
+/// it.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Warning {

@@ -1,6 +1,8 @@
-//! From the waypoint file as written to a [`Plan`]: units, defaults, limits, and every check that needs a place.
+//! From the waypoint file as written to a [`Plan`]: units, defaults, limits, and every check that
+//! needs a place.
 //!
-//! Start at [`check`]. The plan checks what is left (missing limits, repeated points) and names the move.
+//! Start at [`check`]. The plan checks what is left (missing limits, repeated points) and names the
+//! move.
 
 use std::ops::Range;
 
@@ -200,7 +202,8 @@ impl Context<'_> {
         }
     }
 
-    /// What is known of each joint without looking at a move: `[limits]` before the limits of the caller.
+    /// What is known of each joint without looking at a move: `[limits]` before the limits of the
+    /// caller.
     fn limits(&self, known: &[(&str, JointLimits)]) -> Result<Vec<MotionLimits>, Located> {
         for name in self.file.limits.keys() {
             if !self.joints.contains(name.get_ref()) {

@@ -16,8 +16,8 @@ impl Trajectory {
     /// Writes the moves as quintics from rest to rest, in rad and m, with the holds between them.
     ///
     /// # Errors
-    /// [`TrajectoryError::NotWaypoints`] for a motion that is made of something else, such as samples or points on the way:
-    /// by how much it would differ.
+    /// [`TrajectoryError::NotWaypoints`] for a motion that is made of something else, such as
+    /// samples or points on the way: by how much it would differ.
     pub fn to_waypoints_toml(&self) -> Result<String, TrajectoryError> {
         let text = self.waypoints();
         // What was written is read: a motion that is not made of such moves shows here.

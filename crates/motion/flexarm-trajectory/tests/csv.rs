@@ -26,7 +26,8 @@ fn at(trajectory: &Trajectory, t: f64) -> [f64; 3] {
     state
 }
 
-/// `sin² t` with its derivatives at intervals `h`, as far as asked for, over one period from rest to rest.
+/// `sin² t` with its derivatives at intervals `h`, as far as asked for, over one period from rest
+/// to rest.
 fn sine_file(intervals: u32, derivatives: usize) -> String {
     let header = ["time,q", "time,q,q.vel", "time,q,q.vel,q.acc"][derivatives];
     let mut text = format!("{header}\n");
@@ -42,7 +43,8 @@ fn sine_file(intervals: u32, derivatives: usize) -> String {
     text
 }
 
-/// Largest error of the position inside the record (away from the ends, where sin² is not at rest in acceleration).
+/// Largest error of the position inside the record (away from the ends, where sin² is not at rest
+/// in acceleration).
 fn sine_error(intervals: u32, derivatives: usize) -> f64 {
     let trajectory = parse(&sine_file(intervals, derivatives));
     (0..1000)
@@ -278,7 +280,8 @@ proptest! {
             plan.sample(t, &mut q, &mut qdot, &mut qddot);
             read.sample(t, &mut q2, &mut qdot2, &mut qddot2);
             for i in 0..2 {
-                // measured 1.4e-14, 1.1e-12, 1.8e-10: rounding divided by the row spacing and its square
+                // measured 1.4e-14, 1.1e-12, 1.8e-10: rounding divided by the row spacing and its
+                // square
                 prop_assert!((q[i] - q2[i]).abs() < 1e-12);
                 prop_assert!((qdot[i] - qdot2[i]).abs() < 1e-10);
                 prop_assert!((qddot[i] - qddot2[i]).abs() < 1e-8);
@@ -299,7 +302,8 @@ proptest! {
         }
     }
 
-    /// Every number that f64 can hold, in increasing times: an error or a trajectory that can be sampled.
+    /// Every number that f64 can hold, in increasing times: an error or a trajectory that can be
+    /// sampled.
     #[test]
     fn no_number_makes_the_reader_panic(
         rows in prop::collection::vec((any::<f64>(), any::<f64>(), any::<f64>()), 2..6),
@@ -318,9 +322,11 @@ proptest! {
     }
 }
 
-// --- Corners -----------------------------------------------------------------------------------------------------------
+// --- Corners
+// -----------------------------------------------------------------------------------------------------------
 
-/// Rest, 2 rad/s, -2 rad/s, rest, with `columns` of `.vel`: a triangle whose corners lie `shift` beside 0.5, 1.0 and 1.5 s.
+/// Rest, 2 rad/s, -2 rad/s, rest, with `columns` of `.vel`: a triangle whose corners lie `shift`
+/// beside 0.5, 1.0 and 1.5 s.
 fn triangle_file(rate_hz: f64, shift: f64, velocities: bool) -> String {
     let mut text = if velocities { "time,q,q.vel\n".to_owned() } else { "time,q\n".to_owned() };
     for k in 0..=(2.0 * rate_hz) as u32 {
@@ -333,7 +339,8 @@ fn triangle_file(rate_hz: f64, shift: f64, velocities: bool) -> String {
     text
 }
 
-/// Truth: the triangle. Corners at the rows and between them, with and without given velocities; nothing rings beside them.
+/// Truth: the triangle. Corners at the rows and between them, with and without given velocities;
+/// nothing rings beside them.
 #[test]
 fn corners_of_sampled_positions_are_jumps_of_the_velocity() {
     for (rate, shift) in [(1000.0, 0.0), (500.0, 0.0), (1000.0, 3.7e-4), (500.0, 6e-4), (100.0, 2.5e-3)] {
@@ -359,7 +366,8 @@ fn corners_of_sampled_positions_are_jumps_of_the_velocity() {
     }
 }
 
-/// Truth: `cos` before and after a kick of 1 rad/s, curved on both sides, between two rows; third order in the distance of rows.
+/// Truth: `cos` before and after a kick of 1 rad/s, curved on both sides, between two rows; third
+/// order in the distance of rows.
 #[test]
 fn a_corner_between_curved_pieces_is_found() {
     for rate in [1000.0, 200.0] {
@@ -379,7 +387,8 @@ fn a_corner_between_curved_pieces_is_found() {
     }
 }
 
-/// Truth: away from the blends the curve, within them at most an eighth of the jump times their length beside it.
+/// Truth: away from the blends the curve, within them at most an eighth of the jump times their
+/// length beside it.
 #[test]
 fn rounded_corners_jump_no_more_and_stay_near() {
     let corners = parse(&triangle_file(1000.0, 3.7e-4, false));

@@ -1,4 +1,5 @@
-//! Moves against closed forms, continuity of everything that can be planned, limits, holds, time scaling.
+//! Moves against closed forms, continuity of everything that can be planned, limits, holds, time
+//! scaling.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use approx::assert_relative_eq;
@@ -62,7 +63,8 @@ fn nothing_moves_until_the_motion_says_so() {
     }
 }
 
-/// Truth: the velocity of a trapezoid in 2 s with ramps of 0.5 s is D / 1.5 s, its acceleration that over 0.5 s.
+/// Truth: the velocity of a trapezoid in 2 s with ramps of 0.5 s is D / 1.5 s, its acceleration
+/// that over 0.5 s.
 #[test]
 fn plain_trapezoid_of_given_duration_ramps_for_a_quarter() {
     let profile = Profile::Trapezoid { rounding: 0.0 };
@@ -232,7 +234,8 @@ fn any_move() -> impl Strategy<Value = PlannedMove> {
 }
 
 proptest! {
-    /// Continuity at every knot, rest at both ends, every goal reached, limits kept where no duration is given.
+    /// Continuity at every knot, rest at both ends, every goal reached, limits kept where no
+    /// duration is given.
     #[test]
     fn every_plan_is_smooth_reaches_its_goals_and_keeps_its_limits(
         moves in prop::collection::vec(any_move(), 1..4),

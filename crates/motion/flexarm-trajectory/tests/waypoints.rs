@@ -155,7 +155,8 @@ fn each_fault_of_a_file_is_named_with_its_place() {
     assert!(matches!(fault(&text).problem, Problem::OutOfRange { .. }));
 }
 
-/// Truth by hand: one joint as an S-curve of seven phases, v/a + a/j + L/v; two of which one is always the slower.
+/// Truth by hand: one joint as an S-curve of seven phases, v/a + a/j + L/v; two of which one is
+/// always the slower.
 #[test]
 fn an_optimal_move_takes_the_least_time_of_its_limits() {
     let head = "format = 1\nunit = \"rad\"\njoints = [\"a\", \"b\"]\nstart = [0, 0]\n\

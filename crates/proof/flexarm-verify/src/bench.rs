@@ -1,4 +1,5 @@
-//! What the cases share: shipped files, arms held at a pose, loads, and a stepper that runs until it rests.
+//! What the cases share: shipped files, arms held at a pose, loads, and a stepper that runs until
+//! it rests.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -201,8 +202,8 @@ impl Rig {
         Self { arm: self.arm.clone(), frame, X_WF }
     }
 
-    /// Frequencies (Hz) of the modes in which the frame moves along y and along z, world axes, ascending; those that turn it or move
-    /// it along x are left out.
+    /// Frequencies (Hz) of the modes in which the frame moves along y and along z, world axes,
+    /// ascending; those that turn it or move it along x are left out.
     pub fn bending_hz(&self) -> [Vec<f64>; 2] {
         let modes = &self.arm.modes;
         let mut found = [Vec::new(), Vec::new()];
@@ -227,7 +228,8 @@ impl Rig {
         self.arm.clone().with_timed_loads(vec![load]).map_err(step_error)
     }
 
-    /// Displacement and rotation of the frame in the equilibrium under a wrench at it, by Newton's method.
+    /// Displacement and rotation of the frame in the equilibrium under a wrench at it, by Newton's
+    /// method.
     pub fn statics(&self, wrench: &Vector6<f64>) -> Result<Vector6<f64>, Error> {
         self.statics_at(wrench, self)
     }
@@ -265,7 +267,8 @@ impl Rig {
         Err(Error::NotAtRest { steps: AT_MOST, step_s: h, stepper: kind.name() })
     }
 
-    /// Way of the frame from its undeformed place, let go there, seen at the start and every so often.
+    /// Way of the frame from its undeformed place, let go there, seen at the start and every so
+    /// often.
     ///
     /// * `h`: step (s), of which `every` (s) is a multiple.
     pub fn path(&self, kind: StepperKind, h: f64, every: f64, duration: f64) -> Result<Vec<Vector3<f64>>, Error> {
@@ -284,7 +287,8 @@ impl Rig {
         Ok(path)
     }
 
-    /// Compliance at the frame from pairs of opposite loads, so that effects of second order cancel.
+    /// Compliance at the frame from pairs of opposite loads, so that effects of second order
+    /// cancel.
     ///
     /// `loads`: size of each load; `response`: displacement under a wrench.
     pub fn compliance(
@@ -308,7 +312,8 @@ pub const PATH_DAMPING_S: f64 = 5e-4;
 
 /// Places of the tool at the end of each step of generalised-alpha, world axes.
 ///
-/// `stiffening`: whether loads change the stiffness of modal links. Damping is [`PATH_DAMPING_S`] times stiffness in every model.
+/// `stiffening`: whether loads change the stiffness of modal links. Damping is [`PATH_DAMPING_S`]
+/// times stiffness in every model.
 pub fn tool_path(
     robot: &Robot,
     modelling: &Modelling,
@@ -400,8 +405,8 @@ pub fn step_error(source: StepError) -> Error {
     flexarm::Error::Step { source, partial: false }.into()
 }
 
-/// Displacement and rotation of a frame per acceleration of gravity (m/s², world axes), times `g`: from a hundredth of it up and
-/// down, so that what is left is linear.
+/// Displacement and rotation of a frame per acceleration of gravity (m/s², world axes), times `g`:
+/// from a hundredth of it up and down, so that what is left is linear.
 pub fn weight_response(
     robot: &Robot,
     modelling: &Modelling,
@@ -421,7 +426,8 @@ pub fn weight_response(
 mod tests {
     use super::*;
 
-    /// Truth by hand: (3, 4, 0) against (3, 0, 0) is off by 4 of 3, a rotation of 1.1 against 1 by a tenth.
+    /// Truth by hand: (3, 4, 0) against (3, 0, 0) is off by 4 of 3, a rotation of 1.1 against 1 by
+    /// a tenth.
     #[test]
     fn shift_and_turn_are_judged_by_their_own_sizes() {
         let truth = Vector6::new(3.0, 0.0, 0.0, 0.0, 0.0, 1.0);
@@ -446,7 +452,8 @@ mod tests {
         assert!(farthest(&[at(f64::NAN, 0.0)], &[at(0.0, 0.0)]).is_nan() && farthest(&[], &[]).is_nan());
     }
 
-    /// A number that is none must not be dropped, as `f64::max` does, nor may an empty comparison pass.
+    /// A number that is none must not be dropped, as `f64::max` does, nor may an empty comparison
+    /// pass.
     #[test]
     fn the_worst_error_is_what_is_no_number() {
         assert_eq!([1.0, -3.0, 2.0].into_iter().worst(), 3.0);

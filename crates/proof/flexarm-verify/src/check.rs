@@ -1,8 +1,9 @@
 //! Whether a stored page is what the command prints.
 //!
-//! Words and whole numbers must be equal. Numbers with decimals may differ by one of their last digit. Relative errors (per cent, or
-//! with an exponent) may differ by 3 %, and by 5e-9 where they are that small: that is rounding, which differs between processors.
-//! Pictures must have the same words and curves, with coordinates within three units of some two thousand.
+//! Words and whole numbers must be equal. Numbers with decimals may differ by one of their last
+//! digit. Relative errors (per cent, or with an exponent) may differ by 3 %, and by 5e-9 where they
+//! are that small: that is rounding, which differs between processors. Pictures must have the same
+//! words and curves, with coordinates within three units of some two thousand.
 
 use crate::page::FLOOR;
 
@@ -189,7 +190,8 @@ mod tests {
         assert_eq!(differences(page, &page.replace("nothing", "something"))[0].line, 2);
     }
 
-    /// Truth by hand: sign, digits, point, exponent; a point or an `e` without digits after it belongs to the words.
+    /// Truth by hand: sign, digits, point, exponent; a point or an `e` without digits after it
+    /// belongs to the words.
     #[test]
     fn a_number_ends_where_its_digits_end() {
         for (text, length, unit) in [

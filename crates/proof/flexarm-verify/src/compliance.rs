@@ -1,4 +1,5 @@
-//! The compliance of a point by every method, beside a truth: what the first three cases have in common.
+//! The compliance of a point by every method, beside a truth: what the first three cases have in
+//! common.
 
 use flexarm::{Modelling, Robot};
 use nalgebra::{Matrix6, Vector6};
@@ -18,8 +19,8 @@ pub(crate) struct Method {
     pub(crate) C: Matrix6<f64>,
 }
 
-/// Compliance at a frame of a robot without weight by every method: lumped links of two parts in time, the others by Newton's
-/// method.
+/// Compliance at a frame of a robot without weight by every method: lumped links of two parts in
+/// time, the others by Newton's method.
 ///
 /// * `loads`: size of each of the six loads (N, N m). `step_s`: step of those that run in time (s).
 ///
@@ -66,7 +67,8 @@ mod tests {
     use super::*;
     use crate::page::word;
 
-    /// Truth by hand: with C_ii = 1 everywhere, an entry that is off by 3e-3 in column 2 is the error of load 2 alone.
+    /// Truth by hand: with C_ii = 1 everywhere, an entry that is off by 3e-3 in column 2 is the
+    /// error of load 2 alone.
     #[test]
     fn an_error_of_one_load_stands_in_the_row_of_that_load() {
         let truth = Matrix6::identity();

@@ -1,4 +1,5 @@
-//! What keeps a case study from being done: the library's errors, and truths that cannot be computed.
+//! What keeps a case study from being done: the library's errors, and truths that cannot be
+//! computed.
 
 use flexarm::Fault;
 use flexarm_fe_io::MeshError;

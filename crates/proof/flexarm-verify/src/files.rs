@@ -63,8 +63,8 @@ pub fn differences_from(stored: &str, path: &Path, verification: &Verification) 
 }
 
 impl VerificationFiles {
-    /// In a folder; refused if the page or its pictures are there already and are not to be overwritten, or if nothing can be written
-    /// there.
+    /// In a folder; refused if the page or its pictures are there already and are not to be
+    /// overwritten, or if nothing can be written there.
     ///
     /// # Errors
     /// [`flexarm::Error::File`].

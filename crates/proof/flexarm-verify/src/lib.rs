@@ -1,9 +1,11 @@
-//! The case studies: each method against each truth, from shipped files, as tables, figures and claims with bounds.
+//! The case studies: each method against each truth, from shipped files, as tables, figures and
+//! claims with bounds.
 //!
-//! [`verify`] runs them, [`Verification::page`] makes the page `docs/verification.md`. A case is a module with one function
-//! that takes a [`Bench`] and returns a [`page::Case`]; a new one gets a line in `CASES`. Within a case some files compute findings,
-//! plain numbers with names, and others say them: numbers of sentences come from the findings and from constants. What other programs computed is
-//! stored in `tests/verification`, with the script that writes it.
+//! [`verify`] runs them, [`Verification::page`] makes the page `docs/verification.md`. A case is a
+//! module with one function that takes a [`Bench`] and returns a [`page::Case`]; a new one gets a
+//! line in `CASES`. Within a case some files compute findings, plain numbers with names, and others
+//! say them: numbers of sentences come from the findings and from constants. What other programs
+//! computed is stored in `tests/verification`, with the script that writes it.
 //!
 //! ```
 //! use flexarm_verify::{case_names, textbook::rectangle_torsion};
@@ -14,8 +16,8 @@
 //! assert!((rectangle_torsion(1.0, 1e-3) * 3e9 - 1.0).abs() < 1e-3);
 //! ```
 //!
-//! Not here: methods. Everything is done through the public faces of the other crates, and closed forms are written down
-//! again in [`textbook`], apart from the code that they judge.
+//! Not here: methods. Everything is done through the public faces of the other crates, and closed
+//! forms are written down again in [`textbook`], apart from the code that they judge.
 #![allow(non_snake_case, reason = "monogram notation: X_WF, EI_y, C; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
@@ -71,7 +73,8 @@ pub struct Verification {
     pub quick: bool,
 }
 
-/// Called with the share that is done, 0 to 1, and the name of the case under way; breaking off ends the run.
+/// Called with the share that is done, 0 to 1, and the name of the case under way; breaking off
+/// ends the run.
 pub type Progress<'a> = dyn FnMut(f64, &str) -> ControlFlow<()> + 'a;
 
 /// How far a case is.
@@ -96,8 +99,8 @@ impl Pace<'_> {
 /// Runs cases, all if none is named.
 ///
 /// # Errors
-/// [`Error::UnknownCase`], [`flexarm::Error::File`] where files of the checkout are missing, [`flexarm::Error::Interrupted`], and what
-/// the steps of a case may end with.
+/// [`Error::UnknownCase`], [`flexarm::Error::File`] where files of the checkout are missing,
+/// [`flexarm::Error::Interrupted`], and what the steps of a case may end with.
 pub fn verify(bench: &Bench, names: &[String], progress: &mut Progress<'_>) -> Result<Verification, Error> {
     if let Some(unknown) = names.iter().find(|name| !case_names().contains(&name.as_str())) {
         let known = case_names().join(", ");

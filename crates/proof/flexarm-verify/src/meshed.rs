@@ -25,7 +25,8 @@ pub(crate) struct Meshed {
 }
 
 impl Meshed {
-    /// A mesh of aluminium by its path from the root, with node sets `interface_A` and `interface_B`, exact quadrature.
+    /// A mesh of aluminium by its path from the root, with node sets `interface_A` and
+    /// `interface_B`, exact quadrature.
     pub(crate) fn read(bench: &Bench, file: &str, units: UnitSystem) -> Result<Self, Error> {
         Self::read_with(bench, file, units, Material::ALUMINIUM, Quadrature::Exact)
     }
@@ -77,7 +78,8 @@ impl Meshed {
         (R.transpose() * self.model.M.product(&R))[(0, 0)]
     }
 
-    /// Condensed to its two interfaces, each with its tie, with their reference points at `p_A` and `p_B` (m).
+    /// Condensed to its two interfaces, each with its tie, with their reference points at `p_A` and
+    /// `p_B` (m).
     pub(crate) fn condensed(
         &self,
         ties: [Tie; 2],
@@ -114,7 +116,8 @@ impl Condensed<'_> {
         self.under_weight_between(g, f64::NEG_INFINITY, f64::INFINITY)
     }
 
-    /// The same if only what lies between two fractions of the way from A to B has weight, node by node.
+    /// The same if only what lies between two fractions of the way from A to B has weight, node by
+    /// node.
     pub(crate) fn under_weight_between(&self, g: &Vector3<f64>, from: f64, to: f64) -> Vector6<f64> {
         let model = self.inner.model();
         let R = model.rigid_modes(&Vector3::zeros());
@@ -131,7 +134,8 @@ impl Condensed<'_> {
         Vector6::from_fn(|i, _| u[(i, 0)])
     }
 
-    /// Where the energy of unit wrenches at B sits: its part in each of `n` equal slices from A to B, as compliances at B.
+    /// Where the energy of unit wrenches at B sits: its part in each of `n` equal slices from A to
+    /// B, as compliances at B.
     pub(crate) fn slices(&self, mesh: &Meshed, n: usize) -> Vec<Matrix6<f64>> {
         let plane = |k: usize| CutPlane {
             point: self.p_A + (self.p_B - self.p_A) * (k as f64 / n as f64),

@@ -1,7 +1,7 @@
 //! What a verification says: cases with text, tables, figures and claims; as Markdown and as JSON.
 //!
-//! Numbers keep their value until they are printed. Relative errors below [`FLOOR`] are printed as that: what lies below is
-//! rounding and differs between machines.
+//! Numbers keep their value until they are printed. Relative errors below [`FLOOR`] are printed as
+//! that: what lies below is rounding and differs between machines.
 
 use flexarm_draw::{Panel, PlotError};
 use serde::Serialize;
@@ -384,7 +384,8 @@ mod tests {
         assert!(table_text(&table).starts_with("\n| model |"));
     }
 
-    /// A bound that is met exactly holds; what passes it does not, is counted, and is printed in bold.
+    /// A bound that is met exactly holds; what passes it does not, is counted, and is printed in
+    /// bold.
     #[test]
     fn a_claim_fails_when_its_bound_is_passed() {
         let bounds = [(Bound::AtMost(0.01), [true, true, false]), (Bound::AtLeast(0.01), [false, true, true])];

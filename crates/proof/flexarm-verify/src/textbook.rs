@@ -1,6 +1,7 @@
 //! Closed forms written down from textbooks, apart from the code that they judge.
 //!
-//! A straight beam along x, clamped at x = 0; six-vectors `u_x u_y u_z theta_x theta_y theta_z`. SI units.
+//! A straight beam along x, clamped at x = 0; six-vectors `u_x u_y u_z theta_x theta_y theta_z`. SI
+//! units.
 
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
@@ -24,7 +25,8 @@ pub struct Stiffness {
 }
 
 impl Stiffness {
-    /// Displacement of the end per wrench on it. Gere & Timoshenko, Mechanics of Materials, appendix G; Cowper for shear.
+    /// Displacement of the end per wrench on it. Gere & Timoshenko, Mechanics of Materials,
+    /// appendix G; Cowper for shear.
     pub fn tip_compliance(&self) -> Matrix6<f64> {
         let Self { l, EA, EI_y, EI_z, GJ, kGA, .. } = *self;
         let mut C = Matrix6::zeros();
@@ -62,10 +64,11 @@ impl Stiffness {
         self.mu * g * self.l.powi(4) / (8.0 * self.EI_y)
     }
 
-    /// First frequencies (Hz) of bending with stiffness `EI`, rotary inertia (kg m, `rho I`; zero for Euler and Bernoulli) and a
-    /// point mass (kg) at the end, without shear: the clamped solution
-    /// `w = A (cosh ax - cos bx) + B (sinh ax - (a/b) sin bx)` with `EI w'' = 0` and
-    /// `EI w''' + r omega² w' + m omega² w = 0` at the end. Blevins, tables 8-1 and 8-8, for `r = 0`.
+    /// First frequencies (Hz) of bending with stiffness `EI`, rotary inertia (kg m, `rho I`; zero
+    /// for Euler and Bernoulli) and a point mass (kg) at the end, without shear: the clamped
+    /// solution `w = A (cosh ax - cos bx) + B (sinh ax - (a/b) sin bx)` with `EI w'' = 0` and
+    /// `EI w''' + r omega² w' + m omega² w = 0` at the end. Blevins, tables 8-1 and 8-8, for
+    /// `r = 0`.
     pub fn bending_hz(&self, EI: f64, rotary: f64, point_mass: f64, count: usize) -> Vec<f64> {
         let (l, mu) = (self.l, self.mu);
         let determinant = |omega: f64| {
@@ -96,8 +99,9 @@ impl Stiffness {
         found
     }
 
-    /// Height and shortening of the end over the length under a force (N) that keeps its direction, however far it bends;
-    /// neither stretch nor shear. The elastica `EI theta'' = -F cos theta` by RK4 and bisection on the curvature at the clamp.
+    /// Height and shortening of the end over the length under a force (N) that keeps its direction,
+    /// however far it bends; neither stretch nor shear. The elastica `EI theta'' = -F cos theta` by
+    /// RK4 and bisection on the curvature at the clamp.
     pub fn elastica(&self, force: f64) -> [f64; 2] {
         let load = force * self.l.powi(2) / self.EI_y;
         let end = |curvature: f64| -> [f64; 4] {
@@ -121,7 +125,8 @@ impl Stiffness {
     }
 }
 
-/// Torsion constant (m⁴) of a rectangle: St. Venant's series, Timoshenko & Goodier, Theory of Elasticity, article 109.
+/// Torsion constant (m⁴) of a rectangle: St. Venant's series, Timoshenko & Goodier, Theory of
+/// Elasticity, article 109.
 pub fn rectangle_torsion(long: f64, short: f64) -> f64 {
     use std::f64::consts::PI;
     let term = |n: f64| (n * PI * long / (2.0 * short)).tanh() / n.powi(5);
@@ -129,10 +134,12 @@ pub fn rectangle_torsion(long: f64, short: f64) -> f64 {
     long * short.powi(3) * (1.0 / 3.0 - 64.0 / PI.powi(5) * short / long * series)
 }
 
-/// Torsion constant (m⁴) of a rectangle with a hole and one wall thickness, by finite differences on Prandtl's stress function:
-/// zero outside, one unknown constant on the hole. Timoshenko & Goodier, articles 104 and 115.
+/// Torsion constant (m⁴) of a rectangle with a hole and one wall thickness, by finite differences
+/// on Prandtl's stress function: zero outside, one unknown constant on the hole. Timoshenko &
+/// Goodier, articles 104 and 115.
 ///
-/// * `cells`: grid cells over the wall; the error falls with `cells^(-4/3)`, as inner corners have it.
+/// * `cells`: grid cells over the wall; the error falls with `cells^(-4/3)`, as inner corners have
+///   it.
 pub fn hollow_rectangle_torsion(width: f64, height: f64, wall: f64, cells: usize) -> f64 {
     let d = wall / cells as f64;
     let (nx, ny) = ((width / d).round() as usize, (height / d).round() as usize);
@@ -178,7 +185,8 @@ fn bisect(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Moves the point of a compliance by a rigid lever: `Ad C Adᵀ`, from B to T with `p_BT` (same axes).
+/// Moves the point of a compliance by a rigid lever: `Ad C Adᵀ`, from B to T with `p_BT` (same
+/// axes).
 pub fn at_lever(C: &Matrix6<f64>, p_BT: &Vector3<f64>) -> Matrix6<f64> {
     let mut Ad = Matrix6::identity();
     Ad.fixed_view_mut::<3, 3>(0, 3).copy_from(&-p_BT.cross_matrix());
@@ -200,7 +208,8 @@ mod tests {
     const BAR: Stiffness =
         Stiffness { l: 0.8, EA: 5.6e7, EI_y: 7466.7, EI_z: 1866.7, GJ: 1928.0, kGA: [f64::INFINITY; 2], mu: 2.16 };
 
-    /// Truth: the roots 1.8751 and 4.6941 of the clamped beam, and robots/one_beam/README.md with a mass.
+    /// Truth: the roots 1.8751 and 4.6941 of the clamped beam, and robots/one_beam/README.md with a
+    /// mass.
     #[test]
     fn frequencies_are_those_of_the_tables() {
         let f = BAR.bending_hz(BAR.EI_y, 0.0, 0.0, 2);
@@ -209,14 +218,15 @@ mod tests {
         assert!((f[1] / root(4.694_091_133) - 1.0).abs() < 1e-9, "{f:?}");
         let loaded = BAR.bending_hz(BAR.EI_z, 0.0, 0.5, 1)[0];
         assert!((loaded / 17.4228 - 1.0).abs() < 1e-4, "{loaded}");
-        // Rayleigh: rotary inertia adds r/mu times the ratio of squared slope to squared deflection of the mode, 4.6479/l².
+        // Rayleigh: rotary inertia adds r/mu times the ratio of squared slope to squared deflection
+        // of the mode, 4.6479/l².
         let rotary = BAR.bending_hz(BAR.EI_y, 1e-3, 0.0, 1)[0];
         let expected = (1.0 + 1e-3 / BAR.mu * 4.6479 / 0.64).sqrt().recip();
         assert!((rotary / f[0] - expected).abs() < 2e-6, "{} {expected}", rotary / f[0]);
     }
 
-    /// Truth: Bisshopp & Drucker (1945) as tabulated by Mattiasson (1981): F l²/EI = 1: w/l = 0.30172, u/l = 0.05643;
-    /// = 10: 0.81061, 0.55500.
+    /// Truth: Bisshopp & Drucker (1945) as tabulated by Mattiasson (1981): F l²/EI = 1: w/l =
+    /// 0.30172, u/l = 0.05643; = 10: 0.81061, 0.55500.
     #[test]
     fn the_elastica_is_the_published_one() {
         for (load, w, u) in [(1.0, 0.30172, 0.05643), (10.0, 0.81061, 0.55500)] {
@@ -232,7 +242,8 @@ mod tests {
         assert!((rectangle_torsion(2.0, 1.0) / 2.0 - 0.2287).abs() < 5e-5);
     }
 
-    /// Truth: the series of the solid square, whose hole is one grid point; a thin wall, Bredt with the walls' own `s t³/3`.
+    /// Truth: the series of the solid square, whose hole is one grid point; a thin wall, Bredt with
+    /// the walls' own `s t³/3`.
     #[test]
     fn torsion_of_hollow_rectangles_lies_between_solid_and_thin_ones() {
         let solid = hollow_rectangle_torsion(1.0, 1.0, 0.5, 40);
@@ -242,7 +253,8 @@ mod tests {
         assert!((thin / bredt - 1.0).abs() < 1e-2, "{}", thin / bredt);
     }
 
-    /// Truth: a force and a moment at the end against the compliance of the end; continuity at the load.
+    /// Truth: a force and a moment at the end against the compliance of the end; continuity at the
+    /// load.
     #[test]
     fn curves_along_the_beam_end_where_the_compliance_says() {
         let C = BAR.tip_compliance();
@@ -256,7 +268,8 @@ mod tests {
         }
     }
 
-    /// Truth: the weight of each slice deflects the end as a force of its own; the sum over 1000 slices by the midpoint rule.
+    /// Truth: the weight of each slice deflects the end as a force of its own; the sum over 1000
+    /// slices by the midpoint rule.
     #[test]
     fn own_weight_is_the_sum_of_the_weights_of_its_slices() {
         let slices = 1000;
@@ -266,7 +279,8 @@ mod tests {
         assert!((sum / BAR.own_weight(9.81) - 1.0).abs() < 1e-6, "{sum}");
     }
 
-    /// Truth by hand: under F_z at T, 0.5 m along x beyond B, B sees a moment -0.5 about y; T moves by C_zz + 2 (-0.5) C_zy + 0.25 C_yy.
+    /// Truth by hand: under F_z at T, 0.5 m along x beyond B, B sees a moment -0.5 about y; T moves
+    /// by C_zz + 2 (-0.5) C_zy + 0.25 C_yy.
     #[test]
     fn a_lever_makes_a_force_a_moment_and_a_turn_a_shift() {
         let C = BAR.tip_compliance();

@@ -1,4 +1,5 @@
-//! A quick subset of the case studies: every claim holds, and the same command gives the same bytes.
+//! A quick subset of the case studies: every claim holds, and the same command gives the same
+//! bytes.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -15,7 +16,8 @@ fn quick(names: &[&str]) -> Verification {
     verify(&bench(), &names, &mut |_, _| ControlFlow::Continue(())).expect("the checkout has what the cases need")
 }
 
-/// Truths: those of the claims themselves (closed forms, CalculiX, NGSolve, Pinocchio, the stepper with error control).
+/// Truths: those of the claims themselves (closed forms, CalculiX, NGSolve, Pinocchio, the stepper
+/// with error control).
 #[test]
 fn every_claim_of_the_quick_cases_holds() {
     let found = quick(&[]);

@@ -1,19 +1,23 @@
 //! Which flexible element moves the tool how far, and how strained a link is.
 //!
-//! To first order the TCP error is the sum over the elastic elements of `J_e d_e`: the deflection of the element,
-//! carried to the tool by the columns of the Jacobian that belong to it.
+//! To first order the TCP error is the sum over the elastic elements of `J_e d_e`: the deflection
+//! of the element, carried to the tool by the columns of the Jacobian that belong to it.
 
 use nalgebra::{Matrix6, Vector6};
 
-/// Displacement of the tool that the deflection of one element causes, the rest of the arm being rigid.
+/// Displacement of the tool that the deflection of one element causes, the rest of the arm being
+/// rigid.
 ///
 /// ```text
 /// u_T_W = J_WT_e d_e
 /// ```
-/// Exact to first order in `d_e`; the contributions of all elements add up to the TCP error to first order.
+/// Exact to first order in `d_e`; the contributions of all elements add up to the TCP error to
+/// first order.
 ///
-/// * `map`: 6×6, rates of the element's deflection to the twist of the tool in world axes at the tool point.
-/// * `deflection`: elastic coordinates of the element, three translations in m and three rotations in rad.
+/// * `map`: 6×6, rates of the element's deflection to the twist of the tool in world axes at the
+///   tool point.
+/// * `deflection`: elastic coordinates of the element, three translations in m and three rotations
+///   in rad.
 ///
 /// Returns the displacement of the tool in world axes, m and rad, linear first.
 pub fn tcp_displacement(map: &Matrix6<f64>, deflection: &Vector6<f64>) -> Vector6<f64> {
@@ -31,7 +35,8 @@ pub struct ContributionPeak {
     pub peak_rad: f64,
 }
 
-/// Collects the peak contribution of each element, sample by sample, so that no 6×6 maps need to be stored.
+/// Collects the peak contribution of each element, sample by sample, so that no 6×6 maps need to be
+/// stored.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContributionPeaks {
     peaks: Vec<ContributionPeak>,
@@ -43,8 +48,8 @@ impl ContributionPeaks {
         Self { peaks: vec![ContributionPeak { peak_m: 0.0, t_peak_s: 0.0, peak_rad: 0.0 }; elements] }
     }
 
-    /// Takes in one element at time `t` (s); returns the displacement of the tool that it causes, as
-    /// [`tcp_displacement`] does.
+    /// Takes in one element at time `t` (s); returns the displacement of the tool that it causes,
+    /// as [`tcp_displacement`] does.
     ///
     /// # Panics
     /// When there is no such element.
@@ -54,7 +59,8 @@ impl ContributionPeaks {
         displacement
     }
 
-    /// Takes in the displacement of the tool (m, rad, world axes) that one element causes at time `t` (s).
+    /// Takes in the displacement of the tool (m, rad, world axes) that one element causes at time
+    /// `t` (s).
     ///
     /// # Panics
     /// When there is no such element.
@@ -80,8 +86,8 @@ impl ContributionPeaks {
 ///
 /// * `interface_distance_change`: m, positive when the link gets longer. `length`: m.
 ///
-/// Returns a dimensionless number with the sign of the change; `None` when the interfaces coincide (`length` is not
-/// positive).
+/// Returns a dimensionless number with the sign of the change; `None` when the interfaces coincide
+/// (`length` is not positive).
 pub fn engineering_strain(interface_distance_change: f64, length: f64) -> Option<f64> {
     (length > 0.0).then(|| interface_distance_change / length)
 }
@@ -92,7 +98,8 @@ mod tests {
     use nalgebra::{IsometryMatrix3, Rotation3, Translation3, Vector3};
     use proptest::prelude::*;
 
-    /// Map of the deflection of an element at S (in S axes) to the twist of the tool at T, in world axes.
+    /// Map of the deflection of an element at S (in S axes) to the twist of the tool at T, in world
+    /// axes.
     fn map(X_WS: &IsometryMatrix3<f64>, p_WT: &Vector3<f64>) -> Matrix6<f64> {
         let R = *X_WS.rotation.matrix();
         let p_ST = p_WT - X_WS.translation.vector;

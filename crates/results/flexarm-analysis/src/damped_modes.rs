@@ -3,9 +3,10 @@
 //! ```text
 //! (λ² M + λ D + K) φ = 0        λ = -ζ ω + i ω sqrt(1 - ζ²)
 //! ```
-//! The problem is written in the coordinates of the undamped modes, `q = Φ η`, `Φᵀ M Φ = 1`, `Φᵀ K Φ = diag μ`, with
-//! `z = (s η, η̇)` and `s = sqrt|μ|`: the first-order matrix is then as large as the highest frequency and not as its
-//! square, and low modes keep their digits beside stiff ones. Start at [`damped_modes`].
+//! The problem is written in the coordinates of the undamped modes, `q = Φ η`, `Φᵀ M Φ = 1`,
+//! `Φᵀ K Φ = diag μ`, with `z = (s η, η̇)` and `s = sqrt|μ|`: the first-order matrix is then as
+//! large as the highest frequency and not as its square, and low modes keep their digits beside
+//! stiff ones. Start at [`damped_modes`].
 
 use std::f64::consts::TAU;
 
@@ -16,20 +17,23 @@ use crate::linear_system::LinearError;
 /// Undamped modes below this part of the highest `ω²` are rigid motions.
 const RIGID: f64 = 1e-13;
 
-/// A mode of a damped structure: an oscillation (which stands for a conjugate pair), a decay without oscillation
-/// (each of the two on its own), or a rigid motion (`λ = 0`).
+/// A mode of a damped structure: an oscillation (which stands for a conjugate pair), a decay
+/// without oscillation (each of the two on its own), or a rigid motion (`λ = 0`).
 #[derive(Debug, Clone, PartialEq)]
 pub struct DampedMode {
     /// `λ`, 1/s; not below the real axis.
     pub eigenvalue: Complex<f64>,
-    /// `φ`, with `φᴴ M φ = 1` and `φᵀ M φ` real and positive: real where the damping is proportional.
+    /// `φ`, with `φᴴ M φ = 1` and `φᵀ M φ` real and positive: real where the damping is
+    /// proportional.
     pub shape: DVector<Complex<f64>>,
-    /// `|(λ² M + λ D + K) φ|` over the sum of the norms of its three terms: what the eigensolver promises, evaluated.
+    /// `|(λ² M + λ D + K) φ|` over the sum of the norms of its three terms: what the eigensolver
+    /// promises, evaluated.
     pub residual: f64,
 }
 
 impl DampedMode {
-    /// `|λ| / 2π`: the frequency that the mode would have without damping if the damping is proportional, Hz.
+    /// `|λ| / 2π`: the frequency that the mode would have without damping if the damping is
+    /// proportional, Hz.
     pub fn frequency_hz(&self) -> f64 {
         self.eigenvalue.norm() / TAU
     }
@@ -39,7 +43,8 @@ impl DampedMode {
         self.eigenvalue.im / TAU
     }
 
-    /// `-Re λ / |λ|`: 1 for a decay without oscillation, negative for a motion that grows, 0 for a rigid one.
+    /// `-Re λ / |λ|`: 1 for a decay without oscillation, negative for a motion that grows, 0 for a
+    /// rigid one.
     pub fn damping_ratio(&self) -> f64 {
         let size = self.eigenvalue.norm();
         if size > 0.0 { -self.eigenvalue.re / size } else { 0.0 }
@@ -48,8 +53,8 @@ impl DampedMode {
 
 /// All modes of `M q̈ + D q̇ + K q = 0`, by ascending `|λ|`.
 ///
-/// * `M`: n×n, positive definite. `D`, `K`: n×n, symmetric; they may be singular, and `K` indefinite (an inverted
-///   pendulum has a mode with a negative damping ratio).
+/// * `M`: n×n, positive definite. `D`, `K`: n×n, symmetric; they may be singular, and `K`
+///   indefinite (an inverted pendulum has a mode with a negative damping ratio).
 ///
 /// # Errors
 /// [`LinearError`]: sizes that do not fit, `M` not positive definite, an iteration that does not end.
@@ -95,7 +100,8 @@ pub fn damped_modes(M: &DMatrix<f64>, D: &DMatrix<f64>, K: &DMatrix<f64>) -> Res
         if eigenvalue.im.abs() <= 1e-11 * scale {
             eigenvalue.im = 0.0;
         }
-        // The lower one of a pair, and the velocity of a rigid motion without damping, are known already.
+        // The lower one of a pair, and the velocity of a rigid motion without damping, are known
+        // already.
         if eigenvalue.im < 0.0 || eigenvalue.norm() <= 1e-11 * scale {
             continue;
         }
@@ -111,8 +117,8 @@ pub fn damped_modes(M: &DMatrix<f64>, D: &DMatrix<f64>, K: &DMatrix<f64>) -> Res
 /// `K Φ = M Φ diag μ`, `Φᵀ M Φ = 1`.
 fn undamped(M: &DMatrix<f64>, K: &DMatrix<f64>) -> Result<(Vec<f64>, DMatrix<f64>), LinearError> {
     let mass = Cholesky::new(M.clone()).ok_or(LinearError::NotPositiveDefinite { what: "mass matrix" })?;
-    // Without rigid motions K = L Lᵀ and the eigenvalues 1/μ of L^-1 M L^-T: the low modes are the largest.
-    // Rounding may let a singular K pass; its rigid motions would then drown the rest.
+    // Without rigid motions K = L Lᵀ and the eigenvalues 1/μ of L^-1 M L^-T: the low modes are the
+    // largest. Rounding may let a singular K pass; its rigid motions would then drown the rest.
     if let Some(stiffness) = Cholesky::new(K.clone()) {
         let eigen = congruent(&stiffness.l(), M);
         if let Some(eigen) = eigen.filter(|e| e.eigenvalues.min() > 1e3 * RIGID * e.eigenvalues.max()) {

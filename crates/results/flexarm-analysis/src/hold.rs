@@ -9,7 +9,8 @@ use crate::spectrum::{SpectralLine, Taper, strongest_line};
 /// Part of a hold, at its end, over which the final value is averaged when nothing oscillates.
 const QUIET_PART: f64 = 0.25;
 
-/// Figures of one hold: the stretch from the end of a move to the start of the next one or the end of the record.
+/// Figures of one hold: the stretch from the end of a move to the start of the next one or the end
+/// of the record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HoldMetrics {
     /// Start: the end of the move before, s.
@@ -20,23 +21,25 @@ pub struct HoldMetrics {
     pub place_m: [f64; 3],
     /// Translation error at the end, m, in world axes.
     pub end_error_m: [f64; 3],
-    /// Translation error that the arm comes to rest at, m, in world axes: the given quasi-static value at the end of
-    /// the hold; otherwise a weighted mean (`sin²`) over as many whole periods of the oscillation as fit into the
-    /// second half of the hold (at least two); otherwise over its last quarter.
+    /// Translation error that the arm comes to rest at, m, in world axes: the given quasi-static
+    /// value at the end of the hold; otherwise a weighted mean (`sin²`) over as many whole periods
+    /// of the oscillation as fit into the second half of the hold (at least two); otherwise over
+    /// its last quarter.
     pub final_error_m: [f64; 3],
-    /// Time from the start of the hold until the error stays within the band around its final value, s. 0 when it
-    /// never leaves the band. `None` when it is outside at the last sample, or has not been inside for a whole
-    /// period of its oscillation when the hold ends.
+    /// Time from the start of the hold until the error stays within the band around its final
+    /// value, s. 0 when it never leaves the band. `None` when it is outside at the last sample, or
+    /// has not been inside for a whole period of its oscillation when the hold ends.
     pub settling_s: Option<f64>,
-    /// Largest excursion of the error beyond its final value in the direction of approach, m; 0 when it stays within
-    /// the band, or when the tool did not move. As the rigid tool stands still, this is how far the tool goes past
-    /// the place where it comes to rest.
+    /// Largest excursion of the error beyond its final value in the direction of approach, m; 0
+    /// when it stays within the band, or when the tool did not move. As the rigid tool stands
+    /// still, this is how far the tool goes past the place where it comes to rest.
     pub overshoot_m: f64,
     /// Strongest line of the error during the hold.
     pub line: Option<SpectralLine>,
 }
 
-/// Whether a line is worth telling: far below the settling band (m) it neither delays settling nor is it vibration.
+/// Whether a line is worth telling: far below the settling band (m) it neither delays settling nor
+/// is it vibration.
 pub(crate) fn is_seen(line: &SpectralLine, band_m: f64) -> bool {
     line.amplitude > 1e-6 * band_m
 }
@@ -87,13 +90,14 @@ impl Hold<'_> {
         self.mean_since(self.end() - span.min(length))
     }
 
-    /// Average from `start` to the end with weight `sin²`: an oscillation with two or more whole periods in that
-    /// time cancels, and nearly so if it dies away.
+    /// Average from `start` to the end with weight `sin²`: an oscillation with two or more whole
+    /// periods in that time cancels, and nearly so if it dies away.
     fn mean_since(&self, start: f64) -> [f64; 3] {
         let n = self.times.len();
         let (mut sum, mut sum_of_weights) = (Vector3::zeros(), 0.0);
         for i in (0..n).filter(|&i| self.times[i] > start) {
-            // Half the time to either neighbour: the trapezoidal rule, as the weight vanishes at both ends.
+            // Half the time to either neighbour: the trapezoidal rule, as the weight vanishes at
+            // both ends.
             let share = self.times[(i + 1).min(n - 1)] - self.times[i.saturating_sub(1)];
             let part = (self.times[i] - start) / (self.end() - start);
             let weight = share * (PI * part).sin().powi(2);
@@ -113,7 +117,8 @@ impl Hold<'_> {
         if outside + 1 == n {
             return None;
         }
-        // Where the straight line between the last sample outside and the first inside enters the band.
+        // Where the straight line between the last sample outside and the first inside enters the
+        // band.
         let (out, inside) = (distance(outside), distance(outside + 1));
         let part = (out - band) / (out - inside);
         let entry = self.times[outside] + part * (self.times[outside + 1] - self.times[outside]);

@@ -5,16 +5,18 @@
 //! H(s) = J_a - J (M s² + D s + K)^-1 (M_a s² + D_a s + K_a)
 //! u = A_0 y + A_1 ẏ + ... + A_4 y⁗                     A(s) = H(s)^-1 + O(s⁵)
 //! ```
-//! with the error -y of the tool, the change u of the commands and x of the free coordinates, all about the arm linearised along
-//! its motion. The inverse is its series at low frequencies: at rest, damping, inertia, and what these move in turn. It holds up to the first frequency at which
-//! the arm with its tool held would vibrate, which lies well above the first of the arm itself, needs no solution over time and
-//! looks ahead by derivatives alone. Each use leaves `1 - H A` of the error: where that is more than half the commands are filtered
-//! off, without phase, so that iteration settles and noise does not grow. With other numbers of joints than of components A_0 is
-//! the pseudo-inverse; near singular poses it is damped.
+//! with the error -y of the tool, the change u of the commands and x of the free coordinates, all
+//! about the arm linearised along its motion. The inverse is its series at low frequencies: at
+//! rest, damping, inertia, and what these move in turn. It holds up to the first frequency at which
+//! the arm with its tool held would vibrate, which lies well above the first of the arm itself,
+//! needs no solution over time and looks ahead by derivatives alone. Each use leaves `1 - H A` of
+//! the error: where that is more than half the commands are filtered off, without phase, so that
+//! iteration settles and noise does not grow. With other numbers of joints than of components A_0
+//! is the pseudo-inverse; near singular poses it is damped.
 //!
-//! Joints under servos: the series is that of the arm whose motors are prescribed, and gives the motion of the motors and the torques
-//! that they need beyond those fed forward; what the servos must be told for these is a small equation over time (`servo`), stable as
-//! the servos themselves.
+//! Joints under servos: the series is that of the arm whose motors are prescribed, and gives the
+//! motion of the motors and the torques that they need beyond those fed forward; what the servos
+//! must be told for these is a small equation over time (`servo`), stable as the servos themselves.
 
 use nalgebra::{Complex, DMatrix};
 
@@ -23,8 +25,9 @@ use crate::signal::LowPass;
 
 /// The arm linearised at a time of its motion; world axes at the tool, components that count only.
 ///
-/// As `Linear` of `flexarm-stepping`: n free coordinates, m commands, k components of the tool. Joints under servos are free
-/// coordinates, the first of them, driven by nothing; the columns of their commands are zero.
+/// As `Linear` of `flexarm-stepping`: n free coordinates, m commands, k components of the tool.
+/// Joints under servos are free coordinates, the first of them, driven by nothing; the columns of
+/// their commands are zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Node {
     /// Mass, n×n.
@@ -109,7 +112,8 @@ pub enum InversionError {
     },
 }
 
-/// Below this part of the largest singular value the joints move the tool too little in a direction to correct it at once.
+/// Below this part of the largest singular value the joints move the tool too little in a direction
+/// to correct it at once.
 const WEAK: f64 = 0.02;
 /// Part of the error that one use may leave at the highest frequency that is corrected.
 const LEFT: f64 = 0.5;
@@ -163,7 +167,8 @@ impl Inversion {
         Self { cutoff_hz: self.cutoff_hz.min(hz), ..self }
     }
 
-    /// When the joints move the tool in fewest directions (s), and in how many of those asked for; the rest is not corrected there.
+    /// When the joints move the tool in fewest directions (s), and in how many of those asked for;
+    /// the rest is not corrected there.
     pub fn fewest_directions(&self) -> Option<(f64, usize)> {
         let each = self.series.iter().enumerate().map(|(k, series)| (k as f64 * self.spacing_s, series.moved.ncols()));
         each.min_by_key(|(_, directions)| *directions)
@@ -185,8 +190,8 @@ impl Inversion {
 
     /// Change of the commands for which the tool moves by `y`, below the cutoff.
     ///
-    /// * `y`: k×N, a column per time from 0, `step_s` apart; before and after it stays as at the ends, and over
-    ///   [`Inversion::edge_s`] it goes to that.
+    /// * `y`: k×N, a column per time from 0, `step_s` apart; before and after it stays as at the
+    ///   ends, and over [`Inversion::edge_s`] it goes to that.
     ///
     /// Returns m×N.
     pub fn commands(&self, y: &DMatrix<f64>, step_s: f64) -> DMatrix<f64> {
@@ -228,13 +233,14 @@ impl Inversion {
         u
     }
 
-    /// How far from its end an error is changed, so that it ends at rest (s): one that is known so much longer than the commands
-    /// are needed leaves them alone.
+    /// How far from its end an error is changed, so that it ends at rest (s): one that is known so
+    /// much longer than the commands are needed leaves them alone.
     pub fn edge_s(&self) -> f64 {
         self.rest_s() + 1.0 / self.cutoff_hz
     }
 
-    /// Time in which an error comes to rest at the end: so slowly that no term of the series takes more than the error itself does.
+    /// Time in which an error comes to rest at the end: so slowly that no term of the series takes
+    /// more than the error itself does.
     fn rest_s(&self) -> f64 {
         let Some(end) = self.series.last() else { return 0.0 };
         let size = end.A[0].norm();
@@ -243,8 +249,9 @@ impl Inversion {
         (COMES_TO_REST * slowest).max(1.0 / self.cutoff_hz)
     }
 
-    /// Numbers of the nodes about a time, with their weights, which are those of a cubic B-spline: what goes along with the arm has
-    /// no kink at a node, and commands no velocity that jumps there. At the ends it is even.
+    /// Numbers of the nodes about a time, with their weights, which are those of a cubic B-spline:
+    /// what goes along with the arm has no kink at a node, and commands no velocity that jumps
+    /// there. At the ends it is even.
     fn place(&self, t: f64) -> [(usize, f64); 4] {
         let last = self.series.len() as i64 - 1;
         let at = (t / self.spacing_s).clamp(0.0, last as f64);
@@ -312,7 +319,8 @@ impl Series {
         highest.min(most)
     }
 
-    /// Largest part of an error that one use leaves at a frequency, each component of the tool by its own unit.
+    /// Largest part of an error that one use leaves at a frequency, each component of the tool by
+    /// its own unit.
     fn leaves(&self, node: &Node, hz: f64) -> Option<f64> {
         let s = Complex::new(0.0, std::f64::consts::TAU * hz);
         let poly =
@@ -349,10 +357,12 @@ fn complex(A: &DMatrix<f64>) -> DMatrix<Complex<f64>> {
     A.map(|x| Complex::new(x, 0.0))
 }
 
-/// The damped pseudo-inverse, and an orthonormal basis of the directions that it does not damp; none of a matrix without any.
+/// The damped pseudo-inverse, and an orthonormal basis of the directions that it does not damp;
+/// none of a matrix without any.
 ///
-/// Near a singular pose joints would have to move far for little: singular values below [`WEAK`] of the largest are damped, the more
-/// the smaller they are (Nakamura and Hanafusa 1986), and what they would do is left to further iterations, or undone.
+/// Near a singular pose joints would have to move far for little: singular values below [`WEAK`] of
+/// the largest are damped, the more the smaller they are (Nakamura and Hanafusa 1986), and what
+/// they would do is left to further iterations, or undone.
 fn damped_inverse(H: &DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
     if !H.norm_squared().is_finite() {
         return None;
@@ -382,8 +392,9 @@ fn derivative(y: &DMatrix<f64>, h: f64) -> DMatrix<f64> {
     })
 }
 
-/// An error that ends at rest, within so many seconds. What the tool still swings by at the end of a motion is a kink where it is
-/// held on, and the derivatives of a kink would have the joints struck there.
+/// An error that ends at rest, within so many seconds. What the tool still swings by at the end of
+/// a motion is a kink where it is held on, and the derivatives of a kink would have the joints
+/// struck there.
 fn ending_at_rest(y: &DMatrix<f64>, step_s: f64, within_s: f64) -> DMatrix<f64> {
     let last = y.ncols() - 1;
     let length = (within_s / step_s).ceil().clamp(ORDER as f64, (0.5 * last as f64).max(ORDER as f64));
@@ -395,8 +406,9 @@ fn ending_at_rest(y: &DMatrix<f64>, step_s: f64, within_s: f64) -> DMatrix<f64> 
     })
 }
 
-/// Each row without what is above a frequency, without phase: Butterworth's filter of fourth order forwards and backwards. The
-/// ends are held on for so many columns on either side, which is returned as well.
+/// Each row without what is above a frequency, without phase: Butterworth's filter of fourth order
+/// forwards and backwards. The ends are held on for so many columns on either side, which is
+/// returned as well.
 fn filtered(y: &DMatrix<f64>, step_s: f64, cutoff_hz: f64) -> (DMatrix<f64>, usize) {
     // Over three periods at each end.
     let pad = (3.0 / (cutoff_hz * step_s)).ceil() as usize + 2 * ORDER;

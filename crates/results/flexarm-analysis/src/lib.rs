@@ -1,8 +1,9 @@
 //! How far the tool of a flexible arm is from where the rigid arm would have it, in figures.
 //!
-//! The TCP error is the flexible pose minus the pose of the rigid twin: the same robot on the same trajectory with
-//! every elastic coordinate held at zero. [`tcp_error`] gives it for one sample, [`tcp_metrics`] condenses a record of
-//! it: peak, RMS, sag, settling time, overshoot, dominant frequency, parts along and across the path.
+//! The TCP error is the flexible pose minus the pose of the rigid twin: the same robot on the same
+//! trajectory with every elastic coordinate held at zero. [`tcp_error`] gives it for one sample,
+//! [`tcp_metrics`] condenses a record of it: peak, RMS, sag, settling time, overshoot, dominant
+//! frequency, parts along and across the path.
 //!
 //! ```
 //! use flexarm_analysis::{ErrorRecord, MetricSettings, tcp_metrics};
@@ -30,16 +31,19 @@
 //!
 //! [`error_parts`] says how much of the error is sag and how much comes from the motion.
 //!
-//! Linear structures are a part of their own: [`damped_modes`] with what each mode does ([`compliance_parts`],
-//! [`strain_energy_shares`]), and the response to harmonic excitation ([`LinearSystem::response`], [`response_peaks`]).
+//! Linear structures are a part of their own: [`damped_modes`] with what each mode does
+//! ([`compliance_parts`], [`strain_energy_shares`]), and the response to harmonic excitation
+//! ([`LinearSystem::response`], [`response_peaks`]).
 //!
-//! The way back is [`Inversion`]: the joint commands that take an error of the tool away; [`Shaper`] leaves no vibration behind a motion.
+//! The way back is [`Inversion`]: the joint commands that take an error of the tool away;
+//! [`Shaper`] leaves no vibration behind a motion.
 //!
-//! Names of ISO 9283:1998 are used where they fit. A simulation is deterministic and has one cycle, so these are
-//! "ISO 9283-style" figures, not a test after the standard: path accuracy AT ([`TcpMetrics::path_accuracy_m`]),
-//! position overshoot OV ([`TcpMetrics::overshoot_m`]), position stabilisation time ([`TcpMetrics::settling_s`], which
-//! is that of the worst stop and counts from the end of the commanded move and not, as the standard does, from the first
-//! entry into the band).
+//! Names of ISO 9283:1998 are used where they fit. A simulation is deterministic and has one cycle,
+//! so these are "ISO 9283-style" figures, not a test after the standard: path accuracy AT
+//! ([`TcpMetrics::path_accuracy_m`]), position overshoot OV ([`TcpMetrics::overshoot_m`]), position
+//! stabilisation time ([`TcpMetrics::settling_s`], which is that of the worst stop and counts from
+//! the end of the commanded move and not, as the standard does, from the first entry into the
+//! band).
 //!
 //! Frames: W world, T tool. Order: linear first, angular second. SI units.
 //! Not here: simulation, robots, files. Everything is a pure function of slices and matrices.

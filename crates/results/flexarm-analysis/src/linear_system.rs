@@ -4,8 +4,9 @@
 //! M q̈ + D q̇ + K q = B_0 u + B_1 u̇ + B_2 ü        y = C q + F u
 //! H(ω) = C (K + iωD - ω²M)^-1 (B_0 + iωB_1 - ω²B_2) + F
 //! ```
-//! A force has `B_0` alone. A prescribed motion has `B_2` (inertia) and, with weight, `B_0`, and the rigid part `F`.
-//! Start at [`LinearSystem::response`]; [`response_peaks`] finds resonances, [`frequency_grid`] places frequencies.
+//! A force has `B_0` alone. A prescribed motion has `B_2` (inertia) and, with weight, `B_0`, and
+//! the rigid part `F`. Start at [`LinearSystem::response`]; [`response_peaks`] finds resonances,
+//! [`frequency_grid`] places frequencies.
 
 use std::fmt;
 
@@ -85,13 +86,14 @@ impl LinearSystem {
         Ok(())
     }
 
-    /// `H(ω)`, p×m, at `omega` (rad/s): complex amplitude of each output per unit amplitude of each input.
+    /// `H(ω)`, p×m, at `omega` (rad/s): complex amplitude of each output per unit amplitude of each
+    /// input.
     ///
     /// At `omega = 0` it is the static answer, `C K^-1 B_0 + F`.
     ///
     /// # Errors
-    /// [`LinearError::Resonance`] where the dynamic stiffness is singular (no damping, or a rigid motion at 0), and as
-    /// [`LinearSystem::check`].
+    /// [`LinearError::Resonance`] where the dynamic stiffness is singular (no damping, or a rigid
+    /// motion at 0), and as [`LinearSystem::check`].
     pub fn response(&self, omega: f64) -> Result<DMatrix<Complex<f64>>, LinearError> {
         self.check()?;
         let n = self.M.nrows();
@@ -151,8 +153,8 @@ pub fn frequency_grid(from: f64, to: f64, points: usize, spacing: Spacing) -> Ve
 
 /// A grid with frequencies put in around each resonance, so that no peak falls between two points.
 ///
-/// * `grid`: ascending. `modes`: frequency (in the unit of the grid) and damping ratio of each mode; what lies outside
-///   the grid is left out.
+/// * `grid`: ascending. `modes`: frequency (in the unit of the grid) and damping ratio of each
+///   mode; what lies outside the grid is left out.
 pub fn with_resonances(grid: &[f64], modes: &[(f64, f64)]) -> Vec<f64> {
     let (Some(&from), Some(&to)) = (grid.first(), grid.last()) else { return Vec::new() };
     let mut all = grid.to_vec();
@@ -172,11 +174,14 @@ const DEEPEST: u32 = 10;
 /// Entries below this part of the largest are rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// A response over a grid, with frequencies put in until straight lines between the points are the curves of all magnitudes
-/// on logarithmic axes, within a tolerance: many around resonances and where a curve dips, few elsewhere.
+/// A response over a grid, with frequencies put in until straight lines between the points are the
+/// curves of all magnitudes on logarithmic axes, within a tolerance: many around resonances and
+/// where a curve dips, few elsewhere.
 ///
-/// * `grid`: ascending, with a point near each resonance ([`with_resonances`]): what is narrower than its steps is not found.
-/// * `answer`: the response at a frequency; `None` where there is none (an undamped resonance), which leaves that point out.
+/// * `grid`: ascending, with a point near each resonance ([`with_resonances`]): what is narrower
+///   than its steps is not found.
+/// * `answer`: the response at a frequency; `None` where there is none (an undamped resonance),
+///   which leaves that point out.
 /// * `tolerance`: relative, such as 0.01. An interval of the grid is halved ten times at most.
 ///
 /// Returns the frequencies and the responses there.
@@ -204,7 +209,8 @@ pub fn resolved_response(
     found.into_iter().unzip()
 }
 
-/// Whether a magnitude in the middle of an interval is off the line between its ends, on logarithmic axes.
+/// Whether a magnitude in the middle of an interval is off the line between its ends, on
+/// logarithmic axes.
 fn strays(
     H_a: &DMatrix<Complex<f64>>,
     H_m: &DMatrix<Complex<f64>>,
@@ -228,16 +234,17 @@ pub struct ResponsePeak {
     pub magnitude: f64,
 }
 
-/// Local maxima of `magnitude` over a grid of frequencies, each refined between its neighbours by golden-section
-/// search; the highest first. The ends of the grid are not peaks.
+/// Local maxima of `magnitude` over a grid of frequencies, each refined between its neighbours by
+/// golden-section search; the highest first. The ends of the grid are not peaks.
 ///
-/// * `grid`: ascending, fine enough that a peak has a point of its own ([`with_resonances`]). `values`: magnitudes
-///   there.
+/// * `grid`: ascending, fine enough that a peak has a point of its own ([`with_resonances`]).
+///   `values`: magnitudes there.
 pub fn response_peaks(grid: &[f64], values: &[f64], magnitude: impl Fn(f64) -> f64) -> Vec<ResponsePeak> {
     let mut peaks: Vec<ResponsePeak> = (1..grid.len().saturating_sub(1))
         .filter(|&k| values[k] >= values[k - 1] && values[k] > values[k + 1])
         .map(|k| {
-            // 45 steps narrow the neighbourhood to 4e-10 of it, which is all that a maximum lets one see.
+            // 45 steps narrow the neighbourhood to 4e-10 of it, which is all that a maximum lets
+            // one see.
             let refined = golden_maximum(&magnitude, grid[k - 1], grid[k + 1], 45);
             let top = magnitude(refined);
             if top >= values[k] { (refined, top) } else { (grid[k], values[k]) }

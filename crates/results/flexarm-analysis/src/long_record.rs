@@ -1,13 +1,16 @@
 //! A record that grows while a run goes on, in memory that does not.
 //!
-//! Up to [`LongRecord::MOST`] samples all are kept, and the figures are those of [`tcp_metrics_on_path`]. Beyond, stops that
-//! are over are measured and their samples are dropped, and figures of the record as a whole are those that were gathered
-//! sample by sample, by the same sums. What is neither exact nor bounded otherwise:
+//! Up to [`LongRecord::MOST`] samples all are kept, and the figures are those of
+//! [`tcp_metrics_on_path`]. Beyond, stops that are over are measured and their samples are dropped,
+//! and figures of the record as a whole are those that were gathered sample by sample, by the same
+//! sums. What is neither exact nor bounded otherwise:
 //!
-//! * a move or a stop that is longer than that by itself is thinned: the older half of it, except for the beginning of the
-//!   stop, loses every second sample, again and again, so that what is recent has all of them. Only how a stop ends
-//!   depends on it (final value, settling), to within one distance of samples;
-//! * where no stop has a frequency, that of the record is the one of the samples that are left: its end.
+//! * a move or a stop that is longer than that by itself is thinned: the older half of it, except
+//!   for the beginning of the stop, loses every second sample, again and again, so that what is
+//!   recent has all of them. Only how a stop ends depends on it (final value, settling), to within
+//!   one distance of samples;
+//! * where no stop has a frequency, that of the record is the one of the samples that are left: its
+//!   end.
 //!
 //! Start at [`LongRecord::push`].
 
@@ -19,7 +22,8 @@ use crate::metrics::{MetricSettings, TcpMetrics, tcp_metrics_on_path};
 use crate::record::{ErrorRecord, RecordError};
 use crate::repeated_pose::repeated_poses;
 
-/// First samples of a stop that are never dropped, and last ones of a move: ringing is seen there, and the way of arrival.
+/// First samples of a stop that are never dropped, and last ones of a move: ringing is seen there,
+/// and the way of arrival.
 const RINGING: usize = 1 << 15;
 const ARRIVAL: usize = 64;
 /// Blocks of the curve of largest errors; half of them when there are more.
@@ -68,11 +72,13 @@ pub struct LongRecord {
 }
 
 impl LongRecord {
-    /// Samples that are kept one by one: 65,536, which is 2 minutes and 11 seconds at 500 samples a second and takes 8 MB.
+    /// Samples that are kept one by one: 65,536, which is 2 minutes and 11 seconds at 500 samples a
+    /// second and takes 8 MB.
     pub const MOST: usize = 1 << 16;
 
-    /// An empty record of a motion with these moves (start and end, s, ascending). `rests_there` says that the tool comes
-    /// to rest where the static part of its error is: it is then the final value of stops ([`ErrorRecord::quasi_static`]).
+    /// An empty record of a motion with these moves (start and end, s, ascending). `rests_there`
+    /// says that the tool comes to rest where the static part of its error is: it is then the final
+    /// value of stops ([`ErrorRecord::quasi_static`]).
     #[must_use]
     pub fn new(moves: Vec<(f64, f64)>, rests_there: bool, settings: MetricSettings) -> Self {
         Self { rests_there, ..Self::keeping(Self::MOST, moves, settings) }
@@ -227,7 +233,8 @@ impl LongRecord {
         })
     }
 
-    /// Largest size of the translation in each of `pieces` equal pieces of the record, fewer for a record of fewer samples.
+    /// Largest size of the translation in each of `pieces` equal pieces of the record, fewer for a
+    /// record of fewer samples.
     #[must_use]
     pub fn largest_errors(&self, pieces: usize) -> Vec<f64> {
         if self.condensed {
@@ -248,7 +255,8 @@ impl LongRecord {
         tcp_metrics_on_path(&record, Some(&self.path_errors[..length]), &self.settings)
     }
 
-    /// Measures the stops that are over and drops their samples; thins what is left if that is still much.
+    /// Measures the stops that are over and drops their samples; thins what is left if that is
+    /// still much.
     fn condense(&mut self) {
         if !std::mem::replace(&mut self.condensed, true) {
             (0..self.times.len()).for_each(|k| self.gather(&self.sample(k)));
@@ -258,7 +266,8 @@ impl LongRecord {
         let slack = 1e-9 * (now - self.totals.start_s);
         let done = self.moves.partition_point(|(start, _)| *start + slack < now).saturating_sub(1);
         if done > self.past {
-            // The sample at the start of the next move, or before it, is the last of this part and the first of the next.
+            // The sample at the start of the next move, or before it, is the last of this part and
+            // the first of the next.
             let start = self.moves[done].0;
             let end = self.times.partition_point(|t| *t <= start + slack);
             match self.part(end, self.past..done) {
@@ -475,11 +484,13 @@ mod tests {
         }
     }
 
-    /// Truth: the closed form of a decaying exponential, t = ln(A/band)/rate; one stop longer than what is kept.
+    /// Truth: the closed form of a decaying exponential, t = ln(A/band)/rate; one stop longer than
+    /// what is kept.
     #[test]
     fn a_stop_longer_than_what_is_kept_still_settles_when_it_does() {
         let moves = vec![(0.0, 0.5)];
-        // As many as are kept: where the beginning of a stop, which its frequency comes from, stays whole.
+        // As many as are kept: where the beginning of a stop, which its frequency comes from, stays
+        // whole.
         const KEPT: usize = 1 << 17;
         let settings = MetricSettings { settling_band_m: 1e-4, ..MetricSettings::default() };
         let mut record = LongRecord::keeping(KEPT, moves, settings);

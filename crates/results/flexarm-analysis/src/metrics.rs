@@ -13,10 +13,11 @@ use crate::spectrum::{Taper, strongest_line_from};
 /// What a user may choose about the figures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MetricSettings {
-    /// Half width of the band (radius of the ball) around the final value for settling and overshoot, m.
+    /// Half width of the band (radius of the ball) around the final value for settling and
+    /// overshoot, m.
     pub settling_band_m: f64,
-    /// Frequency below which the arm does not ring by itself, Hz; 0 if that is not known. Where no stop is long enough to
-    /// show a line, slower ones in the whole record belong to the motion.
+    /// Frequency below which the arm does not ring by itself, Hz; 0 if that is not known. Where no
+    /// stop is long enough to show a line, slower ones in the whole record belong to the motion.
     pub lowest_hz: f64,
 }
 
@@ -27,14 +28,16 @@ impl Default for MetricSettings {
     }
 }
 
-/// Figures of the TCP error `e` (translation, m) and `θ` (rotation vector, rad) over a record from `t_0` to `t_n`.
+/// Figures of the TCP error `e` (translation, m) and `θ` (rotation vector, rad) over a record from
+/// `t_0` to `t_n`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TcpMetrics {
     /// `max |e|`, m.
     pub peak_m: f64,
     /// Time of `peak_m`, s.
     pub t_peak_s: f64,
-    /// `sqrt(1/(t_n - t_0) ∫ |e|² dt)`, m, by the trapezoidal rule, so uneven steps are weighed rightly.
+    /// `sqrt(1/(t_n - t_0) ∫ |e|² dt)`, m, by the trapezoidal rule, so uneven steps are weighed
+    /// rightly.
     pub rms_m: f64,
     /// `|e(t_n)|`, m: the error that is left at the end of the record.
     pub end_m: f64,
@@ -44,14 +47,15 @@ pub struct TcpMetrics {
     pub peak_rad: f64,
     /// `sqrt(1/(t_n - t_0) ∫ |θ|² dt)`, rad.
     pub rms_rad: f64,
-    /// Settling time, s: the longest [`HoldMetrics::settling_s`] of all holds. `None` when the error has not settled before
-    /// the end of some hold, or when there is no hold after a move.
+    /// Settling time, s: the longest [`HoldMetrics::settling_s`] of all holds. `None` when the
+    /// error has not settled before the end of some hold, or when there is no hold after a move.
     pub settling_s: Option<f64>,
-    /// Largest [`HoldMetrics::overshoot_m`] of all holds, m (position overshoot OV); 0 without a hold.
+    /// Largest [`HoldMetrics::overshoot_m`] of all holds, m (position overshoot OV); 0 without a
+    /// hold.
     pub overshoot_m: f64,
-    /// Frequency of the strongest line in any hold after a move, Hz. Without one: the strongest line, not slower than
-    /// [`MetricSettings::lowest_hz`], of the whole record of `e` minus the quasi-static error (minus its mean when that is
-    /// not known). `None` when no line stands out.
+    /// Frequency of the strongest line in any hold after a move, Hz. Without one: the strongest
+    /// line, not slower than [`MetricSettings::lowest_hz`], of the whole record of `e` minus the
+    /// quasi-static error (minus its mean when that is not known). `None` when no line stands out.
     pub dominant_hz: Option<f64>,
     /// `max |e·t|`, m: ahead of or behind the rigid tool, along its path.
     pub tangential_peak_m: f64,
@@ -74,14 +78,14 @@ pub struct TcpMetrics {
 /// Condenses a record of the TCP error.
 ///
 /// # Errors
-/// [`RecordError`] when the record is empty, its slices differ in length, a value is not finite, times or moves do not
-/// ascend, or the band is not positive.
+/// [`RecordError`] when the record is empty, its slices differ in length, a value is not finite,
+/// times or moves do not ascend, or the band is not positive.
 pub fn tcp_metrics(record: &ErrorRecord<'_>, settings: &MetricSettings) -> Result<TcpMetrics, RecordError> {
     tcp_metrics_on_path(record, None, settings)
 }
 
-/// As [`tcp_metrics`], with the parts of the errors along the path axes (tangential, normal, binormal; m) where they are
-/// known better than from positions, one per sample.
+/// As [`tcp_metrics`], with the parts of the errors along the path axes (tangential, normal,
+/// binormal; m) where they are known better than from positions, one per sample.
 ///
 /// # Errors
 /// As [`tcp_metrics`], of the field `path_errors` too.
@@ -191,7 +195,8 @@ fn path_accuracy(record: &ErrorRecord<'_>, path_errors: &[[f64; 3]]) -> [f64; 2]
 fn holds(record: &ErrorRecord<'_>, band: f64) -> Vec<HoldMetrics> {
     let mut holds = Vec::new();
     for (i, &(start, end)) in record.moves.iter().enumerate() {
-        // Times of moves and samples come from different sums; a billionth of the record is no difference.
+        // Times of moves and samples come from different sums; a billionth of the record is no
+        // difference.
         let slack = 1e-9 * (record.times[record.times.len() - 1] - record.times[0]);
         let until = record.moves.get(i + 1).map_or(f64::INFINITY, |next| next.0);
         let first = record.times.partition_point(|&t| t < end - slack);
@@ -200,7 +205,8 @@ fn holds(record: &ErrorRecord<'_>, band: f64) -> Vec<HoldMetrics> {
             continue;
         }
 
-        // The axes are kept at rest, so those at the first sample of the hold still show the way of arrival.
+        // The axes are kept at rest, so those at the first sample of the hold still show the way of
+        // arrival.
         let before = record.times.partition_point(|&t| t < start);
         let has_moved = record.rigid_positions[before..=first].iter().any(|p| *p != record.rigid_positions[first]);
         let hold = Hold {

@@ -1,12 +1,14 @@
-//! The input shaper that leaves least vibration of several modes within a given delay, their frequencies known to a part.
+//! The input shaper that leaves least vibration of several modes within a given delay, their
+//! frequencies known to a part.
 //!
 //! ```text
 //! min over a of  max over k of  w_k |r_k|,    r_k = Σ a_i exp(λ_k (Δ - t_i)),    a_i >= 0,  Σ a_i = 1,  0 <= t_i <= Δ
 //! ```
-//! with modes λ, each at some frequencies of its band. On a grid of times t_i the problem is one of second-order
-//! cones, one for each mode and frequency [Boyd & Vandenberghe 2004, section 4.4.2]; Clarabel solves it. The grid is
-//! then drawn closer about the copies that were found. Parts that are not negative keep the shaped motion within the
-//! ranges and below the speeds of the motion itself.
+//! with modes λ, each at some frequencies of its band. On a grid of times t_i the problem is one of
+//! second-order cones, one for each mode and frequency [Boyd & Vandenberghe 2004, section 4.4.2];
+//! Clarabel solves it. The grid is then drawn closer about the copies that were found. Parts that
+//! are not negative keep the shaped motion within the ranges and below the speeds of the motion
+//! itself.
 
 use std::f64::consts::TAU;
 
@@ -32,7 +34,8 @@ pub struct ShapedMode {
 pub struct OptimalShaper {
     /// Its copies.
     pub shaper: Shaper,
-    /// Largest vibration that it leaves of any mode within its band, in the unit of the modes' vibrations.
+    /// Largest vibration that it leaves of any mode within its band, in the unit of the modes'
+    /// vibrations.
     pub left: f64,
 }
 
@@ -80,7 +83,8 @@ const IN_BAND: usize = 21;
 const WIDEST: f64 = 0.5;
 /// Parts below this one are no copies.
 const NO_COPY: f64 = 1e-6;
-/// How often the grid is drawn closer, how many times each, and so many of the old steps to both sides.
+/// How often the grid is drawn closer, how many times each, and so many of the old steps to both
+/// sides.
 const CLOSER: (usize, i32) = (3, 8);
 /// Vibration that counts as nothing, over the one without a shaper.
 const NOTHING: f64 = 1e-7;
@@ -90,7 +94,8 @@ const GAP: f64 = 1e-10;
 impl Shaper {
     /// The shaper that leaves least of several modes at a delay after the end of the motion.
     ///
-    /// * `delay_s`: of the last copy, at most; `band`: part by which each frequency may be off to either side, such as 0.1.
+    /// * `delay_s`: of the last copy, at most; `band`: part by which each frequency may be off to
+    ///   either side, such as 0.1.
     ///
     /// # Errors
     /// [`ShaperError`].
@@ -192,7 +197,8 @@ fn gathered(grid: &[(f64, f64)], step: f64) -> Shaper {
 }
 
 impl Shaper {
-    /// Copies without those that are nothing; the rest of the parts goes to the others in proportion.
+    /// Copies without those that are nothing; the rest of the parts goes to the others in
+    /// proportion.
     fn without_nothing(self) -> Self {
         let kept: Vec<(f64, f64)> = self.copies.into_iter().filter(|(_, part)| *part > NO_COPY).collect();
         let sum: f64 = kept.iter().map(|(_, part)| part).sum();
@@ -243,7 +249,8 @@ mod tests {
         ShapedMode { hz, ratio, vibration: 1.0 }
     }
 
-    /// Truth: Singer and Seering's two copies, the only ones that leave nothing within half a period.
+    /// Truth: Singer and Seering's two copies, the only ones that leave nothing within half a
+    /// period.
     #[test]
     fn within_half_a_period_the_optimal_shaper_of_one_mode_is_zv() {
         for ratio in [0.0, 0.05, 0.2] {
@@ -256,7 +263,8 @@ mod tests {
         }
     }
 
-    /// Truth: with less than half a period the least is at both ends, cos(ω Δ/2) of the undamped mode.
+    /// Truth: with less than half a period the least is at both ends, cos(ω Δ/2) of the undamped
+    /// mode.
     #[test]
     fn within_less_than_half_a_period_what_is_left_is_the_cosine_of_half_the_angle() {
         let (hz, delay) = (5.0, 0.06);
@@ -282,7 +290,8 @@ mod tests {
         }
     }
 
-    /// Truth: what is possible with a delay is possible with a longer one, where undamped modes are concerned.
+    /// Truth: what is possible with a delay is possible with a longer one, where undamped modes are
+    /// concerned.
     #[test]
     fn more_delay_never_leaves_more_of_two_modes() {
         let modes = [
@@ -301,7 +310,8 @@ mod tests {
         assert!(found.left < 1e-6 && found.shaper.copies.iter().all(|(_, a)| *a > 0.0), "{found:?}");
     }
 
-    /// Truth: conditions of an optimum (Karush, Kuhn, Tucker) by small moves: no shift of a part to any other time lowers the largest.
+    /// Truth: conditions of an optimum (Karush, Kuhn, Tucker) by small moves: no shift of a part to
+    /// any other time lowers the largest.
     #[test]
     fn no_small_change_of_its_parts_leaves_less() {
         let modes = [mode(6.6, 0.02), ShapedMode { vibration: 0.5, ..mode(11.0, 0.03) }];

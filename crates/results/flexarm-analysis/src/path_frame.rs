@@ -1,9 +1,11 @@
-//! Path axes: along the path of the rigid tool, and two across it that turn no more than the path makes them.
+//! Path axes: along the path of the rigid tool, and two across it that turn no more than the path
+//! makes them.
 //!
-//! The axes across are carried along by the smallest rotation from one tangent to the next (parallel transport; a
-//! rotation-minimising frame, [Bishop 1975]). They are defined wherever there is a tangent: they do not flip where the
-//! curvature changes its side, and an error has one sign on a straight line. At rest they are kept. The normal begins towards
-//! the inside of the first bend; a path that stays in a plane has it in that plane and the binormal square to it.
+//! The axes across are carried along by the smallest rotation from one tangent to the next
+//! (parallel transport; a rotation-minimising frame, [Bishop 1975]). They are defined wherever
+//! there is a tangent: they do not flip where the curvature changes its side, and an error has one
+//! sign on a straight line. At rest they are kept. The normal begins towards the inside of the
+//! first bend; a path that stays in a plane has it in that plane and the binormal square to it.
 
 use nalgebra::Vector3;
 
@@ -18,7 +20,8 @@ const STRAIGHT_CURVATURE: f64 = 1e-4;
 /// Cosine between two tangents below which the tool goes back the way it came: within 10 degrees.
 const TURNED_BACK: f64 = -0.985;
 
-/// Unit axes in the world, square to each other; right-handed until the tool turns back on its own path.
+/// Unit axes in the world, square to each other; right-handed until the tool turns back on its own
+/// path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathFrame {
     /// Direction of the velocity.
@@ -35,11 +38,12 @@ impl PathFrame {
         Self { tangential: Vector3::x(), normal: Vector3::y(), binormal: Vector3::z() }
     }
 
-    /// The axes before the first sample, from the velocities (m/s) and accelerations (m/s²) of a whole motion in order:
-    /// tangential along its beginning, normal towards the inside of its first bend. Without a bend the normal is any; without
-    /// motion these are the world axes.
+    /// The axes before the first sample, from the velocities (m/s) and accelerations (m/s²) of a
+    /// whole motion in order: tangential along its beginning, normal towards the inside of its
+    /// first bend. Without a bend the normal is any; without motion these are the world axes.
     ///
-    /// Straight is where the lateral acceleration is below 1e-6 m/s², below 1e-6 of the whole, or the radius beyond 10 km.
+    /// Straight is where the lateral acceleration is below 1e-6 m/s², below 1e-6 of the whole, or
+    /// the radius beyond 10 km.
     pub fn before(rates: impl IntoIterator<Item = [Vector3<f64>; 2]>) -> Self {
         let mut first: Option<Vector3<f64>> = None;
         for [velocity, acceleration] in rates {
@@ -59,8 +63,10 @@ impl PathFrame {
     /// The axes of the next sample, from the velocity (m/s) of the rigid tool in the world.
     ///
     /// * At rest (slower than 1e-5 m/s): these axes again.
-    /// * Moving: the new tangential axis, and normal and binormal turned with it by the smallest rotation.
-    /// * Turned back on its own path (within 10 degrees): the tangential axis changes its sign, normal and binormal do not.
+    /// * Moving: the new tangential axis, and normal and binormal turned with it by the smallest
+    ///   rotation.
+    /// * Turned back on its own path (within 10 degrees): the tangential axis changes its sign,
+    ///   normal and binormal do not.
     #[must_use]
     pub fn next(&self, velocity: &Vector3<f64>) -> Self {
         let speed = velocity.norm();
@@ -105,9 +111,9 @@ fn lateral(velocity: &Vector3<f64>, acceleration: &Vector3<f64>) -> Option<Vecto
 
 /// Path axes at every sample of the rigid tool's positions.
 ///
-/// Velocity and acceleration are those of the parabola through a sample and its two neighbours (exact for constant
-/// acceleration, whatever the steps); the first and last sample use the parabola next to them. The axes begin as
-/// [`PathFrame::before`] says.
+/// Velocity and acceleration are those of the parabola through a sample and its two neighbours
+/// (exact for constant acceleration, whatever the steps); the first and last sample use the
+/// parabola next to them. The axes begin as [`PathFrame::before`] says.
 ///
 /// * `times`: s, strictly increasing. `positions`: m, in the world, one per time.
 pub fn path_frames(times: &[f64], positions: &[[f64; 3]]) -> Vec<PathFrame> {
@@ -182,8 +188,8 @@ mod tests {
         frames.windows(2).map(turn).fold(0.0, f64::max)
     }
 
-    /// Truth: a plane curve. Where it changes from left to right the axis out of the plane stays, and the normal turns with the
-    /// tangent (by at most 1.3e-2 a sample here).
+    /// Truth: a plane curve. Where it changes from left to right the axis out of the plane stays,
+    /// and the normal turns with the tangent (by at most 1.3e-2 a sample here).
     #[test]
     fn inflections_of_an_s_and_of_a_figure_eight_flip_nothing() {
         let tilt = nalgebra::Rotation3::from_euler_angles(0.4, -0.7, 0.2);
@@ -200,8 +206,8 @@ mod tests {
         }
     }
 
-    /// Truth: closed form. Against the principal normal N and binormal B of a helix of curvature κ and torsion τ the frame
-    /// turns back by the torsion: `n = cos(τs) N - sin(τs) B`.
+    /// Truth: closed form. Against the principal normal N and binormal B of a helix of curvature κ
+    /// and torsion τ the frame turns back by the torsion: `n = cos(τs) N - sin(τs) B`.
     #[test]
     fn along_a_helix_the_axes_lag_the_principal_normal_by_its_torsion() {
         let (radius, rise, rate) = (0.3, 0.1, 1.5);
@@ -226,7 +232,8 @@ mod tests {
         assert!(largest_turn(&frames) < 2e-3);
     }
 
-    /// Truth: a path that is gone back. Only ahead and behind change places; an error across keeps its sign.
+    /// Truth: a path that is gone back. Only ahead and behind change places; an error across keeps
+    /// its sign.
     #[test]
     fn turning_back_on_a_bent_path_keeps_both_axes_across() {
         let angle = |t: f64| 0.6 * (1.0 - (1.5 * t).cos());

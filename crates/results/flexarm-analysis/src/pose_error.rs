@@ -10,8 +10,8 @@ use flexarm_kinematics::{Pose, rotation_vector};
 ///
 /// * `rigid`, `flexible`: poses of the tool in the world, m.
 ///
-/// Returns three translations in m and three rotations in rad. The rotation is exact to about 2e-16 rad absolutely,
-/// because it does not go through an arc cosine.
+/// Returns three translations in m and three rotations in rad. The rotation is exact to about 2e-16
+/// rad absolutely, because it does not go through an arc cosine.
 pub fn tcp_error(rigid: &Pose, flexible: &Pose) -> [f64; 6] {
     let p = flexible.translation.vector - rigid.translation.vector;
     let R = flexible.rotation.matrix() * rigid.rotation.matrix().transpose();

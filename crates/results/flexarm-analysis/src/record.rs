@@ -8,12 +8,14 @@ use std::fmt;
 pub struct ErrorRecord<'a> {
     /// Times in s, strictly increasing.
     pub times: &'a [f64],
-    /// TCP errors from [`crate::tcp_error`]: translation in m, rotation vector in rad, in world axes.
+    /// TCP errors from [`crate::tcp_error`]: translation in m, rotation vector in rad, in world
+    /// axes.
     pub errors: &'a [[f64; 6]],
     /// Positions of the rigid tool in the world, m: they give the path axes.
     pub rigid_positions: &'a [[f64; 3]],
-    /// Translation of the tool, in m, that the arm would have if it stood still at each sample, when known: the
-    /// final value of every hold, and the trend of which the dominant frequency is not part.
+    /// Translation of the tool, in m, that the arm would have if it stood still at each sample,
+    /// when known: the final value of every hold, and the trend of which the dominant frequency is
+    /// not part.
     pub quasi_static: Option<&'a [[f64; 3]]>,
     /// Start and end of each move, s, ascending; between them the joints hold.
     pub moves: &'a [(f64, f64)],

@@ -1,4 +1,5 @@
-//! Poses at which the tool comes to rest more than once: pose accuracy and repeatability in the sense of ISO 9283.
+//! Poses at which the tool comes to rest more than once: pose accuracy and repeatability in the
+//! sense of ISO 9283.
 
 use nalgebra::Vector3;
 
@@ -16,12 +17,13 @@ pub struct RepeatedPose {
     pub visits: usize,
     /// Distance of the mean attained place from the rigid tool's, m (pose accuracy AP).
     pub accuracy_m: f64,
-    /// `l̄ + 3 S`, m, of the distances `l` of the attained places from their mean, with their standard deviation S (pose
-    /// repeatability RP).
+    /// `l̄ + 3 S`, m, of the distances `l` of the attained places from their mean, with their
+    /// standard deviation S (pose repeatability RP).
     pub repeatability_m: f64,
 }
 
-/// Poses with two rests or more, in the order of the first; attained is what the tool has at the end of a rest.
+/// Poses with two rests or more, in the order of the first; attained is what the tool has at the
+/// end of a rest.
 pub(crate) fn repeated_poses(holds: &[HoldMetrics]) -> Vec<RepeatedPose> {
     let mut groups: Vec<(Vector3<f64>, Vec<Vector3<f64>>)> = Vec::new();
     for hold in holds {
@@ -65,8 +67,8 @@ mod tests {
         }
     }
 
-    /// Truth: errors (1, 0, 0), (-1, 0, 0), (0, 2, 0), (0, -2, 0) about (3, 4, 0): the mean is 5 away, distances 1, 1, 2, 2 have
-    /// the mean 1.5 and the standard deviation 1/sqrt(3).
+    /// Truth: errors (1, 0, 0), (-1, 0, 0), (0, 2, 0), (0, -2, 0) about (3, 4, 0): the mean is 5
+    /// away, distances 1, 1, 2, 2 have the mean 1.5 and the standard deviation 1/sqrt(3).
     #[test]
     fn accuracy_and_repeatability_are_those_of_the_formulas_of_the_standard() {
         let (a, b) = ([1.0, 0.0, 0.5], [0.0, 1.0, 0.5]);

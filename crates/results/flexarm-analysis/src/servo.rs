@@ -4,9 +4,10 @@
 //! τ = C(s) (u - q) + F(s) u            C(s) = k_v s + p + i/s,   p = k_v k_p + k_i,   i = k_i k_p
 //! (C + F) (u - q) = τ - F q
 //! ```
-//! with the commands u, the motors q, the torques τ that their motion needs and what is fed forward, F. The lead `u - q` obeys the
-//! equation of the servo on a rigid arm: it is stable where the servo is, and needs no look ahead. Here it is stepped by backward
-//! differences of second order, which also hold where nothing is fed forward.
+//! with the commands u, the motors q, the torques τ that their motion needs and what is fed
+//! forward, F. The lead `u - q` obeys the equation of the servo on a rigid arm: it is stable where
+//! the servo is, and needs no look ahead. Here it is stepped by backward differences of second
+//! order, which also hold where nothing is fed forward.
 
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -36,8 +37,8 @@ impl NodeServo {
         Self { ahead: std::array::from_fn(sum), ..first.clone() }
     }
 
-    /// Adds the controllers to the dynamic stiffness of the free coordinates, of which their motors are the first, and to the forces
-    /// per command.
+    /// Adds the controllers to the dynamic stiffness of the free coordinates, of which their motors
+    /// are the first, and to the forces per command.
     pub(crate) fn close(&self, s: Complex<f64>, Z: &mut DMatrix<Complex<f64>>, N: &mut DMatrix<Complex<f64>>) {
         let F = self.fed(s);
         for (i, axis) in self.axes.iter().enumerate() {
@@ -63,7 +64,8 @@ impl NodeServo {
         part(0, Complex::new(1.0, 0.0)) + part(1, s) + part(2, s * s)
     }
 
-    /// How far commands must be ahead of their motors for torques beyond those fed forward, from rest.
+    /// How far commands must be ahead of their motors for torques beyond those fed forward, from
+    /// rest.
     ///
     /// * `at`: the controllers at each column; `torques`: d×N, `step_s` apart.
     ///
@@ -137,7 +139,8 @@ mod tests {
         }
     }
 
-    /// Truth: at rest what integrates leads by nothing, the other by its torque over its stiffness, from the first moment on.
+    /// Truth: at rest what integrates leads by nothing, the other by its torque over its stiffness,
+    /// from the first moment on.
     #[test]
     fn torques_that_last_are_met_at_rest() {
         let servo = two_axes();
@@ -148,8 +151,8 @@ mod tests {
         }
     }
 
-    /// Truth: amplitude and phase of `1 / (C + F)` at a frequency, of two axes, one with all of it fed forward and one without, which has
-    /// no integrator either.
+    /// Truth: amplitude and phase of `1 / (C + F)` at a frequency, of two axes, one with all of it
+    /// fed forward and one without, which has no integrator either.
     #[test]
     fn leads_are_those_of_the_frequency_response_once_the_start_has_died_away() {
         let (h, omega, N) = (1e-3, 12.0, 6000);

@@ -1,11 +1,12 @@
-//! Input shapers: a motion run through a few delayed copies of itself leaves no vibration of a known frequency behind.
+//! Input shapers: a motion run through a few delayed copies of itself leaves no vibration of a
+//! known frequency behind.
 //!
 //! ```text
 //! q_s(t) = Σ a_i q(t - t_i),   Σ a_i = 1
 //! ```
-//! Zero vibration (ZV, two copies half a damped period apart), and zero vibration and slope (ZVD, three), which forgives a
-//! frequency that is off (Singer and Seering 1990). Shapers of several modes are convolved; the best one within a given delay is in
-//! `optimal_shaper`.
+//! Zero vibration (ZV, two copies half a damped period apart), and zero vibration and slope (ZVD,
+//! three), which forgives a frequency that is off (Singer and Seering 1990). Shapers of several
+//! modes are convolved; the best one within a given delay is in `optimal_shaper`.
 
 use std::f64::consts::{PI, TAU};
 

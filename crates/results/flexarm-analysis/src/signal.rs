@@ -9,7 +9,8 @@ struct Section {
     a: [f64; 2],
 }
 
-/// Butterworth's low-pass of fourth order, run forwards and backwards: no phase, the gain of one pass squared.
+/// Butterworth's low-pass of fourth order, run forwards and backwards: no phase, the gain of one
+/// pass squared.
 #[derive(Clone, Copy, Debug)]
 pub struct LowPass {
     sections: [Section; 2],
@@ -121,7 +122,8 @@ mod tests {
 
     const RATE_HZ: f64 = 250.0;
 
-    /// Truth: Butterworth's gain, `1/(1 + (tan(π f/f_s)/tan(π f_c/f_s))^8)` of both passes, at three frequencies, and no phase; measured 1.1e-14.
+    /// Truth: Butterworth's gain, `1/(1 + (tan(π f/f_s)/tan(π f_c/f_s))^8)` of both passes, at
+    /// three frequencies, and no phase; measured 1.1e-14.
     #[test]
     fn a_wave_keeps_its_phase_and_loses_what_butterworth_says() {
         let low = LowPass::new(10.0, RATE_HZ);

@@ -1,7 +1,7 @@
 //! The strongest line in the spectrum of a vibration, between the bins of the transform.
 //!
-//! The signal is tapered, transformed by a radix-2 FFT of twice its length, and the highest peak is refined by
-//! golden-section search on the exact transform. 10 s at 1 kHz take a few milliseconds.
+//! The signal is tapered, transformed by a radix-2 FFT of twice its length, and the highest peak is
+//! refined by golden-section search on the exact transform. 10 s at 1 kHz take a few milliseconds.
 
 use std::f64::consts::{PI, TAU};
 
@@ -20,9 +20,11 @@ const REFINEMENTS: usize = 24;
 /// How the signal is faded in and out before the transform.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Taper {
-    /// Full weight at the start, faded out by `cos²`: for a vibration that dies away. A long signal is cut off.
+    /// Full weight at the start, faded out by `cos²`: for a vibration that dies away. A long signal
+    /// is cut off.
     FadeOut,
-    /// Faded in and out by `sin²` (Hann): for a signal without a special start. A long signal is averaged in blocks.
+    /// Faded in and out by `sin²` (Hann): for a signal without a special start. A long signal is
+    /// averaged in blocks.
     Both,
 }
 
@@ -31,8 +33,9 @@ pub enum Taper {
 pub struct SpectralLine {
     /// Frequency, Hz.
     pub hz: f64,
-    /// Amplitude of the undamped sinusoid that would give this line, in the unit of the signal, all components
-    /// together (root of the sum of squares). Less than the initial amplitude of a vibration that dies away.
+    /// Amplitude of the undamped sinusoid that would give this line, in the unit of the signal, all
+    /// components together (root of the sum of squares). Less than the initial amplitude of a
+    /// vibration that dies away.
     pub amplitude: f64,
 }
 
@@ -41,10 +44,12 @@ pub struct SpectralLine {
 /// * `times`: s, strictly increasing; steps may vary, the signal is interpolated to even ones.
 /// * `signal`: one entry per time, any unit; its weighted mean is removed.
 ///
-/// Returns `None` when there is no line: fewer than 16 samples, nothing that repeats at least one and a half times
-/// and stands out by 6 dB from the spectrum below it, or an amplitude within the rounding of the signal.
+/// Returns `None` when there is no line: fewer than 16 samples, nothing that repeats at least one
+/// and a half times and stands out by 6 dB from the spectrum below it, or an amplitude within the
+/// rounding of the signal.
 ///
-/// Accuracy, of an undamped sinusoid with `n` cycles in the record: about `0.2 / n²` of the frequency.
+/// Accuracy, of an undamped sinusoid with `n` cycles in the record: about `0.2 / n²` of the
+/// frequency.
 pub fn strongest_line(times: &[f64], signal: &[[f64; 3]], taper: Taper) -> Option<SpectralLine> {
     strongest_line_from(times, signal, taper, 0.0)
 }
@@ -85,16 +90,19 @@ pub(crate) fn strongest_line_from(
 pub struct AmplitudeSpectrum {
     /// Frequencies, Hz, evenly spaced from 0.
     pub hz: Vec<f64>,
-    /// Amplitude of the sinusoid that would give this value, per component, in the unit of the signal.
+    /// Amplitude of the sinusoid that would give this value, per component, in the unit of the
+    /// signal.
     pub amplitude: Vec<[f64; 3]>,
 }
 
-/// The spectrum of a signal with three components, faded in and out by `sin²` (Hann), without its mean.
+/// The spectrum of a signal with three components, faded in and out by `sin²` (Hann), without its
+/// mean.
 ///
 /// * `times`: s, strictly increasing; steps may vary, the signal is interpolated to even ones.
 ///
-/// A steady sinusoid of amplitude `a` gives a line of height `a` (1 % less between two frequencies), a vibration that
-/// dies away a lower one; over a time `T` lines are `4/T` wide at their foot. Returns `None` for fewer than 16 samples.
+/// A steady sinusoid of amplitude `a` gives a line of height `a` (1 % less between two
+/// frequencies), a vibration that dies away a lower one; over a time `T` lines are `4/T` wide at
+/// their foot. Returns `None` for fewer than 16 samples.
 pub fn amplitude_spectrum(times: &[f64], signal: &[[f64; 3]]) -> Option<AmplitudeSpectrum> {
     if times.len() < FEWEST_SAMPLES || times.len() != signal.len() {
         return None;
@@ -165,7 +173,8 @@ impl Tapered {
         power
     }
 
-    /// Transform of one component, filled up with zeros to as many samples as the [`twiddles`] are for.
+    /// Transform of one component, filled up with zeros to as many samples as the [`twiddles`] are
+    /// for.
     fn transform(&self, component: usize, twiddles: &[[f64; 2]]) -> Vec<[f64; 2]> {
         let mut data = vec![[0.0; 2]; 2 * twiddles.len()];
         for (slot, x) in data.iter_mut().zip(&self.samples) {
@@ -220,7 +229,8 @@ fn twiddles(n: usize) -> Vec<[f64; 2]> {
     (0..n / 2).map(at).collect()
 }
 
-/// Radix-2 transform in place, decimation in time; the length is a power of two, `twiddles` are those for it.
+/// Radix-2 transform in place, decimation in time; the length is a power of two, `twiddles` are
+/// those for it.
 fn fft(data: &mut [[f64; 2]], twiddles: &[[f64; 2]]) {
     let n = data.len();
     // Bit reversal, then butterflies of growing span.
@@ -247,8 +257,8 @@ fn fft(data: &mut [[f64; 2]], twiddles: &[[f64; 2]]) {
     }
 }
 
-/// Place of the maximum of a function with one peak in the interval, by golden-section search in so many steps, each of
-/// which leaves 0.618 of the interval.
+/// Place of the maximum of a function with one peak in the interval, by golden-section search in so
+/// many steps, each of which leaves 0.618 of the interval.
 pub(crate) fn golden_maximum(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64, steps: usize) -> f64 {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let (mut left, mut right) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));

@@ -3,8 +3,8 @@
 //! ```text
 //! x(t) = 2 Re Σ φ (φᵀ f) / (2 λ φᵀMφ + φᵀDφ) e^(λ (t-T)),     f = -(λ² M_a + λ D_a + K_a) / λ² ∫ q̈ e^(λ (T-τ)) dτ
 //! ```
-//! about the equilibrium at the end T, where the commands q rest. The structure is that of the end throughout: what a motion does long
-//! before has died away.
+//! about the equilibrium at the end T, where the commands q rest. The structure is that of the end
+//! throughout: what a motion does long before has died away.
 
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -13,7 +13,8 @@ use crate::inversion::Node;
 
 /// Size of the tool's oscillation (m) that commands leave in a mode as they come to rest.
 ///
-/// * `node`: the structure at the end, controllers in its matrices; the first three components of its tool are the position.
+/// * `node`: the structure at the end, controllers in its matrices; the first three components of
+///   its tool are the position.
 /// * `accelerations`: of the commands, m×N, `step_s` apart, the last at the end.
 /// * `detuned`: factor on the eigenvalue in the motion's spectrum, 1 for the mode as it is.
 pub fn vibration_left(node: &Node, mode: &DampedMode, accelerations: &DMatrix<f64>, step_s: f64, detuned: f64) -> f64 {
@@ -39,8 +40,9 @@ mod tests {
     use crate::damped_modes::damped_modes;
     use nalgebra::dmatrix;
 
-    /// Truth: `4 a sin²(ω τ/2) / ω²` behind an acceleration a over τ and -a over τ, of a mass that is carried along and of one
-    /// that is pulled by its spring; a fiftieth of damping takes as much away as the exact integral says.
+    /// Truth: `4 a sin²(ω τ/2) / ω²` behind an acceleration a over τ and -a over τ, of a mass that
+    /// is carried along and of one that is pulled by its spring; a fiftieth of damping takes as
+    /// much away as the exact integral says.
     #[test]
     fn a_mass_on_a_spring_swings_behind_a_motion_as_its_closed_form_says() {
         let (omega, a, tau, h) = (40.0, 2.0, 0.05, 1e-5);

@@ -6,7 +6,8 @@ use std::f64::consts::{PI, TAU};
 use flexarm_analysis::{ErrorRecord, MetricSettings, RecordError, TcpMetrics, tcp_metrics, tcp_metrics_on_path};
 use proptest::prelude::*;
 
-/// A move from 0 to 1 s along x by 0.3 m, then a hold of 4 s with a damped oscillation around a static error.
+/// A move from 0 to 1 s along x by 0.3 m, then a hold of 4 s with a damped oscillation around a
+/// static error.
 #[derive(Debug, Clone, Copy)]
 struct Ringing {
     amplitude: f64,
@@ -33,7 +34,8 @@ impl Ringing {
         self.excursion((omega / self.decay()).atan() / omega)
     }
 
-    /// Last time at which the excursion leaves the band: the last extremum outside it, then bisection.
+    /// Last time at which the excursion leaves the band: the last extremum outside it, then
+    /// bisection.
     fn settling(&self, band: f64) -> f64 {
         let omega = TAU * self.hz;
         let extremum = |k: u32| ((omega / self.decay()).atan() + PI * f64::from(k)) / omega;
@@ -151,7 +153,8 @@ fn a_record_that_ends_with_its_move_has_no_settling_time() {
 #[test]
 fn each_move_has_a_hold_of_its_own() {
     let times = even(1000.0);
-    // Rings at 8 Hz after the first move (along +x), at 16 Hz and half as much after the second (along -x).
+    // Rings at 8 Hz after the first move (along +x), at 16 Hz and half as much after the second
+    // (along -x).
     let ring = |tau: f64, hz: f64| (-6.0 * tau).exp() * (TAU * hz * tau).sin();
     let error = |t: f64| match t {
         t if (1.0..2.5).contains(&t) => 1e-3 * ring(t - 1.0, 8.0),
@@ -209,8 +212,8 @@ proptest! {
         let ringing = Ringing { amplitude, hz, damping_ratio, sag };
         let metrics = ringing.metrics(&even(1000.0), false);
         prop_assert!((metrics.dominant_hz.unwrap() / hz - 1.0).abs() < 0.02); // measured 3.7e-3
-        // A half swing that just leaves the band moves settling by half a period, and with 17 samples per period
-        // its top may lie 1.7 % above the next sample.
+        // A half swing that just leaves the band moves settling by half a period, and with 17
+        // samples per period its top may lie 1.7 % above the next sample.
         let (early, late) = (ringing.settling(1.03e-4), ringing.settling(0.99e-4));
         match metrics.settling_s {
             Some(found) => prop_assert!(found >= early - 1e-3 && found <= late + 1e-3, "{early} <= {found} <= {late}"),
@@ -240,7 +243,8 @@ proptest! {
     }
 }
 
-/// Truth: the record is made with 0.3 mm beside the path in motion and 0.9 mm at rest, and any lag along the path.
+/// Truth: the record is made with 0.3 mm beside the path in motion and 0.9 mm at rest, and any lag
+/// along the path.
 #[test]
 fn path_accuracy_is_the_distance_from_the_path_in_motion() {
     let times = even(1000.0);
@@ -303,8 +307,8 @@ fn given_parts_along_the_path_take_the_place_of_computed_ones() {
     assert_eq!(fault, RecordError::NotFinite { what: "path_errors", index: 3 });
 }
 
-/// Truth: the frequency that the signal was made with. The stop is shorter than a period, and the error that the motion itself
-/// causes is ten times the ringing on it.
+/// Truth: the frequency that the signal was made with. The stop is shorter than a period, and the
+/// error that the motion itself causes is ten times the ringing on it.
 #[test]
 fn ringing_within_a_move_is_found_where_the_stop_is_too_short_to_show_it() {
     let times: Vec<f64> = (0..=425).map(|k| 2e-3 * f64::from(k)).collect();

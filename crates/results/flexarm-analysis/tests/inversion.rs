@@ -1,4 +1,5 @@
-//! Commands for the reference arm in motion against its linear equations of motion integrated forwards.
+//! Commands for the reference arm in motion against its linear equations of motion integrated
+//! forwards.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(clippy::expect_used, clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(non_snake_case, reason = "monogram notation")]
@@ -71,8 +72,9 @@ fn commands_by_the_series_of_the_inverse_move_the_tool_as_asked_at_a_third_of_th
     assert!(as_at_rest > 10.0 * error);
 }
 
-/// Truth: forward integration of the closed loop, which `linearise` makes by itself of the same servos; two joints follow their commands
-/// at once, two of the others have nothing fed forward. Without integral, so that the loop is of second order.
+/// Truth: forward integration of the closed loop, which `linearise` makes by itself of the same
+/// servos; two joints follow their commands at once, two of the others have nothing fed forward.
+/// Without integral, so that the loop is of second order.
 #[test]
 fn commands_of_servos_move_the_tool_as_asked_far_above_their_position_gains() {
     let (arm, tool) = arm();

@@ -1,4 +1,5 @@
-//! Linear structures against closed forms: oscillators, chains of masses, rigid motions, resonance peaks.
+//! Linear structures against closed forms: oscillators, chains of masses, rigid motions, resonance
+//! peaks.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "M, D, K as everywhere in mechanics")]
@@ -22,7 +23,8 @@ fn force_to_displacement(M: DMatrix<f64>, D: DMatrix<f64>, K: DMatrix<f64>, at: 
     LinearSystem { M, D, K, B_0: unit, B_1, B_2, C, F: DMatrix::zeros(1, 1) }
 }
 
-/// Truth: `λ = -ζω ± iω sqrt(1 - ζ²)`, and beyond critical damping `-ζω ± ω sqrt(ζ² - 1)`. Measured 5e-16.
+/// Truth: `λ = -ζω ± iω sqrt(1 - ζ²)`, and beyond critical damping `-ζω ± ω sqrt(ζ² - 1)`. Measured
+/// 5e-16.
 #[test]
 fn an_oscillator_has_its_frequency_and_ratio_up_to_and_beyond_critical_damping() {
     let (m, k) = (3.0, 3.0 * 40.0f64.powi(2));
@@ -48,8 +50,8 @@ fn an_oscillator_has_its_frequency_and_ratio_up_to_and_beyond_critical_damping()
     }
 }
 
-/// Truth: a chain of n equal masses between walls, `ω_j = 2 sqrt(k/m) sin(jπ / (2(n+1)))`, and `ζ_j = β ω_j / 2` for
-/// `D = β K`. Measured 6e-15.
+/// Truth: a chain of n equal masses between walls, `ω_j = 2 sqrt(k/m) sin(jπ / (2(n+1)))`, and
+/// `ζ_j = β ω_j / 2` for `D = β K`. Measured 6e-15.
 #[test]
 fn a_chain_of_masses_has_the_frequencies_and_ratios_of_the_textbook() {
     let (n, m, k, beta) = (7, 0.2, 900.0, 1e-3);
@@ -73,8 +75,8 @@ fn a_chain_of_masses_has_the_frequencies_and_ratios_of_the_textbook() {
     }
 }
 
-/// Truth: two masses with one damper, whose quartic `λ⁴ + ...` is evaluated at what was found; and the trace of the
-/// first-order matrix. The damping is far from proportional. Measured 4e-15.
+/// Truth: two masses with one damper, whose quartic `λ⁴ + ...` is evaluated at what was found; and
+/// the trace of the first-order matrix. The damping is far from proportional. Measured 4e-15.
 #[test]
 fn two_masses_with_one_damper_solve_their_quartic() {
     let (m_1, m_2, k_1, k_2, d) = (2.0, 0.5, 800.0, 300.0, 9.0);
@@ -97,8 +99,9 @@ fn two_masses_with_one_damper_solve_their_quartic() {
     assert!((trace / (-d / m_2) - 1.0).abs() < 1e-12);
 }
 
-/// Truth: two masses on a spring, free in space: one rigid motion, `ω² = k (1/m_1 + 1/m_2)`. With a damper to the ground
-/// on a mass alone: `0` and `-d/m`. An inverted pendulum falls with `sqrt(g/l)`.
+/// Truth: two masses on a spring, free in space: one rigid motion, `ω² = k (1/m_1 + 1/m_2)`. With a
+/// damper to the ground on a mass alone: `0` and `-d/m`. An inverted pendulum falls with
+/// `sqrt(g/l)`.
 #[test]
 fn rigid_motions_and_falling_are_modes_too() {
     let K = dmatrix![500.0, -500.0; -500.0, 500.0];
@@ -121,7 +124,8 @@ fn rigid_motions_and_falling_are_modes_too() {
     assert!(falling.iter().any(|mode| mode.damping_ratio() == -1.0));
 }
 
-/// Two equal oscillators: any pair of shapes will do if both satisfy the equation and span the space.
+/// Two equal oscillators: any pair of shapes will do if both satisfy the equation and span the
+/// space.
 #[test]
 fn equal_frequencies_have_two_shapes() {
     let R = nalgebra::Rotation2::new(0.3);
@@ -151,8 +155,8 @@ fn a_low_mode_beside_a_stiff_one_keeps_its_digits() {
     }
 }
 
-/// Truth: at `ω sqrt(1 - 2ζ²)` the amplitude is `1 / (2 ζ k sqrt(1 - ζ²))`; static `1/k`; phase -90° at ω. Measured
-/// 2e-16 in height and 3e-9 in place.
+/// Truth: at `ω sqrt(1 - 2ζ²)` the amplitude is `1 / (2 ζ k sqrt(1 - ζ²))`; static `1/k`; phase
+/// -90° at ω. Measured 2e-16 in height and 3e-9 in place.
 #[test]
 fn an_oscillator_resonates_as_the_closed_form_says() {
     let (m, omega) = (1.7, TAU * 12.5);
@@ -177,7 +181,8 @@ fn an_oscillator_resonates_as_the_closed_form_says() {
     }
 }
 
-/// Truth: the closed form `1/|k - ω²m + iωd|` at places between the points; with two modes the difference of two such.
+/// Truth: the closed form `1/|k - ω²m + iωd|` at places between the points; with two modes the
+/// difference of two such.
 #[test]
 fn a_resolved_response_is_the_curve_and_not_a_chord_of_it() {
     let mode = |f: f64, zeta: f64, hz: f64| {
@@ -200,7 +205,8 @@ fn a_resolved_response_is_the_curve_and_not_a_chord_of_it() {
             };
             hz.windows(2).flat_map(|pair| (1..8).map(move |k| off(pair, k))).fold(0.0, f64::max)
         };
-        // Measured 0.0200 and 0.0197 with 133 and 82 points; the coarse grid of 78 has 1.0 and 0.025.
+        // Measured 0.0200 and 0.0197 with 133 and 82 points; the coarse grid of 78 has 1.0 and
+        // 0.025.
         eprintln!("{} {} points, {} {}", worst(&hz), hz.len(), worst(&coarse), coarse.len());
         assert!(worst(&hz) < 0.022 && worst(&coarse) > 0.024);
         assert!(hz.len() < 200 && response.len() == hz.len());
@@ -220,8 +226,9 @@ fn an_absorber_stills_the_main_mass() {
     assert_eq!(alone.response(1.0), Err(LinearError::Resonance { omega: 1.0 }));
 }
 
-/// Truth: a mass on a spring and damper whose foot moves: transmissibility `(k + iωd) / (k + iωd - ω²m)`, whether the
-/// coordinate is absolute (force by rate of the foot) or relative to the foot (inertia by its acceleration, and F).
+/// Truth: a mass on a spring and damper whose foot moves: transmissibility
+/// `(k + iωd) / (k + iωd - ω²m)`, whether the coordinate is absolute (force by rate of the foot) or
+/// relative to the foot (inertia by its acceleration, and F).
 #[test]
 fn a_moving_foot_is_force_or_inertia_alike() {
     let (m, d, k) = (1.3, 4.0, 900.0);
@@ -276,8 +283,9 @@ fn positive_definite(n: usize) -> impl Strategy<Value = DMatrix<f64>> {
 }
 
 proptest! {
-    /// Any damping: every mode satisfies its equation, the parts of the compliance add up to `C K^-1 Cᵀ`, the sum of
-    /// the eigenvalues is the trace of `-M^-1 D`, and shares of energy add up to one.
+    /// Any damping: every mode satisfies its equation, the parts of the compliance add up to
+    /// `C K^-1 Cᵀ`, the sum of the eigenvalues is the trace of `-M^-1 D`, and shares of energy add
+    /// up to one.
     #[test]
     fn modes_of_any_structure_hold_together(M in positive_definite(5), D in positive_definite(5), K in positive_definite(5), size in 0.01..3.0_f64) {
         let (D, K) = (D * size, K * 100.0);

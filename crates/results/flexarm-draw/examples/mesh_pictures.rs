@@ -1,7 +1,8 @@
 //! Pictures of the reduction of a mesh file: `cargo run --release -p flexarm-draw
 //! --features png --example mesh_pictures -- MESH OUT SET_A x,y,z SET_B x,y,z`.
 //!
-//! The mesh is in SI units and has its material; both node sets are tied rigidly to frames at the given points.
+//! The mesh is in SI units and has its material; both node sets are tied rigidly to frames at the
+//! given points.
 #![allow(non_snake_case, reason = "monogram notation: X_LI, pose of the interface in the link")]
 #![allow(
     clippy::print_stdout,

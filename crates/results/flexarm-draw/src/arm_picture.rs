@@ -1,10 +1,12 @@
-//! Pictures of the arm at one instant: bent more than it is, coloured by how far it is from its rigid twin.
+//! Pictures of the arm at one instant: bent more than it is, coloured by how far it is from its
+//! rigid twin.
 //!
-//! The rigid twin is light grey with an outline, the flexible arm is magnified by [`RunHeader::magnification`]; colours
-//! show the true deviation, from 0 to [`RunHeader::color_scale_m`]. An arrow leads from the rigid tool centre point to
-//! the magnified one. Links without surfaces are drawn as rods. Start at [`arm_pictures`] for pages, which say beside the
-//! picture what is in it, and at [`arm_png`] for a picture that says so itself; [`arm_sheet`] has both sides beside each
-//! other under a heading.
+//! The rigid twin is light grey with an outline, the flexible arm is magnified by
+//! [`RunHeader::magnification`]; colours show the true deviation, from 0 to
+//! [`RunHeader::color_scale_m`]. An arrow leads from the rigid tool centre point to the magnified
+//! one. Links without surfaces are drawn as rods. Start at [`arm_pictures`] for pages, which say
+//! beside the picture what is in it, and at [`arm_png`] for a picture that says so itself;
+//! [`arm_sheet`] has both sides beside each other under a heading.
 
 use flexarm_spatial::Pose;
 use nalgebra::{Matrix2x3, Matrix3, Point3, SymmetricEigen, Vector3};
@@ -96,7 +98,8 @@ pub fn arm_pictures(
     sides.par_iter().map(|side| stage.picture(*side, size)).collect()
 }
 
-/// The arm as a PNG picture on white with a scale of its colours: rigid twin and magnified flexible arm.
+/// The arm as a PNG picture on white with a scale of its colours: rigid twin and magnified flexible
+/// arm.
 ///
 /// * `size`: width and height, pixels.
 ///
@@ -114,11 +117,12 @@ pub fn arm_png(
     image.to_png().map_err(ArmPictureError::Encode)
 }
 
-/// The arm from both sides on one sheet (PNG), under lines of text, the first of which is the heading.
+/// The arm from both sides on one sheet (PNG), under lines of text, the first of which is the
+/// heading.
 ///
 /// * `width`: pixels.
-/// * `compliance`: displacement of the tool per force, world axes (m/N). Drawn at the tool as an ellipsoid: all places to which
-///   one force of any direction moves it, with its principal axes.
+/// * `compliance`: displacement of the tool per force, world axes (m/N). Drawn at the tool as an
+///   ellipsoid: all places to which one force of any direction moves it, with its principal axes.
 ///
 /// # Errors
 /// [`ArmPictureError`].
@@ -306,8 +310,8 @@ impl Ellipsoid {
             let [x, y, _] = view.project(p);
             [x, y]
         };
-        // The outline is where the two directions of the page move by unit forces: with P onto the page, P C Cᵀ Pᵀ has its
-        // half axes as eigenvectors, their squares as eigenvalues.
+        // The outline is where the two directions of the page move by unit forces: with P onto the
+        // page, P C Cᵀ Pᵀ has its half axes as eigenvectors, their squares as eigenvalues.
         let P = Matrix2x3::from_rows(&[view.right.transpose(), view.up.transpose()]);
         let A = P * self.map;
         let eigen = SymmetricEigen::new(A * A.transpose());
@@ -456,7 +460,8 @@ impl Skin {
     }
 }
 
-/// Towards the viewer and to the right. The plane of the arm is the vertical one through base and tool.
+/// Towards the viewer and to the right. The plane of the arm is the vertical one through base and
+/// tool.
 fn directions(side: ArmSide, rigid: &TwinSample) -> (Vector3<f64>, Vector3<f64>) {
     let reach = rigid.X_WT.translation.vector - rigid.X_WL[0].translation.vector;
     let out = Vector3::new(reach.x, reach.y, 0.0).try_normalize(1e-3).unwrap_or(Vector3::x());
@@ -587,7 +592,8 @@ mod tests {
                 pixels.iter().filter(close).count()
             };
             assert!(count(ARROW, 12) > 8, "{side:?}: {} pixels of the arrow", count(ARROW, 12));
-            // The base does not move, so it has the first colour of the scale; the rigid arm is light grey.
+            // The base does not move, so it has the first colour of the scale; the rigid arm is
+            // light grey.
             assert!(count(color::magnitude(on_scale(0.0)), 40) > 200, "{side:?}");
             let grey = |p: &&Rgb| p.iter().all(|c| (150..240).contains(c)) && p[0].abs_diff(p[2]) < 24;
             let ghost = pixels.iter().filter(grey).count();
@@ -626,7 +632,8 @@ mod tests {
         assert!(right.abs() < 1e-9 && up > 0.5, "{:?}", picture.axes);
     }
 
-    /// Truth: the ellipsoid's points `C f` of unit forces, none of which is outside of its outline while some touch it.
+    /// Truth: the ellipsoid's points `C f` of unit forces, none of which is outside of its outline
+    /// while some touch it.
     #[test]
     fn the_outline_of_the_compliance_holds_what_every_force_does() {
         let C = Matrix3::new(3.0, 0.4, -0.2, 0.4, 1.0, 0.3, -0.2, 0.3, 2.0) * 1e-6;

@@ -1,9 +1,10 @@
 //! A link drawn bent: its surface between stations that a run says the places of.
 //!
-//! Between two stations the link is a beam: cubic Hermite deflection across the line, linear stretch and twist along it,
-//! sections that stay plane and turn with the line's slope (Euler-Bernoulli). For loads at the ends that is the
-//! deflection line itself; at the stations it is exact for every model. Before the first station the surface is
-//! rigid with it, beyond the last one with that.
+//! Between two stations the link is a beam: cubic Hermite deflection across the line, linear
+//! stretch and twist along it, sections that stay plane and turn with the line's slope
+//! (Euler-Bernoulli). For loads at the ends that is the deflection line itself; at the stations it
+//! is exact for every model. Before the first station the surface is rigid with it, beyond the last
+//! one with that.
 
 use flexarm_spatial::{Pose, rotation_vector};
 use nalgebra::{Point3, Rotation3, Translation3, Vector3};
@@ -12,7 +13,8 @@ use flexarm_sample::{BendInfo, LinkMesh};
 
 /// Slabs into which a surface is cut along the link, so that it can bend.
 const SLABS: f64 = 12.0;
-/// A surface has at most this many times its triangles after cutting, to keep wild meshes in bounds.
+/// A surface has at most this many times its triangles after cutting, to keep wild meshes in
+/// bounds.
 const GROWTH: usize = 12;
 
 /// Where undeformed stations are and how a vertex lies between them.
@@ -26,7 +28,8 @@ pub struct BendLine {
 }
 
 impl BendLine {
-    /// The line through the stations; `None` if there are fewer than two or they do not follow each other.
+    /// The line through the stations; `None` if there are fewer than two or they do not follow each
+    /// other.
     #[must_use]
     pub fn new(bend: &BendInfo) -> Option<Self> {
         let stations: Vec<Vector3<f64>> = bend.X_LS.iter().map(|X| X.translation.vector).collect();
@@ -95,7 +98,8 @@ impl BentLine<'_> {
         }
     }
 
-    /// Where the point at `s` metres along the line is (link axes): what [`BentLine::section`] does to it, without its turn.
+    /// Where the point at `s` metres along the line is (link axes): what [`BentLine::section`] does
+    /// to it, without its turn.
     #[must_use]
     pub fn point(&self, s: f64) -> Point3<f64> {
         match self.between(s) {
@@ -233,7 +237,8 @@ impl BentMesh {
     }
 }
 
-/// A link's surface in three: what is rigid with the near interface, what bends, what is rigid with the far one.
+/// A link's surface in three: what is rigid with the near interface, what bends, what is rigid with
+/// the far one.
 #[derive(Clone, Debug)]
 pub struct BentPieces {
     /// Before the first station; stays as it is in the link's frame.
@@ -366,7 +371,8 @@ mod tests {
         }
     }
 
-    /// Truth: a rigid motion of all stations moves every point rigidly, also between the stations, for small angles.
+    /// Truth: a rigid motion of all stations moves every point rigidly, also between the stations,
+    /// for small angles.
     #[test]
     fn a_rigid_motion_of_the_stations_bends_nothing() {
         let places = [[0.0, 0.0, 0.0], [0.4, 0.0, 0.0], [1.0, 0.0, 0.0]];
@@ -384,7 +390,8 @@ mod tests {
         }
     }
 
-    /// Truth: the deflection line at every corner; sections between are interpolated, 1/48 of the link apart.
+    /// Truth: the deflection line at every corner; sections between are interpolated, 1/48 of the
+    /// link apart.
     #[test]
     fn the_corners_of_a_bent_surface_follow_the_line_closely_and_its_ends_exactly() {
         let bend = bend(&[[0.0; 3], [1.0, 0.0, 0.0]]);

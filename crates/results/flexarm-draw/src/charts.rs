@@ -206,7 +206,8 @@ fn dots(points: &[[f64; 2]], radius: u32, style: ShapeStyle) -> impl Iterator<It
     finite(points).map(move |point| Circle::new(point, radius, style))
 }
 
-/// Every column over every other one: points below the diagonal, the correlation of the ranks above it, counts on it.
+/// Every column over every other one: points below the diagonal, the correlation of the ranks above
+/// it, counts on it.
 ///
 /// * `columns`: name and values, equally many.
 pub fn scatter_matrix(columns: &[(&str, &[f64])]) -> String {
@@ -313,8 +314,8 @@ mod tests {
     use super::*;
     use crate::FieldPlot;
 
-    /// Truth: Spearman's coefficient of a rising curve is 1, of a falling one -1; 1, 2, 3, 4 against 2, 1, 4, 3 by the formula
-    /// 1 - 6 sum d^2 / (n (n^2 - 1)) = 0.6.
+    /// Truth: Spearman's coefficient of a rising curve is 1, of a falling one -1; 1, 2, 3, 4
+    /// against 2, 1, 4, 3 by the formula 1 - 6 sum d^2 / (n (n^2 - 1)) = 0.6.
     #[test]
     fn rank_correlations_are_those_of_the_formula() {
         let x = [1.0, 2.0, 3.0, 4.0];

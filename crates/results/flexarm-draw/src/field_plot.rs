@@ -1,4 +1,5 @@
-//! A number over a plane of cells as a picture (SVG): colours with their scale, axes, marked places.
+//! A number over a plane of cells as a picture (SVG): colours with their scale, axes, marked
+//! places.
 //!
 //! Neighbouring cells of one colour in a row are one rectangle. Grids finer than the picture are
 //! thinned to the maximum of the cells that coincide, so that a page with many maps stays small.

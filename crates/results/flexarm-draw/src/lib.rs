@@ -1,9 +1,9 @@
 //! How an arm, a mesh and curves are drawn.
 //!
-//! What recordings, markers and pictures show alike is decided here once: [`Magnifier`] enlarges deflections, [`BendLine`]
-//! and [`BentMesh`] bend surfaces, [`palette`] has the colours. Pictures need no graphics card: `arm_pictures`, `arm_png` and
-//! `arm_sheet` draw an arm at one instant, `mesh_picture` the sheets of a mesh reduction (feature `png`), [`LinePlot`] curves
-//! as SVG.
+//! What recordings, markers and pictures show alike is decided here once: [`Magnifier`] enlarges
+//! deflections, [`BendLine`] and [`BentMesh`] bend surfaces, [`palette`] has the colours. Pictures
+//! need no graphics card: `arm_pictures`, `arm_png` and `arm_sheet` draw an arm at one instant,
+//! `mesh_picture` the sheets of a mesh reduction (feature `png`), [`LinePlot`] curves as SVG.
 //!
 //! ```
 //! use flexarm_draw::Magnifier;

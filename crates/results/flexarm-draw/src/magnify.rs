@@ -7,10 +7,10 @@ use flexarm_sample::{RunHeader, Sample, TwinSample};
 
 /// Draws deflections larger than they are.
 ///
-/// Every frame is placed against the frame that carries it: what the flexible robot adds to the rigid twin's relative
-/// pose there is multiplied (its translation, and its rotation as a rotation vector), then the frames are chained
-/// again from the base. So joints still fit together and rigid links stay rigid, at any factor; with factor 1 the
-/// result is the flexible robot.
+/// Every frame is placed against the frame that carries it: what the flexible robot adds to the
+/// rigid twin's relative pose there is multiplied (its translation, and its rotation as a rotation
+/// vector), then the frames are chained again from the base. So joints still fit together and rigid
+/// links stay rigid, at any factor; with factor 1 the result is the flexible robot.
 #[derive(Clone, Debug)]
 pub struct Magnifier {
     factor: f64,
@@ -54,7 +54,8 @@ impl Magnifier {
         self.factor
     }
 
-    /// Poses of links, stations and tool centre point, magnified. Joint values are those of the flexible robot.
+    /// Poses of links, stations and tool centre point, magnified. Joint values are those of the
+    /// flexible robot.
     #[must_use]
     pub fn magnified(&self, sample: &Sample) -> TwinSample {
         let mut to = TwinSample::default();
@@ -149,8 +150,8 @@ impl Magnifier {
     }
 }
 
-/// Stations of one bend as poses in its link, from the robot's poses in the world; `first` is the number of its first
-/// station.
+/// Stations of one bend as poses in its link, from the robot's poses in the world; `first` is the
+/// number of its first station.
 #[must_use]
 pub fn stations_in_link(twin: &TwinSample, link: usize, first: usize, count: usize) -> Vec<Pose> {
     twin.X_WS[first..first + count].iter().map(|X_WS| twin.X_WL[link].inv_mul(X_WS)).collect()

@@ -1,8 +1,8 @@
-//! The colours of everything that flexarm draws: recordings, reports, plots, pictures. One table, so that a colour means
-//! the same wherever it is seen.
+//! The colours of everything that flexarm draws: recordings, reports, plots, pictures. One table,
+//! so that a colour means the same wherever it is seen.
 //!
-//! * [`axis`]: x is red, y green, z blue, as viewers draw their triads; in shades that people tell apart who see red and
-//!   green alike.
+//! * [`axis`]: x is red, y green, z blue, as viewers draw their triads; in shades that people tell
+//!   apart who see red and green alike.
 //! * [`series`]: whatever is counted (runs, links, drives, joints), in one order.
 //! * [`rigid`]: the rigid twin, a grey that no run has.
 //!
@@ -95,8 +95,8 @@ pub fn series(number: usize, ground: Ground) -> Rgb {
     }
 }
 
-/// Shade of [`series`] for one of the six components of the thing with this number: displacements, then rotations, darker
-/// from one to the next.
+/// Shade of [`series`] for one of the six components of the thing with this number: displacements,
+/// then rotations, darker from one to the next.
 #[must_use]
 pub fn component(number: usize, component: usize, ground: Ground) -> Rgb {
     mix(series(number, ground), [0; 3], 0.11 * (component % 6) as f64)
@@ -154,8 +154,8 @@ mod tests {
 
     const GROUNDS: [Ground; 2] = [Ground::Paper, Ground::Dark];
 
-    /// What is left of a colour for people without red cones (protanopia) and without green ones (deuteranopia), on linear
-    /// light [Machado, Oliveira and Fernandes 2009, table 1, severity 1].
+    /// What is left of a colour for people without red cones (protanopia) and without green ones
+    /// (deuteranopia), on linear light [Machado, Oliveira and Fernandes 2009, table 1, severity 1].
     fn eyes() -> [Matrix3<f64>; 3] {
         [
             Matrix3::identity(),
@@ -164,7 +164,8 @@ mod tests {
         ]
     }
 
-    /// Place of a colour in the perceptually even space OKLab [Ottosson 2020], hundredfold; 2 is just seen side by side.
+    /// Place of a colour in the perceptually even space OKLab [Ottosson 2020], hundredfold; 2 is
+    /// just seen side by side.
     fn oklab(color: Rgb, eye: &Matrix3<f64>) -> Vector3<f64> {
         let linear = |c: u8| {
             let c = f64::from(c) / 255.0;
@@ -209,8 +210,9 @@ mod tests {
                 assert!((0..3).all(|c| c == k || color[c] < color[k]), "{color:?}");
             }
             for eye in eyes() {
-                // Measured: 12.2 on paper and 15.8 on dark ground for eyes without green cones; red, green and blue of the
-                // usual kind (210,40,40), (30,150,50), (40,70,220) have 2.4.
+                // Measured: 12.2 on paper and 15.8 on dark ground for eyes without green cones;
+                // red, green and blue of the usual kind (210,40,40), (30,150,50), (40,70,220) have
+                // 2.4.
                 assert!(closest(&axes, &eye) > 12.0, "{ground:?}: {}", closest(&axes, &eye));
             }
         }

@@ -42,7 +42,8 @@ pub enum CurveLook {
     Total,
     /// In a colour of its own, dashed: what others are compared with.
     Dashed,
-    /// In a colour of its own, a dot at each point: what was measured or computed there and nowhere else.
+    /// In a colour of its own, a dot at each point: what was measured or computed there and nowhere
+    /// else.
     Dots,
     /// As [`CurveLook::Plain`] with a dot at each point.
     Marked,
@@ -156,7 +157,8 @@ const COLUMN: Style = Style {
 /// A plan: a unit is as long on both axes.
 const PLAN: Style = Style { panel: (1920, 1300), equal: true, ..PAGE };
 
-/// Panels over a common horizontal axis, for the screen. Curves are named above the panels, where they hide nothing.
+/// Panels over a common horizontal axis, for the screen. Curves are named above the panels, where
+/// they hide nothing.
 #[derive(Clone, Debug, Default)]
 pub struct LinePlot<'a> {
     /// What is shown.
@@ -183,8 +185,9 @@ impl LinePlot<'_> {
     }
 }
 
-/// Panels in the size of a column of a two-column paper (88 mm, text of 8 points), without a title: that is the caption's
-/// work. Curves are named above the panels; `bands` are stretches of the horizontal axis to be tinted. SVG.
+/// Panels in the size of a column of a two-column paper (88 mm, text of 8 points), without a title:
+/// that is the caption's work. Curves are named above the panels; `bands` are stretches of the
+/// horizontal axis to be tinted. SVG.
 ///
 /// # Errors
 /// As [`LinePlot::svg`].
@@ -200,7 +203,8 @@ pub fn page_plot(x_label: &str, logarithmic_x: bool, panels: &[Panel]) -> Result
     plot(&LinePlot { x_label, logarithmic_x, panels, ..LinePlot::default() }, &[], &PAGE)
 }
 
-/// A plan for a page of text: one panel on which a unit is as long on both axes, curves that may go anywhere, named above it. SVG.
+/// A plan for a page of text: one panel on which a unit is as long on both axes, curves that may go
+/// anywhere, named above it. SVG.
 ///
 /// # Errors
 /// As [`LinePlot::svg`].

@@ -4,8 +4,8 @@
 //! cargo run --release -p flexarm-log --example recorders [SAMPLES [FORMAT ...]]
 //! ```
 //!
-//! The samples have the sizes of those of `robots/kr210` with six gearboxes and two links that bend, at 1 kHz; their numbers
-//! are made up.
+//! The samples have the sizes of those of `robots/kr210` with six gearboxes and two links that
+//! bend, at 1 kHz; their numbers are made up.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, pose of L in W")]
 #![allow(clippy::print_stdout, reason = "an example says what it found")]
 

@@ -76,8 +76,8 @@ impl CreateOptions {
     }
 }
 
-/// Room on the disk below which files are flushed by the sample: all of a run's files together then fill the disk at the
-/// same pace, and what one of them takes last is not missing in the others.
+/// Room on the disk below which files are flushed by the sample: all of a run's files together then
+/// fill the disk at the same pace, and what one of them takes last is not missing in the others.
 const SCARCE_BYTES: u64 = 64 << 20;
 /// Samples between two flushes when room is scarce.
 const SCARCE_EVERY: u32 = 64;
@@ -117,8 +117,8 @@ impl FlushClock {
         due
     }
 
-    /// To be told when a flush is over whose cost grows with the file: the next one waits so long that all of them take
-    /// only a small part of the run.
+    /// To be told when a flush is over whose cost grows with the file: the next one waits so long
+    /// that all of them take only a small part of the run.
     #[cfg(feature = "rerun")]
     pub(crate) fn done(&mut self) {
         // Who asks for no pause gets none.

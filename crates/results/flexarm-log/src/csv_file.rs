@@ -15,16 +15,17 @@ use crate::{CreateOptions, LogError, RunHeader, RunResult, Sample};
 
 /// Writes a run as comma-separated values with a header line.
 ///
-/// Columns: `time`; TCP positions `rigid_x_m` ..., `flexible_x_m` ...; TCP error, flexible minus rigid, in world
-/// axes `error_x_m` ... `error_rz_rad` (rotation vector) and along the path `error_tangential_m`,
-/// `error_normal_m`, `error_binormal_m`; for every flexible link and elastic drive the TCP displacement that it alone causes,
-/// `<name>_contribution_x_m` ...; for every joint `<joint>_position_rad`, `<joint>_effort` and
-/// `rigid_<joint>_effort`; for every elastic element its deflection and load, `<element>_x_m` ...
-/// `<element>_tz_nm`; `kinetic_energy_j`, `potential_energy_j`, `elastic_energy_j`. A run without a rigid twin
-/// has no `rigid_` and no `error_` columns.
+/// Columns: `time`; TCP positions `rigid_x_m` ..., `flexible_x_m` ...; TCP error, flexible minus
+/// rigid, in world axes `error_x_m` ... `error_rz_rad` (rotation vector) and along the path
+/// `error_tangential_m`, `error_normal_m`, `error_binormal_m`; for every flexible link and elastic
+/// drive the TCP displacement that it alone causes, `<name>_contribution_x_m` ...; for every joint
+/// `<joint>_position_rad`, `<joint>_effort` and `rigid_<joint>_effort`; for every elastic element
+/// its deflection and load, `<element>_x_m` ... `<element>_tz_nm`; `kinetic_energy_j`,
+/// `potential_energy_j`, `elastic_energy_j`. A run without a rigid twin has no `rigid_` and no
+/// `error_` columns.
 ///
-/// Numbers are the shortest that read back as the same `f64`. Result figures of `finish` are not written:
-/// a table has no place for them.
+/// Numbers are the shortest that read back as the same `f64`. Result figures of `finish` are not
+/// written: a table has no place for them.
 pub type CsvRecorder = FileRecorder<CsvFile>;
 
 /// A CSV file that is being written.
@@ -77,7 +78,8 @@ impl Lines {
         self.waiting.len() > MOST_WAITING
     }
 
-    /// Writes out what waits. If that fails, it is given up, and the file ends with its last whole line.
+    /// Writes out what waits. If that fails, it is given up, and the file ends with its last whole
+    /// line.
     fn flush(&mut self) -> io::Result<()> {
         let length = self.waiting.len() as u64;
         let result = self.file.write_all(&self.waiting);

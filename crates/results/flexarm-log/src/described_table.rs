@@ -1,7 +1,9 @@
-//! A table with texts beside it, which say what it has no columns for: what Parquet and its like share, both ways.
+//! A table with texts beside it, which say what it has no columns for: what Parquet and its like
+//! share, both ways.
 //!
-//! Written: [`texts_at_start`], [`texts_at_end`], and samples in blocks of columns ([`Block`]). Read: a [`DescribedTable`] of
-//! the names and texts of a file, and [`TableRun`] over anything that gives the numbers of a block ([`Blocks`]).
+//! Written: [`texts_at_start`], [`texts_at_end`], and samples in blocks of columns ([`Block`]).
+//! Read: a [`DescribedTable`] of the names and texts of a file, and [`TableRun`] over anything that
+//! gives the numbers of a block ([`Blocks`]).
 
 use std::path::{Path, PathBuf};
 
@@ -129,8 +131,8 @@ pub(crate) trait Blocks {
     /// How many blocks there are.
     fn count(&self) -> usize;
 
-    /// The numbers of some columns, by their places in the file, of one block; missing ones are NaN. As many numbers for
-    /// each column.
+    /// The numbers of some columns, by their places in the file, of one block; missing ones are
+    /// NaN. As many numbers for each column.
     fn read(&self, path: &Path, block: usize, places: &[usize], columns: &mut [Vec<f64>]) -> Result<(), LogError>;
 }
 

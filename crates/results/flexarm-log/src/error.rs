@@ -124,8 +124,8 @@ fn others(paths: &[PathBuf]) -> String {
 }
 
 impl LogError {
-    /// The same error with the name `shown` for every path in the folder `hidden`: files that come into being under a
-    /// provisional name are called what the user called them.
+    /// The same error with the name `shown` for every path in the folder `hidden`: files that come
+    /// into being under a provisional name are called what the user called them.
     #[must_use]
     pub fn with_path_for(mut self, hidden: &Path, shown: &Path) -> Self {
         let rename = |path: &mut PathBuf| {

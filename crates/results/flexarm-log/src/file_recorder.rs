@@ -1,4 +1,5 @@
-//! What all recorders have in common: a file that is opened by `begin`, and calls that come in order.
+//! What all recorders have in common: a file that is opened by `begin`, and calls that come in
+//! order.
 
 use std::path::{Path, PathBuf};
 
@@ -6,8 +7,8 @@ use crate::{CreateOptions, LogError, Recorder, RunHeader, RunResult, Sample};
 
 /// A recorder of one file; `F` is the file of its format between `begin` and `finish`.
 ///
-/// The file is created by [`Recorder::begin`]. Calls in another order than `begin`, `record`, `finish` are
-/// [`LogError::Order`].
+/// The file is created by [`Recorder::begin`]. Calls in another order than `begin`, `record`,
+/// `finish` are [`LogError::Order`].
 #[derive(Debug)]
 pub struct FileRecorder<F> {
     path: PathBuf,
@@ -22,7 +23,8 @@ enum State<F> {
     Finished,
 }
 
-/// A file of one format that is being written. Dropped without `finish`, it closes itself as well as it can.
+/// A file of one format that is being written. Dropped without `finish`, it closes itself as well
+/// as it can.
 pub trait OpenFile: Send + Sized {
     /// Makes the file and writes what is known before the first sample.
     ///
@@ -36,8 +38,8 @@ pub trait OpenFile: Send + Sized {
     /// As [`Recorder::record`].
     fn record(&mut self, path: &Path, sample: &Sample) -> Result<(), LogError>;
 
-    /// Copies what a file without further samples needs of the one that was added last. Called after [`OpenFile::record`], of
-    /// several samples in a row after the last.
+    /// Copies what a file without further samples needs of the one that was added last. Called
+    /// after [`OpenFile::record`], of several samples in a row after the last.
     fn keep(&mut self, _sample: &Sample) {}
 
     /// Adds the result and ends the file.

@@ -1,4 +1,5 @@
-//! The columns of a run in memory as the table that its CSV has: each column one number wide, under the same name.
+//! The columns of a run in memory as the table that its CSV has: each column one number wide, under
+//! the same name.
 
 use flexarm_sample::{Columns, RunHeader};
 
@@ -71,8 +72,8 @@ fn places(columns: &Columns, has_rigid: bool) -> Vec<Place> {
     places
 }
 
-/// The table as a stream of Arrow's C interface, one record batch long: other programs of the process take the numbers over
-/// without a copy.
+/// The table as a stream of Arrow's C interface, one record batch long: other programs of the
+/// process take the numbers over without a copy.
 ///
 /// # Errors
 /// If the columns make no record batch, which those of a run do.

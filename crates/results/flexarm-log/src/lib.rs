@@ -1,21 +1,24 @@
 //! Recorders: a run of the simulator into CSV, Parquet, MCAP and Rerun files, and back.
 //!
-//! A run hands over one [`RunHeader`], then [`Sample`]s, then its result figures; every [`Recorder`] takes the
-//! same three calls, and [`RecorderSet`] passes them to several files at once. Start at [`CsvRecorder`] for
-//! tables (`ParquetRecorder`, feature `parquet`, for the same table as Parquet), `McapRecorder` (feature `mcap`) for ROS 2 tools, Foxglove and PlotJuggler, `RrdRecorder` (feature
-//! `rerun`) for the Rerun viewer with meshes and a layout.
+//! A run hands over one [`RunHeader`], then [`Sample`]s, then its result figures; every
+//! [`Recorder`] takes the same three calls, and [`RecorderSet`] passes them to several files at
+//! once. Start at [`CsvRecorder`] for tables (`ParquetRecorder`, feature `parquet`, for the same
+//! table as Parquet), `McapRecorder` (feature `mcap`) for ROS 2 tools, Foxglove and PlotJuggler,
+//! `RrdRecorder` (feature `rerun`) for the Rerun viewer with meshes and a layout.
 //!
-//! The way back is [`open_recording`]: a [`RunSource`] gives header, samples and result of a file, for reports and for
-//! other formats. What a format cannot hold is listed by [`RecordingFormat::lost_on_the_way_to`].
+//! The way back is [`open_recording`]: a [`RunSource`] gives header, samples and result of a file,
+//! for reports and for other formats. What a format cannot hold is listed by
+//! [`RecordingFormat::lost_on_the_way_to`].
 //!
 //! What all recorders promise:
 //! * a file is created by [`Recorder::begin`] and replaces an existing one only if told to
 //!   ([`CreateOptions::overwrite`]);
-//! * a killed run loses at most the last moment ([`CreateOptions::flush_every`], of an MCAP its last
-//!   chunk), and what is left can be read; the exceptions ([`FormatInfo::survives_a_kill`]) come into
-//!   being under another name and are there whole or not at all;
-//! * the same samples give the same bytes, on any day and at any speed: nothing in a file depends on the clock. An
-//!   `.rrd` has the same content: Rerun's SDK draws identifiers of chunks from clock and chance.
+//! * a killed run loses at most the last moment ([`CreateOptions::flush_every`], of an MCAP its
+//!   last chunk), and what is left can be read; the exceptions ([`FormatInfo::survives_a_kill`])
+//!   come into being under another name and are there whole or not at all;
+//! * the same samples give the same bytes, on any day and at any speed: nothing in a file depends
+//!   on the clock. An `.rrd` has the same content: Rerun's SDK draws identifiers of chunks from
+//!   clock and chance.
 //!
 //! Not here: what the numbers mean (`flexarm-analysis`), running the simulation (`flexarm`).
 //!

@@ -7,12 +7,14 @@ use crate::{LogError, Recorder, RunHeader, RunResult, Sample};
 
 /// Recorders that get the same header, samples and result.
 ///
-/// One that fails does not keep the others from their data: all are called, then the first error is returned.
-/// Each error names its file. One that cannot begin ends the set, and the files that the others have made go away.
+/// One that fails does not keep the others from their data: all are called, then the first error is
+/// returned. Each error names its file. One that cannot begin ends the set, and the files that the
+/// others have made go away.
 #[derive(Default)]
 pub struct RecorderSet {
     recorders: Vec<Box<dyn Recorder>>,
-    /// The recorders in their place, between [`RecorderSet::on_threads`] and [`RecorderSet::finish`].
+    /// The recorders in their place, between [`RecorderSet::on_threads`] and
+    /// [`RecorderSet::finish`].
     threads: Option<Threads>,
     /// Which file was made under which name.
     made: Vec<(PathBuf, FileId)>,
@@ -48,7 +50,8 @@ impl RecorderSet {
         self.recorders.push(recorder);
     }
 
-    /// The files, in the order in which the recorders were added; none while they are written on threads.
+    /// The files, in the order in which the recorders were added; none while they are written on
+    /// threads.
     pub fn paths(&self) -> impl Iterator<Item = &Path> {
         self.recorders.iter().map(|recorder| recorder.path())
     }
@@ -56,7 +59,8 @@ impl RecorderSet {
     /// Whether all files may be created, as far as can be told without creating one.
     ///
     /// # Errors
-    /// [`LogError::Exists`] for the first file that is there already; [`LogError::Io`] for one that cannot be replaced.
+    /// [`LogError::Exists`] for the first file that is there already; [`LogError::Io`] for one that
+    /// cannot be replaced.
     pub fn check(&self) -> Result<(), LogError> {
         self.recorders.iter().try_for_each(|recorder| recorder.check())
     }
@@ -64,8 +68,8 @@ impl RecorderSet {
     /// Starts all files, or none if one of them may not be written.
     ///
     /// # Errors
-    /// As [`RecorderSet::check`], before any file is created; later, the first error of a recorder, and no new file is
-    /// left.
+    /// As [`RecorderSet::check`], before any file is created; later, the first error of a recorder,
+    /// and no new file is left.
     pub fn begin(&mut self, header: &RunHeader) -> Result<(), LogError> {
         self.check()?;
         let new: Vec<PathBuf> = self.paths().filter(|path| !path.exists()).map(Path::to_owned).collect();
@@ -81,7 +85,8 @@ impl RecorderSet {
         Ok(())
     }
 
-    /// Surfaces and files of the robot are much to write: each recorder begins on a thread of its own.
+    /// Surfaces and files of the robot are much to write: each recorder begins on a thread of its
+    /// own.
     fn begin_all(&mut self, header: &RunHeader) -> Result<(), LogError> {
         if self.recorders.len() < 2 || !several_processors() {
             return self.all(|recorder| recorder.begin(header));
@@ -96,7 +101,8 @@ impl RecorderSet {
         })
     }
 
-    /// Has each file written on a thread of its own from here on, after [`RecorderSet::begin`]. The files get the same bytes.
+    /// Has each file written on a thread of its own from here on, after [`RecorderSet::begin`]. The
+    /// files get the same bytes.
     ///
     /// Where there is one processor, nothing changes.
     pub fn on_threads(&mut self) {
@@ -108,7 +114,8 @@ impl RecorderSet {
     /// Adds one instant to all files.
     ///
     /// # Errors
-    /// The first error of a recorder; on threads it is told some samples after the one that it belongs to.
+    /// The first error of a recorder; on threads it is told some samples after the one that it
+    /// belongs to.
     pub fn record(&mut self, sample: &Sample) -> Result<(), LogError> {
         match &mut self.threads {
             Some(threads) => threads.record(sample),
@@ -116,19 +123,20 @@ impl RecorderSet {
         }
     }
 
-    /// Has the threads add the result and close their files, and does not wait for that; [`RecorderSet::finish`] does. Without
-    /// threads nothing happens yet.
+    /// Has the threads add the result and close their files, and does not wait for that;
+    /// [`RecorderSet::finish`] does. Without threads nothing happens yet.
     pub fn begin_to_finish(&mut self, result: &RunResult) {
         if let Some(threads) = &mut self.threads {
             threads.close(result);
         }
     }
 
-    /// Adds the result to all files and closes them, unless [`RecorderSet::begin_to_finish`] did; then the result is that one's.
+    /// Adds the result to all files and closes them, unless [`RecorderSet::begin_to_finish`] did;
+    /// then the result is that one's.
     ///
     /// # Errors
-    /// The first error of a recorder; [`LogError::Gone`] if files are no longer where they were made: what was written
-    /// to them cannot be found.
+    /// The first error of a recorder; [`LogError::Gone`] if files are no longer where they were
+    /// made: what was written to them cannot be found.
     pub fn finish(&mut self, result: &RunResult) -> Result<(), LogError> {
         match self.threads.take() {
             Some(threads) => {

@@ -1,7 +1,8 @@
-//! The table of a run as a Parquet file: the columns of the CSV as `double`, and the header and the result beside them.
+//! The table of a run as a Parquet file: the columns of the CSV as `double`, and the header and the
+//! result beside them.
 //!
-//! Written through the columns of the format itself: with one kind of number and no missing values Arrow would add
-//! nothing but its compile time. Start at [`ParquetRecorder`].
+//! Written through the columns of the format itself: with one kind of number and no missing values
+//! Arrow would add nothing but its compile time. Start at [`ParquetRecorder`].
 
 use std::fs::File;
 use std::io;
@@ -23,13 +24,15 @@ use crate::{CreateOptions, LogError, RunHeader, RunResult, Sample, table};
 
 /// Writes a run as a Parquet file.
 ///
-/// Columns are those of [`crate::CsvRecorder`], all `double` without missing values, compressed with zstd after their
-/// bytes were sorted by significance. The file's key-value metadata say what a table has no column for: `robot`,
-/// `trajectory`, `units`, `version`; each result figure under its label with `figure.` before it; for readers of flexarm
-/// `flexarm.run` and `flexarm.result` (JSON), and the attached texts.
+/// Columns are those of [`crate::CsvRecorder`], all `double` without missing values, compressed
+/// with zstd after their bytes were sorted by significance. The file's key-value metadata say what
+/// a table has no column for: `robot`, `trajectory`, `units`, `version`; each result figure under
+/// its label with `figure.` before it; for readers of flexarm `flexarm.run` and `flexarm.result`
+/// (JSON), and the attached texts.
 ///
-/// A Parquet file cannot be read before its end is written. So this one comes into being under the name `<file>.partial`
-/// and is renamed by `finish`; a run that is killed, or a disk that is full, leaves nothing under the file's own name.
+/// A Parquet file cannot be read before its end is written. So this one comes into being under the
+/// name `<file>.partial` and is renamed by `finish`; a run that is killed, or a disk that is full,
+/// leaves nothing under the file's own name.
 pub type ParquetRecorder = FileRecorder<ParquetFile>;
 
 /// A Parquet file that is being written.

@@ -1,7 +1,7 @@
 //! Room in a plot: an axis with labels, and a corner in which the names of the curves hide nothing.
 //!
-//! The Rerun viewer labels an axis at powers of ten and their multiples only, and lays the legend over the curves; what it
-//! shows can be told it once the curves are known. Start at [`arrange`].
+//! The Rerun viewer labels an axis at powers of ten and their multiples only, and lays the legend
+//! over the curves; what it shows can be told it once the curves are known. Start at [`arrange`].
 
 /// Most pieces that an [`Envelope`] keeps.
 const PIECES: usize = 256;
@@ -9,9 +9,11 @@ const PIECES: usize = 256;
 const COLUMNS: usize = 64;
 /// Part of the height that stays empty above and below the curves.
 const MARGIN: f64 = 0.05;
-/// Size of a plot in a window of 1600 by 1000 (pixels), as measured on a picture of the viewer, version 0.36.
+/// Size of a plot in a window of 1600 by 1000 (pixels), as measured on a picture of the viewer,
+/// version 0.36.
 const PLOT: [f64; 2] = [610.0, 425.0];
-/// Height of a row of the legend, of its frame, and width of a letter and of what is beside the letters (pixels), likewise.
+/// Height of a row of the legend, of its frame, and width of a letter and of what is beside the
+/// letters (pixels), likewise.
 const LEGEND: [f64; 4] = [23.0, 10.0, 6.4, 36.0];
 /// Labels are at least so far apart (pixels), likewise.
 const APART: f64 = 20.0;
@@ -77,7 +79,8 @@ pub(crate) struct Arrangement {
     pub(crate) range: [f64; 2],
 }
 
-/// Room for the curves and for their names, the length of each being its number of letters; `None` without a finite value.
+/// Room for the curves and for their names, the length of each being its number of letters; `None`
+/// without a finite value.
 pub(crate) fn arrange(curves: &[&Envelope], names: &[usize]) -> Option<Arrangement> {
     let columns: Vec<[f64; 2]> = (0..COLUMNS)
         .map(|k| curves.iter().map(|curve| curve.column(k)).fold([f64::INFINITY, f64::NEG_INFINITY], wider))
@@ -121,8 +124,9 @@ fn wider(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
 }
 
-/// The range, a little wider if need be, with three labels in a large window if these cost little, and with two in a plot
-/// that is 200 pixels high: the viewer labels multiples of a power of ten that it has room for, and then often only 0.
+/// The range, a little wider if need be, with three labels in a large window if these cost little,
+/// and with two in a plot that is 200 pixels high: the viewer labels multiples of a power of ten
+/// that it has room for, and then often only 0.
 fn labelled(range: [f64; 2]) -> [f64; 2] {
     let length = |[low, high]: [f64; 2]| high - low;
     let shown = 10f64.powf((APART * length(range) / PLOT[1]).log10().ceil());
@@ -149,7 +153,8 @@ fn with_multiples([mut low, mut high]: [f64; 2], unit: f64, count: i32) -> [f64;
     [low, high]
 }
 
-/// Multiples of powers of ten in a range that a viewer labels which wants them so many pixels apart.
+/// Multiples of powers of ten in a range that a viewer labels which wants them so many pixels
+/// apart.
 #[cfg(test)]
 pub(crate) fn labels([low, high]: [f64; 2], height: f64, apart: f64) -> usize {
     let least = apart * (high - low) / height;
@@ -175,7 +180,8 @@ mod tests {
         [side(a.corner.left, width), side(!a.corner.top, height)]
     }
 
-    /// Truth: the curve's own points. Many sizes are such that an axis that takes what comes has the label 0 alone.
+    /// Truth: the curve's own points. Many sizes are such that an axis that takes what comes has
+    /// the label 0 alone.
     #[test]
     fn no_curve_is_under_its_legend_and_the_axis_has_labels() {
         for scale in [-6.0, -2.7, -0.25, 0.0, 0.35, 0.78, 0.95, 3.6] {

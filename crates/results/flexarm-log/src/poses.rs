@@ -1,8 +1,10 @@
-//! Which samples of a run show poses of links: recordings have every sample's numbers, but pictures need fewer.
+//! Which samples of a run show poses of links: recordings have every sample's numbers, but pictures
+//! need fewer.
 
 use crate::Sample;
 
-/// Shortest time between two poses (ns): every sample of a run logged at up to 200 Hz, fewer of faster ones.
+/// Shortest time between two poses (ns): every sample of a run logged at up to 200 Hz, fewer of
+/// faster ones.
 const EVERY_NS: u64 = 5_000_000;
 
 /// What a sample is for.
@@ -14,7 +16,8 @@ pub(crate) struct Shown {
     pub(crate) new_peak: bool,
 }
 
-/// Chooses the samples. The `.rrd` and the MCAP have one each, so that one can be made of the other.
+/// Chooses the samples. The `.rrd` and the MCAP have one each, so that one can be made of the
+/// other.
 #[derive(Debug, Default)]
 pub(crate) struct PoseClock {
     last_ns: Option<u64>,
@@ -23,7 +26,8 @@ pub(crate) struct PoseClock {
 }
 
 impl PoseClock {
-    /// Takes a sample, so many ns after the start of the run. `has_rigid`: without a twin there is no error.
+    /// Takes a sample, so many ns after the start of the run. `has_rigid`: without a twin there is
+    /// no error.
     pub(crate) fn take(&mut self, since_start_ns: u64, sample: &Sample, has_rigid: bool) -> Shown {
         let due = self.last_ns.is_none_or(|last| since_start_ns.saturating_sub(last) >= EVERY_NS);
         if due {

@@ -4,7 +4,8 @@ use crate::{RunHeader, RunResult, Sample};
 
 /// Writes a run while it goes on: `begin` once, `record` any number of times, `finish` once.
 ///
-/// A recorder that is dropped without `finish` closes its file as well as it can, without result figures.
+/// A recorder that is dropped without `finish` closes its file as well as it can, without result
+/// figures.
 pub trait Recorder: Send {
     /// Whether `begin` may create the file, as far as can be told without creating it.
     ///
@@ -23,8 +24,8 @@ pub trait Recorder: Send {
     /// Adds one instant. The recorder flushes on its own, at least once a second of wall time.
     ///
     /// # Errors
-    /// [`crate::LogError::Shape`] if the sample does not fit the header; [`crate::LogError`] on a write error
-    /// (full disk).
+    /// [`crate::LogError::Shape`] if the sample does not fit the header; [`crate::LogError`] on a
+    /// write error (full disk).
     fn record(&mut self, sample: &Sample) -> Result<(), crate::LogError>;
 
     /// Adds instants one after another, up to the first that fails.

@@ -1,7 +1,9 @@
-//! A run's header as JSON, and its triangles as one compressed block: what the topics of a recording have no place for.
+//! A run's header as JSON, and its triangles as one compressed block: what the topics of a
+//! recording have no place for.
 //!
-//! `run.json` is a stable format of its own: keys are added, not renamed. It holds everything of a [`RunHeader`] but the
-//! URDF, which recordings carry as it is, and the corners of meshes, which are in `meshes.bin.zst`.
+//! `run.json` is a stable format of its own: keys are added, not renamed. It holds everything of a
+//! [`RunHeader`] but the URDF, which recordings carry as it is, and the corners of meshes, which
+//! are in `meshes.bin.zst`.
 
 use flexarm_kinematics::Pose;
 use nalgebra::{Matrix3, Rotation3, Translation3};
@@ -126,7 +128,8 @@ pub(crate) fn write(header: &RunHeader, meshes: bool) -> String {
     serde_json::to_string(&run).expect("names, texts and numbers are JSON")
 }
 
-/// What an MCAP file needs besides its topics to be read back: the header, and the meshes if there are any.
+/// What an MCAP file needs besides its topics to be read back: the header, and the meshes if there
+/// are any.
 #[cfg(feature = "mcap")]
 pub(crate) fn files(header: &RunHeader) -> std::io::Result<Vec<crate::Attachment>> {
     let file = |name: &str, media_type: &str, bytes| crate::Attachment {
@@ -208,7 +211,8 @@ struct ResultJson {
     files: Vec<(String, String, String)>,
 }
 
-/// What an MCAP file needs at its end to give back the result as it was; attached files are in it by themselves.
+/// What an MCAP file needs at its end to give back the result as it was; attached files are in it
+/// by themselves.
 #[cfg(feature = "mcap")]
 pub(crate) fn result_file(result: &RunResult) -> Attachment {
     let text = write_result(&RunResult { attachments: Vec::new(), ..result.clone() });
@@ -232,7 +236,8 @@ pub(crate) fn write_result(result: &RunResult) -> String {
     serde_json::to_string(&result).expect("names, texts and numbers are JSON")
 }
 
-/// The result from such a text; what is not there is empty, kinds of events that are not known are left out.
+/// The result from such a text; what is not there is empty, kinds of events that are not known are
+/// left out.
 pub(crate) fn read_result(text: &str) -> RunResult {
     let Ok(result) = serde_json::from_str::<ResultJson>(text) else { return RunResult::default() };
     let event =
@@ -262,8 +267,8 @@ fn pose(numbers: &[f64; 12]) -> Pose {
 
 #[cfg(feature = "mcap")]
 pub(crate) mod meshes {
-    //! Triangles of all meshes, one mesh after the other: corners, normals (three `f32` each), triangles (three `u32`
-    //! each), little endian, compressed with zstd.
+    //! Triangles of all meshes, one mesh after the other: corners, normals (three `f32` each),
+    //! triangles (three `u32` each), little endian, compressed with zstd.
 
     use super::MeshEntry;
     use crate::LinkMesh;
@@ -273,13 +278,15 @@ pub(crate) mod meshes {
     /// Its media type.
     pub(crate) const MEDIA_TYPE: &str = "application/zstd";
 
-    /// Surfaces of an arm take a sixth more than with level 9, whose search was a sixth of what an MCAP file took to begin.
+    /// Surfaces of an arm take a sixth more than with level 9, whose search was a sixth of what an
+    /// MCAP file took to begin.
     const LEVEL: i32 = 1;
 
     pub(crate) fn write(meshes: &[LinkMesh]) -> std::io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
         for mesh in meshes {
-            // A mesh without normals for all corners gets zeros: sizes in the file follow from the counts alone.
+            // A mesh without normals for all corners gets zeros: sizes in the file follow from the
+            // counts alone.
             let normals = (0..mesh.positions.len()).map(|k| mesh.normals.get(k).copied().unwrap_or_default());
             let floats = mesh.positions.iter().copied().chain(normals).flatten();
             floats.for_each(|value| bytes.extend(value.to_le_bytes()));

@@ -1,4 +1,5 @@
-//! The table of a run: which numbers of a sample are its columns. CSV and Parquet files share it, both ways.
+//! The table of a run: which numbers of a sample are its columns. CSV and Parquet files share it,
+//! both ways.
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 
@@ -116,7 +117,8 @@ pub(crate) struct TableLayout {
 }
 
 impl TableLayout {
-    /// Finds the columns of a run among `names`; their order does not matter, others are passed over.
+    /// Finds the columns of a run among `names`; their order does not matter, others are passed
+    /// over.
     ///
     /// # Errors
     /// What was found and what was expected.
@@ -175,8 +177,8 @@ impl TableLayout {
         Ok(Self { header, places })
     }
 
-    /// A sample from the numbers of a row in the order of [`columns`]. What a table does not hold is NaN; orientations of
-    /// the tool are those of the world.
+    /// A sample from the numbers of a row in the order of [`columns`]. What a table does not hold
+    /// is NaN; orientations of the tool are those of the world.
     pub(crate) fn sample(&self, row: &[f64], sample: &mut Sample) {
         let mut next = row.iter().copied();
         let mut number = || next.next().unwrap_or(f64::NAN);
@@ -235,7 +237,8 @@ impl TableLayout {
     }
 }
 
-/// Samples per second from two times that follow each other, without the rounding of their difference.
+/// Samples per second from two times that follow each other, without the rounding of their
+/// difference.
 pub(crate) fn rate_hz(first_s: f64, second_s: f64) -> f64 {
     let rate = 1.0 / (second_s - first_s);
     let digits = format!("{rate:.8e}").parse().unwrap_or(rate);

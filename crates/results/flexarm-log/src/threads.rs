@@ -1,11 +1,13 @@
 //! Recorders on threads of their own: a run goes on while its samples are written.
 //!
-//! Each recorder has a thread and a bounded queue of batches of samples, which all recorders share. Every recorder sees the
-//! same samples in the same order as without threads, so its file has the same bytes. Start at [`Threads::record`].
+//! Each recorder has a thread and a bounded queue of batches of samples, which all recorders share.
+//! Every recorder sees the same samples in the same order as without threads, so its file has the
+//! same bytes. Start at [`Threads::record`].
 //!
-//! A batch is handed over when it is full or when the last one is [`PAUSE`] old, so that a slow run keeps nothing back. When
-//! a queue is full the run waits: memory stays what it is, however long the run. On a disk that is nearly full it waits for
-//! each batch: then no file takes the room that another needs to reach as far.
+//! A batch is handed over when it is full or when the last one is [`PAUSE`] old, so that a slow run
+//! keeps nothing back. When a queue is full the run waits: memory stays what it is, however long
+//! the run. On a disk that is nearly full it waits for each batch: then no file takes the room that
+//! another needs to reach as far.
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -51,8 +53,8 @@ struct Worker {
     failed: Arc<Mutex<Option<LogError>>>,
 }
 
-/// Recorders that have begun, each on its thread. Dropped without [`Threads::finish`], the files close themselves as well as
-/// they can, and the threads are over.
+/// Recorders that have begun, each on its thread. Dropped without [`Threads::finish`], the files
+/// close themselves as well as they can, and the threads are over.
 pub(crate) struct Threads {
     workers: Vec<Worker>,
     /// The one that is being filled comes first, then the oldest.
@@ -89,10 +91,12 @@ impl Threads {
     /// Adds one instant.
     ///
     /// # Errors
-    /// The first error of a recorder that has not been told yet; it may belong to an earlier sample.
+    /// The first error of a recorder that has not been told yet; it may belong to an earlier
+    /// sample.
     pub(crate) fn record(&mut self, sample: &Sample) -> Result<(), LogError> {
         let current = &mut self.batches[0];
-        // Nobody else has this one any more: each queue is shorter than the ring. Should one be late, it keeps its own.
+        // Nobody else has this one any more: each queue is shorter than the ring. Should one be
+        // late, it keeps its own.
         if Arc::get_mut(current).is_none() {
             *current = Arc::default();
         }
@@ -154,7 +158,8 @@ impl Threads {
         }
     }
 
-    /// Until all is written, and the result ([`Threads::close`]); the recorders again, and what went wrong first.
+    /// Until all is written, and the result ([`Threads::close`]); the recorders again, and what
+    /// went wrong first.
     ///
     /// # Panics
     /// If a recorder did.
@@ -190,7 +195,8 @@ impl Drop for Threads {
     }
 }
 
-/// What a thread does: writes samples until there are no more, or until that fails, then the result.
+/// What a thread does: writes samples until there are no more, or until that fails, then the
+/// result.
 fn write(
     mut recorder: Box<dyn Recorder>,
     received: &Receiver<Message>,

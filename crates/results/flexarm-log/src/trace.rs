@@ -7,15 +7,17 @@ use crate::{Event, LogError, RunHeader, RunResult, Sample};
 ///
 /// For pictures of a run, not for its numbers: [`crate::Columns`] hold every sample.
 ///
-/// Filled like a recorder, by [`Trace::push`] and [`Trace::finish`]. Memory is bounded, however long the run:
+/// Filled like a recorder, by [`Trace::push`] and [`Trace::finish`]. Memory is bounded, however
+/// long the run:
 ///
-/// * **Curves** ([`Trace::curve`]) of more than [`Trace::WHOLE`] samples are the smallest and the largest value of each of
-///   equal stretches; [`Trace::samples_per_block`] tells. No peak is lost.
-/// * **Rows** of such a run have the figures of the tool alone (their lists are empty). At [`Trace::LIMIT`] rows every second
-///   one is dropped and only every second sample is taken from then on, so that they stay evenly spaced; [`Trace::stride`]
-///   tells. A trace of [`Trace::for_page`] does so at [`Trace::WHOLE`] rows.
-/// * The sample of the largest error ([`Trace::peak`]), and the error of the first [`Trace::BEGINNING`] samples
-///   ([`Trace::beginning`]), are always kept.
+/// * **Curves** ([`Trace::curve`]) of more than [`Trace::WHOLE`] samples are the smallest and the
+///   largest value of each of equal stretches; [`Trace::samples_per_block`] tells. No peak is lost.
+/// * **Rows** of such a run have the figures of the tool alone (their lists are empty). At
+///   [`Trace::LIMIT`] rows every second one is dropped and only every second sample is taken from
+///   then on, so that they stay evenly spaced; [`Trace::stride`] tells. A trace of
+///   [`Trace::for_page`] does so at [`Trace::WHOLE`] rows.
+/// * The sample of the largest error ([`Trace::peak`]), and the error of the first
+///   [`Trace::BEGINNING`] samples ([`Trace::beginning`]), are always kept.
 #[derive(Clone, Debug, Default)]
 pub struct Trace {
     /// What stays the same.
@@ -192,8 +194,8 @@ impl Trace {
         self.rows = rows;
     }
 
-    /// A curve: a value for each row or, in a long run, smallest and largest value of each block. What a run does not have is
-    /// not a number.
+    /// A curve: a value for each row or, in a long run, smallest and largest value of each block.
+    /// What a run does not have is not a number.
     #[must_use]
     pub fn curve(&self, quantity: CurveQuantity) -> Vec<f64> {
         match self.blocks.is_empty() {
@@ -234,8 +236,8 @@ impl Trace {
         self.blocks.size().max(1)
     }
 
-    /// Time (s) and translation of the error (m, world axes) of every sample, of the first [`Trace::BEGINNING`] samples in a long
-    /// run.
+    /// Time (s) and translation of the error (m, world axes) of every sample, of the first
+    /// [`Trace::BEGINNING`] samples in a long run.
     #[must_use]
     pub fn beginning(&self) -> Vec<(f64, [f64; 3])> {
         match self.blocks.is_empty() {
@@ -276,7 +278,8 @@ impl From<&Sample> for TraceRow {
     }
 }
 
-/// A source of samples: what a run is, then its instants, then its result. Readers of recordings implement it.
+/// A source of samples: what a run is, then its instants, then its result. Readers of recordings
+/// implement it.
 pub trait RunSource {
     /// What stays the same.
     fn header(&self) -> &RunHeader;

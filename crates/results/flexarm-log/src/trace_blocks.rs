@@ -1,6 +1,7 @@
 //! Curves of a long run: of each stretch of samples the smallest and the largest value.
 //!
-//! Start at [`Blocks::push`]. Memory does not grow with the run: when there are too many blocks, pairs become one.
+//! Start at [`Blocks::push`]. Memory does not grow with the run: when there are too many blocks,
+//! pairs become one.
 
 use crate::{ElasticSample, TraceRow};
 
@@ -134,8 +135,9 @@ pub(crate) struct Blocks {
     times: Vec<[f64; 2]>,
     /// Way of the rigid tool at the same times (m).
     ways: Vec<[f64; 2]>,
-    /// Smallest and largest value of each quantity, for each block; not a number where there is none. Blocks behind those that
-    /// count are memory to be used again. Each is small: together they take what the start of a program has left free.
+    /// Smallest and largest value of each quantity, for each block; not a number where there is
+    /// none. Blocks behind those that count are memory to be used again. Each is small: together
+    /// they take what the start of a program has left free.
     ranges: Vec<Vec<[f64; 2]>>,
     /// Samples of a full block, and of the last one.
     size: u64,
@@ -197,7 +199,8 @@ impl Blocks {
         self.size *= 2;
     }
 
-    /// Two values for each block: the smallest and the largest; not a number for what the run does not have.
+    /// Two values for each block: the smallest and the largest; not a number for what the run does
+    /// not have.
     pub(crate) fn values(&self, quantity: CurveQuantity) -> Vec<f64> {
         let Some(at) = self.quantities.iter().position(|known| *known == quantity) else {
             return vec![f64::NAN; 2 * self.times.len()];

@@ -1,4 +1,5 @@
-//! A file that is there whole or not at all: for formats that nobody can read before their end is written.
+//! A file that is there whole or not at all: for formats that nobody can read before their end is
+//! written.
 
 use std::fs::File;
 use std::io::Write;
@@ -6,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use crate::{CreateOptions, LogError};
 
-/// The provisional name of a file, `<file>.partial`, until [`WholeFile::finish`] gives it its own. A file that is given up
-/// goes away.
+/// The provisional name of a file, `<file>.partial`, until [`WholeFile::finish`] gives it its own.
+/// A file that is given up goes away.
 #[derive(Debug)]
 pub(crate) struct WholeFile {
     options: CreateOptions,
@@ -26,7 +27,8 @@ impl WholeFile {
         Ok((file, Self { options, partial: Some(partial) }))
     }
 
-    /// Gives the file its name, once its bytes are on the disk. `action` is what an error calls the last of them.
+    /// Gives the file its name, once its bytes are on the disk. `action` is what an error calls the
+    /// last of them.
     pub(crate) fn finish(&mut self, mut file: File, path: &Path, action: &'static str) -> Result<(), LogError> {
         // The name must not be there before the bytes are.
         file.flush().and_then(|()| file.sync_all()).map_err(LogError::io(path, action))?;

@@ -1,15 +1,17 @@
 //! Long files that do not fill the memory of the machine.
 //!
-//! What is written to a file stays in the system's cache until other files need the room. When 15 GB of recordings had filled
-//! it, each further page took the system five times as long as one before (1.5 instead of 0.3 s a GB, Linux 6, 24 GB), and
-//! what others had cached was gone. [`WrittenBehind`] sends what is far behind to the disk and lets go of it.
+//! What is written to a file stays in the system's cache until other files need the room. When 15
+//! GB of recordings had filled it, each further page took the system five times as long as one
+//! before (1.5 instead of 0.3 s a GB, Linux 6, 24 GB), and what others had cached was gone.
+//! [`WrittenBehind`] sends what is far behind to the disk and lets go of it.
 
 use std::fs::File;
 use std::ops::Range;
 
 /// The beginning of a file stays cached: most files are no longer, and are looked at next.
 const CACHED: u64 = 1 << 30;
-/// So often advice is given, and so far back: the disk has time until the second to the last one reaches a page.
+/// So often advice is given, and so far back: the disk has time until the second to the last one
+/// reaches a page.
 const STEP: u64 = 16 << 20;
 const REACH: u64 = 8 * STEP;
 
@@ -39,8 +41,8 @@ impl WrittenBehind {
     }
 }
 
-/// What of these bytes the disk does not have is sent to it, what it has leaves the cache. It is advice: an error means that
-/// all stays as it is.
+/// What of these bytes the disk does not have is sent to it, what it has leaves the cache. It is
+/// advice: an error means that all stays as it is.
 #[cfg(target_os = "linux")]
 fn let_go(file: &File, range: &Range<u64>) {
     let length = std::num::NonZeroU64::new(range.end - range.start);
@@ -54,7 +56,8 @@ fn let_go(_file: &File, _range: &Range<u64>) {}
 mod tests {
     use super::*;
 
-    /// Truth: counted piece by piece. The first advice about a page sends it to the disk, a later one lets go of it.
+    /// Truth: counted piece by piece. The first advice about a page sends it to the disk, a later
+    /// one lets go of it.
     #[test]
     fn what_is_far_behind_is_let_go_of_and_the_beginning_is_not() {
         let (mut behind, mut given) = (WrittenBehind::default(), Vec::new());

@@ -1,4 +1,5 @@
-//! Damaged recordings: whatever their bytes say, reading them ends with samples or with an error, in bounded memory.
+//! Damaged recordings: whatever their bytes say, reading them ends with samples or with an error,
+//! in bounded memory.
 #![allow(non_snake_case, reason = "monogram notation: X_WT, pose of T in W")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
@@ -22,7 +23,8 @@ fn next(seed: &mut u64) -> u64 {
     *seed
 }
 
-/// One change of the kinds that broke readers: a byte inverted, zeros, an end cut off, and lengths that nobody has.
+/// One change of the kinds that broke readers: a byte inverted, zeros, an end cut off, and lengths
+/// that nobody has.
 fn changed(file: &[u8], kind: u64, seed: &mut u64) -> Vec<u8> {
     let mut file = file.to_vec();
     let at = (next(seed) % (file.len() as u64 - 8)) as usize;

@@ -13,7 +13,8 @@ fn rows() -> impl Iterator<Item = &'static FormatInfo> + Clone {
     RecordingFormat::ALL.into_iter().map(RecordingFormat::info)
 }
 
-/// Truth: what a table needs to be one. Two formats with one name, ending or file would hide each other.
+/// Truth: what a table needs to be one. Two formats with one name, ending or file would hide each
+/// other.
 #[test]
 fn every_format_has_its_row_under_its_own_names() {
     for (row, format) in RecordingFormat::ALL.into_iter().enumerate() {

@@ -27,8 +27,8 @@ fn factor_one_gives_the_flexible_robot() {
     }
 }
 
-/// Truth: to first order the displacement of the tool is multiplied; the rest is of second order in the angle, here
-/// 1.7e-3 rad times 20.
+/// Truth: to first order the displacement of the tool is multiplied; the rest is of second order in
+/// the angle, here 1.7e-3 rad times 20.
 #[test]
 fn the_tool_moves_by_the_factor_to_first_order() {
     let sample = synthetic::sample(640);
@@ -39,8 +39,8 @@ fn the_tool_moves_by_the_factor_to_first_order() {
     assert!(error < 0.04, "{error}");
 }
 
-/// Truth: a rigid link keeps its length and a joint its place at any factor; here forearm to tool, and the joint at the end
-/// of the bent link.
+/// Truth: a rigid link keeps its length and a joint its place at any factor; here forearm to tool,
+/// and the joint at the end of the bent link.
 #[test]
 fn rigid_links_stay_rigid_and_joints_stay_closed() {
     let sample = synthetic::sample(640);

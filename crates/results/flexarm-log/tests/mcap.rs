@@ -248,8 +248,8 @@ fn in_world(tree: &Frames, frame: &str) -> nalgebra::Isometry3<f64> {
     X
 }
 
-/// Truth: the poses of links and stations, those of the magnified arm from [`Magnifier`]. Identity: the chain of
-/// transforms from `world` to a frame is its pose.
+/// Truth: the poses of links and stations, those of the magnified arm from [`Magnifier`]. Identity:
+/// the chain of transforms from `world` to a frame is its pose.
 #[test]
 fn the_frames_of_all_robots_chain_up_to_their_poses() {
     let header = synthetic::header();
@@ -282,7 +282,8 @@ fn the_frames_of_all_robots_chain_up_to_their_poses() {
     assert!(error < 1e-6, "{error:e}");
 }
 
-/// Truth: the rates of poses and pictures, at most 200 and 60 a second, beside 500 samples a second.
+/// Truth: the rates of poses and pictures, at most 200 and 60 a second, beside 500 samples a
+/// second.
 #[test]
 fn frames_are_sent_less_often_than_samples_and_the_magnified_arm_less_often_than_the_robots() {
     let file = run("rates.mcap", &synthetic::header(), 501);
@@ -399,7 +400,8 @@ fn by_index(file: &[u8]) -> Vec<(u64, String)> {
     seen
 }
 
-/// Truth: the events of the result. They are written last; readers that go by time find them among the samples.
+/// Truth: the events of the result. They are written last; readers that go by time find them among
+/// the samples.
 #[test]
 fn events_stand_at_their_own_times() {
     let file = run("events.mcap", &synthetic::header(), 1001);
@@ -423,7 +425,8 @@ fn events_stand_at_their_own_times() {
     assert_ne!(topics.last().unwrap(), "/events", "the last event is before the last sample");
 }
 
-/// A run that is not to be magnified shows the deflections that it has: of modes, say, which are large enough to be seen.
+/// A run that is not to be magnified shows the deflections that it has: of modes, say, which are
+/// large enough to be seen.
 #[test]
 fn without_a_magnification_the_flexible_robot_itself_is_drawn_bent() {
     let header = RunHeader { magnification: 0.0, ..synthetic::header() };
@@ -625,7 +628,8 @@ fn no_stamp_is_zero_and_a_recording_read_back_keeps_its_start() {
     }
 }
 
-/// Rerun shows plots in the order of their names, eight of them: the error of the tool must be first.
+/// Rerun shows plots in the order of their names, eight of them: the error of the tool must be
+/// first.
 #[test]
 fn the_first_plot_that_a_viewer_shows_by_itself_is_the_error_of_the_tool() {
     let plotted = |count: usize| {
@@ -651,7 +655,8 @@ fn the_first_plot_that_a_viewer_shows_by_itself_is_the_error_of_the_tool() {
     assert_eq!(plotted(12), topics, "however many elements there are");
 }
 
-/// Truth: the topics of a recording of the same run, and what a JSON and an XML reader make of the files.
+/// Truth: the topics of a recording of the same run, and what a JSON and an XML reader make of the
+/// files.
 #[test]
 fn layouts_refer_to_what_is_in_the_recording() {
     let mut header = synthetic::header();

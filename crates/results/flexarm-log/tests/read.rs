@@ -84,7 +84,8 @@ fn assert_same_but_time(found: &[u8], expected: &[u8]) {
     }
 }
 
-/// The bytes of a table are the check: shortest numbers that read back, so equal tables are equal numbers.
+/// The bytes of a table are the check: shortest numbers that read back, so equal tables are equal
+/// numbers.
 #[test]
 fn a_table_is_the_same_bytes_whatever_formats_it_went_through() {
     for (twin, has_rigid) in [("twin", true), ("alone", false)] {
@@ -99,7 +100,8 @@ fn a_table_is_the_same_bytes_whatever_formats_it_went_through() {
                 let table = converted(&second, to, &format!("{name}-table"), RecordingFormat::Csv);
                 let found = std::fs::read(&table).unwrap();
                 match (from, to) {
-                    // MCAP has whole nanoseconds, and CSV does not say of which step its times are multiples.
+                    // MCAP has whole nanoseconds, and CSV does not say of which step its times are
+                    // multiples.
                     (RecordingFormat::Csv, RecordingFormat::Mcap) => assert_same_but_time(&found, &expected),
                     _ => assert!(found == expected, "{from} to {to}, {twin}"),
                 }
@@ -153,7 +155,8 @@ fn an_mcap_file_gives_back_every_number_to_the_last_bit_and_poses_to_rounding() 
     remove(&[&path]);
 }
 
-/// What a header has no topic for is in the attachments; meshes come back as the triangles that were drawn.
+/// What a header has no topic for is in the attachments; meshes come back as the triangles that
+/// were drawn.
 #[cfg(feature = "mcap")]
 #[test]
 fn an_mcap_file_gives_back_its_header_with_the_meshes() {
@@ -232,7 +235,8 @@ fn a_table_is_read_by_the_names_of_its_columns() {
     remove(&[&path]);
 }
 
-/// What is read from a file cut anywhere: the error, or the samples in front of the cut, each as it was recorded.
+/// What is read from a file cut anywhere: the error, or the samples in front of the cut, each as it
+/// was recorded.
 fn cut_at(file: &[u8], bytes: usize, path: &Path, format: RecordingFormat) -> Result<usize, LogError> {
     std::fs::write(path, &file[..bytes]).unwrap();
     let (_, samples, _, warnings) = read(path, format)?;
@@ -304,7 +308,8 @@ fn what_a_killed_run_left_is_read_up_to_its_last_chunk() {
     remove(&[&path, &copy]);
 }
 
-/// Flipped bits meet a checksum, a size or a name; they must never bring the program down or change a number unseen.
+/// Flipped bits meet a checksum, a size or a name; they must never bring the program down or change
+/// a number unseen.
 #[cfg(feature = "mcap")]
 #[test]
 fn a_damaged_mcap_file_gives_no_wrong_number() {

@@ -117,7 +117,8 @@ fn files_that_are_written_on_threads_have_the_same_bytes() {
     [here, there].iter().for_each(|paths| std::fs::remove_dir_all(paths[0].1.parent().unwrap()).unwrap());
 }
 
-/// The error comes after some samples more; what the others have is whole. Given up without an end, they close themselves.
+/// The error comes after some samples more; what the others have is whole. Given up without an end,
+/// they close themselves.
 #[test]
 fn a_recorder_that_fails_on_its_thread_is_told_and_the_others_have_all_samples() {
     for finished in [true, false] {
@@ -146,7 +147,8 @@ fn a_recorder_that_fails_on_its_thread_is_told_and_the_others_have_all_samples()
     }
 }
 
-/// One that cannot begin takes the others with it: no stray files, and what was there before is as it was.
+/// One that cannot begin takes the others with it: no stray files, and what was there before is as
+/// it was.
 #[test]
 fn one_that_cannot_begin_leaves_no_file_of_the_others() {
     let (new, bad) = (synthetic::scratch("new-too.csv"), synthetic::scratch("missing").join("bad.csv"));

@@ -58,7 +58,8 @@ fn rows(file: &[u8]) -> BTreeMap<String, usize> {
     rows
 }
 
-/// Poses are drawn at most every 5 ms: with 500 samples a second in every third, and in the last one.
+/// Poses are drawn at most every 5 ms: with 500 samples a second in every third, and in the last
+/// one.
 const DRAWN: usize = 335;
 
 #[test]
@@ -87,7 +88,8 @@ fn the_error_has_a_row_for_every_sample_and_the_robots_for_every_picture() {
     for plot in causes {
         assert_eq!(rows[&format!("/plots/{plot}")], DRAWN, "{plot}");
     }
-    // What never moves has one row; what comes to rest has none afterwards; a killing of the ringing takes long.
+    // What never moves has one row; what comes to rest has none afterwards; a killing of the
+    // ringing takes long.
     for twin in ["flexible", "rigid", "magnified"] {
         let of = |link: &str| rows[&format!("/synthetic/{twin}/{link}")];
         assert_eq!(of("base_link"), 1);
@@ -152,8 +154,9 @@ fn latest(rows: &[(i64, Pose)], time_ns: i64) -> Pose {
     rows.iter().rev().find(|(time, _)| *time <= time_ns).unwrap().1
 }
 
-/// Truth: the place of the tool centre point that the sample (and so every other recording) says. Seen through the
-/// surfaces: the forearm's mesh ends in it, the upper arm's bent mesh ends where the forearm begins.
+/// Truth: the place of the tool centre point that the sample (and so every other recording) says.
+/// Seen through the surfaces: the forearm's mesh ends in it, the upper arm's bent mesh ends where
+/// the forearm begins.
 #[test]
 fn the_moving_surfaces_agree_with_the_tool_centre_point_to_a_micrometre() {
     let file = run("surfaces.rrd", &synthetic::header(), synthetic::SAMPLES, NEVER);
@@ -182,7 +185,8 @@ fn the_moving_surfaces_agree_with_the_tool_centre_point_to_a_micrometre() {
     assert!(worst.iter().all(|error| *error < 1e-6), "{worst:?}");
 }
 
-/// Truth: the line through the stations of the sample at the same time. The bent surface ends in the far interface.
+/// Truth: the line through the stations of the sample at the same time. The bent surface ends in
+/// the far interface.
 #[test]
 fn the_bent_surface_ends_where_the_far_interface_is() {
     let file = run("bent.rrd", &synthetic::header(), synthetic::SAMPLES, NEVER);
@@ -274,7 +278,8 @@ fn the_index_lists_the_recording_and_its_layout() {
     assert_eq!(stores.iter().filter(|store| store.is_recording()).count(), 1);
 }
 
-/// What a kill leaves is what is in the file at that moment: all but the last rows, which were too few to be written.
+/// What a kill leaves is what is in the file at that moment: all but the last rows, which were too
+/// few to be written.
 #[test]
 fn a_killed_run_keeps_all_but_the_last_samples() {
     let path = synthetic::scratch("killed.rrd");
@@ -304,7 +309,8 @@ fn a_robot_without_meshes_is_drawn_as_lines_and_one_without_a_twin_alone() {
     assert!(!rows.keys().any(|entity| twin.iter().any(|word| entity.contains(word))), "{:?}", rows.keys());
 }
 
-/// Shapes of modes have no size: what swings is named, and no curve, mark or way tells its millimetres.
+/// Shapes of modes have no size: what swings is named, and no curve, mark or way tells its
+/// millimetres.
 #[test]
 fn a_recording_of_shapes_names_what_it_shows_and_has_no_curves() {
     let caption = |from_s: f64, text: &str| Caption { from_s, text: text.into() };
@@ -370,7 +376,8 @@ fn identity(file: &[u8]) -> String {
         .unwrap()
 }
 
-/// A viewer puts recordings of one identity together: two set-ups, or a run and a study of it, must not share one.
+/// A viewer puts recordings of one identity together: two set-ups, or a run and a study of it, must
+/// not share one.
 #[test]
 fn recordings_of_different_set_ups_have_different_identities() {
     let header = synthetic::header();
@@ -413,7 +420,8 @@ fn a_study_that_is_given_up_keeps_the_runs_it_has() {
     std::fs::remove_file(path).unwrap();
 }
 
-/// REP-199 calls the frame of the tool `tcp`: the link keeps its pose, the tool centre point its own.
+/// REP-199 calls the frame of the tool `tcp`: the link keeps its pose, the tool centre point its
+/// own.
 #[test]
 fn a_link_called_tcp_and_the_tool_centre_point_are_two_entities() {
     let mut header = synthetic::header();

@@ -2,8 +2,8 @@
 
 use flexarm_log::{CurveQuantity, ElasticSample, RunHeader, Sample, Trace};
 
-/// Truth: counting. Two and a half times as many samples as are kept are halved twice: one of four is kept, evenly, and the
-/// largest error is kept although its sample is not.
+/// Truth: counting. Two and a half times as many samples as are kept are halved twice: one of four
+/// is kept, evenly, and the largest error is kept although its sample is not.
 #[test]
 fn a_long_run_is_thinned_evenly_and_says_so() {
     const PEAK: u64 = Trace::LIMIT as u64 + 1;
@@ -44,7 +44,8 @@ fn wave(k: u64) -> Sample {
 /// A quantity, and what it is of a sample.
 type Truth = (CurveQuantity, fn(&Sample) -> f64);
 
-/// Truth: the samples themselves. Every range of a block holds its samples, and the extremes are those of the run.
+/// Truth: the samples themselves. Every range of a block holds its samples, and the extremes are
+/// those of the run.
 #[test]
 fn curves_of_a_long_run_lose_no_peak() {
     const ALL: u64 = 300_000;

@@ -1,4 +1,5 @@
-//! A run as columns: each signal one contiguous array with a name, a unit and a width. Every sample is kept.
+//! A run as columns: each signal one contiguous array with a name, a unit and a width. Every sample
+//! is kept.
 //!
 //! Start at [`Columns::push`]. What thins long runs for pictures is `flexarm_log::Trace`.
 
@@ -110,9 +111,11 @@ impl Columns {
         }
     }
 
-    /// Columns of the same joints, elements and contributors with numbers that were kept elsewhere, each signal under its name.
+    /// Columns of the same joints, elements and contributors with numbers that were kept elsewhere,
+    /// each signal under its name.
     ///
-    /// `None` if they are not all signals of a run, with or without the rigid twin, in their order and equally long.
+    /// `None` if they are not all signals of a run, with or without the rigid twin, in their order
+    /// and equally long.
     #[must_use]
     pub fn filled(&self, signals: impl IntoIterator<Item = (String, Vec<f64>)>) -> Option<Self> {
         let signals: Vec<(String, Vec<f64>)> = signals.into_iter().collect();

@@ -1,8 +1,9 @@
-//! What a run gives: a [`RunHeader`] once, a [`Sample`] per logged instant, a [`RunResult`] at the end; [`Columns`] for
-//! those who want all of it as arrays.
+//! What a run gives: a [`RunHeader`] once, a [`Sample`] per logged instant, a [`RunResult`] at the
+//! end; [`Columns`] for those who want all of it as arrays.
 //!
-//! Recorders, reports, pictures and other programs read these same types. Poses are in the world, SI units, six-vectors
-//! linear first; "flexible" is the simulated robot, "rigid" its twin with every elastic coordinate held at zero.
+//! Recorders, reports, pictures and other programs read these same types. Poses are in the world,
+//! SI units, six-vectors linear first; "flexible" is the simulated robot, "rigid" its twin with
+//! every elastic coordinate held at zero.
 //!
 //! ```
 //! use flexarm_sample::{Columns, RunHeader, Sample, TwinSample};

@@ -1,14 +1,15 @@
-//! What a run gives: a [`RunHeader`] once, then one [`Sample`] per logged instant, its [`RunResult`] at the end.
+//! What a run gives: a [`RunHeader`] once, then one [`Sample`] per logged instant, its
+//! [`RunResult`] at the end.
 //!
-//! All poses are in the world; SI units; six-vectors linear first. "Flexible" is the simulated robot,
-//! "rigid" its twin with every elastic coordinate held at zero.
+//! All poses are in the world; SI units; six-vectors linear first. "Flexible" is the simulated
+//! robot, "rigid" its twin with every elastic coordinate held at zero.
 
 use std::path::PathBuf;
 
 use flexarm_spatial::Pose;
 
-/// The first of January 2000, 0:00 UTC (ns since 1970): when runs begin that are not told when, so that equal runs are equal
-/// files. Not 0, which ROS reads as no time at all.
+/// The first of January 2000, 0:00 UTC (ns since 1970): when runs begin that are not told when, so
+/// that equal runs are equal files. Not 0, which ROS reads as no time at all.
 pub const START_NS: u64 = 946_684_800_000_000_000;
 
 /// What stays the same during a run.
@@ -44,7 +45,8 @@ pub struct RunHeader {
     pub has_static: bool,
     /// Samples per second.
     pub log_rate_hz: f64,
-    /// Time of simulated time zero in recordings whose times have a date (ns since 1970); [`START_NS`] without it.
+    /// Time of simulated time zero in recordings whose times have a date (ns since 1970);
+    /// [`START_NS`] without it.
     pub start_ns: Option<u64>,
     /// Step of the stepper (s): times of samples are whole multiples of it; 0 if it is not known.
     pub step_s: f64,
@@ -52,8 +54,9 @@ pub struct RunHeader {
     pub bends: Vec<BendInfo>,
     /// Flexible links and drives that move the tool, in the order of [`Sample::contributions`].
     pub contributors: Vec<String>,
-    /// What is shown from which instant on, in a recording of shapes that have no size of their own, such as modes: errors and
-    /// deflections in it are drawn ones and are not told. Empty for a run.
+    /// What is shown from which instant on, in a recording of shapes that have no size of their
+    /// own, such as modes: errors and deflections in it are drawn ones and are not told. Empty for
+    /// a run.
     pub captions: Vec<Caption>,
     /// What stands still around the robot, such as the points of a map.
     pub scenery: Vec<Scenery>,
@@ -61,13 +64,14 @@ pub struct RunHeader {
     pub magnification: f64,
     /// Deviation from the rigid twin that gets the last colour of the scale (m).
     pub color_scale_m: f64,
-    /// Box in the world that holds all link frames at all times: lowest and highest corner (m). What to point a camera at.
+    /// Box in the world that holds all link frames at all times: lowest and highest corner (m).
+    /// What to point a camera at.
     pub volume: Option<[[f64; 3]; 2]>,
 }
 
 impl RunHeader {
-    /// Number of the colour that a link, spring or joint has in all plots of the run: contributors are counted first, then
-    /// springs and joints of other names.
+    /// Number of the colour that a link, spring or joint has in all plots of the run: contributors
+    /// are counted first, then springs and joints of other names.
     #[must_use]
     pub fn color_number(&self, name: &str) -> usize {
         let mut known: Vec<&String> = Vec::new();
@@ -95,7 +99,8 @@ pub struct Caption {
 /// Something that stands in the world and does not move.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scenery {
-    /// Title of the view that shows it; those of one title are shown together, those without one in all views.
+    /// Title of the view that shows it; those of one title are shown together, those without one in
+    /// all views.
     pub view: String,
     /// Name, unique within the view.
     pub name: String,
@@ -148,7 +153,8 @@ pub enum SceneryForm {
 
 /// How a link bends: stations along the line from its near interface to its far one.
 ///
-/// In a sample [`TwinSample::X_WS`] says where the stations are; between them the link is drawn as a beam.
+/// In a sample [`TwinSample::X_WS`] says where the stations are; between them the link is drawn as
+/// a beam.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BendInfo {
     /// Index into [`RunHeader::links`].
@@ -213,8 +219,8 @@ pub struct TwinSample {
     pub X_WL: Vec<Pose>,
     /// Pose of the tool centre point in the world.
     pub X_WT: Pose,
-    /// Poses of the stations of all [`RunHeader::bends`] in the world, one link after the other; empty for the rigid twin,
-    /// whose stations are where [`BendInfo::X_LS`] says.
+    /// Poses of the stations of all [`RunHeader::bends`] in the world, one link after the other;
+    /// empty for the rigid twin, whose stations are where [`BendInfo::X_LS`] says.
     pub X_WS: Vec<Pose>,
 }
 
@@ -272,12 +278,13 @@ pub struct Sample {
     pub error_world: [f64; 6],
     /// The same in path axes: tangential, normal, binormal.
     pub error_path: [f64; 6],
-    /// Static part of the error: the TCP error if the arm stood still where it is, under weight and the loads of the instant
-    /// (m, world axes); meaningless unless [`RunHeader::has_static`].
+    /// Static part of the error: the TCP error if the arm stood still where it is, under weight and
+    /// the loads of the instant (m, world axes); meaningless unless [`RunHeader::has_static`].
     pub static_m: [f64; 3],
     /// Elastic elements, in header order.
     pub elastic: Vec<ElasticSample>,
-    /// TCP displacement that each contributor's deflection alone causes (m, world axes), in header order.
+    /// TCP displacement that each contributor's deflection alone causes (m, world axes), in header
+    /// order.
     pub contributions: Vec<[f64; 3]>,
     /// Energies.
     pub energy: EnergySample,

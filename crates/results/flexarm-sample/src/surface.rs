@@ -1,4 +1,5 @@
-//! Surfaces made ready to be drawn: corners shared where the surface is smooth, split where it has an edge.
+//! Surfaces made ready to be drawn: corners shared where the surface is smooth, split where it has
+//! an edge.
 
 use std::collections::HashMap;
 
@@ -10,15 +11,16 @@ use crate::LinkMesh;
 const CREASE_RAD: f64 = 0.6;
 
 impl LinkMesh {
-    /// The same surface with normals of its own making: triangle soup (STL) becomes a mesh with shared corners, which
-    /// looks round where it is round and takes a third of the space.
+    /// The same surface with normals of its own making: triangle soup (STL) becomes a mesh with
+    /// shared corners, which looks round where it is round and takes a third of the space.
     #[must_use]
     pub fn with_creases(mut self) -> Self {
         let point = |k: u32| Vector3::from(self.positions[k as usize].map(f64::from));
         let normal_of = |[a, b, c]: [u32; 3]| (point(b) - point(a)).cross(&(point(c) - point(a)));
         let area_normals: Vec<Vector3<f64>> = self.triangles.iter().map(|t| normal_of(*t)).collect();
 
-        // Per place: corners made so far, each with the direction that opened it and its sum of normals.
+        // Per place: corners made so far, each with the direction that opened it and its sum of
+        // normals.
         let mut made: HashMap<[u32; 3], Vec<(Vector3<f64>, usize)>> = HashMap::new();
         let (mut positions, mut sums): (Vec<[f32; 3]>, Vec<Vector3<f64>>) = (Vec::new(), Vec::new());
         let mut triangles = Vec::with_capacity(self.triangles.len());
@@ -47,8 +49,8 @@ impl LinkMesh {
         self
     }
 
-    /// About the same surface with at most so many corners: corners that share a cell of a grid become one, the grid being as
-    /// fine as that allows.
+    /// About the same surface with at most so many corners: corners that share a cell of a grid
+    /// become one, the grid being as fine as that allows.
     #[must_use]
     pub fn simplified(self, corners: usize) -> Self {
         if self.positions.len() <= corners {

@@ -23,7 +23,8 @@ pub enum UrdfError {
     /// A xacro file that does not make a description.
     #[error("{0}")]
     Xacro(#[source] Box<XacroError>),
-    /// The file was read and something is wrong in it. All faults are listed, in the order of the file.
+    /// The file was read and something is wrong in it. All faults are listed, in the order of the
+    /// file.
     #[error("{}", listed(issues))]
     Invalid {
         /// At least one.

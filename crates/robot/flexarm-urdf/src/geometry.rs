@@ -1,6 +1,7 @@
 //! What a link looks like: shapes and meshes placed on links.
 //!
-//! Frames: L link, V the visual's own frame. Primitives as in URDF: centred at Vo, the cylinder along z.
+//! Frames: L link, V the visual's own frame. Primitives as in URDF: centred at Vo, the cylinder
+//! along z.
 
 use std::path::PathBuf;
 
@@ -63,8 +64,8 @@ const CORNERS: u32 = 48;
 impl Geometry {
     /// The shape as triangles in V, scale applied, outward sides counter-clockwise.
     ///
-    /// Round shapes are inscribed polyhedra of 48 corners, for drawing; their exact mass properties are
-    /// those of [`Geometry::mass_properties`].
+    /// Round shapes are inscribed polyhedra of 48 corners, for drawing; their exact mass properties
+    /// are those of [`Geometry::mass_properties`].
     ///
     /// # Errors
     /// [`MeshError`], for meshes only.
@@ -78,7 +79,8 @@ impl Geometry {
         })
     }
 
-    /// Volume, centroid and inertia per unit density in V: closed forms, and exact integrals over meshes.
+    /// Volume, centroid and inertia per unit density in V: closed forms, and exact integrals over
+    /// meshes.
     ///
     /// # Errors
     /// [`MeshError`], for meshes only.

@@ -1,11 +1,14 @@
-//! Masses and inertias: turned into link axes, checked for being a body's, estimated from meshes on request.
+//! Masses and inertias: turned into link axes, checked for being a body's, estimated from meshes on
+//! request.
 //!
-//! Frames: L link, I the axes of `<inertial>`, R the root link of a moving body (links fixed to each other).
+//! Frames: L link, I the axes of `<inertial>`, R the root link of a moving body (links fixed to
+//! each other).
 //!
 //! ```text
 //! c = p_LoLcm_L,   I_com_L = R_LI I_com_I R_LIᵀ
 //! ```
-//! Start at [`link_inertias`]. Checks are about the centre of mass and relative to the largest principal moment.
+//! Start at [`link_inertias`]. Checks are about the centre of mass and relative to the largest
+//! principal moment.
 
 use flexarm_kinematics::{LinkInertia, SpatialInertia, moment_floor};
 use nalgebra::{Matrix3, Vector3};
@@ -117,7 +120,8 @@ fn principal_moments(inertia: &Matrix3<f64>) -> [f64; 3] {
     moments.map(|m| m * scale)
 }
 
-/// Positive definite and triangle inequality. True if the link has no extent in some direction (rank deficient).
+/// Positive definite and triangle inequality. True if the link has no extent in some direction
+/// (rank deficient).
 fn check_moments(
     name: &str,
     raw: &RawInertial,
@@ -152,7 +156,8 @@ fn check_moments(
     false
 }
 
-/// Joints can be moved without mass behind them; what that leaves out must be known. One warning stands for many.
+/// Joints can be moved without mass behind them; what that leaves out must be known. One warning
+/// stands for many.
 fn tell_massless(robot: &RawRobot, massless: Vec<(Place, Problem)>, report: &mut Report) {
     const MOST: usize = 3;
     if massless.len() <= MOST {
@@ -258,7 +263,8 @@ fn plausible(name: &str, raw: &RawInertial, inertia: &LinkInertia, shape: &LinkS
     }
 }
 
-/// Fills links of bodies without any `<inertial>` from their shapes; says for each link why it could not.
+/// Fills links of bodies without any `<inertial>` from their shapes; says for each link why it
+/// could not.
 fn fill_from_shapes(
     robot: &RawRobot,
     bodies: &[Body],
@@ -283,7 +289,8 @@ fn fill_from_shapes(
     for i in empty.flat_map(|b| b.members.iter().map(|m| m.0)) {
         let link = &robot.links[i];
         match &shapes[i].solids {
-            // A mere frame between others may stay without mass, as long as there is something to estimate.
+            // A mere frame between others may stay without mass, as long as there is something to
+            // estimate.
             Ok(solids) if solids.is_empty() => shapeless.push(i),
             Ok(solids) => {
                 let open: usize = solids.iter().map(|(_, p)| p.open_edges).sum();
@@ -347,7 +354,8 @@ fn bodies_without<'a>(robot: &'a RawRobot, bodies: &'a [Body]) -> impl Iterator<
 /// Diameter of a rod over its length.
 const ROD: f64 = 0.2;
 
-/// A link as a rod from its frame to its farthest joint, of the mass 1 kg/m; `None` for a link without length.
+/// A link as a rod from its frame to its farthest joint, of the mass 1 kg/m; `None` for a link
+/// without length.
 fn rod(robot: &RawRobot, link: usize) -> Option<SpatialInertia> {
     let ends =
         robot.joints.iter().filter(|j| j.urdf.parent.link == robot.links[link].name).map(|j| j.X_PJ.translation.vector);

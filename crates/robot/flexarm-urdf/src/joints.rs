@@ -15,7 +15,8 @@ use crate::spelling::closest;
 /// Axes written with four digits of 1/√2 pass without a warning.
 const UNIT_TOLERANCE: f64 = 1e-4;
 
-/// Takes `<mimic>` from joints that cannot move, and fixes joints that follow one which cannot: their value is constant.
+/// Takes `<mimic>` from joints that cannot move, and fixes joints that follow one which cannot:
+/// their value is constant.
 pub(crate) fn fix_still_followers(robot: &mut RawRobot, report: &mut Report) {
     let mut still: HashMap<String, f64> =
         robot.joints.iter().filter(|j| j.is_fixed()).map(|j| (j.urdf.name.clone(), 0.0)).collect();
@@ -140,7 +141,8 @@ fn limits(raw: &RawJoint, place: &Place, report: &mut Report) -> Limits {
     limits
 }
 
-/// A follower of a follower becomes one of the independent joint: `r (r' q + o') + o = (r r') q + (r o' + o)`.
+/// A follower of a follower becomes one of the independent joint:
+/// `r (r' q + o') + o = (r r') q + (r o' + o)`.
 fn join_mimic_chains(joints: &mut [Joint]) {
     let written: HashMap<String, Mimic> =
         joints.iter().filter_map(|j| Some((j.name.clone(), j.mimic.clone()?))).collect();

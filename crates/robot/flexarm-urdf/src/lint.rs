@@ -1,10 +1,10 @@
 //! Finds what is wrong or doubtful in the tree of a URDF, and writes the text that `urdf_rs` reads.
 //!
-//! Start at [`lint`]. The values of a robot come from `urdf_rs`. It drops words of a vector that are
-//! no numbers, takes a missing `<inertial>` for zeros, stops at the first fault and knows no lines.
-//! The lint reports such faults with their places. It then writes a [`Plain`] text with the elements
-//! and attributes that a mechanism needs, as they stand in the file, without prefixes and with the
-//! first of each element that may stand once. This has three reasons:
+//! Start at [`lint`]. The values of a robot come from `urdf_rs`. It drops words of a vector that
+//! are no numbers, takes a missing `<inertial>` for zeros, stops at the first fault and knows no
+//! lines. The lint reports such faults with their places. It then writes a [`Plain`] text with the
+//! elements and attributes that a mechanism needs, as they stand in the file, without prefixes and
+//! with the first of each element that may stand once. This has three reasons:
 //!
 //! * The parsers of `urdf_rs` recurse, and overflow the stack in a file of 100,000 nested elements.
 //!   The plain text is five elements deep and has at most [`MOST_ELEMENTS`] links and joints,
@@ -13,7 +13,8 @@
 //! * `urdf_rs` refuses robots that are in use: a `<limit>` without velocity, an `<axis>` without
 //!   `xyz`, a `<material>` without name, a `<color>` without `rgba`, an unknown shape, a second
 //!   `<origin>`, an `<inertial>` between visuals, a `<safety_controller>` without `k_velocity`. The
-//!   plain text has the default or leaves the element out. A `<collision>` with a fault is left out.
+//!   plain text has the default or leaves the element out. A `<collision>` with a fault is left
+//!   out.
 //!
 //! The model takes four things from the tree, for which `urdf_rs::Robot` has no place: where an
 //! element stands and whether it is there ([`Mark`]), the transmissions, the version (a bound that

@@ -1,7 +1,8 @@
 //! Turns the values of `urdf_rs` into frames and matrices, and joins them with the marks of the
 //! lint. Start at [`read_robot`].
 //!
-//! Not here: conclusions from the values ([`crate::joints`], [`crate::inertia`], [`crate::shapes`]).
+//! Not here: conclusions from the values ([`crate::joints`], [`crate::inertia`],
+//! [`crate::shapes`]).
 
 use std::collections::HashMap;
 

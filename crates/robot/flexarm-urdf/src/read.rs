@@ -24,12 +24,13 @@ pub struct ReadOptions {
     pub search_paths: Vec<PathBuf>,
     /// Estimate mass and inertia of moving bodies that have none in the file.
     pub inertia_from_mesh: Option<InertiaEstimate>,
-    /// Links whose inertia may be rank deficient or break the triangle inequality, as the rotor-only first
-    /// link of the Manutec r3 does. Negative moments are never waived.
+    /// Links whose inertia may be rank deficient or break the triangle inequality, as the
+    /// rotor-only first link of the Manutec r3 does. Negative moments are never waived.
     pub waive: Vec<String>,
     /// Links whose `<inertial>` counts as not written: masses that only hold a place.
     pub discard: Vec<String>,
-    /// Read the mesh files, to check them and to compare inertias with them. Off, files are only found.
+    /// Read the mesh files, to check them and to compare inertias with them. Off, files are only
+    /// found.
     pub inspect_meshes: bool,
     /// What to do with the up axis of COLLADA meshes.
     pub up_axis: UpAxis,
@@ -52,10 +53,12 @@ impl Default for ReadOptions {
     }
 }
 
-/// Masses for bodies without `<inertial>`, from the volume of their visuals taken as homogeneous and solid. Where no link has
-/// a visual, a total mass is spread by the lengths of the links, each a rod.
+/// Masses for bodies without `<inertial>`, from the volume of their visuals taken as homogeneous
+/// and solid. Where no link has a visual, a total mass is spread by the lengths of the links, each
+/// a rod.
 ///
-/// Bodies count as a whole: where one link of several fixed to each other has an `<inertial>`, nothing is added.
+/// Bodies count as a whole: where one link of several fixed to each other has an `<inertial>`,
+/// nothing is added.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InertiaEstimate {
     /// The same density everywhere (kg/m³).
@@ -73,9 +76,11 @@ pub struct UrdfRobot {
     pub text: String,
     /// What the links look like, in the order of the file.
     pub visuals: Vec<Visual>,
-    /// Shapes for collisions that can be read, in the order of the file. Nothing is checked of them.
+    /// Shapes for collisions that can be read, in the order of the file. Nothing is checked of
+    /// them.
     pub collisions: Vec<Visual>,
-    /// Mesh references as they stand in the file, those of collision shapes too, with the files that were found.
+    /// Mesh references as they stand in the file, those of collision shapes too, with the files
+    /// that were found.
     pub mesh_files: Vec<(String, PathBuf)>,
     /// Links that may be the tool centre point, the default first.
     pub tcp_candidates: Vec<String>,
@@ -129,7 +134,8 @@ pub fn parse_urdf(text: &str, origin_path: impl AsRef<Path>, options: &ReadOptio
 /// The URDF that a xacro file stands for, as text; comments are left out.
 ///
 /// # Errors
-/// [`UrdfError`] if it cannot be read or does not make a document. Whether that is a robot is not looked at.
+/// [`UrdfError`] if it cannot be read or does not make a document. Whether that is a robot is not
+/// looked at.
 pub fn expand_xacro(path: impl AsRef<Path>, options: &ReadOptions) -> Result<String, UrdfError> {
     let path = path.as_ref();
     let text = load_text(path)?;
@@ -238,7 +244,8 @@ fn parse_expanded(
     }
 }
 
-/// All checks, each as far as the ones before it allow, and the robot, which counts only without errors.
+/// All checks, each as far as the ones before it allow, and the robot, which counts only without
+/// errors.
 fn assemble(
     raw: &RawRobot,
     text: &str,

@@ -1,13 +1,14 @@
 //! From `package://name/meshes/a.stl` and its kin to a file.
 //!
-//! Order for packages: the caller's map, the folders above the URDF, the caller's search paths. The environment is read
-//! by [`search_paths_from_environment`] alone, which the caller may use or not.
+//! Order for packages: the caller's map, the folders above the URDF, the caller's search paths. The
+//! environment is read by [`search_paths_from_environment`] alone, which the caller may use or not.
 
 use std::path::{Path, PathBuf};
 
 use flexarm_settings::Setting;
 
-/// Folders from `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH`, for [`crate::ReadOptions::search_paths`].
+/// Folders from `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH`, for
+/// [`crate::ReadOptions::search_paths`].
 ///
 /// The one function of this crate that reads the environment.
 pub fn search_paths_from_environment() -> Vec<PathBuf> {
@@ -35,7 +36,8 @@ pub(crate) struct NotFound {
 }
 
 impl Resolver<'_> {
-    /// Each mesh reference of a URDF once, as it stands there, with its file; those without one are left out.
+    /// Each mesh reference of a URDF once, as it stands there, with its file; those without one are
+    /// left out.
     pub(crate) fn mesh_files(&self, urdf: &str) -> Vec<(String, PathBuf)> {
         let mut files: Vec<(String, PathBuf)> = Vec::new();
         for element in urdf.split("<mesh").skip(1).filter_map(|rest| rest.split('>').next()) {
@@ -94,7 +96,8 @@ impl Resolver<'_> {
         })
     }
 
-    /// The folder of a package, as an absolute path; `near` is the folder of the file that asks for it.
+    /// The folder of a package, as an absolute path; `near` is the folder of the file that asks for
+    /// it.
     pub(crate) fn find_package(&self, package: &str, near: Option<&Path>) -> Result<PathBuf, NotFound> {
         let mut found = self.package_folders(package).into_iter().next();
         for start in near.into_iter().chain([self.folder.as_path()]) {
@@ -118,8 +121,8 @@ impl Resolver<'_> {
         let mut folders: Vec<PathBuf> =
             self.packages.iter().filter(|(name, _)| name == package).map(|(_, path)| path.clone()).collect();
 
-        // Upwards from the URDF: the package itself, or its neighbour in a workspace.
-        // By the name it was given first, then where links lead (installations often link to sources).
+        // Upwards from the URDF: the package itself, or its neighbour in a workspace. By the name
+        // it was given first, then where links lead (installations often link to sources).
         let named = std::path::absolute(&self.folder).ok();
         let real = named.as_deref().and_then(|folder| folder.canonicalize().ok());
         for start in named.iter().chain(real.as_ref().filter(|real| named.as_ref() != Some(real))) {

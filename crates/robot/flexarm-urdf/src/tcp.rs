@@ -9,14 +9,15 @@ const TOOL_NAMES: [&str; 3] = ["tool0", "tcp", "flange"];
 
 /// The link whose frame is the tool centre point unless the user chooses another one.
 ///
-/// `tool0`, else `tcp`, else `flange`, each also with a prefix (`left_tool0`) if there is only one such link; else the
-/// last link of the chain with most moving joints (then with most links; then the first in the file).
-/// `None` for a mechanism without links.
+/// `tool0`, else `tcp`, else `flange`, each also with a prefix (`left_tool0`) if there is only one
+/// such link; else the last link of the chain with most moving joints (then with most links; then
+/// the first in the file). `None` for a mechanism without links.
 pub fn default_tcp(mechanism: &Mechanism) -> Option<&str> {
     tcp_candidates(mechanism).into_iter().next()
 }
 
-/// All links that may be the tool, the default first: the tool frames by name, then the ends of all chains.
+/// All links that may be the tool, the default first: the tool frames by name, then the ends of all
+/// chains.
 pub fn tcp_candidates(mechanism: &Mechanism) -> Vec<&str> {
     let names = || mechanism.links.iter().map(|l| l.name.as_str());
     let mut candidates: Vec<&str> = Vec::new();

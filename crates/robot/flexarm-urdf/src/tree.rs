@@ -1,7 +1,8 @@
-//! Names and tree: every joint joins two known links, every link has one parent, one base holds them all.
+//! Names and tree: every joint joins two known links, every link has one parent, one base holds
+//! them all.
 //!
-//! Start at [`check_names`] and [`check_tree`]; [`moving_bodies`] groups the links that no joint moves against
-//! each other, for the checks of masses.
+//! Start at [`check_names`] and [`check_tree`]; [`moving_bodies`] groups the links that no joint
+//! moves against each other, for the checks of masses.
 
 use std::collections::{HashMap, HashSet};
 

@@ -210,7 +210,8 @@ fn a_moving_link_without_mass_is_told_and_taken() {
     assert!(told[0].help.contains("(inertia_from_density or inertia_from_total_mass, "));
 }
 
-/// What rounding leaves below zero is no fault: six digits of the file, a micrometre about the mass, nothing at all.
+/// What rounding leaves below zero is no fault: six digits of the file, a micrometre about the
+/// mass, nothing at all.
 #[test]
 fn a_moment_below_zero_by_rounding_is_zero() {
     for (mass, moments) in [
@@ -224,7 +225,8 @@ fn a_moment_below_zero_by_rounding_is_zero() {
     }
 }
 
-/// Truth: what does not move has no say, so that the same tensor is a warning at the base and an error on an arm.
+/// Truth: what does not move has no say, so that the same tensor is a warning at the base and an
+/// error on an arm.
 #[test]
 fn inertia_fixed_to_the_base_is_no_error_and_can_be_waived() {
     let bad = format!("<link name='foot'>{}</link>\n", inertial(1.0, [1.0, 1.0, -1.0]));

@@ -22,8 +22,8 @@ fn codes(findings: &[Finding]) -> Vec<(Severity, &'static str)> {
     findings.iter().map(|f| (f.severity, f.code)).collect()
 }
 
-/// The shoulder of a KUKA KR 210 R2700-2 (kroshu/kuka_robot_descriptions, Apache-2.0): principal moments, here
-/// with an inertial frame turned by a yaw.
+/// The shoulder of a KUKA KR 210 R2700-2 (kroshu/kuka_robot_descriptions, Apache-2.0): principal
+/// moments, here with an inertial frame turned by a yaw.
 fn kuka_link(rpy: [f64; 3]) -> String {
     let [r, p, y] = rpy;
     format!(
@@ -52,7 +52,8 @@ fn principal_moments_are_turned_by_the_inertial_yaw() {
     assert_relative_eq!(inertia_of([0.0; 3]), Matrix3::from_diagonal(&vector![Ix, Iy, Iz]), epsilon = 1e-12);
 }
 
-/// Closed form for three angles: R written out as Rz(yaw) Ry(pitch) Rx(roll), the fixed axes of URDF.
+/// Closed form for three angles: R written out as Rz(yaw) Ry(pitch) Rx(roll), the fixed axes of
+/// URDF.
 #[test]
 fn three_angles_turn_about_fixed_axes_in_the_order_roll_pitch_yaw() {
     let [r, p, y] = [0.4, -1.1, 2.3];
@@ -260,7 +261,8 @@ fn inertia_that_does_not_fit_the_geometry_is_warned_of() {
     assert!(findings.iter().any(|f| f.code == "massless-shape"));
 }
 
-/// Closed form: a box of 0.2 × 0.4 × 0.6 m at 2700 kg/m³, displaced and turned by a quarter about z.
+/// Closed form: a box of 0.2 × 0.4 × 0.6 m at 2700 kg/m³, displaced and turned by a quarter about
+/// z.
 #[test]
 fn inertia_is_estimated_from_shapes_on_request() {
     let visual = "<origin xyz='0 0 0.3' rpy='0 0 1.5707963267948966'/><geometry><box size='0.2 0.4 0.6'/></geometry>";
@@ -377,7 +379,8 @@ fn inertia_from_a_mesh_file_needs_it_closed() {
     assert!(error.to_string().contains("could not be estimated: the mesh \"none.obj\" was not found"), "{error}");
 }
 
-/// Every shipped arm of six joints: the class by the axes of its file, and joint values found again from the pose.
+/// Every shipped arm of six joints: the class by the axes of its file, and joint values found again
+/// from the pose.
 #[test]
 fn inverse_kinematics_of_the_shipped_arms_has_a_closed_form() {
     use flexarm_kinematics::{AnalyticArm, ArmClass, Data, Model, PositionForm, Solutions, forward_kinematics};

@@ -93,7 +93,8 @@ proptest! {
         check(&text, &ReadOptions::default());
     }
 
-    /// Elements in any order, cyclic, repeated, with any numbers: reported or read, and never in doubt.
+    /// Elements in any order, cyclic, repeated, with any numbers: reported or read, and never in
+    /// doubt.
     #[test]
     fn no_arrangement_of_elements_panics(parts in prop::collection::vec(
         (0usize..6, 0usize..4, 0usize..4, prop::sample::select(vec!["0 0 1", "0 0 0", "1e308 1e308 1e308", "nan 0 0", "", "1"])),

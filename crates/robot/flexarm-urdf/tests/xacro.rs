@@ -19,7 +19,8 @@ fn with_arguments(arguments: &[(&str, &str)]) -> ReadOptions {
     ReadOptions { packages: vec![("test_parts".to_owned(), data())], arguments, ..ReadOptions::default() }
 }
 
-/// Elements with attributes in order of name and text, without white space around it; namespaces are left out.
+/// Elements with attributes in order of name and text, without white space around it; namespaces
+/// are left out.
 fn outline(text: &str) -> String {
     fn walk(node: roxmltree::Node<'_, '_>, depth: usize, out: &mut String) {
         let prefix = node.tag_name().namespace().unwrap_or_default();

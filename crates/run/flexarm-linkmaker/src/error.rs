@@ -1,4 +1,5 @@
-//! What keeps a link from being made or exported, by cause and with the numbers, and whether the input or the run is to blame.
+//! What keeps a link from being made or exported, by cause and with the numbers, and whether the
+//! input or the run is to blame.
 
 mod import;
 mod job;
@@ -18,7 +19,8 @@ pub use job::JobError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LinkError {
-    /// A file that is not there, or does not hold what is needed; a place of a result that is taken.
+    /// A file that is not there, or does not hold what is needed; a place of a result that is
+    /// taken.
     #[error(transparent)]
     Files(#[from] FileError),
     /// Something in a job file.
@@ -86,8 +88,8 @@ impl LinkError {
         if faults.len() == 1 { faults.remove(0) } else { Self::Several(faults) }
     }
 
-    /// Whether the input or the run is to blame: the run where memory ran out, a solver did not converge or a result could
-    /// not be written.
+    /// Whether the input or the run is to blame: the run where memory ran out, a solver did not
+    /// converge or a result could not be written.
     pub fn fault(&self) -> Fault {
         match self {
             Self::Files(error) => error.fault(),

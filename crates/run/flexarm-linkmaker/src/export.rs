@@ -1,9 +1,9 @@
 //! A flexible link as matrices for other FE programs: what `flexarm export` does.
 //!
-//! Stiffness and mass of the interfaces, with modes where the link has them, are converted to the units asked for,
-//! written, read back through the same path as every import, and compared. A text beside them says the order of the
-//! rows and the units, which most formats do not hold. A link without superelement gives its static stiffness alone.
-//! SID holds the modal link instead.
+//! Stiffness and mass of the interfaces, with modes where the link has them, are converted to the
+//! units asked for, written, read back through the same path as every import, and compared. A text
+//! beside them says the order of the rows and the units, which most formats do not hold. A link
+//! without superelement gives its static stiffness alone. SID holds the modal link instead.
 //!
 //! Not here: the formats (`flexarm-fe-io`).
 
@@ -150,7 +150,8 @@ pub fn export(job: &ExportJob) -> Result<ExportSummary, LinkError> {
     let paths: Vec<PathBuf> = texts.iter().map(|(path, _)| path.clone()).collect();
     check_free(&paths, job.overwrite)?;
 
-    // Back through the door of every import, before anything is written: what cannot be read leaves no file.
+    // Back through the door of every import, before anything is written: what cannot be read leaves
+    // no file.
     let is_readable = |path: &PathBuf| path.extension().is_none_or(|ending| ending != "txt" && ending != "m");
     let readable = texts.iter().filter(|(path, _)| is_readable(path));
     let readable: Vec<InputFile> =

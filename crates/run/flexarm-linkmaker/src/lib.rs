@@ -1,4 +1,5 @@
-//! From a mesh, or from matrices of another FE program, to a flexible link with its files, and back.
+//! From a mesh, or from matrices of another FE program, to a flexible link with its files, and
+//! back.
 //!
 //! | module | from | to |
 //! | --- | --- | --- |
@@ -46,11 +47,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Everything passes the checks of a link before a file is written; what goes wrong is a [`LinkError`] by cause. Units: SI,
-//! except where a job says otherwise. A link belongs to no robot here: what one says of it comes as numbers
-//! ([`reduce::UrdfLink`]).
+//! Everything passes the checks of a link before a file is written; what goes wrong is a
+//! [`LinkError`] by cause. Units: SI, except where a job says otherwise. A link belongs to no robot
+//! here: what one says of it comes as numbers ([`reduce::UrdfLink`]).
 //!
-//! Not here: formats of other programs (`flexarm-fe-io`), elements and reduction (`flexarm-fem`), robots, motion.
+//! Not here: formats of other programs (`flexarm-fe-io`), elements and reduction (`flexarm-fem`),
+//! robots, motion.
 #![allow(non_snake_case, reason = "monogram notation: X_LB is the pose of B in L, K_BB a stiffness block")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 

@@ -16,8 +16,8 @@ pub(crate) fn today() -> String {
     if days == 0 { String::new() } else { date(days) }
 }
 
-/// Date of a day after 1970-01-01. Gregorian calendar, years from March; Hinnant, "chrono-compatible low-level date
-/// algorithms" (2013), `civil_from_days`.
+/// Date of a day after 1970-01-01. Gregorian calendar, years from March; Hinnant,
+/// "chrono-compatible low-level date algorithms" (2013), `civil_from_days`.
 fn date(days: u64) -> String {
     let z = days + 719_468;
     let (era, day_of_era) = (z / 146_097, z % 146_097);

@@ -1,19 +1,22 @@
-//! Stiffness and mass of a link against each other and against materials: slips of units, and matrices that are something else.
+//! Stiffness and mass of a link against each other and against materials: slips of units, and
+//! matrices that are something else.
 
 use flexarm_fem::{Doubt, ReducedLink, RigidPart};
 use nalgebra::{Matrix3, Matrix6};
 
-/// Speed of sound along a link by its stiffness and mass (m/s): steel and aluminium have 5,100, polymers 1,500, beryllium 12,900;
-/// what rides on the link makes it less.
+/// Speed of sound along a link by its stiffness and mass (m/s): steel and aluminium have 5,100,
+/// polymers 1,500, beryllium 12,900; what rides on the link makes it less.
 pub const SOUND: std::ops::RangeInclusive<f64> = 300.0..=13_000.0;
 /// Density of osmium (kg/m³): nothing is heavier.
 pub const OSMIUM: f64 = 22_600.0;
-/// Part of the distance of the interfaces over which one of them spreads along the link, and part of the nodes that it has, where
-/// it is no seat: bores and flanges of the shipped links spread over 0.43 with 0.02 of the nodes.
+/// Part of the distance of the interfaces over which one of them spreads along the link, and part
+/// of the nodes that it has, where it is no seat: bores and flanges of the shipped links spread
+/// over 0.43 with 0.02 of the nodes.
 const SPREAD: f64 = 0.25;
 const SHARE: f64 = 0.1;
 
-/// Speed of sound along a link by its stiffness in the stiffest of three directions, `l √(k/m)` (m/s).
+/// Speed of sound along a link by its stiffness in the stiffest of three directions, `l √(k/m)`
+/// (m/s).
 ///
 /// * `K`: between its ends, translations first (N/m, N, N m/rad), at any point of it.
 /// * `length`: between its interfaces (m). `mass`: kg.
@@ -24,8 +27,8 @@ pub fn sound_speed(K: &Matrix6<f64>, length: f64, mass: f64) -> Option<f64> {
     speed.is_finite().then_some(speed)
 }
 
-/// Density that a body of this mass (kg) and inertia about its centre (kg m²) has at least (kg/m³): of all bodies of one volume
-/// the ball has the least moments, `tr(I) / 2 = 3/5 m R²`.
+/// Density that a body of this mass (kg) and inertia about its centre (kg m²) has at least (kg/m³):
+/// of all bodies of one volume the ball has the least moments, `tr(I) / 2 = 3/5 m R²`.
 pub fn least_density(mass: f64, inertia: &Matrix3<f64>) -> f64 {
     let squared = inertia.trace() / (2.0 * mass) * 5.0 / 3.0;
     mass / (4.0 / 3.0 * std::f64::consts::PI * squared.max(0.0).powf(1.5))
@@ -58,9 +61,11 @@ pub(crate) fn of_link(link: &ReducedLink, whole: &RigidPart) -> Vec<Doubt> {
     doubts
 }
 
-/// An interface that is a part of the link, not a seat on it: its nodes are tied together, so that the link does not bend there.
+/// An interface that is a part of the link, not a seat on it: its nodes are tied together, so that
+/// the link does not bend there.
 ///
-/// * `spread`: between the first and the last of its nodes, along the line of the interfaces, over the length of that line.
+/// * `spread`: between the first and the last of its nodes, along the line of the interfaces, over
+///   the length of that line.
 /// * `share`: its nodes over those of the mesh.
 pub(crate) fn of_interface(name: &str, spread: f64, share: f64) -> Option<Doubt> {
     (spread > SPREAD && share > SHARE).then(|| {

@@ -36,7 +36,8 @@ impl AppliedLoad {
         Self { start_s: Some(start_s), ..self }
     }
 
-    /// A wrench in world axes that stays the same from `start_s` to `end_s` (s) and is zero before and after.
+    /// A wrench in world axes that stays the same from `start_s` to `end_s` (s) and is zero before
+    /// and after.
     pub fn during(frame: &str, F_W: Wrench, start_s: f64, end_s: f64) -> Self {
         let wrench = TimedWrench::new(move |t| if t >= start_s && t <= end_s { F_W } else { Wrench::zeros() });
         Self::new(frame, wrench.with_jumps(vec![start_s, end_s])).starting_at(start_s)
@@ -48,7 +49,8 @@ impl AppliedLoad {
     /// * `F`: n wrenches.
     ///
     /// # Errors
-    /// [`Error::Load`] for fewer than two samples, other numbers of them, and times that do not increase.
+    /// [`Error::Load`] for fewer than two samples, other numbers of them, and times that do not
+    /// increase.
     pub fn sampled(frame: &str, t: &[f64], F: &[Wrench]) -> Result<Self, Error> {
         if t.len() != F.len() || t.len() < 2 || t.windows(2).any(|pair| pair[1].is_nan() || pair[1] <= pair[0]) {
             return Err(LoadError::Samples { times: t.len(), wrenches: F.len() }.into());

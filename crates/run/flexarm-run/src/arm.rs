@@ -1,7 +1,7 @@
 //! A flexible robot, built once and asked often: runs with columns, operating points.
 //!
-//! [`Robot::flexible`] does what costs (substitution, modes); what it returns is immutable, `Send` and `Sync`, and shared by
-//! threads. Each query takes numbers and a workspace of its own.
+//! [`Robot::flexible`] does what costs (substitution, modes); what it returns is immutable, `Send`
+//! and `Sync`, and shared by threads. Each query takes numbers and a workspace of its own.
 
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex};
@@ -41,7 +41,8 @@ pub struct Run {
     pub summary: Summary,
     /// The signals; empty unless the request keeps [`Keep::Columns`](crate::Keep::Columns).
     pub columns: Columns,
-    /// The curves, thinned if the run is long; empty unless the request keeps [`Keep::Curves`](crate::Keep::Curves) or writes recordings.
+    /// The curves, thinned if the run is long; empty unless the request keeps
+    /// [`Keep::Curves`](crate::Keep::Curves) or writes recordings.
     pub trace: Trace,
 }
 
@@ -51,12 +52,14 @@ impl Run {
         self.values("time")
     }
 
-    /// TCP error, flexible minus rigid, world axes (m): three numbers per sample. Empty without the rigid twin.
+    /// TCP error, flexible minus rigid, world axes (m): three numbers per sample. Empty without the
+    /// rigid twin.
     pub fn error_world_m(&self) -> &[f64] {
         self.values("error_world")
     }
 
-    /// Numbers of a signal, rows after each other; empty if there is none of this name. [`Columns::columns`] lists them.
+    /// Numbers of a signal, rows after each other; empty if there is none of this name.
+    /// [`Columns::columns`] lists them.
     pub fn values(&self, name: &str) -> &[f64] {
         self.columns.column(name).map_or(&[], |column| &column.values)
     }
@@ -68,7 +71,8 @@ impl Robot {
     /// Cost: reading of modes, substitution; milliseconds.
     ///
     /// # Errors
-    /// [`Error::Modelling`] if a link or drive has no such model, [`Error::Model`] if the result is no tree.
+    /// [`Error::Modelling`] if a link or drive has no such model, [`Error::Model`] if the result is
+    /// no tree.
     pub fn flexible(&self, modelling: Modelling) -> Result<Arm, Error> {
         Ok(Arm::new(self.clone(), modelling, self.modelled(&modelling)?))
     }
@@ -114,8 +118,8 @@ impl Arm {
         model.coordinates()[..model.n_actuated()].iter().map(|coordinate| coordinate.joint.as_str())
     }
 
-    /// Runs a motion (`&motion`), or a motion with loads, payloads and a start of its own (`&scenario`), and returns
-    /// figures and columns. The modelling of `options` is not used.
+    /// Runs a motion (`&motion`), or a motion with loads, payloads and a start of its own
+    /// (`&scenario`), and returns figures and columns. The modelling of `options` is not used.
     ///
     /// # Errors
     /// [`Error`]; [`Error::fault`] says whether input or run is to blame.
@@ -123,10 +127,11 @@ impl Arm {
         self.simulate_with(scenario, options, RunRequest::default())
     }
 
-    /// As [`Arm::simulate`], with recordings, an observer, progress or less to keep as `request` says.
+    /// As [`Arm::simulate`], with recordings, an observer, progress or less to keep as `request`
+    /// says.
     ///
-    /// Everything about the input is checked before the first file is made. If the run stops early, the recordings are
-    /// closed so that every reader takes them.
+    /// Everything about the input is checked before the first file is made. If the run stops early,
+    /// the recordings are closed so that every reader takes them.
     ///
     /// # Errors
     /// As [`Arm::simulate`]; [`Error::Interrupted`] if observer or progress break off.
@@ -140,8 +145,9 @@ impl Arm {
         run::simulate(self, &scenario.into(), &options, request)
     }
 
-    /// Runs all scenarios on all cores; each has the bits of [`Arm::simulate`], for every number of threads. As soon as
-    /// `stop` returns true, runs that are not done end with [`Error::Interrupted`].
+    /// Runs all scenarios on all cores; each has the bits of [`Arm::simulate`], for every number of
+    /// threads. As soon as `stop` returns true, runs that are not done end with
+    /// [`Error::Interrupted`].
     ///
     /// Threads are those of `rayon`'s pool. A run that fails does not stop the others.
     pub fn simulate_batch(
@@ -160,8 +166,8 @@ impl Arm {
     /// A workspace for equilibria, compliances and frequencies at any number of poses.
     ///
     /// # Errors
-    /// [`Error::Step`] if a spring is not positive definite, or the arm cannot carry its weight at the middle of its joint
-    /// ranges.
+    /// [`Error::Step`] if a spring is not positive definite, or the arm cannot carry its weight at
+    /// the middle of its joint ranges.
     pub fn operating_point(&self) -> Result<OperatingPoint, Error> {
         let flexible = self.flexible();
         let model = &flexible.model;

@@ -1,4 +1,5 @@
-//! Balancers as values: springs, gas springs and counterbalances of a robot, and where they can act.
+//! Balancers as values: springs, gas springs and counterbalances of a robot, and where they can
+//! act.
 
 use flexarm_kinematics::{
     Balancer, BalancerLaw, BalancerPlace, BalancerSpan, Data, Frame, Joint, JointKind, Link, Mechanism, Model,
@@ -32,7 +33,8 @@ pub enum BalancerEnds {
 }
 
 impl RobotBalancer {
-    /// Along the line between two points, each in the axes of its link (m). The law is over their distance (m, N).
+    /// Along the line between two points, each in the axes of its link (m). The law is over their
+    /// distance (m, N).
     pub fn between(name: &str, from: (&str, [f64; 3]), to: (&str, [f64; 3]), law: BalancerLaw) -> Self {
         let ends = BalancerEnds::Points([from, to].map(|(link, p)| (link.to_owned(), p)));
         Self { name: name.to_owned(), ends, law }
@@ -99,7 +101,8 @@ impl Robot {
         Ok(())
     }
 
-    /// Frames for the two ends: fixed to their links, so that a link that bends carries each on the part where it is.
+    /// Frames for the two ends: fixed to their links, so that a link that bends carries each on the
+    /// part where it is.
     fn line(&mut self, name: &str, ends: &[(String, [f64; 3]); 2]) -> Result<BalancerSpan, BalancerError> {
         let name = name.to_owned();
         for (link, p) in ends {

@@ -12,7 +12,8 @@ use crate::error::Error;
 use crate::robot::Robot;
 use crate::robot_file::{RobotFileError, Source};
 
-/// Exponents of gases: isothermal to beyond the adiabatic one of a gas of single atoms, compressed hard.
+/// Exponents of gases: isothermal to beyond the adiabatic one of a gas of single atoms, compressed
+/// hard.
 const EXPONENT: RangeInclusive<f64> = 1.0..=2.0;
 
 /// A spring, a gas spring or a counterbalance: between two points, or over one joint.

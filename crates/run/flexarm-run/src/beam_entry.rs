@@ -65,7 +65,8 @@ pub(crate) struct BeamEntry {
     /// From the line A-B to the beam, link axes (m).
     #[serde(default)]
     pub offset: [f64; 3],
-    /// Where the beam itself begins and ends, link axes (m); A and B if not given. Rigid arms lead from there to the joints.
+    /// Where the beam itself begins and ends, link axes (m); A and B if not given. Rigid arms lead
+    /// from there to the joints.
     pub ends: Option<[[f64; 3]; 2]>,
     /// Where the link is split, as a fraction of A-B.
     #[serde(default = "half")]

@@ -10,7 +10,8 @@ use nalgebra::{DVector, Translation3, Vector3};
 pub struct Bend {
     /// Name of the link.
     pub link: String,
-    /// Links of the model that the stations are fixed to, with their undeformed places in the flexible link (m).
+    /// Links of the model that the stations are fixed to, with their undeformed places in the
+    /// flexible link (m).
     pub stations: Vec<(String, Vector3<f64>)>,
     /// Links of the URDF that hang on a station.
     pub carries: Vec<(String, usize)>,
@@ -26,7 +27,8 @@ pub(crate) fn bends(substituted: &Substituted) -> Vec<Bend> {
             let middle = 0.5 * (pair[0].X_LS.translation.vector + pair[1].X_LS.translation.vector);
             stations.push((pair[0].distal_link.clone(), middle));
         }
-        // Undeformed, the distal part has its frame at the last joint; of a modal link it is interface B itself.
+        // Undeformed, the distal part has its frame at the last joint; of a modal link it is
+        // interface B itself.
         let X_LD = match joints.last() {
             Some(joint) => joint.X_LS,
             None => {

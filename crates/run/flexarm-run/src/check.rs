@@ -83,8 +83,8 @@ impl From<&UrdfFinding> for Finding {
 
 /// All findings about a robot, and about a trajectory on it.
 ///
-/// Never fails: what cannot be loaded is a finding of severity `error`. The robot is held where the trajectory begins,
-/// else its default trajectory, else in the middle of its joint ranges.
+/// Never fails: what cannot be loaded is a finding of severity `error`. The robot is held where the
+/// trajectory begins, else its default trajectory, else in the middle of its joint ranges.
 pub fn check(robot: &Path, trajectory: Option<&Path>, options: &LoadOptions) -> Vec<Finding> {
     check_with_loads(robot, trajectory, None, options)
 }
@@ -165,7 +165,8 @@ fn check_loads(robot: &Robot, motion: Option<&Motion>, path: &Path, findings: &m
     }
 }
 
-/// What is wrong with a motion whose robot cannot be loaded; limits that the robot would give are not missed.
+/// What is wrong with a motion whose robot cannot be loaded; limits that the robot would give are
+/// not missed.
 fn motion_without_robot(path: &Path, options: &MotionOptions) -> Option<Finding> {
     let file = MotionFile { path, joints: None, limits: &[], options, cell: None, text: None };
     let error = motion_formats::read(&file).err()?;

@@ -1,4 +1,5 @@
-//! `[[controller_axis]]` of a robot file: how the robot's controller counts its axes, where it does otherwise than the description.
+//! `[[controller_axis]]` of a robot file: how the robot's controller counts its axes, where it does
+//! otherwise than the description.
 
 use flexarm_kinematics::{JointKind, Mechanism};
 use flexarm_urdf::closest;

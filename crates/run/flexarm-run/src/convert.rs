@@ -50,17 +50,19 @@ pub struct ConvertSummary {
 
 /// Writes the run of a recording as a recording of another format.
 ///
-/// The output comes into being under another name and is renamed at the end: whatever goes wrong, it is there whole or not
-/// at all, and what was there before stays until then.
+/// The output comes into being under another name and is renamed at the end: whatever goes wrong,
+/// it is there whole or not at all, and what was there before stays until then.
 ///
 /// # Errors
-/// [`Error::Recording`] if a format is not known or input and output are one file; [`Error::File`] if the input is not there or
-/// the output is and may not be overwritten; [`Error::Log`] for what the files say.
+/// [`Error::Recording`] if a format is not known or input and output are one file; [`Error::File`]
+/// if the input is not there or the output is and may not be overwritten; [`Error::Log`] for what
+/// the files say.
 pub fn convert(input: &Path, output: &Path, options: &ConvertOptions) -> Result<ConvertSummary, Error> {
     convert_until(input, output, options, &mut |_| ControlFlow::Continue(()))
 }
 
-/// As [`convert()`], until the callback breaks off; it is told the time that the conversion has come to (s).
+/// As [`convert()`], until the callback breaks off; it is told the time that the conversion has
+/// come to (s).
 ///
 /// # Errors
 /// As [`convert()`]; [`Error::Interrupted`] when broken off, and there is no output then.
@@ -132,11 +134,11 @@ pub(crate) fn no_sample(path: &Path, why: Option<&String>) -> Error {
     LogError::NotARecording { path, found, expected, mend }.into()
 }
 
-/// Reads a recording into memory: its summary, if it holds one (MCAP and tables with texts), its curves, and sentences about what is
-/// missing.
+/// Reads a recording into memory: its summary, if it holds one (MCAP and tables with texts), its
+/// curves, and sentences about what is missing.
 ///
-/// What the format does not hold is NaN or empty ([`flexarm_log::RunSource::missing`]); a broken end is no error here, but
-/// one of the sentences.
+/// What the format does not hold is NaN or empty ([`flexarm_log::RunSource::missing`]); a broken
+/// end is no error here, but one of the sentences.
 ///
 /// # Errors
 /// As [`convert()`].
@@ -198,7 +200,8 @@ pub(crate) fn same_file(a: &Path, b: &Path) -> bool {
     a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b)
 }
 
-/// A file in a folder of its own beside the output, so that its name is nobody else's. The folder goes away in the end.
+/// A file in a folder of its own beside the output, so that its name is nobody else's. The folder
+/// goes away in the end.
 struct Partial {
     folder: PathBuf,
     path: PathBuf,

@@ -1,7 +1,9 @@
-//! How far the tool is off in many runs of one arm, on all cores and several runs at a time in each.
+//! How far the tool is off in many runs of one arm, on all cores and several runs at a time in
+//! each.
 //!
-//! For studies: payload, motion, stiffness and damping vary, and of each run the deflection is wanted, not recordings, drives or
-//! settling; these are [`Arm::simulate_batch`]'s. Start at [`Arm::deflections`].
+//! For studies: payload, motion, stiffness and damping vary, and of each run the deflection is
+//! wanted, not recordings, drives or settling; these are [`Arm::simulate_batch`]'s. Start at
+//! [`Arm::deflections`].
 
 use flexarm_stepping::{Batch, BatchRun, FlexibleArm, Spring, StepError, ToolDeflection};
 use rayon::prelude::*;
@@ -19,7 +21,8 @@ pub struct Variation {
     pub scenario: Scenario,
     /// Factor of all stiffnesses.
     pub stiffness: f64,
-    /// Factor of all damping: ratios, coefficients, dampers. What is in proportion to the stiffness follows that as well.
+    /// Factor of all damping: ratios, coefficients, dampers. What is in proportion to the stiffness
+    /// follows that as well.
     pub damping: f64,
 }
 
@@ -43,17 +46,21 @@ impl Variation {
 }
 
 impl Arm {
-    /// Peak, RMS and final deflection of the tool in each run; with `keep_samples` also after every step.
+    /// Peak, RMS and final deflection of the tool in each run; with `keep_samples` also after every
+    /// step.
     ///
-    /// Figures are taken at the start and at the end of every step, not at the log rate. Runs of one tree (same links and
-    /// joints, whatever their inertias, stiffness, damping and motion) go four at a time through the vector instructions of
-    /// processors with AVX2, eight at a time through those of AVX-512; loads, torque-driven joints, curved springs, motions with corners and other steppers than
-    /// generalised-alpha take a run out of that. The numbers are the same to the last bit in any company, order and number of
-    /// threads. A run that fails does not stop the others. As soon as `stop` returns true, runs that have not begun end with
+    /// Figures are taken at the start and at the end of every step, not at the log rate. Runs of
+    /// one tree (same links and joints, whatever their inertias, stiffness, damping and motion) go
+    /// four at a time through the vector instructions of processors with AVX2, eight at a time
+    /// through those of AVX-512; loads, torque-driven joints, curved springs, motions with corners
+    /// and other steppers than generalised-alpha take a run out of that. The numbers are the same
+    /// to the last bit in any company, order and number of threads. A run that fails does not stop
+    /// the others. As soon as `stop` returns true, runs that have not begun end with
     /// [`Error::Interrupted`].
     ///
     /// # Errors
-    /// Of each run its own: as [`Arm::simulate`]; [`ValueError::Factor`] unless both factors are positive.
+    /// Of each run its own: as [`Arm::simulate`]; [`ValueError::Factor`] unless both factors are
+    /// positive.
     pub fn deflections(
         &self,
         runs: &[Variation],

@@ -1,4 +1,5 @@
-//! Drives of a robot file: gearbox springs, rotors, friction and servos, from the text to checked numbers.
+//! Drives of a robot file: gearbox springs, rotors, friction and servos, from the text to checked
+//! numbers.
 
 use std::ops::Range;
 
@@ -55,7 +56,8 @@ pub(crate) enum Numbers {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct GearboxEntry {
-    /// About the axis (N m/rad); or about x, y, z of the joint frame; or for its three translations and rotations; or 6x6.
+    /// About the axis (N m/rad); or about x, y, z of the joint frame; or for its three translations
+    /// and rotations; or 6x6.
     pub stiffness: Option<Numbers>,
     /// Likewise, without the 6x6 (N m s/rad); 3 % modal if not given.
     pub damping: Option<Numbers>,
@@ -160,7 +162,8 @@ impl Drive {
         self.ratio
     }
 
-    /// Inertia of the rotor seen from the joint (kg m²); models have it from [`crate::Robot::rigid`], where the joint has it too.
+    /// Inertia of the rotor seen from the joint (kg m²); models have it from
+    /// [`crate::Robot::rigid`], where the joint has it too.
     pub fn armature(&self) -> f64 {
         self.armature
     }

@@ -1,7 +1,9 @@
-//! One error type for the faces: what went wrong, by cause and with the numbers, and whether the input or the run is to blame.
+//! One error type for the faces: what went wrong, by cause and with the numbers, and whether the
+//! input or the run is to blame.
 //!
 //! Settings in the messages are values ([`Setting`]) that each face names in its own words
-//! ([`flexarm_settings::name_settings`]). What a face makes of an error, such as the number that its process ends with, is its own.
+//! ([`flexarm_settings::name_settings`]). What a face makes of an error, such as the number that
+//! its process ends with, is its own.
 
 mod model;
 mod recording;
@@ -171,8 +173,8 @@ pub enum Error {
     /// A recording could not be written.
     #[error(transparent)]
     Log(#[from] flexarm_log::LogError),
-    /// A link that could not be made of a mesh or of matrices, or not exported. Files, jobs and `.flex` files have the variants
-    /// above, whoever finds what is wrong with them.
+    /// A link that could not be made of a mesh or of matrices, or not exported. Files, jobs and
+    /// `.flex` files have the variants above, whoever finds what is wrong with them.
     #[error(transparent)]
     Link(LinkError),
     /// An error of a study, or of another crate that builds on this one.
@@ -180,7 +182,8 @@ pub enum Error {
     External(Box<dyn ExternalError>),
 }
 
-/// An error of a crate that builds on this one; its `From` for [`Error`] wraps it in [`Error::External`].
+/// An error of a crate that builds on this one; its `From` for [`Error`] wraps it in
+/// [`Error::External`].
 pub trait ExternalError: std::error::Error + Send + Sync + 'static {
     /// Returns whether the input or the run is to blame.
     fn fault(&self) -> Fault {

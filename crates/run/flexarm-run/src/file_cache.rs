@@ -1,4 +1,5 @@
-//! Files that robots are made of, read once: for programs that make many robots of nearly the same file.
+//! Files that robots are made of, read once: for programs that make many robots of nearly the same
+//! file.
 //!
 //! A file that changes while a cache lives is not read again.
 

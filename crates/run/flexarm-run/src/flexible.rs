@@ -1,4 +1,5 @@
-//! A robot with its flexible links and elastic drives in place: which model each of them gets, and the arm that results.
+//! A robot with its flexible links and elastic drives in place: which model each of them gets, and
+//! the arm that results.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -27,8 +28,8 @@ use crate::options::{DriveModel, LinkModel, Modelling};
 use crate::robot::{Robot, tcp_frame};
 use flexarm_linkmaker::import::SECOND_ORDER_UNKNOWN;
 
-/// Springs along Euler angles are not the same seen from either end: a term of third order in the bending is left, which a
-/// chain of n parts divides by n only.
+/// Springs along Euler angles are not the same seen from either end: a term of third order in the
+/// bending is left, which a chain of n parts divides by n only.
 const EULER_CHAIN: &str = "its chain has angles = \"euler-zyx\": where it bends about two axes or twists, its deflection \
                            converges with the number of parts, not with the square of it as with rotation vectors";
 /// Most fixed-interface modes of a link.
@@ -43,11 +44,13 @@ pub struct RobotLink {
     pub flexible: FlexibleLink,
     /// Its damping.
     pub damping: Damping,
-    /// Stiffness of the spring between its two parts, symmetric and positive definite, in the place of its source's (N/m, N, N m/rad).
+    /// Stiffness of the spring between its two parts, symmetric and positive definite, in the place
+    /// of its source's (N/m, N, N m/rad).
     pub stiffness: Option<Matrix6<f64>>,
     /// Factor on the stiffness of all its models.
     pub stiffness_factor: f64,
-    /// Factors on the springs of a lumped link, direction by direction, beside that: K becomes `S K S` with their roots on the diagonal of S.
+    /// Factors on the springs of a lumped link, direction by direction, beside that: K becomes
+    /// `S K S` with their roots on the diagonal of S.
     pub stiffness_factors: [f64; 6],
     /// The beam that it is, if it is one.
     pub beam: Option<BeamLink>,
@@ -68,8 +71,8 @@ pub struct LinkChoices {
     pub eigenmodes: Option<usize>,
     /// Whether loads change the stiffness.
     pub geometric: bool,
-    /// Whether the file says whose mass the parts take; if not, they take that of the uniform beam where the link's own
-    /// cannot be cut.
+    /// Whether the file says whose mass the parts take; if not, they take that of the uniform beam
+    /// where the link's own cannot be cut.
     pub parts_asked: bool,
 }
 
@@ -310,7 +313,8 @@ impl FlexibleRobot {
         PoseError::WithoutInertia { path: self.path.clone(), source, links: light }.into()
     }
 
-    /// What gives way and carries no inertia in some direction: the rows of the mass matrix that depend on earlier ones.
+    /// What gives way and carries no inertia in some direction: the rows of the mass matrix that
+    /// depend on earlier ones.
     fn without_inertia(&self) -> Vec<String> {
         /// Squared share of a row that the rows before leave over.
         const LEAST: f64 = 1e-13;
@@ -342,7 +346,8 @@ impl FlexibleRobot {
         names
     }
 
-    /// Inertia that each torque-driven joint feels at once, all other free coordinates yielding: `1 / (M_ff^-1)_ii`.
+    /// Inertia that each torque-driven joint feels at once, all other free coordinates yielding:
+    /// `1 / (M_ff^-1)_ii`.
     pub(crate) fn quick_inertia(&self, actuated: &DVector<f64>) -> Vec<f64> {
         self.quick_inertia_of(&self.model, actuated)
     }
@@ -406,7 +411,8 @@ impl Robot {
     /// The robot with its links and drives modelled as asked for.
     ///
     /// # Errors
-    /// [`Error::Modelling`] if a link or drive has no such model, [`Error::Model`] if the result is no tree.
+    /// [`Error::Modelling`] if a link or drive has no such model, [`Error::Model`] if the result is
+    /// no tree.
     pub fn modelled(&self, modelling: &Modelling) -> Result<FlexibleRobot, Error> {
         let ChosenLinks { links, doubts, modal_instead } = self.chosen_links(modelling)?;
         let mut substituted = substitute(&self.rigid, &links).map_err(ModellingError::from)?;
@@ -567,7 +573,8 @@ impl Robot {
         laws
     }
 
-    /// Friction of each actuated coordinate, and the joints that are driven by torque: coordinate, servo, limit.
+    /// Friction of each actuated coordinate, and the joints that are driven by torque: coordinate,
+    /// servo, limit.
     fn actuation(&self, model: &Model, drives: DriveModel) -> (Vec<Friction>, Vec<(usize, ServoEntry, f64)>) {
         let actuated = &model.coordinates()[..model.n_actuated()];
         let drive_of = |joint: &str| self.drives.iter().find(|d| d.joint == joint);
@@ -579,8 +586,9 @@ impl Robot {
         (friction, actuated.iter().enumerate().filter_map(servo).collect())
     }
 
-    /// The model of a link on this robot, and a sentence if it is another one than asked for: a link with load on a third
-    /// interface bends in modes, because rigid parts with springs know two.
+    /// The model of a link on this robot, and a sentence if it is another one than asked for: a
+    /// link with load on a third interface bends in modes, because rigid parts with springs know
+    /// two.
     pub(crate) fn form_of(&self, link: &RobotLink, modelling: &Modelling) -> Result<(LinkForm, Option<String>), Error> {
         let form = link.form(modelling).map_err(ModellingError::NoSuchModel)?;
         let branches =
@@ -599,7 +607,8 @@ impl Robot {
         Ok((modal, Some(format!("link {name:?} bends in modes (model = \"modal\"): {why}"))))
     }
 
-    /// Gives a beam that does not say whose mass it takes that of the uniform beam, if the link's own cannot be cut; says so.
+    /// Gives a beam that does not say whose mass it takes that of the uniform beam, if the link's
+    /// own cannot be cut; says so.
     fn uncut(&self, link: &RobotLink, flexible: &mut FlexibleLink) -> Option<String> {
         if link.choices.parts_asked {
             return None;
@@ -644,7 +653,8 @@ fn doubts_of(link: &FlexibleLink, form: &LinkForm) -> Vec<Caveat> {
     doubts
 }
 
-/// A spring with the group of elastic coordinates that it acts on ([`flexarm_kinematics::ElasticGroup::name`]).
+/// A spring with the group of elastic coordinates that it acts on
+/// ([`flexarm_kinematics::ElasticGroup::name`]).
 struct OwnedSpring {
     group: String,
     spring: Spring,

@@ -1,4 +1,5 @@
-//! Gears of a robot file beyond their stiffness: transmission error, hysteresis, and gears that move several joints.
+//! Gears of a robot file beyond their stiffness: transmission error, hysteresis, and gears that
+//! move several joints.
 
 use std::collections::BTreeMap;
 
@@ -50,13 +51,15 @@ pub(crate) struct HysteresisEntry {
     pub loss: Option<f64>,
     /// The same in arc minutes.
     pub loss_arcmin: Option<f64>,
-    /// Width between the middles of the loop at 3 % of the rated torque to either side (rad); by the stiffness if not given.
+    /// Width between the middles of the loop at 3 % of the rated torque to either side (rad); by
+    /// the stiffness if not given.
     pub lost_motion: Option<f64>,
     /// The same in arc minutes.
     pub lost_motion_arcmin: Option<f64>,
     /// Torque to which the lost motion belongs (N m).
     pub rated_torque: Option<f64>,
-    /// Deflection of first loading over which all friction has come to slip (rad); half the loss if not given.
+    /// Deflection of first loading over which all friction has come to slip (rad); half the loss if
+    /// not given.
     pub reach: Option<f64>,
     /// Sliders that it is made of.
     pub sliders: Option<i64>,
@@ -137,8 +140,8 @@ pub(crate) fn harmonics(entries: &[HarmonicEntry], ratio: Option<f64>) -> Result
 
 /// Hysteresis around a spring of that curve.
 ///
-/// The friction of all sliders is the torque of the elastic part at half the loss: with all of them slipping, the branches of the
-/// loop cross zero torque there.
+/// The friction of all sliders is the torque of the elastic part at half the loss: with all of them
+/// slipping, the branches of the loop cross zero torque there.
 ///
 /// # Errors
 /// A sentence about what is missing, no number, or does not fit the stiffness.
@@ -173,8 +176,9 @@ pub(crate) fn hysteresis(
                     2.0 * torque / stiffness
                 ));
             }
-            // On either branch of the loop the elastic part is half its width away from the middle: it must be soft as far as that
-            // and half the lost motion beyond, so that the middle line has the lost motion whatever the width.
+            // On either branch of the loop the elastic part is half its width away from the middle:
+            // it must be soft as far as that and half the lost motion beyond, so that the middle
+            // line has the lost motion whatever the width.
             let (slope, soft) = (torque / half, half + 0.5 * loss);
             let (edge, far) = (slope * soft, soft + 1.0);
             let end = edge + stiffness;
@@ -307,7 +311,8 @@ fn gears_fit(robot: &Robot, joints: &[String]) -> Result<(), String> {
 }
 
 impl Robot {
-    /// Torques of the motors that move several joints, behind their gears, for those of all joints; by the name of the drive.
+    /// Torques of the motors that move several joints, behind their gears, for those of all joints;
+    /// by the name of the drive.
     pub(crate) fn motor_torques(&self, arm: &FlexibleArm, tau: &[f64]) -> BTreeMap<String, f64> {
         let (Some(robot), Some(arm)) = (&self.coupling, &arm.coupling) else { return BTreeMap::new() };
         robot.joints.iter().cloned().zip(arm.motor_torques(tau)).collect()
@@ -324,7 +329,8 @@ pub(crate) struct GearLaws {
 }
 
 impl GearLaws {
-    /// Of a drive whose joint has that coordinate and whose gearbox, if it gives way, is that element.
+    /// Of a drive whose joint has that coordinate and whose gearbox, if it gives way, is that
+    /// element.
     pub(crate) fn add(&mut self, drive: &Drive, coordinate: usize, element: Option<usize>) {
         if let (Some(element), Some((_, gear))) = (element, &drive.gearbox) {
             if !gear.transmission.is_empty() {
@@ -374,7 +380,8 @@ mod tests {
         toml::from_str(text).unwrap()
     }
 
-    /// The middle line and the width of the loop at a torque, by bisection on the branches of a cycle up to `far`.
+    /// The middle line and the width of the loop at a torque, by bisection on the branches of a
+    /// cycle up to `far`.
     fn branches(law: &GearHysteresis, far: f64, torque: f64) -> (f64, f64) {
         // A branch after a reversal at ±far: Masing, sliders at ±reach going back.
         let branch = |side: f64, d: f64| {
@@ -393,8 +400,9 @@ mod tests {
         (0.5 * (down + up), (down - up).abs())
     }
 
-    /// Truth: what the catalogue's words mean. A gear of 1.1 N m/arcsec class (typical figures of a cycloidal gear: 1 arcmin of hysteresis, 1 arcmin of lost
-    /// motion at 3 % of 1570 N m) shows them on its own loop, cycled to the rated torque.
+    /// Truth: what the catalogue's words mean. A gear of 1.1 N m/arcsec class (typical figures of a
+    /// cycloidal gear: 1 arcmin of hysteresis, 1 arcmin of lost motion at 3 % of 1570 N m) shows
+    /// them on its own loop, cycled to the rated torque.
     #[test]
     fn the_loop_of_a_gear_has_the_width_and_the_lost_motion_of_its_catalogue() {
         let stiffness = 1.0e6;

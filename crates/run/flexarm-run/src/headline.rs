@@ -100,10 +100,11 @@ pub(crate) fn digits(size_mm: f64) -> usize {
     if size_mm > 0.0 { (2.0 - size_mm.log10().floor()).clamp(1.0, 9.0) as usize } else { 2 }
 }
 
-/// The parts of a whole as numbers with so many digits behind the point that add up to the rounded whole.
+/// The parts of a whole as numbers with so many digits behind the point that add up to the rounded
+/// whole.
 ///
-/// Each is rounded down or up, those with the largest remainders up. Parts that do not make the whole, to rounding, are
-/// rounded each by itself.
+/// Each is rounded down or up, those with the largest remainders up. Parts that do not make the
+/// whole, to rounding, are rounded each by itself.
 pub(crate) fn rounded(parts: &[f64], whole: f64, digits: usize) -> Vec<String> {
     let unit = 10f64.powi(-(digits as i32));
     let mut units: Vec<f64> = parts.iter().map(|part| (part / unit).floor()).collect();

@@ -19,7 +19,8 @@ use crate::options::Modelling;
 use crate::posed::all_finite;
 use crate::robot::{Robot, tcp_frame};
 
-/// Answer of `flexarm inspect`. SI units; the Jacobian's rows are linear first, world axes, at the TCP.
+/// Answer of `flexarm inspect`. SI units; the Jacobian's rows are linear first, world axes, at the
+/// TCP.
 #[derive(Clone, Debug, Serialize)]
 pub struct Inspection {
     /// Name of the robot.
@@ -195,7 +196,8 @@ pub fn joint_values(values: Option<&[f64]>, joints: &[&str]) -> Result<Vec<f64>,
     }
 }
 
-/// The rigid robot (with payload) at a pose; `at` (rad or m) and `velocity` of all actuated joints, zero without.
+/// The rigid robot (with payload) at a pose; `at` (rad or m) and `velocity` of all actuated joints,
+/// zero without.
 ///
 /// # Errors
 /// [`Error::Pose`] for joint values that do not fit.

@@ -17,7 +17,8 @@ use crate::options::{LinkModel, Modelling};
 use crate::robot::keep;
 use crate::robot_file::{BeamEntry, DampingEntry, FlexibleLinkEntry, RobotFileError, Source};
 
-/// Difference of mirrored entries, over the root of those on the diagonal, up to which a matrix is symmetric as written.
+/// Difference of mirrored entries, over the root of those on the diagonal, up to which a matrix is
+/// symmetric as written.
 const SYMMETRIC: f64 = 1e-9;
 /// Smallest eigenvalue of a stiffness with its diagonal scaled to one: below, rounding decides.
 const DEFINITE: f64 = 1e-12;
@@ -250,7 +251,8 @@ fn beam_link(
         };
         return Err(fail(text.into()));
     }
-    // Any direction across the beam will do if none is asked for: the axis that it is farthest from.
+    // Any direction across the beam will do if none is asked for: the axis that it is farthest
+    // from.
     let y_axis = beam.y_axis.map(Vector3::from).unwrap_or_else(|| {
         let k = axis.abs().imin();
         Vector3::from_fn(|i, _| if i == k { 1.0 } else { 0.0 })

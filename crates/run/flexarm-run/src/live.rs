@@ -1,9 +1,11 @@
-//! An arm that is commanded while it moves: a controller, or somebody who learns one, gives targets period by period.
+//! An arm that is commanded while it moves: a controller, or somebody who learns one, gives targets
+//! period by period.
 //!
-//! A [`Motion`](crate::Motion) is known before a run; here only the target of the next control period is. Joints go from
-//! target to target: on cubics if velocities are told with the targets, else on the parabola through the last three, whose
-//! acceleration is a period late, as that of any controller that is told positions alone. Drives do with them what they do in a run: exact joints are there,
-//! servos follow with their gains and lag.
+//! A [`Motion`](crate::Motion) is known before a run; here only the target of the next control
+//! period is. Joints go from target to target: on cubics if velocities are told with the targets,
+//! else on the parabola through the last three, whose acceleration is a period late, as that of any
+//! controller that is told positions alone. Drives do with them what they do in a run: exact joints
+//! are there, servos follow with their gains and lag.
 
 use std::sync::{Arc, PoisonError, RwLock};
 
@@ -78,14 +80,16 @@ pub struct Live {
 }
 
 impl Arm {
-    /// The arm at rest at a pose, in equilibrium under its weight, to be commanded every `period_s` (s).
+    /// The arm at rest at a pose, in equilibrium under its weight, to be commanded every `period_s`
+    /// (s).
     ///
     /// * `at`: all actuated joints (rad or m), zero without it.
     /// * `options`: stepper and step count; the period is a whole number of steps.
     ///
     /// # Errors
-    /// [`Error::Pose`] for joint values that do not fit, [`Error::Value`] for a step or a period that is not positive or not a
-    /// whole number of steps, [`Error::Step`] where there is no equilibrium.
+    /// [`Error::Pose`] for joint values that do not fit, [`Error::Value`] for a step or a period
+    /// that is not positive or not a whole number of steps, [`Error::Step`] where there is no
+    /// equilibrium.
     pub fn live(&self, at: Option<&[f64]>, period_s: f64, options: &RunOptions) -> Result<Live, Error> {
         let names: Vec<&str> = self.joints().collect();
         let at = joint_values(at, &names)?;
@@ -185,11 +189,13 @@ impl Live {
 
     /// One control period, at whose end the joints are told to be at `q` (rad or m).
     ///
-    /// * `qdot`: velocities there (rad/s or m/s); without them joints go on the parabola through the last three targets.
+    /// * `qdot`: velocities there (rad/s or m/s); without them joints go on the parabola through
+    ///   the last three targets.
     /// * `wrench`: what pulls at the tool meanwhile, world axes (N, N m).
     ///
     /// # Errors
-    /// [`Error::Pose`] for other numbers of values and values that are no numbers, [`Error::Step`] if the step fails.
+    /// [`Error::Pose`] for other numbers of values and values that are no numbers, [`Error::Step`]
+    /// if the step fails.
     pub fn step(&mut self, q: &[f64], qdot: Option<&[f64]>, wrench: &Wrench) -> Result<(), Error> {
         self.check(q)?;
         qdot.map_or(Ok(()), |qdot| self.check(qdot))?;

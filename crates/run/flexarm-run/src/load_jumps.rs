@@ -11,7 +11,8 @@ const KEPT: f64 = 0.1;
 /// which is looked at after so many halvings already: a curve has lost it by then.
 const FIRST_LOOK: u32 = 8;
 
-/// The times of jumps between `start` and `end` (s), to the last place, at most one per five thousandth of it.
+/// The times of jumps between `start` and `end` (s), to the last place, at most one per five
+/// thousandth of it.
 pub(crate) fn jumps_of(wrench: &(dyn Fn(f64) -> Wrench + Send + Sync), start: f64, end: f64) -> Vec<f64> {
     if start >= end {
         return Vec::new();

@@ -1,8 +1,9 @@
-//! A file of loads and payloads (`--loads FILE.toml`), read into the values of a [`Scenario`](crate::Scenario).
+//! A file of loads and payloads (`--loads FILE.toml`), read into the values of a
+//! [`Scenario`](crate::Scenario).
 //!
-//! A file of its own, because loads belong to a run and not to a robot. Start at `read_loads`. Not here: what the values
-//! do on a robot (`applied_load`, `payload`); they remember where they are written (`Written`), so that what is found
-//! wrong there is told with its place.
+//! A file of its own, because loads belong to a run and not to a robot. Start at `read_loads`. Not
+//! here: what the values do on a robot (`applied_load`, `payload`); they remember where they are
+//! written (`Written`), so that what is found wrong there is told with its place.
 
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -103,7 +104,8 @@ struct PayloadEntry {
 
 type WrenchFn = Arc<dyn Fn(f64) -> Wrench + Send + Sync>;
 
-/// Where a value is written: its entry as a whole, and what it says of frame or link and of inertia.
+/// Where a value is written: its entry as a whole, and what it says of frame or link and of
+/// inertia.
 #[derive(Clone, Debug)]
 pub(crate) struct Written {
     entry: RobotFileError,
@@ -206,7 +208,8 @@ fn doubts(e: &LoadEntry) -> Vec<Caveat> {
     caveat::loads::of_phase(e.phase).into_iter().chain(doubtful).collect()
 }
 
-/// Sines and cosines of an expression whose argument is linear in t: text, rate (1/s) and value at zero.
+/// Sines and cosines of an expression whose argument is linear in t: text, rate (1/s) and value at
+/// zero.
 fn sines(text: &str) -> Vec<(String, f64, f64)> {
     let starts = ["sin", "cos"].into_iter().flat_map(|name| text.match_indices(name).map(|(at, _)| at));
     let one = |at: usize| {
@@ -408,7 +411,8 @@ fn stray_key(e: &LoadEntry, kind: &str) -> Option<(&'static str, &'static str)> 
     keys.iter().find(stray).map(|(key, _, kinds)| (*key, *kinds))
 }
 
-/// Nobody knows what is in an expression: the reference stepper looks at it as at a vibration of this period (s).
+/// Nobody knows what is in an expression: the reference stepper looks at it as at a vibration of
+/// this period (s).
 pub(crate) const EXPRESSION_PERIOD: f64 = 5e-3;
 /// Longest expression (characters).
 const LONGEST_EXPRESSION: usize = 2000;
@@ -504,7 +508,8 @@ fn expression(e: &LoadEntry, source: &Source, (start, end): (f64, f64)) -> Resul
     }))
 }
 
-/// One component, in t (s), which is a number at the beginning, in the middle and at the end of the time in which it acts.
+/// One component, in t (s), which is a number at the beginning, in the middle and at the end of the
+/// time in which it acts.
 fn part(
     entry: &Spanned<String>,
     source: &Source,

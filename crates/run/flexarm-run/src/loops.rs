@@ -1,4 +1,5 @@
-//! Closed loops as values: the pins that close the bars of a robot, where they can be, and how well they hand on force.
+//! Closed loops as values: the pins that close the bars of a robot, where they can be, and how well
+//! they hand on force.
 
 use flexarm_kinematics::{
     Data, Joint, JointKind, Link, LoopClosure, Mechanism, Model, ModelError, Pose, forward_kinematics,
@@ -11,14 +12,16 @@ use crate::caveat::size::spread_poses;
 use crate::error::LoopError;
 use crate::robot::Robot;
 
-/// A loop to put on a robot ([`Robot::with_loops`]): a pin on one link goes through an eye of another one.
+/// A loop to put on a robot ([`Robot::with_loops`]): a pin on one link goes through an eye of
+/// another one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RobotLoop {
     /// Unique name.
     pub name: String,
     /// Link that carries the pin, and a point on its axis in link axes (m).
     pub pin: (String, [f64; 3]),
-    /// Axis of the pin in axes of that link; that of the first dependent joint that turns if not given.
+    /// Axis of the pin in axes of that link; that of the first dependent joint that turns if not
+    /// given.
     pub axis: Option<[f64; 3]>,
     /// Link that has the eye, and its place in link axes (m).
     pub eye: (String, [f64; 3]),
@@ -37,7 +40,8 @@ pub struct LoopInfo {
     pub dependent: Vec<DependentInfo>,
     /// Transmission angle (rad, at most a right angle).
     pub transmission_angle: f64,
-    /// The smallest one in poses spread over the joint ranges, without those that limits of dependent joints exclude.
+    /// The smallest one in poses spread over the joint ranges, without those that limits of
+    /// dependent joints exclude.
     pub smallest_transmission_angle: Option<f64>,
 }
 
@@ -75,7 +79,8 @@ impl Robot {
         Ok(self)
     }
 
-    /// Frames for pin and eye: fixed to their links, so that a link that bends carries each on the part where it is.
+    /// Frames for pin and eye: fixed to their links, so that a link that bends carries each on the
+    /// part where it is.
     pub(crate) fn add_loop(&mut self, own: RobotLoop) -> Result<(), LoopError> {
         let RobotLoop { name, pin, axis, eye, dependent, at } = own;
         if self.rigid.loops.iter().any(|other| other.name == name) {
@@ -221,7 +226,8 @@ pub struct AlongMotion {
     pub(crate) range: Vec<[f64; 2]>,
 }
 
-/// Follows a motion; loops must close and may not pass a dead point, where the bars could go on in two ways.
+/// Follows a motion; loops must close and may not pass a dead point, where the bars could go on in
+/// two ways.
 ///
 /// # Errors
 /// [`LoopError::AlongMotion`].

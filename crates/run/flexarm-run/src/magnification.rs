@@ -15,7 +15,8 @@ const PIECES: u32 = 64;
 const SHOWN: f64 = 0.15;
 /// Most that springs turn on the screen (rad).
 const LARGEST_TURN: f64 = 0.3;
-/// A load that strikes at once, or a start from undeformed springs, deflects twice as far as the same load at rest.
+/// A load that strikes at once, or a start from undeformed springs, deflects twice as far as the
+/// same load at rest.
 const SUDDEN: f64 = 2.0;
 
 /// Deflections that a run will have, roughly.
@@ -32,15 +33,16 @@ pub struct Expected {
 }
 
 impl Expected {
-    /// Springs under weight and rigid motion, without their own dynamics: `e = -K^-1 tau_e` with the loads that hold the
-    /// elastic coordinates of the rigid twin at zero.
+    /// Springs under weight and rigid motion, without their own dynamics: `e = -K^-1 tau_e` with
+    /// the loads that hold the elastic coordinates of the rigid twin at zero.
     pub(crate) fn of(arm: &FlexibleArm, tcp: &Frame, duration: f64, start: Start) -> Self {
         let mut twin = RigidTwin::new(arm);
         let mut J = Matrix6xX::zeros(arm.model.nv());
         let mut expected = Self::default();
         // A start from undeformed springs doubles everything, below.
         let sudden = if start == Start::Undeformed { 1.0 } else { SUDDEN };
-        // What acts for a short time only acts on the arm as its mean over half a period of the first mode.
+        // What acts for a short time only acts on the arm as its mean over half a period of the
+        // first mode.
         let window = 0.5 / arm.modes.frequencies_hz().first().copied().unwrap_or(f64::INFINITY).max(1e-3);
         let jumps = arm.load_jumps().map(|t| t + 0.5 * window).take(INSTANTS as usize);
         let evenly = (0..=INSTANTS).map(|k| duration * f64::from(k) / f64::from(INSTANTS));
@@ -121,7 +123,8 @@ impl Expected {
     }
 }
 
-/// Has the scale of colours of pictures end with the largest TCP error of runs that are shown together: before a run it is a guess.
+/// Has the scale of colours of pictures end with the largest TCP error of runs that are shown
+/// together: before a run it is a guess.
 pub(crate) fn fit_color_scale<'a>(traces: impl IntoIterator<Item = &'a mut Trace>) {
     let mut traces: Vec<&mut Trace> = traces.into_iter().filter(|trace| trace.header.color_scale_m > 0.0).collect();
     let peak_m = |trace: &&mut Trace| Vector3::from_row_slice(&trace.peak.error_world[..3]).norm();

@@ -1,4 +1,5 @@
-//! Modes as a recording: each swings for a few seconds after another, slowly and large enough to see.
+//! Modes as a recording: each swings for a few seconds after another, slowly and large enough to
+//! see.
 
 use flexarm_analysis::{DampedMode, tcp_error};
 use flexarm_kinematics::{Frame, forward_kinematics};
@@ -40,11 +41,12 @@ impl Default for ModeMovie {
     }
 }
 
-/// As [`crate::modes()`], and writes a recording in which the modes swing one after another about the static pose, beside
-/// the rigid robot at rest.
+/// As [`crate::modes()`], and writes a recording in which the modes swing one after another about
+/// the static pose, beside the rigid robot at rest.
 ///
 /// # Errors
-/// As [`crate::modes()`]; [`Error::Pose`] for a robot without modes, [`Error::Value`], [`Error::File`] and [`Error::Log`] for files.
+/// As [`crate::modes()`]; [`Error::Pose`] for a robot without modes, [`Error::Value`],
+/// [`Error::File`] and [`Error::Log`] for files.
 pub fn record_modes(
     robot: &Robot,
     modelling: &Modelling,
@@ -146,7 +148,8 @@ fn reach(posed: &Posed) -> f64 {
     data.X_WB.iter().skip(1).map(|X| (X.translation.vector - tool).norm()).fold(0.0, f64::max)
 }
 
-/// Factor on the shape of unit modal mass with which the tool moves so far, or the largest that can be looked at.
+/// Factor on the shape of unit modal mass with which the tool moves so far, or the largest that can
+/// be looked at.
 fn magnification(mode: &DampedMode, linear: &Linear, motion_m: f64) -> f64 {
     let tool = flexarm_analysis::mode_outputs(mode, &crate::modes::tool_map(linear));
     let tool = tool.rows(0, 3).iter().map(|x| x.norm_sqr()).sum::<f64>().sqrt();

@@ -1,4 +1,5 @@
-//! Natural modes at a pose, drives locked or under their servos: frequencies, damping, what the tool does in them and which link bends.
+//! Natural modes at a pose, drives locked or under their servos: frequencies, damping, what the
+//! tool does in them and which link bends.
 
 use flexarm_analysis::{
     DampedMode, LinearError, compliance_parts, damped_modes, effective_mass, mode_outputs, strain_energy_shares,
@@ -40,8 +41,8 @@ pub struct ModeTable {
     pub modes: Vec<ModeFigures>,
     /// How many modes there are; `modes` may be fewer.
     pub total: usize,
-    /// Parts of the static compliance that the modes above carry, per direction of the TCP; null where it does not
-    /// yield.
+    /// Parts of the static compliance that the modes above carry, per direction of the TCP; null
+    /// where it does not yield.
     pub compliance_covered: [Option<f64>; 6],
     /// Written files.
     pub files: Files,
@@ -60,13 +61,16 @@ pub struct ModeFigures {
     pub damped_frequency_hz: f64,
     /// Damping ratio.
     pub damping_ratio: f64,
-    /// Motion of the TCP in the mode scaled to unit modal mass (1/sqrt(kg), rad/sqrt(kg m²) ...), real part.
+    /// Motion of the TCP in the mode scaled to unit modal mass (1/sqrt(kg), rad/sqrt(kg m²) ...),
+    /// real part.
     pub tcp: [f64; 6],
     /// Imaginary part; zero where the damping is proportional.
     pub tcp_imaginary: [f64; 6],
-    /// Mass (kg) at the TCP, moment of inertia (kg m²) for rotations, that moves like the mode; null at a node.
+    /// Mass (kg) at the TCP, moment of inertia (kg m²) for rotations, that moves like the mode;
+    /// null at a node.
     pub effective_mass: [Option<f64>; 6],
-    /// Part of the static compliance of the TCP in each direction that this mode carries; null where it does not yield.
+    /// Part of the static compliance of the TCP in each direction that this mode carries; null
+    /// where it does not yield.
     pub compliance_share: [Option<f64>; 6],
     /// Share of each element in the strain energy.
     pub strain_energy: Vec<f64>,
@@ -147,8 +151,8 @@ fn lowest(robot: &Robot, posed: Posed, count: usize) -> Result<ModeTable, Error>
     table(robot, posed, &linear, &all, count)
 }
 
-/// Frequencies without the dampers (Hz): those that are not in proportion move the others. With locked drives the figures of a
-/// map at this pose, to the last bit.
+/// Frequencies without the dampers (Hz): those that are not in proportion move the others. With
+/// locked drives the figures of a map at this pose, to the last bit.
 fn undamped_frequencies(posed: &Posed, linear: &Linear) -> Result<Vec<f64>, Error> {
     if linear.driven == 0 {
         return Ok(posed.operating_point(&[0.0; 6])?.frequencies_hz().to_vec());
@@ -165,7 +169,8 @@ pub(crate) fn table(
     all: &[DampedMode],
     count: usize,
 ) -> Result<ModeTable, Error> {
-    // Modes under servos share the compliance of springs and servos; where a motor is held by nothing there is none.
+    // Modes under servos share the compliance of springs and servos; where a motor is held by
+    // nothing there is none.
     let compliance = match linear.driven {
         0 => linear.compliance().map_err(step_error)?.diagonal(),
         _ => linear.yielding_compliance().map_or_else(Vector6::zeros, |C| C.diagonal()),

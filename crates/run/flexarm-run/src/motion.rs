@@ -82,12 +82,12 @@ pub fn limits(model: &Model) -> Vec<JointLimits> {
 }
 
 impl Motion {
-    /// Reads a motion file for a robot, of any format that `docs/motions.md` has. A joint that it does not name stays where
-    /// the robot file says, else at zero, or at the limit nearest to it.
+    /// Reads a motion file for a robot, of any format that `docs/motions.md` has. A joint that it
+    /// does not name stays where the robot file says, else at zero, or at the limit nearest to it.
     ///
     /// # Errors
-    /// [`Error::File`], [`Error::Trajectory`] or [`Error::Motion`]: format, units, times, joints that the robot does not have;
-    /// [`Error::Model`].
+    /// [`Error::File`], [`Error::Trajectory`] or [`Error::Motion`]: format, units, times, joints
+    /// that the robot does not have; [`Error::Model`].
     pub fn load(path: impl AsRef<Path>, robot: &Robot) -> Result<Self, Error> {
         Self::load_with(path, robot, &MotionOptions::default())
     }
@@ -100,7 +100,8 @@ impl Motion {
         Self::load_text(path.as_ref(), None, robot, options)
     }
 
-    /// As [`Motion::load_with`], with a text in the place of the one that the file has, if it is waypoints or a path of the tool.
+    /// As [`Motion::load_with`], with a text in the place of the one that the file has, if it is
+    /// waypoints or a path of the tool.
     pub fn load_text(path: &Path, text: Option<&str>, robot: &Robot, options: &MotionOptions) -> Result<Self, Error> {
         let model = robot.rigid_model()?;
         let Robot { hold, controller, .. } = robot;
@@ -121,8 +122,8 @@ impl Motion {
     /// * `q`: n rows of all actuated joints in coordinate order, one after the other (rad or m).
     ///
     /// # Errors
-    /// [`Error::Pose`] for another number of values, [`Error::Trajectory`] for values that are no numbers or times that do
-    /// not increase; [`Error::Model`].
+    /// [`Error::Pose`] for another number of values, [`Error::Trajectory`] for values that are no
+    /// numbers or times that do not increase; [`Error::Model`].
     pub fn from_samples(t: &[f64], q: &[f64], robot: &Robot) -> Result<Self, Error> {
         let model = robot.rigid_model()?;
         let actuated = &model.coordinates()[..model.n_actuated()];
@@ -221,10 +222,12 @@ impl Motion {
         Ok(Self { trajectory: Arc::new(trajectory), violations, likely, warnings, tool_path: None, ..self })
     }
 
-    /// The same motion with each corner, where a velocity jumps, replaced by a blend that lasts `seconds`.
+    /// The same motion with each corner, where a velocity jumps, replaced by a blend that lasts
+    /// `seconds`.
     ///
     /// # Errors
-    /// [`Error::Value`] unless `seconds` is positive, [`Error::Trajectory`] if numbers become too extreme.
+    /// [`Error::Value`] unless `seconds` is positive, [`Error::Trajectory`] if numbers become too
+    /// extreme.
     pub fn with_rounded_corners(self, seconds: f64, model: &Model) -> Result<Self, Error> {
         if !(seconds > 0.0 && seconds.is_finite()) {
             return Err(ValueError::CornerTime(seconds).into());
@@ -242,7 +245,8 @@ impl Motion {
         self.notes.iter().cloned().chain(told).chain(self.held_note()).collect()
     }
 
-    /// Which joints stay where, if the file does not name all: a note where the robot file says so, else a warning.
+    /// Which joints stay where, if the file does not name all: a note where the robot file says so,
+    /// else a warning.
     fn held_note(&self) -> Vec<Caveat> {
         let (told, assumed): (Vec<&HeldJoint>, Vec<&HeldJoint>) = self.held.iter().partition(|held| held.told);
         let file = self.path.display().to_string();

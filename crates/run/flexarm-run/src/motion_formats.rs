@@ -1,4 +1,5 @@
-//! Which formats of motions are read: one row each, recognised by content. A format more is a row more.
+//! Which formats of motions are read: one row each, recognised by content. A format more is a row
+//! more.
 
 use std::io::Read;
 use std::path::Path;
@@ -178,7 +179,8 @@ fn unknown(head: &Head<'_>) -> String {
     format!("this is no motion that can be read: {found}; read are {}; rename or convert the file", names.join(", "))
 }
 
-// ------------------------------------------------------------------------------------------------------------- recognition
+// -------------------------------------------------------------------------------------------------------------
+// recognition
 
 fn is_toml(head: &Head<'_>) -> bool {
     // Programs assign to names as well: a list of joints holds texts, a format is a number.
@@ -217,7 +219,8 @@ fn is_table(head: &Head<'_>) -> bool {
     head.text.lines().take(1000).any(of_numbers)
 }
 
-// ------------------------------------------------------------------------------------------------------------------ readers
+// ------------------------------------------------------------------------------------------------------------------
+// readers
 
 fn waypoints(file: &MotionFile<'_>) -> Result<ReadMotion, Error> {
     no_topic(file, "waypoints")?;

@@ -1,5 +1,5 @@
-//! What is in a motion: peaks against limits, torques of the rigid robot, the path of the tool, curves; and the motion in
-//! another format.
+//! What is in a motion: peaks against limits, torques of the rigid robot, the path of the tool,
+//! curves; and the motion in another format.
 
 use std::path::{Path, PathBuf};
 
@@ -104,7 +104,8 @@ pub struct MotionPeak {
     pub jerk_limit: Option<f64>,
     /// Largest jump of the acceleration.
     pub acceleration_jump: f64,
-    /// Torque or force of greatest magnitude that the rigid robot with its payload needs (N m, N), with a robot.
+    /// Torque or force of greatest magnitude that the rigid robot with its payload needs (N m, N),
+    /// with a robot.
     pub torque: Option<f64>,
     /// When.
     pub torque_at_s: Option<f64>,
@@ -149,14 +150,14 @@ pub struct MotionCurve {
     pub position: Vec<f64>,
 }
 
-/// Looks at a motion, on a robot if one is given, and writes it in the formats that the endings of `outputs` ask for: `.csv`,
-/// `.toml`, `.yaml` (`.yml`), `.json`, and `.svg` for curves.
+/// Looks at a motion, on a robot if one is given, and writes it in the formats that the endings of
+/// `outputs` ask for: `.csv`, `.toml`, `.yaml` (`.yml`), `.json`, and `.svg` for curves.
 ///
 /// * `rate_hz`: rows or points per second of what is written.
 ///
 /// # Errors
-/// As [`Motion::load_with`]; [`Error::File`] for an ending that is not known, [`Error::Taken`] and [`Error::Write`];
-/// [`Error::Trajectory`] for a rate that makes no sense.
+/// As [`Motion::load_with`]; [`Error::File`] for an ending that is not known, [`Error::Taken`] and
+/// [`Error::Write`]; [`Error::Trajectory`] for a rate that makes no sense.
 pub fn motion_report(
     path: &Path,
     robot: Option<&Robot>,
@@ -392,8 +393,8 @@ pub fn of_effort(joint: &str, worst: &Extreme, since_s: f64, limit: f64, of: &st
     Some(MotionViolation { joint: joint.to_owned(), kind: "effort", time_s, since_s, value, limit, message })
 }
 
-/// Length of the path of the tool (m) and its largest speed (m/s), from chords; what they leave out of the length is taken from
-/// chords of twice the step (error of the fourth order in the step).
+/// Length of the path of the tool (m) and its largest speed (m/s), from chords; what they leave out
+/// of the length is taken from chords of twice the step (error of the fourth order in the step).
 fn way_of_tool(trajectory: &Trajectory, model: &Model) -> (f64, f64) {
     let (mut data, tcp) = (Data::new(model), tcp_frame(model));
     let n = model.nv();
@@ -435,7 +436,8 @@ fn sampled(trajectory: &Trajectory, points: usize) -> Vec<(f64, Vec<f64>, Vec<f6
     (0..=points).map(at).collect()
 }
 
-/// A motion in the formats that the endings of files ask for: `.csv`, `.toml`, `.yaml` (`.yml`), `.json`.
+/// A motion in the formats that the endings of files ask for: `.csv`, `.toml`, `.yaml` (`.yml`),
+/// `.json`.
 pub fn motion_texts(
     outputs: &[PathBuf],
     trajectory: &Trajectory,

@@ -1,7 +1,9 @@
-//! What the base of a robot stands on: six springs, or a beam or mesh that bends. From the text to checked numbers.
+//! What the base of a robot stands on: six springs, or a beam or mesh that bends. From the text to
+//! checked numbers.
 //!
-//! Springs are kept beside the rigid robot and put under the base when it is modelled ([`RobotMounting::Springs`]). A beam or
-//! a mesh becomes a flexible link between the ground and the base like any other ([`RobotMounting::Link`]).
+//! Springs are kept beside the rigid robot and put under the base when it is modelled
+//! ([`RobotMounting::Springs`]). A beam or a mesh becomes a flexible link between the ground and
+//! the base like any other ([`RobotMounting::Link`]).
 
 use std::path::PathBuf;
 
@@ -186,7 +188,8 @@ fn stiffness6(given: &Spanned<Numbers>, source: &Source) -> Result<Matrix6<f64>,
     }
 }
 
-/// What rides on the springs beside the base. A base without mass needs to be told that nothing does.
+/// What rides on the springs beside the base. A base without mass needs to be told that nothing
+/// does.
 fn riding_mass(
     robot: &Robot,
     given: &MountingEntry,
@@ -340,11 +343,12 @@ impl Robot {
 
     /// The same robot on six springs.
     ///
-    /// * `springs`: their frame in the base link, their stiffness there, and the mass that rides on them beside the base.
+    /// * `springs`: their frame in the base link, their stiffness there, and the mass that rides on
+    ///   them beside the base.
     ///
     /// # Errors
-    /// [`Error::Modelling`] if the stiffness holds nothing or the name is that of a link, [`Error::Pose`] and others as
-    /// [`Robot::modelled`].
+    /// [`Error::Modelling`] if the stiffness holds nothing or the name is that of a link,
+    /// [`Error::Pose`] and others as [`Robot::modelled`].
     pub fn with_mounting(mut self, springs: Mounting, damping: Damping) -> Result<Self, Error> {
         self.mounting = Some(RobotMounting::Springs { springs, damping });
         self.flexible_robot()?;

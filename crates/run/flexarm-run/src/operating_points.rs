@@ -10,15 +10,16 @@ use crate::error::Error;
 /// Poses that one workspace answers one after another.
 const CHUNK: usize = 256;
 
-/// Answers at m poses, each a contiguous array, pose after pose; world axes at the tool point, linear first. Poses without an
-/// equilibrium have NaN everywhere.
+/// Answers at m poses, each a contiguous array, pose after pose; world axes at the tool point,
+/// linear first. Poses without an equilibrium have NaN everywhere.
 #[derive(Clone, Debug, Default)]
 pub struct OperatingPoints {
     /// Place of the tool, m×3 (m).
     pub tcp_m: Vec<f64>,
     /// The same minus that of the rigid twin, m×3 (m).
     pub deflection_m: Vec<f64>,
-    /// Displacement of the tool per wrench on it, drives locked, m×6×6 (m/N, rad/N; m/(N m), rad/(N m)).
+    /// Displacement of the tool per wrench on it, drives locked, m×6×6 (m/N, rad/N; m/(N m), rad/(N
+    /// m)).
     pub compliance: Vec<f64>,
     /// Natural frequencies, ascending, m×n with the n elastic coordinates of the arm (Hz).
     pub frequencies_hz: Vec<f64>,
@@ -68,17 +69,19 @@ struct Rows<'a> {
 }
 
 impl Arm {
-    /// Static equilibrium, compliance and frequencies at each pose under weight and a wrench on the tool, on all cores.
+    /// Static equilibrium, compliance and frequencies at each pose under weight and a wrench on the
+    /// tool, on all cores.
     ///
     /// * `poses`: m×n, the n actuated joints in coordinate order, pose after pose (rad or m).
     /// * `wrench`: force and moment on the tool at its origin, world axes (N, N m).
     ///
-    /// Cost: about 4.9 us of one core a pose with twelve elastic coordinates, where four go side by side. Threads are those of
-    /// `rayon`'s pool.
+    /// Cost: about 4.9 us of one core a pose with twelve elastic coordinates, where four go side by
+    /// side. Threads are those of `rayon`'s pool.
     ///
     /// # Errors
-    /// [`Error::Step`] with [`StepError::Setup`] if the number of values is no multiple of that of the joints, and as
-    /// [`Arm::operating_point`]. A pose without equilibrium is no error, see [`OperatingPoints::failures`].
+    /// [`Error::Step`] with [`StepError::Setup`] if the number of values is no multiple of that of
+    /// the joints, and as [`Arm::operating_point`]. A pose without equilibrium is no error, see
+    /// [`OperatingPoints::failures`].
     pub fn operating_points(&self, poses: &[f64], wrench: &Wrench) -> Result<OperatingPoints, Error> {
         self.operating_points_until(poses, wrench, &|| false)
     }

@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use flexarm_log::RecordingFormat;
 use flexarm_stepping::StepperKind;
 
-/// How links are modelled: what is asked for. What a link then becomes on the tree is a [`flexarm_flexlink::LinkForm`].
+/// How links are modelled: what is asked for. What a link then becomes on the tree is a
+/// [`flexarm_flexlink::LinkForm`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum LinkModel {
     /// As the robot file says.
@@ -21,7 +22,8 @@ pub enum LinkModel {
 }
 
 impl LinkModel {
-    /// What can be asked for: the word of robot files, command line and recordings, and what it means.
+    /// What can be asked for: the word of robot files, command line and recordings, and what it
+    /// means.
     pub const WORDS: [(&'static str, Self, &'static str); 3] = [
         ("rigid", Self::Rigid, "No link bends"),
         ("lumped", Self::Lumped, "Rigid parts with coupled 6x6 springs"),
@@ -80,7 +82,8 @@ pub struct Modelling {
     pub modes: Option<usize>,
 }
 
-/// Choices of a run: how it is stepped, logged and measured. What happens in it is the [`Scenario`](crate::Scenario).
+/// Choices of a run: how it is stepped, logged and measured. What happens in it is the
+/// [`Scenario`](crate::Scenario).
 #[derive(Clone, Debug)]
 pub struct RunOptions {
     /// Time stepper.
@@ -99,9 +102,11 @@ pub struct RunOptions {
     pub settling_band_m: f64,
     /// Factor by which recordings and pictures show deflections; chosen for the run without it.
     pub magnification: Option<f64>,
-    /// When the run begins in recordings whose times have a date (ns since 1970); [`flexarm_log::START_NS`] without it.
+    /// When the run begins in recordings whose times have a date (ns since 1970);
+    /// [`flexarm_log::START_NS`] without it.
     pub start_ns: Option<u64>,
-    /// Put mesh files into the robot description of recordings, instead of where they are on this machine.
+    /// Put mesh files into the robot description of recordings, instead of where they are on this
+    /// machine.
     pub embed_meshes: bool,
 }
 
@@ -138,8 +143,8 @@ pub struct Outputs {
 }
 
 impl Outputs {
-    /// Into a folder, what a run writes without being asked to: every recording that this build can write, but for tables
-    /// that hold what the CSV does; no figures for papers.
+    /// Into a folder, what a run writes without being asked to: every recording that this build can
+    /// write, but for tables that hold what the CSV does; no figures for papers.
     pub fn everything(folder: impl Into<PathBuf>) -> Self {
         let usual = |format: &RecordingFormat| format.info().by_default && format.is_built_in();
         Self {

@@ -26,7 +26,8 @@ pub struct PayloadChange {
 impl PayloadChange {
     /// A payload is picked up.
     ///
-    /// * `at_s`: when (s). `mass`: kg. `com`: `p_LoLcm_L`, its centre of mass in the carrying link L (m).
+    /// * `at_s`: when (s). `mass`: kg. `com`: `p_LoLcm_L`, its centre of mass in the carrying link
+    ///   L (m).
     pub fn attach(at_s: f64, mass: f64, com: Vector3<f64>) -> Self {
         let carried = LinkInertia { mass, com, inertia_com: Matrix3::zeros() };
         Self { at_s, link: None, carried, written: None }
@@ -37,7 +38,8 @@ impl PayloadChange {
         Self::attach(at_s, 0.0, Vector3::zeros())
     }
 
-    /// The same with an inertia about its centre of mass, link axes (kg m²); without one it is a point.
+    /// The same with an inertia about its centre of mass, link axes (kg m²); without one it is a
+    /// point.
     #[must_use]
     pub fn with_inertia(mut self, inertia_com: Matrix3<f64>) -> Self {
         self.carried.inertia_com = inertia_com;
@@ -98,7 +100,8 @@ impl PayloadChange {
     }
 }
 
-/// A body without what it carries at the start; `None` if the robot's own payload rides on another body.
+/// A body without what it carries at the start; `None` if the robot's own payload rides on another
+/// body.
 fn without_payload(robot: &Robot, model: &Model, body: usize) -> Option<SpatialInertia> {
     let inertia = model.bodies()[body].inertia;
     let at_start = robot.rigid.link(PAYLOAD_LINK).and_then(|l| l.inertia);

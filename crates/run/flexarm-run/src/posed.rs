@@ -63,7 +63,8 @@ impl Posed {
         Self::with(Arc::new(robot.modelled(modelling)?), at)
     }
 
-    /// An arm, its links and drives in place already; `at`: all actuated joints (rad or m), zero without it.
+    /// An arm, its links and drives in place already; `at`: all actuated joints (rad or m), zero
+    /// without it.
     pub fn on(arm: &Arm, at: Option<&[f64]>) -> Result<Self, Error> {
         let flexible = arm.flexible().clone();
         let names: Vec<&str> = flexible.rigid.coordinates().iter().map(|c| c.joint.as_str()).collect();
@@ -83,7 +84,8 @@ impl Posed {
         Ok(Self { tool: flexible.tcp.clone(), flexible, arm, joints, prismatic, at, of_robot: None })
     }
 
-    /// What is to be said of the robot and of the equilibrium that it is in, under a wrench on the tool (world axes).
+    /// What is to be said of the robot and of the equilibrium that it is in, under a wrench on the
+    /// tool (world axes).
     pub fn caveats_of(&self, robot: &Robot, linear: &Linear, wrench: &[f64; 6]) -> Vec<Caveat> {
         let mut caveats = told::of_model(robot, &self.flexible, self.of_robot.as_deref());
         caveats.extend(told::at_rest(robot, self, linear, wrench));
@@ -107,7 +109,8 @@ impl Posed {
         caveats
     }
 
-    /// The linear structure about the equilibrium under weight and a wrench at the TCP (world axes).
+    /// The linear structure about the equilibrium under weight and a wrench at the TCP (world
+    /// axes).
     pub fn linear(&self, wrench: &Vector6<f64>) -> Result<Linear, Error> {
         let F = Wrench::new(wrench.fixed_rows::<3>(0).into(), wrench.fixed_rows::<3>(3).into());
         check_wrench(wrench.as_slice())?;
@@ -160,7 +163,8 @@ fn undeformed(arm: &FlexibleArm) -> (Data, State) {
     (Data::new(&arm.model), state)
 }
 
-/// Engineering strain of each flexible link, and how far its far end has turned (rad), with all coordinates at `q`.
+/// Engineering strain of each flexible link, and how far its far end has turned (rad), with all
+/// coordinates at `q`.
 pub(crate) fn strains(flexible: &FlexibleRobot, arm: &FlexibleArm, q: &DVector<f64>) -> Vec<(f64, f64)> {
     let model = &arm.model;
     let (mut data, straight) = undeformed(arm);
@@ -182,14 +186,15 @@ pub(crate) fn strains(flexible: &FlexibleRobot, arm: &FlexibleArm, q: &DVector<f
 }
 
 impl Arm {
-    /// Mass, damping and stiffness about the equilibrium at a pose under weight and a wrench at the tool, and how the tool
-    /// follows the free coordinates.
+    /// Mass, damping and stiffness about the equilibrium at a pose under weight and a wrench at the
+    /// tool, and how the tool follows the free coordinates.
     ///
     /// * `at`: all actuated joints (rad or m), zero without it.
     /// * `wrench`: force and moment on the tool at its origin, world axes (N, N m).
     ///
     /// # Errors
-    /// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] where there is no equilibrium.
+    /// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] where there is no
+    /// equilibrium.
     pub fn linearise(&self, at: Option<&[f64]>, wrench: [f64; 6]) -> Result<Linear, Error> {
         Posed::on(self, at)?.linear(&wrench.into())
     }

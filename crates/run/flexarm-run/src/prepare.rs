@@ -26,7 +26,8 @@ pub(crate) struct Checked {
 }
 
 impl Arm {
-    /// Returns the arm at the start of a scenario, with its loads and payloads, and the caveats of the loads.
+    /// Returns the arm at the start of a scenario, with its loads and payloads, and the caveats of
+    /// the loads.
     ///
     /// # Errors
     /// Everything about the input that can be found before a stepper is made.
@@ -39,8 +40,8 @@ impl Arm {
         loaded(self.robot(), scenario, options, arm)
     }
 
-    /// As [`FlexibleRobot::arm`](crate::FlexibleRobot::arm). The last one is kept for motions that begin at the same joint
-    /// values: modes and damping depend on nothing else of a motion.
+    /// As [`FlexibleRobot::arm`](crate::FlexibleRobot::arm). The last one is kept for motions that
+    /// begin at the same joint values: modes and damping depend on nothing else of a motion.
     fn in_equilibrium(&self, motion: Arc<dyn PrescribedMotion>) -> Result<FlexibleArm, StepError> {
         let n = self.flexible().model.n_actuated();
         let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);

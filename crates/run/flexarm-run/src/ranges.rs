@@ -6,7 +6,8 @@ use flexarm_settings::{OutOfRange, Quantity};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Quantity of a key; of the key in one table alone if that is named before it, as in `payload.mass`.
+/// Quantity of a key; of the key in one table alone if that is named before it, as in
+/// `payload.mass`.
 pub(crate) type Ranges = &'static [(&'static str, Quantity)];
 
 /// Keys of a robot file.
@@ -78,15 +79,16 @@ pub(crate) const OF_LOADS: Ranges = &[
     ("spindle_rpm", Quantity::SPEED),
 ];
 
-/// The first finite number outside of its range, with its place and what is wrong. Numbers of other keys are only not huge.
+/// The first finite number outside of its range, with its place and what is wrong. Numbers of other
+/// keys are only not huge.
 ///
 /// * `text`: of a file that has been read as TOML.
 pub(crate) fn outside(text: &str, ranges: Ranges) -> Option<(Range<usize>, String)> {
     first(text, &|name, number| if number.is_finite() { check(name, number, ranges) } else { Ok(number) })
 }
 
-/// The first number that is not finite, likewise: of keys that say themselves what they expect it is refused before. An effort
-/// limit of `inf` is none.
+/// The first number that is not finite, likewise: of keys that say themselves what they expect it
+/// is refused before. An effort limit of `inf` is none.
 pub(crate) fn not_finite(text: &str) -> Option<(Range<usize>, String)> {
     let unlimited = |name: &str, number: f64| number == f64::INFINITY && name.starts_with("effort_limit.");
     let finite = |name: &str, number: f64| number.is_finite() || unlimited(name, number);

@@ -28,7 +28,8 @@ pub(crate) struct Recordings {
 }
 
 impl Recordings {
-    /// Makes the files. If one cannot be made, none is left, nor is a folder that was made for them.
+    /// Makes the files. If one cannot be made, none is left, nor is a folder that was made for
+    /// them.
     pub(crate) fn begin(&mut self, header: &RunHeader) -> Result<(), Error> {
         self.set.begin(header)?;
         self.folders.keep();
@@ -67,7 +68,8 @@ fn refuse_others(outputs: &Outputs, ours: &[&str]) -> Result<(), Error> {
     }
 }
 
-/// Removes what an earlier run left that this one does not write: beside the new files it would be taken for its own.
+/// Removes what an earlier run left that this one does not write: beside the new files it would be
+/// taken for its own.
 fn remove_leftovers(outputs: &Outputs, ours: &[&str]) -> Result<(), Error> {
     for file in files_of_a_run().filter(|file| !ours.contains(file)) {
         let path = outputs.folder.join(file);
@@ -80,8 +82,8 @@ fn remove_leftovers(outputs: &Outputs, ours: &[&str]) -> Result<(), Error> {
     remove_figures(&outputs.folder.join(FIGURES_FOLDER))
 }
 
-/// Removes the figures of an earlier run, and their folder if nothing else is in it: drawings beside their data of the same name,
-/// and pictures of the arm.
+/// Removes the figures of an earlier run, and their folder if nothing else is in it: drawings
+/// beside their data of the same name, and pictures of the arm.
 fn remove_figures(folder: &Path) -> Result<(), Error> {
     if !folder.symlink_metadata().is_ok_and(|there| there.is_dir()) {
         return Ok(());
@@ -132,8 +134,8 @@ pub(crate) fn recorder(
     format.recorder(path, options).ok_or_else(|| RecordingError::WithoutFormat { format }.into())
 }
 
-/// Recorders for the outputs; refuses to overwrite before anything is made. `in_study`: the recording of the study is being
-/// written too.
+/// Recorders for the outputs; refuses to overwrite before anything is made. `in_study`: the
+/// recording of the study is being written too.
 pub(crate) fn recorders(outputs: Option<&Outputs>, in_study: bool) -> Result<Recordings, Error> {
     let mut recordings =
         Recordings { set: RecorderSet::new(), names: Files::default(), folders: Undo::default(), held: None };
@@ -226,7 +228,8 @@ pub fn link_frames(robot: &Robot, model: &Model) -> Vec<Frame> {
 /// A model that was not chosen for the run.
 const AS_FILED: &str = "as the robot file says";
 
-/// A path for people: without `folder/..` in it. The file system is not asked, so that the answer is the same anywhere.
+/// A path for people: without `folder/..` in it. The file system is not asked, so that the answer
+/// is the same anywhere.
 pub fn straight(path: &Path) -> String {
     let mut parts: Vec<Component<'_>> = Vec::new();
     for part in path.components() {
@@ -348,7 +351,8 @@ pub fn robot_header(robot: &Robot, arm: &FlexibleArm) -> RunHeader {
     if robot.path != robot.urdf_path {
         attachments.extend(read("robot.toml", "application/toml", &robot.path));
     }
-    // The recorder attaches the files of what is drawn; those of collision shapes belong to the robot too.
+    // The recorder attaches the files of what is drawn; those of collision shapes belong to the
+    // robot too.
     let drawn = |path: &Path| {
         robot.urdf.visuals.iter().any(|v| matches!(&v.geometry, Geometry::Mesh { path: Some(p), .. } if p == path))
     };
@@ -359,8 +363,9 @@ pub fn robot_header(robot: &Robot, arm: &FlexibleArm) -> RunHeader {
     RunHeader { urdf: located_urdf(robot, false), meshes: meshes(robot, &header.links), attachments, ..header }
 }
 
-/// The URDF with the meshes that were found, of visual and of collision shapes, as `file://` references: viewers then find
-/// them without being told where the robot's folder is. Or with their contents as `data:` references.
+/// The URDF with the meshes that were found, of visual and of collision shapes, as `file://`
+/// references: viewers then find them without being told where the robot's folder is. Or with their
+/// contents as `data:` references.
 fn located_urdf(robot: &Robot, embed: bool) -> String {
     use base64::Engine as _;
     let mut text = robot.urdf.text.clone();
@@ -405,7 +410,8 @@ fn description(
     text
 }
 
-/// Visuals as triangles in link axes; those that cannot be read are left out (the URDF reader has warned).
+/// Visuals as triangles in link axes; those that cannot be read are left out (the URDF reader has
+/// warned).
 fn meshes(robot: &Robot, links: &[LinkInfo]) -> Vec<LinkMesh> {
     let mut meshes = Vec::new();
     for (i, visual) in robot.urdf.visuals.iter().enumerate() {

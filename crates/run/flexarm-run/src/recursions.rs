@@ -1,7 +1,8 @@
 //! The recursions of a tree on plain numbers: one state, or many, row after row and on all cores.
 //!
-//! For programs that bring arrays of their own. A tree is that of the rigid robot ([`Robot::recursions`]) or of an arm with its
-//! elastic coordinates after the actuated ones ([`Arm::recursions`]). Springs, dampers and friction are none of it.
+//! For programs that bring arrays of their own. A tree is that of the rigid robot
+//! ([`Robot::recursions`]) or of an arm with its elastic coordinates after the actuated ones
+//! ([`Arm::recursions`]). Springs, dampers and friction are none of it.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -97,7 +98,8 @@ impl Recursions {
     /// * `q`, `qdot`, `qddot`: m×n, all coordinates of the tree.
     ///
     /// # Errors
-    /// [`Error::Pose`] if the arrays do not have m rows of n numbers, [`Error::Loop`] where a loop does not close.
+    /// [`Error::Pose`] if the arrays do not have m rows of n numbers, [`Error::Loop`] where a loop
+    /// does not close.
     pub fn inverse_dynamics(&self, q: &[f64], qdot: &[f64], qddot: &[f64], tau: &mut [f64]) -> Result<(), Error> {
         let n = self.model.nv();
         self.rows([q, qdot, qddot], tau, n, |space, [q, qdot, qddot], tau| {

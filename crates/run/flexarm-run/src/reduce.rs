@@ -10,8 +10,8 @@
 //! # Ok::<(), flexarm_run::Error>(())
 //! ```
 //!
-//! Not here: jobs, interfaces, figures and files (`flexarm-linkmaker`). A job may name a robot whose joints are at the
-//! interfaces; that robot is read here.
+//! Not here: jobs, interfaces, figures and files (`flexarm-linkmaker`). A job may name a robot
+//! whose joints are at the interfaces; that robot is read here.
 
 use flexarm_fem::RigidPart;
 use flexarm_flexlink::{SubstitutionError, distal_joint};
@@ -32,7 +32,8 @@ pub struct ReduceOptions {
 
 /// Reduces a mesh to a link and writes the files.
 ///
-/// Everything that can be checked is checked before the work starts; nothing is written if it fails.
+/// Everything that can be checked is checked before the work starts; nothing is written if it
+/// fails.
 ///
 /// # Errors
 /// [`Error`]; several faults of a job come together. See [`Error::fault`].
@@ -50,7 +51,8 @@ pub fn reduce(
 /// The link of a robot with the joints on it, for [`Reduction::finish`].
 ///
 /// # Errors
-/// [`Error::Urdf`]; [`Error::File`] for a link that is not there, and for one whose joint at B is not clear or not there.
+/// [`Error::Urdf`]; [`Error::File`] for a link that is not there, and for one whose joint at B is
+/// not clear or not there.
 pub fn urdf_link(entry: &UrdfEntry, options: &ReadOptions) -> Result<UrdfLink, Error> {
     let mechanism = read_urdf(&entry.file, options)?.mechanism;
     let X_LB = distal_joint(&mechanism, &entry.link, entry.joint.as_deref()).map(|joint| joint.X_PJ);

@@ -1,4 +1,5 @@
-//! Frequency response at a pose, drives locked or shaken: what the TCP does per newton on it or per radian of a joint.
+//! Frequency response at a pose, drives locked or shaken: what the TCP does per newton on it or per
+//! radian of a joint.
 
 use std::path::PathBuf;
 
@@ -120,7 +121,8 @@ pub struct ResponseCurve {
     pub peaks: Vec<PeakFigures>,
     /// Amplitude of the output per amplitude of the input, one per frequency.
     pub magnitude: Vec<f64>,
-    /// How far the output is ahead of the input (rad), one per frequency; steps of more than half a turn are taken out.
+    /// How far the output is ahead of the input (rad), one per frequency; steps of more than half a
+    /// turn are taken out.
     pub phase_rad: Vec<f64>,
 }
 
@@ -163,13 +165,14 @@ struct Channel {
     joint: bool,
 }
 
-/// Frequency response of the flexible robot at a pose, about its equilibrium under weight, other drives locked.
+/// Frequency response of the flexible robot at a pose, about its equilibrium under weight, other
+/// drives locked.
 ///
 /// `at`: all actuated joints (rad or m), zero without it.
 ///
 /// # Errors
-/// [`Error::Channel`] and [`Error::Value`] for words and numbers that make no sense, [`Error::Step`] where there is no equilibrium,
-/// [`Error::File`] and [`Error::Write`] for files.
+/// [`Error::Channel`] and [`Error::Value`] for words and numbers that make no sense,
+/// [`Error::Step`] where there is no equilibrium, [`Error::File`] and [`Error::Write`] for files.
 pub fn response(
     robot: &Robot,
     modelling: &Modelling,
@@ -339,7 +342,8 @@ fn once(channels: Vec<Channel>, side: &'static str) -> Result<Vec<Channel>, Erro
     Ok(channels)
 }
 
-/// A wrench acts by `Jᵀ`; a joint by the inertia and weight that it moves, and moves the tool directly.
+/// A wrench acts by `Jᵀ`; a joint by the inertia and weight that it moves, and moves the tool
+/// directly.
 fn system(linear: &Linear, inputs: &[Channel], outputs: &[Channel]) -> LinearSystem {
     let n = linear.M.nrows();
     let J = tool_map(linear);
@@ -421,7 +425,8 @@ pub fn readable_unit(unit: &str) -> (String, f64) {
     (format!("µ{of}/{per}").replace("s2", "s²").replace("Nm", "N m"), 1e6)
 }
 
-/// Magnitude over frequency, a panel per unit, and phase of all curves below; the natural frequencies marked.
+/// Magnitude over frequency, a panel per unit, and phase of all curves below; the natural
+/// frequencies marked.
 fn plot(response: &Response) -> Result<String, PlotError> {
     // What moves in the direction of its force has the colour of that axis.
     let look = |c: &ResponseCurve| {

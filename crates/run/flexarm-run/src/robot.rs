@@ -1,4 +1,5 @@
-//! A robot as loaded: URDF, payload, tool centre point and flexible links, ready to make models from.
+//! A robot as loaded: URDF, payload, tool centre point and flexible links, ready to make models
+//! from.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -47,7 +48,8 @@ pub struct Robot {
     pub name: String,
     /// The file that was loaded.
     pub path: PathBuf,
-    /// The description as it was read. Models are made of [`Self::rigid`], which has TCP, payload and rotors besides.
+    /// The description as it was read. Models are made of [`Self::rigid`], which has TCP, payload
+    /// and rotors besides.
     pub urdf: UrdfRobot,
     /// Path of the URDF.
     pub urdf_path: PathBuf,
@@ -96,8 +98,9 @@ impl Robot {
         Self::load_modelled(path, options).map(|(robot, _)| robot)
     }
 
-    /// As [`Robot::load_with`], with its links and drives modelled as the file says ([`Robot::flexible_robot`]): to check a robot is
-    /// to do that, and [`Arm::new`](crate::Arm::new) takes its result.
+    /// As [`Robot::load_with`], with its links and drives modelled as the file says
+    /// ([`Robot::flexible_robot`]): to check a robot is to do that, and
+    /// [`Arm::new`](crate::Arm::new) takes its result.
     ///
     /// # Errors
     /// As [`Robot::load`].
@@ -158,9 +161,11 @@ impl Robot {
         Self::of_text(path, text, options, &FileCache::default())
     }
 
-    /// As [`Robot::from_toml`], with the text of the URDF or xacro besides: nothing of both need be a file.
+    /// As [`Robot::from_toml`], with the text of the URDF or xacro besides: nothing of both need be
+    /// a file.
     ///
-    /// The `urdf` of the robot file is then the name that messages give it, and meshes are looked for from its place.
+    /// The `urdf` of the robot file is then the name that messages give it, and meshes are looked
+    /// for from its place.
     ///
     /// # Errors
     /// As [`Robot::load`].
@@ -213,8 +218,8 @@ impl Robot {
         }
     }
 
-    /// Returns what the text of a robot file at `path` makes of a description that is read already, with its links and drives
-    /// modelled as the file says.
+    /// Returns what the text of a robot file at `path` makes of a description that is read already,
+    /// with its links and drives modelled as the file says.
     ///
     /// # Errors
     /// As [`Robot::load`].
@@ -327,7 +332,8 @@ impl Robot {
         self.rigid.joints.push(Joint::new("__tcp_joint", JointKind::Fixed, link, TCP_FRAME, X_LT));
         self.rigid.links.push(Link { name: TCP_FRAME.into(), inertia: None });
         self.warnings.extend(self.urdf.warnings_only().map(told));
-        // Faults that only show in the whole are put to the last flexible link: that is where a second entry stands.
+        // Faults that only show in the whole are put to the last flexible link: that is where a
+        // second entry stands.
         let last_flexible = file.and_then(|(f, s)| {
             let mounting = f.mounting.as_ref().map(Spanned::span);
             f.flexible_link.last().map(|e| e.link.span()).or(mounting).map(|span| (s, span))
@@ -350,7 +356,8 @@ impl Robot {
         }
     }
 
-    /// Gives a link that is a beam the mass that its entry says, with the centre and the radii of gyration that it has.
+    /// Gives a link that is a beam the mass that its entry says, with the centre and the radii of
+    /// gyration that it has.
     fn reweigh(&mut self, entry: &FlexibleLinkEntry, source: &Source) -> Result<(), RobotFileError> {
         let (Some(mass), name) = (&entry.mass, entry.link.get_ref()) else { return Ok(()) };
         let fail = |message: String| source.error(mass.span(), format!("link {name:?}: {message}"));
@@ -376,7 +383,8 @@ impl Robot {
         }
     }
 
-    /// Hangs the payload on its link, else on the file's TCP link, whatever other frame the user looks at.
+    /// Hangs the payload on its link, else on the file's TCP link, whatever other frame the user
+    /// looks at.
     fn add_payload(&mut self, entry: &Spanned<PayloadEntry>, tcp_link: &str, source: &Source) -> Result<(), Error> {
         let payload = entry.get_ref();
         let com = payload.com.unwrap_or_default();
@@ -409,7 +417,8 @@ impl Robot {
             let message = "payload inertia has a negative principal moment; the order is ixx iyy izz ixy ixz iyz";
             return Err(source.error(entry.span(), message).into());
         }
-        // Its frame is at its centre of mass: a cut through the link then leaves it on the side where it is.
+        // Its frame is at its centre of mass: a cut through the link then leaves it on the side
+        // where it is.
         let inertia = LinkInertia { mass, com: Vector3::zeros(), inertia_com };
         self.rigid.links.push(Link { name: PAYLOAD_LINK.into(), inertia: Some(inertia) });
         let joint = Joint::new("__payload_joint", JointKind::Fixed, link, PAYLOAD_LINK, pose(com, [0.0; 3]));
@@ -422,12 +431,14 @@ impl Robot {
         (&self.tcp.0, &self.tcp.1)
     }
 
-    /// The robot with another tool centre point; the payload stays where it is. Arms made of the robot before keep theirs.
+    /// The robot with another tool centre point; the payload stays where it is. Arms made of the
+    /// robot before keep theirs.
     ///
     /// * `link`: of the robot; `X_LT`: pose of the point in its axes (m).
     ///
     /// # Errors
-    /// [`Error::UnknownTcp`] for a link that is not there, [`Error::Value`] for a pose that is no numbers.
+    /// [`Error::UnknownTcp`] for a link that is not there, [`Error::Value`] for a pose that is no
+    /// numbers.
     pub fn with_tcp(mut self, link: &str, X_LT: Pose) -> Result<Self, Error> {
         let known = || self.rigid.links.iter().map(|l| l.name.clone()).filter(|name| !name.starts_with("__")).collect();
         if link.starts_with("__") || self.rigid.link(link).is_none() {
@@ -500,7 +511,8 @@ pub fn tcp_frame(model: &Model) -> Frame {
     model.frame(TCP_FRAME).expect("added when the robot was loaded").clone()
 }
 
-/// Angles as they were written, and materials that nothing uses: only the text of the file shows them.
+/// Angles as they were written, and materials that nothing uses: only the text of the file shows
+/// them.
 fn written_caveats(file: &RobotFile) -> Vec<Caveat> {
     let rpy = file.tcp.as_ref().and_then(|tcp| caveat::parts::angles("rpy of the TCP", &tcp.get_ref().rpy));
     let beams = file.flexible_link.iter().filter_map(|link| {

@@ -1,4 +1,5 @@
-//! The robot file `robot.toml`: what it may say, read into plain structs. [`crate::Robot`] makes sense of it.
+//! The robot file `robot.toml`: what it may say, read into plain structs. [`crate::Robot`] makes
+//! sense of it.
 //!
 //! Unknown keys are refused, so that a misspelt one is never ignored. Units are SI; angles in rad.
 
@@ -131,9 +132,11 @@ pub(crate) struct FlexibleLinkEntry {
     pub model: Option<Spanned<String>>,
     /// Number of rigid parts of a lumped link; 2 if not given.
     pub segments: Option<Spanned<i64>>,
-    /// Number of fixed-interface modes of a modal link, beside those of its interfaces; all that the .flex file has, 6 of a beam.
+    /// Number of fixed-interface modes of a modal link, beside those of its interfaces; all that
+    /// the .flex file has, 6 of a beam.
     pub modes: Option<Spanned<i64>>,
-    /// Modal: use the link's own modes with A held instead of interface displacements, only as many as given.
+    /// Modal: use the link's own modes with A held instead of interface displacements, only as many
+    /// as given.
     pub eigenmodes: Option<Spanned<i64>>,
     /// Modal: let loads change the stiffness; false if not given.
     pub geometric_stiffening: Option<Spanned<bool>>,
@@ -141,7 +144,8 @@ pub(crate) struct FlexibleLinkEntry {
     pub mass: Option<Spanned<f64>>,
     /// Factor on its stiffness, as measurements told; 1 if not given.
     pub stiffness_factor: Option<Spanned<f64>>,
-    /// Stiffness of the spring between its two parts in the place of its source's, lumped links; 6x6, N/m, N, N m/rad.
+    /// Stiffness of the spring between its two parts in the place of its source's, lumped links;
+    /// 6x6, N/m, N, N m/rad.
     pub stiffness: Option<Spanned<Vec<Vec<f64>>>>,
     /// Factors on the six directions of its springs beside that, lumped links; 1 if not given.
     pub stiffness_factors: Option<Spanned<Vec<f64>>>,

@@ -1,8 +1,10 @@
-//! What happens to an arm in a run: where its joints go, what pulls at it, what it picks up and puts down, how it starts.
+//! What happens to an arm in a run: where its joints go, what pulls at it, what it picks up and
+//! puts down, how it starts.
 //!
-//! A scenario is a value and knows no arm: the same one is run with many, and one arm, which does not change, takes many.
-//! A file of loads fills the same values that a program makes, so that both are checked and act in one way
-//! ([`Scenario::acting_on`]). Not here: how a run is stepped and recorded ([`crate::RunOptions`]).
+//! A scenario is a value and knows no arm: the same one is run with many, and one arm, which does
+//! not change, takes many. A file of loads fills the same values that a program makes, so that both
+//! are checked and act in one way ([`Scenario::acting_on`]). Not here: how a run is stepped and
+//! recorded ([`crate::RunOptions`]).
 
 use std::path::{Path, PathBuf};
 
@@ -20,8 +22,8 @@ use crate::robot::Robot;
 
 /// Motion, loads, changes of payload and start of a run.
 ///
-/// A value that knows no arm: the same scenario is run with many arms, and an arm takes many. A file of loads fills the same
-/// values as a program.
+/// A value that knows no arm: the same scenario is run with many arms, and an arm takes many. A
+/// file of loads fills the same values as a program.
 ///
 /// ```no_run
 /// use flexarm_run::{AppliedLoad, Modelling, Motion, PayloadChange, Robot, RunOptions, Scenario, Wrench};
@@ -58,11 +60,12 @@ impl Scenario {
 
     /// The same with the loads and payloads of a file besides; `docs/loads.md` describes it.
     ///
-    /// What has no end in the file ends with the motion. Whether its frames and links are there shows on a robot.
+    /// What has no end in the file ends with the motion. Whether its frames and links are there
+    /// shows on a robot.
     ///
     /// # Errors
-    /// [`Error::File`] if it cannot be read, [`Error::RobotFile`] with line and column for what is not the format, and for
-    /// numbers and expressions that make no load.
+    /// [`Error::File`] if it cannot be read, [`Error::RobotFile`] with line and column for what is
+    /// not the format, and for numbers and expressions that make no load.
     pub fn with_loads_file(mut self, path: impl AsRef<Path>) -> Result<Self, Error> {
         let (loads, payloads) = read_loads(path.as_ref(), self.duration_s())?;
         self.loads.extend(loads);
@@ -99,9 +102,9 @@ impl Scenario {
     /// What acts on a model of the robot.
     ///
     /// # Errors
-    /// [`Error::Load`], or [`Error::RobotFile`] with the place if the value was read from a file: a load on a frame, or a
-    /// payload on a link, that the model does not move; a payload whose link bends, without a mass or with an inertia that
-    /// no body has; payloads on two bodies.
+    /// [`Error::Load`], or [`Error::RobotFile`] with the place if the value was read from a file: a
+    /// load on a frame, or a payload on a link, that the model does not move; a payload whose link
+    /// bends, without a mass or with an inertia that no body has; payloads on two bodies.
     pub fn acting_on(&self, robot: &Robot, model: &Model) -> Result<Disturbances, Error> {
         let duration = self.duration_s();
         let mut acting = Disturbances::default();

@@ -1,4 +1,5 @@
-//! Gains of servos that a robot file leaves out: such as fit the inertia at the start, and how they follow it.
+//! Gains of servos that a robot file leaves out: such as fit the inertia at the start, and how they
+//! follow it.
 
 use flexarm_kinematics::{Data, Model, mass_matrix};
 use flexarm_stepping::{AxisSlope, ServoAxis};
@@ -7,10 +8,11 @@ use nalgebra::DVector;
 use crate::drive_entry::ServoEntry;
 use crate::flexible::FlexibleRobot;
 
-/// Default gain of the position loop (1/s), bandwidth of the speed loop (1/s), integral over speed gain (1/s), sample (s).
+/// Default gain of the position loop (1/s), bandwidth of the speed loop (1/s), integral over speed
+/// gain (1/s), sample (s).
 const SERVO: [f64; 4] = [20.0, 100.0, 20.0, 1e-3];
-/// Most of the quick inertia over the sampling time that a default velocity gain takes: 2 is where a sampled speed loop
-/// becomes unstable.
+/// Most of the quick inertia over the sampling time that a default velocity gain takes: 2 is where
+/// a sampled speed loop becomes unstable.
 const QUICK_GAIN: f64 = 0.4;
 
 /// Inertia that a joint under a servo feels (kg m² or kg).
@@ -22,7 +24,8 @@ pub(crate) struct Felt {
 }
 
 impl Felt {
-    /// Gains of position, speed and integral: as given, else such as fit. Which of two rules limits them is decided at `rule`.
+    /// Gains of position, speed and integral: as given, else such as fit. Which of two rules limits
+    /// them is decided at `rule`.
     fn gains(&self, servo: &ServoEntry, sample_s: f64, rule: &Felt) -> [f64; 3] {
         let [position, bandwidth, integral, _] = SERVO;
         // Between samples a motor feels only what follows it at once: the springs give way first.
@@ -46,7 +49,8 @@ impl FlexibleRobot {
         self.torque.iter().find_map(|(_, servo, _)| servo.sample_s).unwrap_or(SERVO[3])
     }
 
-    /// Inertia of the rigid robot that each joint under a servo moves with the joints at `q`, and what it feels at once.
+    /// Inertia of the rigid robot that each joint under a servo moves with the joints at `q`, and
+    /// what it feels at once.
     pub(crate) fn inertias_felt(&self, model: &Model, rigid: &Model, q: &DVector<f64>) -> Vec<Felt> {
         let M = mass_matrix(rigid, &mut Data::new(rigid), q).clone();
         let felt = |((k, ..), quick): (&(usize, ServoEntry, f64), f64)| Felt { inertia: M[(*k, *k)], quick };
@@ -65,8 +69,9 @@ impl FlexibleRobot {
         self.torque.iter().zip(felt).map(axis).collect()
     }
 
-    /// How gains that are not given follow a change of the robot: `at` gives the tree, the rigid robot's, and the joints' places where the
-    /// motion begins, so many times changed; about no change, per unit. None where they do not.
+    /// How gains that are not given follow a change of the robot: `at` gives the tree, the rigid
+    /// robot's, and the joints' places where the motion begins, so many times changed; about no
+    /// change, per unit. None where they do not.
     ///
     /// * `step`: a change that is small.
     pub fn gain_slopes(&self, step: f64, at: impl Fn(f64) -> (Model, Model, DVector<f64>)) -> Vec<(usize, AxisSlope)> {

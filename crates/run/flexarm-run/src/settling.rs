@@ -1,4 +1,5 @@
-//! When the tool has settled, in words: the stop that takes longest counts, and one that does not settle is the news.
+//! When the tool has settled, in words: the stop that takes longest counts, and one that does not
+//! settle is the news.
 
 use crate::summary::TcpFigures;
 
@@ -57,7 +58,8 @@ impl Settling {
         }
     }
 
-    /// What is to be said beside the time, or in its place; `band` such as "within 0.1 mm" or empty.
+    /// What is to be said beside the time, or in its place; `band` such as "within 0.1 mm" or
+    /// empty.
     pub fn note(&self, band: &str) -> String {
         let band = if band.is_empty() { String::new() } else { format!(", {band}") };
         match self {

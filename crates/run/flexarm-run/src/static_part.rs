@@ -1,7 +1,9 @@
-//! The static part of the TCP error: how far the tool would be off if the arm stood still wherever its motion is.
+//! The static part of the TCP error: how far the tool would be off if the arm stood still wherever
+//! its motion is.
 //!
-//! Drives at their commanded places, springs in balance with weight and with the loads of the instant, no inertia force. The
-//! curve is smooth between the instants at which something jumps: it is computed on a grid and interpolated by cubics.
+//! Drives at their commanded places, springs in balance with weight and with the loads of the
+//! instant, no inertia force. The curve is smooth between the instants at which something jumps: it
+//! is computed on a grid and interpolated by cubics.
 
 use std::sync::Arc;
 
@@ -9,7 +11,8 @@ use flexarm_kinematics::Frame;
 use flexarm_stepping::{FlexibleArm, StaticPath};
 use nalgebra::Vector3;
 
-/// Time between two equilibria along a motion (s): a cubic through four of them is good to a thousandth of a millimetre.
+/// Time between two equilibria along a motion (s): a cubic through four of them is good to a
+/// thousandth of a millimetre.
 const GRID_S: f64 = 0.02;
 /// Equilibria per shortest period of a load.
 const PER_PERIOD: f64 = 16.0;
@@ -67,8 +70,8 @@ impl StaticPart {
         }
     }
 
-    /// Displacement of the tool at `t` (m, world axes), not before the last time asked for; `None` where the arm has no
-    /// equilibrium.
+    /// Displacement of the tool at `t` (m, world axes), not before the last time asked for; `None`
+    /// where the arm has no equilibrium.
     pub(crate) fn at(&mut self, t: f64) -> Option<[f64; 3]> {
         while !self.failed && (self.block.values.is_empty() || t >= self.block.end) {
             let start = self.block.end;

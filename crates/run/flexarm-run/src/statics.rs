@@ -38,11 +38,13 @@ pub struct Statics {
     pub sag_m: [f64; 3],
     /// The same as a rotation vector (rad).
     pub sag_rad: [f64; 3],
-    /// Displacement of the TCP per wrench at the equilibrium, drives locked, 6×6 (m/N, rad/N; m/(N m), rad/(N m)).
+    /// Displacement of the TCP per wrench at the equilibrium, drives locked, 6×6 (m/N, rad/N; m/(N
+    /// m), rad/(N m)).
     pub compliance: Vec<Vec<f64>>,
     /// Forces with which the drives hold the pose (N m or N).
     pub holding_torque: Vec<f64>,
-    /// Of motors that move several joints, behind their gears: `Cᵀ` times the holding torques of these (N m or N).
+    /// Of motors that move several joints, behind their gears: `Cᵀ` times the holding torques of
+    /// these (N m or N).
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub motor_torque: BTreeMap<String, f64>,
     /// Flexible elements.
@@ -74,9 +76,11 @@ pub struct ElementStatics {
     pub energy_j: f64,
 }
 
-/// Equilibrium of the flexible robot at a pose under its weight and a wrench at the TCP, drives locked.
+/// Equilibrium of the flexible robot at a pose under its weight and a wrench at the TCP, drives
+/// locked.
 ///
-/// `at`: all actuated joints (rad or m), zero without it; `wrench` in world axes, constant while the arm yields.
+/// `at`: all actuated joints (rad or m), zero without it; `wrench` in world axes, constant while
+/// the arm yields.
 ///
 /// # Errors
 /// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] where there is no equilibrium.
@@ -84,7 +88,8 @@ pub fn statics(robot: &Robot, modelling: &Modelling, at: Option<&[f64]>, wrench:
     statics_of(robot, modelling, at, wrench, None)
 }
 
-/// As [`statics()`], and writes the answer and a picture of the arm, its deflections magnified beside the rigid arm.
+/// As [`statics()`], and writes the answer and a picture of the arm, its deflections magnified
+/// beside the rigid arm.
 ///
 /// # Errors
 /// As [`statics()`]; [`Error::File`] and [`Error::Write`] for files.

@@ -1,4 +1,5 @@
-//! Statics as files: the arm at its equilibrium beside the rigid one, with the compliance of its tool, and the figures.
+//! Statics as files: the arm at its equilibrium beside the rigid one, with the compliance of its
+//! tool, and the figures.
 
 use std::path::PathBuf;
 

@@ -1,5 +1,5 @@
-//! Settings of a stepper in a summary: keys and values as its entry in the registry tells them, so that a summary knows no
-//! stepper.
+//! Settings of a stepper in a summary: keys and values as its entry in the registry tells them, so
+//! that a summary knows no stepper.
 
 use std::fmt;
 
@@ -8,7 +8,8 @@ use serde::de::{IgnoredAny, MapAccess, Visitor};
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// Settings under their keys, in the order of the registry. In JSON they are keys of the object around them.
+/// Settings under their keys, in the order of the registry. In JSON they are keys of the object
+/// around them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StepperSettings(pub Vec<(String, SettingValue)>);
 
@@ -138,7 +139,8 @@ mod tests {
         }
     }
 
-    /// A summary of every stepper is read back as it was written; what a later version says besides is passed over.
+    /// A summary of every stepper is read back as it was written; what a later version says besides
+    /// is passed over.
     #[test]
     fn summaries_of_every_stepper_are_read_back() {
         for entry in flexarm_stepping::STEPPERS {

@@ -1,4 +1,5 @@
-//! Several runs compared: robots, link models, steppers or trajectories side by side, in one recording and one report.
+//! Several runs compared: robots, link models, steppers or trajectories side by side, in one
+//! recording and one report.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -31,12 +32,13 @@ pub struct Variant {
 
 /// Runs all variants, the first being the one the others are compared with.
 ///
-/// The first run's files are those of [`Arm::simulate_with`](crate::Arm::simulate_with); each of the others has a folder of its own below. All together
-/// are in `study.rrd` and in the report. The answer is the first run's summary with the others in
-/// [`Summary::with`].
+/// The first run's files are those of [`Arm::simulate_with`](crate::Arm::simulate_with); each of
+/// the others has a folder of its own below. All together are in `study.rrd` and in the report. The
+/// answer is the first run's summary with the others in [`Summary::with`].
 ///
 /// # Errors
-/// As [`Arm::simulate_with`](crate::Arm::simulate_with), with the label of the run that failed; [`Error::Study`] for labels that are not distinct.
+/// As [`Arm::simulate_with`](crate::Arm::simulate_with), with the label of the run that failed;
+/// [`Error::Study`] for labels that are not distinct.
 pub fn compare_study(
     variants: &[Variant],
     outputs: Option<&Outputs>,
@@ -134,19 +136,19 @@ fn folders(variants: &[Variant]) -> Result<Vec<String>, StudyError> {
     Ok(names)
 }
 
-/// Whether two runs are of one robot: of one name and with the same joints, or with their rigid tools in the same places.
-/// Differences between other runs say nothing.
+/// Whether two runs are of one robot: of one name and with the same joints, or with their rigid
+/// tools in the same places. Differences between other runs say nothing.
 pub(crate) fn of_one_robot(first: &Trace, other: &Trace) -> bool {
     let (a, b) = (&first.header, &other.header);
     let one_name = a.robot == b.robot || a.robot.is_empty() || b.robot.is_empty();
     (one_name && a.joints == b.joints) || on_one_motion(first, other)
 }
 
-/// How far the tool of a run is from that of the first, at the first's times; `None` for motions of other lengths and for
-/// other robots.
+/// How far the tool of a run is from that of the first, at the first's times; `None` for motions of
+/// other lengths and for other robots.
 ///
-/// On one motion the places of the rigid tools are the same, so the errors are compared: they are small, and so is what is
-/// lost between the samples. Otherwise the places are.
+/// On one motion the places of the rigid tools are the same, so the errors are compared: they are
+/// small, and so is what is lost between the samples. Otherwise the places are.
 pub(crate) fn difference(first: &Trace, other: &Trace) -> Option<DifferenceFigures> {
     if !of_one_robot(first, other) {
         return None;
@@ -208,10 +210,12 @@ fn on_one_motion(first: &Trace, other: &Trace) -> bool {
 
 /// Times nearer than this are one (s).
 const SAME_TIME: f64 = 1e-10;
-/// Places nearer than this are one (m): those of rigid tools that differ by rounding, and by the time of a sample.
+/// Places nearer than this are one (m): those of rigid tools that differ by rounding, and by the
+/// time of a sample.
 const SAME_PLACE: f64 = 1e-9;
 
-/// Values at `t` between the samples k and k + 1: a cubic with the slopes of the chords across their neighbours.
+/// Values at `t` between the samples k and k + 1: a cubic with the slopes of the chords across
+/// their neighbours.
 fn between(rows: &[TraceRow], values: &[[f64; 3]], k: usize, t: f64) -> [f64; 3] {
     let last = rows.len() - 1;
     let next = (k + 1).min(last);
@@ -233,7 +237,8 @@ fn between(rows: &[TraceRow], values: &[[f64; 3]], k: usize, t: f64) -> [f64; 3]
     })
 }
 
-/// The runs of a study side by side: a header, then a row for each run. Empty for a run that is alone.
+/// The runs of a study side by side: a header, then a row for each run. Empty for a run that is
+/// alone.
 pub fn study_rows(summary: &Summary) -> Vec<Vec<String>> {
     if summary.with.is_empty() {
         return Vec::new();

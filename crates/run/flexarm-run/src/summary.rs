@@ -16,7 +16,8 @@ use crate::stepper_settings::StepperSettings;
 
 /// Answer of `flexarm compare` and `flexarm run`. SI units.
 ///
-/// `summary.json` is read back by `serde_json`; keys that a file of an older version lacks are their defaults.
+/// `summary.json` is read back by `serde_json`; keys that a file of an older version lacks are
+/// their defaults.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Summary {
@@ -60,7 +61,8 @@ pub struct Summary {
     pub energy: EnergyFigures,
     /// Largest force per drive (N m or N).
     pub drives: BTreeMap<String, f64>,
-    /// Largest torque per motor that moves several joints, behind its gear (N m or N), by the joint of its drive.
+    /// Largest torque per motor that moves several joints, behind its gear (N m or N), by the joint
+    /// of its drive.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub motors: BTreeMap<String, f64>,
     /// What [`Summary::caveats`] warn of, as sentences.
@@ -80,11 +82,12 @@ pub struct Summary {
     pub with: Vec<Summary>,
     /// Beginning and end of each move (s).
     pub moves_s: Vec<[f64; 2]>,
-    /// Largest size of the TCP error in each of [`CURVE_PIECES`] equal pieces of the run (m), for the terminal.
+    /// Largest size of the TCP error in each of [`CURVE_PIECES`] equal pieces of the run (m), for
+    /// the terminal.
     #[serde(skip)]
     pub error_curve: Vec<f64>,
-    /// Computed from curves alone: nothing is known of energies, forces, frequencies, the stepper's work and the end of the
-    /// run, and of moves only what [`Summary::moves_s`] says.
+    /// Computed from curves alone: nothing is known of energies, forces, frequencies, the stepper's
+    /// work and the end of the run, and of moves only what [`Summary::moves_s`] says.
     #[serde(skip)]
     pub computed: bool,
 }
@@ -111,11 +114,13 @@ pub struct Files {
     pub plotjuggler_layout: Option<String>,
 }
 
-/// Names of the recordings of a run, by format. In JSON a key for each: the ending of the format's files.
+/// Names of the recordings of a run, by format. In JSON a key for each: the ending of the format's
+/// files.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RecordingFiles(BTreeMap<RecordingFormat, String>);
 
-/// Formats whose key is in every summary, null where none was written; others are there where they were written.
+/// Formats whose key is in every summary, null where none was written; others are there where they
+/// were written.
 const ALWAYS_TOLD: [RecordingFormat; 4] =
     [RecordingFormat::Mcap, RecordingFormat::Rrd, RecordingFormat::Csv, RecordingFormat::Parquet];
 
@@ -162,8 +167,8 @@ pub struct StepperFigures {
     pub name: String,
     /// Step (s).
     pub h_s: f64,
-    /// Settings of its own, each under its key: `rho_inf`, `dispersion_correction` (generalised-alpha), `form`, `preset`
-    /// (SPOOK), `rtol`, `method` (reference).
+    /// Settings of its own, each under its key: `rho_inf`, `dispersion_correction`
+    /// (generalised-alpha), `form`, `preset` (SPOOK), `rtol`, `method` (reference).
     #[serde(flatten)]
     pub settings: StepperSettings,
     /// Steps taken.
@@ -209,11 +214,13 @@ pub struct DriveFigures {
     pub peak_deflection_rad: f64,
 }
 
-/// Energy over the run, from the logged samples (trapezoidal rule: a low log rate shows as imbalance).
+/// Energy over the run, from the logged samples (trapezoidal rule: a low log rate shows as
+/// imbalance).
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct EnergyFigures {
-    /// Net work of the drives: [`EnergyFigures::drives_positive_j`] without [`EnergyFigures::drives_negative_j`] (J).
+    /// Net work of the drives: [`EnergyFigures::drives_positive_j`] without
+    /// [`EnergyFigures::drives_negative_j`] (J).
     pub drives_j: f64,
     /// What the drives put in, each by itself while its power is positive (J).
     pub drives_positive_j: f64,
@@ -266,10 +273,12 @@ pub struct TcpFigures {
     pub end_m: f64,
     /// Distance at rest at the start (m).
     pub static_sag_m: f64,
-    /// Part of `peak_m` that the arm would have standing still there, under weight and the loads of the instant, along the
-    /// direction of the error (m); null where the arm has no equilibrium on its way.
+    /// Part of `peak_m` that the arm would have standing still there, under weight and the loads of
+    /// the instant, along the direction of the error (m); null where the arm has no equilibrium on
+    /// its way.
     pub static_at_peak_m: Option<f64>,
-    /// The rest of `peak_m`, from inertia and ringing (m); negative where the motion relieves the arm.
+    /// The rest of `peak_m`, from inertia and ringing (m); negative where the motion relieves the
+    /// arm.
     pub dynamic_at_peak_m: Option<f64>,
     /// Largest static part (m).
     pub static_peak_m: Option<f64>,
@@ -285,8 +294,8 @@ pub struct TcpFigures {
     pub peak_rad: f64,
     /// Root mean square of the angle (rad).
     pub rms_rad: f64,
-    /// Time from the end of a move until the error stays within the band of its final value (s), at the stop that takes
-    /// longest; null if the tool does not settle at some stop.
+    /// Time from the end of a move until the error stays within the band of its final value (s), at
+    /// the stop that takes longest; null if the tool does not settle at some stop.
     pub settling_s: Option<f64>,
     /// The same in words: after which time, or at which stops the tool has not settled.
     pub settling: String,
@@ -298,7 +307,8 @@ pub struct TcpFigures {
     pub dominant_hz: Option<f64>,
     /// Largest components along, across and out of the path (m).
     pub path_peak_m: [f64; 3],
-    /// Largest distance from the path while the robot moves (m): across and out of the path together.
+    /// Largest distance from the path while the robot moves (m): across and out of the path
+    /// together.
     pub path_accuracy_m: f64,
     /// Root mean square of that distance over the moves (m).
     pub path_rms_m: f64,
@@ -339,7 +349,8 @@ pub struct HoldFigures {
     pub end_s: f64,
     /// Distance at which the tool comes to rest (m).
     pub final_m: f64,
-    /// Time from the beginning of the stop until the error stays within the band of its final value (s).
+    /// Time from the beginning of the stop until the error stays within the band of its final value
+    /// (s).
     pub settling_s: Option<f64>,
     /// Largest excursion past the final value (m).
     pub overshoot_m: f64,

@@ -1,4 +1,5 @@
-//! Our own TOML files: each begins with `format = 1`, and what is wrong in it is told with its place.
+//! Our own TOML files: each begins with `format = 1`, and what is wrong in it is told with its
+//! place.
 
 use flexarm_files::Source;
 use serde::de::DeserializeOwned;

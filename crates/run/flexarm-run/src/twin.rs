@@ -20,9 +20,11 @@ pub(crate) struct RigidTwin {
     pub(crate) velocity: Vector3<f64>,
     /// Acceleration of the TCP (m/s²).
     pub(crate) acceleration: Vector3<f64>,
-    /// What stands where, and how it moves, in [`Self::data`] and [`Self::J`]; `None` where other functions were there last.
+    /// What stands where, and how it moves, in [`Self::data`] and [`Self::J`]; `None` where other
+    /// functions were there last.
     placed: Option<(Arc<Model>, State)>,
-    /// All comes from it, if the tree is for it, with the inertias of this model; made at the first look.
+    /// All comes from it, if the tree is for it, with the inertias of this model; made at the first
+    /// look.
     observer: Option<(Arc<Model>, Option<Lent<Observer>>)>,
 }
 
@@ -41,7 +43,8 @@ impl RigidTwin {
         }
     }
 
-    /// Velocity and acceleration of the TCP at time t; zero, and nothing computed, while all joints stand still.
+    /// Velocity and acceleration of the TCP at time t; zero, and nothing computed, while all joints
+    /// stand still.
     pub(crate) fn rates(&mut self, arm: &FlexibleArm, tcp: &Frame, t: f64) -> [Vector3<f64>; 2] {
         arm.prescribed_state(t, &mut self.state, &mut self.qddot);
         if self.state.qdot.iter().all(|rate| *rate == 0.0) {
@@ -51,8 +54,8 @@ impl RigidTwin {
         [self.velocity, self.acceleration]
     }
 
-    /// Where everything is and how it moves at time t, by the sums of [`RigidTwin::update`]; neither forces nor acceleration.
-    /// While the joints rest it is what it was.
+    /// Where everything is and how it moves at time t, by the sums of [`RigidTwin::update`];
+    /// neither forces nor acceleration. While the joints rest it is what it was.
     pub(crate) fn place(&mut self, arm: &FlexibleArm, tcp: &Frame, t: f64) {
         arm.prescribed_state(t, &mut self.state, &mut self.qddot);
         if let Some((model, state)) = &mut self.placed {
@@ -92,8 +95,8 @@ impl RigidTwin {
         self.acceleration = R * (A.linear + V.angular.cross(&V.linear)) + model.gravity;
     }
 
-    /// Poses in the world, Jacobian and velocity of the tool, with forces its acceleration as well, from one pass; false where
-    /// the tree is not for it.
+    /// Poses in the world, Jacobian and velocity of the tool, with forces its acceleration as well,
+    /// from one pass; false where the tree is not for it.
     fn look(&mut self, arm: &FlexibleArm, tcp: &Frame, with_forces: bool) -> bool {
         let (model, data) = (&arm.model, &mut *self.data);
         let Self { state, qddot, observer, .. } = self;

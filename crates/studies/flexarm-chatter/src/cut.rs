@@ -1,8 +1,10 @@
-//! One cut over time: the arm is run as it is, with the force of the teeth as a load that depends on where the tool is and was.
+//! One cut over time: the arm is run as it is, with the force of the teeth as a load that depends
+//! on where the tool is and was.
 //!
-//! The arm stands at its pose and the work moves past it. At each step the force at the end of the next is found from the tip as it is going
-//! to be (a parabola through the last three places), with the tool's own modes, which answer exactly; within the step it is linear. The
-//! arm is not linearised, and teeth leave the work where it swings out of it.
+//! The arm stands at its pose and the work moves past it. At each step the force at the end of the
+//! next is found from the tip as it is going to be (a parabola through the last three places), with
+//! the tool's own modes, which answer exactly; within the step it is linear. The arm is not
+//! linearised, and teeth leave the work where it swings out of it.
 
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
@@ -37,7 +39,8 @@ const LATE: usize = 60;
 const TEETH: (f64, f64) = (240.0, 4000.0);
 /// It lasts until the start has decayed, or chatter has grown, by the exponential of this.
 const DECAYED: f64 = 12.0;
-/// Motion that differs by more than this from tooth to tooth, in feeds per tooth, and does not become less, is chatter.
+/// Motion that differs by more than this from tooth to tooth, in feeds per tooth, and does not
+/// become less, is chatter.
 const CHATTER: f64 = 0.01;
 /// What counts as not becoming less, from one half of the late part to the other.
 const LASTING: f64 = 0.8;
@@ -78,11 +81,13 @@ pub struct CutRun {
     pub spindle_rpm: f64,
     /// Depth (m).
     pub depth_m: f64,
-    /// Limit of depth at this speed (m); null if there is none up to the deepest that the tool looks at.
+    /// Limit of depth at this speed (m); null if there is none up to the deepest that the tool
+    /// looks at.
     pub limit_m: Option<f64>,
     /// Frequency with which the limit chatters (Hz).
     pub limit_hz: Option<f64>,
-    /// Size of the largest multiplier of a tooth period at this depth: above 1 the linear cut chatters.
+    /// Size of the largest multiplier of a tooth period at this depth: above 1 the linear cut
+    /// chatters.
     pub multiplier: f64,
     /// Whether the run chattered.
     pub chatters: bool,
@@ -96,7 +101,8 @@ pub struct CutRun {
     pub peak_m: f64,
     /// Largest force on the tool at the end (N).
     pub peak_n: f64,
-    /// Frequency at which the tip swings most at the end, beside those of the teeth (Hz); null without chatter.
+    /// Frequency at which the tip swings most at the end, beside those of the teeth (Hz); null
+    /// without chatter.
     pub swing_hz: Option<f64>,
     /// Length of the run (s).
     pub seconds: f64,
@@ -115,7 +121,8 @@ pub struct CutRun {
     pub plot: Option<String>,
 }
 
-/// What the load of the run knows: forces in world axes at the two ends of the step that is next, and the tip from the TCP.
+/// What the load of the run knows: forces in world axes at the two ends of the step that is next,
+/// and the tip from the TCP.
 #[derive(Clone, Copy, Debug)]
 struct Next {
     from: f64,
@@ -319,8 +326,8 @@ fn figures(robot: &Robot, tool: &CuttingTool, curves: &Simulated, cut: &Cut, mul
     }
 }
 
-/// Frequency of the largest part of the motion that is not the same from tooth to tooth: roughly over the late part, then closer over a
-/// longer one.
+/// Frequency of the largest part of the motion that is not the same from tooth to tooth: roughly
+/// over the late part, then closer over a longer one.
 fn swing_hz(curves: &Simulated, cut: &Cut, from: usize) -> f64 {
     let h = curves.time[1] - curves.time[0];
     let late = swing(&curves.displacement[from..], cut.steps);

@@ -35,8 +35,8 @@ pub(super) fn save(answer: &mut Lobes, tool: &CuttingTool, paths: [PathBuf; 4]) 
     Ok(write_all(&files.collect::<Vec<_>>())?)
 }
 
-/// A positive number with this many digits behind the point, or as many as show two that count, never above the number itself: what is
-/// called safe below a limit is safe.
+/// A positive number with this many digits behind the point, or as many as show two that count,
+/// never above the number itself: what is called safe below a limit is safe.
 pub fn rounded_down(x: f64, digits: usize) -> String {
     let needed = if x > 0.0 { (1.0 - x.log10().floor()).clamp(0.0, 12.0) as usize } else { 0 };
     let digits = digits.max(needed);

@@ -1,7 +1,9 @@
-//! Chatter: the limits of depth of a cutting tool on the flexible arm, over the spindle speed, at a pose or along a motion.
+//! Chatter: the limits of depth of a cutting tool on the flexible arm, over the spindle speed, at a
+//! pose or along a motion.
 //!
-//! At each pose the arm is a linear structure about its equilibrium; the tool's own modes, or its measured response, are in series with it
-//! (`place.rs`). The limits are those of [`milling`]. Start at [`lobes`]. [`cut`] follows one cut over time, on the arm as it moves.
+//! At each pose the arm is a linear structure about its equilibrium; the tool's own modes, or its
+//! measured response, are in series with it (`place.rs`). The limits are those of [`milling`].
+//! Start at [`lobes`]. [`cut`] follows one cut over time, on the arm as it moves.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
@@ -46,7 +48,8 @@ use place::Place;
 pub enum CuttingPlace<'a> {
     /// At a pose: all actuated joints (rad or m), zero without it.
     At(Option<&'a [f64]>),
-    /// At so many places of a motion, evenly in time, where the tool moves; the feed is along the motion if the tool says none.
+    /// At so many places of a motion, evenly in time, where the tool moves; the feed is along the
+    /// motion if the tool says none.
     Along(&'a Motion, usize),
 }
 
@@ -82,11 +85,13 @@ pub struct Lobes {
     pub deepest_m: f64,
     /// One per speed: the smallest limit over all poses.
     pub points: Vec<LobePoint>,
-    /// Below this depth the cut is stable at every speed that was asked for (m); null if nothing chatters.
+    /// Below this depth the cut is stable at every speed that was asked for (m); null if nothing
+    /// chatters.
     pub stable_below_m: Option<f64>,
     /// Speed of that limit (1/min).
     pub stable_below_at_rpm: Option<f64>,
-    /// The speed with the deepest stable cut (1/min), and that (m); the deepest that was looked at where nothing chatters.
+    /// The speed with the deepest stable cut (1/min), and that (m); the deepest that was looked at
+    /// where nothing chatters.
     pub best_rpm: f64,
     /// Its depth (m).
     pub best_depth_m: f64,
@@ -95,7 +100,8 @@ pub struct Lobes {
     /// The first of them, for people.
     #[serde(skip)]
     pub(crate) pose_in_words: String,
-    /// Places of the motion that were left out: the tool stands still there, or moves along its axis.
+    /// Places of the motion that were left out: the tool stands still there, or moves along its
+    /// axis.
     pub left_out: usize,
     /// The table; null if nothing was written.
     pub file: Option<String>,
@@ -112,7 +118,8 @@ pub struct Lobes {
 pub struct LobePoint {
     /// Spindle speed (1/min).
     pub spindle_rpm: f64,
-    /// Depth above which the cut chatters (m); null if it does not, up to the deepest that was looked at.
+    /// Depth above which the cut chatters (m); null if it does not, up to the deepest that was
+    /// looked at.
     pub depth_m: Option<f64>,
     /// Frequency at which the tip then swings most (Hz).
     pub chatter_hz: Option<f64>,
@@ -242,8 +249,8 @@ impl ExternalError for LobesError {}
 /// `go_on` is told how many of how many limits are done and may break off by `false`.
 ///
 /// # Errors
-/// [`LobesError`] where nothing yields or the feed makes no sense; [`Error::Pose`], [`Error::Step`] for poses without an equilibrium;
-/// [`Error::Interrupted`]; errors of files.
+/// [`LobesError`] where nothing yields or the feed makes no sense; [`Error::Pose`], [`Error::Step`]
+/// for poses without an equilibrium; [`Error::Interrupted`]; errors of files.
 pub fn lobes(
     robot: &Robot,
     tool: &CuttingTool,
@@ -354,8 +361,8 @@ fn check_deepest(depth_m: f64) -> Result<(), Error> {
     Ok(())
 }
 
-/// The lowest limit of depth at a pose over all speeds of the tool (m): the deepest cut that is looked at where nothing chatters, NaN
-/// where the feed is along the tool's axis.
+/// The lowest limit of depth at a pose over all speeds of the tool (m): the deepest cut that is
+/// looked at where nothing chatters, NaN where the feed is along the tool's axis.
 ///
 /// * `zero_order`: by the mean force alone, as for a tool with a measured response.
 ///

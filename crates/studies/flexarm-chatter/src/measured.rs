@@ -1,4 +1,5 @@
-//! A measured frequency response of a tool: a table of real and imaginary parts, linear between its frequencies.
+//! A measured frequency response of a tool: a table of real and imaginary parts, linear between its
+//! frequencies.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -12,7 +13,8 @@ use flexarm_run::Error;
 const ENTRIES: [(&str, usize, usize); 6] =
     [("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2)];
 
-/// Displacement of the tip per force on it, in the axes of the TCP, measured on a spindle that does not yield itself.
+/// Displacement of the tip per force on it, in the axes of the TCP, measured on a spindle that does
+/// not yield itself.
 #[derive(Clone, Debug)]
 pub(crate) struct MeasuredResponse {
     /// Ascending, rad/s.
@@ -25,7 +27,8 @@ impl MeasuredResponse {
     /// From a table with `frequency_hz`, and `xx_re`, `xx_im` and so on in m/N.
     ///
     /// # Errors
-    /// [`Error::File`] for columns that are missing, unknown or not whole, and frequencies that do not ascend.
+    /// [`Error::File`] for columns that are missing, unknown or not whole, and frequencies that do
+    /// not ascend.
     pub(crate) fn new(table: &NumberTable, path: &Path) -> Result<Self, Error> {
         let fail = |what: String| Error::File { path: path.to_owned(), what };
         let names: Vec<String> = ENTRIES.iter().flat_map(|(e, ..)| [format!("{e}_re"), format!("{e}_im")]).collect();

@@ -1,4 +1,5 @@
-//! Arm and tool as the cutter feels them at one pose: poles in the axes of the cut, or a measured response beside those of the arm.
+//! Arm and tool as the cutter feels them at one pose: poles in the axes of the cut, or a measured
+//! response beside those of the arm.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -61,7 +62,8 @@ impl Place {
         Self::new(Posed::new(robot, modelling, at)?, tool, None, None)
     }
 
-    /// Along a motion, evenly in time, where the tool moves across its axis; and how many places were left out.
+    /// Along a motion, evenly in time, where the tool moves across its axis; and how many places
+    /// were left out.
     pub(super) fn along(
         robot: &Robot,
         modelling: &Modelling,
@@ -149,7 +151,8 @@ impl Place {
         G
     }
 
-    /// Where the response is looked at: about the poles, and at measured frequencies, not beyond the highest of these.
+    /// Where the response is looked at: about the poles, and at measured frequencies, not beyond
+    /// the highest of these.
     fn frequencies(&self) -> Vec<f64> {
         let mut band = self.structure.frequencies();
         if let Some((measured, _)) = &self.measured {

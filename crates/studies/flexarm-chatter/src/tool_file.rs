@@ -1,4 +1,5 @@
-//! The file of a cutting tool (`docs/lobes.md`): cutter, engagement, speeds, where it sits, how it yields; units are converted here.
+//! The file of a cutting tool (`docs/lobes.md`): cutter, engagement, speeds, where it sits, how it
+//! yields; units are converted here.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -197,7 +198,8 @@ impl CuttingTool {
     /// Reads the file of a tool.
     ///
     /// # Errors
-    /// [`Error::RobotFile`] with file, place, what was found and what was expected; [`Error::File`] for a table.
+    /// [`Error::RobotFile`] with file, place, what was found and what was expected; [`Error::File`]
+    /// for a table.
     pub fn load(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
         let text = read_text(path)?;
@@ -316,7 +318,8 @@ impl Reader<'_> {
             engagement: self.engagement(engagement, diameter)?,
         };
         cutter.check().map_err(|error| self.error(e.coefficients.span(), error.to_string()))?;
-        // Units mixed up are off by a million: the softest plastics have 1e7, hard alloys below 1e10 N/m².
+        // Units mixed up are off by a million: the softest plastics have 1e7, hard alloys below
+        // 1e10 N/m².
         if !(1e6..1e11).contains(&coefficients.tangential) {
             let message = format!(
                 "the tangential coefficient is {:.3e} N/m2; materials have 1e7 to 1e10: is the unit right (pressures = \"N/mm2\")?",

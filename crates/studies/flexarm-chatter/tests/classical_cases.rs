@@ -1,4 +1,5 @@
-//! Six classical cases, 41 spindle speeds each, against the limits of another program (`tests/golden/milling_lobes.json`, good to 0.2 %).
+//! Six classical cases, 41 spindle speeds each, against the limits of another program
+//! (`tests/golden/milling_lobes.json`, good to 0.2 %).
 #![allow(
     clippy::unwrap_used,
     clippy::print_stderr,
@@ -87,7 +88,8 @@ fn every_limit_of_the_classical_cases_is_met() {
     assert!(worst < 0.005, "{worst}");
 }
 
-/// Convergence: the tolerance of 1e-3 is met by far, against elements halved until nothing moves by 1e-7.
+/// Convergence: the tolerance of 1e-3 is met by far, against elements halved until nothing moves by
+/// 1e-7.
 #[test]
 fn limits_asked_for_more_exactly_move_less_than_their_tolerance() {
     let mut worst: f64 = 0.0;
@@ -107,7 +109,8 @@ fn limits_asked_for_more_exactly_move_less_than_their_tolerance() {
     assert!(worst < 1e-5, "{worst:.1e}");
 }
 
-/// The zero-order solution is another algorithm: near in a slot of two modes, blind to period doubling at low immersion.
+/// The zero-order solution is another algorithm: near in a slot of two modes, blind to period
+/// doubling at low immersion.
 #[test]
 fn the_zero_order_solution_is_near_in_slots_and_misses_flips() {
     for case in cases() {
@@ -134,7 +137,8 @@ fn the_zero_order_solution_is_near_in_slots_and_misses_flips() {
     }
 }
 
-/// Truth: the search over the whole band. Up to a depth the limit is the same or none, and where nothing chatters nothing is searched.
+/// Truth: the search over the whole band. Up to a depth the limit is the same or none, and where
+/// nothing chatters nothing is searched.
 #[test]
 fn a_search_up_to_a_depth_finds_the_same_limit_with_less_work() {
     let mut work = [0, 0];
@@ -159,8 +163,9 @@ fn a_search_up_to_a_depth_finds_the_same_limit_with_less_work() {
     assert!(10 * work[1] < 7 * work[0], "{work:?}"); // measured 0.57
 }
 
-/// A mode damped to 30000 times critical has poles from 2e-5 to 6e4 times its frequency: 23 million points of the whole band. Where the
-/// teeth are so slow that the resonance alone takes too many, the search is refused.
+/// A mode damped to 30000 times critical has poles from 2e-5 to 6e4 times its frequency: 23 million
+/// points of the whole band. Where the teeth are so slow that the resonance alone takes too many,
+/// the search is refused.
 #[test]
 fn the_work_of_a_limit_does_not_grow_with_the_damping() {
     let cutter = Cutter::straight(3, Coefficients { tangential: 8e8, radial: 2.5e8, axial: 0.0 }, Engagement::slot());

@@ -1,4 +1,5 @@
-//! Limits with a closed form: constant forces (as in turning), the lowest limit of one mode, forces of teeth summed by hand.
+//! Limits with a closed form: constant forces (as in turning), the lowest limit of one mode, forces
+//! of teeth summed by hand.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stderr,
@@ -25,8 +26,9 @@ fn along_x(hz: f64, zeta: f64, stiffness: f64) -> Structure {
     Structure::from_modes(&[mode(hz, zeta, stiffness, Vector3::x())]).unwrap()
 }
 
-/// Truth: four teeth all the way round sum to a constant force, `F = -b N/2 K_r (x - x(t - T))`: turning, whose limit is
-/// `b N/2 K_r = -1 / (2 Re G(ω))` with `ω T = 2 π k + 3 π + 2 arg G` [Tlusty & Poláček 1963]; here for chosen ω, T by the phase.
+/// Truth: four teeth all the way round sum to a constant force, `F = -b N/2 K_r (x - x(t - T))`:
+/// turning, whose limit is `b N/2 K_r = -1 / (2 Re G(ω))` with `ω T = 2 π k + 3 π + 2 arg G`
+/// [Tlusty & Poláček 1963]; here for chosen ω, T by the phase.
 #[test]
 fn constant_forces_have_the_lobes_of_turning() {
     let structure = along_x(150.0, 0.03, 2e7);
@@ -72,7 +74,8 @@ fn crossings(structure: &Structure, T: f64, k: i32) -> Option<f64> {
     (G.re < 0.0).then(|| -1.0 / (2.0 * G.re) / (2.0 * STEEL.radial))
 }
 
-/// Truth: the lowest limit of one mode under a constant force is `2 k ζ (1 + ζ)` over its coefficient, at any lobe.
+/// Truth: the lowest limit of one mode under a constant force is `2 k ζ (1 + ζ)` over its
+/// coefficient, at any lobe.
 #[test]
 fn the_lowest_limit_of_one_mode_is_two_k_zeta() {
     let (k, zeta) = (2e7, 0.03);
@@ -116,7 +119,8 @@ fn forces_of_helical_teeth_are_the_sum_of_their_slices() {
     assert!(same == 0.0);
 }
 
-/// Identity: a helix that lags by a whole pitch over the depth has a constant force, so that the zero-order solution is exact there.
+/// Identity: a helix that lags by a whole pitch over the depth has a constant force, so that the
+/// zero-order solution is exact there.
 #[test]
 fn at_a_depth_of_one_axial_pitch_a_helix_cuts_with_constant_force() {
     let modes =
@@ -164,7 +168,8 @@ fn a_helix_that_goes_to_nothing_is_a_straight_tooth() {
     assert!((a / c - 1.0).abs() > 1e-3);
 }
 
-/// Identity: turning structure and engagement about the tool, and mirroring up into down, change no limit.
+/// Identity: turning structure and engagement about the tool, and mirroring up into down, change no
+/// limit.
 #[test]
 fn limits_do_not_depend_on_the_direction_of_the_feed() {
     let modes =
@@ -185,11 +190,13 @@ fn limits_do_not_depend_on_the_direction_of_the_feed() {
     assert!(change < 1e-9, "{change:.1e}");
 }
 
-/// A range ends where multipliers return: inside of each range the multiplier is above 1, outside below.
+/// A range ends where multipliers return: inside of each range the multiplier is above 1, outside
+/// below.
 #[test]
 fn unstable_ranges_hold_what_multipliers_say() {
     let structure = along_x(922.0, 0.011, 1.34e6);
-    // Period doubling of helical teeth has islands: with the depth the teeth overlap, and the forces come and go less.
+    // Period doubling of helical teeth has islands: with the depth the teeth overlap, and the
+    // forces come and go less.
     let cutter = Cutter { diameter: 0.008, helix: PI / 6.0, ..Cutter::straight(2, STEEL, Engagement::down(0.05)) };
     let mut several = 0;
     for rpm in [14_400.0, 16_200.0, 17_000.0, 17_800.0, 18_200.0] {

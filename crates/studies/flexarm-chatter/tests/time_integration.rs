@@ -1,4 +1,5 @@
-//! Third algorithm: the delay equation integrated in time, with and without teeth that leave the work.
+//! Third algorithm: the delay equation integrated in time, with and without teeth that leave the
+//! work.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stderr,
@@ -36,7 +37,8 @@ impl Chain {
         Structure::from_matrices(&self.M, &self.D, &self.K, &self.J).unwrap()
     }
 
-    /// Growth per tooth period by Runge and Kutta, without loss of contact, the delayed tip by Hermite's cubic.
+    /// Growth per tooth period by Runge and Kutta, without loss of contact, the delayed tip by
+    /// Hermite's cubic.
     fn growth(&self, cutter: &Cutter, spindle: f64, depth: f64, periods: usize, steps: usize) -> f64 {
         let n = self.M.nrows();
         let inverse = self.M.clone().try_inverse().unwrap();
@@ -81,7 +83,8 @@ impl Chain {
     }
 }
 
-/// Truth: growth of the integrated motion, for straight and helical teeth, up and down, several teeth in the cut at once.
+/// Truth: growth of the integrated motion, for straight and helical teeth, up and down, several
+/// teeth in the cut at once.
 #[test]
 fn motion_grows_by_the_leading_multiplier() {
     let chain = Chain::new();
@@ -122,8 +125,9 @@ fn motion_grows_by_the_leading_multiplier() {
     assert!(worst < 0.6, "{worst}");
 }
 
-/// Teeth that leave the work keep the motion finite: it chatters above the limit and is the same from tooth to tooth below. Just below
-/// the limit a cut that started roughly goes on chattering (the bifurcation is subcritical: at 0.9 of it, and 7000 rpm, this one does).
+/// Teeth that leave the work keep the motion finite: it chatters above the limit and is the same
+/// from tooth to tooth below. Just below the limit a cut that started roughly goes on chattering
+/// (the bifurcation is subcritical: at 0.9 of it, and 7000 rpm, this one does).
 #[test]
 fn the_simulated_cut_chatters_above_its_limit_and_not_below() {
     let structure = Chain::new().structure();
@@ -148,7 +152,8 @@ fn the_simulated_cut_chatters_above_its_limit_and_not_below() {
     }
 }
 
-/// Identity: poles of matrices give their frequency response; proportional damping gives the modes again.
+/// Identity: poles of matrices give their frequency response; proportional damping gives the modes
+/// again.
 #[test]
 fn poles_give_the_frequency_response_of_the_matrices() {
     let chain = Chain::new();

@@ -9,7 +9,8 @@ use flexarm_run::Caveat;
 use flexarm_run::MotionViolation;
 use flexarm_run::Robot;
 
-/// More than this part of the peak left on the model is explained, if it is mostly quick: by more than the second.
+/// More than this part of the peak left on the model is explained, if it is mostly quick: by more
+/// than the second.
 const ENOUGH_LEFT: f64 = 0.01;
 const MOSTLY: f64 = 0.5;
 /// A servo that gives this part of its largest torque gives all of it.
@@ -40,7 +41,8 @@ fn quick_caveat(answer: &Compensation, quicker: f64) -> Option<Caveat> {
     })
 }
 
-/// Iterations that made the error on the model larger, with the frequency up to which the kept ones correct.
+/// Iterations that made the error on the model larger, with the frequency up to which the kept ones
+/// correct.
 fn discarded_caveat(answer: &Compensation, discarded: &[Discarded]) -> Option<Caveat> {
     let each = |of: &Discarded| match of.growth.is_finite() {
         true => {
@@ -83,7 +85,8 @@ pub(super) fn of_servos(plant: &Arm, efforts: &[Extreme]) -> Option<Caveat> {
 
 /// What is doubtful of an answer.
 ///
-/// * `own`: limits that the motion passes by itself; `asked`: how many components of the tool count.
+/// * `own`: limits that the motion passes by itself; `asked`: how many components of the tool
+///   count.
 pub(super) fn of(
     answer: &Compensation,
     own: &[MotionViolation],

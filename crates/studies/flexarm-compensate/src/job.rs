@@ -96,8 +96,8 @@ impl<'a> Job<'a> {
     ) -> Result<Self, Error> {
         let motion = &scenario.motion;
         let model = arm.robot().rigid_model()?;
-        // Whole numbers of steps, so that the run is logged at just these times; the last lies at the end or a little beyond, where
-        // the joints are held.
+        // Whole numbers of steps, so that the run is logged at just these times; the last lies at
+        // the end or a little beyond, where the joints are held.
         let step = request.run.step_s;
         let spacing = step * (super::SAMPLE_S / step).round().max(1.0);
         let n = ((motion.trajectory.duration() / spacing - 1e-6).ceil() as usize).max(8);
@@ -218,7 +218,8 @@ impl<'a> Job<'a> {
         Ok(Seen { error, efforts: (0..m).map(worst).collect() })
     }
 
-    /// Error of the tool on the model with changed joints, and what it is when they are held at the end for so many samples more.
+    /// Error of the tool on the model with changed joints, and what it is when they are held at the
+    /// end for so many samples more.
     fn error(&self, change: &DMatrix<f64>, beyond: usize) -> Result<DMatrix<f64>, Error> {
         let motion = self.moved_and_held(change, beyond)?;
         Ok(self.seen_until(self.arm, &self.request.run, &motion, beyond)?.error)
@@ -247,7 +248,8 @@ impl<'a> Job<'a> {
         })
     }
 
-    /// The arm held where the motion begins: gains of servos and dampings of a run are those of its start.
+    /// The arm held where the motion begins: gains of servos and dampings of a run are those of its
+    /// start.
     fn at_start(&self) -> Result<FlexibleArm, Error> {
         let flexible = self.arm.flexible();
         let held = Held(self.q.column(0).iter().copied().collect());
@@ -284,8 +286,9 @@ impl<'a> Job<'a> {
         v.iter().all(|v| v.abs() < REST)
     }
 
-    /// Samples for which the motion is held at its end, so that the inverse sees how the tool swings on there. None with loads, which
-    /// are known up to the end only, and none where the joints do not come to rest.
+    /// Samples for which the motion is held at its end, so that the inverse sees how the tool
+    /// swings on there. None with loads, which are known up to the end only, and none where the
+    /// joints do not come to rest.
     fn samples_beyond(&self, inversion: &Inversion) -> usize {
         match self.scenario.loads.is_empty() && self.ends_at_rest() {
             true => (inversion.edge_s() / self.step_s()).ceil() as usize,
@@ -293,8 +296,8 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// Corrects the commands by the inverse of the arm until the error settles. An iteration that makes the error larger is
-    /// discarded, and the next one corrects up to half the frequency.
+    /// Corrects the commands by the inverse of the arm until the error settles. An iteration that
+    /// makes the error larger is discarded, and the next one corrects up to half the frequency.
     pub(super) fn dynamic(&self) -> Result<Commands, Error> {
         let mut inversion = self.inversion()?;
         let (m, N) = self.q.shape();
@@ -413,8 +416,9 @@ fn controllers(servo: &Servo, q: &[f64], friction: &[Friction]) -> NodeServo {
     }
 }
 
-/// A load as its mean about each moment, over a node or whole periods: what is quicker moves no arm at rest. Where the arm rests longer
-/// the mean is over its rest; nothing before the motion and behind its end (s) counts.
+/// A load as its mean about each moment, over a node or whole periods: what is quicker moves no arm
+/// at rest. Where the arm rests longer the mean is over its rest; nothing before the motion and
+/// behind its end (s) counts.
 pub(super) fn averaged(
     load: &AppliedLoad,
     end: f64,

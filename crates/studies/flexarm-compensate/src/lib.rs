@@ -1,8 +1,10 @@
-//! Joint commands with which a flexible arm's tool follows the pose of the rigid one, found on a model and judged on others.
+//! Joint commands with which a flexible arm's tool follows the pose of the rigid one, found on a
+//! model and judged on others.
 //!
 //! [`compensate_motion`]: the motion is run, the error of the tool is taken away through the arm linearised along the motion
-//! ([`Inversion`]), and the new motion is run again, a few times. At rest ([`Method::Static`]) each point is corrected to its
-//! equilibrium alone. [`static_targets`], [`Inversion`] and [`Shaper`] take and give values.
+//! ([`Inversion`]), and the new motion is run again, a few times. At rest ([`Method::Static`]) each
+//! point is corrected to its equilibrium alone. [`static_targets`], [`Inversion`] and [`Shaper`]
+//! take and give values.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
@@ -86,7 +88,8 @@ pub struct CompensateRequest {
     pub plant: Option<(String, Robot)>,
     /// Judge with stiffness, damping and drives that are off as well.
     pub sweep: bool,
-    /// Greatest acceleration of each joint (rad/s² or m/s²), in coordinate order; not looked at where it is empty.
+    /// Greatest acceleration of each joint (rad/s² or m/s²), in coordinate order; not looked at
+    /// where it is empty.
     pub accelerations: Vec<f64>,
     /// What becomes of commands that pass a limit which the motion itself keeps.
     pub limits: LimitRule,
@@ -135,7 +138,8 @@ pub struct ErrorFigures {
 }
 
 impl ErrorFigures {
-    /// Returns the part of the RMS error that commands take away, in words: `97.3 %`, or how many times as large they make it.
+    /// Returns the part of the RMS error that commands take away, in words: `97.3 %`, or how many
+    /// times as large they make it.
     pub fn reduction_to(&self, after: &Self) -> String {
         let left = after.rms_m / self.rms_m.max(f64::MIN_POSITIVE);
         if left <= 1.0 { format!("{:.2} %", 100.0 * (1.0 - left)) } else { format!("{left:.1} times as large") }
@@ -163,7 +167,8 @@ pub struct Compensation {
     pub cutoff_hz: Option<f64>,
     /// Largest change of each joint (rad or m).
     pub changes: Vec<JointChange>,
-    /// Limits that the new motion passes: positions, speeds and accelerations of the commands, torques of the run on the plant.
+    /// Limits that the new motion passes: positions, speeds and accelerations of the commands,
+    /// torques of the run on the plant.
     pub limits: Vec<MotionViolation>,
     /// How many times as long the motion takes so that limits are kept; 1 if it is as it was.
     pub slowed: f64,
@@ -215,7 +220,8 @@ pub struct PlantFigures {
     pub after: ErrorFigures,
 }
 
-/// Finds commands for a motion, and judges them. Loads and payloads of the scenario act in all runs.
+/// Finds commands for a motion, and judges them. Loads and payloads of the scenario act in all
+/// runs.
 ///
 /// # Errors
 /// [`CompensateError`], and as [`flexarm_run::Arm::simulate`].
@@ -230,7 +236,8 @@ pub fn compensate_motion(
 /// Whether somebody wants a computation to stop.
 type Stop<'a> = &'a (dyn Fn() -> bool + Sync);
 
-/// As [`compensate_motion`]; as soon as `stop` says so, it ends with [`Error::Interrupted`], and nothing is written.
+/// As [`compensate_motion`]; as soon as `stop` says so, it ends with [`Error::Interrupted`], and
+/// nothing is written.
 ///
 /// # Errors
 /// As [`compensate_motion`]; [`Error::Interrupted`].

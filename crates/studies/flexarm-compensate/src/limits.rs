@@ -14,7 +14,8 @@ use flexarm_run::motion::limits as limits_of;
 use flexarm_run::motion_report::of_effort;
 use flexarm_run::motion_report::of_limit;
 
-/// What is passed by less than this part of the limit more than by the motion itself is the motion's own.
+/// What is passed by less than this part of the limit more than by the motion itself is the
+/// motion's own.
 const SAME: f64 = 1e-3;
 /// Room that a slower motion leaves below a limit.
 const ROOM: f64 = 1.01;
@@ -101,7 +102,8 @@ pub(super) fn kept(
     Err(refused(&worse(&answer.limits, &own).cloned().collect::<Vec<_>>(), request.limits).into())
 }
 
-/// How many times as long a motion must take for a limit to be kept; infinite if time does not help.
+/// How many times as long a motion must take for a limit to be kept; infinite if time does not
+/// help.
 fn slower(limit: &MotionViolation) -> f64 {
     let over = ROOM * (limit.value / limit.limit).abs();
     match limit.kind {

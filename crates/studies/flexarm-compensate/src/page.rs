@@ -1,4 +1,5 @@
-//! The page of a compensation: error before and after over time, on other plants, changes of the joints; one file without scripts.
+//! The page of a compensation: error before and after over time, on other plants, changes of the
+//! joints; one file without scripts.
 
 use std::fmt::Write as _;
 

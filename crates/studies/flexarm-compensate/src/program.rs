@@ -1,8 +1,9 @@
-//! A robot program whose targets are corrected for what the arm gives way at rest: the same statements with other numbers.
+//! A robot program whose targets are corrected for what the arm gives way at rest: the same
+//! statements with other numbers.
 //!
-//! Each literal target is replaced by the one that the controller, which knows a rigid arm, must be told so that the flexible tool
-//! is at the old one, under the mean of the loads that act while it rests there. What was written is read again and held against the
-//! equilibria.
+//! Each literal target is replaced by the one that the controller, which knows a rigid arm, must be
+//! told so that the flexible tool is at the old one, under the mean of the loads that act while it
+//! rests there. What was written is read again and held against the equilibria.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -51,7 +52,8 @@ pub struct ProgramFigures {
     pub corrected: usize,
     /// At how many of them loads act, or another payload hangs than at the start.
     pub loaded: usize,
-    /// Largest distance of the flexible tool from its target at rest, with the program as it was (m).
+    /// Largest distance of the flexible tool from its target at rest, with the program as it was
+    /// (m).
     pub before_m: f64,
     /// The same of the replaced ones, with the program as it was written and read again (m).
     pub residual_m: f64,
@@ -161,8 +163,8 @@ pub(super) fn corrected(
     Ok((Corrected { figures, files }, uncovered))
 }
 
-/// Moves with targets, and when the motion is there: the planned moves in the same order; one without a leg of its own finds the arm
-/// there already.
+/// Moves with targets, and when the motion is there: the planned moves in the same order; one
+/// without a leg of its own finds the arm there already.
 fn stops<'a>(program: &'a Understood, scenario: &Scenario) -> Vec<Stop<'a>> {
     let planned = scenario.motion.tool_path.as_ref().map_or(&[][..], |path| &path.moves[..]);
     let mut next = 0;
@@ -319,7 +321,8 @@ impl<'a> AtRest<'a> {
             || self.samples(rest_s).any(|loads| loads.iter().any(pulls))
     }
 
-    /// How far loads are from their mean at a rest, over their largest size; none where nothing acts.
+    /// How far loads are from their mean at a rest, over their largest size; none where nothing
+    /// acts.
     fn change(&self, rest_s: [f64; 2]) -> Option<f64> {
         let all: Vec<Vec<Wrench>> = self.samples(rest_s).collect();
         let each = (0..self.loads.len()).filter_map(|k| {
@@ -368,7 +371,8 @@ impl<'a> AtRest<'a> {
             Target::Pose { X_BT, configuration } => NewTarget::Pose { X_BT, configuration },
         };
         let MoveKind::Arc { via, .. } = &of.kind else { return Ok((target, None)) };
-        // The arm at the auxiliary point, turned as at the end: what it gives way hardly depends on that.
+        // The arm at the auxiliary point, turned as at the end: what it gives way hardly depends on
+        // that.
         let X_MB = base_of(self.arm, of);
         let at = X_MB * nalgebra::Point3::from(*via);
         let X = Pose::from_parts(Translation3::from(at.coords), self.rigid(of, q).rotation);
@@ -379,7 +383,8 @@ impl<'a> AtRest<'a> {
         Ok((target, Some((X_MB.inverse() * nalgebra::Point3::from(moved)).coords)))
     }
 
-    /// Displacement of the flexible tool at joints from where the rigid one is at the joints that were meant.
+    /// Displacement of the flexible tool at joints from where the rigid one is at the joints that
+    /// were meant.
     fn off(&self, stop: &Stop<'_>, q: &DVector<f64>) -> Result<Vector6<f64>, String> {
         let m = self.arm.model.n_actuated();
         let t = stop.rest_s[0];

@@ -18,7 +18,8 @@ use flexarm_settings::written::markdown;
 /// Samples of the recording per second.
 const RECORDED_HZ: f64 = 200.0;
 
-/// The arm before and after, over each other, beside the rigid arm on the motion that was asked for.
+/// The arm before and after, over each other, beside the rigid arm on the motion that was asked
+/// for.
 pub(super) fn record(
     path: &Path,
     answer: &Compensation,
@@ -58,8 +59,8 @@ pub(super) fn record(
     Ok(())
 }
 
-/// A recorder that shows the rigid arm of the first run in all runs, and errors from it: new commands move the rigid arm as
-/// well, and that is not where the tool should be.
+/// A recorder that shows the rigid arm of the first run in all runs, and errors from it: new
+/// commands move the rigid arm as well, and that is not where the tool should be.
 struct Against {
     inner: Box<dyn Recorder>,
     wanted: Arc<Mutex<Vec<TwinSample>>>,

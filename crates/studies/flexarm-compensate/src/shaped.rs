@@ -58,7 +58,8 @@ pub struct ShaperFigures {
     pub kind: &'static str,
     /// Delay (s) and part of each copy of the motion.
     pub copies: Vec<[f64; 2]>,
-    /// Modes at the end of the motion that it was made against, the one that would swing most first.
+    /// Modes at the end of the motion that it was made against, the one that would swing most
+    /// first.
     pub modes: Vec<ShapedModeFigures>,
 }
 
@@ -69,7 +70,8 @@ pub struct ShapedModeFigures {
     pub frequency_hz: f64,
     /// Damping ratio.
     pub damping_ratio: f64,
-    /// Oscillation of the tool that the motion would leave, the largest within the band of the frequency (m).
+    /// Oscillation of the tool that the motion would leave, the largest within the band of the
+    /// frequency (m).
     pub before_m: f64,
     /// The same with the shaper.
     pub after_m: f64,
@@ -183,7 +185,8 @@ impl AtEnd {
         Ok(Self { node, modes: modes.into_iter().filter(swings).collect(), accelerations, step_s })
     }
 
-    /// Modes that the motion makes swing, up to a frequency, the first in any case, the largest first.
+    /// Modes that the motion makes swing, up to a frequency, the first in any case, the largest
+    /// first.
     fn vibrations(&self, band: f64, up_to_hz: f64) -> Vec<ShapedMode> {
         let of = |mode: &DampedMode| {
             let at = |part: &f64| vibration_left(&self.node, mode, &self.accelerations, self.step_s, 1.0 + band * part);

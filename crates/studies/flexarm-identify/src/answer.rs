@@ -41,7 +41,8 @@ pub struct Identification {
     pub residual: Residual,
     /// RMS over readings that the fit had not seen; null with fewer than two readings.
     pub held_out: Option<HeldOutFigures>,
-    /// How many times larger than its declared deviation the scatter is, where chance does not explain it; else null.
+    /// How many times larger than its declared deviation the scatter is, where chance does not
+    /// explain it; else null.
     pub misfit: Option<f64>,
     /// Whether the deviations of the readings were given; if not, the scatter tells them.
     pub deviations_known: bool,
@@ -89,7 +90,8 @@ pub struct FittedParameter {
     pub initial: f64,
     /// Now; the initial value where the readings say nothing.
     pub value: f64,
-    /// Standard deviation; not a number (null in JSON) where the readings do not tell it or the fit does not meet them.
+    /// Standard deviation; not a number (null in JSON) where the readings do not tell it or the fit
+    /// does not meet them.
     pub std: f64,
     /// Where it lies in 95 of 100 cases; not numbers (nulls) without a deviation.
     pub interval: [f64; 2],

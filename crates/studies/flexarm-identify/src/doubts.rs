@@ -34,7 +34,8 @@ const WEIGHT: f64 = 9.81;
 /// A rest of encoders over their noise that is told.
 const ENCODER_REST: f64 = 1.5;
 
-/// Scatter of places about the rigid robot, over their spread, beyond which frames or joints do not fit.
+/// Scatter of places about the rigid robot, over their spread, beyond which frames or joints do not
+/// fit.
 const FRAME_RATIO: f64 = 0.05;
 
 pub(super) fn caveats(found: &Identified) -> Vec<Caveat> {
@@ -94,8 +95,8 @@ pub(super) fn gear_caveat(robot: &Robot) -> Option<Caveat> {
     })
 }
 
-/// Encoders whose rest is more than the noise of the instruments, and as a part of the deflection more than the deviation of the
-/// stiffness.
+/// Encoders whose rest is more than the noise of the instruments, and as a part of the deflection
+/// more than the deviation of the stiffness.
 pub(super) fn encoder_caveats(encoders: &[EncoderFigures]) -> impl Iterator<Item = Caveat> + '_ {
     let odd = |gear: &&EncoderFigures| {
         let more = (gear.rest_rms.powi(2) - gear.noise_rms.powi(2)).max(0.0).sqrt();
@@ -108,7 +109,8 @@ pub(super) fn encoder_caveats(encoders: &[EncoderFigures]) -> impl Iterator<Item
     encoders.iter().filter(odd).map(told)
 }
 
-/// Displacements under forces, or under masses, that are as much larger or smaller than the robot's as a kilogram weighs.
+/// Displacements under forces, or under masses, that are as much larger or smaller than the robot's
+/// as a kilogram weighs.
 pub(super) fn load_caveats(plant: &Plant, input: &MeasurementInput) -> Result<Vec<Caveat>, NoAnswer> {
     let mut caveats = Vec::new();
     for (what, slip, pulls) in [("forces", "kg given as N", true), ("masses", "N given as kg", false)] {

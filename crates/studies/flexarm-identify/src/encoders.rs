@@ -1,5 +1,5 @@
-//! Gears from recorded positions of motors and links: torques of the rigid robot along the motion of its links, filters, the fit's
-//! reading.
+//! Gears from recorded positions of motors and links: torques of the rigid robot along the motion
+//! of its links, filters, the fit's reading.
 
 use crate::estimation::{
     CoupledOutput, GearEstimate, GearRun, Parameter, Reading, ReadingKind, coupled_gear_stiffness, gear_stiffness,
@@ -42,10 +42,12 @@ pub struct EncoderFigures {
     /// Time between samples of each run, or half of one (s).
     #[serde(skip)]
     pub steps_s: Vec<f64>,
-    /// Of each run the deflection without offset and delay, and what the torque makes of it (rad, m).
+    /// Of each run the deflection without offset and delay, and what the torque makes of it (rad,
+    /// m).
     #[serde(skip)]
     pub curves: Vec<[Vec<f64>; 2]>,
-    /// Whether the recordings tell the gear: most of an unseen run follows, and no run decides alone.
+    /// Whether the recordings tell the gear: most of an unseen run follows, and no run decides
+    /// alone.
     pub told: bool,
     /// The parameter that it is.
     #[serde(skip)]
@@ -153,7 +155,8 @@ struct Recorded<'a> {
     joints: &'a [String],
 }
 
-/// Springs of motors that move several joints. Those that are not to be found have the stiffness of the robot file.
+/// Springs of motors that move several joints. Those that are not to be found have the stiffness of
+/// the robot file.
 fn told_of_coupled(
     recorded: &Recorded<'_>,
     coupling: &RobotCoupling,
@@ -236,13 +239,15 @@ fn link_side(robot: &Mechanism) -> Result<Model, flexarm_kinematics::ModelError>
     Model::new(&mechanism)
 }
 
-/// A recording without what is fast, with the torques through the gears. What is compared has passed the filter twice: the torque
-/// of a filtered motion is filtered again, as its products of rates are fast.
+/// A recording without what is fast, with the torques through the gears. What is compared has
+/// passed the filter twice: the torque of a filtered motion is filtered again, as its products of
+/// rates are fast.
 struct Smooth<'a> {
     recording: &'a EncoderRecording,
     rate: Vec<Vec<f64>>,
     torque: Vec<Vec<f64>>,
-    /// The torque that the motors' motion would need, which has no part in the noise of the links' encoders; or the measured one.
+    /// The torque that the motors' motion would need, which has no part in the noise of the links'
+    /// encoders; or the measured one.
     instrument: Vec<Vec<f64>>,
     low: LowPass,
     seen: std::ops::Range<usize>,
@@ -306,8 +311,8 @@ impl<'a> Smooth<'a> {
         })
     }
 
-    /// Mean square of what white noise of the two instruments leaves in the band. Fifth differences show it: what is as slow as an
-    /// arm moves and swings is hardly in them.
+    /// Mean square of what white noise of the two instruments leaves in the band. Fifth differences
+    /// show it: what is as slow as an arm moves and swings is hardly in them.
     fn noise_square(&self, joint: usize) -> Option<f64> {
         let link = self.recording.link[joint].as_ref()?;
         let mut x: Vec<f64> = self.recording.motor[joint].iter().zip(link).map(|(motor, link)| motor - link).collect();
@@ -338,7 +343,8 @@ fn torques(model: &Model, motion: &[Vec<f64>], step_s: f64) -> Vec<Vec<f64>> {
     torque
 }
 
-/// First and second derivative by central differences of fourth order; at the ends the signal stands still.
+/// First and second derivative by central differences of fourth order; at the ends the signal
+/// stands still.
 fn derivatives(x: &[f64], step_s: f64) -> [Vec<f64>; 2] {
     let at = |i: usize, by: isize| x[i.saturating_add_signed(by).min(x.len() - 1)];
     let n = 0..x.len();

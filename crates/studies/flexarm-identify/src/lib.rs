@@ -1,8 +1,8 @@
 //! Parameters of a robot file from measurements at the robot, and poses that are worth measuring.
 //!
-//! [`identify_robot`] reads a file of measurements (`docs/identify.md`), finds what they tell of the robot file's numbers and says
-//! how well; [`plan_measurements`] chooses poses. What they are made of takes and gives values and is passed on here:
-//! [`identify`], [`plan`], [`MeasuredArm`].
+//! [`identify_robot`] reads a file of measurements (`docs/identify.md`), finds what they tell of
+//! the robot file's numbers and says how well; [`plan_measurements`] chooses poses. What they are
+//! made of takes and gives values and is passed on here: [`identify`], [`plan`], [`MeasuredArm`].
 #![allow(non_snake_case, reason = "monogram notation: X_WT, J; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
@@ -60,19 +60,20 @@ pub fn parameters(arm: &Arm) -> Vec<Parameter> {
     candidates_that(arm, |name| !special(name))
 }
 
-/// Returns the six directions of each lumped link's springs, `link.LINK.stiffness_factors[k]`: together they are the link's
-/// stiffness, which [`parameters()`] has as a whole.
+/// Returns the six directions of each lumped link's springs, `link.LINK.stiffness_factors[k]`:
+/// together they are the link's stiffness, which [`parameters()`] has as a whole.
 pub fn link_directions(arm: &Arm) -> Vec<Parameter> {
     candidates_that(arm, parameters::is_direction)
 }
 
-/// Returns the 21 entries of the 6x6 of each lumped link in two parts, `link.LINK.stiffness[i][j]` with i up to j. They exclude
-/// the link's factors.
+/// Returns the 21 entries of the 6x6 of each lumped link in two parts, `link.LINK.stiffness[i][j]`
+/// with i up to j. They exclude the link's factors.
 pub fn link_entries(arm: &Arm) -> Vec<Parameter> {
     candidates_that(arm, parameters::is_entry)
 }
 
-/// Returns place and attitude of the TCP, `tcp.x` to `tcp.rz`: moved and turned about its own axes (m, rad).
+/// Returns place and attitude of the TCP, `tcp.x` to `tcp.rz`: moved and turned about its own axes
+/// (m, rad).
 pub fn tcp_parameters(arm: &Arm) -> Vec<Parameter> {
     candidates_that(arm, parameters::is_tool)
 }
@@ -98,8 +99,9 @@ pub struct IdentifyRequest {
 /// Finds what measurements tell of a robot's numbers, and writes a robot file with them.
 ///
 /// # Errors
-/// [`Error::RobotFile`] with line and column for what is wrong in the file, [`Error::File`] for its tables; [`IdentifyFileError`]
-/// where the measurements cannot be met: units, frames, rank; [`Error::Taken`], [`Error::Write`].
+/// [`Error::RobotFile`] with line and column for what is wrong in the file, [`Error::File`] for its
+/// tables; [`IdentifyFileError`] where the measurements cannot be met: units, frames, rank;
+/// [`Error::Taken`], [`Error::Write`].
 pub fn identify_robot(robot: &Robot, measurements: &Path, request: &IdentifyRequest) -> Result<Identification, Error> {
     let arm = robot.flexible(request.modelling)?;
     if parameters::candidates(robot, arm.flexible()).is_empty() {

@@ -1,5 +1,5 @@
-//! The page of an identification: what was found, instruments and targets, residuals, curves of responses and encoders against the
-//! model, correlation; one file without scripts.
+//! The page of an identification: what was found, instruments and targets, residuals, curves of
+//! responses and encoders against the model, correlation; one file without scripts.
 
 use std::fmt::Write as _;
 

@@ -1,4 +1,5 @@
-//! What of a robot file can be identified: its numbers by name, what each does to the arm, and where it is written.
+//! What of a robot file can be identified: its numbers by name, what each does to the arm, and
+//! where it is written.
 //!
 //! | name | what |
 //! | --- | --- |
@@ -27,7 +28,8 @@ use flexarm_run::RobotLink;
 use flexarm_run::RobotMounting;
 use flexarm_run::robot::PAYLOAD_LINK;
 
-/// Key of what is only fitted if it is named: its directions together are the whole of a link's stiffness.
+/// Key of what is only fitted if it is named: its directions together are the whole of a link's
+/// stiffness.
 const DIRECTIONS: &str = "stiffness_factors";
 
 /// Where a parameter is written in the robot file.
@@ -162,7 +164,8 @@ fn link_directions<'a>(
     })
 }
 
-/// Entries of the 6x6 of a link that is one spring between two rigid parts, in the matrix before its factors.
+/// Entries of the 6x6 of a link that is one spring between two rigid parts, in the matrix before
+/// its factors.
 fn link_entries(link: &RobotLink, spring: usize, flexible: &FlexibleRobot) -> Vec<Candidate> {
     let group = &flexible.model.elastic()[spring];
     if group.size != 6 || group.modal {
@@ -222,7 +225,8 @@ fn gearbox_parameters(joint: &str, K: &GearStiffness, springs: &[usize], slides:
     }
 }
 
-/// Six springs under the base that are not coupled, one by one; a beam or a mesh there has no numbers of its own in the robot file.
+/// Six springs under the base that are not coupled, one by one; a beam or a mesh there has no
+/// numbers of its own in the robot file.
 fn mounting_parameters(robot: &Robot, springs: &[usize]) -> Vec<Candidate> {
     let (Some(RobotMounting::Springs { springs: mounting, .. }), [spring]) = (&robot.mounting, springs) else {
         return Vec::new();
@@ -296,7 +300,8 @@ pub(crate) fn is_direction(name: &str) -> bool {
     name.starts_with("link.") && name.contains(DIRECTIONS)
 }
 
-/// Whether a name, that of the mirrored entry, or that of all dampers of a gearbox, fits a pattern in which * stands for anything.
+/// Whether a name, that of the mirrored entry, or that of all dampers of a gearbox, fits a pattern
+/// in which * stands for anything.
 pub fn fits(pattern: &str, name: &str) -> bool {
     matches(pattern, name)
         || mirrored(name).is_some_and(|name| matches(pattern, &name))

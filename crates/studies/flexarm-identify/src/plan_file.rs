@@ -39,17 +39,21 @@ pub struct PlanRequest {
     pub count: usize,
     /// Forces on the tool among which the plan chooses, world axes (N).
     pub forces: Vec<[f64; 3]>,
-    /// Points of the tool at which a force may act, tool axes (m); the TCP where it is empty. About an axis through the point nothing turns.
+    /// Points of the tool at which a force may act, tool axes (m); the TCP where it is empty. About
+    /// an axis through the point nothing turns.
     pub levers: Vec<[f64; 3]>,
     /// Points of the tool that may be watched, tool axes (m); the TCP where it is empty.
     pub points: Vec<[f64; 3]>,
-    /// Directions along which a gauge may stand, world axes; all three numbers of the displacement are read where it is empty.
+    /// Directions along which a gauge may stand, world axes; all three numbers of the displacement
+    /// are read where it is empty.
     pub directions: Vec<[f64; 3]>,
     /// Deviation of a measured displacement (m).
     pub std_m: f64,
-    /// A table of poses (a column per joint) among which is chosen: those that are reachable and free; rad or m.
+    /// A table of poses (a column per joint) among which is chosen: those that are reachable and
+    /// free; rad or m.
     pub poses: Option<PathBuf>,
-    /// A table of poses where the work will be done: the plan makes the tool's error there sure under the first force.
+    /// A table of poses where the work will be done: the plan makes the tool's error there sure
+    /// under the first force.
     pub work: Option<PathBuf>,
     /// Folder of the files to fill in; nothing is written without it.
     pub output: Option<PathBuf>,
@@ -89,10 +93,12 @@ pub struct MeasurementPlan {
     pub poses: Vec<PlannedReading>,
     /// What to expect of each parameter.
     pub parameters: Vec<ExpectedParameter>,
-    /// Deviation of the tool's displacement where the work is done, largest over these poses and axes (m); null without them.
+    /// Deviation of the tool's displacement where the work is done, largest over these poses and
+    /// axes (m); null without them.
     pub work_std_m: Option<f64>,
-    /// How much more the plan tells than the same number of the candidates as they come: half the logarithm of the ratio of the
-    /// determinants, over the number of parameters; 0.69 is half the deviation.
+    /// How much more the plan tells than the same number of the candidates as they come: half the
+    /// logarithm of the ratio of the determinants, over the number of parameters; 0.69 is half the
+    /// deviation.
     pub gain_over_first: f64,
     /// How many poses were candidates.
     pub candidates: usize,
@@ -193,8 +199,8 @@ pub struct ExpectedParameter {
 /// Chooses poses and loads at which displacements of the tool tell the robot's parameters best.
 ///
 /// # Errors
-/// [`Error::File`] for a table that has no such poses, [`IdentifyFileError`] where there is nothing to find, [`Error::Taken`],
-/// [`Error::Write`].
+/// [`Error::File`] for a table that has no such poses, [`IdentifyFileError`] where there is nothing
+/// to find, [`Error::Taken`], [`Error::Write`].
 pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<MeasurementPlan, Error> {
     let arm = robot.flexible(request.modelling)?;
     let (joints, slides): (Vec<String>, Vec<bool>) = joints_of(&arm).into_iter().unzip();

@@ -1,4 +1,5 @@
-//! Frequency responses and mode shapes in a file of measurements: points of the arm, tables and universal files, units.
+//! Frequency responses and mode shapes in a file of measurements: points of the arm, tables and
+//! universal files, units.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;

@@ -1,4 +1,5 @@
-//! The robot file with identified numbers in the places of the old ones; everything else stays as it was written.
+//! The robot file with identified numbers in the places of the old ones; everything else stays as
+//! it was written.
 
 use std::path::Path;
 
@@ -11,7 +12,8 @@ use super::parameters::Written;
 
 /// The text of the robot file with other values; each with its standard deviation as a comment.
 ///
-/// * `tool`: link of the tool and its pose in the link, as it was; `home`: folder of the old file, `to`: of the new one; paths in the file are rewritten if they differ.
+/// * `tool`: link of the tool and its pose in the link, as it was; `home`: folder of the old file,
+///   `to`: of the new one; paths in the file are rewritten if they differ.
 ///
 /// # Errors
 /// A sentence about what was not found where it should be.
@@ -170,7 +172,8 @@ fn put_stiffness(item: &mut Item, entry: Option<usize>, found: &Found) -> Result
     Ok(())
 }
 
-/// An entry and its mirror image in the `stiffness` of a link, which is `K` where the file has none.
+/// An entry and its mirror image in the `stiffness` of a link, which is `K` where the file has
+/// none.
 fn put_entry(link: &mut dyn TableLike, place: (usize, usize), K: &Matrix6<f64>, number: f64) -> Option<()> {
     if link.get("stiffness").is_none() {
         let mut rows: Array = (0..6).map(|i| (0..6).map(|j| K[(i, j)]).collect::<Array>()).collect();

@@ -1,6 +1,8 @@
-//! Universal files with dataset 58: functions of a modal test, as text (58) and binary (58b); dataset 164 tells their units.
+//! Universal files with dataset 58: functions of a modal test, as text (58) and binary (58b);
+//! dataset 164 tells their units.
 //!
-//! Start at [`read_functions`]. Frequency responses (function type 4) are taken, other functions and other datasets are passed over.
+//! Start at [`read_functions`]. Frequency responses (function type 4) are taken, other functions
+//! and other datasets are passed over.
 
 use nalgebra::Complex;
 

@@ -1,4 +1,5 @@
-//! Entries of a spring's matrix and the place of the tool as parameters: derivatives against Richardson differences, truths found again.
+//! Entries of a spring's matrix and the place of the tool as parameters: derivatives against
+//! Richardson differences, truths found again.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(non_snake_case, reason = "monogram notation")]
@@ -114,7 +115,8 @@ fn measurements(plant: &Plant) -> Measurements {
     Measurements { readings, targets, instruments: vec![Instrument::Known(X)] }
 }
 
-/// Truth: differences of sixth order of the residuals, reading after reading, away from the first guess.
+/// Truth: differences of sixth order of the residuals, reading after reading, away from the first
+/// guess.
 #[test]
 fn readings_of_all_kinds_change_with_entries_and_with_the_tool_as_differences_say() {
     let plant = plant();
@@ -195,8 +197,8 @@ fn read(of: &Measurements, values: &[f64]) -> Measurements {
     all
 }
 
-/// Truth: the arm that was measured. Its bending is a third as stiff and coupled to shear; a full step of Newton's from the first guess
-/// leads to a matrix that is not definite.
+/// Truth: the arm that was measured. Its bending is a third as stiff and coupled to shear; a full
+/// step of Newton's from the first guess leads to a matrix that is not definite.
 #[test]
 fn entries_far_from_the_guess_are_found_and_the_matrix_stays_definite_on_the_way() {
     let plant = plant();
@@ -224,7 +226,8 @@ fn entries_far_from_the_guess_are_found_and_the_matrix_stays_definite_on_the_way
     let arm = MeasuredArm { plant: &plant, parameters: &parameters, measurements: &poses };
     let beyond = DVector::from_vec(vec![0.0, 1.5 * root(&plant.springs[0].K, 0, 4), 0.0]);
     assert!(arm.predicted(&beyond).unwrap_err().to_string().contains("stiffness of an elastic joint"));
-    // Noise: errors over the stated deviations are standard normal; 120 of them within 0.8 to 1.2 in 99 of 100 cases.
+    // Noise: errors over the stated deviations are standard normal; 120 of them within 0.8 to 1.2
+    // in 99 of 100 cases.
     let mut draw = Draw(7);
     let mut normal = || {
         let (u, v) = (draw.between(1e-12, 1.0), draw.between(0.0, std::f64::consts::TAU));

@@ -1,4 +1,5 @@
-//! Parameters found again from made-up measurements: unbiased, with honest uncertainties, and silent where nothing is told.
+//! Parameters found again from made-up measurements: unbiased, with honest uncertainties, and
+//! silent where nothing is told.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(clippy::expect_used, clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(non_snake_case, reason = "monogram notation")]
@@ -50,7 +51,8 @@ fn pose(draw: &mut Draw) -> Vec<f64> {
     [2.5, 0.8, 0.9, 2.5, 1.5, 2.5].iter().map(|range| range * draw.signed()).collect()
 }
 
-/// Displacements under a weight of 100 kg and pulls of 500 N to the side, on an arm of 0.4 m, along three axes.
+/// Displacements under a weight of 100 kg and pulls of 500 N to the side, on an arm of 0.4 m, along
+/// three axes.
 fn pulled(draw: &mut Draw, count: usize) -> Measurements {
     let readings = (0..count).map(|k| {
         let mut force = Vector3::new(0.0, 0.0, -981.0);
@@ -97,8 +99,8 @@ fn read(plant: &Plant, parameters: &[Parameter], truth: &[f64], from: &Measureme
     noisy
 }
 
-/// Truth: the made-up arm. Over 200 seeds each error over its stated deviation is standard normal. Over 1000 seeds: 94.7 % within
-/// their intervals, spread 0.998.
+/// Truth: the made-up arm. Over 200 seeds each error over its stated deviation is standard normal.
+/// Over 1000 seeds: 94.7 % within their intervals, spread 0.998.
 #[test]
 fn of_two_hundred_fits_the_stated_deviations_are_those_of_the_errors() {
     let (plant, parameters) = (plant(), parameters());
@@ -348,7 +350,8 @@ fn displacements_in_the_axes_of_an_instrument_tell_stiffness_and_axes() {
     assert!(turned < 4e-4, "{turned:e}");
 }
 
-/// Truth: an arm whose springs are those of the plant under displacements with joints and axes mixed up.
+/// Truth: an arm whose springs are those of the plant under displacements with joints and axes
+/// mixed up.
 #[test]
 fn joints_in_another_order_and_axes_of_another_frame_are_recognised() {
     let (plant, parameters) = (plant(), parameters());
@@ -380,8 +383,9 @@ fn joints_in_another_order_and_axes_of_another_frame_are_recognised() {
     assert!(off < 0.05, "{off}");
 }
 
-/// Truth: the made-up arm, whose springs are up to two and a half times as stiff or soft as the first guess. From there a plain search
-/// ends where resonances of the model lie on others of the arm.
+/// Truth: the made-up arm, whose springs are up to two and a half times as stiff or soft as the
+/// first guess. From there a plain search ends where resonances of the model lie on others of the
+/// arm.
 #[test]
 fn responses_that_draw_the_search_into_a_false_minimum_are_met_from_another_start() {
     let (plant, parameters) = (plant(), parameters());

@@ -1,4 +1,5 @@
-//! Derivatives by parameters against Richardson differences of the nonlinear answers, on a soft arm whose equilibrium moves.
+//! Derivatives by parameters against Richardson differences of the nonlinear answers, on a soft arm
+//! whose equilibrium moves.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(clippy::expect_used, clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(non_snake_case, reason = "monogram notation")]

@@ -1,4 +1,5 @@
-//! Derivatives of the tool's error along a motion by parameters, against Richardson differences of runs: the damping follows the modes.
+//! Derivatives of the tool's error along a motion by parameters, against Richardson differences of
+//! runs: the damping follows the modes.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(non_snake_case, reason = "monogram notation")]
@@ -94,7 +95,8 @@ fn the_error_along_a_motion_depends_on_each_parameter_with_the_damping_that_foll
     compare(|arm| arm);
 }
 
-/// What is carried changes twice: on the body of the mass that is a parameter, which is gone then, and modal damping follows.
+/// What is carried changes twice: on the body of the mass that is a parameter, which is gone then,
+/// and modal damping follows.
 #[test]
 fn the_damping_after_a_change_of_payload_follows_the_parameters() {
     let body = plant().tool.body;

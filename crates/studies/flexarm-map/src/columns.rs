@@ -22,7 +22,8 @@ pub struct MapColumn {
 }
 
 impl MapColumn {
-    /// What is to be small: the value, or less it where more is better; infinite where there is none.
+    /// What is to be small: the value, or less it where more is better; infinite where there is
+    /// none.
     pub(super) fn cost(&self, value: f64) -> f64 {
         match self.more_is_better {
             _ if !value.is_finite() => f64::INFINITY,
@@ -51,7 +52,8 @@ pub(super) struct Layout {
     pub(super) elements: Vec<std::ops::Range<usize>>,
 }
 
-/// Columns before the joints: place of the rigid tool, number of the place or instant, of the tool's direction, of the branch.
+/// Columns before the joints: place of the rigid tool, number of the place or instant, of the
+/// tool's direction, of the branch.
 pub(super) const HEAD: [(&str, &str); 6] = [
     ("x_m", "place of the rigid arm's tool, world"),
     ("y_m", "place of the rigid arm's tool, world"),

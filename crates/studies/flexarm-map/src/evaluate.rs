@@ -70,7 +70,8 @@ impl<'a> Evaluator<'a> {
         self.cut.is_some()
     }
 
-    /// Appends a row for each pose that has an answer, in order; what the others have instead goes to `failed`, in order too.
+    /// Appends a row for each pose that has an answer, in order; what the others have instead goes
+    /// to `failed`, in order too.
     ///
     /// * `poses`: actuated joints in coordinate order (rad or m), pose after pose.
     /// * `seats`: one for each pose.
@@ -168,7 +169,8 @@ fn push_compliance(C: &Matrix6<f64>, rows: &mut Vec<f64>) {
     rows.push(largest_gain(&C.fixed_view::<3, 3>(3, 3).into_owned()).0);
 }
 
-/// Largest singular value of a matrix and the direction that it belongs to; its largest component is positive.
+/// Largest singular value of a matrix and the direction that it belongs to; its largest component
+/// is positive.
 fn largest_gain(C: &Matrix3<f64>) -> (f64, Vector3<f64>) {
     // Compliances are 1e-9 or so: their squares lose nothing once they are scaled.
     let scale = C.amax();
@@ -188,7 +190,8 @@ mod tests {
     use super::*;
     use nalgebra::{Rotation3, matrix};
 
-    /// Truth: `C = R diag(3, 1, 2) Rᵀ` has the largest gain 3 along the first column of R; of `u vᵀ` it is `|u| |v|` along v.
+    /// Truth: `C = R diag(3, 1, 2) Rᵀ` has the largest gain 3 along the first column of R; of
+    /// `u vᵀ` it is `|u| |v|` along v.
     #[test]
     fn the_worst_direction_is_that_of_the_largest_singular_value() {
         let R = Rotation3::from_euler_angles(0.3, -1.1, 2.0).into_inner();

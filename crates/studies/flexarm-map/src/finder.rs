@@ -17,7 +17,8 @@ pub(super) struct Finder<'m> {
     closed: Option<AnalyticArm>,
     solutions: Solutions,
     data: Data,
-    /// Where joints stay that the tool's pose leaves free, and what copies by whole turns are to be near (rad or m).
+    /// Where joints stay that the tool's pose leaves free, and what copies by whole turns are to be
+    /// near (rad or m).
     near: Vec<f64>,
     /// Where the first joint is (m, world, seen from above).
     foot: [f64; 2],
@@ -59,7 +60,8 @@ impl<'m> Finder<'m> {
         (0..self.model.n_actuated()).filter(|&k| J.column(k).norm() > 1e-9).count()
     }
 
-    /// Joint values within the limits at which the tool has the pose, one per branch, after each other into `found`.
+    /// Joint values within the limits at which the tool has the pose, one per branch, after each
+    /// other into `found`.
     pub(super) fn find(&mut self, X_WT: &Pose, found: &mut Vec<f64>) {
         found.clear();
         let Some(arm) = &self.closed else { return self.search(X_WT, found) };

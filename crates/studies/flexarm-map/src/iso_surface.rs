@@ -13,7 +13,8 @@ pub(super) struct Surface {
     pub(super) triangles: Vec<[u32; 3]>,
 }
 
-/// Corners of a cube by bits (x lowest), in six tetrahedra around the diagonal from 0 to 7: neighbours fit.
+/// Corners of a cube by bits (x lowest), in six tetrahedra around the diagonal from 0 to 7:
+/// neighbours fit.
 const TETRAHEDRA: [[usize; 4]; 6] =
     [[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]];
 
@@ -76,8 +77,8 @@ fn crossing(grid: &Grid, values: &[f64], level: f64, (a, b): (usize, usize)) -> 
 mod tests {
     use super::*;
 
-    /// Truth: a sphere of radius 0.8 has the area 4 π r²; each edge of a closed surface belongs to two triangles, and corners
-    /// less edges plus triangles are two (Euler).
+    /// Truth: a sphere of radius 0.8 has the area 4 π r²; each edge of a closed surface belongs to
+    /// two triangles, and corners less edges plus triangles are two (Euler).
     #[test]
     fn the_surface_of_equal_distance_is_a_closed_sphere_of_the_right_area() {
         let grid = Grid { lower: [-1.0; 3], spacing_m: 0.05, count: [41; 3] };

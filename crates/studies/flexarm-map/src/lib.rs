@@ -1,7 +1,7 @@
 //! Maps of the workspace: sag, compliance, frequencies and error under load at any number of poses.
 //!
-//! [`map()`] goes through places of the tool, joint values or a motion ([`MapRegion`]) and returns a [`Map`]: figures, the best
-//! and the worst pose, and every pose as a row of a [`MapTable`].
+//! [`map()`] goes through places of the tool, joint values or a motion ([`MapRegion`]) and returns
+//! a [`Map`]: figures, the best and the worst pose, and every pose as a row of a [`MapTable`].
 //!
 //! ```no_run
 //! use flexarm_run::Robot;
@@ -15,8 +15,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! At each pose the answers are those of [`flexarm_run::statics()`] and [`flexarm_run::modes()`], to the last bit. Drives are locked.
-//! Collisions are not looked for.
+//! At each pose the answers are those of [`flexarm_run::statics()`] and [`flexarm_run::modes()`],
+//! to the last bit. Drives are locked. Collisions are not looked for.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
@@ -75,11 +75,13 @@ use flexarm_run::robot::tcp_frame;
 
 /// Poses that are tried to find out how far the arm reaches.
 const REACH_POSES: usize = 20_000;
-/// Places along the longest edge of a box whose spacing is not told; fewer for arms whose inverse kinematics is a search.
+/// Places along the longest edge of a box whose spacing is not told; fewer for arms whose inverse
+/// kinematics is a search.
 const USUAL_PLACES: f64 = 32.0;
 const FEW_PLACES: f64 = 10.0;
 
-/// Which poses of a place are kept, of all directions of the tool and branches of the inverse kinematics.
+/// Which poses of a place are kept, of all directions of the tool and branches of the inverse
+/// kinematics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum KeptPoses {
     /// The best one.
@@ -98,21 +100,23 @@ pub struct MapRequest {
     pub modelling: Modelling,
     /// Where.
     pub region: MapRegion,
-    /// Where joints stay that the map does not move, and what branches are near to (rad or m); zero, or the nearest value within
-    /// the limits, without it.
+    /// Where joints stay that the map does not move, and what branches are near to (rad or m);
+    /// zero, or the nearest value within the limits, without it.
     pub at: Option<Vec<f64>>,
     /// Force and moment on the tool besides weight, world axes (N, N m).
     pub wrench: [f64; 6],
-    /// A tool that cuts, at its spindle speeds: the lowest limit of depth of each pose becomes a quantity.
+    /// A tool that cuts, at its spindle speeds: the lowest limit of depth of each pose becomes a
+    /// quantity.
     pub tool: Option<CuttingTool>,
-    /// Limits of depth by the mean cutting force alone (zero-order solution): ten times as quick, blind to period doubling.
+    /// Limits of depth by the mean cutting force alone (zero-order solution): ten times as quick,
+    /// blind to period doubling.
     pub zero_order: bool,
     /// How many natural frequencies; three without it.
     pub frequencies: Option<usize>,
     /// Which poses of a place are kept.
     pub keep: KeptPoses,
-    /// Quantity by which poses are compared: unless told the limit of depth of a tool, or the error under the load, or the worst
-    /// compliance without either.
+    /// Quantity by which poses are compared: unless told the limit of depth of a tool, or the error
+    /// under the load, or the worst compliance without either.
     pub by: Option<String>,
     /// Edges of a workpiece that is to be placed (m, along world axes).
     pub workpiece_m: Option<[f64; 3]>,
@@ -188,7 +192,8 @@ impl Map {
         self.table.row(self.best.row)[place] as usize
     }
 
-    /// A quantity per place of the grid, of the pose that a person would choose there; NaN where the tool does not come.
+    /// A quantity per place of the grid, of the pose that a person would choose there; NaN where
+    /// the tool does not come.
     fn by_place(&self, column: usize, grid: &Grid) -> Vec<f64> {
         let place = columns::HEAD.iter().position(|(name, _)| *name == "place").unwrap_or_default();
         let by = self.table.columns.iter().position(|column| column.name == self.by).unwrap_or(column);
@@ -224,8 +229,8 @@ pub struct GridFigures {
 /// `go_on` is shown how many of how many places are done, and may break off.
 ///
 /// # Errors
-/// [`MapError`] for what cannot be mapped, [`Error::Pose`] for joint values that do not fit, [`Error::Step`] for springs that
-/// hold nothing, [`Error::File`] and [`Error::Write`] for files.
+/// [`MapError`] for what cannot be mapped, [`Error::Pose`] for joint values that do not fit,
+/// [`Error::Step`] for springs that hold nothing, [`Error::File`] and [`Error::Write`] for files.
 pub fn map(
     robot: &Robot,
     request: &MapRequest,
@@ -425,7 +430,8 @@ fn home(model: &Model, at: Option<&[f64]>) -> Result<Vec<f64>, Error> {
     Ok(actuated.iter().map(|c| 0.0_f64.max(c.limits.lower).min(c.limits.upper)).collect())
 }
 
-/// Box around the places that the tool reaches with its joints within their limits, with some room: of many poses.
+/// Box around the places that the tool reaches with its joints within their limits, with some room:
+/// of many poses.
 fn reach(model: &Model) -> [[f64; 3]; 2] {
     const PRIMES: [f64; 10] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0];
     let tool = tcp_frame(model);
@@ -539,7 +545,8 @@ fn summed_up(
     })
 }
 
-/// What each place costs: of its poses the best one, as a person would choose it; the worst one if that is kept.
+/// What each place costs: of its poses the best one, as a person would choose it; the worst one if
+/// that is kept.
 fn cost_by_place(table: &MapTable, grid: &Grid, by: usize) -> Vec<f64> {
     let place = columns::HEAD.iter().position(|(name, _)| *name == "place").unwrap_or_default();
     let mut cost = vec![f64::INFINITY; grid.places()];

@@ -1,4 +1,5 @@
-//! The page of a map: slices, histograms, the best and the worst pose, the best place of a workpiece; one file without scripts.
+//! The page of a map: slices, histograms, the best and the worst pose, the best place of a
+//! workpiece; one file without scripts.
 
 use std::fmt::Write as _;
 

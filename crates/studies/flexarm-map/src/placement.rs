@@ -21,7 +21,8 @@ pub struct Placement {
     pub points: usize,
 }
 
-/// The box of that size with the lowest highest cost; none if no box has only places that are reached.
+/// The box of that size with the lowest highest cost; none if no box has only places that are
+/// reached.
 ///
 /// * `cost`: per place of the grid; infinite where the tool does not come.
 /// * `size_m`: edges along x, y and z; it covers the places that it takes to hold them.
@@ -52,7 +53,8 @@ pub(super) fn best_box(grid: &Grid, cost: &[f64], size_m: [f64; 3]) -> Option<Pl
     })
 }
 
-/// Replaces each value by the largest of itself and those that follow it along an axis within the window.
+/// Replaces each value by the largest of itself and those that follow it along an axis within the
+/// window.
 fn running_maximum(values: &mut [f64], count: [usize; 3], axis: usize, window: usize) {
     let stride = count[..axis].iter().product::<usize>();
     let n = count[axis];

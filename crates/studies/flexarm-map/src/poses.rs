@@ -31,8 +31,9 @@ struct PosesFile {
 
 /// Reads poses from a file: all actuated joints in coordinate order (rad or m), pose after pose.
 ///
-/// A table has a column for each joint, of its name, or with the unit at the end (`_rad`, `_m`, `_deg`). A `.toml` file has
-/// `format = 1`, `poses = [[...], ...]`, and may have `joints = [...]` and `angles = "deg"`.
+/// A table has a column for each joint, of its name, or with the unit at the end (`_rad`, `_m`,
+/// `_deg`). A `.toml` file has `format = 1`, `poses = [[...], ...]`, and may have `joints = [...]`
+/// and `angles = "deg"`.
 ///
 /// * `at`: where joints stay that the file does not name; zero without it.
 ///

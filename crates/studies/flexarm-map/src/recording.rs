@@ -1,5 +1,5 @@
-//! A map as a recording for the Rerun viewer: coloured places, slices, surfaces of one value, ellipsoids of compliance, and the
-//! arm at the worst and at the best pose.
+//! A map as a recording for the Rerun viewer: coloured places, slices, surfaces of one value,
+//! ellipsoids of compliance, and the arm at the worst and at the best pose.
 
 use std::path::Path;
 

@@ -1,4 +1,5 @@
-//! Where a map is taken: places of the tool on a grid, values of joints, or a motion; and the ways the tool may point.
+//! Where a map is taken: places of the tool on a grid, values of joints, or a motion; and the ways
+//! the tool may point.
 
 use flexarm_kinematics::Pose;
 use nalgebra::{Matrix3, Rotation3, Translation3, Unit, Vector3};
@@ -17,9 +18,11 @@ const GOLDEN_RAD: f64 = 2.399_963_229_728_653;
 pub enum MapRegion {
     /// On a grid of places of the tool, by inverse kinematics.
     Workspace(WorkspaceGrid),
-    /// On a grid of joint values; joints that are not named stay where [`super::MapRequest::at`] says.
+    /// On a grid of joint values; joints that are not named stay where [`super::MapRequest::at`]
+    /// says.
     Joints(Vec<JointRange>),
-    /// At poses that are listed: all actuated joints in coordinate order (rad or m). The table has the 6x6 compliance of each.
+    /// At poses that are listed: all actuated joints in coordinate order (rad or m). The table has
+    /// the 6x6 compliance of each.
     Poses(Vec<Vec<f64>>),
     /// At equal distances of time along a motion.
     Along {
@@ -43,7 +46,8 @@ pub struct WorkspaceGrid {
     pub bounds: Option<[[f64; 3]; 2]>,
     /// Distance of the places (m); about a thirtieth of the longest edge without it.
     pub spacing_m: Option<f64>,
-    /// Places nearer to the upright line (world z) through the first joint than this do not count (m): the arm itself is there.
+    /// Places nearer to the upright line (world z) through the first joint than this do not count
+    /// (m): the arm itself is there.
     pub keep_out_m: f64,
     /// How the tool may point.
     pub tool: ToolDirections,
@@ -54,7 +58,8 @@ pub struct WorkspaceGrid {
 pub struct ToolDirections {
     /// Where the z axis of the tool points in the world, of any length.
     pub axis: [f64; 3],
-    /// Rotation of the tool about that axis (rad): at 0 its x axis lies in the plane of that axis and world x, on the side of x.
+    /// Rotation of the tool about that axis (rad): at 0 its x axis lies in the plane of that axis
+    /// and world x, on the side of x.
     pub roll_rad: f64,
     /// Half angle of a cone about the axis within which the tool may tilt (rad).
     pub cone_rad: f64,
@@ -211,8 +216,8 @@ mod tests {
         assert_eq!(grid.index(21 * 4 - 1), [20, 3, 0]);
     }
 
-    /// Truth: the directions of a cap are even if as much of its area lies within each as its number says,
-    /// `1 - cos(angle) = part (1 - cos(cone))`.
+    /// Truth: the directions of a cap are even if as much of its area lies within each as its
+    /// number says, `1 - cos(angle) = part (1 - cos(cone))`.
     #[test]
     fn directions_of_a_cone_lie_evenly_within_it() {
         let cone = 0.6;

@@ -31,7 +31,8 @@ pub(super) enum Places<'a> {
         grid: Grid,
         rotations: &'a [Rotation3<f64>],
         finder: &'a Finder<'a>,
-        /// Radius around the upright line through the finder's foot within which places do not count (m).
+        /// Radius around the upright line through the finder's foot within which places do not
+        /// count (m).
         keep_out_m: f64,
     },
     /// Joint values, by number of the pose.

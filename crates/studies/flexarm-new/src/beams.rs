@@ -1,4 +1,5 @@
-//! Links that look like beams: a hollow section from the outlines of the mesh and the mass of the link.
+//! Links that look like beams: a hollow section from the outlines of the mesh and the mass of the
+//! link.
 //!
 //! Frames: L link; S section, x from the link's origin to the distal joint, y and z across.
 
@@ -13,7 +14,8 @@ use super::ends;
 const CUTS: usize = 48;
 /// Places along the beam at which bending is looked at.
 const STATIONS: usize = 40;
-/// Part of the way between the joints along which there must be a shape, around the line or beside it.
+/// Part of the way between the joints along which there must be a shape, around the line or beside
+/// it.
 const ALONG: f64 = 0.75;
 /// The shape lies beside the line between the joints by this part of its length at most.
 const BESIDE: f64 = 0.45;
@@ -50,7 +52,8 @@ pub(crate) struct BeamSection {
     pub(crate) y_axis: [f64; 3],
     /// From the line between the joints to the centroid, in link axes (m).
     pub(crate) offset: [f64; 3],
-    /// Where the beam itself begins and ends, link axes (m); none from the link's frame to the next joint.
+    /// Where the beam itself begins and ends, link axes (m); none from the link's frame to the next
+    /// joint.
     pub(crate) ends: Option<[[f64; 3]; 2]>,
     /// Largest over smallest outer width along the beam.
     pub(crate) taper: f64,
@@ -71,8 +74,8 @@ pub(crate) struct Candidate<'a> {
     pub(crate) arm: f64,
 }
 
-/// A section for the link, or in words why there is none. Where its shape does not lie between its frames, that of the body
-/// that shape and joint axes tell.
+/// A section for the link, or in words why there is none. Where its shape does not lie between its
+/// frames, that of the body that shape and joint axes tell.
 pub(crate) fn propose(link: &Candidate<'_>) -> Result<BeamSection, String> {
     let reason = match between(link, [Vector3::zeros(), link.distal.X_PJ.translation.vector]) {
         Ok(section) => return Ok(section),
@@ -288,7 +291,8 @@ impl Cuts {
     }
 }
 
-/// Places along the beam with weights that a force at the tip gives their compliance: `3 (1 - x/l)²`, together 1.
+/// Places along the beam with weights that a force at the tip gives their compliance:
+/// `3 (1 - x/l)²`, together 1.
 fn stations(length: f64) -> impl Iterator<Item = (f64, f64)> {
     let weight = move |k: usize| {
         let s = (k as f64 + 0.5) / STATIONS as f64;
@@ -383,7 +387,8 @@ fn hollow(shape: Shape, [width, height]: [f64; 2], wall: f64) -> [f64; 2] {
     [(width * height.powi(3) - w * h.powi(3)) / 12.0, (height * width.powi(3) - h * w.powi(3)) / 12.0]
 }
 
-/// The uniform section whose tip goes as far under a force as that of the link: `1/I = ∑ weight / I(x)` about both axes.
+/// The uniform section whose tip goes as far under a force as that of the link:
+/// `1/I = ∑ weight / I(x)` about both axes.
 fn equivalent(outlines: &[Outline], shape: Shape, length: f64, wall: f64) -> BeamSection {
     let compliance = stations(length).fold([0.0; 2], |[a, b], (x, weight)| {
         let [I_y, I_z] = hollow(shape, outline_at(outlines, x), wall);
@@ -394,7 +399,8 @@ fn equivalent(outlines: &[Outline], shape: Shape, length: f64, wall: f64) -> Bea
     let largest = |x: f64| outline_at(outlines, x).into_iter().fold(0.0, f64::max);
     let sizes = || stations(length).map(|(x, _)| largest(x));
     let taper = sizes().fold(0.0, f64::max) / sizes().fold(f64::INFINITY, f64::min);
-    // Moments go with the sizes as powers of the fourth order about; this halves the error each time.
+    // Moments go with the sizes as powers of the fourth order about; this halves the error each
+    // time.
     for _ in 0..60 {
         let [now_y, now_z] = hollow(shape, [width, height], wall);
         height *= (I_y / now_y).powf(0.25);
@@ -467,8 +473,8 @@ mod tests {
         vec![[-w / 2.0, -h / 2.0], [w / 2.0, -h / 2.0], [w / 2.0, h / 2.0], [-w / 2.0, h / 2.0]]
     }
 
-    /// Truth: the box that the mesh and the mass were made of. Bound 1e-4: positions have seven digits, and the wall is a
-    /// small difference.
+    /// Truth: the box that the mesh and the mass were made of. Bound 1e-4: positions have seven
+    /// digits, and the wall is a small difference.
     #[test]
     fn a_box_of_known_wall_is_found_again_however_its_frame_is_turned() {
         let (length, w, h, wall) = (0.9, 0.18, 0.12, 0.008);
@@ -491,7 +497,8 @@ mod tests {
         }
     }
 
-    /// Truth: tube of diameter 0.2 and wall 0.006. The mesh has 64 corners, so its second moments are 0.3 % below a circle's.
+    /// Truth: tube of diameter 0.2 and wall 0.006. The mesh has 64 corners, so its second moments
+    /// are 0.3 % below a circle's.
     #[test]
     fn a_tube_of_known_wall_is_found_again() {
         let (length, diameter, wall) = (0.8, 0.2, 0.006);
@@ -512,8 +519,8 @@ mod tests {
         assert!(errors[0].abs() < 2e-3 && errors[1].abs() < 3e-3 && errors[2].abs() < 5e-3, "{errors:?}");
     }
 
-    /// Truth: tip of a cantilever under a force, `∫ (l - x)²/(E I(x)) dx`, by Simpson's rule in 2000 steps over the closed
-    /// form of I(x) of a tapered box.
+    /// Truth: tip of a cantilever under a force, `∫ (l - x)²/(E I(x)) dx`, by Simpson's rule in
+    /// 2000 steps over the closed form of I(x) of a tapered box.
     #[test]
     fn the_tip_of_a_tapered_link_goes_as_far_as_that_of_its_uniform_beam() {
         let (length, wall) = (1.0, 0.01);

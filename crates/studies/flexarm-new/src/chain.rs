@@ -179,7 +179,8 @@ fn named_joints(mechanism: &Mechanism, names: &[String]) -> Result<Vec<usize>, N
     Ok(joints)
 }
 
-/// Whether a joint is one of a hand: by its name, or because it moves a finger. The body of a gripper may turn with the arm.
+/// Whether a joint is one of a hand: by its name, or because it moves a finger. The body of a
+/// gripper may turn with the arm.
 fn is_of_hand(joint: &Joint) -> bool {
     let (name, child) = (joint.name.to_lowercase(), joint.child.to_lowercase());
     HAND.iter().any(|word| name.contains(word)) || FINGER.iter().any(|word| child.contains(word))
@@ -249,7 +250,8 @@ fn choose_tool(tree: &Tree<'_>, base: &str, choices: &mut Vec<String>) -> Result
     Ok(best.tool.to_owned())
 }
 
-/// The path up to where a hand begins: a finger by its name, or several short chains from one body after at least three joints.
+/// The path up to where a hand begins: a finger by its name, or several short chains from one body
+/// after at least three joints.
 fn without_hand(tree: &Tree<'_>, path: &[usize]) -> Vec<usize> {
     let mut free = 0;
     let mut length = 0.0;
@@ -289,7 +291,8 @@ fn reach(tree: &Tree<'_>, joint: usize) -> f64 {
     longest
 }
 
-/// The tool frame on the body of a link: by name, else the end of its chain of frames without shape; and whether by name.
+/// The tool frame on the body of a link: by name, else the end of its chain of frames without
+/// shape; and whether by name.
 fn tool_of<'a>(tree: &Tree<'a>, end: &'a str) -> (&'a str, bool) {
     let body = tree.body(end);
     let is_named = |link: &str, tool: &str| {
@@ -301,7 +304,8 @@ fn tool_of<'a>(tree: &Tree<'a>, end: &'a str) -> (&'a str, bool) {
             return (link, true);
         }
     }
-    // Cameras and sensors hang beside; what follows the last joint without a fork leads to the tool.
+    // Cameras and sensors hang beside; what follows the last joint without a fork leads to the
+    // tool.
     let mut at = end;
     loop {
         let mut children = tree.below(at).filter(|&k| !moves(tree.joint(k)));

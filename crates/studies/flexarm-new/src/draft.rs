@@ -153,8 +153,9 @@ impl Draft {
         self.links.iter().filter(|link| link.section.is_ok()).collect()
     }
 
-    /// Tries each beam in the robot file that is to be written: one whose link cannot be cut gets the mass of a uniform beam,
-    /// one that cannot be put in place at all is left out, with the reason.
+    /// Tries each beam in the robot file that is to be written: one whose link cannot be cut gets
+    /// the mass of a uniform beam, one that cannot be put in place at all is left out, with the
+    /// reason.
     pub(crate) fn settle(&mut self, placed: &Placed, _options: &NewOptions) -> Result<(), Error> {
         let loads = |draft: &Self, beams: &[&DraftLink]| {
             let text = text::robot_file(draft, placed, beams);
@@ -179,7 +180,8 @@ impl Draft {
     }
 }
 
-/// Reads the description. Inertias that no body can have keep it from nothing: they are taken as they are, and told.
+/// Reads the description. Inertias that no body can have keep it from nothing: they are taken as
+/// they are, and told.
 fn read(path: &Path, options: &ReadOptions) -> Result<(UrdfRobot, Vec<String>), Error> {
     let error = match read_urdf(path, options) {
         Ok(urdf) => return Ok((urdf, Vec::new())),
@@ -361,7 +363,8 @@ fn links(urdf: &UrdfRobot, chain: &Chain) -> Vec<DraftLink> {
     kept
 }
 
-/// What a link looks like, in its axes; its shapes for collisions where it has no others that can be read.
+/// What a link looks like, in its axes; its shapes for collisions where it has no others that can
+/// be read.
 fn shapes(urdf: &UrdfRobot, link: &str) -> (Vec<TriangleMesh>, bool) {
     let read = |visuals: &[Visual]| -> Vec<TriangleMesh> {
         let own = visuals.iter().filter(|v| v.link == link);

@@ -1,8 +1,10 @@
-//! Where a link's own body begins and ends between its two joints, where the frames of the file lie elsewhere.
+//! Where a link's own body begins and ends between its two joints, where the frames of the file lie
+//! elsewhere.
 //!
-//! A frame may sit anywhere on the axis of its joint, and in many descriptions it sits at the far end of the link. The body
-//! lies along the mesh's longest principal axis; where a joint turns about that axis, more or less, along the axis of the
-//! joint. A joint whose axis crosses the body is where it comes nearest; one that turns about it is at the end of the mesh.
+//! A frame may sit anywhere on the axis of its joint, and in many descriptions it sits at the far
+//! end of the link. The body lies along the mesh's longest principal axis; where a joint turns
+//! about that axis, more or less, along the axis of the joint. A joint whose axis crosses the body
+//! is where it comes nearest; one that turns about it is at the end of the mesh.
 
 use flexarm_kinematics::{Joint, JointKind};
 use flexarm_urdf::TriangleMesh;
@@ -10,11 +12,12 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::beams::Candidate;
 
-/// Cosine between a joint axis and the body from which on the joint turns about the body: 45 degrees. Housings of the next
-/// joint tilt the principal axis by 30.
+/// Cosine between a joint axis and the body from which on the joint turns about the body: 45
+/// degrees. Housings of the next joint tilt the principal axis by 30.
 const ALONG: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// Both ends of the body, the proximal one first, link axes; `None` where shape and joints do not tell them.
+/// Both ends of the body, the proximal one first, link axes; `None` where shape and joints do not
+/// tell them.
 pub(crate) fn of(link: &Candidate<'_>) -> Option<[Vector3<f64>; 2]> {
     let (middle, along) = principal_axis(link.meshes)?;
     let X_LB = &link.distal.X_PJ;

@@ -1,4 +1,5 @@
-//! Torsional stiffness of reducers by their rated torque: figures of two families, for a first guess. The maker's sheet of the gear itself goes before them.
+//! Torsional stiffness of reducers by their rated torque: figures of two families, for a first
+//! guess. The maker's sheet of the gear itself goes before them.
 //!
 //! Stiffness grows almost as the rated torque does: both families turn by about 1e-3 rad under it.
 
@@ -7,7 +8,8 @@ use serde::Serialize;
 /// N m per minute of arc in N m/rad.
 const ARC_MINUTE: f64 = 60.0 * 180.0 / std::f64::consts::PI;
 
-/// Cycloidal reducers, series RV-E of Nabtesco: size, rated torque (N m), torsional rigidity (N m per minute of arc).
+/// Cycloidal reducers, series RV-E of Nabtesco: size, rated torque (N m), torsional rigidity (N m
+/// per minute of arc).
 const CYCLOIDAL: [(f64, f64, f64); 8] = [
     (6.0, 58.0, 20.0),
     (20.0, 167.0, 49.0),
@@ -19,8 +21,8 @@ const CYCLOIDAL: [(f64, f64, f64); 8] = [
     (450.0, 4410.0, 1176.0),
 ];
 
-/// Strain-wave gears, series CSG of Harmonic Drive at ratios from 80: size, rated torque (N m), stiffness at small torque (K1)
-/// and at large torque (K3) (N m/rad).
+/// Strain-wave gears, series CSG of Harmonic Drive at ratios from 80: size, rated torque (N m),
+/// stiffness at small torque (K1) and at large torque (K3) (N m/rad).
 const STRAIN_WAVE: [(f64, f64, f64, f64); 8] = [
     (14.0, 10.0, 4.7e3, 7.1e3),
     (17.0, 31.0, 1.0e4, 1.6e4),
@@ -36,7 +38,8 @@ const STRAIN_WAVE: [(f64, f64, f64, f64); 8] = [
 pub(crate) const CYCLOIDAL_FROM: f64 = 200.0;
 /// Torque for starting and stopping over rated torque, of both families about.
 pub(crate) const PEAK_OVER_RATED: f64 = 2.5;
-/// What gears of arms were identified at over the table's value: the main axes of the shipped KR 210, KR 300 and KR 500.
+/// What gears of arms were identified at over the table's value: the main axes of the shipped KR
+/// 210, KR 300 and KR 500.
 pub(crate) const IDENTIFIED: [f64; 2] = [0.45, 1.9];
 
 /// Stiffness of a reducer for a rated torque.
@@ -53,7 +56,8 @@ pub(crate) struct GearClass {
     pub(crate) is_beyond: bool,
 }
 
-/// The class of a rated torque (N m, above 0): by powers between two sizes, in proportion beyond the table.
+/// The class of a rated torque (N m, above 0): by powers between two sizes, in proportion beyond
+/// the table.
 pub(crate) fn class(rated: f64) -> GearClass {
     if rated >= CYCLOIDAL_FROM {
         let rows: Vec<_> =
@@ -102,7 +106,8 @@ fn between(rows: &[(f64, f64, f64)], rated: f64, before: &str, after: &str) -> (
 mod tests {
     use super::*;
 
-    /// Truth: the rows of the tables themselves; a turn under rated torque of about 1e-3 rad between them.
+    /// Truth: the rows of the tables themselves; a turn under rated torque of about 1e-3 rad
+    /// between them.
     #[test]
     fn the_stiffness_at_the_rated_torque_of_a_size_is_that_of_the_table_and_rises_between() {
         let exact = class(412.0).stiffness / (108.0 * ARC_MINUTE) - 1.0;
@@ -121,7 +126,8 @@ mod tests {
         }
     }
 
-    /// Truth: what was identified on arms (robots/README of each), at their largest torque over 2.5.
+    /// Truth: what was identified on arms (robots/README of each), at their largest torque over
+    /// 2.5.
     #[test]
     fn main_axes_of_identified_arms_lie_within_the_range_of_their_class() {
         let arms = [

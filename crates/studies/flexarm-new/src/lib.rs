@@ -1,4 +1,5 @@
-//! A robot file from a robot description: what can be found out is found out, what cannot is assumed and said, or asked.
+//! A robot file from a robot description: what can be found out is found out, what cannot is
+//! assumed and said, or asked.
 //!
 //! ```no_run
 //! use flexarm_new::{NewOptions, new_robot};
@@ -10,8 +11,9 @@
 //! # Ok::<(), flexarm_run::Error>(())
 //! ```
 //!
-//! Start at [`new_robot`]. `docs/new_robot.md` has the rules and a whole run. Not here: reading the description
-//! (`flexarm-urdf`), what a robot file means ([`flexarm_run::Robot`]), the run that follows ([`flexarm_run::Arm::simulate`]).
+//! Start at [`new_robot`]. `docs/new_robot.md` has the rules and a whole run. Not here: reading the
+//! description (`flexarm-urdf`), what a robot file means ([`flexarm_run::Robot`]), the run that
+//! follows ([`flexarm_run::Arm::simulate`]).
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
@@ -161,8 +163,8 @@ fn did_you_mean(closest: &Option<String>, what: &str, known: &[String]) -> Strin
     }
 }
 
-/// Makes a folder with `robot.toml`, `motion.toml`, `README.md` and, where it does not lie beside, a copy of the description;
-/// loads and checks what it wrote.
+/// Makes a folder with `robot.toml`, `motion.toml`, `README.md` and, where it does not lie beside,
+/// a copy of the description; loads and checks what it wrote.
 ///
 /// # Errors
 /// [`NewError`]: no arm in it, nothing that has a mass, names that are not there; [`Error::Urdf`] for the description;

@@ -1,4 +1,5 @@
-//! What the joints have to carry and to move: torques of weight and of speeding up, over the whole workspace.
+//! What the joints have to carry and to move: torques of weight and of speeding up, over the whole
+//! workspace.
 
 use flexarm_kinematics::{
     Data, Joint, JointKind, Link, LinkInertia, Mechanism, Model, Pose, forward_kinematics, gravity_forces, mass_matrix,
@@ -20,7 +21,8 @@ const WEIGHT_SHARE: f64 = 0.8;
 /// An effort limit this many times what the arm needs is no property of its drive.
 const SENSELESS: f64 = 25.0;
 
-/// Range in which a coordinate is moved: its limits, at most so much to each side of the value nearest to zero.
+/// Range in which a coordinate is moved: its limits, at most so much to each side of the value
+/// nearest to zero.
 pub(crate) fn range(joint: &Joint) -> [f64; 2] {
     let most = if joint.kind.slides() { 1.0 } else { 2.1 };
     let (lower, upper) = (joint.limits.lower, joint.limits.upper);
@@ -153,15 +155,17 @@ pub(crate) fn effort_fault(effort: f64, weight: f64, needed: f64, floor: f64) ->
     }
 }
 
-/// Torque of a payload that sits a fifth of the reach beside an axis (N m): wrists are made for so much. Where nothing is
-/// carried, for a twentieth of the mass that moves.
+/// Torque of a payload that sits a fifth of the reach beside an axis (N m): wrists are made for so
+/// much. Where nothing is carried, for a twentieth of the mass that moves.
 pub(crate) fn wrist_torque(payload: f64, moving_mass: f64, reach: f64) -> f64 {
     9.81 * payload.max(0.05 * moving_mass) * 0.2 * reach
 }
 
-/// A payload from the arm's own mass, rounded to a number that data sheets have, and no more than the effort limits carry.
+/// A payload from the arm's own mass, rounded to a number that data sheets have, and no more than
+/// the effort limits carry.
 ///
-/// * `joints`: effort limit, weight without payload, and how much of it comes with each kg (N m per kg).
+/// * `joints`: effort limit, weight without payload, and how much of it comes with each kg (N m per
+///   kg).
 pub(crate) fn guessed_payload(mass: f64, joints: &[(f64, f64, f64)]) -> f64 {
     let mut most = PAYLOAD_SHARE * mass;
     for &(effort, weight, per_kg) in joints {

@@ -1,4 +1,5 @@
-//! Where the description is: referred to where it lies beside the new folder, else copied with its meshes.
+//! Where the description is: referred to where it lies beside the new folder, else copied with its
+//! meshes.
 
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -103,7 +104,8 @@ fn real(path: &Path) -> Option<PathBuf> {
     Some(if rest.as_os_str().is_empty() { real } else { real.join(rest) })
 }
 
-/// Refers to a description in the new folder, in the one above or in one beside it; copies any other.
+/// Refers to a description in the new folder, in the one above or in one beside it; copies any
+/// other.
 pub(crate) fn place(draft: &Draft, urdf: &Path, folder: &Path, options: &NewOptions) -> Result<Placed, Error> {
     let robot_path = folder.join("robot.toml");
     if let (Some(out), Some(file)) = (real(folder), real(urdf))
@@ -129,7 +131,8 @@ pub(crate) fn place(draft: &Draft, urdf: &Path, folder: &Path, options: &NewOpti
     copied(draft, urdf, folder, robot_path)
 }
 
-/// The description, expanded if it was xacro, with the meshes that it names and paths relative to it.
+/// The description, expanded if it was xacro, with the meshes that it names and paths relative to
+/// it.
 fn copied(draft: &Draft, urdf: &Path, folder: &Path, robot_path: PathBuf) -> Result<Placed, Error> {
     let name = format!("{}.urdf", flexarm_files::file_stem(&draft.name));
     let mut names: BTreeMap<String, PathBuf> = BTreeMap::new();

@@ -124,11 +124,13 @@ pub struct NewLink {
     pub y_axis: Option<[f64; 3]>,
     /// From the line between the joints to the beam, link axes.
     pub offset: Option<[f64; 3]>,
-    /// Where the beam itself begins and ends, link axes; null from the link's frame to the distal joint.
+    /// Where the beam itself begins and ends, link axes; null from the link's frame to the distal
+    /// joint.
     pub ends: Option<[[f64; 3]; 2]>,
     /// Largest over smallest outer width along the beam.
     pub taper: Option<f64>,
-    /// Part of the cuts through the mesh whose outline was not closed: there its convex hull counts.
+    /// Part of the cuts through the mesh whose outline was not closed: there its convex hull
+    /// counts.
     pub open_cuts: Option<f64>,
     /// Why no section is proposed.
     pub reason: Option<String>,

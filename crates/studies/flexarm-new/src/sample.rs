@@ -75,7 +75,8 @@ impl Wish {
     }
 }
 
-/// Rests far from each other, by the place of the tool, with ways between them that keep above the floor.
+/// Rests far from each other, by the place of the tool, with ways between them that keep above the
+/// floor.
 pub(crate) fn sample_motion(model: &Model, workspace: &Workspace, axes: &[Axis]) -> SampleMotion {
     let mut data = Data::new(model);
     let inner = |pose: &Posed| {
@@ -139,7 +140,8 @@ fn still_height(model: &Model, data: &mut Data, workspace: &Workspace) -> f64 {
     still.map(|k| first[k]).fold(f64::INFINITY, f64::min).min(0.0)
 }
 
-/// The pose nearest to the middle of the ranges, then always the one whose tool is farthest from all before.
+/// The pose nearest to the middle of the ranges, then always the one whose tool is farthest from
+/// all before.
 fn choose(model: &Model, data: &mut Data, poses: &[Posed], axes: &[Axis], wish: &Wish) -> Vec<Posed> {
     let away = |pose: &Posed| -> f64 {
         let part =

@@ -1,4 +1,5 @@
-//! What is differentiated of joints under servos beside the rest: friction, gains, and what controllers know of the arm.
+//! What is differentiated of joints under servos beside the rest: friction, gains, and what
+//! controllers know of the arm.
 
 use flexarm_identify::{Effect, RunParameter};
 use flexarm_kinematics::{Model, SpatialInertia};
@@ -12,11 +13,13 @@ use flexarm_run::Error;
 use flexarm_run::Scenario;
 use flexarm_run::robot::PAYLOAD_LINK;
 
-/// Changes over which the gains that follow a mass (kg) or a joint (rad or m) are differenced: they are smooth, and nothing else is in it.
+/// Changes over which the gains that follow a mass (kg) or a joint (rad or m) are differenced: they
+/// are smooth, and nothing else is in it.
 const MASS_STEP: f64 = 0.02;
 const JOINT_STEP: f64 = 2e-3;
 
-/// Adds friction and gains of the joints under servos, and to masses and motions what the controllers make of them.
+/// Adds friction and gains of the joints under servos, and to masses and motions what the
+/// controllers make of them.
 pub(super) fn add_controllers(arm: &Arm, scenario: &Scenario, all: &mut Vec<Named>) -> Result<(), Error> {
     let flexible = arm.flexible();
     if !flexible.has_servo() {
@@ -40,8 +43,8 @@ pub(super) fn add_controllers(arm: &Arm, scenario: &Scenario, all: &mut Vec<Name
     Ok(())
 }
 
-/// Makes of a mass or a motion one of which the controllers know: the rigid robot carries the mass too, and gains that the robot file
-/// leaves out fit the inertia at the start.
+/// Makes of a mass or a motion one of which the controllers know: the rigid robot carries the mass
+/// too, and gains that the robot file leaves out fit the inertia at the start.
 fn follow(arm: &Arm, named: &mut Named, start: &DVector<f64>) {
     let flexible = arm.flexible();
     let (mut fed_forward, gains) = (

@@ -1,6 +1,8 @@
-//! How the tool's error along a motion depends on every number of the robot: derivatives of the whole run, exact, for all of them at once.
+//! How the tool's error along a motion depends on every number of the robot: derivatives of the
+//! whole run, exact, for all of them at once.
 //!
-//! Start at [`sensitivity`], or at [`error_slopes`] for numbers alone; [`pose_sensitivity`] answers for a pose.
+//! Start at [`sensitivity`], or at [`error_slopes`] for numbers alone; [`pose_sensitivity`] answers
+//! for a pose.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
@@ -41,7 +43,8 @@ const SAME_TIME: f64 = 1e-9;
 /// What is asked of [`sensitivity`].
 #[derive(Clone, Debug, Default)]
 pub struct SensitivityRequest {
-    /// How the run goes: modelling, generalised-alpha and its step, limits. Rates and pictures do not count.
+    /// How the run goes: modelling, generalised-alpha and its step, limits. Rates and pictures do
+    /// not count.
     pub run: RunOptions,
     /// Names of what the error is differentiated by, * for anything; all without any.
     pub parameters: Vec<String>,
@@ -72,7 +75,8 @@ pub struct Sensitivity {
     pub peak_rad: f64,
     /// Root of its mean square (rad).
     pub rms_rad: f64,
-    /// One per number of the robot, its tool and its motion; what the RMS depends on most comes first.
+    /// One per number of the robot, its tool and its motion; what the RMS depends on most comes
+    /// first.
     pub parameters: Vec<ParameterSensitivity>,
     /// Error and derivatives over time.
     pub table: Option<String>,
@@ -85,14 +89,16 @@ pub struct Sensitivity {
 /// What a change of one number does to the error.
 #[derive(Clone, Debug, Serialize)]
 pub struct ParameterSensitivity {
-    /// By the names of the robot file, of joints under servos `drive.JOINT.servo.` with their gains and `drive.JOINT.friction.` too;
-    /// `motion.JOINT` for a shift of a joint, `tcp.x`, `.y` and `.z` for the place of the tool in its own axes.
+    /// By the names of the robot file, of joints under servos `drive.JOINT.servo.` with their gains
+    /// and `drive.JOINT.friction.` too; `motion.JOINT` for a shift of a joint, `tcp.x`, `.y` and
+    /// `.z` for the place of the tool in its own axes.
     pub name: String,
     /// Its unit.
     pub unit: String,
     /// Its value; 0 of a shift, 1 of what a servo feeds forward.
     pub value: f64,
-    /// Of which change of it the following are the effect: `1 %`, `1 % of the root of K_ii K_jj`, `1 kg`, `1 mrad` or `1 mm`. They are derivatives, times that.
+    /// Of which change of it the following are the effect: `1 %`, `1 % of the root of K_ii K_jj`,
+    /// `1 kg`, `1 mrad` or `1 mm`. They are derivatives, times that.
     pub per: &'static str,
     /// Of the largest distance, at the time where it is (m).
     pub peak_m: f64,
@@ -114,15 +120,16 @@ struct Named {
     parameter: RunParameter,
 }
 
-/// Error of the tool along a run and its derivatives by parameters, side by side. No other stepper than generalised-alpha; iterations go on
-/// to the end, so that the run is a smooth function of all that goes into it.
+/// Error of the tool along a run and its derivatives by parameters, side by side. No other stepper
+/// than generalised-alpha; iterations go on to the end, so that the run is a smooth function of all
+/// that goes into it.
 ///
-/// Cost: of kr210 (18 elastic coordinates) about ten ordinary runs, and a quarter of one for each parameter. With closed loops or links in
-/// modes a hundred runs and more.
+/// Cost: of kr210 (18 elastic coordinates) about ten ordinary runs, and a quarter of one for each
+/// parameter. With closed loops or links in modes a hundred runs and more.
 ///
 /// # Errors
-/// As [`Arm::simulate`]; [`Error::Step`] where the arm has what is not differentiated (links that stiffen under load, motions
-/// whose velocity jumps under servos).
+/// As [`Arm::simulate`]; [`Error::Step`] where the arm has what is not differentiated (links that
+/// stiffen under load, motions whose velocity jumps under servos).
 pub fn error_slopes(
     arm: &Arm,
     scenario: impl Into<Scenario>,
@@ -167,7 +174,8 @@ fn slopes_and_caveats(
     Ok((found, caveats))
 }
 
-/// Numbers of the arm by which is differentiated: entries of matrices, of which there are many, only by their names.
+/// Numbers of the arm by which is differentiated: entries of matrices, of which there are many,
+/// only by their names.
 fn numbers(arm: &Arm, asked: &[String]) -> Vec<Parameter> {
     let entries = link_entries(arm).into_iter();
     let entries = entries.filter(|own| asked.iter().any(|pattern| asks_for(pattern, &own.name)));
@@ -201,11 +209,13 @@ fn run_parameters(arm: &Arm, scenario: &Scenario, asked: &[String]) -> Result<Ve
     add_controllers(arm, scenario, &mut all)?;
     Ok(all)
 }
-/// How the tool's error along a motion depends on every number of the robot: stiffness and damping of gearboxes and links, masses, the tool's
-/// place, the joints of the motion; of joints under servos their friction and gains.
+/// How the tool's error along a motion depends on every number of the robot: stiffness and damping
+/// of gearboxes and links, masses, the tool's place, the joints of the motion; of joints under
+/// servos their friction and gains.
 ///
 /// # Errors
-/// As [`error_slopes`]; [`Error::Value`] for a name that fits nothing, [`Error::File`] and [`Error::Write`] for the table.
+/// As [`error_slopes`]; [`Error::Value`] for a name that fits nothing, [`Error::File`] and
+/// [`Error::Write`] for the table.
 pub fn sensitivity(
     robot: &Robot,
     scenario: impl Into<Scenario>,
@@ -264,7 +274,8 @@ fn chosen<T>(mut all: Vec<T>, patterns: &[String], name: impl Fn(&T) -> &str) ->
     Ok(all)
 }
 
-/// The change by which a parameter of the arm is told, as words and in its coordinate of the search.
+/// The change by which a parameter of the arm is told, as words and in its coordinate of the
+/// search.
 fn change_of(parameter: &Parameter) -> (&'static str, f64) {
     match parameter.effect {
         Effect::Entry { size, .. } => ("1 % of the root of K_ii K_jj", 0.01 * size),
@@ -273,7 +284,8 @@ fn change_of(parameter: &Parameter) -> (&'static str, f64) {
     }
 }
 
-/// Error and derivatives after every step: six columns of each, world axes, m and rad, for the changes by which parameters are told.
+/// Error and derivatives after every step: six columns of each, world axes, m and rad, for the
+/// changes by which parameters are told.
 fn table(named: &[Named], found: &RunSlopes) -> String {
     const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
     let mut text = String::from("time_s");

@@ -1,4 +1,5 @@
-//! What the numbers of the robot do to the tool at rest, its compliance and the natural frequencies at a pose.
+//! What the numbers of the robot do to the tool at rest, its compliance and the natural frequencies
+//! at a pose.
 
 use flexarm_identify::{Effect, compliance_slopes, frequency_slopes, plant, tool_slopes};
 use flexarm_kinematics::{Pose, Wrench};
@@ -42,13 +43,15 @@ pub struct PoseSensitivity {
 /// What a change of one number does.
 #[derive(Clone, Debug, Serialize)]
 pub struct PoseParameter {
-    /// By the names of the robot file; `tcp.x`, `.y` and `.z` for the place of the tool in its own axes.
+    /// By the names of the robot file; `tcp.x`, `.y` and `.z` for the place of the tool in its own
+    /// axes.
     pub name: String,
     /// Its unit.
     pub unit: String,
     /// Its value.
     pub value: f64,
-    /// Of which change of it the following are the effect: `1 %`, `1 % of the root of K_ii K_jj`, `1 kg` or `1 mm`. They are derivatives, times that.
+    /// Of which change of it the following are the effect: `1 %`, `1 % of the root of K_ii K_jj`,
+    /// `1 kg` or `1 mm`. They are derivatives, times that.
     pub per: &'static str,
     /// Of the tool's place (m).
     pub tcp_m: [f64; 3],
@@ -60,9 +63,11 @@ pub struct PoseParameter {
     pub frequencies_hz: Vec<f64>,
 }
 
-/// What the numbers of the robot do at a pose: tool at rest under the arm's weight, its compliance, natural frequencies; drives locked.
+/// What the numbers of the robot do at a pose: tool at rest under the arm's weight, its compliance,
+/// natural frequencies; drives locked.
 ///
-/// * `at`: all actuated joints (rad or m), zero without it; `parameters`: names, * for anything, all without any.
+/// * `at`: all actuated joints (rad or m), zero without it; `parameters`: names, * for anything,
+///   all without any.
 ///
 /// # Errors
 /// [`Error::Value`] for a name that fits nothing, [`Error::Step`] where there is no equilibrium.
@@ -101,7 +106,8 @@ impl Asked {
     }
 }
 
-/// What moving the tool's point by 1 mm along one of its axes does, with `a` that axis in the world. The arm stands as it does:
+/// What moving the tool's point by 1 mm along one of its axes does, with `a` that axis in the
+/// world. The arm stands as it does:
 ///
 /// ```text
 /// J' = X' J,   C' = X' C + C X'ᵀ,   X' = [0 -[a]x; 0 0]

@@ -1,7 +1,8 @@
 //! The runs of a study: which values the parameters have in each, by its number.
 //!
-//! Parameters with listed values make a full grid, the last one changing fastest; those of one `linked` word go along together.
-//! Parameters with a distribution are drawn together, and every point of the grid gets the same draws.
+//! Parameters with listed values make a full grid, the last one changing fastest; those of one
+//! `linked` word go along together. Parameters with a distribution are drawn together, and every
+//! point of the grid gets the same draws.
 
 use crate::statistics::{Sample, grid_levels};
 
@@ -65,7 +66,8 @@ impl Column {
 
 impl Design {
     /// # Errors
-    /// With the place in the study: linked parameters of different lengths, too many runs or drawn parameters, names twice.
+    /// With the place in the study: linked parameters of different lengths, too many runs or drawn
+    /// parameters, names twice.
     pub(super) fn new(columns: Vec<Column>, file: &StudyFile) -> Result<Self, RobotFileError> {
         let fail = |place: &RobotFileError, message: String| RobotFileError { message, ..place.clone() };
         for (k, column) in columns.iter().enumerate() {
@@ -147,8 +149,9 @@ impl Design {
         &self.drawn
     }
 
-    /// Returns the coordinates of the first, the middle and the last drawn point; the bits are the same on
-    /// every machine. They differ between programs that draw differently. Empty if nothing is drawn.
+    /// Returns the coordinates of the first, the middle and the last drawn point; the bits are the
+    /// same on every machine. They differ between programs that draw differently. Empty if nothing
+    /// is drawn.
     pub(super) fn drawn_coordinates(&self) -> Vec<f64> {
         let points = self.sample.points();
         let places = [0, points / 2, points.saturating_sub(1)];

@@ -1,7 +1,7 @@
 //! Whether a metric is better if it is higher or if it is lower.
 //!
-//! In this order: what the study says, what the numbers of the run in its expression are (a frequency should be high, an error low, and
-//! one over a sag should be high), what its name says.
+//! In this order: what the study says, what the numbers of the run in its expression are (a
+//! frequency should be high, an error low, and one over a sag should be high), what its name says.
 
 use exmex::{Express, FlatEx};
 use serde::Serialize;
@@ -92,7 +92,8 @@ const LOWER: [&str; 12] = [
     "cost",
 ];
 
-/// Of a metric or a parameter by the words of its name; none if it has none that tells, or two that disagree.
+/// Of a metric or a parameter by the words of its name; none if it has none that tells, or two that
+/// disagree.
 pub(super) fn of_name(name: &str) -> Option<Better> {
     let name = name.to_lowercase();
     let words: Vec<&str> = name.split(|c: char| !c.is_alphanumeric()).collect();

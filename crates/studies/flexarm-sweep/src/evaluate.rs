@@ -1,7 +1,8 @@
 //! Runs of a study, some at a time, with what was asked of each.
 //!
-//! Where nothing is asked but how far the tool is off, how long that takes and the frequencies at the start, four runs go side by
-//! side ([`flexarm_stepping::Batch`]); else each has its whole summary. Which way a study goes depends on its metrics alone.
+//! Where nothing is asked but how far the tool is off, how long that takes and the frequencies at
+//! the start, four runs go side by side ([`flexarm_stepping::Batch`]); else each has its whole
+//! summary. Which way a study goes depends on its metrics alone.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -114,7 +115,8 @@ impl Sweep {
         });
     }
 
-    /// Runs with these values of the parameters; what each gave, and by how much it passes each constraint of the study.
+    /// Runs with these values of the parameters; what each gave, and by how much it passes each
+    /// constraint of the study.
     pub(super) fn evaluate_points(
         &self,
         points: &[(usize, Vec<ParameterValue>)],
@@ -200,8 +202,8 @@ impl Sweep {
         Ok(SummaryFacts { summary, mass_kg: built.mass_kg })
     }
 
-    /// A run ready to go side by side with others. `caveats` gets what is to be said of it as far as that can be told before its
-    /// first step, also if it fails.
+    /// A run ready to go side by side with others. `caveats` gets what is to be said of it as far
+    /// as that can be told before its first step, also if it fails.
     fn quick_run(&self, place: usize, values: &[ParameterValue], caveats: &mut Vec<Caveat>) -> Result<QuickRun, Error> {
         let Ready { built, scenario, options } = self.workshop.ready(values)?;
         caveats.extend_from_slice(&built.arm.robot_caveats());

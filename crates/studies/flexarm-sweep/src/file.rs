@@ -1,5 +1,5 @@
-//! The file of a study (`docs/sweep.md`): what is varied, how, and what is asked of each run. Only what can be told without the
-//! robot is checked here.
+//! The file of a study (`docs/sweep.md`): what is varied, how, and what is asked of each run. Only
+//! what can be told without the robot is checked here.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

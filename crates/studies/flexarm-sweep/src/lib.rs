@@ -1,11 +1,13 @@
-//! Studies: many runs of one robot with other numbers in its files, on all cores or anywhere, and what they tell.
+//! Studies: many runs of one robot with other numbers in its files, on all cores or anywhere, and
+//! what they tell.
 //!
-//! `docs/sweep.md` describes the file of a study. [`Sweep::load`] reads and checks it, [`Sweep::run`] runs what is not done yet in a
-//! folder or in a shard of it, [`merge`] joins folders of shards, [`Sweep::minimise`] looks for the least of a metric. Runs have numbers
-//! from 0; a number alone says what a run is, on any machine.
+//! `docs/sweep.md` describes the file of a study. [`Sweep::load`] reads and checks it,
+//! [`Sweep::run`] runs what is not done yet in a folder or in a shard of it, [`merge`] joins
+//! folders of shards, [`Sweep::minimise`] looks for the least of a metric. Runs have numbers from
+//! 0; a number alone says what a run is, on any machine.
 //!
-//! Not here: points of designs and what results tell as mathematics ([`statistics`]); a few runs with their curves over each other
-//! ([`flexarm_run::compare_study`]).
+//! Not here: points of designs and what results tell as mathematics ([`statistics`]); a few runs
+//! with their curves over each other ([`flexarm_run::compare_study`]).
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
@@ -130,8 +132,8 @@ impl Sweep {
     /// Reads and checks a study and all files that it names.
     ///
     /// # Errors
-    /// [`Error::RobotFile`] with line and column of what is wrong in the study: paths that lead nowhere, metrics that no run has,
-    /// files that are not there; what is wrong with the robot.
+    /// [`Error::RobotFile`] with line and column of what is wrong in the study: paths that lead
+    /// nowhere, metrics that no run has, files that are not there; what is wrong with the robot.
     pub fn load(path: &Path, finders: &Finders) -> Result<Self, Error> {
         let file = file::read(path)?;
         let mut workshop = Workshop::new(&file, finders)?;
@@ -202,7 +204,8 @@ impl Sweep {
         self.design.values(run)
     }
 
-    /// Runs what is not done yet of a shard; if that is all of the study, makes the table of all runs.
+    /// Runs what is not done yet of a shard; if that is all of the study, makes the table of all
+    /// runs.
     ///
     /// A run that fails is a row with its reason.
     ///
@@ -479,7 +482,8 @@ fn skeleton(robot: &Robot, flexible: &FlexibleRobot) -> Summary {
     }
 }
 
-/// A number for a text: the same text has the same on any machine (FNV-1a, 64 bits twice with different starts).
+/// A number for a text: the same text has the same on any machine (FNV-1a, 64 bits twice with
+/// different starts).
 fn fingerprint(bytes: &[u8]) -> String {
     let hash = |start: u64| bytes.iter().fold(start, |h, byte| (h ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3));
     format!("{:016x}{:016x}", hash(0xcbf2_9ce4_8422_2325), hash(0x9e37_79b9_7f4a_7c15))

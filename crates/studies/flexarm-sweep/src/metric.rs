@@ -1,4 +1,5 @@
-//! What is asked of each run: numbers of its summary by their place in the JSON, parameters, and expressions of both.
+//! What is asked of each run: numbers of its summary by their place in the JSON, parameters, and
+//! expressions of both.
 
 use exmex::{Express, FlatEx, FloatOpsFactory, MakeOperators};
 use serde_json::Value;
@@ -58,7 +59,8 @@ pub(super) struct Formula {
 
 /// What a metric may speak of.
 pub(super) struct Vocabulary<'a> {
-    /// Names of the parameters, in the order of their columns; none of those whose values are words.
+    /// Names of the parameters, in the order of their columns; none of those whose values are
+    /// words.
     pub(super) parameters: &'a [Option<String>],
     /// Metrics before it.
     pub(super) metrics: &'a [Metric],
@@ -378,7 +380,8 @@ impl Constraint {
         self.less.is_quick() && self.more.is_quick()
     }
 
-    /// By how much it is passed, in parts of the larger side; 0 if it is kept, NaN if a side has no value.
+    /// By how much it is passed, in parts of the larger side; 0 if it is kept, NaN if a side has no
+    /// value.
     pub(super) fn violation(&self, parameters: &[ParameterValue], metrics: &[f64], facts: &dyn Facts) -> f64 {
         let [less, more] = [&self.less, &self.more].map(|side| side.value(parameters, metrics, facts));
         if less.is_nan() || more.is_nan() {

@@ -1,7 +1,8 @@
 //! The search for the least of a metric within the bounds of the parameters and under constraints.
 //!
-//! Runs are asked for a generation at a time ([`LeastSearch`]). Each answer stands in a journal with the values of its parameters; a
-//! search that was stopped asks for the same points again and finds them there.
+//! Runs are asked for a generation at a time ([`LeastSearch`]). Each answer stands in a journal
+//! with the values of its parameters; a search that was stopped asks for the same points again and
+//! finds them there.
 
 use std::collections::HashMap;
 use std::fs::{File, OpenOptions};
@@ -65,11 +66,13 @@ pub struct MinimiseFigures {
     pub start: Option<f64>,
     /// Whether that keeps the constraints.
     pub start_kept: bool,
-    /// Least value so far that keeps the constraints, after each generation; null before there is one.
+    /// Least value so far that keeps the constraints, after each generation; null before there is
+    /// one.
     pub progress: Vec<Option<f64>>,
 }
 
-/// A line of the journal: values of the parameters that are looked for, then metrics and violations, or a reason; caveats.
+/// A line of the journal: values of the parameters that are looked for, then metrics and
+/// violations, or a reason; caveats.
 #[derive(Serialize, Deserialize)]
 struct Line(Vec<f64>, Option<String>, Vec<Option<f64>>, Vec<Option<f64>>, #[serde(default)] Option<String>);
 
@@ -158,8 +161,9 @@ fn key(values: &[f64]) -> Vec<u64> {
 }
 
 impl Sweep {
-    /// Looks for the least of a metric: the parameters move within their bounds, [`MinimiseRequest`] and the study say what is to be
-    /// least and what must hold. The runs that were tried are written as those of a study.
+    /// Looks for the least of a metric: the parameters move within their bounds,
+    /// [`MinimiseRequest`] and the study say what is to be least and what must hold. The runs that
+    /// were tried are written as those of a study.
     ///
     /// # Errors
     /// [`SweepError::Minimise`]: nothing to be least, parameters without bounds; otherwise as [`Sweep::run`].
@@ -253,7 +257,8 @@ impl Sweep {
         }
     }
 
-    /// Where a parameter starts, as a part of its range: what the files say now, if that is within; else the middle.
+    /// Where a parameter starts, as a part of its range: what the files say now, if that is within;
+    /// else the middle.
     fn start(&self, varied: &Varied) -> f64 {
         let own = &self.design.columns[varied.column];
         let now = self.workshop.current(varied.column).filter(|_| own.role != Role::Offset || varied.low <= 0.0);

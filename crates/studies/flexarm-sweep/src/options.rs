@@ -1,4 +1,5 @@
-//! Options of the runs of a study, under the words that `flexarm compare` has for them, with _ for -.
+//! Options of the runs of a study, under the words that `flexarm compare` has for them, with _ for
+//! -.
 
 use flexarm_stepping::{ReferenceMethod, STEPPERS, Start, StepperOptions};
 

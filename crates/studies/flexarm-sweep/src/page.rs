@@ -1,5 +1,5 @@
-//! The page of a study: figures, heat maps, main effects, sensitivities, Pareto front, scatter matrix, the best run; one file without
-//! scripts.
+//! The page of a study: figures, heat maps, main effects, sensitivities, Pareto front, scatter
+//! matrix, the best run; one file without scripts.
 
 use std::fmt::Write as _;
 
@@ -81,7 +81,8 @@ impl Sweep {
         (0..self.metrics.len().min(MOST_METRICS)).map(|metric| self.ranking(columns, metric)).collect()
     }
 
-    /// What is said of the parameters before any picture: who matters, and who cannot be told from chance.
+    /// What is said of the parameters before any picture: who matters, and who cannot be told from
+    /// chance.
     fn who_matters(&self, rankings: &[Ranking]) -> String {
         let names = |list: &mut dyn Iterator<Item = usize>| {
             list.map(|p| markup(&self.design.columns[p].name)).collect::<Vec<_>>().join(", ")
@@ -258,7 +259,8 @@ struct Axes {
 }
 
 impl Axes {
-    /// The strongest parameter and the next one that can have the other axis: what goes to the right, and what goes up.
+    /// The strongest parameter and the next one that can have the other axis: what goes to the
+    /// right, and what goes up.
     fn pair(&mut self, ranked: &[(usize, f64)]) -> Option<(usize, usize)> {
         let (first, rest) = ranked.split_first()?;
         let goes_up = self.upwards.contains(&first.0);

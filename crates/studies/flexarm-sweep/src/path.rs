@@ -1,7 +1,9 @@
-//! Paths of numbers in a TOML file: `payload.mass`, `drive.joint_2.gearbox.stiffness`, `mounting.stiffness[2]`, `drive.*.gearbox`.
+//! Paths of numbers in a TOML file: `payload.mass`, `drive.joint_2.gearbox.stiffness`,
+//! `mounting.stiffness[2]`, `drive.*.gearbox`.
 //!
-//! An entry of a list is named by its `joint`, `link` or `name`, or by its number from 0; `*` stands for all. What is resolved
-//! against the file is a [`Place`], at which a text of the file is changed with everything else left as it was written.
+//! An entry of a list is named by its `joint`, `link` or `name`, or by its number from 0; `*`
+//! stands for all. What is resolved against the file is a [`Place`], at which a text of the file is
+//! changed with everything else left as it was written.
 
 use flexarm_urdf::closest;
 use toml_edit::{DocumentMut, Item, Value};
@@ -41,7 +43,8 @@ pub(super) struct Place {
     pub(super) is_there: bool,
 }
 
-/// The parts of a path; none if it has empty ones, brackets without a number or quotes without an end.
+/// The parts of a path; none if it has empty ones, brackets without a number or quotes without an
+/// end.
 pub(super) fn segments(text: &str) -> Option<Vec<Segment>> {
     let mut found = Vec::new();
     let mut rest = text.trim();
@@ -72,7 +75,8 @@ pub(super) fn segments(text: &str) -> Option<Vec<Segment>> {
     }
 }
 
-/// All places that a path means in a file; none if it leads nowhere. The last keys of it may be new in a table that is there.
+/// All places that a path means in a file; none if it leads nowhere. The last keys of it may be new
+/// in a table that is there.
 pub(super) fn places(root: &toml::Value, path: &[Segment]) -> Vec<Place> {
     let mut found = Vec::new();
     let start = Place { steps: Vec::new(), name: String::new(), is_there: true };

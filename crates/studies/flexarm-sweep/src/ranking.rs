@@ -1,8 +1,9 @@
 //! Which parameters matter for a metric.
 //!
-//! Listed values cross with all others, so that the effect of such a parameter is exact. Drawn values are a sample: a parameter without
-//! any effect varies with the result by chance, the more the fewer the draws ([`beyond_chance`]). Every point of the grid has the same
-//! draws, so a draw counts once, with its mean over the grid.
+//! Listed values cross with all others, so that the effect of such a parameter is exact. Drawn
+//! values are a sample: a parameter without any effect varies with the result by chance, the more
+//! the fewer the draws ([`beyond_chance`]). Every point of the grid has the same draws, so a draw
+//! counts once, with its mean over the grid.
 
 use crate::statistics::{Grouping, MainEffect, SampleMethod, beyond_chance, main_effect};
 
@@ -20,7 +21,8 @@ pub(super) struct Ranking {
     pub(super) matter: Vec<(usize, f64)>,
     /// Drawn ones whose effect cannot be told from chance.
     pub(super) untold: Vec<usize>,
-    /// Part of the scatter of the draws that the strongest of the drawn parameters would explain by chance in 1 of 100 studies.
+    /// Part of the scatter of the draws that the strongest of the drawn parameters would explain by
+    /// chance in 1 of 100 studies.
     pub(super) chance: Option<f64>,
 }
 
@@ -97,7 +99,8 @@ impl Sweep {
 }
 
 impl Source {
-    /// Values of the parameters in each draw, and what the metric has there beyond its mean over all draws, on average over the grid.
+    /// Values of the parameters in each draw, and what the metric has there beyond its mean over
+    /// all draws, on average over the grid.
     fn draws(&self, columns: &Columns, metric: usize) -> (Vec<Vec<f64>>, Vec<f64>) {
         let draw = |run: usize| run / self.stride % self.draws;
         let rest = |run: usize| run - draw(run) * self.stride;

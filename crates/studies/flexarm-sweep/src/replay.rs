@@ -30,7 +30,8 @@ pub struct Replay {
 }
 
 impl Sweep {
-    /// Writes the files of a run with these values, as a person would write them: those that differ from what is there.
+    /// Writes the files of a run with these values, as a person would write them: those that differ
+    /// from what is there.
     ///
     /// # Errors
     /// [`Error::Write`], [`Error::Taken`]; what keeps the run from going.
@@ -54,7 +55,8 @@ impl Sweep {
         Ok(Replay { robot, motion, loads, options: files.options })
     }
 
-    /// The motion at another speed: waypoints with other durations where all of them have one, else a table.
+    /// The motion at another speed: waypoints with other durations where all of them have one, else
+    /// a table.
     fn faster(
         &self,
         files: &RunFiles,

@@ -50,7 +50,8 @@ pub struct SweepSummary {
     pub minimise: Option<MinimiseFigures>,
     /// The sentences of the caveats that warn, each once, with the number of runs that it concerns.
     pub warnings: Vec<String>,
-    /// What `check` and `compare` would say of the runs, each caveat once with its worst value, warnings first.
+    /// What `check` and `compare` would say of the runs, each caveat once with its worst value,
+    /// warnings first.
     pub caveats: Vec<CaveatFigures>,
     /// Runs that several shards had, with the same result; they count once.
     pub doubles: usize,
@@ -85,12 +86,14 @@ pub struct MetricFigures {
     pub std: Option<f64>,
     /// Quantiles 0.05, 0.5 and 0.95.
     pub quantiles: Option<[f64; 3]>,
-    /// Part of its variance that each parameter makes by itself (correlation ratio); null of words and where nothing varies.
+    /// Part of its variance that each parameter makes by itself (correlation ratio); null of words
+    /// and where nothing varies.
     pub shares: BTreeMap<String, Option<f64>>,
-    /// The parameters that matter, the strongest first: listed ones with an effect, and drawn ones whose effect stands out of chance.
+    /// The parameters that matter, the strongest first: listed ones with an effect, and drawn ones
+    /// whose effect stands out of chance.
     pub matters: Vec<String>,
-    /// Part of the scatter of the draws that the strongest of the drawn parameters would have by chance in 1 of 100 studies; null
-    /// where nothing is drawn.
+    /// Part of the scatter of the draws that the strongest of the drawn parameters would have by
+    /// chance in 1 of 100 studies; null where nothing is drawn.
     pub chance: Option<f64>,
     /// What is better of it; null if neither the study nor its expression nor its name tells.
     pub better: Option<Better>,
@@ -291,7 +294,8 @@ impl Sweep {
         (!runs.is_empty()).then_some(ParetoFigures { metrics, better, runs })
     }
 
-    /// Sobol indices of a metric; with a grid besides, of what scatters about the mean at each of its points.
+    /// Sobol indices of a metric; with a grid besides, of what scatters about the mean at each of
+    /// its points.
     fn indices(&self, values: &[f64], columns: &Columns) -> Vec<IndexFigures> {
         let drawn = self.design.drawn();
         if self.file.method != SampleMethod::Saltelli || drawn.is_empty() || !columns.of_design {

@@ -1,4 +1,5 @@
-//! The folder of a study: what was computed so far, in files that survive whatever ends the program.
+//! The folder of a study: what was computed so far, in files that survive whatever ends the
+//! program.
 //!
 //! ```text
 //! study.json              which study it is: its runs, columns and the files that it was made of
@@ -6,8 +7,9 @@
 //! parts/1-of-4-0.parquet  the same as a table, when the journal has become long or the shard is over
 //! runs.parquet            all runs by number, when none is missing; parts are then gone
 //! ```
-//! A journal whose last line was cut is read up to there. Parts come into being under another name. The bytes of `runs.parquet` are
-//! those of its rows: who computed them, in how many shards and in which order does not show.
+//! A journal whose last line was cut is read up to there. Parts come into being under another name.
+//! The bytes of `runs.parquet` are those of its rows: who computed them, in how many shards and in
+//! which order does not show.
 
 use std::collections::{BTreeMap, HashSet};
 use std::fs::{File, OpenOptions, TryLockError};
@@ -324,7 +326,8 @@ impl Store {
     /// Opens the folder of a study for a shard, and reads what is there.
     ///
     /// # Errors
-    /// [`SweepError::Foreign`], [`SweepError::Running`], [`SweepError::Broken`]; what the system says.
+    /// [`SweepError::Foreign`], [`SweepError::Running`], [`SweepError::Broken`]; what the system
+    /// says.
     pub(super) fn open(
         folder: &Path,
         manifest: Manifest,

@@ -1,4 +1,5 @@
-//! What a path of a parameter leads to: the robot file, the motion, the loads, an option, a job by which a link is reduced again.
+//! What a path of a parameter leads to: the robot file, the motion, the loads, an option, a job by
+//! which a link is reduced again.
 
 use super::file::Role;
 use super::path::{Place, Segment, changed, leaves, near, places, segments, written};
@@ -92,7 +93,8 @@ pub(super) struct Edit {
 /// * `known`: changes before it: a factor or an offset goes on top of them.
 ///
 /// # Errors
-/// A sentence: a path that leads nowhere, with those that are near; a factor or an offset of what is no number.
+/// A sentence: a path that leads nowhere, with those that are near; a factor or an offset of what
+/// is no number.
 pub(super) fn edits(
     root: &toml::Value,
     path: &[Segment],

@@ -1,4 +1,5 @@
-//! What is to be said of the runs of a study: the caveats of each, kept with its answer, and each of them once for all runs.
+//! What is to be said of the runs of a study: the caveats of each, kept with its answer, and each
+//! of them once for all runs.
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -61,7 +62,8 @@ pub(super) fn figures<'a>(answers: impl Iterator<Item = &'a Answer>) -> Vec<Cave
     found
 }
 
-/// What makes two caveats the same: kind and place, and where they have no value their words but for the numbers in them.
+/// What makes two caveats the same: kind and place, and where they have no value their words but
+/// for the numbers in them.
 fn key(caveat: &Caveat) -> (String, String, String) {
     let words = match caveat.value {
         Some(_) => String::new(),
@@ -74,7 +76,8 @@ fn key(caveat: &Caveat) -> (String, String, String) {
 fn badness(caveat: &Caveat) -> f64 {
     let (Some(value), Some(yardstick)) = (caveat.value, caveat.yardstick) else { return 0.0 };
     match caveat.code.as_str() {
-        // Their yardsticks are no limits: the reach of the arm, damping without any swing, a frequency that needs ten samples.
+        // Their yardsticks are no limits: the reach of the arm, damping without any swing, a
+        // frequency that needs ten samples.
         "sag" | "damped-mode" => value / yardstick,
         "few-samples" => yardstick / value,
         _ if value > 0.0 && yardstick > 0.0 => (value / yardstick).ln().abs(),

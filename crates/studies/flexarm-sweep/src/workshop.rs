@@ -1,7 +1,9 @@
-//! The runs of a study made ready: the robot of each as its file would say, its motion, loads and options.
+//! The runs of a study made ready: the robot of each as its file would say, its motion, loads and
+//! options.
 //!
-//! A change goes into the text of the file, which is then read as any other, so a run is that of a person who wrote this file.
-//! What does not change (URDF, meshes, reduced links, motions, arms of equal files) is read and built once and shared by threads.
+//! A change goes into the text of the file, which is then read as any other, so a run is that of a
+//! person who wrote this file. What does not change (URDF, meshes, reduced links, motions, arms of
+//! equal files) is read and built once and shared by threads.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -255,7 +257,8 @@ impl Workshop {
     /// Takes the columns of the design.
     ///
     /// # Errors
-    /// With the place in the study: paths that lead nowhere, files that are not there, values that are no option.
+    /// With the place in the study: paths that lead nowhere, files that are not there, values that
+    /// are no option.
     pub(super) fn vary(&mut self, columns: &[Column], file: &StudyFile, finders: &Finders) -> Result<(), Error> {
         let jobs: Vec<String> = self.jobs.iter().map(|(link, _)| link.clone()).collect();
         for column in columns {
@@ -328,7 +331,8 @@ impl Workshop {
         }
     }
 
-    /// The places that a path means in the robot file and others of the study, by name, for parameters of each.
+    /// The places that a path means in the robot file and others of the study, by name, for
+    /// parameters of each.
     pub(super) fn expanded(&self, text: &str) -> Result<Vec<String>, String> {
         let jobs: Vec<String> = self.jobs.iter().map(|(link, _)| link.clone()).collect();
         let Target::Entry(which, path) = Target::parse(text, &jobs)? else { return Ok(vec![text.to_owned()]) };
@@ -396,7 +400,8 @@ impl Workshop {
         }
     }
 
-    /// The files of a run as they would be written by hand; reduces links again where the run asks for that.
+    /// The files of a run as they would be written by hand; reduces links again where the run asks
+    /// for that.
     ///
     /// # Errors
     /// What keeps the run from going.

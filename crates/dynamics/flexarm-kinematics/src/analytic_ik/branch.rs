@@ -1,4 +1,5 @@
-//! Which of the solutions: sides of shoulder, elbow and wrist, the words of programs, and whole turns within limits.
+//! Which of the solutions: sides of shoulder, elbow and wrist, the words of programs, and whole
+//! turns within limits.
 //!
 //! Sources: [KUKA KSS] for status and turn, [ABB RAPID] for confdata.
 
@@ -11,16 +12,20 @@ use super::screw::{Screw, wrapped};
 use super::trig::across;
 use super::{AnalyticArm, ArmClass, Kernel, Solution, Solutions};
 
-/// Side of shoulder, elbow and wrist; functions of the joint values alone that tell the solutions of a pose apart.
+/// Side of shoulder, elbow and wrist; functions of the joint values alone that tell the solutions
+/// of a pose apart.
 ///
-/// Spherical wrist: `shoulder` is set where the wrist centre lies ahead of axis 1, `elbow` where joint 3 is beyond the angle at which
-/// the arm is stretched (in its positive sense, within half a turn), `wrist` where joint 5 is beyond the angle at which the wrist
-/// is straight (the one next to zero). Where axes 1 and 2 are parallel or axes 2 and 3 meet, `shoulder` and `elbow` are the two
-/// roots of the first and of the second equation solved. Arms solved from the tool have the same with `shoulder` and `wrist`
-/// exchanged. Three parallel axes: sides of the first angle, of the two bars, and of the other.
+/// Spherical wrist: `shoulder` is set where the wrist centre lies ahead of axis 1, `elbow` where
+/// joint 3 is beyond the angle at which the arm is stretched (in its positive sense, within half a
+/// turn), `wrist` where joint 5 is beyond the angle at which the wrist is straight (the one next to
+/// zero). Where axes 1 and 2 are parallel or axes 2 and 3 meet, `shoulder` and `elbow` are the two
+/// roots of the first and of the second equation solved. Arms solved from the tool have the same
+/// with `shoulder` and `wrist` exchanged. Three parallel axes: sides of the first angle, of the two
+/// bars, and of the other.
 ///
-/// Each of the eight labels belongs to one solution at most, but where a quartic or a polynomial of degree eight is solved
-/// ([`PositionForm::General`], [`ArmClass::ThreeParallel`] without meeting axes): there several solutions may share one.
+/// Each of the eight labels belongs to one solution at most, but where a quartic or a polynomial of
+/// degree eight is solved ([`PositionForm::General`], [`ArmClass::ThreeParallel`] without meeting
+/// axes): there several solutions may share one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Branch {
     /// Wrist centre ahead of axis 1.
@@ -38,7 +43,8 @@ impl Branch {
     }
 }
 
-/// How the joint values of a model become the axes of the controller whose words are used: `axis = sign q + offset`.
+/// How the joint values of a model become the axes of the controller whose words are used:
+/// `axis = sign q + offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ControllerAxes {
     /// 1 or -1 for each joint.
@@ -96,7 +102,8 @@ pub enum Selection {
     Branch(Branch),
 }
 
-/// KUKA's turn: bit k is set where axis k + 1 is negative (rad; a controller disregards it within some degrees of zero).
+/// KUKA's turn: bit k is set where axis k + 1 is negative (rad; a controller disregards it within
+/// some degrees of zero).
 pub fn kuka_turn(q: &[f64; 6], axes: &ControllerAxes) -> u8 {
     (0..6).fold(0, |bits, k| bits | u8::from(axes.axis(k, q) < 0.0) << k)
 }
@@ -126,7 +133,8 @@ fn is_in_quadrant(axis: f64, quadrant: i32) -> bool {
     abb_quadrant(axis - BOUNDARY) == quadrant || abb_quadrant(axis + BOUNDARY) == quadrant
 }
 
-/// So near to where a bit or a quadrant changes (rad, sine, or part of the reach), a program may say either.
+/// So near to where a bit or a quadrant changes (rad, sine, or part of the reach), a program may
+/// say either.
 const BOUNDARY: f64 = 1e-4;
 
 /// Directions by which sides are told, at zero joint values.
@@ -134,7 +142,8 @@ const BOUNDARY: f64 = 1e-4;
 pub(crate) struct Sides {
     /// Across axes 1 and 2, ahead (unit).
     front: Vector3<f64>,
-    /// Whether a positive angle of joint 3 turns the forearm ahead and down where the upper arm stands upright.
+    /// Whether a positive angle of joint 3 turns the forearm ahead and down where the upper arm
+    /// stands upright.
     elbow_forward: bool,
     /// Whether the positive side of the wrist is that above `phi` (else of `phi + π`).
     wrist_at_phi: bool,
@@ -174,7 +183,8 @@ impl AnalyticArm {
         Branch { shoulder, elbow, wrist }
     }
 
-    /// Numbers whose signs are the sides: sines of angles or lengths over the reach, zero where two branches meet.
+    /// Numbers whose signs are the sides: sines of angles or lengths over the reach, zero where two
+    /// branches meet.
     fn side_values(&self, q: &[f64; 6]) -> [f64; 3] {
         let mut q = *q;
         if self.reversed {
@@ -230,18 +240,21 @@ impl AnalyticArm {
         (q - phi).sin()
     }
 
-    /// Whether words of industrial arms have a meaning: spherical wrist, axes 2 and 3 parallel and across axis 1.
+    /// Whether words of industrial arms have a meaning: spherical wrist, axes 2 and 3 parallel and
+    /// across axis 1.
     fn is_industrial(&self) -> bool {
         let Kernel::Wrist(k) = &self.kernel else { return false };
         self.class == ArmClass::SphericalWrist(PositionForm::Parallel23) && k.axes[0].h.dot(&k.axes[1].h).abs() < 0.5
     }
 
-    /// Whether the forearm is bent ahead and down of the upper arm, as seen where this stands upright.
+    /// Whether the forearm is bent ahead and down of the upper arm, as seen where this stands
+    /// upright.
     fn bent_forward(&self, branch: Branch) -> bool {
         branch.elbow == self.sides.elbow_forward
     }
 
-    /// Whether the elbow is up: above the line from axis 2 to the wrist centre where this lies farther out than axis 2.
+    /// Whether the elbow is up: above the line from axis 2 to the wrist centre where this lies
+    /// farther out than axis 2.
     ///
     /// `None` for other arms than those with a spherical wrist and axes 2 and 3 parallel.
     pub fn elbow_up(&self, q: &[f64; 6]) -> Option<bool> {
@@ -249,11 +262,13 @@ impl AnalyticArm {
         self.is_industrial().then(|| self.bent_forward(branch) == branch.shoulder)
     }
 
-    /// KUKA's status of joint values (rad): bit 0 set where the wrist centre lies behind axis 1 (x in the system that turns with axis
-    /// 1 negative), bit 1 where axis 3 is beyond the angle of the stretched arm, bit 2 where axis 5 is negative.
+    /// KUKA's status of joint values (rad): bit 0 set where the wrist centre lies behind axis 1 (x
+    /// in the system that turns with axis 1 negative), bit 1 where axis 3 is beyond the angle of
+    /// the stretched arm, bit 2 where axis 5 is negative.
     ///
-    /// Ahead is where axis 2 lies from axis 1; where they meet, where the wrist centre is at zero joint values. Bits 3 and 4 (accuracy
-    /// model) are zero. `None` for other arms than those with a spherical wrist and axes 2 and 3 parallel.
+    /// Ahead is where axis 2 lies from axis 1; where they meet, where the wrist centre is at zero
+    /// joint values. Bits 3 and 4 (accuracy model) are zero. `None` for other arms than those with
+    /// a spherical wrist and axes 2 and 3 parallel.
     pub fn kuka_status(&self, q: &[f64; 6], axes: &ControllerAxes) -> Option<u8> {
         let branch = self.branch(q);
         let bits = u8::from(!branch.shoulder)
@@ -264,8 +279,8 @@ impl AnalyticArm {
 
     /// ABB's quarter turns of axes 1, 4 and 6 and configuration number of joint values (rad).
     ///
-    /// `cfx` = 4 where the wrist centre lies behind axis 1, + 2 where it lies behind the lower arm, + 1 where axis 5 is negative. `None`
-    /// for other arms than those with a spherical wrist and axes 2 and 3 parallel.
+    /// `cfx` = 4 where the wrist centre lies behind axis 1, + 2 where it lies behind the lower arm, + 1 where axis 5 is negative. `None` for other arms than those with a spherical wrist and
+    /// axes 2 and 3 parallel.
     pub fn abb_configuration(&self, q: &[f64; 6], axes: &ControllerAxes) -> Option<([i32; 3], i32)> {
         let branch = self.branch(q);
         let cfx = 4 * i32::from(!branch.shoulder)
@@ -274,7 +289,8 @@ impl AnalyticArm {
         self.is_industrial().then(|| ([0, 3, 5].map(|k| abb_quadrant(axes.axis(k, q))), cfx))
     }
 
-    /// Whether joint values are on the branch that is meant, whole turns apart; where two branches meet they are on both.
+    /// Whether joint values are on the branch that is meant, whole turns apart; where two branches
+    /// meet they are on both.
     fn is_on(&self, q: &[f64; 6], selection: &Selection, axes: &ControllerAxes) -> bool {
         let [shoulder, elbow, wrist] = self.side_values(q);
         let fifth = wrapped(axes.axis(4, q)).sin();
@@ -308,12 +324,15 @@ impl AnalyticArm {
         }
     }
 
-    /// The solution that is meant, with the whole turns that are meant, within the limits and nearest to `near` (rad).
+    /// The solution that is meant, with the whole turns that are meant, within the limits and
+    /// nearest to `near` (rad).
     ///
-    /// Turn and quadrants are those of each axis with its whole turns, so that an axis at 200 degrees is not at -160. Programs have
-    /// rounded numbers: an axis or a side within 1e-4 (rad; sine or part of the reach) of where a bit changes may have either, and with axis 5 so
-    /// near to straight those of axes 4 and 6, of which the sum alone is sharp, are left out. `None`: no solution on that branch within the limits, or the arm is not one of which these words tell anything
-    /// ([`Self::kuka_status`], [`Self::abb_configuration`]).
+    /// Turn and quadrants are those of each axis with its whole turns, so that an axis at 200
+    /// degrees is not at -160. Programs have rounded numbers: an axis or a side within 1e-4 (rad;
+    /// sine or part of the reach) of where a bit changes may have either, and with axis 5 so near
+    /// to straight those of axes 4 and 6, of which the sum alone is sharp, are left out. `None`: no
+    /// solution on that branch within the limits, or the arm is not one of which these words tell
+    /// anything ([`Self::kuka_status`], [`Self::abb_configuration`]).
     pub fn choose(
         &self,
         solutions: &Solutions,
@@ -336,12 +355,14 @@ impl AnalyticArm {
         best.map(|(_, q)| q)
     }
 
-    /// The copy of joint values by whole turns that is within the limits and nearest to `near` (rad).
+    /// The copy of joint values by whole turns that is within the limits and nearest to `near`
+    /// (rad).
     pub fn nearest_within_limits(&self, q: &[f64; 6], near: &[f64; 6]) -> Option<[f64; 6]> {
         self.nearest_copy(q, near, |_, _| true)
     }
 
-    /// Shows every copy of joint values by whole turns that is within the limits; a joint without limits has the one in (-π, π].
+    /// Shows every copy of joint values by whole turns that is within the limits; a joint without
+    /// limits has the one in (-π, π].
     pub fn copies_within_limits(&self, q: &[f64; 6], mut visit: impl FnMut(&[f64; 6])) {
         let ranges: [_; 6] = std::array::from_fn(|k| self.turns(k, wrapped(q[k])));
         if ranges.iter().any(|(low, high)| low > high) {
@@ -385,7 +406,8 @@ impl AnalyticArm {
 /// By how much a joint may be beyond its limit, for rounding (rad).
 const LIMIT_SLACK: f64 = 1e-12;
 
-/// Sine of the angle from one bar to the next about the joint `h` between them: from axis `first` to the elbow, from there to the end.
+/// Sine of the angle from one bar to the next about the joint `h` between them: from axis `first`
+/// to the elbow, from there to the end.
 fn bend(first: &Screw, elbow: &Vector3<f64>, end: &Vector3<f64>, h: &Vector3<f64>) -> f64 {
     let across = |v: Vector3<f64>| v - h * h.dot(&v);
     let (a, b) = (across(elbow - first.o), across(end - elbow));

@@ -1,8 +1,10 @@
-//! Inverse kinematics in closed form: every joint position of an arm of six revolute joints that brings a frame to a pose.
+//! Inverse kinematics in closed form: every joint position of an arm of six revolute joints that
+//! brings a frame to a pose.
 //!
-//! [`AnalyticArm::new`] looks at the six joint axes and says which class the arm belongs to, or why it has no solution in
-//! closed form ([`NoAnalyticIk`]; then [`crate::inverse_kinematics_from_many_starts`]). [`AnalyticArm::solve`] fills
-//! [`Solutions`] without allocation. Which of them is meant is a matter of [`Branch`], [`Selection`] and
+//! [`AnalyticArm::new`] looks at the six joint axes and says which class the arm belongs to, or why
+//! it has no solution in closed form ([`NoAnalyticIk`]; then
+//! [`crate::inverse_kinematics_from_many_starts`]). [`AnalyticArm::solve`] fills [`Solutions`]
+//! without allocation. Which of them is meant is a matter of [`Branch`], [`Selection`] and
 //! [`AnalyticArm::choose`] (`branch.rs`).
 //!
 //! | class | what is solved |
@@ -12,17 +14,19 @@
 //! | axes 2, 3, 4 or 3, 4, 5 are parallel | angles 1 and 5 (two and two, or a quartic), then two elbows |
 //! | axes 1, 2, 3 or 4, 5, 6 are parallel | angles 4 and 5 (two and two, or a polynomial of degree eight), then two elbows |
 //!
-//! The equations are the subproblems of Paden and Kahan in the extended set of [Elias & Wen 2022]; classes as in
-//! [Ostermeier et al. 2024]; the quartic is that of [Pieper 1968]. All roots of a polynomial are found at once
-//! (Aberth's iteration on the unit circle of `e^{i q}`), none is searched for.
+//! The equations are the subproblems of Paden and Kahan in the extended set of [Elias & Wen 2022];
+//! classes as in [Ostermeier et al. 2024]; the quartic is that of [Pieper 1968]. All roots of a
+//! polynomial are found at once (Aberth's iteration on the unit circle of `e^{i q}`), none is
+//! searched for.
 //!
-//! Axes may miss their class by [`AXIS_TOLERANCE_RAD`] and [`AXIS_TOLERANCE`] of the reach, as those of files with five digits do.
-//! The class then gives start values, and Newton's method on the arm as it is gives the solutions: each one of them meets the
-//! pose to [`POSE_TOLERANCE`]. Within about the tolerance of a boundary of the workspace some may be missing then.
+//! Axes may miss their class by [`AXIS_TOLERANCE_RAD`] and [`AXIS_TOLERANCE`] of the reach, as
+//! those of files with five digits do. The class then gives start values, and Newton's method on
+//! the arm as it is gives the solutions: each one of them meets the pose to [`POSE_TOLERANCE`].
+//! Within about the tolerance of a boundary of the workspace some may be missing then.
 //!
-//! What misses least where there is no solution is not a solution; [`Solutions::miss`] tells how far it is off.
-//! Where a pose leaves a joint free (straight wrist, wrist centre on axis 1, folded bars of one length), one representative is
-//! given and marked ([`Solution::free`]).
+//! What misses least where there is no solution is not a solution; [`Solutions::miss`] tells how
+//! far it is off. Where a pose leaves a joint free (straight wrist, wrist centre on axis 1, folded
+//! bars of one length), one representative is given and marked ([`Solution::free`]).
 //!
 //! ```
 //! use flexarm_kinematics::*;
@@ -75,7 +79,8 @@ const CAPTURE: f64 = 3e-3;
 /// Most solutions that a class has.
 const MOST_SOLUTIONS: usize = 16;
 
-/// What a solution may miss the pose by: so many m (times the reach, where that is above 1 m) and rad.
+/// What a solution may miss the pose by: so many m (times the reach, where that is above 1 m) and
+/// rad.
 pub const POSE_TOLERANCE: f64 = 1e-12;
 
 /// Solutions whose angles all agree so well (rad) are one: next to a boundary two become one.
@@ -133,7 +138,8 @@ impl Kind {
     }
 }
 
-/// Below this sine two axes are one line to what a pose may be missed by: only the sum of their angles matters.
+/// Below this sine two axes are one line to what a pose may be missed by: only the sum of their
+/// angles matters.
 const STRAIGHT: f64 = POSE_TOLERANCE;
 
 impl Candidates {
@@ -183,8 +189,9 @@ impl std::ops::Deref for Solutions {
 }
 
 impl Solutions {
-    /// Where there is no solution: how far off the joint values are that the class's equations come nearest with. An upper
-    /// bound of the distance of the pose from the workspace, and none of the limits of joints.
+    /// Where there is no solution: how far off the joint values are that the class's equations come
+    /// nearest with. An upper bound of the distance of the pose from the workspace, and none of the
+    /// limits of joints.
     pub fn miss(&self) -> Option<Miss> {
         self.miss.filter(|_| self.is_empty())
     }
@@ -220,7 +227,8 @@ impl AnalyticArm {
         self.class
     }
 
-    /// How far its axes are from those of the class: the larger of angles (rad) and of lengths over the reach.
+    /// How far its axes are from those of the class: the larger of angles (rad) and of lengths over
+    /// the reach.
     pub fn deviation(&self) -> f64 {
         self.deviation
     }
@@ -235,7 +243,8 @@ impl AnalyticArm {
         &self.joints
     }
 
-    /// Limits of its joints, lower and upper (rad), in the order of the chain; infinite where there are none.
+    /// Limits of its joints, lower and upper (rad), in the order of the chain; infinite where there
+    /// are none.
     pub fn limits(&self) -> &[(f64, f64); 6] {
         &self.limits
     }
@@ -245,10 +254,11 @@ impl AnalyticArm {
         self.chain.pose(q)
     }
 
-    /// All joint values that bring the frame to `X_WT`, whatever the limits; a free joint is at zero.
+    /// All joint values that bring the frame to `X_WT`, whatever the limits; a free joint is at
+    /// zero.
     ///
-    /// Does not allocate. A pose with NaN or infinite entries has no solution, and none has one whose rotation is not orthogonal to
-    /// [`POSE_TOLERANCE`].
+    /// Does not allocate. A pose with NaN or infinite entries has no solution, and none has one
+    /// whose rotation is not orthogonal to [`POSE_TOLERANCE`].
     pub fn solve(&self, X_WT: &Pose, solutions: &mut Solutions) {
         self.solve_near(X_WT, &[0.0; 6], solutions);
     }

@@ -1,4 +1,5 @@
-//! Arms with three parallel axes in a row: the plane across them leaves equations in the other angles only.
+//! Arms with three parallel axes in a row: the plane across them leaves equations in the other
+//! angles only.
 
 use std::f64::consts::FRAC_PI_4;
 
@@ -33,8 +34,8 @@ pub(crate) struct Parallel123 {
 /// Two angles and whether one of them is free.
 type Pairs = List<(f64, f64, bool), 16>;
 
-/// The last angle, or where its axis is along the parallel ones first the one next to the hint, in eighths of a turn, at which
-/// the bars reach.
+/// The last angle, or where its axis is along the parallel ones first the one next to the hint, in
+/// eighths of a turn, at which the bars reach.
 fn sixth_angles(
     (angle, size): (f64, f64),
     hint: f64,
@@ -68,7 +69,8 @@ impl Parallel234 {
 
     /// All joint values with `E_1 ... E_6 = G`.
     ///
-    /// With h the common direction and a point o_6 of axis 6, what the three joints between cannot change:
+    /// With h the common direction and a point o_6 of axis 6, what the three joints between cannot
+    /// change:
     /// ```text
     /// (i)   G_R h_6 · R_1 h = h · R_5 h_6            (ii)   (G o_6 - o_1) · R_1 h = h · (E_5 o_6 - o_1)
     /// ```
@@ -127,7 +129,8 @@ impl Parallel234 {
     }
 }
 
-/// Solves `a_i cos t + b_i sin t = K_i(u)`, i = 1, 2, with K affine in cosine and sine of u, for pairs (t, u).
+/// Solves `a_i cos t + b_i sin t = K_i(u)`, i = 1, 2, with K affine in cosine and sine of u, for
+/// pairs (t, u).
 fn pair_of_equations(rows: &[(f64, f64, TrigPolynomial); 2], hint: &[f64; 6], pairs: &mut Pairs) {
     let [(a1, b1, K1), (a2, b2, K2)] = rows;
     let D = a1 * b2 - a2 * b1;
@@ -142,7 +145,8 @@ fn pair_of_equations(rows: &[(f64, f64, TrigPolynomial); 2], hint: &[f64; 6], pa
         }
         return;
     }
-    // The left sides are one and the same but for a factor: what is left of the other row holds u alone.
+    // The left sides are one and the same but for a factor: what is left of the other row holds u
+    // alone.
     let (big, small) = if a1.hypot(*b1) >= a2.hypot(*b2) { (0, 1) } else { (1, 0) };
     let (a, b, K) = &rows[big];
     let size = a.hypot(*b).max(f64::MIN_POSITIVE);
@@ -169,8 +173,9 @@ impl Parallel123 {
     /// ```text
     /// (i)   h · R_4 R_5 h_6 = h · G_R h_6            (ii)   h · E_4 E_5 o_6 = h · G o_6
     /// ```
-    /// Linear in cosine and sine of q_4 with coefficients affine in those of q_5: a polynomial of degree eight, or one after the
-    /// other where axes 5 and 6 meet. Then joint 6 turns `G_Rᵀ h` onto `(R_4 R_5)ᵀ h`.
+    /// Linear in cosine and sine of q_4 with coefficients affine in those of q_5: a polynomial of
+    /// degree eight, or one after the other where axes 5 and 6 meet. Then joint 6 turns `G_Rᵀ h`
+    /// onto `(R_4 R_5)ᵀ h`.
     pub(crate) fn solve(&self, G: &Pose, hint: &[f64; 6], found: &mut Candidates) {
         let [s1, s2, s3, s4, s5, s6] = &self.axes;
         let h = s1.h;
@@ -237,7 +242,8 @@ impl Parallel123 {
         pairs
     }
 
-    /// `h · R_4 (c + R_5 v) = value` as `a cos q4 + b sin q4 = k`, all affine in cosine and sine of q5.
+    /// `h · R_4 (c + R_5 v) = value` as `a cos q4 + b sin q4 = k`, all affine in cosine and sine of
+    /// q5.
     fn row(&self, c: &Vector3<f64>, v: &Vector3<f64>, value: f64) -> (TrigPolynomial, TrigPolynomial, TrigPolynomial) {
         let (h, h4, h5) = (self.axes[0].h, self.axes[3].h, self.axes[4].h);
         let along = h5 * h5.dot(v);

@@ -1,8 +1,8 @@
 //! Three joints that bring a point to a place: `E_1 E_2 E_3 c = p`.
 //!
-//! Where two neighbouring axes intersect or are parallel, one equation holds one angle and the rest follows in closed form
-//! (subproblems of Paden and Kahan, [Elias & Wen 2022]); otherwise the angle of the third joint is a root of a quartic
-//! [Pieper 1968].
+//! Where two neighbouring axes intersect or are parallel, one equation holds one angle and the rest
+//! follows in closed form (subproblems of Paden and Kahan, [Elias & Wen 2022]); otherwise the angle
+//! of the third joint is a root of a quartic [Pieper 1968].
 
 use nalgebra::Vector3;
 
@@ -82,7 +82,8 @@ impl Task {
         }
     }
 
-    /// Axes 1 and 2 meet at o: `|E_3 c - o| = |p - o|`, then `h_1 · R_2 (E_3 c - o) = h_1 · (p - o)`.
+    /// Axes 1 and 2 meet at o: `|E_3 c - o| = |p - o|`, then
+    /// `h_1 · R_2 (E_3 c - o) = h_1 · (p - o)`.
     fn intersecting(&self, found: &mut Threes) {
         let [s1, s2, s3] = &self.axes;
         let (p, v, d) = (self.p - s1.o, self.c - s3.o, s3.o - s1.o);
@@ -115,9 +116,11 @@ impl Task {
         }
     }
 
-    /// Two equations linear in cosine and sine of the second angle, whose squares sum to one: a quartic in the third.
+    /// Two equations linear in cosine and sine of the second angle, whose squares sum to one: a
+    /// quartic in the third.
     ///
-    /// With the common perpendicular of axes 1 and 2 as x (length a), y = h_2 × x, and w = E_3 c - o_2:
+    /// With the common perpendicular of axes 1 and 2 as x (length a), y = h_2 × x, and w = E_3 c -
+    /// o_2:
     /// ```text
     /// x · R_2 w = (r² - a² - |w|²) / (2 a),   y · R_2 w = (z - (h_1·h_2) h_2·w) / (h_1·y),   their squares = |w|² - (h_2·w)²
     /// ```

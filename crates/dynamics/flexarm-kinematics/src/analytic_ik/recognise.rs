@@ -31,8 +31,8 @@ pub enum ArmClass {
     ThreeParallel {
         /// Number of the first of them, 1 to 4.
         first: usize,
-        /// Whether the two axes at the end of the arm from which it is solved meet, as 5 and 6 do in Universal Robots' arms: then
-        /// no polynomial is needed.
+        /// Whether the two axes at the end of the arm from which it is solved meet, as 5 and 6 do
+        /// in Universal Robots' arms: then no polynomial is needed.
         meeting: bool,
     },
 }
@@ -70,7 +70,8 @@ impl std::fmt::Display for ArmClass {
     }
 }
 
-/// Why there is no closed form; [`crate::inverse_kinematics_from_many_starts`] solves such arms by numbers.
+/// Why there is no closed form; [`crate::inverse_kinematics_from_many_starts`] solves such arms by
+/// numbers.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoAnalyticIk {
@@ -101,7 +102,8 @@ pub enum NoAnalyticIk {
     Deficient {
         /// The frame.
         frame: String,
-        /// Smallest over largest singular value of the Jacobian, at the best of some positions, lengths over the reach.
+        /// Smallest over largest singular value of the Jacobian, at the best of some positions,
+        /// lengths over the reach.
         smallest: f64,
     },
     /// No class.
@@ -154,7 +156,8 @@ impl AnalyticArm {
         }
     }
 
-    /// The arm that six of the joints make while all others are held, as those of a rail, a turned table or a seventh axis.
+    /// The arm that six of the joints make while all others are held, as those of a rail, a turned
+    /// table or a seventh axis.
     ///
     /// * `joints`: numbers of the six coordinates, in the order of the chain.
     /// * `q_held`: values of all coordinates, nv long (rad or m); those of the six do not matter.
@@ -256,7 +259,8 @@ fn chain_of(model: &Model, frame: &Frame, joints: &[usize; 6], q_held: &DVector<
     Ok(Chain { axes, X_0, reach })
 }
 
-/// Smallest over largest singular value of the Jacobian (lengths over the reach), at the best of a few positions.
+/// Smallest over largest singular value of the Jacobian (lengths over the reach), at the best of a
+/// few positions.
 fn dexterity(chain: &Chain) -> f64 {
     let positions =
         [[0.3, -0.7, 1.1, 0.5, -0.9, 0.4], [-1.2, 0.4, -0.6, 1.3, 0.8, -0.2], [2.1, 0.9, 0.5, -1.6, 1.4, 1.0]];
@@ -333,8 +337,9 @@ impl Lines {
         Some(self.angle(i, j)).filter(|a| *a <= AXIS_TOLERANCE_RAD)
     }
 
-    /// Middle of the common perpendicular of two lines that meet, and by how much of the reach they do not. Lines that are nearly
-    /// parallel may meet so far away that nothing can be reckoned from there.
+    /// Middle of the common perpendicular of two lines that meet, and by how much of the reach they
+    /// do not. Lines that are nearly parallel may meet so far away that nothing can be reckoned
+    /// from there.
     fn meeting(&self, i: usize, j: usize) -> Option<(Vector3<f64>, f64)> {
         if self.parallel(i, j).is_some() {
             return None;

@@ -61,7 +61,8 @@ impl Turn<'_> {
 pub(crate) struct Chain {
     pub(crate) axes: [Screw; 6],
     pub(crate) X_0: Pose,
-    /// Largest distance of an axis' point or of the tool from the first axis' (m): the scale of lengths.
+    /// Largest distance of an axis' point or of the tool from the first axis' (m): the scale of
+    /// lengths.
     pub(crate) reach: f64,
 }
 
@@ -96,7 +97,8 @@ impl Chain {
         Pose::from_parts(p.into(), Rotation3::from_matrix_unchecked(R))
     }
 
-    /// Jacobian of [`Self::pose`]: velocity of To and angular velocity in world axes (rows linear first).
+    /// Jacobian of [`Self::pose`]: velocity of To and angular velocity in world axes (rows linear
+    /// first).
     pub(crate) fn jacobian(&self, q: &[f64; 6]) -> Matrix6<f64> {
         let p = self.pose(q).translation.vector;
         let mut J = Matrix6::zeros();
@@ -123,10 +125,11 @@ impl Chain {
         Vector6::new(dp.x, dp.y, dp.z, r.x, r.y, r.z)
     }
 
-    /// Improves joint values until the pose is met to rounding or nothing improves; returns what is missed.
+    /// Improves joint values until the pose is met to rounding or nothing improves; returns what is
+    /// missed.
     ///
-    /// Newton's method with the Jacobian; next to singular poses its pseudo-inverse. Stops at once where the start is far from
-    /// the pose, since it is then no solution.
+    /// Newton's method with the Jacobian; next to singular poses its pseudo-inverse. Stops at once
+    /// where the start is far from the pose, since it is then no solution.
     pub(crate) fn polish(&self, q: &mut [f64; 6], X_WT: &Pose, capture: f64) -> Miss {
         const ENOUGH: f64 = 2e-14;
         let mut error = self.error(q, X_WT);

@@ -60,7 +60,8 @@ impl Roots {
 
 /// Roots of `a cos t + b sin t = c`; where there are none, the one angle that misses least.
 ///
-/// * `floor`: where `hypot(a, b)` is not above it, the angle is free and the hint is its representative.
+/// * `floor`: where `hypot(a, b)` is not above it, the angle is free and the hint is its
+///   representative.
 pub(crate) fn linear(a: f64, b: f64, c: f64, floor: f64, hint: f64) -> Roots {
     let size = a.hypot(b);
     if size <= floor {
@@ -86,7 +87,8 @@ pub(crate) fn dot_turned(u: &Vector3<f64>, h: &Vector3<f64>, v: &Vector3<f64>) -
     (k, u.dot(v) - k, u.dot(&h.cross(v)))
 }
 
-/// The angle about `h` that turns the part of `a` across `h` onto that of `b`, and the smaller of their lengths.
+/// The angle about `h` that turns the part of `a` across `h` onto that of `b`, and the smaller of
+/// their lengths.
 pub(crate) fn angle_about(h: &Vector3<f64>, a: &Vector3<f64>, b: &Vector3<f64>) -> (f64, f64) {
     let (a, b) = (a - h * h.dot(a), b - h * h.dot(b));
     (h.dot(&a.cross(&b)).atan2(a.dot(&b)), a.norm().min(b.norm()))
@@ -98,12 +100,14 @@ pub(crate) fn across(h: &Vector3<f64>) -> Vector3<f64> {
     (e - h * h.dot(&e)).normalize()
 }
 
-/// Angles from a vector `v = R(h, t) w` at cosine `u · v`, near the ends of its range without loss of digits.
+/// Angles from a vector `v = R(h, t) w` at cosine `u · v`, near the ends of its range without loss
+/// of digits.
 ///
 /// ```text
 /// u · R(h, t) w = a + b cos(t - phi),     t = phi ± d,     tan²(d/2) = (a + b - u·v) / (u·v - a + b)
 /// ```
-/// Where the range ends at ±1 (`w` can be turned onto `u`: the straight wrist), `1 - u·v` is `|u - v|²/2`.
+/// Where the range ends at ±1 (`w` can be turned onto `u`: the straight wrist), `1 - u·v` is
+/// `|u - v|²/2`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fan {
     pub(crate) phi: f64,
@@ -191,7 +195,8 @@ impl TrigPolynomial {
         (value, slope)
     }
 
-    /// Angles of all roots that lie within `width` of the unit circle, refined; without one, those of all roots (which miss).
+    /// Angles of all roots that lie within `width` of the unit circle, refined; without one, those
+    /// of all roots (which miss).
     ///
     /// The polynomial `z^n f(z)` of degree 2n is solved by Aberth's simultaneous iteration.
     pub(crate) fn roots(&self, width: f64) -> List<f64, { 2 * MOST }> {

@@ -1,4 +1,5 @@
-//! Arms whose last three axes meet: three joints place the meeting point, three turn the tool about it.
+//! Arms whose last three axes meet: three joints place the meeting point, three turn the tool about
+//! it.
 
 use flexarm_spatial::Pose;
 use nalgebra::Vector3;
@@ -27,8 +28,9 @@ impl Wrist {
 
     /// All joint values with `E_1 ... E_6 = G`.
     ///
-    /// `E_1 E_2 E_3 c = G c` at the meeting point c. Then with `Q = (R_1 R_2 R_3)ᵀ G_R` the angle of joint 5 follows from
-    /// `h_4 · R_5 h_6 = h_4 · Q h_6`, that of joint 4 from `R_4 R_5 h_6 = Q h_6`, and that of joint 6 from what is left.
+    /// `E_1 E_2 E_3 c = G c` at the meeting point c. Then with `Q = (R_1 R_2 R_3)ᵀ G_R` the angle
+    /// of joint 5 follows from `h_4 · R_5 h_6 = h_4 · Q h_6`, that of joint 4 from
+    /// `R_4 R_5 h_6 = Q h_6`, and that of joint 6 from what is left.
     pub(crate) fn solve(&self, G: &Pose, hint: &[f64; 6], found: &mut Candidates) {
         let [s1, s2, s3, s4, s5, s6] = &self.axes;
         let p = G.rotation * self.center + G.translation.vector;

@@ -4,9 +4,10 @@
 //!   F_k = I_k S_k            wrench at the body's origin that gives joint k, and all outward of it, a unit acceleration  (10)
 //!   M_ik = S_iᵀ F_k          for all k outward of i, F_k carried to the origin of i's body                               (11)
 //! ```
-//! All of it is in the axes of the first body whose wrench counts, so that a wrench keeps its force on the way inward and only its moment
-//! changes. Three columns go together, component by component: the translations or the rotations of an elastic joint, or up to three
-//! joints of one coordinate, one behind the other.
+//! All of it is in the axes of the first body whose wrench counts, so that a wrench keeps its force
+//! on the way inward and only its moment changes. Three columns go together, component by
+//! component: the translations or the rotations of an elastic joint, or up to three joints of one
+//! coordinate, one behind the other.
 //!
 //! Source: [Featherstone 2008], section 6.2.
 
@@ -68,7 +69,8 @@ struct Three<T: Real> {
     torque: Matrix3<T>,
 }
 
-/// Room for the columns of a joint: beside the next free one inward, if that is the last so far and both have one coordinate.
+/// Room for the columns of a joint: beside the next free one inward, if that is the last so far and
+/// both have one coordinate.
 #[inline(always)]
 fn place_columns<T: Real>(threes: &mut Vec<Three<T>>, inner: Option<Place>, row: usize, size: usize) -> Place {
     if let (Some(inner), Some(last), 1) = (inner, threes.len().checked_sub(1), size)
@@ -324,8 +326,8 @@ fn crossed<T: Real>(v: &Vector3<T>, [x, y, z]: &[Vector3<T>; 3]) -> Matrix3<T> {
     )
 }
 
-/// The mass matrix that is being filled, n columns of n; zero before if it SUMS, because some coordinates do not meet, or meet more than
-/// once.
+/// The mass matrix that is being filled, n columns of n; zero before if it SUMS, because some
+/// coordinates do not meet, or meet more than once.
 struct Entries<'m, T, const SUMS: bool> {
     M: &'m mut [T],
     n: usize,
@@ -404,8 +406,9 @@ impl<T: Real, const SUMS: bool> Entries<'_, T, SUMS> {
 }
 
 impl<T: Real> FreeForces<T> {
-    /// Mass matrix of the free coordinates (kg, kg m, kg m²) at the poses of the last forces, column after column into M, both
-    /// triangles: that of [`crate::mass_matrix`], to rounding. Allocates when it is called first, and not again.
+    /// Mass matrix of the free coordinates (kg, kg m, kg m²) at the poses of the last forces,
+    /// column after column into M, both triangles: that of [`crate::mass_matrix`], to rounding.
+    /// Allocates when it is called first, and not again.
     ///
     /// # Source
     /// [Featherstone 2008], section 6.2.

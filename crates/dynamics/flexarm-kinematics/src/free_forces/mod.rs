@@ -1,5 +1,5 @@
-//! Inverse dynamics of free coordinates alone, where the motion of the others is given: Newton-Euler over the accelerations of
-//! points, O(n).
+//! Inverse dynamics of free coordinates alone, where the motion of the others is given:
+//! Newton-Euler over the accelerations of points, O(n).
 //!
 //! ```text
 //! Outward pass for body B with parent P, in B axes; a is the acceleration of Bo less gravity, p the place of Bo in P, P axes:
@@ -11,12 +11,13 @@
 //! Inward pass:
 //!   τ_B = S_Bᵀ [f_B; n_B],   f_P += R_PB f_B,   n_P += R_PB n_B + p × R_PB f_B      (6)
 //! ```
-//! No velocity of a point occurs, so there are a third fewer operations than in [`crate::inverse_dynamics`] over spatial vectors. Bodies whose
-//! wrench moves no free coordinate (all before the first spring of an arm) take part in (1) to (3) alone, those that carry no
-//! other one not even in that.
+//! No velocity of a point occurs, so there are a third fewer operations than in
+//! [`crate::inverse_dynamics`] over spatial vectors. Bodies whose wrench moves no free coordinate
+//! (all before the first spring of an arm) take part in (1) to (3) alone, those that carry no other
+//! one not even in that.
 //!
-//! Start at [`FreeForces`]; [`Observer`] is it for all coordinates, with poses and energies. Trees with closed loops, balancers or
-//! bodies that bend in modes are not for it.
+//! Start at [`FreeForces`]; [`Observer`] is it for all coordinates, with poses and energies. Trees
+//! with closed loops, balancers or bodies that bend in modes are not for it.
 //!
 //! Source: [Luh, Walker & Paul 1980].
 
@@ -91,7 +92,8 @@ fn parts(model: &Model, roles: &Roles) -> Vec<Part> {
 }
 
 impl<T: Real> FreeForces<T> {
-    /// For the free coordinates of the roles; `None` of trees with closed loops, balancers or bodies that bend in modes.
+    /// For the free coordinates of the roles; `None` of trees with closed loops, balancers or
+    /// bodies that bend in modes.
     #[inline(always)]
     pub fn new(tree: &impl Tree<T>, roles: &Roles) -> Option<Self> {
         let model = tree.model();
@@ -148,10 +150,11 @@ impl<T: Real> FreeForces<T> {
         }
     }
 
-    /// Generalised forces `τ = M(q) q̈ + bias(q, q̇)` (N m or N) of the free coordinates, in their order, into `tau`: those of
-    /// [`crate::inverse_dynamics`], to rounding. O(n), no allocation.
+    /// Generalised forces `τ = M(q) q̈ + bias(q, q̇)` (N m or N) of the free coordinates, in their
+    /// order, into `tau`: those of [`crate::inverse_dynamics`], to rounding. O(n), no allocation.
     ///
-    /// * `loads`: external wrench on each body at Bo, B axes, if there are any; they are subtracted.
+    /// * `loads`: external wrench on each body at Bo, B axes, if there are any; they are
+    ///   subtracted.
     ///
     /// # Source
     /// [Luh, Walker & Paul 1980].

@@ -1,4 +1,5 @@
-//! A body and its joint, as the recursion of [`super::FreeForces`] sees them; letters and equations are those of the module above.
+//! A body and its joint, as the recursion of [`super::FreeForces`] sees them; letters and equations
+//! are those of the module above.
 
 use flexarm_spatial::products::{add, cross, dot, dyad, lift, lift3, mul, mul3, scaled, sub, tr_mul};
 use flexarm_spatial::{ElasticAngles, Real, SpatialInertia, Wrench};
@@ -33,7 +34,8 @@ pub(super) struct Node<T: Real> {
     pub(super) B: Matrix3<T>,
     /// `R_PJ` of an elastic joint.
     pub(super) R_PJ: Matrix3<T>,
-    /// Its motion, where that is kept: where a body other than the next one hangs on it, or it is looked at.
+    /// Its motion, where that is kept: where a body other than the next one hangs on it, or it is
+    /// looked at.
     pub(super) moving: Moving<T>,
     pub(super) keeps_motion: bool,
     pub(super) force: Vector3<T>,
@@ -52,7 +54,8 @@ pub(super) struct Moving<T: Real> {
 /// What the recursion does with a joint.
 #[derive(Clone, Debug)]
 pub(super) enum NodeJoint {
-    /// Turns about an axis, the number among those that turn, and moves so far along it per rad (P axes).
+    /// Turns about an axis, the number among those that turn, and moves so far along it per rad (P
+    /// axes).
     Turns { axis: Vector3<f64>, table: Box<RevoluteTable>, turning: usize, along: Option<Vector3<f64>> },
     /// Slides along this (P axes).
     Slides { along: Vector3<f64> },
@@ -233,7 +236,8 @@ impl<T: Real> Node<T> {
         if matches!(self.joint, NodeJoint::Elastic { .. }) { 6 } else { 1 }
     }
 
-    /// `Sᵀ F`, as many numbers as the joint has coordinates; the force in P axes, the torque in B axes.
+    /// `Sᵀ F`, as many numbers as the joint has coordinates; the force in P axes, the torque in B
+    /// axes.
     #[inline(always)]
     pub(super) fn project(&self, force: &Vector3<T>, torque: &Vector3<T>) -> [T; 6] {
         let ratio = T::splat(self.ratio);

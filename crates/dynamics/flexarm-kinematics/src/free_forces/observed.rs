@@ -1,4 +1,5 @@
-//! All that a run is shown of a tree at an instant, in one pass outward behind the recursion of the module above.
+//! All that a run is shown of a tree at an instant, in one pass outward behind the recursion of the
+//! module above.
 //!
 //! ```text
 //!   v_B  = R_BP (v_P + ω_P × p + ṗ)                              (7)   v: velocity of Bo, B axes
@@ -71,11 +72,14 @@ impl Observer {
         Some(Self { placed: vec![placed; model.bodies.len() - 1], tree })
     }
 
-    /// Poses of all bodies in the world into `X_WB`, generalised forces of all coordinates (N m or N) into `tau`; kinetic energy,
-    /// rotors included, and potential energy of gravity, zero at the world origin (J). They are those of [`crate::inverse_dynamics`],
-    /// [`crate::world_poses`], [`crate::kinetic_energy_of`] and [`crate::potential_energy_of`], to rounding. O(n), no allocation.
+    /// Poses of all bodies in the world into `X_WB`, generalised forces of all coordinates (N m or
+    /// N) into `tau`; kinetic energy, rotors included, and potential energy of gravity, zero at the
+    /// world origin (J). They are those of [`crate::inverse_dynamics`], [`crate::world_poses`],
+    /// [`crate::kinetic_energy_of`] and [`crate::potential_energy_of`], to rounding. O(n), no
+    /// allocation.
     ///
-    /// * `loads`: external wrench on each body at Bo, B axes, if there are any; they are subtracted.
+    /// * `loads`: external wrench on each body at Bo, B axes, if there are any; they are
+    ///   subtracted.
     pub fn observe(
         &mut self,
         model: &Model,

@@ -125,7 +125,8 @@ pub(crate) fn puma() -> Mechanism {
     from_dh("Puma 560", &rows)
 }
 
-/// The shipped arms of six joints and well-known ones, by the numbers of their files and data sheets.
+/// The shipped arms of six joints and well-known ones, by the numbers of their files and data
+/// sheets.
 pub(crate) fn known_arms() -> Vec<Named> {
     let industrial = ArmClass::SphericalWrist(PositionForm::Parallel23);
     let ur = ArmClass::ThreeParallel { first: 2, meeting: true };
@@ -210,7 +211,8 @@ pub(crate) fn known_arms() -> Vec<Named> {
     ]
 }
 
-/// Axes of the world at zero joint values, as (direction, point), become an arm whose frames lie anyhow.
+/// Axes of the world at zero joint values, as (direction, point), become an arm whose frames lie
+/// anyhow.
 pub(crate) fn from_axes(name: &str, axes: &[(Vector3<f64>, Vector3<f64>); 6], draw: &mut Draw) -> Mechanism {
     let mut before = Pose::identity();
     let mut joints = Vec::new();

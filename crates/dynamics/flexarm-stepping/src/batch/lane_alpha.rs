@@ -1,8 +1,10 @@
-//! Generalised-alpha over arms in lanes: the steps of [`crate::GeneralizedAlpha`], each lane with its bits.
+//! Generalised-alpha over arms in lanes: the steps of [`crate::GeneralizedAlpha`], each lane with
+//! its bits.
 //!
-//! All lanes share the times of their steps. Each decides by itself when its iteration ends and when its matrix is renewed; where
-//! one lane needs a matrix, all compute one and the others keep theirs. A lane that would do anything else than take whole
-//! steps, or whose step fails, is left behind ([`LaneAlpha::left_behind`]): its run is to be taken alone.
+//! All lanes share the times of their steps. Each decides by itself when its iteration ends and
+//! when its matrix is renewed; where one lane needs a matrix, all compute one and the others keep
+//! theirs. A lane that would do anything else than take whole steps, or whose step fails, is left
+//! behind ([`LaneAlpha::left_behind`]): its run is to be taken alone.
 
 use std::sync::Arc;
 
@@ -47,7 +49,8 @@ struct Lane {
     alive: bool,
 }
 
-/// Prescribed joints at the start of a step, by which it is known whether the step has to be cut, as [`ReducedArm::resolved`] tells.
+/// Prescribed joints at the start of a step, by which it is known whether the step has to be cut,
+/// as [`ReducedArm::resolved`] tells.
 struct Joints<T> {
     /// Room for the motion of one lane.
     own: [Vec<f64>; 3],
@@ -253,8 +256,8 @@ impl<T: Real> LaneAlpha<T> {
 
     /// One step of all lanes that are not left behind; of others the state means nothing.
     ///
-    /// Equations of motion and matrices have one place each in it: inlined twice, the code would not fit the processor's
-    /// cache.
+    /// Equations of motion and matrices have one place each in it: inlined twice, the code would
+    /// not fit the processor's cache.
     #[inline(always)]
     pub(super) fn step(&mut self) {
         let (t, h) = (self.grid.next_time(), self.grid.step_size());
@@ -392,7 +395,8 @@ impl<T: Real> LaneAlpha<T> {
         }
     }
 
-    /// Takes the correction `d = J^-1 r` off everything on trial, where `active` is 1; the lanes that go on.
+    /// Takes the correction `d = J^-1 r` off everything on trial, where `active` is 1; the lanes
+    /// that go on.
     #[inline(always)]
     fn correct(&mut self, active: T) -> T {
         let zero = T::zero();
@@ -456,7 +460,8 @@ impl<T: Real> LaneAlpha<T> {
 
     /// Newton's matrix at the configuration of the last residual, in the lanes where `wanted` is 1.
     ///
-    /// Mostly it is one lane, so matrices are factorised one by one: there the instructions go along the columns.
+    /// Mostly it is one lane, so matrices are factorised one by one: there the instructions go
+    /// along the columns.
     #[inline(always)]
     fn factor(&mut self, wanted: T) {
         debug_assert_eq!(
@@ -511,8 +516,8 @@ impl Matrices {
         }
     }
 
-    /// `M^-1 K` and the inverse of Newton's matrix from S and a run's C and K, as the dispersion correction of a single run has them; false
-    /// if there is none.
+    /// `M^-1 K` and the inverse of Newton's matrix from S and a run's C and K, as the dispersion
+    /// correction of a single run has them; false if there is none.
     fn invert(&mut self, c_h2: f64, C: &[f64], K: &[f64]) -> bool {
         let Self { n, S, product, L, turned, M_inverse_K, inverse } = self;
         let n = *n;

@@ -1,7 +1,7 @@
 //! Arms of one tree side by side: the equations of motion of [`crate::ReducedArm`] in lanes.
 //!
-//! What they share is the tree. Inertias, stiffness, damping and motion differ. All joints are prescribed, springs straight;
-//! nothing happens at discrete times.
+//! What they share is the tree. Inertias, stiffness, damping and motion differ. All joints are
+//! prescribed, springs straight; nothing happens at discrete times.
 
 use flexarm_kinematics::lanes::{
     LaneTree, inverse_dynamics, mass_matrix_at_poses, rigid_and_flexible, rigid_and_flexible_of_points,
@@ -122,7 +122,8 @@ impl<T: Real> LaneArm<T> {
         [&self.state.qdot.as_slice()[..n], &self.qddot[..n]]
     }
 
-    /// Flexible minus rigid place of a frame (m, world axes), for the joints of the last residual and elastic coordinates x.
+    /// Flexible minus rigid place of a frame (m, world axes), for the joints of the last residual
+    /// and elastic coordinates x.
     #[inline(always)]
     pub(super) fn deflection(&mut self, tool: &Frame, x: &[T]) -> Vector3<T> {
         self.q[self.tree.model().n_actuated()..].copy_from_slice(x);
@@ -133,7 +134,8 @@ impl<T: Real> LaneArm<T> {
         sub(&flexible, &rigid)
     }
 
-    /// `r(x, v, a)` into r. Where `active` is not 1 the elastic state stays that of the call before, and r belongs to it.
+    /// `r(x, v, a)` into r. Where `active` is not 1 the elastic state stays that of the call
+    /// before, and r belongs to it.
     #[inline(always)]
     pub(super) fn residual(&mut self, active: T, x: &[T], v: &[T], a: &[T], r: &mut [T]) {
         let n = self.joints();

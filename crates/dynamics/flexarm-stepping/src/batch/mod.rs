@@ -1,10 +1,11 @@
 //! Many runs of one tree: payload, motion, stiffness, damping and duration differ from run to run.
 //!
-//! Four or eight runs go side by side in the lanes of vector instructions, where the processor has them; what comes out is, to the last
-//! bit, that of the same run alone ([`Batch::run_alone`]). Runs that lanes do not know (other trees, servos, loads, payloads that
-//! change, curved springs, velocities that jump), and those whose steps have to be cut or do not converge, are taken alone.
-//! What a batch tells of a run is how far the tool is from where the rigid arm has it. Start at [`Batch::run`]; threads are
-//! the caller's. Not here: recordings, figures of settling, drives.
+//! Four or eight runs go side by side in the lanes of vector instructions, where the processor has
+//! them; what comes out is, to the last bit, that of the same run alone ([`Batch::run_alone`]).
+//! Runs that lanes do not know (other trees, servos, loads, payloads that change, curved springs,
+//! velocities that jump), and those whose steps have to be cut or do not converge, are taken alone.
+//! What a batch tells of a run is how far the tool is from where the rigid arm has it. Start at
+//! [`Batch::run`]; threads are the caller's. Not here: recordings, figures of settling, drives.
 
 mod lane_alpha;
 mod lane_arm;
@@ -45,7 +46,8 @@ pub struct BatchRun {
     pub duration_s: f64,
 }
 
-/// How far the tool of a run was from that of the rigid arm on the same motion, at the start and after every step.
+/// How far the tool of a run was from that of the rigid arm on the same motion, at the start and
+/// after every step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ToolDeflection {
     /// Steps taken.
@@ -84,7 +86,8 @@ impl ToolDeflection {
 }
 
 impl Batch {
-    /// The runs, as many side by side as [`Batch::most_side_by_side`] where that is possible. Runs that last equally long waste least.
+    /// The runs, as many side by side as [`Batch::most_side_by_side`] where that is possible. Runs
+    /// that last equally long waste least.
     ///
     /// # Errors
     /// Of each run its own: [`StepError`] as by a stepper.

@@ -1,7 +1,8 @@
 //! Small dense matrices, column after column in a slice; n is their number of rows.
 //!
-//! Over numbers or lanes of them. Sums have the order of the same operations in nalgebra, which a single run uses: each lane
-//! has its bits. What a [`Factor`] does is its own, for single poses and lanes alike.
+//! Over numbers or lanes of them. Sums have the order of the same operations in nalgebra, which a
+//! single run uses: each lane has its bits. What a [`Factor`] does is its own, for single poses and
+//! lanes alike.
 
 mod quick;
 
@@ -149,7 +150,8 @@ fn solve_in_place(A: &mut [f64], Bt: &mut [f64], n: usize) -> bool {
     positive
 }
 
-/// Solves `A X = B` with the factor of A; takes `Bᵀ`, leaves `Xᵀ`: turned round, elimination goes over whole columns.
+/// Solves `A X = B` with the factor of A; takes `Bᵀ`, leaves `Xᵀ`: turned round, elimination goes
+/// over whole columns.
 #[inline(always)]
 fn solve_transposed(L: &[f64], Bt: &mut [f64], n: usize) {
     for k in 0..n {
@@ -311,7 +313,8 @@ impl<T: Real> Factor<T> {
             let l = &self.L[k * n + k + 1..(k + 1) * n];
             let inverse = self.inverse[k];
             diagonal[0] *= inverse * inverse;
-            // Half of the diagonal before and half behind the change of the rest keeps it symmetric.
+            // Half of the diagonal before and half behind the change of the rest keeps it
+            // symmetric.
             let half = T::splat(0.5) * diagonal[0];
             scale(b, inverse);
             subtract(b, half, l);

@@ -1,5 +1,5 @@
-//! Small dense matrices and loops of single runs, with the vector instructions that the processor has. Operations and their order are the
-//! same with and without.
+//! Small dense matrices and loops of single runs, with the vector instructions that the processor
+//! has. Operations and their order are the same with and without.
 
 use super::{congruence, dot, largest_of_numbers, product, solve_in_place};
 
@@ -9,7 +9,8 @@ pub(crate) trait Loops {
     fn run(self);
 }
 
-/// Runs loops with the vector instructions that the processor has. Operations and their order are the same with and without.
+/// Runs loops with the vector instructions that the processor has. Operations and their order are
+/// the same with and without.
 #[inline(always)]
 pub(crate) fn quickly(loops: impl Loops) {
     #[cfg(target_arch = "x86_64")]
@@ -39,7 +40,8 @@ pub(crate) fn product_of_numbers(A: &[f64], x: &[f64], y: &mut [f64]) {
     quickly(Product(A, x, y));
 }
 
-/// `A ← L`, `Bᵀ ← A^-1 B`; false if A (n × n) is not positive definite; with the vector instructions that the processor has.
+/// `A ← L`, `Bᵀ ← A^-1 B`; false if A (n × n) is not positive definite; with the vector
+/// instructions that the processor has.
 pub(crate) fn solve_quickly(A: &mut [f64], Bt: &mut [f64], n: usize) -> bool {
     struct Solve<'a>(&'a mut [f64], &'a mut [f64], usize, &'a mut bool);
     impl Loops for Solve<'_> {
@@ -54,7 +56,8 @@ pub(crate) fn solve_quickly(A: &mut [f64], Bt: &mut [f64], n: usize) -> bool {
     positive
 }
 
-/// `S C Sᵀ` with `Sᵀ = 1 + c X` of a symmetric C (n × n); both rooms are as large; with the vector instructions that the processor has.
+/// `S C Sᵀ` with `Sᵀ = 1 + c X` of a symmetric C (n × n); both rooms are as large; with the vector
+/// instructions that the processor has.
 pub(crate) fn congruence_quickly(c: f64, X: &[f64], C: &[f64], n: usize, room: [&mut [f64]; 2], product: &mut [f64]) {
     struct Congruence<'a>(f64, &'a [f64], &'a [f64], usize, [&'a mut [f64]; 2], &'a mut [f64]);
     impl Loops for Congruence<'_> {

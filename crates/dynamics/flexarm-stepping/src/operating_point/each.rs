@@ -24,8 +24,8 @@ pub struct Asked {
     pub frequencies: bool,
 }
 
-/// What is known of one pose among many, of an arm with n elastic coordinates; world axes, at the tool point, linear first. What was
-/// not asked for has no meaning.
+/// What is known of one pose among many, of an arm with n elastic coordinates; world axes, at the
+/// tool point, linear first. What was not asked for has no meaning.
 #[derive(Clone, Debug)]
 pub struct PoseAnswer {
     /// Tool in the world at the equilibrium.
@@ -56,14 +56,15 @@ impl PoseAnswer {
 }
 
 impl OperatingPoint {
-    /// Equilibria at many poses under weight and a wrench at the tool, as [`OperatingPoint::solve`] finds each, to the last bit, and
-    /// what is asked of them; the answers go to `seen` with the number of their pose, in order.
+    /// Equilibria at many poses under weight and a wrench at the tool, as [`OperatingPoint::solve`]
+    /// finds each, to the last bit, and what is asked of them; the answers go to `seen` with the
+    /// number of their pose, in order.
     ///
     /// * `poses`: m×joints, pose after pose (rad or m).
     /// * `F_T_W`: force and moment on the tool at its origin, world axes (N, N m).
     ///
-    /// Cost: four poses take about as long as one and a half where the processor has AVX2 and the arm straight springs, no
-    /// balancers, loops or loads.
+    /// Cost: four poses take about as long as one and a half where the processor has AVX2 and the
+    /// arm straight springs, no balancers, loops or loads.
     ///
     /// # Errors
     /// Of each pose its own, as [`OperatingPoint::solve`].
@@ -108,7 +109,8 @@ impl OperatingPoint {
         Ok(answer)
     }
 
-    /// Poses by lanes, those that leave the plain way alone; how many were taken, from the first one on.
+    /// Poses by lanes, those that leave the plain way alone; how many were taken, from the first
+    /// one on.
     #[cfg(target_arch = "x86_64")]
     fn in_lanes(
         &mut self,

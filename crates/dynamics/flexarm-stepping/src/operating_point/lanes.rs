@@ -1,8 +1,9 @@
-//! Equilibria of one arm at several poses at once, in lanes: what [`super::OperatingPoint`] does on its plain way, operation by
-//! operation, so that each lane has its bits.
+//! Equilibria of one arm at several poses at once, in lanes: what [`super::OperatingPoint`] does on
+//! its plain way, operation by operation, so that each lane has its bits.
 //!
-//! The plain way is Newton's iteration with the factor of the springs at rest, to the end. A lane that leaves it (weight or loads
-//! that change the stiffness much, steps that are too long, no equilibrium) says so and is solved alone.
+//! The plain way is Newton's iteration with the factor of the springs at rest, to the end. A lane
+//! that leaves it (weight or loads that change the stiffness much, steps that are too long, no
+//! equilibrium) says so and is solved alone.
 
 use flexarm_kinematics::lanes::{
     LaneTree, forward_kinematics, frame_jacobian, gravity_forces_at_poses, mass_matrix_at_poses, static_tangent,
@@ -53,7 +54,8 @@ pub(super) struct LanePoints<T: Real> {
 }
 
 impl<T: Real> LanePoints<T> {
-    /// Workspaces for a plain arm; `None` if its tree has closed loops, or its springs have no factor.
+    /// Workspaces for a plain arm; `None` if its tree has closed loops, or its springs have no
+    /// factor.
     pub(super) fn new(point: &OperatingPoint) -> Option<Self> {
         let OperatingPoint { arm, tool, K, .. } = point;
         let (model, n) = (&arm.model, arm.n_elastic_coordinates());
@@ -94,7 +96,8 @@ impl<T: Real> LanePoints<T> {
         }
     }
 
-    /// Finds the equilibria of all lanes, and what is asked of them; 1 in the lanes that have one on the plain way.
+    /// Finds the equilibria of all lanes, and what is asked of them; 1 in the lanes that have one
+    /// on the plain way.
     #[inline(always)]
     pub(super) fn solve(&mut self, F_T_W: &Wrench) -> T {
         let joints = self.q.len() - self.r.len();

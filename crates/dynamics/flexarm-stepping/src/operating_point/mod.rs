@@ -1,13 +1,16 @@
-//! An arm held at one pose after another: equilibrium, compliance, Jacobian, frequencies, without allocation.
+//! An arm held at one pose after another: equilibrium, compliance, Jacobian, frequencies, without
+//! allocation.
 //!
 //! ```text
 //! K e + p(q_a, e) = 0          C = J (K + dp/de)^-1 Jᵀ          (K + dp/de) φ = ω² M φ
 //! ```
-//! with the elastic coordinates e, the springs K, and p the forces that hold weight and loads. Drives are locked. Newton begins
-//! with the factor of the springs, which weight changes little, so a pose costs one tangent, in closed form
-//! ([`flexarm_kinematics::StaticTangent`]), and its answer depends on nothing that was asked before.
+//! with the elastic coordinates e, the springs K, and p the forces that hold weight and loads.
+//! Drives are locked. Newton begins with the factor of the springs, which weight changes little, so
+//! a pose costs one tangent, in closed form ([`flexarm_kinematics::StaticTangent`]), and its answer
+//! depends on nothing that was asked before.
 //!
-//! Start at [`OperatingPoint::new`]. For damping, servos and inputs about one pose: [`crate::linearise`].
+//! Start at [`OperatingPoint::new`]. For damping, servos and inputs about one pose:
+//! [`crate::linearise`].
 
 mod each;
 mod lanes;
@@ -108,14 +111,17 @@ impl OperatingPoint {
     /// Finds the equilibrium with the joints at `q` under weight and a wrench at the tool.
     ///
     /// * `q`: actuated joints in coordinate order (rad or m).
-    /// * `F_T_W`: force and moment on the tool at its origin, world axes (N, N m), the same when the arm yields.
+    /// * `F_T_W`: force and moment on the tool at its origin, world axes (N, N m), the same when
+    ///   the arm yields.
     ///
-    /// Cost: one tangent, two at most for small deflections; no allocation after the first, but for joints with play and where
-    /// a load turns the arm so far that the tangent is not positive definite on the way.
+    /// Cost: one tangent, two at most for small deflections; no allocation after the first, but for
+    /// joints with play and where a load turns the arm so far that the tangent is not positive
+    /// definite on the way.
     ///
     /// # Errors
-    /// [`StepError::Setup`] for another number of joints or values that are no numbers, [`StepError::NoEquilibrium`],
-    /// [`StepError::OpenLoop`], and [`StepError::Singular`] beyond a buckling load.
+    /// [`StepError::Setup`] for another number of joints or values that are no numbers,
+    /// [`StepError::NoEquilibrium`], [`StepError::OpenLoop`], and [`StepError::Singular`] beyond a
+    /// buckling load.
     pub fn solve(&mut self, q: &[f64], F_T_W: &Wrench) -> Result<(), StepError> {
         let m = self.arm.model.n_actuated();
         self.residual = f64::NAN;
@@ -193,7 +199,8 @@ impl OperatingPoint {
                 break;
             }
             self.tangent.factor.solve(self.r.as_mut_slice());
-            // Far from small deflections the full step may overshoot: no coordinate moves by more than 0.5.
+            // Far from small deflections the full step may overshoot: no coordinate moves by more
+            // than 0.5.
             let shorten = (0.5 / self.r.amax()).min(1.0);
             self.q.rows_mut(m, n).axpy(-shorten, &self.r, 1.0);
             if !self.arm.hysteresis.is_empty() {
@@ -206,8 +213,8 @@ impl OperatingPoint {
         }
     }
 
-    /// Takes halves of a step back until the forces are less out of balance than they were: the first loading of a gear may be soft,
-    /// then stiff. The step is in `r`.
+    /// Takes halves of a step back until the forces are less out of balance than they were: the
+    /// first loading of a gear may be soft, then stiff. The step is in `r`.
     fn come_closer(&mut self, mut part: f64, unbalanced: f64) {
         let (m, n) = (self.arm.model.n_actuated(), self.r.len());
         let step = self.r.clone();
@@ -242,7 +249,8 @@ impl OperatingPoint {
         springs.max(carried).max(self.arm.friction_of_gears()).max(f64::MIN_POSITIVE)
     }
 
-    /// The tangent at `q` and the factor of its symmetric part; `small`: for small motions, in which no friction slips.
+    /// The tangent at `q` and the factor of its symmetric part; `small`: for small motions, in
+    /// which no friction slips.
     fn refactor(&mut self, small: bool) -> Result<(), StepError> {
         let (m, n) = (self.arm.model.n_actuated(), self.r.len());
         let tool = Some((&self.tool, &self.F_T_W));
@@ -304,8 +312,9 @@ impl OperatingPoint {
         &self.p.as_slice()[..self.arm.model.n_actuated()]
     }
 
-    /// Forces on the elastic coordinates that weight, loads and the wrench would need at this equilibrium in another arm of the
-    /// same tree, without springs, into `p` (n): with other masses, the slope of a mass.
+    /// Forces on the elastic coordinates that weight, loads and the wrench would need at this
+    /// equilibrium in another arm of the same tree, without springs, into `p` (n): with other
+    /// masses, the slope of a mass.
     pub fn forces_of(&mut self, other: &FlexibleArm, p: &mut DVector<f64>) {
         let mut all = DVector::zeros(self.q.len());
         static_forces(other, Some((&self.tool, &self.F_T_W)), 0.0, &mut self.data, &self.q, &mut all);
@@ -317,7 +326,8 @@ impl OperatingPoint {
         &self.J
     }
 
-    /// Unbalanced force over the largest force; NaN before the first pose and after one that failed.
+    /// Unbalanced force over the largest force; NaN before the first pose and after one that
+    /// failed.
     pub fn residual(&self) -> f64 {
         self.residual
     }
@@ -327,7 +337,8 @@ impl OperatingPoint {
         self.iterations
     }
 
-    /// Displacement of the tool per wrench on it, drives locked, 6×6 (m/N, rad/N; m/(N m), rad/(N m)).
+    /// Displacement of the tool per wrench on it, drives locked, 6×6 (m/N, rad/N; m/(N m), rad/(N
+    /// m)).
     ///
     /// Cost: six solutions with the factor that is there.
     pub fn compliance(&mut self) -> Matrix6<f64> {
@@ -338,10 +349,11 @@ impl OperatingPoint {
         Matrix6::from_fn(|i, j| C[i][j])
     }
 
-    /// Twist of the tool per generalised force on each elastic coordinate, `J (K + dp/de)^-1`, transposed: n×6.
+    /// Twist of the tool per generalised force on each elastic coordinate, `J (K + dp/de)^-1`,
+    /// transposed: n×6.
     ///
-    /// What the tool does when a parameter changes the forces on the elastic coordinates by `dr` is `-yieldingᵀ dr`: one matrix
-    /// for any number of parameters. Empty before the first pose.
+    /// What the tool does when a parameter changes the forces on the elastic coordinates by `dr` is
+    /// `-yieldingᵀ dr`: one matrix for any number of parameters. Empty before the first pose.
     ///
     /// Cost: as [`OperatingPoint::compliance`].
     pub fn yielding(&mut self) -> &DMatrix<f64> {
@@ -351,9 +363,11 @@ impl OperatingPoint {
         &self.tangent.Y
     }
 
-    /// Natural frequencies (Hz), ascending, undamped, drives locked; of the symmetric part of the stiffness.
+    /// Natural frequencies (Hz), ascending, undamped, drives locked; of the symmetric part of the
+    /// stiffness.
     ///
-    /// Cost: a mass matrix and the eigenvalues of an n×n matrix. Not a number where a coordinate moves no mass.
+    /// Cost: a mass matrix and the eigenvalues of an n×n matrix. Not a number where a coordinate
+    /// moves no mass.
     pub fn frequencies_hz(&mut self) -> &[f64] {
         if !self.factored {
             return &[];

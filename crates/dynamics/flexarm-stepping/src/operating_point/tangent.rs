@@ -1,5 +1,5 @@
-//! What is asked of an equilibrium whose tangent is known: compliance, and natural frequencies. Of one pose or of several in lanes,
-//! by the same operations in the same order.
+//! What is asked of an equilibrium whose tangent is known: compliance, and natural frequencies. Of
+//! one pose or of several in lanes, by the same operations in the same order.
 
 use flexarm_kinematics::Real;
 use nalgebra::DMatrix;
@@ -7,10 +7,12 @@ use nalgebra::DMatrix;
 use crate::dense::{Factor, dot, subtract_product, symmetric_part};
 use crate::eigenvalues::symmetric_eigenvalues;
 
-/// Passes of refinement where a constant moment makes the tangent unsymmetric: each leaves a thousandth or less.
+/// Passes of refinement where a constant moment makes the tangent unsymmetric: each leaves a
+/// thousandth or less.
 const REFINEMENTS: usize = 8;
 
-/// `T = K + dp/de`, n × n, the factor of its symmetric part, and the workspaces of what comes of it.
+/// `T = K + dp/de`, n × n, the factor of its symmetric part, and the workspaces of what comes of
+/// it.
 #[derive(Clone, Debug)]
 pub(super) struct Tangent<T: Real> {
     n: usize,
@@ -132,7 +134,8 @@ impl<T: Real> Tangent<T> {
         }
     }
 
-    /// `1/ω²` of all natural frequencies into d, of the symmetric part; 1 where they were found, else 0.
+    /// `1/ω²` of all natural frequencies into d, of the symmetric part; 1 where they were found,
+    /// else 0.
     ///
     /// * `M`: mass matrix of all coordinates, of which those of the springs are the last n.
     #[inline(always)]

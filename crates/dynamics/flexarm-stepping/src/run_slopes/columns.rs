@@ -1,4 +1,5 @@
-//! Loops over whole columns, with the vector instructions that the processor has. Operations and their order are the same with and without.
+//! Loops over whole columns, with the vector instructions that the processor has. Operations and
+//! their order are the same with and without.
 
 use crate::dense::{Loops, quickly};
 use nalgebra::{DMatrix, Dim, Dyn, IsContiguous, Matrix, RawStorage};

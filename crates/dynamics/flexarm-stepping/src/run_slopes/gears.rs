@@ -1,12 +1,14 @@
-//! The tangent of what gears do beside giving way: ripple, hysteresis, coupling, friction that grows with the load.
+//! The tangent of what gears do beside giving way: ripple, hysteresis, coupling, friction that
+//! grows with the load.
 //!
 //! ```text
 //! δ = e - ε(q_m),  δ' = ė - ε' q̇_m:     dF = K dδ + D dδ' + Σ k_i w_i,     dδ' = dė - ε' dq̇_m - ε'' q̇_m dq_m      (1)
 //! on q_m:  -ε' dF - ε'' F dq_m                                                                              (2)
 //! w_i = ds_i - dδ of a slider: the same while it sticks; -dδ of the last time at which it slipped           (3)
 //! ```
-//! A slider that slips stays at its reach, whatever a parameter does. When it begins and ends to do so changes with the parameter, but
-//! its torque does not jump there: the derivative needs nothing of that.
+//! A slider that slips stays at its reach, whatever a parameter does. When it begins and ends to do
+//! so changes with the parameter, but its torque does not jump there: the derivative needs nothing
+//! of that.
 
 use flexarm_kinematics::State;
 use nalgebra::{DMatrix, DVector};
@@ -116,7 +118,8 @@ impl GearSlopes {
         }
     }
 
-    /// Adds what a direction of this number does to the forces, and what its sliders bring along; free coordinates.
+    /// Adds what a direction of this number does to the forces, and what its sliders bring along;
+    /// free coordinates.
     pub(super) fn add_explicit(
         &self,
         at: &Look<'_>,
@@ -161,7 +164,8 @@ impl GearSlopes {
         }
     }
 
-    /// (3) where a step has ended; `x`: derivatives of the free coordinates, directions × N, `joints`: of the joints' motion.
+    /// (3) where a step has ended; `x`: derivatives of the free coordinates, directions × N,
+    /// `joints`: of the joints' motion.
     pub(super) fn settle(&mut self, arm: &FlexibleArm, gears: &GearState, x: &DMatrix<f64>, joints: &DMatrix<f64>) {
         let driven = arm.torque_driven.len();
         let Self { w, ripple, .. } = self;

@@ -1,4 +1,5 @@
-//! A square system that is factored and solved in place, again and again. Not here: systems that are symmetric.
+//! A square system that is factored and solved in place, again and again. Not here: systems that
+//! are symmetric.
 
 use nalgebra::DMatrix;
 

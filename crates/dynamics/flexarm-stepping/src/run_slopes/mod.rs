@@ -1,18 +1,23 @@
-//! How a whole run changes with parameters of the arm and of its motion: the tangent of generalised-alpha, all parameters side by side.
+//! How a whole run changes with parameters of the arm and of its motion: the tangent of
+//! generalised-alpha, all parameters side by side.
 //!
 //! ```text
 //! r(q, q̇, q̈; p) = 0:     M δẍ + V δẋ + K δx = -(∂r/∂p + K_a δq_a + V_a δq̇_a + M_a δq̈_a)                           (1)
 //! ```
-//! holds at the end of every step, with `K = ∂r/∂x`, `V = ∂r/∂ẋ` in closed form ([`flexarm_kinematics::DynamicTangent`]), where loops close or
-//! links bend in modes by differences of the recursions (`forces.rs`); the formulas that join x, ẋ and ẍ
-//! of two steps are linear, so that a step is one linear system for all parameters: a column each. What differs from a run of
-//! [`crate::GeneralizedAlpha`] is that its iterations go on to the end and that the matrix of its dispersion correction is that of the
-//! start of each step: a run whose result is a smooth function of the parameters, of which differences can be taken
-//! ([`GeneralizedAlpha::exactly`]). An ordinary run differs from it by what its iterations leave, far less than the error of its step.
+//! holds at the end of every step, with `K = ∂r/∂x`, `V = ∂r/∂ẋ` in closed form
+//! ([`flexarm_kinematics::DynamicTangent`]), where loops close or links bend in modes by
+//! differences of the recursions (`forces.rs`); the formulas that join x, ẋ and ẍ of two steps are
+//! linear, so that a step is one linear system for all parameters: a column each. What differs from
+//! a run of [`crate::GeneralizedAlpha`] is that its iterations go on to the end and that the matrix
+//! of its dispersion correction is that of the start of each step: a run whose result is a smooth
+//! function of the parameters, of which differences can be taken ([`GeneralizedAlpha::exactly`]).
+//! An ordinary run differs from it by what its iterations leave, far less than the error of its
+//! step.
 //!
-//! Torques under servos are held from sample to sample, and so are their derivatives (`servo.rs`); ripple, hysteresis, coupling and
-//! friction by load are in `gears.rs`. Start at [`run_slopes`]. Not here: names and units of parameters (`flexarm-identify`), motions whose
-//! velocity jumps under servos, links that stiffen under load: these are refused.
+//! Torques under servos are held from sample to sample, and so are their derivatives (`servo.rs`);
+//! ripple, hysteresis, coupling and friction by load are in `gears.rs`. Start at [`run_slopes`].
+//! Not here: names and units of parameters (`flexarm-identify`), motions whose velocity jumps under
+//! servos, links that stiffen under load: these are refused.
 
 mod columns;
 mod forces;
@@ -133,7 +138,8 @@ pub struct SlopesRequest {
     pub keep_samples: bool,
 }
 
-/// Error of the tool along a run, flexible less rigid, and its derivatives: a number per direction, in their order.
+/// Error of the tool along a run, flexible less rigid, and its derivatives: a number per direction,
+/// in their order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RunSlopes {
     /// Steps taken.
@@ -152,7 +158,8 @@ pub struct RunSlopes {
     pub slopes: Vec<[f64; 6]>,
 }
 
-/// A servo that was at its torque limit: the derivatives are those with these very samples at the limit.
+/// A servo that was at its torque limit: the derivatives are those with these very samples at the
+/// limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TorqueLimited {
     /// Coordinate of the joint.
@@ -205,14 +212,15 @@ impl ErrorSlopes {
     }
 }
 
-/// Error of the tool along a run and its exact derivatives in some directions; without any the run alone, to the end of each iteration.
+/// Error of the tool along a run and its exact derivatives in some directions; without any the run
+/// alone, to the end of each iteration.
 ///
-/// Cost: with 18 coordinates about ten ordinary runs, of which a step is often one evaluation, and a quarter of one for each direction. No
-/// allocation in the steps but for what is kept of them.
+/// Cost: with 18 coordinates about ten ordinary runs, of which a step is often one evaluation, and
+/// a quarter of one for each direction. No allocation in the steps but for what is kept of them.
 ///
 /// # Errors
-/// [`StepError::NoSlopes`] where the arm has what is not differentiated; [`StepError::Setup`] for a step that is no time or a spring
-/// that is not there; else as a stepper.
+/// [`StepError::NoSlopes`] where the arm has what is not differentiated; [`StepError::Setup`] for a
+/// step that is no time or a spring that is not there; else as a stepper.
 pub fn run_slopes(
     arm: &FlexibleArm,
     request: &SlopesRequest,

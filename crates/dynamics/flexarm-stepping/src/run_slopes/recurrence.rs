@@ -1,6 +1,7 @@
 //! A run and its tangent, step by step.
 //!
-//! With `S = 1 + c h² M^-1 K` at the start of the step ((5) of generalised-alpha) and `y = M^-1 K ẍ⁺`:
+//! With `S = 1 + c h² M^-1 K` at the start of the step ((5) of generalised-alpha) and
+//! `y = M^-1 K ẍ⁺`:
 //!
 //! ```text
 //! δx̃⁺ = S δẍ⁺ + z,    z = c h² M^-1 (δK ẍ⁺ - δM y)                       δM by parameters and by δq of the start   (1)
@@ -29,10 +30,12 @@ use crate::run_slopes::tangent::{Look, Tangent, add_columns, put};
 use crate::run_slopes::{Direction, SlopesRequest, TorqueLimited};
 use crate::steppers::{Coefficients, GeneralizedAlpha};
 
-/// Iterations of a step that finds its way; after more a matrix that has the dispersion correction in itself would be taken anew within it.
+/// Iterations of a step that finds its way; after more a matrix that has the dispersion correction
+/// in itself would be taken anew within it.
 const MOST_ITERATIONS: usize = 8;
 
-/// A run with its tangent: N free coordinates (d joints driven by torque, n elastic ones), m joints, p directions.
+/// A run with its tangent: N free coordinates (d joints driven by torque, n elastic ones), m
+/// joints, p directions.
 pub(super) struct Recurrence<'a> {
     system: ReducedArm,
     integrator: GeneralizedAlpha,
@@ -44,14 +47,16 @@ pub(super) struct Recurrence<'a> {
     c: f64,
     /// All coordinates at the current time.
     pub(super) q: DVector<f64>,
-    /// Derivatives of the free coordinates, p × N, of their rates and accelerations, and of what the scheme remembers: all directions of
-    /// a coordinate stand together, so that sums go over whole columns.
+    /// Derivatives of the free coordinates, p × N, of their rates and accelerations, and of what
+    /// the scheme remembers: all directions of a coordinate stand together, so that sums go over
+    /// whole columns.
     pub(super) x: DMatrix<f64>,
     v: DMatrix<f64>,
     acceleration: DMatrix<f64>,
     a: DMatrix<f64>,
     x_tilde: DMatrix<f64>,
-    /// Of the motion that joints are given, their rates and accelerations, p × m: their own, or the reference of a servo.
+    /// Of the motion that joints are given, their rates and accelerations, p × m: their own, or the
+    /// reference of a servo.
     pub(super) joints: [DMatrix<f64>; 3],
     /// Where they are to be, m.
     pub(super) reference: [Vec<f64>; 3],
@@ -255,7 +260,8 @@ impl<'a> Recurrence<'a> {
         Ok(())
     }
 
-    /// Derivatives of the torques that hold the joints on their reference at the start, springs as they are.
+    /// Derivatives of the torques that hold the joints on their reference at the start, springs as
+    /// they are.
     fn hold(&mut self) {
         let Self { system, integrator, tangent, directions, joints, x, room, own, servo: Some(servo), .. } = self
         else {
@@ -334,7 +340,8 @@ impl<'a> Recurrence<'a> {
         }
     }
 
-    /// δẍ of the equations of motion at the current state, which is all that the scheme then remembers.
+    /// δẍ of the equations of motion at the current state, which is all that the scheme then
+    /// remembers.
     fn accelerate(&mut self) -> Result<(), StepError> {
         if self.directions.is_empty() {
             return Ok(());
@@ -389,12 +396,14 @@ impl<'a> Recurrence<'a> {
         }
     }
 
-    /// Derivatives of the free velocities where those of the motion jump, `M_ff Δv_f + M_fp Δv_p = 0`: here all jumps are w = `blow`.
+    /// Derivatives of the free velocities where those of the motion jump,
+    /// `M_ff Δv_f + M_fp Δv_p = 0`: here all jumps are w = `blow`.
     ///
     /// ```text
     /// M_ff δΔv_f = -(∂(M w)/∂q δq + δM w + M_fp δΔv_p)
     /// ```
-    /// * `before`: derivatives of the motion's velocities on the other side of the jump, none of rest.
+    /// * `before`: derivatives of the motion's velocities on the other side of the jump, none of
+    ///   rest.
     fn strike(&mut self, t: f64, blow: &DVector<f64>, before: Option<&DMatrix<f64>>) -> Result<(), StepError> {
         if self.directions.is_empty() {
             return Ok(());
@@ -567,7 +576,8 @@ impl<'a> Recurrence<'a> {
     }
 }
 
-/// Takes rows of free coordinates; `column`: which stands in the place of each column, zeros without.
+/// Takes rows of free coordinates; `column`: which stands in the place of each column, zeros
+/// without.
 fn select(from: &DMatrix<f64>, free: &[usize], column: impl Fn(usize) -> Option<usize>, to: &mut DMatrix<f64>) {
     for j in 0..to.ncols() {
         match column(j) {

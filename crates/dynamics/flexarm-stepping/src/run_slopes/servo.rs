@@ -5,11 +5,13 @@
 //! δτ = δk_v error + k_v δerror + δI + δτ_ff;   0 where τ is at its limit
 //! δI += T (δk_i error + k_i δerror);           0 where the integral stops
 //! ```
-//! Between samples torques are held, so that these are all the memory that a controller has. Which samples are at a limit does not change
-//! with a small enough change of a parameter; where one more or less of them is, the integral steps by `k_i T error`: the derivative is
-//! that of the run up to there, and how many samples are at limits is told ([`crate::TorqueLimited`]).
+//! Between samples torques are held, so that these are all the memory that a controller has. Which
+//! samples are at a limit does not change with a small enough change of a parameter; where one more
+//! or less of them is, the integral steps by `k_i T error`: the derivative is that of the run up to
+//! there, and how many samples are at limits is told ([`crate::TorqueLimited`]).
 //!
-//! τ_ff is the rigid robot's inverse dynamics on the reference, whose tangent is that of the motion ([`ForceTangent`]).
+//! τ_ff is the rigid robot's inverse dynamics on the reference, whose tangent is that of the motion
+//! ([`ForceTangent`]).
 
 use flexarm_kinematics::{Data, State, inverse_dynamics, mass_matrix_at_poses, world_poses};
 use nalgebra::{DMatrix, DVector};
@@ -69,7 +71,8 @@ impl ServoSlopes {
 
     /// Takes in the sample that a servo has just taken at t, if any; whether there was one.
     ///
-    /// * `x`, `v`: derivatives of the free coordinates and rates, directions × N, axes first; `joints`: of reference, rates, accelerations.
+    /// * `x`, `v`: derivatives of the free coordinates and rates, directions × N, axes first;
+    ///   `joints`: of reference, rates, accelerations.
     pub(super) fn sample(
         &mut self,
         t: f64,

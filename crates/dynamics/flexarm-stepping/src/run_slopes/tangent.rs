@@ -1,4 +1,5 @@
-//! Matrices of the equations of motion about the current state, and what parameters do to these equations there.
+//! Matrices of the equations of motion about the current state, and what parameters do to these
+//! equations there.
 
 use flexarm_kinematics::{Data, PointLoad, State, StaticTangent};
 use nalgebra::{DMatrix, DVector};
@@ -30,7 +31,8 @@ pub(super) struct Tangent {
     pub(super) K: DMatrix<f64>,
     /// The same three, rows and columns of free coordinates.
     pub(super) own: [DMatrix<f64>; 3],
-    /// The same three, rows of free coordinates, columns of the joints; zero where a joint is itself free.
+    /// The same three, rows of free coordinates, columns of the joints; zero where a joint is
+    /// itself free.
     pub(super) by_joints: [DMatrix<f64>; 3],
     /// What gears do beside giving way.
     pub(super) gears: Option<GearSlopes>,
@@ -94,7 +96,8 @@ impl Tangent {
         }
     }
 
-    /// `∂r/∂q` and `∂r/∂q̇` of the motion that was last given to `data`, loads of time t; `gears`: of the same motion.
+    /// `∂r/∂q` and `∂r/∂q̇` of the motion that was last given to `data`, loads of time t; `gears`:
+    /// of the same motion.
     pub(super) fn compute(
         &mut self,
         arm: &FlexibleArm,
@@ -152,8 +155,8 @@ impl Tangent {
         }
     }
 
-    /// Adds `∂r/∂p` of a direction without the joints' motion to `to`, free coordinates, in the motion of [`Tangent::compute`]; without
-    /// what the controller does.
+    /// Adds `∂r/∂p` of a direction without the joints' motion to `to`, free coordinates, in the
+    /// motion of [`Tangent::compute`]; without what the controller does.
     pub(super) fn add_explicit(
         &mut self,
         at: &Look<'_>,

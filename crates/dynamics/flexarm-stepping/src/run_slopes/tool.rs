@@ -21,7 +21,8 @@ pub(super) struct ToolError {
     rigid_twists: DMatrix<f64>,
     /// Change of the tool's point per direction, tool axes.
     points: Vec<Vector3<f64>>,
-    /// Columns of J for free coordinates and for the joints, these zero where a joint is itself free.
+    /// Columns of J for free coordinates and for the joints, these zero where a joint is itself
+    /// free.
     J_free: Matrix6xX<f64>,
     J_joints: Matrix6xX<f64>,
     /// Whether the motion of the joints changes.

@@ -22,8 +22,9 @@ const LOAD: f64 = 1e-3;
 /// Steps in a period beyond which the error of any stepper is small.
 const MANY: f64 = 1000.0;
 
-/// Largest error over the first period of an oscillation, over its amplitude: the stepper itself runs on (1) and is compared
-/// with (2). Zero for steppers that choose their steps by error control.
+/// Largest error over the first period of an oscillation, over its amplitude: the stepper itself
+/// runs on (1) and is compared with (2). Zero for steppers that choose their steps by error
+/// control.
 ///
 /// * `h_omega`: step times angular frequency.
 /// * `zeta`: damping ratio of the oscillation, below 1.
@@ -80,8 +81,9 @@ mod tests {
         (entry.with)(&StepperOptions::default())
     }
 
-    /// Truth: SPOOK without damping has the frequency `(2/hω) atan(hω/2)` and, from rest, leads by half a step:
-    /// `x = 1 - cos(w' t + hω/2) / cos(hω/2)`; and the radius of RK4, `|R(iy)|² = 1 - y⁶/72 + y⁸/576`.
+    /// Truth: SPOOK without damping has the frequency `(2/hω) atan(hω/2)` and, from rest, leads by
+    /// half a step: `x = 1 - cos(w' t + hω/2) / cos(hω/2)`; and the radius of RK4,
+    /// `|R(iy)|² = 1 - y⁶/72 + y⁸/576`.
     #[test]
     fn the_error_of_a_period_is_that_of_the_closed_amplification() {
         for y in [0.1f64, 0.2, 0.3] {
@@ -111,7 +113,8 @@ mod tests {
         assert_eq!(error_of_a_period(kind("reference"), 1.0, 0.03), 0.0);
     }
 
-    /// The source's preset damps by the step: an oscillation without damping of its own is lost at any step.
+    /// The source's preset damps by the step: an oscillation without damping of its own is lost at
+    /// any step.
     #[test]
     fn settings_count() {
         let source = StepperKind::Spook(SpookSettings { preset: SpookPreset::Source, ..SpookSettings::default() });

@@ -1,15 +1,19 @@
-//! Generalised-alpha twice, with h and with h/2, and what both say together: Richardson's extrapolation.
+//! Generalised-alpha twice, with h and with h/2, and what both say together: Richardson's
+//! extrapolation.
 //!
 //! ```text
 //! y = y_{h/2} + (y_{h/2} - y_h) / 3                 y: positions, velocities, accelerations          (1)
 //! ```
-//! The error of generalised-alpha begins with `h²`, and (1) has none of that left: third order, and with ρ near 1, where the scheme is
-//! nearly its own mirror image in time, close to the fourth. It costs three steps of h instead of one. The two runs go side by side and
-//! know nothing of each other (*passive* extrapolation), so that what is stable, and how modes are damped that are too fast for
-//! the step, is as in each of them. What a jump of loads or velocities does, both meet at its time.
+//! The error of generalised-alpha begins with `h²`, and (1) has none of that left: third order, and
+//! with ρ near 1, where the scheme is nearly its own mirror image in time, close to the fourth. It
+//! costs three steps of h instead of one. The two runs go side by side and know nothing of each
+//! other (*passive* extrapolation), so that what is stable, and how modes are damped that are too
+//! fast for the step, is as in each of them. What a jump of loads or velocities does, both meet at
+//! its time.
 //!
-//! Where the error has no series in h (friction that sticks, hysteresis, steps longer than a twelfth of a period)
-//! nothing is gained, but nothing lost: the result is off by at most the error of the finer run and a third of the difference.
+//! Where the error has no series in h (friction that sticks, hysteresis, steps longer than a
+//! twelfth of a period) nothing is gained, but nothing lost: the result is off by at most the error
+//! of the finer run and a third of the difference.
 //!
 //! Source: [Hairer & Wanner 1996], section IV.9.
 
@@ -51,7 +55,8 @@ impl Method for ExtrapolatedAlpha {
     }
 
     fn start(&self, arm: Arc<FlexibleArm>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
-        // Matrices that are followed differ more between the two runs, and what differs has no series in h: three times the error.
+        // Matrices that are followed differ more between the two runs, and what differs has no
+        // series in h: three times the error.
         let coarse = self.0.stepper(arm.clone(), h, e, false)?;
         let fine = self.0.stepper(arm, 0.5 * h, e, false)?;
         // Both begin in the same state.

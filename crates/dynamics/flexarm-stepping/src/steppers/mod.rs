@@ -1,10 +1,12 @@
-//! The registry of steppers: what a program, a command line or a test can choose from, and how each is made.
+//! The registry of steppers: what a program, a command line or a test can choose from, and how each
+//! is made.
 //!
-//! **A new stepper** is a file in this folder and its lines here: `mod` and `use`, a variant of [`StepperKind`], its line in
-//! `method` and in [`STEPPERS`]. The file has the integrator (an [`crate::Integrator`] over [`crate::SecondOrderSystem`], or
-//! a [`Stepper`] of its own), settings that implement `Method`, and a [`StepperEntry`]. Words and help of the command line,
-//! summaries and the tests that go over all steppers read [`STEPPERS`]; settings that users choose are fields of
-//! [`StepperOptions`] besides.
+//! **A new stepper** is a file in this folder and its lines here: `mod` and `use`, a variant of
+//! [`StepperKind`], its line in `method` and in [`STEPPERS`]. The file has the integrator (an
+//! [`crate::Integrator`] over [`crate::SecondOrderSystem`], or a [`Stepper`] of its own), settings
+//! that implement `Method`, and a [`StepperEntry`]. Words and help of the command line, summaries
+//! and the tests that go over all steppers read [`STEPPERS`]; settings that users choose are fields
+//! of [`StepperOptions`] besides.
 
 mod accuracy;
 mod extrapolated;
@@ -102,7 +104,8 @@ pub struct StepperEntry {
     pub default_step_s: f64,
     /// Power of the step with which its error falls at least; of solvers with error control 0.
     pub order: u32,
-    /// Whether it works in maximal coordinates: no modal links, torques, payloads that change, curved springs, mimic joints.
+    /// Whether it works in maximal coordinates: no modal links, torques, payloads that change,
+    /// curved springs, mimic joints.
     pub maximal: bool,
     /// Whether its steps allocate, because its solver is another library's.
     pub allocates: bool,
@@ -159,9 +162,10 @@ trait Method {
 /// Makes a stepper of the kind, started at `t = 0`.
 ///
 /// # Errors
-/// [`StepError::Setup`] if the step is no positive time, settings make no sense or the stepper does not know something of the
-/// arm, [`StepError::NoEquilibrium`] if the start cannot be found, [`StepError::UnstableStep`] if the step is too long for an
-/// explicit stepper, [`StepError::Singular`] if the first accelerations cannot be solved.
+/// [`StepError::Setup`] if the step is no positive time, settings make no sense or the stepper does
+/// not know something of the arm, [`StepError::NoEquilibrium`] if the start cannot be found,
+/// [`StepError::UnstableStep`] if the step is too long for an explicit stepper,
+/// [`StepError::Singular`] if the first accelerations cannot be solved.
 pub fn new_stepper(
     kind: StepperKind,
     arm: impl Into<Arc<FlexibleArm>>,

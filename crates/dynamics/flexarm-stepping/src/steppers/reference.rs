@@ -1,27 +1,34 @@
-//! Integration with error control, by the solvers of `diffsol`: what the steppers of fixed step are measured against.
+//! Integration with error control, by the solvers of `diffsol`: what the steppers of fixed step are
+//! measured against.
 //!
-//! The second-order system is seen as `y = [x; v]`, `ẏ = [v; a(t, x, v)]`. The solver chooses order and step so that its
-//! estimate of the local error stays below the tolerance, and takes its own steps past the points `t0 + k h`; there its
-//! continuous output is read ([`Integrator::step`]), which is as good there as the steps are at their ends. The error of a
-//! whole run is larger than the tolerance: over 4 s of the reference arm 100 to 200 times (BDF, 1e-6 to 1e-9).
+//! The second-order system is seen as `y = [x; v]`, `ẏ = [v; a(t, x, v)]`. The solver chooses order
+//! and step so that its estimate of the local error stays below the tolerance, and takes its own
+//! steps past the points `t0 + k h`; there its continuous output is read ([`Integrator::step`]),
+//! which is as good there as the steps are at their ends. The error of a whole run is larger than
+//! the tolerance: over 4 s of the reference arm 100 to 200 times (BDF, 1e-6 to 1e-9).
 //!
-//! **Which method.** The highest modes decide (measured in `tests/reference_arm.rs`, `tests/reference_stepper.rs`).
-//! BDF of variable order, the default, is nine times cheaper than the explicit pair where they are well damped, and costs
-//! about as much where they are not: its orders 3 to 5 are unstable near the imaginary axis, so that the error control holds
-//! the step near `1/ω` of a lightly damped mode, however little it moves. Only the A-stable ESDIRK steps over those; it is of
-//! third order, so it pays where modes are in the kHz or the tolerance is loose.
+//! **Which method.** The highest modes decide (measured in `tests/reference_arm.rs`,
+//! `tests/reference_stepper.rs`). BDF of variable order, the default, is nine times cheaper than
+//! the explicit pair where they are well damped, and costs about as much where they are not: its
+//! orders 3 to 5 are unstable near the imaginary axis, so that the error control holds the step
+//! near `1/ω` of a lightly damped mode, however little it moves. Only the A-stable ESDIRK steps
+//! over those; it is of third order, so it pays where modes are in the kHz or the tolerance is
+//! loose.
 //!
-//! **Restarts.** A jump of the load inside a step costs rejected steps: [`Reference::restart_at`] makes the solver end a
-//! step there and start anew. [`Integrator::restart`] is for a system that was changed from outside.
+//! **Restarts.** A jump of the load inside a step costs rejected steps: [`Reference::restart_at`]
+//! makes the solver end a step there and start anew. [`Integrator::restart`] is for a system that
+//! was changed from outside.
 //!
-//! **Who owns what.** A solver of `diffsol` borrows its problem and the problem holds the equations, so none of them can be
-//! kept beside a system that the caller lends for one call. Each call that needs more of the solution builds problem and
-//! solver around the system, lets the solver run and takes its state back. That state holds the history (for BDF the
-//! differences and the order), so nothing of the method is lost; the Jacobian is, so an implicit solver takes 50 steps at a
-//! time, as many as it would keep its Jacobian anyway, and the points that it passes wait in a queue.
+//! **Who owns what.** A solver of `diffsol` borrows its problem and the problem holds the
+//! equations, so none of them can be kept beside a system that the caller lends for one call. Each
+//! call that needs more of the solution builds problem and solver around the system, lets the
+//! solver run and takes its state back. That state holds the history (for BDF the differences and
+//! the order), so nothing of the method is lost; the Jacobian is, so an implicit solver takes 50
+//! steps at a time, as many as it would keep its Jacobian anyway, and the points that it passes
+//! wait in a queue.
 //!
-//! Sources: BDF of variable order [Shampine & Reichelt 1997], ESDIRK3(4) [Jørgensen, Kristensen & Thomsen 2018],
-//! explicit 5(4) pair [Tsitouras 2011].
+//! Sources: BDF of variable order [Shampine & Reichelt 1997], ESDIRK3(4) [Jørgensen, Kristensen &
+//! Thomsen 2018], explicit 5(4) pair [Tsitouras 2011].
 
 use std::sync::Arc;
 
@@ -57,9 +64,11 @@ pub(super) static ENTRY: StepperEntry = StepperEntry {
 const SMALL: f64 = 1e-3;
 /// The same for velocities, over that for positions (1/s): what a mode of 16 Hz has.
 const RATE: f64 = 100.0;
-/// Steps that an implicit solver takes before it is taken apart; its own interval between two Jacobians.
+/// Steps that an implicit solver takes before it is taken apart; its own interval between two
+/// Jacobians.
 const RUN: u64 = 50;
-/// Longest step of the solver (s): at rest it would grow until it passes over a motion that starts later.
+/// Longest step of the solver (s): at rest it would grow until it passes over a motion that starts
+/// later.
 const LONGEST: f64 = 0.02;
 /// Restarts closer to each other than this part of h are one,
 const TOGETHER: f64 = 1e-9;
@@ -91,7 +100,8 @@ impl ReferenceMethod {
     }
 }
 
-/// Tolerances on the local error of a coordinate y: `atol + rtol |y|` in the root mean square over all coordinates.
+/// Tolerances on the local error of a coordinate y: `atol + rtol |y|` in the root mean square over
+/// all coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReferenceSettings {
     /// Relative tolerance.
@@ -205,8 +215,8 @@ impl Reference {
     /// Starts at `t0`; [`Integrator::step`] goes from one multiple of `h` (s) to the next.
     ///
     /// # Errors
-    /// [`StepError::Setup`] for tolerances that make no sense, [`StepError::Singular`] if the first acceleration cannot be
-    /// found.
+    /// [`StepError::Setup`] for tolerances that make no sense, [`StepError::Singular`] if the first
+    /// acceleration cannot be found.
     ///
     /// # Panics
     /// If `h` is not positive.
@@ -239,8 +249,9 @@ impl Reference {
         self.now.grid.after(1 + self.ahead.len() as u64)
     }
 
-    /// Makes the solver end a step at `t` (s) and start anew, because the load jumps there: before `t` the system is only
-    /// asked for times before it, afterwards only for times after it. A time that has passed starts anew at once.
+    /// Makes the solver end a step at `t` (s) and start anew, because the load jumps there: before
+    /// `t` the system is only asked for times before it, afterwards only for times after it. A time
+    /// that has passed starts anew at once.
     ///
     /// # Panics
     /// If `t` is not finite.
@@ -280,7 +291,8 @@ impl Reference {
     fn step_to_point(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
         while self.ahead.is_empty() && !self.now.x.is_empty() {
             if let Err(error) = self.advance(system) {
-                // Points that were passed before the failure are good; the solver tries again from the last one.
+                // Points that were passed before the failure are good; the solver tries again from
+                // the last one.
                 let Some(last) = self.ahead.back().cloned() else {
                     self.start_again();
                     return Err(error);
@@ -292,8 +304,8 @@ impl Reference {
         self.arrive(system, self.next_time(), &y)
     }
 
-    /// Advances to a restart that lies before the next multiple of h ([`Reference::restart_at`]); what is left of the step
-    /// starts anew there.
+    /// Advances to a restart that lies before the next multiple of h ([`Reference::restart_at`]);
+    /// what is left of the step starts anew there.
     fn step_to_restart(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError> {
         while self.kept.time() < t - self.near(t) && !self.now.x.is_empty() {
             if let Err(error) = self.advance(system) {
@@ -388,7 +400,8 @@ impl Reference {
         }
     }
 
-    /// Steps until a point was passed and `least` steps were made, or to the restart at `stop`; queues the points.
+    /// Steps until a point was passed and `least` steps were made, or to the restart at `stop`;
+    /// queues the points.
     fn run<'p, E, S>(
         &mut self,
         mut solver: S,
@@ -416,7 +429,8 @@ impl Reference {
         Ok(result?.unwrap_or_else(|| keep(solver.into_state())))
     }
 
-    /// One step of the solver; queues the points in it. At the restart it returns where the next run starts.
+    /// One step of the solver; queues the points in it. At the restart it returns where the next
+    /// run starts.
     fn solver_step<'p, E, S>(&mut self, solver: &mut S, stop: f64) -> Result<Option<Kept>, StepError>
     where
         E: OdeEquations<T = f64, V = V> + 'p,
@@ -433,7 +447,8 @@ impl Reference {
             solver.set_stop_time(target).map_err(fault)?;
         }
         let reason = solver.step().map_err(fault)?;
-        // A longest step that was rejected leaves its end behind as a time not to pass: that is no restart.
+        // A longest step that was rejected leaves its end behind as a time not to pass: that is no
+        // restart.
         let restart = reason == OdeSolverStopReason::TstopReached && target == stop && stop.is_finite();
 
         let state = solver.state();
@@ -467,7 +482,8 @@ impl Integrator for Reference {
         if t == self.next_time() { self.step_to_point(system) } else { self.step_to_restart(system, t) }
     }
 
-    /// Position and velocity are kept, the acceleration is evaluated again, the step is chosen again.
+    /// Position and velocity are kept, the acceleration is evaluated again, the step is chosen
+    /// again.
     fn restart(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
         self.start_again();
         self.evaluations += 1;
@@ -538,8 +554,8 @@ impl<'s, S: SecondOrderSystem> FirstOrder<'s, S> {
         }
     }
 
-    /// `J w` by a forward difference. The solver asks for one column after the other at the same y, and uses the matrix for
-    /// Newton's method only.
+    /// `J w` by a forward difference. The solver asks for one column after the other at the same y,
+    /// and uses the matrix for Newton's method only.
     fn times_jacobian(&mut self, t: f64, y: &[f64], w: &[f64], Jw: &mut [f64]) {
         let n = self.x.len();
         let base = match self.base.take() {

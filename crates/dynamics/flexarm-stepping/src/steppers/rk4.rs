@@ -1,7 +1,7 @@
 //! The classical explicit Runge-Kutta method of fourth order, for systems that are not stiff.
 //!
-//! Stable while `h ω < 2.78` for every undamped mode; stiffness-proportional damping narrows this further.
-//! Source: [Hairer, Nørsett & Wanner 1993], section II.1.
+//! Stable while `h ω < 2.78` for every undamped mode; stiffness-proportional damping narrows this
+//! further. Source: [Hairer, Nørsett & Wanner 1993], section II.1.
 
 use std::sync::Arc;
 
@@ -146,8 +146,8 @@ impl Integrator for Rk4 {
     }
 }
 
-/// Every mode must lie inside the stability region: on the imaginary axis up to 2.78, 2.61 where damping turns it
-/// inwards, on the negative real axis up to 2.78 again.
+/// Every mode must lie inside the stability region: on the imaginary axis up to 2.78, 2.61 where
+/// damping turns it inwards, on the negative real axis up to 2.78 again.
 fn check_explicit_step(arm: &FlexibleArm, h: f64) -> Result<(), StepError> {
     let mut rate = 0.0f64;
     for (j, omega) in arm.modes.omega.iter().enumerate() {
@@ -172,13 +172,15 @@ fn check_explicit_step(arm: &FlexibleArm, h: f64) -> Result<(), StepError> {
     })
 }
 
-/// Decay (1/s) of a mode with damping `2 ζ ω`; an oscillating one is bounded by its frequency alone.
+/// Decay (1/s) of a mode with damping `2 ζ ω`; an oscillating one is bounded by its frequency
+/// alone.
 fn fastest_decay(damping: f64, omega: f64) -> f64 {
     let squared = damping * damping - 4.0 * omega * omega;
     if squared > 0.0 { 0.5 * (damping + squared.sqrt()) } else { 0.0 }
 }
 
-/// Highest angular frequency and decay (1/s) with the joints driven by torque free, friction near standstill left out.
+/// Highest angular frequency and decay (1/s) with the joints driven by torque free, friction near
+/// standstill left out.
 fn free_rates(arm: &FlexibleArm) -> Result<(f64, f64), StepError> {
     let (model, na) = (&arm.model, arm.model.n_actuated());
     let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));

@@ -1,4 +1,5 @@
-//! SDIRK of third order for second-order systems: implicit, three stages, L-stable, stiffly accurate.
+//! SDIRK of third order for second-order systems: implicit, three stages, L-stable, stiffly
+//! accurate.
 //!
 //! ```text
 //! r(t + c_i h, X_i, V_i, A_i) = 0                               i = 1, 2, 3      (1)  equations of motion hold in each stage
@@ -10,21 +11,22 @@
 //! (1+γ)/2  | (1-γ)/2    γ                       γ³ - 3 γ² + 3/2 γ - 1/6 = 0,   γ = 0.435866...
 //!    1     |  b_1      b_2      γ               b_1 = (-6γ² + 16γ - 1)/4,   b_2 = (6γ² - 20γ + 5)/4   (5)
 //! ```
-//! It is the Runge-Kutta method on `[x; v]`. Unknown are the A_i, one after the other; Newton on (1) with
-//! `M + h γ D + (h γ)² K` for all three, kept until the iteration slows down.
+//! It is the Runge-Kutta method on `[x; v]`. Unknown are the A_i, one after the other; Newton on
+//! (1) with `M + h γ D + (h γ)² K` for all three, kept until the iteration slows down.
 //!
 //! **Stability.** A mode `ẏ = λ y` is multiplied in a step by
 //!
 //! ```text
 //! R(z) = (1 + (1 - 3γ) z + (1/2 - 3γ + 3γ²) z²) / (1 - γ z)³,   z = h λ          (6)
 //! ```
-//! with `|R| ≤ 1` in the left half plane and `R → 0` at infinity: what is too fast for the step is gone after it (an undamped
-//! mode keeps `2.9/(hω)` of itself), where generalised-alpha keeps ρ. Slow modes are damped as well, by `0.026 (hω)⁴` a step.
-//! On the reference arm at 0.25 ms it has 1.7e-7 of the peak deflection after 136,000 evaluations, generalised-alpha 1.6e-6
-//! after 19,000: it is for small errors, and for stiff modes that were set ringing, with no ρ to choose.
+//! with `|R| ≤ 1` in the left half plane and `R → 0` at infinity: what is too fast for the step is
+//! gone after it (an undamped mode keeps `2.9/(hω)` of itself), where generalised-alpha keeps ρ.
+//! Slow modes are damped as well, by `0.026 (hω)⁴` a step. On the reference arm at 0.25 ms it has
+//! 1.7e-7 of the peak deflection after 136,000 evaluations, generalised-alpha 1.6e-6 after 19,000:
+//! it is for small errors, and for stiff modes that were set ringing, with no ρ to choose.
 //!
-//! **Events.** Nothing is remembered from step to step but for the first guess of Newton's method. A step that fails is tried
-//! again as those of generalised-alpha are.
+//! **Events.** Nothing is remembered from step to step but for the first guess of Newton's method.
+//! A step that fails is tried again as those of generalised-alpha are.
 //!
 //! Source: [Alexander 1977]; [Hairer & Wanner 1996], section IV.6.
 
@@ -65,7 +67,8 @@ impl Method for Sdirk3Settings {
     }
 }
 
-/// Part of the first correction of Newton's method that a stage may leave: the stages are of higher order than the extrapolation.
+/// Part of the first correction of Newton's method that a stage may leave: the stages are of higher
+/// order than the extrapolation.
 const LEFT: f64 = 1e-4;
 /// γ: the root of the cubic in (5) for which the method is L-stable.
 const GAMMA: f64 = 0.435_866_521_508_459;
@@ -288,7 +291,8 @@ mod tests {
         (one + z * (1.0 - 3.0 * g) + z * z * (0.5 - 3.0 * g + 3.0 * g * g)) / (one - z * g).powi(3)
     }
 
-    /// Truth: the conditions of orders 1 to 3, `Σ b = 1`, `Σ b c = 1/2`, `Σ b c² = 1/3`, `Σ b_i a_ij c_j = 1/6`, and `Σ_j a_ij = c_i`.
+    /// Truth: the conditions of orders 1 to 3, `Σ b = 1`, `Σ b c = 1/2`, `Σ b c² = 1/3`,
+    /// `Σ b_i a_ij c_j = 1/6`, and `Σ_j a_ij = c_i`.
     #[test]
     fn coefficients_fulfil_the_conditions_of_third_order() {
         let (g, b) = (GAMMA, WEIGHTS[2]);
@@ -304,8 +308,8 @@ mod tests {
         assert!((0..3).all(|i| (sum(&|j| WEIGHTS[i][j]) - NODES[i]).abs() < 1e-15));
     }
 
-    /// Truth: (6) with `h λ = h ω (-ζ ± i sqrt(1 - ζ²))`; a mode far too fast for the step has `2.9/(hω)` left after one step.
-    /// Measured 4e-10 at hω = 1e6, 1e-12 below.
+    /// Truth: (6) with `h λ = h ω (-ζ ± i sqrt(1 - ζ²))`; a mode far too fast for the step has
+    /// `2.9/(hω)` left after one step. Measured 4e-10 at hω = 1e6, 1e-12 below.
     #[test]
     fn a_stiff_mode_is_gone_after_one_step() {
         let h = 1e-2;

@@ -1,4 +1,5 @@
-//! The program `flexarm`. All of it is in the library beside it, which other programs can carry inside themselves.
+//! The program `flexarm`. All of it is in the library beside it, which other programs can carry
+//! inside themselves.
 
 use std::process::ExitCode;
 

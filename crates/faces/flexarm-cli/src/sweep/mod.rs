@@ -54,7 +54,8 @@ pub(crate) struct SweepRunArgs {
     /// Runs at the same time [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub(crate) threads: Option<u16>,
-    /// Look for the least of this metric within the bounds of the parameters; without a name that of the study's [minimise]
+    /// Look for the least of this metric within the bounds of the parameters; without a name that
+    /// of the study's [minimise]
     #[arg(long, value_name = "METRIC", num_args = 0..=1, default_missing_value = "", conflicts_with = "shard")]
     pub(crate) minimise: Option<String>,
     /// What must hold for the least one, such as 'peak_mm <= 6' (may be repeated)
@@ -63,7 +64,8 @@ pub(crate) struct SweepRunArgs {
     /// Most runs of the search [default: 400]
     #[arg(long, value_name = "N", requires = "minimise", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) most_runs: Option<u32>,
-    /// Folder of the results; what is there of the same study is not run again [default: out/ and the name of the study]
+    /// Folder of the results; what is there of the same study is not run again [default: out/ and
+    /// the name of the study]
     #[arg(short, long, help_heading = "Files", value_name = "FOLDER")]
     pub(crate) output: Option<PathBuf>,
     /// Replace results of another study in the folder
@@ -73,7 +75,8 @@ pub(crate) struct SweepRunArgs {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum SweepCommand {
-    /// Write what an engine needs to run the shards of a study: scripts for Slurm, HyperQueue, a shell, jobs of Kubernetes
+    /// Write what an engine needs to run the shards of a study: scripts for Slurm, HyperQueue, a
+    /// shell, jobs of Kubernetes
     Plan(PlanArgs),
     /// Join the results of shards in one table
     Merge(MergeArgs),
@@ -133,7 +136,8 @@ fn sweep(cli: &Cli, args: &SweepRunArgs, study: &Path) -> Result<ExitCode, Failu
     };
     let mut stop = signals::stop_when_asked();
     let mut bar = Bar::new(cli);
-    // Every run that is over is in a file: nothing is lost if the process ends in the middle of another one.
+    // Every run that is over is in a file: nothing is lost if the process ends in the middle of
+    // another one.
     let counts = Arc::new([AtomicUsize::new(0), AtomicUsize::new(0)]);
     let (seen, folder) = (counts.clone(), request.output.clone());
     let watch = signals::end_if_not_stopped(move || {

@@ -1,7 +1,9 @@
-//! `flexarm sweep plan`: what an engine that is there already needs to run the shards of a study and to join them.
+//! `flexarm sweep plan`: what an engine that is there already needs to run the shards of a study
+//! and to join them.
 //!
-//! An engine is a function from a [`Plan`] to files. All of them run the same command with the number of a shard; results go into
-//! one folder, in which no two shards write the same file, and a shard that was killed goes on when it is started again.
+//! An engine is a function from a [`Plan`] to files. All of them run the same command with the
+//! number of a shard; results go into one folder, in which no two shards write the same file, and a
+//! shard that was killed goes on when it is started again.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

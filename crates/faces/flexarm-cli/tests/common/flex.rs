@@ -5,7 +5,8 @@ pub(crate) type Rows = Vec<Vec<f64>>;
 
 const LENGTH: f64 = 0.8;
 
-/// Stiffness at the far end of a clamped Euler-Bernoulli beam along x: 20 mm x 40 mm, 0.8 m, aluminium.
+/// Stiffness at the far end of a clamped Euler-Bernoulli beam along x: 20 mm x 40 mm, 0.8 m,
+/// aluminium.
 pub(crate) fn stiffness_6() -> Rows {
     let (e, g, l, width, height) = (70e9, 26e9, LENGTH, 0.02f64, 0.04f64);
     let (area, i_y, i_z) = (width * height, width * height.powi(3) / 12.0, height * width.powi(3) / 12.0);
@@ -24,7 +25,8 @@ pub(crate) fn stiffness_6() -> Rows {
     k
 }
 
-/// The same beam free at both ends, A then B: `[[Adᵀ K Ad, -Adᵀ K], [-K Ad, K]]`, `u_B = Ad u_A` when it does not bend.
+/// The same beam free at both ends, A then B: `[[Adᵀ K Ad, -Adᵀ K], [-K Ad, K]]`, `u_B = Ad u_A`
+/// when it does not bend.
 pub(crate) fn stiffness_12() -> Rows {
     let k = stiffness_6();
     let mut ad: Rows = (0..6).map(|i| (0..6).map(|j| if i == j { 1.0 } else { 0.0 }).collect()).collect();

@@ -1,4 +1,5 @@
-//! What the command-line tests share: a temporary folder with a small robot in it, the program, its answers.
+//! What the command-line tests share: a temporary folder with a small robot in it, the program, its
+//! answers.
 #![allow(dead_code, reason = "each test binary uses its own part of this")]
 
 pub(crate) mod flex;
@@ -11,8 +12,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use serde_json::Value;
 
-/// Whether the programs that a test starts ignore a signal, because the tests were started so: by nohup (SIGHUP, 1), in the
-/// background of a shell (SIGINT, 2).
+/// Whether the programs that a test starts ignore a signal, because the tests were started so: by
+/// nohup (SIGHUP, 1), in the background of a shell (SIGINT, 2).
 #[cfg(unix)]
 pub(crate) fn is_ignored(signal: u32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -146,7 +147,8 @@ impl Place {
         answer.json()
     }
 
-    /// The command must end with 2, name every word on standard error, print nothing, and leave all files alone.
+    /// The command must end with 2, name every word on standard error, print nothing, and leave all
+    /// files alone.
     pub(crate) fn refused(&self, arguments: &[&str], words: &[&str]) -> Answer {
         self.refused_by(&mut self.command(arguments), words)
     }
@@ -298,7 +300,8 @@ impl Table {
     }
 }
 
-/// Walks over the records of an MCAP file from its first magic to its last; returns how often each opcode occurs.
+/// Walks over the records of an MCAP file from its first magic to its last; returns how often each
+/// opcode occurs.
 pub(crate) fn mcap_records(bytes: &[u8]) -> BTreeMap<u8, usize> {
     const MAGIC: &[u8] = b"\x89MCAP0\r\n";
     assert!(bytes.starts_with(MAGIC), "no MCAP magic at the start");
@@ -318,7 +321,8 @@ pub(crate) fn mcap_records(bytes: &[u8]) -> BTreeMap<u8, usize> {
 const FOOTER: u8 = 0x02;
 const DATA_END: u8 = 0x0f;
 
-/// A file of the reference data, which stand beside the project or where FLEXARM_SHARED says; `None` and a word about it elsewhere.
+/// A file of the reference data, which stand beside the project or where FLEXARM_SHARED says;
+/// `None` and a word about it elsewhere.
 #[allow(clippy::print_stderr, reason = "a test that skips says so")]
 pub(crate) fn reference(name: &str) -> Option<PathBuf> {
     let named = std::env::var_os("FLEXARM_SHARED").map(PathBuf::from);

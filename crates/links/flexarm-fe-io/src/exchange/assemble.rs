@@ -6,9 +6,9 @@
 //! ```text
 //! K_SI = K E / (d_i d_j)        M_SI = M E time² / (d_i d_j)
 //! ```
-//! so `K` is force/length, force, force·length, mass-normalised modes stay so (`M_mm = 1`), `K_mm` is
-//! `1/time²`, `M_bm` is `sqrt(mass)` or `sqrt(mass)·length`. For modes normalised otherwise this is a
-//! mere rescaling of their coordinates: the model is the same.
+//! so `K` is force/length, force, force·length, mass-normalised modes stay so (`M_mm = 1`), `K_mm`
+//! is `1/time²`, `M_bm` is `sqrt(mass)` or `sqrt(mass)·length`. For modes normalised otherwise this
+//! is a mere rescaling of their coordinates: the model is the same.
 
 use nalgebra::DMatrix;
 
@@ -40,8 +40,8 @@ pub struct InterfaceMatrices {
 ///
 /// # Errors
 /// [`ExchangeErrorKind::Ambiguous`] without a map (with the text to give) or without units,
-/// [`ExchangeErrorKind::Interface`] if the map does not fit, or rows are left over that are no modes,
-/// [`ExchangeErrorKind::Defective`] from [`diagnose_substructure`].
+/// [`ExchangeErrorKind::Interface`] if the map does not fit, or rows are left over that are no
+/// modes, [`ExchangeErrorKind::Defective`] from [`diagnose_substructure`].
 pub fn assemble_interfaces(
     imported: &ImportedMatrices,
     map: Option<&InterfaceMap>,

@@ -57,7 +57,8 @@ pub(super) fn cards<'a>(text: Text<'a>, keywords: &[&str]) -> Result<Vec<Card<'a
     Ok(cards)
 }
 
-/// First field and data fields of a line, padded to eight (small) or four (large field), and what is too much.
+/// First field and data fields of a line, padded to eight (small) or four (large field), and what
+/// is too much.
 fn fields(line: &str) -> (&str, Vec<&str>, Option<&str>) {
     const SMALL: usize = 8;
     const LARGE: usize = 4;

@@ -16,8 +16,9 @@ const ROUND_OFF: f64 = 1e-10;
 ///
 /// Debian's CalculiX 2.20 writes substructures without condensing them: the block between the
 /// interfaces is then exactly zero (or rounding), and a translation of both meets a force of full
-/// size. The gate ([`flexarm_fem::gate::check_matrix12`]) refuses such a matrix too, but cannot know why.
-/// Everything else, such as rows in another order or a support that was left in, is for the gate.
+/// size. The gate ([`flexarm_fem::gate::check_matrix12`]) refuses such a matrix too, but cannot
+/// know why. Everything else, such as rows in another order or a support that was left in, is for
+/// the gate.
 ///
 /// * `K`: rows of the interfaces first, six each; any units.
 ///
@@ -54,7 +55,8 @@ pub fn diagnose_substructure(
     Err(Place::file(&imported.origin).fail(ExchangeErrorKind::Defective, "stiffness", found, expected, help))
 }
 
-/// Largest `|k_ij| / sqrt(|k_ii k_jj|)` between an interface and the others; 0 only if all are zero.
+/// Largest `|k_ij| / sqrt(|k_ii k_jj|)` between an interface and the others; 0 only if all are
+/// zero.
 fn largest_coupling(K: &DMatrix<f64>, interface: usize, interfaces: usize) -> f64 {
     let own = 6 * interface..6 * interface + 6;
     let others = || (0..6 * interfaces).filter(|j| !own.contains(j));
@@ -66,7 +68,8 @@ fn largest_coupling(K: &DMatrix<f64>, interface: usize, interfaces: usize) -> f6
     entries.map(relative).fold(0.0, f64::max)
 }
 
-/// Largest force under a translation of all interfaces, over the size of the terms that should cancel.
+/// Largest force under a translation of all interfaces, over the size of the terms that should
+/// cancel.
 fn translation_residual(K: &DMatrix<f64>, interfaces: usize) -> f64 {
     let mut worst = 0.0_f64;
     for axis in 0..3 {

@@ -1,8 +1,8 @@
 //! Nastran DMIG entries, in large, small and free field: bulk data, `.pch` of EXTSEOUT and others.
 //!
 //! One file may hold several matrices (KAAX, MAAX, BAAX, ...). GRID entries give positions. Entries
-//! hold either triangle, mixed; zero columns are absent. Matrices are in the *displacement* frame of
-//! each grid (field CD of GRID), which a warning recalls where it is not the basic one.
+//! hold either triangle, mixed; zero columns are absent. Matrices are in the *displacement* frame
+//! of each grid (field CD of GRID), which a warning recalls where it is not the basic one.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -170,7 +170,8 @@ fn assemble(raw: RawMatrix<'_>, text: Text<'_>) -> Result<Result<LabelledMatrix,
 /// Matrices as DMIG entries in large field: ten significant digits, relative error 5e-10.
 ///
 /// * `matrices`: names, such as `KAAX` (cut to eight characters), with their matrices.
-/// * `rows`: node and component of each row; scalar points have component 0. Every row needs a node.
+/// * `rows`: node and component of each row; scalar points have component 0. Every row needs a
+///   node.
 /// * `positions`: written as GRID entries.
 ///
 /// # Panics
@@ -261,7 +262,8 @@ DMIG*,KAAX,12,0,
         let loads = "DMIG,PAX,0,9,2,0,,,2\nDMIG,PAX,1,0,,11,1,5.\nDMIG,PAX,2,0,,11,2,6.\n";
         let dmig = parse(Text::new(loads, "t.pch")).unwrap();
         assert!(dmig.matrices.is_empty() && dmig.warnings[0].contains("PAX is rectangular"));
-        // Scalar points 1 and 2 loaded by columns 1 and 2: the same labels, but no symmetric matrix.
+        // Scalar points 1 and 2 loaded by columns 1 and 2: the same labels, but no symmetric
+        // matrix.
         for form in [2, 9] {
             let scalar =
                 format!("DMIG,KPAX,0,{form},2,0,,,2\nDMIG,KPAX,1,0,,1,0,5.,\n,2,0,7.\nDMIG,KPAX,2,0,,2,0,6.\n");

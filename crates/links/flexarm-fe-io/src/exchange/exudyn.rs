@@ -1,4 +1,5 @@
-//! Exudyn `FEMinterface.SaveToFile` in HDF5: the full stiffness and mass, three components per node.
+//! Exudyn `FEMinterface.SaveToFile` in HDF5: the full stiffness and mass, three components per
+//! node.
 //!
 //! The default `.npz` holds pickled Python objects, which no other program reads.
 

@@ -257,8 +257,8 @@ const MOST_PROPOSED: usize = 4;
 
 /// The map that the rows suggest, if they suggest one; the user must agree to it.
 ///
-/// Nodes of six components, pairs of nodes of three (CalculiX), or sixes of rows without nodes; of other numbers of rows
-/// without nodes the first twelve.
+/// Nodes of six components, pairs of nodes of three (CalculiX), or sixes of rows without nodes; of
+/// other numbers of rows without nodes the first twelve.
 pub fn propose_map(rows: &[DofLabel]) -> Option<InterfaceMap> {
     let named = |picks: Vec<Vec<RowPick>>| {
         let interfaces = ('A'..='Z').zip(picks).map(|(name, picks)| Interface { name: name.into(), picks });

@@ -13,7 +13,8 @@ use super::sidecar::Sidecar;
 /// Up to this many rows a matrix is stored dense (32 MB).
 pub const LARGEST_DENSE: usize = 2000;
 
-/// Mirrored entries may differ by this much of `sqrt(|k_ii k_jj|)`: the last of nine printed decimals.
+/// Mirrored entries may differ by this much of `sqrt(|k_ii k_jj|)`: the last of nine printed
+/// decimals.
 pub const LARGEST_ASYMMETRY: f64 = 1e-8;
 
 /// What a row of a matrix belongs to.
@@ -201,7 +202,8 @@ impl Triplets {
         self.entries.iter().map(|t| t.row.max(t.column) as usize + 1).max().unwrap_or(0)
     }
 
-    /// Labels for rows about which the file says nothing; refuses counts that the entries cannot fill.
+    /// Labels for rows about which the file says nothing; refuses counts that the entries cannot
+    /// fill.
     pub(super) fn unlabelled(&self, n: usize, place: &Place<'_>) -> Result<Vec<DofLabel>, ExchangeError> {
         if n == 0 || (n > LARGEST_DENSE && n > 8 * self.len()) {
             let found = format!("{n} rows, but {} entries", self.len());

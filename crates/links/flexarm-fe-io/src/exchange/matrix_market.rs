@@ -119,7 +119,8 @@ fn parse_banner(place: &Place<'_>, banner: &str) -> Result<(bool, Symmetry), Exc
     }
 }
 
-/// A symmetric matrix as Matrix Market text, `coordinate real symmetric`, read back to the last bit.
+/// A symmetric matrix as Matrix Market text, `coordinate real symmetric`, read back to the last
+/// bit.
 ///
 /// Only the lower triangle is written. `comments` become lines that begin with `%`.
 pub fn write_matrix_market(matrix: &DMatrix<f64>, comments: &[&str]) -> String {

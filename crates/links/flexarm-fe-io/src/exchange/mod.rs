@@ -23,9 +23,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Units: those of the files everywhere but in [`assemble_interfaces`], which alone converts.
-//! Full models (`.sti`/`.mas`, Exudyn) stay sparse triplets with labels; they are reduced elsewhere.
-//! Writers stand beside the parsers of their format. The modal format SID is separate: [`parse_sid`].
+//! Units: those of the files everywhere but in [`assemble_interfaces`], which alone converts. Full
+//! models (`.sti`/`.mas`, Exudyn) stay sparse triplets with labels; they are reduced elsewhere.
+//! Writers stand beside the parsers of their format. The modal format SID is separate:
+//! [`parse_sid`].
 //!
 //! Not here: meshes, reduction, the checks of a stiffness.
 

@@ -1,8 +1,8 @@
 //! Nastran OUTPUT4 as text: dense columns, sparse strings, and sparse strings with BIGMAT.
 //!
 //! Lines of integers say what follows: four and a name begin a matrix, three a column, one or two a
-//! string of a sparse column; lines with a point hold values. The number of words in a column counts
-//! a double once or twice, depending on the writer, so the values are counted instead.
+//! string of a sparse column; lines with a point hold values. The number of words in a column
+//! counts a double once or twice, depending on the writer, so the values are counted instead.
 
 use nalgebra::DMatrix;
 
@@ -201,10 +201,11 @@ impl Reading {
     }
 }
 
-/// Matrices as OUTPUT4 text, symmetric, double, dense columns: 17 digits, read back to the last bit.
+/// Matrices as OUTPUT4 text, symmetric, double, dense columns: 17 digits, read back to the last
+/// bit.
 ///
-/// The number of words in a column is that of its values, as pyNastran writes and reads it. Names are
-/// cut to eight characters.
+/// The number of words in a column is that of its values, as pyNastran writes and reads it. Names
+/// are cut to eight characters.
 pub fn write_op4(matrices: &[(&str, &DMatrix<f64>)]) -> String {
     const PER_LINE: usize = 3;
     let mut text = String::new();

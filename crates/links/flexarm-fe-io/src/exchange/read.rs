@@ -1,4 +1,5 @@
-//! Files to [`ImportedMatrices`]: each is recognised and parsed, then stiffness and mass are chosen.
+//! Files to [`ImportedMatrices`]: each is recognised and parsed, then stiffness and mass are
+//! chosen.
 
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -33,7 +34,8 @@ impl MatrixRole {
     }
 }
 
-/// Names of the matrices to take from files that hold several (DMIG, OP4); `None`: guess by K and M.
+/// Names of the matrices to take from files that hold several (DMIG, OP4); `None`: guess by K and
+/// M.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct MatrixNames {
     /// Name of the stiffness, such as `KAAX`.
@@ -103,9 +105,9 @@ struct Found {
 ///
 /// Files that belong to a given one are read too where they are not given: `.mas` and `.dof` of a
 /// `.sti`, the `.mapping` of a Harwell-Boeing file, the sidecar `.toml` of Matrix Market files and
-/// the matrices that a sidecar names, also if it was found beside the only given file, which it names.
-/// Beside a single file that is named as a stiffness (`arm_K.mtx`, `STIF1`, `stiffness`) or as a mass, the other
-/// matrix of the same name is found, and said in a warning.
+/// the matrices that a sidecar names, also if it was found beside the only given file, which it
+/// names. Beside a single file that is named as a stiffness (`arm_K.mtx`, `STIF1`, `stiffness`) or
+/// as a mass, the other matrix of the same name is found, and said in a warning.
 ///
 /// # Errors
 /// [`ExchangeError`] with file, line, element, what was found and what was expected.
@@ -194,8 +196,8 @@ fn companions(files: &mut Vec<InputFile>) -> Result<(), ExchangeError> {
         let mut wanted = wanted_by(file)?;
         wanted.retain(|(path, _)| path.exists());
         let is_given = |path: &Path| known[..given].contains(&real(path));
-        // A sidecar that was found counts for the matrices only if it is that of the one given: other
-        // files may be there to replace those that it names.
+        // A sidecar that was found counts for the matrices only if it is that of the one given:
+        // other files may be there to replace those that it names.
         if next >= given && !(given == 1 && wanted.iter().any(|(path, _)| is_given(path))) {
             wanted.clear();
         }
@@ -338,7 +340,8 @@ fn parse_file(file: &InputFile, found: &mut Found) -> Result<(), ExchangeError> 
             return Err(place.fail(ExchangeErrorKind::Unsupported, "file", "a modal body (SID)", expected, help));
         }
     };
-    // What the user says of a file counts most; of several matrices in it those are taken that look so.
+    // What the user says of a file counts most; of several matrices in it those are taken that look
+    // so.
     match (&mut matrices[..], file.role) {
         ([(role, _)], Some(said)) => *role = Some(said),
         (several, Some(said)) => several.iter_mut().for_each(|(role, _)| *role = role.filter(|role| *role == said)),
@@ -453,7 +456,8 @@ fn apply_labels(matrix: &mut LabelledMatrix, labels: &[DofLabel], from: &str) ->
     Ok(())
 }
 
-/// Both matrices over the same rows; a massless row, or one without stiffness, may be absent in a file.
+/// Both matrices over the same rows; a massless row, or one without stiffness, may be absent in a
+/// file.
 fn aligned(
     K: &LabelledMatrix,
     M: &LabelledMatrix,

@@ -1,10 +1,12 @@
-//! Which format a file has, by its content: the endings say little, three formats are called `.mtx`.
+//! Which format a file has, by its content: the endings say little, three formats are called
+//! `.mtx`.
 
 use std::fmt;
 
 use super::text::{real, unpack_head, words};
 
-/// The formats that [`read_matrices`](super::read_matrices) and [`parse_sid`](super::parse_sid) know.
+/// The formats that [`read_matrices`](super::read_matrices) and [`parse_sid`](super::parse_sid)
+/// know.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum MatrixFormat {

@@ -1,7 +1,7 @@
 //! Simscape "Reduced Order Flexible Solid": K and M as comma-separated values, and the frames.
 //!
-//! The rows are those of the interfaces one after the other, translations first, then modes. That is
-//! our reading of the documentation and was not tried in Simscape.
+//! The rows are those of the interfaces one after the other, translations first, then modes. That
+//! is our reading of the documentation and was not tried in Simscape.
 
 use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, Quaternion, Translation3, UnitQuaternion};

@@ -207,8 +207,8 @@ fn assemble(
 
 /// A stiffness, and a mass, as a user element of CalculiX and Abaqus.
 ///
-/// `rows` names the node and component of each row; nodes are repeated per component, as CalculiX does.
-/// Fourteen digits (`e20.13`, as CalculiX reads): values read back to 5e-14 of themselves.
+/// `rows` names the node and component of each row; nodes are repeated per component, as CalculiX
+/// does. Fourteen digits (`e20.13`, as CalculiX reads): values read back to 5e-14 of themselves.
 ///
 /// # Panics
 /// If a matrix does not have as many rows and columns as there are `rows`.

@@ -51,7 +51,8 @@ impl Draft {
         &mut blocks[k]
     }
 
-    /// Keeps the regions for which `keep` holds, and their elements. Returns how many elements went.
+    /// Keeps the regions for which `keep` holds, and their elements. Returns how many elements
+    /// went.
     pub(super) fn retain_regions(&mut self, keep: &[bool]) -> usize {
         let before: usize = self.blocks.iter().map(|block| block.ids.len()).sum();
         let new_index: Vec<usize> = keep

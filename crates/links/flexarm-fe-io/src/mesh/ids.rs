@@ -59,7 +59,8 @@ impl IdIndex {
 
     /// Appends the indices of those numbers of `first, first + step, ... <= last` that exist.
     pub(super) fn extend_from_range(&self, first: u64, last: u64, step: u64, out: &mut Vec<u32>) {
-        // Clipped to the numbers there are: the work never depends on the numbers in the file alone.
+        // Clipped to the numbers there are: the work never depends on the numbers in the file
+        // alone.
         let (low, high) = match self {
             Self::Run { count: 0, .. } => return,
             Self::Run { first, count } => (*first, *first + u64::from(*count) - 1),

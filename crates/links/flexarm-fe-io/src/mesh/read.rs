@@ -20,7 +20,8 @@ const LARGEST: u64 = 8 << 30;
 pub struct ReadOptions {
     /// Units of the numbers in the file.
     pub units: UnitSystem,
-    /// Groups of line elements that are beams: name of the physical curve or element set, section in SI.
+    /// Groups of line elements that are beams: name of the physical curve or element set, section
+    /// in SI.
     pub beams: Vec<(String, BeamProperties)>,
 }
 
@@ -44,7 +45,8 @@ pub struct MeshFile {
     pub element_types: BTreeSet<String>,
 }
 
-/// Reads a mesh file: Gmsh `.msh` 2.2 or 4.1, CalculiX or Abaqus `.inp`, each also compressed by gzip.
+/// Reads a mesh file: Gmsh `.msh` 2.2 or 4.1, CalculiX or Abaqus `.inp`, each also compressed by
+/// gzip.
 ///
 /// ```no_run
 /// use flexarm_fe_io::{ReadOptions, read_mesh};

@@ -10,7 +10,8 @@ use flexarm_fem::{GateLimits, Matrix12, UnitSystem};
 use crate::common::turned_arm;
 use crate::shared::{parse, read, samples, small_structure};
 
-/// CalculiX 2.20 as built by Debian does not condense; the reason must be given, not only a residual.
+/// CalculiX 2.20 as built by Debian does not condense; the reason must be given, not only a
+/// residual.
 #[test]
 fn uncondensed_substructures_of_calculix_are_refused_with_the_reason() {
     let Some(folder) = samples() else { return };
@@ -66,7 +67,8 @@ fn matrices_with_other_faults_are_left_to_the_gate_and_uncoupled_ones_are_not() 
     }
 }
 
-/// The same in a format that CalculiX does not write has no advice about it, and rounding says nothing there.
+/// The same in a format that CalculiX does not write has no advice about it, and rounding says
+/// nothing there.
 #[test]
 fn uncoupled_interfaces_of_other_formats_are_refused_without_the_advice_about_calculix() {
     let (K, _) = small_structure(0);

@@ -95,7 +95,8 @@ fn the_full_matrices_of_calculix_are_read_with_their_rows() {
     assert_eq!(K.rows.last(), Some(&DofLabel::new(950, 3)));
     assert_eq!(sparse.triplets().next(), Some((0, 0, 4.497_626_620_268_5e9)));
 
-    // The six rows of both interfaces are there, and the mass of a translation along x is that of the beam.
+    // The six rows of both interfaces are there, and the mass of a translation along x is that of
+    // the beam.
     let map: InterfaceMap = "A=947:1-3+948:1-3,B=949:1-3+950:1-3".parse().unwrap();
     let along_x = |i: usize| f64::from(K.rows[i].dof == 1 && !matches!(K.rows[i].node, Some(948 | 950)));
     let moved: f64 =

@@ -49,7 +49,8 @@ pub(crate) fn digits_error(a: &DMatrix<f64>, b: &DMatrix<f64>) -> f64 {
     a.iter().zip(b).filter(|(a, b)| a != b).map(|(a, b)| (a - b).abs() / b.abs()).fold(0.0, f64::max)
 }
 
-/// Stiffness and mass of a turned beam with offset and `modes` modal coordinates, SI; every entry lives.
+/// Stiffness and mass of a turned beam with offset and `modes` modal coordinates, SI; every entry
+/// lives.
 pub(crate) fn small_structure(modes: usize) -> (DMatrix<f64>, DMatrix<f64>) {
     let link = crate::common::turned_arm();
     let K12 = link.matrix12();

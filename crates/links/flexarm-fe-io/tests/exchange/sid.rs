@@ -1,4 +1,5 @@
-//! Standard Input Data: the identities of the body, the orders that files disagree in, reading and writing.
+//! Standard Input Data: the identities of the body, the orders that files disagree in, reading and
+//! writing.
 
 use flexarm_fe_io::exchange::{
     ExchangeErrorKind, GyroLayout, OeOrder, Sid, SidMatrix, SidNode, modal_link_from_sid, parse_sid, read_sid,
@@ -330,8 +331,8 @@ fn matrices_that_are_much_larger_than_the_file_are_refused() {
     assert!(of_modes(10_001).unwrap_err().expected.contains("0 to 10000"));
 }
 
-/// Truth: the integrals of the sample, made by another program, over the same mesh: `J1`, `Oe`, `Gr`, `Ge`, `Cr` against
-/// those of the modal link of that mesh. The sample has eleven digits.
+/// Truth: the integrals of the sample, made by another program, over the same mesh: `J1`, `Oe`,
+/// `Gr`, `Ge`, `Cr` against those of the modal link of that mesh. The sample has eleven digits.
 #[test]
 #[allow(clippy::print_stderr, reason = "measured errors, shown with --nocapture")]
 fn the_sample_body_is_the_modal_link_of_its_mesh() {

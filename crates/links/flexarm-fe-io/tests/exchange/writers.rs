@@ -62,7 +62,8 @@ fn a_sidecar_is_found_beside_its_matrices_and_finds_them() {
     assert_eq!(by_matrix.mass.unwrap().dense(), Some(&M));
 }
 
-/// What the sidecar says of a file counts, whatever it is called; other files are not mixed with it.
+/// What the sidecar says of a file counts, whatever it is called; other files are not mixed with
+/// it.
 #[test]
 fn a_stiffness_finds_its_mass_through_the_sidecar() {
     let folder = std::env::temp_dir().join(format!("flexarm_exchange_mass_{}", std::process::id()));

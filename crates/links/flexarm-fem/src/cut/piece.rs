@@ -1,11 +1,11 @@
 //! The piece of one element ahead of a plane.
 //!
-//! In reference coordinates the plane is the zero set of `d(xi) = Σ N_i d_i`, with the distances `d_i` of
-//! the nodes. The reference element is split into tetrahedra, and those that the zero set crosses into
-//! eight, until `d` is nearly linear in each. There it is replaced by its best linear fit, the
-//! tetrahedron is clipped, and `det J`, `x det J`, `x xᵀ det J` are integrated over what remains. The
-//! fit (least squares, not interpolation) makes the mean error of the position of the cut zero, so
-//! that errors of neighbours cancel.
+//! In reference coordinates the plane is the zero set of `d(xi) = Σ N_i d_i`, with the distances
+//! `d_i` of the nodes. The reference element is split into tetrahedra, and those that the zero set
+//! crosses into eight, until `d` is nearly linear in each. There it is replaced by its best linear
+//! fit, the tetrahedron is clipped, and `det J`, `x det J`, `x xᵀ det J` are integrated over what
+//! remains. The fit (least squares, not interpolation) makes the mean error of the position of the
+//! cut zero, so that errors of neighbours cancel.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -16,7 +16,8 @@ use crate::element::{
 };
 use crate::mesh::ElementKind;
 
-/// Deviation of `d` from linear on a small tetrahedron, per range of `d` in the element, that is let be.
+/// Deviation of `d` from linear on a small tetrahedron, per range of `d` in the element, that is
+/// let be.
 const FLAT: f64 = 1e-4;
 
 /// Most times that a tetrahedron is split into eight.
@@ -39,7 +40,8 @@ pub(super) fn side(kind: ElementKind, x: &[Vector3<f64>], plane: &Plane) -> Side
         (low, high) = (low.min(d), high.max(d));
     }
     if !kind.is_beam() {
-        // An element is its straight twin plus offset times bubble, and the bubbles add up to 3 at most.
+        // An element is its straight twin plus offset times bubble, and the bubbles add up to 3 at
+        // most.
         let offset = edges(kind).iter().zip(&x[corners..]).fold(0.0, |offset, ([a, b], middle)| {
             f64::max(offset, plane.normal.dot(&(middle - (x[*a] + x[*b]) * 0.5)).abs())
         });
@@ -219,9 +221,9 @@ impl Clip<'_> {
 const CHILDREN: [[usize; 4]; 8] =
     [[0, 4, 6, 7], [4, 1, 5, 8], [6, 5, 2, 9], [7, 8, 9, 3], [4, 9, 6, 7], [4, 9, 7, 8], [4, 9, 8, 5], [4, 9, 5, 6]];
 
-/// Vertex values of the linear function closest in the mean square to the quadratic with these vertex
-/// values and these offsets at the middles: the projection of the bubble `4 L_a L_b` is 8/15 at its two
-/// ends and -2/15 at the two others.
+/// Vertex values of the linear function closest in the mean square to the quadratic with these
+/// vertex values and these offsets at the middles: the projection of the bubble `4 L_a L_b` is 8/15
+/// at its two ends and -2/15 at the two others.
 fn best_fit(mut d: [f64; 4], offsets: &[f64; 6]) -> [f64; 4] {
     for ([a, b], offset) in EDGES.iter().zip(offsets) {
         for (i, d) in d.iter_mut().enumerate() {

@@ -29,7 +29,8 @@ fn moments(mass: f64, first: Vector3<f64>, second: Matrix3<f64>) -> RigidPart {
     Moments { origin: Vector3::zeros(), mass, first, second }.rigid_part()
 }
 
-/// Largest difference of mass, centre of mass and inertia, in units of a body of the size of `whole`.
+/// Largest difference of mass, centre of mass and inertia, in units of a body of the size of
+/// `whole`.
 fn difference(part: &RigidPart, other: &RigidPart, whole: &RigidPart) -> f64 {
     let size = (whole.inertia.trace() / whole.mass).sqrt();
     let mass = (part.mass - other.mass).abs() / whole.mass;
@@ -53,8 +54,8 @@ fn the_beam_a1_is_cut_into_two_equal_halves() {
     }
 }
 
-/// Truth: the box behind `x = X(y, z) = x_0 + b y + c z`, with `A` the section, `J` its second moments:
-/// `m = ρ A x_0`, `∫ x = ρ/2 ∫ X²`, `∫ x² = ρ/3 ∫ X³`, ...
+/// Truth: the box behind `x = X(y, z) = x_0 + b y + c z`, with `A` the section, `J` its second
+/// moments: `m = ρ A x_0`, `∫ x = ρ/2 ∫ X²`, `∫ x² = ρ/3 ∫ X³`, ...
 #[test]
 fn a_box_cut_by_an_oblique_plane_is_the_closed_form() {
     let (x_0, b, c) = (0.43, 0.9, -0.7);
@@ -81,8 +82,8 @@ fn a_box_cut_by_an_oblique_plane_is_the_closed_form() {
     }
 }
 
-/// Truth: a tetrahedron with edges a, b, c along the axes: volume abc/6, centre a/4, ∫ x² = V a²/10,
-/// ∫ x y = V a b/20.
+/// Truth: a tetrahedron with edges a, b, c along the axes: volume abc/6, centre a/4, ∫ x² = V
+/// a²/10, ∫ x y = V a b/20.
 #[test]
 fn a_plane_across_a_corner_cuts_off_a_tetrahedron() {
     let edge = vector![0.3, 0.08, 0.04];
@@ -139,8 +140,8 @@ fn pipe(kind: ElementKind, n: usize) -> Mesh {
     })
 }
 
-/// Truth: hollow cylinder, and its symmetry: every plane through the centre halves it. Quadratic edges
-/// leave the circle by h⁴.
+/// Truth: hollow cylinder, and its symmetry: every plane through the centre halves it. Quadratic
+/// edges leave the circle by h⁴.
 #[test]
 fn a_pipe_of_curved_elements_weighs_and_halves_as_a_pipe() {
     let (inner, outer, h) = (0.05_f64, 0.1_f64, 0.2_f64);

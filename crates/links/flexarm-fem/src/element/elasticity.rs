@@ -11,8 +11,9 @@ const SHEAR_SLACK: f64 = 1e-9;
 
 /// Checks that a material can be that of a solid element.
 ///
-/// An isotropic solid has two constants. A shear modulus of its own means something for a beam only.
-/// The matrices of this module use `E` and `nu`; call this once per region before computing them.
+/// An isotropic solid has two constants. A shear modulus of its own means something for a beam
+/// only. The matrices of this module use `E` and `nu`; call this once per region before computing
+/// them.
 ///
 /// # Errors
 /// [`FemError::OutOfRange`]: as [`Material::check`]; `nu = 0.5` (the bulk modulus is infinite); a

@@ -100,13 +100,15 @@ pub(crate) enum Geometry {
     Affine,
     /// Mid-edge nodes in the middle of straight edges.
     Straight,
-    /// Distortion: the larger of the relative difference between `det J` at a node and its mean over the
-    /// nodes (how far `1/det J` in the stiffness is from a polynomial), and of twice the offset of a
-    /// mid-edge node per edge length (how much the polynomial of high degree weighs beside it).
+    /// Distortion: the larger of the relative difference between `det J` at a node and its mean
+    /// over the nodes (how far `1/det J` in the stiffness is from a polynomial), and of twice the
+    /// offset of a mid-edge node per edge length (how much the polynomial of high degree weighs
+    /// beside it).
     Curved(f64),
 }
 
-/// Nodes of one element relative to the first (small numbers round less), padded for the vector unit.
+/// Nodes of one element relative to the first (small numbers round less), padded for the vector
+/// unit.
 pub(crate) struct Nodes {
     pub(crate) n: usize,
     pub(crate) x: [[f64; 4]; MAX_NODES],

@@ -8,8 +8,8 @@
 //!
 //! # Source
 //! One dimension: Golub & Welsch (1969). Collapsed: Karniadakis & Sherwin, *Spectral/hp Element
-//! Methods*, section 4.1. Tables: Witherden & Vincent (2015), *Comput. Math. Appl.* 69(10), the rules
-//! of degree 5, 8 and 10 for the tetrahedron as published with PyFR.
+//! Methods*, section 4.1. Tables: Witherden & Vincent (2015), *Comput. Math. Appl.* 69(10), the
+//! rules of degree 5, 8 and 10 for the tetrahedron as published with PyFR.
 
 use std::sync::OnceLock;
 

@@ -29,9 +29,9 @@ pub enum Quadrature {
     /// Sufficient for stiffness and consistent mass.
     #[default]
     Exact,
-    /// The rules of CalculiX for C3D4, C3D10, C3D8, C3D20, C3D6 and C3D15, the same for stiffness and
-    /// mass. The mass of tetrahedra, HEX20 and wedges is under-integrated: right in sum, not in detail.
-    /// WEDGE6 has one motion without stiffness beside the rigid ones.
+    /// The rules of CalculiX for C3D4, C3D10, C3D8, C3D20, C3D6 and C3D15, the same for stiffness
+    /// and mass. The mass of tetrahedra, HEX20 and wedges is under-integrated: right in sum, not in
+    /// detail. WEDGE6 has one motion without stiffness beside the rigid ones.
     Calculix,
     /// The same, but HEX8 with incompatible modes: C3D8I.
     CalculixModes,
@@ -66,8 +66,8 @@ pub struct Point<'a> {
 /// The incompatible modes of HEX8 are not part of `N`: gradients are those of the eight nodes.
 ///
 /// # Errors
-/// [`InvertedElement`] at the first point without positive `det J`; `visit` has then seen the points
-/// before it.
+/// [`InvertedElement`] at the first point without positive `det J`; `visit` has then seen the
+/// points before it.
 ///
 /// # Panics
 /// For a beam, and for a wrong number of nodes.
@@ -170,9 +170,10 @@ pub(crate) struct Tables {
 
 /// Largest distortion of a curved TET10 for 14, 46, 81, 216 and 343 points; above it 512.
 ///
-/// Up to a distortion of 0.35 the error of the stiffness is below 1e-8 of its largest entry, on nearly flat
-/// tetrahedra below 3e-8 (`the_stiffness_of_a_curved_tetrahedron_does_not_depend_on_the_rule`); with 512
-/// points it is 2e-8 at a distortion of 0.4 and 2e-6 at 0.7.
+/// Up to a distortion of 0.35 the error of the stiffness is below 1e-8 of its largest entry, on
+/// nearly flat tetrahedra below 3e-8
+/// (`the_stiffness_of_a_curved_tetrahedron_does_not_depend_on_the_rule`); with 512 points it is
+/// 2e-8 at a distortion of 0.4 and 2e-6 at 0.7.
 pub(crate) const TET10_DISTORTIONS: [f64; 5] = [0.005, 0.07, 0.12, 0.2, 0.35];
 
 impl Tables {

@@ -195,8 +195,8 @@ fn wedge6(xi: [f64; 3], N: &mut [f64], dN: &mut [[f64; 3]]) {
     }
 }
 
-/// Corners `L [(2L - 1)(1 + t t_i) - (1 - t²)] / 2`, edges of the triangles `2 L_a L_b (1 + t t_i)`,
-/// upright edges `L (1 - t²)`.
+/// Corners `L [(2L - 1)(1 + t t_i) - (1 - t²)] / 2`, edges of the triangles
+/// `2 L_a L_b (1 + t t_i)`, upright edges `L (1 - t²)`.
 fn wedge15(xi: [f64; 3], N: &mut [f64], dN: &mut [[f64; 3]]) {
     let (L, dL) = area(xi);
     let t = xi[2];

@@ -39,15 +39,17 @@ impl ElementWorkspace {
         Self { n: 0, volume: 0.0, products: zeros(), stiffness: zeros(), mass: vec![0.0; MAX_NODES * MAX_NODES] }
     }
 
-    /// Computes stiffness and mass of one element; read them by [`Self::stiffness`] and [`Self::mass`].
+    /// Computes stiffness and mass of one element; read them by [`Self::stiffness`] and
+    /// [`Self::mass`].
     ///
     /// ```text
     /// K_ij = ∫ λ a bᵀ + μ (b aᵀ + (a·b) 1) dV,   a = ∇N_i, b = ∇N_j      M_ij = ∫ ρ N_i N_j dV
     /// ```
-    /// HEX8 with [`Quadrature::Exact`] or [`Quadrature::CalculixModes`] has nine incompatible modes `1 - r²`, `1 - s²`, `1 - t²` in each
-    /// direction, condensed statically: it bends without locking. Their gradients use the Jacobian of the
-    /// centre, `(det J_0 / det J) J_0⁻ᵀ`, so that they do no work in constant stress and the patch test
-    /// holds for any shape. They carry no mass.
+    /// HEX8 with [`Quadrature::Exact`] or [`Quadrature::CalculixModes`] has nine incompatible modes
+    /// `1 - r²`, `1 - s²`, `1 - t²` in each direction, condensed statically: it bends without
+    /// locking. Their gradients use the Jacobian of the centre, `(det J_0 / det J) J_0⁻ᵀ`, so that
+    /// they do no work in constant stress and the patch test holds for any shape. They carry no
+    /// mass.
     ///
     /// * `x`: positions of the nodes, m.
     /// * `material`: `E`, `nu` and `rho` are used; `G` is not. Refuse what
@@ -148,7 +150,8 @@ fn gradient_products<const N: usize, const D: usize>(
     products[..D].fill([0.0; D]);
     let centre = if m > N { Some(centre_of_brick(kind, N, nodes)?) } else { None };
 
-    // Four points at a time, so that each entry of the result is read and written once for the four.
+    // Four points at a time, so that each entry of the result is read and written once for the
+    // four.
     let (mut g, mut weight, mut filled) = ([[0.0; D]; 4], [0.0; 4], 0);
     let mut jacobian = Jacobian::checked(kind, N, table, 0, &nodes.x)?;
     let mut largest_det = jacobian.det;
@@ -186,7 +189,8 @@ fn centre_of_brick(kind: ElementKind, n: usize, nodes: &Nodes) -> Result<Jacobia
     if centre.det > 0.0 {
         return Ok(centre);
     }
-    // The mean of eight positive determinants nearby: only a NaN or a badly folded element gets here.
+    // The mean of eight positive determinants nearby: only a NaN or a badly folded element gets
+    // here.
     Err(InvertedElement { kind, det: centre.det, place: super::geometry::Place::GaussPoint(0) })
 }
 

@@ -100,8 +100,8 @@ fn rigid_motions_cost_no_force_on_distorted_elements() {
     }
 }
 
-/// Physics: an unsupported elastic body has six motions without strain and no more. Today's exception
-/// is CalculiX's own: the two points of C3D6 do not see one of its motions.
+/// Physics: an unsupported elastic body has six motions without strain and no more. Today's
+/// exception is CalculiX's own: the two points of C3D6 do not see one of its motions.
 #[test]
 fn every_element_has_exactly_six_modes_without_strain() {
     for kind in SOLIDS {
@@ -133,8 +133,8 @@ fn stiffness_and_mass_are_symmetric_to_the_last_bit() {
 }
 
 /// Physics: the patch test. Nodes on the boundary of a distorted patch follow a linear field; in
-/// balance the nodes within follow it too, and the stress is constant. Quadratic elements have curved
-/// faces inside.
+/// balance the nodes within follow it too, and the stress is constant. Quadratic elements have
+/// curved faces inside.
 #[test]
 fn constant_strain_passes_through_a_distorted_patch_unchanged() {
     for kind in SOLIDS {
@@ -185,8 +185,8 @@ fn the_mass_of_an_element_is_its_density_times_its_volume() {
     }
 }
 
-/// Truth: ∫ a! b! c! d! / (a+b+c+d+3)! over a straight tetrahedron: rho V/20 for TET4, rho V/420 for
-/// TET10.
+/// Truth: ∫ a! b! c! d! / (a+b+c+d+3)! over a straight tetrahedron: rho V/20 for TET4, rho V/420
+/// for TET10.
 #[test]
 fn mass_of_straight_tetrahedra_is_the_closed_form() {
     let (_, M, volume) = matrices(Tet4, &distorted(Tet4, 0.0, 17), Quadrature::Exact);
@@ -314,8 +314,8 @@ fn stiffness_is_the_integral_of_b_transposed_d_b() {
 }
 
 /// Truth: a block bent to the curvature κ with its nodes held across, plane strain:
-/// `E/(1-nu²) I κ² l / 2`. The plain brick cannot curve: it shears as well, by κ x, and is held across:
-/// `[(λ + 2μ) I l + μ b h l³/12] κ² / 2`.
+/// `E/(1-nu²) I κ² l / 2`. The plain brick cannot curve: it shears as well, by κ x, and is held
+/// across: `[(λ + 2μ) I l + μ b h l³/12] κ² / 2`.
 #[test]
 fn a_brick_with_incompatible_modes_bends_without_locking() {
     let (l, b, h) = (0.4, 0.05, 0.1);
@@ -334,8 +334,8 @@ fn a_brick_with_incompatible_modes_bends_without_locking() {
     assert!(locked > 6.0 * bending);
 }
 
-/// A mid-edge node at less than a quarter of its edge turns the map over at the corner. Just below it
-/// no Gauss point sees it.
+/// A mid-edge node at less than a quarter of its edge turns the map over at the corner. Just below
+/// it no Gauss point sees it.
 #[test]
 fn an_element_turned_over_at_a_node_is_reported_there() {
     let mut x: Vec<Vector3<f64>> = reference_nodes(Tet10).iter().map(|xi| Vector3::from(*xi)).collect();

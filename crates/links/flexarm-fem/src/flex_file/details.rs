@@ -1,4 +1,5 @@
-//! The optional tables of a reduced-link file: `[superelement]`, `[[chain]]`, `[modal]` and `[gate]`.
+//! The optional tables of a reduced-link file: `[superelement]`, `[[chain]]`, `[modal]` and
+//! `[gate]`.
 
 use nalgebra::{DMatrix, Matrix6};
 use serde::Deserialize;

@@ -26,7 +26,8 @@ pub(super) fn read_frames(root: &Table<'_, '_>, units: &Units) -> Result<LinkFra
     Ok(frames)
 }
 
-/// Pose from `xyz` and either `rpy`, `rotation` or nothing; `others`: keys that may stand beside them.
+/// Pose from `xyz` and either `rpy`, `rotation` or nothing; `others`: keys that may stand beside
+/// them.
 pub(super) fn read_pose(table: &Table<'_, '_>, units: &Units, others: &[&str]) -> Result<Pose, FlexFileError> {
     table.only(&[&["xyz", "rpy", "rotation"], others].concat())?;
     let p = table.require("xyz", "three numbers, link axes")?.vector()? * units.length;

@@ -1,7 +1,7 @@
 //! The optional table `[modal]` of a reduced-link file: shapes and mass integrals.
 //!
-//! Symmetric matrices are their lower triangles by rows; of `N_kl` the pairs `k <= l` are written, in that order, and
-//! none where all are zero (second order unknown).
+//! Symmetric matrices are their lower triangles by rows; of `N_kl` the pairs `k <= l` are written,
+//! in that order, and none where all are zero (second order unknown).
 
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Matrix6, Matrix6xX, Vector3};
 

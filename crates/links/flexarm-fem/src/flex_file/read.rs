@@ -20,7 +20,8 @@ use crate::reduced::{Provenance, ReducedLink};
 use crate::rigid_part::RigidPart;
 
 const PARTS: [&str; 2] = ["proximal", "distal"];
-/// A file larger than this is refused (bytes): a link with 100 modes and stiffness by load has 10 MB.
+/// A file larger than this is refused (bytes): a link with 100 modes and stiffness by load has 10
+/// MB.
 const LARGEST: u64 = 256 << 20;
 
 /// Reads a reduced-link file.

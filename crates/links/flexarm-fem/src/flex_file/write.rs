@@ -11,8 +11,8 @@ use crate::rigid_part::RigidPart;
 
 /// The text of a reduced-link file: SI units, `K_BB` in link axes, one matrix row per line.
 ///
-/// Numbers are written in the shortest form that reads back to the same value. A rotation is written
-/// as `rpy` where that gives back every bit, else as a matrix.
+/// Numbers are written in the shortest form that reads back to the same value. A rotation is
+/// written as `rpy` where that gives back every bit, else as a matrix.
 pub fn write_flex(link: &ReducedLink) -> String {
     let mut text = format!("format = \"{FORMAT}\"\nversion = {VERSION}\n");
     text += &format!("link = {}\n", quoted(&link.name));
@@ -95,7 +95,8 @@ fn rows(R: &Matrix3<f64>) -> String {
     format!("[{}]", rows.join(", "))
 }
 
-/// `{:?}` prints the shortest text that parses back to the same f64, always with a point or exponent.
+/// `{:?}` prints the shortest text that parses back to the same f64, always with a point or
+/// exponent.
 pub(super) fn numbers<'a>(values: impl Iterator<Item = &'a f64>) -> String {
     let printed: Vec<_> = values.map(|x| format!("{x:?}")).collect();
     format!("[{}]", printed.join(", "))

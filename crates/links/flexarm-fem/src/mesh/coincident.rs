@@ -1,4 +1,5 @@
-//! Nodes in one place that are not one node: parts that were never joined, and cracks inside a body.
+//! Nodes in one place that are not one node: parts that were never joined, and cracks inside a
+//! body.
 
 use std::collections::HashMap;
 
@@ -91,7 +92,8 @@ fn drop_neighbours(mesh: &Mesh, pairs: &mut Vec<[u32; 2]>) {
 }
 
 impl Mesh {
-    /// The distance below which its nodes coincide where nothing is said: [`COINCIDENT`] of the diagonal, m.
+    /// The distance below which its nodes coincide where nothing is said: [`COINCIDENT`] of the
+    /// diagonal, m.
     pub fn coincidence(&self) -> f64 {
         COINCIDENT * self.bounding_box().map_or(0.0, |(low, high)| (high - low).norm())
     }
@@ -123,7 +125,8 @@ mod tests {
     use crate::mesh::{ElementKind, connected_parts};
     use crate::test_mesh::cube;
 
-    /// A bar of two cells along x whose cells do not share the nodes between them where `split` says so.
+    /// A bar of two cells along x whose cells do not share the nodes between them where `split`
+    /// says so.
     fn bar(split: impl Fn(&Vector3<f64>) -> bool) -> Mesh {
         let mut mesh = cube(ElementKind::Hex8, [2, 3, 3], false, |u| u);
         let twin: HashMap<u32, u32> = (0..mesh.nodes.len() as u32)

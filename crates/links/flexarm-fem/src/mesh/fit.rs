@@ -1,8 +1,8 @@
 //! Do elements of different kinds fit together where they meet?
 //!
-//! A mesh with several kinds can share corner nodes and still gape: a first-order face on a second-order
-//! one leaves the mid-side nodes hanging, a quadrilateral on two triangles its diagonal. Both give a
-//! softer link without any other sign.
+//! A mesh with several kinds can share corner nodes and still gape: a first-order face on a
+//! second-order one leaves the mid-side nodes hanging, a quadrilateral on two triangles its
+//! diagonal. Both give a softer link without any other sign.
 
 use std::collections::HashMap;
 

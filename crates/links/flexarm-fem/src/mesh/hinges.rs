@@ -1,4 +1,5 @@
-//! Bodies of a mesh that hang together in a point or along an edge only: hinges, which carry no moment.
+//! Bodies of a mesh that hang together in a point or along an edge only: hinges, which carry no
+//! moment.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -25,7 +26,8 @@ pub struct Hinge {
 /// Bodies that are connected through faces, and where they touch each other in less.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Bodies {
-    /// Body of each node, as an index from the largest; the larger one where it is in two, `usize::MAX` without an element.
+    /// Body of each node, as an index from the largest; the larger one where it is in two,
+    /// `usize::MAX` without an element.
     pub of_node: Vec<usize>,
     /// Elements of each body.
     pub elements: Vec<usize>,

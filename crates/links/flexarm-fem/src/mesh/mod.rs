@@ -1,4 +1,5 @@
-//! A finite element mesh in SI units: nodes, blocks of elements, regions with materials, named sets.
+//! A finite element mesh in SI units: nodes, blocks of elements, regions with materials, named
+//! sets.
 //!
 //! Plain data. Readers (`flexarm-fe-io`) fill it and convert node order and units on the way; here
 //! positions are in m, in the frame of the mesh, and the nodes of an element are in the order of
@@ -145,7 +146,8 @@ impl ElementBlock {
     }
 }
 
-/// A mesh, SI, checked by its reader: every index in range, every set sorted and without repetition.
+/// A mesh, SI, checked by its reader: every index in range, every set sorted and without
+/// repetition.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Mesh {
     /// Positions, m.

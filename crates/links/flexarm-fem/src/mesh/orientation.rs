@@ -1,4 +1,5 @@
-//! Elements whose nodes run the other way round, as after a mirrored import: turned, if all of a kind are.
+//! Elements whose nodes run the other way round, as after a mirrored import: turned, if all of a
+//! kind are.
 
 use nalgebra::Vector3;
 

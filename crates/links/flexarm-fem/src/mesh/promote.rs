@@ -36,7 +36,8 @@ pub fn added_nodes(mesh: &Mesh) -> usize {
     known.len()
 }
 
-/// Puts a node in the middle of every edge of the solids of first order; elements of second order and beams stay.
+/// Puts a node in the middle of every edge of the solids of first order; elements of second order
+/// and beams stay.
 pub fn promoted(mesh: &Mesh) -> Promoted {
     let mut this = Promoted { mesh: mesh.clone(), ends: Vec::new() };
     // Edges of elements of second order have their node already.

@@ -1,4 +1,5 @@
-//! The nodes of an interface against the faces of the surface: what is missing, inside, or on no face.
+//! The nodes of an interface against the faces of the surface: what is missing, inside, or on no
+//! face.
 
 use std::collections::{BTreeSet, HashMap};
 

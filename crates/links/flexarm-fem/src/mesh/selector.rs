@@ -9,8 +9,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 /// A choice of nodes. Lengths are in the unit of the mesh file.
 ///
 /// Text form, as on a command line: `interface_A`, `"a name with & or ("`, `plane(0,0,0; 1,0,0)`,
-/// `cylinder(0,0,0; 0,1,0; 0.05)`, `box(0,0,0; 1,1,1)`. A tolerance may follow as the last argument of a
-/// plane, a cylinder or a box. Terms joined by `&` must all hold.
+/// `cylinder(0,0,0; 0,1,0; 0.05)`, `box(0,0,0; 1,1,1)`. A tolerance may follow as the last argument
+/// of a plane, a cylinder or a box. Terms joined by `&` must all hold.
 ///
 /// In TOML either that text or a table: `{ plane = { point = [0, 0, 0], normal = [1, 0, 0] } }`.
 ///

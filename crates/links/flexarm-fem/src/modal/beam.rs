@@ -12,9 +12,11 @@ use crate::section::{Bar, Section};
 use crate::sparse::ModesWanted;
 
 impl BeamLink {
-    /// The modal link of this beam: static shapes of the distal interface and `modes` fixed-interface modes.
+    /// The modal link of this beam: static shapes of the distal interface and `modes`
+    /// fixed-interface modes.
     ///
-    /// The rigid arms from the beam to the joints weigh nothing. Elements: 24, or two per mode where that is more.
+    /// The rigid arms from the beam to the joints weigh nothing. Elements: 24, or two per mode
+    /// where that is more.
     ///
     /// ```
     /// use flexarm_fem::{BeamLink, Material, Section};
@@ -37,8 +39,9 @@ impl BeamLink {
     /// The modal link of this beam, with choices.
     ///
     /// # Errors
-    /// [`FemError::OutOfRange`] for impossible dimensions, materials and masses, too few elements and too many modes,
-    /// [`FemError::Missing`] for a section without shear stiffness in Timoshenko's theory.
+    /// [`FemError::OutOfRange`] for impossible dimensions, materials and masses, too few elements
+    /// and too many modes, [`FemError::Missing`] for a section without shear stiffness in
+    /// Timoshenko's theory.
     pub fn modal_with(&self, options: &ModalOptions) -> Result<ModalLink, FemError> {
         let reduced = self.reduce()?;
         let m = options.elements;

@@ -3,37 +3,41 @@
 //! ```text
 //! G_kl = ∫ Σ_c ∇φ_k,cᵀ σ ∇φ_l,c dV        σ: stress under one unit load, A held
 //! ```
-//! Solids: at the quadrature points, the stress from the gradients of the displacement (for HEX8 without the
-//! incompatible modes, so its bending stress is as good as that of a brick without them).
+//! Solids: at the quadrature points, the stress from the gradients of the displacement (for HEX8
+//! without the incompatible modes, so its bending stress is as good as that of a brick without
+//! them).
 //!
-//! Beams: the same with plane sections, from the internal forces N, V, T, M of each element, which are linear
-//! between its ends (exact forces at the ends, so only the bow of N and M within an element is lost):
+//! Beams: the same with plane sections, from the internal forces N, V, T, M of each element, which
+//! are linear between its ends (exact forces at the ends, so only the bow of N and M within an
+//! element is lost):
 //!
 //! ```text
 //! N (v'v' + w'w' + r² θx'θx') - M_y v'θx' - M_z w'θx' + V_y w'θx - V_z v'θx + T/2 (θy'θz - θz'θy)
 //! r² = polar/mass
 //! ```
-//! Terms in the axial strain u' are left out: they are as small as the strain of the load. Bending moments are then
-//! pairs of axial forces that keep their direction; at both ends of each element they are made to turn half with the section
-//! (semi-tangential, as torques are already), without which bent frames come out wrong:
+//! Terms in the axial strain u' are left out: they are as small as the strain of the load. Bending
+//! moments are then pairs of axial forces that keep their direction; at both ends of each element
+//! they are made to turn half with the section (semi-tangential, as torques are already), without
+//! which bent frames come out wrong:
 //!
 //! ```text
 //! G_θθ = -M_z (θx θy + θy θx)/2 + M_y (θx θz + θz θx)/2         at each end, M on the element
 //! ```
 //! Straight through a node these cancel.
 //!
-//! Rigid ties turn with their interface. The second-order part of that motion, `θ × (θ × r)/2` of each tied
-//! node, does work with the forces f of the tie:
+//! Rigid ties turn with their interface. The second-order part of that motion, `θ × (θ × r)/2` of
+//! each tied node, does work with the forces f of the tie:
 //!
 //! ```text
 //! G_θθ = Σ (r fᵀ + f rᵀ)/2 - (r·f) 1
 //! ```
-//! so an interface ahead of the elastic part buckles as it should, and torques on it are semi-tangential: their
-//! virtual work is that on the rotation vector. Distributing ties have no such part here.
+//! so an interface ahead of the elastic part buckles as it should, and torques on it are
+//! semi-tangential: their virtual work is that on the rotation vector. Distributing ties have no
+//! such part here.
 //!
-//! Source: Przemieniecki (1968), chapter 15; Argyris, Dunne & Scharpf (1978), *Comput. Meth. Appl. Mech. Eng.* 14, for
-//! moments; Wallrapp & Schwertassek (1991), *Int. J. Numer. Meth. Eng.* 32, for the
-//! unit loads of the floating frame.
+//! Source: Przemieniecki (1968), chapter 15; Argyris, Dunne & Scharpf (1978), *Comput. Meth. Appl.
+//! Mech. Eng.* 14, for moments; Wallrapp & Schwertassek (1991), *Int. J. Numer. Meth. Eng.* 32, for
+//! the unit loads of the floating frame.
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
@@ -87,7 +91,8 @@ pub(super) fn geometric_stiffness(
     let wrenches = source.condensation.unit_load_shapes();
     let loads = FIELDS + wrenches.ncols();
 
-    // Forces of inertia on the DoF; those on beams also element by element, for the internal forces.
+    // Forces of inertia on the DoF; those on beams also element by element, for the internal
+    // forces.
     let mut F = solid_forces(source);
     let beam_forces: Vec<_> = beams.iter().map(element_forces).collect();
     for (beam, forces) in beams.iter().zip(&beam_forces) {
@@ -177,7 +182,8 @@ fn add_solids(source: &ModalSource<'_>, U: &DMatrix<f64>, shapes: &DMatrix<f64>,
                     .enumerate()
                     .fold(Matrix3::zeros(), |sum, (i, d)| sum + A.fixed_view::<3, 1>(dof(i), column) * d.transpose())
             };
-            // Nine rows per point: gradients times weight and stress on one side, gradients on the other.
+            // Nine rows per point: gradients times weight and stress on one side, gradients on the
+            // other.
             let (mut right, mut stresses) = (Vec::new(), Vec::new());
             let visited = for_each_point(block.kind, &x, Purpose::Stiffness, source.quadrature, |point| {
                 for k in 0..n {

@@ -1,13 +1,15 @@
 //! The modal link: shapes and mass integrals of a link that deforms in a floating frame.
 //!
-//! The floating frame is the link frame L, tangent at interface A: A does not deform. A point at s moves to
+//! The floating frame is the link frame L, tangent at interface A: A does not deform. A point at s
+//! moves to
 //!
 //! ```text
 //! s + u,   u(s) = Σ φ_k(s) η_k
 //! ```
-//! Coordinates of a reduced link: six per interface but A (displacement and rotation of that interface, link axes, with
-//! the static shapes that belong to them), then the amplitudes of its fixed-interface modes. All that the equations of
-//! motion need are integrals over the undeformed body, and none of them depends on η:
+//! Coordinates of a reduced link: six per interface but A (displacement and rotation of that
+//! interface, link axes, with the static shapes that belong to them), then the amplitudes of its
+//! fixed-interface modes. All that the equations of motion need are integrals over the undeformed
+//! body, and none of them depends on η:
 //!
 //! ```text
 //! C_t,k = ∫ φ_k dm    C_r,k = ∫ s × φ_k dm    P_k = ∫ s φ_kᵀ dm    N_kl = ∫ φ_k φ_lᵀ dm    M_kl = ∫ φ_k·φ_l dm
@@ -60,21 +62,23 @@ pub struct ModalInterface {
 /// ```text
 /// K_eff = K + Σ load_i G_i
 /// ```
-/// The stress is the static one of the link with A held under that load alone. Loads are dead: forces keep their
-/// direction in link axes.
+/// The stress is the static one of the link with A held under that load alone. Loads are dead:
+/// forces keep their direction in link axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GeometricStiffness {
     /// Per m/s² of the acceleration of Lo minus gravity, along x, y, z of the link: load `-a dm`.
     pub acceleration: [DMatrix<f64>; 3],
     /// Per rad/s² of angular acceleration about x, y, z: load `-α × s dm`.
     pub angular: [DMatrix<f64>; 3],
-    /// Per rad²/s² of `ω_i ω_j` in the order xx yy zz xy xz yz: load `-ω × (ω × s) dm`. `ω_x ω_y` counts once.
+    /// Per rad²/s² of `ω_i ω_j` in the order xx yy zz xy xz yz: load `-ω × (ω × s) dm`. `ω_x ω_y`
+    /// counts once.
     pub centrifugal: [DMatrix<f64>; 6],
     /// Per unit wrench on each interface, forces (1/N) before torques (1/(N·m)), at Io, link axes.
     pub interface: Vec<[DMatrix<f64>; 6]>,
 }
 
-/// Shapes and inertia invariants of a link in its floating frame: link axes, tangent at interface A. SI units.
+/// Shapes and inertia invariants of a link in its floating frame: link axes, tangent at interface
+/// A. SI units.
 ///
 /// The builders check; afterwards it is plain data. All integrals are over the undeformed link.
 #[derive(Debug, Clone, PartialEq)]
@@ -144,7 +148,8 @@ impl ModalLink {
         self.coordinates() == 0 || self.N.iter().any(|N| N.amax() > 0.0)
     }
 
-    /// Mass over the motion of the link frame (linear, angular, link axes, at Lo), then the coordinates; undeformed.
+    /// Mass over the motion of the link frame (linear, angular, link axes, at Lo), then the
+    /// coordinates; undeformed.
     ///
     /// ```text
     /// [ m 1     -[mc]x   C_t ]
@@ -173,7 +178,8 @@ impl ModalLink {
             .map_or_else(Vec::new, |pairs| pairs.omega.iter().map(|omega| omega / std::f64::consts::TAU).collect())
     }
 
-    /// Natural frequencies of the free link, Hz, ascending; the first six belong to rigid motions and are near zero.
+    /// Natural frequencies of the free link, Hz, ascending; the first six belong to rigid motions
+    /// and are near zero.
     pub fn free_frequencies_hz(&self) -> Vec<f64> {
         let n = self.coordinates();
         let mut K = DMatrix::zeros(6 + n, 6 + n);
@@ -184,7 +190,8 @@ impl ModalLink {
     /// Compliance of an interface with A held, at Io, link axes.
     ///
     /// # Errors
-    /// [`FemError::OutOfRange`] for an interface that there is not, [`FemError::Missing`] for a singular stiffness.
+    /// [`FemError::OutOfRange`] for an interface that there is not, [`FemError::Missing`] for a
+    /// singular stiffness.
     pub fn compliance(&self, interface: usize) -> Result<nalgebra::Matrix6<f64>, FemError> {
         let Some(at) = self.interfaces.get(interface) else {
             return Err(FemError::OutOfRange {
@@ -200,12 +207,14 @@ impl ModalLink {
         Ok(flexarm_spatial::symmetric_part(&nalgebra::Matrix6::from_column_slice(C.as_slice())))
     }
 
-    /// Whether mass and stiffness are positive definite, so that all frequencies with A held are real and above zero.
+    /// Whether mass and stiffness are positive definite, so that all frequencies with A held are
+    /// real and above zero.
     pub fn is_positive_definite(&self) -> bool {
         transform::eigenpairs(&self.K, &self.M).is_some()
     }
 
-    /// Whether the coordinates are those of Craig and Bampton: six per interface, then modes that move none of them.
+    /// Whether the coordinates are those of Craig and Bampton: six per interface, then modes that
+    /// move none of them.
     pub fn is_craig_bampton(&self) -> bool {
         let unit = |(i, interface): (usize, &ModalInterface)| {
             let expected = |r: usize, c: usize| if c == 6 * i + r { 1.0 } else { 0.0 };

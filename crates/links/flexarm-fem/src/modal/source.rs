@@ -5,8 +5,8 @@
 //! beams    φ = u + θ × r over the section, D = ∫ r rᵀ dm per length:
 //!          ∫ s φᵀ dm = ∫ (μ s uᵀ + D [θ]xᵀ) dx,   ∫ φ_k φ_lᵀ dm = ∫ (μ u_k u_lᵀ + [θ_k]x D [θ_l]xᵀ) dx
 //! ```
-//! M_s, x and φ are those of the FE model, so both are exact for its displacement field: solids whatever their
-//! shape, beams by four Gauss points for the cubic shapes of [`Beam`](crate::Beam).
+//! M_s, x and φ are those of the FE model, so both are exact for its displacement field: solids
+//! whatever their shape, beams by four Gauss points for the cubic shapes of [`Beam`](crate::Beam).
 
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Matrix6xX, Vector3};
 
@@ -89,7 +89,8 @@ struct Integrals {
 impl ModalSource<'_> {
     /// The modal link.
     ///
-    /// * `geometric`: whether to find the stiffness by initial stress: 12 more solves, and a pass over the elements.
+    /// * `geometric`: whether to find the stiffness by initial stress: 12 more solves, and a pass
+    ///   over the elements.
     pub fn modal_link(&self, name: impl Into<String>, geometric: bool) -> ModalLink {
         let shapes = self.shapes();
         let n = shapes.ncols();

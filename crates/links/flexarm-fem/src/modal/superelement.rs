@@ -5,8 +5,8 @@
 //! ```text
 //! [C_t; C_r] = Rᵀ M      mass, first moment, inertia = Rᵀ M R
 //! ```
-//! are exact. Where the mass sits inside is lost: of `P_k` only the skew part follows, from `C_r`; its symmetric
-//! part and all `N_kl`, the terms of second order, are unknown and set to zero.
+//! are exact. Where the mass sits inside is lost: of `P_k` only the skew part follows, from `C_r`;
+//! its symmetric part and all `N_kl`, the terms of second order, are unknown and set to zero.
 
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Vector3};
 

@@ -1,4 +1,5 @@
-//! Integrals of meshes against brute force and the FE matrices, and stiffness by initial stress of solids.
+//! Integrals of meshes against brute force and the FE matrices, and stiffness by initial stress of
+//! solids.
 #![allow(clippy::print_stderr, reason = "tables of measured errors, shown with --nocapture")]
 
 use std::f64::consts::PI;
@@ -198,7 +199,8 @@ fn integrals_of_a_mesh_are_those_over_fine_points() {
     }
 }
 
-/// Identities: axial(P_k) = C_r,k, tr N_kl = M_kl, N_lk = N_klᵀ; `[C_t; C_r] = Rᵀ M φ`, `Rᵀ M R` of the FE model.
+/// Identities: axial(P_k) = C_r,k, tr N_kl = M_kl, N_lk = N_klᵀ; `[C_t; C_r] = Rᵀ M φ`, `Rᵀ M R` of
+/// the FE model.
 fn check_identities(what: &str, link: &ModalLink, model: &FeModel, shapes: &DMatrix<f64>) {
     let n = link.coordinates();
     let R = model.rigid_modes(&Vector3::zeros());
@@ -272,7 +274,8 @@ fn frame(theory: BeamTheory) -> (Mesh, Vec<Interface>) {
     (mesh, interfaces)
 }
 
-/// Second algorithm: first-order terms of a condensed matrix by rigid motions alone; and what it cannot know is zero.
+/// Second algorithm: first-order terms of a condensed matrix by rigid motions alone; and what it
+/// cannot know is zero.
 #[test]
 fn a_condensed_matrix_tells_everything_of_first_order() {
     let (mesh, interfaces) = casting(ElementKind::Hex20, [Tie::Rigid; 2]);
@@ -323,8 +326,8 @@ fn a_condensed_matrix_tells_everything_of_first_order() {
     assert_eq!(crate::parse_flex(&crate::write_flex(&orthogonal), "casting").unwrap(), orthogonal);
 }
 
-/// Truth: the shapes with rigid motions added, over fine points. Identity: frequencies of the free link stay, and with A
-/// held again all is as before.
+/// Truth: the shapes with rigid motions added, over fine points. Identity: frequencies of the free
+/// link stay, and with A held again all is as before.
 #[test]
 fn data_in_any_frame_give_the_link_held_at_a() {
     let (mesh, interfaces) = casting(ElementKind::Hex20, [Tie::Rigid; 2]);
@@ -362,7 +365,8 @@ fn data_in_any_frame_give_the_link_held_at_a() {
     assert!(errors.iter().all(|e| *e < 1e-12), "{}", list.join(" ")); // measured 4e-16
 }
 
-/// Truth: the same mesh, tied and reduced in the other axes. With stiffness by initial stress, of which every load is a component.
+/// Truth: the same mesh, tied and reduced in the other axes. With stiffness by initial stress, of
+/// which every load is a component.
 #[test]
 fn a_link_in_other_axes_is_that_of_the_turned_mesh() {
     let (mesh, interfaces) = casting(ElementKind::Hex20, [Tie::Rigid; 2]);
@@ -430,7 +434,8 @@ fn buckling_load(K: &DMatrix<f64>, G: &DMatrix<f64>) -> f64 {
     -1.0 / eigenvalues.min()
 }
 
-/// Truth: Euler's column, π² EI/(4 l²); with a rigid end of length a: tan(k l) = 1/(k a), F = k² EI.
+/// Truth: Euler's column, π² EI/(4 l²); with a rigid end of length a: tan(k l) = 1/(k a), F = k²
+/// EI.
 #[test]
 fn a_cantilever_buckles_at_eulers_load() {
     for a in [0.0, 0.5] {
@@ -449,8 +454,9 @@ fn a_cantilever_buckles_at_eulers_load() {
     }
 }
 
-/// Truth: lateral buckling of a deep cantilever under a force at its end, 4.0126 sqrt(EI GJ)/l² [Timoshenko & Gere,
-/// eq. 6-21]; of one under a moment that turns half with its end, π sqrt(EI GJ)/l (semi-tangential).
+/// Truth: lateral buckling of a deep cantilever under a force at its end, 4.0126 sqrt(EI GJ)/l²
+/// [Timoshenko & Gere, eq. 6-21]; of one under a moment that turns half with its end, π sqrt(EI
+/// GJ)/l (semi-tangential).
 #[test]
 fn a_deep_cantilever_tips_over_at_the_textbooks_load() {
     let mut beam = slender(1e5);
@@ -467,14 +473,15 @@ fn a_deep_cantilever_tips_over_at_the_textbooks_load() {
     assert!(moment.abs() < 1e-3, "{moment:.1e}"); // measured 2.8e-4
 }
 
-/// Truth: Wright, Smith, Thresher & Wang (1982), *J. Appl. Mech.* 49, hub radius zero: first flapwise frequency over
-/// sqrt(EI/(μ l⁴)).
+/// Truth: Wright, Smith, Thresher & Wang (1982), *J. Appl. Mech.* 49, hub radius zero: first
+/// flapwise frequency over sqrt(EI/(μ l⁴)).
 #[test]
 fn a_spinning_beam_stiffens_as_in_the_literature() {
     let link = slender(4.0).modal_with(&ModalOptions { modes: 12, geometric: true, elements: 24 }).unwrap();
     let G = link.geometric.as_ref().unwrap();
     for (spin, truth) in [(0.0, 3.5160), (1.0, 3.6816), (2.0, 4.1373), (4.0, 5.5850), (10.0, 11.2023)] {
-        // About z; flapping along z by EI_y. Centrifugal forces on the deformed link: ω² (e_z·φ)² - ω² φ·φ.
+        // About z; flapping along z by EI_y. Centrifugal forces on the deformed link: ω² (e_z·φ)² -
+        // ω² φ·φ.
         let n = link.coordinates();
         let softening = DMatrix::from_fn(n, n, |k, l| link.N[k * n + l][(2, 2)] - link.N[k * n + l].trace());
         let K = &link.K + (&G.centrifugal[2] + softening) * (spin * spin);
@@ -520,7 +527,8 @@ fn solids_stiffen_as_the_beam_does() {
         let size = sizes[group].iter().fold(0.0_f64, |a, b| a.max(*b));
         let error = (scaled(a) - scaled(&b)).amax() / size;
         eprintln!("load {j}: solid against beam {error:.1e}, own size {:.1e}", sizes[j] / size);
-        // measured 1.7e-2: tied ends cannot warp in torsion, which fades with the thickness; bending 9e-4
+        // measured 1.7e-2: tied ends cannot warp in torsion, which fades with the thickness;
+        // bending 9e-4
         assert!(error < 0.03, "{j}: {error:.1e}");
     }
     let buckling = |link: &ModalLink| buckling_load(&link.K, &-&link.geometric.as_ref().unwrap().interface[0][0]);

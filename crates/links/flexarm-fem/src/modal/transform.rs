@@ -14,13 +14,15 @@ pub(super) struct Eigenpairs {
     pub(super) Phi: DMatrix<f64>,
 }
 
-/// Rotations of pairs of columns until they are orthogonal to rounding; half as many always sufficed.
+/// Rotations of pairs of columns until they are orthogonal to rounding; half as many always
+/// sufficed.
 const MOST_SWEEPS: usize = 60;
 
 /// All modes of a dense symmetric positive definite pencil; `None` where it is not.
 ///
-/// One-sided Jacobi: columns that are orthonormal in K are turned in pairs until they are orthogonal in M too. Low
-/// frequencies keep their digits beside high ones, which eigenvalues of a matrix of ω² would not.
+/// One-sided Jacobi: columns that are orthonormal in K are turned in pairs until they are
+/// orthogonal in M too. Low frequencies keep their digits beside high ones, which eigenvalues of a
+/// matrix of ω² would not.
 ///
 /// Source: Demmel & Veselić (1992), *SIAM J. Matrix Anal. Appl.* 13.
 pub(super) fn eigenpairs(K: &DMatrix<f64>, M: &DMatrix<f64>) -> Option<Eigenpairs> {
@@ -93,14 +95,14 @@ fn turn(A: &mut DMatrix<f64>, i: usize, j: usize, cos: f64, sin: f64) {
 impl ModalLink {
     /// The same link in its modes with A held: `K = diag(ω²)`, `M = 1`, ascending.
     ///
-    /// Stiffness and mass decouple, and the highest modes, which belong to no motion of the link, can be left out;
-    /// with some left out, interfaces yield less under static loads.
+    /// Stiffness and mass decouple, and the highest modes, which belong to no motion of the link,
+    /// can be left out; with some left out, interfaces yield less under static loads.
     ///
     /// * `keep`: number of modes; all if not given.
     ///
     /// # Errors
-    /// [`FemError::Missing`] where stiffness or mass are not positive definite, [`FemError::OutOfRange`] for more
-    /// modes than coordinates.
+    /// [`FemError::Missing`] where stiffness or mass are not positive definite,
+    /// [`FemError::OutOfRange`] for more modes than coordinates.
     ///
     /// # Source
     /// Craig & Chang (1977): the orthogonalised set of Craig and Bampton's shapes.
@@ -128,8 +130,8 @@ impl ModalLink {
     /// The link with its first `modes` fixed-interface modes only.
     ///
     /// # Errors
-    /// [`FemError::Missing`] for other coordinates than those of Craig and Bampton, [`FemError::OutOfRange`] for more
-    /// modes than there are.
+    /// [`FemError::Missing`] for other coordinates than those of Craig and Bampton,
+    /// [`FemError::OutOfRange`] for more modes than there are.
     pub fn truncated(&self, modes: usize) -> Result<Self, FemError> {
         if !self.is_craig_bampton() {
             let help = "the coordinates are not those of Craig and Bampton; orthogonalised links take `keep`";
@@ -163,10 +165,11 @@ impl ModalLink {
         })
     }
 
-    /// The same link in another frame: from each shape a rigid motion is taken away, `φ_k - c_k - θ_k × s`.
+    /// The same link in another frame: from each shape a rigid motion is taken away,
+    /// `φ_k - c_k - θ_k × s`.
     ///
-    /// Stiffness stays; that by initial stress belongs to the other support and is dropped. Unknown terms of second
-    /// order stay unknown.
+    /// Stiffness stays; that by initial stress belongs to the other support and is dropped. Unknown
+    /// terms of second order stay unknown.
     ///
     /// * `motion`: c_k (at Lo) over θ_k, link axes, one column per coordinate.
     pub fn without_rigid_motion(self, motion: &Matrix6xX<f64>) -> Self {

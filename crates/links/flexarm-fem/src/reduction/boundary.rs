@@ -13,7 +13,8 @@ pub enum Tie {
     /// RBE2: every node moves with the interface as one rigid body; stiffens the seat.
     #[default]
     Rigid,
-    /// RBE3: the interface follows the mean motion of the nodes, all with the same weight; adds no stiffness.
+    /// RBE3: the interface follows the mean motion of the nodes, all with the same weight; adds no
+    /// stiffness.
     Distributing,
 }
 
@@ -97,7 +98,8 @@ pub enum TieError {
 pub struct Boundary {
     /// Rows of B: (DoF, boundary column, factor).
     rigid: Vec<(u32, u32, f64)>,
-    /// Rows of G: for each constrained boundary DoF its column and the (DoF, weight) it is the mean of.
+    /// Rows of G: for each constrained boundary DoF its column and the (DoF, weight) it is the mean
+    /// of.
     means: Vec<(usize, Vec<(u32, f64)>)>,
     /// DoF that neither follow an interface nor are boundary DoF themselves, ascending.
     free: Vec<u32>,
@@ -220,7 +222,8 @@ fn check(model: &FeModel, interfaces: &[Interface]) -> Result<(), TieError> {
     Ok(())
 }
 
-/// Weighted centre and second moments `Σ (r² 1 - r rᵀ)` of the nodes, checked to hold every rotation.
+/// Weighted centre and second moments `Σ (r² 1 - r rᵀ)` of the nodes, checked to hold every
+/// rotation.
 fn spread(model: &FeModel, interface: &Interface) -> Result<(Vector3<f64>, Matrix3<f64>), TieError> {
     let points: Vec<_> = interface.nodes.iter().map(|node| model.nodes[*node as usize]).collect();
     let count = points.len();

@@ -14,12 +14,12 @@ use crate::sparse::{
     grams, orthonormalising, subtract_products,
 };
 
-/// A pivot this far below its diagonal entry is rounding: a mechanism that passed by its sign. Links of
-/// a thousand times their thickness stay above 1e-10.
+/// A pivot this far below its diagonal entry is rounding: a mechanism that passed by its sign.
+/// Links of a thousand times their thickness stay above 1e-10.
 const SINGULAR: f64 = 1e-12;
 
-/// Smallest eigenvalue of the stiffness of the interfaces, scaled to a unit diagonal, below which one of them moves freely:
-/// that of the gate.
+/// Smallest eigenvalue of the stiffness of the interfaces, scaled to a unit diagonal, below which
+/// one of them moves freely: that of the gate.
 const FREE: f64 = 1e-10;
 
 /// How to solve.
@@ -92,7 +92,8 @@ struct Saddle {
     rows: Vec<Vec<(u32, f64)>>,
     /// `K_ii⁻¹ Gᵀ`, by blocks.
     Z: Vec<Block>,
-    /// Inverse of the small matrix for the forces λ and, where nothing holds the mesh, its rigid motion.
+    /// Inverse of the small matrix for the forces λ and, where nothing holds the mesh, its rigid
+    /// motion.
     small: nalgebra::LU<f64, nalgebra::Dyn, nalgebra::Dyn>,
     /// Scale of the compliances in it.
     scale: f64,
@@ -187,7 +188,8 @@ impl<'m> Condensation<'m> {
         this.T_B = blocks(&T.columns(6.min(columns), columns.saturating_sub(6)).into_owned());
         this.T = T;
         let KT = this.model.K.product(&this.T);
-        // The energy is symmetric whatever T is; the forces on the interfaces are so only if T solves the equations.
+        // The energy is symmetric whatever T is; the forces on the interfaces are so only if T
+        // solves the equations.
         let mut forces = gram(&this.boundary.rigid_part(), &KT);
         for ((column, _), row) in this.boundary.means().iter().zip(lambda.row_iter()) {
             let mut force = forces.row_mut(*column);
@@ -250,7 +252,8 @@ impl<'m> Condensation<'m> {
         Some(Saddle { rows, Z, small: small.lu(), scale, rigid })
     }
 
-    /// Solves `K u + Gᵀ λ = F` on the free DoF with `G u = g`; tied DoF are zero. F is replaced by u.
+    /// Solves `K u + Gᵀ λ = F` on the free DoF with `G u = g`; tied DoF are zero. F is replaced by
+    /// u.
     ///
     /// Returns λ, one row per constrained boundary DoF.
     fn solve_constrained(&self, F: &mut Block, g: Option<&DMatrix<f64>>) -> DMatrix<f64> {
@@ -388,8 +391,9 @@ impl<'m> Condensation<'m> {
         self.asymmetry
     }
 
-    /// Condition number of `K_ii`: largest over smallest eigenvalue, the one by power iteration, the other by two steps of
-    /// subspace iteration that begin with the static shapes of an interface. Not a number where no unknown is inside.
+    /// Condition number of `K_ii`: largest over smallest eigenvalue, the one by power iteration,
+    /// the other by two steps of subspace iteration that begin with the static shapes of an
+    /// interface. Not a number where no unknown is inside.
     pub fn condition_estimate(&self) -> f64 {
         let rows = self.model.size();
         let keep_inside = |x: &mut DMatrix<f64>| {
@@ -460,7 +464,8 @@ pub(crate) fn worst(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(0.0, |worst: f64, x| if !(x <= worst) { x } else { worst })
 }
 
-/// The interface that moves most, and how, where a stiffness of six rows per interface resists some motion with nothing.
+/// The interface that moves most, and how, where a stiffness of six rows per interface resists some
+/// motion with nothing.
 fn free_direction(K: &DMatrix<f64>) -> Option<(usize, Direction)> {
     let scale = K.diagonal().map(|k| if k > 0.0 { 1.0 / k.sqrt() } else { 0.0 });
     let scaled = DMatrix::from_fn(K.nrows(), K.ncols(), |i, j| K[(i, j)] * scale[i] * scale[j]);

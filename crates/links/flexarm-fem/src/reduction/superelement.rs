@@ -17,7 +17,8 @@ pub struct InterfaceFrame {
     pub tie: Option<Tie>,
 }
 
-/// Stiffness and mass over the boundary DoF, six per interface, and mass-normalised modes after them.
+/// Stiffness and mass over the boundary DoF, six per interface, and mass-normalised modes after
+/// them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Superelement {
     /// Interfaces, proximal first.
@@ -44,7 +45,8 @@ impl Superelement {
         (self.boundary()..self.K.nrows()).map(|k| self.K[(k, k)].max(0.0).sqrt() / std::f64::consts::TAU).collect()
     }
 
-    /// Natural frequencies with some interfaces held, ascending, Hz; those of rigid motions are near zero.
+    /// Natural frequencies with some interfaces held, ascending, Hz; those of rigid motions are
+    /// near zero.
     ///
     /// Empty where the mass is not positive definite.
     pub fn frequencies_hz(&self, held: &[usize]) -> Vec<f64> {
@@ -78,7 +80,8 @@ pub fn stiffness12(element: &Superelement) -> Option<Matrix12> {
     Some(Matrix12::from_column_slice(K12.as_slice()))
 }
 
-/// Frequencies of a small dense pencil, Hz, ascending; empty where the mass is not positive definite.
+/// Frequencies of a small dense pencil, Hz, ascending; empty where the mass is not positive
+/// definite.
 pub(crate) fn generalised_frequencies(K: &DMatrix<f64>, M: &DMatrix<f64>) -> Vec<f64> {
     // Rows of different units are scaled by the mass first.
     let scale = M.diagonal().map(|m| 1.0 / m.sqrt());

@@ -158,7 +158,8 @@ fn every_element_and_tie_passes_the_gate() {
                 let error = mode.reduced_error().unwrap();
                 assert!(error > -1e-9 && error < 4e-3, "{what}");
             }
-            // Elements of first order in so few cells are too stiff, and that is said; nothing else.
+            // Elements of first order in so few cells are too stiff, and that is said; nothing
+            // else.
             let is_order = |doubt: &str| crate::mesh::second_order(kind).is_some() && doubt.contains("first order");
             let others: Vec<_> = result.doubts.iter().filter(|doubt| !is_order(&doubt.message)).collect();
             assert!(others.is_empty(), "{others:?}");
@@ -253,7 +254,8 @@ fn a_cantilever_of_solids_converges_to_the_beam() {
     }
 }
 
-/// Truth: the compliance of the mesh itself. The joints of a chain add up to it, for any number of parts.
+/// Truth: the compliance of the mesh itself. The joints of a chain add up to it, for any number of
+/// parts.
 #[test]
 fn a_chain_of_any_number_of_parts_has_the_compliance_of_the_mesh() {
     for tie in [Tie::Rigid, Tie::Distributing] {
@@ -276,7 +278,8 @@ fn a_chain_of_any_number_of_parts_has_the_compliance_of_the_mesh() {
 /// Truth: `C_k` of a piece of a uniform beam in closed form.
 #[test]
 fn the_joints_of_a_uniform_beam_are_those_of_its_pieces() {
-    // Slices of whole elements: the energy is then shared exactly. Away from the clamped ends, nu = 0.
+    // Slices of whole elements: the energy is then shared exactly. Away from the clamped ends, nu =
+    // 0.
     let material = Material::isotropic(200e9, 0.0, 7800.0);
     let (mesh, a, b) = bar(ElementKind::Hex20, [16, 2, 2], [1.0, 0.05, 0.08], |p| p);
     let ends = vec![
@@ -295,8 +298,8 @@ fn the_joints_of_a_uniform_beam_are_those_of_its_pieces() {
         let x = joint.X_LS.translation.vector;
         assert!((x - Vector3::new(0.125 + 0.25 * k as f64, 0.0, 0.0)).norm() < 2e-3, "{x}");
         let C = joint.K_S.try_inverse().unwrap();
-        // Stretch and bending: the elements are exact. Shear and torsion: two elements across, and at
-        // the ends the section cannot warp.
+        // Stretch and bending: the elements are exact. Shear and torsion: two elements across, and
+        // at the ends the section cannot warp.
         for (i, bound) in [(0, 1e-9), (1, 1e-2), (2, 1e-2), (3, 5e-2), (4, 1e-8), (5, 1e-8)] {
             let error = C[(i, i)] / C_S[(i, i)] - 1.0;
             // measured 4e-13, 9.6e-3, 7.4e-3, 4.2e-2, 1.5e-10, 3.1e-10
@@ -352,7 +355,8 @@ fn sag_and_first_frequency_of_a_chain_converge_to_those_of_the_mesh() {
     }
 }
 
-/// Third interface: the link between A and B does not feel a free branch, the superelement keeps it.
+/// Third interface: the link between A and B does not feel a free branch, the superelement keeps
+/// it.
 #[test]
 fn a_third_interface_that_is_left_free_changes_nothing_between_the_first_two() {
     let (mesh, interfaces) = casting(ElementKind::Hex20, [Tie::Rigid; 2]);
@@ -523,13 +527,14 @@ fn an_attached_body_stays_on_the_interface_on_whose_side_it_lies() {
         result.link.details.as_ref().unwrap().chains[0].parts.iter().map(|p| p.mass).collect()
     };
     let gained: Vec<f64> = masses(&with).iter().zip(masses(&bare)).map(|(a, b)| a - b).collect();
-    // Not where its centre lies: that part would bend away under it, which the modal link and the two parts do not know.
+    // Not where its centre lies: that part would bend away under it, which the modal link and the
+    // two parts do not know.
     assert!((gained[0] - 12.0).abs() < 1e-12 && gained[1].abs() < 1e-12 && (gained[3] - 12.0).abs() < 1e-12);
     assert_eq!(with.link.K_BB, bare.link.K_BB);
 }
 
-/// Why chains share energy instead of chaining superelements: a section tied rigidly cannot warp, one
-/// tied by its mean can more than in one piece. Neither sum is the compliance of the link.
+/// Why chains share energy instead of chaining superelements: a section tied rigidly cannot warp,
+/// one tied by its mean can more than in one piece. Neither sum is the compliance of the link.
 #[test]
 fn segments_as_superelements_of_their_own_do_not_add_up_to_the_link() {
     let (mesh, interfaces) = casting(ElementKind::Hex20, [Tie::Rigid; 2]);

@@ -1,7 +1,9 @@
-//! Up to eight tall columns side by side: the shape in which factors, masses and bases are passed over.
+//! Up to eight tall columns side by side: the shape in which factors, masses and bases are passed
+//! over.
 //!
-//! A row is one cache line. What is read once, an entry of a factor or of a matrix, serves all eight columns, and their
-//! numbers go through the vector units together. Sums run over the rows in order, the same on every machine.
+//! A row is one cache line. What is read once, an entry of a factor or of a matrix, serves all
+//! eight columns, and their numbers go through the vector units together. Sums run over the rows in
+//! order, the same on every machine.
 
 use flexarm_spatial::Real;
 use nalgebra::DMatrix;
@@ -127,8 +129,8 @@ fn basis_factors(basis: &[Block], C: &DMatrix<f64>) -> Vec<Small> {
     basis.iter().map(of).collect()
 }
 
-/// Combinations `[V_1 V_2 ...] C` of a basis, each of at most eight columns. They take the place of the basis, which they would be
-/// a good part of beside it.
+/// Combinations `[V_1 V_2 ...] C` of a basis, each of at most eight columns. They take the place of
+/// the basis, which they would be a good part of beside it.
 pub(crate) fn combine(basis: &mut Vec<Block>, combinations: &[DMatrix<f64>]) {
     let rows = basis.first().map_or(0, |V| V.rows.len());
     let factors: Vec<_> = combinations.iter().map(|C| basis_factors(basis, &-C)).collect();

@@ -79,7 +79,8 @@ impl fmt::Debug for Cholesky {
 }
 
 impl Cholesky {
-    /// Factorises `K`, which is given away: of the memory that a factorisation needs it would be a tenth.
+    /// Factorises `K`, which is given away: of the memory that a factorisation needs it would be a
+    /// tenth.
     ///
     /// # Errors
     /// [`NotPositiveDefinite`], with the unknown at which it was found.
@@ -112,7 +113,8 @@ impl Cholesky {
 
     /// Smallest pivot `L_jj²` over the diagonal entry of the matrix it came from, and its unknown.
     ///
-    /// Near rounding (1e-16 to 1e-12) where the matrix is singular but passed by the sign of an error.
+    /// Near rounding (1e-16 to 1e-12) where the matrix is singular but passed by the sign of an
+    /// error.
     pub fn smallest_pivot(&self) -> (f64, usize) {
         self.smallest_pivot
     }
@@ -195,7 +197,8 @@ fn in_order(K: &SparseSymmetric, position: Option<&[u32]>) -> SparseColMat<u32, 
     SparseColMat::new(SymbolicSparseColMat::new_unsorted_checked(n, n, starts, None, rows), values)
 }
 
-/// The factor of a matrix whose unknowns are in the order of elimination. The pivot of an error is counted in that order.
+/// The factor of a matrix whose unknowns are in the order of elimination. The pivot of an error is
+/// counted in that order.
 ///
 /// On one thread: with more, faer 0.24 gives wrong factors now and then, without an error
 /// (private-gemm-x86 0.1.22; errors of 6 in a matrix of diagonals of 30 were seen).
@@ -312,7 +315,8 @@ mod tests {
         }
     }
 
-    /// Truth: the residual. Large dense blocks, many small ones, and a grid whose separators are both.
+    /// Truth: the residual. Large dense blocks, many small ones, and a grid whose separators are
+    /// both.
     #[test]
     fn a_factor_of_large_and_small_blocks_solves_its_matrix_and_has_the_same_bits_each_time() {
         let side = 16;

@@ -6,14 +6,16 @@
 //! H = Vᵀ M K⁻¹ M V: block tridiagonal of A_j and R_j,   H s = θ s
 //! ‖K⁻¹ M φ - θ φ‖_M = ‖R_{j+1} s_last‖   for φ = V s
 //! ```
-//! All basis vectors are kept M-orthonormal, so no ghost modes appear; a block of eight finds multiple frequencies (the two
-//! bending planes of a round tube) together, and one pass over the factor serves the whole block. The operator is given as two
-//! closures, so that constraints stay outside.
+//! All basis vectors are kept M-orthonormal, so no ghost modes appear; a block of eight finds
+//! multiple frequencies (the two bending planes of a round tube) together, and one pass over the
+//! factor serves the whole block. The operator is given as two closures, so that constraints stay
+//! outside.
 //!
-//! Modes of the same body without one of its supports come from the same basis ([`modes_of_two_supports`]): no further solves.
+//! Modes of the same body without one of its supports come from the same basis
+//! ([`modes_of_two_supports`]): no further solves.
 //!
-//! Source: Grimes, Lewis & Simon (1994), A shifted block Lanczos algorithm, sections 2 and 4, with full
-//! reorthogonalisation in place of their selective one.
+//! Source: Grimes, Lewis & Simon (1994), A shifted block Lanczos algorithm, sections 2 and 4, with
+//! full reorthogonalisation in place of their selective one.
 
 mod basis;
 mod released;

@@ -1,12 +1,14 @@
-//! Sparse symmetric matrices: storage, products, Cholesky factors, eigenpairs. The one place that names faer.
+//! Sparse symmetric matrices: storage, products, Cholesky factors, eigenpairs. The one place that
+//! names faer.
 //!
 //! ```text
 //! SparseSymmetric --(Ordering)--> Cholesky --solve--> K⁻¹ F        eight right-hand sides at a time
 //!                                     |
 //!                                 smallest_modes: shift-invert block Lanczos on any operator (K, M)
 //! ```
-//! Only the lower triangle is stored, by columns. Tall results are nalgebra matrices, one column per
-//! right-hand side; whatever reads a factor, a matrix or a basis takes them as [`Block`]s, row by row.
+//! Only the lower triangle is stored, by columns. Tall results are nalgebra matrices, one column
+//! per right-hand side; whatever reads a factor, a matrix or a basis takes them as [`Block`]s, row
+//! by row.
 //!
 //! Not here: what the rows mean. Degrees of freedom, ties and boundaries are the business of
 //! [`crate::reduction`].

@@ -1,8 +1,8 @@
 //! Fill-reducing order of the unknowns.
 //!
-//! Approximate minimum degree (faer's own) is good for thin-walled castings up to some 10⁵ unknowns;
-//! nested dissection (METIS) fills less on large and solid ones. METIS works on groups of unknowns
-//! with equal neighbours, which for a mesh are its nodes.
+//! Approximate minimum degree (faer's own) is good for thin-walled castings up to some 10⁵
+//! unknowns; nested dissection (METIS) fills less on large and solid ones. METIS works on groups of
+//! unknowns with equal neighbours, which for a mesh are its nodes.
 //!
 //! Source: Amestoy, Davis & Duff (1996); Karypis & Kumar (1998), METIS 5.2.
 
@@ -36,7 +36,8 @@ impl Ordering {
 
 /// Order of elimination by nested dissection: `order[k]` is eliminated as number `k`.
 ///
-/// `None` where METIS declines (out of memory, or more than 2³¹ neighbours), and where nothing is coupled: it divides by zero.
+/// `None` where METIS declines (out of memory, or more than 2³¹ neighbours), and where nothing is
+/// coupled: it divides by zero.
 pub(super) fn nested_dissection(pattern: &Pattern) -> Option<Vec<u32>> {
     let (group_of, groups) = group_equal_columns(pattern);
     let graph = Graph::of_groups(pattern, &group_of, groups.len()).filter(Graph::has_edges)?;

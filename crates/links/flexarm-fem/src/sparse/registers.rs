@@ -1,7 +1,8 @@
 //! Vector registers after faer's kernels.
 //!
-//! Its kernels in assembly leave the upper halves of the registers in use. The processor then keeps them through every instruction
-//! that works on the lower halves alone, which is most of this program, at a third of its speed, until they are cleared.
+//! Its kernels in assembly leave the upper halves of the registers in use. The processor then keeps
+//! them through every instruction that works on the lower halves alone, which is most of this
+//! program, at a third of its speed, until they are cleared.
 
 /// Work that ends as every function over lanes does: with all upper halves cleared.
 #[cfg(target_arch = "x86_64")]

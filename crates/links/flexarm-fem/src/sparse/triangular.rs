@@ -4,8 +4,9 @@
 //! L y = b:   y_J = L_JJ⁻¹ b_J,   b_I -= L_IJ y_J          J: columns of a supernode, I: the rows below its block
 //! Lᵀ x = y:  x_J = L_JJ⁻ᵀ (y_J - L_IJᵀ x_I)               in reverse
 //! ```
-//! Each pass reads the factor once, four columns of a supernode at a time, which is what it costs: the factor does not fit into
-//! a cache. Libraries take the right-hand sides column by column and lose most of the time to packing.
+//! Each pass reads the factor once, four columns of a supernode at a time, which is what it costs:
+//! the factor does not fit into a cache. Libraries take the right-hand sides column by column and
+//! lose most of the time to packing.
 
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use flexarm_spatial::Real;
@@ -122,7 +123,8 @@ impl<'a> Supernode<'a> {
         k * (2 * self.height + 1 - k) / 2
     }
 
-    /// Entries of `N` columns from column `k` on, from row `from` on; what they say above the diagonal belongs to other columns.
+    /// Entries of `N` columns from column `k` on, from row `from` on; what they say above the
+    /// diagonal belongs to other columns.
     #[inline(always)]
     fn columns<const N: usize>(&self, k: usize, from: usize) -> [&'a [f64]; N] {
         let mut columns = [&self.entries[..0]; N];

@@ -1,5 +1,5 @@
-//! Loops over the rows of blocks with the vector instructions that the processor has. Operations and their order are the same
-//! with and without.
+//! Loops over the rows of blocks with the vector instructions that the processor has. Operations
+//! and their order are the same with and without.
 
 use flexarm_spatial::Real;
 

@@ -1,4 +1,5 @@
-//! Tokens to expressions: one parser for KRL, RAPID and URScript, which differ in their operators and aggregates.
+//! Tokens to expressions: one parser for KRL, RAPID and URScript, which differ in their operators
+//! and aggregates.
 
 use std::rc::Rc;
 
@@ -374,7 +375,8 @@ impl Parser {
         Ok(Expr { kind: Kind::Record(kind, fields), span: start.to(end) })
     }
 
-    /// `(a, b)` with what the language allows: left out values in KRL, `\Name:=value` in RAPID, `name=value` in URScript.
+    /// `(a, b)` with what the language allows: left out values in KRL, `\Name:=value` in RAPID,
+    /// `name=value` in URScript.
     pub(crate) fn arguments(&mut self) -> Result<Vec<Argument>> {
         self.expect_symbol("(")?;
         let mut arguments = Vec::new();

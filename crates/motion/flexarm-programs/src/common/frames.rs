@@ -1,4 +1,5 @@
-//! Orientations as the makers of robots write them. Angles in rad unless the name says otherwise, lengths in m.
+//! Orientations as the makers of robots write them. Angles in rad unless the name says otherwise,
+//! lengths in m.
 
 use flexarm_spatial::Pose;
 use nalgebra::{Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};

@@ -40,7 +40,8 @@ pub(crate) struct Lexeme {
     pub(crate) span: Span,
 }
 
-/// The tokens of a text. What cannot be a token is an error only where a statement uses it, so it is given as a name.
+/// The tokens of a text. What cannot be a token is an error only where a statement uses it, so it
+/// is given as a name.
 pub(crate) fn tokens(text: &str, file: usize, spelling: &Spelling) -> Result<Vec<Lexeme>> {
     let mut found: Vec<Lexeme> = Vec::with_capacity(text.len() / 5);
     let bytes = text.as_bytes();

@@ -1,8 +1,8 @@
-//! Runs a program: variables, expressions, branches, loops and calls. What a language does with its own words is its
-//! [`Dialect`]'s matter.
+//! Runs a program: variables, expressions, branches, loops and calls. What a language does with its
+//! own words is its [`Dialect`]'s matter.
 //!
-//! A value that only the controller knows (an input, a measured position) goes through expressions and variables as
-//! [`Value::Outside`]; it is an error where a move, a branch or a loop needs it.
+//! A value that only the controller knows (an input, a measured position) goes through expressions
+//! and variables as [`Value::Outside`]; it is an error where a move, a branch or a loop needs it.
 
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -35,7 +35,8 @@ pub(crate) trait Dialect: Sized {
         span: Span,
     ) -> Result<Flow>;
 
-    /// May a variable that was not declared be assigned? A note may be made of it; `false`: the assignment has no effect.
+    /// May a variable that was not declared be assigned? A note may be made of it; `false`: the
+    /// assignment has no effect.
     fn undeclared(machine: &mut Machine<Self>, name: &str, span: Span) -> Result<bool>;
 
     /// A value for a variable or parameter of a type.
@@ -745,7 +746,8 @@ impl<'a, D: Dialect> Machine<'a, D> {
         combine(operator, &a, &b, [left.span, right.span], span)
     }
 
-    /// Where the literal stands that an expression has its value from: itself, or what was assigned to a variable.
+    /// Where the literal stands that an expression has its value from: itself, or what was assigned
+    /// to a variable.
     pub(crate) fn origin(&mut self, expression: &Expr) -> Option<Span> {
         match &expression.kind {
             Kind::Record(..) | Kind::List(_) => Some(expression.span),

@@ -1,5 +1,5 @@
-//! What the languages have in common: tokens, expressions, statements, the machine that runs them, frames, and the
-//! recorder of moves and notes.
+//! What the languages have in common: tokens, expressions, statements, the machine that runs them,
+//! frames, and the recorder of moves and notes.
 
 pub(crate) mod expressions;
 pub(crate) mod frames;

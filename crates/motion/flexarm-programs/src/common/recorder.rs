@@ -11,7 +11,8 @@ pub(crate) struct Recorder<'a> {
     pub(crate) options: &'a ReadOptions<'a>,
     pub(crate) texts: Vec<Text>,
     pub(crate) items: Vec<Item>,
-    /// Of each item, where the literals of its target and of the auxiliary point of its circle stand.
+    /// Of each item, where the literals of its target and of the auxiliary point of its circle
+    /// stand.
     sources: Vec<Sources>,
     /// The same of the next move.
     pub(crate) next: Sources,

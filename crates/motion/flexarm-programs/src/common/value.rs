@@ -19,7 +19,8 @@ pub(crate) enum Value {
     Record(Rc<Record>),
     /// `p[x, y, z, rx, ry, rz]`, m and rad.
     Pose([f64; 6]),
-    /// Joint values that stand for a pose (`get_inverse_kin`): the pose and joint values near which they are.
+    /// Joint values that stand for a pose (`get_inverse_kin`): the pose and joint values near which
+    /// they are.
     Inverse(Box<([f64; 6], Option<Vec<f64>>)>),
     /// What only the controller knows, and what was made of it.
     Outside(Rc<str>),

@@ -189,7 +189,8 @@ impl Gcode<'_> {
         Ok(Helix { plane: self.plane, centre, radius, from, angle, start: start[w], rise: goal[w] - start[w] })
     }
 
-    /// Moves of an arc: one where it is flat and less than whole, else pieces that follow each other without a stop.
+    /// Moves of an arc: one where it is flat and less than whole, else pieces that follow each
+    /// other without a stop.
     fn pieces(&mut self, helix: &Helix, goal: Vector3<f64>, speed: Speed, span: Span) -> Result<()> {
         let error = self.recorder.options.gcode.helix_error_m.max(1e-9);
         let mut count = (helix.angle.abs() / if helix.rise == 0.0 { 1.75 * PI } else { PI / 2.0 }).ceil().max(1.0);

@@ -1,10 +1,10 @@
 //! G-code of milling machines (RS274/NGC) for a robot that carries the tool.
 //!
-//! [`words`] makes words of the lines, [`arcs`] moves of G2 and G3, this module keeps what is in force and runs the blocks in
-//! the order of the standard.
+//! [`words`] makes words of the lines, [`arcs`] moves of G2 and G3, this module keeps what is in
+//! force and runs the blocks in the order of the standard.
 //!
-//! Frames: B is the work frame (G54 and its kin), T the tool. The tool's orientation is fixed, or turned by A, B, C
-//! ([`crate::Rotary`]).
+//! Frames: B is the work frame (G54 and its kin), T the tool. The tool's orientation is fixed, or
+//! turned by A, B, C ([`crate::Rotary`]).
 
 mod arcs;
 mod words;
@@ -453,7 +453,8 @@ impl<'a> Gcode<'a> {
         Ok(())
     }
 
-    /// Takes the coordinates before the first move from the joint values at the start, if the robot's kinematics are known.
+    /// Takes the coordinates before the first move from the joint values at the start, if the
+    /// robot's kinematics are known.
     fn place_at_start(&mut self, span: Span) {
         if self.has_moved || self.recorder.options.start.is_none() {
             return;

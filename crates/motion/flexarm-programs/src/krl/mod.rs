@@ -1,9 +1,10 @@
 //! KUKA's KRL: `.src` with its `.dat`, and what teach pendants write into both.
 //!
-//! [`parse`] makes statements of the lines, [`system`] knows BAS, the inline forms' helpers and the system variables,
-//! [`motion`] makes moves of PTP, LIN, CIRC and the splines.
+//! [`parse`] makes statements of the lines, [`system`] knows BAS, the inline forms' helpers and the
+//! system variables, [`motion`] makes moves of PTP, LIN, CIRC and the splines.
 //!
-//! Frames: B `$BASE` in W `$WORLD` (less `$ROBROOT`), T `$TOOL` on the flange F. A, B, C are Z-Y'-X'' in degrees.
+//! Frames: B `$BASE` in W `$WORLD` (less `$ROBROOT`), T `$TOOL` on the flange F. A, B, C are
+//! Z-Y'-X'' in degrees.
 
 mod motion;
 mod parse;
@@ -122,7 +123,8 @@ fn beside(path: &Path, stem: &str, ending: &str) -> Option<(std::path::PathBuf, 
     Some((file, bytes))
 }
 
-/// `$config.dat` of the controller, where a backup has it: in `System` beside a folder that the program is in.
+/// `$config.dat` of the controller, where a backup has it: in `System` beside a folder that the
+/// program is in.
 fn configuration(path: &Path) -> Option<(std::path::PathBuf, Vec<u8>)> {
     let folders = path.ancestors().skip(1).take(LEVELS_OF_A_BACKUP);
     folders

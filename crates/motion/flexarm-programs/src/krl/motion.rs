@@ -296,7 +296,8 @@ fn configuration(record: &Record, span: Span) -> Result<Configuration> {
     Ok(if status.is_none() && turn.is_none() { Configuration::Nearest } else { Configuration::Kuka { status, turn } })
 }
 
-/// The orientation that a path ends with, by `$ORI_TYPE`; `turned` is how far a path that is followed turns it.
+/// The orientation that a path ends with, by `$ORI_TYPE`; `turned` is how far a path that is
+/// followed turns it.
 fn oriented(
     machine: &mut Krls<'_>,
     context: &Context,
@@ -472,7 +473,8 @@ fn path_speed(machine: &mut Krls<'_>, span: Span) -> Result<Speed> {
     })
 }
 
-/// What the words behind a target say of its end; the last one counts, as `C_PTP C_DIS` is for a path behind a PTP.
+/// What the words behind a target say of its end; the last one counts, as `C_PTP C_DIS` is for a
+/// path behind a PTP.
 fn blend(machine: &mut Krls<'_>, arguments: &[Argument], span: Span) -> Result<Blend> {
     let mut result = Blend::Stop;
     for argument in arguments {

@@ -1,4 +1,5 @@
-//! Lines of KRL to statements. What is not understood becomes a statement that is an error where it is reached.
+//! Lines of KRL to statements. What is not understood becomes a statement that is an error where it
+//! is reached.
 
 use std::rc::Rc;
 

@@ -218,7 +218,8 @@ fn geometry(
     }))
 }
 
-/// Frame with its origin at the first of three targets, x towards the second, the third on the side of y.
+/// Frame with its origin at the first of three targets, x towards the second, the third on the side
+/// of y.
 fn def_frame<'v>(machine: &mut Rapids<'_>, at: &impl Fn(usize) -> Result<&'v Value>, span: Span) -> Result<Value> {
     let mut points = [Vector3::zeros(); 3];
     for (k, point) in points.iter_mut().enumerate() {

@@ -1,10 +1,10 @@
 //! ABB's RAPID: modules with `main`, its data types and its moves.
 //!
-//! [`parse`] makes statements of the text, [`types`] knows the data types and what is predefined, [`functions`] the functions,
-//! [`motion`] the moves.
+//! [`parse`] makes statements of the text, [`types`] knows the data types and what is predefined,
+//! [`functions`] the functions, [`motion`] the moves.
 //!
-//! Frames: B is the object frame of the work object (user frame, then object frame, then program displacement) in W; T the
-//! tool's frame on the flange F. Quaternions have their real part first.
+//! Frames: B is the object frame of the work object (user frame, then object frame, then program
+//! displacement) in W; T the tool's frame on the flange F. Quaternions have their real part first.
 
 mod functions;
 mod motion;
@@ -93,7 +93,8 @@ pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<R
     Ok(machine.recorder.finish(&name))
 }
 
-/// Modules in the folder of the program that alone declare a name which the program uses and does not declare.
+/// Modules in the folder of the program that alone declare a name which the program uses and does
+/// not declare.
 fn add_siblings(texts: &mut Vec<Text>, unit: &mut parse::Unit) -> Result<()> {
     let path = texts[0].path.clone();
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(std::path::Path::new("."));
@@ -129,7 +130,8 @@ fn add_siblings(texts: &mut Vec<Text>, unit: &mut parse::Unit) -> Result<()> {
     }
 }
 
-/// Declarations of modules, in any order of need; one that cannot be read is an error where its name is used.
+/// Declarations of modules, in any order of need; one that cannot be read is an error where its
+/// name is used.
 fn declare(machine: &mut Rapids<'_>, data: &[Statement]) {
     use crate::common::tree::Action;
     for statement in data {

@@ -1,4 +1,5 @@
-//! Text of RAPID to statements. What is not understood becomes a statement that is an error where it is reached.
+//! Text of RAPID to statements. What is not understood becomes a statement that is an error where
+//! it is reached.
 
 use std::collections::HashSet;
 use std::rc::Rc;

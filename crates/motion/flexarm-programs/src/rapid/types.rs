@@ -58,8 +58,8 @@ fn fields(kind: &str) -> Option<&'static [(&'static str, &'static str)]> {
     })
 }
 
-/// A value of a type: lists become records, what is not told gets the language's default. `kind` ends with `{}` for each
-/// dimension of an array.
+/// A value of a type: lists become records, what is not told gets the language's default. `kind`
+/// ends with `{}` for each dimension of an array.
 pub(super) fn coerce(records: &Records, kind: &str, value: Value, span: Span, depth: usize) -> Result<Value> {
     if depth > 8 {
         return fail(span, format!("the type `{kind}` contains itself"));

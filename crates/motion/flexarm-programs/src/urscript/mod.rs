@@ -1,8 +1,10 @@
 //! Universal Robots' URScript.
 //!
-//! [`parse`] makes statements of the text, [`functions`] knows the functions, this module the moves.
+//! [`parse`] makes statements of the text, [`functions`] knows the functions, this module the
+//! moves.
 //!
-//! Poses are m and rotation vectors in rad, in the robot's base; T is what `set_tcp` says, on the flange F.
+//! Poses are m and rotation vectors in rad, in the robot's base; T is what `set_tcp` says, on the
+//! flange F.
 
 mod functions;
 mod parse;
@@ -352,7 +354,8 @@ fn motion(machine: &mut UrScripts<'_>, name: &str, arguments: &[Argument], span:
     machine.recorder.add(step, span)
 }
 
-/// `movec(via, to, a, v, r, mode)`: mode 0 turns the tool evenly, mode 1 keeps it relative to the circle.
+/// `movec(via, to, a, v, r, mode)`: mode 0 turns the tool evenly, mode 1 keeps it relative to the
+/// circle.
 fn arc(machine: &mut UrScripts<'_>, arguments: &[Argument], to: &mut Target, span: Span) -> Result<MoveKind> {
     let (value, at) = required(machine, arguments, 0, &["pose_via"], span)?;
     let via = match target(value, at)? {

@@ -1,4 +1,5 @@
-//! Text of URScript to statements. What is not understood becomes a statement that is an error where it is reached.
+//! Text of URScript to statements. What is not understood becomes a statement that is an error
+//! where it is reached.
 
 use std::rc::Rc;
 

@@ -1,4 +1,5 @@
-//! Lines, separators and numbers of tables: what is between the fields, and whether decimals are behind points or commas.
+//! Lines, separators and numbers of tables: what is between the fields, and whether decimals are
+//! behind points or commas.
 
 use flexarm_settings::written::csv_fields;
 
@@ -13,7 +14,8 @@ pub(super) enum Separator {
 }
 
 impl Separator {
-    /// In the order in which they are tried: a comma may be in a number, so those that may not come first.
+    /// In the order in which they are tried: a comma may be in a number, so those that may not come
+    /// first.
     pub(super) const ALL: [Self; 4] = [Self::Semicolon, Self::Tab, Self::Comma, Self::Spaces];
 
     pub(super) fn in_words(self) -> &'static str {
@@ -70,7 +72,8 @@ fn plain(field: &str) -> Option<(String, Decimal)> {
     }
 }
 
-/// A time in units of 1e-12, exact as far as it is written: seconds since 1970 with nanoseconds have more digits than an f64.
+/// A time in units of 1e-12, exact as far as it is written: seconds since 1970 with nanoseconds
+/// have more digits than an f64.
 pub(super) fn exact(field: &str) -> Option<i128> {
     const DIGITS: usize = 12;
     let (text, _) = plain(field)?;
@@ -88,8 +91,8 @@ pub(super) fn exact(field: &str) -> Option<i128> {
     Some(sign * digits.parse::<i128>().ok()?)
 }
 
-/// A time of day, with or without a date (`2024-03-01T12:00:00.004Z`, `12:00:00.004`), in units of 1e-12 s since 1970 or since
-/// midnight. Zones are passed over: all rows of a table have the same.
+/// A time of day, with or without a date (`2024-03-01T12:00:00.004Z`, `12:00:00.004`), in units of
+/// 1e-12 s since 1970 or since midnight. Zones are passed over: all rows of a table have the same.
 pub(super) fn clock_time(field: &str) -> Option<i128> {
     let field = field.trim().trim_end_matches('Z');
     let (date, clock) = match field.split_once(['T', ' ']) {

@@ -69,8 +69,8 @@ pub(super) fn unit(word: &str) -> Option<Unit> {
     is_sound.then_some(Unit { measure: *measure, per_s, scale: *scale })
 }
 
-/// Name and unit of a column: `A1[deg]`, `joint_1 (rad)`, `q1_deg`, `t / s`. A bracket that holds no unit belongs to the name,
-/// and is returned as the third: a unit that is not known.
+/// Name and unit of a column: `A1[deg]`, `joint_1 (rad)`, `q1_deg`, `t / s`. A bracket that holds
+/// no unit belongs to the name, and is returned as the third: a unit that is not known.
 pub(super) fn name_and_unit(column: &str) -> (String, Option<Unit>, Option<String>) {
     let column = column.trim();
     for (open, close) in [('[', ']'), ('(', ')'), ('{', '}'), ('<', '>')] {

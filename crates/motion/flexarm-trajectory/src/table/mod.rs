@@ -1,14 +1,18 @@
-//! Tables of joint values that other programs wrote: any separator, decimal points or commas, units in the names of the
-//! columns, columns that are not of the motion; and `run.csv`, the table of a run of this library.
+//! Tables of joint values that other programs wrote: any separator, decimal points or commas, units
+//! in the names of the columns, columns that are not of the motion; and `run.csv`, the table of a
+//! run of this library.
 //!
-//! What the table does not say is either told by the user ([`ColumnMap`]) or assumed with a [`Warning`] that says so. Our own
-//! format ([`crate::csv_file`]) is read as ever: a table with commas, a column `time` and no units in its header.
+//! What the table does not say is either told by the user ([`ColumnMap`]) or assumed with a
+//! [`Warning`] that says so. Our own format ([`crate::csv_file`]) is read as ever: a table with
+//! commas, a column `time` and no units in its header.
 //!
-//! * The header is the first line that is neither blank nor a comment (`#`, `%`, `//`), or the last comment before numbers
-//!   begin. A second line may hold units alone.
-//! * A name may end with its unit: `A1[deg]`, `q1 (rad)`, `q1_deg`, `t / ms`. Names that end with `vel`, `velocity`, `acc`
-//!   are rates, the last part of `/joint_states/joint_1/position` is what it says.
-//! * Where the joints of the robot are known, columns with other names are left out, with a warning.
+//! * The header is the first line that is neither blank nor a comment (`#`, `%`, `//`), or the last
+//!   comment before numbers begin. A second line may hold units alone.
+//! * A name may end with its unit: `A1[deg]`, `q1 (rad)`, `q1_deg`, `t / ms`. Names that end with
+//!   `vel`, `velocity`, `acc` are rates, the last part of `/joint_states/joint_1/position` is what
+//!   it says.
+//! * Where the joints of the robot are known, columns with other names are left out, with a
+//!   warning.
 //!
 //! Start at [`Trajectory::parse_table`].
 
@@ -26,7 +30,8 @@ use crate::spline::{JointSamples, Samples, not_increasing};
 use crate::trajectory::Trajectory;
 use crate::warning::Warning;
 
-/// A joint of a table without a unit that reaches this is in degrees, or the unit must be told: two turns.
+/// A joint of a table without a unit that reaches this is in degrees, or the unit must be told: two
+/// turns.
 const SUSPICIOUS_ANGLE: f64 = 4.0 * std::f64::consts::PI;
 /// Most numbers that are kept.
 const MOST_NUMBERS: usize = 30_000_000;
@@ -59,13 +64,14 @@ pub struct TableInfo {
 }
 
 impl Trajectory {
-    /// Reads sampled joint values from a table of any of the kinds that the page of the module describes.
+    /// Reads sampled joint values from a table of any of the kinds that the page of the module
+    /// describes.
     ///
     /// * `origin`: file name for messages.
     ///
     /// # Errors
-    /// As [`Trajectory::parse_csv`], and for what the table leaves open: which column is the time, decimal commas between
-    /// commas, large angles without a unit.
+    /// As [`Trajectory::parse_csv`], and for what the table leaves open: which column is the time,
+    /// decimal commas between commas, large angles without a unit.
     pub fn parse_table(
         text: &str,
         origin: &str,
@@ -161,7 +167,8 @@ impl<'t> Table<'t> {
         let mut content = lines().filter(|(_, line)| !line.trim().is_empty() && !is_comment(line));
         let Some((first_line, first)) = content.next() else { return Err(nowhere(Problem::Empty)) };
         let second = content.next();
-        // In a file without a header the last comment before the numbers may be one, as numpy writes it.
+        // In a file without a header the last comment before the numbers may be one, as numpy
+        // writes it.
         let comment = lines().take_while(|(line, _)| *line < first_line).filter(|(_, line)| is_comment(line)).last();
         let comment = comment.map(|(line, text)| (line, text.trim_start().trim_start_matches(['#', '%', '/']).trim()));
 
@@ -268,7 +275,8 @@ fn run_joint(name: &str) -> Option<(&str, bool)> {
     joint.or_else(|| name.strip_suffix("_position_m").map(|joint| (joint, true)))
 }
 
-/// What separates the names of a header, so that the line below it has as many numbers if that is possible.
+/// What separates the names of a header, so that the line below it has as many numbers if that is
+/// possible.
 fn separator_of(header: &str, below: Option<&str>) -> Separator {
     let width = |separator: &Separator| separator.split(header).len();
     let fits = |separator: &&Separator| {
@@ -282,8 +290,8 @@ fn separator_of(header: &str, below: Option<&str>) -> Separator {
     candidates.iter().find(fits).or_else(|| candidates.first()).copied().unwrap_or(Separator::Comma)
 }
 
-/// Separator, line and names of a header that stands below lines of another kind: right above the first line of numbers, with
-/// as many fields. None where the first line could be the header.
+/// Separator, line and names of a header that stands below lines of another kind: right above the
+/// first line of numbers, with as many fields. None where the first line could be the header.
 fn below_preamble(lines: &[(usize, &str)]) -> Option<(Separator, usize, Vec<String>)> {
     let are_numbers = |separator: &Separator, line: &str| {
         let fields = separator.split(line);
@@ -411,7 +419,8 @@ impl Table<'_> {
         let mut dropped = Vec::new();
         for (place, column) in self.names.iter().enumerate().filter(|(place, _)| *place != time) {
             if column.is_empty() {
-                // A line that ends with its separator has an empty field more; elsewhere it is a count of rows, for instance.
+                // A line that ends with its separator has an empty field more; elsewhere it is a
+                // count of rows, for instance.
                 if place + 1 < self.names.len() {
                     dropped.push(format!("#{}", place + 1));
                 }
@@ -502,7 +511,8 @@ impl Table<'_> {
         }
     }
 
-    /// The column that a text names: a number, the whole name, the name without its unit, a name with another unit.
+    /// The column that a text names: a number, the whole name, the name without its unit, a name
+    /// with another unit.
     fn column(&self, asked: &str) -> Result<(usize, Option<Unit>), Located> {
         let (bare, told, unknown) = name_and_unit(asked);
         let missing = || {
@@ -723,7 +733,8 @@ impl Table<'_> {
         fields
     }
 
-    /// Reads the values of a line in the order of the layout. Returns its time, and whether that is a time of day.
+    /// Reads the values of a line in the order of the layout. Returns its time, and whether that is
+    /// a time of day.
     fn row(
         &self,
         line: usize,
@@ -776,7 +787,8 @@ impl Table<'_> {
         Ok(())
     }
 
-    /// Factor of the times to s. Without a unit they are seconds, unless only a date since 1970 explains their size.
+    /// Factor of the times to s. Without a unit they are seconds, unless only a date since 1970
+    /// explains their size.
     fn time_scale(&self, layout: &mut Layout, rows: &Rows) -> f64 {
         if rows.clock {
             return 1.0;

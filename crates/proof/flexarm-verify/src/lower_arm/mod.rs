@@ -1,6 +1,8 @@
-//! A cast lower arm: from a mesh of tetrahedra to a link, each step against the mesh and against two other programs.
+//! A cast lower arm: from a mesh of tetrahedra to a link, each step against the mesh and against
+//! two other programs.
 //!
-//! `truth` has what the mesh and the other programs say, `study` and `parts` compute findings, `page` and `parts_page` say them.
+//! `truth` has what the mesh and the other programs say, `study` and `parts` compute findings,
+//! `page` and `parts_page` say them.
 
 mod page;
 mod parts;

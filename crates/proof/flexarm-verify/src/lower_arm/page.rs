@@ -12,8 +12,8 @@ use crate::page::{Bound, Case, Figure, Table, bare_error, digits, error, fixed, 
 
 /// First frequency of a bar in two parts over its true one, less one: case 1.
 const BAR_IN_TWO_PARTS: f64 = 0.02;
-/// The wall of seat A (m); a finer mesh (degrees of freedom) and what it changes the compliance's diagonal by, least and most:
-/// `robots/lower_arm/README.md`.
+/// The wall of seat A (m); a finer mesh (degrees of freedom) and what it changes the compliance's
+/// diagonal by, least and most: `robots/lower_arm/README.md`.
 const WALL_M: f64 = 0.026;
 const FINER_MESH: f64 = 484e3;
 const FINER_CHANGES: [f64; 2] = [0.002, 0.030];

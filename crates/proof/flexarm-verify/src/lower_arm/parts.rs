@@ -18,7 +18,8 @@ pub(super) const MODES: usize = 3;
 /// Where stretches of the casting end, over the way from A to B.
 pub(super) const CUTS: [f64; 2] = [0.2, 0.9];
 
-/// A chain of so many parts under weight along x, y, z; sizes of shifts of B over those of the mesh.
+/// A chain of so many parts under weight along x, y, z; sizes of shifts of B over those of the
+/// mesh.
 pub(super) struct ChainError {
     pub(super) parts: usize,
     /// Mass of its first part (kg).
@@ -86,12 +87,14 @@ impl Subject<'_> {
         (joint.X_LS.translation.vector - p_A).dot(&along) / along.norm_squared()
     }
 
-    /// Size of a shift of B under weight along an axis over that of the mesh under all of the weight.
+    /// Size of a shift of B under weight along an axis over that of the mesh under all of the
+    /// weight.
     fn size(&self, u: &Vector6<f64>, axis: usize) -> f64 {
         u.fixed_rows::<3>(0).norm() / self.truth.sag[axis].fixed_rows::<3>(0).norm()
     }
 
-    /// Motion of B of a chain under weight, in closed form: the weight of all parts beyond a joint yields it.
+    /// Motion of B of a chain under weight, in closed form: the weight of all parts beyond a joint
+    /// yields it.
     fn sag(&self, chain: &Chain, axis: usize) -> Vector6<f64> {
         let (_, p_B) = self.condensed.points();
         chain.sag(&p_B, &weight(axis)).unwrap_or_else(|| Vector6::repeat(f64::NAN))
@@ -149,7 +152,8 @@ fn weight(axis: usize) -> Vector3<f64> {
 mod tests {
     use super::*;
 
-    /// The first part and what lies below the cut are not beyond it; across, the larger of x and y counts.
+    /// The first part and what lies below the cut are not beyond it; across, the larger of x and y
+    /// counts.
     #[test]
     fn what_is_missed_is_summed_beyond_the_seat_alone() {
         let stretch = |begin: f64, missed: [f64; 3]| Stretch { name: String::new(), begin, mass_kg: 1.0, missed };

@@ -87,7 +87,8 @@ fn models() -> Vec<Model> {
     all.map(|((name, modelling), parts)| Model { name, parts, modelling }).collect()
 }
 
-/// Errors of the shift and of the rotation of B under weight along x, y, z, as vectors over their sizes.
+/// Errors of the shift and of the rotation of B under weight along x, y, z, as vectors over their
+/// sizes.
 pub(super) type SagErrors = [[f64; 2]; 3];
 
 /// Own weight in three directions.
@@ -236,7 +237,8 @@ mod tests {
         }
     }
 
-    /// The modal links' worst is theirs, not that of two parts; a number of parts that is not there is no number.
+    /// The modal links' worst is theirs, not that of two parts; a number of parts that is not there
+    /// is no number.
     #[test]
     fn errors_under_weight_are_those_of_their_models() {
         let weight = weight();

@@ -24,7 +24,8 @@ pub(super) struct Flexibility {
 /// Links, drives and both on every motion.
 pub(super) struct Flexibilities {
     pub(super) made: Vec<Flexibility>,
-    /// Sag of links and drives together less the sum of the two alone, over it, the worst of all motions.
+    /// Sag of links and drives together less the sum of the two alone, over it, the worst of all
+    /// motions.
     pub(super) sum_error: f64,
 }
 
@@ -52,7 +53,8 @@ impl Flexibilities {
     }
 }
 
-/// At rest compliances in series add: sag of both less the sum of the two alone, over it; nothing where there are no three.
+/// At rest compliances in series add: sag of both less the sum of the two alone, over it; nothing
+/// where there are no three.
 fn sum_of_two(sags: &[Vector3<f64>]) -> f64 {
     match sags {
         [links, drives, both] => (links + drives - both).norm() / both.norm(),

@@ -1,7 +1,8 @@
 //! The forearm's sag under its own weight, part by part: chain against mesh.
 //!
-//! Under a unit force at B the mesh moves by `U`, and by reciprocity the sag of B is the sum of weight times `U`; the parts of a chain
-//! move rigidly. The difference is summed over the nodes of each part.
+//! Under a unit force at B the mesh moves by `U`, and by reciprocity the sag of B is the sum of
+//! weight times `U`; the parts of a chain move rigidly. The difference is summed over the nodes of
+//! each part.
 
 use flexarm::Robot;
 use flexarm_fem::chain::Chain;
@@ -130,7 +131,8 @@ impl Joint {
 mod tests {
     use super::*;
 
-    /// Truth by hand: a joint at x = 1 that shifts by 2 along y and turns by 0.1 about z moves the point at x = 4 by 2.3 along y.
+    /// Truth by hand: a joint at x = 1 that shifts by 2 along y and turns by 0.1 about z moves the
+    /// point at x = 4 by 2.3 along y.
     #[test]
     fn a_joint_moves_what_lies_beyond_it_by_shift_and_lever() {
         let joint = Joint { p: Vector3::x(), yields: Vector6::new(0.0, 2.0, 0.0, 0.0, 0.0, 0.1) };

@@ -38,8 +38,8 @@ pub(super) struct Methods {
     pub(super) steps: Vec<StepErrors>,
 }
 
-/// Two parts with damping proportional to stiffness in all, at one step: largest distance of the tool from the stepper with error
-/// control, over the peak.
+/// Two parts with damping proportional to stiffness in all, at one step: largest distance of the
+/// tool from the stepper with error control, over the peak.
 pub(super) struct StepErrors {
     pub(super) step_s: f64,
     /// Compliant constraints, local.
@@ -102,7 +102,8 @@ fn list() -> Vec<Method> {
     list
 }
 
-/// SPOOK damps each spring in proportion to its stiffness; with such damping in both, only the steppers differ.
+/// SPOOK damps each spring in proportion to its stiffness; with such damping in both, only the
+/// steppers differ.
 fn proportionally_damped(robot: &Robot, first_hz: f64) -> Robot {
     let mut robot = robot.clone();
     for link in &mut robot.flexible {
@@ -111,7 +112,8 @@ fn proportionally_damped(robot: &Robot, first_hz: f64) -> Robot {
     robot
 }
 
-/// Where the rest of compliant constraints comes from: same model, same damping, stepper with error control.
+/// Where the rest of compliant constraints comes from: same model, same damping, stepper with error
+/// control.
 fn step_errors(
     runs: &mut Runs<'_, '_>,
     robot: &Robot,

@@ -1,6 +1,8 @@
-//! The whole manipulator in motion: link models and steppers against modal links, links against drives.
+//! The whole manipulator in motion: link models and steppers against modal links, links against
+//! drives.
 //!
-//! `runs` makes runs, `methods`, `pick`, `forearm` and `drives` compute findings, `page` and `drives_page` say them.
+//! `runs` makes runs, `methods`, `pick`, `forearm` and `drives` compute findings, `page` and
+//! `drives_page` say them.
 
 mod drives;
 mod drives_page;
@@ -52,7 +54,8 @@ impl Findings {
         let robot = bench.robot(LINKS)?;
         let moves: &[&'static str] =
             if bench.quick { &["point_to_point"] } else { &["pick_and_place", "point_to_point", "large_moves"] };
-        // One motion of all methods weighs about 150 runs by generalised-alpha, a pick 55, the rest 80.
+        // One motion of all methods weighs about 150 runs by generalised-alpha, a pick 55, the rest
+        // 80.
         let pick_weight = if bench.quick { 0.0 } else { 55.0 };
         let mut runs = Runs::new(pace, 150.0 * moves.len() as f64 + 80.0 + pick_weight);
         let motions = moves.iter().map(|&name| Methods::new(bench, &mut runs, &robot, name));

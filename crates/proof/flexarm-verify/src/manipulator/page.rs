@@ -67,7 +67,8 @@ pub(super) fn curve(run: &Run, name: &str, look: CurveLook, axis: usize) -> Plot
 fn methods(case: &mut Case, found: &Methods) {
     case.heading(&format!("`trajectories/{}.toml`, links alone", found.motion));
     case.table(methods_table(found));
-    // Spring-damper and compliant constraints with two parts; the chain that closes what is left; the stepper alone.
+    // Spring-damper and compliant constraints with two parts; the chain that closes what is left;
+    // the stepper alone.
     let bounds =
         [(TWO_PARTS, 0.01), (CONSTRAINTS, 0.01), (FINE_CONSTRAINTS, 0.01), (EIGHT_PARTS, 0.004), (MODAL, 2e-4)];
     for (k, bound) in bounds {

@@ -1,4 +1,5 @@
-//! The manipulator picks something up and sets it down: every stepper over payloads that change at once.
+//! The manipulator picks something up and sets it down: every stepper over payloads that change at
+//! once.
 
 use flexarm::{DriveModel, Modelling, Robot, RunOptions, Scenario, StepperKind};
 
@@ -16,7 +17,8 @@ pub(super) struct Picked {
     pub(super) stepper: String,
     pub(super) explicit: bool,
     pub(super) run: Run,
-    /// Largest distance of the tool from that of the same links by the stepper with error control, over its peak.
+    /// Largest distance of the tool from that of the same links by the stepper with error control,
+    /// over its peak.
     pub(super) error: f64,
 }
 

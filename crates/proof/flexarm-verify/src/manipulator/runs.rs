@@ -174,7 +174,8 @@ mod tests {
         }
     }
 
-    /// Truth by hand: (3, 4, 0) has the largest length, (0, 0, -4.5) the largest z; components peak at their own instants.
+    /// Truth by hand: (3, 4, 0) has the largest length, (0, 0, -4.5) the largest z; components peak
+    /// at their own instants.
     #[test]
     fn each_direction_peaks_at_its_own_instant() {
         let peaks = run(&[[3.0, 4.0, 0.0], [0.0, 0.0, -4.5]]).peaks();

@@ -1,4 +1,5 @@
-//! Lowest frequencies with held motors: what the gears explain of the vibration that the recordings show, and what not.
+//! Lowest frequencies with held motors: what the gears explain of the vibration that the recordings
+//! show, and what not.
 
 use flexarm::{DriveModel, Modelling, Robot, Wrench};
 
@@ -8,10 +9,11 @@ use crate::bench::{Bench, Worst};
 
 /// Stiffness of the gears of axes 1 to 3 in the source (N m/rad).
 const SOURCE: [f64; WITH_ENCODER] = [4_577_800.0, 7_518_900.0, 4_099_900.0];
-/// Frequencies of these springs and rigid links at the home pose and 5 s into run 1, from the mass matrix of Pinocchio 3 (`pin.crba`, URDF with
-/// the load) without weight (Hz, two decimals).
+/// Frequencies of these springs and rigid links at the home pose and 5 s into run 1, from the mass
+/// matrix of Pinocchio 3 (`pin.crba`, URDF with the load) without weight (Hz, two decimals).
 const PINOCCHIO_HZ: [[f64; 3]; 2] = [[12.10, 12.90, 24.76], [9.88, 13.39, 35.08]];
-/// Lowest vibration in the recordings while axis 1 moves, runs 1 and 3, where the link encoder moves five times as far as the motor (Hz).
+/// Lowest vibration in the recordings while axis 1 moves, runs 1 and 3, where the link encoder
+/// moves five times as far as the motor (Hz).
 pub(super) const SEEN_HZ: [f64; 2] = [5.9, 6.3];
 /// A robot of the class whose wrist gears were identified.
 pub(super) const WRIST: &str = "robots/kr500_identified/robot.toml";

@@ -1,4 +1,5 @@
-//! What gives way: deflection of the gears in a run along the recorded motor positions against motor minus link encoder.
+//! What gives way: deflection of the gears in a run along the recorded motor positions against
+//! motor minus link encoder.
 
 use std::sync::Arc;
 
@@ -14,7 +15,8 @@ use flexarm_analysis::signal::{LowPass, delayed, least_squares, rest, rms};
 pub(super) const LATE_S: f64 = 3.0e-3;
 /// Both are compared up to here (Hz).
 pub(super) const COMPARED_HZ: f64 = 12.0;
-/// Periods per turn of the link encoders' ripple, axes 1 to 3, and lines beside them, where the encoder's mounting puts them.
+/// Periods per turn of the link encoders' ripple, axes 1 to 3, and lines beside them, where the
+/// encoder's mounting puts them.
 pub(super) const RIPPLE: [f64; WITH_ENCODER] = [1010.0, 826.0, 678.0];
 const LINES: [f64; 7] = [-12.0, -8.0, -4.0, 0.0, 4.0, 8.0, 12.0];
 /// Gears that yield, motors along the motion.
@@ -40,8 +42,8 @@ pub(super) struct Gears {
     pub(super) rests: Vec<Rest>,
     /// Stiffness of the springs (N m/rad).
     pub(super) stiffness: Vec<f64>,
-    /// Axes 2 and 3 in run 2: time (s), measured and simulated deflection without their means, encoder errors taken off
-    /// (rad).
+    /// Axes 2 and 3 in run 2: time (s), measured and simulated deflection without their means,
+    /// encoder errors taken off (rad).
     pub(super) time_s: Vec<f64>,
     pub(super) measured: Vec<Vec<f64>>,
     pub(super) simulated: Vec<Vec<f64>>,

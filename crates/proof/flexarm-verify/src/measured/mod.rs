@@ -1,6 +1,8 @@
-//! A measured robot: a KUKA KR 300 R2500 with 150 kg, motor and link encoders, against inverse dynamics, gears, servos and frequencies.
+//! A measured robot: a KUKA KR 300 R2500 with 150 kg, motor and link encoders, against inverse
+//! dynamics, gears, servos and frequencies.
 //!
-//! `recording` and `signal` prepare the recordings, `torques`, `gears`, `servo` and `frequencies` compute findings, `page` says them.
+//! `recording` and `signal` prepare the recordings, `torques`, `gears`, `servo` and `frequencies`
+//! compute findings, `page` says them.
 
 mod frequencies;
 mod gears;

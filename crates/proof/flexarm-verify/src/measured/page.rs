@@ -11,7 +11,8 @@ use super::{Findings, ROBOT};
 use crate::bench::Worst;
 use crate::page::{Bound, Case, Figure, Table, digits, fixed, listed, percent, plain, word};
 
-/// What a good rigid model leaves of the torques of axes 1 to 3 on the two runs that it was not fitted to.
+/// What a good rigid model leaves of the torques of axes 1 to 3 on the two runs that it was not
+/// fitted to.
 const TORQUE_BOUNDS: [f64; WITH_ENCODER] = [0.11, 0.045, 0.031];
 /// What a spring of constant stiffness leaves of the deflection of axes 2 and 3 (rad).
 const DEFLECTION_BOUND: f64 = 40e-6;

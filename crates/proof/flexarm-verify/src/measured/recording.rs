@@ -29,7 +29,8 @@ pub(super) struct Recording {
     pub(super) motor: Vec<Vec<f64>>,
     /// Behind the gear, axes 1 to 3 (rad).
     pub(super) link: Vec<Vec<f64>>,
-    /// Motor positions without what is faster than [`SMOOTH_HZ`], their speed and acceleration (rad, s).
+    /// Motor positions without what is faster than [`SMOOTH_HZ`], their speed and acceleration
+    /// (rad, s).
     pub(super) q: Vec<Vec<f64>>,
     pub(super) v: Vec<Vec<f64>>,
     pub(super) a: Vec<Vec<f64>>,

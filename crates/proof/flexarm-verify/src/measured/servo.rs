@@ -1,4 +1,5 @@
-//! Runs under servos along the recorded references: how far motors and links stay behind, as orders of magnitude.
+//! Runs under servos along the recorded references: how far motors and links stay behind, as orders
+//! of magnitude.
 
 use std::sync::Arc;
 
@@ -13,7 +14,8 @@ use flexarm_analysis::signal::rms;
 /// Steps of the simulation per sample.
 const STEPS: usize = 4;
 
-/// RMS of reference minus position per axis (rad): behind the gear where an encoder is, of the motor elsewhere.
+/// RMS of reference minus position per axis (rad): behind the gear where an encoder is, of the
+/// motor elsewhere.
 pub(super) type Tracking = [f64; AXES];
 
 pub(super) struct Servos {

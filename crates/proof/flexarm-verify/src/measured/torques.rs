@@ -31,7 +31,8 @@ pub(super) type Friction = [f64; 3];
 pub(super) struct Torques {
     /// From run 1 alone with the whole model; the others have the same.
     pub(super) friction: Vec<Friction>,
-    /// By variant and run: per axis the RMS of the difference over that of the torque, while it moves.
+    /// By variant and run: per axis the RMS of the difference over that of the torque, while it
+    /// moves.
     pub(super) errors: Vec<Vec<[f64; AXES]>>,
     /// Run 3: time (s), measured and computed torques of axes 1 to 3, smoothed (N m).
     pub(super) shown: Shown,

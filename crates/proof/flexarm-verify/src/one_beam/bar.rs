@@ -1,4 +1,5 @@
-//! The bar of `robots/one_beam/README.md` in closed form: aluminium, its width along y, its height along z.
+//! The bar of `robots/one_beam/README.md` in closed form: aluminium, its width along y, its height
+//! along z.
 
 use crate::textbook::{Stiffness, rectangle_torsion};
 
@@ -31,7 +32,8 @@ pub(super) fn bar_with_shear() -> Stiffness {
     Stiffness { kGA: [kGA; 2], ..bar }
 }
 
-/// First frequencies with the rotary inertia of the section and a mass at the end (kg): sideways, upwards (Hz).
+/// First frequencies with the rotary inertia of the section and a mass at the end (kg): sideways,
+/// upwards (Hz).
 pub(super) fn bending_hz(point_mass: f64, count: usize) -> [Vec<f64>; 2] {
     let bar = bar();
     [(bar.EI_z, ROTARY[0]), (bar.EI_y, ROTARY[1])].map(|(EI, rotary)| bar.bending_hz(EI, rotary, point_mass, count))
@@ -41,7 +43,8 @@ pub(super) fn bending_hz(point_mass: f64, count: usize) -> [Vec<f64>; 2] {
 mod tests {
     use super::*;
 
-    /// Truth by hand: 70e9 * 20 * 40^3/12 mm^4 = 7466.7 N m², 0.8 mm² * 70e9, 2.16 kg/m; l³/(3 EI) = 22.857 µm/N, q l^4/(8 EI) = 0.1453 mm.
+    /// Truth by hand: 70e9 * 20 * 40^3/12 mm^4 = 7466.7 N m², 0.8 mm² * 70e9, 2.16 kg/m; l³/(3 EI)
+    /// = 22.857 µm/N, q l^4/(8 EI) = 0.1453 mm.
     #[test]
     fn the_bar_is_the_one_of_its_readme() {
         let bar = bar();
@@ -53,7 +56,8 @@ mod tests {
         assert!((1e3 * bar.own_weight(9.81) - 0.145_300).abs() < 1e-6, "{}", bar.own_weight(9.81));
     }
 
-    /// Truth by hand: l/(k G A) = 0.8/(0.850928 * 26.3158e9 * 8e-4) = 0.04466 µm/N at the end besides bending, along y and z alike.
+    /// Truth by hand: l/(k G A) = 0.8/(0.850928 * 26.3158e9 * 8e-4) = 0.04466 µm/N at the end
+    /// besides bending, along y and z alike.
     #[test]
     fn shear_adds_the_same_deflection_in_both_directions() {
         let (with, without) = (bar_with_shear().tip_compliance(), bar().tip_compliance());
@@ -63,7 +67,8 @@ mod tests {
         assert_eq!(with[(4, 4)], without[(4, 4)]);
     }
 
-    /// Truths: a ball and rotary inertia lower a frequency; twice as high is twice as fast, but for rotary inertia.
+    /// Truths: a ball and rotary inertia lower a frequency; twice as high is twice as fast, but for
+    /// rotary inertia.
     #[test]
     fn a_ball_and_rotary_inertia_lower_the_frequencies() {
         let ([bare_side, bare_up], [side, up]) = (bending_hz(0.0, 2), bending_hz(BALL_KG, 2));

@@ -32,7 +32,8 @@ pub(super) struct LargeLoad {
     /// Height of the end (m) and engineering strain by nonlinear finite elements.
     pub(super) fe_height_m: f64,
     pub(super) fe_strain: f64,
-    /// Height of the end of the reduced link, relative differences from those: linear elements, then every model.
+    /// Height of the end of the reduced link, relative differences from those: linear elements,
+    /// then every model.
     pub(super) fe_linear_error: f64,
     pub(super) fe_errors: Vec<f64>,
     /// Engineering strain of two parts.
@@ -47,7 +48,8 @@ pub(super) struct LargeLoads {
     pub(super) loads: Vec<LargeLoad>,
 }
 
-/// What bends: the link of beam theory and the one reduced from the mesh, both without weight, and their models.
+/// What bends: the link of beam theory and the one reduced from the mesh, both without weight, and
+/// their models.
 struct Subjects {
     robot: Robot,
     meshed: Robot,
@@ -114,7 +116,8 @@ impl LargeLoad {
     }
 }
 
-/// Change of the distance of the ends over it, where the end moves by `x` along the bar and by `z` across it (m).
+/// Change of the distance of the ends over it, where the end moves by `x` along the bar and by `z`
+/// across it (m).
 fn engineering_strain(x: f64, z: f64) -> f64 {
     (LENGTH_M + x).hypot(z) / LENGTH_M - 1.0
 }
@@ -123,7 +126,8 @@ fn engineering_strain(x: f64, z: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Truth by hand: the triangle 0.6, 0.8, 1.0 (its long side is the bar), a pure stretch, a turn without any.
+    /// Truth by hand: the triangle 0.6, 0.8, 1.0 (its long side is the bar), a pure stretch, a turn
+    /// without any.
     #[test]
     fn the_engineering_strain_is_that_of_the_line_between_the_ends() {
         assert!((engineering_strain(0.0, 0.6) - 0.25).abs() < 1e-15);

@@ -15,7 +15,8 @@ use crate::compliance::{Method, by_every_method};
 use crate::meshed::Meshed;
 use crate::textbook::Stiffness;
 
-/// Elements along x, y and z, and compliance about x with elements half as large (rad/(N m)): `robots/one_beam/fe/README.md`.
+/// Elements along x, y and z, and compliance about x with elements half as large (rad/(N m)):
+/// `robots/one_beam/fe/README.md`.
 pub(super) const ELEMENTS: [usize; 3] = [40, 2, 2];
 const TORSION_OF_FINER_MESH: f64 = 409.989e-6;
 /// Places of the loaded sections (m).

@@ -1,6 +1,7 @@
 //! One clamped beam: everything that has an answer on paper.
 //!
-//! `bar` has the closed forms, `study`, `motion`, `mesh` and `large_loads` compute findings, `page` and `mesh_page` say them.
+//! `bar` has the closed forms, `study`, `motion`, `mesh` and `large_loads` compute findings, `page`
+//! and `mesh_page` say them.
 
 mod bar;
 mod large_loads;

@@ -27,7 +27,8 @@ pub(super) const CLAIMED_STEP_S: f64 = 1e-3;
 pub(super) struct Stepped {
     pub(super) name: &'static str,
     kind: StepperKind,
-    /// Largest distance of the end from the truth over its peak, one per step; not a number where the stepper refuses the step.
+    /// Largest distance of the end from the truth over its peak, one per step; not a number where
+    /// the stepper refuses the step.
     pub(super) errors: Vec<f64>,
 }
 
@@ -75,7 +76,8 @@ impl Stepped {
         self.kind == ALPHA
     }
 
-    /// Whether its joints are compliant constraints in their exact form, in axes of the part or of the world.
+    /// Whether its joints are compliant constraints in their exact form, in axes of the part or of
+    /// the world.
     pub(super) fn is_spook(&self, form: ConstraintForm) -> bool {
         self.kind == spook(form)
     }
@@ -92,7 +94,8 @@ fn steppers() -> [(&'static str, StepperKind); 5] {
     ]
 }
 
-/// Largest distance of the end from the truth, over the peak; the explicit stepper refuses steps beyond its limit.
+/// Largest distance of the end from the truth, over the peak; the explicit stepper refuses steps
+/// beyond its limit.
 fn step_error(rig: &Rig, kind: StepperKind, h: f64, truth: &[Vector3<f64>], peak_m: f64) -> Result<f64, Error> {
     match rig.path(kind, h, SEEN_EVERY_S, DURATION_S) {
         Ok(path) => Ok(path.iter().zip(truth).map(|(a, b)| (a - b).norm()).worst() / peak_m),
@@ -115,11 +118,13 @@ pub(super) struct Spun {
     pub(super) name: String,
     /// Whether loads change its stiffness.
     pub(super) stiffening: bool,
-    /// Largest distance of the end from the truth, over the peak: in all, along the undeformed bar, across it.
+    /// Largest distance of the end from the truth, over the peak: in all, along the undeformed bar,
+    /// across it.
     pub(super) errors: [f64; 3],
 }
 
-/// A spin-up: modal links, whose velocity terms are integrals over shapes, against chains of rigid bodies, which have none of them.
+/// A spin-up: modal links, whose velocity terms are integrals over shapes, against chains of rigid
+/// bodies, which have none of them.
 pub(super) struct SpinUp {
     /// Largest deflection of the truth (m).
     pub(super) peak_m: f64,
@@ -155,7 +160,8 @@ fn spin_up(t: f64, q: &mut [f64], qdot: &mut [f64], qddot: &mut [f64]) {
     qddot[0] = SPEED / TIME_S * (1.0 - phase.cos());
 }
 
-/// Largest distance of two paths in all, along the undeformed bar (whose end goes along `rigid`), and across it (m).
+/// Largest distance of two paths in all, along the undeformed bar (whose end goes along `rigid`),
+/// and across it (m).
 fn apart(path: &[Vector3<f64>], truth: &[Vector3<f64>], rigid: &[Vector3<f64>]) -> [f64; 3] {
     let parted = path.iter().zip(truth).zip(rigid).map(|((a, b), r)| {
         let (d, along) = (a - b, r.normalize());
@@ -169,7 +175,8 @@ fn apart(path: &[Vector3<f64>], truth: &[Vector3<f64>], rigid: &[Vector3<f64>]) 
 mod tests {
     use super::*;
 
-    /// Truth: at T the speed is w and the angle w T/2; the derivatives are those of the angle by central differences.
+    /// Truth: at T the speed is w and the angle w T/2; the derivatives are those of the angle by
+    /// central differences.
     #[test]
     fn the_spin_up_ends_at_its_speed_without_acceleration() {
         let at = |t: f64| {

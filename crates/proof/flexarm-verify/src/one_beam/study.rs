@@ -308,7 +308,8 @@ impl Weight {
     }
 }
 
-/// Part of the peak by which a modal link misses the shortening of a bar that bends by `peak_m` at its end: `3/5 w²/l`.
+/// Part of the peak by which a modal link misses the shortening of a bar that bends by `peak_m` at
+/// its end: `3/5 w²/l`.
 pub(super) fn shortening_over_peak(peak_m: f64) -> f64 {
     0.6 * peak_m / LENGTH_M
 }
@@ -317,7 +318,8 @@ pub(super) fn shortening_over_peak(peak_m: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Truth: the shape x²(3l - x)/(2 l³) of a bar under an end force shortens by half the integral of its squared slope, by Simpson's rule.
+    /// Truth: the shape x²(3l - x)/(2 l³) of a bar under an end force shortens by half the integral
+    /// of its squared slope, by Simpson's rule.
     #[test]
     fn a_bar_under_an_end_force_shortens_by_three_fifths_of_its_deflection_squared() {
         let (w, n) = (0.01, 200);
@@ -328,7 +330,8 @@ mod tests {
         assert!((shortening_over_peak(w) * w / shortening - 1.0).abs() < 1e-9, "{shortening}");
     }
 
-    /// Truth by hand: a moment bends with constant curvature, so its slope at l is M l/EI, wherever beyond the load it is seen.
+    /// Truth by hand: a moment bends with constant curvature, so its slope at l is M l/EI, wherever
+    /// beyond the load it is seen.
     #[test]
     fn loads_at_stations_are_those_of_the_closed_form() {
         let bar = bar();

@@ -1,4 +1,5 @@
-//! The same arm and motion in other programs: stored results, and our curve of today against the stored truth.
+//! The same arm and motion in other programs: stored results, and our curve of today against the
+//! stored truth.
 //!
 //! `today` and `stored` compute findings, `page` says them.
 

@@ -7,13 +7,14 @@ use super::today::{MOTION, ROUNDING_M, SEEN_HZ, Today};
 use super::{About, Findings};
 use crate::page::{Bound, Case, Cell, Figure, Table, digits, error, plain, word};
 
-/// Damping of the first mode, over critical, and tolerance of DOP853 in the stored truth: `tools/crosscheck/other_programs.py`.
+/// Damping of the first mode, over critical, and tolerance of DOP853 in the stored truth:
+/// `tools/crosscheck/other_programs.py`.
 const DAMPING: f64 = 0.03;
 const STORED_TOLERANCE: f64 = 1e-12;
 /// How far converged curves may be apart, over the peak.
 const CONVERGED: f64 = 1e-6;
-/// Exudyn's floating frame against modal links over the peak, as its marker is and with a structure ten times as stiff:
-/// `tools/crosscheck/exudyn_ffrf.py`.
+/// Exudyn's floating frame against modal links over the peak, as its marker is and with a structure
+/// ten times as stiff: `tools/crosscheck/exudyn_ffrf.py`.
 const FLOATING_FRAME_ERRORS: [f64; 2] = [5.6e-4, 3.3e-5];
 
 pub(super) fn page(found: &Findings) -> Case {

@@ -82,7 +82,8 @@ fn runs(first: &Value, second: &Value) -> Vec<StoredRun> {
 }
 
 impl StoredRun {
-    /// * `other`: the same run on the second motion. `last`: the method of the row above, which "the same" speaks of.
+    /// * `other`: the same run on the second motion. `last`: the method of the row above, which
+    ///   "the same" speaks of.
     fn new(row: &Value, other: &Value, last: &str) -> Self {
         let method = text(&row["method"]);
         let how = method.strip_prefix("the same");

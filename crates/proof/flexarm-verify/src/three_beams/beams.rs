@@ -53,7 +53,8 @@ pub(super) fn members() -> [Member; 3] {
 }
 
 impl Member {
-    /// What it adds to the compliance of the tip: as a cantilever in world axes, its end carried to the tip by a lever.
+    /// What it adds to the compliance of the tip: as a cantilever in world axes, its end carried to
+    /// the tip by a lever.
     pub(super) fn at_tip(&self) -> Matrix6<f64> {
         at_lever(&turned(&self.section.tip_compliance(), &self.R), &(tip() - self.end))
     }
@@ -132,7 +133,8 @@ pub(super) fn box_torsion_over_bredt(cells: usize) -> f64 {
     hollow_rectangle_torsion(b, h, t, cells) / bredt - 1.0
 }
 
-/// Area of the walls along a force on the box over its area in shear after Cowper, less one; along y and z.
+/// Area of the walls along a force on the box over its area in shear after Cowper, less one; along
+/// y and z.
 pub(super) fn box_walls_over_cowper() -> [f64; 2] {
     let [b, h, t] = BOX_M;
     [2.0 * t * b / shear_area(b - t, h - t, t) - 1.0, 2.0 * t * h / shear_area(h - t, b - t, t) - 1.0]
@@ -142,8 +144,9 @@ pub(super) fn box_walls_over_cowper() -> [f64; 2] {
 mod tests {
     use super::*;
 
-    /// Truth by hand: tube of 0.8 m with I = pi (30^4 - 27^4)/4 mm^4, box with I_y = (30 50^3 - 24 44^3)/12 mm^4. A torque about z turns
-    /// the tube by l/GJ, and the box and the rectangle bend about z.
+    /// Truth by hand: tube of 0.8 m with I = pi (30^4 - 27^4)/4 mm^4, box with I_y = (30 50^3 - 24
+    /// 44^3)/12 mm^4. A torque about z turns the tube by l/GJ, and the box and the rectangle bend
+    /// about z.
     #[test]
     fn the_tip_turns_by_the_sum_of_what_each_beam_turns() {
         let [tube, hollow, bar] = members().map(|member| member.section);
@@ -151,14 +154,16 @@ mod tests {
         assert!((hollow.EI_y / (70e9 * 1.421_32e-7) - 1.0).abs() < 1e-9, "{}", hollow.EI_y / 70e9);
         let by_hand = 0.8 / tube.GJ + 0.6 / hollow.EI_z + 0.4 / bar.EI_z;
         assert!((tip_compliance()[(5, 5)] / by_hand - 1.0).abs() < 1e-12);
-        // A force along y at the tip only stretches the rectangle; the other two bend, and the tube twists by its lever of 0.6 m.
+        // A force along y at the tip only stretches the rectangle; the other two bend, and the tube
+        // twists by its lever of 0.6 m.
         let stretch = 0.4 / bar.EA;
         assert!((members()[RECTANGLE].at_tip()[(1, 1)] / stretch - 1.0).abs() < 1e-12);
         let tube_alone = tube.tip_compliance()[(2, 2)] + 0.36 * 0.8 / tube.GJ;
         assert!((members()[TUBE].at_tip()[(1, 1)] / tube_alone - 1.0).abs() < 1e-12);
     }
 
-    /// Truth: the two factors of each section as the page has printed them, and Cowper's table: 0.851 for a bar at nu = 0.33.
+    /// Truth: the two factors of each section as the page has printed them, and Cowper's table:
+    /// 0.851 for a bar at nu = 0.33.
     #[test]
     fn shear_factors_by_displacement_are_above_those_by_work() {
         for (factors, cowper) in [(thin_tube_shear_factors(), 0.533_066), (bar_shear_factors(), 0.850_928)] {

@@ -1,6 +1,7 @@
 //! Three beams with right-angle corners: every load bends and twists some of them.
 //!
-//! `beams` has the closed forms, `study`, `sections`, `ring_down` and `whirl` compute findings, `page` says them.
+//! `beams` has the closed forms, `study`, `sections`, `ring_down` and `whirl` compute findings,
+//! `page` says them.
 
 mod beams;
 mod page;

@@ -21,7 +21,8 @@ use crate::page::{Bound, Case, Cell, Figure, Table, bare_error, digits, error, f
 const CALCULIX_POINTS: usize = 3;
 /// Elements around the tube (`robots/three_beams/fe/README.md`).
 const AROUND_THE_TUBE: usize = 24;
-/// Every so many samples are drawn: ten curves per panel would hide each other, and a point every 2 ms draws 100 Hz.
+/// Every so many samples are drawn: ten curves per panel would hide each other, and a point every 2
+/// ms draws 100 Hz.
 const DRAWN: usize = 2;
 const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -147,7 +148,8 @@ fn sag_and_frequencies(found: &Meshes) -> Table {
 }
 
 fn why_sag_and_frequencies(found: &Meshes) -> String {
-    // Modes in which the ball has most of the motion, and those in which the beams bend between their ends.
+    // Modes in which the ball has most of the motion, and those in which the beams bend between
+    // their ends.
     let moving = found.ball_shares.iter().take_while(|share| **share > 0.5).count();
     let held: Vec<usize> = (0..found.held_shares.len()).filter(|k| found.held_shares[*k] > 0.1).collect();
     let two_parts = found.model("2 parts").map_or(&[][..], |model| &model.hz_errors);

@@ -80,7 +80,8 @@ impl RingDown {
         &self.models[STIFFENED].path
     }
 
-    /// Largest distance of a model from the truth, both by the stepper with error control, over the peak.
+    /// Largest distance of a model from the truth, both by the stepper with error control, over the
+    /// peak.
     pub(super) fn model_error(&self, model: usize) -> f64 {
         farthest(&self.models[model].path, self.truth()) / self.peak_m
     }
@@ -141,7 +142,8 @@ fn runs(models: &[Model], duration_s: f64, peak_m: f64, quick: bool) -> Result<V
     made.collect()
 }
 
-/// Why the models differ: frequencies and shares in the sag, each alone; and why compliant constraints do.
+/// Why the models differ: frequencies and shares in the sag, each alone; and why compliant
+/// constraints do.
 ///
 /// All distances are largest ones over the peak.
 pub(super) struct Causes {
@@ -158,7 +160,8 @@ pub(super) struct ModelCauses {
     pub(super) model: usize,
     /// Relative differences of the frequencies of the summed modes.
     pub(super) hz_errors: Vec<f64>,
-    /// Of sums with its frequencies and the truth's shares, the other way round, and with both its own.
+    /// Of sums with its frequencies and the truth's shares, the other way round, and with both its
+    /// own.
     pub(super) by_frequencies: f64,
     pub(super) by_shares: f64,
     pub(super) by_both: f64,
@@ -228,7 +231,8 @@ impl ConstraintCauses {
     }
 }
 
-/// Largest part of the distance of two stepped motions that is not the distance of two sums of modes (m).
+/// Largest part of the distance of two stepped motions that is not the distance of two sums of
+/// modes (m).
 fn unexplained(stepped: [&[Vector3<f64>]; 2], sums: [&[Vector3<f64>]; 2]) -> f64 {
     let ([a, b], [c, d]) = (stepped, sums);
     (0..a.len()).map(|k| ((a[k] - b[k]) - (c[k] - d[k])).norm()).worst()
@@ -273,8 +277,9 @@ impl Ringing {
         Self { rest: at(e) - rig.X_WF.translation.vector - sum, modes: kept }
     }
 
-    /// What compliant constraints make of it with steps of `h`, to second order: `ω (1 - ζ h ω/2 - (h ω)²/12)` from the recurrence of the
-    /// theory page, section 4, on an oscillator; the decay stays.
+    /// What compliant constraints make of it with steps of `h`, to second order:
+    /// `ω (1 - ζ h ω/2 - (h ω)²/12)` from the recurrence of the theory page, section 4, on an
+    /// oscillator; the decay stays.
     fn stepped(&self, h: f64) -> Self {
         let slower = |&Mode { omega, zeta, sag }: &Mode| {
             let factor = 1.0 - 0.5 * zeta * h * omega - (h * omega).powi(2) / 12.0;
@@ -283,7 +288,8 @@ impl Ringing {
         Self { modes: self.modes.iter().map(slower).collect(), rest: self.rest }
     }
 
-    /// Way of the tip, let go undeformed: with its frequencies and the parts in the sag of another, ahead by some time (s).
+    /// Way of the tip, let go undeformed: with its frequencies and the parts in the sag of another,
+    /// ahead by some time (s).
     fn path(&self, shapes: &Self, times: &Times, ahead_s: f64) -> Vec<Vector3<f64>> {
         let at = |t: f64| -> Vector3<f64> {
             let swing = self.modes.iter().zip(&shapes.modes).map(|(Mode { omega, zeta, .. }, Mode { sag, .. })| {
@@ -306,8 +312,8 @@ mod tests {
         Ringing { modes: vec![mode], rest: Vector3::new(0.0, 0.0, -2e-4) }
     }
 
-    /// Truth: the closed form of a damped oscillator let go: it starts at rest at the static rest alone, passes its sag by exp(-pi z/sqrt(1-z²))
-    /// after half a period, and ends at the sag.
+    /// Truth: the closed form of a damped oscillator let go: it starts at rest at the static rest
+    /// alone, passes its sag by exp(-pi z/sqrt(1-z²)) after half a period, and ends at the sag.
     #[test]
     fn a_mode_let_go_overshoots_its_sag_by_its_damping() {
         let ringing = one_mode();
@@ -319,7 +325,8 @@ mod tests {
         assert!((path[199].z + 1.2e-3).abs() < 1e-15, "{}", path[199].z);
     }
 
-    /// Truth by hand: h = 1 ms, 40 rad/s, damping 0.1: factor 1 - 0.002 - 0.0016/12; the decay zeta omega is the same.
+    /// Truth by hand: h = 1 ms, 40 rad/s, damping 0.1: factor 1 - 0.002 - 0.0016/12; the decay zeta
+    /// omega is the same.
     #[test]
     fn compliant_constraints_lower_the_frequency_and_keep_the_decay() {
         let slower = one_mode().stepped(1e-3);

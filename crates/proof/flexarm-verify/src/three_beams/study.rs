@@ -41,7 +41,8 @@ impl TipLoads {
     }
 }
 
-/// Sag of the tip (m, rad) under the weight of beams and ball, and frequencies (Hz), by one program on the mesh of the whole arm.
+/// Sag of the tip (m, rad) under the weight of beams and ball, and frequencies (Hz), by one program
+/// on the mesh of the whole arm.
 pub(super) struct WholeMesh {
     /// Program, script and day.
     pub(super) provenance: String,
@@ -184,7 +185,8 @@ fn ball_shares(rig: &Rig, count: usize) -> Vec<f64> {
     (0..count).map(|k| BALL_KG * shift(k).norm_squared()).collect()
 }
 
-/// How much of the strain energy of each mode is in coordinates after the six of the end of each modal link.
+/// How much of the strain energy of each mode is in coordinates after the six of the end of each
+/// modal link.
 fn held_shares(rig: &Rig, count: usize) -> Vec<f64> {
     let K = rig.arm.stiffness();
     let share = |k: usize| {

@@ -1,4 +1,5 @@
-//! Ringing while it turns: modal links, whose velocity terms are integrals over shapes, against chains of rigid bodies.
+//! Ringing while it turns: modal links, whose velocity terms are integrals over shapes, against
+//! chains of rigid bodies.
 
 use std::sync::Arc;
 

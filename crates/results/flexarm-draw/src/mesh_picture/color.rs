@@ -5,7 +5,8 @@ use crate::palette::{self, Ground};
 
 pub use crate::palette::{magnitude, mix};
 
-/// Colours of interfaces in their order: blue, orange, green, and so on, which colour-blind people tell apart.
+/// Colours of interfaces in their order: blue, orange, green, and so on, which colour-blind people
+/// tell apart.
 pub const INTERFACES: [Rgb; 6] =
     [[0, 101, 204], [240, 120, 0], [0, 158, 96], [204, 90, 170], [120, 80, 30], [0, 170, 200]];
 

@@ -20,7 +20,8 @@ const LOAD: f64 = 1e3;
 const LOAD_COLOR: Rgb = [214, 0, 110];
 /// Panels of a sheet.
 const PANELS: usize = 6;
-/// Links that are so many times as long as high on the picture have two panels in a row, others three.
+/// Links that are so many times as long as high on the picture have two panels in a row, others
+/// three.
 const LONG: f64 = 2.6;
 /// Colour of edges on the coloured body: seen on dark and on light.
 const EDGE: Rgb = [225, 228, 235];

@@ -10,7 +10,8 @@ const RASTER: RasterHeight = RasterHeight::Size32;
 const RASTER_HEIGHT: f64 = 1.2;
 const BASE: f64 = 25.0;
 
-/// Calls with every pixel that a line of round ends covers: `(x, y, place along the line from 0 to 1, share)`.
+/// Calls with every pixel that a line of round ends covers:
+/// `(x, y, place along the line from 0 to 1, share)`.
 pub(super) fn cover_line(
     size: [usize; 2],
     from: [f64; 2],

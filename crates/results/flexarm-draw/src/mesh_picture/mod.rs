@@ -5,8 +5,8 @@
 //! unit_loads.png   deflection under 1 kN and 1 kN m at B in six panels, A held
 //! modes.png        the first six modes with A held, with the frequencies of the reduced models
 //! ```
-//! A reduction can be right in every number and still be that of the wrong faces; a person sees it at a
-//! glance. Start at [`write_pictures`]; [`MeshPictures`] gives the same as images in memory.
+//! A reduction can be right in every number and still be that of the wrong faces; a person sees it
+//! at a glance. Start at [`write_pictures`]; [`MeshPictures`] gives the same as images in memory.
 //!
 //! Layers: [`scene`] draws triangles and knows no finite elements, the sheets turn a mesh and its
 //! reduction into scenes. The same input gives the same bytes. Nothing here needs a graphics card.
@@ -182,10 +182,11 @@ impl<'a> MeshPictures<'a> {
     }
 }
 
-/// Draws a reduction into `dir`: `interfaces.png`, `unit_loads.png`, and `modes.png` if it has modes.
+/// Draws a reduction into `dir`: `interfaces.png`, `unit_loads.png`, and `modes.png` if it has
+/// modes.
 ///
-/// Makes the folder; files of these names are replaced. Takes well under a second per sheet for a skin of
-/// twenty thousand faces, in an optimised build.
+/// Makes the folder; files of these names are replaced. Takes well under a second per sheet for a
+/// skin of twenty thousand faces, in an optimised build.
 ///
 /// * `interfaces`: those of the reduction, proximal first.
 ///

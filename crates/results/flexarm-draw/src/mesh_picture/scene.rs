@@ -24,7 +24,8 @@ const LIFT: f64 = 0.004;
 /// How the triangles are coloured.
 #[derive(Debug, Clone, Copy)]
 pub enum Paint<'a> {
-    /// Each triangle in a colour of its own, and another one where the value `side` of its points is positive.
+    /// Each triangle in a colour of its own, and another one where the value `side` of its points
+    /// is positive.
     Faces {
         /// Colours of each triangle, for negative and for positive `side`.
         colors: &'a [[Rgb; 2]],
@@ -311,7 +312,8 @@ fn mean(colors: impl Iterator<Item = Rgb> + Clone) -> Rgb {
     [0, 1, 2].map(|c| (colors.clone().map(|color| usize::from(color[c])).sum::<usize>() / count) as u8)
 }
 
-/// Light on a wall by its normal in axes of the picture: a key light from the upper left, one from the viewer.
+/// Light on a wall by its normal in axes of the picture: a key light from the upper left, one from
+/// the viewer.
 fn brightness(right: f64, up: f64, toward: f64) -> f64 {
     // A wall seen from behind is lit like one seen from the front.
     let sign = if toward < 0.0 { -1.0 } else { 1.0 };

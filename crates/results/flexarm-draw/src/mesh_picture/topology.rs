@@ -1,4 +1,5 @@
-//! What makes a heap of triangles look like a body: normals that are smooth over curved walls, lines at edges.
+//! What makes a heap of triangles look like a body: normals that are smooth over curved walls,
+//! lines at edges.
 
 use nalgebra::Vector3;
 
@@ -16,7 +17,8 @@ pub(super) fn triangle_normals(positions: &[Vector3<f64>], triangles: &[[u32; 3]
     triangles.iter().map(normal).collect()
 }
 
-/// Normals at the corners of triangles: the mean of the triangles around that belong to the same wall.
+/// Normals at the corners of triangles: the mean of the triangles around that belong to the same
+/// wall.
 pub(super) fn corner_normals(positions: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Vec<[Vector3<f64>; 3]> {
     let normals = triangle_normals(positions, triangles);
     let mut starts = vec![0_u32; positions.len() + 1];

@@ -18,7 +18,8 @@ pub struct View {
 }
 
 impl View {
-    /// A view in which all `points` fill a box of the picture, `[left, top, width, height]` in pixels.
+    /// A view in which all `points` fill a box of the picture, `[left, top, width, height]` in
+    /// pixels.
     ///
     /// * `right`: direction that points to the right as far as `toward` allows.
     pub fn fit(
@@ -43,7 +44,8 @@ impl View {
         Self { right, up, toward, scale, origin }
     }
 
-    /// Place on the picture in pixels from the top left, and nearness to the viewer in the same unit.
+    /// Place on the picture in pixels from the top left, and nearness to the viewer in the same
+    /// unit.
     pub fn project(&self, p: &Vector3<f64>) -> [f64; 3] {
         [
             self.origin[0] + self.scale * self.right.dot(p),
@@ -93,7 +95,8 @@ impl LinkAxes {
         Self { along, across, out: along.cross(&across) }
     }
 
-    /// A direction to look from: `turn` about the vertical of the picture, then `tilt` above it, radians.
+    /// A direction to look from: `turn` about the vertical of the picture, then `tilt` above it,
+    /// radians.
     ///
     /// Positive `turn` shows the end of B.
     pub(super) fn viewpoint(&self, turn: f64, tilt: f64) -> Vector3<f64> {

@@ -1,7 +1,7 @@
 //! Tables of results as Parquet files.
 //!
-//! A number or text that is missing is null in the file; a NaN is missing. The same table gives the same bytes on any machine: rows
-//! go into groups of [`GROUP`], nothing depends on the clock.
+//! A number or text that is missing is null in the file; a NaN is missing. The same table gives the
+//! same bytes on any machine: rows go into groups of [`GROUP`], nothing depends on the clock.
 
 use std::fs::File;
 use std::path::Path;

@@ -1,4 +1,5 @@
-//! Tables of results that are no recording of a run: whole numbers, numbers and texts in columns with names.
+//! Tables of results that are no recording of a run: whole numbers, numbers and texts in columns
+//! with names.
 //!
 //! Written and read as Parquet (`data_table/file.rs`), in builds that have it.
 

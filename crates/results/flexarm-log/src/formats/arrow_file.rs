@@ -1,8 +1,8 @@
-//! The table of a run as an Arrow IPC file (Feather, version 2), written and read: the columns of the CSV as `double`, the
-//! header and the result beside them.
+//! The table of a run as an Arrow IPC file (Feather, version 2), written and read: the columns of
+//! the CSV as `double`, the header and the result beside them.
 //!
-//! Numbers lie in the file as they do in memory, uncompressed: pyarrow, polars and DuckDB map it instead of reading it. Start
-//! at [`ArrowRecorder`].
+//! Numbers lie in the file as they do in memory, uncompressed: pyarrow, polars and DuckDB map it
+//! instead of reading it. Start at [`ArrowRecorder`].
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -34,12 +34,14 @@ const CONTINUATION: [u8; 4] = [0xff; 4];
 
 /// Writes a run as an Arrow IPC file, which is also called Feather, version 2.
 ///
-/// Columns are those of [`crate::CsvRecorder`], all `double` without missing values, in record batches of at most 16,384
-/// rows, not compressed. The metadata of the schema say what a table has no column for, under the keys of
-/// `ParquetRecorder`'s. They are in the footer; the copy of the schema at the start of the file, which streaming readers
-/// take, lacks what is known only at the end of the run.
+/// Columns are those of [`crate::CsvRecorder`], all `double` without missing values, in record
+/// batches of at most 16,384 rows, not compressed. The metadata of the schema say what a table has
+/// no column for, under the keys of `ParquetRecorder`'s. They are in the footer; the copy of the
+/// schema at the start of the file, which streaming readers take, lacks what is known only at the
+/// end of the run.
 ///
-/// As a Parquet file it comes into being under the name `<file>.partial` and is renamed by `finish`.
+/// As a Parquet file it comes into being under the name `<file>.partial` and is renamed by
+/// `finish`.
 pub type ArrowRecorder = FileRecorder<ArrowFile>;
 
 /// An Arrow file that is being written.
@@ -125,7 +127,8 @@ impl ArrowFile {
         Ok(())
     }
 
-    /// What follows the last record batch: the footer with the schema, all its texts, and the places of the batches.
+    /// What follows the last record batch: the footer with the schema, all its texts, and the
+    /// places of the batches.
     fn end(&self, result: &RunResult) -> Vec<u8> {
         let mut texts = self.schema.metadata().clone();
         texts.extend(texts_at_end(result));

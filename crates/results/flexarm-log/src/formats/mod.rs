@@ -1,7 +1,9 @@
-//! The formats of recordings: a row of [`FORMATS`] each, and nothing about a format is said anywhere else.
+//! The formats of recordings: a row of [`FORMATS`] each, and nothing about a format is said
+//! anywhere else.
 //!
-//! A format is its module and its row. From the row come the files of a run, the words of `convert`, what reports look for,
-//! the keys of summaries and the flags of the command line. Start at [`RecordingFormat`]; [`open_recording`] is the way back.
+//! A format is its module and its row. From the row come the files of a run, the words of
+//! `convert`, what reports look for, the keys of summaries and the flags of the command line. Start
+//! at [`RecordingFormat`]; [`open_recording`] is the way back.
 //!
 //! | format | what comes back |
 //! | --- | --- |
@@ -37,7 +39,8 @@ pub enum RecordingFormat {
     Arrow,
 }
 
-/// The module of a format, if this build has its feature: its recorder and, where it is read back, its reader.
+/// The module of a format, if this build has its feature: its recorder and, where it is read back,
+/// its reader.
 macro_rules! code {
     ($recorder:ty) => {
         Some(Code { recorder: |path, options| Box::new(<$recorder>::create(path, options)), reader: None })
@@ -144,7 +147,8 @@ pub struct FormatInfo {
     pub format: RecordingFormat,
     /// What people call it.
     pub name: &'static str,
-    /// Ending of file names, without the dot; also its word on command lines and its key in summaries.
+    /// Ending of file names, without the dot; also its word on command lines and its key in
+    /// summaries.
     pub extension: &'static str,
     /// Endings that are understood besides.
     pub other_extensions: &'static [&'static str],
@@ -158,11 +162,13 @@ pub struct FormatInfo {
     pub by_default: bool,
     /// Feature of this crate that brings it; every build has one without.
     pub feature: Option<&'static str>,
-    /// Whether what a killed run leaves can be read; otherwise the file is there whole or not at all.
+    /// Whether what a killed run leaves can be read; otherwise the file is there whole or not at
+    /// all.
     pub survives_a_kill: bool,
     /// Most samples that a file can hold.
     pub most_samples: Option<u64>,
-    /// Latest time of a sample that a file can hold (s), for a run that begins at [`crate::START_NS`].
+    /// Latest time of a sample that a file can hold (s), for a run that begins at
+    /// [`crate::START_NS`].
     pub latest_s: Option<f64>,
     code: Option<Code>,
 }
@@ -170,7 +176,8 @@ pub struct FormatInfo {
 /// How much of a run a format holds, most first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Holds {
-    /// Every number of every sample, poses (of links at most 200 a second), surfaces, and what is said about the run.
+    /// Every number of every sample, poses (of links at most 200 a second), surfaces, and what is
+    /// said about the run.
     Everything,
     /// A table of scalars with names, set-up, result and events.
     DescribedTable,
@@ -260,7 +267,8 @@ impl RecordingFormat {
         self.info().holds.is_table()
     }
 
-    /// A recorder that will write `path`; none if this build cannot ([`RecordingFormat::is_built_in`]).
+    /// A recorder that will write `path`; none if this build cannot
+    /// ([`RecordingFormat::is_built_in`]).
     #[must_use]
     pub fn recorder(self, path: impl Into<PathBuf>, options: CreateOptions) -> Option<Box<dyn Recorder>> {
         self.info().code.map(|code| (code.recorder)(path.into(), options))

@@ -11,8 +11,8 @@ use crate::{LogError, RunSource};
 /// Opens a recording of flexarm and reads what it says about the run as a whole.
 ///
 /// # Errors
-/// [`LogError::Io`] if it cannot be read, [`LogError::NotARecording`] if it is something else, of a format that is only
-/// written, or of one that this build has no feature for.
+/// [`LogError::Io`] if it cannot be read, [`LogError::NotARecording`] if it is something else, of a
+/// format that is only written, or of one that this build has no feature for.
 pub fn open_recording(path: &Path, format: RecordingFormat) -> Result<Box<dyn RunSource>, LogError> {
     check_kind(path, format)?;
     match format.info().code {

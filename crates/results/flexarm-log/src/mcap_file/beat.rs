@@ -1,6 +1,7 @@
 //! What is sent less often than samples come.
 
-/// Says yes to the first sample of every interval of simulated time, so never more often than its rate on average.
+/// Says yes to the first sample of every interval of simulated time, so never more often than its
+/// rate on average.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Beat {
     hz: u32,

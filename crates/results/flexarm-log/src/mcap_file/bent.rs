@@ -1,8 +1,9 @@
-//! Links that bend, for viewers that only know rigid bodies: the surface in slabs across the link, each with a frame of
-//! its own that moves with the section in its middle.
+//! Links that bend, for viewers that only know rigid bodies: the surface in slabs across the link,
+//! each with a frame of its own that moves with the section in its middle.
 //!
-//! Meshes are sent once and frames often; so the bent link moves as smoothly as the rest of the arm, at a hundredth of
-//! the bytes of a new surface per picture. Slabs overlap a little, which hides the slits between them.
+//! Meshes are sent once and frames often; so the bent link moves as smoothly as the rest of the
+//! arm, at a hundredth of the bytes of a new surface per picture. Slabs overlap a little, which
+//! hides the slits between them.
 
 use flexarm_kinematics::Pose;
 use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
@@ -125,7 +126,8 @@ mod tests {
         }
     }
 
-    /// Truth: the bent surface that is drawn point by point elsewhere, at points of the middle sections.
+    /// Truth: the bent surface that is drawn point by point elsewhere, at points of the middle
+    /// sections.
     #[test]
     fn a_slab_moves_with_the_section_in_its_middle() {
         let (link, _) = link();

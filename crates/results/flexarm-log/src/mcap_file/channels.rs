@@ -1,8 +1,8 @@
 //! Topics of a recording: names, message types, qualities of service.
 //!
-//! Rerun plots eight topics of joint states and arrays by itself, in the order of their names: the error of the tool has a name
-//! that comes first, and what would fill all places, such as a deflection of each element, is of a type that it does not
-//! plot.
+//! Rerun plots eight topics of joint states and arrays by itself, in the order of their names: the
+//! error of the tool has a name that comes first, and what would fill all places, such as a
+//! deflection of each element, is of a type that it does not plot.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
@@ -183,7 +183,8 @@ fn qos_profile(latched: bool) -> String {
     )
 }
 
-/// Names turned into valid and distinct parts of a ROS topic: letters, digits and `_`, no digit first.
+/// Names turned into valid and distinct parts of a ROS topic: letters, digits and `_`, no digit
+/// first.
 pub(crate) fn topic_names(names: &[String]) -> Vec<String> {
     // `/elastic/joint_states` is taken.
     let mut taken = BTreeSet::from(["joint_states".to_owned()]);

@@ -1,8 +1,8 @@
 //! Texts of the ROS 2 message definitions that a recording uses.
 //!
-//! The field lists follow the packages `std_msgs`, `geometry_msgs`, `sensor_msgs`, `tf2_msgs`, `visualization_msgs` (as
-//! since Humble, with texture and embedded mesh), `rcl_interfaces` and `builtin_interfaces` of ROS 2; readers decode
-//! messages by them.
+//! The field lists follow the packages `std_msgs`, `geometry_msgs`, `sensor_msgs`, `tf2_msgs`,
+//! `visualization_msgs` (as since Humble, with texture and embedded mesh), `rcl_interfaces` and
+//! `builtin_interfaces` of ROS 2; readers decode messages by them.
 
 /// Line between a message and the definitions it depends on.
 const SEPARATOR: &str = "================================================================================";

@@ -1,4 +1,5 @@
-//! Coordinate frames of a recording: the trees of both robots and of the magnified arm, and what moves in them.
+//! Coordinate frames of a recording: the trees of both robots and of the magnified arm, and what
+//! moves in them.
 
 use flexarm_kinematics::Pose;
 
@@ -114,8 +115,8 @@ impl Frames {
         }
     }
 
-    /// Goes on to a sample; makes the magnified arm if it is time for a picture. Returns whether the sample's frames are to be
-    /// written.
+    /// Goes on to a sample; makes the magnified arm if it is time for a picture. Returns whether
+    /// the sample's frames are to be written.
     pub(crate) fn advance(&mut self, since_start_ns: u64, sample: &Sample) -> bool {
         let Shown { due, new_peak } = self.clock.take(since_start_ns, sample, self.has_rigid);
         self.shown = due || new_peak;
@@ -211,8 +212,8 @@ pub(crate) fn is_magnified(header: &RunHeader) -> bool {
     header.has_rigid && header.magnification > 0.0
 }
 
-/// The robot whose links are drawn bent: the magnified one. Deflections of a recording that is not to be magnified, such
-/// as one of modes, can be seen as they are; those of a single robot cannot.
+/// The robot whose links are drawn bent: the magnified one. Deflections of a recording that is not
+/// to be magnified, such as one of modes, can be seen as they are; those of a single robot cannot.
 pub(crate) fn bending_tree(header: &RunHeader) -> Option<Tree> {
     match (is_magnified(header), header.has_rigid) {
         (true, _) => Some(Tree::Magnified),

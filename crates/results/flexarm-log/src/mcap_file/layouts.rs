@@ -1,7 +1,7 @@
 //! Layouts for viewers of a recording: files that lie beside it and are opened with it.
 //!
-//! Both show the same: the error of the tool, what causes it, what the drives do; Foxglove the arm as well. Curves have the
-//! colours that they have elsewhere ([`flexarm_draw::palette`]).
+//! Both show the same: the error of the tool, what causes it, what the drives do; Foxglove the arm
+//! as well. Curves have the colours that they have elsewhere ([`flexarm_draw::palette`]).
 
 use serde_json::{Value, json};
 
@@ -70,7 +70,8 @@ fn plots(header: &RunHeader) -> Vec<Plot> {
     plots
 }
 
-/// A layout for [Foxglove](https://foxglove.dev): the arm with its ghost on the left, plots on the right, events below.
+/// A layout for [Foxglove](https://foxglove.dev): the arm with its ghost on the left, plots on the
+/// right, events below.
 #[must_use]
 pub fn foxglove_layout(header: &RunHeader) -> String {
     let plots = plots(header);

@@ -1,7 +1,8 @@
-//! What viewers draw without any file: the links' surfaces, the paths of the tool, and its error, magnified.
+//! What viewers draw without any file: the links' surfaces, the paths of the tool, and its error,
+//! magnified.
 //!
-//! A viewer that jumps in time shows the last message of each topic, so what is sent at another pace has a topic of its
-//! own: surfaces once, paths each second, the error often.
+//! A viewer that jumps in time shows the last message of each topic, so what is sent at another
+//! pace has a topic of its own: surfaces once, paths each second, the error often.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -60,7 +61,8 @@ pub(crate) fn surfaces<'a>(header: &RunHeader, frames: &'a SurfaceFrames) -> Vec
     markers
 }
 
-/// Which links can be elsewhere than those of the rigid twin: magnified, the others would only lie on themselves.
+/// Which links can be elsewhere than those of the rigid twin: magnified, the others would only lie
+/// on themselves.
 fn deviating(header: &RunHeader) -> Vec<bool> {
     let bends = |name: &String| header.bends.iter().any(|bend| header.links[bend.link].name == *name);
     let drives_give_way = !header.contributors.iter().all(bends);
@@ -189,7 +191,8 @@ pub(crate) struct MovingMarkers {
     flexible: Path,
     rigid: Path,
     magnified: Path,
-    /// Distance from the base to the tool in the first sample (m): lines are so wide that they are seen on any robot.
+    /// Distance from the base to the tool in the first sample (m): lines are so wide that they are
+    /// seen on any robot.
     reach: f64,
     seconds: Beat,
     errors: Beat,

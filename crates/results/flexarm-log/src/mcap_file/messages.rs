@@ -1,6 +1,8 @@
-//! The ROS 2 messages of a recording, and their bytes: plain CDR, little endian [OMG DDSI-RTPS 2.5, section 10].
+//! The ROS 2 messages of a recording, and their bytes: plain CDR, little endian [OMG DDSI-RTPS 2.5,
+//! section 10].
 //!
-//! CDR has values and no names, so a message is a tuple of its fields, in the order of its definition.
+//! CDR has values and no names, so a message is a tuple of its fields, in the order of its
+//! definition.
 
 use std::io;
 
@@ -121,7 +123,8 @@ pub(crate) enum MarkerKind {
     TriangleList = 11,
 }
 
-/// What is set of a `visualization_msgs/Marker`; it stays until another of its namespace and number comes.
+/// What is set of a `visualization_msgs/Marker`; it stays until another of its namespace and number
+/// comes.
 #[derive(Clone, Debug)]
 pub(crate) struct Marker<'a> {
     pub(crate) frame: &'a str,
@@ -130,7 +133,8 @@ pub(crate) struct Marker<'a> {
     pub(crate) kind: MarkerKind,
     /// Place of a text (m).
     pub(crate) place: [f64; 3],
-    /// Sizes: of a line its width, of an arrow shaft, head width and head length, of a text its height as the third (m).
+    /// Sizes: of a line its width, of an arrow shaft, head width and head length, of a text its
+    /// height as the third (m).
     pub(crate) scale: [f64; 3],
     /// Red, green, blue, alpha, 0 to 1.
     pub(crate) color: [f32; 4],

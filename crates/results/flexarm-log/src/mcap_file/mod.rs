@@ -5,8 +5,8 @@
 //! are in the file once they are closed: up to there readers that need no index read what a killed
 //! run leaves. The `mcap` crate writes them ([`output`]).
 //!
-//! Start at [`McapRecorder`]; topics are in [`channels`], messages in [`messages`], coordinate frames in [`frames`], what
-//! viewers draw in [`markers`].
+//! Start at [`McapRecorder`]; topics are in [`channels`], messages in [`messages`], coordinate
+//! frames in [`frames`], what viewers draw in [`markers`].
 
 mod beat;
 mod bent;
@@ -56,22 +56,26 @@ use crate::{CreateOptions, EventKind, LogError, RunHeader, RunResult, START_NS, 
 /// | `/markers/path` | `visualization_msgs/MarkerArray` | paths of the tool so far, each second; namespaces `path/flexible`, `path/rigid`, `path/magnified` |
 /// | `/markers/error` | `visualization_msgs/MarkerArray` | the TCP error, magnified, 20 times a second |
 ///
-/// All else comes with every sample. `/tf` is also there at each sample whose error is larger than all before it, so that the
-/// largest one has its poses, and at the last sample; an `.rrd` made of the file is the one of the run.
+/// All else comes with every sample. `/tf` is also there at each sample whose error is larger than
+/// all before it, so that the largest one has its poses, and at the last sample; an `.rrd` made of
+/// the file is the one of the run.
 ///
-/// Topics with `rigid` and `error` need a rigid twin, the magnified arm also [`RunHeader::magnification`]. It is sent at
-/// most 60 times per second of simulated time, with the precision of `f32`. A link of [`RunHeader::bends`] is drawn bent in
-/// slabs with the frames `magnified/<link>/bend_<k>`; in a recording that is not magnified, such as one of modes, the
+/// Topics with `rigid` and `error` need a rigid twin, the magnified arm also
+/// [`RunHeader::magnification`]. It is sent at most 60 times per second of simulated time, with the
+/// precision of `f32`. A link of [`RunHeader::bends`] is drawn bent in slabs with the frames
+/// `magnified/<link>/bend_<k>`; in a recording that is not magnified, such as one of modes, the
 /// flexible robot itself is drawn so.
 ///
-/// The names of an array's entries are in the label of its one dimension, separated by commas. SI units.
+/// The names of an array's entries are in the label of its one dimension, separated by commas. SI
+/// units.
 ///
-/// `header.stamp`, log time and publish time of a message are [`RunHeader::start_ns`], or [`START_NS`] without one, and
-/// simulated time.
+/// `header.stamp`, log time and publish time of a message are [`RunHeader::start_ns`], or
+/// [`START_NS`] without one, and simulated time.
 ///
-/// The file also holds `robot.urdf`, the mesh files, `RunHeader::attachments`, for readers of flexarm `run.json` and
-/// `meshes.bin.zst` (header and surfaces) and, at the end, `result.json` and `RunResult::attachments` as attachments, and the groups of `RunHeader::metadata`, `flexarm.recording`, `flexarm.units` and, at the end,
-/// `flexarm.result` as metadata.
+/// The file also holds `robot.urdf`, the mesh files, `RunHeader::attachments`, for readers of
+/// flexarm `run.json` and `meshes.bin.zst` (header and surfaces) and, at the end, `result.json` and
+/// `RunResult::attachments` as attachments, and the groups of `RunHeader::metadata`,
+/// `flexarm.recording`, `flexarm.units` and, at the end, `flexarm.result` as metadata.
 pub type McapRecorder = FileRecorder<McapFile>;
 
 /// Stamp of a simulated time in a file whose time zero is `start_ns`.
@@ -285,7 +289,8 @@ impl McapFile {
         self.output.send(channel, self.samples, stamp, messages::joint_state(stamp, &self.joints, values))
     }
 
-    /// Deflections and loads: all by name with each sample, and one topic pair per element for what draws them.
+    /// Deflections and loads: all by name with each sample, and one topic pair per element for what
+    /// draws them.
     fn elastic(&mut self, stamp: Stamp, sample: &Sample) -> io::Result<()> {
         if let Some(channel) = self.channels.elastic_joint_states {
             self.values.clear();

@@ -2,8 +2,9 @@
 //!
 //! What comes back of a run is said beside the table of formats (`formats/mod.rs`).
 //!
-//! A file that a killed run left, or a copy that broke off, is read up to its break; [`crate::RunSource::warnings`] says so.
-//! What a format does not hold is not made up: numbers are NaN, lists empty, and [`crate::RunSource::missing`] lists it.
+//! A file that a killed run left, or a copy that broke off, is read up to its break;
+//! [`crate::RunSource::warnings`] says so. What a format does not hold is not made up: numbers are
+//! NaN, lists empty, and [`crate::RunSource::missing`] lists it.
 
 mod csv_table;
 #[cfg(feature = "mcap")]
@@ -45,8 +46,8 @@ pub(crate) fn stem(path: &Path) -> String {
     PathBuf::from(path.file_stem().unwrap_or_default()).display().to_string()
 }
 
-/// Time (s) and number of steps of a stamp. Stamps are whole nanoseconds; where the step is known, the time is that
-/// multiple of it to the last bit.
+/// Time (s) and number of steps of a stamp. Stamps are whole nanoseconds; where the step is known,
+/// the time is that multiple of it to the last bit.
 #[cfg(feature = "mcap")]
 fn exact_time(time_ns: u64, step_s: f64) -> (f64, u64) {
     let time_s = time_ns as f64 / 1e9;

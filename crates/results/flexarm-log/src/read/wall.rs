@@ -1,6 +1,7 @@
 //! The last wall before what a dependency makes of a damaged file.
 //!
-//! Sizes that a file claims are checked before a dependency sees them; what still goes wrong inside it ends here.
+//! Sizes that a file claims are checked before a dependency sees them; what still goes wrong inside
+//! it ends here.
 
 use std::any::Any;
 use std::cell::Cell;
@@ -12,8 +13,8 @@ thread_local! {
     static CAUGHT: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Calls a reader of a dependency. A panic in it is an error in words, and says nothing by itself. What the reader has
-/// changed must not be used after an error.
+/// Calls a reader of a dependency. A panic in it is an error in words, and says nothing by itself.
+/// What the reader has changed must not be used after an error.
 pub(crate) fn caught<T>(read: impl FnOnce() -> T) -> Result<T, String> {
     static QUIET: Once = Once::new();
     QUIET.call_once(|| {

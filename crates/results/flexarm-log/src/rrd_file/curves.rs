@@ -13,7 +13,8 @@ use crate::{RunHeader, Sample};
 pub(crate) struct Curves {
     /// The error, at every sample; in the order in which [`Curves::push_error`] fills them.
     error: Vec<ScalarTrack>,
-    /// All else, at the instants at which the robots are drawn; in the order of [`Curves::push_causes`].
+    /// All else, at the instants at which the robots are drawn; in the order of
+    /// [`Curves::push_causes`].
     causes: Vec<ScalarTrack>,
     has_rigid: bool,
 }

@@ -11,8 +11,8 @@ pub(crate) struct Eye {
     pub(crate) target: [f32; 3],
 }
 
-/// How far beside the middle the scale of colours stands, and half its height, as shares of the distance of the eye: within
-/// a view that is wider than high, outside of the arm.
+/// How far beside the middle the scale of colours stands, and half its height, as shares of the
+/// distance of the eye: within a view that is wider than high, outside of the arm.
 const BESIDE: [f64; 2] = [0.62, 0.3];
 
 impl Eye {
@@ -27,13 +27,13 @@ impl Eye {
     }
 }
 
-/// From where the line of sight is turned against the direction in which the arm reaches (rad): aside of the plane in which
-/// it stands at first, so that bending in that plane is seen.
+/// From where the line of sight is turned against the direction in which the arm reaches (rad):
+/// aside of the plane in which it stands at first, so that bending in that plane is seen.
 const TURN_RAD: f64 = -1.15;
 /// Rise of the line of sight.
 const RISE: f64 = 0.36;
-/// Distance of the eye in radii of the ball around everything: the viewer's field of view is 55 degrees high, and the view
-/// about as wide as it is high.
+/// Distance of the eye in radii of the ball around everything: the viewer's field of view is 55
+/// degrees high, and the view about as wide as it is high.
 const DISTANCE: f64 = 1.6;
 /// Bodies reach beyond their frames.
 const MARGIN: f64 = 1.08;

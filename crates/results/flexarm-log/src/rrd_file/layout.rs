@@ -1,7 +1,9 @@
-//! What the viewer shows when it opens a recording: the robots on the left, plots and text on the right.
+//! What the viewer shows when it opens a recording: the robots on the left, plots and text on the
+//! right.
 //!
-//! Written as the entities of a blueprint: the builder of the SDK (`rerun::blueprint`) cannot set the eye and the
-//! background of a 3D view, the legend and the axis of a plot, and the columns of a log.
+//! Written as the entities of a blueprint: the builder of the SDK (`rerun::blueprint`) cannot set
+//! the eye and the background of a 3D view, the legend and the axis of a plot, and the columns of a
+//! log.
 
 use rerun::external::re_sdk_types::blueprint::archetypes::{
     Background, ContainerBlueprint, EyeControls3D, PanelBlueprint, PlotLegend, ScalarAxis, TextLogColumns, TimeAxis,
@@ -72,8 +74,8 @@ impl Part {
     }
 }
 
-/// The entities of a layout with `root` as the window, playing on `timeline`; without an eye the viewer
-/// chooses one.
+/// The entities of a layout with `root` as the window, playing on `timeline`; without an eye the
+/// viewer chooses one.
 pub(crate) fn entities(root: &Part, timeline: &str, eye: Option<Eye>) -> (Entities, Vec<PlotPlace>) {
     let mut layout = Layout { entities: Vec::new(), plots: Vec::new(), parts: 0, eye };
     let root_id = layout.add(root).id;
@@ -97,7 +99,8 @@ pub(crate) struct PlotPlace {
     path: String,
 }
 
-/// For each plot an axis that shows all its curves with labels, and a corner in which their names hide nothing.
+/// For each plot an axis that shows all its curves with labels, and a corner in which their names
+/// hide nothing.
 pub(crate) fn rooms(plots: &[PlotPlace], seen: &[Seen]) -> Entities {
     let mut entities: Entities = Vec::new();
     for plot in plots {
@@ -166,7 +169,8 @@ impl Layout {
         let contents = ViewContents::new(view.contents.iter().map(String::as_str));
         self.log(&format!("{}/ViewContents", placed.path), contents);
         if view.class == VIEW_PLOT {
-            // All plots zoom together; the legend gets its place when the curves are known ([`rooms`]).
+            // All plots zoom together; the legend gets its place when the curves are known
+            // ([`rooms`]).
             self.log(&format!("{}/PlotLegend", placed.path), PlotLegend::new().with_corner(Corner2D::LeftTop));
             self.log(&format!("{}/TimeAxis", placed.path), TimeAxis::new().with_link(LinkAxis::LinkToGlobal));
             self.plots.push(PlotPlace { origin: view.origin.clone(), path: placed.path.clone() });

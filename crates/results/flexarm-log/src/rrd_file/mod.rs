@@ -1,9 +1,9 @@
 //! Runs as a Rerun recording (.rrd): robots with their meshes, plots, text and a window layout.
 //!
-//! Start at [`RrdRecorder`] for one run and [`RrdStudy`] for several in one view. [`run`] holds what a run shows, made of
-//! [`robot`]s and [`curves`]; [`tracks`] holds rows until they are worth a chunk; [`window`] says what the viewer
-//! shows, [`layout`] writes that down; [`stream`] writes the file. Only this module names the `rerun` crate, which breaks
-//! about monthly.
+//! Start at [`RrdRecorder`] for one run and [`RrdStudy`] for several in one view. [`run`] holds
+//! what a run shows, made of [`robot`]s and [`curves`]; [`tracks`] holds rows until they are worth
+//! a chunk; [`window`] says what the viewer shows, [`layout`] writes that down; [`stream`] writes
+//! the file. Only this module names the `rerun` crate, which breaks about monthly.
 
 mod colors;
 mod curves;
@@ -32,10 +32,11 @@ use crate::{CreateOptions, LogError, RunHeader, RunResult, Sample};
 
 pub use self::study::{RrdStudy, StudySeat};
 
-/// Samples whose rows are written together, and fewer after which they are written because time has passed: enough for
-/// compression, few enough for quick reading.
+/// Samples whose rows are written together, and fewer after which they are written because time has
+/// passed: enough for compression, few enough for quick reading.
 const CHUNK_ROWS: [usize; 2] = [1024, 128];
-/// The same of a long run, which is one with more than so many writings: the SDK keeps a list of all chunks in memory.
+/// The same of a long run, which is one with more than so many writings: the SDK keeps a list of
+/// all chunks in memory.
 const LONG_CHUNK_ROWS: [usize; 2] = [8 * 1024, 1024];
 const SHORT_WRITINGS: usize = 16;
 
@@ -61,13 +62,15 @@ const SHORT_WRITINGS: usize = 16;
 /// | `/events` | moves, largest error, settling, limits |
 /// | `/summary`, `/urdf` | result and set-up, and the robot's description, as text |
 ///
-/// Errors and deflections are in millimetres and milliradians because people read them here; the other formats
-/// are for programs and keep metres and radians. Curves have every sample; poses at most 200 a second, in single
-/// precision, which is all the viewer has: that is 1e-6 m on an arm of a few metres. A bent surface is written whenever a
-/// corner has moved by 0.1 mm (by a 1500th of the scene on the magnified arm); what is rigid with its ends always.
+/// Errors and deflections are in millimetres and milliradians because people read them here; the
+/// other formats are for programs and keep metres and radians. Curves have every sample; poses at
+/// most 200 a second, in single precision, which is all the viewer has: that is 1e-6 m on an arm of
+/// a few metres. A bent surface is written whenever a corner has moved by 0.1 mm (by a 1500th of
+/// the scene on the magnified arm); what is rigid with its ends always.
 ///
-/// Timelines: `sim_time` (a duration) and `step`. The identifier of the recording is a hash of the header. Equal runs give
-/// equal entities, times and values; how rows are grouped into chunks, and the identifiers of these, differ.
+/// Timelines: `sim_time` (a duration) and `step`. The identifier of the recording is a hash of the
+/// header. Equal runs give equal entities, times and values; how rows are grouped into chunks, and
+/// the identifiers of these, differ.
 pub type RrdRecorder = FileRecorder<RrdFile>;
 
 impl OpenFile for RrdFile {
@@ -157,7 +160,8 @@ impl Store {
         stream.constant(&path(["urdf"]), &urdf)
     }
 
-    /// Gives the plots room for their curves and for the names of these, now that all are known, and ends the file.
+    /// Gives the plots room for their curves and for the names of these, now that all are known,
+    /// and ends the file.
     fn finish(&mut self) -> Result<()> {
         let rooms = layout::rooms(&self.plots, &self.seen);
         if !rooms.is_empty() {
@@ -221,7 +225,8 @@ impl RunWriter {
         Ok(())
     }
 
-    /// Writes the layout if that has not happened yet, with the robot of this sample in the picture.
+    /// Writes the layout if that has not happened yet, with the robot of this sample in the
+    /// picture.
     fn layout(&mut self, store: &mut Store, first: Option<&Sample>) -> Result<()> {
         let Some(window) = self.layout.take() else { return Ok(()) };
         let (entities, plots) = layout::entities(&window, SIM_TIME, eye::eye(&self.header, first));
@@ -240,7 +245,8 @@ impl RunWriter {
     }
 }
 
-/// The text panel: the result once it is known, then the set-up. A list, because its lines break where the panel ends.
+/// The text panel: the result once it is known, then the set-up. A list, because its lines break
+/// where the panel ends.
 fn summary(description: &str, result: &RunResult) -> String {
     if result.readable.is_empty() {
         return description.to_owned();
@@ -263,8 +269,8 @@ pub(crate) fn link_part(name: &str) -> String {
     }
 }
 
-/// FNV-1a of all that a header says, files included, and of the labels of a study: the same set-up gives the same recording,
-/// and a viewer that has two of different set-ups keeps them apart.
+/// FNV-1a of all that a header says, files included, and of the labels of a study: the same set-up
+/// gives the same recording, and a viewer that has two of different set-ups keeps them apart.
 fn content_hash(header: &RunHeader, labels: &[String]) -> u64 {
     const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
     const PRIME: u64 = 0x0000_0100_0000_01b3;

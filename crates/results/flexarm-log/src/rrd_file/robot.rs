@@ -1,4 +1,5 @@
-//! One of the robots of a recording: rigid twin, flexible arm, or the flexible arm with its deflections magnified.
+//! One of the robots of a recording: rigid twin, flexible arm, or the flexible arm with its
+//! deflections magnified.
 
 use flexarm_kinematics::{Pose, rotation_vector};
 use nalgebra::{Point3, Vector3};
@@ -171,7 +172,8 @@ impl RobotTracks {
             Rgba32::from_unmultiplied_rgba(red, green, blue, alpha)
         };
         match self.look.paint {
-            // Its back faces only: they are hidden wherever the flexible robot is in the same place.
+            // Its back faces only: they are hidden wherever the flexible robot is in the same
+            // place.
             Paint::Ghost => {
                 surface.with_albedo_factor(AlbedoFactor(colors::ghost())).with_face_rendering(MeshFaceRendering::Back)
             }
@@ -181,7 +183,8 @@ impl RobotTracks {
         }
     }
 
-    /// A surface that takes its colours from a strip which comes with time; `along` says from where on it, 0 to 1.
+    /// A surface that takes its colours from a strip which comes with time; `along` says from where
+    /// on it, 0 to 1.
     fn strip(&self, mesh: &LinkMesh, width: usize, along: impl Iterator<Item = f32>) -> Mesh3D {
         if !matches!(self.look.paint, Paint::Deviation(_)) {
             return self.painted(mesh);
@@ -190,7 +193,8 @@ impl RobotTracks {
         surface.with_albedo_texture_format(TintTrack::format(width))
     }
 
-    /// Whether its colours tell how far it is from the rigid twin, and it has surfaces that show them.
+    /// Whether its colours tell how far it is from the rigid twin, and it has surfaces that show
+    /// them.
     pub(crate) fn is_colored(&self) -> bool {
         matches!(self.look.paint, Paint::Deviation(_)) && self.skeleton.is_none()
     }
@@ -200,7 +204,8 @@ impl RobotTracks {
         &self.look.root
     }
 
-    /// The tool as a line from the frame that carries it to the tool centre point: most robot files have no mesh for it.
+    /// The tool as a line from the frame that carries it to the tool centre point: most robot files
+    /// have no mesh for it.
     pub(crate) fn tool(&self, X_TL: &Pose, stream: &RrdStream) -> Result<()> {
         const SHORTEST_M: f64 = 0.01;
         if X_TL.translation.vector.norm() < SHORTEST_M {
@@ -216,7 +221,8 @@ impl RobotTracks {
         stream.constant(&self.look.root.join(&path(["tcp", "tool"])), &line)
     }
 
-    /// Adds an instant. `twin` is what is drawn; `sample` says how far places really are from the rigid twin.
+    /// Adds an instant. `twin` is what is drawn; `sample` says how far places really are from the
+    /// rigid twin.
     pub(crate) fn push(&mut self, when: Instant, twin: &TwinSample, sample: &Sample) {
         for (link, track) in &mut self.links {
             track.push(when, &twin.X_WL[*link]);

@@ -93,7 +93,8 @@ impl Fineness {
         const PIXELS: f64 = 800.0;
         let extent = header.volume.map_or(3.0, |[low, high]| size(&[0, 1, 2].map(|c| high[c] - low[c])));
         let pixel_m = extent / PIXELS;
-        // Of arms that bend by centimetres in proportion; of arms of a few centimetres a pixel is less.
+        // Of arms that bend by centimetres in proportion; of arms of a few centimetres a pixel is
+        // less.
         let true_tolerance_m = (0.02 * header.color_scale_m).max(1e-4).min(pixel_m);
         // A power of two, so that rounded numbers are short.
         let quantum_m = (0.5 * pixel_m).log2().floor().exp2() as f32;
@@ -199,7 +200,8 @@ impl RunTracks {
         })
     }
 
-    /// Writes what is known of the robots with the first sample: their tools, and where the scale of their colours stands.
+    /// Writes what is known of the robots with the first sample: their tools, and where the scale
+    /// of their colours stands.
     pub(crate) fn tools(&self, header: &RunHeader, first: &Sample, stream: &RrdStream) -> Result<()> {
         self.captions(header, first, stream)?;
         self.tool_lines(header, first, stream)?;

@@ -1,4 +1,5 @@
-//! What stands still around a robot: points, surfaces and ellipsoids of a map, a view for each group.
+//! What stands still around a robot: points, surfaces and ellipsoids of a map, a view for each
+//! group.
 
 use crate::{RunHeader, Scenery, SceneryForm};
 use rerun::{

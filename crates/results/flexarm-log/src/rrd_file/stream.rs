@@ -82,7 +82,8 @@ impl RrdStream {
         Ok(self.recording.send_columns(path.clone(), times, columns)?)
     }
 
-    /// Writes entities of the layout and shows it, now and by default. What is written later replaces what was there.
+    /// Writes entities of the layout and shows it, now and by default. What is written later
+    /// replaces what was there.
     pub(crate) fn show(&self, entities: &Entities, version: i64) -> Result<()> {
         self.blueprint.set_time_sequence("blueprint", version);
         for (path, what) in entities {
@@ -109,14 +110,16 @@ impl RrdStream {
         let length = || self.path.metadata().ok().map(|file| file.len());
         let before = length();
         self.recording.disconnect();
-        // The SDK does not say whether the index was written. It is never empty; a file that was removed has no length.
+        // The SDK does not say whether the index was written. It is never empty; a file that was
+        // removed has no length.
         match length().is_none_or(|length| Some(length) > before) {
             true => Ok(()),
             false => Err(self.broken(&"the index is missing").into()),
         }
     }
 
-    /// Returns why the file cannot be written, which the SDK says only to its log: writing more fails alike.
+    /// Returns why the file cannot be written, which the SDK says only to its log: writing more
+    /// fails alike.
     fn broken(&self, error: &dyn std::fmt::Display) -> io::Error {
         let probe = || {
             let mut file = OpenOptions::new().append(true).open(&self.path)?;

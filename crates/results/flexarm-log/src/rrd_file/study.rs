@@ -9,10 +9,11 @@ use super::run::Seat;
 use super::{RunWriter, Store, content_hash, path, stream_error};
 use crate::{CreateOptions, LogError, Recorder, RunHeader, RunResult, Sample};
 
-/// A recording of several runs: each has its arm in a colour of its own (deflections magnified), the way of its tool and its
-/// error; the first one all curves and the rigid twin too.
+/// A recording of several runs: each has its arm in a colour of its own (deflections magnified),
+/// the way of its tool and its error; the first one all curves and the rigid twin too.
 ///
-/// The runs are recorded one after another, each through its [`StudySeat`]; time starts at zero for all of them.
+/// The runs are recorded one after another, each through its [`StudySeat`]; time starts at zero for
+/// all of them.
 pub struct RrdStudy {
     path: PathBuf,
     options: CreateOptions,
@@ -21,7 +22,8 @@ pub struct RrdStudy {
 }
 
 impl RrdStudy {
-    /// A study that will write `path`, with a label for each run; the file is created when the first run begins.
+    /// A study that will write `path`, with a label for each run; the file is created when the
+    /// first run begins.
     pub fn create(path: impl Into<PathBuf>, options: CreateOptions, labels: Vec<String>) -> Self {
         Self { path: path.into(), options, labels, store: Arc::default() }
     }

@@ -101,7 +101,8 @@ impl Track for PoseTrack {
     }
 }
 
-/// The colours of a surface, as a strip from its near end to its far end; rows only where they change.
+/// The colours of a surface, as a strip from its near end to its far end; rows only where they
+/// change.
 #[derive(Debug)]
 pub(crate) struct TintTrack {
     path: EntityPath,
@@ -347,7 +348,8 @@ impl ScalarTrack {
     }
 }
 
-/// The way of a point through the whole run, drawn as one line, or in pieces whose colour is a value.
+/// The way of a point through the whole run, drawn as one line, or in pieces whose colour is a
+/// value.
 #[derive(Debug)]
 pub(crate) struct PathTrack {
     path: EntityPath,

@@ -34,7 +34,8 @@ pub(crate) fn window(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part
     ];
     // A recording of modes has neither a path nor events.
     let moves = !header.contributors.is_empty() || header.magnification > 0.0 || header.elements.is_empty();
-    // Two plots below each other, no more: the viewer labels an axis at powers of ten where there is little room.
+    // Two plots below each other, no more: the viewer labels an axis at powers of ten where there
+    // is little room.
     let errors = match seat {
         Seat::InStudy(..) => vec![
             plot("TCP error of all runs [mm]", &["study", "error"]),

@@ -1,7 +1,8 @@
 //! A made-up robot with three links and a motion of two seconds: input for recorders, not physics.
 //!
-//! The upper arm gives way like a damped oscillator that the motion's acceleration pushes, so that the files
-//! show what real ones do: an error while the arm speeds up and slows down, and ringing afterwards.
+//! The upper arm gives way like a damped oscillator that the motion's acceleration pushes, so that
+//! the files show what real ones do: an error while the arm speeds up and slows down, and ringing
+//! afterwards.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, pose of L in W")]
 #![allow(dead_code, reason = "every test and the example use their own part")]
 
@@ -107,7 +108,8 @@ pub(crate) fn sample(step: u64) -> Sample {
     let q = [1.2 * s - 0.6, -0.9 + 0.7 * s, 1.2 - 0.5 * s];
     let qdot = [1.2 * v, 0.7 * v, -0.5 * v];
 
-    // Bending about y from weight and motion, about z from the turning column; ringing after the stop.
+    // Bending about y from weight and motion, about z from the turning column; ringing after the
+    // stop.
     let since_stop = (time_s - 1.2).max(0.0);
     let ringing = if time_s > 1.2 { (-4.0 * since_stop).exp() * (TAU * 9.0 * since_stop).sin() } else { 0.0 };
     let about_y = 1.5e-3 + 2.0e-4 * a + 8.0e-4 * ringing;
@@ -134,8 +136,8 @@ pub(crate) fn sample(step: u64) -> Sample {
     }
 }
 
-/// The first so many samples of which poses are written: every 6 ms at 500 samples a second, those with a larger error than
-/// all before, and the last.
+/// The first so many samples of which poses are written: every 6 ms at 500 samples a second, those
+/// with a larger error than all before, and the last.
 pub(crate) fn samples_with_poses(count: u64) -> Vec<u64> {
     let error = |step: u64| sample(step).error_world[..3].iter().map(|part| part * part).sum::<f64>().sqrt();
     let mut largest = -1.0;

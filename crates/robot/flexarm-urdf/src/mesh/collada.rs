@@ -1,7 +1,9 @@
-//! COLLADA 1.4/1.5: triangles and polylists of the visual scene, in metres, z up, node transforms applied.
+//! COLLADA 1.4/1.5: triangles and polylists of the visual scene, in metres, z up, node transforms
+//! applied.
 //!
-//! `mesh_loader` reads COLLADA too, but it draws a geometry that is placed several times only once, leaves normals
-//! unturned, ignores the up axis and panics on some broken files. Not read: skins, textures, curves, line sets.
+//! `mesh_loader` reads COLLADA too, but it draws a geometry that is placed several times only once,
+//! leaves normals unturned, ignores the up axis and panics on some broken files. Not read: skins,
+//! textures, curves, line sets.
 //!
 //! Frames: G geometry, N node, V the URDF's visual frame. `T_VG` includes the unit.
 

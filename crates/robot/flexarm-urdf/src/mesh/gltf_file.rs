@@ -1,7 +1,9 @@
-//! glTF 2.0, binary or with buffers beside it: triangles of the default scene, z up, node transforms applied.
+//! glTF 2.0, binary or with buffers beside it: triangles of the default scene, z up, node
+//! transforms applied.
 //!
-//! The `gltf` crate splits the file and reads its structure; indices and ranges are followed here, because its own
-//! validation and iterators panic on those that lead nowhere. Not read: textures, skins, sparse or packed accessors.
+//! The `gltf` crate splits the file and reads its structure; indices and ranges are followed here,
+//! because its own validation and iterators panic on those that lead nowhere. Not read: textures,
+//! skins, sparse or packed accessors.
 
 use std::path::Path;
 

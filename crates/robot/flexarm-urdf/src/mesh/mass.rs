@@ -36,8 +36,8 @@ impl TriangleMesh {
     /// ```text
     /// V = Σ d/6,   V c = Σ d/24 (a+b+c),   ∫ r rᵀ = Σ d/120 (aaᵀ + bbᵀ + ccᵀ + (a+b+c)(a+b+c)ᵀ)
     /// ```
-    /// Exact for a closed mesh, up to rounding. The reference is the middle of the bounding box, so that a mesh far
-    /// from its origin loses no digits.
+    /// Exact for a closed mesh, up to rounding. The reference is the middle of the bounding box, so
+    /// that a mesh far from its origin loses no digits.
     pub fn mass_properties(&self) -> MassProperties {
         let (low, high) = self.bounds().unwrap_or_default();
         let reference = (low + high) * 0.5;
@@ -76,7 +76,8 @@ impl TriangleMesh {
         self.welded_by((high - low).norm())
     }
 
-    /// Formats without shared vertices repeat them, some with rounding: weld to a millionth of the size.
+    /// Formats without shared vertices repeat them, some with rounding: weld to a millionth of the
+    /// size.
     fn welded_by(&self, size: f64) -> Vec<u32> {
         let cell = (size * 1e-6).max(f64::MIN_POSITIVE);
         let mut cells: HashMap<[i64; 3], u32> = HashMap::new();

@@ -8,10 +8,10 @@
 //! | COLLADA (`.dae`) | `<unit>` applied | `<up_axis>` turned to z | applied |
 //! | glTF (`.glb`, `.gltf`) | metres by definition | y by definition, turned to z | applied |
 //!
-//! Turning is `(x, y, z) -> (x, -z, y)` for y up. Viewers do not agree on it: for glTF, RViz (since 2025), Drake and
-//! Blender turn, older RViz does not; for COLLADA, RViz and Gazebo ignore `<up_axis>`, and some robot files carry a
-//! wrong one for that reason: [`UpAxis::Ignored`] reads them. The scale of the URDF comes last
-//! ([`TriangleMesh::scaled`]).
+//! Turning is `(x, y, z) -> (x, -z, y)` for y up. Viewers do not agree on it: for glTF, RViz (since
+//! 2025), Drake and Blender turn, older RViz does not; for COLLADA, RViz and Gazebo ignore
+//! `<up_axis>`, and some robot files carry a wrong one for that reason: [`UpAxis::Ignored`] reads
+//! them. The scale of the URDF comes last ([`TriangleMesh::scaled`]).
 //!
 //! Start at [`load_mesh`]. Not here: finding files (`resolve`), placing shapes on links
 //! ([`crate::Visual`]).

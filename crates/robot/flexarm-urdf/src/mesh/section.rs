@@ -1,7 +1,8 @@
 //! Cross sections of triangle meshes: the outline in a plane, its area and second moments.
 //!
-//! What counts is the outside: of loops within each other the outermost, so that a hollow body and its outer hull have the
-//! same section. A mesh that is not closed there counts as the convex hull of its cut.
+//! What counts is the outside: of loops within each other the outermost, so that a hollow body and
+//! its outer hull have the same section. A mesh that is not closed there counts as the convex hull
+//! of its cut.
 //!
 //! Notation: S is the frame of the section, x the normal of its plane, y and z in it.
 
@@ -23,11 +24,13 @@ pub struct CrossSection {
     pub second_moments: Matrix2<f64>,
     /// Length of the outline (m).
     pub perimeter: f64,
-    /// Whether the mesh was closed there; if not, the numbers are those of the convex hull of the cut.
+    /// Whether the mesh was closed there; if not, the numbers are those of the convex hull of the
+    /// cut.
     pub is_closed: bool,
 }
 
-/// Outlines with more loops than this count as their convex hull: screens and threads, not sections.
+/// Outlines with more loops than this count as their convex hull: screens and threads, not
+/// sections.
 const MOST_LOOPS: usize = 400;
 /// Part of the cut's length that may belong to open ends.
 const OPEN: f64 = 0.02;
@@ -36,7 +39,8 @@ const OVERLAP: f64 = 1.001;
 
 /// The section of meshes, all in the axes of one link L, by the plane y-z of S.
 ///
-/// Loops within others do not count. `None` where the plane passes all meshes by, or only touches them.
+/// Loops within others do not count. `None` where the plane passes all meshes by, or only touches
+/// them.
 pub fn cross_section(meshes: &[TriangleMesh], X_LS: &Pose) -> Option<CrossSection> {
     let X_SL = X_LS.inverse();
     let (mut loops, mut points) = (Vec::new(), Vec::new());
@@ -75,7 +79,8 @@ struct Cut {
 
 /// Segments of all triangles that the plane x = 0 of S passes, joined at the edges that they share.
 ///
-/// A vertex on the plane counts as in front of it, so every edge is either passed or not, the same for both its triangles.
+/// A vertex on the plane counts as in front of it, so every edge is either passed or not, the same
+/// for both its triangles.
 fn cut(mesh: &TriangleMesh, X_SL: &Pose) -> Cut {
     let points: Vec<Vector3<f64>> =
         mesh.positions.iter().map(|p| (X_SL * Point3::from(p.map(f64::from))).coords).collect();
@@ -171,7 +176,8 @@ fn contains(points: &[Vector2<f64>], p: &Vector2<f64>) -> bool {
     sides(points).filter(passes).count() % 2 == 1
 }
 
-/// Area, centroid and second moments of a polygon, by the divergence theorem over its sides (a, b), with d = a × b:
+/// Area, centroid and second moments of a polygon, by the divergence theorem over its sides (a, b),
+/// with d = a × b:
 ///
 /// ```text
 /// A = Σ d/2,   A c = Σ d/6 (a + b),   ∫ r rᵀ = Σ d/24 (aaᵀ + bbᵀ + (a + b)(a + b)ᵀ)

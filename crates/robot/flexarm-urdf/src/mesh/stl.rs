@@ -1,4 +1,5 @@
-//! STL, binary and ascii, told apart by size: a binary file has 84 + 50 n bytes, whatever its header says.
+//! STL, binary and ascii, told apart by size: a binary file has 84 + 50 n bytes, whatever its
+//! header says.
 
 use std::path::Path;
 

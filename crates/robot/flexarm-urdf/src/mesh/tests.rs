@@ -69,7 +69,8 @@ fn obj() -> Vec<u8> {
 
 /// In millimetres, y up, with a node that moves and a second geometry level; the box as a polylist.
 fn collada() -> Vec<u8> {
-    // V has z up: x_V = x, y_V = -z, z_V = y of the file; the node moves by 100 mm along the file's x
+    // V has z up: x_V = x, y_V = -z, z_V = y of the file; the node moves by 100 mm along the file's
+    // x
     let file_size = [SIZE[0], SIZE[2], SIZE[1]].map(|x| x * 1000.0);
     let file_centre = [CENTRE[0], CENTRE[2], -CENTRE[1]].map(|x| x * 1000.0);
     let moved = [file_centre[0] - 100.0, file_centre[1], file_centre[2]];
@@ -185,7 +186,8 @@ fn a_turned_up_axis_is_remarked_and_can_be_ignored() {
     assert_relative_eq!(ignored.mesh.mass_properties().centroid, file, max_relative = 1e-14);
 }
 
-/// X_UP by the specification: right is -y, up is x, towards the viewer is z; z up: right x, up z, towards -y.
+/// X_UP by the specification: right is -y, up is x, towards the viewer is z; z up: right x, up z,
+/// towards -y.
 #[test]
 fn x_up_is_turned_as_the_specification_says() {
     let text = String::from_utf8(collada()).unwrap().replace("Y_UP", "X_UP");
@@ -273,7 +275,8 @@ fn an_open_mesh_and_one_inside_out_are_recognised() {
     assert_eq!(mesh.mass_properties().open_edges, 3);
 }
 
-/// Closed forms of primitives against the integrals over their polyhedra, inscribed with 48 corners.
+/// Closed forms of primitives against the integrals over their polyhedra, inscribed with 48
+/// corners.
 #[test]
 fn primitives_agree_with_their_triangles() {
     let shapes = [

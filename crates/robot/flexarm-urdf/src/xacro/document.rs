@@ -38,7 +38,8 @@ impl fmt::Display for At {
     }
 }
 
-/// An element with its attributes in the order of the file. Names have their prefixes, as in the file.
+/// An element with its attributes in the order of the file. Names have their prefixes, as in the
+/// file.
 #[derive(Clone, Debug)]
 pub(crate) struct Element {
     pub(crate) name: String,

@@ -1,12 +1,15 @@
-//! Xacro, the macro language of robot descriptions, read as ROS's program reads it (version 2, in order of the file).
+//! Xacro, the macro language of robot descriptions, read as ROS's program reads it (version 2, in
+//! order of the file).
 //!
-//! Start at [`expand`]: a file in, one element tree as text out, with the place of every line of it. The way in between:
-//! [`document`] is XML as a tree, [`process`] what the elements of xacro do, [`macros`] and [`scope`] what they define,
-//! [`text`] cuts attributes into pieces, [`expression`] and [`substitution`] give the pieces their values, [`yaml`] reads
+//! Start at [`expand`]: a file in, one element tree as text out, with the place of every line of
+//! it. The way in between: [`document`] is XML as a tree, [`process`] what the elements of xacro
+//! do, [`macros`] and [`scope`] what they define, [`text`] cuts attributes into pieces,
+//! [`expression`] and [`substitution`] give the pieces their values, [`yaml`] reads
 //! `xacro.load_yaml`.
 //!
-//! A file is read from anywhere, so nothing here may run away: calls are counted, depth and work are bounded, and no
-//! clock is needed. The result is the same on every machine but for what the file itself asks of the environment.
+//! A file is read from anywhere, so nothing here may run away: calls are counted, depth and work
+//! are bounded, and no clock is needed. The result is the same on every machine but for what the
+//! file itself asks of the environment.
 //!
 //! Not here: comments and processing instructions, which are left out; what a URDF means.
 //!

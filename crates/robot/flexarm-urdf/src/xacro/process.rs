@@ -298,7 +298,8 @@ impl Interpreter<'_> {
         Ok(content.nodes)
     }
 
-    /// The files that a name means: one, or all that fit its `*`, `?` and `[...]` in the order of their names.
+    /// The files that a name means: one, or all that fit its `*`, `?` and `[...]` in the order of
+    /// their names.
     fn matching(&mut self, spec: &str, at: &At) -> Outcome<Vec<PathBuf>> {
         let path = self.beside(spec);
         if !spec.contains(['*', '?', '[']) || path.is_file() {

@@ -1,7 +1,7 @@
 //! Properties by name: one table for the document, one for each macro call and each namespace.
 //!
-//! A name that a table does not have is looked for in the one it was made from: that of the caller, as ROS's xacro does.
-//! Texts are evaluated at their first use.
+//! A name that a table does not have is looked for in the one it was made from: that of the caller,
+//! as ROS's xacro does. Texts are evaluated at their first use.
 
 use std::cell::RefCell;
 use std::collections::HashMap;

@@ -1,5 +1,5 @@
-//! Substitutions `$(arg name)`, `$(find package)`, `$(env NAME)`, `$(optenv NAME default)`, `$(eval expression)`,
-//! `$(dirname)` and `$(cwd)`. Their results are text.
+//! Substitutions `$(arg name)`, `$(find package)`, `$(env NAME)`, `$(optenv NAME default)`,
+//! `$(eval expression)`, `$(dirname)` and `$(cwd)`. Their results are text.
 
 use std::path::{Path, PathBuf};
 

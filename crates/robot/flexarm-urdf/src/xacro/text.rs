@@ -15,7 +15,8 @@ enum Piece<'t> {
     Substitution(&'t str),
 }
 
-/// Cuts a text: an expression ends at the first `}`, a substitution at the first `)`; `$${` stands for `${`.
+/// Cuts a text: an expression ends at the first `}`, a substitution at the first `)`; `$${` stands
+/// for `${`.
 fn pieces(text: &str) -> Result<Vec<Piece<'_>>, Trouble> {
     let mut found = Vec::new();
     let mut rest = text;

@@ -1,4 +1,5 @@
-//! YAML files of `xacro.load_yaml`, with the scalars of PyYAML (YAML 1.1: `on` is true, `1e3` without a dot is text).
+//! YAML files of `xacro.load_yaml`, with the scalars of PyYAML (YAML 1.1: `on` is true, `1e3`
+//! without a dot is text).
 
 use std::rc::Rc;
 

@@ -1,8 +1,10 @@
-//! From matrices of another FE program to a flexible link with its files: what `flexarm import` does.
+//! From matrices of another FE program to a flexible link with its files: what `flexarm import`
+//! does.
 //!
-//! An [`ImportJob`] says which files, in which units, which rows are the interfaces and where these are. What is not
-//! said and not in the files is asked for, with the text to type. Full models are reduced here; everything then
-//! passes the gate of the link, and its figures are in the [`ImportSummary`].
+//! An [`ImportJob`] says which files, in which units, which rows are the interfaces and where these
+//! are. What is not said and not in the files is asked for, with the text to type. Full models are
+//! reduced here; everything then passes the gate of the link, and its figures are in the
+//! [`ImportSummary`].
 //!
 //! ```no_run
 //! use flexarm_linkmaker::import::{ImportJob, ImportOutputs, import};
@@ -19,7 +21,8 @@
 //! # Ok::<(), flexarm_linkmaker::LinkError>(())
 //! ```
 //!
-//! Lengths in a job are in the unit of the files, masses in SI. Not here: parsers and reduction (`flexarm-fe-io`, `flexarm-fem`).
+//! Lengths in a job are in the unit of the files, masses in SI. Not here: parsers and reduction
+//! (`flexarm-fe-io`, `flexarm-fem`).
 
 pub(crate) mod full;
 mod sid;
@@ -51,7 +54,8 @@ pub use flexarm_fem::{RigidPart, SplitAt as Split, UnitSystem as UnitsOfFile};
 pub use summary::{ImportChecks, ImportFiles, ImportInterface, ImportPart, ImportSummary, markdown, tables};
 pub use words::{FrameAt, ImportFormat, ImportMap, NodeChoice, parse_inertia, parse_part, parse_split, triple};
 
-/// What is said of a modal link without its terms of second order, here and where a robot takes one.
+/// What is said of a modal link without its terms of second order, here and where a robot takes
+/// one.
 pub const SECOND_ORDER_UNKNOWN: &str = "second-order terms of the modal link are unknown: a condensed mass does not \
      tell where inside the link it is; what turning does to the bending is left out";
 

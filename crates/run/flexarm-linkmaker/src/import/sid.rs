@@ -1,5 +1,5 @@
-//! A modal body (SID) as a link: its modal link in the frame at A, and the compliance of B with A held, from the modes at
-//! both nodes.
+//! A modal body (SID) as a link: its modal link in the frame at A, and the compliance of B with A
+//! held, from the modes at both nodes.
 //!
 //! ```text
 //! P = Φ_B - Ad_BA Φ_A          elastic displacement of B with A held, per mode (rows: phi, then psi)
@@ -103,7 +103,8 @@ pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(M
     Ok((reduction, parts))
 }
 
-/// The modal link, with the mapped nodes as its interfaces; `None` and a warning where the data do not give one.
+/// The modal link, with the mapped nodes as its interfaces; `None` and a warning where the data do
+/// not give one.
 fn modal_link(
     sid: &Sid,
     name: &str,

@@ -1,4 +1,5 @@
-//! Figures of an import, with the keys of `flexarm reduce` where both have them. SI units, link axes.
+//! Figures of an import, with the keys of `flexarm reduce` where both have them. SI units, link
+//! axes.
 
 use std::fmt::Write as _;
 

@@ -1,4 +1,5 @@
-//! Words of an import: which rows or nodes are an interface, where it is, masses, the place of the joint.
+//! Words of an import: which rows or nodes are an interface, where it is, masses, the place of the
+//! joint.
 
 use std::fmt;
 use std::str::FromStr;
@@ -12,7 +13,8 @@ use nalgebra::{Matrix3, Vector3};
 pub enum ImportMap {
     /// Rows of the matrices: `A=1001,B=1002`, `A=947:1-3+948:1-3,...`, `A=#1-6,B=#7-12`.
     Rows(InterfaceMap),
-    /// Nodes tied rigidly: `A=set:NAME,B=plane(x,y,z;nx,ny,nz)`; for full models of solids with positions.
+    /// Nodes tied rigidly: `A=set:NAME,B=plane(x,y,z;nx,ny,nz)`; for full models of solids with
+    /// positions.
     Nodes(Vec<(String, NodeChoice)>),
 }
 
@@ -112,7 +114,8 @@ fn split_outside_brackets(text: &str) -> Vec<&str> {
     parts
 }
 
-/// Frame of an interface, `NAME=x,y,z` or `NAME=x,y,z,roll,pitch,yaw`; unit of the file, rad, link axes.
+/// Frame of an interface, `NAME=x,y,z` or `NAME=x,y,z,roll,pitch,yaw`; unit of the file, rad, link
+/// axes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameAt {
     /// The interface.
@@ -182,7 +185,8 @@ impl ImportFormat {
     }
 }
 
-/// A rigid part, `mass;cx,cy,cz;ixx,iyy,izz,ixy,ixz,iyz`: kg, m, kg m² about its centre of mass, link axes.
+/// A rigid part, `mass;cx,cy,cz;ixx,iyy,izz,ixy,ixz,iyz`: kg, m, kg m² about its centre of mass,
+/// link axes.
 ///
 /// # Errors
 /// What is wrong with the text.
@@ -208,7 +212,8 @@ pub fn parse_inertia(text: &str) -> Result<Matrix3<f64>, String> {
     Ok(Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz))
 }
 
-/// Where the elastic joint sits: `elastic-centre`, `mid`, a fraction, or a point in the unit of the file.
+/// Where the elastic joint sits: `elastic-centre`, `mid`, a fraction, or a point in the unit of the
+/// file.
 ///
 /// # Errors
 /// What is wrong with the text.

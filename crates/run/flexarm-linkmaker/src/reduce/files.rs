@@ -42,7 +42,8 @@ impl Paths {
     }
 
     /// # Errors
-    /// [`FileError::Taken`] for what is there already, [`FileError::Unusable`] for a folder in the place of a file.
+    /// [`FileError::Taken`] for what is there already, [`FileError::Unusable`] for a folder in the
+    /// place of a file.
     pub(super) fn new(outputs: &ReduceOutputs, link: &str) -> Result<Self, FileError> {
         let file = file_stem(link);
         let folder = outputs.folder.as_ref().map(|path| Folder {
@@ -90,7 +91,8 @@ pub(super) fn job_file(job: &ReduceJob, folder: &Path) -> String {
     format!("# The job as it was run, every default written out. Again: flexarm reduce reduce.toml\n{body}")
 }
 
-/// The way to `path` from `folder`: relative where both lie in one tree below the root, else absolute.
+/// The way to `path` from `folder`: relative where both lie in one tree below the root, else
+/// absolute.
 fn from_folder(folder: &Path, path: &Path) -> PathBuf {
     let whole = |p: &Path| std::path::absolute(p).map(|p| normal(&p));
     let (Ok(folder), Ok(path)) = (whole(folder), whole(path)) else { return path.to_owned() };

@@ -25,7 +25,8 @@ pub(super) struct Chosen {
 }
 
 impl Chosen {
-    /// Sentences about nodes that are no seat: corners without the nodes between them, edges, nodes inside.
+    /// Sentences about nodes that are no seat: corners without the nodes between them, edges, nodes
+    /// inside.
     pub(super) fn seat_doubts(&self) -> Vec<String> {
         let (name, seat, chosen) = (&self.interface.name, &self.seat, self.chosen_nodes);
         let mut doubts = Vec::new();

@@ -1,6 +1,8 @@
-//! The job file of a reduction, read into a plain struct; command-line flags are a second such struct on top.
+//! The job file of a reduction, read into a plain struct; command-line flags are a second such
+//! struct on top.
 //!
-//! Unknown keys are refused. Lengths are in the unit of the mesh, positions in the link frame, angles in rad.
+//! Unknown keys are refused. Lengths are in the unit of the mesh, positions in the link frame,
+//! angles in rad.
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -65,7 +67,8 @@ pub struct ReduceJob {
     /// Chains to store in the link, by their number of parts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chains: Option<Vec<usize>>,
-    /// Whether the modal link gets its stiffness by load: `geometric_stiffening = true` of a robot file needs it.
+    /// Whether the modal link gets its stiffness by load: `geometric_stiffening = true` of a robot
+    /// file needs it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub geometric: Option<bool>,
     /// Nodes nearer to each other than this become one, unit of the mesh; closes seams and cracks.
@@ -141,8 +144,8 @@ pub struct UrdfEntry {
     /// The joint at B; the only moving child joint if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joint: Option<String>,
-    /// What the URDF's link weighs beyond the mesh (motors, gears, cables) rides on the two parts, as the
-    /// halves of a uniform bar, so that the rigid robot stays that of the URDF.
+    /// What the URDF's link weighs beyond the mesh (motors, gears, cables) rides on the two parts,
+    /// as the halves of a uniform bar, so that the rigid robot stays that of the URDF.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub rest: bool,
 }
@@ -156,10 +159,12 @@ impl ReduceJob {
         Self { mesh: mesh.into(), ..Self::default() }
     }
 
-    /// A job file, or a job with nothing but this mesh; told apart by content: a job is TOML with `mesh = ...`.
+    /// A job file, or a job with nothing but this mesh; told apart by content: a job is TOML with
+    /// `mesh = ...`.
     ///
     /// # Errors
-    /// [`LinkError::Files`] if it cannot be read, [`LinkError::JobFile`] with line and column for what is not the format.
+    /// [`LinkError::Files`] if it cannot be read, [`LinkError::JobFile`] with line and column for
+    /// what is not the format.
     pub fn load(path: &Path) -> Result<Self, LinkError> {
         let unreadable = |e: std::io::Error| {
             let what = match e.kind() {
@@ -201,8 +206,8 @@ impl ReduceJob {
         given.unwrap_or_else(|| stem(&self.mesh))
     }
 
-    /// Puts `flags` over this job: what is given there counts. Interfaces are matched by name; a new name is a new
-    /// interface. The mesh stays.
+    /// Puts `flags` over this job: what is given there counts. Interfaces are matched by name; a
+    /// new name is a new interface. The mesh stays.
     pub fn put_over(&mut self, flags: Self) {
         fn put<T>(own: &mut Option<T>, given: Option<T>) {
             if given.is_some() {

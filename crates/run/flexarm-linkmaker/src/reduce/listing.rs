@@ -12,8 +12,8 @@ use serde::Serialize;
 use super::interfaces::Place;
 use super::summary::MaterialFigures;
 
-/// Answer of `flexarm reduce --list`. Lengths are in the unit of the mesh file; sets in the link frame, which is the
-/// frame of the mesh unless the job says otherwise.
+/// Answer of `flexarm reduce --list`. Lengths are in the unit of the mesh file; sets in the link
+/// frame, which is the frame of the mesh unless the job says otherwise.
 #[derive(Clone, Debug, Serialize)]
 pub struct MeshListing {
     /// The file.

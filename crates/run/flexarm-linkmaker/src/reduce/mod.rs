@@ -1,9 +1,10 @@
 //! From a mesh to a flexible link with its files: what `flexarm reduce` does.
 //!
-//! A [`ReduceJob`] comes from a file, from flags, or from both ([`ReduceJob::put_over`]). [`Reduction::open`] checks it and
-//! reads the mesh; [`Reduction::finish`] reduces it and writes the link file, the complete job, the figures and a report.
-//! Between the two a caller with a robot says what that knows of the link ([`UrdfLink`]). [`list_mesh`] shows what is in a
-//! mesh, to see what can be typed.
+//! A [`ReduceJob`] comes from a file, from flags, or from both ([`ReduceJob::put_over`]).
+//! [`Reduction::open`] checks it and reads the mesh; [`Reduction::finish`] reduces it and writes
+//! the link file, the complete job, the figures and a report. Between the two a caller with a robot
+//! says what that knows of the link ([`UrdfLink`]). [`list_mesh`] shows what is in a mesh, to see
+//! what can be typed.
 //!
 //! ```no_run
 //! use flexarm_linkmaker::reduce::{ReduceJob, ReduceOutputs, Reduction};
@@ -15,8 +16,9 @@
 //! # Ok::<(), flexarm_linkmaker::LinkError>(())
 //! ```
 //!
-//! Units: SI, except lengths in a job, which are in the unit of its mesh. Positions of interfaces are in the link
-//! frame; places that choose nodes are in the frame of the mesh, as a mesher shows them.
+//! Units: SI, except lengths in a job, which are in the unit of its mesh. Positions of interfaces
+//! are in the link frame; places that choose nodes are in the frame of the mesh, as a mesher shows
+//! them.
 //!
 //! Not here: the reduction itself (`flexarm-fem`), the file of the robot.
 
@@ -96,11 +98,12 @@ pub struct Reduction {
 }
 
 impl Reduction {
-    /// Reads the mesh of a job. The numbers of the job and the places of the results are checked before.
+    /// Reads the mesh of a job. The numbers of the job and the places of the results are checked
+    /// before.
     ///
     /// # Errors
-    /// [`LinkError::Job`] for numbers that make no sense, [`LinkError::Files`] for places that are taken,
-    /// [`LinkError::Mesh`].
+    /// [`LinkError::Job`] for numbers that make no sense, [`LinkError::Files`] for places that are
+    /// taken, [`LinkError::Mesh`].
     pub fn open(
         job: &ReduceJob,
         outputs: Option<&ReduceOutputs>,
@@ -116,9 +119,11 @@ impl Reduction {
 
     /// Reduces the mesh to a link and writes the files.
     ///
-    /// * `robot`: what the robot of the job ([`ReduceJob::urdf`]) says of the link; `None` if the job has none.
+    /// * `robot`: what the robot of the job ([`ReduceJob::urdf`]) says of the link; `None` if the
+    ///   job has none.
     ///
-    /// Everything that can be checked is checked before the work starts; nothing is written if it fails.
+    /// Everything that can be checked is checked before the work starts; nothing is written if it
+    /// fails.
     ///
     /// # Errors
     /// [`LinkError`]; several faults of a job come together. See [`LinkError::fault`].

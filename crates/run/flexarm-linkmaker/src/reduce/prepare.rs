@@ -31,7 +31,8 @@ pub(super) struct Prepared {
     pub(super) doubts: Vec<Doubt>,
 }
 
-/// The mesh of a job in its own axes, SI, with its nodes merged as the job says and what is to be told of it.
+/// The mesh of a job in its own axes, SI, with its nodes merged as the job says and what is to be
+/// told of it.
 pub(super) fn read(job: &ReduceJob) -> Result<(MeshFile, Vec<String>), LinkError> {
     let units = units_of(job);
     let mut file = read_mesh(&job.mesh, &ReadOptions { units, ..ReadOptions::default() }).map_err(Box::new)?;

@@ -56,7 +56,8 @@ pub struct ReduceSummary {
     pub split_m: [f64; 3],
     /// The two rigid parts, proximal first.
     pub parts: Vec<PartFigures>,
-    /// Bodies that ride on the link without being in the mesh; they are in `parts`, not in `mass_kg`.
+    /// Bodies that ride on the link without being in the mesh; they are in `parts`, not in
+    /// `mass_kg`.
     pub attached: Vec<PartFigures>,
     /// Chains of more parts that the link file holds.
     pub chains: Vec<ChainFigures>,
@@ -286,10 +287,11 @@ pub struct CheckFigures {
     pub worst_element: u64,
     /// Smallest volume of an element over that of the best shape with edges of the same length.
     pub smallest_fullness: f64,
-    /// Largest distance of a mid-side node from the middle of its edge, over the length of the edge.
+    /// Largest distance of a mid-side node from the middle of its edge, over the length of the
+    /// edge.
     pub largest_offset: f64,
-    /// Compliance at B with elements of second order over that of the mesh, the component farthest from one; null for
-    /// elements of second order.
+    /// Compliance at B with elements of second order over that of the mesh, the component farthest
+    /// from one; null for elements of second order.
     pub order_ratio: Option<f64>,
     /// The same along x y z rx ry rz.
     pub order_ratios: Option<[f64; 6]>,
@@ -428,7 +430,8 @@ pub(super) fn summary_of(
     }
 }
 
-/// Interfaces that take much of the link between the two that are farthest apart; `nodes`: of the mesh.
+/// Interfaces that take much of the link between the two that are farthest apart; `nodes`: of the
+/// mesh.
 fn spreads(chosen: &[Chosen], nodes: usize) -> Vec<Doubt> {
     let place = |one: &Chosen| one.interface.X_LI.translation.vector;
     let pairs = chosen.iter().enumerate().flat_map(|(k, a)| chosen[..k].iter().map(move |b| place(a) - place(b)));

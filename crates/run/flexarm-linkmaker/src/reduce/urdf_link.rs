@@ -5,8 +5,9 @@ use flexarm_fem::matrix_link::halves_of_bar;
 use flexarm_spatial::Pose;
 use nalgebra::Vector3;
 
-/// What a robot says of the link that is made: where its joints are, and what it weighs. Whoever reads the file of the robot
-/// ([`UrdfEntry::file`](super::UrdfEntry::file)) fills it in. SI, link axes.
+/// What a robot says of the link that is made: where its joints are, and what it weighs. Whoever
+/// reads the file of the robot ([`UrdfEntry::file`](super::UrdfEntry::file)) fills it in. SI, link
+/// axes.
 #[derive(Clone, Debug)]
 pub struct UrdfLink {
     /// Name of the link in the robot.

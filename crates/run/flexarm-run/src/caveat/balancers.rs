@@ -1,4 +1,5 @@
-//! Balancers against the weight that they are to carry, and against the room that they have over the joint ranges.
+//! Balancers against the weight that they are to carry, and against the room that they have over
+//! the joint ranges.
 
 use flexarm_kinematics::{BalancerLaw, Data, Mechanism, Model, forward_kinematics, gravity_forces};
 use nalgebra::DVector;
@@ -70,7 +71,8 @@ fn lengths(model: &Model, number: usize) -> Lengths {
     })
 }
 
-/// What one balancer does to the joint on which it acts most, over poses spread over the joint ranges (N m or N).
+/// What one balancer does to the joint on which it acts most, over poses spread over the joint
+/// ranges (N m or N).
 struct Alone {
     /// Largest torque of its own.
     torque: f64,

@@ -30,7 +30,8 @@ pub(crate) fn of_payload(robot: &Robot, size: &Size, what: &str, link: &str) -> 
     of_place(robot, size, what, link, [&kinds::PAYLOAD_FIXED, &kinds::PAYLOAD_INSIDE])
 }
 
-/// Something that belongs to the end of the arm, on a link. Kinds: where no joint moves the link, where the arm goes on behind it.
+/// Something that belongs to the end of the arm, on a link. Kinds: where no joint moves the link,
+/// where the arm goes on behind it.
 fn of_place(robot: &Robot, size: &Size, what: &str, link: &str, [fixed, inside]: [&CaveatKind; 2]) -> Option<Caveat> {
     let mechanism = &robot.urdf.mechanism;
     let location = format!("{what} on link {link:?}");
@@ -94,7 +95,8 @@ impl Behind {
     }
 }
 
-/// Joints that do not yield where almost all others of the arm do, or with ones that yield on both sides.
+/// Joints that do not yield where almost all others of the arm do, or with ones that yield on both
+/// sides.
 fn stiff_joints(robot: &Robot) -> Vec<Caveat> {
     let elastic = |drive: &Drive| drive.kind != DriveKind::Prescribed && drive.gearbox.is_some();
     let yields = |joint: &Joint| robot.drives.iter().any(|drive| drive.joint == joint.name && elastic(drive));

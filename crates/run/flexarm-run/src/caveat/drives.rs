@@ -1,4 +1,5 @@
-//! Drives of a robot file: gear stiffness against effort limit, play, ratio, rotor, friction, gains.
+//! Drives of a robot file: gear stiffness against effort limit, play, ratio, rotor, friction,
+//! gains.
 
 use std::ops::RangeInclusive;
 
@@ -13,14 +14,16 @@ use crate::drive_entry::{Drive, DriveKind};
 
 /// Drives above this (N m) are geared stiffly; springs are put into weaker ones on purpose.
 const STRONG: f64 = 150.0;
-/// Rotation of a strong gear under its effort limit (rad): note, warning. Reducers have 1e-3 at rated torque, 5e-3 at peak.
+/// Rotation of a strong gear under its effort limit (rad): note, warning. Reducers have 1e-3 at
+/// rated torque, 5e-3 at peak.
 const TURNED: [f64; 2] = [0.01, 0.08];
 /// The same of weak drives, springs in series included.
 const TURNED_WEAK: [f64; 2] = [0.3, 3.0];
 /// A note this many times beyond its yardstick names the slip too.
 const HINTED: f64 = 3.0;
-/// Rotation of a strong gear over the median of the other strong gears of its robot: gears of shipped robots have up to 7.5, one
-/// of them half as stiff up to 15, and most of them in N m/deg more than that.
+/// Rotation of a strong gear over the median of the other strong gears of its robot: gears of
+/// shipped robots have up to 7.5, one of them half as stiff up to 15, and most of them in N m/deg
+/// more than that.
 const ODD: f64 = 16.0;
 /// The same of gears that are too stiff: note, warning.
 const RIGID: [f64; 2] = [1e-4, 1e-5];
@@ -46,7 +49,8 @@ const ROTOR: f64 = 10.0;
 const SAMPLE: RangeInclusive<f64> = 1e-6..=0.05;
 /// Position loops are slower than this (1/s).
 const POSITION_GAIN: f64 = 1000.0;
-/// Velocity gain times sampling time over the inertia felt at once: a sampled speed loop is stable below it.
+/// Velocity gain times sampling time over the inertia felt at once: a sampled speed loop is stable
+/// below it.
 const STABLE: f64 = 2.0;
 
 /// All of them about the drives as they are written.
@@ -97,7 +101,8 @@ fn stiffness(drive: &Drive) -> Option<(f64, Option<f64>)> {
     }
 }
 
-/// Median rotation under their effort limits of the other strong gears (rad); none of a weak one, or without two others.
+/// Median rotation under their effort limits of the other strong gears (rad); none of a weak one,
+/// or without two others.
 fn others_turn(drive: &Drive, drives: &[Drive], mechanism: &Mechanism) -> Option<f64> {
     let turns = |drive: &Drive| {
         let joint = mechanism.joints.iter().find(|j| j.name == drive.joint && !j.kind.slides())?;
@@ -224,13 +229,15 @@ fn servo(drive: &Drive) -> Vec<Caveat> {
     caveats
 }
 
-/// A velocity gain that the sampled loop does not bear: `inertia` is what the motor feels at once (kg m²).
+/// A velocity gain that the sampled loop does not bear: `inertia` is what the motor feels at once
+/// (kg m²).
 pub(crate) fn speed_loop(joint: &str, gain: f64, sample_s: f64, inertia: f64) -> Option<Caveat> {
     let most = STABLE * inertia / sample_s;
     (inertia > 0.0 && gain > most).then(|| kinds::VELOCITY_GAIN.found(format!("joint {joint:?}"), gain, most))
 }
 
-/// How far the spring of a drive has turned (rad) or moved (m): under weight, or in motion (`times` 2).
+/// How far the spring of a drive has turned (rad) or moved (m): under weight, or in motion (`times`
+/// 2).
 pub(crate) fn give(drive: &Drive, effort: f64, rotation: f64, translation: f64, times: f64) -> Vec<Caveat> {
     let [unusual, wrong] = SAGS[usize::from(effort <= STRONG)].map(|limit| times * limit);
     let mut caveats = Vec::new();

@@ -1,4 +1,5 @@
-//! The catalogue of caveats: code, sentence, unit and help. `docs/caveats.md` tells the source of each yardstick.
+//! The catalogue of caveats: code, sentence, unit and help. `docs/caveats.md` tells the source of
+//! each yardstick.
 
 use super::CaveatKind;
 pub(crate) use super::kinds_of_use::*;

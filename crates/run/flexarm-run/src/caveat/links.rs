@@ -18,18 +18,20 @@ use crate::robot::Robot;
 const YOUNG: RangeInclusive<f64> = 1e8..=1.3e12;
 /// Density from foam to osmium (kg/m³).
 const RHO: RangeInclusive<f64> = 20.0..=22_600.0;
-/// Poisson's ratio of what robots are made of; rubber has almost 0.5, foams that get thicker when pulled have less than 0.
+/// Poisson's ratio of what robots are made of; rubber has almost 0.5, foams that get thicker when
+/// pulled have less than 0.
 const NU: RangeInclusive<f64> = 0.0..=0.495;
 /// A section is at most this many times as thick as the beam is long.
 const THICK: f64 = 3.0;
-/// Radius of gyration of a section over the length of the beam: thinner are wires, thicker no beams.
+/// Radius of gyration of a section over the length of the beam: thinner are wires, thicker no
+/// beams.
 const SLENDER: RangeInclusive<f64> = 5e-4..=1.0;
 /// Torsional over bending stiffness.
 const TORSION: RangeInclusive<f64> = 1e-3..=1e3;
 /// What an eccentric shear centre may add to the bending of a tip.
 const TWIST: f64 = 0.01;
-/// Wall over width (diameter) of a hollow section: note, warning. Eurocode 3 (EN 1993-1-1, table 5.2) has flat walls buckle
-/// before they yield below 1/42, round ones below 1/90.
+/// Wall over width (diameter) of a hollow section: note, warning. Eurocode 3 (EN 1993-1-1, table
+/// 5.2) has flat walls buckle before they yield below 1/42, round ones below 1/90.
 const THIN: [f64; 2] = [1.0 / 42.0, 1.0 / 90.0];
 /// Damping that is taken where none is given.
 pub(super) const USUAL_DAMPING: f64 = 0.03;
@@ -73,8 +75,8 @@ fn geometric(name: &str, link: &RobotLink) -> Option<Caveat> {
     Some(Caveat::said("geometric-stiffening", name, message, &help))
 }
 
-/// Sink (m) of a base under the weight of the whole robot, and tilt (rad) under that weight at a lever of 1 m: cast pedestals
-/// and anchored plates stay below a tenth of it.
+/// Sink (m) of a base under the weight of the whole robot, and tilt (rad) under that weight at a
+/// lever of 1 m: cast pedestals and anchored plates stay below a tenth of it.
 const SINKS: [f64; 2] = [1e-3, 5e-3];
 
 /// Springs under the base.
@@ -153,7 +155,8 @@ fn section(name: &str, beam: &BeamLink) -> Vec<Caveat> {
     caveats
 }
 
-/// Where the shear centre is not the centroid: the twist that a force at the tip would add there, against its bending.
+/// Where the shear centre is not the centroid: the twist that a force at the tip would add there,
+/// against its bending.
 ///
 /// ```text
 /// F e² l/GJ < 0.01 F l³/(3 EI_y)      e_max = l √(0.01 GJ/(3 EI_y))
@@ -164,7 +167,8 @@ fn shear_centre(name: &str, beam: &BeamLink, bar: &Bar) -> Option<Caveat> {
     (e > most).then(|| kinds::SHEAR_CENTRE.found(name, e, most))
 }
 
-/// A wall that is far too thin for its width, and an outer size that is half or twice what the link's inertia tells.
+/// A wall that is far too thin for its width, and an outer size that is half or twice what the
+/// link's inertia tells.
 fn sizes(name: &str, beam: &BeamLink, own: Option<&LinkInertia>) -> Vec<Caveat> {
     let mut caveats = Vec::new();
     let (width, wall) = match beam.section {

@@ -26,7 +26,8 @@ pub(crate) fn of_phase(phase: f64) -> Option<Caveat> {
     parts::angles("the phase of a load", &[phase])
 }
 
-/// The argument of a sine or cosine as it goes with time: `rate` (rad/s) and its value at zero (rad).
+/// The argument of a sine or cosine as it goes with time: `rate` (rad/s) and its value at zero
+/// (rad).
 pub(crate) fn of_sine(text: &str, rate: f64, phase: f64) -> Option<Caveat> {
     let quarters = rate.abs() / QUARTER;
     let whole = quarters > 0.5 && (quarters - quarters.round()).abs() < 1e-9;

@@ -6,7 +6,8 @@ use flexarm_trajectory::Trajectory;
 use super::{Caveat, CaveatKind, kinds};
 use crate::loops::{along_motion, over_ranges};
 
-/// Transmission angle: note below the first, warning below the second (rad). At 10 degrees a rod carries six times the force.
+/// Transmission angle: note below the first, warning below the second (rad). At 10 degrees a rod
+/// carries six times the force.
 const TRANSMISSION: [f64; 2] = [0.698_131_700_797_731_8, 0.174_532_925_199_432_95];
 /// Dependent joints away from where the loop was told to be assembled (rad or m).
 const ASSEMBLED: f64 = 1e-6;

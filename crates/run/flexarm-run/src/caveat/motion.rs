@@ -1,4 +1,5 @@
-//! A motion against the robot that is to follow it, and loads against the robot that is to bear them.
+//! A motion against the robot that is to follow it, and loads against the robot that is to bear
+//! them.
 
 use flexarm_kinematics::{Data, Model, State, inverse_dynamics};
 use flexarm_stepping::Load;
@@ -76,7 +77,8 @@ pub(crate) fn degrees(violations: &[LimitViolation], model: &Model) -> &'static 
     if any && all { "about 57 times: degrees?" } else { "" }
 }
 
-/// Largest force and moment of the loads of a run, against weight and size of the arm with its payload.
+/// Largest force and moment of the loads of a run, against weight and size of the arm with its
+/// payload.
 pub(crate) fn of_loads(loads: &[Load], duration: f64, size: &Size) -> Vec<Caveat> {
     let mut caveats = Vec::new();
     for load in loads {

@@ -1,4 +1,5 @@
-//! What the files say of tool, payload, gravity, masses and limits, against the size of the robot itself.
+//! What the files say of tool, payload, gravity, masses and limits, against the size of the robot
+//! itself.
 
 use flexarm_kinematics::{Joint, Link, LinkInertia, Mechanism, Model};
 use flexarm_linkmaker::yardsticks::OSMIUM;
@@ -9,7 +10,8 @@ use super::slip::{self, slip};
 use super::{Caveat, kinds};
 use crate::robot::{PAYLOAD_LINK, Robot};
 
-/// A tool or payload this many times the robot's size away, and this far at least (m), is not held by it.
+/// A tool or payload this many times the robot's size away, and this far at least (m), is not held
+/// by it.
 const FAR: (f64, f64) = (1.5, 2.0);
 /// Arms longer than this have not been built (m): concrete pumps reach 70 m.
 const LONGEST: f64 = 100.0;
@@ -200,7 +202,8 @@ const NO_WEIGHT: f64 = 1e-4;
 fn strong_drives(model: &Model, size: &Size) -> Option<Caveat> {
     let weight = weight_carried(model);
     let most = weight.iter().fold(0.0f64, |m, w| m.max(*w));
-    // A joint that hardly leaves the horizontal carries what its axis is off, no weight to measure a drive by.
+    // A joint that hardly leaves the horizontal carries what its axis is off, no weight to measure
+    // a drive by.
     let some = NO_WEIGHT * size.mass * model.gravity.norm() * size.extent;
     let limited = |k: &usize| model.coordinates()[*k].limits.effort.is_finite();
     let effort = |k: usize| model.coordinates()[k].limits.effort;

@@ -11,7 +11,8 @@ use crate::robot::Robot;
 const SAG: [f64; 2] = [0.03, 0.1];
 /// First frequency below which an arm with gears is unusual, any arm is wrong (Hz).
 const SLOW: [f64; 2] = [3.0, 0.02];
-/// First frequency times size: above the speed of sound in steel and aluminium nothing swings so fast (m/s).
+/// First frequency times size: above the speed of sound in steel and aluminium nothing swings so
+/// fast (m/s).
 const SOUND: f64 = 5100.0;
 /// Damping ratio of the first mode: note, warning.
 const DAMPED: [f64; 2] = [0.2, 0.5];

@@ -12,7 +12,8 @@ const POSES: u32 = 32;
 pub struct Size {
     /// Distance from the base along the chain, per link (m).
     distances: HashMap<String, f64>,
-    /// How far its mass reaches from the base: joint distances, mass centres and radii of gyration (m).
+    /// How far its mass reaches from the base: joint distances, mass centres and radii of gyration
+    /// (m).
     pub(crate) extent: f64,
     /// Mass (kg).
     pub(crate) mass: f64,
@@ -65,7 +66,8 @@ pub(crate) fn least_density(inertia: &LinkInertia) -> f64 {
     flexarm_linkmaker::yardsticks::least_density(inertia.mass, &inertia.inertia_com)
 }
 
-/// Largest torque of weight and balancers that each joint of the rigid robot carries in poses spread over the joint ranges (N m or N).
+/// Largest torque of weight and balancers that each joint of the rigid robot carries in poses
+/// spread over the joint ranges (N m or N).
 pub(crate) fn weight_carried(model: &Model) -> DVector<f64> {
     let mut data = Data::new(model);
     let mut weight = DVector::zeros(model.nv());

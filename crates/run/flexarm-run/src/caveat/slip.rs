@@ -28,7 +28,8 @@ pub(crate) const INERTIA: &[Factor] = &[(1e4, "kg cm2"), (1e6, "kg mm2"), (1e9, 
 
 /// The first slip without which the value would lie in the range; empty if there is none.
 ///
-/// `power`: with which power of the number the value goes, such as 0.5 for a radius of gyration and its inertia.
+/// `power`: with which power of the number the value goes, such as 0.5 for a radius of gyration and
+/// its inertia.
 pub fn slip(value: f64, plausible: &RangeInclusive<f64>, factors: &[Factor], power: f64) -> String {
     let mends = |(factor, _): &&Factor| plausible.contains(&(value / factor.powf(power)));
     factors.iter().find(mends).map(|(factor, words)| told(*factor, words)).unwrap_or_default()

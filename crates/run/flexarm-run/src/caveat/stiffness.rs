@@ -1,4 +1,5 @@
-//! Stiffness of links: what a robot file gives against the beam or `.flex` file that it takes the place of, and against mass.
+//! Stiffness of links: what a robot file gives against the beam or `.flex` file that it takes the
+//! place of, and against mass.
 
 use flexarm_linkmaker::yardsticks::{SOUND, sound_speed};
 use nalgebra::{Matrix6, Vector6};
@@ -7,13 +8,15 @@ use super::slip::{self, slip};
 use super::{Caveat, kinds};
 use crate::flexible::RobotLink;
 
-/// Measured links are at most this many times as stiff, or as soft, as their beam or mesh in any direction.
+/// Measured links are at most this many times as stiff, or as soft, as their beam or mesh in any
+/// direction.
 const MEASURED: f64 = 3.0;
 /// Coupling terms over the root of their diagonal terms: below, they do not matter.
 const COUPLED: f64 = 0.1;
 /// Two matrices that differ by less than this are the same.
 const SAME: f64 = 0.02;
-/// Slowest sound along a link of a robot by its stiffness and mass (m/s): castings with drives on them have 300.
+/// Slowest sound along a link of a robot by its stiffness and mass (m/s): castings with drives on
+/// them have 300.
 const SLOWEST: f64 = 50.0;
 /// Factors of matrices in other units.
 const UNITS: &[slip::Factor] = &[(1e3, "N mm or m N"), (1e-3, "kN or N/mm"), (1e6, "mN"), (1e-6, "MN")];

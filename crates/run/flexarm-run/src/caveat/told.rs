@@ -23,7 +23,8 @@ pub enum Use<'a> {
     Held(&'a [f64], &'a [f64; 6]),
     /// Moves it along a motion with its loads.
     Along(&'a Scenario),
-    /// Neither: the robot is looked at where its own motion begins, else in the middle of its joint ranges.
+    /// Neither: the robot is looked at where its own motion begins, else in the middle of its joint
+    /// ranges.
     Any,
 }
 
@@ -55,7 +56,8 @@ pub fn told(robot: &Robot, flexible: &Arc<FlexibleRobot>, of_robot: Option<&[Cav
     once_each(caveats)
 }
 
-/// As [`told()`], of a robot as its file models it, for commands that compute nothing of its links and drives.
+/// As [`told()`], of a robot as its file models it, for commands that compute nothing of its links
+/// and drives.
 pub(crate) fn of_robot(robot: &Robot) -> Result<Vec<Caveat>, Error> {
     Ok(told(robot, &Arc::new(robot.flexible_robot()?), None, Use::Any))
 }
@@ -76,7 +78,8 @@ pub fn of_motion(motion: &Motion, rigid: &Model) -> Vec<Caveat> {
     caveats
 }
 
-/// Of the loads and payloads of a scenario. Those that do not fit the robot are an error of the command.
+/// Of the loads and payloads of a scenario. Those that do not fit the robot are an error of the
+/// command.
 fn of_scenario(robot: &Robot, scenario: &Scenario, flexible: &FlexibleRobot) -> Vec<Caveat> {
     let Ok(acting) = scenario.acting_on(robot, &flexible.model) else { return Vec::new() };
     let loads = motion::of_loads(&acting.loads, scenario.duration_s(), &Size::of(&robot.rigid));
@@ -91,7 +94,8 @@ pub(crate) fn at_rest(robot: &Robot, posed: &Posed, linear: &Linear, wrench: &[f
     caveats
 }
 
-/// Where a robot stands to be looked at: where the motion begins, else in the middle of its joint ranges (rad or m).
+/// Where a robot stands to be looked at: where the motion begins, else in the middle of its joint
+/// ranges (rad or m).
 pub(crate) fn standing_pose(robot: &Robot, motion: Option<&Motion>) -> Result<Vec<f64>, Error> {
     let model = robot.rigid_model()?;
     let actuated = &model.coordinates()[..model.n_actuated()];

@@ -1,4 +1,5 @@
-//! Whether the models hold: deflections, strains, forces of drives, sampling. For runs, statics and `check` alike.
+//! Whether the models hold: deflections, strains, forces of drives, sampling. For runs, statics and
+//! `check` alike.
 
 use std::f64::consts::TAU;
 
@@ -33,7 +34,8 @@ pub(crate) fn link(name: &str, rotation: f64, strain: f64) -> impl Iterator<Item
     bent.into_iter().chain(strained)
 }
 
-/// Drives that need more than they have, in coordinate order: [`kinds::EFFORT`] or [`kinds::HOLDING`].
+/// Drives that need more than they have, in coordinate order: [`kinds::EFFORT`] or
+/// [`kinds::HOLDING`].
 pub(crate) fn efforts<'a>(
     kind: &'a CaveatKind,
     coordinates: &'a [Coordinate],
@@ -45,13 +47,14 @@ pub(crate) fn efforts<'a>(
     coordinates.iter().zip(needed).filter(over).map(told)
 }
 
-/// A limited joint further than this outside its range may have been given in degrees: times its limit, and at least (rad).
+/// A limited joint further than this outside its range may have been given in degrees: times its
+/// limit, and at least (rad).
 const LIKE_DEGREES: (f64, f64) = (1.25, std::f64::consts::PI);
 /// A joint without limits that turns further than this may have been (rad): two turns.
 const MANY_TURNS: f64 = 4.0 * std::f64::consts::PI;
 
-/// Whether the value of a joint that turns was probably meant in degrees: in degrees it lies in the range, in radians far
-/// outside.
+/// Whether the value of a joint that turns was probably meant in degrees: in degrees it lies in the
+/// range, in radians far outside.
 fn like_degrees(c: &Coordinate, q: f64) -> bool {
     let (lower, upper) = (c.limits.lower, c.limits.upper);
     let limit = if q < 0.0 { lower } else { upper };
@@ -83,19 +86,22 @@ pub(crate) fn sampling(first_hz: f64, logged_hz: f64) -> Option<Caveat> {
     (logged_hz < SAMPLES_PER_PERIOD * first_hz).then(|| kinds::FEW_SAMPLES.found("run", logged_hz, first_hz))
 }
 
-/// Steps (s) against the first mode (Hz, damping ratio), by what the stepper makes of an oscillation like it.
+/// Steps (s) against the first mode (Hz, damping ratio), by what the stepper makes of an
+/// oscillation like it.
 pub(crate) fn step(kind: StepperKind, step_s: f64, first_hz: f64, ratio: f64) -> Option<Caveat> {
     // What hardly swings has no period.
     let error = if ratio < 0.9 { error_of_a_period(kind, step_s * TAU * first_hz, ratio) } else { 0.0 };
     (error > PERIOD_ERROR).then(|| kinds::COARSE_STEP.found("run", 100.0 * error, 100.0 * PERIOD_ERROR))
 }
 
-/// What the steps of a stepper in maximal coordinates leave of its joints, as a part of the largest TCP error.
+/// What the steps of a stepper in maximal coordinates leave of its joints, as a part of the largest
+/// TCP error.
 pub(crate) fn drift(stepper: &str, part: f64) -> Option<Caveat> {
     (part > DRIFT).then(|| kinds::JOINT_DRIFT.found(format!("the steps of {stepper}"), 100.0 * part, 100.0 * DRIFT))
 }
 
-/// A settling band (m) against what robots are specified by and against the largest TCP error (m). The usual band is only noted.
+/// A settling band (m) against what robots are specified by and against the largest TCP error (m).
+/// The usual band is only noted.
 pub(crate) fn band(band_m: f64, peak_m: f64, usual_m: f64) -> Option<Caveat> {
     let likely = || slip(band_m, &(1e-6..=WIDE_BAND), slip::LENGTH, 1.0);
     if band_m > WIDE_BAND {

@@ -11,7 +11,8 @@ use flexarm_stepping::StepError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ModellingError {
-    /// A link that does not have the model asked for; the sentence names the link and what is missing.
+    /// A link that does not have the model asked for; the sentence names the link and what is
+    /// missing.
     #[error("{0}")]
     NoSuchModel(String),
     /// A link with load on a third interface that cannot bend in modes either.

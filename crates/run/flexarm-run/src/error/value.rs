@@ -100,7 +100,8 @@ pub enum ValueError {
         /// Most.
         most: usize,
     },
-    /// The lowest frequency of a response, which must not be negative, and not zero on a logarithmic axis.
+    /// The lowest frequency of a response, which must not be negative, and not zero on a
+    /// logarithmic axis.
     #[error("{} must be {}, found {found} Hz", Setting::LowestFrequency, lowest(*logarithmic))]
     LowestFrequency {
         /// The frequency (Hz).

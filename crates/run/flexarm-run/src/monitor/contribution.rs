@@ -1,4 +1,5 @@
-//! Who moves the tool how far: flexible links, elastic drives, and what servos leave of the way to go.
+//! Who moves the tool how far: flexible links, elastic drives, and what servos leave of the way to
+//! go.
 //!
 //! ```text
 //! u_T = J_e e        first order: columns of the twin's Jacobian that belong to the deflections e
@@ -34,7 +35,8 @@ impl Contributions {
     pub(crate) fn update(&mut self, seen: &Observation, twin: &RigidTwin, arm: &FlexibleArm) {
         self.moved.fill(Vector6::zeros());
         for (element, place) in arm.elements.iter().zip(&self.places) {
-            // Column by column: a product of views whose sizes are known at run time takes three times as long.
+            // Column by column: a product of views whose sizes are known at run time takes three
+            // times as long.
             let mut displacement = Vector6::zeros();
             for k in element.coordinate..element.coordinate + element.size {
                 displacement += twin.J.column(k) * seen.q[k];

@@ -1,4 +1,5 @@
-//! What the drives must supply: the largest force of each, when it first passed its limit, how often a servo was at its own.
+//! What the drives must supply: the largest force of each, when it first passed its limit, how
+//! often a servo was at its own.
 
 use flexarm_stepping::{FlexibleArm, Observation};
 

@@ -60,7 +60,8 @@ struct EnergyBook {
     gross: [f64; 2],
     /// Power of each drive at the sample before (W).
     drives: Vec<f64>,
-    /// Largest gap between what is stored and what was supplied, and largest change of what is stored (J).
+    /// Largest gap between what is stored and what was supplied, and largest change of what is
+    /// stored (J).
     gap: f64,
     swing: f64,
     /// Largest sum of the sizes of its parts (J).
@@ -83,8 +84,8 @@ impl EnergyBook {
         *last = work;
     }
 
-    /// Adds a sample. `power`: of drives, loads, dissipation; `impulse_work`: work of the drives so far that is in no power, where
-    /// velocities jumped (J); `drives`: power of each drive (W).
+    /// Adds a sample. `power`: of drives, loads, dissipation; `impulse_work`: work of the drives so
+    /// far that is in no power, where velocities jumped (J); `drives`: power of each drive (W).
     fn add(&mut self, t: f64, energy: [f64; 3], power: [f64; 3], impulse_work: f64, drives: impl Iterator<Item = f64>) {
         if let Some((t_before, p)) = self.before {
             for c in 0..3 {
@@ -129,8 +130,8 @@ impl EnergyBook {
     }
 }
 
-/// Work of a power that goes from one value to another along a straight line: where it is positive, and where it is negative,
-/// both as positive numbers.
+/// Work of a power that goes from one value to another along a straight line: where it is positive,
+/// and where it is negative, both as positive numbers.
 fn parts(time: f64, from: f64, to: f64) -> [f64; 2] {
     let whole = 0.5 * time * (from + to);
     if from * to >= 0.0 {
@@ -147,8 +148,8 @@ mod tests {
     use flexarm_kinematics::{LinkInertia, forward_kinematics};
     use flexarm_stepping::{FlexibleArm, Spring};
 
-    /// Truth: a mass m that is picked up at p with the velocity v brings `m v²/2 - m g·p`, and takes it along when it is put
-    /// down; v by differences of p.
+    /// Truth: a mass m that is picked up at p with the velocity v brings `m v²/2 - m g·p`, and
+    /// takes it along when it is put down; v by differences of p.
     #[test]
     fn a_payload_brings_its_energy_and_takes_it_along() {
         let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..");
@@ -187,8 +188,8 @@ mod tests {
         assert_eq!(energy.result().payload_j, 0.0);
     }
 
-    /// Truth: the integral of `A sin t` over a turn is 2 A - 2 A, of each drive by itself. Identity: what is put in without
-    /// what is taken out is the net work.
+    /// Truth: the integral of `A sin t` over a turn is 2 A - 2 A, of each drive by itself.
+    /// Identity: what is put in without what is taken out is the net work.
     #[test]
     fn drives_that_give_back_what_they_took_have_no_net_work_and_much_gross_work() {
         let mut book = EnergyBook::default();

@@ -1,8 +1,9 @@
-//! What is watched in a run: one file per thing, each a struct that is shown every logged sample (`update`) and says at the
-//! end, or at any time before, what it has seen (`result`).
+//! What is watched in a run: one file per thing, each a struct that is shown every logged sample
+//! (`update`) and says at the end, or at any time before, what it has seen (`result`).
 //!
-//! A monitor sees the arm as the stepper shows it ([`Observation`]) beside the rigid twin, and keeps sums and largest values,
-//! no curves. Not here: samples for recordings (`run::sampler`), sentences about what was seen (`caveat`).
+//! A monitor sees the arm as the stepper shows it ([`Observation`]) beside the rigid twin, and
+//! keeps sums and largest values, no curves. Not here: samples for recordings (`run::sampler`),
+//! sentences about what was seen (`caveat`).
 
 pub(crate) mod contribution;
 pub(crate) mod deflection;

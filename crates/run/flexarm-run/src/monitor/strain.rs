@@ -63,7 +63,8 @@ impl Strains {
         Self { spans: spans.collect(), largest: vec![LinkStrain::default(); flexible.spans.len()] }
     }
 
-    /// * `X_WB`: poses of all bodies in the world; `rigid`: those of the rigid twin, in which a link always is as it is undeformed.
+    /// * `X_WB`: poses of all bodies in the world; `rigid`: those of the rigid twin, in which a
+    ///   link always is as it is undeformed.
     pub(crate) fn update(&mut self, X_WB: &[Pose], rigid: &[Pose]) {
         for (span, largest) in self.spans.iter_mut().zip(&mut self.largest) {
             let (X_WA, X_WE) = (span.near.pose(X_WB), span.far.pose(X_WB));
@@ -89,8 +90,8 @@ mod tests {
     use super::*;
     use nalgebra::Vector3;
 
-    /// Truth: a link of 2 m whose far end moves by 1 mm along it and turns by 0.02 rad; the whole arm turned and moved is the
-    /// same link.
+    /// Truth: a link of 2 m whose far end moves by 1 mm along it and turns by 0.02 rad; the whole
+    /// arm turned and moved is the same link.
     #[test]
     fn strain_and_rotation_are_those_of_the_link_wherever_the_arm_is() {
         let on = |body: usize, X_FI: Pose| {

@@ -1,8 +1,9 @@
 //! The error across the path of a motion that is told by the path of the tool, move by move.
 //!
-//! Terms as in ISO 9283, of one run in place of many: path accuracy is the largest distance across the path; the corner overshoot is how
-//! far the tool swings on along the old direction behind a corner. A workpiece is often set where the tool really is; what is left
-//! then is bounded by half the diagonal of the box that the error vector stays in.
+//! Terms as in ISO 9283, of one run in place of many: path accuracy is the largest distance across
+//! the path; the corner overshoot is how far the tool swings on along the old direction behind a
+//! corner. A workpiece is often set where the tool really is; what is left then is bounded by half
+//! the diagonal of the box that the error vector stays in.
 
 use std::sync::Arc;
 
@@ -27,15 +28,18 @@ pub struct PathFigures {
     pub t_across_peak_s: f64,
     /// Root mean square of that distance over the samples of those moves (m).
     pub across_rms_m: f64,
-    /// Middle of the box that the error stays in on those moves: by how much a workpiece would be moved (m, world axes).
+    /// Middle of the box that the error stays in on those moves: by how much a workpiece would be
+    /// moved (m, world axes).
     pub offset_m: [f64; 3],
     /// What is left then, at most (m): half the diagonal of the box.
     pub left_m: f64,
-    /// How far the tool swings on behind a corner, beyond its static deflection (m); 0 without a corner.
+    /// How far the tool swings on behind a corner, beyond its static deflection (m); 0 without a
+    /// corner.
     pub corner_overshoot_m: f64,
     /// Move by move, those of the tool alone.
     pub moves: Vec<PathMoveFigures>,
-    /// Points of the path with the error there, some thousands of them: rigid tool and error (m, world axes). Not in files.
+    /// Points of the path with the error there, some thousands of them: rigid tool and error (m,
+    /// world axes). Not in files.
     #[serde(skip)]
     pub points: Vec<[f64; 6]>,
 }
@@ -206,7 +210,8 @@ mod tests {
         }
     }
 
-    /// Truth: a tool that goes along x for a second, then along y, with a sag of 2 mm and a swing along x of 1 mm behind the corner.
+    /// Truth: a tool that goes along x for a second, then along y, with a sag of 2 mm and a swing
+    /// along x of 1 mm behind the corner.
     #[test]
     fn sag_is_an_offset_and_a_swing_behind_the_corner_an_overshoot() {
         let path = ToolPath {

@@ -45,19 +45,20 @@ const UNKNOWN: &str = "unknown";
 /// A recording to be read.
 struct Input {
     path: PathBuf,
-    /// Its figures, if they are known from elsewhere: those of the recording lack what a study adds.
+    /// Its figures, if they are known from elsewhere: those of the recording lack what a study
+    /// adds.
     of_study: Option<Summary>,
 }
 
-/// Makes the report of one recording, or one page in which several are compared. The folder of a study gives the page
-/// of the study.
+/// Makes the report of one recording, or one page in which several are compared. The folder of a
+/// study gives the page of the study.
 ///
-/// Figures are those that the recording holds. If it holds none (a table, a killed run), those of the tool are computed from
-/// its curves, and what curves cannot tell is left out.
+/// Figures are those that the recording holds. If it holds none (a table, a killed run), those of
+/// the tool are computed from its curves, and what curves cannot tell is left out.
 ///
 /// # Errors
-/// As [`read_run`]; [`Error::File`] for a folder without a recording; [`Error::Taken`]; [`Error::Recording`] if
-/// the page would replace a recording that it is made of.
+/// As [`read_run`]; [`Error::File`] for a folder without a recording; [`Error::Taken`];
+/// [`Error::Recording`] if the page would replace a recording that it is made of.
 pub fn report(recordings: &[PathBuf], options: &ReportOptions) -> Result<ReportFiles, Error> {
     let mut warnings = Vec::new();
     let mut inputs = Vec::new();

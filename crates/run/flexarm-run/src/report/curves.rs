@@ -99,8 +99,8 @@ impl Table {
     }
 }
 
-/// Indices, ascending, of at most about `most` points of curves with a common axis: first and last, and of each of
-/// equal pieces the smallest and the largest value of every curve.
+/// Indices, ascending, of at most about `most` points of curves with a common axis: first and last,
+/// and of each of equal pieces the smallest and the largest value of every curve.
 pub(super) fn thinned(curves: &[&[f64]], length: usize, most: usize) -> Vec<usize> {
     if length <= most || curves.is_empty() {
         return (0..length).collect();
@@ -399,7 +399,8 @@ fn elements(summary: &Summary, trace: &Trace) -> Vec<Plot> {
     plots.into_iter().filter(|plot| !is_zero(plot)).collect()
 }
 
-/// Whether all curves of a plot are zero everywhere: springs of one kind alone leave the plots of the others so.
+/// Whether all curves of a plot are zero everywhere: springs of one kind alone leave the plots of
+/// the others so.
 fn is_zero(plot: &Plot) -> bool {
     let tables = plot.views.iter().flat_map(|view| &view.tables);
     tables.flat_map(|table| &table.curves).flat_map(|curve| &curve.y).all(|y| *y == 0.0)

@@ -1,5 +1,5 @@
-//! A folder of figures for papers: every plot of the page as SVG in the width of a column, with its data as CSV, and
-//! pictures of the arm at print size.
+//! A folder of figures for papers: every plot of the page as SVG in the width of a column, with its
+//! data as CSV, and pictures of the arm at print size.
 
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,8 @@ use crate::summary::Summary;
 /// Width of the pictures of the arm (pixels): 300 a inch across both columns of a paper.
 const PICTURE_WIDTH: usize = 1800;
 
-/// Writes the folder. Plots without a finite value, and pictures that cannot be drawn, are left out.
+/// Writes the folder. Plots without a finite value, and pictures that cannot be drawn, are left
+/// out.
 ///
 /// # Errors
 /// [`Error::Write`].
@@ -76,7 +77,8 @@ fn svg(plot: &Plot, view: &PlotView, bands: &[(f64, f64)]) -> Result<String, fle
     paper_plot(&format!("{} ({})", plot.x_label, plot.x_unit), &[panel], bands)
 }
 
-/// The data of a plot: a column per curve, units in the names; sets of curves with axes of their own beside each other.
+/// The data of a plot: a column per curve, units in the names; sets of curves with axes of their
+/// own beside each other.
 fn csv(plot: &Plot, view: &PlotView) -> String {
     let plain = |unit: &str| unit.replace('°', "deg").replace(' ', "_");
     let name = |text: &str, unit: &str| csv_field(&format!("{}_{}", text.replace(' ', "_"), plain(unit)));

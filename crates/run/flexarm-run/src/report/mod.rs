@@ -1,7 +1,9 @@
-//! The report of a run: a page for the browser, its figures as Markdown and JSON, figures for papers.
+//! The report of a run: a page for the browser, its figures as Markdown and JSON, figures for
+//! papers.
 //!
-//! Start at [`html`]; what a person wants to see in numbers is in [`figure_groups`], which page, Markdown and the
-//! terminal share. `curves` makes the data of the plots, `picture` has the arm drawn, `figures` writes the folder for papers.
+//! Start at [`html`]; what a person wants to see in numbers is in [`figure_groups`], which page,
+//! Markdown and the terminal share. `curves` makes the data of the plots, `picture` has the arm
+//! drawn, `figures` writes the folder for papers.
 
 mod again;
 mod curves;
@@ -52,7 +54,8 @@ pub(crate) fn write(outputs: &Outputs, summary: &Summary, trace: &Trace, page: &
     }
 }
 
-/// Writes report and `summary.json` of several runs into the output folder; the summary has all but the first within.
+/// Writes report and `summary.json` of several runs into the output folder; the summary has all but
+/// the first within.
 pub(crate) fn write_study(outputs: &Outputs, summary: &Summary, traces: &[(String, Trace)]) -> Result<(), Error> {
     let summaries = std::iter::once(summary).chain(&summary.with);
     let runs: Vec<ReportRun<'_>> =
@@ -151,7 +154,8 @@ impl Figure {
     }
 }
 
-/// The figures of a run in groups: what the tool does, what links and drives contribute, how the run went.
+/// The figures of a run in groups: what the tool does, what links and drives contribute, how the
+/// run went.
 pub fn figure_groups(summary: &Summary) -> Vec<FigureGroup> {
     let groups = [
         FigureGroup { title: "TCP", rows: tool_figures(summary) },

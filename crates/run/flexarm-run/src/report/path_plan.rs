@@ -16,7 +16,8 @@ pub(crate) struct PathPlan {
     pub(crate) factor: f64,
 }
 
-/// Draws the path in the plane in which it lies best, and beside it the tool with its errors, less the offset of the workpiece.
+/// Draws the path in the plane in which it lies best, and beside it the tool with its errors, less
+/// the offset of the workpiece.
 pub(crate) fn path_plan(figures: &PathFigures) -> Option<PathPlan> {
     let split = |row: &[f64; 6]| (Vector3::new(row[0], row[1], row[2]), Vector3::new(row[3], row[4], row[5]));
     let points: Vec<(Vector3<f64>, Vector3<f64>)> = figures.points.iter().map(split).collect();
@@ -49,7 +50,8 @@ pub(crate) fn path_plan(figures: &PathFigures) -> Option<PathPlan> {
     Some(PathPlan { svg, factor })
 }
 
-/// Two world axes if the points lie square to the third, else the two directions in which they spread most.
+/// Two world axes if the points lie square to the third, else the two directions in which they
+/// spread most.
 fn plane(points: impl Iterator<Item = Vector3<f64>>) -> [Vector3<f64>; 2] {
     let spread: Matrix3<f64> = points.map(|p| p * p.transpose()).sum();
     let eigen = spread.symmetric_eigen();

@@ -6,7 +6,8 @@ use flexarm_log::Trace;
 pub(super) struct Picture {
     /// For the caption.
     pub(super) title: &'static str,
-    /// PNG file without a ground, and where x, y and z point on it (right and up); or why there is none.
+    /// PNG file without a ground, and where x, y and z point on it (right and up); or why there is
+    /// none.
     pub(super) drawn: Result<(Vec<u8>, [[f64; 2]; 3]), String>,
 }
 
@@ -38,7 +39,8 @@ pub(super) fn pictures(_trace: &Trace, _width: usize) -> Vec<Picture> {
     vec![Picture { title: "", drawn }]
 }
 
-/// Both pictures for paper, with their scales, by the names of their files. Those that cannot be drawn are left out.
+/// Both pictures for paper, with their scales, by the names of their files. Those that cannot be
+/// drawn are left out.
 #[cfg(feature = "png")]
 pub(super) fn printed(trace: &Trace, width: usize) -> Vec<(&'static str, Vec<u8>)> {
     use flexarm_draw::{ArmSide, arm_png};

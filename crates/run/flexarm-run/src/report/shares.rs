@@ -1,4 +1,5 @@
-//! Who has which share in the largest TCP error: what table and page tell of links, drives, servos and stepper.
+//! Who has which share in the largest TCP error: what table and page tell of links, drives, servos
+//! and stepper.
 
 use crate::headline::{self, rounded};
 use crate::summary::{DriveFigures, LinkFigures, Summary};
@@ -59,7 +60,8 @@ pub(super) fn part_shares(summary: &Summary) -> Vec<PartShare<'_>> {
     links.chain(drives).chain(others).collect()
 }
 
-/// The shares of all parts in mm, as numbers that add up to the peak as it is shown; those that are not known are `None`.
+/// The shares of all parts in mm, as numbers that add up to the peak as it is shown; those that are
+/// not known are `None`.
 pub(super) fn share_numbers(summary: &Summary, shares: &[PartShare<'_>], digits: usize) -> Vec<Option<String>> {
     let known: Vec<f64> = shares.iter().filter_map(|share| Some(1e3 * share.at_peak_m?)).collect();
     let peak = summary.tcp.as_ref().map_or(f64::NAN, |tcp| 1e3 * tcp.peak_m);

@@ -13,7 +13,8 @@ use crate::options::RunOptions;
 use crate::posed::strains;
 use crate::robot::Robot;
 
-/// Steps in a period of a gear's ripple with which a step of second order meets its amplitude within a few per cent.
+/// Steps in a period of a gear's ripple with which a step of second order meets its amplitude
+/// within a few per cent.
 const RIPPLE_STEPS: f64 = 12.0;
 
 /// A run that is ready to go.
@@ -31,7 +32,8 @@ pub struct BeforeRun<'a> {
 }
 
 impl BeforeRun<'_> {
-    /// Caveats about the models of the links, the motion, the arm at rest where it begins, steps and stepper.
+    /// Caveats about the models of the links, the motion, the arm at rest where it begins, steps
+    /// and stepper.
     ///
     /// * `sag_m`: how far the TCP is off at rest (m).
     pub(crate) fn caveats(&self, sag_m: f64) -> Vec<Caveat> {
@@ -60,8 +62,8 @@ impl BeforeRun<'_> {
         caveats
     }
 
-    /// As `caveats`, for a study that keeps no samples: links are looked at where they rest, and torques of the rigid
-    /// robot beyond a limit warn.
+    /// As `caveats`, for a study that keeps no samples: links are looked at where they rest, and
+    /// torques of the rigid robot beyond a limit warn.
     pub fn caveats_of_study(&self, sag_m: f64) -> Vec<Caveat> {
         let warns = |caveat: Caveat| match caveat.code == kinds::MOTION_EFFORT.code {
             true => Caveat { severity: Severity::Warning, ..caveat },
@@ -95,7 +97,8 @@ impl BeforeRun<'_> {
         })
     }
 
-    /// Ripple of a gear that is faster than the steps follow, at the largest speed of a thousand instants of the motion.
+    /// Ripple of a gear that is faster than the steps follow, at the largest speed of a thousand
+    /// instants of the motion.
     fn ripple(&self) -> Option<Caveat> {
         let (arm, model, duration) = (self.arm, &self.arm.model, self.motion.trajectory.duration());
         if arm.transmission.is_empty() || self.options.stepper.entry().steps == StepRule::ByErrorControl {

@@ -37,7 +37,8 @@ impl RunLoop<'_> {
         let mut jumps: Vec<f64> = self.arm.load_jumps().collect();
         jumps.sort_by(f64::total_cmp);
         jumps.dedup();
-        // A table or a milling load has a corner at every row; a list of those tells nobody anything.
+        // A table or a milling load has a corner at every row; a list of those tells nobody
+        // anything.
         const MOST_JUMPS: usize = 20;
         for t in jumps.iter().take(if jumps.len() <= MOST_JUMPS { MOST_JUMPS } else { 1 }) {
             add(*t, EventKind::Load, "an external load changes".into());

@@ -161,7 +161,8 @@ impl RunLoop<'_> {
     }
 }
 
-/// TCP error with the drives at rest in their first position, also for runs that start undeformed (m).
+/// TCP error with the drives at rest in their first position, also for runs that start undeformed
+/// (m).
 pub fn static_sag(arm: &FlexibleArm, tcp: &Frame) -> f64 {
     let model = &arm.model;
     let (mut data, mut state) = (arm.lend_data(), State::zeros(model));

@@ -1,7 +1,9 @@
-//! The main job: rigid and flexible run along one motion, logged while it goes on, measured at the end.
+//! The main job: rigid and flexible run along one motion, logged while it goes on, measured at the
+//! end.
 //!
-//! `RunLoop::go` takes the steps of the arm and of its rigid twin, updates `Monitors`, and passes samples to recorders,
-//! curves and observer. Figures of what was seen are in `figures`, what happened when in `events`.
+//! `RunLoop::go` takes the steps of the arm and of its rigid twin, updates `Monitors`, and passes
+//! samples to recorders, curves and observer. Figures of what was seen are in `figures`, what
+//! happened when in `events`.
 
 mod before;
 mod events;
@@ -47,10 +49,12 @@ pub use figures::static_sag;
 /// What servos leave of the way to go, among the contributors to the TCP error.
 const FOLLOWING_ERROR: &str = "following error";
 
-/// Part of the first natural frequency at the start below which the arm does not ring anywhere on its way.
+/// Part of the first natural frequency at the start below which the arm does not ring anywhere on
+/// its way.
 const RINGING_FROM: f64 = 0.5;
 
-/// Coordinates times steps between two looks at the progress callback: a stop must not wait for many large steps.
+/// Coordinates times steps between two looks at the progress callback: a stop must not wait for
+/// many large steps.
 const POLL_EVERY: usize = 2000;
 /// Most steps between two looks.
 const RAREST_POLL: usize = 64;
@@ -200,7 +204,8 @@ pub(crate) fn simulate(
     summary.cpu_s_per_simulated_s = summary.cpu_s / summary.duration_s.max(1e-9);
     summary.files = files.names.clone();
     run.trace.finish(if detail < Detail::Curves { RunResult::default() } else { result(&summary, events) });
-    // The page is made while the recordings are closed, of long runs afterwards: each takes memory, the page what they leave.
+    // The page is made while the recordings are closed, of long runs afterwards: each takes memory,
+    // the page what they leave.
     files.set.begin_to_finish(&run.trace.result);
     let make_page = || outputs.map(|_| crate::report::page(&summary, &run.trace));
     let early = if run.trace.samples() < LONG_RUN { make_page() } else { None };
@@ -212,8 +217,9 @@ pub(crate) fn simulate(
     Ok(Run { summary, columns: columns.unwrap_or_default(), trace: run.trace })
 }
 
-/// The error to tell, if the run or the writing of its result failed. What stopped the run is the news: after a full disk,
-/// closing fails again. But nobody must be told of a log that is not there.
+/// The error to tell, if the run or the writing of its result failed. What stopped the run is the
+/// news: after a full disk, closing fails again. But nobody must be told of a log that is not
+/// there.
 fn how_it_ended(end: Result<(), Error>, reported: Result<(), Error>) -> Result<(), Error> {
     match (end, reported) {
         (Err(Error::Interrupted { .. }), Err(lost)) => Err(lost),
@@ -222,7 +228,8 @@ fn how_it_ended(end: Result<(), Error>, reported: Result<(), Error>) -> Result<(
     }
 }
 
-/// What recordings are told at the end. Timings stay out of it: recordings of the same run are the same bytes.
+/// What recordings are told at the end. Timings stay out of it: recordings of the same run are the
+/// same bytes.
 fn result(summary: &Summary, events: Vec<Event>) -> RunResult {
     let timeless =
         Summary { wall_s: 0.0, cpu_s: 0.0, real_time_factor: 0.0, cpu_s_per_simulated_s: 0.0, ..summary.clone() };
@@ -363,7 +370,8 @@ impl<'a> RunLoop<'a> {
         Ok(())
     }
 
-    /// Compares with the twin, shows the monitors what there is, and fills the sample as far as it is wanted.
+    /// Compares with the twin, shows the monitors what there is, and fills the sample as far as it
+    /// is wanted.
     fn observe(&mut self, step: u64) {
         self.stepper.observe(&mut self.seen);
         // The twin carries what the arm carries.
@@ -423,7 +431,8 @@ fn tool_monitor(
     });
     let path = PathFrame::before(instants.map(|t| twin.rates(arm, tcp, t)));
     let static_part = options.with_twin.then(|| StaticPart::new(arm, tcp, moves(motion), duration, sample_s));
-    // Stops come to rest where the static part is, unless servos bring the joints elsewhere or a load moves it.
+    // Stops come to rest where the static part is, unless servos bring the joints elsewhere or a
+    // load moves it.
     let rests_there = arm.torque_driven.is_empty() && arm.loads.is_empty();
     let first_hz = arm.modes.frequencies_hz().first().copied().unwrap_or(0.0);
     let settings = MetricSettings { settling_band_m: options.settling_band_m, lowest_hz: RINGING_FROM * first_hz };

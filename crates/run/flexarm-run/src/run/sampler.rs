@@ -1,4 +1,5 @@
-//! What recordings, curves and observers are shown of an instant of a run: one [`Sample`], filled again and again.
+//! What recordings, curves and observers are shown of an instant of a run: one [`Sample`], filled
+//! again and again.
 
 use flexarm_kinematics::{AxisMotion, Frame, JointMotion};
 use flexarm_log::{ElasticSample, EnergySample, Sample};

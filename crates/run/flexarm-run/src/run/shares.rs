@@ -3,8 +3,8 @@
 //! ```text
 //! x_flexible - x_rigid = ∫ J(q(s)) Δq ds,   q(s) = q_rigid + s Δq,   s from 0 to 1        (1)
 //! ```
-//! A coordinate has its own term of `J Δq`, so the terms of all coordinates together are the error. Three points of Gauss's
-//! rule leave an error of seventh order in Δq.
+//! A coordinate has its own term of `J Δq`, so the terms of all coordinates together are the error.
+//! Three points of Gauss's rule leave an error of seventh order in Δq.
 
 use std::sync::Arc;
 
@@ -40,8 +40,8 @@ impl AtPeak {
         }
     }
 
-    /// What each coordinate has in the error, along its direction (m), and what no coordinate has: steppers in maximal
-    /// coordinates let joints drift apart.
+    /// What each coordinate has in the error, along its direction (m), and what no coordinate has:
+    /// steppers in maximal coordinates let joints drift apart.
     pub(super) fn along(&self, tcp: &Frame) -> (Vec<f64>, f64) {
         let Some(model) = &self.model else { return (Vec::new(), 0.0) };
         let (mut data, mut J) = (Data::new(model), Matrix6xX::zeros(model.nv()));

@@ -190,7 +190,8 @@ struct Reader<'a> {
 /// Reads a path file and plans its motion.
 ///
 /// # Errors
-/// [`Error::RobotFile`] with line and column of what is wrong; [`Error::Path`] for what the arm cannot do.
+/// [`Error::RobotFile`] with line and column of what is wrong; [`Error::Path`] for what the arm
+/// cannot do.
 pub(crate) fn read_path_file(
     path: &Path,
     text: &str,

@@ -1,6 +1,7 @@
 //! Motions told by the path of the tool: a program of moves and a robot become joints over time.
 //!
-//! `file` reads our own path files; robot programs come as a [`Program`] from elsewhere. Both end in `ToolPath::plan`.
+//! `file` reads our own path files; robot programs come as a [`Program`] from elsewhere. Both end
+//! in `ToolPath::plan`.
 
 mod file;
 mod program;
@@ -89,7 +90,8 @@ pub struct Overrides {
 }
 
 impl<'a> Cell<'a> {
-    /// The flange of the controller, the robot's own tool on it, and a note if a link had to be chosen.
+    /// The flange of the controller, the robot's own tool on it, and a note if a link had to be
+    /// chosen.
     fn flange(&self) -> (Frame, Pose, Option<String>) {
         let tcp = tcp_frame(self.model);
         let named = |name: &str| self.model.frame(name).filter(|frame| frame.body == tcp.body).cloned();
@@ -110,7 +112,8 @@ impl<'a> Cell<'a> {
         (flange, X_FT, note)
     }
 
-    /// Where the controller's world stands in that of the model: its link `base`, if that does not move.
+    /// Where the controller's world stands in that of the model: its link `base`, if that does not
+    /// move.
     fn world(&self) -> Pose {
         let base = self.model.frame(BASE).filter(|frame| frame.body == 0);
         base.map_or_else(Pose::identity, |frame| frame.X_BF)

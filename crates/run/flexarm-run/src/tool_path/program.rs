@@ -14,7 +14,8 @@ use crate::error::Error;
 /// Reads a robot program and plans its motion; the name of its language beside it.
 ///
 /// # Errors
-/// [`Error::Program`] for what cannot be read, with line and statement; [`Error::Path`] for what the arm cannot do.
+/// [`Error::Program`] for what cannot be read, with line and statement; [`Error::Path`] for what
+/// the arm cannot do.
 pub(crate) fn read_robot_program(
     path: &Path,
     cell: &Cell<'_>,

@@ -1,8 +1,9 @@
 //! Named motions of standards within a cube of the workspace, as moves of the tool.
 //!
-//! * Poses and paths after ISO 9283: the test plane holds two opposite edges of the cube along y and its diagonal in x and z; pose
-//!   P1 is its centre, P2 to P5 lie at 80 % of the way to its corners, the square path runs through P2 to P5 with sharp corners,
-//!   the circles have diameters of 80 % and 10 % of the side.
+//! * Poses and paths after ISO 9283: the test plane holds two opposite edges of the cube along y
+//!   and its diagonal in x and z; pose P1 is its centre, P2 to P5 lie at 80 % of the way to its
+//!   corners, the square path runs through P2 to P5 with sharp corners, the circles have diameters
+//!   of 80 % and 10 % of the side.
 //! * Circles in the three planes of the cube, there and back, after ISO 230-4.
 //! * Settling: short moves along each axis, each followed by a rest.
 

@@ -1,14 +1,17 @@
-//! What cuts: teeth, engagement, and the force of a tooth on the tool per metre of depth and of chip.
+//! What cuts: teeth, engagement, and the force of a tooth on the tool per metre of depth and of
+//! chip.
 //!
-//! Axes: x along the feed (of the tool relative to the work), z along the tool from its tip to the spindle, y completes them. The angle φ
-//! of a tooth runs from +y to +x (clockwise seen from the spindle). With the lead angle κ of the edge (90 degrees for an end mill):
+//! Axes: x along the feed (of the tool relative to the work), z along the tool from its tip to the
+//! spindle, y completes them. The angle φ of a tooth runs from +y to +x (clockwise seen from the
+//! spindle). With the lead angle κ of the edge (90 degrees for an end mill):
 //!
 //! ```text
 //! n = (sin κ sin φ, sin κ cos φ, -cos κ)    chip thickness of a displacement u: nᵀ u
 //! t = (cos φ, -sin φ, 0)                    a = (cos κ sin φ, cos κ cos φ, sin κ)
 //! F = -(depth / sin κ) (K_t t + K_r n + K_a a) (nᵀ u)
 //! ```
-//! On a helical tooth the edge at the height z is behind by `2 z tan(helix) / diameter`; the integral over the depth is in closed form.
+//! On a helical tooth the edge at the height z is behind by `2 z tan(helix) / diameter`; the
+//! integral over the depth is in closed form.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -37,7 +40,8 @@ pub struct Engagement {
 }
 
 impl Engagement {
-    /// Up-milling: the chip starts with no thickness. `immersion`: radial depth over diameter, above 0 to 1.
+    /// Up-milling: the chip starts with no thickness. `immersion`: radial depth over diameter,
+    /// above 0 to 1.
     pub fn up(immersion: f64) -> Self {
         Self { entry: 0.0, exit: (1.0 - 2.0 * immersion).clamp(-1.0, 1.0).acos() }
     }
@@ -75,7 +79,8 @@ pub struct Cutter {
     pub engagement: Engagement,
 }
 
-/// Force on the tool and reading of the chip at one moment: `F = -push (thicknessᵀ u)`, columns one by one.
+/// Force on the tool and reading of the chip at one moment: `F = -push (thicknessᵀ u)`, columns one
+/// by one.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Regeneration {
     pub(crate) pairs: Vec<(Vector3<f64>, Vector3<f64>)>,
@@ -157,7 +162,8 @@ impl Cutter {
         (t * k.tangential + self.thickness(phi) * k.radial + a * k.axial) / sk
     }
 
-    /// Cutter angles within one pitch at which a tooth, or its end at this depth, enters or leaves; ascending, with 0 and the pitch.
+    /// Cutter angles within one pitch at which a tooth, or its end at this depth, enters or leaves;
+    /// ascending, with 0 and the pitch.
     pub(crate) fn events(&self, depth: f64) -> Vec<f64> {
         let pitch = self.pitch();
         let Engagement { entry, exit } = self.engagement;
@@ -179,7 +185,8 @@ impl Cutter {
         kept
     }
 
-    /// The force at the cutter angle `alpha` (of tooth 0 at the tip) per metre of displacement, at a depth.
+    /// The force at the cutter angle `alpha` (of tooth 0 at the tip) per metre of displacement, at
+    /// a depth.
     pub(crate) fn regeneration(&self, alpha: f64, depth: f64) -> Regeneration {
         let axes = if self.thickness(0.0).z == 0.0 { 2 } else { 3 };
         if self.is_straight() {

@@ -1,7 +1,8 @@
 //! The eigenvalue of largest size of the map over a period.
 //!
-//! Small maps as matrices. Large ones by Arnoldi's method: most of their eigenvalues are next to nothing, as the motion of a period ago
-//! acts through few shapes alone, so that a subspace a little larger than the number of states holds all that count.
+//! Small maps as matrices. Large ones by Arnoldi's method: most of their eigenvalues are next to
+//! nothing, as the motion of a period ago acts through few shapes alone, so that a subspace a
+//! little larger than the number of states holds all that count.
 
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -95,7 +96,8 @@ impl<'a> Krylov<'a> {
         false
     }
 
-    /// `|A v - λ v|` of the unit vector that stands for an eigenvalue of `H`: what is left outside of the directions.
+    /// `|A v - λ v|` of the unit vector that stands for an eigenvalue of `H`: what is left outside
+    /// of the directions.
     fn residual(&self, H: &DMatrix<f64>, value: Complex<f64>) -> f64 {
         let n = H.nrows();
         let shift = value * (1.0 + 1e-12) + Complex::new(1e-300, 0.0);
@@ -125,7 +127,8 @@ mod tests {
     use crate::milling::period::Period;
     use crate::milling::structure::{Mode, Structure};
 
-    /// Truth: all eigenvalues of the matrix. Slow modes of an arm that hardly decay within a period, and fast ones of a tool.
+    /// Truth: all eigenvalues of the matrix. Slow modes of an arm that hardly decay within a
+    /// period, and fast ones of a tool.
     #[test]
     fn few_directions_hold_the_largest_multiplier() {
         let mode = |k: u32| Mode {

@@ -1,7 +1,8 @@
 //! The smallest depth at which a multiplier leaves the unit circle, at one spindle speed.
 //!
-//! The depth is searched upwards on elements that are half a period of the fastest mode that matters; the limit found there is then solved
-//! for again with elements half as long, until it no longer moves.
+//! The depth is searched upwards on elements that are half a period of the fastest mode that
+//! matters; the limit found there is then solved for again with elements half as long, until it no
+//! longer moves.
 
 use std::f64::consts::{PI, TAU};
 
@@ -23,8 +24,8 @@ const NOTHING: f64 = 1e-9;
 const EXACT: f64 = 1e-7;
 /// Most halvings of the elements.
 const MOST_HALVINGS: usize = 6;
-/// A mode matters if the deepest cut times its compliance at resonance times the cutting coefficients is above this (at about 1 it
-/// chatters by itself).
+/// A mode matters if the deepest cut times its compliance at resonance times the cutting
+/// coefficients is above this (at about 1 it chatters by itself).
 const MATTERS: f64 = 0.2;
 /// Largest map whose eigenvalues are asked for.
 const MOST_UNKNOWNS: usize = 2500;
@@ -67,7 +68,8 @@ pub struct Limit {
     pub kind: Kind,
     /// Frequency at which the tip swings most, Hz.
     pub chatter_hz: f64,
-    /// Angle of the multiplier over the tooth period, Hz, 0 to half the tooth frequency: the chatter without multiples of that.
+    /// Angle of the multiplier over the tooth period, Hz, 0 to half the tooth frequency: the
+    /// chatter without multiples of that.
     pub multiplier_hz: f64,
     /// Relative change of the depth when the elements were halved last.
     pub change: f64,
@@ -75,13 +77,15 @@ pub struct Limit {
     pub unknowns: usize,
 }
 
-/// The smallest depth at which the cut chatters at a spindle speed (rad/s); none if it is stable up to the deepest.
+/// The smallest depth at which the cut chatters at a spindle speed (rad/s); none if it is stable up
+/// to the deepest.
 ///
-/// A first unstable range of depths that is narrower than a step of the search (6 %) is found if the largest multiplier shows its peak.
+/// A first unstable range of depths that is narrower than a step of the search (6 %) is found if
+/// the largest multiplier shows its peak.
 ///
 /// # Errors
-/// [`ChatterError::Value`] for a cutter, a speed or options that make no sense, [`ChatterError::TooSlow`] where a tooth period holds too
-/// many oscillations.
+/// [`ChatterError::Value`] for a cutter, a speed or options that make no sense,
+/// [`ChatterError::TooSlow`] where a tooth period holds too many oscillations.
 pub fn limit_of_depth(
     structure: &Structure,
     cutter: &Cutter,
@@ -109,9 +113,11 @@ pub fn limit_of_depth(
     Ok(Some(described(structure, cutter, spindle, &period, depth, change)))
 }
 
-/// All ranges of depth up to the deepest in which the cut chatters, with their ends to the given tolerance; the last may end at the deepest.
+/// All ranges of depth up to the deepest in which the cut chatters, with their ends to the given
+/// tolerance; the last may end at the deepest.
 ///
-/// Costs as many times a limit as there are depths of the search beyond it. Ranges narrower than a step may be missed.
+/// Costs as many times a limit as there are depths of the search beyond it. Ranges narrower than a
+/// step may be missed.
 ///
 /// # Errors
 /// As [`limit_of_depth`].
@@ -145,7 +151,8 @@ pub fn unstable_ranges(
     Ok(ranges)
 }
 
-/// The Floquet multiplier of largest size over one tooth period at a depth, elements halved until it settles to `1e-6`.
+/// The Floquet multiplier of largest size over one tooth period at a depth, elements halved until
+/// it settles to `1e-6`.
 ///
 /// # Errors
 /// As [`limit_of_depth`].
@@ -285,7 +292,8 @@ fn nearby_limit(period: &Period, depth: f64, options: &LimitOptions) -> Option<f
     None
 }
 
-/// Where the growth is zero between two depths with opposite signs: regula falsi, the end that stays halved (Illinois).
+/// Where the growth is zero between two depths with opposite signs: regula falsi, the end that
+/// stays halved (Illinois).
 fn crossing(period: &Period, mut a: (f64, f64), mut b: (f64, f64)) -> f64 {
     for k in 0..100 {
         if (b.0 - a.0).abs() <= EXACT * b.0.abs() {
@@ -319,7 +327,8 @@ fn described(structure: &Structure, cutter: &Cutter, spindle: f64, period: &Peri
     Limit { depth, kind, chatter_hz: chatter / TAU, multiplier_hz: angle / TAU / tooth, change, unknowns: map.nrows() }
 }
 
-/// Frequency `|arg μ / T + 2π k / T|` (rad/s) of the largest harmonic of the tip for the eigenvector of μ.
+/// Frequency `|arg μ / T + 2π k / T|` (rad/s) of the largest harmonic of the tip for the
+/// eigenvector of μ.
 fn strongest_harmonic(
     structure: &Structure,
     period: &Period,
@@ -330,7 +339,8 @@ fn strongest_harmonic(
 ) -> f64 {
     let base = multiplier.arg() / tooth;
     let Some(vector) = eigenvector(map, multiplier) else { return base };
-    // Forces at the nodes, the exponential taken out of them; the vector holds the chips of the last tooth, which grow by μ.
+    // Forces at the nodes, the exponential taken out of them; the vector holds the chips of the
+    // last tooth, which grow by μ.
     let nodes = period.cut_nodes(depth);
     let force = |first: usize, pairs: &[(Vector3<f64>, Vector3<f64>)]| {
         pairs.iter().enumerate().fold(Vector3::<Complex<f64>>::zeros(), |sum, (k, (push, _))| {

@@ -3,8 +3,9 @@
 //! ```text
 //! M x'' + D x' + K x = Jᵀ F      u = J x
 //! ```
-//! In the coordinates of the undamped modes, `x = Φ η`, with `z = (Ω η, η')`, the first-order matrix is as large as the highest frequency
-//! and not as its square. Its right and left eigenvectors give the poles; what they promise is checked on the frequency response.
+//! In the coordinates of the undamped modes, `x = Φ η`, with `z = (Ω η, η')`, the first-order
+//! matrix is as large as the highest frequency and not as its square. Its right and left
+//! eigenvectors give the poles; what they promise is checked on the frequency response.
 
 use nalgebra::{Cholesky, Complex, DMatrix, Matrix3, Matrix3xX, Schur, SymmetricEigen, Vector3};
 
@@ -19,12 +20,14 @@ const REAL: f64 = 1e-11;
 impl Structure {
     /// From mass, damping and stiffness matrix and the tip's Jacobian.
     ///
-    /// * `M`, `D`, `K`: n×n; `M` positive definite, the symmetric part of `K` too; `D` any that takes energy out. SI units.
+    /// * `M`, `D`, `K`: n×n; `M` positive definite, the symmetric part of `K` too; `D` any that
+    ///   takes energy out. SI units.
     /// * `J`: 3×n, velocity of the tip per rate of the coordinates, in the axes of the cut.
     ///
     /// # Errors
-    /// [`ChatterError::Size`], [`ChatterError::NotFinite`], [`ChatterError::NotPositiveDefinite`], [`ChatterError::Undamped`] for a mode
-    /// that does not decay, [`ChatterError::NotConverged`]; [`ChatterError::NotModal`] for two modes that are the same one.
+    /// [`ChatterError::Size`], [`ChatterError::NotFinite`], [`ChatterError::NotPositiveDefinite`],
+    /// [`ChatterError::Undamped`] for a mode that does not decay, [`ChatterError::NotConverged`];
+    /// [`ChatterError::NotModal`] for two modes that are the same one.
     pub fn from_matrices(
         M: &DMatrix<f64>,
         D: &DMatrix<f64>,
@@ -119,7 +122,8 @@ fn undamped(M: &DMatrix<f64>, K: &DMatrix<f64>) -> Result<(Vec<f64>, DMatrix<f64
     let mass = mass.ok_or(ChatterError::NotPositiveDefinite { what: "mass matrix" })?;
     let stiffness = Cholesky::new((K + K.transpose()) * 0.5);
     let stiffness = stiffness.ok_or(ChatterError::NotPositiveDefinite { what: "stiffness matrix" })?;
-    // Eigenvalues 1/ω² of L^-1 M L^-T with K = L Lᵀ: the low modes, which move the tip most, are the largest.
+    // Eigenvalues 1/ω² of L^-1 M L^-T with K = L Lᵀ: the low modes, which move the tip most, are
+    // the largest.
     let singular = || ChatterError::NotPositiveDefinite { what: "stiffness matrix" };
     let (L, half) = (stiffness.l(), mass.l());
     let X = L.solve_lower_triangular(&half).ok_or_else(singular)?;
@@ -164,7 +168,8 @@ fn eigenvectors(A: &DMatrix<f64>) -> Result<Eigenvectors, ChatterError> {
     Ok(((0..n).map(|k| T[(k, k)]).collect(), right))
 }
 
-/// The product `o lᵀ` of a real pole is real; so are then its factors, but for a phase that they share.
+/// The product `o lᵀ` of a real pole is real; so are then its factors, but for a phase that they
+/// share.
 fn real_residue(pole: &mut Pole) {
     let largest = pole.input.iter().copied().max_by(|a, b| a.norm_sqr().total_cmp(&b.norm_sqr())).unwrap_or_default();
     if largest.norm() > 0.0 {

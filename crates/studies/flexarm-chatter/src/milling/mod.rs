@@ -1,9 +1,11 @@
 //! Stability of milling with a structure that yields.
 //!
-//! A tooth cuts what the last one left. Where the structure swings between them, the chip is thicker or thinner, the force follows, and
-//! above a depth of cut the swing grows: chatter. [`Structure`] says how the tool's tip yields, [`Cutter`] what cuts;
-//! [`limit_of_depth`] finds the depth at a spindle speed from the Floquet multipliers of a tooth period, [`zero_order_limit`] from the
-//! mean force alone [Altintas & Budak 1995], and [`simulate`] cuts step by step, with teeth that leave the work.
+//! A tooth cuts what the last one left. Where the structure swings between them, the chip is
+//! thicker or thinner, the force follows, and above a depth of cut the swing grows: chatter.
+//! [`Structure`] says how the tool's tip yields, [`Cutter`] what cuts; [`limit_of_depth`] finds the
+//! depth at a spindle speed from the Floquet multipliers of a tooth period, [`zero_order_limit`]
+//! from the mean force alone [Altintas & Budak 1995], and [`simulate`] cuts step by step, with
+//! teeth that leave the work.
 //!
 //! ```
 //! use flexarm_chatter::milling::{Coefficients, Cutter, Engagement, LimitOptions, Mode, Structure, limit_of_depth};

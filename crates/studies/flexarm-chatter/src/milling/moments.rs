@@ -3,8 +3,8 @@
 //! ```text
 //! I_j(c) = ∫_0^c e^{z (c - σ)} ℓ_j(σ) dσ
 //! ```
-//! with the Lagrange polynomials ℓ_j of the Gauss nodes of (0, 1). Small `z` by Gauss quadrature; for large ones by parts, which is a
-//! finite sum as ℓ_j is a polynomial.
+//! with the Lagrange polynomials ℓ_j of the Gauss nodes of (0, 1). Small `z` by Gauss quadrature;
+//! for large ones by parts, which is a finite sum as ℓ_j is a polynomial.
 
 use std::sync::LazyLock;
 
@@ -17,7 +17,8 @@ const POINTS: usize = 14;
 /// Up to here the quadrature is exact to rounding, beyond the sum by parts is.
 const SMALL: f64 = 7.0;
 
-/// The nodes and what depends on them alone. Targets are the nodes and, last, the end of the element.
+/// The nodes and what depends on them alone. Targets are the nodes and, last, the end of the
+/// element.
 pub(crate) struct Rule {
     /// Gauss nodes within (0, 1).
     pub(crate) nodes: [f64; NODES],
@@ -62,7 +63,8 @@ impl Rule {
         }
     }
 
-    /// All moments for `z`, the pole times the length of the element, with lengths in units of the element.
+    /// All moments for `z`, the pole times the length of the element, with lengths in units of the
+    /// element.
     pub(crate) fn moments(&self, z: Complex<f64>) -> Moments {
         let targets: [f64; NODES + 1] = std::array::from_fn(|i| *self.nodes.get(i).unwrap_or(&1.0));
         let decay = targets.map(|c| (z * c).exp());
@@ -156,7 +158,8 @@ fn derivative(coefficients: &SMatrix<f64, NODES, NODES>, j: usize, order: usize,
 mod tests {
     use super::*;
 
-    /// Truth: for ℓ summed over all nodes (which is 1) the integral is (e^{z c} - 1) / z; weighted with x_j, ∫ e^{z(c-σ)} σ dσ.
+    /// Truth: for ℓ summed over all nodes (which is 1) the integral is (e^{z c} - 1) / z; weighted
+    /// with x_j, ∫ e^{z(c-σ)} σ dσ.
     #[test]
     fn moments_of_one_and_of_the_first_power_are_those_of_the_closed_form() {
         let mut worst: f64 = 0.0;

@@ -1,13 +1,17 @@
-//! One tooth period as a linear map: the state of the structure and what the last tooth left, to the same a period later.
+//! One tooth period as a linear map: the state of the structure and what the last tooth left, to
+//! the same a period later.
 //!
 //! ```text
 //! z' = Λ z + l F(t)      F = -Σ_k P_k(t) (w_k(t) - w_k(t - T))      w_k = N_k(t)ᵀ u(t)
 //! ```
-//! The period is cut where teeth enter or leave. While none cuts the structure moves freely, without error. The rest is divided into
-//! elements: within one the force is the polynomial through its values at the Gauss nodes, and the poles answer it exactly. The unknowns
-//! are the chip thicknesses at the nodes, so that their number depends on how long and how fast something cuts, not on the structure.
+//! The period is cut where teeth enter or leave. While none cuts the structure moves freely,
+//! without error. The rest is divided into elements: within one the force is the polynomial through
+//! its values at the Gauss nodes, and the poles answer it exactly. The unknowns are the chip
+//! thicknesses at the nodes, so that their number depends on how long and how fast something cuts,
+//! not on the structure.
 //!
-//! In the order of the error this is a semi-discretisation [Insperger & Stépán 2004] of all of the force, a full one [Ding 2010], with elements of sixth order in place of steps of the first.
+//! In the order of the error this is a semi-discretisation [Insperger & Stépán 2004] of all of the
+//! force, a full one [Ding 2010], with elements of sixth order in place of steps of the first.
 
 use nalgebra::{Complex, DMatrix, Matrix3, Vector3};
 
@@ -131,7 +135,8 @@ impl<'a> Period<'a> {
         answers
     }
 
-    /// A depth below which the mean force makes nothing chatter, at any speed: `|b (1 - e^{-i ω T})| = 1/|λ|` with an eigenvalue of `G H`.
+    /// A depth below which the mean force makes nothing chatter, at any speed:
+    /// `|b (1 - e^{-i ω T})| = 1/|λ|` with an eigenvalue of `G H`.
     pub(crate) fn zero_order_bound(&self) -> f64 {
         let H = self.cutter.mean_force_matrix().map(|x| Complex::new(x, 0.0));
         let size = |w: &f64| (self.structure.frequency_response(*w) * H).norm();
@@ -187,7 +192,8 @@ impl<'a> Period<'a> {
         stretches.iter().map(all).collect()
     }
 
-    /// One element: its chips from the state at its start and the chips of the last tooth, then the state at its end.
+    /// One element: its chips from the state at its start and the chips of the last tooth, then the
+    /// state at its end.
     fn element(&self, answers: &Answers, nodes: &[Regeneration], first: usize, decay: &[Rotation]) -> Element {
         let nz = self.structure.n_states();
         let pairs: Vec<(usize, Vector3<f64>, Vector3<f64>)> = nodes

@@ -1,9 +1,11 @@
-//! Cutting step by step: teeth that leave the work where the tool swings out of it, and meet what earlier ones left.
+//! Cutting step by step: teeth that leave the work where the tool swings out of it, and meet what
+//! earlier ones left.
 //!
-//! Each angle of a tooth has the deepest cut that was made there. The chip is what goes beyond it; without one there is no force. The edge
-//! is cut into slices along the tool, each with angles of its own, so that a helix needs no interpolation. The structure moves exactly
-//! under a force that is linear within a step, the force at its end found by corrections. [`simulate`] does both; who steps a structure in
-//! another way takes [`RegenerativeCut`] alone.
+//! Each angle of a tooth has the deepest cut that was made there. The chip is what goes beyond it;
+//! without one there is no force. The edge is cut into slices along the tool, each with angles of
+//! its own, so that a helix needs no interpolation. The structure moves exactly under a force that
+//! is linear within a step, the force at its end found by corrections. [`simulate`] does both; who
+//! steps a structure in another way takes [`RegenerativeCut`] alone.
 
 use std::f64::consts::TAU;
 
@@ -75,8 +77,9 @@ pub fn simulate(structure: &Structure, cutter: &Cutter, cut: &Cut) -> Result<Sim
 }
 
 impl Simulated {
-    /// How much the motion differs from tooth to tooth: standard deviation of the displacement at one moment of each period about its
-    /// mean, the largest over the moments and directions, m. Over the last `teeth` periods.
+    /// How much the motion differs from tooth to tooth: standard deviation of the displacement at
+    /// one moment of each period about its mean, the largest over the moments and directions, m.
+    /// Over the last `teeth` periods.
     pub fn scatter(&self, steps: usize, teeth: usize) -> f64 {
         let from = self.displacement.len().saturating_sub(steps * teeth);
         let mut largest: f64 = 0.0;
@@ -141,7 +144,8 @@ impl ForcedMotion {
         motion
     }
 
-    /// Displacement at the end of a step, m, under the force at its start (N) that goes to none at its end.
+    /// Displacement at the end of a step, m, under the force at its start (N) that goes to none at
+    /// its end.
     pub fn predicted(&self, force: &Vector3<f64>) -> Vector3<f64> {
         let force = force.map(|x| Complex::new(x, 0.0));
         let parts = self.poles.iter().zip(&self.state);
@@ -191,7 +195,8 @@ pub struct RegenerativeCut {
     cutter: Cutter,
     cut: Cut,
     slices: usize,
-    /// Farthest that the edge has been at an angle, along the thickness, m: by slice, then step of the turn.
+    /// Farthest that the edge has been at an angle, along the thickness, m: by slice, then step of
+    /// the turn.
     surface: Vec<Vec<f64>>,
 }
 
@@ -248,7 +253,8 @@ impl RegenerativeCut {
         }
     }
 
-    /// Force on the tool (N) at the end of a step with the tip displaced by `u` (m), axes of the cut.
+    /// Force on the tool (N) at the end of a step with the tip displaced by `u` (m), axes of the
+    /// cut.
     pub fn force(&self, step: usize, u: &Vector3<f64>) -> Vector3<f64> {
         let mut force = Vector3::zeros();
         let width = self.cut.depth / self.slices as f64;

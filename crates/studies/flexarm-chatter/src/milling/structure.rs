@@ -3,14 +3,16 @@
 //! ```text
 //! z_r' = λ_r z_r + l_rᵀ F        u = Σ 2 Re(o_r z_r)  (pairs)  + Σ o_r z_r  (real poles)
 //! ```
-//! Any linear structure without repeated defective poles is of this form: modes with damping ratios, or `M`, `D`, `K` with any damping
-//! ([`crate::milling::poles_of_matrices`]). Structures in series, such as a tool on a flange, are the poles of both.
+//! Any linear structure without repeated defective poles is of this form: modes with damping
+//! ratios, or `M`, `D`, `K` with any damping ([`crate::milling::poles_of_matrices`]). Structures in
+//! series, such as a tool on a flange, are the poles of both.
 
 use nalgebra::{Complex, Matrix3, Vector3};
 
 use crate::milling::error::ChatterError;
 
-/// An eigenvalue of the structure with what excites it and what it moves. One above the real axis stands for a conjugate pair.
+/// An eigenvalue of the structure with what excites it and what it moves. One above the real axis
+/// stands for a conjugate pair.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pole {
     /// `λ`, 1/s, negative real part, not below the real axis.
@@ -38,14 +40,16 @@ pub struct Structure {
     poles: Vec<Pole>,
 }
 
-/// Two equal real poles have no such form; they are moved apart by this part of themselves, which the square of it changes.
+/// Two equal real poles have no such form; they are moved apart by this part of themselves, which
+/// the square of it changes.
 const APART: f64 = 1e-6;
 
 impl Structure {
     /// From its poles.
     ///
     /// # Errors
-    /// [`ChatterError::NotFinite`]; [`ChatterError::Undamped`] for a pole that does not decay, whose limit of depth is zero.
+    /// [`ChatterError::NotFinite`]; [`ChatterError::Undamped`] for a pole that does not decay,
+    /// whose limit of depth is zero.
     pub fn from_poles(poles: Vec<Pole>) -> Result<Self, ChatterError> {
         for pole in &poles {
             let numbers = pole.input.iter().chain(pole.output.iter()).chain([&pole.value]);
@@ -88,7 +92,8 @@ impl Structure {
         Self::from_poles(poles)
     }
 
-    /// Both under the same force, their displacements added: a tool that yields on a flange that does.
+    /// Both under the same force, their displacements added: a tool that yields on a flange that
+    /// does.
     #[must_use]
     pub fn in_series(mut self, other: &Self) -> Self {
         self.poles.extend_from_slice(&other.poles);

@@ -1,11 +1,12 @@
-//! The limit from the mean force of the teeth alone [Altintas & Budak 1995]: exact where the force is constant, good for slots and many teeth,
-//! blind to what teeth that come and go excite (period doubling at low immersion).
+//! The limit from the mean force of the teeth alone [Altintas & Budak 1995]: exact where the force
+//! is constant, good for slots and many teeth, blind to what teeth that come and go excite (period
+//! doubling at low immersion).
 //!
 //! ```text
 //! det(1 + b (1 - e^{-i ω T}) G(i ω) H) = 0        H: mean force matrix
 //! ```
-//! With an eigenvalue λ of `G H`: `b (1 - e^{-i ω T}) = -1/λ`, whose phase gives ω and whose size b. It needs the frequency response alone, so a
-//! measured one will do.
+//! With an eigenvalue λ of `G H`: `b (1 - e^{-i ω T}) = -1/λ`, whose phase gives ω and whose size
+//! b. It needs the frequency response alone, so a measured one will do.
 
 use std::f64::consts::TAU;
 
@@ -21,7 +22,8 @@ const PER_TURN: f64 = 24.0;
 const BISECTIONS: usize = 50;
 /// Most points of a search.
 const MOST_POINTS: usize = 100_000;
-/// Between two frequencies of the band the response is at most this many times that at the larger end.
+/// Between two frequencies of the band the response is at most this many times that at the larger
+/// end.
 const BETWEEN: f64 = 4.0;
 /// An eigenvalue below this part of the product of norms is nothing.
 const NOTHING: f64 = 1e-12;
@@ -35,16 +37,16 @@ pub struct ZeroOrderLimit {
     pub chatter_hz: f64,
 }
 
-/// The smallest depth of the zero-order solution at a spindle speed (rad/s); none if no frequency of the band chatters up to the deepest
-/// cut (m).
+/// The smallest depth of the zero-order solution at a spindle speed (rad/s); none if no frequency
+/// of the band chatters up to the deepest cut (m).
 ///
 /// * `response`: of the tip, m/N, at an angular frequency in rad/s.
-/// * `band`: angular frequencies (rad/s), ascending, fine enough for the resonances ([`Structure::frequencies`]); points are put between
-///   them as the tooth period asks.
+/// * `band`: angular frequencies (rad/s), ascending, fine enough for the resonances
+///   ([`Structure::frequencies`]); points are put between them as the tooth period asks.
 ///
 /// # Errors
-/// [`ChatterError::Value`] for a cutter or a speed that makes no sense, [`ChatterError::TooSlow`] where a tooth period holds too many
-/// oscillations.
+/// [`ChatterError::Value`] for a cutter or a speed that makes no sense, [`ChatterError::TooSlow`]
+/// where a tooth period holds too many oscillations.
 pub fn zero_order_limit(
     response: &dyn Fn(f64) -> Matrix3<Complex<f64>>,
     cutter: &Cutter,
@@ -145,7 +147,8 @@ fn matched(found: [Complex<f64>; 3], last: &[Complex<f64>; 3]) -> [Complex<f64>;
 }
 
 impl Structure {
-    /// Angular frequencies (rad/s) at which the response is worth knowing: evenly by ratio, and densely about each resonance.
+    /// Angular frequencies (rad/s) at which the response is worth knowing: evenly by ratio, and
+    /// densely about each resonance.
     pub fn frequencies(&self) -> Vec<f64> {
         let sizes: Vec<f64> = self.poles().iter().map(|p| p.value.norm()).collect();
         let (Some(low), Some(high)) = (sizes.iter().copied().reduce(f64::min), sizes.iter().copied().reduce(f64::max))

@@ -1,11 +1,13 @@
-//! Stiffness of gears that move several joints, from the positions of the motors and of the links behind them.
+//! Stiffness of gears that move several joints, from the positions of the motors and of the links
+//! behind them.
 //!
 //! ```text
 //! C q_m - q_link = C diag(c) Cᵀ τ:     row i:  Σ_k c_k C_ik (Cᵀ τ)_k + d_i q̇_i + offset of the run
 //! ```
-//! with the compliance `c_k` of each motor's spring behind its gear and a delay `d_i` of each link's encoder (and, fitted to the rest, damping in
-//! proportion to the rate of what each link shows): what one link shows is a
-//! combination of springs, and one encoder may tell several of them. Deviations and what counts as told as for a single gear
+//! with the compliance `c_k` of each motor's spring behind its gear and a delay `d_i` of each
+//! link's encoder (and, fitted to the rest, damping in proportion to the rate of what each link
+//! shows): what one link shows is a combination of springs, and one encoder may tell several of
+//! them. Deviations and what counts as told as for a single gear
 //! ([`crate::estimation::gear_stiffness`]), of each spring beside what the others do.
 
 use crate::estimation::encoders::{BLOCK, GearEstimate, Normal, centred, damping_time, jackknife, squares};
@@ -21,11 +23,13 @@ pub struct CoupledOutput {
     pub deflection_rate: Vec<f64>,
     /// Of each spring its part of the deflection per compliance: `C_ik (Cᵀ τ)_k` (N m).
     pub torques: Vec<Vec<f64>>,
-    /// The same of signals without the noise of the encoders ([`crate::estimation::GearRun::instrument`]).
+    /// The same of signals without the noise of the encoders
+    /// ([`crate::estimation::GearRun::instrument`]).
     pub instruments: Vec<Vec<f64>>,
 }
 
-/// Finds the stiffness of each spring from all recordings of the same encoders; one recording is taken as two halves.
+/// Finds the stiffness of each spring from all recordings of the same encoders; one recording is
+/// taken as two halves.
 ///
 /// None for less than two blocks of samples, or springs that these encoders do not tell apart.
 pub fn coupled_gear_stiffness(runs: &[Vec<CoupledOutput>]) -> Option<Vec<GearEstimate>> {
@@ -147,7 +151,8 @@ impl Fit {
         rest
     }
 
-    /// Of a run, over the encoders that show a spring: what that spring does by the readings without the others, and by its torque.
+    /// Of a run, over the encoders that show a spring: what that spring does by the readings
+    /// without the others, and by its torque.
     fn curves(&self, run: &[CoupledOutput], motor: usize) -> [Vec<f64>; 2] {
         let (mut measured, mut expected) = (Vec::new(), Vec::new());
         for (number, output) in run.iter().enumerate() {

@@ -1,15 +1,18 @@
-//! Stiffness of a gear from the positions of its motor and of the link behind it, recorded while the robot moves.
+//! Stiffness of a gear from the positions of its motor and of the link behind it, recorded while
+//! the robot moves.
 //!
 //! ```text
 //! δ = motor - link = c τ - T dδ/dt + d q̇ + offset of the run
 //! ```
-//! with the compliance c, the torque τ through the gear, the time T = damping / stiffness of the gear, and a delay d between the two
-//! instruments. T is fitted to what the others leave. The torque follows from the link's
-//! motion or from a sensor. The noise of the link's encoder is in the deflection and, through its second derivative, in the torque; a
-//! plain least-squares fit would take the one for the cause of the other. So both are compared by a third signal without that noise
-//! (instrumental variables): the torque that the motor's motion would need.
-//! Samples of a recording are not independent: deviations are those of a jackknife over blocks of time. Whether the gear is told at
-//! all is asked of runs, or halves of one run, that the fit has not seen. Not here: torques, filters.
+//! with the compliance c, the torque τ through the gear, the time T = damping / stiffness of the
+//! gear, and a delay d between the two instruments. T is fitted to what the others leave. The
+//! torque follows from the link's motion or from a sensor. The noise of the link's encoder is in
+//! the deflection and, through its second derivative, in the torque; a plain least-squares fit
+//! would take the one for the cause of the other. So both are compared by a third signal without
+//! that noise (instrumental variables): the torque that the motor's motion would need. Samples of a
+//! recording are not independent: deviations are those of a jackknife over blocks of time. Whether
+//! the gear is told at all is asked of runs, or halves of one run, that the fit has not seen. Not
+//! here: torques, filters.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -20,8 +23,8 @@ pub struct GearRun {
     pub deflection: Vec<f64>,
     /// Through the gear, on the link's side (N m).
     pub torque: Vec<f64>,
-    /// A signal that goes along with the torque and has no part in the noise of the link's encoder (N m); the torque itself if it is
-    /// measured.
+    /// A signal that goes along with the torque and has no part in the noise of the link's encoder
+    /// (N m); the torque itself if it is measured.
     pub instrument: Vec<f64>,
     /// Speed of the joint (rad/s).
     pub rate: Vec<f64>,
@@ -48,12 +51,14 @@ pub struct GearEstimate {
     pub rest_rms: f64,
     /// Deflection without offsets and delay (rad, RMS).
     pub deflection_rms: f64,
-    /// Of each run, or half of one: the deflection without offset and delay, and what the torque makes of the gear (rad).
+    /// Of each run, or half of one: the deflection without offset and delay, and what the torque
+    /// makes of the gear (rad).
     pub curves: Vec<[Vec<f64>; 2]>,
 }
 
 impl GearEstimate {
-    /// Whether the recordings tell the stiffness: most of a run that was not seen follows from it, and it does not depend on one run.
+    /// Whether the recordings tell the stiffness: most of a run that was not seen follows from it,
+    /// and it does not depend on one run.
     pub fn is_told(&self) -> bool {
         let sound = |x: &f64| x.is_finite() && *x > 0.0;
         let mut unseen = self.unseen_r2.clone();
@@ -159,7 +164,8 @@ impl Normal {
         }
     }
 
-    /// The coefficients; columns from `needed` on that are zero have none. None if the others cannot be told apart.
+    /// The coefficients; columns from `needed` on that are zero have none. None if the others
+    /// cannot be told apart.
     pub(crate) fn solved(&self, needed: usize) -> Option<Vec<f64>> {
         let n = self.zy.len();
         let scales = self.sizes.each_ref().map(|sizes| sizes.map(f64::sqrt));
@@ -210,7 +216,8 @@ impl Fit {
         centred_runs.iter().for_each(|[y, t, z, v, _]| sums.add(&[(0, t, z), (1, v, v)], y));
         let found = sums.solved(1)?;
         let (compliance, delay) = (found[0], found[1]);
-        // Of what is left: friction, which jumps where the torque is largest, would pass for damping and change the compliance.
+        // Of what is left: friction, which jumps where the torque is largest, would pass for
+        // damping and change the compliance.
         let damping = centred_runs.iter().map(|[y, t, _, v, w]| {
             let rest: Vec<f64> = (0..y.len()).map(|k| y[k] - compliance * t[k] - delay * v[k]).collect();
             (rest, &w[..])
@@ -264,8 +271,8 @@ mod tests {
         GearRun { deflection_rate: vec![0.0; n], deflection, instrument: torque.clone(), torque, rate }
     }
 
-    /// Truth: the stiffness from which the deflection was made. The link's encoder has noise about 5 Hz, which its second derivative
-    /// carries into the torque of 400 kg m².
+    /// Truth: the stiffness from which the deflection was made. The link's encoder has noise about
+    /// 5 Hz, which its second derivative carries into the torque of 400 kg m².
     #[test]
     fn noise_of_the_link_encoder_that_is_in_deflection_and_torque_does_not_pass_for_a_spring() {
         let noisy = |seed: f64| {

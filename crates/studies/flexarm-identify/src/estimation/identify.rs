@@ -1,4 +1,5 @@
-//! Parameters of an arm from readings: estimate, uncertainty, what is not told, what argues against the model.
+//! Parameters of an arm from readings: estimate, uncertainty, what is not told, what argues against
+//! the model.
 
 use flexarm_kinematics::Pose;
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Translation3, Vector3};
@@ -10,7 +11,8 @@ use crate::estimation::reading::{Component, Instrument, Measurements, Reading, R
 
 /// A residual over its own standard deviation beyond which a reading is named.
 const SUSPICIOUS: f64 = 4.0;
-/// One-sided normal quantile at which the scatter is said to be larger than declared: one in a thousand.
+/// One-sided normal quantile at which the scatter is said to be larger than declared: one in a
+/// thousand.
 const MISFIT_QUANTILE: f64 = 3.09;
 /// Most rounds in which an unknown scatter is found.
 const SCATTER_ROUNDS: usize = 6;
@@ -26,7 +28,8 @@ const UNTOLD: f64 = 0.05;
 pub struct IdentifyOptions {
     /// Loss, iterations, tolerance.
     pub search: Search,
-    /// Whether the deviations of the readings are known; if not, only their ratios count and the scatter tells their size.
+    /// Whether the deviations of the readings are known; if not, only their ratios count and the
+    /// scatter tells their size.
     pub deviations_known: bool,
     /// Parts into which readings are divided to hold one out after another; 0 for none.
     pub folds: usize,
@@ -49,7 +52,8 @@ pub struct Found {
     pub initial: f64,
     /// Now; the initial value where the readings say nothing.
     pub value: f64,
-    /// Standard deviation; not a number where the readings say nothing or the fit does not meet them.
+    /// Standard deviation; not a number where the readings say nothing or the fit does not meet
+    /// them.
     pub std: f64,
     /// Where it lies in 95 of 100 cases; not numbers where there is no deviation.
     pub interval: [f64; 2],
@@ -83,11 +87,13 @@ pub struct Identified {
     pub solution: Solution,
     /// Standard residuals with the initial values, unknowns of the measurement fitted.
     pub before: Vec<f64>,
-    /// Residual of each number over what its own scatter would be: beyond four it argues against the rest.
+    /// Residual of each number over what its own scatter would be: beyond four it argues against
+    /// the rest.
     pub normalised: Vec<f64>,
     /// Numbers of [`Self::normalised`] beyond four, the largest first.
     pub suspicious: Vec<usize>,
-    /// How many times larger than declared the scatter is, where chance does so less than once in a thousand cases.
+    /// How many times larger than declared the scatter is, where chance does so less than once in a
+    /// thousand cases.
     pub misfit: Option<f64>,
     /// Readings that the fit has not seen.
     pub held_out: Option<HeldOut>,
@@ -195,9 +201,10 @@ pub fn identify(
     }
 }
 
-/// Returns how many times larger than the given deviations the readings scatter about the fit, where only the ratios of deviations are
-/// known, and where the search ended. It begins with the scatter about the arm as it is, so that losses and what is identified have a
-/// measure from the start.
+/// Returns how many times larger than the given deviations the readings scatter about the fit,
+/// where only the ratios of deviations are known, and where the search ended. It begins with the
+/// scatter about the arm as it is, so that losses and what is identified have a measure from the
+/// start.
 fn scatter(
     plant: &Plant,
     parameters: &[Parameter],
@@ -232,7 +239,8 @@ fn scatter(
     Ok((scatter, at.unwrap_or_else(|| DVector::zeros(parameters.len() + measurements.own_unknowns()))))
 }
 
-/// What is known before. A prior weaker than the reference does not count: the readings alone make a parameter identifiable.
+/// What is known before. A prior weaker than the reference does not count: the readings alone make
+/// a parameter identifiable.
 fn priors(parameters: &[Parameter]) -> Vec<f64> {
     parameters.iter().map(|parameter| parameter.prior.min(parameter.reference())).collect()
 }
@@ -253,8 +261,9 @@ fn fitted(
     })
 }
 
-/// The fit of all readings. Frequency responses have minima that are none where resonances of the model lie on others of the arm: they
-/// are fitted by their logarithm first, and from several starts as long as the scatter is not that declared.
+/// The fit of all readings. Frequency responses have minima that are none where resonances of the
+/// model lie on others of the arm: they are fitted by their logarithm first, and from several
+/// starts as long as the scatter is not that declared.
 fn searched(
     plant: &Plant,
     parameters: &[Parameter],
@@ -296,7 +305,8 @@ fn searched(
     best
 }
 
-/// A number between -1.5 and 1.5 for a start and a coordinate: the additive recurrence of roots of primes.
+/// A number between -1.5 and 1.5 for a start and a coordinate: the additive recurrence of roots of
+/// primes.
 fn spread(start: usize, coordinate: usize) -> f64 {
     const PRIMES: [f64; 12] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0, 37.0];
     let root = PRIMES[coordinate % PRIMES.len()].sqrt() * (1 + coordinate / PRIMES.len()) as f64;
@@ -352,7 +362,8 @@ fn placed(plant: &Plant, measurements: &Measurements) -> Result<Measurements, Id
     Ok(placed)
 }
 
-/// Whether a reading is a displacement of which all three components were seen in the axes of an instrument, and nothing else.
+/// Whether a reading is a displacement of which all three components were seen in the axes of an
+/// instrument, and nothing else.
 fn seen_in_axes(kind: &ReadingKind, instrument: usize) -> bool {
     let ReadingKind::Displacement { rows, .. } = kind else { return false };
     let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
@@ -381,7 +392,8 @@ pub(crate) fn points(values: &[f64]) -> Vec<Vector3<f64>> {
     values.chunks_exact(3).map(Vector3::from_column_slice).collect()
 }
 
-/// Rotation and translation that bring points onto others with the least sum of squares (Arun, Huang and Blostein 1987).
+/// Rotation and translation that bring points onto others with the least sum of squares (Arun,
+/// Huang and Blostein 1987).
 pub(crate) fn rigid_fit(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Pose> {
     let n = from.len();
     if n < 3 {
@@ -394,7 +406,8 @@ pub(crate) fn rigid_fit(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Po
     Some(Pose::from_parts(Translation3::from(b - R * a), R))
 }
 
-/// Rotation that brings vectors onto others with the least sum of squares; none where all are along one line.
+/// Rotation that brings vectors onto others with the least sum of squares; none where all are along
+/// one line.
 pub(crate) fn rotation_fit(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Rotation3<f64>> {
     let H: Matrix3<f64> = from.iter().zip(to).map(|(p, q)| p * q.transpose()).sum();
     if !H.norm_squared().is_finite() {
@@ -446,7 +459,8 @@ fn held_out(
     for fold in 0..folds {
         let others = measurements.of_readings(|k| k % folds != fold);
         let own = measurements.of_readings(|k| k % folds == fold);
-        // What belongs to the measurement may not follow from the others alone: then this part has no say.
+        // What belongs to the measurement may not follow from the others alone: then this part has
+        // no say.
         let Ok(found) = fitted(plant, parameters, &others, options, Some(&all.unknowns)) else { continue };
         let arm = MeasuredArm { plant, parameters, measurements: &own };
         let unseen = arm.evaluate(&found.unknowns, None)?;
@@ -465,7 +479,8 @@ fn held_out(
     Ok(Some(HeldOut { folds, rms: rms(&residuals), rms_initial: rms(before), residuals }))
 }
 
-/// χ² over its degrees of freedom that chance exceeds once in a thousand cases (Wilson and Hilferty).
+/// χ² over its degrees of freedom that chance exceeds once in a thousand cases (Wilson and
+/// Hilferty).
 fn chi_square_bound(freedom: usize) -> f64 {
     let nine = 2.0 / (9.0 * freedom as f64);
     (1.0 - nine + MISFIT_QUANTILE * nine.sqrt()).powi(3)
@@ -491,7 +506,8 @@ fn told(
     let share = |k: usize| 1.0 - V.row(k).norm_squared();
     let found = parameters.iter().enumerate().map(|(k, parameter)| {
         let spread = solution.covariance[(k, k)].sqrt();
-        // Directions are judged where the prior holds them; where the search ends they may be known less.
+        // Directions are judged where the prior holds them; where the search ends they may be known
+        // less.
         let identifiable = share(k) <= UNTOLD && spread <= parameter.reference();
         let (x, std) = (solution.unknowns[k], if identifiable && fits { spread * scatter } else { f64::NAN });
         Found {

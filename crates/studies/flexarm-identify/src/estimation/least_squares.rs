@@ -1,12 +1,14 @@
-//! Nonlinear least squares with what the data cannot say kept at its prior, and the uncertainty of the rest.
+//! Nonlinear least squares with what the data cannot say kept at its prior, and the uncertainty of
+//! the rest.
 //!
 //! ```text
 //! minimise Σ ρ(r_i(x, b))        x parameters with priors N(0, σ_p²), b unknowns of the measurement without priors
 //! ```
-//! First Levenberg and Marquardt's method with the prior as rows of its own. Then the singular values of the Jacobian (columns
-//! times σ_p, nuisance unknowns projected out) say which directions of x the data know better than the prior; within these the
-//! prior is dropped, so that estimates are free of it, and across them x stays where the prior has it. Residuals are in units of
-//! their standard deviations. Not here: what is measured and what the parameters are.
+//! First Levenberg and Marquardt's method with the prior as rows of its own. Then the singular
+//! values of the Jacobian (columns times σ_p, nuisance unknowns projected out) say which directions
+//! of x the data know better than the prior; within these the prior is dropped, so that estimates
+//! are free of it, and across them x stays where the prior has it. Residuals are in units of their
+//! standard deviations. Not here: what is measured and what the parameters are.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -15,8 +17,8 @@ pub trait Residuals {
     /// What can go wrong.
     type Error;
 
-    /// Residuals over their standard deviations at all unknowns, parameters first; their derivatives into `J` if it is there
-    /// (resized as needed).
+    /// Residuals over their standard deviations at all unknowns, parameters first; their
+    /// derivatives into `J` if it is there (resized as needed).
     ///
     /// # Errors
     /// Where the model has no answer at these unknowns.
@@ -86,13 +88,15 @@ pub struct Solution {
     pub leverages: DVector<f64>,
     /// Covariance of the parameters, with the prior's across what is not identified.
     pub covariance: DMatrix<f64>,
-    /// Directions in the parameters over their prior deviations: one unit column each, the best known first.
+    /// Directions in the parameters over their prior deviations: one unit column each, the best
+    /// known first.
     pub directions: DMatrix<f64>,
     /// How many times better than the prior each direction is known.
     pub gains: Vec<f64>,
     /// How many of the directions are identified.
     pub identified: usize,
-    /// Square of the residuals' scale, `Σ r² / (m - n)` where their square counts; else robust, so that a few outliers leave it.
+    /// Square of the residuals' scale, `Σ r² / (m - n)` where their square counts; else robust, so
+    /// that a few outliers leave it.
     pub scale: f64,
     /// Twice the cost of the residuals under the loss.
     pub cost: f64,
@@ -100,7 +104,8 @@ pub struct Solution {
     pub freedom: usize,
     /// Iterations of both phases.
     pub iterations: usize,
-    /// Whether the last step was below the tolerance; of an identification also that the fit meets the readings.
+    /// Whether the last step was below the tolerance; of an identification also that the fit meets
+    /// the readings.
     pub converged: bool,
 }
 
@@ -119,7 +124,8 @@ pub enum SolveError<E> {
     NotFinite,
 }
 
-/// Smallest gain of a direction that counts as identified: the data know it as well as the prior does.
+/// Smallest gain of a direction that counts as identified: the data know it as well as the prior
+/// does.
 const IDENTIFIED: f64 = 1.0;
 /// Relative size below which a column depends on the others.
 const DEPENDENT: f64 = 1e-10;
@@ -127,7 +133,8 @@ const DEPENDENT: f64 = 1e-10;
 /// Solves the problem from a start.
 ///
 /// * `start`: all unknowns; those of the measurements may be guesses.
-/// * `prior`: standard deviation of each parameter about 0, positive; the unknowns after them have none.
+/// * `prior`: standard deviation of each parameter about 0, positive; the unknowns after them have
+///   none.
 ///
 /// # Errors
 /// [`SolveError`].
@@ -160,7 +167,8 @@ struct Descent {
     converged: bool,
 }
 
-/// Levenberg and Marquardt's method along the columns of `basis`; weights of the loss renewed at every point.
+/// Levenberg and Marquardt's method along the columns of `basis`; weights of the loss renewed at
+/// every point.
 fn descend<P: Residuals>(
     problem: &P,
     basis: &DMatrix<f64>,
@@ -276,7 +284,8 @@ impl Known {
         Ok(Self { directions, gains, identified })
     }
 
-    /// Columns along which the unknowns may move: identified directions of the parameters, then all unknowns without a prior.
+    /// Columns along which the unknowns may move: identified directions of the parameters, then all
+    /// unknowns without a prior.
     fn basis(&self, prior: &DVector<f64>, unknowns: usize) -> DMatrix<f64> {
         let (p, k) = (prior.len(), self.identified);
         let own = unknowns - p;
@@ -304,7 +313,8 @@ impl Known {
     }
 }
 
-/// Orthonormal columns that span those of a matrix; the number of a column that depends on those before.
+/// Orthonormal columns that span those of a matrix; the number of a column that depends on those
+/// before.
 fn orthonormal(A: &DMatrix<f64>) -> Result<DMatrix<f64>, usize> {
     let (Q, R) = A.clone().qr().unpack();
     let is_own = |k: usize| R.get((k, k)).is_some_and(|left| *left > DEPENDENT * A.column(k).norm());
@@ -357,8 +367,8 @@ const CLIPPED: f64 = 2.5;
 /// Mean of `min(z², CLIPPED²)` over normal numbers z.
 const CLIPPED_MEAN: f64 = 0.977_56;
 
-/// Square of the scale s of residuals, not a number without degrees of freedom. Robust (Huber's second proposal):
-/// `Σ min(r²/s², CLIPPED²) = CLIPPED_MEAN (m - n)`.
+/// Square of the scale s of residuals, not a number without degrees of freedom. Robust (Huber's
+/// second proposal): `Σ min(r²/s², CLIPPED²) = CLIPPED_MEAN (m - n)`.
 pub(crate) fn scale(residuals: &[f64], freedom: usize, loss: Loss) -> f64 {
     if freedom == 0 {
         return f64::NAN;
@@ -434,7 +444,8 @@ mod tests {
         assert!((found.covariance[(2, 2)].sqrt() - 0.7).abs() < 1e-12, "its deviation is the prior's");
     }
 
-    /// Truth: quantiles of the normal distribution, whose scale is 1; two of 402 numbers are a hundred.
+    /// Truth: quantiles of the normal distribution, whose scale is 1; two of 402 numbers are a
+    /// hundred.
     #[test]
     fn two_wild_residuals_leave_the_scale_where_it_was() {
         let mut residuals: Vec<f64> = Vec::new();

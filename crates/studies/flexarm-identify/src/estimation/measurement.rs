@@ -1,8 +1,9 @@
 //! What an arm with given parameters would have shown of what was measured.
 //!
-//! A reading is one thing done at the robot: a displacement between two loads at a pose, a place in the axes of an instrument, the
-//! natural frequencies of a hammer test. Each becomes rows: residual over standard deviation, and its derivatives by the
-//! parameters and by the unknowns that belong to the measurement (where the instrument stands, where the target is on the tool).
+//! A reading is one thing done at the robot: a displacement between two loads at a pose, a place in
+//! the axes of an instrument, the natural frequencies of a hammer test. Each becomes rows: residual
+//! over standard deviation, and its derivatives by the parameters and by the unknowns that belong
+//! to the measurement (where the instrument stands, where the target is on the tool).
 
 use std::borrow::Cow;
 
@@ -125,7 +126,8 @@ impl<'a> Workspaces<'a> {
         Ok(AtRest { X_WT, slopes: Some(moved), turns: Some(turns) })
     }
 
-    /// The parameters as they act on an arm that carries this at its tool: moving the tool moves that mass.
+    /// The parameters as they act on an arm that carries this at its tool: moving the tool moves
+    /// that mass.
     fn under(&self, carried: &SpatialInertia) -> Cow<'a, [Parameter]> {
         if !self.parameters.iter().any(|p| matches!(p.effect, Effect::Tool(_))) {
             return Cow::Borrowed(self.parameters);
@@ -184,8 +186,8 @@ impl MeasuredArm<'_> {
         self.measurements.readings.iter().flat_map(of).collect()
     }
 
-    /// Of each measured shape its reading's number, the mode of the arm that is most like it (from 0), and how much: the modal assurance
-    /// criterion, from 0 to 1.
+    /// Of each measured shape its reading's number, the mode of the arm that is most like it (from
+    /// 0), and how much: the modal assurance criterion, from 0 to 1.
     ///
     /// # Errors
     /// [`NoAnswer`].
@@ -270,7 +272,8 @@ impl MeasuredArm<'_> {
         DMatrix::from_fn(rows, columns, |i, j| if j < p { 0.0 } else { slope(i, j - p) })
     }
 
-    /// Place of an instrument in the world if it counts, and by which rotation vector (its axes) it is turned from `X`.
+    /// Place of an instrument in the world if it counts, and by which rotation vector (its axes) it
+    /// is turned from `X`.
     fn instrument_at(&self, number: usize, X: &Pose, placed: bool, own: &[f64], slopes: bool) -> Block {
         let (X_IW, place, turn) = self.measurements.instrument(number, own);
         let X_WI = X_IW.inverse();
@@ -367,7 +370,8 @@ impl MeasuredArm<'_> {
             slopes.view_mut((0, p + first), (3, 3)).fill_with_identity();
         }
         if let Some(first) = turn {
-            // The increments are of a rotation vector: its rate map to the angular velocity on the left.
+            // The increments are of a rotation vector: its rate map to the angular velocity on the
+            // left.
             let rates = left_jacobian(&Vector3::new(own[first], own[first + 1], own[first + 2]));
             for k in 0..3 {
                 slopes.view_mut((0, p + first + k), (3, 1)).copy_from(&rates.column(k).cross(&seen));
@@ -380,9 +384,11 @@ impl MeasuredArm<'_> {
     }
 }
 
-/// Velocity at the tool's origin and angular velocity per unit of each parameter that moves the tool, by its number.
+/// Velocity at the tool's origin and angular velocity per unit of each parameter that moves the
+/// tool, by its number.
 ///
-/// * `R`: rotation of the tool as it is now, in the axes asked for; `turn`: by which of that it is turned from its own axes.
+/// * `R`: rotation of the tool as it is now, in the axes asked for; `turn`: by which of that it is
+///   turned from its own axes.
 fn tool_twists<'a>(
     parameters: &'a [Parameter],
     R: &Rotation3<f64>,
@@ -439,7 +445,8 @@ impl MeasuredArm<'_> {
         let none = |values| Ok(Block { values, slopes: DMatrix::zeros(rows.len(), 0) });
         let (Some(a), Some(b)) = (after.point_slopes(point), before.point_slopes(point)) else { return none(values) };
         let (Some(wa), Some(wb)) = (&after.turns, &before.turns) else { return none(values) };
-        // Rotation from before to after: its angular velocity is wa - R wb, its vector's rate the inverse of the rate map.
+        // Rotation from before to after: its angular velocity is wa - R wb, its vector's rate the
+        // inverse of the rate map.
         let rate = left_jacobian(&turned).try_inverse().unwrap_or_else(nalgebra::Matrix3::identity);
         let p = a.ncols();
         let mut all = DMatrix::zeros(rows.len(), p + own.len());

@@ -1,9 +1,11 @@
 //! Parameters of flexible arms from measurements, with their uncertainties.
 //!
-//! A [`Plant`] is an arm as it is known, [`Parameter`]s say what of it is unknown, [`Measurements`] what was read at the robot.
-//! [`MeasuredArm`] puts them together; [`identify`] finds the parameters, says which of them the readings tell and how well, and
-//! which readings argue against the model. [`plan`] chooses poses and loads that are worth measuring. Derivatives are in closed
-//! form ([`tool_slopes`], [`compliance_slopes`], [`frequency_slopes`], [`structure_slopes`], and [`error_slopes`] along a motion).
+//! A [`Plant`] is an arm as it is known, [`Parameter`]s say what of it is unknown, [`Measurements`]
+//! what was read at the robot. [`MeasuredArm`] puts them together; [`identify`] finds the
+//! parameters, says which of them the readings tell and how well, and which readings argue against
+//! the model. [`plan`] chooses poses and loads that are worth measuring. Derivatives are in closed
+//! form ([`tool_slopes`], [`compliance_slopes`], [`frequency_slopes`], [`structure_slopes`], and
+//! [`error_slopes`] along a motion).
 //!
 //! Not here: files, units, robots by name (the facade).
 

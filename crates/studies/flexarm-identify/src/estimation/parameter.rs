@@ -31,12 +31,13 @@ pub struct Place {
 /// What a parameter does.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Effect {
-    /// Factor on the stiffness of springs. On one coordinate of a spring K becomes `S K S` with `√factor` there, so that it stays
-    /// symmetric and positive definite.
+    /// Factor on the stiffness of springs. On one coordinate of a spring K becomes `S K S` with
+    /// `√factor` there, so that it stays symmetric and positive definite.
     Stiffness(Vec<Place>),
-    /// Entry of a spring's matrix and its mirror image: the search's coordinate is the change of the parameter's value, and the entry
-    /// changes by `factor` times that. The matrix must stay positive definite: an arm without is no answer, and the search goes no step
-    /// that leads there. Not to be taken beside [`Effect::Stiffness`] on the same spring.
+    /// Entry of a spring's matrix and its mirror image: the search's coordinate is the change of
+    /// the parameter's value, and the entry changes by `factor` times that. The matrix must stay
+    /// positive definite: an arm without is no answer, and the search goes no step that leads
+    /// there. Not to be taken beside [`Effect::Stiffness`] on the same spring.
     Entry {
         /// Number of the spring.
         spring: usize,
@@ -49,8 +50,9 @@ pub enum Effect {
         /// `√(K_ii K_jj)` in the unit of the value: what the entry is large or small against.
         size: f64,
     },
-    /// Tool moved along one of its own axes (0 to 2; m), or turned by a rotation vector about them (3 to 5; rad): together
-    /// `X_BT exp`, the displacement in the axes as they were. What is measured, loaded and carried at the tool moves along.
+    /// Tool moved along one of its own axes (0 to 2; m), or turned by a rotation vector about them
+    /// (3 to 5; rad): together `X_BT exp`, the displacement in the axes as they were. What is
+    /// measured, loaded and carried at the tool moves along.
     Tool(usize),
     /// Factor on the damping of springs, whatever describes it.
     Damping(Vec<usize>),
@@ -79,7 +81,8 @@ pub struct Parameter {
     pub unit: String,
     /// Value in the arm as it is.
     pub initial: f64,
-    /// Standard deviation of what is known before: of the logarithm for stiffnesses and dampings, in the unit else.
+    /// Standard deviation of what is known before: of the logarithm for stiffnesses and dampings,
+    /// in the unit else.
     pub prior: f64,
     /// What it does.
     pub effect: Effect,
@@ -91,8 +94,8 @@ impl Parameter {
         matches!(self.effect, Effect::Stiffness(_) | Effect::Damping(_) | Effect::Damper { .. })
     }
 
-    /// Standard deviation of the search's coordinate that the readings must reach for the parameter to be told, whatever its prior
-    /// is; the default of a prior.
+    /// Standard deviation of the search's coordinate that the readings must reach for the parameter
+    /// to be told, whatever its prior is; the default of a prior.
     pub fn reference(&self) -> f64 {
         match &self.effect {
             Effect::Stiffness(_) | Effect::Damping(_) | Effect::Damper { .. } => std::f64::consts::LN_2,
@@ -177,7 +180,8 @@ impl Plant {
     }
 }
 
-/// Displacement (m) and rotation vector (rad) of the tool in its own axes at coordinates of the search.
+/// Displacement (m) and rotation vector (rad) of the tool in its own axes at coordinates of the
+/// search.
 pub(crate) fn tool_shift(parameters: &[Parameter], x: &[f64]) -> (Vector3<f64>, Vector3<f64>) {
     let (mut p, mut turn) = (Vector3::zeros(), Vector3::zeros());
     for (parameter, x) in parameters.iter().zip(x) {
@@ -190,7 +194,8 @@ pub(crate) fn tool_shift(parameters: &[Parameter], x: &[f64]) -> (Vector3<f64>, 
     (p, turn)
 }
 
-/// Change of an inertia about Bo, B axes, as it moves with velocity `v` at the point `p` and angular velocity `w`.
+/// Change of an inertia about Bo, B axes, as it moves with velocity `v` at the point `p` and
+/// angular velocity `w`.
 pub(crate) fn carried_along(
     I: &SpatialInertia,
     p: &Vector3<f64>,

@@ -1,8 +1,9 @@
 //! Poses and loads that are worth measuring.
 //!
-//! Of many candidates those are taken whose readings together tell the parameters best: the largest determinant of the
-//! information (D-optimal), or the smallest variance of what the parameters will be used for. First one after another, the best
-//! next one each time, then by exchange as long as an exchange pays (Fedorov). The prior's information counts from the start.
+//! Of many candidates those are taken whose readings together tell the parameters best: the largest
+//! determinant of the information (D-optimal), or the smallest variance of what the parameters will
+//! be used for. First one after another, the best next one each time, then by exchange as long as
+//! an exchange pays (Fedorov). The prior's information counts from the start.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -11,7 +12,8 @@ use crate::estimation::measurement::{MeasuredArm, NoAnswer};
 use crate::estimation::parameter::{Parameter, Plant};
 use crate::estimation::reading::{Measurements, Reading};
 
-/// Something that could be measured: a reading with the deviations expected of it; its values do not count.
+/// Something that could be measured: a reading with the deviations expected of it; its values do
+/// not count.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate(pub Reading);
 
@@ -20,7 +22,8 @@ pub struct Candidate(pub Reading);
 pub struct PlanOptions {
     /// How many readings.
     pub count: usize,
-    /// Readings whose predicted numbers should be as sure as possible, the unit of each by its deviation; the determinant without.
+    /// Readings whose predicted numbers should be as sure as possible, the unit of each by its
+    /// deviation; the determinant without.
     pub purpose: Vec<Reading>,
     /// Whether a candidate may be taken more than once.
     pub repeat: bool,

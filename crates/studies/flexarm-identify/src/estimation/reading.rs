@@ -12,7 +12,8 @@ pub struct LoadCase {
     pub wrench: Wrench,
     /// Where they act, in tool axes (m).
     pub at: Vector3<f64>,
-    /// What is fixed to the tool besides what the robot carries: inertia about the tool's origin, tool axes.
+    /// What is fixed to the tool besides what the robot carries: inertia about the tool's origin,
+    /// tool axes.
     pub carried: SpatialInertia,
 }
 
@@ -54,7 +55,8 @@ pub enum Component {
 }
 
 impl Component {
-    /// Its direction, the instrument in whose axes it is (else those of the world), and whether it is a rotation.
+    /// Its direction, the instrument in whose axes it is (else those of the world), and whether it
+    /// is a rotation.
     pub fn parts(&self) -> (Vector3<f64>, Option<usize>, bool) {
         match *self {
             Self::Along(d) => (d, None, false),
@@ -79,7 +81,8 @@ pub struct Reading {
 /// How a measured response is compared with the arm's.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Form {
-    /// Logarithm of the magnitude, and phase (rad): what is off by a part of itself counts alike everywhere.
+    /// Logarithm of the magnitude, and phase (rad): what is off by a part of itself counts alike
+    /// everywhere.
     #[default]
     Logarithmic,
     /// Real and imaginary part: what is large counts.
@@ -99,12 +102,14 @@ pub struct MeasuredResponse {
     pub answer: Answer,
     /// How it is compared.
     pub form: Form,
-    /// Frequencies (rad/s), values in SI units, and the deviations of the two numbers that each becomes.
+    /// Frequencies (rad/s), values in SI units, and the deviations of the two numbers that each
+    /// becomes.
     pub points: Vec<(f64, Complex<f64>, [f64; 2])>,
 }
 
 impl MeasuredResponse {
-    /// The two numbers of a value at a point: of a phase that one within half a turn of the measured.
+    /// The two numbers of a value at a point: of a phase that one within half a turn of the
+    /// measured.
     pub(crate) fn numbers(&self, k: usize, value: Complex<f64>) -> [f64; 2] {
         let measured = self.points[k].1;
         match self.form {
@@ -144,8 +149,9 @@ impl MeasuredShape {
         self.amplitudes.normalize()
     }
 
-    /// The mode of the arm that is most like it: its number, its modal assurance criterion `(aᵀb)²` of unit vectors a and b, and its amplitudes at the probes, with
-    /// length 1 and the sign of the measured.
+    /// The mode of the arm that is most like it: its number, its modal assurance criterion `(aᵀb)²`
+    /// of unit vectors a and b, and its amplitudes at the probes, with length 1 and the sign of the
+    /// measured.
     pub(crate) fn likeliest(&self, found: &StructureSlopes) -> Option<(usize, f64, DVector<f64>)> {
         let measured = self.unit();
         let of = |j: usize| {
@@ -187,11 +193,13 @@ pub enum ReadingKind {
         /// Standard deviation of each component (m).
         std: Vector3<f64>,
     },
-    /// A parameter by itself, told by a measurement of another kind ([`crate::estimation::gear_stiffness`]).
+    /// A parameter by itself, told by a measurement of another kind
+    /// ([`crate::estimation::gear_stiffness`]).
     Known {
         /// Name of the parameter.
         parameter: String,
-        /// Its coordinate: of stiffnesses the logarithm of the value over the initial one, else the difference.
+        /// Its coordinate: of stiffnesses the logarithm of the value over the initial one, else the
+        /// difference.
         value: f64,
         /// Standard deviation of that.
         std: f64,
@@ -205,7 +213,8 @@ pub enum ReadingKind {
         /// Standard deviation of each component (m).
         std: f64,
     },
-    /// How an instrument is known to stand, with deviations: the first guess of it, which must be unknown.
+    /// How an instrument is known to stand, with deviations: the first guess of it, which must be
+    /// unknown.
     InstrumentAt {
         /// Number of the instrument.
         instrument: usize,
@@ -322,7 +331,8 @@ pub struct Measurements {
 }
 
 impl Measurements {
-    /// How many unknowns belong to the measurements: those of the instruments, then three per unknown target.
+    /// How many unknowns belong to the measurements: those of the instruments, then three per
+    /// unknown target.
     pub fn own_unknowns(&self) -> usize {
         let targets = self.targets.iter().filter(|t| matches!(t, Target::Unknown(_))).count();
         self.of_instruments() + 3 * targets
@@ -344,7 +354,8 @@ impl Measurements {
         Self { readings, ..self.clone() }
     }
 
-    /// The same with the logarithm of responses in the place of their real and imaginary parts; none if there are no such.
+    /// The same with the logarithm of responses in the place of their real and imaginary parts;
+    /// none if there are no such.
     pub(crate) fn logarithmic(&self) -> Option<Self> {
         let mut all = self.clone();
         let mut some = false;
@@ -352,7 +363,8 @@ impl Measurements {
             let ReadingKind::Response(response) = &mut reading.kind else { continue };
             if response.form == Form::Complex {
                 (some, response.form) = (true, Form::Logarithmic);
-                // A deviation as a part of the value; of a value in the noise next to nothing is known.
+                // A deviation as a part of the value; of a value in the noise next to nothing is
+                // known.
                 let part = |value: &Complex<f64>, std: &[f64; 2]| std.map(|std| (std / value.norm()).min(10.0));
                 response.points.retain(|(_, value, _)| value.norm() > 0.0);
                 response.points.iter_mut().for_each(|(_, value, std)| *std = part(value, std));
@@ -361,7 +373,8 @@ impl Measurements {
         some.then_some(all)
     }
 
-    /// The world in the axes of an instrument, and where in `own` the unknowns of its place and of its rotation begin.
+    /// The world in the axes of an instrument, and where in `own` the unknowns of its place and of
+    /// its rotation begin.
     pub(crate) fn instrument(&self, number: usize, own: &[f64]) -> (Pose, Option<usize>, Option<usize>) {
         let first = self.instruments[..number].iter().map(Instrument::unknowns).sum();
         let v = |at: usize| Vector3::new(own[at], own[at + 1], own[at + 2]);

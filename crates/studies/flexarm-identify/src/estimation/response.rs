@@ -4,8 +4,9 @@
 //! H(ω) = (iω)^s cᵀ Z^-1 b,     Z = K + iωD - ω²M
 //! dH   = (iω)^s [ dcᵀ Z^-1 b + cᵀ Z^-1 db - (Z^-T c)ᵀ dZ Z^-1 b ]
 //! ```
-//! with b and c the Jacobians of the excited and of the watched point along their directions, about the equilibrium under weight,
-//! drives locked. Modal damping follows the modes: its change has those of their shapes,
+//! with b and c the Jacobians of the excited and of the watched point along their directions, about
+//! the equilibrium under weight, drives locked. Modal damping follows the modes: its change has
+//! those of their shapes,
 //!
 //! ```text
 //! dφ_j = Σ_i a_ij φ_i,     a_ij = φ_iᵀ(dK - ω_j² dM)φ_j / (ω_j² - ω_i²),     a_jj = -φ_jᵀ dM φ_j / 2
@@ -19,7 +20,8 @@ use nalgebra::{Complex, DMatrix, DVector, RowDVector, Vector3};
 use crate::estimation::parameter::{Effect, Parameter, Plant, entry_slope, slope_of};
 use crate::estimation::sensitivity::{along, eigen, explicit, force_slopes};
 
-/// Squares of two frequencies nearer than this part of each other belong to modes whose shapes are not determined.
+/// Squares of two frequencies nearer than this part of each other belong to modes whose shapes are
+/// not determined.
 const SAME_FREQUENCY: f64 = 1e-9;
 
 /// A point of the arm and a direction, of a force or of an accelerometer.
@@ -97,12 +99,15 @@ pub struct StructureSlopes {
     pub shapes: DMatrix<f64>,
 }
 
-/// The linear structure of an arm held at a pose under its weight, and its derivatives by parameters.
+/// The linear structure of an arm held at a pose under its weight, and its derivatives by
+/// parameters.
 ///
-/// * `plant`: with the parameters as they are now; `q`: actuated joints (rad or m); `probes`: points that are hit or watched.
+/// * `plant`: with the parameters as they are now; `q`: actuated joints (rad or m); `probes`:
+///   points that are hit or watched.
 ///
-/// Explicit parts are exact, those by the moving equilibrium central differences of fourth order along its path. Where two natural
-/// frequencies coincide, modal damping that differs between elements has no derivative.
+/// Explicit parts are exact, those by the moving equilibrium central differences of fourth order
+/// along its path. Where two natural frequencies coincide, modal damping that differs between
+/// elements has no derivative.
 ///
 /// # Errors
 /// As [`OperatingPoint::solve`]; [`StepError::Singular`] where a coordinate moves no mass.
@@ -228,7 +233,8 @@ impl Damped<'_> {
             match effect {
                 Effect::Stiffness(places) => {
                     for place in places {
-                        // Of coupled gears each motor's spring is in the stiffness of several joints.
+                        // Of coupled gears each motor's spring is in the stiffness of several
+                        // joints.
                         match self.arm.coupled_stiffness_slope(place.spring) {
                             Some((coupled, slope)) => {
                                 let own = coupled.iter().position(|k| *k == self.arm.offset(e));
@@ -293,7 +299,8 @@ impl Damped<'_> {
 }
 
 impl StructureSlopes {
-    /// Change of a mode's shape (number from 0, the lowest) per unit of each parameter's coordinate, its modal mass kept at 1.
+    /// Change of a mode's shape (number from 0, the lowest) per unit of each parameter's
+    /// coordinate, its modal mass kept at 1.
     pub fn shape_slopes(&self, mode: usize) -> Vec<DVector<f64>> {
         let of = |change: &Structure| {
             let (S, T) =
@@ -304,7 +311,8 @@ impl StructureSlopes {
     }
 }
 
-/// Parts of the other shapes in the change of a mode's, from the changes of stiffness and mass in the modes.
+/// Parts of the other shapes in the change of a mode's, from the changes of stiffness and mass in
+/// the modes.
 fn shape_parts(omega2: &[f64], j: usize, S: &DMatrix<f64>, T: &DMatrix<f64>) -> DVector<f64> {
     let w2 = omega2[j];
     DVector::from_fn(omega2.len(), |i, _| match w2 - omega2[i] {
@@ -324,8 +332,8 @@ pub struct ResponseSlopes {
 }
 
 impl StructureSlopes {
-    /// `H(ω)` of the probe `watched` per newton at the probe `hit` (numbers among the probes), at `omega` (rad/s), and its
-    /// derivatives by the parameters.
+    /// `H(ω)` of the probe `watched` per newton at the probe `hit` (numbers among the probes), at
+    /// `omega` (rad/s), and its derivatives by the parameters.
     ///
     /// # Errors
     /// [`StepError::Singular`] at a resonance without damping.

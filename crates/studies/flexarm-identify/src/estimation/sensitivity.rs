@@ -3,8 +3,9 @@
 //! ```text
 //! K e + p(e) = 0:     V_T = -J (K + dp/de)^-1 dr/dx          dω²/dx = φᵀ (dK/dx - ω² dM/dx) φ
 //! ```
-//! with r the unbalanced forces. One matrix of an operating point serves all parameters. In dK/dx and dM/dx the explicit part is
-//! exact; the part by the moving equilibrium is a central difference of fourth order of the closed tangents along de/dx.
+//! with r the unbalanced forces. One matrix of an operating point serves all parameters. In dK/dx
+//! and dM/dx the explicit part is exact; the part by the moving equilibrium is a central difference
+//! of fourth order of the closed tangents along de/dx.
 
 use flexarm_kinematics::{Frame, Wrench};
 use flexarm_stepping::{FlexibleArm, OperatingPoint, StepError, Tangents};
@@ -12,7 +13,8 @@ use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, SymmetricEigen};
 
 use crate::estimation::parameter::{Effect, Parameter, Plant, entry_slope, scaled, slope_of};
 
-/// Length of the differences along the equilibrium's path, over the size of the elastic coordinates.
+/// Length of the differences along the equilibrium's path, over the size of the elastic
+/// coordinates.
 const DIFFERENCE: f64 = 1e-3;
 
 /// `dr/dx`: change of the unbalanced forces on the elastic coordinates per parameter, n×p.
@@ -31,7 +33,8 @@ pub(crate) fn force_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) ->
                     }
                     let element = &arm.elements[place.spring];
                     let first = arm.offset(element);
-                    // A spring of one coordinate is turned by the error of its transmission as well.
+                    // A spring of one coordinate is turned by the error of its transmission as
+                    // well.
                     let turned = arm.deflection(place.spring, e[first], at.coordinates().as_slice());
                     let e = if element.size == 1 { &[turned] } else { &e[first..first + element.size] };
                     let f = match &element.curve {
@@ -74,10 +77,11 @@ fn carrying(arm: &FlexibleArm, body: usize, per_kg: &flexarm_kinematics::Spatial
     arm.with_inertia(body, inertia)
 }
 
-/// Twist of the tool (world axes, at its point; m, rad) per unit of each parameter's coordinate, 6×p, at a pose that is solved.
+/// Twist of the tool (world axes, at its point; m, rad) per unit of each parameter's coordinate,
+/// 6×p, at a pose that is solved.
 ///
-/// Of [`Effect::Tool`] the part by deflection, which is zero here: loads stay where they are, and the frame itself is not moved.
-/// [`crate::estimation::MeasuredArm`] has all of it.
+/// Of [`Effect::Tool`] the part by deflection, which is zero here: loads stay where they are, and
+/// the frame itself is not moved. [`crate::estimation::MeasuredArm`] has all of it.
 ///
 /// # Errors
 /// As [`OperatingPoint::solve`].
@@ -100,7 +104,8 @@ pub struct FrequencySlopes {
 ///
 /// * `plant`: with the parameters as they are now; `q`: actuated joints (rad or m).
 ///
-/// Where two frequencies coincide their shapes are not determined, and neither is the derivative of each.
+/// Where two frequencies coincide their shapes are not determined, and neither is the derivative of
+/// each.
 ///
 /// # Errors
 /// As [`OperatingPoint::solve`]; [`StepError::Singular`] where a coordinate moves no mass.
@@ -187,8 +192,8 @@ pub(crate) fn along_coordinates(
     (0..a.len()).map(|k| ((&c[k] - &b[k]) * 8.0 - (&d[k] - &a[k])) / (12.0 * h)).collect()
 }
 
-/// Derivatives of the Cartesian compliance of the tool, drives locked, at a pose that is solved: one 6×6 per parameter, per unit of
-/// its coordinate (m/N, rad/N; m/(N m), rad/(N m)).
+/// Derivatives of the Cartesian compliance of the tool, drives locked, at a pose that is solved:
+/// one 6×6 per parameter, per unit of its coordinate (m/N, rad/N; m/(N m), rad/(N m)).
 ///
 /// * `F_T_W`: the wrench with which it was solved.
 ///

@@ -1,12 +1,14 @@
-//! Slips in a file of measurements that no stiffness explains: joints in another order, displacements in other axes.
+//! Slips in a file of measurements that no stiffness explains: joints in another order,
+//! displacements in other axes.
 //!
 //! Displacements are nearly linear in the compliances of the springs,
 //!
 //! ```text
 //! d ≈ -Σ a_k ∂d/∂(ln k_k),     a_k ≥ 0: compliance over that of the arm as it is
 //! ```
-//! so that each order of joints and each rotation of the axes leaves a rest that no compliances explain, whatever the first guess
-//! of the stiffnesses is. A slip is told if the rest is large and another order or other axes leave almost nothing.
+//! so that each order of joints and each rotation of the axes leaves a rest that no compliances
+//! explain, whatever the first guess of the stiffnesses is. A slip is told if the rest is large and
+//! another order or other axes leave almost nothing.
 
 use flexarm_kinematics::Pose;
 use nalgebra::{DMatrix, DVector, Rotation3, Vector3};
@@ -39,7 +41,8 @@ pub struct FoundSlip {
 
 /// Smallest rest, over the displacements, that calls for a slip; of places over their spread.
 const REST: [f64; 2] = [0.25, 0.1];
-/// A mended slip leaves this part of the rest at most, and so much of the displacements, of the places' spread.
+/// A mended slip leaves this part of the rest at most, and so much of the displacements, of the
+/// places' spread.
 const MENDED: f64 = 1.0 / 3.0;
 const LEFT: [f64; 2] = [0.15, 0.05];
 /// Readings that are looked at.
@@ -47,7 +50,8 @@ const MOST_READINGS: usize = 16;
 /// Rounds of compliances and rotation.
 const ROUNDS: usize = 15;
 
-/// Returns the slip that explains what the arm cannot; none if the arm can, or nothing simple explains it.
+/// Returns the slip that explains what the arm cannot; none if the arm can, or nothing simple
+/// explains it.
 ///
 /// * `slides`: of each joint whether it slides; values of both kinds are not exchanged.
 pub fn likely_slip(
@@ -73,7 +77,8 @@ pub fn likely_slip(
     found.flatten().or_else(|| among(rest, || None, slides, 1))
 }
 
-/// Some readings, evenly from all of them; instruments at the world's origin, targets where they are guessed.
+/// Some readings, evenly from all of them; instruments at the world's origin, targets where they
+/// are guessed.
 fn some_of(measurements: &Measurements, some: impl Fn(&ReadingKind) -> bool) -> Measurements {
     let all: Vec<usize> = (0..measurements.readings.len()).filter(|k| some(&measurements.readings[*k].kind)).collect();
     let every = all.len().div_ceil(MOST_READINGS).max(1);
@@ -95,7 +100,8 @@ fn ordered(measurements: &Measurements, order: &[usize]) -> Measurements {
     other
 }
 
-/// The best slip of those that leave little of a rest which calls for one; `kind`: 0 for displacements, 1 for places.
+/// The best slip of those that leave little of a rest which calls for one; `kind`: 0 for
+/// displacements, 1 for places.
 fn among(
     rest: impl Fn(&[usize]) -> Option<f64>,
     axes: impl Fn() -> Option<(Rotation3<f64>, f64)>,
@@ -111,7 +117,8 @@ fn among(
     (rest_mended < (MENDED * before).min(LEFT[kind])).then_some(FoundSlip { slip, rest: before, rest_mended })
 }
 
-/// The order of joints that leaves least: from the order as it is, the reverse and the shifts by exchanges as long as one pays.
+/// The order of joints that leaves least: from the order as it is, the reverse and the shifts by
+/// exchanges as long as one pays.
 fn best_order(
     rest: &impl Fn(&[usize]) -> Option<f64>,
     as_said: Vec<usize>,
@@ -156,7 +163,8 @@ impl Moved {
         Some(Self { A: -J, b: DVector::from_vec(b) })
     }
 
-    /// What the springs explain with compliances of 0 or above: the most negative one is left out until none is.
+    /// What the springs explain with compliances of 0 or above: the most negative one is left out
+    /// until none is.
     fn explained(&self, b: &DVector<f64>) -> DVector<f64> {
         let mut kept: Vec<usize> = (0..self.A.ncols()).collect();
         while !kept.is_empty() {
@@ -177,8 +185,8 @@ impl Moved {
         (&self.b - self.explained(&self.b)).norm() / self.b.norm()
     }
 
-    /// The rotation into world axes that leaves least, and what it leaves: in turn the best compliances and the best rotation, from all
-    /// axes that stand on those of the world.
+    /// The rotation into world axes that leaves least, and what it leaves: in turn the best
+    /// compliances and the best rotation, from all axes that stand on those of the world.
     fn turned(&self) -> Option<(Rotation3<f64>, f64)> {
         let seen = points(self.b.as_slice());
         let upright = [Vector3::x(), Vector3::y(), Vector3::z()];

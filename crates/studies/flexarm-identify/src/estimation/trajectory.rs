@@ -1,7 +1,9 @@
-//! How the error of the tool along a motion answers to parameters of the arm, its tool and its motion.
+//! How the error of the tool along a motion answers to parameters of the arm, its tool and its
+//! motion.
 //!
-//! The equations of motion are differentiated by [`run_slopes`]; here is what each parameter is to them. Modal damping and Rayleigh's follow
-//! the modes and the mass of the start, which move with the equilibrium there, so that all parameters have a part in the damping matrix.
+//! The equations of motion are differentiated by [`run_slopes`]; here is what each parameter is to
+//! them. Modal damping and Rayleigh's follow the modes and the mass of the start, which move with
+//! the equilibrium there, so that all parameters have a part in the damping matrix.
 
 use std::sync::Arc;
 
@@ -19,7 +21,8 @@ use crate::estimation::sensitivity::{along_coordinates, eigen, explicit};
 /// What a run is differentiated by.
 #[derive(Clone)]
 pub enum RunParameter {
-    /// Of the arm, per unit of its coordinate of the search: of the logarithm of what is logarithmic.
+    /// Of the arm, per unit of its coordinate of the search: of the logarithm of what is
+    /// logarithmic.
     Arm(Parameter),
     /// A shift of a joint's whole motion, by its coordinate (per rad or m).
     Joint(usize),
@@ -27,7 +30,8 @@ pub enum RunParameter {
     Motion(Arc<dyn PrescribedMotion>),
     /// Place of the tool's point along this, tool axes (per m).
     Tool(Vector3<f64>),
-    /// Friction of a joint, by its coordinate: changes of the numbers of its law, per unit. It moves joints under servos alone.
+    /// Friction of a joint, by its coordinate: changes of the numbers of its law, per unit. It
+    /// moves joints under servos alone.
     Friction(usize, Friction),
     /// The controller of a joint, by the number of its axis, per unit.
     Servo(usize, AxisSlope),
@@ -73,8 +77,8 @@ pub fn error_slopes(
     run_slopes(arm, request, &directions)
 }
 
-/// Changes of the damping matrix after each change of inertia, a matrix per parameter: the damping then is that of the arm with what it
-/// carries then, where the motion begins.
+/// Changes of the damping matrix after each change of inertia, a matrix per parameter: the damping
+/// then is that of the arm with what it carries then, where the motion begins.
 fn damping_after_changes(
     arm: &FlexibleArm,
     effects: &[Option<&Effect>],

@@ -1,4 +1,5 @@
-//! The file of measurements (`docs/identify.md`): readings one by one or as tables, units, what is unknown.
+//! The file of measurements (`docs/identify.md`): readings one by one or as tables, units, what is
+//! unknown.
 
 mod common;
 mod displacement;

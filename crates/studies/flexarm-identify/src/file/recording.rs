@@ -25,7 +25,8 @@ pub(super) struct EncodersEntry {
     link: Spanned<BTreeMap<String, String>>,
     /// Columns of the torques through the gears, on the side of the links, of some joints.
     torque: Option<Spanned<BTreeMap<String, String>>>,
-    /// Of coupled gears: whether the columns of motors are those of the motors behind their gears or what the controller makes of them.
+    /// Of coupled gears: whether the columns of motors are those of the motors behind their gears
+    /// or what the controller makes of them.
     positions: Option<Spanned<String>>,
     below: Option<Spanned<f64>>,
     edge: Option<Spanned<f64>>,
@@ -146,7 +147,8 @@ fn even_step(time: &[f64]) -> Option<f64> {
 }
 
 impl Reader<'_> {
-    /// Joints from motors that move several of them, `q = C q_m`; joints that the controller has made of them stay.
+    /// Joints from motors that move several of them, `q = C q_m`; joints that the controller has
+    /// made of them stay.
     fn behind_coupling(&self, e: &EncodersEntry, motor: &mut [Vec<f64>]) -> Result<(), Error> {
         let Some(coupling) = self.cell.arm.robot().coupling() else { return Ok(()) };
         match e.positions.as_ref().map(|word| (word.get_ref().as_str(), word.span())) {

@@ -1,14 +1,16 @@
 //! Which drawn parameters have an effect that chance does not explain.
 //!
-//! With few draws every parameter varies with a result by chance. A parameter is named only if the part of the variance that it explains
-//! is one that the strongest of all parameters without an effect would reach in 1 of 100 studies.
+//! With few draws every parameter varies with a result by chance. A parameter is named only if the
+//! part of the variance that it explains is one that the strongest of all parameters without an
+//! effect would reach in 1 of 100 studies.
 //!
 //! ```text
 //! R^2 = |Q^T r|^2 / |r|^2                            part that the orthonormal columns Q (q of them) explain of the residuals r   (1)
 //! R^2 ~ Beta(q/2, (d - q)/2)                         for random r with d degrees of freedom                                       (2)
 //! ```
-//! The columns of a parameter are polynomials of its ranks. Parameters are taken one after the other, the strongest first (forward
-//! selection): what a stronger one explains is no scatter in which a weaker one is lost.
+//! The columns of a parameter are polynomials of its ranks. Parameters are taken one after the
+//! other, the strongest first (forward selection): what a stronger one explains is no scatter in
+//! which a weaker one is lost.
 
 use statrs::function::beta::inv_beta_reg;
 
@@ -17,8 +19,8 @@ use statrs::function::beta::inv_beta_reg;
 pub struct BeyondChance {
     /// Their places, the strongest first.
     pub parameters: Vec<usize>,
-    /// Part of the variance that the strongest of all parameters would stay below in 99 of 100 studies if none had an effect; 1 where
-    /// the draws are too few to tell anything.
+    /// Part of the variance that the strongest of all parameters would stay below in 99 of 100
+    /// studies if none had an effect; 1 where the draws are too few to tell anything.
     pub chance: f64,
 }
 
@@ -36,7 +38,8 @@ const TINY: f64 = 1e-9;
 
 /// The drawn parameters whose effect on a result stands out of chance.
 ///
-/// * `columns`: values of each parameter, one for each draw. Draws must be independent of each other.
+/// * `columns`: values of each parameter, one for each draw. Draws must be independent of each
+///   other.
 /// * `y`: the result; draws with a NaN are left out.
 pub fn beyond_chance(columns: &[Vec<f64>], y: &[f64]) -> BeyondChance {
     let sound = |k: &usize| y[*k].is_finite() && columns.iter().all(|x| x[*k].is_finite());
@@ -84,7 +87,8 @@ fn threshold(terms: usize, freedom: usize, parameters: usize) -> f64 {
     1.0 - inv_beta_reg(0.5 * (freedom - terms) as f64, 0.5 * terms as f64, LEVEL / parameters as f64)
 }
 
-/// Legendre polynomials of the ranks, which are spread from -1 to 1; equal values share the mean of their ranks.
+/// Legendre polynomials of the ranks, which are spread from -1 to 1; equal values share the mean of
+/// their ranks.
 fn polynomials(x: &[f64], terms: usize) -> Vec<Vec<f64>> {
     let mut order: Vec<usize> = (0..x.len()).collect();
     order.sort_by(|i, j| x[*i].total_cmp(&x[*j]));
@@ -106,7 +110,8 @@ fn polynomials(x: &[f64], terms: usize) -> Vec<Vec<f64>> {
     found
 }
 
-/// Columns at right angles to each other and to others, of length 1; those that depend on others are left out.
+/// Columns at right angles to each other and to others, of length 1; those that depend on others
+/// are left out.
 fn orthonormal(columns: Vec<Vec<f64>>, others: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let mut found: Vec<Vec<f64>> = Vec::with_capacity(columns.len());
     for mut column in columns {
@@ -151,7 +156,8 @@ mod tests {
         (0..dimensions).map(|d| (0..count).map(|k| sample.coordinate(k, d)).collect()).collect()
     }
 
-    /// Truth: the tails of Beta(1, b), Beta(2, b) and Beta(3, b), and that of Beta(a, 1), integrated in closed form.
+    /// Truth: the tails of Beta(1, b), Beta(2, b) and Beta(3, b), and that of Beta(a, 1),
+    /// integrated in closed form.
     #[test]
     fn chance_reaches_the_threshold_with_the_probability_of_the_beta_distribution() {
         for parameters in [1, 5, 100] {
@@ -199,7 +205,8 @@ mod tests {
             missed += usize::from(found.parameters.first() != Some(&3));
             wrong += usize::from(found.parameters.len() > 1);
             assert!((0.4..0.6).contains(&found.chance), "{}", found.chance);
-            // The weaker one is not lost in the scatter that the stronger one makes, whatever its shape.
+            // The weaker one is not lost in the scatter that the stronger one makes, whatever its
+            // shape.
             let x = drawn(SampleMethod::Random, 7, 100, seed);
             let y: Vec<f64> = (0..100).map(|k| (3.0 * x[1][k]).exp() + 4.0 * (x[5][k] - 0.5).powi(2)).collect();
             let found = beyond_chance(&x, &y).parameters;

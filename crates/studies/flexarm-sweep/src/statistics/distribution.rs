@@ -94,7 +94,8 @@ mod tests {
         assert_eq!(normal_quantile(0.5), 0.0);
     }
 
-    /// Truth: means and variances in closed form; the quantile over an even sample of u is the midpoint rule.
+    /// Truth: means and variances in closed form; the quantile over an even sample of u is the
+    /// midpoint rule.
     #[test]
     fn means_and_variances_are_those_of_the_formulas() {
         let (a, m, b): (f64, f64, f64) = (1.0, 2.5, 7.0);

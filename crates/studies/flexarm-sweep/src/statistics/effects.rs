@@ -20,8 +20,9 @@ pub struct EffectGroup {
 pub struct MainEffect {
     /// By the parameter.
     pub groups: Vec<EffectGroup>,
-    /// Part of the variance of the result that the means of the groups have (correlation ratio). On a full grid this is the part of
-    /// the main effect in the analysis of variance; on a sample it is an estimate of the first Sobol index, from above.
+    /// Part of the variance of the result that the means of the groups have (correlation ratio). On
+    /// a full grid this is the part of the main effect in the analysis of variance; on a sample it
+    /// is an estimate of the first Sobol index, from above.
     pub share: f64,
 }
 
@@ -30,7 +31,8 @@ pub struct MainEffect {
 pub enum Grouping {
     /// A group for each value: for parameters whose values are listed.
     Levels,
-    /// Groups of about equally many runs if there are many values: for parameters that are drawn. Runs of one value stay together.
+    /// Groups of about equally many runs if there are many values: for parameters that are drawn.
+    /// Runs of one value stay together.
     Bins,
 }
 
@@ -41,7 +43,8 @@ const BINS: usize = 8;
 /// Runs that a group has at least, if there are enough for three groups.
 const LEAST_IN_BIN: usize = 6;
 
-/// The main effect of a parameter; none without two values of it or with a result that does not vary.
+/// The main effect of a parameter; none without two values of it or with a result that does not
+/// vary.
 ///
 /// Runs whose `x` or `y` is NaN are left out.
 pub fn main_effect(x: &[f64], y: &[f64], grouping: Grouping) -> Option<MainEffect> {
@@ -124,7 +127,8 @@ pub fn spread(values: &[f64]) -> Option<Spread> {
     Some(Spread { count: sorted.len(), min, max, mean, std, quantiles })
 }
 
-/// Points of which no other is less in one of both numbers and not larger in the other, by the first number.
+/// Points of which no other is less in one of both numbers and not larger in the other, by the
+/// first number.
 pub fn pareto_front(a: &[f64], b: &[f64]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..a.len().min(b.len())).filter(|k| a[*k].is_finite() && b[*k].is_finite()).collect();
     order.sort_by(|i, j| a[*i].total_cmp(&a[*j]).then(b[*i].total_cmp(&b[*j])).then(i.cmp(j)));
@@ -142,8 +146,9 @@ mod tests {
     use super::*;
     use crate::statistics::random::uniform;
 
-    /// Truth: two-way analysis of variance by hand. With a = 0..n-1, b = 0, 1, 2 and y = 3 a + 2 b^2 + c (a - m)(b - 1), where m is the mean of
-    /// a, the last term has no mean over a and none over b, so that
+    /// Truth: two-way analysis of variance by hand. With a = 0..n-1, b = 0, 1, 2 and y = 3 a + 2
+    /// b^2 + c (a - m)(b - 1), where m is the mean of a, the last term has no mean over a and none
+    /// over b, so that
     ///
     /// ```text
     /// V_a = 9 (n^2 - 1)/12     V_b = 4 Var(0, 1, 4) = 4 * 26/9     V_ab = c^2 (n^2 - 1)/12 * 2/3

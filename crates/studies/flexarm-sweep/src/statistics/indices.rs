@@ -1,11 +1,12 @@
-//! Which parameter makes how much of the variance of a result: Sobol indices of a Saltelli design, with their confidence.
+//! Which parameter makes how much of the variance of a result: Sobol indices of a Saltelli design,
+//! with their confidence.
 //!
 //! ```text
 //! first  S_i  = mean of f(B) (f(AB_i) - f(A)) / V                   (1)   alone
 //! total  ST_i = mean of (f(A) - f(AB_i))^2 / (2 V)                  (2)   with all that it does together with others
 //! ```
-//! A and B are the two points of a base, AB_i is A with coordinate i of B; V is the variance of f over all A and B.
-//! Source: [Saltelli 2010], table 2, (b) and (f).
+//! A and B are the two points of a base, AB_i is A with coordinate i of B; V is the variance of f
+//! over all A and B. Source: [Saltelli 2010], table 2, (b) and (f).
 
 use rand::RngExt;
 
@@ -29,9 +30,11 @@ const DRAWS: usize = 400;
 /// Fewest base points that say something.
 const FEWEST: usize = 8;
 
-/// Sobol indices of all parameters; none with fewer than eight sound base points, or if the result does not vary.
+/// Sobol indices of all parameters; none with fewer than eight sound base points, or if the result
+/// does not vary.
 ///
-/// * `y`: the result at each point of the design, in its order; a base point with a NaN in one of its points is left out.
+/// * `y`: the result at each point of the design, in its order; a base point with a NaN in one of
+///   its points is left out.
 /// * `dimensions`: number of parameters.
 /// * `seed`: of the draws for the intervals (bootstrap over base points, percentiles).
 pub fn sobol_indices(y: &[f64], dimensions: usize, seed: u64) -> Option<Vec<SobolIndex>> {
@@ -130,7 +133,8 @@ mod tests {
         }
     }
 
-    /// Truth: the g-function of Sobol, V_i = 1 / (3 (1 + a_i)^2), V = prod (1 + V_i) - 1, ST_i = V_i prod_(j != i) (1 + V_j) / V.
+    /// Truth: the g-function of Sobol, V_i = 1 / (3 (1 + a_i)^2), V = prod (1 + V_i) - 1, ST_i =
+    /// V_i prod_(j != i) (1 + V_j) / V.
     #[test]
     fn indices_of_the_g_function_are_those_of_its_formulas() {
         let a = [0.0, 1.0, 4.5, 9.0, 99.0];
@@ -145,7 +149,8 @@ mod tests {
         }
     }
 
-    /// Truth: of 100 studies with other seeds about 95 intervals hold the index of a linear function, a_i^2 / sum a^2.
+    /// Truth: of 100 studies with other seeds about 95 intervals hold the index of a linear
+    /// function, a_i^2 / sum a^2.
     #[test]
     fn intervals_hold_the_index_as_often_as_they_say() {
         let expected = 4.0 / 5.25;

@@ -1,11 +1,12 @@
-//! Random numbers that depend on nothing but their place: seed, stream and index. Any of them can be had alone, on any machine,
-//! in any order.
+//! Random numbers that depend on nothing but their place: seed, stream and index. Any of them can
+//! be had alone, on any machine, in any order.
 
 use rand::distr::Open01;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
-/// Returns the generator of a stream at its start. Numbers of different streams have nothing to do with each other.
+/// Returns the generator of a stream at its start. Numbers of different streams have nothing to do
+/// with each other.
 pub(crate) fn stream(seed: u64, stream: u64) -> ChaCha8Rng {
     let mut generator = ChaCha8Rng::seed_from_u64(seed);
     generator.set_stream(stream);

@@ -14,8 +14,8 @@ pub enum SampleMethod {
     LatinHypercube,
     /// Sobol's sequence with its digits shifted, otherwise for each 65536 points.
     Sobol,
-    /// Saltelli's design for [`crate::statistics::sobol_indices`]: two points of Sobol's sequence, and the first with one coordinate after the
-    /// other from the second.
+    /// Saltelli's design for [`crate::statistics::sobol_indices`]: two points of Sobol's sequence,
+    /// and the first with one coordinate after the other from the second.
     Saltelli,
 }
 
@@ -50,7 +50,8 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// `count` points, or so many base points of Saltelli's design; none for more dimensions than the method has.
+    /// `count` points, or so many base points of Saltelli's design; none for more dimensions than
+    /// the method has.
     ///
     /// Cost: memory of `count` times `dimensions` for Latin hypercubes, else next to nothing.
     pub fn new(method: SampleMethod, dimensions: usize, count: usize, seed: u64) -> Option<Self> {
@@ -130,7 +131,8 @@ mod tests {
         }
     }
 
-    /// Truth: for a sum of the coordinates a Latin hypercube has an error of order n^-3/2, random points of order n^-1/2.
+    /// Truth: for a sum of the coordinates a Latin hypercube has an error of order n^-3/2, random
+    /// points of order n^-1/2.
     #[test]
     fn a_latin_hypercube_and_sobols_sequence_meet_the_mean_of_a_sum_closer_than_random_points() {
         let (n, d) = (256, 4);

@@ -1,11 +1,13 @@
-//! The least of a function within a box and under constraints, from its values alone: covariance matrix adaptation (CMA-ES).
+//! The least of a function within a box and under constraints, from its values alone: covariance
+//! matrix adaptation (CMA-ES).
 //!
-//! A generation is asked for, its points are tried by the caller, in any order and on any number of machines, and told. Of the
-//! crates there are, `argmin` has no such method and `cmaes` (still since 2023, with a linear algebra of its own version) wants to
-//! call the function itself and knows no constraints; here generations go out as a whole.
+//! A generation is asked for, its points are tried by the caller, in any order and on any number of
+//! machines, and told. Of the crates there are, `argmin` has no such method and `cmaes` (still
+//! since 2023, with a linear algebra of its own version) wants to call the function itself and
+//! knows no constraints; here generations go out as a whole.
 //!
-//! Source: [Hansen 2016], with its default numbers. Constraints are a penalty in proportion to their violation, whose weight grows
-//! while most points violate them and falls while none does.
+//! Source: [Hansen 2016], with its default numbers. Constraints are a penalty in proportion to
+//! their violation, whose weight grows while most points violate them and falls while none does.
 
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
@@ -19,7 +21,8 @@ use crate::statistics::random::stream;
 pub struct Judged {
     /// What is to be least; NaN of a point that could not be tried.
     pub value: f64,
-    /// How far it is from keeping the constraints: 0 if it does, else the sum of the relative violations.
+    /// How far it is from keeping the constraints: 0 if it does, else the sum of the relative
+    /// violations.
     pub violation: f64,
 }
 
@@ -149,7 +152,8 @@ impl LeastSearch {
         self.sigma * widest.sqrt() < NOTHING
     }
 
-    /// Points from the best to the worst: the value with the penalty, points that could not be tried last.
+    /// Points from the best to the worst: the value with the penalty, points that could not be
+    /// tried last.
     fn ranked(&mut self, judged: &[Judged]) -> Vec<usize> {
         let tried: Vec<&Judged> = judged.iter().filter(|j| j.value.is_finite() && j.violation.is_finite()).collect();
         let violating = tried.iter().filter(|j| !j.keeps()).count();
@@ -237,8 +241,8 @@ mod tests {
         assert!(judged.value < 1e-9);
     }
 
-    /// Truth: the least mass of two walls with a compliance kept, min a + 2 b under 1/a + 1/b <= c, is at a = sqrt(2) b,
-    /// b = (1 + 1/sqrt(2)) / c.
+    /// Truth: the least mass of two walls with a compliance kept, min a + 2 b under 1/a + 1/b <= c,
+    /// is at a = sqrt(2) b, b = (1 + 1/sqrt(2)) / c.
     #[test]
     fn two_walls_are_as_thin_as_the_compliance_allows() {
         let c = 6.0;

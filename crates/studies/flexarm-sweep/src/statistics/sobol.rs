@@ -20,7 +20,8 @@ fn digits(point: u32, dimension: usize) -> u32 {
 
 /// Returns a coordinate with its digits shifted at random, between 0 and 1, neither of them.
 ///
-/// A shift keeps how even the points are: every interval of length 2^-k has as many of 2^m points as before.
+/// A shift keeps how even the points are: every interval of length 2^-k has as many of 2^m points
+/// as before.
 pub(crate) fn shifted(point: usize, dimension: usize, seed: u64) -> f64 {
     let mut shifts = stream(seed, dimension as u64);
     shifts.set_word_pos((point >> BLOCK) as u128);
@@ -36,7 +37,8 @@ mod tests {
         f64::from(digits(point, dimension)) / 2f64.powi(32)
     }
 
-    /// Truth: the first points as scipy 1.17.1's `qmc.Sobol(scramble=False)` prints them, with the same direction numbers.
+    /// Truth: the first points as scipy 1.17.1's `qmc.Sobol(scramble=False)` prints them, with the
+    /// same direction numbers.
     #[test]
     fn the_first_points_are_those_of_joe_and_kuo() {
         let expected = [
@@ -75,7 +77,8 @@ mod tests {
         (17, 127, 0.84375),
     ];
 
-    /// Truth: the definition of a (0, m, 1)-net: each of 2^m intervals holds one of 2^m points, in every dimension and block.
+    /// Truth: the definition of a (0, m, 1)-net: each of 2^m intervals holds one of 2^m points, in
+    /// every dimension and block.
     #[test]
     fn every_interval_holds_one_point() {
         for (seed, first) in [(0, 0), (1, 0), (0, 3 << BLOCK)] {

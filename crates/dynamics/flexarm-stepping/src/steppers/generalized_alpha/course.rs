@@ -1,19 +1,22 @@
 //! Newton's matrices between two renewals: followed along the line through their last two values.
 //!
-//! While the joints move, masses change steadily, and a matrix that is kept gets old in proportion to the time; one that goes on along
-//! the line gets old with the square of it. Beyond the end of the line, as many steps as there are between its two values, it is kept.
+//! While the joints move, masses change steadily, and a matrix that is kept gets old in proportion
+//! to the time; one that goes on along the line gets old with the square of it. Beyond the end of
+//! the line, as many steps as there are between its two values, it is kept.
 //!
 //! ```text
 //! A_n+1 = A_n + (A_taken - A_before) / m        for the m steps after A was taken, m steps after A_before        (9)
 //! ```
 //! On the reference arm at 1 ms 80 matrices are taken in 4000 steps instead of 185.
 
-/// `h ω` of the first mode up to which matrices are followed: of longer steps too few lie between two renewals, and the matrices of a
-/// turning point would be far off (10 ms on the reference arm: error 8e-3 instead of 4e-3).
+/// `h ω` of the first mode up to which matrices are followed: of longer steps too few lie between
+/// two renewals, and the matrices of a turning point would be far off (10 ms on the reference arm:
+/// error 8e-3 instead of 4e-3).
 pub(super) const SHORT: f64 = 0.3;
 
-/// Largest ρ of a matrix that is followed: half of what others may have, because `M^-1 K`, which belongs to the scheme, is then as near to
-/// the truth as there (errors of the accuracy table within 4 %; with 3 % they were 8 % larger).
+/// Largest ρ of a matrix that is followed: half of what others may have, because `M^-1 K`, which
+/// belongs to the scheme, is then as near to the truth as there (errors of the accuracy table
+/// within 4 %; with 3 % they were 8 % larger).
 pub(crate) const FOLLOWED_TO: f64 = 0.015;
 
 /// What is known of the inverse of Newton's matrix and of `M^-1 K`; each n × n.
@@ -29,7 +32,8 @@ pub(crate) struct Course {
 }
 
 impl Course {
-    /// What the next step adds to the matrices, and whether that is something else than in the step before.
+    /// What the next step adds to the matrices, and whether that is something else than in the step
+    /// before.
     #[inline]
     pub(crate) fn step(&mut self) -> (&[Vec<f64>; 2], bool) {
         self.steps = self.steps.saturating_add(1);
@@ -80,7 +84,8 @@ impl Course {
 mod tests {
     use super::*;
 
-    /// Truth: matrices on a straight line are met in every step up to the end of the line, and kept after it.
+    /// Truth: matrices on a straight line are met in every step up to the end of the line, and kept
+    /// after it.
     #[test]
     fn a_matrix_that_changes_steadily_is_met_in_every_step_of_the_line() {
         let at = |t: f64| [vec![1.0 + 0.5 * t, -2.0 * t], vec![3.0, 0.25 * t]];

@@ -1,12 +1,13 @@
-//! The dispersion correction of generalised-alpha, (5) of the module above: what it does to accelerations and to the matrix
-//! of Newton's method.
+//! The dispersion correction of generalised-alpha, (5) of the module above: what it does to
+//! accelerations and to the matrix of Newton's method.
 //!
 //! ```text
 //! x̃ = Sᵀ ẍ,   Sᵀ = 1 + c h² M^-1 K                                  (6)
 //! J = M + C Sᵀ,   C = h γ' D + h² β' K                              (7)  derivative of (1) with respect to ẍ⁺
 //! S J = M + c h² K + S C Sᵀ,   J^-1 = (S J)^-1 S                    (8)  symmetric for every damping, unlike J
 //! ```
-//! Along a tree, and with modes, the matrix has all of it in itself: [`crate::tree_matrix`], [`crate::mode_matrix`].
+//! Along a tree, and with modes, the matrix has all of it in itself: [`crate::tree_matrix`],
+//! [`crate::mode_matrix`].
 
 use nalgebra::{DMatrix, DVector};
 
@@ -16,7 +17,8 @@ use crate::error::StepError;
 use crate::iteration_matrix::{IterationMatrix, Way};
 use crate::system::SecondOrderSystem;
 
-/// The correction for steps of one length. Allocates when it is made and for its first matrix, not after.
+/// The correction for steps of one length. Allocates when it is made and for its first matrix, not
+/// after.
 #[derive(Clone, Debug)]
 pub(super) struct DispersionCorrection {
     /// c of (5).
@@ -67,7 +69,8 @@ impl DispersionCorrection {
         self.c_h2 = self.c * dt * dt;
     }
 
-    /// Makes of M and C, as they were read, what (8) has in their places; with `kept` (6) stays as it is, and only the matrix is another.
+    /// Makes of M and C, as they were read, what (8) has in their places; with `kept` (6) stays as
+    /// it is, and only the matrix is another.
     ///
     /// # Errors
     /// [`StepError::Singular`] if the mass matrix is not positive definite.
@@ -124,8 +127,8 @@ impl DispersionCorrection {
         quickly(Shifted { a, c_h2: self.c_h2, shift, to: x_tilde.as_mut_slice() });
     }
 
-    /// What a change d of ẍ, the last solution with the matrix, adds to the change of x̃, coordinate by coordinate: a factor and
-    /// numbers, together `c h² M^-1 K d`.
+    /// What a change d of ẍ, the last solution with the matrix, adds to the change of x̃,
+    /// coordinate by coordinate: a factor and numbers, together `c h² M^-1 K d`.
     pub(super) fn shift<'a>(&'a mut self, matrix: &'a IterationMatrix, d: &DVector<f64>) -> (f64, &'a DVector<f64>) {
         match &matrix.way {
             Way::Tree(tree) => return (1.0, tree.shift()),

@@ -1,5 +1,6 @@
-//! What a step of a single run does coordinate by coordinate, as loops for the vector instructions that the processor has; the letters are
-//! those of the module above. Over lanes `batch/lane_alpha.rs` does the same, to the same bits.
+//! What a step of a single run does coordinate by coordinate, as loops for the vector instructions
+//! that the processor has; the letters are those of the module above. Over lanes
+//! `batch/lane_alpha.rs` does the same, to the same bits.
 
 use super::Coefficients;
 use crate::dense::{Loops, largest_of_numbers};

@@ -1,4 +1,5 @@
-//! Generalised-alpha for second-order systems: implicit, second order, with chosen damping at infinity.
+//! Generalised-alpha for second-order systems: implicit, second order, with chosen damping at
+//! infinity.
 //!
 //! ```text
 //! r(t⁺, x⁺, v⁺, ẍ⁺) = 0                                        (1)  equations of motion hold at the new time
@@ -6,31 +7,34 @@
 //! v⁺ = v + h [(1 - γ) a + γ a⁺]                                 (3)
 //! (1 - α_m) a⁺ + α_m a = (1 - α_f) ẍ⁺ + α_f ẍ                   (4)  algorithmic acceleration a
 //! ```
-//! with `α_m = (2ρ-1)/(ρ+1)`, `α_f = ρ/(ρ+1)`, `γ = 1/2 + α_f - α_m`, `β = (γ + 1/2)²/4`; ρ is the spectral
-//! radius at infinite frequency: 1 keeps all energy, 0 kills the highest modes in one step.
+//! with `α_m = (2ρ-1)/(ρ+1)`, `α_f = ρ/(ρ+1)`, `γ = 1/2 + α_f - α_m`, `β = (γ + 1/2)²/4`; ρ is the
+//! spectral radius at infinite frequency: 1 keeps all energy, 0 kills the highest modes in one
+//! step.
 //!
-//! Unknown is ẍ⁺; Newton on (1) with `M + h γ' D + h² β' K`, `β' = β (1-α_f)/(1-α_m)`, γ' alike. The matrix is kept
-//! until the iteration slows down.
+//! Unknown is ẍ⁺; Newton on (1) with `M + h γ' D + h² β' K`, `β' = β (1-α_f)/(1-α_m)`, γ' alike.
+//! The matrix is kept until the iteration slows down.
 //!
 //! Source: [Chung & Hulbert 1993]; form (4) as in [Arnold & Brüls 2007].
 //!
-//! **Dispersion correction.** No A-stable linear multistep method has a smaller frequency error than the trapezoidal
-//! rule's `(hω)²/12` (Dahlquist's second barrier), and in a ringing arm the phase drifts by just that. With the
-//! correction on, (4) is fed not with ẍ but with
+//! **Dispersion correction.** No A-stable linear multistep method has a smaller frequency error
+//! than the trapezoidal rule's `(hω)²/12` (Dahlquist's second barrier), and in a ringing arm the
+//! phase drifts by just that. With the correction on, (4) is fed not with ẍ but with
 //!
 //! ```text
 //! x̃ = ẍ - c h² d²ẍ/dt² ≈ (1 + c h² M^-1 K) ẍ,     c = β - Δ/2 + [α_f(1-α_f) - α_m(1-α_m)]/2 - Δ²/2 - 1/12,   Δ = α_f - α_m     (5)
 //! ```
-//! which cancels the second-order term of the frequency error of free vibration: the second derivative of the
-//! acceleration is taken from the stiffness, not from past steps, so that stability stays unconditional
-//! (a mode ω meets the scheme as `ω² (1 + c (hω)²)`, still positive). At rest ẍ = 0 and nothing changes. What is left out
-//! of (5) is the second derivative of the load, slow against the modes, and that of the damping force, 2ζ of the rest.
-//! The price: where rho is far below 1, the scheme damps modes of `hω` near 1 about twice as much as without.
+//! which cancels the second-order term of the frequency error of free vibration: the second
+//! derivative of the acceleration is taken from the stiffness, not from past steps, so that
+//! stability stays unconditional (a mode ω meets the scheme as `ω² (1 + c (hω)²)`, still positive).
+//! At rest ẍ = 0 and nothing changes. What is left out of (5) is the second derivative of the load,
+//! slow against the modes, and that of the damping force, 2ζ of the rest. The price: where rho is
+//! far below 1, the scheme damps modes of `hω` near 1 about twice as much as without.
 //!
-//! **Events.** The scheme remembers accelerations a and x̃, which a jump makes wrong: after [`Integrator::restart`]
-//! they are taken anew from the equations of motion, after [`Integrator::renew`] the matrix as well. A step may end
-//! anywhere before the next multiple of h ([`Integrator::advance_to`]). A step whose iteration fails is tried again
-//! with a matrix of its start, then in halves, down to `h/64`; after that the multiples of h go on.
+//! **Events.** The scheme remembers accelerations a and x̃, which a jump makes wrong: after
+//! [`Integrator::restart`] they are taken anew from the equations of motion, after
+//! [`Integrator::renew`] the matrix as well. A step may end anywhere before the next multiple of h
+//! ([`Integrator::advance_to`]). A step whose iteration fails is tried again with a matrix of its
+//! start, then in halves, down to `h/64`; after that the multiples of h go on.
 
 mod course;
 mod dispersion;
@@ -101,7 +105,8 @@ impl AlphaSettings {
         (OF_DAMPING * (1.0 - self.rho)).min(QUICK)
     }
 
-    /// The stepper of an arm, with what its searches may leave; `follow`: its matrices go on along lines where that is good.
+    /// The stepper of an arm, with what its searches may leave; `follow`: its matrices go on along
+    /// lines where that is good.
     pub(crate) fn stepper(
         self,
         arm: Arc<FlexibleArm>,
@@ -133,29 +138,34 @@ pub(crate) fn leave_of(settings: AlphaSettings, arm: &FlexibleArm, h: f64) -> Op
     (left > 0.0 && forgets_errors(arm)).then_some(left)
 }
 
-/// Whether the matrices of an arm whose steps may leave something go on along a line between two renewals ([`Course`]): of short steps.
+/// Whether the matrices of an arm whose steps may leave something go on along a line between two
+/// renewals ([`Course`]): of short steps.
 pub(crate) fn follows(settings: AlphaSettings, arm: &FlexibleArm, h: f64) -> bool {
     settings.dispersion_correction && arm.modes.omega.first().is_some_and(|omega| h * omega <= course::SHORT)
 }
 
-/// Part of the first correction of Newton's method that steps of a damped arm may leave: an error well below the scheme's own, for
-/// half the evaluations (`what_a_quick_iteration_leaves_is_small_beside_the_error_of_its_step`).
+/// Part of the first correction of Newton's method that steps of a damped arm may leave: an error
+/// well below the scheme's own, for half the evaluations
+/// (`what_a_quick_iteration_leaves_is_small_beside_the_error_of_its_step`).
 ///
-/// What is left comes back enlarged by the next extrapolation, up to `2 + 1/ρ` times for a mode that changes its sign in every step; the
-/// damping of the scheme, `1 - ρ` for such modes, must outweigh it ([`AlphaSettings::may_leave`]).
+/// What is left comes back enlarged by the next extrapolation, up to `2 + 1/ρ` times for a mode
+/// that changes its sign in every step; the damping of the scheme, `1 - ρ` for such modes, must
+/// outweigh it ([`AlphaSettings::may_leave`]).
 const QUICK: f64 = 0.03;
 /// Part of `1 - ρ` that may be left.
 const OF_DAMPING: f64 = 0.3;
-/// Damping ratio of every mode above which the error of a step has faded before many others have come to it.
+/// Damping ratio of every mode above which the error of a step has faded before many others have
+/// come to it.
 const DAMPED: f64 = 1e-3;
-/// `h ω` of the first mode up to which a step follows it, twelve steps in its period; beyond, extrapolations are no guide.
+/// `h ω` of the first mode up to which a step follows it, twelve steps in its period; beyond,
+/// extrapolations are no guide.
 const FOLLOWED: f64 = 0.5;
 
 /// Part that may be left in such steps.
 const COARSE: f64 = 1e-3;
 
-/// Whether nothing in the arm keeps what a step leaves: joints are where their motion is, springs straight and in Newton's
-/// matrix whole, modes damped.
+/// Whether nothing in the arm keeps what a step leaves: joints are where their motion is, springs
+/// straight and in Newton's matrix whole, modes damped.
 fn forgets_errors(arm: &FlexibleArm) -> bool {
     let straight = arm.elements.iter().all(|element| element.curve.is_none() && element.geometric.is_none());
     let mut force = DVector::zeros(arm.n_elastic_coordinates());
@@ -287,8 +297,8 @@ impl GeneralizedAlpha {
         })
     }
 
-    /// The same, with steps whose Newton iteration may leave this part of its first correction, the error of an extrapolation
-    /// over the step.
+    /// The same, with steps whose Newton iteration may leave this part of its first correction, the
+    /// error of an extrapolation over the step.
     #[must_use]
     pub fn leaving(self, part: f64) -> Self {
         Self { newton: self.newton.leaving(part), ..self }
@@ -300,16 +310,17 @@ impl GeneralizedAlpha {
         Self { course: Some(Course::default()), newton: self.newton.keeping(FOLLOWED_TO), ..self }
     }
 
-    /// The same, with steps that are smooth functions of all that goes into them: the matrix, with that of the dispersion correction, is taken
-    /// at the start of each step, and the iteration goes on until nothing is left. Along trees and with modes, whose matrix has the
-    /// correction in itself, that holds of steps that need no more than eight iterations.
+    /// The same, with steps that are smooth functions of all that goes into them: the matrix, with
+    /// that of the dispersion correction, is taken at the start of each step, and the iteration
+    /// goes on until nothing is left. Along trees and with modes, whose matrix has the correction
+    /// in itself, that holds of steps that need no more than eight iterations.
     #[must_use]
     pub fn exactly(self) -> Self {
         Self { exact: true, course: None, ..self.leaving(0.0) }
     }
 
-    /// a and x̃ of the current acceleration alone. With the correction in x̃, a jump would set modes of `hω >> 1` ringing
-    /// from one step to the next.
+    /// a and x̃ of the current acceleration alone. With the correction in x̃, a jump would set
+    /// modes of `hω >> 1` ringing from one step to the next.
     fn remember(&mut self) {
         self.a.copy_from(&self.now.acceleration);
         self.previous.copy_from(&self.now.acceleration);
@@ -460,7 +471,8 @@ impl ImplicitStep for GeneralizedAlpha {
             }
         }
         if self.exact {
-            // What is left of the last correction is as small beside it as that beside the one before.
+            // What is left of the last correction is as small beside it as that beside the one
+            // before.
             self.residual(system, t);
             self.newton.matrix.solve(&mut self.newton.r);
             self.correct(Sizes::default());
@@ -469,7 +481,8 @@ impl ImplicitStep for GeneralizedAlpha {
         self.accept(t);
         system.settle(t, &self.now.x);
         if !self.newton.factored {
-            // The last residual was as good as here, and (6) is the same for all that a step places.
+            // The last residual was as good as here, and (6) is the same for all that a step
+            // places.
             let _singular_is_found_again_in_the_next_step = self.factor(system, t, false);
             self.newton.renewed_between();
         }

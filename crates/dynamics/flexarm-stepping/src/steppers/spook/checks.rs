@@ -30,8 +30,8 @@ pub(super) fn check_known(arm: &FlexibleArm) -> Result<(), StepError> {
 /// Least moment of inertia over the largest with which a body can be turned about all its axes.
 const LEAST_MOMENT: f64 = 1e-9;
 
-/// A body at an end of the arm has six degrees of freedom and nothing behind it: its own mass and moments must hold them.
-/// Elsewhere the bodies that it carries do.
+/// A body at an end of the arm has six degrees of freedom and nothing behind it: its own mass and
+/// moments must hold them. Elsewhere the bodies that it carries do.
 pub(super) fn check_ends(model: &Model) -> Result<(), StepError> {
     let carries = |i: usize| model.bodies().iter().any(|body| body.parent == i);
     for (_, body) in model.bodies().iter().enumerate().skip(1).filter(|(i, _)| !carries(*i)) {

@@ -1,8 +1,8 @@
 //! SPOOK: compliant constraints in maximal coordinates.
 //!
-//! Every body has six degrees of freedom; every joint is six constraint rows with a compliance: `K_S^-1` for an
-//! elastic joint, next to nothing for a rigid one, whose distal frame must follow the proximal frame moved by
-//! the prescribed coordinate. One step solves
+//! Every body has six degrees of freedom; every joint is six constraint rows with a compliance:
+//! `K_S^-1` for an elastic joint, next to nothing for a rigid one, whose distal frame must follow
+//! the proximal frame moved by the prescribed coordinate. One step solves
 //!
 //! ```text
 //! [ M  -Gᵀ ] [ v⁺ ]   [ M v + h f                             ]
@@ -10,13 +10,16 @@
 //!
 //! Σ = (4/h²) Υ K_S^-1,   Υ = 1/(1 + 4 τ/h)                        τ: damping time, D_S = τ K_S
 //! ```
-//! λ is an impulse; at rest `λ/h = -K g` whatever h and τ. `g_t` is the explicit time rate of a prescribed joint.
-//! The matrix is block tridiagonal (a tree of 6×6 blocks) and eliminated from the leaves to the base, O(bodies).
+//! λ is an impulse; at rest `λ/h = -K g` whatever h and τ. `g_t` is the explicit time rate of a
+//! prescribed joint. The matrix is block tridiagonal (a tree of 6×6 blocks) and eliminated from the
+//! leaves to the base, O(bodies).
 //!
-//! A step ends where a load or a prescribed velocity jumps; the next one has a length of its own, and with it Σ and Υ.
+//! A step ends where a load or a prescribed velocity jumps; the next one has a length of its own,
+//! and with it Σ and Υ.
 //!
-//! Frames: P, Q proximal and distal face of a joint, P = Q when undeformed. [`constraint`] has the rows,
-//! [`solve`] the elimination, [`pins`] what closes a loop of links. Source: [Lacoursière 2007]; theory page, section 4.
+//! Frames: P, Q proximal and distal face of a joint, P = Q when undeformed. [`constraint`] has the
+//! rows, [`solve`] the elimination, [`pins`] what closes a loop of links. Source: [Lacoursière
+//! 2007]; theory page, section 4.
 
 mod checks;
 mod compliance;
@@ -67,17 +70,20 @@ pub enum ConstraintForm {
     /// In the proximal frame, with the exact Jacobian: constant stiffness.
     #[default]
     Local,
-    /// In world axes, stiffness turned along; equal to the local form to first order in the deflection.
+    /// In world axes, stiffness turned along; equal to the local form to first order in the
+    /// deflection.
     Global,
 }
 
 /// How Σ and Υ follow from the damping time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum SpookPreset {
-    /// `Υ = 1/(1 + 4 τ/h)` with the physical damping time of each elastic joint; rigid joints take τ = 2h.
+    /// `Υ = 1/(1 + 4 τ/h)` with the physical damping time of each elastic joint; rigid joints take
+    /// τ = 2h.
     #[default]
     Exact,
-    /// The thesis' choice: τ = 2h everywhere and `1 + 4 τ/h ≈ 4 τ/h`, so Υ = 1/8 and Σ = K^-1/(2 h²).
+    /// The thesis' choice: τ = 2h everywhere and `1 + 4 τ/h ≈ 4 τ/h`, so Υ = 1/8 and Σ = K^-1/(2
+    /// h²).
     Source,
 }
 
@@ -194,8 +200,9 @@ impl Spook {
     /// Starts at `t = 0` at rest with elastic coordinates `e`.
     ///
     /// # Errors
-    /// [`StepError::Setup`] for what has no place in maximal coordinates here: mimic joints, modal links, torques, payloads
-    /// that change, curved springs, links without mass or moments of inertia at an end of the arm.
+    /// [`StepError::Setup`] for what has no place in maximal coordinates here: mimic joints, modal
+    /// links, torques, payloads that change, curved springs, links without mass or moments of
+    /// inertia at an end of the arm.
     pub fn new(arm: FlexibleArm, h: f64, settings: SpookSettings, e: &DVector<f64>) -> Result<Self, StepError> {
         check_known(&arm)?;
         let model = arm.model.clone();
@@ -329,8 +336,8 @@ impl Spook {
         (kinetic, potential)
     }
 
-    /// What the joint of body i shows: drive forces, or the coordinates of a spring, their rates and its load. `force`: what
-    /// the joint puts on the body, in its rows.
+    /// What the joint of body i shows: drive forces, or the coordinates of a spring, their rates
+    /// and its load. `force`: what the joint puts on the body, in its rows.
     fn observe_joint(&self, i: usize, force: Vector6<f64>, out: &mut Observation) {
         let body = &self.arm.model.bodies()[i];
         let element = || self.arm.elements.iter().position(|element| element.body == i);
@@ -388,7 +395,8 @@ impl Spook {
         power
     }
 
-    /// Relative motion of the two faces of the joint of body i and its rate for the present poses, in the local form.
+    /// Relative motion of the two faces of the joint of body i and its rate for the present poses,
+    /// in the local form.
     fn deflection_now(&self, i: usize, angles: ElasticAngles) -> (Vector6<f64>, Vector6<f64>) {
         let body = &self.arm.model.bodies()[i];
         let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
@@ -515,7 +523,8 @@ impl Spook {
         }
     }
 
-    /// Value of the joint of a balancer at the current time: prescribed coordinates and deflections of springs.
+    /// Value of the joint of a balancer at the current time: prescribed coordinates and deflections
+    /// of springs.
     fn joint_value(&self, balancer: &PlacedBalancer) -> f64 {
         let BalancerPlace::Joint { terms, offset, .. } = &balancer.place else { return 0.0 };
         let model = &self.arm.model;
@@ -531,7 +540,8 @@ impl Spook {
         terms.iter().fold(*offset, |x, (k, c)| x + c * coordinate(*k))
     }
 
-    /// Body blocks: mass, momentum, impulse of gravity, gyroscopic moment and loads, about the centre of mass in world axes.
+    /// Body blocks: mass, momentum, impulse of gravity, gyroscopic moment and loads, about the
+    /// centre of mass in world axes.
     fn update_body_blocks(&mut self) {
         let (h, gravity) = (self.dt, self.arm.model.gravity);
         for (i, body) in self.bodies.iter().enumerate().skip(1) {
@@ -551,7 +561,8 @@ impl Spook {
         }
     }
 
-    /// A step of length `h` to `t_next`. The old poses stay until all new ones are known to be sound.
+    /// A step of length `h` to `t_next`. The old poses stay until all new ones are known to be
+    /// sound.
     fn advance(&mut self, t_next: f64, h: f64) -> Result<(), StepError> {
         if h != self.dt {
             self.dt = h;

@@ -6,8 +6,9 @@
 //! K z = r,   [ K  -Gᵀ ] [ z ]   [ r ]
 //!            [ G   Σ  ] [ μ ] = [ s ]          z = z_r + Z μ,   Z = K^-1 Gᵀ,   (G Z + Σ) μ = s - G z_r
 //! ```
-//! K is the matrix of the opened tree, in which dependent joints are free along their axes; Z is solved for row by row. What
-//! lies along the pin is free, and so is the tilt of the eye on it, as in [`flexarm_kinematics::PlacedLoop`].
+//! K is the matrix of the opened tree, in which dependent joints are free along their axes; Z is
+//! solved for row by row. What lies along the pin is free, and so is the tilt of the eye on it, as
+//! in [`flexarm_kinematics::PlacedLoop`].
 
 use flexarm_kinematics::{JointMotion, Model, Pose};
 use nalgebra::{DMatrix, DVector, Vector2, Vector3, Vector6};
@@ -59,7 +60,8 @@ impl Pins {
         self.rows.is_empty()
     }
 
-    /// Rows at the present poses. Returns the first loop that is open, or whose links lie in a line.
+    /// Rows at the present poses. Returns the first loop that is open, or whose links lie in a
+    /// line.
     pub(super) fn update(&mut self, model: &Model, poses: &[Pose], bodies: &[BodyState]) -> Option<usize> {
         let mut open = None;
         for (k, own) in model.loops().iter().enumerate() {

@@ -6,16 +6,18 @@
 //! S λ = ŝ - G_p v_p,   S = Σ + G_c M̂_c^-1 G_cᵀ,   ŝ = s - G_c M̂_c^-1 b̂_c                                    (2)
 //! M̂_p += G_pᵀ S^-1 G_p,   b̂_p += G_pᵀ S^-1 ŝ                                                              (3)
 //! ```
-//! For a serial arm this is the block tridiagonal LDLᵀ in body order. M̂ and S are symmetric positive definite. `G_c` is square,
-//! a block triangle whose inverse is known, so that neither M̂ nor S is factorised; in the coordinates of the rows
+//! For a serial arm this is the block tridiagonal LDLᵀ in body order. M̂ and S are symmetric
+//! positive definite. `G_c` is square, a block triangle whose inverse is known, so that neither M̂
+//! nor S is factorised; in the coordinates of the rows
 //!
 //! ```text
 //! M̃ = G_c^-T M̂_c G_c^-1,   b̃ = G_c^-T b̂_c,   H = M̃ + Σ^-1
 //! S^-1 = Σ^-1 H^-1 M̃,   S^-1 ŝ = Σ^-1 H^-1 (M̃ s - b̃),   v_c = G_c^-1 (s - Σ λ - G_p v_p)               (4)
 //! ```
-//! which holds for hard joints (Σ next to nothing) and soft ones alike. Where Σ is hard in some directions and soft in others,
-//! `S = Σ + M̃^-1` is inverted itself. A joint that is free along a line σ of its rows (it follows from a closed loop) has there a
-//! rate ε and no force: with `a = S_0^-1 σ` of the joint that is hard there as well
+//! which holds for hard joints (Σ next to nothing) and soft ones alike. Where Σ is hard in some
+//! directions and soft in others, `S = Σ + M̃^-1` is inverted itself. A joint that is free along a
+//! line σ of its rows (it follows from a closed loop) has there a rate ε and no force: with
+//! `a = S_0^-1 σ` of the joint that is hard there as well
 //!
 //! ```text
 //! S^-1 = S_0^-1 - a aᵀ / σᵀa,     σᵀλ = 0,     ε = (σᵀ S_0^-1 ŝ - aᵀ G_p v_p) / σᵀa,     v_c = G_c^-1 (s - Σ λ - G_p v_p - σ ε)    (5)
@@ -333,7 +335,8 @@ impl TreeSolver {
         Self { parent, M: vec![Symmetric::zeros(); n], b: vec![zero; n], s: vec![zero; n], joints }
     }
 
-    /// Solves for velocities and impulses; `M`, `b` and `s` hold the blocks of bodies and joints, `M` and `b` are used up.
+    /// Solves for velocities and impulses; `M`, `b` and `s` hold the blocks of bodies and joints,
+    /// `M` and `b` are used up.
     ///
     /// * `rows`, `sigma`: of the joint that carries each body.
     ///
@@ -406,7 +409,8 @@ mod tests {
             Rows { g: Vector6::zeros(), G, S: self.vector() }
         }
 
-        /// Hard, soft, soft along one line alone, and free along the line of the rows; and Σ as it is.
+        /// Hard, soft, soft along one line alone, and free along the line of the rows; and Σ as it
+        /// is.
         fn sigma(&mut self, kind: u64) -> (Sigma, Matrix6<f64>) {
             let hard = 1e-8;
             match kind % 4 {
@@ -430,8 +434,9 @@ mod tests {
         Matrix6::from_columns(&[0, 1, 2, 3, 4, 5].map(|k| map(&Vector6::ith(k, 1.0))))
     }
 
-    /// Truth: the saddle-point matrix (1) of the whole tree, dense, by LU; bodies on levers and on turned rows, joints that are hard,
-    /// soft, soft in one direction, and free in one. Measured: 2e-12 of the velocities and 9e-12 of the impulses, at compliances from 1e-8 to 1.
+    /// Truth: the saddle-point matrix (1) of the whole tree, dense, by LU; bodies on levers and on
+    /// turned rows, joints that are hard, soft, soft in one direction, and free in one. Measured:
+    /// 2e-12 of the velocities and 9e-12 of the impulses, at compliances from 1e-8 to 1.
     #[test]
     fn elimination_along_the_tree_solves_the_whole_matrix() {
         proptest!(|(seed in any::<u64>(), count in 1_usize..9)| {

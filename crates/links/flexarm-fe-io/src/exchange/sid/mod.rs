@@ -1,8 +1,9 @@
 //! Standard Input Data of a flexible body (Wallrapp 1994): the `.SID_FEM` file, read and written.
 //!
-//! A body with `nq` shape coordinates: mass integrals as Taylor series in them, and frames of nodes.
-//! Matrices are kept as the entries of the file, so reading and writing loses nothing; [`SidMatrix::m0`]
-//! and [`SidMatrix::m1`] give them dense. Indices of the first-order part are (row, mode, column).
+//! A body with `nq` shape coordinates: mass integrals as Taylor series in them, and frames of
+//! nodes. Matrices are kept as the entries of the file, so reading and writing loses nothing;
+//! [`SidMatrix::m0`] and [`SidMatrix::m1`] give them dense. Indices of the first-order part are
+//! (row, mode, column).
 //!
 //! Writers of this format disagree in three places, which the file does not say:
 //!
@@ -12,7 +13,8 @@
 //! Oe       columns xx yy zz xy yz xz, or xx yy zz xy xz yz
 //! ```
 //! The first shows in the size. The others follow from identities that every body fulfils,
-//! `(Gr_j + Gr_jᵀ)/2 = J1_j`, and the products in `Oe` are those of `-J1_j`; see [`Sid::conventions`].
+//! `(Gr_j + Gr_jᵀ)/2 = J1_j`, and the products in `Oe` are those of `-J1_j`; see
+//! [`Sid::conventions`].
 //!
 //! Units: those of the file; [`Sid::in_units`] gives others.
 

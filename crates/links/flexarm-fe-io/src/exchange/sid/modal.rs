@@ -6,9 +6,10 @@
 //! Gr_k = -2 ∫ [s]x [φ_k]x dm = 2 (tr(P_k) 1 - P_kᵀ)                    Ge_kl = 2 ∫ φ_l × φ_k dm
 //! Oe0 = ∫ φ_kᵀ [ω]x² s dm,  Oe1 = ∫ φ_kᵀ [ω]x² φ_l dm                  by products ω_i ω_j
 //! ```
-//! Stiffness by initial stress goes where the standard has it, as first-order parts of Ct, Cr, Oe and, with the
-//! other sign, of phi and psi of the nodes; and once more by itself, in blocks `K0t`, `K0r`, `K0omega` and `K0F`, since
-//! nobody can take it out of `Oe` again. Column `i n + l` of a block: entry l for load i.
+//! Stiffness by initial stress goes where the standard has it, as first-order parts of Ct, Cr, Oe
+//! and, with the other sign, of phi and psi of the nodes; and once more by itself, in blocks `K0t`,
+//! `K0r`, `K0omega` and `K0F`, since nobody can take it out of `Oe` again. Column `i n + l` of a
+//! block: entry l for load i.
 //!
 //! Source: Wallrapp (1994), *Mech. Struct. & Mach.* 22.
 
@@ -128,19 +129,21 @@ pub fn sid_of_modal_link(link: &ModalLink) -> Sid {
 
 /// The modal link that Standard Input Data describe.
 ///
-/// A is the first node that no coordinate moves (else see [`modal_link_held_at`]); every other node becomes an
-/// interface, in the order of the file. The names of the link and of the nodes are those that [`sid_of_modal_link`] wrote, else `name` and the numbers of the
-/// nodes. Damping (`De`) is not taken over. In a file without the block `K0omega` centrifugal stiffening stays in
-/// `Oe`, so in N.
+/// A is the first node that no coordinate moves (else see [`modal_link_held_at`]); every other node
+/// becomes an interface, in the order of the file. The names of the link and of the nodes are those
+/// that [`sid_of_modal_link`] wrote, else `name` and the numbers of the nodes. Damping (`De`) is
+/// not taken over. In a file without the block `K0omega` centrifugal stiffening stays in `Oe`, so
+/// in N.
 ///
 /// * `name`: name of the link, and of the data in messages.
 /// * `sid`: in SI.
 ///
 /// # Errors
-/// [`ExchangeErrorKind::Ambiguous`] as [`Sid::conventions`]; [`ExchangeErrorKind::Missing`] without a node A or
-/// another one; [`ExchangeErrorKind::Unsupported`] with initial stress; [`ExchangeErrorKind::Defective`] for a
-/// mass or stiffness that is not positive definite, and for frames that are not orthonormal;
-/// [`ExchangeErrorKind::WrongSize`] for blocks of other sizes than the modes say.
+/// [`ExchangeErrorKind::Ambiguous`] as [`Sid::conventions`]; [`ExchangeErrorKind::Missing`] without
+/// a node A or another one; [`ExchangeErrorKind::Unsupported`] with initial stress;
+/// [`ExchangeErrorKind::Defective`] for a mass or stiffness that is not positive definite, and for
+/// frames that are not orthonormal; [`ExchangeErrorKind::WrongSize`] for blocks of other sizes than
+/// the modes say.
 pub fn modal_link_from_sid(name: &str, sid: &Sid) -> Result<ModalLink, ExchangeError> {
     check_sizes(name, sid)?;
     of_node(name, sid, held_node(name, sid)?)
@@ -148,8 +151,8 @@ pub fn modal_link_from_sid(name: &str, sid: &Sid) -> Result<ModalLink, ExchangeE
 
 /// As [`modal_link_from_sid`], with a given node as A, whatever frame the data have.
 ///
-/// Where the coordinates move that node, its motion is taken out of all shapes as that of a rigid body; stiffness by
-/// initial stress belongs to the frame of the data and is then left out.
+/// Where the coordinates move that node, its motion is taken out of all shapes as that of a rigid
+/// body; stiffness by initial stress belongs to the frame of the data and is then left out.
 ///
 /// # Errors
 /// As [`modal_link_from_sid`]; [`ExchangeErrorKind::Missing`] if there is no such node.
@@ -369,7 +372,8 @@ fn geometric(sid: &Sid, A: usize) -> Option<GeometricStiffness> {
     })
 }
 
-/// N: symmetric parts from `Oe1` without the stiffening in it, skew ones from `Ge`, or `Cr1` where that is empty.
+/// N: symmetric parts from `Oe1` without the stiffening in it, skew ones from `Ge`, or `Cr1` where
+/// that is empty.
 fn second_order(sid: &Sid, gyro: GyroLayout, oe: OeOrder) -> Vec<Matrix3<f64>> {
     let n = sid.nq();
     let stiffening: Option<[DMatrix<f64>; 6]> = by_loads(sid, "K0omega", 0, 6);
@@ -411,7 +415,8 @@ fn is_still(node: &SidNode) -> bool {
     still(&node.phi) && still(&node.psi)
 }
 
-/// The rigid motions of the whole link that move it as the coordinates move a node: at Lo, then rotation.
+/// The rigid motions of the whole link that move it as the coordinates move a node: at Lo, then
+/// rotation.
 fn motion_of(node: &SidNode, n: usize) -> Matrix6xX<f64> {
     let (phi, psi) = (node.phi.m0(), node.psi.m0());
     let p = Vector3::from_iterator(node.origin.m0().iter().copied());

@@ -11,7 +11,8 @@ use crate::exchange::text::{Text, shown, unpack, words};
 const MOST_MODES: usize = 10_000;
 /// `Ge` has three columns per shape coordinate.
 const MOST_ROWS: usize = 3 * MOST_MODES;
-/// Entries that a dense matrix may have, zeros included: so many in any file, so many more per byte.
+/// Entries that a dense matrix may have, zeros included: so many in any file, so many more per
+/// byte.
 const MOST_ENTRIES: (usize, usize) = (1 << 20, 16);
 
 /// Reads a `.SID_FEM` file, which may be packed with gzip.

@@ -1,4 +1,5 @@
-//! A [`Sid`] in other units. The shape coordinates keep their numbers; what multiplies them changes.
+//! A [`Sid`] in other units. The shape coordinates keep their numbers; what multiplies them
+//! changes.
 //!
 //! Per shape coordinate, with the units L of length, M of mass and T of time:
 //!
@@ -12,7 +13,8 @@ use super::{Sid, SidMatrix, SidNode};
 use flexarm_fem::units::UnitSystem;
 
 impl Sid {
-    /// The same body in other units; blocks beyond the standard and those that [`ModalLink`](flexarm_fem::ModalLink) writes stay as they are.
+    /// The same body in other units; blocks beyond the standard and those that
+    /// [`ModalLink`](flexarm_fem::ModalLink) writes stay as they are.
     pub fn in_units(&self, from: &UnitSystem, to: &UnitSystem) -> Self {
         let [length, mass, time] = [from.length / to.length, from.mass / to.mass, from.time / to.time];
         let (first, second) = (mass * length, mass * length * length);

@@ -43,11 +43,13 @@ struct GroupNodes {
 /// A set is tidied when it has twice as many nodes as after the last time, and this many more.
 const FEW: usize = 32;
 
-/// Nodes in all sets: so many in any file, so many more per byte. 160 groups of all nodes at 40 bytes per node.
+/// Nodes in all sets: so many in any file, so many more per byte. 160 groups of all nodes at 40
+/// bytes per node.
 const MOST_MEMBERS: (usize, usize) = (1 << 20, 4);
 
 impl GroupNodes {
-    /// Sorts and removes duplicates: neighbouring elements share most of their nodes. Returns how many are new.
+    /// Sorts and removes duplicates: neighbouring elements share most of their nodes. Returns how
+    /// many are new.
     fn tidy(&mut self) -> usize {
         self.ids.sort_unstable();
         self.ids.dedup();
@@ -263,7 +265,8 @@ impl Collector {
 mod tests {
     use super::*;
 
-    /// Puts triangles into 64 groups as a file of 8 bytes per triangle; returns the numbers that are held.
+    /// Puts triangles into 64 groups as a file of 8 bytes per triangle; returns the numbers that
+    /// are held.
     fn held(triangles: impl ExactSizeIterator<Item = [u64; 3]>) -> Result<usize, MeshError> {
         let bytes = vec![b'\n'; 8 * triangles.len()];
         let src = Source { bytes: &bytes, origin: "t.msh", binary: false };

@@ -100,7 +100,8 @@ fn skip_section(reader: &mut Reader, section: &[u8]) {
     }
 }
 
-/// `version file-type data-size`, and in binary files the integer one that shows the order of bytes.
+/// `version file-type data-size`, and in binary files the integer one that shows the order of
+/// bytes.
 fn mesh_format(reader: &mut Reader) -> Result<Header, MeshError> {
     let at = reader.pos;
     let version_word = reader.word("version")?;

@@ -117,7 +117,8 @@ impl<'a> Reader<'a> {
 
     /// A count of things that take at least so many integers, sizes and reals each.
     ///
-    /// A count that cannot fit into the rest of the file is refused here, before anything is allocated.
+    /// A count that cannot fit into the rest of the file is refused here, before anything is
+    /// allocated.
     pub(super) fn checked(&self, count: u64, what: &str, parts: [usize; 3]) -> Result<usize, MeshError> {
         let [ints, sizes, reals] = parts;
         let each = match self.layout {

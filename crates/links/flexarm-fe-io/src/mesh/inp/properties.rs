@@ -179,7 +179,8 @@ impl SectionCard {
     }
 }
 
-/// Dimensions as in Abaqus; two equal numbers for CIRC are CalculiX's diameters (its beamsections.f).
+/// Dimensions as in Abaqus; two equal numbers for CIRC are CalculiX's diameters (its
+/// beamsections.f).
 fn beam_section(name: &str, dimensions: &[f64]) -> Option<Section> {
     match (name, dimensions) {
         ("RECT", [a, b]) => Some(Section::Rectangle { width: *a, height: *b }),

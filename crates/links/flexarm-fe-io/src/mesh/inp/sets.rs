@@ -8,8 +8,8 @@ use crate::mesh::ids::IdIndex;
 use crate::mesh::source::{Source, parse_u64, shown};
 use flexarm_fem::spelling::listed;
 
-/// What sets may grow to by nesting and generation: a bound by the size of the file, so that a small
-/// file cannot ask for endless work.
+/// What sets may grow to by nesting and generation: a bound by the size of the file, so that a
+/// small file cannot ask for endless work.
 pub(super) struct Budget {
     left: usize,
 }
@@ -169,7 +169,8 @@ impl Sets {
             members.dedup();
         }
 
-        // Members through sets inside: a walk from each, so that cycles and deep nesting do no harm.
+        // Members through sets inside: a walk from each, so that cycles and deep nesting do no
+        // harm.
         let mut all = direct.clone();
         let mut seen_from = vec![usize::MAX; self.list.len()];
         for (k, set) in self.list.iter().enumerate().filter(|(_, set)| !set.inner.is_empty()) {
@@ -193,7 +194,8 @@ impl Sets {
     }
 }
 
-/// Sorts and removes doubles when a list has grown to twice its size, so that it cannot grow without end.
+/// Sorts and removes doubles when a list has grown to twice its size, so that it cannot grow
+/// without end.
 fn tidy(members: &mut Vec<u32>, before: usize) {
     if before > 1024 && members.len() > 2 * before {
         members.sort_unstable();

@@ -10,7 +10,8 @@ pub(super) enum Class {
     Solid(ElementKind),
     /// A straight beam.
     Beam(BeamTheory),
-    /// A plane element or line with so many nodes that mesh programs write along with a solid: a group of nodes.
+    /// A plane element or line with so many nodes that mesh programs write along with a solid: a
+    /// group of nodes.
     Skin(usize),
 }
 
@@ -25,7 +26,8 @@ impl Class {
     }
 }
 
-/// Looks up a type in capitals; with it a remark where the file asks for something that is not done.
+/// Looks up a type in capitals; with it a remark where the file asks for something that is not
+/// done.
 pub(super) fn class(name: &str) -> Option<(Class, Option<&'static str>)> {
     const REDUCED: Option<&str> = Some("reduced integration is not used: the program has its own rules");
     let solid = |kind, remark| Some((Class::Solid(kind), remark));

@@ -37,7 +37,8 @@ impl Condensation<'_> {
         smallest_modes(&mut self.pencil(freed, solve, mass), wanted)
     }
 
-    /// [`Self::fixed_modes`] and so many of [`Self::held_modes`]; with two interfaces for the solves of the former alone.
+    /// [`Self::fixed_modes`] and so many of [`Self::held_modes`]; with two interfaces for the
+    /// solves of the former alone.
     ///
     /// # Errors
     /// [`ModesError`].
@@ -63,8 +64,9 @@ impl Condensation<'_> {
         Ok((self.fixed_modes(wanted)?, self.held_modes(ModesWanted::Count(held))?))
     }
 
-    /// Modes as they are, or, where the mesh says that rounding left them rough, `ω² K⁻¹ M φ` of each: in thin plates, where a combination
-    /// of a hundred vectors leaves ten times what one solution does.
+    /// Modes as they are, or, where the mesh says that rounding left them rough, `ω² K⁻¹ M φ` of
+    /// each: in thin plates, where a combination of a hundred vectors leaves ten times what one
+    /// solution does.
     fn smoothed(&self, mut modes: Modes, solve: impl Fn(&mut Block)) -> Modes {
         if self.mode_residuals(&modes).iter().all(|residual| *residual <= ROUGH) {
             return modes;
@@ -125,7 +127,8 @@ impl Condensation<'_> {
         smallest_modes(&mut pencil, wanted)
     }
 
-    /// Row `i` of the boundary under the rigid motion that moves the first interface by `j`, from the stiffness itself.
+    /// Row `i` of the boundary under the rigid motion that moves the first interface by `j`, from
+    /// the stiffness itself.
     fn rigid_at(&self, i: usize, j: usize) -> f64 {
         // K_BB u_B + K_BA u_A = 0 for a motion without force.
         let n = self.K_g.nrows();
@@ -133,8 +136,8 @@ impl Condensation<'_> {
         -(self.tip.row(i - 6) * K_BA)[(0, 0)]
     }
 
-    /// Residual `‖K φ - ω² M φ + Gᵀ λ‖ / ‖ω² M φ‖` of each mode over the free DoF, as the mesh says it; for modes
-    /// under any support.
+    /// Residual `‖K φ - ω² M φ + Gᵀ λ‖ / ‖ω² M φ‖` of each mode over the free DoF, as the mesh says
+    /// it; for modes under any support.
     pub fn mode_residuals(&self, modes: &Modes) -> Vec<f64> {
         let K = self.model.K.product(&modes.shapes);
         let M = self.model.M.product(&modes.shapes);

@@ -1,4 +1,5 @@
-//! Models at the edge of what can be reduced: nothing free, one unknown, parts that hang on one interface, no mass.
+//! Models at the edge of what can be reduced: nothing free, one unknown, parts that hang on one
+//! interface, no mass.
 
 use super::*;
 use crate::matrix_link::reduce_matrices;
@@ -73,7 +74,8 @@ fn a_cube_all_of_whose_nodes_are_in_interfaces_has_the_modes_that_its_ties_leave
     }
 }
 
-/// Truth: a model that keeps all its DoF is its own superelement; one inner mass on a spring has ω² = k/m.
+/// Truth: a model that keeps all its DoF is its own superelement; one inner mass on a spring has ω²
+/// = k/m.
 #[test]
 fn a_model_without_inner_dof_stays_as_it_is_and_one_with_a_single_one_has_one_mode() {
     let beam =
@@ -116,7 +118,8 @@ fn a_model_without_inner_dof_stays_as_it_is_and_one_with_a_single_one_has_one_mo
     assert!(matches!(few, Err(MeshLinkError::Reduction(ReductionError::Tie(TieError::TooFew { found: 1 })))));
 }
 
-/// Truth: with every node kept the modes with A held are those of the dense pencil of the other nodes.
+/// Truth: with every node kept the modes with A held are those of the dense pencil of the other
+/// nodes.
 #[test]
 fn a_beam_of_one_element_has_no_fixed_modes_and_six_with_one_end_held() {
     let beam = Some(BeamProperties {
@@ -142,7 +145,8 @@ fn a_beam_of_one_element_has_no_fixed_modes_and_six_with_one_end_held() {
     assert!(reduction.condition_estimate().is_nan());
 }
 
-/// Truth: the half between the interfaces by itself; what hangs on A beyond it is carried along without force.
+/// Truth: the half between the interfaces by itself; what hangs on A beyond it is carried along
+/// without force.
 #[test]
 fn an_end_that_hangs_on_the_first_interface_alone_does_not_change_the_stiffness() {
     let plane = |mesh: &Mesh, x: f64| -> Vec<u32> {

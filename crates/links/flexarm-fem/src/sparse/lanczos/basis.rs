@@ -7,12 +7,13 @@ use crate::sparse::block::{Block, WIDTH, combine, grams, subtract_products};
 
 /// What is left of a direction, over the largest θ, that is rounding of the operator.
 const NOISE: f64 = 1e-13;
-/// Size of `K⁻¹ M x` over that of x, in parts of the largest one of the first block, below which it is rounding: uniform acceleration
-/// moves nothing in some directions.
+/// Size of `K⁻¹ M x` over that of x, in parts of the largest one of the first block, below which it
+/// is rounding: uniform acceleration moves nothing in some directions.
 const VANISHED: f64 = 1e-10;
 /// Smallest eigenvalue of the scaled Gram matrix of a block below which a direction is dropped.
 const DEPENDENT: f64 = 1e-10;
-/// The same, below which the block is orthogonalised once more: a near-dependent block magnifies what was left.
+/// The same, below which the block is orthogonalised once more: a near-dependent block magnifies
+/// what was left.
 const NEAR_DEPENDENT: f64 = 1e-4;
 
 /// M-orthonormal blocks `V_1 V_2 ...` with `H = Vᵀ M K⁻¹ M V`.
@@ -126,7 +127,8 @@ impl Basis {
         let mut A = MV.gram(&W);
         W.subtract_product(&V, &A);
         self.blocks.push(V);
-        // The recurrence alone loses the modes that were found; once is enough to keep the basis orthonormal to rounding.
+        // The recurrence alone loses the modes that were found; once is enough to keep the basis
+        // orthonormal to rounding.
         let mut MW = MV;
         (pencil.mass)(&W, &mut MW);
         let C = grams(&self.blocks, &MW);
@@ -146,7 +148,8 @@ impl Basis {
         self.append(W, MW, pencil, &[])
     }
 
-    /// Makes `W` M-orthonormal and takes it as the newest block; directions that vanish are dropped.
+    /// Makes `W` M-orthonormal and takes it as the newest block; directions that vanish are
+    /// dropped.
     ///
     /// ```text
     /// G = Wᵀ M W,   V = W B with Bᵀ G B = 1,   R = Vᵀ M W = Bᵀ G
@@ -207,7 +210,8 @@ impl Basis {
 
     /// Whether the projected operator is to be looked at; `count`: modes wanted.
     pub(super) fn is_to_be_looked_at(&mut self, count: usize, limit: usize) -> bool {
-        // The small eigenproblem grows with the cube of the basis: a larger one is looked at less often.
+        // The small eigenproblem grows with the cube of the basis: a larger one is looked at less
+        // often.
         if self.len() < self.next_look.max(2 * count + WIDTH) && !self.is_full(limit) {
             return false;
         }
@@ -285,8 +289,9 @@ impl Basis {
     }
 }
 
-/// `Q` with `Qᵀ G Q = 1` for a positive semidefinite G whose rows may have different units, and the smallest eigenvalue of the
-/// scaled G that was kept. Directions that depend on the others, or are shorter than `noise`, are dropped.
+/// `Q` with `Qᵀ G Q = 1` for a positive semidefinite G whose rows may have different units, and the
+/// smallest eigenvalue of the scaled G that was kept. Directions that depend on the others, or are
+/// shorter than `noise`, are dropped.
 pub(crate) fn orthonormalising(G: &DMatrix<f64>, noise: f64) -> (DMatrix<f64>, f64) {
     let n = G.nrows();
     let scale: Vec<f64> = G.diagonal().iter().map(|g| if *g > 0.0 { 1.0 / g.sqrt() } else { 0.0 }).collect();

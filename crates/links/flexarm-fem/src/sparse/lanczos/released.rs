@@ -9,7 +9,8 @@ use crate::sparse::block::Block;
 /// A support that is taken away.
 #[derive(Debug, Clone, Copy)]
 pub struct Released<'a> {
-    /// Its static shapes T: displacement of every row for a unit of each of its coordinates; at most six.
+    /// Its static shapes T: displacement of every row for a unit of each of its coordinates; at
+    /// most six.
     pub T: &'a Block,
     /// Compliance `C = (Tᵀ K T)⁻¹` of these coordinates.
     pub C: &'a DMatrix<f64>,
@@ -74,7 +75,8 @@ mod tests {
                 F.rows[..m].copy_from_slice(&inner.rows);
             };
             let mass = &mut |X: &Block, Y: &mut Block| Y.clone_from(X);
-            // A unit of the last mass pulls the others along evenly; its stiffness is that of n springs in series.
+            // A unit of the last mass pulls the others along evenly; its stiffness is that of n
+            // springs in series.
             let T = DMatrix::from_fn(n, 1, |i, _| (i + 1) as f64 / n as f64);
             let released = Released { T: &Block::of_columns(&T, 0, 1), C: &DMatrix::from_element(1, 1, n as f64) };
             let mut pencil = Pencil { rows: n, dimension: m, solve, mass };

@@ -56,7 +56,8 @@ pub(super) struct Assembly {
     log_time: u64,
     sample: Sample,
     seen: Vec<Topic>,
-    /// The last sample that [`Assembly::take`] or [`Assembly::close`] finished, and its topics in order.
+    /// The last sample that [`Assembly::take`] or [`Assembly::close`] finished, and its topics in
+    /// order.
     pub(super) done: Sample,
     pub(super) done_topics: Vec<Topic>,
     pub(super) events: Vec<Event>,
@@ -124,8 +125,8 @@ impl Assembly {
             Record::Message { header, data } => {
                 let Some(&topic) = self.channels.get(&header.channel_id) else { return Ok(None) };
                 let next = topic.is_of_a_sample() && self.sequence != Some(header.sequence);
-                // Frames come before the rest of their sample and are numbered by themselves. Those of the last one can come
-                // behind it.
+                // Frames come before the rest of their sample and are numbered by themselves. Those
+                // of the last one can come behind it.
                 let of_next = topic == Topic::Frames && self.log_time != header.log_time;
                 let closed = (next || of_next) && self.close();
                 if next {

@@ -19,7 +19,8 @@ pub(super) struct Frames {
     /// Place of a frame by its name.
     places: HashMap<String, Place>,
     parents: Vec<Option<usize>>,
-    /// Last transform of each link of the flexible robot and of the rigid twin, and of each station.
+    /// Last transform of each link of the flexible robot and of the rigid twin, and of each
+    /// station.
     X_PL: [Vec<Pose>; 2],
     X_LS: Vec<(usize, Pose)>,
     has_rigid: bool,

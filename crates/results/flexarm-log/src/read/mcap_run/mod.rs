@@ -1,8 +1,8 @@
-//! An MCAP file of a run, record by record: memory does not grow with the length of the run, and a file without an end
-//! is read up to its last whole chunk.
+//! An MCAP file of a run, record by record: memory does not grow with the length of the run, and a
+//! file without an end is read up to its last whole chunk.
 //!
-//! [`walk`] gives the records, [`found`] keeps what is said once, [`assembly`] makes samples of messages, [`frames`] poses in
-//! the world of transforms between neighbours.
+//! [`walk`] gives the records, [`found`] keeps what is said once, [`assembly`] makes samples of
+//! messages, [`frames`] poses in the world of transforms between neighbours.
 
 mod assembly;
 mod found;
@@ -125,7 +125,8 @@ impl RunSource for McapRun {
             _ if !found.whole => self.warnings.push(broken_end(path, "its index is missing", count, last_s)),
             _ => {}
         }
-        // Topic and metadata are for other programs; the file of its own has kinds and order as well.
+        // Topic and metadata are for other programs; the file of its own has kinds and order as
+        // well.
         let mut result = match &found.result {
             Some(text) => run_json::read_result(&String::from_utf8_lossy(text)),
             None => RunResult {

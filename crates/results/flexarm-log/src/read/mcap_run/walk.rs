@@ -18,7 +18,8 @@ pub(super) enum Flow {
     Stop,
 }
 
-/// Calls `take` with every record, those in chunks included. Returns why the file ends before its end, if it does.
+/// Calls `take` with every record, those in chunks included. Returns why the file ends before its
+/// end, if it does.
 pub(super) fn walk(
     path: &Path,
     take: &mut dyn FnMut(Record<'_>) -> Result<Flow, LogError>,
@@ -68,10 +69,11 @@ pub(super) fn walk(
     Ok(None)
 }
 
-/// Whether the texts of a record are within it: the library takes memory for them before it looks. `None` for records that
-/// say nothing about a run, such as the index.
+/// Whether the texts of a record are within it: the library takes memory for them before it looks.
+/// `None` for records that say nothing about a run, such as the index.
 fn texts_fit(kind: u8, record: &[u8]) -> Option<bool> {
-    // Bytes before the first text; texts, or what has its length before it likewise; whether pairs of texts follow.
+    // Bytes before the first text; texts, or what has its length before it likewise; whether pairs
+    // of texts follow.
     let (before, texts, pairs) = match kind {
         op::HEADER => (0, 2, false),
         op::FOOTER | op::MESSAGE => return Some(true),

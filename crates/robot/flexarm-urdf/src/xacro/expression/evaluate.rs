@@ -93,8 +93,8 @@ impl Interpreter<'_> {
         })
     }
 
-    /// Counts a value with all that is in it, before it is printed or compared: lists may share their elements, and be
-    /// much larger than what they take.
+    /// Counts a value with all that is in it, before it is printed or compared: lists may share
+    /// their elements, and be much larger than what they take.
     pub(crate) fn charge_whole(&mut self, value: &Value) -> Result<(), Trouble> {
         self.charge(value.size())?;
         match value {

@@ -1,7 +1,8 @@
 //! Expressions between `${` and `}`: Python's, without anything that could leave the document.
 //!
-//! Start at [`Interpreter::expression`]. Tokens, a tree by precedence, then values; what a value prints as is Python's
-//! `repr`, because that is what ends up in the document. Whole numbers have 128 bits; passing that is an error.
+//! Start at [`Interpreter::expression`]. Tokens, a tree by precedence, then values; what a value
+//! prints as is Python's `repr`, because that is what ends up in the document. Whole numbers have
+//! 128 bits; passing that is an error.
 
 mod arithmetic;
 mod evaluate;

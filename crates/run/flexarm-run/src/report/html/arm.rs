@@ -12,7 +12,8 @@ use super::number::{number, short};
 use crate::report::picture::{pictures, scale_colors};
 use flexarm_settings::written::markup;
 
-/// Width of the pictures of the arm (pixels): more than the page shows, whose two pictures stand beside each other.
+/// Width of the pictures of the arm (pixels): more than the page shows, whose two pictures stand
+/// beside each other.
 const PICTURE_WIDTH: usize = 810;
 
 pub(super) fn arm_pictures(runs: &[ReportRun<'_>]) -> String {

@@ -90,7 +90,8 @@ pub(super) fn moving(s: &Summary) -> Option<&TcpFigures> {
     s.tcp.as_ref().filter(|_| s.knows_moves())
 }
 
-/// Units of figures of which a change in per cent says something; a time or an energy has no natural zero.
+/// Units of figures of which a change in per cent says something; a time or an energy has no
+/// natural zero.
 const RELATIVE: [&str; 3] = ["mm", "mrad", "Hz"];
 
 const COMPARED: [Compared; 18] = [

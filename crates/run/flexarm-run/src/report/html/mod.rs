@@ -1,8 +1,10 @@
-//! The report as one page that loads nothing: style, behaviour, data and pictures are written into it.
+//! The report as one page that loads nothing: style, behaviour, data and pictures are written into
+//! it.
 //!
-//! The same runs give the same bytes, but for the paragraph with the id `timings`. Start at [`html`].
-//! Rooms: the largest figures and the comparison of runs (`figures`), the arm (`arm`), tables (`tables`), what the plots are made of (`data`).
-//! Not here: what is plotted (`curves`), how the arm is drawn (`picture`), how plots behave (`assets/report.js`).
+//! The same runs give the same bytes, but for the paragraph with the id `timings`. Start at
+//! [`html`]. Rooms: the largest figures and the comparison of runs (`figures`), the arm (`arm`),
+//! tables (`tables`), what the plots are made of (`data`). Not here: what is plotted (`curves`),
+//! how the arm is drawn (`picture`), how plots behave (`assets/report.js`).
 
 mod arm;
 mod data;
@@ -59,7 +61,8 @@ pub fn html(runs: &[ReportRun<'_>]) -> String {
         [run] => super::title(run.summary),
         _ => format!("{} runs: {}", runs.len(), runs.iter().map(|run| run.label).collect::<Vec<_>>().join(", ")),
     };
-    // The banner of the minified file names an address; licence and origin stand in a comment of this page.
+    // The banner of the minified file names an address; licence and origin stand in a comment of
+    // this page.
     let uplot = UPLOT.split_once("*/").map_or(UPLOT, |(_, code)| code);
     let mut page = String::new();
     let _ = write!(
@@ -93,8 +96,8 @@ pub fn html(runs: &[ReportRun<'_>]) -> String {
     page
 }
 
-/// The colours of curves as variables of the style: `--c0` and so on, `--x`, `--y`, `--z`, `--rigid`, dark where the reader
-/// wants it dark; and under `--paper-...` for print.
+/// The colours of curves as variables of the style: `--c0` and so on, `--x`, `--y`, `--z`,
+/// `--rigid`, dark where the reader wants it dark; and under `--paper-...` for print.
 fn colors() -> String {
     let list = |prefix: &str, ground: Ground| {
         let series = (0..palette::SERIES_LENGTH).map(|k| (format!("c{k}"), palette::series(k, ground)));

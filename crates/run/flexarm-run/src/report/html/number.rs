@@ -26,12 +26,14 @@ pub(super) fn fixed(x: f64) -> String {
 /// Sizes below are nothing.
 const SMALLEST: f64 = 1e-300;
 
-/// With more digits the standard library is asked, and also where a number lies so near to the middle of two that rounding of
-/// the scaled one could choose the other (in units of the last digit).
+/// With more digits the standard library is asked, and also where a number lies so near to the
+/// middle of two that rounding of the scaled one could choose the other (in units of the last
+/// digit).
 const MOST_SCALED: usize = 9;
 const NEAR_MIDDLE: f64 = 1e-4;
 
-/// Significant digits of a number above zero as a whole number, and the power of ten of the first of them.
+/// Significant digits of a number above zero as a whole number, and the power of ten of the first
+/// of them.
 fn rounded(x: f64, digits: usize) -> (u64, i32) {
     scaled(x, digits).unwrap_or_else(|| {
         let written = format!("{x:.*e}", digits - 1);
@@ -71,7 +73,8 @@ fn scaled(x: f64, digits: usize) -> Option<(u64, i32)> {
     }
 }
 
-/// Adds the shorter form of a number with so many significant digits, at most fifteen; null if it is none.
+/// Adds the shorter form of a number with so many significant digits, at most fifteen; null if it
+/// is none.
 pub(super) fn push_short(text: &mut String, x: f64, digits: usize) {
     if !x.is_finite() {
         text.push_str("null");

@@ -1,4 +1,5 @@
-//! Tables of the page: the path of the tool, the terms of ISO 9283, stops, links, drives and energies.
+//! Tables of the page: the path of the tool, the terms of ISO 9283, stops, links, drives and
+//! energies.
 
 use std::fmt::Write as _;
 
