@@ -23,12 +23,11 @@ RUNS = {  # robot and file: motion, its kind, sample interval (s)
 }
 ALLOWED = 1e-11
 HEADER = """\
-# robots/{name} on trajectories/{motion}: converged motion with elastic gearboxes, motors
-# prescribed, tau = k (q_motor - q) + d (q_motor' - q') on the joint side, no friction; start in
-# static equilibrium. Tool: Pinocchio {pin} (RNEA, CRBA) with scipy's DOP853 at rtol 1e-12,
-# restarted at the kinks of the motion; Radau at rtol 1e-10 agrees to 1e-13 m. Regenerate:
-# tools/golden_gearboxes.py --write. Units m, rad, s; world axes (z up); rotation = rotation vector
-# of R_flexible R_rigid^T; windup_i = angle of link i minus that of its motor, joint side.
+# robots/{name} on trajectories/{motion}: converged motion with elastic gearboxes, motors prescribed,
+# tau = k (q_motor - q) + d (q_motor' - q') on the joint side, no friction; start in static equilibrium.
+# Tool: Pinocchio {pin} (RNEA, CRBA) with scipy's DOP853 at rtol 1e-12, restarted at the kinks of the motion; Radau at rtol
+# 1e-10 agrees to 1e-13 m. Regenerate: tools/golden_gearboxes.py --write. Units m, rad, s; world axes (z up);
+# rotation = rotation vector of R_flexible R_rigid^T; windup_i = angle of link i minus that of its motor, joint side.
 """
 
 

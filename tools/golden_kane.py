@@ -38,15 +38,12 @@ CASES = {  # Omega (rad/s); length (m), EA, kGA (N), EI (N m2), rA (kg/m), rI (k
 }
 DEGREE, ELEMENTS, RTOL, ALLOWED = 3, 8, 1e-9, 1e-8
 HEADER = """\
-# Spin-up of a cantilever of {length} m ("{name}" of tools/golden_kane.py): EA = {EA:.6g} N, kGA =
-# {kGA:.6g} N, EI = {EI:.6g} N m2, {rA:.6g} kg/m, rotary inertia {rI:.6g} kg m; root turns at
-# {turn:.0f} rad/s after 15 s, psi' = {turn:.0f} (t/15 - sin(2 pi t/15)/(2 pi)). In the axes that
-# turn with the root: tip_u along the undeformed beam, tip_v across (positive in the sense of the
-# turning), tip_angle; linear_tip_v: constant stiffness, no centrifugal stiffening, until it exceeds
-# the length, then nan. Units s, rad/s, m, rad. Tool: own geometrically exact finite elements,
-# {elements} cubic; scipy {scipy}, Radau at rtol {rtol:.0e}. Regenerate: tools/golden_kane.py. Twice
-# the elements: {finer} m; Exudyn 1.13.6, 32 ANCFCable2D, without shear and rotary inertia, whose
-# doing that is: {cable} m.
+# Spin-up of a cantilever of {length} m ("{name}" of tools/golden_kane.py): EA = {EA:.6g} N, kGA = {kGA:.6g} N,
+# EI = {EI:.6g} N m2, {rA:.6g} kg/m, rotary inertia {rI:.6g} kg m; root turns at {turn:.0f} rad/s after 15 s, psi' = {turn:.0f} (t/15 - sin(2 pi t/15)/(2 pi)).
+# In the axes that turn with the root: tip_u along the undeformed beam, tip_v across (positive in the sense of the turning), tip_angle;
+# linear_tip_v: constant stiffness, no centrifugal stiffening, until it exceeds the length, then nan. Units s, rad/s, m, rad.
+# Tool: own geometrically exact finite elements, {elements} cubic; scipy {scipy}, Radau at rtol {rtol:.0e}. Regenerate: tools/golden_kane.py.
+# Twice the elements: {finer} m; Exudyn 1.13.6, 32 ANCFCable2D, without shear and rotary inertia, whose doing that is: {cable} m.
 time,rate,tip_u,tip_v,tip_angle,linear_tip_v
 """
 AGREES = {"kane": ("4.1e-8", "5.1e-5"), "kane_slow": ("8.2e-9", "2.8e-5"), "simo": ("1.3e-8", "5.3e-5")}    # by --check; tip_v, m
@@ -186,8 +183,7 @@ def exudyn_cable(turn, numbers, elements, step, times):
     for a, b in zip(nodes, nodes[1:]):
         system.AddObject(Cable2D(length=h, massPerLength=rA, bendingStiffness=EI, axialStiffness=EA, nodeNumbers=[a, b]))
     ground = system.AddMarker(MarkerNodeCoordinate(nodeNumber=system.AddNode(NodePointGround()), coordinate=0))
-    # the slope at the root is prescribed in direction and length: a stretch of 1e-4 is suppressed
-    # in one point
+    # the slope at the root is prescribed in direction and length: a stretch of 1e-4 is suppressed in one point
     motion = [None, None, lambda mbs, t, number, offset: np.cos(spin(turn, t)[0]) - 1,
               lambda mbs, t, number, offset: np.sin(spin(turn, t)[0])]
     for coordinate, offset in enumerate(motion):

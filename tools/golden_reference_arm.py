@@ -29,12 +29,11 @@ GOLDEN = ROOT / "tests" / "golden" / "reference_arm_mid.csv"
 EVERY_S = 0.004
 ALLOWED = 1e-11
 HEADER = """\
-# Reference arm (robots/reference_arm): converged TCP motion, drives prescribed, elastic joints as x
-# y z rx ry rz with R = Rz Ry Rx and generalised force -(K e + beta K de/dt), start in static
-# equilibrium. Tool: Pinocchio 4.1.0 (RNEA, CRBA) with scipy's DOP853 at rtol 1e-10, restarted at
-# the jumps of the jerk; a Radau run at rtol 1e-9 agrees to 7.3e-13 m. Regenerate:
-# tools/golden_reference_arm.py. Units m, rad, s; world axes; rotation = rotation vector of
-# R_flexible R_rigid^T.
+# Reference arm (robots/reference_arm): converged TCP motion, drives prescribed, elastic joints as x y z rx ry rz with
+# R = Rz Ry Rx and generalised force -(K e + beta K de/dt), start in static equilibrium.
+# Tool: Pinocchio 4.1.0 (RNEA, CRBA) with scipy's DOP853 at rtol 1e-10, restarted at the jumps of the jerk; a Radau run
+# at rtol 1e-9 agrees to 7.3e-13 m. Regenerate: tools/golden_reference_arm.py. Units m, rad, s; world axes;
+# rotation = rotation vector of R_flexible R_rigid^T.
 time,rigid_x,rigid_y,rigid_z,flexible_x,flexible_y,flexible_z,rotation_x,rotation_y,rotation_z
 """
 

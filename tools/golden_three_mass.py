@@ -20,11 +20,10 @@ import numpy as np
 ROOT = Path(__file__).parent.parent
 FOLDER, GOLDEN = ROOT / "robots" / "abb_three_mass", ROOT / "tests" / "golden"
 HEADER = """\
-# robots/abb_three_mass: frequency response, linear, without friction. Tool: numpy {numpy}; script:
-# tools/golden_three_mass.py. Columns, real and imaginary part each: motor_per_torque = q_m''/u and
-# arm_per_torque = q_a''/u, motor free, u its torque (rad/s2 per N m); arm_per_motor = q_a/q_m,
-# motor prescribed (-); arm_compliance = q_a/t_a, motor held, t_a torque on the arm (rad per N m).
-# Frequency in Hz; exp(+i w t).
+# robots/abb_three_mass: frequency response, linear, without friction. Tool: numpy {numpy}; script: tools/golden_three_mass.py.
+# Columns, real and imaginary part each: motor_per_torque = q_m''/u and arm_per_torque = q_a''/u, motor free, u its torque
+# (rad/s2 per N m); arm_per_motor = q_a/q_m, motor prescribed (-); arm_compliance = q_a/t_a, motor held, t_a torque on the
+# arm (rad per N m). Frequency in Hz; exp(+i w t).
 """
 
 

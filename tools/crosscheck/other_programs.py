@@ -82,8 +82,7 @@ def cheapest(run, repeats=REPEATS):
     return *result, best
 
 
-# -------------------------------------------------------------------------------------------
-# Pinocchio
+# ------------------------------------------------------------------------------------------- Pinocchio
 class Hybrid:
     """The arm in Pinocchio, with the elastic coordinates in the order x y z rx ry rz per link."""
 
@@ -188,8 +187,7 @@ class Hybrid:
         return np.array([self.tcp(motion(t)[0], x) for t, x in zip(times, e)])
 
 
-# ----------------------------------------------------------------------------------------------
-# Exudyn
+# ---------------------------------------------------------------------------------------------- Exudyn
 KEEP = []                          # Exudyn does not keep user functions alive
 
 
@@ -323,8 +321,7 @@ def exudyn_frequencies(chain, motion, beta):
     return np.sort(ComputeODE2Eigenvalues(mbs, s, constrainedCoordinates=given, convert2Frequencies=True, ignoreAlgebraicEquations=True)[0])
 
 
-# ----------------------------------------------------------------------------------------------
-# MuJoCo
+# ---------------------------------------------------------------------------------------------- MuJoCo
 class MuJoCo:
     def __init__(self, chain, beta, step, integrator):
         text, tendons, motors, armature = "", "", "", ARMATURE[integrator]
@@ -441,8 +438,7 @@ class MuJoCo:
         return times, self.positions(q), np.abs(np.array(q)[:, self.given] - motion.many(times)[0]).max()
 
 
-# ---------------------------------------------------------------------------------------------
-# flexarm
+# --------------------------------------------------------------------------------------------- flexarm
 class Flexarm:
     def __init__(self, program, folder, beta, angles):
         self.program, self.folder = Path(program).resolve(), folder / angles
@@ -478,8 +474,7 @@ class Flexarm:
         return table["time"], column("rigid"), column("flexible"), cost(round(1 / every)), cost(FEW_HZ)
 
 
-# ------------------------------------------------------------------------------------------ the
-# table
+# ------------------------------------------------------------------------------------------ the table
 def digits(x, n=6):
     if isinstance(x, (list, tuple, np.ndarray)):
         return [digits(y, n) for y in x]
@@ -618,11 +613,9 @@ def compare(name, chain, hybrid, beta, soft, vector):
 
 def write_curve(rows, beta, f1):
     head = f"""\
-# robots/kr210/links.toml on trajectories/pick_and_place.toml: converged motion of the TCP, joints
-# exactly along the motion, start in equilibrium. Unlike robot.toml: damping = {{ stiffness_beta =
-# {beta!r} }} (s; 3 % of the first mode at the start, {f1:.6f} Hz) and angles = "euler-zyx", both
-# links. Pinocchio {pin.__version__} (RNEA, CRBA) with scipy's DOP853 at rtol 1e-12. Regenerate:
-# tools/crosscheck/other_programs.py --write. Units m, s; world axes.
+# robots/kr210/links.toml on trajectories/pick_and_place.toml: converged motion of the TCP, joints exactly along the motion, start in equilibrium.
+# Unlike robot.toml: damping = {{ stiffness_beta = {beta!r} }} (s; 3 % of the first mode at the start, {f1:.6f} Hz) and angles = "euler-zyx", both links.
+# Pinocchio {pin.__version__} (RNEA, CRBA) with scipy's DOP853 at rtol 1e-12. Regenerate: tools/crosscheck/other_programs.py --write. Units m, s; world axes.
 time,rigid_x,rigid_y,rigid_z,flexible_x,flexible_y,flexible_z
 """
     stride = round(CURVE_EVERY_S / EVERY_S)
