@@ -302,6 +302,7 @@ pub(crate) struct InspectArgs {
     /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot
     pub(crate) robot: PathBuf,
     /// Joint values in coordinate order, or name=value pairs (rad or m; 30deg for degrees)
+    /// [default: where the robot's own motion begins, else all zero]
     #[arg(long, value_name = "Q1,Q2,...", allow_hyphen_values = true)]
     pub(crate) at: Option<String>,
     /// Joint velocities, likewise (rad/s, m/s)

@@ -163,7 +163,7 @@ fn shaping(args: &CompensateArgs) -> Result<Option<Shaping>, Failure> {
 pub(crate) fn run(cli: &Cli, args: &CompensateArgs) -> Result<ExitCode, Failure> {
     let robot = Robot::load_with(&shipped::robot(Some(&args.robot))?, &load_options(&args.load)?)?;
     let motion = match (&args.motion, &robot.default_trajectory) {
-        (Some(given), _) => shipped::trajectory(given),
+        (Some(given), _) => shipped::trajectory(given)?,
         (None, Some(own)) => own.clone(),
         (None, None) => return Err(Failure::Usage("the robot has no motion of its own: give one".into())),
     };

@@ -49,7 +49,7 @@ pub(crate) fn run(cli: &Cli, args: &ConvertArgs) -> Result<ExitCode, Failure> {
 
 fn text(summary: &ConvertSummary) -> String {
     let mut out = format!("{} -> {}\n", summary.input, summary.output);
-    let mut table = crate::print::table(&[]);
+    let mut table = crate::print::table::<&str>(&[]);
     table.add_row(["samples", &summary.samples.to_string()]);
     table.add_row(["duration", &format!("{:.3} s", summary.duration_s)]);
     out += &crate::print::lines(&table);

@@ -119,7 +119,7 @@ pub fn shipped_robot(given: &Path) -> Result<PathBuf, flexarm::Error> {
 
 /// The motion of a path, or of a name that is shipped; the path itself if there is none.
 pub fn shipped_motion(given: &Path) -> PathBuf {
-    shipped::trajectory(given)
+    shipped::trajectory_file(given)
 }
 
 /// The robot file of a path, or of a name that is shipped; the path itself if there is none.
@@ -136,7 +136,7 @@ pub fn shipped_tool(given: &Path) -> PathBuf {
 /// Text for people or JSON for programs, without characters that a terminal obeys; a closed pipe is
 /// not an error.
 fn answer(cli: &Cli, json: impl FnOnce() -> String, text: impl FnOnce() -> String) {
-    answer_styled(cli, json, || visible(&text()));
+    answer_styled(cli, json, || print::plain_zeros(&visible(&text())));
 }
 
 /// The same for a text with styles, whose names are [`visible`] already.
@@ -281,7 +281,7 @@ fn run_options(args: &RunArgs, with_twin: bool) -> RunOptions {
 fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<(Variant, FlexibleRobot), Failure> {
     let (robot, as_filed) = Robot::load_modelled(&shipped::robot(args.robot.as_deref())?, &load_options(&args.load)?)?;
     let trajectory = match (&args.trajectory, &robot.default_trajectory) {
-        (Some(given), _) => shipped::trajectory(given),
+        (Some(given), _) => shipped::trajectory(given)?,
         (None, Some(own)) => own.clone(),
         (None, None) => {
             let text = "the robot has no default_trajectory: give a .csv or .toml trajectory after the robot";
@@ -357,8 +357,9 @@ fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool, line: &[OsString]) -> Re
 
 fn inspect(cli: &Cli, args: &InspectArgs) -> Result<ExitCode, Failure> {
     let robot = Robot::load_with(&shipped::robot(Some(&args.robot))?, &load_options(&args.load)?)?;
-    let values = |text: &Option<String>| values::joint_values(text.as_deref(), &robot);
-    let inspection = flexarm::inspect(&robot, values(&args.at)?.as_deref(), values(&args.velocity)?.as_deref())?;
+    let at = values::pose(args.at.as_deref(), &robot)?;
+    let velocity = values::joint_values(args.velocity.as_deref(), &robot)?;
+    let inspection = flexarm::inspect(&robot, at.as_deref(), velocity.as_deref())?;
     if !cli.quiet {
         inspection.warnings.iter().for_each(|text| print::warning(text));
     }
@@ -367,7 +368,7 @@ fn inspect(cli: &Cli, args: &InspectArgs) -> Result<ExitCode, Failure> {
 }
 
 fn check(cli: &Cli, args: &CheckArgs) -> Result<ExitCode, Failure> {
-    let trajectory = args.trajectory.as_deref().map(shipped::trajectory);
+    let trajectory = args.trajectory.as_deref().map(shipped::trajectory).transpose()?;
     let robot = shipped::robot(Some(&args.robot))?;
     let (motion, options) = (args.motion.options(), load_options(&args.load)?);
     let loads = args.loads.as_deref();

@@ -89,11 +89,12 @@ pub(crate) fn cutting_tool(given: &Path, rpm: &[f64]) -> Result<CuttingTool, Fai
 pub(crate) fn run(cli: &Cli, args: &LobesArgs) -> Result<ExitCode, Failure> {
     let robot = Robot::load_with(&shipped::robot(Some(&args.pose.robot))?, &load_options(&args.pose.load)?)?;
     let tool = cutting_tool(&args.tool, &args.rpm)?;
-    let at = values::joint_values(args.pose.at.as_deref(), &robot)?;
+    let at = values::pose(args.pose.at.as_deref(), &robot)?;
     if let Some(words) = &args.cut {
         return follow(cli, args, words, &robot, &tool, at.as_deref());
     }
-    let motion = args.along.as_ref().map(|given| Motion::load(shipped::trajectory(given), &robot)).transpose()?;
+    let motion = args.along.as_deref().map(shipped::trajectory).transpose()?;
+    let motion = motion.map(|path| Motion::load(path, &robot)).transpose()?;
     let place = match &motion {
         Some(motion) => CuttingPlace::Along(motion, args.places),
         None => CuttingPlace::At(at.as_deref()),

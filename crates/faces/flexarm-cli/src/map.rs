@@ -197,7 +197,7 @@ fn joint_range(text: &str, robot: &Robot) -> Result<JointRange, Failure> {
 
 fn region(args: &MapArgs, robot: &Robot) -> Result<MapRegion, Failure> {
     if let Some(motion) = &args.along {
-        let motion = Motion::load_with(shipped::trajectory(motion), robot, &args.input.options())?;
+        let motion = Motion::load_with(shipped::trajectory(motion)?, robot, &args.input.options())?;
         return Ok(MapRegion::Along { motion: Box::new(motion), points: args.points });
     }
     if let Some(file) = &args.poses {
@@ -263,13 +263,13 @@ fn text(map: &Map) -> String {
         ),
         None => format!("{}: {} poses in {:.2} s\n", map.robot, map.poses, map.wall_s),
     };
-    let mut t = table(&["", "unit", "least", "5 %", "median", "95 %", "most", "best pose", "worst pose"]);
+    let mut t = table(&["", "unit", "min", "median", "max", "best", "worst"]);
     for column in map.table.columns.iter().filter(|column| column.quantity) {
         let Some(spread) = map.quantities.get(&column.name) else { continue };
         let unit = readable_quantity(&column.name).1;
-        let at = |part: &str| spread.quantiles.get(part).copied().unwrap_or(f64::NAN);
+        let median = spread.quantiles.get("0.5").copied().unwrap_or(f64::NAN);
         let pose = |pose: &MapPose| pose.quantities.get(&column.name).copied().unwrap_or(f64::NAN);
-        let numbers = [spread.min, at("0.05"), at("0.5"), at("0.95"), spread.max, pose(&map.best), pose(&map.worst)];
+        let numbers = [spread.min, median, spread.max, pose(&map.best), pose(&map.worst)];
         let mut row = vec![column.name.clone(), unit.to_owned()];
         row.extend(numbers.map(|x| quantity_text(&column.name, x)));
         t.add_row(row);

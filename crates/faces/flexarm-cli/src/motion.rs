@@ -75,7 +75,7 @@ pub(crate) fn run(cli: &Cli, args: &MotionArgs) -> Result<ExitCode, Failure> {
         Some(given) => Some(Robot::load_with(&shipped::robot(Some(given))?, &load_options(&args.load)?)?),
         None => None,
     };
-    let motion = shipped::trajectory(&args.motion);
+    let motion = shipped::trajectory(&args.motion)?;
     let options = args.input.options();
     let report = flexarm::motion_report(&motion, robot.as_ref(), &options, &outputs, args.rate, args.force)?;
     crate::print::warnings(cli, &report.warnings);

@@ -12,14 +12,16 @@ use flexarm::{
 use crate::args::Cli;
 use crate::failure::Failure;
 use crate::posed_args::{ModesArgs, PoseArgs, QuantityName, ResponseArgs, SpacingName, StaticsArgs};
-use crate::print::{caveats, lines, table};
+use crate::print::{caveats, filled, lines, table};
 use crate::shipped::OutputFolder;
 use crate::{answer, load_options, shipped, to_json, values};
 
 /// Directions at the TCP.
 const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
-/// Columns that a terminal has room for: peaks of a response.
+/// Peaks of a response in the columns of a terminal.
 const SHOWN_PEAKS: usize = 3;
+/// Modes in the columns of a terminal.
+const MODES_SIDE_BY_SIDE: usize = 8;
 
 fn load(pose: &PoseArgs) -> Result<Robot, Failure> {
     Ok(Robot::load_with(&shipped::robot(Some(&pose.robot))?, &load_options(&pose.load)?)?)
@@ -28,7 +30,7 @@ fn load(pose: &PoseArgs) -> Result<Robot, Failure> {
 pub(crate) fn statics(cli: &Cli, args: &StaticsArgs) -> Result<ExitCode, Failure> {
     let wrench = args.wrench.as_deref().map_or(Ok([0.0; 6]), |text| values::wrench("--wrench", text))?;
     let (robot, modelling) = (load(&args.pose)?, args.pose.modelling.modelling());
-    let at = values::joint_values(args.pose.at.as_deref(), &robot)?;
+    let at = values::pose(args.pose.at.as_deref(), &robot)?;
     let at = at.as_deref();
     let found = match &args.output {
         Some(folder) => {
@@ -47,7 +49,7 @@ pub(crate) fn modes(cli: &Cli, args: &ModesArgs) -> Result<ExitCode, Failure> {
         return Err(Failure::Usage("--count must be at least 1".into()));
     }
     let robot = load(&args.pose)?;
-    let at = values::joint_values(args.pose.at.as_deref(), &robot)?;
+    let at = values::pose(args.pose.at.as_deref(), &robot)?;
     let at = at.as_deref();
     let modelling = args.pose.modelling.modelling();
     let found = match &args.output {
@@ -85,7 +87,7 @@ pub(crate) fn response(cli: &Cli, args: &ResponseArgs) -> Result<ExitCode, Failu
     let found = flexarm::response(
         &robot,
         &args.pose.modelling.modelling(),
-        values::joint_values(args.pose.at.as_deref(), &robot)?.as_deref(),
+        values::pose(args.pose.at.as_deref(), &robot)?.as_deref(),
         &request,
         outputs.as_ref(),
     )?;
@@ -103,9 +105,10 @@ fn right(table: &mut comfy_table::Table, from: usize) {
     }
 }
 
-fn pose_text(joints: &[String], at: &[f64]) -> String {
+/// First lines of an answer at a pose, of at most 80 columns.
+fn pose_text(robot: &str, joints: &[String], at: &[f64], end: &str) -> String {
     let values: Vec<String> = joints.iter().zip(at).map(|(joint, q)| format!("{joint} {q:.4}")).collect();
-    values.join(", ")
+    filled(&format!("{robot} at {}{end}", values.join(", ")), ", ")
 }
 
 fn triple(values: &[f64], scale: f64) -> Vec<String> {
@@ -113,7 +116,7 @@ fn triple(values: &[f64], scale: f64) -> Vec<String> {
 }
 
 fn statics_text(s: &Statics) -> String {
-    let mut out = format!("{} at {}\nTCP on {}, world axes\n", s.robot, pose_text(&s.joints, &s.at), s.tcp);
+    let mut out = pose_text(&s.robot, &s.joints, &s.at, "") + &format!("TCP on {}, world axes\n", s.tcp);
     let mut t = table(&["", "x [mm]", "y [mm]", "z [mm]", "rx [mrad]", "ry [mrad]", "rz [mrad]"]);
     let row = |name: &str, d: &[f64; 3], r: &[f64; 3]| [vec![name.to_owned()], triple(d, 1e3), triple(r, 1e3)].concat();
     t.add_row(row("sag by weight", &s.sag_m, &s.sag_rad));
@@ -134,7 +137,7 @@ fn statics_text(s: &Statics) -> String {
     out += &lines(&t);
     let holding: Vec<String> =
         s.joints.iter().zip(&s.holding_torque).map(|(joint, torque)| format!("{joint} {torque:.2}")).collect();
-    out += &format!("\nholding torques [N m or N]: {}\n", holding.join(", "));
+    out += &format!("\n{}", filled(&format!("holding torques [N m or N]: {}", holding.join(", ")), ", "));
     for (what, path) in [("picture", &s.files.picture), ("figures", &s.files.json)] {
         if let Some(path) = path {
             out += &format!("{what:<7} {path}\n");
@@ -146,36 +149,45 @@ fn statics_text(s: &Statics) -> String {
 fn modes_text(m: &ModeTable) -> String {
     let drives =
         if m.driven.is_empty() { "drives locked".to_owned() } else { format!("under servos: {}", m.driven.join(", ")) };
-    let mut out = format!("{} at {}, {drives}\n", m.robot, pose_text(&m.joints, &m.at));
+    let mut out = pose_text(&m.robot, &m.joints, &m.at, &format!(", {drives}"));
     if m.modes.is_empty() {
         return out + "no modes: nothing is flexible\n";
     }
-    let head = ["mode", "Hz", "damping [%]", "moves the TCP in", "mass there [kg]"].map(str::to_owned);
-    let shares = m.elements.iter().map(|name| format!("{name} [%]"));
-    let compliance = AXES[..3].iter().map(|axis| format!("of C_{axis} [%]"));
-    let head: Vec<String> = head.into_iter().chain(shares).chain(compliance).collect();
-    let mut t = table(&head.iter().map(String::as_str).collect::<Vec<_>>());
-    let percent = |x: f64| format!("{:.1}", 100.0 * x);
+    let mut t = table(&["mode", "f [Hz]", "damping [%]", "TCP direction", "mass there [kg]"]);
     for (k, mode) in m.modes.iter().enumerate() {
-        let mut row = vec![
-            (k + 1).to_string(),
-            // A decay without oscillation has a rate, no frequency.
-            if mode.damping_ratio < 1.0 {
-                format!("{:.3}", mode.frequency_hz)
-            } else {
-                format!("({:.3})", mode.frequency_hz)
-            },
-            if mode.damping_ratio < 1.0 { format!("{:.3}", 100.0 * mode.damping_ratio) } else { "decays".into() },
-            direction(&mode.tcp),
-            // Of the whole translation.
-            mass(mode.tcp[..3].iter().map(|x| x * x).sum()),
-        ];
-        row.extend(mode.strain_energy.iter().map(|x| percent(*x)));
-        row.extend(mode.compliance_share[..3].iter().map(|x| x.map_or_else(|| "-".into(), percent)));
-        t.add_row(row);
+        // A decay without oscillation has a rate, no frequency.
+        let (frequency, damping) = match mode.damping_ratio < 1.0 {
+            true => (format!("{:.3}", mode.frequency_hz), format!("{:.3}", 100.0 * mode.damping_ratio)),
+            false => (format!("({:.3})", mode.frequency_hz), "decays".into()),
+        };
+        // Of the whole translation.
+        let mass = mass(mode.tcp[..3].iter().map(|x| x * x).sum());
+        t.add_row([(k + 1).to_string(), frequency, damping, direction(&mode.tcp), mass]);
     }
     right(&mut t, 1);
     out += &lines(&t);
+    let percent = |x: f64| format!("{:.1}", 100.0 * x);
+    for (block, modes) in m.modes.chunks(MODES_SIDE_BY_SIDE).enumerate() {
+        let first = block * MODES_SIDE_BY_SIDE + 1;
+        let head = |title: &str| {
+            let numbers = (first..first + modes.len()).map(|k| k.to_string());
+            table(&std::iter::once(title.to_owned()).chain(numbers).collect::<Vec<_>>())
+        };
+        let mut t = head("energy in [%]");
+        for (k, name) in m.elements.iter().enumerate() {
+            let shares = modes.iter().map(|mode| percent(mode.strain_energy[k]));
+            t.add_row(std::iter::once(name.clone()).chain(shares));
+        }
+        right(&mut t, 1);
+        out += &format!("\n{}", lines(&t));
+        let mut t = head("share of [%]");
+        for (k, axis) in AXES[..3].iter().enumerate() {
+            let shares = modes.iter().map(|mode| mode.compliance_share[k].map_or_else(|| "-".into(), percent));
+            t.add_row(std::iter::once(format!("compliance {axis}")).chain(shares));
+        }
+        right(&mut t, 1);
+        out += &format!("\n{}", lines(&t));
+    }
     for (format, path) in m.files.recordings.iter() {
         out += &format!("{:<7} {path}\n", format.info().name);
     }
@@ -204,10 +216,10 @@ fn direction(tcp: &[f64; 6]) -> String {
 }
 
 fn response_text(r: &Response) -> String {
-    let mut out = format!("{} at {}, other drives locked\n", r.robot, pose_text(&r.joints, &r.at));
+    let mut out = pose_text(&r.robot, &r.joints, &r.at, ", other drives locked");
     let head = ["from", "to", "unit", "at rest"].into_iter().map(str::to_owned);
     let head: Vec<String> = head.chain((1..=SHOWN_PEAKS).map(|k| format!("peak {k}"))).collect();
-    let mut t = table(&head.iter().map(String::as_str).collect::<Vec<_>>());
+    let mut t = table(&head);
     for c in &r.curves {
         let (unit, factor) = flexarm::readable_unit(&c.unit);
         let number = |x: f64| match factor * x {

@@ -24,7 +24,7 @@ pub(crate) struct PoseArgs {
     /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot
     pub(crate) robot: PathBuf,
     /// Joint values in coordinate order, or name=value pairs (rad or m; 30deg for degrees)
-    /// [default: all zero]
+    /// [default: where the robot's own motion begins, else all zero]
     #[arg(long, value_name = "Q1,Q2,...", allow_hyphen_values = true)]
     pub(crate) at: Option<String>,
     #[command(flatten)]

@@ -56,11 +56,11 @@ impl TextTable {
     }
 }
 
-pub(crate) fn table(header: &[&str]) -> TextTable {
+pub(crate) fn table<C: AsRef<str>>(header: &[C]) -> TextTable {
     let mut table = TextTable { table: Table::new(), shortens: false };
     table.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Dynamic);
     if !header.is_empty() {
-        table.set_header(header);
+        table.set_header(header.iter().map(AsRef::as_ref));
     }
     table
 }
@@ -73,6 +73,42 @@ pub(crate) fn lines(table: &TextTable) -> String {
 
 /// Where names are whole.
 pub(crate) const SHORTENED: &str = "names that end in … are shortened: --json has them whole\n";
+
+/// Text in lines of at most 80 columns, broken after a separator.
+pub(crate) fn filled(text: &str, separator: &str) -> String {
+    let mut out = String::new();
+    let mut width = 0;
+    for part in text.split_inclusive(separator) {
+        let long = part.trim_end().chars().count();
+        if width > 0 && width + long > 80 {
+            out.truncate(out.trim_end().len());
+            out += "\n  ";
+            width = 2;
+        }
+        out += part;
+        width += part.chars().count();
+    }
+    out + "\n"
+}
+
+/// The text with zeros that were rounded from negative numbers written without their sign.
+pub(crate) fn plain_zeros(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    let mut before = ' ';
+    for (k, c) in text.char_indices() {
+        let number = || text[k + 1..].split(|c: char| !c.is_ascii_digit() && c != '.').next().unwrap_or_default();
+        let starts = before.is_whitespace() || "[(,".contains(before);
+        let is_zero = |number: &str| number.contains('.') && number.chars().all(|c| c == '0' || c == '.');
+        // A minus sign becomes a blank where columns are aligned.
+        match c == '-' && starts && is_zero(number()) && !text[k + 1 + number().len()..].starts_with('e') {
+            true if before == ' ' => out.push(' '),
+            true => {}
+            false => out.push(c),
+        }
+        before = c;
+    }
+    out
+}
 
 fn limit(x: Option<f64>) -> String {
     x.map_or_else(|| "-".into(), |x| format!("{x:.4}"))
@@ -96,21 +132,26 @@ fn loop_line(own: &flexarm::LoopInfo) -> String {
 /// What was loaded.
 pub(crate) fn inspection(i: &Inspection) -> String {
     let mut out = format!("{}, {:.2} kg\n", i.robot, i.mass_kg);
-    let mut t = table(&["joint", "type", "lower", "upper", "velocity", "effort", "at", "gravity torque", "bias"]);
+    // Without velocities the bias is the gravity torque.
+    let moves = i.bias.iter().zip(&i.gravity_torque).any(|(bias, gravity)| bias != gravity);
+    let mut head = vec!["joint", "type", "lower", "upper", "velocity", "effort", "at", "gravity"];
+    head.extend(moves.then_some("bias"));
+    let mut t = table(&head);
     for (k, j) in i.joints.iter().enumerate() {
-        t.add_row([
+        let mut row = vec![
             j.name.clone(),
             j.kind.into(),
             limit(j.lower),
             limit(j.upper),
             limit(j.velocity),
-            limit(j.effort),
+            j.effort.map_or_else(|| "-".into(), |effort| format!("{effort:.1}")),
             format!("{:.4}", i.q[k]),
-            format!("{:.3}", i.gravity_torque[k]),
-            format!("{:.3}", i.bias[k]),
-        ]);
+            format!("{:.2}", i.gravity_torque[k]),
+        ];
+        row.extend(moves.then(|| format!("{:.2}", i.bias[k])));
+        t.add_row(row);
     }
-    for k in 2..9 {
+    for k in 2..head.len() {
         if let Some(column) = t.column_mut(k) {
             column.set_cell_alignment(CellAlignment::Right);
         }
@@ -195,13 +236,16 @@ pub(crate) fn findings(findings: &[Finding]) -> String {
             out += &format!("    help: {}\n", message(help));
         }
     }
-    let count = |severity: &str| findings.iter().filter(|f| f.severity == severity).count();
-    out += &format!("{} errors, {} warnings, {} notes\n", count("error"), count("warning"), count("note"));
+    let count = |severity: &str| match findings.iter().filter(|f| f.severity == severity).count() {
+        1 => format!("1 {severity}"),
+        n => format!("{n} {severity}s"),
+    };
+    out += &format!("{}, {}, {}\n", count("error"), count("warning"), count("note"));
     out
 }
 
 fn report_table(report: &ReportTable) -> String {
-    let mut t = table(&[]);
+    let mut t = table::<&str>(&[]);
     if report.header.iter().any(|name| !name.is_empty()) {
         t.set_header(report.header.clone());
     }
@@ -357,4 +401,29 @@ pub(crate) fn caveats(cli: &Cli, caveats: &[Caveat]) {
         }
     }
     warnings(cli, &texts);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{filled, plain_zeros};
+
+    #[test]
+    fn a_number_that_is_rounded_to_zero_has_no_sign() {
+        for (text, expected) in [
+            (" -0.000  -0.001", "  0.000  -0.001"),
+            ("[-0.0000, 0.1]", "[0.0000, 0.1]"),
+            ("-0.0", " 0.0"),
+            ("x-0.0 run-0.00 1e-0.0", "x-0.0 run-0.00 1e-0.0"),
+            ("-0.0e3 -0.05 -0 --out", "-0.0e3 -0.05 -0 --out"),
+        ] {
+            assert_eq!(plain_zeros(text), expected);
+        }
+    }
+
+    #[test]
+    fn lines_have_at_most_80_columns_where_a_separator_allows_it() {
+        let text = filled(&["joint_1 0.1234"; 12].join(", "), ", ");
+        assert!(text.lines().count() > 1 && text.lines().all(|line| line.len() <= 80), "{text}");
+        assert_eq!(text.split_whitespace().count(), 24);
+    }
 }

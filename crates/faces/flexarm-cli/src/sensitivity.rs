@@ -76,7 +76,7 @@ pub(crate) fn run(cli: &Cli, args: &SensitivityArgs) -> Result<ExitCode, Failure
         return Ok(ExitCode::SUCCESS);
     }
     let motion = match (&args.motion, &robot.default_trajectory) {
-        (Some(given), _) => shipped::trajectory(given),
+        (Some(given), _) => shipped::trajectory(given)?,
         (None, Some(own)) => own.clone(),
         (None, None) => return Err(Failure::Usage("the robot has no motion of its own: give one".into())),
     };

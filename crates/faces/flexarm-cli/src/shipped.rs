@@ -53,54 +53,76 @@ pub(crate) fn robot_file(given: &Path) -> PathBuf {
     roots().iter().map(|root| root.join("robots").join(given)).find(|path| path.exists()).unwrap_or(found)
 }
 
-/// A robot by path or name.
+/// A robot by path or name; the default robot without one.
 ///
 /// # Errors
-/// A name that no robot has, with the ones that there are.
+/// [`Error::File`] for a name that no shipped robot has, with the names that there are.
 pub(crate) fn robot(given: Option<&Path>) -> Result<PathBuf, Error> {
     let given = given.unwrap_or(Path::new("kr210"));
     let path = find(given, "robots", &["/robot.toml"]);
-    if path.exists() || given.components().count() != 1 || given.extension().is_some() {
-        return Ok(path);
-    }
-    let folders =
-        roots().into_iter().flat_map(|root| std::fs::read_dir(root.join("robots")).into_iter().flatten().flatten());
-    let whole = folders.filter(|entry| entry.path().join("robot.toml").is_file());
-    let mut names: Vec<String> = whole.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
-    names.sort();
-    names.dedup();
-    let meant = closest(&given.to_string_lossy(), names.iter().map(String::as_str));
-    let meant = meant.map_or_else(String::new, |name| format!("did you mean {name:?}? "));
-    let what = format!(
-        "there is no such file and no shipped robot of this name; {meant}shipped are {}; or give a robot.toml, a folder \
-         with one, or a .urdf or .xacro file",
-        names.join(", ")
-    );
-    Err(Error::File { path, what })
+    let advice = "give a robot.toml, a folder with one, or a .urdf or .xacro file";
+    known(given, path, "robot", advice, || names("robots", |entry| entry.join("robot.toml").is_file()))
 }
 
 /// A trajectory by path or name.
-pub(crate) fn trajectory(given: &Path) -> PathBuf {
+///
+/// # Errors
+/// [`Error::File`] for a name that no shipped trajectory has, with the names that there are.
+pub(crate) fn trajectory(given: &Path) -> Result<PathBuf, Error> {
+    let path = trajectory_file(given);
+    let is_motion = |path: &Path| has_ending(path, &["toml", "csv"]) && !path.to_string_lossy().contains(".loads.");
+    known(given, path, "trajectory", "give a .csv or .toml file, a bag or a robot program", || {
+        names("trajectories", is_motion)
+    })
+}
+
+/// A trajectory by path or name, for files that name trajectories.
+pub(crate) fn trajectory_file(given: &Path) -> PathBuf {
     find(given, "trajectories", &["", ".toml", ".csv"])
 }
 
 /// A cutting tool by path or name.
 ///
 /// # Errors
-/// A name that no tool has, with the ones that there are.
-pub(crate) fn tool(given: &Path) -> Result<PathBuf, Failure> {
+/// [`Error::File`] for a name that no shipped tool has, with the names that there are.
+pub(crate) fn tool(given: &Path) -> Result<PathBuf, Error> {
     let path = find(given, "robots/tools", &[".toml"]);
+    known(given, path, "tool", "give a .toml file", || names("robots/tools", |path| has_ending(path, &["toml"])))
+}
+
+fn has_ending(path: &Path, endings: &[&str]) -> bool {
+    path.extension().is_some_and(|ending| endings.iter().any(|e| ending == *e))
+}
+
+/// Names of the entries of a folder of shipped files.
+fn names(folder: &str, wanted: impl Fn(&Path) -> bool) -> Vec<String> {
+    let entries = |root: PathBuf| std::fs::read_dir(root.join(folder)).into_iter().flatten().flatten();
+    let paths = roots().into_iter().flat_map(entries).map(|entry| entry.path()).filter(|path| wanted(path));
+    let mut names: Vec<String> = paths.filter_map(|p| Some(p.file_stem()?.to_string_lossy().into_owned())).collect();
+    names.sort();
+    names.dedup();
+    names
+}
+
+/// The path, unless it is a bare name that leads to no file.
+fn known(
+    given: &Path,
+    path: PathBuf,
+    kind: &str,
+    advice: &str,
+    names: impl FnOnce() -> Vec<String>,
+) -> Result<PathBuf, Error> {
     if path.exists() || given.components().count() != 1 || given.extension().is_some() {
         return Ok(path);
     }
-    let files = |root: PathBuf| std::fs::read_dir(root.join("robots/tools")).into_iter().flatten().flatten();
-    let tools = roots().into_iter().flat_map(files).map(|entry| entry.path());
-    let tools = tools.filter(|path| path.extension().is_some_and(|ending| ending == "toml"));
-    let mut names: Vec<String> = tools.filter_map(|p| Some(p.file_stem()?.to_string_lossy().into_owned())).collect();
-    names.sort();
-    names.dedup();
-    let what = format!("there is no such file and no shipped tool of this name; shipped are {}", names.join(", "));
-    Err(Error::File { path, what }.into())
+    let names = names();
+    let meant = closest(&given.to_string_lossy(), names.iter().map(String::as_str));
+    let meant = meant.map_or_else(String::new, |name| format!("did you mean {name:?}? "));
+    let what = format!(
+        "there is no such file and no shipped {kind} of this name; {meant}shipped are {}; or {advice}",
+        names.join(", ")
+    );
+    Err(Error::File { path, what })
 }
 
 /// Where a command puts its files: the folder that was asked for, else a new one that no other run

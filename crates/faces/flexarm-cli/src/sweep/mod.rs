@@ -106,7 +106,7 @@ fn parse_shard(text: &str) -> Result<Shard, String> {
 }
 
 /// Shipped robots and motions by their names.
-const FINDERS: Finders = Finders { robot: shipped::robot_file, motion: shipped::trajectory };
+const FINDERS: Finders = Finders { robot: shipped::robot_file, motion: shipped::trajectory_file };
 
 pub(crate) fn run(cli: &Cli, args: &SweepArgs) -> Result<ExitCode, Failure> {
     match (&args.command, &args.run.study) {
