@@ -324,7 +324,8 @@ TCP
   RMS TCP error            1.1000 mm
   peak along the path      1.0000 mm
   peak normal to the path  0.2000 mm    binormal 0.3000 mm
-  path accuracy            0.0000 mm    largest distance from the path in motion
+  path accuracy            0.0000 mm    maximum distance from the path while
+                                        moving
   static sag at the start  0.0000 mm
   error at the end         0.0000 mm
   peak rotation            0.0000 mrad  RMS 0.0000 mrad
@@ -333,14 +334,14 @@ TCP
   dominant frequency        15.72 Hz
 
 links and drives
-  link bar                 1.2000 mm    of TCP motion; strain 4.5e-5, bends by
-                                        0.7000 mrad
+  link bar                 1.2000 mm    maximum TCP motion; strain 4.5e-5, bending
+                                        angle 0.7000 mrad
 
 run
-  steps                      2000       rk4, 1 ms, 0.0 evaluations each
+  steps                      2000       rk4, 1 ms, 0.0 evaluations per step
   simulated                  2.00 s
-  in                         0.00 s     0 times real time
-  processor                   0.0 ms    per simulated second
+  wall time                  0.00 s     0 times real time
+  CPU time                    0.0 ms    per simulated second
 
 TCP error over time, mm
   1.416 ┤⠀⠀⠀⠀⠀⠀⣀⡤⠖⠋⠉⠉⠉⠓⠲⢤⣀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⣀⡤⠖⠚⠉⠉⠉⠓⠲⢤⣀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⣀⡤⠖⠋⠉⠉⠉⠙⠲⢤⣀⠀⠀⠀⠀⠀⠀⠀⠀⠀
@@ -359,7 +360,7 @@ files
     /// How far the tool is off and what bends is read before anything else.
     #[test]
     fn the_first_line_says_what_bends() {
-        let headline = "6.01 mm = 5.02 static + 0.99 in motion (up to 2.85); links 1.41, gearboxes 4.61 (joint_2 most)";
+        let headline = "TCP error 6.01 mm = 5.02 static + 0.99 dynamic (maximum 2.85); links 1.41, gearboxes 4.61";
         let text = plain(&Summary { headline: headline.into(), ..example() }, 120);
         assert!(text.starts_with(&format!("{headline}\narm on swing")), "{text}");
     }
@@ -411,7 +412,7 @@ runs
   peak [mm]         1.4159       1.4159
   at [s]             0.600        0.600
   static [mm]            -            -
-  in motion [mm]         -            -
+  dynamic [mm]           -            -
   RMS [mm]          1.1000       1.1000
 ";
         assert!(text.contains(expected), "{text}");

@@ -32,7 +32,7 @@ def test_runs_and_responses_are_drawn(run: flexarm.Run, arm: flexarm.Arm, tmp_pa
     matplotlib = pytest.importorskip("matplotlib")
     matplotlib.use("Agg")
     ax = run.plot()
-    assert [line.get_label() for line in ax.lines] == ["TCP error", "standing still", "in motion"]
+    assert [line.get_label() for line in ax.lines] == ["TCP error", "static", "dynamic"]
     assert ax.lines[0].get_ydata().max() == pytest.approx(1e3 * run.summary["tcp"]["peak_m"], rel=1e-3)
     again = run.plot(ax, parts=False)
     assert again is ax and len(ax.lines) == 4

@@ -100,7 +100,7 @@ fn a_robot_with_nothing_that_bends_says_so_first_and_how_to_give_it_something() 
     let folder = root().join("robots/kr210");
     let bare = Robot::load_with(&folder.join("kr210.urdf"), &LoadOptions::default()).unwrap();
     let (summary, _) = run(&bare, "point_to_point.toml", &RunOptions::default());
-    assert!(summary.bends.is_nothing() && summary.headline.starts_with("nothing bends"), "{}", summary.headline);
+    assert!(summary.bends.is_nothing() && summary.headline.starts_with("nothing is flexible"), "{}", summary.headline);
     for word in ["[[flexible_link]]", "[[drive]]", "gearbox", "robot file"] {
         assert!(summary.headline.contains(word), "{word}: {}", summary.headline);
     }
@@ -108,11 +108,11 @@ fn a_robot_with_nothing_that_bends_says_so_first_and_how_to_give_it_something() 
     let modelling = Modelling { links: LinkModel::Rigid, drives: DriveModel::Rigid, ..Modelling::default() };
     let (summary, _) = run(&load("kr210"), "point_to_point.toml", &RunOptions { modelling, ..RunOptions::default() });
     let line = &summary.headline;
-    assert!(line.starts_with("nothing bends") && line.contains("as chosen") && !line.contains("[["), "{line}");
+    assert!(line.starts_with("nothing is flexible") && line.contains("as chosen") && !line.contains("[["), "{line}");
     // Without the rigid twin there is nothing to compare with; what bends is said all the same.
     let options = RunOptions { with_twin: false, ..RunOptions::default() };
     let (summary, _) = run(&load("kr210/links.toml"), "point_to_point.toml", &options);
-    assert_eq!(summary.headline, "what bends: links link_2, link_3; not compared with the rigid robot");
+    assert_eq!(summary.headline, "flexible: links link_2, link_3; not compared with the rigid robot");
 }
 
 /// Truth: the stops of the same run. Two of its three last half a second, in which the arm on its
@@ -150,7 +150,7 @@ fn a_study_has_both_parts_and_the_word_of_each_run() {
     let column = |name: &str| rows[0].iter().position(|head| head == name).unwrap_or_else(|| panic!("{:?}", rows[0]));
     let tcp = summary.with[0].tcp.as_ref().unwrap();
     assert_eq!(rows[2][column("static [mm]")], format!("{:.4}", 1e3 * tcp.static_at_peak_m.unwrap()));
-    assert_eq!(rows[2][column("in motion [mm]")], format!("{:.4}", 1e3 * tcp.dynamic_peak_m.unwrap()));
+    assert_eq!(rows[2][column("dynamic [mm]")], format!("{:.4}", 1e3 * tcp.dynamic_peak_m.unwrap()));
     assert_eq!(rows[1][column("settling [s]")], "not settled");
     let page = flexarm::markdown(&summary);
     assert!(page.contains(&format!("* castings: {}", summary.with[0].headline)), "{page}");

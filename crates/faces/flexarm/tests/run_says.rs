@@ -74,7 +74,7 @@ fn check(name: &str, summary: &Summary) {
     let groups = figure_groups(summary);
     let rows = groups.iter().flat_map(|group| &group.rows);
     let shares =
-        rows.filter(|row| row.note.starts_with("of the peak") && row.unit == "mm" && !row.name.contains("static"));
+        rows.filter(|row| row.note.starts_with("at the peak") && row.unit == "mm" && !row.name.contains("static"));
     let printed: f64 = shares.map(|row| row.value.parse::<f64>().unwrap()).sum();
     let peak = (1e7 * tcp.peak_m).round() * 1e-4;
     assert!((printed - peak).abs() < 1e-6, "{name}: printed {printed} of {peak} mm");

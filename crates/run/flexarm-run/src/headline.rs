@@ -56,13 +56,13 @@ pub(crate) fn headline(summary: &Summary, by_choice: bool) -> String {
     let why_nothing = why_nothing(by_choice);
     let nothing = summary.bends.is_nothing();
     match (&summary.tcp, nothing) {
-        (None, true) => format!("nothing bends: {why_nothing}"),
+        (None, true) => format!("nothing is flexible: {why_nothing}"),
         (None, false) => format!("{}; not compared with the rigid robot", what_bends(&summary.bends)),
         (Some(tcp), true) if tcp.peak_m < NOTHING_M => {
-            format!("nothing bends, so the tool is where the rigid robot has it: {why_nothing}")
+            format!("nothing is flexible, so the TCP is where the rigid model has it: {why_nothing}")
         }
         (Some(tcp), _) => {
-            let nothing = if nothing { format!("; nothing bends: {why_nothing}") } else { String::new() };
+            let nothing = if nothing { format!("; nothing is flexible: {why_nothing}") } else { String::new() };
             let path = summary.path.as_ref().map_or_else(String::new, across);
             format!("{path}{}; {}{nothing}", parts(tcp), shares(tcp))
         }
@@ -74,7 +74,7 @@ fn why_nothing(by_choice: bool) -> &'static str {
     match by_choice {
         true => "links and drives are rigid as chosen for this run",
         false => {
-            "the robot has no flexible link and no gearbox that yields. Give it a robot file with urdf = \"...\" and a \
+            "the robot has no flexible link and no elastic gearbox. Give it a robot file with urdf = \"...\" and a \
              [[flexible_link]] (reduced = \"...\" or beam = { ... }), or a [[drive]] with gearbox = { stiffness = ... }"
         }
     }
@@ -89,10 +89,10 @@ fn what_bends(bends: &Bending) -> String {
     let kinds = [
         list("link", "links", &bends.links),
         list("the gearbox of", "the gearboxes of", &bends.gearboxes),
-        list("what it stands on,", "", bends.mounting.as_slice()),
+        list("mounting", "", bends.mounting.as_slice()),
     ];
     let kinds: Vec<String> = kinds.into_iter().flatten().collect();
-    format!("what bends: {}", kinds.join("; "))
+    format!("flexible: {}", kinds.join("; "))
 }
 
 /// Digits behind the point with which a length shows three figures.
@@ -128,9 +128,9 @@ fn parts(tcp: &TcpFigures) -> String {
         (Some(at_rest), Some(moving), Some(most)) => {
             let parts = rounded(&[1e3 * at_rest, 1e3 * moving], 1e3 * tcp.peak_m, digits);
             let (sign, moving) = parts[1].strip_prefix('-').map_or(('+', parts[1].as_str()), |size| ('-', size));
-            format!("{peak} = {} static {sign} {moving} in motion (up to {})", parts[0], mm(most))
+            format!("TCP error {peak} = {} static {sign} {moving} dynamic (maximum {})", parts[0], mm(most))
         }
-        _ => format!("{peak} (static part not known: the arm has no equilibrium somewhere on its way)"),
+        _ => format!("TCP error {peak} (static part unknown: the arm has no equilibrium at some pose of the motion)"),
     }
 }
 
@@ -139,7 +139,7 @@ fn across(path: &PathFigures) -> String {
     let digits = digits(1e3 * path.across_peak_m);
     let mm = |x: f64| format!("{:.digits$}", 1e3 * x);
     let (peak, left) = (mm(path.across_peak_m), mm(path.left_m));
-    format!("{peak} mm across the path, {left} with the workpiece set where the tool is; ")
+    format!("{peak} mm across the path, {left} with the workpiece shifted to fit; ")
 }
 
 /// Kinds of shares with their words, in the order in which they are told.
@@ -147,8 +147,8 @@ const GROUPS: [(&str, &str); 5] = [
     (LINK, "links"),
     (GEARBOX, "gearboxes"),
     (MOUNTING, "mounting"),
-    (SERVO, "following error of the servos"),
-    (STEPPER, "joints that drift apart, as the step is long"),
+    (SERVO, "servo following error"),
+    (STEPPER, "constraint drift of the step"),
 ];
 
 fn shares(tcp: &TcpFigures) -> String {
@@ -166,7 +166,7 @@ fn shares(tcp: &TcpFigures) -> String {
         let most = most.filter(|most| most.kind == *kind && [LINK, GEARBOX].contains(kind));
         let most = most.map_or_else(String::new, |most| match shares.len() {
             1 => format!(" ({})", most.name),
-            _ => format!(" ({} most)", most.name),
+            _ => format!(" (largest: {})", most.name),
         });
         format!("{word} {sum}{most}")
     });

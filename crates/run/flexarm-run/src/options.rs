@@ -59,7 +59,7 @@ impl DriveModel {
     /// What can be asked for: the word of command line and recordings, and what it means.
     pub const WORDS: [(&'static str, Self, &'static str); 3] = [
         ("rigid", Self::Rigid, "Every joint exactly along the trajectory, no springs"),
-        ("elastic", Self::Elastic, "Gearboxes give way, motors exactly along the trajectory"),
+        ("elastic", Self::Elastic, "Elastic gearboxes, motors exactly on the trajectory"),
         ("servo", Self::Servo, "Motors by torque under servos"),
     ];
 

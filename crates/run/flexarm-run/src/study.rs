@@ -248,7 +248,7 @@ pub fn study_rows(summary: &Summary) -> Vec<Vec<String>> {
         "peak [mm]",
         "at [s]",
         "static [mm]",
-        "in motion [mm]",
+        "dynamic [mm]",
         "RMS [mm]",
         "sag [mm]",
         "end [mm]",
@@ -287,9 +287,9 @@ pub fn study_rows(summary: &Summary) -> Vec<Vec<String>> {
 }
 
 /// What the columns of [`study_rows`] mean that do not say it themselves.
-pub const STUDY_NOTE: &str = "static: part of the peak that the arm has standing still there; in motion: largest part that its motion adds; \
-     settling: at the stop that takes longest; apart: largest distance of the flexible TCP from that of the first run at the same time, and that over the \
-     first run's largest TCP error; neither is told between different robots";
+pub const STUDY_NOTE: &str = "static: static deflection at the pose of the peak; dynamic: maximum of the rest; settling: at the stop that takes \
+     longest; apart: maximum distance of the flexible TCP from that of the first run at the same time, also over the \
+     first run's peak TCP error; not given between different robots";
 
 #[cfg(feature = "rerun")]
 fn study_markdown(summary: &Summary) -> String {

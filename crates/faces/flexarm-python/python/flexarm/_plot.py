@@ -23,9 +23,9 @@ def run(run: Any, ax: Any, parts: bool) -> Any:
     ax.plot(run.time, 1e3 * np.linalg.norm(e, axis=1), label="TCP error", color="#b3261e", linewidth=1.4)
     if parts:
         static = run.error_static
-        ax.plot(run.time, 1e3 * np.linalg.norm(static, axis=1), label="standing still", color="#1f5fa8", linewidth=1.0)
+        ax.plot(run.time, 1e3 * np.linalg.norm(static, axis=1), label="static", color="#1f5fa8", linewidth=1.0)
         motion = np.linalg.norm(e - static, axis=1)
-        ax.plot(run.time, 1e3 * motion, label="in motion", color="#7a7a7a", linewidth=0.8)
+        ax.plot(run.time, 1e3 * motion, label="dynamic", color="#7a7a7a", linewidth=0.8)
         ax.legend(frameon=False)
     ax.set(xlabel="time (s)", ylabel="distance (mm)", title=f"{run.summary['robot']}: {run.summary['trajectory']}")
     ax.margins(x=0)

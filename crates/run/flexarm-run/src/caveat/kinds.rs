@@ -7,7 +7,7 @@ pub(crate) use super::kinds_of_use::*;
 /// Far end of a flexible link turned beyond small rotations.
 pub(crate) const LARGE_DEFORMATION: CaveatKind = CaveatKind::warning(
     "large-deformation",
-    "{where} bends by {value} rad, beyond the {yardstick} rad for which the linear elastic model is good",
+    "{where} deflects by {value} rad; the linear elastic model holds up to {yardstick} rad",
     "rad",
     "the model is linear elastic: check stiffness, loads and units",
 );
@@ -59,7 +59,7 @@ pub(crate) const COARSE_STEP: CaveatKind = CaveatKind::warning(
 /// Joints that drift apart in maximal coordinates.
 pub(crate) const JOINT_DRIFT: CaveatKind = CaveatKind::warning(
     "joint-drift",
-    "joints drift apart in {where}: {value} % of the largest TCP error is theirs and no deflection: lower {step_s}",
+    "constraint drift in {where}: {value} % of the peak TCP error is drift of the joints and no deflection: lower {step_s}",
     "%",
     "the drift falls with the square of the step",
 );
@@ -162,7 +162,7 @@ pub(crate) const DENSITY: CaveatKind = CaveatKind::warning(
 /// Springs under the base, along.
 pub(crate) const MOUNTING_SINK: CaveatKind = CaveatKind::warning(
     "mounting-soft",
-    "{where} gives way by {value} m under the weight of the robot, a pedestal by less than {yardstick} m",
+    "{where} deflects by {value} m under the weight of the robot, a pedestal by less than {yardstick} m",
     "m",
     "stiffness is in N/m along and N m/rad about the axes",
 );

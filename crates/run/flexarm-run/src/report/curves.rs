@@ -177,7 +177,7 @@ fn error(trace: &Trace) -> Plot {
     if trace.header.has_static {
         views[0].name = "error".into();
         views.push(static_and_dynamic(trace));
-        note += " Static: the error if the arm stood still where it is; in motion: the rest.";
+        note += " Static: deflection of the arm at rest in the same pose; dynamic: the rest.";
     }
     Plot {
         y_label: "TCP error",
@@ -194,10 +194,10 @@ fn static_and_dynamic(trace: &Trace) -> PlotView {
     let curves = vec![
         curve(trace, "size", Kind::Total, 1e3, CurveQuantity::ErrorSize),
         curve(trace, "static", Kind::Plain, 1e3, CurveQuantity::StaticSize),
-        curve(trace, "in motion", Kind::Plain, 1e3, CurveQuantity::MovingSize),
+        curve(trace, "dynamic", Kind::Plain, 1e3, CurveQuantity::MovingSize),
     ];
     let table = Table::new(trace.curve_times(), curves, MOST_POINTS);
-    PlotView { name: "static and in motion".into(), tables: vec![table], ..PlotView::default() }
+    PlotView { name: "static and dynamic".into(), tables: vec![table], ..PlotView::default() }
 }
 
 fn rotation(trace: &Trace) -> Plot {

@@ -185,23 +185,28 @@ fn tool_figures(summary: &Summary) -> Vec<Figure> {
         (tcp.static_at_peak_m, tcp.dynamic_at_peak_m, tcp.dynamic_peak_m, tcp.t_dynamic_peak_s)
     {
         let parts = rounded(&[1e3 * at_rest, 1e3 * moving], 1e3 * tcp.peak_m, MM_DIGITS);
-        let note = "what it would be standing still there";
+        let note = "static deflection at the same pose";
         rows.push(Figure::new("static part of the peak", parts[0].clone(), "mm", note));
-        let note = format!("up to {} mm at {t:.3} s", mm(most));
-        rows.push(Figure::new("part of the peak in motion", parts[1].clone(), "mm", note));
+        let note = format!("maximum {} mm at {t:.3} s", mm(most));
+        rows.push(Figure::new("dynamic part of the peak", parts[1].clone(), "mm", note));
     }
     rows.push(Figure::new("RMS TCP error", mm(tcp.rms_m), "mm", ""));
     let [along, normal, binormal] = tcp.path_peak_m;
     rows.push(Figure::new("peak along the path", mm(along), "mm", ""));
     let across = format!("binormal {} mm", mm(binormal));
     rows.push(Figure::new("peak normal to the path", mm(normal), "mm", across));
-    rows.push(Figure::new("path accuracy", mm(tcp.path_accuracy_m), "mm", "largest distance from the path in motion"));
+    rows.push(Figure::new(
+        "path accuracy",
+        mm(tcp.path_accuracy_m),
+        "mm",
+        "maximum distance from the path while moving",
+    ));
     if let Some(path) = &summary.path {
-        let note = format!("at {:.3} s, on moves of the tool; RMS {} mm", path.t_across_peak_s, mm(path.across_rms_m));
-        rows.push(Figure::new("across the path", mm(path.across_peak_m), "mm", note));
+        let note = format!("maximum, at {:.3} s; RMS {} mm", path.t_across_peak_s, mm(path.across_rms_m));
+        rows.push(Figure::new("error across the path", mm(path.across_peak_m), "mm", note));
         let [x, y, z] = path.offset_m.map(mm);
-        let note = format!("with the workpiece moved by ({x}, {y}, {z}) mm, where the tool is");
-        rows.push(Figure::new("left of it at most", mm(path.left_m), "mm", note));
+        let note = format!("maximum, with the workpiece shifted by ({x}, {y}, {z}) mm");
+        rows.push(Figure::new("across, work shifted", mm(path.left_m), "mm", note));
         rows.push(Figure::new("corner overshoot", mm(path.corner_overshoot_m), "mm", "beyond the static deflection"));
     }
     rows.push(Figure::new("static sag at the start", mm(tcp.static_sag_m), "mm", ""));
@@ -209,7 +214,7 @@ fn tool_figures(summary: &Summary) -> Vec<Figure> {
     let rms = format!("RMS {} mrad", mm(tcp.rms_rad));
     rows.push(Figure::new("peak rotation", mm(tcp.peak_rad), "mrad", rms));
     if let Some(worst) = tcp.poses.iter().max_by(|a, b| a.repeatability_m.total_cmp(&b.repeatability_m)) {
-        let note = format!("after ISO 9283, of {} poses with several stops the worst", tcp.poses.len());
+        let note = format!("ISO 9283, worst of {} poses with several stops", tcp.poses.len());
         rows.push(Figure::new("pose repeatability", mm(worst.repeatability_m), "mm", note));
     }
     rows.push(Figure::new("overshoot after a move", mm(tcp.overshoot_m), "mm", ""));
@@ -234,41 +239,41 @@ fn part_figures(summary: &Summary) -> Vec<Figure> {
         let (name, turns) = match share.part {
             Part::Link(link) => {
                 let (strain, turn) = (link.engineering_strain, mm(link.peak_rotation_rad));
-                (format!("link {}", share.name), format!("; strain {strain:.1e}, bends by {turn} mrad"))
+                (format!("link {}", share.name), format!("; strain {strain:.1e}, bending angle {turn} mrad"))
             }
             Part::Drive(drive) => {
-                let turns = format!("; gives way by {} mrad", mm(drive.peak_deflection_rad));
+                let turns = format!("; deflection {} mrad", mm(drive.peak_deflection_rad));
                 (format!("drive {}", share.name), turns)
             }
-            Part::None if share.kind == headline::STEPPER => ("joints drifting apart".to_owned(), String::new()),
+            Part::None if share.kind == headline::STEPPER => ("constraint drift".to_owned(), String::new()),
             Part::None => (share.name.to_owned(), String::new()),
         };
         let largest = share.largest_m.map(mm).unwrap_or_default();
         rows.push(match number {
             Some(at_peak) if share.largest_m.is_some() => {
-                Figure::new(name, at_peak, "mm", format!("of the peak; at most {largest} mm{turns}"))
+                Figure::new(name, at_peak, "mm", format!("at the peak; maximum {largest} mm{turns}"))
             }
-            Some(at_peak) => Figure::new(name, at_peak, "mm", "of the peak"),
-            None => Figure::new(name, largest, "mm", format!("of TCP motion{turns}")),
+            Some(at_peak) => Figure::new(name, at_peak, "mm", "at the peak"),
+            None => Figure::new(name, largest, "mm", format!("maximum TCP motion{turns}")),
         });
     }
     if let Some(first) = summary.frequencies_hz.first() {
         let others: Vec<String> = summary.frequencies_hz.iter().skip(1).take(3).map(|f| format!("{f:.2}")).collect();
-        let note = if others.is_empty() { String::new() } else { format!("then {} Hz", others.join(", ")) };
+        let note = if others.is_empty() { String::new() } else { format!("next {} Hz", others.join(", ")) };
         rows.push(Figure::new("first frequency", format!("{first:.2}"), "Hz", note));
     }
     let e = &summary.energy;
     if e.drives_j != 0.0 || e.loads_j != 0.0 {
         let (put_in, taken_out) = (e.drives_positive_j, e.drives_negative_j);
-        let mut note = format!("they put in {put_in:.3} J and took out {taken_out:.3} J; ");
+        let mut note = format!("positive {put_in:.3} J, negative {taken_out:.3} J; ");
         if e.loads_j != 0.0 {
-            let _ = write!(note, "by loads {:.3} J, ", e.loads_j);
+            let _ = write!(note, "work of loads {:.3} J, ", e.loads_j);
         }
         if e.payload_j != 0.0 {
-            let _ = write!(note, "with payloads {:.3} J, ", e.payload_j);
+            let _ = write!(note, "energy of payloads {:.3} J, ", e.payload_j);
         }
         let (dissipated, stored) = (e.dissipated_j, e.stored_j);
-        let _ = write!(note, "dissipated {dissipated:.3} J, stored {stored:.3} J; open by {:.1e}", e.imbalance);
+        let _ = write!(note, "dissipated {dissipated:.3} J, stored {stored:.3} J; imbalance {:.1e}", e.imbalance);
         rows.push(Figure::new("net work of the drives", format!("{:.3}", e.drives_j), "J", note));
     }
     rows
@@ -277,12 +282,12 @@ fn part_figures(summary: &Summary) -> Vec<Figure> {
 fn run_figures(summary: &Summary) -> Vec<Figure> {
     let s = &summary.stepper;
     let evaluations = s.evaluations as f64 / s.steps.max(1) as f64;
-    let work = format!("{}, {} ms, {evaluations:.1} evaluations each", s.name, 1e3 * s.h_s);
+    let work = format!("{}, {} ms, {evaluations:.1} evaluations per step", s.name, 1e3 * s.h_s);
     let (wall, factor) = (summary.wall_s, summary.real_time_factor);
     vec![
         Figure::new("steps", s.steps.to_string(), "", work),
         Figure::new("simulated", format!("{:.2}", summary.duration_s), "s", ""),
-        Figure::new("in", format!("{wall:.2}"), "s", format!("{factor:.0} times real time")),
-        Figure::new("processor", format!("{:.1}", 1e3 * summary.cpu_s_per_simulated_s), "ms", "per simulated second"),
+        Figure::new("wall time", format!("{wall:.2}"), "s", format!("{factor:.0} times real time")),
+        Figure::new("CPU time", format!("{:.1}", 1e3 * summary.cpu_s_per_simulated_s), "ms", "per simulated second"),
     ]
 }

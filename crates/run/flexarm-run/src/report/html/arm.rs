@@ -28,7 +28,7 @@ pub(super) fn arm_pictures(runs: &[ReportRun<'_>]) -> String {
         let none = if run.trace.peak.flexible.X_WL.is_empty() {
             Some("the recording has no poses of links, so there is no picture of the arm")
         } else if lies_on_twin(run) {
-            Some("nothing gives way: the arm lies on its rigid twin, so there is no picture of it")
+            Some("nothing is flexible: the arm coincides with its rigid twin, so there is no picture of it")
         } else {
             None
         };

@@ -38,14 +38,14 @@ pub(super) fn tiles(run: &ReportRun<'_>) -> String {
     };
     if let Some(tcp) = &s.tcp {
         let mm = |x: f64| fixed(1e3 * x);
-        let when = if lies_on_twin(run) { "nothing gives way".into() } else { format!("at {:.3} s", tcp.t_peak_s) };
+        let when = if lies_on_twin(run) { "nothing is flexible".into() } else { format!("at {:.3} s", tcp.t_peak_s) };
         tile("Peak TCP error", mm(tcp.peak_m), "mm", when);
         tile("RMS TCP error", mm(tcp.rms_m), "mm", "over the whole run".into());
         if let (Some(at_rest), Some(moving), Some(most)) =
             (tcp.static_at_peak_m, tcp.dynamic_at_peak_m, tcp.dynamic_peak_m)
         {
-            tile("Static part", mm(at_rest), "mm", "of the peak: standing still there".into());
-            tile("Part in motion", mm(moving), "mm", format!("of the peak; up to {} mm", mm(most)));
+            tile("Static part", mm(at_rest), "mm", "of the peak: static deflection there".into());
+            tile("Dynamic part", mm(moving), "mm", format!("of the peak; maximum {} mm", mm(most)));
         }
         tile("Static sag", mm(tcp.static_sag_m), "mm", "at rest at the start".into());
         if s.knows_moves() {
@@ -66,10 +66,10 @@ pub(super) fn tiles(run: &ReportRun<'_>) -> String {
             tile("First natural frequency", fixed(*hz), "Hz", "at the start pose, motors held".into());
         }
         if let Some((joint, peak)) = s.drives.iter().max_by(|a, b| a.1.total_cmp(b.1)) {
-            tile("Largest force of a drive", fixed(*peak), "N m", format!("{joint} (N if it slides)"));
+            tile("Maximum drive force", fixed(*peak), "N m", format!("{joint} (N if it slides)"));
         }
         if !s.computed {
-            let open = format!("balance open by {:.1e}", s.energy.imbalance);
+            let open = format!("imbalance {:.1e}", s.energy.imbalance);
             let gross = format!("{} by the drives, {open}", gross(&s.energy));
             tile("Net work of the drives", fixed(s.energy.drives_j), "J", gross);
         }
@@ -97,8 +97,8 @@ const RELATIVE: [&str; 3] = ["mm", "mrad", "Hz"];
 const COMPARED: [Compared; 18] = [
     ("peak TCP error", "mm", |s| s.tcp.as_ref().map(|t| 1e3 * t.peak_m)),
     ("static part of the peak", "mm", |s| Some(1e3 * s.tcp.as_ref()?.static_at_peak_m?)),
-    ("part of the peak in motion", "mm", |s| Some(1e3 * s.tcp.as_ref()?.dynamic_at_peak_m?)),
-    ("largest part in motion", "mm", |s| Some(1e3 * s.tcp.as_ref()?.dynamic_peak_m?)),
+    ("dynamic part of the peak", "mm", |s| Some(1e3 * s.tcp.as_ref()?.dynamic_at_peak_m?)),
+    ("maximum dynamic part", "mm", |s| Some(1e3 * s.tcp.as_ref()?.dynamic_peak_m?)),
     ("time of the peak", "s", |s| s.tcp.as_ref().map(|t| t.t_peak_s)),
     ("RMS TCP error", "mm", |s| s.tcp.as_ref().map(|t| 1e3 * t.rms_m)),
     (APART, "mm", |s| s.difference.as_ref().map(|d| 1e3 * d.peak_m)),

@@ -79,7 +79,7 @@ pub(super) const STABILISATION: &str = "Position stabilisation time";
 const ISO: [Iso; 8] = [
     (
         "Path accuracy (AT)",
-        "largest distance of the flexible tool from the rigid tool across the path, while moving",
+        "maximum distance of the flexible from the rigid TCP across the path while moving",
         "mm",
         |s| moving(s).map(|t| 1e3 * t.path_accuracy_m),
     ),
