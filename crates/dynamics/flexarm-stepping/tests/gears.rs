@@ -101,8 +101,9 @@ fn ripple(cycles: f64, amplitude: f64) -> Vec<TransmissionError> {
     vec![TransmissionError { element: 0, motor: 0, harmonics }]
 }
 
-/// Truth: without load the gear stands where its error is, with a torque T it gives way by T/k
-/// besides; the same in an operating point, a linear structure and along a path.
+/// Truth: without load the gear is off by its error, with a torque T by T/k more; the same in an
+/// operating point, a linear structure and along a path. The motor holds the torque by virtual
+/// work, `-T (1 + dε/dq)` with the error ε of the gear.
 #[test]
 fn at_rest_the_joint_is_off_by_the_error_of_its_gear() {
     let torque = 12.0;
@@ -125,6 +126,10 @@ fn at_rest_the_joint_is_off_by_the_error_of_its_gear() {
             assert!((found - truth).abs() < 1e-14, "{found} {truth}");
         }
         assert!((turned - truth).abs() < 1e-12, "{turned} {truth}");
+        let slope = 4e-3 * (100.0 * q + 0.4).cos() + 4e-3 * (200.0 * q - 1.0).cos();
+        for held in [linear.holding[0], point.holding_efforts()[0]] {
+            assert!((held + torque * (1.0 + slope)).abs() < 1e-10, "{held} {slope}"); // measured MEASURED
+        }
         assert!((linear.compliance().unwrap()[(5, 5)] * K - 1.0).abs() < 1e-12);
     }
 }

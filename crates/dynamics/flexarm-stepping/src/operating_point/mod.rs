@@ -52,6 +52,8 @@ pub struct OperatingPoint {
     F_T_W: Wrench,
     /// Static forces, all coordinates: where the joints' part stays.
     p: DVector<f64>,
+    /// Efforts of the joints that hold the equilibrium.
+    holding: DVector<f64>,
     slopes: StaticSlopes,
     /// Unbalanced forces, and Newton's step.
     r: DVector<f64>,
@@ -93,6 +95,7 @@ impl OperatingPoint {
             q: DVector::zeros(nv),
             F_T_W: Wrench::zeros(),
             p: DVector::zeros(nv),
+            holding: DVector::zeros(arm.model.n_actuated()),
             slopes: StaticSlopes::new(&arm, arm.model.n_actuated()),
             r: DVector::zeros(n),
             dp_de: DMatrix::zeros(n, n),
@@ -157,6 +160,10 @@ impl OperatingPoint {
         self.refactor(true)?;
         self.X_WT = self.data.X_WF(&self.tool);
         frame_jacobian(&self.arm.model, &self.data, &self.tool, &mut self.J);
+        self.holding.copy_from(&self.p.rows(0, m));
+        // The springs carry the static forces.
+        self.r.zip_apply(&self.p.rows(m, self.r.len()), |carried, p| *carried = -p);
+        self.arm.add_motor_forces(self.q.as_slice(), self.r.as_slice(), self.holding.as_mut_slice());
         self.residual = residual;
         Ok(())
     }
@@ -309,7 +316,7 @@ impl OperatingPoint {
 
     /// Forces with which the drives hold the pose (N m or N), in coordinate order.
     pub fn holding_efforts(&self) -> &[f64] {
-        &self.p.as_slice()[..self.arm.model.n_actuated()]
+        self.holding.as_slice()
     }
 
     /// Forces on the elastic coordinates that weight, loads and the wrench would need at this
