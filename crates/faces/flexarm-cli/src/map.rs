@@ -258,11 +258,12 @@ pub(crate) fn run(cli: &Cli, args: &MapArgs) -> Result<ExitCode, Failure> {
 fn text(map: &Map) -> String {
     let mut out = match &map.grid {
         Some(grid) => format!(
-            "{}: {} of {} places within reach, {} m apart, {} directions of the tool; {} poses in {:.2} s\n",
+            "{}: {} of {} places within reach, {} m apart, {} directions of the tool; {} poses in {:.2} s",
             map.robot, map.reachable, map.points, grid.spacing_m, grid.directions, map.poses, map.wall_s
         ),
-        None => format!("{}: {} poses in {:.2} s\n", map.robot, map.poses, map.wall_s),
+        None => format!("{}: {} poses in {:.2} s", map.robot, map.poses, map.wall_s),
     };
+    out = crate::print::filled(&out, " ");
     let mut t = table(&["", "unit", "min", "median", "max", "best", "worst"]);
     for column in map.table.columns.iter().filter(|column| column.quantity) {
         let Some(spread) = map.quantities.get(&column.name) else { continue };
@@ -284,7 +285,7 @@ fn text(map: &Map) -> String {
     for (name, pose) in [("best", &map.best), ("worst", &map.worst)] {
         let place = pose.place_m.map(|x| format!("{x:.3}")).join(", ");
         let joints: Vec<String> = pose.q.iter().map(|q| format!("{q:.4}")).collect();
-        out += &format!("  {name:<5} at {place} m, joints {}\n", joints.join(", "));
+        out += &crate::print::filled(&format!("  {name:<5} at {place} m, joints {}", joints.join(", ")), ", ");
     }
     if let Some(placement) = &map.placement {
         let unit = readable_quantity(&map.by).1;

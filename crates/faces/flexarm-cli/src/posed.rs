@@ -218,7 +218,7 @@ fn direction(tcp: &[f64; 6]) -> String {
 fn response_text(r: &Response) -> String {
     let mut out = pose_text(&r.robot, &r.joints, &r.at, ", other drives locked");
     let head = ["from", "to", "unit", "at rest"].into_iter().map(str::to_owned);
-    let head: Vec<String> = head.chain((1..=SHOWN_PEAKS).map(|k| format!("peak {k}"))).collect();
+    let head: Vec<String> = head.chain((1..=SHOWN_PEAKS).map(|k| format!("peak {k} at [Hz]"))).collect();
     let mut t = table(&head);
     for c in &r.curves {
         let (unit, factor) = flexarm::readable_unit(&c.unit);
@@ -230,7 +230,7 @@ fn response_text(r: &Response) -> String {
         let at_rest = c.at_rest.map_or_else(|| "-".into(), number);
         let mut row = vec![c.input.clone(), c.output.clone(), unit, at_rest];
         row.extend(
-            c.peaks.iter().take(SHOWN_PEAKS).map(|p| format!("{} at {:.2} Hz", number(p.magnitude), p.frequency_hz)),
+            c.peaks.iter().take(SHOWN_PEAKS).map(|p| format!("{} at {:.2}", number(p.magnitude), p.frequency_hz)),
         );
         t.add_row(row);
     }

@@ -101,7 +101,7 @@ pub(crate) fn plain_zeros(text: &str) -> String {
         let is_zero = |number: &str| number.contains('.') && number.chars().all(|c| c == '0' || c == '.');
         // A minus sign becomes a blank where columns are aligned.
         match c == '-' && starts && is_zero(number()) && !text[k + 1 + number().len()..].starts_with('e') {
-            true if before == ' ' => out.push(' '),
+            true if out.ends_with("  ") => out.push(' '),
             true => {}
             false => out.push(c),
         }
@@ -181,8 +181,8 @@ pub(crate) fn inspection(i: &Inspection) -> String {
         out += &loop_line(l);
     }
     for f in &i.flexible_links {
-        out += &format!(
-            "flexible: {} ({}), {:.4} m, parts {} kg; {}, {} coordinates\n",
+        let line = format!(
+            "flexible: {} ({}), {:.4} m, parts {} kg; {}, {} coordinates",
             f.name,
             f.method,
             f.length_m,
@@ -190,6 +190,7 @@ pub(crate) fn inspection(i: &Inspection) -> String {
             f.model,
             f.coordinates
         );
+        out += &filled(&line, " ");
         if let Some(hz) = &f.modal_frequencies_hz {
             let first: Vec<String> = hz.iter().take(6).map(|hz| format!("{hz:.1}")).collect();
             let more = if hz.len() > 6 { hz.last().map(|hz| format!(", ... {hz:.0}")) } else { None };
@@ -214,10 +215,11 @@ pub(crate) fn inspection(i: &Inspection) -> String {
             m.mass_kg
         );
     }
-    out += &format!(
-        "TCP on {}: position {:.6?} m, quaternion wxyz {:.6?}\n",
+    let tcp = format!(
+        "TCP on {}: position {:.6?} m, quaternion wxyz {:.6?}",
         i.tcp.link, i.tcp.position_m, i.tcp.quaternion_wxyz
     );
+    out += &filled(&tcp, " ");
     out
 }
 
@@ -410,9 +412,10 @@ mod tests {
     #[test]
     fn a_number_that_is_rounded_to_zero_has_no_sign() {
         for (text, expected) in [
-            (" -0.000  -0.001", "  0.000  -0.001"),
+            ("  -0.000  -0.001", "   0.000  -0.001"),
+            ("joint_6 -0.00", "joint_6 0.00"),
             ("[-0.0000, 0.1]", "[0.0000, 0.1]"),
-            ("-0.0", " 0.0"),
+            ("-0.0", "0.0"),
             ("x-0.0 run-0.00 1e-0.0", "x-0.0 run-0.00 1e-0.0"),
             ("-0.0e3 -0.05 -0 --out", "-0.0e3 -0.05 -0 --out"),
         ] {
