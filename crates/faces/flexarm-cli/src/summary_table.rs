@@ -334,8 +334,8 @@ TCP
   dominant frequency        15.72 Hz
 
 links and drives
-  link bar                 1.2000 mm    maximum TCP motion; strain 4.5e-5, bending
-                                        angle 0.7000 mrad
+  link bar                 1.2000 mm    maximum TCP motion; strain 4.5e-5,
+                                        bending angle 0.7000 mrad
 
 run
   steps                      2000       rk4, 1 ms, 0.0 evaluations per step
@@ -408,12 +408,12 @@ files
         let text = plain(&summary, 60);
         let expected = "\
 runs
-  run             as given  links=modal
-  peak [mm]         1.4159       1.4159
-  at [s]             0.600        0.600
-  static [mm]            -            -
-  dynamic [mm]           -            -
-  RMS [mm]          1.1000       1.1000
+  run           as given  links=modal
+  peak [mm]       1.4159       1.4159
+  at [s]           0.600        0.600
+  static [mm]          -            -
+  dynamic [mm]         -            -
+  RMS [mm]        1.1000       1.1000
 ";
         assert!(text.contains(expected), "{text}");
     }

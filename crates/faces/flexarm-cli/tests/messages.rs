@@ -56,9 +56,9 @@ fn a_run_names_the_flags_that_mend_it() {
                 &["--step", "1e-10"],
                 "1 s in steps of 1e-10 s make 1.0e10 steps, at most 1e9 are taken: raise --step or cut the trajectory",
             ),
-            (&["--step", "-1"], "the step (--step) must be positive, found -1 s"),
-            (&["--log-rate", "-1"], "the log rate (--log-rate) must be positive, found -1 Hz"),
-            (&["--settling-band", "0"], "the settling band (--settling-band) must be positive, found 0 m"),
+            (&["--step", "-1"], "--step: the step must be positive, found -1 s"),
+            (&["--log-rate", "-1"], "--log-rate: the log rate must be positive, found -1 Hz"),
+            (&["--settling-band", "0"], "--settling-band: the settling band must be positive, found 0 m"),
             (&["--round-corners", "-1"], "corners are rounded within a positive time, found -1 s: try 0.02"),
             (&["--links", "modal", "--segments", "3"], not_lumped),
             (

@@ -7,7 +7,7 @@ use flexarm_settings::{OutOfRange, Setting};
 #[non_exhaustive]
 pub enum ValueError {
     /// The step, which must be positive.
-    #[error("the step ({setting}) must be positive, found {0} s", setting = Setting::Step)]
+    #[error("{setting}: the step must be positive, found {0} s", setting = Setting::Step)]
     Step(f64),
     /// A number that is none.
     #[error("{what} has the entry {found}, expected finite numbers")]
@@ -21,10 +21,10 @@ pub enum ValueError {
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
     /// The log rate, which must be positive.
-    #[error("the log rate ({setting}) must be positive, found {0} Hz", setting = Setting::LogRate)]
+    #[error("{setting}: the log rate must be positive, found {0} Hz", setting = Setting::LogRate)]
     LogRate(f64),
     /// The settling band, which must be positive.
-    #[error("the settling band ({setting}) must be positive, found {0} m", setting = Setting::SettlingBand)]
+    #[error("{setting}: the settling band must be positive, found {0} m", setting = Setting::SettlingBand)]
     SettlingBand(f64),
     /// The factor of deflections, which must be positive.
     #[error("the factor of deflections ({setting}) must be positive, found {0} times", setting = Setting::Magnification)]
