@@ -174,8 +174,8 @@ pub struct FlexibleArm {
     pub elements: Vec<ElasticElement>,
     /// Damping matrix on the elastic coordinates.
     pub D: DMatrix<f64>,
-    /// `beta` per element that approximates `D` best (s); exact when stiffness-proportional. Used
-    /// by SPOOK.
+    /// `beta` per element that approximates `D` (s); exact when stiffness-proportional. Used by
+    /// SPOOK.
     pub tau: Vec<f64>,
     /// Whether `D` is block diagonal with `beta K` in the blocks.
     pub proportional: bool,

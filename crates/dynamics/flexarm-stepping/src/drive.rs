@@ -189,10 +189,11 @@ impl Friction {
 ///
 /// ```text
 /// v_c = q̇_ref + position_gain (q_ref - q)
-/// τ   = velocity_gain (v_c - q̇) + integral_gain ∫ (v_c - q̇) dt + τ_ff        |τ| ≤ limit, held until the next sample
+/// τ   = velocity_gain (v_c - q̇) + integral_gain ∫ (v_c - q̇) dt + τ_ff,   |τ| ≤ limit
 /// ```
-/// q is the motor angle on the joint side. τ_ff is the torque of the rigid robot on the reference
-/// motion, including rotor and friction. The integral stops while the torque is at its limit.
+/// q is the motor angle on the joint side. τ is held until the next sample. τ_ff is the torque of
+/// the rigid robot on the reference motion, including rotor and friction. The integral stops while
+/// the torque is at its limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ServoAxis {
     /// Coordinate of the joint.

@@ -2,10 +2,10 @@
 //! per elastic joint, with the bodies behind prescribed joints fixed to it.
 //!
 //! ```text
-//! V_B = Ad_BQ V_Q + S x'        Q: body behind the next elastic joint inward, S: motion subspace
-//! of B's own joint
+//! V_B = Ad_BQ V_Q + S x'
 //! α = S^-1 V_B                  I = Sᵀ M_BBo S,   X = S_B^-1 Ad_BQ S_Q
 //! ```
+//! Q is the body behind the next elastic joint inward, S the motion subspace of B's own joint.
 
 use flexarm_kinematics::{Data, ElasticAngles, JointMotion, Model, Pose, SpatialInertia, State, skew};
 use nalgebra::{Matrix3, Matrix6};

@@ -100,7 +100,7 @@ pub enum StepError {
         h: f64,
         /// Highest natural frequency (Hz).
         highest_hz: f64,
-        /// Largest stable step (s).
+        /// Maximum stable step (s).
         largest_s: f64,
     },
     /// The derivative of a run is not available.

@@ -10,9 +10,9 @@
 //! free velocities jump by Δv_f,
 //!
 //! ```text
-//! M_ff Δv_f = -M_fp Δv_p                                   no impulse from springs, dampers,
-//! friction and weight: finite
+//! M_ff Δv_f = -M_fp Δv_p
 //! ```
+//! because springs, dampers, friction and weight are finite and contribute no impulse.
 //!
 //! An integrator that evaluates accelerations at a few times within a step uses
 //! `h Σ w_i a(t + c_i h)` as the velocity change of a prescribed joint

@@ -2,16 +2,11 @@
 //! and gears that couple several joints.
 //!
 //! ```text
-//! δ = e - ε(q_m)             ε: transmission error at the motor's coordinate; δ: deflection of the
-//! spring     (1)
-//! F = elastic(δ) + Σ k_i s_i       s_i: deflection of slider i, |s_i| <= r_i
-//! (2)
-//! s_i ← clamp(s_i + Δδ, -r_i, r_i)                            play operator, state at the ends of
-//! steps       (3)
-//! on e: F;   on q_m: -ε'(q_m) F                               virtual work of F through δ
-//! (4)
-//! θ = C^-1 q,  K = C^-T K_m C^-1,  τ_m = Cᵀ τ                 gears between motors θ and joints q
-//! = C θ       (5)
+//! δ = e - ε(q_m)                              ε: transmission error, δ: spring deflection  (1)
+//! F = elastic(δ) + Σ k_i s_i                  s_i: deflection of slider i, |s_i| <= r_i    (2)
+//! s_i ← clamp(s_i + Δδ, -r_i, r_i)            play operator, state at the ends of steps    (3)
+//! on e: F;   on q_m: -ε'(q_m) F               so that F does the work F δ̇                  (4)
+//! θ = C^-1 q,  K = C^-T K_m C^-1,  τ_m = Cᵀ τ gears between motors θ and joints q = C θ    (5)
 //! ```
 //! Sliders in parallel follow Masing's rules: a branch after a reversal is the first loading curve
 //! scaled by two, and the loss of a closed cycle does not depend on the rate. Start at

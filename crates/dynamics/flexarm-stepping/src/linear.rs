@@ -368,7 +368,7 @@ impl Statics<'_> {
             }
             let springs = with_curves(arm, &at_rest, q.as_slice(), &e);
             let tangent = &springs + self.slopes(data, &q).view((m, m), (ne, ne));
-            // Where the tangent is not positive definite, its step leads uphill to a saddle point;
+            // If the tangent is not positive definite, its step leads uphill to a saddle point;
             // a step with the springs only leads downhill.
             let stable = ((&tangent + tangent.transpose()) * 0.5).cholesky().is_some();
             buckled |= !stable;

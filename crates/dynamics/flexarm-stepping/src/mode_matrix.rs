@@ -15,10 +15,10 @@
 //!
 //! ```text
 //! [ μ + c   c ] [ x_m ]   [ r_m - vᵀ x_b ]
-//! [ -s k    μ ] [ u_m ] = [     - vᵀ u_b ]          a = 1/(μ (μ + c) + s k c)                   (2)
+//! [ -s k    μ ] [ u_m ] = [     - vᵀ u_b ]          a = 1/(μ (μ + c) + s k c)             (2)
 //!
 //! [ M_b + C_b - Σ a μ v vᵀ      C_b + Σ a c v vᵀ       ] [ x_b ]   [ r_b - Σ a μ v r_m  ]
-//! [ -s K_b - Σ a s k v vᵀ       M_b - Σ a (μ + c) v vᵀ ] [ u_b ] = [     - Σ a s k v r_m ]        (3)
+//! [ -s K_b - Σ a s k v vᵀ       M_b - Σ a (μ + c) v vᵀ ] [ u_b ] = [     - Σ a s k v r_m ]  (3)
 //! ```
 //! Without a correction s and u are zero. A solution costs the number of modes times the number of
 //! other coordinates, and the factorisation of (3) costs that again for each of the others; a dense

@@ -62,7 +62,8 @@ pub struct ReducedArm {
     tree: Option<ElasticTree>,
     /// Modes that are eliminated first, if there are enough of them.
     modes: Option<HeldModes>,
-    /// Equations of motion of the free coordinates only, if supported for this tree and faster.
+    /// Equations of motion of the free coordinates only, if these suffice and the tree is
+    /// supported.
     points: Option<Lent<FreeForces>>,
     poses: Poses,
     /// Workspace of observations, if supported for this tree; created at the first observation.

@@ -13,9 +13,9 @@
 //! algorithm:
 //!
 //! ```text
-//! inward    Î_j = I_j + Σ_children X_cᵀ I'_c X_c,   Δ_j = Î_j + S_j,   I'_j = S_j Δ_j^-1 Î_j       (4)
-//!           w_j = Δ_j^-1 (r_j - Σ_children X_cᵀ f_c),   f_j = r_j - S_j w_j                        (5)
-//! outward   x_j = w_j - Δ_j^-1 Î_j X_j α_p                                                      (6)
+//! inward    Î_j = I_j + Σ_children X_cᵀ I'_c X_c,   Δ_j = Î_j + S_j,   I'_j = S_j Δ_j^-1 Î_j  (4)
+//!           w_j = Δ_j^-1 (r_j - Σ_children X_cᵀ f_c),   f_j = r_j - S_j w_j                    (5)
+//! outward   x_j = w_j - Δ_j^-1 Î_j X_j α_p                                                 (6)
 //! ```
 //!
 //! **With a correction** by s, such as the dispersion correction of generalised-alpha,
@@ -28,7 +28,7 @@
 //!
 //! ```text
 //! [ M + C    C ] [ x ]   [ r ]
-//! [ -s K     M ] [ u ] = [ 0 ]        S_j = [ C_j C_j; -s K_j 0 ],   I and X in both rows        (8)
+//! [ -s K     M ] [ u ] = [ 0 ]        S_j = [ C_j C_j; -s K_j 0 ],   I and X in both rows     (8)
 //! ```
 //! and the step needs u as well. With some coordinates held the matrix keeps its form, with
 //! determinant `det M det J > 0`, because

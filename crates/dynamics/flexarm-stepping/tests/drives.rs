@@ -314,7 +314,7 @@ fn backlash_is_a_free_play_of_twice_its_half() {
     }
 }
 
-/// Truth: uniform motion through the backlash, then a sine: period in closed form; energy is
+/// Truth: constant acceleration through the backlash, then a sine: period in closed form; energy is
 /// conserved.
 ///
 /// Measured: period 3e-9 (RK4, 0.02 ms), 8e-7 (generalised-alpha, 0.1 ms), 1e-8 (reference, rtol

@@ -154,7 +154,8 @@ fn modal_damping_keeps_its_ratio_with_another_payload() {
     for kind in registered(false) {
         let error = error(&arm, kind, 1e-3, 4.0, 2, truth) / after.abs();
         eprintln!("{:<18} {error:.1e}", kind.name());
-        assert!(error < 2e-4, "{} {error}", kind.name()); // measured 2e-5; with the damping of the empty arm 0.2
+        // measured 2e-5; with the damping of the empty arm 0.2
+        assert!(error < 2e-4, "{} {error}", kind.name());
     }
 }
 
@@ -258,7 +259,8 @@ fn the_work_of_a_blow_is_the_energy_that_it_brings() {
         (0..40).for_each(|_| stepper.step().unwrap());
         stepper.observe(&mut seen);
         let truth = 2.0 * (0.5 * 0.5f64.powi(2) + -0.75 * (0.5 - 0.375));
-        assert!((seen.impulse_work - truth).abs() < 1e-12, "{} {}", kind.name(), seen.impulse_work); // measured 1e-16
+        // measured 1e-16
+        assert!((seen.impulse_work - truth).abs() < 1e-12, "{} {}", kind.name(), seen.impulse_work);
     }
 }
 

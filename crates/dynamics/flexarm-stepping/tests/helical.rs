@@ -119,7 +119,8 @@ fn a_driven_spindle_needs_the_torque_of_the_textbook() {
             largest = largest.max(truth.abs());
             let X = seen.X_WB[1];
             let rise = PITCH * AMPLITUDE * (1.0 - (OMEGA * seen.t).cos());
-            assert!((X.translation.z - rise).abs() < 1e-5, "{}", kind.name()); // measured 1e-16; SPOOK 2e-7
+            // measured 1e-16; SPOOK 2e-7
+            assert!((X.translation.z - rise).abs() < 1e-5, "{}", kind.name());
         }
         eprintln!("{:<18} torque {:.1e} of the largest", kind.name(), worst / largest);
         assert!(worst < bound * largest, "{}: {worst} of {largest}", kind.name());

@@ -22,7 +22,7 @@ fn point(stiffness: f64) -> OperatingPoint {
     OperatingPoint::new(FlexibleArm::new(model, springs, held).unwrap(), tool)
 }
 
-/// Returns 31 poses, the last group of four not full; one contains NaN.
+/// Returns 31 poses, the last group of four not full; one contains an infinite value.
 fn poses(joints: usize) -> Vec<f64> {
     let mut all: Vec<f64> = (0..31 * joints).map(|k| 3.0 * ((k as f64 * 0.618_034).fract() - 0.5)).collect();
     all[9 * joints + 1] = f64::INFINITY;

@@ -369,8 +369,8 @@ impl OperatingPoint {
     /// Returns the natural frequencies (Hz), ascending, undamped, drives locked, with the symmetric
     /// part of the stiffness.
     ///
-    /// Cost: a mass matrix and the eigenvalues of an n×n matrix. Not finite if a coordinate has no
-    /// mass.
+    /// Cost: a mass matrix and the eigenvalues of an n×n matrix. Infinite or NaN, up to
+    /// round-off, if a coordinate has no mass.
     pub fn frequencies_hz(&mut self) -> &[f64] {
         if !self.factored {
             return &[];

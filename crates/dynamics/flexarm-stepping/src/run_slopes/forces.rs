@@ -4,8 +4,7 @@
 //! ```text
 //! ∂τ/∂q̇: τ is quadratic in q̇, so central differences of any step size are exact
 //! ∂τ/∂q: central differences of sixth order
-//! additional inertia I of a body: Jᵀ (I A + V × I V)                                     J at its
-//! origin
+//! additional inertia I of a body: Jᵀ (I A + V × I V), J at its origin
 //! ```
 //! Differences take eight passes of the recursions per coordinate, twenty with the dispersion
 //! correction.

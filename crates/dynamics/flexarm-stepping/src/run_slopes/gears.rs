@@ -2,10 +2,10 @@
 //! load-dependent friction.
 //!
 //! ```text
-//! δ = e - ε(q_m),  δ' = ė - ε' q̇_m:     dF = K dδ + D dδ' + Σ k_i w_i,     dδ' = dė - ε' dq̇_m - ε'' q̇_m dq_m      (1)
-//! on q_m:  -ε' dF - ε'' F dq_m                                                                              (2)
-//! w_i = ds_i - dδ of a slider: unchanged while it sticks; -dδ at the last time at which it slipped
-//! (3)
+//! δ = e - ε(q_m),  δ' = ė - ε' q̇_m
+//! dF = K dδ + D dδ' + Σ k_i w_i,     dδ' = dė - ε' dq̇_m - ε'' q̇_m dq_m                    (1)
+//! on q_m:  -ε' dF - ε'' F dq_m                                                            (2)
+//! w_i = ds_i - dδ of a slider: constant while it sticks; -dδ of the last time it slipped  (3)
 //! ```
 //! A slipping slider stays at its reach, independent of any parameter. The times at which slipping
 //! begins and ends depend on the parameter, but the torque does not jump there, so that the

@@ -2,7 +2,8 @@
 //! of generalised-alpha, for all parameters in parallel.
 //!
 //! ```text
-//! r(q, q̇, q̈; p) = 0:     M δẍ + V δẋ + K δx = -(∂r/∂p + K_a δq_a + V_a δq̇_a + M_a δq̈_a)                           (1)
+//! r(q, q̇, q̈; p) = 0
+//! M δẍ + V δẋ + K δx = -(∂r/∂p + K_a δq_a + V_a δq̇_a + M_a δq̈_a)        (1)
 //! ```
 //! holds at the end of every step, with `K = ∂r/∂x`, `V = ∂r/∂ẋ` in closed form
 //! ([`flexarm_kinematics::DynamicTangent`]), or by differences of the recursions with closed loops

@@ -4,12 +4,12 @@
 //! `y = M^-1 K ẍ⁺`:
 //!
 //! ```text
-//! δx̃⁺ = S δẍ⁺ + z,    z = c h² M^-1 (δK ẍ⁺ - δM y)                       δM due to parameters and
-//! to δq of the start  (1)
-//! δx⁺ = x_h + c_K δx̃⁺,  δẋ⁺ = v_h + c_D δx̃⁺                             x_h, v_h from quantities
-//! at the start       (2)
-//! (M + (c_D V + c_K K) S) δẍ⁺ = -(V (v_h + c_D z) + K (x_h + c_K z) + δr)                                         (3)
+//! δx̃⁺ = S δẍ⁺ + z,    z = c h² M^-1 (δK ẍ⁺ - δM y)                          (1)
+//! δx⁺ = x_h + c_K δx̃⁺,  δẋ⁺ = v_h + c_D δx̃⁺                                (2)
+//! (M + (c_D V + c_K K) S) δẍ⁺ = -(V (v_h + c_D z) + K (x_h + c_K z) + δr)     (3)
 //! ```
+//! δM is due to the parameters and to δq at the start of the step; x_h and v_h follow from
+//! quantities known there.
 
 use std::sync::Arc;
 
@@ -402,7 +402,7 @@ impl<'a> Recurrence<'a> {
     }
 
     /// Computes the derivatives of the free velocities at a velocity jump of the motion,
-    /// `M_ff Δv_f + M_fp Δv_p = 0`; w = `blow` contains the jumps of all coordinates:
+    /// `M_ff Δv_f + M_fp Δv_p = 0`; w, the argument `blow`, contains the jumps of all coordinates:
     ///
     /// ```text
     /// M_ff δΔv_f = -(∂(M w)/∂q δq + δM w + M_fp δΔv_p)

@@ -1,10 +1,10 @@
 //! Accuracy of a stepper for an oscillation, measured by running it on the test equation.
 //!
 //! ```text
-//! x'' + 2 ζ x' + x = 1,   x(0) = x'(0) = 0                      (1)  a body on a spring, time in
-//! units of 1/ω
+//! x'' + 2 ζ x' + x = 1,   x(0) = x'(0) = 0                      (1)
 //! x(t) = 1 - e^(-ζt) (cos wt + ζ/w sin wt),   w² = 1 - ζ²       (2)
 //! ```
+//! (1) is a body on a spring, with time in units of 1/ω.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;

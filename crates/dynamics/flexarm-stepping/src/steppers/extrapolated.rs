@@ -1,7 +1,7 @@
 //! Richardson extrapolation of generalised-alpha with step sizes h and h/2.
 //!
 //! ```text
-//! y = y_{h/2} + (y_{h/2} - y_h) / 3                 y: positions, velocities, accelerations          (1)
+//! y = y_{h/2} + (y_{h/2} - y_h) / 3      y: positions, velocities, accelerations        (1)
 //! ```
 //! The error of generalised-alpha starts with `h²`, which (1) eliminates: third order, and with ρ
 //! near 1, where the scheme is nearly symmetric in time, close to fourth. It costs three steps

@@ -2,14 +2,14 @@
 //! accurate.
 //!
 //! ```text
-//! r(t + c_i h, X_i, V_i, A_i) = 0                               i = 1, 2, 3      (1)  equations of motion hold in each stage
-//! V_i = v + h Σ_j a_ij A_j                                      a_ii = γ         (2)
-//! X_i = x + h Σ_j a_ij V_j                                                       (3)
-//! x⁺ = X_3,   v⁺ = V_3,   ẍ⁺ = A_3                                               (4)  the last stage is the new state
+//! r(t + c_i h, X_i, V_i, A_i) = 0      i = 1, 2, 3      (1)  equations of motion in each stage
+//! V_i = v + h Σ_j a_ij A_j             a_ii = γ         (2)
+//! X_i = x + h Σ_j a_ij V_j                              (3)
+//! x⁺ = X_3,   v⁺ = V_3,   ẍ⁺ = A_3                      (4)  the last stage is the new state
 //!
 //!    γ     |   γ
-//! (1+γ)/2  | (1-γ)/2    γ                       γ³ - 3 γ² + 3/2 γ - 1/6 = 0,   γ = 0.435866...
-//!    1     |  b_1      b_2      γ               b_1 = (-6γ² + 16γ - 1)/4,   b_2 = (6γ² - 20γ + 5)/4   (5)
+//! (1+γ)/2  | (1-γ)/2    γ            γ³ - 3 γ² + 3/2 γ - 1/6 = 0,   γ = 0.435866...
+//!    1     |  b_1      b_2      γ    b_1 = (-6γ² + 16γ - 1)/4,   b_2 = (6γ² - 20γ + 5)/4   (5)
 //! ```
 //! This is the Runge-Kutta method applied to `[x; v]`. The unknowns are the A_i, one after the
 //! other; Newton's method on (1) uses the same matrix `M + h γ D + (h γ)² K` for all three, kept

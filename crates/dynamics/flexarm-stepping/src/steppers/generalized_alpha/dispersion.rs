@@ -2,9 +2,9 @@
 //! accelerations and on Newton's matrix.
 //!
 //! ```text
-//! x̃ = Sᵀ ẍ,   Sᵀ = 1 + c h² M^-1 K                                  (6)
-//! J = M + C Sᵀ,   C = h γ' D + h² β' K                              (7)  derivative of (1) with respect to ẍ⁺
-//! S J = M + c h² K + S C Sᵀ,   J^-1 = (S J)^-1 S                    (8)  symmetric for every damping, unlike J
+//! x̃ = Sᵀ ẍ,   Sᵀ = 1 + c h² M^-1 K                   (6)
+//! J = M + C Sᵀ,   C = h γ' D + h² β' K               (7)  derivative of (1) by ẍ⁺
+//! S J = M + c h² K + S C Sᵀ,   J^-1 = (S J)^-1 S     (8)  symmetric for every damping, unlike J
 //! ```
 //! For trees and modal links the matrix contains the complete correction: [`crate::tree_matrix`],
 //! [`crate::mode_matrix`].

@@ -2,10 +2,10 @@
 //! high-frequency damping.
 //!
 //! ```text
-//! r(t⁺, x⁺, v⁺, ẍ⁺) = 0                                        (1)  equations of motion hold at the new time
-//! x⁺ = x + h v + h² [(1/2 - β) a + β a⁺]                        (2)  Newmark
-//! v⁺ = v + h [(1 - γ) a + γ a⁺]                                 (3)
-//! (1 - α_m) a⁺ + α_m a = (1 - α_f) ẍ⁺ + α_f ẍ                   (4)  algorithmic acceleration a
+//! r(t⁺, x⁺, v⁺, ẍ⁺) = 0                           (1)  equations of motion at the new time
+//! x⁺ = x + h v + h² [(1/2 - β) a + β a⁺]          (2)  Newmark
+//! v⁺ = v + h [(1 - γ) a + γ a⁺]                   (3)
+//! (1 - α_m) a⁺ + α_m a = (1 - α_f) ẍ⁺ + α_f ẍ    (4)  algorithmic acceleration a
 //! ```
 //! with `α_m = (2ρ-1)/(ρ+1)`, `α_f = ρ/(ρ+1)`, `γ = 1/2 + α_f - α_m`, `β = (γ + 1/2)²/4`; ρ is the
 //! spectral radius at infinite frequency: 1 conserves all energy, 0 annihilates the highest modes
@@ -21,7 +21,8 @@
 //! the phase of a ringing arm drift. With the correction, (4) uses instead of ẍ
 //!
 //! ```text
-//! x̃ = ẍ - c h² d²ẍ/dt² ≈ (1 + c h² M^-1 K) ẍ,     c = β - Δ/2 + [α_f(1-α_f) - α_m(1-α_m)]/2 - Δ²/2 - 1/12,   Δ = α_f - α_m     (5)
+//! x̃ = ẍ - c h² d²ẍ/dt² ≈ (1 + c h² M^-1 K) ẍ                                       (5)
+//! c = β - Δ/2 + [α_f(1-α_f) - α_m(1-α_m)]/2 - Δ²/2 - 1/12,   Δ = α_f - α_m
 //! ```
 //! which cancels the second-order term of the frequency error of free vibration. The second
 //! derivative of the acceleration is computed from the stiffness and not from previous steps, so

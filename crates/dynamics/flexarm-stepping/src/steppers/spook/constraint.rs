@@ -17,7 +17,8 @@
 //! angle rates. `G` on the child has the inverse
 //!
 //! ```text
-//! local:   [ R_P, [r_2]x R_P B_P^-1; 0, R_P B_P^-1 ],   B_P^-1 = R_PQ B        global:  [ 1, [r_2]x; 0, 1 ]
+//! local:   [ R_P, [r_2]x R_P B_P^-1; 0, R_P B_P^-1 ],   B_P^-1 = R_PQ B
+//! global:  [ 1, [r_2]x; 0, 1 ]
 //! ```
 
 use flexarm_kinematics::{AxisMotion, ElasticAngles, Pose, rotation_vector, skew};

@@ -1,14 +1,16 @@
 //! Pins that close loops: two constraint rows each, between bodies that no joint connects.
 //!
 //! ```text
-//! c_k = e_k . d,   d = p_eye - p_pin           e_1, e_2 across the pin, on the body A that carries it; eye on body B
+//! c_k = e_k . d,   d = p_eye - p_pin
 //! G_A = [ -e, -(r_A + d) x e ],   G_B = [ e, r_B x e ]
 //! K z = r,   [ K  -Gᵀ ] [ z ]   [ r ]
-//!            [ G   Σ  ] [ μ ] = [ s ]          z = z_r + Z μ,   Z = K^-1 Gᵀ,   (G Z + Σ) μ = s - G z_r
+//!            [ G   Σ  ] [ μ ] = [ s ]
+//! z = z_r + Z μ,   Z = K^-1 Gᵀ,   (G Z + Σ) μ = s - G z_r
 //! ```
-//! K is the matrix of the opened tree, in which dependent joints are free along their axes; Z is
-//! solved for row by row. Displacement along the pin and tilt of the eye on it are free, as in
-//! [`flexarm_kinematics::PlacedLoop`].
+//! The directions e_1, e_2 are perpendicular to the pin and fixed to the body A that carries it;
+//! the eye is on body B. K is the matrix of the opened tree, in which dependent joints are free
+//! along their axes; Z is solved for row by row. Displacement along the pin and tilt of the eye on
+//! it are free, as in [`flexarm_kinematics::PlacedLoop`].
 
 use flexarm_kinematics::{JointMotion, Model, Pose};
 use nalgebra::{DMatrix, DVector, Vector2, Vector3, Vector6};

@@ -1,10 +1,11 @@
 //! Elimination of the saddle-point matrix over a tree of bodies, from the leaves: O(bodies).
 //!
 //! ```text
-//! body c:   M_c v_c - G_cᵀ λ - (children) = b_c              joint of c:  G_p v_p + G_c v_c + Σ λ = s        (1)
+//! body c:       M_c v_c - G_cᵀ λ - (children) = b_c
+//! joint of c:   G_p v_p + G_c v_c + Σ λ = s                                     (1)
 //! M̂_c v_c = b̂_c + G_cᵀ λ                                       (children eliminated)
-//! S λ = ŝ - G_p v_p,   S = Σ + G_c M̂_c^-1 G_cᵀ,   ŝ = s - G_c M̂_c^-1 b̂_c                                    (2)
-//! M̂_p += G_pᵀ S^-1 G_p,   b̂_p += G_pᵀ S^-1 ŝ                                                              (3)
+//! S λ = ŝ - G_p v_p,   S = Σ + G_c M̂_c^-1 G_cᵀ,   ŝ = s - G_c M̂_c^-1 b̂_c        (2)
+//! M̂_p += G_pᵀ S^-1 G_p,   b̂_p += G_pᵀ S^-1 ŝ                                    (3)
 //! ```
 //! For a serial arm this is the block tridiagonal LDLᵀ in body order. M̂ and S are symmetric
 //! positive definite. `G_c` is square and block triangular with a known inverse, so that neither M̂
@@ -12,7 +13,7 @@
 //!
 //! ```text
 //! M̃ = G_c^-T M̂_c G_c^-1,   b̃ = G_c^-T b̂_c,   H = M̃ + Σ^-1
-//! S^-1 = Σ^-1 H^-1 M̃,   S^-1 ŝ = Σ^-1 H^-1 (M̃ s - b̃),   v_c = G_c^-1 (s - Σ λ - G_p v_p)               (4)
+//! S^-1 = Σ^-1 H^-1 M̃,   S^-1 ŝ = Σ^-1 H^-1 (M̃ s - b̃),   v_c = G_c^-1 (s - Σ λ - G_p v_p)     (4)
 //! ```
 //! which holds for hard joints (Σ almost zero) and soft ones alike. If Σ is hard in some directions
 //! and soft in others, `S = Σ + M̃^-1` is inverted directly. A joint that is free along a line σ of
@@ -20,7 +21,8 @@
 //! `a = S_0^-1 σ` of the same joint without the free line
 //!
 //! ```text
-//! S^-1 = S_0^-1 - a aᵀ / σᵀa,     σᵀλ = 0,     ε = (σᵀ S_0^-1 ŝ - aᵀ G_p v_p) / σᵀa,     v_c = G_c^-1 (s - Σ λ - G_p v_p - σ ε)    (5)
+//! S^-1 = S_0^-1 - a aᵀ / σᵀa,   σᵀλ = 0,   ε = (σᵀ S_0^-1 ŝ - aᵀ G_p v_p) / σᵀa
+//! v_c = G_c^-1 (s - Σ λ - G_p v_p - σ ε)                                             (5)
 //! ```
 
 use flexarm_spatial::products::{cross3, mul, mul3, tr_mul, tr_mul3, turn_symmetric};
