@@ -185,19 +185,19 @@ pub struct FlexibleArm {
     pub torque_driven: Vec<usize>,
     /// Friction per actuated coordinate (empty: none).
     pub friction: Vec<Friction>,
-    /// Controller of the joints that are driven by torque.
+    /// Controller of the joints driven by torque.
     pub servo: Option<Arc<Servo>>,
     /// External loads.
     pub loads: Vec<Load>,
     /// Changes of inertia, by time.
     pub inertia_changes: Vec<InertiaChange>,
-    /// Errors of transmissions; see [`FlexibleArm::with_transmission_errors`].
+    /// Transmission errors; see [`FlexibleArm::with_transmission_errors`].
     pub transmission: Vec<TransmissionError>,
     /// Gears with hysteresis; see [`FlexibleArm::with_hysteresis`].
     pub hysteresis: Vec<Hysteresis>,
     /// Friction that grows with the transmitted torque.
     pub load_friction: Vec<LoadFriction>,
-    /// Gears that move several joints; see [`FlexibleArm::with_coupling`].
+    /// Gears that couple several joints; see [`FlexibleArm::with_coupling`].
     pub coupling: Option<GearCoupling>,
     /// Stiffness between elastic coordinates of coupled gears: row, column, entry; the symmetric
     /// entry is implied.

@@ -21,7 +21,7 @@ pub struct Modes {
 }
 
 impl Modes {
-    /// Frequencies (Hz), ascending.
+    /// Returns the frequencies (Hz), ascending.
     pub fn frequencies_hz(&self) -> Vec<f64> {
         self.omega.iter().map(|w| w / std::f64::consts::TAU).collect()
     }

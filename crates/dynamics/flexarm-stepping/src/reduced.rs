@@ -260,7 +260,7 @@ impl ReducedArm {
         self.qddot.as_mut_slice()[n..].copy_from_slice(&a.as_slice()[driven..]);
     }
 
-    /// `f += K x + D v + friction - τ`.
+    /// Adds springs, dampers, friction and controller: `f += K x + D v + friction - τ`.
     fn add_forces(&mut self, x: &DVector<f64>, v: &DVector<f64>, f: &mut DVector<f64>) {
         let driven = self.arm.torque_driven.len();
         if self.gears.is_some() {

@@ -27,7 +27,7 @@ pub struct Counts {
 
 /// A running simulation.
 pub trait Stepper: Send {
-    /// Current time (s).
+    /// Returns the current time (s).
     fn time(&self) -> f64;
 
     /// Advances by one step. After an error the state is that of the last good time. Does not

@@ -17,7 +17,7 @@ use crate::tree_matrix::TreeMatrices;
 
 /// A mechanical system with n coordinates x in a vector space.
 pub trait SecondOrderSystem {
-    /// Number of coordinates.
+    /// Returns the number of coordinates.
     fn dimension(&self) -> usize;
 
     /// Writes `r(t, x, v, a)` (N or N m) into `r`.

@@ -713,7 +713,7 @@ fn reference_stepper_and_generalised_alpha_agree_over_events() {
     assert!(errors[0] < 5e-6 && (order - 2.0).abs() < 0.2, "{errors:?} {order}");
 }
 
-// --- What a stepper might not see
+// --- Short and fast loads
 
 /// A free rotor at rest: long steps would miss a short pulse, and a sine if they are multiples of
 /// its period.

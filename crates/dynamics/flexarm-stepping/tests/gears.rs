@@ -356,7 +356,7 @@ fn friction_under_load_is_its_part_of_the_transmitted_torque() {
     assert!(refused.is_err_and(|e| e.to_string().contains("gearbox")));
 }
 
-// --- Gears that move several joints
+// --- Coupled gears
 
 fn coupled(C: Matrix2<f64>, elements: Vec<usize>) -> GearCoupling {
     let inverse = C.try_inverse().unwrap();

@@ -106,7 +106,7 @@ fn dispersion_correction_cancels_the_leading_error() {
     }
 }
 
-/// Unconditional stability with the correction: h ω from 0.1 to 1e5, undamped, rho 0.9 and 1.
+/// Unconditional stability with the correction: h ω from 0.1 to 1e5, undamped, rho from 0 to 1.
 #[test]
 fn corrected_scheme_is_stable_for_any_step() {
     for rho in [0.0, 0.5, 0.9, 1.0] {

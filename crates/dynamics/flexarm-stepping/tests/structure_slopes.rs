@@ -47,7 +47,7 @@ fn richardson(size: f64, f: impl Fn(f64) -> DVector<f64>) -> DVector<f64> {
     d(1.0) * 0.8 - d(2.0) * 0.2 + d(3.0) * (4.0 / 105.0) - d(4.0) / 280.0
 }
 
-// --- Closed loops and links in modes
+// --- Closed loops and modal links
 
 /// An arm whose forces are differentiated by differences; the parameters are a spring, a mass, the
 /// motion, the tool.
@@ -227,7 +227,7 @@ fn arms_with_links_in_modes_are_differentiated() {
     }
 }
 
-// --- Corners
+// --- Velocity jumps
 
 /// The reference arm, at rest until 0.05 s and from 0.13 s on, in between with the speeds of its
 /// motion; or moving from the start.

@@ -280,7 +280,7 @@ impl OperatingPoint {
         }
     }
 
-    /// Returns the arm, with its own motion, springs and loads.
+    /// Returns the arm; its springs and loads apply here, its own motion does not.
     pub fn arm(&self) -> &FlexibleArm {
         &self.arm
     }

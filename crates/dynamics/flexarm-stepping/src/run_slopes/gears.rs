@@ -65,7 +65,7 @@ impl GearSlopes {
         rows += &*by_q;
         let mut rows = to_rate.rows_mut(m, n);
         rows += &*by_rate;
-        // (2)
+        // Motor rows, (2).
         for (error, [slope, bend]) in arm.transmission.iter().zip(ripple) {
             let (k, motor) = (arm.offset(&arm.elements[error.element]), error.motor);
             add_row(to_q, motor, -*slope, by_q, k);

@@ -113,8 +113,8 @@ mod tests {
         assert_eq!(error_of_a_period(kind("reference"), 1.0, 0.03), 0.0);
     }
 
-    /// The preset of the source damps in proportion to the step: an oscillation without physical
-    /// damping is lost at any step size.
+    /// The preset of the source damps with a time in proportion to the step: an oscillation without
+    /// physical damping decays at any step size.
     #[test]
     fn settings_count() {
         let source = StepperKind::Spook(SpookSettings { preset: SpookPreset::Source, ..SpookSettings::default() });

@@ -287,7 +287,7 @@ mod tests {
         [g.now.x[0], g.now.v[0]]
     }
 
-    /// Stability function (6).
+    /// Returns the stability function (6).
     fn R(z: Complex<f64>) -> Complex<f64> {
         let (g, one) = (GAMMA, Complex::from(1.0));
         (one + z * (1.0 - 3.0 * g) + z * z * (0.5 - 3.0 * g + 3.0 * g * g)) / (one - z * g).powi(3)

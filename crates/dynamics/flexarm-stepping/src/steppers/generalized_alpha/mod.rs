@@ -213,13 +213,13 @@ pub(crate) struct Coefficients {
 }
 
 impl Coefficients {
-    /// `h γ'` and `h² β'`: derivatives of v⁺ and x⁺ with respect to x̃⁺.
+    /// Returns `h γ'` and `h² β'`, the derivatives of v⁺ and x⁺ with respect to x̃⁺.
     pub(crate) fn derivatives(&self, h: f64) -> (f64, f64) {
         let ratio = (1.0 - self.alpha_f) / (1.0 - self.alpha_m);
         (h * self.gamma * ratio, h * h * self.beta * ratio)
     }
 
-    /// `c` of (5).
+    /// Returns `c` of (5).
     pub(crate) fn dispersion(&self) -> f64 {
         let Self { alpha_m, alpha_f, beta, .. } = *self;
         let shift = alpha_f - alpha_m;

@@ -56,7 +56,7 @@ pub(super) fn joined(a: &Vector3<f64>, b: &Vector3<f64>) -> Vector6<f64> {
     Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z)
 }
 
-/// Returns a symmetric matrix from its lower triangle; the compiler omits the rest.
+/// Returns a symmetric matrix from its lower triangle; the upper triangle is not read.
 #[inline(always)]
 fn mirrored(X: &Matrix3<f64>) -> Matrix3<f64> {
     let (xy, xz, yz) = (X[(1, 0)], X[(2, 0)], X[(2, 1)]);
