@@ -357,6 +357,7 @@ impl ReducedArm {
         if jump.iter().all(|jump| *jump == 0.0) {
             return Ok(());
         }
+        // M_ff Δv_f = -M_fp Δv_p
         self.set(t, x, v);
         let M = mass_matrix(&self.arm.model, &mut self.data, &self.state.q);
         let size = self.free.len();

@@ -215,7 +215,7 @@ impl Sizes {
     }
 }
 
-/// One Newton iteration, for the accelerations at `t`.
+/// One run of Newton's method, for the accelerations at `t`.
 pub(crate) struct Search {
     t: f64,
     h: f64,

@@ -141,6 +141,7 @@ impl ModeInverse {
         let Self { matrices, s, inverse, determinants, right, solved, shift, .. } = self;
         let ModeMatrices { others, modes, coupling, own, .. } = &*matrices;
         let nb = others.len();
+        // Right-hand side of (3).
         for (i, &k) in others.iter().enumerate() {
             (right[2 * i], right[2 * i + 1]) = (r[k], 0.0);
         }
@@ -153,6 +154,7 @@ impl ModeInverse {
                 pair[1] -= v * u;
             }
         }
+        // Other coordinates by (3), then the modes by (2).
         solved.gemv(1.0, inverse, right, 0.0);
         for (((&coordinate, v), [mu, c, k]), a) in modes.iter().zip(columns()).zip(own).zip(&*determinants) {
             let (mut x, mut u) = (r[coordinate], 0.0);
@@ -178,6 +180,7 @@ impl ModeInverse {
         let Self { matrices, s, mass_factor, force, .. } = self;
         let ModeMatrices { others, modes, coupling, own, K, .. } = &*matrices;
         let nb = others.len();
+        // Force s K x on the other coordinates, with the modes eliminated from M.
         force.fill(0.0);
         for (column, &k) in K.as_slice().chunks_exact(nb.max(1)).zip(others) {
             let x = *s * x[k];

@@ -302,6 +302,7 @@ impl<const F: usize> Elimination<F> {
     fn solve(&mut self, tree: &[TreeNode], r: &[f64]) {
         let Self { s, nodes } = self;
         let none = [Vector6::zeros(); F];
+        // Inward pass (5).
         nodes.iter_mut().for_each(|node| node.carried = none);
         for (j, own) in tree.iter().enumerate().rev() {
             let (inner, outer) = nodes.split_at_mut(j);
@@ -315,6 +316,7 @@ impl<const F: usize> Elimination<F> {
                 *to += own.inward(&(f[i] - stretched[i]));
             }
         }
+        // Outward pass (6).
         for (j, own) in tree.iter().enumerate() {
             let (inner, outer) = nodes.split_at_mut(j);
             let node = &mut outer[0];

@@ -115,11 +115,13 @@ impl Pins {
         [h, upsilon, sigma]: [f64; 3],
         mut open: impl FnMut([(usize, Vector6<f64>); 2], &mut Found) -> Result<(), E>,
     ) -> Result<Option<()>, E> {
+        // Columns of Z = K^-1 Gᵀ.
         let count = self.rows.len();
         for j in 0..count {
             let ([A, B], G) = (self.bodies[j], self.rows[j].G);
             open([(A, G[0]), (B, G[1])], &mut self.columns[j])?;
         }
+        // (G Z + Σ) μ = s - G z_r
         for i in 0..count {
             for j in 0..count {
                 self.A[(i, j)] = self.rate(i, &self.columns[j].0);

@@ -353,6 +353,7 @@ impl TreeSolver {
         lambda: &mut [Vector6<f64>],
     ) -> Result<(), usize> {
         let n = self.parent.len();
+        // Inward pass: eliminate body and joint, (3) to (5).
         for i in (1..n).rev() {
             let (M, b) = rows[i].G.in_rows(&self.M[i], &self.b[i]);
             let (S_inverse, y) = sigma[i].hold(&M, &b, &self.s[i]).ok_or(i)?;
@@ -369,6 +370,7 @@ impl TreeSolver {
             }
             self.joints[i] = held;
         }
+        // Outward pass: impulses and velocities.
         v[0] = Vector6::zeros();
         for i in 1..n {
             let Held { S_inverse, y, free } = &self.joints[i];
