@@ -1,4 +1,4 @@
-//! What does one step of the moving reference arm cost, with each stepper?
+//! Cost of one step of the moving reference arm with each stepper.
 //!
 //! The work-precision table (time against error) is printed by
 //! `cargo test --release -p flexarm-stepping --test reference_arm -- --nocapture`; MuJoCo's step on

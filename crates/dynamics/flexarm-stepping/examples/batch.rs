@@ -1,10 +1,10 @@
-//! Time per step of many runs of the reference arm: alone, and side by side.
+//! Time per step of many runs of the reference arm: individually and in parallel lanes.
 //!
 //! ```text
 //! cargo run --release -p flexarm-stepping --example batch [RUNS]
 //! ```
-//! 4 s; stiffness and speed differ from run to run. CPU time of one thread, start of the runs
-//! included, all lines in turn, the smallest of five.
+//! 4 s; stiffness and speed differ from run to run. CPU time of one thread including the start of
+//! the runs, all lines in turn, minimum of five.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "an example")]
 
 use std::sync::Arc;
@@ -36,7 +36,7 @@ fn runs(number: usize, duration_s: f64) -> Vec<BatchRun> {
     (0..number).map(one).collect()
 }
 
-/// CPU time of one thread (s).
+/// Returns the CPU time of one thread (s).
 fn cost(work: impl FnOnce()) -> f64 {
     let start = cpu_time::ThreadTime::now();
     work();

@@ -1,10 +1,10 @@
-//! What long chains cost: an arm of two links, each a chain of so many elastic joints, set-up and
-//! steps alone.
+//! Cost of long chains: an arm of two links, each a chain of elastic joints; set-up, and steps
+//! without set-up.
 //!
 //! ```text
 //! cargo run --release --workspace --example chains [STEPS] [JOINTS ...]
 //! ```
-//! Generalised-alpha with default settings at 1 ms; CPU time of one thread, smallest of five.
+//! Generalised-alpha with default settings at 1 ms; CPU time of one thread, minimum of five.
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "an example")]
 
@@ -15,7 +15,7 @@ use flexarm_kinematics::{ElasticAngles, Model};
 use flexarm_stepping::*;
 use flexarm_testkit::chain_arm;
 
-/// The arm; its joints swing.
+/// Returns the arm; its joints oscillate.
 fn arm(joints: usize) -> FlexibleArm {
     let chains = chain_arm(joints, 0, ElasticAngles::EulerZyx);
     let model = Arc::new(Model::new(&chains.mechanism).unwrap());

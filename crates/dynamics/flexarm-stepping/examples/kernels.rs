@@ -1,8 +1,8 @@
-//! One kernel so many times, for counting its instructions: `tools/instruction_counts.py`.
+//! Repeats one kernel, to count its instructions: `tools/instruction_counts.py`.
 //!
 //! ```text
 //! cargo run --release --workspace --example kernels KERNEL TIMES
-//! cargo run --release --workspace --example kernels               # the names
+//! cargo run --release --workspace --example kernels               # lists the names
 //! ```
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "an example")]
@@ -15,7 +15,7 @@ use flexarm_stepping::*;
 use flexarm_testkit::{chain_arm, reference_arm, reference_motion};
 use nalgebra::DVector;
 
-/// A kernel, to be called so many times.
+/// A kernel; its argument is the number of repetitions.
 type Kernel = fn(usize);
 
 const KERNELS: [(&str, Kernel); 13] = [
@@ -75,7 +75,7 @@ const KERNELS: [(&str, Kernel); 13] = [
     }),
 ];
 
-/// The reference arm in some motion.
+/// The reference arm at one state of motion.
 struct Case {
     model: Model,
     data: Data,
@@ -118,7 +118,7 @@ fn steps(times: usize, arm: FlexibleArm, kind: StepperKind, h: f64) {
     black_box(stepper.time());
 }
 
-/// The reference arm and so many poses.
+/// Returns the reference arm and `times` poses.
 fn poses(times: usize) -> (OperatingPoint, Vec<f64>) {
     let arm = beams();
     let tool = arm.model.frame("tcp").unwrap().clone();
@@ -126,7 +126,7 @@ fn poses(times: usize) -> (OperatingPoint, Vec<f64>) {
     (OperatingPoint::new(arm, tool), poses)
 }
 
-/// The reference arm on its motion.
+/// Returns the reference arm on its motion.
 fn beams() -> FlexibleArm {
     let reference = reference_arm(true);
     let damping = Damping::StiffnessProportional(reference.beta);
@@ -140,7 +140,7 @@ fn beams() -> FlexibleArm {
     FlexibleArm::new(Arc::new(Model::new(&reference.mechanism).unwrap()), springs, Arc::new(motion)).unwrap()
 }
 
-/// Two links of four elastic joints each.
+/// Returns an arm with two links of four elastic joints each.
 fn chains() -> FlexibleArm {
     let chains = chain_arm(4, 0, ElasticAngles::EulerZyx);
     let damping = Damping::StiffnessProportional(1e-3);

@@ -1,11 +1,11 @@
-//! What links with many modes cost: the reference arm with two modal beams of so many
-//! fixed-interface modes, steps alone.
+//! Cost of links with many modes: the reference arm with two modal beams with a given number of
+//! fixed-interface modes; steps without set-up.
 //!
 //! ```text
 //! cargo run --release --workspace --example modal [STEPS] [MODES ...]
 //! ```
 //! Generalised-alpha with default settings at 1 ms, with the modes eliminated and with dense
-//! matrices; CPU time of one thread, in turn, smallest of five.
+//! matrices; CPU time of one thread, in turn, minimum of five.
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "an example")]
 
@@ -29,7 +29,7 @@ fn beams() -> [BeamLink; 2] {
     [lower.along(z, x, 0.0, Vector3::zeros()).unwrap(), upper.along(x, Vector3::y(), 0.0, Vector3::zeros()).unwrap()]
 }
 
-/// The arm with so many modes in each link.
+/// Returns the arm with `modes` modes in each link.
 fn arm(modes: usize) -> FlexibleArm {
     let mut mechanism = reference_arm(false).mechanism;
     for (name, next, length) in [("2b", "3", vector![0.0, 0.0, 1.095]), ("4b", "5", vector![1.0, 0.0, 0.0])] {
@@ -63,7 +63,7 @@ fn arm(modes: usize) -> FlexibleArm {
     FlexibleArm::new(model, springs, Arc::new(motion)).unwrap()
 }
 
-/// The same system, which does not say which of its coordinates are modes.
+/// The same system without information about its modes.
 struct Dense(ReducedArm);
 
 impl SecondOrderSystem for Dense {
@@ -93,7 +93,7 @@ impl SecondOrderSystem for Dense {
     }
 }
 
-/// CPU time of a step (us), and the work.
+/// Returns the CPU time of a step (us), and the work.
 fn timed(system: &mut impl SecondOrderSystem, e: &DVector<f64>, steps: usize) -> (f64, Counts) {
     let v = DVector::zeros(e.len());
     let mut alpha =

@@ -1,11 +1,11 @@
-//! Time against error: every stepper on the reference arm, 4 s, steps alone.
+//! Time against error: every stepper on the reference arm, 4 s, steps without set-up.
 //!
 //! ```text
 //! cargo run --release -p flexarm-stepping --example work_precision
 //! ```
-//! The error is the largest distance of the tool every 0.5 ms, or after every longer step, from the
-//! reference's, over its peak deflection; CPU time of one thread, the smallest of five runs, all
-//! lines in turn.
+//! The error is the maximum distance of the tool from that of the reference, every 0.5 ms or after
+//! every longer step, relative to its peak deflection; CPU time of one thread, minimum of five
+//! runs, all lines in turn.
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "an example")]
 
@@ -17,7 +17,7 @@ use flexarm_testkit::{reference_arm, reference_motion};
 use nalgebra::{DVector, Vector3};
 
 const DURATION: f64 = 4.0;
-/// Distance of the points that are compared (s).
+/// Interval of the compared points (s).
 const POINTS: f64 = 0.5e-3;
 
 fn arm() -> FlexibleArm {
@@ -34,7 +34,7 @@ fn arm() -> FlexibleArm {
     FlexibleArm::new(model, springs, Arc::new(motion)).unwrap()
 }
 
-/// Tool positions every [`POINTS`], and the work.
+/// Returns the tool positions every [`POINTS`], and the work.
 fn path(arm: &FlexibleArm, kind: StepperKind, h: f64) -> (Vec<Vector3<f64>>, Counts) {
     let tool = arm.model.frame("tcp").unwrap();
     let mut stepper = new_stepper(kind, arm.clone(), h, Start::Equilibrium).unwrap();
@@ -52,7 +52,7 @@ fn path(arm: &FlexibleArm, kind: StepperKind, h: f64) -> (Vec<Vector3<f64>>, Cou
     (points, stepper.counts())
 }
 
-/// CPU time of the steps alone (s).
+/// Returns the CPU time of the steps (s).
 fn cost(arm: &FlexibleArm, kind: StepperKind, h: f64) -> f64 {
     let mut stepper = new_stepper(kind, arm.clone(), h, Start::Equilibrium).unwrap();
     let start = cpu_time::ThreadTime::now();
@@ -62,7 +62,7 @@ fn cost(arm: &FlexibleArm, kind: StepperKind, h: f64) -> f64 {
     start.elapsed().as_secs_f64()
 }
 
-/// The same points of the rigid twin.
+/// Returns the same points of the rigid arm.
 fn rigid_path(arm: &FlexibleArm, count: usize) -> Vec<Vector3<f64>> {
     let (mut data, mut state) = (Data::new(&arm.model), State::zeros(&arm.model));
     let mut qddot = DVector::zeros(arm.model.nv());

@@ -1,9 +1,9 @@
-//! The flexible arm that every stepper gets: tree, springs, damping, drives, motion, external
+//! Flexible arm, the input of every stepper: tree, springs, damping, drives, motion, external
 //! loads.
 //!
-//! Immutable and shared; each stepper makes its own state from it. Start at [`FlexibleArm::new`].
+//! Immutable and shared; each stepper derives its own state from it. Start at [`FlexibleArm::new`].
 //!
-//! The free coordinates x of an arm are those of the joints that are driven by torque, then the
+//! The free coordinates x of an arm are those of the joints driven by torque, followed by the
 //! elastic ones. All other joints are prescribed.
 
 use std::sync::Arc;
@@ -21,18 +21,18 @@ use crate::modes::{Modes, modes_at};
 use crate::motion::PrescribedMotion;
 use crate::workspaces::Workspaces;
 
-/// Stiffness and damping of one group of elastic coordinates, before it has its place in the model.
+/// Stiffness and damping of one group of elastic coordinates, before it is assigned to the model.
 #[derive(Clone, Debug)]
 pub struct Spring {
     /// Name for logs.
     pub name: String,
-    /// Stiffness, size×size of the group.
+    /// Stiffness matrix, size×size of the group.
     pub K: DMatrix<f64>,
-    /// How it is damped.
+    /// Damping.
     pub damping: Damping,
-    /// Torque over deflection where it is not a straight line; only with one coordinate.
+    /// Torque over deflection if the spring is nonlinear; only for a single coordinate.
     pub curve: Option<TorqueCurve>,
-    /// Stiffness by load (geometric stiffening); only on modal bodies.
+    /// Load-dependent stiffness (geometric stiffening); only for modal bodies.
     pub geometric: Option<Arc<GeometricStiffness>>,
 }
 
@@ -43,13 +43,13 @@ impl From<(String, Matrix6<f64>, Damping)> for Spring {
     }
 }
 
-/// What loads add to the stiffness of a modal body, n×n per unit.
+/// Geometric stiffness of a modal body: contributions of loads to its stiffness, n×n per unit load.
 ///
-/// `K + Σ α_i acceleration_i + Σ ω_i ω_j centrifugal_ij`: the body's own inertia as it is
-/// accelerated and turned, body axes. Loads of what hangs on it are in `interface`.
+/// `K + Σ α_i acceleration_i + Σ ω_i ω_j centrifugal_ij` accounts for the body's own inertia forces
+/// under acceleration and rotation, in body axes. Loads of the attached bodies are in `interface`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GeometricStiffness {
-    /// Per unit acceleration of the origin, gravity taken off (s²/m).
+    /// Per unit acceleration of the origin, gravity subtracted (s²/m).
     pub acceleration: [DMatrix<f64>; 3],
     /// Per unit angular acceleration.
     pub angular: [DMatrix<f64>; 3],
@@ -59,14 +59,14 @@ pub struct GeometricStiffness {
     pub interface: Vec<[DMatrix<f64>; 6]>,
 }
 
-/// A spring in its place: generalised force `-(K e + D ė)` on its coordinates.
+/// A spring assigned to its coordinates: generalised force `-(K e + D ė)`.
 #[derive(Clone, Debug)]
 pub struct ElasticElement {
     /// Name for logs.
     pub name: String,
     /// Body behind the joint (distal part), or the modal body.
     pub body: usize,
-    /// First of its coordinates in the model.
+    /// Index of its first coordinate in the model.
     pub coordinate: usize,
     /// Number of its coordinates.
     pub size: usize,
@@ -76,7 +76,7 @@ pub struct ElasticElement {
     pub K: DMatrix<f64>,
     /// `K^-1`.
     pub C: DMatrix<f64>,
-    /// How it is damped.
+    /// Damping.
     pub damping: Damping,
     /// See [`Spring::curve`].
     pub curve: Option<TorqueCurve>,
@@ -85,7 +85,7 @@ pub struct ElasticElement {
 }
 
 impl ElasticElement {
-    /// Stored energy (J) at its coordinates.
+    /// Returns the stored energy (J) at the coordinates `e`.
     pub fn energy(&self, e: &[f64]) -> f64 {
         match &self.curve {
             Some(curve) => curve.energy(e[0]),
@@ -97,14 +97,15 @@ impl ElasticElement {
         }
     }
 
-    /// What the spring pulls with at its coordinates (N, N m): `K e`, or the curve.
+    /// Returns the elastic force (N, N m) at the coordinates `e`: `K e`, or the torque of the
+    /// curve.
     pub fn spring_force(&self, e: &[f64]) -> DVector<f64> {
         let mut f = DVector::zeros(e.len());
         self.add_spring_force(e, f.as_mut_slice());
         f
     }
 
-    /// `f += K e`, or the curve.
+    /// Adds the elastic force: `f += K e`, or the torque of the curve.
     #[inline]
     pub(crate) fn add_spring_force(&self, e: &[f64], f: &mut [f64]) {
         match &self.curve {
@@ -114,7 +115,7 @@ impl ElasticElement {
     }
 }
 
-/// `y += A x` for a square A, with the vector instructions that the processor has.
+/// Computes `y += A x` for a square A, with the vector instructions that the processor has.
 pub(crate) fn add_product(A: &DMatrix<f64>, x: &[f64], y: &mut [f64]) {
     struct AddProduct<'a>(&'a [f64], &'a [f64], &'a mut [f64]);
     impl Loops for AddProduct<'_> {
@@ -129,8 +130,8 @@ pub(crate) fn add_product(A: &DMatrix<f64>, x: &[f64], y: &mut [f64]) {
 /// Damping of an elastic element.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Damping {
-    /// Damping ratio of the arm's modes, weighted by the share of strain energy that this element
-    /// has in each mode.
+    /// Damping ratio of the arm's modes, weighted by the share of strain energy of this element in
+    /// each mode.
     Modal(f64),
     /// `D = beta K` (s).
     StiffnessProportional(f64),
@@ -141,7 +142,7 @@ pub enum Damping {
 }
 
 impl Damping {
-    /// So many times as much of it.
+    /// Returns the damping scaled by `factor`.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
         match self {
@@ -153,85 +154,85 @@ impl Damping {
     }
 }
 
-/// A change of what a body carries while the arm moves.
+/// A change of the inertia of a body during the motion, such as a payload that is picked up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InertiaChange {
-    /// When (s).
+    /// Time of the change (s).
     pub t: f64,
-    /// Which body.
+    /// Index of the body.
     pub body: usize,
-    /// Its inertia from then on, about Bo, B axes, with all that is fixed to it.
+    /// New inertia about Bo, in B axes, including everything fixed to the body.
     pub inertia: SpatialInertia,
 }
 
 /// Tree, springs, damping, drives and motion.
 #[derive(Clone)]
 pub struct FlexibleArm {
-    /// The tree; elastic joints and modal bodies in it are the springs.
+    /// Kinematic tree; its elastic joints and modal bodies are the springs.
     pub model: Arc<Model>,
     /// Springs, in coordinate order; one per elastic group of the model.
     pub elements: Vec<ElasticElement>,
     /// Damping matrix on the elastic coordinates.
     pub D: DMatrix<f64>,
-    /// `beta` per element that comes nearest to `D` (exact when stiffness-proportional), for SPOOK
-    /// (s).
+    /// `beta` per element that approximates `D` (s); exact when stiffness-proportional. Used by
+    /// SPOOK.
     pub tau: Vec<f64>,
     /// Whether `D` is block diagonal with `beta K` in the blocks.
     pub proportional: bool,
-    /// Motion of the actuated joints; what servos follow.
+    /// Motion of the actuated joints; reference of the servos.
     pub motion: Arc<dyn PrescribedMotion>,
     /// Actuated coordinates driven by torque, ascending.
     pub torque_driven: Vec<usize>,
     /// Friction per actuated coordinate (empty: none).
     pub friction: Vec<Friction>,
-    /// Controller of the joints that are driven by torque.
+    /// Controller of the joints driven by torque.
     pub servo: Option<Arc<Servo>>,
     /// External loads.
     pub loads: Vec<Load>,
     /// Changes of inertia, by time.
     pub inertia_changes: Vec<InertiaChange>,
-    /// Errors of transmissions; see [`FlexibleArm::with_transmission_errors`].
+    /// Transmission errors; see [`FlexibleArm::with_transmission_errors`].
     pub transmission: Vec<TransmissionError>,
-    /// Gears whose torque has a history; see [`FlexibleArm::with_hysteresis`].
+    /// Gears with hysteresis; see [`FlexibleArm::with_hysteresis`].
     pub hysteresis: Vec<Hysteresis>,
     /// Friction that grows with the transmitted torque.
     pub load_friction: Vec<LoadFriction>,
-    /// Gears that move several joints; see [`FlexibleArm::with_coupling`].
+    /// Gears that couple several joints; see [`FlexibleArm::with_coupling`].
     pub coupling: Option<GearCoupling>,
-    /// Stiffness between elastic coordinates of coupled gears: row, column, entry, which stands in
-    /// the mirrored place too.
+    /// Stiffness between elastic coordinates of coupled gears: row, column, entry; the symmetric
+    /// entry is implied.
     pub cross_stiffness: Vec<(usize, usize, f64)>,
-    /// The same of their dampers.
+    /// Damping between elastic coordinates of coupled gears, in the same form.
     pub cross_damping: Vec<(usize, usize, f64)>,
     /// Natural modes at the start pose, drives locked.
     pub modes: Modes,
-    /// Shared with all copies of the arm.
+    /// Reusable workspaces, shared with all copies of the arm.
     pub workspaces: Workspaces,
 }
 
 /// Sampled joint controllers; see [`ServoAxis`].
 #[derive(Clone, Debug)]
 pub struct Servo {
-    /// Time between two samples (s).
+    /// Sampling period (s).
     pub sample_s: f64,
-    /// One per joint driven by torque, in the order of [`FlexibleArm::torque_driven`].
+    /// One axis per joint driven by torque, in the order of [`FlexibleArm::torque_driven`].
     pub axes: Vec<ServoAxis>,
-    /// The rigid robot, for the feed-forward; coordinates are the actuated ones.
+    /// Rigid robot for the feed-forward; its coordinates are the actuated ones.
     pub rigid: Arc<Model>,
 }
 
 impl FlexibleArm {
-    /// Damping ratio of the first mode; 0 if nothing swings.
+    /// Returns the damping ratio of the first mode; 0 without elastic coordinates.
     pub fn first_damping_ratio(&self) -> f64 {
         let Some(omega) = self.modes.omega.first() else { return 0.0 };
         let shape = self.modes.shapes.column(0);
         shape.dot(&(&self.D * shape)) / (2.0 * omega)
     }
 
-    /// Puts springs on the elastic groups of a model.
+    /// Creates an arm from a model and the springs of its elastic groups.
     ///
     /// `springs` lists name, stiffness and damping in the order of `model.elastic()`. The modal
-    /// damping matrix and the modes are those of the static pose at `t = 0`.
+    /// damping matrix and the modes are computed at the static equilibrium at `t = 0`.
     ///
     /// # Errors
     /// [`StepError::Setup`] if counts or sizes differ, [`StepError::Singular`] if a stiffness is
@@ -289,7 +290,7 @@ impl FlexibleArm {
         Ok(arm)
     }
 
-    /// The same arm with constant external loads: (body, wrench at Bo in world axes).
+    /// Returns the arm with constant external loads: (body, wrench at Bo in world axes).
     ///
     /// # Errors
     /// As [`FlexibleArm::new`].
@@ -297,7 +298,7 @@ impl FlexibleArm {
         self.with_timed_loads(loads.into_iter().map(|(body, F)| Load::constant(body, F)).collect())
     }
 
-    /// The same arm with external loads that change with time.
+    /// Returns the arm with external loads that change with time.
     ///
     /// # Errors
     /// As [`FlexibleArm::new`].
@@ -307,7 +308,7 @@ impl FlexibleArm {
         Ok(self)
     }
 
-    /// The same arm with what it carries changing on the way; changes at 0 or before hold from the
+    /// Returns the arm with inertias that change during the motion; changes at t ≤ 0 apply from the
     /// start.
     ///
     /// # Errors
@@ -319,8 +320,8 @@ impl FlexibleArm {
         Ok(self)
     }
 
-    /// Carries out the changes that are due at the start, so that it is found in equilibrium with
-    /// them.
+    /// Applies the inertia changes that are due at the start, so that the initial equilibrium
+    /// includes them.
     pub(crate) fn carry_from_start(&mut self) -> Result<(), StepError> {
         let due = self.inertia_changes.iter().take_while(|change| change.t <= SAME_TIME).count();
         for change in self.inertia_changes.drain(..due) {
@@ -329,11 +330,12 @@ impl FlexibleArm {
         if due > 0 { self.update_modes_and_damping() } else { Ok(()) }
     }
 
-    /// The same arm with some joints driven by torque, under a controller.
+    /// Returns the arm with some joints driven by torque, under a controller.
     ///
     /// # Errors
-    /// [`StepError::Setup`] if the axes are not actuated coordinates, the rigid robot has not just
-    /// these, or an axis without mass behind it has no rotor.
+    /// [`StepError::Setup`] if the axes are not ascending actuated coordinates, the rigid robot has
+    /// a different number of coordinates, friction of an axis depends on its load without a
+    /// gearbox, or an axis without inertia behind it has no rotor.
     pub fn with_servo(mut self, servo: Servo) -> Result<Self, StepError> {
         let n = self.model.n_actuated();
         self.torque_driven = servo.axes.iter().map(|a| a.coordinate).collect();
@@ -374,30 +376,31 @@ impl FlexibleArm {
         Ok(self)
     }
 
-    /// The same arm with the inertia of one body replaced (about Bo, B axes); modes and damping
-    /// stay as they are.
+    /// Returns the arm with the inertia of one body replaced (about Bo, B axes); modes and damping
+    /// are not updated.
     #[must_use]
     pub fn with_inertia(&self, body: usize, inertia: SpatialInertia) -> Self {
         Self { model: Arc::new(self.model.with_inertia(body, inertia)), ..self.clone() }
     }
 
-    /// The same arm along another motion; modes and damping stay as they are.
+    /// Returns the arm with another motion; modes and damping are not updated.
     #[must_use]
     pub fn along(&self, motion: Arc<dyn PrescribedMotion>) -> Self {
         Self { motion, ..self.clone() }
     }
 
-    /// Number of elastic coordinates.
+    /// Returns the number of elastic coordinates.
     pub fn n_elastic_coordinates(&self) -> usize {
         self.model.n_elastic()
     }
 
-    /// Number of free coordinates: joints driven by torque, then elastic ones.
+    /// Returns the number of free coordinates: joints driven by torque, then elastic ones.
     pub fn n_free(&self) -> usize {
         self.torque_driven.len() + self.model.n_elastic()
     }
 
-    /// Stiffness on the elastic coordinates, block diagonal; of curved springs their slope at rest.
+    /// Returns the stiffness on the elastic coordinates: blocks of the elements plus cross
+    /// stiffness of coupled gears. Nonlinear springs contribute their `K`.
     pub fn stiffness(&self) -> DMatrix<f64> {
         let n = self.n_elastic_coordinates();
         let mut K = DMatrix::zeros(n, n);
@@ -411,27 +414,28 @@ impl FlexibleArm {
         K
     }
 
-    /// First coordinate of an element within the elastic ones.
+    /// Returns the first coordinate of an element within the elastic ones.
     pub fn offset(&self, element: &ElasticElement) -> usize {
         element.coordinate - self.model.n_actuated()
     }
 
-    /// Elastic energy (J) at elastic coordinates `e`, transmission errors and what sliders lost
-    /// left out.
+    /// Returns the elastic energy (J) at elastic coordinates `e`, without transmission errors and
+    /// losses of sliders.
     pub fn elastic_energy(&self, e: &[f64]) -> f64 {
         let own: f64 =
             self.elements.iter().map(|element| element.energy(&e[self.offset(element)..][..element.size])).sum();
         self.cross_stiffness.iter().fold(own, |sum, &(i, j, k)| sum + k * e[i] * e[j])
     }
 
-    /// Full state at time `t` with elastic coordinates zero; the accelerations go into `qddot`.
+    /// Writes positions and velocities of the actuated joints at time `t` into `state` and their
+    /// accelerations into `qddot`.
     pub fn prescribed_state(&self, t: f64, state: &mut State, qddot: &mut DVector<f64>) {
         let n = self.model.n_actuated();
         let (q, qdot) = (state.q.as_mut_slice(), state.qdot.as_mut_slice());
         self.motion.sample(t, &mut q[..n], &mut qdot[..n], &mut qddot.as_mut_slice()[..n]);
     }
 
-    /// Puts the loads of time `t` on the bodies, for the poses in `data.X_WB`.
+    /// Writes the external loads at time `t` into `data.F_ext`, for the poses in `data.X_WB`.
     pub fn apply_loads(&self, data: &mut Data, t: f64) {
         for load in &self.loads {
             data.F_ext[load.body] = Wrench::zeros();
@@ -441,12 +445,12 @@ impl FlexibleArm {
         }
     }
 
-    /// Friction torque of an actuated coordinate at a speed.
+    /// Returns the friction torque of an actuated coordinate at a speed.
     pub(crate) fn friction_torque(&self, coordinate: usize, rate: f64) -> f64 {
         self.friction.get(coordinate).map_or(0.0, |f| f.torque(rate))
     }
 
-    /// Motion of a spring of one coordinate, for the rows of SPOOK.
+    /// Returns the joint axis of a spring with one coordinate, for the constraint rows of SPOOK.
     pub(crate) fn single_axis(&self, body: usize) -> Option<AxisMotion> {
         match self.model.bodies()[body].motion {
             JointMotion::Axis(motion) => Some(motion),
@@ -454,8 +458,8 @@ impl FlexibleArm {
         }
     }
 
-    /// Modes at `t = 0` and the damping matrix that follows from them; to be called after a change
-    /// by hand.
+    /// Recomputes the modes at `t = 0` and the damping matrix that depends on them; to be called
+    /// after fields were changed directly.
     ///
     /// # Errors
     /// As [`FlexibleArm::new`].
@@ -475,13 +479,14 @@ impl FlexibleArm {
                 Damping::Modal(zeta) => 2.0 * zeta / first,
                 Damping::StiffnessProportional(beta) => beta,
                 Damping::Rayleigh(a, b) => a / (first * first) + b,
-                // The one factor that gives the same trace.
+                // Factor that gives the same trace.
                 Damping::Dampers(d) => d[..e.size].iter().sum::<f64>() / e.K.trace(),
             })
             .collect();
         self.D.fill(0.0);
 
-        // D = M Φ diag(2 ζ ω) Φᵀ M with ζ of each mode weighted by strain energy, plus blocks.
+        // D = M Φ diag(2 ζ ω) Φᵀ M, ζ of each mode weighted by strain energy, plus the blocks of
+        // the elements.
         let M = self.mass_at_start();
         if !self.damps_by_element() {
             self.add_modal_damping(&M);
@@ -509,7 +514,8 @@ impl FlexibleArm {
         Ok(())
     }
 
-    /// Mass matrix of the elastic coordinates where the modes are taken.
+    /// Returns the mass matrix of the elastic coordinates at the pose at which the modes are
+    /// computed.
     fn mass_at_start(&self) -> DMatrix<f64> {
         let (model, n) = (&self.model, self.n_elastic_coordinates());
         let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));
@@ -520,7 +526,7 @@ impl FlexibleArm {
         M.view((model.n_actuated(), model.n_actuated()), (n, n)).clone_owned()
     }
 
-    /// Ratio with which the element of an elastic coordinate is damped.
+    /// Returns the modal damping ratio of the element of an elastic coordinate.
     fn modal_ratio(&self, offset: usize) -> f64 {
         let own = self.elements.iter().find(|e| (self.offset(e)..self.offset(e) + e.size).contains(&offset));
         own.map_or(0.0, |e| if let Damping::Modal(ratio) = e.damping { ratio } else { 0.0 })

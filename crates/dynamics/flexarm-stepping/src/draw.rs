@@ -1,8 +1,8 @@
-//! Numbers and matrices drawn from a seed, for tests of kernels.
+//! Pseudo-random numbers and matrices from a seed, for tests of kernels.
 
 use nalgebra::Matrix6;
 
-/// Numbers between -1 and 1 in turn.
+/// Generator of pseudo-random numbers in [-1, 1).
 pub(crate) struct Draw(pub(crate) u64);
 
 impl Draw {
@@ -11,7 +11,7 @@ impl Draw {
         (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }
 
-    /// Symmetric, with no eigenvalue below `least`.
+    /// Returns a random symmetric matrix with no eigenvalue below `least`.
     pub(crate) fn definite(&mut self, least: f64) -> Matrix6<f64> {
         let A = Matrix6::from_fn(|_, _| self.next());
         A * A.transpose() + Matrix6::identity() * least

@@ -1,29 +1,29 @@
-//! What sits in a drive: curved springs, friction, and the axis of a sampled controller.
+//! Parts of a drive: nonlinear springs, friction, and one axis of a sampled controller.
 //!
-//! Start at [`ServoAxis`], [`Friction`] and [`TorqueCurve`]. All quantities are on the joint's side
-//! of the gear. Not here: rotors (they are in the tree), gearbox springs that are straight (they
-//! are elements of the arm).
+//! Start at [`ServoAxis`], [`Friction`] and [`TorqueCurve`]. All quantities are on the joint side
+//! of the gear. Not here: rotors (in the tree) and linear gearbox springs (elements of the arm).
 
-/// Torque of a spring over its deflection, by straight pieces, odd or not; the end pieces go on.
+/// Piecewise linear torque of a spring over its deflection, odd or not; the end pieces are
+/// extrapolated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TorqueCurve {
     /// Deflections (rad or m), ascending.
     x: Vec<f64>,
-    /// Torques (N m or N), never falling.
+    /// Torques (N m or N), non-decreasing.
     y: Vec<f64>,
 }
 
-/// Why points make no curve.
+/// Reason why points are rejected as a torque curve.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{0}")]
 pub struct CurveError(String);
 
 impl TorqueCurve {
-    /// From points (deflection, torque).
+    /// Creates a curve from points (deflection, torque).
     ///
     /// # Errors
-    /// [`CurveError`] for fewer than two points, deflections that do not rise, torques that fall,
-    /// or ends that are flat.
+    /// [`CurveError`] for fewer than two points, values that are not finite, deflections that do
+    /// not increase, torques that decrease, or flat end pieces.
     pub fn new(points: &[[f64; 2]]) -> Result<Self, CurveError> {
         let fail = |text: String| Err(CurveError(text));
         if points.len() < 2 {
@@ -49,24 +49,26 @@ impl TorqueCurve {
         Ok(Self { x: points.iter().map(|p| p[0]).collect(), y: points.iter().map(|p| p[1]).collect() })
     }
 
-    /// A straight spring with play: no torque within `± half` (rad), then `stiffness`.
+    /// Creates a linear spring with backlash: no torque within `± half` (rad), slope `stiffness`
+    /// beyond.
     pub fn backlash(stiffness: f64, half: f64) -> Self {
         let reach = half + 1.0;
         Self { x: vec![-reach, -half, half, reach], y: vec![-stiffness, 0.0, 0.0, stiffness] }
     }
 
-    /// A straight spring.
+    /// Creates a linear spring.
     pub fn straight(stiffness: f64) -> Self {
         Self { x: vec![-1.0, 0.0, 1.0], y: vec![-stiffness, 0.0, stiffness] }
     }
 
-    /// The sum with a spring of that stiffness whose torque no longer grows beyond `± reach`.
+    /// Returns the sum with a spring of stiffness `stiffness` whose torque saturates beyond
+    /// `± reach`.
     #[must_use]
     pub fn with_slider(&self, stiffness: f64, reach: f64) -> Self {
         let mut x = self.x.clone();
-        // Exactly nothing at no deflection.
+        // The point at 0 makes the torque exactly zero at zero deflection.
         x.extend([-reach, 0.0, reach]);
-        // The end pieces go on without the slider.
+        // Outer points: the end pieces have the slope without the slider.
         let end = self.x.iter().fold(reach, |end, x| end.max(x.abs())) + 1.0;
         x.extend([-end, end]);
         x.sort_by(f64::total_cmp);
@@ -75,7 +77,7 @@ impl TorqueCurve {
         Self { x, y }
     }
 
-    /// The same deflections with so many times the torque.
+    /// Returns the curve with its torques scaled by `factor`.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {
         Self { x: self.x.clone(), y: self.y.iter().map(|y| factor * y).collect() }
@@ -86,21 +88,22 @@ impl TorqueCurve {
         inner.iter().take_while(|x| e >= **x).count()
     }
 
-    /// Torque at a deflection.
+    /// Returns the torque at deflection `e`.
     pub fn torque(&self, e: f64) -> f64 {
-        // From the inner end of the first piece, which may be long: no digits are lost beside a
-        // play.
+        // Measured from the inner end of the first piece, which may be long: avoids round-off next
+        // to backlash.
         let k = self.piece(e).max(1);
         self.y[k] + self.slope(e) * (e - self.x[k])
     }
 
-    /// Its slope.
+    /// Returns the slope at deflection `e`.
     pub fn slope(&self, e: f64) -> f64 {
         let k = self.piece(e);
         (self.y[k + 1] - self.y[k]) / (self.x[k + 1] - self.x[k])
     }
 
-    /// Distance from a deflection without slope to where the torque rises again in that direction.
+    /// Returns the distance from a deflection in a flat piece to the next rising piece in
+    /// `direction`; `None` if the curve rises at `e`.
     pub(crate) fn way_out(&self, e: f64, direction: f64) -> Option<f64> {
         let rises = |k: usize| self.y[k + 1] > self.y[k];
         let here = self.piece(e);
@@ -114,12 +117,12 @@ impl TorqueCurve {
         }
     }
 
-    /// Steepest slope: the stiffness that linear figures use.
+    /// Returns the steepest slope: the stiffness for linear analyses.
     pub fn stiffest(&self) -> f64 {
         (0..self.x.len() - 1).map(|k| (self.y[k + 1] - self.y[k]) / (self.x[k + 1] - self.x[k])).fold(0.0, f64::max)
     }
 
-    /// Work from zero deflection to `e` (J).
+    /// Returns the work from zero deflection to `e` (J).
     pub fn energy(&self, e: f64) -> f64 {
         let (low, high, sign) = if e < 0.0 { (e, 0.0, -1.0) } else { (0.0, e, 1.0) };
         let mut places: Vec<f64> = self.x.iter().copied().filter(|x| *x > low && *x < high).collect();
@@ -130,22 +133,22 @@ impl TorqueCurve {
     }
 }
 
-/// Friction of a drive: viscous, Coulomb made smooth near standstill, and the Stribeck rise.
+/// Friction of a drive: viscous, regularised Coulomb, and Stribeck effect.
 ///
 /// ```text
 /// τ = viscous q̇ + (coulomb + stribeck exp(-(q̇/v_s)²)) tanh(q̇/v_0)
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Friction {
-    /// (N m s/rad).
+    /// Viscous coefficient (N m s/rad).
     pub viscous: f64,
-    /// (N m).
+    /// Coulomb friction (N m).
     pub coulomb: f64,
-    /// What static friction has beyond Coulomb's (N m).
+    /// Excess of static friction over Coulomb friction (N m).
     pub stribeck: f64,
-    /// Speed at which that has fallen to 1/e (rad/s).
+    /// Speed at which this excess has decayed to 1/e (rad/s).
     pub stribeck_velocity: f64,
-    /// Speed `v_0` over which the sign changes (rad/s): below it the joint creeps instead of
+    /// Regularisation speed `v_0` of the sign change (rad/s): below it the joint creeps instead of
     /// sticking.
     pub regularisation: f64,
 }
@@ -155,13 +158,13 @@ impl Friction {
     pub const NONE: Friction =
         Friction { viscous: 0.0, coulomb: 0.0, stribeck: 0.0, stribeck_velocity: 1.0, regularisation: 1.0 };
 
-    /// Torque against the motion (N m) at a speed (rad/s).
+    /// Returns the torque against the motion (N m) at a speed (rad/s).
     pub fn torque(&self, rate: f64) -> f64 {
         let rise = self.stribeck * (-(rate / self.stribeck_velocity).powi(2)).exp();
         self.viscous * rate + (self.coulomb + rise) * (rate / self.regularisation).tanh()
     }
 
-    /// Its derivative by the speed.
+    /// Returns the derivative of the torque with respect to the speed.
     pub fn slope(&self, rate: f64) -> f64 {
         let (s, t) = (rate / self.stribeck_velocity, (rate / self.regularisation).tanh());
         let rise = self.stribeck * (-s * s).exp();
@@ -169,7 +172,8 @@ impl Friction {
             - rise * 2.0 * s / self.stribeck_velocity * t
     }
 
-    /// Change of the torque at a speed as the numbers of the law change by those of `by`.
+    /// Returns the directional derivative of the torque at a speed with respect to the parameters,
+    /// in direction `by`.
     pub fn change(&self, rate: f64, by: &Friction) -> f64 {
         let (s, t) = (rate / self.stribeck_velocity, (rate / self.regularisation).tanh());
         let bell = (-s * s).exp();
@@ -180,28 +184,29 @@ impl Friction {
     }
 }
 
-/// One axis of the controller: position loop around a speed loop, sampled, with feed-forward and a
+/// One axis of the controller: sampled position loop around a velocity loop, with feed-forward and
 /// torque limit.
 ///
 /// ```text
 /// v_c = q̇_ref + position_gain (q_ref - q)
-/// τ   = velocity_gain (v_c - q̇) + integral_gain ∫ (v_c - q̇) dt + τ_ff        |τ| ≤ limit, held until the next sample
+/// τ   = velocity_gain (v_c - q̇) + integral_gain ∫ (v_c - q̇) dt + τ_ff,   |τ| ≤ limit
 /// ```
-/// q is the motor's angle seen from the joint. τ_ff is the rigid robot's torque on the reference
-/// motion, rotor and friction included. The integral stops while the torque is at its limit.
+/// q is the motor angle on the joint side. τ is held until the next sample. τ_ff is the torque of
+/// the rigid robot on the reference motion, including rotor and friction. The integral stops while
+/// the torque is at its limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ServoAxis {
     /// Coordinate of the joint.
     pub coordinate: usize,
-    /// (1/s).
+    /// Position loop gain (1/s).
     pub position_gain: f64,
-    /// (N m s/rad).
+    /// Velocity loop gain (N m s/rad).
     pub velocity_gain: f64,
-    /// (N m/rad).
+    /// Integral gain of the velocity loop (N m/rad).
     pub integral_gain: f64,
     /// Whether τ_ff is added.
     pub feed_forward: bool,
-    /// Largest torque (N m); infinite: none.
+    /// Torque limit (N m); infinite for none.
     pub limit: f64,
 }
 
@@ -228,7 +233,7 @@ mod tests {
         assert!((soft.torque(0.0005) - 1.0).abs() < 1e-12 && (soft.stiffest() - 98.0 / 0.009).abs() < 1e-9);
     }
 
-    /// The slope is the derivative, by central differences; measured 1e-9.
+    /// The slope is the derivative of the torque, by central differences; measured 1e-9.
     #[test]
     fn friction_slope_is_the_derivative_of_its_torque() {
         let f = Friction { viscous: 3.0, coulomb: 20.0, stribeck: 8.0, stribeck_velocity: 0.2, regularisation: 0.05 };
@@ -238,7 +243,7 @@ mod tests {
         }
     }
 
-    /// Truth: differences of fourth order in all five numbers at once; measured 3e-12.
+    /// Truth: fourth-order differences in all five parameters at once; measured 3e-12.
     #[test]
     fn the_change_of_friction_is_the_derivative_of_its_torque_by_its_numbers() {
         let f = Friction { viscous: 3.0, coulomb: 20.0, stribeck: 8.0, stribeck_velocity: 0.2, regularisation: 0.05 };

@@ -1,31 +1,31 @@
-//! Eigenvalues of small symmetric matrices in storage that the caller keeps: no allocation.
+//! Eigenvalues of small symmetric matrices in storage of the caller, without allocation.
 //!
-//! Householder's reduction to a tridiagonal matrix ([Golub and Van Loan 2013], 8.3), then QL steps
-//! with squares of rotations, as in LAPACK's `dsterf`: two divisions side by side instead of a root
-//! and then a division. Eigenvalues alone; absolute errors are some units in the last place of the
-//! largest. Where eigenvectors are wanted, nalgebra has them. Of one matrix or of several side by
-//! side: each lane has the bits of its matrix alone.
+//! Householder reduction to tridiagonal form ([Golub and Van Loan 2013], 8.3), then QL steps with
+//! squared rotations, as in LAPACK's `dsterf`: two independent divisions instead of a root followed
+//! by a division. Computes eigenvalues only; absolute errors are a few units in the last place of
+//! the largest one. For eigenvectors use nalgebra. Works on one matrix or on several in SIMD lanes;
+//! the result of a lane is bitwise that of its matrix by itself.
 
 use flexarm_kinematics::Real;
 
 use crate::dense::{dot, larger};
 
-/// Most QL steps per eigenvalue; two are usual.
+/// Maximum number of QL steps per eigenvalue; two are typical.
 const MOST_STEPS: usize = 60;
 
-/// Squares below this are not divided by; the matrix is about one.
+/// Lower bound of squares used as divisors; the matrix is scaled to about one.
 const SMALLEST: f64 = 1e-280;
 
-/// Eigenvalues of the symmetric matrix `A` (n×n, column after column, lower triangle read,
+/// Writes the eigenvalues of the symmetric matrix `A` (n×n, column-major, lower triangle read,
 /// destroyed), unsorted, into `d` (n).
 ///
 /// * `e`: n numbers of workspace.
 ///
-/// Returns 1, and 0 where the iteration does not end, as with entries that are no numbers.
+/// Returns 1 on convergence, else 0, as with NaN or infinite entries.
 #[inline(always)]
 pub(crate) fn symmetric_eigenvalues<T: Real>(A: &mut [T], d: &mut [T], e: &mut [T]) -> T {
     tridiagonalise(A, d, e);
-    // About one, so that squares neither overflow nor vanish.
+    // Scale to about one, so that squares neither overflow nor underflow.
     let (mut largest, mut broken) = (T::zero(), T::zero());
     for x in d.iter().chain(e.iter()) {
         largest = larger(largest, x.abs());
@@ -36,7 +36,7 @@ pub(crate) fn symmetric_eigenvalues<T: Real>(A: &mut [T], d: &mut [T], e: &mut [
     for (d, e) in d.iter_mut().zip(e.iter_mut()) {
         *d /= scale;
         let ratio = *e / scale;
-        // What is no number has nothing to iterate.
+        // Without finite entries there is nothing to iterate.
         *e = broken.pick_below(T::one(), ratio * ratio, T::zero());
     }
     let ended = ql(d, e);
@@ -46,19 +46,19 @@ pub(crate) fn symmetric_eigenvalues<T: Real>(A: &mut [T], d: &mut [T], e: &mut [
     broken.pick_below(T::one(), ended, T::zero())
 }
 
-/// Diagonal into `d`, subdiagonal into `e[..n-1]`, `e[n-1] = 0`.
+/// Reduces `A`: diagonal into `d`, subdiagonal into `e[..n-1]`, `e[n-1] = 0`.
 #[inline(always)]
 fn tridiagonalise<T: Real>(A: &mut [T], d: &mut [T], e: &mut [T]) {
     let n = d.len();
     for k in 0..n.saturating_sub(2) {
         let (inward, B) = A.split_at_mut((k + 1) * n);
         let (v, w) = (&mut inward[k * n + k + 1..], &mut e[k + 1..]);
-        // v = x - α e_1 below the diagonal of column k; H = 1 - 2 v vᵀ / vᵀv makes it (α, 0, 0,
+        // v = x - α e_1 below the diagonal of column k; H = 1 - 2 v vᵀ / vᵀv maps it to (α, 0, 0,
         // ...).
         let (norm, first) = (dot(v, v).sqrt(), v[0]);
         let alpha = first.pick_below(T::zero(), norm, -norm);
         v[0] -= alpha;
-        // A column that is zero stays: v is zero then.
+        // A zero column stays as it is: v is zero then.
         let half = norm * (norm + first.abs());
         let half = T::zero().pick_below(norm, half, T::one());
         // p = B v / (vᵀv / 2);  w = p - v (pᵀv) / vᵀv;  B -= v wᵀ + w vᵀ
@@ -85,8 +85,8 @@ fn tridiagonalise<T: Real>(A: &mut [T], d: &mut [T], e: &mut [T]) {
     }
 }
 
-/// `w = B v` with the lower triangle of a symmetric B, whose columns begin with `above` entries
-/// that do not count.
+/// Computes `w = B v` with the lower triangle of a symmetric B whose columns begin with `above`
+/// unused entries.
 #[inline(always)]
 fn multiply<T: Real>(B: &[T], above: usize, v: &[T], w: &mut [T]) {
     w.fill(T::zero());
@@ -99,11 +99,10 @@ fn multiply<T: Real>(B: &[T], above: usize, v: &[T], w: &mut [T]) {
     }
 }
 
-/// Eigenvalues of a tridiagonal matrix with squares beside its diagonal, in place of the latter; 1
-/// where that came to an end, else 0.
+/// Computes the eigenvalues of a tridiagonal matrix, with squared subdiagonal in `e`, in place of
+/// its diagonal `d`; returns 1 on convergence, else 0.
 ///
-/// Lanes go together from eigenvalue to eigenvalue: one that has found its own waits for the
-/// others.
+/// All lanes work on the same eigenvalue: a lane that has converged waits for the others.
 #[inline(always)]
 fn ql<T: Real>(d: &mut [T], e: &mut [T]) -> T {
     let n = d.len();
@@ -124,14 +123,14 @@ fn ql<T: Real>(d: &mut [T], e: &mut [T]) -> T {
     ended
 }
 
-/// What has not fallen apart from row l on.
+/// Leading unreduced block that starts at row l.
 struct Block<T> {
-    /// Its last row, of each lane, as a number, and its diagonal entry.
+    /// Last row of the block in each lane, as a number, and its diagonal entry.
     end: T,
     d_end: T,
-    /// The largest of them.
+    /// Maximum of the last rows.
     last: usize,
-    /// Whether it is the same in all lanes.
+    /// Whether the last row is the same in all lanes.
     alike: bool,
 }
 
@@ -145,7 +144,7 @@ impl<T: Real> Block<T> {
         while row < last {
             let bound = T::splat(f64::EPSILON) * (d[row].abs() + d[row + 1].abs());
             let small = (bound * bound).pick_below(e[row], T::zero(), T::one());
-            // Where it is small for the first time.
+            // First row with a negligible subdiagonal entry.
             let here = end.pick_below(none, T::zero(), small);
             end = T::splat(0.5).pick_below(here, T::splat(row as f64), end);
             d_end = T::splat(0.5).pick_below(here, d[row], d_end);
@@ -159,8 +158,8 @@ impl<T: Real> Block<T> {
     }
 }
 
-/// A QL step with Wilkinson's shift σ on the rows from l to the end of a block, from the bottom up.
-/// Of rotations by c and s the squares are enough:
+/// Applies a QL step with Wilkinson's shift σ to the rows from l to the end of a block, from the
+/// bottom up. Only the squares of the rotations by c and s are needed:
 ///
 /// ```text
 /// r = p + e²,   c² = p/r,   s² = e²/r,   γ' = c² (d - σ) - s² γ,   p' = γ'²/c²
@@ -179,9 +178,9 @@ fn sweep<T: Real>(d: &mut [T], e: &mut [T], l: usize, block: &Block<T>) {
         let r = p + b;
         let (c_new, s_new, inverse) = (p / r, b / r, r / p);
         let gamma_new = c_new * (a - shift) - s_new * gamma;
-        // γ is nearly zero where p is.
+        // γ is nearly zero if p is.
         let p_new = T::splat(SMALLEST).pick_below(p, gamma_new * gamma_new * inverse, c * b);
-        // In the first rotation s is zero: the block ends there.
+        // In the first rotation s is zero, because the block ends there.
         let (above, below) = (s * r, gamma + (a - gamma_new));
         if block.alike {
             (e[i + 1], d[i + 1]) = (above, below);
@@ -196,7 +195,7 @@ fn sweep<T: Real>(d: &mut [T], e: &mut [T], l: usize, block: &Block<T>) {
         gamma = half.pick_below(on, gamma_new, gamma);
         p = half.pick_below(on, p_new, p);
     }
-    // Lanes of which the block is a single row did not take part.
+    // Lanes whose block is a single row are unchanged.
     let row = T::splat(l as f64);
     d[l] = row.pick_below(block.end, shift + gamma, d[l]);
     e[l] = row.pick_below(block.end, s * p, e[l]);
@@ -216,11 +215,11 @@ mod tests {
         d
     }
 
-    /// Truth: nalgebra's eigenvalues. Measured: 6e-15 of the largest.
+    /// Truth: nalgebra's eigenvalues. Measured: 6e-15 relative to the largest.
     #[test]
     fn eigenvalues_are_those_of_nalgebra() {
         proptest!(|(n in 1_usize..24, seed in proptest::collection::vec(-1.0_f64..1.0, 600), rank in 1_usize..24)| {
-            // Full and defective rank, equal eigenvalues.
+            // Full and deficient rank, multiple eigenvalues.
             let B = DMatrix::from_fn(n, n, |i, j| if j < rank { seed[i * 24 + j] } else { 0.0 });
             let A = &B * B.transpose();
             let mut truth: Vec<f64> = A.clone().symmetric_eigenvalues().iter().copied().collect();
@@ -232,8 +231,8 @@ mod tests {
         });
     }
 
-    /// Truth: each matrix alone. Lanes whose blocks fall apart at other rows, at once, or that are
-    /// no numbers.
+    /// Truth: each matrix by itself. Lanes whose blocks split at different rows, split immediately,
+    /// or contain NaN.
     #[cfg(target_arch = "x86_64")]
     #[test]
     fn every_lane_has_the_bits_of_its_matrix_alone() {

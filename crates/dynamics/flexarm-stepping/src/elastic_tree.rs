@@ -1,10 +1,11 @@
-//! A flexible arm whose free coordinates are elastic joints, as matrices on a tree: a node per
-//! elastic joint, with what the prescribed joints behind it carry fixed to it.
+//! Matrices on a tree for a flexible arm whose free coordinates are all elastic joints: one node
+//! per elastic joint, with the bodies behind prescribed joints fixed to it.
 //!
 //! ```text
-//! V_B = Ad_BQ V_Q + S x'        Q: the body behind the next elastic joint inward, S the motion subspace of B's own
+//! V_B = Ad_BQ V_Q + S x'
 //! α = S^-1 V_B                  I = Sᵀ M_BBo S,   X = S_B^-1 Ad_BQ S_Q
 //! ```
+//! Q is the body behind the next elastic joint inward, S the motion subspace of B's own joint.
 
 use flexarm_kinematics::{Data, ElasticAngles, JointMotion, Model, Pose, SpatialInertia, State, skew};
 use nalgebra::{Matrix3, Matrix6};
@@ -13,17 +14,17 @@ use crate::arm::{Damping, FlexibleArm, add_product};
 use crate::dense::{Loops, quickly};
 use crate::tree_matrix::{TreeMatrices, TreeNode};
 
-/// Fewest elastic joints for which elimination is taken instead of a dense inverse: with two, 12
-/// coordinates, a step takes as long either way, with three 2.8 instead of 3.3 us, with five 4.0
-/// instead of 7.5, with 64 48 instead of 1800 (`examples/chains.rs`). With three a batch gains more
-/// from its lanes, whose matrices are dense.
+/// Minimum number of elastic joints for elimination instead of a dense inverse: with two, 12
+/// coordinates, a step takes the same time either way, with three 2.8 instead of 3.3 us, with five
+/// 4.0 instead of 7.5, with 64 48 instead of 1800 (`examples/chains.rs`). With three a batch gains
+/// more from its SIMD lanes, whose matrices are dense.
 const FEWEST_NODES: usize = 4;
 
-/// Where the nodes are among the bodies, and workspaces.
+/// Assignment of the bodies to nodes, and workspaces.
 #[derive(Clone, Debug)]
 pub(crate) struct ElasticTree {
     joints: Vec<ElasticJoint>,
-    /// One per body: the node that it is fixed to, and its pose there.
+    /// Per body: the node to which it is fixed, and its pose there.
     carriers: Vec<(Option<usize>, Pose)>,
 }
 
@@ -35,18 +36,19 @@ struct ElasticJoint {
     /// S: `[L 0; 0 B]`.
     L: Matrix3<f64>,
     B: Matrix3<f64>,
-    /// Everything fixed to the body, about its origin, in its axes.
+    /// Inertia of all bodies fixed to the joint's body, about its origin, in its axes.
     inertia: SpatialInertia,
 }
 
 impl ElasticTree {
-    /// Of an arm whose steps are faster along its tree than with dense matrices.
+    /// Returns the tree of an arm if its steps are faster along the tree than with dense matrices.
     pub(crate) fn that_pays(arm: &FlexibleArm) -> Option<Self> {
         Self::of(arm).filter(|tree| tree.len() >= FEWEST_NODES && arm.damps_by_element())
     }
 
-    /// None where a free coordinate is no elastic joint of six, where a spring is not straight, or
-    /// where closed loops tie branches of the tree together.
+    /// Returns `None` if a free coordinate does not belong to an elastic joint with six
+    /// coordinates, if a spring is nonlinear or a gear has other effects, or if closed loops
+    /// connect branches of the tree.
     pub(crate) fn of(arm: &FlexibleArm) -> Option<Self> {
         let model = &arm.model;
         let straight = arm.elements.iter().all(|e| e.size == 6 && !e.modal && e.curve.is_none());
@@ -62,7 +64,7 @@ impl ElasticTree {
         for element in &arm.elements {
             let JointMotion::Elastic(angles) = model.bodies()[element.body].motion else { return None };
             let (body, coordinate, one) = (element.body, element.coordinate, Matrix3::identity());
-            // Coordinates in the order of nodes, nodes in the order of bodies.
+            // Coordinates must be in the order of the nodes, nodes in the order of the bodies.
             let in_order = arm.offset(element) == 6 * joints.len();
             let outward = joints.last().is_none_or(|last: &ElasticJoint| last.body < body);
             if !(in_order && outward) {
@@ -73,13 +75,13 @@ impl ElasticTree {
         Some(Self { joints, carriers: vec![(None, Pose::identity()); model.bodies().len()] })
     }
 
-    /// Number of nodes.
+    /// Returns the number of nodes.
     fn len(&self) -> usize {
         self.joints.len()
     }
 
-    /// Inertias and motions at the poses of the last pass in `data`, which was at `state`; false at
-    /// a singularity of the angles.
+    /// Computes inertias and motions at the poses of the last pass in `data`, evaluated at `state`;
+    /// returns false at a singularity of the angles.
     pub(crate) fn place(&mut self, model: &Model, data: &Data, state: &State, nodes: &mut Vec<TreeNode>) -> bool {
         nodes.resize_with(self.joints.len(), || TreeNode::new(None));
         let mut next = 0;
@@ -114,7 +116,7 @@ impl ElasticTree {
     }
 }
 
-/// `A`, `B`, `C` of `S_B^-1 Ad_BQ S_Q`.
+/// Returns the blocks `A`, `B`, `C` of `S_B^-1 Ad_BQ S_Q`.
 fn motion(own: &ElasticJoint, B_inverse: &Matrix3<f64>, X_QB: &Pose, inner: &ElasticJoint) -> [Matrix3<f64>; 3] {
     let Rt = X_QB.rotation.matrix().transpose();
     let turn = own.L.transpose() * Rt;
@@ -122,7 +124,7 @@ fn motion(own: &ElasticJoint, B_inverse: &Matrix3<f64>, X_QB: &Pose, inner: &Ela
 }
 
 impl ElasticJoint {
-    /// `Sᵀ M S`.
+    /// Returns `Sᵀ M S`.
     fn inertia_of_coordinates(&self) -> Matrix6<f64> {
         let Self { L, B, inertia, .. } = self;
         let coupling = -(L.transpose() * skew(&inertia.first_moment) * B);
@@ -135,7 +137,7 @@ impl ElasticJoint {
     }
 }
 
-/// `f += D v` of a block on the diagonal of a matrix.
+/// Computes `f += D v` for a diagonal block of a matrix.
 struct AddBlock<'a> {
     D: &'a [f64],
     rows: usize,
@@ -149,7 +151,7 @@ impl Loops for AddBlock<'_> {
     fn run(self) {
         let Self { D, rows, first, v, f } = self;
         let columns = D.chunks_exact(rows).skip(first).map(|column| &column[first..]).zip(v);
-        // Mostly of an elastic joint: a loop of known length.
+        // Usually an elastic joint: a loop of known length.
         if let Ok(f) = <&mut [f64; 6]>::try_from(&mut *f) {
             let mut sum = *f;
             for (column, rate) in columns {
@@ -163,13 +165,14 @@ impl Loops for AddBlock<'_> {
 }
 
 impl FlexibleArm {
-    /// Whether the damping matrix has blocks on its diagonal alone, one per element.
+    /// Returns whether the damping matrix is block diagonal with one block per element.
     pub(crate) fn damps_by_element(&self) -> bool {
         self.cross_damping.is_empty()
             && !self.elements.iter().any(|e| matches!(e.damping, Damping::Modal(zeta) if zeta != 0.0))
     }
 
-    /// `f += D v` over the elastic coordinates: O(n) where the damping has a block per element.
+    /// Computes `f += D v` over the elastic coordinates; O(n) if the damping has one block per
+    /// element.
     pub(crate) fn add_damping(&self, v: &[f64], f: &mut [f64]) {
         if !self.damps_by_element() {
             return add_product(&self.D, v, f);
@@ -180,8 +183,8 @@ impl FlexibleArm {
         }
     }
 
-    /// Blocks of `c_D D + c_K K` and K, for straight springs of six coordinates that are damped by
-    /// element.
+    /// Writes the blocks of `c_D D + c_K K` and K for linear springs with six coordinates that are
+    /// damped by element.
     pub(crate) fn blocks(&self, c_D: f64, c_K: f64, to: &mut TreeMatrices) {
         for (k, (node, element)) in to.nodes.iter_mut().zip(&self.elements).enumerate() {
             node.K.copy_from_slice(element.K.as_slice());

@@ -1,17 +1,17 @@
-//! Why a simulation stops.
+//! Errors that stop a simulation.
 
 use flexarm_kinematics::{Data, Model};
 use flexarm_settings::Setting;
 
-/// A step that fails with a transmission angle below this failed because of it: the dependent
-/// joints turn a hundred times as fast as those that drive (rad).
+/// Transmission angle (rad) below which a failed step is attributed to a dead point: there the
+/// dependent joints turn about a hundred times as fast as the driving joints.
 pub(crate) const DEAD_POINT_RAD: f64 = 0.01;
 
-/// A step, a start or a set-up that failed; carries what is needed to understand it.
+/// Failure of a step, a start or a set-up, with the data needed to understand it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StepError {
-    /// The state left every plausible range.
+    /// The state left the plausible range.
     #[error(
         "the simulation diverged at t = {t:.6} s (step {h:e} s): {what}; try a smaller {}; a motion so fast that the links cannot hold it also ends like this",
         Setting::Step
@@ -21,10 +21,10 @@ pub enum StepError {
         t: f64,
         /// Step (s).
         h: f64,
-        /// What left its range, with the value.
+        /// Quantity that left its range, with the value.
         what: String,
     },
-    /// The iteration of an implicit step did not end.
+    /// The iteration of an implicit step did not converge.
     #[error(
         "the step to t = {t:.6} s (step {h:e} s) did not converge in {iterations} iterations; last relative correction {correction:.1e}: try a smaller {}",
         Setting::Step
@@ -36,13 +36,13 @@ pub enum StepError {
         h: f64,
         /// Iterations done.
         iterations: usize,
-        /// Size of the last correction over the size of the acceleration.
+        /// Size of the last correction relative to the acceleration.
         correction: f64,
     },
     /// A matrix that must be positive definite is not.
     #[error("the {matrix} at t = {t:.6} s is not positive definite: check masses and stiffnesses")]
     Singular {
-        /// Which matrix.
+        /// Name of the matrix.
         matrix: &'static str,
         /// Time (s).
         t: f64,
@@ -57,10 +57,10 @@ pub enum StepError {
         t: f64,
         /// Iterations done.
         iterations: usize,
-        /// Unbalanced force over applied force.
+        /// Unbalanced force relative to the applied force.
         residual: f64,
     },
-    /// A loop of links at its dead point, or whose links do not reach each other.
+    /// A closed loop is at a dead point, or its links do not reach each other.
     #[error(
         "loop {name:?} does not close beyond t = {t:.6} s: its links lie in a line there, or do not reach each other; keep the driving joints \
          away from this dead point, or check the lengths of its links"
@@ -68,10 +68,10 @@ pub enum StepError {
     OpenLoop {
         /// Time (s).
         t: f64,
-        /// The loop.
+        /// Name of the loop.
         name: String,
     },
-    /// The solver with error control found no step that keeps the tolerance.
+    /// The solver with error control found no step size that meets the tolerance.
     #[error(
         "the reference stepper gave up at t = {t:.6} s (step {h:e} s): {what}; try a larger {} or another {}",
         Setting::Tolerance,
@@ -82,13 +82,13 @@ pub enum StepError {
         t: f64,
         /// Step of the solver (s).
         h: f64,
-        /// What the solver says.
+        /// Message of the solver.
         what: String,
     },
-    /// An explicit stepper cannot work with this step.
+    /// The step size is too large for an explicit stepper.
     #[error(
         "{stepper} with step {h:e} s is unstable here: the highest frequency is {highest_hz:.1} Hz, which needs a step below {:.2e} s; use {} or {} generalized-alpha",
-        // Rounding to three digits stays below it.
+        // 0.995 keeps the value rounded to three digits below the limit.
         0.995 * largest_s,
         Setting::Step,
         Setting::Stepper
@@ -100,15 +100,15 @@ pub enum StepError {
         h: f64,
         /// Highest natural frequency (Hz).
         highest_hz: f64,
-        /// Largest stable step (s).
+        /// Maximum stable step (s).
         largest_s: f64,
     },
-    /// A run is not differentiated.
+    /// The derivative of a run is not available.
     #[error("derivatives of a run are not known with {what}: {mend}")]
     NoSlopes {
-        /// What is in the way.
+        /// Feature that prevents it.
         what: &'static str,
-        /// What to do.
+        /// Remedy.
         mend: &'static str,
     },
     /// The parts of the arm do not fit together.
@@ -123,19 +123,20 @@ pub enum StepError {
 }
 
 impl StepError {
-    /// Of the loop that was at its dead point when a step failed.
+    /// Returns the error for the loop that was at its dead point when a step failed, if any.
     pub(crate) fn dead_point(model: &Model, data: &Data, t: f64) -> Option<Self> {
         let dead = data.transmission_angles().iter().position(|angle| angle.is_nan() || *angle < DEAD_POINT_RAD);
         let k = data.open_loop().or(dead)?;
         Some(Self::OpenLoop { t, name: model.loops()[k].name.clone() })
     }
 
-    /// Of the first loop that the last coordinates in `data` do not let close.
+    /// Returns the error for the first loop that does not close at the last coordinates in `data`,
+    /// if any.
     pub(crate) fn open_loop(model: &Model, data: &Data, t: f64) -> Option<Self> {
         data.open_loop().map(|k| Self::OpenLoop { t, name: model.loops()[k].name.clone() })
     }
 
-    /// The settings whose change may mend it; empty where it is the model or the motion.
+    /// Returns the settings whose change may help; empty if the cause is the model or the motion.
     pub fn settings(&self) -> &'static [Setting] {
         match self {
             Self::Diverged { .. } | Self::NotConverged { .. } => &[Setting::Step],

@@ -1,24 +1,26 @@
-//! What happens at discrete times: payloads, samples of the controller, jumps of loads and of
+//! Discrete events of a run: payload changes, samples of the controller, jumps of loads and of
 //! prescribed velocities.
 //!
-//! Between two events everything is smooth. A step ends at each of them, wherever it lies, and what
-//! is asked for at that time belongs to the side from which it is asked ([`EventQueue::side`]).
-//! What is to come and what is over stands in one place of a run's state, the [`EventQueue`]; who
-//! else follows a run learns of it from the observation. Start at [`ReducedArm::at_time`].
+//! Between two events everything is smooth. A step ends at each event, wherever it is, and a
+//! quantity evaluated at that time belongs to the side from which it is evaluated
+//! ([`EventQueue::side`]). The [`EventQueue`] is the only part of a run's state that knows which
+//! events are pending and which are over. Start at [`ReducedArm::at_time`].
 //!
-//! A joint whose prescribed velocity jumps by Δv_p strikes the arm: positions stay, the free
-//! velocities take the impulse,
+//! A velocity jump Δv_p of a prescribed joint is an impulse on the arm: positions stay, and the
+//! free velocities jump by Δv_f,
 //!
 //! ```text
-//! M_ff Δv_f = -M_fp Δv_p                                   springs, dampers, friction and weight are finite: no impulse
+//! M_ff Δv_f = -M_fp Δv_p
 //! ```
+//! because springs, dampers, friction and weight are finite and contribute no impulse.
 //!
-//! An integrator that asks for accelerations at few times of its steps takes the impulse of a
-//! prescribed joint for `h Σ w_i a(t + c_i h)` ([`crate::Integrator::MOTION_RULE`]; at the ends
-//! alone `h (a_n + a_n+1) / 2`). Where that is not how the velocity changes, because it rises
-//! within a few samples, the step is cut ([`ReducedArm::resolved`]).
+//! An integrator that evaluates accelerations at a few times within a step uses
+//! `h Σ w_i a(t + c_i h)` as the velocity change of a prescribed joint
+//! ([`crate::Integrator::MOTION_RULE`]; with the end points only, `h (a_n + a_n+1) / 2`). Where the
+//! velocity changes within a few samples this is inaccurate, and the step is shortened
+//! ([`ReducedArm::resolved`]).
 //!
-//! Not here: the integrators, which are told by [`Change`] what to renew.
+//! Not here: the integrators; [`Change`] states what they have to update.
 
 use std::sync::Arc;
 
@@ -32,26 +34,26 @@ use crate::iteration_matrix::storage_of;
 use crate::load::Load;
 use crate::reduced::ReducedArm;
 
-/// Times closer than this are the same (s).
+/// Times that differ by less than this are equal (s).
 pub(crate) const SAME_TIME: f64 = 1e-9;
 
-/// By which part of the speed a velocity may change otherwise than accelerations at the ends of a
-/// step say.
+/// Maximum difference between the velocity change of a prescribed joint and the quadrature of its
+/// accelerations over a step, relative to its speed.
 pub(crate) const IMPULSE_DEFECT: f64 = 1e-3;
-/// Speeds below this are no measure (rad/s or m/s).
+/// Lower bound of the speed in this ratio (rad/s or m/s).
 pub(crate) const SLOW: f64 = 0.01;
-/// Most halvings of a step.
+/// Maximum number of halvings of a step.
 const MOST_CUTS: u32 = 7;
 
 /// Velocities and accelerations of the actuated joints at the start of a step.
 pub(crate) struct StepStart {
-    /// When (s); NaN when it is not known.
+    /// Time (s); NaN if unknown.
     time: f64,
     qdot: Vec<f64>,
     qddot: Vec<f64>,
-    /// Largest speeds so far.
+    /// Maximum speeds so far.
     top: Vec<f64>,
-    /// Mean accelerations over the step as an integrator takes them.
+    /// Mean accelerations over the step by the quadrature rule of an integrator.
     mean: Vec<f64>,
 }
 
@@ -67,33 +69,32 @@ impl StepStart {
     }
 }
 
-/// What an event leaves behind.
+/// Effect of an event on the integrator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Change {
-    /// Nothing happened.
+    /// No event.
     Nothing,
-    /// Accelerations, perhaps velocities, have jumped.
+    /// Accelerations, and possibly velocities, have jumped.
     Motion,
-    /// So did masses or damping: matrices are out of date.
+    /// Masses or damping have jumped as well: matrices are out of date.
     Matrices,
 }
 
-/// What happens at discrete times, and how much of it is over: the part of a run's state that
-/// knows. Times nearer than [`SAME_TIME`] are one.
+/// Pending and past events of a run. Times that differ by less than [`SAME_TIME`] are equal.
 pub(crate) struct EventQueue {
-    /// When loads or prescribed velocities jump, and other stops of loads, ascending, and how many
-    /// of these times are over.
+    /// Times of jumps of loads and prescribed velocities and of other stops of loads, ascending,
+    /// and the number of them that are over.
     jumps: Vec<f64>,
     jumps_over: usize,
-    /// Changes of inertia, by time, and how many of them have been carried out.
+    /// Changes of inertia in order of time, and the number of them that have been applied.
     changes: Vec<InertiaChange>,
     changes_over: usize,
-    /// When the controller takes its samples.
+    /// Sample times of the controller.
     clock: Option<SampleClock>,
 }
 
 impl EventQueue {
-    /// Of an arm whose run begins: nothing is over.
+    /// Creates the queue for the start of a run.
     pub(crate) fn of(arm: &FlexibleArm) -> Self {
         let loads = arm.loads.iter().flat_map(|load| {
             let jumps = load.wrench.jumps.iter().copied().filter(|t| jumps_at(load, *t));
@@ -105,12 +106,12 @@ impl EventQueue {
         Self { jumps, jumps_over: 0, changes: arm.inertia_changes.clone(), changes_over: 0, clock }
     }
 
-    /// Of an arm that stands still: changes of inertia alone.
+    /// Creates a queue with the changes of inertia only, for statics.
     pub(crate) fn of_changes(arm: &FlexibleArm) -> Self {
         Self { jumps: Vec::new(), jumps_over: 0, changes: arm.inertia_changes.clone(), changes_over: 0, clock: None }
     }
 
-    /// The next event after `t`, if any: at `end` if that is the same time.
+    /// Returns the time of the next event after `t`, if any; exactly `end` if it is the same time.
     pub(crate) fn next(&self, t: f64, end: f64) -> Option<f64> {
         let change = self.changes.get(self.changes_over).map(|change| change.t);
         let sample = self.clock.as_ref().map(|clock| clock.after(t));
@@ -122,37 +123,37 @@ impl EventQueue {
         self.jumps.get(self.jumps_over).copied()
     }
 
-    /// The time nearest to t between the last jump and the next one.
+    /// Returns the time nearest to `t` strictly between the last jump and the next one.
     pub(crate) fn side(&self, t: f64) -> f64 {
         let after = self.jumps_over.checked_sub(1).map_or(t, |k| t.max(self.jumps[k].next_up()));
         self.next_jump().map_or(after, |next| after.min(next.next_down()))
     }
 
-    /// Leaves the jumps at t behind; the times just before the first and just after the last of
-    /// them.
+    /// Marks the jumps at `t` as over; returns the times just before the first and just after the
+    /// last of them.
     pub(crate) fn pass_jumps(&mut self, t: f64) -> Option<(f64, f64)> {
         let first = self.next_jump().filter(|first| *first <= t + SAME_TIME)?;
         self.jumps_over = self.jumps.partition_point(|time| *time <= t + SAME_TIME);
         Some((first.next_down(), self.jumps[self.jumps_over - 1].next_up()))
     }
 
-    /// How many jumps are over.
+    /// Returns the number of jumps that are over.
     pub(crate) fn jumps_over(&self) -> usize {
         self.jumps_over
     }
 
-    /// How many changes of inertia are over.
+    /// Returns the number of changes of inertia that are over.
     pub(crate) fn changes_over(&self) -> usize {
         self.changes_over
     }
 
-    /// The next change of inertia that is due at t, which is over with that, and its number.
+    /// Returns the next change of inertia due at `t` with its number, and marks it as over.
     pub(crate) fn due_change(&mut self, t: f64) -> Option<(usize, &InertiaChange)> {
         self.changes_before(t + SAME_TIME)
     }
 
-    /// As [`EventQueue::due_change`] as far as `t` is approached from below: what happens there is
-    /// still to come.
+    /// Works as [`EventQueue::due_change`] for `t` approached from below: changes at `t` itself are
+    /// still pending.
     pub(crate) fn change_before(&mut self, t: f64) -> Option<(usize, &InertiaChange)> {
         self.changes_before((t - SAME_TIME).next_down())
     }
@@ -164,13 +165,13 @@ impl EventQueue {
         Some((number, change))
     }
 
-    /// Whether the controller takes a sample at t, which is over with that.
+    /// Returns whether the controller takes a sample at `t`, and marks it as over.
     pub(crate) fn sample_due(&mut self, t: f64) -> bool {
         self.clock.as_mut().is_some_and(|clock| clock.is_due(t))
     }
 }
 
-/// Evenly spaced samples from 0 on.
+/// Evenly spaced samples, starting at 0.
 struct SampleClock {
     sample_s: f64,
     /// Number of the next sample.
@@ -178,7 +179,7 @@ struct SampleClock {
 }
 
 impl SampleClock {
-    /// Time of the first sample after t.
+    /// Returns the time of the first sample after `t`.
     fn after(&self, t: f64) -> f64 {
         let s = self.sample_s;
         ((t + SAME_TIME) / s).floor() * s + s
@@ -194,24 +195,24 @@ impl SampleClock {
 }
 
 impl FlexibleArm {
-    /// Times at which a load begins, ends, jumps or bends (s), load by load.
+    /// Returns the times at which a load begins, ends, jumps or has a kink (s), load by load.
     pub fn load_jumps(&self) -> impl Iterator<Item = f64> {
         self.loads.iter().flat_map(|load| load.wrench.jumps.iter().copied())
     }
 }
 
-/// Does the load jump there, or only begin, end or bend?
+/// Returns whether the load is discontinuous at `t`; otherwise it begins, ends or has a kink there.
 fn jumps_at(load: &Load, t: f64) -> bool {
     let (before, after) = (load.wrench.at(t.next_down()).to_vector(), load.wrench.at(t.next_up()).to_vector());
     (after - before).amax() > 1e-9 * before.amax().max(after.amax())
 }
 
-/// Damping of an arm: matrix, factors, whether they say the same.
+/// Damping of an arm: matrix `D`, factors `tau`, and whether `D` is proportional to the stiffness.
 pub(crate) type ArmDamping = (DMatrix<f64>, Vec<f64>, bool);
 
-/// What the arm damps with after each change of inertia: a ratio of modal damping is one of the
-/// modes that the arm then has. An arm that cannot stand with its new payload keeps the damping it
-/// had.
+/// Returns the damping of the arm after each change of inertia: modal damping is recomputed with
+/// the modes of the changed arm. If the arm has no static equilibrium with its new payload, the
+/// previous damping is kept.
 pub(crate) fn damping_after_changes(arm: &FlexibleArm) -> Vec<ArmDamping> {
     let mut changed = arm.clone();
     let damping = |change: &InertiaChange| {
@@ -226,12 +227,12 @@ pub(crate) fn damping_after_changes(arm: &FlexibleArm) -> Vec<ArmDamping> {
 }
 
 impl ReducedArm {
-    /// The next time after `t` at which something happens, if any; that of `end` if it is the same.
+    /// Returns the time of the next event after `t`, if any; exactly `end` if it is the same time.
     pub fn next_event(&self, t: f64, end: f64) -> Option<f64> {
         self.events.next(t, end)
     }
 
-    /// Carries out what happens at t; free velocities may jump.
+    /// Applies the events at `t`; free velocities may jump.
     pub(crate) fn at_time(&mut self, t: f64, x: &DVector<f64>, v: &mut DVector<f64>) -> Result<Change, StepError> {
         let mut what = Change::Nothing;
         while let Some((number, change)) = self.events.due_change(t) {
@@ -259,8 +260,9 @@ impl ReducedArm {
         Ok(what)
     }
 
-    /// Where a step from t to `stop` has to end so that the rule of the integrator meets the
-    /// impulse of the prescribed joints: there, or before it; see the module page. No allocation.
+    /// Returns the end of a step from `t` to at most `stop` over which the quadrature rule of the
+    /// integrator reproduces the velocity change of the prescribed joints; see the module
+    /// documentation. Does not allocate.
     pub(crate) fn resolved(&mut self, t: f64, mut stop: f64, rule: &[(f64, f64)]) -> f64 {
         if rule.is_empty() {
             return stop;
@@ -280,10 +282,11 @@ impl ReducedArm {
         stop
     }
 
-    /// Whether accelerations by the rule say how the prescribed velocities change from t to `stop`.
+    /// Returns whether the quadrature rule reproduces the change of the prescribed velocities from
+    /// `t` to `stop`.
     fn meets_impulse(&mut self, t: f64, stop: f64, rule: &[(f64, f64)]) -> bool {
         let h = stop - t;
-        // Σ w_i a(t + c_i h), that of the end last.
+        // Mean acceleration Σ w_i a(t + c_i h), with the term at the end added last.
         let start = &mut self.step_start;
         start.mean.fill(0.0);
         let mut at_end = 0.0;
@@ -312,7 +315,7 @@ impl ReducedArm {
         all
     }
 
-    /// Joint motion at t into the state, as [`ReducedArm::set`] keeps it.
+    /// Samples the joint motion at `t` into the state, as [`ReducedArm::set`] does.
     pub(crate) fn sample_joints(&mut self, t: f64) {
         let t = self.events.side(t);
         if t != self.sampled_at {
@@ -330,7 +333,8 @@ impl ReducedArm {
         start.top.iter_mut().zip(&start.qdot).for_each(|(top, speed)| *top = larger(*top, speed.abs()));
     }
 
-    /// The impulse of prescribed velocities that jump between two times; see the module page.
+    /// Applies the impulse of prescribed velocities that jump between `before` and `after`; see the
+    /// module documentation.
     fn strike(
         &mut self,
         t: f64,
@@ -340,7 +344,7 @@ impl ReducedArm {
         v: &mut DVector<f64>,
     ) -> Result<(), StepError> {
         let n = self.arm.model.n_actuated();
-        // Jump of each velocity; those of free coordinates are unknown.
+        // Velocity jump of each coordinate; those of the free coordinates are unknown yet.
         let jump = &mut self.tau;
         jump.fill(0.0);
         self.arm.prescribed_state(before, &mut self.state, &mut self.qddot);
@@ -353,6 +357,7 @@ impl ReducedArm {
         if jump.iter().all(|jump| *jump == 0.0) {
             return Ok(());
         }
+        // M_ff Δv_f = -M_fp Δv_p
         self.set(t, x, v);
         let M = mass_matrix(&self.arm.model, &mut self.data, &self.state.q);
         let size = self.free.len();
@@ -367,8 +372,8 @@ impl ReducedArm {
         for (i, &k) in self.free.iter().enumerate() {
             self.tau[k] = self.shifted[i];
         }
-        // Work: impulse times mean velocity, 1/2 (v⁺ M v⁺ - v⁻ M v⁻) = Δvᵀ M (v⁺ - Δv/2) with the
-        // velocities now in `state`.
+        // Work: impulse times mean velocity, 1/2 (v⁺ M v⁺ - v⁻ M v⁻) = Δvᵀ M (v⁺ - Δv/2); `state`
+        // holds the velocities after the jump.
         let M = &self.data.M;
         let new = |k: usize| {
             let free = self.free.iter().position(|&l| l == k);
@@ -406,8 +411,8 @@ mod tests {
         assert_eq!(events.pass_jumps(0.6), None);
     }
 
-    /// A step that ends at an event, but for rounding, ends there: no second step of a rounding's
-    /// length.
+    /// A step that ends at an event up to rounding ends exactly there: no second step of the length
+    /// of a rounding error.
     #[test]
     fn an_event_at_the_end_of_a_step_but_for_rounding_is_at_its_end() {
         let events = queue(&[0.1 + 0.2], None);
@@ -415,7 +420,7 @@ mod tests {
         assert_eq!(events.next(0.2, 0.25), Some(0.1 + 0.2));
     }
 
-    /// Truth: a clock of 1 ms ticks 1001 times from 0 to 1 s, at times that are sums of steps and
+    /// Truth: a clock of 1 ms has 1001 samples from 0 to 1 s, whether times are sums of steps or
     /// multiples of them.
     #[test]
     fn a_controller_takes_each_sample_once() {

@@ -1,17 +1,17 @@
-//! What a gearbox does beside giving way: errors of its transmission, hysteresis, friction under
-//! load, and gears that move several joints.
+//! Gearbox effects other than elasticity: transmission errors, hysteresis, load-dependent friction,
+//! and gears that couple several joints.
 //!
 //! ```text
-//! δ = e - ε(q_m)             ε: transmission error at the motor's coordinate; δ deflects the spring          (1)
-//! F = elastic(δ) + Σ k_i s_i       s_i: deflection of the slider i, |s_i| <= r_i                              (2)
-//! s_i ← clamp(s_i + Δδ, -r_i, r_i)                            the play operator, state at the ends of steps   (3)
-//! on e: F;   on q_m: -ε'(q_m) F                               so that F does the work F δ̇                     (4)
-//! θ = C^-1 q,  K = C^-T K_m C^-1,  τ_m = Cᵀ τ                 gears between motors θ and joints q = C θ       (5)
+//! δ = e - ε(q_m)                              ε: transmission error, δ: spring deflection  (1)
+//! F = elastic(δ) + Σ k_i s_i                  s_i: deflection of slider i, |s_i| <= r_i    (2)
+//! s_i ← clamp(s_i + Δδ, -r_i, r_i)            play operator, state at the ends of steps    (3)
+//! on e: F;   on q_m: -ε'(q_m) F               so that F does the work F δ̇                  (4)
+//! θ = C^-1 q,  K = C^-T K_m C^-1,  τ_m = Cᵀ τ gears between motors θ and joints q = C θ    (5)
 //! ```
 //! Sliders in parallel follow Masing's rules: a branch after a reversal is the first loading curve
-//! twice as large, and the loss of a closed cycle does not depend on its speed. Start at
+//! scaled by two, and the loss of a closed cycle does not depend on the rate. Start at
 //! [`TransmissionError`], [`Hysteresis`], [`GearCoupling`] and [`LoadFriction`]; [`GearState`] is
-//! what a run remembers. Not here: springs themselves (`arm`), rotors (in the tree).
+//! the state of a run. Not here: springs (`arm`), rotors (in the tree).
 //!
 //! Sources: [Iwan 1966] for sliders in parallel; [Tuttle & Seering 1996] for (1) with harmonics of
 //! the motor.
@@ -28,108 +28,108 @@ use crate::statics::spring_forces;
 /// One harmonic of a transmission error: `amplitude sin(cycles q + phase)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Harmonic {
-    /// On the joint's side (rad or m).
+    /// Amplitude on the joint side (rad or m).
     pub amplitude: f64,
-    /// Cycles in a turn of the joint, or radians of phase per radian of it; for a slide radians per
-    /// metre.
+    /// Cycles per turn of the joint, which is radians of phase per radian; for a prismatic joint
+    /// radians per metre.
     pub cycles: f64,
-    /// At joint value zero (rad).
+    /// Phase at joint position zero (rad).
     pub phase: f64,
 }
 
-/// Error of a transmission over the coordinate of its motor, see (1) of the module page.
+/// Transmission error as a function of the motor's coordinate, equation (1) of the module.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TransmissionError {
-    /// Element of the gearbox's spring, of one coordinate.
+    /// Element index of the gearbox spring (single coordinate).
     pub element: usize,
-    /// Coordinate of the joint, where the motor is.
+    /// Actuated coordinate of the joint, on the motor side.
     pub motor: usize,
-    /// Its harmonics.
+    /// Harmonics.
     pub harmonics: Vec<Harmonic>,
 }
 
 impl TransmissionError {
-    /// ε (rad or m) with the motor at `q`, seen from the joint.
+    /// Returns ε (rad or m) at motor coordinate `q`, on the joint side.
     pub fn at(&self, q: f64) -> f64 {
         self.harmonics.iter().map(|h| h.amplitude * (h.cycles * q + h.phase).sin()).sum()
     }
 
-    /// d²ε/dq².
+    /// Returns the second derivative d²ε/dq².
     pub(crate) fn bend(&self, q: f64) -> f64 {
         self.harmonics.iter().map(|h| -h.amplitude * h.cycles * h.cycles * (h.cycles * q + h.phase).sin()).sum()
     }
 
-    /// dε/dq.
+    /// Returns the derivative dε/dq.
     pub fn slope(&self, q: f64) -> f64 {
         let cosine = |h: &Harmonic| h.amplitude * h.cycles * (h.cycles * q + h.phase + FRAC_PI_2).sin();
         self.harmonics.iter().map(cosine).sum()
     }
 }
 
-/// A spring with dry friction behind it.
+/// A spring in series with dry friction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slider {
-    /// Of the spring (N m/rad or N/m).
+    /// Stiffness of the spring (N m/rad or N/m).
     pub stiffness: f64,
-    /// Deflection of the spring at which the friction slips (rad or m).
+    /// Deflection of the spring at which the friction element slips (rad or m).
     pub reach: f64,
 }
 
-/// A gearbox whose torque depends on how its deflection came about, whatever its speed: (2) and (3)
-/// of the module page.
+/// A gearbox with rate-independent hysteresis: its torque depends on the history of its deflection,
+/// equations (2) and (3) of the module.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hysteresis {
-    /// Element of the gearbox's spring, of one coordinate.
+    /// Element index of the gearbox spring (single coordinate).
     pub element: usize,
-    /// What is left without the friction.
+    /// Elastic torque, without friction.
     pub elastic: TorqueCurve,
-    /// Sliders in parallel with it.
+    /// Sliders in parallel with the elastic spring.
     pub sliders: Vec<Slider>,
 }
 
 impl Hysteresis {
-    /// Sliders that slip one after the other, evenly up to the deflection `reach`, with the torque
-    /// `friction` together.
+    /// Creates sliders that slip one after the other at evenly spaced deflections up to `reach`,
+    /// with the total torque `friction`.
     ///
-    /// First loading along them is a polygon with corners on the parabola `friction (2 x - x²)`,
+    /// The first loading curve is a polygon with its corners on the parabola `friction (2 x - x²)`,
     /// `x = δ / reach`, of Rayleigh's law. All arguments are positive.
     pub fn even_sliders(friction: f64, reach: f64, count: usize) -> Vec<Slider> {
         let n = count as f64;
-        // Slopes of the polygon between its corners fall by equal steps of 2 friction / (reach n).
+        // The slopes of the polygon decrease from corner to corner by 2 friction / (reach n).
         let slip = |i: usize| reach * (i as f64 + 1.0) / n;
         let each = 2.0 * friction / (reach * n);
         let slope = |i: usize| if i < count { each * (n - i as f64 - 0.5) } else { 0.0 };
         (0..count).map(|i| Slider { stiffness: slope(i) - slope(i + 1), reach: slip(i) }).collect()
     }
 
-    /// The curve of first loading from rest.
+    /// Returns the curve of first loading from rest.
     pub fn first_loading(&self) -> TorqueCurve {
         self.sliders
             .iter()
             .fold(self.elastic.clone(), |curve, slider| curve.with_slider(slider.stiffness, slider.reach))
     }
 
-    /// Slope of small motions about a deflection: no slider slips.
+    /// Returns the slope for small motions about the deflection `delta`, at which no slider slips.
     pub fn stuck_slope(&self, delta: f64) -> f64 {
         self.elastic.slope(delta) + self.sliders.iter().map(|slider| slider.stiffness).sum::<f64>()
     }
 
-    /// Loss of a closed cycle between `-amplitude` and `amplitude` (J): `4 Σ k r (amplitude - r)`
-    /// over the sliders that slip.
+    /// Returns the loss of a closed cycle between `-amplitude` and `amplitude` (J):
+    /// `4 Σ k r (amplitude - r)` over the sliders that slip.
     pub fn loss(&self, amplitude: f64) -> f64 {
         self.sliders.iter().map(|s| 4.0 * s.stiffness * s.reach * (amplitude - s.reach).max(0.0)).sum()
     }
 }
 
-/// Friction that grows with the torque that a gear transmits: `coefficient |τ| tanh(q̇ / v_0)`.
+/// Friction that grows with the torque transmitted by a gear: `coefficient |τ| tanh(q̇ / v_0)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LoadFriction {
     /// Coordinate of the joint.
     pub coordinate: usize,
-    /// Element of the gearbox's spring, of one coordinate, whose torque is transmitted; without one
-    /// what moves the joint.
+    /// Element index of the gearbox spring (single coordinate) whose torque is transmitted; without
+    /// one, the torque that drives the joint counts.
     pub element: Option<usize>,
-    /// Friction over transmitted torque.
+    /// Ratio of friction to transmitted torque.
     pub coefficient: f64,
     /// Speed `v_0` over which the sign changes (rad/s).
     pub regularisation: f64,
@@ -145,61 +145,62 @@ impl LoadFriction {
         self.coefficient * transmitted.abs() * (1.0 - t * t) / self.regularisation
     }
 
-    /// Derivative of the friction by the transmitted torque.
+    /// Returns the derivative of the friction with respect to the transmitted torque.
     pub(crate) fn by_torque(&self, transmitted: f64, rate: f64) -> f64 {
         self.coefficient * transmitted.signum() * (rate / self.regularisation).tanh()
     }
 }
 
-/// Gears by which motors move several joints, see (5) of the module page.
+/// Gears through which motors move several joints, equation (5) of the module.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GearCoupling {
-    /// Elements of the gearboxes' springs in the order of the motors; none if the gears are rigid.
+    /// Element indices of the gearbox springs in the order of the motors; empty if the gears are
+    /// rigid.
     pub elements: Vec<usize>,
     /// Coordinates of the joints, in the same order.
     pub coordinates: Vec<usize>,
-    /// C, joints per motors behind their gears.
+    /// C: joint coordinates from motor coordinates (after the gears).
     pub C: DMatrix<f64>,
     /// Its inverse.
     pub C_inverse: DMatrix<f64>,
 }
 
 impl GearCoupling {
-    /// `C^-T diag(values) C^-1`: stiffness, damping or inertia of the motors on the joints.
+    /// Returns `C^-T diag(values) C^-1`: stiffness, damping or inertia of the motors on the joints.
     pub fn on_joints(C_inverse: &DMatrix<f64>, values: &[f64]) -> DMatrix<f64> {
         C_inverse.transpose() * DMatrix::from_diagonal(&DVector::from_column_slice(values)) * C_inverse
     }
 
-    /// Torques of the motors behind their gears, `Cᵀ τ`, for those of the joints in all
+    /// Returns the motor torques after the gears, `Cᵀ τ`, from joint torques `tau` over all
     /// coordinates.
     pub fn motor_torques(&self, tau: &[f64]) -> Vec<f64> {
         let joints = DVector::from_iterator(self.coordinates.len(), self.coordinates.iter().map(|k| tau[*k]));
         self.C.tr_mul(&joints).as_slice().to_vec()
     }
 
-    /// Whether each motor moves its own joint alone.
+    /// Returns whether C is the identity, so that each motor moves only its own joint.
     pub(crate) fn is_none(&self) -> bool {
         self.C.is_identity(0.0)
     }
 
-    /// Place of a coordinate among the coupled ones.
+    /// Returns the index of a coordinate among the coupled ones.
     pub(crate) fn place(&self, coordinate: usize) -> Option<usize> {
         self.coordinates.iter().position(|k| *k == coordinate)
     }
 
-    /// Rate of the motor of that number behind its gear.
+    /// Returns the rate of motor `number` after its gear.
     pub(crate) fn motor_rate(&self, number: usize, rates: &[f64]) -> f64 {
         self.coordinates.iter().enumerate().map(|(j, k)| self.C_inverse[(number, j)] * rates[*k]).sum()
     }
 }
 
 impl FlexibleArm {
-    /// The same arm with gears that move several joints: its springs, dampers and friction so far
-    /// are those of the motors behind their gears, and become those of the joints.
+    /// Returns the arm with gears that couple several joints. Springs, dampers and friction given
+    /// so far are those of the motors after their gears; they are transformed to the joints.
     ///
     /// # Errors
-    /// [`StepError::Setup`] if sizes differ, springs have more than one coordinate, are curved or
-    /// are missing for some of the motors, and as [`FlexibleArm::new`].
+    /// [`StepError::Setup`] if sizes differ, or if springs have more than one coordinate, are
+    /// nonlinear or are missing for some motors; errors of [`FlexibleArm::new`].
     pub fn with_coupling(mut self, coupling: GearCoupling) -> Result<Self, StepError> {
         let n = coupling.coordinates.len();
         let single = |k: &usize| self.elements.get(*k).is_some_and(|e| e.size == 1 && e.curve.is_none());
@@ -241,9 +242,9 @@ impl FlexibleArm {
         Ok(self)
     }
 
-    /// `dK/d(ln k)` for the stiffness k of one motor's spring in coupled gears: the elastic
-    /// coordinates of all of them, and the matrix over these; none of an element whose gear moves
-    /// its own joint alone.
+    /// Returns `dK/d(ln k)` for the stiffness k of one motor's spring in coupled gears: the elastic
+    /// coordinates of all coupled springs, and the matrix over them. `None` if the element is not
+    /// coupled.
     pub fn coupled_stiffness_slope(&self, element: usize) -> Option<(Vec<usize>, DMatrix<f64>)> {
         let coupling = self.coupling.as_ref()?;
         let motor = coupling.elements.iter().position(|k| *k == element)?;
@@ -254,13 +255,13 @@ impl FlexibleArm {
         Some((places, row.tr_mul(&row) * own))
     }
 
-    /// `dD/d(ln d)` for the damper d of one motor in coupled gears, as
+    /// Returns `dD/d(ln d)` for the damper d of one motor in coupled gears, in the form of
     /// [`FlexibleArm::coupled_stiffness_slope`].
     pub fn coupled_damping_slope(&self, element: usize) -> Option<(Vec<usize>, DMatrix<f64>)> {
         let coupling = self.coupling.as_ref()?;
         let motor = coupling.elements.iter().position(|k| *k == element)?;
         let places: Vec<usize> = coupling.elements.iter().map(|k| self.offset(&self.elements[*k])).collect();
-        // Dampers alone: what else damps follows the modes.
+        // Dampers only: other damping is derived from the modes.
         let mut D = DMatrix::zeros(places.len(), places.len());
         for (i, k) in coupling.elements.iter().enumerate() {
             D[(i, i)] = if let Damping::Dampers(d) = self.elements[*k].damping { d[0] } else { 0.0 };
@@ -275,11 +276,11 @@ impl FlexibleArm {
         Some((places, row.tr_mul(&row) * own))
     }
 
-    /// The same arm with gears whose torque has a history; their elements have the curve of first
-    /// loading from here on.
+    /// Returns the arm with hysteresis in gears; the springs of these gears get the first loading
+    /// curve.
     ///
     /// # Errors
-    /// [`StepError::Setup`] if an element has more than one coordinate or none is there, and as
+    /// [`StepError::Setup`] if an element does not exist or has more than one coordinate; errors of
     /// [`FlexibleArm::new`].
     pub fn with_hysteresis(mut self, laws: Vec<Hysteresis>) -> Result<Self, StepError> {
         for law in &laws {
@@ -299,7 +300,7 @@ impl FlexibleArm {
         Ok(self)
     }
 
-    /// The same arm with transmission errors.
+    /// Returns the arm with transmission errors.
     ///
     /// # Errors
     /// As [`FlexibleArm::with_hysteresis`].
@@ -317,28 +318,29 @@ impl FlexibleArm {
         Ok(self)
     }
 
-    /// Whether a gearbox does more than give way along a line or a curve.
+    /// Returns whether any gear has a transmission error, hysteresis, load-dependent friction or
+    /// coupling.
     pub(crate) fn has_gear_laws(&self) -> bool {
         !(self.transmission.is_empty() && self.hysteresis.is_empty() && self.load_friction.is_empty())
             || self.coupling.as_ref().is_some_and(|coupling| !coupling.is_none())
     }
 
-    /// Largest torque that the friction in a gear holds (N m or N): beside it nothing smaller is
-    /// out of balance.
+    /// Returns the largest friction torque of the gears with hysteresis (N m or N); a scale for the
+    /// force balance, in which smaller residuals do not count.
     pub(crate) fn friction_of_gears(&self) -> f64 {
         let of_law = |law: &Hysteresis| law.sliders.iter().map(|s| s.stiffness * s.reach).sum::<f64>();
         self.hysteresis.iter().map(of_law).fold(0.0, f64::max)
     }
 
-    /// Deflection δ of a spring of one coordinate e (rad, m), with the joints at `q`: e less the
-    /// transmission error, if there is one.
+    /// Returns the deflection δ (rad, m) of a spring with one coordinate e, with the joints at `q`:
+    /// e minus the transmission error, if any.
     pub fn deflection(&self, element: usize, e: f64, q: &[f64]) -> f64 {
         let errors = self.transmission.iter().filter(|error| error.element == element);
         errors.fold(e, |delta, error| delta - error.at(q[error.motor]))
     }
 
-    /// Slope of a curved spring in small motions about all coordinates `q`, none of a straight one:
-    /// no friction slips, and from within a play the steepest.
+    /// Returns the slope of a nonlinear spring for small motions about the coordinates `q`: no
+    /// slider slips, and within backlash the steepest slope counts. `None` for a linear spring.
     pub fn vibration_slope(&self, element: usize, q: &[f64]) -> Option<f64> {
         let own = &self.elements[element];
         let curve = own.curve.as_ref()?;
@@ -350,11 +352,11 @@ impl FlexibleArm {
         Some(if slope > 0.0 { slope } else { curve.stiffest() })
     }
 
-    /// What the springs pull with, and the energy in each element, at rest with all coordinates at
-    /// `q`.
+    /// Returns the forces of the springs and the energy of each element, at rest with all
+    /// coordinates at `q`.
     ///
-    /// Forces over the elastic coordinates (N, N m); of coupled gears the energy is that of the
-    /// joint's part, `F e / 2`.
+    /// The forces are over the elastic coordinates (N, N m). For coupled gears the energy is the
+    /// share of the joint, `F e / 2`.
     pub fn springs_at_rest(&self, q: &DVector<f64>) -> (DVector<f64>, Vec<f64>) {
         let e = q.rows(self.model.n_actuated(), self.n_elastic_coordinates()).into_owned();
         let F = spring_forces(self, q.as_slice(), &e);
@@ -371,7 +373,7 @@ impl FlexibleArm {
         (F, energies)
     }
 
-    /// `f += K x` of what couples springs.
+    /// Adds the cross stiffness of coupled springs: `f += K x`.
     pub(crate) fn add_cross_forces(&self, x: &[f64], f: &mut [f64]) {
         for &(i, j, k) in &self.cross_stiffness {
             f[i] += k * x[j];
@@ -379,16 +381,16 @@ impl FlexibleArm {
         }
     }
 
-    /// What transmission errors put on the motors for the forces F of the springs: adds to `tau`
-    /// over all joints.
+    /// Adds the reaction of the transmission errors on the motors, for the spring forces F, to
+    /// `tau` over all joints: equation (4).
     pub(crate) fn add_motor_forces(&self, q: &[f64], F: &[f64], tau: &mut [f64]) {
         for error in &self.transmission {
             tau[error.motor] -= error.slope(q[error.motor]) * F[self.offset(&self.elements[error.element])];
         }
     }
 
-    /// Friction of all actuated coordinates at these rates and transmitted torques, into
-    /// `friction`.
+    /// Writes the friction of all actuated coordinates, at the given rates and transmitted torques,
+    /// into `friction`.
     pub(crate) fn friction_torques(
         &self,
         rates: &[f64],
@@ -398,7 +400,7 @@ impl FlexibleArm {
         for (k, friction) in friction.iter_mut().enumerate() {
             *friction = match self.coupling.as_ref().and_then(|coupling| Some((coupling, coupling.place(k)?))) {
                 None => self.friction_torque(k, rates[k]),
-                // C^-T of the torques on the motors.
+                // C^-T times the friction torques on the motors.
                 Some((coupling, j)) => {
                     let motors = coupling.coordinates.iter().enumerate();
                     motors
@@ -414,7 +416,8 @@ impl FlexibleArm {
         }
     }
 
-    /// Slope of the friction of a coordinate by the rate of another one; never falling.
+    /// Returns the derivative of the friction of one coordinate with respect to the rate of
+    /// another; negative slopes of the friction laws count as zero.
     pub(crate) fn friction_slope(&self, row: usize, column: usize, rates: &[f64], gears: &GearState) -> f64 {
         let unloaded = self.unloaded_friction_slope(row, column, rates, 0.0);
         if row != column {
@@ -426,8 +429,8 @@ impl FlexibleArm {
         unloaded + loaded.sum::<f64>()
     }
 
-    /// The same without what grows with the transmitted torque; the slope of each motor is this or
-    /// more.
+    /// Returns the same derivative without load-dependent friction; the slope of each motor is at
+    /// least `least`.
     pub(crate) fn unloaded_friction_slope(&self, row: usize, column: usize, rates: &[f64], least: f64) -> f64 {
         let own = |k: usize, rate: f64| self.friction.get(k).map_or(0.0, |f| f.slope(rate).max(least));
         let places = self.coupling.as_ref().and_then(|c| Some((c, c.place(row)?, c.place(column)?)));
@@ -440,37 +443,37 @@ impl FlexibleArm {
     }
 }
 
-/// Numbers of the motors, zeros where the gears are rigid.
+/// Returns the values per motor; zeros if the gears are rigid.
 fn stiffness_of(n: usize, values: &[f64]) -> Vec<f64> {
     if values.is_empty() { vec![0.0; n] } else { values.to_vec() }
 }
 
-/// Sliders of one gear at the end of the last step.
+/// Slider state of one gear at the end of the last step.
 #[derive(Clone, Debug)]
 struct Slipped {
     delta: f64,
     s: Vec<f64>,
 }
 
-/// What a run knows of its gears: where their sliders are, and the forces of the last evaluation.
+/// Gear state of a run: slider positions, and the forces of the last evaluation.
 #[derive(Clone, Debug)]
 pub(crate) struct GearState {
     /// Deflections and their rates, per elastic coordinate.
     pub(crate) delta: DVector<f64>,
     pub(crate) rate: DVector<f64>,
-    /// Forces of springs and dampers on them.
+    /// Forces of springs and dampers at these deflections.
     pub(crate) F: DVector<f64>,
-    /// The part of the dampers.
+    /// Share of the dampers.
     damper: DVector<f64>,
     /// Friction per actuated coordinate.
     pub(crate) friction: Vec<f64>,
     slipped: Vec<Slipped>,
-    /// Lost to hysteresis so far (J).
+    /// Energy lost to hysteresis so far (J).
     pub(crate) lost: f64,
 }
 
 impl GearState {
-    /// Of an arm that needs one.
+    /// Creates the state if the arm has gear laws.
     pub(crate) fn of(arm: &FlexibleArm) -> Option<Box<Self>> {
         let zeros = DVector::zeros(arm.n_elastic_coordinates());
         let slipped = |law: &Hysteresis| Slipped { delta: 0.0, s: vec![0.0; law.sliders.len()] };
@@ -487,10 +490,11 @@ impl GearState {
         })
     }
 
-    /// Springs and dampers at the elastic coordinates and rates, joints at `q` and `qdot`.
+    /// Computes springs and dampers at elastic coordinates `e` and rates `v`, with the joints at
+    /// `q` and `qdot`.
     pub(crate) fn update(&mut self, arm: &FlexibleArm, q: &[f64], qdot: &[f64], e: &[f64], v: &[f64]) {
         let Self { delta, rate, F, damper, slipped, .. } = self;
-        // (1)
+        // Deflections (1) and their rates.
         delta.as_mut_slice().copy_from_slice(e);
         rate.as_mut_slice().copy_from_slice(v);
         for error in &arm.transmission {
@@ -498,7 +502,7 @@ impl GearState {
             delta[k] -= error.at(q[error.motor]);
             rate[k] -= error.slope(q[error.motor]) * qdot[error.motor];
         }
-        // Dampers.
+        // Dampers: D δ̇.
         damper.fill(0.0);
         if arm.proportional {
             for (element, tau) in arm.elements.iter().zip(&arm.tau) {
@@ -509,7 +513,7 @@ impl GearState {
         } else {
             arm.add_damping(rate.as_slice(), damper.as_mut_slice());
         }
-        // Springs, (2)
+        // Springs: equation (2).
         F.copy_from(damper);
         for (k, element) in arm.elements.iter().enumerate() {
             let range = arm.offset(element)..arm.offset(element) + element.size;
@@ -526,7 +530,7 @@ impl GearState {
         arm.add_cross_forces(delta.as_slice(), F.as_mut_slice());
     }
 
-    /// Slope of a curved spring of one coordinate at its last deflection.
+    /// Returns the slope of a nonlinear spring with one coordinate at its last deflection.
     pub(crate) fn slope(&self, arm: &FlexibleArm, k: usize, element: &ElasticElement, curve: &TorqueCurve) -> f64 {
         let delta = self.delta[arm.offset(element)];
         match arm.hysteresis.iter().zip(&self.slipped).find(|(law, _)| law.element == k) {
@@ -535,14 +539,16 @@ impl GearState {
         }
     }
 
-    /// Torque of a spring with hysteresis at its last deflection, none of another one.
+    /// Returns the torque of a spring with hysteresis at its last deflection; `None` for other
+    /// springs.
     pub(crate) fn hysteresis_torque(&self, arm: &FlexibleArm, element: usize) -> Option<f64> {
         let (law, slipped) = arm.hysteresis.iter().zip(&self.slipped).find(|(law, _)| law.element == element)?;
         let delta = self.delta[arm.offset(&arm.elements[element])];
         Some(law.elastic.torque(delta) + slipped.torque(law, delta))
     }
 
-    /// Of each slider of each law its stiffness, 0 where it slips.
+    /// Reports each slider of each law: its number, its elastic coordinate, and its stiffness (0
+    /// while it slips).
     pub(crate) fn stuck(&self, arm: &FlexibleArm, mut tell: impl FnMut(usize, usize, f64)) {
         let mut number = 0;
         for (law, slipped) in arm.hysteresis.iter().zip(&self.slipped) {
@@ -554,7 +560,7 @@ impl GearState {
         }
     }
 
-    /// Loads `-(F)` of the elements; the power that the dampers take (W).
+    /// Writes the loads `-F` of the elements; returns the power dissipated by the dampers (W).
     pub(crate) fn loads(&self, arm: &FlexibleArm, loads: &mut [Vector6<f64>]) -> f64 {
         for (load, element) in loads.iter_mut().zip(&arm.elements) {
             let first = arm.offset(element);
@@ -563,7 +569,7 @@ impl GearState {
         self.damper.dot(&self.rate)
     }
 
-    /// Energy in the springs at the last deflections (J).
+    /// Returns the energy in the springs at the last deflections (J).
     pub(crate) fn energy(&self, arm: &FlexibleArm) -> f64 {
         let mut energy = 0.0;
         for (k, element) in arm.elements.iter().enumerate() {
@@ -576,8 +582,9 @@ impl GearState {
         energy + arm.cross_stiffness.iter().map(|&(i, j, k)| k * self.delta[i] * self.delta[j]).sum::<f64>()
     }
 
-    /// A step has ended with the joints at `q` and the elastic coordinates `e`: (3), and what the
-    /// sliders lost. At the start of a run they have followed the first loading.
+    /// Accepts the end of a step with the joints at `q` and the elastic coordinates at `e`: moves
+    /// the sliders by (3) and adds their losses. The first call of a run moves them along the first
+    /// loading curve.
     pub(crate) fn settle(&mut self, arm: &FlexibleArm, q: &[f64], e: &[f64]) {
         for (law, slipped) in arm.hysteresis.iter().zip(&mut self.slipped) {
             let delta = arm.deflection(law.element, e[arm.offset(&arm.elements[law.element])], q);
@@ -585,7 +592,8 @@ impl GearState {
         }
     }
 
-    /// As [`GearState::settle`], of what happened before the run.
+    /// Moves the sliders as [`GearState::settle`] does, for the time before the run: without
+    /// losses.
     pub(crate) fn begin(&mut self, arm: &FlexibleArm, q: &[f64], e: &[f64]) {
         self.settle(arm, q, e);
         self.lost = 0.0;
@@ -593,7 +601,7 @@ impl GearState {
 }
 
 impl Slipped {
-    /// Deflections of the sliders with the gear at `delta`.
+    /// Returns the deflections of the sliders with the gear at deflection `delta`.
     fn at<'a>(&'a self, law: &'a Hysteresis, delta: f64) -> impl Iterator<Item = (f64, &'a Slider)> + 'a {
         let way = delta - self.delta;
         self.s.iter().zip(&law.sliders).map(move |(s, slider)| ((s + way).clamp(-slider.reach, slider.reach), slider))
@@ -611,7 +619,7 @@ impl Slipped {
         self.at(law, delta).map(|(s, slider)| 0.5 * slider.stiffness * s * s).sum()
     }
 
-    /// Goes on to `delta`; what the friction of the sliders took (J).
+    /// Advances the sliders to the deflection `delta`; returns the energy dissipated (J).
     fn advance(&mut self, law: &Hysteresis, delta: f64) -> f64 {
         let way = delta - self.delta;
         let mut lost = 0.0;
@@ -631,7 +639,7 @@ mod tests {
     use super::*;
 
     /// Truth: Rayleigh's parabola at the corners, and the area of Masing's loop `8 ∫ f - 4 A f(A)`
-    /// of first loading f by closed forms of straight pieces.
+    /// for the first loading curve f, in closed form for piecewise linear curves.
     #[test]
     fn sliders_follow_rayleighs_law_and_lose_the_area_of_masings_loop() {
         let (friction, reach) = (30.0, 2e-4);
@@ -652,14 +660,15 @@ mod tests {
         for amplitude in [0.3 * reach, 0.77 * reach, 2.5 * reach] {
             let masing = 8.0 * curve.energy(amplitude) - 4.0 * amplitude * curve.torque(amplitude);
             assert!((eight.loss(amplitude) - masing).abs() < 1e-12, "{amplitude} {masing}");
-            // The state that follows a closed cycle loses as much, once it has been there before.
+            // The slider state that follows a closed cycle loses the same energy, after a first
+            // loading.
             let mut slipped = Slipped { delta: 0.0, s: vec![0.0; 8] };
             slipped.advance(&eight, amplitude);
             let lost: f64 = [-amplitude, amplitude].iter().map(|d| slipped.advance(&eight, *d)).sum();
             assert!((lost - masing).abs() < 1e-12, "{lost} {masing}");
         }
-        // Many sliders: 2/3 κ A³ / reach with κ = 2 friction / reach, Rayleigh's loss below the
-        // reach.
+        // Many sliders: 2/3 κ A³ / reach with κ = 2 friction / reach, Rayleigh's loss for
+        // amplitudes below the reach.
         let (many, A) = (law(2000), 0.5 * reach);
         let rayleigh = 2.0 / 3.0 * (2.0 * friction / reach) * A.powi(3) / reach;
         assert!((many.loss(A) / rayleigh - 1.0).abs() < 1e-5, "{}", many.loss(A) / rayleigh);

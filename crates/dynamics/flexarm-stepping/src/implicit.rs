@@ -1,17 +1,18 @@
-//! What implicit integrators share: a matrix that is kept, when Newton's method ends, what becomes
-//! of a step that fails.
+//! Common parts of implicit integrators: reuse of the Newton matrix, convergence test, retry of
+//! failed steps.
 //!
 //! ```text
 //! r(ẍ) = 0        ẍ ← ẍ - J^-1 r        J: kept until an iteration slows down
 //! ```
-//! The first correction `d = J^-1 r` is the error of an extrapolation over the step. Each iteration
-//! leaves a part ρ of the one before, as lengths of vectors; what a search may leave of the first
-//! one is a part of it ([`Newton::leaving`]). ρ is measured where two iterations are made, in every
-//! eighth step for certain (every 24th while it is small), and grows as the arm moves away from
-//! where J was taken: while it is known to be small enough, a step needs one evaluation.
+//! The first correction `d = J^-1 r` is the error of the extrapolation over the step. Each
+//! iteration reduces the norm of the correction by a factor ρ; the permitted remaining error is a
+//! fraction of the first correction ([`Newton::leaving`]). ρ is measured whenever two iterations
+//! are made, at least in every eighth step (every 24th while it is small), and grows as the arm
+//! moves away from the configuration at which J was computed. While ρ is known to be small enough,
+//! a step needs one evaluation.
 //!
-//! A step whose iteration fails is tried again with a matrix of its start, then in halves, down to
-//! `h/64`.
+//! A step whose iteration fails is repeated with a matrix computed at its start, then in halves,
+//! down to `h/64`.
 
 use nalgebra::DVector;
 
@@ -21,79 +22,77 @@ use crate::iteration_matrix::IterationMatrix;
 use crate::stepper::Counts;
 use crate::system::SecondOrderSystem;
 
-/// Most Newton iterations for one set of accelerations before they count as not found.
+/// Maximum number of Newton iterations for one set of accelerations.
 const MAX_ITERATIONS: usize = 25;
-/// A step that fails is halved so many times before the run is given up.
+/// Maximum number of halvings of a failed step.
 const MOST_HALVINGS: u32 = 6;
-/// A step that needed more iterations than this renews the matrix for the next one; twice as many,
-/// for itself.
+/// Number of iterations above which a step renews the matrix for the next one; at twice this number
+/// it renews the matrix for itself.
 const RENEW_ABOVE: usize = 4;
-/// Largest ρ of a matrix that is kept, unless told otherwise.
+/// Default of the maximum ρ of a matrix that is kept.
 const STALE: f64 = 0.03;
-/// Accepted correction over the size of the acceleration.
+/// Accepted correction relative to the acceleration.
 const TOLERANCE: f64 = 1e-9;
-/// Part of the first correction that a search may leave unless it is told otherwise: errors that
-/// nothing damps add up.
+/// Default of the permitted remaining fraction of the first correction: errors that nothing damps
+/// accumulate.
 const TO_THE_END: f64 = 1e-6;
-/// Part of what may be left that ρ may be with a matrix just taken: more is no age of the matrix
-/// but something that it does not know (weight, loads, speeds), whose error has the same sign in
-/// every step and may feed a mode.
+/// Maximum ρ of a new matrix relative to the permitted remaining fraction. A larger ρ is not due to
+/// the age of the matrix but to terms missing from it (weight, loads, velocities), whose error has
+/// the same sign in every step and may excite a mode.
 const EXACT: f64 = 0.5;
-/// In every step whose number is a multiple of this ρ is measured anew: in all runs that go side by
-/// side at once.
+/// ρ is measured in every step whose number is a multiple of this; parallel runs of a batch thus
+/// measure at the same steps.
 const MEASURED_EVERY: u64 = 8;
-/// The same while ρ is below this part of what may be left: until it has grown to that the arm
-/// moves on for a while.
+/// Interval while ρ is small (see [`WELL_BELOW`]) and cannot become too large within a few steps.
 const MEASURED_RARELY: u64 = 24;
-/// See [`MEASURED_RARELY`].
+/// ρ relative to the permitted remaining fraction below which [`MEASURED_RARELY`] applies.
 const WELL_BELOW: f64 = 0.3;
-/// A first correction so many times as large as the largest of late comes from something new, of
-/// which ρ says nothing.
+/// A first correction that exceeds the recent maximum by this factor has a new cause, for which ρ
+/// is not known.
 const SUDDEN: f64 = 1.2;
-/// What is left of the largest of late after each search.
+/// Decay factor of the recent maximum per search.
 const FADING: f64 = 0.95;
-/// Corrections below this, over the size of the acceleration, are too near to rounding to measure
-/// ρ.
+/// Corrections below this, relative to the acceleration, are too close to round-off to measure ρ.
 const MEASURABLE: f64 = 1e-9;
-/// Corrections of x below this fraction of x are rounding.
+/// Corrections of x below this fraction of x are round-off.
 const ROUNDING: f64 = 1e-14;
 
-/// Newton's matrix with the step that it belongs to, and the work done with it.
+/// Newton matrix with its step size, and counters of the work done.
 #[derive(Clone, Debug)]
 pub(crate) struct Newton {
     pub(crate) matrix: IterationMatrix,
-    /// Residual, after a solution the correction.
+    /// Residual; after a solution the correction.
     pub(crate) r: DVector<f64>,
-    /// Step to which matrix and memory belong (s).
+    /// Step size for which matrix and history are valid (s).
     pub(crate) dt: f64,
-    /// Whether the matrix is still good.
+    /// Whether the matrix is still valid.
     pub(crate) factored: bool,
-    /// Whether what is remembered of the steps before is to be taken anew.
+    /// Whether the history of previous steps has to be initialised again.
     pub(crate) fresh: bool,
-    /// Whether the next matrix continues the last one: same length of the step, same masses but for
-    /// the motion.
+    /// Whether the next matrix continues the last one: same step size, masses changed only by the
+    /// motion.
     pub(crate) same_course: bool,
     iterations: u64,
     factorisations: u64,
     last_iterations: usize,
     last_correction: f64,
-    /// ρ as measured last, infinite with a new matrix, and as measured first with this one.
+    /// ρ as measured last (infinite with a new matrix), and as measured first with this matrix.
     contraction: f64,
     first_contraction: f64,
-    /// Whether it is to be measured in this step.
+    /// Whether ρ is to be measured in this step.
     measuring: bool,
-    /// Part of the first correction that a search may leave.
+    /// Permitted remaining fraction of the first correction.
     left: f64,
-    /// Largest ρ of a matrix that is kept.
+    /// Maximum ρ of a matrix that is kept.
     stale: f64,
-    /// Whether the matrix was taken in the search under way.
+    /// Whether the matrix was computed during the current search.
     new: bool,
-    /// Largest first correction of late.
+    /// Decaying maximum of the first corrections.
     largest_first: f64,
 }
 
 impl Newton {
-    /// For n coordinates and steps of length h (s).
+    /// Creates the state for n coordinates and step size `h` (s).
     pub(crate) fn new(n: usize, h: f64) -> Self {
         Self {
             matrix: IterationMatrix::new(),
@@ -116,41 +115,42 @@ impl Newton {
         }
     }
 
-    /// The same, with searches that may leave this part of their first correction.
+    /// Sets the permitted remaining fraction of the first correction.
     pub(crate) fn leaving(self, left: f64) -> Self {
         Self { left, ..self }
     }
 
-    /// The same, with a matrix that is kept up to this ρ.
+    /// Sets the maximum ρ of a matrix that is kept.
     pub(crate) fn keeping(self, stale: f64) -> Self {
         Self { stale, ..self }
     }
 
-    /// After so many whole steps the next one begins.
+    /// Begins the next step after `steps` complete ones.
     pub(crate) fn begin_step(&mut self, steps: u64) {
         let every = if self.contraction <= WELL_BELOW * self.left { MEASURED_RARELY } else { MEASURED_EVERY };
         self.measuring = steps.is_multiple_of(every);
     }
 
-    /// Matrix and memory are out of date.
+    /// Invalidates matrix and history.
     fn forget(&mut self) {
         (self.factored, self.fresh, self.same_course) = (false, true, false);
     }
 
-    /// The matrix in `self.matrix` was inverted.
+    /// Records that `self.matrix` was inverted.
     pub(crate) fn renewed(&mut self) {
         (self.factored, self.new, self.same_course) = (true, true, true);
         (self.contraction, self.first_contraction) = (f64::INFINITY, f64::INFINITY);
         self.factorisations += 1;
     }
 
-    /// The matrix was taken between two steps: what the next search measures counts.
+    /// Records that the matrix was computed between two steps, so that the next search may measure
+    /// ρ.
     pub(crate) fn renewed_between(&mut self) {
         self.new = false;
     }
 
-    /// A step was found in so many iterations, at most `longest` of them for one set of
-    /// accelerations.
+    /// Records a converged step with its number of iterations, at most `longest` of them for one
+    /// set of accelerations.
     pub(crate) fn found(&mut self, iterations: usize, longest: usize) {
         self.iterations += iterations as u64;
         self.last_iterations += iterations;
@@ -159,7 +159,7 @@ impl Newton {
         self.factored = longest <= RENEW_ABOVE && !stale;
     }
 
-    /// Whether a search may end with its first correction, of that norm.
+    /// Returns whether a search may end with its first correction, of norm `norm`.
     fn ends_at_once(&mut self, norm: f64) -> bool {
         let calm = norm <= SUDDEN * self.largest_first;
         self.largest_first = norm.max(FADING * self.largest_first);
@@ -167,8 +167,8 @@ impl Newton {
         calm && exact && !self.measuring && self.contraction <= self.left
     }
 
-    /// An iteration left this part of the one before. With the matrix of the search itself it says
-    /// nothing of those to come.
+    /// Records the measured ρ. A matrix computed during the search is exact there, so that its ρ is
+    /// not representative of later steps.
     fn measured(&mut self, contraction: f64) {
         if !self.new {
             if self.contraction.is_infinite() {
@@ -178,21 +178,21 @@ impl Newton {
         }
     }
 
-    /// Work after so many steps.
+    /// Returns the work after `steps` complete steps.
     pub(crate) fn counts(&self, steps: u64) -> Counts {
         Counts { steps, evaluations: self.iterations, factorisations: self.factorisations }
     }
 
-    /// Iterations of the last step and the relative correction with which it ended.
+    /// Returns the iterations of the last step and its final relative correction.
     pub(crate) fn last(&self) -> (usize, f64) {
         (self.last_iterations, self.last_correction)
     }
 }
 
-/// Sizes of one Newton correction, the largest over all coordinates.
+/// Sizes of one Newton correction, as maxima over all coordinates.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Sizes {
-    /// Length of the correction.
+    /// Norm of the correction.
     norm: f64,
     correction: f64,
     acceleration: f64,
@@ -200,14 +200,14 @@ pub(crate) struct Sizes {
 }
 
 impl Sizes {
-    /// Of a correction with this norm, before any coordinate.
+    /// Creates the sizes for a correction with this norm, before any coordinate is included.
     pub(crate) fn of(norm: f64) -> Self {
         Self { norm, ..Self::default() }
     }
 
-    /// Takes in one coordinate: correction and value of its acceleration, and its place.
+    /// Includes one coordinate: correction and value of its acceleration, and its position.
     pub(crate) fn include(&mut self, correction: f64, acceleration: f64, place: f64) {
-        // `max` passes over NaN.
+        // `max` ignores NaN.
         let finite = correction.is_finite();
         self.correction = if finite { self.correction.max(correction.abs()) } else { f64::INFINITY };
         self.acceleration = self.acceleration.max(acceleration.abs());
@@ -215,16 +215,16 @@ impl Sizes {
     }
 }
 
-/// One use of Newton's method, for accelerations at `t`.
+/// One run of Newton's method, for the accelerations at `t`.
 pub(crate) struct Search {
     t: f64,
     h: f64,
     /// `dx/dẍ` of the method (s²).
     c_K: f64,
     pub(crate) iterations: usize,
-    /// Whether it got a fresh matrix; for those who do not compute one at once.
+    /// Whether it was given a fresh matrix; used by callers that compute the matrix later.
     pub(crate) renewed: bool,
-    /// Norms of the first correction and of the last one.
+    /// Norms of the first and of the last correction.
     first: f64,
     last: f64,
 }
@@ -234,16 +234,16 @@ impl Search {
         Self { t, h, c_K, iterations: 0, renewed: false, first: 0.0, last: f64::INFINITY }
     }
 
-    /// Whether the iteration stalls: it gets a fresh matrix.
+    /// Returns whether the iteration stalls and needs a fresh matrix.
     pub(crate) fn stalls(&self) -> bool {
         self.iterations == 2 * RENEW_ABOVE
     }
 
-    /// Counts a correction; whether it was the last one that is needed.
+    /// Counts a correction; returns whether the iteration has converged.
     ///
     /// # Errors
-    /// [`StepError::Diverged`] where values are out of all range, [`StepError::NotConverged`] after
-    /// too many iterations.
+    /// [`StepError::Diverged`] if values are out of range, [`StepError::NotConverged`] after too
+    /// many iterations.
     pub(crate) fn ends(&mut self, sizes: Sizes, newton: &mut Newton) -> Result<bool, StepError> {
         let Sizes { norm, correction, acceleration: size, place } = sizes;
         let Self { t, h, c_K, .. } = *self;
@@ -267,13 +267,14 @@ impl Search {
         if self.iterations == MAX_ITERATIONS {
             return Err(StepError::NotConverged { t, h, iterations: self.iterations, correction: correction / size });
         }
-        // Else the contraction seen so far tells whether the next correction would be small enough.
+        // Otherwise estimate from the contraction whether the next correction would be small
+        // enough.
         self.last = norm;
         Ok(!first && contraction < 0.1 && norm * contraction <= newton.left * self.first)
     }
 }
 
-/// What an implicit integrator does of its own; the rest of an [`Integrator`] is the same for all.
+/// Method-specific part of an implicit [`Integrator`]; the rest is common.
 pub(crate) trait ImplicitStep: Send {
     /// [`Integrator::MOTION_RULE`].
     const MOTION_RULE: &'static [(f64, f64)];
@@ -286,10 +287,10 @@ pub(crate) trait ImplicitStep: Send {
 
     fn newton_mut(&mut self) -> &mut Newton;
 
-    /// What depends on the length of the step, other than Newton's matrix.
+    /// Updates quantities other than Newton's matrix that depend on the step size.
     fn set_length(&mut self, _dt: f64) {}
 
-    /// One step of length `newton().dt` to t; on error nothing but the matrix has changed.
+    /// Takes one step of size `newton().dt` to `t`; on error only the matrix has changed.
     fn attempt(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError>;
 }
 
@@ -306,7 +307,7 @@ impl<M: ImplicitStep> Integrator for M {
 
     fn advance_to(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError> {
         let grid = &ImplicitStep::current(self).grid;
-        // Whole steps are all the same, so that their matrix lasts.
+        // Complete steps use exactly the same step size, so that their matrix can be kept.
         let dt = if t == grid.next_time() && grid.is_on_step() { grid.step_size() } else { t - grid.time() };
         let steps = grid.steps();
         self.newton_mut().last_iterations = 0;
@@ -334,7 +335,7 @@ impl<M: ImplicitStep> Integrator for M {
     }
 }
 
-/// From the current time to t: in one step, else in two halves.
+/// Advances from the current time to `t`: in one step, or if that fails in two halves.
 fn cross(
     method: &mut impl ImplicitStep,
     system: &mut impl SecondOrderSystem,
@@ -347,7 +348,7 @@ fn cross(
         method.set_length(dt);
         method.newton_mut().forget();
     }
-    // With the matrix that is there, then with one of the step's start.
+    // First with the existing matrix, then with one computed at the start of the step.
     let kept = method.newton().factored;
     let mut result = method.attempt(system, t);
     if result.is_err() && kept {

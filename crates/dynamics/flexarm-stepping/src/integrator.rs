@@ -1,7 +1,6 @@
-//! The seam between integrators and whoever steps them: a grid of times, a state, events.
+//! Interface between integrators and their callers: a time grid, a state, events.
 //!
-//! [`ReducedStepper`] puts any of them behind a flexible arm, once for all: its steps end at events
-//! too.
+//! [`ReducedStepper`] combines any integrator with a flexible arm; its steps also end at events.
 
 use std::sync::Arc;
 
@@ -16,7 +15,7 @@ use crate::reduced::ReducedArm;
 use crate::stepper::{Counts, LARGEST_DEFLECTION, Stepper};
 use crate::system::SecondOrderSystem;
 
-/// The multiples of a step, and how far an integrator has come along them.
+/// Time grid with constant step size, and the current time on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimeGrid {
     t0: f64,
@@ -26,71 +25,71 @@ pub struct TimeGrid {
 }
 
 impl TimeGrid {
-    /// Times `t0 + k h` (s), at `t0`.
+    /// Creates the grid `t0 + k h` (s) with current time `t0`.
     pub fn new(t0: f64, h: f64) -> Self {
         Self { t0, h, t: t0, steps: 0 }
     }
 
-    /// First time (s).
+    /// Returns the first time (s).
     pub fn start(&self) -> f64 {
         self.t0
     }
 
-    /// Current time (s); between two events it may lie off the grid.
+    /// Returns the current time (s); between two events it may be off the grid.
     pub fn time(&self) -> f64 {
         self.t
     }
 
-    /// Step (s).
+    /// Returns the step size (s).
     pub fn step_size(&self) -> f64 {
         self.h
     }
 
-    /// Whole steps behind the current time.
+    /// Returns the number of complete steps taken.
     pub fn steps(&self) -> u64 {
         self.steps
     }
 
-    /// The multiple of the step so many steps after the current one (s).
+    /// Returns the grid time (s) `steps` steps after the current one.
     pub fn after(&self, steps: u64) -> f64 {
         self.t0 + (self.steps + steps) as f64 * self.h
     }
 
-    /// Next multiple of the step (s).
+    /// Returns the next grid time (s).
     pub fn next_time(&self) -> f64 {
         self.after(1)
     }
 
-    /// Whether the current time is a multiple of the step.
+    /// Returns whether the current time is on the grid.
     pub fn is_on_step(&self) -> bool {
         self.t == self.after(0)
     }
 
-    /// Time has come to t (s), at most to the next multiple of the step.
+    /// Sets the current time to `t` (s), at most the next grid time.
     pub fn reach(&mut self, t: f64) {
         self.steps += u64::from(t == self.next_time());
         self.t = t;
     }
 }
 
-/// Where an integrator is: on its grid, and what moves how.
+/// Current state of an integrator: time grid, positions, velocities, accelerations.
 #[derive(Clone, Debug)]
 pub struct Current {
-    /// The times.
+    /// Time grid and current time.
     pub grid: TimeGrid,
     /// Positions.
     pub x: DVector<f64>,
     /// Velocities.
     pub v: DVector<f64>,
-    /// Accelerations that fulfil the equations of motion.
+    /// Accelerations, consistent with the equations of motion.
     pub acceleration: DVector<f64>,
 }
 
 impl Current {
-    /// At `t0` (s), on a grid of step `h` (s).
+    /// Creates the state at `t0` (s), on a grid of step size `h` (s).
     ///
     /// # Errors
-    /// [`StepError::Singular`] if the acceleration cannot be found.
+    /// [`StepError::Singular`] if the acceleration cannot be computed.
     ///
     /// # Panics
     /// If `h` is not positive.
@@ -108,50 +107,50 @@ impl Current {
         Ok(current)
     }
 
-    /// Takes the acceleration from the equations of motion.
+    /// Updates the acceleration from the equations of motion.
     ///
     /// # Errors
-    /// [`StepError::Singular`] if it cannot be found.
+    /// [`StepError::Singular`] if it cannot be computed.
     pub fn accelerate(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
         system.acceleration(self.grid.time(), &self.x, &self.v, &mut self.acceleration)
     }
 }
 
-/// An integrator of second-order systems; it steps along a grid and stops between its times where
-/// it is told to.
+/// An integrator of second-order systems; it steps along a time grid and can stop between grid
+/// times.
 ///
 /// After an error the state is that of the last good time.
 pub trait Integrator: Send {
-    /// Where in a step it asks for prescribed accelerations, as parts of the step, and with which
-    /// weights they make the impulse. Steps are cut where this misses the change of a velocity that
-    /// rises within them; empty: they are short anyway.
+    /// Quadrature rule with which a step integrates prescribed accelerations: (fraction of the
+    /// step, weight). Steps are subdivided where the rule misses the change of a prescribed
+    /// velocity within them. Empty: no subdivision, because the steps are short anyway.
     const MOTION_RULE: &'static [(f64, f64)] = &[];
 
-    /// Where it is.
+    /// Returns the current state.
     fn current(&self) -> &Current;
 
-    /// The same; of what an event may change, the velocities, [`Integrator::restart`] must follow.
+    /// Returns the current state for modification; after a change of velocities at an event the
+    /// caller must call [`Integrator::restart`].
     fn current_mut(&mut self) -> &mut Current;
 
-    /// Advances to t (s), which lies after the current time and not beyond the next multiple of the
-    /// step.
+    /// Advances to `t` (s), which is after the current time and not beyond the next grid time.
     ///
     /// # Errors
-    /// [`StepError::NotConverged`] or [`StepError::SolverGaveUp`] if the step has no solution that
-    /// is found, [`StepError::Diverged`] if it is out of all range, [`StepError::Singular`] if a
-    /// matrix cannot be solved.
+    /// [`StepError::NotConverged`] or [`StepError::SolverGaveUp`] if no solution of the step is
+    /// found, [`StepError::Diverged`] if the state is out of range, [`StepError::Singular`] if a
+    /// matrix cannot be factorised.
     fn advance_to(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError>;
 
-    /// Starts anew from the current state: to be called when a force or a velocity has jumped.
+    /// Restarts from the current state; to be called after a jump of a force or a velocity.
     ///
     /// # Errors
-    /// [`StepError::Singular`] if the acceleration cannot be found.
+    /// [`StepError::Singular`] if the acceleration cannot be computed.
     fn restart(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
         self.current_mut().accelerate(system)
     }
 
-    /// As [`Integrator::restart`], when masses, stiffness or damping have changed: matrices too are
-    /// out of date.
+    /// Restarts as [`Integrator::restart`] does after a change of masses, stiffness or damping,
+    /// which also makes stored matrices out of date.
     ///
     /// # Errors
     /// As [`Integrator::restart`].
@@ -159,19 +158,19 @@ pub trait Integrator: Send {
         self.restart(system)
     }
 
-    /// Beyond this time (s), to which the next steps lead, nothing is known yet.
+    /// Announces the next event at time `_t` (s): the solution must not be extrapolated beyond it.
     fn expect_event(&mut self, _t: f64) {}
 
-    /// Work so far.
+    /// Returns the work done so far.
     fn counts(&self) -> Counts;
 
-    /// Iterations of the last step and the relative correction with which it ended (0 where there
-    /// are none).
+    /// Returns the iterations of the last step and its final relative correction (zeros without
+    /// iterations).
     fn last_iteration(&self) -> (usize, f64) {
         (0, 0.0)
     }
 
-    /// Advances to the next multiple of the step.
+    /// Advances to the next grid time.
     ///
     /// # Errors
     /// As [`Integrator::advance_to`].
@@ -179,35 +178,35 @@ pub trait Integrator: Send {
         self.advance_to(system, self.next_time())
     }
 
-    /// Current time (s).
+    /// Returns the current time (s).
     fn time(&self) -> f64 {
         self.current().grid.time()
     }
 
-    /// Next multiple of the step (s).
+    /// Returns the next grid time (s).
     fn next_time(&self) -> f64 {
         self.current().grid.next_time()
     }
 
-    /// Step (s).
+    /// Returns the step size (s).
     fn step_size(&self) -> f64 {
         self.current().grid.step_size()
     }
 
-    /// Whole steps taken.
+    /// Returns the number of complete steps taken.
     fn steps(&self) -> u64 {
         self.current().grid.steps()
     }
 }
 
-/// A stepper of reduced coordinates; its steps end at events too.
+/// Stepper of an arm in reduced coordinates; its steps also end at events.
 pub(crate) struct ReducedStepper<I> {
     pub(crate) system: ReducedArm,
     pub(crate) integrator: I,
 }
 
 impl<I: Integrator> ReducedStepper<I> {
-    /// An arm at `t = 0` with elastic coordinates `e`, and the integrator that is made for it from
+    /// Starts an arm at `t = 0` with elastic coordinates `e`; `make` builds the integrator from
     /// positions and velocities.
     pub(crate) fn start(
         arm: impl Into<Arc<FlexibleArm>>,
@@ -231,8 +230,8 @@ impl<I: Integrator> Stepper for ReducedStepper<I> {
         let Self { system, integrator } = self;
         let end = integrator.next_time();
         loop {
-            // To the next event, to the end of the step, or not so far where a prescribed velocity
-            // rises in between.
+            // Advance to the next event, to the end of the step, or less far where a prescribed
+            // velocity changes fast in between.
             let event = system.next_event(integrator.time(), end);
             let stop = event.filter(|t| *t < end).unwrap_or(end);
             let stop = system.resolved(integrator.time(), stop, I::MOTION_RULE);
@@ -240,10 +239,10 @@ impl<I: Integrator> Stepper for ReducedStepper<I> {
                 integrator.expect_event(event);
             }
             if let Err(error) = integrator.advance_to(system, stop) {
-                // Where a loop does not close nothing is a number, and that is the cause.
+                // An open loop makes the state NaN; report the loop as the cause of the failure.
                 return Err(StepError::dead_point(&system.arm.model, &system.data, stop).unwrap_or(error));
             }
-            // What happens there.
+            // Apply the events at this time.
             let h = integrator.step_size();
             let now = integrator.current_mut();
             check_deflection(&system.arm, &now.x, stop, h)?;
@@ -272,7 +271,7 @@ impl<I: Integrator> Stepper for ReducedStepper<I> {
     }
 }
 
-/// Stops a run whose links have come apart.
+/// Returns an error if an elastic coordinate exceeds [`LARGEST_DEFLECTION`].
 pub(crate) fn check_deflection(arm: &FlexibleArm, x: &DVector<f64>, t: f64, h: f64) -> Result<(), StepError> {
     if largest_quickly(x.as_slice()) <= LARGEST_DEFLECTION {
         return Ok(());

@@ -1,11 +1,13 @@
-//! The matrix of Newton's method in an implicit step, `J = M + c_D D + c_K K`, in one of three
-//! ways: as its inverse, which is used dozens of times before it is renewed, and a product costs a
-//! third of two triangular solutions; or, where the coordinates sit on a tree and are many,
-//! eliminated along it ([`crate::tree_matrix`]); or, where many are modes, these first
-//! ([`crate::mode_matrix`]).
+//! Matrix of Newton's method in an implicit step, `J = M + c_D D + c_K K`, in one of three forms:
+//!
+//! - dense inverse: it is used dozens of times before it is renewed, and a product costs a third of
+//!   two triangular solves;
+//! - elimination along the tree, if the coordinates form a tree and are many
+//!   ([`crate::tree_matrix`]);
+//! - elimination of the modal coordinates first, if many are modal ([`crate::mode_matrix`]).
 //!
 //! Between [`IterationMatrix::read`] and [`IterationMatrix::invert`] a method may change a dense J
-//! ([`DenseInverse`]'s fields). Nothing here allocates after the first time.
+//! (fields of [`DenseInverse`]). Nothing here allocates after the first use.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -15,39 +17,39 @@ use crate::mode_matrix::ModeInverse;
 use crate::system::SecondOrderSystem;
 use crate::tree_matrix::TreeInverse;
 
-/// `J^-1`, or of `J = M + (c_D D + c_K K) (1 + s M^-1 K)`.
+/// `J^-1`, or the inverse of `J = M + (c_D D + c_K K) (1 + s M^-1 K)`.
 #[derive(Clone, Debug)]
 pub(crate) struct IterationMatrix {
     pub(crate) way: Way,
-    /// s, if any.
+    /// Factor s, if any.
     s: Option<f64>,
 }
 
-/// How it is solved.
+/// Form of the matrix.
 #[derive(Clone, Debug)]
 pub(crate) enum Way {
-    /// By a dense inverse; s is the caller's to put in.
+    /// Dense inverse; the caller applies s.
     Dense(DenseInverse),
-    /// Along the tree, with s.
+    /// Elimination along the tree, including s.
     Tree(TreeInverse),
-    /// Modes first, with s.
+    /// Elimination of modes first, including s.
     Modes(Box<ModeInverse>),
 }
 
-/// `(S + C)^-1 B`; as read, `S = M`, `C = c_D D + c_K K` and `B = 1`. All are n × n and symmetric
-/// but B.
+/// `(S + C)^-1 B`; after reading, `S = M`, `C = c_D D + c_K K` and `B = 1`. All are n × n; S and C
+/// are symmetric.
 #[derive(Clone, Debug)]
 pub(crate) struct DenseInverse {
     /// M; after the inversion the factor.
     pub(crate) S: DMatrix<f64>,
     pub(crate) C: DMatrix<f64>,
-    /// Bᵀ, after the inversion the inverse.
+    /// Bᵀ; after the inversion the inverse.
     pub(crate) inverse: DMatrix<f64>,
     product: DVector<f64>,
 }
 
 impl DenseInverse {
-    /// Room for n coordinates.
+    /// Allocates matrices for n coordinates.
     fn new(n: usize) -> Self {
         let square = || DMatrix::zeros(n, n);
         Self { S: square(), C: square(), inverse: square(), product: DVector::zeros(n) }
@@ -75,15 +77,16 @@ impl DenseInverse {
 }
 
 impl IterationMatrix {
-    /// For as many coordinates as the system will have that is read.
+    /// Creates the matrix; the number of coordinates is that of the system read first.
     pub(crate) fn new() -> Self {
         Self { way: Way::Tree(TreeInverse::default()), s: None }
     }
 
-    /// M and `c_D D + c_K K` at the configuration of the system's last residual; `s` as above.
+    /// Reads M and `c_D D + c_K K` at the configuration of the last residual of the system; `s` as
+    /// above.
     pub(crate) fn read(&mut self, system: &mut impl SecondOrderSystem, c_D: f64, c_K: f64, s: Option<f64>) {
         self.s = s;
-        // A system whose matrices once were dense ones keeps them.
+        // A system whose matrices were dense once keeps dense matrices.
         if let Way::Tree(tree) = &mut self.way {
             if system.along_tree(c_D, c_K, &mut tree.matrices) {
                 return;
@@ -101,7 +104,7 @@ impl IterationMatrix {
         }
     }
 
-    /// Factorises what was read, for [`IterationMatrix::solve`].
+    /// Factorises the matrix read, for [`IterationMatrix::solve`].
     ///
     /// # Errors
     /// [`StepError::Singular`] if J, or along a tree M, is not positive definite.
@@ -124,7 +127,7 @@ impl IterationMatrix {
     }
 }
 
-/// The storage of a factor that is not needed any more, to be filled again.
+/// Returns the storage of a factor that is no longer needed, for reuse.
 pub(crate) fn storage_of(factor: &mut Option<Cholesky<f64, Dyn>>, n: usize) -> DMatrix<f64> {
     match factor.take() {
         Some(old) => old.unpack_dirty(),

@@ -1,10 +1,10 @@
 //! Time steppers for flexible arms: generalised-alpha, SPOOK, explicit RK4, a reference with error
 //! control; static equilibrium and modes.
 //!
-//! A [`FlexibleArm`] (tree, springs, damping, motion) goes into [`new_stepper`]; the [`Stepper`]
-//! that comes out is advanced and observed. The integrators for reduced coordinates know only
-//! [`SecondOrderSystem`]; SPOOK works on the bodies themselves. Not here: files, metrics, the
-//! substitution of links.
+//! [`new_stepper`] turns a [`FlexibleArm`] (tree, springs, damping, motion) into a [`Stepper`],
+//! which the caller advances and observes. The integrators for reduced coordinates know only
+//! [`SecondOrderSystem`]; SPOOK works in the maximal coordinates of the bodies. Not here: files,
+//! metrics, the replacement of links by flexible ones.
 //!
 //! ```
 //! use std::sync::Arc;

@@ -1,16 +1,15 @@
-//! The arm as a linear structure about a static pose: what statics, modes and frequency response
-//! are made of.
+//! Linearisation of the arm about a static pose: basis of statics, modes and frequency response.
 //!
 //! ```text
 //! M ẍ + D ẋ + K x = Jᵀ F - M_a q̈_a - D_a q̇_a - K_a q_a        V_T = J ẋ + J_a q̇_a
 //! ```
 //! for small motions x of the free coordinates and commands q_a of the joints about the equilibrium
-//! under weight and a constant wrench at a tool frame T. A prescribed joint is where its command
-//! is; one that is driven by torque is free, and its servo is a spring and a damper towards the
-//! command, with its feed-forward, without its sampling, its limit and its integral (which at rest
-//! holds the motor where it is commanded). Start at [`linearise`]. Everything that knows how the
-//! coordinates are laid out is in the few functions of this file. Not here: eigenvalues and
-//! frequency response (`flexarm-analysis`).
+//! under weight and a constant wrench at a tool frame T. A prescribed joint follows its command
+//! exactly. A joint driven by torque is free; its servo acts as a spring and a damper towards the
+//! command, with feed-forward but without sampling, limit and integral (at rest the integral makes
+//! the motor reach its command). Start at [`linearise`]. The layout of the coordinates is known
+//! only to the few functions of this file. Not here: eigenvalues and frequency response
+//! (`flexarm-analysis`).
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -27,58 +26,59 @@ use crate::statics::{
     MOST_HALVINGS, StaticSlopes, for_vibration, spring_forces, static_equilibrium, static_forces, with_curves,
 };
 
-/// Accepted unbalanced force over the largest force, as in [`static_equilibrium`].
+/// Accepted unbalanced force relative to the largest force, as in [`static_equilibrium`].
 const TOLERANCE: f64 = 1e-13;
-/// Most Newton iterations.
+/// Maximum number of Newton iterations.
 const MOST_ITERATIONS: usize = 30;
 
-/// Linear structure about a static pose; n free coordinates (joints driven by torque, then elastic
-/// ones), m joints. World axes, at the tool point, linear first.
+/// Linear model about a static pose with n free coordinates (joints driven by torque, then elastic
+/// ones) and m joints. Tool quantities are in world axes at the tool point, linear part first.
 #[derive(Clone, Debug)]
 pub struct Linear {
     /// Free coordinates at the equilibrium.
     pub equilibrium: DVector<f64>,
-    /// All coordinates there.
+    /// All coordinates at the equilibrium.
     pub q: DVector<f64>,
     /// Mass matrix of the free coordinates, n×n.
     pub M: DMatrix<f64>,
     /// Damping matrix, n×n.
     pub D: DMatrix<f64>,
-    /// Tangent stiffness: springs, change of weight and of the wrench, n×n. Symmetric unless there
-    /// is a constant moment, which is not conservative.
+    /// Tangent stiffness, n×n: springs plus the geometric stiffness of weight and tool wrench.
+    /// Symmetric unless there is a constant moment, which is not conservative.
     pub K: DMatrix<f64>,
-    /// How many of the free coordinates are joints driven by torque; they come first.
+    /// Number of joints driven by torque; they are the first free coordinates.
     pub driven: usize,
-    /// The part of `K` that is springs alone, n×n, block diagonal.
+    /// Share of the springs in `K`, n×n.
     pub springs: DMatrix<f64>,
     /// Name and free coordinates of each elastic element.
     pub elements: Vec<(String, Range<usize>)>,
     /// Forces on the free coordinates per acceleration of the commands, n×m.
     pub M_a: DMatrix<f64>,
-    /// Per their rates, n×m; zero for prescribed joints.
+    /// Forces on the free coordinates per rate of the commands, n×m; zero for prescribed joints.
     pub D_a: DMatrix<f64>,
-    /// Per the commands themselves, n×m.
+    /// Forces on the free coordinates per command, n×m.
     pub K_a: DMatrix<f64>,
     /// Twist of the tool per rate of the free coordinates, 6×n.
     pub J: Matrix6xX<f64>,
-    /// Twist of the tool per rate of the commands, the structure not yielding, 6×m; zero for joints
+    /// Twist of the tool per rate of the commands with the structure rigid, 6×m; zero for joints
     /// driven by torque.
     pub J_a: Matrix6xX<f64>,
-    /// Tool in the world at the equilibrium.
+    /// Pose of the tool in the world at the equilibrium.
     pub X_WT: Pose,
-    /// Forces with which the drives hold the pose, m.
+    /// Drive forces that hold the pose, m.
     pub holding: DVector<f64>,
-    /// Unbalanced force over the largest force at the equilibrium.
+    /// Unbalanced force relative to the largest force at the equilibrium.
     pub residual: f64,
-    /// Newton iterations beyond those under weight alone.
+    /// Newton iterations in addition to those for the equilibrium under weight.
     pub iterations: usize,
 }
 
 impl Linear {
-    /// Cartesian compliance of the tool, `J K^-1 Jᵀ` (m/N, rad/N; m/(N m), rad/(N m)), motors held.
+    /// Returns the Cartesian compliance of the tool, `J K^-1 Jᵀ` (m/N, rad/N; m/(N m), rad/(N m)),
+    /// with motors held.
     ///
     /// # Errors
-    /// [`StepError::Singular`] where a motion has no stiffness.
+    /// [`StepError::Singular`] if a direction has no stiffness.
     pub fn compliance(&self) -> Result<Matrix6<f64>, StepError> {
         let n = self.K.nrows() - self.driven;
         if n == 0 {
@@ -96,8 +96,8 @@ impl Linear {
 }
 
 impl Linear {
-    /// Twist of the tool at rest per change of the commands, `J_a - J K^-1 K_a`, 6×m: commands move
-    /// the tool and what it gives way. None where a motion has no stiffness.
+    /// Returns the static twist of the tool per change of the commands, `J_a - J K^-1 K_a`, 6×m:
+    /// rigid motion plus the change of the deflection. `None` if a direction has no stiffness.
     pub fn command_slopes(&self) -> Option<Matrix6xX<f64>> {
         if self.K.is_empty() {
             return Some(self.J_a.clone());
@@ -105,8 +105,8 @@ impl Linear {
         Some(&self.J_a - &self.J * self.K.clone().lu().solve(&self.K_a)?)
     }
 
-    /// As [`Linear::compliance`], with motors under servos yielding like springs; none where one of
-    /// them is held by nothing.
+    /// Returns the compliance as [`Linear::compliance`] does, with the stiffness of the servos
+    /// included. `None` if a motor is not held.
     pub fn yielding_compliance(&self) -> Option<Matrix6<f64>> {
         let K = (&self.K + self.K.transpose()) * 0.5;
         let scale = K.diagonal().amax();
@@ -120,18 +120,19 @@ impl Linear {
     }
 }
 
-/// The arm about its equilibrium at time `t` of the motion, prescribed joints locked there.
+/// Linearises the arm about its equilibrium at time `t` of the motion, prescribed joints locked
+/// there.
 ///
 /// * `tool`: a frame of the arm's model; `F_T_W`: constant wrench on it, at its origin, in world
-///   axes, which stays the same and follows the point when the arm yields. The arm's own loads act
-///   as well.
+///   axes, which keeps its direction and moves with the point as the arm deflects. The arm's own
+///   loads act as well.
 ///
 /// # Errors
 /// [`StepError::NoEquilibrium`], [`StepError::Singular`], [`StepError::OpenLoop`].
 pub fn linearise(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, t: f64) -> Result<Linear, StepError> {
     let model = &arm.model;
     let (m, nv, driven) = (model.n_actuated(), model.nv(), arm.torque_driven.len());
-    // Places of the free coordinates among all.
+    // Indices of the free coordinates.
     let free: Vec<usize> = arm.torque_driven.iter().copied().chain(m..nv).collect();
     let n = free.len();
     let mut data = Data::new(model);
@@ -157,8 +158,8 @@ pub fn linearise(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, t: f64) -> Res
     let mut J = Matrix6xX::zeros(nv);
     frame_jacobian(model, &data, tool, &mut J);
 
-    // Commands move prescribed joints; those that are driven by torque hear of them by their servos
-    // alone.
+    // Commands move prescribed joints directly; joints driven by torque receive them only through
+    // their servos.
     let (mut M_a, mut K_a) = (M.columns(0, m).select_rows(&free), slopes.columns(0, m).select_rows(&free));
     let mut J_a = J.columns(0, m).into_owned();
     for &k in &arm.torque_driven {
@@ -192,7 +193,8 @@ pub fn linearise(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, t: f64) -> Res
     Ok(linear)
 }
 
-/// Forces of the joints that hold the pose: weight and loads, and what ripple asks of the motors.
+/// Returns the joint forces that hold the pose: weight, loads, and reactions of transmission errors
+/// on the motors.
 fn holding(arm: &FlexibleArm, q: &DVector<f64>, e: &DVector<f64>, p: &DVector<f64>) -> DVector<f64> {
     let mut holding = p.rows(0, arm.model.n_actuated()).into_owned();
     let F = spring_forces(arm, q.as_slice(), e);
@@ -201,7 +203,7 @@ fn holding(arm: &FlexibleArm, q: &DVector<f64>, e: &DVector<f64>, p: &DVector<f6
 }
 
 impl Linear {
-    /// Servos: springs and dampers towards the commands, and what they feed forward.
+    /// Adds the servos: springs and dampers towards the commands, and their feed-forward.
     fn close_loops(&mut self, arm: &FlexibleArm, servo: &Servo) {
         let m = arm.model.n_actuated();
         let [K, D, M] = servo.fed_forward(self.q.rows(0, m).as_slice(), &arm.friction);
@@ -225,11 +227,11 @@ fn viscous(friction: &[Friction], coordinate: usize) -> f64 {
 }
 
 impl Servo {
-    /// Torques fed forward about rest at a pose, per command, its rate and its acceleration: a row
-    /// per axis, a column per joint.
+    /// Returns the feed-forward torques about rest at a pose per command, per rate and per
+    /// acceleration of the commands: one row per axis, one column per joint.
     ///
-    /// * `pose`: all actuated joints; `friction`: theirs, as in [`FlexibleArm::friction`], whose
-    ///   viscous part is fed forward as well.
+    /// * `pose`: all actuated joints; `friction`: of these joints, as in [`FlexibleArm::friction`];
+    ///   its viscous part is fed forward as well.
     pub fn fed_forward(&self, pose: &[f64], friction: &[Friction]) -> [DMatrix<f64>; 3] {
         let (model, m) = (&self.rigid, pose.len());
         let (mut data, pose) = (Data::new(model), DVector::from_column_slice(pose));
@@ -247,7 +249,7 @@ impl Servo {
         [of(&K), of(&D), of(&M)]
     }
 
-    /// The same with gains of zero and nothing fed forward: motors that nothing holds.
+    /// Returns the servo with zero gains and without feed-forward: the motors are free.
     #[must_use]
     pub fn opened(&self) -> Self {
         let open = |axis: &ServoAxis| ServoAxis {
@@ -262,34 +264,34 @@ impl Servo {
 }
 
 impl FlexibleArm {
-    /// The same arm with motors that are where they are commanded, without its servos.
+    /// Returns the arm without servos: motors follow their commands exactly.
     #[must_use]
     pub fn with_motors_held(&self) -> Self {
         Self { torque_driven: Vec::new(), servo: None, ..self.clone() }
     }
 
-    /// The same arm with motors that nothing holds.
+    /// Returns the arm with free motors.
     #[must_use]
     pub fn with_servo_opened(&self) -> Self {
         Self { servo: self.servo.as_ref().map(|servo| Arc::new(servo.opened())), ..self.clone() }
     }
 }
 
-/// Mass, tangent stiffness and Jacobian of an arm at given coordinates, drives locked: what
-/// [`linearise`] finds at the equilibrium, anywhere.
+/// Mass, tangent stiffness and Jacobian of an arm at arbitrary coordinates, drives locked: the
+/// matrices of [`linearise`], not restricted to the equilibrium.
 #[derive(Clone, Debug)]
 pub struct Tangents {
     /// Mass matrix of the elastic coordinates, n×n.
     pub M: DMatrix<f64>,
-    /// Springs, change of weight and of the wrench, n×n.
+    /// Stiffness of springs, weight and wrench, n×n.
     pub K: DMatrix<f64>,
     /// Twist of the tool per rate of the elastic coordinates, 6×n.
     pub J: Matrix6xX<f64>,
 }
 
 impl Tangents {
-    /// At all coordinates `q` (joints, then elastic ones), under weight, the loads of time 0 and a
-    /// wrench at the tool's origin (world axes).
+    /// Computes the matrices at all coordinates `q` (joints, then elastic ones), under weight, the
+    /// loads at time 0 and a wrench at the tool's origin (world axes).
     pub fn at(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, q: &DVector<f64>) -> Self {
         let model = &arm.model;
         let (m, n) = (model.n_actuated(), arm.n_elastic_coordinates());
@@ -306,7 +308,7 @@ impl Tangents {
     }
 }
 
-/// Joints on their reference at `t` with elastic coordinates.
+/// Returns all coordinates: joints on their reference at `t`, and elastic coordinates `e`.
 fn all_coordinates(arm: &FlexibleArm, t: f64, e: &DVector<f64>) -> DVector<f64> {
     let model = &arm.model;
     let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));
@@ -315,7 +317,7 @@ fn all_coordinates(arm: &FlexibleArm, t: f64, e: &DVector<f64>) -> DVector<f64> 
     state.q
 }
 
-/// Weight and loads.
+/// Static loading: weight, loads of the arm, wrench on the tool.
 struct Statics<'a> {
     arm: &'a FlexibleArm,
     tool: &'a Frame,
@@ -324,11 +326,11 @@ struct Statics<'a> {
     t: f64,
 }
 
-/// The arm at rest under weight and loads, motors held.
+/// Equilibrium of the arm at rest under weight and loads, motors held.
 struct Equilibrium {
     /// All coordinates.
     q: DVector<f64>,
-    /// Elastic ones.
+    /// Elastic coordinates.
     e: DVector<f64>,
     /// Static forces on all coordinates.
     p: DVector<f64>,
@@ -341,7 +343,7 @@ impl Statics<'_> {
         StepError::Singular { matrix: "static stiffness (with the effect of weight and load)", t: self.t }
     }
 
-    /// `K e + p(e) = 0` by Newton's method, from the equilibrium under weight.
+    /// Solves `K e + p(e) = 0` by Newton's method, starting from the equilibrium under weight.
     fn equilibrium(&self, data: &mut Data) -> Result<Equilibrium, StepError> {
         let Self { arm, t, .. } = *self;
         let (m, ne) = (arm.model.n_actuated(), arm.model.n_elastic());
@@ -366,13 +368,13 @@ impl Statics<'_> {
             }
             let springs = with_curves(arm, &at_rest, q.as_slice(), &e);
             let tangent = &springs + self.slopes(data, &q).view((m, m), (ne, ne));
-            // Where the tangent is not positive definite its step leads uphill, to a saddle: the
-            // springs alone lead down.
+            // If the tangent is not positive definite, its step leads uphill to a saddle point;
+            // a step with the springs only leads downhill.
             let stable = ((&tangent + tangent.transpose()) * 0.5).cholesky().is_some();
             buckled |= !stable;
             let step = if stable { tangent } else { springs }.lu().solve(&r).ok_or_else(|| self.singular())?;
-            // Far from small deflections the full step may overshoot: no coordinate moves by more
-            // than 0.5.
+            // The full step may overshoot for large deflections: no coordinate moves by more than
+            // 0.5.
             let mut part = (0.5 / step.amax()).min(1.0);
             let mut closer = arm.hysteresis.is_empty();
             for _ in 0..MOST_HALVINGS {
@@ -390,7 +392,8 @@ impl Statics<'_> {
         }
     }
 
-    /// Tangent stiffness of the free coordinates: springs and the slopes of weight and loads.
+    /// Returns the tangent stiffness of the free coordinates: springs plus slopes of weight and
+    /// loads.
     fn tangent(
         &self,
         springs: &DMatrix<f64>,
@@ -399,13 +402,13 @@ impl Statics<'_> {
     ) -> Result<DMatrix<f64>, StepError> {
         let (driven, ne) = (self.arm.torque_driven.len(), self.arm.model.n_elastic());
         let mut change = slopes.select_rows(free).select_columns(free);
-        // Without constant moments the forces have a potential; what is not symmetric is rounding.
+        // Without constant moments the forces have a potential, and any asymmetry is round-off.
         let moments = self.arm.loads.iter().any(|load| load.wrench.at(self.t).torque.norm() > 0.0);
         if self.F_T_W.torque.norm() == 0.0 && !moments {
             change = (&change + change.transpose()) * 0.5;
         }
         let K = springs + change;
-        // Beyond a buckling load there is an equilibrium too, but the arm does not stay there.
+        // An equilibrium beyond the buckling load exists but is unstable.
         let elastic = K.view((driven, driven), (ne, ne));
         if ne > 0 && ((elastic + elastic.transpose()) * 0.5).cholesky().is_none() {
             return Err(self.singular());
@@ -413,14 +416,14 @@ impl Statics<'_> {
         Ok(K)
     }
 
-    /// As [`static_forces`].
+    /// Returns the static forces; see [`static_forces`].
     fn forces(&self, data: &mut Data, q: &DVector<f64>) -> DVector<f64> {
         let mut p = DVector::zeros(q.len());
         static_forces(self.arm, Some((self.tool, &self.F_T_W)), self.t, data, q, &mut p);
         p
     }
 
-    /// Their derivatives by all coordinates.
+    /// Returns the derivatives of the static forces with respect to all coordinates.
     fn slopes(&self, data: &mut Data, q: &DVector<f64>) -> DMatrix<f64> {
         let mut P = DMatrix::zeros(q.len(), q.len());
         let tool = Some((self.tool, &self.F_T_W));

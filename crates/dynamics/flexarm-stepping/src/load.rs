@@ -7,66 +7,66 @@ use std::sync::Arc;
 use flexarm_kinematics::{PointLoad, Pose, Wrench};
 use nalgebra::{Rotation3, Vector3};
 
-/// Axes in which a load keeps its direction.
+/// Axes in which the components of a load are constant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum LoadAxes {
     /// World axes.
     #[default]
     World,
-    /// Axes of the frame in which it acts: it turns with the body.
+    /// Axes of the frame on which it acts: the load rotates with the body.
     Frame,
 }
 
-/// A wrench as a function of time, with what a stepper must know of its curve.
+/// A wrench as a function of time, with its discontinuities and time scale for the steppers.
 #[derive(Clone)]
 pub struct TimedWrench {
     /// Axes in which force and moment are given.
     pub axes: LoadAxes,
     /// Force (N) and moment (N m) at time t (s).
     pub value: Arc<dyn Fn(f64) -> Wrench + Send + Sync>,
-    /// Times at which it begins, ends, jumps or bends (s); the reference stepper steps over none of
-    /// them.
+    /// Times at which it begins, ends, jumps or has a kink (s); steps of the reference stepper end
+    /// there.
     pub jumps: Vec<f64>,
-    /// Times at which steps of given length end, beside those at which it jumps (s): what is
-    /// shorter than a step would fall between two of its ends.
+    /// Additional times at which steps of fixed size end (s): a load pulse shorter than a step
+    /// would otherwise fall between two step ends.
     pub stops: Vec<f64>,
-    /// Shortest period in it (s), infinite without one: the steps of the reference stepper stay
-    /// well below.
+    /// Shortest period in the load (s), infinite if not periodic: an upper scale for the steps of
+    /// the reference stepper.
     pub period: f64,
 }
 
 impl TimedWrench {
-    /// In world axes, without jumps and without a period.
+    /// Creates a wrench in world axes, without jumps and without a period.
     pub fn new(value: impl Fn(f64) -> Wrench + Send + Sync + 'static) -> Self {
         let value = Arc::new(value);
         Self { axes: LoadAxes::World, value, jumps: Vec::new(), stops: Vec::new(), period: f64::INFINITY }
     }
 
-    /// The same in these axes.
+    /// Returns the wrench in these axes.
     #[must_use]
     pub fn in_axes(self, axes: LoadAxes) -> Self {
         Self { axes, ..self }
     }
 
-    /// The same with these times at which it begins, ends, jumps or bends (s).
+    /// Returns the wrench with these times at which it begins, ends, jumps or has a kink (s).
     #[must_use]
     pub fn with_jumps(self, jumps: Vec<f64>) -> Self {
         Self { jumps, ..self }
     }
 
-    /// The same with these times at which steps of given length end (s).
+    /// Returns the wrench with these additional times at which steps of fixed size end (s).
     #[must_use]
     pub fn with_stops(self, stops: Vec<f64>) -> Self {
         Self { stops, ..self }
     }
 
-    /// The same with this as the shortest period in it (s).
+    /// Returns the wrench with this shortest period (s).
     #[must_use]
     pub fn with_period(self, period: f64) -> Self {
         Self { period, ..self }
     }
 
-    /// Force (N) and moment (N m) at time t (s).
+    /// Returns force (N) and moment (N m) at time `t` (s).
     pub fn at(&self, t: f64) -> Wrench {
         (self.value)(t)
     }
@@ -88,22 +88,22 @@ pub struct Load {
     pub body: usize,
     /// Frame on the body at whose origin it acts.
     pub X_BF: Pose,
-    /// What acts there.
+    /// The wrench.
     pub wrench: TimedWrench,
 }
 
 impl Load {
-    /// A wrench at the body's origin.
+    /// Creates a load at the body's origin.
     pub fn at_origin(body: usize, wrench: TimedWrench) -> Self {
         Self { body, X_BF: Pose::identity(), wrench }
     }
 
-    /// A constant wrench at the body's origin, world axes.
+    /// Creates a constant load at the body's origin, in world axes.
     pub fn constant(body: usize, F_W: Wrench) -> Self {
         Self::at_origin(body, TimedWrench::new(move |_| F_W))
     }
 
-    /// At time t (s), for the tangent of the static forces.
+    /// Returns the load at time `t` (s) as a point load, for the tangent of the static forces.
     pub(crate) fn point_load(&self, t: f64, X_WB: &Pose) -> PointLoad {
         let (F, turns) = (self.wrench.at(t), self.wrench.axes == LoadAxes::Frame);
         let R = if turns { X_WB.rotation * self.X_BF.rotation } else { Rotation3::identity() };
@@ -111,7 +111,7 @@ impl Load {
         PointLoad { body: self.body, p_B: self.X_BF.translation.vector, F_W, turns }
     }
 
-    /// At Bo in body axes.
+    /// Returns the wrench at time `t` (s) at Bo, in body axes.
     pub(crate) fn on_body(&self, t: f64, X_WB: &Pose) -> Wrench {
         let F = self.wrench.at(t);
         match self.wrench.axes {

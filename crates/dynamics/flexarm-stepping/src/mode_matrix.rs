@@ -1,28 +1,28 @@
-//! Matrices of an arm with many modes that meet nobody but what carries them: eliminated one by
-//! one, so that a matrix of the few other coordinates is left.
+//! Matrices of an arm with many modes that are coupled only with the coordinates carrying them: the
+//! modes are eliminated one by one, which leaves a matrix of the few other coordinates.
 //!
-//! Fixed-interface modes of a link do not move what hangs on it, are orthogonal to each other and
-//! to the link's interface motions in stiffness, and have a constant mass. With b the other
-//! coordinates and m such a mode, v its column of M,
+//! Fixed-interface modes of a link do not move the attached bodies, are orthogonal in stiffness to
+//! each other and to the interface motions of the link, and have constant mass. With b the other
+//! coordinates, m such a mode and v its column of M,
 //!
 //! ```text
 //! M = [ M_b  v ... ]     K = [ K_b     ]     C = [ C_b     ]
 //!     [ vᵀ   μ     ]         [      k  ]         [      c  ]                                   (1)
 //! ```
-//! For `J = M + C (1 + s M^-1 K)`, the matrix of generalised-alpha with its correction,
-//! `u = s M^-1 K x` stands beside x (as in [`crate::tree_matrix`], (8)), and each mode is two by
-//! two:
+//! For `J = M + C (1 + s M^-1 K)`, the matrix of generalised-alpha with dispersion correction,
+//! `u = s M^-1 K x` is added as a second unknown (as in [`crate::tree_matrix`], (8)), and each mode
+//! is a two by two system:
 //!
 //! ```text
 //! [ μ + c   c ] [ x_m ]   [ r_m - vᵀ x_b ]
-//! [ -s k    μ ] [ u_m ] = [     - vᵀ u_b ]          a = 1/(μ (μ + c) + s k c)                   (2)
+//! [ -s k    μ ] [ u_m ] = [     - vᵀ u_b ]          a = 1/(μ (μ + c) + s k c)             (2)
 //!
 //! [ M_b + C_b - Σ a μ v vᵀ      C_b + Σ a c v vᵀ       ] [ x_b ]   [ r_b - Σ a μ v r_m  ]
-//! [ -s K_b - Σ a s k v vᵀ       M_b - Σ a (μ + c) v vᵀ ] [ u_b ] = [     - Σ a s k v r_m ]        (3)
+//! [ -s K_b - Σ a s k v vᵀ       M_b - Σ a (μ + c) v vᵀ ] [ u_b ] = [     - Σ a s k v r_m ]  (3)
 //! ```
-//! Without a correction s is zero, and so is u. A solution costs the number of modes times that of
-//! the others, and (3) as much for each of the others; a dense inverse would cost the square and
-//! the cube of all.
+//! Without a correction s and u are zero. A solution costs the number of modes times the number of
+//! other coordinates, and the factorisation of (3) costs that again for each of the others; a dense
+//! inverse costs the square and the cube of their sum.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -47,17 +47,17 @@ pub struct ModeMatrices {
     pub own: Vec<[f64; 3]>,
 }
 
-/// `J^-1` of matrices with modes; see the module page.
+/// `J^-1` of matrices with modes; see the module documentation.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ModeInverse {
     pub(crate) matrices: ModeMatrices,
     s: f64,
-    /// Inverse of (3), x and u of a coordinate side by side: `2 n_b × 2 n_b`.
+    /// Inverse of (3), x and u of a coordinate adjacent: `2 n_b × 2 n_b`.
     inverse: DMatrix<f64>,
     block: DMatrix<f64>,
     /// a of each mode.
     determinants: Vec<f64>,
-    /// Of the matrix that is left of M, for the correction of an acceleration.
+    /// Factor of the Schur complement of M, for the correction of an acceleration.
     mass_factor: Option<Cholesky<f64, Dyn>>,
     /// Right-hand side and solution of (3).
     right: DVector<f64>,
@@ -67,7 +67,7 @@ pub(crate) struct ModeInverse {
     shift: DVector<f64>,
 }
 
-/// `A += x v vᵀ` below the diagonal and on it, for all modes.
+/// Computes `A += x v vᵀ` on and below the diagonal, for all modes.
 fn add_squares(A: &mut DMatrix<f64>, columns: &DMatrix<f64>, factor: impl Fn(usize) -> f64) {
     let n = A.nrows();
     for (m, v) in columns.as_slice().chunks_exact(n).enumerate() {
@@ -82,7 +82,7 @@ fn add_squares(A: &mut DMatrix<f64>, columns: &DMatrix<f64>, factor: impl Fn(usi
 }
 
 impl ModeInverse {
-    /// Factorises what is in `matrices`, with the correction by s or without.
+    /// Factorises `matrices`, with the correction by s or without.
     ///
     /// # Errors
     /// [`StepError::Singular`] if M or J is not positive definite.
@@ -99,14 +99,14 @@ impl ModeInverse {
         let ModeMatrices { mass, C, K, coupling, own, .. } = &self.matrices;
         self.determinants.clear();
         self.determinants.extend(own.iter().map(|[mu, c, k]| 1.0 / (mu * (mu + c) + s * k * c)));
-        // What is left of M.
+        // Schur complement of M.
         let mut left = crate::iteration_matrix::storage_of(&mut self.mass_factor, nb);
         left.copy_from(mass);
         add_squares(&mut left, coupling, |m| -1.0 / own[m][0]);
         let light = own.iter().all(|[mu, ..]| *mu > 0.0);
         let factor = Cholesky::new(left).filter(|_| light);
         self.mass_factor = Some(factor.ok_or(StepError::Singular { matrix: "mass matrix", t })?);
-        // (3), block by block into its places.
+        // Assemble (3) block by block.
         let a = &self.determinants;
         let block = &mut self.block;
         let parts: [(usize, usize, [f64; 3]); 4] =
@@ -136,11 +136,12 @@ impl ModeInverse {
         }
     }
 
-    /// Replaces `r` by `d = J^-1 r`; also finds [`ModeInverse::shift`].
+    /// Replaces `r` by `d = J^-1 r`; also computes [`ModeInverse::shift`].
     pub(crate) fn solve(&mut self, r: &mut DVector<f64>) {
         let Self { matrices, s, inverse, determinants, right, solved, shift, .. } = self;
         let ModeMatrices { others, modes, coupling, own, .. } = &*matrices;
         let nb = others.len();
+        // Right-hand side of (3).
         for (i, &k) in others.iter().enumerate() {
             (right[2 * i], right[2 * i + 1]) = (r[k], 0.0);
         }
@@ -153,6 +154,7 @@ impl ModeInverse {
                 pair[1] -= v * u;
             }
         }
+        // Other coordinates by (3), then the modes by (2).
         solved.gemv(1.0, inverse, right, 0.0);
         for (((&coordinate, v), [mu, c, k]), a) in modes.iter().zip(columns()).zip(own).zip(&*determinants) {
             let (mut x, mut u) = (r[coordinate], 0.0);
@@ -168,16 +170,17 @@ impl ModeInverse {
         }
     }
 
-    /// `s M^-1 K d` of the last solution d.
+    /// Returns `s M^-1 K d` of the last solution d.
     pub(crate) fn shift(&self) -> &DVector<f64> {
         &self.shift
     }
 
-    /// `y = x + s M^-1 K x`.
+    /// Computes `y = x + s M^-1 K x`.
     pub(crate) fn correct(&mut self, x: &DVector<f64>, y: &mut DVector<f64>) {
         let Self { matrices, s, mass_factor, force, .. } = self;
         let ModeMatrices { others, modes, coupling, own, K, .. } = &*matrices;
         let nb = others.len();
+        // Force s K x on the other coordinates, with the modes eliminated from M.
         force.fill(0.0);
         for (column, &k) in K.as_slice().chunks_exact(nb.max(1)).zip(others) {
             let x = *s * x[k];
@@ -201,8 +204,8 @@ impl ModeInverse {
     }
 }
 
-/// Puts the inverse in the place of a matrix by Gauss and Jordan, two rows and columns at a time;
-/// false where the determinant of a pivot is not positive.
+/// Inverts a matrix in place by Gauss-Jordan elimination, two rows and columns at a time; returns
+/// false if the determinant of a pivot is not positive.
 fn invert_in_pairs(A: &mut DMatrix<f64>) -> bool {
     let n = A.nrows();
     for k in (0..n).step_by(2) {
@@ -212,7 +215,7 @@ fn invert_in_pairs(A: &mut DMatrix<f64>) -> bool {
             return false;
         }
         let pivot = [[d / determinant, -b / determinant], [-c / determinant, a / determinant]];
-        // Both columns with the pivot taken out.
+        // Both columns without the pivot.
         for j in k..k + 2 {
             (A[(k, j)], A[(k + 1, j)]) = (0.0, 0.0);
         }

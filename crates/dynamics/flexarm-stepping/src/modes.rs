@@ -1,4 +1,4 @@
-//! Natural frequencies and shapes of the arm about its static pose, drives locked.
+//! Natural frequencies and mode shapes of the arm about its static equilibrium, drives locked.
 
 use flexarm_kinematics::{State, mass_matrix};
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
@@ -16,19 +16,19 @@ pub struct Modes {
     pub shapes: DMatrix<f64>,
     /// Elastic coordinates of the static pose.
     pub equilibrium: DVector<f64>,
-    /// Largest `|K φ - ω² M φ| / |K φ|`: what the eigensolver promises, evaluated.
+    /// Maximum of `|K φ - ω² M φ| / |K φ|`: check of the eigensolver.
     pub residual: f64,
 }
 
 impl Modes {
-    /// Frequencies (Hz), ascending.
+    /// Returns the frequencies (Hz), ascending.
     pub fn frequencies_hz(&self) -> Vec<f64> {
         self.omega.iter().map(|w| w / std::f64::consts::TAU).collect()
     }
 }
 
-/// Undamped modes at time `t` of the motion, about static equilibrium, with the stiffness of
-/// weight.
+/// Computes the undamped modes at time `t` of the motion about static equilibrium, including the
+/// geometric stiffness due to weight.
 ///
 /// # Errors
 /// [`StepError::NoEquilibrium`] or [`StepError::Singular`].
@@ -48,8 +48,8 @@ pub fn modes_at(arm: &FlexibleArm, t: f64) -> Result<Modes, StepError> {
     state.q.rows_mut(na, n).copy_from(&equilibrium);
     let M = mass_matrix(model, &mut data, &state.q).view((na, na), (n, n)).clone_owned();
 
-    // K φ = ω² M φ with K = L Lᵀ: eigenvalues 1/ω² of L^-1 M L^-T, the low modes largest and most
-    // accurate.
+    // K φ = ω² M φ with K = L Lᵀ: the eigenvalues of L^-1 M L^-T are 1/ω², so the low modes are the
+    // largest and most accurate.
     let factor = Cholesky::new(Kt.clone())
         .ok_or(StepError::Singular { matrix: "static stiffness (with the effect of weight)", t })?;
     let L = factor.l();

@@ -1,12 +1,12 @@
-//! Where the prescribed joints are at a given time. Not here: trajectories and their files.
+//! Motion of the prescribed joints over time. Not here: trajectories and their files.
 
 /// Positions, velocities and accelerations of the actuated coordinates as functions of time.
 pub trait PrescribedMotion: Send + Sync {
     /// Writes the values at `t` (s), in coordinate order: rad or m, per s, per s².
     fn sample(&self, t: f64, q: &mut [f64], qdot: &mut [f64], qddot: &mut [f64]);
 
-    /// Times at which a velocity jumps (s): just before and after them the samples differ. One at 0
-    /// starts from rest.
+    /// Returns the times at which a velocity jumps (s); samples just before and after differ. A
+    /// jump at 0 starts from rest.
     fn velocity_jumps(&self) -> Vec<f64> {
         Vec::new()
     }

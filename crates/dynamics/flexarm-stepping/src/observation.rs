@@ -1,4 +1,4 @@
-//! What a run sees of a stepper: state, poses, forces, energies, powers.
+//! Observable quantities of a stepper: state, poses, forces, energies, powers.
 
 use std::sync::Arc;
 
@@ -9,12 +9,12 @@ use crate::arm::FlexibleArm;
 use crate::dense::dot;
 use crate::reduced::ReducedArm;
 
-/// What a run can see of a stepper at its current time.
+/// Observable quantities of a stepper at its current time.
 #[derive(Clone, Debug)]
 pub struct Observation {
     /// Time (s).
     pub t: f64,
-    /// The tree, with what it carries at this time.
+    /// Model, with the inertias of this time.
     pub model: Arc<Model>,
     /// All coordinates, actuated then elastic.
     pub q: DVector<f64>,
@@ -22,25 +22,26 @@ pub struct Observation {
     pub qdot: DVector<f64>,
     /// Poses of all bodies in the world.
     pub X_WB: Vec<Pose>,
-    /// Forces that the drives must supply, per actuated coordinate.
+    /// Torques or forces of the drives, per actuated coordinate.
     pub drive: DVector<f64>,
-    /// Generalised elastic load per element: what the spring and damper put on the distal part; of
-    /// modal bodies the forces of the first six coordinates, of single springs the first component.
+    /// Generalised elastic load per element: force of spring and damper on the distal part. For
+    /// modal bodies the first six coordinates, for single springs the first component.
     pub load: Vec<Vector6<f64>>,
     /// Kinetic, gravitational and elastic energy (J).
     pub energy: [f64; 3],
-    /// Power of the drives, of the external loads, and what dampers and friction take away (W).
+    /// Power of the drives, power of the external loads, and power dissipated by dampers and
+    /// friction (W).
     pub power: [f64; 3],
-    /// Work of the drives so far where velocities of the motion jumped (J); not in their power,
-    /// which has no impulses.
+    /// Work done so far by the drives at velocity jumps of the motion (J); not in their power,
+    /// which contains no impulses.
     pub impulse_work: f64,
-    /// What the hysteresis of gears has taken so far (J); not in the power, for it does not depend
-    /// on speed.
+    /// Energy dissipated so far by hysteresis of gears (J); not in the power, because it is
+    /// rate-independent.
     pub hysteresis_work: f64,
 }
 
 impl Observation {
-    /// Space for the arm's figures.
+    /// Allocates an observation for the arm.
     pub fn new(arm: &FlexibleArm) -> Self {
         let model = &arm.model;
         Self {
@@ -77,13 +78,13 @@ pub(crate) fn observe_reduced(
     out.q.copy_from(&state.q);
     out.qdot.copy_from(&state.qdot);
 
-    // Drives: what the prescribed motion needs, what the controller holds.
+    // Drives: inverse dynamics of prescribed joints, held torques of controlled joints.
     out.drive.copy_from(&data.tau.rows(0, n));
     for (&k, torque) in driven.iter().zip(system.held_torques()) {
         out.drive[k] = *torque;
     }
 
-    // Springs, and what dampers and friction take away.
+    // Springs, dampers and friction.
     let gears = system.gears.as_ref();
     let [mut damping, elastic] = match gears {
         Some(gears) => [gears.loads(arm, &mut out.load), gears.energy(arm)],
@@ -108,10 +109,10 @@ pub(crate) fn observe_reduced(
     out.energy = [kinetic, potential, elastic];
 }
 
-/// Loads `-(K e + D ė)` of the elements, their first six components; the power that the dampers
-/// take, `ėᵀ D ė` (W), and the elastic energy (J).
+/// Writes the loads `-(K e + D ė)` of the elements (first six components). Returns the power
+/// dissipated by the dampers, `ėᵀ D ė` (W), and the elastic energy (J).
 ///
-/// * `rooms`: scratch, a number per elastic coordinate at least.
+/// * `rooms`: scratch, at least one number per elastic coordinate each.
 fn element_loads(
     arm: &FlexibleArm,
     e: &[f64],

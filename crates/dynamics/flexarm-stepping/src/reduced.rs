@@ -1,12 +1,12 @@
-//! The flexible arm in reduced coordinates: elastic ones and torque-driven joints free, the others
-//! truly prescribed.
+//! Flexible arm in reduced coordinates: elastic coordinates and joints driven by torque are free,
+//! all other joints are prescribed.
 //!
 //! ```text
 //! M_ff ẍ + h_f(q, q̇, [q̈_p, 0]) + K x + D ẋ + friction(ẋ) = τ
 //! ```
-//! The residual is one Newton-Euler pass, the acceleration one hybrid pass; mass matrix, damping
-//! and stiffness are dense in the free coordinates. Torques of a sampled controller stay constant
-//! between its samples. What happens at discrete times is in `events`. Not here: integration.
+//! The residual is one Newton-Euler pass, the acceleration one hybrid-dynamics pass. Mass matrix,
+//! damping and stiffness are dense in the free coordinates. Torques of a sampled controller are
+//! constant between its samples. Discrete events are in `events`. Not here: integration.
 
 use std::sync::Arc;
 
@@ -28,10 +28,11 @@ use crate::system::SecondOrderSystem;
 use crate::tree_matrix::TreeMatrices;
 use crate::workspaces::Lent;
 
-/// Passes after which the stiffness by load of an acceleration has settled.
+/// Maximum number of fixed-point passes for accelerations with load-dependent (geometric)
+/// stiffness.
 const GEOMETRIC_PASSES: usize = 12;
 
-/// A flexible arm as a second-order system; see the module page.
+/// A flexible arm as a second-order system; see the module documentation.
 pub struct ReducedArm {
     pub(crate) arm: Arc<FlexibleArm>,
     pub(crate) data: Lent<Data>,
@@ -45,57 +46,57 @@ pub struct ReducedArm {
     pub(crate) events: EventQueue,
     /// Damping after each change of inertia.
     pub(crate) dampings: Vec<ArmDamping>,
-    /// Work of the drives where prescribed velocities jumped (J).
+    /// Work done by the drives at jumps of prescribed velocities (J).
     pub(crate) struck: f64,
     geometric: bool,
     pub(crate) sampled_at: f64,
     pub(crate) step_start: StepStart,
-    /// Storage of the factor of `M_ff` in a blow.
+    /// Storage of the factor of `M_ff` at velocity jumps.
     pub(crate) mass_factor: Option<Cholesky<f64, Dyn>>,
     pub(crate) shifted: DVector<f64>,
-    /// Forces of the springs, or of loads that stiffen them.
+    /// Forces of the springs, or of load-dependent stiffness.
     pub(crate) forces: DVector<f64>,
-    /// What gears do beside giving way.
+    /// State of gear effects other than elasticity.
     pub(crate) gears: Option<Box<GearState>>,
-    /// The elastic joints as a tree, where they are enough and damped by element.
+    /// Tree of the elastic joints, if there are enough of them and they are damped by element.
     tree: Option<ElasticTree>,
-    /// The modes that are eliminated first, where they are enough.
+    /// Modes that are eliminated first, if there are enough of them.
     modes: Option<HeldModes>,
-    /// The equations of motion of the free coordinates alone, where they are enough and the tree is
-    /// for it.
+    /// Equations of motion of the free coordinates only, if these suffice and the tree is
+    /// supported.
     points: Option<Lent<FreeForces>>,
     poses: Poses,
-    /// What a run is shown comes from it, if the tree is for it; made with the first observation.
+    /// Workspace of observations, if supported for this tree; created at the first observation.
     observer: Option<Option<Lent<Observer>>>,
 }
 
-/// Where the poses of the state are.
+/// Location of the poses of the current state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Poses {
     /// In `data`.
     InData,
     /// In `points`, after a residual.
     InPoints,
-    /// In neither, after an observation.
+    /// In neither place, after an observation.
     Nowhere,
 }
 
-/// Which of the free coordinates are modes that are eliminated first.
+/// Partition of the free coordinates into modes, which are eliminated first, and others.
 #[derive(Clone, Debug)]
 pub(crate) struct HeldModes {
     others: Vec<usize>,
     modes: Vec<usize>,
-    /// Room for `c_D D + c_K K`, and K, of all.
+    /// Workspace for `c_D D + c_K K`, and for K, over all free coordinates.
     dense: DMatrix<f64>,
     K: DMatrix<f64>,
 }
 
-/// Fewest modes that are eliminated: with 16 a step takes as long either way, with 40 12 instead of
-/// 19 us, with 80 25 instead of 74 (`examples/modal.rs`).
+/// Minimum number of modes for elimination: with 16 a step takes the same time with a dense
+/// inverse, with 40 12 instead of 19 us, with 80 25 instead of 74 (`examples/modal.rs`).
 const FEWEST_MODES: usize = 16;
 
 impl HeldModes {
-    /// Of an arm whose steps are faster with its modes eliminated.
+    /// Returns the partition if steps are faster with the modes eliminated.
     pub(crate) fn that_pay(arm: &FlexibleArm) -> Option<Self> {
         let shift = |k: usize| k - arm.model.n_actuated() + arm.torque_driven.len();
         let modes: Vec<usize> = arm.model.held_modes().into_iter().map(shift).collect();
@@ -119,21 +120,21 @@ impl HeldModes {
     }
 }
 
-/// Whether a coordinate meets no other one in a matrix, to rounding.
+/// Returns whether a coordinate is uncoupled in a matrix, up to round-off.
 fn is_alone(A: &DMatrixView<'_, f64>, k: usize) -> bool {
     const ROUNDING: f64 = 1e-11;
     (0..A.nrows()).all(|j| j == k || A[(k, j)].abs() <= ROUNDING * (A[(k, k)] * A[(j, j)]).abs().sqrt())
 }
 
 impl ReducedArm {
-    /// Workspaces for the arm, those of a run that is over where there are some.
+    /// Creates the workspaces for the arm, reusing those of an earlier run if available.
     pub fn new(arm: impl Into<Arc<FlexibleArm>>) -> Self {
         let arm = arm.into();
         let model = &arm.model;
         let n = arm.n_free();
         let driven = arm.torque_driven.clone();
         let roles = Roles::new(model, |k| k < model.n_actuated() && !driven.contains(&k));
-        // Loads on links that stiffen them are in the spatial accelerations.
+        // Load-dependent stiffness needs the spatial accelerations of the full pass.
         let geometric = arm.elements.iter().any(|e| e.geometric.is_some());
         let points = if geometric { None } else { arm.lend_points(&roles) };
         Self {
@@ -163,13 +164,13 @@ impl ReducedArm {
         }
     }
 
-    /// The arm.
+    /// Returns the arm.
     pub fn arm(&self) -> &FlexibleArm {
         &self.arm
     }
 
-    /// Free coordinates and rates at `t = 0`: joints on their reference, springs at `e`, at the
-    /// reference's speed. A motion whose velocities jump at 0 starts from rest.
+    /// Returns free coordinates and rates at `t = 0`: driven joints at position and speed of their
+    /// reference, springs at `e`. A motion whose velocities jump at 0 starts from rest.
     pub(crate) fn start(&mut self, e: &DVector<f64>) -> Result<(DVector<f64>, DVector<f64>), StepError> {
         let (n, driven) = (self.arm.n_free(), self.arm.torque_driven.len());
         let (mut x, mut v) = (DVector::zeros(n), DVector::zeros(n));
@@ -183,7 +184,8 @@ impl ReducedArm {
             gears.begin(&self.arm, self.state.q.as_slice(), e.as_slice());
         }
         if self.servo.is_some() {
-            // The integrators carry what holds the arm on its motion with the springs as they are.
+            // Initialise the controller with the torques that keep the arm on its motion with the
+            // springs as they are.
             let mut at_rest = DVector::zeros(n);
             for (i, &k) in self.arm.torque_driven.iter().enumerate() {
                 at_rest[i] = self.qddot[k];
@@ -198,7 +200,8 @@ impl ReducedArm {
         Ok((x, v))
     }
 
-    /// Joint motion at t (once per time) and free coordinates into the full state.
+    /// Writes the joint motion at `t` (sampled once per time) and the free coordinates into the
+    /// full state.
     pub(crate) fn set(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>) {
         let t = self.events.side(t);
         self.sample_joints(t);
@@ -216,7 +219,7 @@ impl ReducedArm {
         }
     }
 
-    /// Whether the arm's loops close where it starts.
+    /// Checks that the loops of the arm close at the start.
     ///
     /// # Errors
     /// [`StepError::OpenLoop`].
@@ -229,7 +232,7 @@ impl ReducedArm {
         StepError::open_loop(&self.arm.model, &self.data, 0.0).map_or(Ok(()), Err)
     }
 
-    /// The masses of the arm's bodies have changed.
+    /// Updates the workspaces after a change of the masses of the bodies.
     pub(crate) fn weigh(&mut self) {
         if let Some(points) = &mut self.points {
             points.weigh(&*self.arm.model);
@@ -241,7 +244,8 @@ impl ReducedArm {
         }
     }
 
-    /// Poses of the state into `data`, where a residual or an observation left none.
+    /// Computes the poses of the state in `data` if a residual or an observation has not left them
+    /// there.
     fn place(&mut self) {
         if self.poses != Poses::InData {
             forward_kinematics(&self.arm.model, &mut self.data, &self.state.q);
@@ -256,7 +260,7 @@ impl ReducedArm {
         self.qddot.as_mut_slice()[n..].copy_from_slice(&a.as_slice()[driven..]);
     }
 
-    /// `f += K x + D v + friction - τ`.
+    /// Adds springs, dampers, friction and controller: `f += K x + D v + friction - τ`.
     fn add_forces(&mut self, x: &DVector<f64>, v: &DVector<f64>, f: &mut DVector<f64>) {
         let driven = self.arm.torque_driven.len();
         if self.gears.is_some() {
@@ -291,7 +295,8 @@ impl ReducedArm {
         }
     }
 
-    /// As [`ReducedArm::add_forces`], where gears do more than give way; in the state that was set.
+    /// Works as [`ReducedArm::add_forces`] for arms with gear effects other than elasticity, at the
+    /// state set before.
     #[cold]
     fn add_gear_forces(&mut self, x: &DVector<f64>, v: &DVector<f64>, f: &mut DVector<f64>) {
         let Self { arm, gears: Some(gears), state, servo, tau, .. } = self else { return };
@@ -302,7 +307,7 @@ impl ReducedArm {
         if driven == 0 {
             return;
         }
-        // Motors: what ripple and friction put on them, what the controller gives.
+        // Motors: transmission error and friction minus the torque of the controller.
         let GearState { F, friction, .. } = &mut **gears;
         let load = |k: Option<usize>| k.map_or(0.0, |k| F[arm.offset(&arm.elements[k])]);
         arm.friction_torques(qdot, |law| load(law.element), friction);
@@ -314,8 +319,8 @@ impl ReducedArm {
         }
     }
 
-    /// What ripple and friction add to the forces of the actuated joints in `data.tau`, in the
-    /// state that was set.
+    /// Adds the torques of transmission errors and friction to the actuated joints in `data.tau`,
+    /// at the state set before.
     #[cold]
     fn add_gear_torques(&mut self, x: &DVector<f64>, v: &DVector<f64>) {
         let Self { arm, gears: Some(gears), state, data, qddot, .. } = self else { return };
@@ -327,7 +332,7 @@ impl ReducedArm {
         let rotor = |k: usize| arm.model.rotor_inertia(k) * qddot[k];
         let load = |law: &LoadFriction| match law.element {
             Some(k) => F[arm.offset(&arm.elements[k])],
-            // A rigid gear passes on what the joint needs without its own rotor.
+            // A rigid gear transmits the torque of the joint without the share of its own rotor.
             None => tau[law.coordinate] - rotor(law.coordinate),
         };
         arm.friction_torques(qdot, load, friction);
@@ -340,8 +345,8 @@ impl ReducedArm {
         add_geometric_forces(&self.arm, &self.data, &x.as_slice()[driven..], &mut f.as_mut_slice()[driven..]);
     }
 
-    /// Full motion at `t`: poses, twists and all generalised forces; those of the actuated joints
-    /// are the torques that the drives must supply, friction included.
+    /// Computes poses, twists and all generalised forces at `t`; those of the actuated joints are
+    /// the drive torques, friction included.
     pub(crate) fn evaluate(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>, a: &DVector<f64>) {
         self.set(t, x, v);
         self.set_accelerations(a);
@@ -351,8 +356,8 @@ impl ReducedArm {
         world_poses(&self.arm.model, &mut self.data);
     }
 
-    /// As [`ReducedArm::evaluate`], with the poses into `X_WB` and no twists; kinetic energy and
-    /// potential energy of gravity (J).
+    /// Works as [`ReducedArm::evaluate`] with the poses in `X_WB` and without twists; returns
+    /// kinetic energy and potential energy of gravity (J).
     pub(crate) fn observe(
         &mut self,
         t: f64,
@@ -380,8 +385,8 @@ impl ReducedArm {
         energies
     }
 
-    /// What friction and gears add to the forces of the actuated joints in `data.tau`, in the state
-    /// that was set.
+    /// Adds friction and gear torques to the actuated joints in `data.tau`, at the state set
+    /// before.
     fn add_joint_torques(&mut self, x: &DVector<f64>, v: &DVector<f64>) {
         if self.gears.is_some() {
             return self.add_gear_torques(x, v);
@@ -391,14 +396,14 @@ impl ReducedArm {
         }
     }
 
-    /// Torques that the controller holds now, in the order of [`FlexibleArm::torque_driven`]; empty
-    /// without one.
+    /// Returns the torques currently held by the controller, in the order of
+    /// [`FlexibleArm::torque_driven`]; empty without a controller.
     pub(crate) fn held_torques(&self) -> &[f64] {
         self.servo.as_ref().map_or(&[], |s| &s.torque)
     }
 }
 
-/// `f += K (x + tau v)` of a spring; y is room.
+/// `f += K (x + tau v)` of a spring; `y` is workspace.
 struct Damped<'a> {
     K: &'a [f64],
     tau: f64,
@@ -425,8 +430,8 @@ impl GeometricStiffness {
     }
 }
 
-/// Adds what the loads of the last Newton-Euler pass in `data` do to the stiffness of modal bodies;
-/// `e` and `f` are over the elastic coordinates.
+/// Adds the forces of load-dependent stiffness of modal bodies, for the loads of the last
+/// Newton-Euler pass in `data`; `e` and `f` are over the elastic coordinates.
 pub(crate) fn add_geometric_forces(arm: &FlexibleArm, data: &Data, e: &[f64], f: &mut [f64]) {
     for element in &arm.elements {
         let Some(geometric) = &element.geometric else { continue };
@@ -444,7 +449,8 @@ pub(crate) fn add_geometric_forces(arm: &FlexibleArm, data: &Data, e: &[f64], f:
     }
 }
 
-/// Loads in the order of [`GeometricStiffness::matrices`], from the last Newton-Euler pass.
+/// Returns the loads in the order of [`GeometricStiffness::matrices`], from the last Newton-Euler
+/// pass.
 fn geometric_loads<'a>(
     arm: &'a FlexibleArm,
     data: &'a Data,
@@ -468,8 +474,8 @@ fn geometric_loads<'a>(
         w.y * w.z,
     ];
     let wrenches = (0..geometric.interface.len()).flat_map(move |number| {
-        // What hangs on the interface pulls with the opposite of what it needs, in the axes of the
-        // link.
+        // The load at the interface is the negative of the wrench that the attached body requires,
+        // in link axes.
         let carried = arm.model.bodies().iter().enumerate().find(|(_, b)| {
             b.parent == body && matches!(b.motion, JointMotion::Interface { interface, .. } if interface == number)
         });
@@ -483,7 +489,7 @@ fn geometric_loads<'a>(
 }
 
 impl ReducedArm {
-    /// Checks that the mass matrix of the last coordinates is positive definite.
+    /// Checks that the mass matrix at the last coordinates is positive definite.
     #[cold]
     fn check_mass(&mut self, t: f64) -> Result<(), StepError> {
         let n = self.dimension();
@@ -555,7 +561,7 @@ impl SecondOrderSystem for ReducedArm {
             if !self.geometric || (pass > 0 && change <= 1e-13 * a.amax()) {
                 break;
             }
-            // The loads belong to the accelerations just found.
+            // Update the loads for the accelerations just computed.
             inverse_dynamics(&self.arm.model, &mut self.data, &self.state, &self.qddot);
         }
         self.forces = forces;
@@ -585,7 +591,7 @@ impl SecondOrderSystem for ReducedArm {
         C.as_mut_slice().fill(0.0);
         // Friction of the joints driven by torque.
         for (i, &k) in self.arm.torque_driven.iter().enumerate() {
-            // A falling friction would take away from what must stay positive.
+            // A negative friction slope (Stribeck) is dropped to keep the matrix positive definite.
             C[(i, i)] = c_D * self.arm.friction.get(k).map_or(0.0, |f| f.slope(self.state.qdot[k]).max(0.0));
         }
         if let Some(gears) = &self.gears {
@@ -596,7 +602,7 @@ impl SecondOrderSystem for ReducedArm {
                 }
             }
         }
-        // Springs, with their dampers where these are in proportion.
+        // Springs, including their dampers if these are proportional.
         for (k, element) in self.arm.elements.iter().enumerate() {
             let (first, size) = (driven + self.arm.offset(element), element.size);
             let damping = if self.arm.proportional { c_D * self.arm.tau[k] } else { 0.0 };
@@ -615,7 +621,7 @@ impl SecondOrderSystem for ReducedArm {
             C[(driven + i, driven + j)] += c_K * k;
             C[(driven + j, driven + i)] += c_K * k;
         }
-        // Else the damping couples the elements.
+        // Otherwise the damping couples the elements.
         if !self.arm.proportional {
             let ne = self.dimension() - driven;
             C.view_mut((driven, driven), (ne, ne)).zip_apply(&self.arm.D, |s, d| *s += c_D * d);

@@ -1,5 +1,5 @@
-//! The sampled controller of the joints that are driven by torque: what it remembers between
-//! samples. Not here: when it takes them (`events`).
+//! Sampled controller of the joints driven by torque: its state between samples. Not here: the
+//! sample times (`events`).
 
 use std::sync::Arc;
 
@@ -10,20 +10,20 @@ use crate::arm::{FlexibleArm, Servo};
 use crate::drive::Friction;
 use crate::gear::LoadFriction;
 
-/// What a sample found and did on an axis, for those who differentiate it.
+/// Inputs and branches of one sample of one axis, recorded for its differentiation.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct AxisSample {
-    /// Reference less joint (rad or m).
+    /// Position error: reference minus joint position (rad or m).
     pub(crate) lag: f64,
-    /// Error of the speed loop.
+    /// Error of the velocity loop.
     pub(crate) error: f64,
-    /// What was fed forward.
+    /// Feed-forward torque.
     pub(crate) ahead: f64,
-    /// Whether it set the integral from the torque held.
+    /// Whether the integral was initialised from the held torque.
     pub(crate) filled: bool,
     /// Whether the torque is at its limit.
     pub(crate) limited: bool,
-    /// Whether the integral went on.
+    /// Whether the integral was updated.
     pub(crate) integrated: bool,
 }
 
@@ -36,12 +36,12 @@ pub(crate) struct ServoState {
     pub(crate) torque: Vec<f64>,
     /// Integral part of the torque.
     integral: Vec<f64>,
-    /// The first sample sets the integrals so that the torques stay what they are.
+    /// Whether the next sample initialises the integrals such that the torques stay unchanged.
     fresh: bool,
     data: Data,
     pub(crate) reference: State,
     pub(crate) qddot: DVector<f64>,
-    /// Samples so far, and what the last one did.
+    /// Number of samples so far, and data of the last one.
     pub(crate) samples: u64,
     pub(crate) last: Vec<AxisSample>,
 }
@@ -64,7 +64,7 @@ impl ServoState {
         }
     }
 
-    /// Reference motion and the rigid robot's torques at t.
+    /// Computes the reference motion and the torques of the rigid robot at `t`.
     fn update_reference(&mut self, t: f64, arm: &FlexibleArm) {
         let n = self.qddot.len();
         let (q, qdot) = (self.reference.q.as_mut_slice(), self.reference.qdot.as_mut_slice());
@@ -72,7 +72,7 @@ impl ServoState {
         inverse_dynamics(&self.servo.rigid, &mut self.data, &self.reference, &self.qddot);
     }
 
-    /// Torque of the rigid robot on the reference of the last sample.
+    /// Returns the torque of the rigid robot on the reference of the last sample.
     pub(crate) fn rigid_torque(&self, coordinate: usize) -> f64 {
         self.data.tau[coordinate]
     }
@@ -87,8 +87,8 @@ impl ServoState {
         if self.servo.axes[axis].feed_forward { self.data.tau[k] + friction } else { 0.0 }
     }
 
-    /// Fills the integrators so that the first sample gives the torques `needed`, if it finds the
-    /// joints on their reference.
+    /// Initialises the controller such that the first sample returns the torques `needed` if the
+    /// joints are on their reference.
     pub(crate) fn hold(&mut self, needed: &DVector<f64>) {
         for (torque, axis) in self.torque.iter_mut().zip(&self.servo.axes) {
             *torque = needed[axis.coordinate];
@@ -96,7 +96,7 @@ impl ServoState {
         self.fresh = true;
     }
 
-    /// Takes the sample of time t.
+    /// Computes the sample at time `t`.
     pub(crate) fn sample(&mut self, t: f64, arm: &FlexibleArm, x: &[f64], v: &[f64]) {
         self.update_reference(t, arm);
         for axis in 0..self.servo.axes.len() {
@@ -106,14 +106,15 @@ impl ServoState {
             let wanted = self.reference.qdot[k] + a.position_gain * lag;
             let error = wanted - v[axis];
             let ahead = self.feed_forward(axis);
-            // Without an integrator nothing remembers the load: the joint sags into its gains.
+            // Without integral action the load is not compensated: the joint sags until the gains
+            // balance it.
             let filled = self.fresh && a.integral_gain > 0.0;
             if filled {
                 self.integral[axis] = self.torque[axis] - ahead - a.velocity_gain * error;
             }
             let unlimited = a.velocity_gain * error + self.integral[axis] + ahead;
             self.torque[axis] = unlimited.clamp(-a.limit, a.limit);
-            // At the limit the integral only runs back.
+            // Anti-windup: at the limit the integral changes only away from it.
             let limited = unlimited != self.torque[axis];
             let integrated = !limited || (unlimited > 0.0) != (error > 0.0);
             self.last[axis] = AxisSample { lag, error, ahead, filled, limited, integrated };

@@ -1,5 +1,5 @@
-//! Static equilibria along a motion: each is sought from the one before, with the stiffness that
-//! was inverted there.
+//! Static equilibria along a motion: each one starts from the previous one and reuses its inverse
+//! tangent stiffness.
 
 use std::sync::Arc;
 
@@ -17,47 +17,46 @@ use crate::reduced::add_geometric_forces;
 use crate::statics::{add_spring_forces, static_equilibrium, tangent_stiffness, with_curves};
 use crate::workspaces::Lent;
 
-/// A correction below this part of the deflection ends the search: the next one would be ten times
-/// smaller at least.
+/// Relative correction that ends the search: the next correction would be at least ten times
+/// smaller.
 const SMALL: f64 = 1e-7;
-/// Deflections below this are none (m, rad).
+/// Corrections below this count as zero (m, rad).
 const NOTHING: f64 = 1e-15;
-/// Corrections with one inverse; that of the right place needs three or four.
+/// Maximum number of corrections with one inverse; a current inverse needs three or four.
 const MOST_CORRECTIONS: usize = 8;
 
-/// An instant before t (s), nearer than anything happens.
+/// Returns a time just before `t` (s), closer than the separation of events.
 pub(crate) fn before(t: f64) -> f64 {
     t - 1e-12 * t.max(1.0)
 }
 
-/// The elastic coordinates of an arm that stands still wherever its motion is, for times in
-/// ascending order.
+/// Static equilibria of an arm at the positions of its motion, for times in ascending order.
 ///
-/// The same equilibria as [`static_equilibrium`], at the price of a few evaluations of weight each:
-/// the tangent stiffness changes little along a motion, so that its inverse at one place serves
-/// many instants.
+/// The results are those of [`static_equilibrium`] at the cost of a few evaluations of weight each:
+/// the tangent stiffness changes little along a motion, so that its inverse at one position serves
+/// many times.
 pub struct StaticPath {
     arm: Arc<FlexibleArm>,
     events: EventQueue,
     data: Lent<Data>,
-    /// Weight on the springs alone, where the tree is for it.
+    /// Static forces on the springs only, if supported for this tree.
     points: Option<Lent<FreeForces>>,
     /// Drives at the last time, springs at `e`.
     state: State,
     qddot: DVector<f64>,
-    /// Neither velocity nor acceleration.
+    /// Zero velocities and accelerations.
     still: DVector<f64>,
     e: DVector<f64>,
     unbalanced: DVector<f64>,
     correction: DVector<f64>,
-    /// Of the tangent stiffness.
+    /// Inverse of the tangent stiffness.
     inverse: Option<DMatrix<f64>>,
-    /// When the equilibrium was sought anew and the inverse is still to be taken (s).
+    /// Time (s) of the last full solution, if the inverse has not been computed since.
     sought_at: Option<f64>,
 }
 
 impl StaticPath {
-    /// For an arm with its loads and its changes of inertia.
+    /// Creates the path of an arm with its loads and changes of inertia.
     pub fn new(arm: impl Into<Arc<FlexibleArm>>) -> Self {
         let arm = arm.into();
         let (nv, n) = (arm.model.nv(), arm.n_elastic_coordinates());
@@ -77,9 +76,9 @@ impl StaticPath {
         }
     }
 
-    /// All coordinates at time `t` (s), not before the last one asked for: drives where the motion
-    /// is, springs in balance with weight and loads. What the arm carries is what it carries from
-    /// `t` on.
+    /// Returns all coordinates at time `t` (s), which must not be before the last requested time:
+    /// drives at the motion, springs in balance with weight and loads. A change of inertia at `t`
+    /// is included.
     ///
     /// # Errors
     /// As [`static_equilibrium`].
@@ -91,7 +90,7 @@ impl StaticPath {
         self.balanced(t)
     }
 
-    /// As [`StaticPath::at`], just before `t`: what happens at that time is still to come.
+    /// Returns the coordinates just before `t`: events at that time are still pending.
     ///
     /// # Errors
     /// As [`static_equilibrium`].
@@ -113,15 +112,16 @@ impl StaticPath {
         Ok(&self.state.q)
     }
 
-    /// How far a frame is from where it would be with all springs undeformed (m, world axes), at
-    /// the coordinates of the last time asked for.
+    /// Returns the displacement of a frame from its position with all springs undeformed (m, world
+    /// axes), at the coordinates of the last requested time.
     pub fn displacement(&mut self, frame: &Frame) -> Vector3<f64> {
         forward_kinematics(&self.arm.model, &mut self.data, &self.state.q);
         let yielding = self.data.X_WF(frame).translation.vector;
         yielding - self.undeformed(frame)
     }
 
-    /// Where a frame would be, for the poses in `data`; of closed loops these poses are lost.
+    /// Returns the undeformed position of a frame, for the poses in `data`; with closed loops these
+    /// poses are overwritten.
     fn undeformed(&mut self, frame: &Frame) -> Vector3<f64> {
         let Self { arm, data, state, .. } = self;
         if !arm.model.loops().is_empty() {
@@ -141,12 +141,12 @@ impl StaticPath {
         p
     }
 
-    /// The arm that stands still, with what it carries now.
+    /// Returns the arm with its current inertias.
     pub fn arm(&self) -> &FlexibleArm {
         &self.arm
     }
 
-    /// The inverse where the equilibrium was sought anew: only a second time asks for it.
+    /// Computes the inverse at the last full solution; delayed until a second time is requested.
     fn take_inverse(&mut self) {
         let Some(t) = self.sought_at.take().filter(|_| !self.e.is_empty()) else { return };
         let K = with_curves(&self.arm, &self.arm.stiffness(), self.state.q.as_slice(), &self.e);
@@ -154,12 +154,12 @@ impl StaticPath {
         self.inverse = factor.map(|factor| factor.inverse());
     }
 
-    /// The springs into the state.
+    /// Writes the elastic coordinates into the state.
     fn bend(&mut self) {
         self.state.q.as_mut_slice()[self.arm.model.n_actuated()..].copy_from_slice(self.e.as_slice());
     }
 
-    /// Newton with the inverse at hand; false if it does not lead to the equilibrium.
+    /// Runs Newton's method with the existing inverse; returns false if it does not converge.
     fn correct(&mut self, t: f64) -> bool {
         let Some(inverse) = self.inverse.take() else { return false };
         let (mut found, mut last) = (false, f64::INFINITY);
@@ -167,7 +167,7 @@ impl StaticPath {
             self.balance(t);
             product_of_numbers(inverse.as_slice(), self.unbalanced.as_slice(), self.correction.as_mut_slice());
             let size = self.correction.amax();
-            // An inverse of another place makes small steps too; it must make them quickly smaller.
+            // An inverse of another position also makes small steps; require a fast decrease.
             if !size.is_finite() || size > 0.1 * last {
                 break;
             }
@@ -185,7 +185,7 @@ impl StaticPath {
         found
     }
 
-    /// Forces of springs, weight and loads in the state.
+    /// Computes the unbalanced forces of springs, weight and loads at the state.
     fn balance(&mut self, t: f64) {
         let Self { arm, data, points, state, still, e, unbalanced, .. } = self;
         if !arm.loads.is_empty() {
@@ -209,7 +209,7 @@ impl StaticPath {
     }
 }
 
-/// What the arm carries from now on.
+/// Applies a change of inertia to the arm.
 fn carry(arm: &mut Arc<FlexibleArm>, points: &mut Option<Lent<FreeForces>>, change: &InertiaChange) {
     let arm = Arc::make_mut(arm);
     arm.model = Arc::new(arm.model.with_inertia(change.body, change.inertia));

@@ -1,4 +1,4 @@
-//! Joint targets at which a flexible arm at rest has its tool where the rigid arm would.
+//! Joint targets at which the tool of a flexible arm at rest is at the pose of the rigid arm.
 
 use std::sync::Arc;
 
@@ -11,65 +11,64 @@ use crate::error::StepError;
 use crate::linear::linearise;
 use crate::motion::Held;
 
-/// Accepted distance of the tool (m, rad).
+/// Accepted error of the tool pose (m, rad).
 const TOLERANCE: f64 = 1e-12;
-/// Most Newton iterations.
+/// Maximum number of Newton iterations.
 const MOST_ITERATIONS: usize = 30;
-/// Singular values below this part of the largest are directions in which the joints cannot move
-/// the tool.
+/// Relative singular value below which the joints cannot move the tool in that direction.
 const RANK: f64 = 1e-6;
 
-/// Targets at a pose.
+/// Joint targets for a pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StaticTargets {
     /// Joint targets (rad or m).
     pub q: Vec<f64>,
-    /// Displacement of the tool from where it should be with the targets as they were: position,
-    /// then rotation vector, world axes.
+    /// Displacement of the tool from its desired pose with the original targets: position, then
+    /// rotation vector, world axes.
     pub before: Vector6<f64>,
-    /// The same with the new ones, in the components asked for.
+    /// Displacement with the new targets, in the requested components.
     pub after: Vector6<f64>,
     /// Newton iterations.
     pub iterations: usize,
 }
 
-/// Why there are no targets.
+/// Reason why no targets were found.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TargetError {
-    /// No equilibrium.
+    /// The equilibrium failed.
     #[error(transparent)]
     Step(#[from] StepError),
-    /// A servo without position gain.
+    /// A servo has no position gain.
     #[error("the servo of joint {joint:?} holds no position: give it a position_gain and a velocity_gain")]
     NothingHolds {
-        /// The joint.
+        /// Name of the joint.
         joint: String,
     },
-    /// The joints cannot move the tool so, or the iteration does not settle.
+    /// The joints cannot move the tool there, or the iteration does not converge.
     #[error(
         "after {iterations} iterations the tool is still {left_m:.1e} m and {left_rad:.1e} rad from its place: the arm cannot move it there (singular pose, too few joints)"
     )]
     NotReached {
-        /// How many.
+        /// Number of iterations.
         iterations: usize,
-        /// What is left.
+        /// Remaining position error (m).
         left_m: f64,
-        /// What is left.
+        /// Remaining rotation error (rad).
         left_rad: f64,
     },
 }
 
-/// Finds joint targets with which the tool at rest is where the rigid arm has it at `q`.
+/// Computes joint targets with which the tool at rest is where the rigid arm has it at `q`.
 ///
-/// * `arm`: its own motion does not count; the payload is that of time 0.
+/// * `arm`: its own motion is ignored; the payload is that at time 0.
 /// * `F_T_W`: constant wrench on the tool, world axes, as in [`linearise`].
-/// * `t`: time (s) whose loads of the arm act.
-/// * `components`: which of position and rotation (world axes) count.
+/// * `t`: time (s) at which the arm's loads are evaluated.
+/// * `components`: components of position and rotation (world axes) to be matched.
 ///
 /// With fewer components than joints the joints move as little as possible. Motors under servos
-/// with an integral are where they are commanded at rest; those without sag into their gains, and
-/// are told so much more.
+/// with an integral reach their commands at rest; those without deviate by the static error of
+/// their gains, and the targets are offset by this error.
 ///
 /// # Errors
 /// [`TargetError`].
@@ -115,8 +114,8 @@ pub fn static_targets(
     unreachable!("the loop returns at its last iteration")
 }
 
-/// Moves the targets of servos without an integral on, so that their motors hold the torques
-/// `holding` where they are.
+/// Offsets the targets of servos without an integral such that their motors hold the torques
+/// `holding` at the desired positions.
 fn lead(servo: &Servo, q: &mut [f64], holding: &DVector<f64>) -> Result<(), TargetError> {
     let (motors, n) = (q.to_vec(), servo.rigid.nv());
     let sagging = |axis: &&ServoAxis| axis.integral_gain * axis.position_gain == 0.0;
@@ -144,7 +143,7 @@ fn lead(servo: &Servo, q: &mut [f64], holding: &DVector<f64>) -> Result<(), Targ
     Err(TargetError::NotReached { iterations: MOST_ITERATIONS, left_m, left_rad })
 }
 
-/// The tool of the rigid arm: every elastic coordinate at zero.
+/// Returns the tool pose of the rigid arm, with all elastic coordinates zero.
 fn rigid_pose(arm: &FlexibleArm, tool: &Frame, q: &[f64]) -> Pose {
     let mut all = DVector::zeros(arm.model.nv());
     all.rows_mut(0, q.len()).copy_from_slice(q);
@@ -153,7 +152,7 @@ fn rigid_pose(arm: &FlexibleArm, tool: &Frame, q: &[f64]) -> Pose {
     data.X_WF(tool)
 }
 
-/// From a pose to another: position, then rotation vector, world axes.
+/// Returns the displacement between two poses: position, then rotation vector, world axes.
 fn displacement(from: &Pose, to: &Pose) -> Vector6<f64> {
     let p = to.translation.vector - from.translation.vector;
     let r = rotation_vector((to.rotation * from.rotation.inverse()).matrix());

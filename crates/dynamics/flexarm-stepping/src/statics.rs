@@ -1,4 +1,5 @@
-//! Static equilibrium of the elastic coordinates, drives held: Newton on `K e + g_e(q_a, e) = 0`.
+//! Static equilibrium of the elastic coordinates, drives held: Newton's method on
+//! `K e + g_e(q_a, e) = 0`.
 
 use flexarm_kinematics::products::{add, cross, lift, tr_mul};
 use flexarm_kinematics::{
@@ -11,22 +12,23 @@ use crate::arm::FlexibleArm;
 use crate::error::StepError;
 use crate::reduced::add_geometric_forces;
 
-/// Accepted unbalanced force over the largest spring or gravity force.
+/// Accepted unbalanced force relative to the largest spring or gravity force.
 const TOLERANCE: f64 = 1e-13;
 
-/// Halvings of a step that leads farther from the equilibrium of a gear with hysteresis.
+/// Maximum number of halvings of a step that moves away from the equilibrium of a gear with
+/// hysteresis.
 pub(crate) const MOST_HALVINGS: usize = 12;
 
-/// Elastic coordinates at which springs carry gravity and the loads of time `t`.
+/// Computes the elastic coordinates at which the springs carry gravity and the loads at time `t`.
 ///
-/// Inertia forces are left out: the drives are held where the motion is at `t`.
+/// Inertia forces are neglected: the drives are held at the position of the motion at `t`.
 ///
 /// # Errors
 /// [`StepError::NoEquilibrium`], [`StepError::Singular`] or [`StepError::OpenLoop`].
 pub fn static_equilibrium(arm: &FlexibleArm, t: f64) -> Result<DVector<f64>, StepError> {
     let n = arm.n_elastic_coordinates();
-    // What was found with the modes is found again at once if nothing has changed since; a play is
-    // left from its middle.
+    // Start from the equilibrium computed with the modes, which is the solution if nothing has
+    // changed since; with nonlinear springs (backlash) start undeformed.
     let straight = arm.elements.iter().all(|element| element.curve.is_none());
     let known = t == 0.0 && straight && arm.modes.equilibrium.len() == n;
     let mut e = if known { arm.modes.equilibrium.clone() } else { DVector::zeros(n) };
@@ -36,8 +38,8 @@ pub fn static_equilibrium(arm: &FlexibleArm, t: f64) -> Result<DVector<f64>, Ste
     let mut data = arm.lend_data();
     let K = arm.stiffness();
     let mut residual = f64::INFINITY;
-    // A loop's first loading may be soft, then stiff: full steps may go to and fro between its
-    // pieces.
+    // The first loading curve of a hysteresis may be soft, then stiff: full steps may oscillate
+    // between its pieces.
     let most = if arm.hysteresis.is_empty() { 30 } else { 200 };
     for iteration in 0..most {
         let (g, scale) = unbalanced(arm, &mut data, t, &e);
@@ -46,7 +48,7 @@ pub fn static_equilibrium(arm: &FlexibleArm, t: f64) -> Result<DVector<f64>, Ste
         }
         let previous = residual;
         residual = g.amax() / scale.max(f64::MIN_POSITIVE);
-        // Done, or as good as rounding allows.
+        // Converged, or limited by round-off.
         if residual <= TOLERANCE || (iteration > 2 && residual < 1e-9 && residual >= 0.5 * previous) {
             return Ok(e);
         }
@@ -60,12 +62,11 @@ pub fn static_equilibrium(arm: &FlexibleArm, t: f64) -> Result<DVector<f64>, Ste
             return Err(StepError::Singular { matrix: "static stiffness (with the effect of weight)", t });
         };
         let step = factor.solve(&g);
-        // Behind a play a small load may be less than the rounding of the deflection makes.
+        // Beyond a backlash, a small load may be below the round-off of the deflection.
         if step.amax() <= 2.0 * f64::EPSILON * e.amax() {
             return Ok(e);
         }
-        // Far from small deflections the full step may overshoot: no coordinate moves by more than
-        // 0.5.
+        // The full step may overshoot for large deflections: no coordinate moves by more than 0.5.
         let mut shorten = (0.5 / step.amax()).min(1.0);
         let mut closer = arm.hysteresis.is_empty();
         for _ in 0..MOST_HALVINGS {
@@ -80,7 +81,7 @@ pub fn static_equilibrium(arm: &FlexibleArm, t: f64) -> Result<DVector<f64>, Ste
     Err(StepError::NoEquilibrium { t, iterations: most, residual })
 }
 
-/// Generalised forces out of balance, and the size of what should balance.
+/// Returns the unbalanced generalised forces, and the scale of the balancing forces.
 fn unbalanced(arm: &FlexibleArm, data: &mut Data, t: f64, e: &DVector<f64>) -> (DVector<f64>, f64) {
     let g = gravity_part(arm, data, t, e);
     let spring = spring_forces(arm, &joints_at(arm, t), e);
@@ -94,7 +95,7 @@ pub(crate) fn spring_forces(arm: &FlexibleArm, q: &[f64], e: &DVector<f64>) -> D
     f
 }
 
-/// Where the joints are at time t; nothing where no spring asks for it.
+/// Returns the joint positions at time `t`; empty if no spring depends on them.
 fn joints_at(arm: &FlexibleArm, t: f64) -> Vec<f64> {
     if arm.transmission.is_empty() {
         return Vec::new();
@@ -104,7 +105,8 @@ fn joints_at(arm: &FlexibleArm, t: f64) -> Vec<f64> {
     state.q.as_slice().to_vec()
 }
 
-/// `f += K e`, or the curves; over the elastic coordinates, with the joints at `q`.
+/// Adds the spring forces, `f += K e` or the curves, over the elastic coordinates, with the joints
+/// at `q`.
 pub(crate) fn add_spring_forces(arm: &FlexibleArm, q: &[f64], e: &[f64], f: &mut [f64]) {
     for (k, element) in arm.elements.iter().enumerate() {
         let range = arm.offset(element)..arm.offset(element) + element.size;
@@ -116,8 +118,9 @@ pub(crate) fn add_spring_forces(arm: &FlexibleArm, q: &[f64], e: &[f64], f: &mut
     arm.add_cross_forces(e, f);
 }
 
-/// What holds the arm still at `q` without its springs: weight, the loads of time t, a wrench at
-/// the tool's origin (world axes), stiffness by load; all coordinates, into `p`. No allocation.
+/// Writes the static forces without springs at `q` into `p`, over all coordinates: weight, the
+/// loads at time `t`, a wrench at the tool's origin (world axes) and load-dependent stiffness. Does
+/// not allocate.
 pub(crate) fn static_forces(
     arm: &FlexibleArm,
     tool: Option<(&Frame, &Wrench)>,
@@ -137,8 +140,8 @@ pub(crate) fn static_forces(
     add_geometric_forces(arm, data, &q.as_slice()[m..], &mut p.as_mut_slice()[m..]);
 }
 
-/// Adds a wrench at a frame's origin (world axes) to those on its body, for the poses in
-/// `data.X_WB`.
+/// Adds a wrench at a frame's origin (world axes) to the external wrench on its body, for the poses
+/// in `data.X_WB`.
 #[inline(always)]
 pub(crate) fn add_wrench<T: Real>(data: &mut Data<T>, at: &Frame, F_W: &Wrench) {
     let R_WB = data.X_WB[at.body].rotation.matrix();
@@ -161,8 +164,8 @@ fn gravity_part(arm: &FlexibleArm, data: &mut Data, t: f64, e: &DVector<f64>) ->
     g
 }
 
-/// The stiffness with curved springs at their slope; where play leaves none, the steepest slope
-/// finds the way out.
+/// Returns the stiffness with the tangent slopes of nonlinear springs; within backlash, where the
+/// slope is zero, the steepest slope is used to leave it.
 pub(crate) fn with_curves(arm: &FlexibleArm, K: &DMatrix<f64>, q: &[f64], e: &DVector<f64>) -> DMatrix<f64> {
     let mut tangent = K.clone();
     for (number, element) in arm.elements.iter().enumerate() {
@@ -175,7 +178,7 @@ pub(crate) fn with_curves(arm: &FlexibleArm, K: &DMatrix<f64>, q: &[f64], e: &DV
     tangent
 }
 
-/// As [`with_curves`], for small motions about a place: there no friction slips, and sliders are
+/// Works as [`with_curves`] for small motions: friction does not slip, so that sliders act as
 /// springs.
 pub(crate) fn for_vibration(arm: &FlexibleArm, K: &DMatrix<f64>, q: &[f64], e: &DVector<f64>) -> DMatrix<f64> {
     let mut tangent = with_curves(arm, K, q, e);
@@ -186,8 +189,8 @@ pub(crate) fn for_vibration(arm: &FlexibleArm, K: &DMatrix<f64>, q: &[f64], e: &
     tangent
 }
 
-/// Stiffness with which Newton's step out of a play ends just beyond its edge, however small the
-/// force.
+/// Returns the stiffness with which Newton's step out of a backlash ends just beyond its edge,
+/// however small the force.
 fn leave_play(arm: &FlexibleArm, q: &[f64], e: &DVector<f64>, g: &DVector<f64>, K: &DMatrix<f64>) -> DMatrix<f64> {
     let mut K = K.clone();
     for (number, element) in arm.elements.iter().enumerate() {
@@ -202,7 +205,7 @@ fn leave_play(arm: &FlexibleArm, q: &[f64], e: &DVector<f64>, g: &DVector<f64>, 
     K
 }
 
-/// `K + dg/de` under weight and the loads of time t, symmetrised.
+/// Returns `K + dg/de` under weight and the loads at time `t`, symmetrised.
 pub(crate) fn tangent_stiffness(
     arm: &FlexibleArm,
     data: &mut Data,
@@ -219,14 +222,14 @@ pub(crate) fn tangent_stiffness(
     K + (&G + G.transpose()) * 0.5
 }
 
-/// Step of the central differences (m, rad).
+/// Step size of the central differences (m, rad).
 const DIFFERENCE: f64 = 1e-6;
 
-/// Derivatives of [`static_forces`] by the coordinates, with their workspace: in closed form; by
-/// central differences where loads change the stiffness of modal bodies.
+/// Derivatives of [`static_forces`] with respect to the coordinates, with workspace: in closed
+/// form, or by central differences if loads change the stiffness of modal bodies.
 #[derive(Clone, Debug)]
 pub(crate) struct StaticSlopes {
-    /// First coordinate, 0 or that of the first spring.
+    /// First coordinate: 0, or that of the first spring.
     first: usize,
     exact: StaticTangent,
     loads: Vec<PointLoad>,
@@ -235,7 +238,7 @@ pub(crate) struct StaticSlopes {
     down: DVector<f64>,
 }
 
-/// A wrench at a frame's origin that keeps its direction, world axes.
+/// Returns a wrench at a frame's origin with constant direction (world axes) as a point load.
 pub(crate) fn load_at(frame: &Frame, F_W: &Wrench) -> PointLoad {
     PointLoad { body: frame.body, p_B: frame.X_BF.translation.vector, F_W: *F_W, turns: false }
 }
@@ -253,8 +256,8 @@ impl StaticSlopes {
         }
     }
 
-    /// Into `G`, a row and a column per coordinate from the first one on; leaves `data` with the
-    /// poses at `q`.
+    /// Writes the derivatives into `G`, one row and column per coordinate from the first one on;
+    /// leaves the poses at `q` in `data`.
     pub(crate) fn compute(
         &mut self,
         arm: &FlexibleArm,
@@ -268,7 +271,7 @@ impl StaticSlopes {
         self.compute_at_poses(arm, tool, t, data, q, G);
     }
 
-    /// As [`StaticSlopes::compute`], with the poses at `q` in `data`.
+    /// Works as [`StaticSlopes::compute`] with the poses at `q` already in `data`.
     pub(crate) fn compute_at_poses(
         &mut self,
         arm: &FlexibleArm,

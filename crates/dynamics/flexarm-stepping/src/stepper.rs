@@ -1,24 +1,25 @@
-//! One face for all steppers: step, observe, count. Which there are is in [`crate::steppers`].
+//! Common interface of all steppers: step, observe, count. The steppers are listed in
+//! [`crate::steppers`].
 
 use crate::error::StepError;
 use crate::observation::Observation;
 
-/// Where a run starts.
+/// Initial state of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Start {
-    /// Springs carry the weight: no ringing.
+    /// Static equilibrium: the springs carry the weight, so the arm does not ring.
     #[default]
     Equilibrium,
-    /// Springs relaxed.
+    /// Undeformed: the springs are relaxed.
     Undeformed,
 }
 
 /// Work done by a stepper.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Steps taken; those of the solver where it chooses them.
+    /// Steps taken; internal steps for a solver with step size control.
     pub steps: u64,
-    /// Newton iterations or evaluations of the equations of motion.
+    /// Newton iterations, or evaluations of the equations of motion.
     pub evaluations: u64,
     /// Matrix factorisations.
     pub factorisations: u64,
@@ -26,11 +27,11 @@ pub struct Counts {
 
 /// A running simulation.
 pub trait Stepper: Send {
-    /// Current time (s).
+    /// Returns the current time (s).
     fn time(&self) -> f64;
 
-    /// Advances by one step; on error the state stays at the last good time. No stepper allocates
-    /// here but those that say so ([`crate::StepperEntry::allocates`]).
+    /// Advances by one step. After an error the state is that of the last good time. Does not
+    /// allocate unless the stepper declares it ([`crate::StepperEntry::allocates`]).
     ///
     /// # Errors
     /// [`StepError`] with time, step and cause.
@@ -39,15 +40,15 @@ pub trait Stepper: Send {
     /// Writes the current state into `out`.
     fn observe(&mut self, out: &mut Observation);
 
-    /// Work so far.
+    /// Returns the work done so far.
     fn counts(&self) -> Counts;
 
-    /// Iterations of the last step and the relative correction it ended with (0 where there are
-    /// none).
+    /// Returns the iterations of the last step and its final relative correction (zeros without
+    /// iterations).
     fn last_iteration(&self) -> (usize, f64) {
         (0, 0.0)
     }
 }
 
-/// Elastic coordinates beyond this are no deflection of a link any more (m, rad).
+/// Bound on elastic coordinates (m, rad): larger values are not a deflection of a link.
 pub(crate) const LARGEST_DEFLECTION: f64 = 3.0;

@@ -1,12 +1,13 @@
-//! The seam between integrators and what they integrate: a second-order system with stiffness.
+//! Interface between integrators and the systems they integrate: a second-order system with
+//! stiffness.
 //!
 //! ```text
 //! r(t, x, v, a) = M(x) a + D v + K x + b(t, x, v) = 0
 //! ```
-//! The integrators ([`crate::GeneralizedAlpha`], [`crate::Rk4`]) know this trait and nothing of
-//! robots; the trait knows nothing of any integrator: it gives residual, acceleration and matrices,
-//! and what is made of these is theirs. [`crate::ReducedArm`] is the flexible arm behind it; the
-//! tests put a pendulum and an oscillator there.
+//! The integrators ([`crate::GeneralizedAlpha`], [`crate::Rk4`]) depend on this trait and know
+//! nothing of robots. The trait provides residual, acceleration and matrices and knows nothing of
+//! any integrator. [`crate::ReducedArm`] implements it for the flexible arm; the tests implement it
+//! for a pendulum and an oscillator.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -14,18 +15,18 @@ use crate::error::StepError;
 use crate::mode_matrix::ModeMatrices;
 use crate::tree_matrix::TreeMatrices;
 
-/// A mechanical system in n coordinates x of a vector space.
+/// A mechanical system with n coordinates x in a vector space.
 pub trait SecondOrderSystem {
-    /// Number of coordinates.
+    /// Returns the number of coordinates.
     fn dimension(&self) -> usize;
 
-    /// `r(t, x, v, a)` (N or N m), written into `r`.
+    /// Writes `r(t, x, v, a)` (N or N m) into `r`.
     fn residual(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>, a: &DVector<f64>, r: &mut DVector<f64>);
 
-    /// Acceleration for which the residual vanishes, written into `a`.
+    /// Writes the acceleration for which the residual vanishes into `a`.
     ///
     /// # Errors
-    /// [`StepError::Singular`] if the mass matrix cannot be solved.
+    /// [`StepError::Singular`] if the mass matrix cannot be factorised.
     fn acceleration(
         &mut self,
         t: f64,
@@ -34,32 +35,32 @@ pub trait SecondOrderSystem {
         a: &mut DVector<f64>,
     ) -> Result<(), StepError>;
 
-    /// Mass matrix M at the configuration of the last `residual` call, n × n, written over all of
-    /// `M`.
+    /// Writes the n × n mass matrix M at the configuration of the last `residual` call into `M`.
     fn mass(&mut self, M: &mut DMatrix<f64>);
 
-    /// `c_D D + c_K K`, damping and stiffness as they are tangent to the residual at the
-    /// configuration of its last call, n × n, written over all of `C`. For Newton's method: what is
-    /// left out costs iterations and no accuracy.
+    /// Writes `c_D D + c_K K` (n × n) into `C`: tangent damping and stiffness at the configuration
+    /// of the last `residual` call. Used by Newton's method only: omitted terms cost iterations,
+    /// not accuracy.
     fn damping_and_stiffness(&mut self, c_D: f64, c_K: f64, C: &mut DMatrix<f64>);
 
-    /// K of the springs about their relaxed places, constant and symmetric, n × n, written over all
-    /// of `K`.
+    /// Writes the stiffness matrix K of the springs about their relaxed positions (constant,
+    /// symmetric, n × n) into `K`.
     fn stiffness(&mut self, K: &mut DMatrix<f64>);
 
-    /// A step has ended at t (s) with x: what the system remembers of its way belongs to that time
-    /// from here on.
+    /// Accepts `x` at time `t` (s) as the end of a step: history variables of the system are
+    /// updated to that state.
     fn settle(&mut self, _t: f64, _x: &DVector<f64>) {}
 
-    /// The same three matrices where they sit on a tree, into `to`, from which they are solved in
-    /// O(n) instead of O(n²). False where they do not, or where n is so small that dense ones are
-    /// faster: `to` then holds anything.
+    /// Writes the same three matrices in tree structure into `to`, which solves them in O(n)
+    /// instead of O(n²). Returns `false`, with the contents of `to` unspecified, if they have no
+    /// tree structure or if n is so small that dense matrices are faster.
     fn along_tree(&mut self, _c_D: f64, _c_K: f64, _to: &mut TreeMatrices) -> bool {
         false
     }
 
-    /// The same three matrices where many of the coordinates are modes that meet the others in mass
-    /// alone, and each other not at all. False where they are not, as above.
+    /// Writes the same three matrices into `to` for a system in which many coordinates are modal:
+    /// these are coupled with the others by the mass matrix only, and not with each other.
+    /// Otherwise returns `false` as [`SecondOrderSystem::along_tree`] does.
     fn with_modes(&mut self, _c_D: f64, _c_K: f64, _to: &mut ModeMatrices) -> bool {
         false
     }

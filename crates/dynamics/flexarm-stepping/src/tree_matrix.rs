@@ -1,7 +1,7 @@
-//! Matrices that sit on a tree, and their solutions by elimination along it: O(n), instead of O(n²)
-//! with a dense inverse and O(n³) to make that.
+//! Matrices on a tree and their solution by elimination along it: O(n), compared with O(n²) for a
+//! dense inverse and O(n³) to compute that inverse.
 //!
-//! A node has six coordinates `x_j` and moves with its parent p; damping and stiffness have a block
+//! A node has six coordinates `x_j` relative to its parent p; damping and stiffness have one block
 //! per node:
 //!
 //! ```text
@@ -9,30 +9,31 @@
 //! M = Σ_j (∂α_j/∂x)ᵀ I_j (∂α_j/∂x)                                                            (2)
 //! M^-1 f:   α_j = I_j^-1 (f_j - Σ_children X_cᵀ f_c),   x_j = α_j - X_j α_p                    (3)
 //! ```
-//! `M + S`, S a block `S_j` per node, is solved as articulated bodies are:
+//! A matrix `M + S`, with one block `S_j` per node in S, is solved as in the articulated-body
+//! algorithm:
 //!
 //! ```text
-//! inward    Î_j = I_j + Σ_children X_cᵀ I'_c X_c,   Δ_j = Î_j + S_j,   I'_j = S_j Δ_j^-1 Î_j       (4)
-//!           w_j = Δ_j^-1 (r_j - Σ_children X_cᵀ f_c),   f_j = r_j - S_j w_j                        (5)
-//! outward   x_j = w_j - Δ_j^-1 Î_j X_j α_p                                                      (6)
+//! inward    Î_j = I_j + Σ_children X_cᵀ I'_c X_c,   Δ_j = Î_j + S_j,   I'_j = S_j Δ_j^-1 Î_j  (4)
+//!           w_j = Δ_j^-1 (r_j - Σ_children X_cᵀ f_c),   f_j = r_j - S_j w_j                    (5)
+//! outward   x_j = w_j - Δ_j^-1 Î_j X_j α_p                                                 (6)
 //! ```
 //!
-//! **With a correction** by s, as the dispersion correction of generalised-alpha,
+//! **With a correction** by s, such as the dispersion correction of generalised-alpha,
 //!
 //! ```text
 //! J = M + C (1 + s M^-1 K)                                                                  (7)
 //! ```
-//! is no such matrix. But with `u = s M^-1 K x` beside x it is one of two vectors per node, to
-//! which (4) to (6) apply as they are:
+//! has no such form. But with `u = s M^-1 K x` as a second unknown it has, with two vectors per
+//! node, and (4) to (6) apply unchanged:
 //!
 //! ```text
 //! [ M + C    C ] [ x ]   [ r ]
-//! [ -s K     M ] [ u ] = [ 0 ]        S_j = [ C_j C_j; -s K_j 0 ],   I and X in both rows        (8)
+//! [ -s K     M ] [ u ] = [ 0 ]        S_j = [ C_j C_j; -s K_j 0 ],   I and X in both rows     (8)
 //! ```
-//! and u is what a step needs besides. Coordinates that are held leave a matrix of the same kind,
-//! of determinant `det M det J > 0`, for
-//! `(1 + s K M^-1) J = M + s K + (1 + s K M^-1) C (1 + s M^-1 K)` is positive definite: no pivot of
-//! two by two vanishes, whatever the damping.
+//! and the step needs u as well. With some coordinates held the matrix keeps its form, with
+//! determinant `det M det J > 0`, because
+//! `(1 + s K M^-1) J = M + s K + (1 + s K M^-1) C (1 + s M^-1 K)` is positive definite: no two by
+//! two pivot vanishes, whatever the damping.
 //!
 //! Source of (4) to (6): [Featherstone 2008], Table 7.1. Not here: bodies and joints.
 
@@ -45,21 +46,20 @@ use crate::error::StepError;
 /// A node of a [`TreeMatrices`]: six coordinates.
 #[derive(Clone, Debug)]
 pub struct TreeNode {
-    /// Number of the node that it moves with, which comes before it; none if it stands on fixed
-    /// ground.
+    /// Index of the parent node, which precedes it; `None` on fixed ground.
     pub parent: Option<usize>,
-    /// `I`, symmetric, in (2) of the module page.
+    /// `I` of (2) in the module documentation, symmetric.
     pub inertia: Matrix6<f64>,
     /// `A`, `B`, `C` of X in (1).
     pub carried: [Matrix3<f64>; 3],
     /// Block of `c_D D + c_K K`, symmetric.
     pub C: Matrix6<f64>,
-    /// Block of K, of the springs about their relaxed places, symmetric.
+    /// Block of the stiffness K of the springs about their relaxed positions, symmetric.
     pub K: Matrix6<f64>,
 }
 
 impl TreeNode {
-    /// On fixed ground, without inertia, damping and stiffness.
+    /// Creates a node without inertia, damping and stiffness, with the motion of its parent.
     pub fn new(parent: Option<usize>) -> Self {
         let zero = Matrix6::zeros();
         Self {
@@ -72,20 +72,20 @@ impl TreeNode {
     }
 }
 
-/// The matrices of a [`crate::SecondOrderSystem`] whose coordinates sit on a tree, six and six in
-/// the order of its nodes.
+/// Matrices of a [`crate::SecondOrderSystem`] whose coordinates form a tree, six per node in the
+/// order of the nodes.
 #[derive(Clone, Debug, Default)]
 pub struct TreeMatrices {
-    /// Parents before children.
+    /// Nodes, parents before children.
     pub nodes: Vec<TreeNode>,
 }
 
-/// F vectors of a node, x alone or x and u, and what maps them.
+/// F vectors of a node (x, or x and u), and maps between them.
 type Vectors<const F: usize> = [Vector6<f64>; F];
 type Matrices<const F: usize> = [[Matrix6<f64>; F]; F];
 type Scalars<const F: usize> = [[f64; F]; F];
 
-/// `y += A x`.
+/// Computes `y += A x`.
 #[inline(always)]
 fn add_product(A: &Matrix6<f64>, x: &Vector6<f64>, y: &mut Vector6<f64>) {
     let y = &mut y.data.0[0];
@@ -96,7 +96,7 @@ fn add_product(A: &Matrix6<f64>, x: &Vector6<f64>, y: &mut Vector6<f64>) {
     }
 }
 
-/// `A x`.
+/// Returns `A x`.
 #[inline(always)]
 fn product(A: &Matrix6<f64>, x: &Vector6<f64>) -> Vector6<f64> {
     let mut y = Vector6::zeros();
@@ -104,7 +104,7 @@ fn product(A: &Matrix6<f64>, x: &Vector6<f64>) -> Vector6<f64> {
     y
 }
 
-/// `A x`.
+/// Returns `A x`.
 #[inline(always)]
 fn products<const F: usize>(A: &Matrices<F>, x: &Vectors<F>) -> Vectors<F> {
     let mut y = [[0.0; 6]; F];
@@ -121,17 +121,18 @@ fn products<const F: usize>(A: &Matrices<F>, x: &Vectors<F>) -> Vectors<F> {
     y.map(Vector6::from)
 }
 
-/// Column k of all.
+/// Returns column k of all blocks.
 fn column<const F: usize>(A: &Matrices<F>, k: usize) -> [Vectors<F>; F] {
     from_fn(|i| from_fn(|j| A[i][j].column(k).into()))
 }
 
-/// Entry (i, j) of all.
+/// Returns entry (i, j) of all blocks.
 fn entry<const F: usize>(A: &Matrices<F>, i: usize, j: usize) -> Scalars<F> {
     from_fn(|row| from_fn(|column| A[row][column][(i, j)]))
 }
 
-/// The inverse of a number, or of two by two; none where they have no positive determinant.
+/// Returns the inverse of a number or of a two by two matrix; `None` if its determinant is not
+/// positive.
 fn inverse<const F: usize>(a: &Scalars<F>) -> Option<Scalars<F>> {
     let last = F - 1;
     let determinant = if F == 1 { a[0][0] } else { a[0][0] * a[last][last] - a[0][last] * a[last][0] };
@@ -145,22 +146,21 @@ fn inverse<const F: usize>(a: &Scalars<F>) -> Option<Scalars<F>> {
     (determinant > 0.0 && determinant.is_finite()).then_some(inverse)
 }
 
-/// `a b`.
+/// Returns `a b`.
 fn scalar_product<const F: usize>(a: &Scalars<F>, b: &Scalars<F>) -> Scalars<F> {
     from_fn(|i| from_fn(|j| (0..F).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
-/// `x a`.
+/// Returns `x a`.
 fn scaled<const F: usize>(x: &[Vectors<F>; F], a: &Scalars<F>) -> [Vectors<F>; F] {
     from_fn(|i| from_fn(|j| (0..F).fold(Vector6::zeros(), |sum, k| sum + x[i][k] * a[k][j])))
 }
 
-/// Puts the inverse in the place of a matrix, by Gauss and Jordan; false where a pivot is not
-/// positive.
+/// Inverts a matrix in place by Gauss-Jordan elimination; returns false if a pivot is not positive.
 fn invert<const F: usize>(A: &mut Matrices<F>) -> bool {
     for k in 0..6 {
         let Some(pivot) = inverse(&entry(A, k, k)) else { return false };
-        // Column k with its pivot taken out.
+        // Column k without its pivot.
         let mut own = column(A, k);
         own.iter_mut().flatten().for_each(|part| part[k] = 0.0);
         for j in (0..6).filter(|j| *j != k) {
@@ -184,7 +184,7 @@ fn invert<const F: usize>(A: &mut Matrices<F>) -> bool {
 }
 
 impl TreeNode {
-    /// `X α`.
+    /// Returns `X α`.
     #[inline(always)]
     fn outward(&self, alpha: &Vector6<f64>) -> Vector6<f64> {
         let [A, B, C] = &self.carried;
@@ -197,7 +197,7 @@ impl TreeNode {
         Vector6::from(moved)
     }
 
-    /// `Xᵀ f`.
+    /// Returns `Xᵀ f`.
     #[inline(always)]
     fn inward(&self, f: &Vector6<f64>) -> Vector6<f64> {
         let [A, B, C] = &self.carried;
@@ -211,13 +211,13 @@ impl TreeNode {
         Vector6::from(carried)
     }
 
-    /// `Xᵀ I X`.
+    /// Returns `Xᵀ I X`.
     fn inertia_inward(&self, I: &Matrix6<f64>) -> Matrix6<f64> {
         let half = Matrix6::from_columns(&[0, 1, 2, 3, 4, 5].map(|k| self.inward(&I.column(k).into()))).transpose();
         Matrix6::from_columns(&[0, 1, 2, 3, 4, 5].map(|k| self.inward(&half.column(k).into()))).transpose()
     }
 
-    /// `S` of (4), or with F = 2 of (8).
+    /// Returns `S` of (4), or of (8) with F = 2.
     fn springs<const F: usize>(&self, s: f64) -> Matrices<F> {
         let mut S = [[self.C; F]; F];
         if F > 1 {
@@ -227,7 +227,7 @@ impl TreeNode {
         S
     }
 
-    /// `S x`.
+    /// Returns `S x`.
     #[inline(always)]
     fn stretched<const F: usize>(&self, s: f64, x: &Vectors<F>) -> Vectors<F> {
         if F == 1 {
@@ -239,7 +239,7 @@ impl TreeNode {
     }
 }
 
-/// (4) of one node.
+/// Elimination (4) of one node.
 #[derive(Clone, Debug)]
 struct Eliminated<const F: usize> {
     /// `Δ^-1`.
@@ -248,7 +248,7 @@ struct Eliminated<const F: usize> {
     held: Matrices<F>,
     /// `Î`.
     inertia: Matrices<F>,
-    /// In a solution what the children put on the node, then `α`.
+    /// During a solution the forces from the children, then `α`.
     carried: Vectors<F>,
     w: Vectors<F>,
 }
@@ -261,7 +261,7 @@ struct Elimination<const F: usize> {
 }
 
 impl<const F: usize> Elimination<F> {
-    /// (4); false where a pivot is not positive.
+    /// Factorises by (4); returns false if a pivot is not positive.
     fn factor(&mut self, tree: &[TreeNode], s: f64) -> bool {
         self.s = s;
         let (zero, none) = ([[Matrix6::zeros(); F]; F], [Vector6::zeros(); F]);
@@ -298,10 +298,11 @@ impl<const F: usize> Elimination<F> {
         true
     }
 
-    /// (5) and (6) for r in the first rows: leaves the solution of node j in its `w`.
+    /// Solves by (5) and (6) for `r` in the first rows; leaves the solution of node j in its `w`.
     fn solve(&mut self, tree: &[TreeNode], r: &[f64]) {
         let Self { s, nodes } = self;
         let none = [Vector6::zeros(); F];
+        // Inward pass (5).
         nodes.iter_mut().for_each(|node| node.carried = none);
         for (j, own) in tree.iter().enumerate().rev() {
             let (inner, outer) = nodes.split_at_mut(j);
@@ -315,6 +316,7 @@ impl<const F: usize> Elimination<F> {
                 *to += own.inward(&(f[i] - stretched[i]));
             }
         }
+        // Outward pass (6).
         for (j, own) in tree.iter().enumerate() {
             let (inner, outer) = nodes.split_at_mut(j);
             let node = &mut outer[0];
@@ -332,11 +334,11 @@ impl<const F: usize> Elimination<F> {
     }
 }
 
-/// `J^-1` of `J = M + C`, or of (7), on a tree; see the module page.
+/// `J^-1` on a tree for `J = M + C`, or for (7); see the module documentation.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TreeInverse {
     pub(crate) matrices: TreeMatrices,
-    /// s of (7); none: `J = M + C`.
+    /// s of (7); `None` for `J = M + C`.
     s: Option<f64>,
     plain: Elimination<1>,
     corrected: Elimination<2>,
@@ -349,7 +351,7 @@ pub(crate) struct TreeInverse {
 }
 
 impl TreeInverse {
-    /// Factorises what is in `matrices`, (7) with s or `M + C` without.
+    /// Factorises `matrices`: (7) with s, or `M + C` without.
     ///
     /// # Errors
     /// [`StepError::Singular`] if an inertia or `J` is not positive definite.
@@ -382,7 +384,7 @@ impl TreeInverse {
         Ok(())
     }
 
-    /// Replaces `r` by `d = J^-1 r`; with s also finds [`TreeInverse::shift`].
+    /// Replaces `r` by `d = J^-1 r`; with s also computes [`TreeInverse::shift`].
     pub(crate) fn solve(&mut self, r: &mut DVector<f64>) {
         let nodes = &self.matrices.nodes;
         if self.s.is_none() {
@@ -400,16 +402,16 @@ impl TreeInverse {
         }
     }
 
-    /// `s M^-1 K d` of the last solution d.
+    /// Returns `s M^-1 K d` of the last solution d.
     pub(crate) fn shift(&self) -> &DVector<f64> {
         &self.shift
     }
 
-    /// `y = x + s M^-1 K x`, by (3).
+    /// Computes `y = x + s M^-1 K x`, by (3).
     pub(crate) fn correct(&mut self, x: &DVector<f64>, y: &mut DVector<f64>) {
         let Self { matrices, s, lightness, alpha, .. } = self;
         let s = s.unwrap_or(0.0);
-        // First what the children put on each node.
+        // Inward pass: accumulate the forces from the children.
         alpha.iter_mut().for_each(|alpha| *alpha = Vector6::zeros());
         for (j, node) in matrices.nodes.iter().enumerate().rev() {
             let f = product(&node.K, &Vector6::from_column_slice(&x.as_slice()[6 * j..6 * j + 6]));
@@ -436,8 +438,8 @@ mod tests {
     use proptest::prelude::*;
     use proptest::test_runner::TestRunner;
 
-    /// A random tree with branches and several roots; stiffness of very different size from node to
-    /// node.
+    /// Creates a random tree with branches and several roots; stiffness differs by orders of
+    /// magnitude between nodes.
     fn tree(seed: u64, count: usize) -> TreeMatrices {
         let mut draw = Draw(seed);
         let nodes = (0..count).map(|j| {
@@ -457,7 +459,7 @@ mod tests {
         TreeMatrices { nodes: nodes.collect() }
     }
 
-    /// (2), C and K as dense matrices.
+    /// Returns M of (2), C and K as dense matrices.
     fn dense(tree: &TreeMatrices) -> [DMatrix<f64>; 3] {
         let n = 6 * tree.nodes.len();
         let (mut M, mut C, mut K) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n), DMatrix::zeros(n, n));
@@ -506,10 +508,10 @@ mod tests {
         result.unwrap();
     }
 
-    /// Truth: `J = M + C (1 + s M^-1 K)` dense, by LU; solution, shift, and `x + s M^-1 K x`.
-    /// Damping that has nothing to do with the stiffness, and `C = κ K` where the roots a and b are
-    /// complex, equal, real, and very different (`τ = (κ/s)^1/2` of 0.02, 1, 2, 2.1 and 50).
-    /// Measured: 2e-12, 2e-12, 1e-12.
+    /// Truth: `J = M + C (1 + s M^-1 K)` dense, by LU; solution, shift, and `x + s M^-1 K x`. With
+    /// damping unrelated to the stiffness, and with `C = κ K` where the roots a and b are complex,
+    /// equal, real, and very different (`τ = (κ/s)^1/2` of 0.02, 1, 2, 2.1 and 50). Measured:
+    /// 2e-12, 2e-12, 1e-12.
     #[test]
     fn the_corrected_matrix_is_solved_with_one_elimination_whatever_the_damping() {
         let mut runner = TestRunner::new(ProptestConfig::with_cases(100));
@@ -544,7 +546,7 @@ mod tests {
         result.unwrap();
     }
 
-    /// A node without inertia has no acceleration, with springs or without.
+    /// A node without inertia is reported as a singular mass matrix, with springs or without.
     #[test]
     fn a_node_without_inertia_is_found() {
         let mut matrices = tree(1, 3);

@@ -1,10 +1,10 @@
-//! Workspaces of the recursions over one tree, handed from run to run.
+//! Pool of workspaces for recursions over one tree, reused from run to run.
 //!
-//! An arm shares them with all its copies: what a run gives back, the next one takes. New or used,
-//! the bits are the same, for a recursion writes everything that it reads. Trees whose workspaces
-//! begin where they were last (closed loops), or that are rarely run often (modal bodies,
-//! balancers), get new ones each time, and so does an arm whose masses have changed since it was
-//! made.
+//! An arm shares the pool with all its copies: workspaces returned by one run are reused by the
+//! next. Results are bitwise the same with new and reused workspaces, because a recursion writes
+//! everything it reads. Fresh workspaces are allocated each time for trees whose recursions start
+//! from the previous solution (closed loops), for trees that are rarely run in large numbers (modal
+//! bodies, balancers), and for an arm whose masses have changed since it was created.
 
 use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -13,13 +13,13 @@ use flexarm_kinematics::{Data, FreeForces, Model, Observer, Roles};
 
 use crate::arm::FlexibleArm;
 
-/// Where workspaces wait for the next run.
+/// Pool of unused workspaces.
 type Shelf<T> = Arc<Mutex<Vec<T>>>;
 
-/// The workspaces that nobody uses just now.
+/// Workspaces that are currently unused.
 #[derive(Clone)]
 pub struct Workspaces {
-    /// The tree that they are for.
+    /// Model for which they were made.
     model: Arc<Model>,
     data: Shelf<Data>,
     points: Shelf<FreeForces>,
@@ -27,12 +27,12 @@ pub struct Workspaces {
 }
 
 impl Workspaces {
-    /// None yet.
+    /// Creates an empty pool.
     pub(crate) fn of(model: &Arc<Model>) -> Self {
         Self { model: model.clone(), data: Shelf::default(), points: Shelf::default(), observers: Shelf::default() }
     }
 
-    /// Whether they are for this very model, and none of them remembers anything.
+    /// Returns whether they belong to this same model and carry no state between uses.
     fn are_for(&self, model: &Arc<Model>) -> bool {
         Arc::ptr_eq(&self.model, model)
             && model.loops().is_empty()
@@ -42,8 +42,8 @@ impl Workspaces {
 }
 
 impl FlexibleArm {
-    /// A workspace for recursions over the tree, without external wrenches: one that a run before
-    /// gave back, or a new one.
+    /// Returns a workspace for recursions over the tree, without external wrenches: a returned one
+    /// or a new one.
     pub fn lend_data(&self) -> Lent<Data> {
         let shelf = self.workspaces.are_for(&self.model).then_some(&self.workspaces.data);
         let mut lent = Lent::from(shelf, || Some(Data::new(&self.model))).expect("there are always new ones");
@@ -51,24 +51,26 @@ impl FlexibleArm {
         lent
     }
 
-    /// The same of [`Observer::new`]: `None` where there is none for the tree.
+    /// Returns an observer workspace in the same way; `None` if [`Observer::new`] supports no such
+    /// tree.
     pub fn lend_observer(&self) -> Option<Lent<Observer>> {
         let shelf = self.workspaces.are_for(&self.model).then_some(&self.workspaces.observers);
         Lent::from(shelf, || Observer::new(&self.model))
     }
 
-    /// The same of [`FreeForces::new`].
+    /// Returns a workspace of [`FreeForces::new`] in the same way.
     pub(crate) fn lend_points(&self, roles: &Roles) -> Option<Lent<FreeForces>> {
-        // Of the springs alone: which joints are driven by torque may change from arm to arm.
+        // Only if all free coordinates are elastic: the joints driven by torque may differ between
+        // copies.
         let held = roles.free_coordinates().first().is_none_or(|first| *first >= self.model.n_actuated());
         let shelf = (held && self.workspaces.are_for(&self.model)).then_some(&self.workspaces.points);
         Lent::from(shelf, || FreeForces::new(&*self.model, roles))
     }
 }
 
-/// A workspace on loan; dropping it gives it back.
+/// A borrowed workspace; dropping it returns it to the pool.
 pub struct Lent<T> {
-    /// There until it is given back.
+    /// `Some` until it is returned.
     it: Option<T>,
     shelf: Option<Shelf<T>>,
 }
@@ -80,7 +82,7 @@ impl<T> Lent<T> {
         Some(Self { it: Some(it), shelf: shelf.cloned() })
     }
 
-    /// It will not be given back: what stands in it is no longer that of the arm.
+    /// Keeps the workspace out of the pool, because its contents no longer match the arm.
     pub fn keep(&mut self) {
         self.shelf = None;
     }
@@ -104,7 +106,7 @@ impl<T> DerefMut for Lent<T> {
 
 impl<T> Drop for Lent<T> {
     fn drop(&mut self) {
-        // After a panic nobody knows what stands in it.
+        // After a panic the contents are undefined: drop the workspace.
         if let (Some(it), Some(shelf), false) = (self.it.take(), &self.shelf, std::thread::panicking()) {
             shelf.lock().unwrap_or_else(PoisonError::into_inner).push(it);
         }

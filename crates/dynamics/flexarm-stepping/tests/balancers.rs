@@ -1,5 +1,4 @@
-//! Balancers in motion: every stepper against the others, statics, modes and lanes, the energy that
-//! they store.
+//! Balancers in motion: steppers against each other, statics, modes and lanes, stored energy.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
@@ -15,8 +14,8 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 const POSE: [f64; 6] = [0.4, 0.5, -0.3, 0.7, 0.6, -1.2];
 
-/// The reference arm with a gas cylinder from the column to the far part of its lower arm, and
-/// torques over two joints.
+/// Returns the reference arm with a gas cylinder from the column to the distal part of its lower
+/// arm, and torque balancers at two joints.
 fn balanced() -> Mechanism {
     let mut tree = reference_arm(true).mechanism;
     for (link, frame, place) in
@@ -49,12 +48,13 @@ fn moving() -> Arc<dyn PrescribedMotion> {
     }))
 }
 
-/// Place of the TCP at the end of a run.
+/// Returns the position of the TCP at the end of a run.
 fn end(arm: &FlexibleArm, kind: StepperKind, h: f64, start: Start, duration: f64) -> Vector3<f64> {
     end_of(arm, kind, h, start, duration).0
 }
 
-/// The same, the energy of weight and balancers there (J), and what the drives hold (N m).
+/// Returns the same, the potential energy of weight and balancers there (J), and the drive torques
+/// (N m).
 fn end_of(
     arm: &FlexibleArm,
     kind: StepperKind,
@@ -75,9 +75,9 @@ fn of(word: &str) -> StepperKind {
     (entry.with)(&StepperOptions::default())
 }
 
-/// Truth: Newton's statics with the balancers in forces and tangent. Maximal coordinates know
-/// bodies and wrenches only, so SPOOK finds the same rest by another way; drift measured 9e-11 of
-/// what the balancers do to the sag.
+/// Truth: Newton statics with the balancers in forces and tangent. Maximal coordinates use only
+/// bodies and wrenches, so SPOOK finds the same equilibrium independently; drift measured 9e-11 of
+/// the balancers' effect on the sag.
 #[test]
 fn an_arm_with_balancers_rests_where_statics_say_in_every_stepper() {
     let held: Arc<dyn PrescribedMotion> = Arc::new(Held(POSE.to_vec()));
@@ -100,9 +100,9 @@ fn an_arm_with_balancers_rests_where_statics_say_in_every_stepper() {
     }
 }
 
-/// Truth: the reference stepper on the same equations, and for SPOOK its first order. Differences
-/// over what the balancers change (2.8 mm): measured generalised-alpha and SDIRK3 below 1e-6, RK4
-/// 1.0e-7, SPOOK 2.9e-4 at 0.2 ms and 1.1e-4 at 0.1 ms.
+/// Truth: the reference stepper on the same equations; for SPOOK its first order. Differences
+/// relative to the effect of the balancers (2.8 mm): measured generalised-alpha and SDIRK3 below
+/// 1e-6, RK4 1.0e-7, SPOOK 2.9e-4 at 0.2 ms and 1.1e-4 at 0.1 ms.
 #[test]
 fn steppers_agree_on_an_arm_that_moves_with_balancers() {
     let arm = arm_of(&balanced(), moving(), 1e-3);
@@ -123,8 +123,8 @@ fn steppers_agree_on_an_arm_that_moves_with_balancers() {
     assert!(spook[0] < 5e-3 && spook[1] < 0.6 * spook[0], "{spook:?}");
 }
 
-/// Truth: without damping and with drives that stand still the energy of springs, weight and
-/// balancers stays; RK4 at 25 us, measured 8e-7 of what swings between them.
+/// Truth: without damping and with locked drives the energy of springs, weight and balancers is
+/// conserved; RK4 at 25 us, measured 8e-7 of the energy exchanged between them.
 #[test]
 fn a_ringing_arm_keeps_its_energy_with_balancers_in_it() {
     let arm = arm_of(&balanced(), Arc::new(Held(POSE.to_vec())), 1e-12);
@@ -142,7 +142,7 @@ fn a_ringing_arm_keeps_its_energy_with_balancers_in_it() {
     assert!(gap < 1e-5 * kinetic, "{gap} {kinetic}");
 }
 
-/// Truth: omega² = (k_s + c D k - m g l)/(m l²) of a rod that stands on a soft spring, held by a
+/// Truth: omega² = (k_s + c D k - m g l)/(m l²) of an upright rod on a soft spring, held by a
 /// spring without free length above it.
 #[test]
 fn a_balancer_raises_the_frequency_as_the_closed_form_says() {
@@ -189,7 +189,8 @@ fn compliance_has_the_stiffness_of_the_balancers_in_it() {
     }
 }
 
-/// Lanes do not know balancers: such runs are taken one by one, to the bit as alone.
+/// Lanes do not support balancers: such runs are computed individually, with bitwise the same
+/// results.
 #[test]
 fn runs_with_balancers_side_by_side_are_those_alone() {
     let runs: Vec<BatchRun> = [1e-3, 2e-3]

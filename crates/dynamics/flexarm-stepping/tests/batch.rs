@@ -1,4 +1,4 @@
-//! Many runs of one tree side by side against the same runs alone.
+//! Runs of one tree in parallel lanes against the same runs computed individually.
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
@@ -9,7 +9,7 @@ use flexarm_stepping::*;
 use flexarm_testkit::{reference_arm, reference_motion};
 use nalgebra::{Matrix3, Vector3};
 
-/// What differs from run to run.
+/// Parameters that differ from run to run.
 #[derive(Clone, Copy)]
 struct Variation {
     speed: f64,
@@ -85,8 +85,9 @@ fn varied() -> Vec<BatchRun> {
     variations.map(run).to_vec()
 }
 
-/// Truth: the run alone. Payload, speed, stiffness, damping and duration differ, and the last group
-/// is not full; at 20 ms all iterate to the end, at 2 ms most steps take one evaluation.
+/// Truth: the individual run. Payload, speed, stiffness, damping and duration differ, and the last
+/// group is not full; at 20 ms all runs iterate to convergence, at 2 ms most steps take one
+/// evaluation.
 #[test]
 fn a_run_side_by_side_with_others_has_the_bits_of_the_run_alone() {
     let runs = varied();
@@ -109,7 +110,7 @@ fn damping_ratios_and_other_settings_have_the_bits_of_the_run_alone() {
     }
 }
 
-/// A group in which one run has loads, and one in which trees differ, is taken one by one.
+/// A group with loads in one run, and one with different trees, is computed run by run.
 #[test]
 fn what_lanes_do_not_know_is_run_alone() {
     let mut runs = varied();
@@ -123,7 +124,7 @@ fn what_lanes_do_not_know_is_run_alone() {
     assert_equal_alone(&batch(5e-3, &runs), &runs);
 }
 
-/// A velocity that rises within a step cuts it in its own run, and leaves the others as they are.
+/// A fast change of velocity within a step subdivides the step of its own run only.
 #[test]
 fn a_step_that_is_cut_in_one_run_is_no_step_of_the_others() {
     let mut runs = varied();

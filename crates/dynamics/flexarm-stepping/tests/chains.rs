@@ -1,5 +1,5 @@
-//! Chains of rigid parts with springs between them: how fast their deflection converges with the
-//! number of parts.
+//! Chains of rigid parts connected by springs: convergence of their deflection with the number of
+//! parts.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 #![allow(non_snake_case, reason = "monogram notation")]
@@ -10,14 +10,13 @@ use flexarm_kinematics::*;
 use flexarm_stepping::*;
 use nalgebra::{Matrix3, Matrix6, Translation3, Vector3, Vector6};
 
-/// Length (m), mass (kg), stiffness EA, GA (N), GJ, EI about y and z (N m²) of a cantilever along
-/// x.
+/// Cantilever along x: length (m), mass (kg), stiffness EA, GA (N), GJ, EI about y and z (N m²).
 const LENGTH: f64 = 1.0;
 const MASS: f64 = 3.0;
 const STIFFNESS: [f64; 6] = [1e7, 1e6, 1e6, 300.0, 250.0, 500.0];
 
-/// The cantilever as n equal parts, a spring in the middle of each; a heavy ball sits beside its
-/// tip and twists it.
+/// Returns the cantilever as n equal parts with a spring in the middle of each; a heavy ball beside
+/// its tip twists it.
 fn cantilever(n: usize, angles: ElasticAngles, gravity: Vector3<f64>, aside: f64) -> FlexibleArm {
     let mut chain = Mechanism::new("cantilever");
     chain.gravity = gravity;
@@ -25,7 +24,7 @@ fn cantilever(n: usize, angles: ElasticAngles, gravity: Vector3<f64>, aside: f64
     let (piece, mass) = (LENGTH / n as f64, MASS / n as f64);
     let mut springs: Vec<Spring> = Vec::new();
     for k in 1..=n {
-        // Between the springs a whole piece, after the last one half of one and the ball.
+        // Between springs a whole part, after the last spring half a part and the ball.
         let last = k == n;
         let (length, mass) = if last { (0.5 * piece, 0.5 * mass) } else { (piece, mass) };
         let mut inertia =
@@ -51,7 +50,7 @@ fn cantilever(n: usize, angles: ElasticAngles, gravity: Vector3<f64>, aside: f64
     FlexibleArm::new(Arc::new(Model::new(&chain).unwrap()), springs, Arc::new(Held(vec![]))).unwrap()
 }
 
-/// Where the tip hangs.
+/// Returns the static position of the tip.
 fn tip(n: usize, angles: ElasticAngles, gravity: Vector3<f64>, aside: f64) -> Vector3<f64> {
     let arm = cantilever(n, angles, gravity, aside);
     let q = static_equilibrium(&arm, 0.0).unwrap();
@@ -61,12 +60,12 @@ fn tip(n: usize, angles: ElasticAngles, gravity: Vector3<f64>, aside: f64) -> Ve
     end * nalgebra::Point3::new(0.5 * LENGTH / n as f64, 0.0, 0.0) - nalgebra::Point3::origin()
 }
 
-/// Truth: both kinds of angles have one limit, that of the rotation vectors by Richardson's
-/// extrapolation. Bent about both axes and twisted, by 37 mm, a chain with rotation vectors
-/// converges with the square of the number of parts; what Euler angles add falls with the number
-/// alone: `½ φᵀKφ` in angles about axes that turn one after the other changes in third order when
-/// the ends of the spring are exchanged, so that n springs bent by 1/n keep an error of
-/// `n · n · 1/n³`. In a plane the two are the same.
+/// Truth: both kinds of angles have the same limit, obtained from the rotation vectors by
+/// Richardson extrapolation. Bent about both axes and twisted, by 37 mm, a chain with rotation
+/// vectors converges with the square of the number of parts. The additional error of Euler angles
+/// decreases only linearly: `½ φᵀKφ` in angles about successive axes changes in third order when
+/// the ends of the spring are exchanged, so that n springs with angles of order 1/n keep an error
+/// of `n · n · 1/n³`. In a plane the two are the same.
 #[test]
 fn chains_converge_with_the_square_of_their_parts_unless_with_euler_angles() {
     use ElasticAngles::{EulerZyx, RotationVector};
@@ -76,7 +75,7 @@ fn chains_converge_with_the_square_of_their_parts_unless_with_euler_angles() {
     let truth = fine + (fine - coarse) / 3.0;
     let errors = |angles| [8, 16, 32].map(|n| (at(n, angles) - truth).norm());
     let (vector, euler) = (errors(RotationVector), errors(EulerZyx));
-    // What the angles add.
+    // Additional error of the Euler angles.
     let added = [0, 1, 2].map(|k| euler[k] - vector[k]);
     let order = |e: [f64; 3]| (e[1] / e[2]).log2();
     eprintln!("bent by {:.3} m: rotation vectors {vector:?}, Euler angles {euler:?}", (truth - Vector3::x()).norm());
@@ -84,7 +83,7 @@ fn chains_converge_with_the_square_of_their_parts_unless_with_euler_angles() {
     // measured 2.000 and 0.921
     assert!((order(vector) - 2.0).abs() < 0.05, "{vector:?}");
     assert!((order(added) - 1.0).abs() < 0.2, "{added:?}");
-    // In a plane there is one angle, the same for both.
+    // In a plane there is one angle, identical for both.
     for n in [4, 16] {
         let apart = (tip(n, EulerZyx, down, 0.0) - tip(n, RotationVector, down, 0.0)).norm();
         assert!(apart < 1e-12, "{apart}");

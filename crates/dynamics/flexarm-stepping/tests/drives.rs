@@ -1,4 +1,4 @@
-//! Servos, friction, gearboxes with play, loads and payloads that change, against closed forms.
+//! Servos, friction, gearboxes with backlash, loads and payload changes, against closed forms.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
@@ -16,10 +16,10 @@ fn reference(rtol: f64) -> StepperKind {
     StepperKind::Reference(ReferenceSettings::new(rtol))
 }
 
-/// A body on a vertical axis: inertia J about it (and mass 1 at the axis), in no gravity.
+/// Inertia J of a body on a vertical axis (mass 1 at the axis), without gravity.
 const J: f64 = 0.8;
 
-/// `spring`: stiffness of a gearbox with a rotor of that armature before it.
+/// `spring`: stiffness of a gearbox, with a rotor of the given armature on its motor side.
 fn rotor(spring: Option<f64>, armature: f64) -> Mechanism {
     let mut rotor = Mechanism::new("rotor");
     rotor.gravity = Vector3::zeros();
@@ -45,7 +45,7 @@ fn rotor(spring: Option<f64>, armature: f64) -> Mechanism {
     rotor
 }
 
-/// The rotor alone or with a spring that is not damped.
+/// Returns the rotor, optionally with an undamped spring.
 fn arm(mechanism: &Mechanism, spring: Option<f64>, motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
     let model = Arc::new(Model::new(mechanism).expect("a tree"));
     let damping = Damping::StiffnessProportional(0.0);
@@ -73,12 +73,12 @@ fn servo(sample_s: f64, axis: ServoAxis) -> Servo {
     Servo { sample_s, axes: vec![axis], rigid }
 }
 
-/// One joint that moves as `f(t)` = position, speed, acceleration.
+/// Motion of one joint; `f(t)` returns position, speed, acceleration.
 fn motion(f: impl Fn(f64) -> [f64; 3] + Send + Sync + 'static) -> Arc<dyn PrescribedMotion> {
     Arc::new(MotionFn(move |t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| [q[0], v[0], a[0]] = f(t)))
 }
 
-/// Observations at every step.
+/// Returns the observations at every step.
 fn run(arm: &FlexibleArm, kind: StepperKind, h: f64, duration: f64) -> Vec<Observation> {
     let mut stepper = new_stepper(kind, arm.clone(), h, Start::Undeformed).expect("starts");
     let mut seen = Observation::new(arm);
@@ -94,10 +94,9 @@ fn run(arm: &FlexibleArm, kind: StepperKind, h: f64, duration: f64) -> Vec<Obser
 }
 
 // --- Servo
-// -------------------------------------------------------------------------------------------------------------
 
-/// A pendulum driven by torque follows its reference; with the rigid robot's torque fed forward it
-/// does so far better.
+/// A pendulum driven by torque follows its reference, much better with feed-forward of the rigid
+/// robot's torque.
 ///
 /// Measured: 6.5e-3 rad of 1.2, with feed-forward 1.6e-5, in all steppers.
 #[test]
@@ -127,7 +126,7 @@ fn pendulum_follows_its_reference() {
     assert!(spread < 0.02, "{errors:?}");
 }
 
-/// The loop written down by itself: exact zero-order hold of `J q̈ + b q̇ = τ`.
+/// Independent implementation of the loop: exact zero-order hold of `J q̈ + b q̇ = τ`.
 fn sampled_loop(
     axis: ServoAxis,
     sample_s: f64,
@@ -143,7 +142,7 @@ fn sampled_loop(
         let [q_ref, v_ref, a_ref] = path(n as f64 * sample_s);
         let error = v_ref + axis.position_gain * (q_ref - q) - v;
         let ahead = if axis.feed_forward { J * a_ref + b * v_ref } else { 0.0 };
-        // At the start the integral is what is missing of the torque of the reference motion.
+        // The initial integral supplies the rest of the torque of the reference motion.
         let first = if axis.integral_gain > 0.0 { J * a0 + b * v - ahead - axis.velocity_gain * error } else { 0.0 };
         let I = *integral.get_or_insert(first);
         let wanted = axis.velocity_gain * error + I + ahead;
@@ -206,11 +205,11 @@ fn sampled_controller_equals_its_discrete_loop() {
     }
 }
 
-/// A step of the reference that the torque limit cannot follow: the torque stays within, and the
-/// integral does not wind up.
+/// A step of the reference that exceeds the torque limit: the torque stays within the limit, and
+/// the integral does not wind up.
 ///
-/// Truth: the loop by itself, which RK4 equals to 1.4e-11. It does not overshoot, as without an
-/// integral; with one that runs on at the limit it overshoots by 1.85 rad.
+/// Truth: the independent loop, which RK4 matches to 1.4e-11. It does not overshoot, just as
+/// without an integral; with an integral that continues at the limit it overshoots by 1.85 rad.
 #[test]
 fn torque_limit_saturates_without_winding_up() {
     let target = |t: f64| [if t < 0.1 - 1e-9 { 0.0 } else { 2.0 }, 0.0, 0.0];
@@ -237,12 +236,11 @@ fn torque_limit_saturates_without_winding_up() {
 }
 
 // --- Friction
-// ----------------------------------------------------------------------------------------------------------
 
-/// Truth: `J ω̇ = -b ω - c`: ω(t) and rest at `t = J/b ln(1 + b ω_0/c)`.
+/// Truth: `J ω̇ = -b ω - c`: ω(t), and standstill at `t = J/b ln(1 + b ω_0/c)`.
 ///
-/// Measured: speeds within 0.48 v_0 of the sharp law for `v_0` of 0.1, 0.02, 0.004 rad/s; below v_0
-/// 136, 27, 5 ms before the rest.
+/// Measured: speeds within 0.48 v_0 of the discontinuous law for `v_0` of 0.1, 0.02, 0.004 rad/s;
+/// below v_0 136, 27, 5 ms before standstill.
 #[test]
 fn coasting_rotor_stops_when_its_friction_says() {
     let (b, c, w0) = (0.2, 0.5, 6.0);
@@ -269,11 +267,10 @@ fn coasting_rotor_stops_when_its_friction_says() {
 }
 
 // --- Gearboxes
-// ---------------------------------------------------------------------------------------------------------
 
 const GEAR: f64 = 900.0;
 
-/// A constant moment on the body behind a held gearbox with that curve.
+/// Returns an arm with a constant moment on the body behind a held gearbox with the given curve.
 fn loaded(curve: Option<TorqueCurve>, moment: f64) -> FlexibleArm {
     let model = Arc::new(Model::new(&rotor(Some(GEAR), 0.0)).expect("a tree"));
     let body = model.frame("body").expect("there").body;
@@ -283,8 +280,8 @@ fn loaded(curve: Option<TorqueCurve>, moment: f64) -> FlexibleArm {
     arm.with_loads(vec![(body, Wrench::new(Vector3::zeros(), Vector3::z() * moment))]).expect("valid")
 }
 
-/// Time of the first return to rest at the start, by the rates; and the largest relative change of
-/// the energy.
+/// Returns the time of the first return to rest at the start, from the rates, and the maximum
+/// relative change of the energy.
 fn period(arm: &FlexibleArm, moment: f64, kind: StepperKind, h: f64, duration: f64) -> (f64, f64, f64) {
     let seen = run(arm, kind, h, duration);
     let mut found = f64::NAN;
@@ -301,11 +298,11 @@ fn period(arm: &FlexibleArm, moment: f64, kind: StepperKind, h: f64, duration: f
     (found, drift, top)
 }
 
-/// Truth: statics `e = ±(half + M/k)`: between the two signs of a vanishing moment lie 2 half.
-/// Measured: equal to rounding.
+/// Truth: statics `e = ±(half + M/k)`: for the two signs of a vanishing moment the deflections
+/// differ by 2 half. Measured: equal to round-off.
 ///
-/// Newton crept out of the play by M/k at a time and gave up where that was less than a thirtieth
-/// of it.
+/// Regression: Newton's method left the backlash in steps of M/k and failed where M/k was less than
+/// a thirtieth of it.
 #[test]
 fn backlash_is_a_free_play_of_twice_its_half() {
     let half = 0.01;
@@ -317,7 +314,8 @@ fn backlash_is_a_free_play_of_twice_its_half() {
     }
 }
 
-/// Truth: free fall through the play, then a sine: period in closed form; energy is kept.
+/// Truth: constant acceleration through the backlash, then a sine: period in closed form; energy is
+/// conserved.
 ///
 /// Measured: period 3e-9 (RK4, 0.02 ms), 8e-7 (generalised-alpha, 0.1 ms), 1e-8 (reference, rtol
 /// 1e-9); energy 2e-8, 2e-6, 5e-8.
@@ -380,7 +378,7 @@ fn period_on_a_curved_spring_is_that_of_the_quadrature() {
     }
 }
 
-/// A half sine of moment on the body for `T`.
+/// Returns a half sine of moment on the body for the time `T`.
 fn pulse(body: usize, peak: f64, T: f64) -> Load {
     let wrench = move |t: f64| {
         let m = if t < T { peak * (PI * t / T).sin() } else { 0.0 };
@@ -389,8 +387,8 @@ fn pulse(body: usize, peak: f64, T: f64) -> Load {
     Load::at_origin(body, TimedWrench::new(wrench))
 }
 
-/// Motor and body, free, with a spring between: after an impulse on the body the momentum is the
-/// impulse, and both swing with `ω² = k (1/J_1 + 1/J_2)`. Measured: frequency 4e-9
+/// Motor and body, free, connected by a spring: after an impulse on the body the momentum equals
+/// the impulse, and both oscillate with `ω² = k (1/J_1 + 1/J_2)`. Measured: frequency 4e-9
 /// (generalised-alpha, 0.5 ms), 2e-11 (RK4).
 #[test]
 fn free_motor_behind_a_spring_swings_as_two_masses() {
@@ -401,7 +399,7 @@ fn free_motor_behind_a_spring_swings_as_two_masses() {
         arm.with_servo(servo(100.0, IDLE)).expect("valid").with_timed_loads(vec![pulse(body, peak, T)]).expect("valid");
     let truth = (GEAR * (1.0 / J_1 + 1.0 / J)).sqrt() / TAU;
     let impulse = peak * T * 2.0 / PI;
-    // The half sine by the trapezoidal rule: (π h/T)²/12 too little.
+    // The trapezoidal rule underestimates the half sine by (π h/T)²/12.
     let rule = |h: f64| 1.1 * (PI * h / T).powi(2) / 12.0;
     for (kind, h, bound) in [(StepperKind::Rk4, 1e-4, 1e-9), (ALPHA, 5e-4, rule(5e-4)), (reference(1e-9), 1e-3, 1e-6)] {
         let seen = run(&arm, kind, h, 2.0);
@@ -419,7 +417,7 @@ fn free_motor_behind_a_spring_swings_as_two_masses() {
     }
 }
 
-/// Truth: `τ = (J + armature) q̈` of a driven joint; kinetic energy alike.
+/// Truth: `τ = (J + armature) q̈` of a driven joint; kinetic energy likewise.
 #[test]
 fn rotor_adds_to_the_torque_of_the_joint() {
     let path = || motion(|t| [t * t, 2.0 * t, 2.0]);
@@ -433,8 +431,8 @@ fn rotor_adds_to_the_torque_of_the_joint() {
     }
 }
 
-/// A light motor behind its spring swings faster than the arm with its drives locked: RK4 refuses a
-/// step that is too long for it.
+/// A light motor with its spring oscillates faster than the arm with its drives locked: RK4 refuses
+/// a step that is too large for it.
 ///
 /// Truth: `h ω = 2.78` with `ω² = k (1/J_1 + 1/J_2)`.
 #[test]
@@ -449,7 +447,7 @@ fn explicit_step_must_follow_the_free_motor() {
     assert!(matches!(error, StepError::UnstableStep { .. }), "{error}");
 }
 
-/// A joint driven by torque with nothing before its spring cannot be solved for, and says so.
+/// A joint driven by torque without inertia on the motor side of its spring is refused.
 #[test]
 fn massless_motor_before_a_spring_is_refused() {
     let arm = arm(&rotor(Some(GEAR), 0.0), Some(GEAR), Arc::new(Held(vec![0.0])));
@@ -458,9 +456,9 @@ fn massless_motor_before_a_spring_is_refused() {
 }
 
 // --- Loads
-// -------------------------------------------------------------------------------------------------------------
 
-/// A body of 7 kg on a six-DoF spring with coupling; its tool frame is off its centre of mass.
+/// Returns a body of 7 kg on a six-DoF spring with coupling; its tool frame is off its centre of
+/// mass.
 fn sprung_body(gravity: Vector3<f64>) -> FlexibleArm {
     let mut beam = Mechanism::new("beam");
     beam.gravity = gravity;
@@ -480,8 +478,9 @@ fn sprung_body(gravity: Vector3<f64>) -> FlexibleArm {
 /// Truth: `(K + i p D - p² M)⁻¹ F` of all six coordinates, `D = 2 M + 0.001 K`, below, at and above
 /// the first modes.
 ///
-/// Measured, of the amplitude: RK4 7e-6 (of second order in the deflection), generalised-alpha
-/// 1.7e-4 with 200 steps a cycle, reference stepper at 1e-8 8e-5 (its smallest absolute tolerance).
+/// Measured, relative to the amplitude: RK4 7e-6 (second order in the deflection),
+/// generalised-alpha 1.7e-4 with 200 steps per cycle, reference stepper at 1e-8 8e-5 (its smallest
+/// absolute tolerance).
 #[test]
 fn harmonic_force_swings_the_tip_as_the_frequency_response_says() {
     let arm = sprung_body(Vector3::zeros());
@@ -522,11 +521,11 @@ fn harmonic_force_swings_the_tip_as_the_frequency_response_says() {
     }
 }
 
-/// A short pulse of force: the momentum right after it is its integral, in world axes; the moment
-/// arm counts too.
+/// A short pulse of force: the momentum immediately after it is its integral, in world axes,
+/// including the moment of the lever arm.
 ///
-/// Measured: RK4 4e-5 (what the spring has done meanwhile), generalised-alpha 2.1e-3, the
-/// trapezoidal rule of 20 steps.
+/// Measured: RK4 4e-5 (due to the spring force during the pulse), generalised-alpha 2.1e-3, the
+/// trapezoidal rule with 20 steps.
 #[test]
 fn impulse_changes_the_momentum_by_its_integral() {
     let arm = sprung_body(Vector3::zeros());
@@ -552,8 +551,8 @@ fn impulse_changes_the_momentum_by_its_integral() {
     }
 }
 
-/// Truth: moments about the axis. A load in frame axes keeps its lever as the body turns, one in
-/// world axes does not.
+/// Truth: moments about the axis. A load in frame axes keeps its lever arm as the body rotates, one
+/// in world axes does not.
 #[test]
 fn load_in_frame_axes_turns_along() {
     let path = || motion(|t| [2.0 * t, 2.0, 0.0]);
@@ -572,14 +571,13 @@ fn load_in_frame_axes_turns_along() {
             };
             let truth = lever.cross(&force).z * (1.0 + o.t) + 0.3;
             assert!((o.drive[0] + truth).abs() < 1e-12, "{axes:?} {} {truth}", o.t);
-            // Power of the load: moment times the turning speed.
+            // Power of the load: moment times angular velocity.
             assert!((o.power[1] - 2.0 * truth).abs() < 1e-12, "{axes:?} {:?}", o.power);
         }
     }
 }
 
 // --- Payloads
-// ----------------------------------------------------------------------------------------------------------
 
 /// The reference arm with rotors, which keep the sampled loops of a light wrist stable.
 fn geared(elastic: bool) -> flexarm_testkit::ReferenceArm {
@@ -591,7 +589,7 @@ fn geared(elastic: bool) -> flexarm_testkit::ReferenceArm {
     reference
 }
 
-/// The reference arm, held, that lets its tool (20 of 23 kg) go at `t`.
+/// Returns the reference arm, held, that releases its tool (20 of 23 kg) at `t`.
 fn dropping_arm(t: f64, beta: f64, motion: Arc<dyn PrescribedMotion>) -> (FlexibleArm, FlexibleArm) {
     let reference = geared(true);
     let model = Arc::new(Model::new(&reference.mechanism).expect("valid"));
@@ -605,8 +603,8 @@ fn dropping_arm(t: f64, beta: f64, motion: Arc<dyn PrescribedMotion>) -> (Flexib
     (arm, FlexibleArm::new(light, springs, motion).expect("valid"))
 }
 
-/// Truth: before the drop the static pose with the payload, at the end that without; drives and
-/// energy alike. Measured: 1e-15.
+/// Truth: before the drop the static pose with the payload, at the end the pose without it;
+/// likewise drives and energy. Measured: 1e-15.
 #[test]
 fn arm_that_drops_its_payload_comes_to_rest_in_the_new_static_pose() {
     let (arm, light) = dropping_arm(0.1, 1e-2, Arc::new(Held(vec![0.4, 0.5, -0.3, 0.7, 0.6, -1.2])));
@@ -639,8 +637,8 @@ fn arm_that_drops_its_payload_comes_to_rest_in_the_new_static_pose() {
     }
 }
 
-/// Ringing about the new static pose: the mean of an arm that is hardly damped, over many periods;
-/// measured 5.8e-4 of the jump.
+/// Ringing about the new static pose: mean over many periods of an almost undamped arm; measured
+/// 5.8e-4 of the jump.
 #[test]
 fn ringing_after_the_drop_has_the_new_static_pose_as_its_mean() {
     let (arm, light) = dropping_arm(0.05, 2e-5, Arc::new(Held(vec![0.4, 0.5, -0.3, 0.7, 0.6, -1.2])));
@@ -666,12 +664,12 @@ fn run_from(arm: &FlexibleArm, kind: StepperKind, h: f64, duration: f64) -> Vec<
     all
 }
 
-/// Samples of the servo and a drop of payload during the motion: the reference stepper, which
-/// chooses its steps, lands on them. Measured, at 1e-9 against: RK4 at 0.1 ms 3.4e-11,
+/// Samples of the servo and a payload drop during the motion: the reference stepper, which chooses
+/// its own steps, ends steps there. Measured against it at 1e-9: RK4 at 0.1 ms 3.4e-11,
 /// generalised-alpha 2.3e-6, 6.1e-7, 1.6e-7 m or rad at 1, 0.5, 0.25 ms.
 ///
-/// A sample that was a rounding later than the point at which it is taken was met twice, and the
-/// solver refused.
+/// Regression: a sample that was a rounding error later than its point was met twice, and the
+/// solver failed.
 #[test]
 fn reference_stepper_and_generalised_alpha_agree_over_events() {
     let path: Arc<dyn PrescribedMotion> = Arc::new(MotionFn(|t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| {
@@ -715,11 +713,10 @@ fn reference_stepper_and_generalised_alpha_agree_over_events() {
     assert!(errors[0] < 5e-6 && (order - 2.0).abs() < 0.2, "{errors:?} {order}");
 }
 
-// --- What a stepper might not see
-// --------------------------------------------------------------------------------------
+// --- Short and fast loads
 
-/// A free rotor at rest: long steps see neither a short pulse, nor a sine whose periods they are
-/// multiples of.
+/// A free rotor at rest: long steps would miss a short pulse, and a sine if they are multiples of
+/// its period.
 ///
 /// Truth: the integral of the moment over the inertia.
 #[test]
@@ -733,7 +730,7 @@ fn the_reference_stepper_sees_short_loads_and_fast_ones() {
     let pulse = pulse.with_jumps([0.0, 0.137, 0.5, 0.863, 1.0].iter().map(|s| start + s * T).collect());
     let sine = TimedWrench::new(move |t| moment(if t >= 1.0 { 30.0 * (TAU * 50.0 * (t - 1.0)).sin() } else { 0.0 }));
     let sine = sine.with_jumps(vec![1.0]).with_period(0.02);
-    // The sine: after a whole period at rest again, on the way at most twice its amplitude over J
+    // The sine: at rest again after a whole period, in between at most twice its amplitude over J
     // omega.
     for (wrench, truth) in [(pulse, 30.0 * T * 2.0 / PI / J), (sine, 2.0 * 30.0 / (J * TAU * 50.0))] {
         let arm = arm.clone().with_timed_loads(vec![Load::at_origin(1, wrench)]).expect("valid");
@@ -745,8 +742,8 @@ fn the_reference_stepper_sees_short_loads_and_fast_ones() {
     }
 }
 
-/// A load that is infinite at an instant ends the run; it used to go on with positions that were no
-/// numbers.
+/// A load that is infinite at one time stops the run; it used to continue with positions that were
+/// NaN.
 #[test]
 fn a_load_that_is_no_number_stops_the_run() {
     let arm = arm(&rotor(Some(GEAR), 0.5), Some(GEAR), Arc::new(Held(vec![0.0])));

@@ -1,4 +1,4 @@
-//! Long chains: matrices on a tree and their elimination, beside the dense ones.
+//! Long chains: matrices on a tree and their elimination, compared with dense ones.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 #![allow(non_snake_case, reason = "monogram notation")]
@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;
 
-/// Chains of so many joints in two links and a branch, moved along all joints.
+/// Returns chains with `joints` joints in two links and a branch, with a motion of all joints.
 fn arm(joints: usize, branch: usize, angles: ElasticAngles, damping: impl Fn(usize) -> Damping) -> FlexibleArm {
     let chains = chain_arm(joints, branch, angles);
     let model = Arc::new(Model::new(&chains.mechanism).unwrap());
@@ -32,7 +32,7 @@ fn arm(joints: usize, branch: usize, angles: ElasticAngles, damping: impl Fn(usi
     FlexibleArm::new::<(String, nalgebra::Matrix6<f64>, Damping)>(model, springs, Arc::new(motion)).unwrap()
 }
 
-/// The same system, which does not say that it sits on a tree.
+/// The same system without its tree structure.
 struct Dense(ReducedArm);
 
 impl SecondOrderSystem for Dense {
@@ -89,9 +89,9 @@ fn far(found: &DMatrix<f64>, truth: &DMatrix<f64>) -> f64 {
     (found - truth).amax() / truth.amax()
 }
 
-/// Truth: mass matrix by composite rigid bodies, damping and stiffness as they are assembled. Bent
-/// by up to 0.5 rad, with a branch, on joints that slide and turn, both kinds of angles, dampers in
-/// proportion and not. Measured: 3e-15.
+/// Truth: mass matrix by composite rigid bodies, damping and stiffness as assembled. Deflected by
+/// up to 0.5 rad, with a branch, prismatic and revolute joints, both kinds of angles, proportional
+/// and other dampers. Measured: 3e-15.
 #[test]
 fn an_arm_of_chains_has_on_its_tree_the_same_matrices() {
     for (joints, branch, angles) in [
@@ -128,8 +128,8 @@ fn an_arm_of_chains_has_on_its_tree_the_same_matrices() {
     }
 }
 
-/// Steps of one integrator on the arm as it is and on the dense one: largest distance over the
-/// peak, and both counts.
+/// Runs one integrator on the arm with its tree and on the dense one; returns the maximum distance
+/// relative to the peak, and both counts.
 fn compared<I: Integrator>(
     arm: &FlexibleArm,
     (h, steps): (f64, usize),
@@ -148,7 +148,7 @@ fn compared<I: Integrator>(
     (far / peak, [a.counts(), b.counts()])
 }
 
-/// Either system, to start an integrator with.
+/// Either system, to start an integrator.
 trait Beginning {
     fn alpha(&mut self, h: f64, settings: AlphaSettings, x: DVector<f64>) -> GeneralizedAlpha;
     fn sdirk3(&mut self, h: f64, x: DVector<f64>) -> Sdirk3;
@@ -166,9 +166,9 @@ impl<S: SecondOrderSystem> Beginning for S {
 }
 
 /// Truth: the dense matrices of the same system. Chains of 2 to 31 joints with a branch, every
-/// spectral radius, with and without correction, lightly and strongly damped (modes that swing and
-/// that creep), in proportion and not. Measured: 7e-11 at rho 0 and 31 joints, 7e-12 elsewhere; the
-/// same iterations and factorisations.
+/// spectral radius, with and without correction, lightly and strongly damped (oscillating and
+/// overdamped modes), proportional damping and other. Measured: 7e-11 at rho 0 and 31 joints, 7e-12
+/// elsewhere; the same iterations and factorisations.
 #[test]
 fn a_run_along_the_tree_is_the_dense_run() {
     let proportional: fn(f64) -> Damping = Damping::StiffnessProportional;
@@ -189,7 +189,7 @@ fn a_run_along_the_tree_is_the_dense_run() {
         eprintln!("{joints} joints, sdirk3: {far:.1e}, {tree:?}");
         assert!(far < 1e-9 && tree == dense, "{far:e}");
     }
-    // What is not in proportion to the stiffness, or not in one.
+    // Damping that is not proportional to the stiffness, or with different factors.
     let dampings: [fn(usize) -> Damping; 3] = [
         |k| Damping::Dampers([300.0 + k as f64, 200.0, 200.0, 3.0, 2.0, 2.0]),
         |k| Damping::StiffnessProportional(1e-4 * (1 + k) as f64),
@@ -207,7 +207,7 @@ fn a_run_along_the_tree_is_the_dense_run() {
     }
 }
 
-/// Matrices that are taken anew included.
+/// Including renewals of the matrices.
 #[test]
 fn steps_of_chains_do_not_allocate() {
     let arm = arm(8, 2, ElasticAngles::RotationVector, |_| Damping::StiffnessProportional(1e-3));

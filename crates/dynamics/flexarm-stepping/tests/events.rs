@@ -1,5 +1,4 @@
-//! What happens at discrete times: payloads, loads that start between steps, velocities that jump,
-//! steps that fail.
+//! Discrete events: payload changes, loads that start between steps, velocity jumps, failing steps.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
@@ -18,14 +17,14 @@ fn reference() -> StepperKind {
     StepperKind::Reference(ReferenceSettings::new(1e-9))
 }
 
-/// Every stepper of the registry with its default settings; `maximal`: those in maximal coordinates
-/// too.
+/// Returns every stepper of the registry with its default settings; `maximal`: including those in
+/// maximal coordinates.
 fn registered(maximal: bool) -> impl Iterator<Item = StepperKind> {
     let entries = STEPPERS.into_iter().filter(move |entry| maximal || !entry.maximal);
     entries.map(|entry| (entry.with)(&StepperOptions::default()))
 }
 
-/// Whether its errors at 1 ms are far below those of an implicit method of second order.
+/// Returns whether the errors at 1 ms are far below those of an implicit method of second order.
 fn is_fine(kind: &StepperKind) -> bool {
     kind.entry().steps != StepRule::AnyLength
 }
@@ -33,10 +32,10 @@ fn is_fine(kind: &StepperKind) -> bool {
 const K: f64 = 4e4;
 const MASS: f64 = 10.0;
 
-/// Joint velocity that is zero, then something else, at one or several times.
+/// Piecewise constant joint velocity, zero at first, that jumps at given times.
 #[derive(Clone)]
 struct Corners {
-    /// (time, velocity from then on).
+    /// Time and the velocity from then on.
     corners: Vec<(f64, f64)>,
 }
 
@@ -56,7 +55,7 @@ impl PrescribedMotion for Corners {
     }
 }
 
-/// A slide along x that carries a body on a 6x6 spring, in no gravity unless given.
+/// Returns a slide along x with a body on a 6x6 spring, and gravity if given.
 fn slide(motion: Arc<dyn PrescribedMotion>, gravity: f64, damping: Damping) -> FlexibleArm {
     let mut slide = Mechanism::new("slide");
     slide.gravity = -Vector3::z() * gravity;
@@ -82,7 +81,7 @@ fn held() -> Arc<dyn PrescribedMotion> {
     Arc::new(Held(vec![0.0]))
 }
 
-/// Largest distance of an elastic coordinate from `truth(t)` at the steps.
+/// Returns the maximum distance of elastic coordinate `k` from `truth(t)` at the steps.
 fn error(arm: &FlexibleArm, kind: StepperKind, h: f64, duration: f64, k: usize, truth: impl Fn(f64) -> f64) -> f64 {
     let mut stepper = new_stepper(kind, arm.clone(), h, Start::Equilibrium).unwrap();
     let mut seen = Observation::new(arm);
@@ -103,11 +102,11 @@ fn pick_up(t: f64, mass: f64, damping: Damping) -> FlexibleArm {
     arm
 }
 
-/// Truth: the closed form of a mass that is hung on a spring at rest. The time of the event is on
-/// the steps and between them. With the matrix of the empty arm the iteration of the next step
+/// Truth: closed form of a mass that is attached to a spring at rest. The time of the event is at
+/// the end of a step or within one. With the matrix of the empty arm the iteration of the next step
 /// diverged.
 ///
-/// Measured, of the sag: generalised-alpha 2.5e-5, RK4 3.7e-8, reference 8.4e-8.
+/// Measured, relative to the sag: generalised-alpha 2.5e-5, RK4 3.7e-8, reference 8.4e-8.
 #[test]
 fn an_arm_that_picks_up_fifty_times_its_mass_swings_about_the_new_sag() {
     let (heavy, g) = (50.0 * MASS, 9.81);
@@ -125,21 +124,21 @@ fn an_arm_that_picks_up_fifty_times_its_mass_swings_about_the_new_sag() {
     }
 }
 
-/// A payload that is there from the start is part of the equilibrium in which the run starts.
-/// Truth: `m g / K`, at rest.
+/// A payload present from the start is part of the initial equilibrium. Truth: `m g / K`, at rest.
 #[test]
 fn a_payload_of_time_zero_hangs_still() {
     let heavy = 7.0 * MASS;
     let arm = pick_up(0.0, heavy, Damping::Modal(0.03));
     for kind in registered(true) {
         let error = error(&arm, kind, 1e-3, 0.1, 2, |_| -heavy * 9.81 / K);
-        // The sag is 0.17 m; from the equilibrium without the payload it would swing by as much.
+        // The sag is 0.17 m; from the equilibrium without payload the arm would oscillate with that
+        // amplitude.
         assert!(error < 1e-6, "{} {error}", kind.name());
     }
 }
 
-/// Truth: a ratio of modal damping is one of the modes that the arm has: 3 % after the pick-up as
-/// before.
+/// Truth: a modal damping ratio refers to the modes of the current arm: 3 % before and after the
+/// pick-up.
 #[test]
 fn modal_damping_keeps_its_ratio_with_another_payload() {
     let (heavy, g, zeta, at) = (50.0 * MASS, 9.81, 0.03_f64, 0.1);
@@ -155,14 +154,15 @@ fn modal_damping_keeps_its_ratio_with_another_payload() {
     for kind in registered(false) {
         let error = error(&arm, kind, 1e-3, 4.0, 2, truth) / after.abs();
         eprintln!("{:<18} {error:.1e}", kind.name());
-        assert!(error < 2e-4, "{} {error}", kind.name()); // measured 2e-5; with the damping of the empty arm 0.2
+        // measured 2e-5; with the damping of the empty arm 0.2
+        assert!(error < 2e-4, "{} {error}", kind.name());
     }
 }
 
 /// Truth: an oscillator under a force that begins and ends between steps.
 ///
-/// Second order in the step, 16 where the step is a quarter; before, both ends were known to a step
-/// only: first order.
+/// Second order in the step size: a quarter of the step gives a sixteenth of the error. Resolving
+/// both ends only to a step would give first order.
 #[test]
 fn a_load_that_begins_and_ends_between_steps_acts_as_long_as_it_lasts() {
     let (from, to, F) = (0.01034, 0.05271, 300.0);
@@ -187,10 +187,10 @@ fn a_load_that_begins_and_ends_between_steps_acts_as_long_as_it_lasts() {
     }
 }
 
-/// Truth: the base of an oscillator at rest starts with Δv at once; e = -Δv/ω sin ω(t - t_c) for
-/// each corner, added up.
+/// Truth: the base of an oscillator at rest jumps to velocity Δv; e = -Δv/ω sin ω(t - t_c) for each
+/// corner, summed up.
 ///
-/// Corners on the steps, between them, two in one step, and at the start.
+/// Corners at the ends of steps, between them, two in one step, and at the start.
 #[test]
 fn the_base_velocity_jumps_and_the_spring_takes_the_impulse() {
     let corners = vec![(0.0, 0.3), (0.02, -0.5), (0.06037, 1.0), (0.0611, 0.2), (0.1, 0.0)];
@@ -218,12 +218,12 @@ fn the_base_velocity_jumps_and_the_spring_takes_the_impulse() {
     }
 }
 
-/// Truth: the base of an oscillator gets its velocity at a constant acceleration within 3 ms,
-/// between the steps, without a corner being told: `e = -a/ω² (1 - cos ω(t - t_0))` less the same
-/// from the end of the rise on.
+/// Truth: the base of an oscillator reaches its velocity with constant acceleration within 3 ms,
+/// between the steps, without a declared velocity jump: `e = -a/ω² (1 - cos ω(t - t_0))` minus the
+/// same from the end of the acceleration on.
 ///
-/// Measured, of the amplitude of a corner: generalised-alpha 2.6e-5 at 1 ms, 3.9e-4 at 2 ms, SDIRK3
-/// 7.2e-5 and 2.9e-3 (2.1e-2 at 1 ms without steps that are cut), RK4 1.5e-3 at 0.1 ms.
+/// Measured, relative to the amplitude of a corner: generalised-alpha 2.6e-5 at 1 ms, 3.9e-4 at 2
+/// ms, SDIRK3 7.2e-5 and 2.9e-3 (2.1e-2 at 1 ms without subdivided steps), RK4 1.5e-3 at 0.1 ms.
 #[test]
 fn velocities_that_rise_within_a_few_steps_strike_as_hard_as_corners() {
     let (v, from, rise) = (0.5, 0.01034, 0.003);
@@ -247,8 +247,8 @@ fn velocities_that_rise_within_a_few_steps_strike_as_hard_as_corners() {
     }
 }
 
-/// Truth: work of the drive in a blow is what the kinetic energy gains, `m Δv (v + Δv/2)` of the
-/// carriage alone, because the body on the spring keeps its velocity.
+/// Truth: the work of the drive at a velocity jump is the gain of kinetic energy, `m Δv (v + Δv/2)`
+/// of the carriage only, because the body on the spring keeps its velocity.
 #[test]
 fn the_work_of_a_blow_is_the_energy_that_it_brings() {
     let motion = Corners { corners: vec![(0.0105, 0.5), (0.0305, -0.25)] };
@@ -259,13 +259,14 @@ fn the_work_of_a_blow_is_the_energy_that_it_brings() {
         (0..40).for_each(|_| stepper.step().unwrap());
         stepper.observe(&mut seen);
         let truth = 2.0 * (0.5 * 0.5f64.powi(2) + -0.75 * (0.5 - 0.375));
-        assert!((seen.impulse_work - truth).abs() < 1e-12, "{} {}", kind.name(), seen.impulse_work); // measured 1e-16
+        // measured 1e-16
+        assert!((seen.impulse_work - truth).abs() < 1e-12, "{} {}", kind.name(), seen.impulse_work);
     }
 }
 
-/// A force that begins in the middle of a long run, a payload and a corner at one time, and a step
-/// that is longer than the time between them: every stepper comes to the same end as the one with
-/// error control.
+/// A force that begins in the middle of a long run, a payload and a velocity jump at one time, and
+/// a step that is longer than the time between them: every stepper reaches the same final state as
+/// the one with error control.
 #[test]
 fn events_at_one_time_and_events_within_one_step_are_all_met() {
     let motion = Corners { corners: vec![(0.05, 0.4), (0.0503, -0.2), (0.06, 0.0)] };
@@ -298,9 +299,9 @@ fn events_at_one_time_and_events_within_one_step_are_all_met() {
     }
 }
 
-/// A mass between two walls: the force `x / (1 - x²)` has no values beyond them.
+/// A mass between two walls: the force `x / (1 - x²)` is undefined beyond them.
 struct Walls {
-    /// Where the residual was asked for last.
+    /// Position of the last residual.
     x: f64,
 }
 
@@ -336,9 +337,9 @@ impl SecondOrderSystem for Walls {
     }
 }
 
-/// A step that ends beyond a wall has no solution that Newton finds; shorter ones have, and after
-/// the bounce the steps are whole again. Truth: energy, `v²/2 - ln(1 - x²)/2`, and the time, which
-/// stays on the steps.
+/// A step that ends beyond a wall has no solution that Newton's method finds; shorter steps have
+/// one, and after the bounce the steps are complete again. Truth: energy, `v²/2 - ln(1 - x²)/2`,
+/// and the time, which stays on the grid.
 #[test]
 fn a_step_that_fails_is_taken_in_shorter_ones() {
     let settings = AlphaSettings { rho: 1.0, dispersion_correction: false };

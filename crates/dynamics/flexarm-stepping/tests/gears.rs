@@ -1,5 +1,4 @@
-//! Transmission errors, hysteresis, friction under load and gears that move several joints, against
-//! closed forms.
+//! Transmission errors, hysteresis, load-dependent friction and coupled gears against closed forms.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
@@ -12,7 +11,7 @@ use flexarm_stepping::*;
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Vector2, Vector3, vector};
 
 const ALPHA: StepperKind = StepperKind::GeneralizedAlpha(AlphaSettings { rho: 0.9, dispersion_correction: true });
-/// Inertia of a body about the axis (kg m²), stiffness of its gear (N m/rad).
+/// Inertia of a body about the axis (kg m²) and stiffness of its gear (N m/rad).
 const J: f64 = 0.8;
 const K: f64 = 5e4;
 
@@ -20,8 +19,8 @@ fn reference() -> StepperKind {
     StepperKind::Reference(ReferenceSettings::new(1e-9))
 }
 
-/// Bodies one behind the other on the z axis in no gravity, a motor and a spring before each, with
-/// rotors of that armature.
+/// Returns a chain of bodies on the z axis without gravity, with a motor and a spring before each
+/// body and rotors of the given armature.
 fn chain(count: usize, armature: f64) -> Mechanism {
     let mut chain = Mechanism::new("chain");
     chain.gravity = Vector3::zeros();
@@ -59,7 +58,7 @@ fn arm(tree: &Mechanism, damper: f64, motion: Arc<dyn PrescribedMotion>) -> Flex
     FlexibleArm::new(model, springs, motion).expect("valid")
 }
 
-/// One joint that moves as `f(t)` = position, speed, acceleration.
+/// Motion of one joint; `f(t)` returns position, speed, acceleration.
 fn motion(f: impl Fn(f64) -> [f64; 3] + Send + Sync + 'static) -> Arc<dyn PrescribedMotion> {
     Arc::new(MotionFn(move |t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| [q[0], v[0], a[0]] = f(t)))
 }
@@ -78,8 +77,8 @@ fn run(arm: &FlexibleArm, kind: StepperKind, h: f64, duration: f64) -> Vec<Obser
     all
 }
 
-/// Gap between what went in and what is stored or lost, over what went in, drives and loads by the
-/// trapezoidal rule.
+/// Returns the difference between the energy supplied and the energy stored or dissipated, relative
+/// to the energy supplied; drives and loads by the trapezoidal rule.
 fn imbalance(seen: &[Observation]) -> f64 {
     let work =
         |c: usize| -> f64 { seen.windows(2).map(|w| 0.5 * (w[1].t - w[0].t) * (w[0].power[c] + w[1].power[c])).sum() };
@@ -91,7 +90,6 @@ fn imbalance(seen: &[Observation]) -> f64 {
 }
 
 // --- Transmission error
-// ------------------------------------------------------------------------------------------------
 
 fn ripple(cycles: f64, amplitude: f64) -> Vec<TransmissionError> {
     let harmonics = vec![
@@ -135,9 +133,9 @@ fn at_rest_the_joint_is_off_by_the_error_of_its_gear() {
 }
 
 /// Truth: `Y = A √((k² + (d w)²) / ((k - J w²)² + (d w)²))` for the harmonic of frequency w =
-/// cycles Ω, below, at and above the resonance of the joint; in every stepper that knows it.
-/// Measured with 50 steps a period 2.6e-3 at most (generalised-alpha), 2.5e-3 (SDIRK, at resonance,
-/// which its damping takes from), 1.6e-5 (RK4), 2e-8 (reference).
+/// cycles Ω, below, at and above the resonance of the joint; in every stepper that supports it.
+/// Measured with 50 steps per period at most 2.6e-3 (generalised-alpha), 2.5e-3 (SDIRK, at
+/// resonance, which its damping reduces), 1.6e-5 (RK4), 2e-8 (reference).
 #[test]
 fn ripple_drives_the_joint_through_its_resonance_as_a_base_drives_an_oscillator() {
     let (d, A, cycles) = (8.0, 3e-5, 120.0);
@@ -184,7 +182,7 @@ const IDLE: ServoAxis = ServoAxis {
     limit: f64::INFINITY,
 };
 
-/// A motor that turns freely, without torque, from some speed.
+/// Returns an arm whose motor turns freely, without torque, with an initial speed.
 fn coasting(tree: &Mechanism, damper: f64, speed: f64) -> FlexibleArm {
     let mut rigid = Mechanism::new("rigid");
     rigid.links.push(Link { name: "base".into(), inertia: None });
@@ -195,9 +193,9 @@ fn coasting(tree: &Mechanism, damper: f64, speed: f64) -> FlexibleArm {
     arm(tree, damper, motion(move |t| [speed * t, speed, 0.0])).with_servo(servo).unwrap()
 }
 
-/// Truth: nothing goes in, nothing is damped: the energy of a coasting motor with its body stays,
-/// though the ripple exchanges it between them. Measured 2.0e-7 (reference), 1.3e-8 (RK4 at 0.05
-/// ms), 5.8e-4 (SDIRK at 0.1 ms).
+/// Truth: without supply and damping the energy of a coasting motor with its body is conserved,
+/// although the transmission error exchanges it between them. Measured 2.0e-7 (reference), 1.3e-8
+/// (RK4 at 0.05 ms), 5.8e-4 (SDIRK at 0.1 ms).
 #[test]
 fn ripple_takes_no_energy_from_a_motor_that_coasts() {
     let arm = coasting(&chain(1, 0.3), 0.0, 2.5).with_transmission_errors(ripple(100.0, 2e-3)).unwrap();
@@ -214,13 +212,12 @@ fn ripple_takes_no_energy_from_a_motor_that_coasts() {
 }
 
 // --- Hysteresis
-// --------------------------------------------------------------------------------------------------------
 
 fn law() -> Hysteresis {
     Hysteresis { element: 0, elastic: TorqueCurve::straight(K), sliders: Hysteresis::even_sliders(40.0, 4e-4, 6) }
 }
 
-/// The body under a torque that swings, its motor held.
+/// Returns the body under an oscillating torque, its motor held.
 fn swinging(amplitude: f64, hz: f64) -> FlexibleArm {
     let arm = arm(&chain(1, 0.0), 20.0, Arc::new(Held(vec![0.0]))).with_hysteresis(vec![law()]).unwrap();
     let body = arm.model.frame("body_0").unwrap().body;
@@ -229,9 +226,9 @@ fn swinging(amplitude: f64, hz: f64) -> FlexibleArm {
     arm.with_timed_loads(vec![Load { wrench, ..Load::constant(body, Wrench::zeros()) }]).unwrap()
 }
 
-/// Truth: the area of Masing's loop at the amplitude reached, `4 Σ k r (A - r)`, whatever the speed
-/// of the cycle, small or large amplitude, in every stepper with a fixed step; nothing at all while
-/// no slider slips. Measured 1e-4 of the loss at most.
+/// Truth: the area of Masing's loop at the amplitude reached, `4 Σ k r (A - r)`, for any speed of
+/// the cycle, small or large amplitude, in every stepper with a fixed step; zero while no slider
+/// slips. Measured at most 1e-4 of the loss.
 #[test]
 fn a_closed_cycle_loses_the_area_of_its_loop_at_any_speed() {
     for (amplitude, hz) in [(25.0, 0.5), (25.0, 2.0), (90.0, 0.5), (90.0, 2.0), (4.0, 1.0)] {
@@ -254,9 +251,9 @@ fn a_closed_cycle_loses_the_area_of_its_loop_at_any_speed() {
     }
 }
 
-/// Truth: RK4 at 4e-6 s. The force has corners and a reversal lies within a step, so that orders
-/// fall to two and below: measured from 0.4 ms to 0.025 ms generalised-alpha 5.6e-3 to 2.1e-5 of
-/// the peak (order 2.0), SDIRK 3.5e-4 to 2.5e-6 (1.8), RK4 2.0e-4 to 2.1e-6 (1.7).
+/// Truth: RK4 at 4e-6 s. The force has kinks and reversals within steps, so that orders drop to two
+/// and below: measured from 0.4 ms to 0.025 ms generalised-alpha 5.6e-3 to 2.1e-5 of the peak
+/// (order 2.0), SDIRK 3.5e-4 to 2.5e-6 (1.8), RK4 2.0e-4 to 2.1e-6 (1.7).
 #[test]
 fn steppers_with_hysteresis_come_to_one_solution_as_the_step_falls() {
     let shaken = |arm: &FlexibleArm, kind: StepperKind, h: f64| -> Vec<f64> {
@@ -284,7 +281,7 @@ fn steppers_with_hysteresis_come_to_one_solution_as_the_step_falls() {
 }
 
 /// Truth: for small motions no slider slips, `ω = √((k + Σ k_i) / J)`; at rest under a load the
-/// gear stands on the curve of first loading, friction (2 x - x²) at the corners of the sliders.
+/// gear is on the first loading curve, friction (2 x - x²) at the corners of the sliders.
 #[test]
 fn modes_have_the_stuck_stiffness_and_statics_the_first_loading() {
     let (friction, reach) = (40.0, 4e-4);
@@ -307,10 +304,10 @@ fn modes_have_the_stuck_stiffness_and_statics_the_first_loading() {
 }
 
 // --- Friction under load
-// -----------------------------------------------------------------------------------------------
 
 /// Truth: a joint that turns steadily against a torque T needs `T + viscous q̇ + coulomb + c |T|`,
-/// driving or driven, through a spring or a rigid gear; the friction takes its power.
+/// driving or driven, through a spring or a rigid gear; the friction dissipates the corresponding
+/// power.
 #[test]
 fn friction_under_load_is_its_part_of_the_transmitted_torque() {
     let (speed, c) = (1.5, 0.08);
@@ -337,7 +334,7 @@ fn friction_under_load_is_its_part_of_the_transmitted_torque() {
             }
         }
     }
-    // A motor that coasts against the load loses what its friction takes.
+    // A motor that coasts against the load loses the energy dissipated by its friction.
     let mut arm = coasting(&chain(1, 0.4), 3.0, 4.0);
     arm.load_friction = laws(Some(0));
     let body = arm.model.frame("body_0").unwrap().body;
@@ -354,7 +351,7 @@ fn friction_under_load_is_its_part_of_the_transmitted_torque() {
         );
         assert!(imbalance(&seen) < 2e-3, "{} {}", kind.name(), imbalance(&seen));
     }
-    // Without a spring nothing tells its load before it moves.
+    // Without a spring the load is not known before the joint moves.
     let mut bare = chain(1, 0.4);
     bare.joints[1].kind = JointKind::Fixed;
     let model = Arc::new(Model::new(&bare).unwrap());
@@ -364,8 +361,7 @@ fn friction_under_load_is_its_part_of_the_transmitted_torque() {
     assert!(refused.is_err_and(|e| e.to_string().contains("gearbox")));
 }
 
-// --- Gears that move several joints
-// ------------------------------------------------------------------------------------
+// --- Coupled gears
 
 fn coupled(C: Matrix2<f64>, elements: Vec<usize>) -> GearCoupling {
     let inverse = C.try_inverse().unwrap();
@@ -373,7 +369,7 @@ fn coupled(C: Matrix2<f64>, elements: Vec<usize>) -> GearCoupling {
     GearCoupling { elements, coordinates: vec![0, 1], C: dense(&C), C_inverse: dense(&inverse) }
 }
 
-/// As a wrist whose second motor turns the first joint too, and back.
+/// A wrist whose second motor also turns the first joint, and vice versa.
 const WRIST: Matrix2<f64> = Matrix2::new(1.0, 0.25, -0.4, 1.0);
 
 fn two(C: Option<Matrix2<f64>>) -> FlexibleArm {
@@ -393,7 +389,7 @@ fn two(C: Option<Matrix2<f64>>) -> FlexibleArm {
 }
 
 /// Truth: deflections `C K_m^-1 Cᵀ τ` under torques, and frequencies of `K φ = ω² M φ` with K =
-/// C^-T K_m C^-1 and M = [J_1 + J_2, J_2; J_2, J_2], both by hand from 2x2 matrices.
+/// C^-T K_m C^-1 and M = [J_1 + J_2, J_2; J_2, J_2], both written out as 2x2 matrices.
 #[test]
 fn coupled_gears_give_way_and_swing_as_two_springs_at_the_motors() {
     let arm = two(Some(WRIST));
@@ -408,7 +404,8 @@ fn coupled_gears_give_way_and_swing_as_two_springs_at_the_motors() {
     for (found, truth) in arm.modes.omega.iter().zip([(half - root).sqrt(), (half + root).sqrt()]) {
         assert!((found / truth - 1.0).abs() < 1e-12, "{found} {truth}");
     }
-    // A torque on the second body goes through both joints, one on the first through the first.
+    // A torque on the second body acts on both joints, one on the first body on the first joint
+    // only.
     let torques = [7.0, -11.0];
     let wrench = |k: usize| {
         let body = arm.model.frame(&format!("body_{k}")).unwrap().body;
@@ -421,7 +418,7 @@ fn coupled_gears_give_way_and_swing_as_two_springs_at_the_motors() {
     let found = Vector2::new(e[0], e[1]);
     assert!((found - truth).norm() < 1e-12 * truth.norm(), "{found} {truth}");
     assert!((loaded.elastic_energy(e.as_slice()) / (0.5 * truth.dot(&(stiff * truth))) - 1.0).abs() < 1e-12);
-    // Modal damping: the ratio asked for in every mode.
+    // Modal damping: the requested ratio in every mode.
     let mut springs = vec![spring(K, 0.0), spring(0.6 * K, 0.0)];
     springs.iter_mut().for_each(|s| s.damping = Damping::Modal(0.04));
     let modal = FlexibleArm::new(arm.model.clone(), springs, Arc::new(Held(vec![0.0, 0.0]))).unwrap();
@@ -432,8 +429,8 @@ fn coupled_gears_give_way_and_swing_as_two_springs_at_the_motors() {
 }
 
 /// Truth: the energy balance, with damping and friction at the motors; the reference stepper for
-/// all others. Identity: torques and speeds of motors and joints have one power; without coupling
-/// (C = 1) the bits are those of single gears.
+/// all others. Identity: torques and speeds of motors and joints have the same power; without
+/// coupling (C = 1) results are bitwise those of single gears.
 #[test]
 fn a_run_with_coupled_gears_balances_and_without_coupling_has_the_same_bits() {
     let arm = two(Some(WRIST));
@@ -460,7 +457,7 @@ fn a_run_with_coupled_gears_balances_and_without_coupling_has_the_same_bits() {
         let same = a.iter().zip(&b).all(|(a, b)| a.q == b.q && a.drive == b.drive && a.load == b.load);
         assert!(same, "{}", kind.name());
     }
-    // Spook and the reference say what they do not know.
+    // SPOOK and the reference stepper report what they do not support.
     let spook = StepperKind::Spook(SpookSettings::default());
     for (arm, kind, word) in [
         (two(Some(WRIST)), spook, "several joints"),

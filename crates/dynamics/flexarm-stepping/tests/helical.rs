@@ -1,4 +1,4 @@
-//! A body on a spindle, driven and on a spring, in closed form through every stepper.
+//! A body on a helical joint (spindle), driven and on a spring, in closed form with every stepper.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
@@ -15,7 +15,7 @@ const PITCH: f64 = 0.05;
 const STIFFNESS: f64 = 60.0;
 const G: f64 = 9.81;
 
-/// What the coordinate moves: I_zz + m p².
+/// Effective inertia of the coordinate: I_zz + m p².
 const INERTIA: f64 = I_ZZ + MASS * PITCH * PITCH;
 
 fn steppers() -> [StepperKind; 4] {
@@ -27,7 +27,7 @@ fn steppers() -> [StepperKind; 4] {
     ]
 }
 
-/// An upright spindle that carries a body, behind a spring if there is one.
+/// Returns an upright spindle that carries a body, behind a spring if `spring`.
 fn spindle(spring: bool, motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
     let mut tree = Mechanism::new("spindle");
     let axis = Vector3::z_axis();
@@ -52,11 +52,11 @@ fn spindle(spring: bool, motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
     FlexibleArm::new(Arc::new(Model::new(&tree).unwrap()), springs, motion).unwrap()
 }
 
-/// Truth: let go relaxed, the spring turns to φ₀ (1 - cos ωt) with φ₀ = -m g p/k and ω² = k/(I_zz +
-/// m p²); at rest it stays at φ₀.
+/// Truth: released with relaxed spring, the spindle oscillates as φ₀ (1 - cos ωt) with φ₀ = -m g
+/// p/k and ω² = k/(I_zz + m p²); at rest it stays at φ₀.
 ///
-/// Measured, of the sag: generalised-alpha 6e-8, RK4 1e-9, reference 1e-7, SPOOK 5e-3; at rest
-/// 2e-10 at most.
+/// Measured, relative to the sag: generalised-alpha 6e-8, RK4 1e-9, reference 1e-7, SPOOK 5e-3; at
+/// rest at most 2e-10.
 #[test]
 fn a_body_on_a_sprung_spindle_swings_about_its_sag() {
     let arm = spindle(true, Arc::new(Held(vec![0.0])));
@@ -73,7 +73,7 @@ fn a_body_on_a_sprung_spindle_swings_about_its_sag() {
                 stepper.observe(&mut seen);
                 let swing = if start == Start::Undeformed { (omega * seen.t).cos() } else { 0.0 };
                 *worst = worst.max((seen.q[1] - sag * (1.0 - swing)).abs() / sag.abs());
-                // The body has turned by φ and moved by p φ.
+                // The body has rotated by φ and moved by p φ.
                 let X = seen.X_WB[2];
                 let turned = rotation_vector(X.rotation.matrix()).z;
                 assert!((turned - seen.q[1]).abs() < 1e-9 && (X.translation.z - PITCH * seen.q[1]).abs() < 1e-9);
@@ -84,7 +84,7 @@ fn a_body_on_a_sprung_spindle_swings_about_its_sag() {
     }
 }
 
-/// A turn there and back.
+/// A rotation back and forth.
 struct Swing;
 
 const AMPLITUDE: f64 = 2.0;
@@ -99,8 +99,9 @@ impl PrescribedMotion for Swing {
 
 /// Truth: τ = (I_zz + m p²) q̈ + m g p, and the body rises by p q.
 ///
-/// Measured, of the largest torque: 3e-16 in reduced coordinates, 4e-4 for SPOOK, whose force is
-/// the mean of its last step; its first ten steps are left out, in which its impulses settle.
+/// Measured, relative to the largest torque: 3e-16 in reduced coordinates, 4e-4 for SPOOK, whose
+/// force is the mean over its last step; its first ten steps, in which its impulses settle, are
+/// excluded.
 #[test]
 fn a_driven_spindle_needs_the_torque_of_the_textbook() {
     let arm = spindle(false, Arc::new(Swing));
@@ -118,7 +119,8 @@ fn a_driven_spindle_needs_the_torque_of_the_textbook() {
             largest = largest.max(truth.abs());
             let X = seen.X_WB[1];
             let rise = PITCH * AMPLITUDE * (1.0 - (OMEGA * seen.t).cos());
-            assert!((X.translation.z - rise).abs() < 1e-5, "{}", kind.name()); // measured 1e-16; SPOOK 2e-7
+            // measured 1e-16; SPOOK 2e-7
+            assert!((X.translation.z - rise).abs() < 1e-5, "{}", kind.name());
         }
         eprintln!("{:<18} torque {:.1e} of the largest", kind.name(), worst / largest);
         assert!(worst < bound * largest, "{}: {worst} of {largest}", kind.name());

@@ -1,4 +1,4 @@
-//! The linear structure about a static pose against the nonlinear arm that it stands for.
+//! Linearisation about a static pose against the nonlinear arm.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
@@ -28,16 +28,16 @@ fn at(arm: &FlexibleArm, tool: &Frame, F: &Vector6<f64>) -> Linear {
     linearise(arm, tool, &wrench(F), 0.0).expect("an equilibrium")
 }
 
-/// Small displacement of the tool from one equilibrium to another.
+/// Returns the small displacement of the tool from one equilibrium to another.
 fn moved(from: &Linear, to: &Linear) -> Vector6<f64> {
     let d = to.X_WT.translation.vector - from.X_WT.translation.vector;
     let phi = rotation_vector((to.X_WT.rotation * from.X_WT.rotation.inverse()).matrix());
     Vector6::new(d.x, d.y, d.z, phi.x, phi.y, phi.z)
 }
 
-/// Truth: central differences of the nonlinear equilibrium over the wrench, with weight alone and
-/// under a heavy load (force and moment), on an arm twenty times as soft as the reference arm (sag
-/// 4 cm), where the change of weight and load counts.
+/// Truth: central differences of the nonlinear equilibrium with respect to the wrench, under weight
+/// and under an additional heavy load (force and moment), on an arm twenty times softer than the
+/// reference arm (sag 4 cm), for which the geometric stiffness matters.
 #[test]
 fn compliance_is_the_derivative_of_the_nonlinear_equilibrium() {
     let (arm, tool) = arm_at(&POSE, 20.0);
@@ -56,7 +56,7 @@ fn compliance_is_the_derivative_of_the_nonlinear_equilibrium() {
             let change = moved(&at(&arm, &tool, &(load - part)), &at(&arm, &tool, &(load + part)));
             differences.set_column(k, &(change / (2.0 * step)));
         }
-        // Metres and radians: each entry against the diagonal of its row and column.
+        // Metres and radians: each entry is relative to the diagonal of its row and column.
         let scale = |i: usize, j: usize| (C[(i, i)] * C[(j, j)]).sqrt();
         let error = Matrix6::from_fn(|i, j| (C[(i, j)] - differences[(i, j)]) / scale(i, j)).amax();
         let skew = Matrix6::from_fn(|i, j| (C[(i, j)] - C[(j, i)]) / scale(i, j)).amax();
@@ -77,8 +77,8 @@ fn compliance_is_the_derivative_of_the_nonlinear_equilibrium() {
     }
 }
 
-/// Truth: the stepper's own static start with the wrench as a load on the tool's body. A force at
-/// To is a force at Bo with the moment of the arm that they have at the *end*.
+/// Truth: the static start of a stepper with the wrench as a load on the tool's body. A force at To
+/// is a force at Bo with a moment; the lever arm is that of the final pose.
 #[test]
 fn the_equilibrium_under_a_wrench_is_that_of_the_steppers() {
     let (arm, tool) = arm_at(&POSE, 5.0);
@@ -104,8 +104,8 @@ fn the_equilibrium_under_a_wrench_is_that_of_the_steppers() {
     assert!(error < 1e-10); // measured 4e-14
 }
 
-/// Truth: modes of the arm by the other routine, and central differences of inverse dynamics over
-/// the joints.
+/// Truth: modes of the arm from the other routine, and central differences of inverse dynamics with
+/// respect to the joints.
 #[test]
 fn matrices_are_those_of_the_modes_and_of_inverse_dynamics() {
     let (arm, tool) = arm_at(&POSE, 1.0);
@@ -146,7 +146,7 @@ fn matrices_are_those_of_the_modes_and_of_inverse_dynamics() {
     }
 }
 
-/// A rigid robot has no compliance, and its drives hold what gravity asks for.
+/// A rigid robot has no compliance, and its drives hold the gravity torques.
 #[test]
 fn a_rigid_arm_does_not_yield() {
     let reference = reference_arm(false);

@@ -1,5 +1,5 @@
-//! Arms with closed loops in motion: every stepper against the others, statics, modes, energy,
-//! servos, what is refused.
+//! Arms with closed loops in motion: steppers against each other, statics, modes, energy, servos,
+//! refused cases.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
@@ -30,7 +30,7 @@ fn arm(motion: Arc<dyn PrescribedMotion>, beta: f64) -> FlexibleArm {
     FlexibleArm::new(Arc::new(Model::new(&made.mechanism).unwrap()), springs, motion).unwrap()
 }
 
-/// From [`POSE`] to another one in 0.6 s, with no jump in acceleration.
+/// Returns a motion from [`POSE`] to another pose in 0.6 s, with continuous acceleration.
 fn moving() -> Arc<dyn PrescribedMotion> {
     Arc::new(MotionFn(|t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| {
         let (s, T) = ((t / 0.6).clamp(0.0, 1.0), 0.6);
@@ -50,8 +50,8 @@ fn of(word: &str) -> StepperKind {
     (entry.with)(&StepperOptions::default())
 }
 
-/// What a run ends with: place of the tool, energies (kinetic, potential, elastic), forces of the
-/// drives.
+/// Returns the final state of a run: position of the tool, energies (kinetic, potential, elastic),
+/// drive forces.
 fn end(arm: &FlexibleArm, kind: StepperKind, h: f64, duration: f64) -> (Vector3<f64>, f64, DVector<f64>) {
     let tool = arm.model.frame("tool").unwrap().clone();
     let mut seen = Observation::new(arm);
@@ -61,8 +61,8 @@ fn end(arm: &FlexibleArm, kind: StepperKind, h: f64, duration: f64) -> (Vector3<
     ((seen.X_WB[tool.body] * tool.X_BF).translation.vector, seen.energy[1], seen.drive.clone())
 }
 
-/// Truth: the reference stepper on the same equations. Differences over the deflection at the end
-/// of the motion: measured generalised-alpha 1.0e-6, SDIRK3 8e-7, RK4 1.1e-7.
+/// Truth: the reference stepper on the same equations. Differences relative to the deflection at
+/// the end of the motion: measured generalised-alpha 1.0e-6, SDIRK3 8e-7, RK4 1.1e-7.
 #[test]
 fn steppers_agree_on_an_arm_with_a_loop() {
     let arm = arm(moving(), 1e-4);
@@ -86,8 +86,9 @@ fn steppers_agree_on_an_arm_with_a_loop() {
     }
 }
 
-/// Truth: the reference stepper. SPOOK is of first order: its torques are off by half as much with
-/// half the step (1.3e-3 at 0.4 ms, 1.6e-4 at 0.05 ms), its tool by 3.7e-6 m and 1.2e-7 m.
+/// Truth: the reference stepper. SPOOK is of first order: half the step size halves the error of
+/// its torques (1.3e-3 at 0.4 ms, 1.6e-4 at 0.05 ms), the error of its tool is 3.7e-6 m and 1.2e-7
+/// m.
 #[test]
 fn spook_tends_to_the_others_on_an_arm_with_a_loop() {
     let arm = arm(moving(), 1e-3);
@@ -104,13 +105,13 @@ fn spook_tends_to_the_others_on_an_arm_with_a_loop() {
     }
 }
 
-/// Truth: virtual work of springs and weight about the rigid pose. To first order of the springs'
-/// compliance the tool moves by `-J K^-1 g`, with J and g of the closed model; the deflection
-/// itself makes the rest, measured 7.7e-8 of it.
+/// Truth: virtual work of springs and weight about the rigid pose. To first order in the compliance
+/// of the springs the tool moves by `-J K^-1 g`, with J and g of the closed model; the remainder is
+/// due to the deflection itself, measured 7.7e-8 of it.
 #[test]
 fn an_arm_with_a_loop_rests_where_virtual_work_says() {
     let mut arm = arm(Arc::new(Held(POSE.to_vec())), 1e-3);
-    // Ten thousand times as stiff: what is left of second order.
+    // Ten thousand times stiffer, to reduce the second-order remainder.
     for element in &mut arm.elements {
         element.K *= 1e4;
     }
@@ -155,8 +156,8 @@ fn compliance_over_a_loop_is_the_slope_of_the_equilibria() {
     assert!((point.compliance() - C).amax() < 1e-9 * C.amax());
 }
 
-/// Truth: without damping and with drives that stand still the energy stays; RK4 at 10 us, measured
-/// 4.3e-11 of what swings.
+/// Truth: without damping and with locked drives the energy is conserved; RK4 at 10 us, measured
+/// 4.3e-11 of the exchanged energy.
 #[test]
 fn a_ringing_arm_with_a_loop_keeps_its_energy() {
     let arm = arm(Arc::new(Held(POSE.to_vec())), 1e-14);
@@ -195,7 +196,7 @@ fn frequencies_over_a_loop_agree_between_linear_structure_and_operating_point() 
     assert!(squares[0] > 0.0 && point.frequencies_hz()[0] < 60.0, "{:?}", point.frequencies_hz());
 }
 
-/// Truth: with the torques of its inverse dynamics fed forward a rigid arm stays on its motion.
+/// Truth: with the torques of its inverse dynamics as feed-forward a rigid arm stays on its motion.
 /// Sampled at 0.1 ms, measured 3.9e-6 rad and 0.34 % of the torque.
 #[test]
 fn servos_drive_a_rigid_arm_with_a_loop_along_its_motion() {
@@ -254,7 +255,8 @@ fn runs_side_by_side_are_those_alone() {
     }
 }
 
-/// A crank that turns until the rod is too short: all steppers stop there, and say where and why.
+/// A crank that turns until the rod is too short: all steppers stop there and report place and
+/// cause.
 #[test]
 fn a_motion_that_tears_a_loop_apart_ends_with_its_name_and_time() {
     let tearing = || -> Arc<dyn PrescribedMotion> {

@@ -1,5 +1,5 @@
-//! Arms with links that bend in modes: published spin-ups, what is kept, every stepper against
-//! every other, chains.
+//! Arms with modal links: published spin-ups, conservation laws, steppers against each other,
+//! chains.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
@@ -47,7 +47,7 @@ fn own_inertia(modal: &ModalLink) -> LinkInertia {
     LinkInertia { mass: body.mass, com: body.com, inertia_com: body.inertia }
 }
 
-/// Springs in the order of the model, by the name of their group.
+/// Springs in the order of the model, selected by the name of their group.
 fn arm_of(mechanism: &Mechanism, springs: &[(String, Spring)], motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
     let model = Arc::new(Model::new(mechanism).expect("a tree"));
     let of = |group: &ElasticGroup| springs.iter().find(|(name, _)| *name == group.name).expect("a spring").1.clone();
@@ -70,7 +70,6 @@ fn run(arm: &FlexibleArm, kind: StepperKind, h: f64, start: Start, times: &[f64]
 }
 
 // --- Spin-up of a cantilever
-// -------------------------------------------------------------------------------------------
 
 struct Row {
     t: f64,
@@ -150,11 +149,12 @@ impl SpinUp {
 
 /// Truth: geometrically exact finite elements (`tools/golden_kane.py`).
 ///
-/// Measured errors of the tip's lag over its peak: kane 3.1e-3, kane_slow 1.7e-3, simo 1.4e-3
-/// (0.75, 0.53 and 0.57 m); of what rings on after 15 s: 1.0e-4 m of 7.7e-3, 1.1e-4 of 8.3e-3,
-/// 7.2e-5 of 3.6e-3. The steady stretch is the linear one, `μ Ω² l³/(3 EA)`, within 3e-5, 1.4e-4,
-/// 5e-5; the exact beam's is less by the foreshortening of what rings on (0.8 %, 2.3 %, 0.07 %):
-/// second order in the deflection, no modal link of first-order shapes has it.
+/// Measured errors of the tip deflection relative to its peak: kane 3.1e-3, kane_slow 1.7e-3, simo
+/// 1.4e-3 (0.75, 0.53 and 0.57 m); of the residual vibration after 15 s: 1.0e-4 m of 7.7e-3, 1.1e-4
+/// of 8.3e-3, 7.2e-5 of 3.6e-3. The steady stretch is the linear one, `μ Ω² l³/(3 EA)`, within
+/// 3e-5, 1.4e-4, 5e-5; that of the exact beam is smaller by the foreshortening due to the residual
+/// vibration (0.8 %, 2.3 %, 0.07 %): a term of second order in the deflection, which no modal link
+/// with first-order shapes has.
 #[test]
 fn stiffened_cantilever_follows_the_exact_beam_in_the_spin_up() {
     for case in spin_ups() {
@@ -181,11 +181,11 @@ fn stiffened_cantilever_follows_the_exact_beam_in_the_spin_up() {
     }
 }
 
-/// Without stiffening by load the beam softens as it turns: the linear beam of the same file, up to
-/// its divergence.
+/// Without geometric stiffening the beam softens as it rotates: compared with the linear beam of
+/// the same file, up to its divergence.
 ///
-/// Measured: 3.1e-5, 8.0e-5 and 1.4e-5 m up to 2.4 m, where the exact beams lag by 0.73, 0.44 and
-/// 0.53 m. The run ends as diverged where the deflection passes 3 m.
+/// Measured: 3.1e-5, 8.0e-5 and 1.4e-5 m up to a deflection of 2.4 m, where the exact beams deflect
+/// by 0.73, 0.44 and 0.53 m. The run ends as diverged when the deflection exceeds 3 m.
 #[test]
 fn cantilever_without_stiffening_softens_as_the_linear_beam_does() {
     for case in spin_ups() {
@@ -208,25 +208,23 @@ fn cantilever_without_stiffening_softens_as_the_linear_beam_does() {
     }
 }
 
-// --- What a free body keeps
-// --------------------------------------------------------------------------------------------
+// --- Conservation laws of a free body
 
-/// A soft beam with a mass at its tip, flying freely: three slides and three turns without torque,
-/// in no gravity.
+/// Returns a soft beam with a mass at its tip, flying freely: three prismatic and three revolute
+/// joints without torque, without gravity.
 fn free_flyer() -> FlexibleArm {
     flyer_with_modes_turned_by(0.0)
 }
 
-/// The same with its first two modes, which have one frequency, taken in other directions by this
-/// angle.
+/// Returns the same with its first two modes, which have the same frequency, rotated by this angle.
 fn flyer_with_modes_turned_by(angle: f64) -> FlexibleArm {
     let beam = BeamLink::new("beam", Section::Given(bar(1e6, 4e5, 60.0, 0.6, 3e-3)), Material::STEEL, 1.5);
-    // Five modes: with four one of two that have the same frequency would be missing, and which one
-    // is nobody's choice.
+    // Five modes: with four, one of two modes with the same frequency would be missing, and which
+    // one would be arbitrary.
     let modal = Arc::new(turned(beam.modal(5).expect("a beam"), [6, 7], angle));
     let mut body = Mechanism::new("flyer");
     body.gravity = Vector3::zeros();
-    // The gimbals weigh next to nothing.
+    // The gimbals have almost no mass.
     let light = |m: f64| LinkInertia { mass: m, com: Vector3::zeros(), inertia_com: Matrix3::identity() * m };
     let tool = LinkInertia {
         mass: 2.0,
@@ -275,8 +273,8 @@ fn flyer_with_modes_turned_by(angle: f64) -> FlexibleArm {
     arm.with_servo(servo).expect("a joint that carries a modal link needs no rotor")
 }
 
-/// A link whose coordinates k and l are turned into each other: the same deflections in other
-/// coordinates.
+/// Returns the link with its coordinates k and l rotated into each other: the same deflections in
+/// other coordinates.
 fn turned(mut link: ModalLink, [k, l]: [usize; 2], angle: f64) -> ModalLink {
     let n = link.M.nrows();
     let (s, c) = angle.sin_cos();
@@ -295,7 +293,7 @@ fn turned(mut link: ModalLink, [k, l]: [usize; 2], angle: f64) -> ModalLink {
     link
 }
 
-/// Measured 2e-13 of the largest bend.
+/// Measured 2e-13 of the largest deflection.
 #[test]
 fn modes_of_one_frequency_may_be_taken_in_any_directions() {
     let bends = |angle: f64| {
@@ -311,7 +309,7 @@ fn modes_of_one_frequency_may_be_taken_in_any_directions() {
     }
 }
 
-/// Momentum and energy of an observation.
+/// Returns momentum and energy of an observation.
 fn kept(arm: &FlexibleArm, seen: &Observation) -> (Wrench, f64) {
     let (mut data, mut state) = (Data::new(&arm.model), State::zeros(&arm.model));
     state.q.copy_from(&seen.q);
@@ -320,7 +318,7 @@ fn kept(arm: &FlexibleArm, seen: &Observation) -> (Wrench, f64) {
     (momentum_of(&arm.model, &data), seen.energy.iter().sum())
 }
 
-/// Largest change of linear momentum, angular momentum and energy over their size.
+/// Returns the maximum relative change of linear momentum, angular momentum and energy.
 fn drift_of_the_flyer(kind: StepperKind, h: f64) -> [f64; 3] {
     let arm = free_flyer();
     let times: Vec<f64> = (0..=20).map(|k| 0.02 * f64::from(k)).collect();
@@ -348,9 +346,9 @@ fn drift_of_the_flyer(kind: StepperKind, h: f64) -> [f64; 3] {
 }
 
 /// Truth: conservation of momentum, angular momentum and energy of a body that tumbles and
-/// vibrates; it bends by 41 mm.
+/// vibrates; it deflects by 41 mm.
 ///
-/// Measured, largest of the three: RK4 at 0.04 ms 2.0e-9 (the gimbals of 1e-9 kg; energy alone
+/// Measured, largest of the three: RK4 at 0.04 ms 2.0e-9 (due to the gimbals of 1e-9 kg; energy
 /// 2.5e-10, with half the step 1.1e-11), reference stepper at 1e-9 2.2e-8, generalised-alpha
 /// 8.3e-4, 1.4e-4, 1.6e-5 at 1, 0.5, 0.25 ms.
 #[test]
@@ -367,8 +365,8 @@ fn free_flying_modal_body_keeps_momentum_and_energy() {
     assert!(errors[0] < 1e-3 && errors[2] < errors[0] / 12.0, "{errors:?}");
 }
 
-/// A heavy horizontal cantilever let go undeformed: relative energy drift over `periods` of its
-/// first mode.
+/// Returns the relative energy drift of a heavy horizontal cantilever released undeformed, over
+/// `periods` of its first mode.
 fn drift_of_the_cantilever(kind: StepperKind, steps_per_period: f64, periods: f64) -> (f64, f64) {
     let beam = BeamLink::new("beam", Section::Circle { diameter: 0.02 }, Material::STEEL, 1.5);
     let modal = Arc::new(beam.modal(1).expect("a beam"));
@@ -406,8 +404,8 @@ fn drift_of_the_cantilever(kind: StepperKind, steps_per_period: f64, periods: f6
     (size, drift)
 }
 
-/// Truth: an undamped cantilever keeps its energy. Relative to the energy of its swing, 50 steps a
-/// period, 300 periods:
+/// Truth: an undamped cantilever conserves its energy. Relative to the energy of its vibration, 50
+/// steps per period, 300 periods:
 ///
 /// | scheme | within | drifts by |
 /// | --- | --- | --- |
@@ -416,7 +414,7 @@ fn drift_of_the_cantilever(kind: StepperKind, steps_per_period: f64, periods: f6
 /// | rho 0.9 | | -1.0e-3 |
 /// | rho 0.9 with dispersion correction | | -1.1e-3 |
 ///
-/// RK4 loses 1.3e-6 in 100 periods of 1000 steps (stability asks for so many), 4.3e-8 with 2000:
+/// RK4 loses 1.3e-6 in 100 periods of 1000 steps (required for stability), 4.3e-8 with 2000 steps:
 /// fifth order.
 #[test]
 fn undamped_vibration_keeps_its_energy_over_many_periods() {
@@ -433,8 +431,7 @@ fn undamped_vibration_keeps_its_energy_over_many_periods() {
     assert!(losses[0] < 3e-6 && (order - 5.0).abs() < 0.3, "{losses:?} {order}");
 }
 
-// --- Every stepper against every other
-// ---------------------------------------------------------------------------------
+// --- Steppers against each other
 
 /// Lower and upper arm of the reference arm as beams.
 fn arm_beams() -> [BeamLink; 2] {
@@ -450,7 +447,7 @@ fn arm_beams() -> [BeamLink; 2] {
     ]
 }
 
-/// The rigid reference arm with its two halves in one link each.
+/// Returns the rigid reference arm with the two halves of each arm in one link.
 fn whole_links() -> Mechanism {
     let mut arm = reference_arm(false).mechanism;
     for (name, next, length) in [("2b", "3", vector![0.0, 0.0, 1.095]), ("4b", "5", vector![1.0, 0.0, 0.0])] {
@@ -494,7 +491,7 @@ fn tcp(arm: &FlexibleArm, seen: &Observation) -> Vector3<f64> {
     (seen.X_WB[frame.body] * frame.X_BF).translation.vector
 }
 
-/// Largest distance of two runs' TCP.
+/// Returns the maximum distance between the TCP positions of two runs.
 fn distance(arm: &FlexibleArm, a: &[Observation], b: &[Observation]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (tcp(arm, a) - tcp(arm, b)).norm()).fold(0.0, f64::max)
 }
@@ -526,7 +523,7 @@ fn steppers_agree_on_the_reference_arm_with_modal_links() {
     assert!(text.contains("modes") && text.contains("generalized-alpha"), "{text}");
 }
 
-/// The lumped reference arm with gearboxes of one stiffness at the axes 2 and 3.
+/// Returns the lumped reference arm with single-axis gearboxes at axes 2 and 3.
 fn geared_arm(motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
     let reference = reference_arm(true);
     let mut mechanism = reference.mechanism.clone();
@@ -543,7 +540,7 @@ fn geared_arm(motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
 }
 
 /// Truth: the reference stepper. Measured: 1.44e-5, 4.39e-6, 1.56e-6, 6.4e-7 m at 1, 0.5, 0.25,
-/// 0.125 ms, the order falls to 1.28; at rest 1e-10 of the sag of 5.5 mm.
+/// 0.125 ms, with an order decreasing to 1.28; at rest 1e-10 of the sag of 5.5 mm.
 #[test]
 fn spook_with_gearboxes_converges_with_first_order_and_rests_exactly() {
     let arm = geared_arm(reference_arm_motion());
@@ -570,7 +567,6 @@ fn spook_with_gearboxes_converges_with_first_order_and_rests_exactly() {
 }
 
 // --- Chains of rigid parts
-// ---------------------------------------------------------------------------------------------
 
 fn chain_arm(parts: usize, motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
     let links: Vec<FlexibleLink> = arm_beams()
@@ -590,8 +586,8 @@ fn chain_arm(parts: usize, motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
     arm_of(&soft.mechanism, &springs, motion)
 }
 
-/// Truth: the modal link of 6 modes with stiffening by load. Largest error of the first four
-/// frequencies, and of the sag of the TCP:
+/// Truth: the modal link with 6 modes and geometric stiffening. Maximum error of the first four
+/// frequencies, and error of the sag of the TCP:
 ///
 /// | parts | frequencies | sag | without stiffening |
 /// | --- | --- | --- | --- |
@@ -600,9 +596,9 @@ fn chain_arm(parts: usize, motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
 /// | 5 | 3.1e-4 | 7.3e-4 | |
 /// | 9 | 1.7e-4 | 1.2e-4 | 3.7e-4, 3.6e-4 |
 ///
-/// Second order, down to what is left: chains shorten as they bend and carry that in their mass,
-/// shapes of first order do not. It goes with the load (1.8e-4, 0.9e-4, 0.45e-4 at one, half, a
-/// quarter of gravity), as the deflection does.
+/// Second order, down to a remainder: chains shorten as they bend and include this in their mass
+/// matrix, first-order shapes do not. The remainder is proportional to the load (1.8e-4, 0.9e-4,
+/// 0.45e-4 at one, half, a quarter of gravity), as the deflection is.
 #[test]
 fn chains_of_rigid_parts_converge_to_the_modal_link() {
     let pose = || Arc::new(Held(vec![0.4, 0.7, -0.3, 0.7, 0.6, -1.2]));
@@ -632,10 +628,9 @@ fn chains_of_rigid_parts_converge_to_the_modal_link() {
 }
 
 // --- Allocations
-// -------------------------------------------------------------------------------------------------------
 
-/// The reference arm with modal links that stiffen, gearboxes of one, three and six stiffnesses and
-/// sampled controllers.
+/// Returns the reference arm with modal links with geometric stiffening, gearboxes with one, three
+/// and six stiffnesses, and sampled controllers.
 fn everything() -> FlexibleArm {
     let options = ModalOptions { geometric: true, modes: 2, ..ModalOptions::default() };
     let modals = arm_beams().map(|b| Arc::new(b.modal_with(&options).expect("a beam")));
@@ -684,10 +679,10 @@ fn everything() -> FlexibleArm {
     arm.with_servo(Servo { sample_s: 1e-3, axes: (0..6).map(axis).collect(), rigid }).expect("valid")
 }
 
-/// With modal links, gearboxes, play, friction and servos, samples included; and the two steppers
-/// agree to 1.5e-7 m or rad.
+/// With modal links, gearboxes, backlash, friction and servos, samples included; and the two
+/// steppers agree to 1.5e-7 m or rad.
 ///
-/// Every new factor of the corrected matrix allocated.
+/// Regression: every new factor of the corrected matrix allocated.
 #[test]
 fn steps_do_not_allocate_with_modal_links_and_drives() {
     let ends = [(ALPHA, 2.5e-4), (StepperKind::Rk4, 2e-5)].map(|(kind, h)| {
@@ -711,9 +706,8 @@ fn steps_do_not_allocate_with_modal_links_and_drives() {
 }
 
 // --- Modes that are eliminated first
-// -------------------------------------------------------------------------------------
 
-/// The same system, which does not say which of its coordinates are modes.
+/// The same system without information about its modes.
 struct Dense(ReducedArm);
 
 impl SecondOrderSystem for Dense {
@@ -743,7 +737,7 @@ impl SecondOrderSystem for Dense {
     }
 }
 
-/// Steps of a system: states on the way, and the work.
+/// Takes steps of a system; returns the states along the run, and the work.
 fn states(
     system: &mut impl SecondOrderSystem,
     settings: AlphaSettings,
@@ -761,8 +755,8 @@ fn states(
     (states, alpha.counts())
 }
 
-/// Truth: the dense matrices of the same arm, inverted as a whole. The arm begins with its springs
-/// relaxed, so it rings. Measured: 5e-14 of the largest deflection, at rho 0; the same iterations
+/// Truth: the dense matrices of the same arm, inverted as a whole. The arm starts with relaxed
+/// springs, so it rings. Measured: 5e-14 of the largest deflection, at rho 0; the same iterations
 /// and factorisations.
 #[test]
 fn a_run_with_its_modes_eliminated_is_the_dense_run() {
@@ -789,7 +783,8 @@ fn a_run_with_its_modes_eliminated_is_the_dense_run() {
     }
 }
 
-/// Truth: what a mode is. Damping by the arm's modes couples them, and so few do not pay.
+/// Truth: the definition of such modes. Modal damping couples them, and with few modes elimination
+/// is not faster.
 #[test]
 fn modes_that_meet_or_are_few_are_not_eliminated() {
     let arm = |modes, damping| {

@@ -1,4 +1,4 @@
-//! The integrators on systems with closed-form answers; none of them knows a robot.
+//! Integrators on systems with closed-form solutions, independent of robots.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
@@ -50,7 +50,8 @@ impl SecondOrderSystem for Oscillators {
     }
 }
 
-/// Free vibration `x = e^(-ζωt)(cos w t + ζω/w sin w t)` of one damped oscillator started at 1.
+/// Error of the free vibration `x = e^(-ζωt)(cos w t + ζω/w sin w t)` of one damped oscillator that
+/// starts at 1.
 fn free_vibration_error(run: impl Fn(&mut Oscillators) -> f64) -> f64 {
     let (omega, zeta, t) = (20.0f64, 0.03, 1.0);
     let mut system = Oscillators {
@@ -89,9 +90,10 @@ fn generalized_alpha_is_of_second_order() {
     }
 }
 
-/// The dispersion correction takes most of the second-order error away; measured 4.8e-6, 4.9e-6,
-/// 5.2e-6 at 1 ms for rho = 1, 0.9, 0.8 instead of 3.4e-4 to 3.6e-4 (a scheme that corrected x but
-/// kept the plain a had 2.0e-5 at 0.9). What is left is the damping force's share, 2 zeta of it.
+/// The dispersion correction removes most of the second-order error; measured 4.8e-6, 4.9e-6,
+/// 5.2e-6 at 1 ms for rho = 1, 0.9, 0.8 instead of 3.4e-4 to 3.6e-4 (a scheme that corrects x but
+/// uses the plain a has 2.0e-5 at 0.9). The remaining error is due to the damping force, a share of
+/// 2 zeta.
 #[test]
 fn dispersion_correction_cancels_the_leading_error() {
     for rho in [0.8, 0.9, 1.0] {
@@ -104,7 +106,7 @@ fn dispersion_correction_cancels_the_leading_error() {
     }
 }
 
-/// Unconditional stability with the correction: h ω from 0.1 to 1e5, undamped, rho 0.9 and 1.
+/// Unconditional stability with the correction: h ω from 0.1 to 1e5, undamped, rho from 0 to 1.
 #[test]
 fn corrected_scheme_is_stable_for_any_step() {
     for rho in [0.0, 0.5, 0.9, 1.0] {
@@ -118,7 +120,7 @@ fn corrected_scheme_is_stable_for_any_step() {
                 g.step(&mut s).expect("steps");
                 largest = largest.max(g.now.x[0].abs());
             }
-            // The start is not on the scheme's own orbit: a bounded overshoot, no growth.
+            // The initial state is not on an orbit of the scheme: a bounded overshoot, no growth.
             let end = g.now.x[0].abs();
             assert!(largest < 1e5 && end <= largest && end < 20.0, "rho {rho} omega {omega}: {largest} {end}");
         }
@@ -141,8 +143,8 @@ fn rk4_is_of_fourth_order() {
     assert!((order - 4.0).abs() < 0.1, "{order}");
 }
 
-/// Energy of an undamped oscillator: kept to rounding for rho = 1 (measured 3e-13), lost for rho <
-/// 1.
+/// Energy of an undamped oscillator: conserved to round-off for rho = 1 (measured 3e-13),
+/// dissipated for rho < 1.
 #[test]
 fn spectral_radius_one_keeps_the_energy_and_less_loses_it() {
     let energy_after = |rho: f64| {
@@ -157,7 +159,7 @@ fn spectral_radius_one_keeps_the_energy_and_less_loses_it() {
     assert!(energy_after(0.5) < 1e-10);
 }
 
-/// A mode with h ω = 10⁴ dies at the rate rho per step: what the parameter promises.
+/// A mode with h ω = 10⁴ decays by the factor rho per step, as the parameter states.
 #[test]
 fn stiff_modes_shrink_by_the_spectral_radius_each_step() {
     let rho = 0.6;
@@ -172,7 +174,7 @@ fn stiff_modes_shrink_by_the_spectral_radius_each_step() {
     assert!((measured - rho).abs() < 0.03, "{measured}");
 }
 
-/// One body on a 6x6 spring without gravity: the linear oscillator of the SPOOK step.
+/// Returns one body on a 6x6 spring without gravity: the linear oscillator of the SPOOK step.
 fn body_on_spring(k: f64, beta: f64) -> FlexibleArm {
     let mut tree = Mechanism::new("oscillator");
     tree.gravity = Vector3::zeros();
@@ -186,7 +188,8 @@ fn body_on_spring(k: f64, beta: f64) -> FlexibleArm {
     FlexibleArm::new(model, vec![spring], Arc::new(Held(vec![]))).expect("valid")
 }
 
-/// `(M + h² K/4)(v⁺ - v) = -h K g - h τ K v⁺` for every step; measured 1e-15 of the largest term.
+/// Recurrence `(M + h² K/4)(v⁺ - v) = -h K g - h τ K v⁺` in every step; measured 1e-15 of the
+/// largest term.
 #[test]
 fn spook_on_a_linear_oscillator_is_the_known_recurrence() {
     let (m, k, tau, h) = (3.0, 4e3, 2e-3, 5e-3);
@@ -204,7 +207,7 @@ fn spook_on_a_linear_oscillator_is_the_known_recurrence() {
     }
 }
 
-/// Without damping its frequency error is of second order:
+/// Without damping the frequency error of SPOOK is of second order:
 /// `ω_h = (2/h) asin(hω/2 / sqrt(1 + (hω)²/4))`.
 #[test]
 fn spook_frequency_is_accurate_to_second_order() {
@@ -237,8 +240,8 @@ fn spook_frequency_is_accurate_to_second_order() {
 }
 
 /// Truth: a damped oscillator under a constant force,
-/// `x = F/k (1 - e^(-ζωt) (cos wt + ζω/w sin wt))`. The error of every stepper that takes the steps
-/// it is given falls at least with the power of the step that its entry says.
+/// `x = F/k (1 - e^(-ζωt) (cos wt + ζω/w sin wt))`. The error of every stepper with a given step
+/// size decreases at least with the order stated in its entry.
 #[test]
 fn every_stepper_is_of_the_order_that_it_states() {
     let (m, k, zeta, F, t) = (3.0f64, 4e3f64, 0.05f64, 20.0, 0.2f64);
@@ -264,7 +267,7 @@ fn every_stepper_is_of_the_order_that_it_states() {
     }
 }
 
-/// Modal damping gives every mode the ratio asked for: from the eigenvalues of the damped system;
+/// Modal damping gives every mode the requested ratio, from the eigenvalues of the damped system;
 /// measured 1e-12.
 #[test]
 fn modal_damping_gives_every_mode_its_ratio() {

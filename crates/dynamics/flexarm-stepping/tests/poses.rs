@@ -1,4 +1,4 @@
-//! Many poses side by side against the same poses alone.
+//! Many poses in parallel lanes against the same poses one by one.
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 
 const ALL: Asked = Asked { jacobian: true, compliance: true, frequencies: true };
 
-/// The reference arm with springs that are so many times as stiff.
+/// Returns the reference arm with its springs scaled by `stiffness`.
 fn point(stiffness: f64) -> OperatingPoint {
     let reference = reference_arm(true);
     let model = Arc::new(Model::new(&reference.mechanism).unwrap());
@@ -22,7 +22,7 @@ fn point(stiffness: f64) -> OperatingPoint {
     OperatingPoint::new(FlexibleArm::new(model, springs, held).unwrap(), tool)
 }
 
-/// 31 poses, the last group of four not full; one has no number in it.
+/// Returns 31 poses, the last group of four not full; one contains an infinite value.
 fn poses(joints: usize) -> Vec<f64> {
     let mut all: Vec<f64> = (0..31 * joints).map(|k| 3.0 * ((k as f64 * 0.618_034).fract() - 0.5)).collect();
     all[9 * joints + 1] = f64::INFINITY;
@@ -37,7 +37,7 @@ fn of_pose(X: &flexarm_kinematics::Pose) -> Vec<u64> {
     bits(X.translation.vector.iter().chain(X.rotation.matrix()))
 }
 
-/// Number of poses with an answer, all with the bits of [`OperatingPoint::solve`].
+/// Returns the number of poses with a result, all bitwise those of [`OperatingPoint::solve`].
 fn assert_equal_alone(stiffness: f64, F: &Wrench) -> usize {
     let (mut together, mut alone) = (point(stiffness), point(stiffness));
     let joints = together.arm().model.n_actuated();
@@ -64,8 +64,8 @@ fn assert_equal_alone(stiffness: f64, F: &Wrench) -> usize {
     answered
 }
 
-/// Truth: each pose alone. Under the last load the softest arm moves by metres, far from the plain
-/// way that lanes go.
+/// Truth: each pose individually. Under the last load the softest arm deflects by metres, far from
+/// the standard path of the lanes.
 #[test]
 fn every_pose_among_many_has_the_bits_of_the_pose_alone() {
     let (force, moment) = (Vector3::new(20.0, -35.0, 60.0), Vector3::new(3.0, 8.0, -5.0));
@@ -81,7 +81,7 @@ fn every_pose_among_many_has_the_bits_of_the_pose_alone() {
     }
 }
 
-/// What is no whole pose is told as such, and so is a load that is no number.
+/// An incomplete pose and a load that is not finite are reported as errors.
 #[test]
 fn half_a_pose_and_a_broken_load_have_their_errors() {
     let mut at = point(1.0);

@@ -46,7 +46,7 @@ fn arm() -> FlexibleArm {
     FlexibleArm::new(model, springs, Arc::new(motion)).expect("valid")
 }
 
-/// Largest TCP difference to the golden curve over the peak deflection.
+/// Returns the maximum TCP difference to the golden curve relative to the peak deflection.
 fn tcp_error(kind: StepperKind, h: f64) -> f64 {
     let golden = golden();
     let arm = arm();
@@ -83,10 +83,10 @@ fn spook(form: ConstraintForm, preset: SpookPreset) -> StepperKind {
 
 const ALPHA: StepperKind = StepperKind::GeneralizedAlpha(AlphaSettings { rho: 0.9, dispersion_correction: true });
 
-/// Truth: Pinocchio's mass matrix and the central differences of its gravity forces about the same
+/// Truth: Pinocchio's mass matrix and central differences of its gravity forces about the same
 /// pose.
 ///
-/// (Pinocchio's own derivative of gravity leaves out dS/dq of its ZYX joint: 9.0634 Hz instead of
+/// (Pinocchio's own derivative of gravity omits dS/dq of its ZYX joint: 9.0634 Hz instead of
 /// 9.0660.)
 #[test]
 fn frequencies_and_static_pose_equal_those_of_the_other_tool() {
@@ -134,8 +134,8 @@ fn plain_generalized_alpha_is_bounded_by_the_trapezoidal_rule() {
     assert!(trapezoidal < errors[0] && trapezoidal > 1.03e-2);
 }
 
-/// Newton's iteration may leave a part of its first correction where damping forgets it: the path
-/// then differs from that of an iteration to the end by less than the step itself is in error.
+/// Newton's iteration may leave a fraction of its first correction if damping removes it: the path
+/// then differs from that of fully converged iterations by less than the error of the step size.
 /// Elastic coordinates every 20 ms for 2 s; measured 1/9 of the error at 5 ms and 1/20 at 1 ms,
 /// with half the evaluations.
 #[test]
@@ -154,7 +154,7 @@ fn what_a_quick_iteration_leaves_is_small_beside_the_error_of_its_step() {
         }
         (path, alpha.counts().evaluations)
     };
-    // 10 ms are less than twelve steps in the period of the first mode.
+    // 10 ms is less than twelve steps per period of the first mode.
     for (h, part) in [(10e-3, 1e-3), (5e-3, 0.03), (1e-3, 0.03)] {
         let ((quick, few), (whole, many)) = (path(h, Some(part)), path(h, None));
         let (finer, _) = path(0.25 * h, None);
@@ -166,10 +166,11 @@ fn what_a_quick_iteration_leaves_is_small_beside_the_error_of_its_step() {
     }
 }
 
-/// Steps of 10 ms, less than twelve in the period of the first mode, as a run takes them: about two
-/// evaluations each, not one, which lightly damped arms do not stand, nor an iteration to the end.
-/// Beside that, measured 1.5e-3 of the largest elastic coordinate apart in 2 s, whatever iterations
-/// leave: a run cuts the steps in which the motion begins.
+/// Steps of 10 ms, fewer than twelve per period of the first mode, with the settings of a run:
+/// about two evaluations each, neither one, which is unstable for lightly damped arms, nor full
+/// convergence. Measured difference to the fully converged run: 1.5e-3 of the largest elastic
+/// coordinate in 2 s, independent of the iteration error, because a run subdivides the steps in
+/// which the motion begins.
 #[test]
 fn coarse_steps_of_a_run_take_two_evaluations() {
     let h = 10e-3;
@@ -193,10 +194,10 @@ fn coarse_steps_of_a_run_take_two_evaluations() {
     assert!(10 * few < 7 * many && few > 300, "{few} {many}"); // measured 425 and 771 in 200 steps
 }
 
-/// A load that grows to many times the weight makes a stiffness of its own, of which Newton's
-/// matrix knows nothing: what is left of each iteration then has the same sign in every step.
-/// Truth: the stepper with error control; measured 1.6e-4 of the deflection at 10 ms with 7 steps
-/// in the period of the first mode.
+/// A load that grows to many times the weight adds a geometric stiffness that Newton's matrix does
+/// not contain: the iteration error then has the same sign in every step. Truth: the stepper with
+/// error control; measured 1.6e-4 of the deflection at 10 ms with 7 steps per period of the first
+/// mode.
 #[test]
 fn what_the_matrix_does_not_know_feeds_no_mode() {
     let at_end = |kind: StepperKind| {
@@ -218,8 +219,9 @@ fn what_the_matrix_does_not_know_feeds_no_mode() {
     assert!(error < 2e-3, "{error}");
 }
 
-/// Two runs of second order make one of third and more; measured 2.3e-5, 1.9e-6, 3.9e-7 of the peak
-/// at 4, 2, 1 ms, where generalised-alpha with the half step has 1.1e-4, 2.7e-5, 6.8e-6.
+/// Extrapolation of two second-order runs is at least of third order; measured 2.3e-5, 1.9e-6,
+/// 3.9e-7 of the peak at 4, 2, 1 ms, where generalised-alpha with the half step has 1.1e-4, 2.7e-5,
+/// 6.8e-6.
 #[test]
 fn extrapolation_takes_the_second_order_out_of_the_error() {
     let extrapolated = StepperKind::ExtrapolatedAlpha(ExtrapolatedAlpha::default());
@@ -243,15 +245,15 @@ fn sdirk3_converges_to_the_reference_with_third_order() {
     assert!((order - 3.0).abs() < 0.1, "{order}"); // measured 3.00
 }
 
-/// RK4 ends at the rounding of the stored curve (12 digits of metres); measured 1.7e-9 of the peak,
-/// 8 pm.
+/// RK4 reaches the round-off of the stored curve (12 digits of metres); measured 1.7e-9 of the
+/// peak, 8 pm.
 #[test]
 fn rk4_equals_the_reference_to_picometres() {
     assert!(tcp_error(StepperKind::Rk4, 1.25e-4) < 5e-9);
 }
 
 /// SPOOK, local form; measured 4.8e-3, 1.7e-3, 5.2e-4, 2.4e-4 of the peak at 1, 0.5, 0.2, 0.1 ms:
-/// first order at last.
+/// asymptotically first order.
 #[test]
 fn spook_converges_to_the_reference_with_first_order() {
     let errors = [1e-3, 5e-4, 2e-4, 1e-4].map(|h| tcp_error(spook(ConstraintForm::Local, SpookPreset::Exact), h));
@@ -261,7 +263,7 @@ fn spook_converges_to_the_reference_with_first_order() {
 }
 
 /// The global form differs by terms of first order in the deflection; measured 1.4e-3 of the peak,
-/// whatever the step.
+/// for any step size.
 #[test]
 fn global_constraints_differ_from_local_ones_by_the_size_of_the_deflection() {
     let local = tcp_error(spook(ConstraintForm::Local, SpookPreset::Exact), 1e-4);
@@ -272,8 +274,8 @@ fn global_constraints_differ_from_local_ones_by_the_size_of_the_deflection() {
 }
 
 /// The source preset damps with tau = 2h instead of the physical time: its error does not vanish
-/// with the step. Measured 3.4e-2 at 1 ms (tau = 2 ms is near the physical 1.05 ms) and 1.6e-1 at
-/// 0.1 ms (hardly damped).
+/// with the step size. Measured 3.4e-2 at 1 ms (tau = 2 ms is near the physical 1.05 ms) and 1.6e-1
+/// at 0.1 ms (almost undamped).
 #[test]
 fn source_preset_ties_the_damping_to_the_step() {
     let kind = spook(ConstraintForm::Local, SpookPreset::Source);
@@ -286,8 +288,8 @@ const fn reference(method: ReferenceMethod, rtol: f64) -> StepperKind {
     StepperKind::Reference(ReferenceSettings { rtol, atol: 1e-3 * rtol, method })
 }
 
-/// Error control: the error (m) falls with the tolerance, at 1e-9 about a nanometre. The table is
-/// the measured one.
+/// Error control: the error (m) decreases with the tolerance, at 1e-9 to about a nanometre.
+/// Measured:
 ///
 /// | rtol | bdf | evaluations | esdirk34 | evaluations | tsit45 | evaluations |
 /// | --- | --- | --- | --- | --- | --- | --- |
@@ -298,8 +300,8 @@ const fn reference(method: ReferenceMethod, rtol: f64) -> StepperKind {
 /// | 1e-10 | 2.5e-10 | 14989 | | | 7.3e-11 | 104941 |
 /// | 1e-11 | 4.8e-11 | 20500 | | | 1.0e-11 | 117997 |
 ///
-/// RK4 at 0.125 ms takes 128000 evaluations; it is unstable at 0.25 ms. The explicit pair works at
-/// its stability limit too. The stored curve itself is good to 8e-12.
+/// RK4 at 0.125 ms takes 128000 evaluations; it is unstable at 0.25 ms. The explicit pair also
+/// works at its stability limit. The stored curve itself is accurate to 8e-12.
 #[test]
 fn reference_stepper_converges_with_its_tolerance() {
     use ReferenceMethod::{Bdf, Esdirk34, Tsit45};
@@ -317,10 +319,10 @@ fn reference_stepper_converges_with_its_tolerance() {
     }
 }
 
-/// Second algorithm: the two methods that share nothing but the right-hand side, modal damping of 3
-/// % as in most robot files.
+/// Second algorithm: the two methods share only the right-hand side; modal damping of 3 % as in
+/// most robot files.
 ///
-/// Largest difference of an elastic coordinate over 4 s; measured 2.2e-12 (explicit) and 4.5e-12
+/// Maximum difference of an elastic coordinate over 4 s; measured 2.2e-12 (explicit) and 4.5e-12
 /// (BDF) m or rad.
 #[test]
 fn reference_stepper_agrees_with_rk4() {
@@ -348,8 +350,8 @@ fn reference_stepper_agrees_with_rk4() {
     }
 }
 
-/// No stepper of the registry allocates in its step, but those that say so: their solver is another
-/// library's.
+/// No stepper of the registry allocates in its steps, except those that declare it because their
+/// solver is another library's.
 #[test]
 fn steps_do_not_allocate() {
     for entry in STEPPERS.into_iter().filter(|entry| !entry.allocates) {
@@ -409,10 +411,11 @@ fn work_of_the_drives_is_stored_or_dissipated() {
     }
 }
 
-/// Newton stays as quick when the links are damped unlike each other, and the run agrees with RK4.
+/// Newton's method converges as fast when the damping of the links differs, and the run agrees with
+/// RK4.
 ///
-/// The corrected iteration matrix is not symmetric then; it was factorised as if it were, and such
-/// runs diverged.
+/// Regression: the corrected iteration matrix is then not symmetric; it was factorised as if it
+/// were, and such runs diverged.
 #[test]
 fn unlike_damping_of_the_links_costs_no_more_iterations() {
     let reference = reference_arm(true);
@@ -448,8 +451,8 @@ fn unlike_damping_of_the_links_costs_no_more_iterations() {
         eprintln!("{damping:?}: {counts:?} (plain {count:?}), error {error:.1e} (plain {plain_error:.1e})");
         assert!(counts.evaluations < 2 * count.evaluations);
         assert!(counts.factorisations < 4 * count.factorisations + 20);
-        // The correction knows nothing of damping: where modes are overdamped it gains nothing, and
-        // little is left anyway.
+        // The correction does not account for damping: for overdamped modes it gains nothing, and
+        // their error is small anyway.
         assert!(error < plain_error.max(1e-5));
     }
 }

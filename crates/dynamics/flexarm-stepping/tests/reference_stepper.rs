@@ -1,4 +1,4 @@
-//! The reference stepper: closed forms, restarts, its work on the reference arm.
+//! Reference stepper: closed forms, restarts, its work on the reference arm.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
@@ -9,8 +9,8 @@ use nalgebra::{DMatrix, DVector};
 
 use ReferenceMethod::{Bdf, Esdirk34, Tsit45};
 
-/// `ẍ + 2 ζ ω ẋ + ω² x = load(t)`, uncoupled; it has no matrices, the reference stepper asks for
-/// none.
+/// `ẍ + 2 ζ ω ẋ + ω² x = load(t)`, uncoupled; without matrices, which the reference stepper does
+/// not use.
 struct Oscillators<F> {
     omega: Vec<f64>,
     zeta: f64,
@@ -55,7 +55,8 @@ fn settings(method: ReferenceMethod, rtol: f64) -> ReferenceSettings {
 
 const METHODS: [ReferenceMethod; 3] = [Bdf, Esdirk34, Tsit45];
 
-/// A run over `t` in `[0, 1]`; the largest error of x and of v/ω at the points, and the integrator.
+/// Runs over `t` in `[0, 1]`; returns the maximum error of x and of v/ω at the points, and the
+/// integrator.
 fn run<F: Fn(f64) -> f64>(
     system: &mut Oscillators<F>,
     settings: ReferenceSettings,
@@ -80,8 +81,8 @@ fn run<F: Fn(f64) -> f64>(
 
 const OMEGA: f64 = TAU * 10.0;
 
-/// Truth: `x = cos ω t`, ten periods. Measured, over the tolerance: BDF 12 to 170, ESDIRK 60 to
-/// 330, explicit 2 to 3.
+/// Truth: `x = cos ω t`, ten periods. Measured, relative to the tolerance: BDF 12 to 170, ESDIRK 60
+/// to 330, explicit 2 to 3.
 #[test]
 fn harmonic_oscillator_keeps_its_closed_form_to_the_tolerance() {
     for method in METHODS {
@@ -110,8 +111,8 @@ fn harmonic_oscillator_keeps_its_closed_form_to_the_tolerance() {
     }
 }
 
-/// `ẍ + 2 ζ ω ẋ + ω² x = f sin p t` from rest: driven part and the free vibration that cancels it
-/// at the start.
+/// `ẍ + 2 ζ ω ẋ + ω² x = f sin p t` from rest: forced vibration plus the free vibration that
+/// cancels it at the start.
 fn driven(t: f64, zeta: f64, f: f64, p: f64) -> [f64; 2] {
     let (a, b) = (OMEGA * OMEGA - p * p, 2.0 * zeta * OMEGA * p);
     let (s, c) = (f * a / (a * a + b * b), -f * b / (a * a + b * b));
@@ -124,7 +125,7 @@ fn driven(t: f64, zeta: f64, f: f64, p: f64) -> [f64; 2] {
     ]
 }
 
-/// Truth: the closed form above. Measured at 1e-8, over the tolerance times the amplitude: BDF 24,
+/// Truth: the closed form above. Measured at 1e-8, relative to tolerance times amplitude: BDF 24,
 /// ESDIRK 100, explicit 0.3.
 #[test]
 fn damped_driven_oscillator_keeps_its_closed_form() {
@@ -139,10 +140,10 @@ fn damped_driven_oscillator_keeps_its_closed_form() {
     }
 }
 
-/// Points inside the solver's steps are as good as its own: ten thousand points, hundreds to a
-/// step, against a hundred.
+/// Points inside the solver's steps are as accurate as the steps: ten thousand points, hundreds per
+/// step, against one hundred.
 ///
-/// Measured: the largest errors differ by 5 % at most.
+/// Measured: the maximum errors differ by at most 5 %.
 #[test]
 fn error_between_the_steps_is_that_of_the_steps() {
     for method in METHODS {
@@ -159,14 +160,14 @@ fn error_between_the_steps_is_that_of_the_steps() {
     }
 }
 
-/// Rest, then a load that jumps at s: `x = (1 - cos ω(t - s)) f/ω²`.
+/// Closed form from rest with a load that jumps at s: `x = (1 - cos ω(t - s)) f/ω²`.
 fn after_jump(t: f64, s: f64) -> [f64; 2] {
     let u = OMEGA * (t - s).max(0.0);
     [1.0 - u.cos(), OMEGA * u.sin()]
 }
 
-/// Truth: the closed form above; s at a point, between points, and known to the system as the last
-/// time before the jump or as the first one after it.
+/// Truth: the closed form above; s at a point or between points, and defined by the system as the
+/// last time before the jump or as the first one after it.
 ///
 /// Measured: BDF 8.2e-7 at a tolerance of 1e-8, ESDIRK 1.5e-4 at 1e-6, explicit 2.8e-8 at 1e-8,
 /// with 4 to 10 % fewer evaluations than without the restart; the error is the same, because the
@@ -206,7 +207,7 @@ fn restart_at_a_jump_of_the_load_keeps_the_accuracy() {
     }
 }
 
-/// A system that its owner changes at a point: `restart` there, whatever the solver knew beyond it.
+/// A system changed from outside at a point: `restart` there discards the solution beyond it.
 #[test]
 fn restart_sees_a_system_changed_from_outside() {
     let s = 0.25;
@@ -234,7 +235,7 @@ fn restart_sees_a_system_changed_from_outside() {
     }
 }
 
-/// A restart that is announced when the solver has already passed it, and one that comes twice.
+/// A restart announced after the solver has passed it, and one announced twice.
 #[test]
 fn restart_may_be_announced_late_and_twice() {
     let (s, f) = (0.253, OMEGA * OMEGA);
@@ -255,11 +256,11 @@ fn restart_may_be_announced_late_and_twice() {
     }
 }
 
-/// A load of 20 ms after half a second of rest: no step is so long that it passes over the load.
+/// A load of 20 ms after half a second of rest: no step is long enough to miss it.
 ///
-/// Truth: the same run of the explicit method at 1e-9 with restarts at both ends of the load.
-/// Measured: 1e-2 of the end at a tolerance of 1e-3, 5e-6 to 1e-4 at 1e-6. A longest step that was
-/// rejected once counted as a restart here.
+/// Truth: the same run with the explicit method at 1e-9 and restarts at both ends of the load.
+/// Measured, relative to the final value: 1e-2 at a tolerance of 1e-3, 5e-6 to 1e-4 at 1e-6.
+/// Regression: a rejected step of maximum length once counted as a restart here.
 #[test]
 fn a_pulse_after_a_long_rest_is_seen() {
     let pulse = |t: f64| if (0.507..0.527).contains(&t) { (25.0 * TAU * (t - 0.507)).sin().powi(2) * 1e3 } else { 0.0 };
@@ -278,12 +279,12 @@ fn a_pulse_after_a_long_rest_is_seen() {
     }
 }
 
-/// What each method is for: a slow oscillator beside one of 5 kHz that hardly moves, driven for a
-/// second.
+/// Purpose of each method: a slow oscillator together with one of 5 kHz of very small amplitude,
+/// driven for a second.
 ///
 /// Measured evaluations at 1e-6, BDF / ESDIRK / explicit: 110 700, 6 160, 134 773 with 1 % damping;
-/// 1 447, 3 802, 74 029 with 90 %: only the A-stable method steps over a lightly damped fast mode,
-/// BDF over a damped one.
+/// 1 447, 3 802, 74 029 with 90 %: only the A-stable method takes steps beyond the period of a
+/// lightly damped fast mode, BDF beyond that of a damped one.
 #[test]
 fn a_fast_mode_is_stepped_over_by_the_method_made_for_it() {
     let count = |method: ReferenceMethod, zeta: f64| {
@@ -307,8 +308,7 @@ fn a_fast_mode_is_stepped_over_by_the_method_made_for_it() {
     }
 }
 
-/// A system that fails, a system that runs away and tolerances that make no sense end with their
-/// own words.
+/// A failing system, a diverging system and invalid tolerances give errors with their own message.
 #[test]
 fn failures_say_what_happened() {
     struct Failing(Option<StepError>);
@@ -341,7 +341,7 @@ fn failures_say_what_happened() {
             let error = (0..1000).find_map(|_| g.step(&mut system).err()).expect("fails");
             let (t, x) = (g.time(), g.now.x[0]);
             match fault {
-                // All points before the failure were delivered, and it does not go away.
+                // All points before the failure were delivered, and the failure persists.
                 Some(_) => {
                     assert!(error == singular && (0.098..0.101).contains(&t), "{method:?}: {error} {t}");
                     assert_eq!(g.step(&mut system), Err(singular.clone()));
@@ -363,7 +363,7 @@ fn failures_say_what_happened() {
     }
 }
 
-/// An arm without elastic links has nothing to integrate; time goes on.
+/// An arm without elastic links has nothing to integrate; the time still advances.
 #[test]
 fn no_coordinates_are_no_trouble() {
     let mut system = Oscillators { omega: vec![], zeta: 0.0, load: |_| 0.0, evaluations: 0 };

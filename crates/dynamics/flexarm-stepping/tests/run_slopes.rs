@@ -36,7 +36,7 @@ fn oscillator(m: f64, k: f64, d: f64) -> FlexibleArm {
     FlexibleArm::new(Arc::new(Model::new(&tree).unwrap()), vec![spring], Arc::new(Held(vec![]))).unwrap()
 }
 
-/// Fall from the relaxed spring in closed form, and its derivatives by m, k and d.
+/// Closed form of the fall from the relaxed spring, and its derivatives with respect to m, k and d.
 fn fall(m: f64, k: f64, d: f64, t: f64) -> [f64; 4] {
     let z = |m: f64, k: f64, d: f64| {
         let (w2, s) = (k / m, d / (2.0 * m));
@@ -55,8 +55,8 @@ fn fall(m: f64, k: f64, d: f64, t: f64) -> [f64; 4] {
     ]
 }
 
-/// Truth: closed form. The derivatives converge as the run itself does, with the second power of
-/// the step.
+/// Truth: closed form. The derivatives converge as the run itself does, with the square of the step
+/// size.
 #[test]
 fn a_falling_mass_depends_on_mass_spring_and_damper_as_in_closed_form() {
     let (m, k, d) = (10.0, 1.6e4, 60.0);
@@ -91,7 +91,7 @@ fn a_falling_mass_depends_on_mass_spring_and_damper_as_in_closed_form() {
             let order = (errors[0][i] / errors[1][i]).log2();
             assert!((order - 2.0).abs() < 0.25, "{i}: order {order}, {errors:?}");
         }
-        // 3e-2 to 1e-3 of the sag without the correction: the phase drifts for four periods.
+        // 3e-2 to 1e-3 of the sag without the correction: the phase drifts over four periods.
         assert!(errors[1].iter().all(|error| *error < 3e-2), "{errors:?}");
     }
 }
@@ -99,15 +99,15 @@ fn a_falling_mass_depends_on_mass_spring_and_damper_as_in_closed_form() {
 /// Parameters of the reference arm, by number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum What {
-    /// All of the lower spring, with its damping.
+    /// Stiffness of the whole lower spring, with its damping.
     Lower,
-    /// One entry of the upper spring.
+    /// One entry of the upper spring's stiffness.
     Entry,
     Damper,
     Mass,
-    /// A shift of a joint's whole motion.
+    /// Shift of the whole motion of a joint.
     Shift(usize),
-    /// So many times the motion of a joint.
+    /// Factor on the motion of a joint.
     Stretch(usize),
     Tool,
 }
@@ -161,7 +161,7 @@ struct Case {
 }
 
 impl Case {
-    /// The arm with one parameter changed by x: ten times as soft as the reference arm.
+    /// Returns the arm with one parameter changed by x, ten times softer than the reference arm.
     fn arm(&self, what: What, x: f64) -> FlexibleArm {
         let by = |other: What| if what == other { x } else { 0.0 };
         let K_S = reference_arm(true).K_S.map(|K| K / 10.0);
@@ -190,7 +190,7 @@ impl Case {
         let force =
             |t: f64| Wrench::new(Vector3::new(80.0 * (9.0 * t).sin(), 0.0, -50.0), Vector3::new(0.0, 20.0, 5.0));
         let world = Load::at_origin(body, TimedWrench::new(force));
-        // From the middle of a step on.
+        // Starts in the middle of a step.
         let late = move |t: f64| if t < 0.1013 { Wrench::zeros() } else { force(2.0 * t) };
         let turning = TimedWrench::new(late).in_axes(LoadAxes::Frame).with_jumps(vec![0.1013]);
         let turning = Load { X_BF: Pose::translation(0.1, 0.2, -0.1), ..Load::at_origin(body - 1, turning) };
@@ -248,7 +248,8 @@ impl Case {
         }
     }
 
-    /// Errors of all times after each other, then their sizes at the steps of the peaks, and RMS.
+    /// Returns the errors at all times, concatenated, then their sizes at the steps of the peaks,
+    /// and the RMS values.
     fn run(&self, what: What, x: f64, peaks: [usize; 2]) -> DVector<f64> {
         let arm = self.arm(what, x);
         let tool = if what == What::Tool { Vector3::new(0.3, -0.2, 0.5) * x } else { Vector3::zeros() };
@@ -258,8 +259,8 @@ impl Case {
         DVector::from_iterator(6 * found.errors.len() + 4, found.errors.iter().flatten().copied().chain(figures))
     }
 
-    /// Largest error of each direction over its largest entry: along the run, and of the four
-    /// figures.
+    /// Compares derivatives and differences: maximum error of each direction relative to its
+    /// largest entry, along the run and for the four figures.
     fn compare(&self, name: &str, bound: f64) {
         let arm = self.arm(What::Tool, 0.0);
         let directions = ALL.map(|what| self.direction(what));
@@ -283,13 +284,13 @@ impl Case {
             let figures_off: Vec<f64> = of_figures.iter().zip(figures).map(|(a, b)| a - b).collect();
             let (error, of_figures) = (scale(&off) / scale(along), scale(&figures_off) / scale(figures));
             eprintln!("{name}, {what:?}: {error:.1e} of {:.2e}, figures {of_figures:.1e}", scale(along));
-            // 1e-9 and less: where least, the rounding of the differences.
+            // 1e-9 and less; at best limited by the round-off of the differences.
             assert!(error < bound && of_figures < bound, "{name}, {what:?}: {error:e} {of_figures:e}");
         }
     }
 }
 
-/// Derivative by differences of sixth order.
+/// Returns the derivative by sixth-order differences.
 fn richardson(h: f64, f: impl Fn(f64) -> DVector<f64>) -> DVector<f64> {
     let d = |h: f64| (f(h) - f(-h)) / (2.0 * h);
     let (a, b, c) = (d(h), d(0.5 * h), d(0.25 * h));
@@ -320,8 +321,8 @@ fn loads_that_jump_and_turn_and_balancers_are_in_the_derivatives() {
     Case { tree, loaded: true, settings: AlphaSettings::default() }.compare("loads and balancers", 1e-8);
 }
 
-/// An ordinary run ends its iterations early and keeps its matrices: what that does is small beside
-/// the run, and beside its error.
+/// An ordinary run ends its iterations early and keeps its matrices: the effect is small compared
+/// with the run and with its error.
 #[test]
 fn the_run_that_is_differentiated_is_the_ordinary_run_but_for_what_iterations_leave() {
     let case = Case { tree: reference_arm(true).mechanism, loaded: false, settings: AlphaSettings::default() };
@@ -384,7 +385,7 @@ fn twice_as_many_steps_allocate_no_more() {
     let case = Case { tree: reference_arm(true).mechanism, loaded: true, settings: AlphaSettings::default() };
     let arm = case.arm(What::Tool, 0.0);
     let directions = ALL.map(|what| case.direction(what));
-    // The first run makes workspaces that the others take.
+    // The first run creates workspaces that the others reuse.
     let counts = [0.3, 0.3, 0.6].map(|duration_s| {
         let request = SlopesRequest { duration_s, keep_samples: false, ..case.request(&arm, Vector3::zeros()) };
         count_allocations(|| drop(run_slopes(&arm, &request, &directions).unwrap()))

@@ -1,5 +1,5 @@
-//! Derivatives of runs of joints under servos, of gears with laws of their own and of payloads that
-//! change: against Richardson differences of whole runs.
+//! Derivatives of runs with servos, gear laws and payload changes against Richardson differences of
+//! whole runs.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
@@ -19,19 +19,19 @@ const GEAR: [f64; 3] = [9e4, 7e4, 3e4];
 const GEAR_DAMPING: f64 = 30.0;
 const ROTOR: f64 = 6.0;
 const STEP: f64 = 2e-3;
-/// Of the tool's error as differences see it (m, rad).
+/// Round-off of the tool error in the differences (m, rad).
 const ROUNDING: f64 = 2e-14;
 
-/// One number of the arm.
+/// One parameter of the arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum What {
     /// Stiffness of the gear of the second joint, as a factor.
     Gear,
-    /// Of the link that bends, with its damping.
+    /// Stiffness of the flexible link, with its damping, as a factor.
     Link,
     /// Damping of the last gear, as a factor.
     Damper,
-    /// kg on the last body, which the controller knows of.
+    /// Additional mass of the last body (kg), known to the controller.
     Mass,
     Viscous,
     Coulomb,
@@ -41,7 +41,7 @@ enum What {
     Position,
     Velocity,
     Integral,
-    /// Factor on what all servos feed forward.
+    /// Factor on the feed-forward of all servos.
     Ahead,
     Shift(usize),
     Stretch(usize),
@@ -68,7 +68,7 @@ const ALL: [What; 17] = [
     What::Tool,
 ];
 
-/// Three joints that each turn to and fro.
+/// Oscillation of three joints.
 struct Swing {
     shift: [f64; 3],
     stretch: [f64; 3],
@@ -91,8 +91,8 @@ fn inertia(mass: f64) -> LinkInertia {
     LinkInertia { mass, com: vector![0.03, -0.02, 0.25], inertia_com: moments }
 }
 
-/// About z, y, y, a motor and a gear at each; the second link bends in its middle. `factor` on all
-/// inertias and the weight.
+/// Three joints about z, y, y, each with a motor and a gear; the second link is flexible in its
+/// middle. `factor` scales all inertias and the weight.
 fn tree(elastic: bool, factor: f64) -> Mechanism {
     let mut tree = Mechanism::new("arm");
     let link = |name: &str, inertia: Option<LinkInertia>| Link { name: name.into(), inertia };
@@ -139,7 +139,7 @@ fn axis(coordinate: usize) -> ServoAxis {
     ServoAxis { coordinate, position_gain, velocity_gain, integral_gain, feed_forward: true, limit: f64::INFINITY }
 }
 
-/// What gears do beside giving way.
+/// Gear effects other than elasticity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Gears {
     Plain,
@@ -159,7 +159,7 @@ struct Case {
     integral: bool,
     gears: Gears,
     friction: bool,
-    /// Whether the payload changes on the way, under a load.
+    /// Whether the payload changes during the run, under a load.
     payload: bool,
     settings: AlphaSettings,
 }
@@ -179,7 +179,7 @@ impl Case {
         }
     }
 
-    /// The arm with one number changed by x.
+    /// Returns the arm with parameter `what` changed by x.
     fn arm(&self, what: What, x: f64) -> FlexibleArm {
         let by = |other: What| if what == other { x } else { 0.0 };
         let motion = Swing {
@@ -377,7 +377,7 @@ impl Case {
         }
     }
 
-    /// Errors of all times after each other.
+    /// Returns the errors at all times, concatenated.
     fn run(&self, what: What, x: f64) -> DVector<f64> {
         let arm = self.arm(what, x);
         let tool = if what == What::Tool { vector![0.3, -0.2, 0.5] * x } else { Vector3::zeros() };
@@ -385,7 +385,8 @@ impl Case {
         DVector::from_iterator(6 * found.errors.len(), found.errors.iter().flatten().copied())
     }
 
-    /// Largest error of each direction over its largest entry along the run.
+    /// Compares the derivatives with differences: maximum error of each direction relative to its
+    /// largest entry along the run.
     fn compare(&self, name: &str, all: &[What], bound: f64) -> RunSlopes {
         let arm = self.arm(What::Tool, 0.0);
         let directions: Vec<Direction> = all.iter().map(|what| self.direction(*what)).collect();
@@ -395,14 +396,15 @@ impl Case {
             let own: Vec<f64> = found.slopes.iter().skip(k).step_by(all.len()).flatten().copied().collect();
             let error = (DVector::from_vec(own) - &truth).amax();
             eprintln!("{name}, {what:?}: {:.1e} of {:.2e}", error / truth.amax(), truth.amax());
-            // Places are rounded at 2e-14 m along a run, differences by their length.
+            // Positions are rounded to 2e-14 m along a run; divided by the length of the
+            // differences.
             let rounding = ROUNDING / self.size(*what);
             assert!(error < bound * truth.amax() + rounding, "{name}, {what:?}: {error:e} {rounding:e}");
         }
         found
     }
 
-    /// Length of the differences.
+    /// Returns the length of the differences.
     fn size(&self, what: What) -> f64 {
         let size = match what {
             What::Mass | What::Tool => 0.3,
@@ -413,8 +415,8 @@ impl Case {
             What::Integral => 300.0,
             _ => 0.02,
         };
-        // So short that no torque changes its sign and no slider or servo begins to slip or to be
-        // at its limit at another sample.
+        // Short enough that no torque changes sign, and that no slider or servo changes between
+        // sticking and slipping, or reaches its limit, at a different sample.
         let kinked = [Gears::Hysteresis, Gears::LoadFriction].contains(&self.gears) || self.limit.is_finite();
         if kinked { 0.02 * size } else { size }
     }
@@ -429,7 +431,7 @@ fn heavier(model: &Model, kg: f64) -> Model {
     model.with_inertia(body, inertia)
 }
 
-/// Derivative by differences of eighth order over `± size`.
+/// Returns the derivative by eighth-order differences over `± size`.
 fn richardson(size: f64, f: impl Fn(f64) -> DVector<f64>) -> DVector<f64> {
     let h = 0.25 * size;
     let d = |k: f64| (f(k * h) - f(-k * h)) / h;
@@ -440,12 +442,13 @@ fn richardson(size: f64, f: impl Fn(f64) -> DVector<f64>) -> DVector<f64> {
 #[test]
 fn a_run_under_servos_depends_on_its_numbers_as_differences_of_runs_say() {
     Case::new().compare("servos", &ALL, 1e-8);
-    // The rigid robot with so many times the inertia and weight needs so many times the torque.
+    // If inertia and weight of the rigid robot are scaled, so is its torque.
     let case = Case { friction: false, ..Case::new() };
     case.compare("fed forward", &[What::Ahead], 1e-8);
 }
 
-/// Truth: the same, with one joint prescribed, samples that are no steps, and nothing fed forward.
+/// Truth: differences of whole runs, with one joint prescribed, samples between the ends of steps,
+/// and no feed-forward.
 #[test]
 fn servos_beside_prescribed_joints_and_samples_within_steps_are_differentiated() {
     let plain = AlphaSettings { rho: 0.8, dispersion_correction: false };
@@ -493,7 +496,7 @@ fn twice_as_many_steps_allocate_no_more() {
     let case = Case { gears: Gears::Hysteresis, payload: true, limit: 450.0, ..Case::new() };
     let arm = case.arm(What::Tool, 0.0);
     let directions = ALL.map(|what| case.direction(what));
-    // The first run makes workspaces that the others take.
+    // The first run creates workspaces that the others reuse.
     let counts = [0.3, 0.3, 0.6].map(|duration_s| {
         let request = SlopesRequest { duration_s, keep_samples: false, ..case.request(&arm, Vector3::zeros()) };
         count_allocations(|| drop(run_slopes(&arm, &request, &directions).unwrap()))

@@ -1,9 +1,9 @@
-//! What a run costs each stepper: steps, evaluations of the equations of motion (Newton iterations)
-//! and factorisations.
+//! Cost of a run with each stepper: steps, evaluations of the equations of motion (Newton
+//! iterations) and factorisations.
 //!
-//! These numbers only show change: the program itself printed them. A change that gives the same
-//! results and works twice as hard is seen here. Whoever means it writes the new numbers down; a
-//! new stepper gets a line.
+//! These numbers were printed by the program itself and only show changes, such as a modification
+//! that gives the same results at twice the cost. If a change is intended, update the numbers; add
+//! a line for a new stepper.
 #![allow(non_snake_case, reason = "monogram notation")]
 
 use std::sync::Arc;
@@ -12,8 +12,8 @@ use flexarm_kinematics::Model;
 use flexarm_stepping::*;
 use flexarm_testkit::{reference_arm, reference_motion};
 
-/// Stepper, step (s), then the work: steps, evaluations, factorisations. The reference takes steps
-/// of its own.
+/// Stepper, step size (s), then the work: steps, evaluations, factorisations. The reference stepper
+/// chooses its own steps.
 const WORK: [(&str, f64, [u64; 3]); 6] = [
     ("generalized-alpha", 1e-3, [500, 553, 15]),
     ("spook", 1e-3, [500, 500, 500]),

@@ -1,4 +1,4 @@
-//! Joint targets at rest against the equilibrium found by another way.
+//! Joint targets at rest against the equilibrium computed independently.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::expect_used, clippy::unwrap_used, reason = "a failed unwrap fails the test")]
@@ -22,7 +22,7 @@ fn arm(softer: f64) -> (FlexibleArm, Frame) {
     (FlexibleArm::new(model, springs, Arc::new(Held(POSE.to_vec()))).expect("valid"), tool)
 }
 
-/// Truth: the equilibrium of [`OperatingPoint`], on an arm that sags by 4 cm, under a load besides.
+/// Truth: the equilibrium of [`OperatingPoint`], on an arm that sags by 4 cm, also under a load.
 #[test]
 fn at_rest_the_tool_of_a_soft_arm_is_where_the_rigid_arm_has_it() {
     let (arm, tool) = arm(20.0);
@@ -54,7 +54,7 @@ fn with_the_position_alone_the_joints_move_as_little_as_they_can() {
 }
 
 /// Truth: Richardson differences of the equilibrium of [`OperatingPoint`], on an arm that sags by 4
-/// cm under a load besides.
+/// cm, also under a load.
 #[test]
 fn the_tool_at_rest_moves_with_each_command_as_its_equilibrium_does() {
     let (arm, tool) = arm(20.0);

@@ -1,4 +1,4 @@
-//! At rest every stepper is at the static equilibrium, whatever the step.
+//! At rest every stepper stays at the static equilibrium, for any step size.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
@@ -52,14 +52,14 @@ fn spook(preset: SpookPreset) -> StepperKind {
     StepperKind::Spook(SpookSettings { form: ConstraintForm::Local, preset })
 }
 
-/// Every stepper of the registry that takes steps of any length, with its default settings.
+/// Returns every stepper of the registry that accepts any step size, with its default settings.
 fn any_length() -> impl Iterator<Item = StepperKind> {
     let entries = STEPPERS.into_iter().filter(|entry| entry.steps != StepRule::UpToTheStabilityLimit);
     entries.map(|entry| (entry.with)(&StepperOptions::default()))
 }
 
-/// Truth: Newton statics `K e + g(e) = 0`. Measured: generalised-alpha 2e-16 m, SPOOK 5e-13 m of
-/// 1.9 mm.
+/// Truth: Newton statics `K e + g(e) = 0`. Measured drift: generalised-alpha 2e-16 m, SPOOK 5e-13 m
+/// of 1.9 mm.
 #[test]
 fn static_deflection_does_not_depend_on_the_step() {
     for loaded in [false, true] {
@@ -77,7 +77,7 @@ fn static_deflection_does_not_depend_on_the_step() {
     }
 }
 
-/// Distance between static and undeformed TCP.
+/// Returns the distance between the static and the undeformed TCP.
 fn static_deflection(arm: &FlexibleArm) -> f64 {
     let mut seen = Observation::new(arm);
     let mut at = |start| {
@@ -89,8 +89,8 @@ fn static_deflection(arm: &FlexibleArm) -> f64 {
     (sagging - at(Start::Undeformed)).norm()
 }
 
-/// Started undeformed and damped to rest, every stepper finds the static pose by itself; measured
-/// 2e-12 to 4e-10.
+/// Started undeformed and damped to rest, every stepper reaches the static pose; measured 2e-12 to
+/// 4e-10.
 #[test]
 fn a_ringing_arm_settles_on_the_static_pose() {
     let arm = arm(2e-2, true);
@@ -104,8 +104,8 @@ fn a_ringing_arm_settles_on_the_static_pose() {
     }
 }
 
-/// The global form leaves out a moment d × f: its rest differs by the size of the deflection, not
-/// of the step.
+/// The global form neglects a moment d × f: its rest pose has an error of the order of the
+/// deflection, independent of the step size.
 #[test]
 fn global_constraints_rest_near_the_static_pose() {
     let arm = arm(2e-2, true);
@@ -118,7 +118,7 @@ fn global_constraints_rest_near_the_static_pose() {
     assert!((errors[0] - errors[1]).abs() < 1e-7);
 }
 
-/// Truth: the drives' torques at rest are the gravity torques of the sagging arm, in every stepper
+/// Truth: the drive torques at rest are the gravity torques of the deflected arm, in every stepper
 /// from the first sample on; measured 2.6e-10.
 #[test]
 fn drives_carry_the_weight_from_the_first_sample_on() {
@@ -145,8 +145,8 @@ fn drives_carry_the_weight_from_the_first_sample_on() {
 }
 
 /// Truth: the fastest decay of an overdamped mode, `(d + sqrt(d² - 4 omega²))/2` with
-/// `d = 2 ζ omega`, against the real limit of RK4, 2.78. The damping itself, d, would refuse steps
-/// up to twice too small.
+/// `d = 2 ζ omega`, against the limit of RK4 on the real axis, 2.78. A check with d itself would
+/// refuse steps up to a factor of two below the limit.
 #[test]
 fn rk4_takes_steps_up_to_the_decay_of_an_overdamped_mode() {
     let undamped = arm(0.0, false);
@@ -176,7 +176,7 @@ fn rk4_takes_steps_up_to_the_decay_of_an_overdamped_mode() {
     }
 }
 
-/// Truth: Newton statics from nothing at each instant. Measured 3e-12 of the largest deflection.
+/// Truth: Newton statics from scratch at each time. Measured 3e-12 of the largest deflection.
 #[test]
 fn equilibria_followed_along_a_motion_are_those_found_at_each_instant() {
     let mut arm = arm(1e-3, true);
@@ -196,7 +196,7 @@ fn equilibria_followed_along_a_motion_are_those_found_at_each_instant() {
     for k in 0..=100 {
         let t = 0.02 * f64::from(k);
         if k == 50 {
-            // What happens at an instant is still to come just before it.
+            // Events at a time are still pending just before it.
             let before = path.just_before(t).expect("an equilibrium").rows(6, 12).clone_owned();
             let truth = static_equilibrium(&arm, t).expect("an equilibrium");
             worst = worst.max((before - &truth).amax());

@@ -1,5 +1,5 @@
-//! Derivatives of runs of arms with closed loops, with links in modes, and along motions with
-//! corners: against differences of whole runs.
+//! Derivatives of runs with closed loops, with modal links, and along motions with velocity jumps:
+//! against differences of whole runs.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
@@ -40,20 +40,20 @@ fn heavier(model: &Model, kg: f64) -> Model {
     model.with_inertia(body, inertia)
 }
 
-/// Derivative by differences of eighth order over `± size`.
+/// Returns the derivative by eighth-order differences over `± size`.
 fn richardson(size: f64, f: impl Fn(f64) -> DVector<f64>) -> DVector<f64> {
     let h = 0.25 * size;
     let d = |k: f64| (f(k * h) - f(-k * h)) / h;
     d(1.0) * 0.8 - d(2.0) * 0.2 + d(3.0) * (4.0 / 105.0) - d(4.0) / 280.0
 }
 
-// --- Closed loops and links in modes
-// -----------------------------------------------------------------------------------
+// --- Closed loops and modal links
 
-/// An arm whose forces are differenced: what changes is a spring, a mass, the motion, the tool.
+/// An arm whose forces are differentiated by differences; the parameters are a spring, a mass, the
+/// motion, the tool.
 struct Other {
     tree: Mechanism,
-    /// Per group of the model, ten times as soft as the arm that is shipped.
+    /// Springs per group of the model, ten times softer than those of the shipped arm.
     springs: Vec<Spring>,
     tool: &'static str,
     servo: Option<Mechanism>,
@@ -189,8 +189,8 @@ fn arms_with_closed_loops_are_differentiated() {
     }
 }
 
-/// The reference arm whose upper arm is one link, a tube of six modes; with servos a rotor on each
-/// joint.
+/// Returns the reference arm with its upper arm as one link, a tube with six modes; with servos
+/// also a rotor at each joint.
 fn modal_arm(damping: Damping, servo: bool) -> Other {
     let mut arm = reference_arm(false).mechanism;
     arm.links.retain(|link| link.name != "link4b");
@@ -227,8 +227,7 @@ fn arms_with_links_in_modes_are_differentiated() {
     }
 }
 
-// --- Corners
-// -----------------------------------------------------------------------------------------------------------
+// --- Velocity jumps
 
 /// The reference arm, at rest until 0.05 s and from 0.13 s on, in between with the speeds of its
 /// motion; or moving from the start.
@@ -253,7 +252,8 @@ impl PrescribedMotion for Corners {
     }
 }
 
-/// Truth: differences of whole runs, blows within a step, at its end and at the start of the run.
+/// Truth: differences of whole runs, with velocity jumps within a step, at its end and at the start
+/// of the run.
 #[test]
 fn motions_whose_velocity_jumps_are_differentiated() {
     let reference = reference_arm(true);

@@ -1,4 +1,4 @@
-//! Workspaces that runs of one arm hand on to each other.
+//! Workspaces that are reused between runs of one arm.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;
 
-/// Moves so many times as fast as the reference motion.
+/// Returns the reference motion at `speed` times its speed.
 fn motion(speed: f64) -> Arc<dyn PrescribedMotion> {
     Arc::new(MotionFn(move |t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| {
         let (x, y, z) = reference_motion(speed * t);
@@ -32,7 +32,7 @@ fn arm() -> FlexibleArm {
     FlexibleArm::new(model, springs, motion(1.0)).unwrap()
 }
 
-/// Bits of all that a run and its equilibria show.
+/// Returns the bits of all results of a run and of its equilibria.
 fn bits(arm: &FlexibleArm, kind: StepperKind) -> Vec<u64> {
     let mut stepper = new_stepper(kind, arm.clone(), 2e-3, Start::Equilibrium).unwrap();
     let mut path = StaticPath::new(arm.clone());
@@ -57,7 +57,7 @@ fn bits(arm: &FlexibleArm, kind: StepperKind) -> Vec<u64> {
     bits
 }
 
-/// Heavier at the tool from a time on.
+/// Returns a change to a heavier tool at a given time.
 fn payload(arm: &FlexibleArm, t: f64) -> InertiaChange {
     let body = arm.model.frame("link6").unwrap().body;
     let mut inertia = arm.model.bodies()[body].inertia;
@@ -65,8 +65,8 @@ fn payload(arm: &FlexibleArm, t: f64) -> InertiaChange {
     InertiaChange { t, body, inertia }
 }
 
-/// Truth: the same run of an arm that has run nothing before. In between the arm runs other
-/// motions, under loads, with payloads that come before and during a run.
+/// Truth: the same run of an arm that has not run before. In between the arm runs other motions,
+/// under loads, with payload changes before and during a run.
 #[test]
 fn a_run_has_the_same_bits_with_new_and_with_used_workspaces() {
     let shared = arm();
@@ -101,7 +101,7 @@ fn the_second_run_of_an_arm_takes_less_memory_than_the_first() {
     assert!(second + 50 < first, "{second} and {first} allocations");
 }
 
-/// Truth: poses with the springs bent and with the springs at zero; energy and loads by the
+/// Truth: poses with the springs deflected and with the springs at zero; energy and loads from the
 /// stiffness matrix.
 #[test]
 fn displacement_energy_and_loads_are_those_of_their_definitions() {

@@ -1,10 +1,10 @@
-//! Generalised-alpha over arms in lanes: the steps of [`crate::GeneralizedAlpha`], each lane with
-//! its bits.
+//! Generalised-alpha for arms in SIMD lanes: the steps of [`crate::GeneralizedAlpha`], bitwise the
+//! same in each lane.
 //!
-//! All lanes share the times of their steps. Each decides by itself when its iteration ends and
-//! when its matrix is renewed; where one lane needs a matrix, all compute one and the others keep
-//! theirs. A lane that would do anything else than take whole steps, or whose step fails, is left
-//! behind ([`LaneAlpha::left_behind`]): its run is to be taken alone.
+//! All lanes share the times of their steps. Each lane has its own decisions on convergence and on
+//! renewal of its matrix; if one lane needs a matrix, all compute the mass matrix and the others
+//! keep their matrices. A lane whose step fails or would have to be subdivided is abandoned
+//! ([`LaneAlpha::left_behind`]), and its run is computed individually.
 
 use std::sync::Arc;
 
@@ -25,38 +25,38 @@ use crate::stepper::{LARGEST_DEFLECTION, Start};
 use crate::steppers::{AlphaSettings, Coefficients, Course, FOLLOWED_TO, GeneralizedAlpha, follows, leave_of};
 use crate::system::SecondOrderSystem;
 
-/// Parts of a step.
+/// Phases of a step.
 #[derive(Clone, Copy, PartialEq)]
 enum Part {
-    /// A matrix at its start.
+    /// Computation of a matrix at the start.
     Begin,
     /// Newton's method.
     Iterate,
-    /// Matrices for the next one.
+    /// Renewal of matrices for the next step.
     End,
 }
 
-/// One run: its motion, and the memory of its Newton iterations.
+/// One run: its motion, and the state of its Newton iterations.
 struct Lane {
     motion: Arc<dyn PrescribedMotion>,
     newton: Newton,
-    /// `c_D D + c_K K` and K, which do not change.
+    /// `c_D D + c_K K` and K, both constant.
     C: DMatrix<f64>,
     K: DMatrix<f64>,
-    /// Its matrices between two renewals, where they are followed.
+    /// Extrapolation of its matrices between two renewals, if used.
     course: Option<Course>,
-    /// Whether its run goes on here.
+    /// Whether the run continues in this lane.
     alive: bool,
 }
 
-/// Prescribed joints at the start of a step, by which it is known whether the step has to be cut,
-/// as [`ReducedArm::resolved`] tells.
+/// Prescribed joints at the start of a step, to decide whether the step has to be subdivided as in
+/// [`ReducedArm::resolved`].
 struct Joints<T> {
-    /// Room for the motion of one lane.
+    /// Workspace for the motion of one lane.
     own: [Vec<f64>; 3],
     qdot: Vec<T>,
     qddot: Vec<T>,
-    /// Largest speeds so far.
+    /// Maximum speeds so far.
     top: Vec<T>,
 }
 
@@ -71,7 +71,7 @@ impl<T: Real> Joints<T> {
         }
     }
 
-    /// A step begins with these rates.
+    /// Begins a step with these rates.
     #[inline(always)]
     fn begin(&mut self, qdot: &[T], qddot: &[T]) {
         self.qdot.copy_from_slice(qdot);
@@ -81,7 +81,8 @@ impl<T: Real> Joints<T> {
         }
     }
 
-    /// 1 where a step of length h may end with these rates; the next one begins with them.
+    /// Returns 1 in lanes in which a step of size h may end with these rates; the next step begins
+    /// with them.
     #[inline(always)]
     fn meets_impulse(&mut self, h: f64, qdot: &[T], qddot: &[T]) -> T {
         let [(_, at_start), (_, at_end)] = GeneralizedAlpha::ENDS;
@@ -90,7 +91,7 @@ impl<T: Real> Joints<T> {
             let mean = T::zero() + T::splat(at_start) * self.qddot[k];
             let defect = qdot[k] - self.qdot[k] - T::splat(h) * (mean + T::splat(at_end) * qddot[k]);
             let bound = T::splat(IMPULSE_DEFECT) * larger(self.top[k], qdot[k].abs());
-            // No number meets anything.
+            // NaN does not satisfy the bound.
             let below = bound.pick_below(defect.abs(), T::zero(), meets);
             let number = (defect * T::zero()).pick_below(T::splat(0.5), T::one(), T::zero());
             meets = number.pick_below(T::splat(0.5), T::zero(), below);
@@ -100,7 +101,7 @@ impl<T: Real> Joints<T> {
     }
 }
 
-/// Runs in lanes, at one time.
+/// Runs in lanes at one common time.
 pub(super) struct LaneAlpha<T: Real> {
     coefficients: Coefficients,
     /// `c h²` of the dispersion correction, 0 without.
@@ -110,14 +111,14 @@ pub(super) struct LaneAlpha<T: Real> {
     arm: LaneArm<T>,
     joints: Joints<T>,
     pub(super) grid: TimeGrid,
-    /// Positions, velocities, accelerations; ẍ one step before, a and x̃.
+    /// Positions, velocities, accelerations; ẍ of the previous step; a and x̃.
     x: Vec<T>,
     v: Vec<T>,
     acceleration: Vec<T>,
     previous: Vec<T>,
     a: Vec<T>,
     x_tilde: Vec<T>,
-    /// The same on trial.
+    /// Trial values of the same.
     x_new: Vec<T>,
     v_new: Vec<T>,
     trial: Vec<T>,
@@ -129,9 +130,10 @@ pub(super) struct LaneAlpha<T: Real> {
     /// `M^-1 K` and the inverse of Newton's matrix.
     M_inverse_K: Vec<T>,
     inverse: Vec<T>,
-    /// What a step adds to both, by their courses.
+    /// Change of both matrices per step, by their extrapolation.
     changes: [Vec<T>; 2],
-    /// Whether each of them still lacks what this step adds: that comes with its next product.
+    /// Whether each of them still lacks the change of this step, which is added with its next
+    /// product.
     behind: [bool; 2],
     /// Workspaces of the matrices.
     S: Vec<T>,
@@ -139,10 +141,10 @@ pub(super) struct LaneAlpha<T: Real> {
 }
 
 impl<T: Real> LaneAlpha<T> {
-    /// Arms at the start of their runs, as many as lanes; `None` where lanes do not know them.
+    /// Creates the runs at their start, one arm per lane; `None` if lanes do not support them.
     ///
     /// # Errors
-    /// As a run alone, with the number of the lane.
+    /// As of an individual run, with the number of the lane.
     pub(super) fn new(
         arms: &[&FlexibleArm],
         settings: AlphaSettings,
@@ -191,7 +193,7 @@ impl<T: Real> LaneAlpha<T> {
         }
         let [qdot, qddot] = all.arm.joint_rates();
         all.joints.begin(qdot, qddot);
-        // Poses of the joints, before any step.
+        // Poses of the joints before the first step.
         all.arm.residual(T::one(), &all.x, &all.v, &all.acceleration, &mut all.r);
         all.a.copy_from_slice(&all.acceleration);
         all.x_tilde.copy_from_slice(&all.acceleration);
@@ -199,7 +201,7 @@ impl<T: Real> LaneAlpha<T> {
         Some(Ok(all))
     }
 
-    /// The start of one run, as it would be alone.
+    /// Starts one run as it would start individually.
     fn begin(
         &mut self,
         lane: usize,
@@ -243,21 +245,22 @@ impl<T: Real> LaneAlpha<T> {
         self.arm.set_joints(lane, q, qdot, system.qddot.as_slice());
     }
 
-    /// Flexible minus rigid place of a frame now (m, world axes).
+    /// Returns the current flexible minus rigid position of a frame (m, world axes).
     #[inline(always)]
     pub(super) fn deflection(&mut self, tool: &Frame) -> Vector3<T> {
         self.arm.deflection(tool, &self.x)
     }
 
-    /// Whether the run of a lane is to be taken alone.
+    /// Returns whether the run of a lane has to be computed individually.
     pub(super) fn left_behind(&self, lane: usize) -> bool {
         !self.lanes[lane].alive
     }
 
-    /// One step of all lanes that are not left behind; of others the state means nothing.
+    /// Advances all lanes that are not abandoned by one step; the state of abandoned lanes is
+    /// undefined.
     ///
-    /// Equations of motion and matrices have one place each in it: inlined twice, the code would
-    /// not fit the processor's cache.
+    /// The residual and the matrices are each called at one place only: inlined twice, the code
+    /// would exceed the instruction cache.
     #[inline(always)]
     pub(super) fn step(&mut self) {
         let (t, h) = (self.grid.next_time(), self.grid.step_size());
@@ -269,7 +272,7 @@ impl<T: Real> LaneAlpha<T> {
         let mut active = T::one();
         let mut part = Part::Iterate;
         if self.mask(|lane| !lane.newton.factored).any_above(0.5) {
-            // The first step: the joints are still where they start.
+            // First step: the joints are still at their initial position.
             part = Part::Begin;
             self.x_new.copy_from_slice(&self.x);
             self.v_new.copy_from_slice(&self.v);
@@ -314,7 +317,7 @@ impl<T: Real> LaneAlpha<T> {
         }
     }
 
-    /// What the next step adds to the matrices that are followed.
+    /// Updates the extrapolated change of the matrices for the next step.
     #[inline(always)]
     fn follow(&mut self) {
         for (k, lane) in self.lanes.iter_mut().enumerate() {
@@ -326,7 +329,7 @@ impl<T: Real> LaneAlpha<T> {
         self.behind = [true; 2];
     }
 
-    /// 1 in the lanes that fulfil a condition, else 0.
+    /// Returns 1 in the lanes that satisfy a condition, else 0.
     fn mask(&self, condition: impl Fn(&Lane) -> bool) -> T {
         let mut mask = T::zero();
         for (k, lane) in self.lanes.iter().enumerate() {
@@ -335,7 +338,8 @@ impl<T: Real> LaneAlpha<T> {
         mask
     }
 
-    /// Puts the joints and the prediction at the end of the step; the lanes that take it.
+    /// Sets the joints and the prediction at the end of the step; returns the lanes that take the
+    /// step.
     #[inline(always)]
     fn begin_search(&mut self, t: f64) -> T {
         self.sample(t);
@@ -346,7 +350,7 @@ impl<T: Real> LaneAlpha<T> {
         self.mask(|lane| lane.alive)
     }
 
-    /// Lanes whose iteration is to get a fresh matrix, which they get once.
+    /// Returns the lanes whose iteration needs a fresh matrix; at most once per step.
     fn stalled(&mut self, active: T) -> T {
         let mut stalled = T::zero();
         for (k, search) in self.searches.iter_mut().enumerate() {
@@ -357,7 +361,8 @@ impl<T: Real> LaneAlpha<T> {
         stalled
     }
 
-    /// Joints of all lanes at the end of the step; a step that has to be cut is none for lanes.
+    /// Samples the joints of all lanes at the end of the step; lanes whose step has to be
+    /// subdivided are abandoned.
     #[inline(always)]
     fn sample(&mut self, t: f64) {
         let joints = &mut self.joints;
@@ -373,7 +378,8 @@ impl<T: Real> LaneAlpha<T> {
         }
     }
 
-    /// As in a single run, where `active` is 1.
+    /// Computes positions and velocities from the trial accelerations as in a single run, where
+    /// `active` is 1.
     #[inline(always)]
     fn place(&mut self, active: T) {
         match std::mem::take(&mut self.behind[1]) {
@@ -395,8 +401,8 @@ impl<T: Real> LaneAlpha<T> {
         }
     }
 
-    /// Takes the correction `d = J^-1 r` off everything on trial, where `active` is 1; the lanes
-    /// that go on.
+    /// Subtracts the correction `d = J^-1 r` from all trial values where `active` is 1; returns the
+    /// lanes that continue.
     #[inline(always)]
     fn correct(&mut self, active: T) -> T {
         let zero = T::zero();
@@ -426,7 +432,7 @@ impl<T: Real> LaneAlpha<T> {
         self.judge(active, &sizes)
     }
 
-    /// Whether the iteration of each lane goes on.
+    /// Returns the lanes whose iteration continues.
     fn judge(&mut self, mut active: T, sizes: &LaneSizes<T>) -> T {
         for (k, search) in self.searches.iter_mut().enumerate() {
             if active.lane(k) != 1.0 {
@@ -438,14 +444,14 @@ impl<T: Real> LaneAlpha<T> {
                 Ok(true) => lane.newton.found(search.iterations, search.iterations),
                 Err(_) => lane.alive = false,
             }
-            // A link that has come apart is told by the run alone.
+            // An excessive deflection is reported by the individual run.
             lane.alive &= sizes.place.lane(k) <= LARGEST_DEFLECTION;
             active.set_lane(k, 0.0);
         }
         active
     }
 
-    /// What was on trial becomes the state.
+    /// Accepts the trial values as the state.
     #[inline(always)]
     fn accept(&mut self) {
         for k in 0..self.x.len() {
@@ -458,9 +464,10 @@ impl<T: Real> LaneAlpha<T> {
         std::mem::swap(&mut self.acceleration, &mut self.trial);
     }
 
-    /// Newton's matrix at the configuration of the last residual, in the lanes where `wanted` is 1.
+    /// Computes Newton's matrix at the configuration of the last residual in the lanes in which
+    /// `wanted` is 1.
     ///
-    /// Mostly it is one lane, so matrices are factorised one by one: there the instructions go
+    /// Usually it is a single lane, so matrices are factorised one by one, with vector instructions
     /// along the columns.
     #[inline(always)]
     fn factor(&mut self, wanted: T) {
@@ -474,7 +481,8 @@ impl<T: Real> LaneAlpha<T> {
             for (to, from) in matrices.S.iter_mut().zip(T::flat(&self.S).chunks_exact(T::LANES)) {
                 *to = from[k];
             }
-            // A run alone goes on without a matrix, or fails: it will tell.
+            // Without a valid matrix the lane is abandoned; the individual run continues without it
+            // or reports the error.
             lane.alive &= matrices.invert(self.c_h2, lane.C.as_slice(), lane.K.as_slice());
             lane.newton.renewed();
             lane.newton.fresh = false;
@@ -489,7 +497,7 @@ impl<T: Real> LaneAlpha<T> {
     }
 }
 
-/// Newton's matrix of one lane; n × n, column after column.
+/// Newton's matrix of one lane; n × n, column-major.
 struct Matrices {
     n: usize,
     /// M, then `M + c h² K + S C Sᵀ` and its factor.
@@ -516,8 +524,8 @@ impl Matrices {
         }
     }
 
-    /// `M^-1 K` and the inverse of Newton's matrix from S and a run's C and K, as the dispersion
-    /// correction of a single run has them; false if there is none.
+    /// Computes `M^-1 K` and the inverse of Newton's matrix from S and the C and K of a run, as the
+    /// dispersion correction of a single run does; returns false if there is none.
     fn invert(&mut self, c_h2: f64, C: &[f64], K: &[f64]) -> bool {
         let Self { n, S, product, L, turned, M_inverse_K, inverse } = self;
         let n = *n;
@@ -525,7 +533,7 @@ impl Matrices {
         M_inverse_K.copy_from_slice(K);
         let positive = solve_quickly(L, M_inverse_K, n);
         congruence_quickly(c_h2, M_inverse_K, C, n, [L, turned], product);
-        // M + c h² K + S C Sᵀ, and Sᵀ on the right-hand side, which is kept transposed.
+        // M + c h² K + S C Sᵀ, and Sᵀ as right-hand side, stored transposed.
         for ((s, k), c) in S.iter_mut().zip(K).zip(product.iter()) {
             *s += c_h2 * *k;
             *s += *c;
@@ -545,7 +553,7 @@ impl Matrices {
 struct LaneSizes<T> {
     norm: T,
     correction: T,
-    /// Zero, or not a number where some correction is none.
+    /// Zero, or NaN if a correction is not finite.
     broken: T,
     acceleration: T,
     place: T,
@@ -554,7 +562,7 @@ struct LaneSizes<T> {
 impl<T: Real> LaneSizes<T> {
     #[inline(always)]
     fn include(&mut self, correction: T, acceleration: T, place: T) {
-        // What is not a number stays in a sum, and passes by in a largest value.
+        // NaN propagates through a sum but not through a maximum.
         self.broken += correction * T::zero();
         self.correction = larger(self.correction, correction.abs());
         self.acceleration = larger(self.acceleration, acceleration.abs());
@@ -569,7 +577,7 @@ impl<T: Real> LaneSizes<T> {
     }
 }
 
-/// The new value where `active` is 1, else the old one.
+/// Returns the new value where `active` is 1, else the old one.
 #[inline(always)]
 fn picked<T: Real>(active: T, old: T, new: T) -> T {
     active.pick_below(T::splat(0.5), old, new)

@@ -1,7 +1,7 @@
-//! Arms of one tree side by side: the equations of motion of [`crate::ReducedArm`] in lanes.
+//! Arms of one tree in SIMD lanes: the equations of motion of [`crate::ReducedArm`].
 //!
-//! What they share is the tree. Inertias, stiffness, damping and motion differ. All joints are
-//! prescribed, springs straight; nothing happens at discrete times.
+//! The arms share the tree; inertias, stiffness, damping and motion differ. All joints are
+//! prescribed, springs are linear, and there are no discrete events.
 
 use flexarm_kinematics::lanes::{
     LaneTree, inverse_dynamics, mass_matrix_at_poses, rigid_and_flexible, rigid_and_flexible_of_points,
@@ -15,9 +15,9 @@ use crate::dense::add_product;
 use crate::elastic_tree::ElasticTree;
 use crate::reduced::HeldModes;
 
-/// A spring in its place.
+/// A spring assigned to its coordinates.
 struct Element<T> {
-    /// First of its coordinates among the elastic ones.
+    /// Its first coordinate among the elastic ones.
     first: usize,
     size: usize,
     /// Stiffness, size × size.
@@ -29,20 +29,20 @@ struct Element<T> {
 /// Arms in lanes, with the workspaces of their equations of motion.
 pub(super) struct LaneArm<T: Real> {
     tree: LaneTree<T>,
-    /// The equations of motion of the elastic coordinates alone, where the tree is for it.
+    /// Equations of motion of the elastic coordinates only, if supported for this tree.
     points: Option<FreeForces<T>>,
     data: Data<T>,
     state: State<T>,
     qddot: Vec<T>,
     elements: Vec<Element<T>>,
-    /// Damping where it is not in proportion to the stiffness, n × n.
+    /// Damping matrix if not proportional to the stiffness, n × n.
     D: Option<Vec<T>>,
     shifted: Vec<T>,
-    /// All coordinates, of which the elastic ones count.
+    /// All coordinates, of which only the elastic ones are used.
     q: Vec<T>,
 }
 
-/// A number of each arm.
+/// Collects one number per arm in lanes.
 fn gather<'a, T: Real>(arms: &[&'a FlexibleArm], number: impl Fn(&'a FlexibleArm) -> f64) -> T {
     let mut all = T::zero();
     for (lane, arm) in arms.iter().enumerate() {
@@ -52,7 +52,7 @@ fn gather<'a, T: Real>(arms: &[&'a FlexibleArm], number: impl Fn(&'a FlexibleArm
 }
 
 impl<T: Real> LaneArm<T> {
-    /// Arms in lanes; `None` where they do not share a tree, or are what lanes do not know.
+    /// Creates the arms in lanes; `None` if they have different trees or unsupported features.
     pub(super) fn new(arms: &[&FlexibleArm]) -> Option<Self> {
         let first = arms.first()?;
         let plain = |arm: &&FlexibleArm| {
@@ -98,17 +98,17 @@ impl<T: Real> LaneArm<T> {
         })
     }
 
-    /// Number of joints, all prescribed; their coordinates come first.
+    /// Returns the number of joints, all prescribed; their coordinates come first.
     pub(super) fn joints(&self) -> usize {
         self.tree.model().n_actuated()
     }
 
-    /// Number of elastic coordinates.
+    /// Returns the number of elastic coordinates.
     pub(super) fn dimension(&self) -> usize {
         self.tree.model().n_elastic()
     }
 
-    /// Motion of the joints of one arm, until it is set again.
+    /// Sets the joint motion of one arm.
     pub(super) fn set_joints(&mut self, lane: usize, q: &[f64], qdot: &[f64], qddot: &[f64]) {
         let n = self.joints();
         set_lane(&mut self.state.q.as_mut_slice()[..n], lane, q);
@@ -116,14 +116,14 @@ impl<T: Real> LaneArm<T> {
         set_lane(&mut self.qddot[..n], lane, qddot);
     }
 
-    /// Velocities and accelerations of the joints.
+    /// Returns velocities and accelerations of the joints.
     pub(super) fn joint_rates(&self) -> [&[T]; 2] {
         let n = self.joints();
         [&self.state.qdot.as_slice()[..n], &self.qddot[..n]]
     }
 
-    /// Flexible minus rigid place of a frame (m, world axes), for the joints of the last residual
-    /// and elastic coordinates x.
+    /// Returns the flexible minus the rigid position of a frame (m, world axes), for the joints of
+    /// the last residual and elastic coordinates x.
     #[inline(always)]
     pub(super) fn deflection(&mut self, tool: &Frame, x: &[T]) -> Vector3<T> {
         self.q[self.tree.model().n_actuated()..].copy_from_slice(x);
@@ -134,8 +134,8 @@ impl<T: Real> LaneArm<T> {
         sub(&flexible, &rigid)
     }
 
-    /// `r(x, v, a)` into r. Where `active` is not 1 the elastic state stays that of the call
-    /// before, and r belongs to it.
+    /// Writes `r(x, v, a)` into `r`. Lanes in which `active` is not 1 keep the elastic state of the
+    /// previous call, and their `r` belongs to it.
     #[inline(always)]
     pub(super) fn residual(&mut self, active: T, x: &[T], v: &[T], a: &[T], r: &mut [T]) {
         let n = self.joints();
@@ -172,7 +172,7 @@ impl<T: Real> LaneArm<T> {
         }
     }
 
-    /// Mass matrix at the configuration of the last residual.
+    /// Computes the mass matrix at the configuration of the last residual.
     #[inline(always)]
     pub(super) fn mass(&mut self, M: &mut [T]) {
         if let Some(points) = &mut self.points {
@@ -186,7 +186,7 @@ impl<T: Real> LaneArm<T> {
     }
 }
 
-/// Numbers of one lane.
+/// Copies numbers into one lane.
 #[inline(always)]
 pub(super) fn set_lane<T: Real>(to: &mut [T], lane: usize, from: &[f64]) {
     for (to, from) in T::flat_mut(to).chunks_exact_mut(T::LANES).zip(from) {
@@ -194,7 +194,7 @@ pub(super) fn set_lane<T: Real>(to: &mut [T], lane: usize, from: &[f64]) {
     }
 }
 
-/// Where `active` is 1, `to` becomes `from`.
+/// Copies `from` to `to` in the lanes in which `active` is 1.
 #[inline(always)]
 fn set<T: Real>(active: T, from: &[T], to: &mut [T]) {
     let half = T::splat(0.5);

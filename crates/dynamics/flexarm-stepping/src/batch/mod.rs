@@ -1,11 +1,11 @@
-//! Many runs of one tree: payload, motion, stiffness, damping and duration differ from run to run.
+//! Many runs of one tree that differ in payload, motion, stiffness, damping and duration.
 //!
-//! Four or eight runs go side by side in the lanes of vector instructions, where the processor has
-//! them; what comes out is, to the last bit, that of the same run alone ([`Batch::run_alone`]).
-//! Runs that lanes do not know (other trees, servos, loads, payloads that change, curved springs,
-//! velocities that jump), and those whose steps have to be cut or do not converge, are taken alone.
-//! What a batch tells of a run is how far the tool is from where the rigid arm has it. Start at
-//! [`Batch::run`]; threads are the caller's. Not here: recordings, figures of settling, drives.
+//! Four or eight runs are computed in parallel in SIMD lanes if the processor has them; results are
+//! bitwise those of the same run by itself ([`Batch::run_alone`]). Runs with features that lanes do
+//! not support (different trees, servos, loads, payload changes, nonlinear springs, velocity
+//! jumps), and runs whose steps must be subdivided or do not converge, are computed individually.
+//! The result of a run is the deflection of the tool relative to the rigid arm. Start at
+//! [`Batch::run`]; threads are left to the caller. Not here: recordings, settling figures, drives.
 
 mod lane_alpha;
 mod lane_arm;
@@ -22,16 +22,16 @@ use crate::stepper::Start;
 use crate::steppers::{StepperKind, new_stepper};
 use lane_alpha::LaneAlpha;
 
-/// What all runs of a batch have in common.
+/// Common settings of the runs of a batch.
 #[derive(Clone, Debug)]
 pub struct Batch {
-    /// Step (s).
+    /// Step size (s).
     pub step_s: f64,
-    /// The stepper; only generalised-alpha takes runs side by side.
+    /// Stepper; only generalised-alpha computes runs in parallel lanes.
     pub stepper: StepperKind,
-    /// Where runs start.
+    /// Initial state of the runs.
     pub start: Start,
-    /// The frame whose deflection is told.
+    /// Frame whose deflection is computed.
     pub tool: Frame,
     /// Whether to keep the deflection after every step.
     pub keep_samples: bool,
@@ -42,32 +42,32 @@ pub struct Batch {
 pub struct BatchRun {
     /// Tree, springs, damping and motion.
     pub arm: FlexibleArm,
-    /// How long it lasts (s); its last step may pass that.
+    /// Duration (s); the last step may end after it.
     pub duration_s: f64,
 }
 
-/// How far the tool of a run was from that of the rigid arm on the same motion, at the start and
+/// Deflection of the tool of a run relative to the rigid arm on the same motion, at the start and
 /// after every step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ToolDeflection {
     /// Steps taken.
     pub steps: u64,
-    /// Largest distance (m).
+    /// Maximum distance (m).
     pub peak_m: f64,
-    /// When, for the first time (s).
+    /// Time of the first maximum (s).
     pub t_peak_s: f64,
-    /// Root of the mean square distance (m).
+    /// Root mean square distance (m).
     pub rms_m: f64,
-    /// Flexible minus rigid at the end, world axes (m).
+    /// Flexible minus rigid position at the end, world axes (m).
     pub end_m: [f64; 3],
-    /// The same at the start and after every step, if the batch keeps them.
+    /// Deflection at the start and after every step, if the batch keeps samples.
     pub samples_m: Vec<[f64; 3]>,
 }
 
 impl ToolDeflection {
     fn include(&mut self, t: f64, deflection: Vector3<f64>, keep: bool) {
         let square = dot(&deflection, &deflection);
-        // Until the end the sum of squares.
+        // Sum of squares until `finished`.
         self.rms_m += square;
         if square.sqrt() > self.peak_m {
             (self.peak_m, self.t_peak_s) = (square.sqrt(), t);
@@ -86,11 +86,11 @@ impl ToolDeflection {
 }
 
 impl Batch {
-    /// The runs, as many side by side as [`Batch::most_side_by_side`] where that is possible. Runs
-    /// that last equally long waste least.
+    /// Computes the runs, in groups of [`Batch::most_side_by_side`] where possible. Groups of runs
+    /// with equal duration waste the least time.
     ///
     /// # Errors
-    /// Of each run its own: [`StepError`] as by a stepper.
+    /// Per run: [`StepError`] as returned by a stepper.
     pub fn run(&self, runs: &[BatchRun]) -> Vec<Result<ToolDeflection, StepError>> {
         let mut all = Vec::with_capacity(runs.len());
         for group in runs.chunks(Self::most_side_by_side()) {
@@ -105,22 +105,23 @@ impl Batch {
         all
     }
 
-    /// Runs that this processor takes side by side: eight with AVX-512, four with AVX2.
+    /// Returns the number of runs that this processor computes in parallel: eight with AVX-512,
+    /// four with AVX2.
     #[cfg(target_arch = "x86_64")]
     pub fn most_side_by_side() -> usize {
         flexarm_kinematics::most_lanes()
     }
 
-    /// Runs that this processor takes side by side.
+    /// Returns the number of runs that this processor computes in parallel.
     #[cfg(not(target_arch = "x86_64"))]
     pub fn most_side_by_side() -> usize {
         1
     }
 
-    /// One run by itself.
+    /// Computes one run by itself.
     ///
     /// # Errors
-    /// [`StepError`] as by a stepper.
+    /// [`StepError`] as returned by a stepper.
     pub fn run_alone(&self, run: &BatchRun) -> Result<ToolDeflection, StepError> {
         let mut stepper = new_stepper(self.stepper, run.arm.clone(), self.step_s, self.start)?;
         let mut seen = Observation::new(&run.arm);
@@ -132,7 +133,7 @@ impl Batch {
                 stepper.step()?;
             }
             stepper.observe(&mut seen);
-            // A new tree where what it carries has changed.
+            // The model changes with the payload.
             let same = |tree: &LaneTree<f64>| std::ptr::eq(tree.model(), std::sync::Arc::as_ptr(&seen.model));
             if !tool.as_ref().is_some_and(|(tree, _)| same(tree)) {
                 tool = LaneTree::new(std::slice::from_ref(&seen.model)).map(|tree| (tree, Data::new(&seen.model)));
@@ -147,12 +148,13 @@ impl Batch {
         Ok(result.finished(steps))
     }
 
-    /// Steps of a run: the last one may pass its end.
+    /// Returns the number of steps of a run; the last one may end after the duration.
     fn steps(&self, run: &BatchRun) -> u64 {
         (run.duration_s / self.step_s - 1e-9).ceil().max(0.0) as u64
     }
 
-    /// Runs in lanes: `None` where that is not possible, of all or of one of them.
+    /// Computes a group in lanes. `None` if the group, inner `None` if one run has to be computed
+    /// individually.
     #[cfg(target_arch = "x86_64")]
     fn side_by_side(&self, runs: &[BatchRun]) -> Option<Vec<Option<ToolDeflection>>> {
         use flexarm_kinematics::{OverLanes, with_lanes};
@@ -174,16 +176,16 @@ impl Batch {
         None
     }
 
-    /// As many runs as lanes, or fewer.
+    /// Computes as many runs as there are lanes, or fewer.
     #[inline(always)]
     fn in_lanes<T: Real>(&self, runs: &[BatchRun]) -> Option<Vec<Option<ToolDeflection>>> {
-        // Settings that make no stepper are told by the run alone.
+        // Errors of invalid settings are reported by the individual run.
         let StepperKind::GeneralizedAlpha(settings) = self.stepper else { return None };
         if !(0.0..=1.0).contains(&settings.rho) || self.step_s.is_nan() || self.step_s <= 0.0 {
             return None;
         }
         let arms: Vec<&FlexibleArm> = runs.iter().map(|run| &run.arm).collect();
-        // Lanes that are left over repeat the last run.
+        // Unused lanes repeat the last run.
         let mut filled = arms.clone();
         filled.resize(T::LANES, arms.last()?);
         let mut lanes = LaneAlpha::<T>::new(&filled, settings, self.step_s, self.start)?.ok()?;

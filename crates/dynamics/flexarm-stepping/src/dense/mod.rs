@@ -1,8 +1,8 @@
-//! Small dense matrices, column after column in a slice; n is their number of rows.
+//! Small dense matrices, column-major in a slice; n is the number of rows.
 //!
-//! Over numbers or lanes of them. Sums have the order of the same operations in nalgebra, which a
-//! single run uses: each lane has its bits. What a [`Factor`] does is its own, for single poses and
-//! lanes alike.
+//! For numbers or SIMD lanes of numbers. Sums are in the order of the same operations in nalgebra,
+//! which single runs use, so that each lane is bitwise the same. [`Factor`] has its own order, used
+//! for single poses and lanes alike.
 
 mod quick;
 
@@ -10,7 +10,7 @@ use flexarm_kinematics::Real;
 
 pub(crate) use quick::{Loops, congruence_quickly, largest_quickly, norm, product_of_numbers, quickly, solve_quickly};
 
-/// `y = A x`.
+/// Computes `y = A x`.
 #[inline(always)]
 pub(crate) fn product<T: Real>(A: &[T], x: &[T], y: &mut [T]) {
     let Some((x_0, x)) = x.split_first() else { return };
@@ -21,7 +21,7 @@ pub(crate) fn product<T: Real>(A: &[T], x: &[T], y: &mut [T]) {
     add_columns(columns, x.iter().copied(), y);
 }
 
-/// `A ← A + B`.
+/// Computes `A ← A + B`.
 #[inline(always)]
 pub(crate) fn add<T: Real>(A: &mut [T], B: &[T]) {
     for (a, b) in A.iter_mut().zip(B) {
@@ -29,20 +29,20 @@ pub(crate) fn add<T: Real>(A: &mut [T], B: &[T]) {
     }
 }
 
-/// `A ← A + B`, then `y = A x`: each entry is fetched once.
+/// Computes `A ← A + B`, then `y = A x`; each entry is loaded once.
 #[inline(always)]
 pub(crate) fn change_and_product<T: Real>(A: &mut [T], B: &[T], x: &[T], y: &mut [T]) {
     add(A, B);
     product(A, x, y);
 }
 
-/// `y += A x`.
+/// Computes `y += A x`.
 #[inline(always)]
 pub(crate) fn add_product<T: Real>(A: &[T], x: &[T], y: &mut [T]) {
     add_columns(A, x.iter().copied(), y);
 }
 
-/// `y -= A x`.
+/// Computes `y -= A x`.
 #[inline(always)]
 pub(crate) fn subtract_product<T: Real>(A: &[T], x: &[T], y: &mut [T]) {
     add_columns(
@@ -55,10 +55,10 @@ pub(crate) fn subtract_product<T: Real>(A: &[T], x: &[T], y: &mut [T]) {
     );
 }
 
-/// Rows whose sums are in registers at a time: as many as that, then as many as this.
+/// Numbers of rows whose sums are kept in registers: blocks of the first size, then of the second.
 const ROWS: [usize; 2] = [12, 6];
 
-/// Adds multiples of columns, to each row one after the other.
+/// Adds multiples of the columns of A to `y`, in order for each row.
 #[inline(always)]
 fn add_columns<T: Real>(A: &[T], factors: impl Iterator<Item = T> + Clone, y: &mut [T]) {
     let n = y.len();
@@ -80,14 +80,14 @@ fn add_columns<T: Real>(A: &[T], factors: impl Iterator<Item = T> + Clone, y: &m
     }
 }
 
-/// [`add_columns`] for N rows.
+/// Performs [`add_columns`] for N rows.
 #[inline(always)]
 fn add_to_rows<T: Real, const N: usize>(A: &[T], factors: impl Iterator<Item = T>, first: usize, y: &mut [T]) {
     let n = y.len();
     let rows = &mut y[first..first + N];
     let mut sums = [T::zero(); N];
     sums.copy_from_slice(rows);
-    // Not by `chunks_exact(n).zip(...)`, which divides by n first.
+    // `chunks_exact(n).zip(...)` would first divide by n.
     let mut rest = A;
     for factor in factors {
         let Some((column, next)) = rest.split_at_checked(n) else { break };
@@ -99,7 +99,7 @@ fn add_to_rows<T: Real, const N: usize>(A: &[T], factors: impl Iterator<Item = T
     rows.copy_from_slice(&sums);
 }
 
-/// `aᵀ b`.
+/// Returns `aᵀ b`.
 #[inline(always)]
 pub(crate) fn dot<T: Real>(a: &[T], b: &[T]) -> T {
     let mut sums = [T::zero(); 8];
@@ -120,7 +120,8 @@ pub(crate) fn dot<T: Real>(a: &[T], b: &[T]) -> T {
     total
 }
 
-/// Cholesky's factor in the lower triangle; 1 where the matrix is positive definite, else 0.
+/// Computes the Cholesky factor in the lower triangle; returns 1 where the matrix is positive
+/// definite, else 0.
 #[inline(always)]
 pub(crate) fn cholesky<T: Real>(A: &mut [T], n: usize) -> T {
     let mut positive = T::one();
@@ -141,7 +142,7 @@ pub(crate) fn cholesky<T: Real>(A: &mut [T], n: usize) -> T {
     positive
 }
 
-/// Replaces A by its factor and `Bᵀ` by `A^-1 B`; false if A is not positive definite.
+/// Replaces A by its factor and `Bᵀ` by `A^-1 B`; returns false if A is not positive definite.
 #[inline(always)]
 fn solve_in_place(A: &mut [f64], Bt: &mut [f64], n: usize) -> bool {
     let positive = cholesky(A, n) == 1.0;
@@ -150,8 +151,8 @@ fn solve_in_place(A: &mut [f64], Bt: &mut [f64], n: usize) -> bool {
     positive
 }
 
-/// Solves `A X = B` with the factor of A; takes `Bᵀ`, leaves `Xᵀ`: turned round, elimination goes
-/// over whole columns.
+/// Solves `A X = B` with the factor of A, from `Bᵀ` to `Xᵀ`: in transposed form, elimination works
+/// on whole columns.
 #[inline(always)]
 fn solve_transposed(L: &[f64], Bt: &mut [f64], n: usize) {
     for k in 0..n {
@@ -175,7 +176,7 @@ fn scale<T: Real>(column: &mut [T], by: T) {
     }
 }
 
-/// Takes a multiple of one column off another.
+/// Subtracts a multiple of one column from another.
 #[inline(always)]
 fn subtract<T: Real>(to: &mut [T], factor: T, from: &[T]) {
     for (to, from) in to.iter_mut().zip(from) {
@@ -183,7 +184,7 @@ fn subtract<T: Real>(to: &mut [T], factor: T, from: &[T]) {
     }
 }
 
-/// `S C Sᵀ` with `Sᵀ = 1 + c X` of a symmetric C; both rooms are as large.
+/// Computes `S C Sᵀ` with `Sᵀ = 1 + c X` for a symmetric C; both workspaces are n × n.
 #[inline(always)]
 fn congruence(c: f64, X: &[f64], C: &[f64], n: usize, room: [&mut [f64]; 2], product: &mut [f64]) {
     let [room, Xt] = room;
@@ -204,7 +205,7 @@ fn congruence(c: f64, X: &[f64], C: &[f64], n: usize, room: [&mut [f64]; 2], pro
     }
 }
 
-/// Symmetric part of A (n × n) into the lower triangle of S.
+/// Writes the symmetric part of A (n × n) into the lower triangle of S.
 #[inline(always)]
 pub(crate) fn symmetric_part<T: Real>(A: &[T], n: usize, S: &mut [T]) {
     for (j, column) in S.chunks_exact_mut(n.max(1)).enumerate() {
@@ -214,13 +215,13 @@ pub(crate) fn symmetric_part<T: Real>(A: &[T], n: usize, S: &mut [T]) {
     }
 }
 
-/// The larger one; `a` where b is not a number.
+/// Returns the larger number; `a` if b is NaN.
 #[inline(always)]
 pub(crate) fn larger<T: Real>(a: T, b: T) -> T {
     a.pick_below(b, b, a)
 }
 
-/// Largest absolute value; not a number if some entry is none, or infinite.
+/// Returns the maximum absolute value; NaN if an entry is NaN or infinite.
 #[inline(always)]
 pub(crate) fn largest<T: Real>(x: &[T]) -> T {
     let (mut largest, mut broken) = (T::zero(), T::zero());
@@ -231,7 +232,7 @@ pub(crate) fn largest<T: Real>(x: &[T]) -> T {
     largest + broken
 }
 
-/// Largest absolute value; infinite if some entry is no number.
+/// Returns the maximum absolute value; infinite if an entry is not finite.
 #[inline(always)]
 pub(crate) fn largest_of_numbers(x: &[f64]) -> f64 {
     let (mut most, mut broken) = ([0.0; 4], [0.0; 4]);
@@ -250,29 +251,29 @@ pub(crate) fn largest_of_numbers(x: &[f64]) -> f64 {
     if finite { all } else { f64::INFINITY }
 }
 
-/// `A = L Lᵀ` of a symmetric matrix, in storage that is filled again and again.
+/// Factor `A = L Lᵀ` of a symmetric matrix, in reusable storage.
 #[derive(Clone, Debug)]
 pub(crate) struct Factor<T> {
     n: usize,
-    /// In the lower triangle; above it is what was given.
+    /// L in the lower triangle; the upper triangle keeps the entries of A.
     L: Vec<T>,
     /// `1 / L_kk`.
     inverse: Vec<T>,
 }
 
 impl<T: Real> Factor<T> {
-    /// Room for n rows.
+    /// Allocates storage for n rows.
     pub(crate) fn new(n: usize) -> Self {
         Self { n, L: vec![T::zero(); n * n], inverse: vec![T::zero(); n] }
     }
 
-    /// Takes over another factor of as many rows.
+    /// Copies another factor with the same number of rows.
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.L.copy_from_slice(&other.L);
         self.inverse.copy_from_slice(&other.inverse);
     }
 
-    /// Of A, n × n, lower triangle read; 1 where A is positive definite, else 0.
+    /// Factorises A (n × n, lower triangle read); returns 1 where A is positive definite, else 0.
     #[inline(always)]
     pub(crate) fn compute(&mut self, A: &[T]) -> T {
         self.L.copy_from_slice(A);
@@ -283,13 +284,13 @@ impl<T: Real> Factor<T> {
         positive
     }
 
-    /// `x ← L^-1 x`.
+    /// Computes `x ← L^-1 x`.
     #[inline(always)]
     pub(crate) fn solve_lower(&self, x: &mut [T]) {
         self.solve_rows(0, x);
     }
 
-    /// `x ← A^-1 x`.
+    /// Computes `x ← A^-1 x`.
     #[inline(always)]
     pub(crate) fn solve(&self, x: &mut [T]) {
         self.solve_lower(x);
@@ -300,7 +301,8 @@ impl<T: Real> Factor<T> {
         }
     }
 
-    /// `B ← L^-1 B L^-T` of a symmetric matrix of which the lower triangle is read and written.
+    /// Computes `B ← L^-1 B L^-T` for a symmetric matrix, of which only the lower triangle is read
+    /// and written.
     ///
     /// # Source
     /// LAPACK's `dsygs2`.
@@ -313,7 +315,7 @@ impl<T: Real> Factor<T> {
             let l = &self.L[k * n + k + 1..(k + 1) * n];
             let inverse = self.inverse[k];
             diagonal[0] *= inverse * inverse;
-            // Half of the diagonal before and half behind the change of the rest keeps it
+            // Half of the diagonal term before and half after the rank-two update keeps the update
             // symmetric.
             let half = T::splat(0.5) * diagonal[0];
             scale(b, inverse);
@@ -330,7 +332,7 @@ impl<T: Real> Factor<T> {
         }
     }
 
-    /// `x ← L^-1 x` with rows and columns of L from `first` on.
+    /// Computes `x ← L^-1 x` with rows and columns of L from `first` on.
     #[inline(always)]
     fn solve_rows(&self, first: usize, x: &mut [T]) {
         for k in 0..x.len() {
@@ -342,7 +344,7 @@ impl<T: Real> Factor<T> {
     }
 }
 
-/// `A ← Aᵀ`.
+/// Computes `A ← Aᵀ`.
 #[inline(always)]
 fn transpose(A: &mut [f64], n: usize) {
     for j in 0..n {
@@ -357,7 +359,7 @@ mod tests {
     use super::*;
     use nalgebra::{Cholesky, DMatrix, DVector};
 
-    /// Truth: nalgebra; the same bits.
+    /// Truth: nalgebra, bitwise.
     #[test]
     fn every_operation_has_the_bits_of_the_library() {
         for n in [1, 3, 8, 13, 18] {
@@ -396,7 +398,8 @@ mod tests {
         assert_eq!(cholesky(&mut [f64::NAN], 1), 0.0);
     }
 
-    /// Truth: nalgebra's factor, solution and products; measured 4e-14 of the largest entry.
+    /// Truth: nalgebra's factor, solution and products; measured 4e-14 relative to the largest
+    /// entry.
     #[test]
     fn a_factor_solves_and_reduces_to_standard_form() {
         for n in [1, 2, 7, 18] {

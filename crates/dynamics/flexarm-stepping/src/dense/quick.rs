@@ -1,16 +1,16 @@
 //! Small dense matrices and loops of single runs, with the vector instructions that the processor
-//! has. Operations and their order are the same with and without.
+//! has. Results are bitwise the same without them.
 
 use super::{congruence, dot, largest_of_numbers, product, solve_in_place};
 
-/// Loops over numbers, inlined down to them.
+/// Loops over numbers, with all calls inlined.
 pub(crate) trait Loops {
-    /// Does them.
+    /// Runs the loops.
     fn run(self);
 }
 
-/// Runs loops with the vector instructions that the processor has. Operations and their order are
-/// the same with and without.
+/// Runs loops with the vector instructions that the processor has. Results are bitwise the same
+/// without them.
 #[inline(always)]
 pub(crate) fn quickly(loops: impl Loops) {
     #[cfg(target_arch = "x86_64")]
@@ -28,7 +28,7 @@ pub(crate) fn quickly(loops: impl Loops) {
     loops.run();
 }
 
-/// `y = A x`, with the vector instructions that the processor has.
+/// Computes `y = A x` with the vector instructions that the processor has.
 pub(crate) fn product_of_numbers(A: &[f64], x: &[f64], y: &mut [f64]) {
     struct Product<'a>(&'a [f64], &'a [f64], &'a mut [f64]);
     impl Loops for Product<'_> {
@@ -40,8 +40,8 @@ pub(crate) fn product_of_numbers(A: &[f64], x: &[f64], y: &mut [f64]) {
     quickly(Product(A, x, y));
 }
 
-/// `A ← L`, `Bᵀ ← A^-1 B`; false if A (n × n) is not positive definite; with the vector
-/// instructions that the processor has.
+/// Computes `A ← L`, `Bᵀ ← A^-1 B` with the vector instructions that the processor has; returns
+/// false if A (n × n) is not positive definite.
 pub(crate) fn solve_quickly(A: &mut [f64], Bt: &mut [f64], n: usize) -> bool {
     struct Solve<'a>(&'a mut [f64], &'a mut [f64], usize, &'a mut bool);
     impl Loops for Solve<'_> {
@@ -56,8 +56,8 @@ pub(crate) fn solve_quickly(A: &mut [f64], Bt: &mut [f64], n: usize) -> bool {
     positive
 }
 
-/// `S C Sᵀ` with `Sᵀ = 1 + c X` of a symmetric C (n × n); both rooms are as large; with the vector
-/// instructions that the processor has.
+/// Computes `S C Sᵀ` with `Sᵀ = 1 + c X` for a symmetric C (n × n), with the vector instructions
+/// that the processor has; both workspaces are n × n.
 pub(crate) fn congruence_quickly(c: f64, X: &[f64], C: &[f64], n: usize, room: [&mut [f64]; 2], product: &mut [f64]) {
     struct Congruence<'a>(f64, &'a [f64], &'a [f64], usize, [&'a mut [f64]; 2], &'a mut [f64]);
     impl Loops for Congruence<'_> {
@@ -70,7 +70,7 @@ pub(crate) fn congruence_quickly(c: f64, X: &[f64], C: &[f64], n: usize, room: [
     quickly(Congruence(c, X, C, n, room, product));
 }
 
-/// `|x|`, with the vector instructions that the processor has.
+/// Returns `|x|`, with the vector instructions that the processor has.
 pub(crate) fn norm(x: &[f64]) -> f64 {
     struct Square<'a>(&'a [f64], &'a mut f64);
     impl Loops for Square<'_> {
@@ -84,7 +84,7 @@ pub(crate) fn norm(x: &[f64]) -> f64 {
     square.sqrt()
 }
 
-/// [`largest_of_numbers`] with the vector instructions that the processor has.
+/// Computes [`largest_of_numbers`] with the vector instructions that the processor has.
 pub(crate) fn largest_quickly(x: &[f64]) -> f64 {
     struct Largest<'a>(&'a [f64], &'a mut f64);
     impl Loops for Largest<'_> {

@@ -1,4 +1,4 @@
-//! Many poses of one arm, four or eight side by side where the processor and the arm allow it.
+//! Many poses of one arm, four or eight in parallel if processor and arm allow it.
 
 #[cfg(target_arch = "x86_64")]
 use flexarm_kinematics::{OverLanes, Real, with_lanes};
@@ -10,35 +10,35 @@ use super::OperatingPoint;
 use super::lanes::{LanePoints, plain};
 use crate::error::StepError;
 
-/// Most poses side by side.
+/// Maximum number of poses in parallel.
 const LANES: usize = 8;
 
-/// What is asked of many poses beside their equilibrium: [`OperatingPoint::solve_each`].
+/// Optional outputs per pose, in addition to the equilibrium; see [`OperatingPoint::solve_each`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Asked {
-    /// The Jacobian of the elastic coordinates.
+    /// Whether the Jacobian of the elastic coordinates is computed.
     pub jacobian: bool,
-    /// The compliance of the tool.
+    /// Whether the compliance of the tool is computed.
     pub compliance: bool,
-    /// All natural frequencies.
+    /// Whether the natural frequencies are computed.
     pub frequencies: bool,
 }
 
-/// What is known of one pose among many, of an arm with n elastic coordinates; world axes, at the
-/// tool point, linear first. What was not asked for has no meaning.
+/// Results for one of many poses of an arm with n elastic coordinates; world axes, at the tool
+/// point, linear part first. Fields that were not requested have no meaning.
 #[derive(Clone, Debug)]
 pub struct PoseAnswer {
-    /// Tool in the world at the equilibrium.
+    /// Pose of the tool in the world at the equilibrium.
     pub tcp_pose: Pose,
-    /// Tool in the world with every elastic coordinate at zero.
+    /// Pose of the tool in the world with all elastic coordinates zero.
     pub rigid_tcp_pose: Pose,
     /// Elastic coordinates (m, rad), n.
     pub deflections: Vec<f64>,
     /// Twist of the tool per rate of the elastic coordinates, 6×n.
     pub jacobian: Matrix6xX<f64>,
-    /// As [`OperatingPoint::compliance`].
+    /// Compliance; see [`OperatingPoint::compliance`].
     pub compliance: Matrix6<f64>,
-    /// As [`OperatingPoint::frequencies_hz`], n.
+    /// Frequencies (Hz), n; see [`OperatingPoint::frequencies_hz`].
     pub frequencies_hz: Vec<f64>,
 }
 
@@ -56,18 +56,18 @@ impl PoseAnswer {
 }
 
 impl OperatingPoint {
-    /// Equilibria at many poses under weight and a wrench at the tool, as [`OperatingPoint::solve`]
-    /// finds each, to the last bit, and what is asked of them; the answers go to `seen` with the
-    /// number of their pose, in order.
+    /// Computes equilibria at many poses under weight and a wrench at the tool, bitwise as
+    /// [`OperatingPoint::solve`] does, with the requested outputs; calls `seen` with the number of
+    /// each pose and its result, in order.
     ///
     /// * `poses`: m×joints, pose after pose (rad or m).
     /// * `F_T_W`: force and moment on the tool at its origin, world axes (N, N m).
     ///
-    /// Cost: four poses take about as long as one and a half where the processor has AVX2 and the
-    /// arm straight springs, no balancers, loops or loads.
+    /// Cost: with AVX2 four poses take about as long as one and a half, if the arm has only linear
+    /// springs and no balancers, loops or loads.
     ///
     /// # Errors
-    /// Of each pose its own, as [`OperatingPoint::solve`].
+    /// Per pose, as [`OperatingPoint::solve`].
     pub fn solve_each(
         &mut self,
         poses: &[f64],
@@ -109,8 +109,8 @@ impl OperatingPoint {
         Ok(answer)
     }
 
-    /// Poses by lanes, those that leave the plain way alone; how many were taken, from the first
-    /// one on.
+    /// Computes poses in lanes, and individually those that leave the standard path; returns the
+    /// number of poses done, from the first one on.
     #[cfg(target_arch = "x86_64")]
     fn in_lanes(
         &mut self,
@@ -122,7 +122,7 @@ impl OperatingPoint {
     ) -> usize {
         let joints = self.arm.model.n_actuated();
         let finite = F_T_W.force.iter().chain(&F_T_W.torque).all(|x| x.is_finite());
-        // One pose costs less alone.
+        // A single pose is cheaper without lanes.
         if joints == 0 || poses.len() < 2 * joints || !finite || !plain(&self.arm) {
             return 0;
         }
@@ -142,14 +142,14 @@ impl OperatingPoint {
     }
 }
 
-/// Poses of a plain arm.
+/// Poses of an arm that lanes support.
 #[cfg(target_arch = "x86_64")]
 struct InLanes<'a> {
     point: &'a mut OperatingPoint,
     poses: &'a [f64],
     F_T_W: &'a Wrench,
     asked: Asked,
-    /// One for each lane.
+    /// One per lane.
     answers: &'a mut [PoseAnswer],
     seen: &'a mut dyn FnMut(usize, Result<&PoseAnswer, StepError>),
 }
@@ -167,12 +167,12 @@ impl OverLanes for InLanes<'_> {
             let usable = |pose: &[f64]| pose.len() == joints && pose.iter().all(|q| q.is_finite());
             let Some(first) = group.chunks(joints).find(|pose| usable(pose)) else { break };
             for lane in 0..T::LANES {
-                // A lane without a pose of its own takes one of the others.
+                // A lane without a valid pose of its own repeats another one.
                 let own = group.chunks(joints).nth(lane).filter(|pose| usable(pose));
                 points.place(lane, own.unwrap_or(first));
             }
             let found = points.solve(F_T_W);
-            // An arm that is so soft is better taken alone.
+            // A very soft arm is better computed pose by pose.
             if !found.any_above(0.5) {
                 break;
             }

@@ -1,9 +1,9 @@
-//! Equilibria of one arm at several poses at once, in lanes: what [`super::OperatingPoint`] does on
-//! its plain way, operation by operation, so that each lane has its bits.
+//! Equilibria of one arm at several poses in SIMD lanes: the operations of the standard path of
+//! [`super::OperatingPoint`] in the same order, so that each lane is bitwise the same.
 //!
-//! The plain way is Newton's iteration with the factor of the springs at rest, to the end. A lane
-//! that leaves it (weight or loads that change the stiffness much, steps that are too long, no
-//! equilibrium) says so and is solved alone.
+//! The standard path is Newton's iteration with the factor of the springs at rest, up to
+//! convergence. A lane that leaves it (weight or loads that change the stiffness much, steps that
+//! are too large, no equilibrium) is reported and solved individually.
 
 use flexarm_kinematics::lanes::{
     LaneTree, forward_kinematics, frame_jacobian, gravity_forces_at_poses, mass_matrix_at_poses, static_tangent,
@@ -18,7 +18,7 @@ use crate::arm::FlexibleArm;
 use crate::dense::{Factor, larger, largest};
 use crate::statics::{add_wrench, load_at};
 
-/// Whether poses of an arm can be taken in lanes.
+/// Returns whether poses of an arm can be computed in lanes.
 pub(super) fn plain(arm: &FlexibleArm) -> bool {
     arm.n_elastic_coordinates() > 0
         && !arm.has_gear_laws()
@@ -27,15 +27,15 @@ pub(super) fn plain(arm: &FlexibleArm) -> bool {
         && arm.elements.iter().all(|element| element.curve.is_none() && element.geometric.is_none())
 }
 
-/// Springs of an element in their place.
+/// Stiffness of an element, assigned to its coordinates.
 struct Element {
     first: usize,
-    /// size × size, column after column.
+    /// size × size, column-major.
     K: Vec<f64>,
     size: usize,
 }
 
-/// Poses in lanes, and the workspaces that they need.
+/// Poses in lanes, with the workspaces for them.
 pub(super) struct LanePoints<T: Real> {
     tool: Frame,
     tree: LaneTree<T>,
@@ -54,8 +54,8 @@ pub(super) struct LanePoints<T: Real> {
 }
 
 impl<T: Real> LanePoints<T> {
-    /// Workspaces for a plain arm; `None` if its tree has closed loops, or its springs have no
-    /// factor.
+    /// Creates the workspaces for a supported arm; `None` if its tree has closed loops or the
+    /// stiffness is not positive definite.
     pub(super) fn new(point: &OperatingPoint) -> Option<Self> {
         let OperatingPoint { arm, tool, K, .. } = point;
         let (model, n) = (&arm.model, arm.n_elastic_coordinates());
@@ -89,15 +89,15 @@ impl<T: Real> LanePoints<T> {
         })
     }
 
-    /// Puts the joints of a lane at a pose.
+    /// Sets the joints of a lane.
     pub(super) fn place(&mut self, lane: usize, pose: &[f64]) {
         for (to, from) in self.q.iter_mut().zip(pose) {
             to.set_lane(lane, *from);
         }
     }
 
-    /// Finds the equilibria of all lanes, and what is asked of them; 1 in the lanes that have one
-    /// on the plain way.
+    /// Computes the equilibria of all lanes and their tangents; returns 1 in the lanes with a
+    /// result on the standard path.
     #[inline(always)]
     pub(super) fn solve(&mut self, F_T_W: &Wrench) -> T {
         let joints = self.q.len() - self.r.len();
@@ -121,7 +121,7 @@ impl<T: Real> LanePoints<T> {
         found * positive
     }
 
-    /// Newton's iteration of all lanes until each has ended; 1 where it ended at an equilibrium.
+    /// Runs Newton's iteration of all lanes until each has ended; returns 1 where it converged.
     #[inline(always)]
     fn newton(&mut self, F_T_W: &Wrench) -> T {
         let (mut active, mut found) = (T::one(), T::zero());
@@ -145,7 +145,7 @@ impl<T: Real> LanePoints<T> {
             }
             previous = residual;
             self.rest.solve(&mut self.r);
-            // A step that would have to be shortened.
+            // Lanes whose step would have to be shortened leave the standard path.
             active = largest(&self.r).pick_below(T::splat(0.5 + 0.5 * f64::EPSILON), active, T::zero());
             let joints = self.q.len() - self.r.len();
             for (q, r) in self.q[joints..].iter_mut().zip(&self.r) {
@@ -155,7 +155,7 @@ impl<T: Real> LanePoints<T> {
         found
     }
 
-    /// `r = K e + p`; the largest of it over the largest of both.
+    /// Computes `r = K e + p`; returns its maximum relative to the largest force.
     #[inline(always)]
     fn unbalance(&mut self, F_T_W: &Wrench) -> T {
         let Self { tool, tree, data, elements, q, r, .. } = self;
@@ -181,7 +181,7 @@ impl<T: Real> LanePoints<T> {
         largest(r) / scale
     }
 
-    /// The rest of what is asked, of all lanes: one answer for each.
+    /// Computes the requested outputs of all lanes, one answer each.
     #[inline(always)]
     pub(super) fn answer(&mut self, asked: Asked, answers: &mut [PoseAnswer]) {
         let joints = self.q.len() - self.r.len();
@@ -210,7 +210,7 @@ impl<T: Real> LanePoints<T> {
     }
 }
 
-/// The numbers of one lane.
+/// Copies the numbers of one lane.
 #[inline(always)]
 fn copy_lane<T: Real>(from: &[T], lane: usize, to: &mut [f64]) {
     for (to, from) in to.iter_mut().zip(T::flat(from).iter().skip(lane).step_by(T::LANES)) {

@@ -1,15 +1,15 @@
-//! An arm held at one pose after another: equilibrium, compliance, Jacobian, frequencies, without
+//! An arm held at a sequence of poses: equilibrium, compliance, Jacobian and frequencies, without
 //! allocation.
 //!
 //! ```text
 //! K e + p(q_a, e) = 0          C = J (K + dp/de)^-1 Jᵀ          (K + dp/de) φ = ω² M φ
 //! ```
-//! with the elastic coordinates e, the springs K, and p the forces that hold weight and loads.
-//! Drives are locked. Newton begins with the factor of the springs, which weight changes little, so
-//! a pose costs one tangent, in closed form ([`flexarm_kinematics::StaticTangent`]), and its answer
-//! depends on nothing that was asked before.
+//! with the elastic coordinates e, the spring stiffness K, and p the static forces of weight and
+//! loads. Drives are locked. Newton's method begins with the factor of the springs, which weight
+//! changes little, so that a pose needs one tangent in closed form
+//! ([`flexarm_kinematics::StaticTangent`]), and the result does not depend on earlier calls.
 //!
-//! Start at [`OperatingPoint::new`]. For damping, servos and inputs about one pose:
+//! Start at [`OperatingPoint::new`]. For damping, servos and inputs at one pose use
 //! [`crate::linearise`].
 
 mod each;
@@ -27,30 +27,31 @@ use crate::statics::{MOST_HALVINGS, StaticSlopes, add_spring_forces, static_equi
 pub use each::{Asked, PoseAnswer};
 use tangent::{Tangent, to_hertz};
 
-/// Accepted unbalanced force over the largest force.
+/// Accepted unbalanced force relative to the largest force.
 const TOLERANCE: f64 = 1e-13;
-/// Most Newton iterations.
+/// Maximum number of Newton iterations.
 const MOST_ITERATIONS: usize = 60;
-/// A step that leaves more than this part of the residual asks for a new tangent.
+/// Residual reduction of a step above which the tangent is renewed.
 const SLOW: f64 = 0.1;
 
-/// Equilibria of an arm at given poses, with the workspace that they need.
+/// Equilibria of an arm at given poses, with the workspace for them.
 ///
-/// World axes, at the tool point, linear first. The load of the arm at time 0 acts as well.
+/// Tool quantities are in world axes at the tool point, linear part first. The arm's loads at time
+/// 0 are included.
 #[derive(Clone)]
 pub struct OperatingPoint {
     arm: FlexibleArm,
     tool: Frame,
     data: Data,
-    /// Any joint with play or a curved spring.
+    /// Whether any spring is nonlinear (backlash or curve).
     curved: bool,
-    /// Springs at rest, n×n, and their factor, if they have one.
+    /// Stiffness of the springs at rest, n×n, and its factor if it is positive definite.
     K: DMatrix<f64>,
     rest: Option<Factor<f64>>,
     /// All coordinates: joints, then elastic ones.
     q: DVector<f64>,
     F_T_W: Wrench,
-    /// Static forces, all coordinates: where the joints' part stays.
+    /// Static forces over all coordinates; the part of the joints is read after the solution.
     p: DVector<f64>,
     /// Efforts of the joints that hold the equilibrium.
     holding: DVector<f64>,
@@ -59,7 +60,7 @@ pub struct OperatingPoint {
     r: DVector<f64>,
     dp_de: DMatrix<f64>,
     tangent: Tangent<f64>,
-    /// Whether the tangent has a factor.
+    /// Whether the tangent is factorised.
     factored: bool,
     X_WT: Pose,
     X_WT_rigid: Pose,
@@ -68,18 +69,18 @@ pub struct OperatingPoint {
     iterations: usize,
 }
 
-/// The arm does not stay at an equilibrium whose tangent is not positive definite.
+/// Returns the error for an equilibrium whose tangent is not positive definite: it is unstable.
 fn beyond_buckling() -> StepError {
     StepError::Singular { matrix: "static stiffness (with the effect of weight and load)", t: 0.0 }
 }
 
-/// Whether the iteration has come to its end.
+/// Returns whether the iteration has converged.
 fn settled(iteration: usize, residual: f64, previous: f64) -> bool {
     residual <= TOLERANCE || (iteration > 2 && residual < 1e-9 && residual >= 0.5 * previous)
 }
 
 impl OperatingPoint {
-    /// The workspace for an arm and a frame on it; nothing is solved yet.
+    /// Creates the workspace for an arm and a frame on it; nothing is solved yet.
     ///
     /// * `tool`: a frame of the arm's model.
     pub fn new(arm: FlexibleArm, tool: Frame) -> Self {
@@ -111,18 +112,18 @@ impl OperatingPoint {
         }
     }
 
-    /// Finds the equilibrium with the joints at `q` under weight and a wrench at the tool.
+    /// Computes the equilibrium with the joints at `q` under weight and a wrench at the tool.
     ///
     /// * `q`: actuated joints in coordinate order (rad or m).
-    /// * `F_T_W`: force and moment on the tool at its origin, world axes (N, N m), the same when
-    ///   the arm yields.
+    /// * `F_T_W`: force and moment on the tool at its origin, world axes (N, N m), with constant
+    ///   direction as the arm deflects.
     ///
-    /// Cost: one tangent, two at most for small deflections; no allocation after the first, but for
-    /// joints with play and where a load turns the arm so far that the tangent is not positive
-    /// definite on the way.
+    /// Cost: one tangent, at most two for small deflections. Does not allocate after the first
+    /// call, except with backlash, and where a load deflects the arm so far that the tangent is not
+    /// positive definite at some iterate.
     ///
     /// # Errors
-    /// [`StepError::Setup`] for another number of joints or values that are no numbers,
+    /// [`StepError::Setup`] for a wrong number of joints or values that are not finite,
     /// [`StepError::NoEquilibrium`], [`StepError::OpenLoop`], and [`StepError::Singular`] beyond a
     /// buckling load.
     pub fn solve(&mut self, q: &[f64], F_T_W: &Wrench) -> Result<(), StepError> {
@@ -148,15 +149,15 @@ impl OperatingPoint {
         }
         self.X_WT_rigid = self.data.X_WF(&self.tool);
         if self.curved {
-            // Out of a play by a way of its own.
+            // Leave backlash with the dedicated solver.
             let held = FlexibleArm { motion: std::sync::Arc::new(Held(q.to_vec())), ..self.arm.clone() };
             let e = static_equilibrium(&held, 0.0)?;
             self.q.rows_mut(m, e.len()).copy_from(&e);
-            // The springs at rest are not those beyond the play.
+            // The factor of the springs at rest does not apply beyond the backlash.
             self.factored = false;
         }
         let residual = self.newton()?;
-        // What is asked for next belongs to the equilibrium itself.
+        // Later queries need the tangent at the equilibrium.
         self.refactor(true)?;
         self.X_WT = self.data.X_WF(&self.tool);
         frame_jacobian(&self.arm.model, &self.data, &self.tool, &mut self.J);
@@ -168,7 +169,7 @@ impl OperatingPoint {
         Ok(())
     }
 
-    /// The factor of the springs at rest.
+    /// Resets the tangent to the factor of the springs at rest.
     fn start_from_springs(&mut self) {
         self.factored = self.rest.is_some();
         if let Some(rest) = &self.rest {
@@ -176,7 +177,7 @@ impl OperatingPoint {
         }
     }
 
-    /// Newton's iteration from the elastic coordinates in `q`; returns the residual.
+    /// Runs Newton's iteration from the elastic coordinates in `q`; returns the residual.
     fn newton(&mut self) -> Result<f64, StepError> {
         let (m, n) = (self.arm.model.n_actuated(), self.r.len());
         let (mut residual, mut buckled) = (f64::INFINITY, false);
@@ -195,7 +196,8 @@ impl OperatingPoint {
             if !self.factored || residual > SLOW * previous {
                 if self.refactor(false).is_err() {
                     buckled = true;
-                    // Its step would lead uphill, to a saddle: the springs alone lead down.
+                    // Its step would lead uphill to a saddle point; a step with the springs only
+                    // leads downhill.
                     self.start_from_springs();
                 }
                 self.forces();
@@ -206,8 +208,8 @@ impl OperatingPoint {
                 break;
             }
             self.tangent.factor.solve(self.r.as_mut_slice());
-            // Far from small deflections the full step may overshoot: no coordinate moves by more
-            // than 0.5.
+            // The full step may overshoot for large deflections: no coordinate moves by more than
+            // 0.5.
             let shorten = (0.5 / self.r.amax()).min(1.0);
             self.q.rows_mut(m, n).axpy(-shorten, &self.r, 1.0);
             if !self.arm.hysteresis.is_empty() {
@@ -220,8 +222,8 @@ impl OperatingPoint {
         }
     }
 
-    /// Takes halves of a step back until the forces are less out of balance than they were: the
-    /// first loading of a gear may be soft, then stiff. The step is in `r`.
+    /// Reverts halves of the step in `r` until the residual is below `unbalanced`: the first
+    /// loading curve of a gear may be soft, then stiff.
     fn come_closer(&mut self, mut part: f64, unbalanced: f64) {
         let (m, n) = (self.arm.model.n_actuated(), self.r.len());
         let step = self.r.clone();
@@ -236,12 +238,12 @@ impl OperatingPoint {
         }
     }
 
-    /// Weight, loads and stiffness by load at `q`, without springs, into `p`.
+    /// Computes weight, loads and load-dependent stiffness at `q`, without springs, in `p`.
     fn forces(&mut self) {
         static_forces(&self.arm, Some((&self.tool, &self.F_T_W)), 0.0, &mut self.data, &self.q, &mut self.p);
     }
 
-    /// `r = K e + p`; returns the largest of both.
+    /// Computes `r = K e + p`; returns the largest of these forces.
     fn unbalance(&mut self) -> f64 {
         let m = self.arm.model.n_actuated();
         let (e, p) = (&self.q.as_slice()[m..], &self.p.as_slice()[m..]);
@@ -256,12 +258,12 @@ impl OperatingPoint {
         springs.max(carried).max(self.arm.friction_of_gears()).max(f64::MIN_POSITIVE)
     }
 
-    /// The tangent at `q` and the factor of its symmetric part; `small`: for small motions, in
-    /// which no friction slips.
+    /// Computes the tangent at `q` and the factor of its symmetric part; `small`: for small
+    /// motions, in which friction does not slip.
     fn refactor(&mut self, small: bool) -> Result<(), StepError> {
         let (m, n) = (self.arm.model.n_actuated(), self.r.len());
         let tool = Some((&self.tool, &self.F_T_W));
-        // The last forces were those at `q`.
+        // `data` holds the poses of the last forces, which were evaluated at `q`.
         self.slopes.compute_at_poses(&self.arm, tool, 0.0, &mut self.data, &self.q, &mut self.dp_de);
         self.tangent.T.copy_from_slice(self.dp_de.as_slice());
         self.tangent.add_springs(&self.K);
@@ -274,7 +276,8 @@ impl OperatingPoint {
                 self.tangent.T[k * n + k] += if slope > 0.0 { slope } else { curve.stiffest() } - self.K[(k, k)];
             }
         }
-        // A constant moment is not conservative; what differences leave without one is their error.
+        // A constant moment is not conservative; without one any asymmetry is an error of the
+        // differences.
         let moments = self.arm.loads.iter().any(|load| load.wrench.at(0.0).torque.norm() > 0.0);
         self.tangent.symmetric = self.F_T_W.torque.norm() == 0.0 && !moments;
         self.factored = self.tangent.factorise() == 1.0;
@@ -284,70 +287,70 @@ impl OperatingPoint {
         }
     }
 
-    /// The arm, driven along a motion of its own; its springs and loads are those here.
+    /// Returns the arm; its springs and loads apply here, its own motion does not.
     pub fn arm(&self) -> &FlexibleArm {
         &self.arm
     }
 
-    /// Tool in the world at the equilibrium.
+    /// Returns the pose of the tool in the world at the equilibrium.
     pub fn tcp_pose(&self) -> Pose {
         self.X_WT
     }
 
-    /// Tool in the world with every elastic coordinate at zero.
+    /// Returns the pose of the tool in the world with all elastic coordinates zero.
     pub fn rigid_tcp_pose(&self) -> Pose {
         self.X_WT_rigid
     }
 
-    /// All coordinates at the equilibrium: joints, then elastic ones.
+    /// Returns all coordinates at the equilibrium: joints, then elastic ones.
     pub fn coordinates(&self) -> &DVector<f64> {
         &self.q
     }
 
-    /// The frame whose pose is asked for.
+    /// Returns the tool frame.
     pub fn tool(&self) -> &Frame {
         &self.tool
     }
 
-    /// Elastic coordinates (m, rad) in the order of the elements.
+    /// Returns the elastic coordinates (m, rad) in the order of the elements.
     pub fn deflections(&self) -> &[f64] {
         &self.q.as_slice()[self.arm.model.n_actuated()..]
     }
 
-    /// Forces with which the drives hold the pose (N m or N), in coordinate order.
+    /// Returns the efforts with which the drives hold the pose (N m or N), in coordinate order.
     pub fn holding_efforts(&self) -> &[f64] {
         self.holding.as_slice()
     }
 
-    /// Forces on the elastic coordinates that weight, loads and the wrench would need at this
-    /// equilibrium in another arm of the same tree, without springs, into `p` (n): with other
-    /// masses, the slope of a mass.
+    /// Writes the static forces on the elastic coordinates, without springs, of another arm of the
+    /// same tree at this equilibrium under weight, loads and the wrench into `p` (n). With changed
+    /// masses this gives the derivative with respect to a mass.
     pub fn forces_of(&mut self, other: &FlexibleArm, p: &mut DVector<f64>) {
         let mut all = DVector::zeros(self.q.len());
         static_forces(other, Some((&self.tool, &self.F_T_W)), 0.0, &mut self.data, &self.q, &mut all);
         p.copy_from(&all.rows(self.arm.model.n_actuated(), self.r.len()));
     }
 
-    /// Twist of the tool per rate of the coordinates, joints first, 6×(m + n).
+    /// Returns the twist of the tool per rate of the coordinates, joints first, 6×(m + n).
     pub fn jacobian(&self) -> &Matrix6xX<f64> {
         &self.J
     }
 
-    /// Unbalanced force over the largest force; NaN before the first pose and after one that
-    /// failed.
+    /// Returns the unbalanced force relative to the largest force; NaN before the first pose and
+    /// after a failed one.
     pub fn residual(&self) -> f64 {
         self.residual
     }
 
-    /// Newton iterations of the last pose.
+    /// Returns the number of Newton iterations of the last pose.
     pub fn iterations(&self) -> usize {
         self.iterations
     }
 
-    /// Displacement of the tool per wrench on it, drives locked, 6×6 (m/N, rad/N; m/(N m), rad/(N
-    /// m)).
+    /// Returns the displacement of the tool per wrench on it, drives locked, 6×6 (m/N, rad/N; m/(N
+    /// m), rad/(N m)).
     ///
-    /// Cost: six solutions with the factor that is there.
+    /// Cost: six solutions with the existing factor.
     pub fn compliance(&mut self) -> Matrix6<f64> {
         if !self.factored {
             return Matrix6::zeros();
@@ -356,11 +359,11 @@ impl OperatingPoint {
         Matrix6::from_fn(|i, j| C[i][j])
     }
 
-    /// Twist of the tool per generalised force on each elastic coordinate, `J (K + dp/de)^-1`,
-    /// transposed: n×6.
+    /// Returns the twist of the tool per generalised force on each elastic coordinate,
+    /// `J (K + dp/de)^-1`, transposed: n×6.
     ///
-    /// What the tool does when a parameter changes the forces on the elastic coordinates by `dr` is
-    /// `-yieldingᵀ dr`: one matrix for any number of parameters. Empty before the first pose.
+    /// A parameter that changes the forces on the elastic coordinates by `dr` moves the tool by
+    /// `-yieldingᵀ dr`: one matrix serves any number of parameters. Zero before the first pose.
     ///
     /// Cost: as [`OperatingPoint::compliance`].
     pub fn yielding(&mut self) -> &DMatrix<f64> {
@@ -370,11 +373,11 @@ impl OperatingPoint {
         &self.tangent.Y
     }
 
-    /// Natural frequencies (Hz), ascending, undamped, drives locked; of the symmetric part of the
-    /// stiffness.
+    /// Returns the natural frequencies (Hz), ascending, undamped, drives locked, with the symmetric
+    /// part of the stiffness.
     ///
-    /// Cost: a mass matrix and the eigenvalues of an n×n matrix. Not a number where a coordinate
-    /// moves no mass.
+    /// Cost: a mass matrix and the eigenvalues of an n×n matrix. Infinite or NaN, up to
+    /// round-off, if a coordinate has no mass.
     pub fn frequencies_hz(&mut self) -> &[f64] {
         if !self.factored {
             return &[];

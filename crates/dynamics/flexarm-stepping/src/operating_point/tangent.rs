@@ -1,5 +1,5 @@
-//! What is asked of an equilibrium whose tangent is known: compliance, and natural frequencies. Of
-//! one pose or of several in lanes, by the same operations in the same order.
+//! Compliance and natural frequencies from the tangent at an equilibrium, for one pose or for
+//! several in lanes, with the same operations in the same order.
 
 use flexarm_kinematics::Real;
 use nalgebra::DMatrix;
@@ -7,20 +7,19 @@ use nalgebra::DMatrix;
 use crate::dense::{Factor, dot, subtract_product, symmetric_part};
 use crate::eigenvalues::symmetric_eigenvalues;
 
-/// Passes of refinement where a constant moment makes the tangent unsymmetric: each leaves a
-/// thousandth or less.
+/// Passes of iterative refinement if a constant moment makes the tangent unsymmetric; each reduces
+/// the error to a thousandth or less.
 const REFINEMENTS: usize = 8;
 
-/// `T = K + dp/de`, n × n, the factor of its symmetric part, and the workspaces of what comes of
-/// it.
+/// `T = K + dp/de`, n × n, the factor of its symmetric part, and workspaces of derived quantities.
 #[derive(Clone, Debug)]
 pub(super) struct Tangent<T: Real> {
     n: usize,
-    /// As it is, column after column.
+    /// T itself, column-major.
     pub(super) T: Vec<T>,
-    /// Of `(T + Tᵀ)/2`.
+    /// Factor of `(T + Tᵀ)/2`.
     pub(super) factor: Factor<T>,
-    /// Whether T is its symmetric part.
+    /// Whether T is treated as symmetric.
     pub(super) symmetric: bool,
     Jt: Vec<T>,
     /// `T^-1 Jᵀ`, n × 6.
@@ -33,7 +32,7 @@ pub(super) struct Tangent<T: Real> {
 }
 
 impl<T: Real> Tangent<T> {
-    /// Room for n elastic coordinates.
+    /// Allocates the tangent for n elastic coordinates.
     pub(super) fn new(n: usize) -> Self {
         let zeros = |size: usize| vec![T::zero(); size];
         Self {
@@ -58,14 +57,15 @@ impl<T: Real> Tangent<T> {
         }
     }
 
-    /// Factorises the symmetric part; 1 where it is positive definite, else 0.
+    /// Factorises the symmetric part; returns 1 where it is positive definite, else 0.
     #[inline(always)]
     pub(super) fn factorise(&mut self) -> T {
         symmetric_part(&self.T, self.n, &mut self.A);
         self.factor.compute(&self.A)
     }
 
-    /// Displacement of the tool per wrench on it; `J`: 6 × n, of the elastic coordinates.
+    /// Returns the displacement of the tool per wrench on it; `J`: 6 × n, of the elastic
+    /// coordinates.
     #[inline(always)]
     pub(super) fn compliance(&mut self, J: &[T]) -> [[T; 6]; 6] {
         let mut C = [[T::zero(); 6]; 6];
@@ -102,7 +102,7 @@ impl<T: Real> Tangent<T> {
         }
     }
 
-    /// `Y = T^-1 Jᵀ`, or with Tᵀ.
+    /// Computes `Y = T^-1 Jᵀ`, or with Tᵀ if `transposed`.
     #[inline(always)]
     pub(super) fn solve(&mut self, J: &[T], transposed: bool) {
         if self.n == 0 {
@@ -134,10 +134,10 @@ impl<T: Real> Tangent<T> {
         }
     }
 
-    /// `1/ω²` of all natural frequencies into d, of the symmetric part; 1 where they were found,
-    /// else 0.
+    /// Computes `1/ω²` of all natural frequencies in `d`, with the symmetric part; returns 1 on
+    /// success, else 0.
     ///
-    /// * `M`: mass matrix of all coordinates, of which those of the springs are the last n.
+    /// * `M`: mass matrix of all coordinates; those of the springs are the last n.
     #[inline(always)]
     pub(super) fn find_frequencies(&mut self, M: &[T]) -> T {
         let n = self.n;
@@ -151,13 +151,13 @@ impl<T: Real> Tangent<T> {
     }
 }
 
-/// Column c of n rows.
+/// Returns column c of a matrix with n rows.
 #[inline(always)]
 fn rows<T>(A: &[T], n: usize, c: usize) -> &[T] {
     &A[c * n..(c + 1) * n]
 }
 
-/// Frequencies (Hz), ascending, from `1/ω²`; all of them no numbers if they were not found.
+/// Converts `1/ω²` to frequencies (Hz), ascending; all NaN if not `found`.
 pub(super) fn to_hertz(found: bool, d: &mut [f64]) {
     if !found {
         d.fill(f64::NAN);

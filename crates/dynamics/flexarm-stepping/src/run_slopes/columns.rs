@@ -1,10 +1,10 @@
-//! Loops over whole columns, with the vector instructions that the processor has. Operations and
-//! their order are the same with and without.
+//! Loops over whole columns with the vector instructions that the processor has. Results are
+//! bitwise the same without them.
 
 use crate::dense::{Loops, quickly};
 use nalgebra::{DMatrix, Dim, Dyn, IsContiguous, Matrix, RawStorage};
 
-/// `toᵀ += A Xᵀ` for the block of A from this row and column on.
+/// Computes `toᵀ += A Xᵀ` for the block of A that starts at `corner`.
 pub(super) fn add_product<R: Dim, S: RawStorage<f64, R, Dyn> + IsContiguous>(
     A: &Matrix<f64, R, Dyn, S>,
     corner: (usize, usize),
@@ -34,7 +34,7 @@ impl Loops for AddProduct<'_> {
             let entry = |k: usize| A[(column + k) * rows + row + i];
             let mut fours = X.chunks_exact(4 * p);
             let mut k = 0;
-            // Four columns at a time: the sums go through the registers once for all four.
+            // Four columns at a time, so that the sums are loaded and stored once for all four.
             for x in fours.by_ref() {
                 let (a, x0) = ([entry(k), entry(k + 1), entry(k + 2), entry(k + 3)], &x[..p]);
                 let (x1, x2, x3) = (&x[p..2 * p], &x[2 * p..3 * p], &x[3 * p..]);

@@ -1,12 +1,12 @@
-//! How the forces of a motion change: in closed form, and where loops close or links bend in modes
-//! by differences of the recursions.
+//! Derivatives of the generalised forces of a motion: in closed form, or by differences of the
+//! recursions with closed loops or modal links.
 //!
 //! ```text
-//! ∂τ/∂q̇: τ is a polynomial of second degree in q̇, of which central differences of any length are exact
+//! ∂τ/∂q̇: τ is quadratic in q̇, so central differences of any step size are exact
 //! ∂τ/∂q: central differences of sixth order
-//! of an inertia I more on a body: Jᵀ (I A + V × I V)                                     J of its origin
+//! additional inertia I of a body: Jᵀ (I A + V × I V), J at its origin
 //! ```
-//! Differences take eight passes of the recursions for each coordinate, twenty with the dispersion
+//! Differences take eight passes of the recursions per coordinate, twenty with the dispersion
 //! correction.
 
 use flexarm_kinematics::{
@@ -17,27 +17,29 @@ use nalgebra::{DMatrix, DVector, Matrix6xX, Vector6};
 
 use crate::arm::FlexibleArm;
 
-/// Step of the differences by coordinates (rad, m; of modes their own units).
+/// Step size of the differences with respect to coordinates (rad, m; modal coordinates in their own
+/// units).
 const STEP: f64 = 1e-2;
-/// Weights of differences of sixth order at 1, 2 and 3 steps.
+/// Weights of sixth-order differences at 1, 2 and 3 steps.
 const WEIGHTS: [f64; 3] = [0.75, -0.15, 1.0 / 60.0];
 
 /// `∂τ/∂q` and `∂τ/∂q̇` of a model, with workspace.
 pub(super) enum ForceTangent {
-    /// Of trees of rigid bodies.
+    /// Closed form, for trees of rigid bodies.
     Closed(Box<DynamicTangent>),
-    /// Of others.
+    /// Differences, for other models.
     Differences(Box<Differences>),
 }
 
-/// Workspace of differences.
+/// Workspace of the differences.
 pub(super) struct Differences {
     data: Data,
     state: State,
     still: DVector<f64>,
     J: Matrix6xX<f64>,
     origin: Frame,
-    /// Accelerations at rest without weight, if what is asked for is of such a motion.
+    /// Accelerations of the last [`ForceTangent::of_inertia`], at rest and without gravity; `None`
+    /// if the last call was `compute`.
     at_rest: Option<DVector<f64>>,
 }
 
@@ -56,12 +58,13 @@ impl ForceTangent {
         }))
     }
 
-    /// Whether loads and balancers are in [`ForceTangent::compute`].
+    /// Returns whether [`ForceTangent::compute`] includes loads and balancers.
     pub(super) fn has_loads(&self) -> bool {
         matches!(self, Self::Differences(_))
     }
 
-    /// As [`DynamicTangent::compute`]; `loads`: the arm and the time of its loads.
+    /// Computes the derivatives as [`DynamicTangent::compute`] does; `loads`: the arm and the time
+    /// of its loads.
     pub(super) fn compute(
         &mut self,
         model: &Model,
@@ -76,7 +79,7 @@ impl ForceTangent {
         }
     }
 
-    /// As [`DynamicTangent::of_inertia`].
+    /// Computes the derivative of inertia forces as [`DynamicTangent::of_inertia`] does.
     pub(super) fn of_inertia(
         &mut self,
         model: &Model,
@@ -91,7 +94,7 @@ impl ForceTangent {
         }
     }
 
-    /// As [`DynamicTangent::add_inertia_forces`].
+    /// Adds inertia forces as [`DynamicTangent::add_inertia_forces`] does.
     pub(super) fn add_inertia_forces(
         &mut self,
         model: &Model,
@@ -108,7 +111,7 @@ impl ForceTangent {
 }
 
 impl Differences {
-    /// Forces of the motion in `state`, under the loads of an arm at a time.
+    /// Returns the forces of the motion in `state`, under the loads of an arm at a time.
     fn forces(&mut self, model: &Model, qddot: &DVector<f64>, loads: Option<(&FlexibleArm, f64)>) -> &DVector<f64> {
         let Self { data, state, .. } = self;
         if let Some((arm, t)) = loads.filter(|(arm, _)| !arm.loads.is_empty()) {
@@ -130,7 +133,7 @@ impl Differences {
         self.at_rest = None;
         self.state.q.copy_from(&state.q);
         self.state.qdot.copy_from(&state.qdot);
-        // As large as the speeds, so that rounding stays small.
+        // Step size of the order of the speeds, to keep round-off small.
         let speed = state.qdot.amax().max(1.0);
         for k in 0..state.q.len() {
             let mut column = by_rate.column_mut(k);
@@ -144,7 +147,7 @@ impl Differences {
         }
     }
 
-    /// Differences by coordinate k.
+    /// Computes the differences with respect to coordinate k.
     fn column(
         &mut self,
         model: &Model,
@@ -177,7 +180,7 @@ impl Differences {
             for (number, weight) in WEIGHTS.into_iter().enumerate() {
                 for side in [1.0, -1.0] {
                     self.state.q[k] = here + side * (number + 1) as f64 * STEP;
-                    // Less the weight and what balances it.
+                    // Subtract gravity and the forces that balance it.
                     column.axpy(side * weight / STEP, self.forces(model, a, None), 1.0);
                     column.axpy(-side * weight / STEP, self.forces(model, &still, None), 1.0);
                 }

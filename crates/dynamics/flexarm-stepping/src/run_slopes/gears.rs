@@ -1,14 +1,15 @@
-//! The tangent of what gears do beside giving way: ripple, hysteresis, coupling, friction that
-//! grows with the load.
+//! Tangent of gear effects other than elasticity: transmission errors, hysteresis, coupling,
+//! load-dependent friction.
 //!
 //! ```text
-//! δ = e - ε(q_m),  δ' = ė - ε' q̇_m:     dF = K dδ + D dδ' + Σ k_i w_i,     dδ' = dė - ε' dq̇_m - ε'' q̇_m dq_m      (1)
-//! on q_m:  -ε' dF - ε'' F dq_m                                                                              (2)
-//! w_i = ds_i - dδ of a slider: the same while it sticks; -dδ of the last time at which it slipped           (3)
+//! δ = e - ε(q_m),  δ' = ė - ε' q̇_m
+//! dF = K dδ + D dδ' + Σ k_i w_i,     dδ' = dė - ε' dq̇_m - ε'' q̇_m dq_m                    (1)
+//! on q_m:  -ε' dF - ε'' F dq_m                                                            (2)
+//! w_i = ds_i - dδ of a slider: constant while it sticks; -dδ of the last time it slipped  (3)
 //! ```
-//! A slider that slips stays at its reach, whatever a parameter does. When it begins and ends to do
-//! so changes with the parameter, but its torque does not jump there: the derivative needs nothing
-//! of that.
+//! A slipping slider stays at its reach, independent of any parameter. The times at which slipping
+//! begins and ends depend on the parameter, but the torque does not jump there, so that the
+//! derivative does not involve them.
 
 use flexarm_kinematics::State;
 use nalgebra::{DMatrix, DVector};
@@ -18,16 +19,16 @@ use crate::gear::GearState;
 use crate::run_slopes::Direction;
 use crate::run_slopes::tangent::{Look, add_columns, add_springs, place};
 
-/// The tangent at the current state; n elastic coordinates.
+/// Tangent at the current state; n elastic coordinates.
 pub(super) struct GearSlopes {
-    /// Of all springs at their deflections, n × n.
+    /// Stiffness of all springs at their deflections, n × n.
     K: DMatrix<f64>,
     /// `∂F/∂q` and `∂F/∂q̇`, n × nv.
     by_q: DMatrix<f64>,
     by_rate: DMatrix<f64>,
     /// ε' and ε'' of each transmission error.
     ripple: Vec<[f64; 2]>,
-    /// Of each load friction, its derivative by the transmitted torque.
+    /// Derivative of each load-dependent friction with respect to the transmitted torque.
     loaded: Vec<f64>,
     /// w of (3): directions × sliders.
     w: DMatrix<f64>,
@@ -47,7 +48,8 @@ impl GearSlopes {
         }
     }
 
-    /// Adds springs, dampers and friction to `∂r/∂q` and `∂r/∂q̇`; `gears`: of the same state.
+    /// Adds springs, dampers and friction to `∂r/∂q` and `∂r/∂q̇`; `gears` must belong to the same
+    /// state.
     pub(super) fn compute(
         &mut self,
         arm: &FlexibleArm,
@@ -63,7 +65,7 @@ impl GearSlopes {
         rows += &*by_q;
         let mut rows = to_rate.rows_mut(m, n);
         rows += &*by_rate;
-        // (2)
+        // Motor rows, (2).
         for (error, [slope, bend]) in arm.transmission.iter().zip(ripple) {
             let (k, motor) = (arm.offset(&arm.elements[error.element]), error.motor);
             add_row(to_q, motor, -*slope, by_q, k);
@@ -87,7 +89,7 @@ impl GearSlopes {
         }
     }
 
-    /// (1) without the sliders' past.
+    /// Computes (1) without the history terms of the sliders.
     fn forces(&mut self, arm: &FlexibleArm, state: &State, gears: &GearState) {
         let Self { K, by_q, by_rate, ripple, .. } = self;
         let (m, n) = (arm.model.n_actuated(), by_q.nrows());
@@ -118,8 +120,8 @@ impl GearSlopes {
         }
     }
 
-    /// Adds what a direction of this number does to the forces, and what its sliders bring along;
-    /// free coordinates.
+    /// Adds the forces due to direction `number` and the history terms of its sliders; free
+    /// coordinates.
     pub(super) fn add_explicit(
         &self,
         at: &Look<'_>,
@@ -149,7 +151,7 @@ impl GearSlopes {
         }
         for (coordinate, by) in &direction.friction {
             let Some(law) = arm.friction.get(*coordinate) else { continue };
-            // The friction of a motor that moves several joints.
+            // Friction of a motor that moves several joints.
             let coupled = arm.coupling.as_ref().and_then(|coupling| Some((coupling, coupling.place(*coordinate)?)));
             if let Some((coupling, motor)) = coupled {
                 let change = law.change(coupling.motor_rate(motor, rates), by);
@@ -164,8 +166,8 @@ impl GearSlopes {
         }
     }
 
-    /// (3) where a step has ended; `x`: derivatives of the free coordinates, directions × N,
-    /// `joints`: of the joints' motion.
+    /// Updates w by (3) at the end of a step; `x`: derivatives of the free coordinates, directions
+    /// × N; `joints`: of the joint motion.
     pub(super) fn settle(&mut self, arm: &FlexibleArm, gears: &GearState, x: &DMatrix<f64>, joints: &DMatrix<f64>) {
         let driven = arm.torque_driven.len();
         let Self { w, ripple, .. } = self;
@@ -187,7 +189,7 @@ impl GearSlopes {
     }
 }
 
-/// Adds a multiple of a row of one matrix to a row of another.
+/// Adds a multiple of row `k` of `from` to a row of `to`.
 fn add_row(to: &mut DMatrix<f64>, row: usize, factor: f64, from: &DMatrix<f64>, k: usize) {
     for column in 0..from.ncols() {
         to[(row, column)] += factor * from[(k, column)];

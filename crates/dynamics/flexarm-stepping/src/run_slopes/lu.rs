@@ -1,5 +1,4 @@
-//! A square system that is factored and solved in place, again and again. Not here: systems that
-//! are symmetric.
+//! LU factorisation of a square system in reusable storage. Not here: symmetric systems.
 
 use nalgebra::DMatrix;
 
@@ -9,21 +8,21 @@ use crate::error::StepError;
 /// `P A = L U`.
 #[derive(Clone, Debug)]
 pub(super) struct Lu {
-    /// Both factors in one.
+    /// Both factors in one matrix.
     pub(super) A: DMatrix<f64>,
     rows: Vec<usize>,
 }
 
 impl Lu {
-    /// Room for n unknowns.
+    /// Allocates storage for n unknowns.
     pub(super) fn new(n: usize) -> Self {
         Self { A: DMatrix::zeros(n, n), rows: vec![0; n] }
     }
 
-    /// Factors what stands in `A`.
+    /// Factorises `A` in place.
     ///
     /// # Errors
-    /// [`StepError::Singular`] of the matrix of this name.
+    /// [`StepError::Singular`] with the name `matrix`.
     pub(super) fn factor(&mut self, matrix: &'static str, t: f64) -> Result<(), StepError> {
         let n = self.A.nrows();
         for k in 0..n {
@@ -82,7 +81,7 @@ impl Loops for Eliminate<'_> {
     }
 }
 
-/// Takes multiples of one column off others.
+/// Subtracts multiples of one column from others.
 #[inline(always)]
 fn subtract(from: &[f64], factors: &[f64], others: &mut [f64]) {
     for (to, factor) in others.chunks_exact_mut(from.len()).zip(factors) {
@@ -94,7 +93,7 @@ fn subtract(from: &[f64], factors: &[f64], others: &mut [f64]) {
 mod tests {
     use super::*;
 
-    /// Truth: the product with the solution. 2e-14.
+    /// Truth: the product with the solution. Measured: 2e-14.
     #[test]
     fn a_system_without_a_leading_pivot_is_solved() {
         let n = 7;

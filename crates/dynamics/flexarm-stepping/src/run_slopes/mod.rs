@@ -1,23 +1,23 @@
-//! How a whole run changes with parameters of the arm and of its motion: the tangent of
-//! generalised-alpha, all parameters side by side.
+//! Derivatives of a whole run with respect to parameters of the arm and of its motion: the tangent
+//! of generalised-alpha, for all parameters in parallel.
 //!
 //! ```text
-//! r(q, q̇, q̈; p) = 0:     M δẍ + V δẋ + K δx = -(∂r/∂p + K_a δq_a + V_a δq̇_a + M_a δq̈_a)                           (1)
+//! r(q, q̇, q̈; p) = 0
+//! M δẍ + V δẋ + K δx = -(∂r/∂p + K_a δq_a + V_a δq̇_a + M_a δq̈_a)        (1)
 //! ```
 //! holds at the end of every step, with `K = ∂r/∂x`, `V = ∂r/∂ẋ` in closed form
-//! ([`flexarm_kinematics::DynamicTangent`]), where loops close or links bend in modes by
-//! differences of the recursions (`forces.rs`); the formulas that join x, ẋ and ẍ of two steps are
-//! linear, so that a step is one linear system for all parameters: a column each. What differs from
-//! a run of [`crate::GeneralizedAlpha`] is that its iterations go on to the end and that the matrix
-//! of its dispersion correction is that of the start of each step: a run whose result is a smooth
-//! function of the parameters, of which differences can be taken ([`GeneralizedAlpha::exactly`]).
-//! An ordinary run differs from it by what its iterations leave, far less than the error of its
-//! step.
+//! ([`flexarm_kinematics::DynamicTangent`]), or by differences of the recursions with closed loops
+//! or modal links (`forces.rs`). The formulas that relate x, ẋ and ẍ of two steps are linear, so
+//! that a step is one linear system for all parameters, with one column each. In contrast to a run
+//! of [`crate::GeneralizedAlpha`], iterations converge fully, and the matrix of the dispersion
+//! correction is that at the start of each step: the result is a smooth function of the parameters,
+//! of which differences can be taken ([`GeneralizedAlpha::exactly`]). An ordinary run differs from
+//! it by its iteration error, which is far below the error of its step size.
 //!
-//! Torques under servos are held from sample to sample, and so are their derivatives (`servo.rs`);
-//! ripple, hysteresis, coupling and friction by load are in `gears.rs`. Start at [`run_slopes`].
-//! Not here: names and units of parameters (`flexarm-identify`), motions whose velocity jumps under
-//! servos, links that stiffen under load: these are refused.
+//! Torques under servos are constant between samples, and so are their derivatives (`servo.rs`);
+//! transmission errors, hysteresis, coupling and load-dependent friction are in `gears.rs`. Start
+//! at [`run_slopes`]. Not here: names and units of parameters (`flexarm-identify`). Refused:
+//! motions with velocity jumps under servos, and links with geometric stiffness.
 
 mod columns;
 mod forces;
@@ -44,52 +44,55 @@ use crate::steppers::AlphaSettings;
 use recurrence::Recurrence;
 use tool::ToolError;
 
-/// A parameter as the equations of motion see it: what changes per unit of it.
+/// Direction in parameter space: derivatives of the terms of the equations of motion with respect
+/// to one parameter.
 #[derive(Clone, Default)]
 pub struct Direction {
-    /// Stiffness of springs, by their number.
+    /// Change of the stiffness of springs, by element index.
     pub springs: Vec<(usize, SpringSlope)>,
-    /// Stiffness of all elastic coordinates together, where springs are coupled.
+    /// Change of the stiffness of all elastic coordinates together, for coupled springs.
     pub stiffness: Option<DMatrix<f64>>,
-    /// Damping matrix of the elastic coordinates.
+    /// Change of the damping matrix of the elastic coordinates.
     pub damping: Option<DMatrix<f64>>,
-    /// The same after each change of inertia, in their order; as before without.
+    /// Change of the damping matrix after each change of inertia, in order; unchanged if missing.
     pub dampings_after: Vec<DMatrix<f64>>,
-    /// Inertia of bodies, about Bo, B axes; until another one is put in its place on the way.
+    /// Change of the inertia of bodies, about Bo, B axes; valid until the inertia is replaced
+    /// during the run.
     pub inertias: Vec<(usize, SpatialInertia)>,
-    /// Inertia of bodies of the rigid robot that servos feed forward, about Bo, B axes.
+    /// Change of the inertia of bodies of the rigid robot used for the feed-forward, about Bo, B
+    /// axes.
     pub fed_forward: Vec<(usize, SpatialInertia)>,
-    /// Friction of actuated coordinates: changes of the numbers of their law.
+    /// Change of the friction of actuated coordinates, as changes of the friction parameters.
     pub friction: Vec<(usize, Friction)>,
-    /// Controllers, by the number of the axis in [`crate::Servo::axes`].
+    /// Change of the controllers, by index of the axis in [`crate::Servo::axes`].
     pub servo: Vec<(usize, AxisSlope)>,
-    /// Motion of the joints; of those driven by torque their reference.
+    /// Change of the motion of the joints; for joints driven by torque, of their reference.
     pub motion: Option<Arc<dyn PrescribedMotion>>,
-    /// Place of the tool's point, tool axes (m).
+    /// Change of the position of the tool point, tool axes (m).
     pub tool: Vector3<f64>,
 }
 
-/// Change of the controller of an axis.
+/// Change of the controller of one axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AxisSlope {
-    /// Of [`crate::ServoAxis::position_gain`] (1/s).
+    /// Change of [`crate::ServoAxis::position_gain`] (1/s).
     pub position_gain: f64,
-    /// Of [`crate::ServoAxis::velocity_gain`] (N m s/rad).
+    /// Change of [`crate::ServoAxis::velocity_gain`] (N m s/rad).
     pub velocity_gain: f64,
-    /// Of [`crate::ServoAxis::integral_gain`] (N m/rad).
+    /// Change of [`crate::ServoAxis::integral_gain`] (N m/rad).
     pub integral_gain: f64,
-    /// So many times the torque that is fed forward.
+    /// Change of a factor on the feed-forward torque.
     pub feed_forward: f64,
 }
 
 impl Direction {
-    /// Change of the damping matrix after so many changes of inertia.
+    /// Returns the change of the damping matrix after `changes` changes of inertia.
     fn damping_after(&self, changes: usize) -> Option<&DMatrix<f64>> {
         let later = changes.checked_sub(1).and_then(|k| self.dampings_after.get(k));
         later.or(self.damping.as_ref())
     }
 
-    /// Change of inertias that is still there after so many changes of inertia.
+    /// Returns the changes of inertias that still apply after `changes` changes of inertia.
     fn inertias_after<'a>(
         &'a self,
         arm: &'a FlexibleArm,
@@ -100,7 +103,7 @@ impl Direction {
         self.inertias.iter().filter(move |(body, _)| there(*body)).map(|(body, more)| (*body, more))
     }
 
-    /// Change of the controller of an axis.
+    /// Returns the change of the controller of an axis.
     fn axis(&self, number: usize) -> AxisSlope {
         let own = self.servo.iter().filter(|(axis, _)| *axis == number);
         own.fold(AxisSlope::default(), |sum, (_, by)| AxisSlope {
@@ -115,73 +118,73 @@ impl Direction {
 /// Change of a spring.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SpringSlope {
-    /// So many times the spring itself, matrix or curve.
+    /// Multiple of the spring itself, matrix or curve.
     Factor(f64),
-    /// Of its matrix.
+    /// Change of its stiffness matrix.
     Matrix(DMatrix<f64>),
 }
 
-/// What is asked of [`run_slopes`].
+/// Inputs of [`run_slopes`].
 #[derive(Clone, Debug)]
 pub struct SlopesRequest {
     /// Settings of generalised-alpha.
     pub settings: AlphaSettings,
-    /// Step (s).
+    /// Step size (s).
     pub step_s: f64,
-    /// How long (s); the last step may pass that.
+    /// Duration (s); the last step may end after it.
     pub duration_s: f64,
-    /// Where it starts.
+    /// Initial state.
     pub start: Start,
-    /// The tool.
+    /// Tool frame.
     pub tool: Frame,
-    /// Whether to keep the errors and slopes after every step.
+    /// Whether to keep errors and slopes after every step.
     pub keep_samples: bool,
 }
 
-/// Error of the tool along a run, flexible less rigid, and its derivatives: a number per direction,
+/// Tool error along a run (flexible minus rigid arm) and its derivatives, one number per direction
 /// in their order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RunSlopes {
     /// Steps taken.
     pub steps: u64,
-    /// Distance (m).
+    /// Position error (m).
     pub position: ErrorSlopes,
-    /// Angle (rad).
+    /// Rotation error (rad).
     pub rotation: ErrorSlopes,
-    /// Servos that were at their torque limits, by the time when they first were.
+    /// Servos that reached their torque limits, in order of the time of the first limited sample.
     pub limited: Vec<TorqueLimited>,
-    /// Times of the start and after every step (s), if kept.
+    /// Times of the start and of the end of every step (s), if kept.
     pub times_s: Vec<f64>,
-    /// Error then: displacement (m) and rotation vector (rad), world axes.
+    /// Errors at these times: displacement (m) and rotation vector (rad), world axes.
     pub errors: Vec<[f64; 6]>,
-    /// Its derivatives, a column per direction: those of one time after those of the time before.
+    /// Derivatives of the errors, one column per direction, time after time.
     pub slopes: Vec<[f64; 6]>,
 }
 
-/// A servo that was at its torque limit: the derivatives are those with these very samples at the
-/// limit.
+/// A servo that reached its torque limit; the derivatives hold for an unchanged set of limited
+/// samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TorqueLimited {
     /// Coordinate of the joint.
     pub coordinate: usize,
-    /// In how many samples.
+    /// Number of limited samples.
     pub samples: u64,
-    /// When first (s).
+    /// Time of the first one (s).
     pub first_s: f64,
 }
 
-/// Largest and mean size of an error, with derivatives.
+/// Peak and root mean square of an error, with derivatives.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ErrorSlopes {
-    /// Largest.
+    /// Maximum.
     pub peak: f64,
-    /// When, for the first time (s).
+    /// Time of the first maximum (s).
     pub t_peak_s: f64,
-    /// Root of the mean square.
+    /// Root mean square.
     pub rms: f64,
-    /// Of `peak`, at the time where it is.
+    /// Derivatives of `peak`, at the time of the peak.
     pub peak_slopes: Vec<f64>,
-    /// Of `rms`.
+    /// Derivatives of `rms`.
     pub rms_slopes: Vec<f64>,
 }
 
@@ -190,7 +193,7 @@ impl ErrorSlopes {
         Self { peak_slopes: vec![0.0; directions], rms_slopes: vec![0.0; directions], ..Self::default() }
     }
 
-    /// Takes in the error of a time; until the end `rms` and its slopes are sums.
+    /// Adds the error of one time; until [`ErrorSlopes::finish`] `rms` and its slopes are sums.
     fn include<'a>(&mut self, t: f64, error: Vector3<f64>, slopes: impl Iterator<Item = Vector3<f64>> + Clone + 'a) {
         let size = error.norm();
         self.rms += error.norm_squared();
@@ -212,15 +215,16 @@ impl ErrorSlopes {
     }
 }
 
-/// Error of the tool along a run and its exact derivatives in some directions; without any the run
-/// alone, to the end of each iteration.
+/// Computes the tool error along a run and its exact derivatives in the given directions; without
+/// directions it only runs, with fully converged iterations.
 ///
-/// Cost: with 18 coordinates about ten ordinary runs, of which a step is often one evaluation, and
-/// a quarter of one for each direction. No allocation in the steps but for what is kept of them.
+/// Cost: with 18 coordinates about ten ordinary runs, whose steps often need one evaluation, plus a
+/// quarter of an ordinary run per direction. Steps do not allocate except for kept samples.
 ///
 /// # Errors
-/// [`StepError::NoSlopes`] where the arm has what is not differentiated; [`StepError::Setup`] for a
-/// step that is no time or a spring that is not there; else as a stepper.
+/// [`StepError::NoSlopes`] if the arm has a feature that is not differentiated;
+/// [`StepError::Setup`] for a step that is not a positive time, for an element that does not exist,
+/// or for a matrix of the wrong shape; otherwise as a stepper.
 pub fn run_slopes(
     arm: &FlexibleArm,
     request: &SlopesRequest,
@@ -262,7 +266,7 @@ pub fn run_slopes(
     Ok(found)
 }
 
-/// Change of the elastic coordinates at rest at the start, n × p.
+/// Returns the derivatives of the elastic coordinates at the initial equilibrium, n × p.
 ///
 /// # Errors
 /// As [`run_slopes`].
@@ -277,7 +281,7 @@ pub fn equilibrium_slopes(arm: &FlexibleArm, directions: &[Direction]) -> Result
     };
     let mut arm = arm.with_motors_held();
     arm.carry_from_start()?;
-    // Nothing of a motion or of a controller counts here.
+    // Controller directions have no effect on the equilibrium.
     let still = |own: &Direction| Direction { servo: Vec::new(), ..own.clone() };
     let directions: Vec<Direction> = directions.iter().map(still).collect();
     let directions = &directions[..];
@@ -286,7 +290,7 @@ pub fn equilibrium_slopes(arm: &FlexibleArm, directions: &[Direction]) -> Result
     Ok(Recurrence::new(arm, &request, directions, &e)?.x.transpose())
 }
 
-/// What of the arm and of the directions is not differentiated.
+/// Checks that the arm and the directions can be differentiated.
 fn check(arm: &FlexibleArm, request: &SlopesRequest, directions: &[Direction]) -> Result<(), StepError> {
     let SlopesRequest { settings, step_s, .. } = request;
     if !(step_s.is_finite() && *step_s > 0.0) {

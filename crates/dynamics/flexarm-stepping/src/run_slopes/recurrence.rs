@@ -1,13 +1,15 @@
-//! A run and its tangent, step by step.
+//! Recurrence of a run and its tangent, step by step.
 //!
 //! With `S = 1 + c h² M^-1 K` at the start of the step ((5) of generalised-alpha) and
 //! `y = M^-1 K ẍ⁺`:
 //!
 //! ```text
-//! δx̃⁺ = S δẍ⁺ + z,    z = c h² M^-1 (δK ẍ⁺ - δM y)                       δM by parameters and by δq of the start   (1)
-//! δx⁺ = x_h + c_K δx̃⁺,  δẋ⁺ = v_h + c_D δx̃⁺                             x_h, v_h from what is known at the start  (2)
-//! (M + (c_D V + c_K K) S) δẍ⁺ = -(V (v_h + c_D z) + K (x_h + c_K z) + δr)                                         (3)
+//! δx̃⁺ = S δẍ⁺ + z,    z = c h² M^-1 (δK ẍ⁺ - δM y)                          (1)
+//! δx⁺ = x_h + c_K δx̃⁺,  δẋ⁺ = v_h + c_D δx̃⁺                                (2)
+//! (M + (c_D V + c_K K) S) δẍ⁺ = -(V (v_h + c_D z) + K (x_h + c_K z) + δr)     (3)
 //! ```
+//! δM is due to the parameters and to δq at the start of the step; x_h and v_h follow from
+//! quantities known there.
 
 use std::sync::Arc;
 
@@ -30,8 +32,8 @@ use crate::run_slopes::tangent::{Look, Tangent, add_columns, put};
 use crate::run_slopes::{Direction, SlopesRequest, TorqueLimited};
 use crate::steppers::{Coefficients, GeneralizedAlpha};
 
-/// Iterations of a step that finds its way; after more a matrix that has the dispersion correction
-/// in itself would be taken anew within it.
+/// Maximum number of iterations of a step; after more of them a matrix that contains the dispersion
+/// correction would be renewed within the step.
 const MOST_ITERATIONS: usize = 8;
 
 /// A run with its tangent: N free coordinates (d joints driven by torque, n elastic ones), m
@@ -40,55 +42,56 @@ pub(super) struct Recurrence<'a> {
     system: ReducedArm,
     integrator: GeneralizedAlpha,
     directions: &'a [Direction],
-    /// Whether the motion of the joints changes.
+    /// Whether any direction changes the motion of the joints.
     moves: bool,
     coefficients: Coefficients,
-    /// c of the dispersion correction; 0 without.
+    /// Factor c of the dispersion correction; 0 without it.
     c: f64,
     /// All coordinates at the current time.
     pub(super) q: DVector<f64>,
-    /// Derivatives of the free coordinates, p × N, of their rates and accelerations, and of what
-    /// the scheme remembers: all directions of a coordinate stand together, so that sums go over
+    /// Derivatives of the free coordinates, p × N, of their rates and accelerations, and of the
+    /// history of the scheme. All directions of a coordinate are contiguous, so that sums run over
     /// whole columns.
     pub(super) x: DMatrix<f64>,
     v: DMatrix<f64>,
     acceleration: DMatrix<f64>,
     a: DMatrix<f64>,
     x_tilde: DMatrix<f64>,
-    /// Of the motion that joints are given, their rates and accelerations, p × m: their own, or the
-    /// reference of a servo.
+    /// Derivatives of the joint motion, its rates and accelerations, p × m; for joints under
+    /// servos, of the reference.
     pub(super) joints: [DMatrix<f64>; 3],
-    /// Where they are to be, m.
+    /// Prescribed or reference motion of the joints, with rates and accelerations, m.
     pub(super) reference: [Vec<f64>; 3],
     servo: Option<ServoSlopes>,
     tangent: Tangent,
-    /// Sᵀ, then S, and M of the start of the step.
+    /// S (first transposed), and the factor of M at the start of the step.
     S: DMatrix<f64>,
     mass: Lu,
     matrix: Lu,
-    /// δM y by all coordinates, nv × nv, and its rows of free ones by those, and by the joints.
+    /// `∂(M y)/∂q`, nv × nv; and its rows of free coordinates with the columns of the free
+    /// coordinates and of the joints.
     of_inertia: DMatrix<f64>,
     inertia_by: [DMatrix<f64>; 2],
-    /// `M^-1 K ẍ⁺`, all coordinates.
+    /// `y = M^-1 K ẍ⁺`, over all coordinates.
     y: DVector<f64>,
-    /// All coordinates at the start of the step, and the derivatives of the joints there.
+    /// All coordinates at the start of the step, and the derivatives of the joint motion there.
     q_start: DVector<f64>,
     joints_start: DMatrix<f64>,
     /// `c_D V + c_K K`.
     C: DMatrix<f64>,
-    /// z, x_h and v_h, and the right-hand side.
+    /// z, x_h, v_h and the right-hand side.
     z: DMatrix<f64>,
     x_h: DMatrix<f64>,
     v_h: DMatrix<f64>,
     rhs: DMatrix<f64>,
     room: DVector<f64>,
-    /// Room for one direction: its joints, its free coordinates.
+    /// Workspace for one direction: its joint motion, its free coordinates.
     sample: [Vec<f64>; 3],
     own: Vec<f64>,
 }
 
 impl<'a> Recurrence<'a> {
-    /// The run at its start, with elastic coordinates `e`.
+    /// Creates the run at its start, with elastic coordinates `e`.
     pub(super) fn new(
         arm: FlexibleArm,
         request: &SlopesRequest,
@@ -149,14 +152,15 @@ impl<'a> Recurrence<'a> {
         }
         run.look();
         if let Some(blow) = &blow {
-            // From rest.
+            // The run starts from rest.
             run.strike(0.0, blow, None)?;
         }
         run.accelerate()?;
         Ok(run)
     }
 
-    /// Derivatives of the start: where it begins, what the controllers hold there.
+    /// Computes the derivatives of the initial state and of the torques initially held by the
+    /// controllers.
     fn begin(&mut self, e: &DVector<f64>, at_rest: bool) -> Result<(), StepError> {
         for (i, &k) in self.system.arm.torque_driven.iter().enumerate() {
             self.x.column_mut(i).copy_from(&self.joints[0].column(k));
@@ -177,27 +181,27 @@ impl<'a> Recurrence<'a> {
         Ok(())
     }
 
-    /// Servos that were at their limits.
+    /// Returns the servos that reached their torque limits.
     pub(super) fn limited(&self) -> Vec<TorqueLimited> {
         self.servo.as_ref().map_or(Vec::new(), |servo| servo.limited.clone())
     }
 
-    /// Current time (s).
+    /// Returns the current time (s).
     pub(super) fn time(&self) -> f64 {
         self.integrator.time()
     }
 
-    /// The free coordinates.
+    /// Returns the indices of the free coordinates.
     pub(super) fn free(&self) -> &[usize] {
         &self.system.free
     }
 
-    /// Poses of the current state.
+    /// Returns model and poses of the current state.
     pub(super) fn poses(&self) -> (&Arc<Model>, &Data) {
         (&self.system.arm.model, &self.system.data)
     }
 
-    /// Where the joints are to be at t, and the derivatives of that.
+    /// Samples the joint motion at `t` and its derivatives.
     fn sample_joints(&mut self, t: f64) {
         let [q, qdot, qddot] = &mut self.reference;
         self.system.arm.motion.sample(t, q, qdot, qddot);
@@ -212,7 +216,7 @@ impl<'a> Recurrence<'a> {
         }
     }
 
-    /// δx of the equilibrium at the start.
+    /// Computes δx of the equilibrium at the start.
     fn rest(&mut self, e: &DVector<f64>) -> Result<(), StepError> {
         let Self { system, tangent, directions, joints, x, room, .. } = self;
         let arm = &system.arm;
@@ -260,8 +264,8 @@ impl<'a> Recurrence<'a> {
         Ok(())
     }
 
-    /// Derivatives of the torques that hold the joints on their reference at the start, springs as
-    /// they are.
+    /// Computes the derivatives of the torques that hold the joints on their reference at the
+    /// start, with the springs as they are.
     fn hold(&mut self) {
         let Self { system, integrator, tangent, directions, joints, x, room, own, servo: Some(servo), .. } = self
         else {
@@ -294,7 +298,7 @@ impl<'a> Recurrence<'a> {
         }
     }
 
-    /// Takes in a sample of the controllers at t, if one was just taken.
+    /// Differentiates the sample of the controllers at `t`, if one was just taken.
     fn sample_servo(&mut self, t: f64) {
         let Self { system, servo: Some(slopes), directions, x, v, joints, .. } = self else { return };
         if let Some(servo) = &system.servo {
@@ -302,7 +306,7 @@ impl<'a> Recurrence<'a> {
         }
     }
 
-    /// Motion and matrices of the current state.
+    /// Evaluates the motion and the tangent matrices at the current state.
     fn look(&mut self) {
         let Self { system, integrator, tangent, directions, .. } = self;
         let now = Integrator::current(integrator);
@@ -318,7 +322,8 @@ impl<'a> Recurrence<'a> {
         }
     }
 
-    /// δr of (3), with what the joints' motion and the controllers do, into `rhs`.
+    /// Computes δr of (3), including the contributions of the joint motion and of the controllers,
+    /// in `rhs`.
     fn explicit(&mut self) {
         let Self { system, integrator, tangent, directions, joints, rhs, room, own, servo, .. } = self;
         let now = Integrator::current(integrator);
@@ -340,8 +345,8 @@ impl<'a> Recurrence<'a> {
         }
     }
 
-    /// δẍ of the equations of motion at the current state, which is all that the scheme then
-    /// remembers.
+    /// Computes δẍ from the equations of motion at the current state and resets the history of the
+    /// scheme to it.
     fn accelerate(&mut self) -> Result<(), StepError> {
         if self.directions.is_empty() {
             return Ok(());
@@ -360,7 +365,7 @@ impl<'a> Recurrence<'a> {
         Ok(())
     }
 
-    /// To the next multiple of the step.
+    /// Advances to the next grid time.
     pub(super) fn step(&mut self) -> Result<(), StepError> {
         let end = self.integrator.next_time();
         loop {
@@ -396,13 +401,13 @@ impl<'a> Recurrence<'a> {
         }
     }
 
-    /// Derivatives of the free velocities where those of the motion jump,
-    /// `M_ff Δv_f + M_fp Δv_p = 0`: here all jumps are w = `blow`.
+    /// Computes the derivatives of the free velocities at a velocity jump of the motion,
+    /// `M_ff Δv_f + M_fp Δv_p = 0`; w, the argument `blow`, contains the jumps of all coordinates:
     ///
     /// ```text
     /// M_ff δΔv_f = -(∂(M w)/∂q δq + δM w + M_fp δΔv_p)
     /// ```
-    /// * `before`: derivatives of the motion's velocities on the other side of the jump, none of
+    /// * `before`: derivatives of the motion's velocities before the jump; `None` for a start from
     ///   rest.
     fn strike(&mut self, t: f64, blow: &DVector<f64>, before: Option<&DMatrix<f64>>) -> Result<(), StepError> {
         if self.directions.is_empty() {
@@ -442,7 +447,7 @@ impl<'a> Recurrence<'a> {
         Ok(())
     }
 
-    /// Run and tangent to `stop`.
+    /// Advances run and tangent to `stop`.
     fn advance(&mut self, stop: f64) -> Result<(), StepError> {
         let (dt, fresh) = self.next_length(stop);
         let differentiated = !self.directions.is_empty();
@@ -475,7 +480,7 @@ impl<'a> Recurrence<'a> {
         Ok(())
     }
 
-    /// Length of the step to `stop`, and whether the scheme forgets what was before it.
+    /// Returns the size of the step to `stop`, and whether the scheme resets its history before it.
     fn next_length(&self, stop: f64) -> (f64, bool) {
         let grid = &Integrator::current(&self.integrator).grid;
         let whole = stop == grid.next_time() && grid.is_on_step();
@@ -484,7 +489,7 @@ impl<'a> Recurrence<'a> {
         (dt, newton.fresh || newton.dt != dt)
     }
 
-    /// S and z of (1), at the end of the step.
+    /// Computes S and z of (1), at the end of the step.
     fn correct(&mut self, dt: f64) {
         self.S.fill_with_identity();
         self.z.fill(0.0);
@@ -496,10 +501,10 @@ impl<'a> Recurrence<'a> {
         let (arm, free) = (&system.arm, &system.free);
         let driven = arm.torque_driven.len();
         let acceleration = &Integrator::current(integrator).acceleration;
-        // K is symmetric: the transposed of M^-1 K.
+        // K is symmetric, so this is the transpose of M^-1 K.
         S.copy_from(&tangent.K);
         mass.solve_transposed(S);
-        // One direction's room serves for M^-1 K ẍ⁺.
+        // y = M^-1 K ẍ⁺, using the workspace of one direction.
         own.fill(0.0);
         for (own, column) in own.iter_mut().zip(S.column_iter()) {
             *own = column.dot(acceleration);
@@ -539,7 +544,7 @@ impl<'a> Recurrence<'a> {
         (0..S.nrows()).for_each(|k| S[(k, k)] += 1.0);
     }
 
-    /// (3), and what follows from it.
+    /// Solves (3) and updates all derivatives.
     fn solve(&mut self, dt: f64, t: f64) -> Result<(), StepError> {
         let (c_D, c_K) = self.coefficients.derivatives(dt);
         for k in 0..self.x.len() {
@@ -561,7 +566,7 @@ impl<'a> Recurrence<'a> {
         matrix.solve_transposed(rhs);
 
         self.acceleration.copy_from(&self.rhs);
-        // S δẍ⁺ in the place of the right-hand side.
+        // Overwrite the right-hand side by S δẍ⁺.
         self.rhs.fill(0.0);
         add_product(&self.S, (0, 0), &self.acceleration, &mut self.rhs);
         for k in 0..self.x.len() {
@@ -576,8 +581,8 @@ impl<'a> Recurrence<'a> {
     }
 }
 
-/// Takes rows of free coordinates; `column`: which stands in the place of each column, zeros
-/// without.
+/// Copies the rows of free coordinates; `column` returns the source of each column, or `None` for
+/// zeros.
 fn select(from: &DMatrix<f64>, free: &[usize], column: impl Fn(usize) -> Option<usize>, to: &mut DMatrix<f64>) {
     for j in 0..to.ncols() {
         match column(j) {

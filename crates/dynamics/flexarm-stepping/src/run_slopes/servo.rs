@@ -1,17 +1,18 @@
-//! The tangent of the sampled controllers of joints that are driven by torque, sample by sample.
+//! Tangent of the sampled controllers of joints driven by torque, sample by sample.
 //!
 //! ```text
 //! error = q̇_ref + k_p (q_ref - q) - q̇,   τ = k_v error + I + τ_ff,   I += k_i T error
 //! δτ = δk_v error + k_v δerror + δI + δτ_ff;   0 where τ is at its limit
 //! δI += T (δk_i error + k_i δerror);           0 where the integral stops
 //! ```
-//! Between samples torques are held, so that these are all the memory that a controller has. Which
-//! samples are at a limit does not change with a small enough change of a parameter; where one more
-//! or less of them is, the integral steps by `k_i T error`: the derivative is that of the run up to
-//! there, and how many samples are at limits is told ([`crate::TorqueLimited`]).
+//! Torques are held between samples, so that torque and integral are the complete state of a
+//! controller. A sufficiently small change of a parameter does not change which samples are
+//! limited. Where one sample more or less is limited, the integral jumps by `k_i T error`: the
+//! derivative is that of a fixed set of limited samples, and the number of these samples is
+//! reported ([`crate::TorqueLimited`]).
 //!
-//! τ_ff is the rigid robot's inverse dynamics on the reference, whose tangent is that of the motion
-//! ([`ForceTangent`]).
+//! τ_ff is the inverse dynamics of the rigid robot on the reference; its tangent is that of
+//! [`ForceTangent`].
 
 use flexarm_kinematics::{Data, State, inverse_dynamics, mass_matrix_at_poses, world_poses};
 use nalgebra::{DMatrix, DVector};
@@ -21,28 +22,28 @@ use crate::run_slopes::forces::ForceTangent;
 use crate::run_slopes::{Direction, TorqueLimited};
 use crate::servo::ServoState;
 
-/// What the controllers remember, differentiated: a row per direction, a column per axis.
+/// Derivatives of the controller states: one row per direction, one column per axis.
 pub(super) struct ServoSlopes {
-    /// Of the torques held.
+    /// Derivatives of the held torques.
     pub(super) torque: DMatrix<f64>,
     integral: DMatrix<f64>,
     ahead: DMatrix<f64>,
-    /// Samples that were seen.
+    /// Number of samples processed.
     samples: u64,
-    /// Which axes were at their limits, and when first.
+    /// Axes that reached their limits, with the time of the first limited sample.
     pub(super) limited: Vec<TorqueLimited>,
-    /// Whether what is fed forward changes with any direction but by its friction and factors.
+    /// Whether any direction changes the feed-forward other than through friction and factors.
     moves: bool,
     rigid: Rigid,
 }
 
-/// The rigid robot on its reference.
+/// Rigid robot on its reference.
 struct Rigid {
     tangent: ForceTangent,
     data: Data,
     by_q: DMatrix<f64>,
     by_rate: DMatrix<f64>,
-    /// Forces by a change of inertia.
+    /// Joint forces due to one direction.
     room: Vec<f64>,
 }
 
@@ -69,10 +70,10 @@ impl ServoSlopes {
         }
     }
 
-    /// Takes in the sample that a servo has just taken at t, if any; whether there was one.
+    /// Differentiates the sample that a servo has just taken at `t`; returns whether there was one.
     ///
     /// * `x`, `v`: derivatives of the free coordinates and rates, directions × N, axes first;
-    ///   `joints`: of reference, rates, accelerations.
+    ///   `joints`: derivatives of reference, rates and accelerations.
     pub(super) fn sample(
         &mut self,
         t: f64,
@@ -119,7 +120,7 @@ impl ServoSlopes {
         }
     }
 
-    /// Of what is fed forward.
+    /// Computes the derivatives of the feed-forward torques.
     fn feed_forward(
         &mut self,
         arm: &FlexibleArm,
@@ -162,7 +163,7 @@ impl ServoSlopes {
 }
 
 impl Rigid {
-    /// The tangent of the reference motion of the last sample.
+    /// Computes the tangent at the reference motion of the last sample.
     fn look(&mut self, servo: &ServoState) {
         let (model, state, qddot): (_, &State, &DVector<f64>) = (&servo.servo.rigid, &servo.reference, &servo.qddot);
         inverse_dynamics(model, &mut self.data, state, qddot);
@@ -171,7 +172,7 @@ impl Rigid {
         mass_matrix_at_poses(model, &mut self.data);
     }
 
-    /// Change of all joint torques by a direction, into `room`.
+    /// Computes the change of all joint torques in a direction, in `room`.
     fn forces(&mut self, servo: &ServoState, direction: &Direction, p: usize, joints: &[DMatrix<f64>; 3]) {
         let Self { tangent, data, by_q, by_rate, room } = self;
         room.fill(0.0);

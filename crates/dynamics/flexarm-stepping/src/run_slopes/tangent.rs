@@ -1,5 +1,5 @@
-//! Matrices of the equations of motion about the current state, and what parameters do to these
-//! equations there.
+//! Tangent matrices of the equations of motion at the current state, and the derivatives of these
+//! equations with respect to parameters.
 
 use flexarm_kinematics::{Data, PointLoad, State, StaticTangent};
 use nalgebra::{DMatrix, DVector};
@@ -12,7 +12,7 @@ use crate::run_slopes::forces::ForceTangent;
 use crate::run_slopes::gears::GearSlopes;
 use crate::run_slopes::{Direction, SpringSlope};
 
-/// Matrices of (1) of the module above at the current state.
+/// Matrices of (1) of the parent module at the current state.
 pub(super) struct Tangent {
     dynamic: ForceTangent,
     pub(super) inertia: ForceTangent,
@@ -20,25 +20,25 @@ pub(super) struct Tangent {
     points: Vec<PointLoad>,
     /// Whether there are loads or balancers.
     loaded: bool,
-    /// Of other places than the current one.
+    /// Workspace for configurations other than the current one.
     pub(super) work: Data,
     /// `∂r/∂q`, `∂r/∂q̇` and M of all coordinates, nv × nv.
     pub(super) by_q: DMatrix<f64>,
     pub(super) by_rate: DMatrix<f64>,
     pub(super) M: DMatrix<f64>,
     G: DMatrix<f64>,
-    /// Stiffness about the relaxed springs, free coordinates.
+    /// Stiffness about the relaxed springs, over the free coordinates.
     pub(super) K: DMatrix<f64>,
-    /// The same three, rows and columns of free coordinates.
+    /// The three matrices with rows and columns of the free coordinates.
     pub(super) own: [DMatrix<f64>; 3],
-    /// The same three, rows of free coordinates, columns of the joints; zero where a joint is
-    /// itself free.
+    /// The three matrices with rows of the free coordinates and columns of the joints; zero for
+    /// joints that are free.
     pub(super) by_joints: [DMatrix<f64>; 3],
-    /// What gears do beside giving way.
+    /// Tangent of gear effects other than elasticity.
     pub(super) gears: Option<GearSlopes>,
 }
 
-/// The state of a run at which its equations are looked at, with room for one direction.
+/// State of a run at which its equations are differentiated.
 pub(super) struct Look<'a> {
     pub(super) arm: &'a FlexibleArm,
     pub(super) data: &'a Data,
@@ -49,12 +49,12 @@ pub(super) struct Look<'a> {
     /// Rates of the joints.
     pub(super) rates: &'a [f64],
     pub(super) gears: Option<&'a GearState>,
-    /// Changes of inertia that are over.
+    /// Number of changes of inertia that are over.
     pub(super) changes: usize,
 }
 
 impl<'a> Look<'a> {
-    /// At the state of an integrator, which the system was evaluated at last.
+    /// Returns the state of an integrator at which the system was last evaluated.
     pub(super) fn at(system: &'a ReducedArm, now: &'a Current) -> Self {
         Self {
             arm: &system.arm,
@@ -96,8 +96,8 @@ impl Tangent {
         }
     }
 
-    /// `∂r/∂q` and `∂r/∂q̇` of the motion that was last given to `data`, loads of time t; `gears`:
-    /// of the same motion.
+    /// Computes `∂r/∂q` and `∂r/∂q̇` at the motion last evaluated in `data`, with the loads at time
+    /// `t`; `gears` must belong to the same motion.
     pub(super) fn compute(
         &mut self,
         arm: &FlexibleArm,
@@ -136,7 +136,8 @@ impl Tangent {
         }
     }
 
-    /// Takes rows and columns of free coordinates; with `moves` those of the joints too.
+    /// Extracts rows and columns of the free coordinates, and with `moves` also the columns of the
+    /// joints.
     pub(super) fn gather(&mut self, arm: &FlexibleArm, free: &[usize], moves: bool) {
         let Self { by_q, by_rate, M, own, by_joints, .. } = self;
         for ((from, to), joints) in [&*by_q, by_rate, M].into_iter().zip(own).zip(by_joints) {
@@ -155,8 +156,8 @@ impl Tangent {
         }
     }
 
-    /// Adds `∂r/∂p` of a direction without the joints' motion to `to`, free coordinates, in the
-    /// motion of [`Tangent::compute`]; without what the controller does.
+    /// Adds `∂r/∂p` of a direction to `to` (free coordinates) at the motion of
+    /// [`Tangent::compute`], without the contributions of joint motion and controllers.
     pub(super) fn add_explicit(
         &mut self,
         at: &Look<'_>,
@@ -190,12 +191,12 @@ impl Tangent {
     }
 }
 
-/// Place of a coordinate among those that are driven by torque.
+/// Returns the index of a coordinate among those driven by torque.
 pub(super) fn place(arm: &FlexibleArm, coordinate: usize) -> Option<usize> {
     arm.torque_driven.iter().position(|k| *k == coordinate)
 }
 
-/// Adds what changes of springs pull with at the deflections x; elastic coordinates.
+/// Adds the forces due to changes of springs at the deflections x, over the elastic coordinates.
 pub(super) fn add_springs(
     arm: &FlexibleArm,
     direction: &Direction,
@@ -220,7 +221,7 @@ pub(super) fn add_springs(
 }
 
 impl SpringSlope {
-    /// Adds its part of `δK x`.
+    /// Adds its share of `δK x`.
     pub(super) fn add_linear(&self, K: &DMatrix<f64>, x: &[f64], to: &mut [f64]) {
         let (matrix, factor) = match self {
             Self::Factor(factor) => (K, *factor),
@@ -232,14 +233,14 @@ impl SpringSlope {
     }
 }
 
-/// `to += A x` for a square A.
+/// Computes `to += A x` for a square A.
 pub(super) fn add_columns(A: &DMatrix<f64>, x: &[f64], to: &mut [f64]) {
     for (column, x) in A.as_slice().chunks_exact(A.nrows()).zip(x).filter(|(_, x)| **x != 0.0) {
         to.iter_mut().zip(column).for_each(|(to, a)| *to += a * x);
     }
 }
 
-/// Puts the numbers of a direction into its row.
+/// Copies the values of a direction into its row.
 pub(super) fn put(from: &[f64], to: &mut DMatrix<f64>, row: usize) {
     from.iter().enumerate().for_each(|(i, x)| to[(row, i)] = *x);
 }

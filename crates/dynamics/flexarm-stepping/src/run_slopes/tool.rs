@@ -1,4 +1,4 @@
-//! The tool's error against the rigid arm, and its derivatives from those of the coordinates.
+//! Tool error relative to the rigid arm, and its derivatives from those of the coordinates.
 
 use flexarm_kinematics::{Data, ElasticAngles, Frame, forward_kinematics, frame_jacobian, rotation_vector};
 use nalgebra::{DMatrix, DVector, Matrix6xX, Vector3, Vector6};
@@ -8,26 +8,26 @@ use crate::run_slopes::Direction;
 use crate::run_slopes::columns::add_product;
 use crate::run_slopes::recurrence::Recurrence;
 
-/// Error and derivatives of one time, with workspaces.
+/// Tool error and derivatives at one time, with workspaces.
 pub(super) struct ToolError {
     tool: Frame,
-    /// The arm with all elastic coordinates at zero.
+    /// Rigid arm: all elastic coordinates zero.
     rigid: Data,
     q: DVector<f64>,
     J: Matrix6xX<f64>,
     J_rigid: Matrix6xX<f64>,
-    /// Twists of the tool and of the rigid arm's, p × 6.
+    /// Derivatives of the tool pose as twists, for the flexible and for the rigid arm, p × 6.
     twists: DMatrix<f64>,
     rigid_twists: DMatrix<f64>,
-    /// Change of the tool's point per direction, tool axes.
+    /// Change of the tool point per direction, tool axes.
     points: Vec<Vector3<f64>>,
-    /// Columns of J for free coordinates and for the joints, these zero where a joint is itself
-    /// free.
+    /// Columns of J for the free coordinates and for the joints; the latter are zero for free
+    /// joints.
     J_free: Matrix6xX<f64>,
     J_joints: Matrix6xX<f64>,
-    /// Whether the motion of the joints changes.
+    /// Whether any direction changes the motion of the joints.
     moves: bool,
-    /// Per direction, after [`ToolError::look`].
+    /// Derivatives of the error per direction, after [`ToolError::look`].
     pub(super) slopes: Vec<[f64; 6]>,
 }
 
@@ -50,7 +50,8 @@ impl ToolError {
         }
     }
 
-    /// The error at the run's time: displacement and rotation vector, world axes.
+    /// Returns the error at the current time of the run: displacement and rotation vector, world
+    /// axes.
     pub(super) fn look(&mut self, run: &Recurrence<'_>) -> Vector6<f64> {
         let (model, data) = run.poses();
         let m = model.n_actuated();
@@ -70,7 +71,7 @@ impl ToolError {
         if self.moves {
             frame_jacobian(model, &self.rigid, &self.tool, &mut self.J_rigid);
         }
-        // w = B θ' in the axes of the turned frame.
+        // w = B θ' in the axes of the rotated frame.
         let (_, B) = ElasticAngles::RotationVector.pose(&theta);
         let rates = B.try_inverse().unwrap_or(B) * turned.transpose();
         self.twists.fill(0.0);

@@ -1,9 +1,10 @@
-//! How well a stepper follows an oscillation, found by running it on the test equation.
+//! Accuracy of a stepper for an oscillation, measured by running it on the test equation.
 //!
 //! ```text
-//! x'' + 2 ζ x' + x = 1,   x(0) = x'(0) = 0                      (1)  a body on a spring, in units of its own frequency
+//! x'' + 2 ζ x' + x = 1,   x(0) = x'(0) = 0                      (1)
 //! x(t) = 1 - e^(-ζt) (cos wt + ζ/w sin wt),   w² = 1 - ζ²       (2)
 //! ```
+//! (1) is a body on a spring, with time in units of 1/ω.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -17,19 +18,18 @@ use crate::motion::Held;
 use crate::observation::Observation;
 use crate::stepper::Start;
 
-/// Load of (1), small enough that no stepper takes the deflection for a divergence.
+/// Load of (1), small enough that no stepper reports a divergence.
 const LOAD: f64 = 1e-3;
-/// Steps in a period beyond which the error of any stepper is small.
+/// Number of steps per period above which the error of any stepper is small.
 const MANY: f64 = 1000.0;
 
-/// Largest error over the first period of an oscillation, over its amplitude: the stepper itself
-/// runs on (1) and is compared with (2). Zero for steppers that choose their steps by error
-/// control.
+/// Returns the maximum error over the first period of an oscillation relative to its amplitude: the
+/// stepper runs on (1) and is compared with (2). Zero for steppers with error control.
 ///
-/// * `h_omega`: step times angular frequency.
+/// * `h_omega`: step size times angular frequency.
 /// * `zeta`: damping ratio of the oscillation, below 1.
 ///
-/// Returns infinity where the stepper does not take such steps.
+/// Returns infinity if the stepper does not accept the step size.
 pub fn error_of_a_period(kind: StepperKind, h_omega: f64, zeta: f64) -> f64 {
     if kind.entry().steps == StepRule::ByErrorControl || h_omega * MANY < TAU {
         return 0.0;
@@ -38,7 +38,7 @@ pub fn error_of_a_period(kind: StepperKind, h_omega: f64, zeta: f64) -> f64 {
     swing(kind, h_omega, zeta, steps).unwrap_or(f64::INFINITY)
 }
 
-/// Largest error of so many steps; none if the stepper refuses them.
+/// Returns the maximum error over `steps` steps; `None` if the stepper refuses them.
 fn swing(kind: StepperKind, h: f64, zeta: f64, steps: usize) -> Option<f64> {
     let arm = body_on_spring(zeta)?;
     let mut seen = Observation::new(&arm);
@@ -55,7 +55,7 @@ fn swing(kind: StepperKind, h: f64, zeta: f64, steps: usize) -> Option<f64> {
     largest.is_finite().then_some(largest)
 }
 
-/// A body of unit mass on a spring of unit stiffness, with the load of (1).
+/// Returns a body of unit mass on a spring of unit stiffness, with the load of (1).
 fn body_on_spring(zeta: f64) -> Option<FlexibleArm> {
     let mut tree = Mechanism::new("oscillator");
     tree.gravity = Vector3::zeros();
@@ -82,7 +82,7 @@ mod tests {
     }
 
     /// Truth: SPOOK without damping has the frequency `(2/hω) atan(hω/2)` and, from rest, leads by
-    /// half a step: `x = 1 - cos(w' t + hω/2) / cos(hω/2)`; and the radius of RK4,
+    /// half a step: `x = 1 - cos(w' t + hω/2) / cos(hω/2)`; and the amplification of RK4,
     /// `|R(iy)|² = 1 - y⁶/72 + y⁸/576`.
     #[test]
     fn the_error_of_a_period_is_that_of_the_closed_amplification() {
@@ -102,7 +102,7 @@ mod tests {
         assert!((0.5..2.0).contains(&(found / loss.hypot(phase))), "{found:.3e}, {loss:.3e}, {phase:.3e}");
     }
 
-    /// Truth: the orders that the registry states.
+    /// Truth: the orders stated in the registry.
     #[test]
     fn half_the_step_divides_the_error_of_a_period_by_the_power_of_the_order() {
         for entry in STEPPERS.into_iter().filter(|entry| entry.steps != StepRule::ByErrorControl) {
@@ -113,8 +113,8 @@ mod tests {
         assert_eq!(error_of_a_period(kind("reference"), 1.0, 0.03), 0.0);
     }
 
-    /// The source's preset damps by the step: an oscillation without damping of its own is lost at
-    /// any step.
+    /// The preset of the source damps with a time in proportion to the step: an oscillation without
+    /// physical damping decays at any step size.
     #[test]
     fn settings_count() {
         let source = StepperKind::Spook(SpookSettings { preset: SpookPreset::Source, ..SpookSettings::default() });

@@ -1,19 +1,17 @@
-//! Generalised-alpha twice, with h and with h/2, and what both say together: Richardson's
-//! extrapolation.
+//! Richardson extrapolation of generalised-alpha with step sizes h and h/2.
 //!
 //! ```text
-//! y = y_{h/2} + (y_{h/2} - y_h) / 3                 y: positions, velocities, accelerations          (1)
+//! y = y_{h/2} + (y_{h/2} - y_h) / 3      y: positions, velocities, accelerations        (1)
 //! ```
-//! The error of generalised-alpha begins with `h²`, and (1) has none of that left: third order, and
-//! with ρ near 1, where the scheme is nearly its own mirror image in time, close to the fourth. It
-//! costs three steps of h instead of one. The two runs go side by side and know nothing of each
-//! other (*passive* extrapolation), so that what is stable, and how modes are damped that are too
-//! fast for the step, is as in each of them. What a jump of loads or velocities does, both meet at
-//! its time.
+//! The error of generalised-alpha starts with `h²`, which (1) eliminates: third order, and with ρ
+//! near 1, where the scheme is nearly symmetric in time, close to fourth. It costs three steps
+//! instead of one. The two runs are independent of each other (*passive* extrapolation), so that
+//! stability and the damping of modes that are too fast for the step are those of each run. Both
+//! apply jumps of loads or velocities at their exact times.
 //!
-//! Where the error has no series in h (friction that sticks, hysteresis, steps longer than a
-//! twelfth of a period) nothing is gained, but nothing lost: the result is off by at most the error
-//! of the finer run and a third of the difference.
+//! If the error has no expansion in powers of h (friction that sticks, hysteresis, fewer than
+//! twelve steps per period) the extrapolation gains nothing but is harmless: the error is at most
+//! that of the finer run plus a third of the difference.
 //!
 //! Source: [Hairer & Wanner 1996], section IV.9.
 
@@ -41,7 +39,7 @@ pub(super) static ENTRY: StepperEntry = StepperEntry {
     with: |options| StepperKind::ExtrapolatedAlpha(ExtrapolatedAlpha(options.alpha)),
 };
 
-/// Generalised-alpha, extrapolated, with the settings of both runs.
+/// Extrapolated generalised-alpha, with the settings of both runs.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct ExtrapolatedAlpha(pub AlphaSettings);
 
@@ -55,21 +53,21 @@ impl Method for ExtrapolatedAlpha {
     }
 
     fn start(&self, arm: Arc<FlexibleArm>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
-        // Matrices that are followed differ more between the two runs, and what differs has no
-        // series in h: three times the error.
+        // Extrapolated matrices differ more between the two runs, by errors without an expansion in
+        // h: three times the error.
         let coarse = self.0.stepper(arm.clone(), h, e, false)?;
         let fine = self.0.stepper(arm, 0.5 * h, e, false)?;
-        // Both begin in the same state.
+        // Both start in the same state.
         let now = fine.integrator.now.clone();
         Ok(Box::new(Extrapolated { x: now.x, v: now.v, a: now.acceleration, t: 0.0, coarse, fine }))
     }
 }
 
-/// The two runs, and what both say.
+/// The two runs and their extrapolated state.
 struct Extrapolated {
     coarse: ReducedStepper<GeneralizedAlpha>,
     fine: ReducedStepper<GeneralizedAlpha>,
-    /// (1), after the last whole step.
+    /// Result of (1) after the last complete step.
     x: DVector<f64>,
     v: DVector<f64>,
     a: DVector<f64>,
@@ -111,7 +109,7 @@ impl Stepper for Extrapolated {
         observe_reduced(&mut self.fine.system, self.t, &self.x, &self.v, &self.a, out);
     }
 
-    /// Steps are those of h; the work is that of both runs.
+    /// Counts the steps of h and the work of both runs.
     fn counts(&self) -> Counts {
         let (coarse, fine) = (self.coarse.counts(), self.fine.counts());
         Counts {

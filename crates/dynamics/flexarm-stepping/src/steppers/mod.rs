@@ -1,12 +1,11 @@
-//! The registry of steppers: what a program, a command line or a test can choose from, and how each
-//! is made.
+//! Registry of steppers: the choices of programs, command line and tests, and their construction.
 //!
-//! **A new stepper** is a file in this folder and its lines here: `mod` and `use`, a variant of
-//! [`StepperKind`], its line in `method` and in [`STEPPERS`]. The file has the integrator (an
+//! **A new stepper** is a file in this folder plus its lines here: `mod` and `use`, a variant of
+//! [`StepperKind`], its line in `method` and in [`STEPPERS`]. The file contains the integrator (an
 //! [`crate::Integrator`] over [`crate::SecondOrderSystem`], or a [`Stepper`] of its own), settings
-//! that implement `Method`, and a [`StepperEntry`]. Words and help of the command line, summaries
-//! and the tests that go over all steppers read [`STEPPERS`]; settings that users choose are fields
-//! of [`StepperOptions`] besides.
+//! that implement `Method`, and a [`StepperEntry`]. Names and help of the command line, summaries,
+//! and the tests over all steppers read [`STEPPERS`]; settings chosen by the user are also fields
+//! of [`StepperOptions`].
 
 mod accuracy;
 mod extrapolated;
@@ -34,7 +33,7 @@ pub use rk4::{Rk4, STABILITY_LIMIT};
 pub use sdirk3::Sdirk3;
 pub use spook::{ConstraintForm, Spook, SpookPreset, SpookSettings};
 
-/// Which time stepper, with its settings.
+/// Time stepper with its settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StepperKind {
     /// Implicit, reduced coordinates.
@@ -43,11 +42,11 @@ pub enum StepperKind {
     Spook(SpookSettings),
     /// Explicit, reduced coordinates.
     Rk4,
-    /// Steps of its own choice under error control, reduced coordinates.
+    /// Variable step size with error control, reduced coordinates.
     Reference(ReferenceSettings),
     /// Implicit, third order, L-stable, reduced coordinates.
     Sdirk3,
-    /// Generalised-alpha with the step and its half, extrapolated.
+    /// Generalised-alpha with full and half step, extrapolated.
     ExtrapolatedAlpha(ExtrapolatedAlpha),
 }
 
@@ -67,17 +66,17 @@ impl StepperKind {
         }
     }
 
-    /// What is known of the stepper whatever its settings.
+    /// Returns the properties of the stepper that do not depend on its settings.
     pub fn entry(&self) -> &'static StepperEntry {
         self.method().entry()
     }
 
-    /// Word of the command line.
+    /// Returns the name on the command line.
     pub fn name(&self) -> &'static str {
         self.entry().name
     }
 
-    /// The settings under their keys in summaries, in their order.
+    /// Returns the settings with their keys in summaries, in order.
     pub fn settings(&self) -> Vec<(&'static str, StepperSetting)> {
         self.method().settings()
     }
@@ -89,53 +88,53 @@ impl Default for StepperKind {
     }
 }
 
-/// What is known of a stepper whatever its settings.
+/// Properties of a stepper that do not depend on its settings.
 #[derive(Debug)]
 pub struct StepperEntry {
-    /// Word of the command line, of summaries and messages.
+    /// Name on the command line, in summaries and in messages.
     pub name: &'static str,
-    /// Other spellings of it that are understood.
+    /// Accepted alternative spellings of the name.
     pub aliases: &'static [&'static str],
     /// One line of help.
     pub help: &'static str,
-    /// Where its steps come from and how long they may be.
+    /// Rule for its step size.
     pub steps: StepRule,
-    /// Step where none is given (s): what the shipped robots are computed with to about a per cent.
+    /// Default step size (s); accurate to about one per cent for the shipped robots.
     pub default_step_s: f64,
-    /// Power of the step with which its error falls at least; of solvers with error control 0.
+    /// Minimum order of convergence; 0 for solvers with error control.
     pub order: u32,
-    /// Whether it works in maximal coordinates: no modal links, torques, payloads that change,
-    /// curved springs, mimic joints.
+    /// Whether it works in maximal coordinates, without support for modal links, torque drives,
+    /// payload changes, nonlinear springs and mimic joints.
     pub maximal: bool,
-    /// Whether its steps allocate, because its solver is another library's.
+    /// Whether its steps allocate, because the solver is from another library.
     pub allocates: bool,
-    /// The stepper with its part of the options.
+    /// Returns the stepper with its part of the options.
     pub with: fn(&StepperOptions) -> StepperKind,
 }
 
-/// Where the steps of a stepper come from and how long they may be.
+/// Rule for the step size of a stepper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StepRule {
-    /// As given, and stable whatever their length.
+    /// As given; stable for any step size.
     AnyLength,
-    /// As given, and refused beyond the limit of stability.
+    /// As given; refused above the stability limit.
     UpToTheStabilityLimit,
-    /// Chosen by error control; what is given is the distance of the points.
+    /// Chosen by error control; the given step is the output interval.
     ByErrorControl,
 }
 
-/// Settings of all steppers, of which each takes its own.
+/// Settings of all steppers; each uses its own part.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StepperOptions {
-    /// Generalised-alpha.
+    /// Settings of generalised-alpha.
     pub alpha: AlphaSettings,
-    /// SPOOK.
+    /// Settings of SPOOK.
     pub spook: SpookSettings,
-    /// Reference.
+    /// Settings of the reference stepper.
     pub reference: ReferenceSettings,
 }
 
-/// A setting of a stepper as summaries tell it.
+/// Value of a stepper setting in summaries.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StepperSetting {
     /// A number.
@@ -146,26 +145,26 @@ pub enum StepperSetting {
     Word(&'static str),
 }
 
-/// What the registry asks of the settings of a stepper.
+/// Interface between the registry and the settings of a stepper.
 trait Method {
     fn entry(&self) -> &'static StepperEntry;
 
-    /// Under their keys in summaries, in their order.
+    /// Returns the settings with their keys in summaries, in order.
     fn settings(&self) -> Vec<(&'static str, StepperSetting)> {
         Vec::new()
     }
 
-    /// The stepper at `t = 0` with elastic coordinates `e`; `h` (s) is positive.
+    /// Creates the stepper at `t = 0` with elastic coordinates `e`; `h` (s) is positive.
     fn start(&self, arm: Arc<FlexibleArm>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError>;
 }
 
-/// Makes a stepper of the kind, started at `t = 0`.
+/// Creates a stepper of the given kind, started at `t = 0`.
 ///
 /// # Errors
-/// [`StepError::Setup`] if the step is no positive time, settings make no sense or the stepper does
-/// not know something of the arm, [`StepError::NoEquilibrium`] if the start cannot be found,
-/// [`StepError::UnstableStep`] if the step is too long for an explicit stepper,
-/// [`StepError::Singular`] if the first accelerations cannot be solved.
+/// [`StepError::Setup`] if the step is not a positive time, settings are invalid or the stepper
+/// does not support a feature of the arm, [`StepError::NoEquilibrium`] if the initial equilibrium
+/// is not found, [`StepError::UnstableStep`] if the step is too large for an explicit stepper,
+/// [`StepError::Singular`] if the initial accelerations cannot be computed.
 pub fn new_stepper(
     kind: StepperKind,
     arm: impl Into<Arc<FlexibleArm>>,
@@ -190,7 +189,7 @@ pub fn new_stepper(
 mod tests {
     use super::*;
 
-    /// The table and the kinds say the same, and no word means two steppers.
+    /// The table and the kinds agree, and no name refers to two steppers.
     #[test]
     fn every_entry_makes_a_stepper_of_its_own_name() {
         let mut words: Vec<&str> = Vec::new();

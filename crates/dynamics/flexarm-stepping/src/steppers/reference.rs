@@ -1,31 +1,30 @@
-//! Integration with error control, by the solvers of `diffsol`: what the steppers of fixed step are
-//! measured against.
+//! Integration with error control by the solvers of `diffsol`: the reference for the steppers of
+//! fixed step size.
 //!
-//! The second-order system is seen as `y = [x; v]`, `ẏ = [v; a(t, x, v)]`. The solver chooses order
-//! and step so that its estimate of the local error stays below the tolerance, and takes its own
-//! steps past the points `t0 + k h`; there its continuous output is read ([`Integrator::step`]),
-//! which is as good there as the steps are at their ends. The error of a whole run is larger than
-//! the tolerance: over 4 s of the reference arm 100 to 200 times (BDF, 1e-6 to 1e-9).
+//! The second-order system is written as `y = [x; v]`, `ẏ = [v; a(t, x, v)]`. The solver chooses
+//! order and step size such that its estimate of the local error stays below the tolerance, and
+//! steps past the points `t0 + k h`, at which its continuous output is evaluated
+//! ([`Integrator::step`]) with the same accuracy as at the ends of its steps. The error of a whole
+//! run is larger than the tolerance: over 4 s of the reference arm 100 to 200 times (BDF, 1e-6 to
+//! 1e-9).
 //!
-//! **Which method.** The highest modes decide (measured in `tests/reference_arm.rs`,
+//! **Choice of the method.** The highest modes decide (measured in `tests/reference_arm.rs`,
 //! `tests/reference_stepper.rs`). BDF of variable order, the default, is nine times cheaper than
-//! the explicit pair where they are well damped, and costs about as much where they are not: its
-//! orders 3 to 5 are unstable near the imaginary axis, so that the error control holds the step
-//! near `1/ω` of a lightly damped mode, however little it moves. Only the A-stable ESDIRK steps
-//! over those; it is of third order, so it pays where modes are in the kHz or the tolerance is
-//! loose.
+//! the explicit pair if they are well damped, and costs about as much if not: its orders 3 to 5 are
+//! unstable near the imaginary axis, so that the error control keeps the step near `1/ω` of a
+//! lightly damped mode, however small its amplitude. Only the A-stable ESDIRK can take larger
+//! steps; it is of third order, so it is preferable for modes in the kHz range or loose tolerances.
 //!
-//! **Restarts.** A jump of the load inside a step costs rejected steps: [`Reference::restart_at`]
-//! makes the solver end a step there and start anew. [`Integrator::restart`] is for a system that
-//! was changed from outside.
+//! **Restarts.** A jump of the load inside a step causes rejected steps: with
+//! [`Reference::restart_at`] the solver ends a step there and restarts. [`Integrator::restart`] is
+//! for a system that was changed from outside.
 //!
-//! **Who owns what.** A solver of `diffsol` borrows its problem and the problem holds the
-//! equations, so none of them can be kept beside a system that the caller lends for one call. Each
-//! call that needs more of the solution builds problem and solver around the system, lets the
-//! solver run and takes its state back. That state holds the history (for BDF the differences and
-//! the order), so nothing of the method is lost; the Jacobian is, so an implicit solver takes 50
-//! steps at a time, as many as it would keep its Jacobian anyway, and the points that it passes
-//! wait in a queue.
+//! **Ownership.** A solver of `diffsol` borrows its problem, and the problem owns the equations, so
+//! neither can be stored beside a system that the caller lends for one call. Each call that needs
+//! more of the solution builds problem and solver around the system, runs the solver and takes its
+//! state back. That state contains the history (for BDF the differences and the order), so the
+//! method loses nothing except the Jacobian. An implicit solver therefore takes 50 steps at a time,
+//! as many as it would keep its Jacobian anyway, and the points that it passes are queued.
 //!
 //! Sources: BDF of variable order [Shampine & Reichelt 1997], ESDIRK3(4) [Jørgensen, Kristensen &
 //! Thomsen 2018], explicit 5(4) pair [Tsitouras 2011].
@@ -60,37 +59,37 @@ pub(super) static ENTRY: StepperEntry = StepperEntry {
     with: |options| StepperKind::Reference(options.reference),
 };
 
-/// Positions below this count as small: absolute over relative tolerance (m, rad).
+/// Position scale below which the absolute tolerance applies: absolute over relative tolerance (m,
+/// rad).
 const SMALL: f64 = 1e-3;
-/// The same for velocities, over that for positions (1/s): what a mode of 16 Hz has.
+/// Ratio of the scale of velocities to that of positions (1/s): that of a mode of 16 Hz.
 const RATE: f64 = 100.0;
-/// Steps that an implicit solver takes before it is taken apart; its own interval between two
-/// Jacobians.
+/// Number of steps of an implicit solver per call: its own interval between two Jacobians.
 const RUN: u64 = 50;
-/// Longest step of the solver (s): at rest it would grow until it passes over a motion that starts
-/// later.
+/// Maximum step of the solver (s): at rest the step would otherwise grow until it misses a motion
+/// that starts later.
 const LONGEST: f64 = 0.02;
-/// Restarts closer to each other than this part of h are one,
+/// Restarts are merged if they are closer to each other than this fraction of h,
 const TOGETHER: f64 = 1e-9;
-/// and those closer than this part of the time, where the solver sees no difference (2e-14 of it).
+/// or than this fraction of the time, which the solver cannot resolve (2e-14 of it).
 const ROUNDING: f64 = 1e-13;
-/// Increment of the differences for the Jacobian, over what counts as small.
+/// Increment of the finite differences for the Jacobian, relative to the scales.
 const INCREMENT: f64 = 1e-4;
 
-/// Method of the solver; see the module page.
+/// Method of the solver; see the module documentation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum ReferenceMethod {
-    /// Implicit multistep formulas of orders 1 to 5.
+    /// Implicit multistep formulas of orders 1 to 5 (BDF).
     #[default]
     Bdf,
-    /// Implicit Runge-Kutta of third order, A-stable: for lightly damped modes in the kHz.
+    /// Implicit Runge-Kutta of third order, A-stable; for lightly damped modes in the kHz range.
     Esdirk34,
-    /// Explicit Runge-Kutta of fifth order: for a second opinion.
+    /// Explicit Runge-Kutta of fifth order, as an independent check.
     Tsit45,
 }
 
 impl ReferenceMethod {
-    /// The word of the command line.
+    /// Returns the name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Bdf => "bdf",
@@ -100,27 +99,27 @@ impl ReferenceMethod {
     }
 }
 
-/// Tolerances on the local error of a coordinate y: `atol + rtol |y|` in the root mean square over
+/// Tolerances on the local error: `atol + rtol |y|` per coordinate y, in the root mean square over
 /// all coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReferenceSettings {
     /// Relative tolerance.
     pub rtol: f64,
-    /// Absolute tolerance of positions (m, rad); of velocities 100/s times as much.
+    /// Absolute tolerance of positions (m, rad); that of velocities is 100/s times larger.
     pub atol: f64,
     /// Method of the solver.
     pub method: ReferenceMethod,
 }
 
 impl ReferenceSettings {
-    /// The default method; coordinates below 1 mm or 1 mrad count as small.
+    /// Creates settings with the default method; coordinates below 1 mm or 1 mrad count as small.
     pub fn new(rtol: f64) -> Self {
         Self { rtol, atol: SMALL * rtol, method: ReferenceMethod::default() }
     }
 
     fn check(&self) -> Result<(), StepError> {
         let Self { rtol, atol, .. } = *self;
-        // Below this the estimate of the local error is rounding.
+        // Below 1e-13 the estimate of the local error is round-off.
         if !(1e-13..=1e-2).contains(&rtol) {
             return Err(StepError::Setup(format!(
                 "the relative tolerance must lie between 1e-13 and 1e-2, found {rtol:e}"
@@ -156,11 +155,11 @@ impl Method for ReferenceSettings {
         }
         let stepper = ReducedStepper::start(arm, e, |system, x, v| {
             let mut integrator = Reference::new(system, 0.0, h, *self, x, v)?;
-            // Else a solver that takes long steps may not see a short load at all.
+            // Otherwise a solver with large steps may miss a short load.
             for t in system.arm.load_jumps().filter(|t| *t > 0.0) {
                 integrator.restart_at(t);
             }
-            // No whole part of a period, or a sine would look like nothing at all.
+            // Not an integer fraction of the period, at which samples of a sine could all be zero.
             let period = system.arm.loads.iter().map(|load| load.wrench.period).fold(f64::INFINITY, f64::min);
             integrator.limit_steps(0.137 * period);
             Ok(integrator)
@@ -172,7 +171,7 @@ impl Method for ReferenceSettings {
 type V = NalgebraVec<f64>;
 type Lu = NalgebraLU<f64>;
 
-/// What the next run of the solver continues.
+/// State from which the next run of the solver continues.
 enum Kept {
     /// Time and `[x; v]`, without history.
     Start(f64, Vec<f64>),
@@ -181,7 +180,7 @@ enum Kept {
 }
 
 impl Kept {
-    /// How far the solver has come (s).
+    /// Returns the time that the solver has reached (s).
     fn time(&self) -> f64 {
         match self {
             Self::Start(t, _) => *t,
@@ -191,7 +190,7 @@ impl Kept {
     }
 }
 
-/// The integrator with its state; see the module page.
+/// The integrator with its state; see the module documentation.
 pub struct Reference {
     settings: ReferenceSettings,
     /// Time, positions, velocities and accelerations.
@@ -199,24 +198,24 @@ pub struct Reference {
     kept: Kept,
     /// `[x; v]` at the points after the current time that the solver has passed.
     ahead: VecDeque<Vec<f64>>,
-    /// Times of restarts, in order.
+    /// Times of restarts, ascending.
     restarts: Vec<f64>,
-    /// Longest step of the solver (s).
+    /// Maximum step of the solver (s).
     longest: f64,
-    /// Steps of the solver so far; it may be ahead of the current time.
+    /// Steps of the solver so far; the solver may be ahead of the current time.
     pub solver_steps: u64,
-    /// Evaluations of the equations of motion so far, those for Jacobians included.
+    /// Evaluations of the equations of motion so far, including those for Jacobians.
     pub evaluations: u64,
     /// Factorisations so far.
     pub factorisations: u64,
 }
 
 impl Reference {
-    /// Starts at `t0`; [`Integrator::step`] goes from one multiple of `h` (s) to the next.
+    /// Starts at `t0`; [`Integrator::step`] advances from one multiple of `h` (s) to the next.
     ///
     /// # Errors
-    /// [`StepError::Setup`] for tolerances that make no sense, [`StepError::Singular`] if the first
-    /// acceleration cannot be found.
+    /// [`StepError::Setup`] for invalid tolerances, [`StepError::Singular`] if the initial
+    /// acceleration cannot be computed.
     ///
     /// # Panics
     /// If `h` is not positive.
@@ -244,21 +243,22 @@ impl Reference {
         })
     }
 
-    /// First point that is neither reached nor waiting.
+    /// Returns the first point that is neither reached nor queued.
     fn next_point(&self) -> f64 {
         self.now.grid.after(1 + self.ahead.len() as u64)
     }
 
-    /// Makes the solver end a step at `t` (s) and start anew, because the load jumps there: before
-    /// `t` the system is only asked for times before it, afterwards only for times after it. A time
-    /// that has passed starts anew at once.
+    /// Makes the solver end a step at `t` (s) and restart, because the load jumps there: before `t`
+    /// the system is evaluated only at times before it, afterwards only at times after it. A time
+    /// in the past causes an immediate restart.
     ///
     /// # Panics
     /// If `t` is not finite.
     pub fn restart_at(&mut self, t: f64) {
         assert!(t.is_finite(), "a restart has a time");
         let near = self.near(t);
-        // A point is met exactly: a restart that is a rounding beyond it would be met again.
+        // Points are reached exactly: a restart that is a rounding error beyond a point would be
+        // met twice.
         let (t0, h) = (self.now.grid.start(), self.now.grid.step_size());
         let point = t0 + ((t - t0) / h).round() * h;
         let t = if (t - point).abs() <= near { point } else { t };
@@ -271,18 +271,18 @@ impl Reference {
         self.restarts.insert(self.restarts.partition_point(|other| *other < t), t);
     }
 
-    /// Keeps the solver's steps below `longest` (s).
+    /// Limits the solver's steps to `longest` (s).
     pub fn limit_steps(&mut self, longest: f64) {
         self.longest = self.longest.min(longest);
     }
 
-    /// Drops what the solver knows beyond the current time.
+    /// Discards the solution of the solver beyond the current time.
     fn start_again(&mut self) {
         self.ahead.clear();
         self.kept = Kept::Start(self.now.grid.time(), together(&self.now.x, &self.now.v));
     }
 
-    /// Times closer than this to t are the same (s).
+    /// Returns the distance from `t` below which times are equal (s).
     fn near(&self, t: f64) -> f64 {
         TOGETHER * self.now.grid.step_size() + ROUNDING * t.abs()
     }
@@ -291,8 +291,7 @@ impl Reference {
     fn step_to_point(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
         while self.ahead.is_empty() && !self.now.x.is_empty() {
             if let Err(error) = self.advance(system) {
-                // Points that were passed before the failure are good; the solver tries again from
-                // the last one.
+                // Points passed before the failure are valid; the solver retries from the last one.
                 let Some(last) = self.ahead.back().cloned() else {
                     self.start_again();
                     return Err(error);
@@ -304,8 +303,8 @@ impl Reference {
         self.arrive(system, self.next_time(), &y)
     }
 
-    /// Advances to a restart that lies before the next multiple of h ([`Reference::restart_at`]);
-    /// what is left of the step starts anew there.
+    /// Advances to a restart before the next multiple of h ([`Reference::restart_at`]); the rest of
+    /// the step starts anew there.
     fn step_to_restart(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError> {
         while self.kept.time() < t - self.near(t) && !self.now.x.is_empty() {
             if let Err(error) = self.advance(system) {
@@ -322,7 +321,7 @@ impl Reference {
         Ok(())
     }
 
-    /// Takes over position and velocity at t.
+    /// Sets position and velocity at `t`, and evaluates the acceleration.
     fn arrive(&mut self, system: &mut impl SecondOrderSystem, t: f64, y: &[f64]) -> Result<(), StepError> {
         let n = self.now.x.len();
         let (x, v) = (DVector::from_column_slice(&y[..n]), DVector::from_column_slice(&y[n..]));
@@ -334,11 +333,11 @@ impl Reference {
         Ok(())
     }
 
-    /// Lends the system to a solver that continues from what was kept.
+    /// Runs a solver on the system, continuing from the kept state.
     fn advance(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
         let start = self.kept.time();
         let kept = std::mem::replace(&mut self.kept, Kept::Start(start, Vec::new()));
-        // The system is asked for times between two restarts, without these.
+        // The system is evaluated strictly between two restarts.
         let passed = self.restarts.partition_point(|t| *t <= start);
         let from = if passed > 0 { self.restarts[passed - 1].next_up() } else { f64::NEG_INFINITY };
         let stop = self.restarts.get(passed).copied().unwrap_or(f64::INFINITY);
@@ -346,12 +345,12 @@ impl Reference {
         let result = self.solve(kept, stop, &equations);
         let FirstOrder { evaluations, error, .. } = equations.into_inner();
         self.evaluations += evaluations;
-        // What stopped the system explains what stopped the solver.
+        // An error of the system is the cause of the solver's error.
         self.kept = error.map_or(result, Err)?;
         Ok(())
     }
 
-    /// Builds problem and solver around the equations and lets it run.
+    /// Builds problem and solver around the equations and runs it.
     fn solve<S: SecondOrderSystem>(
         &mut self,
         kept: Kept,
@@ -363,7 +362,7 @@ impl Reference {
         let fault = |error: DiffsolError| gave_up(start, h, &error);
         let (y0, bdf, runge_kutta) = match kept {
             Kept::Start(_, y) => (y, None, None),
-            // The problem asks for a start, the state has its own.
+            // The problem requires an initial value, but the kept state has its own.
             Kept::Bdf(state) => (vec![0.0; 2 * n], Some(state), None),
             Kept::RungeKutta(state) => (vec![0.0; 2 * n], None, Some(state)),
         };
@@ -400,8 +399,8 @@ impl Reference {
         }
     }
 
-    /// Steps until a point was passed and `least` steps were made, or to the restart at `stop`;
-    /// queues the points.
+    /// Steps until a point was passed and at least `least` steps were taken, or to the restart at
+    /// `stop`; queues the points.
     fn run<'p, E, S>(
         &mut self,
         mut solver: S,
@@ -429,8 +428,8 @@ impl Reference {
         Ok(result?.unwrap_or_else(|| keep(solver.into_state())))
     }
 
-    /// One step of the solver; queues the points in it. At the restart it returns where the next
-    /// run starts.
+    /// Takes one step of the solver and queues the points in it. At a restart it returns the state
+    /// from which the next run starts.
     fn solver_step<'p, E, S>(&mut self, solver: &mut S, stop: f64) -> Result<Option<Kept>, StepError>
     where
         E: OdeEquations<T = f64, V = V> + 'p,
@@ -438,7 +437,7 @@ impl Reference {
     {
         let (t, h) = (solver.state().t, solver.state().h);
         let fault = |error: DiffsolError| gave_up(t, h, &error);
-        // The solver knows no longest step, but a time not to pass.
+        // The solver has no maximum step, but a stop time.
         let mut target = if h > self.longest { t + self.longest } else { f64::INFINITY };
         if target > stop - self.near(stop) {
             target = stop;
@@ -447,8 +446,7 @@ impl Reference {
             solver.set_stop_time(target).map_err(fault)?;
         }
         let reason = solver.step().map_err(fault)?;
-        // A longest step that was rejected leaves its end behind as a time not to pass: that is no
-        // restart.
+        // A rejected step of maximum length leaves its end as stop time: this is not a restart.
         let restart = reason == OdeSolverStopReason::TstopReached && target == stop && stop.is_finite();
 
         let state = solver.state();
@@ -477,20 +475,21 @@ impl Integrator for Reference {
         &mut self.now
     }
 
-    /// To a multiple of the step, or to a restart before it ([`Reference::restart_at`]). Allocates.
+    /// Advances to a multiple of the step, or to a restart before it ([`Reference::restart_at`]).
+    /// Allocates.
     fn advance_to(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError> {
         if t == self.next_time() { self.step_to_point(system) } else { self.step_to_restart(system, t) }
     }
 
-    /// Position and velocity are kept, the acceleration is evaluated again, the step is chosen
-    /// again.
+    /// Keeps position and velocity, evaluates the acceleration again and lets the solver choose its
+    /// step again.
     fn restart(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
         self.start_again();
         self.evaluations += 1;
         self.now.accelerate(system)
     }
 
-    /// The solver must not look past an event.
+    /// The solver must not step past an event.
     fn expect_event(&mut self, t: f64) {
         self.restart_at(t);
     }
@@ -500,18 +499,18 @@ impl Integrator for Reference {
     }
 }
 
-/// The system of first order `y = [x; v]`, with what an evaluation needs.
+/// The system in first-order form, `y = [x; v]`, with workspace for an evaluation.
 struct FirstOrder<'s, S> {
     system: &'s mut S,
-    /// Times are moved into this range.
+    /// Times are clamped to this range.
     from: f64,
     to: f64,
     x: DVector<f64>,
     v: DVector<f64>,
     a: DVector<f64>,
-    /// Where the Jacobian is wanted, and the acceleration there.
+    /// Point at which the Jacobian is evaluated, and the acceleration there.
     base: Option<(f64, Vec<f64>, DVector<f64>)>,
-    /// Increments of positions and velocities for it.
+    /// Increments of positions and velocities for the Jacobian.
     increments: [f64; 2],
     evaluations: u64,
     error: Option<StepError>,
@@ -535,7 +534,7 @@ impl<'s, S: SecondOrderSystem> FirstOrder<'s, S> {
         }
     }
 
-    /// `ẏ = [v; a]`.
+    /// Computes `ẏ = [v; a]`.
     fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
         self.evaluate(t, y.iter().copied());
         let n = self.x.len();
@@ -543,7 +542,8 @@ impl<'s, S: SecondOrderSystem> FirstOrder<'s, S> {
         dy[n..].copy_from_slice(self.a.as_slice());
     }
 
-    /// The acceleration at t and y into `a`; a failure becomes NaN, which makes the solver give up.
+    /// Computes the acceleration at `t` and `y` in `a`; a failure gives NaN, at which the solver
+    /// gives up.
     fn evaluate(&mut self, t: f64, y: impl Iterator<Item = f64>) {
         self.x.iter_mut().chain(self.v.iter_mut()).zip(y).for_each(|(to, from)| *to = from);
         self.evaluations += 1;
@@ -554,8 +554,8 @@ impl<'s, S: SecondOrderSystem> FirstOrder<'s, S> {
         }
     }
 
-    /// `J w` by a forward difference. The solver asks for one column after the other at the same y,
-    /// and uses the matrix for Newton's method only.
+    /// Computes `J w` by a forward difference. The solver requests one column after the other at
+    /// the same y and uses the matrix for Newton's method only.
     fn times_jacobian(&mut self, t: f64, y: &[f64], w: &[f64], Jw: &mut [f64]) {
         let n = self.x.len();
         let base = match self.base.take() {

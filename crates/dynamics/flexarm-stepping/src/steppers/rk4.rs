@@ -1,4 +1,4 @@
-//! The classical explicit Runge-Kutta method of fourth order, for systems that are not stiff.
+//! Classical explicit Runge-Kutta method of fourth order, for non-stiff systems.
 //!
 //! Stable while `h ω < 2.78` for every undamped mode; stiffness-proportional damping narrows this
 //! further. Source: [Hairer, Nørsett & Wanner 1993], section II.1.
@@ -27,7 +27,7 @@ pub(super) static ENTRY: StepperEntry = StepperEntry {
     with: |_| StepperKind::Rk4,
 };
 
-/// There is nothing to set.
+/// RK4 has no settings.
 pub(super) struct Rk4Settings;
 
 impl Method for Rk4Settings {
@@ -40,7 +40,8 @@ impl Method for Rk4Settings {
         let mut changed = FlexibleArm::clone(&arm);
         for change in &arm.inertia_changes {
             changed.model = Arc::new(changed.model.with_inertia(change.body, change.inertia));
-            // An arm that cannot stand with this payload may be able to move with it.
+            // An arm without static equilibrium with this payload may still be able to move with
+            // it.
             if changed.update_modes_and_damping().is_ok() {
                 check_explicit_step(&changed, h)?;
             }
@@ -65,10 +66,10 @@ pub struct Rk4 {
 }
 
 impl Rk4 {
-    /// Starts at `t0` with step `h` (s).
+    /// Starts at `t0` with step size `h` (s).
     ///
     /// # Errors
-    /// [`StepError::Singular`] if the first acceleration cannot be found.
+    /// [`StepError::Singular`] if the initial acceleration cannot be computed.
     ///
     /// # Panics
     /// If `h` is not positive.
@@ -107,7 +108,7 @@ impl Integrator for Rk4 {
     fn advance_to(&mut self, system: &mut impl SecondOrderSystem, t_new: f64) -> Result<(), StepError> {
         let t = self.now.grid.time();
         let h = t_new - t;
-        // Stage 1 is the acceleration kept from the end of the last step.
+        // Stage 1 is the acceleration at the end of the last step.
         self.dx.copy_from(&self.now.v);
         self.dv.copy_from(&self.now.acceleration);
         self.v_stage.copy_from(&self.now.v);
@@ -146,8 +147,8 @@ impl Integrator for Rk4 {
     }
 }
 
-/// Every mode must lie inside the stability region: on the imaginary axis up to 2.78, 2.61 where
-/// damping turns it inwards, on the negative real axis up to 2.78 again.
+/// Checks that every mode is inside the stability region: on the imaginary axis up to 2.78, 2.61
+/// where damping moves the eigenvalue inwards, on the negative real axis up to 2.78 again.
 fn check_explicit_step(arm: &FlexibleArm, h: f64) -> Result<(), StepError> {
     let mut rate = 0.0f64;
     for (j, omega) in arm.modes.omega.iter().enumerate() {
@@ -156,7 +157,7 @@ fn check_explicit_step(arm: &FlexibleArm, h: f64) -> Result<(), StepError> {
     }
     let mut highest = arm.modes.omega.last().copied().unwrap_or(0.0);
     if !arm.torque_driven.is_empty() {
-        // Motors that are free swing against their springs.
+        // Free motors oscillate against their springs.
         let (omega, decay) = free_rates(arm)?;
         rate = rate.max(omega * STABILITY_LIMIT / 2.61).max(decay);
         highest = highest.max(omega);
@@ -172,15 +173,15 @@ fn check_explicit_step(arm: &FlexibleArm, h: f64) -> Result<(), StepError> {
     })
 }
 
-/// Decay (1/s) of a mode with damping `2 ζ ω`; an oscillating one is bounded by its frequency
-/// alone.
+/// Returns the decay rate (1/s) of an overdamped mode with damping `2 ζ ω`; 0 for an oscillating
+/// mode, which is bounded by its frequency.
 fn fastest_decay(damping: f64, omega: f64) -> f64 {
     let squared = damping * damping - 4.0 * omega * omega;
     if squared > 0.0 { 0.5 * (damping + squared.sqrt()) } else { 0.0 }
 }
 
-/// Highest angular frequency and decay (1/s) with the joints driven by torque free, friction near
-/// standstill left out.
+/// Returns the highest angular frequency and decay rate (1/s) with the joints driven by torque
+/// free, without Coulomb and Stribeck friction.
 fn free_rates(arm: &FlexibleArm) -> Result<(f64, f64), StepError> {
     let (model, na) = (&arm.model, arm.model.n_actuated());
     let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));

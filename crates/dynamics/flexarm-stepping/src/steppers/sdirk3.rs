@@ -1,32 +1,34 @@
-//! SDIRK of third order for second-order systems: implicit, three stages, L-stable, stiffly
+//! SDIRK method of third order for second-order systems: implicit, three stages, L-stable, stiffly
 //! accurate.
 //!
 //! ```text
-//! r(t + c_i h, X_i, V_i, A_i) = 0                               i = 1, 2, 3      (1)  equations of motion hold in each stage
-//! V_i = v + h Σ_j a_ij A_j                                      a_ii = γ         (2)
-//! X_i = x + h Σ_j a_ij V_j                                                       (3)
-//! x⁺ = X_3,   v⁺ = V_3,   ẍ⁺ = A_3                                               (4)  the last stage is the new state
+//! r(t + c_i h, X_i, V_i, A_i) = 0      i = 1, 2, 3      (1)  equations of motion in each stage
+//! V_i = v + h Σ_j a_ij A_j             a_ii = γ         (2)
+//! X_i = x + h Σ_j a_ij V_j                              (3)
+//! x⁺ = X_3,   v⁺ = V_3,   ẍ⁺ = A_3                      (4)  the last stage is the new state
 //!
 //!    γ     |   γ
-//! (1+γ)/2  | (1-γ)/2    γ                       γ³ - 3 γ² + 3/2 γ - 1/6 = 0,   γ = 0.435866...
-//!    1     |  b_1      b_2      γ               b_1 = (-6γ² + 16γ - 1)/4,   b_2 = (6γ² - 20γ + 5)/4   (5)
+//! (1+γ)/2  | (1-γ)/2    γ            γ³ - 3 γ² + 3/2 γ - 1/6 = 0,   γ = 0.435866...
+//!    1     |  b_1      b_2      γ    b_1 = (-6γ² + 16γ - 1)/4,   b_2 = (6γ² - 20γ + 5)/4   (5)
 //! ```
-//! It is the Runge-Kutta method on `[x; v]`. Unknown are the A_i, one after the other; Newton on
-//! (1) with `M + h γ D + (h γ)² K` for all three, kept until the iteration slows down.
+//! This is the Runge-Kutta method applied to `[x; v]`. The unknowns are the A_i, one after the
+//! other; Newton's method on (1) uses the same matrix `M + h γ D + (h γ)² K` for all three, kept
+//! until the convergence slows down.
 //!
-//! **Stability.** A mode `ẏ = λ y` is multiplied in a step by
+//! **Stability.** A step multiplies a mode `ẏ = λ y` by
 //!
 //! ```text
 //! R(z) = (1 + (1 - 3γ) z + (1/2 - 3γ + 3γ²) z²) / (1 - γ z)³,   z = h λ          (6)
 //! ```
-//! with `|R| ≤ 1` in the left half plane and `R → 0` at infinity: what is too fast for the step is
-//! gone after it (an undamped mode keeps `2.9/(hω)` of itself), where generalised-alpha keeps ρ.
-//! Slow modes are damped as well, by `0.026 (hω)⁴` a step. On the reference arm at 0.25 ms it has
-//! 1.7e-7 of the peak deflection after 136,000 evaluations, generalised-alpha 1.6e-6 after 19,000:
-//! it is for small errors, and for stiff modes that were set ringing, with no ρ to choose.
+//! with `|R| ≤ 1` in the left half plane and `R → 0` at infinity: a mode that is too fast for the
+//! step vanishes in one step (an undamped one keeps `2.9/(hω)` of its amplitude), whereas
+//! generalised-alpha keeps ρ. Slow modes are damped as well, by `0.026 (hω)⁴` per step. On the
+//! reference arm at 0.25 ms the error is 1.7e-7 of the peak deflection after 136,000 evaluations,
+//! that of generalised-alpha 1.6e-6 after 19,000: the method is for small errors and for stiff
+//! modes that are excited, without a ρ to choose.
 //!
-//! **Events.** Nothing is remembered from step to step but for the first guess of Newton's method.
-//! A step that fails is tried again as those of generalised-alpha are.
+//! **Events.** Only the initial guess of Newton's method depends on the previous step. A step that
+//! fails is repeated as in generalised-alpha.
 //!
 //! Source: [Alexander 1977]; [Hairer & Wanner 1996], section IV.6.
 
@@ -54,7 +56,7 @@ pub(super) static ENTRY: StepperEntry = StepperEntry {
     with: |_| StepperKind::Sdirk3,
 };
 
-/// There is nothing to set.
+/// SDIRK3 has no settings.
 pub(super) struct Sdirk3Settings;
 
 impl Method for Sdirk3Settings {
@@ -67,39 +69,39 @@ impl Method for Sdirk3Settings {
     }
 }
 
-/// Part of the first correction of Newton's method that a stage may leave: the stages are of higher
-/// order than the extrapolation.
+/// Permitted iteration error of a stage as a fraction of the first Newton correction: the stages
+/// are of higher order than the extrapolation.
 const LEFT: f64 = 1e-4;
 /// γ: the root of the cubic in (5) for which the method is L-stable.
 const GAMMA: f64 = 0.435_866_521_508_459;
-/// c_i of (1).
+/// Nodes c_i of (1).
 const NODES: [f64; 3] = [GAMMA, 0.5 * (1.0 + GAMMA), 1.0];
-/// a_ij of (5).
+/// Weights a_ij of (5).
 const WEIGHTS: [[f64; 3]; 3] = [
     [GAMMA, 0.0, 0.0],
     [0.5 * (1.0 - GAMMA), GAMMA, 0.0],
     [0.25 * (-6.0 * GAMMA * GAMMA + 16.0 * GAMMA - 1.0), 0.25 * (6.0 * GAMMA * GAMMA - 20.0 * GAMMA + 5.0), GAMMA],
 ];
 
-/// The integrator with its state; see the module page.
+/// The integrator with its state; see the module documentation.
 #[derive(Clone, Debug)]
 pub struct Sdirk3 {
     newton: Newton,
     /// Time, positions, velocities and accelerations.
     pub now: Current,
-    /// A_i and V_i of the stages, X of the one on trial.
+    /// A_i and V_i of the stages, X of the current stage.
     A: [DVector<f64>; 3],
     V: [DVector<f64>; 3],
     X: DVector<f64>,
-    /// A_2 of the last step.
+    /// A_2 of the previous step.
     before: DVector<f64>,
 }
 
 impl Sdirk3 {
-    /// Starts at `t0` with step `h` (s).
+    /// Starts at `t0` with step size `h` (s).
     ///
     /// # Errors
-    /// [`StepError::Singular`] if the first acceleration cannot be found.
+    /// [`StepError::Singular`] if the initial acceleration cannot be computed.
     ///
     /// # Panics
     /// If `h` is not positive.
@@ -123,7 +125,7 @@ impl Sdirk3 {
         })
     }
 
-    /// Newton's matrix `M + h γ D + (h γ)² K` at the configuration of the last residual.
+    /// Computes Newton's matrix `M + h γ D + (h γ)² K` at the configuration of the last residual.
     fn factor(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError> {
         let c = GAMMA * self.newton.dt;
         self.newton.matrix.read(system, c, c * c, None);
@@ -132,7 +134,7 @@ impl Sdirk3 {
         Ok(())
     }
 
-    /// First guess of A_i: the line through the last two accelerations that are known.
+    /// Predicts A_i by linear extrapolation of the last two known accelerations.
     fn predict(&mut self, i: usize) {
         let (done, rest) = self.A.split_at_mut(i);
         let (earlier, later, ratio) = match done {
@@ -146,7 +148,7 @@ impl Sdirk3 {
         }
     }
 
-    /// V_i and X_i of the trial A_i by (2) and (3).
+    /// Computes V_i and X_i from the trial A_i by (2) and (3).
     fn place(&mut self, i: usize) {
         let h = self.newton.dt;
         for k in 0..self.now.x.len() {
@@ -161,7 +163,7 @@ impl Sdirk3 {
         }
     }
 
-    /// Takes the correction `d = J^-1 r` of A_i off everything on trial.
+    /// Subtracts the correction `d = J^-1 r` of A_i from all trial values.
     fn correct(&mut self, i: usize, mut sizes: Sizes) -> Sizes {
         let c = GAMMA * self.newton.dt;
         for k in 0..self.now.x.len() {
@@ -174,7 +176,7 @@ impl Sdirk3 {
         sizes
     }
 
-    /// Stage i at time t by Newton's method on (1); how many iterations it took.
+    /// Solves stage i at time `t` by Newton's method on (1); returns the number of iterations.
     fn stage(&mut self, system: &mut impl SecondOrderSystem, t: f64, i: usize) -> Result<usize, StepError> {
         self.predict(i);
         self.place(i);
@@ -223,7 +225,7 @@ impl ImplicitStep for Sdirk3 {
         }
         self.newton.found(iterations.iter().sum(), iterations.into_iter().max().unwrap_or(0));
 
-        // (4)
+        // New state (4): the last stage.
         std::mem::swap(&mut self.now.x, &mut self.X);
         std::mem::swap(&mut self.now.v, &mut self.V[2]);
         std::mem::swap(&mut self.now.acceleration, &mut self.A[2]);
@@ -285,7 +287,7 @@ mod tests {
         [g.now.x[0], g.now.v[0]]
     }
 
-    /// (6)
+    /// Returns the stability function (6).
     fn R(z: Complex<f64>) -> Complex<f64> {
         let (g, one) = (GAMMA, Complex::from(1.0));
         (one + z * (1.0 - 3.0 * g) + z * z * (0.5 - 3.0 * g + 3.0 * g * g)) / (one - z * g).powi(3)
@@ -308,8 +310,8 @@ mod tests {
         assert!((0..3).all(|i| (sum(&|j| WEIGHTS[i][j]) - NODES[i]).abs() < 1e-15));
     }
 
-    /// Truth: (6) with `h λ = h ω (-ζ ± i sqrt(1 - ζ²))`; a mode far too fast for the step has
-    /// `2.9/(hω)` left after one step. Measured 4e-10 at hω = 1e6, 1e-12 below.
+    /// Truth: (6) with `h λ = h ω (-ζ ± i sqrt(1 - ζ²))`; a mode far too fast for the step keeps
+    /// `2.9/(hω)` of its amplitude after one step. Measured 4e-10 at hω = 1e6, 1e-12 below.
     #[test]
     fn a_stiff_mode_is_gone_after_one_step() {
         let h = 1e-2;
@@ -329,7 +331,7 @@ mod tests {
         }
     }
 
-    /// Truth: no mode grows, `|R(iy)| ≤ 1`, and a slow one loses `0.026 (hω)⁴` a step.
+    /// Truth: no mode grows, `|R(iy)| ≤ 1`, and a slow one loses `0.026 (hω)⁴` per step.
     #[test]
     fn no_undamped_mode_grows_and_slow_ones_lose_little() {
         let size = |y: f64| R(Complex::new(0.0, y)).norm();

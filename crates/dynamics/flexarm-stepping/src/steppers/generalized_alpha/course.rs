@@ -1,39 +1,40 @@
-//! Newton's matrices between two renewals: followed along the line through their last two values.
+//! Linear extrapolation of Newton's matrices between two renewals, through their last two values.
 //!
-//! While the joints move, masses change steadily, and a matrix that is kept gets old in proportion
-//! to the time; one that goes on along the line gets old with the square of it. Beyond the end of
-//! the line, as many steps as there are between its two values, it is kept.
+//! While the joints move, masses change steadily: the error of a constant matrix grows in
+//! proportion to time, that of an extrapolated one with its square. The extrapolation extends over
+//! as many steps as there are between the two values; beyond, the matrix is kept constant.
 //!
 //! ```text
-//! A_n+1 = A_n + (A_taken - A_before) / m        for the m steps after A was taken, m steps after A_before        (9)
+//! A_n+1 = A_n + (A_new - A_old) / m                                                            (9)
 //! ```
-//! On the reference arm at 1 ms 80 matrices are taken in 4000 steps instead of 185.
+//! for the m steps after the renewal A_new, which was m steps after A_old.
+//! On the reference arm at 1 ms, 4000 steps need 80 renewals instead of 185.
 
-/// `h ω` of the first mode up to which matrices are followed: of longer steps too few lie between
-/// two renewals, and the matrices of a turning point would be far off (10 ms on the reference arm:
-/// error 8e-3 instead of 4e-3).
+/// Maximum `h ω` of the first mode for extrapolation: with larger steps there are too few of them
+/// between two renewals, and matrices near a turning point would be far off (10 ms on the reference
+/// arm: error 8e-3 instead of 4e-3).
 pub(super) const SHORT: f64 = 0.3;
 
-/// Largest ρ of a matrix that is followed: half of what others may have, because `M^-1 K`, which
-/// belongs to the scheme, is then as near to the truth as there (errors of the accuracy table
-/// within 4 %; with 3 % they were 8 % larger).
+/// Maximum ρ of an extrapolated matrix: half of the usual value, because `M^-1 K`, which is part of
+/// the scheme, is then as accurate as with constant matrices (errors of the accuracy table within 4
+/// %; with 3 % they were 8 % larger).
 pub(crate) const FOLLOWED_TO: f64 = 0.015;
 
-/// What is known of the inverse of Newton's matrix and of `M^-1 K`; each n × n.
+/// Extrapolation of the inverse of Newton's matrix and of `M^-1 K`; each n × n.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Course {
-    /// As they were taken last; empty: never, or in another course.
+    /// Values at the last renewal; empty if there is none in this course.
     before: [Vec<f64>; 2],
-    /// What each step adds.
+    /// Change per step.
     change: [Vec<f64>; 2],
-    /// Steps since, and how many more are on the line.
+    /// Steps since the last renewal, and remaining steps of the extrapolation.
     steps: u32,
     left: u32,
 }
 
 impl Course {
-    /// What the next step adds to the matrices, and whether that is something else than in the step
-    /// before.
+    /// Returns the change of the matrices in the next step, and whether it differs from that of the
+    /// previous step.
     #[inline]
     pub(crate) fn step(&mut self) -> (&[Vec<f64>; 2], bool) {
         self.steps = self.steps.saturating_add(1);
@@ -45,7 +46,7 @@ impl Course {
         (&self.change, ends)
     }
 
-    /// The matrices were taken anew: what the steps to come add.
+    /// Records renewed matrices; returns the change per step from here on.
     pub(crate) fn taken(&mut self, matrices: [&[f64]; 2]) -> &[Vec<f64>; 2] {
         let known = self.steps > 0 && !self.before[0].is_empty();
         let part = 1.0 / f64::from(self.steps.max(1));
@@ -62,13 +63,13 @@ impl Course {
             before.clear();
             before.extend_from_slice(matrix);
         }
-        // One more, in which the change ends.
+        // One more step, in which the change becomes zero.
         self.left = if known { self.steps.saturating_add(1) } else { 0 };
         self.steps = 0;
         &self.change
     }
 
-    /// What comes is not continued from here: other steps, other masses.
+    /// Discards the course after a change of step size or masses.
     pub(crate) fn forget(&mut self) {
         self.before.iter_mut().for_each(Vec::clear);
         self.left = 0;
@@ -84,8 +85,8 @@ impl Course {
 mod tests {
     use super::*;
 
-    /// Truth: matrices on a straight line are met in every step up to the end of the line, and kept
-    /// after it.
+    /// Truth: matrices that change linearly are reproduced in every step up to the end of the
+    /// extrapolation, and kept constant after it.
     #[test]
     fn a_matrix_that_changes_steadily_is_met_in_every_step_of_the_line() {
         let at = |t: f64| [vec![1.0 + 0.5 * t, -2.0 * t], vec![3.0, 0.25 * t]];

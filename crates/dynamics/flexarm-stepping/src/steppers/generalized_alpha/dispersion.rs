@@ -1,12 +1,12 @@
-//! The dispersion correction of generalised-alpha, (5) of the module above: what it does to
-//! accelerations and to the matrix of Newton's method.
+//! Dispersion correction of generalised-alpha, (5) of the parent module: its effect on
+//! accelerations and on Newton's matrix.
 //!
 //! ```text
-//! x̃ = Sᵀ ẍ,   Sᵀ = 1 + c h² M^-1 K                                  (6)
-//! J = M + C Sᵀ,   C = h γ' D + h² β' K                              (7)  derivative of (1) with respect to ẍ⁺
-//! S J = M + c h² K + S C Sᵀ,   J^-1 = (S J)^-1 S                    (8)  symmetric for every damping, unlike J
+//! x̃ = Sᵀ ẍ,   Sᵀ = 1 + c h² M^-1 K                   (6)
+//! J = M + C Sᵀ,   C = h γ' D + h² β' K               (7)  derivative of (1) by ẍ⁺
+//! S J = M + c h² K + S C Sᵀ,   J^-1 = (S J)^-1 S     (8)  symmetric for every damping, unlike J
 //! ```
-//! Along a tree, and with modes, the matrix has all of it in itself: [`crate::tree_matrix`],
+//! For trees and modal links the matrix contains the complete correction: [`crate::tree_matrix`],
 //! [`crate::mode_matrix`].
 
 use nalgebra::{DMatrix, DVector};
@@ -17,8 +17,7 @@ use crate::error::StepError;
 use crate::iteration_matrix::{IterationMatrix, Way};
 use crate::system::SecondOrderSystem;
 
-/// The correction for steps of one length. Allocates when it is made and for its first matrix, not
-/// after.
+/// The correction for one step size. Allocates at its creation and for its first matrix only.
 #[derive(Clone, Debug)]
 pub(super) struct DispersionCorrection {
     /// c of (5).
@@ -29,14 +28,14 @@ pub(super) struct DispersionCorrection {
     K: DMatrix<f64>,
     /// `M^-1 K` at the configuration of the last matrix.
     M_inverse_K: DMatrix<f64>,
-    /// Room for the factor of M and products.
+    /// Workspace for the factor of M and for products.
     room: [DMatrix<f64>; 3],
-    /// `M^-1 K` times a vector.
+    /// Product of `M^-1 K` and a vector.
     shift: DVector<f64>,
 }
 
 impl DispersionCorrection {
-    /// For n coordinates and steps of length h (s).
+    /// Creates the correction for n coordinates and step size `h` (s).
     pub(super) fn new(c: f64, h: f64, n: usize) -> Self {
         let none = DMatrix::zeros(0, 0);
         Self {
@@ -49,28 +48,28 @@ impl DispersionCorrection {
         }
     }
 
-    /// `M^-1 K`, n × n.
+    /// Returns `M^-1 K`, n × n.
     pub(super) fn M_inverse_K(&self) -> &[f64] {
         self.M_inverse_K.as_slice()
     }
 
-    /// The same, to be followed.
+    /// Returns `M^-1 K` for extrapolation.
     pub(super) fn M_inverse_K_mut(&mut self) -> &mut [f64] {
         self.M_inverse_K.as_mut_slice()
     }
 
-    /// `c h²`.
+    /// Returns `c h²`.
     pub(super) fn c_h2(&self) -> f64 {
         self.c_h2
     }
 
-    /// The next steps have the length dt (s).
+    /// Sets the step size of the next steps (s).
     pub(super) fn set_length(&mut self, dt: f64) {
         self.c_h2 = self.c * dt * dt;
     }
 
-    /// Makes of M and C, as they were read, what (8) has in their places; with `kept` (6) stays as
-    /// it is, and only the matrix is another.
+    /// Replaces M and C of the matrix by the terms of (8); with `kept`, (6) is not updated and only
+    /// the matrix changes.
     ///
     /// # Errors
     /// [`StepError::Singular`] if the mass matrix is not positive definite.
@@ -99,18 +98,18 @@ impl DispersionCorrection {
             }
         }
 
-        // S C Sᵀ
+        // Product S C Sᵀ.
         let (X, C) = (M_inverse_K.as_slice(), matrix.C.as_slice());
         congruence_quickly(c_h2, X, C, n, [factor.as_mut_slice(), turned.as_mut_slice()], product.as_mut_slice());
         matrix.C.copy_from(product);
 
-        // M + c h² K, and Sᵀ on the right-hand side, which is kept transposed.
+        // M + c h² K, and Sᵀ as right-hand side, stored transposed.
         matrix.S.zip_apply(K, |s, k| *s += c_h2 * k);
         matrix.inverse.zip_apply(M_inverse_K, |i, s| *i += c_h2 * s);
         Ok(())
     }
 
-    /// x̃ of an acceleration by (6).
+    /// Computes x̃ of an acceleration by (6).
     pub(super) fn corrected(
         &mut self,
         matrix: &mut IterationMatrix,
@@ -127,8 +126,8 @@ impl DispersionCorrection {
         quickly(Shifted { a, c_h2: self.c_h2, shift, to: x_tilde.as_mut_slice() });
     }
 
-    /// What a change d of ẍ, the last solution with the matrix, adds to the change of x̃,
-    /// coordinate by coordinate: a factor and numbers, together `c h² M^-1 K d`.
+    /// Returns the contribution of a change d of ẍ, the last solution with the matrix, to the
+    /// change of x̃ beyond d itself: a factor and a vector, whose product is `c h² M^-1 K d`.
     pub(super) fn shift<'a>(&'a mut self, matrix: &'a IterationMatrix, d: &DVector<f64>) -> (f64, &'a DVector<f64>) {
         match &matrix.way {
             Way::Tree(tree) => return (1.0, tree.shift()),
@@ -139,7 +138,7 @@ impl DispersionCorrection {
         (self.c_h2, &self.shift)
     }
 
-    /// `M^-1 K d`.
+    /// Computes `M^-1 K d`.
     fn shift_by(&mut self, d: &DVector<f64>) {
         product_of_numbers(self.M_inverse_K.as_slice(), d.as_slice(), self.shift.as_mut_slice());
     }

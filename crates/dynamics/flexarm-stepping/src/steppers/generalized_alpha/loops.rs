@@ -1,12 +1,12 @@
-//! What a step of a single run does coordinate by coordinate, as loops for the vector instructions
-//! that the processor has; the letters are those of the module above. Over lanes
-//! `batch/lane_alpha.rs` does the same, to the same bits.
+//! Loops over the coordinates in a step of a single run, with the vector instructions that the
+//! processor has; notation of the parent module. `batch/lane_alpha.rs` does the same over lanes,
+//! with bitwise the same results.
 
 use super::Coefficients;
 use crate::dense::{Loops, largest_of_numbers};
 use crate::implicit::Sizes;
 
-/// x⁺ and v⁺ from x, v, a, x̃ and x̃⁺.
+/// Computes x⁺ and v⁺ from x, v, a, x̃ and x̃⁺.
 pub(super) struct Place<'a> {
     pub(super) coefficients: Coefficients,
     pub(super) h: f64,
@@ -30,7 +30,7 @@ impl Loops for Place<'_> {
     }
 }
 
-/// `to = a + c h² shift`.
+/// Computes `to = a + c h² shift`.
 pub(super) struct Shifted<'a> {
     pub(super) a: &'a [f64],
     pub(super) c_h2: f64,
@@ -47,12 +47,12 @@ impl Loops for Shifted<'_> {
     }
 }
 
-/// Takes a correction d of ẍ⁺ off everything on trial.
+/// Subtracts a correction d of ẍ⁺ from all trial values.
 pub(super) struct Correct<'a> {
     pub(super) d: &'a [f64],
-    /// What d adds to the correction of x̃⁺: a factor and numbers.
+    /// Additional correction of x̃⁺ due to d: a factor and a vector.
     pub(super) shift: Option<(f64, &'a [f64])>,
-    /// Parts of the correction of x̃⁺ in v⁺ and x⁺.
+    /// Derivatives of v⁺ and x⁺ with respect to x̃⁺.
     pub(super) derivatives: (f64, f64),
     /// ẍ⁺, x̃⁺, x⁺, v⁺.
     pub(super) trial: [&'a mut [f64]; 4],
@@ -88,7 +88,7 @@ impl Loops for Correct<'_> {
     }
 }
 
-/// `A ← A + B`.
+/// Computes `A ← A + B`.
 pub(super) struct Add<'a>(pub(super) &'a mut [f64], pub(super) &'a [f64]);
 
 impl Loops for Add<'_> {
@@ -98,7 +98,7 @@ impl Loops for Add<'_> {
     }
 }
 
-/// `to = 2 a - b`.
+/// Computes `to = 2 a - b`.
 pub(super) struct Extrapolate<'a> {
     pub(super) a: &'a [f64],
     pub(super) b: &'a [f64],
@@ -114,7 +114,7 @@ impl Loops for Extrapolate<'_> {
     }
 }
 
-/// a⁺ in the place of a.
+/// Replaces a by a⁺.
 pub(super) struct Remember<'a> {
     pub(super) coefficients: Coefficients,
     pub(super) a: &'a mut [f64],

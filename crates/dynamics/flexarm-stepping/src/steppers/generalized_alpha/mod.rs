@@ -1,40 +1,42 @@
-//! Generalised-alpha for second-order systems: implicit, second order, with chosen damping at
-//! infinity.
+//! Generalised-alpha for second-order systems: implicit, second order, with adjustable
+//! high-frequency damping.
 //!
 //! ```text
-//! r(t⁺, x⁺, v⁺, ẍ⁺) = 0                                        (1)  equations of motion hold at the new time
-//! x⁺ = x + h v + h² [(1/2 - β) a + β a⁺]                        (2)  Newmark
-//! v⁺ = v + h [(1 - γ) a + γ a⁺]                                 (3)
-//! (1 - α_m) a⁺ + α_m a = (1 - α_f) ẍ⁺ + α_f ẍ                   (4)  algorithmic acceleration a
+//! r(t⁺, x⁺, v⁺, ẍ⁺) = 0                           (1)  equations of motion at the new time
+//! x⁺ = x + h v + h² [(1/2 - β) a + β a⁺]          (2)  Newmark
+//! v⁺ = v + h [(1 - γ) a + γ a⁺]                   (3)
+//! (1 - α_m) a⁺ + α_m a = (1 - α_f) ẍ⁺ + α_f ẍ    (4)  algorithmic acceleration a
 //! ```
 //! with `α_m = (2ρ-1)/(ρ+1)`, `α_f = ρ/(ρ+1)`, `γ = 1/2 + α_f - α_m`, `β = (γ + 1/2)²/4`; ρ is the
-//! spectral radius at infinite frequency: 1 keeps all energy, 0 kills the highest modes in one
-//! step.
+//! spectral radius at infinite frequency: 1 conserves all energy, 0 annihilates the highest modes
+//! in one step.
 //!
-//! Unknown is ẍ⁺; Newton on (1) with `M + h γ' D + h² β' K`, `β' = β (1-α_f)/(1-α_m)`, γ' alike.
-//! The matrix is kept until the iteration slows down.
+//! The unknown is ẍ⁺; Newton's method on (1) uses the matrix `M + h γ' D + h² β' K` with
+//! `β' = β (1-α_f)/(1-α_m)` and γ' likewise. The matrix is kept until the convergence slows down.
 //!
 //! Source: [Chung & Hulbert 1993]; form (4) as in [Arnold & Brüls 2007].
 //!
 //! **Dispersion correction.** No A-stable linear multistep method has a smaller frequency error
-//! than the trapezoidal rule's `(hω)²/12` (Dahlquist's second barrier), and in a ringing arm the
-//! phase drifts by just that. With the correction on, (4) is fed not with ẍ but with
+//! than the `(hω)²/12` of the trapezoidal rule (Dahlquist's second barrier), and this error makes
+//! the phase of a ringing arm drift. With the correction, (4) uses instead of ẍ
 //!
 //! ```text
-//! x̃ = ẍ - c h² d²ẍ/dt² ≈ (1 + c h² M^-1 K) ẍ,     c = β - Δ/2 + [α_f(1-α_f) - α_m(1-α_m)]/2 - Δ²/2 - 1/12,   Δ = α_f - α_m     (5)
+//! x̃ = ẍ - c h² d²ẍ/dt² ≈ (1 + c h² M^-1 K) ẍ                                       (5)
+//! c = β - Δ/2 + [α_f(1-α_f) - α_m(1-α_m)]/2 - Δ²/2 - 1/12,   Δ = α_f - α_m
 //! ```
-//! which cancels the second-order term of the frequency error of free vibration: the second
-//! derivative of the acceleration is taken from the stiffness, not from past steps, so that
-//! stability stays unconditional (a mode ω meets the scheme as `ω² (1 + c (hω)²)`, still positive).
-//! At rest ẍ = 0 and nothing changes. What is left out of (5) is the second derivative of the load,
-//! slow against the modes, and that of the damping force, 2ζ of the rest. The price: where rho is
-//! far below 1, the scheme damps modes of `hω` near 1 about twice as much as without.
+//! which cancels the second-order term of the frequency error of free vibration. The second
+//! derivative of the acceleration is computed from the stiffness and not from previous steps, so
+//! that the scheme stays unconditionally stable (a mode ω enters it as `ω² (1 + c (hω)²)`, still
+//! positive). At rest ẍ = 0 and nothing changes. (5) neglects the second derivative of the load,
+//! which is slow compared with the modes, and that of the damping force, a relative error of 2ζ.
+//! Drawback: for rho far below 1 the scheme damps modes with `hω` near 1 about twice as much as
+//! without the correction.
 //!
-//! **Events.** The scheme remembers accelerations a and x̃, which a jump makes wrong: after
-//! [`Integrator::restart`] they are taken anew from the equations of motion, after
-//! [`Integrator::renew`] the matrix as well. A step may end anywhere before the next multiple of h
-//! ([`Integrator::advance_to`]). A step whose iteration fails is tried again with a matrix of its
-//! start, then in halves, down to `h/64`; after that the multiples of h go on.
+//! **Events.** The scheme stores accelerations a and x̃, which are invalid after a jump:
+//! [`Integrator::restart`] recomputes them from the equations of motion, and [`Integrator::renew`]
+//! also renews the matrix. A step may end anywhere before the next multiple of h
+//! ([`Integrator::advance_to`]). A step whose iteration fails is repeated with a matrix computed at
+//! its start, then in halves, down to `h/64`; afterwards the grid of multiples of h continues.
 
 mod course;
 mod dispersion;
@@ -74,7 +76,7 @@ pub(super) static ENTRY: StepperEntry = StepperEntry {
 pub struct AlphaSettings {
     /// Spectral radius at infinite frequency, 0 to 1.
     pub rho: f64,
-    /// Cancel the leading frequency error; see the module page.
+    /// Whether to cancel the leading frequency error; see the module documentation.
     pub dispersion_correction: bool,
 }
 
@@ -100,13 +102,13 @@ impl Method for AlphaSettings {
 }
 
 impl AlphaSettings {
-    /// What the steps of a damped arm may leave.
+    /// Returns the permitted iteration error of a damped arm.
     fn may_leave(&self) -> f64 {
         (OF_DAMPING * (1.0 - self.rho)).min(QUICK)
     }
 
-    /// The stepper of an arm, with what its searches may leave; `follow`: its matrices go on along
-    /// lines where that is good.
+    /// Creates the stepper of an arm with its permitted iteration error; `follow`: whether its
+    /// matrices may be extrapolated between renewals.
     pub(crate) fn stepper(
         self,
         arm: Arc<FlexibleArm>,
@@ -131,41 +133,42 @@ impl AlphaSettings {
     }
 }
 
-/// What the steps of an arm may leave; `None`: nothing.
+/// Returns the permitted iteration error of an arm as a fraction of the first correction; `None`
+/// for full convergence.
 pub(crate) fn leave_of(settings: AlphaSettings, arm: &FlexibleArm, h: f64) -> Option<f64> {
     let followed = arm.modes.omega.first().is_none_or(|omega| h * omega <= FOLLOWED);
     let left = if followed { settings.may_leave() } else { settings.may_leave().min(COARSE) };
     (left > 0.0 && forgets_errors(arm)).then_some(left)
 }
 
-/// Whether the matrices of an arm whose steps may leave something go on along a line between two
-/// renewals ([`Course`]): of short steps.
+/// Returns whether the matrices of an arm with a permitted iteration error are extrapolated between
+/// renewals ([`Course`]): only for small steps.
 pub(crate) fn follows(settings: AlphaSettings, arm: &FlexibleArm, h: f64) -> bool {
     settings.dispersion_correction && arm.modes.omega.first().is_some_and(|omega| h * omega <= course::SHORT)
 }
 
-/// Part of the first correction of Newton's method that steps of a damped arm may leave: an error
-/// well below the scheme's own, for half the evaluations
+/// Permitted iteration error of damped arms, as a fraction of the first correction of Newton's
+/// method: well below the error of the scheme, for half the evaluations
 /// (`what_a_quick_iteration_leaves_is_small_beside_the_error_of_its_step`).
 ///
-/// What is left comes back enlarged by the next extrapolation, up to `2 + 1/ρ` times for a mode
-/// that changes its sign in every step; the damping of the scheme, `1 - ρ` for such modes, must
-/// outweigh it ([`AlphaSettings::may_leave`]).
+/// The error is amplified by the next extrapolation, up to `2 + 1/ρ` times for a mode that changes
+/// sign in every step; the damping of the scheme for such modes, `1 - ρ`, must exceed this
+/// ([`AlphaSettings::may_leave`]).
 const QUICK: f64 = 0.03;
-/// Part of `1 - ρ` that may be left.
+/// Permitted iteration error as a fraction of `1 - ρ`.
 const OF_DAMPING: f64 = 0.3;
-/// Damping ratio of every mode above which the error of a step has faded before many others have
-/// come to it.
+/// Minimum damping ratio of all modes for a permitted iteration error: the error of one step then
+/// decays before many others accumulate.
 const DAMPED: f64 = 1e-3;
-/// `h ω` of the first mode up to which a step follows it, twelve steps in its period; beyond,
-/// extrapolations are no guide.
+/// Maximum `h ω` of the first mode that steps resolve, twelve steps per period; beyond it
+/// extrapolations are poor predictions.
 const FOLLOWED: f64 = 0.5;
 
-/// Part that may be left in such steps.
+/// Permitted iteration error for steps beyond [`FOLLOWED`].
 const COARSE: f64 = 1e-3;
 
-/// Whether nothing in the arm keeps what a step leaves: joints are where their motion is, springs
-/// straight and in Newton's matrix whole, modes damped.
+/// Returns whether iteration errors do not accumulate in the arm: joints are prescribed, springs
+/// are linear and completely represented in Newton's matrix, modes are damped.
 fn forgets_errors(arm: &FlexibleArm) -> bool {
     let straight = arm.elements.iter().all(|element| element.curve.is_none() && element.geometric.is_none());
     let mut force = DVector::zeros(arm.n_elastic_coordinates());
@@ -178,7 +181,7 @@ fn forgets_errors(arm: &FlexibleArm) -> bool {
     arm.torque_driven.is_empty() && !arm.has_gear_laws() && straight && damped
 }
 
-/// The integrator with its state; see the module page.
+/// The integrator with its state; see the module documentation.
 #[derive(Clone, Debug)]
 pub struct GeneralizedAlpha {
     coefficients: Coefficients,
@@ -190,11 +193,11 @@ pub struct GeneralizedAlpha {
     course: Option<Course>,
     /// Time, positions, velocities and accelerations.
     pub now: Current,
-    /// a and x̃ at the current time, ẍ one step before it.
+    /// a and x̃ at the current time, ẍ one step earlier.
     a: DVector<f64>,
     x_tilde: DVector<f64>,
     previous: DVector<f64>,
-    /// x⁺, v⁺, ẍ⁺ and x̃⁺ on trial.
+    /// Trial values of x⁺, v⁺, ẍ⁺ and x̃⁺.
     x_new: DVector<f64>,
     v_new: DVector<f64>,
     trial: DVector<f64>,
@@ -210,13 +213,13 @@ pub(crate) struct Coefficients {
 }
 
 impl Coefficients {
-    /// `h γ'` and `h² β'`: derivatives of v⁺ and x⁺ with respect to x̃⁺.
+    /// Returns `h γ'` and `h² β'`, the derivatives of v⁺ and x⁺ with respect to x̃⁺.
     pub(crate) fn derivatives(&self, h: f64) -> (f64, f64) {
         let ratio = (1.0 - self.alpha_f) / (1.0 - self.alpha_m);
         (h * self.gamma * ratio, h * h * self.beta * ratio)
     }
 
-    /// `c` of (5).
+    /// Returns `c` of (5).
     pub(crate) fn dispersion(&self) -> f64 {
         let Self { alpha_m, alpha_f, beta, .. } = *self;
         let shift = alpha_f - alpha_m;
@@ -230,7 +233,7 @@ impl Coefficients {
         Self { alpha_m, alpha_f, beta: 0.25 * (gamma + 0.5).powi(2), gamma }
     }
 
-    /// x⁺ and v⁺ by (4), (2), (3) from x, v, a and x̃ of one coordinate and x̃⁺.
+    /// Returns x⁺ and v⁺ by (4), (2), (3) from x, v, a and x̃ of one coordinate and x̃⁺.
     #[inline(always)]
     pub(crate) fn advance<T: Real>(&self, h: f64, x: T, v: T, a: T, x_tilde: T, x_tilde_new: T) -> (T, T) {
         let Self { alpha_m, alpha_f, beta, gamma } = *self;
@@ -243,7 +246,7 @@ impl Coefficients {
         )
     }
 
-    /// a⁺ of (4).
+    /// Returns a⁺ of (4).
     #[inline(always)]
     pub(crate) fn remembered<T: Real>(&self, a: T, x_tilde: T, x_tilde_new: T) -> T {
         let Self { alpha_m, alpha_f, .. } = *self;
@@ -253,15 +256,15 @@ impl Coefficients {
 }
 
 impl GeneralizedAlpha {
-    /// Its [`Integrator::MOTION_RULE`]: the ends of a step alone.
+    /// [`Integrator::MOTION_RULE`]: the end points of a step.
     ///
     /// [`Integrator::MOTION_RULE`]: crate::Integrator::MOTION_RULE
     pub(crate) const ENDS: [(f64, f64); 2] = [(0.0, 0.5), (1.0, 0.5)];
 
-    /// Starts at `t0` with step `h` (s).
+    /// Starts at `t0` with step size `h` (s).
     ///
     /// # Errors
-    /// [`StepError::Singular`] if the first acceleration cannot be found.
+    /// [`StepError::Singular`] if the initial acceleration cannot be computed.
     ///
     /// # Panics
     /// If the spectral radius is outside `[0, 1]` or `h` is not positive.
@@ -297,30 +300,30 @@ impl GeneralizedAlpha {
         })
     }
 
-    /// The same, with steps whose Newton iteration may leave this part of its first correction, the
-    /// error of an extrapolation over the step.
+    /// Permits an iteration error of `part` times the first Newton correction, which is the error
+    /// of an extrapolation over the step.
     #[must_use]
     pub fn leaving(self, part: f64) -> Self {
         Self { newton: self.newton.leaving(part), ..self }
     }
 
-    /// The same, with dense matrices that go on along a line between two renewals.
+    /// Enables extrapolation of dense matrices between renewals.
     #[must_use]
     pub fn following(self) -> Self {
         Self { course: Some(Course::default()), newton: self.newton.keeping(FOLLOWED_TO), ..self }
     }
 
-    /// The same, with steps that are smooth functions of all that goes into them: the matrix, with
-    /// that of the dispersion correction, is taken at the start of each step, and the iteration
-    /// goes on until nothing is left. Along trees and with modes, whose matrix has the correction
-    /// in itself, that holds of steps that need no more than eight iterations.
+    /// Makes steps smooth functions of all their inputs: the matrix, and with it that of the
+    /// dispersion correction, is computed at the start of each step, and the iteration converges
+    /// fully. For trees and modal links, whose matrix contains the correction, this holds for steps
+    /// of at most eight iterations.
     #[must_use]
     pub fn exactly(self) -> Self {
         Self { exact: true, course: None, ..self.leaving(0.0) }
     }
 
-    /// a and x̃ of the current acceleration alone. With the correction in x̃, a jump would set
-    /// modes of `hω >> 1` ringing from one step to the next.
+    /// Initialises a and x̃ with the current acceleration, without the correction: with it, a jump
+    /// would excite modes with `hω >> 1` that alternate from step to step.
     fn remember(&mut self) {
         self.a.copy_from(&self.now.acceleration);
         self.previous.copy_from(&self.now.acceleration);
@@ -328,7 +331,8 @@ impl GeneralizedAlpha {
         self.newton.fresh = false;
     }
 
-    /// Newton's matrix, (7) or (8), at the configuration of the last residual; `kept`: without (6).
+    /// Computes Newton's matrix, (7) or (8), at the configuration of the last residual; `kept`:
+    /// without updating (6).
     fn factor(&mut self, system: &mut impl SecondOrderSystem, t: f64, kept: bool) -> Result<(), StepError> {
         let (c_D, c_K) = self.coefficients.derivatives(self.newton.dt);
         let matrix = &mut self.newton.matrix;
@@ -347,7 +351,7 @@ impl GeneralizedAlpha {
         Ok(())
     }
 
-    /// The matrices of the next step, where they are followed.
+    /// Adds the extrapolated change of the matrices for the next step, if enabled.
     fn follow(&mut self) {
         if let (Some(course), Some(correction), Way::Dense(dense)) =
             (&mut self.course, &mut self.correction, &mut self.newton.matrix.way)
@@ -358,7 +362,7 @@ impl GeneralizedAlpha {
         }
     }
 
-    /// x̃⁺, a⁺, x⁺, v⁺ of the trial ẍ⁺ by (5), (4), (2), (3).
+    /// Computes x̃⁺, a⁺, x⁺, v⁺ from the trial ẍ⁺ by (5), (4), (2), (3).
     fn place(&mut self) {
         let h = self.newton.dt;
         match &mut self.correction {
@@ -374,12 +378,12 @@ impl GeneralizedAlpha {
         });
     }
 
-    /// `r(t⁺, x⁺, v⁺, ẍ⁺)` of (1).
+    /// Computes `r(t⁺, x⁺, v⁺, ẍ⁺)` of (1).
     fn residual(&mut self, system: &mut impl SecondOrderSystem, t: f64) {
         system.residual(t, &self.x_new, &self.v_new, &self.trial, &mut self.newton.r);
     }
 
-    /// Takes the correction `d = J^-1 r` of ẍ⁺ off everything on trial.
+    /// Subtracts the correction `d = J^-1 r` of ẍ⁺ from all trial values.
     fn correct(&mut self, mut sizes: Sizes) -> Sizes {
         let d = &self.newton.r;
         let shift = self.correction.as_mut().map(|correction| correction.shift(&self.newton.matrix, d));
@@ -394,7 +398,7 @@ impl GeneralizedAlpha {
         sizes
     }
 
-    /// What was on trial becomes the state at t.
+    /// Accepts the trial values as the state at `t`.
     fn accept(&mut self, t: f64) {
         quickly(loops::Remember {
             coefficients: self.coefficients,
@@ -438,7 +442,7 @@ impl ImplicitStep for GeneralizedAlpha {
 
     fn attempt(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError> {
         if self.exact || !self.newton.factored {
-            // The matrix belongs to the configuration of the last residual.
+            // The matrix is computed at the configuration of the last residual.
             system.residual(self.now.grid.time(), &self.now.x, &self.now.v, &self.now.acceleration, &mut self.newton.r);
             self.factor(system, t, false)?;
         } else {
@@ -459,7 +463,7 @@ impl ImplicitStep for GeneralizedAlpha {
         loop {
             self.residual(system, t);
             if search.stalls() {
-                // What a step that is to be smooth places is that of its start.
+                // In exact mode keep (6) of the start of the step.
                 self.factor(system, t, self.exact)?;
                 self.place();
                 self.residual(system, t);
@@ -471,8 +475,8 @@ impl ImplicitStep for GeneralizedAlpha {
             }
         }
         if self.exact {
-            // What is left of the last correction is as small beside it as that beside the one
-            // before.
+            // One more correction: the error left by the last one is smaller than it by the same
+            // factor again.
             self.residual(system, t);
             self.newton.matrix.solve(&mut self.newton.r);
             self.correct(Sizes::default());
@@ -481,8 +485,8 @@ impl ImplicitStep for GeneralizedAlpha {
         self.accept(t);
         system.settle(t, &self.now.x);
         if !self.newton.factored {
-            // The last residual was as good as here, and (6) is the same for all that a step
-            // places.
+            // The last residual is close enough to this configuration, and (6) then stays the same
+            // throughout the next step.
             let _singular_is_found_again_in_the_next_step = self.factor(system, t, false);
             self.newton.renewed_between();
         }

@@ -1,4 +1,4 @@
-//! What maximal coordinates cannot take: refused before a run.
+//! Checks for features that maximal coordinates do not support, before a run.
 
 use flexarm_kinematics::Model;
 use nalgebra::Vector3;
@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
 
-/// Refuses what has no place in maximal coordinates here.
+/// Refuses arms with unsupported features.
 pub(super) fn check_known(arm: &FlexibleArm) -> Result<(), StepError> {
     let unknown = [
         (!arm.torque_driven.is_empty(), "joints driven by torque"),
@@ -27,11 +27,11 @@ pub(super) fn check_known(arm: &FlexibleArm) -> Result<(), StepError> {
     }
 }
 
-/// Least moment of inertia over the largest with which a body can be turned about all its axes.
+/// Minimum ratio of the smallest to the largest principal moment of inertia of an end body.
 const LEAST_MOMENT: f64 = 1e-9;
 
-/// A body at an end of the arm has six degrees of freedom and nothing behind it: its own mass and
-/// moments must hold them. Elsewhere the bodies that it carries do.
+/// Checks the bodies at the ends of the arm: with six degrees of freedom and no body outward, they
+/// need mass and moments of inertia of their own. Other bodies get them from the bodies they carry.
 pub(super) fn check_ends(model: &Model) -> Result<(), StepError> {
     let carries = |i: usize| model.bodies().iter().any(|body| body.parent == i);
     for (_, body) in model.bodies().iter().enumerate().skip(1).filter(|(i, _)| !carries(*i)) {

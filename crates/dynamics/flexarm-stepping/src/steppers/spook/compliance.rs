@@ -7,14 +7,14 @@ use super::solve::{Sigma, Symmetric};
 use super::{RIGID_COMPLIANCE, SpookPreset};
 use crate::arm::FlexibleArm;
 
-/// What a joint's rows are made of.
+/// Compliance of the rows of a joint.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct JointCompliance {
     pub(super) sigma: Sigma,
     pub(super) upsilon: f64,
 }
 
-/// Υ of rows that do not give way: of τ = 2h.
+/// Returns Υ of rigid rows, with τ = 2h.
 pub(super) fn rigid_upsilon(preset: SpookPreset) -> f64 {
     match preset {
         SpookPreset::Exact => 1.0 / 9.0,
@@ -22,7 +22,7 @@ pub(super) fn rigid_upsilon(preset: SpookPreset) -> f64 {
     }
 }
 
-/// Does the joint of a body follow from a closed loop?
+/// Returns whether the joint of a body is a dependent joint of a closed loop.
 fn is_dependent(model: &Model, body: usize) -> bool {
     model.loops().iter().any(|own| own.dependent.contains(&body))
 }

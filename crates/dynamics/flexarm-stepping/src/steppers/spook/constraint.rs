@@ -8,16 +8,17 @@
 //! hard:    g_t = d,       g_r = R_P angles
 //!          G_t = [ -1, [r_1 + d]x, 1, -[r_2]x ],        G_r = [ 0, -1, 0, 1 ]
 //! ```
-//! The hard rows are the local ones behind `blkdiag(R_P, R_P B_P^-1)`, which changes nothing where
-//! the compliance is next to nothing (angles are their own image). A prescribed joint moves P by
-//! `S = [l; a]` per rate of its coordinate, in the hard rows by `[R_P l; R_Q B a]`.
+//! The hard rows are the local ones multiplied by `blkdiag(R_P, R_P B_P^-1)`, which has no effect
+//! if the compliance is almost zero (angles are mapped to themselves). A prescribed joint moves P
+//! by `S = [l; a]` per rate of its coordinate, in the hard rows by `[R_P l; R_Q B a]`.
 //!
-//! Columns: (v, w) of the parent's centre of mass, then of the child's, world axes. `r_i` from the
-//! centre of mass to the joint's frame; `B_P` maps relative angular velocity in P axes to angle
-//! rates. `G` on the child has the inverse
+//! Columns: (v, w) of the parent's centre of mass, then of the child's, world axes. `r_i` points
+//! from the centre of mass to the joint's frame; `B_P` maps relative angular velocity in P axes to
+//! angle rates. `G` on the child has the inverse
 //!
 //! ```text
-//! local:   [ R_P, [r_2]x R_P B_P^-1; 0, R_P B_P^-1 ],   B_P^-1 = R_PQ B        global:  [ 1, [r_2]x; 0, 1 ]
+//! local:   [ R_P, [r_2]x R_P B_P^-1; 0, R_P B_P^-1 ],   B_P^-1 = R_PQ B
+//! global:  [ 1, [r_2]x; 0, 1 ]
 //! ```
 
 use flexarm_kinematics::{AxisMotion, ElasticAngles, Pose, rotation_vector, skew};
@@ -27,13 +28,13 @@ use nalgebra::{Matrix3, Vector3, Vector6};
 use super::ConstraintForm;
 use super::solve::{Jacobian, Triangle, joined};
 
-/// One joint's rows.
+/// Constraint rows of one joint.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rows {
     /// Constraint value.
     pub(super) g: Vector6<f64>,
     pub(super) G: Jacobian,
-    /// Motion of a prescribed joint in the rows: minus their explicit rate per rate of its
+    /// Motion of a prescribed joint in the rows: minus their explicit rate, per rate of its
     /// coordinate.
     pub(super) S: Vector6<f64>,
 }
@@ -44,8 +45,8 @@ impl Rows {
         Self { g: Vector6::zeros(), G: Jacobian::Levers { parent: zero, child: zero }, S: Vector6::zeros() }
     }
 
-    /// Rows between frame P (pose in the world, on a body with centre of mass `x_1`) and frame Q
-    /// (likewise `x_2`).
+    /// Creates the rows between frame P (pose in the world, on a body with centre of mass `x_1`)
+    /// and frame Q (likewise with `x_2`).
     #[inline]
     pub(super) fn new(
         form: ConstraintForm,
@@ -62,7 +63,7 @@ impl Rows {
         match form {
             ConstraintForm::Local => {
                 let Rt = R_P.transpose();
-                // Angle rates from angular velocity in world axes, and the way back.
+                // Angle rates from angular velocity in world axes, and the inverse map.
                 let B = angles.pose(&phi).1;
                 let turn = mul3(&B.try_inverse().unwrap_or_else(Matrix3::identity), &R_Q.transpose());
                 let back = mul3(R_Q, &B);
@@ -82,8 +83,8 @@ impl Rows {
         }
     }
 
-    /// The local form of a joint with next to no compliance, without its turn into the axes and
-    /// angles of P; likewise.
+    /// Creates the rows of a joint with almost no compliance: the local form without rotation into
+    /// the axes and angles of P.
     #[inline]
     pub(super) fn hard(
         motion: Option<AxisMotion>,

@@ -1,8 +1,8 @@
 //! SPOOK: compliant constraints in maximal coordinates.
 //!
 //! Every body has six degrees of freedom; every joint is six constraint rows with a compliance:
-//! `K_S^-1` for an elastic joint, next to nothing for a rigid one, whose distal frame must follow
-//! the proximal frame moved by the prescribed coordinate. One step solves
+//! `K_S^-1` for an elastic joint, almost zero for a rigid one, whose distal frame must follow the
+//! proximal frame displaced by the prescribed coordinate. One step solves
 //!
 //! ```text
 //! [ M  -Gᵀ ] [ v⁺ ]   [ M v + h f                             ]
@@ -10,16 +10,16 @@
 //!
 //! Σ = (4/h²) Υ K_S^-1,   Υ = 1/(1 + 4 τ/h)                        τ: damping time, D_S = τ K_S
 //! ```
-//! λ is an impulse; at rest `λ/h = -K g` whatever h and τ. `g_t` is the explicit time rate of a
-//! prescribed joint. The matrix is block tridiagonal (a tree of 6×6 blocks) and eliminated from the
-//! leaves to the base, O(bodies).
+//! λ is an impulse; at rest `λ/h = -K g` for any h and τ. `g_t` is the explicit time rate of a
+//! prescribed joint. The matrix is block tridiagonal (a tree of 6×6 blocks) and is eliminated from
+//! the leaves to the base, O(bodies).
 //!
-//! A step ends where a load or a prescribed velocity jumps; the next one has a length of its own,
-//! and with it Σ and Υ.
+//! A step ends where a load or a prescribed velocity jumps; the rest of it has its own step size,
+//! and thus its own Σ and Υ.
 //!
-//! Frames: P, Q proximal and distal face of a joint, P = Q when undeformed. [`constraint`] has the
-//! rows, [`solve`] the elimination, [`pins`] what closes a loop of links. Source: [Lacoursière
-//! 2007]; theory page, section 4.
+//! Frames: P, Q proximal and distal face of a joint, P = Q when undeformed. [`constraint`] contains
+//! the rows, [`solve`] the elimination, [`pins`] the closure of loops. Source: [Lacoursière 2007];
+//! theory page, section 4.
 
 mod checks;
 mod compliance;
@@ -61,33 +61,33 @@ pub(super) static ENTRY: StepperEntry = StepperEntry {
     with: |options| StepperKind::Spook(options.spook),
 };
 
-/// Compliance of a rigid joint (m/N, rad/(N m)): 1e4 N move it by 1e-13 m.
+/// Compliance of a rigid joint (m/N, rad/(N m)): 1e4 N displace it by 1e-13 m.
 const RIGID_COMPLIANCE: f64 = 1e-17;
 
 /// Axes in which the relative motion of an elastic joint is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum ConstraintForm {
-    /// In the proximal frame, with the exact Jacobian: constant stiffness.
+    /// In the proximal frame, with the exact Jacobian; the stiffness is constant.
     #[default]
     Local,
-    /// In world axes, stiffness turned along; equal to the local form to first order in the
-    /// deflection.
+    /// In world axes, with the stiffness rotated along; equal to the local form to first order in
+    /// the deflection.
     Global,
 }
 
-/// How Σ and Υ follow from the damping time.
+/// Relation of Σ and Υ to the damping time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum SpookPreset {
-    /// `Υ = 1/(1 + 4 τ/h)` with the physical damping time of each elastic joint; rigid joints take
-    /// τ = 2h.
+    /// `Υ = 1/(1 + 4 τ/h)` with the physical damping time of each elastic joint; τ = 2h for rigid
+    /// joints.
     #[default]
     Exact,
-    /// The thesis' choice: τ = 2h everywhere and `1 + 4 τ/h ≈ 4 τ/h`, so Υ = 1/8 and Σ = K^-1/(2
+    /// Choice of the thesis: τ = 2h everywhere and `1 + 4 τ/h ≈ 4 τ/h`, so Υ = 1/8 and Σ = K^-1/(2
     /// h²).
     Source,
 }
 
-/// Choices of the method.
+/// Settings of SPOOK.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct SpookSettings {
     /// Local or global constraint form.
@@ -117,7 +117,7 @@ impl Method for SpookSettings {
 struct BodyState {
     /// Position of the centre of mass in the world.
     x: Vector3<f64>,
-    /// Attitude of the body axes.
+    /// Orientation of the body axes.
     R: UnitQuaternion<f64>,
     /// Velocity of the centre of mass and angular velocity, world axes.
     V: Twist,
@@ -129,7 +129,7 @@ struct BodyState {
 }
 
 impl BodyState {
-    /// Pose of the body frame B.
+    /// Returns the pose of the body frame B.
     fn X_WB(&self) -> Pose {
         let R = self.R.to_rotation_matrix();
         Pose::from_parts(sub(&self.x, &mul(R.matrix(), &self.com)).into(), R)
@@ -139,7 +139,7 @@ impl BodyState {
 /// Prescribed motion at one time.
 #[derive(Clone, Debug)]
 struct Sampled {
-    /// The time, on its side of a jump (s).
+    /// Time, on its side of a jump (s).
     at: f64,
     q: DVector<f64>,
     qdot: DVector<f64>,
@@ -152,7 +152,7 @@ impl Sampled {
         Self { at: f64::NAN, q: zeros.clone(), qdot: zeros.clone(), qddot: zeros }
     }
 
-    /// At t, unless it is there already.
+    /// Samples the motion at `t` unless it was already sampled there.
     fn take(&mut self, arm: &FlexibleArm, events: &EventQueue, t: f64) {
         let t = events.side(t);
         if t != self.at {
@@ -163,13 +163,13 @@ impl Sampled {
     }
 }
 
-/// The stepper; see the module page.
+/// The stepper; see the module documentation.
 pub struct Spook {
     arm: FlexibleArm,
     h: f64,
     steps: u64,
     t: f64,
-    /// Step to which `compliance` belongs, and that of the impulses in `lambda` (s).
+    /// Step size of `compliance` and of the impulses in `lambda` (s).
     dt: f64,
     events: EventQueue,
     settings: SpookSettings,
@@ -182,12 +182,12 @@ pub struct Spook {
     lambda: Vec<Vector6<f64>>,
     solver: TreeSolver,
     pins: Pins,
-    /// M and zeros: blocks of the bodies before the elimination, of arms with loops.
+    /// Blocks of the bodies before the elimination; used for arms with loops.
     masses: Vec<Symmetric>,
     /// Prescribed motion at the current time and at the end of the step.
     now: Sampled,
     next: Sampled,
-    /// Prescribed velocities that the bodies have.
+    /// Prescribed velocities at the start of the step, consistent with those of the bodies.
     rates: DVector<f64>,
     /// Poses of the bodies at the current time.
     poses: Vec<Pose>,
@@ -200,9 +200,10 @@ impl Spook {
     /// Starts at `t = 0` at rest with elastic coordinates `e`.
     ///
     /// # Errors
-    /// [`StepError::Setup`] for what has no place in maximal coordinates here: mimic joints, modal
-    /// links, torques, payloads that change, curved springs, links without mass or moments of
-    /// inertia at an end of the arm.
+    /// [`StepError::Setup`] for features that are not supported in maximal coordinates: mimic
+    /// joints, torque drives, payload changes, nonlinear springs, gear effects other than
+    /// elasticity, and end links without mass or moments of inertia; [`StepError::ModalLinks`] for
+    /// modal links.
     pub fn new(arm: FlexibleArm, h: f64, settings: SpookSettings, e: &DVector<f64>) -> Result<Self, StepError> {
         check_known(&arm)?;
         let model = arm.model.clone();
@@ -248,13 +249,13 @@ impl Spook {
             velocities: vec![Vector6::zeros(); n],
             loads,
         };
-        // The impulses of the first step, so that the forces are known before it.
+        // Compute the impulses of the first step, so that forces are available before it.
         spook.solve(h)?;
         Ok(spook)
     }
 }
 
-/// Body i as `data` has it.
+/// Returns the state of body i from `data`.
 fn body_state(model: &Model, data: &Data, i: usize) -> BodyState {
     let (body, X) = (&model.bodies()[i], data.X_WB[i]);
     let (com, mass) = (body.inertia.com(), body.inertia.mass);
@@ -299,13 +300,13 @@ impl Stepper for Spook {
         out.qdot.rows_mut(0, n).copy_from(&self.now.qdot);
         let (mut kinetic, mut potential) = self.observe_bodies(out);
         for i in 1..self.bodies.len() {
-            // Mean force over the last step (before the first one: over that).
+            // Mean force over the last step; before the first step, over that step.
             self.observe_joint(i, self.lambda[i] / h, out);
         }
         for balancer in self.arm.model.balancers() {
             potential += balancer.law.energy(balancer.length(&out.X_WB, out.q.as_slice()));
         }
-        // Drives: friction and rotors are no rows of the constraints.
+        // Drives: friction and rotors are not part of the constraints.
         for (k, rate) in self.now.qdot.iter().enumerate() {
             out.drive[k] += self.arm.friction_torque(k, *rate);
         }
@@ -324,7 +325,7 @@ impl Stepper for Spook {
 }
 
 impl Spook {
-    /// Poses of the bodies; their kinetic and gravitational energy (J).
+    /// Writes the poses of the bodies; returns their kinetic and gravitational energy (J).
     fn observe_bodies(&self, out: &mut Observation) -> (f64, f64) {
         let (mut kinetic, mut potential) = (0.0, 0.0);
         for (i, state) in self.bodies.iter().enumerate() {
@@ -336,8 +337,8 @@ impl Spook {
         (kinetic, potential)
     }
 
-    /// What the joint of body i shows: drive forces, or the coordinates of a spring, their rates
-    /// and its load. `force`: what the joint puts on the body, in its rows.
+    /// Writes the drive force of the joint of body i, or the coordinates of its spring with rates
+    /// and load. `force`: force of the joint on the body, in its rows.
     fn observe_joint(&self, i: usize, force: Vector6<f64>, out: &mut Observation) {
         let body = &self.arm.model.bodies()[i];
         let element = || self.arm.elements.iter().position(|element| element.body == i);
@@ -369,7 +370,7 @@ impl Spook {
         }
     }
 
-    /// Power of dampers and friction (W) at all rates `qdot`.
+    /// Returns the power of dampers and friction (W) at all rates `qdot`.
     fn damping_power(&self, qdot: &DVector<f64>) -> f64 {
         let mut damping = 0.0;
         for (k, element) in self.arm.elements.iter().enumerate() {
@@ -382,7 +383,7 @@ impl Spook {
         damping
     }
 
-    /// Power of the external loads (W).
+    /// Returns the power of the external loads (W).
     fn load_power(&self) -> f64 {
         let mut power = 0.0;
         for load in &self.arm.loads {
@@ -395,8 +396,8 @@ impl Spook {
         power
     }
 
-    /// Relative motion of the two faces of the joint of body i and its rate for the present poses,
-    /// in the local form.
+    /// Returns the relative displacement of the two faces of the joint of body i and its rate at
+    /// the current poses, in the local form.
     fn deflection_now(&self, i: usize, angles: ElasticAngles) -> (Vector6<f64>, Vector6<f64>) {
         let body = &self.arm.model.bodies()[i];
         let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
@@ -405,10 +406,11 @@ impl Spook {
         (rows.g, rows.G.of_parent(&parent.V.to_vector()) + rows.G.of_child(&child.V.to_vector()))
     }
 
-    /// Velocities and impulses of the step from the current time; poses stay.
+    /// Computes velocities and impulses of the step from the current time; poses stay unchanged.
     fn solve(&mut self, t_next: f64) -> Result<(), StepError> {
         let t = self.t;
-        // Rates at the end of the step belong to the new velocities, positions at its start to g.
+        // Rates are taken at the end of the step, with the new velocities; positions at its start,
+        // for g.
         self.next.take(&self.arm, &self.events, t_next);
         self.now.take(&self.arm, &self.events, t);
         for (pose, body) in self.poses.iter_mut().zip(&self.bodies) {
@@ -444,7 +446,7 @@ impl Spook {
         closed.map_err(|_| singular())?.ok_or_else(singular)
     }
 
-    /// Right-hand sides of the joints, and compliances in the axes of their rows.
+    /// Updates the right-hand sides of the joints, and their compliances in the axes of their rows.
     fn update_right_hand_sides(&mut self) {
         let h = self.dt;
         for (i, body) in self.arm.model.bodies().iter().enumerate().skip(1) {
@@ -459,14 +461,14 @@ impl Spook {
             let rate = row.G.of_parent(&parent.V.to_vector()) + row.G.of_child(&child.V.to_vector());
             let mut s = row.g * (-4.0 / h * upsilon) + rate * *upsilon;
             if matches!(body.motion, JointMotion::Axis(_)) && !body.elastic && body.coordinate < self.rates.len() {
-                // g_t = -S q̇, now and at the end of the step.
+                // g_t = -S q̇ at the start and at the end of the step.
                 s -= row.S * (upsilon * self.rates[body.coordinate] - self.next.qdot[body.coordinate]);
             }
             self.solver.s[i] = s;
         }
     }
 
-    /// Rows of every joint, and what its prescribed coordinate does to them.
+    /// Updates the rows of every joint, including the effect of its prescribed coordinate.
     fn update_rows(&mut self) -> Result<(), StepError> {
         let (h, t) = (self.dt, self.t);
         for (i, body) in self.arm.model.bodies().iter().enumerate().skip(1) {
@@ -477,14 +479,14 @@ impl Spook {
                 JointMotion::Elastic(angles) => {
                     Rows::new(self.settings.form, angles, &X_WP(), &parent.x, X_WQ, &child.x)
                 }
-                // A single spring is measured from its relaxed place.
+                // A single spring is measured from its relaxed position.
                 _ if body.elastic => {
                     Rows::new(ConstraintForm::Local, Default::default(), &X_WP(), &parent.x, X_WQ, &child.x)
                 }
                 JointMotion::Axis(motion) => {
                     let q = match self.now.q.get(body.coordinate) {
                         Some(q) => *q,
-                        // A dependent joint is where its bodies are.
+                        // The coordinate of a dependent joint follows from its bodies.
                         None => {
                             let X = X_WP().inverse() * X_WQ;
                             let turn = rotation_vector(X.rotation.matrix());
@@ -507,7 +509,7 @@ impl Spook {
         Ok(())
     }
 
-    /// External loads and balancers on each body at Bo in world axes.
+    /// Updates external loads and balancer forces on each body, at Bo in world axes.
     fn update_loads(&mut self) {
         self.loads.iter_mut().for_each(|load| *load = Vector6::zeros());
         for load in &self.arm.loads {
@@ -523,8 +525,8 @@ impl Spook {
         }
     }
 
-    /// Value of the joint of a balancer at the current time: prescribed coordinates and deflections
-    /// of springs.
+    /// Returns the joint value of a balancer at the current time: prescribed coordinates and
+    /// deflections of springs.
     fn joint_value(&self, balancer: &PlacedBalancer) -> f64 {
         let BalancerPlace::Joint { terms, offset, .. } = &balancer.place else { return 0.0 };
         let model = &self.arm.model;
@@ -540,17 +542,17 @@ impl Spook {
         terms.iter().fold(*offset, |x, (k, c)| x + c * coordinate(*k))
     }
 
-    /// Body blocks: mass, momentum, impulse of gravity, gyroscopic moment and loads, about the
-    /// centre of mass in world axes.
+    /// Updates the body blocks: mass, momentum, impulse of gravity, gyroscopic moment and loads,
+    /// about the centre of mass in world axes.
     fn update_body_blocks(&mut self) {
         let (h, gravity) = (self.dt, self.arm.model.gravity);
         for (i, body) in self.bodies.iter().enumerate().skip(1) {
-            // M
+            // Mass matrix M.
             let R = self.poses[i].rotation.matrix();
             let J = turn_symmetric(R, &body.J);
             let mass = Matrix3::from_diagonal_element(body.mass);
             self.solver.M[i] = Symmetric { A: mass, B: Matrix3::zeros(), C: J };
-            // M v + h f
+            // Momentum M v + h f.
             let spin = mul(&J, &body.V.angular);
             let load = &self.loads[i];
             let (F, T): (Vector3<f64>, Vector3<f64>) = (load.fixed_rows::<3>(0).into(), load.fixed_rows::<3>(3).into());
@@ -561,8 +563,8 @@ impl Spook {
         }
     }
 
-    /// A step of length `h` to `t_next`. The old poses stay until all new ones are known to be
-    /// sound.
+    /// Takes a step of size `h` to `t_next`. The old poses are kept until all new ones are known to
+    /// be valid.
     fn advance(&mut self, t_next: f64, h: f64) -> Result<(), StepError> {
         if h != self.dt {
             self.dt = h;

@@ -1,14 +1,16 @@
-//! Pins that close loops: two rows each between bodies that no joint connects.
+//! Pins that close loops: two constraint rows each, between bodies that no joint connects.
 //!
 //! ```text
-//! c_k = e_k . d,   d = p_eye - p_pin           e_1, e_2 across the pin, on the body A that carries it; eye on body B
+//! c_k = e_k . d,   d = p_eye - p_pin
 //! G_A = [ -e, -(r_A + d) x e ],   G_B = [ e, r_B x e ]
 //! K z = r,   [ K  -Gᵀ ] [ z ]   [ r ]
-//!            [ G   Σ  ] [ μ ] = [ s ]          z = z_r + Z μ,   Z = K^-1 Gᵀ,   (G Z + Σ) μ = s - G z_r
+//!            [ G   Σ  ] [ μ ] = [ s ]
+//! z = z_r + Z μ,   Z = K^-1 Gᵀ,   (G Z + Σ) μ = s - G z_r
 //! ```
-//! K is the matrix of the opened tree, in which dependent joints are free along their axes; Z is
-//! solved for row by row. What lies along the pin is free, and so is the tilt of the eye on it, as
-//! in [`flexarm_kinematics::PlacedLoop`].
+//! The directions e_1, e_2 are perpendicular to the pin and fixed to the body A that carries it;
+//! the eye is on body B. K is the matrix of the opened tree, in which dependent joints are free
+//! along their axes; Z is solved for row by row. Displacement along the pin and tilt of the eye on
+//! it are free, as in [`flexarm_kinematics::PlacedLoop`].
 
 use flexarm_kinematics::{JointMotion, Model, Pose};
 use nalgebra::{DMatrix, DVector, Vector2, Vector3, Vector6};
@@ -17,13 +19,13 @@ use super::BodyState;
 use super::solve::joined;
 use crate::error::DEAD_POINT_RAD;
 
-/// A pin that is further than this from its eye has come off, m.
+/// Maximum distance of a pin from its eye (m); beyond it the loop is open.
 const LARGEST_GAP: f64 = 1e-2;
 
 /// One of the two rows of a pin.
 #[derive(Clone, Copy, Debug)]
 struct Row {
-    /// Of the body with the pin and of that with the eye.
+    /// Gradients on the body with the pin and on the body with the eye.
     G: [Vector6<f64>; 2],
     c: f64,
 }
@@ -31,12 +33,12 @@ struct Row {
 /// Velocities and impulses of the tree.
 pub(super) type Found = (Vec<Vector6<f64>>, Vec<Vector6<f64>>);
 
-/// All pins of an arm with the room that they need.
+/// All pins of an arm, with workspace.
 pub(super) struct Pins {
     rows: Vec<Row>,
     /// Bodies of each row.
     bodies: Vec<[usize; 2]>,
-    /// Column by column what a unit impulse of a row does.
+    /// Response of the tree to a unit impulse of each row.
     columns: Vec<Found>,
     A: DMatrix<f64>,
     mu: DVector<f64>,
@@ -60,8 +62,8 @@ impl Pins {
         self.rows.is_empty()
     }
 
-    /// Rows at the present poses. Returns the first loop that is open, or whose links lie in a
-    /// line.
+    /// Updates the rows at the current poses. Returns the first loop that is open or at a dead
+    /// point.
     pub(super) fn update(&mut self, model: &Model, poses: &[Pose], bodies: &[BodyState]) -> Option<usize> {
         let mut open = None;
         for (k, own) in model.loops().iter().enumerate() {
@@ -77,7 +79,7 @@ impl Pins {
                 self.rows[2 * k + row] = Row { G, c: e.dot(&d) };
             }
             let gap = Vector2::new(self.rows[2 * k].c, self.rows[2 * k + 1].c).norm();
-            // How the eye goes across the pin with each of the dependent joints.
+            // Velocity of the eye across the pin per rate of each dependent joint.
             let [u, v] = own.dependent.map(|i| {
                 let body = &model.bodies()[i];
                 let X_WP = poses[body.parent] * body.X_PJ;
@@ -94,18 +96,18 @@ impl Pins {
         open
     }
 
-    /// What moves the rows at these velocities.
+    /// Returns the rate of a row at velocities `v`.
     fn rate(&self, row: usize, v: &[Vector6<f64>]) -> f64 {
         let [A, B] = self.bodies[row];
         self.rows[row].G[0].dot(&v[A]) + self.rows[row].G[1].dot(&v[B])
     }
 
-    /// Closes the loops of what the opened tree does.
+    /// Adds the impulses of the pins to the solution of the opened tree.
     ///
     /// * `before`: velocities at the start of the step; `h`, `upsilon`, `sigma`: of the pins.
-    /// * `open`: solves the tree for momenta on the bodies alone.
+    /// * `open`: solves the tree for momenta on the bodies only.
     ///
-    /// Returns `None` where the pins cannot be held.
+    /// Returns `None` if the matrix of the pins is not positive definite.
     pub(super) fn close<E>(
         &mut self,
         (v, lambda): (&mut [Vector6<f64>], &mut [Vector6<f64>]),
@@ -113,11 +115,13 @@ impl Pins {
         [h, upsilon, sigma]: [f64; 3],
         mut open: impl FnMut([(usize, Vector6<f64>); 2], &mut Found) -> Result<(), E>,
     ) -> Result<Option<()>, E> {
+        // Columns of Z = K^-1 Gᵀ.
         let count = self.rows.len();
         for j in 0..count {
             let ([A, B], G) = (self.bodies[j], self.rows[j].G);
             open([(A, G[0]), (B, G[1])], &mut self.columns[j])?;
         }
+        // (G Z + Σ) μ = s - G z_r
         for i in 0..count {
             for j in 0..count {
                 self.A[(i, j)] = self.rate(i, &self.columns[j].0);
@@ -138,7 +142,7 @@ impl Pins {
     }
 }
 
-/// Solves a positive definite system in its place; whether it is one.
+/// Solves a positive definite system in place; returns whether it is positive definite.
 fn eliminate(A: &mut DMatrix<f64>, x: &mut DVector<f64>) -> bool {
     let n = x.len();
     for k in 0..n {

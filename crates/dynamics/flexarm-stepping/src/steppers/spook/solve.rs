@@ -1,26 +1,28 @@
-//! Elimination of the saddle-point matrix over a tree of bodies, leaves first: O(bodies).
+//! Elimination of the saddle-point matrix over a tree of bodies, from the leaves: O(bodies).
 //!
 //! ```text
-//! body c:   M_c v_c - G_cᵀ λ - (children) = b_c              joint of c:  G_p v_p + G_c v_c + Σ λ = s        (1)
+//! body c:       M_c v_c - G_cᵀ λ - (children) = b_c
+//! joint of c:   G_p v_p + G_c v_c + Σ λ = s                                     (1)
 //! M̂_c v_c = b̂_c + G_cᵀ λ                                       (children eliminated)
-//! S λ = ŝ - G_p v_p,   S = Σ + G_c M̂_c^-1 G_cᵀ,   ŝ = s - G_c M̂_c^-1 b̂_c                                    (2)
-//! M̂_p += G_pᵀ S^-1 G_p,   b̂_p += G_pᵀ S^-1 ŝ                                                              (3)
+//! S λ = ŝ - G_p v_p,   S = Σ + G_c M̂_c^-1 G_cᵀ,   ŝ = s - G_c M̂_c^-1 b̂_c        (2)
+//! M̂_p += G_pᵀ S^-1 G_p,   b̂_p += G_pᵀ S^-1 ŝ                                    (3)
 //! ```
 //! For a serial arm this is the block tridiagonal LDLᵀ in body order. M̂ and S are symmetric
-//! positive definite. `G_c` is square, a block triangle whose inverse is known, so that neither M̂
+//! positive definite. `G_c` is square and block triangular with a known inverse, so that neither M̂
 //! nor S is factorised; in the coordinates of the rows
 //!
 //! ```text
 //! M̃ = G_c^-T M̂_c G_c^-1,   b̃ = G_c^-T b̂_c,   H = M̃ + Σ^-1
-//! S^-1 = Σ^-1 H^-1 M̃,   S^-1 ŝ = Σ^-1 H^-1 (M̃ s - b̃),   v_c = G_c^-1 (s - Σ λ - G_p v_p)               (4)
+//! S^-1 = Σ^-1 H^-1 M̃,   S^-1 ŝ = Σ^-1 H^-1 (M̃ s - b̃),   v_c = G_c^-1 (s - Σ λ - G_p v_p)     (4)
 //! ```
-//! which holds for hard joints (Σ next to nothing) and soft ones alike. Where Σ is hard in some
-//! directions and soft in others, `S = Σ + M̃^-1` is inverted itself. A joint that is free along a
-//! line σ of its rows (it follows from a closed loop) has there a rate ε and no force: with
-//! `a = S_0^-1 σ` of the joint that is hard there as well
+//! which holds for hard joints (Σ almost zero) and soft ones alike. If Σ is hard in some directions
+//! and soft in others, `S = Σ + M̃^-1` is inverted directly. A joint that is free along a line σ of
+//! its rows (a dependent joint of a closed loop) has a rate ε and no force along it: with
+//! `a = S_0^-1 σ` of the same joint without the free line
 //!
 //! ```text
-//! S^-1 = S_0^-1 - a aᵀ / σᵀa,     σᵀλ = 0,     ε = (σᵀ S_0^-1 ŝ - aᵀ G_p v_p) / σᵀa,     v_c = G_c^-1 (s - Σ λ - G_p v_p - σ ε)    (5)
+//! S^-1 = S_0^-1 - a aᵀ / σᵀa,   σᵀλ = 0,   ε = (σᵀ S_0^-1 ŝ - aᵀ G_p v_p) / σᵀa
+//! v_c = G_c^-1 (s - Σ λ - G_p v_p - σ ε)                                             (5)
 //! ```
 
 use flexarm_spatial::products::{cross3, mul, mul3, tr_mul, tr_mul3, turn_symmetric};
@@ -54,14 +56,15 @@ pub(super) fn joined(a: &Vector3<f64>, b: &Vector3<f64>) -> Vector6<f64> {
     Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z)
 }
 
-/// A symmetric matrix from its lower triangle; what is above is not computed at all.
+/// Returns a symmetric matrix from its lower triangle; the upper triangle is not read.
 #[inline(always)]
 fn mirrored(X: &Matrix3<f64>) -> Matrix3<f64> {
     let (xy, xz, yz) = (X[(1, 0)], X[(2, 0)], X[(2, 1)]);
     Matrix3::new(X[(0, 0)], xy, xz, xy, X[(1, 1)], yz, xz, yz, X[(2, 2)])
 }
 
-/// Inverse of a symmetric matrix by cofactors, none if the determinant is not positive.
+/// Returns the inverse of a symmetric matrix by cofactors; `None` if the determinant is not
+/// positive.
 #[inline(always)]
 fn inverse(X: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     let (a, b, c): (Vector3<f64>, Vector3<f64>, Vector3<f64>) =
@@ -78,7 +81,7 @@ impl Symmetric {
         Self { A: Matrix3::zeros(), B: Matrix3::zeros(), C: Matrix3::zeros() }
     }
 
-    /// Of a symmetric matrix.
+    /// Creates the blocks of a symmetric matrix.
     pub(super) fn new(X: &Matrix6<f64>) -> Self {
         let block = |i, j| X.fixed_view::<3, 3>(i, j).into_owned();
         Self { A: block(0, 0), B: block(0, 3), C: block(3, 3) }
@@ -88,7 +91,7 @@ impl Symmetric {
         Self { A: self.A * s, B: self.B * s, C: self.C * s }
     }
 
-    /// `blkdiag(R, R) X blkdiag(R, R)ᵀ`.
+    /// Returns `blkdiag(R, R) X blkdiag(R, R)ᵀ`.
     pub(super) fn turned(&self, R: &Matrix3<f64>) -> Self {
         let B = mul3(&mul3(R, &self.B), &R.transpose());
         Self { A: turn_symmetric(R, &self.A), B, C: turn_symmetric(R, &self.C) }
@@ -105,7 +108,7 @@ impl Symmetric {
         joined(&(mul(&self.A, &a) + mul(&self.B, &b)), &(tr_mul(&self.B, &a) + mul(&self.C, &b)))
     }
 
-    /// `X Y` for a symmetric product.
+    /// Returns `X Y`, which must be symmetric.
     #[inline(always)]
     fn commuting_product(&self, Y: &Self) -> Self {
         let Bt = Y.B.transpose();
@@ -115,10 +118,10 @@ impl Symmetric {
         Self { A: mirrored(&A), B, C: mirrored(&C) }
     }
 
-    /// `X Y Z` for a symmetric product.
+    /// Returns `X Y Z`, which must be symmetric.
     #[inline(always)]
     fn symmetric_product(&self, Y: &Self, Z: &Self) -> Self {
-        // The columns of Y Z.
+        // Columns of Y Z.
         let Bt = Z.B.transpose();
         let (tt, tr) = (mul3(&Y.A, &Z.A) + mul3(&Y.B, &Bt), mul3(&Y.A, &Z.B) + mul3(&Y.B, &Z.C));
         let (rt, rr) = (tr_mul3(&Y.B, &Z.A) + mul3(&Y.C, &Bt), tr_mul3(&Y.B, &Z.B) + mul3(&Y.C, &Z.C));
@@ -128,7 +131,7 @@ impl Symmetric {
         Self { A: mirrored(&A), B, C: mirrored(&C) }
     }
 
-    /// By elimination of A; none if not positive definite.
+    /// Inverts by elimination of A; `None` if not positive definite.
     #[inline(always)]
     fn inverse(&self) -> Option<Self> {
         let A = inverse(&self.A)?;
@@ -152,7 +155,7 @@ impl Triangle {
         joined(&tr_mul(&self.tv, &a), &(tr_mul(&self.tw, &a) + tr_mul(&self.rw, &b)))
     }
 
-    /// `Gᵀ X G`.
+    /// Returns `Gᵀ X G`.
     #[inline(always)]
     fn congruent(&self, X: &Symmetric) -> Symmetric {
         let Self { tv, tw, rw } = self;
@@ -162,7 +165,7 @@ impl Triangle {
     }
 }
 
-/// `Gᵀ X G` for `G = [[1, [r]x], [0, 1]]`.
+/// Returns `Gᵀ X G` for `G = [[1, [r]x], [0, 1]]`.
 #[inline(always)]
 fn shifted(X: &Symmetric, r: &Vector3<f64>) -> Symmetric {
     // A [r]x = -([r]x A)ᵀ for a symmetric A.
@@ -176,12 +179,12 @@ fn shifted(X: &Symmetric, r: &Vector3<f64>) -> Symmetric {
 pub(super) enum Jacobian {
     /// `[[-1, [parent]x], [0, -1]]` and `[[1, -[child]x], [0, 1]]`: rows in world axes.
     Levers { parent: Vector3<f64>, child: Vector3<f64> },
-    /// Anything.
+    /// General block triangles.
     Turned { parent: Triangle, child: Triangle, back: Triangle },
 }
 
 impl Jacobian {
-    /// `G_p v`.
+    /// Returns `G_p v`.
     #[inline(always)]
     pub(super) fn of_parent(&self, v: &Vector6<f64>) -> Vector6<f64> {
         match self {
@@ -193,7 +196,7 @@ impl Jacobian {
         }
     }
 
-    /// `G_c v`.
+    /// Returns `G_c v`.
     #[inline(always)]
     pub(super) fn of_child(&self, v: &Vector6<f64>) -> Vector6<f64> {
         match self {
@@ -205,7 +208,7 @@ impl Jacobian {
         }
     }
 
-    /// `G_c^-1 u`.
+    /// Returns `G_c^-1 u`.
     #[inline(always)]
     fn back(&self, u: &Vector6<f64>) -> Vector6<f64> {
         match self {
@@ -217,7 +220,7 @@ impl Jacobian {
         }
     }
 
-    /// `G_c^-T M G_c^-1` and `G_c^-T b`.
+    /// Returns `G_c^-T M G_c^-1` and `G_c^-T b`.
     #[inline(always)]
     fn in_rows(&self, M: &Symmetric, b: &Vector6<f64>) -> (Symmetric, Vector6<f64>) {
         match self {
@@ -229,7 +232,7 @@ impl Jacobian {
         }
     }
 
-    /// `G_pᵀ S G_p` and `G_pᵀ y`.
+    /// Returns `G_pᵀ S G_p` and `G_pᵀ y`.
     #[inline(always)]
     fn on_parent(&self, S: &Symmetric, y: &Vector6<f64>) -> (Symmetric, Vector6<f64>) {
         match self {
@@ -246,13 +249,13 @@ impl Jacobian {
 #[derive(Clone, Copy, Debug)]
 #[expect(clippy::large_enum_variant, reason = "a box per joint would be in the way of every step")]
 pub(super) enum Sigma {
-    /// This times the identity.
+    /// Multiple of the identity.
     Hard(f64),
     /// Σ and its inverse.
     Soft(Symmetric, Symmetric),
-    /// Σ alone.
+    /// Σ only.
     Mixed(Symmetric),
-    /// This times the identity, but for the line S of the rows, which is free.
+    /// Multiple of the identity, except along the line S of the rows, which is free.
     Free(f64),
 }
 
@@ -265,7 +268,7 @@ impl Sigma {
         }
     }
 
-    /// `S^-1`, and `S^-1 ŝ`, by (4).
+    /// Returns `S^-1` and `S^-1 ŝ` by (4).
     #[inline(always)]
     fn hold(&self, M: &Symmetric, b: &Vector6<f64>, s: &Vector6<f64>) -> Option<(Symmetric, Vector6<f64>)> {
         let push = M.times(s) - b;
@@ -292,17 +295,18 @@ impl Sigma {
     }
 }
 
-/// A joint with what lies outward of it eliminated: `S^-1` and `S^-1 ŝ`.
+/// A joint with everything outward of it eliminated: `S^-1` and `S^-1 ŝ`.
 #[derive(Clone, Copy, Debug)]
 struct Held {
     S_inverse: Symmetric,
     y: Vector6<f64>,
-    /// `a / σᵀa` and what of ε does not come from the parent, of a joint with a free line.
+    /// For a joint with a free line: `a / σᵀa`, and the part of ε that is independent of the
+    /// parent.
     free: Option<(Vector6<f64>, f64)>,
 }
 
 impl Held {
-    /// With the line σ free: (5).
+    /// Frees the line σ by (5).
     fn freed(self, line: &Vector6<f64>) -> Option<Self> {
         let Self { S_inverse, y, .. } = self;
         let a = S_inverse.times(line);
@@ -335,8 +339,8 @@ impl TreeSolver {
         Self { parent, M: vec![Symmetric::zeros(); n], b: vec![zero; n], s: vec![zero; n], joints }
     }
 
-    /// Solves for velocities and impulses; `M`, `b` and `s` hold the blocks of bodies and joints,
-    /// `M` and `b` are used up.
+    /// Solves for velocities and impulses; `M`, `b` and `s` are the blocks of bodies and joints.
+    /// `M` and `b` are overwritten.
     ///
     /// * `rows`, `sigma`: of the joint that carries each body.
     ///
@@ -349,6 +353,7 @@ impl TreeSolver {
         lambda: &mut [Vector6<f64>],
     ) -> Result<(), usize> {
         let n = self.parent.len();
+        // Inward pass: eliminate body and joint, (3) to (5).
         for i in (1..n).rev() {
             let (M, b) = rows[i].G.in_rows(&self.M[i], &self.b[i]);
             let (S_inverse, y) = sigma[i].hold(&M, &b, &self.s[i]).ok_or(i)?;
@@ -365,6 +370,7 @@ impl TreeSolver {
             }
             self.joints[i] = held;
         }
+        // Outward pass: impulses and velocities.
         v[0] = Vector6::zeros();
         for i in 1..n {
             let Held { S_inverse, y, free } = &self.joints[i];
@@ -409,8 +415,7 @@ mod tests {
             Rows { g: Vector6::zeros(), G, S: self.vector() }
         }
 
-        /// Hard, soft, soft along one line alone, and free along the line of the rows; and Σ as it
-        /// is.
+        /// Returns a hard, soft, singly soft or free Σ, and its matrix.
         fn sigma(&mut self, kind: u64) -> (Sigma, Matrix6<f64>) {
             let hard = 1e-8;
             match kind % 4 {
@@ -429,14 +434,14 @@ mod tests {
         }
     }
 
-    /// A 6×6 matrix by what it does to unit vectors.
+    /// Returns a 6×6 matrix from its action on the unit vectors.
     fn matrix(map: impl Fn(&Vector6<f64>) -> Vector6<f64>) -> Matrix6<f64> {
         Matrix6::from_columns(&[0, 1, 2, 3, 4, 5].map(|k| map(&Vector6::ith(k, 1.0))))
     }
 
-    /// Truth: the saddle-point matrix (1) of the whole tree, dense, by LU; bodies on levers and on
-    /// turned rows, joints that are hard, soft, soft in one direction, and free in one. Measured:
-    /// 2e-12 of the velocities and 9e-12 of the impulses, at compliances from 1e-8 to 1.
+    /// Truth: the saddle-point matrix (1) of the whole tree, dense, by LU; bodies with levers and
+    /// with rotated rows, joints that are hard, soft, soft in one direction, and free in one.
+    /// Measured: 2e-12 of the velocities and 9e-12 of the impulses, at compliances from 1e-8 to 1.
     #[test]
     fn elimination_along_the_tree_solves_the_whole_matrix() {
         proptest!(|(seed in any::<u64>(), count in 1_usize..9)| {
@@ -451,7 +456,7 @@ mod tests {
                 (solver.M[i], solver.b[i], solver.s[i]) = (Symmetric::new(M), draw.vector(), draw.vector());
             }
 
-            // Velocities, then impulses, then the rates ε of free lines.
+            // Unknowns: velocities, impulses, rates ε of the free lines.
             let (mut A, mut right) = (DMatrix::zeros(13 * count, 13 * count), DVector::zeros(13 * count));
             for i in 1..n {
                 let (v, l) = (6 * (i - 1), 6 * (count + i - 1));
