@@ -1,9 +1,10 @@
-//! Reduced (and full) matrices from and to other FE programs.
+//! Import and export of reduced (and full) matrices of other FE programs.
 //!
-//! Reading has three steps, each with its own function: [`recognise`] tells the format by content,
-//! [`read_matrices`] gives the matrices as they stand in the files ([`ImportedMatrices`]), and
-//! [`assemble_interfaces`] picks the rows of the interfaces and converts to SI. The result goes
-//! through the gate ([`flexarm_fem::ReducedLink::from_matrix12`]) like every other stiffness.
+//! Reading has three steps, each with its own function: [`recognise`] detects the format by
+//! content, [`read_matrices`] returns the matrices as they are in the files ([`ImportedMatrices`]),
+//! and [`assemble_interfaces`] extracts the rows of the interfaces and converts to SI. The result
+//! passes through the gate ([`flexarm_fem::ReducedLink::from_matrix12`]) like every other
+//! stiffness.
 //!
 //! ```
 //! use flexarm_fe_io::exchange::{InputFile, MatrixNames, parse_matrices, propose_map, assemble_interfaces};
@@ -23,10 +24,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Units: those of the files everywhere but in [`assemble_interfaces`], which alone converts. Full
-//! models (`.sti`/`.mas`, Exudyn) stay sparse triplets with labels; they are reduced elsewhere.
-//! Writers stand beside the parsers of their format. The modal format SID is separate:
-//! [`parse_sid`].
+//! Units: those of the files everywhere except in [`assemble_interfaces`], the only place that
+//! converts. Full models (`.sti`/`.mas`, Exudyn) stay sparse triplets with labels; they are reduced
+//! elsewhere. Writers are in the same module as the parser of their format. The modal format SID is
+//! separate: [`parse_sid`].
 //!
 //! Not here: meshes, reduction, the checks of a stiffness.
 
