@@ -174,7 +174,7 @@ mod tests {
         builder.create_dataset("numbers").with_f64_data(&[1.0; 100]);
         let bytes = builder.finish().unwrap();
         let file = File::from_bytes(bytes).unwrap();
-        // A valid small file with a wrong file size.
+        // A valid file of 800 bytes of numbers, with a wrong file size.
         let small = Reader { file, size: 0, left: Cell::new(LARGEST_UNPACKED), place: Place::file("t.hdf5") };
         assert!(small.reals("numbers").unwrap_err().to_string().contains("than the file can hold"));
     }
