@@ -10,7 +10,7 @@
 //! let mesh = parse_mesh(deck.as_bytes(), "one.inp", &options)?.mesh;
 //! assert_eq!((mesh.nodes[1].x, mesh.blocks[0].kind.name()), (0.1, "TET4"));
 //!
-//! // What is wrong with a file is said with its place.
+//! // Errors give their position in the file.
 //! let error = parse_mesh(deck.replace(",4\n", ",9\n").as_bytes(), "one.inp", &options).unwrap_err();
 //! assert!(error.to_string().contains("one.inp"), "{error}");
 //! # Ok::<(), Box<dyn std::error::Error>>(())

@@ -15,7 +15,7 @@
 //! let arm = BeamLink::new("lower_arm", section, Material::ALUMINIUM, 1.095).reduce()?;
 //! assert!((arm.mass() - 2700.0 * 5.2e-3 * 1.095).abs() < 1e-9);
 //!
-//! // 1 kN across the tip, along link y, bends it by 0.36 mm.
+//! // 1 kN across the tip, along link y, deflects it by 0.36 mm.
 //! let u_B = arm.tip_compliance()? * nalgebra::Vector6::new(0.0, 1000.0, 0.0, 0.0, 0.0, 0.0);
 //! assert!((u_B[1] - 0.361e-3).abs() < 1e-6);
 //!

@@ -9,7 +9,7 @@
 //! | --- | --- |
 //! | `J` | 3 % (without junctions and edges 25 %) |
 //! | `k_z`, force along the web | 9 % too soft |
-//! | `k_y`, force along the flanges | 22 % too soft: fillets and the width of the web matter there |
+//! | `k_y`, force along the flanges | 22 % too soft: fillets and web width matter there |
 //! | shear centre | 5 % |
 //!
 //! If warping of a flange is restrained at one end, the beam is stiffer in torsion than St.

@@ -200,8 +200,7 @@ proptest! {
         prop_assert!((d_S.dot(&(K_S * d_S)) - u_B.dot(&(K_BB * u_B))).abs() <= 1e-12 * scale);
     }
 
-    /// Moving the split away and back preserves K_S; the compliance at B does not depend on the
-    /// split.
+    /// The stiffness at B does not depend on the position of the split.
     #[test]
     fn moving_the_split_of_a_link_keeps_its_tip_stiffness(X_LS in pose()) {
         let link = turned_arm();

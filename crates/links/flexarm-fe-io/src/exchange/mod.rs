@@ -15,7 +15,7 @@
 //! let file = InputFile::new("job_STIF1.mtx", text); // Abaqus: node,dof,node,dof,value
 //! let imported = parse_matrices(&[file], &MatrixNames::default())?;
 //!
-//! // Which node is A? Without an answer the error proposes one.
+//! // Without a map of the interfaces, the error proposes one.
 //! let question = assemble_interfaces(&imported, None, Some(&UnitSystem::SI)).unwrap_err();
 //! assert!(question.help.contains("A=1001,B=1002"));
 //! let map = propose_map(&imported.stiffness.rows).unwrap();

@@ -479,7 +479,8 @@ fn a_spinning_beam_stiffens_as_in_the_literature() {
     let link = slender(4.0).modal_with(&ModalOptions { modes: 12, geometric: true, elements: 24 }).unwrap();
     let G = link.geometric.as_ref().unwrap();
     for (spin, truth) in [(0.0, 3.5160), (1.0, 3.6816), (2.0, 4.1373), (4.0, 5.5850), (10.0, 11.2023)] {
-        // About z; flapping along z with EI_y. Centrifugal forces on the deformed link: ω² (e_z·φ)² - ω² φ·φ.
+        // Spin about z; flapping along z with EI_y. Centrifugal forces on the deformed link:
+        // ω² (e_z·φ)² - ω² φ·φ.
         let n = link.coordinates();
         let softening = DMatrix::from_fn(n, n, |k, l| link.N[k * n + l][(2, 2)] - link.N[k * n + l].trace());
         let K = &link.K + (&G.centrifugal[2] + softening) * (spin * spin);
