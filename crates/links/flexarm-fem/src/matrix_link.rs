@@ -60,7 +60,7 @@ pub struct MatrixReduction {
     pub link: ReducedLink,
     /// Mass properties according to the matrices or the plan.
     pub whole: RigidPart,
-    /// Frequencies with A clamped and B free, Hz; empty without mass.
+    /// Frequencies with A clamped and everything else free, Hz; empty without mass.
     pub held_frequencies_hz: Vec<f64>,
     /// Frequencies of the two rigid parts with their joint, A clamped, Hz.
     pub lumped_frequencies_hz: Vec<f64>,

@@ -109,8 +109,8 @@ impl ElementQuality {
 fn fullness(kind: ElementKind, x: &[Vector3<f64>], det: f64) -> f64 {
     let length2 = |a: usize, b: usize| (x[a] - x[b]).norm_squared();
     let mean = |pairs: &[[usize; 2]]| pairs.iter().map(|[a, b]| length2(*a, *b)).sum::<f64>() / pairs.len() as f64;
-    // det J of the ideal shape: 6 V for the regular tetrahedron; V/8 for the brick; V/2 for the
-    // wedge (t from -1 to 1).
+    // det J of the ideal shape: its volume V over that of the reference element, which is 6 V for
+    // the regular tetrahedron, V for the wedge and V/8 for the brick.
     let best = match kind {
         ElementKind::Tet4 | ElementKind::Tet10 => mean(&edges(kind)[..6]).powf(1.5) / 2f64.sqrt(),
         ElementKind::Wedge6 | ElementKind::Wedge15 => {

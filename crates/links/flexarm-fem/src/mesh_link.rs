@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! mesh --assemble--> K, M --tie, factorise--> K_g, M_g, modes --+--> ReducedLink (K_BB, two parts, chains)
-//!                                                               +--> MeshGate: what was checked, with numbers
+//!                                                               +--> MeshGate: checks, with numbers
 //! ```
 //! Start at [`reduce_mesh`]. Everything is in link axes and SI; a mesh in another frame is
 //! transformed first ([`Mesh::transformed`]).
@@ -254,11 +254,13 @@ pub fn reduce_mesh(
     let (X_LA, X_LB) = (plan.interfaces[0].X_LI, plan.interfaces[1].X_LI);
     let mut doubts = suspicious(mesh, &bodies);
     let loose = FemError::Missing { what: "stiffness of the third interface", help: "it holds nothing" };
+    // Two-part link from the 12×12 of A and B.
     let K12 = stiffness12(&superelement).ok_or(loose)?;
     let frames = LinkFrames::new(X_LA, X_LB);
     let (frames, parts) = split(mesh, &densities, frames, &K12, plan.split, &mut doubts)?;
     let mut link = ReducedLink::from_matrix12(&plan.name, frames, &K12, parts, plan.provenance.clone(), &plan.limits)?;
 
+    // Chains and checks against the mesh; then the attached bodies.
     let source = ChainSource {
         mesh,
         model: &model,

@@ -212,6 +212,7 @@ impl<'m> Hierarchy<'m> {
             if rho.iter().zip(energy).all(|(rho, energy)| !(rho.abs() > DONE * energy)) {
                 return (x, step);
             }
+            // Step length α = rᵀz / pᵀAp for each column.
             let q = self.product(&p);
             let curvature = dots(&p, &q);
             for k in 0..x.ncols() {
@@ -219,6 +220,7 @@ impl<'m> Hierarchy<'m> {
                 x.column_mut(k).axpy(alpha, &p.column(k), 1.0);
                 residual.column_mut(k).axpy(-alpha, &q.column(k), 1.0);
             }
+            // New direction p = z + β p.
             z = self.precondition(condensation, &residual);
             let next = dots(&residual, &z);
             for k in 0..x.ncols() {

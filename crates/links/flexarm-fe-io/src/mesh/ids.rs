@@ -59,8 +59,7 @@ impl IdIndex {
 
     /// Appends the indices of the existing numbers among `first, first + step, ... <= last`.
     pub(super) fn extend_from_range(&self, first: u64, last: u64, step: u64, out: &mut Vec<u32>) {
-        // Clipped to the existing numbers, so that the work is not determined by the range in the
-        // file alone.
+        // Clipped to the existing numbers, which bounds the work for any range in the file.
         let (low, high) = match self {
             Self::Run { count: 0, .. } => return,
             Self::Run { first, count } => (*first, *first + u64::from(*count) - 1),

@@ -230,6 +230,7 @@ fn add_beam(
     // Squared polar radius of gyration of the section.
     let r2 = (bar.rotary_y + bar.rotary_z) / bar.mass_per_length;
     let K = element.beam.stiffness12();
+    // End forces of the element: K u minus the inertia forces on it.
     let mut ends = K * element.gather(U);
     let mut inertia = ends.columns_mut(0, FIELDS);
     inertia -= forces;
@@ -238,6 +239,7 @@ fn add_beam(
     for (j, G) in G.iter_mut().enumerate() {
         for at in [3, 9] {
             let (M_y, M_z) = (ends[(at + 1, j)], ends[(at + 2, j)]);
+            // Semi-tangential correction of the end moments.
             let turning = Matrix3::new(0.0, -M_z, M_y, -M_z, 0.0, 0.0, M_y, 0.0, 0.0) * 0.5;
             let theta = local.fixed_rows::<3>(at);
             *G += theta.transpose() * turning * theta;
@@ -252,6 +254,7 @@ fn add_beam(
         let [tx, ty, tz] = [0, 1, 2].map(|a| theta.row(a).transpose());
         let [dtx, dty, dtz] = [0, 1, 2].map(|a| dtheta.row(a).transpose());
         let both = |a: &nalgebra::DVector<f64>, b: &nalgebra::DVector<f64>| a * b.transpose() + b * a.transpose();
+        // Quadratic forms of each internal force (module documentation).
         let of_N = &dv * dv.transpose() + &dw * dw.transpose() + &dtx * dtx.transpose() * r2;
         let of_Vy = both(&dw, &tx);
         let of_Vz = -both(&dv, &tx);

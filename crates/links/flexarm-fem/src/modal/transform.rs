@@ -44,6 +44,7 @@ pub(super) fn eigenpairs(K: &DMatrix<f64>, M: &DMatrix<f64>) -> Option<Eigenpair
                     continue;
                 }
                 worst = worst.max(c.abs() / size);
+                // Jacobi rotation that makes columns i and j of H orthogonal.
                 let zeta = (b - a) / (2.0 * c);
                 let t = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
                 let cos = 1.0 / t.hypot(1.0);
@@ -55,6 +56,7 @@ pub(super) fn eigenpairs(K: &DMatrix<f64>, M: &DMatrix<f64>) -> Option<Eigenpair
             break;
         }
     }
+    // ω = 1/|h|, in ascending order; Φ = W/|h| is M-orthonormal.
     let sizes: Vec<f64> = H.column_iter().map(|h| h.norm()).collect();
     if sizes.iter().any(|size| !(*size > 0.0)) {
         return None;

@@ -144,6 +144,7 @@ impl<'m> Condensation<'m> {
         boundary: Boundary,
         options: CondensationOptions,
     ) -> Result<Self, ReductionError> {
+        // Free DoF, less six of an unsupported mesh (grounding), and their Cholesky factor.
         let mut solved = boundary.free().to_vec();
         let rigid = if boundary.holds() {
             None
@@ -225,6 +226,7 @@ impl<'m> Condensation<'m> {
                 row.iter().filter_map(inside).collect()
             })
             .collect();
+        // Z = K_ii⁻¹ Gᵀ and the Schur complement S = G Z.
         let mut Z = DMatrix::zeros(self.solved.len(), m);
         for (k, row) in rows.iter().enumerate() {
             for (at, weight) in row {
@@ -263,6 +265,7 @@ impl<'m> Condensation<'m> {
             fill_others(&mut F.rows, &self.solved);
             return DMatrix::zeros(0, width);
         };
+        // y = K_ii⁻¹ F, its constraint gap G y - g, and λ from the small system.
         let mut y = Block { rows: self.solved.iter().map(|dof| F.rows[*dof as usize]).collect(), width };
         self.factor.solve_block(&mut y);
         let m = saddle.rows.len();
@@ -278,6 +281,7 @@ impl<'m> Condensation<'m> {
         if !saddle.small.solve_mut(&mut right) {
             right.fill(f64::NAN);
         }
+        // u = y - Z λ, plus the rigid motion of an unsupported mesh.
         let forces = right.rows(0, m).into_owned();
         subtract_products(&mut y, &saddle.Z, &forces);
         self.solved.iter().zip(&y.rows).for_each(|(dof, y)| F.rows[*dof as usize] = *y);

@@ -118,6 +118,7 @@ impl Basis {
             beside.X = std::mem::take(&mut beside.X).resize(old + width, columns, 0.0);
             beside.X.rows_mut(old, width).copy_from(&MV.gram(T));
         }
+        // Recurrence: W = K⁻¹ M V_j - V_{j-1} R_jᵀ - V_j A_j.
         let mut W = MV.clone();
         (pencil.solve)(&mut W);
         self.solves += width;
@@ -136,6 +137,7 @@ impl Basis {
         let old = self.len();
         A += C.rows(old, width);
 
+        // Append A_j to the diagonal of H and R_j beside it.
         let mut H = DMatrix::zeros(old + width, old + width);
         H.view_mut((0, 0), (old, old)).copy_from(&self.projected);
         H.view_mut((old, old), (width, width)).copy_from(&((&A + A.transpose()) * 0.5));
@@ -167,6 +169,7 @@ impl Basis {
         if G.iter().any(|x| !x.is_finite()) {
             return Err(ModesError::NotFinite);
         }
+        // At the start: drop directions that K⁻¹ M maps to rounding.
         let most = sizes2.iter().enumerate().map(|(k, size2)| G[(k, k)] / size2).fold(0.0, f64::max);
         for (k, size2) in sizes2.iter().enumerate() {
             if G[(k, k)] <= VANISHED.powi(2) * most * size2 {
@@ -183,6 +186,7 @@ impl Basis {
             self.mass_newest = self.newest.clone();
             return Ok(());
         }
+        // First pass: W Q. Then, for a nearly dependent block, reorthogonalise against the basis.
         let near_dependent = (smallest < NEAR_DEPENDENT).then(|| MW.clone());
         W.multiply(&Q);
         MW.multiply(&Q);
@@ -192,6 +196,7 @@ impl Basis {
             subtract_products(&mut W, &self.blocks, &C);
             (pencil.mass)(&W, &mut MW);
         }
+        // Second pass (Cholesky) for orthonormality to rounding; R follows from both factors.
         let second = W.gram(&MW);
         let Some(L) = ((&second + second.transpose()) * 0.5).cholesky() else {
             return Err(ModesError::NotFinite);

@@ -28,6 +28,7 @@ impl Basis {
         let beside = self.beside.as_ref()?;
         let (X, G, C) = (&beside.X, &beside.G, released.C);
         let (n, w) = X.shape();
+        // P = [V T]ᵀ M K_r⁻¹ M [V T]
         let mut P = DMatrix::zeros(n + w, n + w);
         P.view_mut((0, 0), (n, n)).copy_from(&(&self.projected + X * C * X.transpose()));
         let mut P_VT = X * C * G;
@@ -37,6 +38,7 @@ impl Basis {
         P.view_mut((n, 0), (w, n)).copy_from(&P_VT.transpose());
         P.view_mut((n, n), (w, w)).copy_from(&(&beside.S + G * C * G));
 
+        // Columns of B: the orthonormal basis [V T'] in terms of [V T]; H = Bᵀ P B.
         let (Q, _) = orthonormalising(&(G - X.transpose() * X), 0.0);
         let extra = Q.ncols();
         let mut B = DMatrix::identity(n + w, n + extra);
