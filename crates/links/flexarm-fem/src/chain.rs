@@ -47,7 +47,7 @@ pub struct Chain {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ChainError {
-    /// Fewer than two parts.
+    /// Fewer than two parts were requested.
     #[error("a chain needs at least two parts, not {parts}")]
     TooFewParts {
         /// Requested number of parts.
