@@ -1,7 +1,7 @@
-//! What a reduction costs, phase by phase:
-//! `cargo run --release -p flexarm-fem --example reduction_cost -- MESH UNITS A B [MODES]`.
+//! Prints the cost of a reduction, phase by phase:
+//! `cargo run --release -p flexarm-fe-io --example reduction_cost -- MESH UNITS A B [MODES]`.
 //!
-//! `A` and `B` are node sets of the mesh; both are tied rigidly at the mean of their nodes.
+//! `A` and `B` are node sets of the mesh; each is tied rigidly to a frame at the mean of its nodes.
 #![allow(
     clippy::print_stdout,
     clippy::unwrap_used,

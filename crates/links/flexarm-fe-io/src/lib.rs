@@ -1,4 +1,4 @@
-//! Files of other finite element programs: meshes ([`mesh`]) and condensed or full matrices
+//! Reads files of other finite element programs: meshes ([`mesh`]) and condensed or full matrices
 //! ([`exchange`]).
 //!
 //! ```
@@ -10,15 +10,15 @@
 //! let mesh = parse_mesh(deck.as_bytes(), "one.inp", &options)?.mesh;
 //! assert_eq!((mesh.nodes[1].x, mesh.blocks[0].kind.name()), (0.1, "TET4"));
 //!
-//! // What is wrong with a file is said with its place.
+//! // Errors give their position in the file.
 //! let error = parse_mesh(deck.replace(",4\n", ",9\n").as_bytes(), "one.inp", &options).unwrap_err();
 //! assert!(error.to_string().contains("one.inp"), "{error}");
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Everything ends in types of [`flexarm_fem`]: a [`Mesh`](flexarm_fem::Mesh) in SI, matrices over
-//! interfaces, a [`ModalLink`](flexarm_fem::ModalLink) from Standard Input Data. Packed files are
-//! unpacked no further than a real file would go.
+//! All results are types of [`flexarm_fem`]: a [`Mesh`](flexarm_fem::Mesh) in SI, matrices over
+//! interfaces, a [`ModalLink`](flexarm_fem::ModalLink) from Standard Input Data. Compressed files
+//! are unpacked only up to the size that a real file would have.
 //!
 //! Not here: elements, reduction, the checks of a stiffness, the `.flex` file.
 #![allow(non_snake_case, reason = "monogram notation: X_LB is the pose of B in L, K_BB a stiffness block")]

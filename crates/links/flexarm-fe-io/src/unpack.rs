@@ -1,27 +1,27 @@
-//! Packed files into memory, no further than a real file would go: a few kilobytes of gzip can
-//! unpack to gigabytes.
+//! Unpacks compressed files into memory with a size limit: a few kilobytes of gzip can expand to
+//! gigabytes.
 
 use std::io::Read;
 
 use flate2::read::MultiGzDecoder;
 
-/// What any packed file may unpack to (bytes).
+/// Unpacked size that is always allowed, bytes.
 const ALWAYS_UNPACKED: u64 = 64 << 20;
-/// Beyond that, so many times its packed size: meshes and matrices written as text pack 3 to 30
+/// Maximum ratio of unpacked to packed size above that; text meshes and matrices compress 3 to 30
 /// times.
 const LARGEST_RATIO: u64 = 50;
 
-/// Whether the bytes are packed with gzip.
+/// Whether the bytes are compressed with gzip.
 pub(crate) fn is_gzip(bytes: &[u8]) -> bool {
     bytes.starts_with(&[0x1f, 0x8b])
 }
 
-/// What packed bytes may unpack to, at most `largest`.
+/// Maximum allowed unpacked size of packed bytes, at most `largest`.
 pub(crate) fn allowed_unpacked(packed: usize, largest: u64) -> u64 {
     ALWAYS_UNPACKED.max(LARGEST_RATIO.saturating_mul(packed as u64)).min(largest)
 }
 
-/// Why packed bytes were not unpacked: what was found, what was expected, how to mend it.
+/// Unpacking error: what was found, what was expected, and a hint for a correction.
 pub(crate) struct NotUnpacked {
     pub(crate) too_large: bool,
     pub(crate) found: String,
@@ -29,7 +29,7 @@ pub(crate) struct NotUnpacked {
     pub(crate) help: &'static str,
 }
 
-/// Unpacks gzip, at most to `largest` bytes and no more than a sound file of this size holds.
+/// Unpacks gzip, up to `largest` bytes and the size that is plausible for the packed size.
 pub(crate) fn unpacked(packed: &[u8], largest: u64) -> Result<Vec<u8>, NotUnpacked> {
     let allowed = allowed_unpacked(packed.len(), largest);
     let mut bytes = Vec::new();
@@ -53,11 +53,11 @@ pub(crate) fn unpacked(packed: &[u8], largest: u64) -> Result<Vec<u8>, NotUnpack
     Ok(bytes)
 }
 
-/// What bytes packed with gzip hold; no more than a sound file of this size does.
+/// Unpacks gzip bytes, up to the size that is plausible for the packed size.
 ///
 /// # Errors
-/// A sentence about what was found and expected: bytes that are not packed, cut off, or that unpack
-/// to far more than real files.
+/// A message with what was found and expected, if the bytes are not gzip, truncated, or expand to
+/// far more than real files.
 pub fn unpack_gzip(packed: &[u8]) -> Result<Vec<u8>, String> {
     unpacked(packed, u64::MAX).map_err(|why| format!("{}, expected {}: {}", why.found, why.expected, why.help))
 }
@@ -83,7 +83,7 @@ mod tests {
         assert!(!unpacked(&bytes[..bytes.len() / 2], 100_000).err().unwrap().too_large);
     }
 
-    /// 1000 to 1, as no mesh packs: 71 MB of blanks in 71 kB.
+    /// Ratio 1000 to 1, beyond any mesh: 71 MB of blanks in 71 kB.
     #[test]
     fn a_ratio_that_no_mesh_has_is_refused_beyond_64_megabytes() {
         let bytes = packed(&vec![b' '; 71 << 20]);

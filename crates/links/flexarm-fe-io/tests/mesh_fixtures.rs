@@ -1,5 +1,5 @@
 //! One small mesh in every layout that Gmsh writes (`data/three_blocks.*`, made by
-//! `tools/make_mesh_fixtures.py`), and in those that it does not write on this machine.
+//! `tools/make_mesh_fixtures.py`), and in layouts that it does not write on this platform.
 
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 
@@ -22,7 +22,7 @@ fn read(bytes: &[u8]) -> MeshFile {
     parse_mesh(bytes, "three_blocks", &ReadOptions::default()).unwrap()
 }
 
-/// Corners between which the mid-side nodes lie, in the order that `ElementKind` documents.
+/// Corners of the edges of the mid-side nodes, in the order that `ElementKind` documents.
 fn edges(kind: ElementKind) -> &'static [[usize; 2]] {
     match kind {
         ElementKind::Tet10 => &[[1, 2], [2, 3], [3, 1], [1, 4], [2, 4], [3, 4]],
@@ -34,7 +34,7 @@ fn edges(kind: ElementKind) -> &'static [[usize; 2]] {
     }
 }
 
-/// Elements with the numbers of their nodes, whatever the order of nodes in the file.
+/// Elements with their node numbers, independent of the order of nodes in the file.
 fn by_number(mesh: &Mesh) -> BTreeSet<(String, u64, Vec<u64>)> {
     let mut all = BTreeSet::new();
     for block in &mesh.blocks {
@@ -46,7 +46,7 @@ fn by_number(mesh: &Mesh) -> BTreeSet<(String, u64, Vec<u64>)> {
     all
 }
 
-/// Volume inside the triangles of the skin (divergence theorem), for one region or all.
+/// Volume enclosed by the triangles of the skin (divergence theorem).
 fn volume(mesh: &Mesh) -> f64 {
     let p = |node: u32| mesh.nodes[node as usize];
     skin(mesh).triangles().iter().map(|[a, b, c]| p(*a).dot(&p(*b).cross(&p(*c))) / 6.0).sum()
@@ -112,7 +112,7 @@ fn the_skin_encloses_the_volume_and_has_no_hole() {
             *edges.entry((a, b)).or_insert(0) += 1;
         }
     }
-    // Every edge is run along once in each direction.
+    // Every edge is traversed once in each direction.
     assert!(edges.iter().all(|((a, b), count)| *count == 1 && edges.get(&(*b, *a)) == Some(&1)));
 }
 
@@ -144,8 +144,8 @@ fn lengths_are_converted_with_the_named_units() {
     assert!(small.nodes.iter().zip(&large.nodes).all(|(a, b)| (a - b * 1e-3).norm() < 1e-18));
 }
 
-/// Rewrites the numbers of a text file of version 4.1 as bytes of either order, `size_t` of 4 or 8
-/// bytes.
+/// Converts the numbers of a text file of version 4.1 to binary of either byte order, with `size_t`
+/// of 4 or 8 bytes.
 fn as_binary(text: &[u8], big_endian: bool, size: usize) -> Vec<u8> {
     let mut words = std::str::from_utf8(text).unwrap().split_ascii_whitespace();
     let mut out = Vec::new();
@@ -279,7 +279,7 @@ fn a_count_that_the_file_cannot_hold_is_refused_before_memory_is_taken() {
     assert!(error.to_string().contains("900000000000000"), "{error}");
 }
 
-/// Whatever is read must keep the promises of `Mesh`, and what works on it must not stop.
+/// Any mesh that is read must satisfy the invariants of `Mesh`, and functions on it must not panic.
 fn check_if_read(bytes: &[u8]) -> Result<(), TestCaseError> {
     let Ok(MeshFile { mesh, .. }) = parse_mesh(bytes, "fuzz", &ReadOptions::default()) else { return Ok(()) };
     let nodes = mesh.nodes.len();

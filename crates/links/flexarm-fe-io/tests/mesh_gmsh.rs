@@ -1,4 +1,4 @@
-//! Gmsh files by hand: groups, beams, and what is refused with which advice.
+//! Hand-written Gmsh files: groups, beams, and rejected input with its advice.
 
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 
@@ -8,10 +8,10 @@ use flexarm_fem::mesh::BeamProperties;
 use flexarm_fem::{BeamTheory, ElementKind, Section};
 use nalgebra::Vector3;
 
-/// Five nodes: a unit tetrahedron and one point more.
+/// Five nodes: a unit tetrahedron and one further point.
 const NODES: &str = "$Nodes\n5\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n5 1 1 1\n$EndNodes\n";
 
-/// A file of version 2.2 with given names and elements.
+/// A file of version 2.2 with the given names and elements.
 fn msh2(names: &str, elements: &[&str]) -> String {
     let names = match names.lines().count() {
         0 => String::new(),
@@ -131,7 +131,7 @@ fn impossible_nodes_are_refused_with_their_line() {
         let error = read(&good.replacen(from, to, 1)).unwrap_err();
         assert_eq!((error.kind, error.place), (kind, Place::Line(line)), "{error}");
     }
-    // Fortran's exponents and windows' ends of lines do no harm.
+    // Fortran exponents and Windows line ends are accepted.
     let odd = good.replacen("3 0 1 0", "3 0 1.0D+00 0", 1).replace('\n', "\r\n");
     assert_eq!(read(&odd).unwrap().mesh, read(&good).unwrap().mesh);
 }
@@ -167,7 +167,7 @@ fn an_entity_in_two_physical_volumes_is_refused_with_both_names() {
     let error = read(text).unwrap_err();
     assert_eq!(error.kind, Kind::Region);
     assert!(error.to_string().contains("\"body\" and \"rib\""), "{error}");
-    // In one group it is read, and the parameters of its nodes are passed over.
+    // In one group it is read, and the parameters of its nodes are ignored.
     let mesh = read(&text.replace("1 1 1 2 1 -2 0", "1 1 1 1 -2 0")).unwrap().mesh;
     assert_eq!((mesh.regions[0].name.as_str(), mesh.nodes[3]), ("rib", Vector3::z()));
 }

@@ -1,4 +1,5 @@
-//! CalculiX and Abaqus decks by hand: cards, sets, sections, and what is refused with which advice.
+//! Hand-written CalculiX and Abaqus decks: cards, sets, sections, and rejected input with its
+//! advice.
 
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 
@@ -8,7 +9,7 @@ use flexarm_fem::mesh::BeamProperties;
 use flexarm_fem::{BeamTheory, ElementKind, Section};
 use nalgebra::Vector3;
 
-/// A unit cube and, on top of it, a tetrahedron; nodes 1 to 9.
+/// A unit cube with a tetrahedron on top; nodes 1 to 9.
 const NODES: &str =
     "*NODE, NSET=Nall\n1, 0,0,0\n2, 1,0,0\n3, 1,1,0\n4, 0,1,0\n5, 0,0,1\n6, 1,0,1\n7, 1,1,1\n8, 0,1,1\n9, .2,.2,2\n";
 const CUBE: &str = "*ELEMENT, TYPE=C3D8, ELSET=cube\n1, 1,2,3,4,5,6,7,8\n";
@@ -58,7 +59,7 @@ fn sets_that_contain_each_other_over_and_over_are_resolved_all_the_same() {
     sets += "*NSET, NSET=s0\ns299, 2\n";
     assert_eq!(cube_and(&sets).unwrap().mesh.node_sets["s100"], [0, 1]);
 
-    // So deep that the work would grow without measure: refused at once.
+    // Nesting so deep that the work would grow without bound is rejected at once.
     let deep: String = (1..100_000).map(|k| format!("*NSET, NSET=s{k}\ns{}\n", k - 1)).collect();
     assert_eq!(cube_and(&format!("*NSET, NSET=s0\n1\n{deep}")).unwrap_err().kind, Kind::TooLarge);
 }
@@ -167,7 +168,7 @@ fn one_instance_in_place_is_a_flat_deck_and_more_are_refused() {
     let rest = "*Node\n1, 5,5,5\n*Nset, nset=A, instance=P-1\n2, 3\n*Nset, nset=RP\n1\n*Nset, nset=B\nP-1.A, P-1.7\n*End Assembly\n";
     let file = read(&format!("{part}*Instance, name=P-1, part=P\n*End Instance\n{rest}")).unwrap();
     let sets = &file.mesh.node_sets;
-    // The assembly's own set keeps the name, its reference points are no nodes of the mesh.
+    // The set of the assembly keeps its name; its reference points are not nodes of the mesh.
     assert_eq!((&sets["A"][..], &sets["part.A"][..]), (&[1, 2][..], &[0][..]));
     assert!(!sets.contains_key("RP") && file.mesh.nodes.len() == 9);
     assert_eq!(sets["B"], [1, 2, 6]);

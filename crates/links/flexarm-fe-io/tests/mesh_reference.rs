@@ -1,5 +1,5 @@
-//! Meshes of the reference cases, made and used by other programs; skipped where they are not at
-//! hand.
+//! Meshes of the reference cases, made and used by other programs; skipped if they are not
+//! available.
 
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(clippy::print_stdout, reason = "a skipped test says so")]
@@ -11,7 +11,7 @@ use flexarm_fe_io::mesh::{ReadOptions, read_mesh};
 use flexarm_fem::mesh::{Mesh, connected_parts, select, skin};
 use flexarm_fem::{ElementKind, Material};
 
-/// A file of the shared folder: `FLEXARM_SHARED`, or `shared` beside a folder above this crate.
+/// A file of the shared folder: `FLEXARM_SHARED`, or `shared` next to a folder above this crate.
 fn shared(file: &str) -> Option<PathBuf> {
     let above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().map(|folder| folder.join("shared"));
     let folder = std::env::var_os("FLEXARM_SHARED").map(PathBuf::from);
@@ -26,20 +26,20 @@ fn read(path: &Path) -> MeshFile {
     read_mesh(path, &ReadOptions::default()).unwrap()
 }
 
-/// Divergence theorem over the triangles of the skin.
+/// Volume by the divergence theorem over the triangles of the skin.
 fn volume(mesh: &Mesh) -> f64 {
     let p = |node: u32| mesh.nodes[node as usize];
     skin(mesh).triangles().iter().map(|[a, b, c]| p(*a).dot(&p(*b).cross(&p(*c))) / 6.0).sum()
 }
 
-/// Reads the three formats of a mesh and checks that they say the same; returns the deck's mesh.
+/// Reads the three formats of a mesh and checks that they agree; returns the mesh of the deck.
 fn same_in_all_formats(stem: &str, nodes: usize, elements: usize, interfaces: [usize; 2]) -> Option<Mesh> {
     let [v22, v41, deck] = ["_v22.msh.gz", "_v41.msh.gz", ".inp.gz"].map(|end| shared(&format!("{stem}{end}")));
     let (v22, v41, deck) = (read(&v22?).mesh, read(&v41?).mesh, read(&deck?).mesh);
     assert_eq!((v22.nodes.len(), v22.element_count()), (nodes, elements));
     assert_eq!(v41, v22);
 
-    // The deck has four reference nodes at the end, its nodes have twelve digits.
+    // The deck has four reference nodes at the end, and its nodes have twelve digits.
     assert_eq!(deck.node_ids[..nodes], v22.node_ids);
     assert!(deck.nodes.iter().zip(&v22.nodes).all(|(a, b)| (a - b).norm() < 1e-11));
     assert_eq!(deck.blocks.len(), 1);
@@ -71,7 +71,7 @@ fn the_arm_of_tetrahedra_is_the_same_in_three_formats() {
     let rim = "interface_a & cylinder(0,0,0; 0,1,0; 0.165; 1e-5)".parse().unwrap();
     assert!(select(&mesh, &rim, 1.0).unwrap().len() > 10);
 
-    // CalculiX's mass matrix: unit acceleration of both interfaces along x.
+    // Mass matrix of CalculiX: unit acceleration of both interfaces along x.
     let Some(matrix) = shared("A2_lower_arm/arm_tet10_h30mm_ccx_M12.mtx") else { return };
     let text = std::fs::read_to_string(matrix).unwrap();
     let mut lines = text.lines().filter(|line| !line.starts_with('%'));

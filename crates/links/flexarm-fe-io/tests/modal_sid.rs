@@ -1,4 +1,4 @@
-//! Modal links through Standard Input Data and back.
+//! Conversion of modal links to Standard Input Data and back.
 #![allow(non_snake_case, reason = "monogram notation, as in the crate")]
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(clippy::print_stderr, reason = "measured errors, shown with --nocapture")]
@@ -35,7 +35,7 @@ fn a_modal_link_survives_standard_input_data() {
     assert!(P < 1e-12 && N < 1e-12, "{P:.1e} {N:.1e}"); // measured 7e-17, 1.1e-15
     assert_eq!(ModalLink { P: link.P.clone(), N: link.N.clone(), ..back }, link);
 
-    // Without the blocks of its own the stiffening comes from where the standard has it, but for
+    // Without flexarm's own blocks the stiffening comes from the places of the standard, except for
     // the centrifugal part.
     let mut plain = read.clone();
     plain.others.clear();
@@ -52,7 +52,7 @@ fn a_modal_link_survives_standard_input_data() {
     eprintln!("stiffening {gaps:?}");
     assert!(gaps.iter().all(|gap| *gap < 1e-12), "{gaps:?}"); // measured 1e-17
 
-    // What cannot be a modal link is refused by name.
+    // Data that cannot be a modal link is rejected.
     let mut stressed = read.clone();
     stressed.ksigma = SidMatrix::constant(n, &DMatrix::from_element(n, 1, 1.0));
     assert_eq!(modal_link_from_sid("arm", &stressed).unwrap_err().kind, ExchangeErrorKind::Unsupported);
@@ -67,8 +67,8 @@ fn a_modal_link_survives_standard_input_data() {
     assert_eq!(modal_link_from_sid("arm", &skewed).unwrap_err().kind, ExchangeErrorKind::Defective);
 }
 
-/// Identity: metres or millimetres, it is the same body; with stiffening, without, and with terms
-/// of first order only.
+/// Identity: in metres or millimetres it is the same body; with stiffening, without, and with
+/// first-order terms only.
 #[test]
 fn a_modal_link_in_other_units_is_the_same_body() {
     let full = turned().modal_with(&ModalOptions { modes: 5, geometric: true, ..ModalOptions::default() }).unwrap();
@@ -98,18 +98,18 @@ fn a_modal_link_in_other_units_is_the_same_body() {
     }
 }
 
-/// Identity: data in a frame that drifts with the shapes, whose file says how A moves in it, give
-/// the link held at A.
+/// Identity: data in a frame that moves with the shapes, with the motion of A in the file, give the
+/// link clamped at A.
 #[test]
 fn data_in_any_frame_give_the_link_held_at_a() {
     let link = turned().modal_with(&ModalOptions { modes: 5, ..ModalOptions::default() }).unwrap();
     let (n, lever) = (link.coordinates(), link.inertia.amax().sqrt());
-    // Motions in proportion to the shapes, so that all terms count.
+    // Motions proportional to the shapes, so that all terms matter.
     let size = |k: usize| (link.M[(k, k)] / link.mass).sqrt();
     let motion = Matrix6xX::from_fn(n, |r, k| 0.5 * size(k) * ((7 * r + 3 * k) as f64).sin());
     let adrift = link.clone().without_rigid_motion(&-&motion);
 
-    // The file of the drifting frame says how A moves in it.
+    // The file of the moving frame contains the motion of A.
     let mut sid = sid_of_modal_link(&adrift);
     let p = link.X_LA.translation.vector;
     let at_A = |k: usize| {

@@ -1,7 +1,8 @@
-//! The reducer against two independent FE codes on the same meshes.
+//! Reductions against two independent FE codes on the same meshes.
 //!
 //! Truth: CalculiX 2.20 matrices (4-point rule for stiffness and mass of C3D10), condensed, and the
-//! frequencies of CalculiX; stored outside the project, so these tests say "skipped" without them.
+//! frequencies of CalculiX. They are stored outside the project; without them these tests print
+//! "skipped".
 
 #![allow(non_snake_case, reason = "K, M as in the theory")]
 #![allow(
@@ -30,7 +31,7 @@ fn reference(name: &str) -> Option<PathBuf> {
     found
 }
 
-/// A dense Matrix Market file, `coordinate symmetric` or `array`.
+/// Reads a dense Matrix Market file, `coordinate symmetric` or `array`.
 fn matrix(name: &str) -> Option<DMatrix<f64>> {
     let text = std::fs::read_to_string(reference(name)?).unwrap();
     let coordinate = text.lines().next().unwrap().contains("coordinate");
@@ -54,7 +55,7 @@ fn matrix(name: &str) -> Option<DMatrix<f64>> {
     Some(A)
 }
 
-/// Largest difference of entries over `sqrt(d_i d_j)`.
+/// Maximum difference of entries relative to `sqrt(d_i d_j)`.
 fn difference(A: &DMatrix<f64>, B: &DMatrix<f64>) -> f64 {
     let d = B.diagonal().map(f64::sqrt);
     (0..A.nrows())
@@ -136,7 +137,7 @@ impl Case {
             matrix(&format!("{}_CB22_K.mtx", self.matrices)).unwrap(),
             matrix(&format!("{}_CB22_M.mtx", self.matrices)).unwrap(),
         );
-        // A mode has no sign of its own.
+        // The sign of a mode is arbitrary.
         for k in 12..22 {
             let dot: f64 = (0..12).map(|i| element.M[(i, k)] * M[(i, k)] / M[(i, i)]).sum();
             if dot < 0.0 {
@@ -161,7 +162,8 @@ fn beam_of_tetrahedra_equals_calculix() {
     BEAM_TET.agrees_with_calculix(1e-8); // measured 6.0e-10
 }
 
-/// The stored matrix of this case is itself off by 3.2e-8 under rigid motion: printed digits.
+/// The stored matrix of this case is itself off by 3.2e-8 under rigid motion, because of its
+/// printed digits.
 #[test]
 fn beam_of_bricks_equals_calculix_to_the_digits_of_its_matrix() {
     BEAM_HEX.agrees_with_calculix(5e-8); // measured 3.3e-8
@@ -207,7 +209,7 @@ fn frequencies_of_the_beam_are_those_of_two_other_codes() {
     }
 }
 
-/// What the choice of quadrature means on a curved casting; exact is the default.
+/// Effect of the quadrature on a curved casting; exact is the default.
 #[test]
 fn four_points_on_curved_elements_differ_by_a_ten_thousandth_from_exact_quadrature() {
     let Some(mesh) = ARM.read() else { return };

@@ -1,12 +1,14 @@
-//! Straight uniform beam in closed form: stiffness, compliance, consistent mass, mass of a piece.
+//! Closed-form stiffness, compliance, consistent mass and partial mass of a straight uniform beam.
 //!
-//! Beam axes E: origin at the proximal end A, x along the beam to B, y and z the principal axes of
-//! the section. Components `u_x u_y u_z theta_x theta_y theta_z`, A before B. The static matrices
-//! are exact for loads at the two ends, so one element is enough whatever the length.
+//! Beam axes E: origin at the proximal end A, x along the beam to B, y and z along the principal
+//! axes of the section. Displacements are ordered `u_x u_y u_z theta_x theta_y theta_z`, A before
+//! B. The static matrices are exact for loads at the two ends, so one element is enough for any
+//! length.
 //!
-//! Signs: `theta_z = dv/dx` for the deflection v along y, but `theta_y = -dw/dx` for w along z.
+//! Signs: `theta_z = dv/dx` for the deflection v along y, but `theta_y = -dw/dx` for the deflection
+//! w along z.
 //!
-//! Not here: distributed loads, buckling, offsets from beam to joint ([`crate::BeamLink`]).
+//! Not here: distributed loads, buckling, offsets between beam and joint ([`crate::BeamLink`]).
 
 use flexarm_spatial::Matrix12;
 use nalgebra::{Matrix3, Matrix4, Matrix6, SMatrix, Vector3, Vector4};
@@ -16,11 +18,11 @@ use crate::error::{FemError, positive};
 use crate::rigid_part::RigidPart;
 use crate::section::Bar;
 
-/// Whether a beam yields to shear.
+/// Beam theory: with or without shear deformation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BeamTheory {
-    /// No shear deformation: slender beams.
+    /// Without shear deformation; for slender beams.
     EulerBernoulli,
     /// With shear deformation `F l/(kGA)`.
     #[default]
@@ -28,7 +30,7 @@ pub enum BeamTheory {
 }
 
 impl BeamTheory {
-    /// The name that files use.
+    /// Name used in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::EulerBernoulli => "euler-bernoulli",
@@ -47,24 +49,24 @@ pub struct Beam {
     shear_z: f64,
 }
 
-/// One bending plane: where its deflection and rotation stand, and the sign of the rotation.
+/// One bending plane: rows of its deflection and rotation, and the sign of the rotation.
 struct Plane {
     /// Row numbers of the deflection and the rotation at A, then at B.
     rows: [usize; 4],
     /// `theta = sign * d(deflection)/dx`.
     sign: f64,
     EI: f64,
-    /// Second mass moment per length, kg·m.
+    /// Rotary inertia of the section per length, kg·m.
     rotary: f64,
     /// Ratio of shear to bending compliance, `12 EI/(kGA l²)`.
     phi: f64,
 }
 
 impl Beam {
-    /// Beam of the given length in m.
+    /// Creates a beam of the given length in m.
     ///
     /// # Errors
-    /// [`FemError::OutOfRange`] for the length or a value of the bar; [`FemError::Missing`] where
+    /// [`FemError::OutOfRange`] for an invalid length or value of the bar; [`FemError::Missing`] if
     /// Timoshenko's theory lacks a shear stiffness.
     pub fn new(bar: Bar, theory: BeamTheory, length: f64) -> Result<Self, FemError> {
         bar.check()?;
@@ -84,7 +86,7 @@ impl Beam {
         })
     }
 
-    /// Length from A to B, m.
+    /// Distance from A to B, m.
     pub fn length(&self) -> f64 {
         self.length
     }
@@ -105,12 +107,13 @@ impl Beam {
         ]
     }
 
-    /// Stiffness of both ends, 12×12, beam axes.
+    /// Stiffness matrix of both ends, 12×12, beam axes.
     ///
     /// ```text
     /// F = K [u_A; u_B]
     /// ```
-    /// (N/m, N/rad; N·m/m, N·m/rad), exactly symmetric, with the six rigid motions as null space.
+    /// Units N/m, N/rad; N·m/m, N·m/rad. Exactly symmetric; its null space is the six rigid
+    /// motions.
     ///
     /// # Source
     /// Przemieniecki (1968), *Theory of Matrix Structural Analysis*, eq. (5.116).
@@ -151,12 +154,12 @@ impl Beam {
         K
     }
 
-    /// Stiffness `K_BB` of the end B with A held, 6×6, at B, beam axes.
+    /// Stiffness `K_BB` of the end B with A clamped, 6×6, at B, beam axes.
     pub fn tip_stiffness(&self) -> Matrix6<f64> {
         self.stiffness12().fixed_view::<6, 6>(6, 6).into_owned()
     }
 
-    /// Compliance `C_BB` of the end B with A held, 6×6, at B, beam axes.
+    /// Compliance `C_BB` of the end B with A clamped, 6×6, at B, beam axes.
     ///
     /// ```text
     /// stretch  F l/EA            bending by a force   F l³/(3EI) + F l/(kGA),   slope F l²/(2EI)
@@ -176,16 +179,16 @@ impl Beam {
         C
     }
 
-    /// Consistent mass of both ends, 12×12, beam axes, with the rotary inertia of the section.
+    /// Consistent mass matrix of both ends, 12×12, beam axes, including the rotary inertia of the
+    /// section.
     ///
     /// ```text
     /// M = ∫ (rho A Nᵀ N + rho I N_thetaᵀ N_theta) dx
     /// ```
-    /// with the static shapes of [`Self::stiffness12`]; (kg, kg·m; kg·m, kg·m²). Exact for rigid
-    /// motions and Guyan's mass for the rest.
+    /// with the static shape functions of [`Self::stiffness12`]; units kg, kg·m; kg·m, kg·m². Exact
+    /// for rigid motions; otherwise equal to the Guyan-reduced mass.
     ///
-    /// # Source
-    /// Shapes: Friedman & Kosmatka (1993), *Computers & Structures* 47(3).
+    /// Shape functions: Friedman & Kosmatka (1993), *Computers & Structures* 47(3).
     pub fn mass12(&self) -> Matrix12 {
         let l = self.length;
         let mut M = Matrix12::zeros();
@@ -214,12 +217,12 @@ impl Beam {
         &self.bar
     }
 
-    /// How the section at `xi = x/l` follows the twelve displacements of the ends.
+    /// Shape functions of the section at `xi = x/l` over the twelve end displacements.
     pub(crate) fn section_at(&self, xi: f64) -> SectionShapes {
         let l = self.length;
         let mut s = SectionShapes::default();
         for (row, target, slope) in [(0, &mut s.u, &mut s.du), (3, &mut s.theta, &mut s.dtheta)] {
-            // Stretch and twist are linear.
+            // Stretch and twist are linear in xi.
             (target[(0, row)], target[(0, row + 6)]) = (1.0 - xi, xi);
             (slope[(0, row)], slope[(0, row + 6)]) = (-1.0 / l, 1.0 / l);
         }
@@ -227,7 +230,8 @@ impl Beam {
             let (N, N_theta) = plane.shapes(xi, l);
             let (dN, dN_theta) = plane.slopes(xi, l);
             let signs = [1.0, plane.sign, 1.0, plane.sign];
-            // Deflection along y turns the section about z, and the other way round.
+            // Deflection along y rotates the section about z, deflection along z rotates it about
+            // y.
             let (along, about) = (plane.rows[0], plane.rows[1] - 3);
             for i in 0..4 {
                 let column = plane.rows[i];
@@ -242,7 +246,8 @@ impl Beam {
 
     /// Mass, centre of mass and inertia of the piece between the fractions `from` and `to`.
     ///
-    /// Uniform bar with the rotary inertia of its section; beam axes, from the end A.
+    /// Treats the piece as a uniform bar with the rotary inertia of its section; beam axes, origin
+    /// at A.
     ///
     /// # Errors
     /// [`FemError::OutOfRange`] unless `0 <= from < to <= 1`.
@@ -272,7 +277,7 @@ impl Beam {
 }
 
 impl Plane {
-    /// Adds a 4×4 in (w, dw/dx) at A and B to the 12×12, with the sign of the rotations.
+    /// Adds a 4×4 matrix over (w, dw/dx) at A and B to the 12×12, with the sign of the rotations.
     fn scatter(&self, k: &Matrix4<f64>, K: &mut Matrix12) {
         let signs = [1.0, self.sign, 1.0, self.sign];
         for i in 0..4 {
@@ -301,7 +306,7 @@ impl Plane {
         (N / (1.0 + phi), N_theta / (1.0 + phi))
     }
 
-    /// Derivatives of [`Self::shapes`] by x, 1/m.
+    /// Derivatives of [`Self::shapes`] with respect to x, 1/m.
     fn slopes(&self, xi: f64, l: f64) -> (Vector4<f64>, Vector4<f64>) {
         let phi = self.phi;
         let x2 = xi * xi;
@@ -321,23 +326,23 @@ impl Plane {
     }
 }
 
-/// Three rows over the twelve displacements of the ends of a beam.
+/// Three rows over the twelve end displacements of a beam.
 pub(crate) type Matrix3x12 = SMatrix<f64, 3, 12>;
 
-/// Motion of one section, beam axes, per displacement of the ends.
+/// Motion of one section per unit end displacement, beam axes.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct SectionShapes {
     /// Displacement of the centre line.
     pub(crate) u: Matrix3x12,
-    /// Its derivative along the beam, 1/m.
+    /// Derivative of `u` along the beam, 1/m.
     pub(crate) du: Matrix3x12,
     /// Rotation of the section.
     pub(crate) theta: Matrix3x12,
-    /// Its derivative along the beam, 1/m.
+    /// Derivative of `theta` along the beam, 1/m.
     pub(crate) dtheta: Matrix3x12,
 }
 
-/// Four Gauss points on [0, 1] with their weights: exact to degree 7, the mass needs 6.
+/// Four Gauss points on [0, 1] with their weights: exact to degree 7; the mass needs degree 6.
 pub(crate) fn gauss4() -> [(f64, f64); 4] {
     let root = (6.0_f64 / 5.0).sqrt();
     let inner = (3.0 / 7.0 - 2.0 / 7.0 * root).sqrt();

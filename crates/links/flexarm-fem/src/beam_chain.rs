@@ -1,8 +1,8 @@
-//! A beam link as n rigid parts in series with n - 1 elastic joints, in closed form.
+//! Closed-form chain of a beam link: n rigid parts in series with n - 1 elastic joints.
 //!
-//! The beam is cut into n - 1 slices of equal length; each joint stands in the middle of its slice
-//! and has the slice's stiffness, each part reaches from joint to joint. The joints add up to the
-//! whole beam for every end wrench.
+//! The beam is cut into n - 1 slices of equal length. Each joint is at the middle of its slice and
+//! has the stiffness of the slice; each part reaches from joint to joint. The joint compliances add
+//! up to that of the whole beam for every end wrench.
 
 use crate::beam::Beam;
 use crate::beam_link::BeamLink;
@@ -12,7 +12,7 @@ use crate::reduced::{ElasticSplit, stiffness_at_split};
 use flexarm_spatial::Pose;
 
 impl BeamLink {
-    /// The beam as a chain of `parts` rigid parts, link axes.
+    /// Splits the beam into a chain of `parts` rigid parts, link axes.
     ///
     /// # Errors
     /// As [`BeamLink::reduce`], and [`FemError::OutOfRange`] for fewer than two parts.
@@ -53,7 +53,7 @@ mod tests {
     use approx::assert_relative_eq;
     use nalgebra::{Vector3, vector};
 
-    /// Truth: the closed-form compliance of the whole beam; measured 2e-13 of its diagonal.
+    /// Truth: closed-form compliance of the whole beam; measured 2e-13 of its diagonal.
     #[test]
     fn joints_of_a_beam_chain_add_up_to_the_beam() {
         let section = Section::Box { width: 0.12, height: 0.08, wall: 0.01 };

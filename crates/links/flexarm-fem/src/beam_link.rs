@@ -1,9 +1,8 @@
 //! A whole link as one beam: from a section, a material and a few frames to a [`ReducedLink`].
 //!
-//! The beam runs along x of its frame E from `X_LE` over `length`; rigid arms tie its two ends to
-//! the joint frames A and B, wherever they are. The link is cut at a fraction of the beam; the
-//! elastic joint sits at the same fraction of the straight line from A to B unless it is put
-//! elsewhere.
+//! The beam runs along x of its frame E, from `X_LE` over `length`. Rigid arms connect its two ends
+//! to the joint frames A and B, wherever they are. The link is cut at a fraction of the beam; the
+//! elastic joint is at the same fraction of the straight line from A to B unless `X_LS` is given.
 //!
 //! ```text
 //! u_E2 = Ad_E2B u_B,    K_BB = Ad_E2Bᵀ K_E2E2 Ad_E2B        E2: distal end of the beam, beam axes
@@ -21,7 +20,7 @@ use crate::reduced::{Provenance, ReducedLink};
 use crate::rigid_part::RigidPart;
 use crate::section::Section;
 
-/// Recipe of a link that is one uniform beam between two joints.
+/// Definition of a link that is one uniform beam between two joints.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BeamLink {
     /// Name of the link.
@@ -30,7 +29,7 @@ pub struct BeamLink {
     pub section: Section,
     /// Material; not used by [`Section::Given`].
     pub material: Material,
-    /// With or without shear deformation.
+    /// Beam theory, with or without shear deformation.
     pub theory: BeamTheory,
     /// Length of the beam, m.
     pub length: f64,
@@ -40,11 +39,11 @@ pub struct BeamLink {
     pub X_LA: Pose,
     /// Distal interface.
     pub X_LB: Pose,
-    /// Where the link is cut, as a fraction of the beam, between 0 and 1.
+    /// Position of the cut as a fraction of the beam, between 0 and 1.
     pub split_fraction: f64,
-    /// Split frame; at `split_fraction` of the line from A to B, in link axes, if not given.
+    /// Split frame; if not given, at `split_fraction` of the line from A to B, in link axes.
     pub X_LS: Option<Pose>,
-    /// Mass of the whole link, kg, spread along the beam; that of the section if not given.
+    /// Mass of the whole link, kg, distributed along the beam; if not given, that of the section.
     pub mass: Option<f64>,
 }
 
@@ -66,12 +65,13 @@ impl BeamLink {
         }
     }
 
-    /// The same beam with joints at the link origin and at `length * axis`, and the beam itself
-    /// parallel to that line.
+    /// Places the joints at the link origin and at `length * axis`, and the beam parallel to that
+    /// line.
     ///
     /// * `axis`: direction of the beam, link axes.
-    /// * `y`: direction of the section's y axis before `roll`; only its part across `axis` counts.
-    /// * `roll`: turn of the section about `axis`, rad.
+    /// * `y`: direction of the section's y axis before `roll`; only its component across `axis`
+    ///   counts.
+    /// * `roll`: rotation of the section about `axis`, rad.
     /// * `offset`: from the joint line to the beam, link axes, m.
     ///
     /// # Errors
@@ -95,12 +95,12 @@ impl BeamLink {
         })
     }
 
-    /// The reduced link, in closed form.
+    /// Reduces the link in closed form.
     ///
     /// # Errors
     /// [`FemError::OutOfRange`] for impossible dimensions, materials, fractions and masses,
     /// [`FemError::Missing`] for a section without shear stiffness in Timoshenko's theory, and the
-    /// gate's errors where levers are so long that the stiffness drowns in rounding.
+    /// errors of the gate if the lever arms are so long that the stiffness is lost in rounding.
     pub fn reduce(&self) -> Result<ReducedLink, FemError> {
         let frames = LinkFrames::new(self.X_LA, self.X_LB);
         let frames = match self.X_LS {
@@ -109,7 +109,7 @@ impl BeamLink {
         };
         let beam = Beam::new(self.section.bar(&self.material)?, self.theory, self.length)?;
 
-        // Stiffness of the distal beam end, carried over the rigid arm to Bo, link axes.
+        // Stiffness of the distal beam end, transferred over the rigid arm to Bo, link axes.
         let X_LE2 = self.X_LE * Pose::translation(self.length, 0.0, 0.0);
         let Ad_E2B = adjoint(&(X_LE2.inverse() * Pose::from(self.X_LB.translation)));
         let K_BB = Ad_E2B.transpose() * beam.tip_stiffness() * Ad_E2B;
@@ -124,7 +124,7 @@ impl BeamLink {
         )
     }
 
-    /// The two halves of the beam; the rigid arms weigh nothing.
+    /// Rigid parts of the two halves of the beam; the rigid arms are massless.
     fn parts(&self, beam: &Beam) -> Result<[RigidPart; 2], FemError> {
         if !(self.split_fraction > 0.0 && self.split_fraction < 1.0) {
             return Err(FemError::OutOfRange {

@@ -1,23 +1,23 @@
 //! A link as n rigid parts in series with n - 1 elastic joints, exact for every end wrench.
 //!
-//! With A held and the end loaded, the link's energy is `½ F_Bᵀ C_BB F_B`. The mesh knows where
-//! that energy sits: element by element it is a sum of 6×6 matrices,
+//! With A clamped and B loaded, the energy of the link is `½ F_Bᵀ C_BB F_B`. On the mesh this
+//! energy is a sum of 6×6 matrices over the elements:
 //!
 //! ```text
 //! C_BB = Σ_e U_eᵀ K_e U_e,       U: displacements under the six unit wrenches at B
 //! E_k  = share of the elements between two planes,   Σ_k E_k = C_BB
 //! C_k  = Ad_{SB} E_k Ad_{SB}ᵀ,   K_k = C_k⁻¹         joint k, at S_k
 //! ```
-//! so the joints add up to the whole link whatever the planes and the mesh are; for a uniform beam
-//! `C_k` is the closed form of its piece. No section is made rigid to get there: segments reduced
-//! as superelements of their own, with tied sections, do not add up: off by per cents
+//! so the joints add up to the whole link for any planes and any mesh; for a uniform beam `C_k` is
+//! the closed form of its slice. No cross section is made rigid. Reducing each segment as its own
+//! superelement with rigidly tied sections does not add up: it is wrong by several per cent
 //! (`segments_as_superelements_of_their_own_do_not_add_up_to_the_link` in the tests of the
 //! reduction).
 //!
-//! An element cut by a plane gives its energy to both sides by volume. The parts are cut at the
-//! joints, so each joint stands in the middle of the material that it replaces.
+//! The energy of an element that a plane cuts is shared between both sides by volume. The parts are
+//! cut at the joints, so each joint is in the middle of the material that it replaces.
 //!
-//! Source: Castigliano's theorem for `C_BB`; the sharing by energy is ours.
+//! Source: Castigliano's theorem for `C_BB`; sharing by energy is our own.
 
 use flexarm_spatial::{Pose, adjoint, skew, symmetric_part};
 use nalgebra::{DMatrix, Matrix3, Matrix6, SMatrix, Vector3, Vector6};
@@ -31,29 +31,29 @@ use crate::reduced::ElasticSplit;
 use crate::reduction::generalised_frequencies;
 use crate::rigid_part::RigidPart;
 
-/// A matrix with one column per unit wrench at B.
+/// 6×6 matrix with one row and one column per unit wrench at B.
 type Loads = SMatrix<f64, 6, 6>;
 
-/// n rigid parts, n - 1 elastic joints, from A to B.
+/// Chain of n rigid parts and n - 1 elastic joints, from A to B.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chain {
     /// Joints, proximal first; poses in the link frame, stiffness in the axes of the joint.
     pub joints: Vec<ElasticSplit>,
-    /// Parts, proximal first; one more than joints.
+    /// Parts, proximal first; one more than there are joints.
     pub parts: Vec<RigidPart>,
 }
 
-/// Why a chain could not be made.
+/// Errors of building a chain.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ChainError {
-    /// Fewer than two parts.
+    /// Fewer than two parts were requested.
     #[error("a chain needs at least two parts, not {parts}")]
     TooFewParts {
-        /// Parts asked for.
+        /// Requested number of parts.
         parts: usize,
     },
-    /// A slice without enough material to be a joint.
+    /// A slice does not contain enough material for an elastic joint.
     #[error(
         "between {from:.4} and {to:.4} of the way from A to B there is too little material for an \
          elastic joint (its compliance is singular); ask for fewer parts, {parts} are too many"
@@ -61,9 +61,9 @@ pub enum ChainError {
     EmptySlice {
         /// Start of the slice, as a fraction of AB.
         from: f64,
-        /// Its end.
+        /// End of the slice, as a fraction of AB.
         to: f64,
-        /// Parts asked for.
+        /// Requested number of parts.
         parts: usize,
     },
     /// The parts could not be cut.
@@ -71,12 +71,12 @@ pub enum ChainError {
     Cut(#[from] CutError),
 }
 
-/// Where each unit load at B leaves its energy along the link.
+/// Distributes the elastic energy of the unit loads at B over the slices of the link.
 ///
-/// * `U`: displacements of all DoF under the six unit wrenches at B, A held.
+/// * `U`: displacements of all DoF under the six unit wrenches at B, A clamped.
 /// * `planes`: n - 1 planes between the n slices, from A to B.
 ///
-/// Returns one 6×6 per slice, m/N ... rad/(N·m), at Bo, link axes; their sum is `C_BB`.
+/// Returns one 6×6 compliance per slice, m/N to rad/(N·m), at Bo, link axes; their sum is `C_BB`.
 ///
 /// # Errors
 /// None: elements were checked when they were assembled.
@@ -110,7 +110,7 @@ pub fn energy_by_slice(
             let Some(K_e) = K_e else { continue };
             let energy = u.transpose() * K_e * &u;
             let energy = Loads::from_fn(|i, j| energy[(i, j)]);
-            // Inverted elements were refused when the model was assembled.
+            // Inverted elements were rejected when the model was assembled.
             let Ok(shares) = volume_fractions(block.kind, &x, planes) else { continue };
             for (slice, share) in slices.iter_mut().zip(shares) {
                 *slice += energy * share;
@@ -120,8 +120,8 @@ pub fn energy_by_slice(
     slices.iter().map(symmetric_part).collect()
 }
 
-/// The centre of compliance: where a symmetric 6×6 compliance at `p_B` couples least, its coupling
-/// block symmetric there. For a straight uniform beam, the middle.
+/// Centre of compliance of a 6×6 compliance given at `p_B`: the point where the coupling block is
+/// symmetric, so that coupling is minimal. For a straight uniform beam this is its middle.
 ///
 /// ```text
 /// C_tr(S) = C_tr(B) - [p_BS]x C_rr,   skew part of C_tr(S) = 0:   three equations for S
@@ -130,29 +130,29 @@ pub fn energy_by_slice(
 pub fn centre_of_compliance(C: &Matrix6<f64>, p_B: &Vector3<f64>) -> Option<Vector3<f64>> {
     let C_tr = C.fixed_view::<3, 3>(0, 3).into_owned();
     let C_rr = C.fixed_view::<3, 3>(3, 3).into_owned();
-    // u_S = u_B + theta x p_BS = u_B - [p]x theta: C_tr(S) = C_tr - [p]x C_rr; axial vectors of
-    // both sides: vee([p]x C_rr - C_rrᵀ [p]xᵀ ...) = (tr(C_rr) 1 - C_rr) p.
+    // u_S = u_B + theta x p_BS = u_B - [p]x theta, so C_tr(S) = C_tr - [p]x C_rr. The axial vector
+    // of [p]x C_rr is (tr(C_rr) 1 - C_rr) p.
     let axial = |A: &Matrix3<f64>| Vector3::new(A[(2, 1)] - A[(1, 2)], A[(0, 2)] - A[(2, 0)], A[(1, 0)] - A[(0, 1)]);
     let matrix = Matrix3::identity() * C_rr.trace() - C_rr;
     matrix.try_inverse().map(|inverse| p_B + inverse * axial(&C_tr))
 }
 
-/// What a chain is cut from.
+/// Inputs for cutting a mesh into a chain.
 #[derive(Debug, Clone, Copy)]
 pub struct ChainSource<'a> {
-    /// The mesh, link axes.
+    /// Mesh, link axes.
     pub mesh: &'a Mesh,
-    /// Its model.
+    /// FE model of the mesh.
     pub model: &'a FeModel,
     /// Material of each region.
     pub materials: &'a [Material],
-    /// Quadrature of the model.
+    /// Quadrature used for the model.
     pub quadrature: Quadrature,
-    /// Displacements under the six unit wrenches at B, A held.
+    /// Displacements under the six unit wrenches at B, A clamped.
     pub U: &'a DMatrix<f64>,
     /// Origin of A, link axes, m.
     pub p_LA: Vector3<f64>,
-    /// Origin of B.
+    /// Origin of B, link axes, m.
     pub p_LB: Vector3<f64>,
 }
 
@@ -162,13 +162,13 @@ impl ChainSource<'_> {
         CutPlane { point: self.p_LA + normal * fraction, normal }
     }
 
-    /// How far along AB a point is, as a fraction.
+    /// Position of a point along AB, as a fraction.
     fn fraction(&self, p: &Vector3<f64>) -> f64 {
         let along = self.p_LB - self.p_LA;
         (p - self.p_LA).dot(&along) / along.norm_squared()
     }
 
-    /// The chain of `parts` parts.
+    /// Splits the mesh into a chain of `parts` parts.
     ///
     /// # Errors
     /// [`ChainError`].
@@ -185,7 +185,8 @@ impl ChainSource<'_> {
         for (k, E) in energies.iter().enumerate() {
             let (from, to) = (bound(k), bound(k + 1));
             let empty = || ChainError::EmptySlice { from, to, parts };
-            // The centre of compliance of the slice, unless a bent link puts it outside.
+            // Centre of compliance of the slice, or its middle if a bent link puts the centre
+            // outside.
             let middle = self.plane((from + to) / 2.0).point;
             let centre = centre_of_compliance(E, &self.p_LB).filter(|p| {
                 let t = self.fraction(p);
@@ -194,7 +195,7 @@ impl ChainSource<'_> {
             let p_LS = centre.unwrap_or(middle);
             let X_LS = Pose::translation(p_LS.x, p_LS.y, p_LS.z);
             let p = self.p_LB - p_LS;
-            // From Bo to So, same axes.
+            // Maps twists from Bo to So, same axes.
             let Ad_SB = adjoint(&Pose::translation(p.x, p.y, p.z));
             let C_S = symmetric_part(&(Ad_SB * E * Ad_SB.transpose()));
             let scale = C_S.diagonal().map(|c| 1.0 / c.sqrt());
@@ -210,13 +211,13 @@ impl ChainSource<'_> {
 }
 
 impl Chain {
-    /// Displacement twist of each part at the link origin per joint coordinate:
-    /// `xi_i = Σ_{k<i} Ad_{LS_k} d_k`.
+    /// Maps from joint coordinates to displacement twists at the link origin:
+    /// `xi_i = Σ_{k<i} Ad_{LS_k} d_k` for part i.
     fn carries(&self) -> Vec<Matrix6<f64>> {
         self.joints.iter().map(|joint| adjoint(&joint.X_LS)).collect()
     }
 
-    /// Compliance at B with A held, link axes: `Σ Ad_{BS} C_S Ad_{BS}ᵀ`.
+    /// Compliance at B with A clamped, link axes: `Σ Ad_{BS} C_S Ad_{BS}ᵀ`.
     pub fn tip_compliance(&self, p_LB: &Vector3<f64>) -> Option<Matrix6<f64>> {
         let mut C = Matrix6::zeros();
         for joint in &self.joints {
@@ -229,7 +230,7 @@ impl Chain {
         Some(C)
     }
 
-    /// Stiffness and mass over the joint coordinates, A held: `K = blkdiag(K_S)`,
+    /// Stiffness and mass over the joint coordinates, A clamped: `K = blkdiag(K_S)`,
     /// `M = Σ J_iᵀ M_i J_i`.
     pub fn held_matrices(&self) -> (DMatrix<f64>, DMatrix<f64>) {
         let (n, carries) = (6 * self.joints.len(), self.carries());
@@ -239,7 +240,7 @@ impl Chain {
         }
         for (a, Ad_a) in carries.iter().enumerate() {
             for (b, Ad_b) in carries.iter().enumerate() {
-                // Both joints move the parts beyond the farther one.
+                // The parts beyond the farther joint are moved by both joints.
                 let beyond = self.parts.iter().skip(a.max(b) + 1);
                 let inertia: Matrix6<f64> = beyond.map(RigidPart::spatial_inertia).sum();
                 M.view_mut((6 * a, 6 * b), (6, 6)).copy_from(&(Ad_a.transpose() * inertia * Ad_b));
@@ -248,17 +249,17 @@ impl Chain {
         (K, M)
     }
 
-    /// Natural frequencies with A held, Hz, ascending.
+    /// Natural frequencies with A clamped, Hz, ascending.
     pub fn held_frequencies_hz(&self) -> Vec<f64> {
         let (K, M) = self.held_matrices();
         generalised_frequencies(&K, &M)
     }
 
-    /// Displacement of B under the link's own weight, A held.
+    /// Static deflection of B under the weight of the link, A clamped.
     ///
     /// * `gravity`: m/s², link axes.
     ///
-    /// Returns the displacement at Bo, link axes.
+    /// Returns the displacement twist at Bo, link axes.
     pub fn sag(&self, p_LB: &Vector3<f64>, gravity: &Vector3<f64>) -> Option<Vector6<f64>> {
         let mut u = Vector6::zeros();
         for (k, joint) in self.joints.iter().enumerate() {

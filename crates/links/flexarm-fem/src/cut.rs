@@ -1,15 +1,15 @@
 //! Mass properties of a mesh, whole and cut into rigid parts by planes.
 //!
-//! Start at [`cut`]; [`mass_properties`] is the case without planes, and [`volume_fractions`] the
-//! share of one element in each part. Planes are in order from the proximal to the distal end,
-//! normals point that way: plane k separates part k from part k + 1, and a point belongs to the
-//! part whose number is the number of planes it lies ahead of. Planes must not meet inside the
+//! Start at [`cut`]. [`mass_properties`] is the case without planes; [`volume_fractions`] is the
+//! share of one element in each part. Planes are ordered from the proximal to the distal end, and
+//! their normals point that way: plane k separates part k from part k + 1, and a point belongs to
+//! the part whose number is the number of planes behind it. Planes must not intersect inside the
 //! body.
 //!
-//! What lies ahead of each plane is integrated; a part is the difference of two of these, so that
-//! the parts add up to the whole. Mesh axes, m, kg.
+//! The material ahead of each plane is integrated; a part is the difference of two such integrals,
+//! so the parts add up to the whole. Mesh axes, m, kg.
 //!
-//! Not here: where to cut; the elastic joint between the parts ([`crate::reduced`]).
+//! Not here: choice of the planes; the elastic joint between the parts ([`crate::reduced`]).
 
 mod moments;
 mod piece;
@@ -24,56 +24,56 @@ use crate::mesh::{ElementKind, Mesh, Region};
 use crate::rigid_part::RigidPart;
 use moments::{Line, Moments};
 
-/// Mass of a part over that of the whole below which the part counts as empty.
+/// Ratio of part mass to total mass below which a part counts as empty.
 const EMPTY: f64 = 1e-9;
 
-/// A plane that cuts a mesh.
+/// Plane that cuts a mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CutPlane {
-    /// A point in the plane, m.
+    /// Any point in the plane, m.
     pub point: Vector3<f64>,
-    /// Normal, from the proximal to the distal side; any length but zero.
+    /// Normal, from the proximal to the distal side; any non-zero length.
     pub normal: Vector3<f64>,
 }
 
-/// Why a mesh was not weighed or cut.
+/// Errors of weighing or cutting a mesh.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CutError {
-    /// No element has mass.
+    /// The mesh has no elements.
     #[error("the mesh has no elements")]
     NoElements,
-    /// Not one density per region.
+    /// The number of densities differs from the number of regions.
     #[error("{found} densities were given for the {expected} regions of the mesh")]
     WrongCount {
-        /// Regions of the mesh.
+        /// Number of regions of the mesh.
         expected: usize,
-        /// Densities.
+        /// Number of densities.
         found: usize,
     },
-    /// A density, section or length that cannot be.
+    /// A density, section or length is out of range.
     #[error("region {region:?}: {source}")]
     Region {
         /// Name of the region.
         region: String,
-        /// What is wrong.
+        /// Cause.
         source: Box<FemError>,
     },
-    /// Beam elements without a section.
+    /// A region has beam elements but no section.
     #[error("region {region:?} has beam elements but no section: give one to the region")]
     NoSection {
         /// Name of the region.
         region: String,
     },
-    /// An element that is inverted.
+    /// An element is inverted.
     #[error("element {element}: {source}")]
     Inverted {
-        /// Its number in the file.
+        /// Number of the element in the file.
         element: u64,
-        /// Where and how much.
+        /// Place and determinant.
         source: InvertedElement,
     },
-    /// A plane without direction or place.
+    /// A plane has no direction, or a point or normal that is not finite.
     #[error("plane {plane} has no direction: its normal is ({}, {}, {})", normal.x, normal.y, normal.z)]
     NoNormal {
         /// Number of the plane, from 0.
@@ -81,7 +81,7 @@ pub enum CutError {
         /// The normal.
         normal: Vector3<f64>,
     },
-    /// A part without material.
+    /// A part contains no material.
     #[error(
         "cut plane {plane} leaves part {part} empty: {mass:.3e} kg of {whole:.3e} kg; does it miss the body, \
          point the other way, or stand in the wrong order?"
@@ -91,14 +91,14 @@ pub enum CutError {
         plane: usize,
         /// Number of the part, from 0.
         part: usize,
-        /// What was found in it, kg; negative if planes are out of order.
+        /// Computed mass of the part, kg; negative if planes are out of order.
         mass: f64,
         /// Mass of the mesh, kg.
         whole: f64,
     },
 }
 
-/// A checked plane: `distance = normal · x - offset`.
+/// Checked plane: `distance = normal · (x - point)`.
 #[derive(Debug, Clone, Copy)]
 struct Plane {
     normal: Vector3<f64>,
@@ -122,10 +122,10 @@ impl Plane {
 
 /// Mass, centre of mass and inertia of a mesh.
 ///
-/// Exact for solids, straight or curved: the integrands are polynomials and so is the rule. Beams
-/// count as lines with the mass and the rotary inertia of their section.
+/// Exact for solids, straight or curved: the integrands are polynomials, and the rule is exact for
+/// their degree. Beams count as lines with the mass and the rotary inertia of their section.
 ///
-/// * `densities`: one per region, kg/m³. A beam section given by its stiffness and mass per length
+/// * `densities`: one per region, kg/m³. A beam section given by stiffness and mass per length
 ///   ([`Section::Given`](crate::Section::Given)) keeps its own mass.
 ///
 /// # Errors
@@ -135,27 +135,27 @@ pub fn mass_properties(mesh: &Mesh, densities: &[f64]) -> Result<RigidPart, CutE
     Ok(whole.rigid_part())
 }
 
-/// The rigid parts into which planes cut a mesh, from the proximal to the distal one.
+/// Cuts a mesh by planes into rigid parts, ordered from proximal to distal.
 ///
-/// Straight tetrahedra, parallelepipeds and prisms are cut exactly, and so is any element in which
-/// the plane is plane in reference coordinates too (a cut across an extruded mesh). In other curved
-/// elements the cut face is replaced by small flat pieces, at most 1/16 of an element wide: the
-/// mass of a part is wrong by less than about 1e-6 of the mass of the elements that the plane
+/// Straight tetrahedra, parallelepipeds and prisms are cut exactly, as is any element in which the
+/// plane is also a plane in reference coordinates (a cut across an extruded mesh). In other curved
+/// elements the cut face is replaced by small flat pieces, at most 1/16 of an element wide; the
+/// mass of a part is then wrong by less than about 1e-6 of the mass of the elements that the plane
 /// crosses (measured 2e-7 with arcs of 45 degrees per element). The parts always add up to the
 /// mesh.
 ///
-/// Beams are cut square to their axis.
+/// Beams are cut perpendicular to their axis.
 ///
 /// * `densities`: as in [`mass_properties`].
 ///
 /// # Errors
-/// [`CutError`]: the input cannot be, an element is inverted, or a part is empty.
+/// [`CutError`] if the input is invalid, an element is inverted, or a part is empty.
 pub fn cut(mesh: &Mesh, densities: &[f64], planes: &[CutPlane]) -> Result<Vec<RigidPart>, CutError> {
     let planes: Vec<Plane> =
         planes.iter().enumerate().map(|(number, plane)| Plane::new(number, plane)).collect::<Result<_, _>>()?;
     let (whole, ahead) = weigh(mesh, densities, &planes)?;
 
-    // Part k: ahead of plane k - 1 and not ahead of plane k.
+    // Part k is ahead of plane k - 1 and not ahead of plane k.
     let mut parts = Vec::with_capacity(planes.len() + 1);
     for part in 0..=planes.len() {
         let mut moments = if part == 0 { whole } else { ahead[part - 1] };
@@ -163,7 +163,7 @@ pub fn cut(mesh: &Mesh, densities: &[f64], planes: &[CutPlane]) -> Result<Vec<Ri
             moments.subtract(beyond);
         }
         if !(moments.mass > EMPTY * whole.mass) {
-            // The last part is bounded by the last plane only.
+            // Only the last plane bounds the last part.
             let plane = part.min(planes.len() - 1);
             return Err(CutError::EmptyPart { plane, part, mass: moments.mass, whole: whole.mass });
         }
@@ -172,12 +172,13 @@ pub fn cut(mesh: &Mesh, densities: &[f64], planes: &[CutPlane]) -> Result<Vec<Ri
     Ok(parts)
 }
 
-/// Share of the volume of an element in each part, `planes.len() + 1` numbers that add up to one.
+/// Share of the volume of an element (of the length for a beam) in each part, `planes.len() + 1`
+/// numbers that add up to one.
 ///
-/// Of the length for a beam. Costs a dot product per node and plane unless a plane crosses.
+/// Costs one dot product per node and plane if no plane crosses the element.
 ///
 /// # Errors
-/// [`InvertedElement`] if it is crossed and inverted.
+/// [`InvertedElement`] if a plane crosses the element and it is inverted.
 ///
 /// # Panics
 /// For a wrong number of nodes.
@@ -212,12 +213,12 @@ pub fn volume_fractions(
     Ok(fractions)
 }
 
-/// Moments of the whole mesh and of what lies ahead of each plane.
+/// Moments of the whole mesh and of the material ahead of each plane.
 fn weigh(mesh: &Mesh, densities: &[f64], planes: &[Plane]) -> Result<(Moments, Vec<Moments>), CutError> {
     if densities.len() != mesh.regions.len() {
         return Err(CutError::WrongCount { expected: mesh.regions.len(), found: densities.len() });
     }
-    // Moments about the middle of the box: numbers of the size of the body, whatever its place.
+    // Moments about the centre of the bounding box keep the numbers at the size of the body.
     let (low, high) = mesh.bounding_box().ok_or(CutError::NoElements)?;
     let origin = (low + high) * 0.5;
     let mut whole = Moments::about(origin);
@@ -262,7 +263,7 @@ fn in_region(region: &Region, source: FemError) -> CutError {
     CutError::Region { region: region.name.clone(), source: Box::new(source) }
 }
 
-/// A beam element as a line with mass.
+/// Creates the line with mass of a beam element.
 fn line(region: &Region, density: f64, x: &[Vector3<f64>]) -> Result<Line, CutError> {
     let beam = region.beam.as_ref().ok_or_else(|| CutError::NoSection { region: region.name.clone() })?;
     Line::new(beam, density, x[0], x[1]).map_err(|source| in_region(region, source))

@@ -1,27 +1,27 @@
-//! What was accepted in a mesh or in matrices, but looks like a mistake.
+//! Warnings: input of a mesh or matrices that was accepted but looks like a mistake.
 
 use std::fmt;
 
-/// A sentence for people, with its number for programs.
+/// Warning: a sentence for the user, with its number for programs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Doubt {
-    /// Short, stable name of its kind, such as `first-order`.
+    /// Short, stable name of the kind of warning, such as `first-order`.
     pub code: &'static str,
-    /// All of it in one sentence.
+    /// Complete message, one sentence.
     pub message: String,
-    /// What was found, if it is a number.
+    /// Measured value, if the warning is about a number.
     pub value: Option<f64>,
-    /// What it is compared with.
+    /// Reference value for comparison.
     pub yardstick: Option<f64>,
 }
 
 impl Doubt {
-    /// A doubt without a number.
+    /// Creates a warning without a number.
     pub fn said(code: &'static str, message: impl Into<String>) -> Self {
         Self { code, message: message.into(), value: None, yardstick: None }
     }
 
-    /// A doubt about a number; yardstick: where it begins.
+    /// Creates a warning about a number; `yardstick` is the value at which the warning starts.
     pub fn found(code: &'static str, value: f64, yardstick: f64, message: impl Into<String>) -> Self {
         Self { code, message: message.into(), value: Some(value), yardstick: Some(yardstick) }
     }

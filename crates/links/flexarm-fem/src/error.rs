@@ -1,76 +1,76 @@
-//! What can be wrong with a beam or with a reduced matrix, with measured and allowed values.
+//! Errors of beams and reduced matrices, with measured and allowed values.
 //!
-//! Errors in the text of a file are [`FlexFileError`](crate::FlexFileError), which carries one of
-//! these as its source where the text is well formed but the link in it cannot be.
+//! Errors in the text of a file are [`FlexFileError`](crate::FlexFileError). It carries one of
+//! these errors as its source if the text is well formed but the link in it is impossible.
 
 use std::fmt;
 
 use nalgebra::Vector3;
 
-/// Names of the six components at an interface, in the order used everywhere.
+/// Names of the six components at an interface, in the order used throughout.
 pub const COMPONENTS: [&str; 6] = ["ux", "uy", "uz", "rx", "ry", "rz"];
 
-/// Why a beam or a reduced link was refused.
+/// Errors of beams and reduced links.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FemError {
-    /// A dimension, a modulus, a mass, ... outside its range.
+    /// A dimension, modulus, mass or similar is out of range.
     #[error("{what} is {found}, allowed is {allowed}")]
     OutOfRange {
-        /// The quantity.
+        /// Name of the quantity.
         what: String,
-        /// Its value.
+        /// Value found.
         found: f64,
-        /// The range it must lie in.
+        /// Allowed range.
         allowed: String,
     },
     /// A quantity that the chosen method needs was not given.
     #[error("{what} is missing: {help}")]
     Missing {
-        /// The quantity.
+        /// Name of the quantity.
         what: &'static str,
-        /// How to mend it.
+        /// Hint for a correction.
         help: &'static str,
     },
-    /// A name that is not in a table of names.
+    /// A name is not in a table of names.
     #[error("{what} {found:?} is not known; known are {known}")]
     UnknownName {
-        /// What was looked up.
+        /// Kind of name.
         what: &'static str,
-        /// The name that was asked for.
+        /// Name that was looked up.
         found: String,
         /// All names of the table.
         known: String,
     },
-    /// A matrix with a NaN or an infinity in it.
+    /// A matrix has a NaN or infinite entry.
     #[error("{what} has a NaN or infinite entry at row {row}, column {column} (counted from 0)")]
     NotFinite {
-        /// The matrix.
+        /// Name of the matrix.
         what: &'static str,
         /// Row of the entry, from 0.
         row: usize,
         /// Column of the entry, from 0.
         column: usize,
     },
-    /// A stiffness that is not symmetric.
+    /// A stiffness matrix is not symmetric.
     #[error(
         "{what} is not symmetric: relative asymmetry {asymmetry:.1e} at ({row}, {column}), allowed \
          {allowed:.1e}; was a row or column lost or two of them swapped, or are these printed with \
          too few digits?"
     )]
     NotSymmetric {
-        /// The matrix.
+        /// Name of the matrix.
         what: &'static str,
         /// `max |k_ij - k_ji| / sqrt(k_ii k_jj)`.
         asymmetry: f64,
-        /// The bound on it.
+        /// Allowed asymmetry.
         allowed: f64,
-        /// Row of the worst pair, from 0.
+        /// Row of the pair with the largest asymmetry, from 0.
         row: usize,
-        /// Column of the worst pair, from 0.
+        /// Column of the pair with the largest asymmetry, from 0.
         column: usize,
     },
-    /// A 12×12 stiffness that resists a motion of both interfaces as one rigid body.
+    /// A 12×12 stiffness resists a rigid motion of both interfaces.
     #[error(
         "the 12x12 stiffness moves under rigid motion: a {motion} of both interfaces gives a \
          relative force {residual:.1e} in {row}, allowed {allowed:.1e}; the interface frames say \
@@ -79,33 +79,33 @@ pub enum FemError {
         implied(implied_p_AB)
     )]
     MovesUnderRigidMotion {
-        /// Largest force over the size of the terms that should cancel in it.
+        /// Maximum force relative to the size of the terms that should cancel in it.
         residual: f64,
-        /// The bound on it.
+        /// Allowed residual.
         allowed: f64,
-        /// The worst rigid motion, such as "rotation about y".
+        /// Rigid motion with the largest residual, such as "rotation about y".
         motion: &'static str,
-        /// The row in which the force appears, such as "A uz".
+        /// Row of the largest residual, such as "A uz".
         row: String,
-        /// From A to B according to the interface frames, link axes, m.
+        /// Vector from A to B according to the interface frames, link axes, m.
         p_AB: Vector3<f64>,
-        /// From A to B according to the matrix itself, where it says something.
+        /// Vector from A to B implied by the matrix itself, if it implies one.
         implied_p_AB: Option<Vector3<f64>>,
     },
-    /// A stiffness without resistance, or with negative resistance, in some direction.
+    /// A stiffness is zero or negative in some direction.
     #[error(
         "{what} is singular or not positive definite: smallest eigenvalue {min_eigenvalue:.2e} \
          (scaled to a unit diagonal, at least {allowed:.0e} is needed) in the direction {direction}; \
          a mechanism is left, usually an untied or half-tied interface"
     )]
     NotPositiveDefinite {
-        /// The matrix.
+        /// Name of the matrix.
         what: &'static str,
         /// Smallest eigenvalue of the matrix scaled to a unit diagonal.
         min_eigenvalue: f64,
-        /// The bound on it.
+        /// Minimum allowed eigenvalue.
         allowed: f64,
-        /// The displacement that meets no resistance.
+        /// Displacement without resistance.
         direction: Direction,
     },
     /// `K_AA` or `K_AB` of a 12×12 do not follow from its `K_BB`.
@@ -114,32 +114,32 @@ pub enum FemError {
          K_BB says by {residual:.1e}, allowed {allowed:.1e}"
     )]
     BlocksDisagree {
-        /// Largest difference over the size of the terms in it.
+        /// Maximum difference relative to the size of its terms.
         residual: f64,
-        /// The bound on it.
+        /// Allowed residual.
         allowed: f64,
     },
-    /// An inertia tensor that no rigid body has.
+    /// An inertia tensor is impossible for a rigid body.
     #[error(
         "the inertia of {part} is impossible: principal moments {:.6e}, {:.6e}, {:.6e} kg m2; {rule}",
         principal[0], principal[1], principal[2]
     )]
     ImpossibleInertia {
-        /// The part.
+        /// Name of the part.
         part: String,
         /// Principal moments about the centre of mass, ascending, kg·m².
         principal: [f64; 3],
-        /// The rule that is broken.
+        /// Violated rule.
         rule: &'static str,
     },
 }
 
-/// A displacement in the components of one or two interfaces, largest component ±1.
+/// Displacement in the components of one or two interfaces, scaled to a largest component of ±1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Direction(pub Vec<f64>);
 
 impl Direction {
-    /// Scales `components` to a largest component of one.
+    /// Scales `components` so that the largest has magnitude 1.
     pub(crate) fn new(components: impl IntoIterator<Item = f64>) -> Self {
         let raw: Vec<f64> = components.into_iter().collect();
         let peak = raw.iter().fold(0.0, |peak: f64, x| peak.max(x.abs()));
@@ -149,7 +149,7 @@ impl Direction {
 }
 
 impl fmt::Display for Direction {
-    /// Names the components above one per cent of the largest: `uy 1.000, rz -0.667`.
+    /// Lists the components above one per cent of the largest: `uy 1.000, rz -0.667`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut separator = "";
         for (i, x) in self.0.iter().enumerate().filter(|(_, x)| x.abs() > 0.01) {
@@ -165,7 +165,7 @@ impl fmt::Display for Direction {
     }
 }
 
-/// Refuses anything but a positive finite number.
+/// Returns `found`, or an error unless it is positive and finite.
 pub(crate) fn positive(what: impl Into<String>, found: f64) -> Result<f64, FemError> {
     if found > 0.0 && found.is_finite() {
         return Ok(found);
@@ -174,7 +174,7 @@ pub(crate) fn positive(what: impl Into<String>, found: f64) -> Result<f64, FemEr
 }
 
 fn place(p: &Vector3<f64>) -> String {
-    // Rounded first, so that no -0.000000 is printed.
+    // Rounded first, so that -0.000000 is never printed.
     let round = |x: f64| (x * 1e6).round() / 1e6 + 0.0;
     format!("({:.6}, {:.6}, {:.6}) m", round(p.x), round(p.y), round(p.z))
 }

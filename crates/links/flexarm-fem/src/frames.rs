@@ -1,56 +1,56 @@
-//! The frames of a link: where it is held, where it is loaded, where it is split.
+//! Frames of a link: A proximal interface (clamped), B distal interface (loaded), S split.
 //!
-//! All in the link frame L: A proximal interface, B distal interface, S split.
+//! All poses are in the link frame L.
 
 use flexarm_spatial::Pose;
 use nalgebra::Vector3;
 
 use crate::error::FemError;
 
-/// No link is longer than this, m: a larger distance is a mistake in the units.
+/// Maximum distance of a frame from the link origin, m; a larger one is an error in the units.
 const LONGEST_LINK: f64 = 100.0;
 
-/// The three frames of a link, in its own frame L.
+/// The three frames of a link, in link frame L.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinkFrames {
     /// Proximal interface.
     pub X_LA: Pose,
     /// Distal interface.
     pub X_LB: Pose,
-    /// Split: where the elastic joint sits, and in whose axes `K_S` is given.
+    /// Split frame: place of the elastic joint, and axes of `K_S`.
     pub X_LS: Pose,
 }
 
 impl LinkFrames {
-    /// Frames with S midway between A and B, in link axes.
+    /// Creates frames with S midway between A and B, in link axes.
     pub fn new(X_LA: Pose, X_LB: Pose) -> Self {
         Self { X_LA, X_LB, X_LS: Pose::identity() }.with_split_fraction(0.5)
     }
 
-    /// S on the straight line from A to B, in link axes.
+    /// Places S on the straight line from A to B, in link axes.
     pub fn with_split_fraction(self, fraction: f64) -> Self {
         let p_LA = self.X_LA.translation.vector;
         let p_LS = p_LA + self.p_AB() * fraction;
         self.with_split(Pose::translation(p_LS.x, p_LS.y, p_LS.z))
     }
 
-    /// S anywhere.
+    /// Places S at any pose.
     pub fn with_split(self, X_LS: Pose) -> Self {
         Self { X_LS, ..self }
     }
 
-    /// From A to B, link axes, m.
+    /// Vector from A to B, link axes, m.
     pub fn p_AB(&self) -> Vector3<f64> {
         self.X_LB.translation.vector - self.X_LA.translation.vector
     }
 
-    /// S in the frame with origin Bo and link axes, in which `K_BB` lives.
+    /// Pose of S in the frame with origin Bo and link axes, the frame of `K_BB`.
     pub(crate) fn X_BS(&self) -> Pose {
         let p = self.X_LB.translation.vector;
         Pose::translation(-p.x, -p.y, -p.z) * self.X_LS
     }
 
-    /// Refuses frames further from the link origin than any link is long.
+    /// Rejects frames farther from the link origin than [`LONGEST_LINK`].
     pub(crate) fn check(&self) -> Result<(), FemError> {
         for (what, X) in [
             ("position of interface A (m)", &self.X_LA),

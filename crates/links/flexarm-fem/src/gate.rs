@@ -1,7 +1,7 @@
-//! The gate that every stiffness matrix passes before it becomes a link.
+//! Checks that every stiffness matrix passes before it becomes a link (the gate).
 //!
 //! All measures are dimensionless: entries are compared with `s_i s_j`, `s_i = sqrt(k_ii)`, which
-//! changes with the units as they do, so a matrix in millimetres passes or fails like one in
+//! scale with the units in the same way. A matrix in millimetres passes or fails like one in
 //! metres.
 //!
 //! ```text
@@ -10,8 +10,8 @@
 //! block_identity       K_AA - Adᵀ K_BB Ad and K_AB + Adᵀ K_BB, over the size of their terms
 //! min_eigenvalue       smallest eigenvalue of k_ij/(s_i s_j) of K_BB; condition: largest over smallest
 //! ```
-//! A positive definite `K_BB` together with the block identity leaves the 12×12 exactly six zero
-//! eigenvalues and six positive ones, so these are not counted once more.
+//! A positive definite `K_BB` together with the block identity implies that the 12×12 has exactly
+//! six zero and six positive eigenvalues, so these are not counted separately.
 //!
 //! Start at [`check_matrix12`] or [`check_matrix6`].
 
@@ -21,45 +21,46 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{COMPONENTS, Direction, FemError};
 
-/// How much each measure of the gate may be.
+/// Limits of the measures of the gate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct GateLimits {
-    /// Largest relative asymmetry.
+    /// Maximum relative asymmetry.
     pub asymmetry: f64,
-    /// Largest rigid-body residual, also the bound on the block identity.
+    /// Maximum rigid-body residual, also the bound on the block identity.
     pub rigid_body_residual: f64,
-    /// Rigid-body residual or block identity above which [`GateReport::warnings`] speaks.
+    /// Rigid-body residual or block identity above which [`GateReport::warnings`] warns.
     pub rigid_body_warning: f64,
-    /// Smallest eigenvalue of `K_BB`, scaled to a unit diagonal.
+    /// Minimum eigenvalue of `K_BB` scaled to a unit diagonal.
     pub min_eigenvalue: f64,
 }
 
 impl Default for GateLimits {
-    /// Text with ten or more digits passes; a matrix with a spring to the ground does not.
+    /// Limits that accept text with ten or more digits and reject a matrix with a spring to the
+    /// ground.
     ///
-    /// One's own assembly reaches a residual of 1e-11, printed matrices 3e-10 to 7e-8.
+    /// flexarm's own assembly reaches a residual of 1e-11, printed matrices 3e-10 to 7e-8.
     fn default() -> Self {
         Self { asymmetry: 1e-9, rigid_body_residual: 1e-3, rigid_body_warning: 1e-6, min_eigenvalue: 1e-10 }
     }
 }
 
-/// What the gate measured; see the module for the definitions.
+/// Measures of the gate; the module defines them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct GateReport {
-    /// Largest relative asymmetry of the source matrix.
+    /// Maximum relative asymmetry of the source matrix.
     pub asymmetry: f64,
     /// Relative force under rigid motions of both interfaces; `None` for a 6×6 source.
     pub rigid_body_residual: Option<f64>,
-    /// Disagreement of `K_AA`, `K_AB` with `K_BB`; `None` for a 6×6 source.
+    /// Difference of `K_AA`, `K_AB` from the values implied by `K_BB`; `None` for a 6×6 source.
     pub block_identity: Option<f64>,
-    /// Smallest eigenvalue of `K_BB` scaled to a unit diagonal.
+    /// Minimum eigenvalue of `K_BB` scaled to a unit diagonal.
     pub min_eigenvalue: f64,
     /// Condition number of the same scaled matrix.
     pub condition: f64,
 }
 
 impl GateReport {
-    /// Sentences about measures that pass, but are worth a look.
+    /// Returns warnings about measures that pass but are unusually large.
     pub fn warnings(&self, limits: &GateLimits) -> Vec<String> {
         [("rigid-body residual", self.rigid_body_residual), ("disagreement of the blocks", self.block_identity)]
             .into_iter()
@@ -75,7 +76,7 @@ impl GateReport {
 
 /// Checks a 12×12 stiffness (A, then B, link axes) and returns its `K_BB`, made exactly symmetric.
 ///
-/// * `p_AB`: from A to B, link axes, m.
+/// * `p_AB`: vector from A to B, link axes, m.
 ///
 /// # Errors
 /// In this order: [`FemError::NotFinite`], [`FemError::NotPositiveDefinite`] (a diagonal entry that
@@ -120,10 +121,10 @@ pub fn check_matrix12(
     Ok((K_BB, report))
 }
 
-/// Checks a 6×6 stiffness (one interface with the other held, or an elastic joint) and returns it
-/// made exactly symmetric.
+/// Checks a 6×6 stiffness (one interface with the other clamped, or an elastic joint) and returns
+/// it made exactly symmetric.
 ///
-/// * `what`: what to call it in messages.
+/// * `what`: name of the matrix in messages.
 ///
 /// # Errors
 /// [`FemError::NotFinite`], [`FemError::NotSymmetric`], [`FemError::NotPositiveDefinite`].
@@ -152,7 +153,7 @@ fn check_finite<const N: usize>(what: &'static str, K: &SMatrix<f64, N, N>) -> R
     Ok(())
 }
 
-/// `s_i = sqrt(k_ii)`; a diagonal entry that is not positive already decides the matter.
+/// `s_i = sqrt(k_ii)`; an error if a diagonal entry is not positive.
 fn diagonal_scale<const N: usize>(
     what: &'static str,
     K: &SMatrix<f64, N, N>,
@@ -194,7 +195,7 @@ fn check_symmetry<const N: usize>(
     Err(FemError::NotSymmetric { what, asymmetry, allowed, row, column })
 }
 
-/// Smallest eigenvalue and condition number of the matrix scaled to a unit diagonal.
+/// Minimum eigenvalue and condition number of the matrix scaled to a unit diagonal.
 fn check_definite(what: &'static str, K: &Matrix6<f64>, limits: &GateLimits) -> Result<(f64, f64), FemError> {
     let s = diagonal_scale(what, K, limits)?;
     let refuse = |min_eigenvalue, direction| {
@@ -203,7 +204,7 @@ fn check_definite(what: &'static str, K: &Matrix6<f64>, limits: &GateLimits) -> 
     };
     let scaled = Matrix6::from_fn(|i, j| K[(i, j)] / s[i] / s[j]);
 
-    // A pair with |k_ij| >= s_i s_j is indefinite by itself; it may also be too large to decompose.
+    // A pair with |k_ij| >= s_i s_j is indefinite by itself, and may be too large to decompose.
     for i in 0..6 {
         for j in i + 1..6 {
             if !(scaled[(i, j)].abs() < 1.0) {
@@ -224,7 +225,7 @@ fn check_definite(what: &'static str, K: &Matrix6<f64>, limits: &GateLimits) -> 
     Ok((min, eigen.eigenvalues.max() / min))
 }
 
-/// The largest of the relative forces under rigid motions, and where it is.
+/// Maximum relative force under rigid motions, with its motion and row.
 struct RigidResidual {
     value: f64,
     motion: &'static str,
@@ -240,7 +241,7 @@ fn rigid_body_residual(K: &Matrix12, s: &SVector<f64, 12>, p_AB: &Vector3<f64>) 
         "rotation about y",
         "rotation about z",
     ];
-    // Rigid motions about the middle C of AB: neither interface is preferred.
+    // Rigid motions about the midpoint C of AB, so that neither interface is preferred.
     let half = Pose::translation(0.5 * p_AB.x, 0.5 * p_AB.y, 0.5 * p_AB.z);
     let mut R = SMatrix::<f64, 12, 6>::zeros();
     R.fixed_view_mut::<6, 6>(0, 0).copy_from(&adjoint(&half)); // p_AC = p_AB/2
@@ -261,7 +262,7 @@ fn rigid_body_residual(K: &Matrix12, s: &SVector<f64, 12>, p_AB: &Vector3<f64>) 
     worst
 }
 
-/// Disagreement of `K_AA = Adᵀ K_BB Ad` and `K_AB = -Adᵀ K_BB`, `Ad = Ad_BA`.
+/// Maximum deviation from `K_AA = Adᵀ K_BB Ad` and `K_AB = -Adᵀ K_BB`, `Ad = Ad_BA`.
 fn block_identity(K: &Matrix12, K_BB: &Matrix6<f64>, s: &SVector<f64, 12>, p_AB: &Vector3<f64>) -> f64 {
     let Ad_BA = lever(p_AB);
     let K_AB = -Ad_BA.transpose() * K_BB;
@@ -279,14 +280,14 @@ fn block_identity(K: &Matrix12, K_BB: &Matrix6<f64>, s: &SVector<f64, 12>, p_AB:
     worst
 }
 
-/// `Ad_BA` of two frames with parallel axes, `p = p_AB`.
+/// `Ad_BA` of two frames with parallel axes at the distance `p_AB`.
 pub(crate) fn lever(p_AB: &Vector3<f64>) -> Matrix6<f64> {
     adjoint(&Pose::translation(-p_AB.x, -p_AB.y, -p_AB.z))
 }
 
-/// The vector from A to B that the matrix itself implies through `Ad_BA = -K_BB⁻¹ K_BA`.
+/// Vector from A to B that the matrix itself implies through `Ad_BA = -K_BB⁻¹ K_BA`.
 ///
-/// `None` where the matrix says nothing of the kind (its blocks are not related by a lever at all).
+/// `None` if the matrix implies none (its blocks are not related by a lever arm).
 fn implied_lever(K: &Matrix12) -> Option<Vector3<f64>> {
     let K_BB = K.fixed_view::<6, 6>(6, 6).into_owned();
     let Ad_BA = -K_BB.try_inverse()? * K.fixed_view::<6, 6>(6, 0);

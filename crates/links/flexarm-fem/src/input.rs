@@ -1,21 +1,21 @@
-//! Files into memory, no further than a real file would go: a device never ends, a pipe without a
-//! writer never begins.
+//! Reads files into memory, regular files up to a size only: a device may never end, and a pipe
+//! without a writer blocks.
 
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-/// The bytes of a file, at most `largest`.
+/// Reads a file of at most `largest` bytes.
 ///
 /// # Errors
-/// What the system says; `Other` where the path is no regular file, `FileTooLarge` where it has
-/// more bytes.
+/// The error of the operating system; `Other` if the path is not a regular file, `FileTooLarge` if
+/// it has more bytes.
 pub fn read_file(path: &Path, largest: u64) -> std::io::Result<Vec<u8>> {
     if !std::fs::metadata(path)?.is_file() {
         return Err(std::io::Error::other("this is not a file"));
     }
     let mut bytes = Vec::new();
-    // One more than allowed, so that a larger file is noticed.
+    // One byte more than allowed, to detect a larger file.
     File::open(path)?.take(largest + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > largest {
         let what = format!("more than {largest} bytes, which is more than is read");

@@ -1,10 +1,10 @@
 //! Beam elements, reduced link matrices with their checks, and the reduced-link file.
 //!
-//! A robot link that bends is described here once, statically and completely: by the 6×6 stiffness
+//! This crate describes a flexible robot link statically and completely: by the 6×6 stiffness
 //! `K_BB` of its distal interface with the proximal one held, by the frames of the two interfaces,
-//! and by the two rigid parts into which it is cut at the split frame S. Every source ends in the
-//! same [`ReducedLink`]: a beam in closed form ([`BeamLink`]), a 12×12 or 6×6 matrix from an FE
-//! program ([`ReducedLink::from_matrix12`], [`ReducedLink::from_matrix6`]), a `.flex` file
+//! and by the two rigid parts into which the split frame S cuts it. Every source leads to the same
+//! [`ReducedLink`]: a beam in closed form ([`BeamLink`]), a 12×12 or 6×6 matrix from an FE program
+//! ([`ReducedLink::from_matrix12`], [`ReducedLink::from_matrix6`]), or a `.flex` file
 //! ([`read_flex`]).
 //!
 //! ```
@@ -15,7 +15,7 @@
 //! let arm = BeamLink::new("lower_arm", section, Material::ALUMINIUM, 1.095).reduce()?;
 //! assert!((arm.mass() - 2700.0 * 5.2e-3 * 1.095).abs() < 1e-9);
 //!
-//! // 1 kN across the tip, along link y, bends it by 0.36 mm.
+//! // 1 kN across the tip, along link y, deflects it by 0.36 mm.
 //! let u_B = arm.tip_compliance()? * nalgebra::Vector6::new(0.0, 1000.0, 0.0, 0.0, 0.0, 0.0);
 //! assert!((u_B[1] - 0.361e-3).abs() < 1e-6);
 //!

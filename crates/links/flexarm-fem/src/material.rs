@@ -1,7 +1,7 @@
 //! Isotropic linear elastic materials.
 //!
-//! The presets are textbook values for a first answer; a certificate or a test of the part is
-//! better.
+//! The presets are textbook values for a first estimate; prefer a certificate or a test of the
+//! part.
 
 use std::ops::RangeInclusive;
 
@@ -21,7 +21,7 @@ pub struct Material {
     pub nu: f64,
     /// Density, kg/m³.
     pub rho: f64,
-    /// Shear modulus, Pa; `E / (2 (1 + nu))` where it is not given.
+    /// Shear modulus, Pa; `E / (2 (1 + nu))` if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub G: Option<f64>,
 }
@@ -42,7 +42,7 @@ impl Material {
     /// kg/m³).
     pub const DUCTILE_IRON: Self = Self::isotropic(169e9, 0.275, 7100.0);
 
-    /// The presets by the name that files use.
+    /// Presets by the names used in files.
     pub const PRESETS: [(&'static str, Self); 4] = [
         ("steel", Self::STEEL),
         ("aluminium", Self::ALUMINIUM),
@@ -50,8 +50,8 @@ impl Material {
         ("ductile_iron", Self::DUCTILE_IRON),
     ];
 
-    /// Other names of the presets, in the form of [`Self::preset`]: lower case, words joined by
-    /// `_`.
+    /// Aliases of the presets, in the form that [`Self::preset`] looks up: lower case, words joined
+    /// by `_`.
     const OTHER_NAMES: [(&'static str, &'static str); 19] = [
         ("structural_steel", "steel"),
         ("carbon_steel", "steel"),
@@ -74,13 +74,13 @@ impl Material {
         ("en_gjs_400", "ductile_iron"),
     ];
 
-    /// Material with the shear modulus that isotropy asks for.
+    /// Material with the isotropic shear modulus `E / (2 (1 + nu))`.
     pub const fn isotropic(E: f64, nu: f64, rho: f64) -> Self {
         Self { E, nu, rho, G: None }
     }
 
-    /// A preset by one of its names (`aluminium`, `Aluminum`, `cast iron`, ...), with the name that
-    /// files use.
+    /// Looks up a preset by one of its names (`aluminium`, `Aluminum`, `cast iron`, ...); returns
+    /// it with the name used in files.
     pub fn preset(name: &str) -> Option<(&'static str, Self)> {
         let plain = plain(name);
         let other = Self::OTHER_NAMES.iter().find(|(other, _)| *other == plain).map(|(_, name)| *name);
@@ -88,18 +88,17 @@ impl Material {
         Self::PRESETS.into_iter().find(|(known, _)| *known == name)
     }
 
-    /// The preset whose name is most like a word that is none.
+    /// Preset whose name is closest to an unknown name.
     pub fn suggestion(name: &str) -> Option<&'static str> {
         let others = Self::OTHER_NAMES.iter().map(|(other, _)| *other);
         let found = spelling::nearest(&plain(name), Self::PRESETS.iter().map(|(known, _)| *known).chain(others))?;
         Self::preset(found).map(|(known, _)| known)
     }
 
-    /// [`Self::preset`], or an error that says which there are.
+    /// Looks up a preset as [`Self::preset`] does, or returns an error that lists all presets.
     ///
     /// # Errors
-    /// [`FemError::UnknownName`], with all the names there are and the one that is meant most
-    /// likely.
+    /// [`FemError::UnknownName`], with all known names and the closest one.
     pub fn named(name: &str) -> Result<Self, FemError> {
         Self::preset(name).map(|(_, material)| material).ok_or_else(|| FemError::UnknownName {
             what: "material",
@@ -119,10 +118,10 @@ impl Material {
         self.G.unwrap_or(self.E / (2.0 * (1.0 + self.nu)))
     }
 
-    /// Checks the ranges: `E > 0`, `rho > 0`, `G > 0`, `-1 < nu <= 0.5`.
+    /// Checks that `E > 0`, `rho > 0`, `G > 0`, `-1 < nu <= 0.5`.
     ///
     /// # Errors
-    /// [`FemError::OutOfRange`] with the first value that is outside.
+    /// [`FemError::OutOfRange`] for the first value out of range.
     pub fn check(&self) -> Result<(), FemError> {
         positive("Young's modulus E (Pa)", self.E)?;
         positive("density rho (kg/m3)", self.rho)?;
@@ -137,11 +136,10 @@ impl Material {
         Ok(())
     }
 
-    /// Sentences about constants that pass [`Self::check`], but that no material of a robot has: a
-    /// wrong unit, most often.
+    /// Warns about constants that pass [`Self::check`] but are implausible for a robot; usually
+    /// because of a wrong unit.
     ///
-    /// * `units`: those in which they were written, so that the message shows what stands in the
-    ///   file.
+    /// * `units`: units of the file, so that the message shows the value as written there.
     pub fn doubts(&self, units: &UnitSystem) -> Vec<String> {
         let mut doubts = Vec::new();
         let written = |value: f64, unit: f64| match *units == UnitSystem::SI {
@@ -181,14 +179,14 @@ impl Material {
     }
 }
 
-/// Young's moduli from soft plastics to diamond, Pa.
+/// Plausible Young's moduli, from soft plastics to diamond, Pa.
 const MODULI: RangeInclusive<f64> = 1e8..=1.2e12;
-/// Densities from rigid foam to osmium, kg/m³.
+/// Plausible densities, from rigid foam to osmium, kg/m³.
 const DENSITIES: RangeInclusive<f64> = 20.0..=23_000.0;
-/// Poisson's ratios from cork to stiff rubber.
+/// Plausible Poisson's ratios, from cork to stiff rubber.
 const RATIOS: RangeInclusive<f64> = 0.0..=0.49;
 
-/// By how much a modulus is too large after a slip, and the slip.
+/// Unit errors of a modulus: factor by which the value is too large, and description.
 const MODULUS_SLIPS: [(f64, &str); 5] = [
     (1e6, "given in Pa where the file is in MPa (mm, N)?"),
     (1e-6, "given in MPa where Pa is expected?"),
@@ -196,7 +194,7 @@ const MODULUS_SLIPS: [(f64, &str); 5] = [
     (1e3, "given in MPa where the file is in GPa?"),
     (1e-3, "a factor of 1000 too small?"),
 ];
-/// The same of a density.
+/// Unit errors of a density, as [`MODULUS_SLIPS`].
 const DENSITY_SLIPS: [(f64, &str); 5] = [
     (1e12, "given in kg/m3 where the file is in t/mm3?"),
     (1e-12, "given in t/mm3 where kg/m3 is expected?"),
@@ -205,10 +203,10 @@ const DENSITY_SLIPS: [(f64, &str); 5] = [
     (1e-3, "given in g/cm3 where kg/m3 is expected?"),
 ];
 
-/// The slip that explains a value, if one does.
+/// Describes the unit error that explains a value, if there is one.
 fn likely(value: f64, sound: &RangeInclusive<f64>, slips: &[(f64, &str)]) -> String {
-    // Metals are meant most often, so the slip that leads nearest to the middle of the range
-    // counts.
+    // Metals are the most common, so the factor that leads closest to the middle of the range is
+    // chosen.
     let middle = (sound.start() * sound.end()).sqrt();
     let explains = slips.iter().filter(|(factor, _)| sound.contains(&(value / factor)));
     let off = |factor: f64| (value / factor / middle).ln().abs();
@@ -216,7 +214,7 @@ fn likely(value: f64, sound: &RangeInclusive<f64>, slips: &[(f64, &str)]) -> Str
     best.map_or_else(|| ": is the unit right?".into(), |(_, words)| format!(": {words}"))
 }
 
-/// A name in lower case with `_` between words.
+/// Converts a name to lower case with `_` between words.
 fn plain(name: &str) -> String {
     name.trim().to_lowercase().replace([' ', '-'], "_")
 }
@@ -257,7 +255,7 @@ mod tests {
         assert_eq!(Material::suggestion("unobtainium"), None);
     }
 
-    /// Truth: the same steel, written with one slip of the unit each.
+    /// Truth: the same steel, each time with one unit error.
     #[test]
     fn a_slip_of_the_unit_is_told_with_the_value_in_the_file_and_the_slip() {
         let mm: UnitSystem = "mm-t-s".parse().unwrap();
@@ -280,7 +278,7 @@ mod tests {
         }
     }
 
-    /// Metals, plastics, composites and ceramics of data sheets: no false alarm.
+    /// No false alarm for metals, plastics, composites and ceramics of data sheets.
     #[test]
     fn materials_of_data_sheets_raise_no_doubt() {
         for (E, nu, rho) in [

@@ -1,4 +1,4 @@
-//! From matrices of another FE program to a checked flexible link.
+//! Makes a checked flexible link from matrices of another FE program.
 //!
 //! ```text
 //! full K, M (.sti/.mas, HDF5) --Guyan or Craig-Bampton--> superelement --+
@@ -6,9 +6,9 @@
 //! ```
 //! Start at [`link_from_superelement`]; a full model goes through [`reduce_matrices`] first.
 //!
-//! A matrix says nothing about where the mass sits along the link, so the two rigid parts are
-//! given, or are the halves of the uniform bar with the same mass, centre of mass and inertia
-//! ([`halves_of_bar`]), which is said in a warning.
+//! Matrices do not describe the distribution of mass along the link. The two rigid parts are either
+//! given or are the halves of the uniform bar with the same mass, centre of mass and inertia
+//! ([`halves_of_bar`]); the latter gives a warning.
 
 use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, Matrix3, Vector3};
@@ -27,52 +27,52 @@ use crate::reduction::{
 use crate::rigid_part::RigidPart;
 use crate::sparse::{ModesWanted, SparseSymmetric};
 
-/// Where the masses of the two parts come from.
+/// Source of the masses of the two parts.
 #[derive(Debug, Clone, PartialEq)]
 pub enum PartMasses {
-    /// Given: proximal and distal, link axes.
+    /// Given parts: proximal and distal, link axes.
     Given([RigidPart; 2]),
-    /// One body, halved as a uniform bar.
+    /// One given body, halved as a uniform bar.
     Whole(RigidPart),
-    /// The mass matrix, halved as a uniform bar.
+    /// Body of the mass matrix, halved as a uniform bar.
     FromMatrix,
 }
 
-/// What to make of a superelement.
+/// Options for making a link from a superelement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MatrixPlan {
     /// Name of the link.
     pub name: String,
     /// Masses of the parts.
     pub masses: PartMasses,
-    /// Place of the elastic joint.
+    /// Position of the elastic joint.
     pub split: SplitAt,
     /// Limits of the gate.
     pub limits: GateLimits,
-    /// Where the numbers come from.
+    /// Provenance of the numbers.
     pub provenance: Provenance,
 }
 
-/// What came out.
+/// Link made from matrices, with checks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MatrixReduction {
     /// The link, with its superelement if the matrices had a mass.
     pub link: ReducedLink,
     /// Mass properties according to the matrices or the plan.
     pub whole: RigidPart,
-    /// Frequencies with A held and everything else free, Hz; empty without mass.
+    /// Frequencies with A clamped and everything else free, Hz; empty without mass.
     pub held_frequencies_hz: Vec<f64>,
-    /// The same of the two rigid parts with their joint.
+    /// Frequencies of the two rigid parts with their joint, A clamped, Hz.
     pub lumped_frequencies_hz: Vec<f64>,
-    /// What was accepted, but is worth a look.
+    /// Warnings about accepted but suspicious input.
     pub doubts: Vec<Doubt>,
 }
 
-/// Reduces a full model to some of its own DoF: six per interface, in order.
+/// Reduces a full model to some of its own DoF, six per interface, in order.
 ///
-/// * `K`, `M`: SI, the same rows.
-/// * `boundary`: rows kept, interface by interface, `ux uy uz rx ry rz`.
-/// * `frames`: the interfaces they belong to.
+/// * `K`, `M`: SI, with the same rows.
+/// * `boundary`: retained rows, interface by interface, `ux uy uz rx ry rz`.
+/// * `frames`: interfaces of these rows.
 ///
 /// # Errors
 /// [`MeshLinkError::Reduction`], [`MeshLinkError::Modes`].
@@ -94,9 +94,9 @@ pub fn reduce_matrices(
     Ok(condensation.superelement(frames, &modes))
 }
 
-/// The superelement with its matrices turned from the axes they were given in to link axes.
+/// Rotates the matrices of a superelement from their own axes to link axes.
 ///
-/// * `R_LM`: axes of the matrices in link axes.
+/// * `R_LM`: rotation from the axes of the matrices to link axes.
 pub fn turned(element: Superelement, R_LM: &Matrix3<f64>) -> Superelement {
     let n = element.K.nrows();
     let mut Q = DMatrix::identity(n, n);
@@ -107,10 +107,10 @@ pub fn turned(element: Superelement, R_LM: &Matrix3<f64>) -> Superelement {
     Superelement { K: turn(&element.K), M: turn(&element.M), interfaces: element.interfaces }
 }
 
-/// Makes a link of a superelement in link axes; `has_mass`: whether its mass means anything.
+/// Makes a link of a superelement in link axes; `has_mass`: whether its mass matrix is meaningful.
 ///
 /// # Errors
-/// [`MeshLinkError::Gate`] for a stiffness that fails the gate, or a mass that is missing or
+/// [`MeshLinkError::Gate`] if the stiffness fails the gate, or if the mass is missing or
 /// impossible.
 pub fn link_from_superelement(
     element: Superelement,
@@ -168,19 +168,20 @@ pub fn link_from_superelement(
     Ok(MatrixReduction { link, whole, held_frequencies_hz, lumped_frequencies_hz, doubts })
 }
 
-/// A body as two halves along an axis: together they have its mass, centre of mass and inertia.
+/// Splits a body into two halves along an axis with the same total mass, centre of mass and
+/// inertia.
 ///
-/// Each half of a uniform bar of length l has its centre l/4 from the middle, where `l²/12` is the
-/// second moment of the bar along its axis over its mass. A bowed body has no such halves; those of
-/// its ellipsoid of inertia, cut across the axis, have their centres along `S a` (S: second
-/// moments, a: axis), and always exist.
+/// The centre of each half of a uniform bar of length l is l/4 from the middle; `l²/12` is the
+/// second moment of the bar along its axis over its mass. A bowed body may have no such halves.
+/// Then the halves of its ellipsoid of inertia, cut across the axis, are used: their centres are
+/// along `S a` (S: second moments, a: axis), and they always exist.
 pub fn halves_of_bar(whole: &RigidPart, along: &Vector3<f64>) -> [RigidPart; 2] {
     let axis = along.normalize();
-    // Second moment along the axis: half the trace less the moment about it.
+    // Second moment along the axis: half the trace minus the moment about the axis.
     let spread = (whole.inertia.trace() / 2.0 - axis.dot(&(whole.inertia * axis))).max(0.0) / whole.mass;
     let at = |offset: Vector3<f64>| {
         let c = offset.cross_matrix();
-        // Steiner with the mass of both halves at +-offset.
+        // Parallel axis theorem with both half masses at +-offset.
         let inertia = (whole.inertia + c * c * whole.mass) * 0.5;
         let half = |com| RigidPart { mass: whole.mass / 2.0, com, inertia };
         [half(whole.com - offset), half(whole.com + offset)]
@@ -200,7 +201,7 @@ mod tests {
     use crate::material::Material;
     use crate::section::Section;
 
-    /// Truth: the two halves of a uniform beam, in closed form.
+    /// Truth: closed-form halves of a uniform beam.
     #[test]
     fn the_halves_of_a_uniform_bar_are_its_halves() {
         let bar = Section::Rectangle { width: 0.04, height: 0.06 }.bar(&Material::STEEL).unwrap();
@@ -213,7 +214,7 @@ mod tests {
         }
     }
 
-    /// Truth: the parts together are the whole.
+    /// Truth: the merged parts equal the whole.
     #[test]
     fn two_halves_make_the_body_again() {
         let whole = RigidPart {
@@ -227,8 +228,8 @@ mod tests {
         a.check("a half").unwrap();
     }
 
-    /// Truth: points on a bow, on whose chord halves of a straight bar would need mass that is not
-    /// there.
+    /// Truth: points on a bow; halves of a straight bar along its chord would need an impossible
+    /// inertia.
     #[test]
     fn a_bowed_body_has_halves_too() {
         let points: Vec<Vector3<f64>> =
@@ -242,10 +243,10 @@ mod tests {
         let again = a.merged(&b);
         assert!((again.inertia - whole.inertia).amax() < 1e-13 && (again.com - whole.com).norm() < 1e-14);
         let truth = points[25..].iter().sum::<Vector3<f64>>() / 25.0;
-        assert!((b.com - truth).norm() < 0.03, "{} instead of {truth}", b.com); // the bow is no ellipsoid
+        assert!((b.com - truth).norm() < 0.03, "{} instead of {truth}", b.com); // not an ellipsoid
     }
 
-    /// Second algorithm: the beam's own 12x12 and mass, through the route of imported matrices.
+    /// Second algorithm: 12x12 and mass of a beam, through the route of imported matrices.
     #[test]
     fn a_beam_as_matrices_gives_the_beam_as_a_link() {
         let bar = Section::Rectangle { width: 0.04, height: 0.06 }.bar(&Material::STEEL).unwrap();

@@ -1,5 +1,4 @@
-//! What is checked on every reduction of a mesh, with numbers; written into the link file and the
-//! report.
+//! Checks of every reduction of a mesh, with numbers; written into the link file and the report.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -9,52 +8,52 @@ use crate::element::{edges, jacobian_range};
 use crate::mesh::{ElementKind, Mesh};
 use crate::order_check::OrderCheck;
 
-/// One mode with A held and B free, as the mesh and the reduced models have it, Hz.
+/// One mode with A clamped and B free, frequencies of the mesh and of the reduced models, Hz.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ModeCheck {
-    /// Of the whole mesh.
+    /// Frequency of the whole mesh.
     pub mesh_hz: f64,
-    /// Of the superelement with its modes (Craig-Bampton; Guyan without any).
+    /// Frequency of the superelement with its modes (Craig-Bampton; Guyan if it has none).
     pub reduced_hz: Option<f64>,
-    /// Of the superelement without modes.
+    /// Frequency of the superelement without modes.
     pub guyan_hz: Option<f64>,
-    /// Of the two rigid parts with their elastic joint.
+    /// Frequency of the two rigid parts with their elastic joint.
     pub lumped_hz: Option<f64>,
 }
 
 impl ModeCheck {
-    /// Relative error of the reduced model.
+    /// Relative frequency error of the reduced model.
     pub fn reduced_error(&self) -> Option<f64> {
         self.reduced_hz.map(|hz| hz / self.mesh_hz - 1.0)
     }
 }
 
-/// Shape of the elements.
+/// Shape quality of the elements.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct ElementQuality {
-    /// Elements.
+    /// Number of elements.
     pub elements: usize,
-    /// Smallest Jacobian at an integration point over the mean of its element.
+    /// Minimum Jacobian at an integration point, relative to the mean of its element.
     pub smallest_at_points: f64,
-    /// Smallest Jacobian at a node over the mean of its element.
+    /// Minimum Jacobian at a node, relative to the mean of its element.
     pub smallest_at_nodes: f64,
-    /// Number in the file of the element with the smallest one at a node.
+    /// Number in the file of the element with the minimum Jacobian at a node.
     pub worst_element: u64,
-    /// Smallest volume of an element over that of the best shape of its kind with edges of the same
-    /// length; 1 is best.
+    /// Minimum volume of an element, relative to the ideal shape of its kind with the same edge
+    /// lengths; 1 is ideal.
     #[serde(default = "one")]
     pub smallest_fullness: f64,
-    /// Number in the file of that element.
+    /// Number in the file of the element with the minimum fullness.
     #[serde(default)]
     pub flattest_element: u64,
-    /// Elements below [`MeshGate::SMALLEST_FULLNESS`].
+    /// Number of elements below [`MeshGate::SMALLEST_FULLNESS`].
     #[serde(default)]
     pub flat_elements: usize,
-    /// Largest distance of a mid-side node from the middle of its edge, over the length of the
-    /// edge.
+    /// Maximum distance of a mid-side node from the middle of its edge, relative to the edge
+    /// length.
     #[serde(default)]
     pub largest_offset: f64,
-    /// Number in the file of the element with it.
+    /// Number in the file of the element with the maximum offset.
     #[serde(default)]
     pub bent_element: u64,
 }
@@ -64,7 +63,7 @@ fn one() -> f64 {
 }
 
 impl ElementQuality {
-    /// Looks at every solid element of a mesh.
+    /// Measures every solid element of a mesh.
     pub fn of(mesh: &Mesh) -> Self {
         let mut quality =
             Self { smallest_at_points: 1.0, smallest_at_nodes: 1.0, smallest_fullness: 1.0, ..Self::default() };
@@ -79,7 +78,7 @@ impl ElementQuality {
                 x.extend(nodes.iter().map(|node| mesh.nodes[*node as usize]));
                 let range = jacobian_range(block.kind, &x);
                 quality.smallest_at_points = quality.smallest_at_points.min(range.min_gauss);
-                // TOML has no larger integers.
+                // Larger integers cannot be represented in TOML.
                 let id = (*id).min(i64::MAX as u64);
                 if range.min_node < quality.smallest_at_nodes {
                     (quality.smallest_at_nodes, quality.worst_element) = (range.min_node, id);
@@ -99,18 +98,19 @@ impl ElementQuality {
     }
 }
 
-/// Volume over that of the regular shape whose edges have the same mean square along each direction
-/// of the element.
+/// Volume relative to the ideal shape whose edges have the same mean square length along each
+/// direction of the element.
 ///
-/// Tetrahedra are compared with the regular one (a sliver has edges and no volume); bricks and
-/// wedges, which may well be flat, with the right-angled one of their own three edge lengths.
+/// The ideal tetrahedron is the regular one (a sliver has long edges and no volume). The ideal
+/// brick or wedge, which may well be flat, is the right-angled one with the element's own three
+/// edge lengths.
 ///
 /// * `det`: mean of the determinant of the Jacobian, m³.
 fn fullness(kind: ElementKind, x: &[Vector3<f64>], det: f64) -> f64 {
     let length2 = |a: usize, b: usize| (x[a] - x[b]).norm_squared();
     let mean = |pairs: &[[usize; 2]]| pairs.iter().map(|[a, b]| length2(*a, *b)).sum::<f64>() / pairs.len() as f64;
-    // det J of the best shape: 6 V of the regular tetrahedron; edge products of brick (8 det = V)
-    // and wedge (2 V, t from -1 to 1).
+    // det J of the ideal shape: its volume V over that of the reference element, which is 6 V for
+    // the regular tetrahedron, V for the wedge and V/8 for the brick.
     let best = match kind {
         ElementKind::Tet4 | ElementKind::Tet10 => mean(&edges(kind)[..6]).powf(1.5) / 2f64.sqrt(),
         ElementKind::Wedge6 | ElementKind::Wedge15 => {
@@ -126,7 +126,7 @@ fn fullness(kind: ElementKind, x: &[Vector3<f64>], det: f64) -> f64 {
     if best > 0.0 { det / best } else { 0.0 }
 }
 
-/// Largest distance of a mid-side node from the middle of its edge, over the length of the edge.
+/// Maximum distance of a mid-side node from the middle of its edge, relative to the edge length.
 fn largest_offset(kind: ElementKind, x: &[Vector3<f64>]) -> f64 {
     let corners = match kind {
         ElementKind::Tet10 => 4,
@@ -140,63 +140,62 @@ fn largest_offset(kind: ElementKind, x: &[Vector3<f64>]) -> f64 {
     edges(kind).iter().zip(&x[corners..]).map(one).fold(0.0, f64::max)
 }
 
-/// The checks of a reduction.
+/// Results of the checks of a reduction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MeshGate {
-    /// DoF of the mesh.
+    /// Number of DoF of the mesh.
     pub dofs: usize,
-    /// `max |k_ij - k_ji| / sqrt(k_ii k_jj)` of the condensed stiffness, before it is made
-    /// symmetric.
+    /// `max |k_ij - k_ji| / sqrt(k_ii k_jj)` of the condensed stiffness before symmetrisation.
     pub asymmetry: f64,
-    /// Largest relative force under rigid motion of all interfaces.
+    /// Maximum relative force under rigid motion of all interfaces.
     pub rigid_body_residual: f64,
-    /// Disagreement of `K_AA`, `K_AB` with `K_BB`.
+    /// Difference of `K_AA`, `K_AB` from the values implied by `K_BB`.
     pub block_identity: f64,
-    /// Modes of the free reduced link without frequency; six are right.
+    /// Number of modes of the free reduced link with zero frequency; should be six.
     pub zero_modes: usize,
-    /// Relative difference of the mass in the reduced matrix from that of the mesh.
+    /// Relative difference between the mass of the reduced matrix and of the mesh.
     pub mass_error: f64,
-    /// The same of the centre of mass, m.
+    /// Difference between the centres of mass, m.
     pub com_error_m: f64,
-    /// The same of the inertia about the link origin, relative.
+    /// Relative difference between the inertias about the link origin.
     pub inertia_error: f64,
-    /// Condition number of `K_ii`, estimated.
+    /// Estimated condition number of `K_ii`.
     pub condition: f64,
-    /// Largest residual `‖K φ - ω² M φ‖ / ‖ω² M φ‖` of the fixed-interface modes and of those with
-    /// A held.
+    /// Maximum residual `‖K φ - ω² M φ‖ / ‖ω² M φ‖` of the fixed-interface modes and of the modes
+    /// with A clamped.
     pub mode_residual: f64,
     /// Frequencies of the fixed-interface modes, Hz.
     pub fixed_frequencies_hz: Vec<f64>,
-    /// Modes with A held.
+    /// Modes with A clamped.
     pub modes: Vec<ModeCheck>,
-    /// Shape of the elements.
+    /// Shape quality of the elements.
     pub quality: ElementQuality,
-    /// How much too stiff elements of first order make the link; none where there are none, or too
-    /// many to tell.
+    /// Excess stiffness due to first-order elements; none if there are no such elements, or too
+    /// many to check.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub order: Option<OrderCheck>,
 }
 
 impl MeshGate {
-    /// Relative force under rigid motion above which [`Self::doubts`] speaks.
+    /// Relative force under rigid motion above which [`Self::doubts`] warns.
     pub const RIGID_BODY_RESIDUAL: f64 = 1e-7;
-    /// The same for the relative difference of mass and inertia.
+    /// Relative difference of mass and inertia above which [`Self::doubts`] warns.
     pub const MASS_ERROR: f64 = 1e-6;
-    /// The same for the residual of a mode. The square of its frequency is off by less than the
-    /// residual; in thin plates rounding alone leaves 1e-6.
+    /// Residual of a mode above which [`Self::doubts`] warns. The relative error of the squared
+    /// frequency is below the residual; in thin plates rounding alone gives 1e-6.
     pub const MODE_RESIDUAL: f64 = 1e-5;
-    /// Jacobian at a node, over the mean of its element, below which it speaks.
+    /// Jacobian at a node, relative to the mean of its element, below which [`Self::doubts`] warns.
     pub const SMALLEST_JACOBIAN: f64 = 0.05;
-    /// Volume of an element over that of the best shape below which it speaks.
+    /// Volume of an element, relative to the ideal shape, below which the element counts as flat.
     pub const SMALLEST_FULLNESS: f64 = 0.01;
-    /// Part of the elements that may be below.
+    /// Fraction of flat elements above which [`Self::doubts`] warns.
     pub const FEW_FLAT: f64 = 1e-3;
-    /// Offset of a mid-side node over the length of its edge above which it speaks: an arc of 140
-    /// degrees.
+    /// Offset of a mid-side node, relative to its edge length, above which [`Self::doubts`] warns:
+    /// an arc of 140 degrees.
     pub const LARGEST_OFFSET: f64 = 0.35;
 
-    /// What passes, but is worth a look.
+    /// Returns warnings about results that pass but are suspicious.
     pub fn doubts(&self) -> Vec<Doubt> {
         let mut doubts = Vec::new();
         let mut see = |code: &'static str, value: f64, usual: f64, bad: bool, sentence: String| {
@@ -222,7 +221,7 @@ impl MeshGate {
 }
 
 impl ElementQuality {
-    /// What is said of elements that are folded, flat or bent.
+    /// Warnings about folded, flat or bent elements.
     fn doubts(&self) -> Vec<Doubt> {
         let mut doubts = Vec::new();
         let (value, usual) = (self.smallest_at_nodes, MeshGate::SMALLEST_JACOBIAN);
@@ -234,7 +233,7 @@ impl ElementQuality {
             doubts.push(Doubt::found("folded-element", value, usual, said));
         }
         let (value, usual) = (self.smallest_fullness, MeshGate::SMALLEST_FULLNESS);
-        // One among thousands stiffens only what is next to it.
+        // One sliver among thousands of elements stiffens only its neighbourhood.
         if self.flat_elements as f64 > MeshGate::FEW_FLAT * self.elements as f64 {
             let said = format!(
                 "{} element(s) are nearly without volume, the flattest is {}: its volume is {value:.1e} of that of the best \
@@ -266,8 +265,8 @@ mod tests {
         ElementQuality::of(mesh)
     }
 
-    /// Truth: right-angled bricks and wedges over an equilateral triangle are full, Kuhn's
-    /// tetrahedra are 0.61.
+    /// Truth: right-angled bricks and wedges over an equilateral triangle have fullness 1, Kuhn's
+    /// tetrahedra 0.61.
     #[test]
     fn the_best_shape_of_a_kind_is_full_also_where_it_is_flat() {
         for (kind, fullness) in [(ElementKind::Hex8, 1.0), (ElementKind::Hex20, 1.0), (ElementKind::Wedge6, 0.866)] {
@@ -293,7 +292,7 @@ mod tests {
             let found = quality(&mesh);
             assert!(found.flat_elements == 0 && found.smallest_fullness > 0.2, "{kind:?}: {found:?}");
         }
-        // The last corner of one tetrahedron nearly in the plane of the others.
+        // The last corner of one tetrahedron is moved close to the plane of the others.
         let mut mesh = cube(ElementKind::Tet4, [1, 1, 1], false, |u| u);
         let element = mesh.blocks[0].elements().next().unwrap().to_vec();
         let x = positions(&mesh, &element);

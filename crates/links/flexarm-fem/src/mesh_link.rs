@@ -1,11 +1,11 @@
-//! From a mesh with named interfaces to a checked flexible link, in one call.
+//! Turns a mesh with named interfaces into a checked flexible link, in one call.
 //!
 //! ```text
 //! mesh --assemble--> K, M --tie, factorise--> K_g, M_g, modes --+--> ReducedLink (K_BB, two parts, chains)
-//!                                                               +--> MeshGate: what was checked, with numbers
+//!                                                               +--> MeshGate: checks, with numbers
 //! ```
-//! Start at [`reduce_mesh`]. Everything is in link axes and SI: a mesh in another frame is moved
-//! first ([`Mesh::transformed`]).
+//! Start at [`reduce_mesh`]. Everything is in link axes and SI; a mesh in another frame is
+//! transformed first ([`Mesh::transformed`]).
 //!
 //! Not here: files, clocks, pictures.
 
@@ -31,22 +31,22 @@ use crate::reduction::{
 use crate::rigid_part::RigidPart;
 use crate::sparse::{Modes, ModesError, ModesWanted};
 
-/// Where the elastic joint of the two-part link sits.
+/// Position of the elastic joint of the two-part link.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum SplitAt {
-    /// At the centre of compliance of the link, if a cut there has material on both sides; else mid
-    /// length.
+    /// At the centre of compliance of the link if a cut there has material on both sides, otherwise
+    /// midway.
     #[default]
     ElasticCentre,
     /// Midway between A and B.
     MidLength,
-    /// At a fraction of the way from A to B.
+    /// At a fraction of the distance from A to B.
     Fraction(f64),
     /// At a point, link axes, m.
     Point(Vector3<f64>),
 }
 
-/// What to make of a mesh.
+/// Options for making a link from a mesh.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinkPlan {
     /// Name of the link.
@@ -57,112 +57,112 @@ pub struct LinkPlan {
     pub assembly: AssemblyOptions,
     /// Order of elimination.
     pub condensation: CondensationOptions,
-    /// Fixed-interface modes to keep; a count of zero is Guyan.
+    /// Number of fixed-interface modes to keep; zero gives Guyan reduction.
     pub modes: ModesWanted,
-    /// Place of the elastic joint.
+    /// Position of the elastic joint.
     pub split: SplitAt,
-    /// Chains to make, by their number of parts.
+    /// Numbers of parts of the chains to make.
     pub chains: Vec<usize>,
-    /// Bodies that ride on the link without being in its mesh (motors, gears, cables), link axes;
-    /// each stays rigidly on the interface on whose side of the split its centre of mass lies, so
-    /// in a chain it joins the first or last part.
+    /// Bodies attached to the link that are not in its mesh (motors, gears, cables), link axes.
+    /// Each is rigidly attached to the interface on whose side of the split its centre of mass is;
+    /// in a chain it is merged into the first or last part.
     pub attached: Vec<RigidPart>,
-    /// Whether the modal link gets its stiffness by initial stress; 12 more solves and a pass over
+    /// Whether to compute the geometric stiffness of the modal link; 12 more solves and a pass over
     /// all elements.
     pub geometric: bool,
-    /// Modes with A held against which the reduced models are judged.
+    /// Number of modes with A clamped against which the reduced models are checked.
     pub judged_modes: usize,
     /// Limits of the gate.
     pub limits: GateLimits,
-    /// Where the numbers come from.
+    /// Provenance of the numbers.
     pub provenance: Provenance,
 }
 
-/// What came out.
+/// Link made from a mesh, with checks.
 #[derive(Debug, Clone)]
 pub struct MeshReduction {
     /// The link, with its superelement, modal link, chains and gate in [`ReducedLink::details`].
     pub link: ReducedLink,
     /// Mass properties of the whole mesh, link axes.
     pub whole: RigidPart,
-    /// Size of the linear algebra.
+    /// Figures of the linear algebra.
     pub solver: SolverFigures,
-    /// Displacements of all DoF under six unit wrenches at B, A held; for pictures.
+    /// Displacements of all DoF under six unit wrenches at B, A clamped; for pictures.
     pub unit_loads: DMatrix<f64>,
     /// Fixed-interface modes over all DoF; for pictures.
     pub fixed_modes: Modes,
-    /// Modes with A held, over all DoF; for pictures.
+    /// Modes with A clamped, over all DoF; for pictures.
     pub held_modes: Modes,
-    /// The chains of the mesh alone, without bodies that ride on it; those of the link have them.
+    /// Chains of the mesh without attached bodies; the chains of the link include them.
     pub bare_chains: Vec<Chain>,
-    /// Right-hand sides solved in all.
+    /// Total number of right-hand sides solved.
     pub solves: usize,
-    /// What was accepted, but looks like a mistake.
+    /// Warnings about accepted but suspicious input.
     pub doubts: Vec<Doubt>,
 }
 
-/// Why a mesh could not become a link.
+/// Errors of turning a mesh into a link.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshLinkError {
-    /// Elements, materials, sections.
+    /// Elements, materials or sections are invalid.
     #[error(transparent)]
     Assembly(#[from] AssemblyError),
-    /// Ties, factorisation.
+    /// Ties or factorisation failed.
     #[error(transparent)]
     Reduction(#[from] ReductionError),
-    /// Modes.
+    /// The modes could not be computed.
     #[error(transparent)]
     Modes(#[from] ModesError),
-    /// Parts.
+    /// The parts could not be cut.
     #[error(transparent)]
     Cut(#[from] CutError),
-    /// Chains.
+    /// A chain could not be made.
     #[error(transparent)]
     Chain(#[from] ChainError),
-    /// The gate refused the result.
+    /// The gate rejected the result.
     #[error(transparent)]
     Gate(Box<FemError>),
-    /// An interface that the mesh does not hold.
+    /// An interface is not supported by the mesh.
     #[error("interface {interface:?} can move without force while {first:?} is held ({direction}): {cause}")]
     FreeInterface {
-        /// Its name.
+        /// Name of the interface.
         interface: String,
-        /// The proximal interface.
+        /// Name of the proximal interface.
         first: String,
-        /// How it moves, link axes.
+        /// Free motion, link axes.
         direction: Direction,
-        /// Why, as far as the mesh tells.
+        /// Probable cause, as far as the mesh shows it.
         cause: String,
     },
-    /// Bodies of the mesh that turn against each other.
+    /// Bodies of the mesh can rotate against each other.
     #[error("{source}; {cause}")]
     Hinge {
-        /// What was found.
+        /// Error of the reduction.
         source: ReductionError,
-        /// Where the bodies touch.
+        /// Places where the bodies touch.
         cause: String,
     },
-    /// Elements of different kinds that meet without fitting.
+    /// Elements of different kinds do not fit at their common faces.
     #[error(
         "{count} pair(s) of elements meet without fitting: {list}; the faces gape or overlap; use one order of \
          elements, and wedges or one kind where tetrahedra meet bricks"
     )]
     Misfit {
-        /// How many.
+        /// Number of pairs.
         count: usize,
-        /// The first ones.
+        /// First pairs.
         list: String,
     },
-    /// A split that leaves nothing on one side.
+    /// A split leaves no material on one side.
     #[error("the cut through the elastic joint at ({:.6}, {:.6}, {:.6}) m: {source}; choose another place for the split", p[0], p[1], p[2])]
     Split {
-        /// The split point, link axes.
+        /// Split point, link axes, m.
         p: [f64; 3],
-        /// Why.
+        /// Cause.
         source: CutError,
     },
-    /// Parts of the mesh that hang on no interface.
+    /// Parts of the mesh are connected to no interface.
     #[error(
         "the mesh falls into {parts} parts that share no node: {list}; only one may remain; {}",
         if *coincident > 0 {
@@ -172,11 +172,11 @@ pub enum MeshLinkError {
         }
     )]
     Unconnected {
-        /// How many.
+        /// Number of parts.
         parts: usize,
-        /// Their sizes, with one node each.
+        /// Sizes of the parts, with one node each.
         list: String,
-        /// Pairs of nodes in one place.
+        /// Number of pairs of coincident nodes.
         coincident: usize,
     },
 }
@@ -190,11 +190,11 @@ impl From<FemError> for MeshLinkError {
 /// Steps of a reduction, for progress displays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ReductionStep {
-    /// Element matrices.
+    /// Computing and assembling element matrices.
     Assembly,
-    /// Sparse Cholesky and static shapes.
+    /// Sparse Cholesky factorisation and static shapes.
     Factorisation,
-    /// Fixed-interface modes, and those with A held, to judge the result.
+    /// Fixed-interface modes, and modes with A clamped for the check.
     Modes,
     /// Parts, chains and checks.
     Parts,
@@ -204,7 +204,7 @@ impl ReductionStep {
     /// All steps, in order.
     pub const ALL: [Self; 4] = [Self::Assembly, Self::Factorisation, Self::Modes, Self::Parts];
 
-    /// What it is called.
+    /// Name of the step.
     pub fn name(self) -> &'static str {
         match self {
             Self::Assembly => "assembly",
@@ -229,7 +229,7 @@ pub fn reduce_mesh(
     check_connected(mesh)?;
     check_fit(mesh)?;
     let bodies = bodies(mesh);
-    // Frames in other units are refused before the work, not after it.
+    // Frames in wrong units are rejected before the expensive work.
     if let [a, b, ..] = plan.interfaces.as_slice() {
         LinkFrames::new(a.X_LI, b.X_LI).check()?;
     }
@@ -254,11 +254,13 @@ pub fn reduce_mesh(
     let (X_LA, X_LB) = (plan.interfaces[0].X_LI, plan.interfaces[1].X_LI);
     let mut doubts = suspicious(mesh, &bodies);
     let loose = FemError::Missing { what: "stiffness of the third interface", help: "it holds nothing" };
+    // Two-part link from the 12×12 of A and B.
     let K12 = stiffness12(&superelement).ok_or(loose)?;
     let frames = LinkFrames::new(X_LA, X_LB);
     let (frames, parts) = split(mesh, &densities, frames, &K12, plan.split, &mut doubts)?;
     let mut link = ReducedLink::from_matrix12(&plan.name, frames, &K12, parts, plan.provenance.clone(), &plan.limits)?;
 
+    // Chains and checks against the mesh; then the attached bodies.
     let source = ChainSource {
         mesh,
         model: &model,
@@ -300,10 +302,10 @@ pub fn reduce_mesh(
     Ok(MeshReduction { link, whole, solver, unit_loads, fixed_modes, held_modes, bare_chains, solves, doubts })
 }
 
-/// How to mend a hinge.
+/// Hint for removing a hinge.
 const JOIN: &str = "connect bodies by whole faces (fragment or Coherence in Gmsh, a tie or merge elsewhere)";
 
-/// A mechanism, with the interface by name and the hinge that lets it move.
+/// Replaces a mechanism error by one with the interface name and the hinge that causes it.
 fn with_cause(error: ReductionError, plan: &LinkPlan, bodies: &Bodies) -> MeshLinkError {
     let hinges = |with: Option<[usize; 2]>| -> Vec<String> {
         let between = |bodies: [usize; 2]| with.is_none_or(|with| bodies == with);
@@ -330,7 +332,7 @@ fn with_cause(error: ReductionError, plan: &LinkPlan, bodies: &Bodies) -> MeshLi
     }
 }
 
-/// The body on which most nodes of an interface are.
+/// Body with the most nodes of an interface.
 fn body_of(interface: &Interface, bodies: &Bodies) -> usize {
     let mut count = vec![0_usize; bodies.elements.len()];
     for node in &interface.nodes {
@@ -341,7 +343,7 @@ fn body_of(interface: &Interface, bodies: &Bodies) -> usize {
     (0..count.len()).rev().max_by_key(|body| count[*body]).unwrap_or(0)
 }
 
-/// What is said of a mesh that is connected, but not as it looks: cracks, hinges.
+/// Warnings about cracks and hinges in a mesh that is connected.
 fn suspicious(mesh: &Mesh, bodies: &Bodies) -> Vec<Doubt> {
     let mut doubts: Vec<Doubt> = bodies
         .hinges
@@ -399,7 +401,7 @@ fn check_connected(mesh: &Mesh) -> Result<(), MeshLinkError> {
     Err(MeshLinkError::Unconnected { parts: parts.len(), list: list.join(", "), coincident })
 }
 
-/// Split frame and the two parts. The cut is across AB, through S.
+/// Split frame and the two parts. The cut is through S, perpendicular to AB.
 fn split(
     mesh: &Mesh,
     densities: &[f64],
@@ -422,8 +424,8 @@ fn split(
     Ok((frames.with_split(Pose::translation(p_LS.x, p_LS.y, p_LS.z)), parts))
 }
 
-/// Merges bodies into the part of that interface on whose side of the split they lie: the two-part
-/// link, chains and modal links then carry them alike.
+/// Merges attached bodies into the part of the interface on whose side of the split they are, so
+/// that the two-part link, chains and modal links carry them alike.
 fn attach(attached: &[RigidPart], link: &mut ReducedLink, chains: &mut [Chain]) -> Result<(), FemError> {
     let (along, p_LS) = (link.p_AB(), link.split.X_LS.translation.vector);
     for body in attached {
@@ -441,9 +443,9 @@ fn attach(attached: &[RigidPart], link: &mut ReducedLink, chains: &mut [Chain]) 
     Ok(())
 }
 
-/// The split point, link axes, and a sentence where it is not the one asked for.
+/// Returns the split point, link axes, and a message if it is not the requested one.
 ///
-/// * `possible`: whether a cut there leaves two parts.
+/// * `possible`: whether a cut at a point leaves two parts.
 pub(crate) fn split_point(
     frames: &LinkFrames,
     K12: &Matrix12,
@@ -472,7 +474,7 @@ pub(crate) fn split_point(
     }
 }
 
-/// Everything that is checked on a finished reduction.
+/// Computes the checks of a finished reduction.
 fn gate(
     condensation: &Condensation<'_>,
     element: &Superelement,
@@ -518,7 +520,7 @@ fn gate(
     }
 }
 
-/// Largest relative force under the six rigid motions of all interfaces.
+/// Maximum relative force under the six rigid motions of all interfaces.
 fn rigid_residual(element: &Superelement) -> f64 {
     let n = element.boundary();
     let R = rigid_motions(element);
@@ -534,7 +536,7 @@ fn rigid_residual(element: &Superelement) -> f64 {
     largest
 }
 
-/// Rigid motions of the interfaces about the middle of the first two.
+/// Rigid motions of the interfaces about the midpoint of the first two.
 fn rigid_motions(element: &Superelement) -> DMatrix<f64> {
     let p = |k: usize| element.interfaces[k].X_LI.translation.vector;
     rigid_motions_about(element, &((p(0) + p(1)) / 2.0))
@@ -551,7 +553,7 @@ pub(crate) fn rigid_motions_about(element: &Superelement, point: &Vector3<f64>) 
     R
 }
 
-/// Mass, centre of mass and inertia that the reduced mass says: `Rᵀ M R` about the link origin.
+/// Mass, centre of mass and inertia of the reduced mass matrix: `Rᵀ M R` about the link origin.
 pub fn condensed_body(element: &Superelement) -> RigidPart {
     let n = element.boundary();
     let R = rigid_motions_about(element, &Vector3::zeros());
@@ -564,7 +566,8 @@ pub fn condensed_body(element: &Superelement) -> RigidPart {
     RigidPart { mass, com, inertia: (inertia + inertia.transpose()) * 0.5 }
 }
 
-/// What is said of a link whose size, mass or frequency no robot link has: wrong units, most often.
+/// Warnings about a size, mass or frequency that is implausible for a robot link, usually wrong
+/// units.
 fn implausible(mesh: &Mesh, whole: &RigidPart, held: &Modes) -> Vec<Doubt> {
     let size = mesh.bounding_box().map_or(0.0, |(low, high)| (high - low).amax());
     let first = held.frequencies_hz().first().copied();

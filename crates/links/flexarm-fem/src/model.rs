@@ -1,5 +1,4 @@
-//! The assembled finite element model: degrees of freedom, sparse stiffness and mass of a whole
-//! mesh.
+//! Assembled finite element model: degrees of freedom, sparse stiffness and mass of a whole mesh.
 //!
 //! Nodes of solid elements have three DoF, nodes of beams six; nodes without an element have none.
 //! DoF are numbered node by node, `ux uy uz (rx ry rz)`, in mesh axes.
@@ -22,50 +21,50 @@ use crate::sparse::SparseSymmetric;
 pub use mass::MassMatrix;
 use scatter::NodeGraph;
 
-/// Why a mesh could not be assembled.
+/// Errors of assembling a mesh.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum AssemblyError {
-    /// Elements whose Jacobian is not positive.
+    /// Elements have a Jacobian that is not positive.
     #[error(
         "{count} element(s) of {total} are inverted or folded, the Jacobian there is not positive: {list}; \
          mend the mesh (for curved tetrahedra: straight sides, Mesh.SecondOrderLinear = 1 in Gmsh, or \
          Mesh.HighOrderOptimize = 2)"
     )]
     InvertedElements {
-        /// How many.
+        /// Number of such elements.
         count: usize,
-        /// Of how many.
+        /// Number of all elements.
         total: usize,
-        /// The first ones, with kind, number in the file, place and value.
+        /// First such elements, with kind, number in the file, place and value.
         list: String,
     },
-    /// A region without a material.
+    /// A region has no material.
     #[error("region {region:?} has no material: give one for it, or one for all")]
     NoMaterial {
-        /// Its name.
+        /// Name of the region.
         region: String,
     },
-    /// A region with beams but without a section.
+    /// A region has beams but no section.
     #[error("region {region:?} has beam elements but no section: the mesh file must have one, or give it")]
     NoSection {
-        /// Its name.
+        /// Name of the region.
         region: String,
     },
-    /// A material or a beam that cannot be.
+    /// A material or a beam is invalid.
     #[error("region {region:?}: {source}")]
     Property {
-        /// Its name.
+        /// Name of the region.
         region: String,
-        /// What is wrong with it.
+        /// Cause.
         source: Box<FemError>,
     },
-    /// A mesh without elements.
+    /// The mesh has no elements.
     #[error("the mesh has no element that carries stiffness")]
     Empty,
 }
 
-/// Which DoF belong to which node.
+/// Map from nodes to DoF.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DofMap {
     /// First DoF of each node; one more entry than there are nodes.
@@ -73,7 +72,7 @@ pub struct DofMap {
 }
 
 impl DofMap {
-    /// Three DoF for the nodes of solids, six for those of beams, none for unused ones.
+    /// Assigns three DoF to the nodes of solids, six to those of beams, none to unused ones.
     pub fn new(mesh: &Mesh) -> Self {
         let mut count = vec![0_u8; mesh.nodes.len()];
         for block in &mesh.blocks {
@@ -114,19 +113,19 @@ impl DofMap {
     }
 }
 
-/// What the assembly needs besides the mesh.
+/// Options of the assembly.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct AssemblyOptions {
     /// Quadrature of solid elements.
     pub quadrature: Quadrature,
-    /// Material of regions that bring none of their own.
+    /// Material of regions without their own.
     pub material: Option<Material>,
 }
 
 /// Stiffness and mass of a mesh, SI, mesh axes.
 #[derive(Debug, Clone)]
 pub struct FeModel {
-    /// Which DoF belong to which node.
+    /// Map from nodes to DoF.
     pub dofs: DofMap,
     /// Positions of all nodes, m.
     pub nodes: Vec<Vector3<f64>>,
@@ -136,7 +135,7 @@ pub struct FeModel {
     pub M: MassMatrix,
 }
 
-/// Material of each region, checked: its own, or the one for all.
+/// Returns the checked material of each region: its own, or the common one of the options.
 ///
 /// # Errors
 /// [`AssemblyError::NoMaterial`] and [`AssemblyError::Property`].
@@ -164,7 +163,7 @@ pub fn materials(mesh: &Mesh, options: &AssemblyOptions) -> Result<Vec<Material>
 }
 
 impl FeModel {
-    /// Stiffness and mass of `mesh`.
+    /// Assembles stiffness and mass of `mesh`.
     ///
     /// # Errors
     /// [`AssemblyError`].
@@ -205,16 +204,16 @@ impl FeModel {
         Ok(Self { dofs, nodes: mesh.nodes.clone(), K, M })
     }
 
-    /// A model whose matrices come from elsewhere; it has rows, but no nodes.
+    /// Model with matrices from another source; it has rows, but no node positions.
     pub fn from_matrices(K: SparseSymmetric, M: SparseSymmetric) -> Self {
         let dofs = DofMap { first: (0..=K.size() as u32).collect() };
         Self { nodes: vec![Vector3::zeros(); K.size()], dofs, K, M: MassMatrix::from_general(M) }
     }
 
-    /// A model of solids whose matrices come from elsewhere: three DoF per node, node by node.
+    /// Model of solids with matrices from another source: three DoF per node, node by node.
     ///
     /// # Panics
-    /// If the matrices have another number of rows.
+    /// If the matrices do not have three rows per node.
     pub fn from_nodal_matrices(nodes: Vec<Vector3<f64>>, K: SparseSymmetric, M: SparseSymmetric) -> Self {
         assert_eq!((K.size(), M.size()), (3 * nodes.len(), 3 * nodes.len()), "three rows per node");
         let dofs = DofMap { first: (0..=nodes.len() as u32).map(|node| 3 * node).collect() };
@@ -226,7 +225,7 @@ impl FeModel {
         self.dofs.size()
     }
 
-    /// The six rigid motions about `point`, by columns: three translations, three rotations.
+    /// The six rigid motions about `point`, as columns: three translations, three rotations.
     pub fn rigid_modes(&self, point: &Vector3<f64>) -> DMatrix<f64> {
         let mut R = DMatrix::zeros(self.size(), 6);
         for (node, p) in self.nodes.iter().enumerate() {
@@ -249,7 +248,7 @@ impl FeModel {
     }
 }
 
-/// Inverted elements, counted; the first few described.
+/// Count of inverted elements, with descriptions of the first ten.
 #[derive(Default)]
 struct Inverted {
     count: usize,
@@ -274,7 +273,7 @@ impl Inverted {
     }
 }
 
-/// A beam element between its nodes, and the turn of its axes: `A = Q A_E Qᵀ`.
+/// Beam element between its nodes, and the rotation from its axes to mesh axes: `A = Q A_E Qᵀ`.
 pub(crate) fn beam_of(
     mesh: &Mesh,
     region: usize,
@@ -330,7 +329,7 @@ fn add_beams(
     Ok(())
 }
 
-/// Axes of a beam in mesh axes, by columns: x along it, y as near to `y_axis` as that allows.
+/// Axes of a beam in mesh axes, as columns: x along it, y as close to `y_axis` as possible.
 pub(crate) fn beam_axes(along: &Vector3<f64>, y_axis: &Vector3<f64>) -> Result<nalgebra::Matrix3<f64>, FemError> {
     let x = along.normalize();
     let y = y_axis - x * x.dot(y_axis);

@@ -1,19 +1,19 @@
-//! I-beams and channels with parallel flanges: what follows from their five lengths.
+//! Section properties of I-beams and channels with parallel flanges, from their five lengths.
 //!
-//! Area and second moments are exact, fillets included. Torsion is that of walls with a term for
-//! each junction and each free edge; shear factors and shear centre are those of thin walls. What
-//! that is wrong by was measured against finite elements over the section
+//! Area and second moments are exact, including fillets. The torsion constant is that of thin walls
+//! with a correction for each junction and each free edge; shear factors and shear centre are those
+//! of thin walls. Their errors were measured against finite elements over the section
 //! (`tests/open_sections.rs`):
 //!
 //! | quantity | rolled profiles, webs of 0.25 to 2 flanges, fillets up to 1.5 flanges |
 //! | --- | --- |
 //! | `J` | 3 % (without junctions and edges 25 %) |
 //! | `k_z`, force along the web | 9 % too soft |
-//! | `k_y`, force along the flanges | 22 % too soft: fillets and the width of the web count there |
+//! | `k_y`, force along the flanges | 22 % too soft: fillets and web width matter there |
 //! | shear centre | 5 % |
 //!
-//! A flange held at one end against warping is stiffer in torsion than St. Venant's `J` says: no
-//! beam here knows of that.
+//! If warping of a flange is restrained at one end, the beam is stiffer in torsion than St.
+//! Venant's `J`; the beams of this crate do not model that.
 //!
 //! Axes as in [`crate::Section`]: y along the flanges, z along the web.
 
@@ -32,7 +32,7 @@ pub(crate) struct Open {
     pub(crate) fillet: f64,
 }
 
-/// Area, second moment about its own centroid and place of the latter along one axis.
+/// Area, second moment about its own centroid, and position of the centroid along one axis.
 struct Piece {
     A: f64,
     I: f64,
@@ -48,7 +48,7 @@ impl Open {
             .chain([0.5, 0.5, -0.5, -0.5].map(|side| self.fillet_at(side * web, side.signum())));
         let [A, _, I_z] = sum(along_y);
         let (I_y, h_mid) = (self.about_y(4.0), h - flange);
-        // The web lies where bending along y has no stress: the two flanges shear as rectangles.
+        // The web is unstressed in bending along y: only the two flanges shear, as rectangles.
         let k_y = 10.0 * (1.0 + nu) / (12.0 + 11.0 * nu) * (2.0 * b * flange / A);
         let k_z = web_shear_factor(2.0 * b * flange / (h_mid * web), b / h_mid, nu);
         Ok(SectionProperties { A, I_y, I_z, J: self.torsion(Junction::Tee), k_y, k_z, shear_centre_y: 0.0 })
@@ -68,14 +68,14 @@ impl Open {
             I_z,
             J: self.torsion(Junction::Corner),
             k_y: flange_shear_factor(b_mid, h_mid, web, flange),
-            // Two channels back to back are an I-beam of twice the width and twice the web that
-            // shears without twist.
+            // Two channels back to back form an I-beam of twice the width and twice the web
+            // thickness that shears without twist.
             k_z: web_shear_factor(2.0 * b_mid * flange / (h_mid * web), 2.0 * b_mid / h_mid, nu),
             shear_centre_y: 0.5 * web - y_c - shear_centre(b_mid, h_mid, web, flange),
         })
     }
 
-    /// `room`: how far a flange stands out from the web on one side, m.
+    /// `room`: overhang of a flange beyond the web on one side, m.
     fn check(&self, room: f64) -> Result<(), FemError> {
         let lengths = [("width (m)", self.width), ("height (m)", self.height), ("web thickness (m)", self.web)];
         for (what, length) in lengths {
@@ -96,10 +96,9 @@ impl Open {
         Ok(())
     }
 
-    /// A fillet whose corner lies at `corner` along an axis and that fills towards `side` (+1 or
-    /// -1).
+    /// Fillet with its corner at `corner` along an axis, extending towards `side` (+1 or -1).
     ///
-    /// A square less the quarter of a circle: area `(1 - π/4) r²`, second moment about the corner
+    /// A square minus a quarter circle: area `(1 - π/4) r²`, second moment about the corner
     /// `(1 - 5π/16) r⁴`.
     fn fillet_at(&self, corner: f64, side: f64) -> Piece {
         let r = self.fillet;
@@ -109,7 +108,7 @@ impl Open {
         Piece { A, I, at: corner + side * centroid }
     }
 
-    /// Second moment about y, with that many fillets: the outer rectangle less what is beside the
+    /// Second moment about y with `fillets` fillets: the outer rectangle minus the areas beside the
     /// web.
     fn about_y(&self, fillets: f64) -> f64 {
         let Self { width: b, height: h, web, flange, .. } = *self;
@@ -118,15 +117,15 @@ impl Open {
             + fillets * (fillet.I + fillet.A * fillet.at * fillet.at)
     }
 
-    /// Torsion constant: strips, the material in the junctions, and what the edges of the flanges
-    /// lack.
+    /// Torsion constant: strips, corrections for the junctions and for the free edges of the
+    /// flanges.
     ///
     /// ```text
     /// J = 2/3 b t_f³ + 1/3 (h - 2 t_f) t_w³ + 2 α D⁴ - 0.420 t_f⁴       D: largest circle inscribed in a junction
     /// ```
     ///
     /// # Source
-    /// [El Darwish & Johnston 1965], with α by their fits for a T (I-beam) and an L (channel).
+    /// [El Darwish & Johnston 1965], with their fits of α for a T (I-beam) and an L (channel).
     fn torsion(&self, junction: Junction) -> f64 {
         let Self { width: b, height: h, web, flange, fillet: r } = *self;
         let (w, f) = (web / flange, r / flange);
@@ -145,14 +144,14 @@ impl Open {
     }
 }
 
-/// How web and flange meet.
+/// Kind of junction of web and flange.
 #[derive(Clone, Copy)]
 enum Junction {
     Tee,
     Corner,
 }
 
-/// A rectangle of that size across and along the axis.
+/// Rectangle with these sizes across and along the axis.
 fn rectangle(across: f64, along: f64, at: f64) -> Piece {
     Piece { A: across * along, I: across * along.powi(3) / 12.0, at }
 }
@@ -168,10 +167,10 @@ fn sum(pieces: impl IntoIterator<Item = Piece>) -> [f64; 3] {
     [A, first / A, second - first * first / A]
 }
 
-/// Shear factor of a thin-walled I-section under a force along the web.
+/// Shear factor of a thin-walled I-section for a force along the web.
 ///
-/// * `m`: area of both flanges over that of the web.
-/// * `n`: width over height, midlines.
+/// * `m`: area of both flanges divided by that of the web.
+/// * `n`: width divided by height, midlines.
 ///
 /// # Source
 /// [Cowper 1966], table 1, thin-walled I-section.
@@ -187,15 +186,15 @@ fn web_shear_factor(m: f64, n: f64, nu: f64) -> f64 {
             + 5.0 * nu * n2 * (8.0 * m + 9.0 * m2))
 }
 
-/// Shear factor of a thin-walled channel under a force along the flanges, from the energy of the
+/// Shear factor of a thin-walled channel for a force along the flanges, from the energy of the
 /// shear flow.
 ///
 /// ```text
-/// 1/(k A) = ∫ (S/I_z)² ds/t       S: first moment of what lies outward, t: thickness
+/// 1/(k A) = ∫ (S/I_z)² ds/t       S: first moment of the area farther out, t: thickness
 /// flange  S = t_f (y_1² - y²)/2   from the edge y_1 to the web at -c
 /// web     S = t_w c s             s from the middle, where the flow changes its sign
 /// ```
-/// Poisson's ratio is left out: it counts by 2 % in a rectangle. Lengths of midlines.
+/// Poisson's ratio is neglected; its effect is 2 % in a rectangle. Lengths are those of midlines.
 fn flange_shear_factor(b: f64, h: f64, web: f64, flange: f64) -> f64 {
     let A = 2.0 * b * flange + h * web;
     let c = b * b * flange / A;
@@ -207,7 +206,7 @@ fn flange_shear_factor(b: f64, h: f64, web: f64, flange: f64) -> f64 {
     I_z * I_z / (A * flow)
 }
 
-/// How far the shear centre of a thin-walled channel lies outside of its web, midlines:
+/// Distance of the shear centre of a thin-walled channel from its web, on the outside, midlines:
 /// `3 b² t_f / (h t_w + 6 b t_f)`.
 fn shear_centre(b: f64, h: f64, web: f64, flange: f64) -> f64 {
     3.0 * b * b * flange / (h * web + 6.0 * b * flange)

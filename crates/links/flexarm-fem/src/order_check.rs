@@ -1,18 +1,19 @@
-//! How much too stiff elements of first order make a link: the same mesh, solved in second order.
+//! Measures the excess stiffness of first-order elements by solving the same mesh in second order.
 //!
-//! A tetrahedron or wedge with corner nodes alone has (nearly) constant strain and cannot bend; a
-//! link of two layers of them is several times too stiff, and no residual shows it. Here every edge
-//! gets a node in its middle and the unit loads at B are solved again in that larger space:
+//! A tetrahedron or wedge with corner nodes only has (nearly) constant strain and cannot bend; a
+//! link with two layers of them is several times too stiff, and no residual shows it. Here every
+//! edge gets a mid-edge node and the unit loads at B are solved again in that larger space:
 //!
 //! ```text
-//! u = Σ N_i u_i + Σ b_e d_e          d_e: how far the middle of edge e leaves the mean of its ends
+//! u = Σ N_i u_i + Σ b_e d_e          d_e: offset of the middle of edge e from the mean of its ends
 //! C₂ = C₁ + Fᵀ(u₂ - u₁)              compliance of B, A held; F: unit wrenches at B
 //! ```
-//! Conjugate gradients with the factor of the mesh itself and the 3×3 blocks of the edges as
-//! preconditioner: a hierarchical basis, whose condition does not grow with the mesh, so a few
-//! dozen products suffice and nothing is factorised. Edges on a rigidly tied face stay straight.
+//! Conjugate gradients, preconditioned by the factor of the original mesh and the 3×3 blocks of the
+//! edges. In this hierarchical basis the condition number does not grow with the mesh size, so a
+//! few dozen products are enough and no new factorisation is needed. Edges on a rigidly tied face
+//! stay straight.
 //!
-//! Start at [`check_order`]. Not here: elements of second order, whose own error stays unknown.
+//! Start at [`check_order`]. Not here: the discretisation error of second-order elements.
 //!
 //! Source: [Zienkiewicz, Gago & Kelly 1983].
 
@@ -28,34 +29,34 @@ use crate::model::{AssemblyError, AssemblyOptions, FeModel};
 use crate::reduction::{Condensation, Interface, Tie};
 use crate::sparse::{SparseSymmetric, gram};
 
-/// Nodes of the larger space above which it is not solved: its stiffness would take gigabytes.
+/// Maximum number of nodes of the larger space; above it the stiffness would take gigabytes.
 const MOST_NODES: usize = 600_000;
-/// Steps after which the answer is a lower bound.
+/// Maximum number of steps; the result is then a lower bound.
 const MOST_STEPS: usize = 80;
-/// Energy of a step over the energy of the solution at which it is done.
+/// Tolerance: energy of a step relative to the energy of the solution.
 const DONE: f64 = 1e-4;
 
-/// The same mesh in first and second order.
+/// Comparison of a mesh in first and second order.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OrderCheck {
-    /// Compliance of B (x y z rx ry rz, A held) in second order over that of the mesh.
+    /// Compliance of B (x y z rx ry rz, A clamped) in second order divided by that of the mesh.
     pub compliance_ratio: [f64; 6],
-    /// Steps of the solver.
+    /// Number of steps of the solver.
     pub steps: usize,
 }
 
 impl OrderCheck {
-    /// Ratio beyond which the mesh is called too stiff; its inverse, too soft.
+    /// Ratio above which the mesh is reported as too stiff, and below its inverse as too soft.
     pub const LARGEST_RATIO: f64 = 1.1;
 
-    /// The ratio that is farthest from one.
+    /// Ratio with the largest deviation from one.
     pub fn worst(&self) -> f64 {
         let off = |ratio: &f64| if *ratio > 0.0 { ratio.ln().abs() } else { f64::INFINITY };
         self.compliance_ratio.into_iter().max_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(1.0)
     }
 
-    /// What is said where it is far from one.
+    /// Warning if the worst ratio is out of bounds.
     pub fn doubt(&self) -> Option<Doubt> {
         let worst = self.worst();
         if worst < Self::LARGEST_RATIO && worst > 1.0 / Self::LARGEST_RATIO {
@@ -78,13 +79,13 @@ impl OrderCheck {
     }
 }
 
-/// Solves the unit loads again in second order; `None` where no solid is of first order, or there
-/// are too many.
+/// Solves the unit loads again in second order; `None` if the mesh has no first-order solid or
+/// would have too many nodes.
 ///
-/// * `U`: displacements of all DoF under six unit wrenches at B, A held.
+/// * `U`: displacements of all DoF under six unit wrenches at B, A clamped.
 ///
 /// # Errors
-/// [`AssemblyError`], where the elements of second order cannot be made.
+/// [`AssemblyError`] if the second-order model cannot be assembled.
 pub fn check_order(
     mesh: &Mesh,
     options: &AssemblyOptions,
@@ -101,7 +102,7 @@ pub fn check_order(
     let model = FeModel::assemble(&finer.mesh, &options)?;
     let space = Hierarchy::new(mesh, interfaces, &model, finer.ends);
 
-    // f - K₂ u₁ in the larger space; on the corners f is what the mesh itself balances.
+    // f - K₂ u₁ in the larger space; at the corner nodes f is K₁ u₁ of the original mesh.
     let (rows, n) = (model.size(), U.nrows());
     let forces = condensation.model().K.product(U);
     let mut start = DMatrix::zeros(rows, 6);
@@ -119,20 +120,19 @@ pub fn check_order(
     Ok(is_finite.then_some(OrderCheck { compliance_ratio, steps }))
 }
 
-/// The larger space: DoF of the mesh, then three per new node, relative to the mean of the edge's
-/// ends.
+/// Larger space: DoF of the mesh, then three per new node, relative to the mean of the edge's ends.
 struct Hierarchy<'m> {
     K: &'m SparseSymmetric,
     edges: Vec<Edge>,
 }
 
-/// A new node.
+/// New node in the middle of an edge.
 struct Edge {
-    /// Its first DoF.
+    /// First DoF of the node.
     dof: usize,
-    /// Those of the ends.
+    /// First DoF of the end nodes.
     ends: [usize; 2],
-    /// Inverse of its block of the stiffness; zero where it follows a rigid tie.
+    /// Inverse of its diagonal block of the stiffness; zero if it follows a rigid tie.
     inverse: Matrix3<f64>,
 }
 
@@ -155,7 +155,7 @@ impl<'m> Hierarchy<'m> {
         Self { K: &model.K, edges: ends.into_iter().zip(mesh.nodes.len()..).map(edge).collect() }
     }
 
-    /// `Sᵀ K S X`, S from relative to absolute displacements.
+    /// `Sᵀ K S X` with S from relative to absolute displacements.
     fn product(&self, X: &DMatrix<f64>) -> DMatrix<f64> {
         let mut absolute = X.clone();
         for mut x in absolute.column_iter_mut() {
@@ -178,7 +178,8 @@ impl<'m> Hierarchy<'m> {
         forces
     }
 
-    /// The mesh's own solution on the corners, each edge by itself beside it.
+    /// Block preconditioner: solution of the original mesh for the corners, and each edge on its
+    /// own.
     fn precondition(&self, condensation: &Condensation<'_>, residual: &DMatrix<f64>) -> DMatrix<f64> {
         let n = condensation.model().size();
         let mut corners = residual.rows(0, n).into_owned();
@@ -192,8 +193,8 @@ impl<'m> Hierarchy<'m> {
         z
     }
 
-    /// Conjugate gradients on each column by itself, until a step brings less than [`DONE`] of
-    /// `energy` to all.
+    /// Conjugate gradients on each column separately, until a step adds less than [`DONE`] of
+    /// `energy` to every column.
     fn solve(
         &self,
         condensation: &Condensation<'_>,
@@ -211,6 +212,7 @@ impl<'m> Hierarchy<'m> {
             if rho.iter().zip(energy).all(|(rho, energy)| !(rho.abs() > DONE * energy)) {
                 return (x, step);
             }
+            // Step length α = rᵀz / pᵀAp for each column.
             let q = self.product(&p);
             let curvature = dots(&p, &q);
             for k in 0..x.ncols() {
@@ -218,6 +220,7 @@ impl<'m> Hierarchy<'m> {
                 x.column_mut(k).axpy(alpha, &p.column(k), 1.0);
                 residual.column_mut(k).axpy(-alpha, &q.column(k), 1.0);
             }
+            // New direction p = z + β p.
             z = self.precondition(condensation, &residual);
             let next = dots(&residual, &z);
             for k in 0..x.ncols() {
@@ -230,7 +233,7 @@ impl<'m> Hierarchy<'m> {
     }
 }
 
-/// Edges of faces of the surface all of whose corners are tied rigidly to one interface.
+/// Edges of surface faces whose corners are all tied rigidly to one interface.
 fn tied_edges(mesh: &Mesh, interfaces: &[Interface]) -> HashSet<[u32; 2]> {
     let mut owner = vec![u32::MAX; mesh.nodes.len()];
     for (k, interface) in (0..).zip(interfaces).filter(|(_, interface)| interface.tie == Tie::Rigid) {

@@ -1,20 +1,21 @@
-//! The reduced link: everything static about a link with two interfaces, in one 6×6 and two rigid
-//! parts.
+//! The reduced link: complete static description of a link with two interfaces, by a 6×6 stiffness
+//! and two rigid parts.
 //!
 //! ```text
 //! F_B = K_BB u_B        wrench and displacement at Bo, link axes, A held
 //! K_AA = Adᵀ K_BB Ad,   K_AB = -Adᵀ K_BB,   Ad = Ad_BA
 //! K_S = Ad_BSᵀ K_BB Ad_BS
 //! ```
-//! A 12×12 of an FE program therefore holds no more than its `K_BB`, and the elastic joint at the
-//! split frame S gives B exactly the displacement of the FE model under any wrench at B, wherever S
-//! lies. The two parts are rigid, so sag under distributed weight and frequencies are approximate.
+//! A 12×12 of an FE program therefore holds no more information than its `K_BB`. The elastic joint
+//! at the split frame S gives B exactly the displacement of the FE model under any wrench at B, for
+//! any position of S. The two parts are rigid, so sag under distributed weight and frequencies are
+//! approximate.
 //!
 //! Start at [`ReducedLink::from_matrix12`] and [`ReducedLink::from_matrix6`]; beams come from
 //! [`BeamLink`](crate::BeamLink), files from [`read_flex`](crate::read_flex).
 //!
-//! More than two interfaces, modes and chains of parts are in [`LinkDetails`]. Not here: how meshes
-//! are reduced ([`crate::mesh_link`]).
+//! More than two interfaces, modes and chains of parts are in [`LinkDetails`]. Not here: the
+//! reduction of meshes ([`crate::mesh_link`]).
 
 use flexarm_spatial::{Matrix12, Pose, adjoint, symmetric_part};
 use nalgebra::{Matrix6, Vector3};
@@ -37,42 +38,42 @@ pub struct ElasticSplit {
     pub K_S: Matrix6<f64>,
 }
 
-/// Where the numbers of a link come from; free text but for `method`.
+/// Provenance of the numbers of a link; free text except for `method`.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Provenance {
     /// Program, drawing or data set.
     pub source: String,
-    /// How the stiffness was found: "guyan", "beam timoshenko", ...
+    /// Method for the stiffness: "guyan", "beam timoshenko", ...
     pub method: String,
-    /// How the interfaces are tied: "rigid", "distributing", ...
+    /// Tie of the interfaces: "rigid", "distributing", ...
     pub tie: String,
     /// Units of the source before conversion.
     pub units: String,
-    /// Day of the calculation, ISO 8601.
+    /// Date of the calculation, ISO 8601.
     pub date: String,
-    /// Anything else.
+    /// Other remarks.
     pub note: String,
 }
 
-/// What a reduction of a mesh, or a matrix with mass, knows beyond the static 6×6.
+/// Data beyond the static 6×6, from the reduction of a mesh or a matrix with mass.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct LinkDetails {
     /// Stiffness and mass over all interfaces and modes, link axes.
     pub superelement: Option<Superelement>,
-    /// Chains of rigid parts, by their number of parts.
+    /// Chains of rigid parts with different numbers of parts.
     pub chains: Vec<Chain>,
-    /// Bodies that ride on the link (motors, gears): already in the two parts and in the chains,
+    /// Bodies attached to the link (motors, gears): included in the two parts and in the chains,
     /// but not in the superelement, whose mass is that of the mesh.
     pub attached: Vec<RigidPart>,
-    /// Shapes and mass integrals of the mesh in the frame at A, without the bodies that ride on it.
+    /// Shapes and mass integrals of the mesh in the frame at A, without attached bodies.
     pub modal: Option<ModalLink>,
-    /// What was checked against the mesh.
+    /// Checks against the mesh.
     pub gate: Option<MeshGate>,
 }
 
-/// A link with two interfaces, reduced; what every source delivers. SI units.
+/// Reduced link with two interfaces, the common result of all sources. SI units.
 ///
-/// The constructors check; afterwards it is plain data.
+/// The constructors check the data; afterwards it is plain data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReducedLink {
     /// Name of the link.
@@ -81,31 +82,32 @@ pub struct ReducedLink {
     pub X_LA: Pose,
     /// Distal interface B in the link frame.
     pub X_LB: Pose,
-    /// Stiffness at Bo with A held, link axes, exactly symmetric.
+    /// Stiffness at Bo with A clamped, link axes, exactly symmetric.
     pub K_BB: Matrix6<f64>,
-    /// The same stiffness as an elastic joint at the split.
+    /// The same stiffness as an elastic joint at the split frame.
     pub split: ElasticSplit,
     /// Rigid part on the side of A.
     pub proximal: RigidPart,
     /// Rigid part on the side of B.
     pub distal: RigidPart,
-    /// Where the numbers come from.
+    /// Provenance of the numbers.
     pub provenance: Provenance,
-    /// What the gate measured on the source matrix.
+    /// Measures of the gate on the source matrix.
     pub checks: GateReport,
-    /// Superelement, chains and checks of a mesh, where the source has them.
+    /// Superelement, chains and checks of a mesh, if the source has them.
     pub details: Option<Box<LinkDetails>>,
 }
 
 impl ReducedLink {
-    /// Link from a 12×12 stiffness of its two interfaces, A then B, both in *link axes*.
+    /// Creates a link from the 12×12 stiffness of its two interfaces, A then B, both in *link
+    /// axes*.
     ///
     /// * `K`: `F = K [u_A; u_B]`, (N/m, N/rad; N·m/m, N·m/rad), at Ao and Bo.
     /// * `parts`: proximal and distal rigid part.
     ///
     /// # Errors
-    /// Those of [`check_matrix12`] (not symmetric, moves under rigid motion, singular, ...),
-    /// [`FemError::OutOfRange`] for frames, and those of [`RigidPart::check`].
+    /// Errors of [`check_matrix12`] (not symmetric, resists rigid motion, singular, ...),
+    /// [`FemError::OutOfRange`] for frames, and errors of [`RigidPart::check`].
     pub fn from_matrix12(
         name: impl Into<String>,
         frames: LinkFrames,
@@ -119,9 +121,9 @@ impl ReducedLink {
         Self::assemble(name.into(), frames, K_BB, checks, parts, provenance)
     }
 
-    /// Link from the 6×6 stiffness at Bo with A held, in *link axes*.
+    /// Creates a link from the 6×6 stiffness at Bo with A clamped, in *link axes*.
     ///
-    /// Less can be checked than in a 12×12: symmetry and positive definiteness.
+    /// Fewer checks are possible than for a 12×12: symmetry and positive definiteness.
     ///
     /// # Errors
     /// As [`Self::from_matrix12`].
@@ -154,30 +156,30 @@ impl ReducedLink {
         Ok(Self { name, X_LA, X_LB, K_BB, split, proximal, distal, provenance, checks, details: None })
     }
 
-    /// The frames of the link.
+    /// Frames of the link.
     pub fn frames(&self) -> LinkFrames {
         LinkFrames { X_LA: self.X_LA, X_LB: self.X_LB, X_LS: self.split.X_LS }
     }
 
-    /// Mass of both parts, kg.
+    /// Total mass of both parts, kg.
     pub fn mass(&self) -> f64 {
         self.proximal.mass + self.distal.mass
     }
 
-    /// Both parts as one rigid body: the link of the rigid twin.
+    /// Both parts merged into one rigid body, for the rigid reference model.
     pub fn rigid(&self) -> RigidPart {
         self.proximal.merged(&self.distal)
     }
 
-    /// From A to B, link axes, m.
+    /// Vector from A to B, link axes, m.
     pub fn p_AB(&self) -> Vector3<f64> {
         self.frames().p_AB()
     }
 
-    /// Compliance `C_BB = K_BB⁻¹` at Bo with A held, link axes.
+    /// Compliance `C_BB = K_BB⁻¹` at Bo with A clamped, link axes.
     ///
     /// # Errors
-    /// [`FemError::NotPositiveDefinite`] if `K_BB` was changed into a singular matrix by hand.
+    /// [`FemError::NotPositiveDefinite`] if the caller has changed `K_BB` into a singular matrix.
     pub fn tip_compliance(&self) -> Result<Matrix6<f64>, FemError> {
         let (K_BB, _) = check_matrix6("K_BB", &self.K_BB, &GateLimits::default())?;
         let scale = K_BB.diagonal().map(|k| 1.0 / k.sqrt());
@@ -193,7 +195,7 @@ impl ReducedLink {
         })
     }
 
-    /// Stiffness of both interfaces, 12×12, A then B, link axes: the way back to FE programs.
+    /// Stiffness of both interfaces, 12×12, A then B, link axes, for export to FE programs.
     pub fn matrix12(&self) -> Matrix12 {
         let Ad_BA = lever(&self.p_AB());
         let K_AB = -Ad_BA.transpose() * self.K_BB;
@@ -205,11 +207,12 @@ impl ReducedLink {
         K
     }
 
-    /// Sentences about what was accepted, but looks like a mistake.
+    /// Returns warnings about accepted but suspicious input.
     ///
-    /// Besides those of the gate: `K_S` stiffer in rotation than any lever of the link explains,
-    /// `sqrt(tr K_rr / tr K_tt)` above ten times the distance of its frames. Forces per millimetre
-    /// read as forces per metre look like that, and a 6×6 holds no other trace of its units.
+    /// In addition to those of the gate: `K_S` is stiffer in rotation than any lever arm of the
+    /// link explains, with `sqrt(tr K_rr / tr K_tt)` above ten times the distance of its frames.
+    /// This is the effect of reading forces per millimetre as forces per metre, and the only trace
+    /// of wrong units in a 6×6.
     pub fn warnings(&self, limits: &GateLimits) -> Vec<String> {
         let mut warnings = self.checks.warnings(limits);
         let K_S = self.split.K_S.diagonal();
@@ -228,10 +231,10 @@ impl ReducedLink {
         warnings
     }
 
-    /// The same link with its elastic joint moved to another frame. The parts stay as they are cut.
+    /// Moves the elastic joint to another frame. The cut between the parts is unchanged.
     ///
     /// # Errors
-    /// Those of [`stiffness_at_split`].
+    /// Errors of [`stiffness_at_split`].
     pub fn with_split(&self, X_LS: Pose) -> Result<Self, FemError> {
         let frames = self.frames().with_split(X_LS);
         frames.check()?;
@@ -239,9 +242,9 @@ impl ReducedLink {
         Ok(Self { split, ..self.clone() })
     }
 
-    /// The link a plain spring model makes of this one: `K_S` reduced to its diagonal.
+    /// Reduces `K_S` to its diagonal, as a plain spring model does.
     ///
-    /// Only to show what that costs; `K_BB` follows, so that the link stays one consistent thing.
+    /// Only to show the resulting error; `K_BB` is updated so that the link stays consistent.
     pub fn without_coupling(&self) -> Self {
         let K_S = drop_coupling(&self.split.K_S);
         let Ad_SB = adjoint(&self.frames().X_BS().inverse());
@@ -261,10 +264,10 @@ fn elastic_split(frames: &LinkFrames, K_BB: &Matrix6<f64>) -> Result<ElasticSpli
 /// ```text
 /// u_B = Ad_BS d_S,    K_S = Ad_BSᵀ K_BB Ad_BS
 /// ```
-/// Exact to first order for every wrench at B, wherever S lies. `K_S` couples force and rotation
-/// even where the beam is straight; see [`drop_coupling`] for what ignoring that means.
+/// Exact to first order for every wrench at B and any position of S. `K_S` couples force and
+/// rotation even if the beam is straight; see [`drop_coupling`] for the effect of ignoring this.
 ///
-/// * `K_BB`: (N/m, N/rad; N·m/m, N·m/rad), at Bo, with A held.
+/// * `K_BB`: (N/m, N/rad; N·m/m, N·m/rad), at Bo, with A clamped.
 /// * `X_BS`: pose of S in the frame at Bo in whose axes `K_BB` is given, translation in m.
 ///
 /// Returns `K_S`, same units, at So, in S axes, exactly symmetric.
@@ -278,13 +281,13 @@ pub fn stiffness_at_split(K_BB: &Matrix6<f64>, X_BS: &Pose) -> Result<Matrix6<f6
     let (K_BB, _) = check_matrix6("K_BB", K_BB, &GateLimits::default())?;
     let Ad_BS = adjoint(X_BS);
     let K_S = symmetric_part(&(Ad_BS.transpose() * K_BB * Ad_BS));
-    // Far levers can make it too large, or bury the translations under rounding.
+    // Long lever arms can make it overflow, or lose the translations in rounding.
     check_matrix6("K_S", &K_S, &GateLimits::default()).map(|_| K_S)
 }
 
-/// The diagonal of `K_S`: six separate springs, as plain spring models have them.
+/// Diagonal of `K_S`: six separate springs, as in plain spring models.
 ///
-/// Wrong by tens of per cent wherever `K_S` is coupled; kept only to show that.
+/// Wrong by tens of per cent where `K_S` is coupled; only for demonstrating that error.
 pub fn drop_coupling(K_S: &Matrix6<f64>) -> Matrix6<f64> {
     Matrix6::from_diagonal(&K_S.diagonal())
 }

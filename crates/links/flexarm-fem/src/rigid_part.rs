@@ -1,11 +1,12 @@
-//! The rigid half of a cut link: mass, centre of mass, inertia, and what no body can have.
+//! Rigid part of a cut link: mass, centre of mass, inertia, and checks that they are possible.
 
 use flexarm_spatial::{Pose, skew};
 use nalgebra::{Matrix3, Matrix6, SymmetricEigen, Vector3};
 
 use crate::error::{FemError, positive};
 
-/// Slack in the triangle inequality of principal moments, relative to the largest: printed digits.
+/// Tolerance of the triangle inequality of principal moments, relative to the largest, for few
+/// digits.
 const INERTIA_SLACK: f64 = 1e-6;
 
 /// Mass properties of one part of a link.
@@ -13,14 +14,14 @@ const INERTIA_SLACK: f64 = 1e-6;
 pub struct RigidPart {
     /// Mass, kg.
     pub mass: f64,
-    /// Centre of mass from the link origin, link axes, m.
+    /// Centre of mass relative to the link origin, link axes, m.
     pub com: Vector3<f64>,
     /// Inertia about the centre of mass, link axes, kg·m².
     pub inertia: Matrix3<f64>,
 }
 
 impl RigidPart {
-    /// The part with its coordinates carried from frame E to frame L.
+    /// Transforms the part from frame E to frame L.
     pub fn transformed(&self, X_LE: &Pose) -> Self {
         let R = X_LE.rotation.matrix();
         Self {
@@ -31,13 +32,13 @@ impl RigidPart {
         .symmetrised()
     }
 
-    /// The part with the rounding asymmetry of its inertia removed.
+    /// Removes the rounding asymmetry of the inertia.
     pub(crate) fn symmetrised(&self) -> Self {
         let inertia = (self.inertia + self.inertia.transpose()) * 0.5;
         Self { inertia, ..self.clone() }
     }
 
-    /// This part and another one as a single rigid body.
+    /// Merges this part and another one into a single rigid body.
     pub fn merged(&self, other: &Self) -> Self {
         let mass = self.mass + other.mass;
         let com = (self.com * self.mass + other.com * other.mass) / mass;
@@ -48,7 +49,7 @@ impl RigidPart {
         Self { mass, com, inertia: about_com(self) + about_com(other) }
     }
 
-    /// The part with its mass scaled to `mass`, shape unchanged.
+    /// Scales the part to the mass `mass` with its shape unchanged.
     pub fn with_mass(&self, mass: f64) -> Self {
         let inertia = self.inertia * (mass / self.mass);
         Self { mass, com: self.com, inertia }
@@ -69,13 +70,14 @@ impl RigidPart {
         M
     }
 
-    /// Checks that a body with these values can exist.
+    /// Checks that these values are possible for a body.
     ///
-    /// * `part`: what to call it in the message.
+    /// * `part`: name of the part in messages.
     ///
     /// # Errors
     /// [`FemError::OutOfRange`] for mass and centre of mass; [`FemError::ImpossibleInertia`] for an
-    /// inertia that is not positive definite or breaks the triangle inequality `I_1 + I_2 >= I_3`.
+    /// inertia that is not positive definite or violates the triangle inequality
+    /// `I_1 + I_2 >= I_3`.
     pub fn check(&self, part: &str) -> Result<(), FemError> {
         positive(format!("mass of {part} (kg)"), self.mass)?;
         if let Some(found) = self.com.iter().find(|x| !x.is_finite()) {
@@ -101,7 +103,7 @@ impl RigidPart {
         if !((self.inertia - symmetric).amax() <= 1e-9 * size) {
             return refuse([f64::NAN; 3], "the tensor must be symmetric");
         }
-        // Scaled first, so that the eigensolver sees numbers of order one whatever the unit.
+        // Scaled first, so that the eigensolver works with numbers of order one in any unit.
         if size == 0.0 {
             return refuse([0.0; 3], "all must be positive");
         }
@@ -139,7 +141,7 @@ mod tests {
         }
     }
 
-    /// Truth: parallel axis theorem, two half bars are one bar.
+    /// Truth: parallel axis theorem; two half bars make one bar.
     #[test]
     fn two_half_bars_make_one_bar() {
         let half = bar(0.5).with_mass(1.5);

@@ -1,13 +1,12 @@
-//! Cross sections of beams and what follows from them: area, second moments, torsion, shear
-//! factors.
+//! Cross sections of beams and their properties: area, second moments, torsion, shear factors.
 //!
-//! Beam axes E: x along the beam, y and z in the section. `width` lies along y, `height` along z.
-//! `I_y` is the second moment *about* y (bending that deflects along z), `k_y` the shear factor for
-//! a force *along* y. y and z are principal axes and the beam axis runs through the centroid, which
-//! is also the shear centre of all shapes but the channel: see
+//! Beam axes E: x along the beam, y and z in the section. `width` is along y, `height` along z.
+//! `I_y` is the second moment *about* y (bending with deflection along z), `k_y` the shear factor
+//! for a force *along* y. y and z are principal axes and the beam axis runs through the centroid,
+//! which is also the shear centre of all shapes except the channel: see
 //! [`SectionProperties::shear_centre_y`].
 //!
-//! Start at [`Section::bar`]; [`Section::properties`] shows the purely geometric step.
+//! Start at [`Section::bar`]; [`Section::properties`] is the purely geometric step.
 
 use std::f64::consts::PI;
 
@@ -77,11 +76,12 @@ pub enum Section {
         #[serde(default)]
         fillet: f64,
     },
-    /// Any section, by its stiffness and mass per length; the material is not used.
+    /// Any section, given by its stiffness and mass per length; the material is not used.
     Given(Bar),
 }
 
-/// Geometry of a section: no material but Poisson's ratio, which the shear factors need.
+/// Geometry of a section; independent of the material except for Poisson's ratio in the shear
+/// factors.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SectionProperties {
     /// Area, m².
@@ -96,15 +96,14 @@ pub struct SectionProperties {
     pub k_y: f64,
     /// Shear factor for a force along z.
     pub k_z: f64,
-    /// Place of the shear centre along y from the centroid, m; 0 but for channels. A force along z
-    /// that passes it by twists the beam. [`crate::Beam`] bends and twists about the centroid
-    /// whatever stands here: who lets a channel bend across its web must know what that leaves out
-    /// (the caveat `shear-centre` of robots).
+    /// Position of the shear centre along y relative to the centroid, m; 0 except for channels. A
+    /// force along z that does not pass through the shear centre twists the beam. [`crate::Beam`]
+    /// bends and twists about the centroid and ignores this value, so bending of a channel across
+    /// its web is incomplete (caveat `shear-centre` of robots).
     pub shear_centre_y: f64,
 }
 
-/// Stiffness and mass of a bar per unit of its length: all that a beam needs to know of its
-/// section.
+/// Stiffness and mass of a bar per unit length: the section data that a beam needs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Bar {
@@ -130,16 +129,17 @@ pub struct Bar {
     pub rotary_z: f64,
 }
 
-/// The words of the shapes with the lengths that each takes, and the shape of a word: one line per
+/// Lists the shapes: name in files, variant, and lengths with optional defaults, one line per
 /// shape.
 macro_rules! shapes {
     ($($word:literal => $shape:ident { $($length:ident $(= $default:literal)?),+ }),+ $(,)?) => {
-        /// The shapes by the word that files use, with the lengths (m) that each takes.
+        /// Names of the shapes in files, with the lengths (m) of each.
         pub const SHAPES: &'static [(&'static str, &'static [&'static str])] =
             &[$(($word, &[$(stringify!($length)),+])),+];
 
-        /// The shape of that word of [`Self::SHAPES`], its lengths (m) from `length`, which is
-        /// given the key and what to take where it is left out; none for another word.
+        /// Creates the shape with this name in [`Self::SHAPES`]. Its lengths (m) come from
+        /// `length`, which is called with the key and its default value; `None` for an unknown
+        /// name.
         ///
         /// # Errors
         /// The first error of `length`.
@@ -165,7 +165,7 @@ impl Section {
         "channel" => Channel { width, height, web, flange, fillet = 0.0 },
     }
 
-    /// Largest outer size (m); none for [`Section::Given`].
+    /// Maximum outer size (m); none for [`Section::Given`].
     pub fn largest_size(&self) -> Option<f64> {
         match *self {
             Self::Box { width, height, .. }
@@ -177,19 +177,18 @@ impl Section {
         }
     }
 
-    /// Area, second moments, torsion constant and shear factors of the shape.
+    /// Computes area, second moments, torsion constant and shear factors of the shape.
     ///
-    /// * `nu`: Poisson's ratio, for the shear factors of Cowper.
+    /// * `nu`: Poisson's ratio, for Cowper's shear factors.
     ///
     /// # Errors
     /// [`FemError::OutOfRange`] for impossible dimensions; [`FemError::Missing`] for
     /// [`Section::Given`], which has no shape.
     ///
     /// # Source
-    /// Shear factors: Cowper (1966), table 1, circle, hollow circle, rectangle; thin box: walls
-    /// parallel to the force over the whole area. Torsion: rectangle by St. Venant's series
-    /// (Timoshenko & Goodier, art. 109), box by Bredt's formula on the midline of the wall. I-beam
-    /// and channel: the module `open_section` beside this one.
+    /// Shear factors: Cowper (1966), table 1, circle, hollow circle, rectangle, thin-walled box.
+    /// Torsion: rectangle by St. Venant's series (Timoshenko & Goodier, art. 109), box by Bredt's
+    /// formula on the midline of the wall. I-beam and channel: the module `open_section`.
     pub fn properties(&self, nu: f64) -> Result<SectionProperties, FemError> {
         match *self {
             Self::Rectangle { width, height } => rectangle(width, height, nu),
@@ -213,7 +212,7 @@ impl Section {
         }
     }
 
-    /// The section filled with a material.
+    /// Stiffness and mass of the section with a material.
     ///
     /// # Errors
     /// As [`Section::properties`], and [`FemError::OutOfRange`] for an impossible material or bar.
@@ -245,7 +244,7 @@ impl Bar {
     /// Checks that every value is positive and finite.
     ///
     /// # Errors
-    /// [`FemError::OutOfRange`] naming the first value that is not.
+    /// [`FemError::OutOfRange`] for the first value that is not.
     pub fn check(&self) -> Result<(), FemError> {
         let values = [
             ("EA (N)", Some(self.EA)),
@@ -288,7 +287,7 @@ fn rectangle(width: f64, height: f64, nu: f64) -> Result<SectionProperties, FemE
 /// J = a b³ [1/3 - (64/π⁵) (b/a) Σ tanh(nπa/2b)/n⁵],   n = 1, 3, 5, ...,   a >= b
 /// ```
 /// With `tanh = 1 - 2/(e^{nπa/b} + 1)` the first part sums to (31/32) ζ(5) and the rest converges
-/// exponentially: eight terms reach rounding even for a square.
+/// exponentially: eight terms are exact to rounding even for a square.
 fn rectangle_torsion(width: f64, height: f64) -> f64 {
     const ZETA_5: f64 = 1.036_927_755_143_37;
     let (a, b) = (width.max(height), width.min(height));
@@ -318,12 +317,12 @@ fn hollow_box(width: f64, height: f64, wall: f64, nu: f64) -> Result<SectionProp
     })
 }
 
-/// Shear factor of a thin-walled box under a force along the walls of length `a`, midline to
-/// midline; `b` across.
+/// Shear factor of a thin-walled box for a force along the walls of length `a` (midline to
+/// midline); `b` is the length of the walls across.
 ///
-/// All four walls shear, those across the force too: the walls along the force alone, `a/(a + b)`,
-/// are 14 to 45 % too stiff for ordinary boxes; solid elements agree with this formula to 1 % (case
-/// 2 of docs/verification.md).
+/// All four walls shear, including those across the force: counting only the walls along the force,
+/// `a/(a + b)`, is 14 to 45 % too stiff for ordinary boxes. Solid elements agree with this formula
+/// to 1 % (case 2 of docs/verification.md).
 ///
 /// # Source
 /// [Cowper 1966], table 1, thin-walled box, one wall thickness (`m = n = b/a`).
@@ -343,7 +342,7 @@ fn ring(outer: f64, inner: f64, nu: f64) -> Result<SectionProperties, FemError> 
     positive("diameter (m)", outer)?;
     let (ro, ri) = (0.5 * outer, 0.5 * inner);
     let I = PI / 4.0 * (ro.powi(4) - ri.powi(4));
-    // Cowper's hollow circle; m = 0 gives his solid one, m -> 1 the thin tube 2(1+nu)/(4+3nu).
+    // Cowper's hollow circle; m = 0 is the solid one, m -> 1 the thin tube 2(1+nu)/(4+3nu).
     let m2 = (ri / ro).powi(2);
     let q = (1.0 + m2).powi(2);
     let k = 6.0 * (1.0 + nu) * q / ((7.0 + 6.0 * nu) * q + (20.0 + 12.0 * nu) * m2);

@@ -1,13 +1,13 @@
-//! Words in messages: the nearest of some known ones, lists that do not run on.
+//! Words in messages: closest known word, and lists of limited length.
 
-/// The known word that `word` is most like, if at most a third of its letters differ.
+/// Known word closest to `word`, if at most a third of its letters differ.
 pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let with_distance = known.into_iter().map(|one| (strsim::levenshtein(word, one), one));
     let (distance, found) = with_distance.min_by_key(|(distance, _)| *distance)?;
     (3 * distance <= found.chars().count().max(3)).then_some(found)
 }
 
-/// `items` joined for a message, at most eight of them.
+/// Joins at most eight of `items` for a message.
 pub fn listed<T: std::fmt::Display>(items: impl IntoIterator<Item = T>) -> String {
     const MOST: usize = 8;
     let mut items = items.into_iter();

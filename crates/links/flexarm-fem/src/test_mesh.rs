@@ -1,4 +1,4 @@
-//! Meshes for tests: a box in every kind of solid, with nodes moved at will.
+//! Meshes for tests: a box in every kind of solid, with nodes moved arbitrarily.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use crate::element::edges;
 use crate::mesh::{ElementBlock, ElementKind, Mesh, Region};
 
-/// All solids.
+/// All solid element kinds.
 pub(crate) const SOLIDS: [ElementKind; 6] = [
     ElementKind::Tet4,
     ElementKind::Tet10,
@@ -17,7 +17,7 @@ pub(crate) const SOLIDS: [ElementKind; 6] = [
     ElementKind::Wedge15,
 ];
 
-/// Numbers between -1 and 1, the same in every run.
+/// Pseudo-random numbers between -1 and 1, the same in every run.
 pub(crate) struct Noise(pub(crate) u64);
 
 impl Noise {
@@ -31,10 +31,10 @@ impl Noise {
     }
 }
 
-/// The unit cube in `divisions` cells, each of one brick, two wedges or six tetrahedra, one region.
+/// Unit cube in `divisions` cells, each of one brick, two wedges or six tetrahedra, one region.
 ///
-/// Corners are placed by `place(unit position)`; mid-edge nodes too if `curved`, else in the
-/// middle.
+/// Corners are placed by `place(unit position)`; mid-edge nodes too if `curved`, otherwise in the
+/// middle of the edge.
 pub(crate) fn cube(
     kind: ElementKind,
     divisions: [usize; 3],
@@ -46,7 +46,7 @@ pub(crate) fn cube(
         blocks: vec![ElementBlock { kind, region: 0, ids: vec![], connectivity: vec![] }],
         ..Mesh::default()
     };
-    // Key: position in half cells, so that the middle of an edge has one too.
+    // Key: position in half cells, so that midpoints of edges have one too.
     let mut known: BTreeMap<[usize; 3], u32> = BTreeMap::new();
     let mut node = |mesh: &mut Mesh, key: [usize; 3], ends: Option<[u32; 2]>| {
         *known.entry(key).or_insert_with(|| {
@@ -85,7 +85,7 @@ fn cells(kind: ElementKind) -> Vec<Vec<usize>> {
     match kind {
         ElementKind::Hex8 | ElementKind::Hex20 => vec![vec![0, 1, 3, 2, 4, 5, 7, 6]],
         ElementKind::Wedge6 | ElementKind::Wedge15 => vec![vec![0, 1, 3, 4, 5, 7], vec![0, 3, 2, 4, 7, 6]],
-        // One tetrahedron for each order of the axes along the way from corner 0 to corner 7.
+        // One tetrahedron per permutation of the axes along the path from corner 0 to corner 7.
         _ => vec![[1, 2, 4], [2, 4, 1], [4, 1, 2], [1, 4, 2], [2, 1, 4], [4, 2, 1]]
             .into_iter()
             .enumerate()

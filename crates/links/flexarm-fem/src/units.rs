@@ -1,11 +1,11 @@
-//! Coherent systems of units of meshes and matrices, as FE programs use them without saying so.
+//! Coherent unit systems of meshes and matrices, which FE programs use without declaring them.
 //!
-//! A mesh file or a matrix file carries no units. The user names the system, such as `mm-t-s`
-//! (forces then are in N, stresses in MPa), and every reader converts to SI with it.
+//! Mesh and matrix files do not contain units. The user names the system, such as `mm-t-s` (forces
+//! in N, stresses in MPa), and every reader uses it to convert to SI.
 
 use crate::error::FemError;
 
-/// Units of length, mass and time; those of force, stress and density follow.
+/// Units of length, mass and time; units of force, stress and density are derived.
 ///
 /// ```
 /// use flexarm_fem::UnitSystem;
@@ -16,15 +16,15 @@ use crate::error::FemError;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UnitSystem {
-    /// One unit of length, m.
+    /// Unit of length, m.
     pub length: f64,
-    /// One unit of mass, kg.
+    /// Unit of mass, kg.
     pub mass: f64,
-    /// One unit of time, s.
+    /// Unit of time, s.
     pub time: f64,
 }
 
-/// The words for each unit and what they are in SI.
+/// Names of the units and their values in SI.
 const LENGTHS: [(&str, f64); 5] = [("m", 1.0), ("mm", 1e-3), ("cm", 1e-2), ("in", 0.0254), ("ft", 0.3048)];
 const MASSES: [(&str, f64); 6] = [
     ("kg", 1.0),
@@ -40,22 +40,22 @@ impl UnitSystem {
     /// m, kg, s, N, Pa.
     pub const SI: Self = Self { length: 1.0, mass: 1.0, time: 1.0 };
 
-    /// One unit of force, N.
+    /// Unit of force, N.
     pub fn force(&self) -> f64 {
         self.mass * self.length / (self.time * self.time)
     }
 
-    /// One unit of stress, Pa.
+    /// Unit of stress, Pa.
     pub fn stress(&self) -> f64 {
         self.force() / (self.length * self.length)
     }
 
-    /// One unit of density, kg/m³.
+    /// Unit of density, kg/m³.
     pub fn density(&self) -> f64 {
         self.mass / self.length.powi(3)
     }
 
-    /// The name, such as `mm-t-s`.
+    /// Name of the system, such as `mm-t-s`.
     pub fn name(&self) -> String {
         fn word(table: &[(&'static str, f64)], value: f64) -> String {
             let known = table.iter().find(|(_, factor)| *factor == value);
@@ -74,8 +74,8 @@ impl std::fmt::Display for UnitSystem {
 impl std::str::FromStr for UnitSystem {
     type Err = FemError;
 
-    /// Reads `length-mass-time`: `m-kg-s` (or `SI`), `mm-t-s`, `mm-kg-ms`, `cm-g-s`, `in-slinch-s`,
-    /// `ft-slug-s`, ...
+    /// Parses `length-mass-time`: `m-kg-s` (or `SI`), `mm-t-s`, `mm-kg-ms`, `cm-g-s`,
+    /// `in-slinch-s`, `ft-slug-s`, ...
     fn from_str(text: &str) -> Result<Self, FemError> {
         if text.eq_ignore_ascii_case("si") {
             return Ok(Self::SI);

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, Matrix6, SMatrix, Vector6};
 
 const THEORIES: [BeamTheory; 2] = [BeamTheory::EulerBernoulli, BeamTheory::Timoshenko];
 
-/// Every value different, so that a swap shows.
+/// All values differ, so that a swap is detected.
 fn bar() -> Bar {
     Bar {
         EA: 4.2e8,
@@ -54,7 +54,7 @@ fn tip_yields_to_six_loads_as_the_textbook_says() {
     }
 }
 
-/// Identity: compliance and stiffness are inverses, and rigid motions cost no force.
+/// Identity: compliance and stiffness are inverses, and rigid motions cause no force.
 #[test]
 fn stiffness_and_compliance_belong_together() {
     let l = 0.8;
@@ -93,7 +93,7 @@ fn compliances_of_segments_add_up_to_the_whole_beam() {
     }
 }
 
-/// Truth: the textbook mass matrix m/420 [156 22l 54 -13l; ...] of a beam without rotary inertia.
+/// Truth: textbook mass matrix m/420 [156 22l 54 -13l; ...] of a beam without rotary inertia.
 #[test]
 fn slender_mass_is_the_textbook_matrix() {
     let l = 0.8;
@@ -116,7 +116,8 @@ fn slender_mass_is_the_textbook_matrix() {
     }
 }
 
-/// Identity: `Rᵀ M R` of the consistent mass is the spatial inertia of the piece, in both theories.
+/// Identity: `Rᵀ M R` of the consistent mass is the spatial inertia of the piece, for both
+/// theories.
 #[test]
 fn consistent_mass_has_the_mass_properties_of_the_piece() {
     let l = 0.8;
@@ -131,11 +132,11 @@ fn consistent_mass_has_the_mass_properties_of_the_piece() {
     }
 }
 
-/// Truth: w_n = (beta_n l)² sqrt(EI/(rho A l⁴)) of the clamped-free beam, from eight elements.
+/// Truth: w_n = (beta_n l)² sqrt(EI/(rho A l⁴)) of the clamped-free beam, with eight elements.
 #[test]
 fn cantilever_frequencies_converge_to_the_closed_form() {
     let (l, n) = (1.0, 8_u32);
-    // No rotary inertia and equal stiffness in y and z: the lowest pair is the first bending.
+    // No rotary inertia and equal stiffness in y and z: the lowest pair is the first bending mode.
     let slender = Bar { EI_y: 1.3e5, rotary_y: 1e-9, rotary_z: 1e-9, ..bar() };
     let element = Beam::new(slender, BeamTheory::EulerBernoulli, l / f64::from(n)).unwrap();
     let (k, m) = (element.stiffness12(), element.mass12());
@@ -152,13 +153,13 @@ fn cantilever_frequencies_converge_to_the_closed_form() {
             }
         }
     }
-    // Torsion has next to no inertia here and hence only very high frequencies.
+    // Torsion has almost no inertia here and therefore only very high frequencies.
     let L_inv = M.cholesky().unwrap().l().try_inverse().unwrap();
     let mut squares: Vec<f64> = (&L_inv * K * L_inv.transpose()).symmetric_eigenvalues().iter().copied().collect();
     squares.sort_by(f64::total_cmp);
     for (pair, beta_l, bound) in [(0, 1.875_104_069, 1e-5), (2, 4.694_091_133, 3e-4)] {
         let omega_n = f64::powi(beta_l, 2) * (1.3e5 / 14.0_f64).sqrt() / (l * l);
-        // measured 2e-6 and 8e-5: the element's own error, of order (beta h)⁴
+        // measured 2e-6 and 8e-5: discretisation error of the element, of order (beta h)⁴
         assert_relative_eq!(squares[pair].sqrt(), omega_n, max_relative = bound);
         assert_relative_eq!(squares[pair + 1].sqrt(), omega_n, max_relative = bound);
     }
@@ -191,9 +192,9 @@ fn box_of_the_lower_arm_has_its_hand_calculated_values() {
     assert_relative_eq!(s.J, 2.094_230_769_230_769e-5, max_relative = 1e-13);
 }
 
-/// Truths: two walls far apart are two strips, 10(1+nu)/(12+11nu); a square by Cowper's table,
-/// 20(1+nu)/(48+39nu); without Poisson's ratio a square is what its shear flow says, 5/12. Solid
-/// elements: 0.2797, 0.5946 for the last one.
+/// Truths: two distant walls are two strips, 10(1+nu)/(12+11nu); a square by Cowper's table,
+/// 20(1+nu)/(48+39nu); a square with nu = 0 by its shear flow, 5/12. Solid elements: 0.2797, 0.5946
+/// for the last case.
 #[test]
 fn all_walls_of_a_box_shear() {
     let k = |width, height, wall, nu| {
@@ -212,8 +213,8 @@ fn all_walls_of_a_box_shear() {
     assert_relative_eq!(k_z, 0.5946, max_relative = 1e-2);
 }
 
-/// Truth: J = 0.140577014955154 a⁴ for a square, b h³/3 (1 - 0.630 h/b) for a strip
-/// (Timoshenko & Goodier, art. 109), and 0.21 approximation of the theory page in between.
+/// Truth: J = 0.140577014955154 a⁴ for a square, b h³/3 (1 - 0.630 h/b) for a strip (Timoshenko &
+/// Goodier, art. 109), and the 0.21 approximation of the theory page in between.
 #[test]
 fn rectangle_torsion_is_the_exact_series() {
     let J = |width, height| Section::Rectangle { width, height }.properties(0.3).unwrap().J;

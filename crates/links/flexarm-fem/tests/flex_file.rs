@@ -1,4 +1,4 @@
-//! The reduced-link file: what it says is what comes back, and every mistake is named.
+//! The reduced-link file: lossless reading and writing, and a precise error for every mistake.
 #![allow(non_snake_case, reason = "monogram notation, as in the crate")]
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 
@@ -14,14 +14,14 @@ use flexarm_spatial::{turn6, twice};
 use nalgebra::{DMatrix, Matrix6};
 use proptest::prelude::*;
 
-/// The example of the format's own page.
+/// The example in the documentation of the format.
 const EXAMPLE: &str = include_str!("../src/flex_file/format.md");
 
 fn example() -> &'static str {
     EXAMPLE.split("```toml\n").nth(1).unwrap().split("```").next().unwrap()
 }
 
-/// The error of the example after a change of its text.
+/// The error after changing the text of the example.
 fn error_of(from: &str, to: &str) -> FlexFileError {
     assert!(example().contains(from), "{from:?} is not in the example");
     parse_flex(&example().replacen(from, to, 1), "arm.flex").unwrap_err()
@@ -243,7 +243,7 @@ fn matrices_that_cannot_be_a_link_are_refused_with_the_reason() {
     assert!(&*far.element == "interface" && far.to_string().contains("millimetres"), "{far}");
 }
 
-/// A 6×6 in N/mm read as N/m passes the gate, which has no units; the warning is what is left.
+/// A 6×6 in N/mm read as N/m passes the dimensionless gate; only the warning remains.
 #[test]
 fn a_stiffness_in_other_units_than_its_frames_is_warned_about() {
     let link = lower_arm().reduce().unwrap();
@@ -268,7 +268,7 @@ fn rotations_are_rpy_or_an_orthonormal_matrix() {
     assert_eq!(mirrored.kind, FlexErrorKind::Rotation);
 }
 
-/// A file cut off anywhere is refused: the last thing in it is required.
+/// A file truncated anywhere is rejected: its last entry is required.
 #[test]
 fn truncated_files_are_refused_wherever_they_end() {
     let text = write_flex(&turned_arm());
@@ -300,7 +300,7 @@ proptest! {
         let _ = parse_flex(&text, "text");
     }
 
-    /// Cuts and pastes of a good file reach every branch behind the parser.
+    /// Cutting and pasting in a good file reaches every branch after the parser.
     #[test]
     fn mutilated_files_never_panic(
         from in 0.0..1.0_f64, length in 0_usize..40, paste in "[0-9a-zA-Z.=\"\\[\\], \n-]{0,12}",
@@ -312,7 +312,8 @@ proptest! {
         let _ = flexarm_fem::flex_file::parse_flex_bytes(&changed, "bytes");
     }
 
-    /// Numbers of any size in any place of the matrix: an error or a link, never a panic or a loop.
+    /// Numbers of any size at any position of the matrix: an error or a link, never a panic or a
+    /// loop.
     #[test]
     fn any_number_anywhere_never_panics(value in any::<f64>(), i in 0_usize..6, j in 0_usize..6) {
         let mut link = parse_flex(example(), "a").unwrap();

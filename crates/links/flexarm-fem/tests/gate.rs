@@ -1,4 +1,4 @@
-//! Bad matrices and what is said about them; good ones from another FE program.
+//! Bad matrices with their error messages, and good ones from another FE program.
 #![allow(non_snake_case, reason = "monogram notation, as in the crate")]
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 
@@ -33,7 +33,7 @@ fn a_beam_passes_with_margins_at_rounding() {
     assert!(report.warnings(&GateLimits::default()).is_empty());
 }
 
-/// The measures are pure numbers: millimetres instead of metres change nothing.
+/// The measures are dimensionless: millimetres instead of metres change nothing.
 #[test]
 fn the_gate_does_not_depend_on_units() {
     let link = turned_arm();
@@ -59,7 +59,7 @@ fn a_matrix_that_is_not_symmetric_is_named_with_the_place() {
     assert!(check_matrix12(&K, &p_AB, &loose).is_ok());
 }
 
-/// A spring of one per cent of the bending stiffness left between B and the ground.
+/// A spring of one per cent of the bending stiffness remains between B and the ground.
 #[test]
 fn a_grounded_matrix_moves_under_rigid_motion() {
     let (mut K, p_AB) = good();
@@ -70,7 +70,7 @@ fn a_grounded_matrix_moves_under_rigid_motion() {
     assert!(error.to_string().contains("moves under rigid motion"));
 }
 
-/// The matrix in millimetres, the frames in metres: it says itself how far apart A and B are.
+/// Matrix in millimetres, frames in metres: the matrix implies the distance between A and B.
 #[test]
 fn wrong_units_show_in_the_distance_that_the_matrix_implies() {
     let (K, p_AB) = good();
@@ -80,11 +80,11 @@ fn wrong_units_show_in_the_distance_that_the_matrix_implies() {
     assert!(error.to_string().contains("the matrix itself (0.000000, 0.000000, 1.095000) m"));
 }
 
-/// A distal interface on a hinge about x: no resistance to turning there.
+/// A distal interface on a hinge about x: no resistance to that rotation.
 #[test]
 fn a_mechanism_is_singular_in_its_direction() {
     let mut K = lower_arm().reduce().unwrap().K_BB;
-    // Condense the rotation about x out and put a frictionless hinge in its place.
+    // Condense the rotation about x and put a frictionless hinge in its place.
     let column = K.column(3).into_owned();
     K -= column * column.transpose() / column[3];
     let hinge = check_matrix6("K_BB", &K, &GateLimits::default()).unwrap_err();
@@ -111,7 +111,7 @@ fn entries_that_are_no_numbers_are_named() {
     assert!(matches!(error, FemError::NotFinite { row: 2, column: 9, .. }), "{error}");
 }
 
-/// Extremes must end in an error, not in a loop of the eigensolver.
+/// Extreme values must give an error, not an endless loop of the eigensolver.
 #[test]
 fn absurd_sizes_end_in_an_error() {
     for (i, j, value) in [(0, 1, 1e300), (0, 0, 1e-320), (5, 5, 1e308), (0, 5, f64::MAX)] {
@@ -145,7 +145,7 @@ fn matrices_of_calculix_pass() {
     }
 }
 
-/// The folder of reference data, if this checkout has one beside it.
+/// The folder of reference data, if there is one next to this checkout.
 fn reference_folder() -> Option<PathBuf> {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .ancestors()
@@ -153,7 +153,7 @@ fn reference_folder() -> Option<PathBuf> {
         .find(|folder| folder.is_dir())
 }
 
-/// A 12×12 in Matrix Market array format: comments, sizes, one entry per line, column by column.
+/// Reads a 12×12 in Matrix Market array format: comments, sizes, one entry per line, by columns.
 fn read_array(path: &Path) -> Matrix12 {
     let text = std::fs::read_to_string(path).unwrap();
     let entries: Vec<f64> =

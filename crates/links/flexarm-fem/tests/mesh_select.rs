@@ -1,4 +1,4 @@
-//! Choice of interface nodes on a block of bricks whose node positions are known.
+//! Selection of interface nodes on a block of bricks with known node positions.
 
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 
@@ -6,7 +6,7 @@ use flexarm_fem::mesh::{Mesh, Region, SelectError, connected_parts, select, skin
 use flexarm_fem::{ElementBlock, ElementKind, NodeSelector};
 use nalgebra::Vector3;
 
-/// `n` unit cubes along each axis, in m times `unit`; one node more in no element.
+/// `n` unit cubes along each axis, in m times `unit`, and one node without an element.
 fn bricks(n: u32, unit: f64) -> Mesh {
     let at = |i: u32, j: u32, k: u32| (k * (n + 1) + j) * (n + 1) + i;
     let mut mesh = Mesh::default();
@@ -42,9 +42,9 @@ fn places_choose_nodes_of_the_surface_only() {
     let mesh = bricks(4, 1e-3); // mm, as the selections below
     for (text, count) in [
         ("plane(0,0,0; 1,0,0)", 25),
-        ("plane(2,0,0; -3,0,0)", 16), // a cut: the rim without what is inside
+        ("plane(2,0,0; -3,0,0)", 16), // a cut: the rim without inner nodes
         ("plane(0.4,0,0; 1,0,0; 0.5)", 25),
-        ("box(0,0,0; 4,4,4)", 98), // all of the skin
+        ("box(0,0,0; 4,4,4)", 98), // the whole skin
         ("box(1,1,1; 3,3,4)", 9),
         ("cylinder(2,2,0; 0,0,2; 1)", 8), // four nodes at each end
         ("cylinder(2,2,0; 0,0,1; 1) & plane(0,0,4; 0,0,1)", 4),

@@ -1,4 +1,4 @@
-//! The modal link of a uniform beam against closed forms, and what does not depend on its
+//! The modal link of a uniform beam against closed forms, and invariance under changes of
 //! coordinates.
 #![allow(non_snake_case, reason = "monogram notation, as in the crate")]
 #![allow(
@@ -15,8 +15,8 @@ use common::{lower_arm, turned};
 use flexarm_fem::{Bar, BeamLink, BeamTheory, FemError, Material, ModalOptions, Section};
 use nalgebra::{DMatrix, Matrix6, Vector6};
 
-/// A slender uniform beam of unit length and mass, its bending stiffness 1 and 1.7, stiff in
-/// stretch and torsion.
+/// Slender uniform beam of unit length and mass with bending stiffness 1 and 1.7, stiff in stretch
+/// and torsion.
 fn slender() -> BeamLink {
     let r2 = 1e-7;
     let bar = Bar {
@@ -61,7 +61,7 @@ fn a_modal_link_without_modes_yields_as_the_reduced_link() {
                 let gap = (C * F - truth).component_mul(&scale).amax() / truth.component_mul(&scale).amax();
                 assert!(gap < 1e-9, "{load} {gap:.1e}"); // measured 3e-15
             }
-            // Mass properties are those of the two parts.
+            // The mass properties are those of the two parts.
             let (body, truth) = (link.rigid(), reduced.rigid());
             let inertia = (body.inertia - truth.inertia).amax() / truth.inertia.amax();
             let com = (body.com - truth.com).norm();
@@ -71,7 +71,7 @@ fn a_modal_link_without_modes_yields_as_the_reduced_link() {
     }
 }
 
-/// Roots of a frequency equation of the uniform beam, `β l`, by bisection between sign changes.
+/// Roots `β l` of a frequency equation of the uniform beam, by bisection between sign changes.
 fn roots(f: impl Fn(f64) -> f64, count: usize) -> Vec<f64> {
     let mut found = Vec::new();
     let mut x = 0.1;
@@ -92,13 +92,13 @@ fn roots(f: impl Fn(f64) -> f64, count: usize) -> Vec<f64> {
 /// Frequencies of both planes, rad/s, ascending: `(β l)² sqrt(EI)`.
 fn both_planes(y: &[f64], z: &[f64]) -> Vec<f64> {
     let of = |roots: &[f64], EI: f64| roots.iter().map(|b| b * b * EI.sqrt()).collect::<Vec<_>>();
-    // Deflection along y bends by EI_z.
+    // Deflection along y depends on EI_z.
     let mut all = [of(y, 1.7), of(z, 1.0)].concat();
     all.sort_by(f64::total_cmp);
     all
 }
 
-/// Frequencies in rad/s of a dense pencil, by the Cholesky factor of the mass.
+/// Frequencies of a dense pencil, rad/s, by the Cholesky factor of the mass.
 fn frequencies(K: &DMatrix<f64>, M: &DMatrix<f64>) -> Vec<f64> {
     let inverse = M.clone().cholesky().unwrap().l().try_inverse().unwrap();
     let A = &inverse * K * inverse.transpose();
@@ -109,7 +109,7 @@ fn frequencies(K: &DMatrix<f64>, M: &DMatrix<f64>) -> Vec<f64> {
 }
 
 /// Truth: Euler-Bernoulli, cos cosh = -1 (clamped), cos cosh = 1 (free), tan = tanh (pinned about z
-/// at A, clamped across); the first half of as many modes as are kept.
+/// at A, clamped across); checked for the lower half of the retained modes.
 #[test]
 fn frequencies_of_a_beam_are_the_closed_forms_however_its_frame_is_held() {
     let kept = 24;
@@ -144,7 +144,7 @@ fn frequencies_of_a_beam_are_the_closed_forms_however_its_frame_is_held() {
     assert!(free[5] < 1e-3 * free[6] && (free[6] / 4.730_040_745_f64.powi(2) - 1.0).abs() < 1e-4);
 }
 
-/// Second algorithm: all modes of the elements, which is the FE model itself.
+/// Second algorithm: all modes of the elements, which are the FE model itself.
 #[test]
 fn few_modes_give_the_low_frequencies_of_all_elements() {
     for beam in [lower_arm(), turned()] {
@@ -161,12 +161,12 @@ fn few_modes_give_the_low_frequencies_of_all_elements() {
                 assert!((-1e-9..2e-3).contains(&error), "{what} {k}: {error:.1e}"); // measured 8.3e-4
             }
         }
-        // Twice as many elements move the low frequencies little.
+        // Doubling the number of elements changes the low frequencies little.
         let fine = beam.modal_with(&ModalOptions { modes: 30, elements: 48, geometric: false }).unwrap();
         for k in 0..6 {
             let error = few.held_frequencies_hz()[k] / fine.held_frequencies_hz()[k] - 1.0;
             eprintln!("elements {k}: {error:.1e}");
-            assert!(error.abs() < 2e-3, "{k}: {error:.1e}"); // measured EEE
+            assert!(error.abs() < 2e-3, "{k}: {error:.1e}");
         }
     }
 }
@@ -175,7 +175,7 @@ fn worst(values: impl Iterator<Item = f64>) -> f64 {
     values.fold(0.0, |worst: f64, x| if x <= worst { worst } else { x })
 }
 
-/// Identity: coordinates are a choice; motions, frequencies and compliance are not.
+/// Identity: motions, frequencies and compliance do not depend on the choice of coordinates.
 #[test]
 fn an_orthogonalised_link_is_the_same_link() {
     let options = ModalOptions { modes: 10, geometric: true, ..ModalOptions::default() };
@@ -185,7 +185,7 @@ fn an_orthogonalised_link_is_the_same_link() {
         let n = link.coordinates();
         let held =
             worst(link.held_frequencies_hz().iter().zip(modes.held_frequencies_hz()).map(|(a, b)| (a / b - 1.0).abs()));
-        // By another solver, whose low frequencies lose digits to the high ones.
+        // Another solver, whose low frequencies lose digits to the high ones.
         let dense = worst(
             frequencies(&link.K, &link.M)
                 .iter()
@@ -205,7 +205,7 @@ fn an_orthogonalised_link_is_the_same_link() {
         assert!(free < 1e-10, "{free:.1e}"); // measured 2e-12
         assert!(compliance < 1e-10, "{compliance:.1e}"); // measured 3e-15
 
-        // The integrals still fit each other, and the modes are orthonormal.
+        // The integrals are still consistent, and the modes are orthonormal.
         let trace = worst((0..n * n).map(|at| (modes.N[at].trace() - f64::from(at / n == at % n)).abs()));
         assert!(trace < 1e-10, "{trace:.1e}"); // measured 1.3e-13
         let axial = |A: &nalgebra::Matrix3<f64>| {
@@ -223,7 +223,7 @@ fn an_orthogonalised_link_is_the_same_link() {
     }
 }
 
-/// Identity: leaving modes out is the same as never having had them.
+/// Identity: truncating modes equals not computing them.
 #[test]
 fn a_truncated_link_is_the_one_with_fewer_modes() {
     let options = |modes| ModalOptions { modes, geometric: true, ..ModalOptions::default() };
@@ -231,7 +231,7 @@ fn a_truncated_link_is_the_one_with_fewer_modes() {
     let cut = many.truncated(4).unwrap();
     assert_eq!((cut.coordinates(), &cut.labels, &cut.interfaces), (10, &few.labels, &few.interfaces));
     let size = |k: usize| few.M[(k, k)].sqrt();
-    // Modes have any sign: squares of their integrals are compared.
+    // The sign of a mode is arbitrary, so quadratic integrals are compared.
     let N = worst((0..10).map(|k| (cut.N[k * 11] - few.N[k * 11]).amax() / (size(k) * size(k))));
     let K = worst((0..10).map(|k| (cut.K[(k, k)] / few.K[(k, k)] - 1.0).abs()));
     eprintln!("truncated: N {N:.1e} K {K:.1e}");
@@ -239,21 +239,20 @@ fn a_truncated_link_is_the_one_with_fewer_modes() {
     assert!(matches!(many.truncated(10), Err(FemError::OutOfRange { .. })));
 }
 
-/// Truth: the sum over the static shape of a cantilever under its own weight, `w l⁴/(8 EI)` at the
-/// tip.
+/// Truth: static deflection of a cantilever under its own weight, `w l⁴/(8 EI)` at the tip.
 #[test]
 fn a_cantilever_sags_under_its_own_weight_as_the_textbook_says() {
     let link = slender().modal(6).unwrap();
-    // Kη = -C_tᵀ a for an acceleration of the frame: the weight of a unit of gravity along -z.
+    // Kη = -C_tᵀ a for an acceleration of the frame: unit gravity along -z.
     let load = link.C_t.row(2).transpose() * -1.0;
     let eta = link.K.clone().cholesky().unwrap().solve(&nalgebra::DVector::from_column_slice(load.as_slice()));
     let error = eta[2] / (-1.0 / 8.0) - 1.0;
     eprintln!("sag {error:.1e}");
     assert!(error.abs() < 1e-9, "{error:.1e}"); // measured 2.6e-13
-    // The twelve unit loads know the pull of gravity along the beam: hanging, it stiffens.
+    // The unit loads include gravity along the beam: a hanging beam stiffens.
     let hanging = slender().modal_with(&ModalOptions { geometric: true, ..ModalOptions::default() }).unwrap();
     let G = &hanging.geometric.as_ref().unwrap().acceleration[0];
-    // Load -a along x pushes: with a = -1 the beam hangs along gravity.
+    // The load -a along x compresses the beam: with a = -1 the beam hangs along gravity.
     assert!(G[(2, 2)] < 0.0);
     // Truth: a column buckles under its own weight at 7.8373 EI/l² [Timoshenko & Gere, art. 2.12].
     let L = hanging.K.clone().cholesky().unwrap().l();

@@ -1,5 +1,5 @@
 //! I-beams and channels against tables of rolled profiles, finite elements over the section, and
-//! thin walls.
+//! thin-wall limits.
 #![allow(non_snake_case, reason = "monogram notation, as in the crate")]
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(clippy::print_stderr, reason = "tables of measured errors, shown with --nocapture")]
@@ -7,17 +7,18 @@
 use approx::assert_relative_eq;
 use flexarm_fem::{FemError, Section, SectionProperties};
 
-/// Place from the middle of a cell, shape functions, their slopes.
+/// Position relative to the centre of a cell, shape functions, and their derivatives.
 type GaussPoint = ([f64; 2], [f64; 4], [[f64; 2]; 4]);
 
-/// Lengths of the profiles below: whether a channel; width, height, web, flange, fillet (mm).
+/// Dimensions of the profiles below: whether it is a channel; width, height, web, flange, fillet
+/// (mm).
 type Profile = (bool, [f64; 5]);
 
 const IPE_200: Profile = (false, [100.0, 200.0, 5.6, 8.5, 12.0]);
 const IPE_300: Profile = (false, [150.0, 300.0, 7.1, 10.7, 15.0]);
 const UPE_200: Profile = (true, [80.0, 200.0, 6.0, 11.0, 13.0]);
 
-/// Properties in mm, and without Poisson's ratio.
+/// Properties in mm, with Poisson's ratio zero.
 fn properties((channel, [width, height, web, flange, fillet]): Profile) -> SectionProperties {
     let section = match channel {
         true => Section::Channel { width, height, web, flange, fillet },
@@ -26,9 +27,9 @@ fn properties((channel, [width, height, web, flange, fillet]): Profile) -> Secti
     section.properties(0.0).unwrap()
 }
 
-/// Truth: tables of rolled profiles, cm², cm⁴ (EN 10365 as producers print it; three to four
-/// digits). `J` of the tables is by the same source with rounded fits: measured 0.9 % for IPE 200,
-/// 1 % for IPE 300, 0.1 % for UPE 200.
+/// Truth: tables of rolled profiles, cm², cm⁴ (EN 10365 as printed by manufacturers; three to four
+/// digits). `J` in the tables is from the same source with rounded fits: measured 0.9 % for IPE
+/// 200, 1 % for IPE 300, 0.1 % for UPE 200.
 #[test]
 fn rolled_profiles_have_the_values_of_their_tables() {
     for (profile, [A, I_y, I_z, J]) in [
@@ -42,13 +43,13 @@ fn rolled_profiles_have_the_values_of_their_tables() {
         assert_relative_eq!(s.I_z / 1e4, I_z, max_relative = 1e-3); // measured 2e-4 at most
         assert_relative_eq!(s.J / 1e4, J, max_relative = 2e-2);
     }
-    // UPE 200: the shear centre lies 5.41 cm from the centroid, on the side of the web.
+    // UPE 200: the shear centre is 5.41 cm from the centroid, on the side of the web.
     assert_relative_eq!(properties(UPE_200).shear_centre_y, -54.1, max_relative = 2e-3); // measured 5e-4
 }
 
 /// Second algorithm: area, moments, torsion, shear and shear centre from finite elements over the
-/// section, without any assumption on walls. The sharp corners of cells hold a part of the
-/// difference in `J`: with cells of half the size it moves by 0.2 %. Measured: J 2.4 %, k_y 21 %
+/// section, without assumptions about walls. The sharp corners of cells contribute to the
+/// difference in `J`: with cells of half the size it changes by 0.2 %. Measured: J 2.4 %, k_y 21 %
 /// and k_z 8.2 % too soft, shear centre 4.4 %.
 #[test]
 fn sections_agree_with_finite_elements_over_them() {
@@ -85,7 +86,7 @@ fn sections_agree_with_finite_elements_over_them() {
             off(s.k_z, k_z),
             if channel { off(s.shear_centre_y, lever) } else { 0.0 },
         );
-        // The cells are the section where its lengths are multiples of them.
+        // The cells represent the section exactly if its dimensions are multiples of the cell size.
         let exact = if fillet == 0.0 { 1e-12 } else { 3e-3 };
         assert_relative_eq!(s.A, cells.A, max_relative = exact);
         assert_relative_eq!(s.I_y, cells.I_y, max_relative = exact);
@@ -100,9 +101,9 @@ fn sections_agree_with_finite_elements_over_them() {
     }
 }
 
-/// Truths of walls that get thin: `J = Σ l t³/3`; a channel of depth b and equal walls on b × 2b
-/// has its shear centre `3b/8` outside of the web; an I-beam is sheared along y in its flanges
-/// alone, 5/6 of their area.
+/// Truths in the limit of thin walls: `J = Σ l t³/3`; a channel of depth b and equal walls on b ×
+/// 2b has its shear centre `3b/8` outside of the web; an I-beam shears along y only in its flanges,
+/// with 5/6 of their area.
 #[test]
 fn thin_walls_have_their_limits() {
     let (b, t) = (1.0, 1e-4);
@@ -112,7 +113,7 @@ fn thin_walls_have_their_limits() {
         assert_relative_eq!(s.A, 4.0 * b * t, max_relative = 1e-3); // measured 5e-5
         assert_relative_eq!(s.J, 4.0 * b * t.powi(3) / 3.0, max_relative = 1e-3); // measured 6e-5
     }
-    // Centroid at b/4, the flanges half of the area.
+    // Centroid at b/4; the flanges are half of the area.
     assert_relative_eq!(thin(true).shear_centre_y, -0.25 * b - 0.375 * b, max_relative = 1e-3); // measured 5e-5
     assert_relative_eq!(thin(false).k_y, 5.0 / 6.0 * 0.5, max_relative = 1e-3); // measured 5e-5
 }
@@ -136,8 +137,8 @@ fn impossible_profiles_name_the_length() {
     assert_eq!(refused(|l| l[4] = -1.0), "fillet radius (m)");
 }
 
-/// A section as square cells of one size: St. Venant torsion and flexure (without Poisson's ratio)
-/// by finite elements.
+/// A section made of square cells of one size: St. Venant torsion and flexure (with Poisson's ratio
+/// zero) by finite elements.
 ///
 /// Both are `min ∫ ½ |∇φ + b|² - s φ` over the section with free edges; `τ/G = ∇φ + b`:
 ///
@@ -147,7 +148,7 @@ fn impossible_profiles_name_the_length() {
 /// ```
 struct Cells {
     size: f64,
-    /// Nodes of each cell, and its middle from the centroid.
+    /// Nodes of each cell, and its centre relative to the centroid.
     nodes: Vec<[usize; 4]>,
     middle: Vec<[f64; 2]>,
     n: usize,
@@ -207,7 +208,7 @@ impl Cells {
         (1.0 / (shear.energy * self.A), shear.moment)
     }
 
-    /// Conjugate gradients over bilinear cells, four Gauss points each.
+    /// Conjugate gradients over bilinear cells with four Gauss points each.
     fn solve(&self, source: impl Fn(f64, f64) -> f64, b: impl Fn(f64, f64) -> [f64; 2]) -> Shear {
         let points = self.points();
         let mut K = [[0.0; 4]; 4];
@@ -262,7 +263,7 @@ impl Cells {
 
     fn conjugate_gradients(&self, K: &[[f64; 4]; 4], mut r: Vec<f64>) -> Vec<f64> {
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        // The constant is free: the loads have no sum but rounding.
+        // The constant part of the solution is arbitrary; the sum of the loads is only rounding.
         let mean = r.iter().sum::<f64>() / self.n as f64;
         r.iter_mut().for_each(|r| *r -= mean);
         let (mut x, mut p, mut Kp) = (vec![0.0; self.n], r.clone(), vec![0.0; self.n]);

@@ -1,4 +1,4 @@
-//! The split: any elastic joint carries the stiffness of the whole link.
+//! The split: an elastic joint at any frame reproduces the stiffness of the whole link.
 #![allow(non_snake_case, reason = "monogram notation, as in the crate")]
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 
@@ -13,7 +13,7 @@ use flexarm_spatial::adjoint;
 use nalgebra::{Matrix6, Vector3, Vector6};
 use proptest::prelude::*;
 
-/// Truth: Euler-Bernoulli cantilever, w = F l³/(3EI), slope = F l²/(2EI), for any place of the
+/// Truth: Euler-Bernoulli cantilever, w = F l³/(3EI), slope = F l²/(2EI), for any position of the
 /// split.
 #[test]
 fn split_keeps_cantilever_tip_deflection() {
@@ -67,8 +67,8 @@ fn mid_split_agrees_with_the_numpy_implementation() {
         assert_relative_eq!(lower.distal.inertia[(i, i)], moment, max_relative = 1e-12);
     }
 
-    // The upper arm there has the thin-tube shear factor 2(1+nu)/(4+3nu); `Tube` takes the exact
-    // one.
+    // The upper arm of the reference uses the thin-tube shear factor 2(1+nu)/(4+3nu); `Tube` uses
+    // the exact one.
     let tube = Section::Tube { outer_diameter: 0.140, wall: 0.006 };
     let bar = tube.bar(&Material::STEEL).unwrap();
     let kGA = bar.EA / 2.6 * (2.6 / 4.9);
@@ -92,7 +92,7 @@ fn mid_split_agrees_with_the_numpy_implementation() {
     }
 }
 
-/// Second way: the offset beam's tip displacement by moving wrench and displacement over the arms.
+/// Second algorithm: tip displacement of the offset beam by transforming wrench and displacement.
 #[test]
 fn offset_beam_moves_its_joint_frame_as_the_rigid_arms_say() {
     let recipe = offset_arm();
@@ -101,7 +101,7 @@ fn offset_beam_moves_its_joint_frame_as_the_rigid_arms_say() {
         .unwrap()
         .tip_compliance();
     let R_LE = recipe.X_LE.rotation;
-    let p_BE2 = Vector3::new(0.03, 0.05, 0.0); // the joint B sits beside the end of the beam
+    let p_BE2 = Vector3::new(0.03, 0.05, 0.0); // joint B is offset from the end of the beam
     let (f, t) = (Vector3::new(120.0, -40.0, 900.0), Vector3::new(15.0, 25.0, -35.0));
 
     // Wrench at the beam end, displacement there, and back to B.
@@ -115,7 +115,7 @@ fn offset_beam_moves_its_joint_frame_as_the_rigid_arms_say() {
     assert_relative_eq!(u_B.fixed_rows::<3>(3).into_owned(), theta, max_relative = 1e-11);
 }
 
-/// Identity: mass, centre and inertia of both parts do not depend on where the link is cut.
+/// Identity: mass, centre and inertia of the merged parts do not depend on the position of the cut.
 #[test]
 fn the_cut_does_not_change_the_whole_body() {
     let whole = |split_fraction| BeamLink { split_fraction, ..offset_arm() }.reduce().unwrap().rigid();
@@ -128,7 +128,7 @@ fn the_cut_does_not_change_the_whole_body() {
     }
 }
 
-/// What dropping the coupling costs: a straight beam split at 0.4 of its length, tip deflection.
+/// Error of dropping the coupling: tip deflection of a straight beam split at 0.4 of its length.
 #[test]
 fn dropping_the_coupling_is_wrong_by_tens_of_per_cent() {
     let link = BeamLink { split_fraction: 0.4, ..lower_arm() }.reduce().unwrap();
@@ -174,7 +174,7 @@ fn impossible_recipes_are_named() {
 proptest! {
     #![proptest_config(fixed_cases())]
 
-    /// u_B = C_BB F_B whatever the split: the elastic joint at S carries any wrench at B.
+    /// u_B = C_BB F_B for any split: the elastic joint at S transmits any wrench at B.
     #[test]
     fn tip_displacement_does_not_depend_on_the_split(
         K_BB in spd_stiffness(), X_BS in pose(), F_B in vector6(),
@@ -184,7 +184,7 @@ proptest! {
         let F_S = Ad_BS.transpose() * F_B;
         let u_B = Ad_BS * K_S.cholesky().unwrap().solve(&F_S);
         let exact = K_BB.cholesky().unwrap().solve(&F_B);
-        // Compared in energy, which has one unit; measured 2e-13.
+        // Compared in energy, which has a single unit; measured 2e-13.
         let error = u_B - exact;
         let energy = |x: &Vector6<f64>| x.dot(&(K_BB * x)).max(0.0);
         prop_assert!(energy(&error).sqrt() <= 1e-11 * energy(&exact).sqrt());
@@ -200,7 +200,7 @@ proptest! {
         prop_assert!((d_S.dot(&(K_S * d_S)) - u_B.dot(&(K_BB * u_B))).abs() <= 1e-12 * scale);
     }
 
-    /// Moving the split away and back leaves K_S; the joint never changes what B feels.
+    /// The stiffness at B does not depend on the position of the split.
     #[test]
     fn moving_the_split_of_a_link_keeps_its_tip_stiffness(X_LS in pose()) {
         let link = turned_arm();

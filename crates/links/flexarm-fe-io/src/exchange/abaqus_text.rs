@@ -1,7 +1,7 @@
 //! Matrices without a header: `node,dof,node,dof,value`, `row column value`, and lists of rows.
 //!
-//! Abaqus `*MATRIX OUTPUT` and newer CalculiX write the first, Abaqus `COORDINATE` and CalculiX
-//! `.sti`/`.mas` the second. Either triangle or both may be there.
+//! Abaqus `*MATRIX OUTPUT` and newer CalculiX write the first format, Abaqus `COORDINATE` and
+//! CalculiX `.sti`/`.mas` the second. The file may contain either triangle or both.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -9,14 +9,14 @@ use super::error::{ExchangeError, ExchangeErrorKind};
 use super::matrix::{DofLabel, LabelledMatrix, Storage, Triplets};
 use super::text::{Text, shown, words};
 
-/// Lines with data: no comments, no empty ones.
+/// Lines with data, without comments and empty lines.
 fn data<'a>(text: &Text<'a>) -> impl Iterator<Item = (super::error::Place<'a>, &'a str)> + use<'a> {
     text.lines().filter(|(_, line)| !line.starts_with("**") && !line.trim().is_empty())
 }
 
 /// Reads `node,dof,node,dof,value` (commas or blanks); rows are sorted by node and component.
 ///
-/// Returns a sentence about internal unknowns (negative labels), if there are any.
+/// Also returns a warning about internal unknowns (negative labels), if there are any.
 pub(super) fn parse_labelled(text: Text<'_>) -> Result<(LabelledMatrix, Option<String>), ExchangeError> {
     let mut entries = Vec::new();
     for (place, line) in data(&text) {
@@ -70,7 +70,7 @@ pub(super) fn parse_coordinate(text: Text<'_>, storage: Storage) -> Result<Label
     triplets.symmetric("the matrix", text.origin, rows, storage)
 }
 
-/// Reads a CalculiX `.dof`: one `node.dof` per row. It is text: `10.1` and `10.10` differ.
+/// Reads a CalculiX `.dof`: one `node.dof` per row, as text, because `10.1` and `10.10` differ.
 pub(super) fn parse_dof_list(text: Text<'_>) -> Result<Vec<DofLabel>, ExchangeError> {
     let mut rows = Vec::new();
     for (place, line) in data(&text) {

@@ -1,4 +1,5 @@
-//! From a matrix of a file to stiffness and mass of the interfaces, in SI: the one place of units.
+//! Converts a matrix of a file to stiffness and mass of the interfaces in SI; units are handled
+//! only here.
 //!
 //! Every row has a displacement unit `d_i`: the unit of length for translations, 1 (rad) for
 //! rotations, `sqrt(mass)·length` for modal coordinates. With the unit of energy `E`
@@ -6,9 +7,9 @@
 //! ```text
 //! K_SI = K E / (d_i d_j)        M_SI = M E time² / (d_i d_j)
 //! ```
-//! so `K` is force/length, force, force·length, mass-normalised modes stay so (`M_mm = 1`), `K_mm`
-//! is `1/time²`, `M_bm` is `sqrt(mass)` or `sqrt(mass)·length`. For modes normalised otherwise this
-//! is a mere rescaling of their coordinates: the model is the same.
+//! so `K` is in force/length, force, force·length. Mass-normalised modes stay normalised
+//! (`M_mm = 1`), `K_mm` is in `1/time²`, `M_bm` in `sqrt(mass)` or `sqrt(mass)·length`. For modes
+//! normalised otherwise this only rescales their coordinates; the model is the same.
 
 use nalgebra::DMatrix;
 
@@ -29,19 +30,19 @@ pub struct InterfaceMatrices {
     pub M: Option<DMatrix<f64>>,
     /// Number of modal coordinates after the interfaces.
     pub modes: usize,
-    /// Larger of the asymmetries of the file.
+    /// Larger of the asymmetries of the matrices in the file.
     pub asymmetry: f64,
 }
 
-/// Picks the rows of the interfaces and converts to SI.
+/// Extracts the rows of the interfaces and converts them to SI.
 ///
-/// * `map`: which rows are which interface; `None` takes that of the sidecar, if there is one.
-/// * `units`: units of the file; `None` takes those of the sidecar.
+/// * `map`: rows of each interface; `None` uses the map of the sidecar, if there is one.
+/// * `units`: units of the file; `None` uses those of the sidecar.
 ///
 /// # Errors
-/// [`ExchangeErrorKind::Ambiguous`] without a map (with the text to give) or without units,
-/// [`ExchangeErrorKind::Interface`] if the map does not fit, or rows are left over that are no
-/// modes, [`ExchangeErrorKind::Defective`] from [`diagnose_substructure`].
+/// [`ExchangeErrorKind::Ambiguous`] without a map (with a proposal) or without units,
+/// [`ExchangeErrorKind::Interface`] if the map does not fit or leaves rows that are not modes,
+/// [`ExchangeErrorKind::Defective`] from [`diagnose_substructure`].
 pub fn assemble_interfaces(
     imported: &ImportedMatrices,
     map: Option<&InterfaceMap>,
@@ -87,17 +88,18 @@ pub fn assemble_interfaces(
     Ok(InterfaceMatrices { names, K, M, modes: resolved.modal.len(), asymmetry })
 }
 
-/// Rows that nobody called modal must look so: no stiffness between them and anything else.
+/// Checks that rows not declared as modal look like modes: no stiffness coupling with any other
+/// row.
 ///
-/// Otherwise a full model without labels would pass as one with hundreds of modes. Scalar points of
-/// Nastran are what they say.
+/// Otherwise a full model without labels would be accepted as one with hundreds of modes. Scalar
+/// points of Nastran are declared modal.
 fn check_modes(
     imported: &ImportedMatrices,
     K: &DMatrix<f64>,
     rows: &[usize],
     boundary: usize,
 ) -> Result<(), ExchangeError> {
-    /// Coupling above this, relative to the diagonal, is no rounding.
+    /// Maximum coupling relative to the diagonal that counts as rounding.
     const COUPLED: f64 = 1e-6;
     let is_said = |i: usize| imported.stiffness.rows[rows[i]].node.is_some_and(|node| node >= 0);
     let coupling = |i: usize, j: usize| K[(i, j)].abs() / (K[(i, i)] * K[(j, j)]).abs().sqrt();
@@ -114,7 +116,7 @@ fn check_modes(
     Ok(())
 }
 
-/// The error that asks which rows are A and B, with the text to type where the rows suggest one.
+/// Error that asks for the rows of A and B, with a proposed map if the rows suggest one.
 fn ask_for_map(imported: &ImportedMatrices) -> ExchangeError {
     let rows = &imported.stiffness.rows;
     let help = match propose_map(rows) {

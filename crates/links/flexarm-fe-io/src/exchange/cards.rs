@@ -1,33 +1,33 @@
-//! Nastran bulk data: physical lines in small, large or free field put together to entries.
+//! Nastran bulk data: joins physical lines in small, large or free field into entries.
 
 use super::error::{ExchangeError, ExchangeErrorKind, Place};
 use super::text::{Text, shown};
 
-/// One entry with all its continuation lines.
+/// Entry with all its continuation lines.
 #[derive(Debug)]
 pub(super) struct Card<'a> {
-    /// The first line.
+    /// Place of the first line.
     pub(super) place: Place<'a>,
     /// Keyword without `*`, upper case.
     pub(super) keyword: String,
-    /// Data fields after the keyword: eight per line, four per line in large field.
+    /// Data fields after the keyword with their line numbers: eight per line, four in large field.
     pub(super) fields: Vec<(&'a str, usize)>,
 }
 
 impl<'a> Card<'a> {
-    /// A data field, from 0; empty if it is not there.
+    /// Data field `i`, from 0; empty if absent.
     pub(super) fn field(&self, i: usize) -> &'a str {
         self.fields.get(i).map_or("", |(text, _)| text)
     }
 
-    /// The line of a field.
+    /// Place of field `i`.
     pub(super) fn place_of(&self, i: usize) -> Place<'a> {
         let line = self.fields.get(i).map(|(_, line)| *line).or(self.place.line);
         Place { line, ..self.place }
     }
 }
 
-/// The entries with one of these keywords, in the order of the file.
+/// Entries with one of these keywords, in file order.
 pub(super) fn cards<'a>(text: Text<'a>, keywords: &[&str]) -> Result<Vec<Card<'a>>, ExchangeError> {
     let mut cards: Vec<Card<'_>> = Vec::new();
     let mut skipping = true;
@@ -57,8 +57,8 @@ pub(super) fn cards<'a>(text: Text<'a>, keywords: &[&str]) -> Result<Vec<Card<'a
     Ok(cards)
 }
 
-/// First field and data fields of a line, padded to eight (small) or four (large field), and what
-/// is too much.
+/// First field and data fields of a line, padded to eight (small) or four (large field), and the
+/// first excess field.
 fn fields(line: &str) -> (&str, Vec<&str>, Option<&str>) {
     const SMALL: usize = 8;
     const LARGE: usize = 4;
@@ -74,13 +74,13 @@ fn fields(line: &str) -> (&str, Vec<&str>, Option<&str>) {
         let data = (0..count).map(|i| columns(line, 8 + i * width, width)).collect();
         (head, data, count)
     };
-    // One more is the name of the continuation.
+    // One additional field is the name of the continuation.
     let beyond = data.iter().skip(count + 1).find(|field| !field.is_empty()).copied();
     data.resize(count, "");
     (head, data, beyond)
 }
 
-/// Columns of a line without blanks around; what is beyond its end, or no ASCII, is empty.
+/// Columns of a line, trimmed; empty if beyond its end or not ASCII.
 fn columns(line: &str, first: usize, width: usize) -> &str {
     let end = (first + width).min(line.len());
     line.get(first..end).unwrap_or("").trim()

@@ -1,4 +1,4 @@
-//! Substructure files that are wrong although they are well formed, with the reason.
+//! Diagnosis of substructure files that are well formed but wrong, with the cause.
 
 use nalgebra::DMatrix;
 
@@ -6,18 +6,18 @@ use super::error::{ExchangeError, ExchangeErrorKind, Place};
 use super::matrix::ImportedMatrices;
 use super::recognise::MatrixFormat;
 
-/// A relative force under translation of the whole above this is of order one: nothing cancels.
+/// Relative force under translation above which it is of order one: nothing cancels.
 const OF_ORDER_ONE: f64 = 0.5;
 
-/// Coupling below this, relative to the diagonal, is rounding.
+/// Coupling relative to the diagonal below which it is rounding.
 const ROUND_OFF: f64 = 1e-10;
 
-/// Refuses a matrix with an interface that knows nothing of the others, and is held all the same.
+/// Rejects a matrix with an interface that is not coupled to the others but is still supported.
 ///
-/// Debian's CalculiX 2.20 writes substructures without condensing them: the block between the
-/// interfaces is then exactly zero (or rounding), and a translation of both meets a force of full
-/// size. The gate ([`flexarm_fem::gate::check_matrix12`]) refuses such a matrix too, but cannot
-/// know why. Everything else, such as rows in another order or a support that was left in, is for
+/// Debian's CalculiX 2.20 writes substructures without condensing them. The block between the
+/// interfaces is then exactly zero (or rounding), and a translation of both causes a force of full
+/// size. The gate ([`flexarm_fem::gate::check_matrix12`]) also rejects such a matrix, but cannot
+/// give the cause. Other errors, such as rows in another order or a remaining support, are left to
 /// the gate.
 ///
 /// * `K`: rows of the interfaces first, six each; any units.
@@ -32,7 +32,7 @@ pub fn diagnose_substructure(
     if interfaces < 2 || K.nrows() < 6 * interfaces {
         return Ok(());
     }
-    // Layouts of CalculiX and Abaqus.
+    // Formats of CalculiX and Abaqus.
     let is_substructure = matches!(imported.format, MatrixFormat::UserElement | MatrixFormat::LabelledText);
     let largest = |i: usize| largest_coupling(K, i, interfaces);
     let mut couplings = (0..interfaces).map(|i| (i, largest(i)));
@@ -55,7 +55,7 @@ pub fn diagnose_substructure(
     Err(Place::file(&imported.origin).fail(ExchangeErrorKind::Defective, "stiffness", found, expected, help))
 }
 
-/// Largest `|k_ij| / sqrt(|k_ii k_jj|)` between an interface and the others; 0 only if all are
+/// Maximum `|k_ij| / sqrt(|k_ii k_jj|)` between an interface and the others; 0 only if all are
 /// zero.
 fn largest_coupling(K: &DMatrix<f64>, interface: usize, interfaces: usize) -> f64 {
     let own = 6 * interface..6 * interface + 6;
@@ -68,8 +68,8 @@ fn largest_coupling(K: &DMatrix<f64>, interface: usize, interfaces: usize) -> f6
     entries.map(relative).fold(0.0, f64::max)
 }
 
-/// Largest force under a translation of all interfaces, over the size of the terms that should
-/// cancel.
+/// Maximum force under a translation of all interfaces, relative to the size of the terms that
+/// should cancel.
 fn translation_residual(K: &DMatrix<f64>, interfaces: usize) -> f64 {
     let mut worst = 0.0_f64;
     for axis in 0..3 {

@@ -1,8 +1,9 @@
-//! Nastran DMIG entries, in large, small and free field: bulk data, `.pch` of EXTSEOUT and others.
+//! Nastran DMIG entries in large, small and free field: bulk data, `.pch` of EXTSEOUT and others.
 //!
-//! One file may hold several matrices (KAAX, MAAX, BAAX, ...). GRID entries give positions. Entries
-//! hold either triangle, mixed; zero columns are absent. Matrices are in the *displacement* frame
-//! of each grid (field CD of GRID), which a warning recalls where it is not the basic one.
+//! A file may contain several matrices (KAAX, MAAX, BAAX, ...). GRID entries give positions.
+//! Entries may be from either triangle, mixed; zero columns are absent. Matrices are in the
+//! *displacement* frame of each grid (field CD of GRID); a warning is given if it is not the basic
+//! frame.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -13,7 +14,7 @@ use super::error::{ExchangeError, ExchangeErrorKind, Place};
 use super::matrix::{DofLabel, LabelledMatrix, Storage, Triplets};
 use super::text::{Text, shown};
 
-/// What a file of DMIG entries holds.
+/// Contents of a file with DMIG entries.
 #[derive(Debug, Default)]
 pub(super) struct Dmig {
     pub(super) matrices: Vec<LabelledMatrix>,
@@ -23,7 +24,7 @@ pub(super) struct Dmig {
 
 struct RawMatrix<'a> {
     name: String,
-    /// IFO 2 or 9: rows and columns are different things, even where their numbers are the same.
+    /// IFO 2 or 9: rows and columns have different meanings even if their numbers are the same.
     is_rectangular: bool,
     header: Place<'a>,
     entries: Vec<(DofLabel, DofLabel, f64, Place<'a>)>,
@@ -61,7 +62,7 @@ pub(super) fn parse(text: Text<'_>) -> Result<Dmig, ExchangeError> {
     Ok(result)
 }
 
-/// `DMIG NAME 0 IFO TIN TOUT POLAR _ NCOL`.
+/// Checks the header `DMIG NAME 0 IFO TIN TOUT POLAR _ NCOL`.
 fn check_header(card: &Card<'_>, name: &str) -> Result<(), ExchangeError> {
     let place = card.place;
     let is_header = card.field(1) == "0" && !card.field(2).is_empty();
@@ -85,7 +86,7 @@ fn check_header(card: &Card<'_>, name: &str) -> Result<(), ExchangeError> {
     }
 }
 
-/// `DMIG NAME GJ CJ _ (Gi Ci Ai Bi)...`.
+/// Reads a column `DMIG NAME GJ CJ _ (Gi Ci Ai Bi)...`.
 fn parse_column<'a>(card: &Card<'a>, matrix: &mut RawMatrix<'a>) -> Result<(), ExchangeError> {
     let column = label(&card.place, "column", card.field(1), card.field(2))?;
     let place_of = |i: usize| card.place_of(i);
@@ -119,7 +120,7 @@ fn label(place: &Place<'_>, what: &str, node: &str, dof: &str) -> Result<DofLabe
     component.map(|dof| DofLabel::new(node, dof)).ok_or_else(wrong)
 }
 
-/// `GRID ID CP X1 X2 X3 CD`.
+/// Reads a grid point `GRID ID CP X1 X2 X3 CD`.
 fn parse_grid(card: &Card<'_>, result: &mut Dmig) -> Result<(), ExchangeError> {
     let place = card.place;
     let id = place.integer("GRID number", card.field(0))?;
@@ -144,7 +145,7 @@ fn parse_grid(card: &Card<'_>, result: &mut Dmig) -> Result<(), ExchangeError> {
     Ok(())
 }
 
-/// The symmetric matrix, or a sentence why it can be none.
+/// Assembles the symmetric matrix, or returns the reason why the matrix is not symmetric.
 fn assemble(raw: RawMatrix<'_>, text: Text<'_>) -> Result<Result<LabelledMatrix, String>, ExchangeError> {
     let RawMatrix { name, is_rectangular, header, entries } = raw;
     let rows: BTreeSet<DofLabel> = entries.iter().map(|(row, ..)| *row).collect();
@@ -152,11 +153,11 @@ fn assemble(raw: RawMatrix<'_>, text: Text<'_>) -> Result<Result<LabelledMatrix,
     if entries.is_empty() {
         return Ok(Err(format!("DMIG {name} (line {}) has no entries", header.line.unwrap_or(0))));
     }
-    // Columns that are numbers instead of grids: loads and other rectangular matrices.
+    // Columns without grids in common with the rows: loads and other rectangular matrices.
     if is_rectangular || rows.is_disjoint(&columns) {
         return Ok(Err(format!("DMIG {name} is rectangular and was left out")));
     }
-    // Grids first, scalar points (modal coordinates) after them, each in rising order.
+    // Grids first, then scalar points (modal coordinates), each in ascending order.
     let mut labels: Vec<DofLabel> = rows.union(&columns).copied().collect();
     labels.sort_by_key(|label| (label.dof == 0, *label));
     let index: HashMap<DofLabel, usize> = labels.iter().enumerate().map(|(i, label)| (*label, i)).collect();
@@ -167,15 +168,15 @@ fn assemble(raw: RawMatrix<'_>, text: Text<'_>) -> Result<Result<LabelledMatrix,
     triplets.symmetric(&name, text.origin, labels, Storage::BySize).map(Ok)
 }
 
-/// Matrices as DMIG entries in large field: ten significant digits, relative error 5e-10.
+/// Writes matrices as DMIG entries in large field: ten significant digits, relative error 5e-10.
 ///
-/// * `matrices`: names, such as `KAAX` (cut to eight characters), with their matrices.
+/// * `matrices`: names, such as `KAAX` (truncated to eight characters), with their matrices.
 /// * `rows`: node and component of each row; scalar points have component 0. Every row needs a
 ///   node.
 /// * `positions`: written as GRID entries.
 ///
 /// # Panics
-/// If a matrix does not have as many rows and columns as there are `rows`.
+/// If a matrix does not have one row and one column per entry of `rows`.
 pub fn write_dmig(
     matrices: &[(&str, &nalgebra::DMatrix<f64>)],
     rows: &[DofLabel],
@@ -208,7 +209,7 @@ pub fn write_dmig(
     text
 }
 
-/// A number in 16 columns, nine decimals, with D exponent.
+/// Formats a number in 16 columns, nine decimals, with D exponent.
 fn large(value: f64) -> String {
     super::user_element::fortran(value, 9, 16).replace('E', "D")
 }
@@ -262,7 +263,7 @@ DMIG*,KAAX,12,0,
         let loads = "DMIG,PAX,0,9,2,0,,,2\nDMIG,PAX,1,0,,11,1,5.\nDMIG,PAX,2,0,,11,2,6.\n";
         let dmig = parse(Text::new(loads, "t.pch")).unwrap();
         assert!(dmig.matrices.is_empty() && dmig.warnings[0].contains("PAX is rectangular"));
-        // Scalar points 1 and 2 loaded by columns 1 and 2: the same labels, but no symmetric
+        // Scalar points 1 and 2 loaded by columns 1 and 2: the same labels, but not a symmetric
         // matrix.
         for form in [2, 9] {
             let scalar =

@@ -1,50 +1,51 @@
-//! What can be wrong with a file of matrices, and where.
+//! Errors in matrix files, with their position.
 
-/// The sort of mistake, for programs; the message is for people.
+/// Kind of error, for programs; the message is for users.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ExchangeErrorKind {
     /// The file could not be opened or unpacked.
     Unreadable,
-    /// None of the formats that this program reads.
+    /// The format is not one that this program reads.
     NotRecognised,
-    /// A known format, but a variant that cannot be a stiffness or a mass, such as complex numbers.
+    /// The format is known, but this variant is not a stiffness or mass, for example complex
+    /// numbers.
     Unsupported,
-    /// Text that does not follow the format.
+    /// The text does not follow the format.
     Syntax,
-    /// Fewer or more entries than the file itself says.
+    /// The file has fewer or more entries than it declares.
     WrongSize,
-    /// A NaN, an infinity, or a number too large to hold.
+    /// A number is NaN, infinite or too large.
     NotFinite,
-    /// The same entry twice with different values, or mirrored entries that differ.
+    /// An entry occurs twice with different values, or mirrored entries differ.
     Unequal,
-    /// More than one answer is possible: the user must choose.
+    /// Several interpretations are possible, and the user must choose.
     Ambiguous,
-    /// Something that is needed is not in the file.
+    /// Required data is not in the file.
     Missing,
     /// The map of interfaces does not fit the rows of the matrix.
     Interface,
-    /// A matrix that is well formed but known to be wrong.
+    /// The matrix is well formed but known to be wrong.
     Defective,
 }
 
-/// A mistake in a file of matrices.
+/// Error in a matrix file.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{origin}{}: {element}: found {found}; expected {expected}{}", at(.line), mend(.help))]
 pub struct ExchangeError {
-    /// The sort of mistake.
+    /// Kind of error.
     pub kind: ExchangeErrorKind,
-    /// File, or the name that was given to the bytes.
+    /// File, or the name given to the bytes.
     pub origin: Box<str>,
-    /// Line, from 1; `None` where the file as a whole or a binary file is meant.
+    /// Line, from 1; `None` for the file as a whole or a binary file.
     pub line: Option<usize>,
-    /// The element, such as `entry (3, 4)` (row and column from 1, as in the files).
+    /// Element, such as `entry (3, 4)` (row and column from 1, as in the files).
     pub element: Box<str>,
-    /// What stands there.
+    /// Text or value found.
     pub found: Box<str>,
-    /// What may stand there.
+    /// Text or value expected.
     pub expected: Box<str>,
-    /// How to mend it; may be empty.
+    /// Hint for a correction; may be empty.
     pub help: Box<str>,
 }
 
@@ -56,7 +57,7 @@ fn mend(help: &str) -> String {
     if help.is_empty() { String::new() } else { format!(" ({help})") }
 }
 
-/// A file and, in text, a line of it: where an error happens.
+/// Position of an error: a file and, for text, a line of it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Place<'a> {
     pub(super) origin: &'a str,
@@ -64,7 +65,7 @@ pub(super) struct Place<'a> {
 }
 
 impl<'a> Place<'a> {
-    /// The file as a whole.
+    /// Refers to the file as a whole.
     pub(super) fn file(origin: &'a str) -> Self {
         Self { origin, line: None }
     }

@@ -1,7 +1,6 @@
-//! Exudyn `FEMinterface.SaveToFile` in HDF5: the full stiffness and mass, three components per
-//! node.
+//! Exudyn `FEMinterface.SaveToFile` in HDF5: full stiffness and mass, three components per node.
 //!
-//! The default `.npz` holds pickled Python objects, which no other program reads.
+//! The default `.npz` contains pickled Python objects, which other programs cannot read.
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -14,7 +13,7 @@ use super::matrix::{DofLabel, LabelledMatrix, Storage, Triplets};
 use super::text::LARGEST_UNPACKED;
 use crate::unpack::allowed_unpacked;
 
-/// What a file of Exudyn holds; nodes are counted from 0, as Exudyn does.
+/// Contents of an Exudyn file; nodes are numbered from 0, as in Exudyn.
 pub(super) struct Exudyn {
     pub(super) stiffness: LabelledMatrix,
     pub(super) mass: LabelledMatrix,
@@ -22,16 +21,16 @@ pub(super) struct Exudyn {
     pub(super) node_sets: BTreeMap<String, Vec<i64>>,
 }
 
-/// An open file; errors name the data set.
+/// Open file; errors name the data set.
 struct Reader<'a> {
     file: File,
     size: usize,
-    /// Bytes that may still be read: several names may stand for the same data.
+    /// Remaining number of bytes that may be read; several names may refer to the same data.
     left: Cell<u64>,
     place: Place<'a>,
 }
 
-/// Reads the matrices, the positions and the node sets.
+/// Reads the matrices, positions and node sets.
 pub(super) fn parse(bytes: &[u8], origin: &str) -> Result<Exudyn, ExchangeError> {
     let place = Place::file(origin);
     let syntax = |error: hdf5_pure::Error| {
@@ -62,8 +61,8 @@ impl Reader<'_> {
         self.place.fail(ExchangeErrorKind::Syntax, what, found, expected, help)
     }
 
-    /// A data set whose size the file can have: packed data grow at most a thousandfold, and all
-    /// that is read stays below [`LARGEST_UNPACKED`].
+    /// Opens a data set, with an error if its size is impossible for the file: packed data expands
+    /// at most a thousandfold, and the total read stays below [`LARGEST_UNPACKED`].
     fn dataset(&self, name: &str) -> Result<hdf5_pure::Dataset, ExchangeError> {
         let wrong = |error: hdf5_pure::Error| self.fail(name, error.to_string(), "this data set");
         let dataset = self.file.dataset(name).map_err(wrong)?;
@@ -73,7 +72,7 @@ impl Reader<'_> {
         if bytes(width).is_none_or(|bytes| bytes > 1100 * self.size as u64) {
             return Err(self.fail(name, "more numbers than the file can hold", "its own size"));
         }
-        // Numbers become 8 bytes each, however short they are in the file.
+        // Each number becomes 8 bytes, even if it is shorter in the file.
         match bytes(width.max(8)).and_then(|bytes| self.left.get().checked_sub(bytes)) {
             Some(left) => self.left.set(left),
             None => {
@@ -101,7 +100,7 @@ impl Reader<'_> {
         dataset.read_i64().or_else(|error| short().ok_or(error)).map_err(wrong)
     }
 
-    /// A matrix in compressed rows: `data`, `indices`, `indptr`.
+    /// Reads a matrix in compressed row format: `data`, `indices`, `indptr`.
     fn matrix(&self, name: &str, rows: &[DofLabel]) -> Result<LabelledMatrix, ExchangeError> {
         let n = rows.len();
         let values = self.reals(&format!("{name}/data"))?;
@@ -132,7 +131,7 @@ impl Reader<'_> {
         triplets.symmetric(name, self.place.origin, rows.to_vec(), Storage::Sparse)
     }
 
-    /// Node sets by name; what cannot be read is left out, for nothing depends on it.
+    /// Reads the node sets by name; unreadable ones are skipped, because nothing depends on them.
     fn node_sets(&self, nodes: usize) -> BTreeMap<String, Vec<i64>> {
         const MOST_SETS: usize = 1000;
         let set = |i: usize| {
@@ -175,7 +174,7 @@ mod tests {
         builder.create_dataset("numbers").with_f64_data(&[1.0; 100]);
         let bytes = builder.finish().unwrap();
         let file = File::from_bytes(bytes).unwrap();
-        // 800 bytes of a file of which only the size is changed.
+        // A valid file of 800 bytes of numbers, with a wrong file size.
         let small = Reader { file, size: 0, left: Cell::new(LARGEST_UNPACKED), place: Place::file("t.hdf5") };
         assert!(small.reals("numbers").unwrap_err().to_string().contains("than the file can hold"));
     }

@@ -1,16 +1,16 @@
-//! Fortran edit descriptors: `(8I10)`, `(1P,3E25.16)`, `1P5D16.9`, and the fields they cut out.
+//! Fortran edit descriptors: `(8I10)`, `(1P,3E25.16)`, `1P5D16.9`, and fields of such formats.
 
 use super::error::{ExchangeError, ExchangeErrorKind, Place};
 use super::text::shown;
 
-/// Repeated fields of one width.
+/// Repeated fields of equal width.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Format {
-    /// Columns of each field.
+    /// Number of columns of each field.
     pub(super) width: usize,
 }
 
-/// Reads the last descriptor of a format.
+/// Parses the last descriptor of a format.
 pub(super) fn parse_format(text: &str, place: &Place<'_>) -> Result<Format, ExchangeError> {
     let upper = text.to_ascii_uppercase();
     let width = upper.rfind(['I', 'E', 'D', 'F', 'G']).and_then(|letter| {
@@ -23,9 +23,10 @@ pub(super) fn parse_format(text: &str, place: &Place<'_>) -> Result<Format, Exch
 }
 
 impl Format {
-    /// The fields of a line; blank ones at its end are left out.
+    /// Splits a line into fields; blank ones at its end are omitted.
     pub(super) fn fields<'l>(&self, line: &'l str) -> impl Iterator<Item = &'l str> + use<'l> {
-        // Columns are bytes: a line with other characters than ASCII has no numbers after them.
+        // Columns are bytes; a line with non-ASCII characters has no valid numbers and is treated
+        // as empty.
         let line = if line.is_ascii() { line.trim_end() } else { "" };
         let width = self.width;
         (0..line.len().div_ceil(width)).map(move |i| line[i * width..line.len().min((i + 1) * width)].trim())

@@ -1,11 +1,11 @@
-//! Harwell-Boeing, as ANSYS `HBMAT` writes it: `RSA` (lower triangle by columns) and `RUA`.
+//! Harwell-Boeing as written by ANSYS `HBMAT`: `RSA` (lower triangle by columns) and `RUA`.
 
 use super::error::{ExchangeError, ExchangeErrorKind, Place};
 use super::fortran::{Format, parse_format};
 use super::matrix::{LabelledMatrix, Storage, Triplets};
 use super::text::{Text, shown, words};
 
-/// Reads a matrix; its rows are named by a `.mapping` file.
+/// Reads a matrix; a `.mapping` file gives the labels of its rows.
 pub(super) fn parse(text: Text<'_>) -> Result<LabelledMatrix, ExchangeError> {
     let mut lines = text.lines();
     let mut next = || {
@@ -28,7 +28,7 @@ pub(super) fn parse(text: Text<'_>) -> Result<LabelledMatrix, ExchangeError> {
         next()?;
     }
 
-    // Three lists, each beginning on a new line.
+    // Three lists, each starting on a new line.
     let mut list =
         |what: &'static str, format: Format, count: usize| -> Result<Vec<(Place<'_>, &str)>, ExchangeError> {
             let mut fields = Vec::new();
@@ -69,7 +69,7 @@ pub(super) fn parse(text: Text<'_>) -> Result<LabelledMatrix, ExchangeError> {
     triplets.symmetric("the matrix", text.origin, rows, Storage::BySize)
 }
 
-/// Number of rows and of entries of a real, symmetric or unsymmetric, assembled matrix.
+/// Numbers of rows and entries of a real, symmetric or unsymmetric, assembled matrix.
 fn parse_kind(place: &Place<'_>, line: &str) -> Result<(usize, usize), ExchangeError> {
     let mut words = words(line);
     let kind = place.word("type", &mut words)?;

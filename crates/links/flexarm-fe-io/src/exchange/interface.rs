@@ -1,10 +1,10 @@
-//! Which rows of an imported matrix are which interface: text such as `A=1001,B=1002`.
+//! Map from rows of an imported matrix to interfaces: text such as `A=1001,B=1002`.
 //!
 //! ```text
 //! A=1001,B=1002                                  components 1 to 6 of these nodes
 //! A=947:1-3+948:1-3,B=949:1-3+950:1-3            CalculiX: rotations are 1 to 3 of a second node
 //! A=#1-6,B=#7-12                                 rows of the file, from 1
-//! A=1001,B=1002,modal=#13-22                     which other rows are modal coordinates
+//! A=1001,B=1002,modal=#13-22                     other rows that are modal coordinates
 //! ```
 //! Every interface needs six rows, in the order ux uy uz rx ry rz.
 
@@ -15,12 +15,12 @@ use std::str::FromStr;
 use super::error::{ExchangeError, ExchangeErrorKind, Place};
 use super::matrix::{DofLabel, LabelledMatrix};
 
-/// What a map is called in messages.
+/// Name of a map in messages.
 const ORIGIN: &str = "map of interfaces";
-/// No map names more rows than this.
+/// Maximum number of rows in a map.
 const MOST_ROWS: i64 = 100_000;
 
-/// Some rows of a matrix.
+/// Selection of rows of a matrix.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RowPick {
     /// Components `first` to `last` of a node.
@@ -32,7 +32,7 @@ pub enum RowPick {
         /// Last component.
         last: u8,
     },
-    /// Rows of the file from `first` to `last`, counted from 1.
+    /// Rows `first` to `last` of the file, from 1.
     Rows {
         /// First row.
         first: usize,
@@ -41,21 +41,21 @@ pub enum RowPick {
     },
 }
 
-/// An interface and its six rows.
+/// Interface and its six rows.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Interface {
-    /// Its name, such as "A".
+    /// Name, such as "A".
     pub name: String,
-    /// Its rows, ux uy uz rx ry rz.
+    /// Rows in the order ux uy uz rx ry rz.
     pub picks: Vec<RowPick>,
 }
 
-/// All interfaces in the order in which they are wanted.
+/// All interfaces in the requested order.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct InterfaceMap {
-    /// The interfaces.
+    /// Interfaces.
     pub interfaces: Vec<Interface>,
-    /// Rows that are modal coordinates; empty: those without a node or with component 0.
+    /// Rows that are modal coordinates; if empty, those without a node or with component 0.
     pub modal: Vec<RowPick>,
 }
 
@@ -64,7 +64,7 @@ fn wrong(element: impl Into<Box<str>>, found: impl Into<Box<str>>, expected: &st
 }
 
 impl Interface {
-    /// Reads the rows of one interface, such as `947:1-3+948:1-3`.
+    /// Parses the rows of one interface, such as `947:1-3+948:1-3`.
     ///
     /// # Errors
     /// [`ExchangeErrorKind::Interface`].
@@ -73,7 +73,7 @@ impl Interface {
         Ok(Self { name: name.to_owned(), picks })
     }
 
-    /// The rows as text.
+    /// Writes the rows as text.
     pub fn rows_text(&self) -> String {
         self.picks.iter().map(RowPick::to_string).collect::<Vec<_>>().join("+")
     }
@@ -145,7 +145,7 @@ impl FromStr for InterfaceMap {
     }
 }
 
-/// The rows of a map in a matrix, from 0.
+/// Rows of a map in a matrix, from 0.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ResolvedMap {
     pub(super) interfaces: Vec<[usize; 6]>,
@@ -153,7 +153,7 @@ pub(super) struct ResolvedMap {
 }
 
 impl InterfaceMap {
-    /// Finds the rows; all rows that are left over must be modal coordinates.
+    /// Finds the rows; all remaining rows must be modal coordinates.
     pub(super) fn resolve(&self, rows: &[DofLabel], origin: &str) -> Result<ResolvedMap, ExchangeError> {
         let index: HashMap<DofLabel, usize> = rows.iter().enumerate().map(|(i, label)| (*label, i)).collect();
         let mut owner: HashMap<usize, &str> = HashMap::new();
@@ -232,7 +232,7 @@ fn nodes_in(index: &HashMap<DofLabel, usize>) -> String {
     }
 }
 
-/// [`propose_map`] of a matrix: rows at its end that are coupled with nothing are modes.
+/// As [`propose_map`], for a matrix: uncoupled rows at its end are modes.
 pub fn propose_map_of(matrix: &LabelledMatrix) -> Option<InterfaceMap> {
     let n = matrix.size();
     let unlabelled = matrix.rows.iter().all(|label| *label == DofLabel::UNKNOWN);
@@ -252,13 +252,13 @@ pub fn propose_map_of(matrix: &LabelledMatrix) -> Option<InterfaceMap> {
     Some(InterfaceMap { modal: vec![RowPick::Rows { first: interfaces + 1, last: n }], ..map })
 }
 
-/// Nodes or sixes of rows beyond which no map is proposed: a full model, or modes.
+/// Number of nodes or groups of six rows above which no map is proposed: a full model, or modes.
 const MOST_PROPOSED: usize = 4;
 
-/// The map that the rows suggest, if they suggest one; the user must agree to it.
+/// Proposes a map, if the rows suggest one; the user must confirm it.
 ///
-/// Nodes of six components, pairs of nodes of three (CalculiX), or sixes of rows without nodes; of
-/// other numbers of rows without nodes the first twelve.
+/// Uses nodes with six components, pairs of nodes with three (CalculiX), or groups of six rows
+/// without nodes; for another number of rows without nodes, the first twelve.
 pub fn propose_map(rows: &[DofLabel]) -> Option<InterfaceMap> {
     let named = |picks: Vec<Vec<RowPick>>| {
         let interfaces = ('A'..='Z').zip(picks).map(|(name, picks)| Interface { name: name.into(), picks });

@@ -1,4 +1,4 @@
-//! Symmetric matrices with labelled rows, as they stand in a file: no units are converted here.
+//! Symmetric matrices with labelled rows as they are in a file; no unit conversion here.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt;
@@ -10,36 +10,36 @@ use super::error::{ExchangeError, ExchangeErrorKind, Place};
 use super::recognise::MatrixFormat;
 use super::sidecar::Sidecar;
 
-/// Up to this many rows a matrix is stored dense (32 MB).
+/// Maximum number of rows of a matrix that is stored dense (32 MB).
 pub const LARGEST_DENSE: usize = 2000;
 
-/// Mirrored entries may differ by this much of `sqrt(|k_ii k_jj|)`: the last of nine printed
+/// Allowed difference of mirrored entries relative to `sqrt(|k_ii k_jj|)`: the last of nine printed
 /// decimals.
 pub const LARGEST_ASYMMETRY: f64 = 1e-8;
 
-/// What a row of a matrix belongs to.
+/// Node and component of a matrix row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct DofLabel {
-    /// Number of the node; `None` where the file does not say.
+    /// Number of the node; `None` if the file does not give it.
     pub node: Option<i64>,
     /// 1 to 3 translations, 4 to 6 rotations; 0 for a scalar (modal) coordinate or if unknown.
     ///
-    /// CalculiX gives the rotations of a rigid body as 1 to 3 of a second node.
+    /// In CalculiX the rotations of a rigid body are components 1 to 3 of a second node.
     pub dof: u8,
 }
 
 impl DofLabel {
-    /// A row about which the file says nothing.
+    /// Label of a row without information in the file.
     pub const UNKNOWN: Self = Self { node: None, dof: 0 };
 
-    /// A component of a node.
+    /// Label of a component of a node.
     pub fn new(node: i64, dof: u8) -> Self {
         Self { node: Some(node), dof }
     }
 }
 
 impl fmt::Display for DofLabel {
-    /// `1001:3`, or `?:3` where the node is not known.
+    /// Writes `1001:3`, or `?:3` if the node is unknown.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.node {
             Some(node) => write!(f, "{node}:{}", self.dof),
@@ -48,7 +48,7 @@ impl fmt::Display for DofLabel {
     }
 }
 
-/// Lower triangle of a symmetric matrix, each place once, sorted by column and then row, from 0.
+/// Lower triangle of a symmetric matrix, each position once, sorted by column and then row, from 0.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SparseSymmetric {
     /// Number of rows.
@@ -57,7 +57,7 @@ pub struct SparseSymmetric {
     pub rows: Vec<u32>,
     /// Column of each entry.
     pub columns: Vec<u32>,
-    /// The entries; zeros are left out.
+    /// Value of each entry; zeros are omitted.
     pub values: Vec<f64>,
 }
 
@@ -72,32 +72,32 @@ impl SparseSymmetric {
         self.values.is_empty()
     }
 
-    /// `(row, column, value)` of the lower triangle.
+    /// Iterates over `(row, column, value)` of the lower triangle.
     pub fn triplets(&self) -> impl Iterator<Item = (usize, usize, f64)> + '_ {
         let places = self.rows.iter().zip(&self.columns).zip(&self.values);
         places.map(|((row, column), value)| (*row as usize, *column as usize, *value))
     }
 }
 
-/// The numbers of a matrix.
+/// Entries of a matrix.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Entries {
-    /// Up to [`LARGEST_DENSE`] rows; both triangles, exactly symmetric.
+    /// Dense, up to [`LARGEST_DENSE`] rows; both triangles, exactly symmetric.
     Dense(DMatrix<f64>),
-    /// Full models.
+    /// Sparse, for full models.
     Sparse(SparseSymmetric),
 }
 
-/// A symmetric matrix with its rows, in the units of the file.
+/// Symmetric matrix with labelled rows, in the units of the file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LabelledMatrix {
-    /// Its name in the file, or the file itself.
+    /// Name of the matrix in the file, or of the file.
     pub name: String,
-    /// What each row belongs to.
+    /// Label of each row.
     pub rows: Vec<DofLabel>,
-    /// The numbers.
+    /// Entries.
     pub entries: Entries,
-    /// Largest `|k_ij - k_ji| / sqrt(|k_ii k_jj|)` of the file, which is gone from the entries.
+    /// Maximum `|k_ij - k_ji| / sqrt(|k_ii k_jj|)` in the file; the entries are symmetrised.
     pub asymmetry: f64,
 }
 
@@ -107,7 +107,7 @@ impl LabelledMatrix {
         self.rows.len()
     }
 
-    /// The dense matrix, unless it is stored sparse.
+    /// Dense matrix, or `None` if it is stored sparse.
     pub fn dense(&self) -> Option<&DMatrix<f64>> {
         match &self.entries {
             Entries::Dense(matrix) => Some(matrix),
@@ -115,7 +115,7 @@ impl LabelledMatrix {
         }
     }
 
-    /// The lower triangle, however it is stored.
+    /// Lower triangle, from either storage.
     pub fn to_sparse(&self) -> SparseSymmetric {
         match &self.entries {
             Entries::Sparse(sparse) => sparse.clone(),
@@ -134,36 +134,36 @@ impl LabelledMatrix {
         }
     }
 
-    /// Whether the file says which node the rows belong to.
+    /// Whether the file labels the rows with nodes.
     pub fn is_labelled(&self) -> bool {
         self.rows.iter().any(|label| label.node.is_some())
     }
 }
 
-/// What one or several files say about one structure, in the units of the files.
+/// Data of one structure from one or several files, in the units of the files.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImportedMatrices {
     /// Format of the file with the stiffness.
     pub format: MatrixFormat,
-    /// Where it came from, for messages.
+    /// Source of the data, for messages.
     pub origin: String,
-    /// The stiffness.
+    /// Stiffness matrix.
     pub stiffness: LabelledMatrix,
-    /// The mass, in the same order of rows.
+    /// Mass matrix, with the same order of rows.
     pub mass: Option<LabelledMatrix>,
-    /// Positions of nodes, where the format has them.
+    /// Positions of nodes, if the format has them.
     pub positions: BTreeMap<i64, Vector3<f64>>,
-    /// Nodes by the name of their set, where the format has them.
+    /// Nodes by name of their set, if the format has them.
     pub node_sets: BTreeMap<String, Vec<i64>>,
-    /// Frames of the interfaces in the order of the rows, where the format has them.
+    /// Frames of the interfaces in the order of the rows, if the format has them.
     pub frames: Vec<Pose>,
     /// Units, interfaces and frames from the sidecar of Matrix Market files.
     pub sidecar: Option<Sidecar>,
-    /// Sentences about what was accepted, but should be looked at.
+    /// Warnings about accepted but suspicious input.
     pub warnings: Vec<String>,
 }
 
-/// Entries as they come from a file, in any order and any triangle.
+/// Entries as read from a file, in any order and from either triangle.
 #[derive(Debug, Default)]
 pub(super) struct Triplets {
     entries: Vec<Triplet>,
@@ -177,7 +177,7 @@ struct Triplet {
     value: f64,
 }
 
-/// How to store the result.
+/// Storage of the result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Storage {
     /// Dense up to [`LARGEST_DENSE`] rows.
@@ -197,13 +197,13 @@ impl Triplets {
         self.entries.len()
     }
 
-    /// Number of rows that the entries need.
+    /// Number of rows required by the entries.
     pub(super) fn extent(&self) -> usize {
         self.entries.iter().map(|t| t.row.max(t.column) as usize + 1).max().unwrap_or(0)
     }
 
-    /// Labels for rows about which the file says nothing; refuses counts that the entries cannot
-    /// fill.
+    /// Labels for rows without information in the file; an error if there are too few entries for
+    /// `n` rows.
     pub(super) fn unlabelled(&self, n: usize, place: &Place<'_>) -> Result<Vec<DofLabel>, ExchangeError> {
         if n == 0 || (n > LARGEST_DENSE && n > 8 * self.len()) {
             let found = format!("{n} rows, but {} entries", self.len());
@@ -213,9 +213,9 @@ impl Triplets {
         Ok(vec![DofLabel::UNKNOWN; n])
     }
 
-    /// Makes the symmetric matrix: fills missing triangles and refuses contradictions.
+    /// Builds the symmetric matrix: fills missing triangles and rejects contradictions.
     ///
-    /// All rows and columns must be below `rows.len()`.
+    /// All row and column indices must be below `rows.len()`.
     pub(super) fn symmetric(
         mut self,
         name: &str,
@@ -229,7 +229,7 @@ impl Triplets {
             scale[t.row as usize] = t.value.abs().sqrt();
         }
 
-        // Entries of one place stand together, lower triangle before upper.
+        // Entries of the same position are adjacent, lower triangle before upper.
         let place = |t: &Triplet| (t.row.min(t.column), t.row.max(t.column));
         self.entries.sort_by_key(|t| (place(t), t.row < t.column));
         let mut lower = SparseSymmetric { n, ..SparseSymmetric::default() };
@@ -260,7 +260,7 @@ impl Triplets {
     }
 }
 
-/// The one value of an entry that a file may give several times, and the relative asymmetry.
+/// Single value of an entry that the file may give several times, and the relative asymmetry.
 fn common_value(
     group: &[Triplet],
     size: f64,
@@ -271,7 +271,7 @@ fn common_value(
     let first = group[0];
     let Some(last) = group.iter().find(|t| t.value != first.value) else { return Ok((first.value, 0.0)) };
 
-    // Mirrored entries may differ by rounding, entries of the same place not at all.
+    // Mirrored entries may differ by rounding, repeated entries must be equal.
     let upper = group.iter().find(|t| (t.row < t.column) != (first.row < first.column));
     let mirrored =
         upper.filter(|upper| group.iter().all(|t| t.value == if t.row < t.column { upper.value } else { first.value }));
@@ -295,9 +295,9 @@ fn common_value(
     ))
 }
 
-/// A matrix in another order of rows; rows that it lacks are zero.
+/// Reorders the rows of a matrix; rows that it lacks become zero.
 ///
-/// Returns `None` if it has a row that `rows` lacks.
+/// Returns `None` if the matrix has a row that `rows` lacks.
 pub(super) fn reordered(matrix: &LabelledMatrix, rows: &[DofLabel]) -> Option<LabelledMatrix> {
     if matrix.rows == rows {
         return Some(matrix.clone());

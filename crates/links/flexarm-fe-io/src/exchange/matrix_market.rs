@@ -1,7 +1,7 @@
 //! Matrix Market: `%%MatrixMarket matrix coordinate|array real|integer symmetric|general`.
 //!
-//! Units, frames and the meaning of the rows are not in the file; they come from the [`Sidecar`]
-//! that [`write_matrix_market`] puts beside its files, or from the user.
+//! The file does not contain units, frames and the meaning of the rows; they come from the
+//! [`Sidecar`] written together with [`write_matrix_market`] files, or from the user.
 //!
 //! [`Sidecar`]: super::Sidecar
 
@@ -11,20 +11,20 @@ use super::error::{ExchangeError, ExchangeErrorKind, Place};
 use super::matrix::{LabelledMatrix, Storage, Triplets};
 use super::text::{Text, shown, words};
 
-/// One triangle (by the standard the lower), or all entries.
+/// Symmetry: one triangle (the lower one by the standard), or all entries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Symmetry {
     Symmetric,
     General,
 }
 
-/// Reads a matrix; rows have no labels.
+/// Reads a matrix; its rows have no labels.
 pub(super) fn parse(text: Text<'_>) -> Result<LabelledMatrix, ExchangeError> {
     let mut lines = text.lines();
     let (place, banner) = lines.next().ok_or_else(|| cut_off(&text.file()))?;
     let (is_array, symmetry) = parse_banner(&place, banner)?;
 
-    // Size line, then the entries; comments and empty lines anywhere.
+    // Size line, then the entries; comments and empty lines are allowed anywhere.
     let mut lines = lines.filter(|(_, line)| !line.starts_with('%') && !line.trim().is_empty());
     let (place, size) = lines.next().ok_or_else(|| cut_off(&text.file()))?;
     let mut size = words(size);
@@ -91,7 +91,7 @@ fn cut_off(place: &Place<'_>) -> ExchangeError {
     place.fail(ExchangeErrorKind::Syntax, "header", "the end of the file", "a header and a line with the size", "")
 }
 
-/// Whether it is an array, and its symmetry.
+/// Parses whether the layout is an array, and the symmetry.
 fn parse_banner(place: &Place<'_>, banner: &str) -> Result<(bool, Symmetry), ExchangeError> {
     let lower = banner.to_ascii_lowercase();
     let words: Vec<_> = words(lower.trim_start_matches('\u{feff}')).collect();
@@ -119,10 +119,10 @@ fn parse_banner(place: &Place<'_>, banner: &str) -> Result<(bool, Symmetry), Exc
     }
 }
 
-/// A symmetric matrix as Matrix Market text, `coordinate real symmetric`, read back to the last
-/// bit.
+/// Writes a symmetric matrix as Matrix Market text, `coordinate real symmetric`; it reads back bit
+/// for bit.
 ///
-/// Only the lower triangle is written. `comments` become lines that begin with `%`.
+/// Only the lower triangle is written. `comments` become lines that start with `%`.
 pub fn write_matrix_market(matrix: &DMatrix<f64>, comments: &[&str]) -> String {
     let n = matrix.nrows().min(matrix.ncols());
     let mut text = String::from("%%MatrixMarket matrix coordinate real symmetric\n");

@@ -1,9 +1,10 @@
-//! Reduced (and full) matrices from and to other FE programs.
+//! Import and export of reduced (and full) matrices of other FE programs.
 //!
-//! Reading has three steps, each with its own function: [`recognise`] tells the format by content,
-//! [`read_matrices`] gives the matrices as they stand in the files ([`ImportedMatrices`]), and
-//! [`assemble_interfaces`] picks the rows of the interfaces and converts to SI. The result goes
-//! through the gate ([`flexarm_fem::ReducedLink::from_matrix12`]) like every other stiffness.
+//! Reading has three steps, each with its own function: [`recognise`] detects the format by
+//! content, [`read_matrices`] returns the matrices as they are in the files ([`ImportedMatrices`]),
+//! and [`assemble_interfaces`] extracts the rows of the interfaces and converts to SI. The result
+//! passes through the gate ([`flexarm_fem::ReducedLink::from_matrix12`]) like every other
+//! stiffness.
 //!
 //! ```
 //! use flexarm_fe_io::exchange::{InputFile, MatrixNames, parse_matrices, propose_map, assemble_interfaces};
@@ -14,7 +15,7 @@
 //! let file = InputFile::new("job_STIF1.mtx", text); // Abaqus: node,dof,node,dof,value
 //! let imported = parse_matrices(&[file], &MatrixNames::default())?;
 //!
-//! // Which node is A? Without an answer the error proposes one.
+//! // Without a map of the interfaces, the error proposes one.
 //! let question = assemble_interfaces(&imported, None, Some(&UnitSystem::SI)).unwrap_err();
 //! assert!(question.help.contains("A=1001,B=1002"));
 //! let map = propose_map(&imported.stiffness.rows).unwrap();
@@ -23,10 +24,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Units: those of the files everywhere but in [`assemble_interfaces`], which alone converts. Full
-//! models (`.sti`/`.mas`, Exudyn) stay sparse triplets with labels; they are reduced elsewhere.
-//! Writers stand beside the parsers of their format. The modal format SID is separate:
-//! [`parse_sid`].
+//! Units: those of the files everywhere except in [`assemble_interfaces`], the only place that
+//! converts. Full models (`.sti`/`.mas`, Exudyn) stay sparse triplets with labels; they are reduced
+//! elsewhere. Writers are in the same module as the parser of their format. The modal format SID is
+//! separate: [`parse_sid`].
 //!
 //! Not here: meshes, reduction, the checks of a stiffness.
 

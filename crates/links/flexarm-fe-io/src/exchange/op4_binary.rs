@@ -1,10 +1,10 @@
-//! Nastran OUTPUT4, binary: Fortran records, little or big endian, dense or sparse, BIGMAT or not.
+//! Nastran OUTPUT4 binary: Fortran records, little or big endian, dense or sparse, BIGMAT or not.
 
 use super::error::{ExchangeError, ExchangeErrorKind, Place};
 use super::matrix::{LabelledMatrix, Triplets};
 use super::op4_text::Header;
 
-/// Bytes with their order.
+/// Bytes with their byte order.
 struct Records<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -48,7 +48,7 @@ impl<'a> Records<'a> {
         word
     }
 
-    /// A 32-bit integer at word `i`, which must be inside.
+    /// Reads the 32-bit integer at word `i`, which must be in range.
     fn integer(&self, bytes: &[u8], i: usize) -> i32 {
         i32::from_le_bytes(self.word(bytes, i))
     }
@@ -65,7 +65,7 @@ impl<'a> Records<'a> {
         f64::from_le_bytes(eight)
     }
 
-    /// The payload of the next record.
+    /// Reads the payload of the next record.
     fn next(&mut self, what: &str) -> Result<&'a [u8], ExchangeError> {
         let rest = &self.bytes[self.at..];
         let length = |at: usize| Some(self.integer(rest.get(at..at.checked_add(4)?)?, 0));
@@ -110,7 +110,7 @@ impl<'a> Records<'a> {
             self.values(header, data, row, column, triplets)?;
             return Ok(true);
         }
-        // A sparse column: strings, each led by its length and first row.
+        // Sparse column: strings, each preceded by its length and first row.
         while !data.is_empty() {
             let lead = if header.big { 2 } else { 1 };
             if data.len() < 4 * lead {
@@ -129,7 +129,7 @@ impl<'a> Records<'a> {
         Ok(true)
     }
 
-    /// Values from `row` (from 1) downwards.
+    /// Adds values from `row` (from 1) downwards.
     fn values(
         &self,
         header: &Header,

@@ -1,8 +1,9 @@
 //! Nastran OUTPUT4 as text: dense columns, sparse strings, and sparse strings with BIGMAT.
 //!
-//! Lines of integers say what follows: four and a name begin a matrix, three a column, one or two a
-//! string of a sparse column; lines with a point hold values. The number of words in a column
-//! counts a double once or twice, depending on the writer, so the values are counted instead.
+//! The number of integers in a line gives its meaning: four and a name start a matrix, three a
+//! column, one or two a string of a sparse column; lines with a decimal point contain values.
+//! Depending on the writer, the number of words in a column counts a double once or twice, so the
+//! values are counted instead.
 
 use nalgebra::DMatrix;
 
@@ -12,13 +13,13 @@ use super::matrix::{LabelledMatrix, Storage, Triplets};
 use super::text::{Text, shown, words};
 use super::user_element::fortran;
 
-/// The header of a matrix, in text and in binary files.
+/// Header of a matrix, in text and in binary files.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Header {
     pub(super) name: String,
     pub(super) columns: usize,
     pub(super) rows: usize,
-    /// Strings carry their length and row in two integers instead of one.
+    /// Whether strings give their length and row in two integers instead of one (BIGMAT).
     pub(super) big: bool,
     pub(super) is_double: bool,
 }
@@ -47,7 +48,7 @@ impl Header {
         .map(|header| Self { big: rows < 0, ..header })
     }
 
-    /// The symmetric matrix, or nothing for a rectangular one.
+    /// Builds the symmetric matrix, or `None` for a rectangular one.
     pub(super) fn finish(self, triplets: Triplets, origin: &str) -> Result<Option<LabelledMatrix>, ExchangeError> {
         if self.rows != self.columns {
             return Ok(None);
@@ -56,20 +57,20 @@ impl Header {
         triplets.symmetric(&self.name, origin, rows, Storage::BySize).map(Some)
     }
 
-    /// Length of a string in words and its first row (from 1), from its one integer.
+    /// Decodes the single integer of a string: length in words, and first row (from 1).
     pub(super) fn string(code: i64) -> (i64, i64) {
         (code / 65536 - 1, code % 65536)
     }
 }
 
-/// A matrix being read.
+/// State of reading a matrix.
 struct Reading {
     header: Header,
     format: Format,
     triplets: Triplets,
     column: usize,
     row: usize,
-    /// Values of the column or string at hand: so many so far, and the words that it promises.
+    /// Number of values read in the current column or string, and number of words declared for it.
     count: usize,
     promised: usize,
 }
@@ -98,7 +99,7 @@ pub(super) fn parse(text: Text<'_>) -> Result<Vec<LabelledMatrix>, ExchangeError
     Ok(matrices)
 }
 
-/// Four integers and a name that begins with a letter.
+/// Whether a line has four integers and a name that starts with a letter.
 fn is_header(line: &str) -> bool {
     let (head, name) = (line.get(..32), line.get(32..33));
     head.is_some_and(|head| !head.contains('.'))
@@ -124,7 +125,8 @@ fn begin(place: &Place<'_>, head: &str, line: &str) -> Result<Reading, ExchangeE
 }
 
 impl Reading {
-    /// A column (three integers) or a string of a sparse column (one or two).
+    /// Reads the header of a column (three integers) or of a string of a sparse column (one or
+    /// two).
     fn integers(&mut self, place: &Place<'_>, line: &str) -> Result<(), ExchangeError> {
         self.check_count(place)?;
         let numbers = words(line).map(|word| place.integer("column", word)).collect::<Result<Vec<_>, _>>()?;
@@ -136,7 +138,7 @@ impl Reading {
                     return Err(place.fail(ExchangeErrorKind::Syntax, "column", found, format!("1 to {last}"), ""));
                 }
                 self.column = column as usize;
-                // The words of a sparse column are counted string by string.
+                // The words of a sparse column are counted per string.
                 (row, if row == 0 { 0 } else { length })
             }
             [length, row] => (row, length.saturating_sub(1)),
@@ -162,7 +164,7 @@ impl Reading {
             let value = place.number("entry", field)?;
             let row = self.row + self.count;
             self.count += 1;
-            // The column after the last ends the matrix with one dummy value.
+            // A column after the last one, with one dummy value, ends the matrix.
             if self.column == self.header.columns + 1 {
                 continue;
             }
@@ -176,7 +178,7 @@ impl Reading {
         Ok(())
     }
 
-    /// A double counts as one word or as two.
+    /// Checks the number of values; a double may count as one word or two.
     fn check_count(&self, place: &Place<'_>) -> Result<(), ExchangeError> {
         let halves = self.header.is_double && 2 * self.count == self.promised;
         if self.count == self.promised || halves || self.column == self.header.columns + 1 {
@@ -201,11 +203,11 @@ impl Reading {
     }
 }
 
-/// Matrices as OUTPUT4 text, symmetric, double, dense columns: 17 digits, read back to the last
-/// bit.
+/// Writes matrices as OUTPUT4 text, symmetric, double, dense columns, with 17 digits; they read
+/// back bit for bit.
 ///
-/// The number of words in a column is that of its values, as pyNastran writes and reads it. Names
-/// are cut to eight characters.
+/// The number of words in a column is the number of its values, as in pyNastran. Names are
+/// truncated to eight characters.
 pub fn write_op4(matrices: &[(&str, &DMatrix<f64>)]) -> String {
     const PER_LINE: usize = 3;
     let mut text = String::new();

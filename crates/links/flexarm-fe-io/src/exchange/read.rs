@@ -1,5 +1,5 @@
-//! Files to [`ImportedMatrices`]: each is recognised and parsed, then stiffness and mass are
-//! chosen.
+//! Reads files into [`ImportedMatrices`]: recognises and parses each file, then selects stiffness
+//! and mass.
 
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ use super::text::{LARGEST_UNPACKED, Text, unpack};
 use super::{abaqus_text, dmig, harwell_boeing, matrix_market, op4_binary, op4_text, sidecar, simscape, user_element};
 use flexarm_fem::input::read_file;
 
-/// What a matrix is.
+/// Role of a matrix.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MatrixRole {
     /// Stiffness.
@@ -25,7 +25,7 @@ pub enum MatrixRole {
 }
 
 impl MatrixRole {
-    /// "stiffness" or "mass".
+    /// Name: "stiffness" or "mass".
     pub fn name(self) -> &'static str {
         match self {
             Self::Stiffness => "stiffness",
@@ -34,7 +34,7 @@ impl MatrixRole {
     }
 }
 
-/// Names of the matrices to take from files that hold several (DMIG, OP4); `None`: guess by K and
+/// Names of the matrices to select in files with several (DMIG, OP4); `None`: by the letters K and
 /// M.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct MatrixNames {
@@ -44,19 +44,19 @@ pub struct MatrixNames {
     pub mass: Option<String>,
 }
 
-/// A file in memory.
+/// File in memory.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct InputFile {
-    /// Path, or what to call it in messages.
+    /// Path, or name in messages.
     pub origin: String,
-    /// Its content, which may be packed with gzip.
+    /// Contents, optionally compressed with gzip.
     pub bytes: Vec<u8>,
-    /// What its matrix is; `None`: by its content or by its name.
+    /// Role of its matrix; `None`: by contents or file name.
     pub role: Option<MatrixRole>,
 }
 
 impl InputFile {
-    /// A file whose role is guessed.
+    /// Creates a file without a given role.
     pub fn new(origin: impl Into<String>, bytes: impl Into<Vec<u8>>) -> Self {
         Self { origin: origin.into(), bytes: bytes.into(), role: None }
     }
@@ -74,13 +74,13 @@ impl InputFile {
         Ok(Self { origin, bytes, role: None })
     }
 
-    /// The same file with its role said.
+    /// Sets the role.
     pub fn with_role(self, role: MatrixRole) -> Self {
         Self { role: Some(role), ..self }
     }
 }
 
-/// A matrix that may be the stiffness or the mass.
+/// Matrix that may be the stiffness or the mass.
 #[derive(Debug)]
 pub(super) struct Candidate {
     pub(super) format: MatrixFormat,
@@ -89,7 +89,7 @@ pub(super) struct Candidate {
     pub(super) matrix: LabelledMatrix,
 }
 
-/// What all files together hold.
+/// Combined contents of all files.
 #[derive(Debug, Default)]
 struct Found {
     candidates: Vec<Candidate>,
@@ -103,14 +103,14 @@ struct Found {
 
 /// Reads files of one structure, such as `job.sti`, `job.mas`, `job.dof`.
 ///
-/// Files that belong to a given one are read too where they are not given: `.mas` and `.dof` of a
+/// Files that belong to a given one are read even if they are not given: `.mas` and `.dof` of a
 /// `.sti`, the `.mapping` of a Harwell-Boeing file, the sidecar `.toml` of Matrix Market files and
-/// the matrices that a sidecar names, also if it was found beside the only given file, which it
-/// names. Beside a single file that is named as a stiffness (`arm_K.mtx`, `STIF1`, `stiffness`) or
-/// as a mass, the other matrix of the same name is found, and said in a warning.
+/// the matrices named in a sidecar. A sidecar next to a single given file also counts if it names
+/// that file. Next to a single file that is named as a stiffness (`arm_K.mtx`, `STIF1`,
+/// `stiffness`) or as a mass, the other matrix is found by name, with a warning.
 ///
 /// # Errors
-/// [`ExchangeError`] with file, line, element, what was found and what was expected.
+/// [`ExchangeError`] with file, line, element, value found and value expected.
 pub fn read_matrices<P: AsRef<Path>>(paths: &[P], names: &MatrixNames) -> Result<ImportedMatrices, ExchangeError> {
     let mut files = paths.iter().map(InputFile::open).collect::<Result<Vec<_>, _>>()?;
     companions(&mut files)?;
@@ -125,7 +125,7 @@ pub fn read_matrices<P: AsRef<Path>>(paths: &[P], names: &MatrixNames) -> Result
     Ok(imported)
 }
 
-/// The mass that belongs to a single stiffness, or the other way round, by its name.
+/// Finds the mass that belongs to a single stiffness, or vice versa, by its name.
 fn other_matrix(files: &[InputFile]) -> Result<Option<InputFile>, ExchangeError> {
     let is_matrix = |format| {
         matches!(
@@ -157,7 +157,7 @@ fn other_matrix(files: &[InputFile]) -> Result<Option<InputFile>, ExchangeError>
     Ok(None)
 }
 
-/// Names that the other matrix may have: the last word that means the one is changed to the other.
+/// Possible names of the other matrix: the last word for one role is replaced by that of the other.
 fn other_names(name: &str, role: MatrixRole) -> Vec<String> {
     const WORDS: [(&str, &str); 9] = [
         ("stiffness", "mass"),
@@ -173,7 +173,7 @@ fn other_names(name: &str, role: MatrixRole) -> Vec<String> {
     let mut names = Vec::new();
     for (stiffness, mass) in WORDS {
         let (from, to) = if role == MatrixRole::Stiffness { (stiffness, mass) } else { (mass, stiffness) };
-        // A whole word: no letters beside it.
+        // Whole words only, without adjacent letters.
         let is_word = |at: usize| {
             let letter = |c: Option<char>| c.is_some_and(char::is_alphabetic);
             !letter(name[..at].chars().next_back()) && !letter(name[at + from.len()..].chars().next())
@@ -185,9 +185,9 @@ fn other_names(name: &str, role: MatrixRole) -> Vec<String> {
     names
 }
 
-/// Adds the files beside the given ones that belong to them.
+/// Adds files in the same folder that belong to the given ones.
 fn companions(files: &mut Vec<InputFile>) -> Result<(), ExchangeError> {
-    // The same file may have several paths.
+    // Compare canonical paths, since a file may have several paths.
     let real = |path: &Path| std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     let given = files.len();
     let mut known: Vec<PathBuf> = files.iter().map(|file| real(Path::new(&file.origin))).collect();
@@ -196,8 +196,8 @@ fn companions(files: &mut Vec<InputFile>) -> Result<(), ExchangeError> {
         let mut wanted = wanted_by(file)?;
         wanted.retain(|(path, _)| path.exists());
         let is_given = |path: &Path| known[..given].contains(&real(path));
-        // A sidecar that was found counts for the matrices only if it is that of the one given:
-        // other files may be there to replace those that it names.
+        // A sidecar found this way is used for the matrices only if it names the single given file:
+        // other files may be meant to replace those that it names.
         if next >= given && !(given == 1 && wanted.iter().any(|(path, _)| is_given(path))) {
             wanted.clear();
         }
@@ -218,7 +218,7 @@ fn companions(files: &mut Vec<InputFile>) -> Result<(), ExchangeError> {
     Ok(())
 }
 
-/// Files that a file may have beside it, and what a sidecar says they are.
+/// Paths of the files that may belong to a file, with their roles according to a sidecar.
 fn wanted_by(file: &InputFile) -> Result<Vec<(PathBuf, Option<MatrixRole>)>, ExchangeError> {
     let path = Path::new(&file.origin);
     let folder = path.parent().unwrap_or(Path::new(""));
@@ -253,7 +253,7 @@ fn wanted_by(file: &InputFile) -> Result<Vec<(PathBuf, Option<MatrixRole>)>, Exc
     Ok(wanted)
 }
 
-/// Parses files of one structure that are in memory. Never panics.
+/// Parses files of one structure from memory. Never panics.
 ///
 /// # Errors
 /// As [`read_matrices`].
@@ -340,8 +340,8 @@ fn parse_file(file: &InputFile, found: &mut Found) -> Result<(), ExchangeError> 
             return Err(place.fail(ExchangeErrorKind::Unsupported, "file", "a modal body (SID)", expected, help));
         }
     };
-    // What the user says of a file counts most; of several matrices in it those are taken that look
-    // so.
+    // A role given by the user takes precedence; if the file has several matrices, those with that
+    // role are kept.
     match (&mut matrices[..], file.role) {
         ([(role, _)], Some(said)) => *role = Some(said),
         (several, Some(said)) => several.iter_mut().for_each(|(role, _)| *role = role.filter(|role| *role == said)),
@@ -352,13 +352,14 @@ fn parse_file(file: &InputFile, found: &mut Found) -> Result<(), ExchangeError> 
     Ok(())
 }
 
-/// `.sti` and `.mas` are full models; other names may be anything.
+/// Full models (`.sti`, `.mas`) are stored sparse, other files by size.
 fn storage_by_name(origin: &str) -> Storage {
     let name = origin.strip_suffix(".gz").unwrap_or(origin);
     if name.ends_with(".sti") || name.ends_with(".mas") { Storage::Sparse } else { Storage::BySize }
 }
 
-/// By the ending (`.sti`, `.mas`) or the last word of the file name: `arm_K.mtx`, `job_MASS1.mtx`.
+/// Role by the extension (`.sti`, `.mas`) or the last word of the name: `arm_K.mtx`,
+/// `job_MASS1.mtx`.
 fn role_by_name(origin: &str) -> Option<MatrixRole> {
     let name = origin.rsplit(['/', '\\']).next()?.to_ascii_lowercase();
     let name = name.strip_suffix(".gz").unwrap_or(&name);
@@ -377,7 +378,8 @@ fn role_by_name(origin: &str) -> Option<MatrixRole> {
     }
 }
 
-/// Nastran: `KAAX`, `K2GG`, `MAAX`; `K4...` is structural damping.
+/// Role by the first letter of Nastran names: `KAAX`, `K2GG`, `MAAX`; `K4...` is structural
+/// damping.
 fn role_by_letter(name: &str) -> Option<MatrixRole> {
     match name.bytes().next()?.to_ascii_uppercase() {
         b'K' if !name.starts_with("K4") => Some(MatrixRole::Stiffness),
@@ -386,7 +388,7 @@ fn role_by_letter(name: &str) -> Option<MatrixRole> {
     }
 }
 
-/// Picks stiffness and mass and brings them to the same rows.
+/// Selects stiffness and mass and gives them the same rows.
 fn choose(mut found: Found, names: &MatrixNames, origin: &str) -> Result<ImportedMatrices, ExchangeError> {
     for (name, role) in [(&names.stiffness, MatrixRole::Stiffness), (&names.mass, MatrixRole::Mass)] {
         let Some(name) = name else { continue };
@@ -404,7 +406,7 @@ fn choose(mut found: Found, names: &MatrixNames, origin: &str) -> Result<Importe
             }
         }
     }
-    // A single matrix about which nothing is said is a stiffness.
+    // A single matrix without a role is the stiffness.
     if let [only] = &mut found.candidates[..] {
         only.role = only.role.or(Some(MatrixRole::Stiffness));
     }
@@ -456,8 +458,7 @@ fn apply_labels(matrix: &mut LabelledMatrix, labels: &[DofLabel], from: &str) ->
     Ok(())
 }
 
-/// Both matrices over the same rows; a massless row, or one without stiffness, may be absent in a
-/// file.
+/// Brings both matrices to the same rows; a file may omit rows without mass or without stiffness.
 fn aligned(
     K: &LabelledMatrix,
     M: &LabelledMatrix,

@@ -1,12 +1,11 @@
-//! Which format a file has, by its content: the endings say little, three formats are called
+//! Recognition of file formats by content, because file extensions are ambiguous: three formats use
 //! `.mtx`.
 
 use std::fmt;
 
 use super::text::{real, unpack_head, words};
 
-/// The formats that [`read_matrices`](super::read_matrices) and [`parse_sid`](super::parse_sid)
-/// know.
+/// Formats read by [`read_matrices`](super::read_matrices) and [`parse_sid`](super::parse_sid).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum MatrixFormat {
@@ -32,18 +31,18 @@ pub enum MatrixFormat {
     EquationMapping,
     /// Exudyn `FEMinterface.SaveToFile` in HDF5.
     ExudynHdf5,
-    /// A matrix as comma-separated values: Simscape.
+    /// Matrix as comma-separated values: Simscape.
     Csv,
-    /// Origins and quaternions of interfaces as comma-separated values: Simscape.
+    /// Interface origins and quaternions as comma-separated values: Simscape.
     CsvFrames,
     /// Standard Input Data of a flexible body (Wallrapp 1994).
     Sid,
-    /// Units, frames and rows beside Matrix Market files, written by this program.
+    /// Units, frames and rows accompanying Matrix Market files, written by this program.
     Sidecar,
 }
 
 impl MatrixFormat {
-    /// The name for messages.
+    /// Name for messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::MatrixMarket => "Matrix Market",
@@ -71,14 +70,14 @@ impl fmt::Display for MatrixFormat {
     }
 }
 
-/// The format of a file (gzip is unpacked); `None` if it is none of these.
+/// Recognises the format of a file (unpacking gzip); `None` if it is none of these.
 pub fn recognise(bytes: &[u8]) -> Option<MatrixFormat> {
     const HEAD: usize = 1 << 20;
     let head = unpack_head(bytes, HEAD);
     if head.starts_with(b"\x89HDF\r\n\x1a\n") {
         return Some(MatrixFormat::ExudynHdf5);
     }
-    // A Fortran record of 24 bytes, its length before and after.
+    // Fortran record of 24 bytes, with its length before and after.
     let lengths = [head.get(..4), head.get(28..32)];
     if [24_u32.to_le_bytes(), 24_u32.to_be_bytes()].iter().any(|length| lengths == [Some(&length[..]); 2]) {
         return Some(MatrixFormat::Op4Binary);
@@ -122,7 +121,7 @@ fn recognise_text(head: &str) -> Option<MatrixFormat> {
     recognise_row(data)
 }
 
-/// Formats without a header, by the first row of numbers.
+/// Recognises formats without a header by the first row of numbers.
 fn recognise_row(data: &str) -> Option<MatrixFormat> {
     let row: Vec<_> = words(data).collect();
     let integers = row.iter().take_while(|word| word.parse::<i64>().is_ok()).count();
@@ -146,7 +145,7 @@ fn starts_with(line: &str, start: &str) -> bool {
     line.get(..start.len()).is_some_and(|head| head.eq_ignore_ascii_case(start))
 }
 
-/// `RSA`, `RUA`, `CSA`, `PUE`, ... and four numbers.
+/// Whether a line has a type (`RSA`, `RUA`, `CSA`, `PUE`, ...) and at least three numbers.
 fn is_harwell_boeing_type(line: &str) -> bool {
     let Some(kind) = line.get(..3) else { return false };
     let kind: Vec<u8> = kind.bytes().map(|byte| byte.to_ascii_uppercase()).collect();
@@ -156,7 +155,7 @@ fn is_harwell_boeing_type(line: &str) -> bool {
         && words(&line[3..]).take(3).filter(|word| is_digits(word)).count() == 3
 }
 
-/// `4I8` with FORM and TYPE in their ranges, then a column header `3I8`.
+/// Whether the lines are `4I8` with valid FORM and TYPE, then a column header `3I8`.
 fn is_op4_header(first: &str, second: &str) -> bool {
     let field = |line: &str, i: usize| line.get(8 * i..8 * i + 8).and_then(|text| text.trim().parse::<i64>().ok());
     let (form, kind) = (field(first, 2), field(first, 3));

@@ -1,4 +1,5 @@
-//! The small TOML file beside Matrix Market files: units, interfaces, frames, meaning of the rows.
+//! Small TOML file accompanying Matrix Market files: units, interfaces, frames, meaning of the
+//! rows.
 //!
 //! ```toml
 //! format = "flexarm-matrices"
@@ -14,7 +15,7 @@
 //! rotation = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 //! ```
 //! Rows after the interfaces are modal coordinates. The components of all interfaces are along the
-//! link axes; the rotation of a frame is for its joint, not for the matrix.
+//! link axes; the rotation of a frame applies to its joint, not to the matrix.
 
 use flexarm_spatial::Pose;
 use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
@@ -25,14 +26,14 @@ use super::interface::{Interface, InterfaceMap};
 use super::text::Text;
 use flexarm_fem::units::UnitSystem;
 
-/// Value of `format` in every sidecar.
+/// Value of the key `format`.
 pub(super) const FORMAT: &str = "flexarm-matrices";
 const VERSION: i64 = 1;
 
-/// What Matrix Market files do not say about themselves; lengths in the units of the file.
+/// Data missing in Matrix Market files; lengths in the units of the file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sidecar {
-    /// File of the stiffness, beside the sidecar.
+    /// File of the stiffness, relative to the folder of the sidecar.
     pub stiffness: String,
     /// File of the mass.
     pub mass: Option<String>,
@@ -42,22 +43,22 @@ pub struct Sidecar {
     pub interfaces: Vec<SidecarInterface>,
 }
 
-/// An interface of a [`Sidecar`].
+/// Interface of a [`Sidecar`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct SidecarInterface {
-    /// Its rows and name.
+    /// Rows and name of the interface.
     pub interface: Interface,
-    /// Its frame in the link frame, length in units of the file.
+    /// Frame in the link frame, lengths in units of the file.
     pub frame: Pose,
 }
 
 impl Sidecar {
-    /// The interfaces as a map for [`assemble_interfaces`](super::assemble_interfaces).
+    /// Returns the interfaces as a map for [`assemble_interfaces`](super::assemble_interfaces).
     pub fn map(&self) -> InterfaceMap {
         InterfaceMap { interfaces: self.interfaces.iter().map(|i| i.interface.clone()).collect(), modal: Vec::new() }
     }
 
-    /// The frames, translations in m.
+    /// Frames with translations in m.
     pub fn frames_si(&self) -> Vec<Pose> {
         let scaled =
             |X: &Pose| Pose::from_parts(Translation3::from(X.translation.vector * self.units.length), X.rotation);
@@ -126,7 +127,7 @@ pub(super) fn parse(text: Text<'_>) -> Result<Sidecar, ExchangeError> {
     Ok(Sidecar { stiffness: raw.stiffness, mass: raw.mass, units, interfaces })
 }
 
-/// The sidecar as text; frames read back to the last bit.
+/// Writes the sidecar as text; frames read back bit for bit.
 pub fn write_sidecar(sidecar: &Sidecar) -> String {
     let quoted = |text: &str| toml::Value::String(text.to_owned()).to_string();
     let mut text = format!("format = {FORMAT:?}\nversion = {VERSION}\nstiffness = {}\n", quoted(&sidecar.stiffness));

@@ -1,7 +1,7 @@
-//! Simscape "Reduced Order Flexible Solid": K and M as comma-separated values, and the frames.
+//! Simscape "Reduced Order Flexible Solid": K and M as comma-separated values, and frames.
 //!
-//! The rows are those of the interfaces one after the other, translations first, then modes. That
-//! is our reading of the documentation and was not tried in Simscape.
+//! The rows are those of the interfaces in order, translations first, followed by modes. This is
+//! our interpretation of the documentation and has not been tested in Simscape.
 
 use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, Quaternion, Translation3, UnitQuaternion};
@@ -22,7 +22,7 @@ pub(super) fn parse_matrix(text: Text<'_>) -> Result<LabelledMatrix, ExchangeErr
     for (row, (place, line)) in rows(&text).enumerate() {
         let mut count = 0;
         for word in words(line) {
-            // Columns beyond the number of rows are refused below.
+            // Columns beyond the number of rows are rejected below.
             if count < n {
                 triplets.push(row, count, place.number("entry", word)?, &place);
             }
@@ -59,22 +59,22 @@ pub(super) fn parse_frames(text: Text<'_>) -> Result<Vec<Pose>, ExchangeError> {
     Ok(frames)
 }
 
-/// The files for Simscape, by name and text.
+/// Contents of the files for Simscape.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SimscapeFiles {
     /// `<name>_K.csv`.
     pub stiffness: String,
     /// `<name>_M.csv`.
     pub mass: String,
-    /// `<name>_frames.csv`: origin, then quaternion w, x, y, z, of each interface.
+    /// `<name>_frames.csv`: origin and quaternion w, x, y, z of each interface.
     pub frames: String,
-    /// `<name>_load.m`: reads them into the variables that the block asks for.
+    /// `<name>_load.m`: reads the files into the variables that the block needs.
     pub script: String,
 }
 
-/// Stiffness, mass and interface frames for Simscape; SI, 17 digits, read back to the last bit.
+/// Writes stiffness, mass and interface frames for Simscape; SI, 17 digits, reads back bit for bit.
 ///
-/// * `name`: begins the names of the files inside the script.
+/// * `name`: prefix of the file names in the script.
 pub fn write_simscape(name: &str, K: &DMatrix<f64>, M: &DMatrix<f64>, frames: &[Pose]) -> SimscapeFiles {
     let matrix = |matrix: &DMatrix<f64>| -> String {
         let line = |values: Vec<String>| values.join(",") + "\n";

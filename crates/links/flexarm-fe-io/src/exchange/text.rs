@@ -1,4 +1,4 @@
-//! Bytes to lines, words and numbers, as Fortran and C programs write them.
+//! Splits bytes into lines, words and numbers, as written by Fortran and C programs.
 
 use std::borrow::Cow;
 use std::io::Read;
@@ -8,10 +8,10 @@ use flate2::read::MultiGzDecoder;
 use super::error::{ExchangeError, ExchangeErrorKind, Place};
 use crate::unpack::{is_gzip, unpacked};
 
-/// No file is unpacked to more than this: a full model of 300 000 unknowns has half of it.
+/// Maximum unpacked size, bytes; a full model of 300 000 unknowns takes half of it.
 pub(super) const LARGEST_UNPACKED: u64 = 2 << 30;
 
-/// The bytes, unpacked if they are packed with gzip.
+/// Returns the bytes, unpacked if they are compressed with gzip.
 pub(super) fn unpack<'b>(bytes: &'b [u8], origin: &str) -> Result<Cow<'b, [u8]>, ExchangeError> {
     if !is_gzip(bytes) {
         return Ok(Cow::Borrowed(bytes));
@@ -22,18 +22,18 @@ pub(super) fn unpack<'b>(bytes: &'b [u8], origin: &str) -> Result<Cow<'b, [u8]>,
         .map_err(|e| Place::file(origin).fail(ExchangeErrorKind::Unreadable, "gzip data", e.found, e.expected, e.help))
 }
 
-/// The first bytes, unpacked; what cannot be unpacked ends the result without an error.
+/// Returns the first bytes, unpacked; an unpacking error ends the result silently.
 pub(super) fn unpack_head(bytes: &[u8], length: usize) -> Cow<'_, [u8]> {
     if !is_gzip(bytes) {
         return Cow::Borrowed(&bytes[..bytes.len().min(length)]);
     }
     let mut head = Vec::new();
-    // What was unpacked before an error is still there, and is all that recognition needs.
+    // Bytes unpacked before an error are kept; they are enough for recognition.
     let _ = MultiGzDecoder::new(bytes).take(length as u64).read_to_end(&mut head);
     Cow::Owned(head)
 }
 
-/// A text file and what to call it.
+/// Text file with its name in messages.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Text<'a> {
     pub(super) origin: &'a str,
@@ -49,27 +49,27 @@ impl<'a> Text<'a> {
         Place::file(self.origin)
     }
 
-    /// All lines with their places, without line ends.
+    /// Iterates over all lines with their places, without line ends.
     pub(super) fn lines(&self) -> impl Iterator<Item = (Place<'a>, &'a str)> + use<'a> {
         let origin = self.origin;
         self.text.lines().enumerate().map(move |(i, line)| (Place::line(origin, i + 1), line))
     }
 }
 
-/// Words between blanks and commas.
+/// Splits a line into words at blanks and commas.
 pub(super) fn words(line: &str) -> impl Iterator<Item = &str> {
     line.split([',', ' ', '\t', '\r']).filter(|word| !word.is_empty())
 }
 
-/// A real number, also with the exponent letter D, or with none as in `1.5-3`.
+/// Parses a real number, also with the exponent letter D or without one, as in `1.5-3`.
 ///
-/// NaN and infinity come back as such, for the caller to refuse.
+/// NaN and infinity are returned; the caller rejects them.
 pub(super) fn real(text: &str) -> Option<f64> {
     let text = text.trim();
     if let Ok(number) = text.parse() {
         return Some(number);
     }
-    // The sign of an exponent without a letter is the last sign that follows a digit or a point.
+    // The sign of an exponent without a letter is the last sign after a digit or a point.
     let bytes = text.as_bytes();
     let digit = |i: usize| bytes[i].is_ascii_digit() || bytes[i] == b'.';
     let exponent = (1..bytes.len()).rev().find(|&i| matches!(bytes[i], b'+' | b'-') && digit(i - 1));
@@ -82,7 +82,7 @@ pub(super) fn real(text: &str) -> Option<f64> {
 }
 
 impl Place<'_> {
-    /// A finite number.
+    /// Parses a finite number.
     pub(super) fn number(&self, element: &str, text: &str) -> Result<f64, ExchangeError> {
         match real(text) {
             Some(number) if number.is_finite() => Ok(number),
@@ -99,7 +99,7 @@ impl Place<'_> {
         text.trim().parse().map_err(|_| wrong())
     }
 
-    /// A row or column number of a file, from 1, returned from 0.
+    /// Parses a row or column number from 1; returns it from 0.
     pub(super) fn index(&self, element: &str, text: &str) -> Result<usize, ExchangeError> {
         let wrong = || {
             let expected = "a row or column number from 1 to 4294967295";
@@ -111,7 +111,7 @@ impl Place<'_> {
         }
     }
 
-    /// The next word of a line.
+    /// Returns the next word of a line.
     pub(super) fn word<'w>(
         &self,
         element: &str,
@@ -128,14 +128,14 @@ impl Place<'_> {
         })
     }
 
-    /// Refuses anything after the last value of a line.
+    /// Rejects anything after the last value of a line.
     pub(super) fn end<'w>(&self, words: &mut impl Iterator<Item = &'w str>) -> Result<(), ExchangeError> {
         let Some(word) = words.next() else { return Ok(()) };
         Err(self.fail(ExchangeErrorKind::Syntax, "line", shown(word), "the end of the line", ""))
     }
 }
 
-/// Text of a file in quotes, shortened.
+/// Quotes text of a file, shortened.
 pub(super) fn shown(text: &str) -> String {
     const LONGEST: usize = 40;
     let text = text.trim();

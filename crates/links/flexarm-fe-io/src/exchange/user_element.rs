@@ -1,7 +1,7 @@
 //! Substructures of CalculiX and Abaqus: `*USER ELEMENT`, `*MATRIX,TYPE=STIFFNESS` or `MASS`.
 //!
-//! The numbers of the nodes stand only in comments (CalculiX, `** ELEMENT NODES`) or in an
-//! `*ELEMENT` line. Matrices are lower triangles row by row; line breaks mean nothing.
+//! Node numbers are only in comments (CalculiX, `** ELEMENT NODES`) or in an `*ELEMENT` line.
+//! Matrices are lower triangles row by row; line breaks have no meaning.
 
 use nalgebra::DMatrix;
 
@@ -10,7 +10,7 @@ use super::matrix::{DofLabel, LabelledMatrix, Storage, Triplets};
 use super::read::MatrixRole;
 use super::text::{Text, shown, words};
 
-/// What the lines at hand belong to.
+/// Section of the file that the current lines belong to.
 enum Block {
     Other,
     Nodes,
@@ -19,13 +19,13 @@ enum Block {
     Matrix,
 }
 
-/// The file as it stands.
+/// Raw contents of the file.
 #[derive(Default)]
 struct Raw<'a> {
     nodes_promised: Option<usize>,
     unsymmetric: bool,
     nodes: Vec<i64>,
-    /// First node position (from 0) and the components active from there on.
+    /// First node position (from 0) and the active components from there on.
     components: Vec<(usize, Vec<u8>)>,
     matrices: Vec<RawMatrix<'a>>,
 }
@@ -76,7 +76,7 @@ fn scan(text: Text<'_>) -> Result<Raw<'_>, ExchangeError> {
                     matrix.values.push((place, place.number("entry", word)?));
                 }
             }
-            // `*ELEMENT`: its number, then its nodes, which say more than comments.
+            // `*ELEMENT`: its number, then its nodes, which take precedence over comments.
             Block::Element => {
                 raw.nodes = words(line).skip(1).map(|word| place.integer("node", word)).collect::<Result<_, _>>()?;
                 block = Block::Other;
@@ -118,7 +118,8 @@ fn scan_keyword<'a>(raw: &mut Raw<'a>, place: &Place<'a>, line: &str) -> Result<
     }
 }
 
-/// `dof, dof, ...` of the first node, later `position, dof, dof, ...`; each holds for what follows.
+/// `dof, dof, ...` of the first node, then `position, dof, dof, ...`; each is valid for the nodes
+/// that follow.
 fn scan_components(raw: &mut Raw<'_>, place: &Place<'_>, line: &str) -> Result<(), ExchangeError> {
     let mut numbers = Vec::new();
     for word in words(line) {
@@ -143,7 +144,7 @@ fn scan_components(raw: &mut Raw<'_>, place: &Place<'_>, line: &str) -> Result<(
     Ok(())
 }
 
-/// The label of every row; the size of the matrices is checked against it.
+/// Labels of all rows; the size of the matrices is checked against them.
 fn labels(raw: &Raw<'_>, text: Text<'_>) -> Result<Vec<DofLabel>, ExchangeError> {
     let place = text.file();
     let count = if raw.nodes.is_empty() { raw.nodes_promised.unwrap_or(0) } else { raw.nodes.len() };
@@ -152,7 +153,7 @@ fn labels(raw: &Raw<'_>, text: Text<'_>) -> Result<Vec<DofLabel>, ExchangeError>
         let expected = format!("NODES={}", raw.nodes_promised.unwrap_or(0));
         return Err(place.fail(ExchangeErrorKind::WrongSize, "** ELEMENT NODES", found, expected, ""));
     }
-    // A header that promises more nodes than there are entries is not followed.
+    // A header that declares more nodes than there are entries is rejected.
     let most = raw.matrices.iter().map(|matrix| matrix.values.len()).max().unwrap_or(0);
     let mut rows = Vec::new();
     let mut current = raw.components.iter().peekable();
@@ -205,13 +206,14 @@ fn assemble(
     triplets.symmetric(name, text.origin, rows.to_vec(), Storage::BySize)
 }
 
-/// A stiffness, and a mass, as a user element of CalculiX and Abaqus.
+/// Writes a stiffness, and optionally a mass, as a user element of CalculiX and Abaqus.
 ///
-/// `rows` names the node and component of each row; nodes are repeated per component, as CalculiX
-/// does. Fourteen digits (`e20.13`, as CalculiX reads): values read back to 5e-14 of themselves.
+/// `rows` gives the node and component of each row; nodes are repeated per component, as in
+/// CalculiX. Fourteen digits (`e20.13`, as CalculiX reads): values read back with a relative error
+/// of 5e-14.
 ///
 /// # Panics
-/// If a matrix does not have as many rows and columns as there are `rows`.
+/// If a matrix does not have one row and one column per entry of `rows`.
 pub fn write_user_element(K: &DMatrix<f64>, M: Option<&DMatrix<f64>>, rows: &[DofLabel]) -> String {
     let n = rows.len();
     let mut text = format!("** written by flexarm\n*USER ELEMENT,NODES={n:11},LINEAR\n** ELEMENT NODES\n");
@@ -234,13 +236,13 @@ pub fn write_user_element(K: &DMatrix<f64>, M: Option<&DMatrix<f64>>, rows: &[Do
     text
 }
 
-/// `1.2345E+08` with `decimals` digits after the point, right-aligned in `width`.
+/// Formats as `1.2345E+08` with `decimals` digits after the point, right-aligned in `width`.
 pub(super) fn fortran(value: f64, decimals: usize, width: usize) -> String {
     let printed = format!("{value:.decimals$E}");
     let (mantissa, exponent) = printed.split_once('E').unwrap_or((&printed, "0"));
     let exponent: i32 = exponent.parse().unwrap_or(0);
     let sign = if exponent < 0 { '-' } else { '+' };
-    // Three digits of exponent push the letter out, as in Fortran.
+    // A three-digit exponent replaces the letter, as in Fortran.
     let letter = if exponent.abs() < 100 { "E" } else { "" };
     format!("{:>width$}", format!("{mantissa}{letter}{sign}{:02}", exponent.abs()))
 }

@@ -1,4 +1,4 @@
-//! What a reader has collected, and the checks that turn it into a [`Mesh`].
+//! Data collected by a reader, and the checks that turn it into a [`Mesh`].
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -13,7 +13,7 @@ use flexarm_fem::mesh::{ElementBlock, ElementKind, Mesh, Region};
 use flexarm_fem::spelling::listed;
 use flexarm_fem::units::UnitSystem;
 
-/// Nodes, elements and regions as in the file: its numbers, its units. Offsets are for messages.
+/// Nodes, elements and regions in the numbers and units of the file. Offsets are for messages.
 #[derive(Default)]
 pub(super) struct Draft {
     pub(super) node_ids: Vec<u64>,
@@ -25,7 +25,7 @@ pub(super) struct Draft {
     block_of: HashMap<(ElementKind, usize), usize>,
 }
 
-/// Elements of one kind in one region, nodes by their numbers.
+/// Elements of one kind in one region, with the node numbers of the file.
 pub(super) struct DraftBlock {
     pub(super) kind: ElementKind,
     pub(super) region: usize,
@@ -41,7 +41,7 @@ impl Draft {
         self.node_offsets.push(offset);
     }
 
-    /// The block for elements of a kind in a region.
+    /// Returns the block for elements of a kind in a region, creating it if needed.
     pub(super) fn block(&mut self, kind: ElementKind, region: usize) -> &mut DraftBlock {
         let blocks = &mut self.blocks;
         let k = *self.block_of.entry((kind, region)).or_insert_with(|| {
@@ -51,8 +51,8 @@ impl Draft {
         &mut blocks[k]
     }
 
-    /// Keeps the regions for which `keep` holds, and their elements. Returns how many elements
-    /// went.
+    /// Keeps the regions for which `keep` is true, with their elements. Returns the number of
+    /// removed elements.
     pub(super) fn retain_regions(&mut self, keep: &[bool]) -> usize {
         let before: usize = self.blocks.iter().map(|block| block.ids.len()).sum();
         let new_index: Vec<usize> = keep
@@ -70,7 +70,7 @@ impl Draft {
         before - self.blocks.iter().map(|block| block.ids.len()).sum::<usize>()
     }
 
-    /// Checks the nodes: numbers unique, positions finite, not too many.
+    /// Checks the nodes: unique numbers, finite positions, not too many.
     pub(super) fn index_nodes(&self, src: &Source) -> Result<IdIndex, MeshError> {
         if self.nodes.len() >= u32::MAX as usize {
             let found = format!("{} nodes", self.nodes.len());
@@ -87,7 +87,7 @@ impl Draft {
         })
     }
 
-    /// Checks the elements and the sets and makes the mesh, in SI.
+    /// Checks the elements and sets, and makes the mesh in SI.
     pub(super) fn finish(
         self,
         src: &Source,
@@ -129,7 +129,7 @@ impl Draft {
     }
 }
 
-/// Node numbers to indices; refuses missing and repeated nodes.
+/// Converts node numbers to indices; rejects missing and repeated nodes.
 fn resolve(src: &Source, index: &IdIndex, block: &DraftBlock) -> Result<ElementBlock, MeshError> {
     let n = block.kind.nodes();
     let mut connectivity = Vec::with_capacity(block.nodes.len());
@@ -155,9 +155,9 @@ fn resolve(src: &Source, index: &IdIndex, block: &DraftBlock) -> Result<ElementB
     Ok(ElementBlock { kind: block.kind, region: block.region, ids: block.ids.clone(), connectivity })
 }
 
-/// Refuses two elements with the same corners.
+/// Rejects two elements with the same corners.
 fn refuse_twins(src: &Source, drafts: &[DraftBlock], blocks: &[ElementBlock]) -> Result<(), MeshError> {
-    // (sorted corners, place) of every element; twins are neighbours after sorting.
+    // (sorted corners, place) of every element; duplicates are adjacent after sorting.
     let mut keys: Vec<([u32; 8], (u32, u32))> = Vec::with_capacity(blocks.iter().map(ElementBlock::len).sum());
     for (b, block) in (0..).zip(blocks) {
         let corners = corner_count(block.kind);

@@ -1,71 +1,71 @@
-//! What can be wrong in a mesh file, and where.
+//! Errors in a mesh file, with their position.
 
 use std::fmt;
 
-/// The sort of mistake, for programs; the message is for people.
+/// Kind of error, for programs; the message is for users.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum MeshErrorKind {
     /// The file could not be opened or decompressed.
     Unreadable,
-    /// Not a mesh format that is read here, or a version of one that is not.
+    /// The format, or its version, is not supported.
     Format,
-    /// Text or bytes that do not follow the format.
+    /// Text or bytes do not follow the format.
     Syntax,
     /// The file ends too early.
     Truncated,
-    /// A NaN, an infinity, or a number too large to hold.
+    /// A number is NaN, infinite or too large.
     NotFinite,
-    /// An element type, a card or an option that exists but is not supported.
+    /// An element type, card or option is not supported.
     Unsupported,
-    /// A number or a name that is there twice.
+    /// A number or a name occurs twice.
     Duplicate,
-    /// A reference to a node, element, set, material, ... that is not there.
+    /// A referenced node, element, set, material or similar is missing.
     Missing,
-    /// An element that cannot be: a repeated node, or a twin of another.
+    /// An element is invalid: a repeated node, or a duplicate of another element.
     Element,
-    /// An element in two regions.
+    /// An element is in two regions.
     Region,
-    /// A material or a section with impossible numbers.
+    /// A material or section has impossible values.
     Material,
-    /// Larger than this program can hold.
+    /// The data is larger than this program can handle.
     TooLarge,
 }
 
-/// Where in the file.
+/// Position in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
     /// The file as a whole.
     File,
-    /// A line of text, from 1.
+    /// Line of a text file, from 1.
     Line(usize),
-    /// A byte of a binary file, from 0.
+    /// Byte of a binary file, from 0.
     Byte(usize),
 }
 
-/// A mistake in a mesh file.
+/// Error in a mesh file.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{origin}{place}: {element}: found {found}; expected {expected}{}", mend(.help))]
 #[non_exhaustive]
 pub struct MeshError {
-    /// The sort of mistake.
+    /// Kind of error.
     pub kind: MeshErrorKind,
-    /// File, or the name that was given to the bytes.
+    /// File, or the name given to the bytes.
     pub origin: Box<str>,
     /// Line or byte.
     pub place: Place,
-    /// The thing at fault, such as `element 17` or `*NSET INTERFACE_A`.
+    /// Element of the file, such as `element 17` or `*NSET INTERFACE_A`.
     pub element: Box<str>,
-    /// What stands there.
+    /// Text or value found.
     pub found: Box<str>,
-    /// What may stand there.
+    /// Text or value expected.
     pub expected: Box<str>,
-    /// How to mend it; may be empty.
+    /// Hint for a correction; may be empty.
     pub help: Box<str>,
 }
 
 impl MeshError {
-    /// The same with advice.
+    /// Adds a hint for a correction.
     #[must_use]
     pub(super) fn help(mut self, help: impl Into<Box<str>>) -> Self {
         self.help = help.into();

@@ -1,10 +1,10 @@
-//! From the numbers of nodes or elements in a file to their indices.
+//! Map from node or element numbers of a file to their indices.
 
-/// Lookup of unique numbers; memory stays proportional to how many there are.
+/// Lookup of unique numbers; memory is proportional to their count.
 pub(super) enum IdIndex {
-    /// `first, first + 1, ...` in order of the file.
+    /// Numbers `first, first + 1, ...` in file order.
     Run { first: u64, count: u32 },
-    /// A table over all numbers up to the largest; `NONE` where there is none.
+    /// Table over all numbers up to the largest; `NONE` for unused numbers.
     Table(Vec<u32>),
     /// Pairs sorted by number, for numbers with large gaps.
     Sorted(Vec<(u64, u32)>),
@@ -16,7 +16,7 @@ impl IdIndex {
     /// Builds the lookup.
     ///
     /// # Errors
-    /// The two positions of a number that is there twice.
+    /// Returns the two positions of a duplicate number.
     pub(super) fn new(ids: &[u64]) -> Result<Self, (usize, usize)> {
         let first = ids.first().copied().unwrap_or(0);
         if ids.iter().zip(0_u64..).all(|(id, k)| first.checked_add(k) == Some(*id)) {
@@ -42,7 +42,7 @@ impl IdIndex {
         }
     }
 
-    /// Index of a number.
+    /// Returns the index of a number.
     pub(super) fn get(&self, id: u64) -> Option<u32> {
         match self {
             Self::Run { first, count } => id.checked_sub(*first).filter(|k| *k < u64::from(*count)).map(|k| k as u32),
@@ -57,10 +57,9 @@ impl IdIndex {
         }
     }
 
-    /// Appends the indices of those numbers of `first, first + step, ... <= last` that exist.
+    /// Appends the indices of the existing numbers among `first, first + step, ... <= last`.
     pub(super) fn extend_from_range(&self, first: u64, last: u64, step: u64, out: &mut Vec<u32>) {
-        // Clipped to the numbers there are: the work never depends on the numbers in the file
-        // alone.
+        // Clipped to the existing numbers, which bounds the work for any range in the file.
         let (low, high) = match self {
             Self::Run { count: 0, .. } => return,
             Self::Run { first, count } => (*first, *first + u64::from(*count) - 1),

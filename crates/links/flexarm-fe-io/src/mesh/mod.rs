@@ -1,8 +1,9 @@
-//! Meshes of other programs: Gmsh 2.2 and 4.1 (text, binary, packed), CalculiX and Abaqus decks.
+//! Meshes of other programs: Gmsh 2.2 and 4.1 (text, binary, compressed), CalculiX and Abaqus
+//! decks.
 //!
-//! A reader fills a draft (`draft.rs`) in the numbers and units of its file; the draft checks it
-//! and makes the [`Mesh`](flexarm_fem::Mesh) in SI, node order as
-//! [`ElementKind`](flexarm_fem::ElementKind) has it.
+//! A reader fills a draft (`draft.rs`) with the numbers and units of its file; the draft is checked
+//! and converted to the [`Mesh`](flexarm_fem::Mesh) in SI, with the node order of
+//! [`ElementKind`](flexarm_fem::ElementKind).
 
 mod draft;
 mod error;

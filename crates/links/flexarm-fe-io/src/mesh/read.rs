@@ -1,4 +1,4 @@
-//! From a file to a checked mesh: recognises the format by content and calls its reader.
+//! Reads a file into a checked mesh: recognises the format by content and calls its reader.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -12,16 +12,16 @@ use crate::unpack::{is_gzip, unpacked};
 use flexarm_fem::input::read_file;
 use flexarm_fem::units::UnitSystem;
 
-/// A file larger than this is refused, packed or not.
+/// Maximum size of a file, bytes, compressed or not.
 const LARGEST: u64 = 8 << 30;
 
-/// What a mesh file does not say itself.
+/// Information that a mesh file does not contain.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadOptions {
     /// Units of the numbers in the file.
     pub units: UnitSystem,
-    /// Groups of line elements that are beams: name of the physical curve or element set, section
-    /// in SI.
+    /// Groups of line elements that are beams: name of the physical curve or element set, and
+    /// section in SI.
     pub beams: Vec<(String, BeamProperties)>,
 }
 
@@ -32,21 +32,21 @@ impl Default for ReadOptions {
     }
 }
 
-/// A mesh, and what was noticed on the way.
+/// Mesh with the warnings of reading it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeshFile {
-    /// The mesh, SI.
+    /// Mesh, SI.
     pub mesh: Mesh,
-    /// The format, such as `Gmsh MSH 4.1 binary`.
+    /// Format, such as `Gmsh MSH 4.1 binary`.
     pub format: &'static str,
-    /// What was left out or assumed, one sentence each.
+    /// Warnings about omitted or assumed data, one sentence each.
     pub warnings: Vec<String>,
-    /// Element types as the file names them, such as `C3D8I`; empty for formats that number them.
+    /// Element types as named in the file, such as `C3D8I`; empty for formats that number them.
     pub element_types: BTreeSet<String>,
 }
 
-/// Reads a mesh file: Gmsh `.msh` 2.2 or 4.1, CalculiX or Abaqus `.inp`, each also compressed by
-/// gzip.
+/// Reads a mesh file: Gmsh `.msh` 2.2 or 4.1, CalculiX or Abaqus `.inp`, each optionally compressed
+/// with gzip.
 ///
 /// ```no_run
 /// use flexarm_fe_io::{ReadOptions, read_mesh};
@@ -56,7 +56,7 @@ pub struct MeshFile {
 /// ```
 ///
 /// # Errors
-/// [`MeshError`] with file, place, what was found and what was expected.
+/// [`MeshError`] with file, place, value found and value expected.
 pub fn read_mesh(path: impl AsRef<Path>, options: &ReadOptions) -> Result<MeshFile, MeshError> {
     let path = path.as_ref();
     let origin = path.display().to_string();
@@ -103,15 +103,15 @@ fn parse_plain(src: &Source, options: &ReadOptions) -> Result<MeshFile, MeshErro
     }
 }
 
-/// How Gmsh makes a file that is read of one that is not.
+/// Advice for formats that Gmsh can convert.
 const BY_GMSH: &str = "Gmsh reads it: gmsh INPUT -save -format msh41 -o OUTPUT.msh; node sets may get lost, choose interfaces by \
                        place then, such as plane(0,0,0; 1,0,0)";
-/// What to do with a file that Gmsh does not read either.
+/// Advice for formats that Gmsh cannot read.
 const BY_EXPORT: &str = "export the mesh as a CalculiX or Abaqus .inp, or as Gmsh .msh, from the program that wrote it";
-/// What to do with a shape.
+/// Advice for a geometry file.
 const BY_MESHING: &str = "a shape must be meshed first, for example with Gmsh: gmsh INPUT -3 -order 2 -o OUTPUT.msh";
 
-/// The name of a known format that is not read, and how to convert it; by the first lines.
+/// Recognises known but unsupported formats by their first lines; returns the name and the advice.
 fn foreign(text: &[u8]) -> Option<(&'static str, &'static str)> {
     const STARTS: [(&[u8], &str, &str); 9] = [
         (b"# vtk DataFile", "a VTK file", BY_GMSH),
@@ -128,7 +128,7 @@ fn foreign(text: &[u8]) -> Option<(&'static str, &'static str)> {
     if let Some((_, name, help)) = STARTS.iter().find(|(mark, _, _)| starts(mark)) {
         return Some((name, help));
     }
-    // Nastran begins with $ as Gmsh does; universal files with -1.
+    // Nastran files may start with $, as Gmsh files do; universal files start with -1.
     let head = &text[..text.len().min(65_536)];
     let mut lines = head.split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii).filter(|line| !line.is_empty());
     let first = lines.clone().next()?;
@@ -162,7 +162,7 @@ fn foreign(text: &[u8]) -> Option<(&'static str, &'static str)> {
     nastran.then_some(("Nastran bulk data (.bdf, .dat, .nas)", NASTRAN))
 }
 
-/// What to do with Nastran's bulk data.
+/// Advice for Nastran bulk data.
 const NASTRAN: &str = "Gmsh reads it: gmsh INPUT.bdf -save -format msh41 -o OUTPUT.msh; node sets may get lost, choose interfaces by \
                        place then, such as plane(0,0,0; 1,0,0); matrices that Nastran reduced (DMIG .pch, OP4) are imported as \
                        matrices";

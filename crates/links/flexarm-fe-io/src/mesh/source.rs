@@ -1,22 +1,22 @@
-//! The bytes of a mesh file, and errors that know their place in them.
+//! Bytes of a mesh file, and errors with positions in them.
 //!
-//! Readers keep byte offsets only; a line number is counted when a message needs it.
+//! Readers only keep byte offsets; a line number is computed when a message needs it.
 
 use super::error::{MeshError, MeshErrorKind, Place};
 
-/// The whole file.
+/// Contents of the whole file.
 #[derive(Clone, Copy)]
 pub(super) struct Source<'a> {
-    /// Its bytes, decompressed.
+    /// Decompressed bytes.
     pub(super) bytes: &'a [u8],
-    /// Its name.
+    /// Name of the file.
     pub(super) origin: &'a str,
-    /// Whether places are bytes rather than lines.
+    /// Whether positions are bytes rather than lines.
     pub(super) binary: bool,
 }
 
 impl Source<'_> {
-    /// A mistake at a byte offset.
+    /// Creates an error at a byte offset.
     pub(super) fn error(
         &self,
         kind: MeshErrorKind,
@@ -34,7 +34,7 @@ impl Source<'_> {
         self.error_in(kind, place, element, found, expected)
     }
 
-    /// A mistake of the file as a whole.
+    /// Creates an error at a given place.
     pub(super) fn error_in(
         &self,
         kind: MeshErrorKind,
@@ -55,7 +55,7 @@ impl Source<'_> {
     }
 }
 
-/// A piece of the file for a message: short, on one line, readable whatever the bytes are.
+/// Shows a piece of the file in a message: short, on one line, readable for any bytes.
 pub(super) fn shown(bytes: &[u8]) -> String {
     const LONGEST: usize = 40;
     let cut = &bytes[..bytes.len().min(LONGEST)];
@@ -63,7 +63,7 @@ pub(super) fn shown(bytes: &[u8]) -> String {
     format!("{:?}{dots}", String::from_utf8_lossy(cut))
 }
 
-/// An unsigned integer, digits only.
+/// Parses an unsigned integer: digits with an optional `+`.
 pub(super) fn parse_u64(token: &[u8]) -> Option<u64> {
     let token = token.strip_prefix(b"+").unwrap_or(token);
     if token.is_empty() {
@@ -75,7 +75,7 @@ pub(super) fn parse_u64(token: &[u8]) -> Option<u64> {
     })
 }
 
-/// A real number; accepts Fortran's `1.5D+03`. May be infinite or NaN.
+/// Parses a real number, also in Fortran notation `1.5D+03`. The result may be infinite or NaN.
 pub(super) fn parse_f64(token: &[u8]) -> Option<f64> {
     let text = std::str::from_utf8(token).ok()?;
     if let Ok(value) = text.parse() {

@@ -1,4 +1,4 @@
-//! Files that are well formed and wrong.
+//! Files that are well formed but wrong.
 
 use flexarm_fe_io::exchange::{
     ExchangeErrorKind, InputFile, MatrixNames, MatrixRole, assemble_interfaces, parse_matrices, propose_map,
@@ -10,7 +10,7 @@ use flexarm_fem::{GateLimits, Matrix12, UnitSystem};
 use crate::common::turned_arm;
 use crate::shared::{parse, read, samples, small_structure};
 
-/// CalculiX 2.20 as built by Debian does not condense; the reason must be given, not only a
+/// CalculiX 2.20 as built by Debian does not condense; the error must give this cause, not only a
 /// residual.
 #[test]
 fn uncondensed_substructures_of_calculix_are_refused_with_the_reason() {
@@ -31,7 +31,7 @@ fn uncondensed_substructures_of_calculix_are_refused_with_the_reason() {
     }
 }
 
-/// Only what is recognised has the advice about CalculiX; the gate refuses the rest.
+/// Only the recognised fault gives advice about CalculiX; the gate rejects the others.
 #[test]
 fn matrices_with_other_faults_are_left_to_the_gate_and_uncoupled_ones_are_not() {
     let (K, _) = small_structure(0);
@@ -49,7 +49,7 @@ fn matrices_with_other_faults_are_left_to_the_gate_and_uncoupled_ones_are_not() 
         let K12 = Matrix12::from_fn(|i, j| assembled.K[(i, j)]);
         assert!(check_matrix12(&K12, &p_AB, &GateLimits::default()).is_err());
     };
-    // On the ground.
+    // Supported by the ground.
     let mut held = K.clone();
     (0..12).for_each(|i| held[(i, i)] *= 1.5);
     refused_by_the_gate(held);
@@ -57,7 +57,7 @@ fn matrices_with_other_faults_are_left_to_the_gate_and_uncoupled_ones_are_not() 
     let mixed = |i: usize| 6 * (i / 6) + (i + 3) % 6;
     refused_by_the_gate(nalgebra::DMatrix::from_fn(12, 12, |i, j| K[(mixed(i), mixed(j))]));
 
-    // Not condensed: nothing between the interfaces, exactly or to rounding.
+    // Not condensed: the interfaces are uncoupled, exactly or up to rounding.
     for (factor, part) in [(0.0, "exactly zero"), (1e-13, "only rounding")] {
         let of_block = |i: usize, j: usize| if i / 6 == j / 6 { 1.0 } else { factor };
         let error = assemble(&nalgebra::DMatrix::from_fn(12, 12, |i, j| K[(i, j)] * of_block(i, j))).unwrap_err();
@@ -67,8 +67,8 @@ fn matrices_with_other_faults_are_left_to_the_gate_and_uncoupled_ones_are_not() 
     }
 }
 
-/// The same in a format that CalculiX does not write has no advice about it, and rounding says
-/// nothing there.
+/// In a format that CalculiX does not write, the same fault gives no advice about CalculiX, and
+/// coupling at the level of rounding is no indication.
 #[test]
 fn uncoupled_interfaces_of_other_formats_are_refused_without_the_advice_about_calculix() {
     let (K, _) = small_structure(0);
@@ -83,7 +83,7 @@ fn uncoupled_interfaces_of_other_formats_are_refused_without_the_advice_about_ca
     assert!(assemble(1e-13).is_ok());
 }
 
-/// A full model without labels must not pass as interfaces with hundreds of modes.
+/// A full model without labels must not be accepted as interfaces with hundreds of modes.
 #[test]
 fn coupled_rows_are_no_modes_unless_the_map_says_so() {
     let (mut K, _) = small_structure(3);
@@ -128,7 +128,7 @@ fn several_matrices_need_a_name_and_two_bare_ones_a_role() {
     assert_eq!(parse_matrices(&said, &MatrixNames::default()).unwrap().origin, "two.mtx");
 }
 
-/// Fields beyond the tenth would be lost without a word.
+/// Fields beyond the tenth would be lost silently.
 #[test]
 fn too_many_free_fields_are_refused() {
     let text = "DMIG,KAAX,0,6,2\nDMIG,KAAX,1,1,,1,1,4.,,1,2,1.\n";
@@ -136,7 +136,7 @@ fn too_many_free_fields_are_refused() {
     assert!(error.to_string().contains("a.pch:2: free field"), "{error}");
 }
 
-/// Nastran leaves out null columns: a massless node has no rows in MAAX.
+/// Nastran omits null columns: a massless node has no rows in MAAX.
 #[test]
 fn a_massless_row_that_is_absent_becomes_zero() {
     let text = "DMIG,KAAX,0,6,2\nDMIG,KAAX,1,1,,1,1,4.\n,1,2,1.\nDMIG,KAAX,1,2,,1,2,3.\n\

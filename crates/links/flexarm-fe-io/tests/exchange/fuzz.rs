@@ -1,4 +1,5 @@
-//! Bytes that are no matrices: errors, but no panic, no hang, no memory that a header asks for.
+//! Arbitrary bytes: errors, but no panic, no hang, and no allocation of a size declared in a
+//! header.
 
 use std::io::Read;
 use std::time::{Duration, Instant};
@@ -16,7 +17,7 @@ fn parse(bytes: &[u8]) -> Result<ImportedMatrices, ExchangeError> {
     parse_matrices(&[InputFile::new("fuzz", bytes)], &MatrixNames::default())
 }
 
-/// One small whole file of every format.
+/// One small complete file of every format.
 fn seeds() -> Vec<Vec<u8>> {
     let K = nalgebra::DMatrix::from_row_slice(2, 2, &[4.0, -1.5, -1.5, 3.0]);
     let rows = [flexarm_fe_io::exchange::DofLabel::new(7, 1), flexarm_fe_io::exchange::DofLabel::new(8, 0)];
@@ -34,7 +35,7 @@ fn seeds() -> Vec<Vec<u8>> {
     texts.into_iter().map(String::into_bytes).collect()
 }
 
-/// Text of the characters that the formats are made of: gets further than random bytes.
+/// Text made of tokens of the formats, which gets further than random bytes.
 fn soup() -> impl Strategy<Value = String> {
     let words = [
         "%%MatrixMarket matrix ",
@@ -83,7 +84,7 @@ fn soup() -> impl Strategy<Value = String> {
     prop::collection::vec(prop::sample::select(words.to_vec()), 0..40).prop_map(|words| words.concat())
 }
 
-/// Runs and checks that it takes less than any file of this size may.
+/// Runs a function and checks that it takes less than 5 s.
 fn in_time<T>(run: impl FnOnce() -> T) -> T {
     let start = Instant::now();
     let result = run();
@@ -121,7 +122,8 @@ proptest! {
     }
 }
 
-/// The samples, cut at many places and with single bytes changed; packed ones are unpacked first.
+/// The samples, truncated at many places and with single bytes changed; compressed ones are
+/// unpacked first.
 #[test]
 fn samples_that_are_cut_or_changed_do_not_panic() {
     let Some(folder) = samples() else { return };
@@ -147,7 +149,7 @@ fn samples_that_are_cut_or_changed_do_not_panic() {
 }
 
 #[cfg(feature = "hdf5")]
-/// Bytes of the HDF5 sample among zeros, where sizes and addresses stand.
+/// Changes bytes of the HDF5 sample next to zeros, where sizes and addresses are.
 #[test]
 #[ignore = "two and a half minutes; run after an update of hdf5-pure"]
 fn hdf5_with_changed_metadata_does_not_panic() {

@@ -1,4 +1,4 @@
-//! Nastran OUTPUT4 and Harwell-Boeing in the variants that the samples do not have.
+//! Nastran OUTPUT4 and Harwell-Boeing in the variants that are not among the samples.
 
 use flexarm_fe_io::exchange::{ExchangeErrorKind, InputFile, MatrixFormat, MatrixNames, parse_matrices, recognise};
 use nalgebra::DMatrix;
@@ -6,12 +6,12 @@ use proptest::prelude::*;
 
 use crate::common::fixed_cases;
 
-/// Columns with a hole, so that sparse strings are needed: rows 1-2 and 4 of column 1.
+/// Matrix with a gap in a column, which requires sparse strings: rows 1-2 and 4 of column 1.
 fn matrix() -> DMatrix<f64> {
     DMatrix::from_row_slice(4, 4, &[4.0, -1.5, 0.0, 0.25, -1.5, 3.0, 0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.25, 0.0, 0.0, 5.0])
 }
 
-/// How a file is written.
+/// Variant of the file format.
 #[derive(Debug, Clone, Copy)]
 struct Variant {
     big_endian: bool,
@@ -41,7 +41,7 @@ fn strings(column: &[f64]) -> Vec<(usize, Vec<f64>)> {
     strings
 }
 
-/// The matrix as a binary OP4 file, written after the format's description.
+/// The matrix as a binary OP4 file, written according to the description of the format.
 fn binary(A: &DMatrix<f64>, v: Variant) -> Vec<u8> {
     let int = |n: i64| if v.big_endian { (n as i32).to_be_bytes() } else { (n as i32).to_le_bytes() };
     let real = |x: f64| match (v.double, v.big_endian) {

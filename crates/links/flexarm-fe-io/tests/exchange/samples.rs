@@ -1,4 +1,4 @@
-//! Every sample file against the common truth, to the digits that its format has.
+//! Every sample file against the common truth, up to the digits of its format.
 
 use flexarm_fe_io::exchange::{
     DofLabel, Entries, InterfaceMap, MatrixFormat, MatrixNames, assemble_interfaces, propose_map, read_matrices,
@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, Vector3};
 
 use crate::shared::{digits_error, read, samples, truth};
 
-/// Stiffness and mass of the interfaces as the files propose them, SI.
+/// Stiffness and mass of the interfaces with the proposed map, SI.
 fn assembled(folder: &std::path::Path, files: &[&str]) -> (DMatrix<f64>, Option<DMatrix<f64>>, usize) {
     let imported = read(folder, files);
     let map = propose_map(&imported.stiffness.rows).unwrap();
@@ -22,7 +22,7 @@ fn assembled(folder: &std::path::Path, files: &[&str]) -> (DMatrix<f64>, Option<
 fn every_reduced_sample_holds_the_same_stiffness_and_mass() {
     let Some(folder) = samples() else { return };
     let (K, M) = truth(&folder);
-    // Files, measured error of K and of M against 17 digits, and the bound.
+    // Files, bound, and measured error of K and M against 17 digits.
     for (files, bound) in [
         (&["formats/mm_array_K12.mtx"][..], 0.0), // 0
         (&["formats/abaqus_matrix_input_STIF1.mtx", "formats/abaqus_matrix_input_MASS1.mtx"], 1e-14), // 4.5e-15, 3.4e-15
@@ -86,7 +86,7 @@ fn each_sample_is_recognised_by_its_content() {
 #[test]
 fn the_full_matrices_of_calculix_are_read_with_their_rows() {
     let Some(folder) = samples() else { return };
-    // `.mas` and `.dof` are found beside the `.sti`.
+    // `.mas` and `.dof` are found next to the `.sti`.
     let imported = read(&folder, &["A1_beam/beam_tet10_h50mm_ccx220_REAL.sti.gz"]);
     let (K, M) = (&imported.stiffness, imported.mass.as_ref().unwrap());
     let Entries::Sparse(sparse) = &K.entries else { panic!("a full model is sparse") };
@@ -95,8 +95,8 @@ fn the_full_matrices_of_calculix_are_read_with_their_rows() {
     assert_eq!(K.rows.last(), Some(&DofLabel::new(950, 3)));
     assert_eq!(sparse.triplets().next(), Some((0, 0, 4.497_626_620_268_5e9)));
 
-    // The six rows of both interfaces are there, and the mass of a translation along x is that of
-    // the beam.
+    // The six rows of both interfaces exist, and the mass in a translation along x is that of the
+    // beam.
     let map: InterfaceMap = "A=947:1-3+948:1-3,B=949:1-3+950:1-3".parse().unwrap();
     let along_x = |i: usize| f64::from(K.rows[i].dof == 1 && !matches!(K.rows[i].node, Some(948 | 950)));
     let moved: f64 =
@@ -151,7 +151,7 @@ fn the_full_model_of_exudyn_is_read_with_positions_and_node_sets() {
     let residual = force.iter().zip(&size).map(|(f, s): (&f64, &f64)| f.abs() / s.max(1.0)).fold(0.0, f64::max);
     assert!(residual < 1e-12, "{residual}"); // measured 2e-16
 
-    // Mass: that of the beam along each axis.
+    // Mass: equal to that of the beam along each axis.
     for axis in 1..=3 {
         let on = |i: usize| f64::from(imported.stiffness.rows[i].dof == axis);
         let mass: f64 = M.triplets().map(|(i, j, m)| if i == j { m } else { 2.0 * m } * on(i) * on(j)).sum();

@@ -1,4 +1,4 @@
-//! Where the samples are, and small structures of our own.
+//! Location of the samples, and small structures for tests.
 
 use std::path::{Path, PathBuf};
 
@@ -17,7 +17,7 @@ pub(crate) fn samples() -> Option<PathBuf> {
     found
 }
 
-/// Reads samples, paths below `shared/fe`.
+/// Reads samples with paths relative to `shared/fe`.
 pub(crate) fn read(folder: &Path, files: &[&str]) -> ImportedMatrices {
     let paths: Vec<_> = files.iter().map(|file| folder.join(file)).collect();
     read_matrices(&paths, &MatrixNames::default()).unwrap_or_else(|error| panic!("{error}"))
@@ -28,14 +28,14 @@ pub(crate) fn parse(files: &[(&str, &str)]) -> ImportedMatrices {
     parse_matrices(&files, &MatrixNames::default()).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// The truth about all samples of case A1: Matrix Market with 17 digits.
+/// Truth for all samples of case A1: Matrix Market with 17 digits.
 pub(crate) fn truth(folder: &Path) -> (DMatrix<f64>, DMatrix<f64>) {
     let files = ["formats/mm_coordinate_symmetric_K12.mtx", "formats/mm_coordinate_symmetric_M12.mtx"];
     let imported = read(folder, &files);
     (imported.stiffness.dense().unwrap().clone(), imported.mass.unwrap().dense().unwrap().clone())
 }
 
-/// Largest `|a_ij - b_ij| / sqrt(b_ii b_jj)`.
+/// Maximum `|a_ij - b_ij| / sqrt(b_ii b_jj)`.
 pub(crate) fn scaled_error(a: &DMatrix<f64>, b: &DMatrix<f64>) -> f64 {
     assert_eq!(a.shape(), b.shape());
     let s = b.diagonal().map(f64::sqrt);
@@ -43,14 +43,14 @@ pub(crate) fn scaled_error(a: &DMatrix<f64>, b: &DMatrix<f64>) -> f64 {
     places.map(|(i, j)| (a[(i, j)] - b[(i, j)]).abs() / (s[i] * s[j])).fold(0.0, f64::max)
 }
 
-/// Largest `|a_ij - b_ij| / |b_ij|`: the digits of the format.
+/// Maximum `|a_ij - b_ij| / |b_ij|`: the digits of the format.
 pub(crate) fn digits_error(a: &DMatrix<f64>, b: &DMatrix<f64>) -> f64 {
     assert_eq!(a.shape(), b.shape());
     a.iter().zip(b).filter(|(a, b)| a != b).map(|(a, b)| (a - b).abs() / b.abs()).fold(0.0, f64::max)
 }
 
-/// Stiffness and mass of a turned beam with offset and `modes` modal coordinates, SI; every entry
-/// lives.
+/// Stiffness and mass of a rotated beam with offset and `modes` modal coordinates, SI; all
+/// couplings are non-zero.
 pub(crate) fn small_structure(modes: usize) -> (DMatrix<f64>, DMatrix<f64>) {
     let link = crate::common::turned_arm();
     let K12 = link.matrix12();

@@ -1,4 +1,4 @@
-//! Standard Input Data: the identities of the body, the orders that files disagree in, reading and
+//! Standard Input Data: identities of the body, index orders that differ between files, reading and
 //! writing.
 
 use flexarm_fe_io::exchange::{
@@ -17,7 +17,7 @@ use proptest::prelude::*;
 use crate::common::fixed_cases;
 use crate::shared::{samples, truth};
 
-/// Point masses with three shapes: every integral is a sum that can be written down.
+/// Point masses with three shapes: every integral is an explicit sum.
 fn point_masses(gyro: GyroLayout, oe: OeOrder, tensor_as_3x3: bool) -> Sid {
     let masses =
         [(1.0, Vector3::new(0.1, 0.2, 0.3)), (2.0, Vector3::new(1.0, -0.4, 0.5)), (0.7, Vector3::new(0.3, 0.9, -0.8))];
@@ -93,7 +93,7 @@ fn a_written_body_reads_back_to_the_last_bit() {
         let text = write_sid(&sid);
         assert_eq!(parse_sid(&text, "t").unwrap(), sid, "{text}");
         assert_eq!(sid.Ke.m0(), DMatrix::identity(3, 3));
-        // CRLF, other indentation and case of the keywords change nothing.
+        // CRLF, other indentation and other case of the keywords make no difference.
         let other: String =
             text.lines().map(|line| format!("\t{}\r\n", line.trim().replace("end modal", "END  Modal"))).collect();
         assert_eq!(parse_sid(&other, "t").unwrap(), sid);
@@ -141,7 +141,7 @@ fn the_sample_body_agrees_with_the_reduced_matrices() {
         assert!((0..9).all(|n| AP1[(n / 3, n % 3)] == skew[(n / 3, n % 3)]), "{k}");
     }
 
-    // A held: stiffness and mass of the first six shapes are the blocks of B.
+    // A clamped: stiffness and mass of the first six shapes are the blocks of B.
     let (K, M) = truth(&folder);
     let error = |a: DMatrix<f64>, b: &DMatrix<f64>| {
         let b = b.view((6, 6), (6, 6));
@@ -207,7 +207,7 @@ proptest! {
         let text = write_sid(&point_masses(GyroLayout::ModeMajor, OeOrder::XyYzXz, false));
         let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
         for (place, key, value, is_new) in changes {
-            // In place of a line with this key, or as a new line anywhere.
+            // Replaces a line with this key, or inserts a new line anywhere.
             let line = format!("{key} = {value}");
             let same: Vec<usize> = (0..lines.len()).filter(|&i| lines[i].trim().starts_with(key)).collect();
             match same.get(place.index(same.len().max(1))) {
@@ -219,7 +219,7 @@ proptest! {
     }
 }
 
-/// Everything that can be asked of a body, if the text is one.
+/// Calls all methods of a body, if the text is a valid one.
 fn use_all(text: &str) {
     let Ok(sid) = parse_sid(text, "t") else { return };
     let of_nodes = sid.nodes.iter().flat_map(|node| {
@@ -229,7 +229,7 @@ fn use_all(text: &str) {
     });
     for matrix in sid.blocks().map(|(_, matrix)| matrix).chain(of_nodes) {
         let size = matrix.m0().len();
-        // As the parser: 2^20 and 16 per byte.
+        // As in the parser: 2^20, plus 16 per byte.
         assert!(size <= (1 << 20) + 16 * text.len(), "{size}");
         (0..=matrix.nq.min(8)).for_each(|mode| assert_eq!(matrix.m1(mode).len(), size));
     }
@@ -250,7 +250,7 @@ fn with_block(name: &str, change: impl Fn(&str) -> String) -> String {
     format!("{head} {name}\n{changed} end {name}\n{tail}")
 }
 
-/// `key = value` in place of the line with this key.
+/// Replaces the line with this key by `key = value`.
 fn set(block: &str, key: &str, value: usize) -> String {
     let line =
         |line: &str| if line.trim().starts_with(key) { format!("{key} = {value}\n") } else { format!("{line}\n") };
@@ -284,7 +284,7 @@ fn sizes_after_the_first_entry_are_refused() {
     }
 }
 
-/// A matrix that was made by hand may be anything.
+/// A matrix built by the caller may have any entries.
 #[test]
 fn entries_outside_of_a_matrix_are_left_out() {
     let matrix = SidMatrix {
@@ -300,7 +300,7 @@ fn entries_outside_of_a_matrix_are_left_out() {
     assert_eq!(matrix.m1(0).as_slice(), [0.0, 2.0, 0.0]);
 }
 
-/// A block of any size, and shape coordinates that are only promised.
+/// A block of any size, and shape coordinates that are only declared.
 #[test]
 fn matrices_that_are_much_larger_than_the_file_are_refused() {
     for name in ["Kgeo", "ksigma", "sigma"] {
@@ -331,8 +331,8 @@ fn matrices_that_are_much_larger_than_the_file_are_refused() {
     assert!(of_modes(10_001).unwrap_err().expected.contains("0 to 10000"));
 }
 
-/// Truth: the integrals of the sample, made by another program, over the same mesh: `J1`, `Oe`,
-/// `Gr`, `Ge`, `Cr` against those of the modal link of that mesh. The sample has eleven digits.
+/// Truth: integrals of the sample, computed by another program for the same mesh: `J1`, `Oe`, `Gr`,
+/// `Ge`, `Cr` against those of the modal link of that mesh. The sample has eleven digits.
 #[test]
 #[allow(clippy::print_stderr, reason = "measured errors, shown with --nocapture")]
 fn the_sample_body_is_the_modal_link_of_its_mesh() {
@@ -343,7 +343,7 @@ fn the_sample_body_is_the_modal_link_of_its_mesh() {
     assert!(sample.is_craig_bampton() && sample.geometric.is_none() && sample.has_second_order());
     assert_eq!((&*sample.name, &*sample.interfaces[0].name), ("sample", "1002"));
 
-    // What is read is what is written again.
+    // Writing and reading again changes nothing.
     let again = parse_sid(&write_sid(&sid_of_modal_link(&sample)), "again").unwrap();
     let back = modal_link_from_sid("other", &again).unwrap();
     let size = |k: usize| sample.M[(k, k)].sqrt();
@@ -382,7 +382,7 @@ fn the_sample_body_is_the_modal_link_of_its_mesh() {
     show("sample written and read", &twice);
     assert!(twice.iter().all(|gap| *gap < 1e-12), "{twice:?}"); // measured 1.9e-16
 
-    // The same mesh by this program.
+    // The same mesh, reduced by this program.
     let options = ReadOptions { units: UnitSystem::SI, beams: Vec::new() };
     let mesh = read_mesh(folder.join("A1_beam/beam_tet10_h50mm.inp.gz"), &options).unwrap().mesh;
     let interface = |name: &str, set: &str, x: f64| Interface {
@@ -408,7 +408,7 @@ fn the_sample_body_is_the_modal_link_of_its_mesh() {
         superelement: &superelement,
     };
     let direct = source.modal_link("beam", false);
-    // A mode has any sign: that of its mass with the static shapes.
+    // The sign of a mode is arbitrary: use that of its mass coupling with the static shapes.
     let sign: Vec<f64> = (0..10)
         .map(|k| {
             let like: f64 = (0..6).map(|l| sample.M[(k, l)] * direct.M[(k, l)]).sum();
@@ -417,5 +417,5 @@ fn the_sample_body_is_the_modal_link_of_its_mesh() {
         .collect();
     let found = gaps(&sample, &direct, &sign);
     show("sample against its mesh", &found);
-    assert!(found.iter().all(|gap| *gap < 1e-8), "{found:?}"); // measured 8e-11 (Ke), else 5e-12
+    assert!(found.iter().all(|gap| *gap < 1e-8), "{found:?}"); // measured 8e-11 (Ke), others 5e-12
 }

@@ -1,4 +1,4 @@
-//! Units are converted in one place, and a file in millimetres and tonnes is the same structure.
+//! Units are converted in one place; a file in millimetres and tonnes gives the same structure.
 
 use flexarm_fe_io::exchange::{DofLabel, InterfaceMap, assemble_interfaces, write_dmig, write_matrix_market};
 use flexarm_fem::UnitSystem;
@@ -8,7 +8,7 @@ use crate::shared::{digits_error, parse, samples, scaled_error, small_structure,
 
 /// The same structure in mm, t, s: N/mm, N, N·mm; t, t·mm, t·mm²; modes normalised to one tonne.
 ///
-/// Written by hand per block, not with the rule that is tested.
+/// Written out per block, independently of the rule under test.
 fn in_mm_t_s(K: &DMatrix<f64>, M: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
     let kind = |i: usize| if i >= 12 { 2 } else { usize::from(i % 6 >= 3) };
     let sqrt_t = 1e3_f64.sqrt();
@@ -40,7 +40,7 @@ fn a_copy_in_mm_t_s_gives_the_same_structure() {
     }
 }
 
-/// B first in the file, rotations before translations: the map puts all in order.
+/// B first in the file, rotations before translations: the map restores the order.
 #[test]
 fn the_map_reorders_rows_of_any_file() {
     let (K, M) = small_structure(2);

@@ -1,4 +1,4 @@
-//! What is written is read back: to the last bit, or to the digits that the format has.
+//! Written files read back bit for bit, or up to the digits of the format.
 
 use std::collections::BTreeMap;
 
@@ -36,7 +36,7 @@ fn matrix_market_with_its_sidecar_needs_no_further_answers() {
     ]);
     assert_eq!(imported.sidecar, Some(sidecar));
     let read = assemble_interfaces(&imported, None, None).unwrap();
-    assert_eq!((&read.K, read.M.as_ref(), read.modes), (&K, Some(&M), 3)); // to the last bit
+    assert_eq!((&read.K, read.M.as_ref(), read.modes), (&K, Some(&M), 3)); // bit for bit
 }
 
 #[test]
@@ -62,8 +62,7 @@ fn a_sidecar_is_found_beside_its_matrices_and_finds_them() {
     assert_eq!(by_matrix.mass.unwrap().dense(), Some(&M));
 }
 
-/// What the sidecar says of a file counts, whatever it is called; other files are not mixed with
-/// it.
+/// The role in the sidecar applies whatever the file name is; other files are not mixed in.
 #[test]
 fn a_stiffness_finds_its_mass_through_the_sidecar() {
     let folder = std::env::temp_dir().join(format!("flexarm_exchange_mass_{}", std::process::id()));
@@ -95,7 +94,7 @@ fn a_stiffness_finds_its_mass_through_the_sidecar() {
     assert_eq!(found[3].stiffness.dense(), Some(&(&K * 3.0)));
 }
 
-/// Fourteen digits: half of the last one is 5e-14 of a number that begins with 1.
+/// Fourteen digits: half of the last digit is 5e-14 of a number that starts with 1.
 #[test]
 fn a_user_element_reads_back_to_its_fourteen_digits() {
     let (K, M) = small_structure(2);

@@ -7,7 +7,7 @@ use crate::mesh::BeamProperties;
 use crate::rigid_part::RigidPart;
 use crate::section::Section;
 
-/// `∫ dm`, `∫ r dm`, `∫ r rᵀ dm` with `r` from `origin`.
+/// `∫ dm`, `∫ r dm`, `∫ r rᵀ dm` with `r` measured from `origin`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Moments {
     pub(super) origin: Vector3<f64>,
@@ -42,7 +42,7 @@ impl Moments {
         Self { origin: self.origin, mass: self.mass * factor, first: self.first * factor, second: self.second * factor }
     }
 
-    /// `I = tr(S) 1 - S` with S carried to the centre of mass.
+    /// Rigid part with the inertia `I = tr(S) 1 - S`, S shifted to the centre of mass.
     pub(super) fn rigid_part(&self) -> RigidPart {
         let c = self.first / self.mass;
         let S = self.second - c * c.transpose() * self.mass;
@@ -50,12 +50,12 @@ impl Moments {
     }
 }
 
-/// A straight uniform line of mass with the second moments of its section.
+/// Straight uniform line of mass with the second moments of its section.
 pub(super) struct Line {
     start: Vector3<f64>,
     along: Vector3<f64>,
     mass: f64,
-    /// `∫ r rᵀ dm` of all sections about the axis.
+    /// `∫ r rᵀ dm` of the cross sections about the axis.
     section: Matrix3<f64>,
 }
 
@@ -74,11 +74,11 @@ impl Line {
         let e_y = across / direction;
         let e_z = e_x.cross(&e_y);
 
-        // rotary_z = ∫ y² dm per length: about z, from masses along y.
+        // rotary_z = ∫ y² dm per length: about z, from mass distributed along y.
         let (mass_per_length, rotary_y, rotary_z) = match beam.section {
             Section::Given(bar) => (bar.mass_per_length, bar.rotary_y, bar.rotary_z),
             shape => {
-                // Poisson's ratio enters shear factors only, which have no mass.
+                // Poisson's ratio only affects shear factors, not the mass.
                 let s = shape.properties(0.3)?;
                 (density * s.A, density * s.I_y, density * s.I_z)
             }
@@ -87,7 +87,7 @@ impl Line {
         Ok(Self { start, along, mass: mass_per_length * length, section })
     }
 
-    /// The piece between two fractions of the length.
+    /// Moments of the piece between two fractions of the length.
     pub(super) fn piece(&self, from: f64, to: f64, origin: &Vector3<f64>) -> Moments {
         let share = to - from;
         let mut moments = Moments::about(*origin);

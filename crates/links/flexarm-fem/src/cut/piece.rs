@@ -1,11 +1,11 @@
 //! The piece of one element ahead of a plane.
 //!
 //! In reference coordinates the plane is the zero set of `d(xi) = Σ N_i d_i`, with the distances
-//! `d_i` of the nodes. The reference element is split into tetrahedra, and those that the zero set
-//! crosses into eight, until `d` is nearly linear in each. There it is replaced by its best linear
-//! fit, the tetrahedron is clipped, and `det J`, `x det J`, `x xᵀ det J` are integrated over what
-//! remains. The fit (least squares, not interpolation) makes the mean error of the position of the
-//! cut zero, so that errors of neighbours cancel.
+//! `d_i` of the nodes. The reference element is split into tetrahedra; those that the zero set
+//! crosses are split into eight until `d` is nearly linear in each. There `d` is replaced by its
+//! best linear fit, the tetrahedron is clipped, and `det J`, `x det J`, `x xᵀ det J` are integrated
+//! over the remainder. With a least squares fit instead of interpolation the mean position error of
+//! the cut is zero, so that errors of neighbours cancel.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -16,14 +16,14 @@ use crate::element::{
 };
 use crate::mesh::ElementKind;
 
-/// Deviation of `d` from linear on a small tetrahedron, per range of `d` in the element, that is
-/// let be.
+/// Accepted deviation of `d` from linear on a small tetrahedron, relative to the range of `d` in
+/// the element.
 const FLAT: f64 = 1e-4;
 
-/// Most times that a tetrahedron is split into eight.
+/// Maximum number of times that a tetrahedron is split into eight.
 const DEEPEST: usize = 4;
 
-/// Where an element lies.
+/// Position of an element relative to a plane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Side {
     Behind,
@@ -31,7 +31,8 @@ pub(super) enum Side {
     Crossed,
 }
 
-/// Where an element lies; some curved elements near the plane count as crossed though they are not.
+/// Position of an element; some curved elements near the plane are reported as crossed although
+/// they are not.
 pub(super) fn side(kind: ElementKind, x: &[Vector3<f64>], plane: &Plane) -> Side {
     let corners = corners(kind);
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -40,8 +41,8 @@ pub(super) fn side(kind: ElementKind, x: &[Vector3<f64>], plane: &Plane) -> Side
         (low, high) = (low.min(d), high.max(d));
     }
     if !kind.is_beam() {
-        // An element is its straight twin plus offset times bubble, and the bubbles add up to 3 at
-        // most.
+        // A quadratic element is its straight counterpart plus offsets times bubbles; the bubbles
+        // add up to at most 3.
         let offset = edges(kind).iter().zip(&x[corners..]).fold(0.0, |offset, ([a, b], middle)| {
             f64::max(offset, plane.normal.dot(&(middle - (x[*a] + x[*b]) * 0.5)).abs())
         });
@@ -65,14 +66,14 @@ fn corners(kind: ElementKind) -> usize {
     }
 }
 
-/// Fractions of the length between which a crossed beam is ahead.
+/// Fractions of the length of a crossed beam between which it is ahead of the plane.
 pub(super) fn ahead_of_line(x: &[Vector3<f64>], plane: &Plane) -> (f64, f64) {
     let (d_0, d_1) = (plane.distance(&x[0]), plane.distance(&x[1]));
     let root = d_0 / (d_0 - d_1);
     if d_0 > 0.0 { (0.0, root) } else { (root, 1.0) }
 }
 
-/// Moments of the volume of an element, exact.
+/// Exact moments of the volume of an element.
 pub(super) fn whole(kind: ElementKind, x: &[Vector3<f64>], origin: &Vector3<f64>) -> Result<Moments, InvertedElement> {
     let mut moments = Moments::about(*origin);
     for_each_point(kind, x, Purpose::Mass, Quadrature::Exact, |point| {
@@ -81,7 +82,7 @@ pub(super) fn whole(kind: ElementKind, x: &[Vector3<f64>], origin: &Vector3<f64>
     Ok(moments)
 }
 
-/// Moments of the volume ahead of the plane.
+/// Moments of the volume of an element ahead of the plane.
 pub(super) fn ahead(kind: ElementKind, x: &[Vector3<f64>], plane: &Plane, origin: &Vector3<f64>) -> Moments {
     let n = kind.nodes();
     let mut d = [0.0; 20];
@@ -99,7 +100,7 @@ pub(super) fn ahead(kind: ElementKind, x: &[Vector3<f64>], plane: &Plane, origin
 
 type Xi = Vector3<f64>;
 
-/// The reference element in tetrahedra, all with positive volume.
+/// Splits the reference element into tetrahedra of positive volume.
 fn reference_tets(kind: ElementKind) -> Vec<[Xi; 4]> {
     let nodes = crate::element::reference_nodes(kind);
     let tets: &[[usize; 4]] = match corners(kind) {
@@ -115,7 +116,7 @@ const EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]];
 struct Clip<'a> {
     kind: ElementKind,
     x: &'a [Vector3<f64>],
-    /// Distances of the nodes.
+    /// Distances of the nodes from the plane.
     d: [f64; 20],
     flat: f64,
     origin: &'a Vector3<f64>,
@@ -123,6 +124,9 @@ struct Clip<'a> {
 }
 
 impl Clip<'_> {
+    /// Integrates what is ahead of the plane in a tetrahedron, splitting it where `d` is not
+    /// linear.
+    ///
     /// * `d`: distances of the four vertices.
     fn visit(&mut self, tet: [Xi; 4], d: [f64; 4], depth: usize) {
         let middles = EDGES.map(|[a, b]| (tet[a] + tet[b]) * 0.5);
@@ -133,7 +137,7 @@ impl Clip<'_> {
         }
         let bend = offsets.iter().fold(0.0, |bend: f64, o| bend.max(o.abs()));
 
-        // Twice what a quadratic can reach beyond its vertices: d may be of higher degree.
+        // Twice the overshoot of a quadratic beyond its vertices, since d may be of higher degree.
         let (low, high) =
             (d.iter().copied().fold(f64::INFINITY, f64::min), d.iter().copied().fold(-f64::INFINITY, f64::max));
         if high + 3.0 * bend <= 0.0 {
@@ -180,9 +184,9 @@ impl Clip<'_> {
         }
     }
 
-    /// Adds the moments of a tetrahedron in reference coordinates, either way round.
+    /// Adds the moments of a tetrahedron in reference coordinates, of either orientation.
     fn integrate(&mut self, tet: &[Xi; 4], depth: usize) {
-        // The smaller the tetrahedron, the nearer is det J to a constant on it.
+        // The smaller the tetrahedron, the closer det J is to a constant on it.
         let rule = match depth {
             0 => TetRule::P46,
             1 | 2 => TetRule::P14,
@@ -203,7 +207,7 @@ impl Clip<'_> {
         N.iter().zip(&self.d).map(|(N, d)| N * d).sum()
     }
 
-    /// Position from the origin, and `det J`.
+    /// Position relative to the origin, and `det J`.
     fn place(&self, xi: &Xi) -> (Vector3<f64>, f64) {
         let (mut N, mut dN) = ([0.0; 20], [[0.0; 3]; 20]);
         shape_functions(self.kind, (*xi).into(), &mut N, &mut dN);
@@ -217,13 +221,13 @@ impl Clip<'_> {
     }
 }
 
-/// The eight tetrahedra of half the size; 4 to 9 are the middles of [`EDGES`].
+/// The eight tetrahedra of half the size; vertices 4 to 9 are the midpoints of [`EDGES`].
 const CHILDREN: [[usize; 4]; 8] =
     [[0, 4, 6, 7], [4, 1, 5, 8], [6, 5, 2, 9], [7, 8, 9, 3], [4, 9, 6, 7], [4, 9, 7, 8], [4, 9, 8, 5], [4, 9, 5, 6]];
 
-/// Vertex values of the linear function closest in the mean square to the quadratic with these
-/// vertex values and these offsets at the middles: the projection of the bubble `4 L_a L_b` is 8/15
-/// at its two ends and -2/15 at the two others.
+/// Vertex values of the linear function closest in the least squares sense to the quadratic with
+/// these vertex values and midpoint offsets: the projection of the bubble `4 L_a L_b` is 8/15 at
+/// its two ends and -2/15 at the two other vertices.
 fn best_fit(mut d: [f64; 4], offsets: &[f64; 6]) -> [f64; 4] {
     for ([a, b], offset) in EDGES.iter().zip(offsets) {
         for (i, d) in d.iter_mut().enumerate() {

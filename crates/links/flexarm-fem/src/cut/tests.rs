@@ -8,14 +8,14 @@ use crate::section::Section;
 use crate::test_mesh::{Noise, SOLIDS, cube, positions};
 
 const RHO: f64 = 7850.0;
-/// The steel beam A1: x from 0 to 1, centred in y and z, m.
+/// Steel beam A1: x from 0 to 1, centred in y and z, m.
 const SIZE: Vector3<f64> = Vector3::new(1.0, 0.10, 0.05);
 
 fn beam_a1(unit: Vector3<f64>) -> Vector3<f64> {
     (unit - vector![0.0, 0.5, 0.5]).component_mul(&SIZE)
 }
 
-/// The beam A1 with its inner nodes moved, so that no element is affine.
+/// Beam A1 with its inner nodes moved, so that no element is affine.
 fn uneven_beam(kind: ElementKind) -> Mesh {
     let mut noise = Noise(5);
     let step = vector![0.02, 0.01, 0.005];
@@ -29,22 +29,21 @@ fn moments(mass: f64, first: Vector3<f64>, second: Matrix3<f64>) -> RigidPart {
     Moments { origin: Vector3::zeros(), mass, first, second }.rigid_part()
 }
 
-/// Largest difference of mass, centre of mass and inertia, in units of a body of the size of
-/// `whole`.
+/// Maximum difference of mass, centre of mass and inertia, scaled by a body of the size of `whole`.
 fn difference(part: &RigidPart, other: &RigidPart, whole: &RigidPart) -> f64 {
     let size = (whole.inertia.trace() / whole.mass).sqrt();
     let mass = (part.mass - other.mass).abs() / whole.mass;
     mass.max((part.com - other.com).amax() / size).max((part.inertia - other.inertia).amax() / whole.inertia.amax())
 }
 
-/// Reference numbers of the test body A1 (closed form of a box).
+/// Reference values of the test body A1 (closed form of a box).
 #[test]
 fn the_beam_a1_is_cut_into_two_equal_halves() {
     let plane = CutPlane { point: vector![0.5, 0.0, 0.0], normal: Vector3::x() };
     for kind in SOLIDS {
         let parts = cut(&uneven_beam(kind), &[RHO], &[plane]).unwrap();
         for (part, x) in parts.iter().zip([0.25, 0.75]) {
-            // measured 5e-8 where the plane is curved in reference coordinates, 1e-15 in tetrahedra
+            // measured 5e-8 if the plane is curved in reference coordinates, 1e-15 in tetrahedra
             let tolerance = if matches!(kind, ElementKind::Tet4 | ElementKind::Tet10) { 1e-13 } else { 1e-6 };
             assert!((part.mass - 19.625).abs() < tolerance * 19.625, "{}", kind.name());
             assert!((part.com - vector![x, 0.0, 0.0]).amax() < tolerance);
@@ -54,8 +53,8 @@ fn the_beam_a1_is_cut_into_two_equal_halves() {
     }
 }
 
-/// Truth: the box behind `x = X(y, z) = x_0 + b y + c z`, with `A` the section, `J` its second
-/// moments: `m = ρ A x_0`, `∫ x = ρ/2 ∫ X²`, `∫ x² = ρ/3 ∫ X³`, ...
+/// Truth: the box behind `x = X(y, z) = x_0 + b y + c z`, with `A` the area of the section and `J`
+/// its second moments: `m = ρ A x_0`, `∫ x = ρ/2 ∫ X²`, `∫ x² = ρ/3 ∫ X³`, ...
 #[test]
 fn a_box_cut_by_an_oblique_plane_is_the_closed_form() {
     let (x_0, b, c) = (0.43, 0.9, -0.7);
@@ -100,8 +99,8 @@ fn a_plane_across_a_corner_cuts_off_a_tetrahedron() {
     }
 }
 
-/// Truth: a bar bent to the parabola `z + κ x²`, which quadratic elements follow exactly, above the
-/// plane `z = s + b x + c y`: its height there is `h/2 - s - b x - c y + κ x²`.
+/// Truth: a bar bent to the parabola `z + κ x²`, which quadratic elements represent exactly, above
+/// the plane `z = s + b x + c y`: its height there is `h/2 - s - b x - c y + κ x²`.
 #[test]
 fn a_bent_bar_of_curved_elements_is_cut_as_the_integral_says() {
     let (kappa, s, b, c) = (0.4, 0.006, 0.02, 0.05);
@@ -110,7 +109,7 @@ fn a_bent_bar_of_curved_elements_is_cut_as_the_integral_says() {
         let p = (unit - Vector3::repeat(0.5)).component_mul(&vector![l, w, h]);
         p + kappa * p.x * p.x * Vector3::z()
     };
-    // Gauss in x, y and between the plane and the top: the integrands are polynomials.
+    // Gauss points in x, y and between the plane and the top: the integrands are polynomials.
     let mut exact = Moments::about(Vector3::zeros());
     for (x, w_x) in crate::element::gauss_jacobi(8, 0).into_iter().map(|(x, w_x)| ((x - 0.5) * l, w_x * l)) {
         for (y, w_y) in crate::element::gauss_jacobi(8, 0).into_iter().map(|(y, w_y)| ((y - 0.5) * w, w_y * w)) {
@@ -131,7 +130,7 @@ fn a_bent_bar_of_curved_elements_is_cut_as_the_integral_says() {
     }
 }
 
-/// A pipe about z, radii 0.05 and 0.1, height 0.2, `n` quadratic elements around.
+/// Pipe about z, radii 0.05 and 0.1, height 0.2, with `n` quadratic elements around.
 fn pipe(kind: ElementKind, n: usize) -> Mesh {
     cube(kind, [2, n, 2], true, |unit| {
         let (sin, cos) = (std::f64::consts::TAU * unit.y).sin_cos();
@@ -140,8 +139,8 @@ fn pipe(kind: ElementKind, n: usize) -> Mesh {
     })
 }
 
-/// Truth: hollow cylinder, and its symmetry: every plane through the centre halves it. Quadratic
-/// edges leave the circle by h⁴.
+/// Truth: hollow cylinder, and symmetry: every plane through the centre halves it. The error of
+/// quadratic edges is of order h⁴.
 #[test]
 fn a_pipe_of_curved_elements_weighs_and_halves_as_a_pipe() {
     let (inner, outer, h) = (0.05_f64, 0.1_f64, 0.2_f64);
@@ -188,7 +187,7 @@ fn a_plane_outside_the_body_is_named() {
     assert!(matches!(mass_properties(&Mesh::default(), &[]), Err(CutError::NoElements)));
 }
 
-/// Second algorithm: volume of the parts of the whole mesh.
+/// Second algorithm: volumes of the parts of the whole mesh.
 #[test]
 fn shares_of_the_elements_add_up_to_the_parts() {
     let planes = [0.31, 0.36, 0.8].map(|x| CutPlane { point: x * Vector3::x(), normal: vector![1.0, 0.1, -0.2] });
@@ -209,7 +208,7 @@ fn shares_of_the_elements_add_up_to_the_parts() {
     }
 }
 
-/// Second algorithm: [`Beam::piece`], turned into the axes of the mesh.
+/// Second algorithm: [`Beam::piece`], rotated into mesh axes.
 #[test]
 fn a_line_of_beam_elements_is_cut_as_one_beam() {
     let section = Section::Rectangle { width: 0.06, height: 0.1 };

@@ -1,19 +1,18 @@
-//! Isotropic linear elasticity of a solid: constants of Lamé and the matrix of Hooke's law.
+//! Isotropic linear elasticity of a solid: Lamé constants and the stress-strain matrix.
 
 use nalgebra::Matrix6;
 
 use crate::error::FemError;
 use crate::material::Material;
 
-/// How far a given shear modulus may lie from `E / (2 (1 + nu))`, relative: rounding of data sheets
-/// printed to a few digits must not pass as isotropy, rounding of a computed value must.
+/// Allowed relative difference between a given shear modulus and `E / (2 (1 + nu))`. Covers the
+/// rounding of a computed value, but not that of data sheets printed to a few digits.
 const SHEAR_SLACK: f64 = 1e-9;
 
-/// Checks that a material can be that of a solid element.
+/// Checks that a material is valid for solid elements.
 ///
-/// An isotropic solid has two constants. A shear modulus of its own means something for a beam
-/// only. The matrices of this module use `E` and `nu`; call this once per region before computing
-/// them.
+/// An isotropic solid has two constants; a separate shear modulus is meaningful only for beams. The
+/// matrices of this module use `E` and `nu`; call this once per region before computing them.
 ///
 /// # Errors
 /// [`FemError::OutOfRange`]: as [`Material::check`]; `nu = 0.5` (the bulk modulus is infinite); a
@@ -36,15 +35,16 @@ pub fn check_solid_material(material: &Material) -> Result<(), FemError> {
     }
 }
 
-/// Constants of Lamé `(lambda, mu)`, Pa, from `E` and `nu`.
+/// Lamé constants `(lambda, mu)`, Pa, from `E` and `nu`.
 pub(crate) fn lame(material: &Material) -> (f64, f64) {
     let (E, nu) = (material.E, material.nu);
     (E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), E / (2.0 * (1.0 + nu)))
 }
 
-/// Matrix `D` of Hooke's law, Pa: `sigma = D epsilon`, energy density `epsilonᵀ D epsilon / 2`.
+/// Stress-strain matrix `D` (Hooke's law), Pa: `sigma = D epsilon`, energy density
+/// `epsilonᵀ D epsilon / 2`.
 ///
-/// Order `xx yy zz xy yz zx`, shear strains as angles `gamma_xy = du_x/dy + du_y/dx`.
+/// Order `xx yy zz xy yz zx`; shear strains are engineering strains `gamma_xy = du_x/dy + du_y/dx`.
 ///
 /// # Errors
 /// As [`check_solid_material`].
@@ -67,7 +67,7 @@ mod tests {
     use super::*;
     use nalgebra::Vector6;
 
-    /// Truth: a bar under tension, sigma = E epsilon along it and none across.
+    /// Truth: a bar under tension has sigma = E epsilon along it and no stress across it.
     #[test]
     fn a_bar_under_tension_narrows_by_poissons_ratio() {
         let steel = Material::STEEL;

@@ -1,4 +1,4 @@
-//! The map from reference to real element: its Jacobian, how straight it is, where it turns over.
+//! Map from reference to real element: Jacobian, classification and inversion checks.
 
 use std::fmt;
 
@@ -8,29 +8,29 @@ use super::rules::{Table, tables};
 use super::shape::{MAX_NODES, edges, reference_volume};
 use crate::mesh::ElementKind;
 
-/// Offset of a mid-edge node, or gap to a parallelepiped, per edge length that counts as none.
+/// Offset of a mid-edge node, or gap to a parallelepiped, per edge length that counts as zero.
 const STRAIGHT: f64 = 1e-12;
 
-/// A node may have `det J` this far below zero, per the largest at Gauss points: rounding.
+/// Allowed negative `det J` at a node, relative to the largest at Gauss points: rounding.
 const NODE_SLACK: f64 = 1e-12;
 
-/// Where an element is inverted; both numbers count from 0.
+/// Place of an inversion in an element; both numbers count from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
-    /// At this Gauss point of the stiffness or mass.
+    /// Gauss point of the stiffness or mass.
     GaussPoint(usize),
-    /// At this node of the element.
+    /// Node of the element.
     Node(usize),
 }
 
-/// An element whose map turns over or collapses somewhere.
+/// Element whose map is inverted or collapses somewhere.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InvertedElement {
     /// Kind of the element.
     pub kind: ElementKind,
     /// Determinant of the Jacobian there, m³; zero, negative or NaN.
     pub det: f64,
-    /// Where it was found.
+    /// Place of the determinant.
     pub place: Place,
 }
 
@@ -47,25 +47,25 @@ impl fmt::Display for InvertedElement {
 
 impl std::error::Error for InvertedElement {}
 
-/// How evenly an element fills its space: the ratios are 1 for a parallelepiped, and zero or less
-/// where it is inverted.
+/// Shape quality of an element: the ratios are 1 for a parallelepiped, and zero or less if it is
+/// inverted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JacobianRange {
-    /// Smallest `det J` over the Gauss points of the exact stiffness, over `|mean|`.
+    /// Minimum `det J` over the Gauss points of the exact stiffness, relative to `|mean|`.
     pub min_gauss: f64,
-    /// Gauss point where it is, from 0.
+    /// Gauss point of the minimum, from 0.
     pub gauss_point: usize,
-    /// Smallest `det J` over the nodes, over `|mean|`.
+    /// Minimum `det J` over the nodes, relative to `|mean|`.
     pub min_node: f64,
-    /// Node of the element where it is, from 0.
+    /// Node of the minimum, from 0.
     pub node: usize,
-    /// Mean `det J`, m³: volume over that of the reference element.
+    /// Mean `det J`, m³: volume divided by that of the reference element.
     pub mean: f64,
 }
 
-/// Smallest `det J` over Gauss points and over nodes, scaled by the mean: the quality of a shape.
+/// Computes the minimum `det J` over Gauss points and over nodes, relative to the mean.
 ///
-/// An element without volume gives zeros.
+/// An element without volume gives zero ratios.
 ///
 /// # Panics
 /// For a beam, and for a wrong number of nodes.
@@ -93,22 +93,22 @@ fn dets(table: &Table, nodes: &Nodes) -> impl Iterator<Item = (f64, f64)> {
     (0..table.len()).map(move |p| (table.weight[p], Jacobian::new(nodes.n, table.dN(p), &nodes.x).det))
 }
 
-/// What kind of map an element has; decides the quadrature.
+/// Kind of map of an element; determines the quadrature.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Geometry {
     /// Constant Jacobian.
     Affine,
     /// Mid-edge nodes in the middle of straight edges.
     Straight,
-    /// Distortion: the larger of the relative difference between `det J` at a node and its mean
-    /// over the nodes (how far `1/det J` in the stiffness is from a polynomial), and of twice the
-    /// offset of a mid-edge node per edge length (how much the polynomial of high degree weighs
-    /// beside it).
+    /// Distortion: the maximum of two numbers. The first is the relative difference between `det J`
+    /// at a node and its mean over the nodes (how far `1/det J` in the stiffness is from a
+    /// polynomial). The second is twice the offset of a mid-edge node per edge length (weight of
+    /// the polynomial terms of high degree).
     Curved(f64),
 }
 
-/// Nodes of one element relative to the first (small numbers round less), padded for the vector
-/// unit.
+/// Nodes of one element relative to the first, which reduces rounding; padded for vector
+/// instructions.
 pub(crate) struct Nodes {
     pub(crate) n: usize,
     pub(crate) x: [[f64; 4]; MAX_NODES],
@@ -142,14 +142,14 @@ fn spread_at_nodes(kind: ElementKind, x: &[[f64; 4]; MAX_NODES]) -> f64 {
     dets[..n].iter().fold(0.0, |spread, det| f64::max(spread, (det / mean - 1.0).abs()))
 }
 
-/// The kind of map; the distortion of a curved one only from its offsets.
+/// Classifies the map; the distortion of a curved one is from its mid-edge offsets only.
 fn classify(kind: ElementKind, x: &[Vector3<f64>]) -> Geometry {
     let corners = match kind {
         ElementKind::Tet4 | ElementKind::Tet10 => 4,
         ElementKind::Wedge6 | ElementKind::Wedge15 => 6,
         _ => 8,
     };
-    // Coordinates far from the origin carry their own rounding, eps |x|.
+    // Coordinates far from the origin have a rounding error of eps |x|.
     let rounding = 4.0 * f64::EPSILON * x[0].amax();
     let (mut curved, mut offset) = (false, 0.0_f64);
     for ([a, b], middle) in edges(kind).iter().zip(&x[corners..]) {
@@ -161,7 +161,7 @@ fn classify(kind: ElementKind, x: &[Vector3<f64>]) -> Geometry {
     if curved {
         return Geometry::Curved(2.0 * offset);
     }
-    // Corners that a parallelepiped or prism on corner 0 would have elsewhere.
+    // Distance of the other corners from the parallelepiped or prism spanned at corner 0.
     let gap = |i: usize, from: [usize; 2]| (x[i] - (x[from[0]] + x[from[1]] - x[0])).norm();
     let gap = match corners {
         4 => return Geometry::Affine,
@@ -175,12 +175,12 @@ fn classify(kind: ElementKind, x: &[Vector3<f64>]) -> Geometry {
 /// `J = dx/dxi` at one point.
 pub(crate) struct Jacobian {
     pub(crate) det: f64,
-    /// `inverse[c][a] = dxi_c/dx_a`, without meaning unless `det > 0`.
+    /// `inverse[c][a] = dxi_c/dx_a`, meaningless unless `det > 0`.
     pub(crate) inverse: [[f64; 3]; 3],
 }
 
 impl Jacobian {
-    /// * `dN`: by r for all nodes, then by s, then by t.
+    /// * `dN`: derivatives by r for all nodes, then by s, then by t.
     #[inline(always)]
     pub(crate) fn new(n: usize, dN: &[f64], x: &[[f64; 4]; MAX_NODES]) -> Self {
         let (d_r, d_s, d_t) = (&dN[..n], &dN[n..2 * n], &dN[2 * n..3 * n]);
@@ -201,7 +201,7 @@ impl Jacobian {
         Self { det, inverse: adjugate.map(|row| row.map(|a| a * reciprocal)) }
     }
 
-    /// As [`Self::new`], refusing an inverted element.
+    /// As [`Self::new`], with an error for an inverted element.
     #[inline(always)]
     pub(crate) fn checked(
         kind: ElementKind,
@@ -217,7 +217,7 @@ impl Jacobian {
         Err(InvertedElement { kind, det: jacobian.det, place: Place::GaussPoint(point) })
     }
 
-    /// `dN_i/dx_a` of all nodes into `gradient[a * stride + i]`.
+    /// Writes `dN_i/dx_a` of all nodes to `gradient[a * stride + i]`.
     #[inline(always)]
     pub(crate) fn gradients(&self, n: usize, dN: &[f64], stride: usize, gradient: &mut [f64]) {
         let (d_r, d_s, d_t) = (&dN[..n], &dN[n..2 * n], &dN[2 * n..3 * n]);
@@ -231,8 +231,8 @@ impl Jacobian {
     }
 }
 
-/// Refuses a negative `det J` at a node: with it there is a surface in the element where the
-/// integrand of the stiffness is infinite, whatever the Gauss points say.
+/// Rejects a negative `det J` at a node: the element then contains a surface where the integrand of
+/// the stiffness is infinite, even if `det J` is positive at all Gauss points.
 pub(crate) fn check_nodes(kind: ElementKind, nodes: &Nodes, largest_det: f64) -> Result<(), InvertedElement> {
     let table = &tables(kind).nodes;
     for (number, (_, det)) in dets(table, nodes).enumerate() {

@@ -1,15 +1,15 @@
 //! Solid elements: shape functions, quadrature, stiffness and mass of one element.
 //!
 //! Start at [`ElementWorkspace::stiffness_and_mass`]. [`for_each_point`] visits the quadrature
-//! points with shape functions and gradients, [`jacobian_range`] tells how good the shape of an
-//! element is. TET4, TET10, HEX8, HEX20, WEDGE6 and WEDGE15, isoparametric, isotropic linear
-//! elasticity, in m, Pa and kg; node order of [`ElementKind`](crate::ElementKind).
+//! points with shape functions and gradients; [`jacobian_range`] measures the shape quality of an
+//! element. TET4, TET10, HEX8, HEX20, WEDGE6 and WEDGE15, isoparametric, isotropic linear
+//! elasticity, in m, Pa and kg; node order as in [`ElementKind`](crate::ElementKind).
 //!
 //! Notation: `xi = (r, s, t)` reference coordinates, `N_i` shape functions, `J = dx/dxi`, `det` its
-//! determinant, `lambda` and `mu` the constants of Lamé.
+//! determinant, `lambda` and `mu` Lamé constants.
 //!
-//! Not here: beams ([`crate::beam`]), assembly over a mesh. Functions here panic when they are
-//! given a beam or a wrong number of nodes: these are mistakes of the caller, not of a mesh.
+//! Not here: beams ([`crate::beam`]), assembly over a mesh. Functions here panic for a beam or a
+//! wrong number of nodes: these are errors of the caller, not of a mesh.
 
 mod elasticity;
 mod geometry;

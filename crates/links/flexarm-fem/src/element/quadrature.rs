@@ -1,9 +1,9 @@
-//! Points and weights on the reference tetrahedron, brick and wedge.
+//! Quadrature points and weights on the reference tetrahedron, brick and wedge.
 //!
-//! Products of one-dimensional Gauss rules are computed at start-up for any number of points; on
-//! triangle and tetrahedron the square and the cube are collapsed, with the factor `(1-s)^k` of the
-//! map in the weight (Gauss-Jacobi), so that n points per direction are exact to the total degree
-//! 2n - 1. Symmetric rules with fewer points are tabulated. All weights are positive and all points
+//! Products of one-dimensional Gauss rules are computed once for any number of points. For the
+//! triangle and tetrahedron the square and cube are collapsed, with the factor `(1-s)^k` of the map
+//! in the weight (Gauss-Jacobi), so that n points per direction are exact to total degree 2n - 1.
+//! Symmetric rules with fewer points are tabulated. All weights are positive and all points are
 //! inside.
 //!
 //! # Source
@@ -20,8 +20,8 @@ pub(crate) type WeightedPoint = ([f64; 3], f64);
 
 /// Gauss-Jacobi points on [0, 1] for the weight `(1-x)^alpha`: exact to degree 2n - 1.
 ///
-/// Eigenvalues of the Jacobi matrix of the recurrence of `P_n^(alpha, 0)`; weight from the first
-/// components of the eigenvectors.
+/// Points: eigenvalues of the Jacobi matrix of the recurrence of `P_n^(alpha, 0)`. Weights: from
+/// the first components of the eigenvectors.
 pub(crate) fn gauss_jacobi(n: usize, alpha: usize) -> Vec<(f64, f64)> {
     let a = alpha as f64;
     let mut jacobi = DMatrix::<f64>::zeros(n, n);
@@ -59,7 +59,7 @@ pub(crate) fn brick(n: usize) -> Vec<WeightedPoint> {
     points
 }
 
-/// n² points on the triangle, exact to total degree 2n - 1; from `r = u (1-s)`.
+/// n² points on the triangle, exact to total degree 2n - 1; mapped by `r = u (1-s)`.
 fn triangle(n: usize) -> Vec<([f64; 2], f64)> {
     let u_points = gauss_jacobi(n, 0);
     let mut points = Vec::with_capacity(n * n);
@@ -74,12 +74,12 @@ pub(crate) fn wedge(n_triangle: usize, n_line: usize) -> Vec<WeightedPoint> {
     prism(&triangle(n_triangle), n_line)
 }
 
-/// The midpoint of the triangle, exact to degree 1 there, times n points along the wedge.
+/// Midpoint of the triangle (exact to degree 1 there) times n points along the wedge.
 pub(crate) fn wedge_midpoint(n_line: usize) -> Vec<WeightedPoint> {
     prism(&[([1.0 / 3.0; 2], 0.5)], n_line)
 }
 
-/// Three inner points of the triangle, exact to degree 2 there, times n points along the wedge.
+/// Three interior points of the triangle (exact to degree 2 there) times n points along the wedge.
 pub(crate) fn wedge_three(n_line: usize) -> Vec<WeightedPoint> {
     let (a, b) = (1.0 / 6.0, 2.0 / 3.0);
     prism(&[([a, a], a), ([b, a], a), ([a, b], a)], n_line)
@@ -94,7 +94,7 @@ fn prism(triangle: &[([f64; 2], f64)], n_line: usize) -> Vec<WeightedPoint> {
     along.iter().flat_map(layer).collect()
 }
 
-/// n³ points on the tetrahedron, exact to total degree 2n - 1; from `s = v (1-t)`, `r = u (1-s-t)`.
+/// n³ points on the tetrahedron, exact to total degree 2n - 1; by `s = v (1-t)`, `r = u (1-s-t)`.
 pub(crate) fn tet_collapsed(n: usize) -> Vec<WeightedPoint> {
     let (u_points, v_points) = (gauss_jacobi(n, 0), gauss_jacobi(n, 1));
     let mut points = Vec::with_capacity(n * n * n);
@@ -107,7 +107,7 @@ pub(crate) fn tet_collapsed(n: usize) -> Vec<WeightedPoint> {
     points
 }
 
-/// Points of one symmetric rule of the tetrahedron; weights of all points of a rule add up to 1.
+/// Orbit of points of a symmetric rule of the tetrahedron; all weights of a rule add up to 1.
 enum Orbit {
     /// The centroid: weight.
     Centre(f64),
@@ -162,7 +162,7 @@ const P81: [Orbit; 9] = [
     Orbit::Face(0.174_979_342_183_939, 0.628_071_845_475_366, 0.012_907_035_798_861_991),
 ];
 
-/// The points of a symmetric rule.
+/// Points of a symmetric rule.
 pub(crate) fn tet(rule: TetRule) -> Vec<WeightedPoint> {
     match rule {
         TetRule::P1 => expand(&[Orbit::Centre(1.0)]),
@@ -173,13 +173,13 @@ pub(crate) fn tet(rule: TetRule) -> Vec<WeightedPoint> {
     }
 }
 
-/// The points of a symmetric rule, computed once per process.
+/// Points of a symmetric rule, computed once per process.
 pub(crate) fn tet_points(rule: TetRule) -> &'static [WeightedPoint] {
     static POINTS: [OnceLock<Vec<WeightedPoint>>; 5] = [const { OnceLock::new() }; 5];
     POINTS[rule as usize].get_or_init(|| tet(rule))
 }
 
-/// All different permutations of the barycentric coordinates of each orbit.
+/// Expands each orbit into all distinct permutations of its barycentric coordinates.
 fn expand(orbits: &[Orbit]) -> Vec<WeightedPoint> {
     let mut points = Vec::new();
     for orbit in orbits {
@@ -200,7 +200,7 @@ fn expand(orbits: &[Orbit]) -> Vec<WeightedPoint> {
     points
 }
 
-/// The next larger order of the entries, each different order once; `false` after the last.
+/// Advances to the next larger permutation, each distinct one once; `false` after the last.
 fn next_permutation(L: &mut [f64; 4]) -> bool {
     let Some(i) = (0..3).rev().find(|i| L[*i] < L[i + 1]) else {
         return false;

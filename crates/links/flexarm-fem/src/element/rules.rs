@@ -1,4 +1,4 @@
-//! Which quadrature each element uses, shape functions tabulated at its points, and a visitor.
+//! Choice of quadrature per element, shape functions tabulated at its points, and a visitor.
 
 use std::sync::OnceLock;
 
@@ -9,7 +9,7 @@ use super::quadrature::{TetRule, WeightedPoint, brick, tet, tet_collapsed, wedge
 use super::shape::{MAX_NODES, no_beam, reference_nodes, shape_functions};
 use crate::mesh::ElementKind;
 
-/// Which quadrature rules the matrices of an element are computed with.
+/// Quadrature rules for the matrices of an element.
 ///
 /// | | `Exact`: stiffness | `Exact`: mass | `Calculix`: both |
 /// | --- | --- | --- | --- |
@@ -21,23 +21,23 @@ use crate::mesh::ElementKind;
 /// | WEDGE6 prism, other | 3×2 (exact), 9×3 | closed form, 4×3, exact | 1×2 |
 /// | WEDGE15 prism, straight, curved | 9×3 (exact), 16×4, 25×5 | closed form, 9×4, 25×5, exact | 3×3 |
 ///
-/// Closed form: for every affine element the mass of the reference element times `det J`. The
+/// Closed form: for every affine element, the mass of the reference element times `det J`. The
 /// stiffness of an element that is not affine is the integral of a rational function, which no rule
-/// meets exactly.
+/// integrates exactly.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Quadrature {
     /// Sufficient for stiffness and consistent mass.
     #[default]
     Exact,
     /// The rules of CalculiX for C3D4, C3D10, C3D8, C3D20, C3D6 and C3D15, the same for stiffness
-    /// and mass. The mass of tetrahedra, HEX20 and wedges is under-integrated: right in sum, not in
-    /// detail. WEDGE6 has one motion without stiffness beside the rigid ones.
+    /// and mass. The mass of tetrahedra, HEX20 and wedges is under-integrated: the total is right,
+    /// the distribution is not. WEDGE6 has one zero-energy mode in addition to the rigid motions.
     Calculix,
-    /// The same, but HEX8 with incompatible modes: C3D8I.
+    /// As `Calculix`, but HEX8 with incompatible modes: C3D8I.
     CalculixModes,
 }
 
-/// What the quadrature points are for.
+/// Purpose of the quadrature points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Purpose {
     /// Products of two gradients.
@@ -49,25 +49,26 @@ pub enum Purpose {
 /// One quadrature point of an element.
 #[derive(Debug, Clone, Copy)]
 pub struct Point<'a> {
-    /// Where it is, m.
+    /// Position, m.
     pub position: Vector3<f64>,
-    /// Its reference coordinates.
+    /// Reference coordinates.
     pub xi: [f64; 3],
-    /// Weight times `det J`, m³: these sum to the volume.
+    /// Weight times `det J`, m³; the weights add up to the volume.
     pub weight: f64,
     /// Shape functions, one per node.
     pub N: &'a [f64],
-    /// Their gradients, 1/m.
+    /// Gradients of the shape functions, 1/m.
     pub dN: &'a [Vector3<f64>],
 }
 
-/// Visits the quadrature points of an element in their fixed order.
+/// Visits the quadrature points of an element in a fixed order.
 ///
-/// The incompatible modes of HEX8 are not part of `N`: gradients are those of the eight nodes.
+/// The incompatible modes of HEX8 are not included: `N` and the gradients are those of the eight
+/// nodes.
 ///
 /// # Errors
-/// [`InvertedElement`] at the first point without positive `det J`; `visit` has then seen the
-/// points before it.
+/// [`InvertedElement`] at the first point without a positive `det J`; `visit` has already been
+/// called for the points before it.
 ///
 /// # Panics
 /// For a beam, and for a wrong number of nodes.
@@ -103,7 +104,7 @@ pub fn for_each_point(
     Ok(())
 }
 
-/// Shape functions of one kind at the points of one rule.
+/// Shape functions of one element kind at the points of one rule.
 pub(crate) struct Table {
     n: usize,
     pub(crate) xi: Vec<[f64; 3]>,
@@ -143,7 +144,7 @@ impl Table {
         &self.N[point * self.n..(point + 1) * self.n]
     }
 
-    /// Their derivatives by r for all nodes, then by s, then by t.
+    /// Derivatives of the shape functions by r for all nodes, then by s, then by t.
     pub(crate) fn dN(&self, point: usize) -> &[f64] {
         &self.dN[point * 3 * self.n..(point + 1) * 3 * self.n]
     }
@@ -155,11 +156,11 @@ impl Table {
     }
 }
 
-/// All tables of one kind.
+/// All tables of one element kind.
 pub(crate) struct Tables {
-    /// By rising distortion: affine, straight, curved and more curved.
+    /// In order of distortion: affine, straight, curved and more strongly curved.
     stiffness: Vec<Table>,
-    /// Affine, straight, curved; shorter where there is no such geometry.
+    /// Affine, straight, curved; shorter if the kind lacks such a geometry.
     mass: Vec<Table>,
     calculix: Table,
     /// At the nodes, without weights.
@@ -168,7 +169,8 @@ pub(crate) struct Tables {
     pub(crate) reference_mass: Vec<f64>,
 }
 
-/// Largest distortion of a curved TET10 for 14, 46, 81, 216 and 343 points; above it 512.
+/// Maximum distortion of a curved TET10 for 14, 46, 81, 216 and 343 points; above the last, 512
+/// points.
 ///
 /// Up to a distortion of 0.35 the error of the stiffness is below 1e-8 of its largest entry, on
 /// nearly flat tetrahedra below 3e-8
@@ -212,7 +214,7 @@ impl Tables {
         }
     }
 
-    /// The exact rule for stiffness.
+    /// Rule of [`Quadrature::Exact`] for the stiffness.
     pub(crate) fn stiffness(&self, geometry: Geometry) -> &Table {
         let class = match geometry {
             Geometry::Affine => 0,
@@ -225,7 +227,7 @@ impl Tables {
         &self.stiffness[class.min(self.stiffness.len() - 1)]
     }
 
-    /// The exact rule for mass.
+    /// Rule of [`Quadrature::Exact`] for the mass.
     pub(crate) fn mass(&self, geometry: Geometry) -> &Table {
         let class = match geometry {
             Geometry::Affine => 0,
@@ -260,7 +262,7 @@ fn reference_mass(table: &Table) -> Vec<f64> {
     mass
 }
 
-/// The tables of a kind, computed once per process.
+/// Returns the tables of an element kind, computed once per process.
 pub(crate) fn tables(kind: ElementKind) -> &'static Tables {
     static TABLES: [OnceLock<Tables>; 6] = [const { OnceLock::new() }; 6];
     let slot = match kind {

@@ -5,7 +5,7 @@
 
 use crate::mesh::ElementKind;
 
-/// Most nodes that an element has.
+/// Maximum number of nodes of an element.
 pub(crate) const MAX_NODES: usize = 20;
 
 const TET: [[f64; 3]; 10] = [
@@ -80,7 +80,7 @@ pub fn reference_nodes(kind: ElementKind) -> &'static [[f64; 3]] {
     }
 }
 
-/// Corner numbers of each edge, in the order of the mid-edge nodes that follow the corners.
+/// Corner numbers of each edge, in the order of the mid-edge nodes, which follow the corners.
 ///
 /// # Panics
 /// For a beam.
@@ -106,7 +106,7 @@ pub fn reference_volume(kind: ElementKind) -> f64 {
     }
 }
 
-/// Shape functions `N_i` and `dN_i/d(r, s, t)` at `xi`, one entry per node of `kind`.
+/// Computes `N_i` and `dN_i/d(r, s, t)` at `xi`, one entry per node of `kind`.
 ///
 /// # Panics
 /// For a beam, and for slices shorter than the number of nodes.
@@ -171,7 +171,7 @@ fn hex20(xi: [f64; 3], N: &mut [f64], dN: &mut [[f64; 3]]) {
             dN[i] = [0, 1, 2].map(|c| node[c] * f[(c + 1) % 3] * f[(c + 2) % 3] * (g + f[c]) / 8.0);
             continue;
         }
-        // Along the edge the bubble 1 - r², across it the two linear factors.
+        // Bubble 1 - r² along the edge, two linear factors across it.
         let f = [0, 1, 2].map(|c| if node[c] == 0.0 { 1.0 - xi[c] * xi[c] } else { 1.0 + xi[c] * node[c] });
         let df = [0, 1, 2].map(|c| if node[c] == 0.0 { -2.0 * xi[c] } else { node[c] });
         N[i] = f[0] * f[1] * f[2] / 4.0;

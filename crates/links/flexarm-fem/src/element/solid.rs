@@ -9,13 +9,13 @@ use super::shape::{MAX_NODES, no_beam, reference_volume};
 use crate::material::Material;
 use crate::mesh::ElementKind;
 
-/// Largest number of DoF of an element.
+/// Maximum number of DoF of an element.
 const MAX_DOF: usize = 3 * MAX_NODES;
 
-/// Largest number of pairs of nodes `i <= j`.
+/// Maximum number of node pairs `i <= j`.
 const MAX_PAIRS: usize = MAX_NODES * (MAX_NODES + 1) / 2;
 
-/// Buffers for the matrices of one element at a time; nothing is allocated after [`Self::new`].
+/// Buffers for the matrices of one element; nothing is allocated after [`Self::new`].
 #[derive(Debug, Clone)]
 pub struct ElementWorkspace {
     n: usize,
@@ -33,27 +33,27 @@ impl Default for ElementWorkspace {
 }
 
 impl ElementWorkspace {
-    /// Room for the largest element.
+    /// Allocates room for the largest element.
     pub fn new() -> Self {
         let zeros = || vec![0.0; MAX_DOF * MAX_DOF];
         Self { n: 0, volume: 0.0, products: zeros(), stiffness: zeros(), mass: vec![0.0; MAX_NODES * MAX_NODES] }
     }
 
-    /// Computes stiffness and mass of one element; read them by [`Self::stiffness`] and
+    /// Computes stiffness and mass of one element; read them with [`Self::stiffness`] and
     /// [`Self::mass`].
     ///
     /// ```text
     /// K_ij = ∫ λ a bᵀ + μ (b aᵀ + (a·b) 1) dV,   a = ∇N_i, b = ∇N_j      M_ij = ∫ ρ N_i N_j dV
     /// ```
-    /// HEX8 with [`Quadrature::Exact`] or [`Quadrature::CalculixModes`] has nine incompatible modes
-    /// `1 - r²`, `1 - s²`, `1 - t²` in each direction, condensed statically: it bends without
-    /// locking. Their gradients use the Jacobian of the centre, `(det J_0 / det J) J_0⁻ᵀ`, so that
-    /// they do no work in constant stress and the patch test holds for any shape. They carry no
-    /// mass.
+    /// HEX8 with [`Quadrature::Exact`] or [`Quadrature::CalculixModes`] has nine incompatible
+    /// modes, `1 - r²`, `1 - s²` and `1 - t²` in each direction, which are condensed statically:
+    /// the element bends without locking. Their gradients use the Jacobian at the centre,
+    /// `(det J_0 / det J) J_0⁻ᵀ`, so that they do no work under constant stress and the patch test
+    /// holds for any shape. They carry no mass.
     ///
     /// * `x`: positions of the nodes, m.
-    /// * `material`: `E`, `nu` and `rho` are used; `G` is not. Refuse what
-    ///   [`check_solid_material`](super::check_solid_material) refuses before.
+    /// * `material`: `E`, `nu` and `rho` are used; `G` is not. Call
+    ///   [`check_solid_material`](super::check_solid_material) first.
     ///
     /// # Errors
     /// [`InvertedElement`] at a Gauss point; with [`Quadrature::Exact`] also at a node.
@@ -90,12 +90,12 @@ impl ElementWorkspace {
 
     /// Stiffness, 3n × 3n by rows, N/m; DoF `ux uy uz` of the first node, then of the second, ...
     ///
-    /// Symmetric bit by bit.
+    /// Exactly symmetric, bit for bit.
     pub fn stiffness(&self) -> &[f64] {
         &self.stiffness[..9 * self.n * self.n]
     }
 
-    /// Consistent mass, n × n by rows, kg: the 3n × 3n mass is each entry times the 3 × 3 identity.
+    /// Consistent mass, n × n by rows, kg; the 3n × 3n mass is each entry times the 3 × 3 identity.
     pub fn mass(&self) -> &[f64] {
         &self.mass[..self.n * self.n]
     }
@@ -105,7 +105,7 @@ impl ElementWorkspace {
         self.volume
     }
 
-    /// N nodes, D = 3 × (nodes and incompatible modes).
+    /// Computes both matrices for N nodes; D = 3 × (nodes and incompatible modes).
     fn compute<const N: usize, const D: usize>(
         &mut self,
         kind: ElementKind,
@@ -138,7 +138,7 @@ impl ElementWorkspace {
     }
 }
 
-/// Upper triangle of `∫ g gᵀ` for `g[a m + i] = dN_i/dx_a`; returns the largest `det J`.
+/// Upper triangle of `∫ g gᵀ` for `g[a m + i] = dN_i/dx_a`; returns the maximum `det J`.
 fn gradient_products<const N: usize, const D: usize>(
     kind: ElementKind,
     table: &Table,
@@ -150,8 +150,8 @@ fn gradient_products<const N: usize, const D: usize>(
     products[..D].fill([0.0; D]);
     let centre = if m > N { Some(centre_of_brick(kind, N, nodes)?) } else { None };
 
-    // Four points at a time, so that each entry of the result is read and written once for the
-    // four.
+    // Four points at a time, so that each entry of the result is read and written once per four
+    // points.
     let (mut g, mut weight, mut filled) = ([[0.0; D]; 4], [0.0; 4], 0);
     let mut jacobian = Jacobian::checked(kind, N, table, 0, &nodes.x)?;
     let mut largest_det = jacobian.det;
@@ -189,12 +189,12 @@ fn centre_of_brick(kind: ElementKind, n: usize, nodes: &Nodes) -> Result<Jacobia
     if centre.det > 0.0 {
         return Ok(centre);
     }
-    // The mean of eight positive determinants nearby: only a NaN or a badly folded element gets
-    // here.
+    // The determinant at the centre is close to the mean of eight positive ones, so only NaN or a
+    // badly folded element gets here.
     Err(InvertedElement { kind, det: centre.det, place: super::geometry::Place::GaussPoint(0) })
 }
 
-/// Gradients of the modes `1 - xi_c²`, carried by the Jacobian of the centre.
+/// Gradients of the modes `1 - xi_c²`, mapped by the Jacobian at the centre.
 fn mode_gradients(centre: &Jacobian, det: f64, xi: [f64; 3], m: usize, g: &mut [f64]) {
     let scale = -2.0 * centre.det / det;
     for a in 0..3 {
@@ -204,7 +204,7 @@ fn mode_gradients(centre: &Jacobian, det: f64, xi: [f64; 3], m: usize, g: &mut [
     }
 }
 
-/// Adds `Σ_p w_p g_p g_pᵀ` to the upper triangle (and a little of the lower one).
+/// Adds `Σ_p w_p g_p g_pᵀ` to the upper triangle (and to a few entries of the lower one).
 fn add_outer_products<const D: usize>(g: &[[f64; D]; 4], weight: [f64; 4], products: &mut [[f64; D]]) {
     for (row, products) in products[..D].iter_mut().enumerate() {
         let w = [0, 1, 2, 3].map(|p| weight[p] * g[p][row]);
@@ -215,7 +215,8 @@ fn add_outer_products<const D: usize>(g: &[[f64; D]; 4], weight: [f64; 4], produ
     }
 }
 
-/// `K_ij = λ H_ij + μ (H_ijᵀ + tr(H_ij) 1)` from `H_ij = ∫ a bᵀ`, node by node, both triangles.
+/// Computes `K_ij = λ H_ij + μ (H_ijᵀ + tr(H_ij) 1)` from `H_ij = ∫ a bᵀ` per node pair, both
+/// triangles.
 fn hooke<const D: usize>(H: &[[f64; D]], (lambda, mu): (f64, f64), K: &mut [f64]) {
     let m = D / 3;
     for i in 0..m {
@@ -241,7 +242,7 @@ fn hooke<const D: usize>(H: &[[f64; D]], (lambda, mu): (f64, f64), K: &mut [f64]
     }
 }
 
-/// Eliminates the last DoF of a symmetric positive matrix with these free, and closes up the rows.
+/// Condenses the last DoF of a symmetric positive matrix statically and closes up the rows.
 fn condense(K: &mut [f64], dof: usize, kept: usize) {
     for pivot in (kept..dof).rev() {
         for i in 0..pivot {
@@ -257,7 +258,7 @@ fn condense(K: &mut [f64], dof: usize, kept: usize) {
     }
 }
 
-/// `Σ ρ w det N Nᵀ`, upper triangle by rows; returns the volume.
+/// Adds `Σ ρ w det N Nᵀ` to the upper triangle by rows; returns the volume.
 fn shape_products<const N: usize>(
     kind: ElementKind,
     table: &Table,
@@ -276,7 +277,7 @@ fn shape_products<const N: usize>(
     Ok(volume)
 }
 
-/// Both triangles from the upper one.
+/// Expands the upper triangle to both.
 fn unpack(n: usize, pairs: &[f64], matrix: &mut [f64]) {
     let mut pairs = pairs.iter();
     for i in 0..n {

@@ -10,8 +10,8 @@ use crate::test_mesh::{Noise, SOLIDS, cube, positions};
 
 const STEEL: Material = Material::STEEL;
 
-/// A distorted element far from the origin, 10 cm large: corners moved by a tenth, mid-edge nodes
-/// moved by `curvature` as well.
+/// Distorted element of 10 cm far from the origin: corners moved by a tenth, mid-edge nodes also
+/// moved by `curvature`.
 fn distorted(kind: ElementKind, curvature: f64, seed: u64) -> Vec<Vector3<f64>> {
     let mut noise = Noise(seed);
     let nodes = reference_nodes(kind);
@@ -39,7 +39,7 @@ fn matrices(kind: ElementKind, x: &[Vector3<f64>], rule: Quadrature) -> (DMatrix
     (K, DMatrix::from_row_slice(n, n, workspace.mass()), workspace.volume())
 }
 
-/// Identity: shape functions add up to one, their derivatives to zero, and each is one at its node.
+/// Identity: shape functions add up to one and their derivatives to zero; each is one at its node.
 #[test]
 fn shape_functions_are_a_partition_of_unity_and_one_at_their_own_node() {
     for kind in SOLIDS {
@@ -82,7 +82,7 @@ fn derivatives_of_shape_functions_agree_with_central_differences() {
     }
 }
 
-/// Physics: a body that moves as a whole is not strained; curved elements and both rules included.
+/// Physics: a rigid motion causes no strain; includes curved elements and both rules.
 #[test]
 fn rigid_motions_cost_no_force_on_distorted_elements() {
     for kind in SOLIDS {
@@ -100,8 +100,8 @@ fn rigid_motions_cost_no_force_on_distorted_elements() {
     }
 }
 
-/// Physics: an unsupported elastic body has six motions without strain and no more. Today's
-/// exception is CalculiX's own: the two points of C3D6 do not see one of its motions.
+/// Physics: an unsupported elastic body has exactly six motions without strain. The exception is a
+/// property of CalculiX: the two points of C3D6 miss one of its deformations.
 #[test]
 fn every_element_has_exactly_six_modes_without_strain() {
     for kind in SOLIDS {
@@ -132,8 +132,8 @@ fn stiffness_and_mass_are_symmetric_to_the_last_bit() {
     }
 }
 
-/// Physics: the patch test. Nodes on the boundary of a distorted patch follow a linear field; in
-/// balance the nodes within follow it too, and the stress is constant. Quadratic elements have
+/// Physics: the patch test. Boundary nodes of a distorted patch follow a linear field; in
+/// equilibrium the inner nodes follow it too, and the stress is constant. Quadratic elements have
 /// curved faces inside.
 #[test]
 fn constant_strain_passes_through_a_distorted_patch_unchanged() {
@@ -170,7 +170,7 @@ fn constant_strain_passes_through_a_distorted_patch_unchanged() {
     }
 }
 
-/// Conservation: the mass matrix weighs what the volume weighs; both rules, curved elements.
+/// Conservation: the mass matrix gives density times volume; both rules, curved elements.
 #[test]
 fn the_mass_of_an_element_is_its_density_times_its_volume() {
     for kind in SOLIDS {
@@ -224,7 +224,7 @@ fn mass_of_straight_tetrahedra_is_the_closed_form() {
     assert!((volume * 6.0 / edges.determinant() - 1.0).abs() < 1e-13); // measured 3e-15
 }
 
-/// Second algorithm: mass of curved elements by a rule of far higher degree.
+/// Second algorithm: mass of curved elements by a rule of much higher degree.
 #[test]
 fn mass_of_curved_elements_is_exact() {
     for kind in [Tet10, Hex8, Hex20, Wedge6, Wedge15] {
@@ -246,13 +246,13 @@ fn mass_of_curved_elements_is_exact() {
     }
 }
 
-/// Second algorithm: 12³ points. The tables of [`TET10_DISTORTIONS`] rest on this.
+/// Second algorithm: 12³ points. The basis of the table [`TET10_DISTORTIONS`].
 #[test]
 fn the_stiffness_of_a_curved_tetrahedron_does_not_depend_on_the_rule() {
     let mut noise = Noise(23);
     let (fine, mut tried) = (tet_collapsed(12), [0; 5]);
     while tried.iter().any(|count| *count < 10) {
-        // All sizes of curvature alike, on tetrahedra of all shapes.
+        // Curvatures of all magnitudes, on tetrahedra of all shapes.
         let curvature = 10.0_f64.powf(-2.0 + 1.5 * noise.next());
         let mut x: Vec<Vector3<f64>> =
             reference_nodes(Tet10)[..4].iter().map(|xi| Vector3::from(*xi) + 0.2 * noise.vector()).collect();
@@ -291,7 +291,7 @@ fn strain_matrix(dN: &[Vector3<f64>]) -> DMatrix<f64> {
     B
 }
 
-/// Second algorithm: `∫ Bᵀ D B` by matrices and [`for_each_point`] against the outer products.
+/// Second algorithm: `∫ Bᵀ D B` with matrices and [`for_each_point`] against the outer products.
 #[test]
 fn stiffness_is_the_integral_of_b_transposed_d_b() {
     let D = stress_strain(&STEEL).unwrap();
@@ -313,9 +313,9 @@ fn stiffness_is_the_integral_of_b_transposed_d_b() {
     }
 }
 
-/// Truth: a block bent to the curvature κ with its nodes held across, plane strain:
-/// `E/(1-nu²) I κ² l / 2`. The plain brick cannot curve: it shears as well, by κ x, and is held
-/// across: `[(λ + 2μ) I l + μ b h l³/12] κ² / 2`.
+/// Truth: a block bent to the curvature κ with its nodes restrained across, plane strain:
+/// `E/(1-nu²) I κ² l / 2`. The plain brick cannot represent curvature: it also shears, by κ x, and
+/// is restrained across: `[(λ + 2μ) I l + μ b h l³/12] κ² / 2`.
 #[test]
 fn a_brick_with_incompatible_modes_bends_without_locking() {
     let (l, b, h) = (0.4, 0.05, 0.1);
@@ -334,8 +334,8 @@ fn a_brick_with_incompatible_modes_bends_without_locking() {
     assert!(locked > 6.0 * bending);
 }
 
-/// A mid-edge node at less than a quarter of its edge turns the map over at the corner. Just below
-/// it no Gauss point sees it.
+/// A mid-edge node at less than a quarter of its edge inverts the map at the corner. Just below
+/// that limit no Gauss point detects it.
 #[test]
 fn an_element_turned_over_at_a_node_is_reported_there() {
     let mut x: Vec<Vector3<f64>> = reference_nodes(Tet10).iter().map(|xi| Vector3::from(*xi)).collect();
@@ -347,7 +347,7 @@ fn an_element_turned_over_at_a_node_is_reported_there() {
     let range = jacobian_range(Tet10, &x);
     assert!(range.node == 0 && range.min_node < 0.0 && range.min_gauss > 0.0);
 
-    // The four points of CalculiX do not see it either, at a node pulled further than that.
+    // The four points of CalculiX do not detect it either, until a node is moved much further.
     x[4].x = 0.2;
     workspace.stiffness_and_mass(Tet10, &x, &STEEL, Quadrature::Calculix).unwrap();
     x[4].x = -0.8;
@@ -369,7 +369,7 @@ fn a_mirrored_a_flat_and_a_broken_element_are_refused() {
     }
 }
 
-/// Truth: a parallelepiped has a constant Jacobian, so that every ratio is one.
+/// Truth: a parallelepiped has a constant Jacobian, so every ratio is one.
 #[test]
 fn a_parallelepiped_is_of_perfect_quality() {
     let skew = Matrix3::new(0.1, 0.03, 0.0, 0.0, 0.2, 0.05, 0.01, 0.0, 0.1);

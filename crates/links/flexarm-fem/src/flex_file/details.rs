@@ -1,5 +1,4 @@
-//! The optional tables of a reduced-link file: `[superelement]`, `[[chain]]`, `[modal]` and
-//! `[gate]`.
+//! Optional tables of a reduced-link file: `[superelement]`, `[[chain]]`, `[modal]` and `[gate]`.
 
 use nalgebra::{DMatrix, Matrix6};
 use serde::Deserialize;
@@ -17,13 +16,13 @@ use crate::mesh_gate::MeshGate;
 use crate::reduced::{ElasticSplit, LinkDetails, ReducedLink};
 use crate::reduction::{InterfaceFrame, Superelement, Tie, stiffness12, worst};
 
-/// Relative difference that `K_BB` and the superelement may have.
+/// Allowed relative difference between `K_BB` and the superelement.
 const AGREEMENT: f64 = 1e-6;
 
-/// Modes that a file may carry: far more than any use, far less than fills the memory.
+/// Maximum number of rows of a matrix: far above any use, and small enough for the memory.
 const MOST_ROWS: usize = 6000;
 
-/// The tables as text; empty without details.
+/// Writes the tables as text; empty if the link has no details.
 pub(super) fn write_details(link: &ReducedLink) -> String {
     let Some(details) = &link.details else { return String::new() };
     let mut text = String::new();
@@ -58,7 +57,7 @@ pub(super) fn write_details(link: &ReducedLink) -> String {
         text += &super::modal::write_modal(modal);
     }
     if let Some(gate) = details.gate.as_ref().and_then(|gate| toml::to_string(gate).ok()) {
-        // Its own tables become tables of [gate].
+        // The sub-tables of the report become tables of [gate].
         let body = gate.replace("\n[[", "\n[[gate.").replace("\n[quality]", "\n[gate.quality]");
         let body = body.replace("\n[order]", "\n[gate.order]");
         text += &format!("\n[gate]                        # what was checked against the mesh\n{body}");
@@ -175,7 +174,7 @@ fn read_superelement(
     Ok(element)
 }
 
-/// The superelement must say the same as the 6×6 of its link.
+/// Checks that the superelement agrees with the frames and the 6×6 of its link.
 fn agrees(element: &Superelement, link: &ReducedLink) -> Result<(), String> {
     for (k, X) in [(0, &link.X_LA), (1, &link.X_LB)] {
         let gap = (element.interfaces[k].X_LI.translation.vector - X.translation.vector).norm();
@@ -190,7 +189,7 @@ fn agrees(element: &Superelement, link: &ReducedLink) -> Result<(), String> {
     if gap <= AGREEMENT { Ok(()) } else { Err(format!("a K_BB that differs by {gap:.1e}")) }
 }
 
-/// A square matrix of at least `smallest` rows.
+/// Reads a square matrix of at least `smallest` rows.
 fn read_dense(table: &Table<'_, '_>, key: &str, smallest: usize) -> Result<DMatrix<f64>, FlexFileError> {
     let node = table.require(key, "one array per row")?;
     let rows = node.list()?;
@@ -244,7 +243,8 @@ fn read_chain(node: &Node<'_, '_>, units: &Units, link: &ReducedLink) -> Result<
     Ok(chain)
 }
 
-/// The joints of a chain add up to the 6×6 of its link, its parts to the mass of the two parts.
+/// Checks that the joints of a chain add up to the 6×6 of its link, and its parts to the link's
+/// mass.
 fn chain_agrees(chain: &Chain, link: &ReducedLink) -> Result<(), String> {
     let p_LB = link.X_LB.translation.vector;
     let (Some(sum), Ok(C)) = (chain.tip_compliance(&p_LB), link.tip_compliance()) else {

@@ -1,4 +1,4 @@
-//! A TOML document whose every value knows its place, so that each error can name it.
+//! TOML document in which every value has a position, so that errors can point to it.
 
 use std::ops::Range;
 
@@ -8,13 +8,13 @@ use toml::de::{DeTable, DeValue};
 
 use super::error::{FlexErrorKind, FlexFileError};
 
-/// The text and what to call it.
+/// The text and its name in messages.
 pub(super) struct Document<'d> {
     pub(super) text: &'d str,
     pub(super) origin: &'d str,
 }
 
-/// A table with its path from the root.
+/// Table with its path from the root.
 pub(super) struct Table<'d, 't> {
     document: &'d Document<'d>,
     path: String,
@@ -22,7 +22,7 @@ pub(super) struct Table<'d, 't> {
     map: &'d DeTable<'t>,
 }
 
-/// A value with its path from the root.
+/// Value with its path from the root.
 pub(super) struct Node<'d, 't> {
     document: &'d Document<'d>,
     pub(super) path: String,
@@ -30,7 +30,7 @@ pub(super) struct Node<'d, 't> {
 }
 
 impl<'d> Document<'d> {
-    /// An error at a byte range of the text.
+    /// Creates an error at a byte range of the text.
     pub(super) fn fail(
         &self,
         at: Range<usize>,
@@ -59,7 +59,7 @@ impl<'d> Document<'d> {
     }
 }
 
-/// Line and column (in characters), both from 1, of a byte offset.
+/// Line and column (in characters) of a byte offset, both from 1.
 fn line_and_column(text: &str, offset: usize) -> (usize, usize) {
     let mut end = offset.min(text.len());
     while !text.is_char_boundary(end) {
@@ -76,13 +76,13 @@ impl<'d, 't> Table<'d, 't> {
         if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) }
     }
 
-    /// The value of a key, if it is there.
+    /// Returns the value of an optional key.
     pub(super) fn get(&self, key: &str) -> Option<Node<'d, 't>> {
         let value = self.map.get(key)?;
         Some(Node { document: self.document, path: self.element(key), value })
     }
 
-    /// The value of a key that must be there.
+    /// Returns the value of a required key.
     pub(super) fn require(&self, key: &str, help: &str) -> Result<Node<'d, 't>, FlexFileError> {
         self.get(key).ok_or_else(|| {
             let expected = format!("the key {key:?}");
@@ -90,7 +90,7 @@ impl<'d, 't> Table<'d, 't> {
         })
     }
 
-    /// Refuses every key that is not in `known`.
+    /// Rejects every key that is not in `known`.
     pub(super) fn only(&self, known: &[&str]) -> Result<(), FlexFileError> {
         let strange = |key: &&Spanned<_>| {
             let key: &std::borrow::Cow<'_, str> = key.get_ref();
@@ -108,7 +108,7 @@ impl<'d, 't> Table<'d, 't> {
         ))
     }
 
-    /// An error at the head of this table about one of its keys.
+    /// Creates an error about a key, at the head of this table.
     pub(super) fn fail(
         &self,
         key: &str,
@@ -123,7 +123,7 @@ impl<'d, 't> Table<'d, 't> {
 }
 
 impl<'d, 't> Node<'d, 't> {
-    /// An error at this value.
+    /// Creates an error at this value.
     pub(super) fn fail(
         &self,
         kind: FlexErrorKind,
@@ -149,7 +149,7 @@ impl<'d, 't> Node<'d, 't> {
         self.value.get_ref().as_str().ok_or_else(|| self.wrong_type("text in quotes"))
     }
 
-    /// One of a few words.
+    /// Returns the text if it is one of `known`.
     pub(super) fn word(&self, known: &[&str], help: &str) -> Result<&'d str, FlexFileError> {
         let text = self.text()?;
         if known.contains(&text) {
@@ -167,7 +167,7 @@ impl<'d, 't> Node<'d, 't> {
         .ok_or_else(|| self.wrong_type("a whole number"))
     }
 
-    /// A finite number; whole numbers count as well.
+    /// Returns a finite number; integers are accepted as well.
     pub(super) fn number(&self) -> Result<f64, FlexFileError> {
         let written = match self.value.get_ref() {
             DeValue::Float(number) => number.as_str(),
@@ -185,7 +185,7 @@ impl<'d, 't> Node<'d, 't> {
         }
     }
 
-    /// The entries of an array of exactly `length` values.
+    /// Returns the entries of an array of exactly `length` values.
     pub(super) fn items(&self, length: usize, what: &str) -> Result<Vec<Self>, FlexFileError> {
         let items = self.list()?;
         if items.len() == length {
@@ -195,14 +195,14 @@ impl<'d, 't> Node<'d, 't> {
         Err(self.fail(FlexErrorKind::WrongSize, found, expected, "is the file cut off?"))
     }
 
-    /// The entries of an array of any length.
+    /// Returns the entries of an array of any length.
     pub(super) fn list(&self) -> Result<Vec<Self>, FlexFileError> {
         let array = self.value.get_ref().as_array().ok_or_else(|| self.wrong_type("an array"))?;
         let node = |(i, value)| Node { document: self.document, path: format!("{}[{i}]", self.path), value };
         Ok(array.iter().enumerate().map(node).collect())
     }
 
-    /// An array of exactly N numbers.
+    /// Returns an array of exactly N numbers.
     pub(super) fn numbers<const N: usize>(&self, what: &str) -> Result<[f64; N], FlexFileError> {
         let mut result = [0.0; N];
         for (slot, item) in result.iter_mut().zip(self.items(N, what)?) {

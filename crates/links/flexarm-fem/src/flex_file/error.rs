@@ -1,60 +1,60 @@
-//! What can be wrong in the text of a reduced-link file, and where.
+//! Errors in the text of a reduced-link file, with their position.
 
 use crate::error::FemError;
 
-/// The sort of mistake, for programs; the message is for people.
+/// Kind of error, for programs; the message is for users.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum FlexErrorKind {
     /// The file could not be opened or is not UTF-8 text.
     Unreadable,
-    /// Not TOML.
+    /// The text is not TOML.
     Syntax,
-    /// Another format, or a version this program does not know.
+    /// The format is another one, or its version is unknown to this program.
     Format,
-    /// A required key or table is not there.
+    /// A required key or table is missing.
     MissingKey,
-    /// A key that the format does not have.
+    /// A key is not part of the format.
     UnknownKey,
-    /// A value of the wrong type, such as text for a number.
+    /// A value has the wrong type, such as text for a number.
     WrongType,
-    /// An array of the wrong length.
+    /// An array has the wrong length.
     WrongSize,
-    /// A NaN, an infinity, or a number too large to hold.
+    /// A number is NaN, infinite or too large.
     NotFinite,
-    /// A unit that is not one of the accepted ones.
+    /// A unit is not an accepted one.
     Unit,
-    /// Text that is not one of the accepted words.
+    /// A text is not one of the accepted words.
     Word,
-    /// A rotation matrix that is none.
+    /// A matrix is not a rotation matrix.
     Rotation,
-    /// A part that is there twice, or not at all.
+    /// A part is given twice, or not at all.
     Part,
-    /// Well-formed numbers that cannot be a link; see the source of the error.
+    /// The numbers are well formed but impossible for a link; see the source of the error.
     Link,
 }
 
-/// A mistake in a reduced-link file.
+/// Error in a reduced-link file.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{origin}:{line}:{column}: {element}: found {found}; expected {expected}{}", mend(.help))]
 pub struct FlexFileError {
-    /// The sort of mistake.
+    /// Kind of error.
     pub kind: FlexErrorKind,
-    /// File, or the name that was given to the text.
+    /// File, or the name given to the text.
     pub origin: Box<str>,
     /// Line, from 1.
     pub line: usize,
     /// Column in characters, from 1.
     pub column: usize,
-    /// The element, such as `stiffness.matrix[2][3]` (row and column from 0).
+    /// Element of the document, such as `stiffness.matrix[2][3]` (row and column from 0).
     pub element: Box<str>,
-    /// What stands there.
+    /// Text or value found.
     pub found: Box<str>,
-    /// What may stand there.
+    /// Text or value expected.
     pub expected: Box<str>,
-    /// How to mend it; may be empty.
+    /// Hint for a correction; may be empty.
     pub help: Box<str>,
-    /// Why the link was refused, for [`FlexErrorKind::Link`].
+    /// Reason why the link was rejected, for [`FlexErrorKind::Link`].
     #[source]
     pub source: Option<Box<FemError>>,
 }

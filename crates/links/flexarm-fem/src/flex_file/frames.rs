@@ -1,4 +1,4 @@
-//! The frames of a reduced-link file: `[interface.A]`, `[interface.B]`, `[split]`.
+//! Frames of a reduced-link file: `[interface.A]`, `[interface.B]`, `[split]`.
 
 use flexarm_spatial::Pose;
 use nalgebra::{Matrix3, Rotation3, Translation3};
@@ -9,7 +9,7 @@ use super::read::{refused, required_table};
 use super::units::Units;
 use crate::frames::LinkFrames;
 
-/// Interfaces and split, in SI; the split in the middle where it is not given.
+/// Reads interfaces and split, in SI; without `[split]` the split is in the middle.
 pub(super) fn read_frames(root: &Table<'_, '_>, units: &Units) -> Result<LinkFrames, FlexFileError> {
     let node = root.require("interface", "give [interface.A] and [interface.B]")?;
     let interface = node.table()?;
@@ -26,8 +26,8 @@ pub(super) fn read_frames(root: &Table<'_, '_>, units: &Units) -> Result<LinkFra
     Ok(frames)
 }
 
-/// Pose from `xyz` and either `rpy`, `rotation` or nothing; `others`: keys that may stand beside
-/// them.
+/// Reads a pose from `xyz` and either `rpy`, `rotation` or nothing; `others` are further keys that
+/// the table may have.
 pub(super) fn read_pose(table: &Table<'_, '_>, units: &Units, others: &[&str]) -> Result<Pose, FlexFileError> {
     table.only(&[&["xyz", "rpy", "rotation"], others].concat())?;
     let p = table.require("xyz", "three numbers, link axes")?.vector()? * units.length;

@@ -13,9 +13,9 @@ pub use error::{FlexErrorKind, FlexFileError};
 pub use read::{parse_flex, parse_flex_bytes, parse_flex_with, read_flex};
 pub use write::write_flex;
 
-/// Value of `format` in every file.
+/// Value of the key `format`.
 pub const FORMAT: &str = "flexarm-reduced-link";
-/// The version that this program reads and writes.
+/// Format version that this program reads and writes.
 pub const VERSION: i64 = 1;
-/// The only order of components.
+/// Required order of the components.
 pub const ORDER: &str = "ux uy uz rx ry rz";

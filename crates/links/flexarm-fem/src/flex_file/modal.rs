@@ -1,7 +1,7 @@
-//! The optional table `[modal]` of a reduced-link file: shapes and mass integrals.
+//! Optional table `[modal]` of a reduced-link file: shapes and mass integrals.
 //!
-//! Symmetric matrices are their lower triangles by rows; of `N_kl` the pairs `k <= l` are written,
-//! in that order, and none where all are zero (second order unknown).
+//! Symmetric matrices are written as their lower triangles by rows. Of `N_kl` the pairs `k <= l`
+//! are written in that order, or none if all are zero (second order unknown).
 
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Matrix6, Matrix6xX, Vector3};
 
@@ -13,10 +13,10 @@ use super::write::{numbers, pose_lines, quoted};
 use crate::modal::{GeometricStiffness, ModalInterface, ModalLink};
 use crate::reduced::ReducedLink;
 
-/// More coordinates than any link has.
+/// Maximum number of coordinates, more than any link has.
 const MOST_COORDINATES: usize = 6000;
 
-/// The table as text.
+/// Writes the table as text.
 pub(super) fn write_modal(modal: &ModalLink) -> String {
     let n = modal.coordinates();
     let mut text = String::from(
@@ -63,7 +63,7 @@ fn list(key: &str, rows: impl Iterator<Item = String>) -> String {
     format!("{key} = [\n{rows}]\n")
 }
 
-/// A 3×3 by rows.
+/// Writes a 3×3 by rows.
 fn nine(A: &Matrix3<f64>) -> String {
     numbers(A.transpose().iter())
 }
@@ -74,7 +74,7 @@ fn triangle(A: &DMatrix<f64>) -> String {
     numbers(entries.iter())
 }
 
-/// Reads the table of a link that is complete but for it.
+/// Reads the `[modal]` table of a link whose other data is already read.
 pub(super) fn read_modal(
     node: &Node<'_, '_>,
     units: &Units,
@@ -115,7 +115,7 @@ pub(super) fn read_modal(
     }
     let [xx, yy, zz, xy, xz, yz] =
         table.require("inertia", "about the link origin")?.numbers::<6>("numbers: xx, yy, zz, xy, xz, yz")?;
-    // The matrices first: so much stands in the file, so N may have its room.
+    // Matrices first: N is allocated only after the file has shown that it has n coordinates.
     let K = read_triangle(&table.require("K", "lower triangle")?, n)?;
     let M = read_triangle(&table.require("M", "lower triangle")?, n)?;
     let N = match table.get("N") {
@@ -229,7 +229,7 @@ fn read_geometric(node: &Node<'_, '_>, n: usize, interfaces: usize) -> Result<Ge
     })
 }
 
-/// B must be where the link has it; with all static shapes it must yield as the link does.
+/// Checks the position of B and, if all static shapes are present, the compliance against the link.
 fn agrees(modal: &ModalLink, link: &ReducedLink, agreement: f64) -> Result<(), String> {
     let p_LB: &Vector3<f64> = &link.X_LB.translation.vector;
     let gap = (modal.interfaces[0].X_LI.translation.vector - p_LB).norm();

@@ -1,4 +1,4 @@
-//! Text to [`ReducedLink`]: structure first, then units, then the checks that make it a link.
+//! Reads text into a [`ReducedLink`]: structure first, then units, then the checks of the link.
 
 use std::path::Path;
 
@@ -20,14 +20,13 @@ use crate::reduced::{Provenance, ReducedLink};
 use crate::rigid_part::RigidPart;
 
 const PARTS: [&str; 2] = ["proximal", "distal"];
-/// A file larger than this is refused (bytes): a link with 100 modes and stiffness by load has 10
-/// MB.
+/// Maximum size of a file, bytes; a link with 100 modes and load-dependent stiffness takes 10 MB.
 const LARGEST: u64 = 256 << 20;
 
 /// Reads a reduced-link file.
 ///
 /// # Errors
-/// [`FlexFileError`] with file, line, column, element, what was found and what was expected.
+/// [`FlexFileError`] with file, line, column, element, value found and value expected.
 pub fn read_flex(path: impl AsRef<Path>) -> Result<ReducedLink, FlexFileError> {
     let path = path.as_ref();
     let origin = path.display().to_string();
@@ -61,14 +60,14 @@ pub fn parse_flex(text: &str, origin: &str) -> Result<ReducedLink, FlexFileError
     parse_flex_with(text, origin, &GateLimits::default())
 }
 
-/// [`parse_flex`] with other limits at the gate, for matrices printed with few digits.
+/// As [`parse_flex`], with other limits of the gate, for matrices printed with few digits.
 ///
 /// # Errors
 /// As [`read_flex`].
 pub fn parse_flex_with(text: &str, origin: &str, limits: &GateLimits) -> Result<ReducedLink, FlexFileError> {
     let document = Document { text, origin };
     let parsed = DeTable::parse(text).map_err(|error| {
-        // A cut-off file fails at its very end, where the parser has no place to show.
+        // A truncated file fails at its end, where the parser reports no position.
         let at = error.span().unwrap_or(text.len()..text.len());
         let (found, expected) = (error.message().trim(), "a TOML document");
         document.fail(at, "text", FlexErrorKind::Syntax, found, expected, "is the file cut off?")
@@ -109,7 +108,7 @@ fn unreadable(document: &Document<'_>, at: usize, found: String) -> FlexFileErro
     document.fail(at..at, "file", FlexErrorKind::Unreadable, found, expected, "")
 }
 
-/// `format` and `version` come before everything else: another format would fail anywhere.
+/// Checks `format` and `version` first: another format would fail at an arbitrary place.
 fn check_format(root: &Table<'_, '_>) -> Result<(), FlexFileError> {
     let help = "is this a reduced-link file at all?";
     let format = root.require("format", help)?;
@@ -221,7 +220,7 @@ fn read_stiffness(
         "interface_B" => *frames.X_LB.rotation.matrix(),
         _ => Matrix3::identity(),
     };
-    // Turning by the identity is left out: it must not touch the last bit.
+    // The identity rotation is skipped, so that the stiffness is kept bit for bit.
     let turn = |K: Matrix6<f64>| {
         if axes == "link" { K } else { turn6(&R) * K * turn6(&R).transpose() }
     };
@@ -258,7 +257,7 @@ fn read_square<const N: usize>(node: &Node<'_, '_>) -> Result<[[f64; N]; N], Fle
     Ok(rows)
 }
 
-/// Takes over what was measured on the 12×12 behind a 6×6 file.
+/// Reads the measures of the original 12×12 that a 6×6 file records.
 fn read_checks(root: &Table<'_, '_>, link: &mut ReducedLink) -> Result<(), FlexFileError> {
     let Some(node) = root.get("checks") else { return Ok(()) };
     let table = node.table()?;
@@ -277,7 +276,7 @@ fn read_checks(root: &Table<'_, '_>, link: &mut ReducedLink) -> Result<(), FlexF
     Ok(())
 }
 
-/// A well-formed element that cannot be part of a link.
+/// Error for a well-formed element that is invalid in a link.
 pub(super) fn refused(node: &Node<'_, '_>, cause: FemError, expected: &str) -> FlexFileError {
     let error = node.fail(FlexErrorKind::Link, cause.to_string(), expected, "");
     FlexFileError { source: Some(Box::new(cause)), ..error }

@@ -1,17 +1,17 @@
-//! The units of a reduced-link file. The one place of this crate where a number is not SI.
+//! Units of a reduced-link file: the only place of this crate with numbers that are not SI.
 
 use nalgebra::{Matrix6, Vector6};
 
 use super::document::Table;
 use super::error::{FlexErrorKind, FlexFileError};
 
-/// One declared unit each, in SI.
+/// Declared units, in SI.
 #[derive(Debug, Clone)]
 pub(super) struct Units {
     pub(super) length: f64,
     force: f64,
     pub(super) mass: f64,
-    /// As declared, for the provenance.
+    /// Names as declared, for the provenance.
     pub(super) names: String,
 }
 
@@ -38,9 +38,9 @@ impl Units {
         Ok(Self { length, force, mass, names })
     }
 
-    /// A 6×6 block of a stiffness in SI: force/length, force per rad, force·length per rad.
+    /// Converts a 6×6 stiffness block to SI: force/length, force per rad, force·length per rad.
     pub(super) fn stiffness(&self, K: &Matrix6<f64>) -> Matrix6<f64> {
-        // Lengths of the work-conjugate rows: a displacement is in `length`, a rotation in rad.
+        // Length factors of the conjugate components: displacements in `length`, rotations in rad.
         let l = self.length;
         let s = Vector6::new(1.0, 1.0, 1.0, l, l, l);
         Matrix6::from_fn(|i, j| K[(i, j)] * (s[i] * s[j] * (self.force / l)))

@@ -1,4 +1,4 @@
-//! [`ReducedLink`] to text, such that reading it gives the same numbers to the last bit.
+//! Writes a [`ReducedLink`] as text that reads back to bitwise equal numbers.
 
 use std::fmt::Write;
 
@@ -9,10 +9,10 @@ use super::{FORMAT, ORDER, VERSION};
 use crate::reduced::{Provenance, ReducedLink};
 use crate::rigid_part::RigidPart;
 
-/// The text of a reduced-link file: SI units, `K_BB` in link axes, one matrix row per line.
+/// Writes a reduced-link file: SI units, `K_BB` in link axes, one matrix row per line.
 ///
 /// Numbers are written in the shortest form that reads back to the same value. A rotation is
-/// written as `rpy` where that gives back every bit, else as a matrix.
+/// written as `rpy` if that reproduces every bit, otherwise as a matrix.
 pub fn write_flex(link: &ReducedLink) -> String {
     let mut text = format!("format = \"{FORMAT}\"\nversion = {VERSION}\n");
     text += &format!("link = {}\n", quoted(&link.name));
@@ -46,7 +46,7 @@ fn provenance(p: &Provenance) -> String {
         ("date", &p.date),
         ("note", &p.note),
     ];
-    // `units` is written even if empty: left out, it would read back as those of the file.
+    // `units` is written even if empty: without it, reading would insert the units of the file.
     let written = |(key, value): &(&str, &String)| !value.is_empty() || *key == "units";
     let line = |(key, value): (&str, &String)| format!("{key} = {}\n", quoted(value));
     let lines: String = entries.into_iter().filter(written).map(line).collect();
@@ -95,14 +95,14 @@ fn rows(R: &Matrix3<f64>) -> String {
     format!("[{}]", rows.join(", "))
 }
 
-/// `{:?}` prints the shortest text that parses back to the same f64, always with a point or
+/// `{:?}` prints the shortest text that parses back to the same f64, always with a point or an
 /// exponent.
 pub(super) fn numbers<'a>(values: impl Iterator<Item = &'a f64>) -> String {
     let printed: Vec<_> = values.map(|x| format!("{x:?}")).collect();
     format!("[{}]", printed.join(", "))
 }
 
-/// A TOML basic string.
+/// Quotes a text as a TOML basic string.
 pub(super) fn quoted(text: &str) -> String {
     let mut result = String::from('"');
     for c in text.chars() {

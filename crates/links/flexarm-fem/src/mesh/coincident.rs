@@ -1,5 +1,4 @@
-//! Nodes in one place that are not one node: parts that were never joined, and cracks inside a
-//! body.
+//! Distinct nodes at the same position: parts that were never joined, and cracks inside a body.
 
 use std::collections::HashMap;
 
@@ -8,21 +7,22 @@ use nalgebra::Vector3;
 use super::Mesh;
 use super::surface::skin;
 
-/// Distance below which nodes coincide where none is given, as a part of the diagonal of the mesh.
+/// Default distance below which nodes coincide, relative to the diagonal of the mesh.
 pub const COINCIDENT: f64 = 1e-6;
 
-/// Different nodes in one place.
+/// Distinct nodes at the same position.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Coincident {
     /// Pairs of node indices, the smaller first, ascending.
     pub pairs: Vec<[u32; 2]>,
-    /// Faces of the surface that lie on another one, corner by corner: both sides of a crack count.
+    /// Number of surface faces that coincide with another one at all corners; both sides of a crack
+    /// count.
     pub faces: usize,
 }
 
-/// Nodes of the surface and of beams that lie in one place without being one node.
+/// Finds nodes of the surface and of beams that are at the same position but are distinct.
 ///
-/// * `tolerance`: m; nodes of one element never count, however small it is.
+/// * `tolerance`: m; nodes of the same element are never reported, however small it is.
 pub fn coincident(mesh: &Mesh, tolerance: f64) -> Coincident {
     let skin = skin(mesh);
     let mut nodes = skin.nodes();
@@ -36,7 +36,7 @@ pub fn coincident(mesh: &Mesh, tolerance: f64) -> Coincident {
     }
     drop_neighbours(mesh, &mut pairs);
 
-    // The smallest node of each place stands for it.
+    // The node with the smallest index represents each position.
     let mut place: HashMap<u32, u32> = HashMap::new();
     for [a, b] in &pairs {
         let root = place.get(a).copied().unwrap_or(*a);
@@ -54,7 +54,7 @@ pub fn coincident(mesh: &Mesh, tolerance: f64) -> Coincident {
     Coincident { pairs, faces: count.values().filter(|faces| **faces > 1).sum() }
 }
 
-/// Pairs of `nodes` nearer than `tolerance`, through a grid of cells that are larger than it.
+/// Pairs of `nodes` closer than `tolerance`, found with a grid of larger cells.
 fn near_pairs(mesh: &Mesh, nodes: &[u32], tolerance: f64) -> Vec<[u32; 2]> {
     let size = 8.0 * tolerance.max(f64::MIN_POSITIVE);
     let cell = |p: &Vector3<f64>| [p.x, p.y, p.z].map(|x| (x / size).floor() as i64);
@@ -78,7 +78,7 @@ fn near_pairs(mesh: &Mesh, nodes: &[u32], tolerance: f64) -> Vec<[u32; 2]> {
     pairs
 }
 
-/// Leaves out pairs that are in one element: a small element, not a crack.
+/// Removes pairs within one element: a small element, not a crack.
 fn drop_neighbours(mesh: &Mesh, pairs: &mut Vec<[u32; 2]>) {
     let mut is_paired = vec![false; mesh.nodes.len()];
     pairs.iter().flatten().for_each(|node| is_paired[*node as usize] = true);
@@ -92,19 +92,18 @@ fn drop_neighbours(mesh: &Mesh, pairs: &mut Vec<[u32; 2]>) {
 }
 
 impl Mesh {
-    /// The distance below which its nodes coincide where nothing is said: [`COINCIDENT`] of the
-    /// diagonal, m.
+    /// Default distance below which its nodes coincide: [`COINCIDENT`] times the diagonal, m.
     pub fn coincidence(&self) -> f64 {
         COINCIDENT * self.bounding_box().map_or(0.0, |(low, high)| (high - low).norm())
     }
 
-    /// Makes one node of every group of nodes in one place; returns how many went.
+    /// Merges each group of coincident nodes into one; returns the number of removed nodes.
     ///
     /// * `tolerance`: m.
     pub fn merge_coincident(&mut self, tolerance: f64) -> usize {
         let pairs = coincident(self, tolerance).pairs;
         let mut target: Vec<u32> = (0..self.nodes.len() as u32).collect();
-        // Ascending, so that a chain of near nodes ends in its first.
+        // Ascending, so that a chain of close nodes is merged into its first.
         for [a, b] in &pairs {
             target[*b as usize] = target[*a as usize].min(target[*b as usize]);
         }
@@ -125,8 +124,8 @@ mod tests {
     use crate::mesh::{ElementKind, connected_parts};
     use crate::test_mesh::cube;
 
-    /// A bar of two cells along x whose cells do not share the nodes between them where `split`
-    /// says so.
+    /// Bar of two cells along x; the cells do not share the nodes between them where `split` is
+    /// true.
     fn bar(split: impl Fn(&Vector3<f64>) -> bool) -> Mesh {
         let mut mesh = cube(ElementKind::Hex8, [2, 3, 3], false, |u| u);
         let twin: HashMap<u32, u32> = (0..mesh.nodes.len() as u32)
@@ -153,7 +152,7 @@ mod tests {
         let mut cracked = bar(|p| p.y > 0.4);
         assert_eq!(connected_parts(&cracked).len(), 1);
         let found = coincident(&cracked, 1e-9);
-        // Two rows of four nodes; the three faces between them, from both sides.
+        // Two rows of four nodes; three faces between them, counted from both sides.
         assert_eq!((found.pairs.len(), found.faces), (8, 6));
         assert_eq!(cracked.merge_coincident(1e-9), 8);
         assert_eq!(coincident(&cracked, 1e-9), Coincident::default());
@@ -163,7 +162,7 @@ mod tests {
     #[test]
     fn a_whole_mesh_has_no_coincident_nodes_however_large_the_tolerance() {
         assert_eq!(coincident(&bar(|_| false), 1e-9), Coincident::default());
-        // Nodes of one element are neighbours, not twins.
+        // Nodes of one element are neighbours, not duplicates.
         let one = cube(ElementKind::Hex8, [1, 1, 1], false, |u| u);
         assert_eq!(coincident(&one, 10.0), Coincident::default());
     }

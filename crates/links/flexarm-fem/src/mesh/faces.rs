@@ -2,7 +2,7 @@
 
 use super::ElementKind;
 
-/// Number of corner nodes; they come first.
+/// Number of corner nodes, which come first.
 pub fn corner_count(kind: ElementKind) -> usize {
     match kind {
         ElementKind::Beam2 => 2,
@@ -45,7 +45,7 @@ pub const fn is_second_order(kind: ElementKind) -> bool {
     matches!(kind, ElementKind::Tet10 | ElementKind::Hex20 | ElementKind::Wedge15)
 }
 
-/// All nodes of each face: its corners, then the mid-side nodes of the edges between them in turn.
+/// All nodes of each face: its corners, then the mid-side nodes of its edges in order.
 pub fn face_nodes(kind: ElementKind) -> Vec<Vec<u8>> {
     let middle = |a: u8, b: u8| {
         let edge = edges(kind).iter().position(|edge| *edge == [a, b] || *edge == [b, a]);

@@ -1,8 +1,8 @@
-//! Do elements of different kinds fit together where they meet?
+//! Finds elements of different kinds that do not fit together at their common faces.
 //!
-//! A mesh with several kinds can share corner nodes and still gape: a first-order face on a
-//! second-order one leaves the mid-side nodes hanging, a quadrilateral on two triangles its
-//! diagonal. Both give a softer link without any other sign.
+//! A mesh with several kinds can share corner nodes and still be incompatible: a first-order face
+//! on a second-order one leaves the mid-side nodes hanging, a quadrilateral on two triangles its
+//! diagonal. Both make the link softer without any other symptom.
 
 use std::collections::HashMap;
 
@@ -10,18 +10,19 @@ use super::Mesh;
 use super::faces::is_second_order;
 use super::surface::{FaceRef, for_each_face, skin};
 
-/// Two elements that meet in a face without fitting.
+/// Two elements with a common face that do not fit.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Misfit {
-    /// Kind and number in the file of the one.
+    /// Kind and number in the file of the first element.
     pub first: String,
-    /// Of the other.
+    /// Kind and number in the file of the second element.
     pub second: String,
-    /// Why they do not fit.
+    /// Reason why they do not fit.
     pub why: &'static str,
 }
 
-/// Pairs of elements that share corners of a face but not the face; none where all are of one kind.
+/// Finds pairs of elements that share corners of a face but not the face; none if all are of one
+/// kind.
 pub fn misfits(mesh: &Mesh) -> Vec<Misfit> {
     let solids: Vec<_> = mesh.blocks.iter().filter(|block| !block.kind.is_beam() && !block.is_empty()).collect();
     if solids.windows(2).all(|pair| pair[0].kind == pair[1].kind) {
@@ -33,7 +34,7 @@ pub fn misfits(mesh: &Mesh) -> Vec<Misfit> {
     };
     let mut found = Vec::new();
 
-    // The same corners, but another order.
+    // Same corners, different order.
     let mut first: HashMap<[u32; 4], FaceRef> = HashMap::new();
     for_each_face(&mesh.blocks, |face, key| match first.entry(key) {
         std::collections::hash_map::Entry::Vacant(place) => {
@@ -84,7 +85,7 @@ mod tests {
     use crate::test_mesh::cube;
 
     fn beside(kind: ElementKind, other: ElementKind) -> Mesh {
-        // Two unit cubes with a common face, nodes merged by place.
+        // Two unit cubes with a common face, nodes merged by position.
         let left = cube(kind, [1, 1, 1], false, |u| u);
         let right = cube(other, [1, 1, 1], false, |u| u + nalgebra::Vector3::x());
         let mut mesh = left.clone();
@@ -119,7 +120,7 @@ mod tests {
     #[test]
     fn elements_that_fit_are_let_through() {
         assert!(misfits(&beside(ElementKind::Hex8, ElementKind::Hex8)).is_empty());
-        // Wedges stand with their quadrilaterals to the left.
+        // The wedges have their quadrilaterals on the left.
         assert!(misfits(&beside(ElementKind::Hex20, ElementKind::Wedge15)).is_empty());
     }
 }

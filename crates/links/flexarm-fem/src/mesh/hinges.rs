@@ -1,4 +1,4 @@
-//! Bodies of a mesh that hang together in a point or along an edge only: hinges, which carry no
+//! Bodies of a mesh that are connected only in a point or along an edge: hinges, which carry no
 //! moment.
 
 use std::collections::{BTreeMap, HashMap};
@@ -11,33 +11,34 @@ use super::surface::{FaceRef, for_each_face};
 /// Two bodies that share nodes but no face.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Hinge {
-    /// Elements of the larger body, and the number in the file of one of them.
+    /// Number of elements of the larger body, and the number in the file of one of them.
     pub first: (usize, u64),
-    /// Of the smaller one.
+    /// The same for the smaller body.
     pub second: (usize, u64),
-    /// Numbers in the file of the nodes that they share, ascending.
+    /// Numbers in the file of the shared nodes, ascending.
     pub node_ids: Vec<u64>,
-    /// How these lie: `"one point"`, `"on a line"`, or `"in several places"`.
+    /// Arrangement of these nodes: `"one point"`, `"on a line"`, or `"in several places"`.
     pub shape: &'static str,
     /// The two bodies, as indices from the largest.
     pub bodies: [usize; 2],
 }
 
-/// Bodies that are connected through faces, and where they touch each other in less.
+/// Bodies connected through faces, and the hinges between them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Bodies {
-    /// Body of each node, as an index from the largest; the larger one where it is in two,
-    /// `usize::MAX` without an element.
+    /// Body of each node, as an index from the largest; the larger body for a shared node,
+    /// `usize::MAX` for a node without element.
     pub of_node: Vec<usize>,
-    /// Elements of each body.
+    /// Number of elements of each body.
     pub elements: Vec<usize>,
-    /// Where two bodies share nodes.
+    /// Pairs of bodies that share nodes but no face.
     pub hinges: Vec<Hinge>,
 }
 
-/// Finds the bodies of solids that share faces, and the hinges between them.
+/// Finds bodies of solids connected through faces, and the hinges between them.
 ///
-/// A beam joins all that it touches: whether its ends hold there is a matter of the stiffness.
+/// A beam joins everything that it touches; whether its ends are restrained there is checked by the
+/// stiffness.
 pub fn bodies(mesh: &Mesh) -> Bodies {
     let offsets: Vec<usize> =
         mesh.blocks.iter().scan(0, |sum, b| Some(std::mem::replace(sum, *sum + b.len()))).collect();
@@ -70,7 +71,7 @@ pub fn bodies(mesh: &Mesh) -> Bodies {
         }
     }
 
-    // Bodies by size; the smaller number of an element decides between equals.
+    // Bodies by size; of equal ones the one with the smaller element index first.
     let roots: Vec<usize> = (0..count).map(|element| root(&mut parent, element)).collect();
     let mut sizes: BTreeMap<usize, usize> = BTreeMap::new();
     roots.iter().for_each(|root| *sizes.entry(*root).or_insert(0) += 1);
@@ -142,7 +143,7 @@ fn root(parent: &mut [usize], mut element: usize) -> usize {
     element
 }
 
-/// Towards the smaller index, so that the answer depends on the mesh alone.
+/// Joins towards the smaller index, so that the result depends only on the mesh.
 fn join(parent: &mut [usize], a: usize, b: usize) {
     let (a, b) = (root(parent, a), root(parent, b));
     parent[a.max(b)] = a.min(b);
@@ -164,7 +165,7 @@ mod tests {
 
     #[test]
     fn bodies_that_touch_along_an_edge_or_in_a_point_are_named_with_their_nodes() {
-        // Of 2 x 2 x 1 cells two diagonal ones stay: they share an edge of two nodes.
+        // Keep two diagonal cells of 2 x 2 x 1: they share an edge of two nodes.
         let mut mesh = cube(ElementKind::Hex8, [2, 2, 1], false, |u| u);
         let keep = |mesh: &mut Mesh, wanted: &[usize]| {
             let block = &mut mesh.blocks[0];

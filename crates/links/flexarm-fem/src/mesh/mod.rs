@@ -1,12 +1,11 @@
-//! A finite element mesh in SI units: nodes, blocks of elements, regions with materials, named
-//! sets.
+//! Finite element mesh in SI units: nodes, blocks of elements, regions with materials, named sets.
 //!
-//! Plain data. Readers (`flexarm-fe-io`) fill it and convert node order and units on the way; here
-//! positions are in m, in the frame of the mesh, and the nodes of an element are in the order of
-//! CalculiX and Abaqus ([`ElementKind`]).
+//! Plain data. Readers (`flexarm-fe-io`) fill it and convert node order and units; here positions
+//! are in m, in the mesh frame, and the nodes of an element are in the order of CalculiX and Abaqus
+//! ([`ElementKind`]).
 //!
-//! Start at [`Mesh`], [`select`](select()) for the nodes of an interface, [`skin`] for a
-//! picture, [`connected_parts`] to see whether the mesh is in one piece.
+//! Start at [`Mesh`], [`select`](select()) for the nodes of an interface, [`skin`] for a picture,
+//! [`connected_parts`] to check that the mesh is in one piece.
 //!
 //! Not here: shape functions and matrices of elements ([`crate::element`]), ties, reduction.
 
@@ -42,7 +41,7 @@ pub use select::{SelectError, select};
 pub use selector::{NodeSelector, SelectorSyntaxError};
 pub use surface::{Skin, SkinFace, skin};
 
-/// Kind of an element. Node order: that of CalculiX and Abaqus, named in the variants.
+/// Kind of an element; node order of CalculiX and Abaqus, given for each variant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ElementKind {
     /// Four-node tetrahedron, C3D4.
@@ -57,12 +56,12 @@ pub enum ElementKind {
     Wedge6,
     /// Fifteen-node wedge, C3D15: corners, edges 12 23 31, edges 45 56 64, edges 14 25 36.
     Wedge15,
-    /// Two-node beam with six DoF per node, B31 or B33: straight, section of the region.
+    /// Two-node beam with six DoF per node, B31 or B33: straight, with the section of its region.
     Beam2,
 }
 
 impl ElementKind {
-    /// Nodes of one element.
+    /// Number of nodes of one element.
     pub const fn nodes(self) -> usize {
         match self {
             Self::Beam2 => 2,
@@ -75,7 +74,7 @@ impl ElementKind {
         }
     }
 
-    /// The name in messages and files.
+    /// Name in messages and files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Tet4 => "TET4",
@@ -88,7 +87,7 @@ impl ElementKind {
         }
     }
 
-    /// Whether its nodes have rotations.
+    /// Whether the nodes have rotational DoF.
     pub const fn is_beam(self) -> bool {
         matches!(self, Self::Beam2)
     }
@@ -101,29 +100,29 @@ pub struct BeamProperties {
     pub section: Section,
     /// Direction of the section's y axis, mesh axes; need not be unit or orthogonal to the beam.
     pub y_axis: Vector3<f64>,
-    /// With or without shear deformation.
+    /// Beam theory, with or without shear deformation.
     pub theory: BeamTheory,
 }
 
-/// A named part of the mesh with one material: a physical volume, or an element set with a section.
+/// Named part of the mesh with one material: a physical volume, or an element set with a section.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Region {
     /// Name in the file.
     pub name: String,
     /// Material, if the file has one; SI.
     pub material: Option<Material>,
-    /// Section of its beam elements, if it has any and the file says so.
+    /// Section of the beam elements, if the file gives one.
     pub beam: Option<BeamProperties>,
 }
 
 /// Elements of one kind in one region.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ElementBlock {
-    /// Their kind.
+    /// Kind of the elements.
     pub kind: ElementKind,
     /// Index into [`Mesh::regions`].
     pub region: usize,
-    /// Numbers in the file, for messages.
+    /// Numbers of the elements in the file, for messages.
     pub ids: Vec<u64>,
     /// Node indices, `kind.nodes()` per element.
     pub connectivity: Vec<u32>,
@@ -135,22 +134,22 @@ impl ElementBlock {
         self.ids.len()
     }
 
-    /// Whether there are none.
+    /// Whether the block has no elements.
     pub fn is_empty(&self) -> bool {
         self.ids.is_empty()
     }
 
-    /// Node indices of each element in turn.
+    /// Iterates over the node indices of each element.
     pub fn elements(&self) -> impl ExactSizeIterator<Item = &[u32]> {
         self.connectivity.chunks_exact(self.kind.nodes())
     }
 }
 
-/// A mesh, SI, checked by its reader: every index in range, every set sorted and without
-/// repetition.
+/// Mesh in SI units, checked by its reader: every index is in range, every set is sorted and
+/// without duplicates.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Mesh {
-    /// Positions, m.
+    /// Positions of the nodes, m.
     pub nodes: Vec<Vector3<f64>>,
     /// Numbers of the nodes in the file, for messages.
     pub node_ids: Vec<u64>,
@@ -168,7 +167,7 @@ impl Mesh {
         self.blocks.iter().map(ElementBlock::len).sum()
     }
 
-    /// The mesh with its nodes moved from frame M into frame L; sections of beams turn with it.
+    /// Transforms the nodes from frame M into frame L; the axes of beam sections rotate with them.
     pub fn transformed(mut self, X_LM: &flexarm_spatial::Pose) -> Self {
         for p in &mut self.nodes {
             *p = X_LM.rotation * *p + X_LM.translation.vector;
@@ -179,7 +178,7 @@ impl Mesh {
         self
     }
 
-    /// Which nodes belong to an element.
+    /// Flags the nodes that belong to an element.
     pub fn used_nodes(&self) -> Vec<bool> {
         let mut used = vec![false; self.nodes.len()];
         for node in self.blocks.iter().flat_map(|block| &block.connectivity) {
@@ -188,7 +187,7 @@ impl Mesh {
         used
     }
 
-    /// Smallest box around the nodes that elements use, `(min, max)`, m; `None` without elements.
+    /// Bounding box of the nodes that elements use, `(min, max)`, m; `None` without elements.
     pub fn bounding_box(&self) -> Option<(Vector3<f64>, Vector3<f64>)> {
         let used = self.used_nodes();
         let mut points = self.nodes.iter().zip(&used).filter(|(_, used)| **used).map(|(p, _)| *p);

@@ -1,5 +1,4 @@
-//! Elements whose nodes run the other way round, as after a mirrored import: turned, if all of a
-//! kind are.
+//! Reverses elements with inverted node order, as after a mirrored import, if all of a kind are.
 
 use nalgebra::Vector3;
 
@@ -7,9 +6,10 @@ use super::faces::{corner_count, edges, is_second_order};
 use super::{ElementBlock, ElementKind, Mesh};
 use crate::element::jacobian_range;
 
-/// Turns the elements of every kind of which all are inside out; a sentence for each such kind.
+/// Reverses the elements of every kind of which all are inverted; returns a message for each such
+/// kind.
 ///
-/// Single inverted elements among sound ones stay: they are folded, not reversed.
+/// Single inverted elements among valid ones are left: they are folded, not reversed.
 pub fn turn_reversed(mesh: &mut Mesh) -> Vec<String> {
     let mut said = Vec::new();
     let mut kinds: Vec<ElementKind> =
@@ -23,7 +23,7 @@ pub fn turn_reversed(mesh: &mut Mesh) -> Vec<String> {
             x.iter_mut().zip(nodes).for_each(|(x, node)| *x = mesh.nodes[*node as usize]);
             jacobian_range(kind, &x).mean < 0.0
         };
-        // The first sound element ends the search.
+        // The first valid element ends the search.
         if !mesh.blocks.iter().filter(of_kind).all(|block| block.elements().all(&mut is_reversed)) {
             continue;
         }
@@ -47,7 +47,7 @@ pub fn turn_reversed(mesh: &mut Mesh) -> Vec<String> {
     said
 }
 
-/// The order of the nodes of an element seen in a mirror: which old node comes at each place.
+/// Old node index at each position of the mirrored element.
 fn reversed(kind: ElementKind) -> Vec<usize> {
     let corners: Vec<usize> = match kind {
         ElementKind::Tet4 | ElementKind::Tet10 => vec![1, 0, 2, 3],
@@ -71,7 +71,7 @@ mod tests {
     use super::*;
     use crate::test_mesh::{SOLIDS, cube, positions};
 
-    /// Truth: the volume of the cube, and the mesh as it was before the mirror, mirrored back.
+    /// Truth: the volume of the cube; nothing is reversed a second time.
     #[test]
     fn a_mirrored_mesh_has_positive_volume_again_after_turning() {
         for kind in SOLIDS {
@@ -85,7 +85,7 @@ mod tests {
                 mesh.blocks[0].elements().map(det).sum()
             };
             assert!((volume(&mirrored) / volume(&sound) - 1.0).abs() < 1e-12, "{kind:?}"); // measured 2e-16
-            // Mid-side nodes are in the middle of their edges still.
+            // Mid-side nodes are still in the middle of their edges.
             for nodes in mirrored.blocks[0].elements() {
                 let x = positions(&mirrored, nodes);
                 assert!(jacobian_range(kind, &x).min_node > 1.0 - 1e-12, "{kind:?}");

@@ -1,31 +1,31 @@
-//! Parts of a mesh that share no node: forgotten contacts, doubled nodes, stray elements.
+//! Parts of a mesh that share no node: missing contacts, duplicated nodes, stray elements.
 
 use super::Mesh;
 
-/// A connected part of a mesh.
+/// Connected part of a mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Part {
-    /// Number of its elements.
+    /// Number of elements.
     pub elements: usize,
-    /// Number of its nodes.
+    /// Number of nodes.
     pub nodes: usize,
-    /// One of its nodes, as an index.
+    /// Index of one of its nodes.
     pub node: u32,
-    /// The number of that node in the file.
+    /// Number of that node in the file.
     pub node_id: u64,
 }
 
-/// The connected parts of a mesh, largest first; one part in a mesh that holds together.
+/// Finds the connected parts of a mesh, largest first; a mesh in one piece has one part.
 ///
-/// Two elements are connected when they share a node. Nodes in no element do not count.
+/// Two elements are connected if they share a node. Nodes without an element are ignored.
 pub fn connected_parts(mesh: &Mesh) -> Vec<Part> {
-    // Union of the nodes of every element, then one part per root.
+    // Union of the nodes of every element (union-find), then one part per root.
     let mut parent: Vec<u32> = (0..mesh.nodes.len() as u32).collect();
     for nodes in mesh.blocks.iter().flat_map(|block| block.elements()) {
         let mut root = find(&mut parent, nodes[0]);
         for node in &nodes[1..] {
             let other = find(&mut parent, *node);
-            // Towards the smaller index, so that the answer depends on the mesh alone.
+            // Joins towards the smaller index, so that the result depends only on the mesh.
             parent[root.max(other) as usize] = root.min(other);
             root = root.min(other);
         }
@@ -50,7 +50,7 @@ pub fn connected_parts(mesh: &Mesh) -> Vec<Part> {
     parts
 }
 
-/// Root of a node; halves the way to it.
+/// Root of a node, with path halving.
 fn find(parent: &mut [u32], mut node: u32) -> u32 {
     while parent[node as usize] != node {
         let above = parent[parent[node as usize] as usize];

@@ -1,20 +1,20 @@
-//! The same mesh with a node in the middle of every edge: first order to second.
+//! Converts a first-order mesh to second order by adding a node in the middle of every edge.
 
 use std::collections::{HashMap, HashSet};
 
 use super::faces::{corner_count, edges, is_second_order};
 use super::{ElementBlock, ElementKind, Mesh};
 
-/// A mesh of second order, and what its new nodes stand between.
+/// Second-order mesh, and the edges of its new nodes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Promoted {
-    /// The nodes of the first mesh in their order, then the new ones; straight edges.
+    /// Mesh with the original nodes in their order, then the new ones; edges are straight.
     pub mesh: Mesh,
-    /// The two ends of the edge of each new node.
+    /// End nodes of the edge of each new node.
     pub ends: Vec<[u32; 2]>,
 }
 
-/// The kind with mid-side nodes, of a solid without.
+/// Returns the second-order counterpart of a first-order solid.
 pub fn second_order(kind: ElementKind) -> Option<ElementKind> {
     match kind {
         ElementKind::Tet4 => Some(ElementKind::Tet10),
@@ -36,11 +36,11 @@ pub fn added_nodes(mesh: &Mesh) -> usize {
     known.len()
 }
 
-/// Puts a node in the middle of every edge of the solids of first order; elements of second order
-/// and beams stay.
+/// Adds a node in the middle of every edge of the first-order solids; second-order elements and
+/// beams are unchanged.
 pub fn promoted(mesh: &Mesh) -> Promoted {
     let mut this = Promoted { mesh: mesh.clone(), ends: Vec::new() };
-    // Edges of elements of second order have their node already.
+    // Edges of second-order elements already have their node.
     let mut middle: HashMap<[u32; 2], u32> = HashMap::new();
     for block in mesh.blocks.iter().filter(|block| is_second_order(block.kind)) {
         for nodes in block.elements() {
@@ -82,7 +82,7 @@ mod tests {
     use super::*;
     use crate::test_mesh::cube;
 
-    /// Truth: the mesh that is made in second order from the start.
+    /// Truth: the mesh generated in second order.
     #[test]
     fn a_promoted_mesh_has_the_elements_of_one_made_in_second_order() {
         for kind in [ElementKind::Tet4, ElementKind::Hex8, ElementKind::Wedge6] {

@@ -1,31 +1,31 @@
-//! The nodes of an interface against the faces of the surface: what is missing, inside, or on no
-//! face.
+//! Checks the nodes of an interface against the faces of the surface: missing nodes, nodes inside
+//! the body, nodes on no face.
 
 use std::collections::{BTreeSet, HashMap};
 
 use super::Mesh;
 use super::surface::{Skin, skin};
 
-/// How a set of nodes lies on the surface of a mesh.
+/// Relation of a node set to the surface of a mesh.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Seat {
-    /// Faces of the surface with all their corners in the set.
+    /// Number of surface faces with all their corners in the set.
     pub faces: usize,
-    /// Patches that these faces make, each connected through its nodes.
+    /// Number of patches of these faces, each connected through its nodes.
     pub patches: usize,
-    /// Mid-side nodes of these faces, in the set or not.
+    /// Number of mid-side nodes of these faces, in the set or not.
     pub middles: usize,
-    /// Those of them that are not in the set, ascending.
+    /// Mid-side nodes of these faces that are not in the set, ascending.
     pub missing: Vec<u32>,
-    /// Nodes of the set on the surface, but on none of these faces.
+    /// Number of nodes of the set that are on the surface, but on none of these faces.
     pub stray: usize,
-    /// Nodes of the set inside the body.
+    /// Number of nodes of the set inside the body.
     pub inside: usize,
-    /// Nodes of the set on beams.
+    /// Number of nodes of the set on beams.
     pub on_beams: usize,
 }
 
-/// The surface of a mesh, made once for all its interfaces.
+/// Surface of a mesh, computed once for all interfaces.
 #[derive(Debug)]
 pub struct Surface {
     skin: Skin,
@@ -34,7 +34,7 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// Finds it.
+    /// Computes the surface of `mesh`.
     pub fn new(mesh: &Mesh) -> Self {
         let skin = skin(mesh);
         let mark = |nodes: &[u32]| {
@@ -47,7 +47,7 @@ impl Surface {
         Self { is_outside: mark(&skin.nodes()), is_beam: mark(&beams), skin }
     }
 
-    /// Looks at the nodes of an interface, sorted.
+    /// Checks the nodes of an interface, which must be sorted.
     pub fn seat(&self, nodes: &[u32]) -> Seat {
         let is_in = |node: &u32| nodes.binary_search(node).is_ok();
         let mut seat = Seat::default();
@@ -75,7 +75,7 @@ impl Surface {
     }
 }
 
-/// Groups of nodes that faces join.
+/// Groups of nodes that are connected by faces.
 #[derive(Default)]
 struct Patches {
     parent: HashMap<u32, u32>,

@@ -1,4 +1,4 @@
-//! The nodes of an interface: by set, by place, or both.
+//! Selection of the nodes of an interface: by set, by position, or both.
 
 use std::cmp::Reverse;
 
@@ -8,74 +8,74 @@ use super::selector::NodeSelector;
 use super::surface::skin;
 use super::{ElementKind, Mesh};
 
-/// Tolerance of places where none is given, as a part of the diagonal of the mesh.
+/// Default tolerance of positions, relative to the diagonal of the mesh.
 const TOLERANCE: f64 = 1e-6;
 
-/// Why no nodes were chosen. Lengths in the unit of the mesh file.
+/// Errors of node selection. Lengths in the unit of the mesh file.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SelectError {
-    /// No node set of that name.
+    /// There is no node set of that name.
     #[error("there is no node set {name:?}; {known}")]
     UnknownSet {
-        /// The name that was asked for.
+        /// Requested name.
         name: String,
-        /// The sets there are, nearest spelling first, with their sizes.
+        /// Existing sets with their sizes, closest spelling first.
         known: String,
     },
-    /// Several sets differ from the name only in capitals.
+    /// Several sets match the name except for upper and lower case.
     #[error("{name:?} may be any of {candidates:?}: give the exact spelling")]
     Ambiguous {
-        /// The name that was asked for.
+        /// Requested name.
         name: String,
-        /// The sets that match.
+        /// Matching sets.
         candidates: Vec<String>,
     },
-    /// A direction of no length, a negative radius, a box inside out, a number that is not finite.
+    /// A direction is zero, a radius negative, a box inverted, or a number not finite.
     #[error("{selector}: {what} is {found}, allowed is {allowed}")]
     Geometry {
-        /// The term.
+        /// Term with the error.
         selector: String,
-        /// Its part at fault.
+        /// Part of the term.
         what: &'static str,
-        /// The value of it.
+        /// Value of that part.
         found: String,
-        /// What it may be.
+        /// Allowed values.
         allowed: &'static str,
     },
-    /// No node of the skin is near enough.
+    /// No node of the skin is close enough.
     #[error(
         "{selector} chooses no node: the nearest node of the surface is {nearest_id} at {distance:.3e}, allowed are \
          {tolerance:.3e} (units of the mesh file); are place and unit right, or is a larger tolerance needed?"
     )]
     NothingNear {
-        /// The term.
+        /// Term without nodes.
         selector: String,
         /// Number of the nearest node.
         nearest_id: u64,
-        /// How far it is away.
+        /// Distance of the nearest node.
         distance: f64,
-        /// How far it may be away.
+        /// Maximum allowed distance.
         tolerance: f64,
     },
-    /// Every term chooses nodes, but no node is in all of them, or none is in an element.
+    /// Every term selects nodes, but no node is in all of them, or none belongs to an element.
     #[error("{selector} chooses no node: {reason}")]
     Nothing {
         /// The selector.
         selector: String,
-        /// Why.
+        /// Reason.
         reason: String,
     },
 }
 
-/// Chooses nodes; returns their indices, sorted, at least one.
+/// Selects nodes; returns their indices, sorted, at least one.
 ///
-/// Only nodes of elements are chosen, and by place only nodes of the skin and of beams.
+/// Only nodes of elements are selected; by position only nodes of the skin and of beams.
 ///
-/// * `length_unit`: the unit of the lengths in `selector`, m: that of the mesh file.
+/// * `length_unit`: unit of the lengths in `selector`, m: that of the mesh file.
 ///
 /// # Errors
-/// [`SelectError`]; an empty choice is one.
+/// [`SelectError`], also if the selection is empty.
 pub fn select(mesh: &Mesh, selector: &NodeSelector, length_unit: f64) -> Result<Vec<u32>, SelectError> {
     let used = mesh.used_nodes();
     let diagonal = mesh.bounding_box().map_or(0.0, |(low, high)| (high - low).norm());
@@ -86,11 +86,11 @@ pub fn select(mesh: &Mesh, selector: &NodeSelector, length_unit: f64) -> Result<
 struct Chooser<'a> {
     mesh: &'a Mesh,
     used: Vec<bool>,
-    /// m.
+    /// Unit of lengths, m.
     unit: f64,
-    /// Where none is given, m.
+    /// Default tolerance, m.
     tolerance: f64,
-    /// Nodes of skin and beams, when they are needed.
+    /// Nodes of skin and beams, computed on first use.
     outside: Option<Vec<u32>>,
 }
 
@@ -140,7 +140,7 @@ impl Chooser<'_> {
         })
     }
 
-    /// A node set: exact name, else the only one that differs in capitals alone.
+    /// Looks up a node set by exact name, or by the only name that differs in upper and lower case.
     fn set(&self, name: &str) -> Result<Vec<u32>, SelectError> {
         let sets = &self.mesh.node_sets;
         let nodes = match sets.get(name) {
@@ -166,7 +166,7 @@ impl Chooser<'_> {
         Ok(nodes)
     }
 
-    /// The sets there are, for a message about one that is not there.
+    /// Lists the existing sets for an error message.
     fn known(&self, name: &str) -> String {
         const MOST: usize = 12;
         let lower = name.to_lowercase();
@@ -188,7 +188,7 @@ impl Chooser<'_> {
         format!("{remark}known are {}{rest}", shown.join(", "))
     }
 
-    /// Nodes of the skin whose distance from a place is small.
+    /// Nodes of the skin and of beams within `tolerance` of a place.
     fn near(
         &mut self,
         selector: &NodeSelector,

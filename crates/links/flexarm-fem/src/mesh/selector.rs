@@ -1,4 +1,4 @@
-//! How a user says which nodes: as text on the command line, as text or table in a file.
+//! Node selection by the user: as text on the command line, as text or table in a file.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,11 +6,11 @@ use std::str::FromStr;
 use serde::de::{MapAccess, Visitor, value::MapAccessDeserializer};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// A choice of nodes. Lengths are in the unit of the mesh file.
+/// Node selection. Lengths are in the unit of the mesh file.
 ///
 /// Text form, as on a command line: `interface_A`, `"a name with & or ("`, `plane(0,0,0; 1,0,0)`,
 /// `cylinder(0,0,0; 0,1,0; 0.05)`, `box(0,0,0; 1,1,1)`. A tolerance may follow as the last argument
-/// of a plane, a cylinder or a box. Terms joined by `&` must all hold.
+/// of a plane, a cylinder or a box. Nodes must satisfy all terms joined by `&`.
 ///
 /// In TOML either that text or a table: `{ plane = { point = [0, 0, 0], normal = [1, 0, 0] } }`.
 ///
@@ -23,54 +23,54 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(remote = "Self", rename_all = "snake_case", deny_unknown_fields)]
 pub enum NodeSelector {
-    /// A node set of the mesh by its name.
+    /// Node set of the mesh, by name.
     Set(String),
     /// Nodes of the skin in a plane.
     Plane {
-        /// A point of the plane.
+        /// Point in the plane.
         point: [f64; 3],
-        /// Its normal, of any length.
+        /// Normal of the plane, of any length.
         normal: [f64; 3],
-        /// Largest distance from it; 1e-6 of the diagonal of the mesh where it is not given.
+        /// Maximum distance from the plane; 1e-6 of the diagonal of the mesh if not given.
         #[serde(default)]
         tolerance: Option<f64>,
     },
-    /// Nodes of the skin on the wall of an endless cylinder, such as a bore.
+    /// Nodes of the skin on the wall of an infinite cylinder, such as a bore.
     Cylinder {
-        /// A point of the axis.
+        /// Point on the axis.
         point: [f64; 3],
         /// Direction of the axis, of any length.
         axis: [f64; 3],
         /// Radius of the wall.
         radius: f64,
-        /// Largest distance from it; as for a plane.
+        /// Maximum distance from the wall; default as for a plane.
         #[serde(default)]
         tolerance: Option<f64>,
     },
-    /// Nodes of the skin in a box along the axes, its faces included.
+    /// Nodes of the skin in an axis-aligned box, including its faces.
     Box {
-        /// Smallest coordinates.
+        /// Minimum coordinates.
         min: [f64; 3],
-        /// Largest coordinates.
+        /// Maximum coordinates.
         max: [f64; 3],
-        /// How far outside a node may lie; as for a plane.
+        /// Maximum distance of a node outside the box; default as for a plane.
         #[serde(default)]
         tolerance: Option<f64>,
     },
-    /// Nodes that all of these choose.
+    /// Nodes that all of these selectors select.
     All(Vec<NodeSelector>),
 }
 
-/// Text that is not a choice of nodes.
+/// Syntax error in a node selection.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("node selection {text:?}: found {found}; expected {expected}")]
 #[non_exhaustive]
 pub struct SelectorSyntaxError {
-    /// The term at fault.
+    /// Term with the error.
     pub text: String,
-    /// What is wrong with it.
+    /// Text found.
     pub found: String,
-    /// What may stand there.
+    /// Text expected.
     pub expected: &'static str,
 }
 
@@ -81,7 +81,7 @@ impl FromStr for NodeSelector {
     type Err = SelectorSyntaxError;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        // `&` between terms, not inside quotes.
+        // Split at `&`, except inside quotes.
         let mut quoted = false;
         let terms = text.split(|c| {
             quoted ^= c == '"';
@@ -95,7 +95,7 @@ impl FromStr for NodeSelector {
     }
 }
 
-/// One term of the text form.
+/// Parses one term of the text form.
 fn term(text: &str) -> Result<NodeSelector, SelectorSyntaxError> {
     let text = text.trim();
     let wrong = |found: String, expected| SelectorSyntaxError { text: text.to_owned(), found, expected };
@@ -109,7 +109,7 @@ fn term(text: &str) -> Result<NodeSelector, SelectorSyntaxError> {
     let Some((shape, rest)) = text.split_once('(') else { return Ok(NodeSelector::Set(text.to_owned())) };
     let inside = rest.strip_suffix(')').ok_or_else(|| wrong("no ) at the end".into(), FORMS))?;
 
-    // Groups of numbers between `;`, one or three each.
+    // Groups of one or three numbers, separated by `;`.
     let mut groups = Vec::new();
     for group in inside.split(';') {
         let numbers = group.split(',').map(|word| match word.trim().parse::<f64>() {
@@ -141,7 +141,7 @@ fn term(text: &str) -> Result<NodeSelector, SelectorSyntaxError> {
         ),
         _ => return Err(wrong(format!("{shape:?}"), FORMS)),
     };
-    // As many groups as are used: nothing may be left over.
+    // All groups must be used.
     let used = match &built {
         Some(NodeSelector::Cylinder { tolerance, .. }) => 3 + usize::from(tolerance.is_some()),
         Some(NodeSelector::Plane { tolerance, .. } | NodeSelector::Box { tolerance, .. }) => {
@@ -153,7 +153,7 @@ fn term(text: &str) -> Result<NodeSelector, SelectorSyntaxError> {
 }
 
 impl fmt::Display for NodeSelector {
-    /// The text form.
+    /// Writes the text form.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let triple = |[x, y, z]: &[f64; 3]| format!("{x},{y},{z}");
         let last = |tolerance: &Option<f64>| tolerance.map(|tolerance| format!("; {tolerance}")).unwrap_or_default();
@@ -182,14 +182,14 @@ impl fmt::Display for NodeSelector {
 }
 
 impl Serialize for NodeSelector {
-    /// As text.
+    /// Serialises as text.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)
     }
 }
 
 impl<'de> Deserialize<'de> for NodeSelector {
-    /// From text or from a table.
+    /// Deserialises from text or from a table.
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct TextOrTable;
         impl<'de> Visitor<'de> for TextOrTable {
@@ -204,7 +204,7 @@ impl<'de> Deserialize<'de> for NodeSelector {
             }
 
             fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<NodeSelector, A::Error> {
-                // The derived form, under the name of the type.
+                // Derived implementation (serde remote), an inherent function of the type.
                 NodeSelector::deserialize(MapAccessDeserializer::new(map))
             }
         }

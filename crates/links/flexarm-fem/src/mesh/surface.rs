@@ -1,4 +1,4 @@
-//! The skin of a mesh: faces of volume elements that belong to one element only.
+//! Skin of a mesh: faces of volume elements that belong to one element only.
 
 use super::faces::{face_corners, face_nodes};
 use super::{ElementBlock, Mesh};
@@ -6,9 +6,9 @@ use super::{ElementBlock, Mesh};
 /// Faces of the skin.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Skin {
-    /// Nodes of all faces, one after the other.
+    /// Nodes of all faces, face by face.
     nodes: Vec<u32>,
-    /// Per face: where its nodes end, number of corners, block and element in the block.
+    /// Per face: end of its nodes, number of corners, block, and element in the block.
     faces: Vec<Entry>,
 }
 
@@ -23,23 +23,24 @@ struct Entry {
 /// One face of the skin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SkinFace<'a> {
-    /// Index into [`Mesh::blocks`] of the element it belongs to.
+    /// Index of the block of its element in [`Mesh::blocks`].
     pub block: usize,
-    /// The element within its block.
+    /// Index of the element within its block.
     pub element: usize,
     /// Three or four corners, counter-clockwise seen from outside.
     pub corners: &'a [u32],
-    /// As many mid-side nodes, the first between the first two corners; empty in first order.
+    /// Mid-side nodes, one per corner, the first between the first two corners; empty in first
+    /// order.
     pub midsides: &'a [u32],
 }
 
 /// Finds the skin of the volume elements.
 ///
-/// "Outside" holds for elements of positive volume. Faces that lie on each other without having
-/// the same corners, as between unconnected parts, are both skin. Time grows linearly: about a
-/// second for six million tetrahedra.
+/// "Outside" is valid for elements of positive volume. Coincident faces without common corners, as
+/// between unconnected parts, both belong to the skin. Time is linear: about a second for six
+/// million tetrahedra.
 pub fn skin(mesh: &Mesh) -> Skin {
-    // Faces are sorted into buckets by their smallest corner; partners meet in a bucket.
+    // Faces are sorted into buckets by their smallest corner; both copies of a face share a bucket.
     let mut starts = vec![0_usize; mesh.nodes.len() + 1];
     for_each_face(&mesh.blocks, |_, key| starts[key[0] as usize + 1] += 1);
     for k in 1..starts.len() {
@@ -54,7 +55,7 @@ pub fn skin(mesh: &Mesh) -> Skin {
         *slot += 1;
     });
 
-    // What has no equal in its bucket is skin.
+    // Faces without a copy in their bucket form the skin.
     let mut outer = Vec::new();
     for bucket in starts.windows(2).map(|ends| ends[0]..ends[1]) {
         let bucket = &mut bucketed[bucket];
@@ -77,7 +78,7 @@ pub fn skin(mesh: &Mesh) -> Skin {
     skin
 }
 
-/// A face by block, element and number.
+/// Face by block, element and face number.
 #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct FaceRef {
     pub(super) block: u32,
@@ -85,7 +86,7 @@ pub(super) struct FaceRef {
     face: u8,
 }
 
-/// Calls with every face and its sorted corners; the fourth of a triangle is the largest number.
+/// Calls `call` with every face and its sorted corners; the fourth of a triangle is `u32::MAX`.
 pub(super) fn for_each_face(blocks: &[ElementBlock], mut call: impl FnMut(FaceRef, [u32; 4])) {
     for (b, block) in (0..).zip(blocks) {
         let faces = face_corners(block.kind);
@@ -108,12 +109,12 @@ impl Skin {
         self.faces.len()
     }
 
-    /// Whether there are none, as in a mesh of beams.
+    /// Whether there are no faces, as in a mesh of beams.
     pub fn is_empty(&self) -> bool {
         self.faces.is_empty()
     }
 
-    /// The faces in the order of their elements.
+    /// Iterates over the faces in the order of their elements.
     pub fn faces(&self) -> impl Iterator<Item = SkinFace<'_>> {
         self.faces.iter().scan(0, |start, entry| {
             let nodes = &self.nodes[*start..entry.end];
@@ -123,7 +124,7 @@ impl Skin {
         })
     }
 
-    /// Nodes on the skin, mid-side ones included, sorted.
+    /// Nodes on the skin including mid-side nodes, sorted.
     pub fn nodes(&self) -> Vec<u32> {
         let mut nodes = self.nodes.clone();
         nodes.sort_unstable();
@@ -131,13 +132,13 @@ impl Skin {
         nodes
     }
 
-    /// The skin as plane triangles with all its nodes, for pictures: 1, 2, 4 or 6 per face.
+    /// Skin as plane triangles with all its nodes, for pictures: 1, 2, 4 or 6 per face.
     pub fn triangles(&self) -> Vec<[u32; 3]> {
         let mut triangles = Vec::with_capacity(4 * self.len());
         for face in self.faces() {
             let (c, m) = (face.corners, face.midsides);
             let inner = if m.is_empty() { c } else { m };
-            // In second order: a triangle at each corner, then what the mid-side nodes enclose.
+            // In second order: a triangle at each corner, then the polygon of the mid-side nodes.
             for k in 0..m.len() {
                 triangles.push([c[k], m[k], m[(k + m.len() - 1) % m.len()]]);
             }

@@ -1,4 +1,4 @@
-//! The modal link of a uniform beam, by beam elements between its two ends.
+//! Modal link of a uniform beam, computed with beam elements between its two ends.
 
 use super::{ModalLink, ModalOptions, ModalSource};
 use crate::beam_link::BeamLink;
@@ -12,11 +12,11 @@ use crate::section::{Bar, Section};
 use crate::sparse::ModesWanted;
 
 impl BeamLink {
-    /// The modal link of this beam: static shapes of the distal interface and `modes`
+    /// Computes the modal link of this beam: static shapes of the distal interface and `modes`
     /// fixed-interface modes.
     ///
-    /// The rigid arms from the beam to the joints weigh nothing. Elements: 24, or two per mode
-    /// where that is more.
+    /// The rigid arms from the beam to the joints are massless. The number of elements is 24, or
+    /// two per mode if that is more.
     ///
     /// ```
     /// use flexarm_fem::{BeamLink, Material, Section};
@@ -36,7 +36,7 @@ impl BeamLink {
         self.modal_with(&ModalOptions { modes, elements: options.elements.max(2 * modes), ..options })
     }
 
-    /// The modal link of this beam, with choices.
+    /// Computes the modal link of this beam with options.
     ///
     /// # Errors
     /// [`FemError::OutOfRange`] for impossible dimensions, materials and masses, too few elements
@@ -76,7 +76,7 @@ impl BeamLink {
             .map_err(|_| refused("fixed-interface modes"))?;
         let frame = |i: &Interface| InterfaceFrame { name: i.name.clone(), X_LI: i.X_LI, tie: Some(i.tie) };
         let mut superelement = condensation.superelement(interfaces.iter().map(frame).collect(), &fixed_modes);
-        // The same stiffness in closed form has the last digits that condensing loses.
+        // The closed-form stiffness keeps the last digits that condensation loses.
         let K12 = reduced.matrix12();
         superelement.K.view_mut((0, 0), (12, 12)).copy_from(&K12);
 
@@ -92,7 +92,7 @@ impl BeamLink {
         Ok(source.modal_link(&self.name, options.geometric))
     }
 
-    /// The beam as `m` elements of equal length, link axes.
+    /// Mesh of the beam with `m` elements of equal length, link axes.
     fn elements(&self, m: usize) -> Result<Mesh, FemError> {
         let bar = self.section.bar(&self.material)?;
         let factor = match self.mass {
@@ -116,7 +116,7 @@ impl BeamLink {
                 ids: (1..=m as u64).collect(),
                 connectivity: (0..m as u32).flat_map(|k| [k, k + 1]).collect(),
             }],
-            // The section brings its own stiffness and mass: the material is not used.
+            // The section has its own stiffness and mass, so the material is not used.
             regions: vec![Region {
                 name: self.name.clone(),
                 material: Some(Material::STEEL),

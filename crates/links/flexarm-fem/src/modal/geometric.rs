@@ -1,39 +1,40 @@
-//! Stiffness by initial stress: what a static stress adds to the stiffness of the shapes.
+//! Geometric stiffness: contribution of a static stress to the stiffness of the shapes.
 //!
 //! ```text
 //! G_kl = ∫ Σ_c ∇φ_k,cᵀ σ ∇φ_l,c dV        σ: stress under one unit load, A held
 //! ```
-//! Solids: at the quadrature points, the stress from the gradients of the displacement (for HEX8
-//! without the incompatible modes, so its bending stress is as good as that of a brick without
-//! them).
+//! Solids: evaluated at the quadrature points, with the stress from the displacement gradients (for
+//! HEX8 without the incompatible modes, so its bending stress is only as accurate as that of a
+//! brick without them).
 //!
 //! Beams: the same with plane sections, from the internal forces N, V, T, M of each element, which
-//! are linear between its ends (exact forces at the ends, so only the bow of N and M within an
+//! are linear between its ends (end forces are exact; only the curvature of N and M within an
 //! element is lost):
 //!
 //! ```text
 //! N (v'v' + w'w' + r² θx'θx') - M_y v'θx' - M_z w'θx' + V_y w'θx - V_z v'θx + T/2 (θy'θz - θz'θy)
 //! r² = polar/mass
 //! ```
-//! Terms in the axial strain u' are left out: they are as small as the strain of the load. Bending
-//! moments are then pairs of axial forces that keep their direction; at both ends of each element
-//! they are made to turn half with the section (semi-tangential, as torques are already), without
+//! Terms in the axial strain u' are omitted: they are as small as the strain of the load. Bending
+//! moments are then pairs of axial forces of fixed direction. At both ends of each element they are
+//! corrected to rotate by half the section rotation (semi-tangential, as torques already are);
+//! without this, frames with bends are wrong:
 //! which bent frames come out wrong:
 //!
 //! ```text
 //! G_θθ = -M_z (θx θy + θy θx)/2 + M_y (θx θz + θz θx)/2         at each end, M on the element
 //! ```
-//! Straight through a node these cancel.
+//! These terms cancel at a node between collinear elements.
 //!
-//! Rigid ties turn with their interface. The second-order part of that motion, `θ × (θ × r)/2` of
+//! Rigid ties rotate with their interface. The second-order part of that motion, `θ × (θ × r)/2` at
 //! each tied node, does work with the forces f of the tie:
 //!
 //! ```text
 //! G_θθ = Σ (r fᵀ + f rᵀ)/2 - (r·f) 1
 //! ```
-//! so an interface ahead of the elastic part buckles as it should, and torques on it are
-//! semi-tangential: their virtual work is that on the rotation vector. Distributing ties have no
-//! such part here.
+//! so an interface beyond the elastic part buckles correctly, and torques on it are
+//! semi-tangential: their virtual work is that on the rotation vector. For distributing ties this
+//! term is not included.
 //!
 //! Source: Przemieniecki (1968), chapter 15; Argyris, Dunne & Scharpf (1978), *Comput. Meth. Appl.
 //! Mech. Eng.* 14, for moments; Wallrapp & Schwertassek (1991), *Int. J. Numer. Meth. Eng.* 32, for
@@ -48,17 +49,18 @@ use crate::element::{Purpose, for_each_point};
 use crate::reduction::Tie;
 use crate::sparse::add_product;
 
-/// Accelerations of the floating frame: three linear, three angular, six centrifugal.
+/// Number of acceleration fields of the floating frame: three linear, three angular, six
+/// centrifugal.
 const FIELDS: usize = 12;
 
-/// A field of acceleration that is linear in the place: `a = A s + b`.
+/// Acceleration field that is linear in position: `a = A s + b`.
 struct Field {
     A: Matrix3<f64>,
     b: Vector3<f64>,
 }
 
 impl Field {
-    /// Number `i` of [`FIELDS`].
+    /// Unit field `i` of [`FIELDS`].
     fn unit(i: usize) -> Self {
         let e = |a: usize| Vector3::ith(a, 1.0);
         let (zero, none) = (Matrix3::zeros(), Vector3::zeros());
@@ -79,7 +81,7 @@ impl Field {
     }
 }
 
-/// The stiffness by initial stress of all unit loads.
+/// Computes the geometric stiffness of all unit loads.
 ///
 /// * `shapes`: displacements of all DoF per coordinate.
 pub(super) fn geometric_stiffness(
@@ -91,8 +93,7 @@ pub(super) fn geometric_stiffness(
     let wrenches = source.condensation.unit_load_shapes();
     let loads = FIELDS + wrenches.ncols();
 
-    // Forces of inertia on the DoF; those on beams also element by element, for the internal
-    // forces.
+    // Inertia forces on the DoF; those of beams also per element, for the internal forces.
     let mut F = solid_forces(source);
     let beam_forces: Vec<_> = beams.iter().map(element_forces).collect();
     for (beam, forces) in beams.iter().zip(&beam_forces) {
@@ -132,7 +133,7 @@ pub(super) fn geometric_stiffness(
     }
 }
 
-/// `-∫ Nᵀ a dm` over the solids: a linear field is its own interpolation.
+/// `-∫ Nᵀ a dm` over the solids; the nodal interpolation of a linear field is exact.
 fn solid_forces(source: &ModalSource<'_>) -> DMatrix<f64> {
     let model = source.condensation.model();
     let fields: [Field; FIELDS] = std::array::from_fn(Field::unit);
@@ -176,13 +177,13 @@ fn add_solids(source: &ModalSource<'_>, U: &DMatrix<f64>, shapes: &DMatrix<f64>,
         for nodes in block.elements() {
             let x: Vec<_> = nodes.iter().map(|node| source.mesh.nodes[*node as usize]).collect();
             let dof = |i: usize| model.dofs.of(nodes[i] as usize).start;
-            // Gradients of all displacements at a point: [c, b] = du_c/dx_b.
+            // Displacement gradients at a point: [c, b] = du_c/dx_b.
             let gradient = |A: &DMatrix<f64>, column: usize, dN: &[Vector3<f64>]| {
                 dN.iter()
                     .enumerate()
                     .fold(Matrix3::zeros(), |sum, (i, d)| sum + A.fixed_view::<3, 1>(dof(i), column) * d.transpose())
             };
-            // Nine rows per point: gradients times weight and stress on one side, gradients on the
+            // Nine rows per point: gradients times weighted stress on one side, gradients on the
             // other.
             let (mut right, mut stresses) = (Vec::new(), Vec::new());
             let visited = for_each_point(block.kind, &x, Purpose::Stiffness, source.quadrature, |point| {
@@ -195,7 +196,7 @@ fn add_solids(source: &ModalSource<'_>, U: &DMatrix<f64>, shapes: &DMatrix<f64>,
                     stresses.push(stress * point.weight);
                 }
             });
-            // Inverted elements were refused when the model was assembled.
+            // Inverted elements were rejected when the model was assembled.
             if visited.is_err() {
                 continue;
             }
@@ -226,9 +227,10 @@ fn add_beam(
 ) {
     let bar = element.beam.bar();
     let l = element.beam.length();
-    // Radius of gyration of the section about its axis, squared.
+    // Squared polar radius of gyration of the section.
     let r2 = (bar.rotary_y + bar.rotary_z) / bar.mass_per_length;
     let K = element.beam.stiffness12();
+    // End forces of the element: K u minus the inertia forces on it.
     let mut ends = K * element.gather(U);
     let mut inertia = ends.columns_mut(0, FIELDS);
     inertia -= forces;
@@ -237,6 +239,7 @@ fn add_beam(
     for (j, G) in G.iter_mut().enumerate() {
         for at in [3, 9] {
             let (M_y, M_z) = (ends[(at + 1, j)], ends[(at + 2, j)]);
+            // Semi-tangential correction of the end moments.
             let turning = Matrix3::new(0.0, -M_z, M_y, -M_z, 0.0, 0.0, M_y, 0.0, 0.0) * 0.5;
             let theta = local.fixed_rows::<3>(at);
             *G += theta.transpose() * turning * theta;
@@ -251,6 +254,7 @@ fn add_beam(
         let [tx, ty, tz] = [0, 1, 2].map(|a| theta.row(a).transpose());
         let [dtx, dty, dtz] = [0, 1, 2].map(|a| dtheta.row(a).transpose());
         let both = |a: &nalgebra::DVector<f64>, b: &nalgebra::DVector<f64>| a * b.transpose() + b * a.transpose();
+        // Quadratic forms of each internal force (module documentation).
         let of_N = &dv * dv.transpose() + &dw * dw.transpose() + &dtx * dtx.transpose() * r2;
         let of_Vy = both(&dw, &tx);
         let of_Vz = -both(&dv, &tx);
@@ -259,7 +263,7 @@ fn add_beam(
         let of_Mz = -both(&dw, &dtx);
         for (j, G) in G.iter_mut().enumerate() {
             let end = ends.column(j);
-            // On the face that looks along +x.
+            // Internal force on the section facing +x.
             let inside = |i: usize| w * (-(1.0 - xi) * end[i] + xi * end[6 + i]);
             let parts = [&of_N, &of_Vy, &of_Vz, &of_T, &of_My, &of_Mz];
             for (i, part) in parts.into_iter().enumerate() {
@@ -269,9 +273,9 @@ fn add_beam(
     }
 }
 
-/// Forces of rigid ties times the second-order part of their motion.
+/// Adds the forces of rigid ties times the second-order part of their motion.
 ///
-/// * `on_mesh`: `K U - F`, the forces that ties exert on the mesh.
+/// * `on_mesh`: `K U - F`, the forces of the ties on the mesh.
 fn add_ties(source: &ModalSource<'_>, on_mesh: &DMatrix<f64>, G: &mut [DMatrix<f64>]) {
     let model = source.condensation.model();
     for (i, interface) in source.interfaces.iter().enumerate().skip(1).filter(|(_, i)| i.tie == Tie::Rigid) {

@@ -1,4 +1,4 @@
-//! The modal link: shapes and mass integrals of a link that deforms in a floating frame.
+//! Modal link: shapes and mass integrals of a link that deforms in a floating frame.
 //!
 //! The floating frame is the link frame L, tangent at interface A: A does not deform. A point at s
 //! moves to
@@ -6,17 +6,17 @@
 //! ```text
 //! s + u,   u(s) = Σ φ_k(s) η_k
 //! ```
-//! Coordinates of a reduced link: six per interface but A (displacement and rotation of that
-//! interface, link axes, with the static shapes that belong to them), then the amplitudes of its
-//! fixed-interface modes. All that the equations of motion need are integrals over the undeformed
-//! body, and none of them depends on η:
+//! Coordinates of a reduced link: six per interface other than A (displacement and rotation of that
+//! interface, link axes, with their static shapes), then the amplitudes of the fixed-interface
+//! modes. The equations of motion only need integrals over the undeformed body, none of which
+//! depends on η:
 //!
 //! ```text
 //! C_t,k = ∫ φ_k dm    C_r,k = ∫ s × φ_k dm    P_k = ∫ s φ_kᵀ dm    N_kl = ∫ φ_k φ_lᵀ dm    M_kl = ∫ φ_k·φ_l dm
 //! C_r,k = axial(P_k),   M_kl = tr N_kl,   N_lk = N_klᵀ           axial(A)_x = A_yz - A_zy, ...
 //! ```
-//! These three identities hold for solids and for beams, whose sections stay plane: there
-//! `φ = u + θ × r` at the place r in the section, so the rotary inertia is in all of them.
+//! These three identities hold for solids and for beams with plane sections: there `φ = u + θ × r`
+//! at the position r in the section, so all of them include the rotary inertia.
 //!
 //! | from | with |
 //! | --- | --- |
@@ -46,24 +46,24 @@ use crate::rigid_part::RigidPart;
 
 pub use source::ModalSource;
 
-/// An interface of a modal link and how it follows the coordinates.
+/// Interface of a modal link, with its shape matrix.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModalInterface {
     /// Name.
     pub name: String,
-    /// Frame in the link frame, undeformed.
+    /// Undeformed pose in the link frame.
     pub X_LI: Pose,
     /// Displacement of Io, then rotation of I, link axes, per coordinate; (m; rad).
     pub Phi: Matrix6xX<f64>,
 }
 
-/// Stiffness by initial stress, per unit of the load that makes the stress.
+/// Geometric stiffness, per unit of the load that causes the stress.
 ///
 /// ```text
 /// K_eff = K + Σ load_i G_i
 /// ```
-/// The stress is the static one of the link with A held under that load alone. Loads are dead:
-/// forces keep their direction in link axes.
+/// The stress is the static stress of the link with A clamped under that load only. Loads are dead
+/// loads: forces keep their direction in link axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GeometricStiffness {
     /// Per m/s² of the acceleration of Lo minus gravity, along x, y, z of the link: load `-a dm`.
@@ -71,7 +71,7 @@ pub struct GeometricStiffness {
     /// Per rad/s² of angular acceleration about x, y, z: load `-α × s dm`.
     pub angular: [DMatrix<f64>; 3],
     /// Per rad²/s² of `ω_i ω_j` in the order xx yy zz xy xz yz: load `-ω × (ω × s) dm`. `ω_x ω_y`
-    /// counts once.
+    /// is counted once.
     pub centrifugal: [DMatrix<f64>; 6],
     /// Per unit wrench on each interface, forces (1/N) before torques (1/(N·m)), at Io, link axes.
     pub interface: Vec<[DMatrix<f64>; 6]>,
@@ -80,12 +80,13 @@ pub struct GeometricStiffness {
 /// Shapes and inertia invariants of a link in its floating frame: link axes, tangent at interface
 /// A. SI units.
 ///
-/// The builders check; afterwards it is plain data. All integrals are over the undeformed link.
+/// The builders check the data; afterwards it is plain data. All integrals are over the undeformed
+/// link.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModalLink {
     /// Name of the link.
     pub name: String,
-    /// Every interface but A; the distal one, B, first.
+    /// Interfaces other than A; the distal one, B, first.
     pub interfaces: Vec<ModalInterface>,
     /// Mass, kg.
     pub mass: f64,
@@ -105,22 +106,22 @@ pub struct ModalLink {
     pub M: DMatrix<f64>,
     /// Stiffness over the coordinates, exactly symmetric.
     pub K: DMatrix<f64>,
-    /// Stiffness by initial stress, if it was asked for.
+    /// Geometric stiffness, if requested.
     pub geometric: Option<GeometricStiffness>,
-    /// What each coordinate is, in words.
+    /// Description of each coordinate.
     pub labels: Vec<String>,
-    /// Interface A, which does not deform.
+    /// Pose of interface A, which does not deform.
     pub X_LA: Pose,
 }
 
-/// What to make of a uniform beam.
+/// Options for the modal link of a uniform beam.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ModalOptions {
-    /// Fixed-interface modes.
+    /// Number of fixed-interface modes.
     pub modes: usize,
-    /// Beam elements in between.
+    /// Number of beam elements.
     pub elements: usize,
-    /// Whether to find the stiffness by initial stress.
+    /// Whether to compute the geometric stiffness.
     pub geometric: bool,
 }
 
@@ -136,20 +137,20 @@ impl ModalLink {
         self.K.nrows()
     }
 
-    /// Rigid body of the undeformed link: mass, centre of mass, inertia about it.
+    /// Rigid body of the undeformed link: mass, centre of mass, inertia about the centre of mass.
     pub fn rigid(&self) -> RigidPart {
         let com = self.first_moment / self.mass;
         let c = com.cross_matrix();
         RigidPart { mass: self.mass, com, inertia: self.inertia + c * c * self.mass }
     }
 
-    /// Whether the integrals of second order are known; a condensed mass does not tell them.
+    /// Whether the second-order integrals are known; they do not follow from a condensed mass.
     pub fn has_second_order(&self) -> bool {
         self.coordinates() == 0 || self.N.iter().any(|N| N.amax() > 0.0)
     }
 
-    /// Mass over the motion of the link frame (linear, angular, link axes, at Lo), then the
-    /// coordinates; undeformed.
+    /// Mass matrix over the motion of the link frame (linear, angular, link axes, at Lo) and the
+    /// coordinates, undeformed.
     ///
     /// ```text
     /// [ m 1     -[mc]x   C_t ]
@@ -172,7 +173,7 @@ impl ModalLink {
         M
     }
 
-    /// Natural frequencies with A held, Hz, ascending.
+    /// Natural frequencies with A clamped, Hz, ascending.
     pub fn held_frequencies_hz(&self) -> Vec<f64> {
         transform::eigenpairs(&self.K, &self.M)
             .map_or_else(Vec::new, |pairs| pairs.omega.iter().map(|omega| omega / std::f64::consts::TAU).collect())
@@ -187,10 +188,10 @@ impl ModalLink {
         generalised_frequencies(&K, &self.mass_matrix())
     }
 
-    /// Compliance of an interface with A held, at Io, link axes.
+    /// Compliance of an interface with A clamped, at Io, link axes.
     ///
     /// # Errors
-    /// [`FemError::OutOfRange`] for an interface that there is not, [`FemError::Missing`] for a
+    /// [`FemError::OutOfRange`] if the interface does not exist, [`FemError::Missing`] for a
     /// singular stiffness.
     pub fn compliance(&self, interface: usize) -> Result<nalgebra::Matrix6<f64>, FemError> {
         let Some(at) = self.interfaces.get(interface) else {
@@ -207,14 +208,14 @@ impl ModalLink {
         Ok(flexarm_spatial::symmetric_part(&nalgebra::Matrix6::from_column_slice(C.as_slice())))
     }
 
-    /// Whether mass and stiffness are positive definite, so that all frequencies with A held are
-    /// real and above zero.
+    /// Whether mass and stiffness are positive definite, so that all frequencies with A clamped are
+    /// real and positive.
     pub fn is_positive_definite(&self) -> bool {
         transform::eigenpairs(&self.K, &self.M).is_some()
     }
 
-    /// Whether the coordinates are those of Craig and Bampton: six per interface, then modes that
-    /// move none of them.
+    /// Whether the coordinates are of Craig-Bampton type: six per interface, then modes that do not
+    /// move any interface.
     pub fn is_craig_bampton(&self) -> bool {
         let unit = |(i, interface): (usize, &ModalInterface)| {
             let expected = |r: usize, c: usize| if c == 6 * i + r { 1.0 } else { 0.0 };
@@ -227,12 +228,12 @@ impl ModalLink {
 /// Products of ω in the order of the second-order loads: xx yy zz xy xz yz.
 pub const PRODUCTS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
 
-/// The axial vector of the skew part, doubled: `∫ s × φ dm` of `∫ s φᵀ dm`.
+/// Twice the axial vector of the skew part: gives `∫ s × φ dm` for `∫ s φᵀ dm`.
 pub fn axial(A: &Matrix3<f64>) -> Vector3<f64> {
     Vector3::new(A[(1, 2)] - A[(2, 1)], A[(2, 0)] - A[(0, 2)], A[(0, 1)] - A[(1, 0)])
 }
 
-/// Inertia about the origin of second moments `∫ s sᵀ dm`.
+/// Inertia about the origin for second moments `∫ s sᵀ dm`.
 pub(crate) fn inertia_of(S: &Matrix3<f64>) -> Matrix3<f64> {
     let J = Matrix3::identity() * S.trace() - S;
     (J + J.transpose()) * 0.5

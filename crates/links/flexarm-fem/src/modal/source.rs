@@ -1,12 +1,13 @@
-//! From a mesh and its condensation to a modal link: the integrals themselves.
+//! Computes the integrals of a modal link from a mesh and its condensation.
 //!
 //! ```text
 //! solids   u = Σ N_i u_i, one shape function in x, y, z:   ∫ s_a φ_b dm = x_aᵀ M_s φ_b,   ∫ φ_a φ_b dm = φ_aᵀ M_s φ_b
 //! beams    φ = u + θ × r over the section, D = ∫ r rᵀ dm per length:
 //!          ∫ s φᵀ dm = ∫ (μ s uᵀ + D [θ]xᵀ) dx,   ∫ φ_k φ_lᵀ dm = ∫ (μ u_k u_lᵀ + [θ_k]x D [θ_l]xᵀ) dx
 //! ```
-//! M_s, x and φ are those of the FE model, so both are exact for its displacement field: solids
-//! whatever their shape, beams by four Gauss points for the cubic shapes of [`Beam`](crate::Beam).
+//! M_s, x and φ are those of the FE model, so both formulas are exact for its displacement field:
+//! for solids of any shape, and for beams with four Gauss points for the cubic shapes of
+//! [`Beam`](crate::Beam).
 
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Matrix6xX, Vector3};
 
@@ -20,38 +21,38 @@ use crate::model::{FeModel, beam_of};
 use crate::reduction::{Condensation, Interface, Superelement};
 use crate::sparse::{Modes, gram};
 
-/// A reduced mesh, of which the shapes are integrated.
+/// Reduced mesh whose shapes are integrated.
 #[derive(Debug, Clone, Copy)]
 pub struct ModalSource<'a> {
-    /// The mesh, link axes.
+    /// Mesh, link axes.
     pub mesh: &'a Mesh,
     /// Material of each region.
     pub materials: &'a [Material],
     /// Quadrature of the model.
     pub quadrature: Quadrature,
-    /// Its condensation to the interfaces.
+    /// Condensation of the model to the interfaces.
     pub condensation: &'a Condensation<'a>,
-    /// The interfaces, proximal first.
+    /// Interfaces, proximal first.
     pub interfaces: &'a [Interface],
     /// Fixed-interface modes to keep.
     pub fixed_modes: &'a Modes,
-    /// Stiffness and mass over interfaces and those modes.
+    /// Stiffness and mass over the interfaces and these modes.
     pub superelement: &'a Superelement,
 }
 
-/// A beam element of a mesh, with its place.
+/// Beam element of a mesh, with its position.
 pub(super) struct BeamElement {
     pub(super) beam: Beam,
-    /// Axes of the beam in link axes, by columns.
+    /// Beam axes in link axes, as columns.
     pub(super) R: Matrix3<f64>,
-    /// Its first node.
+    /// Position of its first node.
     pub(super) start: Vector3<f64>,
     /// DoF of both nodes.
     pub(super) dofs: [usize; 12],
 }
 
 impl BeamElement {
-    /// Rows of the element, beam axes.
+    /// Extracts the rows of the element, beam axes.
     pub(super) fn gather(&self, U: &DMatrix<f64>) -> DMatrix<f64> {
         let mut local = DMatrix::from_fn(12, U.ncols(), |i, j| U[(self.dofs[i], j)]);
         for mut column in local.column_iter_mut() {
@@ -63,19 +64,19 @@ impl BeamElement {
         local
     }
 
-    /// Second moments of mass of the section per length, link axes, kg·m.
+    /// Second mass moments of the section per length, link axes, kg·m.
     pub(super) fn section_moments(&self) -> Matrix3<f64> {
         let bar = self.beam.bar();
         self.R * Matrix3::from_diagonal(&Vector3::new(0.0, bar.rotary_z, bar.rotary_y)) * self.R.transpose()
     }
 
-    /// Place on the centre line, link axes, m.
+    /// Position on the centre line, link axes, m.
     pub(super) fn point(&self, xi: f64) -> Vector3<f64> {
         self.start + self.R.column(0) * (xi * self.beam.length())
     }
 }
 
-/// Sums over the body.
+/// Integrals over the body.
 struct Integrals {
     mass: f64,
     first: Vector3<f64>,
@@ -87,10 +88,10 @@ struct Integrals {
 }
 
 impl ModalSource<'_> {
-    /// The modal link.
+    /// Computes the modal link.
     ///
-    /// * `geometric`: whether to find the stiffness by initial stress: 12 more solves, and a pass
-    ///   over the elements.
+    /// * `geometric`: whether to compute the geometric stiffness: 12 more solves, and a pass over
+    ///   the elements.
     pub fn modal_link(&self, name: impl Into<String>, geometric: bool) -> ModalLink {
         let shapes = self.shapes();
         let n = shapes.ncols();
@@ -108,7 +109,7 @@ impl ModalSource<'_> {
             sums.add_beam(beam, &shapes);
         }
 
-        // The transposed half is a copy, so that the identity holds to the last bit.
+        // Copying the transposed half makes the identity hold bit for bit.
         for k in 0..n {
             sums.N[k * n + k] = (sums.N[k * n + k] + sums.N[k * n + k].transpose()) * 0.5;
             for l in 0..k {
@@ -138,7 +139,7 @@ impl ModalSource<'_> {
         }
     }
 
-    /// Displacements of all DoF per coordinate, A held.
+    /// Displacements of all DoF per coordinate, A clamped.
     pub(super) fn shapes(&self) -> DMatrix<f64> {
         let (T, modes) = (self.condensation.shapes(), &self.fixed_modes.shapes);
         let statics = T.ncols() - 6;
@@ -163,7 +164,7 @@ impl ModalSource<'_> {
         let mut beams = Vec::new();
         for block in self.mesh.blocks.iter().filter(|block| block.kind.is_beam()) {
             for nodes in block.elements() {
-                // Impossible beams were refused when the model was assembled.
+                // Invalid beams were rejected when the model was assembled.
                 let Ok((beam, Q)) = beam_of(self.mesh, block.region, nodes, &self.materials[block.region]) else {
                     continue;
                 };
@@ -180,19 +181,19 @@ impl ModalSource<'_> {
     }
 }
 
-/// The six coordinates that are those of interface `i`, counted without A.
+/// Unit columns of the six coordinates of interface `i`, counted without A.
 pub(super) fn unit_shapes(i: usize, n: usize) -> Matrix6xX<f64> {
     Matrix6xX::from_fn(n, |r, c| if c == 6 * i + r { 1.0 } else { 0.0 })
 }
 
-/// A text for each coordinate of a superelement with its first interface held.
+/// Descriptions of the coordinates of a superelement whose first interface is clamped.
 pub(super) fn labels(interfaces: &[&str], element: &Superelement) -> Vec<String> {
     let statics = interfaces.iter().flat_map(|name| COMPONENTS.iter().map(move |c| format!("{name} {c}")));
     let modes = element.fixed_frequencies_hz().into_iter().enumerate();
     statics.chain(modes.map(|(k, hz)| format!("fixed-interface mode {}: {hz:.3} Hz", k + 1))).collect()
 }
 
-/// Rows of one axis of the nodes that carry mass of solids.
+/// Rows of one axis of all nodes with DoF.
 fn rows_of(model: &FeModel, axis: usize, A: &DMatrix<f64>) -> DMatrix<f64> {
     let used: Vec<usize> = (0..model.nodes.len()).filter(|node| !model.dofs.of(*node).is_empty()).collect();
     DMatrix::from_fn(used.len(), A.ncols(), |i, j| A[(model.dofs.of(used[i]).start + axis, j)])
@@ -203,7 +204,7 @@ impl Integrals {
         let n = shapes.ncols();
         let M_shapes = model.M.solid_product(shapes);
 
-        // 1, x, y, z of the nodes, in the first component.
+        // 1, x, y, z of the nodes, stored in their first component.
         let mut places = DMatrix::zeros(model.size(), 4);
         for (node, p) in model.nodes.iter().enumerate().filter(|(node, _)| !model.dofs.of(*node).is_empty()) {
             let row = model.dofs.of(node).start;
@@ -215,7 +216,7 @@ impl Integrals {
         self.first += Vector3::from_fn(|a, _| moments[(0, 1 + a)]);
         self.second += moments.fixed_view::<3, 3>(1, 1);
 
-        // One axis at a time: copies of all would be most of the memory.
+        // One axis at a time: copies of all three would dominate the memory.
         for b in 0..3 {
             let M_axis = rows_of(model, b, &M_shapes);
             let with_places = gram(&X, &M_axis);

@@ -1,12 +1,13 @@
-//! What a condensed stiffness and mass know of the floating frame: everything of first order.
+//! First-order terms of a modal link from a condensed stiffness and mass.
 //!
-//! A rigid motion moves every interface and no mode, so with `R` its columns over the superelement
+//! A rigid motion moves every interface and has no modal part, so with `R` its columns over the
+//! superelement
 //!
 //! ```text
 //! [C_t; C_r] = Rᵀ M      mass, first moment, inertia = Rᵀ M R
 //! ```
-//! are exact. Where the mass sits inside is lost: of `P_k` only the skew part follows, from `C_r`;
-//! its symmetric part and all `N_kl`, the terms of second order, are unknown and set to zero.
+//! are exact. The distribution of mass inside is lost: only the skew part of `P_k` follows, from
+//! `C_r`; its symmetric part and all `N_kl`, the second-order terms, are unknown and set to zero.
 
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Vector3};
 
@@ -17,13 +18,13 @@ use crate::mesh_link::{condensed_body, rigid_motions_about};
 use crate::reduction::Superelement;
 
 impl ModalLink {
-    /// Modal link of a superelement without its mesh; second-order terms are unknown and zero.
+    /// Modal link of a superelement without a mesh; second-order terms are unknown and zero.
     ///
     /// * `element`: link axes, SI, proximal interface first.
     ///
     /// # Errors
-    /// [`FemError::Missing`] for a single interface or an unusable stiffness or mass; those of
-    /// [`RigidPart::check`](crate::RigidPart::check) for a mass that no body has.
+    /// [`FemError::Missing`] for a single interface or an unusable stiffness or mass; errors of
+    /// [`RigidPart::check`](crate::RigidPart::check) for a mass that is impossible for a body.
     pub fn from_superelement(name: impl Into<String>, element: &Superelement) -> Result<Self, FemError> {
         if element.interfaces.len() < 2 {
             return Err(FemError::Missing { what: "a second interface", help: "A is held, something must move" });

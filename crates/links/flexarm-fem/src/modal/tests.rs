@@ -1,5 +1,4 @@
-//! Integrals of meshes against brute force and the FE matrices, and stiffness by initial stress of
-//! solids.
+//! Integrals of meshes against brute force and the FE matrices, and geometric stiffness of solids.
 #![allow(clippy::print_stderr, reason = "tables of measured errors, shown with --nocapture")]
 
 use std::f64::consts::PI;
@@ -24,7 +23,7 @@ fn at(p: Vector3<f64>) -> Pose {
     Pose::from_parts(p.into(), Rotation3::identity())
 }
 
-/// A bar of the unit cube's cells, placed by `shape`, tied at both ends.
+/// Bar of the cells of the unit cube, placed by `shape`, tied at both ends.
 fn bar(
     kind: ElementKind,
     divisions: [usize; 3],
@@ -41,7 +40,7 @@ fn bar(
     (mesh, interfaces)
 }
 
-/// A bent, tapered, twisted bar: every coupling lives.
+/// Bent, tapered, twisted bar: all couplings are non-zero.
 fn casting(kind: ElementKind, tie: [Tie; 2]) -> (Mesh, Vec<Interface>) {
     let p = [Vector3::new(-0.01, 0.02, 0.0), Vector3::new(1.02, 0.14, -0.12)];
     bar(kind, [5, 2, 1], p, tie, |u| {
@@ -51,7 +50,7 @@ fn casting(kind: ElementKind, tie: [Tie; 2]) -> (Mesh, Vec<Interface>) {
     })
 }
 
-/// The modal link of a mesh, and the shapes over all DoF.
+/// Modal link of a mesh, and the shapes over all DoF.
 fn modal(mesh: &Mesh, interfaces: &[Interface], modes: usize) -> (ModalLink, FeModel, DMatrix<f64>) {
     modal_of(mesh, interfaces, Material::STEEL, modes, false)
 }
@@ -83,7 +82,7 @@ fn modal_of(
     (link, model, shapes)
 }
 
-/// Gauss points on [0, 1] with weights, by Newton's method on Legendre's polynomials.
+/// Gauss points on [0, 1] with weights, by Newton's method on Legendre polynomials.
 fn gauss(n: usize) -> Vec<(f64, f64)> {
     let point = |i: usize| {
         let mut x = (PI * (i as f64 + 0.75) / (n as f64 + 0.5)).cos();
@@ -102,7 +101,7 @@ fn gauss(n: usize) -> Vec<(f64, f64)> {
     (0..n).map(point).collect()
 }
 
-/// Many points in the reference element of `kind` with weights.
+/// Dense set of points in the reference element of `kind`, with weights.
 fn fine_points(kind: ElementKind) -> Vec<([f64; 3], f64)> {
     let line = gauss(8);
     let mut points = Vec::new();
@@ -126,10 +125,10 @@ fn fine_points(kind: ElementKind) -> Vec<([f64; 3], f64)> {
     points
 }
 
-/// What is summed over fine points.
+/// Sums over the dense points.
 type Sums = (f64, Vector3<f64>, Matrix3<f64>, Vec<Vector3<f64>>, Vec<Matrix3<f64>>, Vec<Matrix3<f64>>);
 
-/// Sums over fine points: mass, ∫ s, ∫ s sᵀ, ∫ φ, P, N.
+/// Sums over the dense points: mass, ∫ s, ∫ s sᵀ, ∫ φ, P, N.
 fn brute_force(mesh: &Mesh, model: &FeModel, shapes: &DMatrix<f64>) -> Sums {
     let n = shapes.ncols();
     let (mut mass, mut first, mut second) = (0.0, Vector3::zeros(), Matrix3::zeros());
@@ -168,7 +167,7 @@ fn brute_force(mesh: &Mesh, model: &FeModel, shapes: &DMatrix<f64>) -> Sums {
     (mass, first, second, C, P, N)
 }
 
-/// The largest of `count` measures; a NaN stays.
+/// Maximum of `count` measures; NaN if any of them is NaN.
 fn worst(count: usize, gap: impl Fn(usize) -> f64) -> f64 {
     (0..count).map(gap).fold(0.0, |worst: f64, x| if x <= worst { worst } else { x })
 }
@@ -229,7 +228,7 @@ fn integrals_fulfil_their_identities_with_the_mass_of_the_mesh() {
         let (link, model, shapes) = modal(&mesh, &interfaces, 3);
         check_identities(kind.name(), &link, &model, &shapes);
     }
-    // Beams: the rotary inertia of the sections is in all of the integrals.
+    // Beams: all integrals include the rotary inertia of the sections.
     for theory in [BeamTheory::EulerBernoulli, BeamTheory::Timoshenko] {
         let (mesh, interfaces) = frame(theory);
         let (link, model, shapes) = modal(&mesh, &interfaces, 5);
@@ -237,7 +236,7 @@ fn integrals_fulfil_their_identities_with_the_mass_of_the_mesh() {
     }
 }
 
-/// A bent frame of two unequal legs of thick beams.
+/// Frame with a bend: two unequal legs of thick beams.
 fn frame(theory: BeamTheory) -> (Mesh, Vec<Interface>) {
     use crate::mesh::{BeamProperties, ElementBlock, Region};
     let corner = Vector3::new(0.5, 0.1, -0.2);
@@ -274,8 +273,8 @@ fn frame(theory: BeamTheory) -> (Mesh, Vec<Interface>) {
     (mesh, interfaces)
 }
 
-/// Second algorithm: first-order terms of a condensed matrix by rigid motions alone; and what it
-/// cannot know is zero.
+/// Second algorithm: first-order terms of a condensed matrix by rigid motions only; unknown terms
+/// are zero.
 #[test]
 fn a_condensed_matrix_tells_everything_of_first_order() {
     let (mesh, interfaces) = casting(ElementKind::Hex20, [Tie::Rigid; 2]);
@@ -309,12 +308,12 @@ fn a_condensed_matrix_tells_everything_of_first_order() {
     assert_eq!((link.K.clone(), link.labels.clone()), (full.K.clone(), full.labels.clone()));
     assert!(!link.has_second_order() && full.has_second_order());
 
-    // The body is that of the mesh.
+    // The rigid body is that of the mesh.
     let gap = (full.rigid().inertia - reduction.whole.inertia).amax() / reduction.whole.inertia.amax();
     eprintln!("body: {gap:.1e}");
     assert!(gap < 1e-8, "{gap:.1e}"); // measured 7e-16
 
-    // The file keeps it all to the last bit, and refuses another stiffness.
+    // The file preserves everything bit for bit, and another stiffness is rejected.
     let text = crate::write_flex(&reduction.link);
     assert_eq!(crate::parse_flex(&text, "casting").unwrap(), reduction.link);
     let K = text.find("\nK = [").unwrap() + 6;
@@ -326,14 +325,14 @@ fn a_condensed_matrix_tells_everything_of_first_order() {
     assert_eq!(crate::parse_flex(&crate::write_flex(&orthogonal), "casting").unwrap(), orthogonal);
 }
 
-/// Truth: the shapes with rigid motions added, over fine points. Identity: frequencies of the free
-/// link stay, and with A held again all is as before.
+/// Truth: the shapes with rigid motions added, integrated over dense points. Identity: frequencies
+/// of the free link are unchanged, and clamping at A again restores the link.
 #[test]
 fn data_in_any_frame_give_the_link_held_at_a() {
     let (mesh, interfaces) = casting(ElementKind::Hex20, [Tie::Rigid; 2]);
     let (link, model, shapes) = modal(&mesh, &interfaces, 5);
     let n = link.coordinates();
-    // Motions in proportion to the shapes, so that all terms count.
+    // Motions proportional to the shapes, so that all terms matter.
     let size = |k: usize| (link.M[(k, k)] / link.mass).sqrt();
     let motion = Matrix6xX::from_fn(n, |r, k| 0.5 * size(k) * ((7 * r + 3 * k) as f64).sin());
     let adrift = link.clone().without_rigid_motion(&-&motion);
@@ -365,8 +364,8 @@ fn data_in_any_frame_give_the_link_held_at_a() {
     assert!(errors.iter().all(|e| *e < 1e-12), "{}", list.join(" ")); // measured 4e-16
 }
 
-/// Truth: the same mesh, tied and reduced in the other axes. With stiffness by initial stress, of
-/// which every load is a component.
+/// Truth: the same mesh, tied and reduced in the other axes. Includes the geometric stiffness,
+/// whose loads are all vector components.
 #[test]
 fn a_link_in_other_axes_is_that_of_the_turned_mesh() {
     let (mesh, interfaces) = casting(ElementKind::Hex20, [Tie::Rigid; 2]);
@@ -374,7 +373,7 @@ fn a_link_in_other_axes_is_that_of_the_turned_mesh() {
     let moved: Vec<Interface> = interfaces.iter().map(|i| Interface { X_LI: X * i.X_LI, ..i.clone() }).collect();
     let (link, ..) = modal_of(&mesh, &interfaces, Material::STEEL, 0, true);
     let (truth, ..) = modal_of(&mesh.transformed(&X), &moved, Material::STEEL, 0, true);
-    // Its coordinates are components along the other axes.
+    // The coordinates are components along the other axes.
     let mut V = DMatrix::zeros(6, 6);
     for at in [0, 3] {
         V.view_mut((at, at), (3, 3)).copy_from(&X.rotation.matrix().transpose());
@@ -404,7 +403,7 @@ fn a_link_in_other_axes_is_that_of_the_turned_mesh() {
     assert!(errors.iter().all(|e| *e < 1e-9) && stress < 1e-7, "{errors:?} {stress:.1e}");
 }
 
-/// A slender uniform beam of unit mass and length with bending stiffness one, stiff in stretch.
+/// Slender uniform beam of unit mass and length with bending stiffness one, stiff in stretch.
 fn slender(EI_z: f64) -> BeamLink {
     let r2 = 1e-8;
     let bar = Bar {
@@ -424,7 +423,7 @@ fn slender(EI_z: f64) -> BeamLink {
     }
 }
 
-/// The load at which `K + load G` loses its stiffness, the smallest positive one.
+/// Smallest positive load at which `K + load G` becomes singular.
 fn buckling_load(K: &DMatrix<f64>, G: &DMatrix<f64>) -> f64 {
     // K⁻¹ G x = -x/load: eigenvalues of L⁻¹ G L⁻ᵀ.
     let L = K.clone().cholesky().unwrap().l();
@@ -441,7 +440,7 @@ fn a_cantilever_buckles_at_eulers_load() {
     for a in [0.0, 0.5] {
         let beam = BeamLink { X_LB: Pose::translation(1.0 + a, 0.0, 0.0), ..slender(1.5) };
         let link = beam.modal_with(&ModalOptions { modes: 10, geometric: true, ..ModalOptions::default() }).unwrap();
-        // A pull of one newton stiffens, a push softens.
+        // A tension of one newton stiffens, a compression softens.
         let G = -&link.geometric.as_ref().unwrap().interface[0][0];
         let (mut low, mut high) = (1e-6_f64, PI / 2.0);
         for _ in 0..60 {
@@ -454,14 +453,14 @@ fn a_cantilever_buckles_at_eulers_load() {
     }
 }
 
-/// Truth: lateral buckling of a deep cantilever under a force at its end, 4.0126 sqrt(EI GJ)/l²
-/// [Timoshenko & Gere, eq. 6-21]; of one under a moment that turns half with its end, π sqrt(EI
-/// GJ)/l (semi-tangential).
+/// Truth: lateral buckling of a deep cantilever under an end force, 4.0126 sqrt(EI GJ)/l²
+/// [Timoshenko & Gere, eq. 6-21]; under an end moment that rotates by half the end rotation, π
+/// sqrt(EI GJ)/l (semi-tangential).
 #[test]
 fn a_deep_cantilever_tips_over_at_the_textbooks_load() {
     let mut beam = slender(1e5);
     if let Section::Given(bar) = &mut beam.section {
-        // Slow in torsion, so that its modes are among the lowest.
+        // Large torsional inertia, so that torsional modes are among the lowest.
         (bar.GJ, bar.rotary_y, bar.rotary_z) = (0.3, 1e-2, 1e-2);
     }
     let link = beam.modal_with(&ModalOptions { modes: 16, elements: 40, geometric: true }).unwrap();
@@ -474,19 +473,19 @@ fn a_deep_cantilever_tips_over_at_the_textbooks_load() {
 }
 
 /// Truth: Wright, Smith, Thresher & Wang (1982), *J. Appl. Mech.* 49, hub radius zero: first
-/// flapwise frequency over sqrt(EI/(μ l⁴)).
+/// flapwise frequency divided by sqrt(EI/(μ l⁴)).
 #[test]
 fn a_spinning_beam_stiffens_as_in_the_literature() {
     let link = slender(4.0).modal_with(&ModalOptions { modes: 12, geometric: true, elements: 24 }).unwrap();
     let G = link.geometric.as_ref().unwrap();
     for (spin, truth) in [(0.0, 3.5160), (1.0, 3.6816), (2.0, 4.1373), (4.0, 5.5850), (10.0, 11.2023)] {
-        // About z; flapping along z by EI_y. Centrifugal forces on the deformed link: ω² (e_z·φ)² -
-        // ω² φ·φ.
+        // Spin about z; flapping along z with EI_y. Centrifugal forces on the deformed link:
+        // ω² (e_z·φ)² - ω² φ·φ.
         let n = link.coordinates();
         let softening = DMatrix::from_fn(n, n, |k, l| link.N[k * n + l][(2, 2)] - link.N[k * n + l].trace());
         let K = &link.K + (&G.centrifugal[2] + softening) * (spin * spin);
         let pairs = transform::eigenpairs(&symmetric(&K), &link.M).unwrap();
-        // The mode that moves B along z.
+        // The mode with displacement of B along z.
         let flap = (0..n).find(|j| pairs.Phi[(2, *j)].abs() > 1e-6 * pairs.Phi.column(*j).amax()).unwrap();
         let error = pairs.omega[flap] / truth - 1.0;
         eprintln!("spin {spin}: {:.5} {error:.1e}", pairs.omega[flap]);
@@ -494,7 +493,8 @@ fn a_spinning_beam_stiffens_as_in_the_literature() {
     }
 }
 
-/// Second algorithm: the beam's own stiffening, for a slender bar of bricks; loads of all kinds.
+/// Second algorithm: the stiffening of the beam element, for a slender bar of bricks; all kinds of
+/// loads.
 #[test]
 fn solids_stiffen_as_the_beam_does() {
     let (width, height) = (0.0125, 0.0075);
@@ -502,7 +502,7 @@ fn solids_stiffen_as_the_beam_does() {
     let (mesh, interfaces) = bar(ElementKind::Hex20, [24, 2, 2], p, [Tie::Rigid; 2], |u| {
         Vector3::new(u.x, (u.y - 0.5) * width, (u.z - 0.5) * height)
     });
-    // No Poisson's ratio: rigid ties at the ends would hinder it.
+    // Poisson's ratio is zero, because rigid ties at the ends would restrain the contraction.
     let material = Material { nu: 0.0, ..Material::STEEL };
     let (solid, ..) = modal_of(&mesh, &interfaces, material, 8, true);
     let beam = BeamLink::new("bar", Section::Rectangle { width, height }, material, 1.0);
@@ -512,7 +512,7 @@ fn solids_stiffen_as_the_beam_does() {
         let inertia = G.acceleration.iter().chain(&G.angular).chain(&G.centrifugal);
         inertia.chain(G.interface.iter().flatten()).cloned().collect()
     };
-    // Static coordinates: those of the modes may have other signs.
+    // Static coordinates only; the modes may have other signs.
     let s = beam.K.diagonal().map(f64::sqrt);
     let scaled = |G: &DMatrix<f64>| DMatrix::from_fn(6, 6, |i, j| G[(i, j)] / (s[i] * s[j]));
     let sizes: Vec<f64> = all(of_beam).iter().map(|G| scaled(G).amax()).collect();
@@ -527,8 +527,8 @@ fn solids_stiffen_as_the_beam_does() {
         let size = sizes[group].iter().fold(0.0_f64, |a, b| a.max(*b));
         let error = (scaled(a) - scaled(&b)).amax() / size;
         eprintln!("load {j}: solid against beam {error:.1e}, own size {:.1e}", sizes[j] / size);
-        // measured 1.7e-2: tied ends cannot warp in torsion, which fades with the thickness;
-        // bending 9e-4
+        // measured 1.7e-2: tied ends cannot warp in torsion, an effect that decreases with the
+        // thickness; bending 9e-4
         assert!(error < 0.03, "{j}: {error:.1e}");
     }
     let buckling = |link: &ModalLink| buckling_load(&link.K, &-&link.geometric.as_ref().unwrap().interface[0][0]);

@@ -1,4 +1,4 @@
-//! Other coordinates for the same shapes: orthogonalised, or fewer.
+//! Changes of coordinates of a modal link: orthogonalised, truncated, other frame, other axes.
 
 use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Matrix6xX, Rotation3, Translation3, Vector3};
@@ -9,25 +9,24 @@ use crate::error::FemError;
 
 /// Modes with `ΦᵀKΦ = diag(ω²)`, `ΦᵀMΦ = 1`.
 pub(super) struct Eigenpairs {
-    /// rad/s, ascending.
+    /// Angular frequencies, rad/s, ascending.
     pub(super) omega: Vec<f64>,
     pub(super) Phi: DMatrix<f64>,
 }
 
-/// Rotations of pairs of columns until they are orthogonal to rounding; half as many always
-/// sufficed.
+/// Maximum number of sweeps over all pairs of columns; half as many have always been enough.
 const MOST_SWEEPS: usize = 60;
 
-/// All modes of a dense symmetric positive definite pencil; `None` where it is not.
+/// All modes of a dense symmetric positive definite pencil; `None` if it is not positive definite.
 ///
-/// One-sided Jacobi: columns that are orthonormal in K are turned in pairs until they are
-/// orthogonal in M too. Low frequencies keep their digits beside high ones, which eigenvalues of a
-/// matrix of ω² would not.
+/// One-sided Jacobi: columns that are orthonormal in K are rotated in pairs until they are
+/// orthogonal in M too. Low frequencies keep their digits next to high ones, unlike eigenvalues of
+/// a matrix of ω².
 ///
 /// Source: Demmel & Veselić (1992), *SIAM J. Matrix Anal. Appl.* 13.
 pub(super) fn eigenpairs(K: &DMatrix<f64>, M: &DMatrix<f64>) -> Option<Eigenpairs> {
     let n = K.nrows();
-    // W: columns orthonormal in K; H = Gᵀ W with M = G Gᵀ: their momenta.
+    // W: columns orthonormal in K; H = Gᵀ W with M = G Gᵀ, so that HᵀH = WᵀMW.
     let mut W = lower_factor(K)?.transpose().solve_upper_triangular(&DMatrix::identity(n, n))?;
     let G = lower_factor(M)?;
     let mut H = G.transpose() * &W;
@@ -45,6 +44,7 @@ pub(super) fn eigenpairs(K: &DMatrix<f64>, M: &DMatrix<f64>) -> Option<Eigenpair
                     continue;
                 }
                 worst = worst.max(c.abs() / size);
+                // Jacobi rotation that makes columns i and j of H orthogonal.
                 let zeta = (b - a) / (2.0 * c);
                 let t = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
                 let cos = 1.0 / t.hypot(1.0);
@@ -56,6 +56,7 @@ pub(super) fn eigenpairs(K: &DMatrix<f64>, M: &DMatrix<f64>) -> Option<Eigenpair
             break;
         }
     }
+    // ω = 1/|h|, in ascending order; Φ = W/|h| is M-orthonormal.
     let sizes: Vec<f64> = H.column_iter().map(|h| h.norm()).collect();
     if sizes.iter().any(|size| !(*size > 0.0)) {
         return None;
@@ -70,7 +71,7 @@ pub(super) fn eigenpairs(K: &DMatrix<f64>, M: &DMatrix<f64>) -> Option<Eigenpair
     Some(Eigenpairs { omega, Phi })
 }
 
-/// Cholesky factor of a matrix whose rows have different units.
+/// Cholesky factor of a matrix whose rows have different units, computed on a unit diagonal.
 fn lower_factor(A: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let scale = A.diagonal().map(f64::sqrt);
     if scale.iter().any(|s| !(*s > 0.0 && s.is_finite())) {
@@ -93,19 +94,19 @@ fn turn(A: &mut DMatrix<f64>, i: usize, j: usize, cos: f64, sin: f64) {
 }
 
 impl ModalLink {
-    /// The same link in its modes with A held: `K = diag(ω²)`, `M = 1`, ascending.
+    /// Transforms the link to its modes with A clamped: `K = diag(ω²)`, `M = 1`, ascending.
     ///
-    /// Stiffness and mass decouple, and the highest modes, which belong to no motion of the link,
-    /// can be left out; with some left out, interfaces yield less under static loads.
+    /// Stiffness and mass decouple, and the highest modes, which are not physical, can be dropped;
+    /// dropping modes makes the interfaces stiffer under static loads.
     ///
     /// * `keep`: number of modes; all if not given.
     ///
     /// # Errors
-    /// [`FemError::Missing`] where stiffness or mass are not positive definite,
+    /// [`FemError::Missing`] if stiffness or mass is not positive definite,
     /// [`FemError::OutOfRange`] for more modes than coordinates.
     ///
     /// # Source
-    /// Craig & Chang (1977): the orthogonalised set of Craig and Bampton's shapes.
+    /// Craig & Chang (1977): orthogonalisation of the Craig-Bampton shapes.
     pub fn orthogonalised(&self, keep: Option<usize>) -> Result<Self, FemError> {
         let n = self.coordinates();
         let kept = keep.unwrap_or(n);
@@ -127,11 +128,11 @@ impl ModalLink {
         })
     }
 
-    /// The link with its first `modes` fixed-interface modes only.
+    /// Keeps only the first `modes` fixed-interface modes of the link.
     ///
     /// # Errors
-    /// [`FemError::Missing`] for other coordinates than those of Craig and Bampton,
-    /// [`FemError::OutOfRange`] for more modes than there are.
+    /// [`FemError::Missing`] if the coordinates are not of Craig-Bampton type,
+    /// [`FemError::OutOfRange`] for more modes than the link has.
     pub fn truncated(&self, modes: usize) -> Result<Self, FemError> {
         if !self.is_craig_bampton() {
             let help = "the coordinates are not those of Craig and Bampton; orthogonalised links take `keep`";
@@ -165,11 +166,11 @@ impl ModalLink {
         })
     }
 
-    /// The same link in another frame: from each shape a rigid motion is taken away,
+    /// Moves the link to another floating frame by removing a rigid motion from each shape,
     /// `φ_k - c_k - θ_k × s`.
     ///
-    /// Stiffness stays; that by initial stress belongs to the other support and is dropped. Unknown
-    /// terms of second order stay unknown.
+    /// The stiffness is unchanged. The geometric stiffness belongs to the previous support and is
+    /// dropped. Unknown second-order terms stay unknown.
     ///
     /// * `motion`: c_k (at Lo) over θ_k, link axes, one column per coordinate.
     pub fn without_rigid_motion(self, motion: &Matrix6xX<f64>) -> Self {
@@ -186,7 +187,7 @@ impl ModalLink {
             C_t.column_mut(k).axpy(-1.0, &(c[k] * m + turn[k] * mc), 1.0);
             P[k] -= mc * c[k].transpose() + S * turn[k].transpose();
         }
-        // ∫ φ_k ρ_lᵀ and ∫ ρ_k ρ_lᵀ of the rigid motions ρ.
+        // ∫ φ_k ρ_lᵀ and ∫ ρ_k ρ_lᵀ with the rigid motions ρ.
         let mixed =
             |k: usize, l: usize| self.C_t.column(k) * c[l].transpose() + self.P[k].transpose() * turn[l].transpose();
         let rigid = |k: usize, l: usize| {
@@ -227,9 +228,9 @@ impl ModalLink {
         }
     }
 
-    /// The same link in other axes through Lo; its coordinates stay.
+    /// Rotates the axes of the link about Lo; the coordinates are unchanged.
     ///
-    /// * `R`: the present axes in the new ones.
+    /// * `R`: rotation from the present axes to the new ones.
     pub fn turned(&self, R: &Rotation3<f64>) -> Self {
         let r = R.matrix();
         let both = |A: &Matrix3<f64>| r * A * r.transpose();
@@ -259,11 +260,11 @@ impl ModalLink {
         }
     }
 
-    /// `η = V η'`; stiffness and mass too, by their quadratic forms.
+    /// Changes coordinates by `η = V η'`; stiffness and mass transform as quadratic forms.
     pub(super) fn in_coordinates(&self, V: &DMatrix<f64>) -> Self {
         let (n, m) = V.shape();
         let form = |A: &DMatrix<f64>| super::symmetric(&(V.transpose() * A * V));
-        // N_ij' = Σ V_ki V_lj N_kl, entry by entry of the 3×3.
+        // N_ij' = Σ V_ki V_lj N_kl, for each entry of the 3×3.
         let mut N = vec![Matrix3::zeros(); m * m];
         for (a, b) in (0..9).map(|e| (e / 3, e % 3)) {
             let entries = DMatrix::from_fn(n, n, |k, l| self.N[k * n + l][(a, b)]);
@@ -297,9 +298,9 @@ impl ModalLink {
 }
 
 impl GeometricStiffness {
-    /// Per unit load along new axes; `R`: the present axes in the new ones.
+    /// Converts to unit loads along new axes; `R`: rotation from the present axes to the new ones.
     fn turned(&self, R: &Matrix3<f64>) -> Self {
-        // A load a along new axes has the components Rᵀ a along the present ones.
+        // A load a along the new axes has the components Rᵀ a along the present ones.
         let three = |G: &[DMatrix<f64>]| -> [DMatrix<f64>; 3] {
             std::array::from_fn(|i| &G[0] * R[(i, 0)] + &G[1] * R[(i, 1)] + &G[2] * R[(i, 2)])
         };
@@ -311,7 +312,7 @@ impl GeometricStiffness {
         let centrifugal = PRODUCTS.map(|(i, j)| {
             let mut sum = self.centrifugal[0].map(|_| 0.0);
             for ((a, b), G) in PRODUCTS.into_iter().zip(&self.centrifugal) {
-                // ω_a ω_b in products of the new components; each mixed one counts once.
+                // ω_a ω_b in products of the new components; each mixed product is counted once.
                 let once = R[(i, a)] * R[(j, b)];
                 sum += G * if i == j { once } else { once + R[(j, a)] * R[(i, b)] };
             }
@@ -325,7 +326,7 @@ impl GeometricStiffness {
         }
     }
 
-    /// All matrices through `f`.
+    /// Applies `f` to all matrices.
     pub(crate) fn mapped(&self, f: &dyn Fn(&DMatrix<f64>) -> DMatrix<f64>) -> Self {
         Self {
             acceleration: self.acceleration.each_ref().map(f),

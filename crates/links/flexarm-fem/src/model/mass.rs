@@ -1,4 +1,4 @@
-//! Mass of a model: one number per pair of nodes for solids, a general sparse part for beams.
+//! Mass of a model: one number per node pair for solids, a general sparse part for beams.
 
 use flexarm_spatial::Real;
 use nalgebra::DMatrix;
@@ -7,25 +7,25 @@ use super::DofMap;
 use super::scatter::NodeGraph;
 use crate::sparse::{Block, Row, SparseSymmetric, WIDTH, Wide, Work, quickly};
 
-/// Consistent mass. Solids act alike in x, y and z, so a ninth of the entries is enough for them.
+/// Consistent mass. For solids it is the same in x, y and z, so a ninth of the entries is stored.
 #[derive(Debug, Clone)]
 pub struct MassMatrix {
     size: usize,
-    /// Over nodes; multiplies each of the three translations.
+    /// Entries over nodes, applied to each of the three translations, and first DoF of each node.
     nodal: Option<(SparseSymmetric, Vec<u32>)>,
-    /// Over DoF.
+    /// Entries over DoF.
     general: Option<SparseSymmetric>,
 }
 
 impl MassMatrix {
-    /// Zeros with room for the solids of a mesh.
+    /// Zero matrix with room for the solids of a mesh.
     pub(super) fn zeros(graph: &NodeGraph, dofs: &DofMap) -> Self {
         let first = (0..dofs.nodes()).map(|node| dofs.of(node).start as u32).collect();
         let nodal = Some((SparseSymmetric::zeros(graph.node_pattern()), first));
         Self { size: dofs.size(), nodal, general: None }
     }
 
-    /// Mass given over all DoF, as FE programs export it.
+    /// Mass given over all DoF, as exported by FE programs.
     pub fn from_general(general: SparseSymmetric) -> Self {
         Self { size: general.size(), nodal: None, general: Some(general) }
     }
@@ -50,29 +50,29 @@ impl MassMatrix {
         self.size
     }
 
-    /// The product `M X`.
+    /// Computes the product `M X`.
     ///
     /// # Panics
-    /// If `X` has another number of rows.
+    /// If `X` does not have [`Self::size`] rows.
     pub fn product(&self, X: &DMatrix<f64>) -> DMatrix<f64> {
         let mut Y = DMatrix::zeros(X.nrows(), X.ncols());
         self.product_into(X, &mut Y);
         Y
     }
 
-    /// `Y = M X`.
+    /// Computes `Y = M X`.
     ///
     /// # Panics
-    /// If `X` has another number of rows.
+    /// If `X` does not have [`Self::size`] rows, or `Y` another shape.
     pub fn product_into(&self, X: &DMatrix<f64>, Y: &mut DMatrix<f64>) {
         assert!(X.nrows() == self.size && Y.shape() == X.shape(), "mass of {} rows times {:?}", self.size, X.shape());
         by_blocks(X, Y, |x, y| self.block_product(x, y));
     }
 
-    /// `Y = M X`.
+    /// Computes `Y = M X`.
     ///
     /// # Panics
-    /// If the shapes do not fit.
+    /// If the numbers of rows do not match.
     pub fn block_product(&self, X: &Block, Y: &mut Block) {
         assert!(X.rows.len() == self.size && Y.rows.len() == self.size, "mass of {} rows times another", self.size);
         Y.rows.fill(Row::ZERO);
@@ -83,7 +83,7 @@ impl MassMatrix {
         self.add_nodal_product(X, Y);
     }
 
-    /// The part of `M X` that belongs to solids: on node i `Σ_j m_ij x_j`, component by component.
+    /// Share of solids in `M X`: `Σ_j m_ij x_j` at node i, component by component.
     pub(crate) fn solid_product(&self, X: &DMatrix<f64>) -> DMatrix<f64> {
         let mut Y = DMatrix::zeros(X.nrows(), X.ncols());
         by_blocks(X, &mut Y, |x, y| self.add_nodal_product(x, y));
@@ -97,7 +97,7 @@ impl MassMatrix {
     }
 }
 
-/// Columns of X, eight at a time, into those of Y.
+/// Applies `product` to the columns of X, eight at a time, and stores the results in Y.
 fn by_blocks(X: &DMatrix<f64>, Y: &mut DMatrix<f64>, product: impl Fn(&Block, &mut Block)) {
     for at in (0..X.ncols()).step_by(WIDTH) {
         let x = Block::of_columns(X, at, WIDTH.min(X.ncols() - at));

@@ -1,4 +1,4 @@
-//! Which nodes share an element, and where a block of an element matrix goes in the sparse one.
+//! Node adjacency of a mesh, and position of element matrix blocks in the sparse matrix.
 
 use std::sync::Arc;
 
@@ -6,13 +6,13 @@ use super::DofMap;
 use crate::mesh::Mesh;
 use crate::sparse::Pattern;
 
-/// Lower triangle of the node adjacency: for each node the nodes of equal or higher index it meets.
+/// Lower triangle of the node adjacency: for each node its neighbours of equal or higher index.
 #[derive(Debug)]
 pub(super) struct NodeGraph {
     starts: Vec<u32>,
-    /// Ascending within a node; the first one is the node itself if it is used.
+    /// Ascending for each node; the first is the node itself if it is used.
     rows: Vec<u32>,
-    /// DoF of the neighbours before this one, the node itself left out.
+    /// Number of DoF of the preceding neighbours, without the node itself.
     before: Vec<u32>,
     /// Start of each DoF column.
     dof_starts: Vec<u32>,
@@ -82,12 +82,12 @@ impl NodeGraph {
         &rows[starts[node] as usize..starts[node + 1] as usize]
     }
 
-    /// The pattern over nodes.
+    /// Pattern over nodes.
     pub(super) fn node_pattern(&self) -> Arc<Pattern> {
         Arc::new(Pattern { starts: self.starts.clone(), rows: self.rows.clone() })
     }
 
-    /// The pattern over DoF.
+    /// Pattern over DoF.
     pub(super) fn dof_pattern(&self, dofs: &DofMap) -> Arc<Pattern> {
         let mut rows = Vec::with_capacity(self.dof_starts[dofs.size()] as usize);
         for node in 0..dofs.nodes() {
@@ -125,7 +125,7 @@ impl NodeGraph {
                     let column = self.dof_starts[own.start + c] as usize;
                     let entries = &local[(per_node * q + c) * size + per_node * p..][..per_node];
                     if a == b {
-                        // Below and on the diagonal.
+                        // Diagonal block: entries on and below the diagonal.
                         for i in c..per_node {
                             values[column + i - c] += entries[i];
                         }

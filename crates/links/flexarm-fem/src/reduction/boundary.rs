@@ -1,4 +1,4 @@
-//! Interfaces of a link and how they are tied to the mesh.
+//! Interfaces of a link and their ties to the mesh.
 
 use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, Matrix3, SymmetricEigen, Vector3};
@@ -6,20 +6,20 @@ use serde::{Deserialize, Serialize};
 
 use crate::model::FeModel;
 
-/// How the six DoF of an interface act on the nodes of its surface.
+/// Relation between the six DoF of an interface and the nodes of its surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Tie {
-    /// RBE2: every node moves with the interface as one rigid body; stiffens the seat.
+    /// RBE2: every node follows the interface as one rigid body; stiffens the joint seat.
     #[default]
     Rigid,
-    /// RBE3: the interface follows the mean motion of the nodes, all with the same weight; adds no
+    /// RBE3: the interface follows the mean motion of the nodes, with equal weights; adds no
     /// stiffness.
     Distributing,
 }
 
 impl Tie {
-    /// The name that files use.
+    /// Name used in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Rigid => "rigid",
@@ -28,80 +28,80 @@ impl Tie {
     }
 }
 
-/// A joint seat: a frame and the nodes tied to it.
+/// Interface: a frame and the nodes tied to it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Interface {
     /// Name, such as `A`.
     pub name: String,
-    /// Its frame in the mesh frame, m. The six DoF are those of its origin, in mesh axes.
+    /// Frame in the mesh frame, m. The six DoF are those of its origin, in mesh axes.
     pub X_LI: Pose,
     /// Indices of the tied nodes.
     pub nodes: Vec<u32>,
-    /// How they are tied.
+    /// Kind of tie.
     pub tie: Tie,
 }
 
-/// Why interfaces could not be tied.
+/// Errors of tying interfaces.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TieError {
-    /// Fewer than two interfaces.
+    /// There are fewer than two interfaces.
     #[error("{found} interface(s) given; a link needs at least two, a proximal one first")]
     TooFew {
-        /// How many there are.
+        /// Number of interfaces.
         found: usize,
     },
-    /// An interface without nodes.
+    /// An interface has no nodes with DoF.
     #[error("interface {interface:?} has no node that belongs to an element")]
     Empty {
-        /// Its name.
+        /// Name of the interface.
         interface: String,
     },
-    /// Nodes that cannot hold all three rotations.
+    /// The nodes of an interface cannot restrain all three rotations.
     #[error(
         "interface {interface:?}: its {count} node(s) {shape}, so a rotation stays free; \
          an interface on solid elements needs three nodes that are not on a line"
     )]
     Degenerate {
-        /// Its name.
+        /// Name of the interface.
         interface: String,
-        /// Number of its nodes.
+        /// Number of nodes.
         count: usize,
         /// "are one point" or "lie on a line".
         shape: &'static str,
     },
-    /// A node in two interfaces.
+    /// A node belongs to two interfaces.
     #[error("interfaces {first:?} and {second:?} overlap: {count} node(s) are in both, such as index {node}")]
     Overlap {
-        /// The one.
+        /// Name of the first interface.
         first: String,
-        /// The other.
+        /// Name of the second interface.
         second: String,
-        /// How many nodes they share.
+        /// Number of shared nodes.
         count: usize,
-        /// One of them, index in the mesh.
+        /// Mesh index of one of them.
         node: u32,
     },
-    /// Two interfaces of one name.
+    /// Two interfaces have the same name.
     #[error("two interfaces are called {name:?}")]
     SameName {
-        /// The name.
+        /// Name of the interfaces.
         name: String,
     },
-    /// A rigid interface on every node of the mesh.
+    /// All nodes of the mesh are tied rigidly.
     #[error("all nodes are tied rigidly; nothing is left that could bend")]
     NothingFree,
 }
 
-/// The boundary of a model: which DoF are free, and how the others follow the interfaces.
+/// Boundary of a model: free DoF, and the relation of the others to the interfaces.
 #[derive(Debug, Clone)]
 pub struct Boundary {
     /// Rows of B: (DoF, boundary column, factor).
     rigid: Vec<(u32, u32, f64)>,
-    /// Rows of G: for each constrained boundary DoF its column and the (DoF, weight) it is the mean
-    /// of.
+    /// Rows of G: for each constrained boundary DoF its column and the (DoF, weight) pairs of its
+    /// weighted mean.
     means: Vec<(usize, Vec<(u32, f64)>)>,
-    /// DoF that neither follow an interface nor are boundary DoF themselves, ascending.
+    /// DoF that do not follow an interface and are not boundary DoF, ascending.
     free: Vec<u32>,
     columns: usize,
     size: usize,
@@ -113,7 +113,7 @@ impl Boundary {
     /// # Errors
     /// [`TieError`].
     pub fn tie(model: &FeModel, interfaces: &[Interface]) -> Result<Self, TieError> {
-        // Nodes without an element have no DoF and no say; a node counts once.
+        // Nodes without an element have no DoF and are dropped; duplicates are removed.
         let used = |interface: &Interface| {
             let has_dofs = |node: &u32| !model.dofs.of(*node as usize).is_empty();
             let mut nodes: Vec<u32> = interface.nodes.iter().copied().filter(has_dofs).collect();
@@ -153,19 +153,19 @@ impl Boundary {
         Ok(Self { rigid, means, free, columns: 6 * interfaces.len(), size: model.size() })
     }
 
-    /// Boundary made of DoF of the model themselves: the reference nodes of an imported model.
+    /// Boundary of some DoF of the model itself: the reference nodes of an imported model.
     pub fn retained(size: usize, dofs: &[u32]) -> Self {
         let rigid: Vec<_> = dofs.iter().enumerate().map(|(column, dof)| (*dof, column as u32, 1.0)).collect();
         let free = (0..size as u32).filter(|dof| !dofs.contains(dof)).collect();
         Self { rigid, means: Vec::new(), free, columns: dofs.len(), size }
     }
 
-    /// Boundary coordinates: six per interface.
+    /// Number of boundary coordinates, six per interface.
     pub fn columns(&self) -> usize {
         self.columns
     }
 
-    /// DoF that are solved for, ascending.
+    /// DoF of the solution, ascending.
     pub fn free(&self) -> &[u32] {
         &self.free
     }
@@ -175,12 +175,12 @@ impl Boundary {
         &self.means
     }
 
-    /// Whether any boundary DoF holds the model by itself.
+    /// Whether fixing the boundary DoF supports the model by itself.
     pub(super) fn holds(&self) -> bool {
         !self.rigid.is_empty()
     }
 
-    /// B: displacement of every DoF that follows an interface rigidly, one column per boundary DoF.
+    /// B: displacements of the DoF that follow an interface rigidly, one column per boundary DoF.
     pub(super) fn rigid_part(&self) -> DMatrix<f64> {
         let mut B = DMatrix::zeros(self.size, self.columns);
         for (dof, column, factor) in &self.rigid {
@@ -222,8 +222,8 @@ fn check(model: &FeModel, interfaces: &[Interface]) -> Result<(), TieError> {
     Ok(())
 }
 
-/// Weighted centre and second moments `Σ (r² 1 - r rᵀ)` of the nodes, checked to hold every
-/// rotation.
+/// Mean position and second moments `Σ (r² 1 - r rᵀ)` of the nodes; an error if a rotation is
+/// unrestrained.
 fn spread(model: &FeModel, interface: &Interface) -> Result<(Vector3<f64>, Matrix3<f64>), TieError> {
     let points: Vec<_> = interface.nodes.iter().map(|node| model.nodes[*node as usize]).collect();
     let count = points.len();
@@ -244,7 +244,7 @@ fn spread(model: &FeModel, interface: &Interface) -> Result<(Vector3<f64>, Matri
     Ok((centre, moments))
 }
 
-/// Rows of G of one distributing interface, weights equal:
+/// Rows of G of one distributing interface with equal weights:
 /// `u_c = mean u`, `theta = T⁻¹ Σ r x u`, `u_0 = u_c + theta x (p_0 - c)`.
 fn mean_rows(model: &FeModel, interface: &Interface, column: usize) -> Vec<(usize, Vec<(u32, f64)>)> {
     let Ok((centre, moments)) = spread(model, interface) else { return Vec::new() };

@@ -1,4 +1,4 @@
-//! The factorised model with its boundary: static shapes, and modes under three kinds of support.
+//! Factorised model with its boundary: static shapes, and modes under three kinds of support.
 
 mod modes;
 
@@ -14,26 +14,26 @@ use crate::sparse::{
     grams, orthonormalising, subtract_products,
 };
 
-/// A pivot this far below its diagonal entry is rounding: a mechanism that passed by its sign.
-/// Links of a thousand times their thickness stay above 1e-10.
+/// Relative pivot below which the model is singular: a pivot this far below its diagonal entry is
+/// rounding. Links with a length of a thousand times their thickness stay above 1e-10.
 const SINGULAR: f64 = 1e-12;
 
-/// Smallest eigenvalue of the stiffness of the interfaces, scaled to a unit diagonal, below which
-/// one of them moves freely: that of the gate.
+/// Eigenvalue of the interface stiffness, scaled to a unit diagonal, below which an interface moves
+/// freely; the limit of the gate.
 const FREE: f64 = 1e-10;
 
-/// How to solve.
+/// Options of the solver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct CondensationOptions {
     /// Fill-reducing order.
     pub ordering: Ordering,
 }
 
-/// Why a model could not be reduced.
+/// Errors of reducing a model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReductionError {
-    /// The interfaces cannot be tied.
+    /// The interfaces could not be tied.
     #[error(transparent)]
     Tie(#[from] TieError),
     /// `K_ii` has no Cholesky factor.
@@ -42,7 +42,7 @@ pub enum ReductionError {
          force ({component}); a part of the mesh is loose, an element is inverted, or a mechanism is left"
     )]
     Loose {
-        /// Node index at which it was found.
+        /// Index of the node of the failing pivot.
         node: usize,
         /// Component at that node.
         component: &'static str,
@@ -50,7 +50,7 @@ pub enum ReductionError {
     /// The factor does not fit into memory.
     #[error("the factor of {entries} numbers does not fit into memory; coarsen the mesh")]
     OutOfMemory {
-        /// Entries of the factor.
+        /// Number of entries of the factor.
         entries: usize,
     },
     /// An interface after the first can move without force.
@@ -59,45 +59,45 @@ pub enum ReductionError {
          part of the model, and is that part connected in more than a point or a line?", interface + 1
     )]
     FreeInterface {
-        /// Its number, from 0.
+        /// Number of the interface, from 0.
         interface: usize,
-        /// How it moves; components in the axes of the model.
+        /// Free motion; components in the axes of the model.
         direction: Direction,
     },
-    /// Nothing holds the model and no six DoF can.
+    /// The model is unsupported, and no six DoF can support it.
     #[error("the mesh lies on a line or in a point: nothing holds its rotations")]
     NoGrounding,
-    /// The modes were not found.
+    /// The modes could not be computed.
     #[error(transparent)]
     Modes(#[from] ModesError),
 }
 
-/// Size of the linear algebra, for reports.
+/// Figures of the linear algebra, for reports.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SolverFigures {
-    /// DoF of the whole mesh.
+    /// Number of DoF of the whole mesh.
     pub dofs: usize,
-    /// The factor.
+    /// Figures of the factor.
     pub factor: FactorFigures,
-    /// Right-hand sides solved for the static shapes.
+    /// Number of right-hand sides solved for the static shapes.
     pub static_solves: usize,
-    /// Smallest pivot of the factor over the diagonal entry it came from.
+    /// Minimum pivot of the factor relative to its diagonal entry.
     pub smallest_pivot: f64,
 }
 
-/// The part of the solution that distributing ties need.
+/// Data for the saddle point problem of distributing ties.
 #[derive(Debug)]
 struct Saddle {
     /// G over the solved DoF, by rows.
     rows: Vec<Vec<(u32, f64)>>,
     /// `K_ii⁻¹ Gᵀ`, by blocks.
     Z: Vec<Block>,
-    /// Inverse of the small matrix for the forces λ and, where nothing holds the mesh, its rigid
+    /// LU factors of the small matrix for the forces λ and, if the mesh is unsupported, its rigid
     /// motion.
     small: nalgebra::LU<f64, nalgebra::Dyn, nalgebra::Dyn>,
-    /// Scale of the compliances in it.
+    /// Scale of the compliances in the small matrix.
     scale: f64,
-    /// Rigid motions of the whole mesh, if nothing else holds it.
+    /// Rigid motions of the whole mesh, if it is unsupported.
     rigid: Option<Block>,
 }
 
@@ -106,24 +106,24 @@ struct Saddle {
 pub struct Condensation<'m> {
     model: &'m FeModel,
     boundary: Boundary,
-    /// DoF in the factor: the free ones without those held by grounding.
+    /// DoF in the factor: the free ones without those fixed by grounding.
     solved: Vec<u32>,
     factor: Cholesky,
     saddle: Option<Saddle>,
     /// Static shapes, one column per boundary DoF, over all DoF.
     T: DMatrix<f64>,
-    /// The same without the first six columns, by blocks.
+    /// Static shapes without the first six columns, by blocks.
     T_B: Vec<Block>,
     K_g: DMatrix<f64>,
     M_g: DMatrix<f64>,
-    /// Largest relative asymmetry of `K_g` as computed.
+    /// Maximum relative asymmetry of `K_g` before symmetrisation.
     asymmetry: f64,
-    /// Inverse of `K_g` without its first six rows: the compliance with the first interface held.
+    /// Inverse of `K_g` without its first six rows: compliance with the first interface clamped.
     tip: DMatrix<f64>,
 }
 
 impl<'m> Condensation<'m> {
-    /// Ties, factorises and finds the static shapes.
+    /// Ties the interfaces, factorises and computes the static shapes.
     ///
     /// # Errors
     /// [`ReductionError`].
@@ -135,7 +135,7 @@ impl<'m> Condensation<'m> {
         Self::with_boundary(model, Boundary::tie(model, interfaces)?, options)
     }
 
-    /// The same with a boundary made elsewhere.
+    /// As [`Self::new`], with a given boundary.
     ///
     /// # Errors
     /// [`ReductionError`].
@@ -144,6 +144,7 @@ impl<'m> Condensation<'m> {
         boundary: Boundary,
         options: CondensationOptions,
     ) -> Result<Self, ReductionError> {
+        // Free DoF, less six of an unsupported mesh (grounding), and their Cholesky factor.
         let mut solved = boundary.free().to_vec();
         let rigid = if boundary.holds() {
             None
@@ -188,8 +189,8 @@ impl<'m> Condensation<'m> {
         this.T_B = blocks(&T.columns(6.min(columns), columns.saturating_sub(6)).into_owned());
         this.T = T;
         let KT = this.model.K.product(&this.T);
-        // The energy is symmetric whatever T is; the forces on the interfaces are so only if T
-        // solves the equations.
+        // The energy Tᵀ K T is symmetric for any T, but the forces on the interfaces are symmetric
+        // only if T solves the equations, so the asymmetry is measured on the forces.
         let mut forces = gram(&this.boundary.rigid_part(), &KT);
         for ((column, _), row) in this.boundary.means().iter().zip(lambda.row_iter()) {
             let mut force = forces.row_mut(*column);
@@ -225,6 +226,7 @@ impl<'m> Condensation<'m> {
                 row.iter().filter_map(inside).collect()
             })
             .collect();
+        // Z = K_ii⁻¹ Gᵀ and the Schur complement S = G Z.
         let mut Z = DMatrix::zeros(self.solved.len(), m);
         for (k, row) in rows.iter().enumerate() {
             for (at, weight) in row {
@@ -252,8 +254,8 @@ impl<'m> Condensation<'m> {
         Some(Saddle { rows, Z, small: small.lu(), scale, rigid })
     }
 
-    /// Solves `K u + Gᵀ λ = F` on the free DoF with `G u = g`; tied DoF are zero. F is replaced by
-    /// u.
+    /// Solves `K u + Gᵀ λ = F` on the free DoF with `G u = g`; tied DoF are zero. F is overwritten
+    /// by u.
     ///
     /// Returns λ, one row per constrained boundary DoF.
     fn solve_constrained(&self, F: &mut Block, g: Option<&DMatrix<f64>>) -> DMatrix<f64> {
@@ -263,6 +265,7 @@ impl<'m> Condensation<'m> {
             fill_others(&mut F.rows, &self.solved);
             return DMatrix::zeros(0, width);
         };
+        // y = K_ii⁻¹ F, its constraint gap G y - g, and λ from the small system.
         let mut y = Block { rows: self.solved.iter().map(|dof| F.rows[*dof as usize]).collect(), width };
         self.factor.solve_block(&mut y);
         let m = saddle.rows.len();
@@ -278,6 +281,7 @@ impl<'m> Condensation<'m> {
         if !saddle.small.solve_mut(&mut right) {
             right.fill(f64::NAN);
         }
+        // u = y - Z λ, plus the rigid motion of an unsupported mesh.
         let forces = right.rows(0, m).into_owned();
         subtract_products(&mut y, &saddle.Z, &forces);
         self.solved.iter().zip(&y.rows).for_each(|(dof, y)| F.rows[*dof as usize] = *y);
@@ -316,12 +320,12 @@ impl<'m> Condensation<'m> {
         }
     }
 
-    /// The model that was reduced.
+    /// Model that was reduced.
     pub fn model(&self) -> &FeModel {
         self.model
     }
 
-    /// Static shapes: displacement of every DoF for a unit of each boundary DoF.
+    /// Static shapes: displacement of every DoF per unit of each boundary DoF.
     pub fn shapes(&self) -> &DMatrix<f64> {
         &self.T
     }
@@ -331,12 +335,13 @@ impl<'m> Condensation<'m> {
         &self.K_g
     }
 
-    /// Guyan mass, likewise.
+    /// Guyan mass, in the same layout.
     pub fn mass(&self) -> &DMatrix<f64> {
         &self.M_g
     }
 
-    /// Displacements of all DoF under unit wrenches at the interfaces but the first, which is held.
+    /// Displacements of all DoF under unit wrenches at all interfaces except the first, which is
+    /// clamped.
     pub fn unit_load_shapes(&self) -> DMatrix<f64> {
         let n = self.K_g.nrows();
         let T_B = self.T.columns(6, n - 6).into_owned();
@@ -345,7 +350,7 @@ impl<'m> Condensation<'m> {
         U
     }
 
-    /// Displacements of all DoF and of the boundary under nodal forces, the first interface held.
+    /// Replaces nodal forces by the displacements of all DoF, with the first interface clamped.
     pub fn solve_held(&self, F: &mut DMatrix<f64>) {
         for first in (0..F.ncols()).step_by(WIDTH) {
             let mut block = Block::of_columns(F, first, WIDTH.min(F.ncols() - first));
@@ -360,17 +365,17 @@ impl<'m> Condensation<'m> {
         subtract_products(F, &self.T_B, &-u_B);
     }
 
-    /// Displacements of the interfaces but the first under nodal forces, the first one held.
+    /// Displacements of the interfaces after the first under nodal forces, the first one clamped.
     pub fn tip_under(&self, F: &DMatrix<f64>) -> DMatrix<f64> {
         let n = self.K_g.nrows();
         let T_B = self.T.columns(6, n - 6).into_owned();
         &self.tip * gram(&T_B, F)
     }
 
-    /// Guyan reduction where `modes` is empty, Craig-Bampton otherwise.
+    /// Creates the superelement: Guyan reduction if `modes` is empty, Craig-Bampton otherwise.
     ///
     /// * `frames`: name, frame and tie of each interface, in the order of the boundary.
-    /// * `modes`: as [`Self::fixed_modes`] gives them.
+    /// * `modes`: result of [`Self::fixed_modes`].
     pub fn superelement(&self, frames: Vec<InterfaceFrame>, modes: &Modes) -> Superelement {
         let (n, m) = (self.K_g.nrows(), modes.len());
         let mut K = DMatrix::zeros(n + m, n + m);
@@ -386,14 +391,14 @@ impl<'m> Condensation<'m> {
         Superelement { interfaces: frames, K, M }
     }
 
-    /// Largest relative asymmetry of the condensed stiffness as computed.
+    /// Maximum relative asymmetry of the condensed stiffness before symmetrisation.
     pub fn asymmetry(&self) -> f64 {
         self.asymmetry
     }
 
-    /// Condition number of `K_ii`: largest over smallest eigenvalue, the one by power iteration,
-    /// the other by two steps of subspace iteration that begin with the static shapes of an
-    /// interface. Not a number where no unknown is inside.
+    /// Estimates the condition number of `K_ii`: the largest eigenvalue by power iteration, the
+    /// smallest by two steps of subspace iteration that start from the static shapes of an
+    /// interface. NaN if there are no internal unknowns.
     pub fn condition_estimate(&self) -> f64 {
         let rows = self.model.size();
         let keep_inside = |x: &mut DMatrix<f64>| {
@@ -401,7 +406,7 @@ impl<'m> Condensation<'m> {
             self.solved.iter().for_each(|dof| kept[*dof as usize] = x[*dof as usize]);
             *x = kept;
         };
-        // Neighbouring nodes against each other excite the stiff end.
+        // Alternating signs at neighbouring nodes excite the stiff end of the spectrum.
         let mut stiff = DMatrix::from_fn(rows, 1, |i, _| if (i * 2_654_435_761) & 64 == 0 { 1.0 } else { -1.0 });
         let mut largest = 0.0;
         keep_inside(&mut stiff);
@@ -411,7 +416,7 @@ impl<'m> Condensation<'m> {
             keep_inside(&mut stiff);
             largest = stiff.norm();
         }
-        // What hangs on A alone does not move with B.
+        // Parts connected only to A do not move with B; then use the shapes of A.
         let T_A = || Block::of_columns(&self.T, 0, 6.min(self.T.ncols()));
         let inside = |T: &Block| -> Vec<Row> { self.solved.iter().map(|dof| T.rows[*dof as usize]).collect() };
         let moves = |rows: &Vec<Row>| rows.iter().any(|row| *row != Row::ZERO);
@@ -427,7 +432,7 @@ impl<'m> Condensation<'m> {
         largest * SymmetricEigen::new(symmetric(Q.gram(&y))).eigenvalues.max()
     }
 
-    /// Size of the linear algebra.
+    /// Figures of the linear algebra.
     pub fn figures(&self) -> SolverFigures {
         SolverFigures {
             dofs: self.model.size(),
@@ -438,12 +443,12 @@ impl<'m> Condensation<'m> {
     }
 }
 
-/// G times a tall matrix whose entries are `x`.
+/// Product of G and a tall matrix with entries `x`.
 fn apply_rows(rows: &[Vec<(u32, f64)>], columns: usize, x: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
     DMatrix::from_fn(rows.len(), columns, |k, j| rows[k].iter().map(|(at, w)| w * x(*at as usize, j)).sum())
 }
 
-/// Zeros in all rows but those, which ascend.
+/// Sets all rows except `kept`, which are ascending, to zero.
 fn fill_others(rows: &mut [Row], kept: &[u32]) {
     let mut next = 0;
     for row in kept {
@@ -453,26 +458,26 @@ fn fill_others(rows: &mut [Row], kept: &[u32]) {
     rows[next..].fill(Row::ZERO);
 }
 
-/// A tall matrix by blocks.
+/// Splits a tall matrix into blocks.
 fn blocks(X: &DMatrix<f64>) -> Vec<Block> {
     let firsts = (0..X.ncols()).step_by(WIDTH);
     firsts.map(|first| Block::of_columns(X, first, WIDTH.min(X.ncols() - first))).collect()
 }
 
-/// The largest of some measures; a NaN among them stays.
+/// Maximum of some measures; NaN if any of them is NaN.
 pub(crate) fn worst(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(0.0, |worst: f64, x| if !(x <= worst) { x } else { worst })
 }
 
-/// The interface that moves most, and how, where a stiffness of six rows per interface resists some
-/// motion with nothing.
+/// Interface with the largest motion, and its direction, if the boundary stiffness has a motion
+/// without resistance.
 fn free_direction(K: &DMatrix<f64>) -> Option<(usize, Direction)> {
     let scale = K.diagonal().map(|k| if k > 0.0 { 1.0 / k.sqrt() } else { 0.0 });
     let scaled = DMatrix::from_fn(K.nrows(), K.ncols(), |i, j| K[(i, j)] * scale[i] * scale[j]);
     if scaled.iter().any(|x| !x.is_finite()) {
         return None;
     }
-    // A row without any stiffness is a free motion by itself.
+    // A row without stiffness is a free motion.
     let motion = match (0..K.nrows()).find(|i| scale[*i] == 0.0) {
         Some(row) => DVector::from_fn(K.nrows(), |i, _| f64::from(i == row)),
         None => {
@@ -494,7 +499,7 @@ fn symmetric(A: DMatrix<f64>) -> DMatrix<f64> {
     (A + B) * 0.5
 }
 
-/// Inverse of a small SPD matrix whose rows have different units, through its scaled form.
+/// Inverse of a small SPD matrix with rows of different units, scaled to a unit diagonal first.
 pub(crate) fn spd_inverse(K: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let scale = K.diagonal().map(|k| 1.0 / k.sqrt());
     let scaled = DMatrix::from_fn(K.nrows(), K.ncols(), |i, j| K[(i, j)] * scale[i] * scale[j]);

@@ -1,15 +1,15 @@
-//! Six DoF that hold a free body without straining it.
+//! Statically determinate support of a free body by six DoF.
 //!
-//! Where every interface is distributing nothing holds the mesh, and `K_ii` has the six rigid
-//! motions as null space. Holding six well-chosen DoF makes it positive definite; loads in
-//! equilibrium then give no reaction there, so the answer does not depend on the choice.
+//! If every interface is distributing, the mesh is unsupported and `K_ii` has the six rigid motions
+//! as null space. Fixing six well-chosen DoF makes it positive definite. Loads in equilibrium cause
+//! no reaction there, so the result does not depend on the choice.
 
 use nalgebra::DMatrix;
 
 use crate::model::FeModel;
 
-/// Positions in `free` of six DoF of up to three nodes far apart, chosen by pivoted QR of their
-/// rigid motions.
+/// Selects six DoF of up to three distant nodes by pivoted QR of their rigid motions; returns
+/// positions in `free`.
 pub(super) fn statically_determinate(model: &FeModel, free: &[u32], rigid_modes: &DMatrix<f64>) -> Option<Vec<usize>> {
     let used: Vec<usize> = (0..model.nodes.len()).filter(|node| !model.dofs.of(*node).is_empty()).collect();
     let centre = used.iter().map(|n| model.nodes[*n]).sum::<nalgebra::Vector3<f64>>() / used.len() as f64;

@@ -6,8 +6,8 @@
 //! T = [static shapes],  K_g = Tᵀ K T,  M_g = Tᵀ M T                     Guyan
 //! u = T u_b + Φ η,      K = blkdiag(K_g, diag ω²)                        Craig-Bampton
 //! ```
-//! `K_ii` is factorised once; static shapes, fixed-interface modes and the modes with which the
-//! result is judged (A held and B free, all free) use the same factor.
+//! `K_ii` is factorised once; static shapes, fixed-interface modes and the modes for checking the
+//! result (A clamped and B free, all free) use the same factor.
 //!
 //! Start at [`Condensation::new`]; the result is a [`Superelement`].
 //! Source: Guyan (1965); Craig & Bampton (1968); notation of the theory page, section 1.

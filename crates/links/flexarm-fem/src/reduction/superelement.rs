@@ -1,4 +1,4 @@
-//! The reduced model: a small dense stiffness and mass over interfaces and modes.
+//! Reduced model: a small dense stiffness and mass over interfaces and modes.
 
 use flexarm_spatial::{Matrix12, Pose};
 use nalgebra::{DMatrix, SymmetricEigen};
@@ -13,29 +13,28 @@ pub struct InterfaceFrame {
     pub name: String,
     /// Frame in the link frame; the six DoF are those of its origin, in link axes.
     pub X_LI: Pose,
-    /// How it was tied, if known.
+    /// Kind of tie, if known.
     pub tie: Option<Tie>,
 }
 
-/// Stiffness and mass over the boundary DoF, six per interface, and mass-normalised modes after
-/// them.
+/// Stiffness and mass over the boundary DoF, six per interface, followed by mass-normalised modes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Superelement {
     /// Interfaces, proximal first.
     pub interfaces: Vec<InterfaceFrame>,
     /// Stiffness, link axes, SI; modal block diagonal with ω².
     pub K: DMatrix<f64>,
-    /// Mass, likewise; identity in the modal block.
+    /// Mass, link axes, SI; identity in the modal block.
     pub M: DMatrix<f64>,
 }
 
 impl Superelement {
-    /// Boundary DoF.
+    /// Number of boundary DoF.
     pub fn boundary(&self) -> usize {
         6 * self.interfaces.len()
     }
 
-    /// Modal coordinates.
+    /// Number of modal coordinates.
     pub fn modes(&self) -> usize {
         self.K.nrows() - self.boundary()
     }
@@ -45,10 +44,10 @@ impl Superelement {
         (self.boundary()..self.K.nrows()).map(|k| self.K[(k, k)].max(0.0).sqrt() / std::f64::consts::TAU).collect()
     }
 
-    /// Natural frequencies with some interfaces held, ascending, Hz; those of rigid motions are
-    /// near zero.
+    /// Natural frequencies with the interfaces `held` clamped, ascending, Hz; those of rigid
+    /// motions are near zero.
     ///
-    /// Empty where the mass is not positive definite.
+    /// Empty if the mass is not positive definite.
     pub fn frequencies_hz(&self, held: &[usize]) -> Vec<f64> {
         let keep: Vec<usize> =
             (0..self.K.nrows()).filter(|k| *k >= self.boundary() || !held.contains(&(k / 6))).collect();
@@ -57,7 +56,7 @@ impl Superelement {
         generalised_frequencies(&K, &M)
     }
 
-    /// The same superelement without its modes: Guyan.
+    /// Returns the superelement without its modes (Guyan).
     pub fn guyan(&self) -> Self {
         let n = self.boundary();
         let top = |A: &DMatrix<f64>| A.view((0, 0), (n, n)).into_owned();
@@ -65,14 +64,14 @@ impl Superelement {
     }
 }
 
-/// Stiffness of the first two interfaces with every other one, and every mode, free; `None` where
-/// one of those holds nothing.
+/// Stiffness of the first two interfaces with all other interfaces and modes free; `None` if one of
+/// those has a singular stiffness.
 pub fn stiffness12(element: &Superelement) -> Option<Matrix12> {
     let n = element.K.nrows();
     let K = &element.K;
     let mut K12 = K.view((0, 0), (12, 12)).into_owned();
     let K_cb = K.view((12, 0), (n - 12, 12)).into_owned();
-    // Modes of Craig and Bampton have no stiffness with the interfaces.
+    // Craig-Bampton modes have no stiffness coupling with the interfaces.
     if K_cb.iter().any(|k| *k != 0.0) {
         let K_cc = K.view((12, 12), (n - 12, n - 12)).into_owned();
         K12 -= K_cb.transpose() * spd_inverse(&K_cc)? * K_cb;
@@ -80,10 +79,9 @@ pub fn stiffness12(element: &Superelement) -> Option<Matrix12> {
     Some(Matrix12::from_column_slice(K12.as_slice()))
 }
 
-/// Frequencies of a small dense pencil, Hz, ascending; empty where the mass is not positive
-/// definite.
+/// Frequencies of a small dense pencil, Hz, ascending; empty if the mass is not positive definite.
 pub(crate) fn generalised_frequencies(K: &DMatrix<f64>, M: &DMatrix<f64>) -> Vec<f64> {
-    // Rows of different units are scaled by the mass first.
+    // Rows have different units, so both matrices are scaled by the mass first.
     let scale = M.diagonal().map(|m| 1.0 / m.sqrt());
     let scaled = |A: &DMatrix<f64>| DMatrix::from_fn(A.nrows(), A.ncols(), |i, j| A[(i, j)] * scale[i] * scale[j]);
     let (K, M) = (scaled(K), scaled(M));

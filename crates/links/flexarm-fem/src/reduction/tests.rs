@@ -1,4 +1,4 @@
-//! Condensation against closed forms, itself, and the whole mesh.
+//! Condensation against closed forms, alternative algorithms and the whole mesh.
 #![allow(clippy::print_stderr, reason = "tables of measured errors, shown with --nocapture")]
 
 mod degenerate;
@@ -26,7 +26,7 @@ fn at(p: Vector3<f64>) -> Pose {
     Pose::from_parts(p.into(), Rotation3::identity())
 }
 
-/// A bar from x = 0 to `length`, `width` by `height`, with an optional map of its shape.
+/// Bar from x = 0 to `length`, `width` by `height`, with a map of its shape.
 fn bar(
     kind: ElementKind,
     divisions: [usize; 3],
@@ -76,7 +76,7 @@ fn scaled_difference(A: &DMatrix<f64>, B: &DMatrix<f64>) -> f64 {
     (0..n * n).map(|k| (A[k] - B[k]).abs() / (d[k % n] * d[k / n])).fold(0.0, f64::max)
 }
 
-/// A bent, tapered, twisted bar: every coupling lives.
+/// Bent, tapered, twisted bar: all couplings are non-zero.
 fn casting(kind: ElementKind, tie: [Tie; 2]) -> (Mesh, Vec<Interface>) {
     let shape = |p: Vector3<f64>| {
         let t = p.x;
@@ -90,7 +90,7 @@ fn casting(kind: ElementKind, tie: [Tie; 2]) -> (Mesh, Vec<Interface>) {
     (mesh, interfaces)
 }
 
-/// Truth: the closed-form matrices of one beam; static condensation of a chain of beams is exact.
+/// Truth: closed-form matrices of one beam; static condensation of a chain of beams is exact.
 #[test]
 fn ten_beam_elements_condense_to_the_closed_form_of_one() {
     for theory in [BeamTheory::EulerBernoulli, BeamTheory::Timoshenko] {
@@ -135,8 +135,8 @@ fn ten_beam_elements_condense_to_the_closed_form_of_one() {
     }
 }
 
-/// Truth: rigid motion meets no force; mass and inertia are those integrated over the mesh; second
-/// algorithm: the reduced stiffness inverted against the shapes under unit loads.
+/// Truth: rigid motion causes no force; mass and inertia are those integrated over the mesh. Second
+/// algorithm: the inverse of the reduced stiffness against the shapes under unit loads.
 #[test]
 fn every_element_and_tie_passes_the_gate() {
     for kind in crate::test_mesh::SOLIDS {
@@ -154,12 +154,12 @@ fn every_element_and_tie_passes_the_gate() {
             assert!(gate.mass_error < 1e-10 && gate.inertia_error < 1e-9 && gate.com_error_m < 1e-9, "{what}");
             assert!(gate.mode_residual < 1e-7, "{what}");
             for mode in &gate.modes[..3] {
-                // Rayleigh: a reduced basis never gives a frequency below that of the mesh.
+                // Rayleigh: the frequencies of a reduced basis are never below those of the mesh.
                 let error = mode.reduced_error().unwrap();
                 assert!(error > -1e-9 && error < 4e-3, "{what}");
             }
-            // Elements of first order in so few cells are too stiff, and that is said; nothing
-            // else.
+            // First-order elements in so few cells are too stiff, which gives a warning; there is
+            // no other warning.
             let is_order = |doubt: &str| crate::mesh::second_order(kind).is_some() && doubt.contains("first order");
             let others: Vec<_> = result.doubts.iter().filter(|doubt| !is_order(&doubt.message)).collect();
             assert!(others.is_empty(), "{others:?}");
@@ -167,7 +167,7 @@ fn every_element_and_tie_passes_the_gate() {
     }
 }
 
-/// A distributing tie adds no stiffness, so the link is softer with it in every direction.
+/// A distributing tie adds no stiffness, so it makes the link softer in every direction.
 #[test]
 fn a_distributing_tie_is_softer_than_a_rigid_one_under_every_wrench() {
     let compliance = |tie| {
@@ -183,7 +183,7 @@ fn a_distributing_tie_is_softer_than_a_rigid_one_under_every_wrench() {
     assert!(ratio.iter().all(|r| (1.0..1.3).contains(r)), "{ratio}");
 }
 
-/// Second algorithm: the mean motion of the surface, taken from the solution under a unit load.
+/// Second algorithm: mean motion of the surface, from the solution under a unit load.
 #[test]
 fn a_distributing_interface_moves_as_the_mean_of_its_nodes() {
     let (mesh, interfaces) = casting(ElementKind::Hex20, [Tie::Rigid, Tie::Distributing]);
@@ -195,7 +195,7 @@ fn a_distributing_interface_moves_as_the_mean_of_its_nodes() {
     let centre = nodes.iter().map(|n| mesh.nodes[*n as usize]).sum::<Vector3<f64>>() / nodes.len() as f64;
     for load in 0..6 {
         let u = |node: u32| Vector3::from_fn(|i, _| U[(model.dofs.of(node as usize).start + i, load)]);
-        // The rigid motion about the centre nearest to that of the nodes, by least squares.
+        // Least squares fit of a rigid motion about the centre to the motion of the nodes.
         let rows = DMatrix::from_fn(3 * nodes.len(), 6, |row, j| {
             let r = mesh.nodes[nodes[row / 3] as usize] - centre;
             if j < 3 { f64::from(row % 3 == j) } else { -r.cross_matrix()[(row % 3, j - 3)] }
@@ -207,14 +207,13 @@ fn a_distributing_interface_moves_as_the_mean_of_its_nodes() {
         let found = [0, 3].map(|k| Vector3::new(C[(k, load)], C[(k + 1, load)], C[(k + 2, load)]));
         let gap = (found[0] - expected).norm() / C.view((0, load), (3, 1)).amax();
         let gap_turn = (found[1] - turn).norm() / C.view((3, load), (3, 1)).amax();
-        // measured 2e-10 and 5e-9 (the turn under a pull is small)
+        // measured 2e-10 and 5e-9 (the rotation under tension is small)
         assert!(gap < 1e-8 && gap_turn < 1e-7, "load {load}: {gap:.1e} {gap_turn:.1e}");
     }
 }
 
-/// Truth: Timoshenko's cantilever; nu = 0, so that the clamped end does not strain the beam.
-/// The error falls with the order of the element, and the
-/// Richardson limit lies next to the beam.
+/// Truth: Timoshenko's cantilever; nu = 0, so that the clamped end does not strain the beam. The
+/// error decreases with the order of the element, and the Richardson limit is close to the beam.
 #[test]
 fn a_cantilever_of_solids_converges_to_the_beam() {
     let material = Material::isotropic(200e9, 0.0, 7800.0);
@@ -236,7 +235,7 @@ fn a_cantilever_of_solids_converges_to_the_beam() {
             spd_inverse(&reduction.stiffness().view((6, 6), (6, 6)).into_owned()).unwrap()[(1, 1)]
         };
         let c = [tip(1), tip(2), tip(4)];
-        // Richardson: three meshes give order and limit.
+        // Richardson extrapolation: three meshes give order and limit.
         let ratio = (c[1] - c[0]) / (c[2] - c[1]);
         let limit = c[2] + (c[2] - c[1]) / (ratio - 1.0);
         let errors = c.map(|c| c / truth[(1, 1)] - 1.0);
@@ -254,8 +253,8 @@ fn a_cantilever_of_solids_converges_to_the_beam() {
     }
 }
 
-/// Truth: the compliance of the mesh itself. The joints of a chain add up to it, for any number of
-/// parts.
+/// Truth: compliance of the mesh itself. The joint compliances of a chain add up to it for any
+/// number of parts.
 #[test]
 fn a_chain_of_any_number_of_parts_has_the_compliance_of_the_mesh() {
     for tie in [Tie::Rigid, Tie::Distributing] {
@@ -275,11 +274,11 @@ fn a_chain_of_any_number_of_parts_has_the_compliance_of_the_mesh() {
     }
 }
 
-/// Truth: `C_k` of a piece of a uniform beam in closed form.
+/// Truth: closed-form `C_k` of a piece of a uniform beam.
 #[test]
 fn the_joints_of_a_uniform_beam_are_those_of_its_pieces() {
-    // Slices of whole elements: the energy is then shared exactly. Away from the clamped ends, nu =
-    // 0.
+    // Slices of whole elements, so that the energy is shared exactly. nu = 0 avoids effects of the
+    // clamped ends.
     let material = Material::isotropic(200e9, 0.0, 7800.0);
     let (mesh, a, b) = bar(ElementKind::Hex20, [16, 2, 2], [1.0, 0.05, 0.08], |p| p);
     let ends = vec![
@@ -298,8 +297,8 @@ fn the_joints_of_a_uniform_beam_are_those_of_its_pieces() {
         let x = joint.X_LS.translation.vector;
         assert!((x - Vector3::new(0.125 + 0.25 * k as f64, 0.0, 0.0)).norm() < 2e-3, "{x}");
         let C = joint.K_S.try_inverse().unwrap();
-        // Stretch and bending: the elements are exact. Shear and torsion: two elements across, and
-        // at the ends the section cannot warp.
+        // Stretch and bending: the elements are exact. Shear and torsion: only two elements across,
+        // and the section cannot warp at the ends.
         for (i, bound) in [(0, 1e-9), (1, 1e-2), (2, 1e-2), (3, 5e-2), (4, 1e-8), (5, 1e-8)] {
             let error = C[(i, i)] / C_S[(i, i)] - 1.0;
             // measured 4e-13, 9.6e-3, 7.4e-3, 4.2e-2, 1.5e-10, 3.1e-10
@@ -316,7 +315,7 @@ fn table(mesh: &Mesh, interfaces: Vec<Interface>, material: Material) -> (MeshRe
     let options = AssemblyOptions { quadrature: Quadrature::Exact, material: Some(material) };
     let model = FeModel::assemble(mesh, &options).unwrap();
     let reduction = Condensation::new(&model, &interfaces, CondensationOptions::default()).unwrap();
-    // Weight of the whole mesh along z, and where it takes B.
+    // Weight of the whole mesh along z, and the resulting deflection of B.
     let gravity = Vector3::new(0.0, 0.0, -9.81);
     let a = model.rigid_modes(&Vector3::zeros()) * Vector6::new(0.0, 0.0, gravity.z, 0.0, 0.0, 0.0);
     let F = model.M.product(&DMatrix::from_column_slice(a.nrows(), 1, a.as_slice()));
@@ -355,8 +354,8 @@ fn sag_and_first_frequency_of_a_chain_converge_to_those_of_the_mesh() {
     }
 }
 
-/// Third interface: the link between A and B does not feel a free branch, the superelement keeps
-/// it.
+/// Third interface: the link between A and B is not affected by a free branch; the superelement
+/// keeps it.
 #[test]
 fn a_third_interface_that_is_left_free_changes_nothing_between_the_first_two() {
     let (mesh, interfaces) = casting(ElementKind::Hex20, [Tie::Rigid; 2]);
@@ -407,7 +406,7 @@ fn loose_and_inverted_meshes_are_named() {
     let message = refuse(&inverted);
     assert!(message.contains("TET10 1 ") && message.contains("inverted"), "{message}");
 
-    // A second block of steel beside the first.
+    // A second, unconnected block of steel next to the first.
     let mut two = mesh.clone();
     let count = mesh.nodes.len() as u32;
     two.nodes.extend(mesh.nodes.iter().map(|p| p + Vector3::new(0.0, 1.0, 0.0)));
@@ -419,14 +418,14 @@ fn loose_and_inverted_meshes_are_named() {
     let message = refuse(&two);
     assert!(message.contains("2 parts") && message.contains("share no node"), "{message}");
 
-    // No material at all.
+    // No material.
     let mut none = plan(interfaces.clone(), STEEL, 0);
     none.assembly.material = None;
     let message = reduce_mesh(&mesh, &none, &mut |_| ()).unwrap_err().to_string();
     assert!(message.contains("\"box\" has no material"), "{message}");
 }
 
-/// A mechanism: two cubes joined at one node only. Its pivots are rounding, of either sign.
+/// A mechanism: two cubes joined at one node only. Its pivots are rounding errors of either sign.
 #[test]
 fn a_hinge_inside_the_mesh_is_reported_as_loose_however_it_is_turned() {
     let mut noise = Noise(3);
@@ -457,7 +456,7 @@ fn hinge_is_loose(X: &Pose) {
         range.filter(|n| (mesh.nodes[*n].x - x).abs() < 1e-9).map(|n| n as u32).collect::<Vec<u32>>()
     };
     let a = face(0.0, 0..left.nodes.len());
-    // B on the first cube too, so that the second one hangs on its corner.
+    // B is also on the first cube, so that the second one is attached only at a corner.
     let b = face(1.0, 0..left.nodes.len());
     let place = |p: Vector3<f64>| X.rotation * p + X.translation.vector;
     let ends = vec![
@@ -468,7 +467,7 @@ fn hinge_is_loose(X: &Pose) {
     assert!(message.contains("can move without force"), "{message}");
 }
 
-/// Moving the mesh moves everything with it.
+/// Transforming the mesh transforms all results with it.
 #[test]
 fn the_stiffness_of_a_turned_mesh_is_the_turned_stiffness() {
     let (mesh, interfaces) = casting(ElementKind::Hex8, [Tie::Rigid, Tie::Distributing]);
@@ -486,7 +485,7 @@ fn the_stiffness_of_a_turned_mesh_is_the_turned_stiffness() {
     assert!((moved.whole.com - place(straight.whole.com)).norm() < 1e-12);
 }
 
-/// What a reduction knows survives the file to the last bit.
+/// The details of a reduction are preserved in the file bit for bit.
 #[test]
 fn a_link_with_all_its_details_reads_back_the_same() {
     let (mesh, interfaces) = casting(ElementKind::Hex20, [Tie::Rigid, Tie::Distributing]);
@@ -507,7 +506,8 @@ fn a_link_with_all_its_details_reads_back_the_same() {
     assert!(error.contains("superelement") && error.contains("differs by 1.0e-2"), "{error}");
 }
 
-/// Motors and gears ride on the parts; the static model and the mesh's own checks do not see them.
+/// Attached bodies (motors, gears) are merged into the parts; the static model and the checks of
+/// the mesh ignore them.
 #[test]
 fn an_attached_body_stays_on_the_interface_on_whose_side_it_lies() {
     let (mesh, interfaces) = casting(ElementKind::Tet10, [Tie::Rigid; 2]);
@@ -527,20 +527,22 @@ fn an_attached_body_stays_on_the_interface_on_whose_side_it_lies() {
         result.link.details.as_ref().unwrap().chains[0].parts.iter().map(|p| p.mass).collect()
     };
     let gained: Vec<f64> = masses(&with).iter().zip(masses(&bare)).map(|(a, b)| a - b).collect();
-    // Not where its centre lies: that part would bend away under it, which the modal link and the
-    // two parts do not know.
+    // Not merged at the position of its centre: that part would deflect under its weight, unlike in
+    // the modal link and the two-part link.
     assert!((gained[0] - 12.0).abs() < 1e-12 && gained[1].abs() < 1e-12 && (gained[3] - 12.0).abs() < 1e-12);
     assert_eq!(with.link.K_BB, bare.link.K_BB);
 }
 
-/// Why chains share energy instead of chaining superelements: a section tied rigidly cannot warp,
-/// one tied by its mean can more than in one piece. Neither sum is the compliance of the link.
+/// Reason why chains share energy instead of chaining superelements: a rigidly tied section cannot
+/// warp, and a section tied by its mean can warp more than in one piece. Neither sum is the
+/// compliance of the link.
 #[test]
 fn segments_as_superelements_of_their_own_do_not_add_up_to_the_link() {
     let (mesh, interfaces) = casting(ElementKind::Hex20, [Tie::Rigid; 2]);
     let whole = reduce_mesh(&mesh, &plan(interfaces.clone(), STEEL, 0), &mut |_| ()).unwrap().link;
     let C = whole.tip_compliance().unwrap();
-    // Two halves: the elements before and after the middle, the nodes between them as a section.
+    // Two halves: the elements before and after the middle, with the nodes between them as a
+    // section.
     let options = AssemblyOptions { material: Some(STEEL), ..Default::default() };
     let centre = |nodes: &[u32]| nodes.iter().map(|n| mesh.nodes[*n as usize].x).sum::<f64>() / nodes.len() as f64;
     let half = |keep: &dyn Fn(f64) -> bool| {
@@ -575,12 +577,12 @@ fn segments_as_superelements_of_their_own_do_not_add_up_to_the_link() {
     }
 }
 
-/// Node sets of a file may hold reference nodes that no element uses; they change nothing.
+/// Node sets of a file may contain reference nodes that no element uses; they change nothing.
 #[test]
 fn nodes_without_an_element_have_no_say_in_a_tie() {
     let (mesh, interfaces) = casting(ElementKind::Tet10, [Tie::Distributing, Tie::Rigid]);
     let clean = reduce_mesh(&mesh, &plan(interfaces.clone(), STEEL, 0), &mut |_| ()).unwrap();
-    // Two nodes of no element: before all others and after them.
+    // Two nodes without an element: before all others and after them.
     let mut more = mesh.clone();
     more.nodes.insert(0, Vector3::new(0.3, 0.4, 0.5));
     more.nodes.push(Vector3::new(9.0, 9.0, 9.0));
@@ -600,7 +602,7 @@ fn nodes_without_an_element_have_no_say_in_a_tie() {
     assert!(error < 1e-9, "{error:.1e}");
 }
 
-/// A chain that does not belong to its link is refused by the file.
+/// A chain that does not match its link is rejected when the file is read.
 #[test]
 fn an_edited_chain_is_refused() {
     let (mesh, interfaces) = casting(ElementKind::Hex8, [Tie::Rigid; 2]);

@@ -1,8 +1,7 @@
-//! Up to eight tall columns side by side: the shape in which factors, masses and bases are passed
-//! over.
+//! Blocks of up to eight tall columns, the format for right-hand sides, mass products and bases.
 //!
-//! A row is one cache line. What is read once, an entry of a factor or of a matrix, serves all
-//! eight columns, and their numbers go through the vector units together. Sums run over the rows in
+//! A row is one cache line. An entry of a factor or matrix that is read once serves all eight
+//! columns, and their numbers go through the vector units together. Sums run over the rows in
 //! order, the same on every machine.
 
 use flexarm_spatial::Real;
@@ -10,52 +9,52 @@ use nalgebra::DMatrix;
 
 use super::vectors::{Wide, Work, quickly};
 
-/// Columns of a block.
+/// Number of columns of a block.
 pub const WIDTH: usize = 8;
 
-/// Rows that are worked on while they are in the first cache.
+/// Number of rows processed together so that they stay in the first-level cache.
 const PANEL: usize = 256;
 
-/// One row.
+/// One row of a block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(C, align(64))]
 pub struct Row(pub [f64; WIDTH]);
 
 impl Row {
-    /// Zeros.
+    /// Row of zeros.
     pub const ZERO: Self = Self([0.0; WIDTH]);
 }
 
-/// A small matrix over the columns of two blocks, by rows.
+/// Small matrix over the columns of two blocks, by rows.
 pub(super) type Small = [Row; WIDTH];
 
 /// Tall columns; those from `width` on are zero.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Block {
-    /// Row by row.
+    /// Rows of all columns.
     pub rows: Vec<Row>,
-    /// Columns in use.
+    /// Number of columns in use.
     pub width: usize,
 }
 
 impl Block {
-    /// Zeros.
+    /// Creates a block of zeros.
     ///
     /// # Panics
-    /// If there are more columns than fit.
+    /// If `width` exceeds [`WIDTH`].
     pub fn zeros(rows: usize, width: usize) -> Self {
         assert!(width <= WIDTH, "a block has at most {WIDTH} columns");
         Self { rows: vec![Row::ZERO; rows], width }
     }
 
-    /// Columns `first..first + width` of a tall matrix.
+    /// Copies the columns `first..first + width` of a tall matrix.
     pub fn of_columns(X: &DMatrix<f64>, first: usize, width: usize) -> Self {
         let mut block = Self::zeros(X.nrows(), width);
         block.set_columns(X, first);
         block
     }
 
-    /// The same, into the columns in use.
+    /// Copies columns of a tall matrix, from `first` on, into the columns in use.
     pub fn set_columns(&mut self, X: &DMatrix<f64>, first: usize) {
         for k in 0..self.width {
             let column = &X.as_slice()[(first + k) * X.nrows()..][..X.nrows()];
@@ -63,7 +62,7 @@ impl Block {
         }
     }
 
-    /// Puts the columns in use into a tall matrix, from column `first` on.
+    /// Copies the columns in use into a tall matrix, from column `first` on.
     pub fn put_columns(&self, X: &mut DMatrix<f64>, first: usize) {
         let n = X.nrows();
         for k in 0..self.width {
@@ -72,24 +71,24 @@ impl Block {
         }
     }
 
-    /// The tall matrix of the columns in use.
+    /// Returns the columns in use as a tall matrix.
     pub fn to_columns(&self) -> DMatrix<f64> {
         let mut X = DMatrix::zeros(self.rows.len(), self.width);
         self.put_columns(&mut X, 0);
         X
     }
 
-    /// `selfᵀ other`.
+    /// Computes `selfᵀ other`.
     pub fn gram(&self, other: &Self) -> DMatrix<f64> {
         grams(std::slice::from_ref(self), other)
     }
 
-    /// `self -= other C`.
+    /// Computes `self -= other C`.
     pub fn subtract_product(&mut self, other: &Self, C: &DMatrix<f64>) {
         subtract_products(self, std::slice::from_ref(other), C);
     }
 
-    /// `self <- self C`, of as many columns as C.
+    /// Computes `self <- self C`, with the number of columns of C.
     pub fn multiply(&mut self, C: &DMatrix<f64>) {
         let C_small = small(C, 0, self.width);
         quickly(Multiply { X: &mut self.rows, C: &C_small });
@@ -97,7 +96,7 @@ impl Block {
     }
 }
 
-/// `[V_1 V_2 ...]ᵀ X`.
+/// Computes `[V_1 V_2 ...]ᵀ X`.
 pub(crate) fn grams(basis: &[Block], X: &Block) -> DMatrix<f64> {
     let sums = quickly(Grams { basis, X: &X.rows });
     let rows: usize = basis.iter().map(|V| V.width).sum();
@@ -114,12 +113,12 @@ pub(crate) fn grams(basis: &[Block], X: &Block) -> DMatrix<f64> {
     result
 }
 
-/// `X -= [V_1 V_2 ...] C`.
+/// Computes `X -= [V_1 V_2 ...] C`.
 pub(crate) fn subtract_products(X: &mut Block, basis: &[Block], C: &DMatrix<f64>) {
     quickly(SubtractProducts { X: &mut X.rows, first: 0, basis, factors: &basis_factors(basis, C) });
 }
 
-/// The rows of C that belong to each block of a basis.
+/// Rows of C for each block of a basis.
 fn basis_factors(basis: &[Block], C: &DMatrix<f64>) -> Vec<Small> {
     let mut row = 0;
     let of = |V: &Block| {
@@ -129,8 +128,8 @@ fn basis_factors(basis: &[Block], C: &DMatrix<f64>) -> Vec<Small> {
     basis.iter().map(of).collect()
 }
 
-/// Combinations `[V_1 V_2 ...] C` of a basis, each of at most eight columns. They take the place of
-/// the basis, which they would be a good part of beside it.
+/// Computes combinations `[V_1 V_2 ...] C` of a basis, each of at most eight columns. They
+/// overwrite the basis, because both together would need much more memory.
 pub(crate) fn combine(basis: &mut Vec<Block>, combinations: &[DMatrix<f64>]) {
     let rows = basis.first().map_or(0, |V| V.rows.len());
     let factors: Vec<_> = combinations.iter().map(|C| basis_factors(basis, &-C)).collect();
@@ -152,7 +151,7 @@ pub(crate) fn combine(basis: &mut Vec<Block>, combinations: &[DMatrix<f64>]) {
     basis.iter_mut().zip(combinations).for_each(|(V, C)| V.width = C.ncols());
 }
 
-/// Rows `first..first + count` of C.
+/// Rows `first..first + count` of C, padded with zeros.
 fn small(C: &DMatrix<f64>, first: usize, count: usize) -> Small {
     let entry = |i: usize, j: usize| if i < count && j < C.ncols() { C[(first + i, j)] } else { 0.0 };
     std::array::from_fn(|i| Row(std::array::from_fn(|j| entry(i, j))))
@@ -181,7 +180,7 @@ impl Work for Grams<'_> {
     }
 }
 
-/// Rows `FIRST` to `FIRST + 3` of `sum += vᵀ x`.
+/// Adds rows `FIRST` to `FIRST + 3` of `vᵀ x` to `sum`.
 #[inline(always)]
 #[allow(clippy::needless_range_loop, reason = "indices keep the vectors in registers")]
 fn add_gram<T: Real, const P: usize, const FIRST: usize>(v: &[Row], x: &[Row], sum: &mut Small) {
@@ -202,7 +201,7 @@ fn add_gram<T: Real, const P: usize, const FIRST: usize>(v: &[Row], x: &[Row], s
 
 struct SubtractProducts<'a> {
     X: &'a mut [Row],
-    /// Row of the basis at which X begins.
+    /// Row of the basis where X starts.
     first: usize,
     basis: &'a [Block],
     factors: &'a [Small],
@@ -223,7 +222,7 @@ impl Work for SubtractProducts<'_> {
     }
 }
 
-/// `x -= v C` for the columns `FIRST` to `FIRST + 3` of v.
+/// Computes `x -= v C` for the columns `FIRST` to `FIRST + 3` of v.
 #[inline(always)]
 #[allow(clippy::needless_range_loop, reason = "indices keep the vectors in registers")]
 fn subtract<T: Real, const P: usize, const FIRST: usize>(x: &mut [Row], v: &[Row], C: &Small) {

@@ -22,34 +22,35 @@ use super::registers::clear_upper_halves;
 use super::symmetric::SparseSymmetric;
 use super::triangular::{self, Columns};
 
-/// Alignment of what faer works on (bytes).
+/// Memory alignment for faer, bytes.
 const ALIGNED: usize = 64;
 
 /// Size and cost of a factor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FactorFigures {
-    /// Unknowns.
+    /// Number of unknowns.
     pub size: usize,
-    /// Stored entries of the lower triangle of the matrix.
+    /// Number of stored entries of the lower triangle of the matrix.
     pub matrix_entries: usize,
-    /// Stored entries of the factor, with the zeros below the diagonal inside its dense blocks.
+    /// Number of stored entries of the factor, including zeros below the diagonal in its dense
+    /// blocks.
     pub factor_entries: usize,
-    /// The order that was used.
+    /// Ordering used.
     pub ordering: Ordering,
 }
 
-/// Why there is no factor.
+/// Errors of a factorisation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NotPositiveDefinite {
-    /// A pivot was not positive.
+    /// A pivot is not positive.
     Pivot {
-        /// Unknown, as numbered in the matrix.
+        /// Number of the unknown in the matrix.
         unknown: usize,
     },
-    /// Not enough memory for the factor.
+    /// There is not enough memory for the factor.
     OutOfMemory {
-        /// Entries it would have had, if known.
+        /// Number of entries required, if known.
         entries: usize,
     },
 }
@@ -64,7 +65,7 @@ impl fmt::Display for NotPositiveDefinite {
     }
 }
 
-/// The factor `P K Pᵀ = L Lᵀ` of a sparse symmetric positive definite matrix.
+/// Factor `P K Pᵀ = L Lᵀ` of a sparse symmetric positive definite matrix.
 pub struct Cholesky {
     symbolic: SymbolicCholesky<u32>,
     columns: Columns,
@@ -79,11 +80,11 @@ impl fmt::Debug for Cholesky {
 }
 
 impl Cholesky {
-    /// Factorises `K`, which is given away: of the memory that a factorisation needs it would be a
-    /// tenth.
+    /// Factorises `K`. Takes `K` by value to free it early: it is a tenth of the memory of a
+    /// factorisation.
     ///
     /// # Errors
-    /// [`NotPositiveDefinite`], with the unknown at which it was found.
+    /// [`NotPositiveDefinite`], with the unknown of the failing pivot.
     pub fn new(K: SparseSymmetric, ordering: Ordering) -> Result<Self, NotPositiveDefinite> {
         let (n, matrix_entries, diagonal) = (K.size(), K.stored(), K.diagonal());
         let (symbolic, ordering) = analyse(&K, ordering)?;
@@ -106,15 +107,15 @@ impl Cholesky {
         Ok(Self { symbolic, columns, figures, smallest_pivot })
     }
 
-    /// Size and cost.
+    /// Size and cost of the factor.
     pub fn figures(&self) -> FactorFigures {
         self.figures
     }
 
-    /// Smallest pivot `L_jj²` over the diagonal entry of the matrix it came from, and its unknown.
+    /// Minimum pivot `L_jj²` relative to the diagonal entry of the matrix, and its unknown.
     ///
-    /// Near rounding (1e-16 to 1e-12) where the matrix is singular but passed by the sign of an
-    /// error.
+    /// Near rounding (1e-16 to 1e-12) if the matrix is singular and only passed because of the sign
+    /// of a rounding error.
     pub fn smallest_pivot(&self) -> (f64, usize) {
         self.smallest_pivot
     }
@@ -122,7 +123,7 @@ impl Cholesky {
     /// Replaces `B` by `K⁻¹ B`.
     ///
     /// # Panics
-    /// If `B` has another number of rows.
+    /// If the number of rows of `B` is wrong.
     pub fn solve_in_place(&self, B: &mut DMatrix<f64>) {
         assert_eq!(B.nrows(), self.figures.size, "right-hand side of another size");
         for first in (0..B.ncols()).step_by(WIDTH) {
@@ -135,13 +136,13 @@ impl Cholesky {
     /// Replaces `B` by `K⁻¹ B`.
     ///
     /// # Panics
-    /// If `B` has another number of rows.
+    /// If the number of rows of `B` is wrong.
     pub fn solve_block(&self, B: &mut Block) {
         assert_eq!(B.rows.len(), self.figures.size, "right-hand side of another size");
         self.solve_rows(&mut B.rows, None);
     }
 
-    /// The same for right-hand sides by rows, of which the unknowns are those in `at`, or all.
+    /// As [`Self::solve_block`] for rows; the unknowns are the rows `at`, or all rows.
     pub(crate) fn solve_rows(&self, B: &mut [Row], at: Option<&[u32]>) {
         let order = self.symbolic.perm().map(|perm| perm.arrays().0);
         let place = |k: usize| {
@@ -156,7 +157,7 @@ impl Cholesky {
     }
 }
 
-/// The blocks of the factor; none of a matrix without unknowns.
+/// Supernodes of the factor; `None` for a matrix without unknowns.
 fn supernodes(symbolic: &SymbolicCholesky<u32>) -> Option<&SymbolicSupernodalCholesky<u32>> {
     match symbolic.raw() {
         SymbolicCholeskyRaw::Supernodal(raw) => Some(raw),
@@ -165,14 +166,14 @@ fn supernodes(symbolic: &SymbolicCholesky<u32>) -> Option<&SymbolicSupernodalCho
     }
 }
 
-/// The unknown that is eliminated as number `k`.
+/// Unknown that is eliminated as number `k`.
 fn unknown_at(symbolic: &SymbolicCholesky<u32>, k: usize) -> usize {
     symbolic.perm().map_or(k, |perm| perm.arrays().0[k] as usize)
 }
 
-/// The lower triangle of `P K Pᵀ`; rows of a column in any order.
+/// Lower triangle of `P K Pᵀ`; the rows of a column are in any order.
 ///
-/// * `position`: number at which each unknown is eliminated.
+/// * `position`: elimination number of each unknown.
 fn in_order(K: &SparseSymmetric, position: Option<&[u32]>) -> SparseColMat<u32, f64> {
     let (n, pattern) = (K.size(), K.pattern());
     let place = |unknown: usize| position.map_or(unknown as u32, |position| position[unknown]);
@@ -197,11 +198,11 @@ fn in_order(K: &SparseSymmetric, position: Option<&[u32]>) -> SparseColMat<u32, 
     SparseColMat::new(SymbolicSparseColMat::new_unsorted_checked(n, n, starts, None, rows), values)
 }
 
-/// The factor of a matrix whose unknowns are in the order of elimination. The pivot of an error is
-/// counted in that order.
+/// Factorises a matrix whose unknowns are in elimination order. The pivot of an error is numbered
+/// in that order.
 ///
-/// On one thread: with more, faer 0.24 gives wrong factors now and then, without an error
-/// (private-gemm-x86 0.1.22; errors of 6 in a matrix of diagonals of 30 were seen).
+/// Single-threaded: with more threads, faer 0.24 occasionally computes wrong factors without an
+/// error (private-gemm-x86 0.1.22; errors of 6 were seen in a matrix with diagonals of 30).
 fn factorise(
     supernodes: &SymbolicSupernodalCholesky<u32>,
     K: &SparseColMat<u32, f64>,
@@ -211,7 +212,7 @@ fn factorise(
     let mut values = Vec::new();
     values.try_reserve_exact(entries + ALIGNED / size_of::<f64>()).map_err(|_| out_of_memory)?;
     values.resize(values.capacity(), 0.0);
-    // The order in which faer sums depends on the address.
+    // The summation order in faer depends on the memory address, so the start is aligned.
     let start = values.as_ptr().align_offset(ALIGNED);
     let scratch = factorize_supernodal_numeric_llt_scratch::<u32, f64>(supernodes, Par::Seq, Spec::default());
     let mut memory = MemBuffer::try_new(scratch).map_err(|_| out_of_memory)?;
@@ -237,7 +238,7 @@ fn factorise(
     }
 }
 
-/// Over the unknowns: `L_jj² / K_jj`, smallest, with its unknown.
+/// Minimum of `L_jj² / K_jj` over the unknowns, with its unknown.
 fn smallest_pivot(symbolic: &SymbolicCholesky<u32>, columns: &Columns, diagonal: &[f64]) -> (f64, usize) {
     let mut smallest = (f64::INFINITY, 0);
     let Some(supernodes) = supernodes(symbolic) else { return smallest };
@@ -247,7 +248,7 @@ fn smallest_pivot(symbolic: &SymbolicCholesky<u32>, columns: &Columns, diagonal:
             let unknown = unknown_at(symbolic, node.first + k);
             let L_jj = node.entries[node.start_of(k)];
             let ratio = L_jj * L_jj / diagonal[unknown];
-            // A NaN counts as the smallest of all.
+            // NaN counts as the minimum.
             if !(ratio >= smallest.0) {
                 smallest = (ratio, unknown);
             }
@@ -287,7 +288,7 @@ fn analyse(K: &SparseSymmetric, ordering: Ordering) -> Result<(SymbolicCholesky<
 mod tests {
     use super::*;
 
-    /// Parts of `part` unknowns, each coupled to all others of its part and to none outside.
+    /// Groups of `part` unknowns, each coupled to all others of its group and to none outside.
     fn parts(n: usize, part: usize) -> SparseSymmetric {
         let mut triplets = Vec::new();
         for i in 0..n {
@@ -315,8 +316,8 @@ mod tests {
         }
     }
 
-    /// Truth: the residual. Large dense blocks, many small ones, and a grid whose separators are
-    /// both.
+    /// Truth: the residual, for one large dense block, many small ones, and a grid, whose
+    /// separators give both.
     #[test]
     fn a_factor_of_large_and_small_blocks_solves_its_matrix_and_has_the_same_bits_each_time() {
         let side = 16;

@@ -1,4 +1,4 @@
-//! Products of tall matrices, through faer's kernels.
+//! Products of tall matrices with the kernels of faer.
 
 use faer::diag::Diag;
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -18,7 +18,7 @@ pub(super) fn view_mut(A: &mut DMatrix<f64>) -> MatMut<'_, f64> {
     MatMut::from_column_major_slice_mut(A.as_mut_slice(), rows, columns)
 }
 
-/// `Aᵀ B`.
+/// Computes `Aᵀ B`.
 pub(crate) fn gram(A: &DMatrix<f64>, B: &DMatrix<f64>) -> DMatrix<f64> {
     let mut result = DMatrix::zeros(A.ncols(), B.ncols());
     matmul(view_mut(&mut result), Accum::Replace, view(A).transpose(), view(B), 1.0, Par::Seq);
@@ -26,15 +26,15 @@ pub(crate) fn gram(A: &DMatrix<f64>, B: &DMatrix<f64>) -> DMatrix<f64> {
     result
 }
 
-/// `C += factor A B`.
+/// Computes `C += factor A B`.
 pub(crate) fn add_product(C: &mut DMatrix<f64>, factor: f64, A: &DMatrix<f64>, B: &DMatrix<f64>) {
     matmul(view_mut(C), Accum::Add, view(A), view(B), factor, Par::Seq);
     clear_upper_halves();
 }
 
-/// Eigenvalues, ascending, and eigenvectors of a symmetric matrix; `None` if it is not finite.
+/// Ascending eigenvalues, and eigenvectors of a symmetric matrix; `None` if they are not finite.
 ///
-/// In faer's own memory: the order in which faer sums depends on the address.
+/// The results are in memory allocated by faer, because its summation order depends on the address.
 pub(super) fn symmetric_eigen(A: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
     let n = A.nrows();
     let (mut values, mut vectors) = (Diag::zeros(n), Mat::<f64>::zeros(n, n));

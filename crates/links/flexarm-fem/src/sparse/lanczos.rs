@@ -6,13 +6,13 @@
 //! H = Vᵀ M K⁻¹ M V: block tridiagonal of A_j and R_j,   H s = θ s
 //! ‖K⁻¹ M φ - θ φ‖_M = ‖R_{j+1} s_last‖   for φ = V s
 //! ```
-//! All basis vectors are kept M-orthonormal, so no ghost modes appear; a block of eight finds
+//! All basis vectors are kept M-orthonormal, so no ghost modes appear. A block of eight finds
 //! multiple frequencies (the two bending planes of a round tube) together, and one pass over the
-//! factor serves the whole block. The operator is given as two closures, so that constraints stay
-//! outside.
+//! factor serves the whole block. The operator is given as two closures, so that the caller handles
+//! constraints.
 //!
-//! Modes of the same body without one of its supports come from the same basis
-//! ([`modes_of_two_supports`]): no further solves.
+//! Modes of the same body with one support released come from the same basis
+//! ([`modes_of_two_supports`]), without further solves.
 //!
 //! Source: Grimes, Lewis & Simon (1994), A shifted block Lanczos algorithm, sections 2 and 4, with
 //! full reorthogonalisation in place of their selective one.
@@ -29,50 +29,50 @@ use super::dense::symmetric_eigen;
 pub(crate) use basis::orthonormalising;
 pub use released::Released;
 
-/// Residual `‖K⁻¹ M φ - θ φ‖_M / θ` at which a mode counts as found.
+/// Residual `‖K⁻¹ M φ - θ φ‖_M / θ` below which a mode is converged.
 const TOLERANCE: f64 = 1e-10;
 
-/// The pencil, by what it does to blocks of vectors.
+/// Pencil (K, M), given by its action on blocks of vectors.
 pub struct Pencil<'a> {
     /// Length of a vector.
     pub rows: usize,
-    /// Of the space that `solve` maps into, at most `rows`.
+    /// Dimension of the range of `solve`, at most `rows`.
     pub dimension: usize,
-    /// Replaces F by `K⁻¹ F`, with every constraint fulfilled.
+    /// Replaces F by `K⁻¹ F`, with all constraints satisfied.
     pub solve: &'a mut dyn FnMut(&mut Block),
-    /// `Y = M X`.
+    /// Computes `Y = M X`.
     pub mass: &'a mut dyn FnMut(&Block, &mut Block),
 }
 
-/// Which modes are asked for.
+/// Selection of modes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ModesWanted {
-    /// The lowest ones, so many.
+    /// This number of lowest modes.
     Count(usize),
-    /// All below a bound on ω² in (rad/s)², but at most `at_most`.
+    /// All modes below a bound on ω².
     Below {
         /// Bound on ω², (rad/s)².
         omega2: f64,
-        /// Refuse to return more than this.
+        /// Maximum number of modes; more are an error.
         at_most: usize,
     },
 }
 
-/// Modes, ascending.
+/// Modes, in ascending order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Modes {
     /// Squared natural frequencies, (rad/s)².
     pub omega2: Vec<f64>,
-    /// Shapes by columns, mass-normalised, largest component positive.
+    /// Mass-normalised shapes as columns, with the largest component positive.
     pub shapes: DMatrix<f64>,
     /// `‖K⁻¹ M φ - θ φ‖_M / θ` of each mode, from the recurrence.
     pub residuals: Vec<f64>,
-    /// Right-hand sides solved; none where the basis of other modes had them.
+    /// Number of right-hand sides solved; zero if another basis was reused.
     pub solves: usize,
 }
 
 impl Modes {
-    /// No modes of a system with so many rows.
+    /// Empty set of modes of a system with `rows` rows.
     pub fn none(rows: usize) -> Self {
         Self { omega2: Vec::new(), shapes: DMatrix::zeros(rows, 0), residuals: Vec::new(), solves: 0 }
     }
@@ -82,7 +82,7 @@ impl Modes {
         self.omega2.len()
     }
 
-    /// Whether there are none.
+    /// Whether there are no modes.
     pub fn is_empty(&self) -> bool {
         self.omega2.is_empty()
     }
@@ -93,38 +93,38 @@ impl Modes {
     }
 }
 
-/// Why the modes were not found.
+/// Errors of computing modes.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ModesError {
-    /// The basis grew to its limit first.
+    /// The basis reached its size limit before convergence.
     #[error(
         "{found} of {wanted} modes found with a basis of {basis} vectors; the worst of the others has a residual of {residual:.1e}"
     )]
     NotConverged {
-        /// Modes that were found.
+        /// Number of converged modes.
         found: usize,
-        /// Modes that were asked for.
+        /// Number of requested modes.
         wanted: usize,
-        /// Vectors in the basis.
+        /// Number of vectors in the basis.
         basis: usize,
-        /// Largest residual among the wanted ones.
+        /// Maximum residual of the requested modes.
         residual: f64,
     },
-    /// The frequency bound lets in more modes than allowed.
+    /// More modes than allowed are below the frequency bound.
     #[error("more than {at_most} modes lie below the bound; lower the bound or ask for a number of modes")]
     TooMany {
-        /// The limit.
+        /// Maximum number of modes.
         at_most: usize,
     },
-    /// A product with M or K⁻¹ gave a NaN or an infinity.
+    /// A product with M or K⁻¹ is NaN or infinite.
     #[error("the eigenproblem gave a number that is not finite: is the mass zero or the stiffness singular?")]
     NotFinite,
 }
 
-/// The lowest modes of a pencil.
+/// Computes the lowest modes of a pencil.
 ///
-/// Fewer modes than asked for are returned only where the space has no more.
+/// Returns fewer modes than requested only if the space has no more.
 ///
 /// # Errors
 /// [`ModesError`].
@@ -149,13 +149,14 @@ pub fn smallest_modes(pencil: &mut Pencil<'_>, wanted: ModesWanted) -> Result<Mo
     Ok(modes)
 }
 
-/// The lowest modes of a pencil, and so many of the same without some support, from one basis.
+/// Computes the lowest modes of a pencil, and `released_count` modes with one support released,
+/// from one basis.
 ///
 /// ```text
-/// K_r⁻¹ = K⁻¹ + T C Tᵀ                                T: static shapes of the support that is taken away, C = (Tᵀ K T)⁻¹
+/// K_r⁻¹ = K⁻¹ + T C Tᵀ                                T: static shapes of the released support, C = (Tᵀ K T)⁻¹
 /// K_r⁻¹ M [V T] = [V T] P + V_{j+1} R_{j+1} s_last    where V begins with K⁻¹ M T
 /// ```
-/// The basis of the one pencil, with T beside it, is a Lanczos basis of the other one.
+/// The basis of the first pencil, extended by T, is a Lanczos basis of the second.
 ///
 /// # Errors
 /// [`ModesError`].
@@ -194,7 +195,7 @@ pub fn modes_of_two_supports(
 }
 
 impl ModesWanted {
-    /// How many have to be looked for in a space of this dimension.
+    /// Number of modes to compute in a space of this dimension.
     fn count(self, dimension: usize) -> usize {
         match self {
             Self::Count(count) => count.min(dimension),
@@ -206,15 +207,15 @@ impl ModesWanted {
 /// Eigenpairs of a projected operator, largest θ first.
 struct Ritz {
     theta: Vec<f64>,
-    /// Over the basis.
+    /// Eigenvectors over the basis.
     vectors: DMatrix<f64>,
-    /// Over the shapes of a support that is taken away; no rows where there are none.
+    /// Components over the shapes of a released support; no rows if there is none.
     beside: DMatrix<f64>,
     residuals: Vec<f64>,
 }
 
 impl Ritz {
-    /// Eigenpairs of `H`; `None` if it is not finite.
+    /// Positive eigenvalues of `H` and their eigenvectors; `None` if not finite.
     fn of(H: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
         let (eigenvalues, eigenvectors) = symmetric_eigen(H)?;
         let positive: Vec<usize> = (0..eigenvalues.len()).rev().filter(|k| eigenvalues[*k] > 0.0).collect();
@@ -225,7 +226,7 @@ impl Ritz {
         self.residuals.iter().take_while(|r| **r <= TOLERANCE).count()
     }
 
-    /// Number of modes to return, once that is certain.
+    /// Returns the number of modes to return, once it is certain.
     fn settled(&self, wanted: ModesWanted, count: usize, basis: &Basis) -> Result<Option<usize>, ModesError> {
         let exhausted = basis.is_exhausted();
         let good = if exhausted { self.theta.len() } else { self.converged() };
@@ -236,7 +237,7 @@ impl Ritz {
                 if below > at_most {
                     return Err(ModesError::TooMany { at_most });
                 }
-                // One converged mode above the bound shows that none below is missing.
+                // One converged mode above the bound shows that no mode below it is missing.
                 Ok((below < good || exhausted).then_some(below))
             }
         }
@@ -248,7 +249,7 @@ mod tests {
     use super::*;
     use crate::sparse::{Cholesky, Ordering, SparseSymmetric};
 
-    /// Chain of unit masses and springs, both ends held: ω² = 4 sin²(kπ/(2(n+1))).
+    /// Chain of unit masses and springs, both ends fixed: ω² = 4 sin²(kπ/(2(n+1))).
     fn chain(n: usize, copies: usize) -> (SparseSymmetric, Vec<f64>) {
         let mut triplets = Vec::new();
         for copy in 0..copies {
@@ -302,7 +303,7 @@ mod tests {
         assert_eq!(refused.unwrap_err(), ModesError::TooMany { at_most: 5 });
     }
 
-    /// A mass that is zero wherever the body can move: an error, not a panic.
+    /// A mass that is zero for every possible motion: an error, not a panic.
     #[test]
     fn a_body_without_mass_has_no_modes() {
         let (K, _) = chain(20, 1);

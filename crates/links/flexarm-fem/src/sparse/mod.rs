@@ -1,5 +1,5 @@
-//! Sparse symmetric matrices: storage, products, Cholesky factors, eigenpairs. The one place that
-//! names faer.
+//! Sparse symmetric matrices: storage, products, Cholesky factors, eigenpairs. The only module that
+//! uses faer.
 //!
 //! ```text
 //! SparseSymmetric --(Ordering)--> Cholesky --solve--> K⁻¹ F        eight right-hand sides at a time
@@ -7,10 +7,10 @@
 //!                                 smallest_modes: shift-invert block Lanczos on any operator (K, M)
 //! ```
 //! Only the lower triangle is stored, by columns. Tall results are nalgebra matrices, one column
-//! per right-hand side; whatever reads a factor, a matrix or a basis takes them as [`Block`]s, row
-//! by row.
+//! per right-hand side; operations on a factor, matrix or basis take them as [`Block`]s, row by
+//! row.
 //!
-//! Not here: what the rows mean. Degrees of freedom, ties and boundaries are the business of
+//! Not here: the meaning of the rows. Degrees of freedom, ties and boundaries belong to
 //! [`crate::reduction`].
 
 mod block;

@@ -1,14 +1,14 @@
-//! Fill-reducing order of the unknowns.
+//! Fill-reducing ordering of the unknowns.
 //!
-//! Approximate minimum degree (faer's own) is good for thin-walled castings up to some 10⁵
-//! unknowns; nested dissection (METIS) fills less on large and solid ones. METIS works on groups of
-//! unknowns with equal neighbours, which for a mesh are its nodes.
+//! Approximate minimum degree (from faer) is good for thin-walled castings up to about 10⁵
+//! unknowns; nested dissection (METIS) produces less fill for large and solid ones. METIS works on
+//! groups of unknowns with equal neighbours, which for a mesh are its nodes.
 //!
 //! Source: Amestoy, Davis & Duff (1996); Karypis & Kumar (1998), METIS 5.2.
 
 use super::symmetric::Pattern;
 
-/// How the unknowns are ordered before factorisation.
+/// Ordering of the unknowns before factorisation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Ordering {
     /// Approximate minimum degree up to 20,000 unknowns, nested dissection above.
@@ -16,15 +16,15 @@ pub enum Ordering {
     Auto,
     /// Approximate minimum degree.
     MinimumDegree,
-    /// Nested dissection by METIS, with a fixed seed: the same order on every run.
+    /// Nested dissection by METIS, with a fixed seed: the same ordering on every run.
     NestedDissection,
 }
 
-/// Unknowns from which [`Ordering::Auto`] takes nested dissection.
+/// Number of unknowns from which [`Ordering::Auto`] selects nested dissection.
 const NESTED_FROM: usize = 20_000;
 
 impl Ordering {
-    /// The choice for `size` unknowns; never [`Ordering::Auto`].
+    /// Resolves [`Ordering::Auto`] for `size` unknowns.
     pub fn resolve(self, size: usize) -> Self {
         match self {
             Self::Auto if size >= NESTED_FROM => Self::NestedDissection,
@@ -34,10 +34,10 @@ impl Ordering {
     }
 }
 
-/// Order of elimination by nested dissection: `order[k]` is eliminated as number `k`.
+/// Computes a nested dissection ordering: `order[k]` is eliminated as number `k`.
 ///
-/// `None` where METIS declines (out of memory, or more than 2³¹ neighbours), and where nothing is
-/// coupled: it divides by zero.
+/// `None` if METIS fails (out of memory, or more than 2³¹ neighbours), and if no unknowns are
+/// coupled, because METIS then divides by zero.
 pub(super) fn nested_dissection(pattern: &Pattern) -> Option<Vec<u32>> {
     let (group_of, groups) = group_equal_columns(pattern);
     let graph = Graph::of_groups(pattern, &group_of, groups.len()).filter(Graph::has_edges)?;
@@ -45,7 +45,7 @@ pub(super) fn nested_dissection(pattern: &Pattern) -> Option<Vec<u32>> {
     Some(order.into_iter().flat_map(|group| groups[group as usize].clone()).collect())
 }
 
-/// Consecutive unknowns with the same rows below them: the DoF of one mesh node.
+/// Groups consecutive unknowns with the same rows below them: the DoF of one mesh node.
 fn group_equal_columns(pattern: &Pattern) -> (Vec<u32>, Vec<std::ops::Range<u32>>) {
     let n = pattern.size();
     let (mut group_of, mut groups): (Vec<u32>, Vec<std::ops::Range<u32>>) = (Vec::with_capacity(n), Vec::new());
@@ -64,7 +64,7 @@ fn group_equal_columns(pattern: &Pattern) -> (Vec<u32>, Vec<std::ops::Range<u32>
     (group_of, groups)
 }
 
-/// Adjacency of the groups, both directions, without loops: the arrays that METIS takes.
+/// Adjacency of the groups in both directions, without self-loops, as METIS expects it.
 struct Graph {
     starts: Vec<i32>,
     neighbours: Vec<i32>,
@@ -75,7 +75,7 @@ impl Graph {
         let mut edges: Vec<(u32, u32)> = Vec::new();
         let mut last = u32::MAX;
         for j in 0..pattern.size() {
-            // One column of each group is enough: the first one sees them all.
+            // One column of each group is enough: the first one has the neighbours of all.
             let group = group_of[j];
             if group == last {
                 continue;
@@ -126,7 +126,7 @@ fn metis_node_nd(mut graph: Graph, weights: &[i32]) -> Option<Vec<u32>> {
     let mut weights = weights.to_vec();
     let mut options = [0_i32; metis_sys::METIS_NOPTIONS as usize];
     let (mut order, mut position) = (vec![0_i32; weights.len()], vec![0_i32; weights.len()]);
-    // SAFETY: the graph is symmetric, in range and of the lengths that METIS_NodeND documents;
+    // SAFETY: the graph is symmetric, in range and has the lengths that METIS_NodeND documents;
     // options has METIS_NOPTIONS entries; both results have one entry per vertex.
     let status = unsafe {
         metis_sys::METIS_SetDefaultOptions(options.as_mut_ptr());
@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn nested_dissection_orders_every_unknown_once_and_keeps_nodes_together() {
-        // A 6 x 6 grid of nodes with three unknowns each, coupled to the neighbours.
+        // A 6 x 6 grid of nodes with three unknowns each, coupled to their neighbours.
         let node = |x: u32, y: u32| 6 * y + x;
         let mut triplets = Vec::new();
         for y in 0..6 {

@@ -1,10 +1,11 @@
-//! Vector registers after faer's kernels.
+//! Clearing of vector registers after faer's kernels.
 //!
-//! Its kernels in assembly leave the upper halves of the registers in use. The processor then keeps
-//! them through every instruction that works on the lower halves alone, which is most of this
+//! Its assembly kernels leave the upper halves of the registers in use. The processor then
+//! preserves them in every instruction that uses only the lower halves, which is most of this
+//! program, at a third of the speed, until they are cleared.
 //! program, at a third of its speed, until they are cleared.
 
-/// Work that ends as every function over lanes does: with all upper halves cleared.
+/// Empty work over lanes, which ends like all such functions with the upper halves cleared.
 #[cfg(target_arch = "x86_64")]
 struct Clear;
 
@@ -14,14 +15,14 @@ impl flexarm_spatial::lanes::OverLanes for Clear {
 
     #[inline(always)]
     fn run<T: flexarm_spatial::Real>(self) -> bool {
-        // Numbers that differ, so that the upper halves are needed.
+        // Different numbers, so that the upper halves are needed.
         let mut x = T::splat(std::hint::black_box(1.0));
         x.set_lane(T::LANES - 1, std::hint::black_box(2.0));
         (x + x).all_below(5.0)
     }
 }
 
-/// To be called on a thread when faer has worked there.
+/// Clears the upper halves; call it on a thread after faer has run there.
 #[inline(never)]
 pub(super) fn clear_upper_halves() {
     #[cfg(target_arch = "x86_64")]

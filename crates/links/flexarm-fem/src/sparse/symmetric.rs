@@ -8,10 +8,10 @@ use nalgebra::DMatrix;
 use super::block::{Block, Row, WIDTH};
 use super::vectors::{Wide, Work, quickly};
 
-/// Where the entries of a lower triangle are, by columns; rows ascend within a column.
+/// Positions of the entries of a lower triangle, by columns; rows ascend within a column.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pattern {
-    /// Start of each column in `rows`; one more than there are columns.
+    /// Start of each column in `rows`; one more entry than columns.
     pub starts: Vec<u32>,
     /// Row of each entry, at least its column.
     pub rows: Vec<u32>,
@@ -23,12 +23,12 @@ impl Pattern {
         self.starts.len() - 1
     }
 
-    /// The entries of column `j`.
+    /// Range of the entries of column `j`.
     pub fn column(&self, j: usize) -> std::ops::Range<usize> {
         self.starts[j] as usize..self.starts[j + 1] as usize
     }
 
-    /// Position of the entry (`i`, `j`), `i >= j`, if it is there.
+    /// Index of the entry (`i`, `j`), `i >= j`, if it is in the pattern.
     pub fn find(&self, i: usize, j: usize) -> Option<usize> {
         let column = self.column(j);
         let found = self.rows[column.clone()].binary_search(&(i as u32)).ok()?;
@@ -36,25 +36,25 @@ impl Pattern {
     }
 }
 
-/// Symmetric matrix of which the lower triangle is stored.
+/// Symmetric matrix stored as its lower triangle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SparseSymmetric {
     pattern: Arc<Pattern>,
-    /// One per entry of the pattern.
+    /// Value of each entry of the pattern.
     pub values: Vec<f64>,
 }
 
 impl SparseSymmetric {
-    /// Matrix of zeros with room for the entries of `pattern`.
+    /// Zero matrix with room for the entries of `pattern`.
     pub fn zeros(pattern: Arc<Pattern>) -> Self {
         let values = vec![0.0; pattern.rows.len()];
         Self { pattern, values }
     }
 
-    /// Matrix from entries of the lower triangle in any order; entries of one place are summed.
+    /// Creates a matrix from entries of the lower triangle in any order; duplicates are summed.
     ///
     /// # Panics
-    /// If an entry lies outside, or above the diagonal: the caller's bookkeeping is broken.
+    /// If an entry is out of range or above the diagonal, which is an error of the caller.
     pub fn from_triplets(size: usize, triplets: &[(u32, u32, f64)]) -> Self {
         // Counting sort by column, then each short column by row.
         let mut starts = vec![0_u32; size + 1];
@@ -98,35 +98,35 @@ impl SparseSymmetric {
         self.pattern.size()
     }
 
-    /// Where its entries are.
+    /// Pattern of the entries.
     pub fn pattern(&self) -> &Arc<Pattern> {
         &self.pattern
     }
 
-    /// Stored entries: the lower triangle with its diagonal.
+    /// Number of stored entries: the lower triangle with the diagonal.
     pub fn stored(&self) -> usize {
         self.values.len()
     }
 
-    /// The diagonal.
+    /// Diagonal entries.
     pub fn diagonal(&self) -> Vec<f64> {
         (0..self.size()).map(|j| self.pattern.find(j, j).map_or(0.0, |at| self.values[at])).collect()
     }
 
-    /// The product `A X`.
+    /// Computes the product `A X`.
     ///
     /// # Panics
-    /// If `X` has another number of rows.
+    /// If `X` does not have [`Self::size`] rows.
     pub fn product(&self, X: &DMatrix<f64>) -> DMatrix<f64> {
         let mut Y = DMatrix::zeros(X.nrows(), X.ncols());
         self.product_into(X, &mut Y);
         Y
     }
 
-    /// `Y = A X`.
+    /// Computes `Y = A X`.
     ///
     /// # Panics
-    /// If the shapes do not fit.
+    /// If the shapes do not match.
     pub fn product_into(&self, X: &DMatrix<f64>, Y: &mut DMatrix<f64>) {
         let n = self.size();
         assert!(
@@ -147,14 +147,14 @@ impl SparseSymmetric {
         }
     }
 
-    /// `y += A x`.
+    /// Computes `y += A x`.
     fn add_vector_product(&self, x: &[f64], y: &mut [f64]) {
         for j in 0..self.size() {
             let entries = self.pattern.column(j);
             let (mut sum, x_j) = (0.0, x[j]);
             for (row, value) in self.pattern.rows[entries.clone()].iter().zip(&self.values[entries]) {
                 let i = *row as usize;
-                // The diagonal entry would be counted twice: it goes through `sum` alone.
+                // The diagonal entry is only added through `sum`, otherwise it would count twice.
                 if i != j {
                     y[i] += value * x_j;
                 }
@@ -164,16 +164,16 @@ impl SparseSymmetric {
         }
     }
 
-    /// `Y += A X`, each column with the bits of a product by itself.
+    /// Computes `Y += A X`; each column is bitwise equal to the product of that column alone.
     ///
     /// # Panics
-    /// If the shapes do not fit.
+    /// If the shapes do not match.
     pub fn add_block_product(&self, X: &Block, Y: &mut Block) {
         assert!(X.rows.len() == self.size() && Y.rows.len() == self.size(), "blocks of another size");
         quickly(BlockProduct { A: self, X: &X.rows, Y: &mut Y.rows });
     }
 
-    /// The rows and columns in `keep` (ascending), in that order.
+    /// Extracts the rows and columns in `keep` (ascending), in that order.
     pub fn submatrix(&self, keep: &[u32]) -> Self {
         let mut position = vec![u32::MAX; self.size()];
         for (new, old) in keep.iter().enumerate() {

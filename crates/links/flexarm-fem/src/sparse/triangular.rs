@@ -4,9 +4,9 @@
 //! L y = b:   y_J = L_JJ⁻¹ b_J,   b_I -= L_IJ y_J          J: columns of a supernode, I: the rows below its block
 //! Lᵀ x = y:  x_J = L_JJ⁻ᵀ (y_J - L_IJᵀ x_I)               in reverse
 //! ```
-//! Each pass reads the factor once, four columns of a supernode at a time, which is what it costs:
-//! the factor does not fit into a cache. Libraries take the right-hand sides column by column and
-//! lose most of the time to packing.
+//! Each pass reads the factor once, four columns of a supernode at a time. This read dominates the
+//! cost, because the factor does not fit into a cache. Libraries take the right-hand sides column
+//! by column and lose most of the time to packing.
 
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use flexarm_spatial::Real;
@@ -14,7 +14,7 @@ use flexarm_spatial::Real;
 use super::block::Row;
 use super::vectors::{Wide, Work, quickly};
 
-/// The columns of a factor, from the diagonal down, supernode by supernode.
+/// Columns of a factor from the diagonal down, by supernode.
 #[derive(Default)]
 pub(super) struct Columns {
     pub(super) values: Vec<f64>,
@@ -22,7 +22,7 @@ pub(super) struct Columns {
     starts: Vec<usize>,
 }
 
-/// Columns of a supernode (the triangle, then the rows below), and those rows.
+/// Columns of a supernode (the triangle, then the rows below), and the indices of these rows.
 pub(super) struct Supernode<'a> {
     pub(super) first: usize,
     pub(super) width: usize,
@@ -32,7 +32,8 @@ pub(super) struct Supernode<'a> {
 }
 
 impl Columns {
-    /// Leaves out of the blocks of a factorisation what is above the diagonal, an eighth of all.
+    /// Removes the entries above the diagonal, an eighth of the total, from the blocks of a
+    /// factorisation.
     pub(super) fn of_blocks(symbolic: &SymbolicSupernodalCholesky<u32>, mut values: Vec<f64>) -> Self {
         let mut starts = Vec::with_capacity(symbolic.n_supernodes());
         let mut to = 0;
@@ -62,7 +63,7 @@ impl Columns {
     }
 }
 
-/// Replaces `x`, in the order of elimination, by `L⁻ᵀ L⁻¹ x`.
+/// Replaces `x`, in elimination order, by `L⁻ᵀ L⁻¹ x`.
 pub(super) fn solve(symbolic: &SymbolicSupernodalCholesky<u32>, columns: &Columns, x: &mut [Row]) {
     quickly(Solve { symbolic, columns, x });
 }
@@ -109,7 +110,7 @@ impl Work for Solve<'_> {
 }
 
 impl<'a> Supernode<'a> {
-    /// Row of the right-hand sides of each row of this supernode.
+    /// Writes the row of the right-hand sides of each row of this supernode to `rows`.
     #[inline(always)]
     fn rows_into(&self, rows: &mut Vec<u32>) {
         rows.clear();
@@ -117,14 +118,14 @@ impl<'a> Supernode<'a> {
         rows.extend_from_slice(self.below);
     }
 
-    /// Where column `k` begins, with its diagonal.
+    /// Start of column `k`, at its diagonal.
     #[inline(always)]
     pub(super) fn start_of(&self, k: usize) -> usize {
         k * (2 * self.height + 1 - k) / 2
     }
 
-    /// Entries of `N` columns from column `k` on, from row `from` on; what they say above the
-    /// diagonal belongs to other columns.
+    /// Entries of `N` columns from column `k` on, from row `from` on; entries above the diagonal
+    /// belong to other columns.
     #[inline(always)]
     fn columns<const N: usize>(&self, k: usize, from: usize) -> [&'a [f64]; N] {
         let mut columns = [&self.entries[..0]; N];
@@ -151,7 +152,7 @@ fn store<T: Real, const P: usize, const N: usize>(wide: [Wide<T, P>; N], x: &mut
     }
 }
 
-/// Solves for `N` columns from column `k` on and takes them out of the rows below.
+/// Solves for `N` columns from column `k` on and subtracts them from the rows below.
 #[inline(always)]
 fn forward<T: Real, const P: usize, const N: usize>(node: &Supernode<'_>, k: usize, rows: &[u32], x: &mut [Row]) {
     let triangle: [&[f64]; N] = node.columns(k, k);
@@ -175,7 +176,7 @@ fn forward<T: Real, const P: usize, const N: usize>(node: &Supernode<'_>, k: usi
     }
 }
 
-/// Takes the rows below out of `N` columns from column `k` on and solves for them.
+/// Subtracts the rows below from `N` columns from column `k` on and solves for the columns.
 #[inline(always)]
 fn backward<T: Real, const P: usize, const N: usize>(node: &Supernode<'_>, k: usize, rows: &[u32], x: &mut [Row]) {
     let mut y: [Wide<T, P>; N] = load(&x[node.first + k..][..N]);

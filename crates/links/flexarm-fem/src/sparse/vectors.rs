@@ -1,20 +1,20 @@
-//! Loops over the rows of blocks with the vector instructions that the processor has. Operations
-//! and their order are the same with and without.
+//! Loops over the rows of blocks with the vector instructions of the processor. Operations and
+//! their order are the same without vector instructions.
 
 use flexarm_spatial::Real;
 
 use super::block::{Row, WIDTH};
 
-/// Loops over rows, inlined down to the instructions.
+/// Loop over rows, to be inlined completely.
 pub(crate) trait Work {
-    /// What comes of it.
+    /// Result of the work.
     type Output;
 
-    /// Does it with `P` vectors for a row; mark it `#[inline(always)]`, and what it calls.
+    /// Runs the work with `P` vectors per row; mark it and its callees `#[inline(always)]`.
     fn run<T: Real, const P: usize>(self) -> Self::Output;
 }
 
-/// Does the work.
+/// Runs the work with the widest available vectors.
 pub(crate) fn quickly<W: Work>(work: W) -> W::Output {
     #[cfg(target_arch = "x86_64")]
     if flexarm_spatial::lanes::most_lanes() > 1 {
@@ -35,18 +35,18 @@ pub(crate) fn quickly<W: Work>(work: W) -> W::Output {
     work.run::<f64, WIDTH>()
 }
 
-/// A row in vectors.
+/// One row in vector registers.
 #[derive(Clone, Copy)]
 pub(crate) struct Wide<T, const P: usize>([T; P]);
 
 impl<T: Real, const P: usize> Wide<T, P> {
-    /// Zeros.
+    /// Row of zeros.
     #[inline(always)]
     pub(crate) fn zero() -> Self {
         Self([T::splat(0.0); P])
     }
 
-    /// A row.
+    /// Loads a row.
     #[inline(always)]
     pub(crate) fn load(row: &Row) -> Self {
         let mut wide = Self::zero();
@@ -56,7 +56,7 @@ impl<T: Real, const P: usize> Wide<T, P> {
         wide
     }
 
-    /// Into a row.
+    /// Stores to a row.
     #[inline(always)]
     pub(crate) fn store(self, row: &mut Row) {
         for p in 0..P {
@@ -64,7 +64,7 @@ impl<T: Real, const P: usize> Wide<T, P> {
         }
     }
 
-    /// `self += factor other`.
+    /// Computes `self += factor other`.
     #[inline(always)]
     pub(crate) fn add(&mut self, factor: f64, other: Self) {
         let factor = T::splat(factor);
@@ -73,7 +73,7 @@ impl<T: Real, const P: usize> Wide<T, P> {
         }
     }
 
-    /// `self -= factor other`.
+    /// Computes `self -= factor other`.
     #[inline(always)]
     pub(crate) fn subtract(&mut self, factor: f64, other: Self) {
         let factor = T::splat(factor);
@@ -82,7 +82,7 @@ impl<T: Real, const P: usize> Wide<T, P> {
         }
     }
 
-    /// `self *= factor`.
+    /// Computes `self *= factor`.
     #[inline(always)]
     pub(crate) fn scale(&mut self, factor: f64) {
         let factor = T::splat(factor);

@@ -1,4 +1,4 @@
-//! Strategies and sample links shared by the tests of this crate.
+//! Strategies and sample links shared by the tests.
 #![allow(dead_code, reason = "each test binary uses its own part of this module")]
 
 use flexarm_fem::{BeamLink, BeamTheory, LinkFrames, Material, Pose, ReducedLink, Section};
@@ -8,7 +8,7 @@ use proptest::test_runner::RngSeed;
 
 /// Hollow aluminium box 160 x 120 x 10 mm, 1.095 m along link z, 60 kg.
 pub(crate) fn lower_arm() -> BeamLink {
-    // Shear in the walls along the force alone, as the reference data have it.
+    // Shear only in the walls along the force, as in the reference data.
     let whole = Section::Box { width: 0.160, height: 0.120, wall: 0.010 };
     let shear = |side: f64| Some(2.0 * 0.010 * side * Material::ALUMINIUM.shear_modulus());
     let bar = whole.bar(&Material::ALUMINIUM).unwrap();
@@ -18,14 +18,14 @@ pub(crate) fn lower_arm() -> BeamLink {
     BeamLink { mass: Some(60.0), ..link }
 }
 
-/// The same beam beside the joint line, turned, cut off the middle: every coupling lives.
+/// The same beam offset from the joint line, rotated, cut off-centre: all couplings are non-zero.
 pub(crate) fn offset_arm() -> BeamLink {
     let offset = Vector3::new(0.03, 0.05, 0.0);
     let link = lower_arm().along(Vector3::z(), Vector3::x(), 25_f64.to_radians(), offset).unwrap();
     BeamLink { split_fraction: 0.4, theory: BeamTheory::Timoshenko, ..link }
 }
 
-/// A link whose three frames are turned as well.
+/// A link whose three frames are rotated as well.
 pub(crate) fn turned_arm() -> ReducedLink {
     let turned = |x, y, z, roll, pitch, yaw| {
         let R = Rotation3::from_euler_angles(roll, pitch, yaw);
@@ -38,7 +38,7 @@ pub(crate) fn turned_arm() -> ReducedLink {
     link.reduce().unwrap()
 }
 
-/// The same cases in every run, and no files of failures beside the sources.
+/// The same cases in every run, without files of failures next to the sources.
 pub(crate) fn fixed_cases() -> ProptestConfig {
     ProptestConfig { failure_persistence: None, rng_seed: RngSeed::Fixed(20_260_131), ..ProptestConfig::default() }
 }
@@ -71,7 +71,7 @@ pub(crate) fn frames(length: f64) -> LinkFrames {
     LinkFrames::new(Pose::identity(), Pose::translation(length, 0.0, 0.0))
 }
 
-/// An arm beside its joint line, with every frame turned: every coupling lives.
+/// An arm offset from its joint line, with all frames rotated: all couplings are non-zero.
 pub(crate) fn turned() -> BeamLink {
     let pose = |x, y, z, roll, pitch, yaw| {
         Pose::from_parts(Translation3::new(x, y, z), Rotation3::from_euler_angles(roll, pitch, yaw))

@@ -1,4 +1,4 @@
-//! Which of the index orders a SID file uses, found by identities of its own numbers.
+//! Detection of the index orders of a SID file by identities of its numbers.
 
 use nalgebra::{DMatrix, Matrix3};
 
@@ -23,7 +23,7 @@ pub enum OeOrder {
     XyXzYz,
 }
 
-/// The orders of a file, and how well its numbers fit them.
+/// Index orders of a file, with the residuals of their identities.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SidConventions {
     /// Columns of `Gr` and `Ge`.
@@ -36,7 +36,7 @@ pub struct SidConventions {
     pub oe_residual: f64,
 }
 
-/// A file fits an order if its identity holds to this: files have few digits.
+/// Maximum residual of an identity for an order to fit: files have few digits.
 const FITS: f64 = 1e-4;
 
 /// Indices of xy, xz, yz in a 3×3.
@@ -53,7 +53,7 @@ impl OeOrder {
 }
 
 impl GyroLayout {
-    /// Column of an axis and a mode, from 0.
+    /// Column of an axis and a mode, both from 0.
     pub fn column(self, nq: usize, axis: usize, mode: usize) -> usize {
         match self {
             Self::ComponentMajor => axis * nq + mode,
@@ -63,12 +63,12 @@ impl GyroLayout {
 }
 
 impl Sid {
-    /// Inertia about the body frame, undeformed.
+    /// Inertia about the body frame origin, undeformed.
     pub fn J0(&self) -> Matrix3<f64> {
         tensor(&self.J.m0())
     }
 
-    /// Its derivative with respect to a shape coordinate, from 0.
+    /// Derivative of the inertia with respect to shape coordinate `mode`, from 0.
     pub fn J1(&self, mode: usize) -> Matrix3<f64> {
         tensor(&self.J.m1(mode))
     }
@@ -91,13 +91,14 @@ impl Sid {
         DMatrix::from_fn(self.nq(), 6, |row, j| entry(&self.Oe, row, if j < 3 { j } else { columns[j - 3] }))
     }
 
-    /// Finds the orders of `Gr`, `Ge` and `Oe`.
+    /// Detects the orders of `Gr`, `Ge` and `Oe`.
     ///
-    /// With one shape coordinate both layouts of `Gr` are the same; without products of inertia in
-    /// `J1` both orders of `Oe` fit: the first is returned then.
+    /// With one shape coordinate both layouts of `Gr` are equal, and without products of inertia in
+    /// `J1` both orders of `Oe` fit; then the first order is returned.
     ///
     /// # Errors
-    /// [`ExchangeErrorKind::Ambiguous`] if the numbers fit neither; `origin` is for the message.
+    /// [`ExchangeErrorKind::Ambiguous`] if the numbers fit neither order; `origin` is used in the
+    /// message.
     pub fn conventions(&self, origin: &str) -> Result<SidConventions, ExchangeError> {
         let J1: Vec<_> = (0..self.nq()).map(|mode| self.J1(mode)).collect();
         let size = J1.iter().fold(f64::MIN_POSITIVE, |size, J| size.max(J.amax()));
@@ -116,7 +117,7 @@ impl Sid {
             };
             J1.iter().enumerate().map(difference).fold(0.0, f64::max) / size
         };
-        // The first is kept where both fit alike.
+        // The first order is kept if both fit equally.
         let best = |first: f64, second: f64| if second < first { (false, second) } else { (true, first) };
         let (is_component, gyro_residual) = best(of_gyro(GyroLayout::ComponentMajor), of_gyro(GyroLayout::ModeMajor));
         let (is_sid, oe_residual) = best(of_oe(OeOrder::XyYzXz), of_oe(OeOrder::XyXzYz));
@@ -141,7 +142,7 @@ fn entry(matrix: &SidMatrix, row: usize, column: usize) -> f64 {
     matrix.entries0.get(&(row, column)).copied().unwrap_or(0.0)
 }
 
-/// 6×1 (xx yy zz xy xz yz) or 3×3 to a tensor.
+/// Converts 6×1 (xx yy zz xy xz yz) or 3×3 to a tensor.
 fn tensor(J: &DMatrix<f64>) -> Matrix3<f64> {
     if J.shape() != (6, 1) {
         return Matrix3::from_fn(|i, j| J.get((i, j)).copied().unwrap_or(0.0));

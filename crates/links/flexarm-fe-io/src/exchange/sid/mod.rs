@@ -1,22 +1,22 @@
-//! Standard Input Data of a flexible body (Wallrapp 1994): the `.SID_FEM` file, read and written.
+//! Standard Input Data of a flexible body (Wallrapp 1994): reads and writes `.SID_FEM` files.
 //!
-//! A body with `nq` shape coordinates: mass integrals as Taylor series in them, and frames of
-//! nodes. Matrices are kept as the entries of the file, so reading and writing loses nothing;
-//! [`SidMatrix::m0`] and [`SidMatrix::m1`] give them dense. Indices of the first-order part are
+//! A body with `nq` shape coordinates: mass integrals as Taylor series in these, and frames of
+//! nodes. Matrices are stored as the entries of the file, so reading and writing is lossless;
+//! [`SidMatrix::m0`] and [`SidMatrix::m1`] return them dense. Indices of the first-order part are
 //! (row, mode, column).
 //!
-//! Writers of this format disagree in three places, which the file does not say:
+//! Writers of this format differ in three places, which the file does not declare:
 //!
 //! ```text
 //! J        6x1 (xx yy zz xy xz yz) or 3x3; products with their negative sign, as in the tensor
 //! Gr, Ge   column (axis-1) nq + mode, or 3 (mode-1) + axis
 //! Oe       columns xx yy zz xy yz xz, or xx yy zz xy xz yz
 //! ```
-//! The first shows in the size. The others follow from identities that every body fulfils,
+//! The first is visible in the size. The others follow from identities of every body:
 //! `(Gr_j + Gr_jᵀ)/2 = J1_j`, and the products in `Oe` are those of `-J1_j`; see
 //! [`Sid::conventions`].
 //!
-//! Units: those of the file; [`Sid::in_units`] gives others.
+//! Units: those of the file; [`Sid::in_units`] converts to others.
 
 mod conventions;
 mod modal;
@@ -33,25 +33,25 @@ pub use modal::{modal_link_from_sid, modal_link_held_at, sid_of_modal_link};
 pub use parse::{parse_sid, read_sid};
 pub use write::write_sid;
 
-/// Names of the matrices of a body, in the order of the file.
+/// Names of the matrices of a body, in file order.
 pub(super) const BODY_BLOCKS: [&str; 11] = ["mdCM", "J", "Ct", "Cr", "Me", "Gr", "Ge", "Oe", "ksigma", "Ke", "De"];
 /// Names of the matrices of a node.
 pub(super) const NODE_BLOCKS: [&str; 5] = ["origin", "phi", "psi", "AP", "sigma"];
 
-/// A Taylor series of a matrix in the shape coordinates, as it stands in the file.
+/// Taylor series of a matrix in the shape coordinates, as stored in the file.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SidMatrix {
-    /// 0: constant, 1: linear in the shape coordinates.
+    /// Order: 0 constant, 1 linear in the shape coordinates.
     pub order: u8,
-    /// Rows.
+    /// Number of rows.
     pub nrow: usize,
-    /// Columns.
+    /// Number of columns.
     pub ncol: usize,
-    /// Shape coordinates.
+    /// Number of shape coordinates.
     pub nq: usize,
-    /// Quadratic terms; always 0 so far.
+    /// Number of quadratic terms; always 0 so far.
     pub nqn: usize,
-    /// 0 zero, 1 diagonal, 2 symmetric, 3 full, 4 unit matrix.
+    /// Structure: 0 zero, 1 diagonal, 2 symmetric, 3 full, 4 unit matrix.
     pub structure: u8,
     /// Entries of the constant part by (row, column), from 0.
     pub entries0: BTreeMap<(usize, usize), f64>,
@@ -59,14 +59,14 @@ pub struct SidMatrix {
     pub entries1: BTreeMap<(usize, usize, usize), f64>,
 }
 
-/// A node with its frame; all matrices are Taylor series.
+/// Node with its frame; all matrices are Taylor series.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SidNode {
     /// Number of the node.
     pub id: i64,
-    /// Frame in which it is given, usually `body ref`.
+    /// Reference frame, usually `body ref`.
     pub rframe: String,
-    /// Position, 3×1; the linear part repeats `phi`.
+    /// Position, 3×1; the linear part equals `phi`.
     pub origin: SidMatrix,
     /// Displacement shapes, 3×nq.
     pub phi: SidMatrix,
@@ -78,14 +78,14 @@ pub struct SidNode {
     pub sigma: Option<SidMatrix>,
 }
 
-/// A flexible body.
+/// Flexible body.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Sid {
-    /// What stands after the numbers in the first line.
+    /// Text after the numbers in the first line.
     pub comment: String,
     /// Mass.
     pub mass: f64,
-    /// A text for each shape coordinate.
+    /// Description of each shape coordinate.
     pub modes: Vec<String>,
     /// Nodes with their frames.
     pub nodes: Vec<SidNode>,
@@ -105,13 +105,13 @@ pub struct Sid {
     pub Ge: SidMatrix,
     /// Centrifugal terms of shape, nq×6.
     pub Oe: SidMatrix,
-    /// Forces of initial stress, nq×1.
+    /// Forces due to initial stress, nq×1.
     pub ksigma: SidMatrix,
     /// Stiffness, nq×nq.
     pub Ke: SidMatrix,
     /// Damping, nq×nq.
     pub De: SidMatrix,
-    /// Matrices beyond those of the standard, such as geometric stiffening.
+    /// Matrices not in the standard, such as geometric stiffness.
     pub others: Vec<(String, SidMatrix)>,
 }
 
@@ -121,7 +121,7 @@ impl Sid {
         self.modes.len()
     }
 
-    /// The matrices of the body with their names.
+    /// Iterates over the matrices of the body with their names.
     pub fn blocks(&self) -> impl Iterator<Item = (&str, &SidMatrix)> {
         let all = [
             &self.mdCM,
@@ -142,7 +142,7 @@ impl Sid {
 }
 
 impl SidMatrix {
-    /// A constant matrix.
+    /// Creates a constant matrix.
     pub fn constant(nq: usize, m0: &DMatrix<f64>) -> Self {
         let mut matrix = Self { nrow: m0.nrows(), ncol: m0.ncols(), nq, ..Self::default() };
         for (place, value) in places(m0) {
@@ -152,7 +152,8 @@ impl SidMatrix {
         matrix
     }
 
-    /// A matrix that is linear in the shape coordinates; `m1` has one matrix per coordinate.
+    /// Creates a matrix that is linear in the shape coordinates; `m1` has one matrix per
+    /// coordinate.
     pub fn linear(m0: &DMatrix<f64>, m1: &[DMatrix<f64>]) -> Self {
         let mut matrix = Self { order: 1, structure: 3, ..Self::constant(m1.len(), m0) };
         for (mode, part) in m1.iter().enumerate() {
@@ -163,7 +164,7 @@ impl SidMatrix {
         matrix
     }
 
-    /// The constant part; entries outside of the size are left out, which [`parse_sid`] refuses.
+    /// Constant part; entries out of range are ignored here and rejected by [`parse_sid`].
     pub fn m0(&self) -> DMatrix<f64> {
         if self.structure == 4 && self.entries0.is_empty() {
             return DMatrix::identity(self.nrow, self.ncol);
@@ -179,7 +180,7 @@ impl SidMatrix {
         dense
     }
 
-    /// The derivative with respect to a shape coordinate, from 0; zero where there is none.
+    /// Derivative with respect to shape coordinate `mode`, from 0; zero if there is none.
     pub fn m1(&self, mode: usize) -> DMatrix<f64> {
         let mut dense = DMatrix::zeros(self.nrow, self.ncol);
         for (&(row, _, column), &value) in self.entries1.iter().filter(|((_, k, _), _)| *k == mode) {
@@ -189,14 +190,14 @@ impl SidMatrix {
     }
 }
 
-/// Sets an entry, unless it is outside.
+/// Sets an entry if it is in range.
 fn put(dense: &mut DMatrix<f64>, row: usize, column: usize, value: f64) {
     if let Some(entry) = dense.get_mut((row, column)) {
         *entry = value;
     }
 }
 
-/// Entries that are not zero.
+/// Non-zero entries.
 fn places(matrix: &DMatrix<f64>) -> impl Iterator<Item = ((usize, usize), f64)> + '_ {
     let all = (0..matrix.nrows()).flat_map(|row| (0..matrix.ncols()).map(move |column| (row, column)));
     all.map(|place| (place, matrix[place])).filter(|(_, value)| *value != 0.0)

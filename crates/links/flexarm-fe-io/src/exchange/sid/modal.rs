@@ -1,4 +1,4 @@
-//! A modal link from and to Standard Input Data.
+//! Conversion of modal links from and to Standard Input Data.
 //!
 //! ```text
 //! mdCM = ∫ s dm + Σ C_t,k η_k          J = inertia + Σ J1_k η_k      J1 = 2 tr(Ps) 1 - 2 Ps,  Ps: symmetric part of P
@@ -6,10 +6,10 @@
 //! Gr_k = -2 ∫ [s]x [φ_k]x dm = 2 (tr(P_k) 1 - P_kᵀ)                    Ge_kl = 2 ∫ φ_l × φ_k dm
 //! Oe0 = ∫ φ_kᵀ [ω]x² s dm,  Oe1 = ∫ φ_kᵀ [ω]x² φ_l dm                  by products ω_i ω_j
 //! ```
-//! Stiffness by initial stress goes where the standard has it, as first-order parts of Ct, Cr, Oe
-//! and, with the other sign, of phi and psi of the nodes; and once more by itself, in blocks `K0t`,
-//! `K0r`, `K0omega` and `K0F`, since nobody can take it out of `Oe` again. Column `i n + l` of a
-//! block: entry l for load i.
+//! The geometric stiffness is stored as in the standard: as first-order parts of Ct, Cr, Oe and,
+//! with opposite sign, of phi and psi of the nodes. It is also stored separately in the blocks
+//! `K0t`, `K0r`, `K0omega` and `K0F`, because it cannot be separated from `Oe` again. Column
+//! `i n + l` of a block: entry l for load i.
 //!
 //! Source: Wallrapp (1994), *Mech. Struct. & Mach.* 22.
 
@@ -21,11 +21,11 @@ use flexarm_fem::modal::{GeometricStiffness, ModalInterface, ModalLink, PRODUCTS
 use super::{GyroLayout, OeOrder, Sid, SidMatrix, SidNode};
 use crate::exchange::{ExchangeError, ExchangeErrorKind};
 
-/// Start of the comment in which the names of the link and its nodes are kept.
+/// Start of the comment that stores the names of the link and its nodes.
 const COMMENT: &str = "modal link";
-/// Where they stand in the columns of `Oe` as it is written: xx yy zz xy yz xz.
+/// Columns of `Oe` for [`PRODUCTS`], in the written order xx yy zz xy yz xz.
 const OE_COLUMNS: [usize; 6] = [0, 1, 2, 3, 5, 4];
-/// Largest `|RᵀR - 1|` of a node frame: files have few digits.
+/// Maximum `|RᵀR - 1|` of a node frame: files have few digits.
 const ROTATION: f64 = 1e-6;
 
 /// `φᵀ [ω]x² s` per product of ω, from `A = ∫ s φᵀ dm`.
@@ -33,7 +33,7 @@ fn centrifugal(A: &Matrix3<f64>) -> [f64; 6] {
     PRODUCTS.map(|(a, b)| if a == b { A[(a, a)] - A.trace() } else { A[(a, b)] + A[(b, a)] })
 }
 
-/// The symmetric part of A from [`centrifugal`].
+/// Symmetric part of A, inverse of [`centrifugal`].
 fn from_centrifugal(O: [f64; 6]) -> Matrix3<f64> {
     let trace = -0.5 * (O[0] + O[1] + O[2]);
     let mut A = Matrix3::zeros();
@@ -44,14 +44,14 @@ fn from_centrifugal(O: [f64; 6]) -> Matrix3<f64> {
     A
 }
 
-/// The skew matrix A with `axial(A) = c`.
+/// Skew matrix A with `axial(A) = c`.
 fn skew_of(c: &Vector3<f64>) -> Matrix3<f64> {
     c.cross_matrix() * -0.5
 }
 
-/// A modal link as Standard Input Data, SI; node 1 is A, the others follow in order.
+/// Converts a modal link to Standard Input Data, SI; node 1 is A, the others follow in order.
 ///
-/// `De` is zero: a modal link has no damping of its own.
+/// `De` is zero, because a modal link has no damping.
 pub fn sid_of_modal_link(link: &ModalLink) -> Sid {
     let n = link.coordinates();
     let dense = |A: &Matrix3xX<f64>| DMatrix::from_fn(n, 3, |k, a| A[(a, k)]);
@@ -63,7 +63,7 @@ pub fn sid_of_modal_link(link: &ModalLink) -> Sid {
 
     let (mut Gr, mut Ge) = (DMatrix::zeros(3, 3 * n), DMatrix::zeros(n, 3 * n));
     let mut Oe0 = DMatrix::zeros(n, 6);
-    // By mode, as the first-order parts are.
+    // By mode, like the first-order parts.
     let zeros = |columns| vec![DMatrix::zeros(n, columns); n];
     let (mut Ct1, mut Cr1, mut Oe1) = (zeros(3), zeros(3), zeros(6));
     for k in 0..n {
@@ -127,35 +127,35 @@ pub fn sid_of_modal_link(link: &ModalLink) -> Sid {
     }
 }
 
-/// The modal link that Standard Input Data describe.
+/// Converts Standard Input Data to a modal link.
 ///
-/// A is the first node that no coordinate moves (else see [`modal_link_held_at`]); every other node
-/// becomes an interface, in the order of the file. The names of the link and of the nodes are those
-/// that [`sid_of_modal_link`] wrote, else `name` and the numbers of the nodes. Damping (`De`) is
-/// not taken over. In a file without the block `K0omega` centrifugal stiffening stays in `Oe`, so
+/// A is the first node that no coordinate moves (otherwise see [`modal_link_held_at`]); every other
+/// node becomes an interface, in file order. The names of the link and nodes are those written by
+/// [`sid_of_modal_link`], otherwise `name` and the numbers of the nodes. Damping (`De`) is ignored.
+/// In a file without the block `K0omega` the centrifugal stiffening remains in `Oe` and therefore
 /// in N.
 ///
 /// * `name`: name of the link, and of the data in messages.
-/// * `sid`: in SI.
+/// * `sid`: data in SI.
 ///
 /// # Errors
 /// [`ExchangeErrorKind::Ambiguous`] as [`Sid::conventions`]; [`ExchangeErrorKind::Missing`] without
 /// a node A or another one; [`ExchangeErrorKind::Unsupported`] with initial stress;
 /// [`ExchangeErrorKind::Defective`] for a mass or stiffness that is not positive definite, and for
-/// frames that are not orthonormal; [`ExchangeErrorKind::WrongSize`] for blocks of other sizes than
-/// the modes say.
+/// frames that are not orthonormal; [`ExchangeErrorKind::WrongSize`] for blocks whose size does not
+/// match the number of modes.
 pub fn modal_link_from_sid(name: &str, sid: &Sid) -> Result<ModalLink, ExchangeError> {
     check_sizes(name, sid)?;
     of_node(name, sid, held_node(name, sid)?)
 }
 
-/// As [`modal_link_from_sid`], with a given node as A, whatever frame the data have.
+/// As [`modal_link_from_sid`], with a given node as A, for any floating frame of the data.
 ///
-/// Where the coordinates move that node, its motion is taken out of all shapes as that of a rigid
-/// body; stiffness by initial stress belongs to the frame of the data and is then left out.
+/// If the coordinates move that node, its motion is removed from all shapes as a rigid motion; the
+/// geometric stiffness belongs to the frame of the data and is then dropped.
 ///
 /// # Errors
-/// As [`modal_link_from_sid`]; [`ExchangeErrorKind::Missing`] if there is no such node.
+/// As [`modal_link_from_sid`]; [`ExchangeErrorKind::Missing`] if the node does not exist.
 pub fn modal_link_held_at(name: &str, sid: &Sid, node: i64) -> Result<ModalLink, ExchangeError> {
     check_sizes(name, sid)?;
     let ids: Vec<i64> = sid.nodes.iter().map(|node| node.id).collect();
@@ -166,7 +166,9 @@ pub fn modal_link_held_at(name: &str, sid: &Sid, node: i64) -> Result<ModalLink,
     of_node(name, sid, A)
 }
 
-/// * `A`: index of the node that is held.
+/// Converts the data with a given node as A.
+///
+/// * `A`: index of the clamped node.
 fn of_node(name: &str, sid: &Sid, A: usize) -> Result<ModalLink, ExchangeError> {
     let conventions = sid.conventions(name)?;
     if sid.ksigma.m0().iter().any(|x| *x != 0.0) {
@@ -243,10 +245,10 @@ fn fail(
     }
 }
 
-/// A block with its name and the sizes that it may have.
+/// Block with its name and allowed sizes.
 type Block<'a> = (&'a str, &'a SidMatrix, &'a [(usize, usize)]);
 
-/// Data made by hand may have any size; those of a file were checked.
+/// Checks the sizes: those of a file were checked, but data built by the caller may have any size.
 fn check_sizes(origin: &str, sid: &Sid) -> Result<(), ExchangeError> {
     let n = sid.nq();
     let body: [Block<'_>; 9] = [
@@ -270,7 +272,7 @@ fn check_sizes(origin: &str, sid: &Sid) -> Result<(), ExchangeError> {
         ]
     });
     for (name, matrix, sizes) in body.into_iter().chain(of_nodes) {
-        // Shapes have a column per mode.
+        // Shapes have one column per mode (columns 0 in the table).
         let fits = sizes
             .iter()
             .any(|(rows, columns)| (matrix.nrow, matrix.ncol) == (*rows, if *columns == 0 { n } else { *columns }));
@@ -315,7 +317,7 @@ fn side_by_side(n: usize, G: &[DMatrix<f64>]) -> SidMatrix {
     SidMatrix::constant(n, &DMatrix::from_fn(n, n * G.len(), |k, at| G[at / n][(k, at % n)]))
 }
 
-/// The matrices of a block by loads, if it is there with that size.
+/// Matrices of a block by load, if the block is present with the expected size.
 fn by_loads<const LOADS: usize>(sid: &Sid, name: &str, from: usize, all: usize) -> Option<[DMatrix<f64>; LOADS]> {
     let n = sid.nq();
     let (_, block) = sid.others.iter().find(|(other, _)| other.eq_ignore_ascii_case(name))?;
@@ -326,7 +328,8 @@ fn by_loads<const LOADS: usize>(sid: &Sid, name: &str, from: usize, all: usize) 
     Some(std::array::from_fn(|i| symmetric(&dense.columns((from + i) * n, n).into_owned())))
 }
 
-/// From the blocks `K0t` to `K0F`, else from the first-order parts of the standard.
+/// Geometric stiffness from the blocks `K0t` to `K0F`, or from the first-order parts of the
+/// standard.
 fn geometric(sid: &Sid, A: usize) -> Option<GeometricStiffness> {
     let n = sid.nq();
     let nodes: Vec<&SidNode> = sid.nodes.iter().enumerate().filter(|(at, _)| *at != A).map(|(_, node)| node).collect();
@@ -364,7 +367,8 @@ fn geometric(sid: &Sid, A: usize) -> Option<GeometricStiffness> {
         };
         GeometricStiffness {
             acceleration: std::array::from_fn(|axis| first(&sid.Ct, axis)),
-            // The part of Cr1 from N is skew in the coordinates.
+            // The part of Cr1 from N is skew in the coordinates and drops out of the symmetric
+            // part.
             angular: std::array::from_fn(|axis| first(&sid.Cr, axis)),
             centrifugal: std::array::from_fn(|_| DMatrix::zeros(n, n)),
             interface: nodes.iter().map(of_nodes).collect(),
@@ -372,8 +376,8 @@ fn geometric(sid: &Sid, A: usize) -> Option<GeometricStiffness> {
     })
 }
 
-/// N: symmetric parts from `Oe1` without the stiffening in it, skew ones from `Ge`, or `Cr1` where
-/// that is empty.
+/// N: symmetric parts from `Oe1` without its stiffening, skew parts from `Ge`, or from `Cr1` if
+/// `Ge` is empty.
 fn second_order(sid: &Sid, gyro: GyroLayout, oe: OeOrder) -> Vec<Matrix3<f64>> {
     let n = sid.nq();
     let stiffening: Option<[DMatrix<f64>; 6]> = by_loads(sid, "K0omega", 0, 6);
@@ -415,7 +419,7 @@ fn is_still(node: &SidNode) -> bool {
     still(&node.phi) && still(&node.psi)
 }
 
-/// The rigid motions of the whole link that move it as the coordinates move a node: at Lo, then
+/// Rigid motions of the whole link that equal the motion of a node per coordinate: at Lo, then
 /// rotation.
 fn motion_of(node: &SidNode, n: usize) -> Matrix6xX<f64> {
     let (phi, psi) = (node.phi.m0(), node.psi.m0());
@@ -430,7 +434,7 @@ fn motion_of(node: &SidNode, n: usize) -> Matrix6xX<f64> {
     motion
 }
 
-/// The first node that no coordinate moves.
+/// Index of the first node that no coordinate moves.
 fn held_node(origin: &str, sid: &Sid) -> Result<usize, ExchangeError> {
     sid.nodes.iter().position(is_still).ok_or_else(|| {
         let expected = "a node without displacement: interface A, at which the frame is tangent";
@@ -450,13 +454,13 @@ fn frame(origin: &str, node: &SidNode) -> Result<Pose, ExchangeError> {
     Ok(Pose::from_parts(Translation3::from(p), Rotation3::from_matrix_unchecked(R)))
 }
 
-/// Name of the link, if it is in the comment.
+/// Name of the link, if the comment contains it.
 fn link_name(sid: &Sid) -> Option<String> {
     let mut parts = sid.comment.split('|').map(str::trim);
     (parts.next() == Some(COMMENT)).then(|| parts.next().unwrap_or("").to_owned())
 }
 
-/// Names of the nodes from the comment, else their numbers.
+/// Names of the nodes from the comment, otherwise their numbers.
 fn node_names(sid: &Sid) -> Vec<String> {
     let names: Vec<String> = sid.comment.split('|').skip(2).map(|name| name.trim().to_owned()).collect();
     if link_name(sid).is_some() && names.len() == sid.nodes.len() {

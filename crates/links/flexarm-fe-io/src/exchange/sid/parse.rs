@@ -1,4 +1,4 @@
-//! Text to [`Sid`].
+//! Parses text into a [`Sid`].
 
 use std::iter::Peekable;
 use std::path::Path;
@@ -7,32 +7,32 @@ use super::{BODY_BLOCKS, NODE_BLOCKS, Sid, SidMatrix, SidNode};
 use crate::exchange::error::{ExchangeError, ExchangeErrorKind, Place};
 use crate::exchange::text::{Text, shown, unpack, words};
 
-/// More shape coordinates than any body has: sizes above are mistakes.
+/// Maximum number of shape coordinates; larger sizes are errors.
 const MOST_MODES: usize = 10_000;
-/// `Ge` has three columns per shape coordinate.
+/// Maximum number of rows or columns: `Ge` has three columns per shape coordinate.
 const MOST_ROWS: usize = 3 * MOST_MODES;
-/// Entries that a dense matrix may have, zeros included: so many in any file, so many more per
-/// byte.
+/// Maximum number of entries of a dense matrix, including zeros: constant part, and part per byte
+/// of the file.
 const MOST_ENTRIES: (usize, usize) = (1 << 20, 16);
 
-/// Reads a `.SID_FEM` file, which may be packed with gzip.
+/// Reads a `.SID_FEM` file, optionally compressed with gzip.
 ///
 /// # Errors
-/// [`ExchangeError`] with file, line, element, what was found and what was expected.
+/// [`ExchangeError`] with file, line, element, value found and value expected.
 pub fn read_sid(path: impl AsRef<Path>) -> Result<Sid, ExchangeError> {
     let file = crate::exchange::InputFile::open(path)?;
     let bytes = unpack(&file.bytes, &file.origin)?;
     parse_sid(&String::from_utf8_lossy(&bytes), &file.origin)
 }
 
-/// One line: a word, or `key = value`.
+/// One line: a keyword, or `key = value`.
 type Line<'a> = (Place<'a>, &'a str, Option<&'a str>);
 
-/// The lines that are left.
+/// Cursor over the remaining lines.
 struct Cursor<'a, I: Iterator<Item = Line<'a>>> {
     lines: Peekable<I>,
     origin: &'a str,
-    /// Entries that one matrix may have.
+    /// Maximum number of entries of one matrix.
     most_entries: usize,
 }
 
@@ -84,12 +84,12 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
         if same(key, word) { Ok(()) } else { Err(unexpected(&place, key, word)) }
     }
 
-    /// Takes the next line if it is this word.
+    /// Consumes the next line if it is this keyword.
     fn take(&mut self, word: &str) -> bool {
         self.lines.next_if(|(_, key, value)| value.is_none() && same(key, word)).is_some()
     }
 
-    /// `refmod`: mass, number of shape coordinates, a text for each.
+    /// Reads `refmod`: mass, number of shape coordinates, and a description of each.
     fn refmod(&mut self, sid: &mut Sid) -> Result<(), ExchangeError> {
         self.expect("refmod")?;
         let mut promised = 0;
@@ -120,7 +120,7 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
         Ok(())
     }
 
-    /// `frame`: the nodes.
+    /// Reads `frame`: the nodes.
     fn frame(&mut self, sid: &mut Sid) -> Result<(), ExchangeError> {
         self.expect("frame")?;
         while !self.take("end frame") {
@@ -158,7 +158,7 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
         Ok(SidNode { id, rframe, origin, phi, psi, AP, sigma })
     }
 
-    /// The matrices of the body up to `end modal`.
+    /// Reads the matrices of the body up to `end modal`.
     fn body(&mut self, sid: &mut Sid) -> Result<(), ExchangeError> {
         let nq = sid.nq();
         let mut found: [Option<SidMatrix>; 11] = Default::default();
@@ -193,7 +193,7 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
         Err(Place::file(self.origin).fail(kind, "modal", found, "all matrices of the body", "is the file cut off?"))
     }
 
-    /// A matrix up to `end <name>`.
+    /// Reads a matrix up to `end <name>`.
     fn matrix(&mut self, head: Place<'a>, name: &str, nq: usize) -> Result<SidMatrix, ExchangeError> {
         let mut matrix = SidMatrix::default();
         let end = format!("end {name}");
@@ -203,7 +203,8 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
             last = place;
             let value = value.unwrap_or("");
             let is_head = matches!(key, "order" | "nrow" | "ncol" | "nq" | "nqn" | "structure");
-            // Entries are checked against the sizes, which must not change any more.
+            // Entries are checked against the sizes, so these must not change after the first
+            // entry.
             if is_head && !(matrix.entries0.is_empty() && matrix.entries1.is_empty()) {
                 let (element, expected) = (format!("{name}, {key}"), "all sizes before the first entry");
                 return Err(place.fail(ExchangeErrorKind::Syntax, element, shown(value), expected, ""));
@@ -218,7 +219,7 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
                 _ => entry(&mut matrix, &place, name, key, value)?,
             }
         }
-        // Most sizes follow from the kind of matrix.
+        // The kind of matrix determines most sizes.
         let shape = (matrix.nrow, matrix.ncol);
         let expected: &[(usize, usize)] = match name {
             "origin" | "mdCM" => &[(3, 1)],
@@ -250,7 +251,7 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
             let expected = "a square matrix for structure 1 (diagonal), 2 (symmetric) and 4 (unit matrix)";
             return Err(last.fail(ExchangeErrorKind::WrongSize, name, found, expected, ""));
         }
-        // Blocks without a size of their own, and many shape coordinates in a file of a few lines.
+        // Limits blocks of variable size, and many shape coordinates in a file of a few lines.
         if shape.0 * shape.1 > self.most_entries {
             let expected = format!("at most {} entries, by the size of the file", self.most_entries);
             return Err(last.fail(ExchangeErrorKind::WrongSize, name, found, expected, ""));
@@ -259,7 +260,7 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
     }
 }
 
-/// `m0( i, j) = v` or `m1( i, k, j) = v`.
+/// Reads an entry `m0( i, j) = v` or `m1( i, k, j) = v`.
 fn entry(matrix: &mut SidMatrix, place: &Place<'_>, name: &str, key: &str, value: &str) -> Result<(), ExchangeError> {
     let expected = format!("m0( i, j), m1( i, k, j) or end {name}");
     let Some((kind, indices)) = key.strip_suffix(')').and_then(|key| key.split_once('(')) else {
@@ -294,7 +295,7 @@ fn entry(matrix: &mut SidMatrix, place: &Place<'_>, name: &str, key: &str, value
     }
 }
 
-/// A count that is not beyond reason.
+/// Parses a count with an upper limit.
 fn count(place: &Place<'_>, what: &str, text: &str, most: usize) -> Result<usize, ExchangeError> {
     match usize::try_from(place.integer(what, text)?) {
         Ok(count) if count <= most => Ok(count),
@@ -302,7 +303,7 @@ fn count(place: &Place<'_>, what: &str, text: &str, most: usize) -> Result<usize
     }
 }
 
-/// Keywords may be spelt in either case and with several blanks.
+/// Compares keywords, ignoring case and repeated blanks.
 fn same(key: &str, word: &str) -> bool {
     key.split_whitespace().map(str::to_ascii_lowercase).eq(word.split_whitespace().map(str::to_ascii_lowercase))
 }

@@ -1,7 +1,7 @@
-//! A [`Sid`] in other units. The shape coordinates keep their numbers; what multiplies them
-//! changes.
+//! Conversion of a [`Sid`] to other units. The values of the shape coordinates are unchanged; their
+//! factors change.
 //!
-//! Per shape coordinate, with the units L of length, M of mass and T of time:
+//! Dimensions per shape coordinate, with the units L of length, M of mass and T of time:
 //!
 //! ```text
 //! origin, phi  L      mdCM, Ct  M L      Ke, ksigma  M L²/T²      K0t       M L     (per acceleration)
@@ -13,8 +13,8 @@ use super::{Sid, SidMatrix, SidNode};
 use flexarm_fem::units::UnitSystem;
 
 impl Sid {
-    /// The same body in other units; blocks beyond the standard and those that
-    /// [`ModalLink`](flexarm_fem::ModalLink) writes stay as they are.
+    /// Converts the body to other units. Blocks that are neither in the standard nor written for
+    /// [`ModalLink`](flexarm_fem::ModalLink) are unchanged.
     pub fn in_units(&self, from: &UnitSystem, to: &UnitSystem) -> Self {
         let [length, mass, time] = [from.length / to.length, from.mass / to.mass, from.time / to.time];
         let (first, second) = (mass * length, mass * length * length);
@@ -61,12 +61,12 @@ impl Sid {
 }
 
 impl SidMatrix {
-    /// Every entry times a factor that depends on its column, from 0.
+    /// Multiplies every entry by a factor that depends on its column, from 0.
     fn scaled(&self, factor: &dyn Fn(usize) -> f64) -> Self {
         let mut scaled = self.clone();
         let columns = 0..self.ncol;
         if columns.clone().any(|column| factor(column) != 1.0) && scaled.structure == 4 && scaled.entries0.is_empty() {
-            // A unit matrix that is none in other units.
+            // A unit matrix is not one in other units: store its diagonal.
             scaled.structure = 1;
             scaled.entries0 = (0..self.nrow.min(self.ncol)).map(|i| ((i, i), 1.0)).collect();
         }

@@ -1,11 +1,11 @@
-//! [`Sid`] to text, in the layout of the files of FEMBS.
+//! Writes a [`Sid`] as text in the layout of FEMBS files.
 
 use super::{NODE_BLOCKS, Sid, SidMatrix};
 use crate::exchange::user_element::fortran;
 
-/// The text of a `.SID_FEM` file: 17 digits, read back to the last bit.
+/// Writes a `.SID_FEM` file with 17 digits; it reads back bit for bit.
 ///
-/// Index orders stay as they are in the struct; see [`Sid::conventions`].
+/// Index orders are those of the struct; see [`Sid::conventions`].
 pub fn write_sid(sid: &Sid) -> String {
     let mut text =
         format!("{:5} {:4}    :{}\n part\n     new modal\n          refmod\n", sid.nodes.len(), sid.nq(), sid.comment);

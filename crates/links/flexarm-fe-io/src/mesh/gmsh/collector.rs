@@ -1,4 +1,4 @@
-//! Elements of a Gmsh file sorted by physical group.
+//! Collects the elements of a Gmsh file by physical group.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -12,10 +12,10 @@ use crate::mesh::source::{Source, shown};
 use flexarm_fem::mesh::{ElementKind, Mesh, Region};
 use flexarm_fem::spelling::listed;
 
-/// Dimension and tag of a physical group; tag 0 stands for no group.
+/// Dimension and tag of a physical group; tag 0 means no group.
 type GroupKey = (u8, i64);
 
-/// Gathers a mesh while the sections go by.
+/// Mesh data collected while the sections are read.
 pub(super) struct Collector {
     pub(super) draft: Draft,
     keep_lines: bool,
@@ -25,31 +25,31 @@ pub(super) struct Collector {
     regions: HashMap<GroupKey, usize>,
     region_keys: Vec<GroupKey>,
     sets: BTreeMap<GroupKey, GroupNodes>,
-    /// Nodes of all sets together when each was last tidied.
+    /// Total number of nodes of all sets, each counted when it was last tidied.
     kept: usize,
 }
 
 #[derive(Default)]
 struct GroupNodes {
     ids: Vec<u64>,
-    /// How many of them are sorted and unique.
+    /// Number of them that are sorted and unique.
     tidied: usize,
-    /// Where its first element stands.
+    /// Offset of its first element.
     at: usize,
-    /// Where a line with more than two nodes stands, if there is one.
+    /// Offset of a line with more than two nodes, if there is one.
     bent_line: Option<usize>,
 }
 
-/// A set is tidied when it has twice as many nodes as after the last time, and this many more.
+/// A set is tidied when it has doubled since the last time and grown by more than this number.
 const FEW: usize = 32;
 
-/// Nodes in all sets: so many in any file, so many more per byte. 160 groups of all nodes at 40
-/// bytes per node.
+/// Maximum number of nodes in all sets: constant part, and part per byte of the file. That is 160
+/// groups of all nodes at 40 bytes per node.
 const MOST_MEMBERS: (usize, usize) = (1 << 20, 4);
 
 impl GroupNodes {
-    /// Sorts and removes duplicates: neighbouring elements share most of their nodes. Returns how
-    /// many are new.
+    /// Sorts and removes duplicates, since neighbouring elements share most of their nodes. Returns
+    /// the number of new nodes.
     fn tidy(&mut self) -> usize {
         self.ids.sort_unstable();
         self.ids.dedup();
@@ -58,7 +58,7 @@ impl GroupNodes {
 }
 
 impl Collector {
-    /// `keep_lines`: whether line elements may turn out to be beams.
+    /// `keep_lines`: whether line elements may be beams.
     pub(super) fn new(keep_lines: bool) -> Self {
         Self {
             draft: Draft::default(),
@@ -72,7 +72,7 @@ impl Collector {
         }
     }
 
-    /// `$PhysicalNames`: dimension, tag and quoted name of each group.
+    /// Reads `$PhysicalNames`: dimension, tag and quoted name of each group.
     pub(super) fn physical_names(&mut self, reader: &mut Reader) -> Result<(), MeshError> {
         let count = reader.size("number of physical names")?;
         let count = reader.checked(count, "number of physical names", [2, 0, 0])?;
@@ -92,17 +92,17 @@ impl Collector {
         Ok(())
     }
 
-    /// Notes the physical groups of an entity.
+    /// Stores the physical groups of an entity.
     pub(super) fn entity(&mut self, dim: u8, tag: i64, groups: Vec<i64>) {
         self.entities.insert((dim, tag), groups);
     }
 
-    /// The physical groups of an entity.
+    /// Returns the physical groups of an entity.
     pub(super) fn groups_of(&self, dim: u8, tag: i64) -> Vec<i64> {
         self.entities.get(&(dim, tag)).cloned().unwrap_or_default()
     }
 
-    /// Looks up an element type; volumes that are not supported are refused here.
+    /// Looks up an element type; rejects unsupported volumes.
     pub(super) fn shape(&self, reader: &Reader, at: usize, number: i64) -> Result<Shape, MeshError> {
         let known = "4, 8, 6 nodes (tetrahedron, hexahedron, prism) or 10, 20, 15";
         match shape(number) {
@@ -118,7 +118,7 @@ impl Collector {
         }
     }
 
-    /// Takes one element with the physical groups it is in.
+    /// Adds one element with its physical groups.
     pub(super) fn element(
         &mut self,
         src: &Source,
@@ -182,7 +182,7 @@ impl Collector {
         self.names.get(&key).cloned().unwrap_or_else(|| format!("physical_{}_{}", key.0, key.1))
     }
 
-    /// Names regions and sets, makes beams of the lines that are some, and checks all.
+    /// Names regions and sets, turns the lines of beam groups into beams, and checks everything.
     pub(super) fn finish(mut self, src: &Source, options: &ReadOptions) -> Result<(Mesh, Vec<String>), MeshError> {
         let has_volume_groups = self.region_keys.iter().any(|(dim, tag)| *dim == 3 && *tag != 0);
         self.check_beams(src, options)?;
@@ -208,7 +208,7 @@ impl Collector {
         self.draft.finish(src, &index, sets, &options.units)
     }
 
-    /// Every group that the options call a beam must be a physical curve of two-node lines.
+    /// Checks that every beam group of the options is a physical curve of two-node lines.
     fn check_beams(&self, src: &Source, options: &ReadOptions) -> Result<(), MeshError> {
         for (group, _) in &options.beams {
             let curves = || self.sets.iter().filter(|(key, _)| key.0 == 1);
@@ -226,9 +226,10 @@ impl Collector {
         Ok(())
     }
 
-    /// Node sets by name; where dimensions share a name, the highest keeps it.
+    /// Node sets by name; if groups of several dimensions share a name, the highest dimension keeps
+    /// it.
     fn node_sets(&mut self, src: &Source, index: &IdIndex) -> Result<Vec<(String, Vec<u32>)>, MeshError> {
-        // The last duplicates go first: neighbouring elements share most of their nodes.
+        // Remove the remaining duplicates: neighbouring elements share most of their nodes.
         for set in self.sets.values_mut() {
             set.tidy();
         }
@@ -253,7 +254,7 @@ impl Collector {
             let nodes = nodes.collect::<Result<Vec<u32>, _>>()?;
             sets.entry(name).or_insert((key.0, vec![])).1.extend(nodes);
         }
-        // A group with a name but without elements is worth a warning, which an empty set gives.
+        // A named group without elements becomes an empty set, which causes a warning.
         for (key, name) in self.names.iter().filter(|(key, _)| key.0 < 3) {
             sets.entry(name.clone()).or_insert((key.0, vec![]));
         }
@@ -265,8 +266,8 @@ impl Collector {
 mod tests {
     use super::*;
 
-    /// Puts triangles into 64 groups as a file of 8 bytes per triangle; returns the numbers that
-    /// are held.
+    /// Puts triangles into 64 groups, as from a file with 8 bytes per triangle; returns the number
+    /// of stored node numbers.
     fn held(triangles: impl ExactSizeIterator<Item = [u64; 3]>) -> Result<usize, MeshError> {
         let bytes = vec![b'\n'; 8 * triangles.len()];
         let src = Source { bytes: &bytes, origin: "t.msh", binary: false };

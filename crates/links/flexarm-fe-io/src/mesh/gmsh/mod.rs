@@ -1,6 +1,6 @@
 //! Gmsh `.msh` files, versions 2 and 4.1, as text and binary.
 //!
-//! Both versions end in a [`Collector`]: volumes by physical group, nodes of the groups of lower
+//! Both versions fill a [`Collector`]: volumes by physical group, nodes of the groups of lower
 //! dimension. Start at [`parse`]. Layout: Gmsh reference manual, "Gmsh file formats".
 
 mod collector;
@@ -24,7 +24,7 @@ pub(super) fn parse(src: &Source, options: &ReadOptions) -> Result<MeshFile, Mes
         match (section, header) {
             (b"MeshFormat", _) => header = Some(mesh_format(&mut reader)?),
             (b"PhysicalNames", _) => {
-                // Text in binary files, too.
+                // Also text in binary files.
                 let mut text = Reader { layout: Layout::Ascii, ..reader };
                 collector.physical_names(&mut text)?;
                 reader = Reader { layout: reader.layout, ..text };
@@ -70,7 +70,7 @@ struct Header {
     version: u8,
 }
 
-/// Moves behind the next line `$Name`; returns the name and where it stands.
+/// Moves past the next line `$Name`; returns the name and its position.
 fn next_section<'a>(reader: &mut Reader<'a>) -> Option<(&'a [u8], usize)> {
     while reader.left() > 0 {
         reader.skip_blanks();
@@ -83,7 +83,7 @@ fn next_section<'a>(reader: &mut Reader<'a>) -> Option<(&'a [u8], usize)> {
     None
 }
 
-/// Moves behind the line `$End<section>`, or to the end of the file.
+/// Moves past the line `$End<section>`, or to the end of the file.
 fn skip_section(reader: &mut Reader, section: &[u8]) {
     let end = [b"$End", section].concat();
     while reader.left() > 0 {
@@ -100,8 +100,8 @@ fn skip_section(reader: &mut Reader, section: &[u8]) {
     }
 }
 
-/// `version file-type data-size`, and in binary files the integer one that shows the order of
-/// bytes.
+/// Reads `version file-type data-size` and, in binary files, the integer 1 that shows the byte
+/// order.
 fn mesh_format(reader: &mut Reader) -> Result<Header, MeshError> {
     let at = reader.pos;
     let version_word = reader.word("version")?;

@@ -1,4 +1,4 @@
-//! Sections of MSH 2: counts are text, the rest is text or bytes.
+//! Sections of MSH 2: counts are text, the rest is text or binary.
 
 use nalgebra::Vector3;
 
@@ -7,7 +7,7 @@ use super::reader::{Layout, Reader};
 use super::shapes::MOST_NODES;
 use crate::mesh::error::MeshError;
 
-/// `$Nodes`: number and position of each.
+/// Reads `$Nodes`: number and position of each node.
 pub(super) fn nodes(reader: &mut Reader, collector: &mut Collector) -> Result<(), MeshError> {
     let count = text_count(reader, "number of nodes")?;
     let count = reader.checked(count, "number of nodes", [1, 0, 3])?;
@@ -20,7 +20,7 @@ pub(super) fn nodes(reader: &mut Reader, collector: &mut Collector) -> Result<()
     Ok(())
 }
 
-/// `$Elements`: as text one per line, as bytes in runs of one type.
+/// Reads `$Elements`: one per line in text, runs of one type in binary.
 pub(super) fn elements(reader: &mut Reader, collector: &mut Collector) -> Result<(), MeshError> {
     let count = text_count(reader, "number of elements")?;
     let ascii = reader.layout == Layout::Ascii;
@@ -57,7 +57,7 @@ pub(super) fn elements(reader: &mut Reader, collector: &mut Collector) -> Result
     Ok(())
 }
 
-/// A count on a line of its own, text in binary files, too.
+/// Reads a count on its own line, which is text in binary files as well.
 fn text_count(reader: &mut Reader, what: &str) -> Result<u64, MeshError> {
     let layout = std::mem::replace(&mut reader.layout, Layout::Ascii);
     let count = reader.size(what);

@@ -1,4 +1,4 @@
-//! Sections of MSH 4.1: the same numbers in the same order as text and as bytes.
+//! Sections of MSH 4.1: the same numbers in the same order in text and binary.
 
 use nalgebra::Vector3;
 
@@ -7,17 +7,17 @@ use super::reader::{Layout, Reader};
 use super::shapes::MOST_NODES;
 use crate::mesh::error::{MeshError, MeshErrorKind as Kind};
 
-/// Physical groups that one entity may be in.
+/// Maximum number of physical groups of one entity.
 const MOST_GROUPS: usize = 64;
 
-/// `$Entities`: only the physical groups of each are kept.
+/// Reads `$Entities`; only the physical groups of each are kept.
 pub(super) fn entities(reader: &mut Reader, collector: &mut Collector) -> Result<(), MeshError> {
     let mut counts = [0; 4];
     for count in &mut counts {
         *count = reader.size("number of entities")?;
     }
     for (dim, count) in (0_u8..).zip(counts) {
-        // A point has its position, the others have a box and a list of what bounds them.
+        // Points have a position, other entities a bounding box and a list of bounding entities.
         let reals = if dim == 0 { 3 } else { 6 };
         let count = reader.checked(count, "number of entities", [1, 1, reals])?;
         for _ in 0..count {
@@ -48,7 +48,7 @@ fn tags(reader: &mut Reader, what: &str) -> Result<Vec<i64>, MeshError> {
     (0..count).map(|_| reader.int("tag").map(i64::abs)).collect()
 }
 
-/// `$Nodes`: per entity the numbers of its nodes, then their positions.
+/// Reads `$Nodes`: per entity the numbers of its nodes, then their positions.
 pub(super) fn nodes(reader: &mut Reader, collector: &mut Collector) -> Result<(), MeshError> {
     let block_count = header(reader)?;
     for _ in 0..block_count {
@@ -74,7 +74,7 @@ pub(super) fn nodes(reader: &mut Reader, collector: &mut Collector) -> Result<()
     Ok(())
 }
 
-/// `$Elements`: per entity and type the number and the nodes of each element.
+/// Reads `$Elements`: per entity and type the number and the nodes of each element.
 pub(super) fn elements(reader: &mut Reader, collector: &mut Collector) -> Result<(), MeshError> {
     let block_count = header(reader)?;
     let mut nodes = [0_u64; MOST_NODES];
@@ -103,7 +103,7 @@ pub(super) fn elements(reader: &mut Reader, collector: &mut Collector) -> Result
     Ok(())
 }
 
-/// Number of blocks, number of things, smallest and largest number: only the first is needed.
+/// Reads the numbers of blocks and items, minimum and maximum number; returns only the first.
 fn header(reader: &mut Reader) -> Result<usize, MeshError> {
     let blocks = reader.size("number of entity blocks")?;
     for what in ["number in all", "smallest number", "largest number"] {

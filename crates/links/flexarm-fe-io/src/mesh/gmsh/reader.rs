@@ -1,23 +1,23 @@
-//! Numbers of a Gmsh file in turn, as text or as bytes of either order.
+//! Reads the numbers of a Gmsh file in order, as text or in binary of either byte order.
 
 use crate::mesh::error::{MeshError, MeshErrorKind as Kind};
 use crate::mesh::source::{Source, parse_f64, parse_u64, shown};
 
-/// How numbers are written.
+/// Encoding of numbers.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Layout {
-    /// As words between blanks.
+    /// Words separated by blanks.
     Ascii,
-    /// As bytes; `size` is that of Gmsh's `size_t`, 4 or 8.
+    /// Binary; `size` is the size of `size_t` in Gmsh, 4 or 8 bytes.
     Binary {
-        /// Most significant byte first.
+        /// Whether the most significant byte is first.
         big_endian: bool,
-        /// Bytes of a `size_t`.
+        /// Size of `size_t`, bytes.
         size: usize,
     },
 }
 
-/// A place in the file that moves on with every number.
+/// Position in the file that advances with every number.
 pub(super) struct Reader<'a> {
     pub(super) src: Source<'a>,
     pub(super) pos: usize,
@@ -25,12 +25,12 @@ pub(super) struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// Bytes that are left.
+    /// Number of remaining bytes.
     pub(super) fn left(&self) -> usize {
         self.src.bytes.len() - self.pos
     }
 
-    /// The next word of text.
+    /// Reads the next word of text.
     pub(super) fn word(&mut self, what: &str) -> Result<&'a [u8], MeshError> {
         self.skip_blanks();
         let rest = &self.src.bytes[self.pos..];
@@ -47,7 +47,7 @@ impl<'a> Reader<'a> {
         self.pos += rest.iter().position(|byte| !byte.is_ascii_whitespace()).unwrap_or(rest.len());
     }
 
-    /// The rest of the line, without its end; moves behind it.
+    /// Returns the rest of the line without its end, and moves past it.
     pub(super) fn rest_of_line(&mut self) -> &'a [u8] {
         let rest = &self.src.bytes[self.pos..];
         let length = rest.iter().position(|byte| *byte == b'\n').unwrap_or(rest.len());
@@ -55,7 +55,7 @@ impl<'a> Reader<'a> {
         rest[..length].trim_ascii()
     }
 
-    /// A signed integer, C `int`.
+    /// Reads a signed integer, C `int`.
     pub(super) fn int(&mut self, what: &str) -> Result<i64, MeshError> {
         match self.layout {
             Layout::Ascii => {
@@ -73,7 +73,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// An unsigned integer, C `size_t`.
+    /// Reads an unsigned integer, C `size_t`.
     pub(super) fn size(&mut self, what: &str) -> Result<u64, MeshError> {
         match self.layout {
             Layout::Ascii => {
@@ -93,14 +93,14 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The number of a node or an element in MSH 2, an `int`.
+    /// Reads the number of a node or an element in MSH 2, an `int`.
     pub(super) fn id(&mut self, what: &str) -> Result<u64, MeshError> {
         let at = self.pos;
         let value = self.int(what)?;
         u64::try_from(value).map_err(|_| self.wrong(at, what, value.to_string().as_bytes(), "no negative number"))
     }
 
-    /// A real number, C `double`.
+    /// Reads a real number, C `double`.
     pub(super) fn real(&mut self, what: &str) -> Result<f64, MeshError> {
         match self.layout {
             Layout::Ascii => {
@@ -115,10 +115,9 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// A count of things that take at least so many integers, sizes and reals each.
+    /// Checks a count of items that have at least `parts` integers, sizes and reals each.
     ///
-    /// A count that cannot fit into the rest of the file is refused here, before anything is
-    /// allocated.
+    /// A count that is too large for the rest of the file is rejected before anything is allocated.
     pub(super) fn checked(&self, count: u64, what: &str, parts: [usize; 3]) -> Result<usize, MeshError> {
         let [ints, sizes, reals] = parts;
         let each = match self.layout {
@@ -136,7 +135,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The word `$End<section>`.
+    /// Reads the word `$End<section>`.
     pub(super) fn end_of(&mut self, section: &str) -> Result<(), MeshError> {
         let expected = format!("$End{section}");
         self.skip_blanks();
@@ -160,7 +159,7 @@ impl<'a> Reader<'a> {
     }
 
     fn wrong(&self, from: usize, what: &str, word: &[u8], expected: &str) -> MeshError {
-        // From the word itself, not from the blanks before it.
+        // Position of the word itself, not of the blanks before it.
         let blanks = self.src.bytes[from..].iter().take_while(|byte| byte.is_ascii_whitespace()).count();
         self.src.error(Kind::Syntax, from + blanks, what, shown(word), expected)
     }

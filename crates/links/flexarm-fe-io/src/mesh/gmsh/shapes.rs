@@ -1,16 +1,16 @@
-//! Gmsh's element types: dimension, nodes, and the way to our node order.
+//! Element types of Gmsh: dimension, number of nodes, and conversion to our node order.
 
 use flexarm_fem::mesh::ElementKind;
 
-/// What a Gmsh element type is.
+/// Gmsh element type.
 pub(super) struct Shape {
-    /// Gmsh's name in words.
+    /// Name in Gmsh.
     pub(super) name: &'static str,
     /// Topological dimension.
     pub(super) dim: u8,
-    /// Nodes of one element.
+    /// Number of nodes of one element.
     pub(super) nodes: usize,
-    /// For volumes that are supported: the kind, and Gmsh's local index of each of our nodes.
+    /// For supported volumes: the kind, and Gmsh's local index of each of our nodes.
     pub(super) solid: Option<(ElementKind, &'static [u8])>,
 }
 
@@ -18,7 +18,7 @@ const TET: &[u8] = &[0, 1, 2, 3, 4, 5, 6, 7, 9, 8];
 const HEX: &[u8] = &[0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15];
 const WEDGE: &[u8] = &[0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11];
 
-/// The most nodes that any type in the table has.
+/// Maximum number of nodes of the types in the table.
 pub(super) const MOST_NODES: usize = 125;
 
 /// Looks up an element type number.
@@ -68,7 +68,7 @@ pub(super) fn shape(number: i64) -> Option<Shape> {
     }
 }
 
-/// What to do in Gmsh about a volume type that is not supported.
+/// Advice for handling an unsupported volume type in Gmsh.
 pub(super) fn advice(number: i64) -> &'static str {
     match number {
         12 | 13 => "in Gmsh set Mesh.SecondOrderIncomplete=1, which leaves out nodes in faces and volumes",

@@ -1,4 +1,4 @@
-//! The cards of a deck, one after the other.
+//! Reads the cards of a deck in order.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -13,7 +13,7 @@ use crate::mesh::error::{MeshError, MeshErrorKind as Kind};
 use crate::mesh::source::{Source, shown};
 use flexarm_fem::units::UnitSystem;
 
-/// What the cards say.
+/// Contents of the cards.
 pub(super) struct Deck<'a> {
     pub(super) lines: Lines<'a>,
     pub(super) units: UnitSystem,
@@ -23,26 +23,26 @@ pub(super) struct Deck<'a> {
     pub(super) elsets: Sets,
     pub(super) surfaces: Vec<Surface>,
     pub(super) materials: Vec<MaterialCard>,
-    /// Index of each material by its name in capitals.
+    /// Index of each material by its name in upper case.
     pub(super) material_by_name: HashMap<String, usize>,
     pub(super) sections: Vec<SectionCard>,
-    /// Cards that were passed over, with their number.
+    /// Ignored cards with their count.
     ignored: Vec<(String, usize)>,
-    /// Element types that were remarked on.
+    /// Element types that already have a remark.
     remarks: BTreeSet<String>,
     scope: Scope,
     instances: usize,
     assembly_nodes: bool,
 }
 
-/// All elements in the order of the file.
+/// All elements in file order.
 #[derive(Default)]
 pub(super) struct Elements {
     pub(super) ids: Vec<u64>,
     pub(super) offsets: Vec<usize>,
-    /// Index of its card.
+    /// Index of the element card.
     pub(super) cards: Vec<u32>,
-    /// Where the nodes of each begin.
+    /// Start of the nodes of each element.
     pub(super) starts: Vec<usize>,
     pub(super) nodes: Vec<u64>,
     pub(super) groups: Vec<ElementCard>,
@@ -59,9 +59,9 @@ pub(super) struct ElementCard {
 pub(super) struct Surface {
     pub(super) name: String,
     pub(super) scope: Scope,
-    /// Of node sets and nodes rather than faces of elements.
+    /// Whether it consists of node sets and nodes rather than faces of elements.
     pub(super) of_nodes: bool,
-    /// Offset, name of a set or number, face from 0.
+    /// Offset, name of a set or number, and face from 0.
     pub(super) items: Vec<(usize, String, Option<u8>)>,
 }
 
@@ -97,7 +97,7 @@ impl<'a> Deck<'a> {
                 self.card(&card)?;
             }
         }
-        /// Cards that join or load parts of the structure itself.
+        /// Cards that connect, constrain or add parts of the structure.
         const STRUCTURAL: [&str; 9] =
             ["TIE", "EQUATION", "MPC", "COUPLING", "KINEMATIC", "DISTRIBUTING", "MASS", "ROTARY INERTIA", "SPRING"];
         let is_structural = |title: &str| STRUCTURAL.iter().any(|known| title.trim_start_matches('*') == *known);
@@ -193,7 +193,7 @@ impl<'a> Deck<'a> {
         }
     }
 
-    /// One instance that is not moved is the same as a flat deck.
+    /// One instance that is not moved is equivalent to a flat deck.
     fn instance(&mut self, card: &Card) -> Result<(), MeshError> {
         let src = self.lines.src;
         self.instances += 1;
@@ -210,7 +210,7 @@ impl<'a> Deck<'a> {
         Ok(())
     }
 
-    /// `*NODE`: number, x, y, z.
+    /// Reads `*NODE`: number, x, y, z.
     fn nodes(&mut self, card: &Card) -> Result<(), MeshError> {
         let src = self.lines.src;
         if self.scope == Scope::Assembly {
@@ -243,12 +243,12 @@ impl<'a> Deck<'a> {
         Ok(())
     }
 
-    /// Types of all elements, in capitals.
+    /// Types of all elements, in upper case.
     pub(super) fn element_types(&self) -> BTreeSet<String> {
         self.elements.groups.iter().map(|group| group.type_name.clone()).collect()
     }
 
-    /// `*ELEMENT`: number and nodes, over as many lines as they take.
+    /// Reads `*ELEMENT`: number and nodes, over one or more lines.
     fn element_card(&mut self, card: &Card) -> Result<(), MeshError> {
         let src = self.lines.src;
         let type_name = squeezed(card.need(&src, "TYPE")?);
@@ -304,12 +304,12 @@ impl<'a> Deck<'a> {
         Ok(())
     }
 
-    /// `*NSET` and `*ELSET`.
+    /// Reads `*NSET` and `*ELSET`.
     fn set(&mut self, card: &Card) -> Result<(), MeshError> {
         let src = self.lines.src;
         let of_nodes = card.name == "NSET";
         let name = card.need(&src, &card.name)?;
-        // Plain numbers in the assembly, without an instance, are its reference points.
+        // In the assembly, plain numbers without an instance are its reference points.
         let take_ids = self.scope == Scope::Part || card.has("INSTANCE") || !self.assembly_nodes;
         let sets = if of_nodes { &mut self.nsets } else { &mut self.elsets };
         let set = sets.open(name, self.scope, card.at);
@@ -323,7 +323,7 @@ impl<'a> Deck<'a> {
         Ok(())
     }
 
-    /// `*SURFACE`, of nodes or of faces of elements.
+    /// Reads `*SURFACE`, of nodes or of element faces.
     fn surface(&mut self, card: &Card) -> Result<(), MeshError> {
         let src = self.lines.src;
         let name = card.need(&src, "NAME")?.to_owned();

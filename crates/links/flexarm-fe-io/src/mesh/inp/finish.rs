@@ -1,4 +1,4 @@
-//! From the cards to a mesh: sets are resolved, elements sorted into regions.
+//! Builds a mesh from the cards: resolves sets and sorts elements into regions.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -17,11 +17,11 @@ use flexarm_fem::spelling::listed;
 
 const NONE: u32 = u32::MAX;
 
-/// A node set with its name.
+/// Node set with its name.
 type Named = (String, Vec<u32>);
 
 impl Deck<'_> {
-    /// Puts all together and checks it.
+    /// Builds the mesh and checks it.
     pub(super) fn finish(mut self, options: &ReadOptions) -> Result<(Mesh, Vec<String>), MeshError> {
         let src = self.lines.src;
         let nodes = self.draft.index_nodes(&src)?;
@@ -64,7 +64,8 @@ impl Deck<'_> {
         })
     }
 
-    /// Index of the region of every element: of its section, or of its set where it has none.
+    /// Index of the region of every element: that of its section, or of its set if it has no
+    /// section.
     fn regions(&mut self, elsets: &[Vec<u32>]) -> Result<Vec<u32>, MeshError> {
         let src = self.lines.src;
         let mut region_of = vec![NONE; self.elements.ids.len()];
@@ -114,7 +115,7 @@ impl Deck<'_> {
             self.draft.regions.push(Region { name: self.elsets.list[set].name.clone(), material, beam });
         }
 
-        // Without a section: by the set of the element card.
+        // Elements without a section: by the set of the element card.
         let mut by_name = BTreeMap::new();
         for (element, region) in region_of.iter_mut().enumerate().filter(|(_, region)| **region == NONE) {
             let card = &self.elements.groups[self.elements.cards[element] as usize];
@@ -135,7 +136,7 @@ impl Deck<'_> {
         Ok(region_of)
     }
 
-    /// Sections of beams that the caller gives.
+    /// Applies beam sections given by the caller.
     fn beams_of_options(&mut self, options: &ReadOptions, region_of: &[u32]) -> Result<(), MeshError> {
         let mut with_beams = BTreeSet::new();
         for (element, region) in region_of.iter().enumerate() {
@@ -157,7 +158,7 @@ impl Deck<'_> {
         Ok(())
     }
 
-    /// Node sets, nodes of surfaces, and nodes of the element sets that are skins; names differ.
+    /// Node sets, nodes of surfaces, and nodes of element sets of skins, with unique names.
     fn node_sets(
         &self,
         nodes: &IdIndex,
@@ -179,7 +180,7 @@ impl Deck<'_> {
 
         let mut named = Vec::new();
         let mut taken = BTreeSet::new();
-        // Sets of the assembly keep their names, those of the part give way.
+        // Sets of the assembly keep their names; those of the part are renamed if they clash.
         for scope in [Scope::Assembly, Scope::Part] {
             let of_scope = self.nsets.list.iter().zip(&resolved).filter(|(set, _)| set.scope == scope);
             for (set, members) in of_scope {
@@ -215,7 +216,7 @@ impl Deck<'_> {
         Ok(())
     }
 
-    /// Appends the nodes of one element at some local places.
+    /// Appends the nodes of one element at the given local places.
     fn some_nodes(
         &self,
         nodes: &IdIndex,

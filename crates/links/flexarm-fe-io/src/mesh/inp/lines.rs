@@ -3,20 +3,20 @@
 use crate::mesh::error::{MeshError, MeshErrorKind as Kind};
 use crate::mesh::source::{Source, parse_f64, parse_u64, shown};
 
-/// The lines that are neither blank nor comments.
+/// Lines that are neither blank nor comments.
 pub(super) struct Lines<'a> {
     pub(super) src: Source<'a>,
     pos: usize,
 }
 
-/// A line with its offset.
+/// Line with its offset.
 pub(super) type Line<'a> = (usize, &'a [u8]);
 
-/// A keyword line.
+/// Keyword line.
 pub(super) struct Card {
-    /// In capitals, without blanks: `SOLIDSECTION`.
+    /// Name in upper case, without blanks: `SOLIDSECTION`.
     pub(super) name: String,
-    /// Its first words as in the file, for messages.
+    /// First words as in the file, for messages.
     pub(super) title: String,
     /// Offset of the line.
     pub(super) at: usize,
@@ -29,7 +29,7 @@ impl<'a> Lines<'a> {
         Self { src, pos }
     }
 
-    /// The next line, and where the one after it begins; does not move.
+    /// Returns the next line and the start of the one after it, without advancing.
     fn peek(&mut self) -> Option<(Line<'a>, usize)> {
         let bytes = self.src.bytes;
         while self.pos < bytes.len() {
@@ -45,7 +45,7 @@ impl<'a> Lines<'a> {
         None
     }
 
-    /// The next data line of the current card.
+    /// Returns the next data line of the current card.
     pub(super) fn data(&mut self) -> Option<Line<'a>> {
         let (line, next) = self.peek()?;
         if line.1.starts_with(b"*") {
@@ -55,14 +55,14 @@ impl<'a> Lines<'a> {
         Some(line)
     }
 
-    /// The next card; data lines before it are passed over.
+    /// Returns the next card, skipping data lines before it.
     pub(super) fn card(&mut self) -> Option<Card> {
         loop {
             let ((at, line), next) = self.peek()?;
             self.pos = next;
             if line.starts_with(b"*") {
                 let mut text = line[1..].to_vec();
-                // A comma at the end: the card goes on in the next line.
+                // A comma at the end continues the card in the next line.
                 while text.trim_ascii_end().ends_with(b",") {
                     let Some(((_, more), next)) = self.peek() else { break };
                     if more.starts_with(b"*") || !more.contains(&b'=') {
@@ -95,31 +95,31 @@ impl Card {
         self.parameters.iter().find(|(known, _)| known == key).map(|(_, value)| value.as_str())
     }
 
-    /// Whether a parameter is there.
+    /// Whether a parameter is given.
     pub(super) fn has(&self, key: &str) -> bool {
         self.get(key).is_some()
     }
 
-    /// Value of a parameter that must be there.
+    /// Value of a required parameter.
     pub(super) fn need(&self, src: &Source, key: &str) -> Result<&str, MeshError> {
         self.get(key).filter(|value| !value.is_empty()).ok_or_else(|| {
             src.error(Kind::Syntax, self.at, self.title.as_str(), format!("no {key}="), format!("{key}=name"))
         })
     }
 
-    /// An error at the card.
+    /// Creates an error at the card.
     pub(super) fn refuse(&self, src: &Source, found: impl Into<Box<str>>, expected: &str) -> MeshError {
         src.error(Kind::Unsupported, self.at, self.title.as_str(), found, expected)
     }
 }
 
-/// Comma-separated fields of a data line, trimmed; a comma at the end adds none.
+/// Comma-separated fields of a data line, trimmed; a comma at the end adds no field.
 pub(super) fn fields(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     let line = line.trim_ascii_end();
     line.strip_suffix(b",").unwrap_or(line).split(|byte| *byte == b',').map(<[u8]>::trim_ascii)
 }
 
-/// All fields of a data line as numbers; an empty field is zero.
+/// Parses all fields of a data line as numbers; an empty field is zero.
 pub(super) fn numbers(src: &Source, card: &Card, (at, line): Line) -> Result<Vec<f64>, MeshError> {
     let number = |field: &[u8]| {
         let value = if field.is_empty() { Some(0.0) } else { parse_f64(field) };
@@ -132,17 +132,17 @@ pub(super) fn numbers(src: &Source, card: &Card, (at, line): Line) -> Result<Vec
     fields(line).map(number).collect()
 }
 
-/// A field as the number of a node or an element.
+/// Parses a field as the number of a node or an element.
 pub(super) fn id(src: &Source, at: usize, what: &str, field: &[u8]) -> Result<u64, MeshError> {
     parse_u64(field).ok_or_else(|| src.error(Kind::Syntax, at, what, shown(field), "a number without sign or point"))
 }
 
-/// Capitals, without blanks.
+/// Converts to upper case and removes blanks.
 pub(super) fn squeezed(text: &str) -> String {
     text.chars().filter(|c| !c.is_whitespace()).flat_map(char::to_uppercase).collect()
 }
 
-/// Without blanks and quotes around it.
+/// Trims blanks and surrounding quotes.
 pub(super) fn unquoted(text: &str) -> &str {
     let text = text.trim();
     text.strip_prefix('"').and_then(|text| text.strip_suffix('"')).unwrap_or(text)

@@ -1,7 +1,7 @@
 //! CalculiX and Abaqus decks, `.inp`: nodes, elements, sets, materials and sections.
 //!
-//! Cards are read once, in order, into a [`Deck`]; sets, sections and surfaces are put together at
-//! the end ([`finish`](deck)). Loads, ties and steps are passed over and named in a warning.
+//! Cards are read once, in order, into a [`Deck`]; sets, sections and surfaces are resolved at the
+//! end ([`finish`](deck)). Loads, ties and steps are ignored, with a warning that names them.
 
 mod deck;
 mod finish;

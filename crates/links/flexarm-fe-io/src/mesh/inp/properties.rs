@@ -16,7 +16,7 @@ use flexarm_fem::section::Section;
 use flexarm_fem::spelling::listed;
 use flexarm_fem::units::UnitSystem;
 
-/// `*MATERIAL` with what follows it; SI.
+/// `*MATERIAL` with its sub-cards; SI.
 pub(super) struct MaterialCard {
     pub(super) name: String,
     at: usize,
@@ -31,7 +31,7 @@ pub(super) struct SectionCard {
     pub(super) scope: Scope,
     pub(super) at: usize,
     pub(super) title: String,
-    /// Shape and direction of the section's y axis, for beams.
+    /// For beams, shape and direction of the section's y axis.
     pub(super) beam: Option<(Section, Vector3<f64>)>,
 }
 
@@ -41,7 +41,7 @@ impl MaterialCard {
         Ok(Self { name, at: card.at, elastic: None, density: None })
     }
 
-    /// `*ELASTIC`: modulus and Poisson's ratio.
+    /// Reads `*ELASTIC`: modulus and Poisson's ratio.
     pub(super) fn elastic(
         &mut self,
         lines: &mut Lines,
@@ -67,13 +67,13 @@ impl MaterialCard {
         Ok(())
     }
 
-    /// `*DENSITY`.
+    /// Reads `*DENSITY`.
     pub(super) fn density(&mut self, lines: &mut Lines, card: &Card, units: &UnitSystem) -> Result<(), MeshError> {
         self.density = Some(first_line(lines, card)?[0] * units.density());
         Ok(())
     }
 
-    /// The material; `None` with a warning where the deck does not say enough.
+    /// Returns the material, or `None` with a warning if the data in the deck is incomplete.
     pub(super) fn material(&self, src: &Source, warnings: &mut Vec<String>) -> Result<Option<Material>, MeshError> {
         let (Some((E, nu)), Some(rho)) = (self.elastic, self.density) else {
             let missing = if self.elastic.is_none() { "*ELASTIC" } else { "*DENSITY" };
@@ -89,7 +89,7 @@ impl MaterialCard {
 }
 
 impl SectionCard {
-    /// `*SOLID SECTION`.
+    /// Reads `*SOLID SECTION`.
     pub(super) fn solid(src: &Source, card: &Card, scope: Scope) -> Result<Self, MeshError> {
         if card.has("COMPOSITE") {
             return Err(card.refuse(src, "COMPOSITE", "one material per section"));
@@ -104,7 +104,7 @@ impl SectionCard {
         })
     }
 
-    /// `*BEAM SECTION`: dimensions, then the first local direction.
+    /// Reads `*BEAM SECTION`: dimensions, then the first local direction.
     pub(super) fn beam(
         lines: &mut Lines,
         card: &Card,
@@ -136,7 +136,7 @@ impl SectionCard {
                  a diameter: write two equal diameters to mean that"
             ));
         }
-        // Poisson's ratio plays no part in what is possible.
+        // Poisson's ratio does not matter for the check of the dimensions.
         shape.properties(0.3).map_err(|error| impossible(&src, card.at, card.title.clone(), &error))?;
 
         let direction = match lines.data() {
@@ -158,12 +158,12 @@ impl SectionCard {
         Ok(section)
     }
 
-    /// What the elements need.
+    /// Returns the beam properties of the section, if it is one of beams.
     pub(super) fn beam_properties(&self, theory: BeamTheory) -> Option<BeamProperties> {
         self.beam.map(|(section, y_axis)| BeamProperties { section, y_axis, theory })
     }
 
-    /// The material that the section names.
+    /// Finds the material of the section.
     pub(super) fn find<'a>(
         &self,
         src: &Source,
@@ -179,8 +179,8 @@ impl SectionCard {
     }
 }
 
-/// Dimensions as in Abaqus; two equal numbers for CIRC are CalculiX's diameters (its
-/// beamsections.f).
+/// Dimensions as in Abaqus; two equal numbers for CIRC are diameters as in CalculiX
+/// (beamsections.f).
 fn beam_section(name: &str, dimensions: &[f64]) -> Option<Section> {
     match (name, dimensions) {
         ("RECT", [a, b]) => Some(Section::Rectangle { width: *a, height: *b }),
@@ -194,7 +194,7 @@ fn beam_section(name: &str, dimensions: &[f64]) -> Option<Section> {
     }
 }
 
-/// Numbers of the first data line; at least one.
+/// Numbers of the first data line, which is required.
 fn first_line(lines: &mut Lines, card: &Card) -> Result<Vec<f64>, MeshError> {
     let src = lines.src;
     match lines.data() {

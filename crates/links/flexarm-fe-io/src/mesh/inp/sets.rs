@@ -1,4 +1,4 @@
-//! Named sets of nodes or elements, with sets inside sets.
+//! Named sets of nodes or elements, including nested sets.
 
 use std::collections::HashMap;
 
@@ -8,19 +8,19 @@ use crate::mesh::ids::IdIndex;
 use crate::mesh::source::{Source, parse_u64, shown};
 use flexarm_fem::spelling::listed;
 
-/// What sets may grow to by nesting and generation: a bound by the size of the file, so that a
-/// small file cannot ask for endless work.
+/// Limit for the growth of sets by nesting and generation, proportional to the size of the file, so
+/// that a small file cannot cause endless work.
 pub(super) struct Budget {
     left: usize,
 }
 
 impl Budget {
     pub(super) fn new(src: &Source) -> Self {
-        // 500 sets of all nodes at 30 bytes per node.
+        // Enough for 500 sets of all nodes at 30 bytes per node.
         Self { left: src.bytes.len().saturating_mul(16).saturating_add(1 << 20) }
     }
 
-    /// Counts members of a set or surface that stands at an offset.
+    /// Counts members of a set or surface at an offset.
     pub(super) fn spend(&mut self, src: &Source, at: usize, name: &str, members: usize) -> Result<(), MeshError> {
         match self.left.checked_sub(members) {
             Some(left) => {
@@ -35,7 +35,7 @@ impl Budget {
     }
 }
 
-/// Where a name was given: sets of a part and of the assembly may share names.
+/// Scope of a name: sets of a part and of the assembly may have the same name.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) enum Scope {
     /// A flat deck, a part or an instance.
@@ -44,7 +44,7 @@ pub(super) enum Scope {
     Assembly,
 }
 
-/// The sets of one sort.
+/// All sets of nodes, or all sets of elements.
 pub(super) struct Sets {
     /// `node` or `element`.
     what: &'static str,
@@ -53,13 +53,13 @@ pub(super) struct Sets {
 }
 
 pub(super) struct Set {
-    /// As in the file.
+    /// Name as in the file.
     pub(super) name: String,
     pub(super) scope: Scope,
     pub(super) at: usize,
     pub(super) ids: Vec<u64>,
     ranges: Vec<[u64; 3]>,
-    /// Sets of the same sort inside.
+    /// Nested sets of the same kind.
     inner: Vec<usize>,
     /// Element sets whose nodes are members.
     pub(super) of_elements: Vec<usize>,
@@ -70,7 +70,7 @@ impl Sets {
         Self { what, list: Vec::new(), by_name: HashMap::new() }
     }
 
-    /// The set of a name, made if there is none.
+    /// Returns the set with a name, creating it if needed.
     pub(super) fn open(&mut self, name: &str, scope: Scope, at: usize) -> usize {
         *self.by_name.entry((scope, squeezed(name))).or_insert_with(|| {
             let name = name.to_owned();
@@ -79,7 +79,7 @@ impl Sets {
         })
     }
 
-    /// The set of a name, spelled in any case, with or without the instance before a point.
+    /// Finds a set by name, ignoring case, with or without the instance before a point.
     pub(super) fn find(&self, src: &Source, name: &str, scope: Scope, at: usize) -> Result<usize, MeshError> {
         let look = |name: &str| {
             let key = squeezed(unquoted(name));
@@ -94,9 +94,10 @@ impl Sets {
         })
     }
 
-    /// Takes one data line of `*NSET` or `*ELSET`.
+    /// Reads one data line of `*NSET` or `*ELSET`.
     ///
-    /// * `take_ids`: whether plain numbers count; names and numbers with an instance always do.
+    /// * `take_ids`: whether plain numbers are taken; names and numbers with an instance always
+    ///   are.
     pub(super) fn add_line(
         &mut self,
         src: &Source,
@@ -138,9 +139,9 @@ impl Sets {
         Ok(())
     }
 
-    /// Indices of the members of every set, sorted.
+    /// Computes the member indices of every set, sorted.
     ///
-    /// * `own`: further members of each set itself, may be shorter than the list.
+    /// * `own`: further direct members of each set; may be shorter than the list.
     pub(super) fn resolve(
         &self,
         src: &Source,
@@ -148,7 +149,7 @@ impl Sets {
         own: Vec<Vec<u32>>,
         budget: &mut Budget,
     ) -> Result<Vec<Vec<u32>>, MeshError> {
-        // Members of each set itself.
+        // Direct members of each set.
         let mut direct = own;
         direct.resize(self.list.len(), Vec::new());
         for (set, members) in self.list.iter().zip(&mut direct) {
@@ -169,8 +170,8 @@ impl Sets {
             members.dedup();
         }
 
-        // Members through sets inside: a walk from each, so that cycles and deep nesting do no
-        // harm.
+        // Members of nested sets: one traversal per set with an explicit stack, so that cycles and
+        // deep nesting are harmless.
         let mut all = direct.clone();
         let mut seen_from = vec![usize::MAX; self.list.len()];
         for (k, set) in self.list.iter().enumerate().filter(|(_, set)| !set.inner.is_empty()) {
@@ -194,8 +195,7 @@ impl Sets {
     }
 }
 
-/// Sorts and removes doubles when a list has grown to twice its size, so that it cannot grow
-/// without end.
+/// Sorts and removes duplicates when a list has doubled, so that it cannot grow without bound.
 fn tidy(members: &mut Vec<u32>, before: usize) {
     if before > 1024 && members.len() > 2 * before {
         members.sort_unstable();
@@ -203,7 +203,7 @@ fn tidy(members: &mut Vec<u32>, before: usize) {
     }
 }
 
-/// An error for a name that is in no place of the file.
+/// Creates an error for an unknown name, without a position in the file.
 pub(super) fn unknown(src: &Source, element: String, found: String, known: String) -> MeshError {
     src.error_in(Kind::Missing, Place::File, element, found, known)
 }

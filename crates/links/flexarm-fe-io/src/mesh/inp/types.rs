@@ -3,20 +3,20 @@
 use flexarm_fem::beam::BeamTheory;
 use flexarm_fem::mesh::ElementKind;
 
-/// What an element type is to us.
+/// Class of an element type.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Class {
-    /// A volume.
+    /// Volume element of this kind.
     Solid(ElementKind),
-    /// A straight beam.
+    /// Straight beam with this theory.
     Beam(BeamTheory),
-    /// A plane element or line with so many nodes that mesh programs write along with a solid: a
-    /// group of nodes.
+    /// Plane element or line with this number of nodes, which mesh programs write along with a
+    /// solid; used as a group of nodes.
     Skin(usize),
 }
 
 impl Class {
-    /// Nodes of one element.
+    /// Number of nodes of one element.
     pub(super) const fn nodes(self) -> usize {
         match self {
             Self::Solid(kind) => kind.nodes(),
@@ -26,8 +26,7 @@ impl Class {
     }
 }
 
-/// Looks up a type in capitals; with it a remark where the file asks for something that is not
-/// done.
+/// Looks up a type in upper case; also returns a remark if the type requests something unsupported.
 pub(super) fn class(name: &str) -> Option<(Class, Option<&'static str>)> {
     const REDUCED: Option<&str> = Some("reduced integration is not used: the program has its own rules");
     let solid = |kind, remark| Some((Class::Solid(kind), remark));
@@ -35,7 +34,7 @@ pub(super) fn class(name: &str) -> Option<(Class, Option<&'static str>)> {
         "C3D4" => solid(ElementKind::Tet4, None),
         "C3D10" => solid(ElementKind::Tet10, None),
         "C3D10M" | "C3D10HS" | "C3D10T" => solid(ElementKind::Tet10, Some("read as plain C3D10")),
-        // The own rules have incompatible modes always, those of CalculiX with C3D8I alone.
+        // The `Exact` quadrature always has incompatible modes, that of CalculiX only for C3D8I.
         "C3D8" => solid(ElementKind::Hex8, Some("read with incompatible modes unless quadrature = calculix")),
         "C3D8I" => solid(ElementKind::Hex8, None),
         "C3D8R" => solid(ElementKind::Hex8, REDUCED),
@@ -45,7 +44,7 @@ pub(super) fn class(name: &str) -> Option<(Class, Option<&'static str>)> {
         "C3D15" => solid(ElementKind::Wedge15, None),
         "B31" => Some((Class::Beam(BeamTheory::Timoshenko), None)),
         "B33" => Some((Class::Beam(BeamTheory::EulerBernoulli), None)),
-        // What Gmsh writes for the surfaces and curves of a solid.
+        // Types that Gmsh writes for the surfaces and curves of a solid.
         "CPS3" => Some((Class::Skin(3), None)),
         "CPS4" => Some((Class::Skin(4), None)),
         "CPS6" => Some((Class::Skin(6), None)),
@@ -56,7 +55,7 @@ pub(super) fn class(name: &str) -> Option<(Class, Option<&'static str>)> {
     }
 }
 
-/// What to do about a type that is not supported.
+/// Advice for an unsupported type.
 pub(super) fn advice(name: &str) -> &'static str {
     match name {
         "B32" | "B32R" | "B21" | "B22" | "B23" => "beams must be two-node ones in space: B31 or B33",

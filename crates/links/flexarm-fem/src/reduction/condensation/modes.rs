@@ -1,4 +1,4 @@
-//! Modes of the condensed model under three kinds of support, and what the mesh says of them.
+//! Modes of the condensed model under three kinds of support, with their residuals on the mesh.
 //!
 //! Not here: the eigensolver ([`crate::sparse`]).
 
@@ -10,11 +10,11 @@ use crate::sparse::{
     smallest_modes,
 };
 
-/// Residual of a mode above which it goes through the solver once more.
+/// Residual of a mode above which it is refined by one more solve.
 const ROUGH: f64 = 1e-6;
 
 impl Condensation<'_> {
-    /// Modes with every interface held: those of Craig and Bampton.
+    /// Modes with every interface clamped (Craig-Bampton).
     ///
     /// # Errors
     /// [`ModesError`].
@@ -26,7 +26,7 @@ impl Condensation<'_> {
         smallest_modes(&mut self.pencil(0, solve, mass), wanted)
     }
 
-    /// Modes with the first interface held and the others free.
+    /// Modes with the first interface clamped and the others free.
     ///
     /// # Errors
     /// [`ModesError`].
@@ -37,15 +37,15 @@ impl Condensation<'_> {
         smallest_modes(&mut self.pencil(freed, solve, mass), wanted)
     }
 
-    /// [`Self::fixed_modes`] and so many of [`Self::held_modes`]; with two interfaces for the
-    /// solves of the former alone.
+    /// Computes [`Self::fixed_modes`] and `held` of [`Self::held_modes`]; with two interfaces, with
+    /// no more solves than for the former.
     ///
     /// # Errors
     /// [`ModesError`].
     pub fn fixed_and_held_modes(&self, wanted: ModesWanted, held: usize) -> Result<(Modes, Modes), ModesError> {
         let [T_B] = self.T_B.as_slice() else { return self.each_by_itself(wanted, held) };
         if self.dimension() == 0 {
-            // Nothing moves between the interfaces: there is no basis of fixed modes.
+            // All DoF follow the interfaces, so there is no basis of fixed modes.
             return self.each_by_itself(wanted, held);
         }
         let solve = &mut |F: &mut Block| {
@@ -64,9 +64,9 @@ impl Condensation<'_> {
         Ok((self.fixed_modes(wanted)?, self.held_modes(ModesWanted::Count(held))?))
     }
 
-    /// Modes as they are, or, where the mesh says that rounding left them rough, `ω² K⁻¹ M φ` of
-    /// each: in thin plates, where a combination of a hundred vectors leaves ten times what one
-    /// solution does.
+    /// Returns the modes unchanged, or refined to `ω² K⁻¹ M φ` if their residuals on the mesh are
+    /// too large. This happens in thin plates, where a combination of a hundred vectors has ten
+    /// times the rounding error of one solve.
     fn smoothed(&self, mut modes: Modes, solve: impl Fn(&mut Block)) -> Modes {
         if self.mode_residuals(&modes).iter().all(|residual| *residual <= ROUGH) {
             return modes;
@@ -89,7 +89,7 @@ impl Condensation<'_> {
         |X, Y| self.model.M.block_product(X, Y)
     }
 
-    /// The pencil behind a solver that leaves so many boundary coordinates free.
+    /// Pencil of a solver that leaves `freed` boundary coordinates free.
     fn pencil<'a>(
         &self,
         freed: usize,
@@ -99,7 +99,7 @@ impl Condensation<'_> {
         Pencil { rows: self.model.size(), dimension: self.dimension() + freed, solve, mass }
     }
 
-    /// Ways to move with every interface held.
+    /// Number of degrees of freedom with every interface clamped.
     fn dimension(&self) -> usize {
         self.boundary.free().len() - self.boundary.means().len()
     }
@@ -109,7 +109,7 @@ impl Condensation<'_> {
     /// # Errors
     /// [`ModesError`].
     pub fn free_modes(&self, wanted: ModesWanted) -> Result<Modes, ModesError> {
-        // u <- u - R (Rᵀ M R)⁻¹ Rᵀ M u leaves what moves no mass as a whole.
+        // u <- u - R (Rᵀ M R)⁻¹ Rᵀ M u removes the rigid motion (zero momentum).
         let n = self.T.ncols();
         let R_b = DMatrix::from_fn(n, 6, |i, j| if i < 6 { f64::from(i == j) } else { self.rigid_at(i, j) });
         let mut R = DMatrix::zeros(self.T.nrows(), 6);
@@ -130,14 +130,14 @@ impl Condensation<'_> {
     /// Row `i` of the boundary under the rigid motion that moves the first interface by `j`, from
     /// the stiffness itself.
     fn rigid_at(&self, i: usize, j: usize) -> f64 {
-        // K_BB u_B + K_BA u_A = 0 for a motion without force.
+        // K_BB u_B + K_BA u_A = 0 for a motion without forces.
         let n = self.K_g.nrows();
         let K_BA = self.K_g.view((6, j), (n - 6, 1));
         -(self.tip.row(i - 6) * K_BA)[(0, 0)]
     }
 
-    /// Residual `‖K φ - ω² M φ + Gᵀ λ‖ / ‖ω² M φ‖` of each mode over the free DoF, as the mesh says
-    /// it; for modes under any support.
+    /// Residual `‖K φ - ω² M φ + Gᵀ λ‖ / ‖ω² M φ‖` of each mode on the mesh, over the free DoF; for
+    /// modes under any support.
     pub fn mode_residuals(&self, modes: &Modes) -> Vec<f64> {
         let K = self.model.K.product(&modes.shapes);
         let M = self.model.M.product(&modes.shapes);
@@ -154,7 +154,7 @@ impl Condensation<'_> {
         modes.omega2.iter().enumerate().map(one).collect()
     }
 
-    /// Takes the component along the rows of G out of a residual over the free DoF.
+    /// Removes the component along the rows of G from a residual over the free DoF.
     fn remove_tie_forces(&self, r: &mut DVector<f64>) {
         let means = self.boundary.means();
         if means.is_empty() {

@@ -1,5 +1,5 @@
-//! Models at the edge of what can be reduced: nothing free, one unknown, parts that hang on one
-//! interface, no mass.
+//! Models at the limit of what can be reduced: nothing free, one unknown, parts attached to only
+//! one interface, no mass.
 
 use super::*;
 use crate::matrix_link::reduce_matrices;
@@ -17,12 +17,12 @@ fn bar_between(divisions: [usize; 3], tie: [Tie; 2]) -> (FeModel, Vec<Interface>
     (model_of(&mesh), ends)
 }
 
-/// A matrix by its columns.
+/// Dense matrix from products with the unit vectors.
 fn dense(size: usize, product: impl Fn(&DMatrix<f64>) -> DMatrix<f64>) -> DMatrix<f64> {
     product(&DMatrix::identity(size, size))
 }
 
-/// Squared frequencies of a small pencil over some DoF, ascending.
+/// Squared frequencies of a small pencil over the given DoF, ascending.
 fn dense_omega2(model: &FeModel, dofs: &[usize]) -> Vec<f64> {
     let part = |A: DMatrix<f64>| A.select_rows(dofs).select_columns(dofs);
     let K = part(dense(model.size(), |X| model.K.product(X)));
@@ -58,7 +58,7 @@ fn more_modes_than_there_are_unknowns_are_all_modes_that_there_are() {
     check_modes(&reduction, &all, 12);
 }
 
-/// Each distributing interface takes six ways to move from the nodes of its surface.
+/// Each distributing interface removes six degrees of freedom from the nodes of its surface.
 #[test]
 fn a_cube_all_of_whose_nodes_are_in_interfaces_has_the_modes_that_its_ties_leave() {
     let (model, ends) = bar_between([1, 1, 1], [Tie::Rigid; 2]);
@@ -74,8 +74,8 @@ fn a_cube_all_of_whose_nodes_are_in_interfaces_has_the_modes_that_its_ties_leave
     }
 }
 
-/// Truth: a model that keeps all its DoF is its own superelement; one inner mass on a spring has ω²
-/// = k/m.
+/// Truth: a model that retains all its DoF is its own superelement; one inner mass on a spring has
+/// ω² = k/m.
 #[test]
 fn a_model_without_inner_dof_stays_as_it_is_and_one_with_a_single_one_has_one_mode() {
     let beam =
@@ -102,7 +102,7 @@ fn a_model_without_inner_dof_stays_as_it_is_and_one_with_a_single_one_has_one_mo
     assert!((with_one.K[(12, 12)] / 4e5 - 1.0).abs() < 1e-12);
     assert!((with_one.M[(6, 12)].abs() - 2f64.sqrt()).abs() < 1e-12);
 
-    // The same mass without weight cannot swing.
+    // Without its mass the spring end has no mode.
     let without = reduce(&K, &M[..M.len() - 1], 13, 1);
     assert!(matches!(without, Err(MeshLinkError::Modes(ModesError::NotFinite))), "{without:?}");
     assert!(reduce(&K, &M[..M.len() - 1], 13, 0).is_ok());
@@ -118,8 +118,8 @@ fn a_model_without_inner_dof_stays_as_it_is_and_one_with_a_single_one_has_one_mo
     assert!(matches!(few, Err(MeshLinkError::Reduction(ReductionError::Tie(TieError::TooFew { found: 1 })))));
 }
 
-/// Truth: with every node kept the modes with A held are those of the dense pencil of the other
-/// nodes.
+/// Truth: with all nodes in interfaces, the modes with A clamped are those of the dense pencil of
+/// the other nodes.
 #[test]
 fn a_beam_of_one_element_has_no_fixed_modes_and_six_with_one_end_held() {
     let beam = Some(BeamProperties {
@@ -145,8 +145,8 @@ fn a_beam_of_one_element_has_no_fixed_modes_and_six_with_one_end_held() {
     assert!(reduction.condition_estimate().is_nan());
 }
 
-/// Truth: the half between the interfaces by itself; what hangs on A beyond it is carried along
-/// without force.
+/// Truth: the half between the interfaces on its own; a part beyond A is moved along without
+/// forces.
 #[test]
 fn an_end_that_hangs_on_the_first_interface_alone_does_not_change_the_stiffness() {
     let plane = |mesh: &Mesh, x: f64| -> Vec<u32> {
@@ -167,14 +167,14 @@ fn an_end_that_hangs_on_the_first_interface_alone_does_not_change_the_stiffness(
     let error = scaled_difference(&K(&found), &K(&truth));
     assert!(error < 1e-10, "{error:.1e}"); // measured 2e-15
 
-    // Nothing is between the interfaces, and the free end moves with A alone.
+    // Nothing is between the interfaces, and the free end moves only with A.
     let (short, _, _) = bar(ElementKind::Hex8, [3, 1, 1], [0.6, 0.1, 0.1], |p| p - Vector3::x() * 0.4);
     let gate = of(&short).link.details.as_ref().unwrap().gate.clone().unwrap();
     assert!(gate.condition > 1.0 && gate.condition.is_finite(), "{gate:?}");
     assert_eq!(gate.zero_modes, 6);
 }
 
-/// Bodies that nothing joins: an error that says so, whatever the ties.
+/// Interfaces on unconnected bodies: an error with that cause, for any ties.
 #[test]
 fn interfaces_on_bodies_that_nothing_joins_are_refused() {
     let (one, a, _) = bar(ElementKind::Hex8, [2, 1, 1], [0.4, 0.1, 0.1], |p| p);

@@ -16,7 +16,7 @@ fn modes_up_to_a_bound_are_those_below_it() {
     assert!((gram - DMatrix::identity(8, 8)).amax() < 1e-10);
 }
 
-/// Second algorithm: each kind of modes by a basis of its own. Residuals on the mesh itself say
+/// Second algorithm: each kind of modes from a basis of its own. The residuals on the mesh confirm
 /// that both are modes.
 #[test]
 fn modes_with_a_held_from_the_basis_of_the_fixed_ones_are_those_of_a_basis_of_their_own() {

@@ -1,45 +1,45 @@
-//! The Lanczos basis, block by block, and the projected operator.
+//! Lanczos basis, built block by block, and the projected operator.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::{Modes, ModesError, Pencil, Released, Ritz};
 use crate::sparse::block::{Block, WIDTH, combine, grams, subtract_products};
 
-/// What is left of a direction, over the largest θ, that is rounding of the operator.
+/// Remainder of a direction after orthogonalisation, relative to the largest θ, that is rounding.
 const NOISE: f64 = 1e-13;
-/// Size of `K⁻¹ M x` over that of x, in parts of the largest one of the first block, below which it
-/// is rounding: uniform acceleration moves nothing in some directions.
+/// Ratio of the size of `K⁻¹ M x` to that of x, relative to the largest in the first block, below
+/// which the result is rounding: uniform acceleration causes no motion in some directions.
 const VANISHED: f64 = 1e-10;
-/// Smallest eigenvalue of the scaled Gram matrix of a block below which a direction is dropped.
+/// Eigenvalue of the scaled Gram matrix of a block below which a direction is dropped.
 const DEPENDENT: f64 = 1e-10;
-/// The same, below which the block is orthogonalised once more: a near-dependent block magnifies
-/// what was left.
+/// Eigenvalue of the scaled Gram matrix below which the block is orthogonalised again: normalising
+/// a nearly dependent block amplifies the remaining errors.
 const NEAR_DEPENDENT: f64 = 1e-4;
 
 /// M-orthonormal blocks `V_1 V_2 ...` with `H = Vᵀ M K⁻¹ M V`.
 pub(super) struct Basis {
     pub(super) blocks: Vec<Block>,
-    /// The newest block, not yet multiplied; no columns where the space is exhausted.
+    /// Newest block, not yet multiplied; no columns if the space is exhausted.
     newest: Block,
-    /// M times it.
+    /// M times the newest block.
     mass_newest: Block,
-    /// `H`, grown block by block.
+    /// `H`, extended block by block.
     pub(super) projected: DMatrix<f64>,
-    /// `R_{j+1}`: what the newest block is in the last product.
+    /// `R_{j+1}`: coefficients of the newest block in the last product.
     pub(super) coupling: DMatrix<f64>,
-    /// Of the shapes of a support that is taken away.
+    /// Products with the shapes of a released support.
     pub(super) beside: Option<Beside>,
-    /// Of the space that is to be spanned.
+    /// Dimension of the space.
     dimension: usize,
     solves: usize,
     next_look: usize,
 }
 
-/// Products of T, the shapes of a support that is taken away, with the basis.
+/// Products of T, the shapes of a released support, with the basis.
 pub(super) struct Beside {
     /// `Vᵀ M T`.
     pub(super) X: DMatrix<f64>,
-    /// `V_1ᵀ M K⁻¹ M T`; of the later blocks it is zero.
+    /// `V_1ᵀ M K⁻¹ M T`; zero for the later blocks.
     pub(super) Y_1: DMatrix<f64>,
     /// `Tᵀ M T`.
     pub(super) G: DMatrix<f64>,
@@ -48,7 +48,7 @@ pub(super) struct Beside {
 }
 
 impl Basis {
-    /// First block: `K⁻¹ M` of T and of pseudo-random vectors, the same ones on every run.
+    /// First block: `K⁻¹ M` times T and pseudo-random vectors, the same on every run.
     pub(super) fn start(pencil: &mut Pencil<'_>, released: Option<&Released<'_>>) -> Result<Self, ModesError> {
         let (rows, beside) = (pencil.rows, released.map_or(0, |released| released.T.width));
         let mut W = Block::zeros(rows, WIDTH.min(beside + pencil.dimension));
@@ -102,12 +102,12 @@ impl Basis {
         self.projected.nrows()
     }
 
-    /// Whether the basis spans all that there is.
+    /// Whether the basis spans the whole space.
     pub(super) fn is_exhausted(&self) -> bool {
         self.newest.width == 0
     }
 
-    /// One step of the recurrence; `T` as at the start.
+    /// Performs one step of the recurrence; `T` as at the start.
     pub(super) fn advance(&mut self, pencil: &mut Pencil<'_>, T: Option<&Block>) -> Result<(), ModesError> {
         let empty = || Block::zeros(0, 0);
         let V = std::mem::replace(&mut self.newest, empty());
@@ -118,6 +118,7 @@ impl Basis {
             beside.X = std::mem::take(&mut beside.X).resize(old + width, columns, 0.0);
             beside.X.rows_mut(old, width).copy_from(&MV.gram(T));
         }
+        // Recurrence: W = K⁻¹ M V_j - V_{j-1} R_jᵀ - V_j A_j.
         let mut W = MV.clone();
         (pencil.solve)(&mut W);
         self.solves += width;
@@ -127,8 +128,8 @@ impl Basis {
         let mut A = MV.gram(&W);
         W.subtract_product(&V, &A);
         self.blocks.push(V);
-        // The recurrence alone loses the modes that were found; once is enough to keep the basis
-        // orthonormal to rounding.
+        // The recurrence alone loses the modes already found; one reorthogonalisation keeps the
+        // basis orthonormal to rounding.
         let mut MW = MV;
         (pencil.mass)(&W, &mut MW);
         let C = grams(&self.blocks, &MW);
@@ -136,6 +137,7 @@ impl Basis {
         let old = self.len();
         A += C.rows(old, width);
 
+        // Append A_j to the diagonal of H and R_j beside it.
         let mut H = DMatrix::zeros(old + width, old + width);
         H.view_mut((0, 0), (old, old)).copy_from(&self.projected);
         H.view_mut((old, old), (width, width)).copy_from(&((&A + A.transpose()) * 0.5));
@@ -148,14 +150,13 @@ impl Basis {
         self.append(W, MW, pencil, &[])
     }
 
-    /// Makes `W` M-orthonormal and takes it as the newest block; directions that vanish are
-    /// dropped.
+    /// Makes `W` M-orthonormal and stores it as the newest block; vanishing directions are dropped.
     ///
     /// ```text
     /// G = Wᵀ M W,   V = W B with Bᵀ G B = 1,   R = Vᵀ M W = Bᵀ G
     /// ```
-    /// * `MW`: room for M times it.
-    /// * `sizes2`: at the start, `xᵀ M x` of the columns of which W is `K⁻¹ M`.
+    /// * `MW`: workspace for M W.
+    /// * `sizes2`: at the start, `xᵀ M x` of the columns x with W = `K⁻¹ M x`.
     fn append(
         &mut self,
         mut W: Block,
@@ -168,6 +169,7 @@ impl Basis {
         if G.iter().any(|x| !x.is_finite()) {
             return Err(ModesError::NotFinite);
         }
+        // At the start: drop directions that K⁻¹ M maps to rounding.
         let most = sizes2.iter().enumerate().map(|(k, size2)| G[(k, k)] / size2).fold(0.0, f64::max);
         for (k, size2) in sizes2.iter().enumerate() {
             if G[(k, k)] <= VANISHED.powi(2) * most * size2 {
@@ -175,7 +177,7 @@ impl Basis {
                 G.column_mut(k).fill(0.0);
             }
         }
-        // What is left after orthogonalisation must stand out of the rounding of the operator.
+        // The remainder after orthogonalisation must be above the rounding of the operator.
         let reference = self.projected.diagonal().iter().fold(0.0, |peak: f64, h| peak.max(h.abs()));
         let (Q, smallest) = orthonormalising(&G, NOISE * reference);
         if Q.ncols() == 0 || self.len() >= self.dimension {
@@ -184,6 +186,7 @@ impl Basis {
             self.mass_newest = self.newest.clone();
             return Ok(());
         }
+        // First pass: W Q. Then, for a nearly dependent block, reorthogonalise against the basis.
         let near_dependent = (smallest < NEAR_DEPENDENT).then(|| MW.clone());
         W.multiply(&Q);
         MW.multiply(&Q);
@@ -193,6 +196,7 @@ impl Basis {
             subtract_products(&mut W, &self.blocks, &C);
             (pencil.mass)(&W, &mut MW);
         }
+        // Second pass (Cholesky) for orthonormality to rounding; R follows from both factors.
         let second = W.gram(&MW);
         let Some(L) = ((&second + second.transpose()) * 0.5).cholesky() else {
             return Err(ModesError::NotFinite);
@@ -208,10 +212,10 @@ impl Basis {
         Ok(())
     }
 
-    /// Whether the projected operator is to be looked at; `count`: modes wanted.
+    /// Whether the projected operator should be solved now; `count`: number of requested modes.
     pub(super) fn is_to_be_looked_at(&mut self, count: usize, limit: usize) -> bool {
-        // The small eigenproblem grows with the cube of the basis: a larger one is looked at less
-        // often.
+        // The cost of the small eigenproblem grows with the cube of the basis, so a larger one is
+        // solved less often.
         if self.len() < self.next_look.max(2 * count + WIDTH) && !self.is_full(limit) {
             return false;
         }
@@ -223,7 +227,7 @@ impl Basis {
         self.len() >= limit || self.is_exhausted()
     }
 
-    /// An error where the basis may not grow any further.
+    /// Returns an error if the basis has reached its size limit.
     pub(super) fn refuse_if_full(&self, ritz: &Ritz, wanted: usize, limit: usize) -> Result<(), ModesError> {
         if !self.is_full(limit) {
             return Ok(());
@@ -232,7 +236,7 @@ impl Basis {
         Err(ModesError::NotConverged { found: ritz.converged(), wanted, basis: self.len(), residual })
     }
 
-    /// Ritz values, largest θ first.
+    /// Ritz pairs, largest θ first.
     pub(super) fn ritz(&self) -> Option<Ritz> {
         let (theta, vectors) = Ritz::of(&self.projected)?;
         let residuals = self.residuals(&theta, &vectors);
@@ -250,9 +254,10 @@ impl Basis {
         (&self.coupling * bottom).column_iter().zip(theta).map(|(r, theta)| r.norm() / theta).collect()
     }
 
-    /// The first modes of each of some Ritz pairs, so many; `T`: the shapes beside the basis.
+    /// Computes the requested number of modes of each set of Ritz pairs; `T`: shapes that extend
+    /// the basis.
     ///
-    /// The shapes take the place of the basis, which would be half of all memory beside them.
+    /// The shapes overwrite the basis, because storing both would double the memory.
     pub(super) fn into_modes<const N: usize>(self, of: [(&Ritz, usize); N], T: Option<&Block>) -> [Modes; N] {
         let rows = self.newest.rows.len();
         let Self { mut blocks, newest, mass_newest, projected, solves, .. } = self;
@@ -290,7 +295,7 @@ impl Basis {
 }
 
 /// `Q` with `Qᵀ G Q = 1` for a positive semidefinite G whose rows may have different units, and the
-/// smallest eigenvalue of the scaled G that was kept. Directions that depend on the others, or are
+/// smallest retained eigenvalue of the scaled G. Directions that are dependent on others, or
 /// shorter than `noise`, are dropped.
 pub(crate) fn orthonormalising(G: &DMatrix<f64>, noise: f64) -> (DMatrix<f64>, f64) {
     let n = G.nrows();

@@ -1,4 +1,4 @@
-//! The same body without one of its supports, projected onto the basis that the supported one has.
+//! Modes with one support released, projected onto the basis computed with that support.
 
 use nalgebra::DMatrix;
 
@@ -6,10 +6,10 @@ use super::Ritz;
 use super::basis::{Basis, orthonormalising};
 use crate::sparse::block::Block;
 
-/// A support that is taken away.
+/// Released support.
 #[derive(Debug, Clone, Copy)]
 pub struct Released<'a> {
-    /// Its static shapes T: displacement of every row for a unit of each of its coordinates; at
+    /// Static shapes T: displacement of every row per unit of each coordinate of the support; at
     /// most six.
     pub T: &'a Block,
     /// Compliance `C = (Tᵀ K T)⁻¹` of these coordinates.
@@ -17,17 +17,18 @@ pub struct Released<'a> {
 }
 
 impl Basis {
-    /// Ritz values without the support, largest θ first.
+    /// Ritz pairs without the support, largest θ first.
     ///
     /// ```text
     /// [V T]ᵀ M K_r⁻¹ M [V T] = | H + X C Xᵀ        Y + X C G   |      X = Vᵀ M T,   Y = Vᵀ M K⁻¹ M T
     ///                          | (Y + X C G)ᵀ      S + G C G   |      G = Tᵀ M T,   S = Tᵀ M K⁻¹ M T
     /// ```
-    /// and T is made orthonormal to V and in itself: `T' = (T - V X) Q`.
+    /// where T is made orthonormal to V and in itself: `T' = (T - V X) Q`.
     pub(super) fn released_ritz(&self, released: &Released<'_>) -> Option<Ritz> {
         let beside = self.beside.as_ref()?;
         let (X, G, C) = (&beside.X, &beside.G, released.C);
         let (n, w) = X.shape();
+        // P = [V T]ᵀ M K_r⁻¹ M [V T]
         let mut P = DMatrix::zeros(n + w, n + w);
         P.view_mut((0, 0), (n, n)).copy_from(&(&self.projected + X * C * X.transpose()));
         let mut P_VT = X * C * G;
@@ -37,6 +38,7 @@ impl Basis {
         P.view_mut((n, 0), (w, n)).copy_from(&P_VT.transpose());
         P.view_mut((n, n), (w, w)).copy_from(&(&beside.S + G * C * G));
 
+        // Columns of B: the orthonormal basis [V T'] in terms of [V T]; H = Bᵀ P B.
         let (Q, _) = orthonormalising(&(G - X.transpose() * X), 0.0);
         let extra = Q.ncols();
         let mut B = DMatrix::identity(n + w, n + extra);
@@ -58,8 +60,8 @@ mod tests {
     use super::Released;
     use crate::sparse::{Block, Cholesky, ModesWanted, Ordering, Pencil, SparseSymmetric, modes_of_two_supports};
 
-    /// Truth: a chain of n unit masses and springs from a wall, its last mass held or free,
-    /// ω² = 4 sin²(kπ/(2n)) and 4 sin²((2k - 1)π/(2(2n + 1))).
+    /// Truth: a chain of n unit masses and springs from a wall, its last mass fixed or free: ω² = 4
+    /// sin²(kπ/(2n)) and 4 sin²((2k - 1)π/(2(2n + 1))).
     #[test]
     fn a_chain_with_its_end_held_and_free_has_the_frequencies_of_the_closed_forms() {
         for (n, count) in [(300_usize, 12), (4, 20)] {
@@ -75,8 +77,8 @@ mod tests {
                 F.rows[..m].copy_from_slice(&inner.rows);
             };
             let mass = &mut |X: &Block, Y: &mut Block| Y.clone_from(X);
-            // A unit of the last mass pulls the others along evenly; its stiffness is that of n
-            // springs in series.
+            // A unit displacement of the last mass stretches the chain uniformly; its stiffness is
+            // that of n springs in series.
             let T = DMatrix::from_fn(n, 1, |i, _| (i + 1) as f64 / n as f64);
             let released = Released { T: &Block::of_columns(&T, 0, 1), C: &DMatrix::from_element(1, 1, n as f64) };
             let mut pencil = Pencil { rows: n, dimension: m, solve, mass };
