@@ -133,8 +133,8 @@ pub(crate) struct Marker<'a> {
     pub(crate) kind: MarkerKind,
     /// Position of a text (m).
     pub(crate) place: [f64; 3],
-    /// Sizes: of a line its width, of an arrow shaft, head width and head length, of a text its
-    /// height as the third (m).
+    /// Sizes (m): line width; shaft diameter, head diameter and head length of an arrow; height of
+    /// a text, as the third entry.
     pub(crate) scale: [f64; 3],
     /// Red, green, blue, alpha, 0 to 1.
     pub(crate) color: [f32; 4],
