@@ -68,7 +68,7 @@ pub(crate) struct RunTracks {
     study_curves: Option<Curves>,
     /// Whether the shapes shown have an arbitrary scale (modes), so that no errors are shown.
     shapes: bool,
-    /// Which samples have poses; curves have all.
+    /// Selects the samples with poses; curves have all samples.
     clock: PoseClock,
     /// Time of the last sample if it has not been drawn.
     now: Option<Instant>,
