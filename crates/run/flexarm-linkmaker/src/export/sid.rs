@@ -1,5 +1,5 @@
-//! Export as Standard Input Data: the modal link, which has the mass that the other formats
-//! condense.
+//! Export as Standard Input Data: the modal link, with the full mass distribution that the other
+//! formats condense.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -51,8 +51,8 @@ pub(super) fn export(job: &ExportJob, link: &ReducedLink, started: Instant) -> R
     let paths: Vec<PathBuf> = texts.iter().map(|(path, _)| path.clone()).collect();
     check_free(&paths, job.overwrite)?;
 
-    // Back as every import reads it, before anything is written: what cannot be read leaves no
-    // file.
+    // Read the text back with the code of every import before writing any file: data that cannot be
+    // read leave no file.
     let origin = paths[0].display().to_string();
     let back = parse_sid(&texts[0].1, &origin).map_err(Box::new)?.in_units(&job.units, &UnitSystem::SI);
     let back = modal_link_held_at(&link.name, &back, ids[0]).map_err(Box::new)?;
@@ -91,8 +91,8 @@ pub(super) fn export(job: &ExportJob, link: &ReducedLink, started: Instant) -> R
     })
 }
 
-/// Largest difference of the mass integrals, relative to the sizes that mass, inertia and modal
-/// mass give them.
+/// Maximum difference of the mass integrals, relative to the magnitudes given by mass, inertia and
+/// modal mass.
 fn integrals(a: &ModalLink, b: &ModalLink) -> f64 {
     let n = a.coordinates();
     if b.coordinates() != n {
@@ -129,7 +129,7 @@ fn integrals(a: &ModalLink, b: &ModalLink) -> f64 {
     if lost { f64::INFINITY } else { worst }
 }
 
-/// What the format does not say.
+/// Returns the text with frames, units and coordinates, which the format does not hold.
 fn readme(job: &ExportJob, link: &ReducedLink, modal: &ModalLink, map: &str) -> String {
     let units = &job.units;
     let mut text = format!(

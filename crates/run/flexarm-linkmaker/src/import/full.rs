@@ -1,4 +1,4 @@
-//! Full models: rows or nodes of the interfaces are found, everything else is condensed.
+//! Full models: locates rows or nodes of the interfaces and condenses all other rows.
 
 use std::collections::HashMap;
 
@@ -14,7 +14,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::words::{ImportMap, NodeChoice};
 use crate::LinkError;
 
-/// Whether more than the interfaces is in the matrices, so that they must be condensed.
+/// Whether the matrices have more than the interface coordinates, so that they must be condensed.
 pub(super) fn is_full(imported: &ImportedMatrices, map: Option<&InterfaceMap>) -> bool {
     let rows = &imported.stiffness.rows;
     let physical = rows.iter().filter(|label| label.dof > 0 && label.node.is_some_and(|node| node >= 0)).count();
@@ -23,7 +23,7 @@ pub(super) fn is_full(imported: &ImportedMatrices, map: Option<&InterfaceMap>) -
     matches!(imported.stiffness.entries, Entries::Sparse(_)) || physical > limit
 }
 
-/// What to type where the map of a full model is missing.
+/// Proposes a map, as a text to type, for a full model without one.
 pub(super) fn propose(imported: &ImportedMatrices) -> String {
     let setting = Setting::Map;
     if is_solid(imported) && !imported.positions.is_empty() {
@@ -66,19 +66,21 @@ fn box_of(imported: &ImportedMatrices) -> (Vector3<f64>, Vector3<f64>) {
     points.fold((first, first), |(low, high), p| (low.inf(p), high.sup(p)))
 }
 
-/// Frames of the interfaces as the reduction needs them.
+/// Interface frames and options for the reduction.
 pub(super) struct Target<'a> {
     pub(super) units: UnitSystem,
     pub(super) frames: Vec<InterfaceFrame>,
-    /// Axes of the matrices in link axes.
+    /// Rotation from matrix axes to link axes.
     pub(super) R_LM: &'a Matrix3<f64>,
     pub(super) modes: usize,
 }
 
-/// The model reduced to its interfaces, matrix axes; frames are those of the link.
+/// Reduces a model to its interfaces. The result is in matrix axes; its frames are those of the
+/// link.
 ///
 /// # Errors
-/// [`LinkError::Files`] for a map that does not fit, [`LinkError::Import`] from the reduction.
+/// [`LinkError::Files`] for a map that does not match the model, [`LinkError::Import`] from the
+/// reduction.
 pub(super) fn reduce(
     imported: &ImportedMatrices,
     map: &ImportMap,
@@ -126,7 +128,7 @@ pub(super) fn reduce(
                 let mut nodes: Vec<u32> = chosen.iter().filter_map(|node| index.get(node).copied()).collect();
                 nodes.sort_unstable();
                 nodes.dedup();
-                // The tie works in the axes of the matrices.
+                // The reduction with ties works in matrix axes.
                 let p = target.R_LM.transpose() * frame.X_LI.translation.vector;
                 let X_LI = flexarm_spatial::Pose::translation(p.x, p.y, p.z);
                 interfaces.push(Interface { name: name.clone(), X_LI, nodes, tie: Tie::Rigid });
@@ -143,7 +145,7 @@ pub(super) fn reduce(
     }
 }
 
-/// Rows of the interfaces, six each.
+/// Returns the rows of the interfaces, six each.
 fn boundary_rows(imported: &ImportedMatrices, map: &InterfaceMap) -> Result<Vec<u32>, LinkError> {
     let rows = &imported.stiffness.rows;
     let index: HashMap<(i64, u8), u32> =
@@ -183,7 +185,7 @@ fn boundary_rows(imported: &ImportedMatrices, map: &InterfaceMap) -> Result<Vec<
     Ok(boundary)
 }
 
-/// The lower triangle in SI: displacements are lengths, or angles where `is_turn`.
+/// Converts the lower triangle to SI: displacements are lengths, or angles where `is_turn`.
 fn to_si(matrix: &LabelledMatrix, units: UnitSystem, is_turn: &[bool], is_mass: bool) -> SparseSymmetric {
     let energy = units.force() * units.length;
     let unit = if is_mass { energy * units.time * units.time } else { energy };
@@ -196,7 +198,7 @@ fn to_si(matrix: &LabelledMatrix, units: UnitSystem, is_turn: &[bool], is_mass: 
     SparseSymmetric::from_triplets(matrix.size(), &entries)
 }
 
-/// The nodes that a map entry chooses.
+/// Returns the nodes selected by a map entry.
 pub(super) fn chosen_nodes(imported: &ImportedMatrices, choice: &NodeChoice) -> Result<Vec<i64>, String> {
     match choice {
         NodeChoice::Set(name) => imported.node_sets.get(name).cloned().ok_or_else(|| {

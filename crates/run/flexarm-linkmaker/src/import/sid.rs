@@ -1,11 +1,11 @@
-//! A modal body (SID) as a link: its modal link in the frame at A, and the compliance of B with A
-//! held, from the modes at both nodes.
+//! Import of a modal body (SID) as a link: its modal link in the frame at A, and the compliance of
+//! B with A held, from the modes at both nodes.
 //!
 //! ```text
 //! P = Φ_B - Ad_BA Φ_A          elastic displacement of B with A held, per mode (rows: phi, then psi)
-//! C_BB = P Ke⁻¹ Pᵀ             the rigid motions of the reference frame are free, so this holds for any frame
+//! C_BB = P Ke⁻¹ Pᵀ             independent of the reference frame, whose rigid motions are free
 //! ```
-//! The two rigid parts have the mass, centre and inertia of the body. Inside, all is in SI.
+//! The two rigid parts have the mass, centre and inertia of the body. Computed in SI.
 
 use flexarm_fe_io::exchange::{InputFile, InterfaceMap, RowPick, Sid, modal_link_held_at, parse_sid};
 use flexarm_fem::matrix_link::{MatrixReduction, PartMasses, link_from_superelement};
@@ -103,8 +103,8 @@ pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(M
     Ok((reduction, parts))
 }
 
-/// The modal link, with the mapped nodes as its interfaces; `None` and a warning where the data do
-/// not give one.
+/// Returns the modal link with the mapped nodes as its interfaces; `None` with a warning if the
+/// data do not define one.
 fn modal_link(
     sid: &Sid,
     name: &str,
@@ -121,7 +121,7 @@ fn modal_link(
             return None;
         }
     };
-    // Stiffness by load belongs to the frame of the data, which is lost with another node held.
+    // Geometric stiffness belongs to the frame of the data; it is lost with another node held.
     let is_stressed = sid.Ct.order == 1 || sid.others.iter().any(|(block, _)| block.eq_ignore_ascii_case("K0t"));
     if link.geometric.is_none() && is_stressed {
         warnings.push(format!(
@@ -135,7 +135,7 @@ fn modal_link(
     if sid.De.m0().iter().any(|d| *d != 0.0) {
         warnings.push("the damping of the SID (De) is not taken over: give damping in the robot file".into());
     }
-    // One interface per node but A, in the order of the file.
+    // One interface per node except A, in the order of the file.
     let at: Vec<usize> = nodes[1..].iter().map(|(_, node)| if *node > A { node - 1 } else { *node }).collect();
     let interface = |(k, (name, _)): (&usize, &(String, usize))| {
         let own = link.interfaces.get(*k)?;
@@ -150,7 +150,7 @@ fn modal_link(
     Some(if *R_LM == Rotation3::identity() { link } else { link.turned(R_LM) })
 }
 
-/// Names and indices of the nodes, proximal and distal first.
+/// Returns names and indices of the nodes, proximal and distal first.
 fn named_nodes(map: &ImportMap, ids: &[i64]) -> Result<Vec<(String, usize)>, String> {
     let wrong = || format!("a SID needs a map of two nodes or more such as A=1,B=2; its nodes are {ids:?}");
     let ImportMap::Rows(InterfaceMap { interfaces, modal }) = map else { return Err(wrong()) };
@@ -175,7 +175,7 @@ fn named_nodes(map: &ImportMap, ids: &[i64]) -> Result<Vec<(String, usize)>, Str
     }
 }
 
-/// `C_BB`, link axes.
+/// Computes `C_BB` in link axes.
 fn compliance(
     sid: &Sid,
     a: usize,
@@ -210,7 +210,7 @@ fn compliance(
     let factor = scaled.cholesky().ok_or("Ke is not positive definite")?;
     let right = DMatrix::from_fn(nq, 6, |i, j| P[(j, i)] * scale[i]);
     let C = right.transpose() * factor.solve(&right);
-    // The motions that the modes do not hold show as zero eigenvalues of the scaled compliance.
+    // Motions missing in the modes appear as zero eigenvalues of the scaled compliance.
     let s = C.diagonal().map(|c| 1.0 / c.sqrt());
     let unit = DMatrix::from_fn(6, 6, |i, j| C[(i, j)] * s[i] * s[j]);
     let least = unit.symmetric_eigenvalues().min();
@@ -223,7 +223,7 @@ fn compliance(
     Ok(Matrix6::from_fn(|i, j| C[(i, j)]))
 }
 
-/// The 12×12 of both interfaces.
+/// Computes the 12×12 stiffness of both interfaces.
 fn free_stiffness(K_BB: &Matrix6<f64>, p_AB: &Vector3<f64>) -> DMatrix<f64> {
     let mut Ad_BA = Matrix6::identity();
     Ad_BA.fixed_view_mut::<3, 3>(0, 3).copy_from(&-p_AB.cross_matrix());
@@ -236,7 +236,7 @@ fn free_stiffness(K_BB: &Matrix6<f64>, p_AB: &Vector3<f64>) -> DMatrix<f64> {
     (&K + K.transpose()) * 0.5
 }
 
-/// Mass, centre and inertia of the undeformed body, SI, link axes.
+/// Computes mass, centre and inertia of the undeformed body, SI, link axes.
 fn body(sid: &Sid, R_LM: &Rotation3<f64>) -> RigidPart {
     let moment = sid.mdCM.m0();
     let com = Vector3::from_iterator(moment.iter().copied().take(3)) / sid.mass;

@@ -1,4 +1,4 @@
-//! A reduction as tables, for the terminal and for a page of Markdown.
+//! Tables of a reduction, for the terminal and for a Markdown page.
 
 use std::fmt::Write as _;
 
@@ -8,16 +8,16 @@ use flexarm_settings::{gathered, written};
 
 use super::summary::{ModalFigures, ModeFigures, ReduceSummary};
 
-/// A table of text; the first row is the header.
+/// A table of text.
 #[derive(Clone, Debug)]
 pub struct ReportTable {
-    /// What it is about, with units.
+    /// Title, with units.
     pub title: &'static str,
     /// Names of the columns.
     pub header: Vec<String>,
-    /// The rows, each as long as the header.
+    /// Rows, each with the length of the header.
     pub rows: Vec<Vec<String>>,
-    /// Whether it is for the page only: numbers that a terminal has no room for.
+    /// Whether the table is for the page only, because it is too wide for a terminal.
     pub page_only: bool,
 }
 
@@ -27,7 +27,7 @@ impl ReportTable {
         Self { title, header, rows, page_only: false }
     }
 
-    /// The table in Markdown.
+    /// Returns the table in Markdown.
     pub(crate) fn markdown(&self) -> String {
         let rule = vec!["---"; self.header.len()];
         let rows: String = self.rows.iter().map(|cells| written::markdown_row(cells)).collect();
@@ -39,10 +39,10 @@ impl ReportTable {
     }
 }
 
-/// Six components at an interface.
+/// Names of the six components at an interface.
 const COMPONENTS: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 
-/// All tables of a reduction, in the order in which a person asks.
+/// Returns all tables of a reduction, in the order of interest.
 pub fn tables(summary: &ReduceSummary) -> Vec<ReportTable> {
     let mut tables = vec![interfaces(summary), mass(summary), softness(summary)];
     tables.push(matrix("stiffness K_BB at B, A held (N/m, N/rad; N m/m, N m/rad)", &summary.stiffness));
@@ -56,7 +56,7 @@ pub fn tables(summary: &ReduceSummary) -> Vec<ReportTable> {
     tables
 }
 
-/// What a modal link holds.
+/// Returns the table of a modal link.
 pub fn modal_table(modal: &ModalFigures) -> ReportTable {
     let (low, high) = (modal.frequencies_hz.first(), modal.frequencies_hz.last());
     let hz = |x: Option<&f64>| x.map_or_else(|| "-".into(), |x| format!("{x:.1}"));
@@ -72,7 +72,7 @@ pub fn modal_table(modal: &ModalFigures) -> ReportTable {
     ReportTable::new("modal link, A held", &["", ""], rows)
 }
 
-/// The figures as a page of Markdown.
+/// Returns the figures as a Markdown page.
 pub fn markdown(summary: &ReduceSummary) -> String {
     let headline: Vec<String> = headline(summary).lines().map(written::markdown).collect();
     let mut page = format!("# Link {}\n\n{}\n", written::markdown(&summary.link), headline.join("\n"));
@@ -87,7 +87,7 @@ pub fn markdown(summary: &ReduceSummary) -> String {
     page + &warning_list(&summary.warnings)
 }
 
-/// Warnings as a section of Markdown; empty if there are none.
+/// Returns the warnings as a Markdown section; empty if there are none.
 pub(crate) fn warning_list(warnings: &[String]) -> String {
     if warnings.is_empty() {
         return String::new();
@@ -97,7 +97,7 @@ pub(crate) fn warning_list(warnings: &[String]) -> String {
     format!("\n## Warnings\n\n{items}")
 }
 
-/// What was reduced, in two lines.
+/// Describes the mesh and the method in two lines.
 pub fn headline(summary: &ReduceSummary) -> String {
     let materials: Vec<String> =
         summary.materials.iter().map(|m| format!("{}: {}", m.region, m.material.text)).collect();
@@ -120,13 +120,13 @@ fn sentence(title: &str) -> String {
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
-/// Three numbers with `digits` after the point, without a minus before zero.
+/// Formats three numbers with `digits` decimals, without a negative zero.
 fn triple(p: &[f64; 3], digits: usize) -> String {
     let smallest = 0.5 * 10f64.powi(-(digits as i32));
     p.map(|x| format!("{:.digits$}", if x.abs() < smallest { 0.0 } else { x })).join(", ")
 }
 
-/// Four significant digits.
+/// Formats a number with four significant digits.
 fn significant(x: f64) -> String {
     if x == 0.0 {
         return "0".into();
@@ -168,7 +168,7 @@ fn mass(summary: &ReduceSummary) -> ReportTable {
     ReportTable::new("mass", &header, rows)
 }
 
-/// What a unit that people know does at B.
+/// Returns the displacements of B under loads of familiar size.
 fn softness(summary: &ReduceSummary) -> ReportTable {
     let C = &summary.compliance;
     // 1 kN and mm, 1 kN m and mrad.
