@@ -1,29 +1,29 @@
-//! What a map says of each pose: names, units and order of its columns, and which way is better.
+//! Columns of a map: names, units, order, and the direction of improvement.
 
 use flexarm_stepping::FlexibleArm;
 
 use super::MapError;
 use flexarm_chatter::CuttingTool;
 
-/// Most natural frequencies of a map.
+/// Maximum number of natural frequencies of a map.
 pub(super) const MOST_FREQUENCIES: usize = 12;
 
 /// A column of a map.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MapColumn {
-    /// Its name, which ends in its unit.
+    /// Name, which ends in the unit.
     pub name: String,
-    /// What it says, in a few words.
+    /// Short description.
     pub meaning: String,
-    /// Whether it is an answer; else it says where the pose is.
+    /// Whether it is a result; otherwise it describes the pose.
     pub quantity: bool,
-    /// Whether more is better, as for frequencies.
+    /// Whether larger values are better, as for frequencies.
     pub more_is_better: bool,
 }
 
 impl MapColumn {
-    /// What is to be small: the value, or less it where more is better; infinite where there is
-    /// none.
+    /// Returns the cost to minimise: the value, or its negative where larger is better; infinite
+    /// for non-finite values.
     pub(super) fn cost(&self, value: f64) -> f64 {
         match self.more_is_better {
             _ if !value.is_finite() => f64::INFINITY,
@@ -33,12 +33,12 @@ impl MapColumn {
     }
 }
 
-/// The one that costs least, of equals the first; what costs infinitely much does not count.
+/// Returns the index with the minimum cost, the first of equal ones; infinite costs are ignored.
 pub(super) fn cheapest(count: usize, cost: impl Fn(usize) -> f64) -> Option<usize> {
     (0..count).filter(|&k| cost(k).is_finite()).min_by(|&a, &b| cost(a).total_cmp(&cost(b)))
 }
 
-/// The columns of a row, in order.
+/// Columns of a row, in order.
 #[derive(Clone, Debug)]
 pub(super) struct Layout {
     pub(super) columns: Vec<MapColumn>,
@@ -46,14 +46,14 @@ pub(super) struct Layout {
     pub(super) frequencies: usize,
     pub(super) loaded: bool,
     pub(super) cuts: bool,
-    /// Whether the compliance is told in full.
+    /// Whether the full compliance matrix is included.
     pub(super) matrix: bool,
-    /// Elastic elements: their coordinates after the joints.
+    /// Range of coordinates of each elastic element, after the joints.
     pub(super) elements: Vec<std::ops::Range<usize>>,
 }
 
-/// Columns before the joints: place of the rigid tool, number of the place or instant, of the
-/// tool's direction, of the branch.
+/// Columns before the joints: position of the rigid TCP, number of the place or instant, of the
+/// tool direction, of the branch.
 pub(super) const HEAD: [(&str, &str); 6] = [
     ("x_m", "place of the rigid arm's tool, world"),
     ("y_m", "place of the rigid arm's tool, world"),
@@ -63,14 +63,14 @@ pub(super) const HEAD: [(&str, &str); 6] = [
     ("branch", "number of the solution of the inverse kinematics"),
 ];
 
-/// Which of them is the number of the place.
+/// Index of the number of the place in [`HEAD`].
 pub(super) const PLACE: usize = 3;
 
 impl Layout {
-    /// * `joints`: names, and whether they slide.
-    /// * `loaded`: whether a wrench acts besides weight.
-    /// * `tool`: one that cuts.
-    /// * `matrix`: whether the compliance is told in full.
+    /// * `joints`: names, and whether they are prismatic.
+    /// * `loaded`: whether a wrench acts in addition to gravity.
+    /// * `tool`: a cutting tool.
+    /// * `matrix`: whether to include the full compliance matrix.
     pub(super) fn new(
         arm: &FlexibleArm,
         joints: &[(String, bool)],
@@ -132,10 +132,10 @@ impl Layout {
         self.columns.len()
     }
 
-    /// The column by which poses are compared.
+    /// Returns the column by which poses are compared.
     ///
     /// # Errors
-    /// [`MapError::Quantity`].
+    /// [`MapError::Quantity`] if there is no such result column.
     pub(super) fn compared_by(&self, name: Option<&str>) -> Result<usize, MapError> {
         let usual = match (self.cuts, self.loaded) {
             (true, _) => "depth_m",
@@ -158,7 +158,7 @@ fn less(name: &str, meaning: &str) -> MapColumn {
     MapColumn { quantity: true, ..place(name, meaning) }
 }
 
-/// Row after row of the 6x6 compliance: displacement and rotation per force and moment.
+/// Columns of the 6×6 compliance, row by row: displacement and rotation per force and moment.
 fn full_compliance() -> Vec<MapColumn> {
     let moved = [("x", "m"), ("y", "m"), ("z", "m"), ("rx", "rad"), ("ry", "rad"), ("rz", "rad")];
     let pushed = [("fx", "n"), ("fy", "n"), ("fz", "n"), ("tx", "nm"), ("ty", "nm"), ("tz", "nm")];
@@ -169,7 +169,7 @@ fn full_compliance() -> Vec<MapColumn> {
     moved.iter().flat_map(|row| pushed.iter().map(move |column| entry(*row, *column))).collect()
 }
 
-/// Components, size, and angle.
+/// Columns of a displacement: components, norm, and angle.
 fn displacement(what: &str, meaning: &str) -> Vec<MapColumn> {
     let mut columns: Vec<MapColumn> =
         ["x", "y", "z"].iter().map(|axis| place(&format!("{what}_{axis}_m"), meaning)).collect();

@@ -64,7 +64,7 @@ impl Chosen {
     }
 }
 
-/// The mesh with the frame that the user speaks in.
+/// The mesh with the link frame in which the user gives positions.
 pub(super) struct Place<'a> {
     /// Mesh in its own frame (m).
     pub(super) mesh: &'a Mesh,

@@ -73,11 +73,11 @@ const JUDGED_MODES: usize = 10;
 /// Start of a step.
 #[derive(Clone, Copy, Debug)]
 pub struct ReduceProgress {
-    /// What is done in it.
+    /// Name of the step.
     pub step: &'static str,
-    /// Its number, from 1.
+    /// Number of the step, from 1.
     pub number: usize,
-    /// How many there are.
+    /// Number of steps.
     pub of: usize,
 }
 
