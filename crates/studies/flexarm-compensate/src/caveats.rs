@@ -1,4 +1,4 @@
-//! What is doubtful of a compensation.
+//! Caveats of a compensation.
 
 use flexarm_trajectory::Extreme;
 
@@ -9,14 +9,14 @@ use flexarm_run::Caveat;
 use flexarm_run::MotionViolation;
 use flexarm_run::Robot;
 
-/// More than this part of the peak left on the model is explained, if it is mostly quick: by more
-/// than the second.
+/// Minimum remaining fraction of the model's peak error that is explained, and minimum share of it
+/// above the cutoff frequency for that explanation.
 const ENOUGH_LEFT: f64 = 0.01;
 const MOSTLY: f64 = 0.5;
-/// A servo that gives this part of its largest torque gives all of it.
+/// Fraction of the torque limit at which a servo counts as saturated.
 const AT_LIMIT: f64 = 1.0 - 1e-9;
 
-/// Where the joints cannot correct everything that is asked for.
+/// Caveat about poses where the joints cannot correct all requested components.
 fn singular_caveat((t_s, directions): (f64, usize), asked: usize) -> Option<Caveat> {
     (directions < asked).then(|| {
         let text = format!(
@@ -27,7 +27,7 @@ fn singular_caveat((t_s, directions): (f64, usize), asked: usize) -> Option<Cave
     })
 }
 
-/// Why more than a hundredth of the peak is left on the model, where the motion is too quick.
+/// Caveat about more than a hundredth of the peak left on the model because the motion is too fast.
 fn quick_caveat(answer: &Compensation, quicker: f64) -> Option<Caveat> {
     let (first, hz) = (answer.model_peaks_m.first()?, answer.cutoff_hz?);
     let least = answer.model_peaks_m.iter().copied().fold(f64::INFINITY, f64::min);
@@ -41,8 +41,8 @@ fn quick_caveat(answer: &Compensation, quicker: f64) -> Option<Caveat> {
     })
 }
 
-/// Iterations that made the error on the model larger, with the frequency up to which the kept ones
-/// correct.
+/// Caveat about discarded iterations, which increased the error on the model, with the cutoff
+/// frequency of those kept.
 fn discarded_caveat(answer: &Compensation, discarded: &[Discarded]) -> Option<Caveat> {
     let each = |of: &Discarded| match of.growth.is_finite() {
         true => {
@@ -68,7 +68,7 @@ fn discarded_caveat(answer: &Compensation, discarded: &[Discarded]) -> Option<Ca
     })
 }
 
-/// Servos of the plant that give all they have: what they lack, no command gives them.
+/// Caveat about saturated servos of the plant: commands cannot compensate for missing torque.
 pub(super) fn of_servos(plant: &Arm, efforts: &[Extreme]) -> Option<Caveat> {
     let joints: Vec<&str> = plant.joints().collect();
     let at_limit = plant.flexible().servo_limits().filter_map(|(k, limit)| {
@@ -83,10 +83,10 @@ pub(super) fn of_servos(plant: &Arm, efforts: &[Extreme]) -> Option<Caveat> {
     })
 }
 
-/// What is doubtful of an answer.
+/// Returns the caveats of a result.
 ///
-/// * `own`: limits that the motion passes by itself; `asked`: how many components of the tool
-///   count.
+/// * `own`: limits that the motion itself violates.
+/// * `asked`: number of TCP components to correct.
 pub(super) fn of(
     answer: &Compensation,
     own: &[MotionViolation],
@@ -113,7 +113,7 @@ pub(super) fn of(
         );
         caveats.push(Caveat::said("play", "compensation", text, "come to every point from the same side").as_note());
     }
-    // Shaping alone, with the peak of the start and no other, is not meant to.
+    // Shaping alone (a single peak, that of the start) is not meant to reduce the error.
     let corrected = answer.model_peaks_m.len() != 1;
     if corrected && answer.after.peak_m > 0.5 * answer.before.peak_m {
         let text = format!(

@@ -31,9 +31,9 @@ pub enum MapError {
     /// A box with corners that are not numbers or in the wrong order.
     #[error("the box ({}) must have its lowest corner first, found {lower:?} to {upper:?} m", Setting::Bounds)]
     Bounds {
-        /// Lowest corner (m).
+        /// Lower corner (m).
         lower: [f64; 3],
-        /// Highest corner (m).
+        /// Upper corner (m).
         upper: [f64; 3],
     },
     /// A grid spacing that is not positive.

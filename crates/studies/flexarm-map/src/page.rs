@@ -1,5 +1,5 @@
-//! The page of a map: slices, histograms, the best and the worst pose, the best place of a
-//! workpiece; one file without scripts.
+//! HTML page of a map: slices, histograms, the best and the worst pose, the best place of a
+//! workpiece; a single file without scripts.
 
 use std::fmt::Write as _;
 
@@ -12,10 +12,10 @@ use super::{Map, MapPose};
 use flexarm_run::html_page::opening;
 use flexarm_settings::written::markup;
 
-/// Bars of a histogram.
+/// Number of bars of a histogram.
 const BARS: usize = 40;
 
-/// The page.
+/// Returns the page.
 pub(super) fn html(map: &Map, grid: Option<&Grid>) -> String {
     let mut page = opening(&format!("Map of {}", map.robot), "body { max-width: 78rem }\n");
     let _ = writeln!(page, "<p>{}</p>", markup(&in_short(map)));
@@ -59,7 +59,7 @@ pub(super) fn html(map: &Map, grid: Option<&Grid>) -> String {
     page + "</p>\n</body></html>\n"
 }
 
-/// What the map is, in a sentence or two.
+/// Describes the map in a sentence or two.
 fn in_short(map: &Map) -> String {
     let mut text = match &map.grid {
         Some(grid) => format!(
@@ -117,7 +117,7 @@ fn poses(map: &Map) -> String {
     table + "</table>\n"
 }
 
-/// The three planes through the best place.
+/// Draws the three planes through the best place.
 fn slices(map: &Map, grid: &Grid, column: usize) -> String {
     let values = map.by_place(column, grid);
     let (factor, unit) = readable(&map.table.columns[column].name);
@@ -170,7 +170,7 @@ fn slices(map: &Map, grid: &Grid, column: usize) -> String {
     row + "</div>\n"
 }
 
-/// How many poses have which value.
+/// Draws the histogram of a quantity over the poses.
 fn spread(map: &Map, column: usize) -> String {
     let name = &map.table.columns[column].name;
     let (factor, unit) = readable(name);
