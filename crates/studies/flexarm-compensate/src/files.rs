@@ -15,20 +15,20 @@ use flexarm_run::Scenario;
 use flexarm_run::motion_report::check_motion_outputs;
 use flexarm_run::motion_report::motion_texts;
 
-/// A corrected program meets its targets within the digits that are written (m).
+/// Tolerance for the TCP position at corrected targets (m), for the rounding of written digits.
 const WRITTEN_WITHIN_M: f64 = 1e-6;
 
-/// Where everything goes.
+/// Paths of all files.
 pub(super) struct Files {
     /// New motion and page.
     folder: Option<[PathBuf; 2]>,
     recording: Option<PathBuf>,
-    /// The program of the motion, and the output folder.
+    /// Program of the motion, and the output folder.
     program: Option<[PathBuf; 2]>,
 }
 
 impl Files {
-    /// Refuses names that cannot be written before anything is computed.
+    /// Checks the paths before anything is computed.
     pub(super) fn of(motion: &Motion, request: &CompensateRequest) -> Result<Self, Error> {
         check_motion_outputs(&request.motions)?;
         let in_folder = |name: &str| request.output.as_ref().map(|folder| folder.join(name));
@@ -44,7 +44,7 @@ impl Files {
         Ok(Self { folder, recording, program })
     }
 
-    /// The corrected program; what keeps it from being made is a caveat.
+    /// Corrects the program; a failure becomes a caveat.
     pub(super) fn program(
         &self,
         robot: &Robot,
@@ -83,7 +83,7 @@ impl Files {
         Some(corrected)
     }
 
-    /// Writes them, and their names into the answer.
+    /// Writes the files, and their names into the result.
     pub(super) fn write(
         &self,
         answer: &mut Compensation,
@@ -119,7 +119,7 @@ impl Files {
         Ok(())
     }
 
-    /// Nobody loses the program that was corrected, whatever may be overwritten.
+    /// Protects the original program, even if files may be overwritten.
     fn refuse_the_program_itself(&self, names: &[PathBuf]) -> Result<(), Error> {
         let Some([program, _]) = &self.program else { return Ok(()) };
         let home = program.parent().and_then(|folder| folder.canonicalize().ok());

@@ -1,5 +1,5 @@
-//! The page of a compensation: error before and after over time, on other plants, changes of the
-//! joints; one file without scripts.
+//! HTML page of a compensation: error before and after over time, on other plants, changes of the
+//! joints; a single file without scripts.
 
 use std::fmt::Write as _;
 
@@ -9,7 +9,7 @@ use super::{Compensation, ErrorFigures};
 use flexarm_run::html_page::opening;
 use flexarm_settings::written::markup;
 
-/// The page.
+/// Returns the page.
 pub(super) fn html(answer: &Compensation) -> String {
     let mut page = opening(&format!("Compensation of {} on {}", answer.motion, answer.robot), "");
     let _ = writeln!(
@@ -52,7 +52,7 @@ pub(super) fn html(answer: &Compensation) -> String {
     page + "</body></html>\n"
 }
 
-/// What the motion would make swing at its end, and what its shaper leaves.
+/// Describes the predicted residual vibration without and with the shaper.
 fn shaper(answer: &Compensation) -> String {
     let Some(shaper) = &answer.shaper else { return String::new() };
     let mut text = format!(
@@ -75,7 +75,7 @@ fn shaper(answer: &Compensation) -> String {
     text + "</table>\n"
 }
 
-/// Limits that are passed, and how much slower the motion is for their sake.
+/// Lists the violated limits, and the factor by which the motion was slowed.
 fn limits(answer: &Compensation) -> String {
     let mut text = String::from("<h2>Limits of the joints</h2>\n");
     if answer.slowed > 1.0 {
@@ -111,7 +111,7 @@ fn row(name: &str, before: &ErrorFigures, after: &ErrorFigures) -> String {
 }
 
 fn curves(answer: &Compensation) -> String {
-    // As many points as the picture can show.
+    // Limit the number of points to what the plot can show.
     let every = (answer.curves.len() / 1500).max(1);
     let column = |k: usize, factor: f64| -> Vec<f64> {
         answer

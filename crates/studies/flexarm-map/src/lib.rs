@@ -574,7 +574,7 @@ fn one_place(found: &Map) -> Option<Caveat> {
     Some(Caveat::said("one-place", "map", message, help))
 }
 
-/// What is doubtful about the worst pose: the elements there are bent most.
+/// Returns caveats about the worst pose, where the deflections are largest.
 fn validity(robot: &Robot, request: &MapRequest, found: &Map) -> Vec<Caveat> {
     let Ok(worst) = flexarm_run::statics(robot, &request.modelling, Some(&found.worst.q), request.wrench) else {
         return Vec::new();
