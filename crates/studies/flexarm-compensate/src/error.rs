@@ -16,7 +16,7 @@ pub enum CompensateError {
         "the velocity jumps at {t_s} s, which the dynamic method cannot correct: let the motion begin and end at rest and round its corners, or take the static method"
     )]
     Corner {
-        /// When (s).
+        /// Time of the jump (s).
         t_s: f64,
     },
     /// No TCP component is selected.
