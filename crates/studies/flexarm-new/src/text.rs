@@ -8,21 +8,21 @@ use super::beams::BeamSection;
 use super::draft::{Draft, DraftLink};
 use super::place::Placed;
 
-/// No joint of an arm has a higher effort limit (N m).
+/// Maximum plausible effort limit of a joint of an arm (N m).
 const MOST_EFFORT: f64 = 1e6;
 
-/// A text as TOML writes it, also as a key.
+/// Quotes a text as a TOML string, also for keys.
 fn quoted(text: &str) -> String {
-    // JSON escapes are TOML's, but for one character.
+    // JSON escapes are valid in TOML, except for DEL.
     serde_json::to_string(text).unwrap_or_default().replace('\u{7f}', "\\u007F")
 }
 
-/// A number with three digits that count, as the decimal nearest to them.
+/// Rounds a number to three significant digits.
 pub(crate) fn three_digits(value: f64) -> f64 {
     format!("{value:.2e}").parse().unwrap_or(value)
 }
 
-/// A length to a hundredth of a millimetre, a direction to six digits, as TOML writes floats.
+/// Formats a float for TOML, rounded to the given number of decimals.
 fn float(value: f64, digits: i32) -> String {
     let scale = 10f64.powi(digits);
     let value = (value * scale).round() / scale;
@@ -33,7 +33,7 @@ fn vector(values: &[f64; 3], digits: i32) -> String {
     format!("[{}]", values.map(|x| float(x, digits)).join(", "))
 }
 
-/// `box of 120 x 180 mm with a wall of 8.0 mm`.
+/// Describes a section: `box of 120 x 180 mm with a wall of 8.0 mm`.
 pub(crate) fn section_words(s: &BeamSection) -> String {
     let mm = |x: f64| format!("{:.0}", 1e3 * x);
     let size = match s.section {
@@ -54,7 +54,7 @@ fn beam_keys(s: &BeamSection, wall: Option<f64>) -> String {
     }
 }
 
-/// The robot file with these links bending.
+/// Returns the robot file with these links flexible.
 pub(crate) fn robot_file(draft: &Draft, placed: &Placed, beams: &[&DraftLink]) -> String {
     let mut t = String::new();
     // Writing to a String cannot fail.
@@ -157,7 +157,7 @@ fn head(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Result {
     Ok(())
 }
 
-/// Effort limits of the description that make no sense.
+/// Writes infinite effort limits for those of the description that are implausible.
 fn efforts(t: &mut String, draft: &Draft) -> std::fmt::Result {
     let of_arm = draft.joints.iter().filter(|j| j.effort_fault.is_some()).map(|j| &j.joint);
     let known = |effort: f64| of_arm.clone().any(|joint| joint.limits.effort == effort);
@@ -280,7 +280,7 @@ fn drives(t: &mut String, draft: &Draft) -> std::fmt::Result {
     Ok(())
 }
 
-/// The sample motion.
+/// Returns the sample motion file.
 pub(crate) fn motion_file(draft: &Draft) -> String {
     let mut t = String::new();
     let _ = write_motion(&mut t, draft);
@@ -343,7 +343,7 @@ fn write_motion(t: &mut String, draft: &Draft) -> std::fmt::Result {
     Ok(())
 }
 
-/// What was found, what was assumed, what to measure next.
+/// Returns the README: findings, assumptions and next measurements.
 pub(crate) fn readme(draft: &Draft, placed: &Placed) -> String {
     let mut t = String::new();
     let _ = write_readme(&mut t, draft, placed);
