@@ -43,8 +43,8 @@ pub(super) fn add_controllers(arm: &Arm, scenario: &Scenario, all: &mut Vec<Name
     Ok(())
 }
 
-/// Makes of a mass or a motion one of which the controllers know: the rigid robot carries the mass
-/// too, and gains that the robot file leaves out fit the inertia at the start.
+/// Makes the controllers follow a mass or a motion parameter: the rigid model of the feed-forward
+/// carries the mass too, and gains not set in the robot file follow the inertia at the start.
 fn follow(arm: &Arm, named: &mut Named, start: &DVector<f64>) {
     let flexible = arm.flexible();
     let (mut fed_forward, gains) = (
