@@ -21,7 +21,7 @@ pub enum LogError {
     Io {
         /// The file concerned.
         path: PathBuf,
-        /// What was attempted.
+        /// Action attempted, as a verb phrase.
         action: &'static str,
         /// Cause of the failure.
         #[source]
@@ -33,7 +33,7 @@ pub enum LogError {
     Format {
         /// The file being written.
         path: PathBuf,
-        /// What was attempted.
+        /// Action attempted, as a verb phrase.
         action: &'static str,
         /// Message of the format's library.
         cause: String,

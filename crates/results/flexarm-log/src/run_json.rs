@@ -285,8 +285,8 @@ pub(crate) mod meshes {
     pub(crate) fn write(meshes: &[LinkMesh]) -> std::io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
         for mesh in meshes {
-            // Missing normals are written as zeros, so that the size of the block follows from the
-            // counts alone.
+            // Missing normals are written as zeros, so that the counts determine the size of the
+            // block.
             let normals = (0..mesh.positions.len()).map(|k| mesh.normals.get(k).copied().unwrap_or_default());
             let floats = mesh.positions.iter().copied().chain(normals).flatten();
             floats.for_each(|value| bytes.extend(value.to_le_bytes()));

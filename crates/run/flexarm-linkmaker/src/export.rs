@@ -263,6 +263,7 @@ impl Content<'_> {
     fn matrices(&self) -> (DMatrix<f64>, Option<DMatrix<f64>>) {
         let units = &self.job.units;
         let boundary = self.element.boundary();
+        // Unit of each coordinate: u_SI = diag(d) u_file.
         let d: Vec<f64> = (0..self.element.K.nrows())
             .map(|i| match i {
                 i if i >= boundary => units.mass.sqrt() * units.length,
@@ -270,6 +271,7 @@ impl Content<'_> {
                 _ => 1.0,
             })
             .collect();
+        // K_file = diag(d) K diag(d) / energy, and M likewise with the unit of inertia.
         let energy = units.force() * units.length;
         let inertia = units.mass * units.length * units.length;
         let convert =

@@ -377,6 +377,7 @@ impl<'a> Job<'a> {
             let i = nodes.partition_point(|node| *node <= k).clamp(1, nodes.len() - 1);
             let (a, b) = (nodes[i - 1], nodes[i]);
             let s = (k - a) as f64 / (b - a) as f64;
+            // Cubic Hermite interpolation; slopes by central differences, zero at both ends.
             let slope = |i: usize| match i {
                 0 => DVector::zeros(m),
                 i if i + 1 >= nodes.len() => DVector::zeros(m),

@@ -179,6 +179,7 @@ fn largest_gain(C: &Matrix3<f64>) -> (f64, Vector3<f64>) {
         return (if scale == 0.0 { 0.0 } else { f64::NAN }, Vector3::zeros());
     }
     let S = C / scale;
+    // Singular values and right singular vectors from SᵀS.
     let eigen = (S.transpose() * S).symmetric_eigen();
     let (k, square) = eigen.eigenvalues.argmax();
     let v = eigen.eigenvectors.column(k).into_owned();

@@ -487,7 +487,7 @@ mod tests {
             let X = Pose::from_parts(Translation3::identity(), R);
             let X_LB = Pose::from_parts(Translation3::from(R * Vector3::x() * length), Rotation3::identity());
             let found = candidate(mass, &[mesh.clone().transformed(&X)], X_LB).unwrap();
-            // Which of the two sides is called the width depends on the frame.
+            // The frame decides whether width and height are exchanged.
             let y = R.inverse() * Vector3::from(found.y_axis);
             let (width, height) =
                 if y.y.abs() > 0.5 { (found.width, found.height) } else { (found.height, found.width) };

@@ -61,7 +61,7 @@ pub(crate) struct Draft {
     /// Whether an estimate of masses was requested although no link lacks one.
     pub(crate) idle_estimate: bool,
     pub(crate) moving_mass: f64,
-    /// Maximum distance of the TCP from the base in the sampled poses (m).
+    /// Maximum distance of the TCP from the first joint of the arm in the sampled poses (m).
     pub(crate) reach: f64,
     pub(crate) payload: Cube,
     pub(crate) payload_known: bool,
@@ -179,8 +179,8 @@ impl Draft {
     }
 }
 
-/// Reads the description. Physically impossible inertias are accepted as they are, and the links
-/// reported.
+/// Reads the description. Inertias that violate the triangle inequality are accepted as they are;
+/// the names of their links are returned.
 fn read(path: &Path, options: &ReadOptions) -> Result<(UrdfRobot, Vec<String>), Error> {
     let error = match read_urdf(path, options) {
         Ok(urdf) => return Ok((urdf, Vec::new())),

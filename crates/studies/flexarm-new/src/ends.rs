@@ -95,6 +95,7 @@ fn principal_axis(meshes: &[TriangleMesh]) -> Option<(Vector3<f64>, Vector3<f64>
     if !(area > 0.0 && area.is_finite()) {
         return None;
     }
+    // Second moment about the centroid.
     let middle = first / area;
     let spread = (second / area - middle * middle.transpose()).symmetric_eigen();
     let along = spread.eigenvectors.column(spread.eigenvalues.imax()).into_owned();

@@ -64,7 +64,7 @@ fn rounded(axis: &Axis, value: f64) -> f64 {
 struct Wish {
     /// Minimum height of all frames (m).
     floor: f64,
-    /// Minimum distance of the TCP from the z axis of the base (m).
+    /// Minimum distance of the TCP from the z axis of the world (m).
     radius: f64,
     torque: bool,
 }
@@ -201,6 +201,7 @@ fn strong_enough(
     let mut a = DVector::zeros(model.nv());
     state.q.copy_from(at);
     (0..=40).all(|i| {
+        // Quintic s(u) with its time derivatives.
         let u = f64::from(i) / 40.0;
         let s = u.powi(3) * (10.0 - 15.0 * u + 6.0 * u * u);
         let ds = 30.0 * (u * (1.0 - u)).powi(2) / time;

@@ -138,7 +138,7 @@ const FORMATS: &[FormatInfo] = &[
     },
 ];
 
-/// Facts about a format: its row in [`FORMATS`].
+/// Facts about a format: its row in the table of formats.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct FormatInfo {

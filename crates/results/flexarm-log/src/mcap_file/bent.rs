@@ -70,6 +70,7 @@ impl BentLink {
         let line = self.line.bent(&moved);
         let pose = |middle: &Vector3<f64>| {
             let at = line.deformed(middle);
+            // Rotation that maps the undeformed section directions e, f to the deformed ones u, v.
             let [u, v] = self.across.map(|e| line.deformed(&(middle + e)) - at);
             let [e, f] = self.across;
             let turn =

@@ -34,7 +34,7 @@ pub enum ImportError {
     SamePoint {
         /// The proximal interface.
         first: String,
-        /// The other one.
+        /// The other interface.
         second: String,
     },
 }

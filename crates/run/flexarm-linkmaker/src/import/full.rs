@@ -189,6 +189,7 @@ fn boundary_rows(imported: &ImportedMatrices, map: &InterfaceMap) -> Result<Vec<
 fn to_si(matrix: &LabelledMatrix, units: UnitSystem, is_turn: &[bool], is_mass: bool) -> SparseSymmetric {
     let energy = units.force() * units.length;
     let unit = if is_mass { energy * units.time * units.time } else { energy };
+    // K_SI = D⁻¹ K D⁻¹ energy with u_SI = D u_file; M likewise, times the unit of time squared.
     let d: Vec<f64> = is_turn.iter().map(|turn| if *turn { 1.0 } else { units.length }).collect();
     let entries: Vec<(u32, u32, f64)> = matrix
         .to_sparse()

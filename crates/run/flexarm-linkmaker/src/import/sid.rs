@@ -200,10 +200,12 @@ fn compliance(
         Phi.view_mut((3, 0), (3, nq)).copy_from(&(R_LM.matrix() * psi));
         Ok(Phi)
     };
+    // P = Φ_B - Ad_BA Φ_A
     let (Phi_A, Phi_B) = (shape(a)?, shape(b)?);
     let mut Ad_BA = DMatrix::identity(6, 6);
     Ad_BA.view_mut((0, 3), (3, 3)).copy_from(&-p_AB.cross_matrix());
     let P = Phi_B - Ad_BA * Phi_A;
+    // C_BB = P Ke⁻¹ Pᵀ, with Ke scaled to a unit diagonal.
     let Ke = sid.Ke.m0();
     let scale = Ke.diagonal().map(|k| 1.0 / k.sqrt());
     let scaled = DMatrix::from_fn(nq, nq, |i, j| Ke[(i, j)] * scale[i] * scale[j]);
@@ -227,6 +229,7 @@ fn compliance(
 fn free_stiffness(K_BB: &Matrix6<f64>, p_AB: &Vector3<f64>) -> DMatrix<f64> {
     let mut Ad_BA = Matrix6::identity();
     Ad_BA.fixed_view_mut::<3, 3>(0, 3).copy_from(&-p_AB.cross_matrix());
+    // K_AB = -Ad_BAᵀ K_BB,  K_AA = Ad_BAᵀ K_BB Ad_BA
     let K_AB = -Ad_BA.transpose() * K_BB;
     let mut K = DMatrix::zeros(12, 12);
     K.view_mut((0, 0), (6, 6)).copy_from(&(-K_AB * Ad_BA));

@@ -41,6 +41,8 @@ impl Paths {
         self.flex.as_deref().or(self.folder.as_ref().map(|folder| folder.flex.as_path()))
     }
 
+    /// Returns the paths of a reduction, after checking that they are free or may be overwritten.
+    ///
     /// # Errors
     /// [`FileError::Taken`] for an existing file, [`FileError::Unusable`] for a folder in the place
     /// of a file.

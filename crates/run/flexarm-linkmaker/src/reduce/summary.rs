@@ -303,9 +303,9 @@ pub struct CheckFigures {
 pub struct SolverFigures {
     /// Number of unknowns of the factorisation.
     pub unknowns: usize,
-    /// Number of nonzero entries of the lower triangle of the matrix.
+    /// Number of stored entries of the lower triangle of the matrix.
     pub matrix_entries: usize,
-    /// Number of nonzero entries of the factor.
+    /// Number of stored entries of the factor.
     pub factor_entries: usize,
     /// Ordering used: amd or nested.
     pub ordering: &'static str,
