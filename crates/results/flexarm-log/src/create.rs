@@ -10,7 +10,8 @@ use crate::LogError;
 /// Options that every recorder takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CreateOptions {
-    /// Replace an existing file; otherwise `begin` returns [`LogError::Exists`]. Default `false`.
+    /// Whether to replace an existing file; otherwise `begin` returns [`LogError::Exists`]. Default
+    /// `false`.
     pub overwrite: bool,
     /// Maximum wall time between two flushes while samples arrive, and so the span that a killed
     /// run may lose. Default 0.5 s. An MCAP file is written chunk by chunk instead, independent of

@@ -83,12 +83,12 @@ const FEW_PLACES: f64 = 10.0;
 /// Poses kept at each place, among all tool directions and branches of the inverse kinematics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum KeptPoses {
-    /// The best one.
+    /// The best pose.
     #[default]
     Best,
-    /// The worst one.
+    /// The worst pose.
     Worst,
-    /// All.
+    /// All poses.
     All,
 }
 
