@@ -25,8 +25,9 @@ pub(crate) struct Channels {
     pub(crate) elastic: Vec<ElasticChannels>,
     /// Present if there are elastic elements.
     pub(crate) elastic_joint_states: Option<u16>,
-    /// Present if there are contributors.
+    /// Present if there is a rigid twin and the header announces the static error.
     pub(crate) static_error: Option<u16>,
+    /// Present if there are contributors.
     pub(crate) contributions: Option<u16>,
     pub(crate) solver: u16,
     pub(crate) energy: u16,

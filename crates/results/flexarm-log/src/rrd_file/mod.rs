@@ -268,8 +268,9 @@ pub(crate) fn link_part(name: &str) -> String {
     }
 }
 
-/// FNV-1a hash of the whole header, including files, and of the labels of a study: the same set-up
-/// gives the same recording identifier, and a viewer keeps recordings of different set-ups apart.
+/// FNV-1a hash of texts, names, numbers and attached files of the header, and of the labels of a
+/// study: the same set-up gives the same recording identifier, and a viewer keeps recordings of
+/// different set-ups apart.
 fn content_hash(header: &RunHeader, labels: &[String]) -> u64 {
     const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
     const PRIME: u64 = 0x0000_0100_0000_01b3;
