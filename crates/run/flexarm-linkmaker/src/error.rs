@@ -72,7 +72,7 @@ pub enum LinkError {
         source: Box<MeshLinkError>,
     },
     /// The pictures of a reduction could not be drawn.
-    #[error("the pictures failed: {0}")]
+    #[error("drawing the pictures failed: {0}")]
     Pictures(Box<dyn std::error::Error + Send + Sync>),
 }
 

@@ -164,7 +164,7 @@ pub fn export(job: &ExportJob) -> Result<ExportSummary, LinkError> {
     for (what, error) in [("stiffness", Some(stiffness_error)), ("mass", mass_error)] {
         if error.is_some_and(|error| error.is_nan() || error > job.format.digits()) {
             let error = error.unwrap_or(f64::NAN);
-            warnings.push(format!("the {what} read back differs by {error:.1e} (relative to its diagonal)"));
+            warnings.push(format!("the exported {what}, read back, differs by {error:.1e} (relative to its diagonal)"));
         }
     }
     write_all(&texts)?;
@@ -202,8 +202,8 @@ fn element_of(link: &ReducedLink, warnings: &mut Vec<String>) -> (Superelement, 
         return (element, true);
     }
     warnings.push(
-        "the link has no superelement: its static stiffness is written, without mass and modes; the mass of its two \
-         rigid parts is in the text beside it"
+        "the link has no superelement: only its static stiffness is written, without mass and modes; the mass of \
+         its two rigid parts is in the accompanying text file"
             .into(),
     );
     let frame = |name: &str, X_LI| InterfaceFrame { name: name.into(), X_LI, tie: None };
@@ -359,9 +359,9 @@ impl Content<'_> {
     fn readme(&self) -> String {
         let units = &self.job.units;
         let mut text = format!(
-            "Link {}, written by flexarm export as {}\n\nrows: {}\naxes: those of the link at every interface\n\
-             units: {units} (length-mass-time; forces follow: 1 unit = {} N); angles in rad\n\nmap for flexarm import: \
-             {} \"{}\" {} {units}\n\ninterfaces (position in the unit of length, link axes):\n",
+            "Link {}, written by flexarm export as {}\n\nrows: {}\naxes: parallel to the link frame at every \
+             interface\nunits: {units} (length-mass-time; derived unit of force = {} N); angles in rad\n\nmap for \
+             flexarm import: {} \"{}\" {} {units}\n\ninterfaces (position in the unit of length, link axes):\n",
             self.link.name,
             self.job.format.name(),
             self.row_order(),

@@ -45,19 +45,21 @@ pub(crate) fn of_link(link: &ReducedLink, whole: &RigidPart) -> Vec<Doubt> {
     if let Some(speed) = speed.filter(|speed| !SOUND.contains(speed)) {
         let [end, likely] = match speed {
             speed if speed > *SOUND.end() => ["at most 13000", "stiffness 1000 times too large, or mass in t?"],
-            speed if speed < 1e-2 => ["at least 300", "a flexibility (compliance) for a stiffness?"],
+            speed if speed < 1e-2 => ["at least 300", "compliance instead of stiffness?"],
             _ => ["at least 300", "stiffness in N/mm or kN/m, or mass in g?"],
         };
         let yardstick = if speed > *SOUND.end() { *SOUND.end() } else { *SOUND.start() };
         let said = format!(
-            "by stiffness and mass sound runs along the link with {speed:.3e} m/s, along links {end} ({likely})"
+            "from its stiffness and mass, the speed of sound along the link is {speed:.3e} m/s, expected {end} \
+             ({likely})"
         );
         doubts.push(Doubt::found("link-sound", speed, yardstick, said));
     }
     let density = least_density(whole.mass, &whole.inertia);
     if density.is_finite() && density > OSMIUM {
         let said = format!(
-            "by mass and inertia the link has at least {density:.3e} kg/m3, osmium has {OSMIUM} (mass in g, or lengths in m for mm?)"
+            "from its mass and inertia, the density of the link is at least {density:.3e} kg/m3, above that of \
+             osmium, {OSMIUM} (mass in g, or lengths in m instead of mm?)"
         );
         doubts.push(Doubt::found("link-density", density, OSMIUM, said));
     }
@@ -73,8 +75,9 @@ pub(crate) fn of_link(link: &ReducedLink, whole: &RigidPart) -> Vec<Doubt> {
 pub(crate) fn of_interface(name: &str, spread: f64, share: f64) -> Option<Doubt> {
     (spread > SPREAD && share > SHARE).then(|| {
         let said = format!(
-            "interface {name:?} takes {:.0} % of the nodes and {:.0} % of the length between the interfaces, on which the link does not \
-             bend: choose the nodes of the seat alone (told above {:.0} and {:.0} %)",
+            "interface {name:?} covers {:.0} % of the nodes and {:.0} % of the length between the interfaces, \
+             where the link cannot deform: select only the nodes of the seat (limits of this warning: {:.0} and \
+             {:.0} %)",
             100.0 * share,
             100.0 * spread,
             100.0 * SHARE,

@@ -10,7 +10,7 @@ pub enum JobError {
     #[error("modes and modes_up_to_hz exclude each other: give one of them")]
     ModesTwice,
     /// More modes than a reduction can keep.
-    #[error("{} {found}: at most {most} can be kept", Setting::Modes)]
+    #[error("{} {found}: at most {most} modes can be kept", Setting::Modes)]
     TooManyModes {
         /// Number of modes requested.
         found: usize,
@@ -27,12 +27,13 @@ pub enum JobError {
     #[error("merge = {0}: a distance of zero or more, in the unit of the mesh")]
     MergeDistance(f64),
     /// A link name that cannot be part of a file name.
-    #[error("{0:?} is no name for a link: give one that can be part of a file name ({setting})", setting = Setting::Name)]
+    #[error(
+        "{0:?} is not a valid link name: use one that can be part of a file name ({setting})", setting = Setting::Name)]
     LinkName(String),
     /// Invalid node numbers of an export.
     #[error(
-        "{} has {found:?}; {interfaces} different numbers between 1 and 99999999 are needed, one per interface, proximal \
-         first",
+        "{} has {found:?}; {interfaces} distinct numbers between 1 and 99999999 are required, one per interface, \
+         proximal first",
         Setting::Nodes
     )]
     NodeNumbers {

@@ -16,16 +16,15 @@ use crate::{LinkError, stamp};
 pub(super) fn export(job: &ExportJob, link: &ReducedLink, started: Instant) -> Result<ExportSummary, LinkError> {
     let details = link.details.as_deref();
     let Some(modal) = details.and_then(|details| details.modal.as_ref()) else {
-        let what = "has no [modal] section, and SID is nothing else: reduce the mesh again with this version (flexarm reduce), \
-                    or export its matrices in another format";
+        let what = "has no [modal] section, which SID requires: reduce the mesh again with this version (flexarm \
+                    reduce), or export its matrices in another format";
         return Err(LinkError::file(&job.link, what));
     };
     let mut warnings = Vec::new();
     let riding: f64 = details.map_or(0.0, |details| details.attached.iter().map(|body| body.mass).sum());
     if riding > 0.0 {
-        warnings.push(format!(
-            "bodies of {riding:.4} kg that ride on the link are not in the SID, which is the link alone"
-        ));
+        warnings
+            .push(format!("attached bodies of {riding:.4} kg are not in the SID, which contains only the link itself"));
     }
     if !modal.has_second_order() {
         warnings.push(crate::import::SECOND_ORDER_UNKNOWN.into());
@@ -60,7 +59,7 @@ pub(super) fn export(job: &ExportJob, link: &ReducedLink, started: Instant) -> R
     let integrals_error = integrals(modal, &back);
     for (what, error) in [("stiffness", stiffness_error), ("mass", mass_error), ("integrals", integrals_error)] {
         if error.is_nan() || error > ExportFormat::Sid.digits() {
-            warnings.push(format!("the {what} read back differs by {error:.1e} (relative to its diagonal)"));
+            warnings.push(format!("the exported {what}, read back, differs by {error:.1e} (relative to its diagonal)"));
         }
     }
     write_all(&texts)?;
@@ -133,10 +132,10 @@ fn integrals(a: &ModalLink, b: &ModalLink) -> f64 {
 fn readme(job: &ExportJob, link: &ReducedLink, modal: &ModalLink, map: &str) -> String {
     let units = &job.units;
     let mut text = format!(
-        "Link {}, written by flexarm export as {}\n\nbody reference frame: the link frame, tangent at interface A, whose node does \
-         not move\naxes: those of the link\nunits: {units} (length-mass-time; forces follow: 1 unit = {} N); angles in rad\n\
-         Gr, Ge: column (axis-1) nq + mode; Oe: xx yy zz xy yz xz; De is empty\n\nmap for flexarm import: {} \"{map}\" {} \
-         {units}\n\nshape coordinates:\n",
+        "Link {}, written by flexarm export as {}\n\nbody reference frame: the link frame, a tangent frame at \
+         interface A, whose node is fixed in it\naxes: parallel to the link frame\nunits: {units} \
+         (length-mass-time; derived unit of force = {} N); angles in rad\nGr, Ge: column (axis-1) nq + mode; Oe: \
+         xx yy zz xy yz xz; De is empty\n\nmap for flexarm import: {} \"{map}\" {} {units}\n\nshape coordinates:\n",
         link.name,
         job.format.name(),
         units.force(),

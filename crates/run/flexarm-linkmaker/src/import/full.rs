@@ -32,9 +32,9 @@ pub(super) fn propose(imported: &ImportedMatrices) -> String {
         let list = if sets.is_empty() { "none".into() } else { sets.join(", ") };
         let (low, high) = box_of(imported);
         return format!(
-            "choose the nodes of each interface, which are tied rigidly: {setting} A=set:NAME,B=set:NAME with the sets of \
-             the file ({list}), or by planes such as {setting} \"A=plane({},0,0;1,0,0),B=plane({},0,0;1,0,0)\"; the nodes \
-             lie between {:?} and {:?}",
+            "select the nodes of each interface, which are tied rigidly: {setting} A=set:NAME,B=set:NAME with the \
+             node sets of the file ({list}), or planes such as {setting} \
+             \"A=plane({},0,0;1,0,0),B=plane({},0,0;1,0,0)\"; the nodes extend from {:?} to {:?}",
             low.x,
             high.x,
             <[f64; 3]>::from(low),
@@ -46,12 +46,12 @@ pub(super) fn propose(imported: &ImportedMatrices) -> String {
     nodes.dedup();
     match nodes[..] {
         [.., a, b, c, d] => format!(
-            "give {setting} with the reference nodes: CalculiX has them after *RIGID BODY, REF NODE= (translations) and \
-             ROT NODE= (rotations); if they are the last nodes of the model: {setting} \
-             A={a}:1-3+{b}:1-3,B={c}:1-3+{d}:1-3; with six components per node: {setting} A={c},B={d}"
+            "set {setting} to the reference nodes: CalculiX defines them with *RIGID BODY, REF NODE= \
+             (translations) and ROT NODE= (rotations); if they are the last nodes of the model: {setting} \
+             A={a}:1-3+{b}:1-3,B={c}:1-3+{d}:1-3; with six degrees of freedom per node: {setting} A={c},B={d}"
         ),
         _ => format!(
-            "the rows have no node numbers; give the list of rows too (.dof, .mapping), or {setting} A=#1-6,B=#7-12"
+            "the rows have no node numbers; also give the list of rows (.dof, .mapping), or {setting} A=#1-6,B=#7-12"
         ),
     }
 }
@@ -88,7 +88,7 @@ pub(super) fn reduce(
 ) -> Result<Superelement, LinkError> {
     let refuse = |what: String| LinkError::file(&imported.origin, what);
     let Some(mass) = &imported.mass else {
-        let what = "a full model can only be reduced with its mass: give the mass matrix too";
+        let what = "reducing a full model requires its mass matrix: give this file too";
         return Err(refuse(format!("{what} (.mas, {})", Setting::MassFile)));
     };
     let failed = |source| LinkError::Import { path: imported.origin.clone().into(), source: Box::new(source) };
@@ -98,7 +98,10 @@ pub(super) fn reduce(
     match map {
         ImportMap::Rows(map) => {
             if imported.format == MatrixFormat::ExudynHdf5 {
-                return Err(refuse(format!("has no rotations at its nodes: {}", propose(imported))));
+                return Err(refuse(format!(
+                    "has no rotational degrees of freedom at its nodes: {}",
+                    propose(imported)
+                )));
             }
             let boundary = boundary_rows(imported, map)?;
             let mut is_turn: Vec<bool> = rows.iter().map(|label| label.dof > 3).collect();
@@ -111,8 +114,8 @@ pub(super) fn reduce(
         }
         ImportMap::Nodes(list) => {
             if !is_solid(imported) || imported.positions.is_empty() {
-                let what = "sets and planes need three components at every node and positions, which only Exudyn files \
-                            have; pick rows by node:";
+                let what = "node sets and planes require node positions and three degrees of freedom per node, \
+                            which only Exudyn files have; select rows by node:";
                 return Err(refuse(format!("{what} {} A=947:1-3+948:1-3,B=949:1-3+950:1-3", Setting::Map)));
             }
             let nodes: Vec<i64> = rows.iter().step_by(3).filter_map(|label| label.node).collect();
@@ -161,7 +164,9 @@ fn boundary_rows(imported: &ImportedMatrices, map: &InterfaceMap) -> Result<Vec<
                 RowPick::Rows { first, last } if first >= 1 && last <= rows.len() => {
                     boundary.extend(first as u32 - 1..last as u32);
                 }
-                RowPick::Rows { .. } => return Err(refuse(format!("no rows {pick} among {}", rows.len()))),
+                RowPick::Rows { .. } => {
+                    return Err(refuse(format!("rows {pick} do not exist; the matrix has {} rows", rows.len())));
+                }
                 RowPick::Node { node, first, last } => {
                     for dof in first..=last {
                         let row =
@@ -173,14 +178,14 @@ fn boundary_rows(imported: &ImportedMatrices, map: &InterfaceMap) -> Result<Vec<
         }
         if boundary.len() - before != 6 {
             let found = boundary.len() - before;
-            return Err(refuse(format!("{found} rows are named, six are needed (ux uy uz rx ry rz)")));
+            return Err(refuse(format!("{found} rows are selected, six are required (ux uy uz rx ry rz)")));
         }
     }
     let mut sorted = boundary.clone();
     sorted.sort_unstable();
     sorted.dedup();
     if sorted.len() != boundary.len() {
-        return Err(LinkError::file(&imported.origin, format!("the map {map} names a row twice")));
+        return Err(LinkError::file(&imported.origin, format!("the map {map} selects a row twice")));
     }
     Ok(boundary)
 }
@@ -214,7 +219,7 @@ pub(super) fn chosen_nodes(imported: &ImportedMatrices, choice: &NodeChoice) -> 
             let nodes: Vec<i64> = imported.positions.iter().filter(|(_, p)| near(p)).map(|(node, _)| *node).collect();
             if nodes.is_empty() {
                 let (low, high): ([f64; 3], [f64; 3]) = (low.into(), high.into());
-                return Err(format!("no node lies in {choice}; the nodes lie between {low:?} and {high:?}"));
+                return Err(format!("no node is on {choice}; the nodes extend from {low:?} to {high:?}"));
             }
             Ok(nodes)
         }

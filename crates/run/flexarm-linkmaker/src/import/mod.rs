@@ -55,8 +55,9 @@ pub use words::{FrameAt, ImportFormat, ImportMap, NodeChoice, parse_inertia, par
 
 /// Warning about a modal link without its second-order terms, used here and where a robot uses such
 /// a link.
-pub const SECOND_ORDER_UNKNOWN: &str = "second-order terms of the modal link are unknown: a condensed mass does not \
-     tell where inside the link it is; what turning does to the bending is left out";
+pub const SECOND_ORDER_UNKNOWN: &str = "second-order terms of the modal link are unknown, because a condensed mass \
+                                        matrix has no mass distribution inside the link: the effect of rotation on \
+                                        the deformation is neglected";
 
 /// Default number of modes kept of a full model.
 const MODES: usize = 10;
@@ -166,8 +167,11 @@ pub fn import(job: &ImportJob, outputs: Option<&ImportOutputs>) -> Result<Import
 fn expect_format(job: &ImportJob, found: MatrixFormat, origin: &str) -> Result<(), LinkError> {
     match job.format {
         Some(format) if !format.covers(found) => {
-            let what =
-                format!("is {} by its content, {} says otherwise: leave it out", found.name(), Setting::MatrixFormat);
+            let what = format!(
+                "is {} according to its content, but {} gives another format: omit it",
+                found.name(),
+                Setting::MatrixFormat
+            );
             Err(LinkError::file(origin, what))
         }
         _ => Ok(()),
@@ -184,7 +188,10 @@ fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), Lin
     if let (Some(given), Some(sidecar)) = (job.units, sidecar)
         && given != sidecar.units
     {
-        warnings.push(format!("the sidecar says the units are {}, {Caller} {given}, which counts", sidecar.units));
+        warnings.push(format!(
+            "the units are {} in the sidecar and {given} from {Caller}; the latter are used",
+            sidecar.units
+        ));
     }
     let from_sidecar = || sidecar.map(|sidecar| ImportMap::Rows(sidecar.map()));
     let map = job.map.clone().or_else(from_sidecar).filter(|map| !map.entries().is_empty());
@@ -198,8 +205,8 @@ fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), Lin
     let mut faults = Vec::new();
     if units.is_none() {
         let what = format!(
-            "the units of the file are not declared: {units} LENGTH-MASS-TIME, such as {units} m-kg-s (N, Pa) or {units} \
-             mm-t-s (N, MPa); no matrix says them itself",
+            "the units of the file are not declared: {units} LENGTH-MASS-TIME, such as {units} m-kg-s (N, Pa) or \
+             {units} mm-t-s (N, MPa); matrix files do not contain them",
             units = Setting::Units
         );
         faults.push(file_error(&imported, what));
@@ -214,7 +221,7 @@ fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), Lin
                     let rows = imported.stiffness.rows.len();
                     let modal = match unnumbered && map.modal.is_empty() && map.interfaces.len() > 2 {
                         true => format!(
-                            ", or, where modes follow two interfaces, {} \"A=#1-6,B=#7-12,modal=#13-{rows}\"",
+                            ", or, if modes follow two interfaces, {} \"A=#1-6,B=#7-12,modal=#13-{rows}\"",
                             Setting::Map
                         ),
                         false => String::new(),
@@ -224,7 +231,7 @@ fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), Lin
                 None => format!("give {}, such as A=1001,B=1002 or A=#1-6,B=#7-12", Setting::Map),
             }
         };
-        faults.push(file_error(&imported, format!("which rows are interface A and which B is not said: {proposal}")));
+        faults.push(file_error(&imported, format!("the rows of interfaces A and B are not specified: {proposal}")));
     }
     let R_LM = rotation(&job.axes_rpy);
     let placed = map.as_ref().map(|map| place(job, &imported, map, &R_LM, &mut warnings)).transpose();
@@ -259,7 +266,7 @@ fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), Lin
     } else {
         if job.modes.is_some() {
             let modes = Setting::Modes;
-            warnings.push(format!("{modes} only counts for full models; these matrices are reduced already"));
+            warnings.push(format!("{modes} applies only to full models; these matrices are already reduced"));
         }
         let rows = rows_of(&map);
         let reduced = assemble_interfaces(&imported, rows.as_ref(), Some(&units)).map_err(Box::new)?;
@@ -391,7 +398,7 @@ fn place(
                 {
                     let (p, q): ([f64; 3], [f64; 3]) = (p.into(), at.xyz.into());
                     warnings
-                        .push(format!("interface {name}: {from} is {p:?}, {} says {q:?}, which counts", Setting::At));
+                        .push(format!("interface {name}: {from} is {p:?}, {} gives {q:?}, which is used", Setting::At));
                 }
                 Placed { name: name.clone(), xyz: at.xyz, rotation: rotation(&at.rpy), from: "given" }
             }
@@ -421,7 +428,7 @@ fn in_file(imported: &ImportedMatrices, map: &ImportMap, k: usize) -> Result<Opt
     let interface = &map.interfaces[k];
     if let Some(side) = imported.sidecar.as_ref().and_then(|s| s.interfaces.iter().find(|i| i.interface == *interface))
     {
-        return Ok(Some((side.frame, "its place in the sidecar")));
+        return Ok(Some((side.frame, "its position in the sidecar")));
     }
     if let Some(RowPick::Node { node, .. }) = interface.picks.first()
         && let Some(p) = imported.positions.get(node)
@@ -456,7 +463,7 @@ fn no_place(imported: &ImportedMatrices, map: Option<&ImportMap>, names: &[Strin
             };
             let (where_they_are, flags): (Vec<String>, Vec<String>) = names[1..].iter().zip(&places).map(place).unzip();
             format!(
-                "the stiffness itself says, from {a}: {}; if {a} is the origin of the link: {} {a}=0,0,0{}",
+                "the stiffness implies, relative to {a}: {}; if {a} is the origin of the link: {} {a}=0,0,0{}",
                 where_they_are.join(", "),
                 Setting::At,
                 flags.concat()
@@ -467,7 +474,7 @@ fn no_place(imported: &ImportedMatrices, map: Option<&ImportMap>, names: &[Strin
             format!("give {}", flags.join(" "))
         }
     };
-    format!("where the interfaces are is not in the file (unit of the file, link axes): {text}")
+    format!("the file does not contain the interface positions (unit of the file, link axes): {text}")
 }
 
 /// Returns the vector from A to B implied by the blocks of the stiffness, in the unit of the file.

@@ -33,7 +33,10 @@ pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(M
         None => {
             let (first, last) = (ids.first().copied().unwrap_or(1), ids.last().copied().unwrap_or(2));
             let setting = Setting::Map;
-            Err(format!("which nodes are A and B is not said; its nodes are {ids:?}: {setting} \"A={first},B={last}\""))
+            Err(format!(
+                "the nodes of interfaces A and B are not specified; the SID has nodes {ids:?}: {setting} \
+                 \"A={first},B={last}\""
+            ))
         }
     };
     let nodes = nodes.map_err(|what| faults.push(refuse(what))).ok();
@@ -43,7 +46,7 @@ pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(M
     }
     let mut warnings = Vec::new();
     if job.modes.is_some() {
-        warnings.push(format!("{} only counts for full models; the modes of a SID are all kept", Setting::Modes));
+        warnings.push(format!("{} applies only to full models; all modes of a SID are kept", Setting::Modes));
     }
 
     let sid = sid.in_units(&units, &UnitSystem::SI);
@@ -58,7 +61,7 @@ pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(M
     let p = |k: usize| places[k].translation.vector;
     let frame = |k: usize| InterfaceFrame { name: nodes[k].0.clone(), X_LI: places[k], tie: None };
     let C = compliance(&sid, nodes[0].1, nodes[1].1, &R_LM, &(p(1) - p(0))).map_err(refuse)?;
-    let K_BB = C.try_inverse().ok_or_else(|| refuse("the compliance of B cannot be inverted".into()))?;
+    let K_BB = C.try_inverse().ok_or_else(|| refuse("the compliance at B is singular".into()))?;
     let K_BB = (K_BB + K_BB.transpose()) * 0.5;
     let K = free_stiffness(&K_BB, &(p(1) - p(0)));
     let element = Superelement { interfaces: vec![frame(0), frame(1)], K, M: DMatrix::zeros(12, 12) };
@@ -75,7 +78,7 @@ pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(M
     if let Some(modal) = modal {
         if (modal.mass / reduction.whole.mass - 1.0).abs() > 0.01 {
             warnings.push(format!(
-                "the modal link weighs {:.6} kg, as the SID says; the given masses of the parts sum to {:.6} kg",
+                "the modal link has the mass of the SID, {:.6} kg; the given masses of the parts sum to {:.6} kg",
                 modal.mass, reduction.whole.mass
             ));
         }
@@ -116,8 +119,8 @@ fn modal_link(
     let link = match modal_link_held_at(name, sid, sid.nodes[A].id) {
         Ok(link) => link,
         Err(error) => {
-            let used = "only the stiffness between A and B and the rigid mass are used";
-            warnings.push(format!("the SID gives no modal link, {used}: {error}"));
+            let used = "only the stiffness between A and B and the rigid-body mass are used";
+            warnings.push(format!("the SID does not define a modal link, {used}: {error}"));
             return None;
         }
     };
@@ -125,7 +128,8 @@ fn modal_link(
     let is_stressed = sid.Ct.order == 1 || sid.others.iter().any(|(block, _)| block.eq_ignore_ascii_case("K0t"));
     if link.geometric.is_none() && is_stressed {
         warnings.push(format!(
-            "node {} moves in the frame of the SID, in which its stiffness by load is: that is left out",
+            "node {} moves in the reference frame of the SID, in which its geometric stiffness is given: the \
+             geometric stiffness is neglected",
             sid.nodes[A].id
         ));
     }
@@ -133,7 +137,7 @@ fn modal_link(
         warnings.push(SECOND_ORDER_UNKNOWN.into());
     }
     if sid.De.m0().iter().any(|d| *d != 0.0) {
-        warnings.push("the damping of the SID (De) is not taken over: give damping in the robot file".into());
+        warnings.push("the damping of the SID (De) is ignored: set the damping in the robot file".into());
     }
     // One interface per node except A, in the order of the file.
     let at: Vec<usize> = nodes[1..].iter().map(|(_, node)| if *node > A { node - 1 } else { *node }).collect();
@@ -152,7 +156,7 @@ fn modal_link(
 
 /// Returns names and indices of the nodes, proximal and distal first.
 fn named_nodes(map: &ImportMap, ids: &[i64]) -> Result<Vec<(String, usize)>, String> {
-    let wrong = || format!("a SID needs a map of two nodes or more such as A=1,B=2; its nodes are {ids:?}");
+    let wrong = || format!("a SID requires a map of at least two nodes, such as A=1,B=2; its nodes are {ids:?}");
     let ImportMap::Rows(InterfaceMap { interfaces, modal }) = map else { return Err(wrong()) };
     let index = |picks: &[RowPick]| match picks {
         [RowPick::Node { node, first: 1, last: 6 }] => {
@@ -186,8 +190,8 @@ fn compliance(
     let nq = sid.nq();
     if nq < 6 {
         return Err(format!(
-            "has {nq} modes; six relative motions of B need at least six, otherwise B is rigid in some direction: export \
-             more modes, among them the static ones under loads at the interfaces"
+            "has {nq} modes; the six relative motions of B require at least six, otherwise B is rigid in some \
+             direction: export more modes, including the static modes under loads at the interfaces"
         ));
     }
     let shape = |k: usize| -> Result<DMatrix<f64>, String> {
@@ -218,8 +222,9 @@ fn compliance(
     let least = unit.symmetric_eigenvalues().min();
     if least.is_nan() || least <= 1e-10 {
         return Err(format!(
-            "its {nq} modes do not move B against A in all six directions (smallest relative compliance {least:.1e}): \
-             are these the interfaces, and are the static modes under loads at them in the file?"
+            "its {nq} modes do not move B relative to A in all six directions (minimum relative compliance \
+             {least:.1e}): are these nodes the interfaces, and does the file include the static modes under loads \
+             at them?"
         ));
     }
     Ok(Matrix6::from_fn(|i, j| C[(i, j)]))

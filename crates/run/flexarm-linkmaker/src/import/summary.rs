@@ -154,7 +154,7 @@ impl ImportSummary {
         if let (Some(error), Some(m)) = (mass_error, masses)
             && (error.is_nan() || error > MASS_ERROR)
         {
-            let sentence = format!("the mass matrix holds {:.6}, {:.6}, {:.6} kg along x, y, z", m[0], m[1], m[2]);
+            let sentence = format!("the mass matrix has {:.6}, {:.6}, {:.6} kg along x, y, z", m[0], m[1], m[2]);
             all.push(Doubt::found("mass", error, MASS_ERROR, sentence));
         }
         all.extend(crate::yardsticks::of_link(link, whole));
@@ -240,8 +240,8 @@ pub fn tables(summary: &ImportSummary) -> Vec<ReportTable> {
     let C = &summary.compliance;
     let soft = |k: usize| format!("{:.4e}", 1e6 * C[k][k]);
     let softness = vec![
-        vec!["1 kN along it moves B by".into(), soft(0), soft(1), soft(2), "mm".into()],
-        vec!["1 kN m about it turns B by".into(), soft(3), soft(4), soft(5), "mrad".into()],
+        vec!["displacement of B under 1 kN".into(), soft(0), soft(1), soft(2), "mm".into()],
+        vec!["rotation of B under 1 kN m".into(), soft(3), soft(4), soft(5), "mrad".into()],
     ];
     let c = &summary.checks;
     let limits = GateLimits::default();
@@ -251,15 +251,15 @@ pub fn tables(summary: &ImportSummary) -> Vec<ReportTable> {
     };
     let mut checks = vec![
         // A DMIG has nine decimals.
-        below("asymmetry of the file", c.symmetry, 1e-8),
-        below("force under rigid motion", c.rigid_body_residual, limits.rigid_body_warning),
-        below("blocks of the stiffness agree", c.block_identity, limits.rigid_body_warning),
+        below("asymmetry of the stiffness", c.symmetry, 1e-8),
+        below("force under rigid-body motion", c.rigid_body_residual, limits.rigid_body_warning),
+        below("mismatch of the stiffness blocks", c.block_identity, limits.rigid_body_warning),
     ];
     let least = if c.min_eigenvalue > limits.min_eigenvalue { "ok" } else { "warn" };
     let usual = format!("above {:.0e}", limits.min_eigenvalue);
-    checks.push(vec!["smallest eigenvalue".into(), format!("{:.1e}", c.min_eigenvalue), usual, least.into()]);
+    checks.push(vec!["minimum eigenvalue".into(), format!("{:.1e}", c.min_eigenvalue), usual, least.into()]);
     checks.push(match c.mass_error {
-        Some(error) => below("mass along x, y, z and of the link", error, MASS_ERROR),
+        Some(error) => below("mass along x, y, z against the link", error, MASS_ERROR),
         None => vec!["mass".into(), "-".into(), "no mass matrix".into(), "-".into()],
     });
     let count = summary.frequencies_hz.len().max(summary.lumped_frequencies_hz.len());
@@ -281,8 +281,12 @@ pub fn tables(summary: &ImportSummary) -> Vec<ReportTable> {
             &["interface", "rows", "position", "roll, pitch, yaw", "from"],
             interfaces,
         ),
-        table("mass", &["", "mass [kg]", "centre of mass [m]", "ixx, iyy, izz, ixy, ixz, iyz there [kg m2]"], masses),
-        table("how soft it is, A held (along the same axis)", &["", "x", "y", "z", ""], softness),
+        table(
+            "mass",
+            &["", "mass [kg]", "centre of mass [m]", "ixx, iyy, izz, ixy, ixz, iyz about it [kg m2]"],
+            masses,
+        ),
+        table("deflection of B along the load, A held", &["", "x", "y", "z", ""], softness),
         matrix("stiffness K_BB at B, A held (N/m, N/rad; N m/m, N m/rad)", &summary.stiffness),
         matrix("compliance C_BB at B, A held (m/N, m/(N m); rad/N, rad/(N m))", &summary.compliance),
         table("checks", &["", "measured", "usual", ""], checks),

@@ -57,7 +57,7 @@ impl FromStr for ImportMap {
                         let (point, normal) = inside.split_once(';').ok_or_else(wrong)?;
                         let (point, normal) = (triple(point)?, triple(normal)?);
                         if normal.norm() == 0.0 {
-                            return Err(format!("{part:?}: the normal of the plane has no length"));
+                            return Err(format!("{part:?}: the normal of the plane is zero"));
                         }
                         NodeChoice::Plane { point, normal }
                     }
@@ -219,7 +219,9 @@ pub fn parse_inertia(text: &str) -> Result<Matrix3<f64>, String> {
 /// A description of what is wrong with the text.
 pub fn parse_split(text: &str) -> Result<SplitAt, String> {
     let wrong = || {
-        format!("split {text:?}: expected elastic-centre, mid, a fraction of the way from A to B (0 to 1), or x,y,z")
+        format!(
+            "split {text:?}: expected elastic-centre, mid, a fraction of the distance from A to B (0 to 1), or x,y,z"
+        )
     };
     match text.trim() {
         "elastic-centre" | "elastic-center" => Ok(SplitAt::ElasticCentre),

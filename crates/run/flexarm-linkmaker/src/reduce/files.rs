@@ -90,7 +90,7 @@ pub(super) fn job_file(job: &ReduceJob, folder: &Path) -> String {
         urdf.file = from_folder(folder, &urdf.file);
     }
     let body = toml::to_string(&job).expect("strings, numbers and tables");
-    format!("# The job as it was run, every default written out. Again: flexarm reduce reduce.toml\n{body}")
+    format!("# The job as run, with all defaults. To repeat it: flexarm reduce reduce.toml\n{body}")
 }
 
 /// Returns `path` relative to `folder` if both have a common folder below the root, else absolute.

@@ -33,9 +33,9 @@ impl Chosen {
         let mut doubts = Vec::new();
         if !seat.missing.is_empty() {
             doubts.push(format!(
-                "interface {name:?}: its {chosen} nodes hold the corners of {} faces, but {} of the {} mid-side nodes of these \
-                 faces are missing; they were added, because faces tied at their corners alone make the link too soft; write \
-                 sets with all nodes of their faces",
+                "interface {name:?}: its {chosen} nodes include the corners of {} faces, but {} of the {} mid-side \
+                 nodes of these faces are missing; they were added, because faces tied only at their corners make \
+                 the link too soft; write node sets with all nodes of their faces",
                 seat.faces,
                 seat.missing.len(),
                 seat.middles
@@ -43,20 +43,20 @@ impl Chosen {
         }
         if seat.faces == 0 && seat.on_beams == 0 {
             doubts.push(format!(
-                "interface {name:?}: no face of the surface has all its corners among its {chosen} node(s), so it is an edge or \
-                 single nodes, and what is tied there depends on the mesh; choose the nodes of a surface"
+                "interface {name:?}: no face of the surface has all its corners among its {chosen} node(s), so it \
+                 is an edge or single nodes, and the tied area depends on the mesh; select the nodes of a surface"
             ));
         } else if 2 * seat.stray > chosen {
             doubts.push(format!(
-                "interface {name:?}: {} of its {chosen} nodes are on none of the {} faces that it holds; is its tolerance too \
-                 small, or the place not that of the surface?",
+                "interface {name:?}: {} of its {chosen} nodes are on none of its {} faces; is the tolerance too \
+                 small, or is the selector not on the surface?",
                 seat.stray, seat.faces
             ));
         }
         if seat.inside > 0 {
             doubts.push(format!(
-                "interface {name:?}: {} of its {chosen} nodes lie inside the body, where no joint sits, and what is between \
-                 them cannot bend; choose nodes of the surface",
+                "interface {name:?}: {} of its {chosen} nodes are inside the body, where no joint is attached, and \
+                 the material between them cannot deform; select nodes of the surface",
                 seat.inside
             ));
         }
@@ -108,7 +108,7 @@ impl Place<'_> {
         const MOST: usize = 12;
         let sets = &self.mesh.node_sets;
         if sets.is_empty() {
-            return "the mesh has no node sets: choose by place, such as plane(0,0,0; 1,0,0)".into();
+            return "the mesh has no node sets: select nodes by position, such as plane(0,0,0; 1,0,0)".into();
         }
         let shown: Vec<String> =
             sets.iter().take(MOST).map(|(name, nodes)| format!("{name:?} ({} nodes)", nodes.len())).collect();
@@ -123,9 +123,9 @@ impl Place<'_> {
         if job.interface.len() < 2 {
             let found = job.interface.len();
             let what = format!(
-                "{found} interface(s) given, a link needs at least two, the proximal one first: \
-                 {interface} A=SELECTOR {interface} B=SELECTOR, where SELECTOR is a node set or a place such as \
-                 plane(x,y,z; nx,ny,nz); {sets}",
+                "{found} interface(s) given, a link needs at least two, the proximal one first: {interface} \
+                 A=SELECTOR {interface} B=SELECTOR, where SELECTOR is a node set or a region such as plane(x,y,z; \
+                 nx,ny,nz); {sets}",
                 interface = Setting::Interface,
                 sets = self.known_sets()
             );
@@ -172,7 +172,7 @@ impl Place<'_> {
         let X_LI = match (entry.xyz, entry.at, &entry.joint) {
             (Some(xyz), None, None) => {
                 if xyz.iter().chain(&entry.rpy.unwrap_or_default()).any(|x| !x.is_finite()) {
-                    return Err(fail(format!("its position is {xyz:?}, finite numbers are expected")));
+                    return Err(fail(format!("its position is {xyz:?}, expected finite numbers")));
                 }
                 pose(&FrameEntry { xyz, rpy: entry.rpy.unwrap_or_default() }, self.unit)
             }
@@ -223,7 +223,7 @@ impl Place<'_> {
             let distance = (one.interface.X_LI.translation.vector - one.centroid).norm();
             if distance > 0.5 * size {
                 doubts.push(format!(
-                    "interface {:?} stands {distance:.4} m from the centroid of its nodes, in a mesh of {size:.4} m: \
+                    "interface {:?} is {distance:.4} m from the centroid of its nodes, in a mesh of {size:.4} m: \
                      is its position in the unit of the mesh and in the link frame?",
                     one.interface.name
                 ));

@@ -186,7 +186,7 @@ impl ReduceJob {
         let is_toml = path.extension().is_some_and(|e| e == "toml");
         match std::str::from_utf8(&bytes) {
             Ok(text) if is_toml || is_job(text) => parse_job(text, path),
-            Err(_) if is_toml => Err(LinkError::file(path, "a job file is text in UTF-8; this is not")),
+            Err(_) if is_toml => Err(LinkError::file(path, "is not UTF-8 text, which a job file must be")),
             _ => Ok(Self::for_mesh(path)),
         }
     }

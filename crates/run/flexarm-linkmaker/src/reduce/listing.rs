@@ -91,7 +91,8 @@ impl MeshListing {
         let parts = connected_parts(mesh).len();
         let mut warnings = file.warnings.clone();
         if parts > 1 {
-            warnings.push(format!("the mesh falls into {parts} parts that share no node; a link must be in one piece"));
+            warnings
+                .push(format!("the mesh has {parts} parts that share no node; a link must be a single connected part"));
         }
         let typed = |v: Vector3<f64>| -> [f64; 3] { (v / place.unit).into() };
         Self {

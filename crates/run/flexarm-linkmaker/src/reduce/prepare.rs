@@ -56,7 +56,7 @@ pub(super) fn prepare(
     robot: Option<&UrdfLink>,
 ) -> Result<Prepared, LinkError> {
     if let Some(entry) = job.urdf.as_ref().filter(|_| robot.is_none()) {
-        let what = "is the robot of the job: what it says of the link is needed";
+        let what = "is the robot file of the job: its data for the link are required";
         return Err(LinkError::file(&entry.file, what));
     }
     let units = units_of(job);
@@ -115,8 +115,8 @@ fn merge(file: &mut MeshFile, distance: f64, units: UnitSystem, warnings: &mut V
     let merged = file.mesh.merge_coincident(distance * units.length);
     let before = file.mesh.nodes.len();
     warnings.push(match merged {
-        0 => format!("merge: no two of the {before} nodes are nearer than {distance} (unit of the mesh)"),
-        _ => format!("merge: {merged} of {before} nodes were in the place of another one and are now that node"),
+        0 => format!("merge: no two of the {before} nodes are closer than {distance} (unit of the mesh)"),
+        _ => format!("merge: {merged} of {before} nodes coincided with another node and were merged with it"),
     });
     Ok(())
 }
@@ -253,7 +253,7 @@ fn plan(
             env!("CARGO_PKG_VERSION"),
             materials.join("; "),
             quadrature_name(job),
-            if job.geometric == Some(true) { "; stiffness by load" } else { "" }
+            if job.geometric == Some(true) { "; geometric stiffness" } else { "" }
         ),
     };
     LinkPlan {
@@ -278,8 +278,9 @@ fn quadrature(job: &ReduceJob, file: &MeshFile) -> Result<Quadrature, LinkError>
     match job.quadrature.unwrap_or_default() {
         QuadratureChoice::Exact => Ok(Quadrature::Exact),
         QuadratureChoice::Calculix if has("C3D8I") && (has("C3D8") || has("C3D8R")) => {
-            let what = "the deck has C3D8I beside C3D8 or C3D8R; the rules of CalculiX can be had for bricks of one of them: give \
-                        all bricks one type, or leave quadrature out, with which all have incompatible modes";
+            let what = "the deck has C3D8I as well as C3D8 or C3D8R; the rules of CalculiX are available for \
+                        bricks of one type only: use one type for all bricks, or omit quadrature, which gives all \
+                        bricks incompatible modes";
             Err(LinkError::file(&job.mesh, what))
         }
         QuadratureChoice::Calculix if has("C3D8I") => Ok(Quadrature::CalculixModes),

@@ -66,8 +66,8 @@ pub fn modal_table(modal: &ModalFigures) -> ReportTable {
     };
     let rows = vec![
         vec!["coordinates".into(), format!("{}, {of}, {} Hz to {} Hz", modal.coordinates, hz(low), hz(high))],
-        vec!["integrals of second order".into(), if modal.second_order { "known" } else { "unknown" }.into()],
-        vec!["stiffness by load".into(), if modal.geometric { "stored" } else { "not stored" }.into()],
+        vec!["second-order integrals".into(), if modal.second_order { "known" } else { "unknown" }.into()],
+        vec!["geometric stiffness".into(), if modal.geometric { "stored" } else { "not stored" }.into()],
     ];
     ReportTable::new("modal link, A held", &["", ""], rows)
 }
@@ -147,7 +147,7 @@ fn interfaces(summary: &ReduceSummary) -> ReportTable {
             triple(&i.extent_m, 4),
         ]
     });
-    let header = ["interface", "nodes chosen by", "nodes", "tie", "position", "their centroid", "their extent"];
+    let header = ["interface", "node selector", "nodes", "tie", "position", "centroid of nodes", "extent of nodes"];
     ReportTable::new("interfaces (m, link frame)", &header, rows.collect())
 }
 
@@ -158,13 +158,13 @@ fn mass(summary: &ReduceSummary) -> ReportTable {
     };
     let mut rows = vec![row("whole mesh", summary.mass_kg, &summary.com_m, &summary.inertia)];
     for part in &summary.attached {
-        rows.push(row("rides on it", part.mass_kg, &part.com_m, &part.inertia));
+        rows.push(row("attached body", part.mass_kg, &part.com_m, &part.inertia));
     }
     for (name, part) in ["proximal part", "distal part"].iter().zip(&summary.parts) {
         rows.push(row(name, part.mass_kg, &part.com_m, &part.inertia));
     }
     rows.push(vec!["elastic joint".into(), String::new(), triple(&summary.split_m, 4), String::new()]);
-    let header = ["", "mass [kg]", "centre of mass [m]", "ixx, iyy, izz, ixy, ixz, iyz there [kg m2]"];
+    let header = ["", "mass [kg]", "centre of mass [m]", "ixx, iyy, izz, ixy, ixz, iyz about it [kg m2]"];
     ReportTable::new("mass", &header, rows)
 }
 
@@ -174,10 +174,10 @@ fn softness(summary: &ReduceSummary) -> ReportTable {
     // 1 kN and mm, 1 kN m and mrad.
     let of = |k: usize| significant(1e6 * C[k][k]);
     let rows = vec![
-        vec!["1 kN along it moves B by".into(), of(0), of(1), of(2), "mm".into()],
-        vec!["1 kN m about it turns B by".into(), of(3), of(4), of(5), "mrad".into()],
+        vec!["displacement of B under 1 kN".into(), of(0), of(1), of(2), "mm".into()],
+        vec!["rotation of B under 1 kN m".into(), of(3), of(4), of(5), "mrad".into()],
     ];
-    ReportTable::new("how soft it is, A held (along the same axis)", &["", "x", "y", "z", ""], rows)
+    ReportTable::new("deflection of B along the load, A held", &["", "x", "y", "z", ""], rows)
 }
 
 fn matrix(title: &'static str, M: &[[f64; 6]; 6]) -> ReportTable {
@@ -200,14 +200,14 @@ fn checks(summary: &ReduceSummary) -> ReportTable {
     let shape = if c.jacobian_at_nodes < MeshGate::SMALLEST_JACOBIAN { "warn" } else { "ok" };
     let mut rows = vec![
         below("asymmetry of the stiffness", c.symmetry, limits.asymmetry),
-        below("force under rigid motion", c.rigid_body_residual, MeshGate::RIGID_BODY_RESIDUAL),
-        below("blocks of the stiffness agree", c.block_identity, limits.rigid_body_warning),
-        vec!["motions without stiffness".into(), c.zero_modes.to_string(), "6".into(), zero.into()],
+        below("force under rigid-body motion", c.rigid_body_residual, MeshGate::RIGID_BODY_RESIDUAL),
+        below("mismatch of the stiffness blocks", c.block_identity, limits.rigid_body_warning),
+        vec!["zero-stiffness modes".into(), c.zero_modes.to_string(), "6".into(), zero.into()],
         below("mass, reduced against mesh", c.mass_error, MeshGate::MASS_ERROR),
         below("inertia, reduced against mesh", c.inertia_error, MeshGate::MASS_ERROR),
         below("residual of the kept modes", c.mode_residual, MeshGate::MODE_RESIDUAL),
         vec![
-            format!("flattest element ({})", c.worst_element),
+            format!("minimum Jacobian, element {}", c.worst_element),
             format!("{:.3}", c.jacobian_at_nodes),
             format!("above {}", MeshGate::SMALLEST_JACOBIAN),
             shape.into(),
@@ -217,7 +217,7 @@ fn checks(summary: &ReduceSummary) -> ReportTable {
         let close = (1.0 / OrderCheck::LARGEST_RATIO..OrderCheck::LARGEST_RATIO).contains(&ratio);
         let mark = if close { "ok" } else { "warn" };
         let usual = format!("below {}", OrderCheck::LARGEST_RATIO);
-        rows.push(vec!["softer with quadratic elements".into(), format!("{ratio:.2} times"), usual, mark.into()]);
+        rows.push(vec!["compliance ratio, quadratic elements".into(), format!("{ratio:.2} times"), usual, mark.into()]);
     }
     ReportTable::new("checks", &["", "measured", "usual", ""], rows)
 }
@@ -260,12 +260,12 @@ fn cost(summary: &ReduceSummary) -> ReportTable {
     let seconds = |x: f64| format!("{x:.2} s");
     let memory = summary.peak_rss_bytes.map_or_else(|| "-".into(), |b| format!("{:.0} MB", b as f64 / 1e6));
     let rows = vec![
-        vec!["wall clock / processor".into(), format!("{} / {}", seconds(summary.wall_s), seconds(summary.cpu_s))],
+        vec!["wall-clock / CPU time".into(), format!("{} / {}", seconds(summary.wall_s), seconds(summary.cpu_s))],
         vec![
             "read, assemble, factorise".into(),
             format!("{}, {}, {}", seconds(p.read_s), seconds(p.assembly_s), seconds(p.factorisation_s)),
         ],
-        vec!["modes (kept and judging), parts".into(), format!("{}, {}", seconds(p.modes_s), seconds(p.parts_s))],
+        vec!["modes (kept and reference), parts".into(), format!("{}, {}", seconds(p.modes_s), seconds(p.parts_s))],
         vec!["peak memory".into(), memory],
         vec![
             "factor".into(),

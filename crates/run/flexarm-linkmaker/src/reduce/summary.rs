@@ -460,14 +460,16 @@ pub(crate) fn coarse(source: &str, parts: Option<f64>, modes: Option<f64>) -> Ve
     let parts = off(parts, COARSE_PARTS).map(|error| {
         let percent = 100.0 * error;
         let said = format!(
-            "two rigid parts miss the first frequency of {source} by {percent:+.1} %: so will a simulation with them"
+            "the first frequency with two rigid parts differs from that of {source} by {percent:+.1} %, as it will \
+             in a simulation with them"
         );
         Doubt::found("coarse-parts", error, COARSE_PARTS, said)
     });
     let modes = off(modes, MODES_MISS).map(|error| {
         let percent = 100.0 * error;
         let setting = Setting::Modes;
-        let said = format!("the kept modes miss the first frequency by {percent:+.2} %: keep more of them ({setting})");
+        let said =
+            format!("the first frequency with the kept modes differs by {percent:+.2} %: keep more modes ({setting})");
         Doubt::found(COARSE_MODES, error, MODES_MISS, said)
     });
     parts.into_iter().chain(modes).collect()

@@ -42,13 +42,13 @@ impl UrdfLink {
     /// along the line from A to B, in link axes.
     pub(super) fn rest(&self, mesh: &RigidPart, along: &Vector3<f64>) -> Result<[RigidPart; 2], String> {
         let Some(whole) = &self.inertia else {
-            return Err(format!("link {:?} has no inertial, so there is no rest", self.name));
+            return Err(format!("link {:?} has no <inertial>, so `rest` is undefined", self.name));
         };
         let mass = whole.mass - mesh.mass;
         if mass.is_nan() || mass <= 0.0 {
             return Err(format!(
-                "the mesh weighs {:.4} kg, link {:?} of the URDF {:.4} kg: nothing is left that could ride on it; \
-                 leave `rest` out, or correct the density",
+                "the mesh has {:.4} kg, link {:?} of the URDF {:.4} kg: no mass remains for attached bodies; omit \
+                 `rest`, or correct the density",
                 mesh.mass, self.name, whole.mass
             ));
         }
@@ -61,9 +61,9 @@ impl UrdfLink {
         let inertia = whole.inertia + about(whole.mass, whole.com) - mesh.inertia - about(mesh.mass, mesh.com);
         let halves = halves_of_bar(&RigidPart { mass, com, inertia }, along);
         for half in &halves {
-            half.check("what link and mesh differ by").map_err(|error| {
+            half.check("the difference between link and mesh").map_err(|error| {
                 format!(
-                    "{error}: the mesh has more inertia than the URDF's link; leave `rest` out, or correct one of them"
+                    "{error}: the mesh has more inertia than the link in the URDF; omit `rest`, or correct one of them"
                 )
             })?;
         }

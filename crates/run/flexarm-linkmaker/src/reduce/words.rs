@@ -25,7 +25,7 @@ pub(super) const MATERIAL_FORMS: &str =
 impl MaterialChoice {
     fn named(name: &str) -> Result<Self, String> {
         let (name, material) = Material::preset(name).ok_or_else(|| {
-            let meant = Material::suggestion(name).map_or(String::new(), |meant| format!("; is {meant:?} meant?"));
+            let meant = Material::suggestion(name).map_or(String::new(), |meant| format!("; did you mean {meant:?}?"));
             format!("material {name:?} is not known; expected {MATERIAL_FORMS}{meant}")
         })?;
         Ok(Self { name: Some(name), material })
@@ -109,7 +109,7 @@ pub enum SplitChoice {
 }
 
 /// Notations of a split, for messages.
-const SPLIT_FORMS: &str = "elastic-centre, mid, a fraction of the way from A to B (0 to 1), or a point x,y,z";
+const SPLIT_FORMS: &str = "elastic-centre, mid, a fraction of the distance from A to B (0 to 1), or a point x,y,z";
 
 impl SplitChoice {
     fn fraction(x: f64) -> Result<Self, String> {
