@@ -9,18 +9,19 @@ use flexarm_stepping::TargetError;
 #[non_exhaustive]
 pub enum CompensateError {
     /// A robot without flexible links and elastic drives.
-    #[error("the robot has no flexible link and no elastic drive: its tool is where the rigid arm has it")]
+    #[error("the robot has no flexible link and no elastic drive: there is no deflection to compensate")]
     NothingYields,
     /// A velocity jump in the motion.
     #[error(
-        "the velocity jumps at {t_s} s, which the dynamic method cannot correct: let the motion begin and end at rest and round its corners, or take the static method"
+        "the velocity jumps at {t_s} s, which the dynamic method cannot correct: start and end the motion at rest \
+         and blend its corners, or use the static method"
     )]
     Corner {
         /// Time of the jump (s).
         t_s: f64,
     },
     /// No TCP component is selected.
-    #[error("no component of the tool is chosen: choose some of x, y, z, rx, ry, rz")]
+    #[error("no TCP component is selected: select at least one of x, y, z, rx, ry, rz")]
     NoComponent,
     /// An invalid number.
     #[error("{what} is {found}, expected {expected}")]
@@ -50,9 +51,14 @@ pub enum CompensateError {
     },
     /// Commands violate limits that the motion itself keeps.
     #[error(
-        "the new commands pass limits that the motion itself keeps: {}; {}",
+        "the new commands exceed limits that the original motion satisfies: {}; {}",
         limits.join("; "),
-        if *slower { "a slower motion does not mend that, or loads hold its times: change it there, or take it all the same (`limits` = tell)" } else { "let the motion be slower (`limits` = slow), or take it all the same (tell)" }
+        if *slower {
+            "a slower motion does not help, or loads fix its timing: change the motion there, or accept the violation \
+             (`limits` = tell)"
+        } else {
+            "slow the motion down (`limits` = slow), or accept the violation (tell)"
+        }
     )]
     Limits {
         /// Violated limits, a sentence each.
@@ -61,7 +67,7 @@ pub enum CompensateError {
         slower: bool,
     },
     /// A wrong number of acceleration limits.
-    #[error("{found} limits of the acceleration for a robot of {expected} joints: one for each is expected")]
+    #[error("{found} acceleration limits for a robot of {expected} joints: expected one per joint")]
     Accelerations {
         /// Number found.
         found: usize,
@@ -70,7 +76,8 @@ pub enum CompensateError {
     },
     /// A payload change, with the static method.
     #[error(
-        "the payload changes at {at_s} s, and the static method knows one payload: use the dynamic method, or compensate each part of the motion by itself"
+        "the payload changes at {at_s} s, but the static method supports only one payload: use the dynamic method, \
+         or compensate each part of the motion separately"
     )]
     StaticPayload {
         /// Time of the change (s).
@@ -78,7 +85,8 @@ pub enum CompensateError {
     },
     /// A servo that does not hold its position.
     #[error(
-        "the servo of joint {joint:?} holds no position, so that there are no targets for it: give it a position_gain and a velocity_gain, or take motors that are where they are commanded (drives = elastic)"
+        "the servo of joint {joint:?} does not control position, so that no targets can be computed for it: set \
+         its position_gain and velocity_gain, or use motors that follow their commands exactly (drives = elastic)"
     )]
     NothingHolds {
         /// The joint.
@@ -88,7 +96,7 @@ pub enum CompensateError {
     #[error(transparent)]
     Shaper(#[from] ShaperError),
     /// The modes at the end of the motion cannot be computed.
-    #[error("the modes at the end of the motion, for the shaper: {0}")]
+    #[error("cannot compute the modes at the end of the motion for the shaper: {0}")]
     Modes(#[from] LinearError),
     /// The linearised arm cannot be inverted.
     #[error(transparent)]

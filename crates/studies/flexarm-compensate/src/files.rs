@@ -67,7 +67,7 @@ impl Files {
         let ProgramFigures { targets, corrected: done, left, residual_m, .. } = &corrected.figures;
         if let (true, Some(first)) = (done < targets, left.first()) {
             let text = format!(
-                "{} of {targets} targets of the program stay as they were, the first in line {} ({}): {}",
+                "{} of {targets} targets of the program are unchanged, the first in line {} ({}): {}",
                 targets - done,
                 first.line,
                 first.statement,
@@ -79,7 +79,7 @@ impl Files {
             let text = format!("the corrected program misses a target by {:.4} mm", 1e3 * residual_m);
             said(text, "a move depends on a target that was not corrected");
         }
-        uncovered.into_iter().for_each(|text| said(text, "use the motion instead where that matters"));
+        uncovered.into_iter().for_each(|text| said(text, "use the motion instead if that matters"));
         Some(corrected)
     }
 
@@ -126,7 +126,7 @@ impl Files {
         let lost = |name: &&PathBuf| home.is_some() && name.parent().and_then(|f| f.canonicalize().ok()) == home;
         match names.iter().find(lost) {
             Some(name) => {
-                let what = "this is the program that is corrected: choose another output folder".into();
+                let what = "this is the program to be corrected: choose another output folder".into();
                 Err(Error::File { path: name.clone(), what })
             }
             None => Ok(()),

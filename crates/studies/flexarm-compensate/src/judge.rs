@@ -96,13 +96,9 @@ pub(super) fn sweep(
     ];
     let links = !arm.flexible().spans.is_empty();
     if links && arm.flexible().springs.len() > arm.flexible().spans.len() {
+        plants.push(("only drives elastic".into(), robot.clone(), Modelling { links: LinkModel::Rigid, ..modelling }));
         plants.push((
-            "drives alone give way".into(),
-            robot.clone(),
-            Modelling { links: LinkModel::Rigid, ..modelling },
-        ));
-        plants.push((
-            "links alone give way".into(),
+            "only links flexible".into(),
             robot.clone(),
             Modelling { drives: DriveModel::Rigid, ..modelling },
         ));

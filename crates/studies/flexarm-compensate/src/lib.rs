@@ -359,7 +359,7 @@ fn check(scenario: &Scenario, request: &CompensateRequest, arm: &Arm) -> Result<
     }
     if let Some(found) = request.accelerations.iter().copied().find(|limit| limit.is_nan() || *limit <= 0.0) {
         let expected = "a positive number (rad/s2 or m/s2)";
-        return Err(CompensateError::Value { what: "a limit of the acceleration", found, expected });
+        return Err(CompensateError::Value { what: "an acceleration limit", found, expected });
     }
     if let Some(change) = scenario.payloads.iter().find(|change| request.method == Method::Static && change.at_s > 0.0)
     {

@@ -82,8 +82,8 @@ pub(super) fn kept(
         let (mut answer, found, own) = attempt(robot, arm, &scenario, request, stop)?;
         answer.slowed = slowed;
         if slowed > 1.0 {
-            let text = format!("the motion takes {slowed:.4} times as long, so that limits of the joints are kept");
-            let help = "let commands pass them (`limits` = tell), or slow the motion where it is quickest";
+            let text = format!("the motion is slowed down by a factor of {slowed:.4} to satisfy joint limits");
+            let help = "allow violations (`limits` = tell), or slow the motion down where it is fastest";
             answer.caveats.push(Caveat::said("slowed", "compensation", text, help));
         }
         let worse: Vec<MotionViolation> = worse(&answer.limits, &own).cloned().collect();

@@ -142,9 +142,9 @@ pub(super) fn corrected(
             Err(why) => left.push((stop.item, why)),
         }
     }
-    let loaded = if rest.is_loaded() { " under the loads there" } else { "" };
+    let loaded = if rest.is_loaded() { " under the loads at each target" } else { "" };
     let name = plain(&robot.name);
-    let comment = format!("targets corrected by flexarm for {name}: the arm gives way at rest{loaded}");
+    let comment = format!("targets corrected by flexarm for {name}: static deflection{loaded}");
     let rewritten = old.text.rewritten(&targets, &comment);
     left.extend(rewritten.left.iter().map(|(k, why)| (*k, (*why).to_owned())));
 
@@ -193,7 +193,7 @@ fn judged(
     left: &[(usize, String)],
 ) -> Result<ProgramFigures, String> {
     let off = |stop: &Stop<'_>| {
-        let now = again.get(stop.item).and_then(Option::as_ref).ok_or("the corrected program has other moves")?;
+        let now = again.get(stop.item).and_then(Option::as_ref).ok_or("the corrected program has different moves")?;
         Ok([rest.off(stop, stop.q)?, rest.off(stop, now)?])
     };
     let off: Vec<[Vector6<f64>; 2]> = stops.par_iter().map(off).collect::<Result<_, String>>()?;
@@ -223,27 +223,36 @@ fn judged(
 fn uncovered(rest: &AtRest<'_>, stops: &[Stop<'_>], scenario: &Scenario) -> Vec<String> {
     let mut told = Vec::new();
     if rest.sags {
-        told.push("servos without an integral sag into their gains: targets of the program leave that out".to_owned());
+        told.push(
+            "servos without integral action have a steady-state error: the targets of the program do not correct it"
+                .to_owned(),
+        );
     }
     if !rest.is_loaded() {
         return told;
     }
     if scenario.motion.tool_path.is_none() {
-        told.push("when the motion is at its targets is not known: the loads are those of the start".to_owned());
+        told.push(
+            "the times at which the motion reaches its targets are unknown: the loads at the start are used".to_owned(),
+        );
     }
     told.push(
-        "loads between the targets are not in the program: each target has those that act while the arm is there"
+        "the program does not correct for loads between the targets: each target is corrected for the loads that \
+         act while the arm is there"
             .to_owned(),
     );
     let passed = stops.iter().filter(|stop| stop.rest_s[1] <= stop.rest_s[0] && rest.acts(stop.rest_s)).count();
     if passed > 0 {
-        told.push(format!("targets that are passed without a rest: {passed}; the loads there are those of the moment"));
+        told.push(format!(
+            "targets passed without a stop: {passed}; they are corrected for the loads at the time of passing"
+        ));
     }
     let changing = stops.iter().filter_map(|stop| Some((rest.change(stop.rest_s)?, stop.of.line)));
     let changing: Vec<(f64, usize)> = changing.filter(|(change, _)| *change > CHANGES).collect();
     if let Some((worst, line)) = changing.iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
         told.push(format!(
-            "at {} targets the loads change while the arm is there, most in line {line} (by {:.0} % of their largest to one side): their mean is corrected",
+            "at {} targets the loads change while the arm is there, most in line {line} (up to {:.0} % of the \
+             maximum from the mean): the correction uses the mean load",
             changing.len(),
             100.0 * worst
         ));

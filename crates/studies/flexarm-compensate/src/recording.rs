@@ -44,7 +44,7 @@ pub(super) fn record(
     }
     let mm = |x: f64| 1e3 * x;
     study.finish(&format!(
-        "# {} on {}\n\nDistance of the tool from where the rigid arm has it on the motion that was asked for.\n\n\
+        "# {} on {}\n\nDistance of the TCP from that of the rigid arm on the requested motion.\n\n\
          | | peak | RMS | at the end |\n| --- | --- | --- | --- |\n\
          | before | {:.4} mm | {:.4} mm | {:.4} mm |\n| after | {:.4} mm | {:.4} mm | {:.4} mm |\n",
         markdown(&answer.motion),

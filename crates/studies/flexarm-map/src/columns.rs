@@ -55,12 +55,12 @@ pub(super) struct Layout {
 /// Columns before the joints: position of the rigid TCP, number of the place or instant, of the
 /// tool direction, of the branch.
 pub(super) const HEAD: [(&str, &str); 6] = [
-    ("x_m", "place of the rigid arm's tool, world"),
-    ("y_m", "place of the rigid arm's tool, world"),
-    ("z_m", "place of the rigid arm's tool, world"),
-    ("place", "number of the place, x first, or of the instant"),
-    ("direction", "number of the tool's direction"),
-    ("branch", "number of the solution of the inverse kinematics"),
+    ("x_m", "position of the TCP of the rigid arm, world axes"),
+    ("y_m", "position of the TCP of the rigid arm, world axes"),
+    ("z_m", "position of the TCP of the rigid arm, world axes"),
+    ("place", "index of the place (x varies fastest), or of the instant"),
+    ("direction", "index of the tool direction"),
+    ("branch", "index of the inverse kinematics solution"),
 ];
 
 /// Index of the number of the place in [`HEAD`].
@@ -82,13 +82,16 @@ impl Layout {
         let elastic = arm.n_elastic_coordinates();
         let frequencies = frequencies.min(elastic).min(MOST_FREQUENCIES);
         let mut columns: Vec<MapColumn> = HEAD.iter().map(|(name, meaning)| place(name, meaning)).collect();
-        columns.extend(joints.iter().map(|(joint, slides)| {
-            place(&format!("{joint}_{}", if *slides { "m" } else { "rad" }), "where the joint is")
-        }));
-        columns.extend(displacement("sag", "from the rigid tool to the flexible one under weight"));
+        columns.extend(
+            joints.iter().map(|(joint, slides)| {
+                place(&format!("{joint}_{}", if *slides { "m" } else { "rad" }), "joint position")
+            }),
+        );
+        columns.extend(displacement("sag", "displacement of the TCP relative to the rigid arm under gravity"));
         if loaded {
-            columns.extend(displacement("error", "the same under weight and the load"));
-            columns.push(less("load_m", "how far the load moves the tool"));
+            let meaning = "displacement of the TCP relative to the rigid arm under gravity and the load";
+            columns.extend(displacement("error", meaning));
+            columns.push(less("load_m", "displacement of the TCP due to the load"));
         }
         for (axis, name) in ["compliance_x_m_per_n", "compliance_y_m_per_n", "compliance_z_m_per_n"].iter().enumerate()
         {
@@ -96,31 +99,31 @@ impl Layout {
         }
         for pair in ["xy", "xz", "yz"] {
             let (along, by) = pair.split_at(1);
-            let meaning = format!("displacement along {along} per force along {by}, mean with the reverse");
+            let meaning = format!("displacement along {along} per force along {by}, averaged with its transpose");
             columns.push(place(&format!("compliance_{pair}_m_per_n"), &meaning));
         }
-        columns.push(less("compliance_worst_m_per_n", "largest displacement per force, over all directions"));
+        columns.push(less("compliance_worst_m_per_n", "maximum displacement per force over all directions"));
         for name in ["worst_x", "worst_y", "worst_z"] {
-            columns.push(place(name, "direction of that force, world"));
+            columns.push(place(name, "direction of that force, world axes"));
         }
-        columns.push(less("rotation_worst_rad_per_nm", "largest rotation per moment, over all directions"));
+        columns.push(less("rotation_worst_rad_per_nm", "maximum rotation per moment over all directions"));
         if matrix {
             columns.extend(full_compliance());
         }
         for k in 1..=frequencies {
-            let column = less(&format!("frequency_{k}_hz"), "natural frequency under weight, undamped, drives locked");
+            let column = less(&format!("frequency_{k}_hz"), "undamped natural frequency under gravity, drives locked");
             columns.push(MapColumn { more_is_better: true, ..column });
         }
         if let Some(tool) = tool {
             let rpm: Vec<String> = tool.rpm.iter().map(f64::to_string).collect();
             let (rpm, most) = (rpm.join(", "), tool.deepest);
             let meaning =
-                format!("depth of cut above which {} chatters at {rpm} 1/min; {most} where it does not", tool.name);
+                format!("depth of cut above which {} chatters at {rpm} 1/min; {most} if it does not", tool.name);
             columns.push(MapColumn { more_is_better: true, ..less("depth_m", &meaning) });
         }
         let whole = if loaded { "error" } else { "sag" };
         for element in &arm.elements {
-            let meaning = format!("part of it in the {whole}, along the {whole}, first order");
+            let meaning = format!("share of the element in the {whole}, along the {whole}, first order");
             columns.push(MapColumn { quantity: true, ..place(&format!("share_{}", element.name), &meaning) });
         }
         let range = |first: usize, size: usize| first..first + size;
@@ -163,7 +166,7 @@ fn full_compliance() -> Vec<MapColumn> {
     let moved = [("x", "m"), ("y", "m"), ("z", "m"), ("rx", "rad"), ("ry", "rad"), ("rz", "rad")];
     let pushed = [("fx", "n"), ("fy", "n"), ("fz", "n"), ("tx", "nm"), ("ty", "nm"), ("tz", "nm")];
     let entry = |(row, unit): (&str, &str), (column, per): (&str, &str)| {
-        let meaning = format!("entry of the 6x6 compliance: {row} of the tool per {column} on it, world axes");
+        let meaning = format!("entry of the 6x6 compliance: {row} of the TCP per {column} on it, world axes");
         place(&format!("c_{row}_{column}_{unit}_per_{per}"), &meaning)
     };
     moved.iter().flat_map(|row| pushed.iter().map(move |column| entry(*row, *column))).collect()

@@ -10,15 +10,15 @@ use super::MOST_PLACES;
 #[non_exhaustive]
 pub enum MapError {
     /// A tool axis without a direction.
-    #[error("the axis of the tool ({}) must have a direction, found {found:?}", Setting::ToolAxis)]
+    #[error("the tool axis ({}) must be finite and non-zero, found {found:?}", Setting::ToolAxis)]
     ToolAxis {
         /// The axis given.
         found: [f64; 3],
     },
     /// An invalid cone of directions.
     #[error(
-        "the tool's cone must have a half angle from 0 to 180 degrees, at least one tilt and one roll, and at most 10000 \
-         directions, found {:.4} degrees, {tilts} tilts, {rolls} rolls", half_angle_rad.to_degrees()
+        "the cone of tool directions must have a half angle from 0 to 180 degrees, at least one tilt and one roll, \
+         and at most 10000 directions, found {:.4} degrees, {tilts} tilts, {rolls} rolls", half_angle_rad.to_degrees()
     )]
     Cone {
         /// Half angle (rad).
@@ -29,7 +29,7 @@ pub enum MapError {
         rolls: usize,
     },
     /// A box with corners that are not numbers or in the wrong order.
-    #[error("the box ({}) must have its lowest corner first, found {lower:?} to {upper:?} m", Setting::Bounds)]
+    #[error("the box ({}) must have its lower corner first, found {lower:?} to {upper:?} m", Setting::Bounds)]
     Bounds {
         /// Lower corner (m).
         lower: [f64; 3],
@@ -37,20 +37,21 @@ pub enum MapError {
         upper: [f64; 3],
     },
     /// A grid spacing that is not positive.
-    #[error("the distance of the places ({}) must be positive, found {found} m", Setting::GridSpacing)]
+    #[error("the grid spacing ({}) must be positive, found {found} m", Setting::GridSpacing)]
     Spacing {
         /// The spacing given (m).
         found: f64,
     },
     /// An invalid keep-out radius around the base.
-    #[error("the radius that is kept free around the first joint must be zero or positive, found {found} m")]
+    #[error("the keep-out radius around the first joint must be zero or positive, found {found} m")]
     KeepOut {
         /// The radius given (m).
         found: f64,
     },
     /// More places than fit in memory.
     #[error(
-        "the map would have {places:.3e} places, at most {most:.0e} are held in memory: raise {} or take less",
+        "the map would have {places:.3e} places, at most {most:.0e} are held in memory: increase {} or map a \
+         smaller region",
         Setting::GridSpacing
     )]
     TooMany {
@@ -61,7 +62,8 @@ pub enum MapError {
     },
     /// More rows than fit in memory.
     #[error(
-        "the map has more than {most:.0e} poses, which is what is held in memory: keep the best of each place, or raise {}",
+        "the map has more than {most:.0e} poses, the maximum held in memory: keep only the best pose of each \
+         place, or increase {}",
         Setting::GridSpacing
     )]
     TooManyRows {
@@ -70,7 +72,8 @@ pub enum MapError {
     },
     /// Too many combinations of places and directions.
     #[error(
-        "the map would look for {found:.1e} poses of the tool, at most {most:.0e}: take fewer directions, or raise {}",
+        "the map would search for {found:.1e} TCP poses, at most {most:.0e} are allowed: use fewer directions, or \
+         increase {}",
         Setting::GridSpacing
     )]
     TooManyDirections {
@@ -80,7 +83,7 @@ pub enum MapError {
         most: f64,
     },
     /// An unknown joint.
-    #[error("there is no joint {found:?} to be mapped; the joints are {known:?}")]
+    #[error("there is no joint {found:?} to vary; the joints are {known:?}")]
     Joint {
         /// The joint requested.
         found: String,
@@ -91,7 +94,9 @@ pub enum MapError {
     #[error("joint {0:?} is named twice")]
     JointTwice(String),
     /// Invalid values of a joint.
-    #[error("joint {joint:?} is to go from {} to {} in {points} values: expected finite numbers and at least one value", range[0], range[1])]
+    #[error(
+        "joint {joint:?} has a range from {} to {} in {points} values: expected finite numbers and at least one \
+         value", range[0], range[1])]
     JointRange {
         /// The joint.
         joint: String,
@@ -107,13 +112,13 @@ pub enum MapError {
         found: usize,
     },
     /// No joint to vary.
-    #[error("no joint is named that the map is to go through")]
+    #[error("no joint is given for the map to vary")]
     NoJoints,
     /// An invalid number of instants of a motion.
     #[error("a map along a motion needs from one to {MOST_PLACES} instants")]
     Instants,
     /// An unknown quantity.
-    #[error("a map has no quantity {found:?} to compare by; it has {}", known.join(", "))]
+    #[error("the map has no quantity {found:?} to compare poses by; it has {}", known.join(", "))]
     Quantity {
         /// The quantity requested.
         found: String,
@@ -127,11 +132,11 @@ pub enum MapError {
         found: [f64; 3],
     },
     /// A workpiece without a grid of places.
-    #[error("a workpiece is placed on a grid of places: it goes with neither joint values nor a motion")]
+    #[error("a workpiece requires a grid of places: it cannot be combined with joint values or a motion")]
     WorkpieceWithoutGrid,
     /// An arm with too few joints for inverse kinematics.
     #[error(
-        "the arm has {joints} joints, and to bring the tool to a pose takes six: map it over joint values ({})",
+        "the arm has {joints} joints, but reaching a TCP pose requires six: map it over joint values ({})",
         Setting::MapJoints
     )]
     TooFewJoints {
@@ -162,7 +167,7 @@ pub enum MapError {
     /// No pose has a value of the quantity.
     #[error(
         "none of the poses has a {by}{}: compare by another quantity",
-        if by == "depth_m" { ", for the feed of the tool is along its axis (feed = [...] in [tool])" } else { "" }
+        if by == "depth_m" { ", because the feed of the tool is along its axis (feed = [...] in [tool])" } else { "" }
     )]
     NothingToCompare {
         /// The quantity.

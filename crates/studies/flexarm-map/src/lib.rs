@@ -344,9 +344,9 @@ fn region_of<'m>(
             }
             let mut caveats = Vec::new();
             if !finder.is_closed() {
-                let message = "the arm has no inverse kinematics in closed form: poses are found by search, which takes long \
-                               and may miss branches, and places at the border";
-                caveats.push(Caveat::said("searched-poses", "map", message, "map it over joint values"));
+                let message = "the arm has no closed-form inverse kinematics: poses are found by search, which is \
+                               slow and may miss branches, and places near the workspace boundary";
+                caveats.push(Caveat::said("searched-poses", "map", message, "map the arm over joint values"));
             }
             let bounds = workspace.bounds.unwrap_or_else(|| reach(model));
             let edge = (0..3).map(|c| bounds[1][c] - bounds[0][c]).fold(0.0, f64::max);
@@ -401,8 +401,8 @@ fn joint_region<'m>(ranges: &'m [JointRange], model: &Model, near: &[f64]) -> Re
         let limits = actuated[k].limits;
         if first.min(*last) < limits.lower || first.max(*last) > limits.upper {
             let (lower, upper) = (limits.lower, limits.upper);
-            let message = format!("the map takes joint {joint:?} beyond its limits {lower} to {upper}");
-            caveats.push(Caveat::said("outside-limits", joint, message, "take less of the joint"));
+            let message = format!("the map moves joint {joint:?} beyond its limits {lower} to {upper}");
+            caveats.push(Caveat::said("outside-limits", joint, message, "reduce the range of the joint"));
         }
         numbers.push(k);
         poses *= *points as f64;
@@ -496,7 +496,7 @@ fn summed_up(
             "{} of {} poses have no equilibrium and are left out; at the first: {first}",
             taken.failed, taken.poses
         );
-        caveats.push(Caveat::said("no-equilibrium", "map", message, "look at one of them with statics"));
+        caveats.push(Caveat::said("no-equilibrium", "map", message, "analyse one of them with statics"));
     }
     let mut placement = None;
     if let (Some(edges), Some(grid)) = (request.workpiece_m, grid) {
@@ -507,13 +507,14 @@ fn summed_up(
             found
         });
         if placement.is_none() {
-            let message =
-                format!("no place of the grid holds the workpiece of {edges:?} m with every place in it within reach");
+            let message = format!(
+                "the workpiece of {edges:?} m does not fit anywhere on the grid with all its places within reach"
+            );
             caveats.push(Caveat::said(
                 "no-placement",
                 "map",
                 message,
-                "take a smaller workpiece or more directions of the tool",
+                "use a smaller workpiece or more tool directions",
             ));
         }
     }
@@ -563,14 +564,15 @@ fn cost_by_place(table: &MapTable, grid: &Grid, by: usize) -> Vec<f64> {
 /// Returns a caveat if the map has a single place, so that there is nothing to compare.
 fn one_place(found: &Map) -> Option<Caveat> {
     let message = match (found.reachable, found.points) {
-        (1, 1) => "the map has one place: its best and its worst pose say nothing of the workspace".to_owned(),
+        (1, 1) => "the map has only one place: its best and worst poses do not characterise the workspace".to_owned(),
         (1, points) => {
-            format!("the tool reaches one place of {points}: best and worst pose say nothing of the workspace")
+            format!(
+                "the tool reaches only one place of {points}: best and worst poses do not characterise the workspace"
+            )
         }
         _ => return None,
     };
-    let help =
-        "take more places: a larger box, a smaller spacing or more values of the joints; statics answers one pose";
+    let help = "map more places: a larger box, a smaller spacing or more joint values; for a single pose use statics";
     Some(Caveat::said("one-place", "map", message, help))
 }
 

@@ -107,7 +107,10 @@ impl List<'_> {
         };
         self.joints.iter().enumerate().find_map(joint).ok_or_else(|| {
             let known: Vec<&str> = self.joints.iter().map(|(name, _)| *name).collect();
-            format!("column {name:?} is no joint of the robot; its joints are {known:?}, with _deg after the name for degrees")
+            format!(
+                "column {name:?} is not a joint of the robot; its joints are {known:?}; append _deg to the name \
+                 for degrees"
+            )
         })
     }
 
@@ -141,7 +144,7 @@ pub(super) fn region<'m>(poses: &'m [Vec<f64>], model: &Model) -> Result<(Region
         let count = poses.iter().filter(outside).count();
         if count > 0 {
             let (lower, upper) = (c.limits.lower, c.limits.upper);
-            let message = format!("{count} poses take joint {:?} beyond its limits {lower} to {upper}", c.joint);
+            let message = format!("{count} poses have joint {:?} beyond its limits {lower} to {upper}", c.joint);
             caveats.push(Caveat::said("outside-limits", &c.joint, message, "check the units of the list"));
         }
     }

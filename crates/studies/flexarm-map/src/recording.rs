@@ -136,9 +136,11 @@ pub(super) fn shown(map: &Map) -> Vec<usize> {
 }
 
 fn text(map: &Map) -> String {
-    let mut text = format!("# {}: {} of {} places are reached\n\n", markdown(&map.robot), map.reachable, map.points);
-    text += "Dark is little, light is much. The colours go from the lowest to the 98th percent of the values.\n\n";
-    text += "| view | least | median | most |\n| --- | --- | --- | --- |\n";
+    let mut text =
+        format!("# {}: {} of {} places are within reach\n\n", markdown(&map.robot), map.reachable, map.points);
+    text += "Dark is low, light is high. The colour scale runs from the minimum to the 98th percentile of the \
+             values.\n\n";
+    text += "| view | minimum | median | maximum |\n| --- | --- | --- | --- |\n";
     for k in shown(map) {
         let name = &map.table.columns[k].name;
         let Some(spread) = map.quantities.get(name) else { continue };
@@ -151,8 +153,10 @@ fn text(map: &Map) -> String {
     if let Some(placement) = &map.placement {
         let (worst, unit) = (quantity_text(&map.by, placement.worst), readable(&map.by).1);
         let [x, y, z] = placement.centre_m;
-        text +=
-            &format!("\nBest place of the workpiece: centre {x:.3}, {y:.3}, {z:.3} m; worst in it {worst} {unit}.\n");
+        text += &format!(
+            "\nBest position of the workpiece: centre {x:.3}, {y:.3}, {z:.3} m; worst value in it {worst} \
+                 {unit}.\n"
+        );
     }
     text
 }
@@ -291,5 +295,5 @@ fn ellipsoids(map: &Map, size: f32) -> Option<Scenery> {
         colors.push(color(row[worst], scale));
     }
     let form = SceneryForm::Ellipsoids { places, half_axes_m, quaternions, colors };
-    Some(Scenery { view: "ellipsoids of compliance".into(), name: "ellipsoids".into(), form })
+    Some(Scenery { view: "compliance ellipsoids".into(), name: "ellipsoids".into(), form })
 }

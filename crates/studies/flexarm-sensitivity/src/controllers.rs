@@ -80,11 +80,12 @@ pub(super) fn limited(arm: &Arm, found: &RunSlopes) -> Vec<Caveat> {
     let told = |own: &flexarm_stepping::TorqueLimited| {
         let joint = joints[own.coordinate];
         let text = format!(
-            "the servo of joint {joint:?} is at its torque limit in {} samples, first at {:.4} s: the derivatives hold as long as the same \
-             samples are; where another one is, its integral steps",
+            "the servo of joint {joint:?} is at its torque limit in {} samples, first at {:.4} s: the derivatives \
+             are valid as long as the same samples are saturated; if another sample saturates, the servo integral \
+             jumps",
             own.samples, own.first_s
         );
-        Caveat::said("servo-limit", format!("joint {joint:?}"), text, "slow the motion down where it is quickest")
+        Caveat::said("servo-limit", format!("joint {joint:?}"), text, "slow the motion down where it is fastest")
     };
     found.limited.iter().map(told).collect()
 }

@@ -148,8 +148,8 @@ fn slopes_and_caveats(
     keep_samples: bool,
 ) -> Result<(RunSlopes, Vec<Caveat>), Error> {
     let StepperKind::GeneralizedAlpha(settings) = options.stepper else {
-        let what = "another stepper than generalised-alpha";
-        let source = StepError::NoSlopes { what, mend: "take the default one" };
+        let what = "a stepper other than generalised-alpha";
+        let source = StepError::NoSlopes { what, mend: "use the default stepper" };
         return Err(Error::Step { source, partial: false });
     };
     runnable(&scenario.motion, options)?;
