@@ -38,8 +38,8 @@ fn quick_caveat(answer: &Compensation, quicker: f64) -> Option<Caveat> {
     let least = answer.model_peaks_m.iter().copied().fold(f64::INFINITY, f64::min);
     (answer.iterations > 0 && least > ENOUGH_LEFT * first && quicker > MOSTLY).then(|| {
         let text = format!(
-            "{:.1} % of the peak error remains on the model itself; {:.0} % of that, by its RMS, is above {hz:.1} Hz, the \
-             cutoff frequency of the inversion",
+            "{:.1} % of the peak error remains on the model itself; {:.0} % of that, by its RMS, is above {hz:.1} Hz, \
+             the cutoff frequency of the inversion",
             100.0 * least / first,
             100.0 * quicker
         );

@@ -58,7 +58,7 @@ pub(super) fn html(answer: &Compensation) -> String {
 fn shaper(answer: &Compensation) -> String {
     let Some(shaper) = &answer.shaper else { return String::new() };
     let mut text = format!(
-        "<h2>Shaper</h2>\n<p>{}, {} copies, {:.4} s longer. Predicted residual vibration of the TCP after the motion:</p>\n\
+        "<h2>Shaper</h2>\n<p>{}, {} copies, {:.4} s longer. Predicted residual vibration after the motion:</p>\n\
          <table><tr><th>mode (Hz)</th><th>damping ratio</th><th>unshaped (mm)</th><th>shaped (mm)</th></tr>\n",
         shaper.kind,
         shaper.copies.len(),

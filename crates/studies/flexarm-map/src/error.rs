@@ -96,7 +96,10 @@ pub enum MapError {
     /// Invalid values of a joint.
     #[error(
         "joint {joint:?} has a range from {} to {} in {points} values: expected finite numbers and at least one \
-         value", range[0], range[1])]
+         value",
+        range[0],
+        range[1]
+    )]
     JointRange {
         /// The joint.
         joint: String,

@@ -85,7 +85,7 @@ pub(crate) fn propose(link: &Candidate<'_>) -> Result<BeamSection, String> {
     };
     let Some(ends) = ends::of(link) else { return Err(reason) };
     let mut section = between(link, ends).map_err(|why| match why {
-        NoBeam::Else(own) => format!("its shape between the joint axes: {own}"),
+        NoBeam::Else(own) => format!("its geometry between the joint axes: {own}"),
         NoBeam::NotThere(_) => reason,
     })?;
     section.ends = Some(ends.map(|end| (end + Vector3::from(section.offset)).into()));
@@ -112,25 +112,30 @@ fn between(link: &Candidate<'_>, [from, to]: [Vector3<f64>; 2]) -> Result<BeamSe
     let axis = to - from;
     let length = axis.norm();
     if length < SHARE * link.arm || length < 1e-3 {
-        return Err(NoBeam::NotThere(format!("short: {:.0} mm of the arm's {:.0} mm", 1e3 * length, 1e3 * link.arm)));
+        return Err(NoBeam::NotThere(format!(
+            "too short: {:.0} mm of the arm's {:.0} mm",
+            1e3 * length,
+            1e3 * link.arm
+        )));
     }
     let Some(inertia) = link.inertia.filter(|i| i.mass > 0.0) else {
-        return Err(NoBeam::Else("its mass is not known".into()));
+        return Err(NoBeam::Else("its mass is unknown".into()));
     };
     if link.meshes.is_empty() {
-        return Err(NoBeam::Else("it has no shape that can be read".into()));
+        return Err(NoBeam::Else("it has no readable geometry".into()));
     }
     let cuts = Cuts::of(link.meshes, &from, &axis)?;
     let along = cuts.along(length);
     let aside = cuts.centroid(length).norm();
     if along < ALONG || aside > BESIDE * length {
         let where_is_it = if along < ALONG {
-            format!("is there along {:.0} % of the way only", 100.0 * along)
+            format!("covers only {:.0} % of the distance", 100.0 * along)
         } else {
-            format!("lies {:.0} mm beside it", 1e3 * aside)
+            format!("is offset by {:.0} mm", 1e3 * aside)
         };
         return Err(NoBeam::NotThere(format!(
-            "from its frame to joint {:?} its shape {where_is_it}: the frames of the file do not run along the link",
+            "between its frame and joint {:?} its geometry {where_is_it}: the frames of the file are not along the \
+             link",
             link.distal.name
         )));
     }
@@ -139,20 +144,20 @@ fn between(link: &Candidate<'_>, [from, to]: [Vector3<f64>; 2]) -> Result<BeamSe
     let outlines = cuts.outlines(turn, shape);
     let thick = weighted(&outlines, length, |o| o.width.max(o.height));
     if length < SLENDER * thick {
-        return Err(format!("stout: {:.0} mm long, {:.0} mm thick", 1e3 * length, 1e3 * thick).into());
+        return Err(format!("not slender: {:.0} mm long, {:.0} mm thick", 1e3 * length, 1e3 * thick).into());
     }
     let (material, wall) = wall(&outlines, shape, inertia.mass)?;
     let mut section = equivalent(&outlines, shape, length, wall);
     section.material = material;
     if section.taper > TAPER {
         let taper = section.taper;
-        return Err(format!("its width varies by a factor of {taper:.1} between the joints: no beam").into());
+        return Err(format!("its width varies by a factor of {taper:.1} between the joints: not a beam").into());
     }
     let density = MATERIALS.iter().find(|m| m.0 == material).map_or(2700.0, |m| m.1);
     let whole = shell(&outlines, shape, wall);
     let own = shell_between(&outlines, shape, length, wall);
     if own < OWN * whole {
-        return Err(format!("only {:.0} % of its mass lies between the joints", 100.0 * own / whole).into());
+        return Err(format!("only {:.0} % of its mass is between the joints", 100.0 * own / whole).into());
     }
     section.wall_of_half = section.wall.and_then(|_| wall_for(&outlines, shape, 0.5 * inertia.mass / density));
     let R_LS = cuts.X_LS.rotation * Rotation3::from_axis_angle(&Vector3::x_axis(), turn);
@@ -201,7 +206,7 @@ impl Cuts {
         let places = || meshes.iter().flat_map(|m| &m.positions).map(along);
         let (low, high) = (places().fold(f64::INFINITY, f64::min), places().fold(f64::NEG_INFINITY, f64::max));
         if high - low < 1e-4 {
-            return Err("its shape is flat".into());
+            return Err("its geometry is flat".into());
         }
         let step = (high - low) / CUTS as f64;
         let cut = |k: usize| {
@@ -366,7 +371,8 @@ fn wall(outlines: &[Outline], shape: Shape, mass: f64) -> Result<(&'static str, 
         let Some(wall) = wall_for(outlines, shape, mass / density) else { continue };
         if wall < THINNEST {
             return Err(format!(
-                "its {mass:.3} kg would be a wall of {:.2} mm of {words} around its shape: the mass does not fit the mesh",
+                "its {mass:.3} kg would be a wall of {:.2} mm of {words} around its outline: the mass does not \
+                 match the mesh",
                 1e3 * wall
             ));
         }
@@ -374,7 +380,7 @@ fn wall(outlines: &[Outline], shape: Shape, mass: f64) -> Result<(&'static str, 
     }
     let solid = shell(outlines, shape, f64::INFINITY);
     Err(format!(
-        "its mass contradicts its mesh: {mass:.2} kg within {:.2} litres, a solid of steel would have {:.2} kg",
+        "its mass contradicts its mesh: {mass:.2} kg in {:.2} litres, solid steel would have {:.2} kg",
         1e3 * solid,
         7850.0 * solid
     ))
@@ -570,7 +576,7 @@ mod tests {
         assert!(of(0.1).unwrap_err().contains("wall of"));
         let aside = Pose::from_parts(Translation3::new(0.0, 0.0, 0.9), Rotation3::identity());
         let frames = candidate(20.0, std::slice::from_ref(&mesh), aside).unwrap_err();
-        assert!(frames.contains("do not run along"), "{frames}");
+        assert!(frames.contains("are not along the link"), "{frames}");
         let short = Pose::from_parts(Translation3::new(0.1, 0.0, 0.0), Rotation3::identity());
         assert!(candidate(20.0, &[mesh], short).unwrap_err().contains("stout"));
         let wide = Geometry::Sphere { radius: 0.2 }.triangles().unwrap();

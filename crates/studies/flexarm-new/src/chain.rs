@@ -151,13 +151,13 @@ pub(crate) fn find(mechanism: &Mechanism, options: &NewOptions) -> Result<Chain,
     }
     let reason = |k: usize| {
         if path.contains(&k) {
-            "not asked for"
+            "not requested"
         } else if whole.contains(&k) {
             "before the base of the arm"
         } else if is_of_hand(tree.joint(k)) {
             "part of a gripper or hand"
         } else {
-            "not on the way from base to tool"
+            "not on the path from base to tool"
         }
     };
     let others = (0..mechanism.joints.len()).filter(|k| is_free(tree.joint(*k)) && !joints.contains(k));
@@ -242,7 +242,7 @@ fn choose_tool(tree: &Tree<'_>, base: &str, choices: &mut Vec<String>) -> Result
         .collect();
     if !equals.is_empty() {
         choices.push(format!(
-            "the arm that ends at {:?} was taken; {} others have as many joints, with the tools {}",
+            "the arm that ends at {:?} was chosen; {} others have the same number of joints, with the tools {}",
             best.tool,
             equals.len(),
             equals.join(", ")

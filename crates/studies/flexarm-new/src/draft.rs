@@ -170,7 +170,7 @@ impl Draft {
             self.links[k].uniform = true;
             if let Err(error) = loads(self, &[&self.links[k]]) {
                 let reason = error.to_string();
-                self.links[k].section = Err(format!("it cannot be put in place: {reason}"));
+                self.links[k].section = Err(format!("the beam cannot be used: {reason}"));
             }
         }
         self.assumptions = assumptions(self);
@@ -284,8 +284,8 @@ fn joints(model: &Model, mechanism: &Mechanism, chain: &Chain, workspace: &Works
     let weak = |j: &DraftJoint| j.joint.limits.effort < j.weight;
     if joints.len() > 2 && joints.iter().all(same) {
         let (weak, faulty) = (joints.iter().any(weak), joints.iter().any(|j| j.effort_fault.is_some()));
-        let too_little = "is the same for all joints and below what the arm needs to hold itself";
-        let too_much = "is the same for all joints and far above what some of them can need";
+        let too_little = "is the same for all joints and below the torque that holds the arm against gravity";
+        let too_much = "is the same for all joints and far above the torque that some of them can require";
         for joint in &mut joints {
             joint.effort_fault = match joint.effort_fault {
                 _ if weak => Some(too_little),
@@ -380,20 +380,22 @@ fn shapes(urdf: &UrdfRobot, link: &str) -> (Vec<TriangleMesh>, bool) {
 fn assumptions(draft: &Draft) -> Vec<Assumption> {
     let mut list = Vec::new();
     for choice in &draft.chain.choices {
-        list.push(assumption("the arm", choice.clone(), &format!("{} LINK chooses another one", Setting::Tool)));
+        list.push(assumption("the arm", choice.clone(), &format!("choose another one with {} LINK", Setting::Tool)));
     }
     for link in &draft.waived {
-        let text = "its moments of inertia are such as no body has (the largest is above the sum of the others); taken as they are";
+        let text = "its moments of inertia are physically impossible (the maximum is above the sum of the others); \
+                    used unchanged";
         list.push(assumption(&format!("link {link:?}"), text.into(), "correct them in the description"));
     }
     masses(draft, &mut list);
     if !draft.payload_known && draft.payload.mass == 0.0 {
-        let text = "none: the effort limits leave no room for one".to_owned();
+        let text = "none: the effort limits do not allow one".to_owned();
         list.push(assumption("payload", text, &format!("{} KG, or payload in robot.toml", Setting::Payload)));
     }
     if !draft.payload_known && draft.payload.mass > 0.0 {
         let text = format!(
-            "{} kg, at most 15 % of what moves ({:.1} kg) and what the effort limits carry, a cube of aluminium at the tool",
+            "{} kg, at most 15 % of the moving mass ({:.1} kg) and within the effort limits, an aluminium cube at \
+             the tool",
             draft.payload.mass, draft.moving_mass
         );
         list.push(assumption("payload", text, &format!("{} KG, or payload in robot.toml", Setting::Payload)));
@@ -402,28 +404,29 @@ fn assumptions(draft: &Draft) -> Vec<Assumption> {
         let name = format!("joint {:?}", joint.joint.name);
         if joint.speed_assumed {
             let unit = if joint.joint.kind.slides() { "m/s" } else { "rad/s" };
-            let text = format!("its speed limit is not known; the sample motion takes {} {unit}", joint.speed);
-            list.push(assumption(&name, text, "write it into the description, or [limits] of motion.toml"));
+            let text = format!("its speed limit is unknown; the sample motion uses {} {unit}", joint.speed);
+            list.push(assumption(&name, text, "add it to the description, or to [limits] of motion.toml"));
         }
         if let Some(gear) = &joint.gear {
             let of = match joint.effort_fault {
                 None => format!("its effort limit {:.4} N m", joint.joint.limits.effort),
                 Some(why) => format!(
-                    "what the arm needs, {:.0} N m of weight and {:.0} N m in motion, for its effort limit {why}",
+                    "the required torque, {:.0} N m against gravity and {:.0} N m in motion, because its effort \
+                     limit {why}",
                     joint.weight, joint.needed
                 ),
             };
             let text = format!(
-                "its reducer has {:.3e} N m/rad ({:.1e} to {:.1e}), that of a class of {:.0} N m rated torque from {of}",
+                "its reducer has {:.3e} N m/rad ({:.1e} to {:.1e}), typical of a rated torque of {:.0} N m, from {of}",
                 gear.stiffness, gear.low, gear.high, joint.rated
             );
-            list.push(assumption(&name, text, "ask the maker for its torsional stiffness, or measure it"));
+            list.push(assumption(&name, text, "ask the manufacturer for its torsional stiffness, or measure it"));
         }
     }
     for link in &draft.links {
         if let Ok(section) = &link.section {
             let text = format!(
-                "it bends as a {}, all of its {:.2} kg being wall of {}",
+                "it is modelled as a {}, assuming that all of its {:.2} kg is structural, of {}",
                 text::section_words(section),
                 link.mass.unwrap_or(0.0),
                 section.material
@@ -442,39 +445,35 @@ fn masses(draft: &Draft, list: &mut Vec<Assumption>) {
     let own: f64 = draft.urdf.mechanism.links.iter().filter_map(|l| l.inertia).map(|i| i.mass).sum();
     let which = match draft.discarded.is_empty() {
         true => "links without <inertial>",
-        false => "links without <inertial> or with a mass that only held a place",
+        false => "links without <inertial> or with a placeholder mass",
     };
     match draft.estimate {
         Some(flexarm_urdf::InertiaEstimate::TotalMass(mass)) => {
             let text = format!(
-                "{which} have {mass} kg together, spread by the volumes of their meshes or by their lengths; all links together {own:.1} kg"
+                "{which} have {mass} kg in total, distributed by the volumes of their meshes or by their lengths; \
+                 all links have {own:.1} kg in total"
             );
-            list.push(assumption("masses", text, "replace by those of the maker"));
+            list.push(assumption("masses", text, "use the masses of the manufacturer"));
         }
         Some(flexarm_urdf::InertiaEstimate::Density(density)) => {
-            let text = format!("{which} are solid with {density} kg/m³");
-            list.push(assumption("masses", text, "replace by those of the maker"));
+            let text = format!("{which} are solid bodies with {density} kg/m³");
+            list.push(assumption("masses", text, "use the masses of the manufacturer"));
         }
         None => {}
     }
     if draft.idle_estimate {
         let text = format!(
-            "no link lacks a mass, so none was estimated: those of the description count, {own:.1} kg together"
+            "no link lacks a mass, so none was estimated: the masses of the description are used, {own:.1} kg in total"
         );
-        list.push(assumption(
-            "masses",
-            text,
-            "take <inertial> out of the description if its masses are not to be trusted",
-        ));
+        list.push(assumption("masses", text, "remove <inertial> from the description if its masses are unreliable"));
     }
     let alike = placeholders(&draft.urdf.mechanism);
     let mass = alike.first().and_then(|name| draft.urdf.mechanism.link(name)?.inertia).map_or(0.0, |i| i.mass);
     if !alike.is_empty() && draft.discarded.is_empty() {
-        let text =
-            format!("{} links have {mass} kg each: this number only holds the place of their masses", alike.len());
+        let text = format!("{} links have {mass} kg each, which is a placeholder", alike.len());
         let mend = format!(
-            "{} KG spreads the mass of the arm over these links, by the volumes of their meshes or by their lengths; best the \
-             masses of the maker",
+            "distribute the mass of the arm over these links with {} KG, by the volumes of their meshes or by \
+             their lengths; ideally use the masses of the manufacturer",
             Setting::InertiaFromTotalMass
         );
         list.push(assumption("masses", text, &mend));
@@ -484,7 +483,11 @@ fn masses(draft: &Draft, list: &mut Vec<Assumption>) {
         list.push(assumption(
             "masses",
             finding.message.clone(),
-            &format!("{} KG or {} KG_PER_M3 estimate them", Setting::InertiaFromTotalMass, Setting::InertiaFromDensity),
+            &format!(
+                "estimate them with {} KG or {} KG_PER_M3",
+                Setting::InertiaFromTotalMass,
+                Setting::InertiaFromDensity
+            ),
         ));
     }
 }
@@ -494,33 +497,35 @@ fn questions(draft: &Draft) -> Vec<String> {
     let turning: Vec<&str> = draft.joints.iter().filter(|j| j.gear.is_some()).map(|j| j.joint.name.as_str()).collect();
     if !turning.is_empty() {
         list.push(format!(
-            "torsional stiffness of the reducers of {}, in N m/rad at the output (or N m per minute of arc: times 3438); ask \
-             for the type of reducer if nothing else: its catalogue has the number",
+            "torsional stiffness of the reducers of {}, in N m/rad at the output (or N m per arc minute, times \
+             3438); at least the type of reducer, whose catalogue gives the value",
             turning.join(", ")
         ));
     }
     if !draft.payload_known {
-        list.push("mass, centre of mass and inertia of what the tool carries".into());
+        list.push("mass, centre of mass and inertia of the payload".into());
     }
     for link in draft.beams_with_sections() {
         list.push(format!(
-            "link {:?}: wall thickness and material of the casting, and how much of its mass is casting (motors and gears \
-             do not stiffen it); best a CAD model to be meshed",
+            "link {:?}: wall thickness and material of the casting, and the share of the casting in its mass \
+             (motors and gears add no stiffness); ideally a CAD model for meshing",
             link.link
         ));
     }
     let unsure: Vec<&str> =
         draft.joints.iter().filter(|j| j.effort_fault.is_some()).map(|j| j.joint.name.as_str()).collect();
     if !unsure.is_empty() {
-        list.push(format!("largest torque of {}", unsure.join(", ")));
+        list.push(format!("maximum torque of {}", unsure.join(", ")));
     }
     let slow: Vec<&str> = draft.joints.iter().filter(|j| j.speed_assumed).map(|j| j.joint.name.as_str()).collect();
     if !slow.is_empty() {
-        list.push(format!("largest speed of {}", slow.join(", ")));
+        list.push(format!("maximum speed of {}", slow.join(", ")));
     }
     if draft.estimate.is_some() || draft.assumptions.iter().any(|a| a.about == "masses") {
         list.push("mass, centre of mass and inertia of each link".into());
     }
-    list.push("the sag of the tool under a known weight hung on it, in one or two poses: with it the numbers above can be judged".into());
+    list.push(
+        "static deflection of the TCP under a known weight, in one or two poses, to validate the numbers above".into(),
+    );
     list
 }

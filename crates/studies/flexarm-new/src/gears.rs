@@ -66,8 +66,9 @@ pub(crate) fn class(rated: f64) -> GearClass {
         let (stiffness, sizes, is_beyond) = between(&rows, rated, "RV-", "E");
         let [low, high] = IDENTIFIED.map(|factor| factor * stiffness);
         let source = format!(
-            "cycloidal reducers, figures of Nabtesco's series RV-E, {sizes} (compare with the maker's sheet); low and high: what main axes were identified at over this \
-             (KR 210, KR 300 and KR 500 in robots/)"
+            "cycloidal reducers, data of Nabtesco's RV-E series, {sizes} (compare with the manufacturer's data \
+             sheet); low and high: identified stiffness of main axes relative to these data (KR 210, KR 300 and KR \
+             500 in robots/)"
         );
         return GearClass { stiffness, low, high, source, is_beyond };
     }
@@ -77,8 +78,8 @@ pub(crate) fn class(rated: f64) -> GearClass {
     let (low, sizes, is_beyond) = between(&rows(|row| row.2), rated, "CSG-", "");
     let (high, ..) = between(&rows(|row| row.3), rated, "CSG-", "");
     let source = format!(
-        "strain-wave gears, figures of Harmonic Drive's series CSG, ratio 80 and above, {sizes} (compare with the maker's sheet); low: K1 at small torque, high: K3 at \
-         large torque"
+        "strain-wave gears, data of Harmonic Drive's CSG series, ratio 80 and above, {sizes} (compare with the \
+         manufacturer's data sheet); low: K1 at small torque, high: K3 at large torque"
     );
     GearClass { stiffness: (low * high).sqrt(), low, high, source, is_beyond }
 }
@@ -90,11 +91,11 @@ fn between(rows: &[(f64, f64, f64)], rated: f64, before: &str, after: &str) -> (
     let above = rows.iter().position(|row| row.1 >= rated);
     match above {
         Some(0) => {
-            (rows[0].2 * rated / rows[0].1, format!("in proportion below {}", name(&rows[0])), rated < rows[0].1)
+            (rows[0].2 * rated / rows[0].1, format!("scaled in proportion below {}", name(&rows[0])), rated < rows[0].1)
         }
         None => {
             let last = rows[rows.len() - 1];
-            (last.2 * rated / last.1, format!("in proportion above {}", name(&last)), true)
+            (last.2 * rated / last.1, format!("scaled in proportion above {}", name(&last)), true)
         }
         Some(k) => {
             let (a, b) = (rows[k - 1], rows[k]);

@@ -61,7 +61,7 @@ pub struct NewOptions {
 #[non_exhaustive]
 pub enum NewError {
     /// A file of another format.
-    #[error("{path}: this is {what}, a URDF or xacro file is needed; {help}")]
+    #[error("{path}: this is {what}, a URDF or xacro file is required; {help}")]
     OtherFormat {
         /// Path of the file.
         path: String,
@@ -74,7 +74,11 @@ pub enum NewError {
     #[error(
         "robot {robot:?} has no joint that moves: {}; an arm needs at least one joint of type revolute, continuous or prismatic \
          whose lower limit is below its upper one",
-        if *fixed == 0 { "it has no joints at all".to_owned() } else { format!("all its {fixed} joints are fixed, followers or without range") }
+        if *fixed == 0 {
+            "it has no joints at all".to_owned()
+        } else {
+            format!("all of its {fixed} joints are fixed, mimic joints or without range")
+        }
     )]
     NoMovableJoint {
         /// Name of the robot.
@@ -95,13 +99,13 @@ pub enum NewError {
         tool: String,
     },
     /// No joint moves below the base.
-    #[error("no joint moves behind the base {base:?}; choose another one with {}", Setting::Base)]
+    #[error("there is no movable joint after the base {base:?}; choose another base with {}", Setting::Base)]
     NothingBelow {
         /// Base link.
         base: String,
     },
     /// The tool is not below the base.
-    #[error("the tool {tool:?} does not hang on the base {base:?}: no chain of joints leads from one to the other")]
+    #[error("the tool {tool:?} is not connected to the base {base:?} by a chain of joints")]
     NotBelow {
         /// Base link.
         base: String,
@@ -119,7 +123,7 @@ pub enum NewError {
         known: Vec<String>,
     },
     /// A joint that does not exist or does not move independently.
-    #[error("the robot has no joint {joint:?} that moves by itself; {}", did_you_mean(closest, "joints", known))]
+    #[error("the robot has no joint {joint:?} that moves independently; {}", did_you_mean(closest, "joints", known))]
     NoJoint {
         /// Name requested.
         joint: String,
@@ -130,9 +134,9 @@ pub enum NewError {
     },
     /// No moving link has a mass.
     #[error(
-        "no link of the arm has a mass in this file ({links} links without <inertial>): nothing would weigh or bend. Give the mass \
-         of the arm from its data sheet with {} KG: it is spread over the links by the volume of their meshes; or a density with \
-         {} KG_PER_M3",
+        "no link of the arm has a mass in this file ({links} links without <inertial>): without mass there are no \
+         loads and no deflections. Give the mass of the arm from its data sheet with {} KG: it is distributed over \
+         the links by the volume of their meshes; or a density with {} KG_PER_M3",
         Setting::InertiaFromTotalMass,
         Setting::InertiaFromDensity
     )]

@@ -142,13 +142,13 @@ impl Workspace {
 /// * `floor`: minimum effort of a joint of this arm.
 pub(crate) fn effort_fault(effort: f64, weight: f64, needed: f64, floor: f64) -> Option<&'static str> {
     if !effort.is_finite() {
-        Some("has none")
+        Some("is missing")
     } else if effort <= 0.0 {
         Some("is zero")
     } else if effort < weight {
-        Some("is below what the arm needs to hold itself")
+        Some("is below the torque that holds the arm against gravity")
     } else if effort > SENSELESS * needed.max(floor) {
-        Some("is far above what the arm can need")
+        Some("is far above the torque that the arm can require")
     } else {
         None
     }

@@ -65,15 +65,15 @@ pub(crate) fn refuse_other_formats(path: &Path) -> Result<(), Error> {
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let text = String::from_utf8_lossy(&head);
     let root = |name: &str| text.contains(&format!("<{name} ")) || text.contains(&format!("<{name}>"));
-    let usd = "export it as URDF from the program it was made with (Isaac Sim has an exporter to URDF)";
+    let usd = "export it as URDF from the program it was made with (Isaac Sim has a URDF exporter)";
     match ending.as_str() {
         _ if head.starts_with(b"PXR-USDC") || head.starts_with(b"#usda") || ending == "usdz" => is("a USD file", usd),
-        "toml" => is("a robot file already", "run it with flexarm compare, or give the description it refers to"),
+        "toml" => is("already a robot file", "run it with flexarm compare, or give the description it refers to"),
         "stl" | "dae" | "obj" | "glb" | "gltf" | "step" | "stp" => {
-            is("a mesh or drawing", "give the URDF that refers to it; for one link alone: flexarm reduce")
+            is("a mesh or drawing", "give the URDF that refers to it; for a single link use flexarm reduce")
         }
         _ if root("sdf") && !root("robot") => {
-            is("an SDF file", "export the robot as URDF; SDF that came from a URDF: give that one")
+            is("an SDF file", "export the robot as URDF; if the SDF was made from a URDF, give that URDF")
         }
         _ if root("mujoco") && !root("robot") => {
             is("an MJCF file of MuJoCo", "give the URDF it was made from, or convert it (mjcf2urdf)")
@@ -121,7 +121,7 @@ pub(crate) fn place(draft: &Draft, urdf: &Path, folder: &Path, options: &NewOpti
             (name.clone(), path.unwrap_or_else(|| to.display().to_string()))
         });
         return Ok(Placed {
-            words: format!("the description stays where it is: urdf = {reference:?}, relative to this folder"),
+            words: format!("the description is not copied: urdf = {reference:?}, relative to this folder"),
             reference,
             robot_path,
             packages: packages.collect(),

@@ -109,7 +109,7 @@ pub(crate) fn sample_motion(model: &Model, workspace: &Workspace, axes: &[Axis])
         }
     }
     if wish == 3 {
-        motion.notes.push("the effort limits do not hold the arm in the poses of the motion".into());
+        motion.notes.push("the effort limits are too low to hold the arm in the poses of the motion".into());
     }
     if rests.is_empty() {
         rests.extend(poses.first().cloned());
@@ -121,7 +121,7 @@ pub(crate) fn sample_motion(model: &Model, workspace: &Workspace, axes: &[Axis])
         let from = motion.rests[motion.rests.len() - 1].at.clone();
         let (duration, kept) = duration(model, &mut data, &rests[0].q, axes, [&from, &at]);
         if !kept {
-            motion.notes.push(format!("the effort limits are passed on the way to rest {}", motion.rests.len()));
+            motion.notes.push(format!("the effort limits are exceeded on the way to stop {}", motion.rests.len()));
         }
         motion.rests.push(Rest { at, duration });
     }
