@@ -84,7 +84,7 @@ fn every_format_brings_the_link_back() {
             let error = difference(&flex::stiffness_6(), &matrix(&back["stiffness"]));
             assert!(error < bound, "{format} {units}: {error:.1e}");
             assert!((numbers(&back["interfaces"][1]["position_m"])[0] - 0.8).abs() < 1e-9);
-            assert!(place.text(&format!("{into}/report.md")).contains("force under rigid motion"));
+            assert!(place.text(&format!("{into}/report.md")).contains("force under rigid-body motion"));
         }
     }
 }
@@ -298,14 +298,14 @@ fn a_sid_needs_modes_and_nodes() {
     place.refused(&["export", "bar.flex", "--format", "sid", "--units", "m-kg-s", "-o", "out"], &words);
     let link = common::shipped_robot("lower_arm/lower_arm.flex");
     let export = ["export", &link, "--format", "sid", "--units", "m-kg-s", "-o", "out"];
-    place.refused(&[&export[..], &["--nodes", "1"]].concat(), &["--nodes", "2 different numbers"]);
+    place.refused(&[&export[..], &["--nodes", "1"]].concat(), &["--nodes", "2 distinct numbers"]);
     place.json(&export);
     place.refused(&export, &["exists already", "--force"]);
     let import = ["import", "out/lower_arm.SID_FEM", "--units", "m-kg-s", "--no-files", "--map"];
     for (map, words) in [
         ("A=1,B=3", &["no node 3", "[1, 2]"][..]),
         ("A=1,B=1", &["node 1 twice"]),
-        ("A=1", &["two nodes or more"]),
+        ("A=1", &["at least two nodes"]),
         ("A=#1-6,B=#7-12", &["A=1,B=2"]),
     ] {
         place.refused(&[&import[..], &[map]].concat(), words);
@@ -321,7 +321,7 @@ fn a_sid_needs_modes_and_nodes() {
         "-o",
         "two",
     ]);
-    assert!(said["warnings"][0].as_str().unwrap().contains("ride on the link"), "{said}");
+    assert!(said["warnings"][0].as_str().unwrap().contains("attached bodies of"), "{said}");
 }
 
 /// Truth: a cantilever of the sample's figures with its own weight; see `shared/fe` for its origin.

@@ -286,9 +286,9 @@ fn a_reduction_names_its_flags() {
             ),
             (
                 &with(&["--name", "a/b"]),
-                "\"a/b\" is no name for a link: give one that can be part of a file name (--name)",
+                "\"a/b\" is not a valid link name: use one that can be part of a file name (--name)",
             ),
-            (&with(&["--modes", "5000"]), "--modes 5000: at most 1000 can be kept"),
+            (&with(&["--modes", "5000"]), "--modes 5000: at most 1000 modes can be kept"),
             (&with(&["--modes-up-to", "-1"]), "--modes-up-to -1: a positive frequency in Hz is expected"),
             (&with(&["--chains", "1"]), "--chains 1: a chain has 2 to 100 parts"),
             (&with(&["--merge", "-1"]), "merge = -1: a distance of zero or more, in the unit of the mesh"),
@@ -316,7 +316,7 @@ fn an_import_and_an_export_name_their_flags() {
         &[
             (
                 &["f", "--nodes", "1,1"],
-                "--nodes has [1, 1]; 2 different numbers between 1 and 99999999 are needed, one per interface, proximal first",
+                "--nodes has [1, 1]; 2 distinct numbers between 1 and 99999999 are required, one per interface, proximal first",
             ),
             (&["e"], "e/bar.op4: exists already and is not overwritten: choose another place, or give --force"),
         ],
@@ -325,13 +325,13 @@ fn an_import_and_an_export_name_their_flags() {
         (["--units", "m-kg-s"], ["--map", "A=#1-6,B=#7-12"], ["--at", "A=0,0,0", "--at", "B=0.8,0,0"]);
     let mass = ["--mass", "1.728", "--com", "0.4,0,0", "--inertia", "0.0003,0.0924,0.0922,0,0,0"];
     let with = |more: &[&'static str]| [&units[..], &map, &at, &mass, more].concat();
-    let no_place = "e/bar.op4: where the interfaces are is not in the file (unit of the file, link axes): the stiffness itself \
-                    says, from A: B at (0.800000, 0.000000, 0.000000); if A is the origin of the link: --at A=0,0,0 --at \
+    let no_place = "e/bar.op4: the file does not contain the interface positions (unit of the file, link axes): the stiffness \
+                    implies, relative to A: B at (0.800000, 0.000000, 0.000000); if A is the origin of the link: --at A=0,0,0 --at \
                     B=0.800000,0.000000,0.000000";
-    let no_map = "e/bar.op4: which rows are interface A and which B is not said: if the proximal interface comes first: --map \
+    let no_map = "e/bar.op4: the rows of interfaces A and B are not specified: if the proximal interface comes first: --map \
                   \"A=#1-6,B=#7-12\"";
     let no_units = "e/bar.op4: the units of the file are not declared: --units LENGTH-MASS-TIME, such as --units m-kg-s (N, Pa) \
-                    or --units mm-t-s (N, MPa); no matrix says them itself";
+                    or --units mm-t-s (N, MPa); matrix files do not contain them";
     refused(
         &place,
         &["import", "e/bar.op4", "--no-files"],
@@ -342,7 +342,7 @@ fn an_import_and_an_export_name_their_flags() {
             (&with(&["--at", "A=0,0,0"]), "--at A=... is given twice"),
             (
                 &with(&["--format", "dmig"]),
-                "e/bar.op4: is Nastran OP4 text by its content, --format says otherwise: leave it out",
+                "e/bar.op4: is Nastran OP4 text according to its content, but --format gives another format: omit it",
             ),
             (
                 &[&units[..], &map, &["--at", "A=0,0,0", "--at", "B=0,0,0"]].concat(),
@@ -350,7 +350,7 @@ fn an_import_and_an_export_name_their_flags() {
             ),
         ],
     );
-    let modes = "--modes only counts for full models; these matrices are reduced already";
+    let modes = "--modes applies only to full models; these matrices are already reduced";
     told(&place, &[&["import", "e/bar.op4", "--no-files"], &with(&["--modes", "3"])[..]].concat(), &[modes]);
     // A sidecar beside the matrices says units and places; what the user says counts.
     let matrices = ["export", "bar.flex", "--format", "matrix-market", "--units", "m-kg-s", "-o", "m"];
@@ -360,8 +360,8 @@ fn an_import_and_an_export_name_their_flags() {
         &place,
         &[&otherwise[..], &["--mass", "1.7", "--com", "0.004,0,0", "--inertia", "0.0003,0.09,0.09,0,0,0"]].concat(),
         &[
-            "the sidecar says the units are m-kg-s, the command line cm-kg-s, which counts",
-            "interface B: its place in the sidecar is [0.8, 0.0, 0.0], --at says [0.8, 0.0, 1e-5], which counts",
+            "the units are m-kg-s in the sidecar and cm-kg-s from the command line; the latter are used",
+            "interface B: its position in the sidecar is [0.8, 0.0, 0.0], --at gives [0.8, 0.0, 1e-5], which is used",
         ],
     );
 }

@@ -68,7 +68,7 @@ fn new_says_how_to_go_on_where_it_cannot() {
         &["no link of the arm has a mass", "--inertia-from-total-mass KG"],
     );
     place.refused(&["new", "two.urdf", "--tool", "tool1", "--mass", "9"], &["did you mean \"tool0\"?"]);
-    place.refused(&["new", "robot.toml"], &["a robot file already"]);
+    place.refused(&["new", "robot.toml"], &["already a robot file"]);
     place.refused(&["new", "none.urdf"], &["none.urdf", "no such file"]);
     let answer = place.json(&["new", "two.urdf", "-o", "made", "--inertia-from-total-mass", "12", "--no-run"]);
     assert!(answer["summary"].is_null());

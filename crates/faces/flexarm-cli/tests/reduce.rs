@@ -537,7 +537,7 @@ mod refused {
             (&["--material", "aluminium"], &["--material", "twice"]),
             (&["--quadrature", "gauss"], &["calculix"]),
             (&["--urdf", "beam.urdf"], &["--link"]),
-            (&["--name", ""], &["no name for a link", "--name"]),
+            (&["--name", ""], &["not a valid link name", "--name"]),
             (&["--split", "1"], &["elastic joint", "another place for the split"]),
         ] {
             place.refused(&[&SOUND[..], extra].concat(), words);

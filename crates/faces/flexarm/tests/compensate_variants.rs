@@ -73,7 +73,7 @@ fn servos_that_lag_and_sag_are_told_ahead_of_it() {
         drive.servo.position_gain = Some(0.0);
     }
     let error = compensate_motion(&robot, &motion, &servo()).unwrap_err().to_string();
-    assert!(error.contains("joint_a1") && error.contains("holds no position"), "{error}");
+    assert!(error.contains("joint_a1") && error.contains("does not control position"), "{error}");
 }
 
 /// A folder that goes away.

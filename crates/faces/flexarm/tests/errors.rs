@@ -101,7 +101,7 @@ fn what_the_link_maker_finds_has_one_place_beside_what_the_rest_finds() {
         matches!(error, Error::Link(LinkError::Job(JobError::TooManyModes { found: 2000, most: 1000 }))),
         "{error}"
     );
-    assert_eq!(error.to_string(), "modes 2000: at most 1000 can be kept");
+    assert_eq!(error.to_string(), "modes 2000: at most 1000 modes can be kept");
     // The robot of a job is read by the facade.
     let urdf =
         UrdfEntry { file: root().join("robots/kr210/no_such.urdf"), link: "link_2".into(), ..UrdfEntry::default() };

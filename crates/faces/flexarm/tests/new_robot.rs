@@ -263,7 +263,7 @@ fn an_arm_without_any_mass_is_refused_until_its_mass_is_given() {
     let found = codes(&made);
     assert!(found.iter().all(|code| code == "estimated-inertia"), "{found:?}");
     assert!((made.moving_mass_kg / 60.0 - 1.0).abs() < 1e-9, "{}", made.moving_mass_kg);
-    assert!(made.assumptions.iter().any(|a| a.about == "masses" && a.text.contains("60 kg together")));
+    assert!(made.assumptions.iter().any(|a| a.about == "masses" && a.text.contains("60 kg in total")));
 }
 
 /// Five links in a row, all of this mass (kg), with or without shapes.
@@ -410,8 +410,8 @@ fn fingers_are_held_and_of_two_arms_one_moves() {
 #[test]
 fn missing_and_senseless_limits_are_told_and_the_motion_keeps_what_it_can() {
     let limits: [(&str, Option<&'static str>, &str); 6] = [
-        ("none", None, "has none"),
-        ("zeros", Some(r#"lower="-3" upper="3" effort="0" velocity="0""#), "has none"),
+        ("none", None, "is missing"),
+        ("zeros", Some(r#"lower="-3" upper="3" effort="0" velocity="0""#), "is missing"),
         ("endless", Some(r#"lower="-3" upper="3" effort="1e30" velocity="2""#), "is far above"),
         (
             "one for all",
@@ -445,13 +445,15 @@ fn shapes_for_collisions_serve_where_there_are_no_others() {
     assert_eq!(codes(&made), [""; 0]);
     assert!(made.links.iter().any(|l| l.name == "upper" && l.section == Some("box")), "{:?}", made.links);
     let text = std::fs::read_to_string(&made.robot).unwrap();
-    assert!(text.contains("shapes for collisions"));
+    assert!(text.contains("collision geometry"));
     let folder = Folder::new("no-shapes");
     let bare = ARM.urdf("").replace("visual", "sensor");
     let bare = self::made(&folder, &bare, &NewOptions::default());
     assert_eq!(codes(&bare), [""; 0]);
     assert!(
-        bare.links.iter().all(|l| l.reason.as_ref().is_some_and(|r| r.contains("no shape") || r.contains("short")))
+        bare.links
+            .iter()
+            .all(|l| l.reason.as_ref().is_some_and(|r| r.contains("no readable geometry") || r.contains("short")))
     );
 }
 
@@ -460,7 +462,7 @@ fn inertias_that_no_body_has_are_taken_as_they_are_and_told() {
     let folder = Folder::new("odd");
     let made = made(&folder, &Arm { odd: 2.5, ..ARM }.urdf(""), &NewOptions::default());
     codes(&made);
-    assert!(made.assumptions.iter().any(|a| a.text.contains("such as no body has")), "{:?}", made.assumptions);
+    assert!(made.assumptions.iter().any(|a| a.text.contains("physically impossible")), "{:?}", made.assumptions);
     assert!(std::fs::read_to_string(&made.robot).unwrap().contains("waive_inertia = ["));
 }
 
@@ -489,7 +491,7 @@ fn what_is_no_robot_description_is_named_with_what_to_do() {
         ("a.xml", "<mujoco model=\"m\"><worldbody/></mujoco>", "an MJCF file"),
         ("a.usda", "#usda 1.0\ndef Xform \"robot\" {}", "a USD file"),
         ("a.usd", "PXR-USDC\0\0\0", "a USD file"),
-        ("robot.toml", "format = 1", "a robot file already"),
+        ("robot.toml", "format = 1", "already a robot file"),
         ("a.stl", "solid x\nendsolid x", "a mesh"),
     ];
     for (name, text, what) in cases {

@@ -1,11 +1,11 @@
-//! What a sample of a run costs in each format: processor time and bytes.
+//! Cost of a sample in each format: processor time and bytes.
 //!
 //! ```sh
 //! cargo run --release -p flexarm-log --example recorders [SAMPLES [FORMAT ...]]
 //! ```
 //!
-//! The samples have the sizes of those of `robots/kr210` with six gearboxes and two links that
-//! bend, at 1 kHz; their numbers are made up.
+//! The samples have the size of those of `robots/kr210` with six gearboxes and two flexible links,
+//! at 1 kHz; their values are synthetic.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, pose of L in W")]
 #![allow(clippy::print_stdout, reason = "an example says what it found")]
 
@@ -20,7 +20,7 @@ use nalgebra::{Rotation3, Translation3, Vector3};
 
 const JOINTS: usize = 6;
 const STEP_S: f64 = 1e-3;
-/// Links that bend, and their length (m).
+/// Flexible links, and their length (m).
 const BENT: [usize; 2] = [2, 3];
 const LENGTH_M: f64 = 1.1;
 
@@ -51,7 +51,7 @@ fn header() -> RunHeader {
     }
 }
 
-/// The chain of links with each joint turned by `q` and each bent link displaced at its end.
+/// Chain of links with each joint turned by `q` and each flexible link displaced at its end.
 fn twin(q: [f64; JOINTS], qdot: [f64; JOINTS], bends: [[f64; 6]; 2]) -> TwinSample {
     let along = |z| Pose::from(Translation3::new(0.0, 0.0, z));
     let mut X_WL = vec![Pose::identity()];
@@ -113,7 +113,7 @@ fn main() {
     let count: u64 = arguments.next().and_then(|text| text.parse().ok()).unwrap_or(20_000);
     let wanted: Vec<String> = arguments.collect();
     let header = header();
-    // Made before, so that their making is not measured.
+    // Created first, so that this is not measured.
     let samples: Vec<Sample> = (0..count).map(sample).collect();
     println!("format     us a sample   bytes a sample");
     for format in RecordingFormat::ALL {

@@ -1,8 +1,8 @@
-//! Writes one made-up run as CSV, MCAP and .rrd:
+//! Writes one synthetic run as CSV, MCAP and .rrd:
 //! `cargo run --release --example synthetic -- FOLDER`.
 //!
 //! Expect 1001 rows, an error of at most 2.11 mm and of 1.30 mm at the end, and in
-//! `rerun FOLDER/run.rrd` an arm that swings by 1.2 rad beside its ghost.
+//! `rerun FOLDER/run.rrd` an arm that swings by 1.2 rad, with its rigid twin drawn transparently.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, pose of L in W")]
 
 #[path = "../tests/synthetic/mod.rs"]

@@ -1,4 +1,4 @@
-//! How a recording's file comes to be, and when it is flushed.
+//! Creation of a recording's file, and the times of its flushes.
 
 use std::fs::{File, OpenOptions};
 use std::io;
@@ -10,10 +10,12 @@ use crate::LogError;
 /// Options that every recorder takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CreateOptions {
-    /// Replace an existing file; otherwise `begin` returns [`LogError::Exists`]. Default `false`.
+    /// Whether to replace an existing file; otherwise `begin` returns [`LogError::Exists`]. Default
+    /// `false`.
     pub overwrite: bool,
-    /// Longest wall time between two flushes while samples arrive: what a killed run may lose.
-    /// Default 0.5 s. An MCAP is written chunk by chunk instead, whatever the wall time.
+    /// Maximum wall time between two flushes while samples arrive, and so the span that a killed
+    /// run may lose. Default 0.5 s. An MCAP file is written chunk by chunk instead, independent of
+    /// wall time.
     pub flush_every: Duration,
 }
 
@@ -24,13 +26,14 @@ impl Default for CreateOptions {
 }
 
 impl CreateOptions {
-    /// The same with [`CreateOptions::overwrite`] set to `overwrite`.
+    /// Returns the options with [`CreateOptions::overwrite`] set to `overwrite`.
     #[must_use]
     pub fn with_overwrite(self, overwrite: bool) -> Self {
         Self { overwrite, ..self }
     }
 
-    /// Whether `path` may be created: it does not exist, or may be overwritten and can be.
+    /// Checks that `path` can be created: it does not exist, or it may be overwritten and is
+    /// writable.
     pub(crate) fn check(self, path: &Path) -> Result<(), LogError> {
         let Ok(there) = path.metadata() else { return Ok(()) };
         if !self.overwrite {
@@ -40,13 +43,14 @@ impl CreateOptions {
             return Err(LogError::io(path, "replace a folder by a file")(io::ErrorKind::IsADirectory.into()));
         }
         if there.is_file() {
-            // Opened without a change: nothing is replaced before everything can be.
+            // Open without truncating: an existing file stays intact until all files can be
+            // replaced.
             OpenOptions::new().write(true).open(path).map_err(LogError::io(path, "replace the file"))?;
         }
         Ok(())
     }
 
-    /// Creates the file. Two runs that race for one name cannot both win.
+    /// Creates the file. With two concurrent runs and one name, at most one succeeds.
     pub(crate) fn create(self, path: &Path) -> Result<File, LogError> {
         let mut options = OpenOptions::new();
         options.write(true);
@@ -60,7 +64,7 @@ impl CreateOptions {
         })
     }
 
-    /// A clock that says when the next flush of a file is due.
+    /// Returns a clock that decides when the next flush of a file is due.
     pub(crate) fn flush_clock(self, file: &Path) -> FlushClock {
         let folder = folder_of(file);
         let now = Instant::now();
@@ -76,22 +80,22 @@ impl CreateOptions {
     }
 }
 
-/// Room on the disk below which files are flushed by the sample: all of a run's files together then
-/// fill the disk at the same pace, and what one of them takes last is not missing in the others.
+/// Free disk space below which files are flushed every [`SCARCE_EVERY`] samples (bytes): all files
+/// of a run then fill the disk at the same pace and end at about the same sample.
 const SCARCE_BYTES: u64 = 64 << 20;
-/// Samples between two flushes when room is scarce.
+/// Number of samples between two flushes when disk space is scarce.
 const SCARCE_EVERY: u32 = 64;
-/// Longest time between two flushes: clocks do not hold all that a duration does.
+/// Upper bound of the flush interval: adding a larger `Duration` to an `Instant` may overflow.
 const NEVER: Duration = Duration::from_secs(10 * 365 * 24 * 3600);
-/// Part of its time that a run spends on flushes at most.
+/// Reciprocal of the maximum share of wall time spent on flushes (1/20).
 #[cfg(feature = "rerun")]
 const LARGEST_SHARE: u32 = 20;
 
-/// When the next flush is due. It decides when bytes reach the disk, never which bytes.
+/// Decides when the next flush is due. It affects when bytes reach the disk, never which bytes.
 #[derive(Debug)]
 pub(crate) struct FlushClock {
     every: Duration,
-    /// When the last flush was found to be due.
+    /// Time at which the last flush became due.
     begun: Instant,
     next: Instant,
     folder: PathBuf,
@@ -101,7 +105,7 @@ pub(crate) struct FlushClock {
 }
 
 impl FlushClock {
-    /// Whether a flush is due, asked once for each sample; if so, the next interval starts now.
+    /// Whether a flush is due; called once per sample. If so, the next interval starts now.
     pub(crate) fn due(&mut self) -> bool {
         self.waiting += 1;
         let now = Instant::now();
@@ -117,23 +121,23 @@ impl FlushClock {
         due
     }
 
-    /// To be told when a flush is over whose cost grows with the file: the next one waits so long
-    /// that all of them take only a small part of the run.
+    /// Called after a flush whose cost grows with the file size: delays the next one so that
+    /// flushes take at most 1/[`LARGEST_SHARE`] of the run time.
     #[cfg(feature = "rerun")]
     pub(crate) fn done(&mut self) {
-        // Who asks for no pause gets none.
+        // A zero interval asks for a flush at every sample.
         if !self.every.is_zero() {
             self.next = self.next.max(self.begun + LARGEST_SHARE * self.begun.elapsed());
         }
     }
 }
 
-/// The folder in which a file is.
+/// Returns the folder that contains the file; `.` for a bare file name.
 pub(crate) fn folder_of(file: &Path) -> &Path {
     file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Whether a folder's disk is nearly full; `false` where that cannot be told.
+/// Whether the disk of a folder is nearly full; `false` where this is unknown.
 pub(crate) fn is_scarce(folder: &Path) -> bool {
     #[cfg(unix)]
     let free = rustix::fs::statvfs(folder).ok().map(|disk| disk.f_bavail.saturating_mul(disk.f_frsize));

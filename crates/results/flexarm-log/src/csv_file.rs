@@ -1,4 +1,4 @@
-//! The scalars of a run as one table: SI units, one row per sample, units in the column names.
+//! Scalars of a run as one table: SI units, one row per sample, units in the column names.
 
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
@@ -18,38 +18,38 @@ use crate::{CreateOptions, LogError, RunHeader, RunResult, Sample};
 /// Columns: `time`; TCP positions `rigid_x_m` ..., `flexible_x_m` ...; TCP error, flexible minus
 /// rigid, in world axes `error_x_m` ... `error_rz_rad` (rotation vector) and along the path
 /// `error_tangential_m`, `error_normal_m`, `error_binormal_m`; for every flexible link and elastic
-/// drive the TCP displacement that it alone causes, `<name>_contribution_x_m` ...; for every joint
+/// drive its contribution to the TCP displacement, `<name>_contribution_x_m` ...; for every joint
 /// `<joint>_position_rad`, `<joint>_effort` and `rigid_<joint>_effort`; for every elastic element
 /// its deflection and load, `<element>_x_m` ... `<element>_tz_nm`; `kinetic_energy_j`,
 /// `potential_energy_j`, `elastic_energy_j`. A run without a rigid twin has no `rigid_` and no
 /// `error_` columns.
 ///
-/// Numbers are the shortest that read back as the same `f64`. Result figures of `finish` are not
-/// written: a table has no place for them.
+/// Numbers are written as the shortest text that reads back as the same `f64`. The result figures
+/// passed to `finish` are not written.
 pub type CsvRecorder = FileRecorder<CsvFile>;
 
 /// A CSV file that is being written.
 #[derive(Debug)]
 pub struct CsvFile {
-    /// None once lines could not be written: a later line would follow a gap.
+    /// None after a failed write: further lines would follow a gap.
     lines: Option<Lines>,
     shape: Shape,
     flush: FlushClock,
-    /// Numbers of one line; used again for the next one.
+    /// Numbers of one line; buffer reused for every line.
     row: Vec<f64>,
 }
 
-/// Whole lines on their way into the file.
+/// Buffered writer of whole lines.
 #[derive(Debug)]
 struct Lines {
     file: File,
-    /// Bytes of whole lines in the file.
+    /// Number of bytes of whole lines in the file.
     written: u64,
     waiting: Vec<u8>,
     behind: WrittenBehind,
 }
 
-/// Bytes that wait until they are worth a system call.
+/// Buffer size above which lines are written to the file (bytes).
 const MOST_WAITING: usize = 128 << 10;
 
 impl Lines {
@@ -78,14 +78,14 @@ impl Lines {
         self.waiting.len() > MOST_WAITING
     }
 
-    /// Writes out what waits. If that fails, it is given up, and the file ends with its last whole
-    /// line.
+    /// Writes the buffered lines. On failure they are dropped, and the file is cut back to its last
+    /// whole line.
     fn flush(&mut self) -> io::Result<()> {
         let length = self.waiting.len() as u64;
         let result = self.file.write_all(&self.waiting);
         self.waiting.clear();
         if let Err(error) = result {
-            // What cannot be cut stays; the first error is the one to tell.
+            // If truncating fails too, the partial line stays; the first error is the one reported.
             let _ = self.file.set_len(self.written).and_then(|()| self.file.seek(SeekFrom::Start(self.written)));
             return Err(error);
         }
@@ -96,7 +96,7 @@ impl Lines {
 }
 
 impl Drop for Lines {
-    /// A run that was given up still gets its last lines; errors have nowhere to go.
+    /// Writes the last lines of an abandoned run; errors cannot be reported here.
     fn drop(&mut self) {
         let _ = self.flush();
     }
@@ -115,7 +115,6 @@ impl OpenFile for CsvFile {
         let Some(lines) = &mut self.lines else { return Err(LogError::not_open(path, "record")) };
         self.shape.check(path, sample)?;
         table::fill_row(sample, &self.shape, &mut self.row);
-        // The shortest text that reads back, with an exponent where that is shorter.
         lines.add_numbers(&self.row);
         if self.flush.due() || lines.is_full() {
             self.flush(path, "write samples")?;
@@ -132,7 +131,7 @@ impl OpenFile for CsvFile {
 }
 
 impl CsvFile {
-    /// Writes out what waits. A table that could not be written on has come to its end.
+    /// Writes the buffered lines. After a failed write the table is closed.
     fn flush(&mut self, path: &Path, action: &'static str) -> Result<(), LogError> {
         let Some(lines) = &mut self.lines else { return Ok(()) };
         let written = lines.flush().map_err(LogError::io(path, action));

@@ -1,9 +1,9 @@
-//! A table with texts beside it, which say what it has no columns for: what Parquet and its like
-//! share, both ways.
+//! A table with texts for everything that has no column: the part that Parquet and Arrow share,
+//! for writing and reading.
 //!
-//! Written: [`texts_at_start`], [`texts_at_end`], and samples in blocks of columns ([`Block`]).
-//! Read: a [`DescribedTable`] of the names and texts of a file, and [`TableRun`] over anything that
-//! gives the numbers of a block ([`Blocks`]).
+//! Writing: [`texts_at_start`], [`texts_at_end`], and samples in blocks of columns ([`Block`]).
+//! Reading: a [`DescribedTable`] from the column names and texts of a file, and [`TableRun`] over
+//! any source of blocks of numbers ([`Blocks`]).
 
 use std::path::{Path, PathBuf};
 
@@ -12,14 +12,14 @@ use crate::shape::Shape;
 use crate::table::{self, TableLayout};
 use crate::{Attachment, LogError, RunHeader, RunResult, RunSource, Sample, run_json};
 
-/// Key under which the header is stored, as `run.json` of MCAP files.
+/// Key of the run header, the same JSON as `run.json` in MCAP files.
 const RUN_KEY: &str = "flexarm.run";
-/// Key of figures, events and attached texts of the result (JSON).
+/// Key of the figures, events and attached texts of the result (JSON).
 const RESULT_KEY: &str = "flexarm.result";
-/// Before the name of an attached text of the set-up.
+/// Key prefix of the attached set-up files; the file name follows.
 const RUN_FILE: &str = "flexarm.run_file.";
 
-/// Texts that are known at the start, as pairs of key and value.
+/// Returns the texts known at the start of the run, as pairs of key and value.
 pub(crate) fn texts_at_start(header: &RunHeader) -> Vec<(String, String)> {
     let mut pairs = vec![
         ("robot".to_owned(), header.robot.clone()),
@@ -28,7 +28,7 @@ pub(crate) fn texts_at_start(header: &RunHeader) -> Vec<(String, String)> {
         ("version".into(), env!("CARGO_PKG_VERSION").into()),
         (RUN_KEY.into(), run_json::write(header, false)),
     ];
-    // Attached files as far as they are text.
+    // Attached files that are valid UTF-8; others are left out.
     let text = |file: &Attachment| {
         let text = String::from_utf8(file.bytes.clone()).ok()?;
         Some((format!("{RUN_FILE}{}", file.name), text))
@@ -37,7 +37,7 @@ pub(crate) fn texts_at_start(header: &RunHeader) -> Vec<(String, String)> {
     pairs
 }
 
-/// Texts that are known at the end.
+/// Returns the texts known at the end of the run.
 pub(crate) fn texts_at_end(result: &RunResult) -> Vec<(String, String)> {
     let label = |(label, value): &(String, String)| (format!("figure.{label}"), value.clone());
     let mut pairs: Vec<_> = result.figures.iter().map(label).collect();
@@ -45,7 +45,7 @@ pub(crate) fn texts_at_end(result: &RunResult) -> Vec<(String, String)> {
     pairs
 }
 
-/// Samples that wait to be written, column by column.
+/// Samples waiting to be written, column by column.
 #[derive(Debug)]
 pub(crate) struct Block {
     shape: Shape,
@@ -54,7 +54,7 @@ pub(crate) struct Block {
 }
 
 impl Block {
-    /// Samples after which a block is to be written: what is held in memory.
+    /// Number of samples after which a block is written; bounds the memory in use.
     pub(crate) const ROWS: usize = 16_384;
 
     pub(crate) fn new(header: &RunHeader) -> Self {
@@ -78,17 +78,17 @@ impl Block {
     }
 }
 
-/// What names of columns and texts say of a table.
+/// Contents of a table as given by its column names and texts.
 #[derive(Debug)]
 pub(crate) struct DescribedTable {
     pub(crate) layout: TableLayout,
     result: RunResult,
-    /// Whether the file says which run it is of.
+    /// Whether the file holds a run header ([`RUN_KEY`]).
     described: bool,
 }
 
 impl DescribedTable {
-    /// Of a file with these columns and texts.
+    /// Builds the description from the column names and texts of a file.
     pub(crate) fn of(path: &Path, names: &[String], texts: &[(String, String)]) -> Result<Self, LogError> {
         let value = |key: &str| texts.iter().find(|(k, _)| k == key).map(|(_, value)| value.as_str());
         let attached = |(key, text): &(String, String)| {
@@ -100,7 +100,7 @@ impl DescribedTable {
         let refuse = |(found, expected)| not_a_recording(path, found, expected);
         let layout = match value(RUN_KEY).map(|text| run_json::read(text.as_bytes())) {
             Some(Ok((header, run))) => {
-                // Not every format keeps the order of its texts.
+                // Some formats do not keep the order of the texts.
                 attachments.sort_by_key(|file| run.attachments.iter().position(|name| *name == file.name));
                 TableLayout::of_header(header, names)
             }
@@ -126,17 +126,17 @@ fn media_type(name: &str) -> &'static str {
     }
 }
 
-/// The numbers of a table in blocks of rows.
+/// A table read in blocks of rows.
 pub(crate) trait Blocks {
-    /// How many blocks there are.
+    /// Number of blocks.
     fn count(&self) -> usize;
 
-    /// The numbers of some columns, by their places in the file, of one block; missing ones are
-    /// NaN. As many numbers for each column.
+    /// Reads the given columns (indices in the file) of one block. Missing numbers are NaN; all
+    /// columns get the same length.
     fn read(&self, path: &Path, block: usize, places: &[usize], columns: &mut [Vec<f64>]) -> Result<(), LogError>;
 }
 
-/// A run from a table with texts.
+/// A run read from a table with texts.
 #[derive(Debug)]
 pub(crate) struct TableRun<B> {
     path: PathBuf,

@@ -1,84 +1,84 @@
-//! What can go wrong while a run is written. Every message starts with the file.
+//! Errors of writing and reading a run. Every message starts with the file.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
 use flexarm_settings::Setting;
 
-/// A recording could not be started, continued or closed.
+/// An error of starting, continuing, closing or reading a recording.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LogError {
-    /// The file is there already and overwriting was not asked for.
+    /// The file exists and overwriting was not requested.
     #[error("{}: the file exists already; choose another output folder or overwrite it with {}", path.display(), Setting::Overwrite)]
     Exists {
         /// The existing file.
         path: PathBuf,
     },
 
-    /// The operating system refused: missing folder, no permission, full disk.
+    /// The operating system reported an error: missing folder, no permission, full disk.
     #[error("{}: cannot {action}{}", path.display(), remedy(source))]
     Io {
         /// The file concerned.
         path: PathBuf,
-        /// What was attempted.
+        /// Action attempted, as a verb phrase.
         action: &'static str,
-        /// Why it failed.
+        /// Cause of the failure.
         #[source]
         source: io::Error,
     },
 
-    /// The format cannot hold what was given to it.
+    /// The format cannot hold the data.
     #[error("{}: cannot {action}: {cause}", path.display())]
     Format {
         /// The file being written.
         path: PathBuf,
-        /// What was attempted.
+        /// Action attempted, as a verb phrase.
         action: &'static str,
-        /// What the format's library said.
+        /// Message of the format's library.
         cause: String,
     },
 
-    /// A sample does not fit the header of its run.
+    /// A sample does not match the header of its run.
     #[error("{}: sample at t = {time_s} s has {found} entries in {what}, the header says {expected}", path.display())]
     Shape {
         /// The file being written.
         path: PathBuf,
         /// Time of the sample.
         time_s: f64,
-        /// The part of the sample that is wrong.
+        /// Part of the sample with the wrong size.
         what: &'static str,
-        /// Entries it has.
+        /// Number of entries found.
         found: usize,
-        /// Entries the header asks for.
+        /// Number of entries that the header requires.
         expected: usize,
     },
 
-    /// A time that the file's time stamps cannot hold.
+    /// The time of a sample is out of the range of the file's time stamps.
     #[error("{}: sample time {time_s} s is not in the range 0 to {limit_s:.0} s of the file's time stamps", path.display())]
     Time {
         /// The file being written.
         path: PathBuf,
         /// Time of the sample.
         time_s: f64,
-        /// Largest time this file can hold.
+        /// Maximum time this file can hold (s).
         limit_s: f64,
     },
 
-    /// A file that is to be read is no recording, or not one that can be read.
+    /// The file to be read is not a recording, or not one that can be read.
     #[error("{}: found {found}; expected {expected}{}", path.display(), if mend.is_empty() { String::new() } else { format!(": {mend}") })]
     NotARecording {
         /// The file.
         path: PathBuf,
-        /// What is there.
+        /// Contents found.
         found: String,
-        /// What should be there.
+        /// Contents expected.
         expected: String,
-        /// What to do.
+        /// Suggested remedy.
         mend: String,
     },
 
-    /// Files that a run wrote are no longer where they were made.
+    /// Files written by a run are no longer at their paths.
     #[error(
         "{}: no longer there: removed, moved or replaced while the run wrote it; what it held is lost from this place{}",
         paths.first().map(|path| path.display().to_string()).unwrap_or_default(),
@@ -89,19 +89,19 @@ pub enum LogError {
         paths: Vec<PathBuf>,
     },
 
-    /// The calls came in the wrong order: `begin`, any number of `record`, `finish`.
+    /// Calls in the wrong order; the order is `begin`, any number of `record`, `finish`.
     #[error("{}: {call} was called {problem}", path.display())]
     Order {
         /// The file concerned.
         path: PathBuf,
         /// Name of the call.
         call: &'static str,
-        /// Why it cannot be made now.
+        /// Reason why the call is not allowed now.
         problem: &'static str,
     },
 }
 
-/// What to do when a file may not grow any more; nothing for other troubles, which name themselves.
+/// Returns a suggested remedy if the file cannot grow any further; empty for other I/O errors.
 fn remedy(source: &io::Error) -> String {
     use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
     match source.kind() {
@@ -117,15 +117,15 @@ fn remedy(source: &io::Error) -> String {
     }
 }
 
-/// The paths after the first one, in words.
+/// Lists the paths after the first one as part of a sentence.
 fn others(paths: &[PathBuf]) -> String {
     let others: Vec<String> = paths.iter().skip(1).map(|path| path.display().to_string()).collect();
     if others.is_empty() { String::new() } else { format!(", and so is {}", others.join(", ")) }
 }
 
 impl LogError {
-    /// The same error with the name `shown` for every path in the folder `hidden`: files that come
-    /// into being under a provisional name are called what the user called them.
+    /// Returns the same error with every path in the folder `hidden` replaced by `shown`. Files
+    /// created under a temporary name are thus reported under the name that the user gave.
     #[must_use]
     pub fn with_path_for(mut self, hidden: &Path, shown: &Path) -> Self {
         let rename = |path: &mut PathBuf| {
@@ -146,17 +146,17 @@ impl LogError {
         self
     }
 
-    /// A closure for `map_err` that turns an [`io::Error`] into [`LogError::Io`].
+    /// Returns a closure for `map_err` that turns an [`io::Error`] into [`LogError::Io`].
     pub(crate) fn io(path: &Path, action: &'static str) -> impl FnOnce(io::Error) -> Self {
         move |source| Self::Io { path: path.to_owned(), action, source }
     }
 
-    /// `begin` on a recorder that has begun before.
+    /// Error for `begin` on a recorder that has begun before.
     pub(crate) fn begun_twice(path: &Path) -> Self {
         Self::Order { path: path.to_owned(), call: "begin", problem: "a second time" }
     }
 
-    /// `record` or `finish` on a recorder that is not between `begin` and `finish`.
+    /// Error for `record` or `finish` on a recorder that is not between `begin` and `finish`.
     pub(crate) fn not_open(path: &Path, call: &'static str) -> Self {
         Self::Order { path: path.to_owned(), call, problem: "before begin or after finish" }
     }

@@ -1,5 +1,4 @@
-//! What all recorders have in common: a file that is opened by `begin`, and calls that come in
-//! order.
+//! Common part of all recorders: a file created by `begin`, and the check of the order of calls.
 
 use std::path::{Path, PathBuf};
 
@@ -7,8 +6,8 @@ use crate::{CreateOptions, LogError, Recorder, RunHeader, RunResult, Sample};
 
 /// A recorder of one file; `F` is the file of its format between `begin` and `finish`.
 ///
-/// The file is created by [`Recorder::begin`]. Calls in another order than `begin`, `record`,
-/// `finish` are [`LogError::Order`].
+/// The file is created by [`Recorder::begin`]. Calls in any other order than `begin`, `record`,
+/// `finish` return [`LogError::Order`].
 #[derive(Debug)]
 pub struct FileRecorder<F> {
     path: PathBuf,
@@ -23,26 +22,26 @@ enum State<F> {
     Finished,
 }
 
-/// A file of one format that is being written. Dropped without `finish`, it closes itself as well
-/// as it can.
+/// A file of one format that is being written. If it is dropped without `finish`, it closes itself
+/// as far as possible.
 pub trait OpenFile: Send + Sized {
-    /// Makes the file and writes what is known before the first sample.
+    /// Creates the file and writes what is known before the first sample.
     ///
     /// # Errors
     /// [`LogError`] if it cannot be created or written.
     fn begin(path: &Path, options: CreateOptions, header: &RunHeader) -> Result<Self, LogError>;
 
-    /// Adds one instant.
+    /// Adds one sample.
     ///
     /// # Errors
     /// As [`Recorder::record`].
     fn record(&mut self, path: &Path, sample: &Sample) -> Result<(), LogError>;
 
-    /// Copies what a file without further samples needs of the one that was added last. Called
-    /// after [`OpenFile::record`], of several samples in a row after the last.
+    /// Keeps what is needed of the last sample to end the file if no further sample follows. Called
+    /// after [`OpenFile::record`]; after a batch of samples, once for the last one.
     fn keep(&mut self, _sample: &Sample) {}
 
-    /// Adds the result and ends the file.
+    /// Writes the result and closes the file.
     ///
     /// # Errors
     /// As [`Recorder::finish`].
@@ -50,7 +49,7 @@ pub trait OpenFile: Send + Sized {
 }
 
 impl<F> FileRecorder<F> {
-    /// A recorder that will write `path`; the file is created by `begin`.
+    /// Creates a recorder for `path`; the file is created by `begin`.
     pub fn create(path: impl Into<PathBuf>, options: CreateOptions) -> Self {
         Self { path: path.into(), options, state: State::New }
     }

@@ -1,11 +1,11 @@
-//! The columns of a run in memory as the table that its CSV has: each column one number wide, under
-//! the same name.
+//! The columns of a run in memory as the table of its CSV file: one number per column, with the
+//! same names.
 
 use flexarm_sample::{Columns, RunHeader};
 
 use crate::table;
 
-/// Names and numbers of the table's columns, in the order of [`crate::CsvRecorder`]'s.
+/// Returns names and numbers of the table's columns, in the column order of [`crate::CsvRecorder`].
 pub fn flat_columns(columns: &Columns) -> Vec<(String, Vec<f64>)> {
     let has_rigid = columns.column("error_world").is_some();
     let header = RunHeader {
@@ -24,7 +24,7 @@ pub fn flat_columns(columns: &Columns) -> Vec<(String, Vec<f64>)> {
         .collect()
 }
 
-/// Which numbers of which signal a column is.
+/// Signal, and index of the number within it, that make up a column.
 struct Place {
     signal: &'static str,
     number: usize,
@@ -37,7 +37,7 @@ impl Place {
     }
 }
 
-/// In the order of [`table::columns`].
+/// Returns the places in the order of [`table::columns`].
 fn places(columns: &Columns, has_rigid: bool) -> Vec<Place> {
     let mut places = Vec::new();
     let mut take = |signal, numbers: std::ops::Range<usize>| {
@@ -72,11 +72,12 @@ fn places(columns: &Columns, has_rigid: bool) -> Vec<Place> {
     places
 }
 
-/// The table as a stream of Arrow's C interface, one record batch long: other programs of the
-/// process take the numbers over without a copy.
+/// Exports the table as a stream of Arrow's C interface with a single record batch. Other libraries
+/// in the same process can use the numbers without a copy.
 ///
 /// # Errors
-/// If the columns make no record batch, which those of a run do.
+/// [`arrow_schema::ArrowError`] if the columns do not form a record batch; the columns of a run
+/// always do.
 #[cfg(feature = "arrow")]
 pub fn arrow_stream(columns: &Columns) -> Result<impl Send + 'static, arrow_schema::ArrowError> {
     use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Recorders: a run of the simulator into CSV, Parquet, MCAP and Rerun files, and back.
+//! Recorders: write a run of the simulator to CSV, Parquet, MCAP and Rerun files, and read it back.
 //!
 //! A run hands over one [`RunHeader`], then [`Sample`]s, then its result figures; every
 //! [`Recorder`] takes the same three calls, and [`RecorderSet`] passes them to several files at
@@ -6,21 +6,22 @@
 //! table as Parquet), `McapRecorder` (feature `mcap`) for ROS 2 tools, Foxglove and PlotJuggler,
 //! `RrdRecorder` (feature `rerun`) for the Rerun viewer with meshes and a layout.
 //!
-//! The way back is [`open_recording`]: a [`RunSource`] gives header, samples and result of a file,
-//! for reports and for other formats. What a format cannot hold is listed by
-//! [`RecordingFormat::lost_on_the_way_to`].
+//! To read a file, start at [`open_recording`]: a [`RunSource`] gives header, samples and result,
+//! for reports and for other formats. [`RecordingFormat::lost_on_the_way_to`] lists what a format
+//! cannot hold.
 //!
-//! What all recorders promise:
-//! * a file is created by [`Recorder::begin`] and replaces an existing one only if told to
-//!   ([`CreateOptions::overwrite`]);
-//! * a killed run loses at most the last moment ([`CreateOptions::flush_every`], of an MCAP its
-//!   last chunk), and what is left can be read; the exceptions ([`FormatInfo::survives_a_kill`])
-//!   come into being under another name and are there whole or not at all;
+//! Guarantees of all recorders:
+//! * a file is created by [`Recorder::begin`] and replaces an existing one only if
+//!   [`CreateOptions::overwrite`] is set;
+//! * a killed run loses at most the samples since the last flush ([`CreateOptions::flush_every`];
+//!   in an MCAP file the last chunk), and the rest can be read; formats without
+//!   [`FormatInfo::survives_a_kill`] are written under another name and are either complete or
+//!   absent;
 //! * the same samples give the same bytes, on any day and at any speed: nothing in a file depends
-//!   on the clock. An `.rrd` has the same content: Rerun's SDK draws identifiers of chunks from
-//!   clock and chance.
+//!   on the clock. An `.rrd` file has the same content, but Rerun's SDK draws chunk identifiers
+//!   from clock and random numbers.
 //!
-//! Not here: what the numbers mean (`flexarm-analysis`), running the simulation (`flexarm`).
+//! Not here: the meaning of the numbers (`flexarm-analysis`), running the simulation (`flexarm`).
 //!
 //! ```
 //! use flexarm_log::*;

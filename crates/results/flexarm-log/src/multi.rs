@@ -5,41 +5,42 @@ use std::path::{Path, PathBuf};
 use crate::threads::Threads;
 use crate::{LogError, Recorder, RunHeader, RunResult, Sample};
 
-/// Recorders that get the same header, samples and result.
+/// Set of recorders that get the same header, samples and result.
 ///
-/// One that fails does not keep the others from their data: all are called, then the first error is
-/// returned. Each error names its file. One that cannot begin ends the set, and the files that the
-/// others have made go away.
+/// A failing recorder does not keep the others from their data: all are called, then the first
+/// error is returned. Each error names its file. If a recorder cannot begin, the set is cleared and
+/// the files already created by the others are removed.
 #[derive(Default)]
 pub struct RecorderSet {
     recorders: Vec<Box<dyn Recorder>>,
-    /// The recorders in their place, between [`RecorderSet::on_threads`] and
+    /// The recorders running on threads, between [`RecorderSet::on_threads`] and
     /// [`RecorderSet::finish`].
     threads: Option<Threads>,
-    /// Which file was made under which name.
+    /// Path and identity of each file created.
     made: Vec<(PathBuf, FileId)>,
 }
 
-/// What tells two files of one name apart: device and number on it.
+/// Identity of a file, independent of its name: device and inode number.
 type FileId = (u64, u64);
 
 fn file_id(path: &Path) -> Option<FileId> {
     let there = path.metadata().ok()?;
     #[cfg(unix)]
     let id = (std::os::unix::fs::MetadataExt::dev(&there), std::os::unix::fs::MetadataExt::ino(&there));
-    // Elsewhere a file that is open cannot be removed.
+    // On other systems an open file cannot be removed.
     #[cfg(not(unix))]
     let id = (0, u64::from(there.is_file()));
     Some(id)
 }
 
-/// To ask takes as long as to begin a run: only where there are files.
+/// Whether there are several processors. The query takes as long as starting a run, so it is made
+/// only if there are files.
 fn several_processors() -> bool {
     std::thread::available_parallelism().is_ok_and(|processors| processors.get() > 1)
 }
 
 impl RecorderSet {
-    /// An empty set: every call succeeds and writes nothing.
+    /// Creates an empty set: every call succeeds and writes nothing.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
@@ -50,26 +51,26 @@ impl RecorderSet {
         self.recorders.push(recorder);
     }
 
-    /// The files, in the order in which the recorders were added; none while they are written on
-    /// threads.
+    /// Paths of the files, in the order in which the recorders were added; empty while threads
+    /// write them.
     pub fn paths(&self) -> impl Iterator<Item = &Path> {
         self.recorders.iter().map(|recorder| recorder.path())
     }
 
-    /// Whether all files may be created, as far as can be told without creating one.
+    /// Checks that all files may be created, as far as possible without creating one.
     ///
     /// # Errors
-    /// [`LogError::Exists`] for the first file that is there already; [`LogError::Io`] for one that
-    /// cannot be replaced.
+    /// [`LogError::Exists`] for the first file that exists already; [`LogError::Io`] for a file
+    /// that cannot be replaced.
     pub fn check(&self) -> Result<(), LogError> {
         self.recorders.iter().try_for_each(|recorder| recorder.check())
     }
 
-    /// Starts all files, or none if one of them may not be written.
+    /// Starts all files, or none if one of them cannot be written.
     ///
     /// # Errors
     /// As [`RecorderSet::check`], before any file is created; later, the first error of a recorder,
-    /// and no new file is left.
+    /// with all new files removed.
     pub fn begin(&mut self, header: &RunHeader) -> Result<(), LogError> {
         self.check()?;
         let new: Vec<PathBuf> = self.paths().filter(|path| !path.exists()).map(Path::to_owned).collect();
@@ -77,7 +78,7 @@ impl RecorderSet {
         if begun.is_err() {
             self.recorders.clear(); // closes the files
             for path in new {
-                let _ = std::fs::remove_file(path); // what cannot be removed stays; the error that led here is told
+                let _ = std::fs::remove_file(path); // best effort; the error that led here is returned
             }
             return begun;
         }
@@ -85,8 +86,8 @@ impl RecorderSet {
         Ok(())
     }
 
-    /// Surfaces and files of the robot are much to write: each recorder begins on a thread of its
-    /// own.
+    /// Starts all recorders, each on a thread of its own: surfaces and files of the robot are
+    /// large.
     fn begin_all(&mut self, header: &RunHeader) -> Result<(), LogError> {
         if self.recorders.len() < 2 || !several_processors() {
             return self.all(|recorder| recorder.begin(header));
@@ -101,21 +102,20 @@ impl RecorderSet {
         })
     }
 
-    /// Has each file written on a thread of its own from here on, after [`RecorderSet::begin`]. The
+    /// From here on, after [`RecorderSet::begin`], writes each file on a thread of its own. The
     /// files get the same bytes.
     ///
-    /// Where there is one processor, nothing changes.
+    /// With a single processor, nothing changes.
     pub fn on_threads(&mut self) {
         if self.threads.is_none() && !self.recorders.is_empty() && several_processors() {
             self.threads = Some(Threads::start(std::mem::take(&mut self.recorders)));
         }
     }
 
-    /// Adds one instant to all files.
+    /// Adds a sample to all files.
     ///
     /// # Errors
-    /// The first error of a recorder; on threads it is told some samples after the one that it
-    /// belongs to.
+    /// The first error of a recorder; with threads it is returned some samples late.
     pub fn record(&mut self, sample: &Sample) -> Result<(), LogError> {
         match &mut self.threads {
             Some(threads) => threads.record(sample),
@@ -123,20 +123,20 @@ impl RecorderSet {
         }
     }
 
-    /// Has the threads add the result and close their files, and does not wait for that;
-    /// [`RecorderSet::finish`] does. Without threads nothing happens yet.
+    /// Makes the threads add the result and close their files, without waiting for them;
+    /// [`RecorderSet::finish`] waits. Without threads nothing happens yet.
     pub fn begin_to_finish(&mut self, result: &RunResult) {
         if let Some(threads) = &mut self.threads {
             threads.close(result);
         }
     }
 
-    /// Adds the result to all files and closes them, unless [`RecorderSet::begin_to_finish`] did;
-    /// then the result is that one's.
+    /// Adds the result to all files and closes them. After [`RecorderSet::begin_to_finish`], the
+    /// result given there is the one written.
     ///
     /// # Errors
-    /// The first error of a recorder; [`LogError::Gone`] if files are no longer where they were
-    /// made: what was written to them cannot be found.
+    /// The first error of a recorder; [`LogError::Gone`] if files are no longer at their paths, so
+    /// that what was written to them cannot be found.
     pub fn finish(&mut self, result: &RunResult) -> Result<(), LogError> {
         match self.threads.take() {
             Some(threads) => {

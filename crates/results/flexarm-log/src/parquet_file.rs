@@ -1,8 +1,8 @@
-//! The table of a run as a Parquet file: the columns of the CSV as `double`, and the header and the
-//! result beside them.
+//! The table of a run as a Parquet file: the columns of the CSV as `double`, with the header and
+//! the result as metadata.
 //!
-//! Written through the columns of the format itself: with one kind of number and no missing values
-//! Arrow would add nothing but its compile time. Start at [`ParquetRecorder`].
+//! Written with the column writer of the `parquet` crate: with a single number type and no missing
+//! values, Arrow would only add compile time. Start at [`ParquetRecorder`].
 
 use std::fs::File;
 use std::io;
@@ -24,23 +24,23 @@ use crate::{CreateOptions, LogError, RunHeader, RunResult, Sample, table};
 
 /// Writes a run as a Parquet file.
 ///
-/// Columns are those of [`crate::CsvRecorder`], all `double` without missing values, compressed
-/// with zstd after their bytes were sorted by significance. The file's key-value metadata say what
-/// a table has no column for: `robot`, `trajectory`, `units`, `version`; each result figure under
-/// its label with `figure.` before it; for readers of flexarm `flexarm.run` and `flexarm.result`
-/// (JSON), and the attached texts.
+/// Columns are those of [`crate::CsvRecorder`], all `double` without missing values, encoded as
+/// `BYTE_STREAM_SPLIT` and compressed with zstd. Everything without a column is in the key-value
+/// metadata: `robot`, `trajectory`, `units`, `version`; each result figure under its label with the
+/// prefix `figure.`; for readers of flexarm `flexarm.run` and `flexarm.result` (JSON), and the
+/// attached texts.
 ///
-/// A Parquet file cannot be read before its end is written. So this one comes into being under the
-/// name `<file>.partial` and is renamed by `finish`; a run that is killed, or a disk that is full,
-/// leaves nothing under the file's own name.
+/// A Parquet file cannot be read before its footer is written. It is therefore written under the
+/// name `<file>.partial` and renamed by `finish`; a killed run or a full disk leaves nothing under
+/// the file's own name.
 pub type ParquetRecorder = FileRecorder<ParquetFile>;
 
 /// A Parquet file that is being written.
 pub struct ParquetFile {
-    /// None once it is closed.
+    /// None once closed.
     writer: Option<SerializedFileWriter<File>>,
     whole: WholeFile,
-    /// The open row group.
+    /// Samples of the open row group.
     block: Block,
 }
 
@@ -94,7 +94,7 @@ impl ParquetFile {
     }
 }
 
-/// A writer of the columns of a run, with the texts that are known at the start.
+/// Creates a writer of the columns of a run, with the texts known at the start.
 fn writer(file: File, header: &RunHeader) -> Result<SerializedFileWriter<File>, ParquetError> {
     let column = |name: &String| {
         let kind = Type::primitive_type_builder(name, PhysicalType::DOUBLE);
@@ -104,7 +104,7 @@ fn writer(file: File, header: &RunHeader) -> Result<SerializedFileWriter<File>, 
     let schema = Type::group_type_builder("run").with_fields(columns).build()?;
     let properties = WriterProperties::builder()
         .set_created_by(concat!("flexarm ", env!("CARGO_PKG_VERSION")).to_owned())
-        .set_dictionary_enabled(false) // hardly a number comes twice
+        .set_dictionary_enabled(false) // numbers rarely repeat
         .set_encoding(Encoding::BYTE_STREAM_SPLIT)
         .set_compression(Compression::ZSTD(ZstdLevel::try_new(3)?))
         .set_statistics_enabled(EnabledStatistics::Chunk)

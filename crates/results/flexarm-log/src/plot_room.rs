@@ -1,38 +1,38 @@
-//! Room in a plot: an axis with labels, and a corner in which the names of the curves hide nothing.
+//! Plot axes with enough labels, and a legend corner in which it hides no curve.
 //!
-//! The Rerun viewer labels an axis at powers of ten and their multiples only, and lays the legend
-//! over the curves; what it shows can be told it once the curves are known. Start at [`arrange`].
+//! The Rerun viewer labels an axis at powers of ten and their multiples only, and draws the legend
+//! over the curves. Range and corner can be set once the curves are known. Start at [`arrange`].
 
-/// Most pieces that an [`Envelope`] keeps.
+/// Maximum number of pieces of an [`Envelope`].
 const PIECES: usize = 256;
-/// Columns in which the room is looked for.
+/// Number of columns into which the plot is divided for the search of free space.
 const COLUMNS: usize = 64;
-/// Part of the height that stays empty above and below the curves.
+/// Fraction of the height left empty above and below the curves.
 const MARGIN: f64 = 0.05;
-/// Size of a plot in a window of 1600 by 1000 (pixels), as measured on a picture of the viewer,
-/// version 0.36.
+/// Width and height of a plot in a window of 1600 by 1000 (pixels), measured on a screenshot of the
+/// viewer, version 0.36.
 const PLOT: [f64; 2] = [610.0, 425.0];
-/// Height of a row of the legend, of its frame, and width of a letter and of what is beside the
-/// letters (pixels), likewise.
+/// Heights of a row of the legend and of its frame, widths of a letter and of the rest of a row
+/// (pixels), measured likewise.
 const LEGEND: [f64; 4] = [23.0, 10.0, 6.4, 36.0];
-/// Labels are at least so far apart (pixels), likewise.
+/// Minimum distance between labels (pixels), measured likewise.
 const APART: f64 = 20.0;
-/// Part of its length by which an axis grows for a third label.
+/// Maximum relative growth of an axis for a third label.
 const FOR_A_LABEL: f64 = 0.2;
-/// Most by which an axis grows for the legend, as a part of what the curves need.
+/// Maximum relative growth of an axis for the legend.
 const MOST_ROOM: f64 = 0.8;
 
-/// Lowest and highest values of curves over the run, in equal pieces of it.
+/// Minimum and maximum of curves over the run, in pieces of equal numbers of rows.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Envelope {
     pieces: Vec<[f64; 2]>,
-    /// Rows of a piece; of the last one, how many it has.
+    /// Number of rows of a piece, and of the last piece.
     rows: u64,
     in_last: u64,
 }
 
 impl Envelope {
-    /// Adds the values of one instant; what is not finite is not seen.
+    /// Adds the values of one sample; ignores non-finite ones.
     pub(crate) fn push(&mut self, values: impl IntoIterator<Item = f64>) {
         let none = [f64::INFINITY, f64::NEG_INFINITY];
         let grown = |[low, high]: [f64; 2], x: f64| [low.min(x), high.max(x)];
@@ -55,7 +55,7 @@ impl Envelope {
         self.in_last += 1;
     }
 
-    /// Lowest and highest value in a column of [`COLUMNS`].
+    /// Returns minimum and maximum in one of the [`COLUMNS`].
     fn column(&self, column: usize) -> [f64; 2] {
         let count = self.pieces.len();
         let (from, to) = (column * count / COLUMNS, ((column + 1) * count).div_ceil(COLUMNS));
@@ -72,15 +72,15 @@ pub(crate) struct Corner {
     pub(crate) top: bool,
 }
 
-/// Where the names of the curves are, and what the axis shows.
+/// Corner of the legend, and range of the axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Arrangement {
     pub(crate) corner: Corner,
     pub(crate) range: [f64; 2],
 }
 
-/// Room for the curves and for their names, the length of each being its number of letters; `None`
-/// without a finite value.
+/// Chooses range and legend corner for the curves; `names` are the numbers of letters of their
+/// names. `None` if there is no finite value.
 pub(crate) fn arrange(curves: &[&Envelope], names: &[usize]) -> Option<Arrangement> {
     let columns: Vec<[f64; 2]> = (0..COLUMNS)
         .map(|k| curves.iter().map(|curve| curve.column(k)).fold([f64::INFINITY, f64::NEG_INFINITY], wider))
@@ -89,7 +89,7 @@ pub(crate) fn arrange(curves: &[&Envelope], names: &[usize]) -> Option<Arrangeme
     if low > high {
         return None;
     }
-    // A curve that stays where it is still gets an axis.
+    // A constant curve still gets an axis.
     let room = match MARGIN * (high - low) {
         room if room > 0.0 => room,
         _ => 0.5 * high.abs().max(1e-6),
@@ -98,7 +98,7 @@ pub(crate) fn arrange(curves: &[&Envelope], names: &[usize]) -> Option<Arrangeme
     let [row, frame, letter, beside] = LEGEND;
     let width = (names.iter().max().copied().unwrap_or(0) as f64 * letter + beside) / PLOT[0];
     let height = (names.len() as f64 * row + frame) / PLOT[1];
-    // One more: pieces need not end where columns do.
+    // One more column, since pieces need not end at column boundaries.
     let across = ((width * COLUMNS as f64).ceil() as usize + 1).clamp(1, COLUMNS);
     let free = |corner: Corner, [low, high]: [f64; 2]| {
         let under = if corner.left { &columns[..across] } else { &columns[COLUMNS - across..] };
@@ -109,7 +109,8 @@ pub(crate) fn arrange(curves: &[&Envelope], names: &[usize]) -> Option<Arrangeme
             (false, true) => [low.min((below - height * high) / (1.0 - height)), high],
         }
     };
-    // Room for the legend asks for other labels, and these for other room.
+    // Fixed-point iteration: the space for the legend changes the labels, and these change the
+    // space.
     let grown = |corner: Corner| (0..6).fold(base, |range, _| labelled(free(corner, range)));
     let corners = [(true, true), (false, true), (true, false), (false, false)];
     let found = corners.map(|(left, top)| Corner { left, top }).map(|corner| (corner, grown(corner)));
@@ -124,9 +125,9 @@ fn wider(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
 }
 
-/// The range, a little wider if need be, with three labels in a large window if these cost little,
-/// and with two in a plot that is 200 pixels high: the viewer labels multiples of a power of ten
-/// that it has room for, and then often only 0.
+/// Widens the range, if the cost is small, until it has three labels in a large window, and in any
+/// case until it has two in a plot 200 pixels high. The viewer labels those multiples of a power of
+/// ten that fit, which is often only 0.
 fn labelled(range: [f64; 2]) -> [f64; 2] {
     let length = |[low, high]: [f64; 2]| high - low;
     let shown = 10f64.powf((APART * length(range) / PLOT[1]).log10().ceil());
@@ -135,7 +136,7 @@ fn labelled(range: [f64; 2]) -> [f64; 2] {
     with_multiples(range, 10f64.powf(length(range).log10().floor()), 2)
 }
 
-/// The range, grown on the side where it costs less until it has so many multiples of a unit.
+/// Widens the range, on the cheaper side each time, until it has `count` multiples of `unit`.
 fn with_multiples([mut low, mut high]: [f64; 2], unit: f64, count: i32) -> [f64; 2] {
     if !unit.is_normal() {
         return [low, high];
@@ -153,8 +154,8 @@ fn with_multiples([mut low, mut high]: [f64; 2], unit: f64, count: i32) -> [f64;
     [low, high]
 }
 
-/// Multiples of powers of ten in a range that a viewer labels which wants them so many pixels
-/// apart.
+/// Number of labels in a range, for a viewer that labels multiples of powers of ten at least
+/// `apart` pixels apart.
 #[cfg(test)]
 pub(crate) fn labels([low, high]: [f64; 2], height: f64, apart: f64) -> usize {
     let least = apart * (high - low) / height;
@@ -172,7 +173,7 @@ mod tests {
         envelope
     }
 
-    /// Parts of the plot that the legend covers: from left to right and from bottom to top.
+    /// Parts of the plot covered by the legend: from left to right and from bottom to top.
     fn covered(a: &Arrangement, names: &[usize]) -> [[f64; 2]; 2] {
         let width = (*names.iter().max().unwrap() as f64 * LEGEND[2] + LEGEND[3]) / PLOT[0];
         let height = (names.len() as f64 * LEGEND[0] + LEGEND[1]) / PLOT[1];
@@ -180,8 +181,7 @@ mod tests {
         [side(a.corner.left, width), side(!a.corner.top, height)]
     }
 
-    /// Truth: the curve's own points. Many sizes are such that an axis that takes what comes has
-    /// the label 0 alone.
+    /// Truth: the curve's own points. Many of the sizes give an unadjusted axis the single label 0.
     #[test]
     fn no_curve_is_under_its_legend_and_the_axis_has_labels() {
         for scale in [-6.0, -2.7, -0.25, 0.0, 0.35, 0.78, 0.95, 3.6] {
@@ -218,12 +218,12 @@ mod tests {
 
     #[test]
     fn an_error_of_some_millimetres_has_more_labels_than_zero() {
-        // Truth: the fault as it was seen, plus and minus 6 mm in a plot 160 pixels high.
+        // Truth: the fault as reported, plus and minus 6 mm in a plot 160 pixels high.
         assert_eq!(labels([-6.0, 6.0], 160.0, 20.0), 1);
         let wave = envelope((0..500).map(|k| 6.0 * (f64::from(k) * 0.05).sin()));
         let a = arrange(&[&wave], &[6, 6, 6, 9]).unwrap();
         assert!(labels(a.range, PLOT[1], APART) >= 3, "{a:?}");
-        // As seen in the viewer: -8.9 to 13.1 had the labels 0 and 10.
+        // Observed in the viewer: -8.9 to 13.1 has the labels 0 and 10.
         assert_eq!(labels([-8.9, 13.1], PLOT[1], APART), 2);
         assert_eq!(labelled([-8.9, 13.1]), [-10.0, 13.1]);
         assert_eq!(labelled([-0.9, 0.8]), [-1.0, 0.8]);

@@ -1,33 +1,33 @@
-//! Which samples of a run show poses of links: recordings have every sample's numbers, but pictures
-//! need fewer.
+//! Choice of the samples with poses of links: recordings have the numbers of every sample, but
+//! animations need fewer poses.
 
 use crate::Sample;
 
-/// Shortest time between two poses (ns): every sample of a run logged at up to 200 Hz, fewer of
+/// Minimum time between two poses (ns): every sample of a run logged at up to 200 Hz, fewer of
 /// faster ones.
 const EVERY_NS: u64 = 5_000_000;
 
-/// What a sample is for.
+/// Reasons to write the poses of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Shown {
-    /// It is time for a pose.
+    /// Whether a pose is due.
     pub(crate) due: bool,
-    /// No sample before has had so large an error.
+    /// Whether the error exceeds that of all previous samples.
     pub(crate) new_peak: bool,
 }
 
-/// Chooses the samples. The `.rrd` and the MCAP have one each, so that one can be made of the
-/// other.
+/// Chooses the samples. The `.rrd` and the MCAP recorder have one each, with the same choice, so
+/// that an `.rrd` file can be made from an MCAP file.
 #[derive(Debug, Default)]
 pub(crate) struct PoseClock {
     last_ns: Option<u64>,
-    /// Largest error so far (m).
+    /// Maximum error so far (m).
     largest_m: Option<f64>,
 }
 
 impl PoseClock {
-    /// Takes a sample, so many ns after the start of the run. `has_rigid`: without a twin there is
-    /// no error.
+    /// Takes a sample at a time since the start of the run (ns). Without a rigid twin (`has_rigid`)
+    /// there is no error.
     pub(crate) fn take(&mut self, since_start_ns: u64, sample: &Sample, has_rigid: bool) -> Shown {
         let due = self.last_ns.is_none_or(|last| since_start_ns.saturating_sub(last) >= EVERY_NS);
         if due {

@@ -1,16 +1,15 @@
-//! The calls that every recorder takes.
+//! Interface of all recorders.
 
 use crate::{RunHeader, RunResult, Sample};
 
-/// Writes a run while it goes on: `begin` once, `record` any number of times, `finish` once.
+/// Writes a run while it is simulated: `begin` once, `record` any number of times, `finish` once.
 ///
-/// A recorder that is dropped without `finish` closes its file as well as it can, without result
-/// figures.
+/// A recorder dropped without `finish` closes its file as far as possible, without result figures.
 pub trait Recorder: Send {
-    /// Whether `begin` may create the file, as far as can be told without creating it.
+    /// Checks that `begin` may create the file, as far as possible without creating it.
     ///
     /// # Errors
-    /// [`crate::LogError::Exists`] if it is there already and overwriting was not asked for.
+    /// [`crate::LogError::Exists`] if the file exists and overwriting was not requested.
     fn check(&self) -> Result<(), crate::LogError> {
         Ok(())
     }
@@ -21,14 +20,14 @@ pub trait Recorder: Send {
     /// [`crate::LogError`] if it cannot be created or written.
     fn begin(&mut self, header: &RunHeader) -> Result<(), crate::LogError>;
 
-    /// Adds one instant. The recorder flushes on its own, at least once a second of wall time.
+    /// Adds one sample. The recorder flushes on its own, at least once a second of wall time.
     ///
     /// # Errors
     /// [`crate::LogError::Shape`] if the sample does not fit the header; [`crate::LogError`] on a
     /// write error (full disk).
     fn record(&mut self, sample: &Sample) -> Result<(), crate::LogError>;
 
-    /// Adds instants one after another, up to the first that fails.
+    /// Adds samples one after another, up to the first that fails.
     ///
     /// # Errors
     /// As [`Recorder::record`].
@@ -36,12 +35,12 @@ pub trait Recorder: Send {
         samples.iter().try_for_each(|sample| self.record(sample))
     }
 
-    /// Adds the result and closes the file so that every reader accepts it.
+    /// Adds the result and closes the file.
     ///
     /// # Errors
     /// [`crate::LogError`] on a write error.
     fn finish(&mut self, result: &RunResult) -> Result<(), crate::LogError>;
 
-    /// Where it writes.
+    /// Path of the file.
     fn path(&self) -> &std::path::Path;
 }

@@ -1,9 +1,9 @@
-//! A run's header as JSON, and its triangles as one compressed block: what the topics of a
-//! recording have no place for.
+//! A run's header as JSON, and its triangles as one compressed block: data without a topic in a
+//! recording.
 //!
-//! `run.json` is a stable format of its own: keys are added, not renamed. It holds everything of a
-//! [`RunHeader`] but the URDF, which recordings carry as it is, and the corners of meshes, which
-//! are in `meshes.bin.zst`.
+//! `run.json` is a stable format: keys are added, not renamed. It holds all of a [`RunHeader`]
+//! except the URDF, which recordings contain unchanged, and the vertices of meshes, which are in
+//! `meshes.bin.zst`.
 
 use flexarm_kinematics::Pose;
 use nalgebra::{Matrix3, Rotation3, Translation3};
@@ -16,16 +16,16 @@ pub(crate) const RUN_JSON: &str = "run.json";
 /// Name of the result in a recording.
 #[allow(dead_code, reason = "not every format has it")]
 pub(crate) const RESULT_JSON: &str = "result.json";
-/// Media type of both.
+/// Media type of both files.
 #[allow(dead_code, reason = "not every format has it")]
 pub(crate) const JSON: &str = "application/json";
 
-/// Version of the format; a reader refuses higher ones.
+/// Version of the format; a reader refuses later ones.
 const FORMAT: u32 = 1;
 
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct RunJson {
-    /// Always first, for whoever looks into the file.
+    /// First in the file, for human readers.
     pub(crate) format: u32,
     robot: String,
     trajectory: String,
@@ -45,7 +45,7 @@ pub(crate) struct RunJson {
     /// Missing in files of older versions.
     #[serde(default)]
     captions: Vec<(f64, String)>,
-    /// Left out where it is the usual one.
+    /// Left out if it is [`crate::START_NS`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     start_ns: Option<u64>,
     magnification: f64,
@@ -54,7 +54,7 @@ pub(crate) struct RunJson {
     description: String,
     /// Groups of key-value pairs, in their order.
     metadata: Vec<(String, Vec<(String, String)>)>,
-    /// Names of the attached files that are not the recorder's own.
+    /// Names of the attached files, except those of the recorder itself.
     pub(crate) attachments: Vec<String>,
     /// Meshes in the order of `meshes.bin.zst`.
     pub(crate) meshes: Vec<MeshEntry>,
@@ -70,12 +70,12 @@ struct Link {
 #[derive(Debug, Serialize, Deserialize)]
 struct Bend {
     link: usize,
-    /// Three lengths (m), then the nine entries of the rotation matrix, row by row.
+    /// Translation (m), then the nine entries of the rotation matrix, row by row.
     stations: Vec<[f64; 12]>,
     carries: Vec<(usize, usize)>,
 }
 
-/// A mesh without its numbers.
+/// A mesh without its vertices and triangles.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct MeshEntry {
     pub(crate) link: usize,
@@ -85,7 +85,8 @@ pub(crate) struct MeshEntry {
     pub(crate) triangles: usize,
 }
 
-/// The header as JSON text. `meshes` says whether its meshes are listed, that is stored beside it.
+/// Returns the header as JSON text. `meshes`: whether to list its meshes, that is whether they are
+/// stored beside it.
 pub(crate) fn write(header: &RunHeader, meshes: bool) -> String {
     let entry = |mesh: &crate::LinkMesh| MeshEntry {
         link: mesh.link,
@@ -128,8 +129,8 @@ pub(crate) fn write(header: &RunHeader, meshes: bool) -> String {
     serde_json::to_string(&run).expect("names, texts and numbers are JSON")
 }
 
-/// What an MCAP file needs besides its topics to be read back: the header, and the meshes if there
-/// are any.
+/// Returns the files that make an MCAP file readable again: the header, and the meshes if there are
+/// any.
 #[cfg(feature = "mcap")]
 pub(crate) fn files(header: &RunHeader) -> std::io::Result<Vec<crate::Attachment>> {
     let file = |name: &str, media_type: &str, bytes| crate::Attachment {
@@ -144,10 +145,10 @@ pub(crate) fn files(header: &RunHeader) -> std::io::Result<Vec<crate::Attachment
     Ok(files)
 }
 
-/// The header without URDF, attached files and meshes, which the caller adds.
+/// Reads the header, without URDF, attached files and meshes, which the caller adds.
 ///
 /// # Errors
-/// In words, what is wrong with the text.
+/// A description of what is wrong with the text.
 pub(crate) fn read(text: &[u8]) -> Result<(RunHeader, RunJson), String> {
     let mut run: RunJson =
         serde_json::from_slice(text).map_err(|error| format!("{RUN_JSON} cannot be read: {error}"))?;
@@ -203,23 +204,23 @@ struct ResultJson {
     format: u32,
     /// Label and value, in their order.
     figures: Vec<(String, String)>,
-    /// The same for people.
+    /// Label and value for human readers.
     readable: Vec<(String, String)>,
-    /// Time (s), kind, words.
+    /// Time (s), kind, text.
     events: Vec<(f64, String, String)>,
-    /// Name, media type and text of the attached files that are text.
+    /// Name, media type and text of the attached text files.
     files: Vec<(String, String, String)>,
 }
 
-/// What an MCAP file needs at its end to give back the result as it was; attached files are in it
-/// by themselves.
+/// Returns the file with the result for the end of an MCAP file; attached files are in it
+/// separately.
 #[cfg(feature = "mcap")]
 pub(crate) fn result_file(result: &RunResult) -> Attachment {
     let text = write_result(&RunResult { attachments: Vec::new(), ..result.clone() });
     Attachment { name: RESULT_JSON.into(), media_type: JSON.into(), bytes: text.into_bytes() }
 }
 
-/// What is known at the end, as JSON text. Attached files that are not text are left out.
+/// Returns the result as JSON text. Attached files that are not text are left out.
 pub(crate) fn write_result(result: &RunResult) -> String {
     let event = |event: &Event| (event.time_s, event.kind.word().to_owned(), event.text.clone());
     let file = |file: &Attachment| {
@@ -236,8 +237,7 @@ pub(crate) fn write_result(result: &RunResult) -> String {
     serde_json::to_string(&result).expect("names, texts and numbers are JSON")
 }
 
-/// The result from such a text; what is not there is empty, kinds of events that are not known are
-/// left out.
+/// Reads a result from JSON text. Missing parts are empty; events of unknown kinds are left out.
 pub(crate) fn read_result(text: &str) -> RunResult {
     let Ok(result) = serde_json::from_str::<ResultJson>(text) else { return RunResult::default() };
     let event =
@@ -267,26 +267,26 @@ fn pose(numbers: &[f64; 12]) -> Pose {
 
 #[cfg(feature = "mcap")]
 pub(crate) mod meshes {
-    //! Triangles of all meshes, one mesh after the other: corners, normals (three `f32` each),
-    //! triangles (three `u32` each), little endian, compressed with zstd.
+    //! Block of the triangles of all meshes, one mesh after the other: vertices, normals (three
+    //! `f32` each), triangles (three `u32` each), little endian, compressed with zstd.
 
     use super::MeshEntry;
     use crate::LinkMesh;
 
     /// Name of the block in a recording.
     pub(crate) const FILE: &str = "meshes.bin.zst";
-    /// Its media type.
+    /// Media type of the block.
     pub(crate) const MEDIA_TYPE: &str = "application/zstd";
 
-    /// Surfaces of an arm take a sixth more than with level 9, whose search was a sixth of what an
-    /// MCAP file took to begin.
+    /// Level of zstd. Surfaces of an arm take a sixth more space than with level 9, whose search
+    /// took a sixth of the start-up time of an MCAP file.
     const LEVEL: i32 = 1;
 
     pub(crate) fn write(meshes: &[LinkMesh]) -> std::io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
         for mesh in meshes {
-            // A mesh without normals for all corners gets zeros: sizes in the file follow from the
-            // counts alone.
+            // Missing normals are written as zeros, so that the counts determine the size of the
+            // block.
             let normals = (0..mesh.positions.len()).map(|k| mesh.normals.get(k).copied().unwrap_or_default());
             let floats = mesh.positions.iter().copied().chain(normals).flatten();
             floats.for_each(|value| bytes.extend(value.to_le_bytes()));
@@ -295,14 +295,14 @@ pub(crate) mod meshes {
         zstd::bulk::compress(&bytes, LEVEL)
     }
 
-    /// The meshes that `entries` describe.
+    /// Reads the meshes described by `entries`.
     ///
     /// # Errors
-    /// In words, what is wrong with the block.
+    /// A description of what is wrong with the block.
     pub(crate) fn read(block: &[u8], entries: &[MeshEntry]) -> Result<Vec<LinkMesh>, String> {
         let size = |entry: &MeshEntry| entry.corners.checked_mul(24)?.checked_add(entry.triangles.checked_mul(12)?);
         let total = entries.iter().try_fold(0_usize, |sum, entry| sum.checked_add(size(entry)?));
-        // A compressed block is at most some thousand times smaller than its contents.
+        // Limit the allocation: no block compresses by a factor of more than 100,000.
         let total =
             total.filter(|total| *total / 100_000 <= block.len()).ok_or("its counts of corners are too large")?;
         let bytes = zstd::bulk::decompress(block, total).map_err(|error| error.to_string())?;

@@ -1,4 +1,4 @@
-//! The sizes a header promises, and the check that a sample keeps them.
+//! Sizes of a sample as given by the header, and the check of a sample.
 
 use std::path::Path;
 
@@ -29,7 +29,7 @@ impl Shape {
         }
     }
 
-    /// Checks every list of the sample, so that the writers may index without care.
+    /// Checks the length of every list of the sample, so that the writers may index without checks.
     pub(crate) fn check(&self, path: &Path, sample: &Sample) -> Result<(), LogError> {
         let twin = |twin: &TwinSample| {
             [

@@ -1,5 +1,5 @@
-//! The table of a run: which numbers of a sample are its columns. CSV and Parquet files share it,
-//! both ways.
+//! The table of a run: mapping between the numbers of a sample and columns. CSV, Parquet and Arrow
+//! files share it, for writing and reading.
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 
@@ -43,7 +43,7 @@ pub(crate) fn columns(header: &RunHeader) -> Vec<String> {
         names.extend(DISPLACEMENT.iter().chain(&WRENCH).map(|part| format!("{element}_{part}")));
     }
     names.extend(["kinetic", "potential", "elastic"].map(|kind| format!("{kind}_energy_j")));
-    // A link may be called `flexible`: later columns give way.
+    // A link may be named `flexible`: of two equal names the later column gets a suffix.
     let mut taken = BTreeSet::new();
     let distinct = |name: String| {
         let numbered = (2..).map(|n| format!("{name}_{n}"));
@@ -53,7 +53,7 @@ pub(crate) fn columns(header: &RunHeader) -> Vec<String> {
     names.into_iter().map(distinct).collect()
 }
 
-/// Puts the numbers of a sample into `row`, in the order of [`columns`].
+/// Replaces `row` by the numbers of a sample, in the order of [`columns`].
 pub(crate) fn fill_row(sample: &Sample, shape: &Shape, row: &mut Vec<f64>) {
     let has_rigid = shape.has_rigid;
     row.clear();
@@ -84,7 +84,7 @@ pub(crate) fn fill_row(sample: &Sample, shape: &Shape, row: &mut Vec<f64>) {
     row.extend([sample.energy.kinetic, sample.energy.potential, sample.energy.elastic]);
 }
 
-/// What a table made of a run with this header leaves out, as sentences.
+/// Lists, as sentences, what a table made of a run with this header leaves out.
 pub(crate) fn left_out(header: &RunHeader) -> Vec<String> {
     let mut left = vec!["the table has no velocities of joints and no orientations of the tool".to_owned()];
     if !header.links.is_empty() {
@@ -93,7 +93,7 @@ pub(crate) fn left_out(header: &RunHeader) -> Vec<String> {
     left
 }
 
-/// What a table cannot tell a recording with pictures, as sentences.
+/// Lists, as sentences, what a recording with pictures lacks if it is made of a table.
 pub(crate) fn unknown(header: &RunHeader) -> Vec<String> {
     let mut unknown = vec![
         "the table has no velocities of joints and no work of the solver: not a number (NaN) in the new file"
@@ -107,21 +107,20 @@ pub(crate) fn unknown(header: &RunHeader) -> Vec<String> {
     unknown
 }
 
-/// What a table is read with: which of its columns is which number of a sample.
+/// Mapping from the columns of a file to the numbers of a sample.
 #[derive(Clone, Debug)]
 pub(crate) struct TableLayout {
-    /// Header as far as column names say it; no links.
+    /// Header as far as column names determine it; no links.
     pub(crate) header: RunHeader,
     /// Index in the file of each column of [`columns`].
     pub(crate) places: Vec<usize>,
 }
 
 impl TableLayout {
-    /// Finds the columns of a run among `names`; their order does not matter, others are passed
-    /// over.
+    /// Finds the columns of a run among `names`; order is irrelevant, other columns are ignored.
     ///
     /// # Errors
-    /// What was found and what was expected.
+    /// Descriptions of what was found and what was expected.
     pub(crate) fn of_names(names: &[String]) -> Result<Self, (String, String)> {
         let has = |name: &str| names.iter().any(|n| n == name);
         let (has_rigid, has_static) = (has("error_tangential_m"), has("static_error_x_m"));
@@ -139,12 +138,12 @@ impl TableLayout {
         Self::of_header(header, names)
     }
 
-    /// Finds the columns that a run with this header has.
+    /// Finds the columns of a run with this header.
     ///
     /// # Errors
-    /// What was found and what was expected.
+    /// Descriptions of what was found and what was expected.
     pub(crate) fn of_header(mut header: RunHeader, names: &[String]) -> Result<Self, (String, String)> {
-        // What the columns do not hold must not be asked of samples.
+        // Samples must not be expected to hold what the columns lack.
         (header.links, header.meshes) = (Vec::new(), Vec::new());
         header.bends = Vec::new();
         (header.magnification, header.urdf) = (0.0, String::new());
@@ -177,8 +176,8 @@ impl TableLayout {
         Ok(Self { header, places })
     }
 
-    /// A sample from the numbers of a row in the order of [`columns`]. What a table does not hold
-    /// is NaN; orientations of the tool are those of the world.
+    /// Fills a sample from the numbers of a row in the order of [`columns`]. Missing quantities are
+    /// NaN; the TCP orientation is that of the world.
     pub(crate) fn sample(&self, row: &[f64], sample: &mut Sample) {
         let mut next = row.iter().copied();
         let mut number = || next.next().unwrap_or(f64::NAN);
@@ -237,15 +236,15 @@ impl TableLayout {
     }
 }
 
-/// Samples per second from two times that follow each other, without the rounding of their
-/// difference.
+/// Returns the sampling rate (Hz) of two consecutive times, rounded to 9 digits to remove the
+/// rounding error of their difference.
 pub(crate) fn rate_hz(first_s: f64, second_s: f64) -> f64 {
     let rate = 1.0 / (second_s - first_s);
     let digits = format!("{rate:.8e}").parse().unwrap_or(rate);
     if rate.is_finite() && rate > 0.0 { digits } else { 0.0 }
 }
 
-/// The first few of many names.
+/// Returns the first few of many names.
 fn shortened<T: AsRef<str>>(names: &[T]) -> String {
     const SHOWN: usize = 8;
     let mut text: Vec<String> =

@@ -1,13 +1,13 @@
-//! Recorders on threads of their own: a run goes on while its samples are written.
+//! Recorders on threads of their own: the simulation goes on while its samples are written.
 //!
 //! Each recorder has a thread and a bounded queue of batches of samples, which all recorders share.
-//! Every recorder sees the same samples in the same order as without threads, so its file has the
+//! Every recorder gets the same samples in the same order as without threads, so its file has the
 //! same bytes. Start at [`Threads::record`].
 //!
-//! A batch is handed over when it is full or when the last one is [`PAUSE`] old, so that a slow run
-//! keeps nothing back. When a queue is full the run waits: memory stays what it is, however long
-//! the run. On a disk that is nearly full it waits for each batch: then no file takes the room that
-//! another needs to reach as far.
+//! A batch is sent when it is full or when [`PAUSE`] has passed since the last one, so that samples
+//! of a slow run are not held back. When a queue is full the run waits, so memory is bounded
+//! regardless of the length of the run. On a nearly full disk it waits for each batch: then no file
+//! takes the space that another needs for the same samples.
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -19,28 +19,28 @@ use std::time::{Duration, Instant};
 use crate::create::{folder_of, is_scarce};
 use crate::{LogError, Recorder, RunResult, Sample};
 
-/// Samples of a batch.
+/// Maximum number of samples in a batch.
 const BATCH: usize = 64;
-/// Batches that wait for a recorder.
+/// Maximum number of batches waiting for a recorder.
 const QUEUE: usize = 4;
-/// Batches that are made: those that wait, one that is being written, one that is being filled.
+/// Number of batches in the ring: those waiting, one being written, one being filled.
 const BATCHES: usize = QUEUE + 2;
-/// Longest time between two batches while samples come.
+/// Maximum time between two batches while samples arrive.
 const PAUSE: Duration = Duration::from_millis(20);
-/// Time between two looks at how much room the disk has.
+/// Time between two checks of the free disk space.
 const LOOK: Duration = Duration::from_millis(200);
 
-/// Some samples in a row.
+/// Consecutive samples.
 #[derive(Default)]
 struct Batch {
     samples: Vec<Sample>,
-    /// How many of them count; the rest is memory to be used again.
+    /// Number of valid samples; the others are buffers to be reused.
     used: usize,
 }
 
 enum Message {
     Samples(Arc<Batch>),
-    /// To be answered when all before it is written.
+    /// Request for an answer once all earlier messages are processed.
     Reach(SyncSender<()>),
     Finish(Arc<RunResult>),
 }
@@ -49,22 +49,22 @@ enum Message {
 struct Worker {
     queue: SyncSender<Message>,
     thread: JoinHandle<(Box<dyn Recorder>, Result<(), LogError>)>,
-    /// The first error of `record`, until it is told.
+    /// First error of `record` until it is returned.
     failed: Arc<Mutex<Option<LogError>>>,
 }
 
 /// Recorders that have begun, each on its thread. Dropped without [`Threads::finish`], the files
-/// close themselves as well as they can, and the threads are over.
+/// are closed as far as possible, and the threads end.
 pub(crate) struct Threads {
     workers: Vec<Worker>,
-    /// The one that is being filled comes first, then the oldest.
+    /// Ring of batches: first the one being filled, then the oldest.
     batches: VecDeque<Arc<Batch>>,
     handed_over: Instant,
-    /// Folder of the first file, whether its disk is nearly full, and when that was seen.
+    /// Folder of the first file, whether its disk is nearly full, and time of that check.
     folder: PathBuf,
     scarce: bool,
     looked: Instant,
-    /// The result is handed over.
+    /// Whether the result has been sent.
     closed: bool,
 }
 
@@ -75,7 +75,7 @@ impl Threads {
             let (queue, received) = sync_channel(QUEUE);
             let failed = Arc::new(Mutex::new(None));
             let slot = failed.clone();
-            // Profilers tell threads by their names.
+            // Name the thread for profilers.
             let name = recorder.path().extension().map_or_else(Default::default, |e| e.to_string_lossy().into_owned());
             let begin = move || write(recorder, &received, &slot);
             let thread = std::thread::Builder::new().name(name).spawn(begin).expect("the system starts a few threads");
@@ -88,15 +88,14 @@ impl Threads {
         Self { workers, batches, handed_over: now, folder, scarce, looked: now, closed: false }
     }
 
-    /// Adds one instant.
+    /// Adds a sample.
     ///
     /// # Errors
-    /// The first error of a recorder that has not been told yet; it may belong to an earlier
-    /// sample.
+    /// The first error of a recorder not returned yet; it may belong to an earlier sample.
     pub(crate) fn record(&mut self, sample: &Sample) -> Result<(), LogError> {
         let current = &mut self.batches[0];
-        // Nobody else has this one any more: each queue is shorter than the ring. Should one be
-        // late, it keeps its own.
+        // No recorder holds this batch any more, since each queue is shorter than the ring. If one
+        // still does, allocate a new batch.
         if Arc::get_mut(current).is_none() {
             *current = Arc::default();
         }
@@ -113,13 +112,13 @@ impl Threads {
         self.untold().map_or(Ok(()), Err)
     }
 
-    /// Gives the batch to all recorders and begins the next.
+    /// Sends the batch to all recorders and begins the next.
     fn hand_over(&mut self) {
         if self.batches[0].used == 0 {
             return;
         }
         for worker in &self.workers {
-            // A thread that has ended says why when it is joined.
+            // The error of a thread that has ended is returned by `join`.
             let _ = worker.queue.send(Message::Samples(self.batches[0].clone()));
         }
         self.handed_over = Instant::now();
@@ -135,18 +134,18 @@ impl Threads {
         }
     }
 
-    /// Until all recorders have written what they were given.
+    /// Waits until all recorders have written all batches sent to them.
     fn wait(&self) {
         let (reached, all) = sync_channel(self.workers.len());
         for worker in &self.workers {
             let _ = worker.queue.send(Message::Reach(reached.clone()));
         }
         drop(reached);
-        // Ends when nobody can answer any more.
+        // Ends when all senders are dropped.
         all.iter().for_each(drop);
     }
 
-    /// Hands over what waits and the result, once.
+    /// Sends the waiting samples and the result; does nothing when called again.
     pub(crate) fn close(&mut self, result: &RunResult) {
         if std::mem::replace(&mut self.closed, true) {
             return;
@@ -158,11 +157,11 @@ impl Threads {
         }
     }
 
-    /// Until all is written, and the result ([`Threads::close`]); the recorders again, and what
-    /// went wrong first.
+    /// Sends the result ([`Threads::close`]) and waits until everything is written; returns the
+    /// recorders and the first error.
     ///
     /// # Panics
-    /// If a recorder did.
+    /// If a recorder panicked.
     pub(crate) fn finish(mut self, result: &RunResult) -> (Vec<Box<dyn Recorder>>, Result<(), LogError>) {
         self.close(result);
         let (mut recorders, mut outcome) = (Vec::new(), Ok(()));
@@ -176,7 +175,7 @@ impl Threads {
         (recorders, outcome)
     }
 
-    /// The first error that is not told yet.
+    /// Returns the first error not returned yet.
     fn untold(&self) -> Option<LogError> {
         self.workers.iter().find_map(|worker| worker.failed.lock().unwrap_or_else(PoisonError::into_inner).take())
     }
@@ -190,13 +189,12 @@ impl Drop for Threads {
         self.hand_over();
         for Worker { queue, thread, .. } in self.workers.drain(..) {
             drop(queue);
-            let _ = thread.join(); // the recorder is dropped here and closes its file
+            let _ = thread.join(); // the recorder is dropped with the thread and closes its file
         }
     }
 }
 
-/// What a thread does: writes samples until there are no more, or until that fails, then the
-/// result.
+/// Body of a thread: writes samples until the queue ends or a write fails, then the result.
 fn write(
     mut recorder: Box<dyn Recorder>,
     received: &Receiver<Message>,

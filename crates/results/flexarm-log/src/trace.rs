@@ -1,46 +1,46 @@
-//! A run in memory: what reports, overlays and conversions draw from.
+//! A run in memory: the data for reports, overlays and conversions.
 
 use crate::trace_blocks::{Blocks, CurveQuantity};
 use crate::{Event, LogError, RunHeader, RunResult, Sample};
 
-/// A run as columns of scalars, with the sample of the largest error.
+/// A run as columns of scalars, with the sample of the maximum error.
 ///
-/// For pictures of a run, not for its numbers: [`crate::Columns`] hold every sample.
+/// For plots of a run, not for its exact numbers: [`crate::Columns`] hold every sample.
 ///
-/// Filled like a recorder, by [`Trace::push`] and [`Trace::finish`]. Memory is bounded, however
-/// long the run:
+/// Filled like a recorder, by [`Trace::push`] and [`Trace::finish`]. Memory is bounded, independent
+/// of the length of the run:
 ///
-/// * **Curves** ([`Trace::curve`]) of more than [`Trace::WHOLE`] samples are the smallest and the
-///   largest value of each of equal stretches; [`Trace::samples_per_block`] tells. No peak is lost.
-/// * **Rows** of such a run have the figures of the tool alone (their lists are empty). At
+/// * **Curves** ([`Trace::curve`]) of more than [`Trace::WHOLE`] samples consist of the minimum and
+///   the maximum of each block of [`Trace::samples_per_block`] samples. No peak is lost.
+/// * **Rows** of such a run only have the TCP figures and energies (their lists are empty). At
 ///   [`Trace::LIMIT`] rows every second one is dropped and only every second sample is taken from
-///   then on, so that they stay evenly spaced; [`Trace::stride`] tells. A trace of
-///   [`Trace::for_page`] does so at [`Trace::WHOLE`] rows.
-/// * The sample of the largest error ([`Trace::peak`]), and the error of the first
+///   then on, so that they stay evenly spaced ([`Trace::stride`]). A trace of [`Trace::for_page`]
+///   does so at [`Trace::WHOLE`] rows.
+/// * The sample of the maximum error ([`Trace::peak`]), and the error of the first
 ///   [`Trace::BEGINNING`] samples ([`Trace::beginning`]), are always kept.
 #[derive(Clone, Debug, Default)]
 pub struct Trace {
-    /// What stays the same.
+    /// Data that are constant over the run.
     pub header: RunHeader,
-    /// Rows, in order of time; one of every [`Trace::stride`] samples.
+    /// Rows, in order of time; one per [`Trace::stride`] samples.
     pub rows: Vec<TraceRow>,
-    /// The sample with the largest TCP error, for pictures.
+    /// Sample with the maximum TCP error.
     pub peak: Sample,
-    /// What is known at the end.
+    /// Data known at the end.
     pub result: RunResult,
     stride: u64,
     seen: u64,
     without_curves: bool,
     for_page: bool,
     peak_error: f64,
-    /// Curves of a long run, and the row that fills them.
+    /// Curves of a long run, and the row buffer that fills them.
     blocks: Blocks,
     row: TraceRow,
-    /// The first samples of a long run.
+    /// Errors of the first samples of a long run.
     beginning: Vec<(f64, [f64; 3])>,
 }
 
-/// Scalars of one instant; the same numbers as in the [`Sample`].
+/// Scalars of one sample; the same numbers as in [`Sample`].
 ///
 /// The lists of a run of more than [`Trace::WHOLE`] samples are empty.
 #[derive(Clone, Debug, Default)]
@@ -53,19 +53,19 @@ pub struct TraceRow {
     pub error_path: [f64; 6],
     /// See [`Sample::static_m`].
     pub static_m: [f64; 3],
-    /// Place of the rigid TCP (m).
+    /// Position of the rigid TCP (m).
     pub rigid_m: [f64; 3],
-    /// Place of the flexible TCP (m).
+    /// Position of the flexible TCP (m).
     pub flexible_m: [f64; 3],
     /// See [`Sample::contributions`].
     pub contributions: Vec<[f64; 3]>,
     /// Joint positions of the flexible robot (rad or m).
     pub q: Vec<f64>,
-    /// Joint velocities of the flexible robot.
+    /// Joint velocities of the flexible robot (rad/s or m/s).
     pub qdot: Vec<f64>,
-    /// Forces of the drives, flexible robot (N m or N).
+    /// Drive efforts of the flexible robot (N m or N).
     pub effort: Vec<f64>,
-    /// Forces of the drives, rigid twin.
+    /// Drive efforts of the rigid twin (N m or N).
     pub rigid_effort: Vec<f64>,
     /// Deflection (m, rad) and load (N, N m) per elastic element.
     pub elastic: Vec<crate::ElasticSample>,
@@ -74,7 +74,7 @@ pub struct TraceRow {
 }
 
 impl TraceRow {
-    /// Size of the TCP error (m).
+    /// Norm of the TCP error (m).
     #[must_use]
     pub fn error_m(&self) -> f64 {
         size(&self.error_world)
@@ -82,7 +82,7 @@ impl TraceRow {
 }
 
 impl TraceRow {
-    /// Takes the numbers of a sample; its lists are used again.
+    /// Copies the numbers of a sample, reusing the memory of the lists.
     fn fill(&mut self, sample: &Sample) {
         self.time_s = sample.time_s;
         self.error_world = sample.error_world;
@@ -105,7 +105,7 @@ impl TraceRow {
     }
 }
 
-/// Time and translation of the error.
+/// Time and translational error of a row.
 fn translation(row: &TraceRow) -> (f64, [f64; 3]) {
     (row.time_s, [0, 1, 2].map(|c| row.error_world[c]))
 }
@@ -115,37 +115,37 @@ fn size(error: &[f64; 6]) -> f64 {
 }
 
 impl Trace {
-    /// Most samples of a run whose rows and curves are kept as they are.
+    /// Maximum number of samples of a run whose rows and curves are kept in full.
     pub const WHOLE: usize = 1 << 13;
-    /// Rows at which a run is thinned: ten times as many as a plot has points.
+    /// Number of rows at which a run is thinned: ten times the number of points of a plot.
     pub const LIMIT: usize = 1 << 15;
-    /// First samples of a long run whose errors are kept, for its spectrum.
+    /// Number of samples of a long run, from its start, whose errors are kept for its spectrum.
     pub const BEGINNING: usize = 100_000;
 
-    /// An empty trace of a run.
+    /// Creates an empty trace of a run.
     #[must_use]
     pub fn new(header: RunHeader) -> Self {
         Self { header, stride: 1, peak_error: -1.0, ..Self::default() }
     }
 
-    /// An empty trace that keeps no rows, only the sample of the largest error.
+    /// Creates an empty trace that keeps no rows, only the sample of the maximum error.
     #[must_use]
     pub fn without_curves(header: RunHeader) -> Self {
         Self { without_curves: true, ..Self::new(header) }
     }
 
-    /// An empty trace that keeps few rows of a long run: a page shows its curves.
+    /// Creates an empty trace that keeps few rows of a long run, for a page that shows its curves.
     #[must_use]
     pub fn for_page(header: RunHeader) -> Self {
         Self { for_page: true, ..Self::new(header) }
     }
 
-    /// Rows at which a long run is thinned.
+    /// Number of rows at which a long run is thinned.
     fn limit(&self) -> usize {
         if self.for_page { Self::WHOLE } else { Self::LIMIT }
     }
 
-    /// Adds one instant.
+    /// Adds a sample.
     pub fn push(&mut self, sample: &Sample) {
         let error = size(&sample.error_world);
         if error > self.peak_error {
@@ -181,11 +181,11 @@ impl Trace {
         }
     }
 
-    /// From now on the run is a long one.
+    /// Switches to the storage of a long run.
     fn shorten(&mut self) {
         let mut rows = Vec::with_capacity(self.limit());
         self.beginning.reserve_exact(Self::BEGINNING);
-        // One after the other: the blocks take the memory of their lists.
+        // Row by row, so that the blocks reuse the memory freed by the lists.
         for row in std::mem::take(&mut self.rows) {
             self.blocks.push(&row);
             self.beginning.push(translation(&row));
@@ -194,8 +194,8 @@ impl Trace {
         self.rows = rows;
     }
 
-    /// A curve: a value for each row or, in a long run, smallest and largest value of each block.
-    /// What a run does not have is not a number.
+    /// Returns a curve: a value for each row or, in a long run, minimum and maximum of each block.
+    /// NaN for quantities that the run lacks.
     #[must_use]
     pub fn curve(&self, quantity: CurveQuantity) -> Vec<f64> {
         match self.blocks.is_empty() {
@@ -204,7 +204,7 @@ impl Trace {
         }
     }
 
-    /// The times of [`Trace::curve`] (s).
+    /// Returns the times of [`Trace::curve`] (s).
     #[must_use]
     pub fn curve_times(&self) -> Vec<f64> {
         match self.blocks.is_empty() {
@@ -213,7 +213,7 @@ impl Trace {
         }
     }
 
-    /// How far the rigid tool has gone at the times of [`Trace::curve`] (m).
+    /// Returns the path length of the rigid TCP at the times of [`Trace::curve`] (m).
     #[must_use]
     pub fn curve_ways(&self) -> Vec<f64> {
         if !self.blocks.is_empty() {
@@ -230,14 +230,14 @@ impl Trace {
         self.rows.iter().map(step).collect()
     }
 
-    /// Samples of which a curve has the smallest and the largest value: 1 for a curve that has all.
+    /// Number of samples per minimum and maximum of a curve; 1 for a curve with all samples.
     #[must_use]
     pub fn samples_per_block(&self) -> u64 {
         self.blocks.size().max(1)
     }
 
-    /// Time (s) and translation of the error (m, world axes) of every sample, of the first
-    /// [`Trace::BEGINNING`] samples in a long run.
+    /// Returns time (s) and translational error (m, world axes) of every sample, in a long run of
+    /// the first [`Trace::BEGINNING`] samples.
     #[must_use]
     pub fn beginning(&self) -> Vec<(f64, [f64; 3])> {
         match self.blocks.is_empty() {
@@ -246,24 +246,24 @@ impl Trace {
         }
     }
 
-    /// Samples that were pushed, kept or not.
+    /// Number of samples pushed, kept or not.
     #[must_use]
     pub fn samples(&self) -> u64 {
         self.seen
     }
 
-    /// One of so many samples is kept: 1 for a run that is not thinned, otherwise a power of two.
+    /// Number of samples per row: 1 for a run that is not thinned, otherwise a power of two.
     #[must_use]
     pub fn stride(&self) -> u64 {
         self.stride.max(1)
     }
 
-    /// Adds what is known at the end.
+    /// Adds the data known at the end.
     pub fn finish(&mut self, result: RunResult) {
         self.result = result;
     }
 
-    /// What happened, in order of time.
+    /// Returns the events, in order of time.
     #[must_use]
     pub fn events(&self) -> &[Event] {
         &self.result.events
@@ -278,23 +278,23 @@ impl From<&Sample> for TraceRow {
     }
 }
 
-/// A source of samples: what a run is, then its instants, then its result. Readers of recordings
+/// A source of samples: first the header, then the samples, then the result. Readers of recordings
 /// implement it.
 pub trait RunSource {
-    /// What stays the same.
+    /// Returns the data that are constant over the run.
     fn header(&self) -> &RunHeader;
 
-    /// What the source cannot know of a run, as sentences.
+    /// Lists, as sentences, the data that the source lacks.
     fn missing(&self) -> Vec<String> {
         Vec::new()
     }
 
-    /// What a reader should be told, such as a broken end; complete after [`RunSource::replay`].
+    /// Returns warnings, such as a truncated file; complete after [`RunSource::replay`].
     fn warnings(&self) -> Vec<String> {
         Vec::new()
     }
 
-    /// Calls `take` with every instant, in order of time; returns what is known at the end.
+    /// Calls `take` with every sample, in order of time; returns the data known at the end.
     ///
     /// # Errors
     /// [`LogError`] of the source, or the first one that `take` returns.

@@ -1,58 +1,58 @@
-//! Curves of a long run: of each stretch of samples the smallest and the largest value.
+//! Curves of a long run: minimum and maximum of each block of samples.
 //!
 //! Start at [`Blocks::push`]. Memory does not grow with the run: when there are too many blocks,
-//! pairs become one.
+//! pairs are merged.
 
 use crate::{ElasticSample, TraceRow};
 
-/// Most blocks that are kept, more than a page has points for.
+/// Maximum number of blocks, more than a page has points for.
 const MOST_BLOCKS: usize = 4096;
 
-/// A scalar of a run over time, as curves show it.
+/// A scalar of a run over time, as shown in curves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CurveQuantity {
     /// Component of [`TraceRow::error_world`], 0 to 5 (m, rad).
     Error(usize),
-    /// Size of its translation (m).
+    /// Norm of its translation (m).
     ErrorSize,
-    /// Size of its rotation (rad).
+    /// Norm of its rotation (rad).
     TurnSize,
     /// Component of [`TraceRow::error_path`], 0 to 2 (m).
     AlongPath(usize),
-    /// Size of its part across the path (m).
+    /// Norm of its component across the path (m).
     AcrossPath,
-    /// Size of [`TraceRow::static_m`] (m).
+    /// Norm of [`TraceRow::static_m`] (m).
     StaticSize,
-    /// Size of the error without its static part (m).
+    /// Norm of the error without its static part (m).
     MovingSize,
-    /// Component, 0 to 2, of what a contributor does to the tool (m).
+    /// Component, 0 to 2, of a contributor's share of the TCP displacement (m).
     Contribution(usize, usize),
-    /// Its size (m).
+    /// Its norm (m).
     ContributionSize(usize),
     /// Joint position (rad or m).
     Joint(usize),
     /// Joint velocity (rad/s or m/s).
     JointRate(usize),
-    /// Force of a drive (N m or N).
+    /// Effort of a drive (N m or N).
     Effort(usize),
-    /// Force of a drive of the rigid twin (N m or N).
+    /// Effort of a drive of the rigid twin (N m or N).
     RigidEffort(usize),
     /// Component, 0 to 5, of the deflection of an element (m, rad).
     Deflection(usize, usize),
     /// Component, 0 to 5, of the load of an element (N, N m).
     Load(usize, usize),
-    /// Sizes of an element's displacement (0) and rotation (1) (m, rad).
+    /// Norms of an element's displacement (0) and rotation (1) (m, rad).
     DeflectionSize(usize, usize),
-    /// Sizes of an element's force (0) and moment (1) (N, N m).
+    /// Norms of an element's force (0) and moment (1) (N, N m).
     LoadSize(usize, usize),
-    /// Kinetic, gravitational, elastic energy (J).
+    /// Kinetic (0), gravitational (1), elastic (2) energy (J).
     Energy(usize),
 }
 
 impl CurveQuantity {
     const SIZES: [Self; 5] = [Self::ErrorSize, Self::TurnSize, Self::AcrossPath, Self::StaticSize, Self::MovingSize];
 
-    /// Its value in a row; not a number if the run has no such joint, contributor or element.
+    /// Returns its value in a row; NaN if the run has no such joint, contributor or element.
     #[must_use]
     pub fn of(self, row: &TraceRow) -> f64 {
         let element = |k: usize| row.elastic.get(k);
@@ -79,7 +79,7 @@ impl CurveQuantity {
         }
     }
 
-    /// The values of [`CurveQuantity::all`], in its order.
+    /// Computes the values of [`CurveQuantity::all`], in the same order.
     fn all_values(row: &TraceRow, values: &mut Vec<f64>) {
         let TraceRow { error_world, error_path, energy, .. } = row;
         values.clear();
@@ -103,7 +103,7 @@ impl CurveQuantity {
         }
     }
 
-    /// All of a run with as many contributors, joints and elements as this row.
+    /// Returns all quantities of a run with the contributors, joints and elements of this row.
     fn all(row: &TraceRow) -> Vec<Self> {
         let mut all: Vec<Self> = (0..6).map(Self::Error).collect();
         all.extend(Self::SIZES);
@@ -127,29 +127,29 @@ fn norm(v: &[f64]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// Smallest and largest values of all quantities in stretches of equally many samples.
+/// Minimum and maximum of all quantities in blocks of equal numbers of samples.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Blocks {
     quantities: Vec<CurveQuantity>,
     /// First and last time of each block (s).
     times: Vec<[f64; 2]>,
-    /// Way of the rigid tool at the same times (m).
+    /// Path length of the rigid TCP at the same times (m).
     ways: Vec<[f64; 2]>,
-    /// Smallest and largest value of each quantity, for each block; not a number where there is
-    /// none. Blocks behind those that count are memory to be used again. Each is small: together
-    /// they take what the start of a program has left free.
+    /// Minimum and maximum of each quantity, for each block; NaN where there is none. Entries
+    /// beyond the number of blocks are buffers to be reused. Each block is a small allocation of
+    /// its own, so that together they fit into memory left free by the start of the program.
     ranges: Vec<Vec<[f64; 2]>>,
-    /// Samples of a full block, and of the last one.
+    /// Number of samples of a full block, and of the last one.
     size: u64,
     filled: u64,
     way: f64,
     last_m: [f64; 3],
-    /// Of the last sample; the memory is used again.
+    /// Values of the last sample; buffer reused.
     values: Vec<f64>,
 }
 
 impl Blocks {
-    /// Whether nothing has been added.
+    /// Whether no sample has been added.
     pub(crate) fn is_empty(&self) -> bool {
         self.times.is_empty()
     }
@@ -182,7 +182,7 @@ impl Blocks {
         }
     }
 
-    /// Makes one block of every two.
+    /// Merges every two blocks into one.
     fn halve(&mut self) {
         for k in 0..MOST_BLOCKS / 2 {
             self.times[k] = [self.times[2 * k][0], self.times[2 * k + 1][1]];
@@ -199,8 +199,8 @@ impl Blocks {
         self.size *= 2;
     }
 
-    /// Two values for each block: the smallest and the largest; not a number for what the run does
-    /// not have.
+    /// Returns two values for each block, minimum and maximum; NaN for quantities that the run
+    /// lacks.
     pub(crate) fn values(&self, quantity: CurveQuantity) -> Vec<f64> {
         let Some(at) = self.quantities.iter().position(|known| *known == quantity) else {
             return vec![f64::NAN; 2 * self.times.len()];
@@ -208,23 +208,23 @@ impl Blocks {
         self.ranges[..self.times.len()].iter().flat_map(|ranges| ranges[at]).collect()
     }
 
-    /// The times that belong to [`Blocks::values`] (s).
+    /// Returns the times of [`Blocks::values`] (s).
     pub(crate) fn times(&self) -> Vec<f64> {
         self.times.as_flattened().to_vec()
     }
 
-    /// Way of the rigid tool at these times (m).
+    /// Returns the path lengths of the rigid TCP at these times (m).
     pub(crate) fn ways(&self) -> Vec<f64> {
         self.ways.as_flattened().to_vec()
     }
 
-    /// Samples of a block.
+    /// Number of samples of a block.
     pub(crate) fn size(&self) -> u64 {
         self.size
     }
 }
 
-/// A range around two; what is not a number does not count.
+/// Union of two ranges; NaN is ignored.
 fn wider(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
 }

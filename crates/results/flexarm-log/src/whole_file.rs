@@ -1,4 +1,4 @@
-//! A file that is there whole or not at all: for formats that nobody can read before their end is
+//! A file that is either complete or absent, for formats that cannot be read before their end is
 //! written.
 
 use std::fs::File;
@@ -7,17 +7,17 @@ use std::path::{Path, PathBuf};
 
 use crate::{CreateOptions, LogError};
 
-/// The provisional name of a file, `<file>.partial`, until [`WholeFile::finish`] gives it its own.
-/// A file that is given up goes away.
+/// Temporary name of a file, `<file>.partial`, until [`WholeFile::finish`] renames it. An abandoned
+/// file is removed.
 #[derive(Debug)]
 pub(crate) struct WholeFile {
     options: CreateOptions,
-    /// None once the file has its own name.
+    /// None once the file is renamed.
     partial: Option<PathBuf>,
 }
 
 impl WholeFile {
-    /// A new file under the provisional name of `path`.
+    /// Creates a file under the temporary name of `path`.
     pub(crate) fn create(path: &Path, options: CreateOptions) -> Result<(File, Self), LogError> {
         options.check(path)?;
         let mut name = path.file_name().unwrap_or_default().to_owned();
@@ -27,13 +27,12 @@ impl WholeFile {
         Ok((file, Self { options, partial: Some(partial) }))
     }
 
-    /// Gives the file its name, once its bytes are on the disk. `action` is what an error calls the
-    /// last of them.
+    /// Renames the file once its bytes are on the disk. `action` names the last write in errors.
     pub(crate) fn finish(&mut self, mut file: File, path: &Path, action: &'static str) -> Result<(), LogError> {
-        // The name must not be there before the bytes are.
+        // The name must not exist before the bytes are on the disk.
         file.flush().and_then(|()| file.sync_all()).map_err(LogError::io(path, action))?;
         drop(file);
-        self.options.check(path)?; // not there at the start, but perhaps now
+        self.options.check(path)?; // it may have been created since `create`
         if let Some(partial) = &self.partial {
             std::fs::rename(partial, path).map_err(LogError::io(path, "give the file its name"))?;
         }
@@ -45,7 +44,7 @@ impl WholeFile {
 impl Drop for WholeFile {
     fn drop(&mut self) {
         if let Some(path) = &self.partial {
-            let _ = std::fs::remove_file(path); // what cannot be removed stays
+            let _ = std::fs::remove_file(path); // best effort
         }
     }
 }

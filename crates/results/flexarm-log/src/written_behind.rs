@@ -1,36 +1,37 @@
-//! Long files that do not fill the memory of the machine.
+//! Writing of long files without filling the page cache.
 //!
-//! What is written to a file stays in the system's cache until other files need the room. When 15
-//! GB of recordings had filled it, each further page took the system five times as long as one
-//! before (1.5 instead of 0.3 s a GB, Linux 6, 24 GB), and what others had cached was gone.
-//! [`WrittenBehind`] sends what is far behind to the disk and lets go of it.
+//! Written data stay in the page cache until other files need the memory. When 15 GB of recordings
+//! had filled it, each further page took the system five times as long as before (1.5 instead of
+//! 0.3 s per GB, Linux 6, 24 GB), and cached data of other programs were evicted. [`WrittenBehind`]
+//! writes data far behind the end of the file to the disk and drops them from the cache.
 
 use std::fs::File;
 use std::ops::Range;
 
-/// The beginning of a file stays cached: most files are no longer, and are looked at next.
+/// Number of bytes at the start of a file that stay cached: most files are no longer, and are often
+/// read next.
 const CACHED: u64 = 1 << 30;
-/// So often advice is given, and so far back: the disk has time until the second to the last one
-/// reaches a page.
+/// Number of bytes between two calls of `fadvise`, and the number of bytes that each call covers:
+/// the disk has time to write a page until one of the last calls covers it again.
 const STEP: u64 = 16 << 20;
 const REACH: u64 = 8 * STEP;
 
-/// See the module. Nothing in a file depends on it.
+/// Frees the page cache behind the end of a file. It does not affect the contents of the file.
 #[derive(Debug, Default)]
 pub(crate) struct WrittenBehind {
-    /// Bytes that were in the file when advice was given last.
+    /// Length of the file at the last call of `fadvise` (bytes).
     advised: u64,
 }
 
 impl WrittenBehind {
-    /// To be called when so many bytes are in a file for good.
+    /// Called with the number of bytes that are in the file for good.
     pub(crate) fn advance(&mut self, file: &File, written: u64) {
         if let Some(range) = self.next(written) {
             let_go(file, &range);
         }
     }
 
-    /// Bytes that need not stay in memory, where there are enough of them.
+    /// Returns the range of bytes to drop from the cache, if it is large enough.
     fn next(&mut self, written: u64) -> Option<Range<u64>> {
         let reach = written.saturating_sub(REACH).max(CACHED);
         if written < reach + STEP || written < self.advised + STEP {
@@ -41,8 +42,8 @@ impl WrittenBehind {
     }
 }
 
-/// What of these bytes the disk does not have is sent to it, what it has leaves the cache. It is
-/// advice: an error means that all stays as it is.
+/// Starts writing the dirty pages of a range to the disk and drops the clean ones from the cache.
+/// This is advice: an error has no effect.
 #[cfg(target_os = "linux")]
 fn let_go(file: &File, range: &Range<u64>) {
     let length = std::num::NonZeroU64::new(range.end - range.start);
@@ -56,8 +57,8 @@ fn let_go(_file: &File, _range: &Range<u64>) {}
 mod tests {
     use super::*;
 
-    /// Truth: counted piece by piece. The first advice about a page sends it to the disk, a later
-    /// one lets go of it.
+    /// Truth: counted piece by piece. The first call for a page starts writing it, a later one
+    /// drops it.
     #[test]
     fn what_is_far_behind_is_let_go_of_and_the_beginning_is_not() {
         let (mut behind, mut given) = (WrittenBehind::default(), Vec::new());
@@ -71,7 +72,7 @@ mod tests {
             assert!((6..=8).contains(&times), "{times} times about {piece}");
         }
         assert!((100..=160).contains(&given.len()), "{} times in all", given.len());
-        // Short files are left alone.
+        // Short files stay cached.
         let mut short = WrittenBehind::default();
         assert!((0..CACHED).step_by(1 << 20).all(|written| short.next(written).is_none()));
     }

@@ -1,4 +1,4 @@
-//! Arrow files as other programs read them: through the reader of the Arrow library itself.
+//! Arrow files as other programs read them: with the reader of the Arrow library.
 #![cfg(feature = "arrow")]
 #![allow(non_snake_case, reason = "monogram notation: X_WT, pose of T in W")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
@@ -16,7 +16,7 @@ use arrow_ipc::writer::FileWriter;
 use arrow_schema::DataType;
 use flexarm_log::{CreateOptions, CsvRecorder, LogError, Recorder, RecordingFormat, RunResult, open_recording};
 
-/// More than one record batch.
+/// Number of samples, enough for more than one record batch.
 const SAMPLES: u64 = 20_000;
 
 fn write(mut recorder: impl Recorder, samples: u64) {
@@ -40,7 +40,7 @@ fn bits(batches: &[RecordBatch], column: usize) -> Vec<u64> {
     batches.iter().flat_map(values).collect()
 }
 
-/// Truth: the CSV of the same run, whose numbers read back to the last bit.
+/// Truth: the CSV of the same run, whose numbers read back exactly.
 #[test]
 fn other_readers_find_the_columns_of_the_csv_to_the_last_bit_in_a_file_and_in_its_stream() {
     let path = arrow("columns.arrow", SAMPLES);
@@ -60,7 +60,7 @@ fn other_readers_find_the_columns_of_the_csv_to_the_last_bit_in_a_file_and_in_it
     assert!(schema.fields().iter().all(|field| *field.data_type() == DataType::Float64 && !field.is_nullable()));
     let batches: Vec<RecordBatch> = file.map(Result::unwrap).collect();
     assert_eq!(batches.iter().map(RecordBatch::num_rows).collect::<Vec<_>>(), [16_384, 3_616]);
-    // Behind the first 64 bytes a file is a stream.
+    // After its first 64 bytes a file is a stream.
     let bytes = std::fs::read(&path).unwrap();
     let stream: Vec<RecordBatch> = StreamReader::try_new(&bytes[64..], None).unwrap().map(Result::unwrap).collect();
     for (column, name) in names.iter().enumerate() {
@@ -71,7 +71,7 @@ fn other_readers_find_the_columns_of_the_csv_to_the_last_bit_in_a_file_and_in_it
     [path, table].iter().for_each(|path| std::fs::remove_file(path).unwrap());
 }
 
-/// Truth: what was handed over.
+/// Truth: the data given to the recorder.
 #[test]
 fn names_set_up_and_result_are_metadata_of_the_schema_and_come_back() {
     let path = arrow("texts.feather", 10);
@@ -116,7 +116,7 @@ fn read(path: &Path) -> Result<u64, LogError> {
     Ok(samples)
 }
 
-/// The same run gives the same bytes on any day; nothing of it is there before it is whole.
+/// The same run gives the same bytes on any day; there is no file until it is complete.
 #[test]
 fn an_arrow_file_is_there_whole_or_not_at_all_and_does_not_depend_on_the_clock() {
     let [a, b] = ["once.arrow", "twice.arrow"].map(|name| arrow(name, 100));
@@ -130,7 +130,7 @@ fn an_arrow_file_is_there_whole_or_not_at_all_and_does_not_depend_on_the_clock()
     [a, b].iter().for_each(|path| std::fs::remove_file(path).unwrap());
 }
 
-/// A table that another program wrote: a column more, in another order, without texts.
+/// A table of another program: with an additional column, in another order, without texts.
 #[test]
 fn a_table_of_another_program_is_read_and_one_that_lacks_a_column_is_refused() {
     let path = arrow("foreign.arrow", 20);
@@ -159,7 +159,7 @@ fn a_table_of_another_program_is_read_and_one_that_lacks_a_column_is_refused() {
         Ok(())
     })
     .unwrap();
-    // Without a description the joints are in the order of the columns.
+    // Without a header the joints are in the order of the columns.
     assert_eq!(run.header().joints, ["joint_3", "joint_2", "joint_1"]);
     assert_eq!(seen.unwrap().flexible.q, truth.flexible.q.into_iter().rev().collect::<Vec<_>>());
     save(&all[..5]);

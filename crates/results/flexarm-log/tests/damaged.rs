@@ -1,5 +1,5 @@
-//! Damaged recordings: whatever their bytes say, reading them ends with samples or with an error,
-//! in bounded memory.
+//! Damaged recordings: reading them ends with samples or with an error, in bounded memory, whatever
+//! their bytes.
 #![allow(non_snake_case, reason = "monogram notation: X_WT, pose of T in W")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
@@ -11,11 +11,11 @@ use flexarm_testkit::allocations::{CountingAllocator, most_bytes};
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;
 
-/// What reading a small file may take.
+/// Maximum memory for reading a small file (bytes).
 const MOST_BYTES: usize = 200 << 20;
 const CHANGES: u64 = 1000;
 
-/// Numbers that look random and are the same every time (xorshift).
+/// Pseudo-random numbers with a fixed sequence (xorshift).
 fn next(seed: &mut u64) -> u64 {
     *seed ^= *seed << 13;
     *seed ^= *seed >> 7;
@@ -23,8 +23,8 @@ fn next(seed: &mut u64) -> u64 {
     *seed
 }
 
-/// One change of the kinds that broke readers: a byte inverted, zeros, an end cut off, and lengths
-/// that nobody has.
+/// Applies a change of a kind that broke readers: an inverted byte, zeros, truncation, and absurd
+/// lengths.
 fn changed(file: &[u8], kind: u64, seed: &mut u64) -> Vec<u8> {
     let mut file = file.to_vec();
     let at = (next(seed) % (file.len() as u64 - 8)) as usize;

@@ -1,4 +1,4 @@
-//! The table of the formats: what every row must keep.
+//! The table of formats: properties of every row.
 #![allow(non_snake_case, reason = "monogram notation: X_WT, pose of T in W")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
@@ -13,7 +13,7 @@ fn rows() -> impl Iterator<Item = &'static FormatInfo> + Clone {
     RecordingFormat::ALL.into_iter().map(RecordingFormat::info)
 }
 
-/// Truth: what a table needs to be one. Two formats with one name, ending or file would hide each
+/// Truth: consistency of the table. Two formats with one name, extension or file would hide each
 /// other.
 #[test]
 fn every_format_has_its_row_under_its_own_names() {
@@ -35,7 +35,7 @@ fn every_format_has_its_row_under_its_own_names() {
     }
 }
 
-/// Truth: the bytes of files. What a row says of its format is so.
+/// Truth: the bytes of files, which must agree with the row.
 #[test]
 fn a_row_says_how_files_of_its_format_begin_and_what_a_killed_run_leaves() {
     for row in rows().filter(|row| row.format.is_built_in()) {
@@ -48,7 +48,7 @@ fn a_row_says_how_files_of_its_format_begin_and_what_a_killed_run_leaves() {
         let bytes = std::fs::read(&path).unwrap();
         assert!(bytes.starts_with(row.magic), "{}", row.name);
 
-        // Under the name of another format it is called what it is.
+        // Under the name of another format, the error names its own format.
         for other in RecordingFormat::ALL.into_iter().filter(|other| *other != row.format && !row.magic.is_empty()) {
             let error = open_recording(&path, other).map(|_| ()).unwrap_err().to_string();
             assert!(error.contains(&format!("found a file in the format {}", row.name)), "{error}");
@@ -57,7 +57,7 @@ fn a_row_says_how_files_of_its_format_begin_and_what_a_killed_run_leaves() {
     }
 }
 
-/// Truth: the limit itself. A sample at it is taken, one beyond it is refused.
+/// Truth: the limit itself. A sample at the limit is accepted, one beyond it is refused.
 #[test]
 fn a_file_takes_samples_up_to_the_time_that_its_row_says() {
     let header = || RunHeader { start_ns: None, ..synthetic::header() };
@@ -75,7 +75,7 @@ fn a_file_takes_samples_up_to_the_time_that_its_row_says() {
             None => recorder.record(&at(1e12)).unwrap(),
         }
         drop(recorder);
-        let _ = std::fs::remove_file(path); // some are there only when they are finished
+        let _ = std::fs::remove_file(path); // some only exist once finished
     }
 }
 

@@ -1,4 +1,4 @@
-//! The magnified arm: what it keeps and what it enlarges.
+//! The magnified arm: properties it keeps, and displacements it enlarges.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, pose of L in W")]
 
 mod synthetic;
@@ -27,20 +27,20 @@ fn factor_one_gives_the_flexible_robot() {
     }
 }
 
-/// Truth: to first order the displacement of the tool is multiplied; the rest is of second order in
+/// Truth: to first order the displacement of the TCP is multiplied; the rest is of second order in
 /// the angle, here 1.7e-3 rad times 20.
 #[test]
 fn the_tool_moves_by_the_factor_to_first_order() {
     let sample = synthetic::sample(640);
     let from_rigid = |X_WT: &Pose| X_WT.translation.vector - sample.rigid.X_WT.translation.vector;
-    // Once from the sample itself: the magnifier must not be its own truth.
+    // Reference from the sample itself: the magnifier must not be its own truth.
     let (once, twenty) = (from_rigid(&sample.flexible.X_WT), from_rigid(&with_factor(20.0).magnified(&sample).X_WT));
     let error = (twenty - once * 20.0).norm() / twenty.norm();
     assert!(error < 0.04, "{error}");
 }
 
-/// Truth: a rigid link keeps its length and a joint its place at any factor; here forearm to tool,
-/// and the joint at the end of the bent link.
+/// Truth: a rigid link keeps its length and a joint stays closed at any factor; here forearm to
+/// tool, and the joint at the end of the flexible link.
 #[test]
 fn rigid_links_stay_rigid_and_joints_stay_closed() {
     let sample = synthetic::sample(640);

@@ -22,7 +22,7 @@ fn begin(path: &Path, header: &RunHeader) -> McapRecorder {
     recorder
 }
 
-/// A whole run of `samples` samples, as bytes.
+/// Records `samples` samples and returns the bytes of the file.
 fn run(name: &str, header: &RunHeader, samples: u64) -> Vec<u8> {
     let path = synthetic::scratch(name);
     let mut recorder = begin(&path, header);
@@ -33,7 +33,7 @@ fn run(name: &str, header: &RunHeader, samples: u64) -> Vec<u8> {
     bytes
 }
 
-/// Reads CDR as its rules say; the second implementation beside the writer's.
+/// CDR decoder written from the specification, as an independent check of the encoder.
 struct CdrReader<'m> {
     body: &'m [u8],
     at: usize,
@@ -120,14 +120,14 @@ fn every_topic_is_there_with_schema_quality_of_service_and_all_samples() {
         ("/deviation/tcp", "std_msgs/msg/Float64MultiArray", n),
         ("/deviation/tcp_path", "std_msgs/msg/Float64MultiArray", n),
         ("/elastic/joint_states", "sensor_msgs/msg/JointState", n),
-        ("/elastic/upper_arm", "geometry_msgs/msg/WrenchStamped", 120), // 60 Hz, of the samples with poses
+        ("/elastic/upper_arm", "geometry_msgs/msg/WrenchStamped", 120), // 60 Hz, among the samples with poses
         ("/elastic/upper_arm/deflection", "geometry_msgs/msg/TwistStamped", 120),
         ("/energy", "std_msgs/msg/Float64MultiArray", n),
         ("/events", "rcl_interfaces/msg/Log", 3),
         ("/joint_states", "sensor_msgs/msg/JointState", n),
         ("/markers", "visualization_msgs/msg/MarkerArray", 1),
         ("/markers/error", "visualization_msgs/msg/MarkerArray", 41), // 20 Hz, both ends
-        ("/markers/path", "visualization_msgs/msg/MarkerArray", 2),   // at 1 s and 2 s; one point makes no line
+        ("/markers/path", "visualization_msgs/msg/MarkerArray", 2),   // at 1 s and 2 s; a single point makes no line
         ("/rigid/joint_states", "sensor_msgs/msg/JointState", n),
         ("/robot_description", "std_msgs/msg/String", 1),
         ("/solver", "std_msgs/msg/Float64MultiArray", n),
@@ -200,7 +200,7 @@ fn messages_hold_the_samples() {
     assert_eq!(cdr.sequence(), sample.elastic[0].load);
     cdr.end();
 
-    // The first sample with poses from the twelfth sixtieth of a second on.
+    // First sample with poses at or after 12 / 60 s.
     let sample = synthetic::sample(102);
     let picture = |topic: &str| messages(&file, topic)[12].1.clone();
     let data = picture("/elastic/upper_arm/deflection");
@@ -235,7 +235,7 @@ fn frames(file: &[u8], step: u64) -> Frames {
     tree
 }
 
-/// Pose of a frame in the world: the chain of transforms up to it.
+/// Pose of a frame in the world, by the chain of transforms.
 fn in_world(tree: &Frames, frame: &str) -> nalgebra::Isometry3<f64> {
     let mut X = nalgebra::Isometry3::identity();
     let mut frame = frame;
@@ -249,12 +249,12 @@ fn in_world(tree: &Frames, frame: &str) -> nalgebra::Isometry3<f64> {
 }
 
 /// Truth: the poses of links and stations, those of the magnified arm from [`Magnifier`]. Identity:
-/// the chain of transforms from `world` to a frame is its pose.
+/// the chain of transforms from `world` to a frame gives its pose.
 #[test]
 fn the_frames_of_all_robots_chain_up_to_their_poses() {
     let header = synthetic::header();
     let file = run("frames.mcap", &header, 60);
-    // The first sample with poses of a sixtieth of a second: 51 / 500 s > 6 / 60 s.
+    // First sample with poses after 6 / 60 s: 51 / 500 s.
     let tree = frames(&file, 51);
     assert_eq!(tree.len(), 3 * (header.links.len() + 1) + 2 + 10, "three trees with tools, two stations, ten slabs");
 
@@ -276,14 +276,14 @@ fn the_frames_of_all_robots_chain_up_to_their_poses() {
         let X = in_world(&tree, &format!("upper_arm/station_{k}"));
         assert!((X.to_homogeneous() - X_WS.to_homogeneous()).norm() < 1e-13, "station {k}");
     }
-    // Beyond the far end of the bent link its surface moves with the last station.
+    // Beyond the distal end of the flexible link its surface moves with the last station.
     let X = in_world(&tree, "magnified/upper_arm/bend_9") * header.bends[0].X_LS[1].translation;
     let error = (X.to_homogeneous() - magnified.X_WS[1].to_homogeneous()).norm();
     assert!(error < 1e-6, "{error:e}");
 }
 
-/// Truth: the rates of poses and pictures, at most 200 and 60 a second, beside 500 samples a
-/// second.
+/// Truth: the rates of poses and animation frames, at most 200 and 60 per second, with 500 samples
+/// per second.
 #[test]
 fn frames_are_sent_less_often_than_samples_and_the_magnified_arm_less_often_than_the_robots() {
     let file = run("rates.mcap", &synthetic::header(), 501);
@@ -299,7 +299,7 @@ fn frames_are_sent_less_often_than_samples_and_the_magnified_arm_less_often_than
     assert_eq!(counts, (expected.len(), 60, 60));
 }
 
-/// A marker as far as tests look at it: frame, namespace, number, kind, colour, points.
+/// The fields of a marker under test: frame, namespace, number, kind, colour, points.
 type Drawn = (String, String, u32, u32, Vec<f32>, Vec<[f64; 3]>);
 
 fn markers(data: &[u8]) -> Vec<Drawn> {
@@ -309,7 +309,7 @@ fn markers(data: &[u8]) -> Vec<Drawn> {
             let (_, frame) = cdr.header();
             let (namespace, id, kind, action) = (cdr.string(), cdr.u32(), cdr.u32(), cdr.u32());
             assert_eq!(action, 0, "add");
-            cdr.f64s(3 + 4 + 3); // place, attitude, scale
+            cdr.f64s(3 + 4 + 3); // position, orientation, scale
             let color = (0..4).map(|_| f32::from_le_bytes(cdr.take())).collect();
             assert_eq!((cdr.u32(), cdr.u32(), cdr.take::<1>()), (0, 0, [1]), "for ever, locked to its frame");
             let points = (0..cdr.u32()).map(|_| cdr.f64s(3).try_into().unwrap()).collect();
@@ -326,7 +326,7 @@ fn markers(data: &[u8]) -> Vec<Drawn> {
     markers
 }
 
-/// Truth: the meshes of the header; the links that deviate are drawn three times, the others twice.
+/// Truth: the meshes of the header; links that deviate are drawn three times, the others twice.
 #[test]
 fn surfaces_are_in_the_file_in_the_frames_of_all_robots() {
     let header = synthetic::header();
@@ -356,7 +356,7 @@ fn surfaces_are_in_the_file_in_the_frames_of_all_robots() {
     assert!(!magnified.contains(&"magnified/column"), "what does not deviate is not drawn again: {magnified:?}");
 }
 
-/// Truth: rigid tool and error of the sample, the magnification of the header.
+/// Truth: rigid TCP and error of the sample, magnification of the header.
 #[test]
 fn the_error_arrow_is_the_error_magnified_and_paths_follow_the_tools() {
     let header = synthetic::header();
@@ -381,7 +381,7 @@ fn the_error_arrow_is_the_error_magnified_and_paths_follow_the_tools() {
     }
 }
 
-/// Times and topics of all messages in order of time, as readers with an index see them.
+/// Times and topics of all messages in order of time, as given by readers with an index.
 fn by_index(file: &[u8]) -> Vec<(u64, String)> {
     let summary = Summary::read(file).unwrap().unwrap();
     let mut reader = mcap::sans_io::IndexedReader::new(&summary).unwrap();
@@ -400,7 +400,7 @@ fn by_index(file: &[u8]) -> Vec<(u64, String)> {
     seen
 }
 
-/// Truth: the events of the result. They are written last; readers that go by time find them among
+/// Truth: the events of the result. They are written last; readers in order of time find them among
 /// the samples.
 #[test]
 fn events_stand_at_their_own_times() {
@@ -425,8 +425,8 @@ fn events_stand_at_their_own_times() {
     assert_ne!(topics.last().unwrap(), "/events", "the last event is before the last sample");
 }
 
-/// A run that is not to be magnified shows the deflections that it has: of modes, say, which are
-/// large enough to be seen.
+/// Without magnification the deflections are drawn as they are: those of modes, for example, are
+/// large enough to be visible.
 #[test]
 fn without_a_magnification_the_flexible_robot_itself_is_drawn_bent() {
     let header = RunHeader { magnification: 0.0, ..synthetic::header() };
@@ -511,7 +511,7 @@ fn chunks_keep_their_size_and_checksums() {
     assert!(summary.chunk_indexes.len() > 2);
     for chunk in &summary.chunk_indexes {
         assert_eq!(chunk.compression, "zstd");
-        // The last sample may go beyond, and the heads of messages count for nothing.
+        // The last sample may exceed the limit, and message headers are not counted.
         assert!(chunk.uncompressed_size < (1 << 20) * 3 / 2, "{}", chunk.uncompressed_size);
     }
     // The last chunk has the events.
@@ -529,8 +529,8 @@ fn samples_left(file: &[u8]) -> usize {
     stream.map_while(Result::ok).filter(|message| message.channel.topic == "/solver").count()
 }
 
-/// What a kill leaves is what is in the file at that moment: whole chunks, of all samples but those
-/// of the last half second.
+/// After a kill the file has its closed chunks: all samples except those of the last half
+/// second.
 #[test]
 fn a_killed_run_keeps_every_sample_up_to_its_last_chunk() {
     let path = synthetic::scratch("killed.mcap");
@@ -540,8 +540,8 @@ fn a_killed_run_keeps_every_sample_up_to_its_last_chunk() {
         recorder.record(&synthetic::sample(step)).unwrap();
         if step % 37 == 0 {
             let file = std::fs::read(&path).unwrap();
-            // Readers without an index, the ones of others too, meet no broken record and whole
-            // samples only.
+            // Readers without an index, including those of other programs, find no broken record
+            // and only whole samples.
             let stream = MessageStream::new_with_options(&file, Options::IgnoreEndMagic.into()).unwrap();
             let all: Vec<_> = stream.map(Result::unwrap).collect();
             let count = |topic: &str| all.iter().filter(|message| message.channel.topic == topic).count() as u64;
@@ -562,7 +562,7 @@ fn a_file_cut_between_two_chunks_reads_up_to_there() {
     let file = run("cut.mcap", &synthetic::header(), synthetic::SAMPLES);
     let summary = Summary::read(&file).unwrap().unwrap();
     let mut before = 0;
-    // The first chunk holds what is sent once, the last one the events.
+    // The first chunk holds messages sent once, the last one the events.
     for chunk in &summary.chunk_indexes[1..summary.chunk_indexes.len() - 1] {
         let end = (chunk.chunk_start_offset + chunk.chunk_length) as usize;
         let left = samples_left(&file[..end]);
@@ -580,7 +580,7 @@ fn a_dropped_recorder_closes_its_file() {
     drop(recorder);
     let file = std::fs::read(&path).unwrap();
     let summary = Summary::read(&file).unwrap().unwrap();
-    assert_eq!(summary.stats.unwrap().message_count, 10 * 14 + 2 * 2 + 3 + 1); // two pictures, latched ones, the error
+    assert_eq!(summary.stats.unwrap().message_count, 10 * 14 + 2 * 2 + 3 + 1); // two animation frames, latched messages, the error
     std::fs::remove_file(path).unwrap();
 }
 
@@ -602,8 +602,8 @@ fn the_start_time_moves_all_stamps_and_times_out_of_range_are_refused() {
     std::fs::remove_file(path).unwrap();
 }
 
-/// ROS reads 0 as "no time" (tf2: the latest). Truth: the date of the constant, as Python's
-/// `datetime.fromtimestamp(946684800, timezone.utc)` says it: 2000-01-01 00:00.
+/// ROS reads 0 as "no time" (tf2: the latest). Truth: the date of the constant according to
+/// Python's `datetime.fromtimestamp(946684800, timezone.utc)`: 2000-01-01 00:00.
 #[test]
 fn no_stamp_is_zero_and_a_recording_read_back_keeps_its_start() {
     assert_eq!(START_NS, 946_684_800 * 1_000_000_000);
@@ -628,7 +628,7 @@ fn no_stamp_is_zero_and_a_recording_read_back_keeps_its_start() {
     }
 }
 
-/// Rerun shows plots in the order of their names, eight of them: the error of the tool must be
+/// Rerun shows eight plots in the order of their names: the TCP error must be
 /// first.
 #[test]
 fn the_first_plot_that_a_viewer_shows_by_itself_is_the_error_of_the_tool() {
@@ -655,8 +655,8 @@ fn the_first_plot_that_a_viewer_shows_by_itself_is_the_error_of_the_tool() {
     assert_eq!(plotted(12), topics, "however many elements there are");
 }
 
-/// Truth: the topics of a recording of the same run, and what a JSON and an XML reader make of the
-/// files.
+/// Truth: the topics of a recording of the same run, and the contents of the files according to a
+/// JSON and an XML reader.
 #[test]
 fn layouts_refer_to_what_is_in_the_recording() {
     let mut header = synthetic::header();
@@ -677,7 +677,7 @@ fn layouts_refer_to_what_is_in_the_recording() {
     for topic in panels["3D!arm"]["topics"].as_object().unwrap().keys() {
         assert!(topics.contains(&topic.as_str()), "{topic}");
     }
-    // Every panel has its place.
+    // Every panel has a place in the layout.
     fn places(node: &serde_json::Value, found: &mut Vec<String>) {
         match node.as_str() {
             Some(name) => found.push(name.to_owned()),

@@ -11,7 +11,7 @@ use flexarm_log::{
     CreateOptions, Holds, LogError, Recorder, RecordingFormat, RunHeader, RunResult, RunSource, Sample, open_recording,
 };
 
-/// Samples of most tests: more than one chunk of MCAP.
+/// Number of samples of most tests, enough for more than one chunk of MCAP.
 const SAMPLES: u64 = 400;
 
 fn recorder(path: &Path, format: RecordingFormat) -> Box<dyn Recorder> {
@@ -19,7 +19,7 @@ fn recorder(path: &Path, format: RecordingFormat) -> Box<dyn Recorder> {
     format.recorder(path, options).expect("only formats of this build are asked for")
 }
 
-/// Formats of this build whose numbers come back to the last bit.
+/// Formats of this build whose numbers are read back exactly.
 fn exact_formats() -> Vec<RecordingFormat> {
     let exact = |format: &RecordingFormat| format.is_built_in() && format.info().holds != Holds::Pictures;
     RecordingFormat::ALL.into_iter().filter(exact).collect()
@@ -29,7 +29,7 @@ fn scratch(name: &str, format: RecordingFormat) -> PathBuf {
     synthetic::scratch(&format!("{name}.{}", format.extension()))
 }
 
-/// A recording of the made-up run, with or without the rigid twin.
+/// Writes a recording of the synthetic run, with or without the rigid twin.
 fn written(name: &str, format: RecordingFormat, header: &RunHeader, samples: u64) -> PathBuf {
     let path = scratch(name, format);
     let mut recorder = recorder(&path, format);
@@ -39,7 +39,7 @@ fn written(name: &str, format: RecordingFormat, header: &RunHeader, samples: u64
     path
 }
 
-/// Header, samples, result and warnings of a recording.
+/// Reads header, samples, result and warnings of a recording.
 fn read(path: &Path, format: RecordingFormat) -> Result<(RunHeader, Vec<Sample>, RunResult, Vec<String>), LogError> {
     let mut source: Box<dyn RunSource> = open_recording(path, format)?;
     let mut samples = Vec::new();
@@ -50,7 +50,7 @@ fn read(path: &Path, format: RecordingFormat) -> Result<(RunHeader, Vec<Sample>,
     Ok((source.header().clone(), samples, result, source.warnings()))
 }
 
-/// The same run in another format.
+/// Converts a recording to another format.
 fn converted(from: &Path, format: RecordingFormat, name: &str, to: RecordingFormat) -> PathBuf {
     let path = scratch(name, to);
     let mut source = open_recording(from, format).unwrap();
@@ -84,8 +84,8 @@ fn assert_same_but_time(found: &[u8], expected: &[u8]) {
     }
 }
 
-/// The bytes of a table are the check: shortest numbers that read back, so equal tables are equal
-/// numbers.
+/// The bytes of the table are compared: numbers are written as the shortest text that reads back,
+/// so equal bytes mean equal numbers.
 #[test]
 fn a_table_is_the_same_bytes_whatever_formats_it_went_through() {
     for (twin, has_rigid) in [("twin", true), ("alone", false)] {
@@ -100,8 +100,8 @@ fn a_table_is_the_same_bytes_whatever_formats_it_went_through() {
                 let table = converted(&second, to, &format!("{name}-table"), RecordingFormat::Csv);
                 let found = std::fs::read(&table).unwrap();
                 match (from, to) {
-                    // MCAP has whole nanoseconds, and CSV does not say of which step its times are
-                    // multiples.
+                    // MCAP has whole nanoseconds, and CSV does not give the step of which its times
+                    // are multiples.
                     (RecordingFormat::Csv, RecordingFormat::Mcap) => assert_same_but_time(&found, &expected),
                     _ => assert!(found == expected, "{from} to {to}, {twin}"),
                 }
@@ -125,7 +125,7 @@ fn an_mcap_file_gives_back_every_number_to_the_last_bit_and_poses_to_rounding() 
     let mut posed = synthetic::sample(0);
     for (step, found) in (0..).zip(&samples) {
         let truth = synthetic::sample(step);
-        // Poses of links are those of the last sample that has them.
+        // Poses of links are those of the last sample with poses.
         if with_poses.contains(&step) {
             posed = synthetic::sample(step);
         }
@@ -155,8 +155,8 @@ fn an_mcap_file_gives_back_every_number_to_the_last_bit_and_poses_to_rounding() 
     remove(&[&path]);
 }
 
-/// What a header has no topic for is in the attachments; meshes come back as the triangles that
-/// were drawn.
+/// Parts of the header without a topic are in the attachments; meshes are read back as the
+/// triangles drawn.
 #[cfg(feature = "mcap")]
 #[test]
 fn an_mcap_file_gives_back_its_header_with_the_meshes() {
@@ -182,7 +182,7 @@ fn an_mcap_file_gives_back_its_header_with_the_meshes() {
     let truth = synthetic::result();
     assert_eq!((result.figures, result.readable, result.events), (truth.figures, truth.readable, truth.events));
 
-    // A second generation has the same header: nothing is lost bit by bit.
+    // A second conversion gives the same header: no loss accumulates.
     let again = converted(&path, RecordingFormat::Mcap, "header-again", RecordingFormat::Mcap);
     let (second, ..) = read(&again, RecordingFormat::Mcap).unwrap();
     assert_eq!(format!("{second:?}"), format!("{header:?}"));
@@ -214,7 +214,7 @@ fn a_table_is_read_by_the_names_of_its_columns() {
     assert_eq!(header.log_rate_hz, synthetic::RATE_HZ);
     assert!(header.has_rigid && header.links.is_empty());
 
-    // The same columns in another order, with one that is not ours.
+    // The same columns in another order, with an unknown one added.
     let text = std::fs::read_to_string(&path).unwrap();
     let shuffled: String = text
         .lines()
@@ -235,8 +235,8 @@ fn a_table_is_read_by_the_names_of_its_columns() {
     remove(&[&path]);
 }
 
-/// What is read from a file cut anywhere: the error, or the samples in front of the cut, each as it
-/// was recorded.
+/// Reads a file cut at a position: returns the error, or the number of samples before the cut after
+/// comparing them with the originals.
 fn cut_at(file: &[u8], bytes: usize, path: &Path, format: RecordingFormat) -> Result<usize, LogError> {
     std::fs::write(path, &file[..bytes]).unwrap();
     let (_, samples, _, warnings) = read(path, format)?;
@@ -247,14 +247,14 @@ fn cut_at(file: &[u8], bytes: usize, path: &Path, format: RecordingFormat) -> Re
         assert_eq!(found.energy, truth.energy);
     }
     if bytes + 8 >= file.len() && format == RecordingFormat::Mcap {
-        return Ok(samples.len()); // all is there but the closing mark
+        return Ok(samples.len()); // only the closing magic is missing
     }
     assert!(!warnings.is_empty(), "a file cut at {bytes} of {} bytes gives no warning", file.len());
     assert!(warnings[0].starts_with(&path.display().to_string()), "{warnings:?}");
     Ok(samples.len())
 }
 
-/// Cut positions: all of the first, then further and further apart, and all near the end.
+/// Cut positions: all of the first 300, then at larger distances, and all near the end.
 fn cuts(length: usize) -> impl Iterator<Item = usize> {
     let step = length / 300 + 1;
     (0..length.min(300)).chain((300..length).step_by(step)).chain(length.saturating_sub(120)..length)
@@ -284,7 +284,7 @@ fn a_cut_mcap_file_gives_the_samples_before_the_cut_or_a_clear_error() {
     remove(&[&path]);
 }
 
-/// What a kill leaves: whole chunks.
+/// A kill leaves whole chunks.
 #[cfg(feature = "mcap")]
 #[test]
 fn what_a_killed_run_left_is_read_up_to_its_last_chunk() {
@@ -308,8 +308,8 @@ fn what_a_killed_run_left_is_read_up_to_its_last_chunk() {
     remove(&[&path, &copy]);
 }
 
-/// Flipped bits meet a checksum, a size or a name; they must never bring the program down or change
-/// a number unseen.
+/// Flipped bits change a checksum, a size or a name; they must never crash the program or change a
+/// number unnoticed.
 #[cfg(feature = "mcap")]
 #[test]
 fn a_damaged_mcap_file_gives_no_wrong_number() {
@@ -321,7 +321,7 @@ fn a_damaged_mcap_file_gives_no_wrong_number() {
         std::fs::write(&path, &damaged).unwrap();
         let Ok((header, samples, ..)) = read(&path, RecordingFormat::Mcap) else { continue };
         if header.step_s != synthetic::STEP_S || header.elements.len() != 1 {
-            continue; // run.json has no checksum of its own that readers must heed
+            continue; // run.json has no checksum that readers must check
         }
         for (step, found) in (0..).zip(&samples) {
             assert_eq!(
@@ -342,14 +342,14 @@ fn a_cut_csv_file_gives_its_whole_lines() {
     let mut lines = 0;
     for bytes in (head..file.len()).step_by(7) {
         if file[bytes - 1] == b'\n' {
-            continue; // a whole table
+            continue; // a complete table
         }
         let samples = cut_at(&file, bytes, &path, RecordingFormat::Csv).unwrap();
         assert_eq!(samples, file[head..bytes].iter().filter(|byte| **byte == b'\n').count());
         lines = samples;
     }
     assert_eq!(lines, 39);
-    // Within the names of the columns nothing can be known.
+    // A file cut within the column names is an error.
     for bytes in (1..head - 1).step_by(5) {
         std::fs::write(&path, &file[..bytes]).unwrap();
         let error = read(&path, RecordingFormat::Csv).map(|_| ()).unwrap_err();
@@ -371,7 +371,7 @@ fn a_cut_parquet_file_is_an_error_and_never_a_panic() {
     remove(&[&path]);
 }
 
-/// A Parquet file is there whole or not at all; one that was there before stays until then.
+/// A Parquet file is either complete or absent; an existing one is kept until then.
 #[cfg(feature = "parquet")]
 #[test]
 fn a_parquet_file_has_its_name_only_when_it_is_finished() {
@@ -461,7 +461,8 @@ fn an_mcap_file_of_another_program_is_refused_with_its_topics() {
     remove(&[&path]);
 }
 
-/// Another program's Parquet: refused with its columns, unless it has the columns of a recording.
+/// Parquet file of another program: refused with its columns, unless it has the columns of a
+/// recording.
 #[cfg(feature = "parquet")]
 #[test]
 fn a_parquet_file_of_another_program_is_read_by_its_columns_or_refused() {
@@ -501,7 +502,7 @@ fn a_parquet_file_of_another_program_is_read_by_its_columns_or_refused() {
     remove(&[&path]);
 }
 
-/// The picture that a recording gives does not depend on the way that the run took to it.
+/// The contents of a Rerun file do not depend on whether the run was converted.
 #[cfg(all(feature = "rerun", feature = "mcap"))]
 #[test]
 fn a_rerun_file_made_of_an_mcap_file_shows_the_same() {
@@ -532,7 +533,7 @@ fn a_rerun_file_made_of_an_mcap_file_shows_the_same() {
     remove(&[&direct, &mcap, &over]);
 }
 
-/// A file for viewing is refused with the name of the one that is read back.
+/// A write-only format is refused, with the name of the file to read instead.
 #[cfg(feature = "rerun")]
 #[test]
 fn a_rerun_file_is_not_read_back() {

@@ -1,4 +1,4 @@
-//! Several files at once, and files that are there already.
+//! Several files at once, and existing files.
 #![allow(non_snake_case, reason = "monogram notation: X_WT, pose of T in W")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
@@ -45,7 +45,7 @@ fn an_error_names_the_file_and_the_cause() {
     assert!(error.source().unwrap().to_string().contains("No such file"), "{error:?}");
 }
 
-/// A recorder whose disk is full from the first sample on.
+/// A recorder with a full disk from the first sample on.
 struct Full(PathBuf);
 
 impl Recorder for Full {
@@ -85,14 +85,14 @@ fn one_failing_recorder_does_not_cost_the_others_their_data() {
     [good, bad].iter().for_each(|path| std::fs::remove_file(path).unwrap());
 }
 
-/// Truth: the files that are written one sample after another on one thread.
+/// Truth: files written by a single thread, sample after sample.
 #[test]
 fn files_that_are_written_on_threads_have_the_same_bytes() {
     let paths = |folder: &str| {
         let folder = synthetic::scratch(folder);
         std::fs::create_dir(&folder).unwrap();
         let formats = flexarm_log::RecordingFormat::ALL.into_iter().filter(|format| format.is_built_in());
-        // Rerun's SDK draws identifiers from clock and chance.
+        // Rerun's SDK draws identifiers from clock and random numbers.
         let formats = formats.filter(|format| *format != flexarm_log::RecordingFormat::Rrd);
         formats.map(|format| (format, folder.join(format.info().file_name))).collect::<Vec<_>>()
     };
@@ -117,8 +117,8 @@ fn files_that_are_written_on_threads_have_the_same_bytes() {
     [here, there].iter().for_each(|paths| std::fs::remove_dir_all(paths[0].1.parent().unwrap()).unwrap());
 }
 
-/// The error comes after some samples more; what the others have is whole. Given up without an end,
-/// they close themselves.
+/// The error is returned some samples late; the other files are complete. Abandoned recorders close
+/// their files.
 #[test]
 fn a_recorder_that_fails_on_its_thread_is_told_and_the_others_have_all_samples() {
     for finished in [true, false] {
@@ -147,8 +147,8 @@ fn a_recorder_that_fails_on_its_thread_is_told_and_the_others_have_all_samples()
     }
 }
 
-/// One that cannot begin takes the others with it: no stray files, and what was there before is as
-/// it was.
+/// If a recorder cannot begin, the new files of the others are removed, and existing ones are
+/// unchanged.
 #[test]
 fn one_that_cannot_begin_leaves_no_file_of_the_others() {
     let (new, bad) = (synthetic::scratch("new-too.csv"), synthetic::scratch("missing").join("bad.csv"));
@@ -156,7 +156,7 @@ fn one_that_cannot_begin_leaves_no_file_of_the_others() {
     assert!(set.begin(&synthetic::header()).is_err());
     assert!(!new.exists());
 
-    // A folder stands where the second file is to be: the first is not replaced.
+    // A folder has the name of the second file: the first file is not replaced.
     let (old, folder) = (synthetic::scratch("precious.csv"), synthetic::scratch("folder.csv"));
     std::fs::write(&old, "precious").unwrap();
     std::fs::create_dir(&folder).unwrap();

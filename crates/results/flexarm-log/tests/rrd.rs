@@ -44,7 +44,7 @@ fn chunks(file: &[u8]) -> Vec<Chunk> {
     data.collect()
 }
 
-/// Rows with a time, per entity.
+/// Number of rows with a time, per entity.
 fn rows(file: &[u8]) -> BTreeMap<String, usize> {
     let mut rows = BTreeMap::new();
     for chunk in chunks(file).iter().filter(|chunk| !chunk.is_static()) {
@@ -58,8 +58,8 @@ fn rows(file: &[u8]) -> BTreeMap<String, usize> {
     rows
 }
 
-/// Poses are drawn at most every 5 ms: with 500 samples a second in every third, and in the last
-/// one.
+/// Number of samples drawn: at most every 5 ms, so with 500 samples per second every third one, and
+/// the last one.
 const DRAWN: usize = 335;
 
 #[test]
@@ -88,8 +88,8 @@ fn the_error_has_a_row_for_every_sample_and_the_robots_for_every_picture() {
     for plot in causes {
         assert_eq!(rows[&format!("/plots/{plot}")], DRAWN, "{plot}");
     }
-    // What never moves has one row; what comes to rest has none afterwards; a killing of the
-    // ringing takes long.
+    // A fixed link has one row; a link that comes to rest has none afterwards; the ringing decays
+    // slowly.
     for twin in ["flexible", "rigid", "magnified"] {
         let of = |link: &str| rows[&format!("/synthetic/{twin}/{link}")];
         assert_eq!(of("base_link"), 1);
@@ -115,7 +115,7 @@ fn the_error_has_a_row_for_every_sample_and_the_robots_for_every_picture() {
     assert_eq!(fixed.iter().filter(|path| *path == "/summary").count(), 2);
 }
 
-/// Values of a column with a fixed number of numbers in a row, with the times of the rows (ns).
+/// Rows of a column with a fixed number of values per row, with their times (ns).
 fn column(file: &[u8], entity: &str, component: &'static str, width: usize) -> Vec<(i64, Vec<f32>)> {
     let mut found = Vec::new();
     for chunk in chunks(file).iter().filter(|c| !c.is_static() && c.entity_path().to_string() == entity) {
@@ -127,7 +127,7 @@ fn column(file: &[u8], entity: &str, component: &'static str, width: usize) -> V
             _ => chunk.iter_slices::<[f32; 4]>(id).map(|row| row.iter().flatten().copied().collect()).collect(),
         };
         if rows.is_empty() {
-            continue; // other components of the entity have times of their own
+            continue; // other components of the entity have their own times
         }
         assert_eq!(times.len(), rows.len());
         found.extend(times.into_iter().zip(rows));
@@ -154,9 +154,9 @@ fn latest(rows: &[(i64, Pose)], time_ns: i64) -> Pose {
     rows.iter().rev().find(|(time, _)| *time <= time_ns).unwrap().1
 }
 
-/// Truth: the place of the tool centre point that the sample (and so every other recording) says.
-/// Seen through the surfaces: the forearm's mesh ends in it, the upper arm's bent mesh ends where
-/// the forearm begins.
+/// Truth: the TCP position in the sample, and so in every other recording. It is compared with the
+/// surfaces: the forearm's mesh ends at the TCP, the upper arm's bent mesh ends where the forearm
+/// begins.
 #[test]
 fn the_moving_surfaces_agree_with_the_tool_centre_point_to_a_micrometre() {
     let file = run("surfaces.rrd", &synthetic::header(), synthetic::SAMPLES, NEVER);
@@ -170,12 +170,12 @@ fn the_moving_surfaces_agree_with_the_tool_centre_point_to_a_micrometre() {
             let time_ns = (sample.time_s * 1e9).round() as i64;
             let truth = if twin == "flexible" { &sample.flexible } else { &sample.rigid };
             let T = truth.X_WT.translation.vector;
-            // The end of the forearm's box in its own axes.
+            // End of the forearm's box in its own axes.
             let tip = latest(&forearm, time_ns) * nalgebra::Point3::new(0.6, 0.0, 0.0);
             worst[0] = worst[0].max((tip.coords - T).norm());
             worst[1] = worst[1].max((latest(&tcp, time_ns).translation.vector - T).norm());
             if twin == "flexible" {
-                // What is rigid with the far interface of the bent link, at that interface.
+                // Part rigid with the distal interface of the flexible link, at that interface.
                 let end = latest(&upper_arm, time_ns) * latest(&far, time_ns) * nalgebra::Point3::new(0.8, 0.0, 0.0);
                 worst[2] = worst[2].max((end.coords - truth.X_WL[3].translation.vector).norm());
             }
@@ -185,8 +185,8 @@ fn the_moving_surfaces_agree_with_the_tool_centre_point_to_a_micrometre() {
     assert!(worst.iter().all(|error| *error < 1e-6), "{worst:?}");
 }
 
-/// Truth: the line through the stations of the sample at the same time. The bent surface ends in
-/// the far interface.
+/// Truth: the line through the stations of the sample at the same time. The bent surface ends at
+/// the distal interface.
 #[test]
 fn the_bent_surface_ends_where_the_far_interface_is() {
     let file = run("bent.rrd", &synthetic::header(), synthetic::SAMPLES, NEVER);
@@ -218,7 +218,7 @@ fn the_bent_surface_ends_where_the_far_interface_is() {
     }
 }
 
-/// Truth: the samples; millimetres where the names say so.
+/// Truth: the samples, in millimetres where the names say so.
 #[test]
 fn curves_hold_the_samples() {
     let file = run("curves.rrd", &synthetic::header(), 21, NEVER);
@@ -256,7 +256,7 @@ fn content(file: &[u8]) -> BTreeMap<String, Vec<(i64, String)>> {
 
 #[test]
 fn equal_runs_give_equal_content_whenever_they_were_flushed() {
-    let samples = 1200; // a full chunk and a started one
+    let samples = 1200; // a full chunk and a partial one
     let mut contents = [("never", NEVER), ("again", NEVER), ("always", Duration::ZERO)]
         .map(|(name, flush_every)| content(&run(&format!("{name}.rrd"), &synthetic::header(), samples, flush_every)));
     assert!(contents[0].len() > 100, "{} columns", contents[0].len());
@@ -278,8 +278,8 @@ fn the_index_lists_the_recording_and_its_layout() {
     assert_eq!(stores.iter().filter(|store| store.is_recording()).count(), 1);
 }
 
-/// What a kill leaves is what is in the file at that moment: all but the last rows, which were too
-/// few to be written.
+/// After a kill the file has all rows except the last ones, which were too few to be
+/// written.
 #[test]
 fn a_killed_run_keeps_all_but_the_last_samples() {
     let path = synthetic::scratch("killed.rrd");
@@ -309,7 +309,7 @@ fn a_robot_without_meshes_is_drawn_as_lines_and_one_without_a_twin_alone() {
     assert!(!rows.keys().any(|entity| twin.iter().any(|word| entity.contains(word))), "{:?}", rows.keys());
 }
 
-/// Shapes of modes have no size: what swings is named, and no curve, mark or way tells its
+/// Mode shapes have an arbitrary scale: the current mode is named, and no curve, mark or path gives
 /// millimetres.
 #[test]
 fn a_recording_of_shapes_names_what_it_shows_and_has_no_curves() {
@@ -325,7 +325,7 @@ fn a_recording_of_shapes_names_what_it_shows_and_has_no_curves() {
     assert!(rows.contains_key("/synthetic/flexible/tcp"));
 }
 
-/// Names with characters that mean something in an entity path stay one part of it.
+/// Names with special characters of entity paths remain a single part.
 #[test]
 fn any_name_is_one_part_of_a_path() {
     let header = RunHeader {
@@ -376,7 +376,7 @@ fn identity(file: &[u8]) -> String {
         .unwrap()
 }
 
-/// A viewer puts recordings of one identity together: two set-ups, or a run and a study of it, must
+/// Viewers merge recordings with the same identity: two set-ups, or a run and a study of it, must
 /// not share one.
 #[test]
 fn recordings_of_different_set_ups_have_different_identities() {
@@ -406,7 +406,7 @@ fn a_study_that_is_given_up_keeps_the_runs_it_has() {
     first.begin(&synthetic::header()).unwrap();
     (0..100).for_each(|step| first.record(&synthetic::sample(step)).unwrap());
     first.finish(&synthetic::result()).unwrap();
-    // Killed here, the first run would be in the file.
+    // If killed here, the first run would be in the file.
     assert_eq!(rows(&std::fs::read(&path).unwrap())["/plots/study/error/one"], 100);
     let mut second = study.seat(1);
     second.begin(&synthetic::header()).unwrap();
@@ -420,7 +420,7 @@ fn a_study_that_is_given_up_keeps_the_runs_it_has() {
     std::fs::remove_file(path).unwrap();
 }
 
-/// REP-199 calls the frame of the tool `tcp`: the link keeps its pose, the tool centre point its
+/// REP-199 names the tool frame `tcp`: the link keeps its pose, and the TCP entity has its
 /// own.
 #[test]
 fn a_link_called_tcp_and_the_tool_centre_point_are_two_entities() {
@@ -460,7 +460,7 @@ fn what_happened_is_information_and_not_for_debugging() {
     assert!(levels.iter().all(|level| level == "INFO"), "{levels:?}");
 }
 
-/// Truth: the rules of the viewer: it labels multiples of powers of ten that are 20 pixels apart.
+/// Truth: the rule of the viewer, which labels multiples of powers of ten at least 20 pixels apart.
 #[test]
 fn every_plot_has_an_axis_with_labels_at_the_end() {
     let file = run("axes.rrd", &synthetic::header(), synthetic::SAMPLES, NEVER);
@@ -490,7 +490,7 @@ fn number([red, green, blue]: palette::Rgb) -> u32 {
     u32::from_be_bytes([red, green, blue, 0xff])
 }
 
-/// Truth: the table of colours that the report uses.
+/// Truth: the table of colours used by the report.
 #[test]
 fn colours_are_those_of_the_report_and_no_two_shares_have_the_same() {
     let count = 14;

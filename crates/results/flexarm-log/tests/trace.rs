@@ -1,9 +1,9 @@
-//! What a run in memory keeps of its samples.
+//! Samples kept by a run in memory.
 
 use flexarm_log::{CurveQuantity, ElasticSample, RunHeader, Sample, Trace};
 
-/// Truth: counting. Two and a half times as many samples as are kept are halved twice: one of four
-/// is kept, evenly, and the largest error is kept although its sample is not.
+/// Truth: counting. Two and a half times the maximum number of rows are halved twice: every fourth
+/// sample is kept, evenly, and the maximum error is kept although its sample is not.
 #[test]
 fn a_long_run_is_thinned_evenly_and_says_so() {
     const PEAK: u64 = Trace::LIMIT as u64 + 1;
@@ -28,7 +28,7 @@ fn a_short_run_has_every_sample() {
     assert_eq!((trace.rows.len(), trace.samples(), trace.stride()), (1000, 1000, 1));
 }
 
-/// A wave with a spike of one sample, in everything that has curves.
+/// A wave with a spike of one sample, in all quantities with curves.
 fn wave(k: u64) -> Sample {
     let value = (0.01 * k as f64).sin() + if k == 123_457 { 50.0 } else { 0.0 };
     let mut sample = Sample { time_s: k as f64 * 1e-3, ..Sample::default() };
@@ -41,10 +41,10 @@ fn wave(k: u64) -> Sample {
     sample
 }
 
-/// A quantity, and what it is of a sample.
+/// A quantity, and its value in a sample.
 type Truth = (CurveQuantity, fn(&Sample) -> f64);
 
-/// Truth: the samples themselves. Every range of a block holds its samples, and the extremes are
+/// Truth: the samples themselves. Every range of a block contains its samples, and the extremes are
 /// those of the run.
 #[test]
 fn curves_of_a_long_run_lose_no_peak() {
@@ -79,7 +79,7 @@ fn curves_of_a_long_run_lose_no_peak() {
     assert!(
         trace.curve(CurveQuantity::Joint(1)).iter().chain(&trace.curve(CurveQuantity::Effort(0))).all(|x| x.is_nan())
     );
-    // There and back: 9.9 m in a hundred samples forth, 9.9 m back.
+    // Path forth and back: 9.9 m forth in a hundred samples, then 9.9 m back.
     let ways = trace.curve_ways();
     let way = (1..ALL).map(|k| if k % 100 == 0 { 9.9 } else { 0.1 }).sum::<f64>();
     assert!((ways[ways.len() - 1] - way).abs() < 1e-9 * way && ways.is_sorted());

@@ -1,5 +1,5 @@
-//! What keeps a link from being made or exported, by cause and with the numbers, and whether the
-//! input or the run is to blame.
+//! Errors of making or exporting a link, with cause and numbers, and whether the input or the run
+//! is at fault.
 
 mod import;
 mod job;
@@ -15,80 +15,79 @@ use flexarm_settings::Fault;
 pub use import::ImportError;
 pub use job::JobError;
 
-/// What keeps a link from being made or exported.
+/// An error of making or exporting a link.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LinkError {
-    /// A file that is not there, or does not hold what is needed; a place of a result that is
-    /// taken.
+    /// A file is missing or unusable, or the path of a result is taken.
     #[error(transparent)]
     Files(#[from] FileError),
-    /// Something in a job file.
+    /// An invalid job file.
     #[error(transparent)]
     JobFile(#[from] TextFileError),
-    /// Several faults of one job.
+    /// Several errors of one job.
     #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
     Several(Vec<LinkError>),
-    /// A number or a name of a job that makes no sense.
+    /// An invalid number or name in a job.
     #[error(transparent)]
     Job(#[from] JobError),
-    /// Frames of interfaces in an import.
+    /// Invalid interface frames of an import.
     #[error(transparent)]
     ImportJob(#[from] ImportError),
-    /// A reduced-link file.
+    /// An invalid reduced-link file.
     #[error(transparent)]
     Flex(#[from] Box<flexarm_fem::FlexFileError>),
-    /// A mesh file.
+    /// An invalid mesh file.
     #[error(transparent)]
     Mesh(#[from] Box<flexarm_fe_io::MeshError>),
-    /// A file of matrices of another FE program.
+    /// An invalid matrix file of another FE program.
     #[error(transparent)]
     Exchange(#[from] Box<flexarm_fe_io::ExchangeError>),
-    /// An interface of a link to be reduced.
+    /// An invalid interface of a link to be reduced.
     #[error("{place}: interface {interface:?}: {what}")]
     Interface {
-        /// File, file with line, or setting that it comes from.
+        /// File, file with line, or setting that defines the interface.
         place: String,
-        /// Its name.
+        /// Name of the interface.
         interface: String,
-        /// What is wrong and how to mend it.
+        /// Description of the error and its remedy.
         what: String,
     },
-    /// A mesh that could not be reduced to a link.
+    /// A mesh could not be reduced to a link.
     #[error("{}: {source}{note}", path.display())]
     Reduction {
-        /// The mesh.
+        /// The mesh file.
         path: PathBuf,
-        /// What the file can add: numbers of nodes.
+        /// A note from the file: numbers of nodes.
         note: String,
-        /// Why.
+        /// Cause.
         source: Box<MeshLinkError>,
     },
-    /// Matrices that could not become a link.
+    /// A link could not be built from matrices.
     #[error("{}: {source}", path.display())]
     Import {
-        /// The file of the stiffness.
+        /// The stiffness file.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         source: Box<MeshLinkError>,
     },
-    /// Pictures of a reduction that could not be drawn.
-    #[error("the pictures failed: {0}")]
+    /// The pictures of a reduction could not be drawn.
+    #[error("drawing the pictures failed: {0}")]
     Pictures(Box<dyn std::error::Error + Send + Sync>),
 }
 
 impl LinkError {
-    /// A file that does not hold what is needed.
+    /// Error for a file that does not hold the required data.
     pub(crate) fn file(path: impl Into<PathBuf>, what: impl Into<String>) -> Self {
         Self::Files(FileError::Unusable { path: path.into(), what: what.into() })
     }
 
-    /// One fault as it is, several together.
+    /// Returns a single error as it is, several as [`LinkError::Several`].
     pub(crate) fn of_all(mut faults: Vec<Self>) -> Self {
         if faults.len() == 1 { faults.remove(0) } else { Self::Several(faults) }
     }
 
-    /// Whether the input or the run is to blame: the run where memory ran out, a solver did not
+    /// Whether the input or the run is at fault: the run if memory ran out, a solver did not
     /// converge or a result could not be written.
     pub fn fault(&self) -> Fault {
         match self {

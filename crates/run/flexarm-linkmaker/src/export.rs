@@ -1,9 +1,9 @@
-//! A flexible link as matrices for other FE programs: what `flexarm export` does.
+//! Export of a flexible link as matrices for other FE programs (`flexarm export`).
 //!
 //! Stiffness and mass of the interfaces, with modes where the link has them, are converted to the
-//! units asked for, written, read back through the same path as every import, and compared. A text
-//! beside them says the order of the rows and the units, which most formats do not hold. A link
-//! without superelement gives its static stiffness alone. SID holds the modal link instead.
+//! requested units, written, read back by the same code as every import, and compared. A text file
+//! states the order of the rows and the units, which most formats do not hold. For a link without
+//! superelement only its static stiffness is written. SID holds the modal link instead.
 //!
 //! Not here: the formats (`flexarm-fe-io`).
 
@@ -44,7 +44,7 @@ pub enum ExportFormat {
 }
 
 impl ExportFormat {
-    /// Name, as typed.
+    /// Name of the format on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::MatrixMarket => "matrix-market",
@@ -56,30 +56,30 @@ impl ExportFormat {
         }
     }
 
-    /// Largest difference that printing and reading may make, relative to `sqrt(k_ii k_jj)`.
+    /// Tolerance of writing and reading back, relative to `sqrt(k_ii k_jj)`.
     fn digits(self) -> f64 {
         if self == Self::Dmig { 1e-9 } else { 1e-12 }
     }
 }
 
-/// What to export.
+/// Link to export, format and output folder.
 #[derive(Clone, Debug)]
 pub struct ExportJob {
     /// The link file.
     pub link: PathBuf,
-    /// The format.
+    /// Format.
     pub format: ExportFormat,
-    /// Units to write.
+    /// Units of the files.
     pub units: UnitSystem,
-    /// Node numbers of the interfaces; empty: 1001, 1002, ...
+    /// Node numbers of the interfaces; if empty, 1001, 1002, ... (for SID 1, 2, ...).
     pub nodes: Vec<i64>,
-    /// Where to write; made if it is not there.
+    /// Output folder; created if missing.
     pub folder: PathBuf,
-    /// Overwrite what is there.
+    /// Whether to overwrite existing files.
     pub overwrite: bool,
 }
 
-/// Answer of `flexarm export`; SI units, link axes.
+/// Result of `flexarm export`; SI units, link axes.
 #[derive(Clone, Debug, Serialize)]
 pub struct ExportSummary {
     /// Name of the link.
@@ -88,46 +88,46 @@ pub struct ExportSummary {
     pub format: &'static str,
     /// Units of the files.
     pub units: String,
-    /// Rows of the matrices.
+    /// Number of rows of the matrices.
     pub rows: usize,
-    /// How many of them are modal coordinates.
+    /// Number of modal coordinates among the rows.
     pub modes: usize,
-    /// The map with which `flexarm import` reads the files.
+    /// Map with which `flexarm import` reads the files.
     pub map: String,
     /// Mass of the whole link.
     pub mass_kg: f64,
-    /// Its centre of mass.
+    /// Centre of mass.
     pub com_m: [f64; 3],
-    /// Its inertia about the centre of mass, 3×3 (kg m²).
+    /// Inertia about the centre of mass, 3×3 (kg m²).
     pub inertia: [[f64; 3]; 3],
     /// Stiffness at B with A held, 6×6.
     pub stiffness: [[f64; 6]; 6],
     /// Natural frequencies of the matrices with A held (Hz); empty without mass.
     pub frequencies_hz: Vec<f64>,
-    /// What was checked.
+    /// Results of the checks.
     pub checks: ExportChecks,
     /// Wall-clock time (s).
     pub wall_s: f64,
-    /// Largest memory of the process so far; null where the system does not tell.
+    /// Peak memory of the process so far; null where the system does not report it.
     pub peak_rss_bytes: Option<u64>,
-    /// Things worth telling.
+    /// Warnings.
     pub warnings: Vec<String>,
     /// Written files.
     pub files: Vec<String>,
 }
 
-/// Differences between the link and the files as read back, and the checks of the link itself.
+/// Differences between the link and the files read back, and the checks of the link itself.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct ExportChecks {
-    /// Asymmetry of the stiffness of the link's source.
+    /// Asymmetry of the stiffness from which the link was made.
     pub symmetry: f64,
-    /// Force under rigid motion; null where the source was a 6×6.
+    /// Residual force under rigid-body motion; null where the source was a 6×6 matrix.
     pub rigid_body_residual: Option<f64>,
-    /// Largest difference of the mass, relative to `sqrt(m_ii m_jj)`; null without mass.
+    /// Maximum difference of the mass, relative to `sqrt(m_ii m_jj)`; null without mass.
     pub mass_error: Option<f64>,
-    /// Largest difference of the stiffness, relative to `sqrt(k_ii k_jj)`.
+    /// Maximum difference of the stiffness, relative to `sqrt(k_ii k_jj)`.
     pub stiffness_error: f64,
-    /// Largest difference of the mass integrals of a modal link; null in other formats.
+    /// Maximum difference of the mass integrals of a modal link; null in other formats.
     pub integrals_error: Option<f64>,
 }
 
@@ -150,8 +150,8 @@ pub fn export(job: &ExportJob) -> Result<ExportSummary, LinkError> {
     let paths: Vec<PathBuf> = texts.iter().map(|(path, _)| path.clone()).collect();
     check_free(&paths, job.overwrite)?;
 
-    // Back through the door of every import, before anything is written: what cannot be read leaves
-    // no file.
+    // Read the texts back with the code of every import before writing any file: data that cannot
+    // be read leave no file.
     let is_readable = |path: &PathBuf| path.extension().is_none_or(|ending| ending != "txt" && ending != "m");
     let readable = texts.iter().filter(|(path, _)| is_readable(path));
     let readable: Vec<InputFile> =
@@ -164,7 +164,7 @@ pub fn export(job: &ExportJob) -> Result<ExportSummary, LinkError> {
     for (what, error) in [("stiffness", Some(stiffness_error)), ("mass", mass_error)] {
         if error.is_some_and(|error| error.is_nan() || error > job.format.digits()) {
             let error = error.unwrap_or(f64::NAN);
-            warnings.push(format!("the {what} read back differs by {error:.1e} (relative to its diagonal)"));
+            warnings.push(format!("the exported {what}, read back, differs by {error:.1e} (relative to its diagonal)"));
         }
     }
     write_all(&texts)?;
@@ -195,14 +195,15 @@ pub fn export(job: &ExportJob) -> Result<ExportSummary, LinkError> {
     })
 }
 
-/// The superelement of the link, or its static stiffness without mass.
+/// Returns the superelement of the link, or its static stiffness with zero mass; also whether it
+/// has mass.
 fn element_of(link: &ReducedLink, warnings: &mut Vec<String>) -> (Superelement, bool) {
     if let Some(element) = link.details.as_ref().and_then(|details| details.superelement.clone()) {
         return (element, true);
     }
     warnings.push(
-        "the link has no superelement: its static stiffness is written, without mass and modes; the mass of its two \
-         rigid parts is in the text beside it"
+        "the link has no superelement: only its static stiffness is written, without mass and modes; the mass of \
+         its two rigid parts is in the accompanying text file"
             .into(),
     );
     let frame = |name: &str, X_LI| InterfaceFrame { name: name.into(), X_LI, tie: None };
@@ -222,7 +223,7 @@ fn nodes(job: &ExportJob, interfaces: usize) -> Result<Vec<i64>, LinkError> {
     Ok(job.nodes.clone())
 }
 
-/// Largest difference, relative to the diagonal.
+/// Maximum difference, relative to the diagonal.
 fn difference(A: &DMatrix<f64>, B: &DMatrix<f64>) -> f64 {
     if A.shape() != B.shape() {
         return f64::INFINITY;
@@ -233,7 +234,7 @@ fn difference(A: &DMatrix<f64>, B: &DMatrix<f64>) -> f64 {
     all.map(place).fold(0.0, f64::max)
 }
 
-/// All that goes into the files.
+/// Data of the exported files.
 struct Content<'a> {
     job: &'a ExportJob,
     link: &'a ReducedLink,
@@ -243,7 +244,7 @@ struct Content<'a> {
 }
 
 impl Content<'_> {
-    /// Whether rows carry node numbers.
+    /// Whether rows have node numbers.
     fn is_labelled(&self) -> bool {
         matches!(self.job.format, ExportFormat::UserElement | ExportFormat::Dmig)
     }
@@ -258,10 +259,11 @@ impl Content<'_> {
         InterfaceMap { interfaces, modal: Vec::new() }
     }
 
-    /// Matrices in the units of the files: the way back of `assemble_interfaces`.
+    /// Returns the matrices in the units of the files; inverse of `assemble_interfaces`.
     fn matrices(&self) -> (DMatrix<f64>, Option<DMatrix<f64>>) {
         let units = &self.job.units;
         let boundary = self.element.boundary();
+        // Unit of each coordinate: u_SI = diag(d) u_file.
         let d: Vec<f64> = (0..self.element.K.nrows())
             .map(|i| match i {
                 i if i >= boundary => units.mass.sqrt() * units.length,
@@ -269,6 +271,7 @@ impl Content<'_> {
                 _ => 1.0,
             })
             .collect();
+        // K_file = diag(d) K diag(d) / energy, and M likewise with the unit of inertia.
         let energy = units.force() * units.length;
         let inertia = units.mass * units.length * units.length;
         let convert =
@@ -288,7 +291,7 @@ impl Content<'_> {
         physical.chain((0..self.element.modes() as i64).map(|k| DofLabel::new(next + k, 0))).collect()
     }
 
-    /// Names and texts.
+    /// Returns the names and texts of the files.
     fn files(&self) -> Vec<(String, String)> {
         let stem = file_stem(&self.link.name);
         let (K, M) = self.matrices();
@@ -323,7 +326,7 @@ impl Content<'_> {
                 list.extend(M.as_ref().map(|M| ("MAAX", M)));
                 vec![(format!("{stem}.op4"), write_op4(&list))]
             }
-            // Written from the modal link.
+            // SID is written from the modal link by [`sid::export`].
             ExportFormat::Sid => Vec::new(),
             ExportFormat::Simscape => {
                 let zero = DMatrix::zeros(K.nrows(), K.nrows());
@@ -352,13 +355,13 @@ impl Content<'_> {
         format!("ux uy uz rx ry rz of interface {}{modes}", names.join(", then "))
     }
 
-    /// What the format does not say.
+    /// Returns the text with rows, axes, units and interfaces, which the format does not hold.
     fn readme(&self) -> String {
         let units = &self.job.units;
         let mut text = format!(
-            "Link {}, written by flexarm export as {}\n\nrows: {}\naxes: those of the link at every interface\n\
-             units: {units} (length-mass-time; forces follow: 1 unit = {} N); angles in rad\n\nmap for flexarm import: \
-             {} \"{}\" {} {units}\n\ninterfaces (position in the unit of length, link axes):\n",
+            "Link {}, written by flexarm export as {}\n\nrows: {}\naxes: parallel to the link frame at every \
+             interface\nunits: {units} (length-mass-time; derived unit of force = {} N); angles in rad\n\nmap for \
+             flexarm import: {} \"{}\" {} {units}\n\ninterfaces (position in the unit of length, link axes):\n",
             self.link.name,
             self.job.format.name(),
             self.row_order(),
@@ -378,7 +381,7 @@ impl Content<'_> {
     }
 }
 
-/// The rigid parts, as an import takes them.
+/// Returns the rigid parts in the notation of `flexarm import`.
 fn part_lines(link: &ReducedLink) -> String {
     let mut text =
         String::from("\nrigid parts (kg; m; kg m2: ixx,iyy,izz,ixy,ixz,iyz about the centre of mass, link axes):\n");

@@ -1,5 +1,5 @@
-//! From a mesh, or from matrices of another FE program, to a flexible link with its files, and
-//! back.
+//! Flexible links with their files, from a mesh or from matrices of another FE program, and their
+//! export.
 //!
 //! | module | from | to |
 //! | --- | --- | --- |
@@ -47,9 +47,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Everything passes the checks of a link before a file is written; what goes wrong is a
-//! [`LinkError`] by cause. Units: SI, except where a job says otherwise. A link belongs to no robot
-//! here: what one says of it comes as numbers ([`reduce::UrdfLink`]).
+//! Every link is checked before a file is written; errors are a [`LinkError`] by cause. Units: SI,
+//! except where a job specifies others. Links are independent of robots here: data of a robot's
+//! link are given as numbers ([`reduce::UrdfLink`]).
 //!
 //! Not here: formats of other programs (`flexarm-fe-io`), elements and reduction (`flexarm-fem`),
 //! robots, motion.

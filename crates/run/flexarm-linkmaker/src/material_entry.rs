@@ -1,18 +1,18 @@
-//! A material as files say it: the name of a preset, or constants.
+//! A material in a file: the name of a preset, or constants.
 
 use serde::Deserialize;
 
 /// Name of a preset, or constants.
 #[derive(Clone, Debug)]
 pub enum MaterialEntry {
-    /// steel, aluminium, cast_iron, ductile_iron.
+    /// One of steel, aluminium, cast_iron, ductile_iron.
     Named(String),
     /// Elastic constants and density.
     Given(MaterialConstants),
 }
 
 impl<'de> Deserialize<'de> for MaterialEntry {
-    /// By hand, because an untagged enum would not say which constant is missing.
+    /// Implemented by hand: an untagged enum would not report which constant is missing.
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Either;
         impl<'de> serde::de::Visitor<'de> for Either {

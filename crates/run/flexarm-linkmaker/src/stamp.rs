@@ -1,8 +1,8 @@
-//! What the machine says: memory and date.
+//! Data of the machine: memory and date.
 
 use std::time::SystemTime;
 
-/// Largest resident memory of this process, from the kernel.
+/// Returns the peak resident memory of this process (bytes), from the kernel.
 pub(crate) fn peak_rss_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
@@ -10,13 +10,13 @@ pub(crate) fn peak_rss_bytes() -> Option<u64> {
     Some(1024 * kilobytes)
 }
 
-/// Today (UTC), ISO 8601; empty if the clock stands before 1970.
+/// Returns the current date (UTC), ISO 8601; empty if the clock is before 1970.
 pub(crate) fn today() -> String {
     let days = SystemTime::UNIX_EPOCH.elapsed().map_or(0, |since| since.as_secs() / 86_400);
     if days == 0 { String::new() } else { date(days) }
 }
 
-/// Date of a day after 1970-01-01. Gregorian calendar, years from March; Hinnant,
+/// Date of a day, counted from 1970-01-01. Gregorian calendar, years from March; Hinnant,
 /// "chrono-compatible low-level date algorithms" (2013), `civil_from_days`.
 fn date(days: u64) -> String {
     let z = days + 719_468;
@@ -32,7 +32,7 @@ fn date(days: u64) -> String {
 
 #[cfg(test)]
 mod tests {
-    /// Truth: the calendar.
+    /// Truth: calendar dates.
     #[test]
     fn days_since_1970_are_dates() {
         for (days, text) in [(0, "1970-01-01"), (59, "1970-03-01"), (11_016, "2000-02-29"), (20_089, "2025-01-01")] {

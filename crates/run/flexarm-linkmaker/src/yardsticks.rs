@@ -1,25 +1,27 @@
-//! Stiffness and mass of a link against each other and against materials: slips of units, and
-//! matrices that are something else.
+//! Plausibility checks of stiffness against mass, and of the density of a link: detect unit errors
+//! and wrong matrices.
 
 use flexarm_fem::{Doubt, ReducedLink, RigidPart};
 use nalgebra::{Matrix3, Matrix6};
 
-/// Speed of sound along a link by its stiffness and mass (m/s): steel and aluminium have 5,100,
-/// polymers 1,500, beryllium 12,900; what rides on the link makes it less.
+/// Plausible speed of sound along a link, from stiffness and mass (m/s): steel and aluminium have
+/// 5,100, polymers 1,500, beryllium 12,900; attached mass lowers it.
 pub const SOUND: std::ops::RangeInclusive<f64> = 300.0..=13_000.0;
-/// Density of osmium (kg/m³): nothing is heavier.
+/// Density of osmium (kg/m³), the densest material.
 pub const OSMIUM: f64 = 22_600.0;
-/// Part of the distance of the interfaces over which one of them spreads along the link, and part
-/// of the nodes that it has, where it is no seat: bores and flanges of the shipped links spread
-/// over 0.43 with 0.02 of the nodes.
+/// Limits above which an interface is too large for a seat: its extent along the link relative to
+/// the distance of the interfaces, and its share of the nodes. Bores and flanges of the shipped
+/// links reach 0.43 with 0.02 of the nodes.
 const SPREAD: f64 = 0.25;
 const SHARE: f64 = 0.1;
 
-/// Speed of sound along a link by its stiffness in the stiffest of three directions, `l √(k/m)`
-/// (m/s).
+/// Returns the speed of sound along a link according to its stiffness in the stiffest of three
+/// directions, `l √(k/m)` (m/s); `None` if `K` is not positive definite or the result is not
+/// finite.
 ///
-/// * `K`: between its ends, translations first (N/m, N, N m/rad), at any point of it.
-/// * `length`: between its interfaces (m). `mass`: kg.
+/// * `K`: stiffness between the ends, translations first (N/m, N, N m/rad), at any point of the
+///   link.
+/// * `length`: distance between the interfaces (m). `mass`: kg.
 pub fn sound_speed(K: &Matrix6<f64>, length: f64, mass: f64) -> Option<f64> {
     let C = K.cholesky()?.inverse();
     let stiffest = (0..3).map(|i| 1.0 / C[(i, i)]).fold(0.0, f64::max);
@@ -27,14 +29,15 @@ pub fn sound_speed(K: &Matrix6<f64>, length: f64, mass: f64) -> Option<f64> {
     speed.is_finite().then_some(speed)
 }
 
-/// Density that a body of this mass (kg) and inertia about its centre (kg m²) has at least (kg/m³):
-/// of all bodies of one volume the ball has the least moments, `tr(I) / 2 = 3/5 m R²`.
+/// Returns the minimum density (kg/m³) of a body with this mass (kg) and inertia about its centre
+/// of mass (kg m²): among all bodies of equal volume the ball has the smallest moments,
+/// `tr(I) / 2 = 3/5 m R²`.
 pub fn least_density(mass: f64, inertia: &Matrix3<f64>) -> f64 {
     let squared = inertia.trace() / (2.0 * mass) * 5.0 / 3.0;
     mass / (4.0 / 3.0 * std::f64::consts::PI * squared.max(0.0).powf(1.5))
 }
 
-/// What is doubtful of the stiffness and the mass of a link that was made from files.
+/// Returns warnings about implausible stiffness or mass of a link made from files.
 pub(crate) fn of_link(link: &ReducedLink, whole: &RigidPart) -> Vec<Doubt> {
     let mut doubts = Vec::new();
     let length = (link.X_LB.translation.vector - link.X_LA.translation.vector).norm();
@@ -42,36 +45,39 @@ pub(crate) fn of_link(link: &ReducedLink, whole: &RigidPart) -> Vec<Doubt> {
     if let Some(speed) = speed.filter(|speed| !SOUND.contains(speed)) {
         let [end, likely] = match speed {
             speed if speed > *SOUND.end() => ["at most 13000", "stiffness 1000 times too large, or mass in t?"],
-            speed if speed < 1e-2 => ["at least 300", "a flexibility (compliance) for a stiffness?"],
+            speed if speed < 1e-2 => ["at least 300", "compliance instead of stiffness?"],
             _ => ["at least 300", "stiffness in N/mm or kN/m, or mass in g?"],
         };
         let yardstick = if speed > *SOUND.end() { *SOUND.end() } else { *SOUND.start() };
         let said = format!(
-            "by stiffness and mass sound runs along the link with {speed:.3e} m/s, along links {end} ({likely})"
+            "from its stiffness and mass, the speed of sound along the link is {speed:.3e} m/s, expected {end} \
+             ({likely})"
         );
         doubts.push(Doubt::found("link-sound", speed, yardstick, said));
     }
     let density = least_density(whole.mass, &whole.inertia);
     if density.is_finite() && density > OSMIUM {
         let said = format!(
-            "by mass and inertia the link has at least {density:.3e} kg/m3, osmium has {OSMIUM} (mass in g, or lengths in m for mm?)"
+            "from its mass and inertia, the density of the link is at least {density:.3e} kg/m3, above that of \
+             osmium, {OSMIUM} (mass in g, or lengths in m instead of mm?)"
         );
         doubts.push(Doubt::found("link-density", density, OSMIUM, said));
     }
     doubts
 }
 
-/// An interface that is a part of the link, not a seat on it: its nodes are tied together, so that
-/// the link does not bend there.
+/// Returns a warning about an interface that is a section of the link rather than a seat: its nodes
+/// are tied together, so that the link does not bend there.
 ///
-/// * `spread`: between the first and the last of its nodes, along the line of the interfaces, over
-///   the length of that line.
-/// * `share`: its nodes over those of the mesh.
+/// * `spread`: extent of its nodes along the line of the interfaces, relative to the length of that
+///   line.
+/// * `share`: number of its nodes relative to that of the mesh.
 pub(crate) fn of_interface(name: &str, spread: f64, share: f64) -> Option<Doubt> {
     (spread > SPREAD && share > SHARE).then(|| {
         let said = format!(
-            "interface {name:?} takes {:.0} % of the nodes and {:.0} % of the length between the interfaces, on which the link does not \
-             bend: choose the nodes of the seat alone (told above {:.0} and {:.0} %)",
+            "interface {name:?} covers {:.0} % of the nodes and {:.0} % of the length between the interfaces, \
+             where the link cannot deform: select only the nodes of the seat (limits of this warning: {:.0} and \
+             {:.0} %)",
             100.0 * share,
             100.0 * spread,
             100.0 * SHARE,
@@ -85,7 +91,7 @@ pub(crate) fn of_interface(name: &str, spread: f64, share: f64) -> Option<Doubt>
 mod tests {
     use super::*;
 
-    /// Truth: a bar of steel, `EA/l` along it and `12 EI/l³` across: `√(E/rho)`.
+    /// Truth: a steel bar with `EA/l` along it and `12 EI/l³` across it: `√(E/rho)`.
     #[test]
     fn sound_runs_along_a_bar_as_in_its_material() {
         let (E, rho, l, a) = (210e9f64, 7850.0f64, 0.8f64, 0.05f64);
@@ -100,7 +106,7 @@ mod tests {
         assert!(!SOUND.contains(&thousandth), "{thousandth}");
     }
 
-    /// Truth: a ball of steel, and a rod of the same mass, which only looks lighter.
+    /// Truth: a ball of steel, and a rod of the same mass, for which the bound is lower.
     #[test]
     fn no_body_is_lighter_than_the_ball_of_its_inertia() {
         let (density, radius) = (7850.0, 0.1f64);

@@ -1,4 +1,4 @@
-//! What is doubtful of a compensation.
+//! Caveats of a compensation.
 
 use flexarm_trajectory::Extreme;
 
@@ -9,44 +9,50 @@ use flexarm_run::Caveat;
 use flexarm_run::MotionViolation;
 use flexarm_run::Robot;
 
-/// More than this part of the peak left on the model is explained, if it is mostly quick: by more
-/// than the second.
+/// Minimum remaining fraction of the model's peak error that is explained, and minimum share of it
+/// above the cutoff frequency for that explanation.
 const ENOUGH_LEFT: f64 = 0.01;
 const MOSTLY: f64 = 0.5;
-/// A servo that gives this part of its largest torque gives all of it.
+/// Fraction of the torque limit at which a servo counts as saturated.
 const AT_LIMIT: f64 = 1.0 - 1e-9;
 
-/// Where the joints cannot correct everything that is asked for.
+/// Caveat about poses where the joints cannot correct all requested components.
 fn singular_caveat((t_s, directions): (f64, usize), asked: usize) -> Option<Caveat> {
     (directions < asked).then(|| {
         let text = format!(
-            "at {t_s:.2} s the joints move the tool in {directions} of the {asked} directions asked for (a singular pose, or too few joints): \
-             the others are corrected little or not at all there"
+            "at {t_s:.2} s the joints can move the TCP in only {directions} of the {asked} requested directions (a \
+             singular pose, or too few joints): the others are corrected little or not at all"
         );
-        Caveat::said("singular", "compensation", text, "ask for fewer components, or begin and pass elsewhere")
+        Caveat::said(
+            "singular",
+            "compensation",
+            text,
+            "request fewer components, or change the motion to avoid this pose",
+        )
     })
 }
 
-/// Why more than a hundredth of the peak is left on the model, where the motion is too quick.
+/// Caveat about more than a hundredth of the peak left on the model because the motion is too fast.
 fn quick_caveat(answer: &Compensation, quicker: f64) -> Option<Caveat> {
     let (first, hz) = (answer.model_peaks_m.first()?, answer.cutoff_hz?);
     let least = answer.model_peaks_m.iter().copied().fold(f64::INFINITY, f64::min);
     (answer.iterations > 0 && least > ENOUGH_LEFT * first && quicker > MOSTLY).then(|| {
         let text = format!(
-            "{:.1} % of the peak is left on the model itself; {:.0} % of that, by its RMS, is quicker than {hz:.1} Hz, above which the arm is not inverted",
+            "{:.1} % of the peak error remains on the model itself; {:.0} % of that, by its RMS, is above {hz:.1} Hz, \
+             the cutoff frequency of the inversion",
             100.0 * least / first,
             100.0 * quicker
         );
-        Caveat::said("too-quick", "compensation", text, "give the motion more time or smoother accelerations")
+        Caveat::said("too-quick", "compensation", text, "make the motion slower or its accelerations smoother")
     })
 }
 
-/// Iterations that made the error on the model larger, with the frequency up to which the kept ones
-/// correct.
+/// Caveat about discarded iterations, which increased the error on the model, with the cutoff
+/// frequency of those kept.
 fn discarded_caveat(answer: &Compensation, discarded: &[Discarded]) -> Option<Caveat> {
     let each = |of: &Discarded| match of.growth.is_finite() {
         true => {
-            format!("iteration {} (up to {:.1} Hz) made it {:.3} times as large", of.iteration, of.cutoff_hz, of.growth)
+            format!("iteration {} (up to {:.1} Hz) multiplied it by {:.3}", of.iteration, of.cutoff_hz, of.growth)
         }
         false => format!("iteration {} (up to {:.1} Hz) diverged", of.iteration, of.cutoff_hz),
     };
@@ -57,18 +63,18 @@ fn discarded_caveat(answer: &Compensation, discarded: &[Discarded]) -> Option<Ca
     };
     (!named.is_empty()).then(|| {
         let text =
-            format!("iterations that enlarge the RMS error on the model are discarded: {}; {kept}", named.join(", "));
+            format!("iterations that increase the RMS error on the model are discarded: {}; {kept}", named.join(", "));
         let caveat = Caveat::said(
             "discarded",
             "compensation",
             text,
-            "choose a lower cutoff, or give links and gearboxes their damping",
+            "choose a lower cutoff, or set the damping of links and gearboxes",
         );
         if answer.iterations > 0 { caveat.as_note() } else { caveat }
     })
 }
 
-/// Servos of the plant that give all they have: what they lack, no command gives them.
+/// Caveat about saturated servos of the plant: commands cannot compensate for missing torque.
 pub(super) fn of_servos(plant: &Arm, efforts: &[Extreme]) -> Option<Caveat> {
     let joints: Vec<&str> = plant.joints().collect();
     let at_limit = plant.flexible().servo_limits().filter_map(|(k, limit)| {
@@ -77,16 +83,18 @@ pub(super) fn of_servos(plant: &Arm, efforts: &[Extreme]) -> Option<Caveat> {
     });
     let named: Vec<String> = at_limit.collect();
     (!named.is_empty()).then(|| {
-        let text =
-            format!("servos are at their torque limits: {}: what they lack there is not corrected", named.join(", "));
-        Caveat::said("servo-limit", "compensation", text, "slow the motion down where it is quickest")
+        let text = format!(
+            "servos are at their torque limits: {}: the error due to the missing torque is not corrected",
+            named.join(", ")
+        );
+        Caveat::said("servo-limit", "compensation", text, "slow the motion down where it is fastest")
     })
 }
 
-/// What is doubtful of an answer.
+/// Returns the caveats of a result.
 ///
-/// * `own`: limits that the motion passes by itself; `asked`: how many components of the tool
-///   count.
+/// * `own`: limits that the motion itself violates.
+/// * `asked`: number of TCP components to correct.
 pub(super) fn of(
     answer: &Compensation,
     own: &[MotionViolation],
@@ -97,7 +105,7 @@ pub(super) fn of(
     let mut caveats = Vec::new();
     let worse: Vec<&str> = limits::worse(&answer.limits, own).map(|limit| limit.message.as_str()).collect();
     if !worse.is_empty() {
-        let text = format!("the new commands pass limits that the motion keeps: {}", worse.join("; "));
+        let text = format!("the new commands exceed limits that the original motion satisfies: {}", worse.join("; "));
         caveats.push(Caveat::said("limits", "compensation", text, "slow the motion down a little"));
     }
     let untold: Vec<&str> = robot
@@ -108,16 +116,16 @@ pub(super) fn of(
         .collect();
     if !untold.is_empty() {
         let text = format!(
-            "play and friction of {} are not taken away: what they leave depends on the way the joint came",
+            "errors due to backlash and friction of {} are not corrected: they depend on the direction of approach",
             untold.join(", ")
         );
-        caveats.push(Caveat::said("play", "compensation", text, "come to every point from the same side").as_note());
+        caveats.push(Caveat::said("play", "compensation", text, "approach every point from the same side").as_note());
     }
-    // Shaping alone, with the peak of the start and no other, is not meant to.
+    // Shaping alone (a single peak, that of the start) is not meant to reduce the error.
     let corrected = answer.model_peaks_m.len() != 1;
     if corrected && answer.after.peak_m > 0.5 * answer.before.peak_m {
         let text = format!(
-            "less than half of the error is taken away on the plant ({:.3} of {:.3} mm left)",
+            "the error on the plant is reduced by less than half ({:.3} of {:.3} mm remain)",
             1e3 * answer.after.peak_m,
             1e3 * answer.before.peak_m
         );
@@ -125,7 +133,7 @@ pub(super) fn of(
             "little-gained",
             "compensation",
             text,
-            "the model is not that of the plant, or the motion is too quick for it",
+            "the model differs from the plant, or the motion is too fast for it",
         ));
     }
     caveats.extend(discarded_caveat(answer, &found.discarded));

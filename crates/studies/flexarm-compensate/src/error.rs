@@ -1,104 +1,112 @@
-//! Why a motion cannot be compensated.
+//! Errors of compensating a motion.
 
 use flexarm_analysis::{InversionError, LinearError, ShaperError};
 use flexarm_run::ExternalError;
 use flexarm_stepping::TargetError;
 
-/// Why a motion cannot be compensated.
+/// An error of compensating a motion.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CompensateError {
-    /// A rigid robot.
-    #[error("the robot has no flexible link and no elastic drive: its tool is where the rigid arm has it")]
+    /// A robot without flexible links and elastic drives.
+    #[error("the robot has no flexible link and no elastic drive: there is no deflection to compensate")]
     NothingYields,
-    /// Corners.
+    /// A velocity jump in the motion.
     #[error(
-        "the velocity jumps at {t_s} s, which the dynamic method cannot correct: let the motion begin and end at rest and round its corners, or take the static method"
+        "the velocity jumps at {t_s} s, which the dynamic method cannot correct: start and end the motion at rest \
+         and blend its corners, or use the static method"
     )]
     Corner {
-        /// When (s).
+        /// Time of the jump (s).
         t_s: f64,
     },
-    /// Nothing is to be kept.
-    #[error("no component of the tool is chosen: choose some of x, y, z, rx, ry, rz")]
+    /// No TCP component is selected.
+    #[error("no TCP component is selected: select at least one of x, y, z, rx, ry, rz")]
     NoComponent,
-    /// A number that makes no sense.
+    /// An invalid number.
     #[error("{what} is {found}, expected {expected}")]
     Value {
-        /// Which.
+        /// Name of the value.
         what: &'static str,
-        /// Found.
+        /// Value found.
         found: f64,
-        /// Expected.
+        /// Values expected.
         expected: &'static str,
     },
-    /// The run is not logged at the times at which the rigid arm is looked at.
+    /// The run has no sample at a sampling time of the rigid arm.
     #[error("the run has no sample at {t_s} s (off by {off_s:.1e} s): choose a step that divides 0.001 s")]
     Logged {
-        /// When (s).
+        /// Sampling time (s).
         t_s: f64,
-        /// By how much (s).
+        /// Difference to the nearest sample (s).
         off_s: f64,
     },
-    /// The other robot does not have the same joints.
+    /// A plant with other joints than the robot.
     #[error("the plant has the joints {found:?}, the robot {expected:?}: they must be the same")]
     OtherJoints {
-        /// Of the plant.
+        /// Joints of the plant.
         found: Vec<String>,
-        /// Of the robot.
+        /// Joints of the robot.
         expected: Vec<String>,
     },
-    /// Commands pass limits that the motion keeps.
+    /// Commands violate limits that the motion itself keeps.
     #[error(
-        "the new commands pass limits that the motion itself keeps: {}; {}",
+        "the new commands exceed limits that the original motion satisfies: {}; {}",
         limits.join("; "),
-        if *slower { "a slower motion does not mend that, or loads hold its times: change it there, or take it all the same (`limits` = tell)" } else { "let the motion be slower (`limits` = slow), or take it all the same (tell)" }
+        if *slower {
+            "a slower motion does not help, or loads fix its timing: change the motion there, or accept the violation \
+             (`limits` = tell)"
+        } else {
+            "slow the motion down (`limits` = slow), or accept the violation (tell)"
+        }
     )]
     Limits {
-        /// Each in a sentence.
+        /// Violated limits, a sentence each.
         limits: Vec<String>,
-        /// A slower motion was tried.
+        /// Whether a slower motion was tried.
         slower: bool,
     },
-    /// Limits of the acceleration for another number of joints.
-    #[error("{found} limits of the acceleration for a robot of {expected} joints: one for each is expected")]
+    /// A wrong number of acceleration limits.
+    #[error("{found} acceleration limits for a robot of {expected} joints: expected one per joint")]
     Accelerations {
-        /// Found.
+        /// Number found.
         found: usize,
-        /// Expected.
+        /// Number expected.
         expected: usize,
     },
-    /// A payload that changes.
+    /// A payload change, with the static method.
     #[error(
-        "the payload changes at {at_s} s, and the static method knows one payload: use the dynamic method, or compensate each part of the motion by itself"
+        "the payload changes at {at_s} s, but the static method supports only one payload: use the dynamic method, \
+         or compensate each part of the motion separately"
     )]
     StaticPayload {
-        /// When (s).
+        /// Time of the change (s).
         at_s: f64,
     },
-    /// A servo that does not hold its joint.
+    /// A servo that does not hold its position.
     #[error(
-        "the servo of joint {joint:?} holds no position, so that there are no targets for it: give it a position_gain and a velocity_gain, or take motors that are where they are commanded (drives = elastic)"
+        "the servo of joint {joint:?} does not control position, so that no targets can be computed for it: set \
+         its position_gain and velocity_gain, or use motors that follow their commands exactly (drives = elastic)"
     )]
     NothingHolds {
         /// The joint.
         joint: String,
     },
-    /// There is no such shaper.
+    /// An invalid shaper.
     #[error(transparent)]
     Shaper(#[from] ShaperError),
-    /// The modes at the end of the motion are not found.
-    #[error("the modes at the end of the motion, for the shaper: {0}")]
+    /// The modes at the end of the motion cannot be computed.
+    #[error("cannot compute the modes at the end of the motion for the shaper: {0}")]
     Modes(#[from] LinearError),
     /// The linearised arm cannot be inverted.
     #[error(transparent)]
     Inversion(#[from] InversionError),
-    /// A pose without targets.
+    /// A pose without a target.
     #[error("at {t_s:.3} s: {source}")]
     Target {
-        /// When (s).
+        /// Time of the pose (s).
         t_s: f64,
-        /// Why.
+        /// Cause.
         source: TargetError,
     },
 }

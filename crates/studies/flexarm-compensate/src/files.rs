@@ -15,20 +15,20 @@ use flexarm_run::Scenario;
 use flexarm_run::motion_report::check_motion_outputs;
 use flexarm_run::motion_report::motion_texts;
 
-/// A corrected program meets its targets within the digits that are written (m).
+/// Tolerance for the TCP position at corrected targets (m), for the rounding of written digits.
 const WRITTEN_WITHIN_M: f64 = 1e-6;
 
-/// Where everything goes.
+/// Paths of all files.
 pub(super) struct Files {
     /// New motion and page.
     folder: Option<[PathBuf; 2]>,
     recording: Option<PathBuf>,
-    /// The program of the motion, and the output folder.
+    /// Program of the motion, and the output folder.
     program: Option<[PathBuf; 2]>,
 }
 
 impl Files {
-    /// Refuses names that cannot be written before anything is computed.
+    /// Checks the paths before anything is computed.
     pub(super) fn of(motion: &Motion, request: &CompensateRequest) -> Result<Self, Error> {
         check_motion_outputs(&request.motions)?;
         let in_folder = |name: &str| request.output.as_ref().map(|folder| folder.join(name));
@@ -44,7 +44,7 @@ impl Files {
         Ok(Self { folder, recording, program })
     }
 
-    /// The corrected program; what keeps it from being made is a caveat.
+    /// Corrects the program; a failure becomes a caveat.
     pub(super) fn program(
         &self,
         robot: &Robot,
@@ -67,7 +67,7 @@ impl Files {
         let ProgramFigures { targets, corrected: done, left, residual_m, .. } = &corrected.figures;
         if let (true, Some(first)) = (done < targets, left.first()) {
             let text = format!(
-                "{} of {targets} targets of the program stay as they were, the first in line {} ({}): {}",
+                "{} of {targets} targets of the program are unchanged, the first in line {} ({}): {}",
                 targets - done,
                 first.line,
                 first.statement,
@@ -79,11 +79,11 @@ impl Files {
             let text = format!("the corrected program misses a target by {:.4} mm", 1e3 * residual_m);
             said(text, "a move depends on a target that was not corrected");
         }
-        uncovered.into_iter().for_each(|text| said(text, "use the motion instead where that matters"));
+        uncovered.into_iter().for_each(|text| said(text, "use the motion instead if that matters"));
         Some(corrected)
     }
 
-    /// Writes them, and their names into the answer.
+    /// Writes the files, and their names into the result.
     pub(super) fn write(
         &self,
         answer: &mut Compensation,
@@ -119,14 +119,14 @@ impl Files {
         Ok(())
     }
 
-    /// Nobody loses the program that was corrected, whatever may be overwritten.
+    /// Protects the original program, even if files may be overwritten.
     fn refuse_the_program_itself(&self, names: &[PathBuf]) -> Result<(), Error> {
         let Some([program, _]) = &self.program else { return Ok(()) };
         let home = program.parent().and_then(|folder| folder.canonicalize().ok());
         let lost = |name: &&PathBuf| home.is_some() && name.parent().and_then(|f| f.canonicalize().ok()) == home;
         match names.iter().find(lost) {
             Some(name) => {
-                let what = "this is the program that is corrected: choose another output folder".into();
+                let what = "this is the program to be corrected: choose another output folder".into();
                 Err(Error::File { path: name.clone(), what })
             }
             None => Ok(()),

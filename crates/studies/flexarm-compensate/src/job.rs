@@ -1,4 +1,5 @@
-//! A motion on the model, and the commands with which its tool is where it should be.
+//! A motion on the model, and the commands that bring the flexible TCP to the pose of the rigid
+//! one.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -20,70 +21,70 @@ use flexarm_run::prepare::loaded;
 use flexarm_run::robot::tcp_frame;
 use flexarm_run::{RunOptions, RunRequest};
 
-/// Time between two nodes at which the arm is linearised (s).
+/// Maximum time between two nodes at which the arm is linearised (s).
 const NODE_S: f64 = 0.02;
-/// Part of a sample by which logged times may differ from those that are asked for.
+/// Tolerance of logged times, as a fraction of the sampling interval.
 const LOGGED_WITHIN: f64 = 1e-3;
-/// Values of a load of which a mean is made.
+/// Number of values of a load per averaging window.
 const PIECES: u32 = 64;
-/// Windows of a rest over which a load is looked at, at most.
+/// Maximum number of windows over which a load at rest is sampled.
 const LONGEST_REST: f64 = 500.0;
-/// An iteration that leaves more than this part of the one before is the last.
+/// Ratio of errors above which the iteration has settled.
 const SETTLED: f64 = 0.9;
-/// Speeds below this are rest (rad/s or m/s).
+/// Speed below which a joint is at rest (rad/s or m/s).
 const REST: f64 = 1e-6;
-/// Least part of the peak below which nothing more is asked for.
+/// Fraction of the initial error below which the iteration stops.
 const ENOUGH: f64 = 1e-5;
 
-/// A motion on the model, with the poses that its tool should have.
+/// A motion on the model, with the desired TCP poses.
 pub(super) struct Job<'a> {
     arm: &'a Arm,
     request: &'a CompensateRequest,
-    /// The motion with what acts along it.
+    /// The motion with its loads and payloads.
     scenario: &'a Scenario,
     motion: &'a Motion,
-    /// Times of samples (s).
+    /// Sampling times (s).
     pub(super) times: Vec<f64>,
-    /// Joints at these times, m×N.
+    /// Joint positions at these times, m×N.
     q: DMatrix<f64>,
-    /// The rigid arm's tool at these times.
+    /// TCP pose of the rigid arm at these times.
     wanted: Vec<Pose>,
     pub(super) rows: Vec<usize>,
     stop: Stop<'a>,
 }
 
-/// What a run showed.
+/// Result of a run.
 pub(super) struct Seen {
-    /// Displacement of the tool from where it should be, 6×N, world axes.
+    /// Displacement of the TCP from its desired pose, 6×N, world axes.
     pub(super) error: DMatrix<f64>,
-    /// Largest torque or force of each drive.
+    /// Maximum torque or force of each drive.
     pub(super) efforts: Vec<Extreme>,
 }
 
-/// Commands as they were found.
+/// Result of a method.
 pub(super) struct Commands {
     pub(super) motion: Motion,
-    /// Change of the joints, m×N.
+    /// Change of the joint positions, m×N.
     pub(super) change: DMatrix<f64>,
     pub(super) peaks: Vec<f64>,
     pub(super) kept: usize,
     pub(super) cutoff_hz: Option<f64>,
-    /// When the joints move the tool in fewest directions (s), and in how many.
+    /// Time (s) at which the joints control the fewest TCP directions, and their number.
     pub(super) fewest: Option<(f64, usize)>,
-    /// Part of what is left on the model, by its RMS, that is quicker than the cutoff.
+    /// Fraction of the remaining RMS error on the model above the cutoff frequency.
     pub(super) quicker: f64,
-    /// Iterations that made the error larger.
+    /// Discarded iterations, which increased the error.
     pub(super) discarded: Vec<Discarded>,
 }
 
-/// An iteration that made the error larger.
+/// An iteration that increased the error.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Discarded {
-    /// Its number, from 1.
+    /// Number of the iteration, from 1.
     pub(super) iteration: usize,
-    /// Highest frequency that it corrected (Hz).
+    /// Cutoff frequency of its correction (Hz).
     pub(super) cutoff_hz: f64,
-    /// RMS error after it over that before it; NaN if the run diverged.
+    /// Ratio of the RMS error after the iteration to that before; NaN if the run diverged.
     pub(super) growth: f64,
 }
 
@@ -96,8 +97,8 @@ impl<'a> Job<'a> {
     ) -> Result<Self, Error> {
         let motion = &scenario.motion;
         let model = arm.robot().rigid_model()?;
-        // Whole numbers of steps, so that the run is logged at just these times; the last lies at
-        // the end or a little beyond, where the joints are held.
+        // Whole numbers of steps, so that the run is logged at exactly these times; the last one is
+        // at the end or slightly beyond, where the joints are held.
         let step = request.run.step_s;
         let spacing = step * (super::SAMPLE_S / step).round().max(1.0);
         let n = ((motion.trajectory.duration() / spacing - 1e-6).ceil() as usize).max(8);
@@ -117,7 +118,7 @@ impl<'a> Job<'a> {
         Ok(Self { arm, request, scenario, motion, times, q, wanted, rows, stop })
     }
 
-    /// Goes on unless somebody wants it to stop; `t_s`: how far it is.
+    /// Returns an error if an interruption is requested; `t_s`: progress.
     fn go_on(&self, t_s: f64) -> Result<(), Error> {
         match (self.stop)() {
             true => Err(Error::Interrupted { t: t_s, partial: false }),
@@ -129,12 +130,12 @@ impl<'a> Job<'a> {
         self.times[1]
     }
 
-    /// The motion with changed joints.
+    /// Returns the motion with changed joint positions.
     fn moved(&self, change: &DMatrix<f64>) -> Result<Motion, Error> {
         self.moved_and_held(change, 0)
     }
 
-    /// The same, held at its end for so many samples more.
+    /// Returns the changed motion, held at its end for `beyond` more samples.
     fn moved_and_held(&self, change: &DMatrix<f64>, beyond: usize) -> Result<Motion, Error> {
         let (m, h, last) = (self.q.nrows(), self.step_s(), self.times.len() - 1);
         let of = |k: usize, i: i64| change[(k, i.clamp(0, last as i64) as usize)];
@@ -149,7 +150,7 @@ impl<'a> Job<'a> {
             let mut knots = JointKnots { name: self.motion.trajectory.joints()[k].clone(), ..JointKnots::default() };
             for (i, [q, v, a]) in reference[k].iter().enumerate() {
                 let i = i as i64;
-                // At rest at both ends.
+                // Fourth-order central differences; the change is at rest at both ends.
                 let inner = i > 0 && i < last as i64;
                 let rate = (8.0 * (of(k, i + 1) - of(k, i - 1)) - (of(k, i + 2) - of(k, i - 2))) / (12.0 * h);
                 let acceleration =
@@ -167,23 +168,23 @@ impl<'a> Job<'a> {
         Motion::along(trajectory, &format!("{}_compensated", self.motion.name), self.arm.robot())
     }
 
-    /// The times of this job and so many more.
+    /// Returns the sampling times and `beyond` further ones.
     fn times_and(&self, beyond: usize) -> Vec<f64> {
         let further = (0..beyond).map(|k| self.step_s() * (self.times.len() + k) as f64);
         self.times.iter().copied().chain(further).collect()
     }
 
-    /// The motion as it is, at the times of this job.
+    /// Returns the unchanged motion, at the times of this job.
     pub(super) fn as_it_is(&self) -> Result<Motion, Error> {
         self.moved(&DMatrix::zeros(self.q.nrows(), self.q.ncols()))
     }
 
-    /// Run of a motion on an arm, with the loads of the scenario.
+    /// Runs a motion on an arm, with the loads of the scenario.
     pub(super) fn seen(&self, arm: &Arm, run: &RunOptions, motion: &Motion) -> Result<Seen, Error> {
         self.seen_until(arm, run, motion, 0)
     }
 
-    /// The same, of a motion that is held at its end for so many samples more.
+    /// Runs a motion that is held at its end for `beyond` more samples.
     fn seen_until(&self, arm: &Arm, run: &RunOptions, motion: &Motion, beyond: usize) -> Result<Seen, Error> {
         let options =
             RunOptions { log_rate_hz: 1.0 / self.step_s(), with_twin: false, ignore_limits: true, ..run.clone() };
@@ -218,19 +219,19 @@ impl<'a> Job<'a> {
         Ok(Seen { error, efforts: (0..m).map(worst).collect() })
     }
 
-    /// Error of the tool on the model with changed joints, and what it is when they are held at the
-    /// end for so many samples more.
+    /// Returns the TCP error on the model with changed joint positions, including `beyond` samples
+    /// held at the end.
     fn error(&self, change: &DMatrix<f64>, beyond: usize) -> Result<DMatrix<f64>, Error> {
         let motion = self.moved_and_held(change, beyond)?;
         Ok(self.seen_until(self.arm, &self.request.run, &motion, beyond)?.error)
     }
 
-    /// A motion with the loads, payloads and start of the scenario.
+    /// Returns a motion with the loads, payloads and start of the scenario.
     pub(super) fn along(&self, motion: &Motion) -> Scenario {
         Scenario { motion: motion.clone(), ..self.scenario.clone() }
     }
 
-    /// The arm linearised along the motion.
+    /// Linearises the arm along the motion.
     fn inversion(&self) -> Result<Inversion, Error> {
         let duration = self.motion.trajectory.duration();
         let count = ((duration / NODE_S).ceil() as usize).max(1);
@@ -248,8 +249,8 @@ impl<'a> Job<'a> {
         })
     }
 
-    /// The arm held where the motion begins: gains of servos and dampings of a run are those of its
-    /// start.
+    /// Returns the arm held at the start of the motion: servo gains and damping of a run are those
+    /// of its start.
     fn at_start(&self) -> Result<FlexibleArm, Error> {
         let flexible = self.arm.flexible();
         let held = Held(self.q.column(0).iter().copied().collect());
@@ -264,7 +265,7 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// The arm linearised at a time of the motion, motors of servos free.
+    /// Linearises the arm at a time of the motion, with the motors of servos free.
     fn node(&self, start: &FlexibleArm, t: f64) -> Result<Node, Error> {
         let (flexible, m) = (self.arm.flexible(), self.q.nrows());
         let (mut q, mut v, mut a) = (vec![0.0; m], vec![0.0; m], vec![0.0; m]);
@@ -278,7 +279,7 @@ impl<'a> Job<'a> {
         Ok(Node { M: at.M, D: at.D, K: at.K, M_a: at.M_a, D_a: at.D_a, K_a: at.K_a, J, J_a, servo })
     }
 
-    /// Whether all joints rest where the motion ends.
+    /// Whether all joints are at rest at the end of the motion.
     fn ends_at_rest(&self) -> bool {
         let m = self.q.nrows();
         let (mut q, mut v, mut a) = (vec![0.0; m], vec![0.0; m], vec![0.0; m]);
@@ -286,9 +287,9 @@ impl<'a> Job<'a> {
         v.iter().all(|v| v.abs() < REST)
     }
 
-    /// Samples for which the motion is held at its end, so that the inverse sees how the tool
-    /// swings on there. None with loads, which are known up to the end only, and none where the
-    /// joints do not come to rest.
+    /// Returns the number of samples for which the motion is held at its end, so that the inverse
+    /// includes the residual vibration of the TCP. Zero with loads, which are known up to the end
+    /// only, and if the joints do not come to rest.
     fn samples_beyond(&self, inversion: &Inversion) -> usize {
         match self.scenario.loads.is_empty() && self.ends_at_rest() {
             true => (inversion.edge_s() / self.step_s()).ceil() as usize,
@@ -297,7 +298,8 @@ impl<'a> Job<'a> {
     }
 
     /// Corrects the commands by the inverse of the arm until the error settles. An iteration that
-    /// makes the error larger is discarded, and the next one corrects up to half the frequency.
+    /// increases the error by more than a factor of 1/[`SETTLED`] is discarded, and the next one
+    /// corrects up to half the frequency.
     pub(super) fn dynamic(&self) -> Result<Commands, Error> {
         let mut inversion = self.inversion()?;
         let (m, N) = self.q.shape();
@@ -351,7 +353,7 @@ impl<'a> Job<'a> {
         Ok(best)
     }
 
-    /// Each node at rest, a spline between them.
+    /// Corrects each node to its static equilibrium, with a cubic spline between the nodes.
     pub(super) fn at_rest(&self) -> Result<Commands, Error> {
         let (m, N) = self.q.shape();
         let (flexible, arm) = (self.arm.flexible(), self.at_start()?);
@@ -375,6 +377,7 @@ impl<'a> Job<'a> {
             let i = nodes.partition_point(|node| *node <= k).clamp(1, nodes.len() - 1);
             let (a, b) = (nodes[i - 1], nodes[i]);
             let s = (k - a) as f64 / (b - a) as f64;
+            // Cubic Hermite interpolation; slopes by central differences, zero at both ends.
             let slope = |i: usize| match i {
                 0 => DVector::zeros(m),
                 i if i + 1 >= nodes.len() => DVector::zeros(m),
@@ -404,7 +407,7 @@ impl<'a> Job<'a> {
     }
 }
 
-/// Servos about a pose, linear.
+/// Linearises the servos about a pose.
 fn controllers(servo: &Servo, q: &[f64], friction: &[Friction]) -> NodeServo {
     let of = |value: fn(&ServoAxis) -> f64| DVector::from_iterator(servo.axes.len(), servo.axes.iter().map(value));
     NodeServo {
@@ -416,9 +419,9 @@ fn controllers(servo: &Servo, q: &[f64], friction: &[Friction]) -> NodeServo {
     }
 }
 
-/// A load as its mean about each moment, over a node or whole periods: what is quicker moves no arm
-/// at rest. Where the arm rests longer the mean is over its rest; nothing before the motion and
-/// behind its end (s) counts.
+/// Averages a load about each time, over a node or whole periods, since faster changes do not move
+/// an arm at rest. Where the arm rests longer than that, the mean is over its rest; times before
+/// the motion and after its end (s) are left out.
 pub(super) fn averaged(
     load: &AppliedLoad,
     end: f64,

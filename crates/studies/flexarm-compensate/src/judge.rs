@@ -1,4 +1,4 @@
-//! Commands judged on a plant: the model itself, another robot, plants that are off.
+//! Evaluation of commands on a plant: the model itself, another robot, or perturbed plants.
 
 use flexarm_flexlink::GearStiffness;
 use flexarm_trajectory::Extreme;
@@ -15,23 +15,23 @@ use flexarm_run::Motion;
 use flexarm_run::Robot;
 use flexarm_run::RunOptions;
 
-/// What a plant made of commands.
+/// Result of commands on a plant.
 pub(super) struct Judged {
     pub(super) figures: ErrorFigures,
-    /// Distance of the tool at each sample (m).
+    /// Distance between flexible and desired TCP at each sample (m).
     pub(super) distance: Vec<f64>,
-    /// Largest torque or force of each drive.
+    /// Maximum torque or force of each drive.
     pub(super) efforts: Vec<Extreme>,
 }
 
-/// A plant on which commands are judged.
+/// A plant on which commands are evaluated.
 pub(super) struct Judge {
     pub(super) arm: Arm,
     pub(super) run: RunOptions,
 }
 
 impl Judge {
-    /// Another robot with the same joints, if one is asked for, or the arm itself.
+    /// Returns the plant of the request, which must have the same joints, or the arm itself.
     pub(super) fn of(request: &CompensateRequest, arm: &Arm) -> Result<Self, Error> {
         let Some((_, plant)) = &request.plant else {
             return Ok(Self { arm: arm.clone(), run: request.run.clone() });
@@ -59,7 +59,7 @@ impl Judge {
     }
 }
 
-/// The robot with all stiffness and damping so many times as large.
+/// Returns the robot with all stiffness and damping scaled by the given factors.
 fn changed(robot: &Robot, stiffness: f64, damping: f64) -> Robot {
     let mut changed = robot.clone();
     for drive in &mut changed.drives {
@@ -80,7 +80,7 @@ fn changed(robot: &Robot, stiffness: f64, damping: f64) -> Robot {
     changed
 }
 
-/// The commands on plants that are off.
+/// Evaluates the commands on perturbed plants.
 pub(super) fn sweep(
     robot: &Robot,
     request: &CompensateRequest,
@@ -96,13 +96,9 @@ pub(super) fn sweep(
     ];
     let links = !arm.flexible().spans.is_empty();
     if links && arm.flexible().springs.len() > arm.flexible().spans.len() {
+        plants.push(("only drives elastic".into(), robot.clone(), Modelling { links: LinkModel::Rigid, ..modelling }));
         plants.push((
-            "drives alone give way".into(),
-            robot.clone(),
-            Modelling { links: LinkModel::Rigid, ..modelling },
-        ));
-        plants.push((
-            "links alone give way".into(),
+            "only links flexible".into(),
             robot.clone(),
             Modelling { drives: DriveModel::Rigid, ..modelling },
         ));

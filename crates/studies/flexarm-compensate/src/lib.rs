@@ -1,10 +1,10 @@
-//! Joint commands with which a flexible arm's tool follows the pose of the rigid one, found on a
-//! model and judged on others.
+//! Joint commands with which the TCP of a flexible arm follows the pose of the rigid one, found on
+//! a model and evaluated on other plants.
 //!
-//! [`compensate_motion`]: the motion is run, the error of the tool is taken away through the arm linearised along the motion
-//! ([`Inversion`]), and the new motion is run again, a few times. At rest ([`Method::Static`]) each
-//! point is corrected to its equilibrium alone. [`static_targets`], [`Inversion`] and [`Shaper`]
-//! take and give values.
+//! [`compensate_motion`] runs the motion, corrects the TCP error through the arm linearised along
+//! the motion ([`Inversion`]), and repeats this a few times. With [`Method::Static`] each point is
+//! corrected to its static equilibrium only. [`static_targets`], [`Inversion`] and [`Shaper`] work
+//! on plain values.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
@@ -52,54 +52,54 @@ pub use shaped::{ShapedModeFigures, ShaperFigures, Shaping};
 
 /// Time between two samples of the error and two knots of the commands (s).
 const SAMPLE_S: f64 = 1e-3;
-/// Longest step (s): the error is sampled with it.
+/// Maximum step size (s): the error is sampled with it.
 const LONGEST_STEP_S: f64 = 4e-3;
-/// Most iterations that may be asked for.
+/// Maximum number of iterations of a request.
 const MOST_ITERATIONS: usize = 100;
-/// Longest motion that is taken (s): all of it is held in memory, a sample a millisecond.
+/// Maximum duration of a motion (s): all of it is held in memory, with a sample per millisecond.
 const LONGEST_S: f64 = 600.0;
 
-/// How commands are found.
+/// Method of finding commands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
-    /// Inertia, damping and weight, iterated on the simulation.
+    /// Includes inertia, damping and gravity; iterates on the simulation.
     #[default]
     Dynamic,
-    /// Weight and constant loads alone, point by point.
+    /// Includes gravity and constant loads only, point by point.
     Static,
 }
 
-/// What is asked of [`compensate_motion`].
+/// Input of [`compensate_motion`].
 #[derive(Clone, Debug)]
 pub struct CompensateRequest {
-    /// How it is stepped, and how links and drives are modelled.
+    /// Stepping, and modelling of links and drives.
     pub run: RunOptions,
-    /// How commands are found.
+    /// Method of finding commands.
     pub method: Method,
-    /// Which of x, y, z, rx, ry, rz of the tool (world axes) count.
+    /// Selection of the TCP components x, y, z, rx, ry, rz (world axes) to correct.
     pub components: [bool; 6],
-    /// Most iterations of the dynamic method.
+    /// Maximum number of iterations of the dynamic method.
     pub iterations: usize,
-    /// Highest frequency that is corrected (Hz); as far as the inverse holds without it.
+    /// Cutoff frequency of the correction (Hz); default: the limit of validity of the inverse.
     pub cutoff_hz: Option<f64>,
-    /// Also run the motion through a shaper of the modes at its end.
+    /// Shaper of the modes at the end of the motion, through which the motion is run first.
     pub shaper: Option<Shaping>,
-    /// Another robot that judges, with its name.
+    /// Another robot as plant, with its name.
     pub plant: Option<(String, Robot)>,
-    /// Judge with stiffness, damping and drives that are off as well.
+    /// Whether to evaluate the commands on perturbed plants as well.
     pub sweep: bool,
-    /// Greatest acceleration of each joint (rad/s² or m/s²), in coordinate order; not looked at
-    /// where it is empty.
+    /// Acceleration limit of each joint (rad/s² or m/s²), in coordinate order; empty for no check.
     pub accelerations: Vec<f64>,
-    /// What becomes of commands that pass a limit which the motion itself keeps.
+    /// Treatment of commands that violate a limit which the motion itself keeps.
     pub limits: LimitRule,
-    /// Folder of the new motion, the page and the recording; nothing is written without it.
+    /// Folder of the new motion, the page and the recording; `None` writes none of them.
     pub output: Option<PathBuf>,
-    /// Further files of the new motion, by their endings: `.csv`, `.toml`, `.yaml` and `.json`.
+    /// Additional files of the new motion, by extension: `.csv`, `.toml`, `.yaml` and `.json`.
     pub motions: Vec<PathBuf>,
-    /// Write a recording of the arm before and after (`.rrd`), if this build can.
+    /// Whether to write a recording of the arm before and after (`.rrd`), if this build supports
+    /// it.
     pub recording: bool,
-    /// Overwrite what is there.
+    /// Whether to overwrite existing files.
     pub overwrite: bool,
 }
 
@@ -124,107 +124,108 @@ impl Default for CompensateRequest {
     }
 }
 
-/// Error of the tool over a run.
+/// Error of the TCP over a run.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct ErrorFigures {
-    /// Largest distance from the rigid arm's place (m).
+    /// Maximum distance from the rigid arm's TCP (m).
     pub peak_m: f64,
-    /// RMS of it (m).
+    /// RMS distance (m).
     pub rms_m: f64,
-    /// Largest rotation from the rigid arm's (rad).
+    /// Maximum rotation relative to the rigid arm's TCP (rad).
     pub peak_rad: f64,
     /// Distance at the end (m).
     pub end_m: f64,
 }
 
 impl ErrorFigures {
-    /// Returns the part of the RMS error that commands take away, in words: `97.3 %`, or how many
-    /// times as large they make it.
+    /// Returns the reduction of the RMS error as text, such as `97.3 %`, or the factor by which it
+    /// increased.
     pub fn reduction_to(&self, after: &Self) -> String {
         let left = after.rms_m / self.rms_m.max(f64::MIN_POSITIVE);
         if left <= 1.0 { format!("{:.2} %", 100.0 * (1.0 - left)) } else { format!("{left:.1} times as large") }
     }
 }
 
-/// Answer of `flexarm compensate`.
+/// Result of `flexarm compensate`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Compensation {
-    /// The robot whose model found the commands.
+    /// Robot whose model was used to find the commands.
     pub robot: String,
-    /// The motion.
+    /// File of the motion.
     pub motion: String,
     /// `dynamic` or `static`.
     pub method: &'static str,
-    /// Error with the motion as it is, on the plant.
+    /// Error of the unchanged motion, on the plant.
     pub before: ErrorFigures,
     /// Error with the new commands, on the plant.
     pub after: ErrorFigures,
-    /// Peak after each iteration on the model itself, the first without any (m).
+    /// Peak error on the model after each iteration; the first entry is without correction (m).
     pub model_peaks_m: Vec<f64>,
-    /// Iterations that were kept.
+    /// Number of iterations kept.
     pub iterations: usize,
-    /// Highest frequency that was corrected (Hz); null at rest.
+    /// Cutoff frequency of the correction (Hz); null for the static method.
     pub cutoff_hz: Option<f64>,
-    /// Largest change of each joint (rad or m).
+    /// Maximum change of each joint (rad or m).
     pub changes: Vec<JointChange>,
-    /// Limits that the new motion passes: positions, speeds and accelerations of the commands,
+    /// Limits that the new motion violates: positions, speeds and accelerations of the commands,
     /// torques of the run on the plant.
     pub limits: Vec<MotionViolation>,
-    /// How many times as long the motion takes so that limits are kept; 1 if it is as it was.
+    /// Factor by which the motion is slowed down to keep limits; 1 if unchanged.
     pub slowed: f64,
-    /// How much longer the motion takes by its shaper (s).
+    /// Time by which the shaper lengthens the motion (s).
     pub shaper_delay_s: f64,
-    /// The shaper, if there is one.
+    /// Shaper, if there is one.
     pub shaper: Option<ShaperFigures>,
-    /// The same commands on other plants.
+    /// Results of the same commands on other plants.
     pub plants: Vec<PlantFigures>,
-    /// The new motion (.csv).
+    /// New motion (.csv).
     pub file: Option<String>,
-    /// Further files of the new motion.
+    /// Additional files of the new motion.
     pub files: Vec<String>,
-    /// The arm before and after (.rrd).
+    /// Recording of the arm before and after (.rrd).
     pub recording: Option<String>,
-    /// The robot program with corrected targets, of motions that were read from one (KRL, RAPID).
+    /// Robot program with corrected targets, for motions read from a program (KRL, RAPID).
     pub program: Option<ProgramFigures>,
-    /// The page.
+    /// Page.
     pub page: Option<String>,
-    /// What the caveats warn of, as sentences.
+    /// Messages of the caveats.
     pub warnings: Vec<String>,
-    /// What is doubtful.
+    /// Caveats.
     pub caveats: Vec<Caveat>,
-    /// The commands, for programs in the process.
+    /// The commands, for callers in the same process.
     #[serde(skip)]
     pub trajectory: Arc<Trajectory>,
-    /// Distance of the tool over time, before and after, on the plant: time (s), m, m.
+    /// Distance between flexible and rigid TCP over time on the plant: time (s), before (m), after
+    /// (m).
     #[serde(skip)]
     pub curves: Vec<[f64; 3]>,
 }
 
-/// How far a joint is commanded away.
+/// Change of a joint's commands.
 #[derive(Clone, Debug, Serialize)]
 pub struct JointChange {
-    /// Its name.
+    /// Name of the joint.
     pub joint: String,
-    /// Largest change (rad or m).
+    /// Maximum change (rad or m).
     pub largest: f64,
 }
 
-/// The commands on a plant that is not the model.
+/// Result of the commands on a plant other than the model.
 #[derive(Clone, Debug, Serialize)]
 pub struct PlantFigures {
-    /// What is different.
+    /// Description of the plant.
     pub plant: String,
-    /// With the motion as it is.
+    /// Error of the unchanged motion.
     pub before: ErrorFigures,
-    /// With the new commands.
+    /// Error with the new commands.
     pub after: ErrorFigures,
 }
 
-/// Finds commands for a motion, and judges them. Loads and payloads of the scenario act in all
+/// Finds commands for a motion and evaluates them. Loads and payloads of the scenario act in all
 /// runs.
 ///
 /// # Errors
-/// [`CompensateError`], and as [`flexarm_run::Arm::simulate`].
+/// [`CompensateError`]; otherwise as [`flexarm_run::Arm::simulate`].
 pub fn compensate_motion(
     robot: &Robot,
     scenario: impl Into<Scenario>,
@@ -233,14 +234,14 @@ pub fn compensate_motion(
     compensate_motion_until(robot, scenario, request, &|| false)
 }
 
-/// Whether somebody wants a computation to stop.
+/// Callback that returns whether to stop.
 type Stop<'a> = &'a (dyn Fn() -> bool + Sync);
 
-/// As [`compensate_motion`]; as soon as `stop` says so, it ends with [`Error::Interrupted`], and
-/// nothing is written.
+/// Same as [`compensate_motion`]; as soon as `stop` returns true, it ends with
+/// [`Error::Interrupted`], and nothing is written.
 ///
 /// # Errors
-/// As [`compensate_motion`]; [`Error::Interrupted`].
+/// As [`compensate_motion`]; [`Error::Interrupted`] if stopped.
 pub fn compensate_motion_until(
     robot: &Robot,
     scenario: impl Into<Scenario>,
@@ -260,16 +261,16 @@ pub fn compensate_motion_until(
     Ok(answer)
 }
 
-/// What was found and for what, for files.
+/// The motions before and after, for files.
 #[cfg_attr(not(feature = "rerun"), expect(dead_code, reason = "for recordings alone"))]
 struct Found {
-    /// What was asked for, slowed and shaped.
+    /// Requested scenario, slowed and shaped.
     scenario: Scenario,
-    /// The new motion.
+    /// New motion.
     motion: Motion,
 }
 
-/// Commands for a motion as it is.
+/// Finds commands for a motion without slowing it.
 fn attempt(
     robot: &Robot,
     arm: &Arm,
@@ -293,7 +294,7 @@ fn attempt(
     let after = judge.figures(&job, &found.motion)?;
     let limits = limits::passed(robot, &found.motion, &after.efforts, request)?;
     let own = limits::passed(robot, &scenario.motion, &before.efforts, request)?;
-    // What will be refused or run again is not judged elsewhere.
+    // Results that will be refused or computed again are not evaluated on other plants.
     let kept = request.limits == LimitRule::Tell || limits::worse(&limits, &own).next().is_none();
     let plants = match request.sweep && kept {
         true => sweep(robot, request, &job, arm, &found.motion)?,
@@ -358,7 +359,7 @@ fn check(scenario: &Scenario, request: &CompensateRequest, arm: &Arm) -> Result<
     }
     if let Some(found) = request.accelerations.iter().copied().find(|limit| limit.is_nan() || *limit <= 0.0) {
         let expected = "a positive number (rad/s2 or m/s2)";
-        return Err(CompensateError::Value { what: "a limit of the acceleration", found, expected });
+        return Err(CompensateError::Value { what: "an acceleration limit", found, expected });
     }
     if let Some(change) = scenario.payloads.iter().find(|change| request.method == Method::Static && change.at_s > 0.0)
     {
@@ -367,7 +368,7 @@ fn check(scenario: &Scenario, request: &CompensateRequest, arm: &Arm) -> Result<
     if arm.flexible().springs.is_empty() && !arm.flexible().has_servo() {
         return Err(CompensateError::NothingYields);
     }
-    // Equilibria do not depend on speeds.
+    // Static equilibria do not depend on velocities, so the static method accepts velocity jumps.
     match motion.trajectory.velocity_jumps().first() {
         Some(jump) if request.method == Method::Dynamic => Err(CompensateError::Corner { t_s: jump.time_s }),
         _ => Ok(()),

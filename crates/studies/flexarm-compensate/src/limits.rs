@@ -1,4 +1,4 @@
-//! Limits of the joints: what commands pass, and what becomes of them then.
+//! Joint limits: violations by commands, and their treatment.
 
 use flexarm_trajectory::{Extreme, JointLimits};
 
@@ -14,29 +14,30 @@ use flexarm_run::motion::limits as limits_of;
 use flexarm_run::motion_report::of_effort;
 use flexarm_run::motion_report::of_limit;
 
-/// What is passed by less than this part of the limit more than by the motion itself is the
-/// motion's own.
+/// Increase of a violation over that of the motion itself, as a fraction of the limit, up to which
+/// it counts as the motion's own.
 const SAME: f64 = 1e-3;
-/// Room that a slower motion leaves below a limit.
+/// Margin of a slowed motion below a limit.
 const ROOM: f64 = 1.01;
-/// Most times that a motion is slowed.
+/// Maximum number of attempts at slowing a motion.
 const MOST_TIMES: usize = 6;
-/// A motion is not made longer than this many times.
+/// Maximum factor by which a motion is slowed.
 const SLOWEST: f64 = 5.0;
 
-/// What becomes of commands that pass a limit which the motion itself keeps.
+/// Treatment of commands that violate a limit which the motion itself keeps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LimitRule {
-    /// The motion is run more slowly; what time does not mend is an error that names all of them.
+    /// Slow the motion down; limits that this does not help are listed in an error.
     #[default]
     Slow,
-    /// An error that names all of them.
+    /// Return an error that lists all of them.
     Refuse,
-    /// They stand in the answer, with a caveat.
+    /// Report them in the result, with a caveat.
     Tell,
 }
 
-/// Limits that a motion passes, with the largest torques of its run.
+/// Returns the limits violated by a motion, including the drive limits for the peak efforts of its
+/// run.
 pub(super) fn passed(
     robot: &Robot,
     motion: &Motion,
@@ -55,7 +56,7 @@ pub(super) fn passed(
     Ok(passed)
 }
 
-/// Those that the motion itself keeps, or passes by less.
+/// Returns the violations that the motion itself does not have, or has to a lesser degree.
 pub(super) fn worse<'a>(
     passed: &'a [MotionViolation],
     own: &'a [MotionViolation],
@@ -67,7 +68,7 @@ pub(super) fn worse<'a>(
     })
 }
 
-/// Commands that keep the limits, by the rule that was asked for.
+/// Finds commands that keep the limits, according to the rule of the request.
 pub(super) fn kept(
     robot: &Robot,
     arm: &Arm,
@@ -81,8 +82,8 @@ pub(super) fn kept(
         let (mut answer, found, own) = attempt(robot, arm, &scenario, request, stop)?;
         answer.slowed = slowed;
         if slowed > 1.0 {
-            let text = format!("the motion takes {slowed:.4} times as long, so that limits of the joints are kept");
-            let help = "let commands pass them (`limits` = tell), or slow the motion where it is quickest";
+            let text = format!("the motion is slowed down by a factor of {slowed:.4} to satisfy joint limits");
+            let help = "allow violations (`limits` = tell), or slow the motion down where it is fastest";
             answer.caveats.push(Caveat::said("slowed", "compensation", text, help));
         }
         let worse: Vec<MotionViolation> = worse(&answer.limits, &own).cloned().collect();
@@ -102,13 +103,13 @@ pub(super) fn kept(
     Err(refused(&worse(&answer.limits, &own).cloned().collect::<Vec<_>>(), request.limits).into())
 }
 
-/// How many times as long a motion must take for a limit to be kept; infinite if time does not
+/// Returns the factor by which to lengthen a motion to keep a limit; infinite if that does not
 /// help.
 fn slower(limit: &MotionViolation) -> f64 {
     let over = ROOM * (limit.value / limit.limit).abs();
     match limit.kind {
         "velocity" => over,
-        // Of a torque the part of the weight stays: this is asked again until it is enough.
+        // The gravity part of a torque does not scale: repeat until the torque is low enough.
         "acceleration" | "effort" => over.sqrt(),
         _ => f64::INFINITY,
     }

@@ -1,5 +1,5 @@
-//! The page of a compensation: error before and after over time, on other plants, changes of the
-//! joints; one file without scripts.
+//! HTML page of a compensation: error before and after over time, on other plants, changes of the
+//! joints; a single file without scripts.
 
 use std::fmt::Write as _;
 
@@ -9,12 +9,13 @@ use super::{Compensation, ErrorFigures};
 use flexarm_run::html_page::opening;
 use flexarm_settings::written::markup;
 
-/// The page.
+/// Returns the page.
 pub(super) fn html(answer: &Compensation) -> String {
     let mut page = opening(&format!("Compensation of {} on {}", answer.motion, answer.robot), "");
     let _ = writeln!(
         page,
-        "<p>Largest distance of the tool from the rigid arm's: {:.4} mm before, <b>{:.4} mm</b> after ({} method, {} iterations{}).</p>",
+        "<p>Maximum TCP error (distance from the TCP of the rigid arm): {:.4} mm before, <b>{:.4} mm</b> after \
+         ({} method, {} iterations{}).</p>",
         1e3 * answer.before.peak_m,
         1e3 * answer.after.peak_m,
         answer.method,
@@ -25,17 +26,17 @@ pub(super) fn html(answer: &Compensation) -> String {
         let _ = writeln!(page, "<p class=\"no\">{}</p>", markup(&caveat.message));
     }
     page += &curves(answer);
-    page += "<h2>On other plants</h2>\n<table><tr><th>plant</th><th>peak before (mm)</th><th>after</th><th>RMS before</th><th>after</th><th>RMS taken away</th></tr>\n";
+    page += "<h2>Other plants</h2>\n<table><tr><th>plant</th><th>peak before (mm)</th><th>peak after (mm)</th>\
+             <th>RMS before (mm)</th><th>RMS after (mm)</th><th>RMS reduction</th></tr>\n";
     page += &row("as given", &answer.before, &answer.after);
     for plant in &answer.plants {
         page += &row(&markup(&plant.plant), &plant.before, &plant.after);
     }
     page += "</table>\n";
     if answer.plants.iter().any(|plant| plant.after.rms_m > plant.before.rms_m) {
-        page +=
-            "<p>Where the error becomes larger, the commands correct a deflection that this plant does not have.</p>\n";
+        page += "<p>If the error increases, the commands correct a deflection that this plant does not have.</p>\n";
     }
-    page += "<h2>Largest change of each joint</h2>\n<table><tr><th>joint</th><th>rad or m</th><th>deg</th></tr>\n";
+    page += "<h2>Maximum change of each joint</h2>\n<table><tr><th>joint</th><th>rad or m</th><th>deg</th></tr>\n";
     for change in &answer.changes {
         let _ = writeln!(
             page,
@@ -48,16 +49,17 @@ pub(super) fn html(answer: &Compensation) -> String {
     page += "</table>\n";
     page += &shaper(answer);
     page += &limits(answer);
-    page += "<p>Not taken away: noise, play and hysteresis of gears, what is quicker than the cutoff, and what the model does not know.</p>\n";
+    page += "<p>Not corrected: noise, backlash and hysteresis of gearboxes, errors above the cutoff frequency, and \
+             effects that are not in the model.</p>\n";
     page + "</body></html>\n"
 }
 
-/// What the motion would make swing at its end, and what its shaper leaves.
+/// Describes the predicted residual vibration without and with the shaper.
 fn shaper(answer: &Compensation) -> String {
     let Some(shaper) = &answer.shaper else { return String::new() };
     let mut text = format!(
-        "<h2>Shaper</h2>\n<p>{}, {} copies, {:.4} s longer. Forecast of how far the tool swings behind the motion:</p>\n\
-         <table><tr><th>mode (Hz)</th><th>damping ratio</th><th>as it is (mm)</th><th>shaped (mm)</th></tr>\n",
+        "<h2>Shaper</h2>\n<p>{}, {} copies, {:.4} s longer. Predicted residual vibration after the motion:</p>\n\
+         <table><tr><th>mode (Hz)</th><th>damping ratio</th><th>unshaped (mm)</th><th>shaped (mm)</th></tr>\n",
         shaper.kind,
         shaper.copies.len(),
         answer.shaper_delay_s
@@ -75,16 +77,20 @@ fn shaper(answer: &Compensation) -> String {
     text + "</table>\n"
 }
 
-/// Limits that are passed, and how much slower the motion is for their sake.
+/// Lists the violated limits, and the factor by which the motion was slowed.
 fn limits(answer: &Compensation) -> String {
-    let mut text = String::from("<h2>Limits of the joints</h2>\n");
+    let mut text = String::from("<h2>Joint limits</h2>\n");
     if answer.slowed > 1.0 {
-        let _ = writeln!(text, "<p>The motion takes {:.4} times as long, so that limits are kept.</p>", answer.slowed);
+        let _ = writeln!(
+            text,
+            "<p>The motion is slowed down by a factor of {:.4} to satisfy the limits.</p>",
+            answer.slowed
+        );
     }
     if answer.limits.is_empty() {
-        return text + "<p>All are kept.</p>\n";
+        return text + "<p>All limits are satisfied.</p>\n";
     }
-    text += "<table><tr><th>joint</th><th>of</th><th>value</th><th>limit</th><th>time (s)</th></tr>\n";
+    text += "<table><tr><th>joint</th><th>quantity</th><th>value</th><th>limit</th><th>time (s)</th></tr>\n";
     for limit in &answer.limits {
         let _ = writeln!(
             text,
@@ -111,7 +117,7 @@ fn row(name: &str, before: &ErrorFigures, after: &ErrorFigures) -> String {
 }
 
 fn curves(answer: &Compensation) -> String {
-    // As many points as the picture can show.
+    // Limit the number of points to what the plot can show.
     let every = (answer.curves.len() / 1500).max(1);
     let column = |k: usize, factor: f64| -> Vec<f64> {
         answer
@@ -128,9 +134,9 @@ fn curves(answer: &Compensation) -> String {
         legend: true,
         curves: vec![curve("before", CurveLook::Plain, 1), curve("after", CurveLook::Plain, 2)],
     };
-    let panels = [panel("distance of the tool (mm)", false), panel("the same, logarithmic (mm)", true)];
+    let panels = [panel("TCP error (mm)", false), panel("TCP error, logarithmic (mm)", true)];
     let plot = LinePlot {
-        title: "The tool from where the rigid arm has it",
+        title: "Distance of the TCP from that of the rigid arm",
         x_label: "time (s)",
         panels: &panels,
         ..LinePlot::default()

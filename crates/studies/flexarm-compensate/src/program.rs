@@ -1,9 +1,9 @@
-//! A robot program whose targets are corrected for what the arm gives way at rest: the same
+//! Correction of the targets of a robot program for the static deflection of the arm: the same
 //! statements with other numbers.
 //!
-//! Each literal target is replaced by the one that the controller, which knows a rigid arm, must be
-//! told so that the flexible tool is at the old one, under the mean of the loads that act while it
-//! rests there. What was written is read again and held against the equilibria.
+//! The controller assumes a rigid arm. Each literal target is replaced by the one for which the
+//! flexible TCP is at the original target, under the mean of the loads during the rest there. The
+//! written program is read again and checked against the static equilibria.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -31,48 +31,48 @@ use flexarm_run::tool_path::Cell;
 use flexarm_run::tool_path::Overrides;
 use flexarm_run::tool_path::program_text;
 
-/// Folder of the corrected program in the output folder.
+/// Name of the program's folder within the output folder.
 pub(super) const FOLDER: &str = "program";
-/// Moves that are named one by one.
+/// Maximum number of uncorrected moves listed.
 const NAMED: usize = 20;
 
-/// Moments of a rest at which its loads are looked at.
+/// Number of times per rest at which loads are sampled.
 const LOOKS: u32 = 200;
-/// Loads that differ from their mean by more than this part of their largest change at a rest.
+/// Deviation of a load from its mean during a rest, relative to its maximum, above which it is
+/// reported.
 const CHANGES: f64 = 0.1;
 
-/// What became of the targets of a robot program.
+/// Figures of the correction of a robot program.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct ProgramFigures {
-    /// The corrected program, and data lists that changed with it.
+    /// Paths of the corrected program and of the changed data lists.
     pub files: Vec<String>,
-    /// Targets that moves end at; dwells and arcs of a told angle have none.
+    /// Number of targets at the ends of moves; dwells and arcs given by an angle have none.
     pub targets: usize,
-    /// How many of them were replaced.
+    /// Number of targets replaced.
     pub corrected: usize,
-    /// At how many of them loads act, or another payload hangs than at the start.
+    /// Number of targets at which loads act or the payload differs from that at the start.
     pub loaded: usize,
-    /// Largest distance of the flexible tool from its target at rest, with the program as it was
-    /// (m).
+    /// Maximum distance of the flexible TCP from its target at rest, with the original program (m).
     pub before_m: f64,
-    /// The same of the replaced ones, with the program as it was written and read again (m).
+    /// Maximum distance at the replaced targets, with the written program read again (m).
     pub residual_m: f64,
-    /// Largest rotation there (rad).
+    /// Maximum rotation there (rad).
     pub residual_rad: f64,
-    /// Those that stay as they were, the first of them.
+    /// Targets left unchanged; at most the first 20.
     pub left: Vec<LeftTarget>,
 }
 
-/// A target that stays as it was.
+/// A target left unchanged.
 #[derive(Clone, Debug, Serialize)]
 pub struct LeftTarget {
     /// Line of the move.
     pub line: usize,
-    /// The move.
+    /// Statement of the move.
     pub statement: String,
-    /// Why.
+    /// Reason.
     pub why: String,
-    /// Distance of the flexible tool from its target at rest (m).
+    /// Distance of the flexible TCP from its target at rest (m).
     pub residual_m: f64,
 }
 
@@ -82,31 +82,33 @@ pub(super) struct Corrected {
     pub(super) files: Vec<(PathBuf, Vec<u8>)>,
 }
 
-/// Whether a motion was read from a program whose targets can be replaced.
+/// Whether a motion was read from a program with replaceable targets.
 pub(super) fn is_program(motion: &Motion) -> bool {
     ["KRL", "RAPID"]
         .iter()
         .any(|language| motion.format.starts_with("robot program") && motion.format.contains(language))
 }
 
-/// A program as its controller understands it.
+/// A program as interpreted by its controller.
 struct Understood {
     text: ProgramText,
-    /// Joints at the target of each item.
+    /// Joint positions at the target of each item.
     places: Vec<Option<DVector<f64>>>,
 }
 
-/// A move with a target, and when the arm is there.
+/// A move with a target, and the times at which the arm is there.
 struct Stop<'a> {
-    /// Number of its item.
+    /// Index of its item.
     item: usize,
     of: &'a Move,
     q: &'a DVector<f64>,
-    /// From the arrival until the next move begins (s); a moment where the tool passes by.
+    /// From arrival until the start of the next move (s); a single time if the TCP passes without
+    /// stopping.
     rest_s: [f64; 2],
 }
 
-/// The program of a motion with corrected targets, and what is not covered, as sentences.
+/// Returns the program of a motion with corrected targets, and sentences about what it does not
+/// cover.
 ///
 /// * `[path, folder]`: the program, and the output folder.
 pub(super) fn corrected(
@@ -140,13 +142,13 @@ pub(super) fn corrected(
             Err(why) => left.push((stop.item, why)),
         }
     }
-    let loaded = if rest.is_loaded() { " under the loads there" } else { "" };
+    let loaded = if rest.is_loaded() { " under the loads at each target" } else { "" };
     let name = plain(&robot.name);
-    let comment = format!("targets corrected by flexarm for {name}: the arm gives way at rest{loaded}");
+    let comment = format!("targets corrected by flexarm for {name}: static deflection{loaded}");
     let rewritten = old.text.rewritten(&targets, &comment);
     left.extend(rewritten.left.iter().map(|(k, why)| (*k, (*why).to_owned())));
 
-    // What was written, as the controller will understand it.
+    // Interpret the written text as the controller will.
     let [(_, main), others @ ..] = &rewritten.files[..] else {
         return Err(Error::File { path: path.clone(), what: "the program has no text".into() });
     };
@@ -163,8 +165,8 @@ pub(super) fn corrected(
     Ok((Corrected { figures, files }, uncovered))
 }
 
-/// Moves with targets, and when the motion is there: the planned moves in the same order; one
-/// without a leg of its own finds the arm there already.
+/// Returns the moves with targets and their times. Planned moves are in the same order; a move
+/// without a planned leg finds the arm already there.
 fn stops<'a>(program: &'a Understood, scenario: &Scenario) -> Vec<Stop<'a>> {
     let planned = scenario.motion.tool_path.as_ref().map_or(&[][..], |path| &path.moves[..]);
     let mut next = 0;
@@ -183,7 +185,7 @@ fn stops<'a>(program: &'a Understood, scenario: &Scenario) -> Vec<Stop<'a>> {
     stops
 }
 
-/// What targets leave, before and after.
+/// Computes the residuals at the targets, before and after.
 fn judged(
     rest: &AtRest<'_>,
     stops: &[Stop<'_>],
@@ -191,7 +193,7 @@ fn judged(
     left: &[(usize, String)],
 ) -> Result<ProgramFigures, String> {
     let off = |stop: &Stop<'_>| {
-        let now = again.get(stop.item).and_then(Option::as_ref).ok_or("the corrected program has other moves")?;
+        let now = again.get(stop.item).and_then(Option::as_ref).ok_or("the corrected program has different moves")?;
         Ok([rest.off(stop, stop.q)?, rest.off(stop, now)?])
     };
     let off: Vec<[Vector6<f64>; 2]> = stops.par_iter().map(off).collect::<Result<_, String>>()?;
@@ -217,31 +219,40 @@ fn judged(
     Ok(figures)
 }
 
-/// What of loads and servos the targets do not cover, as sentences.
+/// Lists, as sentences, the effects of loads and servos that the targets do not cover.
 fn uncovered(rest: &AtRest<'_>, stops: &[Stop<'_>], scenario: &Scenario) -> Vec<String> {
     let mut told = Vec::new();
     if rest.sags {
-        told.push("servos without an integral sag into their gains: targets of the program leave that out".to_owned());
+        told.push(
+            "servos without integral action have a steady-state error: the targets of the program do not correct it"
+                .to_owned(),
+        );
     }
     if !rest.is_loaded() {
         return told;
     }
     if scenario.motion.tool_path.is_none() {
-        told.push("when the motion is at its targets is not known: the loads are those of the start".to_owned());
+        told.push(
+            "the times at which the motion reaches its targets are unknown: the loads at the start are used".to_owned(),
+        );
     }
     told.push(
-        "loads between the targets are not in the program: each target has those that act while the arm is there"
+        "the program does not correct for loads between the targets: each target is corrected for the loads that \
+         act while the arm is there"
             .to_owned(),
     );
     let passed = stops.iter().filter(|stop| stop.rest_s[1] <= stop.rest_s[0] && rest.acts(stop.rest_s)).count();
     if passed > 0 {
-        told.push(format!("targets that are passed without a rest: {passed}; the loads there are those of the moment"));
+        told.push(format!(
+            "targets passed without a stop: {passed}; they are corrected for the loads at the time of passing"
+        ));
     }
     let changing = stops.iter().filter_map(|stop| Some((rest.change(stop.rest_s)?, stop.of.line)));
     let changing: Vec<(f64, usize)> = changing.filter(|(change, _)| *change > CHANGES).collect();
     if let Some((worst, line)) = changing.iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
         told.push(format!(
-            "at {} targets the loads change while the arm is there, most in line {line} (by {:.0} % of their largest to one side): their mean is corrected",
+            "at {} targets the loads change while the arm is there, most in line {line} (up to {:.0} % of the \
+             maximum from the mean): the correction uses the mean load",
             changing.len(),
             100.0 * worst
         ));
@@ -249,31 +260,31 @@ fn uncovered(rest: &AtRest<'_>, stops: &[Stop<'_>], scenario: &Scenario) -> Vec<
     told
 }
 
-/// Where a file of the program goes.
+/// Returns the path of a file of the program in the output folder.
 pub(super) fn in_folder(folder: &Path, file: &Path) -> PathBuf {
     folder.join(FOLDER).join(file.file_name().unwrap_or_default())
 }
 
-/// Letters that every controller takes.
+/// Replaces characters that some controllers reject.
 fn plain(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_graphic() || c == ' ' { c } else { '_' }).collect()
 }
 
-/// What a program must say in the place of a target, and of an auxiliary point.
+/// New values for a target, and for an auxiliary point.
 type Told = (NewTarget, Option<Vector3<f64>>);
 
-/// The arm at rest, as its controller and as the world sees it.
+/// The arm at rest: the rigid arm of the controller and the flexible one.
 struct AtRest<'a> {
     arm: &'a ProgramArm<'a>,
-    /// Motors held, under the mean of each load over the rest at a time.
+    /// Flexible arm with motors held; each load is replaced by its mean over the rest at that time.
     held: FlexibleArm,
-    /// Payloads, by time.
+    /// Payload changes, in order of time.
     changes: Vec<InertiaChange>,
     tcp: Frame,
     components: [bool; 6],
-    /// Loads as they are.
+    /// Original loads.
     loads: Vec<AppliedLoad>,
-    /// Some servo has no integral.
+    /// Whether a servo lacks an integral term and so sags under load.
     sags: bool,
 }
 
@@ -308,21 +319,21 @@ impl<'a> AtRest<'a> {
         !(self.loads.is_empty() && self.changes.is_empty())
     }
 
-    /// Forces of all loads at samples of a rest (or at its moment).
+    /// Returns the wrenches of all loads at sampling times of a rest (or at its single time).
     fn samples(&self, [from, to]: [f64; 2]) -> impl Iterator<Item = Vec<Wrench>> {
         let at = move |k: u32| from + (to - from) * (f64::from(k) + 0.5) / f64::from(LOOKS);
         (0..LOOKS).map(move |k| self.loads.iter().map(|load| load.wrench.at(at(k))).collect())
     }
 
-    /// Whether a load or another payload acts at a rest.
+    /// Whether a load or a changed payload acts during a rest.
     fn acts(&self, rest_s: [f64; 2]) -> bool {
         let pulls = |load: &Wrench| load.force.norm() + load.torque.norm() > 0.0;
         self.changes.iter().any(|change| change.t <= rest_s[0])
             || self.samples(rest_s).any(|loads| loads.iter().any(pulls))
     }
 
-    /// How far loads are from their mean at a rest, over their largest size; none where nothing
-    /// acts.
+    /// Returns the maximum deviation of loads from their mean during a rest, relative to their
+    /// maximum; `None` if no load acts.
     fn change(&self, rest_s: [f64; 2]) -> Option<f64> {
         let all: Vec<Vec<Wrench>> = self.samples(rest_s).collect();
         let each = (0..self.loads.len()).filter_map(|k| {
@@ -334,13 +345,13 @@ impl<'a> AtRest<'a> {
         each.reduce(f64::max)
     }
 
-    /// The arm with what it carries at a time.
+    /// Returns the arm with its payload at a time.
     fn carrying(&self, t: f64) -> FlexibleArm {
         let due = self.changes.iter().take_while(|change| change.t <= t);
         due.fold(self.held.clone(), |arm, change| arm.with_inertia(change.body, change.inertia))
     }
 
-    /// The tool of a move on the flexible arm.
+    /// Returns the tool frame of a move on the flexible arm.
     fn tool(&self, of: &Move) -> Frame {
         let X_FT = of.X_FT.unwrap_or(self.arm.X_FT);
         Frame { X_BF: self.tcp.X_BF * self.arm.X_FT.inverse() * X_FT, ..self.tcp.clone() }
@@ -352,7 +363,8 @@ impl<'a> AtRest<'a> {
         data.X_WF(&tool_of(self.arm, of))
     }
 
-    /// Joints with which the flexible tool is where the rigid one is at `q`.
+    /// Returns the joint positions at which the flexible TCP is at the pose of the rigid one at
+    /// `q`.
     fn joints(&self, stop: &Stop<'_>, q: &DVector<f64>) -> Result<DVector<f64>, String> {
         let m = self.arm.model.n_actuated();
         let (own, t) = (&q.as_slice()[..m], stop.rest_s[0]);
@@ -363,7 +375,7 @@ impl<'a> AtRest<'a> {
         Ok(new)
     }
 
-    /// What the program must say in the place of a target, and of an auxiliary point.
+    /// Computes the new values of a target, and of an auxiliary point.
     fn target(&self, stop: &Stop<'_>) -> Result<Told, String> {
         let (of, q) = (stop.of, stop.q);
         let target = match target_at(self.arm, of, &self.joints(stop, q)?) {
@@ -371,8 +383,8 @@ impl<'a> AtRest<'a> {
             Target::Pose { X_BT, configuration } => NewTarget::Pose { X_BT, configuration },
         };
         let MoveKind::Arc { via, .. } = &of.kind else { return Ok((target, None)) };
-        // The arm at the auxiliary point, turned as at the end: what it gives way hardly depends on
-        // that.
+        // The arm at the auxiliary point with the orientation of the end: the deflection hardly
+        // depends on orientation.
         let X_MB = base_of(self.arm, of);
         let at = X_MB * nalgebra::Point3::from(*via);
         let X = Pose::from_parts(Translation3::from(at.coords), self.rigid(of, q).rotation);
@@ -383,8 +395,8 @@ impl<'a> AtRest<'a> {
         Ok((target, Some((X_MB.inverse() * nalgebra::Point3::from(moved)).coords)))
     }
 
-    /// Displacement of the flexible tool at joints from where the rigid one is at the joints that
-    /// were meant.
+    /// Returns the displacement of the flexible TCP at the given joint positions from the rigid TCP
+    /// at the intended ones.
     fn off(&self, stop: &Stop<'_>, q: &DVector<f64>) -> Result<Vector6<f64>, String> {
         let m = self.arm.model.n_actuated();
         let t = stop.rest_s[0];

@@ -1,4 +1,4 @@
-//! The recording of an arm before and after its compensation.
+//! Recording of an arm before and after its compensation.
 
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -15,11 +15,11 @@ use flexarm_run::Scenario;
 use flexarm_run::{Keep, RunRequest};
 use flexarm_settings::written::markdown;
 
-/// Samples of the recording per second.
+/// Sampling rate of the recording (Hz).
 const RECORDED_HZ: f64 = 200.0;
 
-/// The arm before and after, over each other, beside the rigid arm on the motion that was asked
-/// for.
+/// Records the arm before and after, drawn over each other, and the rigid arm on the requested
+/// motion.
 pub(super) fn record(
     path: &Path,
     answer: &Compensation,
@@ -44,7 +44,7 @@ pub(super) fn record(
     }
     let mm = |x: f64| 1e3 * x;
     study.finish(&format!(
-        "# {} on {}\n\nDistance of the tool from where the rigid arm has it on the motion that was asked for.\n\n\
+        "# {} on {}\n\nDistance of the TCP from that of the rigid arm on the requested motion.\n\n\
          | | peak | RMS | at the end |\n| --- | --- | --- | --- |\n\
          | before | {:.4} mm | {:.4} mm | {:.4} mm |\n| after | {:.4} mm | {:.4} mm | {:.4} mm |\n",
         markdown(&answer.motion),
@@ -59,8 +59,8 @@ pub(super) fn record(
     Ok(())
 }
 
-/// A recorder that shows the rigid arm of the first run in all runs, and errors from it: new
-/// commands move the rigid arm as well, and that is not where the tool should be.
+/// A recorder that replaces the rigid arm of each run by that of the first, and the errors
+/// accordingly: new commands also move the rigid arm, which is then not at the desired pose.
 struct Against {
     inner: Box<dyn Recorder>,
     wanted: Arc<Mutex<Vec<TwinSample>>>,
@@ -75,7 +75,8 @@ impl Against {
         Self { inner, wanted, first, at: 0, frame: None, interval_s: 1.0 / RECORDED_HZ }
     }
 
-    /// The rigid arm as it should be, and the tool against it.
+    /// Returns the sample with the desired rigid arm, and with the error of the flexible TCP from
+    /// it.
     fn changed(&mut self, sample: &Sample) -> Sample {
         let wanted = self.wanted.lock().unwrap_or_else(PoisonError::into_inner);
         let place = |k: usize| wanted[k.min(wanted.len() - 1)].X_WT.translation.vector;
@@ -123,7 +124,8 @@ impl Recorder for Against {
     }
 
     fn finish(&mut self, result: &RunResult) -> Result<(), LogError> {
-        // Figures of the later runs are about where their own commands have the rigid arm.
+        // The figures of later runs refer to the rigid arm under their own commands, so they are
+        // left out.
         if self.first { self.inner.finish(result) } else { self.inner.finish(&RunResult::default()) }
     }
 

@@ -1,4 +1,4 @@
-//! A motion through an input shaper.
+//! Input shaping of a motion.
 
 use std::sync::Arc;
 
@@ -15,33 +15,35 @@ use flexarm_run::Error;
 use flexarm_run::Motion;
 use flexarm_run::Scenario;
 
-/// Damping ratio beyond which a mode hardly swings.
+/// Damping ratio above which a mode hardly oscillates.
 const SWINGS: f64 = 0.4;
-/// Commands with less than this part of their largest acceleration are at rest.
+/// Fraction of the maximum acceleration below which commands are at rest.
 const RESTS: f64 = 1e-9;
-/// Modes with less than this part of the largest vibration are left alone.
+/// Fraction of the maximum vibration below which a mode is ignored.
 const SMALL: f64 = 1e-3;
-/// Most modes, and most periods of one in a delay.
+/// Maximum number of modes, and of periods of a mode within the delay.
 const MOST: (usize, f64) = (8, 20.0);
-/// Factors on frequencies at which the spectrum of a motion is looked at, in parts of the band.
+/// Offsets, in units of the band, of the frequencies at which the spectrum of a motion is
+/// evaluated.
 const IN_BAND: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
 
-/// Which input shaper.
+/// Choice of the input shaper.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shaping {
-    /// In closed form, against the first mode at the end of the motion.
+    /// Closed-form shaper for the first mode at the end of the motion.
     Mode(ShaperKind),
-    /// What leaves least of all modes at the end of the motion within a delay.
+    /// Shaper with the minimum residual vibration of all modes at the end of the motion, for a
+    /// given delay.
     Optimal {
-        /// At most so much longer (s); a period of the first mode without.
+        /// Maximum delay (s); default: a period of the first mode.
         delay_s: Option<f64>,
-        /// Part by which each frequency may be off to either side.
+        /// Relative uncertainty of each frequency to either side.
         band: f64,
     },
 }
 
 impl Shaping {
-    /// Part by which frequencies may be off unless it is told.
+    /// Default of the relative uncertainty of frequencies.
     pub const BAND: f64 = 0.1;
 }
 
@@ -51,33 +53,32 @@ impl From<ShaperKind> for Shaping {
     }
 }
 
-/// A shaper as it was used.
+/// Figures of a shaper in use.
 #[derive(Clone, Debug, Serialize)]
 pub struct ShaperFigures {
     /// `zv`, `zvd` or `optimal`.
     pub kind: &'static str,
-    /// Delay (s) and part of each copy of the motion.
+    /// Delay (s) and amplitude of each copy of the motion.
     pub copies: Vec<[f64; 2]>,
-    /// Modes at the end of the motion that it was made against, the one that would swing most
-    /// first.
+    /// Modes at the end of the motion for which the shaper was designed, in order of decreasing
+    /// vibration.
     pub modes: Vec<ShapedModeFigures>,
 }
 
-/// A mode and what a shaper leaves of it.
+/// A mode with its residual vibration.
 #[derive(Clone, Debug, Serialize)]
 pub struct ShapedModeFigures {
     /// Natural frequency (Hz).
     pub frequency_hz: f64,
     /// Damping ratio.
     pub damping_ratio: f64,
-    /// Oscillation of the tool that the motion would leave, the largest within the band of the
-    /// frequency (m).
+    /// Residual vibration of the TCP without shaper, maximum within the band of the frequency (m).
     pub before_m: f64,
-    /// The same with the shaper.
+    /// Residual vibration with the shaper (m).
     pub after_m: f64,
 }
 
-/// The motion of a scenario through a shaper.
+/// Returns the motion of a scenario through a shaper.
 pub(super) fn shaped(arm: &Arm, scenario: &Scenario, shaping: Shaping) -> Result<(Motion, ShaperFigures), Error> {
     let motion = &scenario.motion;
     let end = AtEnd::of(arm, scenario)?;
@@ -113,7 +114,7 @@ pub(super) fn shaped(arm: &Arm, scenario: &Scenario, shaping: Shaping) -> Result
     Ok((Motion::along(trajectory, &format!("{}_shaped", motion.name), arm.robot())?, figures))
 }
 
-/// A motion as the sum of its copies.
+/// Returns a motion as the sum of its copies.
 fn through(shaper: &Shaper, motion: &Trajectory) -> Result<Trajectory, Error> {
     let m = motion.joints().len();
     let (mut q, mut v, mut a) = (vec![0.0; m], vec![0.0; m], vec![0.0; m]);
@@ -141,12 +142,12 @@ fn through(shaper: &Shaper, motion: &Trajectory) -> Result<Trajectory, Error> {
     Ok(Trajectory::through_knots(&times, &joints)?)
 }
 
-/// The arm as a structure at the end of a motion, under its servos and with what it carries there.
+/// The linearised arm at the end of a motion, under its servos and with its payload there.
 struct AtEnd {
     node: Node,
-    /// Those that swing, by frequency.
+    /// Oscillating modes, by frequency.
     modes: Vec<DampedMode>,
-    /// Accelerations of the motion until it comes to rest, m×N.
+    /// Accelerations of the motion until it is at rest, m×N.
     accelerations: DMatrix<f64>,
     step_s: f64,
 }
@@ -167,10 +168,11 @@ impl AtEnd {
             motion.sample(step_s * k as f64, &mut q, &mut v, &mut a);
             column.copy_from_slice(&a);
         }
-        // Up to where the commands come to rest: what swings then is what is to be small.
+        // Up to the time at which the commands are at rest; the vibration from then on is to be
+        // minimised.
         let moving = accelerations.column_iter().rposition(|column| column.amax() > RESTS * accelerations.amax());
         let accelerations = accelerations.columns(0, (moving.unwrap_or(0) + 2).min(count + 1)).into_owned();
-        // Gains of servos and dampings are those of the start, as in a run.
+        // Servo gains and damping are those of the start, as in a run.
         let mut held: FlexibleArm = start.along(Arc::new(Held(q)));
         for change in scenario.acting_on(arm.robot(), &held.model)?.changes {
             held = held.with_inertia(change.body, change.inertia);
@@ -185,8 +187,8 @@ impl AtEnd {
         Ok(Self { node, modes: modes.into_iter().filter(swings).collect(), accelerations, step_s })
     }
 
-    /// Modes that the motion makes swing, up to a frequency, the first in any case, the largest
-    /// first.
+    /// Returns the modes that the motion excites, up to a frequency (the first mode in any case),
+    /// in order of decreasing vibration.
     fn vibrations(&self, band: f64, up_to_hz: f64) -> Vec<ShapedMode> {
         let of = |mode: &DampedMode| {
             let at = |part: &f64| vibration_left(&self.node, mode, &self.accelerations, self.step_s, 1.0 + band * part);

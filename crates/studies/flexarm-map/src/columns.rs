@@ -1,29 +1,29 @@
-//! What a map says of each pose: names, units and order of its columns, and which way is better.
+//! Columns of a map: names, units, order, and the direction of improvement.
 
 use flexarm_stepping::FlexibleArm;
 
 use super::MapError;
 use flexarm_chatter::CuttingTool;
 
-/// Most natural frequencies of a map.
+/// Maximum number of natural frequencies of a map.
 pub(super) const MOST_FREQUENCIES: usize = 12;
 
 /// A column of a map.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MapColumn {
-    /// Its name, which ends in its unit.
+    /// Name, which ends in the unit.
     pub name: String,
-    /// What it says, in a few words.
+    /// Short description.
     pub meaning: String,
-    /// Whether it is an answer; else it says where the pose is.
+    /// Whether it is a result; otherwise it describes the pose.
     pub quantity: bool,
-    /// Whether more is better, as for frequencies.
+    /// Whether larger values are better, as for frequencies.
     pub more_is_better: bool,
 }
 
 impl MapColumn {
-    /// What is to be small: the value, or less it where more is better; infinite where there is
-    /// none.
+    /// Returns the cost to minimise: the value, or its negative where larger is better; infinite
+    /// for non-finite values.
     pub(super) fn cost(&self, value: f64) -> f64 {
         match self.more_is_better {
             _ if !value.is_finite() => f64::INFINITY,
@@ -33,12 +33,12 @@ impl MapColumn {
     }
 }
 
-/// The one that costs least, of equals the first; what costs infinitely much does not count.
+/// Returns the index with the minimum cost, the first of equal ones; infinite costs are ignored.
 pub(super) fn cheapest(count: usize, cost: impl Fn(usize) -> f64) -> Option<usize> {
     (0..count).filter(|&k| cost(k).is_finite()).min_by(|&a, &b| cost(a).total_cmp(&cost(b)))
 }
 
-/// The columns of a row, in order.
+/// Columns of a row, in order.
 #[derive(Clone, Debug)]
 pub(super) struct Layout {
     pub(super) columns: Vec<MapColumn>,
@@ -46,31 +46,31 @@ pub(super) struct Layout {
     pub(super) frequencies: usize,
     pub(super) loaded: bool,
     pub(super) cuts: bool,
-    /// Whether the compliance is told in full.
+    /// Whether the full compliance matrix is included.
     pub(super) matrix: bool,
-    /// Elastic elements: their coordinates after the joints.
+    /// Range of coordinates of each elastic element, after the joints.
     pub(super) elements: Vec<std::ops::Range<usize>>,
 }
 
-/// Columns before the joints: place of the rigid tool, number of the place or instant, of the
-/// tool's direction, of the branch.
+/// Columns before the joints: position of the rigid TCP, number of the place or instant, of the
+/// tool direction, of the branch.
 pub(super) const HEAD: [(&str, &str); 6] = [
-    ("x_m", "place of the rigid arm's tool, world"),
-    ("y_m", "place of the rigid arm's tool, world"),
-    ("z_m", "place of the rigid arm's tool, world"),
-    ("place", "number of the place, x first, or of the instant"),
-    ("direction", "number of the tool's direction"),
-    ("branch", "number of the solution of the inverse kinematics"),
+    ("x_m", "position of the TCP of the rigid arm, world axes"),
+    ("y_m", "position of the TCP of the rigid arm, world axes"),
+    ("z_m", "position of the TCP of the rigid arm, world axes"),
+    ("place", "index of the place (x varies fastest), or of the instant"),
+    ("direction", "index of the tool direction"),
+    ("branch", "index of the inverse kinematics solution"),
 ];
 
-/// Which of them is the number of the place.
+/// Index of the number of the place in [`HEAD`].
 pub(super) const PLACE: usize = 3;
 
 impl Layout {
-    /// * `joints`: names, and whether they slide.
-    /// * `loaded`: whether a wrench acts besides weight.
-    /// * `tool`: one that cuts.
-    /// * `matrix`: whether the compliance is told in full.
+    /// * `joints`: names, and whether they are prismatic.
+    /// * `loaded`: whether a wrench acts in addition to gravity.
+    /// * `tool`: a cutting tool.
+    /// * `matrix`: whether to include the full compliance matrix.
     pub(super) fn new(
         arm: &FlexibleArm,
         joints: &[(String, bool)],
@@ -82,13 +82,16 @@ impl Layout {
         let elastic = arm.n_elastic_coordinates();
         let frequencies = frequencies.min(elastic).min(MOST_FREQUENCIES);
         let mut columns: Vec<MapColumn> = HEAD.iter().map(|(name, meaning)| place(name, meaning)).collect();
-        columns.extend(joints.iter().map(|(joint, slides)| {
-            place(&format!("{joint}_{}", if *slides { "m" } else { "rad" }), "where the joint is")
-        }));
-        columns.extend(displacement("sag", "from the rigid tool to the flexible one under weight"));
+        columns.extend(
+            joints.iter().map(|(joint, slides)| {
+                place(&format!("{joint}_{}", if *slides { "m" } else { "rad" }), "joint position")
+            }),
+        );
+        columns.extend(displacement("sag", "displacement of the TCP relative to the rigid arm under gravity"));
         if loaded {
-            columns.extend(displacement("error", "the same under weight and the load"));
-            columns.push(less("load_m", "how far the load moves the tool"));
+            let meaning = "displacement of the TCP relative to the rigid arm under gravity and the load";
+            columns.extend(displacement("error", meaning));
+            columns.push(less("load_m", "displacement of the TCP due to the load"));
         }
         for (axis, name) in ["compliance_x_m_per_n", "compliance_y_m_per_n", "compliance_z_m_per_n"].iter().enumerate()
         {
@@ -96,31 +99,31 @@ impl Layout {
         }
         for pair in ["xy", "xz", "yz"] {
             let (along, by) = pair.split_at(1);
-            let meaning = format!("displacement along {along} per force along {by}, mean with the reverse");
+            let meaning = format!("displacement along {along} per force along {by}, averaged with its transpose");
             columns.push(place(&format!("compliance_{pair}_m_per_n"), &meaning));
         }
-        columns.push(less("compliance_worst_m_per_n", "largest displacement per force, over all directions"));
+        columns.push(less("compliance_worst_m_per_n", "maximum displacement per force over all directions"));
         for name in ["worst_x", "worst_y", "worst_z"] {
-            columns.push(place(name, "direction of that force, world"));
+            columns.push(place(name, "direction of that force, world axes"));
         }
-        columns.push(less("rotation_worst_rad_per_nm", "largest rotation per moment, over all directions"));
+        columns.push(less("rotation_worst_rad_per_nm", "maximum rotation per moment over all directions"));
         if matrix {
             columns.extend(full_compliance());
         }
         for k in 1..=frequencies {
-            let column = less(&format!("frequency_{k}_hz"), "natural frequency under weight, undamped, drives locked");
+            let column = less(&format!("frequency_{k}_hz"), "undamped natural frequency under gravity, drives locked");
             columns.push(MapColumn { more_is_better: true, ..column });
         }
         if let Some(tool) = tool {
             let rpm: Vec<String> = tool.rpm.iter().map(f64::to_string).collect();
             let (rpm, most) = (rpm.join(", "), tool.deepest);
             let meaning =
-                format!("depth of cut above which {} chatters at {rpm} 1/min; {most} where it does not", tool.name);
+                format!("depth of cut above which {} chatters at {rpm} 1/min; {most} if it does not", tool.name);
             columns.push(MapColumn { more_is_better: true, ..less("depth_m", &meaning) });
         }
         let whole = if loaded { "error" } else { "sag" };
         for element in &arm.elements {
-            let meaning = format!("part of it in the {whole}, along the {whole}, first order");
+            let meaning = format!("share of the element in the {whole}, along the {whole}, first order");
             columns.push(MapColumn { quantity: true, ..place(&format!("share_{}", element.name), &meaning) });
         }
         let range = |first: usize, size: usize| first..first + size;
@@ -132,10 +135,10 @@ impl Layout {
         self.columns.len()
     }
 
-    /// The column by which poses are compared.
+    /// Returns the column by which poses are compared.
     ///
     /// # Errors
-    /// [`MapError::Quantity`].
+    /// [`MapError::Quantity`] if there is no such result column.
     pub(super) fn compared_by(&self, name: Option<&str>) -> Result<usize, MapError> {
         let usual = match (self.cuts, self.loaded) {
             (true, _) => "depth_m",
@@ -158,18 +161,18 @@ fn less(name: &str, meaning: &str) -> MapColumn {
     MapColumn { quantity: true, ..place(name, meaning) }
 }
 
-/// Row after row of the 6x6 compliance: displacement and rotation per force and moment.
+/// Columns of the 6×6 compliance, row by row: displacement and rotation per force and moment.
 fn full_compliance() -> Vec<MapColumn> {
     let moved = [("x", "m"), ("y", "m"), ("z", "m"), ("rx", "rad"), ("ry", "rad"), ("rz", "rad")];
     let pushed = [("fx", "n"), ("fy", "n"), ("fz", "n"), ("tx", "nm"), ("ty", "nm"), ("tz", "nm")];
     let entry = |(row, unit): (&str, &str), (column, per): (&str, &str)| {
-        let meaning = format!("entry of the 6x6 compliance: {row} of the tool per {column} on it, world axes");
+        let meaning = format!("entry of the 6x6 compliance: {row} of the TCP per {column} on it, world axes");
         place(&format!("c_{row}_{column}_{unit}_per_{per}"), &meaning)
     };
     moved.iter().flat_map(|row| pushed.iter().map(move |column| entry(*row, *column))).collect()
 }
 
-/// Components, size, and angle.
+/// Columns of a displacement: components, norm, and angle.
 fn displacement(what: &str, meaning: &str) -> Vec<MapColumn> {
     let mut columns: Vec<MapColumn> =
         ["x", "y", "z"].iter().map(|axis| place(&format!("{what}_{axis}_m"), meaning)).collect();

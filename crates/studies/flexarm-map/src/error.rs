@@ -1,97 +1,105 @@
-//! Why a map cannot be taken.
+//! Errors of a map.
 
 use flexarm_run::ExternalError;
 use flexarm_settings::{Fault, Setting};
 
 use super::MOST_PLACES;
 
-/// Why a map cannot be taken.
+/// An error of a map.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MapError {
     /// A tool axis without a direction.
-    #[error("the axis of the tool ({}) must have a direction, found {found:?}", Setting::ToolAxis)]
+    #[error("the tool axis ({}) must be finite and non-zero, found {found:?}", Setting::ToolAxis)]
     ToolAxis {
-        /// What was given.
+        /// The axis given.
         found: [f64; 3],
     },
-    /// A cone of directions that is none.
+    /// An invalid cone of directions.
     #[error(
-        "the tool's cone must have a half angle from 0 to 180 degrees, at least one tilt and one roll, and at most 10000 \
-         directions, found {:.4} degrees, {tilts} tilts, {rolls} rolls", half_angle_rad.to_degrees()
+        "the cone of tool directions must have a half angle from 0 to 180 degrees, at least one tilt and one roll, \
+         and at most 10000 directions, found {:.4} degrees, {tilts} tilts, {rolls} rolls", half_angle_rad.to_degrees()
     )]
     Cone {
         /// Half angle (rad).
         half_angle_rad: f64,
-        /// Directions.
+        /// Number of tilts.
         tilts: usize,
-        /// Rotations about each.
+        /// Number of rotations about each direction.
         rolls: usize,
     },
-    /// A box whose corners are no numbers or in the wrong order.
-    #[error("the box ({}) must have its lowest corner first, found {lower:?} to {upper:?} m", Setting::Bounds)]
+    /// A box with corners that are not numbers or in the wrong order.
+    #[error("the box ({}) must have its lower corner first, found {lower:?} to {upper:?} m", Setting::Bounds)]
     Bounds {
-        /// Lowest corner (m).
+        /// Lower corner (m).
         lower: [f64; 3],
-        /// Highest corner (m).
+        /// Upper corner (m).
         upper: [f64; 3],
     },
-    /// A distance of places that is not positive.
-    #[error("the distance of the places ({}) must be positive, found {found} m", Setting::GridSpacing)]
+    /// A grid spacing that is not positive.
+    #[error("the grid spacing ({}) must be positive, found {found} m", Setting::GridSpacing)]
     Spacing {
-        /// What was given (m).
+        /// The spacing given (m).
         found: f64,
     },
-    /// A radius around the arm's foot that is none.
-    #[error("the radius that is kept free around the first joint must be zero or positive, found {found} m")]
+    /// An invalid keep-out radius around the base.
+    #[error("the keep-out radius around the first joint must be zero or positive, found {found} m")]
     KeepOut {
-        /// What was given (m).
+        /// The radius given (m).
         found: f64,
     },
-    /// More places than can be held.
+    /// More places than fit in memory.
     #[error(
-        "the map would have {places:.3e} places, at most {most:.0e} are held in memory: raise {} or take less",
+        "the map would have {places:.3e} places, at most {most:.0e} are held in memory: increase {} or map a \
+         smaller region",
         Setting::GridSpacing
     )]
     TooMany {
-        /// Places.
+        /// Number of places.
         places: f64,
-        /// Most places.
+        /// Maximum number of places.
         most: usize,
     },
-    /// More rows than can be held.
+    /// More rows than fit in memory.
     #[error(
-        "the map has more than {most:.0e} poses, which is what is held in memory: keep the best of each place, or raise {}",
+        "the map has more than {most:.0e} poses, the maximum held in memory: keep only the best pose of each \
+         place, or increase {}",
         Setting::GridSpacing
     )]
     TooManyRows {
-        /// Most rows.
+        /// Maximum number of rows.
         most: usize,
     },
-    /// More places and directions than anybody waits for.
+    /// Too many combinations of places and directions.
     #[error(
-        "the map would look for {found:.1e} poses of the tool, at most {most:.0e}: take fewer directions, or raise {}",
+        "the map would search for {found:.1e} TCP poses, at most {most:.0e} are allowed: use fewer directions, or \
+         increase {}",
         Setting::GridSpacing
     )]
     TooManyDirections {
-        /// Places times directions.
+        /// Number of places times directions.
         found: f64,
-        /// Most of them.
+        /// Maximum of that product.
         most: f64,
     },
-    /// A joint that the robot does not have.
-    #[error("there is no joint {found:?} to be mapped; the joints are {known:?}")]
+    /// An unknown joint.
+    #[error("there is no joint {found:?} to vary; the joints are {known:?}")]
     Joint {
-        /// What was asked for.
+        /// The joint requested.
         found: String,
-        /// The joints.
+        /// The joints of the robot.
         known: Vec<String>,
     },
-    /// A joint that is named twice.
+    /// A joint named twice.
     #[error("joint {0:?} is named twice")]
     JointTwice(String),
-    /// Values of a joint that are none.
-    #[error("joint {joint:?} is to go from {} to {} in {points} values: expected finite numbers and at least one value", range[0], range[1])]
+    /// Invalid values of a joint.
+    #[error(
+        "joint {joint:?} has a range from {} to {} in {points} values: expected finite numbers and at least one \
+         value",
+        range[0],
+        range[1]
+    )]
     JointRange {
         /// The joint.
         joint: String,
@@ -100,45 +108,45 @@ pub enum MapError {
         /// Number of values.
         points: usize,
     },
-    /// A list of no or too many poses.
+    /// A list of poses that is empty or too long.
     #[error("the list has {found} poses, expected one to {MOST_PLACES}")]
     Poses {
-        /// How many it has.
+        /// Number of poses.
         found: usize,
     },
-    /// No joint to go through.
-    #[error("no joint is named that the map is to go through")]
+    /// No joint to vary.
+    #[error("no joint is given for the map to vary")]
     NoJoints,
-    /// Instants of a motion.
+    /// An invalid number of instants of a motion.
     #[error("a map along a motion needs from one to {MOST_PLACES} instants")]
     Instants,
-    /// A quantity that a map does not have.
-    #[error("a map has no quantity {found:?} to compare by; it has {}", known.join(", "))]
+    /// An unknown quantity.
+    #[error("the map has no quantity {found:?} to compare poses by; it has {}", known.join(", "))]
     Quantity {
-        /// What was asked for.
+        /// The quantity requested.
         found: String,
-        /// What there is.
+        /// The quantities available.
         known: Vec<String>,
     },
-    /// A workpiece whose edges are no lengths.
+    /// A workpiece with edges that are not lengths.
     #[error("the edges of the workpiece must be zero or positive lengths, found {found:?} m")]
     Workpiece {
         /// Edges (m).
         found: [f64; 3],
     },
     /// A workpiece without a grid of places.
-    #[error("a workpiece is placed on a grid of places: it goes with neither joint values nor a motion")]
+    #[error("a workpiece requires a grid of places: it cannot be combined with joint values or a motion")]
     WorkpieceWithoutGrid,
-    /// A tool that cannot be brought to poses.
+    /// An arm with too few joints for inverse kinematics.
     #[error(
-        "the arm has {joints} joints, and to bring the tool to a pose takes six: map it over joint values ({})",
+        "the arm has {joints} joints, but reaching a TCP pose requires six: map it over joint values ({})",
         Setting::MapJoints
     )]
     TooFewJoints {
-        /// Joints that move the tool.
+        /// Number of joints that move the TCP.
         joints: usize,
     },
-    /// Nothing in the box is within reach.
+    /// No place in the box is within reach.
     #[error(
         "none of the {places} places is within reach with the tool pointing along {axis:?} (world) and all joints within \
          their limits: try other values for {} or {}",
@@ -146,34 +154,34 @@ pub enum MapError {
         Setting::ToolAxis
     )]
     OutOfReach {
-        /// Places that were tried.
+        /// Number of places tried.
         places: usize,
-        /// Where the tool was to point.
+        /// Direction of the tool axis.
         axis: [f64; 3],
     },
-    /// The arm stays nowhere.
+    /// No pose has an equilibrium.
     #[error("none of the {poses} poses has an equilibrium; at the first: {first}")]
     NoEquilibrium {
-        /// Poses that were tried.
+        /// Number of poses tried.
         poses: usize,
-        /// Why not.
+        /// Error at the first pose.
         first: String,
     },
-    /// All poses lack the quantity.
+    /// No pose has a value of the quantity.
     #[error(
         "none of the poses has a {by}{}: compare by another quantity",
-        if by == "depth_m" { ", for the feed of the tool is along its axis (feed = [...] in [tool])" } else { "" }
+        if by == "depth_m" { ", because the feed of the tool is along its axis (feed = [...] in [tool])" } else { "" }
     )]
     NothingToCompare {
         /// The quantity.
         by: String,
     },
-    /// The user stopped it.
+    /// Interrupted by the user.
     #[error("stopped after {done} of {places} places; nothing is written")]
     Interrupted {
-        /// Places that are done.
+        /// Number of places done.
         done: usize,
-        /// All places.
+        /// Total number of places.
         places: usize,
     },
 }

@@ -1,4 +1,5 @@
-//! Poses of a map: equilibrium, compliance, frequencies and shares of each as a row of numbers.
+//! Evaluation of the poses of a map: equilibrium, compliance, frequencies and contributions of each
+//! pose as a row of numbers.
 
 use flexarm_analysis::tcp_error;
 use flexarm_kinematics::Wrench;
@@ -12,7 +13,7 @@ use flexarm_run::Modelling;
 use flexarm_run::Robot;
 use flexarm_run::posed;
 
-/// Where a pose is in the map.
+/// Indices of a pose in the map.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seat {
     pub(super) place: usize,
@@ -20,7 +21,7 @@ pub(super) struct Seat {
     pub(super) branch: usize,
 }
 
-/// What weight alone does at a pose.
+/// Sag and frequencies of a pose under gravity only.
 #[derive(Clone, Copy)]
 struct Weighed {
     sag: [f64; 6],
@@ -35,7 +36,7 @@ impl Weighed {
     }
 }
 
-/// Answers many poses at a time.
+/// Evaluates poses in batches.
 #[derive(Clone)]
 pub(super) struct Evaluator<'a> {
     at: OperatingPoint,
@@ -44,7 +45,7 @@ pub(super) struct Evaluator<'a> {
     cut: Option<Cut<'a>>,
 }
 
-/// A tool that cuts, on an arm.
+/// A cutting tool on an arm.
 #[derive(Clone, Copy)]
 pub(super) struct Cut<'a> {
     pub(super) robot: &'a Robot,
@@ -65,16 +66,16 @@ impl<'a> Evaluator<'a> {
         Self { at, layout, wrench: Wrench::new(Vector3::new(fx, fy, fz), Vector3::new(tx, ty, tz)), cut }
     }
 
-    /// Whether a pose takes so long that few should be taken between two looks at whether to go on.
+    /// Whether a pose takes so long that batches between two checks for interruption must be small.
     pub(super) fn is_slow(&self) -> bool {
         self.cut.is_some()
     }
 
-    /// Appends a row for each pose that has an answer, in order; what the others have instead goes
-    /// to `failed`, in order too.
+    /// Appends a row for each pose with a result, in order; the errors of the other poses go to
+    /// `failed`, also in order.
     ///
     /// * `poses`: actuated joints in coordinate order (rad or m), pose after pose.
-    /// * `seats`: one for each pose.
+    /// * `seats`: one per pose.
     pub(super) fn push(&mut self, poses: &[f64], seats: &[Seat], rows: &mut Vec<f64>, mut failed: impl FnMut(Error)) {
         let Self { at, layout, wrench, cut } = self;
         let (joints, loaded) = (layout.joints, layout.loaded);
@@ -84,7 +85,7 @@ impl<'a> Evaluator<'a> {
             push_row(layout, q, seats[k], weighed, found, depth, rows);
             Ok(())
         };
-        // Frequencies are those under weight alone, compliance and shares those under the load.
+        // Frequencies are computed under gravity only, compliance and contributions under the load.
         let under_weight = Asked { frequencies: layout.frequencies > 0, compliance: !loaded, jacobian: !loaded };
         if !loaded {
             return at.solve_each(poses, &Wrench::zeros(), under_weight, |k, answer| match answer {
@@ -136,7 +137,7 @@ fn push_row(
     push_shares(layout, &moved, found, rows);
 }
 
-/// Part of each element in the displacement of the tool: `J_e δ_e` along it, over its size.
+/// Appends the share of each element in the TCP displacement `d`: `(J_e δ_e · d) / |d|²`.
 fn push_shares(layout: &Layout, moved: &[f64; 6], found: &PoseAnswer, rows: &mut Vec<f64>) {
     let d = Vector3::new(moved[0], moved[1], moved[2]);
     let whole = d.norm_squared();
@@ -169,15 +170,16 @@ fn push_compliance(C: &Matrix6<f64>, rows: &mut Vec<f64>) {
     rows.push(largest_gain(&C.fixed_view::<3, 3>(3, 3).into_owned()).0);
 }
 
-/// Largest singular value of a matrix and the direction that it belongs to; its largest component
-/// is positive.
+/// Returns the largest singular value of a matrix and its right singular vector, signed so that its
+/// largest component is positive.
 fn largest_gain(C: &Matrix3<f64>) -> (f64, Vector3<f64>) {
-    // Compliances are 1e-9 or so: their squares lose nothing once they are scaled.
+    // Compliances are of the order of 1e-9: scaling avoids loss in their squares.
     let scale = C.amax();
     if !(scale.is_finite() && scale > 0.0) {
         return (if scale == 0.0 { 0.0 } else { f64::NAN }, Vector3::zeros());
     }
     let S = C / scale;
+    // Singular values and right singular vectors from SᵀS.
     let eigen = (S.transpose() * S).symmetric_eigen();
     let (k, square) = eigen.eigenvalues.argmax();
     let v = eigen.eigenvectors.column(k).into_owned();
@@ -190,8 +192,8 @@ mod tests {
     use super::*;
     use nalgebra::{Rotation3, matrix};
 
-    /// Truth: `C = R diag(3, 1, 2) Rᵀ` has the largest gain 3 along the first column of R; of
-    /// `u vᵀ` it is `|u| |v|` along v.
+    /// Truth: `C = R diag(3, 1, 2) Rᵀ` has the largest gain 3 along the first column of R; that of
+    /// `u vᵀ` is `|u| |v|` along v.
     #[test]
     fn the_worst_direction_is_that_of_the_largest_singular_value() {
         let R = Rotation3::from_euler_angles(0.3, -1.1, 2.0).into_inner();

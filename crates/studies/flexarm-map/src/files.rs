@@ -1,4 +1,4 @@
-//! Files of a map: the table of all poses, the page, the recording, the figures.
+//! Files of a map: table of all poses, page, recording, figures.
 
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,7 @@ use flexarm_run::Arm;
 use flexarm_run::Error;
 use flexarm_run::Robot;
 
-/// Where the files of a map go.
+/// Paths of the files of a map.
 pub(super) struct MapPaths {
     table: PathBuf,
     page: PathBuf,
@@ -24,14 +24,14 @@ pub(super) struct MapPaths {
     json: PathBuf,
 }
 
-/// The table's format in this build.
+/// File name of the table, whose format depends on the build.
 const TABLE: &str = if cfg!(feature = "parquet") { "map.parquet" } else { "map.csv" };
 
-/// Columns of whole numbers.
+/// Integer columns.
 #[cfg(feature = "parquet")]
 const WHOLE: [&str; 3] = ["place", "direction", "branch"];
 
-/// Places of the files, free or to be overwritten.
+/// Returns the paths of the files, after checking that they are free or may be overwritten.
 pub(super) fn places(folder: &Path, overwrite: bool) -> Result<MapPaths, Error> {
     let at = |name: &str| folder.join(name);
     let paths = MapPaths { table: at(TABLE), page: at("map.html"), rrd: at("map.rrd"), json: at("map.json") };
@@ -66,7 +66,7 @@ pub(super) fn save(
     Ok(write_all(&[(paths.page.clone(), page), (paths.json.clone(), json.into_bytes())])?)
 }
 
-/// Writes the table and its texts.
+/// Writes the table with its texts.
 #[cfg(feature = "parquet")]
 fn write_table(map: &Map, path: &Path, overwrite: bool) -> Result<(), Error> {
     let texts = [

@@ -1,4 +1,5 @@
-//! Joint values that bring the tool to a place: every branch, in closed form where the arm has one.
+//! Inverse kinematics: joint positions for a TCP pose, all branches, in closed form where the arm
+//! has one.
 
 use flexarm_kinematics::{
     AnalyticArm, Data, Frame, IkOptions, Model, Pose, Solutions, forward_kinematics, frame_jacobian,
@@ -6,10 +7,10 @@ use flexarm_kinematics::{
 };
 use nalgebra::{DVector, Matrix6xX};
 
-/// Starts of the search for arms without a closed form.
+/// Number of starts of the search for arms without a closed form.
 const STARTS: usize = 12;
 
-/// Inverse kinematics with its workspace.
+/// Inverse kinematics solver with its buffers.
 #[derive(Clone)]
 pub(super) struct Finder<'m> {
     model: &'m Model,
@@ -17,10 +18,10 @@ pub(super) struct Finder<'m> {
     closed: Option<AnalyticArm>,
     solutions: Solutions,
     data: Data,
-    /// Where joints stay that the tool's pose leaves free, and what copies by whole turns are to be
-    /// near (rad or m).
+    /// Positions of the joints that the TCP pose leaves free, and reference for the choice among
+    /// solutions that differ by whole turns (rad or m).
     near: Vec<f64>,
-    /// Where the first joint is (m, world, seen from above).
+    /// Position of the first joint (m, world x and y).
     foot: [f64; 2],
 }
 
@@ -31,27 +32,27 @@ impl<'m> Finder<'m> {
         let mut q = DVector::zeros(model.nv());
         q.rows_mut(0, near.len()).copy_from_slice(&near);
         forward_kinematics(model, &mut data, &q);
-        // The world is the body before the first.
+        // Body 0 is the world, so the first joint carries body 1.
         let foot = data.X_WB.get(1).map_or([0.0; 2], |X| [X.translation.x, X.translation.y]);
         Self { model, tool, closed, solutions: Solutions::default(), data, near, foot }
     }
 
-    /// Distance of a place from the upright line through the first joint (m).
+    /// Returns the distance of a place from the vertical line through the first joint (m).
     pub(super) fn distance_from_foot(&self, [x, y, _]: [f64; 3]) -> f64 {
         (x - self.foot[0]).hypot(y - self.foot[1])
     }
 
-    /// Whether all branches are found, quickly.
+    /// Whether the arm has a closed form, which finds all branches quickly.
     pub(super) fn is_closed(&self) -> bool {
         self.closed.is_some()
     }
 
-    /// Number of joints that move the tool.
+    /// Returns the number of joints that move the TCP.
     pub(super) fn joints(&mut self) -> usize {
         if self.closed.is_some() {
             return 6;
         }
-        // At a pose where no axis goes through the tool by chance.
+        // Evaluate at a generic pose, where no joint axis passes through the TCP by chance.
         let mut q = DVector::zeros(self.model.nv());
         q.iter_mut().enumerate().for_each(|(k, q)| *q = 0.3 + 0.17 * k as f64);
         forward_kinematics(self.model, &mut self.data, &q);
@@ -60,8 +61,8 @@ impl<'m> Finder<'m> {
         (0..self.model.n_actuated()).filter(|&k| J.column(k).norm() > 1e-9).count()
     }
 
-    /// Joint values within the limits at which the tool has the pose, one per branch, after each
-    /// other into `found`.
+    /// Appends to the cleared `found` the joint positions within the limits for a TCP pose, one set
+    /// per branch.
     pub(super) fn find(&mut self, X_WT: &Pose, found: &mut Vec<f64>) {
         found.clear();
         let Some(arm) = &self.closed else { return self.search(X_WT, found) };

@@ -1,24 +1,25 @@
-//! Surfaces of one value through a grid of numbers: marching tetrahedra.
+//! Iso-surfaces of a value on a grid: marching tetrahedra.
 
 use std::collections::HashMap;
 
 use super::region::Grid;
 
-/// Corners and triangles of a surface.
+/// Vertices and triangles of a surface.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Surface {
-    /// Corners (m, world).
+    /// Vertices (m, world).
     pub(super) places: Vec<[f32; 3]>,
-    /// Corner indices.
+    /// Vertex indices.
     pub(super) triangles: Vec<[u32; 3]>,
 }
 
-/// Corners of a cube by bits (x lowest), in six tetrahedra around the diagonal from 0 to 7:
-/// neighbours fit.
+/// Six tetrahedra of a cube around the diagonal from 0 to 7; corners numbered by bits (x lowest).
+/// The faces of neighbouring cubes match.
 const TETRAHEDRA: [[usize; 4]; 6] =
     [[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]];
 
-/// Where the values of a grid pass a level, between places that all have a finite value.
+/// Returns the surface on which the values of a grid equal a level, in cubes with finite values at
+/// all corners.
 pub(super) fn iso_surface(grid: &Grid, values: &[f64], level: f64) -> Surface {
     let mut surface = Surface::default();
     let mut known: HashMap<(usize, usize), u32> = HashMap::new();
@@ -53,7 +54,7 @@ pub(super) fn iso_surface(grid: &Grid, values: &[f64], level: f64) -> Surface {
     surface
 }
 
-/// Triangles in which a tetrahedron is cut; `edge` gives the corner on an edge.
+/// Returns the triangles of a cut tetrahedron; `edge` returns the vertex on an edge.
 fn cut(corners: [usize; 4], values: &[f64], level: f64, edge: &mut dyn FnMut(usize, usize) -> u32) -> Vec<[u32; 3]> {
     let (above, below): (Vec<usize>, Vec<usize>) = corners.iter().partition(|&&k| values[k] > level);
     match (above.as_slice(), below.as_slice()) {
@@ -66,7 +67,7 @@ fn cut(corners: [usize; 4], values: &[f64], level: f64, edge: &mut dyn FnMut(usi
     }
 }
 
-/// Where the value on an edge is the level, in proportion.
+/// Returns the point on an edge at which the linearly interpolated value equals the level.
 fn crossing(grid: &Grid, values: &[f64], level: f64, (a, b): (usize, usize)) -> [f32; 3] {
     let (p, q) = (grid.place(a), grid.place(b));
     let share = (level - values[a]) / (values[b] - values[a]);
@@ -77,8 +78,8 @@ fn crossing(grid: &Grid, values: &[f64], level: f64, (a, b): (usize, usize)) -> 
 mod tests {
     use super::*;
 
-    /// Truth: a sphere of radius 0.8 has the area 4 π r²; each edge of a closed surface belongs to
-    /// two triangles, and corners less edges plus triangles are two (Euler).
+    /// Truth: a sphere of radius r has the area 4 π r²; each edge of a closed surface belongs to
+    /// two triangles, and vertices minus edges plus triangles are two (Euler).
     #[test]
     fn the_surface_of_equal_distance_is_a_closed_sphere_of_the_right_area() {
         let grid = Grid { lower: [-1.0; 3], spacing_m: 0.05, count: [41; 3] };

@@ -1,7 +1,7 @@
-//! Maps of the workspace: sag, compliance, frequencies and error under load at any number of poses.
+//! Workspace maps: sag, compliance, frequencies and error under load at any number of poses.
 //!
-//! [`map()`] goes through places of the tool, joint values or a motion ([`MapRegion`]) and returns
-//! a [`Map`]: figures, the best and the worst pose, and every pose as a row of a [`MapTable`].
+//! [`map()`] evaluates TCP positions, joint positions or a motion ([`MapRegion`]) and returns a
+//! [`Map`]: figures, the best and the worst pose, and every pose as a row of a [`MapTable`].
 //!
 //! ```no_run
 //! use flexarm_run::Robot;
@@ -15,8 +15,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! At each pose the answers are those of [`flexarm_run::statics()`] and [`flexarm_run::modes()`],
-//! to the last bit. Drives are locked. Collisions are not looked for.
+//! At each pose the results equal those of [`flexarm_run::statics()`] and [`flexarm_run::modes()`]
+//! to the last bit. Drives are locked. Collisions are not checked.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
@@ -73,73 +73,72 @@ use flexarm_run::inspect::joint_values;
 use flexarm_run::posed::check_wrench;
 use flexarm_run::robot::tcp_frame;
 
-/// Poses that are tried to find out how far the arm reaches.
+/// Number of poses sampled to estimate the reach of the arm.
 const REACH_POSES: usize = 20_000;
-/// Places along the longest edge of a box whose spacing is not told; fewer for arms whose inverse
-/// kinematics is a search.
+/// Default number of places along the longest edge of a box; fewer for arms whose inverse
+/// kinematics is a numerical search, and for many tool directions.
 const USUAL_PLACES: f64 = 32.0;
 const FEW_PLACES: f64 = 10.0;
 
-/// Which poses of a place are kept, of all directions of the tool and branches of the inverse
-/// kinematics.
+/// Poses kept at each place, among all tool directions and branches of the inverse kinematics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum KeptPoses {
-    /// The best one.
+    /// The best pose.
     #[default]
     Best,
-    /// The worst one.
+    /// The worst pose.
     Worst,
-    /// All.
+    /// All poses.
     All,
 }
 
-/// What is asked of [`map()`].
+/// Input of [`map()`].
 #[derive(Clone, Debug, Default)]
 pub struct MapRequest {
-    /// How links and drives are modelled.
+    /// Modelling of links and drives.
     pub modelling: Modelling,
-    /// Where.
+    /// Region of the map.
     pub region: MapRegion,
-    /// Where joints stay that the map does not move, and what branches are near to (rad or m);
-    /// zero, or the nearest value within the limits, without it.
+    /// Positions of joints that the map does not move, and reference for the choice of branches
+    /// (rad or m); default: zero, or the nearest value within the limits.
     pub at: Option<Vec<f64>>,
-    /// Force and moment on the tool besides weight, world axes (N, N m).
+    /// Force and moment on the TCP in addition to gravity, world axes (N, N m).
     pub wrench: [f64; 6],
-    /// A tool that cuts, at its spindle speeds: the lowest limit of depth of each pose becomes a
-    /// quantity.
+    /// Cutting tool with its spindle speeds: the lowest limit of the depth of cut at each pose
+    /// becomes a quantity.
     pub tool: Option<CuttingTool>,
-    /// Limits of depth by the mean cutting force alone (zero-order solution): ten times as quick,
-    /// blind to period doubling.
+    /// Whether to compute the limits of depth from the mean cutting force only (zero-order
+    /// solution): ten times as fast, but misses period doubling.
     pub zero_order: bool,
-    /// How many natural frequencies; three without it.
+    /// Number of natural frequencies; default three.
     pub frequencies: Option<usize>,
-    /// Which poses of a place are kept.
+    /// Poses kept at each place.
     pub keep: KeptPoses,
-    /// Quantity by which poses are compared: unless told the limit of depth of a tool, or the error
-    /// under the load, or the worst compliance without either.
+    /// Quantity by which poses are compared; default: the limit of depth of a tool, else the error
+    /// under the load, else the worst compliance.
     pub by: Option<String>,
-    /// Edges of a workpiece that is to be placed (m, along world axes).
+    /// Edges of a workpiece to be placed (m, along world axes).
     pub workpiece_m: Option<[f64; 3]>,
-    /// Folder of the files; nothing is written without it.
+    /// Output folder; `None` writes nothing.
     pub output: Option<PathBuf>,
-    /// Overwrite what is there.
+    /// Whether to overwrite existing files.
     pub overwrite: bool,
 }
 
 /// Written files.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct MapFiles {
-    /// Every pose.
+    /// Table of all poses.
     pub table: Option<String>,
-    /// The page.
+    /// Page.
     pub page: Option<String>,
-    /// The recording for the viewer.
+    /// Recording for the viewer.
     pub rrd: Option<String>,
-    /// The figures.
+    /// Figures.
     pub json: Option<String>,
 }
 
-/// Answer of `flexarm map`. SI units, world axes, at the TCP.
+/// Result of `flexarm map`. SI units, world axes, at the TCP.
 #[derive(Clone, Debug, Serialize)]
 pub struct Map {
     /// Name of the robot.
@@ -148,52 +147,54 @@ pub struct Map {
     pub tcp: String,
     /// Joints in coordinate order.
     pub joints: Vec<String>,
-    /// Places, or poses in joints, that were asked for.
+    /// Number of places, or joint poses, requested.
     pub points: usize,
-    /// Those of them with at least one pose within the limits that carries its weight.
+    /// Number of these with at least one pose within the limits that has an equilibrium under
+    /// gravity.
     pub reachable: usize,
-    /// Poses that were answered; more than places where several directions or branches count.
+    /// Number of poses evaluated; larger than the number of places with several directions or
+    /// branches.
     pub poses: usize,
-    /// Poses without an equilibrium.
+    /// Number of poses without an equilibrium.
     pub failed: usize,
-    /// The grid, of a map over places.
+    /// Grid, for a map over TCP positions.
     pub grid: Option<GridFigures>,
-    /// Force (N) and moment (N m) on the TCP, besides weight.
+    /// Force (N) and moment (N m) on the TCP, in addition to gravity.
     pub wrench: [f64; 6],
-    /// Quantity by which best and worst are meant.
+    /// Quantity that defines best and worst.
     pub by: String,
-    /// How each quantity is spread over the rows.
+    /// Distribution of each quantity over the rows.
     pub quantities: BTreeMap<String, Spread>,
     /// The worst pose.
     pub worst: MapPose,
     /// The best pose.
     pub best: MapPose,
-    /// Where the workpiece is best put; null without one, or if none of its places fits.
+    /// Best placement of the workpiece; null without a workpiece, or if it fits nowhere.
     pub placement: Option<Placement>,
-    /// How long it took (s).
+    /// Wall-clock time (s).
     pub wall_s: f64,
-    /// The table of all poses.
+    /// File with the table of all poses.
     pub file: Option<String>,
     /// Written files.
     pub files: MapFiles,
-    /// What the caveats warn of, as sentences.
+    /// Messages of the caveats.
     pub warnings: Vec<String>,
-    /// What is probably wrong with the input, or limits the worth of the result.
+    /// Probable errors of the input, and limits of the result's validity.
     pub caveats: Vec<Caveat>,
-    /// Every pose.
+    /// All poses.
     #[serde(skip)]
     pub table: MapTable,
 }
 
 impl Map {
-    /// Number of the place of the best pose.
+    /// Returns the number of the place of the best pose.
     fn best_place(&self) -> usize {
         let place = columns::HEAD.iter().position(|(name, _)| *name == "place").unwrap_or_default();
         self.table.row(self.best.row)[place] as usize
     }
 
-    /// A quantity per place of the grid, of the pose that a person would choose there; NaN where
-    /// the tool does not come.
+    /// Returns a quantity per place of the grid, for the best pose at each place; NaN for
+    /// unreachable places.
     fn by_place(&self, column: usize, grid: &Grid) -> Vec<f64> {
         let place = columns::HEAD.iter().position(|(name, _)| *name == "place").unwrap_or_default();
         let by = self.table.columns.iter().position(|column| column.name == self.by).unwrap_or(column);
@@ -209,28 +210,29 @@ impl Map {
     }
 }
 
-/// The grid of a map.
+/// Grid of a map.
 #[derive(Clone, Debug, Serialize)]
 pub struct GridFigures {
     /// First place (m).
     pub lower_m: [f64; 3],
     /// Last place (m).
     pub upper_m: [f64; 3],
-    /// Distance of places (m).
+    /// Spacing (m).
     pub spacing_m: f64,
     /// Number of places along x, y and z.
     pub count: [usize; 3],
-    /// Directions of the tool at each.
+    /// Number of tool directions at each place.
     pub directions: usize,
 }
 
-/// Takes a map.
+/// Computes a map.
 ///
-/// `go_on` is shown how many of how many places are done, and may break off.
+/// `go_on` is called with the number of places done and their total, and may interrupt.
 ///
 /// # Errors
-/// [`MapError`] for what cannot be mapped, [`Error::Pose`] for joint values that do not fit,
-/// [`Error::Step`] for springs that hold nothing, [`Error::File`] and [`Error::Write`] for files.
+/// [`MapError`] for an invalid or unreachable region, [`Error::Pose`] for joint positions that do
+/// not match the robot, [`Error::Step`] for singular springs, [`Error::File`] and [`Error::Write`]
+/// for files.
 pub fn map(
     robot: &Robot,
     request: &MapRequest,
@@ -253,7 +255,7 @@ pub fn map(
         && let Err(error) = lowest_limit(robot, &request.modelling, tool, request.zero_order, &near)
         && error.external::<LobesError>().is_some()
     {
-        // What is wrong with tool or robot is so everywhere.
+        // Errors of tool or robot are the same at all poses.
         return Err(error);
     }
     let cut = request.tool.as_ref().map(|tool| Cut {
@@ -287,7 +289,7 @@ pub fn map(
     Ok(found)
 }
 
-/// What a region comes to.
+/// A checked region.
 enum Region<'m> {
     Grid(Grid, Box<Finder<'m>>, f64),
     Poses(usize, Box<PoseOf<'m>>),
@@ -314,7 +316,7 @@ impl<'m> Region<'m> {
     }
 }
 
-/// Checks the region and says what there is to go through.
+/// Checks the region and returns the places or poses to evaluate.
 fn region_of<'m>(
     request: &'m MapRequest,
     model: &'m Model,
@@ -342,9 +344,9 @@ fn region_of<'m>(
             }
             let mut caveats = Vec::new();
             if !finder.is_closed() {
-                let message = "the arm has no inverse kinematics in closed form: poses are found by search, which takes long \
-                               and may miss branches, and places at the border";
-                caveats.push(Caveat::said("searched-poses", "map", message, "map it over joint values"));
+                let message = "the arm has no closed-form inverse kinematics: poses are found by search, which is \
+                               slow and may miss branches, and places near the workspace boundary";
+                caveats.push(Caveat::said("searched-poses", "map", message, "map the arm over joint values"));
             }
             let bounds = workspace.bounds.unwrap_or_else(|| reach(model));
             let edge = (0..3).map(|c| bounds[1][c] - bounds[0][c]).fold(0.0, f64::max);
@@ -376,7 +378,7 @@ fn region_of<'m>(
     }
 }
 
-/// The product of joint values, the first joint quickest.
+/// Returns the product of the joint values, the first joint varying fastest.
 fn joint_region<'m>(ranges: &'m [JointRange], model: &Model, near: &[f64]) -> Result<(Region<'m>, Vec<Caveat>), Error> {
     let actuated = &model.coordinates()[..model.n_actuated()];
     if ranges.is_empty() {
@@ -399,8 +401,8 @@ fn joint_region<'m>(ranges: &'m [JointRange], model: &Model, near: &[f64]) -> Re
         let limits = actuated[k].limits;
         if first.min(*last) < limits.lower || first.max(*last) > limits.upper {
             let (lower, upper) = (limits.lower, limits.upper);
-            let message = format!("the map takes joint {joint:?} beyond its limits {lower} to {upper}");
-            caveats.push(Caveat::said("outside-limits", joint, message, "take less of the joint"));
+            let message = format!("the map moves joint {joint:?} beyond its limits {lower} to {upper}");
+            caveats.push(Caveat::said("outside-limits", joint, message, "reduce the range of the joint"));
         }
         numbers.push(k);
         poses *= *points as f64;
@@ -420,7 +422,7 @@ fn joint_region<'m>(ranges: &'m [JointRange], model: &Model, near: &[f64]) -> Re
     Ok((Region::Poses(poses as usize, Box::new(values)), caveats))
 }
 
-/// Where joints are that are not told: as given, or zero within their limits.
+/// Returns the positions of the joints not varied: as given, or zero clamped to the limits.
 fn home(model: &Model, at: Option<&[f64]>) -> Result<Vec<f64>, Error> {
     let actuated = &model.coordinates()[..model.n_actuated()];
     let names: Vec<&str> = actuated.iter().map(|c| c.joint.as_str()).collect();
@@ -430,8 +432,8 @@ fn home(model: &Model, at: Option<&[f64]>) -> Result<Vec<f64>, Error> {
     Ok(actuated.iter().map(|c| 0.0_f64.max(c.limits.lower).min(c.limits.upper)).collect())
 }
 
-/// Box around the places that the tool reaches with its joints within their limits, with some room:
-/// of many poses.
+/// Returns a box, with a margin, around the TCP positions that the arm reaches within its joint
+/// limits, estimated from many poses.
 fn reach(model: &Model) -> [[f64; 3]; 2] {
     const PRIMES: [f64; 10] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0];
     let tool = tcp_frame(model);
@@ -446,7 +448,7 @@ fn reach(model: &Model) -> [[f64; 3]; 2] {
     for pose in 0..REACH_POSES {
         for k in 0..actuated.len() {
             let (lower, upper) = range(k);
-            // Kronecker's sequence by roots of primes.
+            // Kronecker sequence with square roots of primes.
             q[k] = lower
                 + (upper - lower) * (0.5 + PRIMES[k % PRIMES.len()].sqrt() * (pose * (1 + k / 10)) as f64).fract();
         }
@@ -461,7 +463,7 @@ fn reach(model: &Model) -> [[f64; 3]; 2] {
     [[0, 1, 2].map(|c| low[c] - room[c]), [0, 1, 2].map(|c| high[c] + room[c])]
 }
 
-/// Figures of the rows.
+/// Computes the figures from the rows.
 #[allow(clippy::too_many_arguments, reason = "called once, to keep the caller short")]
 fn summed_up(
     robot: &Robot,
@@ -494,7 +496,7 @@ fn summed_up(
             "{} of {} poses have no equilibrium and are left out; at the first: {first}",
             taken.failed, taken.poses
         );
-        caveats.push(Caveat::said("no-equilibrium", "map", message, "look at one of them with statics"));
+        caveats.push(Caveat::said("no-equilibrium", "map", message, "analyse one of them with statics"));
     }
     let mut placement = None;
     if let (Some(edges), Some(grid)) = (request.workpiece_m, grid) {
@@ -505,13 +507,14 @@ fn summed_up(
             found
         });
         if placement.is_none() {
-            let message =
-                format!("no place of the grid holds the workpiece of {edges:?} m with every place in it within reach");
+            let message = format!(
+                "the workpiece of {edges:?} m does not fit anywhere on the grid with all its places within reach"
+            );
             caveats.push(Caveat::said(
                 "no-placement",
                 "map",
                 message,
-                "take a smaller workpiece or more directions of the tool",
+                "use a smaller workpiece or more tool directions",
             ));
         }
     }
@@ -545,7 +548,7 @@ fn summed_up(
     })
 }
 
-/// What each place costs: of its poses the best one, as a person would choose it; the worst one if
+/// Returns the cost of each place: that of its best pose among the rows, so the worst one if only
 /// that is kept.
 fn cost_by_place(table: &MapTable, grid: &Grid, by: usize) -> Vec<f64> {
     let place = columns::HEAD.iter().position(|(name, _)| *name == "place").unwrap_or_default();
@@ -558,21 +561,22 @@ fn cost_by_place(table: &MapTable, grid: &Grid, by: usize) -> Vec<f64> {
     cost
 }
 
-/// A map of one place compares nothing.
+/// Returns a caveat if the map has a single place, so that there is nothing to compare.
 fn one_place(found: &Map) -> Option<Caveat> {
     let message = match (found.reachable, found.points) {
-        (1, 1) => "the map has one place: its best and its worst pose say nothing of the workspace".to_owned(),
+        (1, 1) => "the map has only one place: its best and worst poses do not characterise the workspace".to_owned(),
         (1, points) => {
-            format!("the tool reaches one place of {points}: best and worst pose say nothing of the workspace")
+            format!(
+                "the tool reaches only one place of {points}: best and worst poses do not characterise the workspace"
+            )
         }
         _ => return None,
     };
-    let help =
-        "take more places: a larger box, a smaller spacing or more values of the joints; statics answers one pose";
+    let help = "map more places: a larger box, a smaller spacing or more joint values; for a single pose use statics";
     Some(Caveat::said("one-place", "map", message, help))
 }
 
-/// What is doubtful about the worst pose: the elements there are bent most.
+/// Returns caveats about the worst pose, where the deflections are largest.
 fn validity(robot: &Robot, request: &MapRequest, found: &Map) -> Vec<Caveat> {
     let Ok(worst) = flexarm_run::statics(robot, &request.modelling, Some(&found.worst.q), request.wrench) else {
         return Vec::new();

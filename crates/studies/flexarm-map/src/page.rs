@@ -1,5 +1,5 @@
-//! The page of a map: slices, histograms, the best and the worst pose, the best place of a
-//! workpiece; one file without scripts.
+//! HTML page of a map: slices, histograms, the best and the worst pose, the best place of a
+//! workpiece; a single file without scripts.
 
 use std::fmt::Write as _;
 
@@ -12,10 +12,10 @@ use super::{Map, MapPose};
 use flexarm_run::html_page::opening;
 use flexarm_settings::written::markup;
 
-/// Bars of a histogram.
+/// Number of bars of a histogram.
 const BARS: usize = 40;
 
-/// The page.
+/// Returns the page.
 pub(super) fn html(map: &Map, grid: Option<&Grid>) -> String {
     let mut page = opening(&format!("Map of {}", map.robot), "body { max-width: 78rem }\n");
     let _ = writeln!(page, "<p>{}</p>", markup(&in_short(map)));
@@ -28,16 +28,17 @@ pub(super) fn html(map: &Map, grid: Option<&Grid>) -> String {
         let centre = placement.centre_m.map(|x| format!("{x:.3}")).join(", ");
         let _ = writeln!(
             page,
-            "<h2>Where to put the workpiece</h2>\n<p>Centre at <b>{centre} m</b> (from {low} to {high} m, {} places): there {} is nowhere \
-             worse than <b>{} {unit}</b>. It is outlined in the slices.</p>",
+            "<h2>Best position of the workpiece</h2>\n<p>Centre at <b>{centre} m</b> (from {low} to {high} m, {} \
+             places). Worst {} in it: <b>{} {unit}</b>. The slices show its outline.</p>",
             placement.points,
             markup(&map.by),
             quantity_text(&map.by, placement.worst)
         );
     }
     if let Some(grid) = grid {
-        page += "<h2>Slices through the best place</h2>\n<p class=\"note\">B is the best, W the worst place, as far as they lie in the \
-                 plane. White is not reached. The scale ends at the 98th percent of all values.</p>\n";
+        page += "<h2>Slices through the best place</h2>\n<p class=\"note\">B: best place, W: worst place, if they \
+                 are in the plane. White: not reached. The colour scale ends at the 98th percentile of all \
+                 values.</p>\n";
         for column in shown(map) {
             page += &slices(map, grid, column);
         }
@@ -45,11 +46,11 @@ pub(super) fn html(map: &Map, grid: Option<&Grid>) -> String {
     page += &quantities(map);
     page += "<h2>Best and worst pose</h2>\n";
     page += &poses(map);
-    page += "<h2>How values are spread</h2>\n<div class=\"row\">\n";
+    page += "<h2>Distributions</h2>\n<div class=\"row\">\n";
     for column in shown(map) {
         page += &spread(map, column);
     }
-    page += "</div>\n<p class=\"note\">Drives locked, small vibrations, no collisions looked for.";
+    page += "</div>\n<p class=\"note\">Drives locked, small vibrations, collisions not checked.";
     for (what, file) in [("Every pose", &map.files.table), ("Recording", &map.files.rrd)] {
         if let Some(file) = file {
             let name = file.rsplit(['/', '\\']).next().unwrap_or(file);
@@ -59,11 +60,11 @@ pub(super) fn html(map: &Map, grid: Option<&Grid>) -> String {
     page + "</p>\n</body></html>\n"
 }
 
-/// What the map is, in a sentence or two.
+/// Describes the map in a sentence or two.
 fn in_short(map: &Map) -> String {
     let mut text = match &map.grid {
         Some(grid) => format!(
-            "{} of {} places within reach, {} mm apart, with {} direction{} of the tool; {} poses.",
+            "{} of {} places within reach, {} mm apart, with {} tool direction{}; {} poses.",
             map.reachable,
             map.points,
             (1e3 * grid.spacing_m * 1e3).round() / 1e3,
@@ -75,13 +76,14 @@ fn in_short(map: &Map) -> String {
     };
     if map.wrench != [0.0; 6] {
         let [fx, fy, fz, tx, ty, tz] = map.wrench;
-        let _ = write!(text, " Load on the tool: {fx}, {fy}, {fz} N and {tx}, {ty}, {tz} N m (world).");
+        let _ = write!(text, " Load at the TCP: {fx}, {fy}, {fz} N and {tx}, {ty}, {tz} N m (world axes).");
     }
     text + &format!(" Best and worst by {}.", map.by)
 }
 
 fn quantities(map: &Map) -> String {
-    let mut table = "<h2>Quantities</h2>\n<table><tr><th></th><th></th><th>least</th><th>5 %</th><th>median</th><th>95 %</th><th>most</th></tr>\n"
+    let mut table = "<h2>Quantities</h2>\n<table><tr><th>quantity</th><th>unit</th><th>minimum</th>\
+                     <th>5 %</th><th>median</th><th>95 %</th><th>maximum</th></tr>\n"
         .to_owned();
     for column in map.table.columns.iter().filter(|column| column.quantity) {
         let Some(spread) = map.quantities.get(&column.name) else { continue };
@@ -117,7 +119,7 @@ fn poses(map: &Map) -> String {
     table + "</table>\n"
 }
 
-/// The three planes through the best place.
+/// Draws the three planes through the best place.
 fn slices(map: &Map, grid: &Grid, column: usize) -> String {
     let values = map.by_place(column, grid);
     let (factor, unit) = readable(&map.table.columns[column].name);
@@ -170,7 +172,7 @@ fn slices(map: &Map, grid: &Grid, column: usize) -> String {
     row + "</div>\n"
 }
 
-/// How many poses have which value.
+/// Draws the histogram of a quantity over the poses.
 fn spread(map: &Map, column: usize) -> String {
     let name = &map.table.columns[column].name;
     let (factor, unit) = readable(name);

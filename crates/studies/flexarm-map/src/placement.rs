@@ -1,4 +1,4 @@
-//! Where to put a workpiece: the box of places whose worst place is best.
+//! Placement of a workpiece: the box of places with the best worst value.
 
 use std::collections::VecDeque;
 
@@ -6,28 +6,29 @@ use serde::Serialize;
 
 use super::region::Grid;
 
-/// The best place for a box.
+/// Best placement of a box.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Placement {
-    /// Lowest corner of the places that it covers (m, world).
+    /// Lower corner of the places covered (m, world).
     pub lower_m: [f64; 3],
-    /// Highest corner (m, world).
+    /// Upper corner (m, world).
     pub upper_m: [f64; 3],
     /// Centre (m, world).
     pub centre_m: [f64; 3],
-    /// The worst value in it, of the quantity by which the map compares.
+    /// Worst value in the box, of the quantity by which the map compares.
     pub worst: f64,
-    /// Places of the map in it, all of which the tool reaches.
+    /// Number of places of the map in the box, all of them reachable.
     pub points: usize,
 }
 
-/// The box of that size with the lowest highest cost; none if no box has only places that are
-/// reached.
+/// Finds the box of the given size with the smallest maximum cost; `None` if every box contains an
+/// unreachable place.
 ///
-/// * `cost`: per place of the grid; infinite where the tool does not come.
-/// * `size_m`: edges along x, y and z; it covers the places that it takes to hold them.
+/// * `cost`: per place of the grid; infinite for unreachable places.
+/// * `size_m`: edges along x, y and z, rounded up to whole grid spacings.
 ///
-/// Cost: linear in the number of places, whatever the size (running maxima, axis by axis).
+/// Complexity: linear in the number of places, independent of the size (running maxima, axis by
+/// axis).
 pub(super) fn best_box(grid: &Grid, cost: &[f64], size_m: [f64; 3]) -> Option<Placement> {
     let window = size_m.map(|edge| (edge / grid.spacing_m - 1e-9).ceil().max(0.0) as usize + 1);
     if (0..3).any(|c| window[c] > grid.count[c]) {
@@ -53,8 +54,7 @@ pub(super) fn best_box(grid: &Grid, cost: &[f64], size_m: [f64; 3]) -> Option<Pl
     })
 }
 
-/// Replaces each value by the largest of itself and those that follow it along an axis within the
-/// window.
+/// Replaces each value by the maximum over the window that starts at it along an axis.
 fn running_maximum(values: &mut [f64], count: [usize; 3], axis: usize, window: usize) {
     let stride = count[..axis].iter().product::<usize>();
     let n = count[axis];
@@ -63,7 +63,7 @@ fn running_maximum(values: &mut [f64], count: [usize; 3], axis: usize, window: u
     for start in (0..values.len()).filter(|k| k / stride % n == 0) {
         (0..n).for_each(|k| line[k] = values[start + k * stride]);
         falling.clear();
-        // From the end on, the front of the queue is the largest within the window.
+        // Going backwards, the front of the queue is the maximum within the window.
         for k in (0..n).rev() {
             while falling.back().is_some_and(|&j| line[j] <= line[k]) {
                 falling.pop_back();
@@ -81,7 +81,7 @@ fn running_maximum(values: &mut [f64], count: [usize; 3], axis: usize, window: u
 mod tests {
     use super::*;
 
-    /// Truth: every box tried by hand.
+    /// Truth: brute force over all boxes.
     #[test]
     fn the_best_box_is_the_one_that_trying_all_of_them_finds() {
         let grid = Grid { lower: [-1.0, 2.0, 0.5], spacing_m: 0.1, count: [9, 7, 5] };

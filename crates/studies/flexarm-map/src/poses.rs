@@ -1,4 +1,4 @@
-//! Poses of a map that are listed in a file.
+//! Lists of poses read from a file.
 
 use std::path::Path;
 
@@ -17,28 +17,28 @@ use flexarm_run::inspect::joint_values;
 use flexarm_run::robot_file::Source;
 use flexarm_run::toml_file::parsed;
 
-/// A list of poses as written.
+/// A list of poses as written in TOML.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PosesFile {
     format: Spanned<i64>,
-    /// rad or deg.
+    /// Unit of angles: rad or deg.
     angles: Option<Spanned<String>>,
-    /// Names of the columns; all actuated joints in coordinate order without it.
+    /// Names of the columns; default: all actuated joints in coordinate order.
     joints: Option<Spanned<Vec<String>>>,
     poses: Vec<Spanned<Vec<f64>>>,
 }
 
 /// Reads poses from a file: all actuated joints in coordinate order (rad or m), pose after pose.
 ///
-/// A table has a column for each joint, of its name, or with the unit at the end (`_rad`, `_m`,
-/// `_deg`). A `.toml` file has `format = 1`, `poses = [[...], ...]`, and may have `joints = [...]`
-/// and `angles = "deg"`.
+/// A table has a column for each joint, with its name, or the name with a unit (`_rad`, `_m`,
+/// `_deg`). A `.toml` file has `format = 1`, `poses = [[...], ...]`, and optionally
+/// `joints = [...]` and `angles = "deg"`.
 ///
-/// * `at`: where joints stay that the file does not name; zero without it.
+/// * `at`: positions of joints that the file does not name; default zero.
 ///
 /// # Errors
-/// [`Error::RobotFile`] or [`Error::File`] with the place of what is wrong.
+/// [`Error::RobotFile`] or [`Error::File`] with the location of the error.
 pub fn read_poses(path: impl AsRef<Path>, robot: &Robot, at: Option<&[f64]>) -> Result<Vec<Vec<f64>>, Error> {
     let (path, model) = (path.as_ref(), robot.rigid_model()?);
     let actuated = &model.coordinates()[..model.n_actuated()];
@@ -52,9 +52,9 @@ pub fn read_poses(path: impl AsRef<Path>, robot: &Robot, at: Option<&[f64]>) -> 
     }
 }
 
-/// What a list needs of the robot.
+/// Data of the robot needed to read a list.
 struct List<'a> {
-    /// Names, and whether they slide.
+    /// Names, and whether they are prismatic.
     joints: &'a [(&'a str, bool)],
     home: Vec<f64>,
 }
@@ -98,7 +98,7 @@ impl List<'_> {
         self.some(poses).map_err(|what| Error::File { path: path.to_owned(), what })
     }
 
-    /// Number of the joint of a column, and its unit in rad or m.
+    /// Returns the index of the joint of a column, and the factor from its unit to rad or m.
     fn column(&self, name: &str) -> Result<(usize, f64), String> {
         let joint = |(k, (joint, slides)): (usize, &(&str, bool))| match (name.strip_prefix(joint)?, slides) {
             ("", _) | ("_rad", false) | ("_m", true) => Some((k, 1.0)),
@@ -107,7 +107,10 @@ impl List<'_> {
         };
         self.joints.iter().enumerate().find_map(joint).ok_or_else(|| {
             let known: Vec<&str> = self.joints.iter().map(|(name, _)| *name).collect();
-            format!("column {name:?} is no joint of the robot; its joints are {known:?}, with _deg after the name for degrees")
+            format!(
+                "column {name:?} is not a joint of the robot; its joints are {known:?}; append _deg to the name \
+                 for degrees"
+            )
         })
     }
 
@@ -128,7 +131,7 @@ impl List<'_> {
     }
 }
 
-/// Checks the poses and says what there is to go through.
+/// Checks the poses and returns them as a region.
 pub(super) fn region<'m>(poses: &'m [Vec<f64>], model: &Model) -> Result<(Region<'m>, Vec<Caveat>), Error> {
     let actuated = &model.coordinates()[..model.n_actuated()];
     let names: Vec<&str> = actuated.iter().map(|c| c.joint.as_str()).collect();
@@ -141,7 +144,7 @@ pub(super) fn region<'m>(poses: &'m [Vec<f64>], model: &Model) -> Result<(Region
         let count = poses.iter().filter(outside).count();
         if count > 0 {
             let (lower, upper) = (c.limits.lower, c.limits.upper);
-            let message = format!("{count} poses take joint {:?} beyond its limits {lower} to {upper}", c.joint);
+            let message = format!("{count} poses have joint {:?} beyond its limits {lower} to {upper}", c.joint);
             caveats.push(Caveat::said("outside-limits", &c.joint, message, "check the units of the list"));
         }
     }

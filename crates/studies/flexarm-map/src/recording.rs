@@ -1,5 +1,5 @@
-//! A map as a recording for the Rerun viewer: coloured places, slices, surfaces of one value,
-//! ellipsoids of compliance, and the arm at the worst and at the best pose.
+//! A map as a recording for the Rerun viewer: coloured places, slices, iso-surfaces, compliance
+//! ellipsoids, and the arm at the worst and at the best pose.
 
 use std::path::Path;
 
@@ -19,16 +19,16 @@ use flexarm_run::record::link_frames;
 use flexarm_run::record::robot_header;
 use flexarm_settings::written::markdown;
 
-/// Most points of a view; of larger maps every so many-th.
+/// Maximum number of points in a view; larger maps are thinned.
 const MOST_POINTS: usize = 300_000;
-/// Most ellipsoids.
+/// Maximum number of ellipsoids.
 const MOST_ELLIPSOIDS: usize = 400;
-/// How long each pose is shown (s).
+/// Duration for which each pose is shown (s).
 const SHOWN_S: f64 = 2.0;
-/// Parts of the places whose values are better than those of the surfaces.
+/// Fractions of the places with better values than the iso-surfaces.
 const SURFACES: [f64; 2] = [0.25, 0.6];
 
-/// Writes the recording, if this build can.
+/// Writes the recording, if this build supports the format.
 pub(super) fn write(
     map: &Map,
     path: &Path,
@@ -71,7 +71,7 @@ pub(super) fn write(
             X_WS: Vec::new(),
         }
     };
-    // The last is shown as long as the first.
+    // The best pose twice, so that it is shown as long as the worst.
     let twins = [&map.worst, &map.best, &map.best].map(&mut twin);
     let links = twins.iter().flat_map(|twin| twin.X_WL.iter().map(|X| X.translation.vector.into()));
     header.volume = Some(around(places_of(map).chain(links)));
@@ -90,19 +90,19 @@ pub(super) fn write(
     Ok(())
 }
 
-/// Places of all poses (m, world).
+/// Positions of all poses (m, world).
 fn places_of(map: &Map) -> impl Iterator<Item = [f64; 3]> + '_ {
     (0..map.table.rows()).map(|k| [0, 1, 2].map(|c| map.table.row(k)[c]))
 }
 
-/// Box around places.
+/// Bounding box of places.
 fn around(places: impl Iterator<Item = [f64; 3]>) -> [[f64; 3]; 2] {
     places.fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[low, high], place| {
         [[0, 1, 2].map(|c| low[c].min(place[c])), [0, 1, 2].map(|c| high[c].max(place[c]))]
     })
 }
 
-/// Factor and unit in which people read a quantity of a map, by its name.
+/// Returns factor and unit for the display of a quantity of a map, by its name.
 pub fn readable(name: &str) -> (f64, &'static str) {
     let ends = [
         ("_m_per_n", 1e6, "mm/kN"),
@@ -115,13 +115,13 @@ pub fn readable(name: &str) -> (f64, &'static str) {
     found.map_or((1.0, ""), |(_, factor, unit)| (*factor, *unit))
 }
 
-/// A quantity as people read it, in the unit of [`readable`]; limits of depth are rounded down.
+/// Formats a quantity for display, in the unit of [`readable`]; limits of depth are rounded down.
 pub fn quantity_text(name: &str, value: f64) -> String {
     let shown = readable(name).0 * value;
     if name == "depth_m" { rounded_down(shown, 4) } else { format!("{shown:.4}") }
 }
 
-/// Quantities that have a view of their own, the one that poses are compared by first.
+/// Columns with a view of their own, the one by which poses are compared first.
 pub(super) fn shown(map: &Map) -> Vec<usize> {
     let wanted = [map.by.as_str(), "compliance_worst_m_per_n", "sag_m", "error_m", "frequency_1_hz"];
     let mut shown: Vec<usize> = Vec::new();
@@ -136,9 +136,11 @@ pub(super) fn shown(map: &Map) -> Vec<usize> {
 }
 
 fn text(map: &Map) -> String {
-    let mut text = format!("# {}: {} of {} places are reached\n\n", markdown(&map.robot), map.reachable, map.points);
-    text += "Dark is little, light is much. The colours go from the lowest to the 98th percent of the values.\n\n";
-    text += "| view | least | median | most |\n| --- | --- | --- | --- |\n";
+    let mut text =
+        format!("# {}: {} of {} places are within reach\n\n", markdown(&map.robot), map.reachable, map.points);
+    text += "Dark is low, light is high. The colour scale runs from the minimum to the 98th percentile of the \
+             values.\n\n";
+    text += "| view | minimum | median | maximum |\n| --- | --- | --- | --- |\n";
     for k in shown(map) {
         let name = &map.table.columns[k].name;
         let Some(spread) = map.quantities.get(name) else { continue };
@@ -151,19 +153,22 @@ fn text(map: &Map) -> String {
     if let Some(placement) = &map.placement {
         let (worst, unit) = (quantity_text(&map.by, placement.worst), readable(&map.by).1);
         let [x, y, z] = placement.centre_m;
-        text +=
-            &format!("\nBest place of the workpiece: centre {x:.3}, {y:.3}, {z:.3} m; worst in it {worst} {unit}.\n");
+        text += &format!(
+            "\nBest position of the workpiece: centre {x:.3}, {y:.3}, {z:.3} m; worst value in it {worst} \
+                 {unit}.\n"
+        );
     }
     text
 }
 
-/// Colour of a value between those of the scale.
+/// Colour of a value on the scale.
 fn color(value: f64, [low, high]: [f64; 2]) -> [u8; 4] {
     let [r, g, b] = magnitude(if high > low { (value - low) / (high - low) } else { 0.5 });
     [r, g, b, 255]
 }
 
-/// First and last colour: without the few largest values, which would leave all others dark.
+/// Returns the ends of the colour scale: minimum and 98th percentile, since the few largest values
+/// would leave all others dark.
 pub(super) fn scale(values: &[f64]) -> [f64; 2] {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
     sorted.sort_unstable_by(f64::total_cmp);
@@ -215,14 +220,14 @@ fn scenery(map: &Map, grid: Option<&Grid>) -> Vec<Scenery> {
     all
 }
 
-/// Distance of places (m).
+/// Distance of places (m); without a grid, 2 % of the longest edge.
 fn size_of(map: &Map, grid: Option<&Grid>) -> f32 {
     let [low, high] = around(places_of(map));
     let edge = (0..3).map(|c| high[c] - low[c]).fold(0.0, f64::max);
     grid.map_or(0.02 * edge, |grid| grid.spacing_m) as f32
 }
 
-/// Rows in the three planes through the best pose's place.
+/// Rows in the three planes through the place of the best pose.
 fn slices(map: &Map, grid: &Grid) -> Vec<usize> {
     let number = columns::HEAD.iter().position(|(name, _)| *name == "place").unwrap_or_default();
     let centre = grid.index(map.best_place());
@@ -233,7 +238,7 @@ fn slices(map: &Map, grid: &Grid) -> Vec<usize> {
     (0..map.table.rows()).filter(within).collect()
 }
 
-/// Surfaces behind which the values are worse.
+/// Returns the iso-surfaces that enclose the best values.
 fn surfaces(map: &Map, grid: &Grid) -> Vec<Scenery> {
     let Some(column) = map.table.columns.iter().position(|column| column.name == map.by) else { return Vec::new() };
     let values = map.by_place(column, grid);
@@ -259,14 +264,14 @@ fn surfaces(map: &Map, grid: &Grid) -> Vec<Scenery> {
     made.collect()
 }
 
-/// Where a unit force of any direction takes the tool, at some of the places.
+/// Returns the compliance ellipsoids at some of the places.
 fn ellipsoids(map: &Map, size: f32) -> Option<Scenery> {
     let index = |name: &str| map.table.columns.iter().position(|column| column.name == name);
     let six = ["x", "y", "z", "xy", "xz", "yz"].map(|part| index(&format!("compliance_{part}_m_per_n")));
     let [x, y, z, xy, xz, yz] = six.iter().copied().collect::<Option<Vec<_>>>()?.try_into().ok()?;
     let worst = index("compliance_worst_m_per_n")?;
     let scale = scale(&map.table.at(worst));
-    // As many as can be seen, in no plane of the grid.
+    // An odd stride, so that the ellipsoids are not all in one plane of the grid.
     let every = map.table.rows().div_ceil(MOST_ELLIPSOIDS).max(1) | 1;
     let rows = (0..map.table.rows()).step_by(every);
     let apart = size * (every as f32).cbrt();
@@ -290,5 +295,5 @@ fn ellipsoids(map: &Map, size: f32) -> Option<Scenery> {
         colors.push(color(row[worst], scale));
     }
     let form = SceneryForm::Ellipsoids { places, half_axes_m, quaternions, colors };
-    Some(Scenery { view: "ellipsoids of compliance".into(), name: "ellipsoids".into(), form })
+    Some(Scenery { view: "compliance ellipsoids".into(), name: "ellipsoids".into(), form })
 }

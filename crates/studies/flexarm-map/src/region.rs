@@ -1,34 +1,32 @@
-//! Where a map is taken: places of the tool on a grid, values of joints, or a motion; and the ways
-//! the tool may point.
+//! Region of a map: TCP positions on a grid, joint positions, or a motion; and the tool directions.
 
 use flexarm_kinematics::Pose;
 use nalgebra::{Matrix3, Rotation3, Translation3, Unit, Vector3};
 
 use super::MapError;
 
-/// Most places and most rows of a map: what is held in memory, about 300 bytes each.
+/// Maximum number of places and of rows of a map, held in memory with about 300 bytes each.
 pub const MOST_PLACES: usize = 5_000_000;
-/// Most places times directions: what somebody would wait for.
+/// Maximum number of places times directions, to bound the run time.
 pub(super) const MOST_QUERIES: f64 = 1e8;
-/// Golden angle (rad): directions of a cone lie on its spiral.
+/// Golden angle (rad) of the spiral of cone directions.
 const GOLDEN_RAD: f64 = 2.399_963_229_728_653;
 
-/// Where a map is taken.
+/// Region of a map.
 #[derive(Clone, Debug)]
 pub enum MapRegion {
-    /// On a grid of places of the tool, by inverse kinematics.
+    /// A grid of TCP positions, by inverse kinematics.
     Workspace(WorkspaceGrid),
-    /// On a grid of joint values; joints that are not named stay where [`super::MapRequest::at`]
-    /// says.
+    /// A grid of joint positions; joints not named stay at [`super::MapRequest::at`].
     Joints(Vec<JointRange>),
-    /// At poses that are listed: all actuated joints in coordinate order (rad or m). The table has
-    /// the 6x6 compliance of each.
+    /// Listed poses: all actuated joints in coordinate order (rad or m). The table has the 6×6
+    /// compliance of each.
     Poses(Vec<Vec<f64>>),
-    /// At equal distances of time along a motion.
+    /// Instants at equal time intervals along a motion.
     Along {
         /// The motion.
         motion: Box<flexarm_run::Motion>,
-        /// How many instants, both ends among them.
+        /// Number of instants, including both ends.
         points: usize,
     },
 }
@@ -39,33 +37,33 @@ impl Default for MapRegion {
     }
 }
 
-/// A box of places in the world.
+/// A box of TCP positions in the world.
 #[derive(Clone, Debug, Default)]
 pub struct WorkspaceGrid {
-    /// Lowest and highest corner (m); all that the arm can reach without it.
+    /// Lower and upper corner (m); default: the reach of the arm.
     pub bounds: Option<[[f64; 3]; 2]>,
-    /// Distance of the places (m); about a thirtieth of the longest edge without it.
+    /// Grid spacing (m); default: about a thirtieth of the longest edge.
     pub spacing_m: Option<f64>,
-    /// Places nearer to the upright line (world z) through the first joint than this do not count
-    /// (m): the arm itself is there.
+    /// Radius around the vertical line (world z) through the first joint within which places are
+    /// left out (m), because the arm itself is there.
     pub keep_out_m: f64,
-    /// How the tool may point.
+    /// Tool directions.
     pub tool: ToolDirections,
 }
 
-/// Orientations of the tool that count at a place.
+/// Tool orientations evaluated at a place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToolDirections {
-    /// Where the z axis of the tool points in the world, of any length.
+    /// Direction of the tool's z axis in the world, of any length.
     pub axis: [f64; 3],
-    /// Rotation of the tool about that axis (rad): at 0 its x axis lies in the plane of that axis
-    /// and world x, on the side of x.
+    /// Rotation of the tool about that axis (rad): at 0 its x axis is in the plane of that axis and
+    /// world x, on the side of x.
     pub roll_rad: f64,
     /// Half angle of a cone about the axis within which the tool may tilt (rad).
     pub cone_rad: f64,
-    /// Directions in the cone, the axis among them.
+    /// Number of directions in the cone, including the axis.
     pub tilts: usize,
-    /// Rotations about the axis, evenly over a turn.
+    /// Number of rotations about the axis, evenly spaced over a turn.
     pub rolls: usize,
 }
 
@@ -76,10 +74,11 @@ impl Default for ToolDirections {
 }
 
 impl ToolDirections {
-    /// Rotations of the tool in the world: tilts, and within each the rolls.
+    /// Returns the rotations of the tool in the world: tilts, and for each of them the rolls.
     ///
     /// # Errors
-    /// [`MapError::ToolAxis`], [`MapError::Cone`].
+    /// [`MapError::ToolAxis`] for an axis without a direction, [`MapError::Cone`] for an invalid
+    /// cone or more than 10,000 directions.
     pub fn rotations(&self) -> Result<Vec<Rotation3<f64>>, MapError> {
         let axis = Unit::try_new(Vector3::from(self.axis), 1e-12).filter(|axis| axis.iter().all(|x| x.is_finite()));
         let axis = axis.ok_or(MapError::ToolAxis { found: self.axis })?;
@@ -93,7 +92,7 @@ impl ToolDirections {
         let straight = upright(&axis);
         let mut rotations = Vec::new();
         for tilt in 0..self.tilts {
-            // Evenly over the cap of the sphere, from the axis to the rim.
+            // Equal areas of the spherical cap, from the axis to the rim.
             let part = if self.tilts == 1 { 0.0 } else { tilt as f64 / (self.tilts - 1) as f64 };
             let angle = (1.0 - part * (1.0 - cone.cos())).clamp(-1.0, 1.0).acos();
             let about = GOLDEN_RAD * tilt as f64;
@@ -108,7 +107,7 @@ impl ToolDirections {
     }
 }
 
-/// The rotation whose z axis is `axis` and whose x axis is as near as can be to world x.
+/// Returns the rotation with z axis `axis` and the x axis as close as possible to world x.
 fn upright(axis: &Unit<Vector3<f64>>) -> Rotation3<f64> {
     let near = if axis.x.abs() < 0.999 { Vector3::x() } else { -Vector3::z() * axis.x.signum() };
     let x = (near - axis.into_inner() * axis.dot(&near)).normalize();
@@ -118,16 +117,16 @@ fn upright(axis: &Unit<Vector3<f64>>) -> Rotation3<f64> {
 /// Values of a joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointRange {
-    /// Its name.
+    /// Name of the joint.
     pub joint: String,
     /// First and last value (rad or m).
     pub range: [f64; 2],
-    /// How many values, both ends among them; one is the middle.
+    /// Number of values, including both ends; a single value is the middle.
     pub points: usize,
 }
 
 impl JointRange {
-    /// Value of that number.
+    /// Returns value `k`.
     pub(super) fn value(&self, k: usize) -> f64 {
         let [first, last] = self.range;
         match self.points {
@@ -137,22 +136,23 @@ impl JointRange {
     }
 }
 
-/// Places on a regular grid, x first.
+/// TCP positions on a regular grid, x varying fastest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {
     /// First place (m).
     pub lower: [f64; 3],
-    /// Distance of the places (m).
+    /// Spacing (m).
     pub spacing_m: f64,
     /// Number of places along x, y and z.
     pub count: [usize; 3],
 }
 
 impl Grid {
-    /// The grid within a box, in its middle.
+    /// Returns the grid centred in a box.
     ///
     /// # Errors
-    /// [`MapError::Bounds`], [`MapError::Spacing`], [`MapError::TooMany`].
+    /// [`MapError::Bounds`], [`MapError::Spacing`] or [`MapError::TooMany`] for an invalid box, an
+    /// invalid spacing or too many places.
     pub(super) fn within([lower, upper]: [[f64; 3]; 2], spacing_m: f64) -> Result<Self, MapError> {
         let sound = (0..3).all(|c| lower[c].is_finite() && upper[c].is_finite() && lower[c] <= upper[c]);
         if !sound {
@@ -161,7 +161,7 @@ impl Grid {
         if !(spacing_m.is_finite() && spacing_m > 0.0) {
             return Err(MapError::Spacing { found: spacing_m });
         }
-        // An edge that is a multiple of the spacing has both its ends.
+        // An edge that is a multiple of the spacing includes both its ends.
         let steps = [0, 1, 2].map(|c| ((upper[c] - lower[c]) / spacing_m + 1e-9).floor());
         let places = steps.iter().map(|n| n + 1.0).product::<f64>();
         if places > MOST_PLACES as f64 {
@@ -176,25 +176,25 @@ impl Grid {
         self.count.iter().product()
     }
 
-    /// Numbers along x, y and z of a place.
+    /// Returns the indices of a place along x, y and z.
     pub fn index(&self, place: usize) -> [usize; 3] {
         let [nx, ny, _] = self.count;
         [place % nx, place / nx % ny, place / (nx * ny)]
     }
 
-    /// A place (m, world).
+    /// Returns the position of a place (m, world).
     pub fn place(&self, place: usize) -> [f64; 3] {
         let k = self.index(place);
         [0, 1, 2].map(|c| self.lower[c] + self.spacing_m * k[c] as f64)
     }
 }
 
-/// The pose of a tool.
+/// Returns the pose of a tool at a place.
 pub(super) fn pose_at(place: [f64; 3], rotation: &Rotation3<f64>) -> Pose {
     Pose::from_parts(Translation3::from(Vector3::from(place)), *rotation)
 }
 
-/// A round number near `x`: 1, 2 or 5 times a power of ten.
+/// Returns the round number nearest to `x`: 1, 2 or 5 times a power of ten.
 pub(super) fn round_number(x: f64) -> f64 {
     let power = 10_f64.powf(x.log10().floor());
     let factors = [1.0, 2.0, 5.0, 10.0].into_iter();
@@ -216,8 +216,8 @@ mod tests {
         assert_eq!(grid.index(21 * 4 - 1), [20, 3, 0]);
     }
 
-    /// Truth: the directions of a cap are even if as much of its area lies within each as its
-    /// number says, `1 - cos(angle) = part (1 - cos(cone))`.
+    /// Truth: directions are uniform on a cap if the area within each is proportional to its
+    /// number, `1 - cos(angle) = part (1 - cos(cone))`.
     #[test]
     fn directions_of_a_cone_lie_evenly_within_it() {
         let cone = 0.6;
@@ -233,7 +233,7 @@ mod tests {
             assert!((share - k as f64 / 49.0).abs() < 1e-12, "{share}");
             mean += z / 50.0;
         }
-        // The centre of a cap is at (1 + cos)/2 on its axis.
+        // The centroid of a cap is on its axis at (1 + cos)/2.
         let centre = axis * 0.5 * (1.0 + cone.cos());
         assert!((mean - centre).norm() < 0.02, "{}", (mean - centre).norm());
     }

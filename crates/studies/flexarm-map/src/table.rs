@@ -1,19 +1,19 @@
-//! The rows of a map, and what they come to: ranges, quantiles, best and worst.
+//! Rows of a map and their statistics: ranges, quantiles, best and worst.
 
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::columns::{HEAD, MapColumn, cheapest};
 
-/// Quantiles that are told.
+/// Quantiles reported.
 pub const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
 
 /// Every pose of a map as a row of numbers.
 #[derive(Clone, Debug, Default)]
 pub struct MapTable {
-    /// Names and meanings.
+    /// Columns: names and meanings.
     pub columns: Vec<MapColumn>,
-    /// Row after row, as long as there are columns.
+    /// Values, row after row, each with one value per column.
     pub values: Vec<f64>,
 }
 
@@ -23,56 +23,56 @@ impl MapTable {
         self.values.len() / self.columns.len().max(1)
     }
 
-    /// Numbers of a pose.
+    /// Returns the values of a pose.
     pub fn row(&self, k: usize) -> &[f64] {
         let width = self.columns.len();
         &self.values[k * width..][..width]
     }
 
-    /// Numbers of a column, pose after pose; none if there is none of that name.
+    /// Returns the values of a column, pose after pose; `None` if there is no column of that name.
     pub fn column(&self, name: &str) -> Option<Vec<f64>> {
         let k = self.columns.iter().position(|column| column.name == name)?;
         Some(self.at(k))
     }
 
-    /// Numbers of the column with that number.
+    /// Returns the values of the column with that index.
     pub(super) fn at(&self, column: usize) -> Vec<f64> {
         self.values.iter().skip(column).step_by(self.columns.len()).copied().collect()
     }
 
-    /// What is to be small; infinite where there is none.
+    /// Returns the cost to minimise; infinite for non-finite values.
     pub(super) fn cost(&self, column: usize, value: f64) -> f64 {
         self.columns[column].cost(value)
     }
 
-    /// Rows with the best and with the worst value of a column.
+    /// Returns the rows with the best and the worst value of a column.
     pub(super) fn extremes(&self, column: usize) -> Option<(usize, usize)> {
         let cost = |row: usize| self.cost(column, self.row(row)[column]);
         Some((cheapest(self.rows(), cost)?, cheapest(self.rows(), |row| -cost(row))?))
     }
 
-    /// Ranges of all quantities, in the order of the columns.
+    /// Returns the distributions of all quantities, in the order of the columns.
     pub(super) fn spreads(&self) -> Vec<(String, Spread)> {
         let quantities: Vec<usize> = (0..self.columns.len()).filter(|&k| self.columns[k].quantity).collect();
         quantities.par_iter().map(|&k| (self.columns[k].name.clone(), Spread::of(self.at(k)))).collect()
     }
 }
 
-/// How the values of a quantity are spread over the poses.
+/// Distribution of a quantity over the poses.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Spread {
-    /// Smallest.
+    /// Minimum.
     pub min: f64,
-    /// Largest.
+    /// Maximum.
     pub max: f64,
     /// Mean.
     pub mean: f64,
-    /// Values below which 5, 25, 50, 75 and 95 % of the poses are, under `0.05` to `0.95`.
+    /// 5, 25, 50, 75 and 95 % quantiles, under the keys `0.05` to `0.95`.
     pub quantiles: std::collections::BTreeMap<String, f64>,
 }
 
 impl Spread {
-    /// Of values in any order; those that are no numbers are left out.
+    /// Computes the distribution of values in any order; non-finite ones are left out.
     pub(super) fn of(mut values: Vec<f64>) -> Self {
         values.retain(|x| x.is_finite());
         values.sort_unstable_by(f64::total_cmp);
@@ -80,7 +80,7 @@ impl Spread {
         let at = |part: f64| match n {
             0 => f64::NAN,
             _ => {
-                // Between the neighbours in proportion, as most programs do it.
+                // Linear interpolation between neighbours, as in most programs.
                 let place = part * (n - 1) as f64;
                 let (k, rest) = (place.floor() as usize, place.fract());
                 let next = values[(k + 1).min(n - 1)];
@@ -96,18 +96,18 @@ impl Spread {
     }
 }
 
-/// A pose of a map with all that it says.
+/// A pose of a map with all its quantities.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MapPose {
-    /// Number of its row.
+    /// Index of its row.
     pub row: usize,
     /// Joints, in coordinate order (rad or m).
     pub q: Vec<f64>,
-    /// Place of the rigid arm's tool (m, world).
+    /// Position of the rigid arm's TCP (m, world).
     pub place_m: [f64; 3],
-    /// Its value of the quantity by which the map compares.
+    /// Value of the quantity by which the map compares.
     pub value: f64,
-    /// All quantities.
+    /// Values of all quantities.
     pub quantities: std::collections::BTreeMap<String, f64>,
 }
 
@@ -129,7 +129,7 @@ impl MapPose {
 mod tests {
     use super::*;
 
-    /// Truth: quantiles of 0, 1, ..., 100 are their percents.
+    /// Truth: quantiles of 0, 1, ..., 100 are their percentages.
     #[test]
     fn quantiles_of_equal_steps_are_their_percents() {
         let values: Vec<f64> = (0..=100).rev().map(f64::from).chain([f64::NAN]).collect();

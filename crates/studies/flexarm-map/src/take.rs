@@ -1,4 +1,4 @@
-//! Goes through the places of a map on all cores.
+//! Evaluation of the places of a map on all cores.
 
 use std::ops::ControlFlow;
 
@@ -12,30 +12,30 @@ use super::finder::Finder;
 use super::region::{Grid, pose_at};
 use super::{KeptPoses, MOST_PLACES, MapError};
 
-/// Places that one thread takes at a time.
+/// Number of places per task of a thread.
 const CHUNK: usize = 64;
-/// Poses that are answered at a time, or as many more as a place has.
+/// Number of waiting poses at which they are evaluated; the poses of one place are never split.
 const MOST_WAITING: usize = 256;
-/// Places between two looks at whether to go on.
+/// Number of places between two calls of `go_on`.
 const BLOCK: usize = 8192;
-/// The same where a place takes long.
+/// Both numbers for slow evaluations.
 const SLOW: [usize; 2] = [1, 16];
 
-/// Puts the joint values of the pose of a number into an empty list.
+/// Appends the joint positions of the pose with this number to an empty list.
 pub(super) type PoseOf<'a> = dyn Fn(usize, &mut Vec<f64>) + Sync + 'a;
 
-/// What there is to go through.
+/// Places or poses to evaluate.
 pub(super) enum Places<'a> {
-    /// Places of the tool, each in all directions.
+    /// TCP positions, each with all directions.
     Grid {
         grid: Grid,
         rotations: &'a [Rotation3<f64>],
         finder: &'a Finder<'a>,
-        /// Radius around the upright line through the finder's foot within which places do not
-        /// count (m).
+        /// Radius around the vertical line through the first joint within which places are left out
+        /// (m).
         keep_out_m: f64,
     },
-    /// Joint values, by number of the pose.
+    /// Joint positions, by number of the pose.
     Joints { count: usize, values: &'a PoseOf<'a> },
 }
 
@@ -48,18 +48,18 @@ impl Places<'_> {
     }
 }
 
-/// What came of them.
+/// Results of the evaluation.
 #[derive(Default)]
 pub(super) struct Taken {
-    /// Row after row, in the order of the places.
+    /// Rows in the order of the places.
     pub(super) rows: Vec<f64>,
-    /// Places with at least one row.
+    /// Number of places with at least one row.
     pub(super) reachable: usize,
-    /// Poses that were tried.
+    /// Number of poses tried.
     pub(super) poses: usize,
-    /// Poses without an answer.
+    /// Number of poses without a result.
     pub(super) failed: usize,
-    /// Why the first of them has none.
+    /// Error of the first of them.
     pub(super) first_failure: Option<String>,
 }
 
@@ -73,7 +73,7 @@ impl Taken {
     }
 }
 
-/// Which of a place's poses are kept.
+/// Selection of the poses kept at a place.
 pub(super) struct Choice<'a> {
     pub(super) layout: &'a Layout,
     pub(super) keep: KeptPoses,
@@ -81,10 +81,11 @@ pub(super) struct Choice<'a> {
     pub(super) by: usize,
 }
 
-/// Goes through all places; the rows are the same for every number of threads.
+/// Evaluates all places; the rows do not depend on the number of threads.
 ///
 /// # Errors
-/// [`MapError::Interrupted`] if `go_on` breaks off, [`MapError::TooManyRows`].
+/// [`MapError::Interrupted`] if `go_on` breaks, [`MapError::TooManyRows`] if the rows do not fit in
+/// memory.
 pub(super) fn take(
     places: &Places<'_>,
     evaluator: &Evaluator<'_>,
@@ -113,19 +114,20 @@ pub(super) fn take(
     Ok(taken)
 }
 
-/// What a thread has.
+/// State of a thread.
 #[derive(Clone)]
 struct Worker<'a> {
     places: &'a Places<'a>,
     finder: Option<Finder<'a>>,
     evaluator: Evaluator<'a>,
     choice: &'a Choice<'a>,
-    /// Joint values of the branches of one direction.
+    /// Joint positions of the branches of one direction.
     branches: Vec<f64>,
-    /// Joint values of the poses of whole places that wait for their answers, and where they are.
+    /// Joint positions of the poses waiting for evaluation, always of whole places, and their
+    /// indices.
     waiting: Vec<f64>,
     seats: Vec<Seat>,
-    /// Their rows.
+    /// Rows of the waiting poses; buffer reused.
     rows: Vec<f64>,
 }
 
@@ -166,7 +168,7 @@ impl<'a> Worker<'a> {
         taken
     }
 
-    /// All branches at a pose of the tool.
+    /// Adds all branches at a TCP pose to the waiting poses.
     fn poses_at(&mut self, X_WT: &Pose, place: usize, direction: usize) {
         let Some(finder) = &mut self.finder else { return };
         finder.find(X_WT, &mut self.branches);
@@ -175,7 +177,7 @@ impl<'a> Worker<'a> {
         self.seats.extend((0..found).map(|branch| Seat { place, direction, branch }));
     }
 
-    /// Answers all poses that wait, and keeps what is asked for of each place.
+    /// Evaluates all waiting poses, and keeps the selected rows of each place.
     fn answer(&mut self, taken: &mut Taken) {
         taken.poses += self.seats.len();
         let mut rows = std::mem::take(&mut self.rows);
@@ -197,7 +199,7 @@ impl<'a> Worker<'a> {
         self.seats.clear();
     }
 
-    /// The rows of one place that are asked for; the first if none has an answer.
+    /// Appends the selected rows of one place; the first row if none has a finite cost.
     fn keep(&self, all: &[f64], rows: &mut Vec<f64>) {
         let Choice { layout, keep, by } = self.choice;
         let (column, width) = (&layout.columns[*by], layout.width());

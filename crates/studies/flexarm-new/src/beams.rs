@@ -1,4 +1,4 @@
-//! Links that look like beams: a hollow section from the outlines of the mesh and the mass of the
+//! Links modelled as beams: a hollow section from the outlines of the mesh and the mass of the
 //! link.
 //!
 //! Frames: L link; S section, x from the link's origin to the distal joint, y and z across.
@@ -10,72 +10,73 @@ use serde::Serialize;
 
 use super::ends;
 
-/// Cuts along the whole mesh.
+/// Number of cuts along the whole mesh.
 const CUTS: usize = 48;
-/// Places along the beam at which bending is looked at.
+/// Number of stations along the beam for the bending compliance.
 const STATIONS: usize = 40;
-/// Part of the way between the joints along which there must be a shape, around the line or beside
-/// it.
+/// Minimum fraction of the distance between the joints along which there must be a shape, on or
+/// beside the line.
 const ALONG: f64 = 0.75;
-/// The shape lies beside the line between the joints by this part of its length at most.
+/// Maximum distance of the shape from the line between the joints, as a fraction of its length.
 const BESIDE: f64 = 0.45;
-/// Outlines of a beam vary by this factor at most.
+/// Maximum ratio of the outer sizes along a beam.
 const TAPER: f64 = 3.5;
-/// Part of a link's mass that its beam has at least: the rest is housings at its ends.
+/// Minimum share of the beam in the link's mass; the rest is housings at its ends.
 const OWN: f64 = 0.2;
-/// A beam is longer than its section is thick, by this factor.
+/// Minimum ratio of a beam's length to the thickness of its section.
 const SLENDER: f64 = 1.2;
-/// A beam is at least this part of the arm's length.
+/// Minimum length of a beam, as a fraction of the arm's length.
 const SHARE: f64 = 0.08;
-/// Walls thinner than this are not cast, bent or printed (m).
+/// Minimum wall thickness that can be cast, bent or printed (m).
 const THINNEST: f64 = 5e-4;
-/// Round: bending the same about all axes to this, and the outline that of a circle to this.
+/// Tolerances of a round section: ratio of the principal second moments, and ratio of perimeters.
 const ROUND: [f64; 2] = [0.12, 0.06];
-/// Materials that are tried, lightest first: name, density (kg/m³), and what is said of it.
+/// Candidate materials, lightest first: name, density (kg/m³), and description.
 const MATERIALS: [(&str, f64, &str); 3] =
     [("aluminium", 2700.0, "aluminium casting"), ("ductile_iron", 7100.0, "cast iron"), ("steel", 7850.0, "steel")];
 
-/// A uniform section that bends as the link's outline would, hollow so that the link has its mass.
+/// A uniform section with the bending stiffness of the link's outline, hollow such that the link
+/// has its mass.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct BeamSection {
-    /// `box`, `tube`, `rectangle` or `circle`, as the robot file calls it.
+    /// One of `box`, `tube`, `rectangle`, `circle`, as in the robot file.
     pub(crate) section: &'static str,
-    /// Along y and z of the section; diameters of round ones (m).
+    /// Sizes along y and z of the section; diameters of round ones (m).
     pub(crate) width: f64,
     pub(crate) height: f64,
-    /// Thickness (m); none of solid ones.
+    /// Wall thickness (m); none of solid ones.
     pub(crate) wall: Option<f64>,
-    /// The same if only half of the mass is wall (m).
+    /// Wall thickness if only half of the mass is in the wall (m).
     pub(crate) wall_of_half: Option<f64>,
     pub(crate) material: &'static str,
     /// Direction of the section's y in link axes.
     pub(crate) y_axis: [f64; 3],
-    /// From the line between the joints to the centroid, in link axes (m).
+    /// Offset of the centroid from the line between the joints, in link axes (m).
     pub(crate) offset: [f64; 3],
-    /// Where the beam itself begins and ends, link axes (m); none from the link's frame to the next
+    /// End points of the beam, link axes (m); none if it runs from the link's frame to the next
     /// joint.
     pub(crate) ends: Option<[[f64; 3]; 2]>,
-    /// Largest over smallest outer width along the beam.
+    /// Ratio of maximum to minimum outer size along the beam.
     pub(crate) taper: f64,
-    /// Part of the cuts whose outline was not closed.
+    /// Fraction of the cuts with an open outline.
     pub(crate) open: f64,
 }
 
-/// What is known of a link that may be a beam.
+/// Data of a link that may be a beam.
 pub(crate) struct Candidate<'a> {
-    /// The joint that carries it.
+    /// Parent joint of the link.
     pub(crate) proximal: Option<&'a Joint>,
-    /// The joint at its far end.
+    /// Joint at the distal end.
     pub(crate) distal: &'a Joint,
     pub(crate) inertia: Option<LinkInertia>,
-    /// Its shapes, in link axes.
+    /// Shapes, in link axes.
     pub(crate) meshes: &'a [TriangleMesh],
     /// Length of the whole arm (m).
     pub(crate) arm: f64,
 }
 
-/// A section for the link, or in words why there is none. Where its shape does not lie between its
-/// frames, that of the body that shape and joint axes tell.
+/// Returns a section for the link, or the reason why there is none. If the shape is not between the
+/// link's frames, the beam runs along the body given by shape and joint axes.
 pub(crate) fn propose(link: &Candidate<'_>) -> Result<BeamSection, String> {
     let reason = match between(link, [Vector3::zeros(), link.distal.X_PJ.translation.vector]) {
         Ok(section) => return Ok(section),
@@ -84,7 +85,7 @@ pub(crate) fn propose(link: &Candidate<'_>) -> Result<BeamSection, String> {
     };
     let Some(ends) = ends::of(link) else { return Err(reason) };
     let mut section = between(link, ends).map_err(|why| match why {
-        NoBeam::Else(own) => format!("its shape between the joint axes: {own}"),
+        NoBeam::Else(own) => format!("its geometry between the joint axes: {own}"),
         NoBeam::NotThere(_) => reason,
     })?;
     section.ends = Some(ends.map(|end| (end + Vector3::from(section.offset)).into()));
@@ -92,9 +93,9 @@ pub(crate) fn propose(link: &Candidate<'_>) -> Result<BeamSection, String> {
     Ok(section)
 }
 
-/// Why there is no beam between two points.
+/// Reasons why there is no beam between two points.
 enum NoBeam {
-    /// There is hardly any way or no shape between them.
+    /// The points are too close, or there is no shape between them.
     NotThere(String),
     /// Another reason.
     Else(String),
@@ -106,30 +107,35 @@ impl From<String> for NoBeam {
     }
 }
 
-/// A section for the part of the link between two points, link axes.
+/// Returns a section for the part of the link between two points, link axes.
 fn between(link: &Candidate<'_>, [from, to]: [Vector3<f64>; 2]) -> Result<BeamSection, NoBeam> {
     let axis = to - from;
     let length = axis.norm();
     if length < SHARE * link.arm || length < 1e-3 {
-        return Err(NoBeam::NotThere(format!("short: {:.0} mm of the arm's {:.0} mm", 1e3 * length, 1e3 * link.arm)));
+        return Err(NoBeam::NotThere(format!(
+            "too short: {:.0} mm of the arm's {:.0} mm",
+            1e3 * length,
+            1e3 * link.arm
+        )));
     }
     let Some(inertia) = link.inertia.filter(|i| i.mass > 0.0) else {
-        return Err(NoBeam::Else("its mass is not known".into()));
+        return Err(NoBeam::Else("its mass is unknown".into()));
     };
     if link.meshes.is_empty() {
-        return Err(NoBeam::Else("it has no shape that can be read".into()));
+        return Err(NoBeam::Else("it has no readable geometry".into()));
     }
     let cuts = Cuts::of(link.meshes, &from, &axis)?;
     let along = cuts.along(length);
     let aside = cuts.centroid(length).norm();
     if along < ALONG || aside > BESIDE * length {
         let where_is_it = if along < ALONG {
-            format!("is there along {:.0} % of the way only", 100.0 * along)
+            format!("covers only {:.0} % of the distance", 100.0 * along)
         } else {
-            format!("lies {:.0} mm beside it", 1e3 * aside)
+            format!("is offset by {:.0} mm", 1e3 * aside)
         };
         return Err(NoBeam::NotThere(format!(
-            "from its frame to joint {:?} its shape {where_is_it}: the frames of the file do not run along the link",
+            "between its frame and joint {:?} its geometry {where_is_it}: the frames of the file are not along the \
+             link",
             link.distal.name
         )));
     }
@@ -138,20 +144,20 @@ fn between(link: &Candidate<'_>, [from, to]: [Vector3<f64>; 2]) -> Result<BeamSe
     let outlines = cuts.outlines(turn, shape);
     let thick = weighted(&outlines, length, |o| o.width.max(o.height));
     if length < SLENDER * thick {
-        return Err(format!("stout: {:.0} mm long, {:.0} mm thick", 1e3 * length, 1e3 * thick).into());
+        return Err(format!("not slender: {:.0} mm long, {:.0} mm thick", 1e3 * length, 1e3 * thick).into());
     }
     let (material, wall) = wall(&outlines, shape, inertia.mass)?;
     let mut section = equivalent(&outlines, shape, length, wall);
     section.material = material;
     if section.taper > TAPER {
         let taper = section.taper;
-        return Err(format!("its width varies by a factor of {taper:.1} between the joints: no beam").into());
+        return Err(format!("its width varies by a factor of {taper:.1} between the joints: not a beam").into());
     }
     let density = MATERIALS.iter().find(|m| m.0 == material).map_or(2700.0, |m| m.1);
     let whole = shell(&outlines, shape, wall);
     let own = shell_between(&outlines, shape, length, wall);
     if own < OWN * whole {
-        return Err(format!("only {:.0} % of its mass lies between the joints", 100.0 * own / whole).into());
+        return Err(format!("only {:.0} % of its mass is between the joints", 100.0 * own / whole).into());
     }
     section.wall_of_half = section.wall.and_then(|_| wall_for(&outlines, shape, 0.5 * inertia.mass / density));
     let R_LS = cuts.X_LS.rotation * Rotation3::from_axis_angle(&Vector3::x_axis(), turn);
@@ -164,22 +170,22 @@ fn between(link: &Candidate<'_>, [from, to]: [Vector3<f64>; 2]) -> Result<BeamSe
     Ok(section)
 }
 
-/// The outlines of a link across the line to its distal joint.
+/// Outlines of a link across the line to its distal joint.
 struct Cuts {
-    /// Section frame at the beginning of the beam.
+    /// Section frame at the start of the beam.
     X_LS: Pose,
-    /// Where along x (m), and what is there; at equal distances over the whole mesh.
+    /// Positions along x (m) with their sections, equally spaced over the whole mesh.
     sections: Vec<(f64, Option<CrossSection>)>,
 }
 
-/// What outlines are taken for.
+/// Shape by which outlines are approximated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Shape {
     Box,
     Tube,
 }
 
-/// Outer size of a box or circle with the outline's second moments, about principal axes.
+/// Outer size of the box or circle with the outline's second moments, about principal axes.
 #[derive(Clone, Copy, Debug)]
 struct Outline {
     x: f64,
@@ -200,7 +206,7 @@ impl Cuts {
         let places = || meshes.iter().flat_map(|m| &m.positions).map(along);
         let (low, high) = (places().fold(f64::INFINITY, f64::min), places().fold(f64::NEG_INFINITY, f64::max));
         if high - low < 1e-4 {
-            return Err("its shape is flat".into());
+            return Err("its geometry is flat".into());
         }
         let step = (high - low) / CUTS as f64;
         let cut = |k: usize| {
@@ -219,7 +225,7 @@ impl Cuts {
         self.found().filter(move |(x, _)| (0.0..=length).contains(x))
     }
 
-    /// Part of the way between the joints with an outline.
+    /// Fraction of the distance between the joints with an outline.
     fn along(&self, length: f64) -> f64 {
         let step = self.sections[1].0 - self.sections[0].0;
         (self.within(length).count() as f64 * step / length).min(1.0)
@@ -235,7 +241,7 @@ impl Cuts {
         self.found().min_by(|a, b| (a.0 - x).abs().total_cmp(&(b.0 - x).abs())).map(|(_, section)| section)
     }
 
-    /// Mean over the beam as a force at its tip sees it.
+    /// Mean over the beam, weighted for a force at its tip.
     fn mean(&self, length: f64) -> (Matrix2<f64>, Vector2<f64>) {
         stations(length).fold((Matrix2::zeros(), Vector2::zeros()), |(I, c), (x, weight)| {
             self.nearest(x).map_or((I, c), |s| (I + s.second_moments * weight, c + s.centroid * weight))
@@ -246,7 +252,8 @@ impl Cuts {
         self.mean(length).1
     }
 
-    /// Angle from y to the axis of the largest `∫ y²` (rad); zero where the axes of S do.
+    /// Returns the angle from y to the axis of the maximum `∫ y²` (rad); zero if the axes of S are
+    /// nearly principal.
     fn principal_turn(&self, length: f64) -> f64 {
         let (I, _) = self.mean(length);
         let (a, b, c) = (I[(0, 0)], I[(1, 1)], I[(0, 1)]);
@@ -272,7 +279,7 @@ impl Cuts {
         self.found().map(outline).filter(|o| o.width.is_normal() && o.height.is_normal()).collect()
     }
 
-    /// Whether outlines are circles, most of them.
+    /// Whether most outlines are circles.
     fn is_round(&self, length: f64) -> bool {
         let round = |s: &CrossSection| {
             let [low, high] = {
@@ -291,8 +298,8 @@ impl Cuts {
     }
 }
 
-/// Places along the beam with weights that a force at the tip gives their compliance:
-/// `3 (1 - x/l)²`, together 1.
+/// Returns positions along the beam with the weights of the tip compliance under a force at the
+/// tip: `3 (1 - x/l)²`, normalised to a sum of 1.
 fn stations(length: f64) -> impl Iterator<Item = (f64, f64)> {
     let weight = move |k: usize| {
         let s = (k as f64 + 0.5) / STATIONS as f64;
@@ -302,7 +309,7 @@ fn stations(length: f64) -> impl Iterator<Item = (f64, f64)> {
     (0..STATIONS).map(move |k| (weight(k).0, weight(k).1 / sum))
 }
 
-/// Between the cuts straight on, beyond them as at the nearest.
+/// Interpolates linearly between the cuts; constant beyond them.
 fn outline_at(outlines: &[Outline], x: f64) -> [f64; 2] {
     let above = outlines.iter().position(|o| o.x >= x);
     let size = |o: &Outline| [o.width, o.height];
@@ -325,7 +332,7 @@ fn weighted(outlines: &[Outline], length: f64, of: impl Fn(&Outline) -> f64) -> 
     stations(length).map(|(x, weight)| weight * value(x)).sum()
 }
 
-/// Volume of a shell of this thickness over all cuts, solid where it has no room (m³).
+/// Volume of a shell of this wall thickness over all cuts, solid where the walls meet (m³).
 fn shell(outlines: &[Outline], shape: Shape, wall: f64) -> f64 {
     let filled = if shape == Shape::Tube { std::f64::consts::FRAC_PI_4 } else { 1.0 };
     let area = |o: &Outline| {
@@ -335,7 +342,7 @@ fn shell(outlines: &[Outline], shape: Shape, wall: f64) -> f64 {
     outlines.iter().map(|o| area(o) * o.step).sum()
 }
 
-/// The same between the joints only.
+/// Volume of the shell between the joints only (m³).
 fn shell_between(outlines: &[Outline], shape: Shape, length: f64, wall: f64) -> f64 {
     let piece = |(x, _): (f64, f64)| {
         let [width, height] = outline_at(outlines, x);
@@ -344,7 +351,7 @@ fn shell_between(outlines: &[Outline], shape: Shape, length: f64, wall: f64) -> 
     stations(length).map(piece).sum()
 }
 
-/// Thickness of the shell that has this volume; `None` if a solid body has less.
+/// Returns the wall thickness of a shell with this volume; `None` if a solid body has less.
 fn wall_for(outlines: &[Outline], shape: Shape, volume: f64) -> Option<f64> {
     let most = outlines.iter().map(|o| 0.5 * o.width.min(o.height)).fold(0.0, f64::max);
     if shell(outlines, shape, most) < volume * (1.0 - 1e-3) {
@@ -358,13 +365,14 @@ fn wall_for(outlines: &[Outline], shape: Shape, volume: f64) -> Option<f64> {
     Some(0.5 * (low + high))
 }
 
-/// The lightest material of which the shape can have the mass, and the thickness of its wall.
+/// Returns the lightest material with which the shape can have the mass, and the wall thickness.
 fn wall(outlines: &[Outline], shape: Shape, mass: f64) -> Result<(&'static str, f64), String> {
     for (name, density, words) in MATERIALS {
         let Some(wall) = wall_for(outlines, shape, mass / density) else { continue };
         if wall < THINNEST {
             return Err(format!(
-                "its {mass:.3} kg would be a wall of {:.2} mm of {words} around its shape: the mass does not fit the mesh",
+                "its {mass:.3} kg would be a wall of {:.2} mm of {words} around its outline: the mass does not \
+                 match the mesh",
                 1e3 * wall
             ));
         }
@@ -372,7 +380,7 @@ fn wall(outlines: &[Outline], shape: Shape, mass: f64) -> Result<(&'static str, 
     }
     let solid = shell(outlines, shape, f64::INFINITY);
     Err(format!(
-        "its mass contradicts its mesh: {mass:.2} kg within {:.2} litres, a solid of steel would have {:.2} kg",
+        "its mass contradicts its mesh: {mass:.2} kg in {:.2} litres, solid steel would have {:.2} kg",
         1e3 * solid,
         7850.0 * solid
     ))
@@ -387,7 +395,7 @@ fn hollow(shape: Shape, [width, height]: [f64; 2], wall: f64) -> [f64; 2] {
     [(width * height.powi(3) - w * h.powi(3)) / 12.0, (height * width.powi(3) - h * w.powi(3)) / 12.0]
 }
 
-/// The uniform section whose tip goes as far under a force as that of the link:
+/// Returns the uniform section with the tip deflection of the link under a force:
 /// `1/I = ∑ weight / I(x)` about both axes.
 fn equivalent(outlines: &[Outline], shape: Shape, length: f64, wall: f64) -> BeamSection {
     let compliance = stations(length).fold([0.0; 2], |[a, b], (x, weight)| {
@@ -399,8 +407,8 @@ fn equivalent(outlines: &[Outline], shape: Shape, length: f64, wall: f64) -> Bea
     let largest = |x: f64| outline_at(outlines, x).into_iter().fold(0.0, f64::max);
     let sizes = || stations(length).map(|(x, _)| largest(x));
     let taper = sizes().fold(0.0, f64::max) / sizes().fold(f64::INFINITY, f64::min);
-    // Moments go with the sizes as powers of the fourth order about; this halves the error each
-    // time.
+    // Fixed-point iteration: second moments scale roughly with the fourth power of the sizes, so
+    // each step about halves the error.
     for _ in 0..60 {
         let [now_y, now_z] = hollow(shape, [width, height], wall);
         height *= (I_y / now_y).powf(0.25);
@@ -447,7 +455,7 @@ mod tests {
         })
     }
 
-    /// A body along x of M whose outline at each place is a polygon of these corners.
+    /// A body along x of M whose outline at each position is a polygon with these corners.
     fn lofted(length: f64, outline: impl Fn(f64) -> Vec<[f64; 2]>) -> TriangleMesh {
         let rings = 40;
         let mut mesh = TriangleMesh::default();
@@ -473,7 +481,7 @@ mod tests {
         vec![[-w / 2.0, -h / 2.0], [w / 2.0, -h / 2.0], [w / 2.0, h / 2.0], [-w / 2.0, h / 2.0]]
     }
 
-    /// Truth: the box that the mesh and the mass were made of. Bound 1e-4: positions have seven
+    /// Truth: the box from which mesh and mass were computed. Bound 1e-4: positions have seven
     /// digits, and the wall is a small difference.
     #[test]
     fn a_box_of_known_wall_is_found_again_however_its_frame_is_turned() {
@@ -485,7 +493,7 @@ mod tests {
             let X = Pose::from_parts(Translation3::identity(), R);
             let X_LB = Pose::from_parts(Translation3::from(R * Vector3::x() * length), Rotation3::identity());
             let found = candidate(mass, &[mesh.clone().transformed(&X)], X_LB).unwrap();
-            // Which of both sides is called the width follows from the frame.
+            // The frame decides whether width and height are exchanged.
             let y = R.inverse() * Vector3::from(found.y_axis);
             let (width, height) =
                 if y.y.abs() > 0.5 { (found.width, found.height) } else { (found.height, found.width) };
@@ -498,7 +506,7 @@ mod tests {
     }
 
     /// Truth: tube of diameter 0.2 and wall 0.006. The mesh has 64 corners, so its second moments
-    /// are 0.3 % below a circle's.
+    /// are 0.3 % below those of a circle.
     #[test]
     fn a_tube_of_known_wall_is_found_again() {
         let (length, diameter, wall) = (0.8, 0.2, 0.006);
@@ -519,8 +527,8 @@ mod tests {
         assert!(errors[0].abs() < 2e-3 && errors[1].abs() < 3e-3 && errors[2].abs() < 5e-3, "{errors:?}");
     }
 
-    /// Truth: tip of a cantilever under a force, `∫ (l - x)²/(E I(x)) dx`, by Simpson's rule in
-    /// 2000 steps over the closed form of I(x) of a tapered box.
+    /// Truth: tip deflection of a cantilever under a force, `∫ (l - x)²/(E I(x)) dx`, by Simpson's
+    /// rule in 2000 steps over the closed form of I(x) of a tapered box.
     #[test]
     fn the_tip_of_a_tapered_link_goes_as_far_as_that_of_its_uniform_beam() {
         let (length, wall) = (1.0, 0.01);
@@ -568,7 +576,7 @@ mod tests {
         assert!(of(0.1).unwrap_err().contains("wall of"));
         let aside = Pose::from_parts(Translation3::new(0.0, 0.0, 0.9), Rotation3::identity());
         let frames = candidate(20.0, std::slice::from_ref(&mesh), aside).unwrap_err();
-        assert!(frames.contains("do not run along"), "{frames}");
+        assert!(frames.contains("are not along the link"), "{frames}");
         let short = Pose::from_parts(Translation3::new(0.1, 0.0, 0.0), Rotation3::identity());
         assert!(candidate(20.0, &[mesh], short).unwrap_err().contains("stout"));
         let wide = Geometry::Sphere { radius: 0.2 }.triangles().unwrap();

@@ -1,4 +1,5 @@
-//! Which joints are the arm: from the base to the tool, what moves on the way, and what is held.
+//! Choice of the joints that form the arm: from base to tool, which of them move, and which are
+//! held.
 
 use std::collections::HashMap;
 
@@ -7,7 +8,7 @@ use flexarm_urdf::closest;
 
 use super::{NewError, NewOptions};
 
-/// Names of tool frames, best first, as they are and with a prefix (`arm_tool0`).
+/// Names of tool frames, best first, also with a prefix (`arm_tool0`).
 const TOOLS: [&str; 12] = [
     "tool0",
     "tcp",
@@ -22,42 +23,42 @@ const TOOLS: [&str; 12] = [
     "ee",
     "gripper_frame_link",
 ];
-/// Words in the names of joints that belong to a hand.
+/// Words in the names of joints of a hand.
 const HAND: [&str; 8] = ["finger", "thumb", "gripper", "jaw", "knuckle", "claw", "grasp", "palm"];
-/// Words in the names of links that are fingers.
+/// Words in the names of finger links.
 const FINGER: [&str; 5] = ["finger", "thumb", "jaw", "knuckle", "claw"];
-/// Words of chains that are no arms.
+/// Words in the names of chains that are not arms.
 const NO_ARM: [&str; 12] =
     ["leg", "ankle", "foot", "toe", "wheel", "knee", "hip", "head", "neck", "camera", "caster", "sole"];
 
-/// The arm in the mechanism; numbers are places in its list of joints.
+/// The arm in the mechanism; numbers are indices into its list of joints.
 #[derive(Clone, Debug)]
 pub(crate) struct Chain {
     pub(crate) base: String,
     pub(crate) tool: String,
-    /// All joints from the base to the tool, fixed ones too.
+    /// All joints from the base to the tool, including fixed ones.
     pub(crate) path: Vec<usize>,
-    /// Those that the motion moves.
+    /// Joints moved by the motion.
     pub(crate) joints: Vec<usize>,
-    /// Joints that move by themselves and are held, with the reason.
+    /// Independently moving joints that are held, with the reason.
     pub(crate) held: Vec<(usize, &'static str)>,
-    /// What was chosen among several, in words.
+    /// Choices made among several candidates, as text.
     pub(crate) choices: Vec<String>,
 }
 
-/// A joint with a coordinate of its own and room to move.
+/// Whether a joint has its own coordinate and a range to move in.
 fn is_free(joint: &Joint) -> bool {
     joint.kind.degrees_of_freedom() == 1 && joint.mimic.is_none() && joint.limits.lower < joint.limits.upper
 }
 
-/// A joint that moves, by itself or after another one.
+/// Whether a joint moves, independently or as a mimic joint.
 fn moves(joint: &Joint) -> bool {
     joint.kind != JointKind::Fixed
 }
 
 struct Tree<'a> {
     mechanism: &'a Mechanism,
-    /// Joint above each link.
+    /// Parent joint of each link.
     above: HashMap<&'a str, usize>,
 }
 
@@ -75,7 +76,7 @@ impl<'a> Tree<'a> {
         self.mechanism.links.iter().map(|l| l.name.as_str()).find(|link| !self.above.contains_key(link))
     }
 
-    /// Joints from the root to a link.
+    /// Returns the joints from the root to a link.
     fn path(&self, link: &str) -> Vec<usize> {
         let mut path = Vec::new();
         let mut at = link;
@@ -92,7 +93,7 @@ impl<'a> Tree<'a> {
         (0..joints.len()).filter(move |&k| joints[k].parent == link)
     }
 
-    /// Links fixed to this one, itself first, nearer ones before farther ones.
+    /// Returns the links fixed to this one, itself first, in order of distance.
     fn body(&self, link: &'a str) -> Vec<&'a str> {
         let mut body = vec![link];
         let mut at = 0;
@@ -103,14 +104,14 @@ impl<'a> Tree<'a> {
         body
     }
 
-    /// Moving joints that start at a link or at one that is fixed to it.
+    /// Returns the moving joints that start at a link or at one fixed to it.
     fn branches(&self, link: &'a str) -> Vec<usize> {
         let body = self.body(link);
         body.into_iter().flat_map(|link| self.below(link)).filter(|&k| moves(self.joint(k))).collect()
     }
 }
 
-/// The chain that was asked for, else the longest one that is an arm.
+/// Returns the requested chain, or else the longest one that is an arm.
 pub(crate) fn find(mechanism: &Mechanism, options: &NewOptions) -> Result<Chain, NewError> {
     let tree = Tree::new(mechanism);
     if !mechanism.joints.iter().any(is_free) {
@@ -150,13 +151,13 @@ pub(crate) fn find(mechanism: &Mechanism, options: &NewOptions) -> Result<Chain,
     }
     let reason = |k: usize| {
         if path.contains(&k) {
-            "not asked for"
+            "not requested"
         } else if whole.contains(&k) {
             "before the base of the arm"
         } else if is_of_hand(tree.joint(k)) {
             "part of a gripper or hand"
         } else {
-            "not on the way from base to tool"
+            "not on the path from base to tool"
         }
     };
     let others = (0..mechanism.joints.len()).filter(|k| is_free(tree.joint(*k)) && !joints.contains(k));
@@ -179,8 +180,8 @@ fn named_joints(mechanism: &Mechanism, names: &[String]) -> Result<Vec<usize>, N
     Ok(joints)
 }
 
-/// Whether a joint is one of a hand: by its name, or because it moves a finger. The body of a
-/// gripper may turn with the arm.
+/// Whether a joint belongs to a hand: by its name, or because it moves a finger. The body of a
+/// gripper may be part of the arm.
 fn is_of_hand(joint: &Joint) -> bool {
     let (name, child) = (joint.name.to_lowercase(), joint.child.to_lowercase());
     HAND.iter().any(|word| name.contains(word)) || FINGER.iter().any(|word| child.contains(word))
@@ -188,11 +189,11 @@ fn is_of_hand(joint: &Joint) -> bool {
 
 /// A chain that may be the arm.
 struct Candidate<'a> {
-    /// Last link that moves.
+    /// Last moving link.
     end: &'a str,
-    /// Number of joints that move by themselves.
+    /// Number of independently moving joints.
     joints: usize,
-    /// Length of all offsets (m).
+    /// Total length of the joint offsets (m).
     length: f64,
     is_arm: bool,
     tool: &'a str,
@@ -228,7 +229,7 @@ fn choose_tool(tree: &Tree<'_>, base: &str, choices: &mut Vec<String>) -> Result
             named,
         });
     }
-    // The order of the file among equals.
+    // Among equals, the first in the file.
     let best = candidates.iter().rev().max_by(|a, b| {
         let rank = |c: &Candidate<'_>| (c.is_arm, c.joints, c.named);
         rank(a).cmp(&rank(b)).then((1e3 * a.length).round().total_cmp(&(1e3 * b.length).round()))
@@ -241,7 +242,7 @@ fn choose_tool(tree: &Tree<'_>, base: &str, choices: &mut Vec<String>) -> Result
         .collect();
     if !equals.is_empty() {
         choices.push(format!(
-            "the arm that ends at {:?} was taken; {} others have as many joints, with the tools {}",
+            "the arm that ends at {:?} was chosen; {} others have the same number of joints, with the tools {}",
             best.tool,
             equals.len(),
             equals.join(", ")
@@ -250,8 +251,8 @@ fn choose_tool(tree: &Tree<'_>, base: &str, choices: &mut Vec<String>) -> Result
     Ok(best.tool.to_owned())
 }
 
-/// The path up to where a hand begins: a finger by its name, or several short chains from one body
-/// after at least three joints.
+/// Returns the path up to the start of a hand: a finger by its name, or several short chains from
+/// one body after at least three joints.
 fn without_hand(tree: &Tree<'_>, path: &[usize]) -> Vec<usize> {
     let mut free = 0;
     let mut length = 0.0;
@@ -274,7 +275,7 @@ fn without_hand(tree: &Tree<'_>, path: &[usize]) -> Vec<usize> {
     path.to_vec()
 }
 
-/// Longest way along joint offsets below a joint, its own not counted (m).
+/// Returns the maximum length of joint offsets below a joint, excluding its own (m).
 fn reach(tree: &Tree<'_>, joint: usize) -> f64 {
     let mut longest = 0.0f64;
     let mut open = vec![(tree.joint(joint).child.as_str(), 0.0, 0usize)];
@@ -291,8 +292,8 @@ fn reach(tree: &Tree<'_>, joint: usize) -> f64 {
     longest
 }
 
-/// The tool frame on the body of a link: by name, else the end of its chain of frames without
-/// shape; and whether by name.
+/// Returns the tool frame on the body of a link, by name, or else the end of its chain of frames
+/// without shape; also whether it was found by name.
 fn tool_of<'a>(tree: &Tree<'a>, end: &'a str) -> (&'a str, bool) {
     let body = tree.body(end);
     let is_named = |link: &str, tool: &str| {
@@ -304,7 +305,7 @@ fn tool_of<'a>(tree: &Tree<'a>, end: &'a str) -> (&'a str, bool) {
             return (link, true);
         }
     }
-    // Cameras and sensors hang beside; what follows the last joint without a fork leads to the
+    // Cameras and sensors branch off; the chain without a fork after the last joint leads to the
     // tool.
     let mut at = end;
     loop {
@@ -323,7 +324,7 @@ mod tests {
 
     use super::*;
 
-    /// (parent, child, moves, offset along x)
+    /// Joints as (parent, child, moves, offset along x).
     fn mechanism(joints: &[(&str, &str, bool, f64)]) -> Mechanism {
         let mut m = Mechanism::new("m");
         m.links.push(Link { name: "base".into(), inertia: None });

@@ -1,4 +1,4 @@
-//! What is found out about a robot, and what is assumed, before anything is written.
+//! Facts and assumptions about a robot, collected before anything is written.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -19,7 +19,7 @@ use super::{NewError, NewOptions, text};
 use flexarm_run::Error;
 use flexarm_run::Robot;
 
-/// A link of the arm: its section, or why it has none.
+/// A link of the arm with its section, or the reason why it has none.
 #[derive(Clone, Debug)]
 pub(crate) struct DraftLink {
     pub(crate) link: String,
@@ -27,9 +27,9 @@ pub(crate) struct DraftLink {
     pub(crate) length: f64,
     pub(crate) mass: Option<f64>,
     pub(crate) section: Result<BeamSection, String>,
-    /// The own inertia of the link cannot be cut in two.
+    /// Whether the link has the mass of a uniform beam, because its own inertia cannot be split.
     pub(crate) uniform: bool,
-    /// Its shapes are those for collisions.
+    /// Whether its shapes are the collision shapes.
     pub(crate) of_collisions: bool,
 }
 
@@ -39,29 +39,29 @@ pub(crate) struct DraftJoint {
     pub(crate) joint: Joint,
     pub(crate) speed: f64,
     pub(crate) speed_assumed: bool,
-    /// What is wrong with its effort limit, if anything.
+    /// Fault of its effort limit, if any.
     pub(crate) effort_fault: Option<&'static str>,
     pub(crate) weight: f64,
     pub(crate) needed: f64,
-    /// Rated torque that its reducer is taken for (N m), and the class.
+    /// Assumed rated torque of its reducer (N m), and the gear class.
     pub(crate) rated: f64,
     pub(crate) gear: Option<GearClass>,
 }
 
-/// All of it.
+/// Everything known or assumed about the robot.
 #[derive(Clone, Debug)]
 pub(crate) struct Draft {
     pub(crate) name: String,
     pub(crate) urdf: UrdfRobot,
     pub(crate) chain: Chain,
     pub(crate) waived: Vec<String>,
-    /// Links whose masses only held a place and were estimated instead.
+    /// Links with placeholder masses, which were estimated instead.
     pub(crate) discarded: Vec<String>,
     pub(crate) estimate: Option<flexarm_urdf::InertiaEstimate>,
-    /// Masses were to be estimated, but no link lacks one.
+    /// Whether an estimate of masses was requested although no link lacks one.
     pub(crate) idle_estimate: bool,
     pub(crate) moving_mass: f64,
-    /// Largest distance of the tool from the base in the poses looked at (m).
+    /// Maximum distance of the TCP from the first joint of the arm in the sampled poses (m).
     pub(crate) reach: f64,
     pub(crate) payload: Cube,
     pub(crate) payload_known: bool,
@@ -70,7 +70,7 @@ pub(crate) struct Draft {
     pub(crate) links: Vec<DraftLink>,
     pub(crate) motion: SampleMotion,
     pub(crate) assumptions: Vec<Assumption>,
-    /// What the maker is to be asked for.
+    /// Questions for the manufacturer.
     pub(crate) questions: Vec<String>,
 }
 
@@ -148,14 +148,13 @@ impl Draft {
         Ok(draft)
     }
 
-    /// Links that are proposed to bend.
+    /// Returns the links proposed as flexible.
     pub(crate) fn beams_with_sections(&self) -> Vec<&DraftLink> {
         self.links.iter().filter(|link| link.section.is_ok()).collect()
     }
 
-    /// Tries each beam in the robot file that is to be written: one whose link cannot be cut gets
-    /// the mass of a uniform beam, one that cannot be put in place at all is left out, with the
-    /// reason.
+    /// Tries each beam in the robot file to be written: a link whose inertia cannot be split gets
+    /// the mass of a uniform beam; a beam that cannot be used at all is left out, with the reason.
     pub(crate) fn settle(&mut self, placed: &Placed, _options: &NewOptions) -> Result<(), Error> {
         let loads = |draft: &Self, beams: &[&DraftLink]| {
             let text = text::robot_file(draft, placed, beams);
@@ -171,7 +170,7 @@ impl Draft {
             self.links[k].uniform = true;
             if let Err(error) = loads(self, &[&self.links[k]]) {
                 let reason = error.to_string();
-                self.links[k].section = Err(format!("it cannot be put in place: {reason}"));
+                self.links[k].section = Err(format!("the beam cannot be used: {reason}"));
             }
         }
         self.assumptions = assumptions(self);
@@ -180,8 +179,8 @@ impl Draft {
     }
 }
 
-/// Reads the description. Inertias that no body can have keep it from nothing: they are taken as
-/// they are, and told.
+/// Reads the description. Inertias that violate the triangle inequality are accepted as they are;
+/// the names of their links are returned.
 fn read(path: &Path, options: &ReadOptions) -> Result<(UrdfRobot, Vec<String>), Error> {
     let error = match read_urdf(path, options) {
         Ok(urdf) => return Ok((urdf, Vec::new())),
@@ -201,10 +200,10 @@ fn read(path: &Path, options: &ReadOptions) -> Result<(UrdfRobot, Vec<String>), 
     Ok((read_urdf(path, &again)?, waived))
 }
 
-/// Part of the links with a mass that must have the same one for it to be a placeholder.
+/// Fraction of the links with a mass that must have the same one for it to be a placeholder.
 const ALIKE: f64 = 0.7;
 
-/// Links with one mass that most links have: it holds the place of others.
+/// Returns the links with the mass shared by most links, if it is a placeholder.
 fn placeholders(mechanism: &Mechanism) -> Vec<String> {
     let with = |link: &Link| Some((link.name.clone(), link.inertia?.mass)).filter(|(_, mass)| *mass > 0.0);
     let with: Vec<(String, f64)> = mechanism.links.iter().filter_map(with).collect();
@@ -217,7 +216,7 @@ fn placeholders(mechanism: &Mechanism) -> Vec<String> {
     if many { names } else { Vec::new() }
 }
 
-/// Mass of all links that the joints of the arm carry (kg).
+/// Mass of all links carried by the joints of the arm (kg).
 fn mass_after(mechanism: &Mechanism, chain: &Chain) -> f64 {
     let above: HashMap<&str, usize> = mechanism.joints.iter().enumerate().map(|(k, j)| (j.child.as_str(), k)).collect();
     let is_moved = |link: &str| {
@@ -234,7 +233,7 @@ fn mass_after(mechanism: &Mechanism, chain: &Chain) -> f64 {
     mechanism.links.iter().filter(|l| is_moved(&l.name)).filter_map(|l| l.inertia).map(|i| i.mass).sum()
 }
 
-/// Where each coordinate is looked at; those that are held have one value.
+/// Returns the range of each coordinate to be sampled; held ones have a single value.
 fn ranges(model: &Model, mechanism: &Mechanism, chain: &Chain, held: &[(String, f64, &'static str)]) -> Vec<[f64; 2]> {
     let range = |name: &str| {
         let joint = chain.joints.iter().map(|&k| &mechanism.joints[k]).find(|j| j.name == name);
@@ -254,7 +253,7 @@ fn guess(bare: &Model, with_one_kg: &Model, ranges: &[[f64; 2]], mass: f64) -> f
     loads::guessed_payload(mass, &joints)
 }
 
-/// How far the tool comes from the first joint of the arm (m).
+/// Returns the maximum distance of the TCP from the first joint of the arm (m).
 fn reach(model: &Model, workspace: &Workspace, mechanism: &Mechanism, chain: &Chain) -> f64 {
     let Some(frame) = model.frame(&mechanism.joints[chain.joints[0]].child) else { return 0.0 };
     let mut data = Data::new(model);
@@ -265,7 +264,9 @@ fn reach(model: &Model, workspace: &Workspace, mechanism: &Mechanism, chain: &Ch
     workspace.poses.iter().map(|pose| distance(&pose.q, &pose.tool, &mut data)).fold(0.0, f64::max)
 }
 
-/// * `floor`: torque that a joint of this arm has at least (N m).
+/// Returns the joints of the arm with their drives.
+///
+/// * `floor`: minimum torque assumed for a joint of this arm (N m).
 fn joints(model: &Model, mechanism: &Mechanism, chain: &Chain, workspace: &Workspace, floor: f64) -> Vec<DraftJoint> {
     let of = |&place: &usize| {
         let joint = &mechanism.joints[place];
@@ -278,13 +279,13 @@ fn joints(model: &Model, mechanism: &Mechanism, chain: &Chain, workspace: &Works
         Some(DraftJoint { joint, speed, speed_assumed, effort_fault, weight, needed, rated: 0.0, gear: None })
     };
     let mut joints: Vec<DraftJoint> = chain.joints.iter().filter_map(of).collect();
-    // One number for all that is wrong for some was never meant.
+    // An effort limit equal for all joints and wrong for some is a placeholder.
     let same = |j: &DraftJoint| j.joint.limits.effort == joints[0].joint.limits.effort;
     let weak = |j: &DraftJoint| j.joint.limits.effort < j.weight;
     if joints.len() > 2 && joints.iter().all(same) {
         let (weak, faulty) = (joints.iter().any(weak), joints.iter().any(|j| j.effort_fault.is_some()));
-        let too_little = "is the same for all joints and below what the arm needs to hold itself";
-        let too_much = "is the same for all joints and far above what some of them can need";
+        let too_little = "is the same for all joints and below the torque that holds the arm against gravity";
+        let too_much = "is the same for all joints and far above the torque that some of them can require";
         for joint in &mut joints {
             joint.effort_fault = match joint.effort_fault {
                 _ if weak => Some(too_little),
@@ -296,7 +297,7 @@ fn joints(model: &Model, mechanism: &Mechanism, chain: &Chain, workspace: &Works
     for joint in &mut joints {
         joint.rated = match joint.effort_fault {
             None => joint.joint.limits.effort / gears::PEAK_OVER_RATED,
-            // Weight may last, speeding up does not.
+            // Gravity torque may last, acceleration torque does not.
             Some(_) => (joint.needed / gears::PEAK_OVER_RATED).max(joint.weight.max(floor) / 1.5),
         };
         joint.gear = (!joint.joint.kind.slides() && joint.rated > 1e-6).then(|| gears::class(joint.rated));
@@ -307,7 +308,7 @@ fn joints(model: &Model, mechanism: &Mechanism, chain: &Chain, workspace: &Works
 fn axis(joint: &DraftJoint, model: &Model, ranges: &[[f64; 2]]) -> Option<Axis> {
     let k = model.coordinates().iter().position(|c| c.joint == joint.joint.name)?;
     let full = ranges[k];
-    // What is not crossed within some seconds is not crossed.
+    // Restrict the range to the distance covered within a few seconds.
     let (middle, half) =
         (0.5 * (full[0] + full[1]), (0.5 * (full[1] - full[0])).min(sample::LONGEST_WAY * joint.speed));
     Some(Axis {
@@ -320,7 +321,7 @@ fn axis(joint: &DraftJoint, model: &Model, ranges: &[[f64; 2]]) -> Option<Axis> 
     })
 }
 
-/// All links between the first moving joint and the tool, with their sections.
+/// Returns all links between the first moving joint and the tool, with their sections.
 fn links(urdf: &UrdfRobot, chain: &Chain) -> Vec<DraftLink> {
     let mechanism = &urdf.mechanism;
     let joint = |k: usize| &mechanism.joints[k];
@@ -335,7 +336,7 @@ fn links(urdf: &UrdfRobot, chain: &Chain) -> Vec<DraftLink> {
         let section = beams::propose(&beams::Candidate { proximal, distal, inertia, meshes: &meshes, arm });
         let ends = section.as_ref().ok().and_then(|section| section.ends);
         let length = ends.map_or(distal.X_PJ.translation.vector, |[from, to]| Vector3::from(to) - Vector3::from(from));
-        // Frames at one place are no links of an arm.
+        // Skip frames at the same point.
         if length.norm() < 1e-6 {
             continue;
         }
@@ -349,7 +350,7 @@ fn links(urdf: &UrdfRobot, chain: &Chain) -> Vec<DraftLink> {
             of_collisions,
         });
     }
-    // One link bends between two joints only: the longest of its ways.
+    // A link is flexible between two joints only: keep the longest span.
     let mut kept: Vec<DraftLink> = Vec::new();
     for link in found {
         if let Some(other) = kept.iter_mut().find(|other| other.link == link.link) {
@@ -363,7 +364,7 @@ fn links(urdf: &UrdfRobot, chain: &Chain) -> Vec<DraftLink> {
     kept
 }
 
-/// What a link looks like, in its axes; its shapes for collisions where it has no others that can
+/// Returns the visual shapes of a link, in its axes, or its collision shapes if no visual one can
 /// be read.
 fn shapes(urdf: &UrdfRobot, link: &str) -> (Vec<TriangleMesh>, bool) {
     let read = |visuals: &[Visual]| -> Vec<TriangleMesh> {
@@ -379,20 +380,22 @@ fn shapes(urdf: &UrdfRobot, link: &str) -> (Vec<TriangleMesh>, bool) {
 fn assumptions(draft: &Draft) -> Vec<Assumption> {
     let mut list = Vec::new();
     for choice in &draft.chain.choices {
-        list.push(assumption("the arm", choice.clone(), &format!("{} LINK chooses another one", Setting::Tool)));
+        list.push(assumption("the arm", choice.clone(), &format!("choose another one with {} LINK", Setting::Tool)));
     }
     for link in &draft.waived {
-        let text = "its moments of inertia are such as no body has (the largest is above the sum of the others); taken as they are";
+        let text = "its moments of inertia are physically impossible (the maximum is above the sum of the others); \
+                    used unchanged";
         list.push(assumption(&format!("link {link:?}"), text.into(), "correct them in the description"));
     }
     masses(draft, &mut list);
     if !draft.payload_known && draft.payload.mass == 0.0 {
-        let text = "none: the effort limits leave no room for one".to_owned();
+        let text = "none: the effort limits do not allow one".to_owned();
         list.push(assumption("payload", text, &format!("{} KG, or payload in robot.toml", Setting::Payload)));
     }
     if !draft.payload_known && draft.payload.mass > 0.0 {
         let text = format!(
-            "{} kg, at most 15 % of what moves ({:.1} kg) and what the effort limits carry, a cube of aluminium at the tool",
+            "{} kg, at most 15 % of the moving mass ({:.1} kg) and within the effort limits, an aluminium cube at \
+             the tool",
             draft.payload.mass, draft.moving_mass
         );
         list.push(assumption("payload", text, &format!("{} KG, or payload in robot.toml", Setting::Payload)));
@@ -401,28 +404,29 @@ fn assumptions(draft: &Draft) -> Vec<Assumption> {
         let name = format!("joint {:?}", joint.joint.name);
         if joint.speed_assumed {
             let unit = if joint.joint.kind.slides() { "m/s" } else { "rad/s" };
-            let text = format!("its speed limit is not known; the sample motion takes {} {unit}", joint.speed);
-            list.push(assumption(&name, text, "write it into the description, or [limits] of motion.toml"));
+            let text = format!("its speed limit is unknown; the sample motion uses {} {unit}", joint.speed);
+            list.push(assumption(&name, text, "add it to the description, or to [limits] of motion.toml"));
         }
         if let Some(gear) = &joint.gear {
             let of = match joint.effort_fault {
                 None => format!("its effort limit {:.4} N m", joint.joint.limits.effort),
                 Some(why) => format!(
-                    "what the arm needs, {:.0} N m of weight and {:.0} N m in motion, for its effort limit {why}",
+                    "the required torque, {:.0} N m against gravity and {:.0} N m in motion, because its effort \
+                     limit {why}",
                     joint.weight, joint.needed
                 ),
             };
             let text = format!(
-                "its reducer has {:.3e} N m/rad ({:.1e} to {:.1e}), that of a class of {:.0} N m rated torque from {of}",
+                "its reducer has {:.3e} N m/rad ({:.1e} to {:.1e}), typical of a rated torque of {:.0} N m, from {of}",
                 gear.stiffness, gear.low, gear.high, joint.rated
             );
-            list.push(assumption(&name, text, "ask the maker for its torsional stiffness, or measure it"));
+            list.push(assumption(&name, text, "ask the manufacturer for its torsional stiffness, or measure it"));
         }
     }
     for link in &draft.links {
         if let Ok(section) = &link.section {
             let text = format!(
-                "it bends as a {}, all of its {:.2} kg being wall of {}",
+                "it is modelled as a {}, assuming that all of its {:.2} kg is structural, of {}",
                 text::section_words(section),
                 link.mass.unwrap_or(0.0),
                 section.material
@@ -436,44 +440,40 @@ fn assumptions(draft: &Draft) -> Vec<Assumption> {
     list
 }
 
-/// Masses that look like no masses of this arm.
+/// Adds the assumptions about masses that are implausible for this arm.
 fn masses(draft: &Draft, list: &mut Vec<Assumption>) {
     let own: f64 = draft.urdf.mechanism.links.iter().filter_map(|l| l.inertia).map(|i| i.mass).sum();
     let which = match draft.discarded.is_empty() {
         true => "links without <inertial>",
-        false => "links without <inertial> or with a mass that only held a place",
+        false => "links without <inertial> or with a placeholder mass",
     };
     match draft.estimate {
         Some(flexarm_urdf::InertiaEstimate::TotalMass(mass)) => {
             let text = format!(
-                "{which} have {mass} kg together, spread by the volumes of their meshes or by their lengths; all links together {own:.1} kg"
+                "{which} have {mass} kg in total, distributed by the volumes of their meshes or by their lengths; \
+                 all links have {own:.1} kg in total"
             );
-            list.push(assumption("masses", text, "replace by those of the maker"));
+            list.push(assumption("masses", text, "use the masses of the manufacturer"));
         }
         Some(flexarm_urdf::InertiaEstimate::Density(density)) => {
-            let text = format!("{which} are solid with {density} kg/m³");
-            list.push(assumption("masses", text, "replace by those of the maker"));
+            let text = format!("{which} are solid bodies with {density} kg/m³");
+            list.push(assumption("masses", text, "use the masses of the manufacturer"));
         }
         None => {}
     }
     if draft.idle_estimate {
         let text = format!(
-            "no link lacks a mass, so none was estimated: those of the description count, {own:.1} kg together"
+            "no link lacks a mass, so none was estimated: the masses of the description are used, {own:.1} kg in total"
         );
-        list.push(assumption(
-            "masses",
-            text,
-            "take <inertial> out of the description if its masses are not to be trusted",
-        ));
+        list.push(assumption("masses", text, "remove <inertial> from the description if its masses are unreliable"));
     }
     let alike = placeholders(&draft.urdf.mechanism);
     let mass = alike.first().and_then(|name| draft.urdf.mechanism.link(name)?.inertia).map_or(0.0, |i| i.mass);
     if !alike.is_empty() && draft.discarded.is_empty() {
-        let text =
-            format!("{} links have {mass} kg each: this number only holds the place of their masses", alike.len());
+        let text = format!("{} links have {mass} kg each, which is a placeholder", alike.len());
         let mend = format!(
-            "{} KG spreads the mass of the arm over these links, by the volumes of their meshes or by their lengths; best the \
-             masses of the maker",
+            "distribute the mass of the arm over these links with {} KG, by the volumes of their meshes or by \
+             their lengths; ideally use the masses of the manufacturer",
             Setting::InertiaFromTotalMass
         );
         list.push(assumption("masses", text, &mend));
@@ -483,7 +483,11 @@ fn masses(draft: &Draft, list: &mut Vec<Assumption>) {
         list.push(assumption(
             "masses",
             finding.message.clone(),
-            &format!("{} KG or {} KG_PER_M3 estimate them", Setting::InertiaFromTotalMass, Setting::InertiaFromDensity),
+            &format!(
+                "estimate them with {} KG or {} KG_PER_M3",
+                Setting::InertiaFromTotalMass,
+                Setting::InertiaFromDensity
+            ),
         ));
     }
 }
@@ -493,33 +497,35 @@ fn questions(draft: &Draft) -> Vec<String> {
     let turning: Vec<&str> = draft.joints.iter().filter(|j| j.gear.is_some()).map(|j| j.joint.name.as_str()).collect();
     if !turning.is_empty() {
         list.push(format!(
-            "torsional stiffness of the reducers of {}, in N m/rad at the output (or N m per minute of arc: times 3438); ask \
-             for the type of reducer if nothing else: its catalogue has the number",
+            "torsional stiffness of the reducers of {}, in N m/rad at the output (or N m per arc minute, times \
+             3438); at least the type of reducer, whose catalogue gives the value",
             turning.join(", ")
         ));
     }
     if !draft.payload_known {
-        list.push("mass, centre of mass and inertia of what the tool carries".into());
+        list.push("mass, centre of mass and inertia of the payload".into());
     }
     for link in draft.beams_with_sections() {
         list.push(format!(
-            "link {:?}: wall thickness and material of the casting, and how much of its mass is casting (motors and gears \
-             do not stiffen it); best a CAD model to be meshed",
+            "link {:?}: wall thickness and material of the casting, and the share of the casting in its mass \
+             (motors and gears add no stiffness); ideally a CAD model for meshing",
             link.link
         ));
     }
     let unsure: Vec<&str> =
         draft.joints.iter().filter(|j| j.effort_fault.is_some()).map(|j| j.joint.name.as_str()).collect();
     if !unsure.is_empty() {
-        list.push(format!("largest torque of {}", unsure.join(", ")));
+        list.push(format!("maximum torque of {}", unsure.join(", ")));
     }
     let slow: Vec<&str> = draft.joints.iter().filter(|j| j.speed_assumed).map(|j| j.joint.name.as_str()).collect();
     if !slow.is_empty() {
-        list.push(format!("largest speed of {}", slow.join(", ")));
+        list.push(format!("maximum speed of {}", slow.join(", ")));
     }
     if draft.estimate.is_some() || draft.assumptions.iter().any(|a| a.about == "masses") {
         list.push("mass, centre of mass and inertia of each link".into());
     }
-    list.push("the sag of the tool under a known weight hung on it, in one or two poses: with it the numbers above can be judged".into());
+    list.push(
+        "static deflection of the TCP under a known weight, in one or two poses, to validate the numbers above".into(),
+    );
     list
 }

@@ -1,10 +1,9 @@
-//! Where a link's own body begins and ends between its two joints, where the frames of the file lie
-//! elsewhere.
+//! End points of a link's body between its two joints, for files whose frames are elsewhere.
 //!
-//! A frame may sit anywhere on the axis of its joint, and in many descriptions it sits at the far
-//! end of the link. The body lies along the mesh's longest principal axis; where a joint turns
-//! about that axis, more or less, along the axis of the joint. A joint whose axis crosses the body
-//! is where it comes nearest; one that turns about it is at the end of the mesh.
+//! A frame may be anywhere on the axis of its joint, and in many descriptions it is at the far end
+//! of the link. The body lies along the mesh's longest principal axis or, if a joint axis is nearly
+//! parallel to that, along the joint axis. A joint whose axis crosses the body is at the point of
+//! the body nearest to the axis; a joint that turns about the body is at the end of the mesh.
 
 use flexarm_kinematics::{Joint, JointKind};
 use flexarm_urdf::TriangleMesh;
@@ -12,12 +11,12 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::beams::Candidate;
 
-/// Cosine between a joint axis and the body from which on the joint turns about the body: 45
-/// degrees. Housings of the next joint tilt the principal axis by 30.
+/// Cosine between a joint axis and the body above which the joint turns about the body: 45 degrees.
+/// Housings of the next joint tilt the principal axis by 30.
 const ALONG: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// Both ends of the body, the proximal one first, link axes; `None` where shape and joints do not
-/// tell them.
+/// Returns both ends of the body, the proximal one first, link axes; `None` if shape and joints do
+/// not determine them.
 pub(crate) fn of(link: &Candidate<'_>) -> Option<[Vector3<f64>; 2]> {
     let (middle, along) = principal_axis(link.meshes)?;
     let X_LB = &link.distal.X_PJ;
@@ -35,7 +34,7 @@ pub(crate) fn of(link: &Candidate<'_>) -> Option<[Vector3<f64>; 2]> {
         (Place::Across(a), Place::Across(b)) => [a, b],
         (Place::Across(a), Place::Along(_)) => [a, farther(a)],
         (Place::Along(_), Place::Across(b)) => [farther(b), b],
-        // A straight tube between two rolls: the frames say which end is which.
+        // A straight tube between two roll joints: the frames determine the order of the ends.
         (Place::Along(a), Place::Along(b)) if a < b => [low, high],
         (Place::Along(a), Place::Along(b)) if a > b => [high, low],
         (Place::Along(a), Place::Along(_)) => [farther(a), nearer(a)],
@@ -43,16 +42,16 @@ pub(crate) fn of(link: &Candidate<'_>) -> Option<[Vector3<f64>; 2]> {
     Some([a, b].map(|s| middle + along * s.clamp(low, high)))
 }
 
-/// Where a joint is along the body (m).
+/// Position of a joint along the body (m).
 enum Place {
-    /// Its axis crosses the body there.
+    /// Point where its axis crosses the body.
     Across(f64),
-    /// It turns about the body; its frame is there.
+    /// Position of its frame; its axis is parallel to the body.
     Along(f64),
 }
 
 impl Place {
-    /// * `point`: on the axis of the joint, seen from the middle of the body.
+    /// * `point`: a point on the joint axis, relative to the middle of the body.
     fn of(point: Vector3<f64>, axis: Option<Vector3<f64>>, along: &Vector3<f64>) -> Self {
         let s = point.dot(along);
         let Some(axis) = axis else { return Self::Across(s) };
@@ -60,12 +59,12 @@ impl Place {
         if cosine.abs() > ALONG {
             return Self::Along(s);
         }
-        // The point of the body nearest to the axis.
+        // Point of the body nearest to the axis.
         Self::Across((s - point.dot(&axis) * cosine) / (1.0 - cosine * cosine))
     }
 }
 
-/// Axis about which a joint turns, in its own axes.
+/// Axis of a joint, in the joint frame.
 fn axis(joint: &Joint) -> Option<Vector3<f64>> {
     match joint.kind {
         JointKind::Revolute(axis) | JointKind::Continuous(axis) | JointKind::Prismatic(axis) => Some(axis.into_inner()),
@@ -77,7 +76,7 @@ fn vector(p: &[f32; 3]) -> Vector3<f64> {
     Vector3::from(p.map(f64::from))
 }
 
-/// Centroid and longest principal axis of the surfaces.
+/// Returns the centroid and the longest principal axis of the surfaces.
 fn principal_axis(meshes: &[TriangleMesh]) -> Option<(Vector3<f64>, Vector3<f64>)> {
     let (mut area, mut first, mut second) = (0.0, Vector3::zeros(), Matrix3::zeros());
     for mesh in meshes {
@@ -88,7 +87,7 @@ fn principal_axis(meshes: &[TriangleMesh]) -> Option<(Vector3<f64>, Vector3<f64>
             let sum = a + b + c;
             area += own;
             first += sum * (own / 3.0);
-            // The integral of r rᵀ over a triangle.
+            // Integral of r rᵀ over a triangle.
             let corners = a * a.transpose() + b * b.transpose() + c * c.transpose();
             second += (corners + sum * sum.transpose()) * (own / 12.0);
         }
@@ -96,6 +95,7 @@ fn principal_axis(meshes: &[TriangleMesh]) -> Option<(Vector3<f64>, Vector3<f64>
     if !(area > 0.0 && area.is_finite()) {
         return None;
     }
+    // Second moment about the centroid.
     let middle = first / area;
     let spread = (second / area - middle * middle.transpose()).symmetric_eigen();
     let along = spread.eigenvectors.column(spread.eigenvalues.imax()).into_owned();

@@ -1,11 +1,12 @@
-//! Torsional stiffness of reducers by their rated torque: figures of two families, for a first
-//! guess. The maker's sheet of the gear itself goes before them.
+//! Torsional stiffness of reducers by rated torque: data of two series, for a first estimate. The
+//! manufacturer's data sheet of the actual gear takes precedence.
 //!
-//! Stiffness grows almost as the rated torque does: both families turn by about 1e-3 rad under it.
+//! Stiffness grows almost proportionally to rated torque: both series twist by about 1e-3 rad under
+//! it.
 
 use serde::Serialize;
 
-/// N m per minute of arc in N m/rad.
+/// Conversion from N m per arc minute to N m/rad.
 const ARC_MINUTE: f64 = 60.0 * 180.0 / std::f64::consts::PI;
 
 /// Cycloidal reducers, series RV-E of Nabtesco: size, rated torque (N m), torsional rigidity (N m
@@ -34,30 +35,30 @@ const STRAIN_WAVE: [(f64, f64, f64, f64); 8] = [
     (65.0, 1236.0, 5.4e5, 9.8e5),
 ];
 
-/// From this rated torque on, arms have cycloidal reducers (N m).
+/// Rated torque from which arms have cycloidal reducers (N m).
 pub(crate) const CYCLOIDAL_FROM: f64 = 200.0;
-/// Torque for starting and stopping over rated torque, of both families about.
+/// Approximate ratio of acceleration torque to rated torque, for both series.
 pub(crate) const PEAK_OVER_RATED: f64 = 2.5;
-/// What gears of arms were identified at over the table's value: the main axes of the shipped KR
+/// Range of the ratio of identified stiffness to the table's value: main axes of the shipped KR
 /// 210, KR 300 and KR 500.
 pub(crate) const IDENTIFIED: [f64; 2] = [0.45, 1.9];
 
 /// Stiffness of a reducer for a rated torque.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct GearClass {
-    /// What a reducer of this class has (N m/rad).
+    /// Typical stiffness of the class (N m/rad).
     pub(crate) stiffness: f64,
-    /// Lowest and highest that the class shows (N m/rad).
+    /// Minimum and maximum of the class (N m/rad).
     pub(crate) low: f64,
     pub(crate) high: f64,
-    /// Family, sizes and where the range comes from.
+    /// Series, sizes and origin of the range.
     pub(crate) source: String,
-    /// Whether the torque is outside of the table.
+    /// Whether the torque is outside the table.
     pub(crate) is_beyond: bool,
 }
 
-/// The class of a rated torque (N m, above 0): by powers between two sizes, in proportion beyond
-/// the table.
+/// Returns the class of a rated torque (N m, above 0): power-law interpolation between two sizes,
+/// proportional beyond the table.
 pub(crate) fn class(rated: f64) -> GearClass {
     if rated >= CYCLOIDAL_FROM {
         let rows: Vec<_> =
@@ -65,8 +66,9 @@ pub(crate) fn class(rated: f64) -> GearClass {
         let (stiffness, sizes, is_beyond) = between(&rows, rated, "RV-", "E");
         let [low, high] = IDENTIFIED.map(|factor| factor * stiffness);
         let source = format!(
-            "cycloidal reducers, figures of Nabtesco's series RV-E, {sizes} (compare with the maker's sheet); low and high: what main axes were identified at over this \
-             (KR 210, KR 300 and KR 500 in robots/)"
+            "cycloidal reducers, data of Nabtesco's RV-E series, {sizes} (compare with the manufacturer's data \
+             sheet); low and high: identified stiffness of main axes relative to these data (KR 210, KR 300 and KR \
+             500 in robots/)"
         );
         return GearClass { stiffness, low, high, source, is_beyond };
     }
@@ -76,23 +78,24 @@ pub(crate) fn class(rated: f64) -> GearClass {
     let (low, sizes, is_beyond) = between(&rows(|row| row.2), rated, "CSG-", "");
     let (high, ..) = between(&rows(|row| row.3), rated, "CSG-", "");
     let source = format!(
-        "strain-wave gears, figures of Harmonic Drive's series CSG, ratio 80 and above, {sizes} (compare with the maker's sheet); low: K1 at small torque, high: K3 at \
-         large torque"
+        "strain-wave gears, data of Harmonic Drive's CSG series, ratio 80 and above, {sizes} (compare with the \
+         manufacturer's data sheet); low: K1 at small torque, high: K3 at large torque"
     );
     GearClass { stiffness: (low * high).sqrt(), low, high, source, is_beyond }
 }
 
-/// Interpolation by powers; the sizes on both sides in words, and whether there is one side only.
+/// Interpolates by a power law; also returns the neighbouring sizes as text, and whether the torque
+/// is outside the table.
 fn between(rows: &[(f64, f64, f64)], rated: f64, before: &str, after: &str) -> (f64, String, bool) {
     let name = |row: &(f64, f64, f64)| format!("{before}{:.0}{after}", row.0);
     let above = rows.iter().position(|row| row.1 >= rated);
     match above {
         Some(0) => {
-            (rows[0].2 * rated / rows[0].1, format!("in proportion below {}", name(&rows[0])), rated < rows[0].1)
+            (rows[0].2 * rated / rows[0].1, format!("scaled in proportion below {}", name(&rows[0])), rated < rows[0].1)
         }
         None => {
             let last = rows[rows.len() - 1];
-            (last.2 * rated / last.1, format!("in proportion above {}", name(&last)), true)
+            (last.2 * rated / last.1, format!("scaled in proportion above {}", name(&last)), true)
         }
         Some(k) => {
             let (a, b) = (rows[k - 1], rows[k]);
@@ -106,8 +109,7 @@ fn between(rows: &[(f64, f64, f64)], rated: f64, before: &str, after: &str) -> (
 mod tests {
     use super::*;
 
-    /// Truth: the rows of the tables themselves; a turn under rated torque of about 1e-3 rad
-    /// between them.
+    /// Truth: the rows of the tables; between them, a twist under rated torque of about 1e-3 rad.
     #[test]
     fn the_stiffness_at_the_rated_torque_of_a_size_is_that_of_the_table_and_rises_between() {
         let exact = class(412.0).stiffness / (108.0 * ARC_MINUTE) - 1.0;
@@ -126,8 +128,8 @@ mod tests {
         }
     }
 
-    /// Truth: what was identified on arms (robots/README of each), at their largest torque over
-    /// 2.5.
+    /// Truth: stiffness identified on arms (see the README of each robot), at the maximum torque
+    /// divided by 2.5.
     #[test]
     fn main_axes_of_identified_arms_lie_within_the_range_of_their_class() {
         let arms = [

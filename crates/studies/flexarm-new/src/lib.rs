@@ -1,5 +1,5 @@
-//! A robot file from a robot description: what can be found out is found out, what cannot is
-//! assumed and said, or asked.
+//! A robot file from a robot description: facts are taken from it, and what is missing is assumed
+//! and reported, or asked for.
 //!
 //! ```no_run
 //! use flexarm_new::{NewOptions, new_robot};
@@ -11,9 +11,9 @@
 //! # Ok::<(), flexarm_run::Error>(())
 //! ```
 //!
-//! Start at [`new_robot`]. `docs/new_robot.md` has the rules and a whole run. Not here: reading the
-//! description (`flexarm-urdf`), what a robot file means ([`flexarm_run::Robot`]), the run that
-//! follows ([`flexarm_run::Arm::simulate`]).
+//! Start at [`new_robot`]. `docs/new_robot.md` has the rules and a complete example. Not here:
+//! reading the description (`flexarm-urdf`), the meaning of a robot file ([`flexarm_run::Robot`]),
+//! the simulation that follows ([`flexarm_run::Arm::simulate`]).
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
@@ -41,109 +41,113 @@ use flexarm_run::motion_report::motion_report;
 
 pub use report::{Assumption, NewDrive, NewHeld, NewJoint, NewLink, NewPayload, NewRobot};
 
-/// Choices of [`new_robot`]; what is not given is found out.
+/// Options of [`new_robot`]; missing ones are determined from the description.
 #[derive(Clone, Debug, Default)]
 pub struct NewOptions {
-    /// Link at which the arm begins; joints before it are held.
+    /// Base link of the arm; joints before it are held.
     pub base: Option<String>,
-    /// Link that is the tool.
+    /// Tool link.
     pub tool: Option<String>,
-    /// Joints that the motion moves; all others are held.
+    /// Joints moved by the motion; all others are held.
     pub joints: Option<Vec<String>>,
-    /// Mass at the tool (kg); 0 for none.
+    /// Payload mass (kg); 0 for none.
     pub payload_kg: Option<f64>,
-    /// For the URDF reader: packages, arguments, masses from meshes.
+    /// Options of the URDF reader: packages, arguments, masses from meshes.
     pub urdf: ReadOptions,
 }
 
-/// Why no robot file can be made.
+/// An error of making a robot file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum NewError {
-    /// Another format.
-    #[error("{path}: this is {what}, a URDF or xacro file is needed; {help}")]
+    /// A file of another format.
+    #[error("{path}: this is {what}, a URDF or xacro file is required; {help}")]
     OtherFormat {
-        /// The file.
+        /// Path of the file.
         path: String,
-        /// What it is.
+        /// Description of the format.
         what: &'static str,
-        /// What to do.
+        /// Suggested remedy.
         help: String,
     },
-    /// No joint with a coordinate and room to move.
+    /// No joint with its own coordinate and a range to move in.
     #[error(
         "robot {robot:?} has no joint that moves: {}; an arm needs at least one joint of type revolute, continuous or prismatic \
          whose lower limit is below its upper one",
-        if *fixed == 0 { "it has no joints at all".to_owned() } else { format!("all its {fixed} joints are fixed, followers or without range") }
+        if *fixed == 0 {
+            "it has no joints at all".to_owned()
+        } else {
+            format!("all of its {fixed} joints are fixed, mimic joints or without range")
+        }
     )]
     NoMovableJoint {
         /// Name of the robot.
         robot: String,
-        /// Number of its joints.
+        /// Number of joints.
         fixed: usize,
     },
-    /// No joint moves between two links.
+    /// No joint moves between base and tool.
     #[error(
         "no joint moves between base {base:?} and tool {tool:?}; choose others with {} and {}",
         Setting::Base,
         Setting::Tool
     )]
     NothingMoves {
-        /// Where the arm begins.
+        /// Base link.
         base: String,
-        /// Where it ends.
+        /// Tool link.
         tool: String,
     },
-    /// Nothing moves behind a link.
-    #[error("no joint moves behind the base {base:?}; choose another one with {}", Setting::Base)]
+    /// No joint moves below the base.
+    #[error("there is no movable joint after the base {base:?}; choose another base with {}", Setting::Base)]
     NothingBelow {
-        /// Where the arm begins.
+        /// Base link.
         base: String,
     },
-    /// The tool is not carried by the base.
-    #[error("the tool {tool:?} does not hang on the base {base:?}: no chain of joints leads from one to the other")]
+    /// The tool is not below the base.
+    #[error("the tool {tool:?} is not connected to the base {base:?} by a chain of joints")]
     NotBelow {
-        /// Where the arm begins.
+        /// Base link.
         base: String,
-        /// Where it ends.
+        /// Tool link.
         tool: String,
     },
-    /// A link that is not there.
+    /// An unknown link.
     #[error("the robot has no link {link:?}; {}", did_you_mean(closest, "links", known))]
     NoLink {
-        /// What was asked for.
+        /// Name requested.
         link: String,
-        /// The nearest name.
+        /// Closest name.
         closest: Option<String>,
         /// All names.
         known: Vec<String>,
     },
-    /// A joint that is not there or does not move by itself.
-    #[error("the robot has no joint {joint:?} that moves by itself; {}", did_you_mean(closest, "joints", known))]
+    /// A joint that does not exist or does not move independently.
+    #[error("the robot has no joint {joint:?} that moves independently; {}", did_you_mean(closest, "joints", known))]
     NoJoint {
-        /// What was asked for.
+        /// Name requested.
         joint: String,
-        /// The nearest name.
+        /// Closest name.
         closest: Option<String>,
         /// All names.
         known: Vec<String>,
     },
-    /// Nothing that moves has a mass.
+    /// No moving link has a mass.
     #[error(
-        "no link of the arm has a mass in this file ({links} links without <inertial>): nothing would weigh or bend. Give the mass \
-         of the arm from its data sheet with {} KG: it is spread over the links by the volume of their meshes; or a density with \
-         {} KG_PER_M3",
+        "no link of the arm has a mass in this file ({links} links without <inertial>): without mass there are no \
+         loads and no deflections. Give the mass of the arm from its data sheet with {} KG: it is distributed over \
+         the links by the volume of their meshes; or a density with {} KG_PER_M3",
         Setting::InertiaFromTotalMass,
         Setting::InertiaFromDensity
     )]
     NoMass {
-        /// Links without mass.
+        /// Number of links without mass.
         links: usize,
     },
-    /// A payload that is no mass.
+    /// A payload that is not a mass.
     #[error("{} is {found}: expected a mass in kg, 0 for none", Setting::Payload)]
     Payload {
-        /// What was given.
+        /// Value found.
         found: f64,
     },
 }
@@ -163,12 +167,12 @@ fn did_you_mean(closest: &Option<String>, what: &str, known: &[String]) -> Strin
     }
 }
 
-/// Makes a folder with `robot.toml`, `motion.toml`, `README.md` and, where it does not lie beside,
-/// a copy of the description; loads and checks what it wrote.
+/// Writes a folder with `robot.toml`, `motion.toml`, `README.md` and, if it is not in the same
+/// place, a copy of the description; then loads and checks the written files.
 ///
 /// # Errors
-/// [`NewError`]: no arm in it, nothing that has a mass, names that are not there; [`Error::Urdf`] for the description;
-/// [`Error::Taken`] for files that are there if `overwrite` is not set, [`Error::Write`].
+/// [`NewError`] if there is no arm, no mass, or an unknown name; [`Error::Urdf`] for an invalid
+/// description; [`Error::Taken`] for existing files if `overwrite` is not set, [`Error::Write`].
 pub fn new_robot(urdf: &Path, folder: &Path, overwrite: bool, options: &NewOptions) -> Result<NewRobot, Error> {
     place::refuse_other_formats(urdf)?;
     let mut draft = draft::Draft::of(urdf, options)?;

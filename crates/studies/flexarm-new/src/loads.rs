@@ -1,5 +1,4 @@
-//! What the joints have to carry and to move: torques of weight and of speeding up, over the whole
-//! workspace.
+//! Loads of the joints: torques from gravity and acceleration, over the whole workspace.
 
 use flexarm_kinematics::{
     Data, Joint, JointKind, Link, LinkInertia, Mechanism, Model, Pose, forward_kinematics, gravity_forces, mass_matrix,
@@ -8,21 +7,21 @@ use nalgebra::{DVector, Matrix3, Translation3, Vector3};
 
 use flexarm_run::caveat::size::halton;
 
-/// Poses at which torques are looked at.
+/// Number of poses sampled.
 const POSES: u32 = 400;
-/// Time in which a joint comes to its full speed (s), where nothing is known.
+/// Assumed time in which a joint accelerates to full speed (s).
 pub(crate) const SPEED_UP: f64 = 0.35;
-/// Payload over moving mass of arms: 0.15 to 0.2 of heavy ones and cobots alike.
+/// Ratio of payload to moving mass: 0.15 to 0.2 for both heavy arms and cobots.
 const PAYLOAD_SHARE: f64 = 0.15;
-/// Density of a payload that nobody knows (kg/m³): aluminium.
+/// Density of an unknown payload (kg/m³): aluminium.
 const PAYLOAD_DENSITY: f64 = 2700.0;
-/// Part of an effort limit that the weight alone may take up.
+/// Maximum share of an effort limit taken up by gravity.
 const WEIGHT_SHARE: f64 = 0.8;
-/// An effort limit this many times what the arm needs is no property of its drive.
+/// Ratio of effort limit to required effort above which the limit is implausible for a drive.
 const SENSELESS: f64 = 25.0;
 
-/// Range in which a coordinate is moved: its limits, at most so much to each side of the value
-/// nearest to zero.
+/// Returns the range in which a coordinate is moved: its limits, at most 2.1 rad or 1 m to each
+/// side of the value closest to zero.
 pub(crate) fn range(joint: &Joint) -> [f64; 2] {
     let most = if joint.kind.slides() { 1.0 } else { 2.1 };
     let (lower, upper) = (joint.limits.lower, joint.limits.upper);
@@ -33,11 +32,11 @@ pub(crate) fn range(joint: &Joint) -> [f64; 2] {
     [middle - most, middle + most]
 }
 
-/// A payload as a cube of aluminium at the tool.
+/// A payload as an aluminium cube at the TCP.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Cube {
     pub(crate) mass: f64,
-    /// Length of an edge (m).
+    /// Edge length (m).
     pub(crate) edge: f64,
 }
 
@@ -51,7 +50,7 @@ impl Cube {
     }
 }
 
-/// The robot with a frame and a load at its tool.
+/// Returns the robot with a frame and a payload at its tool.
 pub(crate) fn loaded(mechanism: &Mechanism, tool: &str, payload: Option<Cube>) -> Mechanism {
     let mut loaded = mechanism.clone();
     let inertia = payload.map(|cube| LinkInertia {
@@ -70,31 +69,31 @@ pub(crate) fn loaded(mechanism: &Mechanism, tool: &str, payload: Option<Cube>) -
     loaded
 }
 
-/// Name of the frame that [`loaded`] adds.
+/// Name of the frame added by [`loaded`].
 pub(crate) const TOOL: &str = "__new_tool";
 
-/// Poses of the arm, held joints where they stay, and what its joints carry in them.
+/// Sampled poses of the arm, with held joints fixed, and the loads of its joints.
 pub(crate) struct Workspace {
-    /// Coordinates that the arm moves.
+    /// Coordinates moved by the arm.
     pub(crate) moved: Vec<usize>,
     pub(crate) poses: Vec<Posed>,
-    /// Largest torque of weight per coordinate (N m or N).
+    /// Maximum gravity torque per coordinate (N m or N).
     pub(crate) weight: Vec<f64>,
-    /// Largest inertia per coordinate (kg m² or kg).
+    /// Maximum inertia per coordinate (kg m² or kg).
     pub(crate) inertia: Vec<f64>,
 }
 
-/// A pose, where the tool is in it, how low the arm comes, and the torques of weight.
+/// A pose with its TCP position, lowest height and gravity torques.
 #[derive(Clone, Debug)]
 pub(crate) struct Posed {
     pub(crate) q: DVector<f64>,
     pub(crate) tool: Vector3<f64>,
-    /// Height of the lowest moving frame (m).
+    /// Height of the lowest frame (m).
     pub(crate) lowest: f64,
     pub(crate) weight: Vec<f64>,
 }
 
-/// One pose with all that is to be known of it.
+/// Evaluates one pose.
 pub(crate) fn posed(model: &Model, data: &mut Data, q: DVector<f64>) -> Posed {
     let weight = gravity_forces(model, data, &q).abs().as_slice().to_vec();
     forward_kinematics(model, data, &q);
@@ -105,7 +104,7 @@ pub(crate) fn posed(model: &Model, data: &mut Data, q: DVector<f64>) -> Posed {
 }
 
 impl Workspace {
-    /// * `ranges`: of each coordinate; held ones have one value.
+    /// * `ranges`: range of each coordinate; a held one has equal ends.
     pub(crate) fn of(model: &Model, ranges: &[[f64; 2]]) -> Self {
         let n = model.nv();
         let moved: Vec<usize> = (0..n).filter(|&k| ranges[k][0] < ranges[k][1]).collect();
@@ -132,39 +131,39 @@ impl Workspace {
         workspace
     }
 
-    /// Torque of weight and of coming to full speed together (N m or N).
+    /// Sum of the maximum gravity torque and the torque to accelerate to `speed` (N m or N).
     pub(crate) fn needed(&self, k: usize, speed: f64) -> f64 {
         self.weight[k] + self.inertia[k] * speed / SPEED_UP
     }
 }
 
-/// What is wrong with an effort limit, in words.
+/// Returns the fault of an effort limit, as part of a sentence.
 ///
-/// * `floor`: what a joint of this arm has at least.
+/// * `floor`: minimum effort of a joint of this arm.
 pub(crate) fn effort_fault(effort: f64, weight: f64, needed: f64, floor: f64) -> Option<&'static str> {
     if !effort.is_finite() {
-        Some("has none")
+        Some("is missing")
     } else if effort <= 0.0 {
         Some("is zero")
     } else if effort < weight {
-        Some("is below what the arm needs to hold itself")
+        Some("is below the torque that holds the arm against gravity")
     } else if effort > SENSELESS * needed.max(floor) {
-        Some("is far above what the arm can need")
+        Some("is far above the torque that the arm can require")
     } else {
         None
     }
 }
 
-/// Torque of a payload that sits a fifth of the reach beside an axis (N m): wrists are made for so
-/// much. Where nothing is carried, for a twentieth of the mass that moves.
+/// Typical torque rating of wrists: that of a payload at a fifth of the reach from the axis (N m),
+/// at least of a twentieth of the moving mass.
 pub(crate) fn wrist_torque(payload: f64, moving_mass: f64, reach: f64) -> f64 {
     9.81 * payload.max(0.05 * moving_mass) * 0.2 * reach
 }
 
-/// A payload from the arm's own mass, rounded to a number that data sheets have, and no more than
-/// the effort limits carry.
+/// Estimates a payload from the arm's mass and the effort limits, rounded down to a number usual in
+/// data sheets.
 ///
-/// * `joints`: effort limit, weight without payload, and how much of it comes with each kg (N m per
+/// * `joints`: effort limit, gravity torque without payload, and its increase with payload (N m per
 ///   kg).
 pub(crate) fn guessed_payload(mass: f64, joints: &[(f64, f64, f64)]) -> f64 {
     let mut most = PAYLOAD_SHARE * mass;
@@ -176,7 +175,7 @@ pub(crate) fn guessed_payload(mass: f64, joints: &[(f64, f64, f64)]) -> f64 {
     rounded_down(most)
 }
 
-/// 1, 1.5, 2, 3, 5, 7 and powers of ten.
+/// Rounds down to 1, 1.5, 2, 3, 5 or 7 times a power of ten.
 fn rounded_down(value: f64) -> f64 {
     if value < 1e-3 {
         return 0.0;
@@ -194,9 +193,9 @@ mod tests {
     #[test]
     fn a_guessed_payload_is_a_share_of_the_mass_that_the_effort_limits_carry() {
         assert_eq!(guessed_payload(1000.0, &[]), 150.0);
-        // 0.8 * 1000 - 600 = 200 N m are left, 20 N m per kg.
+        // 0.8 * 1000 - 600 = 200 N m remain, at 20 N m per kg.
         assert_eq!(guessed_payload(1000.0, &[(1000.0, 600.0, 20.0)]), 10.0);
-        // A limit that the arm itself passes says nothing.
+        // A limit below the arm's own gravity torque is ignored.
         assert_eq!(guessed_payload(1000.0, &[(500.0, 600.0, 20.0)]), 150.0);
         assert_eq!(guessed_payload(20.6, &[]), 3.0);
         assert_eq!(guessed_payload(0.0, &[]), 0.0);

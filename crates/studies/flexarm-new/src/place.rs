@@ -1,5 +1,5 @@
-//! Where the description is: referred to where it lies beside the new folder, else copied with its
-//! meshes.
+//! Location of the description: referenced in place if it is close to the new folder, else copied
+//! with its meshes.
 
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -8,26 +8,26 @@ use super::draft::Draft;
 use super::{NewError, NewOptions};
 use flexarm_run::Error;
 
-/// How the new robot file comes to its description.
+/// Reference of the new robot file to its description.
 #[derive(Clone, Debug)]
 pub(crate) struct Placed {
-    /// `urdf` of the robot file.
+    /// Value of `urdf` in the robot file.
     pub(crate) reference: String,
-    /// The robot file itself, for messages.
+    /// Path of the robot file, for messages.
     pub(crate) robot_path: PathBuf,
-    /// `packages` and `args` of the robot file.
+    /// Values of `packages` and `args` in the robot file.
     pub(crate) packages: Vec<(String, String)>,
     pub(crate) arguments: Vec<(String, String)>,
-    /// What is copied.
+    /// Files to copy.
     pub(crate) files: Vec<(PathBuf, Vec<u8>)>,
-    /// All of it in words.
+    /// Description of the location, as text.
     pub(crate) words: String,
 }
 
-/// Says so for files that are robots in other formats, or no robots.
+/// Rejects files that are robots in other formats, or no robots.
 ///
 /// # Errors
-/// [`NewError::OtherFormat`].
+/// [`NewError::OtherFormat`], or [`Error::File`] for a file that is missing or cannot be read.
 pub(crate) fn refuse_other_formats(path: &Path) -> Result<(), Error> {
     let is = |what, help: &str| {
         let help = help.to_owned();
@@ -65,15 +65,15 @@ pub(crate) fn refuse_other_formats(path: &Path) -> Result<(), Error> {
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let text = String::from_utf8_lossy(&head);
     let root = |name: &str| text.contains(&format!("<{name} ")) || text.contains(&format!("<{name}>"));
-    let usd = "export it as URDF from the program it was made with (Isaac Sim has an exporter to URDF)";
+    let usd = "export it as URDF from the program it was made with (Isaac Sim has a URDF exporter)";
     match ending.as_str() {
         _ if head.starts_with(b"PXR-USDC") || head.starts_with(b"#usda") || ending == "usdz" => is("a USD file", usd),
-        "toml" => is("a robot file already", "run it with flexarm compare, or give the description it refers to"),
+        "toml" => is("already a robot file", "run it with flexarm compare, or give the description it refers to"),
         "stl" | "dae" | "obj" | "glb" | "gltf" | "step" | "stp" => {
-            is("a mesh or drawing", "give the URDF that refers to it; for one link alone: flexarm reduce")
+            is("a mesh or drawing", "give the URDF that refers to it; for a single link use flexarm reduce")
         }
         _ if root("sdf") && !root("robot") => {
-            is("an SDF file", "export the robot as URDF; SDF that came from a URDF: give that one")
+            is("an SDF file", "export the robot as URDF; if the SDF was made from a URDF, give that URDF")
         }
         _ if root("mujoco") && !root("robot") => {
             is("an MJCF file of MuJoCo", "give the URDF it was made from, or convert it (mjcf2urdf)")
@@ -82,7 +82,7 @@ pub(crate) fn refuse_other_formats(path: &Path) -> Result<(), Error> {
     }
 }
 
-/// From a folder to a file by a relative path; both absolute.
+/// Returns the relative path from a folder to a file; both must be absolute.
 fn relative(from: &Path, to: &Path) -> Option<String> {
     let (from, to): (Vec<_>, Vec<_>) = (from.components().collect(), to.components().collect());
     let common = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
@@ -95,7 +95,8 @@ fn relative(from: &Path, to: &Path) -> Option<String> {
     Some(parts.join("/"))
 }
 
-/// The path without links and dots; of a folder that is not there yet, that of the part which is.
+/// Returns the path without symbolic links and dots; for a missing folder, only its existing part
+/// is resolved.
 fn real(path: &Path) -> Option<PathBuf> {
     let whole = std::path::absolute(path).ok()?;
     let there = whole.ancestors().find(|above| above.exists())?;
@@ -104,7 +105,7 @@ fn real(path: &Path) -> Option<PathBuf> {
     Some(if rest.as_os_str().is_empty() { real } else { real.join(rest) })
 }
 
-/// Refers to a description in the new folder, in the one above or in one beside it; copies any
+/// References a description in the new folder, in its parent or in a sibling; copies any
 /// other.
 pub(crate) fn place(draft: &Draft, urdf: &Path, folder: &Path, options: &NewOptions) -> Result<Placed, Error> {
     let robot_path = folder.join("robot.toml");
@@ -120,7 +121,7 @@ pub(crate) fn place(draft: &Draft, urdf: &Path, folder: &Path, options: &NewOpti
             (name.clone(), path.unwrap_or_else(|| to.display().to_string()))
         });
         return Ok(Placed {
-            words: format!("the description stays where it is: urdf = {reference:?}, relative to this folder"),
+            words: format!("the description is not copied: urdf = {reference:?}, relative to this folder"),
             reference,
             robot_path,
             packages: packages.collect(),
@@ -131,8 +132,7 @@ pub(crate) fn place(draft: &Draft, urdf: &Path, folder: &Path, options: &NewOpti
     copied(draft, urdf, folder, robot_path)
 }
 
-/// The description, expanded if it was xacro, with the meshes that it names and paths relative to
-/// it.
+/// Copies the description, expanded if it was xacro, with its meshes and with relative paths.
 fn copied(draft: &Draft, urdf: &Path, folder: &Path, robot_path: PathBuf) -> Result<Placed, Error> {
     let name = format!("{}.urdf", flexarm_files::file_stem(&draft.name));
     let mut names: BTreeMap<String, PathBuf> = BTreeMap::new();
@@ -157,7 +157,7 @@ fn copied(draft: &Draft, urdf: &Path, folder: &Path, robot_path: PathBuf) -> Res
             };
             files.push((folder.join("meshes").join(&new), bytes(path)?));
             meshes += 1;
-            // Materials and buffers that the mesh names lie beside it.
+            // Materials and buffers that the mesh refers to are next to it.
             for beside in ["mtl", "bin"].map(|ending| path.with_extension(ending)).into_iter().filter(|p| p.is_file()) {
                 let own = beside.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
                 if names.insert(own.clone(), beside.clone()).is_none() {

@@ -1,4 +1,4 @@
-//! What was made, for programs: SI units, angles in rad.
+//! Result of making a robot: SI units, angles in rad.
 
 use std::path::{Path, PathBuf};
 
@@ -11,155 +11,157 @@ use flexarm_run::MotionPeak;
 use flexarm_run::MotionReport;
 use flexarm_run::Summary;
 
-/// Answer of `flexarm new`.
+/// Result of `flexarm new`.
 #[derive(Debug, Serialize)]
 pub struct NewRobot {
-    /// The robot file.
+    /// Robot file.
     pub robot: String,
-    /// The sample motion.
+    /// Sample motion file.
     pub motion: String,
-    /// The description that the robot file refers to.
+    /// Description that the robot file refers to.
     pub urdf: String,
     /// Name of the robot.
     pub name: String,
-    /// Whether the description was copied, and from where, in words.
+    /// Whether and from where the description was copied, as text.
     pub placed: String,
-    /// Link at which the arm begins.
+    /// Base link of the arm.
     pub base: String,
-    /// Link that is the tool.
+    /// Tool link.
     pub tool: String,
     /// Links from the base to the tool.
     pub chain: Vec<String>,
     /// Joints of the arm, in the order of the description.
     pub joints: Vec<NewJoint>,
-    /// Joints that stay where they are.
+    /// Joints that are held.
     pub held: Vec<NewHeld>,
     /// Links of the arm, with a section where one is proposed.
     pub links: Vec<NewLink>,
     /// Proposed drives.
     pub drives: Vec<NewDrive>,
-    /// What the tool carries.
+    /// Payload.
     pub payload: NewPayload,
-    /// Largest distance of the tool from the first joint in the poses that were looked at (m).
+    /// Maximum distance of the TCP from the first joint in the sampled poses (m).
     pub reach_m: f64,
-    /// Mass that the joints of the arm move, without payload (kg).
+    /// Mass moved by the joints of the arm, without payload (kg).
     pub moving_mass_kg: f64,
-    /// Everything that was assumed.
+    /// All assumptions.
     pub assumptions: Vec<Assumption>,
-    /// What to ask of the maker, or to measure.
+    /// Questions for the manufacturer, or quantities to measure.
     pub questions: Vec<String>,
-    /// How long the sample motion takes (s).
+    /// Duration of the sample motion (s).
     pub duration_s: f64,
-    /// Its largest values against the limits.
+    /// Peaks of the motion against the limits.
     pub peaks: Vec<MotionPeak>,
-    /// Limits that it passes, in words: those of effort that the arm cannot keep at all.
+    /// Limits violated by the motion, as sentences; only effort limits that the arm cannot keep at
+    /// all.
     pub violations: Vec<String>,
-    /// What `check` finds in the result.
+    /// Findings of `check` in the result.
     pub findings: Vec<Finding>,
-    /// Files that were written.
+    /// Written files.
     pub files: Vec<String>,
-    /// The first run, if there was one.
+    /// Summary of the first run, if there was one.
     pub summary: Option<Box<Summary>>,
 }
 
 /// A joint of the arm; limits are null where there are none.
 #[derive(Clone, Debug, Serialize)]
 pub struct NewJoint {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Word of the URDF for its kind.
+    /// Joint type in the URDF.
     #[serde(rename = "type")]
     pub kind: &'static str,
-    /// Least position (rad or m).
+    /// Minimum position (rad or m).
     pub lower: Option<f64>,
-    /// Greatest position.
+    /// Maximum position (rad or m).
     pub upper: Option<f64>,
     /// Speed limit (rad/s or m/s).
     pub velocity: Option<f64>,
     /// Effort limit of the description (N m or N).
     pub effort: Option<f64>,
-    /// What is wrong with the effort limit, in words; null if nothing.
+    /// Fault of the effort limit, as text; null if none.
     pub effort_fault: Option<&'static str>,
-    /// Largest torque of weight over the workspace, with payload (N m or N).
+    /// Maximum gravity torque over the workspace, with payload (N m or N).
     pub weight_torque: f64,
-    /// The same with that of coming to full speed in 0.35 s.
+    /// Gravity torque plus the torque to accelerate to full speed in 0.35 s (N m or N).
     pub needed_torque: f64,
 }
 
 /// A joint that is held.
 #[derive(Clone, Debug, Serialize)]
 pub struct NewHeld {
-    /// Its name.
+    /// Name.
     pub joint: String,
-    /// Where (rad or m).
+    /// Position at which it is held (rad or m).
     pub at: f64,
-    /// Why.
+    /// Reason.
     pub why: &'static str,
 }
 
 /// A link of the arm. Lengths in m.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct NewLink {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Joint at its far end.
+    /// Joint at its distal end.
     pub distal: String,
-    /// From its frame to that joint, or of its body where the frames do not run along it.
+    /// Distance from its frame to that joint; length of its body where the frames do not run along
+    /// it.
     pub length: f64,
     /// Mass (kg).
     pub mass: Option<f64>,
-    /// `box`, `tube`, `rectangle`, `circle`; null if none is proposed.
+    /// One of `box`, `tube`, `rectangle`, `circle`; null if none is proposed.
     pub section: Option<&'static str>,
-    /// Along y of the section; the diameter of round ones.
+    /// Size along y of the section; diameter of round ones.
     pub width: Option<f64>,
-    /// Along z of the section.
+    /// Size along z of the section.
     pub height: Option<f64>,
-    /// Thickness of the wall; null for solid ones.
+    /// Wall thickness; null for solid ones.
     pub wall: Option<f64>,
-    /// Thickness if only half of the mass is wall.
+    /// Wall thickness if only half of the mass is in the wall.
     pub wall_of_half_mass: Option<f64>,
     /// Name of the material.
     pub material: Option<&'static str>,
     /// Direction of the section's y in link axes.
     pub y_axis: Option<[f64; 3]>,
-    /// From the line between the joints to the beam, link axes.
+    /// Offset from the line between the joints to the beam, link axes.
     pub offset: Option<[f64; 3]>,
-    /// Where the beam itself begins and ends, link axes; null from the link's frame to the distal
+    /// End points of the beam, link axes; null if it runs from the link's frame to the distal
     /// joint.
     pub ends: Option<[[f64; 3]; 2]>,
-    /// Largest over smallest outer width along the beam.
+    /// Ratio of maximum to minimum outer size along the beam.
     pub taper: Option<f64>,
-    /// Part of the cuts through the mesh whose outline was not closed: there its convex hull
-    /// counts.
+    /// Fraction of the cuts through the mesh with an open outline, for which the convex hull is
+    /// used.
     pub open_cuts: Option<f64>,
-    /// Why no section is proposed.
+    /// Reason why no section is proposed.
     pub reason: Option<String>,
-    /// Whether section and material are assumed: always, where there are some.
+    /// Whether section and material are assumed: always, if there are any.
     pub assumed: bool,
 }
 
-/// A drive that is proposed.
+/// A proposed drive.
 #[derive(Clone, Debug, Serialize)]
 pub struct NewDrive {
-    /// Its joint.
+    /// Joint of the drive.
     pub joint: String,
     /// Torsional stiffness at the joint (N m/rad).
     pub stiffness: f64,
-    /// Lowest that the class shows.
+    /// Minimum of the gear class (N m/rad).
     pub low: f64,
-    /// Highest that the class shows.
+    /// Maximum of the gear class (N m/rad).
     pub high: f64,
     /// Rated torque of the class (N m).
     pub rated_torque: f64,
     /// Damping ratio.
     pub damping_ratio: f64,
-    /// Where the stiffness and its range come from.
+    /// Source of the stiffness and its range.
     pub source: String,
-    /// Always.
+    /// Whether it is assumed: always.
     pub assumed: bool,
 }
 
-/// What the tool carries.
+/// Payload of the arm.
 #[derive(Clone, Debug, Serialize)]
 pub struct NewPayload {
     /// Mass (kg).
@@ -170,14 +172,14 @@ pub struct NewPayload {
     pub assumed: bool,
 }
 
-/// Something that was assumed.
+/// An assumption.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Assumption {
-    /// What it is about: a joint, a link, the payload.
+    /// Subject: a joint, a link, the payload.
     pub about: String,
-    /// What was assumed.
+    /// The assumption made.
     pub text: String,
-    /// How to know better.
+    /// Way to replace it by a fact.
     pub mend: String,
 }
 

@@ -1,56 +1,57 @@
-//! A sample motion: from point to point through the workspace, within the limits of the joints.
+//! Sample motion: from point to point through the workspace, within the limits of the joints.
 
 use flexarm_kinematics::{Data, Joint, Model, State, inverse_dynamics};
 use nalgebra::DVector;
 
 use super::loads::{Posed, SPEED_UP, Workspace, posed};
 
-/// Part of the speed limits that the motion uses.
+/// Share of the speed limits used by the motion.
 const SPEED: f64 = 0.6;
-/// Part of the effort limits that it may need.
+/// Maximum share of the effort limits required by the motion.
 const EFFORT: f64 = 0.85;
-/// Part of the effort limits that the weight may need where it rests.
+/// Maximum share of the effort limits required by gravity at rests.
 const WEIGHT: f64 = 0.7;
-/// Fastest joint of the motion (rad/s, m/s), whatever its limit.
+/// Maximum joint speed of the motion, independent of the limit (rad/s, m/s).
 const FASTEST: f64 = 2.5;
-/// Peaks of a quintic over the mean: speed 15/8 D/T, acceleration 10/√3 D/T².
+/// Ratios of the peaks of a quintic to the means: speed 15/8 D/T, acceleration 10/√3 D/T².
 const PEAKS: [f64; 2] = [1.875, 5.773_502_691_896_258];
-/// Half of the way that a joint takes at most, over its speed limit (s): 8 s at 60 % of it.
+/// Half of the maximum distance of a joint over its speed limit (s): 8 s at 60 % of it.
 pub(crate) const LONGEST_WAY: f64 = 1.28;
-/// Goals beside the start.
+/// Maximum number of rests in addition to the start.
 const GOALS: usize = 4;
 
 /// A joint of the motion.
 #[derive(Clone, Debug)]
 pub(crate) struct Axis {
-    /// Its coordinate.
+    /// Index of its coordinate.
     pub(crate) k: usize,
     pub(crate) slides: bool,
-    /// Range in which the workspace was looked at.
+    /// Range of the sampled workspace.
     pub(crate) full: [f64; 2],
-    /// What of it the motion uses: the same middle, less where the joint is slow.
+    /// Range used by the motion: the same middle, smaller for slow joints.
     pub(crate) range: [f64; 2],
-    /// Speed limit, or what is assumed (rad/s, m/s).
+    /// Speed limit, or the one assumed (rad/s, m/s).
     pub(crate) speed: f64,
-    /// Effort limit, where it can be kept (N m, N).
+    /// Effort limit, infinite if it is faulty (N m, N).
     pub(crate) effort: f64,
 }
 
-/// A rest of the motion and the time to it (s), values in the order of the axes.
+/// A rest of the motion with the duration of the move to it (s); values in the order of the axes.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Rest {
     pub(crate) at: Vec<f64>,
     pub(crate) duration: f64,
 }
 
-/// Rests, the start first (with no duration) and last; and what could not be kept, in words.
+/// Rests, beginning (with zero duration) and ending at the start; and notes on limits that cannot
+/// be kept.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SampleMotion {
     pub(crate) rests: Vec<Rest>,
     pub(crate) notes: Vec<String>,
 }
 
-/// Values as they are written: tenths of a degree, tenths of a millimetre, within the range.
+/// Rounds a value to tenths of a degree or tenths of a millimetre, within the range.
 fn rounded(axis: &Axis, value: f64) -> f64 {
     let unit = if axis.slides { 1e-4 } else { 0.1f64.to_radians() };
     let steps = (value / unit).round();
@@ -59,11 +60,11 @@ fn rounded(axis: &Axis, value: f64) -> f64 {
     steps * unit
 }
 
-/// What a rest must have.
+/// Conditions on the poses of the motion.
 struct Wish {
-    /// Lowest height of a frame (m).
+    /// Minimum height of all frames (m).
     floor: f64,
-    /// Least distance of the tool from the axis through the base (m).
+    /// Minimum distance of the TCP from the z axis of the world (m).
     radius: f64,
     torque: bool,
 }
@@ -75,7 +76,7 @@ impl Wish {
     }
 }
 
-/// Rests far from each other, by the place of the tool, with ways between them that keep above the
+/// Returns rests with TCP positions far from each other, and paths between them that keep above the
 /// floor.
 pub(crate) fn sample_motion(model: &Model, workspace: &Workspace, axes: &[Axis]) -> SampleMotion {
     let mut data = Data::new(model);
@@ -108,7 +109,7 @@ pub(crate) fn sample_motion(model: &Model, workspace: &Workspace, axes: &[Axis])
         }
     }
     if wish == 3 {
-        motion.notes.push("the effort limits do not hold the arm in the poses of the motion".into());
+        motion.notes.push("the effort limits are too low to hold the arm in the poses of the motion".into());
     }
     if rests.is_empty() {
         rests.extend(poses.first().cloned());
@@ -120,16 +121,16 @@ pub(crate) fn sample_motion(model: &Model, workspace: &Workspace, axes: &[Axis])
         let from = motion.rests[motion.rests.len() - 1].at.clone();
         let (duration, kept) = duration(model, &mut data, &rests[0].q, axes, [&from, &at]);
         if !kept {
-            motion.notes.push(format!("the effort limits are passed on the way to rest {}", motion.rests.len()));
+            motion.notes.push(format!("the effort limits are exceeded on the way to stop {}", motion.rests.len()));
         }
         motion.rests.push(Rest { at, duration });
     }
     motion
 }
 
-/// Height of the lowest frame of all that do not move, or of the base.
+/// Height of the lowest fixed frame, at most 0.
 fn still_height(model: &Model, data: &mut Data, workspace: &Workspace) -> f64 {
-    // Frames that have the same height in all poses.
+    // Fixed frames have the same height in all poses.
     let heights = |data: &mut Data, q: &DVector<f64>| -> Vec<f64> {
         flexarm_kinematics::forward_kinematics(model, data, q);
         model.frames().iter().map(|frame| data.X_WF(frame).translation.vector.z).collect()
@@ -140,8 +141,8 @@ fn still_height(model: &Model, data: &mut Data, workspace: &Workspace) -> f64 {
     still.map(|k| first[k]).fold(f64::INFINITY, f64::min).min(0.0)
 }
 
-/// The pose nearest to the middle of the ranges, then always the one whose tool is farthest from
-/// all before.
+/// Chooses the pose closest to the middle of the ranges, then repeatedly the one whose TCP is
+/// farthest from all previous ones.
 fn choose(model: &Model, data: &mut Data, poses: &[Posed], axes: &[Axis], wish: &Wish) -> Vec<Posed> {
     let away = |pose: &Posed| -> f64 {
         let part =
@@ -168,7 +169,7 @@ fn choose(model: &Model, data: &mut Data, poses: &[Posed], axes: &[Axis], wish: 
     rests
 }
 
-/// How long a move takes (s), in tenths; and whether the effort limits are kept.
+/// Returns the duration of a move (s), in tenths, and whether the effort limits are kept.
 fn duration(model: &Model, data: &mut Data, at: &DVector<f64>, axes: &[Axis], [from, to]: [&[f64]; 2]) -> (f64, bool) {
     let mut time = 0.2f64;
     for (axis, way) in axes.iter().zip(from.iter().zip(to).map(|(a, b)| (b - a).abs())) {
@@ -187,7 +188,7 @@ fn duration(model: &Model, data: &mut Data, at: &DVector<f64>, axes: &[Axis], [f
     (time, false)
 }
 
-/// Torques of the rigid robot along a quintic against the effort limits.
+/// Checks the torques of the rigid robot along a quintic against the effort limits.
 fn strong_enough(
     model: &Model,
     data: &mut Data,
@@ -200,6 +201,7 @@ fn strong_enough(
     let mut a = DVector::zeros(model.nv());
     state.q.copy_from(at);
     (0..=40).all(|i| {
+        // Quintic s(u) with its time derivatives.
         let u = f64::from(i) / 40.0;
         let s = u.powi(3) * (10.0 - 15.0 * u + 6.0 * u * u);
         let ds = 30.0 * (u * (1.0 - u)).powi(2) / time;
@@ -213,7 +215,7 @@ fn strong_enough(
     })
 }
 
-/// Speed limit of a joint, or what is assumed where there is none.
+/// Returns the speed limit of a joint, or an assumed one and true if there is none.
 pub(crate) fn speed_of(joint: &Joint) -> (f64, bool) {
     let limit = joint.limits.velocity;
     let assumed = if joint.kind.slides() { 0.25 } else { 1.0 };

@@ -8,21 +8,21 @@ use super::beams::BeamSection;
 use super::draft::{Draft, DraftLink};
 use super::place::Placed;
 
-/// No joint of an arm has a higher effort limit (N m).
+/// Maximum plausible effort limit of a joint of an arm (N m).
 const MOST_EFFORT: f64 = 1e6;
 
-/// A text as TOML writes it, also as a key.
+/// Quotes a text as a TOML string, also for keys.
 fn quoted(text: &str) -> String {
-    // JSON escapes are TOML's, but for one character.
+    // JSON escapes are valid in TOML, except for DEL.
     serde_json::to_string(text).unwrap_or_default().replace('\u{7f}', "\\u007F")
 }
 
-/// A number with three digits that count, as the decimal nearest to them.
+/// Rounds a number to three significant digits.
 pub(crate) fn three_digits(value: f64) -> f64 {
     format!("{value:.2e}").parse().unwrap_or(value)
 }
 
-/// A length to a hundredth of a millimetre, a direction to six digits, as TOML writes floats.
+/// Formats a float for TOML, rounded to the given number of decimals.
 fn float(value: f64, digits: i32) -> String {
     let scale = 10f64.powi(digits);
     let value = (value * scale).round() / scale;
@@ -33,7 +33,7 @@ fn vector(values: &[f64; 3], digits: i32) -> String {
     format!("[{}]", values.map(|x| float(x, digits)).join(", "))
 }
 
-/// `box of 120 x 180 mm with a wall of 8.0 mm`.
+/// Describes a section: `box of 120 x 180 mm with a wall of 8.0 mm`.
 pub(crate) fn section_words(s: &BeamSection) -> String {
     let mm = |x: f64| format!("{:.0}", 1e3 * x);
     let size = match s.section {
@@ -54,7 +54,7 @@ fn beam_keys(s: &BeamSection, wall: Option<f64>) -> String {
     }
 }
 
-/// The robot file with these links bending.
+/// Returns the robot file with these links flexible.
 pub(crate) fn robot_file(draft: &Draft, placed: &Placed, beams: &[&DraftLink]) -> String {
     let mut t = String::new();
     // Writing to a String cannot fail.
@@ -67,13 +67,10 @@ pub(crate) fn robot_file(draft: &Draft, placed: &Placed, beams: &[&DraftLink]) -
 fn head(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Result {
     writeln!(
         t,
-        "# {}: made by flexarm new. What is marked ASSUMED was not in the description: put better numbers in its place.",
+        "# {}: made by flexarm new. Values marked ASSUMED are not in the description: replace them by better ones.",
         inline(&draft.name)
     )?;
-    writeln!(
-        t,
-        "# Every key: flexarm format robot. The motion: motion.toml. What was found, and what to ask: README.md."
-    )?;
+    writeln!(t, "# All keys: flexarm format robot. Motion: motion.toml. Findings and open questions: README.md.")?;
     writeln!(t, "format = 1\nname = {}", quoted(&draft.name))?;
     writeln!(t, "urdf = {}", quoted(&placed.reference))?;
     writeln!(t, "default_trajectory = \"motion.toml\"")?;
@@ -89,20 +86,21 @@ fn head(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Result {
     }
     if !draft.waived.is_empty() {
         let names: Vec<String> = draft.waived.iter().map(|n| quoted(n)).collect();
-        writeln!(t, "\n# Moments of inertia such as no body has, taken as they are: correct them in the description.")?;
+        writeln!(t, "\n# Physically impossible moments of inertia, used unchanged: correct them in the description.")?;
         writeln!(t, "waive_inertia = [{}]", names.join(", "))?;
     }
     efforts(t, draft)?;
     if !draft.discarded.is_empty() {
         let names: Vec<String> = draft.discarded.iter().map(|n| quoted(n)).collect();
-        writeln!(t, "\n# One mass for all links only holds the place of others: it does not count.")?;
+        writeln!(t, "\n# The mass of these links is a placeholder, the same for all: it is ignored.")?;
         writeln!(t, "discard_inertia = [{}]", names.join(", "))?;
     }
     match draft.estimate {
         Some(flexarm_urdf::InertiaEstimate::TotalMass(mass)) => {
             writeln!(
                 t,
-                "\n# ASSUMED: links without <inertial> have this mass together (kg), spread by the volume of their meshes."
+                "\n# ASSUMED: total mass (kg) of the links without <inertial>, distributed by the volume of their \
+                 meshes."
             )?;
             writeln!(t, "inertia_from_total_mass = {mass:?}")?;
         }
@@ -112,27 +110,25 @@ fn head(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Result {
         }
         None => {
             if draft.urdf.warnings.iter().any(|w| matches!(w.code, "missing-inertial" | "zero-mass")) {
-                writeln!(t, "\n# Some moving links have no mass in the description. If they weigh something:")?;
-                writeln!(t, "# inertia_from_total_mass =     # kg, all of them together")?;
+                writeln!(t, "\n# Some moving links have no mass in the description. To give them one:")?;
+                writeln!(t, "# inertia_from_total_mass =     # kg, total of these links")?;
             }
         }
     }
     writeln!(
         t,
-        "\n# The tool: {} from the last moving link. Move it to the point that works with xyz (m) and rpy (rad).",
+        "\n# The TCP, in the frame of link {}. Move it to the working point of the tool with xyz (m) and rpy (rad).",
         inline(&draft.chain.tool)
     )?;
     writeln!(t, "tcp = {{ link = {}, xyz = [0.0, 0.0, 0.0], rpy = [0.0, 0.0, 0.0] }}", quoted(&draft.chain.tool))?;
     let p = &draft.payload;
     if p.mass > 0.0 {
-        let origin = if draft.payload_known {
-            "mass as given, shape ASSUMED"
-        } else {
-            "ASSUMED: about 15 % of the mass that moves"
-        };
+        let origin =
+            if draft.payload_known { "mass as given, shape ASSUMED" } else { "ASSUMED: about 15 % of the moving mass" };
         writeln!(
             t,
-            "\n# {origin}: a cube of aluminium with its centre in the tool's frame. com in m, inertia ixx iyy izz ixy ixz iyz in kg m²."
+            "\n# {origin}: an aluminium cube centred at the origin of the tool frame. com in m, inertia ixx iyy \
+             izz ixy ixz iyz in kg m²."
         )?;
         let moment = format!("{:?}", three_digits(p.moment()));
         writeln!(
@@ -144,12 +140,12 @@ fn head(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Result {
     } else {
         writeln!(
             t,
-            "\n# Nothing is carried. payload = {{ link = {}, mass = 5.0, com = [0.0, 0.0, 0.05] }}",
+            "\n# No payload. Example: payload = {{ link = {}, mass = 5.0, com = [0.0, 0.0, 0.05] }}",
             inline(&quoted(&draft.chain.tool))
         )?;
     }
     if !draft.held.is_empty() {
-        writeln!(t, "\n# Joints that are no part of the arm stay here (rad, m).\n[hold]")?;
+        writeln!(t, "\n# Positions of the joints that are not part of the arm (rad, m).\n[hold]")?;
         for (joint, at, why) in &draft.held {
             writeln!(t, "{} = {at:?}   # {why}", quoted(joint))?;
         }
@@ -157,7 +153,7 @@ fn head(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Result {
     Ok(())
 }
 
-/// Effort limits of the description that make no sense.
+/// Writes infinite effort limits for those of the description that are implausible.
 fn efforts(t: &mut String, draft: &Draft) -> std::fmt::Result {
     let of_arm = draft.joints.iter().filter(|j| j.effort_fault.is_some()).map(|j| &j.joint);
     let known = |effort: f64| of_arm.clone().any(|joint| joint.limits.effort == effort);
@@ -173,16 +169,17 @@ fn efforts(t: &mut String, draft: &Draft) -> std::fmt::Result {
     if named.is_empty() {
         return Ok(());
     }
-    writeln!(t, "\n# The effort limits of these joints make no sense in the description: none is known (N m).")?;
+    writeln!(t, "\n# The effort limits of these joints in the description are implausible and ignored (N m).")?;
     writeln!(t, "effort_limit = {{ {} }}", named.join(", "))
 }
 
 fn links(t: &mut String, draft: &Draft, beams: &[&DraftLink]) -> std::fmt::Result {
     writeln!(
         t,
-        "\n# Links that bend. Sections: the outline of the mesh across the line between the joints, hollow so that the link has its"
+        "\n# Flexible links. Sections: the outline of the mesh across the line between the joints, hollow so that \
+         the link has its"
     )?;
-    writeln!(t, "# mass. ASSUMED: material, and that all of the mass is wall: an upper estimate of the stiffness.")?;
+    writeln!(t, "# mass. ASSUMED: the material, and all of the mass in the wall: an upper estimate of the stiffness.")?;
     for link in beams {
         let Ok(s) = &link.section else { continue };
         writeln!(
@@ -195,35 +192,37 @@ fn links(t: &mut String, draft: &Draft, beams: &[&DraftLink]) -> std::fmt::Resul
         if s.ends.is_some() {
             writeln!(
                 t,
-                "# The frames of the description do not run along it: ends are those of its shape between the joint axes."
+                "# The frames of the description are not along it: ends are those of its geometry between the \
+                 joint axes."
             )?;
         }
         if link.of_collisions {
-            writeln!(t, "# The outline is that of the shapes for collisions, which are often larger.")?;
+            writeln!(t, "# The outline is that of the collision geometry, which is often larger.")?;
         }
         if s.taper > 1.25 {
             writeln!(
                 t,
-                "# Its width varies by a factor of {:.1}: this is the uniform beam whose tip goes as far under a force.",
+                "# Its width varies by a factor of {:.1}: this is the uniform beam with the same tip deflection \
+                 under a force.",
                 s.taper
             )?;
         }
         if s.open > 0.0 {
             writeln!(
                 t,
-                "# {:.0} % of the cuts through the mesh do not close: there the convex hull counts.",
+                "# {:.0} % of the sections of the mesh are not closed: their convex hull is used.",
                 100.0 * s.open
             )?;
         }
         if let Some(half) = s.wall_of_half {
             writeln!(
                 t,
-                "# If only half of the mass is wall (motors and gears are the rest): wall = {}",
+                "# If only half of the mass is in the wall (the rest is motors and gears): wall = {}",
                 float(half, 5)
             )?;
         }
         writeln!(t, "[[flexible_link]]\nlink = {}\ndistal = {}", quoted(&link.link), quoted(&link.distal))?;
-        writeln!(t, "damping = {{ modal = 0.03 }}   # ASSUMED: 3 % of critical, as joined structures have")?;
+        writeln!(t, "damping = {{ modal = 0.03 }}   # ASSUMED: 3 % of critical, typical of jointed structures")?;
         let mut beam = format!("section = {:?}, {}, material = {:?}", s.section, beam_keys(s, s.wall), s.material);
         let _ = write!(beam, ", y_axis = {}", vector(&s.y_axis, 6));
         if let Some(ends) = &s.ends {
@@ -238,7 +237,7 @@ fn links(t: &mut String, draft: &Draft, beams: &[&DraftLink]) -> std::fmt::Resul
     }
     let others: Vec<&DraftLink> = draft.links.iter().filter(|l| l.section.is_err()).collect();
     if !others.is_empty() {
-        writeln!(t, "\n# Stiff, for no section could be proposed:")?;
+        writeln!(t, "\n# Rigid, because no section could be proposed:")?;
         for link in others {
             let reason = link.section.as_ref().err().map(|r| inline(r)).unwrap_or_default();
             writeln!(t, "#   {}: {reason}", inline(&link.link))?;
@@ -250,24 +249,25 @@ fn links(t: &mut String, draft: &Draft, beams: &[&DraftLink]) -> std::fmt::Resul
 fn drives(t: &mut String, draft: &Draft) -> std::fmt::Result {
     writeln!(
         t,
-        "\n# Reducers. ASSUMED, all of them: stiffness (N m/rad at the joint) of a class of reducers by rated torque, with the range"
+        "\n# Reducers. All values ASSUMED: stiffness (N m/rad at the joint) of the class of reducers with the \
+         rated torque, with"
     )?;
-    writeln!(t, "# that the class shows. Damping is left out: 3 % of critical.")?;
+    writeln!(t, "# the range of the class. Damping is omitted: 3 % of critical.")?;
     for joint in &draft.joints {
         let name = &joint.joint.name;
         let Some(gear) = &joint.gear else {
             let why = if joint.joint.kind.slides() {
-                "it slides: no class of reducers says how it gives way"
+                "it slides: the classes of reducers have no stiffness for prismatic joints"
             } else {
-                "it carries nothing"
+                "it carries no load"
             };
             writeln!(t, "\n# {} follows the motion exactly; {why}.", inline(name))?;
             continue;
         };
         let of = match joint.effort_fault {
-            None => format!("effort limit {:.4} N m over 2.5", joint.joint.limits.effort),
+            None => format!("effort limit {:.4} N m divided by 2.5", joint.joint.limits.effort),
             Some(why) => format!(
-                "its effort limit {why}, so from what the arm needs: {:.1} N m of weight, {:.1} N m in motion",
+                "its effort limit {why}, so from the required torque: {:.1} N m against gravity, {:.1} N m in motion",
                 joint.weight, joint.needed
             ),
         };
@@ -280,7 +280,7 @@ fn drives(t: &mut String, draft: &Draft) -> std::fmt::Result {
     Ok(())
 }
 
-/// The sample motion.
+/// Returns the sample motion file.
 pub(crate) fn motion_file(draft: &Draft) -> String {
     let mut t = String::new();
     let _ = write_motion(&mut t, draft);
@@ -305,13 +305,15 @@ fn write_motion(t: &mut String, draft: &Draft) -> std::fmt::Result {
     )?;
     writeln!(
         t,
-        "# Within the limits of position and speed (60 % of it at most), and of effort where there are sensible ones."
+        "# Within the position limits, at most 60 % of the speed limits, and within the effort limits that are \
+         plausible."
     )?;
     writeln!(
         t,
-        "# Nothing is known of the surroundings, and links are not kept from each other: look at it before a real arm moves so."
+        "# Collisions with the surroundings and between links are not checked: review the motion before using it \
+         on a real arm."
     )?;
-    writeln!(t, "# Every key: flexarm format motion. Against the limits: flexarm motion motion.toml robot.toml")?;
+    writeln!(t, "# All keys: flexarm format motion. Check against the limits: flexarm motion motion.toml robot.toml")?;
     writeln!(t, "format = 1\nunit = \"deg\"")?;
     if !sliding.is_empty() {
         writeln!(t, "metres = [{}]", sliding.join(", "))?;
@@ -319,10 +321,10 @@ fn write_motion(t: &mut String, draft: &Draft) -> std::fmt::Result {
     writeln!(t, "joints = [{}]", names.join(", "))?;
     let rests = &draft.motion.rests;
     writeln!(t, "start = {}", values(&rests[0].at))?;
-    writeln!(t, "profile = \"quintic\"          # speed and acceleration without jumps")?;
+    writeln!(t, "profile = \"quintic\"          # continuous speed and acceleration")?;
     let assumed: Vec<_> = draft.joints.iter().filter(|j| j.speed_assumed).collect();
     if !assumed.is_empty() {
-        writeln!(t, "\n# ASSUMED: the description has no speed limits for these.\n[limits]")?;
+        writeln!(t, "\n# ASSUMED: the description has no speed limits for these joints.\n[limits]")?;
         for joint in assumed {
             let value =
                 if joint.joint.kind.slides() { float(joint.speed, 4) } else { float(joint.speed.to_degrees(), 1) };
@@ -331,19 +333,19 @@ fn write_motion(t: &mut String, draft: &Draft) -> std::fmt::Result {
     }
     let last = rests.len() - 1;
     for (k, rest) in rests.iter().enumerate().skip(1) {
-        let to = if k == last { "back to the start".to_owned() } else { format!("place {k}") };
+        let to = if k == last { "back to the start".to_owned() } else { format!("stop {k}") };
         writeln!(
             t,
             "\n[[move]]                      # {to}\nto = {}\nduration = {}",
             values(&rest.at),
             float(rest.duration, 1)
         )?;
-        writeln!(t, "hold = {}", if k == last { "1.0                    # to see it settle" } else { "0.5" })?;
+        writeln!(t, "hold = {}", if k == last { "1.0                    # to show the settling" } else { "0.5" })?;
     }
     Ok(())
 }
 
-/// What was found, what was assumed, what to measure next.
+/// Returns the README: findings, assumptions and next measurements.
 pub(crate) fn readme(draft: &Draft, placed: &Placed) -> String {
     let mut t = String::new();
     let _ = write_readme(&mut t, draft, placed);
@@ -355,12 +357,14 @@ fn write_readme(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Res
     writeln!(t, "# {}\n\nMade by `flexarm new`; {}.\n", markdown(&draft.name), markdown(&placed.words))?;
     writeln!(
         t,
-        "```sh\nflexarm compare .            # the arm beside its rigid twin on motion.toml\nflexarm check .              # what is wrong or doubtful"
+        "```sh\nflexarm compare .            # the arm against its rigid twin on motion.toml\n\
+         flexarm check .              # errors and doubtful values"
     )?;
     writeln!(t, "flexarm motion motion.toml . # the motion against the limits\n```\n\n## Found\n")?;
     writeln!(
         t,
-        "* The arm begins at {} and ends at the tool {}, {:.2} m from its first joint at most in the poses that were looked at.",
+        "* The arm starts at {} and ends at the tool {}, at most {:.2} m from its first joint in the poses that \
+         were examined.",
         markdown_code(&draft.chain.base),
         markdown_code(&draft.chain.tool),
         draft.reach
@@ -369,13 +373,14 @@ fn write_readme(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Res
     writeln!(t, "* Its joints: {}.", names.join(", "))?;
     let links: Vec<String> = draft.chain.path.iter().map(|k| markdown_code(&joint(k).child)).collect();
     writeln!(t, "* Its links after the base: {}.", links.join(", "))?;
-    writeln!(t, "* They weigh {:.2} kg together, without payload.", draft.moving_mass)?;
+    writeln!(t, "* Their total mass is {:.2} kg, without payload.", draft.moving_mass)?;
     for (joint, at, why) in &draft.held {
         writeln!(t, "* {} is held at {at}: {why}.", markdown_code(joint))?;
     }
     writeln!(
         t,
-        "\n| joint | effort limit | torque of weight | with speeding up | reducer, N m/rad | range |\n| --- | --- | --- | --- | --- | --- |"
+        "\n| joint | effort limit | gravity torque | torque in motion | reducer, N m/rad | range |\n\
+         | --- | --- | --- | --- | --- | --- |"
     )?;
     for j in &draft.joints {
         let effort = j.joint.limits.effort;
@@ -390,7 +395,8 @@ fn write_readme(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Res
     }
     writeln!(
         t,
-        "\nTorques in N m (forces in N), with payload, the largest over the workspace.\n\n| link | length, mm | mass, kg | section |\n| --- | --- | --- | --- |"
+        "\nTorques in N m (forces in N), with payload, maxima over the workspace.\n\n\
+         | link | length, mm | mass, kg | section |\n| --- | --- | --- | --- |"
     )?;
     for link in &draft.links {
         let section = match &link.section {
@@ -404,7 +410,7 @@ fn write_readme(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Res
     for a in &draft.assumptions {
         writeln!(t, "* {}: {}. Better: {}.", markdown(&a.about), markdown(&a.text), markdown(&a.mend))?;
     }
-    writeln!(t, "\n## What to ask of the maker, or to measure\n")?;
+    writeln!(t, "\n## To ask the manufacturer, or to measure\n")?;
     for question in &draft.questions {
         writeln!(t, "* {}.", markdown(question))?;
     }

@@ -1,5 +1,5 @@
-//! What is differentiated of joints under servos beside the rest: friction, gains, and what
-//! controllers know of the arm.
+//! Parameters of servo-controlled joints: friction, gains, and the controllers' knowledge of the
+//! arm.
 
 use flexarm_identify::{Effect, RunParameter};
 use flexarm_kinematics::{Model, SpatialInertia};
@@ -13,13 +13,13 @@ use flexarm_run::Error;
 use flexarm_run::Scenario;
 use flexarm_run::robot::PAYLOAD_LINK;
 
-/// Changes over which the gains that follow a mass (kg) or a joint (rad or m) are differenced: they
-/// are smooth, and nothing else is in it.
+/// Step sizes for the finite differences of gains by a mass (kg) or a joint position (rad or m);
+/// the gains are smooth functions of both.
 const MASS_STEP: f64 = 0.02;
 const JOINT_STEP: f64 = 2e-3;
 
-/// Adds friction and gains of the joints under servos, and to masses and motions what the
-/// controllers make of them.
+/// Adds friction and gains of servo-controlled joints, and accounts for the controllers' reaction
+/// to masses and motions.
 pub(super) fn add_controllers(arm: &Arm, scenario: &Scenario, all: &mut Vec<Named>) -> Result<(), Error> {
     let flexible = arm.flexible();
     if !flexible.has_servo() {
@@ -43,8 +43,8 @@ pub(super) fn add_controllers(arm: &Arm, scenario: &Scenario, all: &mut Vec<Name
     Ok(())
 }
 
-/// Makes of a mass or a motion one of which the controllers know: the rigid robot carries the mass
-/// too, and gains that the robot file leaves out fit the inertia at the start.
+/// Makes the controllers follow a mass or a motion parameter: the rigid model of the feed-forward
+/// carries the mass too, and gains not set in the robot file follow the inertia at the start.
 fn follow(arm: &Arm, named: &mut Named, start: &DVector<f64>) {
     let flexible = arm.flexible();
     let (mut fed_forward, gains) = (
@@ -74,28 +74,29 @@ fn follow(arm: &Arm, named: &mut Named, start: &DVector<f64>) {
     named.parameter = RunParameter::Followed { parameter, fed_forward, gains };
 }
 
-/// Servos that were at their limits in a run that was differentiated.
+/// Returns caveats about servos that reached their limits in a differentiated run.
 pub(super) fn limited(arm: &Arm, found: &RunSlopes) -> Vec<Caveat> {
     let joints: Vec<&str> = arm.joints().collect();
     let told = |own: &flexarm_stepping::TorqueLimited| {
         let joint = joints[own.coordinate];
         let text = format!(
-            "the servo of joint {joint:?} is at its torque limit in {} samples, first at {:.4} s: the derivatives hold as long as the same \
-             samples are; where another one is, its integral steps",
+            "the servo of joint {joint:?} is at its torque limit in {} samples, first at {:.4} s: the derivatives \
+             are valid as long as the same samples are saturated; if another sample saturates, the servo integral \
+             jumps",
             own.samples, own.first_s
         );
-        Caveat::said("servo-limit", format!("joint {joint:?}"), text, "slow the motion down where it is quickest")
+        Caveat::said("servo-limit", format!("joint {joint:?}"), text, "slow the motion down where it is fastest")
     };
     found.limited.iter().map(told).collect()
 }
-/// A kilogram at the payload of the rigid robot, and its body.
+/// Returns the body of the rigid robot's payload, and the inertia of a kilogram there.
 fn rigid_mass(rigid: &Model) -> Option<(usize, SpatialInertia)> {
     let frame = rigid.frame(PAYLOAD_LINK)?;
     let point = SpatialInertia { mass: 1.0, ..SpatialInertia::zeros() };
     Some((frame.body, point.at_parent(&frame.X_BF)))
 }
 
-/// A model with so many kilograms more.
+/// Returns a model with `kg` times the inertia `per_kg` added to a body.
 fn carrying(model: &Model, body: usize, per_kg: &SpatialInertia, kg: f64) -> Model {
     let mut inertia = model.bodies()[body].inertia;
     inertia += SpatialInertia {
@@ -106,7 +107,7 @@ fn carrying(model: &Model, body: usize, per_kg: &SpatialInertia, kg: f64) -> Mod
     model.with_inertia(body, inertia)
 }
 
-/// Numbers of the friction of a joint that are not zero, each per hundredth of itself.
+/// Returns the nonzero friction parameters of a joint, each per 1 % of its value.
 fn friction_of(arm: &FlexibleArm, coordinate: usize, joint: &str, slides: bool) -> Vec<Named> {
     let Some(law) = arm.friction.get(coordinate) else { return Vec::new() };
     let [torque, damping, speed] = if slides { ["N", "N s/m", "m/s"] } else { ["N m", "N m s/rad", "rad/s"] };
@@ -135,7 +136,7 @@ fn friction_of(arm: &FlexibleArm, coordinate: usize, joint: &str, slides: bool) 
     found
 }
 
-/// Gains of a servo that are not zero, and what it feeds forward, each per hundredth of itself.
+/// Returns the nonzero gains and the feed-forward of a servo, each per 1 % of its value.
 fn gains_of(axis: &ServoAxis, number: usize, joint: &str, slides: bool) -> Vec<Named> {
     let (damping, stiffness) = if slides { ("N s/m", "N/m") } else { ("N m s/rad", "N m/rad") };
     let ahead = f64::from(u8::from(axis.feed_forward));

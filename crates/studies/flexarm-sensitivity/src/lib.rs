@@ -1,8 +1,8 @@
-//! How the tool's error along a motion depends on every number of the robot: derivatives of the
-//! whole run, exact, for all of them at once.
+//! Sensitivity of the TCP error along a motion to all parameters of the robot: exact derivatives of
+//! the whole run, for all parameters at once.
 //!
-//! Start at [`sensitivity`], or at [`error_slopes`] for numbers alone; [`pose_sensitivity`] answers
-//! for a pose.
+//! Start at [`sensitivity`], or at [`error_slopes`] for numbers only; [`pose_sensitivity`] is the
+//! analysis at a pose.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
@@ -37,80 +37,80 @@ use controllers::{add_controllers, limited};
 
 pub use pose::{PoseParameter, PoseSensitivity, pose_sensitivity};
 
-/// Times nearer to the start than this are it (s).
+/// Time below which an event counts as at the start (s).
 const SAME_TIME: f64 = 1e-9;
 
-/// What is asked of [`sensitivity`].
+/// Input of [`sensitivity`].
 #[derive(Clone, Debug, Default)]
 pub struct SensitivityRequest {
-    /// How the run goes: modelling, generalised-alpha and its step, limits. Rates and pictures do
-    /// not count.
+    /// Run options: modelling, generalised-alpha and its step, limits. Rates and recordings are
+    /// ignored.
     pub run: RunOptions,
-    /// Names of what the error is differentiated by, * for anything; all without any.
+    /// Names of the parameters, with * as wildcard; empty for all.
     pub parameters: Vec<String>,
-    /// Table of the error and its derivatives over time (CSV).
+    /// Output table of the error and its derivatives over time (CSV).
     pub table: Option<PathBuf>,
-    /// Overwrite what is there.
+    /// Whether to overwrite existing files.
     pub overwrite: bool,
 }
 
-/// Answer of `flexarm sensitivity`.
+/// Result of `flexarm sensitivity`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Sensitivity {
-    /// The robot.
+    /// Name of the robot.
     pub robot: String,
-    /// The motion.
+    /// File of the motion.
     pub motion: String,
-    /// Step (s), and how many.
+    /// Step size (s).
     pub step_s: f64,
-    /// Steps taken.
+    /// Number of steps.
     pub steps: u64,
-    /// Largest distance of the tool from the rigid one's (m).
+    /// Maximum distance of the TCP from that of the rigid arm (m).
     pub peak_m: f64,
-    /// When (s).
+    /// Time of the maximum distance (s).
     pub t_peak_s: f64,
-    /// Root of its mean square (m).
+    /// RMS distance (m).
     pub rms_m: f64,
-    /// Largest angle (rad).
+    /// Maximum angle (rad).
     pub peak_rad: f64,
-    /// Root of its mean square (rad).
+    /// RMS angle (rad).
     pub rms_rad: f64,
-    /// One per number of the robot, its tool and its motion; what the RMS depends on most comes
-    /// first.
+    /// Sensitivities to the parameters of robot, tool and motion, in order of decreasing effect on
+    /// the RMS distance.
     pub parameters: Vec<ParameterSensitivity>,
-    /// Error and derivatives over time.
+    /// File with error and derivatives over time.
     pub table: Option<String>,
-    /// What the caveats warn of, as sentences.
+    /// Messages of the caveats.
     pub warnings: Vec<String>,
-    /// What is doubtful.
+    /// Caveats.
     pub caveats: Vec<Caveat>,
 }
 
-/// What a change of one number does to the error.
+/// Effect of a change of one parameter on the error.
 #[derive(Clone, Debug, Serialize)]
 pub struct ParameterSensitivity {
-    /// By the names of the robot file, of joints under servos `drive.JOINT.servo.` with their gains
-    /// and `drive.JOINT.friction.` too; `motion.JOINT` for a shift of a joint, `tcp.x`, `.y` and
-    /// `.z` for the place of the tool in its own axes.
+    /// Name as in the robot file; for servo-controlled joints also `drive.JOINT.servo.` with the
+    /// gains and `drive.JOINT.friction.`; `motion.JOINT` for a shift of a joint, `tcp.x`, `.y` and
+    /// `.z` for the position of the TCP in its own axes.
     pub name: String,
-    /// Its unit.
+    /// Unit of the parameter.
     pub unit: String,
-    /// Its value; 0 of a shift, 1 of what a servo feeds forward.
+    /// Value; 0 for a shift, 1 for an active feed-forward.
     pub value: f64,
-    /// Of which change of it the following are the effect: `1 %`, `1 % of the root of K_ii K_jj`,
-    /// `1 kg`, `1 mrad` or `1 mm`. They are derivatives, times that.
+    /// Change to which the following effects refer: `1 %`, `1 % of the root of K_ii K_jj`, `1 kg`,
+    /// `1 mrad` or `1 mm`. They are derivatives times that change.
     pub per: &'static str,
-    /// Of the largest distance, at the time where it is (m).
+    /// Effect on the maximum distance, at its time (m).
     pub peak_m: f64,
-    /// Of the RMS distance (m).
+    /// Effect on the RMS distance (m).
     pub rms_m: f64,
-    /// Of the largest angle (rad).
+    /// Effect on the maximum angle (rad).
     pub peak_rad: f64,
-    /// Of the RMS angle (rad).
+    /// Effect on the RMS angle (rad).
     pub rms_rad: f64,
 }
 
-/// A parameter with its name, and the change by which it is told.
+/// A parameter with its name, and the change for which results are reported.
 struct Named {
     name: String,
     unit: String,
@@ -120,16 +120,16 @@ struct Named {
     parameter: RunParameter,
 }
 
-/// Error of the tool along a run and its derivatives by parameters, side by side. No other stepper
-/// than generalised-alpha; iterations go on to the end, so that the run is a smooth function of all
-/// that goes into it.
+/// Computes the TCP error along a run and its derivatives by parameters, side by side. Only
+/// generalised-alpha is supported; its iterations are fully converged, so that the run is a smooth
+/// function of all inputs.
 ///
-/// Cost: of kr210 (18 elastic coordinates) about ten ordinary runs, and a quarter of one for each
-/// parameter. With closed loops or links in modes a hundred runs and more.
+/// Cost for kr210 (18 elastic coordinates): about ten ordinary runs, plus a quarter of one for each
+/// parameter. With closed loops or modal links a hundred runs and more.
 ///
 /// # Errors
-/// As [`Arm::simulate`]; [`Error::Step`] where the arm has what is not differentiated (links that
-/// stiffen under load, motions whose velocity jumps under servos).
+/// As [`Arm::simulate`]; [`Error::Step`] for features without derivatives (links with geometric
+/// stiffening, motions with velocity jumps under servos).
 pub fn error_slopes(
     arm: &Arm,
     scenario: impl Into<Scenario>,
@@ -148,8 +148,8 @@ fn slopes_and_caveats(
     keep_samples: bool,
 ) -> Result<(RunSlopes, Vec<Caveat>), Error> {
     let StepperKind::GeneralizedAlpha(settings) = options.stepper else {
-        let what = "another stepper than generalised-alpha";
-        let source = StepError::NoSlopes { what, mend: "take the default one" };
+        let what = "a stepper other than generalised-alpha";
+        let source = StepError::NoSlopes { what, mend: "use the default stepper" };
         return Err(Error::Step { source, partial: false });
     };
     runnable(&scenario.motion, options)?;
@@ -174,22 +174,22 @@ fn slopes_and_caveats(
     Ok((found, caveats))
 }
 
-/// Numbers of the arm by which is differentiated: entries of matrices, of which there are many,
-/// only by their names.
+/// Returns the differentiable parameters of the arm; matrix entries, which are many, only if
+/// requested by name.
 fn numbers(arm: &Arm, asked: &[String]) -> Vec<Parameter> {
     let entries = link_entries(arm).into_iter();
     let entries = entries.filter(|own| asked.iter().any(|pattern| asks_for(pattern, &own.name)));
     parameters(arm).into_iter().chain(link_directions(arm)).chain(entries).collect()
 }
 
-/// All numbers by which the error along a motion is differentiated.
+/// Returns all parameters by which the error along a motion is differentiated.
 fn run_parameters(arm: &Arm, scenario: &Scenario, asked: &[String]) -> Result<Vec<Named>, Error> {
     let of_arm = |parameter: Parameter| {
         let (per, scale) = change_of(&parameter);
         let Parameter { name, unit, initial: value, .. } = parameter.clone();
         Named { name, unit, value, per, scale, parameter: RunParameter::Arm(parameter) }
     };
-    // What another payload takes the place of at the start does nothing.
+    // A payload replaced at the start has no effect.
     let gone = scenario.payloads.iter().any(|payload| payload.at_s <= SAME_TIME);
     let there = |own: &Parameter| !(gone && matches!(own.effect, Effect::Mass { .. }));
     let mut all: Vec<Named> = numbers(arm, asked).into_iter().filter(there).map(of_arm).collect();
@@ -209,12 +209,12 @@ fn run_parameters(arm: &Arm, scenario: &Scenario, asked: &[String]) -> Result<Ve
     add_controllers(arm, scenario, &mut all)?;
     Ok(all)
 }
-/// How the tool's error along a motion depends on every number of the robot: stiffness and damping
-/// of gearboxes and links, masses, the tool's place, the joints of the motion; of joints under
-/// servos their friction and gains.
+/// Computes the sensitivity of the TCP error along a motion to all parameters of the robot:
+/// stiffness and damping of gearboxes and links, masses, the TCP position, the joints of the
+/// motion; friction and gains of servo-controlled joints.
 ///
 /// # Errors
-/// As [`error_slopes`]; [`Error::Value`] for a name that fits nothing, [`Error::File`] and
+/// As [`error_slopes`]; [`Error::Value`] for a name that matches nothing, [`Error::File`] and
 /// [`Error::Write`] for the table.
 pub fn sensitivity(
     robot: &Robot,
@@ -262,7 +262,7 @@ pub fn sensitivity(
     })
 }
 
-/// Those of these names, all without any.
+/// Returns the entries whose names match a pattern, all without patterns.
 fn chosen<T>(mut all: Vec<T>, patterns: &[String], name: impl Fn(&T) -> &str) -> Result<Vec<T>, Error> {
     for pattern in patterns {
         if !all.iter().any(|own| fits(pattern, name(own))) {
@@ -274,8 +274,8 @@ fn chosen<T>(mut all: Vec<T>, patterns: &[String], name: impl Fn(&T) -> &str) ->
     Ok(all)
 }
 
-/// The change by which a parameter of the arm is told, as words and in its coordinate of the
-/// search.
+/// Returns the change for which results of a parameter of the arm are reported, as text and in its
+/// estimation coordinate.
 fn change_of(parameter: &Parameter) -> (&'static str, f64) {
     match parameter.effect {
         Effect::Entry { size, .. } => ("1 % of the root of K_ii K_jj", 0.01 * size),
@@ -284,8 +284,8 @@ fn change_of(parameter: &Parameter) -> (&'static str, f64) {
     }
 }
 
-/// Error and derivatives after every step: six columns of each, world axes, m and rad, for the
-/// changes by which parameters are told.
+/// Returns the table of error and derivatives after every step: six columns each, world axes, m and
+/// rad, for the reported changes of the parameters.
 fn table(named: &[Named], found: &RunSlopes) -> String {
     const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
     let mut text = String::from("time_s");

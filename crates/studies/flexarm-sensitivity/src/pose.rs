@@ -1,5 +1,4 @@
-//! What the numbers of the robot do to the tool at rest, its compliance and the natural frequencies
-//! at a pose.
+//! Sensitivity of the static TCP pose, the compliance and the natural frequencies at a pose.
 
 use flexarm_identify::{Effect, compliance_slopes, frequency_slopes, plant, tool_slopes};
 use flexarm_kinematics::{Pose, Wrench};
@@ -19,58 +18,58 @@ use flexarm_run::inspect::joint_values;
 
 use super::{change_of, chosen, numbers};
 
-/// Answer of `flexarm sensitivity --at`: drives locked, world axes, under the robot's own weight.
+/// Result of `flexarm sensitivity --at`: drives locked, world axes, under gravity.
 #[derive(Clone, Debug, Serialize)]
 pub struct PoseSensitivity {
-    /// The robot.
+    /// Name of the robot.
     pub robot: String,
     /// Joints, in coordinate order.
     pub joints: Vec<String>,
-    /// Where they are held (rad or m).
+    /// Positions at which they are held (rad or m).
     pub at: Vec<f64>,
-    /// Compliance of the tool, displacement (m, rad) per force (N) and moment (N m), 6×6.
+    /// Compliance at the TCP, displacement (m, rad) per force (N) and moment (N m), 6×6.
     pub compliance: [[f64; 6]; 6],
     /// Natural frequencies (Hz).
     pub frequencies_hz: Vec<f64>,
-    /// One per number of the robot.
+    /// Sensitivities to the parameters of the robot.
     pub parameters: Vec<PoseParameter>,
-    /// What the caveats warn of, as sentences.
+    /// Messages of the caveats.
     pub warnings: Vec<String>,
-    /// What is doubtful.
+    /// Caveats.
     pub caveats: Vec<Caveat>,
 }
 
-/// What a change of one number does.
+/// Effect of a change of one parameter.
 #[derive(Clone, Debug, Serialize)]
 pub struct PoseParameter {
-    /// By the names of the robot file; `tcp.x`, `.y` and `.z` for the place of the tool in its own
+    /// Name as in the robot file; `tcp.x`, `.y` and `.z` for the position of the TCP in its own
     /// axes.
     pub name: String,
-    /// Its unit.
+    /// Unit of the parameter.
     pub unit: String,
-    /// Its value.
+    /// Value of the parameter.
     pub value: f64,
-    /// Of which change of it the following are the effect: `1 %`, `1 % of the root of K_ii K_jj`,
-    /// `1 kg` or `1 mm`. They are derivatives, times that.
+    /// Change to which the following effects refer: `1 %`, `1 % of the root of K_ii K_jj`, `1 kg`
+    /// or `1 mm`. They are derivatives times that change.
     pub per: &'static str,
-    /// Of the tool's place (m).
+    /// Effect on the TCP position (m).
     pub tcp_m: [f64; 3],
-    /// Of its attitude, a rotation vector (rad).
+    /// Effect on the TCP orientation, as a rotation vector (rad).
     pub tcp_rad: [f64; 3],
-    /// Of the compliance.
+    /// Effect on the compliance.
     pub compliance: [[f64; 6]; 6],
-    /// Of the natural frequencies (Hz).
+    /// Effect on the natural frequencies (Hz).
     pub frequencies_hz: Vec<f64>,
 }
 
-/// What the numbers of the robot do at a pose: tool at rest under the arm's weight, its compliance,
-/// natural frequencies; drives locked.
+/// Computes the sensitivity to the parameters of the robot at a pose: of the static TCP pose under
+/// gravity, the compliance and the natural frequencies, with drives locked.
 ///
-/// * `at`: all actuated joints (rad or m), zero without it; `parameters`: names, * for anything,
-///   all without any.
+/// * `at`: positions of all actuated joints (rad or m); default zero.
+/// * `parameters`: names, with * as wildcard; empty for all.
 ///
 /// # Errors
-/// [`Error::Value`] for a name that fits nothing, [`Error::Step`] where there is no equilibrium.
+/// [`Error::Value`] for a name that matches nothing, [`Error::Step`] if there is no equilibrium.
 pub fn pose_sensitivity(
     robot: &Robot,
     modelling: Modelling,
@@ -90,10 +89,10 @@ pub fn pose_sensitivity(
     slopes(robot, &arm, joints, at, chosen(all, parameters, Asked::name)?)
 }
 
-/// What is asked for.
+/// A requested parameter.
 enum Asked {
     Arm(Parameter),
-    /// The tool's point along one of its axes.
+    /// Position of the TCP along one of its axes.
     Tool(usize),
 }
 
@@ -106,8 +105,8 @@ impl Asked {
     }
 }
 
-/// What moving the tool's point by 1 mm along one of its axes does, with `a` that axis in the
-/// world. The arm stands as it does:
+/// Returns the effect of moving the TCP by 1 mm along one of its axes, with `a` that axis in the
+/// world. The pose of the arm does not change:
 ///
 /// ```text
 /// J' = X' J,   C' = X' C + C X'ᵀ,   X' = [0 -[a]x; 0 0]

@@ -1,7 +1,8 @@
-//! Tables of results as Parquet files.
+//! Result tables as Parquet files.
 //!
-//! A number or text that is missing is null in the file; a NaN is missing. The same table gives the
-//! same bytes on any machine: rows go into groups of [`GROUP`], nothing depends on the clock.
+//! Missing numbers and texts are null in the file; NaN counts as missing. The same table gives the
+//! same bytes on any machine: rows are written in groups of [`GROUP`], and nothing depends on the
+//! clock.
 
 use std::fs::File;
 use std::path::Path;
@@ -23,7 +24,7 @@ use crate::whole_file::WholeFile;
 use crate::{CreateOptions, LogError};
 
 use super::{DataColumn, DataTable, DataValues};
-/// Rows of a group.
+/// Number of rows per row group.
 const GROUP: usize = 65_536;
 
 impl DataValues {
@@ -42,7 +43,7 @@ impl DataValues {
         }
     }
 
-    /// Writes some rows as the next column of a group.
+    /// Writes a range of rows as the next column of a row group.
     fn write(
         &self,
         group: &mut SerializedRowGroupWriter<'_, File>,
@@ -72,10 +73,11 @@ impl DataValues {
 }
 
 impl DataTable {
-    /// Writes it as a Parquet file that is there whole, on the disk, or not at all.
+    /// Writes the table as a Parquet file, atomically: either the whole file is on the disk or
+    /// none.
     ///
     /// # Errors
-    /// [`LogError`]: the file is there already and may not be replaced; what the system says.
+    /// [`LogError`] if the file exists and may not be replaced, or on an I/O error.
     pub fn write(&self, path: &Path, options: CreateOptions) -> Result<(), LogError> {
         const ACTION: &str = "write the table";
         let (file, mut whole) = WholeFile::create(path, options)?;
@@ -95,7 +97,8 @@ impl DataTable {
             .set_max_row_group_row_count(None);
         for column in self.columns.iter().filter(|column| matches!(column.values, DataValues::Number(_))) {
             let place = parquet::schema::types::ColumnPath::from(column.name.as_str());
-            // Hardly a number comes twice: sorted by significance they become small.
+            // Numbers rarely repeat, so a dictionary does not help; grouping bytes by significance
+            // compresses better.
             properties = properties
                 .set_column_dictionary_enabled(place.clone(), false)
                 .set_column_encoding(place, Encoding::BYTE_STREAM_SPLIT);
@@ -115,10 +118,11 @@ impl DataTable {
         writer.into_inner()
     }
 
-    /// Reads a table that [`DataTable::write`] wrote.
+    /// Reads a table written by [`DataTable::write`].
     ///
     /// # Errors
-    /// [`LogError::Io`]; [`LogError::NotARecording`] for what is no such table.
+    /// [`LogError::Io`] if the file cannot be read, [`LogError::NotARecording`] if it is not such a
+    /// table.
     pub fn read(path: &Path) -> Result<Self, LogError> {
         let file = File::open(path).map_err(LogError::io(path, "open the table"))?;
         parquet_table::read(path, || {
@@ -160,7 +164,7 @@ impl DataTable {
     }
 }
 
-/// The values of a column in all groups.
+/// Reads the values of a column from all row groups.
 fn values<T: DataType>(reader: &SerializedFileReader<File>, place: usize) -> Result<Vec<Option<T::T>>, ParquetError> {
     let mut all = Vec::new();
     for number in 0..reader.num_row_groups() {

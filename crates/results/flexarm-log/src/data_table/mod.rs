@@ -1,7 +1,6 @@
-//! Tables of results that are no recording of a run: whole numbers, numbers and texts in columns
-//! with names.
+//! Result tables other than recordings of a run: named columns of integers, numbers and texts.
 //!
-//! Written and read as Parquet (`data_table/file.rs`), in builds that have it.
+//! They are written and read as Parquet (`data_table/file.rs`) in builds with that feature.
 
 #[cfg(feature = "parquet")]
 mod file;
@@ -9,34 +8,34 @@ mod file;
 /// Values of a column.
 #[derive(Clone, Debug, PartialEq)]
 pub enum DataValues {
-    /// Whole numbers, none missing.
+    /// Integers, none missing.
     Whole(Vec<i64>),
-    /// Numbers; NaN are missing.
+    /// Numbers; NaN marks a missing value.
     Number(Vec<f64>),
-    /// Texts.
+    /// Texts; `None` marks a missing value.
     Text(Vec<Option<String>>),
 }
 
-/// A column with its name.
+/// A named column.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DataColumn {
-    /// Its name.
+    /// Name of the column.
     pub name: String,
-    /// Its values.
+    /// Values of the column.
     pub values: DataValues,
 }
 
-/// A table: columns of equal length, and texts about it all.
+/// A table: columns of equal length, and texts that describe the whole table.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DataTable {
     /// The columns.
     pub columns: Vec<DataColumn>,
-    /// Texts by key.
+    /// Texts as pairs of key and value.
     pub texts: Vec<(String, String)>,
 }
 
 impl DataColumn {
-    /// A column.
+    /// Creates a column.
     pub fn new(name: impl Into<String>, values: DataValues) -> Self {
         Self { name: name.into(), values }
     }
@@ -52,19 +51,19 @@ impl DataValues {
         }
     }
 
-    /// Whether there are none.
+    /// Whether there are no values.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 }
 
 impl DataTable {
-    /// Number of rows: the columns are equally long.
+    /// Number of rows, the length of every column.
     pub fn rows(&self) -> usize {
         self.columns.first().map_or(0, |column| column.values.len())
     }
 
-    /// The column of a name.
+    /// Returns the values of the column with this name.
     pub fn column(&self, name: &str) -> Option<&DataValues> {
         self.columns.iter().find(|column| column.name == name).map(|column| &column.values)
     }

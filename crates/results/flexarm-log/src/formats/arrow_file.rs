@@ -1,8 +1,8 @@
 //! The table of a run as an Arrow IPC file (Feather, version 2), written and read: the columns of
-//! the CSV as `double`, the header and the result beside them.
+//! the CSV as `double`, with the header and the result as metadata.
 //!
-//! Numbers lie in the file as they do in memory, uncompressed: pyarrow, polars and DuckDB map it
-//! instead of reading it. Start at [`ArrowRecorder`].
+//! Numbers are stored uncompressed with the layout they have in memory, so pyarrow, polars and
+//! DuckDB can map the file instead of reading it. Start at [`ArrowRecorder`].
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -25,37 +25,36 @@ use crate::read::wall::caught;
 use crate::whole_file::WholeFile;
 use crate::{CreateOptions, LogError, RunHeader, RunResult, Sample, table};
 
-/// First and last bytes of a file.
+/// Magic bytes at the start and the end of a file.
 const MAGIC: &[u8; 6] = b"ARROW1";
-/// Where the first message begins: numbers lie on multiples of this.
+/// Offset of the first message (bytes); numbers are aligned to multiples of it.
 const START: usize = 64;
-/// Marks a message; with a length of zero, that none follows.
+/// Start of a message; followed by a length of zero it marks the end of the stream.
 const CONTINUATION: [u8; 4] = [0xff; 4];
 
-/// Writes a run as an Arrow IPC file, which is also called Feather, version 2.
+/// Writes a run as an Arrow IPC file, also called Feather, version 2.
 ///
 /// Columns are those of [`crate::CsvRecorder`], all `double` without missing values, in record
-/// batches of at most 16,384 rows, not compressed. The metadata of the schema say what a table has
-/// no column for, under the keys of `ParquetRecorder`'s. They are in the footer; the copy of the
-/// schema at the start of the file, which streaming readers take, lacks what is known only at the
+/// batches of at most 16,384 rows, uncompressed. Everything without a column is in the metadata of
+/// the schema, under the keys of `ParquetRecorder`. The footer has all of it; the copy of the
+/// schema at the start of the file, which streaming readers use, lacks what is known only at the
 /// end of the run.
 ///
-/// As a Parquet file it comes into being under the name `<file>.partial` and is renamed by
-/// `finish`.
+/// Like a Parquet file it is written under the name `<file>.partial` and renamed by `finish`.
 pub type ArrowRecorder = FileRecorder<ArrowFile>;
 
 /// An Arrow file that is being written.
 #[derive(Debug)]
 pub struct ArrowFile {
-    /// None once it is closed.
+    /// None once closed.
     file: Option<File>,
     whole: WholeFile,
     schema: SchemaRef,
-    /// The open record batch.
+    /// Samples of the open record batch.
     block: Block,
-    /// Those in the file.
+    /// Record batches in the file.
     batches: Vec<arrow_ipc::Block>,
-    /// Length of the file.
+    /// Length of the file (bytes).
     length: usize,
 }
 
@@ -102,7 +101,7 @@ impl OpenFile for ArrowFile {
 }
 
 impl ArrowFile {
-    /// Appends a message; returns where it begins and how long its description and its numbers are.
+    /// Appends a message; returns its offset and the lengths of its metadata and body.
     fn message(&mut self, message: EncodedData) -> Result<arrow_ipc::Block, ArrowError> {
         let Some(file) = &mut self.file else { return Ok(arrow_ipc::Block::default()) };
         let (description, numbers) = write_message(file, message, &IpcWriteOptions::default())?;
@@ -111,7 +110,7 @@ impl ArrowFile {
         Ok(place)
     }
 
-    /// Writes the samples that wait as a record batch.
+    /// Writes the waiting samples as a record batch.
     fn close_batch(&mut self) -> Result<(), ArrowError> {
         let numbers = |column: &mut Vec<f64>| Arc::new(Float64Array::from(std::mem::take(column))) as ArrayRef;
         let columns = self.block.columns.iter_mut().map(numbers).collect();
@@ -127,14 +126,14 @@ impl ArrowFile {
         Ok(())
     }
 
-    /// What follows the last record batch: the footer with the schema, all its texts, and the
-    /// places of the batches.
+    /// Returns the bytes that follow the last record batch: the footer with the schema, all texts,
+    /// and the places of the batches.
     fn end(&self, result: &RunResult) -> Vec<u8> {
         let mut texts = self.schema.metadata().clone();
         texts.extend(texts_at_end(result));
         let schema = self.schema.as_ref().clone().with_metadata(texts);
 
-        // A builder as the library makes it, emptied again.
+        // The encoder returns its builder finished; reset it to build the footer.
         let mut footer = IpcSchemaEncoder::new().schema_to_fb(&Schema::empty());
         footer.reset();
         let dictionaries = footer.create_vector::<arrow_ipc::Block>(&[]);
@@ -161,7 +160,7 @@ fn arrow_error(path: &Path, action: &'static str) -> impl FnOnce(ArrowError) -> 
     }
 }
 
-/// A run from an Arrow file.
+/// A run read from an Arrow file.
 pub(crate) type ArrowRun = TableRun<Batches>;
 
 impl ArrowRun {
@@ -183,7 +182,7 @@ impl ArrowRun {
     }
 }
 
-/// The bytes of a file's footer; none if it is no whole file.
+/// Reads the bytes of a file's footer; `None` if the file is incomplete.
 fn footer(file: &mut File) -> io::Result<Option<Vec<u8>>> {
     let mut end = [0; 10];
     let length = file.metadata()?.len();
@@ -199,7 +198,7 @@ fn footer(file: &mut File) -> io::Result<Option<Vec<u8>>> {
     Ok(Some(footer))
 }
 
-/// The record batches of a file.
+/// Record batches of a file.
 #[derive(Debug)]
 pub(crate) struct Batches {
     file: File,
@@ -210,7 +209,8 @@ pub(crate) struct Batches {
 }
 
 impl Batches {
-    /// As a footer lists them, with the texts beside the table, sorted by key.
+    /// Reads the list of batches from a footer; also returns the texts of the schema, sorted by
+    /// key.
     fn of(file: File, footer: &[u8]) -> Result<(Self, Vec<(String, String)>), String> {
         let footer = root_as_footer(footer).map_err(|error| error.to_string())?;
         let schema = fb_to_schema(footer.schema().ok_or("its footer has no schema")?);
@@ -221,13 +221,13 @@ impl Batches {
         Ok((Self { file, length, schema: Arc::new(schema), version: footer.version(), places }, texts))
     }
 
-    /// The bytes of a record batch; none if they are not in the file.
+    /// Reads the bytes of a record batch; `None` if they are not within the file.
     fn bytes(&self, place: &arrow_ipc::Block) -> io::Result<Option<Vec<u8>>> {
         let size = |length: i64| u64::try_from(length).ok();
         let start_and_length = || {
             let length = size(place.metaDataLength().into())?.checked_add(size(place.bodyLength())?)?;
             let start = size(place.offset())?;
-            // Nothing is allocated that a file only claims to have.
+            // Check against the file length before allocating.
             (start.checked_add(length)? <= self.length).then_some((start, length))
         };
         let Some((start, length)) = start_and_length() else { return Ok(None) };
@@ -238,7 +238,7 @@ impl Batches {
         Ok(Some(bytes))
     }
 
-    /// Some columns of a record batch.
+    /// Decodes the given columns of a record batch.
     fn batch(&self, place: &arrow_ipc::Block, bytes: Vec<u8>, columns: &[usize]) -> Result<RecordBatch, String> {
         let message = root_as_message(bytes.get(8..).ok_or("a record batch is cut off")?);
         let message = message.map_err(|error| error.to_string())?;
@@ -273,7 +273,7 @@ impl Blocks for Batches {
     }
 }
 
-/// Calls the library, which may panic on a damaged file.
+/// Calls the Arrow library, which may panic on a damaged file.
 fn decoded<T>(path: &Path, decode: impl FnOnce() -> Result<T, String>) -> Result<T, LogError> {
     caught(decode).and_then(|result| result).map_err(|cause| damaged(path, &cause))
 }

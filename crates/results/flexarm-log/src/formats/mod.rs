@@ -1,16 +1,15 @@
-//! The formats of recordings: a row of [`FORMATS`] each, and nothing about a format is said
-//! anywhere else.
+//! Formats of recordings: one row of [`FORMATS`] each, the only place with facts about a format.
 //!
-//! A format is its module and its row. From the row come the files of a run, the words of
-//! `convert`, what reports look for, the keys of summaries and the flags of the command line. Start
-//! at [`RecordingFormat`]; [`open_recording`] is the way back.
+//! A format is its module and its row. The row determines the files of a run, the words of
+//! `convert`, the files that reports look for, the keys of summaries and the flags of the command
+//! line. Start at [`RecordingFormat`]; [`open_recording`] reads a recording back.
 //!
-//! | format | what comes back |
+//! | format | contents read back |
 //! | --- | --- |
-//! | MCAP | everything; numbers exactly, poses of links to 1e-13 (they are stored as quaternions from link to link) |
+//! | MCAP | everything; numbers exactly, poses of links to 1e-13 (stored as quaternions from link to link) |
 //! | Parquet, Arrow | the numbers of the columns exactly; names, set-up, result and events; no poses of links, no velocities |
-//! | CSV | the numbers of the columns exactly (times to 1 ns once they went through MCAP); no poses, velocities, result, nor names of robot and trajectory |
-//! | .rrd | nothing: it is for viewing |
+//! | CSV | the numbers of the columns exactly (times to 1 ns once converted through MCAP); no poses, velocities, result, nor names of robot and trajectory |
+//! | .rrd | nothing; for viewing only |
 
 #[cfg(feature = "arrow")]
 mod arrow_file;
@@ -39,8 +38,8 @@ pub enum RecordingFormat {
     Arrow,
 }
 
-/// The module of a format, if this build has its feature: its recorder and, where it is read back,
-/// its reader.
+/// Recorder and, if the format can be read back, reader of a format; `None` if this build lacks its
+/// feature.
 macro_rules! code {
     ($recorder:ty) => {
         Some(Code { recorder: |path, options| Box::new(<$recorder>::create(path, options)), reader: None })
@@ -139,51 +138,51 @@ const FORMATS: &[FormatInfo] = &[
     },
 ];
 
-/// What there is to know of a format: its row in the table of formats.
+/// Facts about a format: its row in the table of formats.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct FormatInfo {
-    /// Which one it is.
+    /// The format.
     pub format: RecordingFormat,
-    /// What people call it.
+    /// Common name.
     pub name: &'static str,
-    /// Ending of file names, without the dot; also its word on command lines and its key in
+    /// File name extension, without the dot; also the word on command lines and the key in
     /// summaries.
     pub extension: &'static str,
-    /// Endings that are understood besides.
+    /// Other accepted extensions.
     pub other_extensions: &'static [&'static str],
-    /// Name of its file in the folder of a run.
+    /// File name in the folder of a run.
     pub file_name: &'static str,
-    /// First bytes of every file; none for text.
+    /// First bytes of every file; empty for text.
     pub magic: &'static [u8],
-    /// How much of a run it holds.
+    /// Extent of the data that it holds.
     pub holds: Holds,
-    /// Whether a run writes it without being asked to.
+    /// Whether a run writes it by default.
     pub by_default: bool,
-    /// Feature of this crate that brings it; every build has one without.
+    /// Feature of this crate that enables it; `None` if it is always available.
     pub feature: Option<&'static str>,
-    /// Whether what a killed run leaves can be read; otherwise the file is there whole or not at
-    /// all.
+    /// Whether the file of a killed run can be read; otherwise there is either a complete file or
+    /// none.
     pub survives_a_kill: bool,
-    /// Most samples that a file can hold.
+    /// Maximum number of samples in a file.
     pub most_samples: Option<u64>,
-    /// Latest time of a sample that a file can hold (s), for a run that begins at
+    /// Maximum time of a sample (s), for a run that begins at
     /// [`crate::START_NS`].
     pub latest_s: Option<f64>,
     code: Option<Code>,
 }
 
-/// How much of a run a format holds, most first.
+/// Extent of the data that a format holds, from most to least.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Holds {
-    /// Every number of every sample, poses (of links at most 200 a second), surfaces, and what is
-    /// said about the run.
+    /// Every number of every sample, poses (of links at most 200 per second), surfaces, and the
+    /// description of the run.
     Everything,
     /// A table of scalars with names, set-up, result and events.
     DescribedTable,
-    /// A table of scalars alone.
+    /// A table of scalars only.
     Table,
-    /// Curves, and pictures in single precision.
+    /// Curves, and poses in single precision.
     Pictures,
 }
 
@@ -195,16 +194,16 @@ impl Holds {
 
 type Reader = fn(&Path) -> Result<Box<dyn RunSource>, LogError>;
 
-/// How files of a format are opened.
+/// Functions that open files of a format.
 #[derive(Clone, Copy, Debug)]
 struct Code {
     recorder: fn(PathBuf, CreateOptions) -> Box<dyn Recorder>,
-    /// None for formats that are only written.
+    /// None for write-only formats.
     reader: Option<Reader>,
 }
 
 impl RecordingFormat {
-    /// All of them.
+    /// All formats.
     pub const ALL: [Self; FORMATS.len()] = {
         let mut all = [Self::Mcap; FORMATS.len()];
         let mut k = 0;
@@ -215,25 +214,25 @@ impl RecordingFormat {
         all
     };
 
-    /// What there is to know of it.
+    /// Returns the facts about the format.
     #[must_use]
     pub fn info(self) -> &'static FormatInfo {
         &FORMATS[self as usize]
     }
 
-    /// The ending of file names, without the dot.
+    /// Returns the file name extension, without the dot.
     #[must_use]
     pub fn extension(self) -> &'static str {
         self.info().extension
     }
 
-    /// The format that the ending of a file name says.
+    /// Returns the format of a file according to its extension.
     #[must_use]
     pub fn from_path(path: &Path) -> Option<Self> {
         Self::from_word(path.extension()?.to_str()?)
     }
 
-    /// The format with this ending, in small or capital letters.
+    /// Returns the format with this extension, ignoring case.
     #[must_use]
     pub fn from_word(word: &str) -> Option<Self> {
         let word = word.to_ascii_lowercase();
@@ -241,7 +240,7 @@ impl RecordingFormat {
         FORMATS.iter().find(has).map(|info| info.format)
     }
 
-    /// Returns the formats that are read back; those that hold most come first.
+    /// Returns the formats that are read back, in the order of decreasing contents.
     #[must_use]
     pub fn read_back() -> Vec<Self> {
         let mut formats: Vec<Self> = Self::ALL.into_iter().filter(|format| format.is_read_back()).collect();
@@ -255,7 +254,7 @@ impl RecordingFormat {
         self.info().holds != Holds::Pictures
     }
 
-    /// Whether this build can write it and, where it is read back, read it.
+    /// Whether this build can write the format and, if it is read back, read it.
     #[must_use]
     pub fn is_built_in(self) -> bool {
         self.info().code.is_some()
@@ -267,14 +266,14 @@ impl RecordingFormat {
         self.info().holds.is_table()
     }
 
-    /// A recorder that will write `path`; none if this build cannot
+    /// Creates a recorder for `path`; `None` if the format is not in this build
     /// ([`RecordingFormat::is_built_in`]).
     #[must_use]
     pub fn recorder(self, path: impl Into<PathBuf>, options: CreateOptions) -> Option<Box<dyn Recorder>> {
         self.info().code.map(|code| (code.recorder)(path.into(), options))
     }
 
-    /// What is lost on the way from this format to another by their nature, as sentences.
+    /// Returns, as sentences, what a conversion from this format to another loses by their nature.
     #[must_use]
     pub fn lost_on_the_way_to(self, to: Self, header: &RunHeader) -> Vec<String> {
         let (here, there) = (self.info().holds, to.info().holds);

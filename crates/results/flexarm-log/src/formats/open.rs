@@ -1,4 +1,4 @@
-//! A file that is to be a recording: is it what its name says, and who reads it.
+//! Opens a recording: checks that the file is in the expected format and picks its reader.
 
 use std::io::Read;
 use std::path::Path;
@@ -8,11 +8,11 @@ use flexarm_settings::Setting;
 use super::RecordingFormat;
 use crate::{LogError, RunSource};
 
-/// Opens a recording of flexarm and reads what it says about the run as a whole.
+/// Opens a recording of flexarm and reads its header.
 ///
 /// # Errors
-/// [`LogError::Io`] if it cannot be read, [`LogError::NotARecording`] if it is something else, of a
-/// format that is only written, or of one that this build has no feature for.
+/// [`LogError::Io`] if the file cannot be read, [`LogError::NotARecording`] if it is something
+/// else, of a write-only format, or of a format that this build has no feature for.
 pub fn open_recording(path: &Path, format: RecordingFormat) -> Result<Box<dyn RunSource>, LogError> {
     check_kind(path, format)?;
     match format.info().code {
@@ -32,7 +32,7 @@ pub fn open_recording(path: &Path, format: RecordingFormat) -> Result<Box<dyn Ru
     }
 }
 
-/// Looks at the first bytes, so that a file under a wrong name is called what it is.
+/// Checks the first bytes, so that a wrongly named file is reported as what it is.
 fn check_kind(path: &Path, expected: RecordingFormat) -> Result<(), LogError> {
     let refuse = |found: &str, mend: String| {
         let (found, expected) = (found.to_owned(), format!("a recording of flexarm in the format {expected}"));
@@ -42,7 +42,7 @@ fn check_kind(path: &Path, expected: RecordingFormat) -> Result<(), LogError> {
         let inside = path.join(expected.info().file_name);
         return refuse("a folder", format!("give a file in it, such as {}", inside.display()));
     }
-    // A device might never end, a pipe never begin.
+    // Reading a device may never end, opening a pipe may block.
     if path.exists() && !path.is_file() {
         return refuse("what is not a file", "write it to a file first".into());
     }
@@ -78,7 +78,7 @@ fn check_kind(path: &Path, expected: RecordingFormat) -> Result<(), LogError> {
     }
 }
 
-/// UTF-8, perhaps with a character cut at the end.
+/// Whether text is valid UTF-8, apart from a character cut at the end.
 trait OkOrCut {
     fn is_ok_or_cut(&self) -> bool;
 }

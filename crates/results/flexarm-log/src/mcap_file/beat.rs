@@ -1,7 +1,7 @@
-//! What is sent less often than samples come.
+//! Rate limiter for messages sent less often than samples arrive.
 
-/// Says yes to the first sample of every interval of simulated time, so never more often than its
-/// rate on average.
+/// Selects the first sample of every interval of simulated time; the average rate never exceeds
+/// `hz`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Beat {
     hz: u32,
@@ -13,7 +13,7 @@ impl Beat {
         Self { hz, last: None }
     }
 
-    /// Whether the sample at this time since the start (ns) is one to send.
+    /// Whether to send the sample at this time since the start (ns).
     pub(crate) fn due(&mut self, since_start_ns: u64) -> bool {
         let interval = u128::from(since_start_ns) * u128::from(self.hz) / 1_000_000_000;
         let interval = u64::try_from(interval).unwrap_or(u64::MAX);

@@ -1,9 +1,9 @@
-//! Links that bend, for viewers that only know rigid bodies: the surface in slabs across the link,
-//! each with a frame of its own that moves with the section in its middle.
+//! Flexible links for viewers that only know rigid bodies: the surface is cut into slabs across the
+//! link, each with its own frame that moves with the section at its middle.
 //!
-//! Meshes are sent once and frames often; so the bent link moves as smoothly as the rest of the
-//! arm, at a hundredth of the bytes of a new surface per picture. Slabs overlap a little, which
-//! hides the slits between them.
+//! Meshes are sent once and frames often, so the bent link moves as smoothly as the rest of the
+//! arm, at a hundredth of the bytes of a new surface per frame. Slabs overlap slightly, which hides
+//! the gaps between them.
 
 use flexarm_kinematics::Pose;
 use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
@@ -11,27 +11,28 @@ use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
 use crate::{BendInfo, LinkMesh, RunHeader, TwinSample};
 use flexarm_draw::{BendLine, BentMesh, stations_in_link};
 
-/// Slabs between the interfaces; one more before and one behind them.
+/// Number of slabs between the interfaces; there is one more before and one behind them.
 const INNER: usize = 8;
-/// Part of a slab by which a triangle may reach into the next one without being drawn there too.
+/// Fraction of a slab by which a triangle may reach into the next one without being drawn there
+/// too.
 const OVERLAP: f64 = 0.05;
 
-/// A link in slabs.
+/// A flexible link cut into slabs.
 pub(crate) struct BentLink {
     /// Index into [`RunHeader::links`].
     pub(crate) link: usize,
     bend: BendInfo,
     line: BendLine,
-    /// Number of its first station in [`TwinSample::X_WS`].
+    /// Index of its first station in [`TwinSample::X_WS`].
     first: usize,
-    /// Middle of each slab on the line, link axes (m).
+    /// Middle of each slab on the line, in link axes (m).
     middles: Vec<Vector3<f64>>,
-    /// Two directions in the undeformed sections, link axes.
+    /// Two unit vectors in the undeformed sections, in link axes.
     across: [Vector3<f64>; 2],
 }
 
 impl BentLink {
-    /// The links of a run that bend.
+    /// Returns the flexible links of a run.
     pub(crate) fn all(header: &RunHeader) -> Vec<Self> {
         let mut first = 0;
         let link = |bend: &BendInfo| {
@@ -63,12 +64,13 @@ impl BentLink {
         self.middles.len()
     }
 
-    /// Pose of each slab's frame in the link; undeformed they all are the link's frame.
+    /// Returns the pose of each slab's frame in the link; undeformed, all equal the link's frame.
     pub(crate) fn poses(&self, twin: &TwinSample) -> impl Iterator<Item = Pose> {
         let moved = stations_in_link(twin, self.link, self.first, self.bend.X_LS.len());
         let line = self.line.bent(&moved);
         let pose = |middle: &Vector3<f64>| {
             let at = line.deformed(middle);
+            // Rotation that maps the undeformed section directions e, f to the deformed ones u, v.
             let [u, v] = self.across.map(|e| line.deformed(&(middle + e)) - at);
             let [e, f] = self.across;
             let turn =
@@ -79,12 +81,12 @@ impl BentLink {
         self.middles.iter().map(pose).collect::<Vec<_>>().into_iter()
     }
 
-    /// Corners of the triangles of each slab, three per triangle, undeformed, link axes.
+    /// Returns the corners of each slab's triangles, three per triangle, undeformed, in link axes.
     pub(crate) fn slabs(&self, mesh: &LinkMesh) -> Vec<Vec<[f32; 3]>> {
         let mut slabs = vec![Vec::new(); self.count()];
         let Some(bent) = BentMesh::new(mesh, &self.bend) else { return slabs };
         let slab = self.line.length() / INNER as f64;
-        // Place along the link in slabs: the near one ends at 0, the inner ones at 1, 2, ...
+        // Position along the link in slabs: the first slab ends at 0, the inner ones at 1, 2, ...
         let place = |corner: &[f32; 3]| self.line.place(&Vector3::from(corner.map(f64::from))) / slab;
         let number = |place: f64| (place.floor().clamp(-1.0, INNER as f64) + 1.0) as usize;
         for triangle in &bent.mesh.triangles {
@@ -115,7 +117,7 @@ mod tests {
         (BentLink::new(&bend, 0).unwrap(), bend)
     }
 
-    /// Identity: nothing bends, so every slab is where the link is.
+    /// Identity: without deflection, every slab frame is at the link frame.
     #[test]
     fn slabs_of_an_undeformed_link_are_at_the_link() {
         let (link, bend) = link();
@@ -126,8 +128,7 @@ mod tests {
         }
     }
 
-    /// Truth: the bent surface that is drawn point by point elsewhere, at points of the middle
-    /// sections.
+    /// Truth: the bent surface evaluated point by point, at points of the middle sections.
     #[test]
     fn a_slab_moves_with_the_section_in_its_middle() {
         let (link, _) = link();
@@ -141,7 +142,7 @@ mod tests {
         }
     }
 
-    /// Truth: every triangle of the cut surface is somewhere, and none is far from its slab.
+    /// Truth: every triangle of the cut surface is in a slab, and none is far from its slab.
     #[test]
     fn slabs_together_hold_the_surface() {
         let (link, bend) = link();

@@ -1,8 +1,8 @@
-//! Topics of a recording: names, message types, qualities of service.
+//! Topics of a recording: names, message types, quality of service.
 //!
-//! Rerun plots eight topics of joint states and arrays by itself, in the order of their names: the
-//! error of the tool has a name that comes first, and what would fill all places, such as a
-//! deflection of each element, is of a type that it does not plot.
+//! Rerun plots eight topics of joint states and arrays by default, in the order of their names. So
+//! the TCP error has a name that sorts first, and data that would take all eight places, such as
+//! the deflection of each element, has a type that Rerun does not plot.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
@@ -12,10 +12,10 @@ use super::frames::is_magnified;
 use super::output::Output;
 use crate::RunHeader;
 
-/// Channel numbers of all topics. Those of a rigid twin exist only if there is one.
+/// Channel numbers of all topics. Topics of the rigid twin exist only if there is one.
 #[derive(Debug)]
 pub(crate) struct Channels {
-    /// Only if there is a URDF.
+    /// Present if there is a URDF.
     pub(crate) robot_description: Option<u16>,
     pub(crate) tf: u16,
     pub(crate) tf_static: u16,
@@ -23,10 +23,11 @@ pub(crate) struct Channels {
     pub(crate) tcp_flexible: u16,
     pub(crate) rigid: Option<RigidChannels>,
     pub(crate) elastic: Vec<ElasticChannels>,
-    /// Only if there are elastic elements.
+    /// Present if there are elastic elements.
     pub(crate) elastic_joint_states: Option<u16>,
-    /// Only if there are contributors.
+    /// Present if there is a rigid twin and the header announces the static error.
     pub(crate) static_error: Option<u16>,
+    /// Present if there are contributors.
     pub(crate) contributions: Option<u16>,
     pub(crate) solver: u16,
     pub(crate) energy: u16,
@@ -34,13 +35,13 @@ pub(crate) struct Channels {
     pub(crate) markers: MarkerChannels,
 }
 
-/// Topics of what is drawn.
+/// Topics of markers.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MarkerChannels {
-    /// Only if there are meshes.
+    /// Present if there are meshes.
     pub(crate) surfaces: Option<u16>,
     pub(crate) paths: u16,
-    /// Only if there is a magnified arm.
+    /// Present if there is a magnified arm.
     pub(crate) error: Option<u16>,
 }
 
@@ -172,7 +173,8 @@ fn add_channel(output: &mut Output, topic: &str, kind: &str, note: &str) -> io::
     output.add_channel(topic, &name, &schema_text(kind), &metadata)
 }
 
-/// Quality of service as `ros2 bag` writes it. Latched topics reach subscribers that come late.
+/// Quality of service in the form written by `ros2 bag`. Late subscribers also receive latched
+/// topics.
 fn qos_profile(latched: bool) -> String {
     const FOREVER: &str = "\n    sec: 9223372036\n    nsec: 854775807";
     let (depth, durability) = if latched { (1, "transient_local") } else { (10, "volatile") };
@@ -183,7 +185,7 @@ fn qos_profile(latched: bool) -> String {
     )
 }
 
-/// Names turned into valid and distinct parts of a ROS topic: letters, digits and `_`, no digit
+/// Turns names into valid and distinct parts of a ROS topic: letters, digits and `_`, no digit
 /// first.
 pub(crate) fn topic_names(names: &[String]) -> Vec<String> {
     // `/elastic/joint_states` is taken.

@@ -1,4 +1,4 @@
-//! Texts of the ROS 2 message definitions that a recording uses.
+//! Texts of the ROS 2 message definitions used by a recording.
 //!
 //! The field lists follow the packages `std_msgs`, `geometry_msgs`, `sensor_msgs`, `tf2_msgs`,
 //! `visualization_msgs` (as since Humble, with texture and embedded mesh), `rcl_interfaces` and
@@ -7,7 +7,7 @@
 /// Line between a message and the definitions it depends on.
 const SEPARATOR: &str = "================================================================================";
 
-/// A message type: name without `/msg`, fields, and all types it needs, directly or not.
+/// A message type: name without `/msg`, fields, and all types it needs, directly or indirectly.
 type Definition = (&'static str, &'static str, &'static [&'static str]);
 
 const DEFINITIONS: &[Definition] = &[
@@ -110,7 +110,8 @@ const DEFINITIONS: &[Definition] = &[
     ),
 ];
 
-/// Full text of a message type (`package/Type`) with everything it depends on, in ros2msg form.
+/// Returns the full text of a message type (`package/Type`) with all its dependencies, in ros2msg
+/// form.
 pub(crate) fn schema_text(name: &str) -> String {
     let (fields, needs) = find(name);
     let mut text = fields.to_owned();
@@ -132,7 +133,7 @@ mod tests {
 
     const PRIMITIVES: [&str; 8] = ["string", "float64", "float32", "int32", "uint32", "uint8", "byte", "bool"];
 
-    /// Checks that a reader finds each type named by a field in the schema's own text.
+    /// Checks that each type named by a field is defined in the schema's own text.
     #[test]
     fn every_schema_carries_all_types_it_names() {
         for (name, ..) in DEFINITIONS.iter().filter(|(name, ..)| used_by_a_topic(name)) {

@@ -1,5 +1,5 @@
-//! Coordinate frames of a recording: the trees of both robots and of the magnified arm, and what
-//! moves in them.
+//! Coordinate frames of a recording: the trees of both robots and of the magnified arm, and their
+//! transforms.
 
 use flexarm_kinematics::Pose;
 
@@ -12,7 +12,7 @@ use flexarm_draw::Magnifier;
 
 /// Root of all trees.
 pub(crate) const WORLD: &str = "world";
-/// Most pictures of the magnified arm per second of simulated time.
+/// Maximum rate of frames of the magnified arm (per second of simulated time).
 const PICTURES_HZ: u32 = 60;
 
 /// The robots of a recording.
@@ -20,7 +20,7 @@ const PICTURES_HZ: u32 = 60;
 pub(crate) enum Tree {
     Flexible,
     Rigid,
-    /// Made for the eye: rates and precision are those of pictures.
+    /// Drawn only: with the rate and precision of the animation.
     Magnified,
 }
 
@@ -49,25 +49,25 @@ pub(crate) enum Moving {
     No,
 }
 
-/// Names of the frames of all trees, and the magnified arm of the last picture.
+/// Names of the frames of all trees, and the magnified arm last drawn.
 pub(crate) struct Frames {
     links: Vec<LinkFrame>,
     has_rigid: bool,
-    /// Link of the tool centre point, and names of its frame as in [`Tree`].
+    /// Link of the TCP, and names of its frame, indexed by [`Tree`].
     tcp: Option<(usize, [String; 3])>,
-    /// Link and name of each station.
+    /// Link and frame name of each station.
     stations: Vec<(usize, String)>,
-    /// Only if there is something to magnify.
+    /// Present if deflections are magnified.
     magnifier: Option<Magnifier>,
     magnified: TwinSample,
-    /// Links in slabs, with the names of these.
+    /// Links drawn in slabs, with the frame names of the slabs.
     bent: Vec<(BentLink, Vec<String>)>,
     clock: PoseClock,
     pictures: Beat,
-    /// Whether this sample is one for poses, and for a picture.
+    /// Whether the poses of this sample are written, and whether its animation frame is drawn.
     shown: bool,
     due: bool,
-    /// Poses of the last sample, if it was not one for poses and they are known ([`Frames::keep`]).
+    /// Poses of the last sample, if they were not written and are known ([`Frames::keep`]).
     unshown: Sample,
     kept: bool,
 }
@@ -75,7 +75,7 @@ pub(crate) struct Frames {
 struct LinkFrame {
     parent: Option<usize>,
     moving: Moving,
-    /// As in [`Tree`].
+    /// Indexed by [`Tree`].
     names: [String; 3],
 }
 
@@ -115,8 +115,8 @@ impl Frames {
         }
     }
 
-    /// Goes on to a sample; makes the magnified arm if it is time for a picture. Returns whether
-    /// the sample's frames are to be written.
+    /// Advances to a sample; computes the magnified arm if an animation frame is due. Returns
+    /// whether the sample's poses are to be written.
     pub(crate) fn advance(&mut self, since_start_ns: u64, sample: &Sample) -> bool {
         let Shown { due, new_peak } = self.clock.take(since_start_ns, sample, self.has_rigid);
         self.shown = due || new_peak;
@@ -128,7 +128,7 @@ impl Frames {
         self.shown
     }
 
-    /// Keeps the poses of the sample that was gone to last, unless they are written.
+    /// Keeps the poses of the last sample passed to [`Frames::advance`], unless they are written.
     pub(crate) fn keep(&mut self, sample: &Sample) {
         if self.shown {
             return;
@@ -141,22 +141,22 @@ impl Frames {
         }
     }
 
-    /// Returns the transforms of the last sample, once, if it was not one for poses.
+    /// Returns the transforms of the last sample, once, if its poses were not written.
     pub(crate) fn close(&mut self) -> Option<Vec<Transform<'_>>> {
         std::mem::take(&mut self.kept).then(|| self.transforms(&self.unshown, Moving::Yes))
     }
 
-    /// Whether this sample is one for a picture.
+    /// Whether an animation frame is due at this sample.
     pub(crate) fn is_pictured(&self) -> bool {
         self.due
     }
 
-    /// The magnified arm, if this sample shows it.
+    /// Returns the magnified arm, if an animation frame is due.
     pub(crate) fn magnified(&self) -> Option<&TwinSample> {
         (self.due && self.magnifier.is_some()).then_some(&self.magnified)
     }
 
-    /// Returns the transforms of the frames that move, or of those that do not.
+    /// Returns the transforms of either the moving or the fixed frames.
     pub(crate) fn transforms(&self, sample: &Sample, moving: Moving) -> Vec<Transform<'_>> {
         let mut transforms = Vec::with_capacity(3 * self.links.len());
         self.tree(&mut transforms, &sample.flexible, moving, Tree::Flexible);
@@ -188,18 +188,18 @@ impl Frames {
         let name = |link: &'a LinkFrame| link.names[tree as usize].as_str();
         for (index, link) in self.links.iter().enumerate() {
             let (parent, X_WP) = match link.parent {
-                // What hangs on a base that is called `world` and moves is seen from the root.
+                // Children of a moving base link named `world` are given relative to the root.
                 Some(parent) if name(&self.links[parent]) != WORLD => (name(&self.links[parent]), twin.X_WL[parent]),
                 _ => (WORLD, Pose::identity()),
             };
             let child = name(link);
-            // A base link that is called `world` is the root itself.
+            // A base link named `world` is the root itself.
             if link.moving == moving && child != parent {
                 let coarse = tree == Tree::Magnified;
                 transforms.push(Transform { parent, child, X_PC: X_WP.inv_mul(&twin.X_WL[index]), coarse });
             }
         }
-        // The tool is rigid with its link.
+        // The TCP frame is fixed in its link.
         if let (Some((link, names)), Moving::No) = (&self.tcp, moving) {
             let (parent, child) = (name(&self.links[*link]), names[tree as usize].as_str());
             transforms.push(Transform { parent, child, X_PC: twin.X_WL[*link].inv_mul(&twin.X_WT), coarse: false });
@@ -207,13 +207,14 @@ impl Frames {
     }
 }
 
-/// Whether a recording has a magnified arm: that needs the twin and a factor.
+/// Whether a recording has a magnified arm: needs the rigid twin and a factor.
 pub(crate) fn is_magnified(header: &RunHeader) -> bool {
     header.has_rigid && header.magnification > 0.0
 }
 
-/// The robot whose links are drawn bent: the magnified one. Deflections of a recording that is not
-/// to be magnified, such as one of modes, can be seen as they are; those of a single robot cannot.
+/// Robot whose links are drawn bent: the magnified one if there is one; without magnification, as
+/// in a recording of modes, the flexible one; none in a recording of a single robot, whose
+/// deflections are too small to be seen.
 pub(crate) fn bending_tree(header: &RunHeader) -> Option<Tree> {
     match (is_magnified(header), header.has_rigid) {
         (true, _) => Some(Tree::Magnified),
@@ -222,7 +223,7 @@ pub(crate) fn bending_tree(header: &RunHeader) -> Option<Tree> {
     }
 }
 
-/// Frame of a slab of a link that is drawn bent.
+/// Name of the frame of a slab of a link that is drawn bent.
 pub(crate) fn slab_frame(link_frame: &str, slab: usize) -> String {
     format!("{link_frame}/bend_{slab}")
 }

@@ -1,7 +1,7 @@
-//! Layouts for viewers of a recording: files that lie beside it and are opened with it.
+//! Viewer layouts for a recording: files written beside it and opened with it.
 //!
-//! Both show the same: the error of the tool, what causes it, what the drives do; Foxglove the arm
-//! as well. Curves have the colours that they have elsewhere ([`flexarm_draw::palette`]).
+//! Both show the TCP error, its causes, and the drives; Foxglove also shows the arm. Curves have
+//! the same colours as elsewhere ([`flexarm_draw::palette`]).
 
 use serde_json::{Value, json};
 
@@ -10,13 +10,13 @@ use crate::RunHeader;
 use flexarm_draw::palette::{self, Ground, Rgb, hex};
 use flexarm_settings::written::markup;
 
-/// A plot: its title, and its curves.
+/// A plot: title and curves.
 struct Plot {
     title: &'static str,
     curves: Vec<Curve>,
 }
 
-/// A number of a message: topic, path in it as Foxglove and as PlotJuggler write it, name, colour.
+/// A number in a message: topic, path in the notations of Foxglove and PlotJuggler, name, colour.
 struct Curve {
     topic: String,
     foxglove: String,
@@ -70,8 +70,8 @@ fn plots(header: &RunHeader) -> Vec<Plot> {
     plots
 }
 
-/// A layout for [Foxglove](https://foxglove.dev): the arm with its ghost on the left, plots on the
-/// right, events below.
+/// Returns a layout for [Foxglove](https://foxglove.dev): the arm with the rigid twin on the left,
+/// plots on the right, events below.
 #[must_use]
 pub fn foxglove_layout(header: &RunHeader) -> String {
     let plots = plots(header);
@@ -92,7 +92,7 @@ pub fn foxglove_layout(header: &RunHeader) -> String {
         });
         panels.insert(format!("Plot!plot{k}"), plot);
     }
-    // Plots below each other, each as high as the others.
+    // Stack the plots vertically with equal heights.
     let names = (0..plots.len()).map(|k| json!(format!("Plot!plot{k}")));
     let column = names.rev().fold((Value::Null, 0), |(below, count): (Value, usize), name| match count {
         0 => (name, 1),
@@ -113,7 +113,7 @@ pub fn foxglove_layout(header: &RunHeader) -> String {
     serde_json::to_string_pretty(&all).expect("names and numbers are JSON") + "\n"
 }
 
-/// The 3D panel: the magnified arm and its ghost, or the arm as it is.
+/// The 3D panel: the magnified arm and the rigid twin, or the arm as it is.
 fn scene(header: &RunHeader) -> Value {
     let magnified = is_magnified(header);
     let [low, high] = header.volume.unwrap_or([[-1.5, -1.5, 0.0], [1.5, 1.5, 2.0]]);
@@ -143,7 +143,7 @@ fn scene(header: &RunHeader) -> Value {
     })
 }
 
-/// A layout for [PlotJuggler](https://plotjuggler.io): the plots, two on a tab.
+/// Returns a layout for [PlotJuggler](https://plotjuggler.io): the plots, two per tab.
 #[must_use]
 pub fn plotjuggler_layout(header: &RunHeader) -> String {
     let plots = plots(header);

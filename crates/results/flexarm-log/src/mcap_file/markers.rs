@@ -1,8 +1,8 @@
-//! What viewers draw without any file: the links' surfaces, the paths of the tool, and its error,
-//! magnified.
+//! Markers, which viewers draw without any further file: the links' surfaces, the TCP paths, and
+//! the magnified TCP error.
 //!
-//! A viewer that jumps in time shows the last message of each topic, so what is sent at another
-//! pace has a topic of its own: surfaces once, paths each second, the error often.
+//! A viewer that jumps in time shows the last message of each topic, so data sent at different
+//! rates has separate topics: surfaces once, paths every second, the error more often.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -13,11 +13,11 @@ use super::frames::{Tree, WORLD, bending_tree, is_magnified, slab_frame};
 use super::messages::{Marker, MarkerKind};
 use crate::{LinkMesh, RunHeader, Sample, TwinSample};
 
-/// Triangles of one robot beyond which meshes are thinned.
+/// Maximum number of triangles of a robot; larger meshes are coarsened.
 const MOST_TRIANGLES: usize = 100_000;
-/// Points of a path beyond which it is thinned.
+/// Maximum number of points of a path; longer paths are thinned.
 const MOST_POINTS: usize = 1000;
-/// Pictures of the error per second of simulated time.
+/// Rate of the error markers (per second of simulated time).
 const ERROR_HZ: u32 = 20;
 
 const GHOST: [f32; 4] = [0.85, 0.88, 0.92, 0.3];
@@ -26,7 +26,7 @@ const RIGID_PATH: [f32; 4] = [0.75, 0.78, 0.82, 1.0];
 const FLEXIBLE_PATH: [f32; 4] = [0.95, 0.55, 0.1, 1.0];
 const ERROR: [f32; 4] = [0.9, 0.15, 0.15, 1.0];
 
-/// Surfaces of all robots, in the frames of their links.
+/// Returns the surfaces of all robots, in the frames of their links.
 pub(crate) fn surfaces<'a>(header: &RunHeader, frames: &'a SurfaceFrames) -> Vec<Marker<'a>> {
     let total: usize = header.meshes.iter().map(|mesh| mesh.triangles.len()).sum();
     let share = |mesh: &LinkMesh| (mesh.triangles.len() as f64 / total as f64 * MOST_TRIANGLES as f64) as usize;
@@ -61,14 +61,14 @@ pub(crate) fn surfaces<'a>(header: &RunHeader, frames: &'a SurfaceFrames) -> Vec
     markers
 }
 
-/// Which links can be elsewhere than those of the rigid twin: magnified, the others would only lie
-/// on themselves.
+/// Links whose pose can differ from that of the rigid twin; the others need no magnified copy,
+/// which would coincide with them.
 fn deviating(header: &RunHeader) -> Vec<bool> {
     let bends = |name: &String| header.bends.iter().any(|bend| header.links[bend.link].name == *name);
     let drives_give_way = !header.contributors.iter().all(bends);
     let mut deviates: Vec<bool> = Vec::with_capacity(header.links.len());
     for (index, link) in header.links.iter().enumerate() {
-        // A base that is not fixed stands on something that yields.
+        // A base that is not fixed is on an elastic support.
         let stands_free = link.parent.is_none() && !link.fixed;
         let own = stands_free || header.bends.iter().any(|bend| bend.link == index);
         deviates.push(own || link.parent.is_some_and(|parent| deviates[parent] || drives_give_way));
@@ -76,14 +76,14 @@ fn deviating(header: &RunHeader) -> Vec<bool> {
     deviates
 }
 
-/// Names of the frames that surfaces are drawn in.
+/// Names of the frames in which surfaces are drawn.
 pub(crate) struct SurfaceFrames {
     trees: Vec<(Tree, Vec<LinkFrames>)>,
 }
 
 struct LinkFrames {
     name: String,
-    /// The link in slabs with their frames, if it is drawn bent in this tree.
+    /// The link in slabs with their frame names, if it is drawn bent in this tree.
     bent: Option<(BentLink, Vec<String>)>,
 }
 
@@ -116,7 +116,7 @@ fn corners(mesh: &LinkMesh) -> Vec<[f32; 3]> {
     mesh.triangles.iter().flatten().map(|k| mesh.positions[*k as usize]).collect()
 }
 
-/// The mesh with at most about so many triangles: corners that are close together become one.
+/// Coarsens a mesh to at most about `most` triangles by merging close corners.
 fn thinned(mesh: &LinkMesh, most: usize) -> Cow<'_, LinkMesh> {
     if mesh.triangles.len() <= most {
         return Cow::Borrowed(mesh);
@@ -143,7 +143,7 @@ fn thinned(mesh: &LinkMesh, most: usize) -> Cow<'_, LinkMesh> {
     Cow::Owned(LinkMesh { triangles, ..mesh.clone() })
 }
 
-/// Line that the tool has drawn so far.
+/// Path of the TCP so far.
 #[derive(Debug)]
 struct Path {
     points: Vec<[f32; 3]>,
@@ -163,7 +163,7 @@ impl Path {
             self.points.push(self.last);
         }
         self.seen += 1;
-        // One place is for the last point.
+        // The limit includes the last point.
         if self.points.len() >= MOST_POINTS {
             let mut keep = false;
             self.points.retain(|_| {
@@ -183,16 +183,16 @@ impl Path {
     }
 }
 
-/// Markers that change while the run goes on.
+/// Markers that change during the run.
 pub(crate) struct MovingMarkers {
     has_rigid: bool,
-    /// Factor of the magnified error, if there is one.
+    /// Magnification of the error, if any.
     factor: Option<f64>,
     flexible: Path,
     rigid: Path,
     magnified: Path,
-    /// Distance from the base to the tool in the first sample (m): lines are so wide that they are
-    /// seen on any robot.
+    /// Distance from the base to the TCP in the first sample (m); line widths scale with it, so
+    /// that they are visible on any robot.
     reach: f64,
     seconds: Beat,
     errors: Beat,
@@ -212,7 +212,7 @@ impl MovingMarkers {
         }
     }
 
-    /// Takes a sample; returns whether paths and error are to be sent now.
+    /// Adds a sample; returns whether paths and error are due.
     pub(crate) fn advance(
         &mut self,
         since_start_ns: u64,
@@ -233,7 +233,7 @@ impl MovingMarkers {
         (self.seconds.due(since_start_ns), self.errors.due(since_start_ns) && self.factor.is_some())
     }
 
-    /// The paths so far.
+    /// Returns the paths so far.
     pub(crate) fn paths(&self) -> Vec<Marker<'static>> {
         let width = 0.002 * self.reach;
         let line = |namespace, color, path: &Path| {
@@ -252,7 +252,7 @@ impl MovingMarkers {
         lines
     }
 
-    /// The error as an arrow from the rigid tool, so many times longer, and in words.
+    /// Returns the magnified error as an arrow from the rigid TCP, with its size as text.
     pub(crate) fn error(&self, sample: &Sample) -> Vec<Marker<'static>> {
         let factor = self.factor.unwrap_or(1.0);
         let from = sample.rigid.X_WT.translation.vector;
@@ -277,7 +277,7 @@ impl MovingMarkers {
 mod tests {
     use super::*;
 
-    /// A square in many triangles.
+    /// A square of `2 n²` triangles.
     fn sheet(n: u32) -> LinkMesh {
         let at = |k: u32| k as f32 / n as f32;
         let positions = (0..=n).flat_map(|i| (0..=n).map(move |j| [at(i), at(j), 0.0])).collect();

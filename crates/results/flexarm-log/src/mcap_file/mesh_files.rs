@@ -1,10 +1,10 @@
-//! The files that a robot's meshes came from, as attachments of a recording.
+//! Mesh files of a robot, as attachments of a recording.
 
 use std::collections::BTreeSet;
 
 use crate::{Attachment, LogError, RunHeader, mesh_media_type};
 
-/// Each file once, as `meshes/<file name>`.
+/// Reads each file once, named `meshes/<file name>`.
 pub(crate) fn mesh_files(header: &RunHeader) -> Result<Vec<Attachment>, LogError> {
     let (mut seen, mut names, mut files) = (BTreeSet::new(), BTreeSet::new(), Vec::new());
     for path in header.meshes.iter().filter_map(|mesh| mesh.file.as_deref()) {
@@ -15,7 +15,7 @@ pub(crate) fn mesh_files(header: &RunHeader) -> Result<Vec<Attachment>, LogError
         let file_name = path.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
         let mut name = format!("meshes/{file_name}");
         if !names.insert(name.clone()) {
-            name = format!("meshes/{}/{file_name}", seen.len()); // another folder's file of that name
+            name = format!("meshes/{}/{file_name}", seen.len()); // file of the same name in another folder
             names.insert(name.clone());
         }
         files.push(Attachment { name, media_type: mesh_media_type(path).to_owned(), bytes });

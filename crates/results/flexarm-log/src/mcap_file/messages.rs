@@ -1,7 +1,7 @@
-//! The ROS 2 messages of a recording, and their bytes: plain CDR, little endian [OMG DDSI-RTPS 2.5,
+//! ROS 2 messages of a recording and their encoding: plain CDR, little endian [OMG DDSI-RTPS 2.5,
 //! section 10].
 //!
-//! CDR has values and no names, so a message is a tuple of its fields, in the order of its
+//! CDR holds values without names, so a message is a tuple of its fields in the order of its
 //! definition.
 
 use std::io;
@@ -14,20 +14,20 @@ use serde::{Deserialize, Serialize};
 /// Encapsulation header: CDR, little endian, no options.
 const ENCAPSULATION: [u8; 4] = [0x00, 0x01, 0x00, 0x00];
 
-/// Replaces `bytes` by those of a message.
+/// Replaces `bytes` by the encoded message.
 pub(crate) fn encode(message: impl Serialize, bytes: &mut Vec<u8>) -> io::Result<()> {
     bytes.clear();
     bytes.extend(ENCAPSULATION);
     message.serialize(&mut CdrSerializer::<LittleEndian>::new(bytes)).map_err(io::Error::other)
 }
 
-/// Returns the fields at the beginning of a message; `None` if its bytes are not these.
+/// Returns the fields at the start of a message; `None` if the bytes do not match them.
 pub(crate) fn decode<'m, T: Deserialize<'m>>(bytes: &'m [u8]) -> Option<T> {
     let (fields, _) = re_cdr::from_bytes::<T, LittleEndian>(bytes.strip_prefix(&ENCAPSULATION)?).ok()?;
     Some(fields)
 }
 
-/// `builtin_interfaces/Time`: s, ns.
+/// `builtin_interfaces/Time`: seconds, nanoseconds.
 pub(crate) type Time = (u32, u32);
 /// `std_msgs/Header`: time, frame.
 pub(crate) type Header<'a> = (Time, &'a str);
@@ -43,7 +43,7 @@ pub(crate) type LabelledArray<'a> = (Vec<(&'a str, u32, u32)>, u32, Vec<f64>);
 pub(crate) struct Stamp(pub(crate) u64);
 
 impl Stamp {
-    /// Largest time of `builtin_interfaces/Time`, whose seconds are an `int32`.
+    /// Maximum of `builtin_interfaces/Time` (ns), whose seconds are an `int32`.
     pub(crate) const MAX: u64 = i32::MAX as u64 * 1_000_000_000;
 
     fn time(self) -> Time {
@@ -52,16 +52,16 @@ impl Stamp {
     }
 }
 
-/// A coordinate frame and the one it is given in.
+/// Pose of a coordinate frame in its parent frame.
 pub(crate) struct Transform<'a> {
     pub(crate) parent: &'a str,
     pub(crate) child: &'a str,
     pub(crate) X_PC: Pose,
-    /// Made for the eye: seven digits do, and compress well.
+    /// Whether single precision suffices (for drawing only); it compresses well.
     pub(crate) coarse: bool,
 }
 
-/// Translation, then quaternion x, y, z, w: the order of both `Pose` and `Transform`.
+/// Translation, then quaternion x, y, z, w; the layout of both `Pose` and `Transform`.
 fn pose(X: &Pose) -> [f64; 7] {
     let [x, y, z] = X.translation.vector.into();
     let [qx, qy, qz, qw] = UnitQuaternion::from_rotation_matrix(&X.rotation).coords.into();
@@ -99,7 +99,7 @@ pub(crate) fn labelled_array(labels: &str, values: &[f64]) -> impl Serialize {
     ([(labels, size, size)].to_vec(), 0_u32, values)
 }
 
-/// How bad an event is, in the words of `rcl_interfaces/Log`.
+/// Severity of an event, as in `rcl_interfaces/Log`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum Level {
@@ -108,12 +108,12 @@ pub(crate) enum Level {
     Error = 40,
 }
 
-/// `rcl_interfaces/Log`; file, function and line of a program are empty.
+/// `rcl_interfaces/Log`; the fields file, function and line of a program are empty.
 pub(crate) fn log(stamp: Stamp, level: Level, name: &str, text: &str) -> impl Serialize {
     (stamp.time(), level as u8, name, text, "", "", 0_u32)
 }
 
-/// Kinds of `visualization_msgs/Marker` in use.
+/// Kinds of `visualization_msgs/Marker` used here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(i32)]
 pub(crate) enum MarkerKind {
@@ -123,27 +123,27 @@ pub(crate) enum MarkerKind {
     TriangleList = 11,
 }
 
-/// What is set of a `visualization_msgs/Marker`; it stays until another of its namespace and number
-/// comes.
+/// The fields in use of a `visualization_msgs/Marker`. A marker is shown until one with the same
+/// namespace and number replaces it.
 #[derive(Clone, Debug)]
 pub(crate) struct Marker<'a> {
     pub(crate) frame: &'a str,
     pub(crate) namespace: &'a str,
     pub(crate) id: usize,
     pub(crate) kind: MarkerKind,
-    /// Place of a text (m).
+    /// Position of a text (m).
     pub(crate) place: [f64; 3],
-    /// Sizes: of a line its width, of an arrow shaft, head width and head length, of a text its
-    /// height as the third (m).
+    /// Sizes (m): line width; shaft diameter, head diameter and head length of an arrow; height of
+    /// a text, as the third entry.
     pub(crate) scale: [f64; 3],
     /// Red, green, blue, alpha, 0 to 1.
     pub(crate) color: [f32; 4],
-    /// Corners or ends (m), as `f32`: the zeros behind compress to nothing.
+    /// Corners or end points (m), as `f32`: widened to `f64`, their trailing zeros compress well.
     pub(crate) points: Vec<[f32; 3]>,
     pub(crate) text: String,
 }
 
-/// `visualization_msgs/MarkerArray`: all markers move with their frames, for ever.
+/// `visualization_msgs/MarkerArray`: all markers move with their frames and never expire.
 pub(crate) fn markers<'a>(stamp: Stamp, markers: &'a [Marker<'a>]) -> impl Serialize {
     const ADD: i32 = 0;
     const NO_LIST: u32 = 0;
@@ -178,13 +178,13 @@ pub(crate) fn markers<'a>(stamp: Stamp, markers: &'a [Marker<'a>]) -> impl Seria
 mod tests {
     use super::*;
 
-    /// Truth: worked out by hand from the alignment rule.
+    /// Truth: derived by hand from the alignment rule.
     #[test]
     fn values_start_at_multiples_of_their_size() {
         let expected: Vec<u8> = [
             vec![0, 1, 0, 0],                   // encapsulation, not counted
             vec![7, 0, 0, 0],                   // at 0
-            vec![3, 0, 0, 0, b'a', b'b', 0],    // at 4: length with the zero
+            vec![3, 0, 0, 0, b'a', b'b', 0],    // at 4: length including the terminating zero
             vec![0],                            // padding to 12
             vec![1, 0, 0, 0],                   // at 12: count
             vec![0, 0, 0, 0, 0, 0, 0xf0, 0x3f], // at 16: 1.0
@@ -195,7 +195,7 @@ mod tests {
         assert_eq!(bytes, expected);
         assert_eq!(decode(&bytes), Some((7_u32, "ab", vec![1.0_f64])));
 
-        // An empty sequence ends after its count: no padding for elements that are not there.
+        // An empty sequence ends after its count, without padding for absent elements.
         encode(Vec::<f64>::new(), &mut bytes).unwrap();
         assert_eq!(bytes, [0, 1, 0, 0, 0, 0, 0, 0]);
     }

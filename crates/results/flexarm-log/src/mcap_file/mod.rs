@@ -2,11 +2,11 @@
 //!
 //! Profile `ros2`: CDR messages, their definitions embedded, `offered_qos_profiles` on every
 //! channel. Chunks of whole samples, about 1 MiB or half a simulated second, compressed with zstd,
-//! are in the file once they are closed: up to there readers that need no index read what a killed
-//! run leaves. The `mcap` crate writes them ([`output`]).
+//! are written to the file once they are closed; readers that need no index can read a killed run
+//! up to its last closed chunk. The `mcap` crate writes the records ([`output`]).
 //!
 //! Start at [`McapRecorder`]; topics are in [`channels`], messages in [`messages`], coordinate
-//! frames in [`frames`], what viewers draw in [`markers`].
+//! frames in [`frames`], markers for viewers in [`markers`].
 
 mod beat;
 mod bent;
@@ -40,45 +40,45 @@ use crate::{CreateOptions, EventKind, LogError, RunHeader, RunResult, START_NS, 
 /// | topic | message | |
 /// | --- | --- | --- |
 /// | `/robot_description` | `std_msgs/String` | the URDF, once, latched |
-/// | `/tf`, `/tf_static` | `tf2_msgs/TFMessage` | three trees under `world`: links, `rigid/` links and `magnified/` links; stations of a bent link as its children `<link>/station_<k>`, the tool centre point as `<link>/tcp`; at most 200 times a second |
-/// | `/joint_states`, `/rigid/joint_states` | `sensor_msgs/JointState` | effort: what the drives must supply |
+/// | `/tf`, `/tf_static` | `tf2_msgs/TFMessage` | three trees under `world`: links, `rigid/` links and `magnified/` links; stations of a flexible link as its children `<link>/station_<k>`, the TCP as `<link>/tcp`; at most 200 times a second |
+/// | `/joint_states`, `/rigid/joint_states` | `sensor_msgs/JointState` | effort: required drive torque or force |
 /// | `/tcp/flexible`, `/tcp/rigid` | `geometry_msgs/PoseStamped` | in `world` |
 /// | `/tcp/error`, `/tcp/error_path` | `geometry_msgs/TwistStamped` | an error: translation and rotation vector; world axes, path axes |
-/// | `/deviation/tcp`, `/deviation/tcp_path` | `std_msgs/Float64MultiArray` | its translation, which viewers plot unasked, and before all else |
-/// | `/tcp/static_error` | `std_msgs/Float64MultiArray` | what of the error the arm would have standing still: x, y, z, world axes |
-/// | `/tcp/contributions` | `std_msgs/Float64MultiArray` | what each of [`RunHeader::contributors`] does to the tool: x, y, z of each, world axes |
+/// | `/deviation/tcp`, `/deviation/tcp_path` | `std_msgs/Float64MultiArray` | translation of the error, which viewers plot by default and first |
+/// | `/tcp/static_error` | `std_msgs/Float64MultiArray` | static share of the error: x, y, z, world axes |
+/// | `/tcp/contributions` | `std_msgs/Float64MultiArray` | contribution of each of [`RunHeader::contributors`] to the TCP displacement: x, y, z of each, world axes |
 /// | `/elastic/joint_states` | `sensor_msgs/JointState` | all elements as joints `<element>/x` to `<element>/rz`, so that curves have names: deflection, load |
 /// | `/elastic/<element>` | `geometry_msgs/WrenchStamped` | the same load, for arrows; at most 60 times a second |
 /// | `/elastic/<element>/deflection` | `geometry_msgs/TwistStamped` | not a velocity: the same deflection, translation and rotation; at most 60 times a second |
 /// | `/energy`, `/solver` | `std_msgs/Float64MultiArray` | |
-/// | `/events` | `rcl_interfaces/Log` | what happened, at its own time: name is the kind |
+/// | `/events` | `rcl_interfaces/Log` | events, each at its own time; the name is the kind |
 /// | `/markers` | `visualization_msgs/MarkerArray` | surfaces, once, latched; namespaces `flexible`, `rigid`, `magnified` |
-/// | `/markers/path` | `visualization_msgs/MarkerArray` | paths of the tool so far, each second; namespaces `path/flexible`, `path/rigid`, `path/magnified` |
+/// | `/markers/path` | `visualization_msgs/MarkerArray` | TCP paths so far, every second; namespaces `path/flexible`, `path/rigid`, `path/magnified` |
 /// | `/markers/error` | `visualization_msgs/MarkerArray` | the TCP error, magnified, 20 times a second |
 ///
-/// All else comes with every sample. `/tf` is also there at each sample whose error is larger than
-/// all before it, so that the largest one has its poses, and at the last sample; an `.rrd` made of
-/// the file is the one of the run.
+/// All other topics have a message for every sample. `/tf` is also written at each sample whose
+/// error exceeds all previous ones, so that the maximum has its poses, and at the last sample; an
+/// `.rrd` file converted from the recording equals that of the run.
 ///
 /// Topics with `rigid` and `error` need a rigid twin, the magnified arm also
-/// [`RunHeader::magnification`]. It is sent at most 60 times per second of simulated time, with the
-/// precision of `f32`. A link of [`RunHeader::bends`] is drawn bent in slabs with the frames
-/// `magnified/<link>/bend_<k>`; in a recording that is not magnified, such as one of modes, the
-/// flexible robot itself is drawn so.
+/// [`RunHeader::magnification`]. The magnified arm is sent at most 60 times per second of simulated
+/// time, in single precision. A link of [`RunHeader::bends`] is drawn bent in slabs with the frames
+/// `magnified/<link>/bend_<k>`; in a recording without magnification, such as one of modes, the
+/// flexible robot itself is drawn this way.
 ///
-/// The names of an array's entries are in the label of its one dimension, separated by commas. SI
+/// The names of an array's entries are in the label of its only dimension, separated by commas. SI
 /// units.
 ///
-/// `header.stamp`, log time and publish time of a message are [`RunHeader::start_ns`], or
-/// [`START_NS`] without one, and simulated time.
+/// The `header.stamp`, log time and publish time of a message are [`RunHeader::start_ns`] (default
+/// [`START_NS`]) plus the simulated time.
 ///
-/// The file also holds `robot.urdf`, the mesh files, `RunHeader::attachments`, for readers of
-/// flexarm `run.json` and `meshes.bin.zst` (header and surfaces) and, at the end, `result.json` and
-/// `RunResult::attachments` as attachments, and the groups of `RunHeader::metadata`,
-/// `flexarm.recording`, `flexarm.units` and, at the end, `flexarm.result` as metadata.
+/// The file also holds, as attachments, `robot.urdf`, the mesh files, `RunHeader::attachments`, for
+/// readers of flexarm `run.json` and `meshes.bin.zst` (header and surfaces) and, at the end,
+/// `result.json` and `RunResult::attachments`; as metadata, the groups of `RunHeader::metadata`,
+/// `flexarm.recording`, `flexarm.units` and, at the end, `flexarm.result`.
 pub type McapRecorder = FileRecorder<McapFile>;
 
-/// Stamp of a simulated time in a file whose time zero is `start_ns`.
+/// Returns the stamp of a simulated time in a file whose time zero is `start_ns`.
 fn stamp(path: &Path, start_ns: u64, time_s: f64) -> Result<Stamp, LogError> {
     let room_ns = Stamp::MAX.saturating_sub(start_ns);
     let time_ns = (time_s * 1e9).round();
@@ -137,14 +137,14 @@ pub struct McapFile {
     start: Stamp,
     last: Stamp,
     samples: u32,
-    /// Messages so far of topics that do not get one from each sample.
+    /// Message counts of topics without a message for every sample.
     poses: u32,
     paths: u32,
     errors: u32,
     pictures: u32,
-    /// Deflections and loads of a sample; the memory is used again.
+    /// Deflections and loads of a sample; buffer reused for every sample.
     values: Vec<f64>,
-    /// Time of the last message with paths.
+    /// Time of the last message on the paths topic.
     paths_at: Option<Stamp>,
 }
 
@@ -177,7 +177,7 @@ impl McapFile {
         })
     }
 
-    /// Everything that is known before the first sample.
+    /// Writes everything known before the first sample.
     fn describe(&mut self, header: &RunHeader, meshes: &[crate::Attachment]) -> io::Result<()> {
         let (start, output) = (self.start, &mut self.output);
         if let Some(channel) = self.channels.robot_description {
@@ -220,7 +220,7 @@ impl McapFile {
         let since_start = stamp.0 - self.start.0;
         let rigid = self.channels.rigid.map(|channels| (channels, &sample.rigid));
 
-        // Frames. What does not move is known only with the first sample.
+        // Frames. The fixed transforms are known only with the first sample.
         let shown = self.frames.advance(since_start, sample);
         if self.samples == 0 {
             let fixed = messages::transforms(stamp, &self.frames.transforms(sample, Moving::No));
@@ -232,7 +232,7 @@ impl McapFile {
             self.poses = self.poses.wrapping_add(1);
         }
 
-        // Joints and tool centre point of either robot.
+        // Joints and TCP of both robots.
         self.joint_states(self.channels.joint_states, stamp, &sample.flexible)?;
         let tool = &sample.flexible.X_WT;
         self.send(self.channels.tcp_flexible, stamp, messages::pose_stamped(stamp, WORLD, tool))?;
@@ -255,7 +255,7 @@ impl McapFile {
 
         self.elastic(stamp, sample)?;
 
-        // The run itself.
+        // Energies and solver figures.
         let energy = &sample.energy;
         let energies = [energy.kinetic, energy.potential, energy.elastic];
         let labels = "kinetic [J],potential [J],elastic [J]";
@@ -263,7 +263,7 @@ impl McapFile {
         let labels = "iterations,residual";
         self.send(self.channels.solver, stamp, messages::labelled_array(labels, &sample.solver))?;
 
-        // Pictures.
+        // Markers.
         let (paths, error) = self.markers.advance(since_start, sample, self.frames.magnified());
         self.last = stamp;
         if paths {
@@ -279,7 +279,7 @@ impl McapFile {
         Ok(())
     }
 
-    /// A message of a topic that has one of each sample.
+    /// Sends a message on a topic that has one for every sample.
     fn send(&mut self, channel: u16, stamp: Stamp, message: impl Serialize) -> io::Result<()> {
         self.output.send(channel, self.samples, stamp, message)
     }
@@ -289,8 +289,8 @@ impl McapFile {
         self.output.send(channel, self.samples, stamp, messages::joint_state(stamp, &self.joints, values))
     }
 
-    /// Deflections and loads: all by name with each sample, and one topic pair per element for what
-    /// draws them.
+    /// Sends deflections and loads: all elements by name with every sample, and one pair of topics
+    /// per element for viewers that draw them.
     fn elastic(&mut self, stamp: Stamp, sample: &Sample) -> io::Result<()> {
         if let Some(channel) = self.channels.elastic_joint_states {
             self.values.clear();
@@ -314,7 +314,7 @@ impl McapFile {
         Ok(())
     }
 
-    /// An error as a six-vector, and its translation with the norm as plain numbers.
+    /// Sends an error as a six-vector, and its translation with the norm as plain numbers.
     fn error(&mut self, stamp: Stamp, vector: u16, plot: u16, axes: &str, error: &[f64; 6]) -> io::Result<()> {
         self.send(vector, stamp, messages::six_vector_stamped(stamp, WORLD, error))?;
         let [x, y, z, ..] = *error;
@@ -322,7 +322,7 @@ impl McapFile {
         self.send(plot, stamp, messages::labelled_array(axes, &[x, y, z, norm]))
     }
 
-    /// The paths up to the last sample, unless they are in the file already.
+    /// Writes the paths up to the last sample, unless they are already in the file.
     fn paths(&mut self) -> io::Result<()> {
         let stamp = self.last;
         let paths = self.markers.paths();
@@ -336,18 +336,19 @@ impl McapFile {
         Ok(())
     }
 
-    /// The frames of the last sample, unless they are in the file already.
+    /// Writes the frames of the last sample, unless they are already in the file.
     fn last_frames(&mut self) -> io::Result<()> {
         let Some(transforms) = self.frames.close() else { return Ok(()) };
         let message = messages::transforms(self.last, &transforms);
         self.output.send(self.channels.tf, self.poses, self.last, message)
     }
 
-    /// The last frames and paths, the events, the result and the index.
+    /// Writes the last frames and paths, the events, the result and the index.
     fn end(&mut self, result: &RunResult, event_times: &[Stamp]) -> io::Result<()> {
         self.last_frames()?;
         self.paths()?;
-        // In a chunk of their own: their times span the run, those of the chunk before need not.
+        // Events get a chunk of their own: their times span the run, which would widen the time
+        // range of the open chunk.
         self.output.flush()?;
         for ((event, stamp), sequence) in result.events.iter().zip(event_times).zip(0..) {
             let level = match event.kind {
@@ -367,7 +368,7 @@ impl McapFile {
 }
 
 impl Drop for McapFile {
-    /// A run that was given up still gets its index; errors have nowhere to go.
+    /// Writes the index of an abandoned run; errors cannot be reported here.
     fn drop(&mut self) {
         let _ = self.last_frames().and_then(|()| self.output.finish());
     }

@@ -1,5 +1,5 @@
-//! The file itself: the writer of the format's library, chunks that end where the data says so, and
-//! a sink that has only whole records.
+//! The output file: the writer of the `mcap` crate, chunks closed by size or simulated time, and a
+//! sink that only receives whole records.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -13,28 +13,28 @@ use serde::Serialize;
 use super::messages::{Stamp, encode};
 use crate::written_behind::WrittenBehind;
 
-/// A chunk is closed when its messages have so many bytes, or span so much simulated time (ns):
-/// what a killed run loses.
+/// Limits at which a chunk is closed: size of its messages (bytes) and span of simulated time (ns).
+/// A killed run loses at most one chunk.
 const CHUNK_BYTES: usize = 1 << 20;
 const CHUNK_NS: u64 = 500_000_000;
 
-/// Level of zstd. On chunks of runs level 1 takes half the time of level 3, which is zstd's own
-/// choice, and 2 % more room.
+/// Level of zstd. On chunks of runs, level 1 takes half the time of level 3, zstd's default, and 2
+/// % more space.
 const COMPRESSION: u32 = 1;
 
-/// Memory that is used again for the next message, or the next chunk in the file.
+/// Capacity of the buffers kept for the next message and the next chunk (bytes).
 const KEPT_MESSAGE: usize = 64 << 10;
 const KEPT_BYTES: usize = 2 * CHUNK_BYTES;
 
-/// An MCAP file in the making.
+/// An MCAP file that is being written.
 pub(crate) struct Output {
     writer: Writer<NoSeek<WholeRecords>>,
-    /// Bytes of the messages in the open chunk, and the time of the first.
+    /// Size of the messages in the open chunk (bytes), and time of the first.
     held: usize,
     begun: Option<Stamp>,
-    /// Bytes of the last message; the memory is used again.
+    /// Bytes of the last message; buffer reused.
     message: Vec<u8>,
-    /// The library must not be called any more.
+    /// Whether the writer is finished and must not be called any more.
     finished: bool,
 }
 
@@ -51,7 +51,7 @@ impl Output {
         Ok(Self { writer, held: 0, begun: None, message: Vec::new(), finished: false })
     }
 
-    /// Adds a topic of ROS 2 messages; returns its number.
+    /// Adds a topic of ROS 2 messages; returns its channel number.
     pub(crate) fn add_channel(
         &mut self,
         topic: &str,
@@ -63,7 +63,7 @@ impl Output {
         self.writer.add_channel(schema, topic, "cdr", metadata).map_err(io_error)
     }
 
-    /// Adds a message to the open chunk. The `sequence` of a topic counts up.
+    /// Adds a message to the open chunk. `sequence` counts the messages of a topic.
     pub(crate) fn send(
         &mut self,
         channel: u16,
@@ -78,15 +78,14 @@ impl Output {
         self.writer.write_to_known_channel(&header, &self.message).map_err(io_error)
     }
 
-    /// Returns whether the chunk is large or long enough to be closed. Only the messages decide,
-    /// never the clock.
+    /// Whether the chunk is to be closed. This depends only on the messages, never on the clock.
     pub(crate) fn is_full(&self, now: Stamp) -> bool {
         let begun = self.begun.unwrap_or(now);
         self.held >= CHUNK_BYTES || now.0.saturating_sub(begun.0) >= CHUNK_NS
     }
 
-    /// Closes the chunk and brings everything so far into the file. After an error the file is what
-    /// it was before.
+    /// Closes the chunk and writes everything so far to the file. After an error the file is
+    /// unchanged.
     pub(crate) fn flush(&mut self) -> io::Result<()> {
         self.writer.flush().map_err(io_error)?;
         (self.held, self.begun) = (0, None);
@@ -103,7 +102,7 @@ impl Output {
     pub(crate) fn attach(&mut self, stamp: Stamp, file: &crate::Attachment) -> io::Result<()> {
         let attachment = mcap::Attachment {
             log_time: stamp.0,
-            create_time: 0, // unknown, and a run's file must not depend on the day
+            create_time: 0, // unknown, and the file must not depend on the date
             name: file.name.clone(),
             media_type: file.media_type.clone(),
             data: file.bytes.as_slice().into(),
@@ -111,12 +110,12 @@ impl Output {
         self.writer.attach(&attachment).map_err(io_error)
     }
 
-    /// Closes the chunk and writes the index, once.
+    /// Closes the chunk and writes the index; does nothing when called again.
     pub(crate) fn finish(&mut self) -> io::Result<()> {
         if std::mem::replace(&mut self.finished, true) {
             return Ok(());
         }
-        // Flushed first: the chunk stays if there is no room for the index.
+        // Flush first, so that the chunk is kept if there is no room for the index.
         self.writer.flush().and_then(|()| self.writer.finish()).map(drop).map_err(io_error)
     }
 }
@@ -128,8 +127,7 @@ fn io_error(error: McapError) -> io::Error {
     }
 }
 
-/// Holds what the library writes until it asks for a flush, which it does behind whole records
-/// only.
+/// Buffers the library's output until it asks for a flush, which it does only after whole records.
 struct WholeRecords {
     file: File,
     waiting: Vec<u8>,
@@ -149,10 +147,10 @@ impl Write for WholeRecords {
         Ok(bytes.len())
     }
 
-    /// Writes what waits. If that fails (full disk), it waits on, and the file has nothing of it.
+    /// Writes the buffer. On failure (full disk) the buffer is kept and the file is restored.
     fn flush(&mut self) -> io::Result<()> {
         if let Err(error) = self.file.write_all(&self.waiting) {
-            // An error of the restoration is ignored: the first one is returned.
+            // An error while restoring is ignored: the first error is returned.
             let _ = self.file.set_len(self.written).and_then(|()| self.file.seek(SeekFrom::Start(self.written)));
             return Err(error);
         }

@@ -1,4 +1,4 @@
-//! A CSV file of a run, line by line.
+//! Reader of the CSV file of a run, line by line.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -10,7 +10,7 @@ use super::{broken_end, not_a_recording, stem};
 use crate::table::{self, TableLayout};
 use crate::{LogError, RunHeader, RunResult, RunSource, Sample};
 
-/// See the module.
+/// A run read from a CSV file.
 pub(crate) struct CsvRun {
     path: PathBuf,
     layout: TableLayout,
@@ -51,7 +51,7 @@ impl RunSource for CsvRun {
         let (mut sample, mut numbers) = (Sample::default(), Vec::new());
         let (mut count, mut last_s) = (0, 0.0);
         while let Some(row) = rows.next() {
-            // A line without its end is a number without its end.
+            // A last line without a newline may end with a truncated number.
             if !whole && rows.peek().is_none() {
                 self.warnings.push(broken_end(&self.path, "its last line is not whole", count, last_s));
                 break;

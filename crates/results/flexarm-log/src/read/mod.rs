@@ -1,10 +1,10 @@
-//! Recordings read back: start at [`crate::open_recording`].
+//! Readers of recordings. Start at [`crate::open_recording`].
 //!
-//! What comes back of a run is said beside the table of formats (`formats/mod.rs`).
+//! The table of formats (`formats/mod.rs`) lists the contents that each format gives back.
 //!
-//! A file that a killed run left, or a copy that broke off, is read up to its break;
-//! [`crate::RunSource::warnings`] says so. What a format does not hold is not made up: numbers are
-//! NaN, lists empty, and [`crate::RunSource::missing`] lists it.
+//! A file left by a killed run, or an incomplete copy, is read up to the point where it breaks off;
+//! [`crate::RunSource::warnings`] reports this. Data that a format does not hold are not made up:
+//! numbers are NaN, lists are empty, and [`crate::RunSource::missing`] lists them.
 
 mod csv_table;
 #[cfg(feature = "mcap")]
@@ -23,7 +23,7 @@ pub(crate) use self::mcap_run::McapRun;
 pub(crate) use self::parquet_table::ParquetRun;
 use crate::LogError;
 
-/// A refusal in one's own words.
+/// Creates the error for a file that cannot be read as a recording.
 pub(crate) fn not_a_recording(path: &Path, found: impl Into<String>, expected: impl Into<String>) -> LogError {
     LogError::NotARecording {
         path: path.to_owned(),
@@ -33,7 +33,7 @@ pub(crate) fn not_a_recording(path: &Path, found: impl Into<String>, expected: i
     }
 }
 
-/// Where a recording breaks off, in words.
+/// Describes the point where a recording breaks off.
 fn broken_end(path: &Path, cause: &str, samples: u64, time_s: f64) -> String {
     match samples {
         0 => format!("{}: breaks off before the first sample ({cause})", path.display()),
@@ -41,13 +41,13 @@ fn broken_end(path: &Path, cause: &str, samples: u64, time_s: f64) -> String {
     }
 }
 
-/// The file's name without folder and ending: the robot's name where the file has none.
+/// Returns the file name without folder and extension: the robot's name where the file has none.
 pub(crate) fn stem(path: &Path) -> String {
     PathBuf::from(path.file_stem().unwrap_or_default()).display().to_string()
 }
 
-/// Time (s) and number of steps of a stamp. Stamps are whole nanoseconds; where the step is known,
-/// the time is that multiple of it to the last bit.
+/// Returns time (s) and step number of a stamp. Stamps are whole nanoseconds; where the step size
+/// is known, the time is the exact multiple of it.
 #[cfg(feature = "mcap")]
 fn exact_time(time_ns: u64, step_s: f64) -> (f64, u64) {
     let time_s = time_ns as f64 / 1e9;

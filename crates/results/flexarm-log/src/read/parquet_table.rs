@@ -1,4 +1,4 @@
-//! A Parquet file of a run, row group by row group.
+//! Reader of the Parquet file of a run, row group by row group.
 
 use std::fs::File;
 use std::path::Path;
@@ -14,7 +14,7 @@ use super::wall::caught;
 use crate::LogError;
 use crate::described_table::{Blocks, DescribedTable, TableRun};
 
-/// A run from a Parquet file.
+/// A run read from a Parquet file.
 pub(crate) type ParquetRun = TableRun<RowGroups>;
 
 impl ParquetRun {
@@ -34,11 +34,11 @@ impl ParquetRun {
     }
 }
 
-/// The row groups of a file.
+/// Row groups of a file.
 pub(crate) struct RowGroups(SerializedFileReader<File>);
 
 impl RowGroups {
-    /// All columns of the run must be numbers without gaps.
+    /// Checks that the columns of the run are plain numbers.
     fn check_columns(&self, path: &Path, places: &[usize]) -> Result<(), LogError> {
         let schema = self.0.metadata().file_metadata().schema_descr();
         for &place in places {
@@ -53,7 +53,7 @@ impl RowGroups {
         Ok(())
     }
 
-    /// Numbers of a column in a row group.
+    /// Reads the numbers of a column in a row group.
     fn column(&self, path: &Path, group: usize, place: usize, values: &mut Vec<f64>) -> Result<(), LogError> {
         let (mut present, mut levels) = (Vec::new(), Vec::new());
         let rows = read(path, || {
@@ -96,7 +96,7 @@ impl Blocks for RowGroups {
     }
 }
 
-/// Calls the library, which may panic on a damaged file.
+/// Calls the Parquet library, which may panic on a damaged file.
 pub(crate) fn read<T>(path: &Path, read: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, LogError> {
     match caught(read) {
         Ok(result) => result.map_err(|error| broken(path, error)),

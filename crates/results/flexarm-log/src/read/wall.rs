@@ -1,7 +1,7 @@
-//! The last wall before what a dependency makes of a damaged file.
+//! Conversion of panics in a dependency, caused by a damaged file, into errors.
 //!
-//! Sizes that a file claims are checked before a dependency sees them; what still goes wrong inside
-//! it ends here.
+//! Sizes claimed by a file are checked before a dependency sees them; what still goes wrong inside
+//! the dependency is caught here.
 
 use std::any::Any;
 use std::cell::Cell;
@@ -9,12 +9,12 @@ use std::panic::AssertUnwindSafe;
 use std::sync::Once;
 
 thread_local! {
-    /// Whether a panic of this thread is one that is caught here.
+    /// Whether a panic of the current thread is caught here.
     static CAUGHT: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Calls a reader of a dependency. A panic in it is an error in words, and says nothing by itself.
-/// What the reader has changed must not be used after an error.
+/// Calls a reader of a dependency. A panic in it becomes an error message and is not printed. Data
+/// changed by the reader must not be used after an error.
 pub(crate) fn caught<T>(read: impl FnOnce() -> T) -> Result<T, String> {
     static QUIET: Once = Once::new();
     QUIET.call_once(|| {
@@ -31,7 +31,7 @@ pub(crate) fn caught<T>(read: impl FnOnce() -> T) -> Result<T, String> {
     result.map_err(|panic| format!("its reader gave up: {}", message(panic.as_ref())))
 }
 
-/// What a panic says, on one short line.
+/// Returns the message of a panic, on one short line.
 fn message(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
     text.unwrap_or("without a word").chars().map(|c| if c.is_control() { ' ' } else { c }).take(120).collect()

@@ -1,53 +1,53 @@
-//! Colours of a recording: those of [`palette`] on a dark ground, and the scale for distances.
+//! Colours of a recording: those of [`palette`] on a dark background, and the scale for distances.
 
 use rerun::{Color, Rgba32};
 
 use flexarm_draw::palette::{self, Ground, Rgb};
 
-/// How much of the ghost is seen.
+/// Opacity of the rigid twin's surfaces.
 const GHOST_ALPHA: u8 = 0x68;
 
 fn opaque([red, green, blue]: Rgb) -> Color {
     Color(Rgba32::from_rgb(red, green, blue))
 }
 
-/// The axis x (0), y (1) or z (2).
+/// Colour of axis x (0), y (1) or z (2).
 pub(crate) fn axis(number: usize) -> Color {
     opaque(palette::axis(number, Ground::Dark))
 }
 
-/// A run, link, drive or joint by its number.
+/// Colour of a run, link, drive or joint by its number.
 pub(crate) fn series(number: usize) -> Color {
     opaque(palette::series(number, Ground::Dark))
 }
 
-/// One of the six components of what has this number.
+/// Colour of one of the six components of the item with this number.
 pub(crate) fn component(number: usize, component: usize) -> Color {
     opaque(palette::component(number, component, Ground::Dark))
 }
 
-/// A run, link, drive or joint by its number, fainter: what belongs to the rigid twin.
+/// Fainter colour of a run, link, drive or joint by its number, for the rigid twin.
 pub(crate) fn faint(number: usize) -> Color {
     opaque(palette::mix(palette::series(number, Ground::Dark), [0; 3], 0.45))
 }
 
-/// The rigid twin's lines.
+/// Colour of the rigid twin's lines.
 pub(crate) fn rigid() -> Color {
     opaque(palette::rigid(Ground::Dark))
 }
 
-/// The size of an error; marks and texts.
+/// Colour of error norms, marks and texts.
 pub(crate) fn total() -> Color {
     opaque(palette::total(Ground::Dark))
 }
 
-/// The rigid twin's surfaces: its grey, mostly transparent.
+/// Colour of the rigid twin's surfaces: its grey, mostly transparent.
 pub(crate) fn ghost() -> Rgba32 {
     let [red, green, blue] = palette::rigid(Ground::Dark);
     Rgba32::from_unmultiplied_rgba(red, green, blue, GHOST_ALPHA)
 }
 
-/// Colours for a distance: grey where there is none, over yellow to red.
+/// Colour scale for a distance: from grey at zero through yellow to red.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ColorScale {
     /// Distance of the last colour (m).
@@ -55,7 +55,8 @@ pub(crate) struct ColorScale {
 }
 
 impl ColorScale {
-    /// Number of steps; few enough that neighbouring instants often share one, too many to be seen.
+    /// Number of steps: few enough that neighbouring samples often share one, too many to be
+    /// noticed.
     pub(crate) const STEPS: u32 = 40;
     const STOPS: [[f64; 3]; 4] =
         [[168.0, 176.0, 190.0], [250.0, 214.0, 110.0], [240.0, 120.0, 48.0], [196.0, 22.0, 40.0]];

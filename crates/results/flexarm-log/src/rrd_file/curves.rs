@@ -1,4 +1,4 @@
-//! The curves of a run: which plots there are and what goes into them.
+//! Curves of a run, grouped by plot.
 
 use rerun::{Color, EntityPath, TimeColumn};
 
@@ -11,16 +11,16 @@ use crate::{RunHeader, Sample};
 
 /// All curves of a run.
 pub(crate) struct Curves {
-    /// The error, at every sample; in the order in which [`Curves::push_error`] fills them.
+    /// Curves of the error, at every sample, in the order of [`Curves::push_error`].
     error: Vec<ScalarTrack>,
-    /// All else, at the instants at which the robots are drawn; in the order of
+    /// All other curves, at the times at which the robots are drawn, in the order of
     /// [`Curves::push_causes`].
     causes: Vec<ScalarTrack>,
     has_rigid: bool,
 }
 
 impl Curves {
-    /// Curves below `root`.
+    /// Creates the curves below `root`.
     pub(crate) fn new(header: &RunHeader, root: &EntityPath) -> Self {
         let at = |parts: &[&str]| root.join(&path(parts));
         let curve = |group: &str, key: &str, name: &str, color: Color| {
@@ -55,7 +55,7 @@ impl Curves {
         }
         for element in &header.elements {
             let names = |parts: [&str; 6]| parts.map(|part| format!("{element} {part}")).to_vec();
-            // All elements are in one plot.
+            // One plot shows all elements.
             let number = header.color_number(element);
             let color = |part: usize| component(number, part);
             let deflections = names(["x [mm]", "y [mm]", "z [mm]", "rx [mrad]", "ry [mrad]", "rz [mrad]"]);
@@ -73,7 +73,7 @@ impl Curves {
         Self { error, causes: tracks, has_rigid: header.has_rigid }
     }
 
-    /// The size of the error alone, named for a study.
+    /// Creates the curves of the error norm only, named for a study.
     pub(crate) fn of_study(label: &str, root: &EntityPath, color: Color) -> Self {
         let curve = |group: &str| {
             ScalarTrack::new(root.join(&path(["study", group, label])), [format!("{label} [mm]")]).with_colors([color])
@@ -81,14 +81,14 @@ impl Curves {
         Self { error: vec![curve("error"), curve("lateral")], causes: Vec::new(), has_rigid: true }
     }
 
-    /// Adds a row of a study's curves: size of the error, and of its part across the path.
+    /// Adds a row of a study's curves: norm of the error, and of its component across the path.
     pub(crate) fn push_study(&mut self, sample: &Sample) {
         let [_, normal, binormal, ..] = sample.error_path;
         let rows = [size(&sample.error_world[..3]), size(&[normal, binormal])];
         self.error.iter_mut().zip(rows).for_each(|(track, value)| track.push([value * MILLI]));
     }
 
-    /// Adds a row of the error.
+    /// Adds a row of error curves.
     pub(crate) fn push_error(&mut self, sample: &Sample) {
         if !self.has_rigid {
             return;
@@ -99,7 +99,7 @@ impl Curves {
         self.error.iter_mut().zip(row).for_each(|(track, value)| track.push([value * MILLI]));
     }
 
-    /// Adds a row of all else.
+    /// Adds a row of all other curves.
     pub(crate) fn push_causes(&mut self, sample: &Sample) {
         let mut tracks = self.causes.iter_mut();
         let mut put = |values: &mut dyn Iterator<Item = f64>| {
@@ -125,18 +125,18 @@ impl Curves {
         put(&mut sample.solver.into_iter());
     }
 
-    /// Names and colours.
+    /// Writes names and colours.
     pub(crate) fn styles(&self, stream: &RrdStream) -> Result<()> {
         self.error.iter().chain(&self.causes).try_for_each(|track| track.style(stream))
     }
 
-    /// Writes the rows that wait and forgets them.
+    /// Writes the waiting rows and clears them.
     pub(crate) fn send(&mut self, stream: &RrdStream, times: &[TimeColumn], pose_times: &[TimeColumn]) -> Result<()> {
         self.error.iter_mut().try_for_each(|track| track.send(stream, times))?;
         self.causes.iter_mut().try_for_each(|track| track.send(stream, pose_times))
     }
 
-    /// Where each group of curves is, how high and low it goes, and its names.
+    /// Returns path, envelope and names of each group of curves.
     pub(crate) fn seen(&self) -> impl Iterator<Item = Seen> + '_ {
         self.error.iter().chain(&self.causes).map(ScalarTrack::seen)
     }

@@ -1,22 +1,22 @@
-//! Where a recording is looked at from.
+//! Initial viewpoint of a recording.
 
 use nalgebra::{Rotation3, Vector3};
 
 use crate::{RunHeader, Sample};
 
-/// Where the 3D view is seen from, and what is in its middle (m, world).
+/// Position and target of the 3D view's camera (m, world).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Eye {
     pub(crate) position: [f32; 3],
     pub(crate) target: [f32; 3],
 }
 
-/// How far beside the middle the scale of colours stands, and half its height, as shares of the
-/// distance of the eye: within a view that is wider than high, outside of the arm.
+/// Horizontal distance of the colour scale from the middle, and half its height, as fractions of
+/// the camera distance: within a view that is wider than high, outside the arm.
 const BESIDE: [f64; 2] = [0.62, 0.3];
 
 impl Eye {
-    /// Ends of an upright line at the left border of what is seen at first (m): foot and head.
+    /// End points of a vertical line at the left border of the initial view (m): bottom and top.
     pub(crate) fn beside(&self) -> [[f64; 3]; 2] {
         let [position, target] = [self.position, self.target].map(|p| Vector3::from(p.map(f64::from)));
         let ahead = target - position;
@@ -27,18 +27,18 @@ impl Eye {
     }
 }
 
-/// From where the line of sight is turned against the direction in which the arm reaches (rad):
-/// aside of the plane in which it stands at first, so that bending in that plane is seen.
+/// Angle about z from the direction in which the arm reaches to the camera direction (rad): out of
+/// the plane of the arm's first pose, so that bending in that plane is visible.
 const TURN_RAD: f64 = -1.15;
-/// Rise of the line of sight.
+/// Elevation of the camera (tangent of the angle).
 const RISE: f64 = 0.36;
-/// Distance of the eye in radii of the ball around everything: the viewer's field of view is 55
-/// degrees high, and the view about as wide as it is high.
+/// Distance of the camera in radii of the bounding sphere: the viewer's vertical field of view is
+/// 55 degrees, and the view is about as wide as it is high.
 const DISTANCE: f64 = 1.6;
-/// Bodies reach beyond their frames.
+/// Factor on the radius: bodies extend beyond their frames.
 const MARGIN: f64 = 1.08;
 
-/// A place to see all of a run from.
+/// Returns a viewpoint from which the whole run is visible.
 pub(crate) fn eye(header: &RunHeader, first: Option<&Sample>) -> Option<Eye> {
     let (base, tool) = match first {
         Some(sample) => {

@@ -1,9 +1,7 @@
-//! What the viewer shows when it opens a recording: the robots on the left, plots and text on the
-//! right.
+//! Initial layout of the viewer: the robots on the left, plots and text on the right.
 //!
-//! Written as the entities of a blueprint: the builder of the SDK (`rerun::blueprint`) cannot set
-//! the eye and the background of a 3D view, the legend and the axis of a plot, and the columns of a
-//! log.
+//! Written as entities of a blueprint: the SDK's builder (`rerun::blueprint`) cannot set the camera
+//! and the background of a 3D view, the legend and the axis of a plot, and the columns of a log.
 
 use rerun::external::re_sdk_types::blueprint::archetypes::{
     Background, ContainerBlueprint, EyeControls3D, PanelBlueprint, PlotLegend, ScalarAxis, TextLogColumns, TimeAxis,
@@ -25,22 +23,22 @@ const VIEW_PLOT: &str = "TimeSeries";
 const VIEW_TEXT: &str = "TextDocument";
 const VIEW_LOG: &str = "TextLog";
 
-/// Entities of the blueprint with their contents.
+/// Entities of the blueprint with their components.
 pub(crate) type Entities = Vec<(EntityPath, Box<dyn AsComponents>)>;
 
 /// A rectangle of the window.
 pub(crate) enum Part {
-    /// Parts side by side, with their shares of the width.
+    /// Parts side by side, with their fractions of the width.
     Row(Vec<(f32, Part)>),
-    /// Parts below each other, with their shares of the height.
+    /// Parts stacked vertically, with their fractions of the height.
     Column(Vec<(f32, Part)>),
-    /// Parts behind each other.
+    /// Parts as tabs.
     Tabs(Vec<Part>),
-    /// A view of entities: kind, title, origin, query.
+    /// A single view.
     View(View),
 }
 
-/// Something to look at.
+/// A view of entities: kind, title, origin, query.
 pub(crate) struct View {
     pub(crate) class: &'static str,
     pub(crate) title: String,
@@ -49,22 +47,22 @@ pub(crate) struct View {
 }
 
 impl Part {
-    /// The 3D view of the entities that `contents` selects.
+    /// Creates a 3D view of the entities selected by `contents`.
     pub(crate) fn scene(title: &str, origin: EntityPath, contents: Vec<String>) -> Self {
         Self::View(View { class: VIEW_3D, title: title.to_owned(), origin, contents })
     }
 
-    /// A list of messages.
+    /// Creates a list of messages.
     pub(crate) fn log(title: &str, origin: EntityPath) -> Self {
         Self::view(VIEW_LOG, title, origin)
     }
 
-    /// A plot of all scalars below `origin`.
+    /// Creates a plot of all scalars below `origin`.
     pub(crate) fn plot(title: &str, origin: EntityPath) -> Self {
         Self::view(VIEW_PLOT, title, origin)
     }
 
-    /// A text.
+    /// Creates a text view.
     pub(crate) fn text(title: &str, origin: EntityPath) -> Self {
         Self::view(VIEW_TEXT, title, origin)
     }
@@ -74,8 +72,8 @@ impl Part {
     }
 }
 
-/// The entities of a layout with `root` as the window, playing on `timeline`; without an eye the
-/// viewer chooses one.
+/// Returns the entities of a layout with `root` filling the window, playing on `timeline`, and the
+/// places of its plots. Without an eye the viewer chooses a viewpoint.
 pub(crate) fn entities(root: &Part, timeline: &str, eye: Option<Eye>) -> (Entities, Vec<PlotPlace>) {
     let mut layout = Layout { entities: Vec::new(), plots: Vec::new(), parts: 0, eye };
     let root_id = layout.add(root).id;
@@ -92,15 +90,15 @@ pub(crate) fn entities(root: &Part, timeline: &str, eye: Option<Eye>) -> (Entiti
     (layout.entities, layout.plots)
 }
 
-/// A plot in the layout: what it shows, and its place in the blueprint.
+/// A plot in the layout: origin of its entities, and its path in the blueprint.
 #[derive(Clone, Debug)]
 pub(crate) struct PlotPlace {
     origin: EntityPath,
     path: String,
 }
 
-/// For each plot an axis that shows all its curves with labels, and a corner in which their names
-/// hide nothing.
+/// Returns, for each plot, an axis that shows all its curves with labels, and a corner where the
+/// legend hides no curve.
 pub(crate) fn rooms(plots: &[PlotPlace], seen: &[Seen]) -> Entities {
     let mut entities: Entities = Vec::new();
     for plot in plots {
@@ -128,7 +126,7 @@ struct Layout {
     eye: Option<Eye>,
 }
 
-/// A part that has its place in the blueprint.
+/// A part placed in the blueprint.
 struct Placed {
     id: rerun::datatypes::Uuid,
     path: String,
@@ -139,7 +137,7 @@ impl Layout {
         self.entities.push((EntityPath::from(path), Box::new(what)));
     }
 
-    /// Adds a part with everything in it.
+    /// Adds a part and its children.
     fn add(&mut self, part: &Part) -> Placed {
         match part {
             Part::Row(parts) => {
@@ -169,14 +167,14 @@ impl Layout {
         let contents = ViewContents::new(view.contents.iter().map(String::as_str));
         self.log(&format!("{}/ViewContents", placed.path), contents);
         if view.class == VIEW_PLOT {
-            // All plots zoom together; the legend gets its place when the curves are known
-            // ([`rooms`]).
+            // The time axes of all plots zoom together; the legend gets its final corner once the
+            // curves are known ([`rooms`]).
             self.log(&format!("{}/PlotLegend", placed.path), PlotLegend::new().with_corner(Corner2D::LeftTop));
             self.log(&format!("{}/TimeAxis", placed.path), TimeAxis::new().with_link(LinkAxis::LinkToGlobal));
             self.plots.push(PlotPlace { origin: view.origin.clone(), path: placed.path.clone() });
         }
         if view.class == VIEW_LOG {
-            // All messages are of one entity: its path says nothing.
+            // All messages are on one entity, so its path is of no use.
             let column = |kind, visible: bool| TextLogColumn { visible: visible.into(), kind };
             let columns = TextLogColumns::new().with_text_log_columns([
                 column(TextLogColumnKind::EntityPath, false),
@@ -190,7 +188,7 @@ impl Layout {
             self.log(&format!("{}/EyeControls3D", placed.path), eye);
         }
         if view.class == VIEW_3D {
-            // A plain dark ground on which grey, yellow and red stand out alike.
+            // A plain dark background with good contrast to grey, yellow and red.
             let background = Background::new(BackgroundKind::SolidColor).with_color([26, 28, 33]);
             self.log(&format!("{}/Background", placed.path), background);
         }
@@ -201,7 +199,8 @@ impl Layout {
         placed
     }
 
-    /// The next free place. The viewer wants identifiers in the form of a random UUID; these count.
+    /// Reserves the next place. The viewer requires identifiers in the form of a random UUID; these
+    /// are counted up.
     fn place(&mut self, kind: &str) -> Placed {
         self.parts += 1;
         let mut bytes = [0x40; 16];

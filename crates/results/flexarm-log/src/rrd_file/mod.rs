@@ -1,9 +1,9 @@
 //! Runs as a Rerun recording (.rrd): robots with their meshes, plots, text and a window layout.
 //!
-//! Start at [`RrdRecorder`] for one run and [`RrdStudy`] for several in one view. [`run`] holds
-//! what a run shows, made of [`robot`]s and [`curves`]; [`tracks`] holds rows until they are worth
-//! a chunk; [`window`] says what the viewer shows, [`layout`] writes that down; [`stream`] writes
-//! the file. Only this module names the `rerun` crate, which breaks about monthly.
+//! Start at [`RrdRecorder`] for one run and [`RrdStudy`] for several in one view. [`run`] holds the
+//! contents of a run, made of [`robot`]s and [`curves`]; [`tracks`] buffers rows until they are
+//! worth a chunk; [`window`] defines the layout of the viewer, [`layout`] encodes it; [`stream`]
+//! writes the file. Only this module uses the `rerun` crate, whose interface changes about monthly.
 
 mod colors;
 mod curves;
@@ -32,11 +32,11 @@ use crate::{CreateOptions, LogError, RunHeader, RunResult, Sample};
 
 pub use self::study::{RrdStudy, StudySeat};
 
-/// Samples whose rows are written together, and fewer after which they are written because time has
-/// passed: enough for compression, few enough for quick reading.
+/// Number of waiting samples at which rows are written, and the smaller number at which they are
+/// written when a flush is due: enough for compression, few enough for quick reading.
 const CHUNK_ROWS: [usize; 2] = [1024, 128];
-/// The same of a long run, which is one with more than so many writings: the SDK keeps a list of
-/// all chunks in memory.
+/// The same for a long run, which is one with more than [`SHORT_WRITINGS`] writes: the SDK keeps a
+/// list of all chunks in memory.
 const LONG_CHUNK_ROWS: [usize; 2] = [8 * 1024, 1024];
 const SHORT_WRITINGS: usize = 16;
 
@@ -44,33 +44,33 @@ const SHORT_WRITINGS: usize = 16;
 ///
 /// | entity | contents |
 /// | --- | --- |
-/// | `/<robot>/magnified/<link>` | the flexible arm with its deflections multiplied by [`RunHeader::magnification`], every place in the colour of its real distance from the rigid twin |
-/// | `/<robot>/magnified/color_scale` | the colours with their distances |
-/// | `/<robot>/magnified/error` | arrow from the rigid tool centre point to the magnified one, with the real error as text |
-/// | `/<robot>/flexible/<link>`, `/<robot>/rigid/<link>` | pose in the world at true scale; below it the link's meshes, those of the rigid twin as a ghost |
-/// | `/<robot>/<robot of the three>/<link>/<mesh>/bending`, `.../far` | surface of a link that bends: what lies between its interfaces, corner by corner, and what is rigid with the far one |
-/// | `/<robot>/<robot of the three>/tcp` | pose of the tool centre point |
-/// | `/<robot>/path/{magnified,flexible,rigid,peak}` | ways of the tool centre point, coloured by the error, and the place of the largest one |
+/// | `/<robot>/magnified/<link>` | the flexible arm with its deflections multiplied by [`RunHeader::magnification`], coloured by the real distance from the rigid twin |
+/// | `/<robot>/magnified/color_scale` | the colour scale with its distances |
+/// | `/<robot>/magnified/error` | arrow from the rigid TCP to the magnified one, with the real error as text |
+/// | `/<robot>/flexible/<link>`, `/<robot>/rigid/<link>` | pose in the world at true scale; below it the link's meshes, those of the rigid twin transparent |
+/// | `/<robot>/<robot of the three>/<link>/<mesh>/bending`, `.../far` | surface of a flexible link: the part between its interfaces, vertex by vertex, and the part rigid with the distal one |
+/// | `/<robot>/<robot of the three>/tcp` | pose of the TCP |
+/// | `/<robot>/path/{magnified,flexible,rigid,peak}` | TCP paths, coloured by the error, and the place of its maximum |
 /// | `/plots/tcp_error/{x,y,z,norm}`, `/plots/tcp_error_path/{tangential,normal,binormal}` | TCP error, in **mm** |
 /// | `/plots/tcp_error_rotation/{x,y,z}` | its rotation vector, in **mrad** |
-/// | `/plots/contributions` | size of each flexible link's and drive's share of the error, in **mm** |
+/// | `/plots/contributions` | norm of the contribution of each flexible link and drive to the error, in **mm** |
 /// | `/plots/joints/{position,velocity}`, `/plots/joints/effort/{flexible,rigid}` | in rad (m), rad/s (m/s), in N m (N) |
 /// | `/plots/elastic/<element>`, `/plots/elastic_load/<element>` | deflection, in **mm** and **mrad**; load, in N and N m |
 /// | `/plots/energy`, `/plots/solver` | in J; iterations and residual |
-/// | `/caption`, `/<robot>/caption` | in a recording of modes: name and frequency of the one that swings; such a recording has no curves |
-/// | `/scenery/<view>/<name>` | what stands still around the robot, such as the points of a map |
-/// | `/events` | moves, largest error, settling, limits |
+/// | `/caption`, `/<robot>/caption` | in a recording of modes: name and frequency of the current mode; such a recording has no curves |
+/// | `/scenery/<view>/<name>` | fixed objects around the robot, such as the points of a map |
+/// | `/events` | moves, maximum error, settling, limits |
 /// | `/summary`, `/urdf` | result and set-up, and the robot's description, as text |
 ///
-/// Errors and deflections are in millimetres and milliradians because people read them here; the
-/// other formats are for programs and keep metres and radians. Curves have every sample; poses at
-/// most 200 a second, in single precision, which is all the viewer has: that is 1e-6 m on an arm of
-/// a few metres. A bent surface is written whenever a corner has moved by 0.1 mm (by a 1500th of
-/// the scene on the magnified arm); what is rigid with its ends always.
+/// Errors and deflections are in millimetres and milliradians, for human readers; the other formats
+/// are for programs and keep metres and radians. Curves have every sample; poses at most 200 per
+/// second, in the single precision of the viewer: 1e-6 m on an arm of a few metres. A bent surface
+/// is written whenever a vertex has moved by 0.1 mm (by a 1500th of the scene on the magnified
+/// arm); the parts rigid with its ends at every pose.
 ///
 /// Timelines: `sim_time` (a duration) and `step`. The identifier of the recording is a hash of the
-/// header. Equal runs give equal entities, times and values; how rows are grouped into chunks, and
-/// the identifiers of these, differ.
+/// header. Equal runs give equal entities, times and values; the grouping of rows into chunks and
+/// the chunk identifiers differ.
 pub type RrdRecorder = FileRecorder<RrdFile>;
 
 impl OpenFile for RrdFile {
@@ -119,7 +119,7 @@ impl RrdFile {
 }
 
 impl Drop for RrdFile {
-    /// A run that was given up still gets its last rows and its index; errors have nowhere to go.
+    /// Writes the last rows and the index of an abandoned run; errors cannot be reported here.
     fn drop(&mut self) {
         if !self.closed {
             let _ = self.end(&RunResult::default());
@@ -127,11 +127,11 @@ impl Drop for RrdFile {
     }
 }
 
-/// A recording in its file.
+/// A recording with its output file.
 pub(crate) struct Store {
     stream: RrdStream,
     flush: FlushClock,
-    /// Plots of the layout, once it is written, and the curves of all runs that are finished.
+    /// Plots of the layout, once it is written, and the curves of all finished runs.
     plots: Vec<PlotPlace>,
     seen: Vec<Seen>,
 }
@@ -142,7 +142,7 @@ impl Store {
         Ok(Self { stream, flush: options.flush_clock(path), plots: Vec::new(), seen: Vec::new() })
     }
 
-    /// Writes what is said once about a recording.
+    /// Writes the data stored once in a recording.
     fn describe(&self, header: &RunHeader, seat: &Seat) -> Result<()> {
         let stream = &self.stream;
         stream.name(&match (seat, header.trajectory.is_empty()) {
@@ -160,8 +160,7 @@ impl Store {
         stream.constant(&path(["urdf"]), &urdf)
     }
 
-    /// Gives the plots room for their curves and for the names of these, now that all are known,
-    /// and ends the file.
+    /// Sets axis ranges and legend corners, now that all curves are known, and ends the file.
     fn finish(&mut self) -> Result<()> {
         let rooms = layout::rooms(&self.plots, &self.seen);
         if !rooms.is_empty() {
@@ -171,13 +170,13 @@ impl Store {
     }
 }
 
-/// The rows of one run on their way into a recording.
+/// Writes the rows of one run into a recording.
 pub(crate) struct RunWriter {
     header: RunHeader,
     shape: Shape,
     tracks: RunTracks,
     writings: usize,
-    /// The layout, until it is written: with the first sample, which shows where the robot is.
+    /// The layout until it is written with the first sample, whose pose sets the viewpoint.
     layout: Option<Part>,
     tools_due: bool,
 }
@@ -189,7 +188,7 @@ impl RunWriter {
         store.stream.flush()?;
         let has_layout = matches!(seat, Seat::Alone | Seat::InStudy(0, _));
         let layout = has_layout.then(|| window::window(header, &seat, labels));
-        // Surfaces and files are in the recording now.
+        // Surfaces and files are in the recording now; free their memory.
         let header = RunHeader { meshes: Vec::new(), attachments: Vec::new(), urdf: String::new(), ..header.clone() };
         Ok(Self { shape: Shape::of(&header), header, tracks, writings: 0, layout, tools_due: true })
     }
@@ -225,8 +224,8 @@ impl RunWriter {
         Ok(())
     }
 
-    /// Writes the layout if that has not happened yet, with the robot of this sample in the
-    /// picture.
+    /// Writes the layout, unless it is written already, with a viewpoint that fits the pose of this
+    /// sample.
     fn layout(&mut self, store: &mut Store, first: Option<&Sample>) -> Result<()> {
         let Some(window) = self.layout.take() else { return Ok(()) };
         let (entities, plots) = layout::entities(&window, SIM_TIME, eye::eye(&self.header, first));
@@ -234,7 +233,7 @@ impl RunWriter {
         store.stream.show(&entities, 0)
     }
 
-    /// Writes what waits, the paths and the marks.
+    /// Writes the waiting rows, the paths and the marks.
     fn finish(&mut self, store: &mut Store, result: &RunResult) -> Result<()> {
         self.layout(store, None)?;
         self.tracks.close();
@@ -245,8 +244,8 @@ impl RunWriter {
     }
 }
 
-/// The text panel: the result once it is known, then the set-up. A list, because its lines break
-/// where the panel ends.
+/// Returns the text panel: the result once it is known, then the set-up. A list, because lists wrap
+/// at the edge of the panel.
 fn summary(description: &str, result: &RunResult) -> String {
     if result.readable.is_empty() {
         return description.to_owned();
@@ -256,12 +255,12 @@ fn summary(description: &str, result: &RunResult) -> String {
     result.readable.iter().map(line).collect::<String>() + "\n" + description
 }
 
-/// An entity path of parts that may hold any character.
+/// Builds an entity path from parts that may hold any character.
 pub(crate) fn path<S: AsRef<str>>(parts: impl IntoIterator<Item = S>) -> EntityPath {
     EntityPath::from_iter(parts.into_iter().map(|part| part.as_ref().into()))
 }
 
-/// Entity name of a link. Names that a robot's own entities have are for those.
+/// Returns the entity name of a link; names of a robot's own entities get a prefix.
 pub(crate) fn link_part(name: &str) -> String {
     match name {
         "tcp" | "skeleton" | "error" | "color_scale" => format!("link_{name}"),
@@ -269,8 +268,9 @@ pub(crate) fn link_part(name: &str) -> String {
     }
 }
 
-/// FNV-1a of all that a header says, files included, and of the labels of a study: the same set-up
-/// gives the same recording, and a viewer that has two of different set-ups keeps them apart.
+/// FNV-1a hash of texts, names, numbers and attached files of the header, and of the labels of a
+/// study: the same set-up gives the same recording identifier, and a viewer keeps recordings of
+/// different set-ups apart.
 fn content_hash(header: &RunHeader, labels: &[String]) -> u64 {
     const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
     const PRIME: u64 = 0x0000_0100_0000_01b3;

@@ -1,5 +1,5 @@
-//! One of the robots of a recording: rigid twin, flexible arm, or the flexible arm with its
-//! deflections magnified.
+//! One of the robots of a recording: rigid twin, flexible arm, or flexible arm with magnified
+//! deflections.
 
 use flexarm_kinematics::{Pose, rotation_vector};
 use nalgebra::{Point3, Vector3};
@@ -13,32 +13,32 @@ use super::{link_part, path};
 use crate::{LinkMesh, RunHeader, Sample, TwinSample};
 use flexarm_draw::{BendLine, BentMesh, BentPieces, stations_in_link};
 
-/// How a robot is painted.
+/// Colouring of a robot.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Paint {
-    /// In the colours of its meshes.
+    /// Colours of the meshes.
     Own,
     /// Transparent.
     Ghost,
-    /// Every place in the colour of its distance from the rigid twin.
+    /// Coloured by the distance from the rigid twin.
     Deviation(ColorScale),
-    /// All in one colour, seen through if it says so.
+    /// One colour, possibly transparent.
     Plain(Color),
 }
 
-/// A robot's place in the recording and how it looks.
+/// Place and appearance of a robot in the recording.
 #[derive(Clone, Debug)]
 pub(crate) struct Look {
-    /// Entity below which its links are.
+    /// Parent entity of its links.
     pub(crate) root: EntityPath,
     pub(crate) paint: Paint,
-    /// Whether links bend; otherwise their surfaces stay as they are.
+    /// Whether links are drawn bent; otherwise their surfaces stay undeformed.
     pub(crate) bends: bool,
-    /// A bent surface is written again when a corner has moved by more than this (m).
+    /// Vertex displacement above which a bent surface is written again (m).
     pub(crate) tolerance_m: f64,
-    /// Shortest time between two writings of a bent surface (ns).
+    /// Minimum time between two writes of a bent surface (ns).
     pub(crate) every_ns: i64,
-    /// Corners of bent surfaces are rounded to this (m), for the compression; 0 keeps them.
+    /// Rounding of the vertices of bent surfaces (m), for better compression; 0 for none.
     pub(crate) quantum_m: f32,
 }
 
@@ -49,31 +49,31 @@ pub(crate) struct RobotTracks {
     tcp: PoseTrack,
     bent: Vec<BentTracks>,
     tints: Vec<(usize, Point3<f64>, TintTrack)>,
-    /// Only for a robot without meshes, which would not be seen.
+    /// Only for a robot without meshes, which would be invisible otherwise.
     skeleton: Option<SkeletonTrack>,
 }
 
-/// A surface between the ends of a flexible link.
+/// Surface between the interfaces of a flexible link.
 struct BentTracks {
-    /// Link, first of its stations in [`TwinSample::X_WS`], number of stations.
+    /// Link, index of its first station in [`TwinSample::X_WS`], number of stations.
     link: usize,
     stations: (usize, usize),
     middle: BentMesh,
     shape: ShapeTrack,
     far: PoseTrack,
-    /// Colours of the part between, and of what is beyond.
+    /// Colours of the bending part, and of the part beyond it.
     tint: Option<(TintTrack, TintTrack)>,
-    /// Stations that were written last.
+    /// Stations at the last write.
     written: Option<Vec<Pose>>,
-    /// When (ns).
+    /// Time of the last write (ns).
     last: Option<i64>,
 }
 
-/// Places along a bent link at which its colour is computed.
+/// Number of positions along a bent link at which its colour is computed.
 const TINTS: usize = 32;
 
 impl RobotTracks {
-    /// Returns the tracks of a robot; writes what never changes about it.
+    /// Creates the tracks of a robot; writes its constant data.
     pub(crate) fn new(header: &RunHeader, look: Look, stream: &RrdStream) -> Result<Self> {
         let at = |what: &str| look.root.join(&path([what]));
         let pairs = header.links.iter().enumerate();
@@ -83,7 +83,7 @@ impl RobotTracks {
             Paint::Plain(color) => color,
             Paint::Own | Paint::Deviation(_) => colors::series(1),
         };
-        // Frames without a surface are told once, by the robot at true scale.
+        // Frames without a surface are written once, by the robot at true scale.
         let shown = |(k, _): &(usize, &crate::LinkInfo)| {
             matches!(look.paint, Paint::Own) || header.meshes.iter().any(|mesh| mesh.link == *k)
         };
@@ -127,7 +127,7 @@ impl RobotTracks {
                 stream.constant(&entity, &self.painted(&near))?;
                 self.tint(mesh.link, &near, entity);
             }
-            // The corners of the part that bends come with time.
+            // The vertices of the bending part are written later, as functions of time.
             let shape = ShapeTrack::new(middle_at.clone(), middle.mesh.positions.len());
             let line = middle.line();
             let place = |p: &[f32; 3]| line.place(&Vector3::from(p.map(f64::from))) / line.length();
@@ -156,7 +156,7 @@ impl RobotTracks {
         Ok(())
     }
 
-    /// Lets the colour of a rigid surface change with time, if it is to tell the deviation.
+    /// Adds a time-dependent colour to a rigid surface, if the robot is coloured by the deviation.
     fn tint(&mut self, link: usize, mesh: &LinkMesh, entity: EntityPath) {
         if let Paint::Deviation(_) = self.look.paint {
             let sum: Vector3<f64> = mesh.positions.iter().map(|p| Vector3::from(p.map(f64::from))).sum();
@@ -172,7 +172,7 @@ impl RobotTracks {
             Rgba32::from_unmultiplied_rgba(red, green, blue, alpha)
         };
         match self.look.paint {
-            // Its back faces only: they are hidden wherever the flexible robot is in the same
+            // Draw back faces only: they are hidden wherever the flexible robot is in the same
             // place.
             Paint::Ghost => {
                 surface.with_albedo_factor(AlbedoFactor(colors::ghost())).with_face_rendering(MeshFaceRendering::Back)
@@ -183,8 +183,8 @@ impl RobotTracks {
         }
     }
 
-    /// A surface that takes its colours from a strip which comes with time; `along` says from where
-    /// on it, 0 to 1.
+    /// Returns a surface coloured by a strip that changes with time; `along` is the position of
+    /// each vertex on the strip, 0 to 1.
     fn strip(&self, mesh: &LinkMesh, width: usize, along: impl Iterator<Item = f32>) -> Mesh3D {
         if !matches!(self.look.paint, Paint::Deviation(_)) {
             return self.painted(mesh);
@@ -193,19 +193,19 @@ impl RobotTracks {
         surface.with_albedo_texture_format(TintTrack::format(width))
     }
 
-    /// Whether its colours tell how far it is from the rigid twin, and it has surfaces that show
-    /// them.
+    /// Whether the robot is coloured by its distance from the rigid twin and has surfaces that show
+    /// it.
     pub(crate) fn is_colored(&self) -> bool {
         matches!(self.look.paint, Paint::Deviation(_)) && self.skeleton.is_none()
     }
 
-    /// Entity below which it is.
+    /// Parent entity of the robot.
     pub(crate) fn root(&self) -> &EntityPath {
         &self.look.root
     }
 
-    /// The tool as a line from the frame that carries it to the tool centre point: most robot files
-    /// have no mesh for it.
+    /// Writes the tool as a line from the frame of its link to the TCP: most robot files have no
+    /// mesh for it.
     pub(crate) fn tool(&self, X_TL: &Pose, stream: &RrdStream) -> Result<()> {
         const SHORTEST_M: f64 = 0.01;
         if X_TL.translation.vector.norm() < SHORTEST_M {
@@ -221,8 +221,8 @@ impl RobotTracks {
         stream.constant(&self.look.root.join(&path(["tcp", "tool"])), &line)
     }
 
-    /// Adds an instant. `twin` is what is drawn; `sample` says how far places really are from the
-    /// rigid twin.
+    /// Adds a sample. `twin` is the robot as drawn; `sample` has the real poses for the distance
+    /// from the rigid twin.
     pub(crate) fn push(&mut self, when: Instant, twin: &TwinSample, sample: &Sample) {
         for (link, track) in &mut self.links {
             track.push(when, &twin.X_WL[*link]);
@@ -288,16 +288,16 @@ impl BentTracks {
     }
 }
 
-/// Whether a corner may have moved by more than a tolerance (m).
+/// Whether a vertex may have moved by more than a tolerance (m).
 fn moved(before: &[Pose], now: &[Pose], length: f64, tolerance_m: f64) -> bool {
     before.iter().zip(now).any(|(a, b)| {
         let turn = rotation_vector((a.rotation.inverse() * b.rotation).matrix()).norm();
-        // Corners lie a fraction of the length beside the line.
+        // Vertices are assumed within 0.2 of the length of the line.
         (a.translation.vector - b.translation.vector).norm() + 0.2 * length * turn > tolerance_m
     })
 }
 
-/// Colours along a bent link: how far its line is from where the rigid twin has it.
+/// Returns the colours along a bent link: distance of its line from that of the rigid twin.
 fn tints(line: &BendLine, real: &[Pose], sample: &Sample, link: usize, scale: ColorScale) -> [[u8; 3]; TINTS] {
     let (X_flexible, X_rigid) = (&sample.flexible.X_WL[link], &sample.rigid.X_WL[link]);
     let bent = line.bent(real);

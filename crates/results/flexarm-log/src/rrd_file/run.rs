@@ -1,4 +1,4 @@
-//! One run in a recording: its robots, ways of the tool, curves and events.
+//! One run in a recording: its robots, TCP paths, curves and events.
 
 use rerun::{
     Color, EntityPath, LineStrip3D, LineStrips3D, Points3D, Radius, Scalars, SeriesPoints, TextDocument, TextLog,
@@ -17,17 +17,17 @@ use crate::poses::{PoseClock, Shown, size};
 use crate::{Event, EventKind, RunHeader, RunResult, Sample, TwinSample};
 use flexarm_draw::Magnifier;
 
-/// What a run is in its recording.
+/// Role of a run in its recording.
 #[derive(Clone, Debug)]
 pub(crate) enum Seat {
-    /// The only one.
+    /// The only run.
     Alone,
-    /// One of a study's, counted from 0, with its label.
+    /// A run of a study, with its number from 0 and its label.
     InStudy(usize, String),
 }
 
 impl Seat {
-    /// Entity below which the robots of the run are.
+    /// Parent entity of the robots of the run.
     pub(crate) fn root(&self, header: &RunHeader) -> EntityPath {
         match self {
             Self::Alone => path([&header.robot]),
@@ -43,17 +43,17 @@ impl Seat {
     }
 }
 
-/// A robot with the way of its tool.
+/// A robot with its TCP path.
 struct Drawn {
     robot: Option<RobotTracks>,
     way: PathTrack,
     way_color: Option<Color>,
 }
 
-/// Everything of a run that changes with time.
+/// All time-dependent data of a run.
 pub(crate) struct RunTracks {
     root: EntityPath,
-    /// Of every sample, and of those in which the robots are drawn.
+    /// Times of all samples, and of those at which the robots are drawn.
     times: Times,
     pose_times: Times,
     flexible: Drawn,
@@ -63,28 +63,28 @@ pub(crate) struct RunTracks {
     enlarged: TwinSample,
     arrow: Option<ArrowTrack>,
     scale: ColorScale,
-    /// Of every run that is alone or the first of its study.
+    /// Present for a single run or the first run of a study.
     curves: Option<Curves>,
     study_curves: Option<Curves>,
-    /// What is shown has no size: nothing is told about errors.
+    /// Whether the shapes shown have an arbitrary scale (modes), so that no errors are shown.
     shapes: bool,
-    /// Which samples have poses; curves have all.
+    /// Selects the samples with poses; curves have all samples.
     clock: PoseClock,
-    /// Instant of the last sample if it has not been drawn.
+    /// Time of the last sample if it has not been drawn.
     now: Option<Instant>,
-    /// The same with the sample, once it is kept.
+    /// The same once the sample is kept.
     undrawn: Option<Instant>,
     last: Sample,
-    /// Largest error so far (m), its instant, and where the tool is drawn then.
+    /// Maximum error so far (m), its time, and the drawn position of the TCP.
     peak: Option<(f64, Instant, [f32; 3])>,
 }
 
-/// Sizes on the screen, as lengths in the scene (m).
+/// Tolerances of the drawing, as lengths in the scene (m).
 struct Fineness {
     pixel_m: f64,
-    /// How far a corner of an arm at true scale moves unseen.
+    /// Displacement of a vertex of an arm at true scale that is not noticed.
     true_tolerance_m: f64,
-    /// To which places of magnified arms are rounded.
+    /// Rounding of the vertices of magnified arms.
     quantum_m: f32,
 }
 
@@ -93,16 +93,16 @@ impl Fineness {
         const PIXELS: f64 = 800.0;
         let extent = header.volume.map_or(3.0, |[low, high]| size(&[0, 1, 2].map(|c| high[c] - low[c])));
         let pixel_m = extent / PIXELS;
-        // Of arms that bend by centimetres in proportion; of arms of a few centimetres a pixel is
-        // less.
+        // Proportional to the scale for arms with deflections of centimetres, at most one pixel for
+        // arms of a few centimetres.
         let true_tolerance_m = (0.02 * header.color_scale_m).max(1e-4).min(pixel_m);
-        // A power of two, so that rounded numbers are short.
+        // A power of two, so that rounded numbers compress well.
         let quantum_m = (0.5 * pixel_m).log2().floor().exp2() as f32;
         Self { pixel_m, true_tolerance_m, quantum_m }
     }
 }
 
-/// The first run of a study is solid, the others are seen through.
+/// The first run of a study is opaque, the others are transparent.
 fn magnified_paint(seat: &Seat, scale: ColorScale) -> Paint {
     match (seat, seat.color()) {
         (Seat::InStudy(0, _), Some(color)) => Paint::Plain(color),
@@ -115,7 +115,7 @@ fn magnified_paint(seat: &Seat, scale: ColorScale) -> Paint {
 }
 
 impl RunTracks {
-    /// Returns the tracks of a run; writes what never changes about it.
+    /// Creates the tracks of a run; writes its constant data.
     pub(crate) fn new(header: &RunHeader, seat: &Seat, stream: &RrdStream) -> Result<Self> {
         let root = seat.root(header);
         let at = |what: &str| root.join(&path([what]));
@@ -126,7 +126,7 @@ impl RunTracks {
         let Fineness { pixel_m, true_tolerance_m, quantum_m } = Fineness::of(header);
 
         let robot = |name: &str, paint: Paint, bends: bool, tolerance_m: f64, quantum_m: f32| {
-            // At true scale bending is hardly seen; a surface for every picture would be wasted.
+            // At true scale bending is hardly visible; a surface for every frame would be wasteful.
             let every_ns = if quantum_m > 0.0 { 10_000_000 } else { 100_000_000 };
             let look = Look { root: at(name), paint, bends, tolerance_m, every_ns, quantum_m };
             RobotTracks::new(header, look, stream).map(Some)
@@ -134,7 +134,7 @@ impl RunTracks {
         let with_magnified = header.has_rigid && header.magnification > 0.0;
         let flexible = Drawn {
             robot: match alone || !with_magnified {
-                // Deflections that are drawn as they are and coloured are large ones: modes.
+                // Unmagnified deflections with a colour scale are large: modes.
                 true if header.has_rigid && !with_magnified && header.color_scale_m > 0.0 => {
                     robot("flexible", Paint::Deviation(scale), true, pixel_m, quantum_m)?
                 }
@@ -200,13 +200,13 @@ impl RunTracks {
         })
     }
 
-    /// Writes what is known of the robots with the first sample: their tools, and where the scale
-    /// of their colours stands.
+    /// Writes the data of the robots that need the first sample: captions, tools, and the position
+    /// of the colour scale.
     pub(crate) fn tools(&self, header: &RunHeader, first: &Sample, stream: &RrdStream) -> Result<()> {
         self.captions(header, first, stream)?;
         self.tool_lines(header, first, stream)?;
         let colored = std::iter::once(&self.flexible).chain(&self.magnified).filter_map(|drawn| drawn.robot.as_ref());
-        // Shapes of modes have no size: their colours are no millimetres.
+        // Mode shapes have an arbitrary scale: their colours are not millimetres.
         let mut colored = colored.filter(|robot| robot.is_colored() && header.captions.is_empty());
         if let (Some(robot), Some(eye)) = (colored.next_back(), eye(header, Some(first))) {
             color_bar(robot.root(), self.scale, &eye, stream)?;
@@ -221,7 +221,7 @@ impl RunTracks {
         drawn.filter_map(|drawn| drawn.robot.as_ref()).try_for_each(|robot| robot.tool(&X_TL, stream))
     }
 
-    /// Names of what is shown: beside the tool, and as a text of their own.
+    /// Writes the captions, next to the TCP and as a text entity.
     fn captions(&self, header: &RunHeader, first: &Sample, stream: &RrdStream) -> Result<()> {
         for caption in &header.captions {
             let step = (caption.from_s * header.log_rate_hz).round() as i64;
@@ -231,7 +231,7 @@ impl RunTracks {
                 .with_colors([colors::total()])
                 .with_labels([caption.text.as_str()])
                 .with_show_labels(true);
-            // Where poses change with the captions, the scenery names the places.
+            // In a map, where poses change with the captions, the scenery labels the places.
             if header.scenery.is_empty() {
                 stream.single(&self.root.join(&path(["caption"])), &when, &label)?;
             }
@@ -241,7 +241,7 @@ impl RunTracks {
         Ok(())
     }
 
-    /// Adds an instant.
+    /// Adds a sample.
     pub(crate) fn push(&mut self, when: Instant, sample: &Sample) {
         self.times.push(when);
         if let Some(curves) = &mut self.curves {
@@ -267,7 +267,7 @@ impl RunTracks {
         self.undrawn = None;
     }
 
-    /// Keeps the sample that was pushed last, unless it is drawn.
+    /// Keeps the last sample, unless it has been drawn.
     pub(crate) fn keep(&mut self, sample: &Sample) {
         self.undrawn = self.now;
         if self.undrawn.is_some() {
@@ -275,7 +275,7 @@ impl RunTracks {
         }
     }
 
-    /// Draws the last sample, if that has not happened.
+    /// Draws the last sample, unless it has been drawn.
     pub(crate) fn close(&mut self) {
         if let Some(when) = self.undrawn.take() {
             let last = std::mem::take(&mut self.last);
@@ -310,7 +310,7 @@ impl RunTracks {
         }
     }
 
-    /// Where each group of curves is, how high and low it goes, and its names.
+    /// Returns path, envelope and names of each group of curves.
     pub(crate) fn seen(&self) -> Vec<Seen> {
         let mut seen: Vec<Seen> = self.curves.iter().chain(&self.study_curves).flat_map(Curves::seen).collect();
         if let (Some((error, when, _)), Some(_)) = (&self.peak, &self.curves) {
@@ -320,12 +320,12 @@ impl RunTracks {
         seen
     }
 
-    /// Number of samples whose rows wait.
+    /// Number of samples whose rows are waiting.
     pub(crate) fn waiting(&self) -> usize {
         self.times.rows()
     }
 
-    /// Writes the rows that wait and forgets them.
+    /// Writes the waiting rows and clears them.
     pub(crate) fn send(&mut self, stream: &RrdStream) -> Result<()> {
         self.drawn_mut().try_for_each(|track| track.send(stream))?;
         let (times, pose_times) = (self.times.columns(), self.pose_times.columns());
@@ -336,7 +336,7 @@ impl RunTracks {
         Ok(())
     }
 
-    /// Writes the rows of those tracks that take much memory.
+    /// Writes the rows of tracks that take much memory.
     pub(crate) fn send_large(&mut self, stream: &RrdStream) -> Result<()> {
         self.drawn_mut().filter(|track| track.is_large()).try_for_each(|track| track.send(stream))
     }
@@ -360,7 +360,7 @@ impl RunTracks {
         })
     }
 
-    /// The largest error as a mark on the way and in the plot, and what happened when.
+    /// Writes the maximum error as a mark on the path and in the plot, and the events.
     pub(crate) fn marks(&self, stream: &RrdStream, result: &RunResult) -> Result<()> {
         if let Some((error, when, place)) = &self.peak {
             let label = peak_label(*error, *when);
@@ -387,7 +387,7 @@ impl RunTracks {
     }
 }
 
-/// Writes what happened when.
+/// Writes the events with their times.
 fn events(events: &[Event], stream: &RrdStream) -> Result<()> {
     if events.is_empty() {
         return Ok(());
@@ -409,7 +409,8 @@ fn peak_label(error_m: f64, (nanoseconds, _): Instant) -> String {
     format!("peak {:.3} mm at {:.3} s", 1e3 * error_m, nanoseconds as f64 * 1e-9)
 }
 
-/// The scale of the colours, upright beside the robot as it is seen at first, with its numbers.
+/// Writes the colour scale with its numbers, as a vertical bar beside the robot in the initial
+/// view.
 fn color_bar(root: &EntityPath, scale: ColorScale, eye: &Eye, stream: &RrdStream) -> Result<()> {
     let [foot, head] = eye.beside();
     let at = |share: f64| [0, 1, 2].map(|c| (foot[c] + (head[c] - foot[c]) * share) as f32);
@@ -420,7 +421,7 @@ fn color_bar(root: &EntityPath, scale: ColorScale, eye: &Eye, stream: &RrdStream
     let bar = LineStrips3D::new((0..steps).map(piece))
         .with_colors((0..steps).map(color))
         .with_radii([Radius::new_ui_points(5.0)]);
-    // Tenths of micrometres are enough, and rounding is not shown.
+    // Round to 1e-4 mm, to hide rounding errors.
     let mm = |share: f64| (1e7 * scale.full_m * share).round() / 1e4;
     let labels = [format!("{}", mm(0.0)), format!("{} mm", mm(0.5)), format!("{} mm off the rigid arm", mm(1.0))];
     let numbers = Points3D::new([0.0, 0.5, 1.0].map(at))

@@ -1,4 +1,4 @@
-//! What stands still around a robot: points, surfaces and ellipsoids of a map, a view for each
+//! Fixed objects around a robot: points, surfaces and ellipsoids of a map, with a view for each
 //! group.
 
 use crate::{RunHeader, Scenery, SceneryForm};
@@ -11,10 +11,10 @@ use super::path;
 use super::stream::{Result, RrdStream};
 
 const ROOT: &str = "scenery";
-/// Folder of what all views show.
+/// Folder of the objects shown in all views.
 const EVERYWHERE: &str = "everywhere";
 
-/// A view for each title, beside them what is shown now and the text.
+/// Lays out one view per title, beside them the current caption and the summary.
 pub(super) fn window(header: &RunHeader, robot: &EntityPath) -> Part {
     let mut titles: Vec<&str> = Vec::new();
     for scenery in &header.scenery {
@@ -31,7 +31,7 @@ pub(super) fn window(header: &RunHeader, robot: &EntityPath) -> Part {
     Part::Row(vec![(3.0, scenes), (1.6, Part::Column(right))])
 }
 
-/// Writes a thing that stands still.
+/// Writes a fixed object.
 pub(super) fn write(stream: &RrdStream, scenery: &Scenery) -> Result<()> {
     let view = if scenery.view.is_empty() { EVERYWHERE } else { &scenery.view };
     stream.constant(&path([ROOT, view, &scenery.name]), &*archetype(&scenery.form))

@@ -1,4 +1,5 @@
-//! An .rrd file through the Rerun SDK: a recording and the blueprint with the layout of the window.
+//! Writer of an .rrd file through the Rerun SDK: a recording, and the blueprint with the window
+//! layout.
 
 use std::fs::OpenOptions;
 use std::io::{self, Write};
@@ -16,7 +17,7 @@ use super::layout::Entities;
 
 const APPLICATION: &str = "flexarm";
 
-/// Why something could not be written.
+/// An error of writing to the stream.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum StreamError {
     #[error(transparent)]
@@ -36,12 +37,12 @@ pub(crate) struct RrdStream {
     path: PathBuf,
     recording: RecordingStream,
     blueprint: RecordingStream,
-    /// Messages of the blueprint that are not in the file yet.
+    /// Blueprint messages not yet in the file.
     layout: MemorySinkStorage,
 }
 
 impl RrdStream {
-    /// Starts the file. Viewers keep recordings of different `id` apart.
+    /// Creates the file. Viewers keep recordings with different `id` apart.
     pub(crate) fn create(path: &Path, id: &str) -> Result<Self> {
         let builder = |id: String| {
             let source = StoreSource::Other(concat!("flexarm ", env!("CARGO_PKG_VERSION")).to_owned());
@@ -60,12 +61,12 @@ impl RrdStream {
         Ok(self.recording.send_recording_name(name)?)
     }
 
-    /// Writes what holds at all times; the last one written wins.
+    /// Writes data valid at all times; a later call replaces it.
     pub(crate) fn constant(&self, path: &EntityPath, what: &dyn AsComponents) -> Result<()> {
         Ok(self.recording.log_static(path.clone(), what)?)
     }
 
-    /// Writes what holds from one time on.
+    /// Writes data valid from one time on.
     pub(crate) fn single(&self, path: &EntityPath, when: &TimePoint, what: &dyn AsComponents) -> Result<()> {
         let chunk = Chunk::builder(path.clone()).with_archetype(RowId::new(), when.clone(), what).build()?;
         self.recording.send_chunk(chunk);
@@ -82,8 +83,8 @@ impl RrdStream {
         Ok(self.recording.send_columns(path.clone(), times, columns)?)
     }
 
-    /// Writes entities of the layout and shows it, now and by default. What is written later
-    /// replaces what was there.
+    /// Writes entities of the layout and activates it, now and by default. Entities written later
+    /// replace earlier ones.
     pub(crate) fn show(&self, entities: &Entities, version: i64) -> Result<()> {
         self.blueprint.set_time_sequence("blueprint", version);
         for (path, what) in entities {
@@ -96,10 +97,10 @@ impl RrdStream {
         Ok(())
     }
 
-    /// Waits until everything is in the file.
+    /// Waits until all data are in the file.
     ///
     /// # Errors
-    /// The thread of the SDK that writes has given up.
+    /// The SDK's writer thread has failed.
     pub(crate) fn flush(&self) -> Result<()> {
         self.recording.flush_blocking().map_err(|error| self.broken(&error).into())
     }
@@ -110,16 +111,16 @@ impl RrdStream {
         let length = || self.path.metadata().ok().map(|file| file.len());
         let before = length();
         self.recording.disconnect();
-        // The SDK does not say whether the index was written. It is never empty; a file that was
-        // removed has no length.
+        // The SDK does not report whether the index was written. It is never empty; the length of a
+        // removed file is unknown.
         match length().is_none_or(|length| Some(length) > before) {
             true => Ok(()),
             false => Err(self.broken(&"the index is missing").into()),
         }
     }
 
-    /// Returns why the file cannot be written, which the SDK says only to its log: writing more
-    /// fails alike.
+    /// Returns why the file cannot be written, which the SDK only logs: a further write fails the
+    /// same way.
     fn broken(&self, error: &dyn std::fmt::Display) -> io::Error {
         let probe = || {
             let mut file = OpenOptions::new().append(true).open(&self.path)?;

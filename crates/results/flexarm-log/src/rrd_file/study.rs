@@ -1,4 +1,4 @@
-//! Several runs in one recording, one over the other.
+//! Several runs in one recording, drawn over each other.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -9,11 +9,11 @@ use super::run::Seat;
 use super::{RunWriter, Store, content_hash, path, stream_error};
 use crate::{CreateOptions, LogError, Recorder, RunHeader, RunResult, Sample};
 
-/// A recording of several runs: each has its arm in a colour of its own (deflections magnified),
-/// the way of its tool and its error; the first one all curves and the rigid twin too.
+/// A recording of several runs: each has its arm in its own colour (deflections magnified), its TCP
+/// path and its error; the first one also all curves and the rigid twin.
 ///
 /// The runs are recorded one after another, each through its [`StudySeat`]; time starts at zero for
-/// all of them.
+/// each.
 pub struct RrdStudy {
     path: PathBuf,
     options: CreateOptions,
@@ -22,16 +22,16 @@ pub struct RrdStudy {
 }
 
 impl RrdStudy {
-    /// A study that will write `path`, with a label for each run; the file is created when the
-    /// first run begins.
+    /// Creates a study for `path`, with a label for each run; the file is created when the first
+    /// run begins.
     pub fn create(path: impl Into<PathBuf>, options: CreateOptions, labels: Vec<String>) -> Self {
         Self { path: path.into(), options, labels, store: Arc::default() }
     }
 
-    /// The recorder of the run with this number.
+    /// Returns the recorder of the run with this number.
     ///
     /// # Panics
-    /// If there is no label of that number.
+    /// If there is no label with this number.
     #[must_use]
     pub fn seat(&self, number: usize) -> StudySeat {
         StudySeat {
@@ -59,7 +59,7 @@ impl RrdStudy {
 }
 
 impl Drop for RrdStudy {
-    /// A study that was given up still gets its index; errors have nowhere to go.
+    /// Writes the index of an abandoned study; errors cannot be reported here.
     fn drop(&mut self) {
         if let Some(mut store) = lock(&self.store).take() {
             let _ = store.finish();
@@ -80,7 +80,7 @@ pub struct StudySeat {
 impl Recorder for StudySeat {
     fn check(&self) -> Result<(), LogError> {
         match lock(&self.store).is_some() {
-            true => Ok(()), // ours
+            true => Ok(()), // created by this study
             false => self.options.check(&self.path),
         }
     }
@@ -119,7 +119,7 @@ impl Recorder for StudySeat {
         let mut shared = lock(&self.store);
         match (shared.as_mut(), self.run.take()) {
             (Some(store), Some(mut run)) => {
-                // Into the file at once: the next run may take long, or fail.
+                // Flush at once: the next run may take long, or fail.
                 let written = run.finish(store, result).and_then(|()| store.stream.flush());
                 written.map_err(stream_error(&self.path, "write the end of a run"))
             }
@@ -133,7 +133,7 @@ impl Recorder for StudySeat {
 }
 
 impl Drop for StudySeat {
-    /// A run that was given up still gets its last rows; errors have nowhere to go.
+    /// Writes the last rows of an abandoned run; errors cannot be reported here.
     fn drop(&mut self) {
         if let (Some(store), Some(mut run)) = (lock(&self.store).as_mut(), self.run.take()) {
             let _ = run.finish(store, &RunResult::default());

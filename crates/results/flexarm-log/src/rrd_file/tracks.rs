@@ -1,4 +1,4 @@
-//! Rows that wait to be written as columns: one track for each entity that changes with time.
+//! Rows waiting to be written as columns: one track per time-dependent entity.
 
 use flexarm_kinematics::Pose;
 use nalgebra::UnitQuaternion;
@@ -14,7 +14,7 @@ use crate::plot_room::Envelope;
 /// Name of the timeline of simulated time.
 pub(crate) const SIM_TIME: &str = "sim_time";
 
-/// An instant: simulated time (ns), step.
+/// Time of a sample: simulated time (ns), step.
 pub(crate) type Instant = (i64, i64);
 
 /// Times of waiting rows.
@@ -46,18 +46,18 @@ impl Times {
     }
 }
 
-/// A track with times of its own: rows only where something changes.
+/// A track with its own times: rows only where something changes.
 pub(crate) trait Track {
-    /// Whether the rows that wait are worth a chunk by their size.
+    /// Whether the waiting rows are large enough for a chunk.
     fn is_large(&self) -> bool {
         false
     }
 
-    /// Writes the rows that wait, if any, and forgets them.
+    /// Writes the waiting rows, if any, and clears them.
     fn send(&mut self, stream: &RrdStream) -> Result<()>;
 }
 
-/// A moving frame. Instants at which it has not moved are left out.
+/// A moving frame. Samples at which it has not moved are left out.
 #[derive(Debug)]
 pub(crate) struct PoseTrack {
     path: EntityPath,
@@ -101,13 +101,13 @@ impl Track for PoseTrack {
     }
 }
 
-/// The colours of a surface, as a strip from its near end to its far end; rows only where they
+/// Colours of a surface, as a strip from its proximal to its distal end; rows only where they
 /// change.
 #[derive(Debug)]
 pub(crate) struct TintTrack {
     path: EntityPath,
     times: Times,
-    /// Strip after strip, each as long as the last one.
+    /// Concatenated strips of equal length.
     strips: Vec<u8>,
     last: Vec<u8>,
     next: Vec<u8>,
@@ -128,7 +128,7 @@ impl TintTrack {
         }
     }
 
-    /// What says that a strip is `width` pixels of a picture.
+    /// Image format of a strip of `width` pixels.
     pub(crate) fn format(width: usize) -> ImageFormat {
         ImageFormat::rgb8([width as u32, 1])
     }
@@ -148,7 +148,7 @@ impl Track for TintTrack {
     }
 }
 
-/// The corners of a surface that changes its shape.
+/// Vertices of a surface that changes its shape.
 #[derive(Debug)]
 pub(crate) struct ShapeTrack {
     path: EntityPath,
@@ -188,7 +188,7 @@ impl Track for ShapeTrack {
     }
 }
 
-/// An arrow with a text at it.
+/// An arrow with a label.
 #[derive(Debug)]
 pub(crate) struct ArrowTrack {
     path: EntityPath,
@@ -210,7 +210,7 @@ impl ArrowTrack {
         self.labels.push(label);
     }
 
-    /// Colour and width.
+    /// Writes colour and width.
     pub(crate) fn style(&self, stream: &RrdStream, color: Color) -> Result<()> {
         let style = Arrows3D::update_fields()
             .with_colors([color])
@@ -249,7 +249,7 @@ pub(crate) struct SkeletonTrack {
 }
 
 impl SkeletonTrack {
-    /// Line width in points of the screen.
+    /// Line radius (screen points).
     const RADIUS: f32 = 3.0;
 
     pub(crate) fn new(path: EntityPath, color: Color, pairs: Vec<(usize, usize)>) -> Self {
@@ -263,7 +263,7 @@ impl SkeletonTrack {
         self.lines.extend(self.pairs.iter().map(line));
     }
 
-    /// Colour and width of the lines.
+    /// Writes colour and width of the lines.
     pub(crate) fn style(&self, stream: &RrdStream) -> Result<()> {
         let style =
             LineStrips3D::update_fields().with_colors([self.color]).with_radii([Radius::new_ui_points(Self::RADIUS)]);
@@ -285,12 +285,12 @@ impl Track for SkeletonTrack {
     }
 }
 
-/// What is to be known of curves to give them room in a plot.
+/// Data about curves needed to choose range and legend of a plot.
 #[derive(Clone, Debug)]
 pub(crate) struct Seen {
     pub(crate) path: EntityPath,
     pub(crate) envelope: Envelope,
-    /// Letters of each name.
+    /// Number of letters of each name.
     pub(crate) names: Vec<usize>,
 }
 
@@ -327,7 +327,7 @@ impl ScalarTrack {
         Seen { path: self.path.clone(), envelope: self.envelope.clone(), names }
     }
 
-    /// Names and colours of the curves.
+    /// Writes names and colours of the curves.
     pub(crate) fn style(&self, stream: &RrdStream) -> Result<()> {
         let mut lines = SeriesLines::new().with_names(self.names.iter().map(String::as_str));
         if !self.colors.is_empty() {
@@ -336,7 +336,7 @@ impl ScalarTrack {
         stream.constant(&self.path, &lines)
     }
 
-    /// Writes the rows that wait, at these times, and forgets them.
+    /// Writes the waiting rows, at these times, and clears them.
     pub(crate) fn send(&mut self, stream: &RrdStream, times: &[TimeColumn]) -> Result<()> {
         if self.values.is_empty() {
             return Ok(());
@@ -348,23 +348,22 @@ impl ScalarTrack {
     }
 }
 
-/// The way of a point through the whole run, drawn as one line, or in pieces whose colour is a
-/// value.
+/// Path of a point through the whole run, drawn as one line, or in pieces coloured by a value.
 #[derive(Debug)]
 pub(crate) struct PathTrack {
     path: EntityPath,
     points: Vec<([f32; 3], f64)>,
-    /// Only every so many samples become a point.
+    /// Number of samples per point.
     stride: u64,
     seen: u64,
 }
 
 impl PathTrack {
-    /// Points at which the line is thinned out to half of them: finer than a screen shows.
+    /// Number of points at which every second one is removed: finer than a screen shows.
     const LIMIT: usize = 6_000;
-    /// Pieces with a colour of their own.
+    /// Maximum number of pieces with their own colour.
     const PIECES: usize = 300;
-    /// Line width in points of the screen, whatever the distance.
+    /// Line radius (screen points), independent of the distance.
     const RADIUS: f32 = 1.5;
 
     pub(crate) fn new(path: EntityPath) -> Self {
@@ -386,16 +385,16 @@ impl PathTrack {
         }
     }
 
-    /// The whole line in one colour.
+    /// Writes the whole line in one colour.
     pub(crate) fn line(&self, stream: &RrdStream, color: Color) -> Result<()> {
         let line = LineStrip3D::from_iter(self.points.iter().map(|(point, _)| *point));
         self.strips(stream, [line], [color])
     }
 
-    /// The line in pieces, each in the colour of its largest value.
+    /// Writes the line in pieces, each coloured by its maximum value.
     pub(crate) fn colored(&self, stream: &RrdStream, color: impl Fn(f64) -> Color) -> Result<()> {
         let size = self.points.len().div_ceil(Self::PIECES).max(1);
-        // A piece ends where the next begins.
+        // Adjacent pieces share a point.
         let piece = |k: usize| &self.points[k * size..((k + 1) * size + 1).min(self.points.len())];
         let pieces = (0..self.points.len().div_ceil(size)).map(piece);
         let (lines, colors): (Vec<_>, Vec<_>) = pieces

@@ -1,4 +1,4 @@
-//! What the viewer shows of a run, or of several: robots on the left, plots and text on the right.
+//! Layout of the viewer for one or several runs: robots on the left, plots and text on the right.
 
 use rerun::EntityPath;
 
@@ -7,7 +7,7 @@ use super::run::Seat;
 use super::{path, scenery};
 use crate::RunHeader;
 
-/// The robots, below them the result; beside them the error and its causes.
+/// Lays out the robots with the result below, and the error and its causes beside them.
 pub(crate) fn window(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part {
     if !header.scenery.is_empty() {
         return scenery::window(header, &seat.root(header));
@@ -16,7 +16,7 @@ pub(crate) fn window(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part
         return shapes(&seat.root(header));
     }
     let plot = |title: &str, parts: &[&str]| Part::plot(title, path(["plots"].iter().chain(parts)));
-    // What a study shows of its first run alone says so.
+    // Plots of the first run of a study carry its label.
     let own = |title: &str| match seat {
         Seat::Alone => title.to_owned(),
         Seat::InStudy(_, label) => format!("{label}: {}{}", title[..1].to_lowercase(), &title[1..]),
@@ -34,8 +34,8 @@ pub(crate) fn window(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part
     ];
     // A recording of modes has neither a path nor events.
     let moves = !header.contributors.is_empty() || header.magnification > 0.0 || header.elements.is_empty();
-    // Two plots below each other, no more: the viewer labels an axis at powers of ten where there
-    // is little room.
+    // At most two plots below each other: with little space the viewer labels an axis at powers
+    // of ten only.
     let errors = match seat {
         Seat::InStudy(..) => vec![
             plot("TCP error of all runs [mm]", &["study", "error"]),
@@ -66,7 +66,7 @@ pub(crate) fn window(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part
     Part::Row(vec![(3.0, left), (2.0, Part::Column(right))])
 }
 
-/// Shapes that have no size: the robot, what it shows now, and the list of all.
+/// Lays out mode shapes: the robot, the current caption, and the list of all.
 fn shapes(root: &EntityPath) -> Part {
     let title = "Shapes without a size (colour: how far a place moves, grey not at all, red most)";
     let scene = Part::scene(title, root.clone(), vec![format!("+ {root}/**")]);
@@ -74,7 +74,7 @@ fn shapes(root: &EntityPath) -> Part {
     Part::Row(vec![(3.0, scene), (2.0, Part::Column(right))])
 }
 
-/// Magnified and at life size, one behind the other.
+/// Lays out the magnified robot and the one at true scale as tabs.
 fn robots(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part {
     let factor = header.magnification;
     if let Seat::InStudy(..) = seat {

@@ -1,7 +1,8 @@
-//! A made-up robot with three links and a motion of two seconds: input for recorders, not physics.
+//! A synthetic robot with three links and a motion of two seconds: input for recorders, not
+//! physics.
 //!
-//! The upper arm gives way like a damped oscillator that the motion's acceleration pushes, so that
-//! the files show what real ones do: an error while the arm speeds up and slows down, and ringing
+//! The upper arm deflects like a damped oscillator driven by the motion's acceleration, so that the
+//! files look like real ones: an error during acceleration and deceleration, and ringing
 //! afterwards.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, pose of L in W")]
 #![allow(dead_code, reason = "every test and the example use their own part")]
@@ -16,18 +17,18 @@ use flexarm_log::{
 };
 use nalgebra::{Rotation3, Translation3, Vector3};
 
-/// Samples per second.
+/// Sampling rate (Hz).
 pub(crate) const RATE_HZ: f64 = 500.0;
-/// Step of the made-up stepper (s).
+/// Step size of the fictitious stepper (s).
 pub(crate) const STEP_S: f64 = 1e-4;
-/// Number of samples of the whole run: two seconds with both ends.
+/// Number of samples of the whole run: two seconds, including both ends.
 pub(crate) const SAMPLES: u64 = 1001;
 
 const BASE_HEIGHT: f64 = 0.4;
 const UPPER_ARM: f64 = 0.8;
 const FOREARM: f64 = 0.6;
 
-/// The run's header, with meshes and metadata.
+/// Header of the run, with meshes and metadata.
 pub(crate) fn header() -> RunHeader {
     let link = |name: &str, parent, fixed| LinkInfo { name: name.into(), parent, fixed };
     let links = vec![
@@ -82,7 +83,7 @@ pub(crate) fn header() -> RunHeader {
     }
 }
 
-/// Result figures for `finish`.
+/// Result of the run for `finish`.
 pub(crate) fn result() -> RunResult {
     let event = |time_s, kind, text: &str| Event { time_s, kind, text: text.into() };
     RunResult {
@@ -108,7 +109,7 @@ pub(crate) fn sample(step: u64) -> Sample {
     let q = [1.2 * s - 0.6, -0.9 + 0.7 * s, 1.2 - 0.5 * s];
     let qdot = [1.2 * v, 0.7 * v, -0.5 * v];
 
-    // Bending about y from weight and motion, about z from the turning column; ringing after the
+    // Bending about y from gravity and motion, about z from the turning column; ringing after the
     // stop.
     let since_stop = (time_s - 1.2).max(0.0);
     let ringing = if time_s > 1.2 { (-4.0 * since_stop).exp() * (TAU * 9.0 * since_stop).sin() } else { 0.0 };
@@ -136,8 +137,8 @@ pub(crate) fn sample(step: u64) -> Sample {
     }
 }
 
-/// The first so many samples of which poses are written: every 6 ms at 500 samples a second, those
-/// with a larger error than all before, and the last.
+/// The samples among the first `count` whose poses are written: every 6 ms at 500 samples per
+/// second, those with a larger error than all before, and the last.
 pub(crate) fn samples_with_poses(count: u64) -> Vec<u64> {
     let error = |step: u64| sample(step).error_world[..3].iter().map(|part| part * part).sum::<f64>().sqrt();
     let mut largest = -1.0;
@@ -150,14 +151,14 @@ pub(crate) fn samples_with_poses(count: u64) -> Vec<u64> {
     (0..count).filter(|step| has_poses(*step)).collect()
 }
 
-/// A path for a test's file; nothing is there.
+/// Returns a path for a test's file, with nothing there.
 pub(crate) fn scratch(name: &str) -> PathBuf {
     let path = std::env::temp_dir().join(format!("flexarm-log-{}-{name}", std::process::id()));
     std::fs::remove_file(&path).ok();
     path
 }
 
-/// Quintic from 0 to 1 within 1.2 s, its velocity and acceleration.
+/// Quintic from 0 to 1 within 1.2 s, with velocity and acceleration.
 fn swing(time_s: f64) -> (f64, f64, f64) {
     const DURATION: f64 = 1.2;
     let x = (time_s / DURATION).min(1.0);
@@ -167,7 +168,7 @@ fn swing(time_s: f64) -> (f64, f64, f64) {
     (s, v, a)
 }
 
-/// Forward kinematics with the upper arm's end displaced by `deflection`.
+/// Forward kinematics with the upper arm's distal end displaced by `deflection`.
 fn twin(q: [f64; 3], qdot: [f64; 3], deflection: [f64; 6]) -> TwinSample {
     let [x, y, z, rx, ry, rz] = deflection;
     let move_by = |x, y, z| Pose::from_parts(Translation3::new(x, y, z), Rotation3::identity());

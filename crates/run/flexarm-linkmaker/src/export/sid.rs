@@ -1,5 +1,5 @@
-//! Export as Standard Input Data: the modal link, which has the mass that the other formats
-//! condense.
+//! Export as Standard Input Data: the modal link, with the full mass distribution that the other
+//! formats condense.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -16,16 +16,15 @@ use crate::{LinkError, stamp};
 pub(super) fn export(job: &ExportJob, link: &ReducedLink, started: Instant) -> Result<ExportSummary, LinkError> {
     let details = link.details.as_deref();
     let Some(modal) = details.and_then(|details| details.modal.as_ref()) else {
-        let what = "has no [modal] section, and SID is nothing else: reduce the mesh again with this version (flexarm reduce), \
-                    or export its matrices in another format";
+        let what = "has no [modal] section, which SID requires: reduce the mesh again with this version (flexarm \
+                    reduce), or export its matrices in another format";
         return Err(LinkError::file(&job.link, what));
     };
     let mut warnings = Vec::new();
     let riding: f64 = details.map_or(0.0, |details| details.attached.iter().map(|body| body.mass).sum());
     if riding > 0.0 {
-        warnings.push(format!(
-            "bodies of {riding:.4} kg that ride on the link are not in the SID, which is the link alone"
-        ));
+        warnings
+            .push(format!("attached bodies of {riding:.4} kg are not in the SID, which contains only the link itself"));
     }
     if !modal.has_second_order() {
         warnings.push(crate::import::SECOND_ORDER_UNKNOWN.into());
@@ -51,8 +50,8 @@ pub(super) fn export(job: &ExportJob, link: &ReducedLink, started: Instant) -> R
     let paths: Vec<PathBuf> = texts.iter().map(|(path, _)| path.clone()).collect();
     check_free(&paths, job.overwrite)?;
 
-    // Back as every import reads it, before anything is written: what cannot be read leaves no
-    // file.
+    // Read the text back with the code of every import before writing any file: data that cannot be
+    // read leave no file.
     let origin = paths[0].display().to_string();
     let back = parse_sid(&texts[0].1, &origin).map_err(Box::new)?.in_units(&job.units, &UnitSystem::SI);
     let back = modal_link_held_at(&link.name, &back, ids[0]).map_err(Box::new)?;
@@ -60,7 +59,7 @@ pub(super) fn export(job: &ExportJob, link: &ReducedLink, started: Instant) -> R
     let integrals_error = integrals(modal, &back);
     for (what, error) in [("stiffness", stiffness_error), ("mass", mass_error), ("integrals", integrals_error)] {
         if error.is_nan() || error > ExportFormat::Sid.digits() {
-            warnings.push(format!("the {what} read back differs by {error:.1e} (relative to its diagonal)"));
+            warnings.push(format!("the exported {what}, read back, differs by {error:.1e} (relative to its diagonal)"));
         }
     }
     write_all(&texts)?;
@@ -91,8 +90,8 @@ pub(super) fn export(job: &ExportJob, link: &ReducedLink, started: Instant) -> R
     })
 }
 
-/// Largest difference of the mass integrals, relative to the sizes that mass, inertia and modal
-/// mass give them.
+/// Maximum difference of the mass integrals, relative to the magnitudes given by mass, inertia and
+/// modal mass.
 fn integrals(a: &ModalLink, b: &ModalLink) -> f64 {
     let n = a.coordinates();
     if b.coordinates() != n {
@@ -129,14 +128,14 @@ fn integrals(a: &ModalLink, b: &ModalLink) -> f64 {
     if lost { f64::INFINITY } else { worst }
 }
 
-/// What the format does not say.
+/// Returns the text with frames, units and coordinates, which the format does not hold.
 fn readme(job: &ExportJob, link: &ReducedLink, modal: &ModalLink, map: &str) -> String {
     let units = &job.units;
     let mut text = format!(
-        "Link {}, written by flexarm export as {}\n\nbody reference frame: the link frame, tangent at interface A, whose node does \
-         not move\naxes: those of the link\nunits: {units} (length-mass-time; forces follow: 1 unit = {} N); angles in rad\n\
-         Gr, Ge: column (axis-1) nq + mode; Oe: xx yy zz xy yz xz; De is empty\n\nmap for flexarm import: {} \"{map}\" {} \
-         {units}\n\nshape coordinates:\n",
+        "Link {}, written by flexarm export as {}\n\nbody reference frame: the link frame, a tangent frame at \
+         interface A, whose node is fixed in it\naxes: parallel to the link frame\nunits: {units} \
+         (length-mass-time; derived unit of force = {} N); angles in rad\nGr, Ge: column (axis-1) nq + mode; Oe: \
+         xx yy zz xy yz xz; De is empty\n\nmap for flexarm import: {} \"{map}\" {} {units}\n\nshape coordinates:\n",
         link.name,
         job.format.name(),
         units.force(),

@@ -1,4 +1,4 @@
-//! Full models: rows or nodes of the interfaces are found, everything else is condensed.
+//! Full models: locates rows or nodes of the interfaces and condenses all other rows.
 
 use std::collections::HashMap;
 
@@ -14,7 +14,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::words::{ImportMap, NodeChoice};
 use crate::LinkError;
 
-/// Whether more than the interfaces is in the matrices, so that they must be condensed.
+/// Whether the matrices have more than the interface coordinates, so that they must be condensed.
 pub(super) fn is_full(imported: &ImportedMatrices, map: Option<&InterfaceMap>) -> bool {
     let rows = &imported.stiffness.rows;
     let physical = rows.iter().filter(|label| label.dof > 0 && label.node.is_some_and(|node| node >= 0)).count();
@@ -23,7 +23,7 @@ pub(super) fn is_full(imported: &ImportedMatrices, map: Option<&InterfaceMap>) -
     matches!(imported.stiffness.entries, Entries::Sparse(_)) || physical > limit
 }
 
-/// What to type where the map of a full model is missing.
+/// Proposes a map, as a text to type, for a full model without one.
 pub(super) fn propose(imported: &ImportedMatrices) -> String {
     let setting = Setting::Map;
     if is_solid(imported) && !imported.positions.is_empty() {
@@ -32,9 +32,9 @@ pub(super) fn propose(imported: &ImportedMatrices) -> String {
         let list = if sets.is_empty() { "none".into() } else { sets.join(", ") };
         let (low, high) = box_of(imported);
         return format!(
-            "choose the nodes of each interface, which are tied rigidly: {setting} A=set:NAME,B=set:NAME with the sets of \
-             the file ({list}), or by planes such as {setting} \"A=plane({},0,0;1,0,0),B=plane({},0,0;1,0,0)\"; the nodes \
-             lie between {:?} and {:?}",
+            "select the nodes of each interface, which are tied rigidly: {setting} A=set:NAME,B=set:NAME with the \
+             node sets of the file ({list}), or planes such as {setting} \
+             \"A=plane({},0,0;1,0,0),B=plane({},0,0;1,0,0)\"; the nodes extend from {:?} to {:?}",
             low.x,
             high.x,
             <[f64; 3]>::from(low),
@@ -46,12 +46,12 @@ pub(super) fn propose(imported: &ImportedMatrices) -> String {
     nodes.dedup();
     match nodes[..] {
         [.., a, b, c, d] => format!(
-            "give {setting} with the reference nodes: CalculiX has them after *RIGID BODY, REF NODE= (translations) and \
-             ROT NODE= (rotations); if they are the last nodes of the model: {setting} \
-             A={a}:1-3+{b}:1-3,B={c}:1-3+{d}:1-3; with six components per node: {setting} A={c},B={d}"
+            "set {setting} to the reference nodes: CalculiX defines them with *RIGID BODY, REF NODE= \
+             (translations) and ROT NODE= (rotations); if they are the last nodes of the model: {setting} \
+             A={a}:1-3+{b}:1-3,B={c}:1-3+{d}:1-3; with six degrees of freedom per node: {setting} A={c},B={d}"
         ),
         _ => format!(
-            "the rows have no node numbers; give the list of rows too (.dof, .mapping), or {setting} A=#1-6,B=#7-12"
+            "the rows have no node numbers; also give the list of rows (.dof, .mapping), or {setting} A=#1-6,B=#7-12"
         ),
     }
 }
@@ -66,19 +66,21 @@ fn box_of(imported: &ImportedMatrices) -> (Vector3<f64>, Vector3<f64>) {
     points.fold((first, first), |(low, high), p| (low.inf(p), high.sup(p)))
 }
 
-/// Frames of the interfaces as the reduction needs them.
+/// Interface frames and options for the reduction.
 pub(super) struct Target<'a> {
     pub(super) units: UnitSystem,
     pub(super) frames: Vec<InterfaceFrame>,
-    /// Axes of the matrices in link axes.
+    /// Rotation from matrix axes to link axes.
     pub(super) R_LM: &'a Matrix3<f64>,
     pub(super) modes: usize,
 }
 
-/// The model reduced to its interfaces, matrix axes; frames are those of the link.
+/// Reduces a model to its interfaces. The result is in matrix axes; its frames are those of the
+/// link.
 ///
 /// # Errors
-/// [`LinkError::Files`] for a map that does not fit, [`LinkError::Import`] from the reduction.
+/// [`LinkError::Files`] for a map that does not match the model, [`LinkError::Import`] from the
+/// reduction.
 pub(super) fn reduce(
     imported: &ImportedMatrices,
     map: &ImportMap,
@@ -86,7 +88,7 @@ pub(super) fn reduce(
 ) -> Result<Superelement, LinkError> {
     let refuse = |what: String| LinkError::file(&imported.origin, what);
     let Some(mass) = &imported.mass else {
-        let what = "a full model can only be reduced with its mass: give the mass matrix too";
+        let what = "reducing a full model requires its mass matrix: give this file too";
         return Err(refuse(format!("{what} (.mas, {})", Setting::MassFile)));
     };
     let failed = |source| LinkError::Import { path: imported.origin.clone().into(), source: Box::new(source) };
@@ -96,7 +98,10 @@ pub(super) fn reduce(
     match map {
         ImportMap::Rows(map) => {
             if imported.format == MatrixFormat::ExudynHdf5 {
-                return Err(refuse(format!("has no rotations at its nodes: {}", propose(imported))));
+                return Err(refuse(format!(
+                    "has no rotational degrees of freedom at its nodes: {}",
+                    propose(imported)
+                )));
             }
             let boundary = boundary_rows(imported, map)?;
             let mut is_turn: Vec<bool> = rows.iter().map(|label| label.dof > 3).collect();
@@ -109,8 +114,8 @@ pub(super) fn reduce(
         }
         ImportMap::Nodes(list) => {
             if !is_solid(imported) || imported.positions.is_empty() {
-                let what = "sets and planes need three components at every node and positions, which only Exudyn files \
-                            have; pick rows by node:";
+                let what = "node sets and planes require node positions and three degrees of freedom per node, \
+                            which only Exudyn files have; select rows by node:";
                 return Err(refuse(format!("{what} {} A=947:1-3+948:1-3,B=949:1-3+950:1-3", Setting::Map)));
             }
             let nodes: Vec<i64> = rows.iter().step_by(3).filter_map(|label| label.node).collect();
@@ -126,7 +131,7 @@ pub(super) fn reduce(
                 let mut nodes: Vec<u32> = chosen.iter().filter_map(|node| index.get(node).copied()).collect();
                 nodes.sort_unstable();
                 nodes.dedup();
-                // The tie works in the axes of the matrices.
+                // The reduction with ties works in matrix axes.
                 let p = target.R_LM.transpose() * frame.X_LI.translation.vector;
                 let X_LI = flexarm_spatial::Pose::translation(p.x, p.y, p.z);
                 interfaces.push(Interface { name: name.clone(), X_LI, nodes, tie: Tie::Rigid });
@@ -143,7 +148,7 @@ pub(super) fn reduce(
     }
 }
 
-/// Rows of the interfaces, six each.
+/// Returns the rows of the interfaces, six each.
 fn boundary_rows(imported: &ImportedMatrices, map: &InterfaceMap) -> Result<Vec<u32>, LinkError> {
     let rows = &imported.stiffness.rows;
     let index: HashMap<(i64, u8), u32> =
@@ -159,7 +164,9 @@ fn boundary_rows(imported: &ImportedMatrices, map: &InterfaceMap) -> Result<Vec<
                 RowPick::Rows { first, last } if first >= 1 && last <= rows.len() => {
                     boundary.extend(first as u32 - 1..last as u32);
                 }
-                RowPick::Rows { .. } => return Err(refuse(format!("no rows {pick} among {}", rows.len()))),
+                RowPick::Rows { .. } => {
+                    return Err(refuse(format!("rows {pick} do not exist; the matrix has {} rows", rows.len())));
+                }
                 RowPick::Node { node, first, last } => {
                     for dof in first..=last {
                         let row =
@@ -171,22 +178,23 @@ fn boundary_rows(imported: &ImportedMatrices, map: &InterfaceMap) -> Result<Vec<
         }
         if boundary.len() - before != 6 {
             let found = boundary.len() - before;
-            return Err(refuse(format!("{found} rows are named, six are needed (ux uy uz rx ry rz)")));
+            return Err(refuse(format!("{found} rows are selected, six are required (ux uy uz rx ry rz)")));
         }
     }
     let mut sorted = boundary.clone();
     sorted.sort_unstable();
     sorted.dedup();
     if sorted.len() != boundary.len() {
-        return Err(LinkError::file(&imported.origin, format!("the map {map} names a row twice")));
+        return Err(LinkError::file(&imported.origin, format!("the map {map} selects a row twice")));
     }
     Ok(boundary)
 }
 
-/// The lower triangle in SI: displacements are lengths, or angles where `is_turn`.
+/// Converts the lower triangle to SI: displacements are lengths, or angles where `is_turn`.
 fn to_si(matrix: &LabelledMatrix, units: UnitSystem, is_turn: &[bool], is_mass: bool) -> SparseSymmetric {
     let energy = units.force() * units.length;
     let unit = if is_mass { energy * units.time * units.time } else { energy };
+    // K_SI = D⁻¹ K D⁻¹ energy with u_SI = D u_file; M likewise, times the unit of time squared.
     let d: Vec<f64> = is_turn.iter().map(|turn| if *turn { 1.0 } else { units.length }).collect();
     let entries: Vec<(u32, u32, f64)> = matrix
         .to_sparse()
@@ -196,7 +204,7 @@ fn to_si(matrix: &LabelledMatrix, units: UnitSystem, is_turn: &[bool], is_mass: 
     SparseSymmetric::from_triplets(matrix.size(), &entries)
 }
 
-/// The nodes that a map entry chooses.
+/// Returns the nodes selected by a map entry.
 pub(super) fn chosen_nodes(imported: &ImportedMatrices, choice: &NodeChoice) -> Result<Vec<i64>, String> {
     match choice {
         NodeChoice::Set(name) => imported.node_sets.get(name).cloned().ok_or_else(|| {
@@ -211,7 +219,7 @@ pub(super) fn chosen_nodes(imported: &ImportedMatrices, choice: &NodeChoice) -> 
             let nodes: Vec<i64> = imported.positions.iter().filter(|(_, p)| near(p)).map(|(node, _)| *node).collect();
             if nodes.is_empty() {
                 let (low, high): ([f64; 3], [f64; 3]) = (low.into(), high.into());
-                return Err(format!("no node lies in {choice}; the nodes lie between {low:?} and {high:?}"));
+                return Err(format!("no node is on {choice}; the nodes extend from {low:?} to {high:?}"));
             }
             Ok(nodes)
         }

@@ -1,9 +1,8 @@
-//! From matrices of another FE program to a flexible link with its files: what `flexarm import`
-//! does.
+//! Import of matrices of another FE program as a flexible link (`flexarm import`).
 //!
-//! An [`ImportJob`] says which files, in which units, which rows are the interfaces and where these
-//! are. What is not said and not in the files is asked for, with the text to type. Full models are
-//! reduced here; everything then passes the gate of the link, and its figures are in the
+//! An [`ImportJob`] has the files, their units, the rows of the interfaces and their frames. Data
+//! that are in neither the job nor the files are requested in an error, with the text to type. Full
+//! models are reduced here; then every link is checked, and its figures are in the
 //! [`ImportSummary`].
 //!
 //! ```no_run
@@ -21,8 +20,8 @@
 //! # Ok::<(), flexarm_linkmaker::LinkError>(())
 //! ```
 //!
-//! Lengths in a job are in the unit of the files, masses in SI. Not here: parsers and reduction
-//! (`flexarm-fe-io`, `flexarm-fem`).
+//! Lengths in a job are in the unit of the files, masses in SI. Not here: parsers (`flexarm-fe-io`)
+//! and reduction (`flexarm-fem`).
 
 pub(crate) mod full;
 mod sid;
@@ -54,22 +53,23 @@ pub use flexarm_fem::{RigidPart, SplitAt as Split, UnitSystem as UnitsOfFile};
 pub use summary::{ImportChecks, ImportFiles, ImportInterface, ImportPart, ImportSummary, markdown, tables};
 pub use words::{FrameAt, ImportFormat, ImportMap, NodeChoice, parse_inertia, parse_part, parse_split, triple};
 
-/// What is said of a modal link without its terms of second order, here and where a robot takes
-/// one.
-pub const SECOND_ORDER_UNKNOWN: &str = "second-order terms of the modal link are unknown: a condensed mass does not \
-     tell where inside the link it is; what turning does to the bending is left out";
+/// Warning about a modal link without its second-order terms, used here and where a robot uses such
+/// a link.
+pub const SECOND_ORDER_UNKNOWN: &str = "second-order terms of the modal link are unknown, because a condensed mass \
+                                        matrix has no mass distribution inside the link: the effect of rotation on \
+                                        the deformation is neglected";
 
-/// Modes that are kept of a full model if the job does not say.
+/// Default number of modes kept of a full model.
 const MODES: usize = 10;
 
-/// What to import.
+/// Matrices to import, with units, interfaces and masses.
 #[derive(Clone, Debug)]
 pub struct ImportJob {
-    /// Files of one structure; companions beside them are found.
+    /// Files of one structure; companion files in the same folder are found.
     pub files: Vec<PathBuf>,
-    /// File of the mass, if its name does not tell.
+    /// Mass file, if its role does not follow from its name.
     pub mass_file: Option<PathBuf>,
-    /// The format that is expected; `None`: by content.
+    /// Expected format; `None`: recognised by content.
     pub format: Option<ImportFormat>,
     /// Names of the matrices in files that hold several.
     pub names: MatrixNames,
@@ -77,17 +77,17 @@ pub struct ImportJob {
     pub units: Option<UnitSystem>,
     /// Rows or nodes of the interfaces, proximal first; `None`: those of the sidecar.
     pub map: Option<ImportMap>,
-    /// Frames of interfaces; those of the files where it is silent.
+    /// Frames of interfaces; the others are taken from the files.
     pub at: Vec<FrameAt>,
-    /// Axes of the matrices in link axes: roll, pitch, yaw (rad).
+    /// Rotation from matrix axes to link axes: roll, pitch, yaw (rad).
     pub axes_rpy: Vector3<f64>,
-    /// Fixed-interface modes to keep of a full model.
+    /// Number of fixed-interface modes to keep of a full model.
     pub modes: Option<usize>,
     /// Masses of the parts (SI, link axes).
     pub masses: PartMasses,
-    /// Place of the elastic joint; a point is in the unit of the files.
+    /// Position of the elastic joint; a point is in the unit of the files.
     pub split: SplitAt,
-    /// Name of the link; `None`: that of the file.
+    /// Name of the link; `None`: that of the first file.
     pub name: Option<String>,
 }
 
@@ -122,21 +122,21 @@ impl ImportJob {
     }
 }
 
-/// Where the results go.
+/// Paths of the results.
 #[derive(Clone, Debug, Default)]
 pub struct ImportOutputs {
-    /// Folder for link file, summary and report; made if it is not there.
+    /// Folder for link file, summary and report; created if missing.
     pub folder: Option<PathBuf>,
-    /// Another place for the link file.
+    /// Separate path of the link file.
     pub flex: Option<PathBuf>,
-    /// Overwrite what is there.
+    /// Whether to overwrite existing files.
     pub overwrite: bool,
 }
 
-/// Reads matrices, makes a link of them, writes the files.
+/// Reads matrices, makes a link of them and writes the files.
 ///
 /// # Errors
-/// [`LinkError`]; what is missing is asked for all at once. See [`LinkError::fault`].
+/// [`LinkError`]; all missing data are listed in one error. See [`LinkError::fault`].
 pub fn import(job: &ImportJob, outputs: Option<&ImportOutputs>) -> Result<ImportSummary, LinkError> {
     let (started, cpu) = (Instant::now(), cpu_time::ProcessTime::now());
     let name = job.link_name();
@@ -167,15 +167,18 @@ pub fn import(job: &ImportJob, outputs: Option<&ImportOutputs>) -> Result<Import
 fn expect_format(job: &ImportJob, found: MatrixFormat, origin: &str) -> Result<(), LinkError> {
     match job.format {
         Some(format) if !format.covers(found) => {
-            let what =
-                format!("is {} by its content, {} says otherwise: leave it out", found.name(), Setting::MatrixFormat);
+            let what = format!(
+                "is {} according to its content, but {} gives another format: omit it",
+                found.name(),
+                Setting::MatrixFormat
+            );
             Err(LinkError::file(origin, what))
         }
         _ => Ok(()),
     }
 }
 
-/// All formats with a stiffness over physical coordinates.
+/// Imports all formats that have a stiffness over physical coordinates.
 fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), LinkError> {
     let imported = read(job).map_err(Box::new)?;
     expect_format(job, imported.format, &imported.origin)?;
@@ -185,7 +188,10 @@ fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), Lin
     if let (Some(given), Some(sidecar)) = (job.units, sidecar)
         && given != sidecar.units
     {
-        warnings.push(format!("the sidecar says the units are {}, {Caller} {given}, which counts", sidecar.units));
+        warnings.push(format!(
+            "the units are {} in the sidecar and {given} from {Caller}; the latter are used",
+            sidecar.units
+        ));
     }
     let from_sidecar = || sidecar.map(|sidecar| ImportMap::Rows(sidecar.map()));
     let map = job.map.clone().or_else(from_sidecar).filter(|map| !map.entries().is_empty());
@@ -199,8 +205,8 @@ fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), Lin
     let mut faults = Vec::new();
     if units.is_none() {
         let what = format!(
-            "the units of the file are not declared: {units} LENGTH-MASS-TIME, such as {units} m-kg-s (N, Pa) or {units} \
-             mm-t-s (N, MPa); no matrix says them itself",
+            "the units of the file are not declared: {units} LENGTH-MASS-TIME, such as {units} m-kg-s (N, Pa) or \
+             {units} mm-t-s (N, MPa); matrix files do not contain them",
             units = Setting::Units
         );
         faults.push(file_error(&imported, what));
@@ -215,7 +221,7 @@ fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), Lin
                     let rows = imported.stiffness.rows.len();
                     let modal = match unnumbered && map.modal.is_empty() && map.interfaces.len() > 2 {
                         true => format!(
-                            ", or, where modes follow two interfaces, {} \"A=#1-6,B=#7-12,modal=#13-{rows}\"",
+                            ", or, if modes follow two interfaces, {} \"A=#1-6,B=#7-12,modal=#13-{rows}\"",
                             Setting::Map
                         ),
                         false => String::new(),
@@ -225,7 +231,7 @@ fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), Lin
                 None => format!("give {}, such as A=1001,B=1002 or A=#1-6,B=#7-12", Setting::Map),
             }
         };
-        faults.push(file_error(&imported, format!("which rows are interface A and which B is not said: {proposal}")));
+        faults.push(file_error(&imported, format!("the rows of interfaces A and B are not specified: {proposal}")));
     }
     let R_LM = rotation(&job.axes_rpy);
     let placed = map.as_ref().map(|map| place(job, &imported, map, &R_LM, &mut warnings)).transpose();
@@ -260,7 +266,7 @@ fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), Lin
     } else {
         if job.modes.is_some() {
             let modes = Setting::Modes;
-            warnings.push(format!("{modes} only counts for full models; these matrices are reduced already"));
+            warnings.push(format!("{modes} applies only to full models; these matrices are already reduced"));
         }
         let rows = rows_of(&map);
         let reduced = assemble_interfaces(&imported, rows.as_ref(), Some(&units)).map_err(Box::new)?;
@@ -326,7 +332,7 @@ fn plan(job: &ImportJob, name: &str, units: UnitSystem, source: &str, method: &s
 fn read(job: &ImportJob) -> Result<ImportedMatrices, flexarm_fe_io::exchange::ExchangeError> {
     let Some(mass) = &job.mass_file else {
         let imported = read_matrices(&job.files, &job.names)?;
-        // A sidecar that was found beside the stiffness names the mass.
+        // A sidecar found next to the stiffness names the mass file.
         let named = imported.sidecar.as_ref().filter(|_| imported.mass.is_none()).and_then(|s| s.mass.as_ref());
         let path = named.zip(job.files.first()).map(|(name, first)| first.with_file_name(name));
         let Some(path) = path.filter(|path| path.exists()) else { return Ok(imported) };
@@ -349,7 +355,7 @@ fn file_error(imported: &ImportedMatrices, what: impl Into<String>) -> LinkError
     LinkError::file(&imported.origin, what)
 }
 
-/// Frame of an interface, unit of the file.
+/// Frame of an interface, in the unit of the file.
 struct Placed {
     name: String,
     xyz: Vector3<f64>,
@@ -357,7 +363,7 @@ struct Placed {
     from: &'static str,
 }
 
-/// The frame of each interface: as said, or as the file has it.
+/// Returns the frame of each interface, from the job or else from the file.
 fn place(
     job: &ImportJob,
     imported: &ImportedMatrices,
@@ -392,7 +398,7 @@ fn place(
                 {
                     let (p, q): ([f64; 3], [f64; 3]) = (p.into(), at.xyz.into());
                     warnings
-                        .push(format!("interface {name}: {from} is {p:?}, {} says {q:?}, which counts", Setting::At));
+                        .push(format!("interface {name}: {from} is {p:?}, {} gives {q:?}, which is used", Setting::At));
                 }
                 Placed { name: name.clone(), xyz: at.xyz, rotation: rotation(&at.rpy), from: "given" }
             }
@@ -407,7 +413,7 @@ fn place(
     Ok(placed)
 }
 
-/// Where the file says interface `k` is: matrix axes, unit of the file.
+/// Returns the frame of interface `k` according to the file: matrix axes, unit of the file.
 fn in_file(imported: &ImportedMatrices, map: &ImportMap, k: usize) -> Result<Option<(Pose, &'static str)>, String> {
     let at = |p: Vector3<f64>| Pose::from_parts(Translation3::from(p), Rotation3::identity());
     let map = match map {
@@ -422,7 +428,7 @@ fn in_file(imported: &ImportedMatrices, map: &ImportMap, k: usize) -> Result<Opt
     let interface = &map.interfaces[k];
     if let Some(side) = imported.sidecar.as_ref().and_then(|s| s.interfaces.iter().find(|i| i.interface == *interface))
     {
-        return Ok(Some((side.frame, "its place in the sidecar")));
+        return Ok(Some((side.frame, "its position in the sidecar")));
     }
     if let Some(RowPick::Node { node, .. }) = interface.picks.first()
         && let Some(p) = imported.positions.get(node)
@@ -432,14 +438,14 @@ fn in_file(imported: &ImportedMatrices, map: &ImportMap, k: usize) -> Result<Opt
     Ok(imported.frames.get(k).map(|X| (*X, "its frame in the file")))
 }
 
-/// The question where the interfaces are, with what the matrix itself implies.
+/// Returns the request for the interface positions, with those implied by the matrix itself.
 fn no_place(imported: &ImportedMatrices, map: Option<&ImportMap>, names: &[String]) -> String {
     let proposed = match map {
         Some(ImportMap::Rows(map)) => Some(map.clone()),
         Some(ImportMap::Nodes(_)) => None,
         None => propose_map_of(&imported.stiffness),
     };
-    // From the first interface to each other one, which takes the second place for it.
+    // Evaluate from the first interface to each other one, swapped into second place.
     let implied = proposed.and_then(|map| {
         let to = |k: usize| {
             let mut map = map.clone();
@@ -457,7 +463,7 @@ fn no_place(imported: &ImportedMatrices, map: Option<&ImportMap>, names: &[Strin
             };
             let (where_they_are, flags): (Vec<String>, Vec<String>) = names[1..].iter().zip(&places).map(place).unzip();
             format!(
-                "the stiffness itself says, from {a}: {}; if {a} is the origin of the link: {} {a}=0,0,0{}",
+                "the stiffness implies, relative to {a}: {}; if {a} is the origin of the link: {} {a}=0,0,0{}",
                 where_they_are.join(", "),
                 Setting::At,
                 flags.concat()
@@ -468,10 +474,10 @@ fn no_place(imported: &ImportedMatrices, map: Option<&ImportMap>, names: &[Strin
             format!("give {}", flags.join(" "))
         }
     };
-    format!("where the interfaces are is not in the file (unit of the file, link axes): {text}")
+    format!("the file does not contain the interface positions (unit of the file, link axes): {text}")
 }
 
-/// From A to B as the blocks of the stiffness imply it, unit of the file.
+/// Returns the vector from A to B implied by the blocks of the stiffness, in the unit of the file.
 fn implied_distance(imported: &ImportedMatrices, map: &InterfaceMap) -> Option<Vector3<f64>> {
     let reduced = assemble_interfaces(imported, Some(map), Some(&UnitSystem::SI)).ok()?;
     let M = DMatrix::zeros(reduced.K.nrows(), reduced.K.nrows());
@@ -483,7 +489,7 @@ fn implied_distance(imported: &ImportedMatrices, map: &InterfaceMap) -> Option<V
     }
 }
 
-/// The paths of the results.
+/// Paths of the results.
 struct Targets {
     folder: Option<[PathBuf; 3]>,
     flex: Option<PathBuf>,
@@ -518,7 +524,7 @@ impl Targets {
         contents.extend(self.flex.iter().map(|path| (path.clone(), flex.to_owned())));
         check_free(&self.all(), self.overwrite)?;
         write_all(&contents)?;
-        // Not in the files, which are the same wherever they are made.
+        // Set after writing: the files must not depend on their location.
         summary.files.entry = link_file.map(|flex| robot_entry(flex, &summary.link, None));
         Ok(())
     }

@@ -1,11 +1,11 @@
-//! A modal body (SID) as a link: its modal link in the frame at A, and the compliance of B with A
-//! held, from the modes at both nodes.
+//! Import of a modal body (SID) as a link: its modal link in the frame at A, and the compliance of
+//! B with A held, from the modes at both nodes.
 //!
 //! ```text
 //! P = Φ_B - Ad_BA Φ_A          elastic displacement of B with A held, per mode (rows: phi, then psi)
-//! C_BB = P Ke⁻¹ Pᵀ             the rigid motions of the reference frame are free, so this holds for any frame
+//! C_BB = P Ke⁻¹ Pᵀ             independent of the reference frame, whose rigid motions are free
 //! ```
-//! The two rigid parts have the mass, centre and inertia of the body. Inside, all is in SI.
+//! The two rigid parts have the mass, centre and inertia of the body. Computed in SI.
 
 use flexarm_fe_io::exchange::{InputFile, InterfaceMap, RowPick, Sid, modal_link_held_at, parse_sid};
 use flexarm_fem::matrix_link::{MatrixReduction, PartMasses, link_from_superelement};
@@ -33,7 +33,10 @@ pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(M
         None => {
             let (first, last) = (ids.first().copied().unwrap_or(1), ids.last().copied().unwrap_or(2));
             let setting = Setting::Map;
-            Err(format!("which nodes are A and B is not said; its nodes are {ids:?}: {setting} \"A={first},B={last}\""))
+            Err(format!(
+                "the nodes of interfaces A and B are not specified; the SID has nodes {ids:?}: {setting} \
+                 \"A={first},B={last}\""
+            ))
         }
     };
     let nodes = nodes.map_err(|what| faults.push(refuse(what))).ok();
@@ -43,7 +46,7 @@ pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(M
     }
     let mut warnings = Vec::new();
     if job.modes.is_some() {
-        warnings.push(format!("{} only counts for full models; the modes of a SID are all kept", Setting::Modes));
+        warnings.push(format!("{} applies only to full models; all modes of a SID are kept", Setting::Modes));
     }
 
     let sid = sid.in_units(&units, &UnitSystem::SI);
@@ -58,7 +61,7 @@ pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(M
     let p = |k: usize| places[k].translation.vector;
     let frame = |k: usize| InterfaceFrame { name: nodes[k].0.clone(), X_LI: places[k], tie: None };
     let C = compliance(&sid, nodes[0].1, nodes[1].1, &R_LM, &(p(1) - p(0))).map_err(refuse)?;
-    let K_BB = C.try_inverse().ok_or_else(|| refuse("the compliance of B cannot be inverted".into()))?;
+    let K_BB = C.try_inverse().ok_or_else(|| refuse("the compliance at B is singular".into()))?;
     let K_BB = (K_BB + K_BB.transpose()) * 0.5;
     let K = free_stiffness(&K_BB, &(p(1) - p(0)));
     let element = Superelement { interfaces: vec![frame(0), frame(1)], K, M: DMatrix::zeros(12, 12) };
@@ -75,7 +78,7 @@ pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(M
     if let Some(modal) = modal {
         if (modal.mass / reduction.whole.mass - 1.0).abs() > 0.01 {
             warnings.push(format!(
-                "the modal link weighs {:.6} kg, as the SID says; the given masses of the parts sum to {:.6} kg",
+                "the modal link has the mass of the SID, {:.6} kg; the given masses of the parts sum to {:.6} kg",
                 modal.mass, reduction.whole.mass
             ));
         }
@@ -103,8 +106,8 @@ pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(M
     Ok((reduction, parts))
 }
 
-/// The modal link, with the mapped nodes as its interfaces; `None` and a warning where the data do
-/// not give one.
+/// Returns the modal link with the mapped nodes as its interfaces; `None` with a warning if the
+/// data do not define one.
 fn modal_link(
     sid: &Sid,
     name: &str,
@@ -116,16 +119,17 @@ fn modal_link(
     let link = match modal_link_held_at(name, sid, sid.nodes[A].id) {
         Ok(link) => link,
         Err(error) => {
-            let used = "only the stiffness between A and B and the rigid mass are used";
-            warnings.push(format!("the SID gives no modal link, {used}: {error}"));
+            let used = "only the stiffness between A and B and the rigid-body mass are used";
+            warnings.push(format!("the SID does not define a modal link, {used}: {error}"));
             return None;
         }
     };
-    // Stiffness by load belongs to the frame of the data, which is lost with another node held.
+    // Geometric stiffness belongs to the frame of the data; it is lost with another node held.
     let is_stressed = sid.Ct.order == 1 || sid.others.iter().any(|(block, _)| block.eq_ignore_ascii_case("K0t"));
     if link.geometric.is_none() && is_stressed {
         warnings.push(format!(
-            "node {} moves in the frame of the SID, in which its stiffness by load is: that is left out",
+            "node {} moves in the reference frame of the SID, in which its geometric stiffness is given: the \
+             geometric stiffness is neglected",
             sid.nodes[A].id
         ));
     }
@@ -133,9 +137,9 @@ fn modal_link(
         warnings.push(SECOND_ORDER_UNKNOWN.into());
     }
     if sid.De.m0().iter().any(|d| *d != 0.0) {
-        warnings.push("the damping of the SID (De) is not taken over: give damping in the robot file".into());
+        warnings.push("the damping of the SID (De) is ignored: set the damping in the robot file".into());
     }
-    // One interface per node but A, in the order of the file.
+    // One interface per node except A, in the order of the file.
     let at: Vec<usize> = nodes[1..].iter().map(|(_, node)| if *node > A { node - 1 } else { *node }).collect();
     let interface = |(k, (name, _)): (&usize, &(String, usize))| {
         let own = link.interfaces.get(*k)?;
@@ -150,9 +154,9 @@ fn modal_link(
     Some(if *R_LM == Rotation3::identity() { link } else { link.turned(R_LM) })
 }
 
-/// Names and indices of the nodes, proximal and distal first.
+/// Returns names and indices of the nodes, proximal and distal first.
 fn named_nodes(map: &ImportMap, ids: &[i64]) -> Result<Vec<(String, usize)>, String> {
-    let wrong = || format!("a SID needs a map of two nodes or more such as A=1,B=2; its nodes are {ids:?}");
+    let wrong = || format!("a SID requires a map of at least two nodes, such as A=1,B=2; its nodes are {ids:?}");
     let ImportMap::Rows(InterfaceMap { interfaces, modal }) = map else { return Err(wrong()) };
     let index = |picks: &[RowPick]| match picks {
         [RowPick::Node { node, first: 1, last: 6 }] => {
@@ -175,7 +179,7 @@ fn named_nodes(map: &ImportMap, ids: &[i64]) -> Result<Vec<(String, usize)>, Str
     }
 }
 
-/// `C_BB`, link axes.
+/// Computes `C_BB` in link axes.
 fn compliance(
     sid: &Sid,
     a: usize,
@@ -186,8 +190,8 @@ fn compliance(
     let nq = sid.nq();
     if nq < 6 {
         return Err(format!(
-            "has {nq} modes; six relative motions of B need at least six, otherwise B is rigid in some direction: export \
-             more modes, among them the static ones under loads at the interfaces"
+            "has {nq} modes; the six relative motions of B require at least six, otherwise B is rigid in some \
+             direction: export more modes, including the static modes under loads at the interfaces"
         ));
     }
     let shape = |k: usize| -> Result<DMatrix<f64>, String> {
@@ -200,33 +204,37 @@ fn compliance(
         Phi.view_mut((3, 0), (3, nq)).copy_from(&(R_LM.matrix() * psi));
         Ok(Phi)
     };
+    // P = Φ_B - Ad_BA Φ_A
     let (Phi_A, Phi_B) = (shape(a)?, shape(b)?);
     let mut Ad_BA = DMatrix::identity(6, 6);
     Ad_BA.view_mut((0, 3), (3, 3)).copy_from(&-p_AB.cross_matrix());
     let P = Phi_B - Ad_BA * Phi_A;
+    // C_BB = P Ke⁻¹ Pᵀ, with Ke scaled to a unit diagonal.
     let Ke = sid.Ke.m0();
     let scale = Ke.diagonal().map(|k| 1.0 / k.sqrt());
     let scaled = DMatrix::from_fn(nq, nq, |i, j| Ke[(i, j)] * scale[i] * scale[j]);
     let factor = scaled.cholesky().ok_or("Ke is not positive definite")?;
     let right = DMatrix::from_fn(nq, 6, |i, j| P[(j, i)] * scale[i]);
     let C = right.transpose() * factor.solve(&right);
-    // The motions that the modes do not hold show as zero eigenvalues of the scaled compliance.
+    // Motions missing in the modes appear as zero eigenvalues of the scaled compliance.
     let s = C.diagonal().map(|c| 1.0 / c.sqrt());
     let unit = DMatrix::from_fn(6, 6, |i, j| C[(i, j)] * s[i] * s[j]);
     let least = unit.symmetric_eigenvalues().min();
     if least.is_nan() || least <= 1e-10 {
         return Err(format!(
-            "its {nq} modes do not move B against A in all six directions (smallest relative compliance {least:.1e}): \
-             are these the interfaces, and are the static modes under loads at them in the file?"
+            "its {nq} modes do not move B relative to A in all six directions (minimum relative compliance \
+             {least:.1e}): are these nodes the interfaces, and does the file include the static modes under loads \
+             at them?"
         ));
     }
     Ok(Matrix6::from_fn(|i, j| C[(i, j)]))
 }
 
-/// The 12×12 of both interfaces.
+/// Computes the 12×12 stiffness of both interfaces.
 fn free_stiffness(K_BB: &Matrix6<f64>, p_AB: &Vector3<f64>) -> DMatrix<f64> {
     let mut Ad_BA = Matrix6::identity();
     Ad_BA.fixed_view_mut::<3, 3>(0, 3).copy_from(&-p_AB.cross_matrix());
+    // K_AB = -Ad_BAᵀ K_BB,  K_AA = Ad_BAᵀ K_BB Ad_BA
     let K_AB = -Ad_BA.transpose() * K_BB;
     let mut K = DMatrix::zeros(12, 12);
     K.view_mut((0, 0), (6, 6)).copy_from(&(-K_AB * Ad_BA));
@@ -236,7 +244,7 @@ fn free_stiffness(K_BB: &Matrix6<f64>, p_AB: &Vector3<f64>) -> DMatrix<f64> {
     (&K + K.transpose()) * 0.5
 }
 
-/// Mass, centre and inertia of the undeformed body, SI, link axes.
+/// Computes mass, centre and inertia of the undeformed body, SI, link axes.
 fn body(sid: &Sid, R_LM: &Rotation3<f64>) -> RigidPart {
     let moment = sid.mdCM.m0();
     let com = Vector3::from_iterator(moment.iter().copied().take(3)) / sid.mass;

@@ -1,4 +1,4 @@
-//! Figures of an import, with the keys of `flexarm reduce` where both have them. SI units, link
+//! Figures of an import; those shared with `flexarm reduce` have the same keys. SI units, link
 //! axes.
 
 use std::fmt::Write as _;
@@ -13,56 +13,56 @@ use serde::Serialize;
 use super::SECOND_ORDER_UNKNOWN;
 use crate::reduce::{ModalFigures, ReportTable, coarse, doubted, modal_table, warning_list};
 
-/// Answer of `flexarm import`.
+/// Result of `flexarm import`.
 #[derive(Clone, Debug, Serialize)]
 pub struct ImportSummary {
     /// Name of the link.
     pub link: String,
-    /// Files that were given.
+    /// Input files.
     pub sources: Vec<String>,
-    /// Their format.
+    /// Format of the files.
     pub format: String,
-    /// Their units.
+    /// Units of the files.
     pub units: String,
-    /// "reduced matrices", "craig-bampton, 10 modes", ...
+    /// Method: "reduced matrices", "craig-bampton, 10 modes", ...
     pub method: String,
-    /// Rows of the stiffness in the file.
+    /// Number of rows of the stiffness in the file.
     pub rows: usize,
     /// Interfaces, proximal first.
     pub interfaces: Vec<ImportInterface>,
     /// Mass of the whole link.
     pub mass_kg: f64,
-    /// Its centre of mass.
+    /// Centre of mass.
     pub com_m: [f64; 3],
-    /// Its inertia about the centre of mass, 3×3 (kg m²).
+    /// Inertia about the centre of mass, 3×3 (kg m²).
     pub inertia: [[f64; 3]; 3],
     /// Stiffness at B with A held, 6×6, linear first (N/m, N/rad; N m/m, N m/rad).
     pub stiffness: [[f64; 6]; 6],
-    /// Its inverse.
+    /// Inverse of the stiffness.
     pub compliance: [[f64; 6]; 6],
-    /// Where the elastic joint of the two parts sits.
+    /// Position of the elastic joint between the two parts.
     pub split_m: [f64; 3],
     /// The two rigid parts, proximal first.
     pub parts: Vec<ImportPart>,
-    /// Natural frequencies with A held and B free (Hz); empty without mass of matrices or modes.
+    /// Natural frequencies with A held and B free (Hz); empty without a mass matrix or modes.
     pub frequencies_hz: Vec<f64>,
-    /// The same of the two rigid parts with their joint (Hz).
+    /// Natural frequencies of the two rigid parts with their joint (Hz).
     pub lumped_frequencies_hz: Vec<f64>,
     /// Frequencies of the fixed-interface modes in the matrices (Hz).
     pub fixed_interface_hz: Vec<f64>,
-    /// The modal link that the file holds or gives; null where it cannot be one.
+    /// Modal link in the file or computed from it; null where there is none.
     pub modal: Option<ModalFigures>,
-    /// What was checked.
+    /// Results of the checks.
     pub checks: ImportChecks,
-    /// Wall-clock time without the writing of files (s).
+    /// Wall-clock time, excluding the writing of files (s).
     pub wall_s: f64,
     /// Processor time, all threads (s).
     pub cpu_s: f64,
-    /// Largest memory of the process so far; null where the system does not tell.
+    /// Peak memory of the process so far; null where the system does not report it.
     pub peak_rss_bytes: Option<u64>,
-    /// Things worth telling.
+    /// Warnings.
     pub warnings: Vec<String>,
-    /// The same with code, value and yardstick.
+    /// The same warnings with code, value and reference value.
     pub caveats: Vec<Caveat>,
     /// Written files.
     pub files: ImportFiles,
@@ -73,13 +73,13 @@ pub struct ImportSummary {
 pub struct ImportInterface {
     /// Name.
     pub name: String,
-    /// Its rows or nodes in the file.
+    /// Rows or nodes in the file.
     pub rows: String,
-    /// Position of its frame.
+    /// Position of the frame.
     pub position_m: [f64; 3],
-    /// Roll, pitch, yaw of its frame.
+    /// Roll, pitch, yaw of the frame.
     pub rpy_rad: [f64; 3],
-    /// Where the frame comes from.
+    /// Source of the frame.
     pub from: &'static str,
 }
 
@@ -94,37 +94,38 @@ pub struct ImportPart {
     pub inertia: [[f64; 3]; 3],
 }
 
-/// What was checked; relative unless the key has a unit.
+/// Results of the checks; relative unless the key has a unit.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct ImportChecks {
-    /// Largest asymmetry of the matrices in the file.
+    /// Maximum asymmetry of the matrices in the file.
     pub symmetry: f64,
-    /// Force under rigid motion.
+    /// Residual force under rigid-body motion.
     pub rigid_body_residual: f64,
-    /// Mass along x, y, z and that of the link, largest difference; null without a mass matrix.
+    /// Maximum relative difference between the masses along x, y, z and that of the link; null
+    /// without a mass matrix.
     pub mass_error: Option<f64>,
-    /// Disagreement of the blocks of the stiffness.
+    /// Residual of the identity between the blocks of the stiffness.
     pub block_identity: f64,
-    /// Smallest eigenvalue of the stiffness, scaled to a unit diagonal.
+    /// Minimum eigenvalue of the stiffness, scaled to a unit diagonal.
     pub min_eigenvalue: f64,
-    /// Its condition number.
+    /// Condition number of the scaled stiffness.
     pub condition: f64,
 }
 
 /// Written files; null where none was written.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct ImportFiles {
-    /// The link file, for `reduced = "..."` of a robot file.
+    /// Link file, for `reduced = "..."` of a robot file.
     pub flex: Option<String>,
-    /// The entry of a robot file that uses it, as TOML.
+    /// Entry for a robot file that uses the link, as TOML.
     pub entry: Option<String>,
-    /// These figures.
+    /// Summary file.
     pub summary: Option<String>,
-    /// These figures for people.
+    /// Report.
     pub report: Option<String>,
 }
 
-/// What is known beside the reduction.
+/// Data of an import other than the reduction.
 pub(super) struct Parts {
     pub(super) files: Vec<String>,
     pub(super) format: String,
@@ -133,12 +134,12 @@ pub(super) struct Parts {
     pub(super) rows: usize,
     pub(super) interfaces: Vec<ImportInterface>,
     pub(super) asymmetry: f64,
-    /// With its mass, link axes.
+    /// With its mass, in link axes.
     pub(super) element: Option<Superelement>,
     pub(super) warnings: Vec<String>,
 }
 
-/// Difference of masses above which a warning is given.
+/// Relative difference of masses above which a warning is given.
 const MASS_ERROR: f64 = 1e-6;
 
 impl ImportSummary {
@@ -153,7 +154,7 @@ impl ImportSummary {
         if let (Some(error), Some(m)) = (mass_error, masses)
             && (error.is_nan() || error > MASS_ERROR)
         {
-            let sentence = format!("the mass matrix holds {:.6}, {:.6}, {:.6} kg along x, y, z", m[0], m[1], m[2]);
+            let sentence = format!("the mass matrix has {:.6}, {:.6}, {:.6} kg along x, y, z", m[0], m[1], m[2]);
             all.push(Doubt::found("mass", error, MASS_ERROR, sentence));
         }
         all.extend(crate::yardsticks::of_link(link, whole));
@@ -208,7 +209,7 @@ impl ImportSummary {
     }
 }
 
-/// Mass under a translation of all interfaces along x, y, z.
+/// Returns the mass under a translation of all interfaces along x, y, z.
 fn masses_along_axes(element: &Superelement) -> [f64; 3] {
     let n = element.boundary();
     let M: DMatrix<f64> = element.M.view((0, 0), (n, n)).into_owned();
@@ -219,7 +220,7 @@ fn masses_along_axes(element: &Superelement) -> [f64; 3] {
     [along(0), along(1), along(2)]
 }
 
-/// All tables of an import.
+/// Returns all tables of an import.
 pub fn tables(summary: &ImportSummary) -> Vec<ReportTable> {
     let table = |title, header: &[&'static str], rows| ReportTable::new(title, header, rows);
     let vector = |p: &[f64; 3]| p.map(|x| format!("{:.4}", if x.abs() < 5e-5 { 0.0 } else { x })).join(", ");
@@ -239,8 +240,8 @@ pub fn tables(summary: &ImportSummary) -> Vec<ReportTable> {
     let C = &summary.compliance;
     let soft = |k: usize| format!("{:.4e}", 1e6 * C[k][k]);
     let softness = vec![
-        vec!["1 kN along it moves B by".into(), soft(0), soft(1), soft(2), "mm".into()],
-        vec!["1 kN m about it turns B by".into(), soft(3), soft(4), soft(5), "mrad".into()],
+        vec!["displacement of B under 1 kN".into(), soft(0), soft(1), soft(2), "mm".into()],
+        vec!["rotation of B under 1 kN m".into(), soft(3), soft(4), soft(5), "mrad".into()],
     ];
     let c = &summary.checks;
     let limits = GateLimits::default();
@@ -249,16 +250,16 @@ pub fn tables(summary: &ImportSummary) -> Vec<ReportTable> {
         vec![name.to_owned(), format!("{value:.1e}"), format!("below {usual:.0e}"), mark.into()]
     };
     let mut checks = vec![
-        // Nine decimals of a DMIG.
-        below("asymmetry of the file", c.symmetry, 1e-8),
-        below("force under rigid motion", c.rigid_body_residual, limits.rigid_body_warning),
-        below("blocks of the stiffness agree", c.block_identity, limits.rigid_body_warning),
+        // A DMIG has nine decimals.
+        below("asymmetry of the stiffness", c.symmetry, 1e-8),
+        below("force under rigid-body motion", c.rigid_body_residual, limits.rigid_body_warning),
+        below("mismatch of the stiffness blocks", c.block_identity, limits.rigid_body_warning),
     ];
     let least = if c.min_eigenvalue > limits.min_eigenvalue { "ok" } else { "warn" };
     let usual = format!("above {:.0e}", limits.min_eigenvalue);
-    checks.push(vec!["smallest eigenvalue".into(), format!("{:.1e}", c.min_eigenvalue), usual, least.into()]);
+    checks.push(vec!["minimum eigenvalue".into(), format!("{:.1e}", c.min_eigenvalue), usual, least.into()]);
     checks.push(match c.mass_error {
-        Some(error) => below("mass along x, y, z and of the link", error, MASS_ERROR),
+        Some(error) => below("mass along x, y, z against the link", error, MASS_ERROR),
         None => vec!["mass".into(), "-".into(), "no mass matrix".into(), "-".into()],
     });
     let count = summary.frequencies_hz.len().max(summary.lumped_frequencies_hz.len());
@@ -280,8 +281,12 @@ pub fn tables(summary: &ImportSummary) -> Vec<ReportTable> {
             &["interface", "rows", "position", "roll, pitch, yaw", "from"],
             interfaces,
         ),
-        table("mass", &["", "mass [kg]", "centre of mass [m]", "ixx, iyy, izz, ixy, ixz, iyz there [kg m2]"], masses),
-        table("how soft it is, A held (along the same axis)", &["", "x", "y", "z", ""], softness),
+        table(
+            "mass",
+            &["", "mass [kg]", "centre of mass [m]", "ixx, iyy, izz, ixy, ixz, iyz about it [kg m2]"],
+            masses,
+        ),
+        table("deflection of B along the load, A held", &["", "x", "y", "z", ""], softness),
         matrix("stiffness K_BB at B, A held (N/m, N/rad; N m/m, N m/rad)", &summary.stiffness),
         matrix("compliance C_BB at B, A held (m/N, m/(N m); rad/N, rad/(N m))", &summary.compliance),
         table("checks", &["", "measured", "usual", ""], checks),
@@ -291,7 +296,7 @@ pub fn tables(summary: &ImportSummary) -> Vec<ReportTable> {
     tables
 }
 
-/// The figures as a page of Markdown.
+/// Returns the figures as a Markdown page.
 pub fn markdown(summary: &ImportSummary) -> String {
     let mut page = format!(
         "# Link {}\n\n{}: {}, {}, {} rows; {}\n",

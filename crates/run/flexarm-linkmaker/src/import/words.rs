@@ -1,5 +1,5 @@
-//! Words of an import: which rows or nodes are an interface, where it is, masses, the place of the
-//! joint.
+//! Parsing of import options: rows or nodes of the interfaces, their frames, masses, position of
+//! the joint.
 
 use std::fmt;
 use std::str::FromStr;
@@ -8,7 +8,7 @@ use flexarm_fe_io::exchange::{InterfaceMap, MatrixFormat};
 use flexarm_fem::{RigidPart, SplitAt};
 use nalgebra::{Matrix3, Vector3};
 
-/// Which rows or nodes are which interface.
+/// Rows or nodes of the interfaces.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ImportMap {
     /// Rows of the matrices: `A=1001,B=1002`, `A=947:1-3+948:1-3,...`, `A=#1-6,B=#7-12`.
@@ -18,16 +18,16 @@ pub enum ImportMap {
     Nodes(Vec<(String, NodeChoice)>),
 }
 
-/// Nodes of a full model.
+/// Selection of nodes of a full model.
 #[derive(Clone, Debug, PartialEq)]
 pub enum NodeChoice {
-    /// A set of the file.
+    /// A node set of the file.
     Set(String),
     /// All nodes in a plane; unit and axes of the file.
     Plane {
-        /// A point of it.
+        /// A point in the plane.
         point: Vector3<f64>,
-        /// Its normal.
+        /// Normal of the plane.
         normal: Vector3<f64>,
     },
 }
@@ -57,7 +57,7 @@ impl FromStr for ImportMap {
                         let (point, normal) = inside.split_once(';').ok_or_else(wrong)?;
                         let (point, normal) = (triple(point)?, triple(normal)?);
                         if normal.norm() == 0.0 {
-                            return Err(format!("{part:?}: the normal of the plane has no length"));
+                            return Err(format!("{part:?}: the normal of the plane is zero"));
                         }
                         NodeChoice::Plane { point, normal }
                     }
@@ -87,7 +87,7 @@ impl fmt::Display for NodeChoice {
 }
 
 impl ImportMap {
-    /// Names of the interfaces, in order, with what was chosen.
+    /// Returns the names of the interfaces, in order, with the text of their selection.
     pub(super) fn entries(&self) -> Vec<(String, String)> {
         match self {
             Self::Rows(map) => map.interfaces.iter().map(|i| (i.name.clone(), i.rows_text())).collect(),
@@ -96,7 +96,7 @@ impl ImportMap {
     }
 }
 
-/// At commas that stand in no bracket.
+/// Splits at commas outside brackets.
 fn split_outside_brackets(text: &str) -> Vec<&str> {
     let (mut parts, mut depth, mut start) = (Vec::new(), 0_i32, 0);
     for (i, c) in text.char_indices() {
@@ -118,9 +118,9 @@ fn split_outside_brackets(text: &str) -> Vec<&str> {
 /// axes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameAt {
-    /// The interface.
+    /// Name of the interface.
     pub name: String,
-    /// Its position, unit of the file.
+    /// Position, in the unit of the file.
     pub xyz: Vector3<f64>,
     /// Roll, pitch, yaw (rad).
     pub rpy: Vector3<f64>,
@@ -142,7 +142,7 @@ impl FromStr for FrameAt {
     }
 }
 
-/// The format that the user says the files have.
+/// File format as given by the user.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ImportFormat {
     /// Matrix Market.
@@ -168,7 +168,7 @@ pub enum ImportFormat {
 }
 
 impl ImportFormat {
-    /// Whether a file that was recognised as `found` is one.
+    /// Whether a file recognised as `found` has this format.
     pub(super) fn covers(self, found: MatrixFormat) -> bool {
         match self {
             Self::MatrixMarket => found == MatrixFormat::MatrixMarket,
@@ -185,11 +185,11 @@ impl ImportFormat {
     }
 }
 
-/// A rigid part, `mass;cx,cy,cz;ixx,iyy,izz,ixy,ixz,iyz`: kg, m, kg m² about its centre of mass,
-/// link axes.
+/// Parses a rigid part, `mass;cx,cy,cz;ixx,iyy,izz,ixy,ixz,iyz`: kg, m, kg m² about its centre of
+/// mass, link axes.
 ///
 /// # Errors
-/// What is wrong with the text.
+/// A description of what is wrong with the text.
 pub fn parse_part(text: &str) -> Result<RigidPart, String> {
     let wrong = || format!("{text:?}: expected mass;x,y,z;ixx,iyy,izz,ixy,ixz,iyz in kg, m, kg m2");
     let mut pieces = text.split(';');
@@ -201,10 +201,10 @@ pub fn parse_part(text: &str) -> Result<RigidPart, String> {
     Ok(RigidPart { mass, com: triple(com)?, inertia: parse_inertia(inertia)? })
 }
 
-/// Inertia `ixx,iyy,izz,ixy,ixz,iyz` (kg m²).
+/// Parses an inertia `ixx,iyy,izz,ixy,ixz,iyz` (kg m²).
 ///
 /// # Errors
-/// What is wrong with the text.
+/// A description of what is wrong with the text.
 pub fn parse_inertia(text: &str) -> Result<Matrix3<f64>, String> {
     let [xx, yy, zz, xy, xz, yz] = finite_numbers(text)?[..] else {
         return Err(format!("{text:?}: expected ixx,iyy,izz,ixy,ixz,iyz"));
@@ -212,14 +212,16 @@ pub fn parse_inertia(text: &str) -> Result<Matrix3<f64>, String> {
     Ok(Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz))
 }
 
-/// Where the elastic joint sits: `elastic-centre`, `mid`, a fraction, or a point in the unit of the
-/// file.
+/// Parses the position of the elastic joint: `elastic-centre`, `mid`, a fraction, or a point in the
+/// unit of the file.
 ///
 /// # Errors
-/// What is wrong with the text.
+/// A description of what is wrong with the text.
 pub fn parse_split(text: &str) -> Result<SplitAt, String> {
     let wrong = || {
-        format!("split {text:?}: expected elastic-centre, mid, a fraction of the way from A to B (0 to 1), or x,y,z")
+        format!(
+            "split {text:?}: expected elastic-centre, mid, a fraction of the distance from A to B (0 to 1), or x,y,z"
+        )
     };
     match text.trim() {
         "elastic-centre" | "elastic-center" => Ok(SplitAt::ElasticCentre),
@@ -232,10 +234,10 @@ pub fn parse_split(text: &str) -> Result<SplitAt, String> {
     }
 }
 
-/// Three finite numbers between commas.
+/// Parses three finite numbers separated by commas.
 ///
 /// # Errors
-/// What is wrong with the text.
+/// A description of what is wrong with the text.
 pub fn triple(text: &str) -> Result<Vector3<f64>, String> {
     let [x, y, z] = finite_numbers(text)?[..] else { return Err(format!("{text:?}: expected three numbers x,y,z")) };
     Ok(Vector3::new(x, y, z))

@@ -1,4 +1,4 @@
-//! Places and names of the files of a reduction.
+//! Paths and names of the files of a reduction.
 
 use std::path::{Component, Path, PathBuf};
 
@@ -6,18 +6,18 @@ use flexarm_files::{FileError, check_free, file_stem, write_all};
 
 use super::job::ReduceJob;
 
-/// Where the results go.
+/// Paths of the results.
 #[derive(Clone, Debug, Default)]
 pub struct ReduceOutputs {
-    /// Folder for link file, job, summary and report; made if it is not there.
+    /// Folder for link file, job, summary and report; created if missing.
     pub folder: Option<PathBuf>,
-    /// Another place for the link file.
+    /// Separate path of the link file.
     pub flex: Option<PathBuf>,
-    /// Overwrite what is there.
+    /// Whether to overwrite existing files.
     pub overwrite: bool,
 }
 
-/// The paths of one reduction.
+/// Paths of one reduction.
 #[derive(Debug)]
 pub(super) struct Paths {
     pub(super) folder: Option<Folder>,
@@ -25,7 +25,7 @@ pub(super) struct Paths {
     overwrite: bool,
 }
 
-/// Names in the output folder.
+/// Paths in the output folder.
 #[derive(Debug)]
 pub(super) struct Folder {
     pub(super) path: PathBuf,
@@ -36,14 +36,16 @@ pub(super) struct Folder {
 }
 
 impl Paths {
-    /// The link file: where it was asked for, or in the folder.
+    /// Returns the link file: the separate path if given, else the one in the folder.
     pub(super) fn flex(&self) -> Option<&Path> {
         self.flex.as_deref().or(self.folder.as_ref().map(|folder| folder.flex.as_path()))
     }
 
+    /// Returns the paths of a reduction, after checking that they are free or may be overwritten.
+    ///
     /// # Errors
-    /// [`FileError::Taken`] for what is there already, [`FileError::Unusable`] for a folder in the
-    /// place of a file.
+    /// [`FileError::Taken`] for an existing file, [`FileError::Unusable`] for a folder in the place
+    /// of a file.
     pub(super) fn new(outputs: &ReduceOutputs, link: &str) -> Result<Self, FileError> {
         let file = file_stem(link);
         let folder = outputs.folder.as_ref().map(|path| Folder {
@@ -53,7 +55,7 @@ impl Paths {
             report: path.join("report.md"),
             path: path.clone(),
         });
-        // Asked for twice, it is still one file.
+        // If both paths are the same file, keep the one in the folder.
         let whole = |path: &Path| std::path::absolute(path).map(|path| normal(&path)).ok();
         let in_folder = folder.as_ref().and_then(|folder| whole(&folder.flex));
         let flex = outputs.flex.clone().filter(|path| in_folder.is_none() || whole(path) != in_folder);
@@ -80,7 +82,7 @@ impl Paths {
     }
 }
 
-/// The job as a file in `folder`.
+/// Returns the text of the job file in `folder`.
 pub(super) fn job_file(job: &ReduceJob, folder: &Path) -> String {
     let mut job = job.clone();
     job.mesh = from_folder(folder, &job.mesh);
@@ -88,11 +90,10 @@ pub(super) fn job_file(job: &ReduceJob, folder: &Path) -> String {
         urdf.file = from_folder(folder, &urdf.file);
     }
     let body = toml::to_string(&job).expect("strings, numbers and tables");
-    format!("# The job as it was run, every default written out. Again: flexarm reduce reduce.toml\n{body}")
+    format!("# The job as run, with all defaults. To repeat it: flexarm reduce reduce.toml\n{body}")
 }
 
-/// The way to `path` from `folder`: relative where both lie in one tree below the root, else
-/// absolute.
+/// Returns `path` relative to `folder` if both have a common folder below the root, else absolute.
 fn from_folder(folder: &Path, path: &Path) -> PathBuf {
     let whole = |p: &Path| std::path::absolute(p).map(|p| normal(&p));
     let (Ok(folder), Ok(path)) = (whole(folder), whole(path)) else { return path.to_owned() };
@@ -105,7 +106,7 @@ fn from_folder(folder: &Path, path: &Path) -> PathBuf {
     up.chain(path.components().skip(shared)).collect()
 }
 
-/// Without `.` and `..`.
+/// Returns the path without `.` and `..`.
 fn normal(path: &Path) -> PathBuf {
     path.components().fold(PathBuf::new(), |mut sum, component| {
         match component {

@@ -1,4 +1,5 @@
-//! From the interfaces of a job to nodes and frames of a mesh, with messages that say what to type.
+//! Maps the interfaces of a job to nodes and frames of a mesh, with messages that contain the text
+//! to type.
 
 use flexarm_fem::mesh::{Seat, Surface, select};
 use flexarm_fem::reduction::{Interface, Tie};
@@ -11,30 +12,30 @@ use super::job::{FrameEntry, InterfaceEntry, ReduceJob};
 use super::urdf_link::UrdfLink;
 use crate::LinkError;
 
-/// An interface of the mesh, with what a person wants to see of it. Link axes, m.
+/// An interface of the mesh with its figures for the report. Link axes, m.
 #[derive(Clone, Debug)]
 pub(super) struct Chosen {
     pub(super) interface: Interface,
     pub(super) selector: NodeSelector,
     pub(super) centroid: Vector3<f64>,
     pub(super) extent: Vector3<f64>,
-    /// How the nodes that the job chose lie on the surface.
+    /// Position of the chosen nodes on the surface.
     pub(super) seat: Seat,
-    /// How many these were, before mid-side nodes were added.
+    /// Number of chosen nodes, before mid-side nodes were added.
     pub(super) chosen_nodes: usize,
 }
 
 impl Chosen {
-    /// Sentences about nodes that are no seat: corners without the nodes between them, edges, nodes
-    /// inside.
+    /// Returns warnings about nodes that do not form a seat: corners without mid-side nodes, edges,
+    /// nodes inside.
     pub(super) fn seat_doubts(&self) -> Vec<String> {
         let (name, seat, chosen) = (&self.interface.name, &self.seat, self.chosen_nodes);
         let mut doubts = Vec::new();
         if !seat.missing.is_empty() {
             doubts.push(format!(
-                "interface {name:?}: its {chosen} nodes hold the corners of {} faces, but {} of the {} mid-side nodes of these \
-                 faces are missing; they were added, because faces tied at their corners alone make the link too soft; write \
-                 sets with all nodes of their faces",
+                "interface {name:?}: its {chosen} nodes include the corners of {} faces, but {} of the {} mid-side \
+                 nodes of these faces are missing; they were added, because faces tied only at their corners make \
+                 the link too soft; write node sets with all nodes of their faces",
                 seat.faces,
                 seat.missing.len(),
                 seat.middles
@@ -42,20 +43,20 @@ impl Chosen {
         }
         if seat.faces == 0 && seat.on_beams == 0 {
             doubts.push(format!(
-                "interface {name:?}: no face of the surface has all its corners among its {chosen} node(s), so it is an edge or \
-                 single nodes, and what is tied there depends on the mesh; choose the nodes of a surface"
+                "interface {name:?}: no face of the surface has all its corners among its {chosen} node(s), so it \
+                 is an edge or single nodes, and the tied area depends on the mesh; select the nodes of a surface"
             ));
         } else if 2 * seat.stray > chosen {
             doubts.push(format!(
-                "interface {name:?}: {} of its {chosen} nodes are on none of the {} faces that it holds; is its tolerance too \
-                 small, or the place not that of the surface?",
+                "interface {name:?}: {} of its {chosen} nodes are on none of its {} faces; is the tolerance too \
+                 small, or is the selector not on the surface?",
                 seat.stray, seat.faces
             ));
         }
         if seat.inside > 0 {
             doubts.push(format!(
-                "interface {name:?}: {} of its {chosen} nodes lie inside the body, where no joint sits, and what is between \
-                 them cannot bend; choose nodes of the surface",
+                "interface {name:?}: {} of its {chosen} nodes are inside the body, where no joint is attached, and \
+                 the material between them cannot deform; select nodes of the surface",
                 seat.inside
             ));
         }
@@ -63,17 +64,17 @@ impl Chosen {
     }
 }
 
-/// The mesh with the frame that the user speaks in.
+/// The mesh with the link frame in which the user gives positions.
 pub(super) struct Place<'a> {
-    /// In its own frame, m.
+    /// Mesh in its own frame (m).
     pub(super) mesh: &'a Mesh,
-    /// Its unit of length, m; 1 while it is not known.
+    /// Unit of length of the mesh (m); 1 if unknown.
     pub(super) unit: f64,
-    /// Its frame in the link frame, m.
+    /// Frame of the mesh in the link frame (m).
     pub(super) X_LM: Pose,
 }
 
-/// Pose of a job in m.
+/// Converts a pose of the job to m.
 pub(super) fn pose(frame: &FrameEntry, unit: f64) -> Pose {
     let [roll, pitch, yaw] = frame.rpy;
     let position = Vector3::from(frame.xyz) * unit;
@@ -81,7 +82,7 @@ pub(super) fn pose(frame: &FrameEntry, unit: f64) -> Pose {
 }
 
 impl Place<'_> {
-    /// Middle and size of some nodes along the link axes, m.
+    /// Centroid and extent of some nodes along the link axes (m).
     pub(super) fn middle_and_extent(&self, nodes: &[u32]) -> (Vector3<f64>, Vector3<f64>) {
         let points = || nodes.iter().map(|node| self.X_LM * nalgebra::Point3::from(self.mesh.nodes[*node as usize]));
         let sum: Vector3<f64> = points().map(|p| p.coords).sum();
@@ -90,7 +91,7 @@ impl Place<'_> {
         (sum / nodes.len().max(1) as f64, high - low)
     }
 
-    /// Three lengths in the unit of the mesh, with as many digits as make sense for its size.
+    /// Formats three lengths in the unit of the mesh, with digits suited to the size of the mesh.
     pub(super) fn typed(&self, p: &Vector3<f64>) -> String {
         let size = self.mesh.bounding_box().map_or(1.0, |(low, high)| (high - low).norm()) / self.unit;
         let digits = (6.0 - size.log10().ceil()).clamp(0.0, 12.0) as usize;
@@ -102,12 +103,12 @@ impl Place<'_> {
         format!("{},{},{}", one(p.x), one(p.y), one(p.z))
     }
 
-    /// The sets of the mesh, for messages about one that is wanted.
+    /// Lists the node sets of the mesh, for messages.
     pub(super) fn known_sets(&self) -> String {
         const MOST: usize = 12;
         let sets = &self.mesh.node_sets;
         if sets.is_empty() {
-            return "the mesh has no node sets: choose by place, such as plane(0,0,0; 1,0,0)".into();
+            return "the mesh has no node sets: select nodes by position, such as plane(0,0,0; 1,0,0)".into();
         }
         let shown: Vec<String> =
             sets.iter().take(MOST).map(|(name, nodes)| format!("{name:?} ({} nodes)", nodes.len())).collect();
@@ -116,15 +117,15 @@ impl Place<'_> {
         format!("node sets of the mesh: {}{rest}", shown.join(", "))
     }
 
-    /// Nodes and frames of all interfaces, or all that is wrong with them.
+    /// Returns nodes and frames of all interfaces, or all errors.
     pub(super) fn choose(&self, job: &ReduceJob, robot: Option<&UrdfLink>) -> Result<Vec<Chosen>, Vec<LinkError>> {
         let (mut chosen, mut faults) = (Vec::new(), Vec::new());
         if job.interface.len() < 2 {
             let found = job.interface.len();
             let what = format!(
-                "{found} interface(s) given, a link needs at least two, the proximal one first: \
-                 {interface} A=SELECTOR {interface} B=SELECTOR, where SELECTOR is a node set or a place such as \
-                 plane(x,y,z; nx,ny,nz); {sets}",
+                "{found} interface(s) given, a link needs at least two, the proximal one first: {interface} \
+                 A=SELECTOR {interface} B=SELECTOR, where SELECTOR is a node set or a region such as plane(x,y,z; \
+                 nx,ny,nz); {sets}",
                 interface = Setting::Interface,
                 sets = self.known_sets()
             );
@@ -160,7 +161,7 @@ impl Place<'_> {
         };
         let mut nodes = select(self.mesh, selector, self.unit).map_err(|source| fail(source.to_string()))?;
         let (seat, chosen_nodes) = (surface.seat(&nodes), nodes.len());
-        // A face is tied whole: corners without the nodes between them hold it at points only.
+        // Tie whole faces: corners without mid-side nodes would hold a face only at points.
         nodes.extend(&seat.missing);
         nodes.sort_unstable();
         let (centroid, extent) = self.middle_and_extent(&nodes);
@@ -171,7 +172,7 @@ impl Place<'_> {
         let X_LI = match (entry.xyz, entry.at, &entry.joint) {
             (Some(xyz), None, None) => {
                 if xyz.iter().chain(&entry.rpy.unwrap_or_default()).any(|x| !x.is_finite()) {
-                    return Err(fail(format!("its position is {xyz:?}, finite numbers are expected")));
+                    return Err(fail(format!("its position is {xyz:?}, expected finite numbers")));
                 }
                 pose(&FrameEntry { xyz, rpy: entry.rpy.unwrap_or_default() }, self.unit)
             }
@@ -214,7 +215,7 @@ impl Place<'_> {
         )
     }
 
-    /// Sentences about positions that look like a mistake in the unit or the frame.
+    /// Returns warnings about positions that suggest a wrong unit or frame.
     pub(super) fn doubts(&self, chosen: &[Chosen]) -> Vec<String> {
         let size = self.mesh.bounding_box().map_or(0.0, |(low, high)| (high - low).norm());
         let mut doubts = Vec::new();
@@ -222,7 +223,7 @@ impl Place<'_> {
             let distance = (one.interface.X_LI.translation.vector - one.centroid).norm();
             if distance > 0.5 * size {
                 doubts.push(format!(
-                    "interface {:?} stands {distance:.4} m from the centroid of its nodes, in a mesh of {size:.4} m: \
+                    "interface {:?} is {distance:.4} m from the centroid of its nodes, in a mesh of {size:.4} m: \
                      is its position in the unit of the mesh and in the link frame?",
                     one.interface.name
                 ));

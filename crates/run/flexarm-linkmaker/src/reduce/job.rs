@@ -1,7 +1,7 @@
-//! The job file of a reduction, read into a plain struct; command-line flags are a second such
-//! struct on top.
+//! Job file of a reduction, parsed into a plain struct; command-line flags fill a second such
+//! struct that overrides it.
 //!
-//! Unknown keys are refused. Lengths are in the unit of the mesh, positions in the link frame,
+//! Unknown keys are errors. Lengths are in the unit of the mesh, positions in the link frame,
 //! angles in rad.
 
 use std::collections::BTreeMap;
@@ -18,7 +18,7 @@ use toml::Spanned;
 use super::words::{At, MaterialChoice, OrderingChoice, QuadratureChoice, SplitChoice, text};
 use crate::LinkError;
 
-/// What to reduce, and how. Whatever is `None` has a default or is asked for when it is needed.
+/// A reduction job. A value of `None` has a default, or is requested in an error if it is needed.
 ///
 /// ```toml
 /// mesh = "lower_arm.msh.gz"        # relative to this file
@@ -38,60 +38,60 @@ use crate::LinkError;
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct ReduceJob {
-    /// Mesh file; in the file relative to the file, in memory relative to the working folder.
+    /// Mesh file; relative to the job file in a file, to the working folder in memory.
     pub mesh: PathBuf,
-    /// Name of the link; that of the URDF's link, or of the mesh file, if not given.
+    /// Name of the link; default: that of the URDF's link, or of the mesh file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub link: Option<String>,
     /// Units of the mesh, such as `mm-t-s`.
     #[serde(default, with = "text", skip_serializing_if = "Option::is_none")]
     pub units: Option<UnitSystem>,
-    /// Material of all regions, also of those for which the mesh has its own.
+    /// Material of all regions, including those with a material in the mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub material: Option<MaterialChoice>,
-    /// Material of single regions by name; goes before `material`.
+    /// Material of single regions by name; overrides `material`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub materials: BTreeMap<String, MaterialChoice>,
-    /// Fixed-interface modes to keep.
+    /// Number of fixed-interface modes to keep.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modes: Option<usize>,
-    /// Or all below this frequency (Hz).
+    /// Alternatively, keep all modes below this frequency (Hz).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modes_up_to_hz: Option<f64>,
-    /// Tie of interfaces that do not say otherwise.
+    /// Default tie of the interfaces.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tie: Option<Tie>,
-    /// Place of the elastic joint.
+    /// Position of the elastic joint.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub split: Option<SplitChoice>,
     /// Chains to store in the link, by their number of parts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chains: Option<Vec<usize>>,
-    /// Whether the modal link gets its stiffness by load: `geometric_stiffening = true` of a robot
-    /// file needs it.
+    /// Whether to compute the geometric stiffness of the modal link, which
+    /// `geometric_stiffening = true` of a robot file needs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub geometric: Option<bool>,
-    /// Nodes nearer to each other than this become one, unit of the mesh; closes seams and cracks.
+    /// Distance below which nodes are merged, unit of the mesh; closes seams and cracks.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub merge: Option<f64>,
     /// Quadrature of solid elements.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quadrature: Option<QuadratureChoice>,
-    /// Order of elimination.
+    /// Elimination ordering.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ordering: Option<OrderingChoice>,
     /// Pose of the mesh frame in the link frame.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh_frame: Option<FrameEntry>,
-    /// A robot that says where the interfaces are.
+    /// Robot that defines the interface frames.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub urdf: Option<UrdfEntry>,
-    /// Interfaces, proximal first, then distal, then any others.
+    /// Interfaces: proximal, distal, then any others.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub interface: Vec<InterfaceEntry>,
 }
 
-/// A pose; length in the unit of the mesh.
+/// A pose; lengths in the unit of the mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct FrameEntry {
@@ -103,14 +103,14 @@ pub struct FrameEntry {
     pub rpy: [f64; 3],
 }
 
-/// An interface: which nodes, and where its frame is.
+/// An interface: its nodes and its frame.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct InterfaceEntry {
-    /// Name; A, B, C, ... if not given.
+    /// Name; default A, B, C, ...
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// Its nodes. Places are in the frame and the unit of the mesh file.
+    /// Selection of nodes, in frame and unit of the mesh file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub select: Option<NodeSelector>,
     /// Position in the link frame, unit of the mesh.
@@ -119,52 +119,53 @@ pub struct InterfaceEntry {
     /// Roll, pitch, yaw in the link frame (rad).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rpy: Option<[f64; 3]>,
-    /// Or: at the centroid of its nodes.
+    /// Alternatively, position at the centroid of the nodes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at: Option<At>,
-    /// Or: at the origin of a joint of the robot.
+    /// Alternatively, position at the origin of a joint of the robot.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joint: Option<String>,
-    /// How its nodes are tied.
+    /// Tie of the nodes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tie: Option<Tie>,
-    /// File and line that it comes from, for messages.
+    /// File and line of the entry, for messages.
     #[serde(skip)]
     pub place: String,
 }
 
-/// A robot whose joints are at the interfaces of the link.
+/// A robot with joints at the interfaces of the link.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct UrdfEntry {
-    /// URDF or xacro file; as `mesh`, relative to the job file.
+    /// URDF or xacro file; relative to the job file, like `mesh`.
     pub file: PathBuf,
-    /// The link.
+    /// Name of the link.
     pub link: String,
-    /// The joint at B; the only moving child joint if not given.
+    /// Joint at B; default: the only moving child joint.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joint: Option<String>,
-    /// What the URDF's link weighs beyond the mesh (motors, gears, cables) rides on the two parts,
-    /// as the halves of a uniform bar, so that the rigid robot stays that of the URDF.
+    /// Whether the mass of the URDF's link beyond that of the mesh (motors, gears, cables) is
+    /// attached to the two parts, as the halves of a uniform bar, so that the rigid robot stays
+    /// that of the URDF.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub rest: bool,
 }
 
-/// A job file is not longer than this; longer files are meshes.
+/// Maximum size of a job file (bytes); larger files are meshes.
 const LONGEST_JOB: u64 = 1 << 20;
 
 impl ReduceJob {
-    /// Nothing but a mesh.
+    /// Creates a job with only a mesh.
     pub fn for_mesh(mesh: impl Into<PathBuf>) -> Self {
         Self { mesh: mesh.into(), ..Self::default() }
     }
 
-    /// A job file, or a job with nothing but this mesh; told apart by content: a job is TOML with
-    /// `mesh = ...`.
+    /// Reads a job file, or creates a job with only this mesh. The content decides: a job is TOML
+    /// with `mesh = ...`.
     ///
     /// # Errors
-    /// [`LinkError::Files`] if it cannot be read, [`LinkError::JobFile`] with line and column for
-    /// what is not the format.
+    /// [`LinkError::Files`] if the file cannot be read, [`LinkError::JobFile`] with line and column
+    /// if it is not a valid job.
     pub fn load(path: &Path) -> Result<Self, LinkError> {
         let unreadable = |e: std::io::Error| {
             let what = match e.kind() {
@@ -176,7 +177,7 @@ impl ReduceJob {
             LinkError::file(path, what)
         };
         let mut bytes = Vec::new();
-        // A device might never end, a pipe never begin.
+        // Reading a device may never end, opening a pipe may block.
         if !std::fs::metadata(path).map_err(unreadable)?.is_file() {
             return Err(unreadable(std::io::Error::other("this is not a file")));
         }
@@ -185,14 +186,14 @@ impl ReduceJob {
         let is_toml = path.extension().is_some_and(|e| e == "toml");
         match std::str::from_utf8(&bytes) {
             Ok(text) if is_toml || is_job(text) => parse_job(text, path),
-            Err(_) if is_toml => Err(LinkError::file(path, "a job file is text in UTF-8; this is not")),
+            Err(_) if is_toml => Err(LinkError::file(path, "is not UTF-8 text, which a job file must be")),
             _ => Ok(Self::for_mesh(path)),
         }
     }
 
-    /// A job from the text of a job file.
+    /// Parses the text of a job file.
     ///
-    /// * `path`: where the file is, or would be: its paths count from there.
+    /// * `path`: path of the file, real or assumed; paths in the job are relative to it.
     ///
     /// # Errors
     /// [`LinkError::JobFile`] with line and column.
@@ -206,8 +207,8 @@ impl ReduceJob {
         given.unwrap_or_else(|| stem(&self.mesh))
     }
 
-    /// Puts `flags` over this job: what is given there counts. Interfaces are matched by name; a
-    /// new name is a new interface. The mesh stays.
+    /// Overrides this job with the values given in `flags`. Interfaces are matched by name; a new
+    /// name adds an interface. The mesh is kept.
     pub fn put_over(&mut self, flags: Self) {
         fn put<T>(own: &mut Option<T>, given: Option<T>) {
             if given.is_some() {
@@ -218,7 +219,7 @@ impl ReduceJob {
             (self.modes, self.modes_up_to_hz) = (flags.modes, flags.modes_up_to_hz);
         }
         if flags.tie.is_some() {
-            // "All of them" on the command line means all of them.
+            // A tie on the command line applies to all interfaces.
             self.interface.iter_mut().for_each(|entry| entry.tie = None);
         }
         if flags.material.is_some() {
@@ -255,7 +256,7 @@ impl ReduceJob {
         self.name_interfaces();
     }
 
-    /// Gives interfaces without a name the letter of their place.
+    /// Names unnamed interfaces by letters in their order.
     fn name_interfaces(&mut self) {
         for (entry, letter) in self.interface.iter_mut().zip('A'..='Z') {
             entry.name.get_or_insert_with(|| letter.to_string());
@@ -263,7 +264,7 @@ impl ReduceJob {
     }
 }
 
-/// Whether text that is no mesh is TOML with a mesh in it; also if it is spoilt further down.
+/// Whether the text is TOML with a mesh rather than a mesh, even with errors further down.
 fn is_job(text: &str) -> bool {
     let lines = text.lines().map(str::trim_start);
     let mut keys = lines.filter(|line| !line.is_empty() && !line.starts_with('#'));
@@ -295,7 +296,7 @@ fn parse_job(text: &str, path: &Path) -> Result<ReduceJob, LinkError> {
     Ok(job)
 }
 
-/// Where the interfaces stand in the file.
+/// Positions of the interface entries in the file.
 #[derive(Deserialize)]
 struct Places {
     #[serde(default)]
@@ -308,7 +309,7 @@ struct InterfacePlace {
     select: Option<Spanned<IgnoredAny>>,
 }
 
-/// Name of a file without folder and endings.
+/// Returns the name of a file without folder and extensions.
 fn stem(path: &Path) -> String {
     let name = path.file_name().map_or_else(|| "link".into(), |name| name.to_string_lossy().into_owned());
     name.split('.').find(|part| !part.is_empty()).unwrap_or("link").to_owned()

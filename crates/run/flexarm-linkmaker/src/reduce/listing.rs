@@ -1,4 +1,4 @@
-//! What is in a mesh, to see what can be typed: sets, regions, sizes.
+//! Contents of a mesh for the choice of interfaces: sets, regions, sizes.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,37 +12,37 @@ use serde::Serialize;
 use super::interfaces::Place;
 use super::summary::MaterialFigures;
 
-/// Answer of `flexarm reduce --list`. Lengths are in the unit of the mesh file; sets in the link
-/// frame, which is the frame of the mesh unless the job says otherwise.
+/// Result of `flexarm reduce --list`. Lengths are in the unit of the mesh file; sets are in the
+/// link frame, which is the frame of the mesh unless the job sets another.
 #[derive(Clone, Debug, Serialize)]
 pub struct MeshListing {
-    /// The file.
+    /// Mesh file.
     pub mesh: String,
-    /// Its format.
+    /// Format of the file.
     pub format: &'static str,
-    /// Declared units; null while they are not.
+    /// Declared units; null if none are declared.
     pub units: Option<String>,
-    /// Nodes.
+    /// Number of nodes.
     pub nodes: usize,
-    /// Elements.
+    /// Number of elements.
     pub elements: usize,
-    /// Elements of each kind.
+    /// Number of elements of each kind.
     pub element_kinds: BTreeMap<&'static str, usize>,
-    /// Smallest coordinates of the nodes of elements, frame of the mesh.
+    /// Minimum coordinates of the nodes of elements, frame of the mesh.
     pub min: [f64; 3],
-    /// Largest coordinates.
+    /// Maximum coordinates.
     pub max: [f64; 3],
-    /// Largest dimension in m; null without units.
+    /// Maximum dimension (m); null without units.
     pub size_m: Option<f64>,
-    /// Pieces that share no node; one is right.
+    /// Number of connected parts; a link must have one.
     pub parts: usize,
-    /// Regions of elements.
+    /// Element regions.
     pub regions: Vec<RegionListing>,
-    /// Sets of nodes.
+    /// Node sets.
     pub sets: Vec<SetListing>,
-    /// The interfaces of the job.
+    /// Interfaces of the job.
     pub interfaces: Vec<SetListing>,
-    /// Things worth telling.
+    /// Warnings.
     pub warnings: Vec<String>,
 }
 
@@ -51,26 +51,26 @@ pub struct MeshListing {
 pub struct RegionListing {
     /// Name.
     pub name: String,
-    /// Elements.
+    /// Number of elements.
     pub elements: usize,
-    /// Its own material, SI; null if it has none or the units are not declared.
+    /// Material of the region in the file, SI; null if it has none or the units are not declared.
     pub material: Option<MaterialFigures>,
-    /// Whether the file has a material for it.
+    /// Whether the file has a material for the region.
     pub has_material: bool,
 }
 
-/// A set of nodes of the mesh.
+/// A node set of the mesh.
 #[derive(Clone, Debug, Serialize)]
 pub struct SetListing {
     /// Name.
     pub name: String,
-    /// Nodes.
+    /// Number of nodes.
     pub nodes: usize,
-    /// Mean of its nodes.
+    /// Mean of the node positions.
     pub centroid: [f64; 3],
-    /// Size along the axes.
+    /// Extent along the axes.
     pub extent: [f64; 3],
-    /// The centroid as it can be typed.
+    /// Centroid as text to type.
     pub at: String,
 }
 
@@ -91,7 +91,8 @@ impl MeshListing {
         let parts = connected_parts(mesh).len();
         let mut warnings = file.warnings.clone();
         if parts > 1 {
-            warnings.push(format!("the mesh falls into {parts} parts that share no node; a link must be in one piece"));
+            warnings
+                .push(format!("the mesh has {parts} parts that share no node; a link must be a single connected part"));
         }
         let typed = |v: Vector3<f64>| -> [f64; 3] { (v / place.unit).into() };
         Self {

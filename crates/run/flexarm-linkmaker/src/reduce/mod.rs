@@ -1,10 +1,10 @@
-//! From a mesh to a flexible link with its files: what `flexarm reduce` does.
+//! Reduction of a mesh to a flexible link with its files (`flexarm reduce`).
 //!
 //! A [`ReduceJob`] comes from a file, from flags, or from both ([`ReduceJob::put_over`]).
-//! [`Reduction::open`] checks it and reads the mesh; [`Reduction::finish`] reduces it and writes
-//! the link file, the complete job, the figures and a report. Between the two a caller with a robot
-//! says what that knows of the link ([`UrdfLink`]). [`list_mesh`] shows what is in a mesh, to see
-//! what can be typed.
+//! [`Reduction::open`] checks it and reads the mesh; [`Reduction::finish`] reduces the mesh and
+//! writes the link file, the complete job, the figures and a report. In between, a caller with a
+//! robot provides its data of the link ([`UrdfLink`]). [`list_mesh`] lists the contents of a mesh,
+//! for the choice of interfaces.
 //!
 //! ```no_run
 //! use flexarm_linkmaker::reduce::{ReduceJob, ReduceOutputs, Reduction};
@@ -17,10 +17,9 @@
 //! ```
 //!
 //! Units: SI, except lengths in a job, which are in the unit of its mesh. Positions of interfaces
-//! are in the link frame; places that choose nodes are in the frame of the mesh, as a mesher shows
-//! them.
+//! are in the link frame; node selections are in the frame of the mesh, as a mesher shows them.
 //!
-//! Not here: the reduction itself (`flexarm-fem`), the file of the robot.
+//! Not here: the reduction itself (`flexarm-fem`), the robot file.
 
 mod files;
 mod interfaces;
@@ -64,46 +63,45 @@ pub(crate) use summary::{coarse, doubted};
 pub use urdf_link::{LinkJoint, UrdfLink};
 pub use words::{At, MaterialChoice, OrderingChoice, QuadratureChoice, SplitChoice, numbers};
 
-/// Modes that are kept if the job does not say.
+/// Default number of modes to keep.
 const MODES: usize = 10;
-/// More modes than this are a slip of the pen.
+/// Maximum number of modes; more are taken for a typing error.
 const MOST_MODES: usize = 1000;
-/// Modes with A held against which the reduced models are judged.
+/// Number of modes with A held against which the reduced models are checked.
 const JUDGED_MODES: usize = 10;
 
-/// A step that begins.
+/// Start of a step.
 #[derive(Clone, Copy, Debug)]
 pub struct ReduceProgress {
-    /// What is done in it.
+    /// Name of the step.
     pub step: &'static str,
-    /// Its number, from 1.
+    /// Number of the step, from 1.
     pub number: usize,
-    /// How many there are.
+    /// Number of steps.
     pub of: usize,
 }
 
-/// Steps of a reduction: those of the numbers, after the reading.
+/// Number of steps of a reduction, including the reading of the mesh.
 const STEPS: usize = ReductionStep::ALL.len() + 1;
 
-/// A job whose mesh is read and whose places of results are free.
+/// A checked job with its mesh read and the paths of its results free.
 #[derive(Debug)]
 pub struct Reduction {
-    /// Every default written out.
+    /// Job with all defaults filled in.
     job: ReduceJob,
     paths: Option<Paths>,
-    /// In its own axes, with what is to be told of it.
+    /// Mesh in its own axes, with its warnings.
     mesh: (MeshFile, Vec<String>),
     started: Instant,
     cpu: ProcessTime,
 }
 
 impl Reduction {
-    /// Reads the mesh of a job. The numbers of the job and the places of the results are checked
-    /// before.
+    /// Checks the numbers of a job and the paths of the results, then reads the mesh.
     ///
     /// # Errors
-    /// [`LinkError::Job`] for numbers that make no sense, [`LinkError::Files`] for places that are
-    /// taken, [`LinkError::Mesh`].
+    /// [`LinkError::Job`] for invalid numbers, [`LinkError::Files`] for taken paths,
+    /// [`LinkError::Mesh`] for an invalid mesh.
     pub fn open(
         job: &ReduceJob,
         outputs: Option<&ReduceOutputs>,
@@ -119,14 +117,13 @@ impl Reduction {
 
     /// Reduces the mesh to a link and writes the files.
     ///
-    /// * `robot`: what the robot of the job ([`ReduceJob::urdf`]) says of the link; `None` if the
+    /// * `robot`: data of the link from the robot of the job ([`ReduceJob::urdf`]); `None` if the
     ///   job has none.
     ///
-    /// Everything that can be checked is checked before the work starts; nothing is written if it
-    /// fails.
+    /// All checks that do not need the reduction are made first; nothing is written if it fails.
     ///
     /// # Errors
-    /// [`LinkError`]; several faults of a job come together. See [`LinkError::fault`].
+    /// [`LinkError`]; several errors of a job are reported together. See [`LinkError::fault`].
     pub fn finish(
         self,
         robot: Option<&UrdfLink>,
@@ -156,7 +153,7 @@ impl Reduction {
         if let Some(paths) = paths {
             let pictures = if paths.folder.is_some() { pictures(&file.mesh, &plan, &reduction)? } else { Vec::new() };
             write(&job, &paths, &write_flex(&reduction.link), &pictures, &mut summary)?;
-            // Not in the files, which are the same wherever they are made.
+            // Set after writing: the files must not depend on their location.
             let distal = robot.and_then(UrdfLink::distal_joint);
             let link = robot.map_or(&summary.link, |robot| &robot.name);
             summary.files.entry = paths.flex().map(|flex| robot_entry(flex, link, distal));
@@ -165,10 +162,10 @@ impl Reduction {
     }
 }
 
-/// What is in the mesh of a job. Units, materials and positions may be missing.
+/// Lists the contents of a job's mesh. Units, materials and positions may be missing.
 ///
 /// # Errors
-/// [`LinkError::Mesh`], and [`LinkError::Interface`] for interfaces that choose no nodes.
+/// [`LinkError::Mesh`], or [`LinkError::Interface`] for interfaces that select no nodes.
 pub fn list_mesh(job: &ReduceJob) -> Result<MeshListing, LinkError> {
     let read = ReadOptions { units: job.units.unwrap_or(UnitSystem::SI), ..ReadOptions::default() };
     let file = read_mesh(&job.mesh, &read).map_err(Box::new)?;
@@ -189,7 +186,7 @@ pub fn list_mesh(job: &ReduceJob) -> Result<MeshListing, LinkError> {
     Ok(listing)
 }
 
-/// The job with every default written out.
+/// Returns the job with all defaults filled in.
 fn with_defaults(job: &ReduceJob) -> Result<ReduceJob, JobError> {
     let mut job = job.clone();
     job.put_over(ReduceJob::default()); // names the interfaces
@@ -230,7 +227,7 @@ fn phases(read: Duration, starts: &[Instant]) -> PhaseFigures {
     PhaseFigures { read_s: read.as_secs_f64(), assembly_s, factorisation_s, modes_s, parts_s }
 }
 
-/// The sheets of pictures, as PNG with their file names; none without the feature `png`.
+/// Draws the pictures, as PNG with their file names; none without the feature `png`.
 #[cfg(feature = "png")]
 fn pictures(
     mesh: &flexarm_fem::Mesh,

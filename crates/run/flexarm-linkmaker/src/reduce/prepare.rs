@@ -1,4 +1,5 @@
-//! From a job to a mesh with materials and a plan, everything checked before the work starts.
+//! Preparation of a job: a mesh with materials and a plan, with all checks made before the work
+//! starts.
 
 use flexarm_fe_io::mesh::{MeshFile, ReadOptions};
 use flexarm_fe_io::read_mesh;
@@ -20,10 +21,10 @@ use super::words::{MATERIAL_FORMS, OrderingChoice, QuadratureChoice, SplitChoice
 use super::{JUDGED_MODES, MODES, MOST_MODES};
 use crate::{JobError, LinkError, stamp};
 
-/// All that a reduction needs.
+/// Input of a reduction.
 pub(super) struct Prepared {
     pub(super) plan: LinkPlan,
-    /// In link axes, with the materials of the job.
+    /// Mesh in link axes, with the materials of the job.
     pub(super) file: MeshFile,
     pub(super) units: UnitSystem,
     pub(super) chosen: Vec<Chosen>,
@@ -31,8 +32,8 @@ pub(super) struct Prepared {
     pub(super) doubts: Vec<Doubt>,
 }
 
-/// The mesh of a job in its own axes, SI, with its nodes merged as the job says and what is to be
-/// told of it.
+/// Reads the mesh of a job in its own axes, SI, with its nodes merged as the job requests; also
+/// returns its warnings.
 pub(super) fn read(job: &ReduceJob) -> Result<(MeshFile, Vec<String>), LinkError> {
     let units = units_of(job);
     let mut file = read_mesh(&job.mesh, &ReadOptions { units, ..ReadOptions::default() }).map_err(Box::new)?;
@@ -43,7 +44,8 @@ pub(super) fn read(job: &ReduceJob) -> Result<(MeshFile, Vec<String>), LinkError
     Ok((file, warnings))
 }
 
-/// Without units the mesh is still read, to say what could be typed.
+/// Returns the units of the mesh; without units it is read as SI, so that messages can propose
+/// some.
 fn units_of(job: &ReduceJob) -> UnitSystem {
     job.units.unwrap_or(UnitSystem::SI)
 }
@@ -54,7 +56,7 @@ pub(super) fn prepare(
     robot: Option<&UrdfLink>,
 ) -> Result<Prepared, LinkError> {
     if let Some(entry) = job.urdf.as_ref().filter(|_| robot.is_none()) {
-        let what = "is the robot of the job: what it says of the link is needed";
+        let what = "is the robot file of the job: its data for the link are required";
         return Err(LinkError::file(&entry.file, what));
     }
     let units = units_of(job);
@@ -68,7 +70,8 @@ pub(super) fn prepare(
     if job.link_name().trim().is_empty() || job.link_name().contains(['/', '\\', '\n']) {
         faults.push(JobError::LinkName(job.link_name()).into());
     }
-    // Said by the reader about a deck without sections; the job has the material.
+    // The reader's warning about a deck without sections does not apply if the job has the
+    // material.
     warnings.retain(|said| !said.contains("hence without a material") || materials.is_empty());
     let place = Place { mesh: &file.mesh, unit: units.length, X_LM };
     let chosen = place.choose(job, robot).unwrap_or_else(|more| {
@@ -104,7 +107,7 @@ pub(super) fn prepare(
     Ok(Prepared { plan, file, units, chosen, materials, doubts })
 }
 
-/// Joins nodes that lie in one place.
+/// Merges coincident nodes.
 fn merge(file: &mut MeshFile, distance: f64, units: UnitSystem, warnings: &mut Vec<String>) -> Result<(), LinkError> {
     if !(distance.is_finite() && distance >= 0.0) {
         return Err(JobError::MergeDistance(distance).into());
@@ -112,19 +115,19 @@ fn merge(file: &mut MeshFile, distance: f64, units: UnitSystem, warnings: &mut V
     let merged = file.mesh.merge_coincident(distance * units.length);
     let before = file.mesh.nodes.len();
     warnings.push(match merged {
-        0 => format!("merge: no two of the {before} nodes are nearer than {distance} (unit of the mesh)"),
-        _ => format!("merge: {merged} of {before} nodes were in the place of another one and are now that node"),
+        0 => format!("merge: no two of the {before} nodes are closer than {distance} (unit of the mesh)"),
+        _ => format!("merge: {merged} of {before} nodes coincided with another node and were merged with it"),
     });
     Ok(())
 }
 
-/// Sentences about the materials in use, with the numbers as they were written.
+/// Returns warnings about the materials in use, with the numbers as given.
 fn material_doubts(file: &MeshFile, units: UnitSystem, figures: &[RegionFigures]) -> Vec<String> {
     let mut doubts: Vec<(String, Vec<&str>)> = Vec::new();
     for figure in figures {
         let region = file.mesh.regions.iter().find(|region| region.name == figure.region);
         let Some(material) = region.and_then(|region| region.material) else { continue };
-        // Materials of a job are in SI, whatever the mesh is in.
+        // Materials of a job are in SI, independent of the units of the mesh.
         let written = if figure.from == "mesh" { units } else { UnitSystem::SI };
         for doubt in material.doubts(&written) {
             match doubts.iter_mut().find(|(known, _)| *known == doubt) {
@@ -147,7 +150,7 @@ fn no_units(job: &ReduceJob, file: &MeshFile) -> LinkError {
     LinkError::file(&job.mesh, what)
 }
 
-/// Puts the materials of the job into the mesh; says of each region which one counts.
+/// Assigns the materials of the job to the mesh; returns the material of each region.
 fn materials(
     job: &ReduceJob,
     file: &mut MeshFile,
@@ -168,7 +171,7 @@ fn materials(
         let given = job.materials.get(&region.name).or(job.material.as_ref());
         let (material, from) = match (given, region.material) {
             (Some(given), own) => {
-                // Only where the units are known can the two be compared.
+                // The two can only be compared if the units are known.
                 if let Some(own) = own.filter(|own| job.units.is_some() && differ(own, &given.material)) {
                     warnings.push(format!(
                         "region {:?}: the material of the job, {given}, replaces that of the mesh, {}",
@@ -250,7 +253,7 @@ fn plan(
             env!("CARGO_PKG_VERSION"),
             materials.join("; "),
             quadrature_name(job),
-            if job.geometric == Some(true) { "; stiffness by load" } else { "" }
+            if job.geometric == Some(true) { "; geometric stiffness" } else { "" }
         ),
     };
     LinkPlan {
@@ -269,14 +272,15 @@ fn plan(
     }
 }
 
-/// The rules of a job, with incompatible modes under those of CalculiX where the deck has C3D8I.
+/// Returns the quadrature of a job; that of CalculiX with incompatible modes if the deck has C3D8I.
 fn quadrature(job: &ReduceJob, file: &MeshFile) -> Result<Quadrature, LinkError> {
     let has = |name: &str| file.element_types.contains(name);
     match job.quadrature.unwrap_or_default() {
         QuadratureChoice::Exact => Ok(Quadrature::Exact),
         QuadratureChoice::Calculix if has("C3D8I") && (has("C3D8") || has("C3D8R")) => {
-            let what = "the deck has C3D8I beside C3D8 or C3D8R; the rules of CalculiX can be had for bricks of one of them: give \
-                        all bricks one type, or leave quadrature out, with which all have incompatible modes";
+            let what = "the deck has C3D8I as well as C3D8 or C3D8R; the rules of CalculiX are available for \
+                        bricks of one type only: use one type for all bricks, or omit quadrature, which gives all \
+                        bricks incompatible modes";
             Err(LinkError::file(&job.mesh, what))
         }
         QuadratureChoice::Calculix if has("C3D8I") => Ok(Quadrature::CalculixModes),
@@ -291,7 +295,7 @@ pub(super) fn quadrature_name(job: &ReduceJob) -> &'static str {
     }
 }
 
-/// The error with what the file knows of it: numbers and places of nodes.
+/// Adds the number and the position of the node in the file to an error.
 pub(super) fn failed(job: &ReduceJob, file: &MeshFile, units: UnitSystem, source: MeshLinkError) -> LinkError {
     let node = match &source {
         MeshLinkError::Reduction(ReductionError::Tie(TieError::Overlap { node, .. })) => Some(*node as usize),

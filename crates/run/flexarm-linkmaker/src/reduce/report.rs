@@ -1,4 +1,4 @@
-//! A reduction as tables, for the terminal and for a page of Markdown.
+//! Tables of a reduction, for the terminal and for a Markdown page.
 
 use std::fmt::Write as _;
 
@@ -8,16 +8,16 @@ use flexarm_settings::{gathered, written};
 
 use super::summary::{ModalFigures, ModeFigures, ReduceSummary};
 
-/// A table of text; the first row is the header.
+/// A table of text.
 #[derive(Clone, Debug)]
 pub struct ReportTable {
-    /// What it is about, with units.
+    /// Title, with units.
     pub title: &'static str,
     /// Names of the columns.
     pub header: Vec<String>,
-    /// The rows, each as long as the header.
+    /// Rows, each with the length of the header.
     pub rows: Vec<Vec<String>>,
-    /// Whether it is for the page only: numbers that a terminal has no room for.
+    /// Whether the table is for the page only, because it is too wide for a terminal.
     pub page_only: bool,
 }
 
@@ -27,7 +27,7 @@ impl ReportTable {
         Self { title, header, rows, page_only: false }
     }
 
-    /// The table in Markdown.
+    /// Returns the table in Markdown.
     pub(crate) fn markdown(&self) -> String {
         let rule = vec!["---"; self.header.len()];
         let rows: String = self.rows.iter().map(|cells| written::markdown_row(cells)).collect();
@@ -39,10 +39,10 @@ impl ReportTable {
     }
 }
 
-/// Six components at an interface.
+/// Names of the six components at an interface.
 const COMPONENTS: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 
-/// All tables of a reduction, in the order in which a person asks.
+/// Returns all tables of a reduction, in the order of interest.
 pub fn tables(summary: &ReduceSummary) -> Vec<ReportTable> {
     let mut tables = vec![interfaces(summary), mass(summary), softness(summary)];
     tables.push(matrix("stiffness K_BB at B, A held (N/m, N/rad; N m/m, N m/rad)", &summary.stiffness));
@@ -56,7 +56,7 @@ pub fn tables(summary: &ReduceSummary) -> Vec<ReportTable> {
     tables
 }
 
-/// What a modal link holds.
+/// Returns the table of a modal link.
 pub fn modal_table(modal: &ModalFigures) -> ReportTable {
     let (low, high) = (modal.frequencies_hz.first(), modal.frequencies_hz.last());
     let hz = |x: Option<&f64>| x.map_or_else(|| "-".into(), |x| format!("{x:.1}"));
@@ -66,13 +66,13 @@ pub fn modal_table(modal: &ModalFigures) -> ReportTable {
     };
     let rows = vec![
         vec!["coordinates".into(), format!("{}, {of}, {} Hz to {} Hz", modal.coordinates, hz(low), hz(high))],
-        vec!["integrals of second order".into(), if modal.second_order { "known" } else { "unknown" }.into()],
-        vec!["stiffness by load".into(), if modal.geometric { "stored" } else { "not stored" }.into()],
+        vec!["second-order integrals".into(), if modal.second_order { "known" } else { "unknown" }.into()],
+        vec!["geometric stiffness".into(), if modal.geometric { "stored" } else { "not stored" }.into()],
     ];
     ReportTable::new("modal link, A held", &["", ""], rows)
 }
 
-/// The figures as a page of Markdown.
+/// Returns the figures as a Markdown page.
 pub fn markdown(summary: &ReduceSummary) -> String {
     let headline: Vec<String> = headline(summary).lines().map(written::markdown).collect();
     let mut page = format!("# Link {}\n\n{}\n", written::markdown(&summary.link), headline.join("\n"));
@@ -87,7 +87,7 @@ pub fn markdown(summary: &ReduceSummary) -> String {
     page + &warning_list(&summary.warnings)
 }
 
-/// Warnings as a section of Markdown; empty if there are none.
+/// Returns the warnings as a Markdown section; empty if there are none.
 pub(crate) fn warning_list(warnings: &[String]) -> String {
     if warnings.is_empty() {
         return String::new();
@@ -97,7 +97,7 @@ pub(crate) fn warning_list(warnings: &[String]) -> String {
     format!("\n## Warnings\n\n{items}")
 }
 
-/// What was reduced, in two lines.
+/// Describes the mesh and the method in two lines.
 pub fn headline(summary: &ReduceSummary) -> String {
     let materials: Vec<String> =
         summary.materials.iter().map(|m| format!("{}: {}", m.region, m.material.text)).collect();
@@ -120,13 +120,13 @@ fn sentence(title: &str) -> String {
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
-/// Three numbers with `digits` after the point, without a minus before zero.
+/// Formats three numbers with `digits` decimals, without a negative zero.
 fn triple(p: &[f64; 3], digits: usize) -> String {
     let smallest = 0.5 * 10f64.powi(-(digits as i32));
     p.map(|x| format!("{:.digits$}", if x.abs() < smallest { 0.0 } else { x })).join(", ")
 }
 
-/// Four significant digits.
+/// Formats a number with four significant digits.
 fn significant(x: f64) -> String {
     if x == 0.0 {
         return "0".into();
@@ -147,7 +147,7 @@ fn interfaces(summary: &ReduceSummary) -> ReportTable {
             triple(&i.extent_m, 4),
         ]
     });
-    let header = ["interface", "nodes chosen by", "nodes", "tie", "position", "their centroid", "their extent"];
+    let header = ["interface", "node selector", "nodes", "tie", "position", "centroid of nodes", "extent of nodes"];
     ReportTable::new("interfaces (m, link frame)", &header, rows.collect())
 }
 
@@ -158,26 +158,26 @@ fn mass(summary: &ReduceSummary) -> ReportTable {
     };
     let mut rows = vec![row("whole mesh", summary.mass_kg, &summary.com_m, &summary.inertia)];
     for part in &summary.attached {
-        rows.push(row("rides on it", part.mass_kg, &part.com_m, &part.inertia));
+        rows.push(row("attached body", part.mass_kg, &part.com_m, &part.inertia));
     }
     for (name, part) in ["proximal part", "distal part"].iter().zip(&summary.parts) {
         rows.push(row(name, part.mass_kg, &part.com_m, &part.inertia));
     }
     rows.push(vec!["elastic joint".into(), String::new(), triple(&summary.split_m, 4), String::new()]);
-    let header = ["", "mass [kg]", "centre of mass [m]", "ixx, iyy, izz, ixy, ixz, iyz there [kg m2]"];
+    let header = ["", "mass [kg]", "centre of mass [m]", "ixx, iyy, izz, ixy, ixz, iyz about it [kg m2]"];
     ReportTable::new("mass", &header, rows)
 }
 
-/// What a unit that people know does at B.
+/// Returns the displacements of B under loads of familiar size.
 fn softness(summary: &ReduceSummary) -> ReportTable {
     let C = &summary.compliance;
     // 1 kN and mm, 1 kN m and mrad.
     let of = |k: usize| significant(1e6 * C[k][k]);
     let rows = vec![
-        vec!["1 kN along it moves B by".into(), of(0), of(1), of(2), "mm".into()],
-        vec!["1 kN m about it turns B by".into(), of(3), of(4), of(5), "mrad".into()],
+        vec!["displacement of B under 1 kN".into(), of(0), of(1), of(2), "mm".into()],
+        vec!["rotation of B under 1 kN m".into(), of(3), of(4), of(5), "mrad".into()],
     ];
-    ReportTable::new("how soft it is, A held (along the same axis)", &["", "x", "y", "z", ""], rows)
+    ReportTable::new("deflection of B along the load, A held", &["", "x", "y", "z", ""], rows)
 }
 
 fn matrix(title: &'static str, M: &[[f64; 6]; 6]) -> ReportTable {
@@ -200,14 +200,14 @@ fn checks(summary: &ReduceSummary) -> ReportTable {
     let shape = if c.jacobian_at_nodes < MeshGate::SMALLEST_JACOBIAN { "warn" } else { "ok" };
     let mut rows = vec![
         below("asymmetry of the stiffness", c.symmetry, limits.asymmetry),
-        below("force under rigid motion", c.rigid_body_residual, MeshGate::RIGID_BODY_RESIDUAL),
-        below("blocks of the stiffness agree", c.block_identity, limits.rigid_body_warning),
-        vec!["motions without stiffness".into(), c.zero_modes.to_string(), "6".into(), zero.into()],
+        below("force under rigid-body motion", c.rigid_body_residual, MeshGate::RIGID_BODY_RESIDUAL),
+        below("mismatch of the stiffness blocks", c.block_identity, limits.rigid_body_warning),
+        vec!["zero-stiffness modes".into(), c.zero_modes.to_string(), "6".into(), zero.into()],
         below("mass, reduced against mesh", c.mass_error, MeshGate::MASS_ERROR),
         below("inertia, reduced against mesh", c.inertia_error, MeshGate::MASS_ERROR),
         below("residual of the kept modes", c.mode_residual, MeshGate::MODE_RESIDUAL),
         vec![
-            format!("flattest element ({})", c.worst_element),
+            format!("minimum Jacobian, element {}", c.worst_element),
             format!("{:.3}", c.jacobian_at_nodes),
             format!("above {}", MeshGate::SMALLEST_JACOBIAN),
             shape.into(),
@@ -217,7 +217,7 @@ fn checks(summary: &ReduceSummary) -> ReportTable {
         let close = (1.0 / OrderCheck::LARGEST_RATIO..OrderCheck::LARGEST_RATIO).contains(&ratio);
         let mark = if close { "ok" } else { "warn" };
         let usual = format!("below {}", OrderCheck::LARGEST_RATIO);
-        rows.push(vec!["softer with quadratic elements".into(), format!("{ratio:.2} times"), usual, mark.into()]);
+        rows.push(vec!["compliance ratio, quadratic elements".into(), format!("{ratio:.2} times"), usual, mark.into()]);
     }
     ReportTable::new("checks", &["", "measured", "usual", ""], rows)
 }
@@ -260,12 +260,12 @@ fn cost(summary: &ReduceSummary) -> ReportTable {
     let seconds = |x: f64| format!("{x:.2} s");
     let memory = summary.peak_rss_bytes.map_or_else(|| "-".into(), |b| format!("{:.0} MB", b as f64 / 1e6));
     let rows = vec![
-        vec!["wall clock / processor".into(), format!("{} / {}", seconds(summary.wall_s), seconds(summary.cpu_s))],
+        vec!["wall-clock / CPU time".into(), format!("{} / {}", seconds(summary.wall_s), seconds(summary.cpu_s))],
         vec![
             "read, assemble, factorise".into(),
             format!("{}, {}, {}", seconds(p.read_s), seconds(p.assembly_s), seconds(p.factorisation_s)),
         ],
-        vec!["modes (kept and judging), parts".into(), format!("{}, {}", seconds(p.modes_s), seconds(p.parts_s))],
+        vec!["modes (kept and reference), parts".into(), format!("{}, {}", seconds(p.modes_s), seconds(p.parts_s))],
         vec!["peak memory".into(), memory],
         vec![
             "factor".into(),

@@ -17,73 +17,72 @@ use super::prepare::quadrature_name;
 use super::words::described;
 use crate::yardsticks;
 
-/// Answer of `flexarm reduce`.
+/// Result of `flexarm reduce`.
 #[derive(Clone, Debug, Serialize)]
 pub struct ReduceSummary {
     /// Name of the link.
     pub link: String,
     /// The mesh file.
     pub mesh: String,
-    /// Its format.
+    /// Format of the mesh file.
     pub format: &'static str,
-    /// Its units.
+    /// Units of the mesh.
     pub units: String,
-    /// How: "guyan" or "craig-bampton, 10 modes".
+    /// Method: "guyan" or "craig-bampton, 10 modes".
     pub method: String,
-    /// exact or calculix.
+    /// Quadrature: exact or calculix.
     pub quadrature: &'static str,
     /// Material of each region.
     pub materials: Vec<RegionFigures>,
-    /// Nodes of the mesh.
+    /// Number of nodes of the mesh.
     pub nodes: usize,
-    /// Its elements.
+    /// Number of elements.
     pub elements: usize,
-    /// Its degrees of freedom.
+    /// Number of degrees of freedom.
     pub dofs: usize,
     /// Interfaces, proximal first.
     pub interfaces: Vec<InterfaceFigures>,
     /// Mass of the whole link.
     pub mass_kg: f64,
-    /// Its centre of mass.
+    /// Centre of mass.
     pub com_m: [f64; 3],
-    /// Its inertia about the centre of mass, 3×3 (kg m²).
+    /// Inertia about the centre of mass, 3×3 (kg m²).
     pub inertia: [[f64; 3]; 3],
     /// Stiffness at B with A held, 6×6, linear first (N/m, N/rad; N m/m, N m/rad).
     pub stiffness: [[f64; 6]; 6],
-    /// Its inverse: displacement of B per unit load at B.
+    /// Inverse of the stiffness: displacement of B per unit load at B.
     pub compliance: [[f64; 6]; 6],
-    /// Where the elastic joint of the two parts sits.
+    /// Position of the elastic joint between the two parts.
     pub split_m: [f64; 3],
     /// The two rigid parts, proximal first.
     pub parts: Vec<PartFigures>,
-    /// Bodies that ride on the link without being in the mesh; they are in `parts`, not in
-    /// `mass_kg`.
+    /// Bodies attached to the link that are not in the mesh; included in `parts`, not in `mass_kg`.
     pub attached: Vec<PartFigures>,
-    /// Chains of more parts that the link file holds.
+    /// Chains of more parts in the link file.
     pub chains: Vec<ChainFigures>,
     /// Natural frequencies of the mesh with A held and B free (Hz).
     pub frequencies_hz: Vec<f64>,
-    /// Frequencies of the mesh with all interfaces held: the modes that were kept (Hz).
+    /// Frequencies of the kept modes: those of the mesh with all interfaces held (Hz).
     pub fixed_interface_hz: Vec<f64>,
-    /// The modal link in the link file.
+    /// Modal link in the link file.
     pub modal: Option<ModalFigures>,
     /// Modes with A held, of the mesh and of the reduced models.
     pub modes: Vec<ModeFigures>,
-    /// What was checked.
+    /// Results of the checks.
     pub checks: CheckFigures,
-    /// The linear algebra.
+    /// Figures of the linear solver.
     pub solver: SolverFigures,
     /// Time of each step (s).
     pub phases: PhaseFigures,
-    /// Wall-clock time without the writing of files (s).
+    /// Wall-clock time, excluding the writing of files (s).
     pub wall_s: f64,
     /// Processor time, all threads (s).
     pub cpu_s: f64,
-    /// Largest memory of the process so far; null where the system does not tell.
+    /// Peak memory of the process so far; null where the system does not report it.
     pub peak_rss_bytes: Option<u64>,
-    /// Things worth telling.
+    /// Warnings.
     pub warnings: Vec<String>,
-    /// The same with code, value and yardstick.
+    /// The same warnings with code, value and reference value.
     pub caveats: Vec<Caveat>,
     /// Written files.
     pub files: ReduceFiles,
@@ -92,17 +91,17 @@ pub struct ReduceSummary {
 /// Written files; null where none was written.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ReduceFiles {
-    /// The link file, for `reduced = "..."` of a robot file.
+    /// Link file, for `reduced = "..."` of a robot file.
     pub flex: Option<String>,
-    /// The entry of a robot file that uses it, as TOML.
+    /// Entry for a robot file that uses the link, as TOML.
     pub entry: Option<String>,
-    /// The job, complete, to run again.
+    /// Complete job, to run it again.
     pub job: Option<String>,
-    /// These figures.
+    /// Summary file.
     pub summary: Option<String>,
-    /// These figures for people.
+    /// Report.
     pub report: Option<String>,
-    /// What is tied, how the link bends, its modes; empty without the feature `png`.
+    /// Pictures of the ties, the deflections and the modes; empty without the feature `png`.
     pub pictures: Vec<String>,
 }
 
@@ -111,37 +110,37 @@ pub struct ReduceFiles {
 pub struct InterfaceFigures {
     /// Name.
     pub name: String,
-    /// Which nodes were asked for.
+    /// Selection of the nodes.
     pub selector: String,
-    /// How many these are.
+    /// Number of nodes.
     pub nodes: usize,
-    /// rigid or distributing.
+    /// Tie: rigid or distributing.
     pub tie: &'static str,
-    /// Position of its frame.
+    /// Position of the frame.
     pub position_m: [f64; 3],
-    /// Roll, pitch, yaw of its frame.
+    /// Roll, pitch, yaw of the frame.
     pub rpy_rad: [f64; 3],
-    /// Mean of its nodes.
+    /// Mean position of the nodes.
     pub centroid_m: [f64; 3],
-    /// Size of the box around its nodes.
+    /// Size of the bounding box of the nodes.
     pub extent_m: [f64; 3],
 }
 
-/// A region with the material that was used.
+/// A region with the material in use.
 #[derive(Clone, Debug, Serialize)]
 pub struct RegionFigures {
     /// Name of the region.
     pub region: String,
-    /// Its material.
+    /// Material of the region.
     pub material: MaterialFigures,
-    /// mesh, or job.
+    /// Source of the material: mesh or job.
     pub from: &'static str,
 }
 
 /// A material, SI.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MaterialFigures {
-    /// Preset and constants for people.
+    /// Preset and constants as text.
     pub text: String,
     /// Young's modulus (Pa).
     #[serde(rename = "E")]
@@ -180,7 +179,8 @@ impl From<&RigidPart> for PartFigures {
 pub struct ChainFigures {
     /// Number of parts.
     pub parts: usize,
-    /// Natural frequencies with A held and B free (Hz), as many as the mesh's.
+    /// Natural frequencies with A held and B free (Hz), at most as many as checked against the
+    /// mesh.
     pub frequencies_hz: Vec<f64>,
 }
 
@@ -195,19 +195,19 @@ impl ChainFigures {
 /// One mode with A held and B free; errors are relative to the mesh.
 #[derive(Clone, Debug, Serialize)]
 pub struct ModeFigures {
-    /// Of the mesh (Hz).
+    /// Frequency of the mesh (Hz).
     pub mesh_hz: f64,
-    /// Of the reduced matrices with their modes, Craig-Bampton (Hz).
+    /// Frequency of the reduced matrices with their modes, Craig-Bampton (Hz).
     pub reduced_hz: Option<f64>,
-    /// Its error.
+    /// Relative error of the Craig-Bampton frequency.
     pub reduced_error: Option<f64>,
-    /// Of the reduced matrices without modes, Guyan (Hz).
+    /// Frequency of the reduced matrices without modes, Guyan (Hz).
     pub guyan_hz: Option<f64>,
-    /// Its error.
+    /// Relative error of the Guyan frequency.
     pub guyan_error: Option<f64>,
-    /// Of the two rigid parts (Hz).
+    /// Frequency of the two rigid parts (Hz).
     pub lumped_hz: Option<f64>,
-    /// Its error.
+    /// Relative error of the frequency of the two parts.
     pub lumped_error: Option<f64>,
 }
 
@@ -226,20 +226,20 @@ impl From<&ModeCheck> for ModeFigures {
     }
 }
 
-/// A modal link: `model = "modal"` of a robot file.
+/// Figures of a modal link: `model = "modal"` of a robot file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ModalFigures {
-    /// Shape coordinates: six per interface but A, then modes.
+    /// Number of generalised coordinates: six per interface except A, then modes.
     pub coordinates: usize,
-    /// Interfaces but A, distal first.
+    /// Interfaces except A, distal first.
     pub interfaces: Vec<String>,
-    /// Mass, without bodies that ride on the link.
+    /// Mass, without attached bodies.
     pub mass_kg: f64,
-    /// Whether the integrals of second order are known.
+    /// Whether the second-order integrals are known.
     pub second_order: bool,
-    /// Whether stiffness by load is there (`geometric_stiffening = true` of a robot file).
+    /// Whether the geometric stiffness is stored (`geometric_stiffening = true` of a robot file).
     pub geometric: bool,
-    /// Natural frequencies with A held, all of them (Hz).
+    /// All natural frequencies with A held (Hz).
     pub frequencies_hz: Vec<f64>,
 }
 
@@ -256,78 +256,79 @@ impl From<&ModalLink> for ModalFigures {
     }
 }
 
-/// What was checked.
+/// Results of the checks.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct CheckFigures {
-    /// Largest relative asymmetry of the reduced stiffness as computed.
+    /// Maximum relative asymmetry of the reduced stiffness as computed.
     pub symmetry: f64,
-    /// Largest relative force under rigid motion of all interfaces.
+    /// Maximum relative force under rigid-body motion of all interfaces.
     pub rigid_body_residual: f64,
-    /// Relative difference of the mass in the reduced matrix from that of the mesh.
+    /// Relative difference between the mass in the reduced matrix and that of the mesh.
     pub mass_error: f64,
-    /// The same of the centre of mass (m).
+    /// Difference of the centres of mass (m).
     pub com_error_m: f64,
-    /// The same of the inertia, relative.
+    /// Relative difference of the inertias.
     pub inertia_error: f64,
-    /// Disagreement of `K_AA`, `K_AB` with `K_BB`.
+    /// Residual of the identity between `K_AA`, `K_AB` and `K_BB`.
     pub block_identity: f64,
-    /// Modes of the free reduced link without frequency; six are right.
+    /// Number of zero-frequency modes of the free reduced link; must be six.
     pub zero_modes: usize,
-    /// Smallest eigenvalue of `K_BB`, scaled to a unit diagonal.
+    /// Minimum eigenvalue of `K_BB`, scaled to a unit diagonal.
     pub min_eigenvalue: f64,
-    /// Condition number of the stiffness of the free nodes, estimated.
+    /// Estimated condition number of the stiffness of the free nodes.
     pub condition: f64,
-    /// Largest residual of the kept modes.
+    /// Maximum residual of the kept modes.
     pub mode_residual: f64,
-    /// Smallest Jacobian at an integration point over the mean of its element.
+    /// Minimum Jacobian at an integration point, relative to the mean of its element.
     pub jacobian_at_points: f64,
-    /// Smallest Jacobian at a node over the mean of its element.
+    /// Minimum Jacobian at a node, relative to the mean of its element.
     pub jacobian_at_nodes: f64,
-    /// Number in the file of the element with the latter.
+    /// Number in the file of the element with the minimum Jacobian at a node.
     pub worst_element: u64,
-    /// Smallest volume of an element over that of the best shape with edges of the same length.
+    /// Minimum volume of an element, relative to that of the best shape with edges of the same
+    /// length.
     pub smallest_fullness: f64,
-    /// Largest distance of a mid-side node from the middle of its edge, over the length of the
-    /// edge.
+    /// Maximum distance of a mid-side node from the middle of its edge, relative to the length of
+    /// the edge.
     pub largest_offset: f64,
-    /// Compliance at B with elements of second order over that of the mesh, the component farthest
-    /// from one; null for elements of second order.
+    /// Ratio of the compliance at B with second-order elements to that of the mesh, for the
+    /// component with the ratio farthest from one; null for second-order elements.
     pub order_ratio: Option<f64>,
-    /// The same along x y z rx ry rz.
+    /// Ratios of all components, along x y z rx ry rz.
     pub order_ratios: Option<[f64; 6]>,
 }
 
-/// The linear algebra.
+/// Figures of the linear solver.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct SolverFigures {
-    /// Unknowns of the factor.
+    /// Number of unknowns of the factorisation.
     pub unknowns: usize,
-    /// Entries of the lower triangle of the matrix.
+    /// Number of stored entries of the lower triangle of the matrix.
     pub matrix_entries: usize,
-    /// Entries of its factor.
+    /// Number of stored entries of the factor.
     pub factor_entries: usize,
-    /// amd or nested: the order that was used.
+    /// Ordering used: amd or nested.
     pub ordering: &'static str,
-    /// Right-hand sides solved in all.
+    /// Total number of right-hand sides solved.
     pub right_hand_sides: usize,
 }
 
 /// Time of each step (s).
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct PhaseFigures {
-    /// Reading the mesh, choosing nodes.
+    /// Reading of the mesh and selection of nodes.
     pub read_s: f64,
-    /// Element matrices.
+    /// Element matrices and assembly.
     pub assembly_s: f64,
-    /// Cholesky factor and static shapes.
+    /// Cholesky factorisation and static shapes.
     pub factorisation_s: f64,
     /// Fixed-interface modes, and those of the mesh with A held.
     pub modes_s: f64,
-    /// Parts, chains, checks.
+    /// Rigid parts, chains and checks.
     pub parts_s: f64,
 }
 
-/// The figures of a finished reduction; those of the machine come later.
+/// Returns the figures of a finished reduction; times and memory are filled in later.
 pub(super) fn summary_of(
     job: &ReduceJob,
     plan: &LinkPlan,
@@ -406,7 +407,7 @@ pub(super) fn summary_of(
         split_m: link.split.X_LS.translation.vector.into(),
         parts: vec![PartFigures::from(&link.proximal), PartFigures::from(&link.distal)],
         attached: plan.attached.iter().map(PartFigures::from).collect(),
-        // As the mesh is: without what rides on it.
+        // Chains of the mesh without attached bodies.
         chains: reduction.bare_chains.iter().map(|chain| ChainFigures::new(chain, JUDGED_MODES)).collect(),
         frequencies_hz: reduction.held_modes.frequencies_hz(),
         fixed_interface_hz: reduction.fixed_modes.frequencies_hz(),
@@ -430,49 +431,51 @@ pub(super) fn summary_of(
     }
 }
 
-/// Interfaces that take much of the link between the two that are farthest apart; `nodes`: of the
-/// mesh.
+/// Returns warnings about interfaces that extend over a large share of the distance between the two
+/// farthest ones; `nodes` is the number of nodes of the mesh.
 fn spreads(chosen: &[Chosen], nodes: usize) -> Vec<Doubt> {
     let place = |one: &Chosen| one.interface.X_LI.translation.vector;
     let pairs = chosen.iter().enumerate().flat_map(|(k, a)| chosen[..k].iter().map(move |b| place(a) - place(b)));
     let Some(line) = pairs.max_by(|a, b| a.norm().total_cmp(&b.norm())) else { return Vec::new() };
     let length = line.norm();
-    // Of a box of nodes the extent along the line; its edges are along the axes.
+    // Extent of the bounding box along the line; the edges of the box are along the axes.
     let along = |one: &Chosen| one.extent.dot(&(line / length).abs());
     let share = |one: &Chosen| one.interface.nodes.len() as f64 / nodes as f64;
     let judged = |one: &Chosen| yardsticks::of_interface(&one.interface.name, along(one) / length, share(one));
     chosen.iter().filter_map(judged).collect()
 }
 
-/// Errors of the first frequency beyond which a model is called too coarse.
+/// Relative errors of the first frequency above which a model is reported as too coarse.
 const COARSE_PARTS: f64 = 0.05;
 const MODES_MISS: f64 = 0.005;
-/// Code of the caveat that the kept modes miss it.
+/// Code of the caveat about too few modes.
 const COARSE_MODES: &str = "coarse-modes";
 
-/// Sentences about reduced models that miss the first frequency.
+/// Returns warnings about reduced models with an inaccurate first frequency.
 ///
-/// * `source`: whose frequency it is: that of the mesh, or of the matrices.
+/// * `source`: origin of the reference frequency: the mesh, or the matrices.
 /// * `parts`, `modes`: relative errors of the two rigid parts and of the kept modes.
 pub(crate) fn coarse(source: &str, parts: Option<f64>, modes: Option<f64>) -> Vec<Doubt> {
     let off = |error: Option<f64>, bound: f64| error.filter(|error| error.abs() > bound);
     let parts = off(parts, COARSE_PARTS).map(|error| {
         let percent = 100.0 * error;
         let said = format!(
-            "two rigid parts miss the first frequency of {source} by {percent:+.1} %: so will a simulation with them"
+            "the first frequency with two rigid parts differs from that of {source} by {percent:+.1} %, as it will \
+             in a simulation with them"
         );
         Doubt::found("coarse-parts", error, COARSE_PARTS, said)
     });
     let modes = off(modes, MODES_MISS).map(|error| {
         let percent = 100.0 * error;
         let setting = Setting::Modes;
-        let said = format!("the kept modes miss the first frequency by {percent:+.2} %: keep more of them ({setting})");
+        let said =
+            format!("the first frequency with the kept modes differs by {percent:+.2} %: keep more modes ({setting})");
         Doubt::found(COARSE_MODES, error, MODES_MISS, said)
     });
     parts.into_iter().chain(modes).collect()
 }
 
-/// A doubt about a link as a caveat.
+/// Converts a doubt about a link to a caveat.
 pub(crate) fn doubted(link: &str, doubt: Doubt) -> Caveat {
     let Doubt { code, message, value, yardstick } = doubt;
     let finite = |x: Option<f64>| x.filter(|x| x.is_finite());

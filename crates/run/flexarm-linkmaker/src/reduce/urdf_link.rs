@@ -1,12 +1,12 @@
-//! What a robot says of the link that is made of a mesh.
+//! Data of the link from a robot file.
 
 use flexarm_fem::RigidPart;
 use flexarm_fem::matrix_link::halves_of_bar;
 use flexarm_spatial::Pose;
 use nalgebra::Vector3;
 
-/// What a robot says of the link that is made: where its joints are, and what it weighs. Whoever
-/// reads the file of the robot ([`UrdfEntry::file`](super::UrdfEntry::file)) fills it in. SI, link
+/// Data from a robot for the link to be reduced: frames of its joints, and its mass. The caller,
+/// which reads the robot file ([`UrdfEntry::file`](super::UrdfEntry::file)), fills it in. SI, link
 /// axes.
 #[derive(Clone, Debug)]
 pub struct UrdfLink {
@@ -14,45 +14,46 @@ pub struct UrdfLink {
     pub name: String,
     /// Frame of the distal interface: that of the joint at B.
     pub X_LB: Pose,
-    /// The joints on the link, in the order of the robot.
+    /// Joints at the link, in the order of the robot.
     pub joints: Vec<LinkJoint>,
-    /// Mass, centre and inertia about the centre (kg, m, kg m²), if the robot has them.
+    /// Mass, centre of mass and inertia about it (kg, m, kg m²), if the robot has them.
     pub inertia: Option<RigidPart>,
 }
 
-/// A joint on a link.
+/// A joint at a link.
 #[derive(Clone, Debug)]
 pub struct LinkJoint {
-    /// Its name.
+    /// Name of the joint.
     pub name: String,
-    /// Its frame in the link: of the joint that carries the link, the link's own.
+    /// Frame of the joint in the link; for the parent joint, the link's own frame.
     pub X_LJ: Pose,
-    /// Whether it leads on from the link; the other one carries it.
+    /// Whether it is a child joint; otherwise it is the parent joint.
     pub leads_on: bool,
 }
 
 impl UrdfLink {
-    /// Name of the joint at B.
+    /// Returns the name of the joint at B.
     pub(super) fn distal_joint(&self) -> Option<&str> {
         let at_b = |joint: &&LinkJoint| joint.leads_on && joint.X_LJ == self.X_LB;
         self.joints.iter().find(at_b).map(|joint| joint.name.as_str())
     }
 
-    /// What the link weighs beyond its mesh, as two halves along the line from A to B, link axes.
+    /// Returns the difference between the mass of the link and that of its mesh, as two halves
+    /// along the line from A to B, in link axes.
     pub(super) fn rest(&self, mesh: &RigidPart, along: &Vector3<f64>) -> Result<[RigidPart; 2], String> {
         let Some(whole) = &self.inertia else {
-            return Err(format!("link {:?} has no inertial, so there is no rest", self.name));
+            return Err(format!("link {:?} has no <inertial>, so `rest` is undefined", self.name));
         };
         let mass = whole.mass - mesh.mass;
         if mass.is_nan() || mass <= 0.0 {
             return Err(format!(
-                "the mesh weighs {:.4} kg, link {:?} of the URDF {:.4} kg: nothing is left that could ride on it; \
-                 leave `rest` out, or correct the density",
+                "the mesh has {:.4} kg, link {:?} of the URDF {:.4} kg: no mass remains for attached bodies; omit \
+                 `rest`, or correct the density",
                 mesh.mass, self.name, whole.mass
             ));
         }
         let com = (whole.com * whole.mass - mesh.com * mesh.mass) / mass;
-        // Second moments about the centre of the rest.
+        // Second moments about the centre of mass of the difference.
         let about = |part: f64, com_part: Vector3<f64>| {
             let c = (com_part - com).cross_matrix();
             -c * c * part
@@ -60,23 +61,23 @@ impl UrdfLink {
         let inertia = whole.inertia + about(whole.mass, whole.com) - mesh.inertia - about(mesh.mass, mesh.com);
         let halves = halves_of_bar(&RigidPart { mass, com, inertia }, along);
         for half in &halves {
-            half.check("what link and mesh differ by").map_err(|error| {
+            half.check("the difference between link and mesh").map_err(|error| {
                 format!(
-                    "{error}: the mesh has more inertia than the URDF's link; leave `rest` out, or correct one of them"
+                    "{error}: the mesh has more inertia than the link in the URDF; omit `rest`, or correct one of them"
                 )
             })?;
         }
         Ok(halves)
     }
 
-    /// The joints that lead on from the link.
+    /// Returns the child joints.
     pub(super) fn leading_on(&self) -> impl Iterator<Item = &LinkJoint> {
         self.joints.iter().filter(|joint| joint.leads_on)
     }
 
-    /// Frame in the link of a joint at either of its ends.
+    /// Returns the frame of a parent or child joint in the link.
     pub(super) fn joint(&self, name: &str) -> Result<Pose, String> {
-        // One that leads on goes before the one that carries the link.
+        // Child joints are searched before the parent joint.
         let found = self.leading_on().chain(&self.joints).find(|joint| joint.name == name);
         found.map(|joint| joint.X_LJ).ok_or_else(|| {
             let known: Vec<&str> = self.joints.iter().map(|joint| joint.name.as_str()).collect();
@@ -91,7 +92,7 @@ mod tests {
 
     use super::*;
 
-    /// Truth: mass, first moment and moment of inertia of bodies that are joined add up (Steiner).
+    /// Truth: mass, first moment and moment of inertia of joined bodies add up (Steiner).
     #[test]
     fn mesh_and_what_rides_on_it_have_the_mass_and_the_inertia_of_the_robots_link() {
         let body = |mass, com, moments| RigidPart { mass, com, inertia: Matrix3::from_diagonal(&moments) };
@@ -109,7 +110,7 @@ mod tests {
         assert!((joined.com - whole.com).norm() < 1e-12);
         assert!((joined.inertia - whole.inertia).amax() < 1e-12 * whole.inertia.amax());
         assert!(near.com.x < far.com.x, "proximal first");
-        // A mesh that is heavier than the link leaves nothing to ride on it.
+        // A mesh heavier than the link leaves no mass to attach.
         assert!(link.rest(&mesh.with_mass(31.0), &Vector3::x()).unwrap_err().contains("correct the density"));
     }
 

@@ -1,4 +1,4 @@
-//! Words and numbers of a reduction job that may be written in more than one way.
+//! Values of a reduction job with several notations.
 
 use std::fmt;
 use std::str::FromStr;
@@ -9,23 +9,23 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::MaterialEntry;
 
-/// A material by the name of a preset or by its constants.
+/// A material, by the name of a preset or by its constants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MaterialChoice {
-    /// The preset, if it is one.
+    /// Name of the preset, if any.
     pub name: Option<&'static str>,
-    /// Its constants, SI.
+    /// Constants, SI.
     pub material: Material,
 }
 
-/// The forms of a material, for messages.
+/// Notations of a material, for messages.
 pub(super) const MATERIAL_FORMS: &str =
     "steel, aluminium, cast_iron, ductile_iron, or E,nu,rho in SI such as 70e9,0.33,2700 (Pa, -, kg/m3)";
 
 impl MaterialChoice {
     fn named(name: &str) -> Result<Self, String> {
         let (name, material) = Material::preset(name).ok_or_else(|| {
-            let meant = Material::suggestion(name).map_or(String::new(), |meant| format!("; is {meant:?} meant?"));
+            let meant = Material::suggestion(name).map_or(String::new(), |meant| format!("; did you mean {meant:?}?"));
             format!("material {name:?} is not known; expected {MATERIAL_FORMS}{meant}")
         })?;
         Ok(Self { name: Some(name), material })
@@ -51,13 +51,13 @@ impl FromStr for MaterialChoice {
 }
 
 impl fmt::Display for MaterialChoice {
-    /// For reports: the name with the constants.
+    /// Writes name and constants.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&described(&self.material))
     }
 }
 
-/// A material in a few words: the preset that it equals, and its constants.
+/// Describes a material: the preset that it equals, if any, and its constants.
 pub(super) fn described(material: &Material) -> String {
     let name = Material::PRESETS.iter().find(|(_, preset)| preset == material).map_or("", |(name, _)| *name);
     let Material { E, nu, rho, .. } = material;
@@ -94,7 +94,7 @@ impl<'de> Deserialize<'de> for MaterialChoice {
     }
 }
 
-/// Where the elastic joint of the two-part link sits.
+/// Position of the elastic joint of the two-part link.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum SplitChoice {
     /// At the centre of compliance.
@@ -102,14 +102,14 @@ pub enum SplitChoice {
     ElasticCentre,
     /// Midway between A and B.
     Mid,
-    /// At a fraction of the way from A to B.
+    /// At a fraction of the distance from A to B.
     Fraction(f64),
     /// At a point of the link frame, in the unit of the mesh.
     Point([f64; 3]),
 }
 
-/// The forms of a split, for messages.
-const SPLIT_FORMS: &str = "elastic-centre, mid, a fraction of the way from A to B (0 to 1), or a point x,y,z";
+/// Notations of a split, for messages.
+const SPLIT_FORMS: &str = "elastic-centre, mid, a fraction of the distance from A to B (0 to 1), or a point x,y,z";
 
 impl SplitChoice {
     fn fraction(x: f64) -> Result<Self, String> {
@@ -176,22 +176,22 @@ impl<'de> Deserialize<'de> for SplitChoice {
     }
 }
 
-/// Rule by which elements are integrated.
+/// Quadrature rule of the elements.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum QuadratureChoice {
-    /// Enough points for stiffness and mass.
+    /// Enough points for exact stiffness and mass.
     #[default]
     Exact,
     /// The points of CalculiX, for comparison with it.
     Calculix,
 }
 
-/// Order in which the unknowns are eliminated.
+/// Elimination ordering of the unknowns.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum OrderingChoice {
-    /// By size of the mesh.
+    /// Chosen by the size of the mesh.
     #[default]
     Auto,
     /// Approximate minimum degree.
@@ -200,18 +200,18 @@ pub enum OrderingChoice {
     Nested,
 }
 
-/// A position that the mesh itself gives.
+/// A position derived from the mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum At {
-    /// The mean of the chosen nodes.
+    /// The mean of the selected nodes.
     Centroid,
 }
 
-/// Finite numbers between commas.
+/// Parses finite numbers separated by commas.
 ///
 /// # Errors
-/// The word that is not one.
+/// A message with the word that is not a finite number.
 pub fn numbers(text: &str) -> Result<Vec<f64>, String> {
     let number = |word: &str| {
         let value = word.trim().parse().ok().filter(|x: &f64| x.is_finite());
@@ -220,7 +220,7 @@ pub fn numbers(text: &str) -> Result<Vec<f64>, String> {
     text.split(',').map(number).collect()
 }
 
-/// Something with a text form, as an optional string of a file.
+/// (De)serialisation of an optional value through its text form.
 pub(super) mod text {
     use std::fmt::Display;
     use std::str::FromStr;

@@ -1,4 +1,4 @@
-//! Samples from the messages of their topics.
+//! Assembles samples from the messages of their topics.
 
 use std::collections::HashMap;
 
@@ -10,10 +10,10 @@ use crate::mcap_file::messages::{Header, JointState, LabelledArray, Time, decode
 use crate::read::exact_time;
 use crate::{Event, EventKind, RunHeader, Sample, TwinSample};
 
-/// Deflections and loads of all elements.
+/// Topic of the deflections and loads of all elements.
 const ELASTIC: &str = "/elastic/joint_states";
 
-/// What a message of a topic holds; several topics make one sample.
+/// Kind of a message, given by its topic; several topics make up one sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Topic {
     Frames,
@@ -25,7 +25,7 @@ pub(super) enum Topic {
     Error,
     PathError,
     Elastic,
-    /// In older files, which have them with each sample.
+    /// Load of one element; used by older files, which have it for every sample.
     Load(usize),
     Deflection(usize),
     StaticError,
@@ -36,27 +36,27 @@ pub(super) enum Topic {
 }
 
 impl Topic {
-    /// Whether there is one such message per sample. Frames have fewer, but for older files.
+    /// Whether every sample has such a message. Frames have fewer, except in older files.
     fn is_of_a_sample(self) -> bool {
         !matches!(self, Self::Frames | Self::FixedFrames | Self::Events)
     }
 }
 
-/// Puts the messages of a sample together.
+/// Assembles the messages of a sample.
 pub(super) struct Assembly {
     channels: HashMap<u16, Topic>,
-    /// Topic names of this run.
+    /// Known topic names of this run.
     known: HashMap<String, Topic>,
     epoch_ns: u64,
     step_s: f64,
     joints: usize,
     pub(super) frames: Frames,
     sequence: Option<u32>,
-    /// Time of the sample at hand (ns).
+    /// Log time of the current sample (ns).
     log_time: u64,
     sample: Sample,
     seen: Vec<Topic>,
-    /// The last sample that [`Assembly::take`] or [`Assembly::close`] finished, and its topics in
+    /// The last sample completed by [`Assembly::take`] or [`Assembly::close`], and its topics in
     /// order.
     pub(super) done: Sample,
     pub(super) done_topics: Vec<Topic>,
@@ -79,7 +79,7 @@ impl Assembly {
             ("/tcp/contributions", Topic::Contributions),
             ("/energy", Topic::Energy),
             ("/solver", Topic::Solver),
-            ("/diagnostics/solver", Topic::Solver), // of older files
+            ("/diagnostics/solver", Topic::Solver), // older files
             ("/events", Topic::Events),
         ]
         .map(|(name, topic)| (name.to_owned(), topic))
@@ -106,17 +106,19 @@ impl Assembly {
         }
     }
 
-    /// Takes a record. If it begins the next sample, the one before is [`Assembly::done`].
+    /// Takes a record. Returns `Some` if it starts a new sample; the previous one is then in
+    /// [`Assembly::done`].
     ///
     /// # Errors
-    /// In words, what is wrong with a message.
+    /// A description of the message that cannot be read.
     pub(super) fn take(&mut self, record: &Record<'_>) -> Result<Option<()>, String> {
         match record {
             Record::Channel(channel) => {
                 if let Some(topic) = self.known.get(&channel.topic) {
                     self.channels.insert(channel.id, *topic);
                 }
-                // Where all elements are together, those by themselves are for pictures.
+                // With the topic of all elements present, the topics of single elements only serve
+                // viewers.
                 if self.channels.values().any(|topic| *topic == Topic::Elastic) {
                     self.channels.retain(|_, topic| !matches!(topic, Topic::Load(_) | Topic::Deflection(_)));
                 }
@@ -125,8 +127,8 @@ impl Assembly {
             Record::Message { header, data } => {
                 let Some(&topic) = self.channels.get(&header.channel_id) else { return Ok(None) };
                 let next = topic.is_of_a_sample() && self.sequence != Some(header.sequence);
-                // Frames come before the rest of their sample and are numbered by themselves. Those
-                // of the last one can come behind it.
+                // Frames precede the rest of their sample and have their own sequence numbers.
+                // Those of the last sample may follow it.
                 let of_next = topic == Topic::Frames && self.log_time != header.log_time;
                 let closed = (next || of_next) && self.close();
                 if next {
@@ -146,7 +148,7 @@ impl Assembly {
         }
     }
 
-    /// Ends the sample at hand; whether there was one.
+    /// Completes the current sample; returns whether there was one.
     pub(super) fn close(&mut self) -> bool {
         if self.seen.is_empty() {
             return false;
@@ -159,7 +161,7 @@ impl Assembly {
         true
     }
 
-    /// Puts a message's numbers into their places; `None` if it is not what its topic says.
+    /// Stores the numbers of a message; `None` if it does not have the form of its topic.
     fn message(&mut self, topic: Topic, data: &[u8]) -> Option<()> {
         let sample = &mut self.sample;
         match topic {
@@ -186,7 +188,7 @@ impl Assembly {
             }
             Topic::Load(k) => sample.elastic[k].load = six_vector(data)?,
             Topic::Deflection(k) => {
-                // Older files have an array with names.
+                // In older files, an array with names.
                 let array = array(data).and_then(|values| values.try_into().ok());
                 sample.elastic[k].deflection = array.or_else(|| six_vector(data))?;
             }

@@ -1,4 +1,4 @@
-//! What an MCAP file says once: names, set-up, attached files, result.
+//! Data stored once in an MCAP file: names, set-up, attached files, result.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,12 +9,12 @@ use crate::read::{not_a_recording, stem};
 use crate::run_json::{self, RESULT_JSON, RUN_JSON, meshes};
 use crate::{Attachment, LogError, RunHeader};
 
-/// Name of the robot's file in a recording.
+/// Name of the attached URDF.
 const URDF: &str = "robot.urdf";
-/// Groups of metadata that the recorder adds by itself.
+/// Metadata groups written by the recorder itself.
 const OWN_GROUPS: [&str; 3] = ["flexarm.recording", "flexarm.units", "flexarm.result"];
 
-/// What a file says besides its samples.
+/// Contents of a file other than its samples.
 #[derive(Default)]
 pub(super) struct Found {
     library: String,
@@ -24,11 +24,11 @@ pub(super) struct Found {
     pub(super) result: Option<Vec<u8>>,
     mesh_block: Option<Vec<u8>>,
     urdf: Option<Vec<u8>>,
-    /// Attached files that have no part of their own.
+    /// Attached files without a field above.
     pub(super) files: Vec<Attachment>,
-    /// Whether the index is there, which is written last.
+    /// Whether the index, which is written last, is present.
     pub(super) whole: bool,
-    /// Samples that began, up to two.
+    /// Number of samples found so far; reading stops at two.
     pub(super) samples: u32,
     sequence: Option<u32>,
 }
@@ -71,7 +71,8 @@ impl Found {
         group.and_then(|(_, pairs)| pairs.get(key)).map(String::as_str)
     }
 
-    /// The header, how many of the attached files belong to it, and what it lacks.
+    /// Returns the header, the number of attached files that belong to it, and a list of missing
+    /// parts.
     pub(super) fn header(
         &mut self,
         path: &Path,
@@ -105,7 +106,7 @@ impl Found {
             None if run.meshes.is_empty() => {}
             None => missing.push("the file breaks off before the surfaces of the links".to_owned()),
         }
-        // Mesh files stay attached; their triangles are known without them.
+        // Mesh files stay attached; their triangles are in the mesh block.
         let mesh_file = |file: &Attachment| file.name.starts_with("meshes/") && !run.attachments.contains(&file.name);
         let mesh_files = self.files.iter().take_while(|file| mesh_file(file)).count();
         let count = (mesh_files + run.attachments.len()).min(self.files.len());
@@ -113,7 +114,7 @@ impl Found {
         Ok((header, count, missing))
     }
 
-    /// Header from metadata alone: numbers can be read, pictures cannot.
+    /// Builds a header from the metadata only: without link poses and surfaces.
     fn plain_header(&self, path: &Path) -> (RunHeader, usize, Vec<String>) {
         let text = |key: &str| self.recording(key).unwrap_or_default().to_owned();
         let list = |key: &str| text(key).split(',').filter(|name| !name.is_empty()).map(str::to_owned).collect();

@@ -1,4 +1,4 @@
-//! Poses of links in the world from the transforms of an MCAP file.
+//! Poses of links in the world, from the transforms of an MCAP file.
 
 use std::collections::HashMap;
 
@@ -8,15 +8,15 @@ use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use crate::mcap_file::messages::Transforms;
 use crate::{RunHeader, Sample};
 
-/// Translation, then quaternion x, y, z, w.
+/// Converts translation and quaternion x, y, z, w.
 pub(super) fn pose([x, y, z, qx, qy, qz, qw]: [f64; 7]) -> Pose {
     let rotation = UnitQuaternion::from_quaternion(Quaternion::new(qw, qx, qy, qz));
     Pose::from_parts(Translation3::new(x, y, z), rotation.to_rotation_matrix())
 }
 
-/// Trees of frames, from transforms between neighbours to poses in the world.
+/// Trees of frames: converts transforms between neighbours to poses in the world.
 pub(super) struct Frames {
-    /// Place of a frame by its name.
+    /// Places by frame name.
     places: HashMap<String, Place>,
     parents: Vec<Option<usize>>,
     /// Last transform of each link of the flexible robot and of the rigid twin, and of each
@@ -70,12 +70,12 @@ impl Frames {
                     self.X_LS[k].1 = X;
                     self.stations_seen = true;
                 }
-                None => {} // of another tree, made for pictures
+                None => {} // of another tree, for display only
             }
         }
     }
 
-    /// Poses in the world from the last transforms.
+    /// Computes poses in the world from the last transforms.
     pub(super) fn poses(&self, sample: &mut Sample) {
         let twins = [&mut sample.flexible, &mut sample.rigid];
         for (twin, X_PL) in twins.into_iter().zip(&self.X_PL).take(if self.has_rigid { 2 } else { 1 }) {

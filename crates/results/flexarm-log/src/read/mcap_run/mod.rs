@@ -1,8 +1,9 @@
-//! An MCAP file of a run, record by record: memory does not grow with the length of the run, and a
-//! file without an end is read up to its last whole chunk.
+//! Reader of the MCAP file of a run, record by record: the memory in use does not depend on the
+//! length of the run, and a truncated file is read up to its last whole chunk.
 //!
-//! [`walk`] gives the records, [`found`] keeps what is said once, [`assembly`] makes samples of
-//! messages, [`frames`] poses in the world of transforms between neighbours.
+//! [`walk`] iterates over the records, [`found`] keeps data stored once, [`assembly`] assembles
+//! samples from messages, and [`frames`] computes poses in the world from transforms between
+//! neighbours.
 
 mod assembly;
 mod found;
@@ -19,12 +20,12 @@ use self::walk::{Flow, walk};
 use super::{broken_end, not_a_recording};
 use crate::{LogError, RunHeader, RunResult, RunSource, Sample, run_json};
 
-/// See the module.
+/// A run read from an MCAP file.
 pub(crate) struct McapRun {
     path: PathBuf,
     header: RunHeader,
     epoch_ns: u64,
-    /// Topics that every sample has: those of the first.
+    /// Topics of every sample, taken from the first one.
     topics: Vec<Topic>,
     /// Number of attached files that belong to the header.
     files_of_header: usize,
@@ -41,7 +42,7 @@ impl McapRun {
         })?;
         let (mut header, files_of_header, mut missing) = found.header(path, broken.as_deref())?;
 
-        // The first sample once more, now that names can be told apart: what it holds, all hold.
+        // Read the first sample again, now with known topic names: every sample has its topics.
         let epoch_ns = found.recording("epoch_ns").and_then(|text| text.parse().ok()).unwrap_or(0);
         header.start_ns = Some(epoch_ns).filter(|start| *start != crate::START_NS);
         let mut assembly = Assembly::new(&header, epoch_ns);
@@ -95,7 +96,7 @@ impl RunSource for McapRun {
         let (mut count, mut last_s) = (0_u64, 0.0);
         let topics = &self.topics;
         let mut give = |assembly: &Assembly| -> Result<(), LogError> {
-            // One that the end of the file cut short is no sample.
+            // Skip an incomplete sample at a truncated end.
             if assembly.done_topics == *topics && !topics.is_empty() {
                 take(&assembly.done)?;
                 (count, last_s) = (count + 1, assembly.done.time_s);
@@ -125,8 +126,8 @@ impl RunSource for McapRun {
             _ if !found.whole => self.warnings.push(broken_end(path, "its index is missing", count, last_s)),
             _ => {}
         }
-        // Topic and metadata are for other programs; the file of its own has kinds and order as
-        // well.
+        // Event topic and result metadata are for other programs; the attached result also has the
+        // kinds and the order.
         let mut result = match &found.result {
             Some(text) => run_json::read_result(&String::from_utf8_lossy(text)),
             None => RunResult {

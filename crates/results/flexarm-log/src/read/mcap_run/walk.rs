@@ -1,4 +1,4 @@
-//! The records of an MCAP file, up to its end or its break.
+//! Iterates over the records of an MCAP file, up to its end or the point of damage.
 
 use std::fs::File;
 use std::io::Read;
@@ -11,20 +11,20 @@ use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOp
 use crate::LogError;
 use crate::read::wall::caught;
 
-/// Whether more records are wanted.
+/// Whether to go on reading.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Flow {
     On,
     Stop,
 }
 
-/// Calls `take` with every record, those in chunks included. Returns why the file ends before its
-/// end, if it does.
+/// Calls `take` with every record, including those in chunks. If the file is truncated or damaged,
+/// returns the cause.
 pub(super) fn walk(
     path: &Path,
     take: &mut dyn FnMut(Record<'_>) -> Result<Flow, LogError>,
 ) -> Result<Option<String>, LogError> {
-    /// Sizes up to this are believed even in small files: what a chunk unpacks to.
+    /// Maximum record size accepted even in small files (bytes): a chunk expands when decompressed.
     const LARGE: u64 = 32 << 20;
     const READ_BYTES: usize = 64 << 10;
 
@@ -32,7 +32,7 @@ pub(super) fn walk(
     let length = file.metadata().map_err(LogError::io(path, "read the recording"))?.len();
     let options = LinearReaderOptions::default()
         .with_skip_end_magic(true)
-        .with_prevalidate_chunk_crcs(true) // a damaged chunk gives nothing, rather than some numbers and then an error
+        .with_prevalidate_chunk_crcs(true) // a damaged chunk gives an error at once, rather than some numbers first
         .with_record_length_limit(usize::try_from(length.max(LARGE)).unwrap_or(usize::MAX));
     let mut reader = LinearReader::new_with_options(options);
     loop {
@@ -69,11 +69,11 @@ pub(super) fn walk(
     Ok(None)
 }
 
-/// Whether the texts of a record are within it: the library takes memory for them before it looks.
-/// `None` for records that say nothing about a run, such as the index.
+/// Whether the texts of a record are within it: the library allocates memory for them before it
+/// checks. `None` for records without data of a run, such as the index.
 fn texts_fit(kind: u8, record: &[u8]) -> Option<bool> {
-    // Bytes before the first text; texts, or what has its length before it likewise; whether pairs
-    // of texts follow.
+    // Number of bytes before the first text; number of texts (or other length-prefixed fields);
+    // whether pairs of texts follow.
     let (before, texts, pairs) = match kind {
         op::HEADER => (0, 2, false),
         op::FOOTER | op::MESSAGE => return Some(true),
