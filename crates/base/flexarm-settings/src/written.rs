@@ -56,7 +56,7 @@ pub fn message(text: &str) -> String {
     lines.collect::<Vec<_>>().join("\n")
 }
 
-/// Cuts the text to at most `most` characters, and states its full length if it is cut.
+/// Cuts the text to `most` characters, and appends its full length if it is cut.
 pub fn shortened(text: &str, most: usize) -> String {
     match text.char_indices().nth(most) {
         Some((cut, _)) => format!("{}... ({} characters)", &text[..cut], text.chars().count()),
@@ -172,7 +172,7 @@ pub fn csv_field(text: &str) -> String {
     if is_plain { text.to_owned() } else { format!("\"{}\"", text.replace('"', "\"\"")) }
 }
 
-/// Text of an unquoted field written by [`csv_field`].
+/// Text of a field written by [`csv_field`], given without its enclosing quotes.
 pub fn csv_text(field: &str) -> &str {
     field.strip_prefix('\'').filter(|text| is_formula(text)).unwrap_or(field)
 }

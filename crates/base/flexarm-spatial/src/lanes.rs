@@ -50,8 +50,8 @@ pub fn with_four_lanes<W: OverLanes>(work: W) -> Option<W::Output> {
     is_x86_feature_detected!("avx2").then(|| unsafe { over_four(work) })
 }
 
-/// Does the work with vector instructions in [`lanes_for`]`(things)` lanes; `None` if the processor
-/// has none.
+/// Does the work with vector instructions, in as many lanes as [`lanes_for`] returns; `None` if the
+/// processor has none.
 pub fn with_lanes<W: OverLanes>(things: usize, work: W) -> Option<W::Output> {
     #[target_feature(enable = "avx512f,avx512dq")]
     fn over_eight<W: OverLanes>(work: W) -> W::Output {
@@ -124,7 +124,7 @@ macro_rules! lanes {
                 type Output = Self;
                 #[inline(always)]
                 fn $method(self, other: Self) -> Self {
-                    // SAFETY: see the module page.
+                    // SAFETY: see the module documentation.
                     Self(unsafe { $instruction(self.0, other.0) })
                 }
             }
@@ -140,7 +140,7 @@ macro_rules! lanes {
             type Output = Self;
             #[inline(always)]
             fn neg(self) -> Self {
-                // SAFETY: see the module page.
+                // SAFETY: see the module documentation.
                 Self(unsafe { $xor(self.0, $splat(-0.0)) })
             }
         }
@@ -174,7 +174,7 @@ macro_rules! lanes {
 
             #[inline(always)]
             fn splat(x: f64) -> Self {
-                // SAFETY: see the module page.
+                // SAFETY: see the module documentation.
                 Self(unsafe { $splat(x) })
             }
 
@@ -216,7 +216,7 @@ macro_rules! lanes {
 
             #[inline(always)]
             fn sqrt(self) -> Self {
-                // SAFETY: see the module page.
+                // SAFETY: see the module documentation.
                 Self(unsafe { $sqrt(self.0) })
             }
 
@@ -237,7 +237,7 @@ macro_rules! lanes {
 
             #[inline(always)]
             fn abs(self) -> Self {
-                // SAFETY: see the module page.
+                // SAFETY: see the module documentation.
                 Self(unsafe { $andnot($splat(-0.0), self.0) })
             }
         }
@@ -262,14 +262,14 @@ impl Four {
     /// Bit mask of the lanes that are below.
     #[inline(always)]
     fn below(self, bound: Self) -> i32 {
-        // SAFETY: see the module page.
+        // SAFETY: see the module documentation.
         unsafe { _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(self.0, bound.0)) }
     }
 
     /// `yes` where below, otherwise `no`.
     #[inline(always)]
     fn picked(self, bound: Self, yes: Self, no: Self) -> Self {
-        // SAFETY: see the module page.
+        // SAFETY: see the module documentation.
         Self(unsafe { _mm256_blendv_pd(no.0, yes.0, _mm256_cmp_pd::<_CMP_LT_OQ>(self.0, bound.0)) })
     }
 }
@@ -278,14 +278,14 @@ impl Eight {
     /// Bit mask of the lanes that are below.
     #[inline(always)]
     fn below(self, bound: Self) -> i32 {
-        // SAFETY: see the module page.
+        // SAFETY: see the module documentation.
         i32::from(unsafe { _mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, bound.0) })
     }
 
     /// `yes` where below, otherwise `no`.
     #[inline(always)]
     fn picked(self, bound: Self, yes: Self, no: Self) -> Self {
-        // SAFETY: see the module page.
+        // SAFETY: see the module documentation.
         Self(unsafe { _mm512_mask_blend_pd(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, bound.0), no.0, yes.0) })
     }
 }

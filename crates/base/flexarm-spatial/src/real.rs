@@ -117,7 +117,7 @@ pub trait Real:
     }
 }
 
-/// Computes sines and cosines of many angles (rad), each to within one unit in the last place.
+/// Computes sines and cosines of many angles (rad), each bitwise as by [`Real::sin_cos`].
 ///
 /// # Panics
 /// If the slices differ in length.

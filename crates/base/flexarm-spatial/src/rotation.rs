@@ -73,8 +73,8 @@ impl ElasticAngles {
                 let [_, a, b, da, db] = exponential_coefficients(dot(angles, angles));
                 let (P, Pdot) = (skew(angles), skew(rates));
                 let xdot = T::splat(2.0) * dot(angles, rates);
-                // -a' x' [phi]x - a [rates]x + b' x' [phi]x² + b ([rates]x [phi]x + [phi]x
-                // [rates]x)
+                // -a' x' [phi]x - a [rates]x + b' x' [phi]x²
+                //   + b ([rates]x [phi]x + [phi]x [rates]x),  x' = 2 phi·rates
                 let first = add3(&scaled3(&P, -da * xdot), &scaled3(&Pdot, -a));
                 let second = add3(&first, &scaled3(&mul3(&P, &P), db * xdot));
                 add3(&second, &scaled3(&add3(&mul3(&Pdot, &P), &mul3(&P, &Pdot)), b))

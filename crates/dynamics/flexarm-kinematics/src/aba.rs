@@ -30,7 +30,7 @@ pub struct Roles {
     prescribed_modal: Vec<bool>,
     free_coordinates: Vec<usize>,
     /// Whether a free coordinate moves several joints (mimic joints, closed loops) or has a coupled
-    /// rotor: the mass matrix is then solved instead of the recursion.
+    /// rotor: the mass matrix is then used instead of the recursion.
     dense: bool,
 }
 

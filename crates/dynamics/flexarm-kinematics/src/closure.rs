@@ -86,8 +86,8 @@ pub struct PlacedLoop {
     /// Selected solution of (1), 1 or -1.
     root: f64,
     shape: Shape,
-    /// Corner of the triangle at which the force is transmitted to the driven side; `None` for the
-    /// worst.
+    /// Corner of the transmission angle, opposite the side with the driving joints; `None` for the
+    /// minimum over all corners.
     corner: Option<usize>,
 }
 

@@ -116,13 +116,14 @@ impl Task {
         }
     }
 
-    /// Two equations linear in cosine and sine of the second angle, whose squares sum to one, give
-    /// a quartic in the third.
+    /// Two equations linear in cosine and sine of the second angle; eliminating it gives a quartic
+    /// in the third.
     ///
-    /// With the common perpendicular of axes 1 and 2 as x (length a), y = h_2 × x, and w = E_3 c -
-    /// o_2:
+    /// With x along the common perpendicular of axes 1 and 2 (length a), y = h_2 × x and
+    /// w = E_3 c - o_2:
     /// ```text
-    /// x · R_2 w = (r² - a² - |w|²) / (2 a),   y · R_2 w = (z - (h_1·h_2) h_2·w) / (h_1·y),   their squares = |w|² - (h_2·w)²
+    /// X = x · R_2 w = (r² - a² - |w|²) / (2 a)
+    /// Y = y · R_2 w = (z - (h_1·h_2) h_2·w) / (h_1·y),     X² + Y² = |w|² - (h_2·w)²
     /// ```
     fn general(&self, found: &mut Threes) {
         let [s1, s2, s3] = &self.axes;
