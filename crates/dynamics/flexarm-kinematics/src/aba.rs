@@ -358,6 +358,7 @@ fn eliminate_modal(model: &Model, data: &mut Data, i: usize, m: usize, prescribe
         data.pA[i] = data.pA[i] * f64::NAN;
         return;
     };
+    // H_ηη^-1 [H_ηr, τ - p_η].
     for (k, F) in modal.columns.iter().enumerate() {
         let (f, t) = (&F.force, &F.torque);
         for (c, value) in [f.x, f.y, f.z, t.x, t.y, t.z].into_iter().enumerate() {
@@ -366,6 +367,7 @@ fn eliminate_modal(model: &Model, data: &mut Data, i: usize, m: usize, prescribe
         modal.solved[(k, 6)] = data.tau[entry.coordinate + k] - modal.f[k];
     }
     factor.solve_mut(&mut modal.solved);
+    // I_A = I_rr - H_rη H_ηη^-1 H_ηr,  p_A = p_r + H_rη H_ηη^-1 (τ - p_η).
     let I = &mut data.articulated[i];
     for (k, F) in modal.columns.iter().enumerate() {
         let s = |c: usize| modal.solved[(k, c)];

@@ -56,8 +56,8 @@ pub enum BalancerSpan {
 
 /// Force law: tension as a function of length, with energy and rate.
 ///
-/// x is the length of a line (m) or the value of a joint (rad or m), T the tension (N m or N).
-/// Positive tension pulls the ends together, or the joint to lower values.
+/// x is the length of a line (m) or the value of a joint (rad or m), T the tension (N, or N m about
+/// a rotating joint). Positive tension pulls the ends together, or the joint to lower values.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BalancerLaw {
     /// `T = preload + rate (x - free)`.

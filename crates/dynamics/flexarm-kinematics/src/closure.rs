@@ -255,12 +255,14 @@ impl Solved {
     /// Solves one loop: closed form, Newton iterations, then (2).
     fn close(&mut self, model: &Model, data: &mut Data, q: &mut [f64], k: usize) {
         let loop_ = &model.loops[k];
+        // Closed form.
         loop_.place_chains(model, data, &mut self.X);
         let start = loop_.triangle(model, &self.X).solve(loop_.root);
         let mut x = match start {
             Some(turn) => [loop_.start[0] + turn[0], loop_.start[1] + turn[1]],
             None => [f64::NAN; 2],
         };
+        // Newton's method on (1), with J at the current poses.
         let mut last = f64::INFINITY;
         for _ in 0..MOST_ITERATIONS {
             for (body, x) in loop_.dependent.into_iter().zip(x) {
@@ -416,6 +418,7 @@ impl PlacedLoop {
     fn move_chains(&self, model: &Model, data: &Data, q: &[f64], qdot: &[f64], to: &mut LoopRates) {
         let LoopRates { X, v, w, Jdot, .. } = to;
         (v[self.common], w[self.common]) = (Vector3::zeros(), Vector3::zeros());
+        // Velocities of the bodies, from the common body outward.
         for &i in self.chains.iter().flatten() {
             let parent = model.bodies[i].parent;
             let arm = X[i].translation.vector - X[parent].translation.vector;
@@ -426,6 +429,7 @@ impl PlacedLoop {
             });
             (v[i], w[i]) = (v_i, w_i);
         }
+        // Columns of J̇ in A axes: d/dt (l + a × r) - w_A × (l + a × r).
         let (A, p_B) = self.ends_at(X);
         let [a, b] = self.ends;
         let v_B = v[b] + w[b].cross(&(p_B - X[b].translation.vector));
@@ -1084,10 +1088,12 @@ pub(crate) fn assemble(model: &mut Model, mechanism: &Mechanism) -> Result<(), M
         check_plane(&loop_, closure, model, &solved.X)?;
         let triangle = loop_.triangle(model, &solved.X);
         let size = loop_.gap(&solved.X).1;
+        // Size of a displacement, with rotations weighted by the size of the loop.
         let far = |turn: &[f64; 2]| {
             let length = |d: usize| if triangle.joints[d].slides { 1.0 } else { size };
             (turn[0] * length(0)).hypot(turn[1] * length(1))
         };
+        // Assembly mode: the root closest to the requested values.
         let found = [1.0, -1.0].map(|root| triangle.solve(root).map(|turn| (root, turn)));
         let nearest = found.into_iter().flatten().min_by(|a, b| far(&a.1).total_cmp(&far(&b.1)));
         let Some((root, turn)) = nearest else {

@@ -123,8 +123,7 @@ impl<T: Real> SixWrenches<T> {
         }
     }
 
-    /// Shifts the moments to a point r inward of the current one. Loops over rows, for contiguous
-    /// access.
+    /// Shifts the reference point of the moments inward by r. Loops over rows, for contiguous access.
     #[inline(always)]
     fn carry(&mut self, r: &Vector3<T>) {
         let (r, Self { force: [x, y, z], torque: [tx, ty, tz] }) = (*r, self);

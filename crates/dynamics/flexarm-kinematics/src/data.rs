@@ -39,7 +39,7 @@ pub(crate) struct ElasticSubspace<T: Scalar = f64> {
     pub(crate) B: Matrix3<T>,
 }
 
-/// Results and workspaces; each field names the function that fills it.
+/// Results and workspaces; the documentation of each function lists the fields it fills.
 #[derive(Clone, Debug)]
 pub struct Data<T: Scalar = f64> {
     /// Pose of each body in its parent.

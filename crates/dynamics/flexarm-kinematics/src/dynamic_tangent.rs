@@ -144,6 +144,7 @@ impl DynamicTangent {
         for moving in &mut self.bodies {
             (moving.V, moving.A) = (Twist::zeros(), Twist::zeros());
         }
+        // Accelerations of the bodies at zero velocity: sums of the columns times a.
         let mut columns = self.columns.iter().peekable();
         for i in 1..self.bodies.len() {
             let mut A = self.bodies[model.bodies[i].parent].A;
@@ -226,9 +227,11 @@ impl DynamicTangent {
                 [own.velocity, own.acceleration, own.by_rate].map(|twist| twist.at_parent(X_WB));
             let (inner, outer) = (&self.bodies[body.parent], &self.bodies[i]);
             let s = column.s;
+            // (1) and (2).
             column.psi = inner.V.cross(&s) + velocity;
             column.chi = inner.A.cross(&s) + inner.V.cross(&column.psi) + outer.V.cross(&velocity) + acceleration;
             column.kappa = inner.V.cross(&s) + outer.V.cross(&s) + by_rate;
+            // (3) and the products in (4).
             column.by_q = outer.change(&column.chi, &column.psi);
             column.by_rate = outer.change(&column.kappa, &s);
             column.momentum = outer.inertia.mul_twist(&s);
@@ -376,12 +379,15 @@ fn joint_changes(
     let bias = |phi: &Vector3<f64>| angles.rate_map_derivative(phi, &rates) * rates;
     let mut all = [JointChange::none(); 6];
     for c in 0..3 {
+        // Translation column: only Ṡ q̇ depends on its rate.
         let column: Vector3<f64> = S.L.column(c).into();
         all[c].by_rate = Twist::new(column.cross(&w), Vector3::zeros());
 
+        // Angle column.
         let unit = Vector3::ith(c, 1.0);
         let (axis, dB) = (S.B * unit, angles.rate_map_derivative(&phi, &unit));
         let (slide_turned, slides_turned, w_changed) = (slide.cross(&axis), slides.cross(&axis), dB * rates);
+        // ∂(B' φ')/∂φ_c by a five-point difference.
         let second = if rates == Vector3::zeros() {
             rates
         } else {

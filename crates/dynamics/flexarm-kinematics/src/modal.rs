@@ -350,6 +350,7 @@ impl<T: Real> ModalData<T> {
             self.f[k] = f;
         }
         let SpatialInertia { mass, first_moment: h, rotational: J } = &self.inertia;
+        // Force and moment rows of the velocity terms in (5), plus the acceleration ω × v.
         let turned = add(&scaled(&c_t, two), &cross(&w, h));
         let force = add(&scaled(&wv, *mass), &cross(&w, &turned));
         // 2 (tr W 1 - W) ω for the symmetric part of W; the skew part is included in C_r η̇.

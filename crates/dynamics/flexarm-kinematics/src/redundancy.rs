@@ -159,12 +159,14 @@ fn null_space_step(J: &DMatrix<f64>, free: &[&AimedCoordinate], q: &DVector<f64>
     if n == 0 {
         return DVector::zeros(0);
     }
+    // N: eigenvectors of JᵀJ with zero eigenvalue.
     let eigen = J.tr_mul(J).symmetric_eigen();
     let floor = 1e-12 * eigen.eigenvalues.max();
     let null: Vec<usize> = (0..n).filter(|&i| eigen.eigenvalues[i] <= floor).collect();
     if null.is_empty() {
         return DVector::zeros(n);
     }
+    // Gradient and Hessian of the measure in the null space.
     let N = DMatrix::from_fn(n, null.len(), |r, c| eigen.eigenvectors[(r, null[c])]);
     let WN = DMatrix::from_fn(n, null.len(), |r, c| free[r].weight * N[(r, c)]);
     let gradient = WN.tr_mul(&DVector::from_fn(n, |i, _| q[free[i].k] - free[i].middle));

@@ -235,8 +235,8 @@ impl<T: Real> StaticTangent<T> {
                 h_B = add(&h_B, &data.modal[m].inertia.first_moment);
             }
             let X_WB = &data.X_WB[i];
-            // Uses m c instead of c, so that massless bodies need no special case: (m c) gᵀ - (m c
-            // · g) 1.
+            // Uses m c instead of c, so that massless bodies need no special case:
+            // N = (m c) gᵀ - (m c · g) 1.
             let h = add(&scaled(&X_WB.translation.vector, mass), &mul(X_WB.rotation.matrix(), &h_B));
             *carried = Carried { f: scaled(&gravity, mass), ..Carried::weight(gravity, &h) };
         }

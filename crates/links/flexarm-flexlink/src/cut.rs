@@ -71,6 +71,7 @@ pub fn cut_inertia(
     // Both parts have the same offset from the line as the link.
     let coms = [low, high].map(|fraction| link.com + line * (fraction - found));
 
+    // Inertia left after the point masses, by the parallel axis theorem.
     let mut rest = link.inertia_com;
     for (mass, com) in masses.iter().zip(&coms) {
         let c = skew(&(com - link.com));
@@ -99,6 +100,7 @@ pub fn cut_chain(
     p_LB: &Vector3<f64>,
     chain: &[RigidPart],
 ) -> Result<Vec<RigidPart>, CutError> {
+    // Distribution of the chain's mass along A-B: total, mean and variance of the position.
     let line = p_LB - p_LA;
     let fraction = |p: &Vector3<f64>| (p - p_LA).dot(&line) / line.norm_squared();
     let whole: f64 = chain.iter().map(|p| p.mass).sum();
@@ -116,6 +118,7 @@ pub fn cut_chain(
         return Err(CutError::CentreOfMass { found, split: mean, low, high });
     }
     let coms: Vec<Vector3<f64>> = places.iter().map(|x| link.com + line * (x - found)).collect();
+    // Inertia left after the point masses, by the parallel axis theorem.
     let mut rest = link.inertia_com;
     for (mass, com) in masses.iter().zip(&coms) {
         let c = skew(&(com - link.com));

@@ -52,6 +52,7 @@ pub(crate) fn substitute_modal(
 ) -> Result<FlexibleSpan, SubstitutionError> {
     let (name, reduced) = (&flexible.link, &flexible.reduced);
     let fail = |what: String| SubstitutionError::Modal { link: name.clone(), what };
+    // Check that the first interface is at B.
     let Some(far) = modal.interfaces.first() else { return Err(fail("it has one interface only".into())) };
     let distance = (far.X_LI.translation.vector - site.p_LB).norm();
     if distance > AT_INTERFACE * site.length {
@@ -73,6 +74,7 @@ pub(crate) fn substitute_modal(
             }
         }
     }
+    // Mass integrals of the undeformed body from the mechanism's link.
     if let Parts::FromLink(_) = flexible.parts {
         let own = site.own.ok_or_else(|| SubstitutionError::NoInertia { link: name.clone() })?.spatial();
         if (own.mass / body.mass - 1.0).abs() > 1e-9 {
@@ -96,6 +98,7 @@ pub(crate) fn substitute_modal(
     let mut part_masses = vec![body.mass];
     part_masses.extend(near.iter().chain(&beyond).map(|i| i.mass));
     let distal_link = format!("{name}__distal");
+    // One child link per interface, with the joints nearest to it.
     let far_ends = modal.interfaces.iter().map(|interface| interface.X_LI.translation.vector);
     let places: Vec<_> = std::iter::once(site.p_LA).chain(far_ends).collect();
     for (k, interface) in modal.interfaces.iter().enumerate() {

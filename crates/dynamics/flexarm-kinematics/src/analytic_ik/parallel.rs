@@ -137,6 +137,7 @@ fn pair_of_equations(rows: &[(f64, f64, TrigPolynomial); 2], hint: &[f64; 6], pa
     let [(a1, b1, K1), (a2, b2, K2)] = rows;
     let D = a1 * b2 - a2 * b1;
     if D.abs() > 1e-6 {
+        // Cramer's rule for the cosine and sine of t; cos² t + sin² t = 1 determines u.
         let zero = TrigPolynomial::affine(0.0, 0.0, 0.0);
         let cosine = zero.plus(K1, b2 / D).plus(K2, -b1 / D);
         let sine = zero.plus(K2, a1 / D).plus(K1, -a2 / D);
@@ -219,6 +220,7 @@ impl Parallel123 {
         let l = 1.0 / self.reach;
         let rows =
             [self.row(&Vector3::zeros(), &s6.h, level), self.row(&((o5 - s4.o) * l), &((o6 - o5) * l), height * l)];
+        // Cramer's rule for cos q4 = C/D and sin q4 = S/D; C² + S² = D² determines q5.
         let [(a1, b1, k1), (a2, b2, k2)] = &rows;
         let D = a1.times(b2).plus(&a2.times(b1), -1.0);
         let C = k1.times(b2).plus(&k2.times(b1), -1.0);

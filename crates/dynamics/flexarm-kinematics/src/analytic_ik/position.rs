@@ -135,11 +135,13 @@ impl Task {
         let v = self.c - s3.o;
         let along = s3.h * s3.h.dot(&v);
         let (w0, wc, ws) = (s3.o - o2 + along, v - along, s3.h.cross(&v));
+        // |w|² and h_2·w as functions of the third angle.
         let square =
             TrigPolynomial::affine(w0.norm_squared() + wc.norm_squared(), 2.0 * w0.dot(&wc), 2.0 * w0.dot(&ws));
         let height = TrigPolynomial::affine(s2.h.dot(&w0), s2.h.dot(&wc), s2.h.dot(&ws));
         let (r, z) = (self.p - o1, s1.h.dot(&(self.p - o1)));
         let constant = |k| TrigPolynomial::affine(k, 0.0, 0.0);
+        // X, Y and X² + Y² - |w|² + (h_2·w)² = 0.
         let X = constant((r.norm_squared() - a * a) / (2.0 * a)).plus(&square, -0.5 / a);
         let Y = constant(z / sine).plus(&height, -cosine / sine);
         let equation = X.times(&X).plus(&Y.times(&Y), 1.0).plus(&square, -1.0).plus(&height.times(&height), 1.0);

@@ -1,10 +1,8 @@
 //! Mass matrix of the free coordinates by composite rigid bodies, O(n × depth).
 //!
 //! ```text
-//!   F_k  = I_k S_k     wrench at the body origin for unit acceleration of joint k and its subtree
-//!   (10)
-//!   M_ik = S_iᵀ F_k    for all k outward of i, F_k carried to the origin of body i
-//!   (11)
+//!   F_k  = I_k S_k     wrench at Bo that gives joint k with its subtree a unit acceleration   (10)
+//!   M_ik = S_iᵀ F_k    for all k outward of i, F_k carried to the origin of body i            (11)
 //! ```
 //! All quantities are in the axes of the first loading body, so that carrying a wrench inward
 //! changes only its moment. Columns are processed in threes, component by component: the
@@ -309,7 +307,7 @@ impl<T: Real> Three<T> {
         }
     }
 
-    /// Shifts the moments to a point r inward of the current one.
+    /// Shifts the reference point of the moments inward by r.
     #[inline(always)]
     fn carry(&mut self, r: &Vector3<T>) {
         let components = [column(&self.force, 0), column(&self.force, 1), column(&self.force, 2)];
