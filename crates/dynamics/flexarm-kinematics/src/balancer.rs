@@ -85,8 +85,8 @@ pub enum BalancerLaw {
 /// Gas under a piston, `p V^n` constant.
 ///
 /// ```text
-/// pulls:   T =   force v^-n - opposing,     v = 1 - slope (x - at)      volume decreases with length
-/// pushes:  T = -(force v^-n - opposing),    v = 1 + slope (x - at)      volume increases with length
+/// pulls:   T =   force v^-n - opposing,     v = 1 - slope (x - at)    volume decreases with length
+/// pushes:  T = -(force v^-n - opposing),    v = 1 + slope (x - at)    volume increases with length
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GasLaw {

@@ -123,7 +123,7 @@ impl<T: Real> SixWrenches<T> {
         }
     }
 
-    /// Shifts the reference point of the moments inward by r. Loops over rows, for contiguous access.
+    /// Shifts the reference point of the moments inward by r, row by row for contiguous access.
     #[inline(always)]
     fn carry(&mut self, r: &Vector3<T>) {
         let (r, Self { force: [x, y, z], torque: [tx, ty, tz] }) = (*r, self);

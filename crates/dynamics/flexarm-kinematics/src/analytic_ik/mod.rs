@@ -9,7 +9,7 @@
 //!
 //! | class | solution |
 //! | --- | --- |
-//! | axes 4, 5, 6 intersect (spherical wrist) | the first three joints position the wrist centre ([`PositionForm`]), then two wrists each |
+//! | axes 4, 5, 6 intersect (spherical wrist) | joints 1 to 3 from the wrist centre ([`PositionForm`]), then two wrists each |
 //! | axes 1, 2, 3 intersect (spherical shoulder) | the same arm from the other end |
 //! | axes 2, 3, 4 or 3, 4, 5 are parallel | angles 1 and 5 (two and two, or a quartic), then two elbows |
 //! | axes 1, 2, 3 or 4, 5, 6 are parallel | angles 4 and 5 (two and two, or a polynomial of degree eight), then two elbows |
