@@ -1,28 +1,28 @@
-//! What keeps a file from being read or written.
+//! Errors of reading and writing files.
 
 use std::path::{Path, PathBuf};
 
 use flexarm_settings::{Fault, Setting};
 
-/// What keeps a file from being read or written.
+/// Error of reading or writing a file.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
-    /// A file or folder that cannot be used as asked for.
+    /// A file or folder cannot be used as requested.
     #[error("{}: {what}", path.display())]
     Unusable {
         /// The path.
         path: PathBuf,
-        /// What is wrong and how to mend it.
+        /// Description of the problem and its remedy.
         what: String,
     },
-    /// A place of a result that is taken.
+    /// The location of a result is already in use.
     #[error("{}", taken(path, place, *movable))]
     Taken {
-        /// What is there.
+        /// Existing path.
         path: PathBuf,
-        /// What another one of is to be chosen: `place` or `folder`.
+        /// Kind of location to choose instead: `place` or `folder`.
         place: &'static str,
-        /// Whether [`Setting::Output`] chooses it.
+        /// Whether [`Setting::Output`] determines it.
         movable: bool,
     },
     /// A result could not be written.
@@ -30,13 +30,13 @@ pub enum FileError {
     Write {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         source: std::io::Error,
     },
 }
 
 impl FileError {
-    /// Whether the input or the run is to blame.
+    /// Whether the input or the run is responsible.
     pub fn fault(&self) -> Fault {
         match self {
             Self::Unusable { .. } | Self::Taken { .. } => Fault::Input,
@@ -45,7 +45,7 @@ impl FileError {
     }
 }
 
-/// The sentence about a place that is taken; see [`FileError::Taken`].
+/// Message for a location that is already in use; see [`FileError::Taken`].
 pub fn taken(path: &Path, place: &str, movable: bool) -> String {
     let other = if movable { format!(" with {} or", Setting::Output) } else { ", or".into() };
     let path = path.display();

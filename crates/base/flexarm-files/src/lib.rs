@@ -1,4 +1,4 @@
-//! Text files into memory, with the place of what is wrong in them; results onto the disk, all or
+//! Reading of text files with the position of errors in them; writing of results to disk, all or
 //! none.
 //!
 //! ```
@@ -20,7 +20,7 @@
 //! # Ok::<(), FileError>(())
 //! ```
 //!
-//! Not here: what the files mean.
+//! Not here: the meaning of the files.
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod error;

@@ -1,8 +1,8 @@
 //! Tables of numbers with a header: one row of names, then a number in every cell.
 //!
-//! Separated by semicolons, tabs or commas, whichever the header has; with semicolons and tabs a
-//! number may have a decimal comma. Lines that begin with # and empty ones are passed over. Not
-//! here: what the columns mean.
+//! The separator is a semicolon, tab or comma, as found in the header; with semicolons and tabs a
+//! number may have a decimal comma. Empty lines and lines that begin with # are skipped. Not here:
+//! the meaning of the columns.
 
 use std::path::Path;
 
@@ -10,12 +10,12 @@ use flexarm_settings::written::csv_fields;
 
 use crate::{FileError, read_text};
 
-/// A table of numbers.
+/// Table of numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NumberTable {
-    /// Names of the columns, without spaces around and without quotes.
+    /// Column names, without surrounding spaces and quotes.
     pub names: Vec<String>,
-    /// Rows; NaN where a cell is empty.
+    /// Rows; NaN for an empty cell.
     pub rows: Vec<Vec<f64>>,
     /// Line of each row in the file, from 1.
     pub lines: Vec<usize>,
@@ -25,14 +25,14 @@ impl NumberTable {
     /// Reads a file.
     ///
     /// # Errors
-    /// [`FileError::Unusable`] if it cannot be read, has no header, names a column twice, or has a
-    /// row with another number of cells or a cell that is no number: with the line, the column and
-    /// what was found.
+    /// [`FileError::Unusable`] if the file cannot be read, has no header, names a column twice, or
+    /// has a row with a different number of cells or a cell that is not a number. The message gives
+    /// the line, the column and what was found.
     pub fn read(path: &Path) -> Result<Self, FileError> {
         Self::parse(&read_text(path)?).map_err(|what| FileError::Unusable { path: path.to_owned(), what })
     }
 
-    /// From the text of a file; what is wrong, as a sentence.
+    /// Parses the text of a file; the error is a complete message.
     fn parse(text: &str) -> Result<Self, String> {
         let mut lines = text.trim_start_matches('\u{feff}').lines().enumerate();
         let counts = |line: &str| !line.trim().is_empty() && !line.trim_start().starts_with('#');
@@ -74,7 +74,7 @@ impl NumberTable {
         Ok(table)
     }
 
-    /// Number of a column.
+    /// Index of a column.
     pub fn column(&self, name: &str) -> Option<usize> {
         self.names.iter().position(|known| known == name)
     }

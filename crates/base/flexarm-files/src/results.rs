@@ -1,4 +1,4 @@
-//! Files of a result: refused before the work if their places are taken, none left half written.
+//! Result files: rejected before the work if a location is in use, and never left half written.
 
 use std::cell::RefCell;
 use std::io::ErrorKind;
@@ -8,16 +8,15 @@ use std::rc::Rc;
 use crate::FileError;
 
 thread_local! {
-    /// Whether nobody wants the results of this thread any more.
+    /// Predicate that returns true once the results of this thread are no longer wanted.
     static UNWANTED: RefCell<Option<Rc<dyn Fn() -> bool>>> = const { RefCell::new(None) };
 }
 
-/// Does work whose results somebody may stop waiting for: from when `unwanted` says so,
-/// [`write_all`] on this thread refuses.
+/// Runs `work`; once `unwanted` returns true, [`write_all`] on this thread refuses to write.
 ///
-/// So what was broken off leaves no files behind, wherever the work just was.
+/// A cancelled call therefore leaves no files behind, at whatever stage it was.
 pub fn writing_unless<T>(unwanted: impl Fn() -> bool + 'static, work: impl FnOnce() -> T) -> T {
-    /// Puts back what was before, whatever happens.
+    /// Restores the previous predicate on drop.
     struct Before(Option<Rc<dyn Fn() -> bool>>);
     impl Drop for Before {
         fn drop(&mut self) {
@@ -28,11 +27,11 @@ pub fn writing_unless<T>(unwanted: impl Fn() -> bool + 'static, work: impl FnOnc
     work()
 }
 
-/// Refuses places that are taken.
+/// Checks that the paths can be written.
 ///
 /// # Errors
-/// [`FileError::Taken`], and [`FileError::Unusable`] for a folder in the place of a file or the
-/// other way round.
+/// [`FileError::Taken`] for an existing file without `overwrite`, and [`FileError::Unusable`] for a
+/// folder in place of a file or vice versa.
 pub fn check_free(paths: &[PathBuf], overwrite: bool) -> Result<(), FileError> {
     for path in paths {
         let fail = |what: &str| Err(FileError::Unusable { path: path.clone(), what: what.into() });
@@ -52,12 +51,12 @@ pub fn check_free(paths: &[PathBuf], overwrite: bool) -> Result<(), FileError> {
     Ok(())
 }
 
-/// Writes all files, each first under another name; only when all are there are they renamed, so
-/// neither a full disk nor a rename that fails leaves new files behind. Files that were overwritten
-/// before it stay as they are now.
+/// Writes all files, each first under another name; they are renamed only when all are written. A
+/// full disk or a failed rename therefore leaves no new files behind. Files that were already
+/// overwritten before the failure keep their new content.
 ///
 /// # Errors
-/// [`FileError::Write`]; of the kind [`ErrorKind::Interrupted`] where nobody wants them any more
+/// [`FileError::Write`]; with [`ErrorKind::Interrupted`] if the results are no longer wanted
 /// ([`writing_unless`]).
 pub fn write_all(files: &[(PathBuf, impl AsRef<[u8]>)]) -> Result<(), FileError> {
     let unwanted = UNWANTED.with_borrow(Clone::clone);
@@ -87,7 +86,7 @@ pub fn write_all(files: &[(PathBuf, impl AsRef<[u8]>)]) -> Result<(), FileError>
     Ok(())
 }
 
-/// A name as it may stand in a file name.
+/// Converts a name to one that is valid in a file name.
 pub fn file_stem(name: &str) -> String {
     name.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect()
 }
@@ -98,7 +97,7 @@ fn partial(path: &Path) -> PathBuf {
     path.with_file_name(name)
 }
 
-/// Removes on its way out what was made, unless all went well.
+/// Removes the files and folders it made when dropped, unless [`Undo::keep`] was called.
 #[derive(Debug, Default)]
 pub struct Undo {
     files: Vec<PathBuf>,
@@ -107,10 +106,10 @@ pub struct Undo {
 }
 
 impl Undo {
-    /// Makes a folder, and those above it that are missing.
+    /// Creates a folder and its missing parents.
     ///
     /// # Errors
-    /// What the file system says.
+    /// Error of the file system.
     pub fn make(&mut self, folder: &Path) -> std::io::Result<()> {
         let missing: Vec<PathBuf> =
             folder.ancestors().take_while(|f| !f.as_os_str().is_empty() && !f.exists()).map(Path::to_owned).collect();
@@ -119,7 +118,7 @@ impl Undo {
         Ok(())
     }
 
-    /// All went well: what was made stays.
+    /// Keeps everything that was made.
     pub fn keep(&mut self) {
         self.done = true;
     }
@@ -130,7 +129,7 @@ impl Drop for Undo {
         if self.done {
             return;
         }
-        // What cannot be removed stays; the error that led here is reported.
+        // Files that cannot be removed remain; the error that led here is reported.
         for file in &self.files {
             let _ = std::fs::remove_file(file);
         }
@@ -149,7 +148,7 @@ mod tests {
         let place = std::env::temp_dir().join(format!("flexarm-files-undo-{}", std::process::id()));
         std::fs::create_dir_all(&place).unwrap();
         let folder = place.join("made/for/it");
-        // The second one needs a folder where there is a file.
+        // The second file needs a folder where there is a file.
         let in_the_way = place.join("file");
         std::fs::write(&in_the_way, "x").unwrap();
         let failed = write_all(&[(folder.join("a"), "a"), (in_the_way.join("b"), "b")]);

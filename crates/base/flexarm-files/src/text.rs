@@ -1,18 +1,19 @@
-//! Text files into memory: files only, and none larger than a person or a program writes for this
-//! purpose. What is wrong in one is said with line and column.
+//! Reading of text files: regular files only, up to a size limit. Errors in them are reported with
+//! line and column.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use crate::FileError;
 
-/// A file larger than this is refused (bytes).
+/// Maximum size of a file (bytes).
 const LARGEST: u64 = 256 << 20;
 
-/// The text of a file.
+/// Reads the text of a file.
 ///
 /// # Errors
-/// [`FileError::Unusable`] for what cannot be read, is no file, is too large or no text in UTF-8.
+/// [`FileError::Unusable`] for a path that cannot be read, is not a regular file, is too large or
+/// is not UTF-8 text.
 pub fn read_text(path: &Path) -> Result<String, FileError> {
     let fail = |what: String| FileError::Unusable { path: path.to_owned(), what };
     let unreadable = |error: std::io::Error| match error.kind() {
@@ -21,7 +22,7 @@ pub fn read_text(path: &Path) -> Result<String, FileError> {
         }
         _ => fail(format!("cannot be read: {error}")),
     };
-    // A device might never end, a pipe never begin.
+    // Devices may be endless, and pipes may block.
     if !std::fs::metadata(path).map_err(unreadable)?.is_file() {
         return Err(fail("cannot be read: this is not a file".into()));
     }
@@ -33,7 +34,7 @@ pub fn read_text(path: &Path) -> Result<String, FileError> {
     Ok(text)
 }
 
-/// What is wrong in a text file, and where.
+/// Error in a text file, with its position.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{}:{line}:{column}: {message}", path.display())]
 pub struct TextFileError {
@@ -43,13 +44,13 @@ pub struct TextFileError {
     pub line: usize,
     /// Column, from 1.
     pub column: usize,
-    /// What was found, what was expected, how to mend it.
+    /// Message: what was found, what was expected, and the remedy.
     pub message: String,
-    /// Page of the documentation that describes the format: `robot`, `loads`, `measurements`, ...
+    /// Documentation page that describes the format: `robot`, `loads`, `measurements`, ...
     pub page: &'static str,
 }
 
-/// The text of a file with its place, to point into it.
+/// Text of a file with its path, for error positions.
 #[derive(Clone, Debug)]
 pub struct Source {
     /// The file.
@@ -59,12 +60,13 @@ pub struct Source {
 }
 
 impl Source {
-    /// The text of the file at `path`, in a format that `page` of the documentation describes.
+    /// Creates the source for the file at `path`, whose format is described on `page` of the
+    /// documentation.
     pub fn new(path: &Path, text: &str, page: &'static str) -> Self {
         Self { path: path.to_owned(), text: text.to_owned(), page }
     }
 
-    /// An error at a byte range of the text.
+    /// Creates an error at a byte range of the text.
     pub fn error(&self, span: std::ops::Range<usize>, message: impl Into<String>) -> TextFileError {
         let before = self.text.get(..span.start).unwrap_or(&self.text);
         let line = before.matches('\n').count() + 1;
@@ -72,7 +74,8 @@ impl Source {
         TextFileError { path: self.path.clone(), line, column, message: message.into(), page: self.page }
     }
 
-    /// What a reader of TOML says, in the words of the file format instead of those of Rust.
+    /// Creates an error from a message of the TOML parser, in terms of the file format instead of
+    /// Rust types.
     pub fn unread(&self, span: Option<std::ops::Range<usize>>, message: &str) -> TextFileError {
         self.error(span.unwrap_or(0..0), flexarm_settings::without_types(message))
     }

@@ -1,14 +1,14 @@
-//! YAML, of which JSON is a part, as trees of texts. The caller interprets the texts.
+//! YAML, including JSON, as trees of text. The caller interprets the text.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
 
 use saphyr_parser::{Event, Parser, ScalarStyle};
 
-/// Collections nested deeper are refused.
+/// Maximum nesting depth of collections.
 const MOST_NESTED: usize = 40;
 
-/// A text or a collection.
+/// Text or collection.
 #[derive(Clone, Debug)]
 pub struct YamlNode<'t> {
     /// Line, from 1.
@@ -20,31 +20,31 @@ pub struct YamlNode<'t> {
 /// Content of a node.
 #[derive(Clone, Debug)]
 pub enum YamlValue<'t> {
-    /// A text that may mean a number.
+    /// Text, possibly a number.
     Scalar {
         /// The text, without its quotes.
         text: Cow<'t, str>,
-        /// Whether it stands without quotes.
+        /// Whether it is unquoted.
         is_plain: bool,
-        /// Its tag, without the marks in front: `degrees` of `!degrees`.
+        /// Tag without leading marks: `degrees` for `!degrees`.
         tag: Option<String>,
     },
     /// A list.
     List(Vec<YamlNode<'t>>),
-    /// Keys and values by turns, as they stand in the text.
+    /// Alternating keys and values, in source order.
     Map(Vec<YamlNode<'t>>),
 }
 
-/// Error of a text.
+/// Error in the text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct YamlError {
     /// Line, from 1.
     pub line: usize,
-    /// Cause, as the end of a sentence.
+    /// Cause, worded as the end of a sentence.
     pub message: String,
 }
 
-/// A node, what it is known by, how large it is and how deep it is nested.
+/// Node with its anchor, size and nesting depth.
 #[derive(Clone)]
 struct Counted<'t> {
     node: YamlNode<'t>,
@@ -53,14 +53,14 @@ struct Counted<'t> {
     height: usize,
 }
 
-/// Calls `take` with the root of each document, one after another.
+/// Calls `take` with the root of each document in turn.
 ///
-/// * `most`: Maximum number of nodes. Those behind anchors and aliases count again, 32 letters as a
-///   node more.
+/// * `most`: maximum number of nodes. Anchored and aliased nodes count again, and every 32 bytes of
+///   text count as one more node.
 ///
 /// # Errors
-/// [`YamlError`] for what is not YAML, has more nodes or is nested more than 40 deep; and what
-/// `take` returns.
+/// [`YamlError`] for text that is not YAML, has more nodes or is nested more than 40 deep; and
+/// errors returned by `take`.
 pub fn read_yaml<'t, E: From<YamlError>>(
     text: &'t str,
     most: usize,
@@ -153,7 +153,7 @@ mod tests {
             let links = (1..=links).map(|k| format!("a{k}: &a{k} [*a{}]\n", k - 1));
             format!("a0: &a0 x\n{}", links.collect::<String>())
         };
-        // The dictionary is one level more.
+        // The enclosing map adds one level.
         assert!(read_yaml(&chain(MOST_NESTED - 1), 10_000, |_| Ok::<(), YamlError>(())).is_ok());
         let deep = fails(&chain(MOST_NESTED), 10_000);
         assert_eq!((deep.line, deep.message.contains("nested more than 40 deep")), (41, true), "{deep:?}");

@@ -1,23 +1,23 @@
-//! Caveats: what is probably wrong with an input, or limits the worth of a result, as values.
+//! Caveats: likely mistakes in an input, or limits to the validity of a result, as values.
 //!
-//! A caveat compares a value with a physical yardstick. A [`CaveatKind`] is a constant of the crate
-//! that finds it; its sentence is made in one place ([`CaveatKind::found`]), so that all that find
-//! the same say the same.
+//! A caveat compares a value with a physical reference. A [`CaveatKind`] is a constant of the crate
+//! that finds it; its message is formatted in one place ([`CaveatKind::found`]), so that the same
+//! finding always has the same wording.
 //!
-//! Not here: the kinds, their yardsticks, and what makes a model impossible, which is an error.
+//! Not here: the kinds, their references, and what makes a model invalid, which is an error.
 
 use serde::{Deserialize, Serialize};
 
 use crate::Setting;
 
-/// How much a caveat weighs.
+/// Severity of a caveat.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
-    /// The input probably does not say what was meant, or the result is not to be trusted.
+    /// The input is probably wrong, or the result is not reliable.
     #[default]
     Warning,
-    /// Unusual, and possible: something that the reader of a result should know.
+    /// Unusual but possible: a reader of the result should know about it.
     Note,
 }
 
@@ -31,70 +31,70 @@ impl Severity {
     }
 }
 
-/// A kind of caveat: its place in the catalogue.
+/// Kind of a caveat: an entry of the catalogue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CaveatKind {
-    /// Short, stable name for programs.
+    /// Short, stable identifier for programs.
     pub code: &'static str,
-    /// How much it weighs, unless the finder says otherwise.
+    /// Default severity.
     pub severity: Severity,
-    /// One sentence with `{where}`, `{value}` and `{yardstick}` in it, and settings by their keys,
+    /// Message template with `{where}`, `{value}` and `{yardstick}`, and settings by their keys,
     /// such as `{step_s}`.
     pub says: &'static str,
-    /// Unit of value and yardstick; empty for plain numbers.
+    /// Unit of value and reference; empty for dimensionless numbers.
     pub unit: &'static str,
-    /// What to look at, or how to mend it.
+    /// Advice on what to check or how to fix it.
     pub help: &'static str,
 }
 
-/// One caveat. SI units.
+/// Single caveat. SI units.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Caveat {
-    /// How much it weighs.
+    /// Severity.
     pub severity: Severity,
-    /// Short, stable name of its kind.
+    /// Short, stable identifier of its kind.
     pub code: String,
-    /// What it is about: a link, a joint, the payload, a file.
+    /// Subject: a link, a joint, the payload, a file.
     #[serde(rename = "where")]
     pub location: String,
-    /// All of it in one sentence.
+    /// Complete message in one sentence.
     pub message: String,
-    /// What was found.
+    /// Value found.
     pub value: Option<f64>,
-    /// What it is compared with.
+    /// Reference with which the value is compared.
     pub yardstick: Option<f64>,
     /// Unit of both.
     pub unit: String,
-    /// The slip that would explain it, such as "about 1000 times: millimetres?"; empty if none
-    /// does.
+    /// Likely mistake that explains the value, such as "about 1000 times: millimetres?"; empty if
+    /// there is none.
     pub likely: String,
-    /// What to look at, or how to mend it.
+    /// Advice on what to check or how to fix it.
     pub help: String,
-    /// Settings of the call whose change may mend it, as far as it is one of them.
+    /// Settings of the call whose change may resolve it.
     #[serde(skip)]
     pub settings: Vec<Setting>,
-    /// Whether it is about the robot's description (URDF), which is the same in every run.
+    /// Whether it concerns the robot description (URDF), which is the same in every run.
     #[serde(skip)]
     pub of_description: bool,
 }
 
 impl CaveatKind {
-    /// A kind that warns.
+    /// Creates a kind with severity `Warning`.
     pub const fn warning(code: &'static str, says: &'static str, unit: &'static str, help: &'static str) -> Self {
         Self { code, severity: Severity::Warning, says, unit, help }
     }
 
-    /// A kind that only tells.
+    /// Creates a kind with severity `Note`.
     pub const fn note(code: &'static str, says: &'static str, unit: &'static str, help: &'static str) -> Self {
         Self { code, severity: Severity::Note, says, unit, help }
     }
 
-    /// The caveat about a thing with its value and yardstick, in words.
+    /// Creates the caveat for a subject with its value and reference.
     pub fn found(&self, location: impl Into<String>, value: f64, yardstick: f64) -> Caveat {
         let location = location.into();
         let settings = self.settings();
-        // The names of the settings come first: a location may hold braces.
+        // Replace setting names first: a location may contain braces.
         let named = |text: String, setting: &Setting| text.replace(&placeholder(*setting), &setting.to_string());
         let message = (settings.iter().fold(self.says.to_owned(), named))
             .replace("{where}", &location)
@@ -115,14 +115,14 @@ impl CaveatKind {
         }
     }
 
-    /// Settings whose change may mend what it tells.
+    /// Settings whose change may resolve the caveat.
     pub fn settings(&self) -> Vec<Setting> {
         Setting::ALL.into_iter().filter(|setting| self.says.contains(&placeholder(*setting))).collect()
     }
 }
 
 impl Caveat {
-    /// A caveat without a number: the sentence is given.
+    /// Creates a caveat without a value, from a complete message.
     pub fn said(code: &str, location: impl Into<String>, message: impl Into<String>, help: &str) -> Self {
         Self {
             code: code.into(),
@@ -133,14 +133,14 @@ impl Caveat {
         }
     }
 
-    /// With settings whose change may mend it.
+    /// Adds settings whose change may resolve it.
     #[must_use]
     pub fn mended_by(mut self, settings: &[Setting]) -> Self {
         self.settings.extend(settings);
         self
     }
 
-    /// With the slip that would explain it.
+    /// Adds the likely mistake that explains the value.
     #[must_use]
     pub fn likely(mut self, slip: impl Into<String>) -> Self {
         self.likely = slip.into();
@@ -150,31 +150,31 @@ impl Caveat {
         self
     }
 
-    /// As something that only tells.
+    /// Lowers the severity to `Note`.
     #[must_use]
     pub fn as_note(mut self) -> Self {
         self.severity = Severity::Note;
         self
     }
 
-    /// Whether it warns.
+    /// Whether it is a warning.
     pub fn warns(&self) -> bool {
         self.severity == Severity::Warning
     }
 }
 
-/// How the sentence of a kind names a setting.
+/// Placeholder of a setting in the message template of a kind.
 fn placeholder(setting: Setting) -> String {
     format!("{{{}}}", setting.key())
 }
 
-/// The sentences of the caveats that warn.
+/// Messages of the caveats that are warnings.
 pub fn warnings(caveats: &[Caveat]) -> Vec<String> {
     caveats.iter().filter(|caveat| caveat.warns()).map(|caveat| caveat.message.clone()).collect()
 }
 
-/// Each caveat once: of those with the same code about the same thing the last, at the place of the
-/// first.
+/// Removes duplicates: of caveats with the same code and subject, the last one is kept, at the
+/// position of the first.
 pub fn once_each(caveats: Vec<Caveat>) -> Vec<Caveat> {
     let mut kept: Vec<Caveat> = Vec::with_capacity(caveats.len());
     for caveat in caveats {
@@ -188,7 +188,7 @@ pub fn once_each(caveats: Vec<Caveat>) -> Vec<Caveat> {
     kept
 }
 
-/// A number with three or four digits that count.
+/// Formats a number with three or four significant digits.
 pub fn figure(x: f64) -> String {
     if x == 0.0 || !x.is_finite() {
         return format!("{x}");
@@ -229,7 +229,7 @@ mod tests {
         let found = |link: &str, x: f64| kind.found(link, x, 0.05);
         let kept = once_each(vec![found("a", 0.1), found("b", 0.2), found("a", 0.3)]);
         assert_eq!(kept, [found("a", 0.3), found("b", 0.2)]);
-        // Sentences without a value are apart unless they are equal.
+        // Caveats without a value are distinct unless they are equal.
         let said = |text: &str| Caveat::said("file", "x", text, "");
         assert_eq!(once_each(vec![said("one"), said("two"), said("one")]), [said("one"), said("two")]);
     }

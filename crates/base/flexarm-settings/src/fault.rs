@@ -1,10 +1,10 @@
-//! Whom an error is to blame on.
+//! Party responsible for an error.
 
-/// Whom an error is to blame on.
+/// Party responsible for an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// What was given: files, values, places of results. The same call would end in the same way.
+    /// The input: files, values, output locations. The same call would fail in the same way.
     Input,
-    /// The run: it stopped on its way, was stopped, or its results could not be written.
+    /// The run: it stopped, was stopped, or its results could not be written.
     Run,
 }

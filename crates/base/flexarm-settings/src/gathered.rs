@@ -1,12 +1,12 @@
-//! Many sentences of one kind as one.
+//! Merging of many similar messages into one.
 
-/// From so many sentences of one kind on, they are one.
+/// Minimum number of similar messages that are merged.
 const MANY: usize = 3;
-/// Most places that are named.
+/// Maximum number of names listed.
 const NAMED: usize = 3;
 
-/// Sentences for a person: those that differ only in names and numbers are the first of them with
-/// the count and the first few names of the others. Each sentence counts once.
+/// Merges messages that differ only in names and numbers: the first one is kept, with the count and
+/// the first few names of the others. Duplicates count once.
 pub fn gathered(texts: &[String]) -> Vec<String> {
     let mut groups: Vec<(String, Vec<&String>)> = Vec::new();
     for text in texts {
@@ -29,7 +29,7 @@ pub fn gathered(texts: &[String]) -> Vec<String> {
     groups.into_iter().flat_map(told).collect()
 }
 
-/// The sentence without its quoted names and its numbers.
+/// Message without its quoted names and numbers.
 fn kind(text: &str) -> String {
     let mut kind = String::with_capacity(text.len());
     for (k, part) in text.split('"').enumerate() {
@@ -37,7 +37,7 @@ fn kind(text: &str) -> String {
             kind.push('"');
             continue;
         }
-        // Digits, and what belongs to a number: a point, an exponent, a sign.
+        // Digits, and other characters of a number: point, exponent, sign.
         let mut in_number = false;
         let mut letters = part.chars().peekable();
         while let Some(c) = letters.next() {
@@ -58,7 +58,7 @@ fn kind(text: &str) -> String {
     kind
 }
 
-/// The first quoted name of `other` that `first` has otherwise, else the first word.
+/// First quoted name in `other` that differs from `first`, or the first differing word.
 fn difference<'a>(first: &str, other: &'a str) -> Option<&'a str> {
     let quoted = |text: &'a str| text.split('"').skip(1).step_by(2);
     let mut names = first.split('"').skip(1).step_by(2).zip(quoted(other));

@@ -1,15 +1,14 @@
-//! What errors and caveats are made of: the settings that they speak of, as values that each face
-//! names in its own words ([`Setting`]); the [`Caveat`], which compares a value with a yardstick;
-//! whom an error is to blame on ([`Fault`]); ranges of physical quantities ([`Quantity`]); messages
-//! of the reader of TOML without names of types ([`without_types`]); foreign text as each kind of
-//! output may hold it ([`written`]).
+//! Building blocks of errors and caveats: settings named in messages, which each front end names in
+//! its own way ([`Setting`]); the [`Caveat`], which compares a value with a reference; the party
+//! responsible for an error ([`Fault`]); ranges of physical quantities ([`Quantity`]); TOML
+//! messages without type names ([`without_types`]); escaping of foreign text for each kind of
+//! output ([`written`]).
 //!
-//! An error that says "try a smaller step" means a field of a struct to a Rust program, a keyword
-//! argument to a Python one and a flag to somebody at a terminal. Errors and caveats therefore
-//! carry a [`Setting`], and its name is asked for when the sentence is made. Without further words
-//! the names are the library's own ([`Setting::key`]); a face that calls them otherwise says so
-//! once, before anything else, with [`name_settings`]. Names are to a process what a language is:
-//! all its messages, and the files that it writes for people, use the same.
+//! "Try a smaller step" refers to a struct field in Rust, to a keyword argument in Python and to a
+//! flag on the command line. Errors and caveats therefore carry a [`Setting`], whose name is looked
+//! up when the message is formatted. The default names are those of the library ([`Setting::key`]);
+//! a front end with other names sets them once at start with [`name_settings`]. The names are
+//! global to the process: all its messages, and the files it writes for people, use the same.
 //!
 //! ```
 //! use flexarm_settings::Setting;
@@ -17,8 +16,8 @@
 //! assert_eq!(format!("try a smaller {}", Setting::Step), "try a smaller step_s");
 //! ```
 //!
-//! Not here: values, defaults and meaning of the settings, which are fields of the crate that each
-//! belongs to; the kinds of caveats and their yardsticks, which are in the crates that find them.
+//! Not here: values, defaults and meaning of the settings, which are fields of the crate they
+//! belong to; the kinds of caveats and their references, which are in the crates that find them.
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 pub mod caveat;
@@ -37,7 +36,7 @@ pub use gathered::gathered;
 pub use quantity::{OutOfRange, Quantity};
 pub use toml_message::without_types;
 
-/// A setting that a message speaks of.
+/// Setting named in a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Setting {
     // Runs.
@@ -45,21 +44,21 @@ pub enum Setting {
     Step,
     /// Samples per second that a run records.
     LogRate,
-    /// Which stepper integrates.
+    /// Time stepper.
     Stepper,
     /// Relative tolerance of the reference stepper.
     Tolerance,
     /// Method of the reference stepper.
     ReferenceMethod,
-    /// How a run starts: in equilibrium or undeformed.
+    /// Initial state of a run: equilibrium or undeformed.
     Start,
-    /// How flexible links are modelled.
+    /// Model of flexible links.
     Links,
-    /// Factor by which deflections are drawn.
+    /// Factor by which drawn deflections are magnified.
     Magnification,
-    /// Band around the error at rest in which the tool counts as settled (m).
+    /// Band around the static error within which the tool counts as settled (m).
     SettlingBand,
-    /// Run although joint limits are passed.
+    /// Whether to run although joint limits are exceeded.
     IgnoreLimits,
     /// Time within which corners of a motion are rounded (s).
     RoundCorners,
@@ -67,69 +66,69 @@ pub enum Setting {
     Variant,
 
     // Results.
-    /// Folder or file of the results.
+    /// Folder or file for the results.
     Output,
-    /// Replace files that are there.
+    /// Whether to replace existing files.
     Overwrite,
-    /// Format of a recording that is read.
+    /// Format of a recording to read.
     ReadFormat,
-    /// Format of a recording that is written.
+    /// Format of a recording to write.
     WrittenFormat,
 
     // Motions.
-    /// The topic of a bag that holds the motion.
+    /// Topic of a bag that holds the motion.
     Topic,
-    /// Which columns of a table are time and joints.
+    /// Columns of a table used for time and joints.
     Columns,
-    /// Rows per second of a motion that is written.
+    /// Rows per second of a written motion.
     Rate,
 
     // Robots.
-    /// The frame whose motion is looked at.
+    /// Frame whose motion is evaluated.
     Tcp,
     /// Folder of a ROS package.
     Package,
     /// Value of a xacro argument.
     Argument,
-    /// Density from which missing inertias are estimated.
+    /// Density for the estimation of missing inertias.
     InertiaFromDensity,
-    /// Total mass from which missing inertias are estimated.
+    /// Total mass for the estimation of missing inertias.
     InertiaFromTotalMass,
     /// Links whose inertia is not checked.
     WaiveInertia,
 
-    // Robot files that are made of a description.
-    /// The link at which an arm begins.
+    // Robot files made from a description.
+    /// First link of an arm.
     Base,
-    /// The link that is an arm's tool.
+    /// Tool link of an arm.
     Tool,
-    /// The joints of an arm.
+    /// Joints of an arm.
     Joints,
     /// Mass of the payload (kg).
     Payload,
 
     // Modes and frequency responses.
-    /// How long each mode swings in a recording (s).
+    /// Duration of the oscillation of each mode in a recording (s).
     Seconds,
-    /// How far the tool swings in a recording of modes (m).
+    /// Amplitude of the tool in a recording of modes (m).
     ToolMotion,
-    /// Lowest frequency of a response (Hz).
+    /// Minimum frequency of a response (Hz).
     LowestFrequency,
-    /// Highest frequency of a response (Hz).
+    /// Maximum frequency of a response (Hz).
     HighestFrequency,
-    /// Frequencies of a response.
+    /// Number of frequencies of a response.
     Points,
-    /// How the frequencies of a response are spread.
+    /// Spacing of the frequencies of a response.
     Spacing,
 
     // Maps.
-    /// Box of places (m).
+    /// Box of positions (m).
     Bounds,
-    /// Distance of places (m).
+    /// Spacing of positions (m).
     GridSpacing,
-    /// Where the tool points.
+    /// Direction of the tool.
     ToolAxis,
-    /// Joints that a map goes through.
+    /// Joints covered by a map.
     MapJoints,
 
     // Links from meshes and matrices.
@@ -143,29 +142,29 @@ pub enum Setting {
     At,
     /// Material of a mesh or of a region of it.
     Material,
-    /// List what is in a mesh.
+    /// Whether to list the contents of a mesh.
     List,
-    /// Robot that a link belongs to.
+    /// Robot to which a link belongs.
     Urdf,
     /// Link of that robot.
     Link,
     /// Joint at the distal end of that link.
     Joint,
-    /// How many modes are kept.
+    /// Number of modes to keep.
     Modes,
     /// Frequency up to which modes are kept (Hz).
     ModesUpTo,
-    /// Numbers of parts of the chains that are made.
+    /// Numbers of parts of the chains to make.
     Chains,
-    /// Stiffness by load is computed.
+    /// Whether to compute the geometric stiffness.
     Geometric,
     /// Rows or nodes of the interfaces in matrices.
     Map,
     /// File of the mass matrix.
     MassFile,
-    /// Format of matrices that is expected.
+    /// Expected format of matrices.
     MatrixFormat,
-    /// Numbers of the nodes that are written.
+    /// Node numbers to write.
     Nodes,
     /// Rigid part at the proximal end.
     PartA,
@@ -178,7 +177,7 @@ pub enum Setting {
 }
 
 impl Setting {
-    /// Every setting.
+    /// All settings.
     pub const ALL: [Self; 59] = [
         Self::Step,
         Self::LogRate,
@@ -241,7 +240,7 @@ impl Setting {
         Self::Data,
     ];
 
-    /// Its name in the library: a field, a function or a key of a file.
+    /// Name in the library: a field, a function or a key of a file.
     pub fn key(self) -> &'static str {
         match self {
             Self::Step => "step_s",
@@ -308,13 +307,13 @@ impl Setting {
 }
 
 impl fmt::Display for Setting {
-    /// Its name in the words of the face, else [`Setting::key`].
+    /// Writes the name set by the front end, otherwise [`Setting::key`].
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(NAMES.get().map_or_else(|| self.key(), |names| (names.setting)(*self)))
     }
 }
 
-/// Where the settings of a call come from: "the call" in the library.
+/// Source of the settings of a call: "the call" in the library.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Caller;
 
@@ -324,19 +323,19 @@ impl fmt::Display for Caller {
     }
 }
 
-/// What a face calls the settings, and itself.
+/// Names that a front end uses for the settings and for their source.
 #[derive(Clone, Copy, Debug)]
 pub struct Names {
-    /// The name of each setting.
+    /// Name of each setting.
     pub setting: fn(Setting) -> &'static str,
-    /// Where settings come from, such as "the keyword arguments".
+    /// Source of settings, such as "the keyword arguments".
     pub caller: &'static str,
 }
 
 static NAMES: OnceLock<Names> = OnceLock::new();
 
-/// Names the settings in all messages of this process from now on. The first call counts; whether
-/// this is it.
+/// Sets the names of settings for all further messages of this process. Only the first call has an
+/// effect; returns whether this was the first.
 pub fn name_settings(names: Names) -> bool {
     NAMES.set(names).is_ok()
 }

@@ -1,19 +1,19 @@
-//! Sizes that the numbers of robots, tools and loads can have.
+//! Admissible ranges for the numbers of robots, tools and loads.
 //!
-//! The ranges are wide: a number outside of one is no robot, whatever its unit. They keep masses,
-//! lengths and stiffnesses so near to each other that matrices made of them can be factorised. What
-//! is possible but unlikely is a [`crate::Caveat`].
+//! The ranges are wide: a number outside cannot belong to a robot, whatever its unit. They bound
+//! the ratios of masses, lengths and stiffnesses so that matrices made of them can be factorised.
+//! Possible but unlikely values are reported as a [`crate::Caveat`].
 
 use std::fmt;
 
-/// A physical quantity: unit, smallest and largest size of a number that is not zero.
+/// Physical quantity: unit, and range of the magnitude of nonzero values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quantity {
     /// SI unit.
     pub unit: &'static str,
-    /// Smallest size beside zero.
+    /// Minimum magnitude of a nonzero value.
     pub least: f64,
-    /// Largest size.
+    /// Maximum magnitude.
     pub most: f64,
 }
 
@@ -24,7 +24,7 @@ impl Quantity {
     pub const INERTIA: Self = Self::up_to("kg m2", 1e9);
     /// Density.
     pub const DENSITY: Self = Self::up_to("kg/m3", 1e6);
-    /// Length or place.
+    /// Length or position.
     pub const LENGTH: Self = Self::up_to("m", 1e4);
     /// Time.
     pub const TIME: Self = Self::up_to("s", 1e7);
@@ -44,7 +44,7 @@ impl Quantity {
     pub const FREQUENCY: Self = Self::between("Hz", 1e-6, 1e7);
     /// Spindle speed.
     pub const SPEED: Self = Self::between("1/min", 1e-3, 1e7);
-    /// Ratio of a gear, factor on a stiffness.
+    /// Gear ratio or stiffness factor.
     pub const RATIO: Self = Self::between("", 1e-9, 1e9);
     /// Pressure, modulus or cutting coefficient.
     pub const PRESSURE: Self = Self::up_to("Pa", 1e14);
@@ -52,7 +52,7 @@ impl Quantity {
     pub const TOOL_STIFFNESS: Self = Self::between("N/m", 1e-3, 1e13);
     /// Damping ratio of a tool's mode.
     pub const DAMPING_RATIO: Self = Self::between("of critical", 1e-9, 100.0);
-    /// A number whose unit is not known.
+    /// Number of unknown unit.
     pub const NUMBER: Self = Self::up_to("", 1e30);
 
     const fn up_to(unit: &'static str, most: f64) -> Self {
@@ -63,10 +63,10 @@ impl Quantity {
         Self { unit, least, most }
     }
 
-    /// Returns the value if it is zero or of a size in the range.
+    /// Returns the value if it is zero or its magnitude is in the range.
     ///
     /// # Errors
-    /// [`OutOfRange`], also for a value that is not finite.
+    /// [`OutOfRange`], also for a non-finite value.
     pub fn check(self, name: &str, value: f64) -> Result<f64, OutOfRange> {
         match value == 0.0 || (self.least..=self.most).contains(&value.abs()) {
             true => Ok(value),
@@ -74,16 +74,16 @@ impl Quantity {
         }
     }
 
-    /// As [`Quantity::check`], of all values.
+    /// As [`Quantity::check`], for all values.
     ///
     /// # Errors
-    /// [`OutOfRange`] for the first one outside.
+    /// [`OutOfRange`] for the first value outside.
     pub fn check_all<'v>(self, name: &str, values: impl IntoIterator<Item = &'v f64>) -> Result<(), OutOfRange> {
         values.into_iter().try_for_each(|value| self.check(name, *value).map(|_| ()))
     }
 }
 
-/// A number outside of the range of its quantity.
+/// Number outside the range of its quantity.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OutOfRange {
     /// Name of the number.

@@ -1,7 +1,7 @@
-//! What a reader of TOML says, in the words of files instead of those of Rust.
+//! Messages of the TOML parser in terms of files instead of Rust types.
 
-/// The message on one line, without names of types: `expected struct TcpEntry` names one that no
-/// user knows.
+/// Returns the message on one line, without type names: `expected struct TcpEntry` means nothing to
+/// a user.
 #[must_use]
 pub fn without_types(message: &str) -> String {
     const TABLE: &str = "expected a table, { key = value, ... }";

@@ -1,5 +1,5 @@
-//! Foreign text, such as names of joints and cells of files, as each kind of output may hold it:
-//! one function per kind.
+//! Escaping of foreign text, such as joint names and file cells, for each kind of output: one
+//! function per kind.
 //!
 //! JSON and TOML are not here: their writers escape by themselves.
 //!
@@ -12,14 +12,13 @@
 //! assert_eq!(written::csv_field("=1+1"), "\"'=1+1\"");
 //! ```
 
-/// Longest quoted text that a message repeats (characters).
+/// Maximum length of a quoted text in a message (characters).
 const LONGEST_QUOTE: usize = 300;
-/// Longest line of a message (characters).
+/// Maximum length of a line of a message (characters).
 const LONGEST_LINE: usize = 8000;
 
-/// Whether a terminal obeys the character instead of showing it, or a reader cannot see it: control
-/// characters, those that turn the direction of writing, and those that end a line elsewhere than
-/// the eye sees it.
+/// Whether a terminal interprets the character instead of showing it, or it is invisible: control
+/// characters, bidirectional controls, and invisible line separators.
 fn is_hidden(c: char) -> bool {
     c.is_control()
         || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}')
@@ -36,18 +35,19 @@ fn shown(text: &str, keeps: &[char], push: impl Fn(&mut String, char)) -> String
     out
 }
 
-/// Text for a terminal or a plain file: characters that nobody sees are shown as `\u{1b}`, lines
-/// stay.
+/// Escapes text for a terminal or a plain file: hidden characters are shown as `\u{1b}`, line
+/// breaks and tabs are kept.
 pub fn visible(text: &str) -> String {
     shown(text, &['\n', '\t'], String::push)
 }
 
-/// The same on one line, for cells of tables and comments.
+/// As [`visible`], on a single line, for table cells and comments.
 pub fn one_line(text: &str) -> String {
     visible(text).replace(['\n', '\t'], " ")
 }
 
-/// A message for a terminal: [`visible`], quoted texts and lines of a length that a person reads.
+/// Escapes a message for a terminal: [`visible`], with quoted texts and lines cut to a readable
+/// length.
 pub fn message(text: &str) -> String {
     let lines = text.split('\n').map(|line| {
         let line = with_short_quotes(&visible(line));
@@ -56,7 +56,7 @@ pub fn message(text: &str) -> String {
     lines.collect::<Vec<_>>().join("\n")
 }
 
-/// The text in at most about so many characters, with its whole length where it is cut.
+/// Cuts the text to `most` characters, and appends its full length if it is cut.
 pub fn shortened(text: &str, most: usize) -> String {
     match text.char_indices().nth(most) {
         Some((cut, _)) => format!("{}... ({} characters)", &text[..cut], text.chars().count()),
@@ -64,7 +64,7 @@ pub fn shortened(text: &str, most: usize) -> String {
     }
 }
 
-/// Shortens what stands between quotes, and words without a blank.
+/// Shortens quoted texts and words without spaces.
 fn with_short_quotes(text: &str) -> String {
     let mut out = String::with_capacity(text.len().min(2 * LONGEST_LINE));
     let mut rest = text;
@@ -90,8 +90,7 @@ fn with_short_quotes(text: &str) -> String {
     out
 }
 
-/// Where a quoted text ends that begins with `quote`; after the quote itself where it is not
-/// closed.
+/// End of a quoted text that begins with `quote`; just after the opening quote if it is not closed.
 fn end_of_quote(text: &str, quote: char) -> usize {
     let mut escaped = false;
     for (at, c) in text.char_indices().skip(1) {
@@ -105,7 +104,7 @@ fn end_of_quote(text: &str, quote: char) -> usize {
     1
 }
 
-/// Text within an element or an attribute of HTML, SVG and XML.
+/// Escapes text within an element or attribute of HTML, SVG and XML.
 pub fn markup(text: &str) -> String {
     shown(text, &['\n', '\t'], |out, c| match c {
         '&' => out.push_str("&amp;"),
@@ -117,8 +116,8 @@ pub fn markup(text: &str) -> String {
     })
 }
 
-/// Text within a paragraph, a list or a table of Markdown, on one line: no HTML, no links, no
-/// emphasis, no end of a cell.
+/// Escapes text within a paragraph, a list or a table of Markdown, on one line: no HTML, links,
+/// emphasis or cell separators.
 pub fn markdown(text: &str) -> String {
     let text = one_line(text);
     let letters: Vec<char> = text.chars().collect();
@@ -127,14 +126,14 @@ pub fn markdown(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for (k, &c) in letters.iter().enumerate() {
         match c {
-            // The beginnings of tags and of entities; a mark with a blank behind it is only a mark.
+            // Start of tags and entities; a character followed by a space is literal.
             '<' if is_word(Some(k + 1)) || next_is(k, "/!?") => out += "&lt;",
             '&' if is_word(Some(k + 1)) || next_is(k, "#") => out += "&amp;",
             ']' if next_is(k, "([:") => out.extend(['\\', c]),
             '\\' | '`' | '*' | '|' | '~' | '$' => out.extend(['\\', c]),
-            // Underscores within words are letters.
+            // Underscores within words are literal.
             '_' if !(is_word(k.checked_sub(1)) && is_word(Some(k + 1))) => out.extend(['\\', c]),
-            // Marks that begin a heading, a quotation or a list.
+            // Characters that start a heading, a quotation or a list.
             '#' | '>' if k == 0 => out.extend(['\\', c]),
             '-' | '+' if k == 0 && next_is(k, " ") => out.extend(['\\', c]),
             c => out.push(c),
@@ -143,13 +142,13 @@ pub fn markdown(text: &str) -> String {
     out
 }
 
-/// A row of a table of Markdown, with the end of its line.
+/// Row of a Markdown table, with line break.
 pub fn markdown_row(cells: &[impl AsRef<str>]) -> String {
     let cells: Vec<String> = cells.iter().map(|cell| markdown(cell.as_ref())).collect();
     format!("| {} |\n", cells.join(" | "))
 }
 
-/// A name as code within Markdown; one that code cannot hold as plain text.
+/// Formats a name as Markdown code, or as plain text if code cannot contain it.
 pub fn markdown_code(name: &str) -> String {
     match name.contains(['`', '|']) || name.trim().is_empty() {
         true => markdown(name),
@@ -157,14 +156,14 @@ pub fn markdown_code(name: &str) -> String {
     }
 }
 
-/// Whether a spreadsheet would calculate a cell with this text.
+/// Whether a spreadsheet would evaluate a cell with this text.
 fn is_formula(text: &str) -> bool {
     text.trim_start_matches('\'').starts_with(['=', '+', '-', '@', '\t', '\r', '\n', '＝', '＋', '－', '＠'])
 }
 
-/// A text as a field of a table with commas, semicolons or tabs: quoted where it must be. One that
-/// a spreadsheet would take for a formula begins with an apostrophe, which [`csv_fields`] takes off
-/// again.
+/// Formats text as a field of a table with commas, semicolons or tabs, quoted if necessary. Text
+/// that a spreadsheet would evaluate as a formula gets a leading apostrophe, which [`csv_fields`]
+/// removes again.
 pub fn csv_field(text: &str) -> String {
     if is_formula(text) {
         return format!("\"'{}\"", text.replace('"', "\"\""));
@@ -173,15 +172,15 @@ pub fn csv_field(text: &str) -> String {
     if is_plain { text.to_owned() } else { format!("\"{}\"", text.replace('"', "\"\"")) }
 }
 
-/// The text of a field that [`csv_field`] wrote, without its quotes.
+/// Text of a field written by [`csv_field`], given without its enclosing quotes.
 pub fn csv_text(field: &str) -> &str {
     field.strip_prefix('\'').filter(|text| is_formula(text)).unwrap_or(field)
 }
 
-/// The fields of a line of a table, without the quotes around them; a quote within quotes is
+/// Splits a line of a table into fields, without their enclosing quotes; a quote within quotes is
 /// doubled.
 ///
-/// * `runs`: whether several separators after each other are one.
+/// * `runs`: whether several successive separators count as one.
 pub fn csv_fields(line: &str, is_separator: impl Fn(char) -> bool, runs: bool) -> Vec<String> {
     let (mut fields, mut field) = (Vec::new(), String::new());
     let (mut quoted, mut was_quoted, mut gap) = (false, false, false);
@@ -277,7 +276,7 @@ mod tests {
             let line = format!("time,{field},x");
             assert_eq!(csv_fields(&line, |c| c == ',', false), ["time", name, "x"]);
         }
-        // Numbers of other programs are no texts of this one.
+        // Numbers written by other programs are not treated as text of this one.
         assert_eq!(csv_fields("-1.5,'+2,\"-3\"", |c| c == ',', false), ["-1.5", "'+2", "-3"]);
     }
 

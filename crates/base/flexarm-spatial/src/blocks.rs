@@ -1,12 +1,11 @@
-//! Matrices of one or two interfaces in 6×6 blocks: what a stiffness between two frames is turned
-//! and carried with.
+//! 6×6 block matrices for one or two interfaces, used to rotate and shift stiffness matrices.
 
 use nalgebra::{Matrix3, Matrix6, SMatrix};
 
-/// Matrix over two interfaces: the six components of A, then the six of B.
+/// Matrix for two interfaces: six components of A, then six of B.
 pub type Matrix12 = SMatrix<f64, 12, 12>;
 
-/// `blkdiag(R, R)`: turns both halves of a displacement into other axes at the same point.
+/// `blkdiag(R, R)`: rotates both halves of a displacement to other axes at the same point.
 pub fn turn6(R: &Matrix3<f64>) -> Matrix6<f64> {
     let mut result = Matrix6::zeros();
     result.fixed_view_mut::<3, 3>(0, 0).copy_from(R);
@@ -22,7 +21,7 @@ pub fn twice(Q: &Matrix6<f64>) -> Matrix12 {
     result
 }
 
-/// `(K + Kᵀ)/2`; exact where K is symmetric already.
+/// Symmetric part `(K + Kᵀ)/2`; exact if K is already symmetric.
 pub fn symmetric_part(K: &Matrix6<f64>) -> Matrix6<f64> {
     (K + K.transpose()) * 0.5
 }

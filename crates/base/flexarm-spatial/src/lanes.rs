@@ -1,9 +1,9 @@
-//! Four numbers side by side, for processors with AVX2, and eight, for those with AVX-512: the
-//! scalar of recursions over as many runs or poses at once.
+//! SIMD scalars for recursions over several runs or poses at once: four numbers with AVX2, eight
+//! with AVX-512.
 //!
-//! `Four` and `Eight` are [`Real`]: each lane has the bits of the same recursion over `f64`. Nobody
-//! outside can name them: they are what [`with_lanes`] hands to its work once it has seen that the
-//! processor has the instructions.
+//! `Four` and `Eight` implement [`Real`]: each lane gives bitwise the result of the same recursion
+//! over `f64`. The types are private; [`with_lanes`] passes them to its work after checking that
+//! the processor has the instructions.
 
 #![allow(unsafe_code, reason = "vector instructions, which are called where they were found to be there")]
 
@@ -19,17 +19,17 @@ use num_traits::{One, Zero};
 
 use crate::real::Real;
 
-/// Work over lanes. What it calls is inlined, down to the instructions: mark it
+/// Work over SIMD lanes. Its callees must be inlined down to the instructions: mark them
 /// `#[inline(always)]`.
 pub trait OverLanes {
-    /// What comes of it.
+    /// Result of the work.
     type Output;
 
-    /// Does it over lanes of this type.
+    /// Does the work with lanes of this type.
     fn run<T: Real>(self) -> Self::Output;
 }
 
-/// Most lanes that this processor has; 1 where it has none.
+/// Maximum number of lanes of this processor; 1 if it has none.
 pub fn most_lanes() -> usize {
     if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
         8
@@ -40,32 +40,32 @@ pub fn most_lanes() -> usize {
     }
 }
 
-/// Does the work with vector instructions, in four lanes; `None` where the processor has none.
+/// Does the work with vector instructions in four lanes; `None` if the processor has none.
 pub fn with_four_lanes<W: OverLanes>(work: W) -> Option<W::Output> {
     #[target_feature(enable = "avx2")]
     fn over_four<W: OverLanes>(work: W) -> W::Output {
         work.run::<Four>()
     }
-    // SAFETY: the processor has what the function is compiled for.
+    // SAFETY: the processor has the features for which the function is compiled.
     is_x86_feature_detected!("avx2").then(|| unsafe { over_four(work) })
 }
 
-/// Does the work with vector instructions, in lanes for this many things at most: the number of
-/// them is [`lanes_for`]. `None` where the processor has none.
+/// Does the work with vector instructions, in as many lanes as [`lanes_for`] returns; `None` if the
+/// processor has none.
 pub fn with_lanes<W: OverLanes>(things: usize, work: W) -> Option<W::Output> {
     #[target_feature(enable = "avx512f,avx512dq")]
     fn over_eight<W: OverLanes>(work: W) -> W::Output {
         work.run::<Eight>()
     }
     match lanes_for(things) {
-        // SAFETY: the processor has what the function is compiled for.
+        // SAFETY: the processor has the features for which the function is compiled.
         8 => Some(unsafe { over_eight(work) }),
         _ => with_four_lanes(work),
     }
 }
 
-/// Lanes that [`with_lanes`] takes for so many things: eight where there are more than four of
-/// them.
+/// Number of lanes that [`with_lanes`] uses for this many items: eight only if there are more than
+/// four.
 pub fn lanes_for(things: usize) -> usize {
     match most_lanes() {
         8 if things <= 4 => 4,
@@ -73,14 +73,14 @@ pub fn lanes_for(things: usize) -> usize {
     }
 }
 
-/// Loops over numbers, inlined down to them.
+/// Loops over numbers, to be inlined.
 pub trait Loops {
-    /// Runs them.
+    /// Runs the loops.
     fn run(self);
 }
 
-/// Runs loops with the vector instructions that the processor has. Operations and their order are
-/// the same with and without.
+/// Runs loops with the vector instructions of the processor. Operations and their order are the
+/// same with and without.
 #[inline]
 pub fn quickly(loops: impl Loops) {
     #[target_feature(enable = "avx2")]
@@ -88,14 +88,14 @@ pub fn quickly(loops: impl Loops) {
         loops.run();
     }
     if is_x86_feature_detected!("avx2") {
-        // SAFETY: the processor has what `compiled` is compiled for.
+        // SAFETY: the processor has the features for which `compiled` is compiled.
         unsafe { compiled(loops) }
     } else {
         loops.run();
     }
 }
 
-/// Numbers side by side: type, lanes, register and its instructions.
+/// Implements a type of SIMD lanes: type, number of lanes, register type and its instructions.
 macro_rules! lanes {
     ($name:ident, $lanes:literal, $register:ident, $splat:ident, $xor:ident, $andnot:ident, $sqrt:ident, $($trait:ident $method:ident $assign:ident $assign_method:ident $instruction:ident),+) => {
         #[doc = concat!("So many numbers: ", $lanes, ".")]
@@ -104,14 +104,14 @@ macro_rules! lanes {
         struct $name($register);
 
         impl $name {
-            /// From the lanes.
+            /// Creates it from the lanes.
             #[inline(always)]
             fn new(lanes: [f64; $lanes]) -> Self {
                 // SAFETY: the same numbers in the same order.
                 Self(unsafe { std::mem::transmute::<[f64; $lanes], $register>(lanes) })
             }
 
-            /// The lanes.
+            /// Numbers in the lanes.
             #[inline(always)]
             fn lanes(self) -> [f64; $lanes] {
                 // SAFETY: the same numbers in the same order.
@@ -124,7 +124,7 @@ macro_rules! lanes {
                 type Output = Self;
                 #[inline(always)]
                 fn $method(self, other: Self) -> Self {
-                    // SAFETY: see the module page.
+                    // SAFETY: see the module documentation.
                     Self(unsafe { $instruction(self.0, other.0) })
                 }
             }
@@ -140,7 +140,7 @@ macro_rules! lanes {
             type Output = Self;
             #[inline(always)]
             fn neg(self) -> Self {
-                // SAFETY: see the module page.
+                // SAFETY: see the module documentation.
                 Self(unsafe { $xor(self.0, $splat(-0.0)) })
             }
         }
@@ -174,7 +174,7 @@ macro_rules! lanes {
 
             #[inline(always)]
             fn splat(x: f64) -> Self {
-                // SAFETY: see the module page.
+                // SAFETY: see the module documentation.
                 Self(unsafe { $splat(x) })
             }
 
@@ -192,13 +192,13 @@ macro_rules! lanes {
 
             #[inline(always)]
             fn flat(all: &[Self]) -> &[f64] {
-                // SAFETY: each is its numbers without gaps, and more strictly aligned.
+                // SAFETY: each entry consists of its numbers without gaps, with stricter alignment.
                 unsafe { std::slice::from_raw_parts(all.as_ptr().cast(), $lanes * all.len()) }
             }
 
             #[inline(always)]
             fn flat_mut(all: &mut [Self]) -> &mut [f64] {
-                // SAFETY: as in `flat`; every bit pattern is a number.
+                // SAFETY: as in `flat`; every bit pattern is a valid number.
                 unsafe { std::slice::from_raw_parts_mut(all.as_mut_ptr().cast(), $lanes * all.len()) }
             }
 
@@ -216,7 +216,7 @@ macro_rules! lanes {
 
             #[inline(always)]
             fn sqrt(self) -> Self {
-                // SAFETY: see the module page.
+                // SAFETY: see the module documentation.
                 Self(unsafe { $sqrt(self.0) })
             }
 
@@ -237,7 +237,7 @@ macro_rules! lanes {
 
             #[inline(always)]
             fn abs(self) -> Self {
-                // SAFETY: see the module page.
+                // SAFETY: see the module documentation.
                 Self(unsafe { $andnot($splat(-0.0), self.0) })
             }
         }
@@ -259,33 +259,33 @@ lanes!(
 );
 
 impl Four {
-    /// One bit for each lane that is below.
+    /// Bit mask of the lanes that are below.
     #[inline(always)]
     fn below(self, bound: Self) -> i32 {
-        // SAFETY: see the module page.
+        // SAFETY: see the module documentation.
         unsafe { _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(self.0, bound.0)) }
     }
 
-    /// `yes` where below, else `no`.
+    /// `yes` where below, otherwise `no`.
     #[inline(always)]
     fn picked(self, bound: Self, yes: Self, no: Self) -> Self {
-        // SAFETY: see the module page.
+        // SAFETY: see the module documentation.
         Self(unsafe { _mm256_blendv_pd(no.0, yes.0, _mm256_cmp_pd::<_CMP_LT_OQ>(self.0, bound.0)) })
     }
 }
 
 impl Eight {
-    /// One bit for each lane that is below.
+    /// Bit mask of the lanes that are below.
     #[inline(always)]
     fn below(self, bound: Self) -> i32 {
-        // SAFETY: see the module page.
+        // SAFETY: see the module documentation.
         i32::from(unsafe { _mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, bound.0) })
     }
 
-    /// `yes` where below, else `no`.
+    /// `yes` where below, otherwise `no`.
     #[inline(always)]
     fn picked(self, bound: Self, yes: Self, no: Self) -> Self {
-        // SAFETY: see the module page.
+        // SAFETY: see the module documentation.
         Self(unsafe { _mm512_mask_blend_pd(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, bound.0), no.0, yes.0) })
     }
 }
@@ -316,8 +316,8 @@ mod tests {
         }
     }
 
-    /// Truth: the same over one number; both formulas of the rotation vector in one call; four and
-    /// eight lanes, where the processor has them.
+    /// Truth: the same over a single number; both formulas of the rotation vector in one call; four
+    /// and eight lanes, if the processor has them.
     #[test]
     fn every_lane_has_the_bits_of_a_single_number() {
         for angles in [

@@ -1,8 +1,8 @@
-//! Spatial algebra: poses, twists, wrenches, inertias and rotations, as the other crates use them.
+//! Spatial algebra: poses, twists, wrenches, inertias and rotations for the other crates.
 //!
-//! A frame is a letter, `X_AB` the pose of frame B in frame A, `p_A = X_AB p_B`. Six-vectors have
-//! the linear part first. A twist and a wrench belong to a point and to axes: [`Twist::at_parent`]
-//! and [`Wrench::at_parent`] carry them to another frame of the same body.
+//! Frames are denoted by letters: `X_AB` is the pose of frame B in frame A, `p_A = X_AB p_B`.
+//! Six-vectors have the linear part first. A twist or wrench refers to a point and to axes:
+//! [`Twist::at_parent`] and [`Wrench::at_parent`] transform them to another frame of the same body.
 //!
 //! ```
 //! use flexarm_spatial::{Pose, Twist, Wrench, adjoint};

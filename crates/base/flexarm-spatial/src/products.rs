@@ -1,7 +1,7 @@
-//! Vectors and 3×3 matrices in the inner loops of the recursions, written out: nalgebra's general
-//! product of small matrices costs twice as many instructions, and over lanes none of its
-//! operations is sure to be inlined, which they must be ([`crate::lanes`]). The order of the sums
-//! is fixed, so results are the same on every machine.
+//! Operations on 3-vectors and 3×3 matrices in the inner loops of the recursions, written out
+//! explicitly. nalgebra's general product of small matrices takes twice as many instructions, and
+//! over SIMD lanes inlining of its operations is not guaranteed, although it is required
+//! ([`crate::lanes`]). The order of sums is fixed, so results are the same on every machine.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -83,7 +83,7 @@ pub fn tr_mul<T: Real>(A: &Matrix3<T>, v: &Vector3<T>) -> Vector3<T> {
     Vector3::new(a[0] * x + a[1] * y + a[2] * z, b[0] * x + b[1] * y + b[2] * z, c[0] * x + c[1] * y + c[2] * z)
 }
 
-/// Matrix of three columns.
+/// Matrix with the given columns.
 #[inline(always)]
 pub fn columns<T: Real>(a: Vector3<T>, b: Vector3<T>, c: Vector3<T>) -> Matrix3<T> {
     Matrix3::new(a.x, b.x, c.x, a.y, b.y, c.y, a.z, b.z, c.z)
@@ -141,13 +141,13 @@ pub fn cross3<T: Real>(p: &Vector3<T>, A: &Matrix3<T>) -> Matrix3<T> {
     )
 }
 
-/// A constant vector in the scalar of a recursion.
+/// Converts a constant vector to the scalar type of a recursion.
 #[inline(always)]
 pub fn lift<T: Real>(v: &Vector3<f64>) -> Vector3<T> {
     Vector3::new(T::splat(v.x), T::splat(v.y), T::splat(v.z))
 }
 
-/// A constant matrix in the scalar of a recursion.
+/// Converts a constant matrix to the scalar type of a recursion.
 #[inline(always)]
 pub fn lift3<T: Real>(A: &Matrix3<f64>) -> Matrix3<T> {
     let [a, b, c] = &A.data.0;

@@ -1,12 +1,12 @@
-//! The scalar of the recursions: one number, or several side by side ([`crate::lanes`]).
+//! Scalar type of the recursions: one number, or several SIMD lanes ([`crate::lanes`]).
 //!
-//! A recursion that is written over [`Real`] gives every lane the bits that it gives one number:
-//! all operations are rounded alike, none is contracted to a fused one, sums keep their order, and
-//! where numbers choose a formula each lane gets its own.
+//! A recursion over [`Real`] gives every lane bitwise the result for a single number: operations
+//! are rounded identically, none is contracted to a fused multiply-add, sums keep their order, and
+//! a value-dependent choice of formula is made per lane.
 //!
-//! Sine and cosine are computed here, so that they too are the same on every machine: a system's
-//! library differs in the last bit from one processor to the next. Source: [Cody & Waite 1980] for
-//! the reduction; coefficients of the polynomials as in FreeBSD's `k_sin.c` and `k_cos.c`.
+//! Sine and cosine are computed here, so that they are the same on every machine: system libraries
+//! differ in the last bit between processors. Source: [Cody & Waite 1980] for the reduction;
+//! polynomial coefficients as in FreeBSD's `k_sin.c` and `k_cos.c`.
 
 use std::f64::consts::FRAC_2_PI;
 use std::ops::Neg;
@@ -14,15 +14,15 @@ use std::ops::Neg;
 use nalgebra::{ClosedAddAssign, ClosedDivAssign, ClosedMulAssign, ClosedSubAssign, Scalar};
 use num_traits::{One, Zero};
 
-/// Angles up to this (rad) have sine and cosine of this module; beyond, a quarter of a million
-/// turns, of the system.
+/// Maximum angle (rad) for sine and cosine of this module, about a quarter of a million turns;
+/// beyond it the system functions are used.
 const LARGEST_ANGLE: f64 = 1.5e6;
 
-/// Up to here, less than π/4, an angle is its own rest: no quarter of a turn is taken off, and the
-/// bits are the same without.
+/// Angles below this (rad, less than π/4) need no range reduction; the result is bitwise the same
+/// without it.
 const NEAR_ZERO: f64 = 0.78;
 
-/// A real number of a recursion, or lanes of them.
+/// Real number of a recursion, or SIMD lanes of real numbers.
 pub trait Real:
     Scalar
     + Copy
@@ -39,25 +39,25 @@ pub trait Real:
     /// Number of lanes.
     const LANES: usize;
 
-    /// The same number in all lanes.
+    /// Sets all lanes to the same number.
     fn splat(x: f64) -> Self;
 
-    /// The number in one lane.
+    /// Number in lane `k`.
     fn lane(self, k: usize) -> f64;
 
-    /// Another number in one lane.
+    /// Sets the number in lane `k`.
     fn set_lane(&mut self, k: usize, x: f64);
 
     /// Numbers lane by lane: those of entry i begin at `i LANES`.
     fn flat(all: &[Self]) -> &[f64];
 
-    /// The same, to be changed.
+    /// Mutable view, laid out as [`Real::flat`].
     fn flat_mut(all: &mut [Self]) -> &mut [f64];
 
-    /// The first numbers of a slice, one per lane.
+    /// Loads the first numbers of a slice, one per lane.
     fn load(from: &[f64]) -> Self;
 
-    /// Puts the lanes into the first numbers of a slice.
+    /// Stores the lanes in the first numbers of a slice.
     fn store(self, to: &mut [f64]);
 
     /// Square root.
@@ -66,20 +66,20 @@ pub trait Real:
     /// Whether all lanes are below the bound.
     fn all_below(self, bound: f64) -> bool;
 
-    /// Whether some lane is below the bound.
+    /// Whether any lane is below the bound.
     fn any_below(self, bound: f64) -> bool;
 
-    /// Whether some lane is above the bound.
+    /// Whether any lane is above the bound.
     #[inline(always)]
     fn any_above(self, bound: f64) -> bool {
         (-self).any_below(-bound)
     }
 
-    /// `yes` where `self < bound`, else `no`.
+    /// Selects `yes` where `self < bound`, otherwise `no`.
     fn pick_below(self, bound: Self, yes: Self, no: Self) -> Self;
 
-    /// What the first formula gives where `self < bound`, else what the second one gives. A formula
-    /// that no lane needs is not computed.
+    /// Evaluates `yes` where `self < bound`, otherwise `no`. A formula that no lane needs is not
+    /// computed.
     #[inline(always)]
     fn branch_below<const N: usize>(
         self,
@@ -106,7 +106,7 @@ pub trait Real:
         self.pick_below(Self::zero(), -self, self)
     }
 
-    /// Sine and cosine (rad), within one unit of the last place.
+    /// Sine and cosine of an angle in rad, to within one unit in the last place.
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         let size = self.abs();
@@ -117,15 +117,15 @@ pub trait Real:
     }
 }
 
-/// Sines and cosines of many angles (rad), each as [`Real::sin_cos`] has it.
+/// Computes sines and cosines of many angles (rad), each bitwise as by [`Real::sin_cos`].
 ///
 /// # Panics
 /// If the slices differ in length.
 #[inline(always)]
 pub fn sin_cos_all<T: Real>(angles: &[T], sines: &mut [T], cosines: &mut [T]) {
     assert!(sines.len() == angles.len() && cosines.len() == angles.len(), "a sine and a cosine for each angle");
-    // Without a branch in between, numbers too go side by side.
-    // Loops and no closures here and below: over lanes all of it must be inlined.
+    // No branch inside the loop, so that numbers are vectorised as well. Loops instead of closures
+    // here and below: over lanes everything must be inlined.
     let mut in_range = true;
     for angle in angles {
         in_range &= angle.abs().all_below(LARGEST_ANGLE);
@@ -141,7 +141,7 @@ pub fn sin_cos_all<T: Real>(angles: &[T], sines: &mut [T], cosines: &mut [T]) {
     }
 }
 
-/// Where some lane is out of range, or not a number.
+/// Sine and cosine by lane, if some lane is out of range or not a number.
 #[cold]
 #[inline(never)]
 fn sin_cos_by_lane<T: Real>(x: T) -> (T, T) {
@@ -155,7 +155,7 @@ fn sin_cos_by_lane<T: Real>(x: T) -> (T, T) {
     (sine, cosine)
 }
 
-/// `x = k π/2 + (y + tail)`, sine and cosine of the rest, then the quarter of the turn.
+/// `x = k π/2 + (y + tail)`: sine and cosine of the remainder, then the quadrant.
 #[inline(always)]
 fn sine_and_cosine<T: Real>(x: T) -> (T, T) {
     // π/2 in three parts: products of k with the first two are exact.
@@ -169,7 +169,8 @@ fn sine_and_cosine<T: Real>(x: T) -> (T, T) {
     let y = r - c;
     let (sine, cosine) = (sine_near_zero(y, (r - y) - c), cosine_near_zero(y, (r - y) - c));
 
-    // k modulo 4 as -2, -1, 0, 1 or 2: odd quarters change sine and cosine, half of them a sign.
+    // k modulo 4 as -2, -1, 0, 1 or 2: odd quadrants exchange sine and cosine, half of the
+    // quadrants change a sign.
     let quarter = k - rounded(k * T::splat(0.25)) * T::splat(4.0);
     let (half, one) = (T::splat(0.5), T::one());
     let odd = (quarter.abs() - one).abs();
@@ -177,7 +178,7 @@ fn sine_and_cosine<T: Real>(x: T) -> (T, T) {
     ((quarter - half).abs().pick_below(one, s, -s), (quarter + half).abs().pick_below(one, c, -c))
 }
 
-/// Each number in all lanes. Arrays' `map` is not inlined over lanes.
+/// Splats each number over all lanes. `map` of arrays is not inlined over lanes.
 #[inline(always)]
 fn splat_all<T: Real, const N: usize>(numbers: [f64; N]) -> [T; N] {
     let mut all = [T::zero(); N];
@@ -187,7 +188,7 @@ fn splat_all<T: Real, const N: usize>(numbers: [f64; N]) -> [T; N] {
     all
 }
 
-/// The nearest whole number, for `|x| < 2^51`.
+/// Nearest integer, for `|x| < 2^51`.
 #[inline(always)]
 fn rounded<T: Real>(x: T) -> T {
     let large = T::splat(6_755_399_441_055_744.0); // 1.5 * 2^52: its last place is 1
@@ -299,13 +300,12 @@ impl Real for f64 {
 mod tests {
     use super::*;
 
-    /// Units of the last place between two numbers of one sign.
+    /// Number of units in the last place between two numbers of the same sign.
     fn places(a: f64, b: f64) -> u64 {
         a.to_bits().abs_diff(b.to_bits())
     }
 
-    /// Truth: the system's functions, which are right to half a unit or a little more; measured 1
-    /// unit.
+    /// Truth: the system's functions, accurate to half a unit or slightly more; measured 1 unit.
     #[test]
     fn sine_and_cosine_are_within_a_unit_of_the_last_place() {
         let quarters = (-4000..4000).map(|k| f64::from(k) * 0.25 * std::f64::consts::PI);

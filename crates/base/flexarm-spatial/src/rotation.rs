@@ -1,5 +1,5 @@
-//! Three angles of an elastic joint: the rotation they give, and the angular velocity of their
-//! rates.
+//! Angles of an elastic joint: rotation as a function of three angles, and angular velocity as a
+//! function of their rates.
 //!
 //! Frames: P the proximal face of the joint, Q the distal one. `R_PQ = R(angles)` and the angular
 //! velocity of Q in P, in **Q axes**, is `w_PQ_Q = B(angles) d(angles)/dt`. Start at
@@ -14,14 +14,14 @@ use crate::products::{add, add3, columns, cross, dot, mul3, scaled, scaled3};
 use crate::real::Real;
 use crate::vectors::skew;
 
-/// Below this cosine the axis is taken from the symmetric part of the rotation, above from the skew
-/// part.
+/// Cosine below which the axis is taken from the symmetric part of the rotation matrix, above which
+/// from the skew part.
 const NEAR_HALF_TURN: f64 = -0.9;
 
-/// Below this square of the sine a rotation vector is a series.
+/// Squared sine below which a rotation vector is computed from a series.
 const SMALL_SINE_SQUARED: f64 = 5e-4;
 
-/// Which three numbers describe the rotation of an elastic joint.
+/// Parametrisation of the rotation of an elastic joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum ElasticAngles {
     /// Rotation vector in P axes: `R = exp([phi]x)`. No singularity below a full turn.
@@ -39,7 +39,7 @@ pub struct AngleKinematics<T: Scalar = f64> {
     pub R: Matrix3<T>,
     /// `B` with `w_PQ_Q = B rates`.
     pub B: Matrix3<T>,
-    /// `dB/dt rates`: the part of the angular acceleration that is quadratic in the rates.
+    /// `dB/dt rates`: part of the angular acceleration that is quadratic in the rates.
     pub bias: Vector3<T>,
 }
 
@@ -53,7 +53,7 @@ impl ElasticAngles {
         }
     }
 
-    /// Rotation and rate map alone.
+    /// Rotation and rate map, without the bias.
     #[inline(always)]
     pub fn pose<T: Real>(self, angles: &Vector3<T>) -> (Matrix3<T>, Matrix3<T>) {
         match self {
@@ -65,7 +65,7 @@ impl ElasticAngles {
         }
     }
 
-    /// `dB/dt` at `angles` (rad) and `rates` (rad/s), as a matrix.
+    /// Matrix `dB/dt` at `angles` (rad) and `rates` (rad/s).
     #[inline(always)]
     pub fn rate_map_derivative<T: Real>(self, angles: &Vector3<T>, rates: &Vector3<T>) -> Matrix3<T> {
         match self {
@@ -73,8 +73,8 @@ impl ElasticAngles {
                 let [_, a, b, da, db] = exponential_coefficients(dot(angles, angles));
                 let (P, Pdot) = (skew(angles), skew(rates));
                 let xdot = T::splat(2.0) * dot(angles, rates);
-                // -a' x' [phi]x - a [rates]x + b' x' [phi]x² + b ([rates]x [phi]x + [phi]x
-                // [rates]x)
+                // -a' x' [phi]x - a [rates]x + b' x' [phi]x²
+                //   + b ([rates]x [phi]x + [phi]x [rates]x),  x' = 2 phi·rates
                 let first = add3(&scaled3(&P, -da * xdot), &scaled3(&Pdot, -a));
                 let second = add3(&first, &scaled3(&mul3(&P, &P), db * xdot));
                 add3(&second, &scaled3(&add3(&mul3(&Pdot, &P), &mul3(&P, &Pdot)), b))
@@ -83,7 +83,7 @@ impl ElasticAngles {
         }
     }
 
-    /// The angles of a given rotation matrix, the inverse of `kinematics(..).R`.
+    /// Angles of a rotation matrix, the inverse of `kinematics(..).R`.
     pub fn from_rotation(self, R: &Matrix3<f64>) -> Vector3<f64> {
         match self {
             Self::RotationVector => rotation_vector(R),
@@ -102,7 +102,7 @@ impl ElasticAngles {
 /// ```text
 /// (R - Rᵀ)/2 = sin θ [a]x,   (R + Rᵀ)/2 = cos θ 1 + (1 - cos θ) a aᵀ
 /// ```
-/// At exactly half a turn both `a` and `-a` are right; one of them is returned.
+/// At exactly half a turn both `a` and `-a` are valid; one of them is returned.
 pub fn rotation_vector(R: &Matrix3<f64>) -> Vector3<f64> {
     let skew = 0.5 * Vector3::new(R[(2, 1)] - R[(1, 2)], R[(0, 2)] - R[(2, 0)], R[(1, 0)] - R[(0, 1)]);
     let (square, cosine) = (skew.norm_squared(), 0.5 * (R.trace() - 1.0));
@@ -114,10 +114,10 @@ pub fn rotation_vector(R: &Matrix3<f64>) -> Vector3<f64> {
     let sine = square.sqrt();
     let angle = sine.atan2(cosine);
     if cosine > NEAR_HALF_TURN {
-        // θ / sin θ tends to 1; where the sine is lost to underflow, the angle is as well.
+        // θ / sin θ tends to 1; if the sine underflows, the angle does as well.
         return if sine > 0.0 { skew * (angle / sine) } else { skew };
     }
-    // The largest column of a aᵀ is a, up to its length; its sign follows from the skew part.
+    // The largest column of a aᵀ is parallel to a; its sign follows from the skew part.
     let outer = 0.5 * (R + R.transpose()) - Matrix3::identity() * cosine;
     let largest = outer.diagonal().imax();
     let axis = outer.column(largest).normalize();
@@ -147,7 +147,8 @@ fn exponential_coefficients<T: Real>(x: T) -> [T; 5] {
     )
 }
 
-/// All five from the series of two functions; the first omitted terms are below 1e-17 relative.
+/// All five coefficients from the series of two functions; the first omitted terms are below 1e-17
+/// relative.
 ///
 /// ```text
 /// c = (1/2 - a)/x = Σ (-x)^k/(2k + 4)!,   d = (1/6 - b)/x = Σ (-x)^k/(2k + 5)!
@@ -181,7 +182,7 @@ fn coefficients_by_series<T: Real>(x: T) -> [T; 5] {
     [T::one() - x * b, a, b, c - half * b, half * (T::splat(3.0) * d - c)]
 }
 
-/// `Σ p_k x^k`, in pairs and pairs of pairs, which do not wait for each other.
+/// `Σ p_k x^k`, evaluated in independent pairs and pairs of pairs.
 #[inline(always)]
 fn polynomial<T: Real>(x: T, p: &[f64; 8]) -> T {
     let (x2, pair) = (
@@ -192,7 +193,7 @@ fn polynomial<T: Real>(x: T, p: &[f64; 8]) -> T {
     (pair(0) + x2 * pair(2)) + (x2 * x2) * (pair(4) + x2 * pair(6))
 }
 
-/// Links hardly turn so far: this stays out of the recursions' code.
+/// Kept out of the code of the recursions: links hardly ever rotate this far.
 #[cold]
 #[inline(never)]
 fn coefficients_in_closed_form<T: Real>(x: T) -> [T; 5] {
@@ -230,8 +231,8 @@ fn rotation_vector_kinematics<T: Real>(phi: &Vector3<T>, rates: &Vector3<T>) -> 
     let coefficients = exponential_coefficients(dot(phi, phi));
     let (R, B) = rotation_vector_pose(phi, &coefficients);
     let [_, _, b, da, db] = coefficients;
-    // bias = (dB/dt) rates = -a' x' phi×rates + b' x' phi×(phi×rates) + b (rates×(phi×rates)),  x'
-    // = 2 phi·rates
+    // bias = (dB/dt) rates
+    //   = -a' x' phi×rates + b' x' phi×(phi×rates) + b (rates×(phi×rates)),  x' = 2 phi·rates
     let xdot = T::splat(2.0) * dot(phi, rates);
     let c = cross(phi, rates);
     let first = add(&scaled(&c, -da * xdot), &scaled(&cross(phi, &c), db * xdot));
@@ -256,7 +257,7 @@ fn euler_zyx_kinematics<T: Real>(angles: &Vector3<T>, rates: &Vector3<T>) -> Ang
     );
     let (zero, one) = (T::zero(), T::one());
     let B = Matrix3::new(one, zero, -sy, zero, cx, sx * cy, zero, -sx, cx * cy);
-    // The columns of dB/dt but the first, which is zero.
+    // Columns of dB/dt; the first one is zero.
     let [y, z] = euler_zyx_rate_columns((sx, cx), (sy, cy), rates);
     AngleKinematics { R, B, bias: add(&scaled(&y, rates.y), &scaled(&z, rates.z)) }
 }
@@ -285,7 +286,7 @@ mod tests {
     const ANGLES: [[f64; 3]; 5] =
         [[0.0, 0.0, 0.0], [1e-3, -2e-3, 5e-4], [0.05, 0.06, -0.06], [0.4, -0.3, 0.9], [1.2, 0.7, -2.0]];
 
-    /// Truth: nalgebra's own exponential and Euler matrices; measured 2e-16.
+    /// Truth: nalgebra's exponential and Euler matrices; measured 2e-16.
     #[test]
     fn angles_give_the_rotation_they_name() {
         for v in ANGLES.map(Vector3::from) {
@@ -318,7 +319,8 @@ mod tests {
         }
     }
 
-    /// The series below one radian and the closed form above meet; measured 1.7e-16.
+    /// The series below one radian and the closed form above agree at the boundary; measured
+    /// 1.7e-16.
     #[test]
     fn series_and_closed_form_agree_where_they_meet() {
         let below = exponential_coefficients(1.0 - f64::EPSILON);
@@ -342,7 +344,7 @@ mod tests {
         }
     }
 
-    /// Half a turn about any axis is found again; measured 1e-15.
+    /// Rotations up to half a turn about any axis are recovered; measured 1e-15.
     #[test]
     fn rotation_vector_survives_half_a_turn() {
         for axis in [vector![1.0, 0.0, 0.0], vector![0.6, -0.8, 0.0], vector![-0.48, 0.6, 0.64]] {

@@ -1,8 +1,8 @@
 //! Spatial vectors and inertias as pairs of 3-vectors: linear part first, angular part second.
 //!
-//! Frames: A, B any two frames; `X_AB` the pose of B in A. A twist is the velocity of a frame's
-//! origin and its angular velocity; a wrench is the force through that origin and the moment about
-//! it. Start at [`Twist`] and [`adjoint`]. Not here: joints, trees.
+//! Frames: A, B any two frames; `X_AB` is the pose of B in A. A twist consists of the velocity of a
+//! frame's origin and its angular velocity; a wrench of the force through that origin and the
+//! moment about it. Start at [`Twist`] and [`adjoint`]. Not here: joints, trees.
 //!
 //! Source: [Featherstone 2008], chapter 2, with linear and angular parts exchanged.
 
@@ -15,7 +15,7 @@ use crate::real::Real;
 /// Pose `X_AB` of frame B in frame A, as rotation matrix and translation (m). `p_A = X_AB * p_B`.
 pub type Pose<T = f64> = IsometryMatrix3<T>;
 
-/// `X_AC = X_AB X_BC`.
+/// Composition `X_AC = X_AB X_BC`.
 #[inline(always)]
 pub fn composed(X_AB: &Pose, X_BC: &Pose) -> Pose {
     let R = X_AB.rotation.matrix();
@@ -44,7 +44,7 @@ pub struct Wrench<T: Scalar = f64> {
 macro_rules! pair_algebra {
     ($type:ident, $first:ident, $second:ident) => {
         impl<T: Real> $type<T> {
-            /// From the two parts.
+            /// Creates it from its two parts.
             #[inline(always)]
             pub fn new($first: Vector3<T>, $second: Vector3<T>) -> Self {
                 Self { $first, $second }
@@ -54,13 +54,13 @@ macro_rules! pair_algebra {
             pub fn zeros() -> Self {
                 Self { $first: Vector3::zeros(), $second: Vector3::zeros() }
             }
-            /// As one 6-vector, linear first.
+            /// Converts to a 6-vector, linear part first.
             #[inline(always)]
             pub fn to_vector(&self) -> Vector6<T> {
                 let (a, b) = (&self.$first, &self.$second);
                 Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z)
             }
-            /// From one 6-vector, linear first.
+            /// Converts from a 6-vector, linear part first.
             #[inline(always)]
             pub fn from_vector(v: &Vector6<T>) -> Self {
                 Self { $first: Vector3::new(v[0], v[1], v[2]), $second: Vector3::new(v[3], v[4], v[5]) }
@@ -118,21 +118,21 @@ impl<T: Real> Twist<T> {
         dot(&self.linear, &F.force) + dot(&self.angular, &F.torque)
     }
 
-    /// Motion cross product `V × U`: the rate of `U` when it is carried along by `V`.
+    /// Motion cross product `V × U`: time derivative of `U` when it moves with `V`.
     #[inline(always)]
     pub fn cross(&self, U: &Twist<T>) -> Twist<T> {
         let (v, w) = (&self.linear, &self.angular);
         Twist::new(add(&cross(w, &U.linear), &cross(v, &U.angular)), cross(w, &U.angular))
     }
 
-    /// Force cross product `V ×* F`: the rate of `F` when it is carried along by `V`.
+    /// Force cross product `V ×* F`: time derivative of `F` when it moves with `V`.
     #[inline(always)]
     pub fn cross_force(&self, F: &Wrench<T>) -> Wrench<T> {
         let (v, w) = (&self.linear, &self.angular);
         Wrench::new(cross(w, &F.force), add(&cross(w, &F.torque), &cross(v, &F.force)))
     }
 
-    /// `Ad_BA V_A`: the same motion seen at Bo in B axes, for `X_AB` (B fixed in A's body).
+    /// `Ad_BA V_A`: the same motion at Bo in B axes, for `X_AB` (B fixed to A's body).
     #[inline(always)]
     pub fn at_child(&self, X_AB: &Pose<T>) -> Twist<T> {
         let R = X_AB.rotation.matrix();
@@ -140,7 +140,7 @@ impl<T: Real> Twist<T> {
         Twist::new(tr_mul(R, &add(&self.linear, &cross(&self.angular, p))), tr_mul(R, &self.angular))
     }
 
-    /// The inverse of [`Twist::at_child`]: from Bo, B axes to Ao, A axes.
+    /// Inverse of [`Twist::at_child`]: from Bo, B axes to Ao, A axes.
     #[inline(always)]
     pub fn at_parent(&self, X_AB: &Pose<T>) -> Twist<T> {
         let R = X_AB.rotation.matrix();
@@ -158,7 +158,7 @@ impl<T: Real> Wrench<T> {
         Wrench::new(force, add(&mul(R, &self.torque), &cross(&X_AB.translation.vector, &force)))
     }
 
-    /// The inverse of [`Wrench::at_parent`]: from Ao, A axes to Bo, B axes.
+    /// Inverse of [`Wrench::at_parent`]: from Ao, A axes to Bo, B axes.
     #[inline(always)]
     pub fn at_child(&self, X_AB: &Pose<T>) -> Wrench<T> {
         let R = X_AB.rotation.matrix();
@@ -176,7 +176,7 @@ pub fn skew<T: Real>(r: &Vector3<T>) -> Matrix3<T> {
 
 /// `Ad_AB = [[R, [p]x R], [0, R]]` for `X_AB`: maps a twist from B to A.
 ///
-/// Wrenches go the other way with the transpose: `F_B = Ad_ABᵀ F_A`.
+/// Wrenches transform in the opposite direction with the transpose: `F_B = Ad_ABᵀ F_A`.
 pub fn adjoint(X_AB: &Pose) -> Matrix6<f64> {
     let R = X_AB.rotation.matrix();
     let mut Ad = Matrix6::zeros();
@@ -186,7 +186,7 @@ pub fn adjoint(X_AB: &Pose) -> Matrix6<f64> {
     Ad
 }
 
-/// Spatial inertia `M_BBo_B` of a rigid body about Bo, in B axes, by its ten parameters.
+/// Spatial inertia `M_BBo_B` of a rigid body about Bo, in B axes, given by ten parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpatialInertia<T: Scalar = f64> {
     /// Mass m (kg).
@@ -198,13 +198,13 @@ pub struct SpatialInertia<T: Scalar = f64> {
 }
 
 impl SpatialInertia {
-    /// No mass at all.
+    /// Zero inertia.
     pub fn zeros() -> Self {
         Self { mass: 0.0, first_moment: Vector3::zeros(), rotational: Matrix3::zeros() }
     }
 
-    /// From mass (kg), centre of mass `p_BoBcm_B` (m) and inertia about the centre of mass, in B
-    /// axes (kg m²).
+    /// Creates it from mass (kg), centre of mass `p_BoBcm_B` (m) and inertia about the centre of
+    /// mass, in B axes (kg m²).
     pub fn from_com(mass: f64, com: &Vector3<f64>, inertia_com: &Matrix3<f64>) -> Self {
         let c = skew(com);
         Self { mass, first_moment: com * mass, rotational: inertia_com - c * c * mass }
@@ -221,7 +221,7 @@ impl SpatialInertia {
         self.rotational + c * c * self.mass
     }
 
-    /// As a 6×6 matrix, linear first: `[[m 1, -[h]x], [[h]x, I]]`.
+    /// Converts to a 6×6 matrix, linear part first: `[[m 1, -[h]x], [[h]x, I]]`.
     pub fn to_matrix(&self) -> Matrix6<f64> {
         let h = skew(&self.first_moment);
         let mut M = Matrix6::zeros();
@@ -244,20 +244,20 @@ impl<T: Real> SpatialInertia<T> {
         )
     }
 
-    /// The same body about Ao in A axes, for `X_AB`.
+    /// Inertia of the same body about Ao in A axes, for `X_AB`.
     #[inline(always)]
     pub fn at_parent(&self, X_AB: &Pose<T>) -> SpatialInertia<T> {
         self.turned(X_AB.rotation.matrix()).shifted(&X_AB.translation.vector)
     }
 
-    /// In A axes, for `R_AB`.
+    /// Inertia in A axes, for `R_AB`.
     #[inline(always)]
     pub fn turned(&self, R: &Matrix3<T>) -> SpatialInertia<T> {
         let Self { mass, first_moment, rotational } = self;
         SpatialInertia { mass: *mass, first_moment: mul(R, first_moment), rotational: turn_symmetric(R, rotational) }
     }
 
-    /// About a point p before this one.
+    /// Inertia about another point, relative to which the current point is at p.
     #[inline(always)]
     pub fn shifted(&self, p: &Vector3<T>) -> SpatialInertia<T> {
         let h = &self.first_moment;
@@ -274,7 +274,7 @@ impl<T: Real> SpatialInertia<T> {
         }
     }
 
-    /// Inertia of a constant body in the scalar of a recursion.
+    /// Converts a constant inertia to the scalar type of a recursion.
     #[inline(always)]
     pub fn lift(constant: &SpatialInertia) -> Self {
         let SpatialInertia { mass, first_moment, rotational } = constant;
@@ -291,7 +291,7 @@ impl<T: Real> AddAssign for SpatialInertia<T> {
     }
 }
 
-/// Articulated-body inertia: the symmetric 6×6 `[[A, B], [Bᵀ, C]]` by its three blocks.
+/// Articulated-body inertia: symmetric 6×6 matrix `[[A, B], [Bᵀ, C]]` stored as three blocks.
 #[derive(Clone, Copy, Debug)]
 pub struct ArticulatedInertia {
     /// Linear-linear block.
@@ -303,7 +303,7 @@ pub struct ArticulatedInertia {
 }
 
 impl ArticulatedInertia {
-    /// The articulated inertia of a single rigid body.
+    /// Articulated inertia of a single rigid body.
     #[inline(always)]
     pub fn from_rigid(M: &SpatialInertia) -> Self {
         Self { linear: Matrix3::from_diagonal_element(M.mass), coupling: -skew(&M.first_moment), angular: M.rotational }
@@ -328,7 +328,7 @@ impl ArticulatedInertia {
         self.angular -= outer(&t, &F.torque);
     }
 
-    /// The same inertia at Ao in A axes, for `X_AB`.
+    /// Inertia about Ao in A axes, for `X_AB`.
     #[inline(always)]
     pub fn at_parent(&self, X_AB: &Pose) -> Self {
         let R = X_AB.rotation.matrix();
@@ -342,7 +342,7 @@ impl ArticulatedInertia {
         Self { linear, coupling, angular }
     }
 
-    /// As a 6×6 matrix, linear first.
+    /// Converts to a 6×6 matrix, linear part first.
     #[inline]
     pub fn to_matrix(&self) -> Matrix6<f64> {
         let mut M = Matrix6::zeros();
@@ -400,19 +400,19 @@ mod tests {
         assert_relative_eq!(composed(&X, &X).to_homogeneous(), (X * X).to_homogeneous(), epsilon = 1e-13);
     }
 
-    /// Power is the same wherever it is reckoned; measured 2e-16.
+    /// Power does not depend on the reference point and axes; measured 2e-16.
     #[test]
     fn power_does_not_depend_on_the_frame() {
         let (X, V) = (pose(), twist());
         let F = inertia().mul_twist(&twist());
         let here = V.power(&F);
         assert_relative_eq!(V.at_parent(&X).power(&F.at_parent(&X)), here, epsilon = 1e-13);
-        // and the two cross products are adjoint: (V × U)ᵀ F = -Uᵀ (V ×* F)
+        // The two cross products are adjoint: (V × U)ᵀ F = -Uᵀ (V ×* F).
         let U = Twist::new(vector![0.3, 0.2, -0.1], vector![-0.5, 0.6, 0.1]);
         assert_relative_eq!(V.cross(&U).power(&F), -U.power(&V.cross_force(&F)), epsilon = 1e-13);
     }
 
-    /// Truth: the velocity of a point of a rigid body, `v_B = v_A + w × p_AB`, in turned axes.
+    /// Truth: velocity of a point of a rigid body, `v_B = v_A + w × p_AB`, in rotated axes.
     #[test]
     fn adjoint_carries_a_rigid_displacement() {
         let R_BA = Rotation3::from_euler_angles(0.3, -0.8, 1.9);

@@ -1,4 +1,5 @@
-//! What does a query for all solutions cost, by class, beside the numerical iteration for one?
+//! What does a query for all solutions cost, by class, compared with the numerical iteration for
+//! one?
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 #![allow(non_snake_case, reason = "monogram notation")]
 

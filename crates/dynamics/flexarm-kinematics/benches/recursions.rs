@@ -1,8 +1,8 @@
-//! What does one call of each recursion cost on the reference arm, rigid (6), flexible (18) and
-//! with three elastic joints a link (42)?
+//! What does one call of each recursion cost on the reference arm: rigid (6 coordinates), flexible
+//! (18) and with three elastic joints per link (42)?
 //!
-//! `tools/pinocchio_bench.sh` has Pinocchio's C++ and the example `recursion_times` on the same
-//! models in turn.
+//! `tools/pinocchio_bench.sh` runs Pinocchio's C++ and the example `recursion_times` alternately on
+//! the same models.
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
@@ -20,7 +20,7 @@ struct Case {
     qddot: Vec<DVector<f64>>,
 }
 
-/// 64 random states like those of the comparison bench.
+/// 64 random states, as in the comparison benchmark.
 fn case(mut tree: Mechanism) -> Case {
     for joint in &mut tree.joints {
         if let JointKind::Elastic(angles) = &mut joint.kind {

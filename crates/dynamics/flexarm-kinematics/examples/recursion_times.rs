@@ -1,7 +1,8 @@
-//! Times of our recursions per call, in ns, as `tools/pinocchio_bench.sh` sets them beside
-//! Pinocchio's: `cargo run --release --workspace --example recursion_times`
+//! Time per call of the recursions, in ns, for comparison with Pinocchio in
+//! `tools/pinocchio_bench.sh`: `cargo run --release --workspace --example recursion_times`
 //!
-//! 64 random states, 101 batches of 1000 calls; CSV build,model,function,minimum_ns,median_ns.
+//! 64 random states, 101 batches of 1000 calls; CSV columns
+//! build,model,function,minimum_ns,median_ns.
 #![allow(clippy::print_stdout, clippy::unwrap_used, non_snake_case, reason = "an example; monogram notation")]
 
 use std::hint::black_box;
@@ -71,7 +72,7 @@ fn main() {
         let (mut qddot, mut f) = (a[0].clone(), a[1].clone());
         time_calls(name, "hybrid", |i| {
             hybrid_dynamics(&model, &mut data, black_box(&states[i]), &prescribed, &mut qddot, &mut f);
-            // What is used again stays bounded.
+            // Keeps the reused inputs bounded.
             qddot[6] *= 1e-9;
             f.fill(0.1);
         });

@@ -1,10 +1,10 @@
-//! Forward and hybrid dynamics by articulated bodies, O(n).
+//! Forward and hybrid dynamics by the articulated body algorithm, O(n).
 //!
-//! Every joint is either free (its force is given, its acceleration wanted) or prescribed (the
-//! other way round). A free elastic joint has a square, invertible motion subspace: it passes on
-//! exactly its own wrench and no inertia, so the tree falls apart there and each piece is solved by
-//! itself. A modal body gathers what its interfaces carry into `H` over its frame and its n
-//! coordinates and eliminates the latter:
+//! Every joint is either free (force given, acceleration unknown) or prescribed (acceleration
+//! given, force unknown). A free elastic joint has a square, invertible motion subspace: it
+//! transmits its own wrench and no inertia. The tree therefore decouples there and each piece is
+//! solved separately. A modal body accumulates the contributions of its interfaces in `H`, over its
+//! frame and its n coordinates, and eliminates the latter:
 //!
 //! ```text
 //! [ I_rr  H_rη ] [ A ]   [ p_r ]   [ F ]
@@ -23,19 +23,19 @@ use crate::data::{Data, State, add_projection, begin, joint_motion, subspace_tim
 use crate::model::{Body, JointMotion, Model};
 use crate::rnea::nonlinear_effects;
 
-/// Which joints are prescribed; the rest are free.
+/// Set of prescribed joints; all others are free.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Roles {
     pub(crate) prescribed_body: Vec<bool>,
     prescribed_modal: Vec<bool>,
     free_coordinates: Vec<usize>,
-    /// A free coordinate moves several joints, by mimicry or over closed loops: the recursion does
-    /// not apply, the mass matrix does.
+    /// Whether a free coordinate moves several joints (mimic joints, closed loops) or has a coupled
+    /// rotor: the mass matrix is then used instead of the recursion.
     dense: bool,
 }
 
 impl Roles {
-    /// Nothing prescribed.
+    /// All joints free.
     pub fn all_free(model: &Model) -> Self {
         Self::new(model, |_| false)
     }
@@ -45,7 +45,8 @@ impl Roles {
         Self::new(model, |k| k < model.n_actuated())
     }
 
-    /// Coordinates for which `prescribed(index)` holds; those of an elastic group follow its first.
+    /// Prescribes the coordinates for which `prescribed(index)` holds; an elastic group follows its
+    /// first coordinate.
     pub fn new(model: &Model, prescribed: impl Fn(usize) -> bool) -> Self {
         let mut roles = Self {
             prescribed_body: vec![false; model.bodies.len()],
@@ -54,7 +55,7 @@ impl Roles {
             dense: false,
         };
         for (i, body) in model.bodies.iter().enumerate().skip(1) {
-            // Interfaces and welds have no coordinate of their own.
+            // Interfaces and welded joints have no coordinate of their own.
             let own = !matches!(body.motion, JointMotion::Interface { .. } | JointMotion::Welded);
             roles.prescribed_body[i] = own && prescribed(body.coordinate);
         }
@@ -64,7 +65,7 @@ impl Roles {
                 roles.free_coordinates.extend(first..first + size);
                 let moves = |b: &&Body| b.coordinate == first && !matches!(b.motion, JointMotion::Interface { .. });
                 roles.dense |= model.bodies[1..].iter().filter(moves).count() > 1;
-                // A rotor that turns with two joints is on no branch of the tree.
+                // A rotor driven by two joints couples different branches of the tree.
                 roles.dense |= model.rotor_couplings.iter().any(|(a, b, _)| *a == first || *b == first);
             }
         }
@@ -78,11 +79,11 @@ impl Roles {
     }
 }
 
-/// Accelerations q̈ for the generalised forces `tau` (all joints free). Fills
+/// Computes accelerations q̈ for the generalised forces `tau`, with all joints free. Fills
 /// `data.{X_PB, V, A, qddot}`.
 ///
-/// O(n), no allocation; with mimic joints O(n³) by the mass matrix. Accelerations are NaN where a
-/// mass matrix is not positive definite.
+/// O(n), no allocation; O(n³) via the mass matrix for mimic joints, coupled rotors and closed
+/// loops. Accelerations are NaN where a mass matrix is not positive definite.
 pub fn forward_dynamics<'d>(
     model: &Model,
     data: &'d mut Data,
@@ -95,12 +96,13 @@ pub fn forward_dynamics<'d>(
     &data.qddot
 }
 
-/// Free accelerations and prescribed forces.
+/// Computes the accelerations of free joints and the forces of prescribed ones.
 ///
 /// On entry `qddot` holds the accelerations of the prescribed coordinates and `tau` the forces of
-/// the free ones; on return both are complete. External wrenches in `data.F_ext` and balancers act.
-/// Fills `data.{X_PB, V, A}`. O(n), no allocation (dense where a free coordinate is mimicked).
-/// Accelerations are NaN where a mass matrix is not positive definite.
+/// the free ones; on return both are complete. Includes external wrenches in `data.F_ext` and
+/// balancers. Fills `data.{X_PB, V, A}`. O(n), no allocation; dense if a free coordinate has mimic
+/// joints or coupled rotors, or with closed loops. Accelerations are NaN where a mass matrix is not
+/// positive definite.
 pub fn hybrid_dynamics(
     model: &Model,
     data: &mut Data,
@@ -127,7 +129,7 @@ fn solve(model: &Model, data: &mut Data, state: &State, roles: &Roles) {
             true => solve_articulated(model, data, q, qdot, roles),
             false => solve_with_balancers(model, data, q, qdot, roles),
         }
-        // Here both joints of a coupling are prescribed.
+        // In this branch both joints of a rotor coupling are prescribed.
         for &(a, b, inertia) in &model.rotor_couplings {
             data.tau[a] += inertia * data.qddot[b];
             data.tau[b] += inertia * data.qddot[a];
@@ -135,8 +137,8 @@ fn solve(model: &Model, data: &mut Data, state: &State, roles: &Roles) {
     }
 }
 
-/// Apart, so that arms without balancers have the recursion alone in their loops. What a balancer
-/// puts on its joint comes to the given forces, and off those that are asked for.
+/// Separate function, to keep balancers out of the loops of arms without them. The force of a
+/// balancer on its joint is added to the given joint forces and subtracted from the computed ones.
 #[inline(never)]
 fn solve_with_balancers(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], roles: &Roles) {
     with_lines(model, data, q, |data| {
@@ -146,8 +148,8 @@ fn solve_with_balancers(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64],
     });
 }
 
-/// Articulated bodies in three passes. For body B with parent P, each quantity at its own origin,
-/// in its own axes; S, V and A as in `rnea.rs`:
+/// Articulated body algorithm in three passes. For body B with parent P, each quantity at its own
+/// origin, in its own axes; S, V and A as in `rnea.rs`:
 ///
 /// ```text
 /// outward   V_WB = Ad_BP V_WP + S q̇                              (1)  [Featherstone 2008, Table 7.1]
@@ -159,7 +161,7 @@ fn solve_with_balancers(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64],
 /// outward   A' = Ad_BP A_P + c                                   (7)  A_0 = -g
 ///           q̈  = (u - Uᵀ A')/d,   A_B = A' + S q̈                 (8)  prescribed: τ = Sᵀ (I_A A' + p_A), A_B = A'
 /// ```
-/// The S of a free elastic joint is square. It passes its own wrench and no inertia:
+/// The S of a free elastic joint is square. The joint transmits its own wrench and no inertia:
 ///
 /// ```text
 /// inward    F = S^-T τ,   p_a = F,   I_a = 0                     (9)
@@ -179,7 +181,7 @@ fn solve_articulated(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], ro
     finish_bodies(model, data, roles);
 }
 
-/// Outward: poses, velocities and the body's own inertia and forces, (1) to (3).
+/// Outward pass: poses, velocities and the body's own inertia and bias forces, (1) to (3).
 #[inline(always)]
 fn begin_bodies(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], roles: &Roles) {
     data.V[0] = Twist::zeros();
@@ -207,7 +209,7 @@ fn begin_bodies(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], roles: 
     }
 }
 
-/// Inward: what body i passes to its parent through the joint, (4) to (6) and (9).
+/// Inward pass: inertia and force transmitted by body i to its parent, (4) to (6) and (9).
 #[inline(always)]
 fn pass_inward(model: &Model, data: &mut Data, i: usize, roles: &Roles) {
     let body = &model.bodies[i];
@@ -251,10 +253,10 @@ fn pass_inward(model: &Model, data: &mut Data, i: usize, roles: &Roles) {
     }
 }
 
-/// Outward: accelerations of free joints and forces of prescribed ones, (7), (8) and (10).
+/// Outward pass: accelerations of free joints and forces of prescribed ones, (7), (8) and (10).
 #[inline(always)]
 fn finish_bodies(model: &Model, data: &mut Data, roles: &Roles) {
-    // A coordinate may move several joints: their forces add up.
+    // A coordinate may move several joints, so forces are summed from zero.
     for (i, &is_prescribed) in roles.prescribed_body.iter().enumerate().skip(1) {
         if is_prescribed {
             data.tau[model.bodies[i].coordinate] = 0.0;
@@ -290,7 +292,7 @@ fn finish_bodies(model: &Model, data: &mut Data, roles: &Roles) {
     }
 }
 
-/// Outward over a free elastic joint: the accelerations of its six coordinates and that of body i,
+/// Outward step over a free elastic joint: accelerations of its six coordinates and of body i,
 /// (10).
 #[inline(always)]
 fn free_elastic(data: &mut Data, i: usize, k: usize, A: &Twist) -> Twist {
@@ -304,7 +306,7 @@ fn free_elastic(data: &mut Data, i: usize, k: usize, A: &Twist) -> Twist {
     A_B
 }
 
-/// Outward: own inertia and velocity terms of the modal body m on body i.
+/// Outward step: own inertia and velocity terms of modal body m, which is body i.
 #[inline(always)]
 fn begin_modal(model: &Model, data: &mut Data, i: usize, m: usize, qdot: &[f64]) {
     let entry = &model.modal[m];
@@ -317,7 +319,8 @@ fn begin_modal(model: &Model, data: &mut Data, i: usize, m: usize, qdot: &[f64])
     }
 }
 
-/// Inward: what hangs on interface body i, over the frame and the coordinates of its modal body.
+/// Inward step: adds articulated inertia and bias of interface body i to the frame and coordinates
+/// of its modal body.
 #[inline(always)]
 fn gather_interface(model: &Model, data: &mut Data, i: usize, m: usize, interface: usize) {
     let (entry, S, X_PB) = (&model.modal[m], data.elastic[i], data.X_PB[i]);
@@ -337,7 +340,7 @@ fn gather_interface(model: &Model, data: &mut Data, i: usize, m: usize, interfac
     data.pA[parent] += p.at_parent(&X_PB);
 }
 
-/// Inward: takes the coordinates of the modal body out of the articulated inertia of body i.
+/// Inward step: eliminates the modal coordinates from the articulated inertia of body i.
 #[inline(always)]
 fn eliminate_modal(model: &Model, data: &mut Data, i: usize, m: usize, prescribed: bool) {
     let (entry, modal) = (&model.modal[m], &mut data.modal[m]);
@@ -355,6 +358,7 @@ fn eliminate_modal(model: &Model, data: &mut Data, i: usize, m: usize, prescribe
         data.pA[i] = data.pA[i] * f64::NAN;
         return;
     };
+    // H_ηη^-1 [H_ηr, τ - p_η].
     for (k, F) in modal.columns.iter().enumerate() {
         let (f, t) = (&F.force, &F.torque);
         for (c, value) in [f.x, f.y, f.z, t.x, t.y, t.z].into_iter().enumerate() {
@@ -363,6 +367,7 @@ fn eliminate_modal(model: &Model, data: &mut Data, i: usize, m: usize, prescribe
         modal.solved[(k, 6)] = data.tau[entry.coordinate + k] - modal.f[k];
     }
     factor.solve_mut(&mut modal.solved);
+    // I_A = I_rr - H_rη H_ηη^-1 H_ηr,  p_A = p_r + H_rη H_ηη^-1 (τ - p_η).
     let I = &mut data.articulated[i];
     for (k, F) in modal.columns.iter().enumerate() {
         let s = |c: usize| modal.solved[(k, c)];
@@ -375,7 +380,7 @@ fn eliminate_modal(model: &Model, data: &mut Data, i: usize, m: usize, prescribe
     modal.factor = Some(factor);
 }
 
-/// Outward: accelerations of the coordinates of the modal body, or the forces they need.
+/// Outward step: accelerations of the modal coordinates, or their forces if prescribed.
 #[inline(always)]
 fn finish_modal(model: &Model, data: &mut Data, i: usize, m: usize, prescribed: bool) {
     let (entry, modal, A) = (&model.modal[m], &data.modal[m], data.A[i]);
@@ -392,7 +397,8 @@ fn finish_modal(model: &Model, data: &mut Data, i: usize, m: usize, prescribed: 
     }
 }
 
-/// Inward step over a free one-DoF joint: what it passes to the parent, in B axes.
+/// Inward step over a free single-DoF joint: inertia and force transmitted to the parent, in B
+/// axes.
 #[inline(always)]
 fn one_dof_inward(
     data: &mut Data,
@@ -412,18 +418,18 @@ fn one_dof_inward(
     (Some(I), pA + I.mul_twist(c) + U * (u * inverse_d))
 }
 
-/// `F_B = S^-T τ`: the wrench that a free elastic joint puts on B, in B axes.
+/// `F_B = S^-T τ`: wrench exerted on B by a free elastic joint, in B axes.
 #[inline(always)]
 fn elastic_wrench(data: &Data, i: usize, k: usize) -> Wrench {
     let S = &data.elastic[i];
     let tau = data.tau.as_slice();
-    // L is a rotation: L^-T = L.
+    // L is a rotation, so L^-T = L.
     let force = mul(&S.L, &Vector3::new(tau[k], tau[k + 1], tau[k + 2]));
     let torque = tr_mul(&inverse_3x3(&S.B), &Vector3::new(tau[k + 3], tau[k + 4], tau[k + 5]));
     Wrench::new(force, torque)
 }
 
-/// Inverse by cofactors.
+/// Inverse of a 3×3 matrix by cofactors.
 #[inline(always)]
 fn inverse_3x3(B: &Matrix3<f64>) -> Matrix3<f64> {
     let (a, b, c) = (B.column(0).into_owned(), B.column(1).into_owned(), B.column(2).into_owned());
@@ -442,7 +448,8 @@ fn solve_inertia(I: &ArticulatedInertia, F: &Wrench) -> Twist {
     Twist::new(mul(&linear_inverse, &F.force) - mul(&G, &angular), angular)
 }
 
-/// `M_ff q̈_f = τ_f - bias_f - M_fp q̈_p` by Cholesky; then the prescribed forces from RNEA.
+/// Solves `M_ff q̈_f = τ_f - bias_f - M_fp q̈_p` by Cholesky factorisation, then gets the
+/// prescribed forces from RNEA.
 fn solve_dense(model: &Model, data: &mut Data, state: &State, roles: &Roles) {
     let tau = data.tau.clone();
     let mut qddot = data.qddot.clone();

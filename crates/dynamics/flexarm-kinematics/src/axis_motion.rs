@@ -1,10 +1,10 @@
-//! Joints of one coordinate: everything that the recursions need to know of each.
+//! Single-DoF joints: all joint-specific parts of the recursions.
 //!
 //! The motion subspace of such a joint is a constant column in B (and in J) axes, `V_PB_B = S q̇`
-//! with `S = [l; a]`: no bias, no rate. What a recursion does with it is linear in S, so it says
-//! what a rotation and what a translation do ([`AxisMotion::linear`]), and this file says which of
-//! them a joint has. A new kind is a variant here, in [`AxisMotion::linear`] and in the two poses.
-//! Not here: elastic joints of six coordinates and interfaces (`data.rs`).
+//! with `S = [l; a]`: no bias, no rate. Recursions are linear in S, so they supply the result for a
+//! rotation and for a translation ([`AxisMotion::linear`]), and this file combines them by joint
+//! type. A new type needs a variant here, in [`AxisMotion::linear`] and in the two poses. Not here:
+//! six-DoF elastic joints and interfaces (`data.rs`).
 
 use std::ops::Add;
 
@@ -12,26 +12,25 @@ use flexarm_spatial::products::{add, add3, dot, lift, lift3, mul, scaled, scaled
 use flexarm_spatial::{Pose, Real, Twist, Wrench, skew};
 use nalgebra::{Matrix3, Rotation3, Vector3, Vector6};
 
-/// Motion of a joint with one coordinate; axes are unit vectors, with the same components in J and
-/// B axes.
+/// Motion of a single-DoF joint; axes are unit vectors, with the same components in J and B axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AxisMotion {
-    /// Rotation about the axis, rad.
+    /// Rotation about the axis (rad).
     Revolute(Vector3<f64>),
-    /// Translation along the axis, m.
+    /// Translation along the axis (m).
     Prismatic(Vector3<f64>),
-    /// Rotation about the axis, rad, which moves along it as a nut on a spindle does.
+    /// Rotation about the axis (rad) with a proportional translation along it, like a nut on a
+    /// spindle.
     Helical {
-        /// The axis.
+        /// Screw axis.
         axis: Vector3<f64>,
-        /// Translation per rad, m; the lead of the thread over 2π, positive for right-handed
-        /// threads.
+        /// Translation per rad (m): lead of the thread over 2π, positive for right-handed threads.
         pitch: f64,
     },
 }
 
 impl AxisMotion {
-    /// Unit vector of the joint.
+    /// Unit vector of the joint axis.
     #[inline(always)]
     pub fn axis(self) -> Vector3<f64> {
         match self {
@@ -39,12 +38,12 @@ impl AxisMotion {
         }
     }
 
-    /// Whether its coordinate is a length (m) and not an angle (rad).
+    /// Whether the coordinate is a length (m) rather than an angle (rad).
     pub fn slides(self) -> bool {
         matches!(self, Self::Prismatic(_))
     }
 
-    /// Translation along the axis per unit of the coordinate (m/rad or m/m).
+    /// Magnitude of the translation along the axis per unit of the coordinate (m/rad or m/m).
     pub fn travel(self) -> f64 {
         match self {
             Self::Revolute(_) => 0.0,
@@ -53,8 +52,8 @@ impl AxisMotion {
         }
     }
 
-    /// A linear map of `S`, from what it makes of a rotation about the axis and of a translation
-    /// along it.
+    /// Evaluates a linear map of `S` from its values for a rotation about the axis and for a
+    /// translation along it.
     #[inline(always)]
     pub(crate) fn linear<R: Add<Output = R>>(
         self,
@@ -81,8 +80,8 @@ impl AxisMotion {
         }
     }
 
-    /// `X_PB` at the joint value: the same as [`Self::pose`] behind `X_PJ`, from the table of the
-    /// rotation and the sine and cosine of the value (of joints that turn).
+    /// `X_PB` at the joint value: [`Self::pose`] outward of `X_PJ`, from the rotation table and the
+    /// sine and cosine of the value (for rotating joints).
     #[inline(always)]
     pub(crate) fn place<T: Real>(
         self,
@@ -131,7 +130,7 @@ impl AxisMotion {
         )
     }
 
-    /// `S` as six numbers, linear first.
+    /// `S` as a 6-vector, linear part first.
     pub fn column(self) -> Vector6<f64> {
         self.linear(
             |axis| Vector6::new(0.0, 0.0, 0.0, axis.x, axis.y, axis.z),
@@ -139,8 +138,8 @@ impl AxisMotion {
         )
     }
 
-    /// The coordinate of a small displacement `S q` (linear first): the inverse of [`Self::column`]
-    /// on its line.
+    /// Coordinate of a small displacement `S q` (linear part first): left inverse of
+    /// [`Self::column`].
     pub fn coordinate_of(self, displacement: &Vector6<f64>) -> f64 {
         let along = self.linear(
             |axis| axis.dot(&displacement.fixed_rows::<3>(3)),
@@ -153,13 +152,13 @@ impl AxisMotion {
     }
 }
 
-/// `R_PJ travel value`: where a translation leads, in P axes.
+/// Translation `R_PJ travel value` in P axes.
 #[inline(always)]
 fn shifted<T: Real>(X_PJ: &Pose, travel: &Vector3<f64>, value: T) -> Vector3<T> {
     scaled(&lift(&mul(X_PJ.rotation.matrix(), travel)), value)
 }
 
-/// `R_PB(q) = K0 + sin q K1 + cos q K2`: Rodrigues' formula with the placement multiplied in.
+/// `R_PB(q) = K0 + sin q K1 + cos q K2`: Rodrigues' formula including the joint placement.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RevoluteTable {
     K0: Matrix3<f64>,
@@ -174,7 +173,7 @@ impl RevoluteTable {
         Self { K0: R + R * A2, K1: R * A, K2: -(R * A2) }
     }
 
-    /// `R_PB` at the sine and cosine of the joint's angle.
+    /// `R_PB` for sine and cosine of the joint angle.
     #[inline(always)]
     pub(crate) fn at<T: Real>(&self, sine: T, cosine: T) -> Matrix3<T> {
         add3(&add3(&lift3(&self.K0), &scaled3(&lift3(&self.K1), sine)), &scaled3(&lift3(&self.K2), cosine))

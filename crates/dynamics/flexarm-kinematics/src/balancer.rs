@@ -1,15 +1,16 @@
-//! Balancers: forces that depend on where the arm is and on nothing else, as gravity does.
+//! Balancers: forces that depend only on the configuration, like gravity.
 //!
-//! A balancer acts along the line between two points of the arm, or over one joint. It has one
-//! length x and the energy U(x) of its law:
+//! A balancer acts along the line between two points of the arm, or about one joint. It has a
+//! single length x, and its law has the energy U(x):
 //!
 //! ```text
 //! line:   x = |d|,  d = p_WTo - p_WFrom,  u = d/x      force on From  +T u,  on To  -T u      T = dU/dx: tension     (1)
 //!         ∂(T u)/∂d = k u uᵀ + (T/x) (1 - u uᵀ)                                               k = dT/dx              (2)
 //! joint:  x = Σ c_i q_i + x_0                           generalised force  -c_i T                                    (3)
 //! ```
-//! Laws: [`BalancerLaw`]. As part of the mechanism: [`Balancer`]. All recursions over one number
-//! know them, those of [`crate::lanes`] do not. Not here: files, friction in a cylinder, heat.
+//! Force laws: [`BalancerLaw`]; element of the mechanism: [`Balancer`]. All `f64` recursions
+//! include balancers, those of [`crate::lanes`] do not. Not here: files, friction in a cylinder,
+//! heat transfer.
 
 use std::collections::HashSet;
 
@@ -21,97 +22,96 @@ use crate::kinematics::place_bodies;
 use crate::mechanism::Mechanism;
 use crate::model::{Body, Frame, JointMotion, Model, ModelError};
 
-/// A balancer of a mechanism, by the names of what it acts on.
+/// Balancer of a mechanism; links and joints are given by name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Balancer {
     /// Unique name.
     pub name: String,
-    /// Where it acts.
+    /// Points or joint on which it acts.
     pub span: BalancerSpan,
-    /// How strong it is.
+    /// Force law.
     pub law: BalancerLaw,
 }
 
-/// Between what a balancer acts.
+/// Points or joint between which a balancer acts.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BalancerSpan {
-    /// Along the line between the origins of two links; frames on fixed joints follow the part of a
-    /// flexible link that carries them.
+    /// Along the line between the origins of two links. Frames on fixed joints move with the part
+    /// of a flexible link that carries them.
     Points {
-        /// Name of a link.
+        /// Name of the first link.
         from: String,
-        /// Name of another one.
+        /// Name of the second link.
         to: String,
     },
-    /// Over a joint of one coordinate, between its two links: springs of the drive within the joint
-    /// count.
+    /// About a single-DoF joint, between its two links; the value includes the deflection of drive
+    /// springs inside the joint.
     Joint {
         /// Name of the joint.
         joint: String,
-        /// Name of the link that it moves.
+        /// Name of the child link.
         child: String,
     },
 }
 
-/// Tension over length: energy, force and rate of a balancer.
+/// Force law: tension as a function of length, with energy and rate.
 ///
-/// x is the length of a line (m) or the value of a joint (rad or m), T its tension (N): positive
-/// draws the ends together, or the joint to lower values (N m or N).
+/// x is the length of a line (m) or the value of a joint (rad or m), T the tension (N, or N m about
+/// a rotating joint). Positive tension pulls the ends together, or the joint to lower values.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BalancerLaw {
     /// `T = preload + rate (x - free)`.
     Linear {
-        /// (N/m, N m/rad or N/m).
+        /// Spring rate (N/m, N m/rad or N/m).
         rate: f64,
-        /// Length, angle or place at which it has its preload (m, rad or m).
+        /// Length, angle or position at which the tension equals the preload (m, rad or m).
         free: f64,
-        /// (N or N m).
+        /// Preload (N or N m).
         preload: f64,
     },
-    /// A gas that is pressed together.
+    /// Gas spring.
     Gas(GasLaw),
-    /// `T = -amplitude sin(x - zero)`: what balances a weight on one joint.
+    /// `T = -amplitude sin(x - zero)`, which balances a weight on one joint.
     Sine {
-        /// Largest torque (N m).
+        /// Maximum torque (N m).
         amplitude: f64,
-        /// Where there is none (rad).
+        /// Angle of zero torque (rad).
         zero: f64,
     },
-    /// Through points.
+    /// Interpolated curve.
     Curve(BalancerCurve),
 }
 
 /// Gas under a piston, `p V^n` constant.
 ///
 /// ```text
-/// pulls:   T =   force v^-n - opposing,     v = 1 - slope (x - at)      longer: less room for the gas
-/// pushes:  T = -(force v^-n - opposing),    v = 1 + slope (x - at)      longer: more room
+/// pulls:   T =   force v^-n - opposing,     v = 1 - slope (x - at)    volume decreases with length
+/// pushes:  T = -(force v^-n - opposing),    v = 1 + slope (x - at)    volume increases with length
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GasLaw {
     /// Pressure times area of the piston at the length `at` (N).
     pub force: f64,
-    /// What acts on the other side of the piston, as ambient pressure does (N).
+    /// Force on the other side of the piston, such as from ambient pressure (N).
     pub opposing: f64,
-    /// Length at which the gas has that force (m).
+    /// Reference length (m).
     pub at: f64,
-    /// Area of the piston over the volume of the gas at that length (1/m).
+    /// Piston area over gas volume at the reference length (1/m).
     pub slope: f64,
-    /// n: 1 isothermal, 1.4 adiabatic for nitrogen.
+    /// Polytropic exponent n: 1 for isothermal, 1.4 for adiabatic nitrogen.
     pub exponent: f64,
-    /// Whether it pulls.
+    /// Whether it pulls its ends together; otherwise it pushes them apart.
     pub pulls: bool,
 }
 
 impl GasLaw {
-    /// Volume over that at `at`.
+    /// Gas volume relative to that at the length `at`.
     pub fn volume_ratio(&self, x: f64) -> f64 {
         let stretch = self.slope * (x - self.at);
         if self.pulls { 1.0 - stretch } else { 1.0 + stretch }
     }
 
-    /// Length at which the gas has no room left (m); infinite (either sign) where its volume is
-    /// without bounds.
+    /// Length at which the gas volume vanishes (m); infinite, with either sign, if `slope` is zero.
     pub fn end(&self) -> f64 {
         let reach = if self.slope > 0.0 { 1.0 / self.slope } else { f64::INFINITY };
         if self.pulls { self.at + reach } else { self.at - reach }
@@ -121,7 +121,7 @@ impl GasLaw {
         if self.pulls { 1.0 } else { -1.0 }
     }
 
-    /// `v^-n`, NaN where there is no room.
+    /// `v^-n`; NaN for a non-positive volume.
     fn rise(&self, x: f64) -> f64 {
         let v = self.volume_ratio(x);
         if v > 0.0 { v.powf(-self.exponent) } else { f64::NAN }
@@ -134,14 +134,14 @@ impl GasLaw {
         }
         let v = self.volume_ratio(x);
         let log = if v > 0.0 { v.ln() } else { f64::NAN };
-        // ∫ v^-n, without a pole at n = 1.
+        // ∫ v^-n, regular at n = 1.
         let work = if n == 1.0 { -log } else { ((1.0 - n) * log).exp_m1() / (n - 1.0) };
         self.force / self.slope * work - self.opposing * way
     }
 }
 
 impl BalancerLaw {
-    /// T at x (N, N m); NaN beyond the end of a gas.
+    /// Tension T at x (N, N m); NaN beyond the end of a gas spring.
     pub fn tension(&self, x: f64) -> f64 {
         match self {
             Self::Linear { rate, free, preload } => preload + rate * (x - free),
@@ -151,7 +151,7 @@ impl BalancerLaw {
         }
     }
 
-    /// dT/dx (N/m, N m/rad).
+    /// Rate dT/dx (N/m, N m/rad).
     pub fn rate(&self, x: f64) -> f64 {
         match self {
             Self::Linear { rate, .. } => *rate,
@@ -161,12 +161,12 @@ impl BalancerLaw {
         }
     }
 
-    /// U (J), the integral of T from a fixed place of the law.
+    /// Energy U (J), the integral of T from a reference point of the law.
     pub fn energy(&self, x: f64) -> f64 {
         match self {
             Self::Linear { rate, free, preload } => (preload + 0.5 * rate * (x - free)) * (x - free),
             Self::Gas(gas) => gas.energy(x),
-            // From the place where it balances: amplitude (cos - 1) without loss of digits.
+            // Relative to the balanced position: amplitude (cos - 1) without cancellation.
             Self::Sine { amplitude, zero } => -2.0 * amplitude * (0.5 * (x - zero)).sin().powi(2),
             Self::Curve(curve) => curve.at(x)[2],
         }
@@ -185,51 +185,51 @@ impl BalancerLaw {
     }
 }
 
-/// Tension through points: piecewise cubics with a continuous slope that never leave the range of
-/// their two points [Fritsch & Butland 1984]; beyond the first and the last point straight on.
+/// Interpolated tension: piecewise cubics with continuous slope and no overshoot between data
+/// points [Fritsch & Butland 1984]; linear extrapolation beyond the first and last point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BalancerCurve {
     x: Vec<f64>,
     T: Vec<f64>,
     slope: Vec<f64>,
-    /// Energy at the points from the first one on.
+    /// Energy at the data points, relative to the first.
     U: Vec<f64>,
 }
 
-/// Why points make no curve.
+/// Reason why points do not define a curve.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BalancerCurveError {
-    /// Nothing to go through.
+    /// Fewer than two points.
     #[error("a curve needs at least two points, found {found}")]
     TooFew {
-        /// How many there are.
+        /// Number of points.
         found: usize,
     },
-    /// NaN or infinite.
+    /// A value is NaN or infinite.
     #[error("point {number} of the curve has the entry {value}, expected finite numbers")]
     NotFinite {
-        /// Which, from 1.
+        /// Number of the point, from 1.
         number: usize,
-        /// The entry.
+        /// The value.
         value: f64,
     },
-    /// Not ascending.
+    /// The x values do not increase.
     #[error("after {before} comes {after}: the first numbers of the points must rise")]
     Order {
-        /// First number of a point.
+        /// x of a point.
         before: f64,
-        /// That of the next one.
+        /// x of the next point.
         after: f64,
     },
 }
 
 impl BalancerCurve {
-    /// Through points (x, T).
+    /// Builds the curve through points (x, T).
     ///
     /// # Errors
-    /// [`BalancerCurveError`] for fewer than two points, entries that are no numbers, and x that do
-    /// not rise.
+    /// [`BalancerCurveError`] for fewer than two points, non-finite values, or x values that are
+    /// not strictly increasing.
     pub fn new(points: &[[f64; 2]]) -> Result<Self, BalancerCurveError> {
         if points.len() < 2 {
             return Err(BalancerCurveError::TooFew { found: points.len() });
@@ -252,12 +252,12 @@ impl BalancerCurve {
         Ok(Self { x, T, slope, U })
     }
 
-    /// First and last x.
+    /// First and last x of the data points.
     pub fn range(&self) -> [f64; 2] {
         [self.x[0], self.x[self.x.len() - 1]]
     }
 
-    /// Tension, its slope and the energy from the first point on.
+    /// Tension, slope, and energy relative to the first point.
     fn at(&self, x: f64) -> [f64; 3] {
         let last = self.x.len() - 1;
         let straight = |k: usize| {
@@ -282,7 +282,7 @@ impl BalancerCurve {
     }
 }
 
-/// Slopes at the points: weighted harmonic means of the secants, zero at turning points [Fritsch &
+/// Slopes at the data points: weighted harmonic means of the secants, zero at extrema [Fritsch &
 /// Butland 1984].
 fn monotone_slopes(x: &[f64], T: &[f64]) -> Vec<f64> {
     let secants: Vec<f64> = (1..x.len()).map(|k| (T[k] - T[k - 1]) / (x[k] - x[k - 1])).collect();
@@ -304,53 +304,53 @@ fn monotone_slopes(x: &[f64], T: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// A balancer in its place on the tree.
+/// Balancer placed on the tree.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlacedBalancer {
-    /// Its name.
+    /// Name of the balancer.
     pub name: String,
-    /// Its law.
+    /// Force law.
     pub law: BalancerLaw,
-    /// Where it acts.
+    /// Points or joint on which it acts.
     pub place: BalancerPlace,
 }
 
-/// Where a balancer acts on the tree.
+/// Points or joint of the tree on which a balancer acts.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BalancerPlace {
-    /// Between two points: body and point in body axes from Bo (m).
+    /// Between two points: body, and position from Bo in body axes (m).
     Points([(usize, Vector3<f64>); 2]),
-    /// Over a joint.
+    /// About a joint.
     Joint {
-        /// c: coordinates and factors.
+        /// Coordinates and their factors c.
         terms: Vec<(usize, f64)>,
         /// `x_0` (rad or m).
         offset: f64,
         /// Body that carries the joint.
         parent: usize,
-        /// First body behind the joint, in whose axes the axis is constant.
+        /// First body outward of the joint; the axis is constant in its axes.
         body: usize,
-        /// Last body behind the springs of its drive.
+        /// Last body outward of the drive springs.
         child: usize,
-        /// Twist per unit of x, in axes of `body`.
+        /// Joint twist per unit of x, in axes of `body`.
         axis: Twist,
     },
 }
 
-/// A line at a pose: (1) and (2).
+/// Force and stiffness of a line balancer at given poses, (1) and (2).
 #[derive(Clone, Copy, Debug)]
 pub struct BalancerLine {
     /// The two bodies.
     pub bodies: [usize; 2],
-    /// The two points in their bodies (m).
+    /// Positions of the two ends in their bodies (m).
     pub p_B: [Vector3<f64>; 2],
-    /// The same in the world (m).
+    /// Positions of the two ends in the world (m).
     pub p_W: [Vector3<f64>; 2],
     /// Distance (m).
     pub length: f64,
-    /// Force on the first, world axes (N); the second has the opposite.
+    /// Force on the first end, world axes (N); the second end has the opposite force.
     pub F_W: Vector3<f64>,
-    /// (2), N/m.
+    /// Stiffness (2), world axes (N/m).
     pub K_W: Matrix3<f64>,
 }
 
@@ -362,7 +362,8 @@ impl BalancerLine {
         let (T, k) = (law.tension(length), law.rate(length));
         let bodies = ends.map(|(body, _)| body);
         let p_B = ends.map(|(_, p_B)| p_B);
-        // A spring that is free at zero length has a force there too: none, whatever its direction.
+        // At zero length with zero tension the direction is undefined, but the force is zero and
+        // the stiffness isotropic.
         if length == 0.0 && T == 0.0 {
             return Self { bodies, p_B, p_W, length, F_W: Vector3::zeros(), K_W: Matrix3::from_diagonal_element(k) };
         }
@@ -373,7 +374,7 @@ impl BalancerLine {
 }
 
 impl PlacedBalancer {
-    /// The line at these poses of the bodies, of a balancer between points.
+    /// Line at these body poses; `None` for a balancer about a joint.
     pub fn line(&self, X_WB: &[Pose]) -> Option<BalancerLine> {
         match &self.place {
             BalancerPlace::Points(ends) => Some(BalancerLine::new(&self.law, ends, X_WB)),
@@ -381,7 +382,7 @@ impl PlacedBalancer {
         }
     }
 
-    /// Its length (m), or the value of its joint (rad or m), at these poses and coordinates.
+    /// Length of the line (m) or value of the joint (rad or m) at these poses and coordinates.
     pub fn length(&self, X_WB: &[Pose], q: &[f64]) -> f64 {
         match &self.place {
             BalancerPlace::Points(ends) => BalancerLine::new(&self.law, ends, X_WB).length,
@@ -389,9 +390,8 @@ impl PlacedBalancer {
         }
     }
 
-    /// The wrenches that it puts on two bodies at their origins, in world axes, for a joint value
-    /// or length `x`; over a joint whose spring yields in six directions to first order in its
-    /// deflection.
+    /// Wrenches on the two bodies about their origins, in world axes, at length or joint value `x`.
+    /// About a joint with a six-DoF spring, they are exact to first order in its deflection.
     pub fn wrenches(&self, X_WB: &[Pose], x: f64) -> [(usize, Wrench); 2] {
         let at_origin = |body: usize, p_W: &Vector3<f64>, F: Vector3<f64>| {
             let arm = p_W - X_WB[body].translation.vector;
@@ -417,7 +417,7 @@ impl PlacedBalancer {
     }
 }
 
-/// Balancers of a mechanism on its bodies.
+/// Places the balancers of a mechanism on its bodies.
 ///
 /// # Errors
 /// [`ModelError::Duplicate`], [`ModelError::UnknownLink`] and [`ModelError::BadBalancer`].
@@ -463,8 +463,8 @@ pub(crate) fn place_balancers(
     Ok(placed)
 }
 
-/// The bodies from that of the child inward to that of the joint: each turns (or slides) by its
-/// share about the joint's axis.
+/// Sums over the bodies from `child` inward to that of the joint: each contributes its rotation (or
+/// translation) projected on the joint axis.
 fn over_joint(bodies: &[Body], joint: &str, child: usize) -> Option<BalancerPlace> {
     let first = bodies.iter().skip(1).position(|b| b.joint == joint)? + 1;
     let JointMotion::Axis(motion) = bodies[first].motion else { return None };
@@ -504,20 +504,20 @@ fn over_joint(bodies: &[Body], joint: &str, child: usize) -> Option<BalancerPlac
     })
 }
 
-/// Lengths and joint values at the poses in `data.X_WB`, for the energy.
+/// Computes lengths and joint values at the poses in `data.X_WB`, for [`energy`].
 pub(crate) fn measure(model: &Model, data: &mut Data, q: &[f64]) {
     for (x, balancer) in data.balanced.iter_mut().zip(&model.balancers) {
         *x = balancer.length(&data.X_WB, q);
     }
 }
 
-/// Energy of all balancers (J) where they were measured.
+/// Energy of all balancers (J) at the last measured lengths.
 pub(crate) fn energy(model: &Model, data: &Data) -> f64 {
     model.balancers.iter().zip(&data.balanced).map(|(balancer, x)| balancer.law.energy(*x)).sum()
 }
 
-/// A recursion with the balancers' lines among the external wrenches, which are the caller's again
-/// afterwards.
+/// Runs a recursion with the forces of line balancers added to the external wrenches; restores
+/// `data.F_ext` afterwards.
 pub(crate) fn with_lines(model: &Model, data: &mut Data, q: &[f64], run: impl FnOnce(&mut Data)) {
     place_bodies(model, data, q);
     measure(model, data, q);
@@ -534,7 +534,7 @@ pub(crate) fn with_lines(model: &Model, data: &mut Data, q: &[f64], run: impl Fn
     data.F_ext.copy_from_slice(&data.F_held);
 }
 
-/// `τ += factor c T`, (3): with 1 what holds the joints against their balancers.
+/// `τ += factor c T`, (3): with factor 1 the forces that hold the joints against their balancers.
 pub(crate) fn add_joint_torques(model: &Model, data: &mut Data, factor: f64) {
     for (balancer, x) in model.balancers.iter().zip(&data.balanced) {
         if let BalancerPlace::Joint { terms, .. } = &balancer.place {

@@ -1,9 +1,9 @@
-//! Closed chains: planar loops of links that a pin closes, as dependent joints of the tree.
+//! Closed chains: planar loops closed by a pin, treated as dependent joints of the tree.
 //!
-//! A pin on link A goes through an eye of link B. In the plane of the loop these are two equations,
-//! and two joints of the loop follow from them; the tree of the other coordinates is what all
-//! algorithms see. With `p_AB` the place of the eye seen from A and E the two axes of A across the
-//! pin, q the independent coordinates and q_d the dependent ones:
+//! A pin on link A passes through an eye of link B. In the plane of the loop this gives two
+//! equations, which determine two joints of the loop. All algorithms see only the tree of the
+//! independent coordinates. `p_AB` is the position of the eye relative to A, E the two axes of A
+//! perpendicular to the pin, q the independent and q_d the dependent coordinates:
 //!
 //! ```text
 //! c(q, q_d) = Eᵀ p_AB = 0                                                     position             (1)
@@ -12,15 +12,15 @@
 //! τ   = τ_t + Tᵀ τ_d    M = [1; T]ᵀ M_t [1; T]                                 virtual work         (4)
 //! ∂τ/∂q = [1; T]ᵀ (∂τ_t/∂q_t) [1; T] + Σ_d τ_d ∂²q_d/∂q²                       statics              (5)
 //! ```
-//! τ_t and M_t are those of the opened tree with all its coordinates, from the same recursions as
-//! everywhere. The links of a loop make a triangle of the two dependent joints and the pin, whose
-//! sides follow from the independent coordinates: (1) has two solutions in closed form, the two
-//! ways to assemble it, and which of them a loop has stays what it was where it was built. From
-//! there Newton's method on (1) brings what links bend out of the plane, and the last digits. So
-//! q_d depends on q alone, never on what was before.
+//! τ_t and M_t belong to the opened tree with all its coordinates and come from the ordinary
+//! recursions. The two dependent joints and the pin form a triangle whose sides follow from the
+//! independent coordinates. (1) therefore has two closed-form solutions, the two assembly modes; a
+//! loop keeps the mode in which it was built. Newton's method on (1) starts from the closed form
+//! and adds the effect of out-of-plane deflection and the last digits. Hence q_d is a function of q
+//! only and does not depend on the history.
 //!
-//! Loops may rest on each other: the dependent joints of one may be in another. They are solved one
-//! after another. Not here: where the loops of a robot file come from, springs.
+//! Loops may depend on each other: dependent joints of one loop may be part of another. They are
+//! solved in sequence. Not here: reading loops from robot files, springs.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -34,64 +34,64 @@ use crate::mechanism::Mechanism;
 use crate::model::{Body, Frame, JointMotion, Model, ModelError};
 use crate::rnea::balanced;
 
-/// Axes that differ by more than this are not of one plane (rad).
+/// Angular tolerance on joint axes being parallel or perpendicular to the pin axis (rad).
 pub const LOOP_AXIS_TOLERANCE_RAD: f64 = 1e-6;
-/// A loop that is built with its links nearer to a line than this cannot be told from its mirror
-/// image (rad).
+/// Minimum angle between the two columns of J_d at assembly (rad). Nearer to a dead point, the loop
+/// cannot be distinguished from its mirror image.
 const DEAD_RAD: f64 = 1e-4;
-/// Newton iterations after the closed form: one shows that it was right, elastic links take three
-/// or four.
+/// Maximum number of Newton iterations after the closed form. Rigid links need one as confirmation,
+/// flexible links three or four.
 const MOST_ITERATIONS: usize = 12;
 
-/// A pin that closes a chain of links in a plane: an eye on one link stays on the axis of a pin on
-/// another one.
+/// Pin joint that closes a chain of links in a plane: the eye on one link stays on the axis of the
+/// pin on another.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoopClosure {
     /// Unique name.
     pub name: String,
-    /// Name of the link whose origin the pin goes through.
+    /// Name of the link whose origin is on the pin axis.
     pub pin: String,
-    /// Axis of the pin, in the frame of that link.
+    /// Axis of the pin, in the frame of the `pin` link.
     pub axis: Unit<Vector3<f64>>,
     /// Name of the link whose origin is the eye.
     pub eye: String,
-    /// The two joints of the loop that follow from the others.
+    /// The two joints of the loop that are determined by the others.
     pub dependent: [String; 2],
-    /// Joint values near which the loop is assembled (rad or m); joints that are not named are at
-    /// zero.
+    /// Joint values near which the loop is assembled (rad or m); joints not listed are at zero.
     pub at: Vec<(String, f64)>,
 }
 
-/// A loop in its place on the tree.
+/// Loop closure placed on the tree.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlacedLoop {
-    /// Its name.
+    /// Name of the loop.
     pub name: String,
-    /// Bodies that its dependent joints move.
+    /// Bodies moved by its dependent joints.
     pub dependent: [usize; 2],
     /// Bodies that carry the pin and the eye.
     pub ends: [usize; 2],
-    /// Values of the dependent joints where it was built (rad or m).
+    /// Values of the dependent joints in the assembly configuration (rad or m).
     pub start: [f64; 2],
-    /// How far these are from those that were asked for (rad or m).
+    /// Difference between `start` and the requested values (rad or m).
     pub start_miss: [f64; 2],
-    /// First dependent coordinate of the tree; the second follows.
+    /// First dependent coordinate in the tree; the second one follows it.
     first: usize,
     common: usize,
-    /// Bodies outward of the common one, to the pin and to the eye.
+    /// Bodies outward of the common body, to the pin and to the eye.
     chains: [Vec<usize>; 2],
     X_pin: Pose,
     p_eye: Vector3<f64>,
-    /// Coordinates of the tree that move the loop beside its own.
+    /// Tree coordinates that move the loop, without its own dependent ones.
     moved_by: Vec<usize>,
-    /// Which of the two solutions of (1).
+    /// Selected solution of (1), 1 or -1.
     root: f64,
     shape: Shape,
-    /// At which corner of the triangle force passes to the driven side; `None`: the worst.
+    /// Corner of the transmission angle, opposite the side with the driving joints; `None` for the
+    /// minimum over all corners.
     corner: Option<usize>,
 }
 
-/// Where the dependent joints are: on one chain, the inner one first, or one on each.
+/// Location of the dependent joints: both on one chain (`inner` is the inner one), or one on each.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Shape {
     OneChain { chain: usize, inner: usize },
@@ -101,7 +101,7 @@ enum Shape {
 /// Closed loops at the last coordinates, with the workspace of the tree.
 #[derive(Clone, Debug)]
 pub(crate) struct LoopData {
-    /// Of the tree: independent coordinates, then dependent ones.
+    /// Tree coordinates: independent, then dependent.
     q: Vec<f64>,
     qdot: Vec<f64>,
     qddot: Vec<f64>,
@@ -112,25 +112,25 @@ pub(crate) struct LoopData {
     free: CholeskyRoom,
 }
 
-/// Positions and (2).
+/// Positions of the dependent joints and (2).
 #[derive(Clone, Debug)]
 struct Solved {
     /// Rows of (2), one per dependent coordinate, nv long.
     T: Vec<f64>,
     nv: usize,
-    /// `∂c/∂q` of each loop, a pair per coordinate of the tree.
+    /// `∂c/∂q` of each loop, two rows per coordinate of the tree.
     J: Vec<Vec<Vector2<f64>>>,
     /// `J_d^-1` of each loop.
     inverse: Vec<Matrix2<f64>>,
     /// Transmission angle of each loop (rad).
     angle: Vec<f64>,
-    /// First loop that does not close.
+    /// First loop that cannot be closed.
     open: Option<usize>,
     /// Poses in the common body.
     X: Vec<Pose>,
 }
 
-/// (3) and the rate of (2) at velocities of the tree.
+/// (3) and the time derivative of T in (2) at tree velocities.
 #[derive(Clone, Debug)]
 pub(crate) struct LoopRates {
     X: Vec<Pose>,
@@ -138,7 +138,7 @@ pub(crate) struct LoopRates {
     w: Vec<Vector3<f64>>,
     Jdot: Vec<Vector2<f64>>,
     gamma: Vec<f64>,
-    /// As `T`.
+    /// Laid out as `T`.
     Tdot: Vec<f64>,
 }
 
@@ -180,20 +180,21 @@ impl LoopData {
         }
     }
 
-    /// Independent coordinates that move a dependent one, and how fast.
+    /// Calls `add` with each independent coordinate that moves the dependent coordinate k, and the
+    /// entry of T.
     #[inline]
     pub(crate) fn each_leader(&self, k: usize, add: &mut impl FnMut(usize, f64)) {
         self.solved.row(k).iter().enumerate().filter(|(_, t)| **t != 0.0).for_each(|(j, t)| add(j, *t));
     }
 
-    /// The same with the rate of that.
+    /// As [`Self::each_leader`], for all independent coordinates and with the entry of Ṫ.
     pub(crate) fn each_leader_rate(&self, k: usize, mut add: impl FnMut(usize, f64, f64)) {
         let first = (k - self.solved.nv) * self.solved.nv;
         let rates = &self.rates.Tdot[first..first + self.solved.nv];
         self.solved.row(k).iter().zip(rates).enumerate().for_each(|(j, (t, rate))| add(j, *t, *rate));
     }
 
-    /// What a run with velocities leaves: (2) and, where accelerations come, (3).
+    /// Tree velocities from (2) and tree accelerations from (3); `None` stands for zero.
     fn follow(&mut self, model: &Model, data: &Data, qdot: Option<&[f64]>, qddot: Option<&[f64]>) {
         let nv = self.solved.nv;
         match qdot {
@@ -231,7 +232,8 @@ impl Solved {
         }
     }
 
-    /// Dependent coordinates by (1) into `q`, joint poses of the loops into `data`, and (2).
+    /// Computes the dependent coordinates from (1) into `q`, the joint poses of the loops into
+    /// `data`, and (2).
     fn positions(&mut self, model: &Model, data: &mut Data, q: &mut [f64]) {
         self.open = None;
         for loop_ in &model.loops {
@@ -240,7 +242,7 @@ impl Solved {
         begin(model, data, q);
         for (k, loop_) in model.loops.iter().enumerate() {
             for &i in loop_.chains.iter().flatten() {
-                // What an earlier loop has found stays.
+                // Joints solved by an earlier loop are kept.
                 let found = model.loops[..k].iter().any(|other| other.dependent.contains(&i));
                 if !found {
                     joint_position(model, data, i, q);
@@ -250,15 +252,17 @@ impl Solved {
         }
     }
 
-    /// One loop: closed form, Newton, (2).
+    /// Solves one loop: closed form, Newton iterations, then (2).
     fn close(&mut self, model: &Model, data: &mut Data, q: &mut [f64], k: usize) {
         let loop_ = &model.loops[k];
+        // Closed form.
         loop_.place_chains(model, data, &mut self.X);
         let start = loop_.triangle(model, &self.X).solve(loop_.root);
         let mut x = match start {
             Some(turn) => [loop_.start[0] + turn[0], loop_.start[1] + turn[1]],
             None => [f64::NAN; 2],
         };
+        // Newton's method on (1), with J at the current poses.
         let mut last = f64::INFINITY;
         for _ in 0..MOST_ITERATIONS {
             for (body, x) in loop_.dependent.into_iter().zip(x) {
@@ -273,7 +277,7 @@ impl Solved {
             let J_d = Matrix2::from_columns(&[self.J[k][loop_.first], self.J[k][loop_.first + 1]]);
             self.inverse[k] = J_d.try_inverse().unwrap_or_else(|| Matrix2::from_element(f64::NAN));
             let gap = c.norm();
-            // Rounding is reached where it does not shrink any more.
+            // Stops at rounding level, where the residual no longer decreases.
             if gap <= f64::EPSILON * size || gap >= 0.5 * last || gap.is_nan() {
                 break;
             }
@@ -292,7 +296,7 @@ impl Solved {
         self.slopes(loop_, k);
     }
 
-    /// (2) of one loop, after those that it rests on.
+    /// (2) of one loop, after the loops it depends on.
     fn slopes(&mut self, loop_: &PlacedLoop, k: usize) {
         let (nv, inverse) = (self.nv, self.inverse[k]);
         let (before, own) = self.T.split_at_mut((loop_.first - nv) * nv);
@@ -315,7 +319,7 @@ impl Solved {
         }
     }
 
-    /// (3) at the velocities `qdot` of the tree, and if wanted the rate of T.
+    /// (3) at the tree velocities `qdot`, and Ṫ if `with_T`.
     fn rates(&self, model: &Model, data: &Data, q: &[f64], qdot: &[f64], to: &mut LoopRates, with_T: bool) {
         let nv = self.nv;
         for (k, loop_) in model.loops.iter().enumerate() {
@@ -323,7 +327,7 @@ impl Solved {
             loop_.move_chains(model, data, q, qdot, to);
             let (J, Jdot) = (&self.J[k], &to.Jdot);
             let minus = -self.inverse[k];
-            // J̇ q̇ over all, and what accelerates the joints of earlier loops.
+            // J̇ q̇ over all coordinates, plus the γ of dependent joints of earlier loops.
             let own = [loop_.first, loop_.first + 1];
             let all = loop_.moved_by.iter().copied().chain(own);
             let mut c = all.fold(Vector2::zeros(), |sum, j| sum + Jdot[j] * qdot[j]);
@@ -362,17 +366,17 @@ impl Solved {
 }
 
 impl PlacedLoop {
-    /// The pin in the body that carries it, `X_AP`, its axis along z.
+    /// Pose `X_AP` of the pin in the body that carries it, pin axis along z.
     pub fn pin(&self) -> &Pose {
         &self.X_pin
     }
 
-    /// The eye in the body that carries it, `p_BE_B` (m).
+    /// Position `p_BE_B` of the eye in the body that carries it (m).
     pub fn eye(&self) -> &Vector3<f64> {
         &self.p_eye
     }
 
-    /// Poses of the bodies of the loop in the common one.
+    /// Poses of the loop's bodies in the common body.
     fn place_chains(&self, model: &Model, data: &Data, X: &mut [Pose]) {
         X[self.common] = Pose::identity();
         for &i in self.chains.iter().flatten() {
@@ -380,13 +384,13 @@ impl PlacedLoop {
         }
     }
 
-    /// Pin and eye in the common body.
+    /// Pose of the pin and position of the eye in the common body.
     fn ends_at(&self, X: &[Pose]) -> (Pose, Vector3<f64>) {
         let eye = &X[self.ends[1]];
         (X[self.ends[0]] * self.X_pin, eye.rotation * self.p_eye + eye.translation.vector)
     }
 
-    /// (1), and the size of the loop (m).
+    /// Residual of (1) (m), and the size of the loop (m).
     fn gap(&self, X: &[Pose]) -> (Vector2<f64>, f64) {
         let (A, p_B) = self.ends_at(X);
         let p = A.rotation.inverse() * (p_B - A.translation.vector);
@@ -394,8 +398,8 @@ impl PlacedLoop {
         (p.xy(), size.chain([p_B.amax(), A.translation.vector.amax()]).fold(0.0, f64::max))
     }
 
-    /// `∂c/∂q`, a pair per coordinate of the tree; coordinates that do not move the loop keep what
-    /// they have, which is zero.
+    /// `∂c/∂q`, two rows per coordinate of the tree; zero for coordinates that do not move the
+    /// loop.
     fn jacobian(&self, model: &Model, data: &Data, X: &[Pose], J: &mut [Vector2<f64>]) {
         J.fill(Vector2::zeros());
         let (A, p_B) = self.ends_at(X);
@@ -410,10 +414,11 @@ impl PlacedLoop {
         }
     }
 
-    /// Velocities in the axes of the common body, and the rate of the Jacobian.
+    /// Velocities in the axes of the common body, and the time derivative of the Jacobian.
     fn move_chains(&self, model: &Model, data: &Data, q: &[f64], qdot: &[f64], to: &mut LoopRates) {
         let LoopRates { X, v, w, Jdot, .. } = to;
         (v[self.common], w[self.common]) = (Vector3::zeros(), Vector3::zeros());
+        // Velocities of the bodies, from the common body outward.
         for &i in self.chains.iter().flatten() {
             let parent = model.bodies[i].parent;
             let arm = X[i].translation.vector - X[parent].translation.vector;
@@ -424,6 +429,7 @@ impl PlacedLoop {
             });
             (v[i], w[i]) = (v_i, w_i);
         }
+        // Columns of J̇ in A axes: d/dt (l + a × r) - w_A × (l + a × r).
         let (A, p_B) = self.ends_at(X);
         let [a, b] = self.ends;
         let v_B = v[b] + w[b].cross(&(p_B - X[b].translation.vector));
@@ -442,7 +448,7 @@ impl PlacedLoop {
         }
     }
 
-    /// The loop as a triangle in the plane of the pin, dependent joints where they were built.
+    /// The loop as a triangle in the plane normal to the pin, at the joint poses in `X`.
     fn triangle(&self, model: &Model, X: &[Pose]) -> Triangle {
         let (A, p_B) = self.ends_at(X);
         let R = A.rotation.inverse();
@@ -459,9 +465,9 @@ impl PlacedLoop {
         Triangle { joints: [joint(0), joint(1)], ends: [p_A, p_B], shape: self.shape }
     }
 
-    /// Angle between what brings a force and what it turns (rad), 90 degrees at best: between the
-    /// two sides that hold no driving joint; with a joint that slides between the two ways on which
-    /// the dependent joints would move the pin.
+    /// Transmission angle (rad), 90 degrees at best: the angle between the two triangle sides
+    /// without driving joints. With a sliding dependent joint it is the angle between the two
+    /// directions in which the dependent joints move the pin.
     fn transmission(&self, model: &Model, X: &[Pose], J: &[Vector2<f64>]) -> f64 {
         let between = |a: Vector2<f64>, b: Vector2<f64>| (a.x * b.y - a.y * b.x).abs().atan2(a.dot(&b).abs());
         if self.dependent.iter().any(|&body| model.bodies[body].slides()) {
@@ -480,16 +486,17 @@ impl PlacedLoop {
     }
 }
 
-/// A dependent joint in the plane.
+/// Dependent joint projected onto the plane of the loop.
 #[derive(Clone, Copy, Debug)]
 struct FlatJoint {
     slides: bool,
     at: Vector2<f64>,
-    /// Way of what slides; of what turns 1 or -1 about the axis of the pin.
+    /// Direction of a sliding joint; for a revolute joint, x is the sign of its axis along the pin
+    /// axis.
     way: Vector2<f64>,
 }
 
-/// The loop in its plane: dependent joints and the two ends that shall meet.
+/// The loop in its plane: the dependent joints and the two end points to be joined.
 #[derive(Clone, Copy, Debug)]
 struct Triangle {
     joints: [FlatJoint; 2],
@@ -501,23 +508,23 @@ fn angle_of(v: &Vector2<f64>) -> f64 {
     v.y.atan2(v.x)
 }
 
-/// To (-π, π].
+/// Wraps an angle to [-π, π].
 fn wrapped(angle: f64) -> f64 {
     angle - TAU * (angle / TAU).round()
 }
 
 impl Triangle {
-    /// What the dependent joints have to turn or slide, for one of the two roots (1 or -1); `None`
-    /// where the sides do not reach.
+    /// Displacements of the dependent joints that close the loop, for one of the two roots (1 or
+    /// -1); `None` if the sides cannot reach.
     fn solve(&self, root: f64) -> Option<[f64; 2]> {
-        // The first joint moves the first point, and all that moves the second point is the second
-        // joint; or the first joint carries the second one.
+        // Either the first joint carries the second one and both move the first point, or the first
+        // joint moves the first point and the second joint the second point.
         let (first, second, moved, other, carried) = match self.shape {
             Shape::OneChain { chain, inner } => (inner, 1 - inner, self.ends[chain], self.ends[1 - chain], true),
             Shape::BothChains { of_pin } => (of_pin, 1 - of_pin, self.ends[0], self.ends[1], false),
         };
         let (a, b) = (self.joints[first], self.joints[second]);
-        // Carried: moved = a(b(moved)) = other.  Else: a(moved) = b(other).
+        // Carried: a(b(moved)) = other. Otherwise: a(moved) = b(other).
         let (x_a, x_b) = match (a.slides, b.slides) {
             (false, false) => turn_turn(&a, &b, &moved, &other, carried, root)?,
             (false, true) if carried => {
@@ -531,7 +538,7 @@ impl Triangle {
                 (angle_of(&(m + b.way * s)) - angle_of(&w), s)
             }
             (true, false) => {
-                // Seen from the joint that turns, the other end slides back.
+                // Relative to the rotating joint, the other end slides in the opposite direction.
                 let (point, target) = if carried { (moved, other) } else { (other, moved) };
                 let (w, m, sign) = (point - b.at, target - b.at, if carried { -1.0 } else { 1.0 });
                 let s = slide_to(&m, &(a.way * sign), w.norm(), root)?;
@@ -550,7 +557,7 @@ impl Triangle {
     }
 }
 
-/// Carried: `R_a (v + R_b w) = t`; else `R_a u = v + R_b w`.
+/// Two revolute joints. Carried: `R_a (v + R_b w) = t`; otherwise `R_a u = v + R_b w`.
 fn turn_turn(
     a: &FlatJoint,
     b: &FlatJoint,
@@ -562,7 +569,7 @@ fn turn_turn(
     let v = b.at - a.at;
     let (w, t) = if carried { (moved - b.at, other - a.at) } else { (other - b.at, moved - a.at) };
     let cosine = (t.norm_squared() - v.norm_squared() - w.norm_squared()) / (2.0 * v.norm() * w.norm());
-    // A straight line may be longer than its parts by rounding.
+    // For an extended triangle, rounding may put the cosine slightly above 1.
     if cosine.is_nan() || cosine.abs() > 1.0 + 1e-12 {
         return None;
     }
@@ -573,7 +580,7 @@ fn turn_turn(
     Some((if carried { x_a } else { -x_a }, x_b))
 }
 
-/// s for which `|m + s d| = r`.
+/// Slide s for which `|m + s d| = r`.
 fn slide_to(m: &Vector2<f64>, d: &Vector2<f64>, r: f64, root: f64) -> Option<f64> {
     let along = m.dot(d);
     let square = along * along - m.norm_squared() + r * r;
@@ -594,7 +601,7 @@ impl Body {
 }
 
 impl Model {
-    /// Actuated coordinates that move a dependent coordinate of the tree, ascending.
+    /// Actuated coordinates that move a dependent coordinate of the tree, in ascending order.
     pub(crate) fn leaders(&self, dependent: usize) -> Vec<usize> {
         let (mut found, mut open) = (Vec::new(), vec![dependent]);
         while let Some(k) = open.pop() {
@@ -613,7 +620,8 @@ impl Model {
 }
 
 impl Data {
-    /// The first loop that the last coordinates do not let close; what followed from them is NaN.
+    /// Index of the first loop that cannot be closed at the last coordinates; quantities that
+    /// depend on it are NaN.
     pub fn open_loop(&self) -> Option<usize> {
         self.loops.as_ref().and_then(|loops| loops.solved.open)
     }
@@ -629,13 +637,14 @@ impl Data {
         self.loops.as_ref().map_or(&[], |loops| &loops.qdot[loops.solved.nv..])
     }
 
-    /// Transmission angle of each loop at the last coordinates (rad, at most a right angle).
+    /// Transmission angle of each loop at the last coordinates (rad, at most π/2).
     pub fn transmission_angles(&self) -> &[f64] {
         self.loops.as_ref().map_or(&[], |loops| &loops.solved.angle)
     }
 }
 
-/// What depends on loops, done with them taken out of the workspace.
+/// Runs `run` with the loop data taken out of the workspace; solves the loop positions first if `q`
+/// is given.
 fn with_loops(model: &Model, data: &mut Data, q: Option<&[f64]>, run: impl FnOnce(&mut Data, &mut LoopData)) {
     let mut loops = data.loops.take().unwrap_or_else(|| Box::new(LoopData::new(model)));
     if let Some(q) = q {
@@ -647,13 +656,13 @@ fn with_loops(model: &Model, data: &mut Data, q: Option<&[f64]>, run: impl FnOnc
     data.loops = Some(loops);
 }
 
-/// [`crate::forward_kinematics`].
+/// [`crate::forward_kinematics`] with closed loops.
 #[inline(never)]
 pub(crate) fn place(model: &Model, data: &mut Data, q: &[f64]) {
     with_loops(model, data, Some(q), |data, loops| place_and_measure(model, data, &loops.q));
 }
 
-/// [`crate::forward_kinematics_velocity`].
+/// [`crate::forward_kinematics_velocity`] with closed loops.
 #[inline(never)]
 pub(crate) fn move_bodies(model: &Model, data: &mut Data, state: &State) {
     with_loops(model, data, Some(state.q.as_slice()), |data, loops| {
@@ -664,7 +673,7 @@ pub(crate) fn move_bodies(model: &Model, data: &mut Data, state: &State) {
     });
 }
 
-/// [`crate::inverse_dynamics`], (4); without velocities at rest.
+/// [`crate::inverse_dynamics`] by (4); `qdot` of `None` means zero velocities.
 #[inline(never)]
 pub(crate) fn inverse_dynamics(model: &Model, data: &mut Data, q: &[f64], qdot: Option<&[f64]>, qddot: Option<&[f64]>) {
     with_loops(model, data, Some(q), |data, loops| {
@@ -680,7 +689,7 @@ pub(crate) fn inverse_dynamics(model: &Model, data: &mut Data, q: &[f64], qdot: 
     });
 }
 
-/// [`crate::mass_matrix_at_poses`], (4).
+/// [`crate::mass_matrix_at_poses`] by (4).
 #[inline(never)]
 pub(crate) fn mass_matrix_at_poses(model: &Model, data: &mut Data) {
     with_loops(model, data, None, |data, loops| {
@@ -691,7 +700,8 @@ pub(crate) fn mass_matrix_at_poses(model: &Model, data: &mut Data) {
     });
 }
 
-/// `[1; T]ᵀ A [1; T]` over the coordinates from `first` on; A has those of the tree from there on.
+/// `[1; T]ᵀ A [1; T]` for the coordinates from `first` on; A covers the tree coordinates from there
+/// on.
 fn reduce(A: &DMatrix<f64>, solved: &Solved, first: usize, to: &mut DMatrix<f64>) {
     let n = solved.nv - first;
     let nd = A.nrows() - n;
@@ -719,7 +729,8 @@ fn reduce(A: &DMatrix<f64>, solved: &Solved, first: usize, to: &mut DMatrix<f64>
     }
 }
 
-/// [`crate::hybrid_dynamics`]: `M_ff q̈_f = τ_f - bias_f - M_fp q̈_p` with the reduced mass matrix; no allocation after the first.
+/// [`crate::hybrid_dynamics`] with the reduced mass matrix: `M_ff q̈_f = τ_f - bias_f - M_fp q̈_p`.
+/// Does not allocate after the first call.
 #[inline(never)]
 pub(crate) fn solve(model: &Model, data: &mut Data, state: &State, free: &[usize]) {
     let Some(loops) = &mut data.loops else { return };
@@ -727,7 +738,7 @@ pub(crate) fn solve(model: &Model, data: &mut Data, state: &State, free: &[usize
     room.fit(free.len());
     room.right.iter_mut().zip(free).for_each(|(right, &k)| *right = data.tau[k]);
     free.iter().for_each(|&k| data.qddot[k] = 0.0);
-    // Bias with what the prescribed coordinates do.
+    // Bias, including the accelerations of the prescribed coordinates.
     let mut qddot = std::mem::replace(&mut data.qddot, DVector::zeros(0));
     crate::rnea::inverse_dynamics(model, data, state, &qddot);
     room.right.iter_mut().zip(free).for_each(|(right, &k)| *right -= data.tau[k]);
@@ -741,7 +752,7 @@ pub(crate) fn solve(model: &Model, data: &mut Data, state: &State, free: &[usize
     }
 }
 
-/// Room for a factor and a right-hand side; NaN where the matrix is not positive definite.
+/// Workspace of a Cholesky solve; the solution is NaN if the matrix is not positive definite.
 #[derive(Clone, Debug, Default)]
 struct CholeskyRoom {
     L: Vec<f64>,
@@ -754,7 +765,7 @@ impl CholeskyRoom {
         self.right.resize(n, 0.0);
     }
 
-    /// Solves into `right`, for the entries of a symmetric matrix.
+    /// Solves in place in `right`; `entry` returns the entries of a symmetric matrix.
     fn solve(&mut self, entry: impl Fn(usize, usize) -> f64) {
         let n = self.right.len();
         let (L, x) = (&mut self.L, &mut self.right);
@@ -774,7 +785,7 @@ impl CholeskyRoom {
     }
 }
 
-/// What [`crate::StaticTangent`] needs of loops, with its workspace.
+/// Loop terms of [`crate::StaticTangent`], with workspace.
 #[derive(Clone, Debug)]
 pub(crate) struct LoopTangent {
     /// `∂τ_t/∂q_t` of the tree.
@@ -789,7 +800,7 @@ impl LoopTangent {
         Self { G: DMatrix::zeros(n - first, n - first), rates: LoopRates::new(model), qdot: vec![0.0; n] }
     }
 
-    /// (5) into `to`, for the slopes of the tree in `G` and the forces `tau_d` on the dependent
+    /// (5) into `to`, for the tangent of the tree in `G` and the forces `tau_d` on the dependent
     /// coordinates.
     pub(crate) fn reduce(&mut self, model: &Model, data: &Data, first: usize, tau_d: &[f64], to: &mut DMatrix<f64>) {
         let Some(loops) = &data.loops else { return };
@@ -797,7 +808,7 @@ impl LoopTangent {
         reduce(&self.G, solved, first, to);
         let nv = solved.nv;
         for j in first..nv {
-            // Where T does not change with this coordinate there is nothing to add.
+            // T does not depend on this coordinate, so the second term of (5) is zero.
             let moves = model.loops.iter().any(|loop_| loop_.moved_by.contains(&j));
             if !moves {
                 continue;
@@ -815,7 +826,7 @@ impl LoopTangent {
     }
 }
 
-/// A loop on the bodies of the tree, before its coordinates have numbers.
+/// Loop on the bodies of the tree, before its coordinates are numbered.
 pub(crate) struct LoopDraft<'m> {
     closure: &'m LoopClosure,
     dependent: [usize; 2],
@@ -831,7 +842,7 @@ fn bad(closure: &LoopClosure, what: impl Into<String>) -> ModelError {
     ModelError::BadLoop { name: closure.name.clone(), what: what.into() }
 }
 
-/// The loops of a mechanism in an order in which each rests only on those before it.
+/// Loops of a mechanism, ordered so that each depends only on loops before it.
 ///
 /// # Errors
 /// [`ModelError::BadLoop`], [`ModelError::Duplicate`].
@@ -922,8 +933,8 @@ impl<'m> LoopDraft<'m> {
         self.dependent
     }
 
-    /// In its place, with the coordinates numbered; which way it is assembled is found by
-    /// [`assemble`].
+    /// Converts the draft to a placed loop, with coordinates numbered; the assembly mode is set
+    /// later by [`assemble`].
     pub(crate) fn placed(&self, bodies: &[Body], nv: usize, modal_size: impl Fn(usize) -> usize) -> PlacedLoop {
         let mut moved_by: Vec<usize> = Vec::new();
         for &i in self.chains.iter().flatten().filter(|i| !self.dependent.contains(i)) {
@@ -955,8 +966,8 @@ impl<'m> LoopDraft<'m> {
         }
     }
 
-    /// The corner of the triangle opposite to the one side with driving joints: 0 and 1 the
-    /// dependent joints, 2 the pin.
+    /// Corner of the triangle opposite to the side with the driving joints, if only one side has
+    /// any: 0 and 1 are the dependent joints, 2 is the pin.
     fn corner(&self, bodies: &[Body]) -> Option<usize> {
         let mut driven = [false; 3];
         for own in &self.chains {
@@ -984,7 +995,7 @@ impl<'m> LoopDraft<'m> {
     }
 }
 
-/// The bodies behind the two joints that a loop names.
+/// Child bodies of the two dependent joints named in a loop closure.
 fn dependent_bodies(
     closure: &LoopClosure,
     mechanism: &Mechanism,
@@ -1039,7 +1050,8 @@ fn dependent_bodies(
     Ok(found)
 }
 
-/// Finds which way each loop is assembled and checks that it is planar, closes and moves.
+/// Finds the assembly mode of each loop and checks that the loop is planar, can be closed and is
+/// not at a dead point.
 ///
 /// # Errors
 /// [`ModelError::BadLoop`].
@@ -1053,7 +1065,7 @@ pub(crate) fn assemble(model: &mut Model, mechanism: &Mechanism) -> Result<(), M
             let first = model.loops[k].first;
             [q[first], q[first + 1]]
         };
-        // The loops before it at these values of the driving joints.
+        // Solves the preceding loops at these values of the driving joints.
         let mut data = Data::new(model);
         let mut solved = LoopData::new(model).solved;
         let later = model.loops.split_off(k + 1);
@@ -1076,10 +1088,12 @@ pub(crate) fn assemble(model: &mut Model, mechanism: &Mechanism) -> Result<(), M
         check_plane(&loop_, closure, model, &solved.X)?;
         let triangle = loop_.triangle(model, &solved.X);
         let size = loop_.gap(&solved.X).1;
+        // Size of a displacement, with rotations weighted by the size of the loop.
         let far = |turn: &[f64; 2]| {
             let length = |d: usize| if triangle.joints[d].slides { 1.0 } else { size };
             (turn[0] * length(0)).hypot(turn[1] * length(1))
         };
+        // Assembly mode: the root closest to the requested values.
         let found = [1.0, -1.0].map(|root| triangle.solve(root).map(|turn| (root, turn)));
         let nearest = found.into_iter().flatten().min_by(|a, b| far(&a.1).total_cmp(&far(&b.1)));
         let Some((root, turn)) = nearest else {
@@ -1101,7 +1115,7 @@ pub(crate) fn assemble(model: &mut Model, mechanism: &Mechanism) -> Result<(), M
     Ok(())
 }
 
-/// Values of all coordinates of the tree at which a loop is assembled.
+/// Tree coordinates near which a loop is assembled.
 fn start_values(model: &Model, closure: &LoopClosure) -> Result<Vec<f64>, ModelError> {
     let mut q = vec![0.0; model.nv() + model.dependent().len()];
     for (name, value) in &closure.at {
@@ -1120,7 +1134,7 @@ fn start_values(model: &Model, closure: &LoopClosure) -> Result<Vec<f64>, ModelE
     Ok(q)
 }
 
-/// All axes along the pin, all ways across it.
+/// Checks that revolute axes are parallel and sliding axes perpendicular to the pin axis.
 fn check_plane(loop_: &PlacedLoop, closure: &LoopClosure, model: &Model, X: &[Pose]) -> Result<(), ModelError> {
     let (A, _) = loop_.ends_at(X);
     let normal: Vector3<f64> = A.rotation * Vector3::z();
@@ -1153,7 +1167,7 @@ fn check_plane(loop_: &PlacedLoop, closure: &LoopClosure, model: &Model, X: &[Po
     Ok(())
 }
 
-/// The loop must not be assembled at a dead point.
+/// Checks that the loop is not assembled at a dead point.
 fn check_alive(model: &Model, closure: &LoopClosure, k: usize, q: &[f64]) -> Result<(), ModelError> {
     let mut data = Data::new(model);
     let mut solved = LoopData::new(model).solved;

@@ -1,10 +1,11 @@
-//! Mass matrix by composite rigid bodies, O(n × depth).
+//! Mass matrix by the composite rigid body algorithm, O(n × depth).
 //!
-//! The composite inertia of everything outward of B acts on B's motion subspace; the resulting
-//! wrench, carried inward, gives one column of M. All of it is in the axes of the arm's first body,
-//! so that a wrench keeps its force on the way and only its moment changes with the point. The six
-//! columns of an elastic joint go side by side. The coordinates of a modal body are n columns more:
-//! its own `C_t` and `C_r` and what its interfaces carry. Source: [Featherstone 2008], Table 6.2.
+//! The composite inertia of the subtree of B acts on B's motion subspace; the resulting wrench,
+//! carried inward, gives one column of M. All quantities are in the axes of the first body of the
+//! arm, so that carrying a wrench inward changes only its moment. The six columns of an elastic
+//! joint are processed together. The coordinates of a modal body give n more columns: its own `C_t`
+//! and `C_r` plus the contribution of the bodies on its interfaces. Source: [Featherstone 2008],
+//! Table 6.2.
 
 use std::ops::Add;
 
@@ -19,11 +20,11 @@ use crate::kinematics::turned;
 use crate::lanes::Tree;
 use crate::model::{Body, JointMotion, Model};
 
-/// Mass matrix `M(q)`, nv×nv, both triangles (kg, kg m, kg m²). Fills `data.{X_PB, M}`. No
-/// allocation.
+/// Computes the mass matrix `M(q)`, nv×nv, both triangles (kg, kg m, kg m²). Fills
+/// `data.{X_PB, M}`. Does not allocate.
 ///
-/// Of trees without closed loops, balancers and modal bodies [`crate::FreeForces::mass_at`] has the
-/// same matrix, to rounding, in two thirds to four fifths of the time.
+/// For trees without closed loops, balancers and modal bodies, [`crate::FreeForces::mass_at`]
+/// returns the same matrix to rounding in two thirds to four fifths of the time.
 pub fn mass_matrix<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DMatrix<f64> {
     if !model.loops.is_empty() {
         closure::place(model, data, q.as_slice());
@@ -38,7 +39,7 @@ pub fn mass_matrix<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &
     &data.M
 }
 
-/// As [`mass_matrix`], for the joint poses that the last pass of another algorithm left in `data`.
+/// As [`mass_matrix`], with the joint poses left in `data` by the last pass of another algorithm.
 pub fn mass_matrix_at_poses(model: &Model, data: &mut Data) {
     match model.loops.is_empty() {
         true => composite_bodies(model, data),
@@ -46,36 +47,36 @@ pub fn mass_matrix_at_poses(model: &Model, data: &mut Data) {
     }
 }
 
-/// A body in the axes of the first body of its arm: those of the body that hangs on the base, or of
-/// the base if that bends.
+/// Body rotated to the axes of the first body of its arm: the child of the base, or the base itself
+/// if it is a modal body.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Turned<T: Scalar> {
-    /// Turns vectors of the body's axes.
+    /// Rotation from body axes to these axes.
     R: Matrix3<T>,
-    /// From the parent's origin to the body's.
+    /// Position of Bo relative to the parent's origin.
     r: Vector3<T>,
-    /// Motion subspace of its joint, of one coordinate.
+    /// Motion subspace of a single-DoF joint.
     axis: Twist<T>,
-    /// Motion subspace of its joint, of six coordinates.
+    /// Motion subspace of a six-DoF joint.
     S: ElasticSubspace<T>,
 }
 
 impl<T: Real> Turned<T> {
-    /// Not turned at all.
+    /// Identity rotation and zero offset.
     pub(crate) fn identity() -> Self {
         let one = Matrix3::identity();
         Self { R: one, r: Vector3::zeros(), axis: Twist::zeros(), S: ElasticSubspace { L: one, B: one } }
     }
 }
 
-/// Six wrenches side by side, as rows of their components.
+/// Six wrenches, stored as rows of their components.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SixWrenches<T> {
     force: [[T; 6]; 3],
     torque: [[T; 6]; 3],
 }
 
-/// One number for each of six coordinates.
+/// One value for each of six coordinates.
 #[derive(Clone, Copy)]
 struct Six<T>([T; 6]);
 
@@ -91,12 +92,13 @@ impl<T: Real> Add for Six<T> {
 }
 
 impl<T: Real> SixWrenches<T> {
-    /// None.
+    /// Six zero wrenches.
     pub(crate) fn zeros() -> Self {
         Self { force: [[T::zero(); 6]; 3], torque: [[T::zero(); 6]; 3] }
     }
 
-    /// What moves a composite body along the six coordinates of an elastic joint, about Bo.
+    /// Sets the wrenches that give a composite body unit accelerations along the six coordinates of
+    /// an elastic joint, about Bo.
     ///
     /// ```text
     /// translations: force m L,          moment [h]x L
@@ -121,7 +123,7 @@ impl<T: Real> SixWrenches<T> {
         }
     }
 
-    /// About a point r before this one. A row at a time: so the numbers of a row go side by side.
+    /// Shifts the reference point of the moments inward by r, row by row for contiguous access.
     #[inline(always)]
     fn carry(&mut self, r: &Vector3<T>) {
         let (r, Self { force: [x, y, z], torque: [tx, ty, tz] }) = (*r, self);
@@ -137,7 +139,7 @@ impl<T: Real> SixWrenches<T> {
     }
 }
 
-/// `aᵀ` times three rows.
+/// `aᵀ` times three rows of six values.
 #[inline(always)]
 fn along<T: Real>(a: &Vector3<T>, rows: &[[T; 6]; 3]) -> Six<T> {
     let [x, y, z] = rows;
@@ -148,7 +150,7 @@ fn along<T: Real>(a: &Vector3<T>, rows: &[[T; 6]; 3]) -> Six<T> {
     Six(all)
 }
 
-/// [`mass_matrix_at_poses`] over any scalar.
+/// [`mass_matrix_at_poses`] for any scalar type.
 #[inline(always)]
 pub(crate) fn composite_bodies<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>) {
     let model = tree.model();
@@ -191,7 +193,7 @@ pub(crate) fn composite_bodies<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>)
     lower.mirror();
 }
 
-/// Fills `turned` and begins `composite` with the inertia of each body.
+/// Fills `turned` and initialises `composite` with the inertia of each body.
 #[inline(always)]
 fn turn_bodies<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>) {
     let model = tree.model();
@@ -199,7 +201,7 @@ fn turn_bodies<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>) {
     if base_bends {
         data.composite[0] = tree.inertia(0);
     }
-    // Whose axes all others are turned to.
+    // Bodies whose axes are used for their whole arm.
     let is_first = |i: usize| i == 0 || (model.bodies[i].parent == 0 && !base_bends);
     for (i, body) in model.bodies.iter().enumerate().skip(1) {
         let (X_PB, S) = (&data.X_PB[i], &data.elastic[i]);
@@ -230,7 +232,7 @@ fn turn_bodies<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>) {
             JointMotion::Axis(motion) => B.axis = turned(*motion, &B.R, body.ratio),
             JointMotion::Welded => {}
             JointMotion::Elastic(_) | JointMotion::Interface { .. } => {
-                // The translations are along the axes of J.
+                // Translations are along the axes of the joint frame J.
                 B.S.L = if body.is_parallel { P.R } else { mul3(&B.R, &S.L) };
                 B.S.B = mul3(&B.R, &S.B);
             }
@@ -239,7 +241,8 @@ fn turn_bodies<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>) {
     }
 }
 
-/// Zeros in M where not every pair of coordinates meets; mass and wrenches of modal bodies.
+/// Zeroes M if not all pairs of coordinates are written; initialises mass and wrenches of modal
+/// bodies.
 #[inline(always)]
 fn begin_modal_columns<T: Real>(model: &Model, data: &mut Data<T>) {
     if model.sums_entries {
@@ -260,7 +263,7 @@ fn begin_modal_columns<T: Real>(model: &Model, data: &mut Data<T>) {
     }
 }
 
-/// `I_c S` of a joint of one coordinate: the wrench that moves all that is outward of it, at Bo.
+/// `I_c S` of a single-DoF joint, about Bo.
 #[inline(always)]
 fn axis_wrench<T: Real>(motion: &AxisMotion, S: &Twist<T>, composite: &SpatialInertia<T>) -> Wrench<T> {
     motion.linear(
@@ -271,7 +274,7 @@ fn axis_wrench<T: Real>(motion: &AxisMotion, S: &Twist<T>, composite: &SpatialIn
     )
 }
 
-/// `Sᵀ F` of a joint of one coordinate.
+/// `Sᵀ F` of a single-DoF joint.
 #[inline(always)]
 fn axis_project<T: Real>(motion: &AxisMotion, S: &Twist<T>, F: &Wrench<T>) -> T {
     motion.linear(
@@ -282,8 +285,8 @@ fn axis_project<T: Real>(motion: &AxisMotion, S: &Twist<T>, F: &Wrench<T>) -> T 
     )
 }
 
-/// Carries the wrenches of all that is outward of body i, and its own, over to its parent and meets
-/// the parent's joint: one level for all of them at once, because they do not wait for each other.
+/// Carries the wrenches of the subtree of body i to its parent and projects them onto the parent's
+/// joint. All wrenches of one level are processed together, as they are independent of each other.
 #[inline(always)]
 fn carry_columns<T: Real>(model: &Model, data: &mut Data<T>, i: usize) {
     let body = &model.bodies[i];
@@ -310,27 +313,27 @@ fn carry_columns<T: Real>(model: &Model, data: &mut Data<T>, i: usize) {
     }
 }
 
-/// `Sᵀ F` of a joint of six coordinates.
+/// `Sᵀ F` of a six-DoF joint.
 #[inline(always)]
 fn six<T: Real>(S: &ElasticSubspace<T>, F: &Wrench<T>) -> [T; 6] {
     let (f, t) = (tr_mul(&S.L, &F.force), tr_mul(&S.B, &F.torque));
     [f.x, f.y, f.z, t.x, t.y, t.z]
 }
 
-/// [`six`] of six wrenches: a row for each coordinate.
+/// [`six`] of six wrenches, one row per coordinate.
 #[inline(always)]
 fn six_by_six<T: Real>(S: &ElasticSubspace<T>, F: &SixWrenches<T>) -> [[T; 6]; 6] {
     let ([a, b, c], [d, e, f]) = (three_by_six(&S.L, &F.force), three_by_six(&S.B, &F.torque));
     [a, b, c, d, e, f]
 }
 
-/// `Aᵀ` times three rows.
+/// `Aᵀ` times three rows of six values.
 #[inline(always)]
 fn three_by_six<T: Real>(A: &Matrix3<T>, rows: &[[T; 6]; 3]) -> [[T; 6]; 3] {
     [along(&column(A, 0), rows).0, along(&column(A, 1), rows).0, along(&column(A, 2), rows).0]
 }
 
-/// A column of shapes times what six coordinates meet.
+/// Dot product of a mode shape column with the projections on six coordinates.
 #[inline(always)]
 fn times<T: Real>(phi: &[f64], s: &[T; 6]) -> T {
     let mut sum = T::zero();
@@ -340,7 +343,8 @@ fn times<T: Real>(phi: &[f64], s: &[T; 6]) -> T {
     sum
 }
 
-/// What the composite body i, behind an interface, adds to the coordinates of its modal body.
+/// Adds the contribution of composite body i, moved by an interface, to the columns of its modal
+/// body.
 #[inline(always)]
 fn interface_columns<T: Real>(model: &Model, data: &mut Data<T>, i: usize) {
     let JointMotion::Interface { modal, interface } = model.bodies[i].motion else { return };
@@ -355,11 +359,11 @@ fn interface_columns<T: Real>(model: &Model, data: &mut Data<T>, i: usize) {
     }
 }
 
-/// The lower triangle of M, where the recursion writes.
+/// Lower triangle of M, into which the recursion writes.
 struct Lower<'m, T> {
     M: &'m mut [T],
     nv: usize,
-    /// Whether values come on top of what is there.
+    /// Whether values are added to existing entries.
     sums: bool,
 }
 
@@ -369,7 +373,7 @@ impl<'m, T: Real> Lower<'m, T> {
         Self { nv: M.nrows(), M: M.as_mut_slice(), sums: model.sums_entries }
     }
 
-    /// The entry of two coordinates.
+    /// Entry of two coordinates in the lower triangle.
     #[inline(always)]
     fn entry(&mut self, a: usize, b: usize) -> &mut T {
         &mut self.M[a.min(b) * self.nv + a.max(b)]
@@ -382,7 +386,7 @@ impl<'m, T: Real> Lower<'m, T> {
         *entry = if sums { *entry + value } else { value };
     }
 
-    /// The entries of six coordinates, from `six` on, and another one that is none of them.
+    /// Writes the entries of six coordinates, from `six` on, with another coordinate outside them.
     #[inline(always)]
     fn put_six(&mut self, six: usize, one: usize, values: &[T; 6]) {
         if six < one {
@@ -401,7 +405,7 @@ impl<'m, T: Real> Lower<'m, T> {
         }
     }
 
-    /// The joint's own six columns: the translations meet the mass alone.
+    /// Writes the diagonal block of a six-DoF joint; in translation it is the mass times identity.
     #[inline(always)]
     fn put_own_block(&mut self, k: usize, mass: T, S: &ElasticSubspace<T>, F: &SixWrenches<T>) {
         let (tr, rr) = (three_by_six(&S.L, &F.force), three_by_six(&S.B, &F.torque));
@@ -414,13 +418,14 @@ impl<'m, T: Real> Lower<'m, T> {
         }
     }
 
-    /// Six rows of a column on the diagonal; above it the mirror overwrites them.
+    /// Writes six rows of a column of the diagonal block; [`Self::mirror`] overwrites the part
+    /// above the diagonal.
     #[inline(always)]
     fn put_block_column(&mut self, k: usize, column: usize, values: &[T; 6]) {
         self.M[column * self.nv + k..][..6].copy_from_slice(values);
     }
 
-    /// `Sᵀ F` of the joint that moves a body in one column; F at Bo of that body.
+    /// Writes `Sᵀ F` of the joint of `body` into one column; F is about Bo of that body.
     #[inline(always)]
     fn meet(&mut self, model: &Model, body: &Body, own: &Turned<T>, column: usize, F: &Wrench<T>) {
         let row = body.coordinate;
@@ -428,7 +433,8 @@ impl<'m, T: Real> Lower<'m, T> {
             JointMotion::Axis(motion) => {
                 let value = axis_project(motion, &own.axis, F);
                 self.put(row, column, value);
-                // A joint that mimics one inward of it: both triangles meet on the diagonal.
+                // A mimic joint inward of its leader or vice versa: both triangles contribute to
+                // the diagonal.
                 if row == column {
                     self.put(row, column, value);
                 }
@@ -480,7 +486,7 @@ impl<'m, T: Real> Lower<'m, T> {
         }
     }
 
-    /// The upper triangle, four columns of the lower one at a time.
+    /// Copies the lower triangle to the upper one, four columns at a time.
     #[inline(always)]
     fn mirror(&mut self) {
         const WIDE: usize = 4;

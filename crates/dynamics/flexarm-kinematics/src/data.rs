@@ -1,8 +1,8 @@
-//! State and workspaces: what changes while the model stays.
+//! State and workspaces: everything that changes while the model stays fixed.
 //!
-//! [`State`] is small and copyable between steppers; [`Data`] holds results and scratch of every
-//! algorithm, sized once by [`Data::new`], so that no algorithm allocates. Threads share a `Model`,
-//! each with its own `Data`.
+//! [`State`] is small and is copied between steppers; [`Data`] holds results and scratch of all
+//! algorithms, allocated once by [`Data::new`], so that no algorithm allocates. Threads share a
+//! `Model`, each with its own `Data`.
 
 use flexarm_spatial::products::{add, cross, lift, lift3, mul, mul3, tr_mul, transposed};
 use flexarm_spatial::{ArticulatedInertia, ElasticAngles, Pose, Real, SpatialInertia, Twist, Wrench, sin_cos_all};
@@ -24,7 +24,7 @@ pub struct State<T: Scalar = f64> {
 }
 
 impl<T: Real> State<T> {
-    /// All coordinates zero, at rest.
+    /// Zero positions and velocities.
     pub fn zeros(model: &Model) -> Self {
         Self { q: DVector::zeros(model.nv()), qdot: DVector::zeros(model.nv()) }
     }
@@ -33,13 +33,13 @@ impl<T: Real> State<T> {
 /// Motion subspace of an elastic joint or an interface in B axes: `V_PB_B = [L d'; B angles']`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ElasticSubspace<T: Scalar = f64> {
-    /// `R_PBᵀ` on the translation rates.
+    /// `R_PBᵀ`, map of the translation rates.
     pub(crate) L: Matrix3<T>,
     /// Rate map of the angles.
     pub(crate) B: Matrix3<T>,
 }
 
-/// Results and workspaces; see the function that fills each field.
+/// Results and workspaces; the documentation of each function lists the fields it fills.
 #[derive(Clone, Debug)]
 pub struct Data<T: Scalar = f64> {
     /// Pose of each body in its parent.
@@ -48,11 +48,11 @@ pub struct Data<T: Scalar = f64> {
     pub X_WB: Vec<Pose<T>>,
     /// Twist `V_WB_B` of each body at Bo in B axes.
     pub V: Vec<Twist<T>>,
-    /// Spatial acceleration `As_WB_B`, minus gravity where the algorithm says so.
+    /// Spatial acceleration `As_WB_B`, minus gravity if the algorithm says so.
     pub A: Vec<Twist<T>>,
-    /// Wrench that the joint puts on each body, at Bo in B axes ([`crate::inverse_dynamics`]).
+    /// Wrench exerted by the joint on each body, at Bo in B axes ([`crate::inverse_dynamics`]).
     pub F: Vec<Wrench<T>>,
-    /// External wrench on each body, at Bo in B axes; set by the caller, zero at the start.
+    /// External wrench on each body, at Bo in B axes; set by the caller, initially zero.
     pub F_ext: Vec<Wrench<T>>,
     /// Generalised forces.
     pub tau: DVector<T>,
@@ -64,35 +64,34 @@ pub struct Data<T: Scalar = f64> {
     pub(crate) elastic: Vec<ElasticSubspace<T>>,
     pub(crate) bias: Vec<Twist<T>>,
     pub(crate) composite: Vec<SpatialInertia<T>>,
-    /// Bodies in the axes of the mass matrix's recursion, and the wrenches of its columns.
+    /// Bodies in the axes of the mass matrix recursion, and the wrenches of its columns.
     pub(crate) turned: Vec<Turned<T>>,
     pub(crate) single: Vec<Wrench<T>>,
     pub(crate) six: Vec<SixWrenches<T>>,
     pub(crate) articulated: Vec<ArticulatedInertia>,
     pub(crate) pA: Vec<Wrench>,
-    /// One-DoF joints: U = I S, 1/(Sᵀ U), u.
+    /// Single-DoF joints: U = I S, 1/(Sᵀ U), u.
     pub(crate) U: Vec<Wrench>,
     pub(crate) inverse_d: Vec<f64>,
     pub(crate) u: Vec<f64>,
-    /// The caller's external wrenches while those of the balancers are added; none without
-    /// balancers.
+    /// Caller's external wrenches while those of the balancers are added; empty without balancers.
     pub(crate) F_held: Vec<Wrench<T>>,
     /// Length or joint value of each balancer at the last poses.
     pub(crate) balanced: Vec<f64>,
     /// One per modal body.
     pub(crate) modal: Vec<ModalData<T>>,
-    /// Angles of the joints that turn (rad), their sines and cosines.
+    /// Angles of the rotating joints (rad), with sines and cosines.
     pub(crate) angles: Vec<T>,
     pub(crate) sines: Vec<T>,
     pub(crate) cosines: Vec<T>,
-    /// Kinetic energy of the rotors in the last velocity pass.
+    /// Kinetic energy of the rotors from the last velocity pass.
     pub(crate) rotor_energy: T,
-    /// Of models with closed loops.
+    /// Loop data, for models with closed loops.
     pub(crate) loops: Option<Box<LoopData>>,
 }
 
 impl<T: Real> Data<T> {
-    /// Workspaces for a model.
+    /// Allocates the workspaces for a model.
     pub fn new(model: &Model) -> Self {
         let n = model.bodies.len();
         let zero = Twist::zeros();
@@ -133,7 +132,7 @@ impl<T: Real> Data<T> {
         self.F_ext.fill(Wrench::zeros());
     }
 
-    /// Pose of a frame in the world, from the last [`crate::forward_kinematics`].
+    /// World pose of a frame, from the last [`crate::forward_kinematics`].
     #[inline(always)]
     pub fn X_WF(&self, frame: &Frame) -> Pose<T> {
         let (X_WB, X_BF) = (&self.X_WB[frame.body], &frame.X_BF);
@@ -143,21 +142,21 @@ impl<T: Real> Data<T> {
     }
 }
 
-/// No displacement.
+/// Identity pose.
 #[inline(always)]
 pub(crate) fn identity<T: Real>() -> Pose<T> {
     pose(Matrix3::identity(), Vector3::zeros())
 }
 
-/// From its parts.
+/// Pose from rotation matrix and translation.
 #[inline(always)]
 pub(crate) fn pose<T: Real>(R: Matrix3<T>, p: Vector3<T>) -> Pose<T> {
     Isometry { rotation: Rotation3::from_matrix_unchecked(R), translation: Translation3 { vector: p } }
 }
 
-/// Joint pose, joint twist and its bias in B axes; fills `X_PB`, `elastic` for one body.
+/// Joint twist and its bias in B axes; fills `X_PB` and `elastic` for one body.
 ///
-/// `V_PB_B = S q̇` and `bias = dS/dt q̇` (zero for one-DoF joints).
+/// `V_PB_B = S q̇` and `bias = dS/dt q̇` (zero for single-DoF joints).
 #[inline(always)]
 pub(crate) fn joint_motion<T: Real>(
     model: &Model,
@@ -205,7 +204,7 @@ pub(crate) fn joint_motion<T: Real>(
     }
 }
 
-/// Joint pose alone; fills `X_PB` and `elastic` for one body.
+/// Fills `X_PB` and `elastic` for one body, without velocities.
 #[inline(always)]
 pub(crate) fn joint_position<T: Real>(model: &Model, data: &mut Data<T>, i: usize, q: &[T]) {
     let body = &model.bodies[i];
@@ -233,7 +232,7 @@ pub(crate) fn joint_position<T: Real>(model: &Model, data: &mut Data<T>, i: usiz
     }
 }
 
-/// Value of a joint of one coordinate (rad or m).
+/// Value of a single-DoF joint (rad or m).
 #[inline(always)]
 fn joint_value<T: Real>(body: &Body, q: &[T]) -> T {
     T::splat(body.ratio) * q[body.coordinate] + T::splat(body.offset)
@@ -241,7 +240,7 @@ fn joint_value<T: Real>(body: &Body, q: &[T]) -> T {
 
 #[inline(always)]
 fn place_axis<T: Real>(body: &Body, motion: AxisMotion, data: &mut Data<T>, i: usize, q: &[T]) {
-    // A joint that slides may be the only one.
+    // The sines and cosines may be empty if no joint rotates.
     let (sine, cosine) = match motion.slides() {
         true => (T::zero(), T::one()),
         false => (data.sines[body.turning], data.cosines[body.turning]),
@@ -249,7 +248,7 @@ fn place_axis<T: Real>(body: &Body, motion: AxisMotion, data: &mut Data<T>, i: u
     motion.place(&body.X_PJ, &body.turn, joint_value(body, q), (sine, cosine), &mut data.X_PB[i]);
 }
 
-/// `Σ ½ a q̇² + Σ a_12 q̇_1 q̇_2` of the rotors.
+/// Kinetic energy of the rotors, `Σ ½ a q̇² + Σ a_12 q̇_1 q̇_2`.
 #[inline(always)]
 pub(crate) fn rotor_energy<T: Real>(model: &Model, qdot: &[T]) -> T {
     let mut energy = T::zero();
@@ -262,8 +261,8 @@ pub(crate) fn rotor_energy<T: Real>(model: &Model, qdot: &[T]) -> T {
     energy
 }
 
-/// What an algorithm begins with at new coordinates: mass integrals of all modal bodies and, in one
-/// go, sines and cosines of the joints; fills `modal`, `angles`, `sines` and `cosines`.
+/// First step of every algorithm at new coordinates: mass integrals of all modal bodies, and sines
+/// and cosines of all joints at once; fills `modal`, `angles`, `sines` and `cosines`.
 #[inline(always)]
 pub(crate) fn begin<T: Real>(model: &Model, data: &mut Data<T>, q: &[T]) {
     for (angle, &i) in data.angles.iter_mut().zip(&model.turning) {
@@ -276,8 +275,7 @@ pub(crate) fn begin<T: Real>(model: &Model, data: &mut Data<T>, q: &[T]) {
     }
 }
 
-/// Pose of a body behind a joint that turns it by R and shifts it by d (m), both in the joint's
-/// axes.
+/// Pose of a body outward of a joint with rotation R and translation d (m), both in joint axes.
 #[inline(always)]
 fn place_elastic<T: Real>(X_PB: &mut Pose<T>, body: &Body, R: &Matrix3<T>, d: &Vector3<T>) {
     let p_PJ = lift(&body.X_PJ.translation.vector);

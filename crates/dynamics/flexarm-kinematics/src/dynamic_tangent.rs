@@ -1,32 +1,32 @@
-//! How the forces of a motion change with coordinates and velocities, in closed form: `∂τ/∂q` and
-//! `∂τ/∂q̇` of [`crate::inverse_dynamics`], and `∂(M a)/∂q`.
+//! Closed-form derivatives of dynamic forces with respect to coordinates and velocities: `∂τ/∂q`
+//! and `∂τ/∂q̇` of [`crate::inverse_dynamics`], and `∂(M a)/∂q`.
 //!
-//! All about the origin of the world, in its axes: `s_j` the column of coordinate j, V and A twist
-//! and spatial acceleration of the body b that it moves, those of the parent with a dash,
-//! `(S q̇)_j` the derivative of `S q̇` of an elastic joint by its own coordinate. Seen from the
-//! bodies, all of them outward of a joint change their motion alike:
+//! All quantities are about the world origin, in world axes: `s_j` is the column of coordinate j, V
+//! and A the twist and spatial acceleration of the body b that it moves, V' and A' those of its
+//! parent, and `(S q̇)_j` the derivative of `S q̇` of an elastic joint with respect to its own
+//! coordinate. All bodies outward of a joint have the same change of motion:
 //!
 //! ```text
 //! δV_i = ψ_j δq_j,   δA_i = (χ_j + ψ_j × V_i) δq_j                                   i = b and outward      (1)
 //! ψ_j = V' × s_j + (S q̇)_j,   χ_j = A' × s_j + V' × ψ_j + V × (S q̇)_j + (S q̈ + Ṡ q̇)_j
 //! δV_i = s_j δq̇_j,   δA_i = (κ_j + s_j × V_i) δq̇_j,   κ_j = V' × s_j + V × s_j + ∂(Ṡ q̇)/∂q̇_j               (2)
 //! ```
-//! The wrench on a body, `F = I A + V ×* I V`, then changes by `I χ + C ψ`, and likewise with κ and
-//! s,
+//! The wrench on a body, `F = I A + V ×* I V`, then changes by `I χ + C ψ` (for velocities by
+//! `I κ + C s`), with
 //!
 //! ```text
 //! C ψ = I (ψ × V) + ψ ×* I V + V ×* I ψ                 zero for translations ψ                           (3)
 //! ```
-//! and with I, C and F summed over all outward of a joint
+//! and, with I, C and F summed over the subtree of a joint,
 //!
 //! ```text
 //! k outward of j, or in the same joint:   ∂τ_k/∂q_j = s_k · (I_k χ_j + C_k ψ_j) + ∂S_k/∂q_j · F           (4)
 //! k inward of j:                          ∂τ_k/∂q_j = s_k · (I_j χ_j + C_j ψ_j + s_j ×* F_j)
 //! ```
-//! Wrenches from outside and balancers are not in it: they depend on places alone
-//! ([`crate::StaticTangent::of_loads`]). Not here: closed loops and bodies that bend in modes.
-//! Source: the recursions of [Carpentier & Mansard 2018], summed up for joints whose columns depend
-//! on their coordinates.
+//! External wrenches and balancers are not included, as they depend only on the configuration
+//! ([`crate::StaticTangent::of_loads`]). Not here: closed loops and modal bodies. Source: the
+//! recursions of [Carpentier & Mansard 2018], in summed form for joints whose motion subspace
+//! depends on the coordinates.
 
 use flexarm_spatial::{ElasticAngles, Pose, SpatialInertia, Twist, Wrench};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
@@ -34,49 +34,49 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use crate::data::{Data, ElasticSubspace, State};
 use crate::model::{JointMotion, Model};
 
-/// Step of the differences by which the second derivative of a rate map is taken (rad); it is of
-/// second order in the elastic rates.
+/// Finite-difference step for the second derivative of a rate map (rad). The term is of second
+/// order in the elastic rates.
 const DIFFERENCE: f64 = 1e-3;
 
-/// Derivatives of the forces of a motion, with their workspace.
+/// Derivatives of inverse dynamics, with workspace.
 #[derive(Clone, Debug)]
 pub struct DynamicTangent {
     columns: Vec<Column>,
     bodies: Vec<Moving>,
 }
 
-/// What a coordinate does to what it moves.
+/// Derivative terms of one coordinate.
 #[derive(Clone, Copy, Debug)]
 struct Column {
-    /// Its coordinate in the model, its body, its number in the joint.
+    /// Coordinate in the model; `body` that it moves; `component` within the joint.
     k: usize,
     body: usize,
     component: usize,
     s: Twist,
-    /// (1) and (2).
+    /// ψ, χ of (1) and κ of (2).
     psi: Twist,
     chi: Twist,
     kappa: Twist,
-    /// `I χ + C ψ`, and the same for velocities, of all outward.
+    /// `I χ + C ψ`, and `I κ + C s` for velocities, of the subtree.
     by_q: Wrench,
     by_rate: Wrench,
-    /// `I s` and `Cᵀ s` of all outward; of the latter the part that is not zero.
+    /// `I s` and the nonzero (angular) part of `Cᵀ s`, of the subtree.
     momentum: Wrench,
     turned: Vector3<f64>,
 }
 
-/// Motion of a body, and what is carried by it with all outward.
+/// Motion of a body, and the sums of I, C and F over its subtree.
 #[derive(Clone, Copy, Debug)]
 struct Moving {
     V: Twist,
     A: Twist,
     inertia: SpatialInertia,
-    /// Rows of C on a rotation.
+    /// Force and moment rows of C, acting on the angular part.
     C: [Matrix3<f64>; 2],
     F: Wrench,
 }
 
-/// Derivatives of the motion of an elastic joint by one of its coordinates, B axes.
+/// Derivatives of the motion of an elastic joint with respect to one of its coordinates, B axes.
 #[derive(Clone, Copy, Debug)]
 struct JointChange {
     /// `(S q̇)_j`.
@@ -88,7 +88,7 @@ struct JointChange {
 }
 
 impl DynamicTangent {
-    /// For a tree; `None` where it has closed loops or bodies that bend in modes.
+    /// Creates the workspace for a tree; `None` for models with closed loops or modal bodies.
     pub fn new(model: &Model) -> Option<Self> {
         if !model.loops.is_empty() || !model.modal.is_empty() {
             return None;
@@ -105,13 +105,13 @@ impl DynamicTangent {
         Some(Self { columns, bodies: vec![Moving::still(); model.bodies.len()] })
     }
 
-    /// `∂τ/∂q` into `by_q` and `∂τ/∂q̇` into `by_rate`, nv × nv, a column per coordinate; written
-    /// over all of both. No allocation.
+    /// Computes `∂τ/∂q` into `by_q` and `∂τ/∂q̇` into `by_rate`, both nv×nv with one column per
+    /// coordinate and overwritten. Does not allocate.
     ///
     /// * `data`: after [`crate::inverse_dynamics`] of this motion and [`crate::world_poses`].
     ///
     /// # Panics
-    /// If a matrix has another size.
+    /// If the size of a matrix does not match.
     pub fn compute(
         &mut self,
         model: &Model,
@@ -132,18 +132,19 @@ impl DynamicTangent {
         self.add_own_joints(model, data, state.q.as_slice(), by_q);
     }
 
-    /// `∂(M a)/∂q` for constant accelerations a without the inertia of rotors, nv × nv, written
-    /// over all of `G`. No allocation.
+    /// Computes `∂(M a)/∂q` for constant accelerations a, without rotor inertia, into `G` (nv×nv,
+    /// overwritten). Does not allocate.
     ///
     /// * `data`: after [`crate::forward_kinematics`] at q.
     ///
     /// # Panics
-    /// If the matrix has another size.
+    /// If the size of the matrix does not match.
     pub fn of_inertia(&mut self, model: &Model, data: &Data, q: &DVector<f64>, a: &DVector<f64>, G: &mut DMatrix<f64>) {
         self.place(model, data);
         for moving in &mut self.bodies {
             (moving.V, moving.A) = (Twist::zeros(), Twist::zeros());
         }
+        // Accelerations of the bodies at zero velocity: sums of the columns times a.
         let mut columns = self.columns.iter().peekable();
         for i in 1..self.bodies.len() {
             let mut A = self.bodies[model.bodies[i].parent].A;
@@ -153,16 +154,16 @@ impl DynamicTangent {
             self.bodies[i].A = A;
         }
         self.carry(model, data);
-        // At rest.
+        // Zero velocities.
         self.change(model, data, q.as_slice(), &[], a.as_slice());
         self.fill(model, G, None);
         self.add_own_joints(model, data, q.as_slice(), G);
     }
 
-    /// Adds to `tau` (nv) the forces that an inertia more on a body asks for in the motion that was
-    /// last given.
+    /// Adds to `tau` (nv) the forces required by an additional inertia on a body in the motion of
+    /// the last call, scaled by `factor`.
     ///
-    /// * `more`: about Bo, B axes; `data` as it was then.
+    /// * `more`: additional inertia about Bo, B axes; `data`: unchanged since that call.
     pub fn add_inertia_forces(
         &self,
         model: &Model,
@@ -182,7 +183,7 @@ impl DynamicTangent {
         }
     }
 
-    /// Columns in the world.
+    /// Columns in world axes.
     fn place(&mut self, model: &Model, data: &Data) {
         for column in &mut self.columns {
             let body = &model.bodies[column.body];
@@ -196,7 +197,7 @@ impl DynamicTangent {
         }
     }
 
-    /// Sums of I, C and F from the motions.
+    /// Computes I, C and F of all bodies and sums them over subtrees.
     fn carry(&mut self, model: &Model, data: &Data) {
         for (i, moving) in self.bodies.iter_mut().enumerate() {
             moving.load(&model.bodies[i].inertia, &data.X_WB[i]);
@@ -207,7 +208,7 @@ impl DynamicTangent {
         }
     }
 
-    /// (1) and (2), and what they do to wrenches; at rest without rates.
+    /// Computes (1), (2) and the resulting wrench changes; empty `qdot` for zero velocities.
     fn change(&mut self, model: &Model, data: &Data, q: &[f64], qdot: &[f64], qddot: &[f64]) {
         let mut all = [JointChange::none(); 6];
         for column in &mut self.columns {
@@ -226,9 +227,11 @@ impl DynamicTangent {
                 [own.velocity, own.acceleration, own.by_rate].map(|twist| twist.at_parent(X_WB));
             let (inner, outer) = (&self.bodies[body.parent], &self.bodies[i]);
             let s = column.s;
+            // (1) and (2).
             column.psi = inner.V.cross(&s) + velocity;
             column.chi = inner.A.cross(&s) + inner.V.cross(&column.psi) + outer.V.cross(&velocity) + acceleration;
             column.kappa = inner.V.cross(&s) + outer.V.cross(&s) + by_rate;
+            // (3) and the products in (4).
             column.by_q = outer.change(&column.chi, &column.psi);
             column.by_rate = outer.change(&column.kappa, &s);
             column.momentum = outer.inertia.mul_twist(&s);
@@ -236,7 +239,7 @@ impl DynamicTangent {
         }
     }
 
-    /// (4) for all pairs of which one moves the other.
+    /// (4) for all pairs of coordinates where one moves the other.
     fn fill(&self, model: &Model, by_q: &mut DMatrix<f64>, mut by_rate: Option<&mut DMatrix<f64>>) {
         let n = model.nv();
         assert!(by_q.shape() == (n, n), "a row and a column per coordinate");
@@ -247,7 +250,7 @@ impl DynamicTangent {
         }
         for (a, inner) in self.columns.iter().enumerate() {
             let end = model.bodies[inner.body].subtree_end;
-            // Columns are in the order of bodies: what `inner` moves comes after it.
+            // Columns are in body order, so the subtree of `inner` comes after it.
             for (b, outer) in self.columns.iter().enumerate().skip(a).take_while(|(_, outer)| outer.body < end) {
                 let (i, o) = (inner.k, outer.k);
                 by_q[(o, i)] += inner.chi.power(&outer.momentum) + inner.psi.angular.dot(&outer.turned);
@@ -269,7 +272,7 @@ impl DynamicTangent {
         }
     }
 
-    /// `∂S_k/∂q_j · F` of elastic joints.
+    /// Adds `∂S_k/∂q_j · F` of elastic joints.
     fn add_own_joints(&self, model: &Model, data: &Data, q: &[f64], by_q: &mut DMatrix<f64>) {
         for (i, body) in model.bodies.iter().enumerate() {
             let JointMotion::Elastic(angles) = body.motion else { continue };
@@ -279,7 +282,7 @@ impl DynamicTangent {
             let phi = Vector3::new(q[k + 3], q[k + 4], q[k + 5]);
             for c in 0..3 {
                 let dB = angles.rate_map_derivative(&phi, &Vector3::ith(c, 1.0));
-                // L' = -[B e_c]x L: on f that is Lᵀ (B e_c × f).
+                // ∂L/∂φ_c = -[B e_c]x L; its transpose applied to f is Lᵀ (B e_c × f).
                 let slid = S.L.tr_mul(&S.B.column(c).cross(&F.force));
                 let turned = dB.tr_mul(&F.torque);
                 for r in 0..3 {
@@ -321,12 +324,12 @@ impl Moving {
         }
     }
 
-    /// I, C and F of the body alone, from its motion.
+    /// Computes I, C and F of this body only, from its motion.
     fn load(&mut self, inertia: &SpatialInertia, X_WB: &Pose) {
         let inertia = inertia.at_parent(X_WB);
         let (V, momentum) = (self.V, inertia.mul_twist(&self.V));
         self.C = [Matrix3::zeros(); 2];
-        // At rest C is zero.
+        // C is zero at zero velocity.
         let moving = if V == Twist::zeros() { 0 } else { 3 };
         for c in 0..moving {
             let psi = Twist::new(Vector3::zeros(), Vector3::ith(c, 1.0));
@@ -360,7 +363,7 @@ impl JointChange {
     }
 }
 
-/// Of `S q̇ = [L d'; B φ']` and `Ṡ q̇ = [L d' × w; B' φ']` with `w = B φ'`, and
+/// Derivatives of `S q̇ = [L d'; B φ']` and `Ṡ q̇ = [L d' × w; B' φ']`, with `w = B φ'` and
 /// `∂L/∂φ_c = -[B e_c]x L`.
 fn joint_changes(
     angles: ElasticAngles,
@@ -376,12 +379,15 @@ fn joint_changes(
     let bias = |phi: &Vector3<f64>| angles.rate_map_derivative(phi, &rates) * rates;
     let mut all = [JointChange::none(); 6];
     for c in 0..3 {
+        // Translation column: only Ṡ q̇ depends on its rate.
         let column: Vector3<f64> = S.L.column(c).into();
         all[c].by_rate = Twist::new(column.cross(&w), Vector3::zeros());
 
+        // Angle column.
         let unit = Vector3::ith(c, 1.0);
         let (axis, dB) = (S.B * unit, angles.rate_map_derivative(&phi, &unit));
         let (slide_turned, slides_turned, w_changed) = (slide.cross(&axis), slides.cross(&axis), dB * rates);
+        // ∂(B' φ')/∂φ_c by a five-point difference.
         let second = if rates == Vector3::zeros() {
             rates
         } else {

@@ -8,13 +8,13 @@ use crate::data::{Data, State};
 use crate::kinematics::{forward_kinematics, forward_kinematics_velocity};
 use crate::model::Model;
 
-/// Kinetic energy (J); fills `data.{X_PB, X_WB, V}`.
+/// Computes the kinetic energy (J); fills `data.{X_PB, X_WB, V}`.
 pub fn kinetic_energy(model: &Model, data: &mut Data, state: &State) -> f64 {
     forward_kinematics_velocity(model, data, state);
     kinetic_energy_of(model, data)
 }
 
-/// Kinetic energy (J), rotors included, for the twists that another algorithm left in `data.V`.
+/// Kinetic energy (J) including rotors, for the twists left in `data.V` by another algorithm.
 pub fn kinetic_energy_of(model: &Model, data: &Data) -> f64 {
     let bodies = model.bodies.iter().zip(&data.V).skip(1);
     let rigid: f64 = bodies.map(|(body, V)| 0.5 * V.power(&body.inertia.mul_twist(V))).sum();
@@ -25,7 +25,7 @@ pub fn kinetic_energy_of(model: &Model, data: &Data) -> f64 {
 }
 
 /// Momentum of all moving bodies about the world origin, world axes (kg m/s; kg m²/s), for the
-/// poses and twists that another algorithm left in `data.X_WB` and `data.V`.
+/// poses and twists left in `data.X_WB` and `data.V` by another algorithm.
 pub fn momentum_of(model: &Model, data: &Data) -> Wrench {
     let bodies = model.bodies.iter().zip(&data.V).zip(&data.X_WB).skip(1);
     let rigid = bodies.map(|((body, V), X)| body.inertia.mul_twist(V).at_parent(X));
@@ -35,16 +35,16 @@ pub fn momentum_of(model: &Model, data: &Data) -> Wrench {
     rigid.chain(modal).fold(Wrench::zeros(), |sum, p| sum + p)
 }
 
-/// Potential energy of gravity (J), zero at the world origin, and of the balancers; fills
-/// `data.{X_PB, X_WB}`.
+/// Computes the potential energy (J) of gravity, zero at the world origin, and of the balancers;
+/// fills `data.{X_PB, X_WB}`.
 pub fn potential_energy(model: &Model, data: &mut Data, q: &nalgebra::DVector<f64>) -> f64 {
     forward_kinematics(model, data, q);
     potential_energy_of(model, data)
 }
 
-/// Potential energy of gravity and of the balancers (J) for the poses in `data.X_WB`, the
-/// balancers' where the last of [`crate::forward_kinematics`], [`crate::inverse_dynamics`] and
-/// [`crate::hybrid_dynamics`] found them.
+/// Potential energy (J) of gravity for the poses in `data.X_WB`, and of the balancers at their
+/// lengths in the last call of [`crate::forward_kinematics`], [`crate::inverse_dynamics`] or
+/// [`crate::hybrid_dynamics`].
 pub fn potential_energy_of(model: &Model, data: &Data) -> f64 {
     balancer::energy(model, data) - model.gravity.dot(&first_moment(model, data))
 }

@@ -1,9 +1,8 @@
-//! Inverse kinematics: joint values that bring a frame to a pose (damped least squares with
-//! limits).
+//! Numerical inverse kinematics: damped least squares with joint limits.
 //!
-//! Levenberg-Marquardt on the pose error `[p_target - p; log(R_target Rᵀ)]` in world axes, steps
-//! clamped into the joint limits; joints that a limit holds are left out of the next step when it
-//! would push them further out. Elastic coordinates stay as they are in the start value.
+//! Levenberg-Marquardt on the pose error `[p_target - p; log(R_target Rᵀ)]` in world axes, with
+//! steps clamped to the joint limits. Joints at a limit that the step would push further out are
+//! excluded from it. Elastic coordinates keep their start values.
 //!
 //! Source: [Nakamura & Hanafusa 1986], [Wampler 1986]; damping update as in [Marquardt 1963].
 
@@ -14,16 +13,16 @@ use crate::data::Data;
 use crate::kinematics::{forward_kinematics, frame_jacobian};
 use crate::model::{Frame, Model};
 
-/// Tolerances and bounds of the iteration.
+/// Tolerances and limits of the iteration.
 #[derive(Clone, Copy, Debug)]
 pub struct IkOptions {
-    /// Accepted position error (m).
+    /// Position tolerance (m).
     pub position_tolerance_m: f64,
-    /// Accepted rotation error (rad).
+    /// Rotation tolerance (rad).
     pub rotation_tolerance_rad: f64,
-    /// Most iterations before giving up.
+    /// Maximum number of iterations.
     pub max_iterations: usize,
-    /// Length that weighs rotation against translation in the damped step (m).
+    /// Length by which rotations are weighted against translations in the damped step (m).
     pub characteristic_length_m: f64,
 }
 
@@ -38,7 +37,7 @@ impl Default for IkOptions {
     }
 }
 
-/// No joint values were found.
+/// Error: no joint values were found.
 #[derive(Debug, Clone, thiserror::Error)]
 #[error(
     "inverse kinematics of frame {frame:?} stopped after {iterations} iterations {position_m:.3e} m and \
@@ -46,22 +45,22 @@ impl Default for IkOptions {
     if at_limit.is_empty() { String::new() } else { format!(" with {at_limit:?} at their limits") }
 )]
 pub struct IkError {
-    /// Frame that was to reach the target.
+    /// Frame that should reach the target.
     pub frame: String,
-    /// Iterations done.
+    /// Number of iterations done.
     pub iterations: usize,
-    /// Remaining distance (m).
+    /// Remaining position error (m).
     pub position_m: f64,
-    /// Remaining angle (rad).
+    /// Remaining rotation error (rad).
     pub rotation_rad: f64,
-    /// Joints that sit at a limit.
+    /// Joints at a limit.
     pub at_limit: Vec<String>,
 }
 
-/// Joint values, nv long, that bring `frame` to `X_WT`, starting from `q_start` (also nv long).
+/// Finds joint values, nv long, that bring `frame` to `X_WT`, starting from `q_start` (nv long).
 ///
 /// # Errors
-/// [`IkError`] when the target is not reached within tolerance.
+/// [`IkError`] if the target is not reached within tolerance.
 pub fn inverse_kinematics(
     model: &Model,
     data: &mut Data,
@@ -93,7 +92,7 @@ pub fn inverse_kinematics(
         frame_jacobian(model, data, frame, &mut J);
         let mut Jw = DMatrix::from_fn(6, n, |r, c| if r < 3 { J[(r, c)] } else { J[(r, c)] * length });
         let e = weigh(&error);
-        // Joints held by a limit that the gradient pushes outward take no part.
+        // Joints at a limit that the gradient pushes outward are excluded.
         let gradient = Jw.tr_mul(&e);
         for k in 0..n {
             let held = (q[k] <= limits[k].0 && gradient[k] < 0.0) || (q[k] >= limits[k].1 && gradient[k] > 0.0);
@@ -101,7 +100,7 @@ pub fn inverse_kinematics(
                 Jw.column_mut(k).fill(0.0);
             }
         }
-        // Try steps with growing damping until the error shrinks.
+        // Increase the damping until a step reduces the error.
         let scale = Jw.norm_squared().max(1e-12);
         let mut improved = false;
         for _ in 0..25 {

@@ -14,7 +14,7 @@ use crate::closure;
 use crate::data::{Data, State, begin, identity, joint_motion, joint_position, rotor_energy};
 use crate::model::{Frame, JointMotion, Model};
 
-/// Poses of all bodies: fills `data.{X_PB, X_WB}`.
+/// Computes the poses of all bodies; fills `data.{X_PB, X_WB}`.
 pub fn forward_kinematics(model: &Model, data: &mut Data, q: &nalgebra::DVector<f64>) {
     match model.loops.is_empty() {
         true => place_and_measure(model, data, q.as_slice()),
@@ -22,14 +22,14 @@ pub fn forward_kinematics(model: &Model, data: &mut Data, q: &nalgebra::DVector<
     }
 }
 
-/// [`forward_kinematics`] of the tree.
+/// [`forward_kinematics`] of the tree, with balancer lengths.
 #[inline(always)]
 pub(crate) fn place_and_measure(model: &Model, data: &mut Data, q: &[f64]) {
     place_bodies(model, data, q);
     measure(model, data, q);
 }
 
-/// [`forward_kinematics`] over any scalar.
+/// [`forward_kinematics`] for any scalar type.
 #[inline(always)]
 pub(crate) fn place_bodies<T: Real>(model: &Model, data: &mut Data<T>, q: &[T]) {
     begin(model, data, q);
@@ -39,7 +39,7 @@ pub(crate) fn place_bodies<T: Real>(model: &Model, data: &mut Data<T>, q: &[T]) 
     place_in_world(model, data);
 }
 
-/// Poses and twists of all bodies: fills `data.{X_PB, X_WB, V}`.
+/// Computes poses and twists of all bodies; fills `data.{X_PB, X_WB, V}`.
 pub fn forward_kinematics_velocity(model: &Model, data: &mut Data, state: &State) {
     match model.loops.is_empty() {
         true => move_bodies(model, data, state.q.as_slice(), state.qdot.as_slice()),
@@ -47,7 +47,7 @@ pub fn forward_kinematics_velocity(model: &Model, data: &mut Data, state: &State
     }
 }
 
-/// [`forward_kinematics_velocity`] of the tree.
+/// [`forward_kinematics_velocity`] of the tree, with balancer lengths.
 #[inline(always)]
 pub(crate) fn move_bodies(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64]) {
     data.V[0] = Twist::zeros();
@@ -65,12 +65,12 @@ pub(crate) fn move_bodies(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64
     measure(model, data, q);
 }
 
-/// World poses from the joint poses that the last algorithm left in `data`.
+/// Computes world poses from the joint poses left in `data` by the last algorithm.
 pub fn world_poses(model: &Model, data: &mut Data) {
     place_in_world(model, data);
 }
 
-/// [`world_poses`] over any scalar.
+/// [`world_poses`] for any scalar type.
 #[inline(always)]
 pub(crate) fn place_in_world<T: Real>(model: &Model, data: &mut Data<T>) {
     data.X_WB[0] = identity();
@@ -90,7 +90,7 @@ pub fn frame_twist(data: &Data, frame: &Frame) -> Twist {
     Twist::new(R * V.linear, R * V.angular)
 }
 
-/// `J_WT_W`, 6×nv, from the last [`forward_kinematics`]; written into `J`.
+/// Writes `J_WT_W`, 6×nv, from the last [`forward_kinematics`] into `J`.
 ///
 /// # Panics
 /// If `J` does not have nv columns.
@@ -102,8 +102,8 @@ pub fn frame_jacobian(model: &Model, data: &Data, frame: &Frame, J: &mut Matrix6
     });
 }
 
-/// [`frame_jacobian`] over any scalar; `J`: 6 × nv, column after column. Columns of coordinates
-/// beyond nv, which closed loops have, go to `beyond`.
+/// [`frame_jacobian`] for any scalar type; `J` is 6×nv, column by column. Columns of dependent
+/// coordinates of closed loops, from nv on, are passed to `beyond`.
 #[inline(always)]
 pub(crate) fn tree_jacobian<T: Real>(
     model: &Model,
@@ -136,7 +136,7 @@ pub(crate) fn tree_jacobian<T: Real>(
     }
 }
 
-/// Adds a multiple of a twist to the first six numbers.
+/// Adds a multiple of a twist to the first six entries.
 #[inline(always)]
 fn add_column<T: Real>(column: &Twist<T>, factor: T, to: &mut [T]) {
     let (l, a) = (&column.linear, &column.angular);
@@ -145,8 +145,8 @@ fn add_column<T: Real>(column: &Twist<T>, factor: T, to: &mut [T]) {
     }
 }
 
-/// Columns by which the joint of body i moves it, at Bo, in the axes to which R turns those of B:
-/// coordinate of the tree, linear and angular part.
+/// Passes each motion subspace column of the joint of body i to `add`: tree coordinate, linear and
+/// angular part, at Bo, in the axes to which R rotates those of B.
 #[inline(always)]
 pub(crate) fn joint_columns<T: Real>(
     model: &Model,
@@ -180,7 +180,7 @@ pub(crate) fn joint_columns<T: Real>(
     }
 }
 
-/// `R_WB S` times the ratio of a mimic joint: a column of the Jacobian at Bo, in W axes.
+/// `R_WB S` times the ratio of a mimic joint: column of the Jacobian at Bo, in W axes.
 #[inline(always)]
 pub(crate) fn turned<T: Real>(motion: AxisMotion, R_WB: &Matrix3<T>, ratio: f64) -> Twist<T> {
     let ratio = T::splat(ratio);
@@ -192,8 +192,7 @@ pub(crate) fn turned<T: Real>(motion: AxisMotion, R_WB: &Matrix3<T>, ratio: f64)
     )
 }
 
-/// `dJ_WT_W/dt`, 6×nv, from the last [`forward_kinematics_velocity`] at `state`; written into
-/// `Jdot`.
+/// Writes `dJ_WT_W/dt`, 6×nv, from the last [`forward_kinematics_velocity`] at `state` into `Jdot`.
 ///
 /// `A_WT = J q̈ + J̇ q̇` is the acceleration of the point To and the angular acceleration, in world
 /// axes.
@@ -233,8 +232,8 @@ pub fn frame_jacobian_derivative(model: &Model, data: &Data, state: &State, fram
     }
 }
 
-/// As [`joint_columns`] with the rates of the columns `[l, a, l', a']`, for a body that turns with
-/// `w_B` in the axes of the columns; `q` and `qdot` of the elastic coordinates.
+/// As [`joint_columns`], with the rates of the columns: `[l, a, l', a']`. `w_B` is the angular
+/// velocity of the body in the axes of the columns; `q` and `qdot` are those of the tree.
 #[inline(always)]
 #[allow(clippy::too_many_arguments, reason = "of two callers, each with other axes")]
 pub(crate) fn joint_column_rates(
@@ -249,7 +248,7 @@ pub(crate) fn joint_column_rates(
 ) {
     let (body, zero) = (&model.bodies[i], Vector3::zeros());
     match body.motion {
-        // A column fixed in B axes turns with B.
+        // A column fixed in B axes rotates with B.
         JointMotion::Axis(motion) => {
             let Twist { linear: l, angular: a } = turned(motion, R, body.ratio);
             add(body.coordinate, [l, a, w_B.cross(&l), w_B.cross(&a)]);
@@ -261,7 +260,7 @@ pub(crate) fn joint_column_rates(
             let phi = Vector3::new(q[k + 3], q[k + 4], q[k + 5]);
             let rates = Vector3::new(qdot[k + 3], qdot[k + 4], qdot[k + 5]);
             let Bdot = angles.rate_map_derivative(&phi, &rates);
-            // Translation columns are fixed in P: they turn with P, w_P = w_B - R B rates.
+            // Translation columns are fixed in P and rotate with it, w_P = w_B - R B rates.
             let w_P = w_B - R * (S.B * rates);
             let (L, B) = (R * S.L, R * S.B);
             let Bdot_W = R * Bdot;
@@ -284,7 +283,7 @@ pub(crate) fn joint_column_rates(
                 let column = shape.twist(c, &S.L, &S.B);
                 let (l, a) = (R * column.linear, R * column.angular);
                 let turned = R * shape.twist(c, &S.L, &Bdot).angular;
-                // Both parts of the column belong to one coordinate.
+                // Linear and angular part of the column belong to the same coordinate.
                 add(body.coordinate + c, [l, a, w_P.cross(&l), w_B.cross(&a) + turned]);
             }
         }

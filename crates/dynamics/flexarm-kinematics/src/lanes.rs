@@ -1,9 +1,9 @@
-//! The recursions over several runs or poses of one tree at once, in the lanes of a scalar type.
+//! Recursions over several runs or poses of one tree at once, in the lanes of a SIMD scalar type.
 //!
-//! Poses, speeds and inertias differ from lane to lane; bodies, joints and shapes of links are
-//! those of one [`Model`]. Every lane has the bits of the function of the same name over one
-//! number. Functions are inlined into what calls them, so that the instructions of the lanes are at
-//! hand ([`flexarm_spatial::lanes::with_lanes`]).
+//! Poses, velocities and inertias differ between lanes; bodies, joints and mode shapes are those of
+//! one [`Model`]. Every lane gives bitwise the result of the `f64` function of the same name.
+//! Functions are inlined into their callers, so that the SIMD instructions are available
+//! ([`flexarm_spatial::lanes::with_lanes`]).
 
 use std::sync::Arc;
 
@@ -20,10 +20,10 @@ use crate::model::{Body, Frame, JointMotion, Model};
 use crate::rnea::{at_rest, newton_euler};
 use crate::static_tangent::{PointLoad, StaticTangent};
 
-/// A tree whose inertias are in the scalar of a recursion: a [`Model`], or one with several sets of
-/// them ([`LaneTree`]).
+/// Tree with inertias in the scalar type of a recursion: a [`Model`], or one with an inertia per
+/// lane ([`LaneTree`]).
 pub trait Tree<T: Real> {
-    /// Bodies and joints, alike in all lanes.
+    /// Bodies and joints, identical in all lanes.
     fn model(&self) -> &Model;
 
     /// Inertia of a body about Bo, B axes.
@@ -42,7 +42,7 @@ impl Tree<f64> for Model {
     }
 }
 
-/// A tree with inertias of its own in each lane.
+/// Tree with separate inertias for each lane.
 #[derive(Clone, Debug)]
 pub struct LaneTree<T: Real> {
     model: Arc<Model>,
@@ -50,11 +50,11 @@ pub struct LaneTree<T: Real> {
 }
 
 impl<T: Real> LaneTree<T> {
-    /// A tree for each lane; `None` where they differ in more than their inertias, are not as many
-    /// as lanes, or have closed loops.
+    /// Builds the tree from one model per lane; `None` if the models differ in more than their
+    /// inertias, if their number is not the number of lanes, or if they have closed loops.
     pub fn new(models: &[Arc<Model>]) -> Option<Self> {
         let first = models.first().filter(|_| models.len() == T::LANES)?;
-        // Loops are closed by an iteration whose length depends on where the arm is.
+        // Loops are closed by an iteration whose length depends on the configuration.
         if !first.loops.is_empty() {
             return None;
         }
@@ -78,7 +78,7 @@ impl<T: Real> LaneTree<T> {
         Some(Self { model: first.clone(), inertia: (0..first.bodies.len()).map(inertia).collect() })
     }
 
-    /// The tree of the first lane.
+    /// Model of the first lane.
     pub fn model(&self) -> &Model {
         &self.model
     }
@@ -96,31 +96,31 @@ impl<T: Real> Tree<T> for LaneTree<T> {
     }
 }
 
-/// [`crate::inverse_dynamics`] without balancers: `data.tau` has the generalised forces.
+/// [`crate::inverse_dynamics`] without balancers; the generalised forces are in `data.tau`.
 #[inline(always)]
 pub fn inverse_dynamics<T: Real>(tree: &LaneTree<T>, data: &mut Data<T>, state: &State<T>, qddot: &[T]) {
     newton_euler(tree, data, state.q.as_slice(), state.qdot.as_slice(), Some(qddot));
 }
 
-/// [`crate::mass_matrix_at_poses`]: `data.M` has the mass matrix.
+/// [`crate::mass_matrix_at_poses`]; the mass matrix is in `data.M`.
 #[inline(always)]
 pub fn mass_matrix_at_poses<T: Real>(tree: &LaneTree<T>, data: &mut Data<T>) {
     composite_bodies(tree, data);
 }
 
-/// [`crate::forward_kinematics`]: `data.X_WB` has the poses.
+/// [`crate::forward_kinematics`]; the poses are in `data.X_WB`.
 #[inline(always)]
 pub fn forward_kinematics<T: Real>(tree: &LaneTree<T>, data: &mut Data<T>, q: &[T]) {
     place_bodies(&tree.model, data, q);
 }
 
-/// [`crate::gravity_forces_at_poses`] without balancers: `data.tau` has the generalised forces.
+/// [`crate::gravity_forces_at_poses`] without balancers; the generalised forces are in `data.tau`.
 #[inline(always)]
 pub fn gravity_forces_at_poses<T: Real>(tree: &LaneTree<T>, data: &mut Data<T>) {
     at_rest(tree, data);
 }
 
-/// [`crate::frame_jacobian`], column after column in `J` (6 × nv).
+/// [`crate::frame_jacobian`], column by column in `J` (6×nv).
 #[inline(always)]
 pub fn frame_jacobian<T: Real>(tree: &LaneTree<T>, data: &Data<T>, frame: &Frame, J: &mut [T]) {
     tree_jacobian(
@@ -133,7 +133,7 @@ pub fn frame_jacobian<T: Real>(tree: &LaneTree<T>, data: &Data<T>, frame: &Frame
     );
 }
 
-/// [`StaticTangent::compute`] without balancers, under one load, column after column in `G`.
+/// [`StaticTangent::compute`] without balancers, under one load, column by column in `G`.
 #[inline(always)]
 pub fn static_tangent<T: Real>(
     tangent: &mut StaticTangent<T>,
@@ -146,10 +146,10 @@ pub fn static_tangent<T: Real>(
     tangent.of_bodies(tree, data, q, std::iter::once(load), G);
 }
 
-/// Places of a frame's origin in the world (m): with all elastic coordinates at zero, and at `q`.
+/// World positions of a frame origin (m): with all elastic coordinates at zero, and at `q`.
 ///
-/// For the poses of the joints that the last algorithm left in `data`, at the same joint
-/// coordinates; the elastic ones may be others.
+/// Uses the joint poses left in `data` by the last algorithm at the same joint coordinates; the
+/// elastic coordinates may differ.
 #[inline(always)]
 pub fn rigid_and_flexible<T: Real>(tree: &LaneTree<T>, data: &Data<T>, frame: &Frame, q: &[T]) -> [Vector3<T>; 2] {
     places(
@@ -161,7 +161,7 @@ pub fn rigid_and_flexible<T: Real>(tree: &LaneTree<T>, data: &Data<T>, frame: &F
     )
 }
 
-/// [`rigid_and_flexible`] for the poses of the joints of the last [`FreeForces::compute`].
+/// [`rigid_and_flexible`] with the joint poses of the last [`FreeForces::compute`].
 #[inline(always)]
 pub fn rigid_and_flexible_of_points<T: Real>(
     tree: &LaneTree<T>,
@@ -178,8 +178,7 @@ pub fn rigid_and_flexible_of_points<T: Real>(
     )
 }
 
-/// Both places, where a body on a joint of one coordinate has this rotation and origin in its
-/// parent.
+/// Both positions; `pose` returns rotation and origin in the parent of bodies on single-DoF joints.
 #[inline(always)]
 fn places<'a, T: Real>(
     model: &Model,
@@ -189,7 +188,7 @@ fn places<'a, T: Real>(
 ) -> [Vector3<T>; 2] {
     let mut rigid = lift(&frame.X_BF.translation.vector);
     let mut i = frame.body;
-    // Outward of all springs both are the same.
+    // Outward of all springs both positions are equal.
     while i > 0 {
         let body = &model.bodies[i];
         if body.elastic || !matches!(body.motion, JointMotion::Axis(_) | JointMotion::Welded) {
@@ -202,7 +201,7 @@ fn places<'a, T: Real>(
     while i > 0 {
         let body = &model.bodies[i];
         let elastic = match body.motion {
-            // A spring of one coordinate.
+            // Single-DoF spring.
             JointMotion::Axis(motion) if body.elastic => {
                 let [still, moved] =
                     [along_axis(body, motion, T::zero()), along_axis(body, motion, q[body.coordinate])];
@@ -230,7 +229,7 @@ fn places<'a, T: Real>(
                 add(&mul(&R, &flexible), &d)
             }
         };
-        // The joint frame in the parent holds for both.
+        // The joint frame in the parent is common to both.
         let (R_PJ, p_PJ) = (lift3(body.X_PJ.rotation.matrix()), lift(&body.X_PJ.translation.vector));
         rigid = carried((&R_PJ, &p_PJ), &rigid);
         flexible = carried((&R_PJ, &p_PJ), &elastic);
@@ -239,7 +238,7 @@ fn places<'a, T: Real>(
     [rigid, flexible]
 }
 
-/// `X_PB` of a joint of one coordinate.
+/// `X_PB` of a single-DoF joint.
 #[inline(always)]
 pub(crate) fn along_axis<T: Real>(body: &Body, motion: AxisMotion, coordinate: T) -> Pose<T> {
     let value = T::splat(body.ratio) * coordinate + T::splat(body.offset);
@@ -248,7 +247,7 @@ pub(crate) fn along_axis<T: Real>(body: &Body, motion: AxisMotion, coordinate: T
     X_PB
 }
 
-/// A point of B in P.
+/// Transforms a point from B to P.
 #[inline(always)]
 fn carried<T: Real>((R_PB, p_PB): (&Matrix3<T>, &Vector3<T>), p: &Vector3<T>) -> Vector3<T> {
     add(p_PB, &mul(R_PB, p))

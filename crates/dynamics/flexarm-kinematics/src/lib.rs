@@ -1,19 +1,20 @@
 //! Spatial algebra, the immutable tree model, and the kinematics and dynamics recursions of
 //! flexarm.
 //!
-//! A [`Mechanism`] (links and joints by name) becomes a checked [`Model`]; [`Data`] holds
+//! A [`Mechanism`] (links and joints by name) is checked and becomes a [`Model`]; [`Data`] holds
 //! workspaces and results, [`State`] positions and velocities. The algorithms are free functions
-//! that bear the name of what they compute and never allocate. Joints: fixed, revolute, continuous,
-//! prismatic, and the six-DoF elastic joint of a flexible link, at one cost.
+//! named after the quantity they compute, and they do not allocate. Joint types: fixed, revolute,
+//! continuous, prismatic, helical, and the six-DoF elastic joint of a flexible link.
 //!
-//! Inverse kinematics: [`AnalyticArm`] gives all solutions of arms whose axes allow a closed form,
-//! [`inverse_kinematics`] one from a start, [`inverse_kinematics_from_many_starts`] those of any
-//! arm that a search finds, [`inverse_kinematics_with_rule`] the best of a redundant arm.
+//! Inverse kinematics: [`AnalyticArm`] returns all solutions of arms whose geometry allows a closed
+//! form, [`inverse_kinematics`] one solution from an initial guess,
+//! [`inverse_kinematics_from_many_starts`] the solutions of any arm found by a multi-start search,
+//! and [`inverse_kinematics_with_rule`] the best solution of a redundant arm.
 //!
-//! Notation: `X_AB` pose of B in A; `V` twists, `F` wrenches, **linear part first**; see
-//! `docs/references.md` for the sources. Balancers ([`Balancer`]) are forces of the tree as its
-//! weight is; closed planar chains ([`LoopClosure`]) make joints follow from others. Not here:
-//! files, flexible-link stiffness, time.
+//! Notation: `X_AB` is the pose of B in A; `V` are twists, `F` wrenches, **linear part first**;
+//! sources are listed in `docs/references.md`. Balancers ([`Balancer`]) are conservative forces on
+//! the tree, like gravity; closed planar loops ([`LoopClosure`]) make some joints dependent on
+//! others. Not here: file formats, stiffness of flexible links, time integration.
 //!
 //! ```
 //! use flexarm_kinematics::*;

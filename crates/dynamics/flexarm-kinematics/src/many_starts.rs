@@ -1,11 +1,11 @@
-//! Inverse kinematics by numbers from many starts: for arms without a closed form.
+//! Numerical inverse kinematics from many starts, for arms without a closed form.
 //!
-//! The starts are the caller's and points spread evenly over the ranges of the joints (an additive
-//! recurrence with the generalised golden ratio [Roberts 2018]): the same every time. What is found
-//! are solutions; **that all are found is not certain**. How often each was met
-//! ([`FoundSolution::hits`]) gives an idea: where each has several hits, one that was missed has a
+//! The starts are the one of the caller and points spread evenly over the joint ranges (an additive
+//! recurrence with the generalised golden ratio [Roberts 2018]), so the search is deterministic.
+//! All results are solutions, but **finding all solutions is not guaranteed**. The number of hits
+//! of each ([`FoundSolution::hits`]) is an indication: if each has several hits, a missed one has a
 //! small region of attraction. Arms with more than six joints have families of solutions, of which
-//! these are samples.
+//! the results are samples.
 
 use std::f64::consts::{PI, TAU};
 
@@ -16,24 +16,24 @@ use crate::data::Data;
 use crate::inverse_kinematics::{IkError, IkOptions, inverse_kinematics};
 use crate::model::{Frame, JointMotion, Model};
 
-/// Joint values that meet the pose, and from how many starts they were reached.
+/// Joint values that meet the pose, and the number of starts that reached them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FoundSolution {
-    /// All coordinates, nv long; joints that turn without limits are within (-π, π].
+    /// All coordinates, nv long; rotating joints without limits are within (-π, π].
     pub q: DVector<f64>,
-    /// Number of starts that led here.
+    /// Number of starts that converged to this solution.
     pub hits: usize,
 }
 
-/// All distinct joint values within the limits that were reached from `starts` starts, the first
-/// from `q_start`.
+/// Finds all distinct joint values within the limits that are reached from `starts` starts, the
+/// first of which is `q_start`.
 ///
-/// Solutions that differ by whole turns of joints are one. Coordinates that do not move the frame
-/// stay as in `q_start` (nv long, rad or m); joints without limits start within half a turn or 1 m
-/// of it.
+/// Solutions that differ by whole turns of joints count as one. Coordinates that do not move the
+/// frame stay as in `q_start` (nv long, rad or m); joints without limits start within half a turn
+/// or 1 m of it.
 ///
 /// # Errors
-/// [`IkError`] of the start that came nearest, when none reaches the pose.
+/// [`IkError`] of the start with the smallest residual, if none reaches the pose.
 pub fn inverse_kinematics_from_many_starts(
     model: &Model,
     data: &mut Data,
@@ -71,14 +71,16 @@ pub fn inverse_kinematics_from_many_starts(
     }
 }
 
-/// Actuated coordinates that move the frame, from the base on, and whether they turn.
+/// Actuated coordinates that move the frame, from the base outward, and whether whole turns leave
+/// the pose unchanged.
 pub(crate) fn coordinates_of(model: &Model, frame: &Frame) -> Vec<(usize, bool)> {
     let mut chain: Vec<(usize, bool)> = Vec::new();
     let mut body = frame.body;
     while body > 0 {
         let b = &model.bodies[body];
         if b.coordinate != usize::MAX && b.coordinate >= model.nv() {
-            // Over a closed loop others move it; whole turns of these are not looked for.
+            // Moved by other coordinates through a closed loop; whole turns of these are not
+            // identified.
             for k in model.leaders(b.coordinate).into_iter().rev() {
                 if !chain.iter().any(|(known, _)| *known == k) {
                     chain.push((k, false));
@@ -91,7 +93,7 @@ pub(crate) fn coordinates_of(model: &Model, frame: &Frame) -> Vec<(usize, bool)>
             && !b.elastic
             && !chain.iter().any(|(k, _)| *k == b.coordinate)
         {
-            // Whole turns of a helical joint, or of one that others follow, are not the same place.
+            // A whole turn of a helical joint, or of the leader of mimic joints, changes the pose.
             let alone = model.bodies.iter().filter(|o| o.coordinate == b.coordinate && !o.elastic).count() == 1;
             chain.push((b.coordinate, matches!(motion, crate::AxisMotion::Revolute(_)) && alone));
         }
@@ -101,7 +103,7 @@ pub(crate) fn coordinates_of(model: &Model, frame: &Frame) -> Vec<(usize, bool)>
     chain
 }
 
-/// Where the starts of a coordinate lie.
+/// Range of the starts of a coordinate.
 fn range(model: &Model, k: usize, turns: bool, around: f64) -> (f64, f64) {
     let limits = model.coordinates()[k].limits;
     let half = if turns { PI } else { 1.0 };

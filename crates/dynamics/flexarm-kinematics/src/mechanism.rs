@@ -1,8 +1,8 @@
-//! A mechanism as a user describes it: links and joints by name, fixed joints included.
+//! Mechanism as defined by the user: named links and joints, including fixed joints.
 //!
-//! This is the editable form. Readers (URDF) produce it, the flexible-link substitution changes it,
-//! and [`crate::Model::new`] checks it once and turns it into the immutable tree that the
-//! recursions read. Start at [`Mechanism`]. Not here: any computation.
+//! This is the editable form. Readers (URDF) produce it, the flexible-link substitution modifies
+//! it, and [`crate::Model::new`] checks it once and converts it to the immutable tree used by the
+//! recursions. Start at [`Mechanism`]. Not here: any computation.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -15,47 +15,46 @@ use crate::balancer::Balancer;
 use crate::closure::LoopClosure;
 use crate::modal::ModalBody;
 
-/// Links joined by joints into one tree. SI units.
+/// Tree of links connected by joints. SI units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mechanism {
     /// Name of the robot.
     pub name: String,
-    /// All links, in the order of the source; the one that is no joint's child is the base.
+    /// All links, in source order; the link that is no joint's child is the base.
     pub links: Vec<Link>,
-    /// All joints, in the order of the source.
+    /// All joints, in source order.
     pub joints: Vec<Joint>,
-    /// Links that bend in modes, by name; their mass is in the modal body, beside the link's own
-    /// inertia.
+    /// Modal links, by name. The mass of the modal body is in addition to the link's own inertia.
     pub modal: Vec<(String, Arc<ModalBody>)>,
-    /// Springs, gas springs and counterbalances between points of the arm or over joints.
+    /// Springs, gas springs and counterbalances between points of the arm or about joints.
     pub balancers: Vec<Balancer>,
-    /// Rotors that turn with several joints: what their inertias couple.
+    /// Inertia couplings of rotors driven by several joints.
     pub rotor_couplings: Vec<RotorCoupling>,
-    /// Pins that close chains of links in a plane.
+    /// Pins that close planar chains of links.
     pub loops: Vec<LoopClosure>,
-    /// Acceleration of gravity in world (= base link) axes (m/s²).
+    /// Gravitational acceleration in world (= base link) axes (m/s²).
     pub gravity: Vector3<f64>,
-    /// Joints in the order of the actuated coordinates; those that are not named follow in the
-    /// order of the tree, depth first. See [`Mechanism::keep_coordinate_order`].
+    /// Joints in the order of the actuated coordinates; joints not listed follow in tree order,
+    /// depth first. See [`Mechanism::keep_coordinate_order`].
     pub coordinate_order: Vec<String>,
 }
 
-/// Inertia between two joints, of rotors that turn with both: `q̇_1 q̇_2` times this in the kinetic
-/// energy.
+/// Inertia coupling of two joints by rotors that rotate with both: it multiplies `q̇_1 q̇_2` in the
+/// kinetic energy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RotorCoupling {
-    /// Two joints of one coordinate each.
+    /// The two joints, each with one coordinate.
     pub joints: [String; 2],
-    /// Entry of the mass matrix in the row of one and the column of the other (kg m², kg m or kg).
+    /// Off-diagonal entry of the mass matrix (kg m², kg m or kg).
     pub inertia: f64,
 }
 
-/// A rigid body with its frame.
+/// Rigid body with its frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Link {
     /// Unique name.
     pub name: String,
-    /// Mass properties; `None` for a mere frame.
+    /// Mass properties; `None` for a frame without mass.
     pub inertia: Option<LinkInertia>,
 }
 
@@ -71,18 +70,18 @@ pub struct LinkInertia {
 }
 
 impl LinkInertia {
-    /// As spatial inertia about the link's origin.
+    /// Converts to spatial inertia about the link origin.
     pub fn spatial(&self) -> SpatialInertia {
         SpatialInertia::from_com(self.mass, &self.com, &self.inertia_com)
     }
 }
 
-/// A joint between two links.
+/// Joint between two links.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
     /// Unique name.
     pub name: String,
-    /// What it lets move.
+    /// Type of the joint.
     pub kind: JointKind,
     /// Name of the parent link P.
     pub parent: String,
@@ -92,27 +91,27 @@ pub struct Joint {
     pub X_PJ: Pose,
     /// Position, velocity and effort limits.
     pub limits: Limits,
-    /// Set when this joint follows another one.
+    /// Set if this joint follows another one.
     pub mimic: Option<Mimic>,
-    /// Inertia of the rotor seen from the joint, ratio² times its own (kg m² or kg); only on
-    /// one-DoF joints.
+    /// Rotor inertia reflected to the joint, ratio² times its own (kg m² or kg); only for
+    /// single-DoF joints.
     pub armature: f64,
 }
 
-/// What a joint lets move. Axes are unit vectors in the joint frame.
+/// Type of a joint. Axes are unit vectors in the joint frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum JointKind {
-    /// Nothing.
+    /// No motion.
     Fixed,
-    /// One rotation within limits.
+    /// One rotation with position limits.
     Revolute(Unit<Vector3<f64>>),
     /// One rotation without position limits.
     Continuous(Unit<Vector3<f64>>),
     /// One translation.
     Prismatic(Unit<Vector3<f64>>),
-    /// One rotation that slides along its axis as a nut on a spindle does.
+    /// One rotation with a proportional translation along its axis, like a nut on a spindle.
     Helical {
-        /// The axis.
+        /// Screw axis.
         axis: Unit<Vector3<f64>>,
         /// Translation per rad (m).
         pitch: f64,
@@ -123,20 +122,20 @@ pub enum JointKind {
     ElasticRevolute(Unit<Vector3<f64>>),
     /// One small elastic translation.
     ElasticPrismatic(Unit<Vector3<f64>>),
-    /// One small elastic rotation that slides along its axis (the spring behind a helical joint).
+    /// One small elastic rotation with a proportional translation (spring of a helical joint).
     ElasticHelical {
-        /// The axis.
+        /// Screw axis.
         axis: Unit<Vector3<f64>>,
         /// Translation per rad (m).
         pitch: f64,
     },
-    /// Interface of that number of the parent link, which must have a [`ModalBody`]: moves with its
-    /// coordinates.
+    /// Interface of this index of the parent link, which must have a [`ModalBody`]; moves with the
+    /// modal coordinates.
     Interface(usize),
 }
 
 impl JointKind {
-    /// Number of coordinates of its own.
+    /// Number of coordinates of the joint itself.
     pub fn degrees_of_freedom(&self) -> usize {
         match self {
             Self::Fixed | Self::Interface(_) => 0,
@@ -147,7 +146,7 @@ impl JointKind {
         }
     }
 
-    /// Motion of its coordinate, where it has one.
+    /// Axis motion of single-DoF joints.
     pub fn axis_motion(&self) -> Option<AxisMotion> {
         match *self {
             Self::Revolute(axis) | Self::Continuous(axis) | Self::ElasticRevolute(axis) => {
@@ -161,7 +160,7 @@ impl JointKind {
         }
     }
 
-    /// Whether its coordinates are small elastic ones.
+    /// Whether the coordinates are small elastic displacements.
     pub fn is_elastic(&self) -> bool {
         matches!(
             self,
@@ -169,7 +168,7 @@ impl JointKind {
         )
     }
 
-    /// The spring that moves as this joint of one coordinate does.
+    /// Elastic joint with the motion of this single-DoF joint.
     pub fn spring(&self) -> Option<JointKind> {
         match *self {
             Self::Revolute(axis) | Self::Continuous(axis) => Some(Self::ElasticRevolute(axis)),
@@ -179,22 +178,23 @@ impl JointKind {
         }
     }
 
-    /// Whether its coordinate is a joint angle (rad).
+    /// Whether the coordinate is a joint angle (rad).
     pub fn turns(&self) -> bool {
         !self.is_elastic() && self.axis_motion().is_some_and(|motion| !motion.slides())
     }
 
-    /// Whether its coordinate is a joint translation (m).
+    /// Whether the coordinate is a joint translation (m).
     pub fn slides(&self) -> bool {
         !self.is_elastic() && self.axis_motion().is_some_and(AxisMotion::slides)
     }
 
-    /// Translation per unit of its coordinate: 1 where it slides (m/m).
+    /// Translation per unit of the coordinate: 1 for sliding joints (m/m).
     pub fn travel(&self) -> f64 {
         self.axis_motion().map_or(0.0, AxisMotion::travel)
     }
 
-    /// The word of URDF files, and `helical`, which these do not have.
+    /// Name of the type in URDF files; also `helical`, `elastic` and `interface`, which URDF does
+    /// not have.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Fixed => "fixed",
@@ -210,29 +210,29 @@ impl JointKind {
     }
 }
 
-/// Limits of a joint; infinite where there is none.
+/// Joint limits; infinite where there is no limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// Lowest position (rad or m).
+    /// Minimum position (rad or m).
     pub lower: f64,
-    /// Highest position (rad or m).
+    /// Maximum position (rad or m).
     pub upper: f64,
-    /// Highest speed (rad/s or m/s).
+    /// Maximum speed (rad/s or m/s).
     pub velocity: f64,
-    /// Highest torque or force (N m or N).
+    /// Maximum torque or force (N m or N).
     pub effort: f64,
 }
 
 impl Limits {
-    /// No limit at all.
+    /// No limits.
     pub const NONE: Limits =
         Limits { lower: f64::NEG_INFINITY, upper: f64::INFINITY, velocity: f64::INFINITY, effort: f64::INFINITY };
 }
 
-/// `q = ratio * q_of(joint) + offset`.
+/// Mimic relation `q = ratio * q_of(joint) + offset`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mimic {
-    /// Name of the joint that leads.
+    /// Name of the leading joint.
     pub joint: String,
     /// Factor.
     pub ratio: f64,
@@ -241,7 +241,7 @@ pub struct Mimic {
 }
 
 impl Mechanism {
-    /// A mechanism without links, under standard gravity along -z.
+    /// Creates a mechanism without links, under standard gravity along -z.
     pub fn new(name: impl Into<String>) -> Self {
         Self {
             name: name.into(),
@@ -256,9 +256,9 @@ impl Mechanism {
         }
     }
 
-    /// Keeps the order that the actuated coordinates have now, however the tree is changed
-    /// afterwards: joints that move to another link come in another place of the tree, and joint
-    /// values are told by their order.
+    /// Keeps the current order of the actuated coordinates through later changes of the tree.
+    /// Joints that move to another link get another position in the tree, while joint values are
+    /// identified by their order.
     pub fn keep_coordinate_order(&mut self) {
         if !self.coordinate_order.is_empty() {
             return;
@@ -276,24 +276,24 @@ impl Mechanism {
         self.coordinate_order = order;
     }
 
-    /// The link of that name.
+    /// Returns the link with this name.
     pub fn link(&self, name: &str) -> Option<&Link> {
         self.links.iter().find(|l| l.name == name)
     }
 
-    /// The joint of that name.
+    /// Returns the joint with this name.
     pub fn joint(&self, name: &str) -> Option<&Joint> {
         self.joints.iter().find(|j| j.name == name)
     }
 
-    /// The joints that start at a link, in source order.
+    /// Child joints of a link, in source order.
     pub fn child_joints<'a>(&'a self, link: &'a str) -> impl Iterator<Item = &'a Joint> + 'a {
         self.joints.iter().filter(move |j| j.parent == link)
     }
 }
 
 impl Joint {
-    /// A joint without limits or mimic.
+    /// Creates a joint without limits or mimic relation.
     pub fn new(
         name: impl Into<String>,
         kind: JointKind,

@@ -1,9 +1,8 @@
-//! A body that bends in modes: floating frame of reference with its frame at the proximal
-//! interface.
+//! Modal body: flexible body in a floating frame of reference fixed to its proximal interface.
 //!
-//! A point at `s` of the undeformed body stands at `r = s + Σ φ_k(s) η_k`, body axes, with shapes
-//! that vanish where the body hangs on its parent. With a kinetic energy that is exact in η (second
-//! order included) the equations of motion need no more than mass integrals:
+//! A point at `s` in the undeformed body is at `r = s + Σ φ_k(s) η_k`, in body axes; the shapes
+//! vanish at the proximal interface. With a kinetic energy that is exact in η (including second
+//! order), the equations of motion need only mass integrals:
 //!
 //! ```text
 //! h   = ∫ r dm            = S + C_t η                                    (1)
@@ -17,66 +16,65 @@
 //!
 //! W = ∫ r (dr/dt)ᵀ dm = (Σ_k η̇_k Q_k)ᵀ,   g_lk = ∫ φ_l × φ_k dm;   a = v̇ + ω × v in body axes
 //! ```
-//! What turns with the sections (rotary inertia of beams) enters `J_0`, `C_r0` and `M_e` as
-//! constants.
+//! Rotary inertia of beam cross-sections enters `J_0`, `C_r0` and `M_e` as constants.
 //!
-//! Of `Q_k` the symmetric part is enough, as six numbers: `axial(N_kl)` is `g_lk`, and what the
-//! skew part of W adds to T is what `ω × C_r η̇` adds.
+//! Only the symmetric part of `Q_k` is stored, as six numbers: `axial(N_kl)` is `g_lk`, and the
+//! contribution of the skew part of W to T is `ω × C_r η̇`.
 //!
 //! Start at [`ModalBody`]. Sources: [Shabana 2013], chapter 5; [Wallrapp 1994] for the set of
-//! integrals. Not here: stiffness and damping of the modes, where shapes come from.
+//! integrals. Not here: modal stiffness and damping, computation of the shapes.
 
 use flexarm_spatial::products::{add, add3, cross, dot, lift, lift3, mul, scaled, tr_mul};
 use flexarm_spatial::{Pose, Real, SpatialInertia, Twist, Wrench};
 use nalgebra::{Cholesky, DMatrix, Dyn, Matrix3, Matrix6xX, Scalar, Vector3};
 
-/// Shapes at the interfaces and mass integrals over them; n coordinates, link axes, about the
-/// link's origin. SI units.
+/// Mode shapes at the interfaces and mass integrals; n coordinates, link axes, about the link
+/// origin. SI units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModalBody {
     /// Mass (kg).
     pub mass: f64,
     /// `∫ s dm` (kg m).
     pub first_moment: Vector3<f64>,
-    /// Inertia about the origin, undeformed (kg m²).
+    /// Inertia about the origin in the undeformed state (kg m²).
     pub inertia: Matrix3<f64>,
     /// `∫ φ_k dm`, one per coordinate.
     pub C_t: Vec<Vector3<f64>>,
-    /// `∫ s × φ_k dm`, with the rotary inertia of sections.
+    /// `∫ s × φ_k dm`, including rotary inertia of cross-sections.
     pub C_r: Vec<Vector3<f64>>,
     /// `P_k[a,b] = ∫ s_a φ_k,b dm`.
     pub P: Vec<Matrix3<f64>>,
-    /// `N[k n + l][a,b] = ∫ φ_k,a φ_l,b dm`; empty: terms of second order in the deformation are
-    /// left out.
+    /// `N[k n + l][a,b] = ∫ φ_k,a φ_l,b dm`; if empty, second-order terms in the deformation are
+    /// omitted.
     pub N: Vec<Matrix3<f64>>,
-    /// Modal mass, n×n.
+    /// Modal mass matrix, n×n.
     pub M: DMatrix<f64>,
-    /// Every interface but the proximal one.
+    /// All interfaces except the proximal one.
     pub interfaces: Vec<InterfaceShape>,
 }
 
-/// How one interface moves with the coordinates.
+/// Motion of one interface as a function of the coordinates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InterfaceShape {
-    /// Its frame in the link, undeformed.
+    /// Undeformed pose of the interface in the link.
     pub X_LI: Pose,
-    /// Displacement of its origin and rotation vector per coordinate, link axes, 6×n.
+    /// Displacement of its origin and rotation vector per unit coordinate, link axes, 6×n.
     pub Phi: Matrix6xX<f64>,
 }
 
 impl ModalBody {
-    /// Number of coordinates.
+    /// Number of modal coordinates.
     pub fn n(&self) -> usize {
         self.C_t.len()
     }
 
-    /// Mass properties undeformed, about the link's origin.
+    /// Mass properties in the undeformed state, about the link origin.
     pub fn undeformed(&self) -> SpatialInertia {
         SpatialInertia { mass: self.mass, first_moment: self.first_moment, rotational: self.inertia }
     }
 
-    /// Mass matrix of the undeformed body: acceleration and angular acceleration of the link's
-    /// origin, then the modes; (5) at rest, (6 + n)×(6 + n).
+    /// Mass matrix of the undeformed body, (6 + n)×(6 + n): linear and angular acceleration of the
+    /// link origin, then modal accelerations; matrix of (5) at η = 0.
     pub fn mass_matrix(&self) -> DMatrix<f64> {
         let n = self.n();
         let mut M = DMatrix::zeros(6 + n, 6 + n);
@@ -94,9 +92,9 @@ impl ModalBody {
         M
     }
 
-    /// Coordinates that move no interface, if all of them are orthogonal to each other in mass.
+    /// Coordinates that move no interface; empty unless they are mutually orthogonal in mass.
     pub(crate) fn held(&self) -> Vec<usize> {
-        /// Numbers so much smaller than others like them are rounding.
+        /// Relative size below which values are considered rounding errors.
         const ROUNDING: f64 = 1e-12;
         let largest = self.interfaces.iter().map(|shape| shape.Phi.amax()).fold(0.0, f64::max);
         let still = |k: &usize| self.interfaces.iter().all(|shape| shape.Phi.column(*k).amax() <= ROUNDING * largest);
@@ -107,7 +105,7 @@ impl ModalBody {
         if orthogonal { held } else { Vec::new() }
     }
 
-    /// What is wrong with its sizes, if anything.
+    /// Returns a description of inconsistent sizes or values, if any.
     pub(crate) fn fault(&self) -> Option<&'static str> {
         let n = self.n();
         let shapes = self.interfaces.iter().all(|i| i.Phi.ncols() == n);
@@ -123,34 +121,34 @@ impl ModalBody {
     }
 }
 
-/// A modal body as the recursions read it.
+/// Modal body with precomputed tables for the recursions.
 #[derive(Clone, Debug)]
 pub(crate) struct ModalTables {
     pub(crate) shapes: ModalBody,
-    /// (2): column l holds `N_kl` of all k, each as its [`symmetric`] part.
+    /// (2): column l holds `N_kl` for all k, each as its [`symmetric`] part.
     N: Integrals,
-    /// Column l holds `g_lk` of all k.
+    /// Column l holds `g_lk` for all k.
     g: Integrals,
-    /// `P_k` of all k, likewise.
+    /// `P_k` for all k, in the same form.
     P: Vec<f64>,
-    /// Of each interface, the first coordinates that move it; those that follow do not.
+    /// Per interface, the number of leading coordinates that may move it; later ones do not.
     pub(crate) moving: Vec<usize>,
 }
 
-/// Second-order integrals of pairs of coordinates, a column for each coordinate.
+/// Second-order integrals of pairs of coordinates, one column per coordinate.
 #[derive(Clone, Debug)]
 enum Integrals {
-    /// Those of a mesh.
+    /// Dense storage, as for a mesh.
     All(DMatrix<f64>),
-    /// Those of a beam, of whose modes each moves along one axis: row and value of what is not
-    /// zero, and where each column ends.
+    /// Sparse storage, as for a beam whose modes each move along one axis: row and value of the
+    /// nonzero entries, and the end of each column.
     Few { entries: Vec<(u32, f64)>, ends: Vec<usize> },
 }
 
 impl Integrals {
-    /// Entries below that part of the largest that two coordinates could have are rounding.
+    /// Relative magnitude below which entries are dropped as rounding errors.
     const ROUNDING: f64 = 1e-14;
-    /// One of so many entries, or fewer, is not zero where lists are faster than the whole matrix.
+    /// Sparse storage is used if at most one in this many entries is nonzero; it is faster then.
     const SPARSE: usize = 4;
 
     fn new(all: DMatrix<f64>, shapes: &ModalBody) -> Self {
@@ -198,7 +196,7 @@ fn axial(Q: &Matrix3<f64>) -> Vector3<f64> {
     Vector3::new(Q[(2, 1)] - Q[(1, 2)], Q[(0, 2)] - Q[(2, 0)], Q[(1, 0)] - Q[(0, 1)])
 }
 
-/// Twice the symmetric part off the diagonal: xx, yy, zz, xy + yx, xz + zx, yz + zy.
+/// Symmetric part with doubled off-diagonal entries: xx, yy, zz, xy + yx, xz + zx, yz + zy.
 #[inline(always)]
 fn symmetric(Q: &Matrix3<f64>) -> [f64; 6] {
     let off = |a: usize, b: usize| Q[(a, b)] + Q[(b, a)];
@@ -231,12 +229,12 @@ impl ModalTables {
     }
 }
 
-/// Configuration, momentum terms and workspaces of one modal body.
+/// Configuration, velocity terms and workspace of one modal body.
 #[derive(Clone, Debug)]
 pub(crate) struct ModalData<T: Scalar = f64> {
-    /// `η̇` of the last velocity pass.
+    /// `η̇` from the last velocity pass.
     pub(crate) rates: Vec<T>,
-    /// (1) and (3) with the mass: the body as if it were rigid now.
+    /// Rigid-body inertia in the current configuration: mass, (1) and (3).
     pub(crate) inertia: SpatialInertia<T>,
     /// (2), as [`symmetric`] parts.
     Q: Vec<T>,
@@ -244,18 +242,18 @@ pub(crate) struct ModalData<T: Scalar = f64> {
     g: Vec<T>,
     /// (4).
     pub(crate) C_r: Vec<Vector3<T>>,
-    /// Generalised forces on the coordinates.
+    /// Generalised forces on the modal coordinates.
     pub(crate) f: Vec<T>,
     /// Wrench columns of the mass matrix, or `H_rη` of the articulated recursion.
     pub(crate) columns: Vec<Wrench<T>>,
-    /// `H_ηη` and its factor's storage.
+    /// `H_ηη` and the storage of its factorisation.
     pub(crate) H: DMatrix<f64>,
     pub(crate) factor: Option<Cholesky<f64, Dyn>>,
     /// `H_ηη^-1 [H_ηr, τ - p]`, n×7.
     pub(crate) solved: DMatrix<f64>,
 }
 
-/// `y += A x`, four columns at a time: y then goes through the registers once for all four.
+/// `y += A x`, four columns at a time, to load and store y once per four columns.
 #[inline(always)]
 fn add_product<T: Real>(A: &DMatrix<f64>, x: &[T], y: &mut [T]) {
     let rows = A.nrows();
@@ -295,7 +293,7 @@ impl<T: Real> ModalData<T> {
         }
     }
 
-    /// (1) to (4) at coordinates `eta`.
+    /// Computes (1) to (4) at coordinates `eta`.
     #[inline(always)]
     pub(crate) fn place(&mut self, tables: &ModalTables, eta: &[T]) {
         let shapes = &tables.shapes;
@@ -322,7 +320,7 @@ impl<T: Real> ModalData<T> {
         self.inertia = SpatialInertia { mass: T::splat(shapes.mass), first_moment: h, rotational: J };
     }
 
-    /// What (5) gives without spatial acceleration and `η̈`: returns `[F; T]`, sets `f`.
+    /// Velocity terms of (5), without spatial acceleration and `η̈`: returns `[F; T]`, sets `f`.
     #[inline(always)]
     pub(crate) fn bias(&mut self, tables: &ModalTables, V: &Twist<T>, rates: &[T]) -> Wrench<T> {
         let (w, v) = (V.angular, V.linear);
@@ -332,9 +330,10 @@ impl<T: Real> ModalData<T> {
         let shapes = &tables.shapes;
         let (mut W, mut c_t, mut c_r) = ([T::zero(); 6], Vector3::zeros(), Vector3::zeros());
         let two = T::splat(2.0);
-        // ω × v is the part of the origin's acceleration that a spatial acceleration leaves out.
+        // ω × v is the difference between the acceleration of the origin and the spatial
+        // acceleration.
         let wv = cross(&w, &v);
-        // ωᵀ Q ω - tr(Q) ω·ω is a sum over the entries of Q, with these weights.
+        // ωᵀ Q ω - tr(Q) ω·ω as a weighted sum over the entries of Q.
         let (xx, yy, zz) = (w.x * w.x, w.y * w.y, w.z * w.z);
         let weights = [-(yy + zz), -(xx + zz), -(xx + yy), w.x * w.y, w.x * w.z, w.y * w.z];
         let w2 = scaled(&w, two);
@@ -351,9 +350,10 @@ impl<T: Real> ModalData<T> {
             self.f[k] = f;
         }
         let SpatialInertia { mass, first_moment: h, rotational: J } = &self.inertia;
+        // Force and moment rows of the velocity terms in (5), plus the acceleration ω × v.
         let turned = add(&scaled(&c_t, two), &cross(&w, h));
         let force = add(&scaled(&wv, *mass), &cross(&w, &turned));
-        // 2 (tr W 1 - W) ω for the symmetric part of W; its skew part is in C_r η̇.
+        // 2 (tr W 1 - W) ω for the symmetric part of W; the skew part is included in C_r η̇.
         let [x, y, z, xy, xz, yz] = W;
         let rest = Vector3::new(
             two * (y + z) * w.x - xy * w.y - xz * w.z,
@@ -364,8 +364,8 @@ impl<T: Real> ModalData<T> {
         Wrench::new(force, torque)
     }
 
-    /// Mass terms of (5): adds to `f` and returns the wrench, for spatial acceleration A and `η̈`
-    /// (none: zero).
+    /// Mass terms of (5) for spatial acceleration A and `η̈` (`None` for zero): adds to `f` and
+    /// returns the wrench.
     #[inline(always)]
     pub(crate) fn inertia_forces(
         &mut self,
@@ -390,7 +390,8 @@ impl<T: Real> ModalData<T> {
 }
 
 impl ModalData {
-    /// Kinetic energy (J) for the twist of the body frame and the rates of the last velocity pass.
+    /// Kinetic energy (J) for the twist V of the body frame and the modal rates of the last
+    /// velocity pass.
     pub(crate) fn kinetic_energy(&self, tables: &ModalTables, V: &Twist) -> f64 {
         let mut energy = 0.5 * V.power(&self.inertia.mul_twist(V));
         for (k, rate) in self.rates.iter().enumerate() {
@@ -401,7 +402,7 @@ impl ModalData {
         energy
     }
 
-    /// Momentum about the body's origin (kg m/s, kg m²/s), likewise.
+    /// Momentum about the body origin (kg m/s, kg m²/s), for the same rates.
     pub(crate) fn momentum(&self, tables: &ModalTables, V: &Twist) -> Wrench {
         let mut p = self.inertia.mul_twist(V);
         for (k, rate) in self.rates.iter().enumerate() {
@@ -413,7 +414,7 @@ impl ModalData {
 }
 
 impl InterfaceShape {
-    /// Displacement and rotation vector at the coordinates (or their rates).
+    /// Displacement and rotation vector for modal coordinates (or their rates).
     #[inline(always)]
     pub(crate) fn times<T: Real>(&self, eta: &[T]) -> (Vector3<T>, Vector3<T>) {
         let mut y = [T::zero(); 6];
@@ -434,8 +435,8 @@ impl InterfaceShape {
         }
     }
 
-    /// Column k of the motion subspace in the child's axes, for its maps L (translations) and B
-    /// (rotations).
+    /// Column k of the motion subspace in the child's axes, with its maps L (translation) and B
+    /// (rotation).
     #[inline(always)]
     pub(crate) fn twist<T: Real>(&self, k: usize, L: &Matrix3<T>, B: &Matrix3<T>) -> Twist<T> {
         let c = &self.Phi.as_slice()[6 * k..6 * k + 6];
@@ -443,7 +444,7 @@ impl InterfaceShape {
         Twist::new(mul(L, &lift(&l)), mul(B, &lift(&a)))
     }
 
-    /// `Sᵀ F` for all coordinates, F in the child's axes: added to `f`.
+    /// Adds `Sᵀ F` to `f` for all coordinates, F in the child's axes.
     #[inline(always)]
     pub(crate) fn project<T: Real>(&self, L: &Matrix3<T>, B: &Matrix3<T>, F: &Wrench<T>, f: &mut [T]) {
         self.add_transposed(&tr_mul(L, &F.force), &tr_mul(B, &F.torque), f);

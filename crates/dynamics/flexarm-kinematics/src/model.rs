@@ -1,13 +1,13 @@
-//! The immutable tree that the recursions read: bodies in order, parents before children.
+//! Immutable kinematic tree used by the recursions: bodies in order, parents before children.
 //!
-//! Body 0 is the world (the base link and all that is fixed to it); every other body has exactly
-//! one joint to its parent. Links on fixed joints are lumped into the body that carries them and
-//! stay as named [`Frame`]s. Start at [`Model::new`]. Not here: state and results ([`crate::Data`],
-//! [`crate::State`]).
+//! Body 0 is the world (the base link and everything fixed to it); every other body has exactly one
+//! joint to its parent. Links on fixed joints are lumped into the body that carries them and remain
+//! available as named [`Frame`]s. Start at [`Model::new`]. Not here: state and results
+//! ([`crate::Data`], [`crate::State`]).
 //!
-//! Coordinates: actuated joints first (in tree order), then the elastic ones in groups, proximal to
-//! distal: six or one per elastic joint, n per modal body. [`Model::elastic`] and
-//! [`Body::coordinate`] know the offsets.
+//! Coordinates: actuated joints first (in tree order), then the elastic coordinates in groups,
+//! proximal to distal: six or one per elastic joint, n per modal body. The offsets are in
+//! [`Model::elastic`] and [`Body::coordinate`].
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -24,7 +24,7 @@ use crate::lanes::along_axis;
 use crate::mechanism::{Joint, JointKind, Limits, Mechanism, RotorCoupling};
 use crate::modal::ModalTables;
 
-/// A checked tree of bodies; built once, then only read and shared between threads.
+/// Validated tree of bodies; built once, then read-only and shared between threads.
 #[derive(Clone, Debug)]
 pub struct Model {
     /// Name of the mechanism.
@@ -37,92 +37,93 @@ pub struct Model {
     elastic: Vec<ElasticGroup>,
     pub(crate) modal: Vec<Modal>,
     pub(crate) balancers: Vec<PlacedBalancer>,
-    /// Coordinates with rotors, and the inertia of these seen from there.
+    /// Coordinates with rotors, and the rotor inertia reflected to each.
     pub(crate) rotors: Vec<(usize, f64)>,
-    /// Two coordinates and the entry that rotors add to their rows and columns in the mass matrix.
+    /// Pairs of coordinates and the off-diagonal entry that rotors add to the mass matrix.
     pub(crate) rotor_couplings: Vec<(usize, usize, f64)>,
     pub(crate) has_mimic: bool,
-    /// Whether entries of the mass matrix are zero or sums: branches, bodies that bend in modes,
-    /// joints that mimic others.
+    /// Whether entries of the mass matrix may be zero or sums: branches, modal bodies or mimic
+    /// joints.
     pub(crate) sums_entries: bool,
-    /// Closed loops, each after those that it rests on.
+    /// Closed loops, each after the loops it depends on.
     pub(crate) loops: Vec<PlacedLoop>,
-    /// Coordinates that follow from the loops; in the tree they come after all others.
+    /// Coordinates determined by the loops; in the tree they follow all independent ones.
     dependent: Vec<Coordinate>,
-    /// Bodies on joints of one coordinate that turn.
+    /// Bodies moved by single-coordinate joints that rotate.
     pub(crate) turning: Vec<usize>,
-    /// Coordinates of the joints that have one, in the order of the bodies, and the first ones of
-    /// those that have six.
+    /// Coordinates of single-DoF joints, in body order; `six` holds the first coordinate of each
+    /// six-DoF joint.
     pub(crate) single: Vec<usize>,
     pub(crate) six: Vec<usize>,
-    /// Acceleration of gravity in world axes (m/s²).
+    /// Gravitational acceleration in world axes (m/s²).
     pub gravity: Vector3<f64>,
 }
 
-/// One moving body B (or the world, index 0) with the joint to its parent P.
+/// Moving body B (or the world, index 0) with the joint to its parent P.
 #[derive(Clone, Debug)]
 pub struct Body {
-    /// Name of the link whose frame is the body's frame.
+    /// Name of the link whose frame is the body frame.
     pub name: String,
-    /// Name of the joint that moves it.
+    /// Name of the joint that moves the body.
     pub joint: String,
     /// Index of the parent body; 0 is the world. Meaningless for body 0.
     pub parent: usize,
-    /// Joint frame in the parent body at zero coordinate.
+    /// Pose of the joint frame in the parent body at zero coordinate.
     pub X_PJ: Pose,
-    /// Inertia about Bo in B axes, with everything fixed to the body.
+    /// Inertia about Bo in B axes, including everything fixed to the body.
     pub inertia: SpatialInertia,
-    /// What the joint lets move.
+    /// Motion allowed by the joint.
     pub motion: JointMotion,
-    /// Index of the (first) independent coordinate; from [`Model::nv`] on those that closed loops
-    /// determine.
+    /// Index of the (first) independent coordinate; indices from [`Model::nv`] on are dependent
+    /// coordinates of closed loops.
     pub coordinate: usize,
     /// Joint value = ratio × coordinate + offset; (1, 0) except for mimic joints.
     pub ratio: f64,
-    /// See `ratio`.
+    /// Offset of the joint value, see `ratio`.
     pub offset: f64,
-    /// Inertia of the rotor seen from the coordinate (kg m² or kg).
+    /// Rotor inertia reflected to the coordinate (kg m² or kg).
     pub armature: f64,
-    /// Whether its coordinates are elastic ones.
+    /// Whether the joint coordinates are elastic.
     pub elastic: bool,
-    /// Number of its modal body, if it bends in modes.
+    /// Index of its modal body, if it is one.
     pub(crate) modal: Option<usize>,
     pub(crate) turn: RevoluteTable,
-    /// Number of its joint among those that turn.
+    /// Index of its joint among the rotating ones.
     pub(crate) turning: usize,
-    /// One past the last body outward of this one; depth-first order makes a subtree a range.
+    /// One past the last body of the subtree; depth-first order makes a subtree a contiguous range.
     pub(crate) subtree_end: usize,
-    /// Whether the joint frame's axes are the parent's.
+    /// Whether the joint frame has the same axes as the parent frame.
     pub(crate) is_parallel: bool,
     pub(crate) columns: Outward,
 }
 
-/// Joints from a body's own one outward, as ranges of the model's lists `single` and `six`.
+/// Joints of a subtree, including the body's own joint, as ranges of the model's lists `single` and
+/// `six`.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Outward {
     pub(crate) single: Range<usize>,
     pub(crate) six: Range<usize>,
 }
 
-/// Motion of a joint in the recursions.
+/// Joint motion as used by the recursions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum JointMotion {
-    /// One coordinate along a constant column.
+    /// One coordinate along a constant motion axis.
     Axis(AxisMotion),
-    /// Translation in P axes, then angles.
+    /// Translation in P axes, then rotation angles.
     Elastic(ElasticAngles),
-    /// None: a modal link on a fixed joint is a body of its own, without a coordinate.
+    /// No motion: a modal link on a fixed joint is a separate body without a joint coordinate.
     Welded,
-    /// An interface of the parent's modal body; coordinates are those of that body.
+    /// Interface of the parent's modal body; it uses the coordinates of that body.
     Interface {
-        /// Number of the modal body in the model.
+        /// Index of the modal body in the model.
         modal: usize,
-        /// Number of the interface.
+        /// Index of the interface.
         interface: usize,
     },
 }
 
-/// A modal body in the tree.
+/// Modal body in the tree.
 #[derive(Clone, Debug)]
 pub(crate) struct Modal {
     pub(crate) body: usize,
@@ -132,10 +133,10 @@ pub(crate) struct Modal {
 }
 
 impl Body {
-    /// Pose in the parent at the coordinate (rad or m) of its joint, which has one.
+    /// Pose in the parent for the coordinate value (rad or m) of a single-DoF joint.
     ///
     /// # Panics
-    /// If the joint has none or several.
+    /// If the joint does not have exactly one coordinate.
     #[inline]
     pub fn X_PB(&self, coordinate: f64) -> Pose {
         let JointMotion::Axis(motion) = self.motion else { panic!("joint {:?} has not one coordinate", self.joint) };
@@ -144,7 +145,7 @@ impl Body {
 }
 
 impl Modal {
-    /// How an interface moves with each coordinate that moves it, six numbers each.
+    /// Mode shape columns of an interface, six components for each coordinate that moves it.
     #[inline(always)]
     pub(crate) fn columns_of(&self, interface: usize) -> ChunksExact<'_, f64> {
         let moving = 6 * self.tables.moving[interface];
@@ -152,12 +153,12 @@ impl Modal {
     }
 }
 
-/// Elastic coordinates that belong together: one elastic joint, or one modal body.
+/// Contiguous elastic coordinates of one elastic joint or one modal body.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ElasticGroup {
-    /// Name of the joint, or of the link that bends in modes.
+    /// Name of the elastic joint, or of the modal link.
     pub name: String,
-    /// Body behind the joint, or the modal body.
+    /// Child body of the joint, or the modal body.
     pub body: usize,
     /// First coordinate.
     pub coordinate: usize,
@@ -167,43 +168,43 @@ pub struct ElasticGroup {
     pub modal: bool,
 }
 
-/// A named frame fixed to a body: every link of the mechanism is one.
+/// Named frame fixed to a body; there is one per link of the mechanism.
 #[derive(Clone, Debug)]
 pub struct Frame {
     /// Name of the link.
     pub name: String,
-    /// Body that carries it.
+    /// Body that carries the frame.
     pub body: usize,
     /// Pose of the frame in the body.
     pub X_BF: Pose,
 }
 
-/// One independent coordinate.
+/// Independent coordinate.
 #[derive(Clone, Debug)]
 pub struct Coordinate {
-    /// Joint it belongs to.
+    /// Joint that owns the coordinate.
     pub joint: String,
     /// Component within the joint: 0, or 0..6 for elastic joints.
     pub component: usize,
-    /// Body that the joint moves.
+    /// Body moved by the joint.
     pub body: usize,
     /// Limits of the joint.
     pub limits: Limits,
-    /// Word of URDF files for the joint's kind.
+    /// URDF name of the joint type.
     pub kind: &'static str,
 }
 
-/// Most independent coordinates of a model.
+/// Maximum number of independent coordinates of a model.
 pub const MOST_COORDINATES: usize = 600;
 
-/// Why a mechanism is not a usable tree.
+/// Reason why a mechanism is not a valid tree.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ModelError {
-    /// Nothing there.
+    /// The mechanism is empty.
     #[error("mechanism {0:?} has no links: add at least a base link")]
     NoLinks(String),
-    /// Two things of one name.
+    /// Two links or two joints have the same name.
     #[error("{what} {name:?} is defined twice: names must be unique")]
     Duplicate {
         /// "link" or "joint".
@@ -211,7 +212,7 @@ pub enum ModelError {
         /// The name.
         name: String,
     },
-    /// A joint names a link that is not there.
+    /// A joint refers to an unknown link.
     #[error("joint {joint:?} refers to link {link:?}, which does not exist")]
     UnknownLink {
         /// The joint.
@@ -235,13 +236,13 @@ pub enum ModelError {
         /// The links without parent.
         roots: Vec<String>,
     },
-    /// A loop.
+    /// The links form a cycle.
     #[error("links {links:?} form a loop: open it at one joint")]
     Cycle {
         /// The links that cannot be reached from a base.
         links: Vec<String>,
     },
-    /// A body on a spring without mass: nothing says how it would move.
+    /// A body on a spring has no mass, so its motion is undetermined.
     #[error(
         "link {link:?} gives way (joint {joint:?}) and has mass {mass} kg with all that it carries: give it a positive mass, \
          or let nothing give way before it"
@@ -251,30 +252,30 @@ pub enum ModelError {
         link: String,
         /// The joint that moves it.
         joint: String,
-        /// What was found (kg).
+        /// Carried mass found (kg).
         mass: f64,
     },
-    /// Mass properties that no body has.
+    /// Mass properties are not physical.
     #[error("link {link:?}: {what} is {value}, which no body has")]
     BadInertia {
         /// The link.
         link: String,
-        /// Which quantity.
+        /// Name of the quantity.
         what: &'static str,
         /// Its value.
         value: f64,
     },
-    /// A number of a size that no robot has.
+    /// A value is outside its allowed range.
     #[error("{part} {name:?}: {what}")]
     OutOfRange {
-        /// "mechanism", "link" or "joint".
+        /// Part of the mechanism: "mechanism", "link" or "joint".
         part: &'static str,
-        /// Its name.
+        /// Name of the part.
         name: String,
-        /// The number and its range.
+        /// Value and allowed range.
         what: OutOfRange,
     },
-    /// A rotor that couples what are not two joints.
+    /// A rotor coupling does not connect two joints of one coordinate each.
     #[error(
         "the rotor between joint {joint:?} and another one: it needs two joints of one coordinate each, and a finite inertia"
     )]
@@ -282,62 +283,62 @@ pub enum ModelError {
         /// The joint.
         joint: String,
     },
-    /// A link that bends in modes does not fit.
+    /// A modal link is inconsistent with the tree.
     #[error("link {link:?} bends in modes, but {what} is wrong")]
     BadModal {
         /// The link.
         link: String,
-        /// What.
+        /// The inconsistent item.
         what: &'static str,
     },
-    /// A balancer acts on what is not there.
+    /// A balancer refers to a missing item.
     #[error("balancer {balancer:?}: {what} is not in the robot")]
     BadBalancer {
         /// The balancer.
         balancer: String,
-        /// What.
+        /// The missing item.
         what: &'static str,
     },
-    /// A loop that is none.
+    /// A loop closure is invalid.
     #[error("loop {name:?}: {what}")]
     BadLoop {
         /// The loop.
         name: String,
-        /// What is wrong with it.
+        /// Description of the problem.
         what: String,
     },
-    /// Something is NaN or infinite.
+    /// A quantity is NaN or infinite.
     #[error("{what} of {name:?} has a NaN or infinite entry")]
     NotFinite {
-        /// Which quantity.
+        /// Name of the quantity.
         what: &'static str,
-        /// Of which link or joint.
+        /// Name of the link or joint.
         name: String,
     },
-    /// More coordinates than can be computed with.
+    /// The model has more than [`MOST_COORDINATES`] coordinates.
     #[error(
         "the model has {found} coordinates (joints, springs and modes together), at most {MOST_COORDINATES} are taken: memory grows with \
          their square and the time of a step with their cube"
     )]
     TooManyCoordinates {
-        /// How many it has.
+        /// Number of coordinates of the model.
         found: usize,
     },
-    /// A mimic joint without a leader.
+    /// A mimic joint has no valid leader.
     #[error("joint {joint:?} mimics {leader:?}, which is not a movable, independent joint")]
     BadMimic {
         /// The follower.
         joint: String,
-        /// What it asks for.
+        /// Name of the requested leader.
         leader: String,
     },
 }
 
 impl Model {
-    /// Checks the mechanism and orders it as a tree.
+    /// Checks the mechanism and builds the tree.
     ///
     /// # Errors
-    /// [`ModelError`], with the names of the links or joints that are wrong.
+    /// [`ModelError`] with the names of the invalid links or joints.
     pub fn new(mechanism: &Mechanism) -> Result<Self, ModelError> {
         let base = check_tree(mechanism)?;
         let gravity = Quantity::ACCELERATION.check_all("gravity", &mechanism.gravity);
@@ -375,7 +376,7 @@ impl Model {
         build.finish()
     }
 
-    /// Number of independent coordinates (positions = velocities: all live in ℝⁿ).
+    /// Number of independent coordinates; positions and velocities both have this size.
     pub fn nv(&self) -> usize {
         self.coordinates.len()
     }
@@ -395,14 +396,14 @@ impl Model {
         &self.elastic
     }
 
-    /// Whether some body bends in modes.
+    /// Whether the model has modal bodies.
     pub fn has_modal(&self) -> bool {
         !self.modal.is_empty()
     }
 
-    /// Modal coordinates that move no interface and are orthogonal to each other in the body's
-    /// mass, as fixed-interface modes are: the mass matrix has a constant on their diagonal and
-    /// nothing between them.
+    /// Modal coordinates that move no interface and are mutually orthogonal with respect to the
+    /// body's mass, such as fixed-interface modes. The mass matrix has a constant diagonal entry
+    /// for each and zeros between them.
     pub fn held_modes(&self) -> Vec<usize> {
         self.modal
             .iter()
@@ -415,12 +416,12 @@ impl Model {
         &self.bodies
     }
 
-    /// Named frames: all links.
+    /// Named frames, one per link.
     pub fn frames(&self) -> &[Frame] {
         &self.frames
     }
 
-    /// The frame of that name.
+    /// Returns the frame with this name.
     pub fn frame(&self, name: &str) -> Option<&Frame> {
         self.frame_by_name.get(name).map(|&i| &self.frames[i])
     }
@@ -430,48 +431,48 @@ impl Model {
         &self.coordinates
     }
 
-    /// Balancers, in the order of the mechanism.
+    /// Balancers, in the order given in the mechanism.
     pub fn balancers(&self) -> &[PlacedBalancer] {
         &self.balancers
     }
 
-    /// Closed loops, each after those that it rests on.
+    /// Closed loops, each after the loops it depends on.
     pub fn loops(&self) -> &[PlacedLoop] {
         &self.loops
     }
 
-    /// The coordinates that follow from the closed loops, two per loop in the order of
-    /// [`Model::loops`]; they are none of [`Model::coordinates`].
+    /// Coordinates determined by the closed loops, two per loop in the order of [`Model::loops`].
+    /// They are not part of [`Model::coordinates`].
     pub fn dependent(&self) -> &[Coordinate] {
         &self.dependent
     }
 
-    /// Whether some joint follows another one.
+    /// Whether the model has mimic joints.
     pub fn has_mimic(&self) -> bool {
         self.has_mimic
     }
 
-    /// Total mass of all moving bodies (kg), a base that bends in modes included.
+    /// Total mass of all moving bodies (kg), including a modal base.
     pub fn moving_mass(&self) -> f64 {
         let rigid: f64 = self.bodies[1..].iter().map(|b| b.inertia.mass).sum();
         rigid + self.modal.iter().map(|m| m.tables.shapes.mass).sum::<f64>()
     }
 
-    /// The same model with the inertia of one body replaced (about Bo, B axes), with all that is
-    /// fixed to it.
+    /// Returns a copy of the model with the inertia of one body replaced. `inertia` is about Bo in
+    /// B axes and includes everything fixed to the body.
     pub fn with_inertia(&self, body: usize, inertia: SpatialInertia) -> Self {
         let mut model = self.clone();
         model.bodies[body].inertia = inertia;
         model
     }
 
-    /// Inertia of the rotors of a coordinate, seen from it (kg m² or kg).
+    /// Rotor inertia of a coordinate, reflected to it (kg m² or kg).
     pub fn rotor_inertia(&self, coordinate: usize) -> f64 {
         self.rotors.iter().filter(|(k, _)| *k == coordinate).map(|(_, inertia)| inertia).sum()
     }
 
-    /// Whether the other model has the same joints, frames, modal bodies, balancers, loops and
-    /// gravity, to the last bit; inertias may differ.
+    /// Whether the other model has bitwise the same joints, frames, modal bodies, balancers, loops
+    /// and gravity; inertias may differ.
     pub fn is_same_tree(&self, other: &Self) -> bool {
         let body =
             |b: &Body| (b.parent, b.X_PJ, b.motion, b.coordinate, b.ratio, b.offset, b.armature, b.elastic, b.modal);
@@ -495,7 +496,7 @@ fn modal_has(modal: &Modal, interface: usize) -> bool {
     interface < modal.tables.shapes.interfaces.len()
 }
 
-/// Names, parents, connectivity; returns the index of the base link.
+/// Checks names, parents and connectivity; returns the index of the base link.
 fn check_tree(mechanism: &Mechanism) -> Result<usize, ModelError> {
     if mechanism.links.is_empty() {
         return Err(ModelError::NoLinks(mechanism.name.clone()));
@@ -525,7 +526,7 @@ fn check_tree(mechanism: &Mechanism) -> Result<usize, ModelError> {
         }
     }
 
-    // Whatever cannot be reached from a link without parent lies on a loop.
+    // Links that cannot be reached from a link without parent are on a cycle.
     let roots: Vec<usize> =
         (0..mechanism.links.len()).filter(|&i| parent_of[mechanism.links[i].name.as_str()].is_none()).collect();
     let children = children_of_links(mechanism);
@@ -547,7 +548,7 @@ fn check_tree(mechanism: &Mechanism) -> Result<usize, ModelError> {
     Ok(roots[0])
 }
 
-/// The joints that start at each link, in source order.
+/// Child joints of each link, in source order.
 fn children_of_links(mechanism: &Mechanism) -> HashMap<&str, Vec<&Joint>> {
     let mut children: HashMap<&str, Vec<&Joint>> = HashMap::new();
     for joint in &mechanism.joints {
@@ -573,10 +574,11 @@ struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    /// Bodies and frames of the whole tree, depth first. Chains may be long: this does not recurse.
+    /// Adds bodies and frames of the whole tree, depth first. Iterative, since chains may be long.
     fn grow(&mut self, base: usize) -> Result<(), ModelError> {
         self.lump(base, 0, Pose::identity())?;
-        // Joints to go on with, the next one last: parent link, its body, its pose in that body.
+        // Stack of joints to visit: joint, parent link, body of the parent link, its pose in that
+        // body.
         let mut pending: Vec<(&'a Joint, usize, usize, Pose)> = Vec::new();
         let (mut link, mut body, mut X_BL) = (base, 0, Pose::identity());
         loop {
@@ -614,7 +616,7 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// The body behind a joint, which is a new one unless the joint is fixed, and the pose of the
+    /// Returns the child body of a joint (a new body unless the joint is fixed) and the pose of the
     /// child link in it.
     fn cross(&mut self, joint: &Joint, parent: usize, body: usize, X_BL: &Pose) -> Result<(usize, Pose), ModelError> {
         if !joint.X_PJ.translation.vector.iter().chain(joint.X_PJ.rotation.matrix().iter()).all(|x| x.is_finite()) {
@@ -627,7 +629,7 @@ impl<'a> Builder<'a> {
         let link = &mechanism.links[parent];
         let X_BJ = X_BL * joint.X_PJ;
         let motion = match (joint.kind, joint.kind.axis_motion()) {
-            // A link that bends in modes needs a body whose frame is its own.
+            // A modal link needs a body whose frame is its own.
             (JointKind::Fixed, _) if mechanism.modal.iter().any(|(name, _)| *name == joint.child) => {
                 JointMotion::Welded
             }
@@ -673,13 +675,13 @@ impl<'a> Builder<'a> {
         Ok((index, Pose::identity()))
     }
 
-    /// Whether the body's frame is that of the link.
+    /// Whether the body frame coincides with the frame of the link.
     fn frames_are_at(&self, body: usize, link: &str) -> bool {
         self.frames.iter().any(|f| f.body == body && f.name == *link && f.X_BF == Pose::identity())
     }
 
-    /// What gives way is solved for, so it must carry mass. A joint that is moved along a motion
-    /// needs none behind it.
+    /// Checks that every elastic body carries mass: elastic coordinates are solved for, while a
+    /// joint with prescribed motion needs no mass behind it.
     fn check_masses(&self) -> Result<(), ModelError> {
         let own = |b: &Body| b.inertia.mass + b.modal.map_or(0.0, |m| self.modal[m].tables.shapes.mass);
         let mut carried: Vec<f64> = self.bodies.iter().map(own).collect();
@@ -694,7 +696,8 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Numbers the coordinates, ties the joints that share them, and makes the model.
+    /// Numbers the coordinates, connects mimic joints and interfaces to theirs, and builds the
+    /// model.
     fn finish(mut self) -> Result<Model, ModelError> {
         let drafts = draft_loops(self.mechanism, &self.frames, &self.bodies)?;
         let followers: Vec<usize> = drafts.iter().flat_map(LoopDraft::dependent).collect();
@@ -744,7 +747,7 @@ impl<'a> Builder<'a> {
         Ok(model)
     }
 
-    /// Coordinates of the joints that rotors couple.
+    /// Coordinates coupled by rotors, with the coupling inertia.
     fn rotor_couplings(&self) -> Result<Vec<(usize, usize, f64)>, ModelError> {
         let coordinate = |joint: &String| {
             let own = |b: &&Body| b.joint == *joint && matches!(b.motion, JointMotion::Axis(_)) && b.ratio == 1.0;
@@ -762,7 +765,7 @@ impl<'a> Builder<'a> {
         self.mechanism.rotor_couplings.iter().map(placed).collect()
     }
 
-    /// Coordinates of the joints that closed loops determine: after all others.
+    /// Coordinates of the joints determined by closed loops; they are numbered after all others.
     fn number_dependent(&mut self, followers: &[usize], nv: usize) -> Vec<Coordinate> {
         let joints: HashMap<&str, &Joint> = self.children.values().flatten().map(|j| (j.name.as_str(), *j)).collect();
         let mut dependent = Vec::new();
@@ -776,8 +779,8 @@ impl<'a> Builder<'a> {
         dependent
     }
 
-    /// Coordinates of the joints that have some of their own, and of the modal bodies: actuated
-    /// ones first. Bodies that follow from closed loops get none.
+    /// Numbers the coordinates of joints and modal bodies, actuated ones first. Joints determined
+    /// by closed loops, mimic joints and interfaces get none of their own.
     fn number(&mut self, dependent: &[usize]) -> Numbering {
         let mut to = Numbering { coordinates: Vec::new(), elastic: Vec::new(), n_actuated: 0 };
         let joints: HashMap<&str, &Joint> = self.children.values().flatten().map(|j| (j.name.as_str(), *j)).collect();
@@ -806,7 +809,7 @@ impl<'a> Builder<'a> {
         to
     }
 
-    /// Interfaces take the coordinates of their modal body, mimic joints that of their leader.
+    /// Gives interfaces the coordinates of their modal body and mimic joints that of their leader.
     fn share(&mut self, actuated: &[Coordinate]) -> Result<(), ModelError> {
         for body in &mut self.bodies {
             if let JointMotion::Interface { modal, .. } = body.motion {
@@ -827,8 +830,8 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Lists the joints of one and of six coordinates, and says of each body which of them are
-    /// outward.
+    /// Lists the single-DoF and the six-DoF joints and sets, for each body, the ranges of those in
+    /// its subtree.
     fn list_columns(&mut self) -> (Vec<usize>, Vec<usize>) {
         let (mut single, mut six) = (Vec::new(), Vec::new());
         let mut begins = vec![(0, 0)];
@@ -847,7 +850,7 @@ impl<'a> Builder<'a> {
         (single, six)
     }
 
-    /// Where the subtree of each body ends.
+    /// Computes the end of the subtree of each body.
     fn close_subtrees(&mut self) {
         for i in (0..self.bodies.len()).rev() {
             let end = self.bodies[i].subtree_end.max(i + 1);
@@ -858,7 +861,7 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// Coordinates as they are numbered.
+/// Coordinate numbering under construction.
 struct Numbering {
     coordinates: Vec<Coordinate>,
     elastic: Vec<ElasticGroup>,
@@ -866,7 +869,7 @@ struct Numbering {
 }
 
 impl Numbering {
-    /// Adds the coordinates of the joint that moves that body; returns the first.
+    /// Adds the coordinates of a joint that moves `body`; returns the first.
     fn joint(&mut self, joint: &Joint, body: usize, elastic: bool) -> usize {
         let (coordinate, size) = (self.coordinates.len(), joint.kind.degrees_of_freedom());
         self.coordinates.extend((0..size).map(|component| Coordinate {
@@ -884,7 +887,7 @@ impl Numbering {
         coordinate
     }
 
-    /// Adds the coordinates of a modal body, by the name of its link; returns the first.
+    /// Adds the coordinates of a modal body under the name of its link; returns the first.
     fn modal(&mut self, name: String, body: usize, size: usize) -> usize {
         let coordinate = self.coordinates.len();
         self.coordinates.extend((0..size).map(|component| Coordinate {
@@ -899,16 +902,16 @@ impl Numbering {
     }
 }
 
-/// Principal moments below minus this part of the largest are wrong, not rounded: files have six
-/// digits.
+/// Relative tolerance for negative principal moments of inertia. Files have six significant digits;
+/// anything below is an error, not rounding.
 const MOMENT_TOLERANCE: f64 = 1e-6;
 
-/// What a principal moment of inertia may be below zero by rounding (kg m²).
+/// Magnitude of a negative principal moment of inertia that is accepted as rounding (kg m²).
 ///
 /// ```text
 /// floor = 1e-6 |I| + m (1 um)^2 + 1e-20 kg m^2
 /// ```
-/// * `mass` in kg, `largest` the largest principal moment by size in kg m².
+/// * `mass`: mass (kg); `largest`: principal moment of largest magnitude (kg m²).
 pub fn moment_floor(mass: f64, largest: f64) -> f64 {
     MOMENT_TOLERANCE * largest.abs() + 1e-12 * mass.abs() + 1e-20
 }
@@ -917,8 +920,8 @@ fn out_of_range(part: &'static str, name: &str, what: OutOfRange) -> ModelError 
     ModelError::OutOfRange { part, name: name.to_owned(), what }
 }
 
-/// Finite, and of a body that there can be. What stands on the base does not move: nothing follows
-/// from its inertia.
+/// Checks that the inertia is finite and physically possible. The inertia of fixed links has no
+/// effect, so only finiteness is checked for them.
 fn check_inertia(link: &str, inertia: &crate::mechanism::LinkInertia, moves: bool) -> Result<(), ModelError> {
     let finite =
         inertia.mass.is_finite() && inertia.com.iter().chain(inertia.inertia_com.iter()).all(|x| x.is_finite());

@@ -1,13 +1,12 @@
-//! Inverse kinematics of arms with more joints than the pose needs: a rule chooses among the family
-//! of solutions.
+//! Inverse kinematics of redundant arms: a rule selects one of the family of solutions.
 //!
 //! ```text
 //! minimise ½ (q - r)ᵀ W (q - r)    subject to  X_WT(q) = X,  lower <= q <= upper
 //! ```
-//! [`inverse_kinematics`] reaches the pose; then steps within the null space of the Jacobian, each
-//! followed by a return to the pose, bring the measure down: `d = -N (Nᵀ W N)⁻¹ Nᵀ W (q - r)` with
-//! N a basis of the null space [Liégeois 1977]. Joints at a limit that a step would push out are
-//! held. What is found is a minimum next to the start.
+//! [`inverse_kinematics`] reaches the pose. Steps in the null space of the Jacobian, each followed
+//! by a return to the pose, then reduce the measure: `d = -N (Nᵀ W N)⁻¹ Nᵀ W (q - r)` with N a
+//! basis of the null space [Liégeois 1977]. Joints at a limit that a step would exceed are held.
+//! The result is a local minimum near the start.
 
 use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, DVector, Matrix6xX};
@@ -18,36 +17,37 @@ use crate::kinematics::{forward_kinematics, frame_jacobian};
 use crate::many_starts::coordinates_of;
 use crate::model::{Frame, Model};
 
-/// What the joints shall do with their freedom.
+/// Rule for the use of the redundant freedom.
 #[derive(Clone, Debug, PartialEq)]
 pub enum NullSpaceRule {
-    /// Be near to this posture (nv long, rad or m): W = 1.
+    /// Stay near this posture (nv long, rad or m): W = 1.
     NearestTo(DVector<f64>),
-    /// Be near to the middle between limits, each joint in parts of half its range; joints without
-    /// limits are free.
+    /// Stay near the middle of the joint ranges, relative to half of each range; joints without
+    /// limits have no weight.
     AwayFromLimits,
 }
 
-/// A solution under a rule.
+/// Solution under a rule.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RuledSolution {
     /// All coordinates, nv long.
     pub q: DVector<f64>,
     /// `½ (q - r)ᵀ W (q - r)`.
     pub measure: f64,
-    /// Steps in the null space.
+    /// Number of null-space steps.
     pub steps: usize,
-    /// Whether the last step was below 1e-8 (rad or m), and not the number of steps the end.
+    /// Whether it converged: the last step was below 1e-8 (rad or m) or no step reduced the measure
+    /// any more. False if the number of steps ran out.
     pub settled: bool,
 }
 
-/// Joint values that bring `frame` to `X_WT` and are, near the start, the best by the rule.
+/// Finds joint values that bring `frame` to `X_WT` and locally minimise the measure of the rule.
 ///
-/// Coordinates that do not move the frame stay as in `q_start` (nv long). Where the pose leaves no
-/// freedom the result is that of [`inverse_kinematics`].
+/// Coordinates that do not move the frame stay as in `q_start` (nv long). If the pose leaves no
+/// freedom, the result is that of [`inverse_kinematics`].
 ///
 /// # Errors
-/// [`IkError`] when the target is not reached within tolerance.
+/// [`IkError`] if the target is not reached within tolerance.
 ///
 /// # Panics
 /// If the posture of the rule is not nv long.
@@ -76,7 +76,7 @@ pub fn inverse_kinematics_with_rule(
             next = trial.ok().filter(|trial| aim.measure(trial) < measure);
             part *= 0.5;
         }
-        // Where no step helps any more, rounding is reached.
+        // At rounding level no step improves the measure.
         let Some(next) = next else { return Ok(RuledSolution { q, measure, steps, settled: true }) };
         q = next;
         measure = aim.measure(&q);
@@ -84,7 +84,7 @@ pub fn inverse_kinematics_with_rule(
     Ok(RuledSolution { q, measure, steps: options.max_iterations, settled: false })
 }
 
-/// The measure: middle, weight and limits of each coordinate that moves the frame.
+/// Measure: middle, weight and limits of each coordinate that moves the frame.
 struct Aim {
     items: Vec<AimedCoordinate>,
 }
@@ -119,7 +119,7 @@ impl Aim {
         self.items.iter().map(|i| 0.5 * i.weight * (q[i.k] - i.middle).powi(2)).sum()
     }
 
-    /// Step in the null space, nv long, with joints held that it would push out of their limits.
+    /// Null-space step, nv long; joints that it would push beyond their limits are held.
     fn step(&self, model: &Model, data: &mut Data, frame: &Frame, q: &DVector<f64>, length: f64) -> DVector<f64> {
         forward_kinematics(model, data, q);
         let mut J = Matrix6xX::zeros(model.nv());
@@ -142,7 +142,7 @@ impl Aim {
         }
     }
 
-    /// Part of the step up to the first limit that it meets.
+    /// Fraction of the step up to the first limit.
     fn room(&self, q: &DVector<f64>, step: &DVector<f64>) -> f64 {
         let part = |i: &AimedCoordinate| match step[i.k] {
             d if d > 0.0 => (i.upper - q[i.k]) / d,
@@ -159,12 +159,14 @@ fn null_space_step(J: &DMatrix<f64>, free: &[&AimedCoordinate], q: &DVector<f64>
     if n == 0 {
         return DVector::zeros(0);
     }
+    // N: eigenvectors of JᵀJ with zero eigenvalue.
     let eigen = J.tr_mul(J).symmetric_eigen();
     let floor = 1e-12 * eigen.eigenvalues.max();
     let null: Vec<usize> = (0..n).filter(|&i| eigen.eigenvalues[i] <= floor).collect();
     if null.is_empty() {
         return DVector::zeros(n);
     }
+    // Gradient and Hessian of the measure in the null space.
     let N = DMatrix::from_fn(n, null.len(), |r, c| eigen.eigenvectors[(r, null[c])]);
     let WN = DMatrix::from_fn(n, null.len(), |r, c| free[r].weight * N[(r, c)]);
     let gradient = WN.tr_mul(&DVector::from_fn(n, |i, _| q[free[i].k] - free[i].middle));

@@ -1,4 +1,4 @@
-//! Inverse dynamics: generalised forces of a given motion (recursive Newton-Euler), O(n).
+//! Inverse dynamics: generalised forces of a given motion by recursive Newton-Euler, O(n).
 //!
 //! ```text
 //! Outward pass for body B with parent P; each quantity at its own origin, in its own axes:
@@ -8,8 +8,8 @@
 //! Inward pass:
 //!   τ_B   = S_Bᵀ F_B,   F_P += Ad_BPᵀ F_B                  (4)
 //! ```
-//! `Ṡ_B` is the rate of S in B axes: zero for one-DoF joints, not for elastic ones. A body that
-//! bends in modes adds its own inertia forces to (3) and to the forces of its coordinates, see
+//! `Ṡ_B` is the time derivative of S in B axes: zero for single-DoF joints, but not for elastic
+//! ones. A modal body adds its inertia forces to (3) and to the forces of its coordinates, see
 //! [`crate::ModalBody`].
 
 use flexarm_spatial::products::{cross, lift, scaled, tr_mul};
@@ -22,10 +22,11 @@ use crate::data::{Data, State, add_projection, begin, joint_motion, joint_positi
 use crate::lanes::Tree;
 use crate::model::Model;
 
-/// Generalised forces `τ = M(q) q̈ + bias(q, q̇)` (N m or N) for the accelerations `qddot`.
+/// Computes generalised forces `τ = M(q) q̈ + bias(q, q̇)` (N m or N) for the accelerations
+/// `qddot`.
 ///
-/// Elastic coordinates are treated like any other: their entries of τ are what the elastic joint
-/// must supply. External wrenches in `data.F_ext` and balancers are subtracted. Fills
+/// Elastic coordinates are treated like any other: their entries of τ are the forces that the
+/// elastic joint must supply. External wrenches in `data.F_ext` and balancers are subtracted. Fills
 /// `data.{X_PB, V, A, F, tau}`; `A` has gravity subtracted. O(n), no allocation.
 ///
 /// # Source
@@ -44,8 +45,8 @@ pub fn inverse_dynamics<'d>(
     &data.tau
 }
 
-/// Generalised forces at zero acceleration: Coriolis, centrifugal, gravity, balancers and external
-/// loads.
+/// Computes generalised forces at zero acceleration: Coriolis, centrifugal, gravity, balancers and
+/// external loads.
 pub fn nonlinear_effects<'d>(model: &Model, data: &'d mut Data, state: &State) -> &'d DVector<f64> {
     let (q, qdot) = (state.q.as_slice(), state.qdot.as_slice());
     match model.loops.is_empty() {
@@ -55,8 +56,8 @@ pub fn nonlinear_effects<'d>(model: &Model, data: &'d mut Data, state: &State) -
     &data.tau
 }
 
-/// Generalised forces that hold the mechanism still at `q`, against gravity, balancers and external
-/// loads.
+/// Computes the generalised forces that hold the mechanism static at `q`, against gravity,
+/// balancers and external loads.
 pub fn gravity_forces<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DVector<f64> {
     if model.loops.is_empty() {
         begin(model, data, q.as_slice());
@@ -67,8 +68,8 @@ pub fn gravity_forces<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -
     gravity_forces_at_poses(model, data, q)
 }
 
-/// As [`gravity_forces`], for the joint poses that [`crate::forward_kinematics`] at `q` left in
-/// `data`.
+/// As [`gravity_forces`], with the joint poses left in `data` by [`crate::forward_kinematics`] at
+/// `q`.
 pub fn gravity_forces_at_poses<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DVector<f64> {
     match (model.loops.is_empty(), model.balancers.is_empty()) {
         (true, true) => at_rest(model, data),
@@ -81,8 +82,8 @@ pub fn gravity_forces_at_poses<'d>(model: &Model, data: &'d mut Data, q: &DVecto
     &data.tau
 }
 
-/// [`newton_euler`] of a tree that stands still, for the joint poses in `data`: the same bits
-/// without everything that a velocity would make.
+/// [`newton_euler`] for a tree at rest, with the joint poses in `data`: bitwise the same result,
+/// without the velocity terms.
 #[inline(always)]
 pub(crate) fn at_rest<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>) {
     let model = tree.model();
@@ -110,8 +111,8 @@ pub(crate) fn at_rest<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>) {
     carry_inward(model, data);
 }
 
-/// [`newton_euler`] with the balancers of the model, of the tree: closed loops come around it
-/// (`closure.rs`).
+/// [`newton_euler`] with the balancers of the model, for the tree; closed loops are handled in
+/// `closure.rs`.
 #[inline(always)]
 pub(crate) fn balanced(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], qddot: Option<&[f64]>) {
     match model.balancers.is_empty() {
@@ -120,14 +121,14 @@ pub(crate) fn balanced(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], 
     }
 }
 
-/// Apart, so that arms without balancers have the recursion alone in their loops.
+/// Separate function, to keep balancers out of the loops of arms without them.
 #[inline(never)]
 fn with_balancers(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], qddot: Option<&[f64]>) {
     with_lines(model, data, q, |data| newton_euler(model, data, q, qdot, qddot));
     add_joint_torques(model, data, 1.0);
 }
 
-/// Over any scalar, without balancers; `data.tau` has the result.
+/// Newton-Euler recursion for any scalar type, without balancers; the result is in `data.tau`.
 #[inline(always)]
 pub(crate) fn newton_euler<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>, q: &[T], qdot: &[T], qddot: Option<&[T]>) {
     let model = tree.model();
@@ -164,7 +165,7 @@ pub(crate) fn newton_euler<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>, q: 
     }
 }
 
-/// `tau +=` what the rotors need.
+/// Adds the rotor terms to `tau`.
 #[inline(always)]
 fn add_rotors<T: Real>(model: &Model, data: &mut Data<T>, qddot: &[T]) {
     for &(k, armature) in &model.rotors {
@@ -176,7 +177,7 @@ fn add_rotors<T: Real>(model: &Model, data: &mut Data<T>, qddot: &[T]) {
     }
 }
 
-/// The inward pass (4): generalised forces into `data.tau`, wrenches onto the bodies inward.
+/// Inward pass (4): projects wrenches to `data.tau` and adds them to the parent bodies.
 #[inline(always)]
 fn carry_inward<T: Real>(model: &Model, data: &mut Data<T>) {
     data.tau.as_mut_slice().fill(T::zero());
@@ -196,7 +197,8 @@ fn carry_inward<T: Real>(model: &Model, data: &mut Data<T>) {
     }
 }
 
-/// Inertia forces of the modal body m on body i: adds to `F`, sets the forces of its coordinates.
+/// Inertia forces of modal body m, which is body i: adds to `F`, sets the forces of its
+/// coordinates.
 #[inline(always)]
 fn add_modal_forces<T: Real>(model: &Model, data: &mut Data<T>, i: usize, m: usize, qdot: &[T], qddot: Option<&[T]>) {
     let entry = &model.modal[m];

@@ -1,32 +1,33 @@
-//! How the forces that hold a mechanism still change with its coordinates, in closed form.
+//! Derivatives of static forces with respect to the coordinates, in closed form.
 //!
-//! All about the origin of the world, in its axes: the column of coordinate i is the twist
-//! `s_i = [v; w]` of what it moves, and `W_i = [f; n]` the weight and the loads on that.
+//! All quantities are about the world origin, in world axes: the column of coordinate i is the
+//! twist `s_i = [v; w]` of its subtree, and `W_i = [f; n]` the wrench of weight and loads on that
+//! subtree.
 //!
 //! ```text
 //! τ_i = -s_i · W_i                                                           (1)
 //! dW  = T s_j,   T = [   0    A ]    weight m g at c: f = m g, A = 0, N = c fᵀ - (c · f) 1
-//!                    [ -[f]x  N ]    loads that turn with their body have A and more in N   (2)
+//!                    [ -[f]x  N ]    follower loads add terms to A and N                    (2)
 //!
 //! j outward of i, or in the same joint:   ∂τ_i/∂q_j = -s_i · T_j s_j             (3)
 //! j inward of i:                          ∂τ_i/∂q_j = -(s_j × s_i) · W_i - s_i · T_i s_j
 //!                                                   = -w_j · (v_i × f + w_i × n + Aᵀ v_i + Nᵀ w_i)   (4)
-//! in the same elastic joint besides:      -∂s_i/∂q_j · W_i                       (5)
+//! in addition, in the same elastic joint: -∂s_i/∂q_j · W_i                       (5)
 //! ```
-//! The coordinates of a modal body move what hangs on its interfaces as an elastic joint does, and
-//! its own centre of mass:
+//! The coordinates of a modal body move the bodies on its interfaces like an elastic joint, and
+//! also its own centre of mass:
 //!
 //! ```text
 //! τ_k = -(R C_t,k) · g,    ∂τ_k/∂q_j = ∂τ_j/∂η_k = -w_j · (R C_t,k × g)       j inward of the body      (6)
 //! ```
-//! Balancers (`balancer.rs`) act as a pair of loads that keep their direction in (2); that they
-//! turn and stretch is, with the velocity `d_i` of their one end against the other per rate of
-//! coordinate i,
+//! Balancers (`balancer.rs`) enter (2) as a pair of loads of constant direction. Their change of
+//! direction and length adds the following terms, where `d_i` is the relative velocity of the two
+//! ends per unit rate of coordinate i:
 //!
 //! ```text
 //! line:  ∂τ_i/∂q_j += d_i · K d_j        joint:  ∂τ_i/∂q_j += c_i k c_j                    (7)
 //! ```
-//! One pass over the bodies and one over the pairs of coordinates; central differences of
+//! Cost: one pass over the bodies and one over the pairs of coordinates; central differences of
 //! [`crate::gravity_forces`] take 2 n passes over the bodies.
 
 use flexarm_spatial::products::{add, add3, column as column_of, cross, cross3, dot, lift, mul, scaled, sub, tr_mul};
@@ -39,41 +40,41 @@ use crate::data::Data;
 use crate::lanes::Tree;
 use crate::model::{JointMotion, Model};
 
-/// A wrench on a body, for [`StaticTangent::compute`].
+/// Wrench on a body, for [`StaticTangent::compute`].
 #[derive(Clone, Copy, Debug)]
 pub struct PointLoad {
-    /// The body.
+    /// Body on which it acts.
     pub body: usize,
-    /// The point at which it acts, in body axes from Bo (m).
+    /// Point of application, in body axes from Bo (m).
     pub p_B: Vector3<f64>,
-    /// Force and moment there, world axes (N, N m).
+    /// Force and moment at that point, world axes (N, N m).
     pub F_W: Wrench,
-    /// Whether it turns with the body; else it keeps its direction in the world.
+    /// Whether the load rotates with the body; otherwise its direction is constant in the world.
     pub turns: bool,
 }
 
-/// `∂τ/∂q` of the static forces, with its workspace.
+/// Tangent `∂τ/∂q` of the static forces, with its workspace.
 #[derive(Clone, Debug)]
 pub struct StaticTangent<T: Scalar = f64> {
-    /// First coordinate of the matrix.
+    /// First coordinate covered by the matrix.
     first: usize,
     columns: Vec<Column<T>>,
-    /// One per body: weight and loads on all outward of it, and how they change.
+    /// Per body: weight and loads on its subtree, and their derivatives.
     carried: Vec<Carried<T>>,
     g: Vec<Vector3<T>>,
-    /// Of closed loops: slopes of the tree, and forces on the dependent coordinates.
+    /// Closed loops: tangent of the tree; `tau_d` holds the forces on the dependent coordinates.
     loops: Option<Box<LoopTangent>>,
     tau_d: Vec<f64>,
 }
 
-/// A twist by which a coordinate moves what is outward of a body.
+/// Twist of the subtree of a body per unit rate of a coordinate.
 #[derive(Clone, Copy, Debug)]
 struct Column<T: Scalar = f64> {
-    /// Coordinate, from the first one of the matrix.
+    /// Coordinate, relative to the first one of the matrix.
     k: usize,
     body: usize,
-    /// Displacement in joint axes and rates of the angles per rate of the coordinate, of joints
-    /// with angles.
+    /// Displacement in joint axes (`t`) and rates of the angles (`phi`) per unit rate of the
+    /// coordinate, for joints with angles.
     t: Vector3<f64>,
     phi: Vector3<f64>,
     v: Vector3<T>,
@@ -81,9 +82,9 @@ struct Column<T: Scalar = f64> {
     /// `T s` in (3).
     force: Vector3<T>,
     moment: Vector3<T>,
-    /// The bracket of (4).
+    /// Bracket in (4).
     row: Vector3<T>,
-    /// d of (7) for the balancer at hand.
+    /// d in (7) for the current balancer.
     d: Vector3<f64>,
 }
 
@@ -97,7 +98,7 @@ struct Carried<T: Scalar> {
 }
 
 impl<T: Real> Carried<T> {
-    /// A force that keeps its direction, at the point c.
+    /// Force of constant direction at the point c.
     #[inline(always)]
     fn weight(f: Vector3<T>, c: &Vector3<T>) -> Self {
         Self { f, n: cross(c, &f), A: zeros(), N: arm_turns(c, &f) }
@@ -159,7 +160,8 @@ impl PointLoad {
 }
 
 impl<T: Real> StaticTangent<T> {
-    /// For the coordinates from `first` on: 0, or [`Model::n_actuated`] for the elastic ones.
+    /// Creates the workspace for the coordinates from `first` on: 0 for all, [`Model::n_actuated`]
+    /// for the elastic ones.
     pub fn new(model: &Model, first: usize) -> Self {
         let mut columns = Vec::new();
         let (zero, nothing) = (Vector3::zeros(), Vector3::from_element(T::zero()));
@@ -202,7 +204,7 @@ impl<T: Real> StaticTangent<T> {
         Self { first, columns, carried, g: vec![nothing; widest], loops, tau_d }
     }
 
-    /// [`StaticTangent::compute`] without balancers and loops; `G`: column after column.
+    /// [`StaticTangent::compute`] without balancers and loops; `G` is stored column by column.
     #[inline(always)]
     pub(crate) fn of_bodies(
         &mut self,
@@ -220,7 +222,7 @@ impl<T: Real> StaticTangent<T> {
         self.finish(tree.model(), data, q, G);
     }
 
-    /// W and T of (2) of the weight of each body.
+    /// W and T of (2) for the weight of each body.
     #[inline(always)]
     fn carry_weights(&mut self, tree: &impl Tree<T>, data: &Data<T>) {
         let model = tree.model();
@@ -233,13 +235,14 @@ impl<T: Real> StaticTangent<T> {
                 h_B = add(&h_B, &data.modal[m].inertia.first_moment);
             }
             let X_WB = &data.X_WB[i];
-            // m c, so that a body without mass is no exception: (m c) gᵀ - (m c · g) 1.
+            // Uses m c instead of c, so that massless bodies need no special case:
+            // N = (m c) gᵀ - (m c · g) 1.
             let h = add(&scaled(&X_WB.translation.vector, mass), &mul(X_WB.rotation.matrix(), &h_B));
             *carried = Carried { f: scaled(&gravity, mass), ..Carried::weight(gravity, &h) };
         }
     }
 
-    /// What the columns make of all that is carried.
+    /// Sums the loads over subtrees and assembles `G`.
     #[inline(always)]
     fn finish(&mut self, model: &Model, data: &Data<T>, q: &[T], G: &mut [T]) {
         for i in (1..model.bodies.len()).rev() {
@@ -247,7 +250,7 @@ impl<T: Real> StaticTangent<T> {
             let (inner, outer) = self.carried.split_at_mut(i);
             inner[parent].add(&outer[0]);
         }
-        // With closed loops there are coordinates of the opened tree besides.
+        // With closed loops, G also covers the dependent coordinates of the opened tree.
         let n = G.len().isqrt();
         self.place_columns(model, data);
         self.add_pairs(model, G, n);
@@ -255,7 +258,7 @@ impl<T: Real> StaticTangent<T> {
         self.add_modal_weights(model, data, G, n);
     }
 
-    /// Twists of the coordinates, and what (3) and (4) make of them.
+    /// Twists of the coordinates, and the products in (3) and (4).
     #[inline(always)]
     fn place_columns(&mut self, model: &Model, data: &Data<T>) {
         for column in &mut self.columns {
@@ -279,12 +282,12 @@ impl<T: Real> StaticTangent<T> {
         }
     }
 
-    /// (3) and (4) for all pairs of which one moves the other.
+    /// (3) and (4) for all pairs of coordinates where one moves the other.
     #[inline(always)]
     fn add_pairs(&self, model: &Model, G: &mut [T], n: usize) {
         for (a, inner) in self.columns.iter().enumerate() {
             let end = model.bodies[inner.body].subtree_end;
-            // Columns are in the order of bodies: what `inner` moves comes after it.
+            // Columns are in body order, so the subtree of `inner` comes after it.
             for outer in &self.columns[a..] {
                 if outer.body >= end {
                     break;
@@ -299,7 +302,7 @@ impl<T: Real> StaticTangent<T> {
         }
     }
 
-    /// (5): with t translations in joint axes and φ angles, about Bo,
+    /// (5): with t the translations in joint axes and φ the angles, about Bo,
     ///
     /// ```text
     /// ∂s_i/∂q_j · W = (t_j × w_i) · f + ([B φ_j]x B φ_i + ∂B/∂φ_j φ_i) · n_Bo
@@ -337,7 +340,7 @@ impl<T: Real> StaticTangent<T> {
             for c in 0..3 {
                 let (unit, w_B) = (lift(&Vector3::ith(c, 1.0)), column_of(&S.B, c));
                 let dB = angles.rate_map_derivative(&phi, &unit);
-                // The covector on φ_i for φ_j along axis c, as a column.
+                // Covector on φ_i for φ_j along axis c, as a column.
                 let turn = add(&tr_mul(&S.B, &cross(&n_B, &w_B)), &tr_mul(&dB, &n_B));
                 let slide = tr_mul(&S.L, &cross(&w_B, &f_B));
                 turns.data.0[c] = [turn.x, turn.y, turn.z];
@@ -353,7 +356,7 @@ impl<T: Real> StaticTangent<T> {
         }
     }
 
-    /// (6).
+    /// Adds (6).
     #[inline(always)]
     fn add_modal_weights(&mut self, model: &Model, data: &Data<T>, G: &mut [T], n: usize) {
         let gravity = lift(&model.gravity);
@@ -379,14 +382,14 @@ impl<T: Real> StaticTangent<T> {
 }
 
 impl StaticTangent {
-    /// `∂τ/∂q` of the forces that hold the mechanism still under weight and `loads`, without
-    /// springs; (n - first)×(n - first), written over all of `G`. Symmetric but where a load has a
-    /// moment or turns with its body. No allocation.
+    /// Computes `∂τ/∂q` of the forces that hold the mechanism static under gravity and `loads`,
+    /// without springs. `G` is (n - first)×(n - first) and overwritten. It is symmetric unless a
+    /// load has a moment or rotates with its body. Does not allocate.
     ///
     /// * `data`: after [`crate::forward_kinematics`] at `q`.
     ///
     /// # Panics
-    /// If `G` has another size.
+    /// If the size of `G` does not match.
     pub fn compute(&mut self, model: &Model, data: &Data, q: &DVector<f64>, loads: &[PointLoad], G: &mut DMatrix<f64>) {
         let n = model.nv() - self.first;
         assert_eq!(G.shape(), (n, n), "a row and a column per coordinate");
@@ -401,11 +404,11 @@ impl StaticTangent {
         self.loops = Some(tangent);
     }
 
-    /// As [`StaticTangent::compute`], of loads and balancers alone, without the weight; of trees
+    /// As [`StaticTangent::compute`], for loads and balancers only, without gravity; for trees
     /// without closed loops and modal bodies.
     ///
     /// # Panics
-    /// If `G` has another size.
+    /// If the size of `G` does not match.
     pub fn of_loads(
         &mut self,
         model: &Model,
@@ -423,7 +426,7 @@ impl StaticTangent {
         self.add_balancers(model, data, G);
     }
 
-    /// [`StaticTangent::compute`] with all coordinates of the opened tree.
+    /// [`StaticTangent::compute`] over all coordinates of the opened tree.
     fn of_tree(&mut self, model: &Model, data: &Data, q: &DVector<f64>, loads: &[PointLoad], G: &mut DMatrix<f64>) {
         let loads = loads.iter().copied();
         if model.balancers.is_empty() {
@@ -436,7 +439,7 @@ impl StaticTangent {
         self.add_balancers(model, data, G);
     }
 
-    /// Loads, and the forces at both ends of balancers.
+    /// Adds loads and the forces at both ends of line balancers.
     fn carry_loads(&mut self, model: &Model, data: &Data, loads: impl Iterator<Item = PointLoad>) {
         for load in loads {
             self.carried[load.body].add(&load.carried(&data.X_WB[load.body]));
@@ -448,7 +451,7 @@ impl StaticTangent {
         }
     }
 
-    /// (7).
+    /// Adds (7).
     fn add_balancers(&mut self, model: &Model, data: &Data, G: &mut DMatrix<f64>) {
         for (balancer, x) in model.balancers.iter().zip(&data.balanced) {
             match &balancer.place {

@@ -1,5 +1,5 @@
-//! Analytic inverse kinematics against forward kinematics, against a search from many starts, and
-//! against what makers say.
+//! Analytic inverse kinematics against forward kinematics, a multi-start search, and manufacturers'
+//! data.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
@@ -29,13 +29,13 @@ fn forward(model: &Model, data: &mut Data, frame: &Frame, q: &[f64; 6]) -> Pose 
     data.X_WF(frame)
 }
 
-/// Distance (m) and angle (rad) of two poses.
+/// Distance (m) and angle (rad) between two poses.
 fn between(A: &Pose, B: &Pose) -> (f64, f64) {
     let R = A.rotation * B.rotation.inverse();
     ((A.translation.vector - B.translation.vector).norm(), rotation_vector(R.matrix()).norm())
 }
 
-/// Smallest over largest singular value of the Jacobian (lengths over the reach).
+/// Ratio of smallest to largest singular value of the Jacobian (lengths relative to the reach).
 fn dexterity(arm: &Named, data: &Data, reach: f64) -> f64 {
     let mut J = nalgebra::Matrix6xX::zeros(6);
     frame_jacobian(&arm.model, data, &arm.tool(), &mut J);
@@ -74,7 +74,7 @@ fn joint_values_are_found_again_from_their_pose_and_every_solution_meets_it() {
             let sharp = dexterity(&arm, &data, analytic.reach());
             analytic.solve(&X_WT, &mut solutions);
             let error = solutions.iter().map(|s| apart(&s.q, &q)).fold(f64::INFINITY, f64::min);
-            // What rounding of the pose makes of the joint values: 1e-14 over the dexterity.
+            // Rounding of the pose changes joint values by about 1e-14 over the dexterity.
             assert!(error < 1e-9_f64.max(3e-13 / sharp), "{}: {q:?} is missed by {error:.1e}, {sharp:.1e}", arm.name);
             worst_q = worst_q.max(error * sharp.min(1.0));
             assert!(solutions.len() <= analytic.class().most_solutions(), "{}", arm.name);
@@ -91,8 +91,8 @@ fn joint_values_are_found_again_from_their_pose_and_every_solution_meets_it() {
     assert!(worst_q < 3e-13 && worst_m < 1e-12 && worst_rad < 2e-13, "{worst_q:.1e} {worst_m:.1e} {worst_rad:.1e}");
 }
 
-/// Truth: another algorithm, which knows of no geometry. It finds no solution that is missing here;
-/// it may miss some itself.
+/// Truth: another algorithm without knowledge of the geometry. It finds no solution that is missing
+/// here, but may miss some itself.
 #[test]
 fn a_search_from_many_starts_finds_the_same_solutions() {
     let mut draw = Draw(5);
@@ -157,16 +157,16 @@ fn labels_tell_the_solutions_of_a_pose_apart() {
     }
 }
 
-/// The answer at the edge of the workspace: one elbow where the arm is stretched, none beyond it,
-/// told by how far.
+/// Boundary of the workspace: one elbow configuration for a stretched arm, none beyond it, where
+/// the miss is reported.
 #[test]
 fn a_stretched_arm_has_one_elbow_and_a_pose_beyond_it_is_told_by_its_distance() {
     let model = Model::new(&irb120()).unwrap();
     let frame = model.frame("tool").unwrap().clone();
     let arm = AnalyticArm::new(&model, &frame).unwrap();
     let mut solutions = Solutions::default();
-    // Upper arm 0.27 m, forearm hypot(0.302, 0.07) m; stretched where joint 3 is at -(90° -
-    // atan2(70, 302)).
+    // Upper arm 0.27 m, forearm hypot(0.302, 0.07) m; stretched at joint 3 = -(90° - atan2(70,
+    // 302)).
     let stretched = -FRAC_PI_2 + 0.07_f64.atan2(0.302);
     let q = [0.4, 0.7, stretched, 0.3, 0.8, -0.2];
     let X = arm.pose(&q);
@@ -182,7 +182,7 @@ fn a_stretched_arm_has_one_elbow_and_a_pose_beyond_it_is_told_by_its_distance() 
         let miss = solutions.miss().unwrap();
         assert!((miss.position_m / beyond - 1.0).abs() < 1e-12 + 1e-15 / beyond, "{miss:?}"); // measured 3.3e-8 at 1e-9 m
         assert!(miss.rotation_rad < 1e-6, "{miss:?}");
-        // Inside by the same: all eight (where the other shoulder reaches too).
+        // At the same distance inside: all eight solutions (as the other shoulder reaches too).
         let near = Pose::from_parts((X.translation.vector - outward * beyond.min(0.01)).into(), X.rotation);
         arm.solve(&near, &mut solutions);
         assert_eq!(solutions.len(), 8, "{beyond}");
@@ -190,7 +190,7 @@ fn a_stretched_arm_has_one_elbow_and_a_pose_beyond_it_is_told_by_its_distance() 
     }
 }
 
-/// Joint 5 straight or nearly: spherical wrists at zero, Universal Robots' at zero too.
+/// Straight or nearly straight joint 5, for spherical wrists and for Universal Robots arms.
 #[test]
 fn a_straight_wrist_has_a_representative_that_keeps_its_free_joint_where_it_was() {
     let mut kept = 0;
@@ -209,20 +209,20 @@ fn a_straight_wrist_has_a_representative_that_keeps_its_free_joint_where_it_was(
             for bend in [0.0, 1e-11, 1e-9, 1e-7, 1e-4] {
                 q[4] = bend;
                 analytic.solve_near(&analytic.pose(&q), &q, &mut solutions);
-                // Joints on both sides of a bent wrist are as sharp as rounding over the bend,
-                // their sum is sharp.
+                // With a bent wrist, joints 4 and 6 are accurate to rounding over the bend angle,
+                // and their sum to rounding.
                 let nearest = solutions.nearest(&q).unwrap();
                 let tolerance = if bend == 0.0 { 1e-9 } else { 1e-9 + 3e-13 / bend };
                 assert!(apart(&nearest.q, &q) < tolerance, "{} {bend}: {q:?} {nearest:?}", arm.name);
                 assert_eq!(nearest.free, bend == 0.0, "{} {bend}: {q:?} {nearest:?}", arm.name);
             }
             kept += 1;
-            // From elsewhere: free all the same, with the joint at the hint.
+            // Without the position as hint: also free, with the free joint at the hint.
             q[4] = 0.0;
             analytic.solve(&analytic.pose(&q), &mut solutions);
             assert!(solutions.iter().any(|s| s.free && s.q[4].abs() < 1e-9), "{}: {solutions:?}", arm.name);
-            // Universal Robots' arms may not reach with joint 6 there: then it is eighths of a turn
-            // away.
+            // Universal Robots arms may not reach with joint 6 there; then it is a multiple of an
+            // eighth of a turn away.
             for s in solutions.iter().filter(|s| s.free) {
                 let away = match arm.class {
                     ArmClass::SphericalWrist(_) => s.q[3],
@@ -240,11 +240,11 @@ fn a_wrist_centre_on_axis_1_leaves_joint_1_free_and_keeps_it() {
     let model = Model::new(&irb120()).unwrap();
     let arm = AnalyticArm::new(&model, model.frame("tool").unwrap()).unwrap();
     let mut solutions = Solutions::default();
-    // The wrist centre above axis 2: upper arm and forearm make a triangle, turned back by its
-    // angle at the shoulder.
+    // Wrist centre above axis 2: the triangle of upper arm and forearm, rotated back by its angle
+    // at the shoulder.
     let (a, b) = (0.27_f64, 0.302_f64.hypot(0.07));
     for q3 in [-0.6_f64, 0.2, 0.9] {
-        // Angle of the forearm against the upper arm: stretched at -(90° - atan2(70, 302)).
+        // Angle of the forearm to the upper arm; the arm is stretched at -(90° - atan2(70, 302)).
         let bend = q3 + FRAC_PI_2 - 0.07_f64.atan2(0.302);
         let back = (b * bend.sin()).atan2(a + b * bend.cos());
         let q = [1.1, -back, q3, 0.4, -0.7, 0.3];
@@ -254,8 +254,8 @@ fn a_wrist_centre_on_axis_1_leaves_joint_1_free_and_keeps_it() {
     }
 }
 
-/// Truth: the closed form of the wrist centre in the plane of the arm, by the data sheet's lengths;
-/// for bit 2 what controllers recorded (next test but one).
+/// Truth: closed form of the wrist centre in the plane of the arm, from the lengths of the data
+/// sheet; for bit 2, data recorded by controllers (see the next test).
 #[test]
 fn kuka_status_and_turn_are_those_of_the_controller() {
     let mut tree = kr300();
@@ -269,10 +269,10 @@ fn kuka_status_and_turn_are_those_of_the_controller() {
     let arm = AnalyticArm::new(&model, model.frame("tool").unwrap()).unwrap();
     let axes = ControllerAxes::SAME;
     let degrees = |q: [f64; 6]| q.map(f64::to_radians);
-    // The home position of every KUKA: S 'B010', T 'B000010'.
+    // Home position of KUKA robots: S 'B010', T 'B000010'.
     let home = degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]);
     assert_eq!((arm.kuka_status(&home, &axes), kuka_turn(&home, &axes)), (Some(2), 2));
-    // Stretched where axis 3 is at -atan2(41 mm, 1000 mm) = -2.35°.
+    // The arm is stretched at axis 3 = -atan2(41 mm, 1000 mm) = -2.35°.
     assert_eq!(arm.kuka_status(&degrees([10.0, -60.0, -2.3, 5.0, -20.0, 0.0]), &axes), Some(6));
     assert_eq!(arm.kuka_status(&degrees([10.0, -60.0, -2.4, 5.0, 20.0, 0.0]), &axes), Some(0));
 
@@ -289,7 +289,8 @@ fn kuka_status_and_turn_are_those_of_the_controller() {
         let status = u8::from(x < 0.0) + 2 * u8::from(q[2] > stretched) + 4 * u8::from(q[4] < 0.0);
         assert_eq!(arm.kuka_status(&q, &axes), Some(status), "{q:?}");
         behind += u32::from(x < 0.0);
-        // There and back: the pose with its S and T is the joint values, wherever one looks from.
+        // Round trip: the pose with its S and T gives the joint values back, independent of the
+        // reference.
         arm.solve(&arm.pose(&q), &mut solutions);
         let meant = Selection::Kuka { status: Some(status), turn: Some(kuka_turn(&q, &axes)) };
         let chosen = arm.choose(&solutions, &meant, &axes, &[0.0; 6]).unwrap();
@@ -300,9 +301,9 @@ fn kuka_status_and_turn_are_those_of_the_controller() {
     assert!(behind > 200 && solved == 2000);
 }
 
-/// Status and turn of points that KUKA controllers recorded: data lists and positions in public
-/// programs of welding, milling, printing and handling cells. Bits 3 and 4 of the status say
-/// nothing of the branch.
+/// Status and turn of points recorded by KUKA controllers: data lists and positions in public
+/// programs of welding, milling, printing and handling cells. Bits 3 and 4 of the status do not
+/// concern the branch.
 const RECORDED_BY_KUKA: [(u8, &[u8]); 5] = [
     (0, &[14]),
     (2, &[2, 3, 10, 11, 34, 35]),
@@ -311,7 +312,7 @@ const RECORDED_BY_KUKA: [(u8, &[u8]); 5] = [
     (22, &[18, 26, 27, 50]),
 ];
 
-/// Truth: the words of the same point in [`RECORDED_BY_KUKA`], of which the turn tells the signs of
+/// Truth: status and turn of the same point in [`RECORDED_BY_KUKA`]; the turn gives the signs of
 /// the axes.
 #[test]
 fn the_status_of_axes_with_recorded_signs_is_the_one_that_was_recorded_with_them() {
@@ -321,7 +322,7 @@ fn the_status_of_axes_with_recorded_signs_is_the_one_that_was_recorded_with_them
     let mut solutions = Solutions::default();
     for (status, turn) in RECORDED_BY_KUKA.iter().flat_map(|(s, turns)| turns.iter().map(move |t| (*s, *t))) {
         for _ in 0..50 {
-            // Axis 3 clear of the stretched arm at -2.35°, the wrist centre ahead of axis 1.
+            // Axis 3 away from the stretched arm at -2.35°, wrist centre in front of axis 1.
             let largest = [1.5, 1.5, 1.6, 3.0, 2.0, 3.0];
             let q: [f64; 6] = std::array::from_fn(|k| {
                 let size = draw.between(0.1, largest[k]);
@@ -343,9 +344,8 @@ fn the_status_of_axes_with_recorded_signs_is_the_one_that_was_recorded_with_them
     }
 }
 
-/// Truth: positions that a controller recorded at one moment as axis values (degrees) and as a
-/// target with its confdata: arms IRB 4600-40/2.55 on gantries, from the public backup of a
-/// research cell.
+/// Truth: positions that a controller recorded both as axis values (degrees) and as a target with
+/// confdata: IRB 4600-40/2.55 arms on gantries, from the public backup of a research cell.
 #[test]
 fn the_confdata_of_recorded_axes_are_those_that_the_controller_recorded_with_them() {
     let recorded = [
@@ -363,7 +363,7 @@ fn the_confdata_of_recorded_axes_are_those_that_the_controller_recorded_with_the
     }
 }
 
-/// Truth: the table of the manual, by the wrist centre in the plane of the arm.
+/// Truth: table of the manual, from the wrist centre in the plane of the arm.
 #[test]
 fn abb_confdata_are_those_of_the_manual() {
     let mut tree = irb120();
@@ -380,12 +380,12 @@ fn abb_confdata_are_those_of_the_manual() {
     let mut seen = [0; 8];
     for _ in 0..3000 {
         let q: [f64; 6] = std::array::from_fn(|k| draw.between(arm.limits()[k].0, arm.limits()[k].1));
-        // Wrist centre in the plane of the arm, x ahead and z up, from axis 2; the upper arm leans
-        // ahead by axis 2.
+        // Wrist centre in the plane of the arm, x forward and z up, relative to axis 2; a positive
+        // axis 2 leans the upper arm forward.
         let (lean, turned) = (q[1], q[1] + q[2]);
         let forearm = [0.302 * turned.cos() + 0.07 * turned.sin(), -0.302 * turned.sin() + 0.07 * turned.cos()];
         let x = 0.27 * lean.sin() + forearm[0];
-        // In front of the lower arm: on its side of the line along it, seen with the lower arm
+        // In front of the lower arm: on the front side of the line along it, with the lower arm
         // upright.
         let ahead = forearm[0] * lean.cos() - forearm[1] * lean.sin();
         let cfx = 4 * i32::from(x < 0.0) + 2 * i32::from(ahead < 0.0) + i32::from(q[4] < 0.0);
@@ -413,7 +413,7 @@ fn words_choose_the_elbow_above_the_line_from_shoulder_to_wrist() {
         let q = random_q(&mut draw);
         arm.solve(&arm.pose(&q), &mut solutions);
         for s in solutions.iter() {
-            // In the plane of the arm, x ahead and z up (KUKA's axis 2 turns down).
+            // In the plane of the arm, x forward and z up (positive KUKA axis 2 turns downward).
             let (a2, a23) = (s.q[1], s.q[1] + s.q[2]);
             let elbow = [1.15 * a2.cos(), -1.15 * a2.sin()];
             let wrist = [elbow[0] + a23.cos() - 0.041 * a23.sin(), elbow[1] - a23.sin() - 0.041 * a23.cos()];
@@ -521,10 +521,10 @@ fn arms_without_a_closed_form_are_refused_with_what_they_lack() {
     slides.joints[2].kind = JointKind::Prismatic(Vector3::z_axis());
     assert_eq!(refuse(&slides), NoAnalyticIk::Joint { joint: "joint_3".into(), what: "is not revolute" });
     let mut flat = kr300();
-    // Axis 6 along axis 5: five directions.
+    // Axis 6 along axis 5: five directions only.
     flat.joints[5].X_PJ.rotation = Rotation3::identity();
     assert!(matches!(refuse(&flat), NoAnalyticIk::Deficient { smallest, .. } if smallest < 1e-9));
-    // A wrist 1 mm off its centre is no spherical one.
+    // A wrist with axis 6 offset by 1 mm is not spherical.
     let mut off = kr300();
     off.joints[5].X_PJ.translation.vector.x += 1e-3;
     assert!(matches!(refuse(&off), NoAnalyticIk::NoClass { wrist_m, .. } if (1e-4..1e-3).contains(&wrist_m)));
@@ -539,7 +539,7 @@ fn a_pose_of_numbers_that_are_none_has_no_solution() {
     assert!(solutions.is_empty() && solutions.miss().is_none());
 }
 
-/// A seventh axis held, and a rail in front: the same solutions with the held values in place.
+/// A held seventh axis: the same solutions with the held values as part of the geometry.
 #[test]
 fn joints_that_are_held_are_part_of_the_geometry() {
     let mut draw = Draw(37);
@@ -560,7 +560,7 @@ fn joints_that_are_held_are_part_of_the_geometry() {
     assert!(matches!(error, NoAnalyticIk::JointCount { ref joints, .. } if joints.len() == 7), "{error}");
 }
 
-/// KUKA LBR iiwa 7 R800 by its data sheet.
+/// KUKA LBR iiwa 7 R800, from its data sheet.
 fn iiwa() -> Mechanism {
     let (z, y) = (Vector3::z_axis(), Vector3::y_axis());
     let at = |height: f64| Pose::translation(0.0, 0.0, height);
@@ -581,7 +581,7 @@ fn iiwa() -> Mechanism {
     arm
 }
 
-/// Truth: the whole family of solutions, by the closed form at every value of joint 3.
+/// Truth: the whole family of solutions, from the closed form at every value of joint 3.
 #[test]
 fn seven_joints_settle_at_a_minimum_of_the_rule_over_the_family_of_solutions() {
     let model = Model::new(&iiwa()).unwrap();
@@ -606,7 +606,7 @@ fn seven_joints_settle_at_a_minimum_of_the_rule_over_the_family_of_solutions() {
         assert!(m < 2e-10 && rad < 2e-10);
         let measure = |q: &DVector<f64>| (0..7).map(|k| 0.5 * weight[k] * (q[k] - middle[k]).powi(2)).sum::<f64>();
         assert!((measure(&found.q) - found.measure).abs() < 1e-12 && found.measure <= measure(&q));
-        // The family next to what was found: no member of it is better.
+        // Family near the result: no member of it has a smaller measure.
         let mut solutions = Solutions::default();
         let mut least = f64::INFINITY;
         for k in -400..=400 {
@@ -629,7 +629,7 @@ fn seven_joints_settle_at_a_minimum_of_the_rule_over_the_family_of_solutions() {
     }
 }
 
-/// A joint at its limit stays there, and the rule is kept by the others.
+/// A joint at its limit stays there, and the other joints satisfy the rule.
 #[test]
 fn the_rule_holds_joints_at_their_limits() {
     let model = Model::new(&iiwa()).unwrap();
@@ -650,14 +650,14 @@ fn the_rule_holds_joints_at_their_limits() {
     assert!(found.q[6] > q[6] + 0.2, "{found:?}");
 }
 
-/// An arm of no class: the search finds the joint values again, the same ones every time, and
-/// nothing that is no solution.
+/// An arm of no class: the search recovers the joint values, is deterministic, and returns only
+/// solutions.
 #[test]
 fn a_search_from_many_starts_solves_arms_without_a_closed_form() {
     let mut draw = Draw(43);
     let axes = std::array::from_fn(|_| (draw.vector(1.0), draw.vector(0.7)));
     let mut tree = from_axes("skew", &axes, &mut draw);
-    // A finger, which does not move the frame.
+    // A finger joint, which does not move the frame.
     tree.links.push(Link { name: "finger".into(), inertia: None });
     let slide = JointKind::Prismatic(Vector3::x_axis());
     tree.joints.push(Joint::new("finger", slide, "tool", "finger", Pose::identity()));
@@ -692,12 +692,12 @@ fn a_search_from_many_starts_solves_arms_without_a_closed_form() {
     let far = Pose::translation(50.0, 0.0, 0.0);
     let error = inverse_kinematics_from_many_starts(&model, &mut data, &frame, &far, &start, &options, 20)
         .expect_err("too far");
-    // No start came nearer than the stretched arm.
+    // No start comes closer than the stretched arm.
     assert!(error.position_m > 40.0 && error.position_m < 50.0, "{error}");
 }
 
-/// Programs have rounded numbers: a home position with axis 5 at zero and axis 6 a hair below is
-/// still S 2, T 2.
+/// Programs have rounded numbers: a home position with axis 5 at zero and axis 6 slightly negative
+/// is still S 2, T 2.
 #[test]
 fn bits_are_not_turned_by_rounding() {
     let mut tree = kr300();
@@ -710,7 +710,7 @@ fn bits_are_not_turned_by_rounding() {
     let mut solutions = Solutions::default();
     let home = [0.0, -FRAC_PI_2, FRAC_PI_2, 0.0, 0.0, 0.0];
     for shift in [0.0, 1e-6, -1e-6] {
-        // The pose turned and moved as rounding of a program would, to either side.
+        // Pose perturbed in either direction, as by rounding in a program.
         let X = arm.pose(&home)
             * Pose::from_parts(
                 Vector3::new(shift, -shift, shift).into(),
@@ -719,16 +719,16 @@ fn bits_are_not_turned_by_rounding() {
         arm.solve_near(&X, &home, &mut solutions);
         let meant = Selection::Kuka { status: Some(2), turn: Some(2) };
         let chosen = arm.choose(&solutions, &meant, &axes, &home).unwrap();
-        // Joints 1 to 3 are sharp; 4 and 6 of a wrist bent by 1e-6 stand as that says, but no whole
-        // turn away.
+        // Joints 1 to 3 are accurate; joints 4 and 6 depend on the wrist bend of 1e-6, but are not
+        // a whole turn off.
         assert!((0..3).all(|k| (chosen[k] - home[k]).abs() < 1e-5), "{shift} {chosen:?}");
         assert!(chosen[4].abs() < 1e-5 && (chosen[3] + chosen[5]).abs() < 1e-5, "{chosen:?}");
     }
 }
 
-/// Where two lines become coplanar two of the equations become one: axis 6 and axis 1 (three
-/// parallel axes in the middle), axis 6 and axis 4 (three at the base). At these places and next to
-/// them nothing is lost.
+/// If two lines become coplanar, two of the equations become dependent: axes 6 and 1 (three
+/// parallel axes in the middle), or axes 6 and 4 (three at the base). No solution is lost at or
+/// near these positions.
 #[test]
 fn positions_where_two_equations_become_one_lose_no_solution() {
     let mut tried = 0;
@@ -741,7 +741,7 @@ fn positions_where_two_equations_become_one_lose_no_solution() {
         let (frame, mut data) = (arm.tool(), Data::new(&arm.model));
         let analytic = AnalyticArm::new(&arm.model, &frame).unwrap();
         let bodies: Vec<usize> = arm.model.coordinates().iter().map(|c| c.body).collect();
-        // Moment of axis 6 about the other axis: zero where they are coplanar.
+        // Moment of axis 6 about the other axis: zero if they are coplanar.
         let mut moment = |q: &[f64; 6]| {
             forward_kinematics(&arm.model, &mut data, &DVector::from_column_slice(q));
             let line = |k: usize| {
@@ -778,8 +778,8 @@ fn positions_where_two_equations_become_one_lose_no_solution() {
     assert!(tried > 300, "{tried}");
 }
 
-/// Calibrated arms: axes a little off those of the data sheet, but for the wrist, are solved as
-/// arms in general position, however near they are to parallel or to meeting.
+/// Calibrated arms: with axes slightly off those of the data sheet, apart from the wrist, they are
+/// solved as arms in general position, however close the axes are to parallel or intersecting.
 #[test]
 fn arms_just_outside_a_class_are_solved_by_the_general_one() {
     for (tilt, shift) in [(3e-5, 0.0), (1e-3, 0.0), (1e-4, 1e-3), (0.03, 0.01)] {
@@ -802,7 +802,7 @@ fn arms_just_outside_a_class_are_solved_by_the_general_one() {
     }
 }
 
-/// Truth: the same arm with its rail fixed where the limit holds it.
+/// Truth: the same arm with its rail fixed at the limit.
 #[test]
 fn a_rail_at_its_limit_leaves_the_rule_to_the_joints_behind_it() {
     let on_rail = |rail: JointKind, at: f64| {

@@ -1,5 +1,5 @@
-//! Balancers against closed forms: a pendulum with a spring, and a hydraulic counterbalance as
-//! published.
+//! Balancers against closed forms: a pendulum with a spring, and a published hydraulic
+//! counterbalance.
 #![allow(non_snake_case, reason = "monogram notation")]
 
 use flexarm_kinematics::*;
@@ -9,8 +9,8 @@ const MASS: f64 = 12.0;
 const LENGTH: f64 = 0.8;
 const GRAVITY: f64 = 9.81;
 
-/// A mass at the end of a rod that hangs on a hinge about y, q from straight down; an anchor D
-/// above the hinge, the spring's other end at k on the rod.
+/// Point mass on a rod below a hinge about y, q measured from straight down; the spring connects an
+/// anchor at height D above the hinge with a point at distance k along the rod.
 fn pendulum(D: f64, k: f64, law: BalancerLaw) -> Model {
     let mut tree = Mechanism::new("pendulum");
     for name in ["base", "rod", "anchor", "eye"] {
@@ -31,8 +31,8 @@ fn holding(model: &Model, q: f64) -> f64 {
     gravity_forces(model, &mut Data::new(model), &DVector::from_element(1, q))[0]
 }
 
-/// Truth: the spring of a balanced lamp. With a free length of zero and c D k = m g l the rod stays
-/// wherever it is; without that it takes (m g l - c D k) sin q. Measured 3e-14 N m.
+/// Truth: a balanced-arm lamp. With zero free length and c D k = m g l the rod is in equilibrium
+/// everywhere; otherwise it takes the torque (m g l - c D k) sin q. Measured 3e-14 N m.
 #[test]
 fn a_spring_without_free_length_balances_the_rod_everywhere() {
     let (D, k) = (0.5, 0.3);
@@ -46,8 +46,9 @@ fn a_spring_without_free_length_balances_the_rod_everywhere() {
     }
 }
 
-/// Truth: with c D k twice what balances, hanging is unstable and standing stable: about it the rod
-/// swings with omega² = (c D k - m g l)/(m l²). The tangent gives the same; measured 2e-16.
+/// Truth: with c D k twice the balancing value, hanging is unstable and the upright position
+/// stable: there the rod swings with omega² = (c D k - m g l)/(m l²). The tangent gives the same;
+/// measured 2e-16.
 #[test]
 fn slope_of_the_tangent_is_that_of_the_closed_form() {
     let (D, k, weight) = (0.5, 0.3, MASS * GRAVITY * LENGTH);
@@ -64,7 +65,7 @@ fn slope_of_the_tangent_is_that_of_the_closed_form() {
     }
 }
 
-/// Truth: energy of a frictionless pendulum with a spring stays what it was; RK4 at 1 ms over 5 s,
+/// Truth: the energy of a frictionless pendulum with a spring is constant; RK4 at 1 ms over 5 s,
 /// measured 7e-14.
 #[test]
 fn a_swinging_rod_with_a_spring_keeps_its_energy() {
@@ -95,7 +96,7 @@ fn a_swinging_rod_with_a_spring_keeps_its_energy() {
     assert!(state.qdot[0].abs() > 0.1 && (end - start).abs() < 1e-11 * start.abs(), "{start} {end}");
 }
 
-/// Truth: the counterbalance of a KUKA KR 300, formula and pressures read on the robot by its
+/// Truth: counterbalance of a KUKA KR 300, with the formula and pressures read on the robot by its
 /// authors (github.com/JonasWeigand/Robot_Identification, MIT): torque h p A from the law of sines,
 /// pressure within 1.72 % of nine readings. Torque measured 4e-12 N m.
 #[test]
@@ -139,8 +140,8 @@ fn a_hydraulic_counterbalance_has_the_published_torque_and_pressure() {
     assert!((least + 3073.77).abs() < 0.05 && (most - 6179.32).abs() < 0.05, "{least} {most}");
 }
 
-/// Truth: the share of each coordinate. A torque over a joint with an elastic gearbox behind it
-/// acts on motor and spring alike, whichever way the gearbox yields.
+/// Truth: virtual work. A torque about a joint with an elastic gearbox acts equally on motor and
+/// spring, for single-DoF and six-DoF springs.
 #[test]
 fn a_torque_over_a_joint_goes_through_the_spring_of_its_gearbox() {
     for full in [false, true] {

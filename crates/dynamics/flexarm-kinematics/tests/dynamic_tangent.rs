@@ -1,5 +1,5 @@
-//! Derivatives of the forces of a motion against Richardson differences of the recursion itself, on
-//! random trees.
+//! Derivatives of inverse dynamics against Richardson extrapolation of differences of the
+//! recursion, on random trees.
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
@@ -19,11 +19,11 @@ struct Case {
     loads: Vec<Wrench>,
 }
 
-/// A random tree in motion, with balancers and wrenches that turn with the bodies on every other
-/// one.
+/// Random tree in motion with external wrenches fixed to the bodies; every other pair of seeds has
+/// balancers.
 fn case(seed: u64, n_joints: usize) -> Case {
     let mut tree = random_tree(seed, n_joints);
-    // Rotors, and a joint that follows another one.
+    // Rotors, and a mimic joint.
     let single: Vec<usize> = (0..tree.joints.len()).filter(|&k| tree.joints[k].kind.axis_motion().is_some()).collect();
     single.iter().for_each(|&k| tree.joints[k].armature = 0.3 * k as f64);
     if let [first, .., last] = single[..] {
@@ -60,7 +60,7 @@ impl Case {
     }
 }
 
-/// Derivatives along each coordinate by differences of sixth order.
+/// Derivatives with respect to each coordinate by differences of sixth order.
 fn richardson(n: usize, h: f64, mut f: impl FnMut(usize, f64) -> DVector<f64>) -> DMatrix<f64> {
     let mut J = DMatrix::zeros(n, n);
     for k in 0..n {
@@ -107,7 +107,7 @@ fn forces_change_with_coordinates_and_rates_as_differences_of_the_recursion_say(
         let rates = richardson(n, 0.5, |k, h| case.forces(&mut work, &q, &moved(&qdot, k, h)));
         let errors = [(&whole - &truth).amax() / truth.amax(), (&by_rate - &rates).amax() / rates.amax()];
 
-        // Of the mass matrix alone.
+        // Derivative of the mass matrix only.
         forward_kinematics(model, &mut data, &q);
         tangent.of_inertia(model, &data, &q, &case.qddot, &mut G);
         let mut of_inertia = |q: &DVector<f64>| mass_matrix(model, &mut work, q).clone() * &case.qddot;
@@ -122,7 +122,7 @@ fn forces_change_with_coordinates_and_rates_as_differences_of_the_recursion_say(
     eprintln!("by coordinates, by rates, of the mass matrix: {worst:?}");
 }
 
-/// Truth: forces are linear in an inertia.
+/// Truth: forces are linear in the inertia.
 #[test]
 fn an_inertia_more_asks_for_the_difference_of_two_recursions() {
     for seed in 0..6 {

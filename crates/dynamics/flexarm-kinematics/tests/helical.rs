@@ -1,5 +1,5 @@
-//! Helical joints: a nut on a spindle in closed form, and as a rotation with a translation that
-//! follows it.
+//! Helical joints against the closed form of a nut on a spindle, and against a rotation with a
+//! coupled translation.
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stderr, reason = "what was measured stands beside the bound")]
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
@@ -12,10 +12,10 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix6xX, Unit, Vector3};
 
 const MASS: f64 = 2.5;
 const I_ZZ: f64 = 0.03;
-/// Centre of mass off the spindle (m).
+/// Distance of the centre of mass from the spindle (m).
 const OFFSET: f64 = 0.2;
 
-/// A body on an upright spindle that falls as it turns.
+/// Body on a vertical spindle that descends as it turns.
 fn nut(pitch: f64) -> Model {
     let mut tree = Mechanism::new("nut");
     let com = Vector3::new(OFFSET, 0.0, 0.1);
@@ -53,7 +53,7 @@ fn a_nut_under_gravity_turns_with_constant_acceleration() {
     assert!(worst.iter().all(|error| *error < 1e-12), "{worst:?}"); // measured 2e-16
 }
 
-/// Truth: a turn is one lead, and the body looks the same way again.
+/// Truth: one turn advances by one lead and restores the orientation.
 #[test]
 fn a_turn_advances_by_the_lead() {
     let lead = 0.02;
@@ -69,8 +69,8 @@ fn a_turn_advances_by_the_lead() {
     }
 }
 
-/// A chain of revolute, prismatic and helical joints; helical ones as such, or as a rotation and a
-/// translation on a massless link that follows it.
+/// Chain of revolute, prismatic and helical joints. With `as_pairs`, helical joints become a
+/// rotation and a mimicking translation with a massless link between them.
 fn chain(seed: u64, as_pairs: bool) -> Mechanism {
     let mut draw = Draw(seed);
     let mut tree = Mechanism::new("chain");
@@ -100,8 +100,8 @@ fn chain(seed: u64, as_pairs: bool) -> Mechanism {
     tree
 }
 
-/// Second algorithm: the same mechanism with a translation that mimics a rotation, for every
-/// recursion.
+/// Second algorithm: the same mechanism with a translation that mimics a rotation, for all
+/// recursions.
 #[test]
 fn a_helical_joint_is_a_rotation_with_a_translation_that_follows() {
     let mut worst = [0.0f64; 6];

@@ -1,4 +1,4 @@
-//! Identities between the recursions on random trees: each algorithm is the other's truth.
+//! Identities between the recursions on random trees: each algorithm is the truth for another.
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
@@ -12,7 +12,7 @@ use proptest::prelude::*;
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;
 
-/// Largest difference over the largest entry.
+/// Maximum difference relative to the maximum entry.
 fn difference(a: &DVector<f64>, b: &DVector<f64>) -> f64 {
     (a - b).amax() / a.amax().max(b.amax()).max(1e-300)
 }
@@ -42,8 +42,8 @@ fn case(seed: u64, n_joints: usize) -> Case {
     Case { model, data, state, qddot, draw }
 }
 
-/// Balancers of every law: from anchors that no link reaches to links, and over joints of one
-/// coordinate.
+/// Balancers with all laws: between links and anchors that no link reaches, and about single-DoF
+/// joints.
 fn add_balancers(tree: &mut Mechanism, draw: &mut Draw) {
     let links: Vec<String> = tree.links.iter().map(|link| link.name.clone()).collect();
     let single: Vec<Joint> = tree.joints.iter().filter(|j| j.kind.axis_motion().is_some()).cloned().collect();
@@ -86,7 +86,7 @@ fn add_balancers(tree: &mut Mechanism, draw: &mut Draw) {
     }
 }
 
-/// At Bo in B axes.
+/// Wrench of a load at Bo in B axes.
 fn wrench_on_body(load: &PointLoad, X_WB: &Pose, F_W: &Wrench) -> Wrench {
     let R_BW = X_WB.rotation.inverse();
     let (force, torque) = (R_BW * F_W.force, R_BW * F_W.torque);
@@ -108,11 +108,11 @@ proptest! {
         prop_assert!(M.cholesky().is_some());
     }
 
-    /// Over accelerations of points the forces of the free coordinates are those of the recursion
-    /// over spatial vectors, and so is the mass matrix. Measured 3e-13 and 2e-14.
+    /// The recursion over point accelerations gives the same forces of the free coordinates and the
+    /// same mass matrix as the recursions over spatial vectors. Measured 3e-13 and 2e-14.
     #[test]
     fn free_forces_are_those_of_inverse_dynamics(seed in any::<u64>(), n in 1usize..=40, mask in any::<u64>()) {
-        // Balancers and links that bend in modes are not for it.
+        // Balancers and modal links are not supported there.
         let Case { model, mut data, state, qddot, .. } = case((seed & !1) | 2, n);
         let tau = inverse_dynamics(&model, &mut data, &state, &qddot).clone();
         let drawn = Roles::new(&model, |k| (mask >> (k % 64)) & 1 == 1);
@@ -127,7 +127,7 @@ proptest! {
 
             let mut M = DMatrix::zeros(free.len(), free.len());
             points.mass(M.as_mut_slice());
-            // At positions alone the same bits.
+            // Bitwise the same with positions only.
             let mut at_q = DMatrix::from_element(free.len(), free.len(), f64::NAN);
             let mut others = FreeForces::new(&model, &roles).unwrap();
             others.mass_at(state.q.as_slice(), at_q.as_mut_slice());
@@ -141,12 +141,12 @@ proptest! {
         }
     }
 
-    /// Poses, forces and energies of one pass over points are those of the recursions over spatial
-    /// vectors. Measured in 288 trees: 4e-15 of the forces, 9e-16 of a pose, 6e-15 of a velocity,
-    /// 5e-15 of an acceleration, 2e-15 and 2e-16 of the energies.
+    /// Poses, forces and energies of the single pass over points equal those of the recursions over
+    /// spatial vectors. Measured in 288 trees: 4e-15 of the forces, 9e-16 of a pose, 6e-15 of a
+    /// velocity, 5e-15 of an acceleration, 2e-15 and 2e-16 of the energies.
     #[test]
     fn what_is_observed_in_one_pass_is_what_the_recursions_find(seed in any::<u64>(), n in 1usize..=40) {
-        // Balancers and links that bend in modes are not for it.
+        // Balancers and modal links are not supported there.
         let Case { model, mut data, state, qddot, .. } = case((seed & !1) | 2, n);
         let tau = inverse_dynamics(&model, &mut data, &state, &qddot).clone();
         world_poses(&model, &mut data);
@@ -160,7 +160,7 @@ proptest! {
         };
         assert_eq!(count_allocations(observe), 0);
         let moving: Vec<_> = (1..model.bodies().len()).map(|body| observer.motion(body)).collect();
-        // Without forces the poses and velocities have the same bits.
+        // Poses and velocities are bitwise the same without the force pass.
         let mut placed = vec![Pose::identity(); X_WB.len()];
         assert_eq!(count_allocations(|| observer.place(motions, &mut placed)), 0);
         assert!(placed == X_WB && moving.iter().zip(1..).all(|(moving, body)| observer.motion(body) == *moving));
@@ -169,7 +169,7 @@ proptest! {
             let velocity = V.linear + V.angular.cross(&r);
             let error = (moving.velocity(&r) - velocity).norm() / velocity.norm().max(1.0);
             prop_assert!(error <= 1e-13, "velocity {error:e}");
-            // Spatial acceleration + w × v is that of the point.
+            // The point acceleration is the spatial acceleration + w × v.
             let acceleration = A.linear + A.angular.cross(&r) + V.angular.cross(&velocity);
             let error = (moving.acceleration(&r) - acceleration).norm() / acceleration.norm().max(9.0);
             prop_assert!(error <= 1e-13, "acceleration {error:e}");
@@ -186,9 +186,9 @@ proptest! {
         prop_assert!((energies[1] - truth[1]).abs() <= 1e-14 * weight, "{:e}", (energies[1] - truth[1]) / weight);
     }
 
-    /// The tangent of the static forces, with loads that keep their direction and loads that turn
-    /// along, is what central differences of them make; measured below 2e-8 of the largest entry,
-    /// the error of the differences.
+    /// The tangent of the static forces, with fixed and follower loads, equals their central
+    /// differences; measured below 2e-8 of the maximum entry, which is the error of the
+    /// differences.
     #[test]
     fn the_static_tangent_is_the_slope_of_the_static_forces(seed in any::<u64>(), n in 1usize..=24, elastic: bool) {
         let Case { model, mut data, state, mut draw, .. } = case(seed, n);
@@ -200,7 +200,7 @@ proptest! {
         };
         let loads = [load(&mut draw), load(&mut draw)];
         forward_kinematics(&model, &mut data, &state.q);
-        // As they are in the axes of their bodies now.
+        // Loads in the axes of their bodies at this configuration.
         let in_body: Vec<Wrench> = loads.iter().map(|load| wrench_on_body(load, &data.X_WB[load.body], &load.F_W)).collect();
         let mut G = DMatrix::zeros(model.nv() - first, model.nv() - first);
         let mut tangent = StaticTangent::new(&model, first);
@@ -227,8 +227,8 @@ proptest! {
         prop_assert!((&G - &D).amax() <= 1e-7 * D.amax().max(1.0), "{:.1e}", (&G - &D).amax() / D.amax());
     }
 
-    /// Forward dynamics undoes inverse dynamics: the force error of its accelerations; measured at
-    /// most 4e-12.
+    /// Forward dynamics inverts inverse dynamics: force error of the resulting accelerations;
+    /// measured at most 4e-12.
     #[test]
     fn forward_dynamics_is_the_inverse_of_inverse_dynamics(seed in any::<u64>(), n in 1usize..=60) {
         let Case { model, mut data, state, qddot, .. } = case(seed, n);
@@ -239,7 +239,7 @@ proptest! {
         prop_assert!(difference(&tau, &tau_back) < 1e-10, "{:e}", difference(&tau, &tau_back));
     }
 
-    /// Any split into prescribed and free joints gives back the motion and the forces.
+    /// Hybrid dynamics recovers motion and forces for any split into prescribed and free joints.
     #[test]
     fn hybrid_dynamics_agrees_with_inverse_dynamics(seed in any::<u64>(), n in 1usize..=60) {
         let Case { model, mut data, state, qddot, mut draw } = case(seed, n);
@@ -258,8 +258,8 @@ proptest! {
         prop_assert!(difference(&tau, &f) < 1e-10, "forces {:e}", difference(&tau, &f));
     }
 
-    /// dJ/dt against central differences (step 1e-6); measured at most 2e-8 of the largest entry.
-    /// The bound is the differences' own error; exactness to 1e-10 is in
+    /// dJ/dt against central differences (step 1e-6); measured at most 2e-8 of the maximum entry.
+    /// The bound is the error of the differences; agreement to 1e-10 is tested in
     /// `jacobian_derivative_is_the_acceleration_bias`.
     #[test]
     fn jacobian_derivative_is_the_rate_of_the_jacobian(seed in any::<u64>(), n in 1usize..=30) {
@@ -279,8 +279,7 @@ proptest! {
         prop_assert!((&numeric - &Jdot).amax() <= 2e-7 * (1.0 + Jdot.amax()), "{:e}", (&numeric - &Jdot).amax());
     }
 
-    /// J q̈ + J̇ q̇ is the acceleration of the frame that the Newton-Euler pass finds; measured at
-    /// most 1e-13.
+    /// J q̈ + J̇ q̇ equals the frame acceleration of the Newton-Euler pass; measured at most 1e-13.
     #[test]
     fn jacobian_derivative_is_the_acceleration_bias(seed in any::<u64>(), n in 1usize..=60) {
         let Case { model, mut data, state, qddot, .. } = case(seed, n);
@@ -293,7 +292,8 @@ proptest! {
         prop_assert!((V - frame_twist(&data, &frame).to_vector()).amax() <= 1e-11 * (1.0 + V.amax()));
         let A = &J * &qddot + &Jdot * &state.qdot;
         inverse_dynamics(&model, &mut data, &state, &qddot);
-        // Spatial acceleration of the frame (gravity taken out), then of the point: + w × v.
+        // Spatial acceleration of the frame without gravity, plus w × v for the acceleration of the
+        // point.
         let X = data.X_WF(&frame);
         let V_F = data.V[frame.body].at_child(&frame.X_BF);
         let mut A_F = data.A[frame.body].at_child(&frame.X_BF);
@@ -305,7 +305,7 @@ proptest! {
         prop_assert!((angular - A.fixed_rows::<3>(3)).amax() <= 1e-10 * scale);
     }
 
-    /// Kinetic energy is ½ q̇ᵀ M q̇ and gravity is the gradient of the potential energy.
+    /// Kinetic energy is ½ q̇ᵀ M q̇, and gravity forces are the gradient of the potential energy.
     #[test]
     fn energies_agree_with_mass_matrix_and_gravity_forces(seed in any::<u64>(), n in 1usize..=30) {
         let Case { model, mut data, state, .. } = case(seed, n);
@@ -318,14 +318,14 @@ proptest! {
         let up = potential_energy(&model, &mut data, &(&state.q + &state.qdot * h));
         let down = potential_energy(&model, &mut data, &(&state.q - &state.qdot * h));
         let slope = g.dot(&state.qdot);
-        // bound by the size of the terms: the slope itself may cancel
+        // Bound by the size of the terms: the derivative itself may cancel.
         let scale = 1.0 + g.amax() * state.qdot.amax() * model.nv() as f64;
         prop_assert!(((up - down) / (2.0 * h) - slope).abs() <= 1e-6 * scale);
     }
 
-    /// Lagrange's equations from the kinetic energy alone: bias = Ṁ q̇ - ½ ∂(q̇ᵀ M q̇)/∂q, every
-    /// component, by central differences; measured at most 1e-8 of the largest term. The power
-    /// balance below does not see gyroscopic forces, which do no work; this does.
+    /// Lagrange's equations from the kinetic energy only: bias = Ṁ q̇ - ½ ∂(q̇ᵀ M q̇)/∂q, every
+    /// component, by central differences; measured at most 1e-8 of the maximum term. Unlike the
+    /// power balance below, this test sees gyroscopic forces, which do no work.
     #[test]
     fn velocity_terms_are_those_of_lagranges_equations(seed in any::<u64>(), n in 1usize..=8) {
         let Case { model, mut data, state, .. } = case(seed, n);
@@ -346,8 +346,7 @@ proptest! {
         prop_assert!((&bias - &truth).amax() <= 1e-6 * scale, "{:e}", (&bias - &truth).amax() / scale);
     }
 
-    /// Power balance without differences: d/dt(T + U) = q̇ᵀ τ, by dT/dt = q̇ᵀ(M q̈) + ½ q̇ᵀ Ṁ q̇
-    /// along the motion.
+    /// Power balance d/dt(T + U) = q̇ᵀ τ along the motion, by central differences of the energy.
     #[test]
     fn power_of_the_forces_is_the_rate_of_energy(seed in any::<u64>(), n in 1usize..=20) {
         let Case { model, mut data, state, qddot, .. } = case(seed, n);
@@ -366,10 +365,9 @@ proptest! {
     }
 }
 
-/// A body that bends in modes is its mass points: momentum and energy of each, summed; measured
-/// 3e-16.
+/// A modal body equals its mass points: sum of momentum and energy of each; measured 3e-16.
 ///
-/// Second-order terms included: the coordinates here are of the size of the body.
+/// Includes second-order terms: the modal coordinates are of the size of the body.
 #[test]
 fn modal_body_moves_like_its_mass_points() {
     for seed in 0..20 {
@@ -406,7 +404,7 @@ fn modal_body_moves_like_its_mass_points() {
     }
 }
 
-/// No algorithm allocates once `Data` exists.
+/// No algorithm allocates after `Data` is created.
 #[test]
 fn recursions_do_not_allocate() {
     let Case { model, mut data, state, qddot, .. } = case(7, 30);
@@ -430,7 +428,7 @@ fn recursions_do_not_allocate() {
     assert_eq!(allocations, 0);
 }
 
-/// A mimic joint is the same as a hand-made constraint: M, τ and q̈ are Gᵀ M G and so on.
+/// A mimic joint equals an explicit constraint q_full = G q + b: M, τ and q̈ are projected by G.
 #[test]
 fn mimic_joints_project_the_dynamics_of_the_unconstrained_tree() {
     let mut tree = random_tree(11, 0);
@@ -468,7 +466,7 @@ fn mimic_joints_project_the_dynamics_of_the_unconstrained_tree() {
     assert!((back - qddot).amax() < 1e-10);
 }
 
-/// Inverse kinematics finds again what forward kinematics gave, within limits.
+/// Inverse kinematics recovers the pose of forward kinematics, within limits.
 #[test]
 fn inverse_kinematics_reaches_a_reachable_pose_within_limits() {
     let mut tree = flexarm_testkit::reference_arm(false).mechanism;
@@ -497,7 +495,7 @@ fn inverse_kinematics_reaches_a_reachable_pose_within_limits() {
     assert!(error.position_m > 5.0);
 }
 
-/// Wrong trees are refused with the names that are wrong.
+/// Invalid trees are rejected with the names of the invalid items.
 #[test]
 fn wrong_trees_are_refused_by_name() {
     let good = flexarm_testkit::reference_arm(true).mechanism;
@@ -518,9 +516,9 @@ fn wrong_trees_are_refused_by_name() {
     assert!(error(&|t| t.joints[0].mimic = Some(mimic.clone())).contains("ghost"));
 }
 
-/// A rotor that turns with two joints is in all algorithms: `M q̈ + bias` by the mass matrix
-/// against one Newton-Euler pass, kinetic energy against `½ q̇ᵀ M q̇`, accelerations found back
-/// whichever of the two joints is free. Truth for its own part: `a q̇_1 q̇_2`. Measured 3e-13.
+/// A rotor driven by two joints is included in all algorithms: `M q̈ + bias` against one
+/// Newton-Euler pass, kinetic energy against `½ q̇ᵀ M q̇`, and hybrid dynamics with either joint
+/// free. Truth for the coupling term: `a q̇_1 q̇_2`. Measured 3e-13.
 #[test]
 fn rotors_that_turn_with_two_joints_are_in_every_algorithm() {
     let (mut worst, mut own) = (0.0f64, 0.0f64);
@@ -551,7 +549,7 @@ fn rotors_that_turn_with_two_joints_are_in_every_algorithm() {
         let kinetic = kinetic_energy(&model, &mut data, &state);
         let half = 0.5 * state.qdot.dot(&(&M * &state.qdot));
         worst = worst.max((kinetic / half - 1.0).abs());
-        // Its own part, against the tree without any rotor.
+        // Coupling term only, relative to the tree without rotors.
         let mut plain = Data::new(&bare);
         let rotors: f64 = joints.iter().map(|name| 0.25 * state.qdot[place(name)].powi(2)).sum();
         let part = kinetic - kinetic_energy(&bare, &mut plain, &state) - rotors;

@@ -1,5 +1,5 @@
-//! Closed chains against closed forms, against the equations with multipliers, and against
-//! themselves cut elsewhere.
+//! Closed chains against closed forms, against Lagrange multipliers, and against the same loops cut
+//! elsewhere.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
@@ -9,13 +9,13 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix6xX, Vector2, Vector3};
 
 const Y: fn() -> JointKind = || JointKind::Continuous(Vector3::y_axis());
 
-/// What is off, and how far it may be; shown with `--nocapture`.
+/// Asserts a bound on an error and prints both; shown with `--nocapture`.
 fn within(what: &str, off: f64, bound: f64) {
     eprintln!("{what}: {:.1e} of {bound:.0e}", off.abs());
     assert!(off.abs() < bound, "{what}: {off:e}");
 }
 
-/// A body with all ten inertia parameters, none of them nothing.
+/// Link with ten nonzero inertia parameters.
 fn body(name: &str, mass: f64, com: [f64; 3]) -> Link {
     let s = mass * 0.02;
     let inertia_com = Matrix3::new(s * 1.3, s * 0.1, -s * 0.07, s * 0.1, s, s * 0.05, -s * 0.07, s * 0.05, s * 0.9);
@@ -26,33 +26,33 @@ fn at(x: f64, z: f64) -> Pose {
     Pose::translation(x, 0.0, z)
 }
 
-/// Where a loop is cut.
+/// Joint at which a loop is cut.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Cut {
-    /// Rod and upper arm.
+    /// Between rod and upper arm.
     Top,
-    /// Crank and rod, which hangs on the upper arm.
+    /// Between crank and rod, which is then a child of the upper arm.
     Bottom,
     /// As `Top`, with pin and eye exchanged.
     TopTurned,
 }
 
-/// Bars of a loop as a palletiser has them (m).
+/// Link lengths of the loop of a palletiser (m).
 #[derive(Clone, Copy)]
 struct Bars {
     crank: f64,
     rod: f64,
     lever: f64,
     lower: f64,
-    /// Of the crank's hinge from that of the lower arm.
+    /// Position of the crank hinge relative to that of the lower arm.
     base: [f64; 2],
 }
 
 const PARALLELOGRAM: Bars = Bars { crank: 0.4, rod: 1.2, lever: 0.4, lower: 1.2, base: [0.0, 0.0] };
 const GENERAL: Bars = Bars { crank: 0.35, rod: 1.05, lever: 0.47, lower: 1.2, base: [-0.1, 0.25] };
 
-/// Column on a turning base, lower arm, upper arm with a lever behind the elbow, crank and rod;
-/// driven are turn, lower and crank.
+/// Column on a rotating base, lower arm, upper arm with a lever behind the elbow, crank and rod;
+/// driven joints are turn, lower and crank.
 fn palletiser(bars: Bars, cut: Cut) -> Mechanism {
     let mut tree = Mechanism::new("palletiser");
     tree.links.push(Link { name: "base".into(), inertia: None });
@@ -82,7 +82,7 @@ fn palletiser(bars: Bars, cut: Cut) -> Mechanism {
             if cut == Cut::Top { ("lug", "end") } else { ("end", "lug") }
         }
         Cut::Bottom => {
-            // The same rod, with its frame at its lower end still.
+            // Same rod, with its frame still at its lower end.
             tree.links.push(Link { name: "hanger".into(), inertia: None });
             tree.joints.push(Joint::new("rod", Y(), "upper", "hanger", at(-bars.lever, 0.0)));
             tree.joints.push(Joint::new("hang", JointKind::Fixed, "hanger", "rod", at(0.0, -bars.rod)));
@@ -113,7 +113,7 @@ fn state(model: &Model, q: &[f64], qdot: &[f64]) -> State {
 const PLACES: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [0.7, 0.5, -0.2], [-1.1, -0.6, 0.4], [2.0, 0.9, 0.3]];
 const RATES: [f64; 3] = [0.8, -1.1, 1.7];
 
-/// Truth: opposite sides stay parallel. The upper arm stands as the crank does, the rod as the
+/// Truth: opposite sides stay parallel. The upper arm is parallel to the crank and the rod to the
 /// lower arm: the elbow is at crank - lower, the rod at lower - crank. Measured 1.1e-15 rad, 4e-15
 /// rad/s.
 #[test]
@@ -131,16 +131,16 @@ fn opposite_sides_of_a_parallelogram_stay_parallel() {
             within("parallel rod", rod - (place[1] - place[2]), 4e-15);
             let rate = data.dependent_rates()[0];
             within("parallel rate", rate - (RATES[2] - RATES[1]), 1e-14);
-            // Its transmission angle is that between its sides: 90 degrees where lower and crank
-            // stand square.
+            // The transmission angle is the angle between the sides: 90 degrees if lower arm and
+            // crank are perpendicular.
             let square = std::f64::consts::FRAC_PI_2 - (place[2] - place[1]).abs();
             within("parallel transmission", data.transmission_angles()[0] - square, 1e-14);
         }
     }
 }
 
-/// Truth: virtual work. With weights in the upper arm alone the crank carries their whole moment
-/// about the elbow, and the lower arm carries them as if they hung on the elbow. Measured 4e-16 of
+/// Truth: virtual work. With mass in the upper arm only, the crank carries its whole moment about
+/// the elbow, and the lower arm carries its weight as if attached at the elbow. Measured 4e-16 of
 /// the weight.
 #[test]
 fn the_crank_of_a_parallelogram_carries_the_moment_about_the_elbow() {
@@ -154,8 +154,8 @@ fn the_crank_of_a_parallelogram_carries_the_moment_about_the_elbow() {
     for place in PLACES {
         let q = state(&model, &place, &[]).q;
         let tau = gravity_forces(&model, &mut data, &q).clone();
-        // About y a turn by q brings (x, z) to (x cos + z sin, ..): the moment of what hangs there
-        // is -m g x.
+        // A rotation by q about y moves (x, z) to (x cos + z sin, ..): the moment of the weight is
+        // -m g x.
         let x = com[0] * place[2].cos() + com[1] * place[2].sin();
         let scale = m * g;
         within("crank torque", (tau[2] + m * g * x) / scale, 1e-14);
@@ -166,7 +166,7 @@ fn the_crank_of_a_parallelogram_carries_the_moment_about_the_elbow() {
 
 /// Freudenstein's equation of the four-bar with ground d, input a, coupler b, output c, angles of
 /// input and output from the ground: `K1 cos ψ - K2 cos φ + K3 = cos(φ - ψ)`, K1 = d/a, K2 = d/c,
-/// K3 = (a² - b² + c² + d²)/(2 a c). Returns ψ, ψ' and ψ'' by its closed-form root and its
+/// K3 = (a² - b² + c² + d²)/(2 a c). Returns ψ, ψ' and ψ'' from its closed-form root and its
 /// derivatives.
 fn freudenstein([d, a, b, c]: [f64; 4], phi: f64, rate: f64, acceleration: f64, root: f64) -> [f64; 3] {
     let (k1, k2, k3) = (d / a, d / c, (a * a - b * b + c * c + d * d) / (2.0 * a * c));
@@ -192,7 +192,7 @@ fn a_general_four_bar_moves_as_freudensteins_equation_says() {
     for name in ["base", "input", "coupler", "output", "tip", "eye"] {
         tree.links.push(Link { name: name.into(), inertia: None });
     }
-    // About -y, so that angles count from x to z.
+    // About -y, so that angles are positive from x to z.
     let hinge = JointKind::Continuous(-Vector3::y_axis());
     let mut joint =
         |name: &str, kind, parent: &str, child: &str, X| tree.joints.push(Joint::new(name, kind, parent, child, X));
@@ -230,7 +230,7 @@ fn a_general_four_bar_moves_as_freudensteins_equation_says() {
         frame_jacobian_derivative(&model, &data, &state, frame, &mut Jdot);
         let found = -(J[(4, 0)] * acceleration + Jdot[(4, 0)] * rate);
         within("Freudenstein acceleration", found - psi_ddot, 2e-14);
-        // The angle at the pin, by the cosine rule in the triangle that coupler and output make.
+        // Angle at the pin, by the cosine rule in the triangle of coupler and output.
         let diagonal = a * a + d * d - 2.0 * a * d * phi.cos();
         let mu = ((b * b + c * c - diagonal) / (2.0 * b * c)).acos();
         let mu = mu.min(std::f64::consts::PI - mu);
@@ -255,7 +255,7 @@ impl Multipliers {
         Self { open: Model::new(&open).unwrap(), closed, closure }
     }
 
-    /// Number of a coordinate of the closed model, dependent ones last, in the opened one.
+    /// Indices in the opened model of the coordinates of the closed model, dependent ones last.
     fn places(&self) -> Vec<usize> {
         let all = self.closed.coordinates().iter().chain(self.closed.dependent());
         let find = |c: &Coordinate| {
@@ -272,7 +272,7 @@ impl Multipliers {
         x
     }
 
-    /// Rows of the constraint in the axes of the pin's link, where the link may leave the plane.
+    /// Constraint rows in the axes of the pin's link, which may leave the plane.
     fn rows(&self, data: &mut Data, q: &DVector<f64>) -> DMatrix<f64> {
         forward_kinematics(&self.open, data, q);
         let (pin, eye) = (self.open.frame(&self.closure.pin).unwrap(), self.open.frame(&self.closure.eye).unwrap());
@@ -289,7 +289,7 @@ impl Multipliers {
         DMatrix::from_fn(2, q.len(), |r, k| across[(2 * r, k)])
     }
 
-    /// Accelerations of the opened tree and multipliers for forces on the closed coordinates.
+    /// Accelerations of the opened tree for forces on its coordinates.
     fn accelerations(&self, q: &DVector<f64>, qdot: &DVector<f64>, tau: &DVector<f64>) -> DVector<f64> {
         let (n, mut data) = (q.len(), Data::new(&self.open));
         let C = self.rows(&mut data, q);
@@ -311,7 +311,7 @@ impl Multipliers {
         A.lu().solve(&b).unwrap().rows(0, n).into_owned()
     }
 
-    /// Largest difference of free accelerations, over the largest of them.
+    /// Maximum difference of free accelerations, relative to the maximum acceleration.
     fn miss(&self, q: &[f64], qdot: &[f64], tau: &[f64]) -> f64 {
         let state = state(&self.closed, q, qdot);
         let mut data = Data::new(&self.closed);
@@ -330,7 +330,7 @@ impl Multipliers {
     }
 }
 
-/// Truth: a second algorithm, Lagrange multipliers on the opened tree. Measured 7e-13 (the
+/// Truth: a second algorithm, Lagrange multipliers on the opened tree. Measured 7e-13 (error of the
 /// difference formula for Ċ).
 #[test]
 fn accelerations_are_those_with_lagrange_multipliers() {
@@ -345,8 +345,7 @@ fn accelerations_are_those_with_lagrange_multipliers() {
     }
 }
 
-/// A lower arm, a rod and a crank that give way in six directions each, so that the loop leaves its
-/// plane.
+/// Palletiser with six-DoF elastic joints in lower arm and rod, so that the loop leaves its plane.
 fn yielding(bars: Bars, cut: Cut) -> Mechanism {
     let mut tree = palletiser(bars, cut);
     for (link, length) in [("lower", 0.5), ("rod", 0.4)] {
@@ -362,8 +361,8 @@ fn yielding(bars: Bars, cut: Cut) -> Mechanism {
     tree
 }
 
-/// Truth: multipliers, with elastic joints inside the loop that bring pin and eye out of the plane.
-/// Measured 7e-14.
+/// Truth: Lagrange multipliers, with elastic joints inside the loop that move pin and eye out of
+/// the plane. Measured 7e-14.
 #[test]
 fn elastic_links_inside_a_loop_obey_the_multipliers_too() {
     for cut in [Cut::Top, Cut::TopTurned] {
@@ -382,8 +381,8 @@ fn elastic_links_inside_a_loop_obey_the_multipliers_too() {
     }
 }
 
-/// Identity: it is the same machine wherever the loop is opened. Torques of the drives, measured
-/// 1.1e-14 of the largest.
+/// Identity: the mechanism does not depend on where the loop is opened. Drive torques, measured
+/// 1.1e-14 of the maximum.
 #[test]
 fn driving_torques_do_not_depend_on_where_a_loop_is_cut() {
     for bars in [PARALLELOGRAM, GENERAL] {
@@ -406,7 +405,7 @@ fn driving_torques_do_not_depend_on_where_a_loop_is_cut() {
 
 /// Identities: M is symmetric and positive definite; τ = M q̈ + h; the power of the forces is the
 /// rate of the energy (by a difference over 1e-5 s, measured 4e-11); forward and inverse dynamics
-/// undo each other.
+/// invert each other.
 #[test]
 fn reduced_dynamics_are_consistent() {
     for tree in [palletiser(GENERAL, Cut::Top), yielding(GENERAL, Cut::Top), levelled(GENERAL, 1.3)] {
@@ -436,7 +435,7 @@ fn reduced_dynamics_are_consistent() {
         let power = tau.dot(&qdot);
         within("power", (rate - power) / power, 1e-9);
 
-        // Half of the roles prescribed: the same motion, the same forces.
+        // With one coordinate prescribed: the same motion and the same forces.
         let mixed = Roles::new(&model, |k| k == 1);
         let (mut a, mut f) = (DVector::zeros(n), tau.clone());
         a[1] = qddot[1];
@@ -448,8 +447,8 @@ fn reduced_dynamics_are_consistent() {
     }
 }
 
-/// Truth: differences of poses, Jacobians and static forces. Measured 4e-7 (rate of the Jacobian)
-/// and 9e-9 (tangent) relative.
+/// Truth: differences of poses, Jacobians and static forces. Measured 4e-7 (time derivative of the
+/// Jacobian) and 9e-9 (tangent), relative.
 #[test]
 fn jacobian_its_rate_and_the_static_tangent_are_derivatives() {
     for tree in [palletiser(GENERAL, Cut::Bottom), yielding(GENERAL, Cut::Top), levelled(GENERAL, 1.3)] {
@@ -501,7 +500,7 @@ fn jacobian_its_rate_and_the_static_tangent_are_derivatives() {
         }
         within("tangent", (&numeric - &G).amax() / G.amax(), 5e-8);
         within("tangent symmetry", (&G - G.transpose()).amax() / G.amax(), 1e-13);
-        // The part of the elastic coordinates alone is the same.
+        // The tangent restricted to the elastic coordinates is the same.
         if n > 3 {
             forward_kinematics(&model, &mut data, &q);
             let mut part = DMatrix::zeros(n - 3, n - 3);
@@ -511,12 +510,12 @@ fn jacobian_its_rate_and_the_static_tangent_are_derivatives() {
     }
 }
 
-/// Truth: energy of a frictionless four-bar that swings freely stays what it was; RK4 at 0.5 ms
-/// over 1 s, measured 1.6e-13 of the swing.
+/// Truth: the energy of a freely swinging frictionless four-bar is constant; RK4 at 0.5 ms over 1
+/// s, measured 1.6e-13 of the maximum kinetic energy.
 #[test]
 fn a_four_bar_pendulum_keeps_its_energy() {
-    // The upper arm hangs from the elbow with its lever square to the lower arm, far from the dead
-    // point.
+    // The upper arm hangs from the elbow with its lever perpendicular to the lower arm, far from
+    // the dead point.
     let mut tree = palletiser(PARALLELOGRAM, Cut::Top);
     tree.links.iter_mut().filter(|l| l.name == "upper").for_each(|l| *l = body("upper", 90.0, [0.1, -0.05, -0.5]));
     let start = [("lower", 2.6), ("crank", 0.3), ("elbow", -2.3), ("rod", 2.3)];
@@ -553,7 +552,7 @@ fn a_four_bar_pendulum_keeps_its_energy() {
     within("energy", (end - start) / swing, 5e-12);
 }
 
-/// A lifting arm with a cylinder: hinge at (0, 0), cylinder from (0.5, -0.3) to a lug on the arm at
+/// Lifting arm with a cylinder: hinge at (0, 0), cylinder from (0.5, -0.3) to a lug on the arm at
 /// (0.9, 0.2).
 fn lifted(driven: &str, cut_at_lug: bool) -> Mechanism {
     let mut tree = Mechanism::new("lift");
@@ -565,7 +564,7 @@ fn lifted(driven: &str, cut_at_lug: bool) -> Mechanism {
     ]);
     tree.links.push(Link { name: "lug".into(), inertia: None });
     let (dx, dz) = (0.4f64, 0.5f64);
-    // x of barrel and piston along the cylinder at zero.
+    // x axis of barrel and piston along the cylinder at zero coordinates.
     let lean = nalgebra::Rotation3::from_axis_angle(&Vector3::y_axis(), -dz.atan2(dx));
     let length = dx.hypot(dz);
     let foot = Pose::from_parts(Vector3::new(0.5, 0.0, -0.3).into(), lean);
@@ -578,7 +577,8 @@ fn lifted(driven: &str, cut_at_lug: bool) -> Mechanism {
         joint("stroke", slide, "barrel", "piston", at(length, 0.0));
         joint("lug", JointKind::Fixed, "arm", "lug", at(0.9, 0.2));
     } else {
-        // The cylinder hangs on the arm: piston first, then the barrel, whose foot the pin holds.
+        // The cylinder is mounted on the arm: piston first, then the barrel, whose foot is held by
+        // the pin.
         let X = Pose::from_parts(Vector3::new(0.9, 0.0, 0.2).into(), lean);
         joint("foot", Y(), "arm", "piston", X);
         joint("stroke", JointKind::Prismatic(-Vector3::x_axis()), "piston", "barrel", at(-length, 0.0));
@@ -598,9 +598,10 @@ fn lifted(driven: &str, cut_at_lug: bool) -> Mechanism {
     tree
 }
 
-/// Truth: the cosine rule. A cylinder of length s between fixed points at distances a and b from
-/// the hinge holds the arm at the angle α with s² = a² + b² - 2 a b cos α; the force in it by
-/// ds/dα. Each of the three joints may drive. Measured 4e-16 rad and 6e-16 of the force.
+/// Truth: the cosine rule. A cylinder of length s between points at distances a and b from the
+/// hinge holds the arm at the angle α with s² = a² + b² - 2 a b cos α; the cylinder force follows
+/// from ds/dα. Each of the three joints may be the driving one. Measured 4e-16 rad and 6e-16 of the
+/// force.
 #[test]
 fn a_cylinder_lifts_an_arm_as_the_cosine_rule_says() {
     let (foot, lug) = (Vector2::<f64>::new(0.5, -0.3), Vector2::<f64>::new(0.9, 0.2));
@@ -609,7 +610,7 @@ fn a_cylinder_lifts_an_arm_as_the_cosine_rule_says() {
     for cut_at_lug in [true, false] {
         let by = ["arm", "foot", "stroke"].map(|driven| Model::new(&lifted(driven, cut_at_lug)).unwrap());
         for lift in [-0.3, 0.0, 0.4, 0.8] {
-            // About y a positive angle lowers: the arm's joint is at -lift.
+            // A positive angle about y lowers the arm: the joint is at -lift.
             let open = open_0 + lift;
             let s = (a * a + b * b - 2.0 * a * b * open.cos()).sqrt();
             let slope = a * b * open.sin() / s;
@@ -625,8 +626,8 @@ fn a_cylinder_lifts_an_arm_as_the_cosine_rule_says() {
             let (force, values) = of(2, stroke);
             within("arm by the stroke", values[0] + lift, 5e-15);
             within("force in the cylinder", (force * slope + holding) / holding, 1e-14);
-            // Where the cylinder stands square to the line from hinge to foot its angle to the arm
-            // is the largest: a dead point.
+            // If the cylinder is perpendicular to the line from hinge to foot, its angle to the arm
+            // is at its maximum: a dead point.
             if cut_at_lug || open.cos() > a / b {
                 let (_, values) = of(1, foot_q);
                 within("arm by the foot", values[0] + lift, 1e-13);
@@ -639,8 +640,8 @@ fn a_cylinder_lifts_an_arm_as_the_cosine_rule_says() {
     }
 }
 
-/// Two parallelograms more hold the hand level: plate at the elbow, hand at the end of the upper
-/// arm.
+/// Palletiser with two further parallelograms that keep the hand level: plate at the elbow, hand at
+/// the end of the upper arm.
 fn levelled(bars: Bars, hand_rod: f64) -> Mechanism {
     let mut tree = palletiser(bars, Cut::Top);
     for name in ["plate", "level_rod", "level_end", "plate_lug", "hand", "hand_rod", "hand_end", "hand_lug"] {
@@ -667,15 +668,15 @@ fn levelled(bars: Bars, hand_rod: f64) -> Mechanism {
         dependent: dependent.map(String::from),
         at: vec![],
     };
-    // The last first: it rests on both others.
+    // Listed first although it depends on both others.
     tree.loops.insert(0, pin("hand", "hand_lug", "hand_end", ["hand", "hand_rod"]));
     tree.loops.push(pin("level", "plate_lug", "level_end", ["plate", "level_rod"]));
     tree
 }
 
-/// Truth: parallelograms hand on the direction of the column: the hand stays level. And the torques
-/// come from virtual work: a weight at the hand, wherever on it, is carried as if at the hand's
-/// hinge. Measured 9e-16 and 2e-14 of the torque.
+/// Truth: parallelograms transmit the direction of the column, so the hand stays level. Torques
+/// follow from virtual work: a weight on the hand, at any position, acts as if at the hand's hinge.
+/// Measured 9e-16 and 2e-14 of the torque.
 #[test]
 fn two_parallelograms_keep_the_hand_level() {
     let tree = levelled(PARALLELOGRAM, 1.4);
@@ -707,8 +708,8 @@ fn two_parallelograms_keep_the_hand_level() {
     }
 }
 
-/// Truth: the loop itself. What pin and eye leave open is rounding, also where links bend out of
-/// the plane; measured 2.5e-16 m.
+/// Truth: loop closure. The gap between pin and eye is at rounding level, also with out-of-plane
+/// deflection of the links; measured 2.5e-16 m.
 #[test]
 fn a_loop_closes_to_rounding_with_elastic_links() {
     let model = Model::new(&yielding(GENERAL, Cut::Top)).unwrap();
@@ -768,7 +769,7 @@ fn what_is_no_loop_is_refused_with_its_cause() {
 #[test]
 fn a_loop_that_cannot_close_says_so_and_leaves_nothing_that_looks_like_a_result() {
     let mut tree = palletiser(GENERAL, Cut::Top);
-    // A short rod: far out the triangle does not reach.
+    // With this geometry the triangle cannot be closed far out.
     tree.joints.iter_mut().filter(|j| j.name == "crank").for_each(|j| j.X_PJ = at(0.3, 0.9));
     let model = Model::new(&tree).unwrap();
     let mut data = Data::new(&model);
@@ -788,7 +789,7 @@ fn analytic_inverse_kinematics_and_lanes_leave_loops_alone() {
     let model = Model::new(&palletiser(PARALLELOGRAM, Cut::Top)).unwrap();
     let error = AnalyticArm::new(&model, model.frame("tool").unwrap()).unwrap_err().to_string();
     assert!(error.contains("follows from a closed loop"), "{error}");
-    // By numbers it is found.
+    // The numerical iteration finds it.
     let q = DVector::from_row_slice(&PLACES[1]);
     let mut data = Data::new(&model);
     forward_kinematics(&model, &mut data, &q);

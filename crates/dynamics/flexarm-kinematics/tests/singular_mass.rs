@@ -1,4 +1,4 @@
-//! Accelerations where the mass matrix is not positive definite.
+//! Forward dynamics with a mass matrix that is not positive definite.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use flexarm_kinematics::{
@@ -7,7 +7,7 @@ use flexarm_kinematics::{
 };
 use nalgebra::{DVector, Matrix3, Vector3};
 
-/// Two links about upright axes, 1 kg m² each about their own joint.
+/// Two links about vertical axes, 1 kg m² each about their own joint.
 fn two_links(coupled: f64, mass: f64) -> Result<Model, ModelError> {
     let link = |name: &str| Link {
         name: name.into(),
@@ -30,8 +30,8 @@ fn two_links(coupled: f64, mass: f64) -> Result<Model, ModelError> {
     })
 }
 
-/// The mass matrix is [[2, 1 + c], [1 + c, 1]]: for c = 0.2 the truth is its inverse, for c = 100
-/// it is indefinite.
+/// The mass matrix is [[2, 1 + c], [1 + c, 1]]: its inverse is the truth for c = 0.2; it is
+/// indefinite for c = 100.
 #[test]
 fn a_mass_matrix_that_is_not_positive_definite_gives_no_number_and_no_panic() {
     let accelerations = |coupled: f64| {

@@ -1,59 +1,59 @@
-//! Cutting a link's own mass properties in two, so that both parts together are exactly the link.
+//! Division of a link's own mass properties among parts that together are exactly the link.
 //!
-//! For a link whose inertia is known (from its URDF) but not how it is spread: the two centres of
-//! mass are put at the middles of the two pieces of the line A-B, the masses follow from the link's
-//! centre of mass, and what remains of the inertia is shared in proportion to mass. For a uniform
-//! bar cut in the middle this is the exact answer.
+//! For a link whose inertia is known (from its URDF) but not its distribution: the two centres of
+//! mass are placed at the middles of the two pieces of the line A-B, the masses follow from the
+//! link's centre of mass, and the remaining inertia is shared in proportion to mass. For a uniform
+//! bar cut in the middle this is exact.
 
 use flexarm_fem::RigidPart;
 use flexarm_kinematics::{LinkInertia, skew};
 use nalgebra::Vector3;
 
-/// Why a link's inertia cannot be cut this way.
+/// Reason why a link's inertia cannot be divided this way.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CutError {
-    /// The centre of mass lies too near one end.
+    /// The centre of mass is too close to one end.
     #[error(
         "its centre of mass lies at {found:.3} of the line from A to B; cut at {split:.3} the two parts get positive masses \
          only between {low:.3} and {high:.3}: move the split or give the parts in a .flex file"
     )]
     CentreOfMass {
-        /// Fraction of A-B at which the centre of mass lies.
+        /// Fraction of A-B at which the centre of mass is.
         found: f64,
         /// Fraction at which the link is cut.
         split: f64,
-        /// Lowest workable fraction.
+        /// Lower bound of the admissible fraction.
         low: f64,
-        /// Highest workable fraction.
+        /// Upper bound of the admissible fraction.
         high: f64,
     },
-    /// The remaining inertia belongs to no body.
+    /// The remaining inertia is not that of a body.
     #[error(
         "after the masses are placed, {remaining:.3} kg m² remain as smallest principal moment of its inertia, \
          which must stay positive: use parts = \"uniform\" or give the parts in a .flex file"
     )]
     Inertia {
-        /// Smallest principal moment that remains (kg m²).
+        /// Remaining minimum principal moment of inertia (kg m²).
         remaining: f64,
     },
-    /// No body with this mass, centre of mass and inertia bends in these shapes.
+    /// No body with this mass, centre of mass and inertia has these mode shapes.
     #[error(
         "no body with its centre of mass and inertia bends in the shapes of the beam (the smallest eigenvalue of the mass \
          matrix, with the diagonal scaled to one, is {smallest:.1e}, which must be positive): use parts = \"uniform\" or give \
          the parts in a .flex file"
     )]
     Modes {
-        /// Smallest eigenvalue of the scaled mass matrix.
+        /// Minimum eigenvalue of the mass matrix scaled to a unit diagonal.
         smallest: f64,
     },
 }
 
-/// Proximal and distal part of a link cut at `split` of the line from `p_LA` to `p_LB` (link axes)
-/// (m).
+/// Divides a link at the fraction `split` of the line from `p_LA` to `p_LB` (link axes, m); returns
+/// the proximal and the distal part.
 ///
 /// # Errors
-/// [`CutError`] if no two bodies of this kind make up the link.
+/// [`CutError`] if no two such bodies make up the link.
 pub fn cut_inertia(
     link: &LinkInertia,
     p_LA: &Vector3<f64>,
@@ -68,9 +68,10 @@ pub fn cut_inertia(
     }
     let distal_mass = link.mass * (found - low) / (high - low);
     let masses = [link.mass - distal_mass, distal_mass];
-    // Both parts share the link's offset from the line.
+    // Both parts have the same offset from the line as the link.
     let coms = [low, high].map(|fraction| link.com + line * (fraction - found));
 
+    // Inertia left after the point masses, by the parallel axis theorem.
     let mut rest = link.inertia_com;
     for (mass, com) in masses.iter().zip(&coms) {
         let c = skew(&(com - link.com));
@@ -84,21 +85,22 @@ pub fn cut_inertia(
     Ok([part(0), part(1)])
 }
 
-/// The link's own mass properties spread over the parts of a chain, as [`cut_inertia`] does for
-/// two.
+/// Distributes the link's own mass properties over the parts of a chain, as [`cut_inertia`] does
+/// for two.
 ///
-/// Masses follow those of the chain, tilted along A-B until the centre of mass is the link's; all
-/// parts share the link's offset from the line, and what remains of the inertia is shared in
+/// Masses are those of the chain, weighted linearly along A-B so that the centre of mass is that of
+/// the link. All parts have the link's offset from the line, and the remaining inertia is shared in
 /// proportion to mass.
 ///
 /// # Errors
-/// [`CutError`] if no bodies of this kind make up the link.
+/// [`CutError`] if no such bodies make up the link.
 pub fn cut_chain(
     link: &LinkInertia,
     p_LA: &Vector3<f64>,
     p_LB: &Vector3<f64>,
     chain: &[RigidPart],
 ) -> Result<Vec<RigidPart>, CutError> {
+    // Distribution of the chain's mass along A-B: total, mean and variance of the position.
     let line = p_LB - p_LA;
     let fraction = |p: &Vector3<f64>| (p - p_LA).dot(&line) / line.norm_squared();
     let whole: f64 = chain.iter().map(|p| p.mass).sum();
@@ -110,12 +112,13 @@ pub fn cut_chain(
     let masses: Vec<f64> =
         chain.iter().zip(&places).map(|(p, x)| p.mass * link.mass / whole * (1.0 + tilt * (x - mean))).collect();
     if masses.iter().any(|m| *m <= 0.0) {
-        // The tilt at which the lighter end weighs nothing.
+        // Limits at which the lighter end has zero mass.
         let (first, last) = (places[0], places[places.len() - 1]);
         let (low, high) = (mean - spread / (last - mean), mean + spread / (mean - first));
         return Err(CutError::CentreOfMass { found, split: mean, low, high });
     }
     let coms: Vec<Vector3<f64>> = places.iter().map(|x| link.com + line * (x - found)).collect();
+    // Inertia left after the point masses, by the parallel axis theorem.
     let mut rest = link.inertia_com;
     for (mass, com) in masses.iter().zip(&coms) {
         let c = skew(&(com - link.com));
@@ -156,7 +159,7 @@ mod tests {
         }
     }
 
-    /// Mass, centre of mass and inertia of both parts together are those of the link; measured
+    /// Mass, centre of mass and inertia of both parts together equal those of the link; measured
     /// 4e-16.
     #[test]
     fn both_parts_together_are_exactly_the_link() {
@@ -170,10 +173,10 @@ mod tests {
         }
     }
 
-    /// The same for chains, and for two parts the same as the closed form; measured 6e-16.
+    /// Same for chains; for two parts it equals the closed form. Measured 6e-16.
     #[test]
     fn parts_of_a_chain_together_are_exactly_the_link() {
-        // Wider than the bar, whose inertia does not reach over the whole line.
+        // Larger inertia than the bar, which does not extend over the whole line.
         let link = LinkInertia { inertia_com: Matrix3::from_diagonal(&vector![0.02, 0.9, 0.9]), ..bar() };
         let (p_LA, p_LB) = (vector![-0.05, 0.0, 0.0], vector![0.8, 0.0, 0.0]);
         for n in [2, 3, 7] {

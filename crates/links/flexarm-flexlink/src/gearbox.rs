@@ -3,15 +3,15 @@
 //! ```text
 //! parent --joint (prescribed or torque)--> <joint>__motor --spring--> child
 //! ```
-//! The link between has no mass; the rotor is an armature of the motor's joint, `ratio² J`. With
-//! one stiffness the spring turns about the joint's axis; with three the bearings tilt too
-//! (extended flexible joint), as three springs about x, y, z of the joint frame; with six, or a
-//! full 6x6, it gives way in all directions. At zero deflection nothing has moved.
+//! The intermediate link has no mass; the rotor is an armature of the motor's joint, `ratio² J`.
+//! With one stiffness the spring acts about the joint's axis; with three also the bearings tilt
+//! (extended flexible joint), as three springs about x, y, z of the joint frame; with a full 6x6
+//! stiffness, it deflects in all directions. At zero deflection all frames are unchanged.
 
 use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, Mechanism, Pose};
 use nalgebra::{DMatrix, Matrix6, Unit, Vector3};
 
-/// Stiffness of a gearbox on the joint's side.
+/// Stiffness of a gearbox on the joint side.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(clippy::large_enum_variant, reason = "a handful per robot, made once")]
 pub enum GearStiffness {
@@ -23,35 +23,35 @@ pub enum GearStiffness {
     Full(Matrix6<f64>),
 }
 
-/// A joint with an elastic gearbox.
+/// Joint with an elastic gearbox.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gearbox {
     /// Name of the joint.
     pub joint: String,
-    /// Its spring.
+    /// Stiffness of the spring.
     pub stiffness: GearStiffness,
 }
 
-/// A spring that a gearbox brought in, with its stiffness.
+/// Spring inserted for a gearbox.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GearSpring {
-    /// Name for people: the joint, with the axis where there are three.
+    /// Name in messages: the joint, with the axis if there are three.
     pub name: String,
-    /// Name of the gearbox's joint.
+    /// Name of the joint with the gearbox.
     pub gearbox: String,
     /// Name of the elastic joint.
     pub joint: String,
-    /// Number of the spring within its gearbox.
+    /// Index of the spring within its gearbox.
     pub component: usize,
-    /// Stiffness on its coordinates.
+    /// Stiffness for its coordinates.
     pub K: DMatrix<f64>,
 }
 
-/// Why a gearbox does not fit.
+/// Reason why a gearbox is invalid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GearboxError {
-    /// No such joint, or none that moves.
+    /// There is no such joint, or it does not move.
     #[error("gearbox of joint {joint:?}: the robot has no such movable joint")]
     NoJoint {
         /// The joint.
@@ -63,7 +63,7 @@ pub enum GearboxError {
         /// The joint.
         joint: String,
     },
-    /// A joint that a closed loop moves has no motor.
+    /// A dependent joint of a closed loop has no motor.
     #[error("gearbox of joint {joint:?}: the joint follows from loop {name:?}, so nothing drives it")]
     Dependent {
         /// The joint.
@@ -71,27 +71,27 @@ pub enum GearboxError {
         /// The loop.
         name: String,
     },
-    /// A stiffness that holds nothing.
+    /// The stiffness is not positive definite.
     #[error(
         "gearbox of joint {joint:?}: its stiffness must be positive (definite), found {found:e} as its smallest value"
     )]
     NotPositive {
         /// The joint.
         joint: String,
-        /// Smallest eigenvalue or entry.
+        /// Minimum eigenvalue or entry, or the non-finite entry.
         found: f64,
     },
-    /// A matrix that no spring has.
+    /// The stiffness is not symmetric.
     #[error(
         "gearbox of joint {joint:?}: its 6x6 stiffness must be symmetric, found a relative asymmetry of {found:.1e}"
     )]
     NotSymmetric {
         /// The joint.
         joint: String,
-        /// Largest difference to the transpose over the largest entry.
+        /// Maximum difference from the transpose, relative to the maximum entry.
         found: f64,
     },
-    /// A tilting gearbox on a slide.
+    /// A tilting gearbox is on a prismatic joint.
     #[error("gearbox of joint {joint:?}: three stiffnesses are about the axes of a turning joint; this one slides")]
     Slides {
         /// The joint.
@@ -99,7 +99,7 @@ pub enum GearboxError {
     },
 }
 
-/// Largest relative asymmetry of a full stiffness.
+/// Maximum relative asymmetry of a full stiffness.
 pub(crate) const ASYMMETRY: f64 = 1e-9;
 
 fn check_stiffness(joint: &str, stiffness: &GearStiffness) -> Result<(), GearboxError> {
@@ -126,10 +126,10 @@ fn check_stiffness(joint: &str, stiffness: &GearStiffness) -> Result<(), Gearbox
     Ok(())
 }
 
-/// Puts a spring behind each of the joints.
+/// Inserts a spring outward of each of the joints.
 ///
 /// # Errors
-/// [`GearboxError`], naming the joint; nothing of that gearbox is in the mechanism then.
+/// [`GearboxError`] with the name of the joint; that gearbox is then not in the mechanism.
 pub fn insert_gearboxes(mechanism: &mut Mechanism, gearboxes: &[Gearbox]) -> Result<Vec<GearSpring>, GearboxError> {
     let mut springs = Vec::new();
     for gearbox in gearboxes {

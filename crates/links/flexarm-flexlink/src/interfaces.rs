@@ -1,11 +1,11 @@
-//! Which interface of a link each joint hangs on.
+//! Assignment of child joints to the interfaces of a link.
 
 use flexarm_kinematics::{Mechanism, Pose};
 use nalgebra::Vector3;
 
 use crate::substitute::FlexibleLink;
 
-/// A joint on an interface of a link that is neither its near nor its far end.
+/// Joint at an interface of a link other than its proximal and distal ones.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BranchJoint {
     /// Name of the joint.
@@ -14,12 +14,11 @@ pub struct BranchJoint {
     pub interface: String,
 }
 
-/// Joints of the link that hang on another interface than its two ends: the nearest one to the
-/// joint's origin.
+/// Child joints of the link whose nearest interface is neither of its two ends.
 ///
-/// Rigid parts with springs know the two ends only: what hangs elsewhere would ride rigidly on one
-/// of the parts, which can be wrong by a factor of two. Empty for links of which no other interface
-/// is known.
+/// Rigid parts with springs represent the two ends only: a joint elsewhere would be rigidly
+/// attached to one of the parts, with errors up to a factor of two. Empty for links without data on
+/// other interfaces.
 pub fn branch_joints(mechanism: &Mechanism, link: &FlexibleLink) -> Vec<BranchJoint> {
     let others = other_interfaces(link);
     let ends = [&link.reduced.X_LA, &link.reduced.X_LB].map(|X| X.translation.vector);
@@ -33,7 +32,7 @@ pub fn branch_joints(mechanism: &Mechanism, link: &FlexibleLink) -> Vec<BranchJo
     branch.collect()
 }
 
-/// Names and places of the interfaces behind the first two.
+/// Names and positions of the interfaces beyond the first two.
 fn other_interfaces(link: &FlexibleLink) -> Vec<(&str, Vector3<f64>)> {
     let place = |X: &Pose| X.translation.vector;
     let Some(details) = &link.reduced.details else { return Vec::new() };
@@ -44,7 +43,7 @@ fn other_interfaces(link: &FlexibleLink) -> Vec<(&str, Vector3<f64>)> {
     }
 }
 
-/// Number of the place nearest to `p`, the first of several.
+/// Index of the position nearest to `p`, the first one of several.
 pub(crate) fn nearest<'a>(p: &Vector3<f64>, places: impl Iterator<Item = &'a Vector3<f64>>) -> Option<usize> {
     let distances = places.map(|place| (place - p).norm()).enumerate();
     distances.reduce(|best, next| if next.1 < best.1 { next } else { best }).map(|(k, _)| k)

@@ -1,14 +1,14 @@
 //! Substitution of rigid links by flexible ones on the tree.
 //!
-//! A link with a [`ReducedLink`] becomes two or more links, proximal to distal, joined by six-DoF
-//! elastic joints, or one that bends in modes ([`LinkForm`]). Everything that hangs on the link
-//! beyond the split follows the distal part. A joint with an elastic gearbox becomes two, the
-//! motor's and the spring's ([`insert_gearboxes`]); a base may stand on springs
-//! ([`insert_mounting`]). The result is again a [`flexarm_kinematics::Mechanism`]: the tree model
-//! and every algorithm on it stay the same. Start at [`substitute`].
+//! A link with a [`ReducedLink`] becomes two or more links, proximal to distal, connected by
+//! six-DoF elastic joints, or a modal body ([`LinkForm`]). Children of the link beyond the split
+//! move to the distal part. A joint with an elastic gearbox becomes two, motor joint and spring
+//! ([`insert_gearboxes`]); a base may be mounted on springs ([`insert_mounting`]). The result is
+//! again a [`flexarm_kinematics::Mechanism`], so the tree model and all its algorithms are
+//! unchanged. Start at [`substitute`].
 //!
-//! Frames: L link, A proximal and B distal interface, S split. Not here: where the stiffness comes
-//! from (`flexarm-fem`), damping and time (`flexarm-stepping`).
+//! Frames: L link, A proximal and B distal interface, S split. Not here: computation of the
+//! stiffness (`flexarm-fem`), damping and time integration (`flexarm-stepping`).
 //!
 //! ```
 //! use flexarm_fem::{BeamLink, Material, Section};

@@ -1,4 +1,4 @@
-//! A link that bends in modes, on the tree: one body with its interfaces.
+//! Modal links on the tree: one body with its interfaces.
 
 use std::sync::Arc;
 
@@ -12,11 +12,11 @@ use crate::cut::CutError;
 use crate::interfaces::nearest;
 use crate::substitute::{FlexibleLink, FlexibleSpan, Parts, Site, SubstitutionError, inertia_of, move_children};
 
-/// How near the far interface must be to the far end of the reduced link, as a fraction of its
+/// Maximum distance of the far interface from the far end of the reduced link, relative to its
 /// length.
 const AT_INTERFACE: f64 = 1e-6;
 
-/// The mass integrals and shapes as the tree takes them.
+/// Converts the mass integrals and shapes to those of the tree model.
 pub fn modal_body(link: &ModalLink) -> ModalBody {
     ModalBody {
         mass: link.mass,
@@ -25,24 +25,24 @@ pub fn modal_body(link: &ModalLink) -> ModalBody {
         C_t: link.C_t.column_iter().map(|c| c.into_owned()).collect(),
         C_r: link.C_r.column_iter().map(|c| c.into_owned()).collect(),
         P: link.P.clone(),
-        // Terms of second order that nobody knew are left out.
+        // Second-order terms that are not available are omitted.
         N: if link.N.iter().all(|N| N.amax() == 0.0) { Vec::new() } else { link.N.clone() },
         M: link.M.clone(),
         interfaces: link.interfaces.iter().map(|i| InterfaceShape { X_LI: i.X_LI, Phi: i.Phi.clone() }).collect(),
     }
 }
 
-/// Smallest eigenvalue of a mass matrix after its diagonal is scaled to one; 0 or below: no body
-/// has it.
+/// Minimum eigenvalue of a mass matrix scaled to a unit diagonal; a value of zero or below is not
+/// physical.
 fn smallest_scaled(M: &DMatrix<f64>) -> f64 {
     let scale = M.diagonal().map(|x| 1.0 / x.max(f64::MIN_POSITIVE).sqrt());
     DMatrix::from_fn(M.nrows(), M.ncols(), |i, j| M[(i, j)] * scale[i] * scale[j]).symmetric_eigenvalues().min()
 }
 
-/// Puts a modal body in the place of a link.
+/// Replaces a link by a modal body.
 ///
-/// Bodies that ride on the link stay rigidly on the interface on whose side of the cut they are.
-/// With [`Parts::FromLink`] the mass integrals of the undeformed body are made those of the
+/// Attached bodies are fixed rigidly to the interface on their side of the split. With
+/// [`Parts::FromLink`], the mass integrals of the undeformed body are replaced by those of the
 /// mechanism's link.
 pub(crate) fn substitute_modal(
     mechanism: &mut Mechanism,
@@ -52,6 +52,7 @@ pub(crate) fn substitute_modal(
 ) -> Result<FlexibleSpan, SubstitutionError> {
     let (name, reduced) = (&flexible.link, &flexible.reduced);
     let fail = |what: String| SubstitutionError::Modal { link: name.clone(), what };
+    // Check that the first interface is at B.
     let Some(far) = modal.interfaces.first() else { return Err(fail("it has one interface only".into())) };
     let distance = (far.X_LI.translation.vector - site.p_LB).norm();
     if distance > AT_INTERFACE * site.length {
@@ -59,7 +60,7 @@ pub(crate) fn substitute_modal(
     }
     let mut body = modal_body(modal);
 
-    // What rides on the link: at A in the link itself, at B on the distal link.
+    // Attached bodies: those near A go to the link itself, those near B to the distal link.
     let middle = reduced.split.X_LS.translation.vector;
     let line = site.p_LB - site.p_LA;
     let (mut near, mut beyond): (Option<SpatialInertia>, Option<SpatialInertia>) = (None, None);
@@ -73,6 +74,7 @@ pub(crate) fn substitute_modal(
             }
         }
     }
+    // Mass integrals of the undeformed body from the mechanism's link.
     if let Parts::FromLink(_) = flexible.parts {
         let own = site.own.ok_or_else(|| SubstitutionError::NoInertia { link: name.clone() })?.spatial();
         if (own.mass / body.mass - 1.0).abs() > 1e-9 {
@@ -96,10 +98,11 @@ pub(crate) fn substitute_modal(
     let mut part_masses = vec![body.mass];
     part_masses.extend(near.iter().chain(&beyond).map(|i| i.mass));
     let distal_link = format!("{name}__distal");
+    // One child link per interface, with the joints nearest to it.
     let far_ends = modal.interfaces.iter().map(|interface| interface.X_LI.translation.vector);
     let places: Vec<_> = std::iter::once(site.p_LA).chain(far_ends).collect();
     for (k, interface) in modal.interfaces.iter().enumerate() {
-        // Interfaces keep the link's axes.
+        // Interface frames have the axes of the link.
         let X_LI = Pose::from(interface.X_LI.translation);
         let to = if k == 0 { distal_link.clone() } else { format!("{name}__{}", interface.name) };
         move_children(mechanism, name, &to, &X_LI, |child, p| match child == site.distal_joint {

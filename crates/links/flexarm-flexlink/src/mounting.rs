@@ -1,11 +1,11 @@
-//! An elastic mounting: six springs between the ground and the base of a robot.
+//! Elastic mounting: a six-DoF spring between the ground and the base of a robot.
 //!
 //! ```text
-//! ground --springs at S--> <name>__top (mass that rides on them) --fixed--> base
+//! ground --springs at S--> <name>__top (attached mass) --fixed--> base
 //! ```
-//! The ground becomes the root of the tree; at zero deflection the base is where it was, so that
-//! the axes of the world stay those of the base. Not here: a base that stands on a beam or a mesh,
-//! which is a flexible link ([`crate::substitute`]).
+//! The ground becomes the root of the tree. At zero deflection the base is at its original pose, so
+//! that the world axes remain those of the base. Not here: a base on a beam or a mesh, which is a
+//! flexible link ([`crate::substitute`]).
 
 use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, LinkInertia, Mechanism, Pose};
 use nalgebra::Matrix6;
@@ -13,61 +13,62 @@ use nalgebra::Matrix6;
 use crate::gearbox::ASYMMETRY;
 use crate::substitute::{FlexibleSpan, Spring};
 
-/// Springs under the base.
+/// Springs below the base.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mounting {
-    /// Name for people, and of the ground link.
+    /// Name in messages, and name of the ground link.
     pub name: String,
-    /// Pose of S, where the springs are, in the base link.
+    /// Pose of the spring frame S in the base link.
     pub X_BS: Pose,
     /// Stiffness at So in S axes (N/m, N/rad; N m/m, N m/rad).
     pub K_S: Matrix6<f64>,
-    /// What rides on the springs beside the base, in S axes.
+    /// Additional mass on the springs, in S axes.
     pub inertia: Option<LinkInertia>,
 }
 
-/// Why springs do not fit under a base.
+/// Reason why a mounting is invalid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MountingError {
-    /// Another link has the name.
+    /// The name is already used by a link.
     #[error("mounting {name:?}: the robot has a link of that name; call the mounting otherwise with name = \"...\"")]
     NameTaken {
         /// The name.
         name: String,
     },
-    /// The tree has no root.
+    /// The tree has no single root.
     #[error("mounting {name:?}: the robot has no single base link to stand on it, found {roots:?}")]
     NoBase {
         /// The mounting.
         name: String,
-        /// Links that no joint carries.
+        /// Links without parent joint.
         roots: Vec<String>,
     },
-    /// A stiffness that holds nothing.
+    /// The stiffness is not positive definite.
     #[error(
         "mounting {name:?}: its stiffness must be finite and positive definite, found {found:e} as its smallest value"
     )]
     NotPositive {
         /// The mounting.
         name: String,
-        /// Smallest eigenvalue, or the entry that is no number.
+        /// Minimum eigenvalue of the scaled matrix, minimum diagonal entry, or the non-finite
+        /// entry.
         found: f64,
     },
-    /// A matrix that no spring has.
+    /// The stiffness is not symmetric.
     #[error("mounting {name:?}: its 6x6 stiffness must be symmetric, found a relative asymmetry of {found:.1e}")]
     NotSymmetric {
         /// The mounting.
         name: String,
-        /// Largest difference to the transpose over the largest entry.
+        /// Maximum difference from the transpose, relative to the maximum entry.
         found: f64,
     },
 }
 
-/// The link that no joint carries.
+/// Returns the link without parent joint.
 ///
 /// # Errors
-/// [`MountingError::NoBase`] if it is not exactly one.
+/// [`MountingError::NoBase`] if there is not exactly one.
 pub fn base_link<'m>(mechanism: &'m Mechanism, mounting: &str) -> Result<&'m Link, MountingError> {
     let carried = |link: &Link| mechanism.joints.iter().any(|joint| joint.child == link.name);
     let roots: Vec<&Link> = mechanism.links.iter().filter(|link| !carried(link)).collect();
@@ -89,8 +90,7 @@ fn check_stiffness(name: &str, K: &Matrix6<f64>) -> Result<(), MountingError> {
     if asymmetry > ASYMMETRY {
         return Err(MountingError::NotSymmetric { name: name.to_owned(), found: asymmetry });
     }
-    // Forces and moments have different units: what counts is the matrix scaled to ones on its
-    // diagonal.
+    // Forces and moments have different units, so the matrix is scaled to a unit diagonal.
     let diagonal = K.diagonal();
     if diagonal.min() <= 0.0 {
         return not_positive(diagonal.min());
@@ -102,11 +102,11 @@ fn check_stiffness(name: &str, K: &Matrix6<f64>) -> Result<(), MountingError> {
     }
 }
 
-/// Puts the springs between a new ground link and the base. Returns the elastic joint and where to
-/// look for its ends.
+/// Inserts the springs between a new ground link and the base. Returns the elastic joint and the
+/// location of its ends.
 ///
 /// # Errors
-/// [`MountingError`]; the mechanism is as it was then.
+/// [`MountingError`]; the mechanism is then unchanged.
 pub fn insert_mounting(
     mechanism: &mut Mechanism,
     mounting: &Mounting,

@@ -1,5 +1,4 @@
-//! One link into two or more rigid parts with elastic joints between, or into one that bends in
-//! modes.
+//! Replacement of a link by rigid parts connected by elastic joints, or by a modal body.
 
 use std::sync::Arc;
 
@@ -12,48 +11,49 @@ use crate::cut::{CutError, cut_chain, cut_inertia};
 use crate::interfaces::{BranchJoint, branch_joints};
 use crate::modal::substitute_modal;
 
-/// A link that bends.
+/// Link to be made flexible.
 #[derive(Clone, Debug)]
 pub struct FlexibleLink {
     /// Name of the link.
     pub link: String,
-    /// Name of the joint at the distal interface; found by itself if the link has one joint that
-    /// leads on.
+    /// Name of the joint at the distal interface; `None` to find it, if the link has a single child
+    /// joint that qualifies.
     pub distal: Option<String>,
     /// Stiffness, frames and parts.
     pub reduced: ReducedLink,
-    /// Whose mass properties the parts take.
+    /// Source of the mass properties of the parts.
     pub parts: Parts,
     /// Rigid parts or modes.
     pub form: LinkForm,
-    /// Coordinates of the elastic rotation.
+    /// Parametrisation of the elastic rotation.
     pub angles: ElasticAngles,
-    /// `false` drops the coupling terms of `K_S`: only to show what that costs.
+    /// Whether the coupling terms of `K_S` are kept; `false` only to show the error without them.
     pub coupling: bool,
 }
 
 impl FlexibleLink {
-    /// With the reduced link's own parts, rotation vector and full coupling.
+    /// Creates a flexible link with the reduced link's own parts, rotation vector and full
+    /// coupling.
     pub fn new(link: impl Into<String>, reduced: ReducedLink) -> Self {
         let (angles, parts) = (ElasticAngles::default(), Parts::Reduced);
         Self { link: link.into(), distal: None, reduced, parts, form: LinkForm::TwoParts, angles, coupling: true }
     }
 }
 
-/// What a flexible link becomes.
+/// Model of a flexible link.
 #[derive(Clone, Debug, Default)]
 pub enum LinkForm {
-    /// Two rigid parts with one elastic joint, those of the reduced link.
+    /// Two rigid parts with one elastic joint, as in the reduced link.
     #[default]
     TwoParts,
     /// n rigid parts with n - 1 elastic joints.
     Chain(Chain),
-    /// One body that bends in modes.
+    /// One modal body.
     Modal(Arc<ModalLink>),
 }
 
 impl LinkForm {
-    /// A word for people.
+    /// Name for messages and reports.
     pub fn name(&self) -> &'static str {
         match self {
             Self::TwoParts | Self::Chain(_) => "lumped",
@@ -62,17 +62,17 @@ impl LinkForm {
     }
 }
 
-/// Mass properties of the two parts.
+/// Source of the mass properties of the parts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Parts {
-    /// As the reduced link says.
+    /// From the reduced link.
     Reduced,
-    /// The mechanism's own inertia of the link, cut at this fraction of the line A-B: the rigid
-    /// twin is unchanged.
+    /// From the mechanism's own inertia of the link, divided at this fraction of the line A-B; the
+    /// rigid mechanism keeps its mass properties.
     FromLink(f64),
 }
 
-/// The elastic joint that took a link's place.
+/// Elastic joint of a lumped flexible link.
 #[derive(Clone, Debug)]
 pub struct Spring {
     /// Name of the flexible link.
@@ -87,29 +87,29 @@ pub struct Spring {
     pub X_LS: Pose,
 }
 
-/// A flexible link in its place: where to look for its ends.
+/// Flexible link on the tree, with the location of its ends.
 #[derive(Clone, Debug)]
 pub struct FlexibleSpan {
-    /// Name of the link; its frame still is at its proximal end.
+    /// Name of the link; its frame is still at its proximal end.
     pub link: String,
-    /// Name of the link that carries interface B now.
+    /// Name of the link that now carries interface B.
     pub distal_link: String,
     /// Pose of A in the link.
     pub X_LA: Pose,
     /// Pose of B in the distal link.
     pub X_DB: Pose,
-    /// Distance of the interfaces (m).
+    /// Distance between the interfaces (m).
     pub length: f64,
-    /// Mass of the link in the mechanism before (kg).
+    /// Mass of the link in the original mechanism (kg).
     pub own_mass: f64,
-    /// Masses of the parts, proximal first; of a link that bends in modes one (kg).
+    /// Masses of the parts, proximal first (kg); for a modal link, the modal body first.
     pub part_masses: Vec<f64>,
 }
 
-/// A mechanism with its flexible links in place.
+/// Mechanism with its flexible links.
 #[derive(Clone, Debug)]
 pub struct Substituted {
-    /// The tree with elastic joints.
+    /// Tree with elastic joints.
     pub mechanism: Mechanism,
     /// Elastic joints of lumped links, in the order given, proximal first.
     pub springs: Vec<Spring>,
@@ -117,25 +117,25 @@ pub struct Substituted {
     pub spans: Vec<FlexibleSpan>,
 }
 
-/// Why a link cannot be made flexible.
+/// Reason why a link cannot be made flexible.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SubstitutionError {
-    /// No link of that name.
+    /// There is no link with this name.
     #[error("flexible link {link:?} is not a link of the robot; its links are {known:?}")]
     UnknownLink {
-        /// The name asked for.
+        /// Requested name.
         link: String,
-        /// The names there are.
+        /// Names of the existing links.
         known: Vec<String>,
     },
-    /// Named twice.
+    /// A link is listed twice.
     #[error("flexible link {link:?} is listed twice")]
     Twice {
         /// The link.
         link: String,
     },
-    /// The distal joint is not clear.
+    /// The distal joint is ambiguous.
     #[error("link {link:?} has {} joints that lead on ({children:?}): name the one at the far interface with distal = \"...\"", children.len())]
     DistalUnclear {
         /// The link.
@@ -143,17 +143,17 @@ pub enum SubstitutionError {
         /// Its child joints.
         children: Vec<String>,
     },
-    /// The named joint does not start at the link.
+    /// The named joint is not a child of the link.
     #[error("distal joint {joint:?} does not start at link {link:?}; its joints are {children:?}")]
     NotAChild {
         /// The link.
         link: String,
-        /// The joint asked for.
+        /// Requested joint.
         joint: String,
         /// Its child joints.
         children: Vec<String>,
     },
-    /// The reduced link's interface B is not where the joint is.
+    /// Interface B of the reduced link is not at the joint.
     #[error(
         "link {link:?}: interface B of the reduced link lies {distance:.3e} m from joint {joint:?}: check units and frames of the reduced link"
     )]
@@ -165,21 +165,21 @@ pub enum SubstitutionError {
         /// Distance (m).
         distance: f64,
     },
-    /// A link without mass cannot be cut.
+    /// A link without mass cannot be divided.
     #[error("link {link:?} has no inertia to cut: give the parts in a .flex file or use parts = \"uniform\"")]
     NoInertia {
         /// The link.
         link: String,
     },
-    /// Modes and another frame.
+    /// The modal link does not fit the mechanism.
     #[error("link {link:?} cannot bend in modes: {what}")]
     Modal {
         /// The link.
         link: String,
-        /// Why.
+        /// Reason.
         what: String,
     },
-    /// A load where springs between rigid parts know nothing.
+    /// A joint is at an interface that lumped parts do not represent.
     #[error(
         "joint {joint:?} hangs on interface {interface:?} of link {link:?}, which is neither its near nor its far end: rigid parts with \
          springs carry load at the two ends alone, let the link bend in modes"
@@ -192,21 +192,21 @@ pub enum SubstitutionError {
         /// The interface.
         interface: String,
     },
-    /// The parts cannot be made.
+    /// The mass properties cannot be divided.
     #[error("the mass of link {link:?} cannot be spread along it: {source}")]
     Cut {
         /// The link.
         link: String,
-        /// Why.
+        /// Cause.
         #[source]
         source: CutError,
     },
 }
 
-/// How far the reduced link's B may lie from the joint, as a fraction of the link's length.
+/// Maximum distance of the reduced link's B from the joint, relative to the link's length.
 const INTERFACE_TOLERANCE: f64 = 1e-6;
 
-/// The joint at the distal interface of a link.
+/// Finds the joint at the distal interface of a link.
 ///
 /// # Errors
 /// [`SubstitutionError::UnknownLink`], [`SubstitutionError::DistalUnclear`] or
@@ -237,16 +237,16 @@ pub fn distal_joint<'m>(
     }
 }
 
-/// Replaces each named link by rigid parts with elastic joints `<link>__elastic`, or by a body that
-/// bends in modes.
+/// Replaces each named link by rigid parts with elastic joints `<link>__elastic`, or by a modal
+/// body.
 ///
-/// Joints of a lumped link beyond the plane through S across A-B, and always the distal joint, move
-/// to the distal part `<link>__distal`. Joints of a link that bends in modes move to the nearest of
-/// its interfaces. At zero elastic coordinates every frame is where it was, and the actuated
-/// coordinates keep their order.
+/// Joints of a lumped link beyond the plane through S normal to A-B, and always the distal joint,
+/// move to the distal part `<link>__distal`. Joints of a modal link move to the nearest interface.
+/// At zero elastic coordinates all frames are unchanged, and the actuated coordinates keep their
+/// order.
 ///
 /// # Errors
-/// [`SubstitutionError`], naming the link.
+/// [`SubstitutionError`] with the name of the link.
 pub fn substitute(mechanism: &Mechanism, links: &[FlexibleLink]) -> Result<Substituted, SubstitutionError> {
     let mut result = Substituted { mechanism: mechanism.clone(), springs: Vec::new(), spans: Vec::new() };
     result.mechanism.keep_coordinate_order();
@@ -272,7 +272,7 @@ pub fn substitute(mechanism: &Mechanism, links: &[FlexibleLink]) -> Result<Subst
     Ok(result)
 }
 
-/// A link that is to bend, in the mechanism.
+/// Link to be made flexible, with its data in the mechanism.
 pub(crate) struct Site {
     pub(crate) distal_joint: String,
     pub(crate) p_LA: Vector3<f64>,
@@ -327,8 +327,8 @@ fn insert_chain(
     parts: &[RigidPart],
 ) -> (FlexibleSpan, Vec<Spring>) {
     let name = &flexible.link;
-    // The proximal part keeps the link's frame and name, the others have their frames at the joints
-    // before them.
+    // The proximal part keeps the link's frame and name; the frames of the others are at the joints
+    // inward of them.
     for link in mechanism.links.iter_mut().filter(|l| l.name == *name) {
         link.inertia = Some(inertia_of(&parts[0]));
     }
@@ -371,8 +371,8 @@ fn insert_chain(
     (span, springs)
 }
 
-/// Hangs the children of a link for which `moves(name, place)` holds on another one, whose pose in
-/// the link is `X_LD`.
+/// Moves those child joints of a link for which `moves(name, position)` holds to the link `to`,
+/// whose pose in the link is `X_LD`.
 pub(crate) fn move_children(
     mechanism: &mut Mechanism,
     link: &str,

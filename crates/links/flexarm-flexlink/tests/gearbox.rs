@@ -1,4 +1,4 @@
-//! Elastic gearboxes on the tree: what they keep, how they give way, what is refused.
+//! Elastic gearboxes on the tree: invariants, compliance and rejected input.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
@@ -8,7 +8,8 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Matrix6xX, Rotation3, UnitVec
 
 const TIP: [f64; 3] = [0.6, 0.1, -0.2];
 
-/// Turn, slide, turn about oblique axes; heavy links, rotors, a tip frame on the last link.
+/// Rotation, translation, rotation about oblique axes; heavy links, rotors, a tip frame on the last
+/// link.
 fn robot() -> Mechanism {
     let mut robot = Mechanism::new("robot");
     robot.gravity = vector![1.5, -2.0, -9.0];
@@ -44,7 +45,7 @@ fn gearbox(joint: &str, stiffness: GearStiffness) -> Gearbox {
     Gearbox { joint: joint.into(), stiffness }
 }
 
-/// A symmetric positive definite 6x6 with every coupling.
+/// Symmetric positive definite 6x6 matrix with all couplings.
 fn full() -> Matrix6<f64> {
     let A = Matrix6::from_fn(|i, j| if i == j { 2.0 } else { 0.3 / (1.0 + (i + 2 * j) as f64) });
     (A * A.transpose()) * 1e5
@@ -90,7 +91,7 @@ fn undeflected_gearboxes_change_nothing() {
     }
 }
 
-/// The rotor sits before the spring: the mass matrix has it on the motor's row only. Truth: the
+/// The rotor is inward of the spring, so it appears in the motor's diagonal entry only. Truth: the
 /// armature itself.
 #[test]
 fn rotor_stays_on_the_motor_side_of_the_spring() {
@@ -107,7 +108,7 @@ fn rotor_stays_on_the_motor_side_of_the_spring() {
     assert!((rotor - truth).amax() < 1e-12);
 }
 
-/// Compliance of the tip at `q`, by the springs behind one gearbox.
+/// Compliance of the tip at `q` due to the springs of one gearbox.
 fn tip_compliance(mechanism: &Mechanism, springs: &[GearSpring], q: [f64; 3]) -> (Matrix6<f64>, Pose, Pose) {
     let model = Model::new(mechanism).expect("a tree");
     let (mut data, mut full) = (Data::new(&model), DVector::zeros(model.nv()));
@@ -129,8 +130,8 @@ fn tip_compliance(mechanism: &Mechanism, springs: &[GearSpring], q: [f64; 3]) ->
     (C, data.X_WF(tip), data.X_WF(motor))
 }
 
-/// Truth: `Σ u uᵀ/k` with `u = [axis × lever; axis]` for each spring, `A K⁻¹ Aᵀ` for the full one,
-/// axes of the turned joint frame; measured 3e-16 relative.
+/// Truth: `Σ u uᵀ/k` with `u = [axis × lever; axis]` for each spring, `A K⁻¹ Aᵀ` for the full
+/// stiffness, axes of the rotated joint frame; measured 3e-16 relative.
 #[test]
 fn tip_gives_way_by_lever_and_axis() {
     let q = [0.7, 0.3, -0.4];
@@ -176,7 +177,7 @@ fn tip_gives_way_by_lever_and_axis() {
     }
 }
 
-/// Every wrong gearbox is refused by name, and the mechanism stays as it was.
+/// Every invalid gearbox is rejected by name, and the mechanism is unchanged.
 #[test]
 fn gearboxes_that_hold_nothing_or_sit_nowhere_are_refused() {
     let refuse = |joint: &str, stiffness: GearStiffness| {

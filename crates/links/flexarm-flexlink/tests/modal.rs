@@ -1,4 +1,4 @@
-//! What the substitution by modal links keeps and what it adds.
+//! Invariants and effects of the substitution by modal links.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
@@ -16,15 +16,14 @@ fn inertia(mass: f64, com: Vector3<f64>, scale: f64) -> LinkInertia {
     LinkInertia { mass, com, inertia_com: I }
 }
 
-/// An oblique beam from the link's origin with its section turned, offset from the line of the
-/// joints.
+/// Oblique beam from the link origin with a rotated section, offset from the line of the joints.
 fn beam() -> BeamLink {
     let section = Section::Box { width: 0.05, height: 0.08, wall: 0.004 };
     let beam = BeamLink::new("boom", section, Material::STEEL, L);
     beam.along(vector![0.8, 0.3, 0.5], Vector3::z(), 0.4, vector![0.0, 0.02, -0.01]).expect("a direction")
 }
 
-/// Slew - boom - elbow - arm - tool; a motor rides on either end of the boom.
+/// Slew - boom - elbow - arm - tool, with a motor attached at either end of the boom.
 fn robot(boom: LinkInertia) -> Mechanism {
     let mut robot = Mechanism::new("robot");
     robot.gravity = vector![1.5, -2.0, -9.0];
@@ -77,8 +76,8 @@ fn flexible(modal: &Arc<ModalLink>, parts: Parts) -> FlexibleLink {
     FlexibleLink { parts, form, distal: Some("elbow".into()), ..FlexibleLink::new("boom", reduced) }
 }
 
-/// Largest differences of mass matrix, torques of a motion (velocities and accelerations included)
-/// and frames, relative.
+/// Maximum relative differences of mass matrix, torques of a motion (with velocities and
+/// accelerations) and frames.
 fn differences(rigid: &Mechanism, soft: &Mechanism) -> [f64; 3] {
     let (rigid, soft) = (Model::new(rigid).expect("a tree"), Model::new(soft).expect("a tree"));
     let (mut d1, mut d2) = (Data::new(&rigid), Data::new(&soft));
@@ -116,8 +115,8 @@ fn undeformed_robot_with_a_modal_link_is_the_rigid_robot() {
     assert_eq!(soft.spans[0].part_masses, [body.mass]);
 }
 
-/// The same where the modal link takes the mass properties of the robot's link, which are not those
-/// of the beam.
+/// Same, with the modal link taking the mass properties of the robot's link, which differ from
+/// those of the beam.
 #[test]
 fn undeformed_robot_keeps_the_mass_properties_of_its_own_link() {
     let modal = Arc::new(beam().modal(4).expect("a beam"));
@@ -128,8 +127,8 @@ fn undeformed_robot_keeps_the_mass_properties_of_its_own_link() {
     eprintln!("{found:?}");
     assert!(found.iter().all(|d| *d < 1e-12), "{found:?}");
 
-    // With a tenth of its inertia no body of this mass bends like the beam: its modes would move
-    // more than all of it.
+    // No body of this mass with a tenth of the inertia has the modes of the beam: they would move
+    // more than its whole mass.
     let light = robot(inertia(modal.mass, modal.rigid().com, 0.1));
     let error = substitute(&light, &[flexible(&modal, Parts::FromLink(0.5))]).expect_err("no such body").to_string();
     assert!(error.contains("boom") && error.contains("parts = \"uniform\""), "{error}");
@@ -143,7 +142,7 @@ fn undeformed_robot_keeps_the_mass_properties_of_its_own_link() {
     assert!(error.contains("boom"), "{error}");
 }
 
-/// Compliance of a frame by a modal body's coordinates, world axes.
+/// Compliance of a frame due to modal coordinates, world axes.
 fn compliance(model: &Model, name: &str, K: &DMatrix<f64>) -> Matrix6<f64> {
     let mut data = Data::new(model);
     forward_kinematics(model, &mut data, &DVector::zeros(model.nv()));
@@ -154,7 +153,7 @@ fn compliance(model: &Model, name: &str, K: &DMatrix<f64>) -> Matrix6<f64> {
     Matrix6::from_column_slice(C.as_slice())
 }
 
-/// A clamped modal beam along x with a tip frame in link axes.
+/// Clamped modal beam with a tip frame in link axes.
 fn cantilever(modal: &Arc<ModalLink>, reduced: ReducedLink) -> Mechanism {
     let mut arm = Mechanism::new("cantilever");
     arm.gravity = Vector3::zeros();
@@ -168,7 +167,7 @@ fn cantilever(modal: &Arc<ModalLink>, reduced: ReducedLink) -> Mechanism {
     substitute(&arm, &[flexible]).expect("fits").mechanism
 }
 
-/// Truth: `K_BB⁻¹ F` of the reduced link, whatever the number of modes; measured 1.4e-14.
+/// Truth: `K_BB⁻¹ F` of the reduced link, for any number of modes; measured 1.4e-14.
 #[test]
 fn tip_of_a_modal_cantilever_moves_as_its_reduced_stiffness_says() {
     for modes in [0, 1, 6] {
@@ -185,15 +184,15 @@ fn tip_of_a_modal_cantilever_moves_as_its_reduced_stiffness_says() {
     }
 }
 
-/// A beam of Euler and Bernoulli along x with a third interface at the fraction `at`, by its exact
-/// static shapes.
+/// Euler-Bernoulli beam along x with a third interface at the fraction `at`, with its exact static
+/// shapes.
 fn branched(at: f64, name: &str) -> (ModalLink, ReducedLink, f64) {
     let section = Section::Tube { outer_diameter: 0.06, wall: 0.003 };
     let mut straight = BeamLink::new("boom", section, Material::STEEL, L);
     straight.theory = BeamTheory::EulerBernoulli;
     let mut modal = straight.modal(0).expect("a beam");
     let (x, x2, x3) = (at, at * at, at * at * at);
-    // Hermite's cubics of a displacement and of a rotation at B, and their slopes.
+    // Hermite cubics for a displacement and a rotation at B, and their slopes.
     let (v, vs) = (3.0 * x2 - 2.0 * x3, (6.0 * x - 6.0 * x2) / L);
     let (r, rs) = (L * (x3 - x2), 3.0 * x2 - 2.0 * x);
     let mut Phi = Matrix6xX::zeros(6);
@@ -216,10 +215,10 @@ fn branched(at: f64, name: &str) -> (ModalLink, ReducedLink, f64) {
     (modal, straight.reduce().expect("a beam"), EI)
 }
 
-/// Truth: `v(x) = F x² (3 l - x)/(6 EI)` and its slope under a force at the tip, at the branch and
-/// at the tip; measured 2e-16.
+/// Truth: `v(x) = F x² (3 l - x)/(6 EI)` and its slope under a tip force, at the branch and at the
+/// tip; measured 2e-16.
 ///
-/// The branch lies beyond the middle: a joint there must hang on its own interface, not on B.
+/// With the branch beyond the middle, a joint there must be at its own interface, not at B.
 #[test]
 fn children_of_a_branched_modal_link_hang_on_their_interfaces() {
     for at in [0.4, 0.7] {
@@ -261,7 +260,7 @@ fn children_of_a_branched_modal_link_hang_on_their_interfaces() {
             assert!((X.translation.y / v - 1.0).abs() < 1e-9, "{name} {} {v}", X.translation.y);
             assert!((X.rotation.matrix()[(1, 0)] / slope - 1.0).abs() < 1e-9, "{name}");
         }
-        // A lamp off the axis turns with the tip.
+        // A lamp off the axis rotates with the tip.
         let tip = data.X_WF(model.frame("tip").expect("there"));
         let lamp = data.X_WF(model.frame("lamp").expect("there"));
         assert!((tip.inverse() * lamp).translation.vector.metric_distance(&vector![-0.05 * L, 0.05, 0.0]) < 1e-12);
@@ -270,8 +269,8 @@ fn children_of_a_branched_modal_link_hang_on_their_interfaces() {
     }
 }
 
-/// Bodies that ride on the link: near the proximal end they stay, beyond the split they move with
-/// B. Truth: the rigid robot of all, and the inertia of the two links.
+/// Attached bodies: those near the proximal end stay with the link, those beyond the split move
+/// with B. Truth: the rigid robot with all bodies, and the inertias of the two links.
 #[test]
 fn attached_bodies_ride_on_the_side_of_the_split_on_which_they_are() {
     let modal = Arc::new(beam().modal(3).expect("a beam"));
@@ -290,12 +289,12 @@ fn attached_bodies_ride_on_the_side_of_the_split_on_which_they_are() {
     let mass = |link: &str| soft.mechanism.link(link).expect("there").inertia.expect("has mass").mass;
     assert!((mass("boom") - 2.2).abs() < 1e-12 && (mass("boom__distal") - 3.0).abs() < 1e-12);
     assert!((soft.spans[0].part_masses.iter().sum::<f64>() - all.mass).abs() < 1e-12);
-    // The motors of the robot itself, which lie off the ends.
+    // Motors of the robot itself, which are off the ends.
     let parent = |joint: &str| soft.mechanism.joint(joint).expect("there").parent.clone();
     assert_eq!(["near_bolts", "far_bolts", "elbow"].map(parent), ["boom", "boom__distal", "boom__distal"]);
 }
 
-/// A modal link whose far interface is elsewhere, or that has none, is refused by name.
+/// A modal link whose far interface is elsewhere, or that has none, is rejected by name.
 #[test]
 fn modal_links_of_another_place_are_refused() {
     let right = beam().modal(1).expect("a beam");

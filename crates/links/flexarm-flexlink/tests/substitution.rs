@@ -1,4 +1,4 @@
-//! What substitution keeps and what it adds.
+//! Invariants and effects of the substitution by lumped links.
 #![allow(non_snake_case, reason = "monogram notation")]
 
 use approx::assert_relative_eq;
@@ -9,7 +9,7 @@ use nalgebra::{DVector, Matrix3, Vector3, Vector6, vector};
 
 const L: f64 = 0.8;
 
-/// A clamped beam of no weight with a tip frame at its end.
+/// Clamped beam without gravity, with a tip frame at its end.
 fn cantilever(split: f64) -> (Mechanism, FlexibleLink) {
     let mut arm = Mechanism::new("cantilever");
     arm.gravity = Vector3::zeros();
@@ -26,7 +26,7 @@ fn cantilever(split: f64) -> (Mechanism, FlexibleLink) {
     (arm, FlexibleLink::new("beam", beam.reduce().expect("a beam")))
 }
 
-/// Truth: F l³/(3EI), F l²/(2EI), M l²/(2EI), M l/(EI), F l/(EA), T l/(GJ) for any place of the
+/// Truth: F l³/(3EI), F l²/(2EI), M l²/(2EI), M l/(EI), F l/(EA), T l/(GJ) for any position of the
 /// split; measured 2e-15.
 #[test]
 fn tip_of_the_substituted_link_moves_as_the_cantilever_does() {
@@ -61,7 +61,7 @@ fn tip_of_the_substituted_link_moves_as_the_cantilever_does() {
     }
 }
 
-/// At zero elastic coordinates frames, mass matrix and gravity torques are those of the rigid
+/// At zero elastic coordinates, frames, mass matrix and gravity torques equal those of the rigid
 /// robot; measured 1e-14.
 #[test]
 fn undeformed_robot_is_the_rigid_robot() {
@@ -88,7 +88,7 @@ fn undeformed_robot_is_the_rigid_robot() {
     }
 }
 
-/// Dropping the coupling of a split at 0.3 of the beam makes the tip 24 % too soft; the full 6x6
+/// Without the coupling terms, a split at 0.3 of the beam makes the tip 24 % too soft; the full 6x6
 /// gives l³/(3EI).
 #[test]
 fn dropped_coupling_is_wrong_by_tens_of_per_cent() {
@@ -106,7 +106,7 @@ fn dropped_coupling_is_wrong_by_tens_of_per_cent() {
     assert!(error.abs() > 0.1, "{error}");
 }
 
-/// Every wrong request names the link and what there is.
+/// Every invalid request is rejected with the name of the link and the available names.
 #[test]
 fn wrong_requests_are_refused_by_name() {
     let (arm, flexible) = cantilever(0.5);
@@ -122,9 +122,9 @@ fn wrong_requests_are_refused_by_name() {
     assert!(twice.to_string().contains("twice"));
 }
 
-/// Truth: the rigid robot, value by value. Two joints move to the far half of the link, the two
-/// between them stay, and one of them gets a gearbox: in the tree they come in another order, as
-/// coordinates they do not. Measured 5e-15 of the largest.
+/// Truth: the rigid robot, value by value. Two joints move to the distal half of the link, the two
+/// between them stay, and one of these gets a gearbox: their order in the tree changes, the order
+/// of the coordinates does not. Measured 5e-15 of the maximum.
 #[test]
 fn joints_keep_their_order_whichever_half_of_a_link_carries_them() {
     let (mut arm, mut flexible) = cantilever(0.5);

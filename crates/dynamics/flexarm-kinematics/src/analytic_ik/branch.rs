@@ -1,5 +1,5 @@
-//! Which of the solutions: sides of shoulder, elbow and wrist, the words of programs, and whole
-//! turns within limits.
+//! Selection among the solutions: sides of shoulder, elbow and wrist, configuration data of robot
+//! programs, and whole turns within limits.
 //!
 //! Sources: [KUKA KSS] for status and turn, [ABB RAPID] for confdata.
 
@@ -12,52 +12,52 @@ use super::screw::{Screw, wrapped};
 use super::trig::across;
 use super::{AnalyticArm, ArmClass, Kernel, Solution, Solutions};
 
-/// Side of shoulder, elbow and wrist; functions of the joint values alone that tell the solutions
-/// of a pose apart.
+/// Sides of shoulder, elbow and wrist. They are functions of the joint values only and distinguish
+/// the solutions of a pose.
 ///
-/// Spherical wrist: `shoulder` is set where the wrist centre lies ahead of axis 1, `elbow` where
-/// joint 3 is beyond the angle at which the arm is stretched (in its positive sense, within half a
-/// turn), `wrist` where joint 5 is beyond the angle at which the wrist is straight (the one next to
-/// zero). Where axes 1 and 2 are parallel or axes 2 and 3 meet, `shoulder` and `elbow` are the two
-/// roots of the first and of the second equation solved. Arms solved from the tool have the same
-/// with `shoulder` and `wrist` exchanged. Three parallel axes: sides of the first angle, of the two
-/// bars, and of the other.
+/// Spherical wrist: `shoulder` is set if the wrist centre is in front of axis 1, `elbow` if joint 3
+/// is beyond the angle of the stretched arm (in its positive sense, within half a turn), `wrist` if
+/// joint 5 is beyond the angle of the straight wrist (the one closest to zero). If axes 1 and 2 are
+/// parallel or axes 2 and 3 intersect, `shoulder` and `elbow` denote the two roots of the first and
+/// of the second equation solved. Arms solved from the tool have `shoulder` and `wrist` exchanged.
+/// Three parallel axes: the sides denote the first angle, the elbow of the two bars, and the other
+/// angle.
 ///
-/// Each of the eight labels belongs to one solution at most, but where a quartic or a polynomial of
-/// degree eight is solved ([`PositionForm::General`], [`ArmClass::ThreeParallel`] without meeting
-/// axes): there several solutions may share one.
+/// Each of the eight labels belongs to at most one solution, except where a quartic or a polynomial
+/// of degree eight is solved ([`PositionForm::General`], [`ArmClass::ThreeParallel`] without
+/// meeting axes): there several solutions may share a label.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Branch {
-    /// Wrist centre ahead of axis 1.
+    /// Whether the wrist centre is in front of axis 1.
     pub shoulder: bool,
-    /// Elbow bent in the positive sense of its joint.
+    /// Whether the elbow is bent in the positive sense of its joint.
     pub elbow: bool,
-    /// Joint 5 beyond the straight wrist in its positive sense.
+    /// Whether joint 5 is beyond the straight wrist in its positive sense.
     pub wrist: bool,
 }
 
 impl Branch {
-    /// 0 to 7: shoulder 4, elbow 2, wrist 1.
+    /// Index from 0 to 7: shoulder 4, elbow 2, wrist 1.
     pub fn index(self) -> usize {
         4 * usize::from(self.shoulder) + 2 * usize::from(self.elbow) + usize::from(self.wrist)
     }
 }
 
-/// How the joint values of a model become the axes of the controller whose words are used:
+/// Conversion of the model's joint values to the axis values of a robot controller:
 /// `axis = sign q + offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ControllerAxes {
     /// 1 or -1 for each joint.
     pub sign: [f64; 6],
-    /// Value of the axis where the joint is at zero (rad).
+    /// Axis value at zero joint value (rad).
     pub offset: [f64; 6],
 }
 
 impl ControllerAxes {
-    /// Joint values are the controller's.
+    /// Identity: joint values are the controller's axis values.
     pub const SAME: Self = Self { sign: [1.0; 6], offset: [0.0; 6] };
 
-    /// Value of an axis (rad), 0 to 5.
+    /// Value (rad) of axis `k`, 0 to 5.
     pub fn axis(&self, k: usize, q: &[f64; 6]) -> f64 {
         self.sign[k] * q[k] + self.offset[k]
     }
@@ -69,52 +69,52 @@ impl Default for ControllerAxes {
     }
 }
 
-/// What a program says of the solution it means.
+/// Criterion by which a solution is selected.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Selection {
-    /// The nearest.
+    /// The solution closest to a reference.
     #[default]
     Nearest,
     /// KUKA's status and turn ([`AnalyticArm::kuka_status`], [`kuka_turn`]).
     Kuka {
-        /// Bits of S; `None`: any.
+        /// Bits of S; `None` for any.
         status: Option<u8>,
-        /// Bits of T; `None`: any.
+        /// Bits of T; `None` for any.
         turn: Option<u8>,
     },
     /// ABB's confdata ([`AnalyticArm::abb_configuration`]).
     Abb {
-        /// Quarter turns of axes 1, 4, 6.
+        /// Quarter turns of axes 1, 4 and 6.
         quadrants: [i32; 3],
         /// Configuration number, 0 to 7.
         cfx: i32,
     },
-    /// Words; what is `None` is the nearest.
+    /// Named sides; `None` for any.
     Words {
-        /// Wrist centre ahead of axis 1.
+        /// Whether the wrist centre is in front of axis 1.
         front: Option<bool>,
-        /// Elbow up.
+        /// Whether the elbow is up.
         elbow_up: Option<bool>,
-        /// Axis 5 negative.
+        /// Whether axis 5 is negative.
         wrist_flipped: Option<bool>,
     },
-    /// One label.
+    /// Branch label.
     Branch(Branch),
 }
 
-/// KUKA's turn: bit k is set where axis k + 1 is negative (rad; a controller disregards it within
-/// some degrees of zero).
+/// KUKA turn T: bit k is set if axis k + 1 is negative (rad; a controller ignores it within some
+/// degrees of zero).
 pub fn kuka_turn(q: &[f64; 6], axes: &ControllerAxes) -> u8 {
     (0..6).fold(0, |bits, k| bits | u8::from(axes.axis(k, q) < 0.0) << k)
 }
 
-/// ABB's quarter turn of an axis (rad): 0 for 0 to 90 degrees, -1 for -90 to 0, and so on.
+/// ABB quarter turn of an axis (rad): 0 for 0 to 90 degrees, -1 for -90 to 0, and so on.
 pub fn abb_quadrant(axis: f64) -> i32 {
     (axis / FRAC_PI_2).floor() as i32
 }
 
 impl Selection {
-    /// Whether the value of an axis (0 to 5, rad) has the turn or the quadrant that is meant.
+    /// Whether the value of an axis (0 to 5, rad) matches the selected turn or quadrant.
     fn allows(&self, k: usize, axis: f64) -> bool {
         match *self {
             Self::Kuka { turn: Some(turn), .. } => axis.abs() < BOUNDARY || (axis < 0.0) == (turn >> k & 1 == 1),
@@ -133,19 +133,19 @@ fn is_in_quadrant(axis: f64, quadrant: i32) -> bool {
     abb_quadrant(axis - BOUNDARY) == quadrant || abb_quadrant(axis + BOUNDARY) == quadrant
 }
 
-/// So near to where a bit or a quadrant changes (rad, sine, or part of the reach), a program may
-/// say either.
+/// Distance to a change of a bit or quadrant (rad, sine, or fraction of the reach) within which
+/// either value matches.
 const BOUNDARY: f64 = 1e-4;
 
-/// Directions by which sides are told, at zero joint values.
+/// Reference directions for the sides, at zero joint values.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sides {
-    /// Across axes 1 and 2, ahead (unit).
+    /// Unit vector normal to axes 1 and 2, pointing to the front.
     front: Vector3<f64>,
-    /// Whether a positive angle of joint 3 turns the forearm ahead and down where the upper arm
-    /// stands upright.
+    /// Whether a positive rotation of joint 3 bends the forearm forward and down when the upper arm
+    /// is upright.
     elbow_forward: bool,
-    /// Whether the positive side of the wrist is that above `phi` (else of `phi + π`).
+    /// Whether the positive side of the wrist is above `phi` (otherwise above `phi + π`).
     wrist_at_phi: bool,
 }
 
@@ -177,14 +177,14 @@ impl Sides {
 }
 
 impl AnalyticArm {
-    /// Label of joint values (rad).
+    /// Branch label of joint values (rad).
     pub fn branch(&self, q: &[f64; 6]) -> Branch {
         let [shoulder, elbow, wrist] = self.side_values(q).map(|v| v >= 0.0);
         Branch { shoulder, elbow, wrist }
     }
 
-    /// Numbers whose signs are the sides: sines of angles or lengths over the reach, zero where two
-    /// branches meet.
+    /// Values whose signs are the sides: sines of angles or lengths relative to the reach; zero
+    /// where two branches meet.
     fn side_values(&self, q: &[f64; 6]) -> [f64; 3] {
         let mut q = *q;
         if self.reversed {
@@ -216,14 +216,15 @@ impl AnalyticArm {
         values
     }
 
-    /// The same of the two roots of the position problem.
+    /// Sides of the two roots of the position problem.
     fn arm_sides(&self, axes: &[Screw; 6], form: PositionForm, center: &Vector3<f64>, q: &[f64; 6]) -> [f64; 2] {
         let [s1, s2, s3, ..] = axes;
         let c3 = s3.at(q[2]).point(center);
         let c2 = s2.at(q[1]).point(&c3);
         let reach = self.chain.reach;
         match form {
-            // The distance of the centre from o_2 falls with the angle beyond the stretched arm.
+            // The distance of the centre from o_2 decreases with the angle beyond the stretched
+            // arm.
             PositionForm::Parallel23 | PositionForm::Intersecting12 | PositionForm::General => {
                 [self.sides.front.dot(&(c2 - s1.o)) / reach, bend(s2, &s3.o, &c3, &s3.h)]
             }
@@ -240,35 +241,34 @@ impl AnalyticArm {
         (q - phi).sin()
     }
 
-    /// Whether words of industrial arms have a meaning: spherical wrist, axes 2 and 3 parallel and
-    /// across axis 1.
+    /// Whether configuration data of industrial arms apply: spherical wrist, axes 2 and 3 parallel
+    /// and perpendicular to axis 1.
     fn is_industrial(&self) -> bool {
         let Kernel::Wrist(k) = &self.kernel else { return false };
         self.class == ArmClass::SphericalWrist(PositionForm::Parallel23) && k.axes[0].h.dot(&k.axes[1].h).abs() < 0.5
     }
 
-    /// Whether the forearm is bent ahead and down of the upper arm, as seen where this stands
-    /// upright.
+    /// Whether the forearm is bent forward and down from the upper arm, with the upper arm upright.
     fn bent_forward(&self, branch: Branch) -> bool {
         branch.elbow == self.sides.elbow_forward
     }
 
-    /// Whether the elbow is up: above the line from axis 2 to the wrist centre where this lies
-    /// farther out than axis 2.
+    /// Whether the elbow is up: above the line from axis 2 to the wrist centre, when the wrist
+    /// centre is farther out than axis 2.
     ///
-    /// `None` for other arms than those with a spherical wrist and axes 2 and 3 parallel.
+    /// `None` for arms other than those with a spherical wrist and axes 2 and 3 parallel.
     pub fn elbow_up(&self, q: &[f64; 6]) -> Option<bool> {
         let branch = self.branch(q);
         self.is_industrial().then(|| self.bent_forward(branch) == branch.shoulder)
     }
 
-    /// KUKA's status of joint values (rad): bit 0 set where the wrist centre lies behind axis 1 (x
-    /// in the system that turns with axis 1 negative), bit 1 where axis 3 is beyond the angle of
-    /// the stretched arm, bit 2 where axis 5 is negative.
+    /// KUKA status S of joint values (rad): bit 0 is set if the wrist centre is behind axis 1
+    /// (negative x in the frame that rotates with axis 1), bit 1 if axis 3 is beyond the angle of
+    /// the stretched arm, bit 2 if axis 5 is negative.
     ///
-    /// Ahead is where axis 2 lies from axis 1; where they meet, where the wrist centre is at zero
-    /// joint values. Bits 3 and 4 (accuracy model) are zero. `None` for other arms than those with
-    /// a spherical wrist and axes 2 and 3 parallel.
+    /// The front is the side of axis 1 on which axis 2 is or, if they intersect, on which the wrist
+    /// centre is at zero joint values. Bits 3 and 4 (accuracy model) are zero. `None` for arms
+    /// other than those with a spherical wrist and axes 2 and 3 parallel.
     pub fn kuka_status(&self, q: &[f64; 6], axes: &ControllerAxes) -> Option<u8> {
         let branch = self.branch(q);
         let bits = u8::from(!branch.shoulder)
@@ -277,9 +277,10 @@ impl AnalyticArm {
         self.is_industrial().then_some(bits)
     }
 
-    /// ABB's quarter turns of axes 1, 4 and 6 and configuration number of joint values (rad).
+    /// ABB quarter turns of axes 1, 4 and 6 and configuration number of joint values (rad).
     ///
-    /// `cfx` = 4 where the wrist centre lies behind axis 1, + 2 where it lies behind the lower arm, + 1 where axis 5 is negative. `None` for other arms than those with a spherical wrist and
+    /// `cfx` is the sum of 4 if the wrist centre is behind axis 1, 2 if it is behind the lower arm,
+    /// and 1 if axis 5 is negative. `None` for arms other than those with a spherical wrist and
     /// axes 2 and 3 parallel.
     pub fn abb_configuration(&self, q: &[f64; 6], axes: &ControllerAxes) -> Option<([i32; 3], i32)> {
         let branch = self.branch(q);
@@ -289,15 +290,16 @@ impl AnalyticArm {
         self.is_industrial().then(|| ([0, 3, 5].map(|k| abb_quadrant(axes.axis(k, q))), cfx))
     }
 
-    /// Whether joint values are on the branch that is meant, whole turns apart; where two branches
-    /// meet they are on both.
+    /// Whether joint values are on the selected branch, up to whole turns; where two branches meet
+    /// they are on both.
     fn is_on(&self, q: &[f64; 6], selection: &Selection, axes: &ControllerAxes) -> bool {
         let [shoulder, elbow, wrist] = self.side_values(q);
         let fifth = wrapped(axes.axis(4, q)).sin();
         let agree = |wanted: Option<bool>, value: f64| {
             wanted.is_none_or(|wanted| value.abs() < BOUNDARY || wanted == (value >= 0.0))
         };
-        // Bent ahead is beyond the stretched arm, or before it where joint 3 turns the other way.
+        // Bent forward means beyond the stretched arm, or before it if joint 3 has the opposite
+        // sense.
         let bent = if self.sides.elbow_forward { elbow } else { -elbow };
         let up = if shoulder >= 0.0 { bent } else { -bent };
         let bits = |front: bool, ahead: bool, positive: bool| {
@@ -324,15 +326,15 @@ impl AnalyticArm {
         }
     }
 
-    /// The solution that is meant, with the whole turns that are meant, within the limits and
-    /// nearest to `near` (rad).
+    /// Returns the solution that matches the selection, including its turns, within the limits and
+    /// closest to `near` (rad).
     ///
-    /// Turn and quadrants are those of each axis with its whole turns, so that an axis at 200
+    /// Turn and quadrants refer to axis values including whole turns, so that an axis at 200
     /// degrees is not at -160. Programs have rounded numbers: an axis or a side within 1e-4 (rad;
-    /// sine or part of the reach) of where a bit changes may have either, and with axis 5 so near
-    /// to straight those of axes 4 and 6, of which the sum alone is sharp, are left out. `None`: no
-    /// solution on that branch within the limits, or the arm is not one of which these words tell
-    /// anything ([`Self::kuka_status`], [`Self::abb_configuration`]).
+    /// sine or fraction of the reach) of a change of a bit matches either value. If axis 5 is that
+    /// close to straight, axes 4 and 6 are not checked, since only their sum is well determined.
+    /// `None` if no solution of that branch is within the limits, or if the selection does not
+    /// apply to this arm ([`Self::kuka_status`], [`Self::abb_configuration`]).
     pub fn choose(
         &self,
         solutions: &Solutions,
@@ -355,14 +357,14 @@ impl AnalyticArm {
         best.map(|(_, q)| q)
     }
 
-    /// The copy of joint values by whole turns that is within the limits and nearest to `near`
-    /// (rad).
+    /// Returns the joint values shifted by whole turns so that they are within the limits and
+    /// closest to `near` (rad).
     pub fn nearest_within_limits(&self, q: &[f64; 6], near: &[f64; 6]) -> Option<[f64; 6]> {
         self.nearest_copy(q, near, |_, _| true)
     }
 
-    /// Shows every copy of joint values by whole turns that is within the limits; a joint without
-    /// limits has the one in (-π, π].
+    /// Calls `visit` with every copy of the joint values, shifted by whole turns, that is within
+    /// the limits; a joint without limits has one copy, in (-π, π].
     pub fn copies_within_limits(&self, q: &[f64; 6], mut visit: impl FnMut(&[f64; 6])) {
         let ranges: [_; 6] = std::array::from_fn(|k| self.turns(k, wrapped(q[k])));
         if ranges.iter().any(|(low, high)| low > high) {
@@ -379,7 +381,7 @@ impl AnalyticArm {
         }
     }
 
-    /// Whole turns that keep a joint within its limits, first and last.
+    /// First and last number of whole turns that keep a joint within its limits.
     fn turns(&self, k: usize, q: f64) -> (i64, i64) {
         let (lower, upper) = self.limits[k];
         if !(lower.is_finite() && upper.is_finite()) {
@@ -394,7 +396,7 @@ impl AnalyticArm {
         for k in 0..6 {
             let (lower, upper) = self.limits[k];
             let middle = ((near[k] - q[k]) / TAU).round();
-            // What fits may be some turns away; limits hold the search to a few.
+            // A matching copy may be several turns away; the search is limited to four.
             let copies = (-4..=4).map(|turn| q[k] + TAU * (middle + f64::from(turn)));
             let inside = copies.filter(|x| *x >= lower - LIMIT_SLACK && *x <= upper + LIMIT_SLACK && fits(k, *x));
             nearest[k] = inside.min_by(|a, b| (a - near[k]).abs().total_cmp(&(b - near[k]).abs()))?;
@@ -403,11 +405,11 @@ impl AnalyticArm {
     }
 }
 
-/// By how much a joint may be beyond its limit, for rounding (rad).
+/// Tolerance on joint limits, for rounding (rad).
 const LIMIT_SLACK: f64 = 1e-12;
 
-/// Sine of the angle from one bar to the next about the joint `h` between them: from axis `first`
-/// to the elbow, from there to the end.
+/// Sine of the angle between two bars about the joint axis `h` between them: the bar from axis
+/// `first` to the elbow and the bar from there to the end.
 fn bend(first: &Screw, elbow: &Vector3<f64>, end: &Vector3<f64>, h: &Vector3<f64>) -> f64 {
     let across = |v: Vector3<f64>| v - h * h.dot(&v);
     let (a, b) = (across(elbow - first.o), across(end - elbow));
@@ -415,7 +417,7 @@ fn bend(first: &Screw, elbow: &Vector3<f64>, end: &Vector3<f64>, h: &Vector3<f64
 }
 
 impl Solutions {
-    /// The solution nearest to joint values (rad), whole turns apart.
+    /// Returns the solution closest to joint values (rad), up to whole turns.
     pub fn nearest(&self, q: &[f64; 6]) -> Option<&Solution> {
         let distance = |s: &Solution| s.q.iter().zip(q).map(|(a, b)| wrapped(a - b).powi(2)).sum::<f64>();
         self.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))

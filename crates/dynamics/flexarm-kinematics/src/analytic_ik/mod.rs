@@ -1,32 +1,32 @@
-//! Inverse kinematics in closed form: every joint position of an arm of six revolute joints that
-//! brings a frame to a pose.
+//! Analytic inverse kinematics: all joint values of an arm with six revolute joints that bring a
+//! frame to a pose.
 //!
-//! [`AnalyticArm::new`] looks at the six joint axes and says which class the arm belongs to, or why
-//! it has no solution in closed form ([`NoAnalyticIk`]; then
+//! [`AnalyticArm::new`] determines the class of the arm from its six joint axes, or the reason why
+//! it has no closed form ([`NoAnalyticIk`]; then use
 //! [`crate::inverse_kinematics_from_many_starts`]). [`AnalyticArm::solve`] fills [`Solutions`]
-//! without allocation. Which of them is meant is a matter of [`Branch`], [`Selection`] and
+//! without allocation. One of the solutions is selected with [`Branch`], [`Selection`] and
 //! [`AnalyticArm::choose`] (`branch.rs`).
 //!
-//! | class | what is solved |
+//! | class | solution |
 //! | --- | --- |
-//! | axes 4, 5, 6 meet (spherical wrist) | the first three joints place the meeting point ([`PositionForm`]), then two wrists each |
-//! | axes 1, 2, 3 meet (spherical shoulder) | the same arm from the other end |
+//! | axes 4, 5, 6 intersect (spherical wrist) | joints 1 to 3 from the wrist centre ([`PositionForm`]), then two wrists each |
+//! | axes 1, 2, 3 intersect (spherical shoulder) | the same arm from the other end |
 //! | axes 2, 3, 4 or 3, 4, 5 are parallel | angles 1 and 5 (two and two, or a quartic), then two elbows |
 //! | axes 1, 2, 3 or 4, 5, 6 are parallel | angles 4 and 5 (two and two, or a polynomial of degree eight), then two elbows |
 //!
 //! The equations are the subproblems of Paden and Kahan in the extended set of [Elias & Wen 2022];
 //! classes as in [Ostermeier et al. 2024]; the quartic is that of [Pieper 1968]. All roots of a
-//! polynomial are found at once (Aberth's iteration on the unit circle of `e^{i q}`), none is
-//! searched for.
+//! polynomial are computed at once (Aberth's iteration on the unit circle of `e^{i q}`), without a
+//! search.
 //!
-//! Axes may miss their class by [`AXIS_TOLERANCE_RAD`] and [`AXIS_TOLERANCE`] of the reach, as
-//! those of files with five digits do. The class then gives start values, and Newton's method on
-//! the arm as it is gives the solutions: each one of them meets the pose to [`POSE_TOLERANCE`].
-//! Within about the tolerance of a boundary of the workspace some may be missing then.
+//! Axes may deviate from their class by [`AXIS_TOLERANCE_RAD`] and by [`AXIS_TOLERANCE`] of the
+//! reach, as they do in files with five digits. The class then gives start values, and Newton's
+//! method on the actual arm gives the solutions: each meets the pose to [`POSE_TOLERANCE`]. Within
+//! about the tolerance of a workspace boundary, solutions may then be missing.
 //!
-//! What misses least where there is no solution is not a solution; [`Solutions::miss`] tells how
-//! far it is off. Where a pose leaves a joint free (straight wrist, wrist centre on axis 1, folded
-//! bars of one length), one representative is given and marked ([`Solution::free`]).
+//! If there is no solution, the closest approximation is not returned; [`Solutions::miss`] is its
+//! residual. If a pose leaves a joint free (straight wrist, wrist centre on axis 1, folded bars of
+//! equal length), one representative is returned and marked ([`Solution::free`]).
 //!
 //! ```
 //! use flexarm_kinematics::*;
@@ -73,20 +73,20 @@ use screw::{Chain, wrapped};
 use trig::List;
 use wrist::Wrist;
 
-/// What a candidate may miss the pose by to be improved, lengths over the reach.
+/// Maximum pose residual of a candidate for it to be refined (rad; lengths relative to the reach).
 const CAPTURE: f64 = 3e-3;
 
-/// Most solutions that a class has.
+/// Maximum number of solutions of any class.
 const MOST_SOLUTIONS: usize = 16;
 
-/// What a solution may miss the pose by: so many m (times the reach, where that is above 1 m) and
-/// rad.
+/// Maximum pose residual of a solution (m, times the reach if that is above 1 m; rad).
 pub const POSE_TOLERANCE: f64 = 1e-12;
 
-/// Solutions whose angles all agree so well (rad) are one: next to a boundary two become one.
+/// Solutions are merged if all their angles agree to this tolerance (rad): two solutions merge at a
+/// boundary.
 const SAME: f64 = 1e-6;
 
-/// An arm of six revolute joints whose inverse kinematics has a closed form.
+/// Arm of six revolute joints whose inverse kinematics has a closed form.
 #[derive(Clone, Debug)]
 pub struct AnalyticArm {
     chain: Chain,
@@ -100,7 +100,7 @@ pub struct AnalyticArm {
     sides: Sides,
 }
 
-/// Equations of a class.
+/// Solver of a class.
 #[derive(Clone, Copy, Debug)]
 enum Kernel {
     Wrist(Wrist),
@@ -108,7 +108,7 @@ enum Kernel {
     Parallel123(Parallel123),
 }
 
-/// Joint values that may be solutions, as a kernel finds them.
+/// Candidate joint values found by a kernel.
 pub(crate) struct Candidates {
     list: List<Candidate, 64>,
 }
@@ -121,11 +121,11 @@ struct Candidate {
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
-    /// One of its own; whether one of its joints is free.
+    /// Isolated candidate, and whether one of its joints is free.
     Single { free: bool },
-    /// Stands for a whole family if it meets the pose as it is.
+    /// Represents a family of solutions if it meets the pose without refinement.
     Representative { group: usize },
-    /// Of use only where the family of that number has no representative.
+    /// Used only if the family of that number has no accepted representative.
     Member { group: usize },
 }
 
@@ -138,8 +138,8 @@ impl Kind {
     }
 }
 
-/// Below this sine two axes are one line to what a pose may be missed by: only the sum of their
-/// angles matters.
+/// Two axes whose angle has a sine below this are collinear to within the pose tolerance: only the
+/// sum of their joint angles matters.
 const STRAIGHT: f64 = POSE_TOLERANCE;
 
 impl Candidates {
@@ -157,15 +157,15 @@ impl Candidates {
 pub struct Solution {
     /// Joint values in the order of the chain (rad), within (-π, π].
     pub q: [f64; 6],
-    /// On which sides shoulder, elbow and wrist are.
+    /// Sides of shoulder, elbow and wrist.
     pub branch: Branch,
-    /// The pose leaves a joint free: this is one of a family of solutions.
+    /// Whether the pose leaves a joint free, so that this is one of a family of solutions.
     pub free: bool,
-    /// What is left between pose and forward kinematics.
+    /// Residual between the pose and forward kinematics.
     pub miss: Miss,
 }
 
-/// All solutions of one query; made once and filled again and again.
+/// All solutions of one query; reusable.
 #[derive(Clone, Copy, Debug)]
 pub struct Solutions {
     list: List<Solution, MOST_SOLUTIONS>,
@@ -189,9 +189,8 @@ impl std::ops::Deref for Solutions {
 }
 
 impl Solutions {
-    /// Where there is no solution: how far off the joint values are that the class's equations come
-    /// nearest with. An upper bound of the distance of the pose from the workspace, and none of the
-    /// limits of joints.
+    /// Residual of the best candidate if there is no solution. It is an upper bound on the distance
+    /// of the pose from the workspace, without regard to joint limits.
     pub fn miss(&self) -> Option<Miss> {
         self.miss.filter(|_| self.is_empty())
     }
@@ -227,43 +226,44 @@ impl AnalyticArm {
         self.class
     }
 
-    /// How far its axes are from those of the class: the larger of angles (rad) and of lengths over
-    /// the reach.
+    /// Deviation of the axes from the ideal class: the larger of angles (rad) and of lengths
+    /// relative to the reach.
     pub fn deviation(&self) -> f64 {
         self.deviation
     }
 
-    /// Scale of its lengths: all links stretched out, from axis 1 to the frame (m).
+    /// Length scale: total length of all links, from axis 1 to the frame (m).
     pub fn reach(&self) -> f64 {
         self.chain.reach
     }
 
-    /// Numbers of its joints' coordinates in the model, in the order of the chain.
+    /// Indices of the joint coordinates in the model, in the order of the chain.
     pub fn joints(&self) -> &[usize; 6] {
         &self.joints
     }
 
-    /// Limits of its joints, lower and upper (rad), in the order of the chain; infinite where there
-    /// are none.
+    /// Joint limits, lower and upper (rad), in the order of the chain; infinite where there are
+    /// none.
     pub fn limits(&self) -> &[(f64, f64); 6] {
         &self.limits
     }
 
-    /// `X_WT` at joint values (rad), the same as the model's forward kinematics to rounding.
+    /// `X_WT` at joint values (rad); equals the model's forward kinematics to rounding.
     pub fn pose(&self, q: &[f64; 6]) -> Pose {
         self.chain.pose(q)
     }
 
-    /// All joint values that bring the frame to `X_WT`, whatever the limits; a free joint is at
-    /// zero.
+    /// Computes all joint values that bring the frame to `X_WT`, regardless of limits; a free joint
+    /// is set to zero.
     ///
-    /// Does not allocate. A pose with NaN or infinite entries has no solution, and none has one
-    /// whose rotation is not orthogonal to [`POSE_TOLERANCE`].
+    /// Does not allocate. A pose with NaN or infinite entries has no solution, nor has a pose whose
+    /// rotation is not orthogonal to [`POSE_TOLERANCE`].
     pub fn solve(&self, X_WT: &Pose, solutions: &mut Solutions) {
         self.solve_near(X_WT, &[0.0; 6], solutions);
     }
 
-    /// [`Self::solve`] with free joints at the values of `near` (rad), say the position before.
+    /// As [`Self::solve`], with free joints at the values in `near` (rad), such as the previous
+    /// position.
     pub fn solve_near(&self, X_WT: &Pose, near: &[f64; 6], solutions: &mut Solutions) {
         solutions.clear();
         let finite = X_WT.translation.vector.iter().chain(X_WT.rotation.matrix().iter()).all(|x| x.is_finite());
@@ -291,7 +291,7 @@ impl AnalyticArm {
                 Kind::Single { free } => {
                     self.accept(q, free, CAPTURE, X_WT, solutions);
                 }
-                // Not improved: that would lead from where the free joint is to be.
+                // Not refined: refinement would move the free joint away from its requested value.
                 Kind::Representative { group } => {
                     families |= u32::from(self.accept(q, true, 0.0, X_WT, solutions)) << group;
                 }
@@ -303,7 +303,7 @@ impl AnalyticArm {
         }
     }
 
-    /// Improves a candidate that misses by `capture` at most and adds it if it meets the pose.
+    /// Refines a candidate whose residual is at most `capture`, and adds it if it meets the pose.
     fn accept(&self, mut q: [f64; 6], free: bool, capture: f64, X_WT: &Pose, solutions: &mut Solutions) -> bool {
         let miss = self.chain.polish(&mut q, X_WT, capture);
         let q = q.map(wrapped);

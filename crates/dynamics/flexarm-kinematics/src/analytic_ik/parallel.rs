@@ -1,5 +1,5 @@
-//! Arms with three parallel axes in a row: the plane across them leaves equations in the other
-//! angles only.
+//! Arms with three successive parallel axes: projection onto their common direction leaves
+//! equations in the other angles only.
 
 use std::f64::consts::FRAC_PI_4;
 
@@ -15,7 +15,7 @@ use super::{Candidates, Kind, STRAIGHT};
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Parallel234 {
     pub(crate) axes: [Screw; 6],
-    /// Points of axes 5 and 6 next to each other (m).
+    /// Closest points of axes 5 and 6 (m).
     pub(crate) near: (Vector3<f64>, Vector3<f64>),
     pub(crate) fan: Fan,
     pub(crate) meet: bool,
@@ -31,11 +31,12 @@ pub(crate) struct Parallel123 {
     pub(crate) reach: f64,
 }
 
-/// Two angles and whether one of them is free.
+/// Pairs of angles, each with a flag for a free angle.
 type Pairs = List<(f64, f64, bool), 16>;
 
-/// The last angle, or where its axis is along the parallel ones first the one next to the hint, in
-/// eighths of a turn, at which the bars reach.
+/// Candidates for the last angle. If its axis is along the parallel ones the angle is free, and the
+/// first candidate is the angle closest to the hint, in steps of an eighth of a turn, at which the
+/// bars reach.
 fn sixth_angles(
     (angle, size): (f64, f64),
     hint: f64,
@@ -55,7 +56,7 @@ fn sixth_angles(
     angles
 }
 
-/// Points of the last two axes next to each other; one point where they meet.
+/// Closest points of the last two axes; a common midpoint if they intersect.
 fn near_points(axes: &[Screw; 6], meet: bool) -> (Vector3<f64>, Vector3<f64>) {
     let (o5, o6) = feet(&axes[4], &axes[5]);
     if meet { (0.5 * (o5 + o6), 0.5 * (o5 + o6)) } else { (o5, o6) }
@@ -67,14 +68,15 @@ impl Parallel234 {
         Self { axes, near: near_points(&axes, meet), fan, meet, reach }
     }
 
-    /// All joint values with `E_1 ... E_6 = G`.
+    /// Finds all joint values with `E_1 ... E_6 = G`.
     ///
-    /// With h the common direction and a point o_6 of axis 6, what the three joints between cannot
-    /// change:
+    /// With h the common direction and o_6 a point of axis 6, these components are not affected by
+    /// the three parallel joints:
     /// ```text
     /// (i)   G_R h_6 · R_1 h = h · R_5 h_6            (ii)   (G o_6 - o_1) · R_1 h = h · (E_5 o_6 - o_1)
     /// ```
-    /// Then joint 6 turns `G_Rᵀ R_1 h` onto `R_5ᵀ h`, and the plane has two bars with a given end.
+    /// Joint 6 then rotates `G_Rᵀ R_1 h` onto `R_5ᵀ h`, and a planar problem of two bars with a
+    /// given end point remains.
     pub(crate) fn solve(&self, G: &Pose, hint: &[f64; 6], found: &mut Candidates) {
         let [s1, s2, s3, s4, s5, s6] = &self.axes;
         let h = s2.h;
@@ -115,7 +117,7 @@ impl Parallel234 {
             }
             return pairs;
         }
-        // a_i cos q1 + b_i sin q1 = K_i(q5), lengths by the reach.
+        // a_i cos q1 + b_i sin q1 = K_i(q5), lengths relative to the reach.
         let (kt, at, bt) = dot_turned(&tip, &s1.h, &h);
         let (kr, ar, br) = dot_turned(&h, &s5.h, &s6.h);
         let (kp, ap, bp) = dot_turned(&h, &s5.h, &(o6 - o5));
@@ -135,6 +137,7 @@ fn pair_of_equations(rows: &[(f64, f64, TrigPolynomial); 2], hint: &[f64; 6], pa
     let [(a1, b1, K1), (a2, b2, K2)] = rows;
     let D = a1 * b2 - a2 * b1;
     if D.abs() > 1e-6 {
+        // Cramer's rule for the cosine and sine of t; cos² t + sin² t = 1 determines u.
         let zero = TrigPolynomial::affine(0.0, 0.0, 0.0);
         let cosine = zero.plus(K1, b2 / D).plus(K2, -b1 / D);
         let sine = zero.plus(K2, a1 / D).plus(K1, -a2 / D);
@@ -145,8 +148,7 @@ fn pair_of_equations(rows: &[(f64, f64, TrigPolynomial); 2], hint: &[f64; 6], pa
         }
         return;
     }
-    // The left sides are one and the same but for a factor: what is left of the other row holds u
-    // alone.
+    // The left-hand sides are proportional: eliminating t leaves an equation in u only.
     let (big, small) = if a1.hypot(*b1) >= a2.hypot(*b2) { (0, 1) } else { (1, 0) };
     let (a, b, K) = &rows[big];
     let size = a.hypot(*b).max(f64::MIN_POSITIVE);
@@ -168,14 +170,14 @@ impl Parallel123 {
         Self { axes, near: near_points(&axes, meet), meet, reach }
     }
 
-    /// All joint values with `E_1 ... E_6 = G`.
+    /// Finds all joint values with `E_1 ... E_6 = G`.
     ///
     /// ```text
     /// (i)   h · R_4 R_5 h_6 = h · G_R h_6            (ii)   h · E_4 E_5 o_6 = h · G o_6
     /// ```
     /// Linear in cosine and sine of q_4 with coefficients affine in those of q_5: a polynomial of
-    /// degree eight, or one after the other where axes 5 and 6 meet. Then joint 6 turns `G_Rᵀ h`
-    /// onto `(R_4 R_5)ᵀ h`.
+    /// degree eight, or one equation after the other if axes 5 and 6 intersect. Joint 6 then
+    /// rotates `G_Rᵀ h` onto `(R_4 R_5)ᵀ h`.
     pub(crate) fn solve(&self, G: &Pose, hint: &[f64; 6], found: &mut Candidates) {
         let [s1, s2, s3, s4, s5, s6] = &self.axes;
         let h = s1.h;
@@ -218,6 +220,7 @@ impl Parallel123 {
         let l = 1.0 / self.reach;
         let rows =
             [self.row(&Vector3::zeros(), &s6.h, level), self.row(&((o5 - s4.o) * l), &((o6 - o5) * l), height * l)];
+        // Cramer's rule for cos q4 = C/D and sin q4 = S/D; C² + S² = D² determines q5.
         let [(a1, b1, k1), (a2, b2, k2)] = &rows;
         let D = a1.times(b2).plus(&a2.times(b1), -1.0);
         let C = k1.times(b2).plus(&k2.times(b1), -1.0);
@@ -229,7 +232,8 @@ impl Parallel123 {
                 pairs.push(((S / D).atan2(C / D), q5, false));
                 continue;
             }
-            // The two rows are one: its two roots, one of which may fail the other.
+            // The two rows are dependent: take both roots of one; one of them may not satisfy the
+            // other.
             let at =
                 |(a, b, k): &(TrigPolynomial, TrigPolynomial, TrigPolynomial)| (a.at(q5).0, b.at(q5).0, k.at(q5).0);
             let (first, second) = (at(&rows[0]), at(&rows[1]));
@@ -242,8 +246,8 @@ impl Parallel123 {
         pairs
     }
 
-    /// `h · R_4 (c + R_5 v) = value` as `a cos q4 + b sin q4 = k`, all affine in cosine and sine of
-    /// q5.
+    /// `h · R_4 (c + R_5 v) = value` as `a cos q4 + b sin q4 = k`, with a, b and k affine in cosine
+    /// and sine of q5.
     fn row(&self, c: &Vector3<f64>, v: &Vector3<f64>, value: f64) -> (TrigPolynomial, TrigPolynomial, TrigPolynomial) {
         let (h, h4, h5) = (self.axes[0].h, self.axes[3].h, self.axes[4].h);
         let along = h5 * h5.dot(v);

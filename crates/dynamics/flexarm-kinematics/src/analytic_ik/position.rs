@@ -1,44 +1,44 @@
-//! Three joints that bring a point to a place: `E_1 E_2 E_3 c = p`.
+//! Position problem of three joints: `E_1 E_2 E_3 c = p`.
 //!
-//! Where two neighbouring axes intersect or are parallel, one equation holds one angle and the rest
-//! follows in closed form (subproblems of Paden and Kahan, [Elias & Wen 2022]); otherwise the angle
-//! of the third joint is a root of a quartic [Pieper 1968].
+//! If two neighbouring axes intersect or are parallel, one equation contains a single angle and the
+//! others follow in closed form (subproblems of Paden and Kahan, [Elias & Wen 2022]); otherwise the
+//! angle of the third joint is a root of a quartic [Pieper 1968].
 
 use nalgebra::Vector3;
 
 use super::screw::Screw;
 use super::trig::{List, TrigPolynomial, angle_about, dot_turned, linear};
 
-/// What makes the position problem solvable.
+/// Geometric property of the three axes that determines how the position problem is solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum PositionForm {
-    /// The second and the third axis are parallel (almost every industrial arm).
+    /// Second and third axis are parallel (nearly all industrial arms).
     Parallel23,
-    /// The first and the second axis intersect.
+    /// First and second axis intersect.
     Intersecting12,
-    /// The second and the third axis intersect.
+    /// Second and third axis intersect.
     Intersecting23,
-    /// The first and the second axis are parallel.
+    /// First and second axis are parallel.
     Parallel12,
     /// None of these: a quartic.
     General,
 }
 
-/// Joint angles (rad) and which of them are free.
+/// Joint angles (rad), and whether one of them is free.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Three {
     pub(crate) q: [f64; 3],
     pub(crate) free: bool,
 }
 
-/// Four at most: a quartic, or two roots twice.
+/// At most four solutions: roots of a quartic, or two times two roots.
 pub(crate) type Threes = List<Three, 8>;
 
-/// All angles with `E_1 E_2 E_3 c = p`; where there are none, such that miss.
+/// Finds all angles with `E_1 E_2 E_3 c = p`; if there are none, angles that miss.
 ///
-/// * `hint`: what a free angle is to be (rad).
-/// * `reach`: scale of lengths (m).
+/// * `hint`: values used for free angles (rad).
+/// * `reach`: length scale (m).
 pub(crate) fn place(
     form: PositionForm,
     axes: &[Screw; 3],
@@ -67,11 +67,11 @@ struct Task {
     reach: f64,
 }
 
-/// Lengths below this part of the reach are rounding.
+/// Lengths below this fraction of the reach are rounding errors.
 pub(crate) const ROUNDING: f64 = 1e-13;
 
 impl Task {
-    /// `E_3⁻¹ E_2⁻¹ E_1⁻¹ p = c`: the same task from the other end.
+    /// `E_3⁻¹ E_2⁻¹ E_1⁻¹ p = c`: the same problem from the other end.
     fn reversed(&self, found: &mut Threes, solve: impl Fn(&Task, &mut Threes)) {
         let [a, b, c] = &self.axes;
         let [h1, h2, h3] = self.hint;
@@ -82,7 +82,7 @@ impl Task {
         }
     }
 
-    /// Axes 1 and 2 meet at o: `|E_3 c - o| = |p - o|`, then
+    /// Axes 1 and 2 intersect at o: `|E_3 c - o| = |p - o|`, then
     /// `h_1 · R_2 (E_3 c - o) = h_1 · (p - o)`.
     fn intersecting(&self, found: &mut Threes) {
         let [s1, s2, s3] = &self.axes;
@@ -102,7 +102,7 @@ impl Task {
         }
     }
 
-    /// Axes 1 and 2 are parallel: `h_1 · E_3 c = h_1 · p`, then two bars in the plane across.
+    /// Axes 1 and 2 are parallel: `h_1 · E_3 c = h_1 · p`, then two bars in the normal plane.
     fn parallel(&self, found: &mut Threes) {
         let [s1, s2, s3] = &self.axes;
         let floor = ROUNDING * self.reach;
@@ -116,13 +116,14 @@ impl Task {
         }
     }
 
-    /// Two equations linear in cosine and sine of the second angle, whose squares sum to one: a
-    /// quartic in the third.
+    /// Two equations linear in cosine and sine of the second angle; eliminating it gives a quartic
+    /// in the third.
     ///
-    /// With the common perpendicular of axes 1 and 2 as x (length a), y = h_2 × x, and w = E_3 c -
-    /// o_2:
+    /// With x along the common perpendicular of axes 1 and 2 (length a), y = h_2 × x and
+    /// w = E_3 c - o_2:
     /// ```text
-    /// x · R_2 w = (r² - a² - |w|²) / (2 a),   y · R_2 w = (z - (h_1·h_2) h_2·w) / (h_1·y),   their squares = |w|² - (h_2·w)²
+    /// X = x · R_2 w = (r² - a² - |w|²) / (2 a)
+    /// Y = y · R_2 w = (z - (h_1·h_2) h_2·w) / (h_1·y),     X² + Y² = |w|² - (h_2·w)²
     /// ```
     fn general(&self, found: &mut Threes) {
         let [s1, s2, s3] = &self.axes;
@@ -134,11 +135,13 @@ impl Task {
         let v = self.c - s3.o;
         let along = s3.h * s3.h.dot(&v);
         let (w0, wc, ws) = (s3.o - o2 + along, v - along, s3.h.cross(&v));
+        // |w|² and h_2·w as functions of the third angle.
         let square =
             TrigPolynomial::affine(w0.norm_squared() + wc.norm_squared(), 2.0 * w0.dot(&wc), 2.0 * w0.dot(&ws));
         let height = TrigPolynomial::affine(s2.h.dot(&w0), s2.h.dot(&wc), s2.h.dot(&ws));
         let (r, z) = (self.p - o1, s1.h.dot(&(self.p - o1)));
         let constant = |k| TrigPolynomial::affine(k, 0.0, 0.0);
+        // X, Y and X² + Y² - |w|² + (h_2·w)² = 0.
         let X = constant((r.norm_squared() - a * a) / (2.0 * a)).plus(&square, -0.5 / a);
         let Y = constant(z / sine).plus(&height, -cosine / sine);
         let equation = X.times(&X).plus(&Y.times(&Y), 1.0).plus(&square, -1.0).plus(&height.times(&height), 1.0);
@@ -151,7 +154,8 @@ impl Task {
         }
     }
 
-    /// The first angle turns `w` onto `p`, both from a point of the first axis.
+    /// Appends a solution; the first angle rotates `w` onto `p`, both relative to a point of the
+    /// first axis.
     fn finish(&self, w: &Vector3<f64>, p: &Vector3<f64>, q2: f64, q3: f64, free: bool, found: &mut Threes) {
         let (angle, size) = angle_about(&self.axes[0].h, w, p);
         let on_axis = size <= ROUNDING * self.reach;
@@ -160,14 +164,14 @@ impl Task {
     }
 }
 
-/// Two angles.
+/// Two angles (rad), and whether one of them is free.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Two {
     pub(crate) q: [f64; 2],
     pub(crate) free: bool,
 }
 
-/// `E_a E_b c = p` across the common direction of two parallel axes: elbow one way and the other.
+/// Solves `E_a E_b c = p` in the plane normal to two parallel axes: both elbow configurations.
 pub(crate) fn two_bars(
     first: &Screw,
     second: &Screw,
@@ -191,14 +195,14 @@ pub(crate) fn two_bars(
     found
 }
 
-/// Whether two bars come to a point, see [`two_bars`].
+/// Whether two bars can reach a point, see [`two_bars`].
 pub(crate) fn bars_reach(first: &Screw, second: &Screw, c: &Vector3<f64>, p: &Vector3<f64>) -> bool {
     let length = |v: Vector3<f64>| first.h.cross(&v).norm();
     let (d, v, p) = (length(second.o - first.o), length(c - second.o), length(p - first.o));
     (d - v).abs() <= p && p <= d + v
 }
 
-/// Ends of the common perpendicular of two lines that are not parallel, first on the first.
+/// Ends of the common perpendicular of two non-parallel lines, the one on `a` first.
 pub(crate) fn feet(a: &Screw, b: &Screw) -> (Vector3<f64>, Vector3<f64>) {
     let (d, k) = (b.o - a.o, a.h.dot(&b.h));
     let square = 1.0 - k * k;

@@ -1,4 +1,4 @@
-//! Which class an arm belongs to, from its joint axes.
+//! Classification of an arm from its joint axes.
 
 use nalgebra::{DVector, Matrix3, Vector3};
 
@@ -13,32 +13,32 @@ use crate::data::Data;
 use crate::kinematics::forward_kinematics;
 use crate::model::{Frame, JointMotion, Model};
 
-/// Axes count as parallel up to this angle (rad).
+/// Maximum angle between axes that are treated as parallel (rad).
 pub const AXIS_TOLERANCE_RAD: f64 = 2e-5;
 
-/// Axes count as meeting up to this distance, as part of the reach.
+/// Maximum distance between axes that are treated as intersecting, relative to the reach.
 pub const AXIS_TOLERANCE: f64 = 2e-5;
 
-/// Why an arm's inverse kinematics has its closed form.
+/// Geometric class that gives an arm a closed-form inverse kinematics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ArmClass {
-    /// Axes 4, 5 and 6 meet in a point; the first three joints place it.
+    /// Axes 4, 5 and 6 intersect in a point, which the first three joints position.
     SphericalWrist(PositionForm),
-    /// Axes 1, 2 and 3 meet in a point; the form is that of joints 6, 5, 4, in this order.
+    /// Axes 1, 2 and 3 intersect in a point; the form is that of joints 6, 5, 4, in this order.
     SphericalShoulder(PositionForm),
-    /// Three parallel axes in a row.
+    /// Three successive axes are parallel.
     ThreeParallel {
         /// Number of the first of them, 1 to 4.
         first: usize,
-        /// Whether the two axes at the end of the arm from which it is solved meet, as 5 and 6 do
-        /// in Universal Robots' arms: then no polynomial is needed.
+        /// Whether the last two axes, seen from the end at which the solution starts, intersect, as
+        /// axes 5 and 6 of Universal Robots arms do: then no polynomial is needed.
         meeting: bool,
     },
 }
 
 impl ArmClass {
-    /// Most solutions that a pose can have.
+    /// Maximum number of solutions of a pose.
     pub fn most_solutions(self) -> usize {
         match self {
             Self::ThreeParallel { first: 1 | 4, meeting: false } => 16,
@@ -70,12 +70,12 @@ impl std::fmt::Display for ArmClass {
     }
 }
 
-/// Why there is no closed form; [`crate::inverse_kinematics_from_many_starts`] solves such arms by
-/// numbers.
+/// Reason why there is no closed form; such arms are solved numerically by
+/// [`crate::inverse_kinematics_from_many_starts`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoAnalyticIk {
-    /// Not six joints between base and frame.
+    /// The number of joints between base and frame is not six.
     #[error(
         "analytic inverse kinematics of frame {frame:?} needs six joints between it and the base, found {}: {joints:?}",
         joints.len()
@@ -83,15 +83,15 @@ pub enum NoAnalyticIk {
     JointCount {
         /// The frame.
         frame: String,
-        /// Joints that move it, from the base on.
+        /// Joints that move the frame, from the base outward.
         joints: Vec<String>,
     },
-    /// A joint is not one of the six that it must be.
+    /// A joint is not suitable.
     #[error("analytic inverse kinematics: joint {joint:?} {what}")]
     Joint {
         /// The joint.
         joint: String,
-        /// What is wrong with it.
+        /// Description of the problem.
         what: &'static str,
     },
     /// The joints cannot move the frame in all six directions.
@@ -102,11 +102,11 @@ pub enum NoAnalyticIk {
     Deficient {
         /// The frame.
         frame: String,
-        /// Smallest over largest singular value of the Jacobian, at the best of some positions,
-        /// lengths over the reach.
+        /// Ratio of smallest to largest singular value of the Jacobian, lengths relative to the
+        /// reach: maximum over a few positions.
         smallest: f64,
     },
-    /// No class.
+    /// The arm is of no class with a closed form.
     #[error(
         "the axes of {frame:?} are of no class with a closed form: axes 4, 5, 6 miss a common point by {wrist_m:.3e} m, axes 1, \
          2, 3 by {shoulder_m:.3e} m (allowed {allowed_m:.1e} m), and the best three axes in a row are {parallel_rad:.1e} rad from \
@@ -115,16 +115,16 @@ pub enum NoAnalyticIk {
     NoClass {
         /// The frame.
         frame: String,
-        /// Distance of axes 4, 5, 6 from the point nearest to them (m).
+        /// Maximum distance of axes 4, 5, 6 from the point closest to them (m).
         wrist_m: f64,
-        /// The same of axes 1, 2, 3 (m).
+        /// Same for axes 1, 2, 3 (m).
         shoulder_m: f64,
         /// Allowed distance (m).
         allowed_m: f64,
-        /// Largest angle within the three neighbouring axes that are most nearly parallel (rad).
+        /// Maximum angle within the three successive axes that are closest to parallel (rad).
         parallel_rad: f64,
     },
-    /// Joint values that are not numbers.
+    /// The held joint values have the wrong length or are not finite.
     #[error(
         "analytic inverse kinematics: {found} held joint values for a model of {needed} coordinates, or some are not finite"
     )]
@@ -137,12 +137,13 @@ pub enum NoAnalyticIk {
 }
 
 impl AnalyticArm {
-    /// The arm from the base to `frame`, which six revolute joints must move.
+    /// Creates the solver for the arm from the base to `frame`, which six revolute joints must
+    /// move.
     ///
-    /// Fixed joints may lie between them; elastic coordinates are at zero.
+    /// Fixed joints between them are allowed; elastic coordinates are zero.
     ///
     /// # Errors
-    /// [`NoAnalyticIk`], which says what the geometry lacks.
+    /// [`NoAnalyticIk`] with the missing geometric property.
     pub fn new(model: &Model, frame: &Frame) -> Result<Self, NoAnalyticIk> {
         check_open(model, frame)?;
         let joints = moving_joints(model, frame);
@@ -156,14 +157,14 @@ impl AnalyticArm {
         }
     }
 
-    /// The arm that six of the joints make while all others are held, as those of a rail, a turned
-    /// table or a seventh axis.
+    /// Creates the solver for six of the joints with all others held, such as a rail, a turntable
+    /// or a seventh axis.
     ///
-    /// * `joints`: numbers of the six coordinates, in the order of the chain.
-    /// * `q_held`: values of all coordinates, nv long (rad or m); those of the six do not matter.
+    /// * `joints`: indices of the six coordinates, in the order of the chain.
+    /// * `q_held`: values of all coordinates, nv long (rad or m); those of the six are ignored.
     ///
     /// # Errors
-    /// [`NoAnalyticIk`], which says what the geometry lacks.
+    /// [`NoAnalyticIk`] with the missing geometric property.
     pub fn with_joints(
         model: &Model,
         frame: &Frame,
@@ -186,7 +187,8 @@ impl AnalyticArm {
     }
 }
 
-/// A joint that follows from a closed loop turns with others: its axis is where these put it.
+/// Checks that no joint of the chain is determined by a closed loop, since its axis would depend on
+/// other joints.
 fn check_open(model: &Model, frame: &Frame) -> Result<(), NoAnalyticIk> {
     let mut body = frame.body;
     while body > 0 {
@@ -199,7 +201,7 @@ fn check_open(model: &Model, frame: &Frame) -> Result<(), NoAnalyticIk> {
     Ok(())
 }
 
-/// Actuated coordinates that move the frame, from the base on.
+/// Actuated coordinates that move the frame, from the base outward.
 fn moving_joints(model: &Model, frame: &Frame) -> Vec<usize> {
     let mut joints = Vec::new();
     let mut body = frame.body;
@@ -214,7 +216,7 @@ fn moving_joints(model: &Model, frame: &Frame) -> Vec<usize> {
     joints
 }
 
-/// Lines of the six joints in the world with all other joints held.
+/// World lines of the six joint axes at zero, with all other joints held.
 fn chain_of(model: &Model, frame: &Frame, joints: &[usize; 6], q_held: &DVector<f64>) -> Result<Chain, NoAnalyticIk> {
     let mut q = q_held.clone();
     for &k in joints {
@@ -259,8 +261,8 @@ fn chain_of(model: &Model, frame: &Frame, joints: &[usize; 6], q_held: &DVector<
     Ok(Chain { axes, X_0, reach })
 }
 
-/// Smallest over largest singular value of the Jacobian (lengths over the reach), at the best of a
-/// few positions.
+/// Ratio of smallest to largest singular value of the Jacobian (lengths relative to the reach):
+/// maximum over a few positions.
 fn dexterity(chain: &Chain) -> f64 {
     let positions =
         [[0.3, -0.7, 1.1, 0.5, -0.9, 0.4], [-1.2, 0.4, -0.6, 1.3, 0.8, -0.2], [2.1, 0.9, 0.5, -1.6, 1.4, 1.0]];
@@ -280,7 +282,7 @@ struct Found {
     deviation: f64,
 }
 
-/// The first class that fits, the simplest first.
+/// Returns the first matching class, simplest first.
 fn recognise(chain: &Chain, frame: &str) -> Result<Found, NoAnalyticIk> {
     let from_tool = Lines::new(chain, true);
     let from_base = Lines::new(chain, false);
@@ -310,7 +312,7 @@ fn recognise(chain: &Chain, frame: &str) -> Result<Found, NoAnalyticIk> {
     })
 }
 
-/// The axes from one end to the other.
+/// Joint axes, ordered from one end of the arm to the other.
 struct Lines {
     axes: [Screw; 6],
     reach: f64,
@@ -327,7 +329,7 @@ impl Lines {
         Self { axes, reach: chain.reach, reversed }
     }
 
-    /// Angle between two lines, whichever way they point (rad).
+    /// Angle between two lines, regardless of direction (rad).
     fn angle(&self, i: usize, j: usize) -> f64 {
         let (a, b) = (&self.axes[i].h, &self.axes[j].h);
         a.cross(b).norm().atan2(a.dot(b).abs())
@@ -337,9 +339,9 @@ impl Lines {
         Some(self.angle(i, j)).filter(|a| *a <= AXIS_TOLERANCE_RAD)
     }
 
-    /// Middle of the common perpendicular of two lines that meet, and by how much of the reach they
-    /// do not. Lines that are nearly parallel may meet so far away that nothing can be reckoned
-    /// from there.
+    /// Midpoint of the common perpendicular of two intersecting lines, and its length relative to
+    /// the reach. `None` if the lines do not intersect, or if they are nearly parallel and
+    /// intersect too far away for accurate computation.
     fn meeting(&self, i: usize, j: usize) -> Option<(Vector3<f64>, f64)> {
         if self.parallel(i, j).is_some() {
             return None;
@@ -350,7 +352,7 @@ impl Lines {
         Some((0.5 * (a + b), apart)).filter(|_| near && apart <= AXIS_TOLERANCE)
     }
 
-    /// The point nearest to the last three lines, and the largest of its distances from them (m).
+    /// Point closest to the last three lines, and its maximum distance from them (m).
     fn meeting_point(&self) -> Option<(Vector3<f64>, f64)> {
         let (mut A, mut b) = (Matrix3::zeros(), Vector3::zeros());
         for axis in &self.axes[3..] {
@@ -393,7 +395,7 @@ impl Lines {
         Some((kernel, form, apart.max(deviation)))
     }
 
-    /// Three parallel axes from number `start` (0 or 1) on.
+    /// Three parallel axes starting at index `start` (0 or 1).
     fn three_parallel(&self, start: usize) -> Option<(Kernel, bool, f64)> {
         let deviation = self.parallel(start, start + 1)?.max(self.parallel(start, start + 2)?);
         if self.parallel(4, 5).is_some() {

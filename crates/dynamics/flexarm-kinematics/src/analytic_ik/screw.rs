@@ -1,4 +1,4 @@
-//! The arm as a product of six rotations about lines of the world.
+//! Product-of-exponentials form of the arm: six rotations about lines fixed in the world.
 //!
 //! ```text
 //! X_WT(q) = E_1(q_1) ... E_6(q_6) X_WT(0),      E_i(q) x = o_i + R(h_i, q) (x - o_i)
@@ -7,14 +7,14 @@
 use flexarm_spatial::{Pose, rotation_vector, sin_cos_all};
 use nalgebra::{Matrix3, Matrix6, Rotation3, Vector3, Vector6};
 
-/// A line of the world at zero joint values: direction `h` (unit) and a point `o` (m).
+/// World line of a joint axis at zero joint values: direction `h` (unit) and a point `o` (m).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Screw {
     pub(crate) h: Vector3<f64>,
     pub(crate) o: Vector3<f64>,
 }
 
-/// A rotation about a line, by its sine and cosine.
+/// Rotation about a line, given by sine and cosine.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Turn<'a> {
     screw: &'a Screw,
@@ -28,7 +28,7 @@ impl Screw {
         Turn { screw: self, sine, cosine }
     }
 
-    /// The same line, turned the other way round.
+    /// Same line with the opposite direction.
     pub(crate) fn reversed(&self) -> Self {
         Self { h: -self.h, o: self.o }
     }
@@ -56,22 +56,21 @@ impl Turn<'_> {
     }
 }
 
-/// Six screws and the pose of the tool at zero joint values.
+/// Six screws and the tool pose at zero joint values.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Chain {
     pub(crate) axes: [Screw; 6],
     pub(crate) X_0: Pose,
-    /// Largest distance of an axis' point or of the tool from the first axis' (m): the scale of
-    /// lengths.
+    /// Length scale: sum of the distances between successive axis points, and to the tool (m).
     pub(crate) reach: f64,
 }
 
-/// How far a pose is from the one that was asked for.
+/// Residual of a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Miss {
-    /// Distance (m).
+    /// Position error (m).
     pub position_m: f64,
-    /// Angle (rad).
+    /// Rotation error (rad).
     pub rotation_rad: f64,
 }
 
@@ -97,8 +96,8 @@ impl Chain {
         Pose::from_parts(p.into(), Rotation3::from_matrix_unchecked(R))
     }
 
-    /// Jacobian of [`Self::pose`]: velocity of To and angular velocity in world axes (rows linear
-    /// first).
+    /// Jacobian of [`Self::pose`]: velocity of To and angular velocity in world axes, linear rows
+    /// first.
     pub(crate) fn jacobian(&self, q: &[f64; 6]) -> Matrix6<f64> {
         let p = self.pose(q).translation.vector;
         let mut J = Matrix6::zeros();
@@ -118,18 +117,18 @@ impl Chain {
         let X = self.pose(q);
         let dp = X_WT.translation.vector - X.translation.vector;
         let (R, Rt) = (X.rotation.matrix(), X_WT.rotation.matrix());
-        // sin of the angle times its axis, which is the rotation vector where it is small.
+        // Axis times the sine of the angle, equal to the rotation vector for small angles.
         let sine = (0..3).fold(Vector3::zeros(), |s, k| s + R.column(k).cross(&Rt.column(k))) * 0.5;
         let small = R.component_mul(Rt).sum() > 2.0 && sine.norm_squared() < 1e-10;
         let r = if small { sine } else { rotation_vector((X_WT.rotation * X.rotation.inverse()).matrix()) };
         Vector6::new(dp.x, dp.y, dp.z, r.x, r.y, r.z)
     }
 
-    /// Improves joint values until the pose is met to rounding or nothing improves; returns what is
-    /// missed.
+    /// Refines joint values until the pose is met to rounding or no step improves it; returns the
+    /// residual.
     ///
-    /// Newton's method with the Jacobian; next to singular poses its pseudo-inverse. Stops at once
-    /// where the start is far from the pose, since it is then no solution.
+    /// Newton's method with the Jacobian, or with its pseudo-inverse near singular poses. Stops at
+    /// once if the residual exceeds `capture`, since the start is then not near a solution.
     pub(crate) fn polish(&self, q: &mut [f64; 6], X_WT: &Pose, capture: f64) -> Miss {
         const ENOUGH: f64 = 2e-14;
         let mut error = self.error(q, X_WT);
@@ -169,7 +168,7 @@ impl Chain {
     }
 }
 
-/// The angle of a joint within (-π, π].
+/// Wraps an angle to (-π, π].
 pub(crate) fn wrapped(angle: f64) -> f64 {
     use std::f64::consts::{PI, TAU};
     let turned = angle - TAU * (angle / TAU).round();

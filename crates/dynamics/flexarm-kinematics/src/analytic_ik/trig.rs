@@ -1,13 +1,13 @@
-//! Equations in one angle, in closed form or by all roots of a polynomial.
+//! Equations in one angle, solved in closed form or by all roots of a polynomial.
 //!
 //! ```text
-//! a cos t + b sin t = c                          two roots, or the angle that misses least
-//! c_0 + 2 Re sum_k c_k e^{i k t} = 0             up to 2 n roots, as points of the unit circle
+//! a cos t + b sin t = c                          two roots, or the angle of minimum residual
+//! c_0 + 2 Re sum_k c_k e^{i k t} = 0             up to 2 n roots, as points on the unit circle
 //! ```
 
 use nalgebra::{Complex, Vector3};
 
-/// A list of bounded length that lives on the stack.
+/// List of bounded length on the stack.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct List<T: Copy, const N: usize> {
     items: [T; N],
@@ -19,7 +19,7 @@ impl<T: Copy, const N: usize> List<T, N> {
         Self { items: [blank; N], n: 0 }
     }
 
-    /// Adds an item; the classes' numbers of roots bound how many there can be.
+    /// Adds an item; the maximum number of roots of each class bounds the length.
     pub(crate) fn push(&mut self, item: T) {
         assert!(self.n < N, "more roots than the equations can have");
         self.items[self.n] = item;
@@ -44,7 +44,7 @@ impl<T: Copy, const N: usize> List<T, N> {
 pub(crate) struct Roots {
     angles: [f64; 2],
     n: usize,
-    /// Whether every angle solves it; the one given is the hint.
+    /// Whether every angle is a root; the one given is then the hint.
     pub(crate) free: bool,
 }
 
@@ -58,10 +58,9 @@ impl Roots {
     }
 }
 
-/// Roots of `a cos t + b sin t = c`; where there are none, the one angle that misses least.
+/// Roots of `a cos t + b sin t = c`; if there are none, the single angle of minimum residual.
 ///
-/// * `floor`: where `hypot(a, b)` is not above it, the angle is free and the hint is its
-///   representative.
+/// * `floor`: if `hypot(a, b)` does not exceed it, the angle is free and the hint is returned.
 pub(crate) fn linear(a: f64, b: f64, c: f64, floor: f64, hint: f64) -> Roots {
     let size = a.hypot(b);
     if size <= floor {
@@ -81,33 +80,32 @@ pub(crate) fn linear(a: f64, b: f64, c: f64, floor: f64, hint: f64) -> Roots {
     Roots::two(b.atan2(a), half)
 }
 
-/// `(k, a, b)` of `u · R(h, t) v = k + a cos t + b sin t`.
+/// Coefficients `(k, a, b)` of `u · R(h, t) v = k + a cos t + b sin t`.
 pub(crate) fn dot_turned(u: &Vector3<f64>, h: &Vector3<f64>, v: &Vector3<f64>) -> (f64, f64, f64) {
     let k = u.dot(h) * h.dot(v);
     (k, u.dot(v) - k, u.dot(&h.cross(v)))
 }
 
-/// The angle about `h` that turns the part of `a` across `h` onto that of `b`, and the smaller of
-/// their lengths.
+/// Angle about `h` that rotates the component of `a` normal to `h` onto that of `b`, and the
+/// smaller of the lengths of these components.
 pub(crate) fn angle_about(h: &Vector3<f64>, a: &Vector3<f64>, b: &Vector3<f64>) -> (f64, f64) {
     let (a, b) = (a - h * h.dot(a), b - h * h.dot(b));
     (h.dot(&a.cross(&b)).atan2(a.dot(&b)), a.norm().min(b.norm()))
 }
 
-/// A vector across `h` of unit length.
+/// Unit vector normal to `h`.
 pub(crate) fn across(h: &Vector3<f64>) -> Vector3<f64> {
     let e = Vector3::ith(h.iamin(), 1.0);
     (e - h * h.dot(&e)).normalize()
 }
 
-/// Angles from a vector `v = R(h, t) w` at cosine `u · v`, near the ends of its range without loss
-/// of digits.
+/// Solves `u · R(h, t) w = u · v` for the angle t, without cancellation near the ends of the range.
 ///
 /// ```text
 /// u · R(h, t) w = a + b cos(t - phi),     t = phi ± d,     tan²(d/2) = (a + b - u·v) / (u·v - a + b)
 /// ```
-/// Where the range ends at ±1 (`w` can be turned onto `u`: the straight wrist), `1 - u·v` is
-/// `|u - v|²/2`.
+/// If the range ends at ±1 (`w` can be rotated onto `u`, as in a straight wrist), `1 - u·v` is
+/// computed as `|u - v|²/2`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fan {
     pub(crate) phi: f64,
@@ -135,10 +133,10 @@ impl Fan {
     }
 }
 
-/// Highest degree of a [`TrigPolynomial`].
+/// Maximum degree of a [`TrigPolynomial`].
 const MOST: usize = 4;
 
-/// `c_0 + 2 Re sum_k c_k e^{i k t}`, degree at most four; `c_0` is real.
+/// `c_0 + 2 Re sum_k c_k e^{i k t}` of degree at most four; `c_0` is real.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TrigPolynomial {
     c: [Complex<f64>; MOST + 1],
@@ -159,7 +157,7 @@ impl TrigPolynomial {
         if k < 0 { c.conj() } else { c }
     }
 
-    /// The product, whose degree is the sum of theirs.
+    /// Product; its degree is the sum of the two degrees.
     pub(crate) fn times(&self, other: &Self) -> Self {
         let degree = self.degree + other.degree;
         let (n, m) = (self.degree as isize, other.degree as isize);
@@ -182,7 +180,7 @@ impl TrigPolynomial {
         sum
     }
 
-    /// Value and slope.
+    /// Value and derivative.
     pub(crate) fn at(&self, t: f64) -> (f64, f64) {
         let turn = Complex::new(t.cos(), t.sin());
         let (mut value, mut slope, mut power) = (self.c[0].re, 0.0, turn);
@@ -195,8 +193,8 @@ impl TrigPolynomial {
         (value, slope)
     }
 
-    /// Angles of all roots that lie within `width` of the unit circle, refined; without one, those
-    /// of all roots (which miss).
+    /// Refined angles of all roots within `width` of the unit circle; if there is none, the angles
+    /// of all roots, which are then not solutions.
     ///
     /// The polynomial `z^n f(z)` of degree 2n is solved by Aberth's simultaneous iteration.
     pub(crate) fn roots(&self, width: f64) -> List<f64, { 2 * MOST }> {
@@ -222,12 +220,13 @@ impl TrigPolynomial {
         angles
     }
 
-    /// All complex roots of `z^n f(z)`.
+    /// Complex roots of `z^n f(z)`.
     fn aberth(&self, degree: usize) -> [Complex<f64>; 2 * MOST] {
         let n = 2 * degree;
         let mut z = [Complex::new(0.0, 0.0); 2 * MOST];
         for (j, z) in z.iter_mut().enumerate().take(n) {
-            // Off the circle and unevenly: points on it, or mirrored in it, would stay so.
+            // Start values off the circle and irregular: values on the circle, or mirrored in it,
+            // would remain so.
             let angle = 0.4 + std::f64::consts::TAU * j as f64 / n as f64;
             *z = Complex::from_polar(0.8 + 0.13 * ((j * 5) % n) as f64 / n as f64, angle);
         }
@@ -257,7 +256,7 @@ impl TrigPolynomial {
         z
     }
 
-    /// Newton's method from an angle near a root; stays where it would go far (a double root).
+    /// Newton's method from an angle near a root; rejects large steps, as at a double root.
     fn refined(&self, start: f64) -> f64 {
         let mut t = start;
         let mut value = self.at(t);
@@ -278,7 +277,7 @@ impl TrigPolynomial {
 mod tests {
     use super::*;
 
-    /// Truth: a product of factors whose roots are known.
+    /// Truth: product of factors with known roots.
     #[test]
     fn all_roots_of_a_trigonometric_polynomial_of_degree_four_are_found() {
         // sin((t - r)/2) sin((t - s)/2) = (cos((r - s)/2) - cos(t - (r + s)/2)) / 2.

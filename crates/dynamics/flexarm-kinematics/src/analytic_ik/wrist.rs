@@ -1,5 +1,5 @@
-//! Arms whose last three axes meet: three joints place the meeting point, three turn the tool about
-//! it.
+//! Arms whose last three axes intersect: three joints position the intersection point, three rotate
+//! the tool about it.
 
 use flexarm_spatial::Pose;
 use nalgebra::Vector3;
@@ -9,11 +9,11 @@ use super::screw::Screw;
 use super::trig::{Fan, across, angle_about};
 use super::{Candidates, Kind, STRAIGHT};
 
-/// What does not depend on the pose.
+/// Pose-independent data of the solver.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Wrist {
     pub(crate) axes: [Screw; 6],
-    /// Meeting point at zero joint values (m).
+    /// Intersection point at zero joint values (m).
     pub(crate) center: Vector3<f64>,
     pub(crate) form: PositionForm,
     pub(crate) fan: Fan,
@@ -26,11 +26,11 @@ impl Wrist {
         Self { axes, center, form, fan, reach }
     }
 
-    /// All joint values with `E_1 ... E_6 = G`.
+    /// Finds all joint values with `E_1 ... E_6 = G`.
     ///
-    /// `E_1 E_2 E_3 c = G c` at the meeting point c. Then with `Q = (R_1 R_2 R_3)ᵀ G_R` the angle
+    /// `E_1 E_2 E_3 c = G c` for the intersection point c. With `Q = (R_1 R_2 R_3)ᵀ G_R`, the angle
     /// of joint 5 follows from `h_4 · R_5 h_6 = h_4 · Q h_6`, that of joint 4 from
-    /// `R_4 R_5 h_6 = Q h_6`, and that of joint 6 from what is left.
+    /// `R_4 R_5 h_6 = Q h_6`, and that of joint 6 from the remaining rotation.
     pub(crate) fn solve(&self, G: &Pose, hint: &[f64; 6], found: &mut Candidates) {
         let [s1, s2, s3, s4, s5, s6] = &self.axes;
         let p = G.rotation * self.center + G.translation.vector;

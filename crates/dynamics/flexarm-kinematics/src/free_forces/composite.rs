@@ -1,13 +1,12 @@
-//! Mass matrix of the free coordinates by composite bodies, O(n × depth).
+//! Mass matrix of the free coordinates by composite rigid bodies, O(n × depth).
 //!
 //! ```text
-//!   F_k = I_k S_k            wrench at the body's origin that gives joint k, and all outward of it, a unit acceleration  (10)
-//!   M_ik = S_iᵀ F_k          for all k outward of i, F_k carried to the origin of i's body                               (11)
+//!   F_k  = I_k S_k     wrench at Bo that gives joint k with its subtree a unit acceleration   (10)
+//!   M_ik = S_iᵀ F_k    for all k outward of i, F_k carried to the origin of body i            (11)
 //! ```
-//! All of it is in the axes of the first body whose wrench counts, so that a wrench keeps its force
-//! on the way inward and only its moment changes. Three columns go together, component by
-//! component: the translations or the rotations of an elastic joint, or up to three joints of one
-//! coordinate, one behind the other.
+//! All quantities are in the axes of the first loading body, so that carrying a wrench inward
+//! changes only its moment. Columns are processed in threes, component by component: the
+//! translations or the rotations of an elastic joint, or up to three successive single-DoF joints.
 //!
 //! Source: [Featherstone 2008], section 6.2.
 
@@ -22,55 +21,55 @@ use nalgebra::{Matrix3, Vector3};
 use super::node::{Node, NodeJoint};
 use super::{FreeForces, Part};
 
-/// The workspace.
+/// Workspace of the mass matrix.
 #[derive(Clone, Debug)]
 pub(super) struct Composites<T: Real> {
-    /// One for each node.
+    /// Composite bodies, one per node.
     bodies: Vec<Composite<T>>,
-    /// Wrenches on their way inward, three columns each.
+    /// Wrenches carried inward, up to three columns each.
     threes: Vec<Three<T>>,
-    /// Whether some coordinates do not meet, or meet more than once.
+    /// Whether some pairs of coordinates contribute nothing, or more than once.
     sums: bool,
 }
 
-/// A body with all that it carries outward, in the common axes.
+/// Body with everything outward of it, in the common axes.
 #[derive(Clone, Debug)]
 struct Composite<T: Real> {
     mass: T,
     /// First moment and inertia about Bo.
     h: Vector3<T>,
     I: Matrix3<T>,
-    /// Turns vectors of the body's axes.
+    /// Rotation from body axes to the common axes.
     R: Matrix3<T>,
-    /// From the parent's origin to the body's.
+    /// Position of Bo relative to the parent's origin.
     r: Vector3<T>,
-    /// The parent, if its wrench counts.
+    /// Parent, if it is a loading body.
     parent: Option<usize>,
-    /// The first of its joint's columns among the threes, if it is free.
+    /// First column of its joint, if the joint is free.
     own: Option<Place>,
-    /// Threes that move with it.
+    /// Groups of columns in its subtree.
     threes: Range<usize>,
 }
 
-/// A column.
+/// Location of a column: group and lane.
 #[derive(Clone, Copy, Debug)]
 struct Place {
     three: usize,
     lane: usize,
 }
 
-/// Wrenches of up to three columns whose rows in M follow each other.
+/// Wrenches of up to three columns with successive rows in M.
 #[derive(Clone, Debug)]
 struct Three<T: Real> {
     row: usize,
     count: usize,
-    /// `Fᵀ`: a row for each of them, a column for each component.
+    /// `Fᵀ`: one row per wrench, one column per component.
     force: Matrix3<T>,
     torque: Matrix3<T>,
 }
 
-/// Room for the columns of a joint: beside the next free one inward, if that is the last so far and
-/// both have one coordinate.
+/// Allocates columns for a joint. A single-DoF joint shares the group of the next free joint
+/// inward, if that group is the last one, ends with that joint and has room.
 #[inline(always)]
 fn place_columns<T: Real>(threes: &mut Vec<Three<T>>, inner: Option<Place>, row: usize, size: usize) -> Place {
     if let (Some(inner), Some(last), 1) = (inner, threes.len().checked_sub(1), size)
@@ -90,7 +89,7 @@ fn place_columns<T: Real>(threes: &mut Vec<Three<T>>, inner: Option<Place>, row:
 }
 
 impl<T: Real> Composites<T> {
-    /// For n free coordinates.
+    /// Creates the workspace for n free coordinates.
     #[inline(always)]
     fn new(nodes: &[Node<T>], n: usize) -> Self {
         let real = T::splat;
@@ -130,7 +129,7 @@ impl<T: Real> Composites<T> {
         Self { bodies, threes, sums: branches || columns != n }
     }
 
-    /// Own inertias, turned to the common axes.
+    /// Initialises the bodies with their own inertias, rotated to the common axes.
     #[inline(always)]
     fn begin(&mut self, nodes: &[Node<T>]) {
         for (i, node) in nodes.iter().enumerate().filter(|(_, node)| node.part == Part::Loading) {
@@ -148,7 +147,7 @@ impl<T: Real> Composites<T> {
         }
     }
 
-    /// (10) and (11), column after column into M.
+    /// (10) and (11), column by column into M.
     #[inline(always)]
     fn meet<const SUMS: bool>(&mut self, nodes: &[Node<T>], M: &mut Entries<'_, T, SUMS>) {
         for (i, node) in nodes.iter().enumerate().filter(|(_, node)| node.part == Part::Loading).rev() {
@@ -177,7 +176,7 @@ impl<T: Real> Composites<T> {
 }
 
 impl<T: Real> Composite<T> {
-    /// A joint of one coordinate; `base` turns vectors of the parent's axes.
+    /// Columns and entries of a single-DoF joint; `base` rotates vectors from the parent's axes.
     #[inline(always)]
     fn single<const SUMS: bool>(
         &self,
@@ -222,7 +221,7 @@ impl<T: Real> Composite<T> {
         }
     }
 
-    /// A joint of six coordinates.
+    /// Columns and entries of a six-DoF joint; `base` rotates vectors from the parent's axes.
     #[inline(always)]
     fn elastic<const SUMS: bool>(
         &self,
@@ -236,7 +235,7 @@ impl<T: Real> Composite<T> {
         let L = if is_parallel { *base } else { mul3(base, &node.R_PJ) };
         let B = mul3(&self.R, &node.B);
         let h = &self.h;
-        // m L and [h]x L, then -[h]x B and I B, by their rows.
+        // Rows of m L and [h]x L, then of -[h]x B and I B.
         let Lt = transposed(&L);
         let rows = [column(&Lt, 0), column(&Lt, 1), column(&Lt, 2)];
         outward[0].force =
@@ -247,7 +246,7 @@ impl<T: Real> Composite<T> {
         outward[1].force = crossed(&-*h, &rows);
         outward[1].torque = tr_mul3(&B, &self.I);
 
-        // The translations meet the mass alone.
+        // Translation block: mass times identity.
         let zero = T::splat(0.0);
         for c in 0..3 {
             let mut own = [zero; 3];
@@ -266,7 +265,7 @@ impl<T: Real> Composite<T> {
         }
     }
 
-    /// Takes in one that sits at its r.
+    /// Adds the composite body `other`, located at its r.
     #[inline(always)]
     fn take(&mut self, other: &Self) {
         let real = T::splat;
@@ -283,7 +282,7 @@ impl<T: Real> Composite<T> {
     }
 }
 
-/// A column, and its row in M.
+/// Lane of a column and its row in M.
 #[derive(Clone, Copy)]
 struct Column {
     lane: usize,
@@ -291,7 +290,7 @@ struct Column {
 }
 
 impl<T: Real> Three<T> {
-    /// No wrenches.
+    /// Sets all wrenches to zero.
     #[inline(always)]
     fn clear(&mut self) {
         (self.force, self.torque) = (Matrix3::zeros(), Matrix3::zeros());
@@ -308,7 +307,7 @@ impl<T: Real> Three<T> {
         }
     }
 
-    /// About a point r before this one.
+    /// Shifts the reference point of the moments inward by r.
     #[inline(always)]
     fn carry(&mut self, r: &Vector3<T>) {
         let components = [column(&self.force, 0), column(&self.force, 1), column(&self.force, 2)];
@@ -316,7 +315,7 @@ impl<T: Real> Three<T> {
     }
 }
 
-/// `([v]x A)ᵀ` of the rows of A.
+/// `([v]x A)ᵀ` from the rows of A.
 #[inline(always)]
 fn crossed<T: Real>(v: &Vector3<T>, [x, y, z]: &[Vector3<T>; 3]) -> Matrix3<T> {
     columns(
@@ -326,8 +325,8 @@ fn crossed<T: Real>(v: &Vector3<T>, [x, y, z]: &[Vector3<T>; 3]) -> Matrix3<T> {
     )
 }
 
-/// The mass matrix that is being filled, n columns of n; zero before if it SUMS, because some
-/// coordinates do not meet, or meet more than once.
+/// Mass matrix being filled, n columns of length n. With `SUMS` it starts at zero and entries are
+/// added, because some pairs of coordinates contribute nothing, or more than once.
 struct Entries<'m, T, const SUMS: bool> {
     M: &'m mut [T],
     n: usize,
@@ -340,14 +339,15 @@ impl<T: Real, const SUMS: bool> Entries<'_, T, SUMS> {
         *entry = if SUMS { *entry + product } else { product };
     }
 
-    /// What two columns meet.
+    /// Writes an off-diagonal entry and its transpose.
     #[inline(always)]
     fn put(&mut self, row: usize, other: usize, product: T) {
         self.put_one(row, other, product);
         self.put_one(other, row, product);
     }
 
-    /// What a column meets among its own three: itself and those behind it.
+    /// Writes the entries of a column within its own group: the diagonal and the columns outward of
+    /// it.
     #[inline(always)]
     fn put_own(&mut self, row: usize, three: &Three<T>, lane: usize, products: &Vector3<T>) {
         self.put_one(row, row, products[lane]);
@@ -356,7 +356,7 @@ impl<T: Real, const SUMS: bool> Entries<'_, T, SUMS> {
         }
     }
 
-    /// What a column meets among three others.
+    /// Writes the entries of a row for another group of columns.
     #[inline(always)]
     fn put_row(&mut self, row: usize, three: &Three<T>, products: &Vector3<T>) {
         if SUMS || three.count < 3 {
@@ -370,7 +370,7 @@ impl<T: Real, const SUMS: bool> Entries<'_, T, SUMS> {
         (x[row], y[row], z[row]) = (products.x, products.y, products.z);
     }
 
-    /// What three columns of an elastic joint, with these axes, meet among three others.
+    /// Writes the entries of three columns of an elastic joint, with these axes, for another group.
     #[inline(always)]
     fn put_three(&mut self, row: usize, three: &Three<T>, axes: &Matrix3<T>, wrenches: &Matrix3<T>) {
         let a = mul(wrenches, &column(axes, 0));
@@ -395,7 +395,7 @@ impl<T: Real, const SUMS: bool> Entries<'_, T, SUMS> {
         z[row..row + 3].copy_from_slice(&[a.z, b.z, c.z]);
     }
 
-    /// From this one on.
+    /// Three successive columns of M, from `first` on.
     #[inline(always)]
     fn three_columns(&mut self, first: usize) -> [&mut [T]; 3] {
         let n = self.n;
@@ -406,9 +406,9 @@ impl<T: Real, const SUMS: bool> Entries<'_, T, SUMS> {
 }
 
 impl<T: Real> FreeForces<T> {
-    /// Mass matrix of the free coordinates (kg, kg m, kg m²) at the poses of the last forces,
-    /// column after column into M, both triangles: that of [`crate::mass_matrix`], to rounding.
-    /// Allocates when it is called first, and not again.
+    /// Computes the mass matrix of the free coordinates (kg, kg m, kg m²) at the poses of the last
+    /// call, column by column into M, both triangles. Equals [`crate::mass_matrix`] to rounding.
+    /// Allocates on the first call only.
     ///
     /// # Source
     /// [Featherstone 2008], section 6.2.
@@ -434,7 +434,7 @@ impl<T: Real> FreeForces<T> {
         }
     }
 
-    /// [`FreeForces::mass`] at the positions of all coordinates (rad or m).
+    /// As [`FreeForces::mass`], at the positions of all coordinates (rad or m).
     #[inline(always)]
     pub fn mass_at(&mut self, q: &[T], M: &mut [T]) {
         self.place(q);

@@ -1,8 +1,9 @@
-//! Inverse dynamics of free coordinates alone, where the motion of the others is given:
-//! Newton-Euler over the accelerations of points, O(n).
+//! Inverse dynamics for the free coordinates only, with the motion of all coordinates given:
+//! Newton-Euler recursion over point accelerations, O(n).
 //!
 //! ```text
-//! Outward pass for body B with parent P, in B axes; a is the acceleration of Bo less gravity, p the place of Bo in P, P axes:
+//! Outward pass for body B with parent P, in B axes;
+//!   a is the acceleration of Bo minus gravity, p the position of Bo in P, P axes:
 //!   ω_B = R_BP ω_P + w                                        (1)
 //!   α_B = R_BP α_P + ẇ + (R_BP ω_P) × w                       (2)   w: angular velocity of the joint, B axes
 //!   a_B = R_BP (a_P + W_P p + 2 ω_P × ṗ + p̈)                  (3)   W = [α]x + [ω]x²
@@ -11,13 +12,13 @@
 //! Inward pass:
 //!   τ_B = S_Bᵀ [f_B; n_B],   f_P += R_PB f_B,   n_P += R_PB n_B + p × R_PB f_B      (6)
 //! ```
-//! No velocity of a point occurs, so there are a third fewer operations than in
-//! [`crate::inverse_dynamics`] over spatial vectors. Bodies whose wrench moves no free coordinate
-//! (all before the first spring of an arm) take part in (1) to (3) alone, those that carry no other
-//! one not even in that.
+//! Point velocities are not needed, so the recursion takes a third fewer operations than
+//! [`crate::inverse_dynamics`] with spatial vectors. Bodies whose wrench moves no free coordinate
+//! (all before the first spring of an arm) take part only in (1) to (3), and those without a
+//! loading body outward of them not even in these.
 //!
-//! Start at [`FreeForces`]; [`Observer`] is it for all coordinates, with poses and energies. Trees
-//! with closed loops, balancers or bodies that bend in modes are not for it.
+//! Start at [`FreeForces`]; [`Observer`] does the same for all coordinates, with poses and
+//! energies. Trees with closed loops, balancers or modal bodies are not supported.
 //!
 //! Source: [Luh, Walker & Paul 1980].
 
@@ -47,31 +48,31 @@ pub struct Motions<'a, T> {
     pub qddot: &'a [T],
 }
 
-/// A tree with the workspaces of the recursion.
+/// Tree with the workspace of the recursion.
 #[derive(Clone, Debug)]
 pub struct FreeForces<T: Real = f64> {
-    /// All but the world, parents before children.
+    /// All bodies except the world, parents before children.
     nodes: Vec<Node<T>>,
-    /// Minus gravity.
+    /// Negative gravitational acceleration.
     up: Vector3<T>,
-    /// Angles of the joints that turn (rad), their sines and cosines.
+    /// Angles of the rotating joints (rad), with sines and cosines.
     angles: Vec<T>,
     sines: Vec<T>,
     cosines: Vec<T>,
-    /// Free row, coordinate and inertia of what rotors add.
+    /// Rotor terms: row among the free coordinates, coordinate and inertia.
     rotors: Vec<(usize, usize, f64)>,
-    /// The workspace of the mass matrix, once it is asked for.
+    /// Workspace of the mass matrix, created on first use.
     composites: Option<Box<Composites<T>>>,
 }
 
-/// What (1) to (6) need of a body.
+/// Part of (1) to (6) that is evaluated for a body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Part {
-    /// Its pose.
+    /// Pose only.
     Placed,
-    /// Its motion: something outward of it has a wrench that counts.
+    /// Pose and motion: a body outward of it is loading.
     Moving,
-    /// Its wrench: it moves a free coordinate.
+    /// Pose, motion and wrench: it moves a free coordinate.
     Loading,
 }
 
@@ -92,8 +93,8 @@ fn parts(model: &Model, roles: &Roles) -> Vec<Part> {
 }
 
 impl<T: Real> FreeForces<T> {
-    /// For the free coordinates of the roles; `None` of trees with closed loops, balancers or
-    /// bodies that bend in modes.
+    /// Creates the recursion for the free coordinates of `roles`; `None` for trees with closed
+    /// loops, balancers or modal bodies.
     #[inline(always)]
     pub fn new(tree: &impl Tree<T>, roles: &Roles) -> Option<Self> {
         let model = tree.model();
@@ -113,14 +114,14 @@ impl<T: Real> FreeForces<T> {
         let single = model.rotors.iter().map(|&(k, inertia)| (k, k, inertia));
         let coupled = model.rotor_couplings.iter().flat_map(|&(a, b, inertia)| [(a, b, inertia), (b, a, inertia)]);
         let rotors = single.chain(coupled).filter_map(|(to, of, inertia)| Some((row(to)?, of, inertia))).collect();
-        // Whole registers of them.
+        // Padded to whole SIMD registers.
         let together = if T::LANES > 1 { 1 } else { 4 };
         let zeros = vec![T::splat(0.0); model.turning.len().next_multiple_of(together)];
         let up = lift(&-model.gravity);
         Some(Self { nodes, up, angles: zeros.clone(), sines: zeros.clone(), cosines: zeros, rotors, composites: None })
     }
 
-    /// Takes the inertias of a tree that is otherwise the one of before.
+    /// Replaces the inertias by those of a tree that is otherwise identical.
     #[inline(always)]
     pub fn weigh(&mut self, tree: &impl Tree<T>) {
         for (i, node) in self.nodes.iter_mut().enumerate() {
@@ -128,7 +129,7 @@ impl<T: Real> FreeForces<T> {
         }
     }
 
-    /// Sines and cosines of the joints that turn.
+    /// Computes sines and cosines of the rotating joints.
     #[inline(always)]
     fn turn_joints(&mut self, q: &[T]) {
         for node in &self.nodes {
@@ -139,22 +140,22 @@ impl<T: Real> FreeForces<T> {
         sin_cos_all(&self.angles, &mut self.sines, &mut self.cosines);
     }
 
-    /// Poses of the bodies in their parents.
+    /// Computes the poses of the bodies in their parents.
     #[inline(always)]
     fn place(&mut self, q: &[T]) {
         self.turn_joints(q);
-        // Nothing is computed of rates that nobody looks at.
+        // The rates are not used, so the values passed do not matter.
         let motions = Motions { q, qdot: q, qddot: q };
         for node in &mut self.nodes {
             node.place(motions, &self.sines, &self.cosines);
         }
     }
 
-    /// Generalised forces `τ = M(q) q̈ + bias(q, q̇)` (N m or N) of the free coordinates, in their
-    /// order, into `tau`: those of [`crate::inverse_dynamics`], to rounding. O(n), no allocation.
+    /// Computes generalised forces `τ = M(q) q̈ + bias(q, q̇)` (N m or N) of the free coordinates,
+    /// in their order, into `tau`. Equals [`crate::inverse_dynamics`] to rounding. O(n), no
+    /// allocation.
     ///
-    /// * `loads`: external wrench on each body at Bo, B axes, if there are any; they are
-    ///   subtracted.
+    /// * `loads`: external wrench on each body at Bo, B axes, if any; they are subtracted.
     ///
     /// # Source
     /// [Luh, Walker & Paul 1980].
@@ -170,7 +171,7 @@ impl<T: Real> FreeForces<T> {
             if node.part == Part::Placed {
                 continue;
             }
-            // Mostly the parent is the body just done, whose motion is still in registers.
+            // The parent is usually the previous body, whose motion is still in registers.
             last = match node.parent {
                 None => node.follow(&world, &rates),
                 Some(parent) if parent + 1 == i => node.follow(&last, &rates),
@@ -189,11 +190,11 @@ impl<T: Real> FreeForces<T> {
         }
     }
 
-    /// (6).
+    /// Inward pass (6).
     #[inline(always)]
     fn carry_inward(&mut self, tau: &mut [T]) {
         tau.fill(T::splat(0.0));
-        // What the body just done puts on the one before it, if that is its parent.
+        // Wrench of the current body on the previous one, if that is its parent.
         let none = [Vector3::zeros(); 2];
         let mut carried = none;
         for i in (0..self.nodes.len()).rev() {
@@ -223,7 +224,7 @@ impl<T: Real> FreeForces<T> {
         }
     }
 
-    /// Rotation of a body in its parent and place of its origin, as the last forces found them.
+    /// Rotation of a body in its parent and position of its origin, from the last call.
     #[inline(always)]
     pub(crate) fn pose(&self, body: usize) -> (&Matrix3<T>, &Vector3<T>) {
         let node = &self.nodes[body - 1];

@@ -1,5 +1,5 @@
-//! A body and its joint, as the recursion of [`super::FreeForces`] sees them; letters and equations
-//! are those of the module above.
+//! Body and joint in the recursion of [`super::FreeForces`]; symbols and equations are those of the
+//! parent module.
 
 use flexarm_spatial::products::{add, cross, dot, dyad, lift, lift3, mul, mul3, scaled, sub, tr_mul};
 use flexarm_spatial::{ElasticAngles, Real, SpatialInertia, Wrench};
@@ -9,16 +9,16 @@ use super::{Motions, Part};
 use crate::axis_motion::{AxisMotion, RevoluteTable};
 use crate::model::{Body, JointMotion};
 
-/// Place of a body among the nodes; the world has none.
+/// Index of a body among the nodes; `None` for the world.
 type Number = Option<usize>;
 
-/// A body and its joint.
+/// Body with its joint.
 #[derive(Clone, Debug)]
 pub(super) struct Node<T: Real> {
     pub(super) parent: Number,
     pub(super) part: Part,
     pub(super) joint: NodeJoint,
-    /// First coordinate, and its row among the free ones.
+    /// First coordinate, and its row among the free coordinates.
     pub(super) coordinate: usize,
     pub(super) row: Option<usize>,
     pub(super) ratio: f64,
@@ -34,15 +34,15 @@ pub(super) struct Node<T: Real> {
     pub(super) B: Matrix3<T>,
     /// `R_PJ` of an elastic joint.
     pub(super) R_PJ: Matrix3<T>,
-    /// Its motion, where that is kept: where a body other than the next one hangs on it, or it is
-    /// looked at.
+    /// Motion of the body, if `keeps_motion`: a body other than the next one is its child, or the
+    /// motion is observed.
     pub(super) moving: Moving<T>,
     pub(super) keeps_motion: bool,
     pub(super) force: Vector3<T>,
     pub(super) torque: Vector3<T>,
 }
 
-/// (1) to (3) of a body.
+/// Motion of a body, (1) to (3).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Moving<T: Real> {
     pub(super) omega: Vector3<T>,
@@ -51,19 +51,19 @@ pub(super) struct Moving<T: Real> {
     pub(super) W: Matrix3<T>,
 }
 
-/// What the recursion does with a joint.
+/// Joint type in the recursion.
 #[derive(Clone, Debug)]
 pub(super) enum NodeJoint {
-    /// Turns about an axis, the number among those that turn, and moves so far along it per rad (P
-    /// axes).
+    /// Rotation about an axis, with its index among the rotating joints and the translation per rad
+    /// (P axes) of a helical joint.
     Turns { axis: Vector3<f64>, table: Box<RevoluteTable>, turning: usize, along: Option<Vector3<f64>> },
-    /// Slides along this (P axes).
+    /// Translation along this vector (P axes).
     Slides { along: Vector3<f64> },
-    /// Translation, then angles; whether the joint frame has the axes of the parent.
+    /// Translation, then angles; whether the joint frame has the same axes as the parent.
     Elastic { angles: ElasticAngles, is_parallel: bool },
 }
 
-/// What of the joint the outward pass needs.
+/// Joint rates used by the outward pass.
 pub(super) struct JointRates<T: Real> {
     /// w and ẇ, B axes.
     pub(super) turn: Option<[Vector3<T>; 2]>,
@@ -121,13 +121,13 @@ impl<T: Real> Node<T> {
         self.I = inertia.rotational;
     }
 
-    /// Value of a joint of one coordinate.
+    /// Value of a single-DoF joint.
     #[inline(always)]
     pub(super) fn value(&self, q: &[T]) -> T {
         T::splat(self.ratio) * q[self.coordinate] + T::splat(self.offset)
     }
 
-    /// Pose in the parent, and the rates of the joint.
+    /// Computes the pose in the parent, and returns the joint rates.
     #[inline(always)]
     pub(super) fn place(&mut self, motions: Motions<'_, T>, sines: &[T], cosines: &[T]) -> JointRates<T> {
         let Motions { q, qdot, qddot } = motions;
@@ -174,14 +174,14 @@ impl<T: Real> Node<T> {
         }
     }
 
-    /// (1) alone.
+    /// Angular velocity, (1) only.
     #[inline(always)]
     pub(super) fn turns_with(&self, parent: &Vector3<T>, rates: &JointRates<T>) -> Vector3<T> {
         let omega = tr_mul(&self.R, parent);
         rates.turn.as_ref().map_or(omega, |[w, _]| add(&omega, w))
     }
 
-    /// ṗ, P axes, of a joint that shifts its body.
+    /// ṗ in P axes; `None` for joints without translation.
     #[inline(always)]
     pub(super) fn shift_rate(&self, qdot: &[T]) -> Option<Vector3<T>> {
         let k = self.coordinate;
@@ -216,7 +216,7 @@ impl<T: Real> Node<T> {
         Moving { omega, alpha, a: tr_mul(R, &a), W } // (3)
     }
 
-    /// (4) and (5).
+    /// Inertia force and torque, (4) and (5).
     #[inline(always)]
     pub(super) fn load(&mut self, moving: &Moving<T>, external: Option<&Wrench<T>>) {
         let Moving { omega, alpha, a, W } = moving;
@@ -230,14 +230,13 @@ impl<T: Real> Node<T> {
         }
     }
 
-    /// Number of its coordinates.
+    /// Number of coordinates of the joint.
     #[inline(always)]
     pub(super) fn size(&self) -> usize {
         if matches!(self.joint, NodeJoint::Elastic { .. }) { 6 } else { 1 }
     }
 
-    /// `Sᵀ F`, as many numbers as the joint has coordinates; the force in P axes, the torque in B
-    /// axes.
+    /// `Sᵀ F`, one value per joint coordinate; force in P axes, torque in B axes.
     #[inline(always)]
     pub(super) fn project(&self, force: &Vector3<T>, torque: &Vector3<T>) -> [T; 6] {
         let ratio = T::splat(self.ratio);
@@ -261,7 +260,7 @@ impl<T: Real> Node<T> {
     }
 }
 
-/// Two vectors of six numbers.
+/// Splits six values into two vectors.
 #[inline(always)]
 fn pair<T: Real>(x: &[T]) -> [Vector3<T>; 2] {
     [Vector3::new(x[0], x[1], x[2]), Vector3::new(x[3], x[4], x[5])]

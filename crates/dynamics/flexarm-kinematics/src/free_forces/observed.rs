@@ -1,5 +1,5 @@
-//! All that a run is shown of a tree at an instant, in one pass outward behind the recursion of the
-//! module above.
+//! Poses, velocities, forces and energies of a tree at one instant, in a single outward pass after
+//! the recursion of the parent module.
 //!
 //! ```text
 //!   v_B  = R_BP (v_P + ω_P × p + ṗ)                              (7)   v: velocity of Bo, B axes
@@ -15,7 +15,7 @@ use crate::aba::Roles;
 use crate::data::{pose, rotor_energy};
 use crate::model::Model;
 
-/// A body as (7) and (9) find it.
+/// World pose and velocity of a body, from (7) and (9).
 #[derive(Clone, Copy, Debug)]
 struct Placed {
     /// `R_WB`.
@@ -28,42 +28,42 @@ struct Placed {
     v: Vector3<f64>,
 }
 
-/// How a body moves, B axes.
+/// Motion of a body, B axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BodyMotion {
     /// Velocity of Bo (m/s).
     pub v: Vector3<f64>,
     /// Angular velocity (rad/s).
     pub omega: Vector3<f64>,
-    /// Acceleration of the point Bo less gravity (m/s²).
+    /// Acceleration of the point Bo minus gravity (m/s²).
     pub a: Vector3<f64>,
     /// Angular acceleration (rad/s²).
     pub alpha: Vector3<f64>,
 }
 
 impl BodyMotion {
-    /// Velocity of a point r of the body (m/s).
+    /// Velocity of the point at r from Bo (m/s).
     pub fn velocity(&self, r: &Vector3<f64>) -> Vector3<f64> {
         self.v + self.omega.cross(r)
     }
 
-    /// Acceleration of a point r of the body less gravity (m/s²).
+    /// Acceleration of the point at r from Bo, minus gravity (m/s²).
     pub fn acceleration(&self, r: &Vector3<f64>) -> Vector3<f64> {
         self.a + self.alpha.cross(r) + self.omega.cross(&self.omega.cross(r))
     }
 }
 
-/// Inverse dynamics, poses and energies of a tree in one go.
+/// Inverse dynamics, poses and energies of a tree in one call.
 #[derive(Clone, Debug)]
 pub struct Observer {
-    /// Over all coordinates.
+    /// Recursion with all coordinates free.
     tree: FreeForces,
-    /// All bodies but the world.
+    /// All bodies except the world.
     placed: Vec<Placed>,
 }
 
 impl Observer {
-    /// `None` of trees with closed loops, balancers or bodies that bend in modes.
+    /// Creates the observer; `None` for trees with closed loops, balancers or modal bodies.
     pub fn new(model: &Model) -> Option<Self> {
         let mut tree = FreeForces::new(model, &Roles::all_free(model))?;
         tree.nodes.iter_mut().for_each(|node| node.keeps_motion = true);
@@ -72,14 +72,13 @@ impl Observer {
         Some(Self { placed: vec![placed; model.bodies.len() - 1], tree })
     }
 
-    /// Poses of all bodies in the world into `X_WB`, generalised forces of all coordinates (N m or
-    /// N) into `tau`; kinetic energy, rotors included, and potential energy of gravity, zero at the
-    /// world origin (J). They are those of [`crate::inverse_dynamics`], [`crate::world_poses`],
-    /// [`crate::kinetic_energy_of`] and [`crate::potential_energy_of`], to rounding. O(n), no
-    /// allocation.
+    /// Computes the world poses of all bodies into `X_WB` and the generalised forces of all
+    /// coordinates (N m or N) into `tau`. Returns kinetic energy, including rotors, and
+    /// gravitational potential energy, zero at the world origin (J). The results equal those of
+    /// [`crate::inverse_dynamics`], [`crate::world_poses`], [`crate::kinetic_energy_of`] and
+    /// [`crate::potential_energy_of`] to rounding. O(n), no allocation.
     ///
-    /// * `loads`: external wrench on each body at Bo, B axes, if there are any; they are
-    ///   subtracted.
+    /// * `loads`: external wrench on each body at Bo, B axes, if any; they are subtracted.
     pub fn observe(
         &mut self,
         model: &Model,
@@ -100,7 +99,8 @@ impl Observer {
         [kinetic + rotor_energy(model, motions.qdot), -model.gravity.dot(&moment)]
     }
 
-    /// Poses as [`Observer::observe`] finds them, and velocities; neither forces nor accelerations.
+    /// Computes poses as [`Observer::observe`] does, and velocities, but no forces or
+    /// accelerations.
     pub fn place(&mut self, motions: Motions<'_, f64>, X_WB: &mut [Pose]) {
         X_WB[0] = Pose::identity();
         self.tree.turn_joints(motions.q);
@@ -113,21 +113,21 @@ impl Observer {
         }
     }
 
-    /// How a body moved in the last observation; after [`Observer::place`] its velocities are new.
+    /// Motion of a body in the last observation; [`Observer::place`] updates the velocities only.
     ///
     /// # Panics
-    /// If the body is not one of the tree, or is the world.
+    /// If `body` is the world or not a body of the tree.
     pub fn motion(&self, body: usize) -> BodyMotion {
         let (Placed { v, omega, .. }, moving) = (self.placed[body - 1], &self.tree.nodes[body - 1].moving);
         BodyMotion { v, omega, a: moving.a, alpha: moving.alpha }
     }
 
-    /// Takes the inertias of a model that is otherwise the one of before.
+    /// Replaces the inertias by those of a model that is otherwise identical.
     pub fn weigh(&mut self, model: &Model) {
         self.tree.weigh(model);
     }
 
-    /// (7) and the poses of (9), for a body that turns with `omega`, B axes.
+    /// (7) and the poses of (9), for a body with angular velocity `omega`, B axes.
     fn follow(&mut self, i: usize, omega: Vector3<f64>, qdot: &[f64], X_WB: &mut [Pose]) -> Placed {
         let node = &self.tree.nodes[i];
         let mut v = node.shift_rate(qdot).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Arms by their numbers: shipped ones, well-known ones, and random members of each class.
+//! Arms for tests and benchmarks: shipped ones, well-known ones, and random members of each class.
 #![allow(dead_code, reason = "tests and bench each use a part")]
 
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -7,10 +7,10 @@ use flexarm_kinematics::*;
 use flexarm_testkit::Draw;
 use nalgebra::{Rotation3, Translation3, Unit, Vector3};
 
-/// A joint as URDF files have it: origin (m), roll, pitch, yaw (rad), axis.
+/// Joint as in URDF files: origin (m), roll, pitch, yaw (rad), axis.
 type Row = ([f64; 3], [f64; 3], [f64; 3]);
 
-/// An arm and its name.
+/// Arm with its name and expected class.
 pub(crate) struct Named {
     pub(crate) name: String,
     pub(crate) model: Model,
@@ -23,7 +23,7 @@ impl Named {
     }
 }
 
-/// A chain of joints with axes in their frames, and the tool behind the last.
+/// Chain of joints with axes in their frames, and a tool frame after the last one.
 pub(crate) fn chain(name: &str, joints: &[(Pose, JointKind)], tool: Pose) -> Mechanism {
     let mut arm = Mechanism::new(name);
     arm.links.push(Link { name: "base".into(), inertia: None });
@@ -52,7 +52,7 @@ pub(crate) fn from_rows(name: &str, rows: &[Row], tool: ([f64; 3], [f64; 3])) ->
     chain(name, &rows.iter().map(joint).collect::<Vec<_>>(), pose(tool.0, tool.1))
 }
 
-/// Denavit and Hartenberg's rows (d, a, alpha): `Rz(q) Tz(d) Tx(a) Rx(alpha)`.
+/// Builds an arm from Denavit-Hartenberg rows (d, a, alpha): `Rz(q) Tz(d) Tx(a) Rx(alpha)`.
 pub(crate) fn from_dh(name: &str, rows: &[[f64; 3]; 6]) -> Mechanism {
     let link = |[d, a, alpha]: &[f64; 3]| pose([*a, 0.0, *d], [*alpha, 0.0, 0.0]);
     let mut before = Pose::identity();
@@ -94,7 +94,7 @@ pub(crate) fn irb120() -> Mechanism {
     from_rows("ABB IRB 120", &rows, (NONE, [0.0, Q, 0.0]))
 }
 
-/// IRB 4600-40/2.55.
+/// ABB IRB 4600-40/2.55.
 pub(crate) fn irb4600() -> Mechanism {
     let rows: [Row; 6] = [
         ([0.0, 0.0, 0.495], NONE, Z),
@@ -125,8 +125,7 @@ pub(crate) fn puma() -> Mechanism {
     from_dh("Puma 560", &rows)
 }
 
-/// The shipped arms of six joints and well-known ones, by the numbers of their files and data
-/// sheets.
+/// Shipped six-joint arms and well-known ones, with the numbers of their files and data sheets.
 pub(crate) fn known_arms() -> Vec<Named> {
     let industrial = ArmClass::SphericalWrist(PositionForm::Parallel23);
     let ur = ArmClass::ThreeParallel { first: 2, meeting: true };
@@ -211,8 +210,8 @@ pub(crate) fn known_arms() -> Vec<Named> {
     ]
 }
 
-/// Axes of the world at zero joint values, as (direction, point), become an arm whose frames lie
-/// anyhow.
+/// Builds an arm with arbitrary frames from world axes at zero joint values, given as (direction,
+/// point).
 pub(crate) fn from_axes(name: &str, axes: &[(Vector3<f64>, Vector3<f64>); 6], draw: &mut Draw) -> Mechanism {
     let mut before = Pose::identity();
     let mut joints = Vec::new();
@@ -227,7 +226,7 @@ pub(crate) fn from_axes(name: &str, axes: &[(Vector3<f64>, Vector3<f64>); 6], dr
     chain(name, &joints, draw.pose(0.3))
 }
 
-/// A random member of each class.
+/// One random member of each class.
 pub(crate) fn random_arms(seed: u64) -> Vec<Named> {
     let mut draw = Draw(seed);
     let wrist = |form| ArmClass::SphericalWrist(form);
@@ -262,7 +261,7 @@ pub(crate) fn random_arms(seed: u64) -> Vec<Named> {
 type Axes = [(Vector3<f64>, Vector3<f64>); 6];
 
 fn random_axes(class: ArmClass, draw: &mut Draw) -> Axes {
-    // Directions well apart from each other, so that no arm is nearly of another class.
+    // Directions well apart from each other, so that no arm is close to another class.
     let mut axes: Axes = std::array::from_fn(|_| (Vector3::zeros(), draw.vector(0.8)));
     for k in 0..6 {
         loop {
