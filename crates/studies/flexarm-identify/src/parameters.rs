@@ -3,12 +3,12 @@
 //!
 //! | name | meaning |
 //! | --- | --- |
-//! | `drive.JOINT.gearbox.stiffness` | a gearbox with one stiffness (N m/rad; N/m of a sliding joint) |
+//! | `drive.JOINT.gearbox.stiffness` | single stiffness of a gearbox (N m/rad; N/m if it slides) |
 //! | `drive.JOINT.gearbox.stiffness[k]` | one of three or six stiffnesses, from 0 |
 //! | `link.LINK.stiffness_factor` | factor on the whole stiffness of a flexible link |
-//! | `link.LINK.stiffness_factors[k]` | factor on one of the six directions of a lumped link's springs, from 0 |
+//! | `link.LINK.stiffness_factors[k]` | factor on one of six directions of a lumped link, from 0 |
 //! | `link.LINK.stiffness[i][j]` | entry of a two-part link's symmetric 6x6 (N/m, N, N m/rad) |
-//! | `tcp.x`, `.y`, `.z`, `.rx`, `.ry`, `.rz` | translation and rotation of the tool about its own axes (m, rad) |
+//! | `tcp.x`, `.y`, `.z`, `.rx`, `.ry`, `.rz` | shift and rotation of the tool, own axes (m, rad) |
 //! | `mounting.stiffness[k]` | one of six springs under the base, from 0 |
 //! | `drive.JOINT.gearbox.damping` | damping of a gearbox, if the file has it (N m s/rad, N s/m) |
 //! | `drive.JOINT.gearbox.damping[k]` | one of three or six dampers, from 0 |
