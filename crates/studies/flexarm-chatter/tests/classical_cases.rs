@@ -165,8 +165,8 @@ fn a_search_up_to_a_depth_finds_the_same_limit_with_less_work() {
 }
 
 /// A mode with a damping ratio of 30000 has poles from 2e-5 to 6e4 times its frequency, that is, 23
-/// million points over the whole band. If the tooth frequency is so low that the resonance alone
-/// needs too many points, the search returns an error.
+/// million points over the whole band. If the tooth frequency is so low that the
+/// resonance by itself needs too many points, the search returns an error.
 #[test]
 fn the_work_of_a_limit_does_not_grow_with_the_damping() {
     let cutter = Cutter::straight(3, Coefficients { tangential: 8e8, radial: 2.5e8, axial: 0.0 }, Engagement::slot());

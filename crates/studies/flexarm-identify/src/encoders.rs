@@ -37,8 +37,8 @@ pub struct EncoderFigures {
     pub deflection_rms: f64,
     /// RMS of the unexplained deflection (rad, m).
     pub rest_rms: f64,
-    /// RMS of the noise of both encoders below `below`, extrapolated from the noise at higher
-    /// frequencies (rad, m).
+    /// RMS of the noise of both encoders below the cut-off frequency, extrapolated from the noise
+    /// at higher frequencies (rad, m).
     pub noise_rms: f64,
     /// Sampling interval of each run, or of each half of a single run (s).
     #[serde(skip)]

@@ -65,6 +65,8 @@ impl Column {
 }
 
 impl Design {
+    /// Builds the design from the columns of a study.
+    ///
     /// # Errors
     /// With the place in the study: linked parameters with different numbers of values, too many
     /// runs or random parameters, duplicate names.

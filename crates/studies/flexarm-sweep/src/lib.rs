@@ -211,7 +211,8 @@ impl Sweep {
     /// A failed run is a row with the reason of the failure.
     ///
     /// # Errors
-    /// [`SweepError`]: a folder of another study, another process at the same shard, [`SweepError::Stopped`] if `progress` breaks; [`Error::Write`]. Finished runs are kept in all cases.
+    /// [`SweepError`] for a folder of another study or another process at the same shard,
+    /// [`SweepError::Stopped`] if `progress` breaks; [`Error::Write`]. Finished runs are kept.
     pub fn run(&mut self, request: &SweepRequest, progress: &mut SweepProgress<'_>) -> Result<SweepSummary, Error> {
         let (started, cpu) = (Instant::now(), cpu_time::ProcessTime::now());
         let SweepRequest { output, shard, .. } = request;
@@ -378,7 +379,7 @@ impl Sweep {
 /// * `output`: folder of the table.
 ///
 /// # Errors
-/// [`SweepError`]: missing runs, repeated runs with different results, folders of other studies.
+/// [`SweepError`] for missing runs, repeated runs with different results, folders of other studies.
 pub fn merge(
     study: &Sweep,
     folders: &[PathBuf],

@@ -143,6 +143,8 @@ impl Metric {
 }
 
 impl Formula {
+    /// Parses an expression.
+    ///
     /// # Errors
     /// A sentence that names an unknown variable or a syntax error.
     pub(super) fn parse(text: &str, known: &Vocabulary<'_>) -> Result<Self, String> {
@@ -362,6 +364,8 @@ pub(super) struct Constraint {
 }
 
 impl Constraint {
+    /// Parses a constraint.
+    ///
     /// # Errors
     /// As [`Metric::parse`].
     pub(super) fn parse(text: &str, known: &Vocabulary<'_>) -> Result<Self, String> {

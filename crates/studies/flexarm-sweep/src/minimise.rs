@@ -165,7 +165,8 @@ impl Sweep {
     /// study give metric and constraints. The runs are written like those of a study.
     ///
     /// # Errors
-    /// [`SweepError::Minimise`]: no metric to minimise, parameters without bounds; otherwise as [`Sweep::run`].
+    /// [`SweepError::Minimise`] without a metric to minimise or without parameters to vary; an error
+    /// with the place in the study for parameters without bounds; otherwise as [`Sweep::run`].
     pub fn minimise(
         &mut self,
         request: &SweepRequest,

@@ -6,6 +6,8 @@ use flexarm_log::{CreateOptions, DataTable};
 
 use flexarm_run::Error;
 
+/// Writes a table.
+///
 /// # Errors
 /// Errors of the operating system; [`flexarm_run::RecordingError::WithoutFormat`] in a build
 /// without Parquet.
@@ -14,6 +16,8 @@ pub(super) fn write(path: &Path, table: &DataTable, options: CreateOptions) -> R
     Ok(table.write(path, options)?)
 }
 
+/// Reads a table.
+///
 /// # Errors
 /// Errors of the operating system; an error if the file is not a table.
 #[cfg(feature = "parquet")]

@@ -34,7 +34,7 @@ pub struct Coefficients {
 /// Range of angles in which a tooth cuts (rad).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Engagement {
-    /// Entry angle, from 0 to 2π.
+    /// Entry angle, from -2π to 2π.
     pub entry: f64,
     /// Exit angle, above `entry` by at most 2π.
     pub exit: f64,
@@ -70,7 +70,7 @@ pub struct Cutter {
     pub teeth: usize,
     /// Diameter (m); it matters only with a helix.
     pub diameter: f64,
-    /// Helix angle (rad), from 0 to below π/2.
+    /// Helix angle (rad), from 0 to below 1.5.
     pub helix: f64,
     /// Lead angle κ of the edge to the feed plane (rad), above 0 to π/2.
     pub lead: f64,
@@ -93,6 +93,8 @@ impl Cutter {
         Self { teeth, diameter: 1.0, helix: 0.0, lead: FRAC_PI_2, coefficients, engagement }
     }
 
+    /// Checks the parameters.
+    ///
     /// # Errors
     /// [`ChatterError::Value`] for invalid parameters.
     pub fn check(&self) -> Result<(), ChatterError> {

@@ -1,4 +1,4 @@
-//! Largest eigenvalue in magnitude of the map over a period.
+//! Leading eigenvalue (of maximum magnitude) of the map over a period.
 //!
 //! Small maps are converted to matrices. Large ones are treated with the Arnoldi method: most of
 //! their eigenvalues are almost zero, because the motion one period ago acts only through a few
@@ -15,7 +15,7 @@ const EXACT: f64 = 1e-10;
 /// Initial number of directions beyond the number of states.
 const MORE: usize = 30;
 
-/// Returns the largest eigenvalue in magnitude; infinite for a map that overflows.
+/// Returns the leading eigenvalue; infinite for a map that overflows.
 pub(crate) fn leading(map: &PeriodMap) -> Complex<f64> {
     if map.size() <= SMALL {
         return largest(&map.matrix());

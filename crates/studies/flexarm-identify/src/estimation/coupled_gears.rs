@@ -2,7 +2,7 @@
 //! links they drive.
 //!
 //! ```text
-//! C q_m - q_link = C diag(c) Cᵀ τ:     row i:  Σ_k c_k C_ik (Cᵀ τ)_k + d_i q̇_i + offset of the run
+//! C q_m - q_link = C diag(c) Cᵀ τ:    row i:  Σ_k c_k C_ik (Cᵀ τ)_k + d_i q̇_i + offset of the run
 //! ```
 //! with the compliance `c_k` of each motor's gear and a delay `d_i` of each link's encoder. Damping
 //! proportional to the deflection rate of each link is fitted to the residual. The deflection of

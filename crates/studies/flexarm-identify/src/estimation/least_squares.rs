@@ -2,7 +2,8 @@
 //! their prior.
 //!
 //! ```text
-//! minimise Σ ρ(r_i(x, b))        x parameters with priors N(0, σ_p²), b unknowns of the measurement without priors
+//! minimise Σ ρ(r_i(x, b))
+//! x: parameters with priors N(0, σ_p²); b: unknowns of the measurement without priors
 //! ```
 //! The Levenberg-Marquardt method first solves the problem with the prior as additional rows. Then
 //! the singular values of the Jacobian (columns scaled by σ_p, nuisance unknowns projected out)

@@ -10,7 +10,7 @@
 //! derivative contains theirs,
 //!
 //! ```text
-//! dφ_j = Σ_i a_ij φ_i,     a_ij = φ_iᵀ(dK - ω_j² dM)φ_j / (ω_j² - ω_i²),     a_jj = -φ_jᵀ dM φ_j / 2
+//! dφ_j = Σ_i a_ij φ_i,   a_ij = φ_iᵀ(dK - ω_j² dM)φ_j / (ω_j² - ω_i²),   a_jj = -φ_jᵀ dM φ_j / 2
 //! ```
 //! Start at [`structure_slopes`].
 

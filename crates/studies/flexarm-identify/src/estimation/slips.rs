@@ -4,7 +4,7 @@
 //! Displacements are nearly linear in the compliances of the springs,
 //!
 //! ```text
-//! d ≈ -Σ a_k ∂d/∂(ln k_k),     a_k ≥ 0: compliance over that of the arm as it is
+//! d ≈ -Σ a_k ∂d/∂(ln k_k),     a_k ≥ 0: compliance over its initial value
 //! ```
 //! Each order of joints and each rotation of the axes therefore leaves a residual that no
 //! compliances explain, whatever the initial stiffnesses are. A mistake is reported if the residual

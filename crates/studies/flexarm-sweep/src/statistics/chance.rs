@@ -5,8 +5,8 @@
 //! strongest of all parameters without effect would reach in 1 of 100 studies.
 //!
 //! ```text
-//! R^2 = |Q^T r|^2 / |r|^2             share of the residuals r explained by q orthonormal columns Q   (1)
-//! R^2 ~ Beta(q/2, (d - q)/2)          for random r with d degrees of freedom                         (2)
+//! R^2 = |Q^T r|^2 / |r|^2        share of the residuals r that q orthonormal columns Q explain (1)
+//! R^2 ~ Beta(q/2, (d - q)/2)     for random r with d degrees of freedom                        (2)
 //! ```
 //! The columns of a parameter are polynomials of its ranks. Parameters are selected one after the
 //! other, strongest first (forward selection), so that the variance explained by strong parameters
@@ -221,7 +221,7 @@ mod tests {
         assert_eq!(beyond_chance(&x, &x[0].clone()), nothing);
         assert_eq!(beyond_chance(&drawn(SampleMethod::Random, 2, 30, 0), &[3.0; 30]), nothing);
         assert_eq!(beyond_chance(&[], &[]), nothing);
-        // Of two equal parameters one is selected.
+        // Only one of two equal parameters is selected.
         let x = drawn(SampleMethod::Random, 1, 50, 0).remove(0);
         assert_eq!(beyond_chance(&[x.clone(), x.clone()], &x).parameters.len(), 1);
         assert!(beyond_chance(&[vec![1.0; 50]], &x).parameters.is_empty());
