@@ -82,7 +82,8 @@ pub struct CutRun {
     pub spindle_rpm: f64,
     /// Depth of cut (m).
     pub depth_m: f64,
-    /// Limit of depth at this speed (m); null if there is none up to the maximum depth of the tool.
+    /// Limit of depth at this speed (m); null if there is none up to the maximum depth of the tool
+    /// or the depth of this cut.
     pub limit_m: Option<f64>,
     /// Chatter frequency at the limit (Hz).
     pub limit_hz: Option<f64>,

@@ -47,8 +47,7 @@ pub struct EncoderFigures {
     /// (rad, m).
     #[serde(skip)]
     pub curves: Vec<[Vec<f64>; 2]>,
-    /// Whether the recordings determine the stiffness: most of the deflection of unseen runs is
-    /// predicted, and the result does not depend on a single run.
+    /// Whether the recordings determine the stiffness ([`GearEstimate::is_told`]).
     pub told: bool,
     /// Name of the parameter.
     #[serde(skip)]

@@ -42,6 +42,7 @@ impl Structure {
         }
         let (omega, Phi) = undamped(M, K)?;
         let (D_eta, K_eta, J_eta) = (Phi.tr_mul(&(D * &Phi)), Phi.tr_mul(&(K * &Phi)), J * &Phi);
+        // z' = A z + (0, Φᵀ Jᵀ F).
         let A = DMatrix::from_fn(2 * n, 2 * n, |i, j| match (i < n, j < n) {
             (true, true) => 0.0,
             (true, false) => {
@@ -58,6 +59,7 @@ impl Structure {
         let left =
             right.clone().try_inverse().ok_or(ChatterError::NotModal { found: f64::INFINITY, allowed: ALLOWED })?;
 
+        // One pole per conjugate pair: output from the right, input from the left eigenvector.
         let scale = values.iter().map(|x| x.norm()).fold(0.0, f64::max);
         let mut poles = Vec::new();
         for (k, value) in values.iter().enumerate() {

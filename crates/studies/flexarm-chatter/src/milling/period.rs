@@ -116,6 +116,7 @@ impl<'a> Period<'a> {
             let Moments { decay, integrals } = RULE.moments(pole.value * h);
             let (reading, pair) = (pole.reading(), pole.n_states() == 2);
             for i in 0..NODES {
+                // A complex state is two real states, its real and imaginary part.
                 let shown = reading * decay[i];
                 answers.to_nodes[i].set_column(row, &shown.map(|x| x.re));
                 if pair {

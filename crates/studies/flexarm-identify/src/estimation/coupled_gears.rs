@@ -50,6 +50,7 @@ pub fn coupled_gear_stiffness(runs: &[Vec<CoupledOutput>]) -> Option<Vec<GearEst
     }
     let all: Vec<usize> = (0..runs.len()).collect();
     let fit = Fit::of(runs, &all, None)?;
+    // Jackknife over blocks of time, and cross-validation over runs.
     let blocks = all.iter().flat_map(|run| (0..length(&runs[*run]) / BLOCK).map(move |k| (*run, k * BLOCK)));
     let left: Vec<Fit> = blocks.filter_map(|block| Fit::of(runs, &all, Some(block))).collect();
     let others = |run: usize| all.iter().copied().filter(|k| *k != run).collect::<Vec<_>>();

@@ -57,8 +57,9 @@ pub struct GearEstimate {
 }
 
 impl GearEstimate {
-    /// Whether the recordings determine the stiffness: unseen runs are predicted sufficiently well,
-    /// and the result does not depend on a single run.
+    /// Whether the recordings determine the stiffness: the median R² of unseen runs is above 0.3, no
+    /// single run changes the logarithm of the stiffness by 0.5 or more, and [`Self::std_ln`] is
+    /// below 0.5.
     pub fn is_told(&self) -> bool {
         let sound = |x: &f64| x.is_finite() && *x > 0.0;
         let mut unseen = self.unseen_r2.clone();
@@ -89,10 +90,12 @@ pub fn gear_stiffness(runs: &[GearRun]) -> Option<GearEstimate> {
     }
     let all: Vec<usize> = (0..runs.len()).collect();
     let fit = Fit::of(runs, &all, None)?;
+    // Jackknife over blocks of time.
     let blocks: Vec<(usize, usize)> =
         all.iter().flat_map(|run| (0..runs[*run].deflection.len() / BLOCK).map(move |k| (*run, k * BLOCK))).collect();
     let left: Vec<f64> =
         blocks.iter().filter_map(|block| Fit::of(runs, &all, Some(*block))).map(|fit| fit.compliance).collect();
+    // Cross-validation over runs.
     let (mut unseen_r2, mut without_each) = (Vec::new(), Vec::new());
     for run in &all {
         let others: Vec<usize> = all.iter().copied().filter(|k| k != run).collect();

@@ -193,6 +193,7 @@ fn descend<P: Residuals>(
     while iterations < search.most_iterations && !converged {
         iterations += 1;
         let w = weights_of(&r);
+        // Normal equations of the weighted problem in coordinates along the basis.
         let B = &J * basis;
         let weighted = DMatrix::from_fn(B.nrows(), B.ncols(), |i, j| w[i] * B[(i, j)]);
         let mut normal = B.tr_mul(&weighted);
@@ -204,6 +205,7 @@ fn descend<P: Residuals>(
             }
         }
         let diagonal = normal.diagonal();
+        // Increases the damping until a step does not increase the cost.
         let mut better = false;
         for _ in 0..12 {
             let mut damped = normal.clone();

@@ -77,6 +77,7 @@ pub fn plan(
         options.purpose.iter().map(|reading| rows_of(plant, parameters, reading)).collect::<Result<Vec<_>, _>>()?;
     let mut search = Choice { rows: &rows, purpose: &purpose, repeat: options.repeat, chosen: Vec::new() };
     let mut information = DMatrix::identity(p, p);
+    // Greedy selection, then exchange.
     while search.chosen.len() < options.count {
         let Some(best) = search.best(&information) else { break };
         search.add(&mut information, best, 1.0);

@@ -226,6 +226,7 @@ pub fn compliance_slopes(
         let moved = -solve(&here.K, &forces.columns(k, 1).into_owned())?.column(0);
         let change = along(&arm, &q, &moved, look);
         let (eK, _) = explicit(&arm, &tool, F_T_W, &parameter.effect, &q, &here);
+        // dC = dJ K^-1 Jᵀ + J K^-1 dJᵀ - J K^-1 dK K^-1 Jᵀ
         let dC = &change[0] * &U + Y.tr_mul(&change[0].transpose()) - Y.tr_mul(&((&change[1] + eK) * &U));
         found.push(Matrix6::from_fn(|i, j| dC[(i, j)]));
     }

@@ -60,6 +60,7 @@ pub fn beyond_chance(columns: &[Vec<f64>], y: &[f64]) -> BeyondChance {
     let mut freedom = rows.len() - 1;
     found.chance = threshold(terms, freedom, columns.len());
     loop {
+        // Parameter with the largest share of the remaining variance, equation (1).
         let scatter = dot(&residuals, &residuals);
         let part = |k: usize| bases[k].iter().map(|q| dot(q, &residuals).powi(2)).sum::<f64>() / scatter;
         let open: Vec<usize> = (0..columns.len()).filter(|k| !bases[*k].is_empty()).collect();
@@ -69,6 +70,7 @@ pub fn beyond_chance(columns: &[Vec<f64>], y: &[f64]) -> BeyondChance {
         if explains_all || freedom < 2 * q || part(best) <= threshold(q, freedom, open.len()) {
             break;
         }
+        // Projects its columns out of the residuals and of the other parameters.
         found.parameters.push(best);
         freedom -= q;
         let taken = std::mem::take(&mut bases[best]);

@@ -107,6 +107,7 @@ impl LeastSearch {
     pub fn tell(&mut self, judged: &[Judged]) {
         let n = self.mean.len() as f64;
         let order = self.ranked(judged);
+        // Weighted recombination of the better half of the points.
         let mu = self.points.len() / 2;
         let weights: Vec<f64> = (0..mu).map(|k| (mu as f64 + 0.5).ln() - (k as f64 + 1.0).ln()).collect();
         let sum: f64 = weights.iter().sum();
@@ -118,7 +119,7 @@ impl LeastSearch {
         let step = steps.iter().zip(&weights).fold(DVector::zeros(old.len()), |sum, (y, w)| sum + y * *w);
         self.mean = &old + &step * self.sigma;
 
-        // Both evolution paths, then covariance and step size: [Hansen 2016], figure 6.
+        // Learning rates; the updates below are those of [Hansen 2016], figure 6.
         let c_sigma = (effective + 2.0) / (n + effective + 5.0);
         let d_sigma = 1.0 + 2.0 * (((effective - 1.0) / (n + 1.0)).sqrt() - 1.0).max(0.0) + c_sigma;
         let c_c = (4.0 + effective / n) / (n + 4.0 + 2.0 * effective / n);
@@ -126,6 +127,7 @@ impl LeastSearch {
         let c_mu = (1.0 - c_1).min(2.0 * (effective - 2.0 + 1.0 / effective) / ((n + 2.0).powi(2) + effective));
         let expected = n.sqrt() * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n));
 
+        // Evolution paths of step size and covariance.
         let whitened = self.inverse_root() * &step;
         self.path_sigma =
             &self.path_sigma * (1.0 - c_sigma) + whitened * (c_sigma * (2.0 - c_sigma) * effective).sqrt();
@@ -135,6 +137,7 @@ impl LeastSearch {
         let on = if goes_on { 1.0 } else { 0.0 };
         self.path_covariance =
             &self.path_covariance * (1.0 - c_c) + step * (on * (c_c * (2.0 - c_c) * effective).sqrt());
+        // Rank-one and rank-mu update of the covariance, then the step size.
         let rank_mu = steps
             .iter()
             .zip(&weights)
