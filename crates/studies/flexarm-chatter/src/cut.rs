@@ -328,8 +328,8 @@ fn figures(robot: &Robot, tool: &CuttingTool, curves: &Simulated, cut: &Cut, mul
     }
 }
 
-/// Frequency of the largest component of the motion that differs from tooth to tooth: coarse over
-/// the late part, then refined over a longer one.
+/// Returns the frequency of the largest component of the motion that differs from tooth to tooth:
+/// coarse over the late part, then refined over a longer one.
 fn swing_hz(curves: &Simulated, cut: &Cut, from: usize) -> f64 {
     let h = curves.time[1] - curves.time[0];
     let late = swing(&curves.displacement[from..], cut.steps);
@@ -354,7 +354,7 @@ fn swing(motion: &[Vector3<f64>], steps: usize) -> Vec<Vector3<f64>> {
     motion.iter().enumerate().map(|(k, u)| u - means[k % steps]).collect()
 }
 
-/// Squared magnitude of a motion's component at a frequency (Hz).
+/// Returns the squared magnitude of a motion's component at a frequency (Hz).
 fn size_at(motion: &[Vector3<f64>], h: f64, hz: f64) -> f64 {
     let (mut s, mut c) = (Vector3::zeros(), Vector3::zeros());
     for (k, u) in motion.iter().enumerate() {

@@ -100,7 +100,7 @@ pub struct Lobes {
     /// Description of the first pose, for output.
     #[serde(skip)]
     pub(crate) pose_in_words: String,
-    /// Number of poses of the motion without a limit, where the tool is at rest or moves along its
+    /// Number of poses of the motion that are left out: the tool is at rest or moves along its
     /// axis.
     pub left_out: usize,
     /// Path of the table; null if nothing was written.

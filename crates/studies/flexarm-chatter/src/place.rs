@@ -142,7 +142,7 @@ impl Place {
         Ok(place)
     }
 
-    /// Displacement of the tip per force on it (m/N), axes of the cut.
+    /// Returns the displacement of the tip per force on it (m/N), axes of the cut.
     pub(super) fn response(&self, omega: f64) -> Matrix3<Complex<f64>> {
         let mut G = self.structure.frequency_response(omega);
         if let Some((measured, R)) = &self.measured {
@@ -152,8 +152,8 @@ impl Place {
         G
     }
 
-    /// Angular frequencies for evaluating the response: around the poles, and the measured
-    /// frequencies; none above the highest measured one.
+    /// Returns the angular frequencies for evaluating the response: around the poles, and the
+    /// measured frequencies; none above the highest measured one.
     fn frequencies(&self) -> Vec<f64> {
         let mut band = self.structure.frequencies();
         if let Some((measured, _)) = &self.measured {
@@ -174,7 +174,7 @@ impl Place {
         hz
     }
 
-    /// Axes of the cut as columns, world axes.
+    /// Returns the axes of the cut as columns, world axes.
     pub(super) fn axes_of_cut(&self) -> Matrix3<f64> {
         let z = -self.axis;
         Matrix3::from_columns(&[self.feed, z.cross(&self.feed), z])
@@ -186,12 +186,12 @@ impl Place {
         Structure::from_modes(&modes).expect("as they were when the place was made")
     }
 
-    /// Description of the pose.
+    /// Returns the description of the pose.
     pub(super) fn words(&self) -> String {
         pose_in_words(&self.posed.joints, &self.posed.at, &self.posed.prismatic)
     }
 
-    /// Actuated joints.
+    /// Returns the actuated joints.
     pub(super) fn joints(&self) -> &[String] {
         &self.posed.joints
     }
@@ -207,7 +207,7 @@ impl Place {
     }
 }
 
-/// Axes of the cut as columns: x along the feed, z from the tip to the spindle.
+/// Returns the axes of the cut as columns: x along the feed, z from the tip to the spindle.
 fn cutting_axes(feed: &Vector3<f64>, axis: &Vector3<f64>) -> Result<Matrix3<f64>, LobesError> {
     let z = -axis;
     let across = feed - z * z.dot(feed);

@@ -57,7 +57,8 @@ fn constant_forces_have_the_lobes_of_turning() {
     assert!(worst < 1e-6 && zero_order < 1e-9, "{worst:.1e} {zero_order:.1e}");
 }
 
-/// Limit of turning on the lobe k at the delay T, by bisection of the phase over ω above the mode.
+/// Returns the limit of turning on the lobe k at the delay T, by bisection of the phase over ω
+/// above the mode.
 fn crossings(structure: &Structure, T: f64, k: i32) -> Option<f64> {
     let phase = |w: f64| {
         let G = structure.frequency_response(w)[(0, 0)];

@@ -36,8 +36,8 @@ impl Chain {
         Structure::from_matrices(&self.M, &self.D, &self.K, &self.J).unwrap()
     }
 
-    /// Growth per tooth period by the Runge-Kutta method without loss of contact, the delayed tip
-    /// by cubic Hermite interpolation.
+    /// Computes the growth per tooth period by the Runge-Kutta method without loss of contact, the
+    /// delayed tip by cubic Hermite interpolation.
     fn growth(&self, cutter: &Cutter, spindle: f64, depth: f64, periods: usize, steps: usize) -> f64 {
         let n = self.M.nrows();
         let inverse = self.M.clone().try_inverse().unwrap();

@@ -210,7 +210,7 @@ pub struct ResponseCurves {
     pub magnitude: [Vec<f64>; 3],
 }
 
-/// Name of the kind of a reading, for output.
+/// Returns the name of the kind of a reading, for output.
 fn kind_of(reading: &Reading) -> &'static str {
     match reading.kind {
         ReadingKind::Displacement { .. } => "displacements",

@@ -81,7 +81,7 @@ pub(super) fn caveats(found: &Identified) -> Vec<Caveat> {
     caveats
 }
 
-/// Gear effects that the fit does not include.
+/// Returns a caveat about gear effects that the fit does not include.
 pub(super) fn gear_caveat(robot: &Robot) -> Option<Caveat> {
     let has = |drive: &&flexarm_run::Drive| {
         drive.gearbox.as_ref().is_some_and(|(_, gear)| gear.hysteresis.is_some() || !gear.transmission.is_empty())

@@ -132,12 +132,13 @@ pub(super) fn told(arm: &Arm, input: &MeasurementInput, chosen: &[Candidate]) ->
     Ok(found)
 }
 
-/// Sampling intervals of the recordings that have an encoder on the link side of a joint (s).
+/// Returns the sampling intervals of the recordings that have an encoder on the link side of a
+/// joint (s).
 fn steps(runs: &[Smooth<'_>], joint: usize) -> Vec<f64> {
     runs.iter().filter(|run| run.recording.link[joint].is_some()).map(|run| run.recording.step_s).collect()
 }
 
-/// RMS of the noise of a gear's encoders in the passband.
+/// Returns the RMS of the noise of a gear's encoders in the passband.
 fn noise(runs: &[Smooth<'_>], joint: usize) -> f64 {
     let squares: Vec<f64> = runs.iter().filter_map(|run| run.noise_square(joint)).collect();
     (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
@@ -256,6 +257,8 @@ struct Smooth<'a> {
 }
 
 impl<'a> Smooth<'a> {
+    /// Filters a recording, and computes its torques.
+    ///
     /// * `filed`: stiffness of each joint's gearbox in the robot file.
     fn of(recording: &'a EncoderRecording, model: &Model, filed: &[Option<f64>]) -> Result<Self, Error> {
         let EncoderRecording { step_s, below_hz, edge_s, .. } = *recording;
@@ -313,8 +316,8 @@ impl<'a> Smooth<'a> {
         })
     }
 
-    /// Mean square of the white noise of both encoders in the passband, estimated from fifth
-    /// differences, which suppress the slow motion and the vibration of the arm.
+    /// Returns the mean square of the white noise of both encoders in the passband, estimated from
+    /// fifth differences, which suppress the slow motion and the vibration of the arm.
     fn noise_square(&self, joint: usize) -> Option<f64> {
         let link = self.recording.link[joint].as_ref()?;
         let mut x: Vec<f64> = self.recording.motor[joint].iter().zip(link).map(|(motor, link)| motor - link).collect();
@@ -345,8 +348,8 @@ fn torques(model: &Model, motion: &[Vec<f64>], step_s: f64) -> Vec<Vec<f64>> {
     torque
 }
 
-/// First and second derivatives by central differences of fourth order. Beyond its ends the signal
-/// is constant.
+/// Computes first and second derivatives by central differences of fourth order. Beyond its ends
+/// the signal is constant.
 fn derivatives(x: &[f64], step_s: f64) -> [Vec<f64>; 2] {
     let at = |i: usize, by: isize| x[i.saturating_add_signed(by).min(x.len() - 1)];
     let n = 0..x.len();

@@ -151,7 +151,7 @@ pub fn identify_robot(robot: &Robot, measurements: &Path, request: &IdentifyRequ
     Ok(answer)
 }
 
-/// Actuated joints in coordinate order, and whether they slide.
+/// Returns the actuated joints in coordinate order, and whether they slide.
 fn joints_of(arm: &Arm) -> Vec<(String, bool)> {
     let model = &arm.flexible().model;
     let actuated = &model.coordinates()[..model.n_actuated()];

@@ -48,7 +48,7 @@ pub(super) fn html(answer: &Identification) -> String {
     page + "</body></html>\n"
 }
 
-/// Display unit and its factor.
+/// Returns the display unit and its factor.
 fn readable(unit: &str) -> (&'static str, f64) {
     match unit {
         "m" => ("mm", 1e3),

@@ -14,7 +14,7 @@ use nalgebra::{Complex, DMatrix, DVector, Matrix3, Rotation3, Translation3, Vect
 
 const POSE: [f64; 6] = [0.4, 0.5, -0.3, 0.7, 0.6, -1.2];
 
-/// Reference arm with a twentieth of its stiffness.
+/// Returns the reference arm with a twentieth of its stiffness.
 fn plant() -> Plant {
     let reference = reference_arm(true);
     let model = Arc::new(Model::new(&reference.mechanism).unwrap());
@@ -50,7 +50,7 @@ fn step_of(parameter: &Parameter) -> f64 {
     }
 }
 
-/// Derivative by sixth-order Richardson extrapolation of central differences.
+/// Computes a derivative by sixth-order Richardson extrapolation of central differences.
 fn richardson(h: f64, f: impl Fn(f64) -> DVector<f64>) -> DVector<f64> {
     let d = |h: f64| (f(h) - f(-h)) / (2.0 * h);
     let (a, b, c) = (d(h), d(0.5 * h), d(0.25 * h));
@@ -58,7 +58,8 @@ fn richardson(h: f64, f: impl Fn(f64) -> DVector<f64>) -> DVector<f64> {
     (bc * 16.0 - ab) / 15.0
 }
 
-/// One reading of every kind, with a load that acts beside the tool and a mass attached there.
+/// Returns one reading of every kind, with a load that acts beside the tool and a mass attached
+/// there.
 fn measurements(plant: &Plant) -> Measurements {
     let carried = SpatialInertia::from_com(12.0, &Vector3::new(0.1, 0.2, 0.3), &(Matrix3::identity() * 0.3));
     let at = Vector3::new(0.1, 0.02, -0.05);

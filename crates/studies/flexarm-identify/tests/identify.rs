@@ -28,7 +28,7 @@ fn stiffness(name: &str, spring: usize, coordinate: Option<usize>) -> Parameter 
     Parameter { name: name.into(), unit: "1".into(), initial: 1.0, prior: 2f64.ln(), effect }
 }
 
-/// Bending and torsion of both links as separate parameters.
+/// Returns bending and torsion of both links as separate parameters.
 fn parameters() -> Vec<Parameter> {
     vec![
         stiffness("lower about x", 0, Some(3)),
@@ -73,7 +73,7 @@ fn pulled(draw: &mut Draw, count: usize) -> Measurements {
     Measurements { readings: readings.collect(), ..Measurements::default() }
 }
 
-/// Simulated readings of an arm, with noise.
+/// Simulates the readings of an arm, with noise.
 fn read(plant: &Plant, parameters: &[Parameter], truth: &[f64], from: &Measurements, draw: &mut Draw) -> Measurements {
     let arm = MeasuredArm { plant, parameters, measurements: from };
     let mut unknowns = DVector::zeros(parameters.len() + from.own_unknowns());

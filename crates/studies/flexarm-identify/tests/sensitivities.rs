@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Translation3, Vector3};
 
 const POSE: [f64; 6] = [0.4, 0.5, -0.3, 0.7, 0.6, -1.2];
 
-/// Reference arm with a twentieth of its stiffness: its tool sags by 4 cm.
+/// Returns the reference arm with a twentieth of its stiffness: its tool sags by 4 cm.
 fn plant() -> Plant {
     let reference = reference_arm(true);
     let model = Arc::new(Model::new(&reference.mechanism).expect("valid"));
@@ -55,7 +55,7 @@ fn with_damping(plant: &mut Plant) -> Vec<Parameter> {
     all
 }
 
-/// An impact beside the tool, and a point and direction of measurement on the upper link.
+/// Returns two points beside the tool on its body, each with a direction.
 fn probes(plant: &Plant) -> [Probe; 2] {
     let moved = |x: f64, y: f64, z: f64| {
         let frame = plant.tool.clone();
@@ -67,7 +67,7 @@ fn probes(plant: &Plant) -> [Probe; 2] {
     ]
 }
 
-/// Derivative by sixth-order Richardson extrapolation of central differences.
+/// Computes a derivative by sixth-order Richardson extrapolation of central differences.
 fn richardson(h: f64, f: impl Fn(f64) -> DVector<f64>) -> DVector<f64> {
     let d = |h: f64| (f(h) - f(-h)) / (2.0 * h);
     let (a, b, c) = (d(h), d(0.5 * h), d(0.25 * h));

@@ -82,7 +82,7 @@ fn request(tool: Frame) -> SlopesRequest {
     }
 }
 
-/// Derivative by sixth-order Richardson extrapolation of central differences.
+/// Computes a derivative by sixth-order Richardson extrapolation of central differences.
 fn richardson(h: f64, f: impl Fn(f64) -> DVector<f64>) -> DVector<f64> {
     let d = |h: f64| (f(h) - f(-h)) / (2.0 * h);
     let (a, b, c) = (d(h), d(0.5 * h), d(0.25 * h));

@@ -131,13 +131,13 @@ impl Design {
         Ok(Self { columns, sizes, directions, drawn, derived, sample, runs: runs as usize })
     }
 
-    /// Number of runs.
+    /// Returns the number of runs.
     pub(super) fn runs(&self) -> usize {
         self.runs
     }
 
-    /// Number of points of the grid; run number divided by samples per point gives the point of a
-    /// run.
+    /// Returns the number of points of the grid; run number divided by samples per point gives the
+    /// point of a run.
     pub(super) fn grid_points(&self) -> usize {
         self.sizes.iter().product()
     }

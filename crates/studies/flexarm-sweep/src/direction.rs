@@ -64,7 +64,7 @@ const NEUTRAL: [&str; 4] = ["t_peak_s", "t_dynamic_peak_s", "dominant_hz", "visi
 /// Sections of a summary with values that should be low: errors, deflections, torques.
 const LOW: [&str; 6] = ["tcp", "path", "links", "elastic_drives", "drives", "motors"];
 
-/// Preferred direction of a number of the run, by its path.
+/// Returns the preferred direction of a number of the run, by its path.
 pub(super) fn of_fact(path: &[String]) -> Option<Better> {
     let words: Vec<&str> = path.iter().map(String::as_str).collect();
     match words[..] {
@@ -93,8 +93,8 @@ const LOWER: [&str; 12] = [
     "cost",
 ];
 
-/// Preferred direction by the words of a name; `None` without a known word, or with contradictory
-/// ones.
+/// Returns the preferred direction by the words of a name; `None` without a known word, or with
+/// contradictory ones.
 pub(super) fn of_name(name: &str) -> Option<Better> {
     let name = name.to_lowercase();
     let words: Vec<&str> = name.split(|c: char| !c.is_alphanumeric()).collect();
@@ -113,8 +113,8 @@ const SIZES: [f64; 7] = [1e-5, 1e-3, 0.1, 1.0, 10.0, 1e3, 1e5];
 /// Factor of the change of a variable.
 const CHANGE: f64 = 1.01;
 
-/// Preferred direction of an expression of variables with and without directions; `None` if they
-/// contradict each other.
+/// Returns the preferred direction of an expression of variables with and without directions;
+/// `None` if they contradict each other.
 pub(super) fn of_expression(expression: &FlatEx<f64>, variables: &[Option<Better>]) -> Option<Better> {
     let mut found = None;
     for (place, own) in variables.iter().enumerate() {

@@ -175,12 +175,12 @@ impl Sweep {
         Ok(Self { file, design, workshop, metrics, constraints, quick, vocabulary: summary })
     }
 
-    /// Name of the study, by default the stem of its file name.
+    /// Returns the name of the study, by default the stem of its file name.
     pub fn name(&self) -> &str {
         &self.file.name
     }
 
-    /// Number of runs.
+    /// Returns the number of runs.
     pub fn runs(&self) -> usize {
         self.design.runs()
     }
@@ -483,8 +483,8 @@ fn skeleton(robot: &Robot, flexible: &FlexibleRobot) -> Summary {
     }
 }
 
-/// Hash of a text that is the same on any machine (FNV-1a, 64 bits, twice with different initial
-/// values).
+/// Returns a hash of a text that is the same on any machine (FNV-1a, 64 bits, twice with different
+/// initial values).
 fn fingerprint(bytes: &[u8]) -> String {
     let hash = |start: u64| bytes.iter().fold(start, |h, byte| (h ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3));
     format!("{:016x}{:016x}", hash(0xcbf2_9ce4_8422_2325), hash(0x9e37_79b9_7f4a_7c15))

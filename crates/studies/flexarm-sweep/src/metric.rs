@@ -384,8 +384,8 @@ impl Constraint {
         self.less.is_quick() && self.more.is_quick()
     }
 
-    /// Relative violation: excess over the larger magnitude of both sides; 0 if the constraint
-    /// holds, NaN if a side has no value.
+    /// Returns the relative violation: excess over the larger magnitude of both sides; 0 if the
+    /// constraint holds, NaN if a side has no value.
     pub(super) fn violation(&self, parameters: &[ParameterValue], metrics: &[f64], facts: &dyn Facts) -> f64 {
         let [less, more] = [&self.less, &self.more].map(|side| side.value(parameters, metrics, facts));
         if less.is_nan() || more.is_nan() {

@@ -165,8 +165,9 @@ impl Sweep {
     /// study give metric and constraints. The runs are written like those of a study.
     ///
     /// # Errors
-    /// [`SweepError::Minimise`] without a metric to minimise or without parameters to vary; an error
-    /// with the place in the study for parameters without bounds; otherwise as [`Sweep::run`].
+    /// [`SweepError::Minimise`] without a metric to minimise or without parameters to vary; an
+    /// error with the place in the study for parameters without bounds; otherwise as
+    /// [`Sweep::run`].
     pub fn minimise(
         &mut self,
         request: &SweepRequest,
@@ -257,8 +258,8 @@ impl Sweep {
         }
     }
 
-    /// Start of a variable as a fraction of its range: the present value in the files if it is in
-    /// the range, otherwise the middle.
+    /// Returns the start of a variable as a fraction of its range: the present value in the files
+    /// if it is in the range, otherwise the middle.
     fn start(&self, varied: &Varied) -> f64 {
         let own = &self.design.columns[varied.column];
         let now = self.workshop.current(varied.column).filter(|_| own.role != Role::Offset || varied.low <= 0.0);

@@ -37,7 +37,7 @@ struct Source {
 }
 
 impl Sweep {
-    /// Grouping of runs by a parameter.
+    /// Returns the grouping of runs by a parameter.
     fn grouping(&self, parameter: usize, columns: &Columns) -> Grouping {
         let column = &self.design.columns[parameter];
         let is_listed = matches!(column.values, Values::Levels(_)) && !column.is_linked_by(TABLE);

@@ -294,8 +294,8 @@ impl Sweep {
         (!runs.is_empty()).then_some(ParetoFigures { metrics, better, runs })
     }
 
-    /// Sobol indices of a metric. With a grid, those of the deviation from the mean at each grid
-    /// point.
+    /// Computes the Sobol indices of a metric. With a grid, those of the deviation from the mean at
+    /// each grid point.
     fn indices(&self, values: &[f64], columns: &Columns) -> Vec<IndexFigures> {
         let drawn = self.design.drawn();
         if self.file.method != SampleMethod::Saltelli || drawn.is_empty() || !columns.of_design {

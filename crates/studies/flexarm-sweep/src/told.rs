@@ -61,8 +61,8 @@ pub(super) fn figures<'a>(answers: impl Iterator<Item = &'a Answer>) -> Vec<Cave
     found
 }
 
-/// Key of caveats to merge: kind and location, and for caveats without a value also the message
-/// without its digits.
+/// Returns the key of caveats to merge: kind and location, and for caveats without a value also the
+/// message without its digits.
 fn key(caveat: &Caveat) -> (String, String, String) {
     let words = match caveat.value {
         Some(_) => String::new(),
@@ -71,7 +71,8 @@ fn key(caveat: &Caveat) -> (String, String, String) {
     (caveat.code.clone(), caveat.location.clone(), words)
 }
 
-/// Severity of a caveat's value among others of its kind: its distance from the yardstick.
+/// Returns the severity of a caveat's value among others of its kind: its distance from the
+/// yardstick.
 fn badness(caveat: &Caveat) -> f64 {
     let (Some(value), Some(yardstick)) = (caveat.value, caveat.yardstick) else { return 0.0 };
     match caveat.code.as_str() {

@@ -611,7 +611,7 @@ fn mass(robot: &Robot, flexible: &FlexibleRobot) -> f64 {
     own + parts.sum::<f64>()
 }
 
-/// Index of a file in the list of robot, motion and loads.
+/// Returns the index of a file in the list of robot, motion and loads.
 fn word_place(which: Which) -> usize {
     match which {
         Which::Robot | Which::Job(_) => 0,

@@ -128,17 +128,17 @@ impl Cutter {
         }
     }
 
-    /// Angle between teeth (rad).
+    /// Returns the angle between teeth (rad).
     pub fn pitch(&self) -> f64 {
         TAU / self.teeth as f64
     }
 
-    /// Time between teeth (s) at a spindle speed in rad/s.
+    /// Returns the time between teeth (s) at a spindle speed in rad/s.
     pub fn tooth_period(&self, spindle: f64) -> f64 {
         self.pitch() / spindle
     }
 
-    /// Lag of the edge per height (rad/m).
+    /// Returns the lag of the edge per height (rad/m).
     pub(crate) fn lag(&self) -> f64 {
         2.0 * self.helix.tan() / self.diameter
     }
@@ -148,14 +148,14 @@ impl Cutter {
         self.helix == 0.0
     }
 
-    /// Direction of the chip thickness.
+    /// Returns the direction of the chip thickness.
     pub(crate) fn thickness(&self, phi: f64) -> Vector3<f64> {
         let (s, c) = phi.sin_cos();
         let (sk, ck) = self.lead.sin_cos();
         Vector3::new(sk * s, sk * c, if ck.abs() < 1e-12 { 0.0 } else { -ck })
     }
 
-    /// Negative force per depth and chip thickness (N/m²).
+    /// Returns the negative force per depth and chip thickness (N/m²).
     pub(crate) fn push(&self, phi: f64) -> Vector3<f64> {
         let (s, c) = phi.sin_cos();
         let (sk, ck) = self.lead.sin_cos();
@@ -254,7 +254,7 @@ impl Cutter {
         H
     }
 
-    /// Antiderivative over φ of push times thickness.
+    /// Returns the antiderivative over φ of push times thickness.
     fn primitive(&self, phi: f64) -> Matrix3<f64> {
         // Both are e sin φ + f cos φ + g with constant vectors e, f, g.
         let split = |of: &dyn Fn(f64) -> Vector3<f64>| {

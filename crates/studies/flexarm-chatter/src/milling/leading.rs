@@ -96,8 +96,8 @@ impl<'a> Krylov<'a> {
         false
     }
 
-    /// Residual `|A v - λ v|` of the unit Ritz vector of an eigenvalue of `H`, that is, its part
-    /// outside the subspace.
+    /// Returns the residual `|A v - λ v|` of the unit Ritz vector of an eigenvalue of `H`, that is,
+    /// its part outside the subspace.
     fn residual(&self, H: &DMatrix<f64>, value: Complex<f64>) -> f64 {
         let n = H.nrows();
         let shift = value * (1.0 + 1e-12) + Complex::new(1e-300, 0.0);

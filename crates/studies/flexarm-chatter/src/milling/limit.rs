@@ -199,8 +199,8 @@ fn check_size(period: &Period, depth: f64, spindle: f64) -> Result<(), ChatterEr
     Ok(())
 }
 
-/// Initial element length (s): half a period of the fastest relevant mode, with six nodes, at most
-/// a tooth period.
+/// Returns the initial element length (s): half a period of the fastest relevant mode, with six
+/// nodes, at most a tooth period.
 fn first_length(structure: &Structure, cutter: &Cutter, spindle: f64, options: &LimitOptions) -> f64 {
     let stiffness =
         options.deepest * (0..64).map(|k| cutter.push(TAU * f64::from(k) / 64.0).norm()).fold(0.0, f64::max);
@@ -211,7 +211,7 @@ fn first_length(structure: &Structure, cutter: &Cutter, spindle: f64, options: &
     if fastest > 0.0 { (PI / fastest).min(tooth) } else { tooth }
 }
 
-/// Logarithm of the magnitude of the largest multiplier: above 0 beyond the limit.
+/// Returns the logarithm of the magnitude of the largest multiplier: above 0 beyond the limit.
 fn growth(period: &Period, depth: f64) -> f64 {
     leading(&period.at(depth)).norm().ln()
 }
@@ -220,7 +220,7 @@ fn step_ratio(options: &LimitOptions) -> f64 {
     (1.0 / SHALLOWEST).powf(1.0 / (options.depths - 1) as f64)
 }
 
-/// First crossing from shallow to deep.
+/// Finds the first crossing from shallow to deep.
 fn first_limit(period: &Period, options: &LimitOptions) -> Option<f64> {
     let ratio = step_ratio(options);
     let bound = BOUND * period.zero_order_bound();
@@ -279,7 +279,7 @@ fn hidden_peak(period: &Period, a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> 
     None
 }
 
-/// Crossing on refined elements, near a known one.
+/// Finds the crossing on refined elements, near a known one.
 fn nearby_limit(period: &Period, depth: f64, options: &LimitOptions) -> Option<f64> {
     let mut reach = 0.1 * options.tolerance;
     while reach < 0.1 {
@@ -293,8 +293,8 @@ fn nearby_limit(period: &Period, depth: f64, options: &LimitOptions) -> Option<f
     None
 }
 
-/// Zero of the growth between two depths with opposite signs: regula falsi with the Illinois
-/// modification.
+/// Finds the zero of the growth between two depths with opposite signs: regula falsi with the
+/// Illinois modification.
 fn crossing(period: &Period, mut a: (f64, f64), mut b: (f64, f64)) -> f64 {
     for k in 0..100 {
         if (b.0 - a.0).abs() <= EXACT * b.0.abs() {
@@ -328,8 +328,8 @@ fn described(structure: &Structure, cutter: &Cutter, spindle: f64, period: &Peri
     Limit { depth, kind, chatter_hz: chatter / TAU, multiplier_hz: angle / TAU / tooth, change, unknowns: map.nrows() }
 }
 
-/// Frequency `|arg μ / T + 2π k / T|` (rad/s) of the largest harmonic of the tip's motion for the
-/// eigenvector of μ.
+/// Returns the frequency `|arg μ / T + 2π k / T|` (rad/s) of the largest harmonic of the tip's
+/// motion for the eigenvector of μ.
 fn strongest_harmonic(
     structure: &Structure,
     period: &Period,

@@ -173,8 +173,8 @@ fn eigenvectors(A: &DMatrix<f64>) -> Result<Eigenvectors, ChatterError> {
     Ok(((0..n).map(|k| T[(k, k)]).collect(), right))
 }
 
-/// The product `o lᵀ` of a real pole is real, and its factors are real up to opposite phases;
-/// removes these.
+/// Makes the factors of a real pole real. Their product `o lᵀ` is real, so that they are real up to
+/// opposite phases.
 fn real_residue(pole: &mut Pole) {
     let largest = pole.input.iter().copied().max_by(|a, b| a.norm_sqr().total_cmp(&b.norm_sqr())).unwrap_or_default();
     if largest.norm() > 0.0 {
@@ -184,7 +184,7 @@ fn real_residue(pole: &mut Pole) {
     }
 }
 
-/// Frequency response `J (K + i ω D - ω² M)^-1 Jᵀ`.
+/// Computes the frequency response `J (K + i ω D - ω² M)^-1 Jᵀ`.
 fn response(
     M: &DMatrix<f64>,
     D: &DMatrix<f64>,

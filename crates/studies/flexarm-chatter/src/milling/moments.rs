@@ -101,7 +101,7 @@ impl Rule {
     }
 }
 
-/// Gauss-Legendre nodes and weights on (0, 1).
+/// Computes Gauss-Legendre nodes and weights on (0, 1).
 fn gauss<const N: usize>() -> ([f64; N], [f64; N]) {
     let (mut nodes, mut weights) = ([0.0; N], [0.0; N]);
     for k in 0..N {
@@ -126,7 +126,7 @@ fn gauss<const N: usize>() -> ([f64; N], [f64; N]) {
     (nodes, weights)
 }
 
-/// Monomial coefficients of ℓ_j in column j.
+/// Computes the monomial coefficients of ℓ_j in column j.
 fn lagrange_coefficients(nodes: &[f64; NODES]) -> SMatrix<f64, NODES, NODES> {
     let mut coefficients = SMatrix::<f64, NODES, NODES>::zeros();
     for j in 0..NODES {
@@ -145,7 +145,7 @@ fn lagrange_coefficients(nodes: &[f64; NODES]) -> SMatrix<f64, NODES, NODES> {
     coefficients
 }
 
-/// Derivative of ℓ_j at x.
+/// Evaluates a derivative of ℓ_j at x.
 fn derivative(coefficients: &SMatrix<f64, NODES, NODES>, j: usize, order: usize, x: f64) -> f64 {
     let mut sum = 0.0;
     for n in (order..NODES).rev() {

@@ -146,7 +146,7 @@ impl<'a> Period<'a> {
         0.5 / largest.max(f64::MIN_POSITIVE)
     }
 
-    /// Size of the map.
+    /// Returns the size of the map.
     pub(crate) fn unknowns(&self, depth: f64) -> usize {
         let chips = self.with_stretches(depth, |stretches| {
             let cutting = |s: &&Stretch| matches!(s.motion, Motion::Cutting(_));
@@ -181,7 +181,7 @@ impl<'a> Period<'a> {
         })
     }
 
-    /// Force laws at the nodes, by stretch and element.
+    /// Returns the force laws at the nodes, by stretch and element.
     fn regenerations(&self, stretches: &[Stretch], depth: f64) -> Vec<Vec<Vec<Regeneration>>> {
         let at = |s: &Stretch, e: usize, x: f64| {
             self.cutter.regeneration(s.start + (e as f64 + x) * s.length * self.spindle, depth)
@@ -283,12 +283,12 @@ pub(crate) struct PeriodMap {
 }
 
 impl PeriodMap {
-    /// Number of states of the structure.
+    /// Returns the number of states of the structure.
     pub(crate) fn n_states(&self) -> usize {
         self.n_states
     }
 
-    /// Number of states and chips.
+    /// Returns the number of states and chips.
     pub(crate) fn size(&self) -> usize {
         self.size
     }

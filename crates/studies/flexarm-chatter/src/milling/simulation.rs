@@ -78,9 +78,9 @@ pub fn simulate(structure: &Structure, cutter: &Cutter, cut: &Cut) -> Result<Sim
 }
 
 impl Simulated {
-    /// Scatter of the motion from tooth to tooth over the last `teeth` periods (m): standard
-    /// deviation of the displacement at one instant of each period about its mean, maximum over
-    /// instants and directions.
+    /// Returns the scatter of the motion from tooth to tooth over the last `teeth` periods (m):
+    /// standard deviation of the displacement at one instant of each period about its mean, maximum
+    /// over instants and directions.
     pub fn scatter(&self, steps: usize, teeth: usize) -> f64 {
         let from = self.displacement.len().saturating_sub(steps * teeth);
         let mut largest: f64 = 0.0;
@@ -145,8 +145,8 @@ impl ForcedMotion {
         motion
     }
 
-    /// Displacement at the end of a step (m) under a force that decreases from the given value (N)
-    /// to zero.
+    /// Returns the displacement at the end of a step (m) under a force that decreases from the
+    /// given value (N) to zero.
     pub fn predicted(&self, force: &Vector3<f64>) -> Vector3<f64> {
         let force = force.map(|x| Complex::new(x, 0.0));
         let parts = self.poles.iter().zip(&self.state);
@@ -161,18 +161,18 @@ impl ForcedMotion {
         }
     }
 
-    /// Displacement per force at the end of a step (m/N).
+    /// Returns the displacement per force at the end of a step (m/N).
     pub fn end_gain(&self) -> Matrix3<f64> {
         self.end_gain
     }
 
-    /// Displacement of the tip (m).
+    /// Returns the displacement of the tip (m).
     pub fn displacement(&self) -> Vector3<f64> {
         self.poles.iter().zip(&self.state).map(|(p, z)| (p.reading * *z).map(|x| x.re)).sum()
     }
 }
 
-/// `∫_0^1 e^{z (1 - s)} ds` and `∫_0^1 e^{z (1 - s)} s ds`.
+/// Computes `∫_0^1 e^{z (1 - s)} ds` and `∫_0^1 e^{z (1 - s)} s ds`.
 fn ramps(z: Complex<f64>) -> (Complex<f64>, Complex<f64>) {
     if z.norm() < 0.5 {
         // Power series: 1/1! + z/2! + ..., 1/2! + z/3! + ...
@@ -224,12 +224,12 @@ impl RegenerativeCut {
         Ok(work)
     }
 
-    /// Step size (s).
+    /// Returns the step size (s).
     pub fn step_s(&self) -> f64 {
         self.cutter.tooth_period(self.cut.spindle) / self.cut.steps as f64
     }
 
-    /// Angle of a tooth at a step of the turn (rad).
+    /// Returns the angle of a tooth at a step of the turn (rad).
     fn angle(&self, step: usize, tooth: usize, slice: usize) -> f64 {
         let per_turn = (self.cut.steps * self.cutter.teeth) as f64;
         let height = (slice as f64 + 0.5) / self.slices as f64 * self.cut.depth;
@@ -255,8 +255,8 @@ impl RegenerativeCut {
         }
     }
 
-    /// Force on the tool (N) at the end of a step for a displacement `u` of the tip (m), axes of
-    /// the cut.
+    /// Returns the force on the tool (N) at the end of a step for a displacement `u` of the tip
+    /// (m), axes of the cut.
     pub fn force(&self, step: usize, u: &Vector3<f64>) -> Vector3<f64> {
         let mut force = Vector3::zeros();
         let width = self.cut.depth / self.slices as f64;

@@ -111,12 +111,12 @@ impl Structure {
         self
     }
 
-    /// All poles.
+    /// Returns all poles.
     pub fn poles(&self) -> &[Pole] {
         &self.poles
     }
 
-    /// Frequency response of the tip, `u = G(i ω) F` (m/N), 3×3.
+    /// Returns the frequency response of the tip, `u = G(i ω) F` (m/N), 3×3.
     pub fn frequency_response(&self, omega: f64) -> Matrix3<Complex<f64>> {
         let s = Complex::new(0.0, omega);
         let mut G = Matrix3::zeros();
@@ -129,7 +129,7 @@ impl Structure {
         G
     }
 
-    /// Number of real states: two per pair, one per real pole.
+    /// Returns the number of real states: two per pair, one per real pole.
     pub(crate) fn n_states(&self) -> usize {
         self.poles.iter().map(Pole::n_states).sum()
     }
@@ -140,12 +140,12 @@ impl Pole {
         if self.value.im > 0.0 { 2 } else { 1 }
     }
 
-    /// Displacement per unit of the pole's state; its real part counts.
+    /// Returns the displacement per unit of the pole's state; its real part counts.
     pub(crate) fn reading(&self) -> Vector3<Complex<f64>> {
         if self.value.im > 0.0 { self.output * Complex::new(2.0, 0.0) } else { self.output }
     }
 
-    /// Compliance at its resonance (m/N).
+    /// Returns the compliance at its resonance (m/N).
     pub(crate) fn peak(&self) -> f64 {
         self.output.norm() * self.input.norm() / self.value.re.abs()
     }

@@ -91,7 +91,7 @@ pub fn zero_order_limit(
     Ok(best.filter(|best| best.depth <= deepest))
 }
 
-/// Depth `b` times `|1 - e^{-i ω T}|²` for an eigenvalue; real at a limit.
+/// Returns the depth `b` times `|1 - e^{-i ω T}|²` for an eigenvalue; real at a limit.
 fn product(w: f64, lambda: Complex<f64>, T: f64) -> Complex<f64> {
     let delay = Complex::new(1.0, 0.0) - Complex::cis(-w * T);
     -lambda.inv() * delay.conj()
@@ -147,8 +147,8 @@ fn matched(found: [Complex<f64>; 3], last: &[Complex<f64>; 3]) -> [Complex<f64>;
 }
 
 impl Structure {
-    /// Angular frequencies (rad/s) for evaluating the response: at equal ratios, and dense around
-    /// each resonance.
+    /// Returns angular frequencies (rad/s) for evaluating the response: at equal ratios, and dense
+    /// around each resonance.
     pub fn frequencies(&self) -> Vec<f64> {
         let sizes: Vec<f64> = self.poles().iter().map(|p| p.value.norm()).collect();
         let (Some(low), Some(high)) = (sizes.iter().copied().reduce(f64::min), sizes.iter().copied().reduce(f64::max))

@@ -141,7 +141,7 @@ impl Fit {
         Some(fit)
     }
 
-    /// Residual of an encoder's deflection.
+    /// Returns the residual of an encoder's deflection.
     fn rest(&self, output: &CoupledOutput, number: usize) -> Vec<f64> {
         let kept: Vec<usize> = (0..output.deflection.len()).collect();
         let mut rest = centred(&output.deflection, &kept);
@@ -154,8 +154,8 @@ impl Fit {
         rest
     }
 
-    /// For a run, over the encoders that a spring affects: the deflection without the contributions
-    /// of the other springs, and the deflection that the spring's torque predicts.
+    /// Returns, for a run and the encoders that a spring affects, the deflection without the
+    /// contributions of the other springs, and the deflection that the spring's torque predicts.
     fn curves(&self, run: &[CoupledOutput], motor: usize) -> [Vec<f64>; 2] {
         let (mut measured, mut expected) = (Vec::new(), Vec::new());
         for (number, output) in run.iter().enumerate() {

@@ -57,8 +57,8 @@ pub struct GearEstimate {
 }
 
 impl GearEstimate {
-    /// Whether the recordings determine the stiffness: the median R² of unseen runs is above 0.3, no
-    /// single run changes the logarithm of the stiffness by 0.5 or more, and [`Self::std_ln`] is
+    /// Whether the recordings determine the stiffness: the median R² of unseen runs is above 0.3,
+    /// no single run changes the logarithm of the stiffness by 0.5 or more, and [`Self::std_ln`] is
     /// below 0.5.
     pub fn is_told(&self) -> bool {
         let sound = |x: &f64| x.is_finite() && *x > 0.0;
@@ -121,8 +121,8 @@ pub fn gear_stiffness(runs: &[GearRun]) -> Option<GearEstimate> {
     })
 }
 
-/// Jackknife standard deviation of an estimate, from the estimates that each leave out one part of
-/// the data.
+/// Returns the jackknife standard deviation of an estimate, from the estimates that each leave out
+/// one part of the data.
 pub(crate) fn jackknife(without: &[f64]) -> f64 {
     let n = without.len() as f64;
     let mean = without.iter().sum::<f64>() / n;
@@ -238,13 +238,14 @@ impl Fit {
         [measured, t.iter().map(|t| self.compliance * t).collect()]
     }
 
-    /// Sums of squares of a run without offset: the residual, and the deflection.
+    /// Returns the sums of squares of a run without offset: the residual, and the deflection.
     fn left_of(&self, run: &GearRun) -> (f64, f64) {
         squares(&self.curves(run))
     }
 }
 
-/// Time constant T of a residual modelled as `-T` times a rate; 0 if the rates are zero.
+/// Returns the time constant T of a residual modelled as `-T` times a rate; 0 if the rates are
+/// zero.
 pub(crate) fn damping_time<'a>(of: impl Iterator<Item = (Vec<f64>, &'a [f64])>) -> f64 {
     let sums = of.fold((0.0, 0.0), |sums, (rest, rate)| {
         rest.iter().zip(rate).fold(sums, |(a, b), (r, w)| (a + r * w, b + w * w))
@@ -252,7 +253,7 @@ pub(crate) fn damping_time<'a>(of: impl Iterator<Item = (Vec<f64>, &'a [f64])>) 
     if sums.1 > 0.0 { -sums.0 / sums.1 } else { 0.0 }
 }
 
-/// Sums of squares of the residual of a measured curve and of the curve itself.
+/// Returns the sums of squares of the residual of a measured curve and of the curve itself.
 pub(crate) fn squares([measured, expected]: &[Vec<f64>; 2]) -> (f64, f64) {
     measured.iter().zip(expected).fold((0.0, 0.0), |(rest, whole), (y, c)| (rest + (y - c).powi(2), whole + y * y))
 }

@@ -482,7 +482,7 @@ fn held_out(
     Ok(Some(HeldOut { folds, rms: rms(&residuals), rms_initial: rms(before), residuals }))
 }
 
-/// Upper 0.1 % quantile of χ² over its degrees of freedom (Wilson and Hilferty).
+/// Returns the upper 0.1 % quantile of χ² over its degrees of freedom (Wilson and Hilferty).
 fn chi_square_bound(freedom: usize) -> f64 {
     let nine = 2.0 / (9.0 * freedom as f64);
     (1.0 - nine + MISFIT_QUANTILE * nine.sqrt()).powi(3)

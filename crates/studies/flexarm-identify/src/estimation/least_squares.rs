@@ -39,7 +39,7 @@ pub enum Loss {
 }
 
 impl Loss {
-    /// Weight of a residual in the equivalent weighted problem.
+    /// Returns the weight of a residual in the equivalent weighted problem.
     fn weight(self, r: f64) -> f64 {
         match self {
             Self::Square => 1.0,
@@ -49,7 +49,7 @@ impl Loss {
         }
     }
 
-    /// Twice the cost; the square for small residuals.
+    /// Returns twice the cost; the square for small residuals.
     fn cost(self, r: f64) -> f64 {
         match self {
             Self::Square => r * r,
@@ -169,8 +169,8 @@ struct Descent {
     converged: bool,
 }
 
-/// Levenberg-Marquardt method along the columns of `basis`. The weights of the loss are updated in
-/// every iteration.
+/// Runs the Levenberg-Marquardt method along the columns of `basis`. The weights of the loss are
+/// updated in every iteration.
 fn descend<P: Residuals>(
     problem: &P,
     basis: &DMatrix<f64>,
@@ -371,8 +371,8 @@ const CLIPPED: f64 = 2.5;
 /// Mean of `min(z², CLIPPED²)` for standard normal z.
 const CLIPPED_MEAN: f64 = 0.977_56;
 
-/// Square of the scale s of the residuals; NaN without degrees of freedom. Robust (Huber's proposal
-/// 2): `Σ min(r²/s², CLIPPED²) = CLIPPED_MEAN (m - n)`.
+/// Returns the square of the scale s of the residuals; NaN without degrees of freedom. Robust
+/// (Huber's proposal 2): `Σ min(r²/s², CLIPPED²) = CLIPPED_MEAN (m - n)`.
 pub(crate) fn scale(residuals: &[f64], freedom: usize, loss: Loss) -> f64 {
     if freedom == 0 {
         return f64::NAN;

@@ -275,8 +275,8 @@ impl MeasuredArm<'_> {
         DMatrix::from_fn(rows, columns, |i, j| if j < p { 0.0 } else { slope(i, j - p) })
     }
 
-    /// Position of an instrument in the world if `placed`, and the rotation vector, in the
-    /// instrument's axes, by which it is turned from `X`.
+    /// Returns the position of an instrument in the world if `placed`, and the rotation vector, in
+    /// the instrument's axes, by which it is turned from `X`.
     fn instrument_at(&self, number: usize, X: &Pose, placed: bool, own: &[f64], slopes: bool) -> Block {
         let (X_IW, place, turn) = self.measurements.instrument(number, own);
         let X_WI = X_IW.inverse();
@@ -407,7 +407,8 @@ fn tool_twists<'a>(
     })
 }
 
-/// Left Jacobian of a rotation vector: angular velocity (fixed axes) per rate of the vector.
+/// Returns the left Jacobian of a rotation vector: angular velocity (fixed axes) per rate of the
+/// vector.
 fn left_jacobian(v: &Vector3<f64>) -> nalgebra::Matrix3<f64> {
     let angle = v.norm();
     let K = v.cross_matrix();

@@ -95,8 +95,8 @@ impl Parameter {
         matches!(self.effect, Effect::Stiffness(_) | Effect::Damping(_) | Effect::Damper { .. })
     }
 
-    /// Maximum standard deviation of the search coordinate for the parameter to count as
-    /// identifiable, whatever its prior is. It is also the default prior.
+    /// Returns the maximum standard deviation of the search coordinate for the parameter to count
+    /// as identifiable, whatever its prior is. It is also the default prior.
     pub fn reference(&self) -> f64 {
         match &self.effect {
             Effect::Stiffness(_) | Effect::Damping(_) | Effect::Damper { .. } => std::f64::consts::LN_2,
@@ -196,8 +196,8 @@ pub(crate) fn tool_shift(parameters: &[Parameter], x: &[f64]) -> (Vector3<f64>, 
     (p, turn)
 }
 
-/// Rate of change of an inertia about Bo, B axes, as it moves with velocity `v` at the point `p`
-/// and angular velocity `w`.
+/// Returns the rate of change of an inertia about Bo, B axes, as it moves with velocity `v` at the
+/// point `p` and angular velocity `w`.
 pub(crate) fn carried_along(
     I: &SpatialInertia,
     p: &Vector3<f64>,
@@ -248,7 +248,7 @@ pub(crate) fn entry_slope(n: usize, row: usize, column: usize, change: f64) -> D
     dK
 }
 
-/// `dK/d(ln factor)` of a spring's matrix.
+/// Returns `dK/d(ln factor)` of a spring's matrix.
 pub(crate) fn slope_of(K: &DMatrix<f64>, coordinate: Option<usize>) -> DMatrix<f64> {
     match coordinate {
         None => K.clone(),

@@ -118,7 +118,7 @@ impl Choice<'_> {
         }
     }
 
-    /// Cost function of the plan.
+    /// Evaluates the cost function of the plan.
     fn cost(&self, information: &DMatrix<f64>) -> f64 {
         if self.purpose.is_empty() {
             return -log_determinant(information);

@@ -117,7 +117,7 @@ impl MeasuredResponse {
         }
     }
 
-    /// Derivatives of the same two numbers, given that of the value.
+    /// Returns the derivatives of the same two numbers, given that of the value.
     pub(crate) fn number_slopes(&self, value: Complex<f64>, slope: Complex<f64>) -> [f64; 2] {
         match self.form {
             Form::Complex => [slope.re, slope.im],
@@ -237,7 +237,7 @@ pub enum ReadingKind {
 }
 
 impl Reading {
-    /// Number of measured numbers.
+    /// Returns the number of measured numbers.
     pub fn rows(&self) -> usize {
         match &self.kind {
             ReadingKind::Displacement { rows, .. } => rows.len(),
@@ -307,7 +307,7 @@ pub enum Instrument {
 }
 
 impl Instrument {
-    /// Number of unknowns.
+    /// Returns the number of unknowns.
     pub fn unknowns(&self) -> usize {
         match self {
             Self::Known(_) => 0,
@@ -329,8 +329,8 @@ pub struct Measurements {
 }
 
 impl Measurements {
-    /// Number of unknowns of the measurements: those of the instruments, then three per unknown
-    /// target.
+    /// Returns the number of unknowns of the measurements: those of the instruments, then three per
+    /// unknown target.
     pub fn own_unknowns(&self) -> usize {
         let targets = self.targets.iter().filter(|t| matches!(t, Target::Unknown(_))).count();
         self.of_instruments() + 3 * targets
@@ -340,7 +340,7 @@ impl Measurements {
         self.instruments.iter().map(Instrument::unknowns).sum()
     }
 
-    /// Number of measured numbers.
+    /// Returns the number of measured numbers.
     pub fn rows(&self) -> usize {
         self.readings.iter().map(Reading::rows).sum()
     }

@@ -64,7 +64,7 @@ impl Answer {
         }
     }
 
-    /// Unit of the magnitude.
+    /// Returns the unit of the magnitude.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Receptance => "m/N",
@@ -155,7 +155,7 @@ pub fn structure_slopes(
     })
 }
 
-/// Jacobian of each probe along its direction.
+/// Computes the Jacobian of each probe along its direction.
 fn rows(arm: &FlexibleArm, probes: &[Probe], q: &DVector<f64>) -> Vec<RowDVector<f64>> {
     let row = |probe: &Probe| {
         let J = Tangents::at(arm, &probe.frame, &Wrench::zeros(), q).J;
@@ -186,7 +186,7 @@ struct SpringSlope {
 }
 
 impl Damped<'_> {
-    /// Derivative of the damping matrix, given those of stiffness and mass.
+    /// Computes the derivative of the damping matrix, given those of stiffness and mass.
     pub(crate) fn slope(&self, effect: &Effect, dK: &DMatrix<f64>, dM: &DMatrix<f64>) -> DMatrix<f64> {
         let springs = self.springs(effect);
         let n = dK.nrows();
@@ -302,8 +302,8 @@ impl Damped<'_> {
 }
 
 impl StructureSlopes {
-    /// Derivatives of a mode's shape (`mode` from 0, the lowest) with respect to each parameter's
-    /// coordinate, at unit modal mass.
+    /// Computes the derivatives of a mode's shape (`mode` from 0, the lowest) with respect to each
+    /// parameter's coordinate, at unit modal mass.
     pub fn shape_slopes(&self, mode: usize) -> Vec<DVector<f64>> {
         let of = |change: &Structure| {
             let (S, T) =
@@ -373,7 +373,7 @@ impl StructureSlopes {
     }
 }
 
-/// Dynamic stiffness `K + iωD - ω²M`.
+/// Returns the dynamic stiffness `K + iωD - ω²M`.
 fn dynamic(s: &Structure, omega: f64) -> DMatrix<Complex<f64>> {
     let square = omega * omega;
     DMatrix::from_fn(s.K.nrows(), s.K.ncols(), |i, j| {

@@ -17,8 +17,8 @@ use crate::estimation::parameter::{Effect, Parameter, Plant, entry_slope, scaled
 /// Step of the central differences: maximum change of an elastic coordinate per step (m, rad).
 const DIFFERENCE: f64 = 1e-3;
 
-/// `dr/dx`: derivative of the unbalanced forces on the elastic coordinates with respect to each
-/// parameter, n×p.
+/// Computes `dr/dx`, the derivative of the unbalanced forces on the elastic coordinates with
+/// respect to each parameter, n×p.
 pub(crate) fn force_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) -> Result<DMatrix<f64>, StepError> {
     let n = at.deflections().len();
     let mut slopes = DMatrix::zeros(n, parameters.len());
@@ -54,8 +54,8 @@ pub(crate) fn force_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) ->
                     slopes[(first + column, k)] += factor * e[first + row];
                 }
             }
-            // These parameters exert no force here; the measurement accounts for payload and load
-            // at the tool.
+            // Damping exerts no force at rest; for a moved tool the caller accounts for payload and
+            // load.
             Effect::Damping(_) | Effect::Damper { .. } | Effect::Tool(_) => {}
             Effect::Mass { body, per_kg } => {
                 // Forces are linear in a mass: a difference of any size is exact.
@@ -78,8 +78,8 @@ fn carrying(arm: &FlexibleArm, body: usize, per_kg: &flexarm_kinematics::Spatial
     arm.with_inertia(body, inertia)
 }
 
-/// Derivatives of the tool pose as twists (world axes, at the tool's origin; m, rad) per unit of
-/// each parameter's coordinate, 6×p, at a solved pose.
+/// Computes the derivatives of the tool pose as twists (world axes, at the tool's origin; m, rad)
+/// per unit of each parameter's coordinate, 6×p, at a solved pose.
 ///
 /// For [`Effect::Tool`] this is only the part due to deflection, which is zero here: loads stay in
 /// place, and the motion of the frame itself is not included. [`crate::estimation::MeasuredArm`]
@@ -169,8 +169,8 @@ pub(crate) fn eigen(at: &Tangents) -> Result<(Vec<f64>, DMatrix<f64>), StepError
     Ok((omega2, shapes))
 }
 
-/// Derivative of matrices that depend on the coordinates, as the elastic coordinates move by `de`
-/// per unit.
+/// Computes the derivative of matrices that depend on the coordinates, as the elastic coordinates
+/// move by `de` per unit.
 pub(crate) fn along(
     arm: &FlexibleArm,
     q: &DVector<f64>,
@@ -198,8 +198,8 @@ pub(crate) fn along_coordinates(
     (0..a.len()).map(|k| ((&c[k] - &b[k]) * 8.0 - (&d[k] - &a[k])) / (12.0 * h)).collect()
 }
 
-/// Derivatives of the Cartesian compliance of the tool with locked drives at a solved pose: one 6×6
-/// per parameter, per unit of its coordinate (m/N, rad/N; m/(N m), rad/(N m)).
+/// Computes the derivatives of the Cartesian compliance of the tool with locked drives at a solved
+/// pose: one 6×6 per parameter, per unit of its coordinate (m/N, rad/N; m/(N m), rad/(N m)).
 ///
 /// * `F_T_W`: wrench of the solved operating point.
 ///
@@ -233,7 +233,7 @@ pub fn compliance_slopes(
     Ok(found)
 }
 
-/// Explicit derivatives of stiffness and mass with respect to the parameter.
+/// Computes the explicit derivatives of stiffness and mass with respect to the parameter.
 pub(crate) fn explicit(
     arm: &FlexibleArm,
     tool: &Frame,

@@ -164,8 +164,8 @@ impl Moved {
         Some(Self { A: -J, b: DVector::from_vec(b) })
     }
 
-    /// Part of `b` that the springs explain with non-negative compliances: the most negative
-    /// compliance is removed until none is negative.
+    /// Returns the part of `b` that the springs explain with non-negative compliances: the most
+    /// negative compliance is removed until none is negative.
     fn explained(&self, b: &DVector<f64>) -> DVector<f64> {
         let mut kept: Vec<usize> = (0..self.A.ncols()).collect();
         while !kept.is_empty() {
@@ -209,7 +209,7 @@ impl Moved {
     }
 }
 
-/// Residual of the positions over their spread, with each instrument at its best fit.
+/// Returns the residual of the positions over their spread, with each instrument at its best fit.
 fn place_rest(plant: &Plant, measurements: &Measurements) -> Option<f64> {
     let arm = MeasuredArm { plant, parameters: &[], measurements };
     let (world, seen) = (points(&arm.predicted(&DVector::zeros(0)).ok()?), points(&arm.observed()));

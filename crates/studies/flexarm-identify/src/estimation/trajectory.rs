@@ -79,8 +79,8 @@ pub fn error_slopes(
     run_slopes(arm, request, &directions)
 }
 
-/// Derivatives of the damping matrix after each change of inertia, a matrix per parameter. That
-/// damping is computed with the changed inertia at the initial pose.
+/// Computes the derivatives of the damping matrix after each change of inertia, a matrix per
+/// parameter. That damping is computed with the changed inertia at the initial pose.
 fn damping_after_changes(
     arm: &FlexibleArm,
     effects: &[Option<&Effect>],
@@ -109,7 +109,7 @@ fn damping_after_changes(
     Ok(found)
 }
 
-/// Derivatives with respect to a parameter, without those of the damping matrix.
+/// Computes the derivatives with respect to a parameter, without those of the damping matrix.
 fn direction(arm: &FlexibleArm, parameter: &RunParameter) -> Direction {
     let mut direction = Direction::default();
     match parameter {
@@ -159,8 +159,8 @@ fn direction(arm: &FlexibleArm, parameter: &RunParameter) -> Direction {
     direction
 }
 
-/// Derivatives of the damping matrix with respect to each parameter, by way of the modes at the
-/// start.
+/// Computes the derivatives of the damping matrix with respect to each parameter, by way of the
+/// modes at the start.
 fn damping_slopes(
     arm: &FlexibleArm,
     effects: &[Option<&Effect>],

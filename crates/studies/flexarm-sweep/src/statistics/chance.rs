@@ -89,7 +89,8 @@ fn threshold(terms: usize, freedom: usize, parameters: usize) -> f64 {
     1.0 - inv_beta_reg(0.5 * (freedom - terms) as f64, 0.5 * terms as f64, LEVEL / parameters as f64)
 }
 
-/// Legendre polynomials of the ranks, scaled to -1 to 1; equal values share their mean rank.
+/// Computes Legendre polynomials of the ranks, scaled to -1 to 1; equal values share their mean
+/// rank.
 fn polynomials(x: &[f64], terms: usize) -> Vec<Vec<f64>> {
     let mut order: Vec<usize> = (0..x.len()).collect();
     order.sort_by(|i, j| x[*i].total_cmp(&x[*j]));

@@ -67,7 +67,7 @@ pub fn sobol_indices(y: &[f64], dimensions: usize, seed: u64) -> Option<Vec<Sobo
     Some(found.iter().zip(&drawn).map(index).collect())
 }
 
-/// First-order and total index of each parameter over some base points.
+/// Returns the first-order and total index of each parameter over some base points.
 fn estimate(bases: &[&[f64]], rows: &[usize], dimensions: usize) -> Option<Vec<[f64; 2]>> {
     let n = rows.len() as f64;
     let sum: f64 = rows.iter().map(|k| bases[*k][0] + bases[*k][1]).sum();

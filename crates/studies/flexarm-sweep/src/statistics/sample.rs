@@ -28,7 +28,7 @@ impl SampleMethod {
         ("saltelli", Self::Saltelli, "count times (parameters + 2) points for Sobol indices"),
     ];
 
-    /// Maximum number of dimensions.
+    /// Returns the maximum number of dimensions.
     pub fn most_dimensions(self) -> usize {
         match self {
             Self::Random | Self::LatinHypercube => usize::MAX,
@@ -70,7 +70,7 @@ impl Sample {
         Some(Self { method, dimensions, count, seed, order })
     }
 
-    /// Number of points.
+    /// Returns the number of points.
     pub fn points(&self) -> usize {
         match self.method {
             SampleMethod::Saltelli => self.count * (self.dimensions + 2),

@@ -82,7 +82,7 @@ impl LeastSearch {
         }
     }
 
-    /// Number of points in a generation: a multiple of four.
+    /// Returns the number of points in a generation: a multiple of four.
     pub fn size(dimensions: usize) -> usize {
         let usual = 4 + (3.0 * (dimensions.max(1) as f64).ln()) as usize;
         usual.max(8).next_multiple_of(4)
