@@ -112,8 +112,9 @@ pub fn limit_of_depth(
     Ok(Some(described(structure, cutter, spindle, &period, depth, change)))
 }
 
-/// Computes all ranges of depth up to the maximum in which the cut chatters. Their ends have the
-/// given tolerance; the last range may end at the maximum depth.
+/// Computes all ranges of depth up to the maximum in which the cut chatters. The first limit has
+/// the given tolerance, the other ends that of elements refined once; the last range may end at the
+/// maximum depth.
 ///
 /// Cost: that of a limit times the number of further depths in the search. Ranges narrower than a
 /// step may be missed.
