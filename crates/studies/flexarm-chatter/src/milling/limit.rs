@@ -113,11 +113,11 @@ pub fn limit_of_depth(
 }
 
 /// Computes all ranges of depth up to the maximum in which the cut chatters. The first limit has
-/// the given tolerance; the other ends are those of elements refined once. The last range may end at
-/// the maximum depth.
+/// the given tolerance; the other ends are those of elements refined once. The last range may end
+/// at the maximum depth.
 ///
-/// Cost: that of a limit, plus an eigenvalue problem per further depth of the search. Ranges narrower
-/// than a step may be missed.
+/// Cost: that of a limit, plus an eigenvalue problem per further depth of the search. Ranges
+/// narrower than a step may be missed.
 ///
 /// # Errors
 /// As [`limit_of_depth`].
