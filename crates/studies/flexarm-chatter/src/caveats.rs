@@ -1,4 +1,4 @@
-//! Cutting tools: sizes of diameter, frequency, stiffness and damping that tools have.
+//! Caveats about cutting tools: plausible ranges of diameter, frequency, stiffness and damping.
 
 use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
@@ -9,28 +9,28 @@ use flexarm_run::caveat::slip::{self, Factor};
 
 use crate::CuttingTool;
 
-/// A cutter of a size that no arm carries, or finer than any.
+/// Diameter of a cutter outside the usual range.
 const TOOL_DIAMETER: CaveatKind = CaveatKind::warning(
     "tool-diameter",
     "the cutter of {where} has a diameter of {value} m, the usual range ends at {yardstick} m",
     "m",
     "check diameter and lengths of the tool's file",
 );
-/// A mode of a tool that is slower or faster than those of tools.
+/// Natural frequency of a tool's mode outside the usual range.
 const TOOL_FREQUENCY: CaveatKind = CaveatKind::warning(
     "tool-frequency",
     "{where} has a natural frequency of {value} Hz, the usual range of tools and spindles ends at {yardstick} Hz",
     "Hz",
     "frequencies of modes are in Hz",
 );
-/// A mode of a tool that is softer or stiffer than those of tools.
+/// Stiffness of a tool's mode outside the usual range.
 const TOOL_STIFFNESS: CaveatKind = CaveatKind::warning(
     "tool-stiffness",
     "{where} has a stiffness of {value} N/m, the usual range of tools and spindles ends at {yardstick} N/m",
     "N/m",
     "the stiffness of a mode is in N/m, its mass in kg",
 );
-/// A mode of a tool that is damped as no tool is.
+/// Damping ratio of a tool's mode outside the usual range.
 const TOOL_DAMPING: CaveatKind = CaveatKind::warning(
     "tool-damping",
     "{where} has a damping ratio of {value}, the usual range of tools and spindles ends at {yardstick}",
@@ -47,7 +47,7 @@ const TOO_FAST: &[Factor] = &[(1e-3, "kHz"), (TAU, "rad/s"), (60.0, "1/min")];
 const TOO_SOFT: &[Factor] = &[(1e-6, "N/um"), (1e-3, "N/mm")];
 const TOO_DAMPED: &[Factor] = &[(100.0, "per cent")];
 
-/// What of a tool is beyond what tools have.
+/// Returns the caveats about properties of a tool outside the usual ranges.
 pub fn tool_caveats(tool: &CuttingTool) -> Vec<Caveat> {
     let name = format!("the tool {:?}", tool.name);
     let mut found = Vec::new();

@@ -1,10 +1,10 @@
-//! One cut over time: the arm is run as it is, with the force of the teeth as a load that depends
-//! on where the tool is and was.
+//! Simulation of one cut over time: the full model of the arm, with the force of the teeth as a
+//! load that depends on present and past positions of the tool.
 //!
-//! The arm stands at its pose and the work moves past it. At each step the force at the end of the
-//! next is found from the tip as it is going to be (a parabola through the last three places), with
-//! the tool's own modes, which answer exactly; within the step it is linear. The arm is not
-//! linearised, and teeth leave the work where it swings out of it.
+//! The arm is held at its pose, and the workpiece moves past it. Each step predicts the tip by a
+//! parabola through its last three positions, adds the exact response of the tool's own modes, and
+//! computes the force at the end of the next step; within a step the force is linear. The arm is
+//! not linearised, and teeth lose contact with the workpiece where the tool moves out of it.
 
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
@@ -33,44 +33,45 @@ use flexarm_run::caveat;
 use flexarm_run::{Keep, RunRequest};
 use flexarm_sample::Sample;
 
-/// Tooth periods over which figures are taken.
+/// Number of tooth periods at the end over which figures are computed.
 const LATE: usize = 60;
-/// Fewest and most tooth periods that a run lasts if it is not told how long.
+/// Minimum and maximum number of tooth periods of a simulation without a given duration.
 const TEETH: (f64, f64) = (240.0, 4000.0);
-/// It lasts until the start has decayed, or chatter has grown, by the exponential of this.
+/// The simulation lasts until the initial transient has decayed, or chatter has grown, by the
+/// exponential of this.
 const DECAYED: f64 = 12.0;
-/// Motion that differs by more than this from tooth to tooth, in feeds per tooth, and does not
-/// become less, is chatter.
+/// Scatter from tooth to tooth over the feed per tooth above which lasting motion is chatter.
 const CHATTER: f64 = 0.01;
-/// What counts as not becoming less, from one half of the late part to the other.
+/// Minimum ratio of the late scatter to that of the interval before for lasting motion.
 const LASTING: f64 = 0.8;
 
-/// Frequencies among which the swing is looked for, and steps over which it is then found closer.
+/// Maximum number of frequencies in the search for the chatter frequency, and number of steps for
+/// its refinement.
 const FREQUENCIES: usize = 4000;
 const LONGER: usize = 60_000;
-/// Most steps of a run.
+/// Maximum number of steps.
 const MOST_STEPS: usize = 4_000_000;
 
-/// A cut to be followed.
+/// Arguments of [`cut`].
 #[derive(Clone, Debug)]
 pub struct CutRequest {
-    /// Which links bend and how.
+    /// Modelling of links and drives.
     pub modelling: Modelling,
     /// Spindle speed (1/min).
     pub spindle_rpm: f64,
-    /// Depth (m).
+    /// Depth of cut (m).
     pub depth_m: f64,
-    /// How long (s); as long as it takes to see without it.
+    /// Duration (s); if absent, as long as chatter needs to appear or decay.
     pub seconds: Option<f64>,
-    /// Steps per tooth period.
+    /// Number of steps per tooth period.
     pub steps: usize,
-    /// Folder of the files; none without it.
+    /// Folder of the output files; none are written if absent.
     pub output: Option<PathBuf>,
-    /// Overwrite what is there.
+    /// Whether to overwrite existing files.
     pub overwrite: bool,
 }
 
-/// Answer of `flexarm lobes` for one cut over time. SI units; axes of the cut.
+/// Result of `flexarm lobes` for one cut over time. SI units; axes of the cut.
 #[derive(Clone, Debug, Serialize)]
 pub struct CutRun {
     /// Name of the robot.
@@ -79,50 +80,50 @@ pub struct CutRun {
     pub tool: String,
     /// Spindle speed (1/min).
     pub spindle_rpm: f64,
-    /// Depth (m).
+    /// Depth of cut (m).
     pub depth_m: f64,
-    /// Limit of depth at this speed (m); null if there is none up to the deepest that the tool
-    /// looks at.
+    /// Limit of depth at this speed (m); null if there is none up to the maximum depth of the tool
+    /// or the depth of this cut.
     pub limit_m: Option<f64>,
-    /// Frequency with which the limit chatters (Hz).
+    /// Chatter frequency at the limit (Hz).
     pub limit_hz: Option<f64>,
-    /// Size of the largest multiplier of a tooth period at this depth: above 1 the linear cut
-    /// chatters.
+    /// Magnitude of the largest multiplier over a tooth period at this depth; above 1 the
+    /// linearised cut chatters.
     pub multiplier: f64,
-    /// Whether the run chattered.
+    /// Whether the simulated cut chatters.
     pub chatters: bool,
-    /// How much the tip moved differently from tooth to tooth at the end: standard deviation (m).
+    /// Scatter of the tip's motion from tooth to tooth at the end: standard deviation (m).
     pub scatter_m: f64,
-    /// The same over the feed per tooth.
+    /// Scatter over the feed per tooth.
     pub scatter_per_feed: f64,
     /// Feed per tooth (m).
     pub feed_per_tooth_m: f64,
-    /// Largest displacement of the tip at the end, from where it is without a cut (m).
+    /// Maximum displacement of the tip at the end, relative to its position without a cut (m).
     pub peak_m: f64,
-    /// Largest force on the tool at the end (N).
+    /// Maximum force on the tool at the end (N).
     pub peak_n: f64,
-    /// Frequency at which the tip swings most at the end, beside those of the teeth (Hz); null
-    /// without chatter.
+    /// Frequency of the largest component of the tip's motion at the end, apart from the tooth
+    /// frequencies (Hz); null without chatter.
     pub swing_hz: Option<f64>,
-    /// Length of the run (s).
+    /// Duration of the simulation (s).
     pub seconds: f64,
-    /// Length of a step (s).
+    /// Step size (s).
     pub step_s: f64,
-    /// What the caveats warn of, as sentences.
+    /// Sentences of the caveats that are warnings.
     pub warnings: Vec<String>,
-    /// What is probably wrong with the input, or limits the worth of the result.
+    /// Caveats about the input and the validity of the result.
     pub caveats: Vec<Caveat>,
-    /// The curves.
+    /// Simulated curves.
     #[serde(skip)]
     pub curves: Simulated,
-    /// The table; null if nothing was written.
+    /// Path of the table; null if nothing was written.
     pub file: Option<String>,
-    /// Picture; null if nothing was written.
+    /// Path of the plot; null if nothing was written.
     pub plot: Option<String>,
 }
 
-/// What the load of the run knows: forces in world axes at the two ends of the step that is next,
-/// and the tip from the TCP.
+/// State of the simulation's load: forces at both ends of the next step, and the vector from the
+/// TCP to the tip, in world axes.
 #[derive(Clone, Copy, Debug)]
 struct Next {
     from: f64,
@@ -132,10 +133,10 @@ struct Next {
     tip: Vector3<f64>,
 }
 
-/// Follows one cut.
+/// Simulates one cut.
 ///
 /// # Errors
-/// As [`super::lobes`]; [`Error::Step`] where the run stops.
+/// As [`super::lobes`]; [`Error::Step`] if the simulation fails.
 pub fn cut(robot: &Robot, tool: &CuttingTool, at: Option<&[f64]>, request: &CutRequest) -> Result<CutRun, Error> {
     if tool.measured.is_some() {
         return Err(LobesError::MeasuredTool.into());
@@ -179,7 +180,7 @@ pub fn cut(robot: &Robot, tool: &CuttingTool, at: Option<&[f64]>, request: &CutR
     Ok(answer)
 }
 
-/// The run itself.
+/// Runs the simulation.
 fn run(
     robot: &Robot,
     tool: &CuttingTool,
@@ -222,18 +223,18 @@ fn run(
     Ok(follower.curves)
 }
 
-/// What is kept from step to step.
+/// State kept from step to step.
 struct Follower {
     work: RegenerativeCut,
     tool: ForcedMotion,
-    /// World to the axes of the cut.
+    /// Rotation from world axes to the axes of the cut.
     R_CW: Matrix3<f64>,
     next: Arc<Mutex<Next>>,
     step_s: f64,
     step: usize,
-    /// The tip without a cut, world axes.
+    /// Position of the tip without a cut, world axes.
     rest: Option<Vector3<f64>>,
-    /// The tip as the arm moves it, the last three steps, axes of the cut.
+    /// Displacement of the tip due to the arm in the last three steps, axes of the cut.
     past: [Vector3<f64>; 3],
     force: Vector3<f64>,
     curves: Simulated,
@@ -256,12 +257,13 @@ impl Follower {
         }
     }
 
-    /// The arm at the end of a step; `tip`: from the TCP to the tip, world axes.
+    /// Processes the state of the arm at the end of a step; `tip`: from the TCP to the tip, world
+    /// axes.
     fn see(&mut self, t: f64, p_W: Vector3<f64>, tip: Vector3<f64>) {
         let rest = *self.rest.get_or_insert(p_W + tip);
         let arm = self.R_CW * (p_W + tip - rest);
         self.past = [arm, self.past[0], self.past[1]];
-        // The force that was there at the end of the step.
+        // Force at the end of the step.
         let before = self.force;
         if self.step > 0 {
             let ended = self.next.lock().unwrap_or_else(PoisonError::into_inner).end;
@@ -274,7 +276,7 @@ impl Follower {
             self.curves.force.push(self.force);
             self.curves.chip.push(chip);
         }
-        // Where the tip is going, and the force there.
+        // Predicted position of the tip at the end of the next step, and the force there.
         let going = self.past[0] * 3.0 - self.past[1] * 3.0 + self.past[2];
         let free = going + self.tool.predicted(&self.force);
         let mut end = self.force;
@@ -326,8 +328,8 @@ fn figures(robot: &Robot, tool: &CuttingTool, curves: &Simulated, cut: &Cut, mul
     }
 }
 
-/// Frequency of the largest part of the motion that is not the same from tooth to tooth: roughly
-/// over the late part, then closer over a longer one.
+/// Returns the frequency of the largest component of the motion that differs from tooth to tooth:
+/// coarse over the late part, then refined over a longer one.
 fn swing_hz(curves: &Simulated, cut: &Cut, from: usize) -> f64 {
     let h = curves.time[1] - curves.time[0];
     let late = swing(&curves.displacement[from..], cut.steps);
@@ -344,7 +346,7 @@ fn swing_hz(curves: &Simulated, cut: &Cut, from: usize) -> f64 {
     largest(&mut { near }, &longer)
 }
 
-/// A motion of whole tooth periods without what repeats with the teeth.
+/// Subtracts the part that repeats with the teeth from a motion of whole tooth periods.
 fn swing(motion: &[Vector3<f64>], steps: usize) -> Vec<Vector3<f64>> {
     let periods = (motion.len() / steps).max(1) as f64;
     let mean = |moment: usize| motion.iter().skip(moment).step_by(steps).sum::<Vector3<f64>>() / periods;
@@ -352,7 +354,7 @@ fn swing(motion: &[Vector3<f64>], steps: usize) -> Vec<Vector3<f64>> {
     motion.iter().enumerate().map(|(k, u)| u - means[k % steps]).collect()
 }
 
-/// Square of the part of a motion at a frequency (Hz).
+/// Returns the squared magnitude of a motion's component at a frequency (Hz).
 fn size_at(motion: &[Vector3<f64>], h: f64, hz: f64) -> f64 {
     let (mut s, mut c) = (Vector3::zeros(), Vector3::zeros());
     for (k, u) in motion.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! What `flexarm lobes` writes: table, diagram, page, figures.
+//! Output files of `flexarm lobes`: table, diagram, page, figures.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -12,15 +12,15 @@ use flexarm_run::Error;
 use flexarm_run::html_page::opening;
 use flexarm_settings::written::markup;
 
-/// Files in the output folder.
+/// File names in the output folder.
 pub(super) const NAMES: [&str; 4] = ["lobes.csv", "lobes.svg", "lobes.html", "lobes.json"];
-/// Files of a cut over time.
+/// File names for a cut over time.
 pub(super) const CUT_NAMES: [&str; 3] = ["cut.csv", "cut.svg", "cut.json"];
-/// Points of a curve that a picture can show.
+/// Maximum number of plotted points of a curve.
 const SHOWN: usize = 4000;
-/// Limits, and frequencies, further apart than this are drawn over a logarithmic axis.
+/// Ratio of maximum to minimum above which limits and frequencies have a logarithmic axis.
 const WIDE: f64 = 40.0;
-/// Poses that are drawn one by one.
+/// Maximum number of poses with a curve each.
 const DRAWN: usize = 8;
 
 pub(super) fn save(answer: &mut Lobes, tool: &CuttingTool, paths: [PathBuf; 4]) -> Result<(), Error> {
@@ -35,8 +35,8 @@ pub(super) fn save(answer: &mut Lobes, tool: &CuttingTool, paths: [PathBuf; 4]) 
     Ok(write_all(&files.collect::<Vec<_>>())?)
 }
 
-/// A positive number with this many digits behind the point, or as many as show two that count,
-/// never above the number itself: what is called safe below a limit is safe.
+/// Formats a positive number with the given number of decimals, or as many as show two significant
+/// digits. Rounds down, so that a depth below a stability limit remains below it.
 pub fn rounded_down(x: f64, digits: usize) -> String {
     let needed = if x > 0.0 { (1.0 - x.log10().floor()).clamp(0.0, 12.0) as usize } else { 0 };
     let digits = digits.max(needed);
@@ -61,7 +61,7 @@ fn csv(answer: &Lobes) -> String {
     text
 }
 
-/// Depth and chatter frequency over the spindle speed.
+/// Plots depth and chatter frequency over the spindle speed.
 fn plot(answer: &Lobes, tool: &CuttingTool) -> Result<String, PlotError> {
     let rpm = |p: &LobePoint| p.spindle_rpm;
     let depths = |f: &dyn Fn(&LobePoint) -> Option<f64>| -> Vec<f64> {
@@ -115,7 +115,7 @@ fn plot(answer: &Lobes, tool: &CuttingTool) -> Result<String, PlotError> {
     .svg()
 }
 
-/// A curve with gaps where there is no limit: one of the same name per stretch.
+/// Splits a curve with gaps into one curve of the same name per stretch.
 fn stretches(name: &str, look: CurveLook, x: &[f64], y: &[f64]) -> Vec<PlotCurve> {
     let mut curves: Vec<PlotCurve> = Vec::new();
     let mut open = false;
@@ -215,10 +215,10 @@ fn cut_csv(answer: &CutRun) -> String {
     text
 }
 
-/// Displacement over the whole run, the force at its end.
+/// Plots displacement and force over the whole simulation.
 fn cut_plot(answer: &CutRun) -> Result<String, PlotError> {
     let c = &answer.curves;
-    // Of each piece the smallest and the largest value.
+    // Minimum and maximum of each chunk of samples.
     let every = (2 * c.time.len() / SHOWN).max(1);
     let swing = |f: &dyn Fn(usize) -> f64| -> (Vec<f64>, Vec<f64>) {
         let all: Vec<usize> = (0..c.time.len()).collect();

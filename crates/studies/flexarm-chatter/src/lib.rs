@@ -1,9 +1,9 @@
-//! Chatter: the limits of depth of a cutting tool on the flexible arm, over the spindle speed, at a
-//! pose or along a motion.
+//! Chatter: limits of the depth of cut of a cutting tool on the flexible arm over the spindle
+//! speed, at a pose or along a motion.
 //!
-//! At each pose the arm is a linear structure about its equilibrium; the tool's own modes, or its
-//! measured response, are in series with it (`place.rs`). The limits are those of [`milling`].
-//! Start at [`lobes`]. [`cut`] follows one cut over time, on the arm as it moves.
+//! At each pose the arm is a linear structure about its equilibrium, in series with the tool's own
+//! modes or its measured response (`place.rs`). The limits are those of [`milling`]. Start at
+//! [`lobes`]. [`cut`] simulates one cut over time, on the moving arm.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
@@ -43,34 +43,36 @@ pub use tool_file::CuttingTool;
 
 use place::Place;
 
-/// Where the tool cuts.
+/// Poses at which the tool cuts.
 #[derive(Clone, Debug)]
 pub enum CuttingPlace<'a> {
-    /// At a pose: all actuated joints (rad or m), zero without it.
+    /// One pose: all actuated joints (rad or m), zero if `None`.
     At(Option<&'a [f64]>),
-    /// At so many places of a motion, evenly in time, where the tool moves; the feed is along the
-    /// motion if the tool says none.
+    /// A number of poses along a motion, at equal intervals of time where the tool moves. The feed
+    /// follows the motion unless the tool gives one.
     Along(&'a Motion, usize),
 }
 
-/// How limits are looked for.
+/// Arguments of [`lobes`].
 #[derive(Clone, Debug, Default)]
 pub struct LobesRequest {
-    /// Which links bend and how.
+    /// Modelling of links and drives.
     pub modelling: Modelling,
-    /// Deepest cut that is looked at (m); that of the tool without it.
+    /// Maximum depth of cut (m); that of the tool if absent.
     pub deepest_m: Option<f64>,
-    /// The mean force alone (zero-order solution) instead of the multipliers of the tooth period.
+    /// Whether to use the mean force (zero-order solution) instead of the multipliers of the tooth
+    /// period.
     pub zero_order: bool,
-    /// All unstable ranges of depth of each speed, not the lowest limit alone (at a pose).
+    /// Whether to find all unstable ranges of depth at each speed, not only the lowest limit (at a
+    /// pose).
     pub ranges: bool,
-    /// Folder of the files; none without it.
+    /// Folder of the output files; none are written if absent.
     pub output: Option<PathBuf>,
-    /// Overwrite what is there.
+    /// Whether to overwrite existing files.
     pub overwrite: bool,
 }
 
-/// Answer of `flexarm lobes`. SI units, speeds in 1/min.
+/// Result of `flexarm lobes`. SI units, spindle speeds in 1/min.
 #[derive(Clone, Debug, Serialize)]
 pub struct Lobes {
     /// Name of the robot.
@@ -79,57 +81,54 @@ pub struct Lobes {
     pub tool: String,
     /// Joints, in coordinate order.
     pub joints: Vec<String>,
-    /// floquet or zero-order.
+    /// Method: `floquet` or `zero-order`.
     pub method: &'static str,
-    /// Deepest cut that was looked at (m).
+    /// Maximum depth of cut in the search (m).
     pub deepest_m: f64,
-    /// One per speed: the smallest limit over all poses.
+    /// Minimum limit over all poses, one per speed.
     pub points: Vec<LobePoint>,
-    /// Below this depth the cut is stable at every speed that was asked for (m); null if nothing
-    /// chatters.
+    /// Depth below which the cut is stable at every speed (m); null if it never chatters.
     pub stable_below_m: Option<f64>,
-    /// Speed of that limit (1/min).
+    /// Speed of this limit (1/min).
     pub stable_below_at_rpm: Option<f64>,
-    /// The speed with the deepest stable cut (1/min), and that (m); the deepest that was looked at
-    /// where nothing chatters.
+    /// Speed with the maximum stable depth of cut (1/min).
     pub best_rpm: f64,
-    /// Its depth (m).
+    /// Maximum stable depth of cut at this speed (m); [`Self::deepest_m`] if it does not chatter.
     pub best_depth_m: f64,
-    /// What was found at each pose.
+    /// Limits at each pose.
     pub poses: Vec<PoseLobes>,
-    /// The first of them, for people.
+    /// Description of the first pose, for output.
     #[serde(skip)]
     pub(crate) pose_in_words: String,
-    /// Places of the motion that were left out: the tool stands still there, or moves along its
+    /// Number of poses of the motion that are left out: the tool is at rest or moves along its
     /// axis.
     pub left_out: usize,
-    /// The table; null if nothing was written.
+    /// Path of the table; null if nothing was written.
     pub file: Option<String>,
-    /// Written files.
+    /// Output files.
     pub files: LobesFiles,
-    /// What the caveats warn of, as sentences.
+    /// Sentences of the caveats that are warnings.
     pub warnings: Vec<String>,
-    /// What is probably wrong with the input, or limits the worth of the result.
+    /// Caveats about the input and the validity of the result.
     pub caveats: Vec<Caveat>,
 }
 
-/// A limit.
+/// Stability limit.
 #[derive(Clone, Debug, Serialize)]
 pub struct LobePoint {
     /// Spindle speed (1/min).
     pub spindle_rpm: f64,
-    /// Depth above which the cut chatters (m); null if it does not, up to the deepest that was
-    /// looked at.
+    /// Depth above which the cut chatters (m); null if it is stable up to the maximum depth.
     pub depth_m: Option<f64>,
-    /// Frequency at which the tip then swings most (Hz).
+    /// Frequency of the largest component of the tip's motion at the limit (Hz).
     pub chatter_hz: Option<f64>,
-    /// hopf (a frequency of its own) or flip (every second tooth cuts the same).
+    /// Type of bifurcation: `hopf` (independent frequency) or `flip` (period of two teeth).
     pub kind: Option<&'static str>,
     /// Limit of the zero-order solution, for comparison (m).
     pub zero_order_depth_m: Option<f64>,
-    /// Which pose it is of.
+    /// Index of the pose.
     pub pose: usize,
-    /// All unstable ranges of depth (m), if asked for.
+    /// All unstable ranges of depth (m), if requested.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub unstable_m: Vec<[f64; 2]>,
 }
@@ -137,101 +136,101 @@ pub struct LobePoint {
 /// Limits at one pose.
 #[derive(Clone, Debug, Serialize)]
 pub struct PoseLobes {
-    /// Joints (rad or m).
+    /// Joint values (rad or m).
     pub at: Vec<f64>,
-    /// When the motion is there (s).
+    /// Time of the pose in the motion (s).
     pub time_s: Option<f64>,
     /// Direction of the feed, world axes.
     pub feed: [f64; 3],
-    /// From the spindle to the tip, world axes.
+    /// Direction from the spindle to the tip, world axes.
     pub axis: [f64; 3],
     /// Lowest natural frequencies of arm and tool (Hz).
     pub frequencies_hz: Vec<f64>,
-    /// Compliance at rest along the feed, across it, and along the tool (m/N).
+    /// Static compliance along the feed, across it, and along the tool's axis (m/N).
     pub compliance: [f64; 3],
-    /// Lowest limit (m); null if nothing chatters.
+    /// Minimum limit over all speeds (m); null if the cut never chatters.
     pub stable_below_m: Option<f64>,
-    /// Its speed (1/min).
+    /// Speed of this limit (1/min).
     pub stable_below_at_rpm: Option<f64>,
     /// Limit at each speed (m).
     pub depth_m: Vec<Option<f64>>,
 }
 
-/// Written files; null where none was written.
+/// Output files; null for files that were not written.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct LobesFiles {
     /// Table.
     pub csv: Option<String>,
     /// Diagram.
     pub plot: Option<String>,
-    /// Page for the browser.
+    /// HTML page.
     pub page: Option<String>,
-    /// This answer.
+    /// Result as JSON.
     pub json: Option<String>,
 }
 
-/// Why there are no lobes.
+/// Reason why limits cannot be computed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LobesError {
-    /// The structure or the cut.
+    /// Error of the structure or the cut.
     #[error("{place}: {source}{}", if matches!(source, ChatterError::Undamped { .. }) { "; give the links and drives of the robot damping" } else { "" })]
     Chatter {
-        /// The pose, in words.
+        /// Description of the pose.
         place: String,
-        /// Why.
+        /// Cause.
         source: ChatterError,
     },
-    /// Neither the arm nor the tool yields.
+    /// Neither the arm nor the tool is flexible.
     #[error(
         "nothing yields: the robot has no flexible link and no elastic drive, and the tool no mode and no measured response"
     )]
     NothingYields,
-    /// The feed goes along the tool.
+    /// The feed is parallel to the tool's axis.
     #[error("the feed is along the tool's axis: give the tool a feed across its axis (feed = [...] in [tool])")]
     FeedAlongAxis,
-    /// The feed is not known.
+    /// The feed is unknown.
     #[error(
         "the motion never moves the tool across its axis: there is no feed; give the tool one (feed = [...] in [tool])"
     )]
     NoFeed,
-    /// A motion without places.
+    /// Too few poses along the motion.
     #[error("{found} places along the motion: expected {least} or more")]
     Places {
-        /// Asked for.
+        /// Requested number.
         found: usize,
-        /// Least.
+        /// Minimum number.
         least: usize,
     },
-    /// A measured response has no multipliers.
+    /// The method needs modes, but the tool has a measured response.
     #[error(
         "the tool has a measured response, which tells modes only when one is fitted: the limits are those of the zero-order solution; ranges and runs need [[mode]] entries"
     )]
     MeasuredTool,
-    /// A depth that makes no sense.
+    /// The maximum depth is not a positive number.
     #[error("the deepest cut is {found} m, expected a positive number")]
     Deepest {
-        /// Found.
+        /// Value found (m).
         found: f64,
     },
-    /// A run of too many steps.
+    /// The simulation would take too many steps.
     #[error("the run would take {steps} steps, at most {most}: ask for a shorter one, or fewer steps per tooth")]
     Long {
-        /// Steps.
+        /// Number of steps.
         steps: usize,
-        /// Most.
+        /// Maximum number of steps.
         most: usize,
     },
-    /// A length of a run that makes no sense.
+    /// The duration of the simulation is not a positive number.
     #[error("{} is {found} s, expected a positive number", flexarm_settings::Setting::Seconds)]
     Seconds {
-        /// Found.
+        /// Value found (s).
         found: f64,
     },
-    /// A speed that makes no sense.
+    /// A spindle speed is not a positive number.
     #[error("the spindle speed is {found} 1/min, expected a positive number")]
     Speed {
-        /// Found.
+        /// Value found (1/min).
         found: f64,
     },
 }
@@ -244,12 +243,13 @@ impl From<LobesError> for flexarm_run::Error {
 
 impl ExternalError for LobesError {}
 
-/// Limits of depth at a pose or along a motion.
+/// Computes the limits of depth at a pose or along a motion.
 ///
-/// `go_on` is told how many of how many limits are done and may break off by `false`.
+/// `go_on` receives the numbers of finished limits and of all limits; it stops the computation by
+/// returning `false`.
 ///
 /// # Errors
-/// [`LobesError`] where nothing yields or the feed makes no sense; [`Error::Pose`], [`Error::Step`]
+/// [`LobesError`] if nothing is flexible or the feed is invalid; [`Error::Pose`], [`Error::Step`]
 /// for poses without an equilibrium; [`Error::Interrupted`]; errors of files.
 pub fn lobes(
     robot: &Robot,
@@ -361,13 +361,13 @@ fn check_deepest(depth_m: f64) -> Result<(), Error> {
     Ok(())
 }
 
-/// The lowest limit of depth at a pose over all speeds of the tool (m): the deepest cut that is
-/// looked at where nothing chatters, NaN where the feed is along the tool's axis.
+/// Returns the minimum limit of depth at a pose over all speeds of the tool (m): the maximum depth
+/// if the cut never chatters, NaN if the feed is parallel to the tool's axis.
 ///
-/// * `zero_order`: by the mean force alone, as for a tool with a measured response.
+/// * `zero_order`: whether to use the mean force, as for a tool with a measured response.
 ///
 /// # Errors
-/// Those of [`lobes`] at a pose.
+/// As [`lobes`] at a pose.
 pub fn lowest_limit(
     robot: &Robot,
     modelling: &Modelling,
@@ -389,7 +389,7 @@ pub fn lowest_limit(
     Ok(lowest)
 }
 
-/// The smallest of two limits; none is the largest.
+/// Returns the smaller of two limits; no limit counts as infinite.
 fn lower<'p>(a: &'p LobePoint, b: &'p LobePoint) -> &'p LobePoint {
     let depth = |p: &LobePoint| p.depth_m.unwrap_or(f64::INFINITY);
     if depth(b) < depth(a) { b } else { a }

@@ -1,5 +1,5 @@
-//! A measured frequency response of a tool: a table of real and imaginary parts, linear between its
-//! frequencies.
+//! Measured frequency response of a tool: a table of real and imaginary parts, interpolated
+//! linearly over frequency.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -9,26 +9,27 @@ use nalgebra::{Complex, Matrix3};
 
 use flexarm_run::Error;
 
-/// Entries that a table may have, with their places; the others are their mirror images, or zero.
+/// Entries that a table may contain, with row and column; the others follow by symmetry or are
+/// zero.
 const ENTRIES: [(&str, usize, usize); 6] =
     [("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2)];
 
-/// Displacement of the tip per force on it, in the axes of the TCP, measured on a spindle that does
-/// not yield itself.
+/// Displacement of the tip per force on it, in the axes of the TCP, measured on a rigidly held
+/// spindle.
 #[derive(Clone, Debug)]
 pub(crate) struct MeasuredResponse {
-    /// Ascending, rad/s.
+    /// Angular frequencies, ascending (rad/s).
     pub(crate) omega: Vec<f64>,
-    /// m/N.
+    /// Frequency response (m/N).
     pub(crate) values: Vec<Matrix3<Complex<f64>>>,
 }
 
 impl MeasuredResponse {
-    /// From a table with `frequency_hz`, and `xx_re`, `xx_im` and so on in m/N.
+    /// Reads a table with `frequency_hz`, and `xx_re`, `xx_im` and so on in m/N.
     ///
     /// # Errors
-    /// [`Error::File`] for columns that are missing, unknown or not whole, and frequencies that do
-    /// not ascend.
+    /// [`Error::File`] for missing, unknown or incomplete columns, and for frequencies that are not
+    /// ascending.
     pub(crate) fn new(table: &NumberTable, path: &Path) -> Result<Self, Error> {
         let fail = |what: String| Error::File { path: path.to_owned(), what };
         let names: Vec<String> = ENTRIES.iter().flat_map(|(e, ..)| [format!("{e}_re"), format!("{e}_im")]).collect();
@@ -68,7 +69,7 @@ impl MeasuredResponse {
         Ok(Self { omega, values })
     }
 
-    /// Linear between the measured frequencies, the ends beyond them.
+    /// Interpolates linearly between the measured frequencies; constant beyond them.
     pub(crate) fn at(&self, omega: f64) -> Matrix3<Complex<f64>> {
         let k = self.omega.partition_point(|w| *w <= omega).clamp(1, self.omega.len() - 1);
         let s = ((omega - self.omega[k - 1]) / (self.omega[k] - self.omega[k - 1])).clamp(0.0, 1.0);

@@ -1,5 +1,5 @@
-//! Arm and tool as the cutter feels them at one pose: poles in the axes of the cut, or a measured
-//! response beside those of the arm.
+//! Compliance of arm and tool at the cutter at one pose: poles in the axes of the cut, plus the
+//! measured response of the tool if there is one.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -21,15 +21,15 @@ use flexarm_run::TCP_FRAME;
 use flexarm_run::posed::Posed;
 use flexarm_run::response::pose_in_words;
 
-/// Fewest places along a motion.
+/// Minimum number of poses along a motion.
 const LEAST_PLACES: usize = 2;
-/// A tool slower than this stands still (m/s).
+/// Speed below which the tool counts as at rest (m/s).
 const STANDS: f64 = 1e-5;
-/// A feed nearer to the tool's axis than this (sine of the angle) is along it.
+/// Sine of the angle to the tool's axis below which a feed counts as parallel to it.
 const ALONG_AXIS: f64 = 0.05;
-/// Difference of times for the direction of the feed (s).
+/// Time difference for the direction of the feed (s).
 const INSTANT: f64 = 1e-4;
-/// Natural frequencies that are told.
+/// Maximum number of reported natural frequencies.
 const TOLD: usize = 6;
 
 /// One pose with the axes of the cut: x along the feed, z from the tip to the spindle.
@@ -37,22 +37,22 @@ pub(super) struct Place {
     posed: Posed,
     linear: Linear,
     pub(super) time_s: Option<f64>,
-    /// World axes.
+    /// Direction of the feed, world axes.
     pub(super) feed: Vector3<f64>,
-    /// From the spindle to the tip, world axes.
+    /// Direction from the spindle to the tip, world axes.
     pub(super) axis: Vector3<f64>,
-    /// TCP to world.
+    /// Rotation from TCP to world axes.
     R_WT: Matrix3<f64>,
     /// Arm and modes of the tool, in the axes of the cut.
     pub(super) structure: Structure,
-    /// The tool's, if it is measured.
+    /// Measured response of the tool, if any, and rotation from its axes to those of the cut.
     measured: Option<(MeasuredResponse, Matrix3<f64>)>,
-    /// Angular frequencies at which the response is worth knowing, rad/s.
+    /// Angular frequencies for evaluating the response (rad/s).
     pub(super) band: Vec<f64>,
 }
 
 impl Place {
-    /// At a pose.
+    /// Returns the place at a pose.
     pub(super) fn at(
         robot: &Robot,
         modelling: &Modelling,
@@ -62,8 +62,8 @@ impl Place {
         Self::new(Posed::new(robot, modelling, at)?, tool, None, None)
     }
 
-    /// Along a motion, evenly in time, where the tool moves across its axis; and how many places
-    /// were left out.
+    /// Returns places along a motion, at equal intervals of time, where the tool moves across its
+    /// axis, and the number of intervals without a place.
     pub(super) fn along(
         robot: &Robot,
         modelling: &Modelling,
@@ -114,7 +114,8 @@ impl Place {
         let feed = match (tool.feed, along) {
             (Some(feed), _) => feed.in_world(&R_WT),
             (None, Some(along)) => along,
-            // Any direction across the tool: the x axis of the TCP, or y where that is the tool's.
+            // Arbitrary direction across the tool: the x axis of the TCP, or y if x is near the
+            // tool's axis.
             (None, None) if (R_WT.inverse() * axis).x.abs() < 0.9 => R_WT * Vector3::x(),
             (None, None) => R_WT * Vector3::y(),
         };
@@ -141,7 +142,7 @@ impl Place {
         Ok(place)
     }
 
-    /// Displacement of the tip per force on it, axes of the cut, m/N.
+    /// Returns the displacement of the tip per force on it (m/N), axes of the cut.
     pub(super) fn response(&self, omega: f64) -> Matrix3<Complex<f64>> {
         let mut G = self.structure.frequency_response(omega);
         if let Some((measured, R)) = &self.measured {
@@ -151,8 +152,8 @@ impl Place {
         G
     }
 
-    /// Where the response is looked at: about the poles, and at measured frequencies, not beyond
-    /// the highest of these.
+    /// Returns the angular frequencies for evaluating the response: around the poles, and the
+    /// measured frequencies; none above the highest measured one.
     fn frequencies(&self) -> Vec<f64> {
         let mut band = self.structure.frequencies();
         if let Some((measured, _)) = &self.measured {
@@ -173,40 +174,40 @@ impl Place {
         hz
     }
 
-    /// Axes of the cut as columns, world axes.
+    /// Returns the axes of the cut as columns, world axes.
     pub(super) fn axes_of_cut(&self) -> Matrix3<f64> {
         let z = -self.axis;
         Matrix3::from_columns(&[self.feed, z.cross(&self.feed), z])
     }
 
-    /// The tool's own modes alone, axes of the cut.
+    /// Returns the tool's own modes as a structure, axes of the cut.
     pub(super) fn tool_structure(&self, tool: &CuttingTool) -> Structure {
         let modes = tool_modes(tool, &(self.axes_of_cut().transpose() * self.R_WT));
         Structure::from_modes(&modes).expect("as they were when the place was made")
     }
 
-    /// The pose in words.
+    /// Returns the description of the pose.
     pub(super) fn words(&self) -> String {
         pose_in_words(&self.posed.joints, &self.posed.at, &self.posed.prismatic)
     }
 
-    /// Actuated joints.
+    /// Returns the actuated joints.
     pub(super) fn joints(&self) -> &[String] {
         &self.posed.joints
     }
 
-    /// Their values (rad or m).
+    /// Values of the actuated joints (rad or m).
     pub(super) fn pose(&self) -> &[f64] {
         &self.posed.at
     }
 
-    /// What is to be said of the robot and of its pose.
+    /// Returns the caveats about the robot and its pose.
     pub(super) fn told(&self, robot: &Robot) -> Vec<Caveat> {
         self.posed.caveats_of(robot, &self.linear, &[0.0; 6])
     }
 }
 
-/// Axes of the cut as columns: x along the feed, z from the tip to the spindle.
+/// Returns the axes of the cut as columns: x along the feed, z from the tip to the spindle.
 fn cutting_axes(feed: &Vector3<f64>, axis: &Vector3<f64>) -> Result<Matrix3<f64>, LobesError> {
     let z = -axis;
     let across = feed - z * z.dot(feed);
@@ -217,14 +218,15 @@ fn cutting_axes(feed: &Vector3<f64>, axis: &Vector3<f64>) -> Result<Matrix3<f64>
     Ok(Matrix3::from_columns(&[x, z.cross(&x), z]))
 }
 
-/// Arm and tool in series. `R_CW`: world to axes of the cut; `R_WT`: TCP to world.
+/// Returns arm and tool in series. `R_CW`: rotation from world axes to those of the cut; `R_WT`:
+/// from TCP to world axes.
 fn structure(
     linear: &Linear,
     tool: &CuttingTool,
     R_CW: Matrix3<f64>,
     R_WT: &Matrix3<f64>,
 ) -> Result<Structure, crate::milling::ChatterError> {
-    // Velocity of the tip: that of the TCP and its rotation.
+    // Velocity of the tip: velocity of the TCP plus the effect of its angular velocity.
     let tip = R_WT * tool.tip;
     let mut J = Matrix3xX::zeros(linear.J.ncols());
     for (mut column, twist) in J.column_iter_mut().zip(linear.J.column_iter()) {
@@ -235,7 +237,7 @@ fn structure(
     Ok(arm.in_series(&Structure::from_modes(&tool_modes(tool, &(R_CW * R_WT)))?))
 }
 
-/// The tool's own modes in the axes of the cut. `R_CT`: from those of the TCP.
+/// Returns the tool's own modes in the axes of the cut. `R_CT`: rotation from the axes of the TCP.
 fn tool_modes(tool: &CuttingTool, R_CT: &Matrix3<f64>) -> Vec<Mode> {
     let modes = tool.modes.iter().flat_map(|mode| {
         let directions = match mode.direction {

@@ -1,5 +1,5 @@
-//! The file of a cutting tool (`docs/lobes.md`): cutter, engagement, speeds, where it sits, how it
-//! yields; units are converted here.
+//! File of a cutting tool (`docs/lobes.md`): cutter, engagement, spindle speeds, position of the
+//! tip, flexibility. Units are converted here.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ use flexarm_run::RobotFileError;
 use flexarm_run::robot_file::Source;
 use flexarm_run::toml_file::parsed;
 
-/// The file as written.
+/// Contents of the file as written.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ToolFile {
@@ -58,11 +58,11 @@ struct CoefficientEntry {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct EngagementEntry {
-    /// up, down, slot, full or angles.
+    /// `up`, `down`, `slot`, `full` or `angles`.
     kind: Spanned<String>,
-    /// Radial depth.
+    /// Radial depth of cut.
     ae: Option<Spanned<f64>>,
-    /// Radial depth over diameter.
+    /// Radial depth of cut over diameter.
     immersion: Option<Spanned<f64>>,
     entry: Option<Spanned<f64>>,
     exit: Option<Spanned<f64>>,
@@ -71,7 +71,7 @@ struct EngagementEntry {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct SpindleEntry {
-    /// 1/min.
+    /// Spindle speeds (1/min).
     rpm: Option<Spanned<Vec<f64>>>,
     from: Option<Spanned<f64>>,
     to: Option<Spanned<f64>>,
@@ -92,14 +92,14 @@ struct ToolEntry {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ModeEntry {
-    /// radial, axial, or a direction.
+    /// `radial`, `axial`, or a direction.
     direction: Spanned<DirectionEntry>,
-    /// Hz.
+    /// Natural frequency (Hz).
     frequency: Spanned<f64>,
     damping: Spanned<f64>,
-    /// kg.
+    /// Modal mass (kg).
     mass: Option<Spanned<f64>>,
-    /// N/m.
+    /// Modal stiffness (N/m).
     stiffness: Option<Spanned<f64>>,
 }
 
@@ -116,39 +116,39 @@ struct MeasuredEntry {
     file: Spanned<PathBuf>,
 }
 
-/// A cutting tool as its file has it, SI units.
+/// Cutting tool from its file, in SI units.
 #[derive(Clone, Debug)]
 pub struct CuttingTool {
-    /// Name of the file.
+    /// Name of the tool, the stem of its file name.
     pub name: String,
     pub(crate) cutter: Cutter,
-    /// Spindle speeds, 1/min, ascending.
+    /// Spindle speeds (1/min), ascending.
     pub rpm: Vec<f64>,
-    /// Deepest cut that is looked at, m.
+    /// Maximum depth of cut (m).
     pub deepest: f64,
-    /// From the spindle to the tip.
+    /// Direction from the spindle to the tip.
     pub(crate) axis: Direction,
-    /// Along the feed.
+    /// Direction of the feed.
     pub(crate) feed: Option<Direction>,
-    /// The tip in the axes of the TCP, m.
+    /// Position of the tip in the axes of the TCP (m).
     pub(crate) tip: Vector3<f64>,
-    /// m, for runs over time.
+    /// Feed per tooth (m), for simulations over time.
     pub(crate) feed_per_tooth: f64,
     pub(crate) modes: Vec<ToolMode>,
     pub(crate) measured: Option<MeasuredResponse>,
 }
 
-/// A unit vector in the axes of the TCP or of the world.
+/// Unit vector in the axes of the TCP or of the world.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Direction {
-    /// Turns with the TCP.
+    /// Fixed in the TCP.
     Tcp(Vector3<f64>),
-    /// Stays as it is.
+    /// Fixed in the world.
     World(Vector3<f64>),
 }
 
 impl Direction {
-    /// In world axes. `R_WT`: TCP to world.
+    /// Returns the direction in world axes. `R_WT`: rotation from TCP to world axes.
     pub(crate) fn in_world(self, R_WT: &Rotation3<f64>) -> Vector3<f64> {
         match self {
             Self::Tcp(direction) => R_WT * direction,
@@ -157,37 +157,37 @@ impl Direction {
     }
 }
 
-/// A mode of the tool itself.
+/// Mode of the tool itself.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ToolMode {
     pub(crate) direction: ToolDirection,
-    /// rad/s.
+    /// Natural frequency (rad/s).
     pub(crate) omega: f64,
     pub(crate) damping_ratio: f64,
-    /// kg.
+    /// Modal mass (kg).
     pub(crate) mass: f64,
 }
 
-/// Where a mode of the tool swings.
+/// Direction of a mode of the tool.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum ToolDirection {
-    /// Both directions across the tool alike.
+    /// Both radial directions, with equal modes.
     Radial,
-    /// Along it.
+    /// Along the tool's axis.
     Axial,
-    /// A unit vector in the axes of the TCP.
+    /// Unit vector in the axes of the TCP.
     Along(Vector3<f64>),
 }
 
-/// Deepest cut that is looked at if the file does not say: this many diameters.
+/// Default maximum depth of cut over the diameter.
 const DEEPEST: f64 = 1.0;
-/// Feed per tooth in runs if the file does not say, over the diameter.
+/// Default feed per tooth in simulations over the diameter.
 const FEED: f64 = 0.005;
-/// Spindle speeds of a range if the file does not say.
+/// Default number of spindle speeds in a range.
 const POINTS: usize = 101;
-/// Diameters of cutters.
+/// Valid range of cutter diameters.
 const DIAMETER: Quantity = Quantity { unit: "m", least: 1e-6, most: 2.0 };
-/// Most spindle speeds.
+/// Maximum number of spindle speeds.
 const MOST_POINTS: usize = 10_000;
 
 const LENGTHS: [(&str, f64); 2] = [("m", 1.0), ("mm", 1e-3)];
@@ -198,8 +198,8 @@ impl CuttingTool {
     /// Reads the file of a tool.
     ///
     /// # Errors
-    /// [`Error::RobotFile`] with file, place, what was found and what was expected; [`Error::File`]
-    /// for a table.
+    /// [`Error::RobotFile`] with the file and place, the value found and the values expected;
+    /// [`Error::File`] for a table.
     pub fn load(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
         let text = read_text(path)?;
@@ -216,12 +216,12 @@ impl CuttingTool {
         reader.tool(&file, name)
     }
 
-    /// Spindle speeds that the file asks for, 1/min.
+    /// Returns the spindle speeds of the file (1/min).
     pub fn spindle_rpm(&self) -> &[f64] {
         &self.rpm
     }
 
-    /// The same tool at other spindle speeds (1/min, positive), in any order.
+    /// Returns the tool with other spindle speeds (1/min, positive), given in any order.
     #[must_use]
     pub fn at_speeds(mut self, mut rpm: Vec<f64>) -> Self {
         rpm.sort_by(f64::total_cmp);
@@ -244,7 +244,7 @@ fn unit(
     })
 }
 
-/// What all entries need.
+/// Data for reading entries.
 struct Reader<'a> {
     source: &'a Source,
     folder: &'a Path,
@@ -318,8 +318,8 @@ impl Reader<'_> {
             engagement: self.engagement(engagement, diameter)?,
         };
         cutter.check().map_err(|error| self.error(e.coefficients.span(), error.to_string()))?;
-        // Units mixed up are off by a million: the softest plastics have 1e7, hard alloys below
-        // 1e10 N/m².
+        // Confused units are off by a million: coefficients are 1e7 N/m² for the softest plastics
+        // and below 1e10 N/m² for hard alloys.
         if !(1e6..1e11).contains(&coefficients.tangential) {
             let message = format!(
                 "the tangential coefficient is {:.3e} N/m2; materials have 1e7 to 1e10: is the unit right (pressures = \"N/mm2\")?",
@@ -427,7 +427,7 @@ impl Reader<'_> {
         }
     }
 
-    /// A direction and the axes that it is given in.
+    /// Reads a direction and the axes in which it is given.
     fn direction(
         &self,
         [what, its_axes]: [&str; 2],
@@ -501,7 +501,7 @@ impl Reader<'_> {
         MeasuredResponse::new(&NumberTable::read(&path)?, &path)
     }
 
-    /// A positive number in SI units.
+    /// Returns a positive number in SI units.
     fn positive(&self, what: &str, value: &Spanned<f64>, unit: f64, quantity: Quantity) -> Result<f64, Error> {
         match unit * *value.get_ref() {
             x if x > 0.0 || x.is_nan() => self.told(value.span(), quantity.check(what, x)),
@@ -509,7 +509,7 @@ impl Reader<'_> {
         }
     }
 
-    /// A point, m.
+    /// Returns a point (m).
     fn point(&self, what: &str, value: &Spanned<[f64; 3]>) -> Result<Vector3<f64>, Error> {
         let point = Vector3::from(*value.get_ref()) * self.length;
         self.told(value.span(), Quantity::LENGTH.check_all(what, &point)).map(|()| point)

@@ -1,5 +1,5 @@
-//! Six classical cases, 41 spindle speeds each, against the limits of another program
-//! (`tests/golden/milling_lobes.json`, good to 0.2 %).
+//! Six classical cases with 41 spindle speeds each, against the limits from another program
+//! (`tests/golden/milling_lobes.json`, accurate to 0.2 %).
 #![allow(
     clippy::unwrap_used,
     clippy::print_stderr,
@@ -23,7 +23,7 @@ struct Case {
     rows: Vec<Row>,
 }
 
-/// Speed (1/min), and depth (m), kind and frequency (Hz) where there is a limit.
+/// Speed (1/min), and depth (m), type and frequency (Hz) if there is a limit.
 type Row = (f64, Option<(f64, Kind, f64)>);
 
 fn cases() -> Vec<Case> {
@@ -58,7 +58,8 @@ fn read(name: &str, case: &Value) -> Case {
     }
 }
 
-/// Truth: the limits of another program with another method, to 0.2 %; required within 0.5 %.
+/// Truth: limits from another program with another method, accurate to 0.2 %; required within 0.5
+/// %.
 #[test]
 fn every_limit_of_the_classical_cases_is_met() {
     let mut worst: f64 = 0.0;
@@ -80,16 +81,16 @@ fn every_limit_of_the_classical_cases_is_met() {
             assert!(found.change <= 1e-3, "{} at {rpm} rpm: {:.1e}", case.name, found.change);
         }
         eprintln!("{}: {:.3} %, {beside:.3} Hz, {largest} unknowns", case.name, 100.0 * far);
-        // measured 0.06 Hz
+        // measured: 0.06 Hz
         assert!(beside < 0.3, "{}: {beside}", case.name);
         worst = worst.max(far);
     }
-    // measured 0.11 %
+    // measured: 0.11 %
     assert!(worst < 0.005, "{worst}");
 }
 
-/// Convergence: the tolerance of 1e-3 is met by far, against elements halved until nothing moves by
-/// 1e-7.
+/// Convergence: the error is well below the tolerance of 1e-3, compared with elements refined to a
+/// tolerance of 1e-7.
 #[test]
 fn limits_asked_for_more_exactly_move_less_than_their_tolerance() {
     let mut worst: f64 = 0.0;
@@ -105,12 +106,12 @@ fn limits_asked_for_more_exactly_move_less_than_their_tolerance() {
         }
     }
     eprintln!("largest difference {worst:.1e}");
-    // measured 8e-8: elements are of high order, one halving too many costs little
+    // measured: 8e-8; elements are of high order, one refinement too many costs little
     assert!(worst < 1e-5, "{worst:.1e}");
 }
 
-/// The zero-order solution is another algorithm: near in a slot of two modes, blind to period
-/// doubling at low immersion.
+/// The zero-order solution is another algorithm: accurate in a slot with two modes, but without
+/// period doubling at low immersion.
 #[test]
 fn the_zero_order_solution_is_near_in_slots_and_misses_flips() {
     for case in cases() {
@@ -137,8 +138,8 @@ fn the_zero_order_solution_is_near_in_slots_and_misses_flips() {
     }
 }
 
-/// Truth: the search over the whole band. Up to a depth the limit is the same or none, and where
-/// nothing chatters nothing is searched.
+/// Truth: the search over the whole band. With a maximum depth the limit is the same or none, and
+/// frequencies without chatter are skipped.
 #[test]
 fn a_search_up_to_a_depth_finds_the_same_limit_with_less_work() {
     let mut work = [0, 0];
@@ -160,12 +161,12 @@ fn a_search_up_to_a_depth_finds_the_same_limit_with_less_work() {
         }
     }
     eprintln!("{work:?} responses");
-    assert!(10 * work[1] < 7 * work[0], "{work:?}"); // measured 0.57
+    assert!(10 * work[1] < 7 * work[0], "{work:?}"); // measured: 0.57
 }
 
-/// A mode damped to 30000 times critical has poles from 2e-5 to 6e4 times its frequency: 23 million
-/// points of the whole band. Where the teeth are so slow that the resonance alone takes too many,
-/// the search is refused.
+/// A mode with a damping ratio of 30000 has poles from 2e-5 to 6e4 times its frequency, that is, 23
+/// million points over the whole band. If the tooth frequency is so low that the
+/// resonance by itself needs too many points, the search returns an error.
 #[test]
 fn the_work_of_a_limit_does_not_grow_with_the_damping() {
     let cutter = Cutter::straight(3, Coefficients { tangential: 8e8, radial: 2.5e8, axial: 0.0 }, Engagement::slot());
@@ -184,7 +185,7 @@ fn the_work_of_a_limit_does_not_grow_with_the_damping() {
         let band = structure.frequencies();
         let found = zero_order_limit(&response, &cutter, 6000.0 * TAU / 60.0, &band, 0.02);
         eprintln!("damping {damping}, {stiffness:e} N/m: {} responses, {found:?}", calls.get());
-        assert!(found.is_ok() && calls.get() < 5000, "{} {found:?}", calls.get()); // measured 2223
+        assert!(found.is_ok() && calls.get() < 5000, "{} {found:?}", calls.get()); // measured: 2223
         let slow = zero_order_limit(&response, &cutter, 1e-6 * TAU / 60.0, &band, 1.0);
         assert!(matches!(slow, Ok(None) | Err(ChatterError::TooSlow { .. })), "{slow:?}");
         assert!(calls.get() < 800_000, "{}", calls.get());

@@ -1,5 +1,5 @@
-//! Limits with a closed form: constant forces (as in turning), the lowest limit of one mode, forces
-//! of teeth summed by hand.
+//! Limits in closed form: constant forces (as in turning), the minimum limit of one mode, sums of
+//! tooth forces.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stderr,
@@ -26,9 +26,10 @@ fn along_x(hz: f64, zeta: f64, stiffness: f64) -> Structure {
     Structure::from_modes(&[mode(hz, zeta, stiffness, Vector3::x())]).unwrap()
 }
 
-/// Truth: four teeth all the way round sum to a constant force, `F = -b N/2 K_r (x - x(t - T))`:
-/// turning, whose limit is `b N/2 K_r = -1 / (2 Re G(ω))` with `ω T = 2 π k + 3 π + 2 arg G`
-/// [Tlusty & Poláček 1963]; here for chosen ω, T by the phase.
+/// Truth: the forces of four teeth engaged over the full turn sum to a constant force,
+/// `F = -b N/2 K_r (x - x(t - T))`, as in turning. Its limit is `b N/2 K_r = -1 / (2 Re G(ω))` with
+/// `ω T = 2 π k + 3 π + 2 arg G` [Tlusty & Poláček 1963]; here ω is chosen and T follows from the
+/// phase.
 #[test]
 fn constant_forces_have_the_lobes_of_turning() {
     let structure = along_x(150.0, 0.03, 2e7);
@@ -40,7 +41,7 @@ fn constant_forces_have_the_lobes_of_turning() {
         let depth = -1.0 / (2.0 * G.re) / (2.0 * STEEL.radial);
         let T = (2.0 * PI * lobe + (3.0 * PI + 2.0 * G.arg()).rem_euclid(TAU)) / omega;
         let spindle = cutter.pitch() / T;
-        // Other lobes may be lower: take the lowest.
+        // Other lobes may have a lower limit: takes the minimum.
         let others = (0..60).flat_map(|k| crossings(&structure, T, k)).fold(f64::INFINITY, f64::min);
         let truth = others.min(depth);
         let found = limit_of_depth(&structure, &cutter, spindle, &LimitOptions::to(0.2)).unwrap().unwrap();
@@ -52,11 +53,12 @@ fn constant_forces_have_the_lobes_of_turning() {
         zero_order = zero_order.max((zero.depth / truth - 1.0).abs());
     }
     eprintln!("semi-discrete {worst:.1e}, zero order {zero_order:.1e}");
-    // measured 2e-9 and 1e-15
+    // measured: 2e-9 and 1e-15
     assert!(worst < 1e-6 && zero_order < 1e-9, "{worst:.1e} {zero_order:.1e}");
 }
 
-/// Limits of turning on the lobe k at the delay T, by bisection of the phase over ω above the mode.
+/// Returns the limit of turning on the lobe k at the delay T, by bisection of the phase over ω
+/// above the mode.
 fn crossings(structure: &Structure, T: f64, k: i32) -> Option<f64> {
     let phase = |w: f64| {
         let G = structure.frequency_response(w)[(0, 0)];
@@ -74,8 +76,8 @@ fn crossings(structure: &Structure, T: f64, k: i32) -> Option<f64> {
     (G.re < 0.0).then(|| -1.0 / (2.0 * G.re) / (2.0 * STEEL.radial))
 }
 
-/// Truth: the lowest limit of one mode under a constant force is `2 k ζ (1 + ζ)` over its
-/// coefficient, at any lobe.
+/// Truth: the minimum limit of one mode under a constant force is `2 k ζ (1 + ζ)` over its
+/// coefficient, on any lobe.
 #[test]
 fn the_lowest_limit_of_one_mode_is_two_k_zeta() {
     let (k, zeta) = (2e7, 0.03);
@@ -89,7 +91,7 @@ fn the_lowest_limit_of_one_mode_is_two_k_zeta() {
     let lowest = limits.fold(f64::INFINITY, f64::min);
     let truth = 2.0 * k * zeta * (1.0 + zeta) / (2.0 * STEEL.radial);
     eprintln!("{lowest:.6e}, closed form {truth:.6e}");
-    // measured 9e-5: how near the speeds come to the lowest point
+    // measured: 9e-5, due to the spacing of the speeds
     assert!((lowest / truth - 1.0).abs() < 1e-3 && lowest > truth * (1.0 - 1e-9));
 }
 
@@ -113,14 +115,14 @@ fn forces_of_helical_teeth_are_the_sum_of_their_slices() {
     let mean: Matrix3<f64> = (0..turn).map(at).sum();
     let averaged = (straight.mean_force_matrix() - mean).norm() / mean.norm();
     eprintln!("slices {worst:.1e}, mean {averaged:.1e}");
-    // measured 2e-5 (slices at the edge of the cut) and 1e-5
+    // measured: 2e-5 (slices at the edge of the cut) and 1e-5
     assert!(worst < 5e-4 && averaged < 1e-4, "{worst:.1e} {averaged:.1e}");
     let same = (helical.mean_force_matrix() - straight.mean_force_matrix()).norm();
     assert!(same == 0.0);
 }
 
-/// Identity: a helix that lags by a whole pitch over the depth has a constant force, so that the
-/// zero-order solution is exact there.
+/// Identity: a helix that lags by a whole pitch over the depth has a constant force, for which the
+/// zero-order solution is exact.
 #[test]
 fn at_a_depth_of_one_axial_pitch_a_helix_cuts_with_constant_force() {
     let modes =
@@ -134,7 +136,7 @@ fn at_a_depth_of_one_axial_pitch_a_helix_cuts_with_constant_force() {
     };
     assert!(spread(pitch) < 1e-12 && spread(0.5 * pitch) > 0.1);
 
-    // Scale the coefficients so that the limit lies exactly there, by the zero-order solution.
+    // Scales the coefficients so that the limit of the zero-order solution is exactly this depth.
     let spindle = 4321.0 * TAU / 60.0;
     let response = |w: f64| structure.frequency_response(w);
     let limit =
@@ -148,11 +150,11 @@ fn at_a_depth_of_one_axial_pitch_a_helix_cuts_with_constant_force() {
     let turn = (multiplier.arg().abs() - (TAU * limit.chatter_hz * tooth + PI).rem_euclid(TAU) + PI).abs();
     let turn = turn.min((multiplier.arg().abs() + (TAU * limit.chatter_hz * tooth + PI).rem_euclid(TAU) - PI).abs());
     eprintln!("multiplier {:.3e} off the circle, angle {turn:.1e}", multiplier.norm() - 1.0);
-    // measured 1e-11 and 5e-12
+    // measured: 1e-11 and 5e-12
     assert!((multiplier.norm() - 1.0).abs() < 1e-8 && turn < 1e-8);
 }
 
-/// Identity: without a helix angle, and with one so small that it changes nothing.
+/// Identity: no helix angle, and one so small that it changes nothing.
 #[test]
 fn a_helix_that_goes_to_nothing_is_a_straight_tooth() {
     let structure = along_x(922.0, 0.011, 2e7);
@@ -168,8 +170,7 @@ fn a_helix_that_goes_to_nothing_is_a_straight_tooth() {
     assert!((a / c - 1.0).abs() > 1e-3);
 }
 
-/// Identity: turning structure and engagement about the tool, and mirroring up into down, change no
-/// limit.
+/// Identity: rotating structure and engagement about the tool changes no limit.
 #[test]
 fn limits_do_not_depend_on_the_direction_of_the_feed() {
     let modes =
@@ -179,24 +180,23 @@ fn limits_do_not_depend_on_the_direction_of_the_feed() {
     let spindle = 3000.0 * TAU / 60.0;
     let options = LimitOptions { tolerance: 1e-6, ..LimitOptions::to(0.1) };
     let first = limit_of_depth(&structure, &cutter, spindle, &options).unwrap().unwrap();
-    // A tooth at φ + a in axes turned by a clockwise about z.
+    // A tooth at φ + a in axes rotated by a, clockwise about z.
     let a = 0.9;
     let R = nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), -a).into_inner();
     let turned = Cutter { engagement: Engagement { entry: 0.4 + a, exit: 2.0 + a }, ..cutter };
     let second = limit_of_depth(&structure.rotated(&R), &turned, spindle, &options).unwrap().unwrap();
     let change = (first.depth / second.depth - 1.0).abs();
     eprintln!("{:.6e} m, {change:.1e}", first.depth);
-    // measured 4e-13
+    // measured: 4e-13
     assert!(change < 1e-9, "{change:.1e}");
 }
 
-/// A range ends where multipliers return: inside of each range the multiplier is above 1, outside
-/// below.
+/// Inside each range the magnitude of the largest multiplier is above 1, outside it is below 1.
 #[test]
 fn unstable_ranges_hold_what_multipliers_say() {
     let structure = along_x(922.0, 0.011, 1.34e6);
-    // Period doubling of helical teeth has islands: with the depth the teeth overlap, and the
-    // forces come and go less.
+    // Period doubling of helical teeth has islands: with increasing depth the teeth overlap, and
+    // the forces vary less.
     let cutter = Cutter { diameter: 0.008, helix: PI / 6.0, ..Cutter::straight(2, STEEL, Engagement::down(0.05)) };
     let mut several = 0;
     for rpm in [14_400.0, 16_200.0, 17_000.0, 17_800.0, 18_200.0] {

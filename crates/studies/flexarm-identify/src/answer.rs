@@ -1,4 +1,4 @@
-//! What `flexarm identify` answers, and how it is made of what was found.
+//! Result of `flexarm identify`, built from the result of the estimation.
 
 use std::path::Path;
 
@@ -17,200 +17,200 @@ use flexarm_run::Caveat;
 use flexarm_run::Error;
 use flexarm_run::Robot;
 
-/// Readings that are named as arguing against the model.
+/// Maximum number of suspicious readings in the result.
 const MOST_SUSPICIOUS: usize = 10;
 
-/// Answer of `flexarm identify`.
+/// Result of `flexarm identify`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Identification {
-    /// The robot.
+    /// Robot.
     pub robot: String,
-    /// The file of measurements.
+    /// File of measurements.
     pub measurements: String,
-    /// How many readings, and numbers in them.
+    /// Number of readings.
     pub readings: usize,
-    /// Numbers that were measured.
+    /// Number of measured numbers.
     pub numbers: usize,
-    /// What was fitted.
+    /// Fitted parameters.
     pub parameters: Vec<FittedParameter>,
     /// Correlation of the parameters, row after row.
     pub correlation: Vec<Vec<f64>>,
-    /// Combinations that the readings do not tell.
+    /// Combinations that the readings do not determine.
     pub untold: Vec<Vec<Weight>>,
     /// RMS of the residuals.
     pub residual: Residual,
-    /// RMS over readings that the fit had not seen; null with fewer than two readings.
+    /// RMS of cross-validation residuals; null with fewer than two readings.
     pub held_out: Option<HeldOutFigures>,
-    /// How many times larger than its declared deviation the scatter is, where chance does not
-    /// explain it; else null.
+    /// Ratio of the scatter to the declared one if chance does not explain it; otherwise null.
     pub misfit: Option<f64>,
-    /// Whether the deviations of the readings were given; if not, the scatter tells them.
+    /// Whether the deviations of the readings were given; if not, they are estimated from the
+    /// scatter.
     pub deviations_known: bool,
-    /// Gears of which motor and link were recorded.
+    /// Gears with recorded positions of motor and link.
     pub encoders: Vec<EncoderFigures>,
-    /// Readings that argue against the rest, the worst first.
+    /// Readings that contradict the others, worst first.
     pub suspicious: Vec<Suspicious>,
-    /// Measured shapes of modes against those of the arm.
+    /// Measured mode shapes compared with those of the arm.
     pub shapes: Vec<ShapeFigures>,
-    /// Unknown instruments as found, in the world.
+    /// Estimated poses of unknown instruments, in the world.
     pub instruments: Vec<FoundFrame>,
-    /// Unknown targets as found, tool axes (m).
+    /// Estimated positions of unknown targets in tool axes (m).
     pub targets: Vec<FoundPoint>,
-    /// Iterations.
+    /// Number of iterations.
     pub iterations: usize,
-    /// Whether the search ended by itself, at a fit that meets the readings.
+    /// Whether the search converged to a solution that fits the readings.
     pub converged: bool,
-    /// The new robot file.
+    /// New robot file.
     pub file: Option<String>,
-    /// The page.
+    /// Path of the page.
     pub page: Option<String>,
-    /// What is doubtful, of the robot as well.
+    /// Caveats about the identification and the robot.
     pub caveats: Vec<Caveat>,
-    /// The sentences of the caveats that warn.
+    /// Sentences of the caveats that are warnings.
     pub warnings: Vec<String>,
-    /// Instruments and targets: what each is.
+    /// Descriptions of the instruments and targets.
     #[serde(skip)]
     pub frames: Vec<String>,
-    /// Frequency responses: measured, expected before and after.
+    /// Frequency responses: measured, predicted before and after.
     #[serde(skip)]
     pub responses: Vec<ResponseCurves>,
-    /// Each number: measured, expected before and after.
+    /// Measured numbers: measured, predicted before and after.
     #[serde(skip)]
     pub compared: Vec<Compared>,
 }
 
-/// A number of the robot file as it was found.
+/// Estimate of a number of the robot file.
 #[derive(Clone, Debug, Serialize)]
 pub struct FittedParameter {
-    /// By the names of the robot file.
+    /// Name, as in the robot file.
     pub name: String,
     /// Unit of the values.
     pub unit: String,
-    /// Before.
+    /// Initial value.
     pub initial: f64,
-    /// Now; the initial value where the readings say nothing.
+    /// Estimated value; the initial value if the parameter is not identifiable.
     pub value: f64,
-    /// Standard deviation; not a number (null in JSON) where the readings do not tell it or the fit
-    /// does not meet them.
+    /// Standard deviation; NaN (null in JSON) if the parameter is not identifiable or the model
+    /// does not fit the readings.
     pub std: f64,
-    /// Where it lies in 95 of 100 cases; not numbers (nulls) without a deviation.
+    /// 95 % confidence interval; NaN (nulls) where `std` is NaN.
     pub interval: [f64; 2],
-    /// Whether the readings tell it.
+    /// Whether the readings determine the parameter.
     pub identifiable: bool,
 }
 
-/// A parameter in a combination.
+/// Parameter in a combination.
 #[derive(Clone, Debug, Serialize)]
 pub struct Weight {
-    /// Its name.
+    /// Name of the parameter.
     pub name: String,
-    /// Its weight, over the prior deviation.
+    /// Weight of the parameter over its prior deviation.
     pub weight: f64,
 }
 
-/// RMS before and after.
+/// RMS of the residuals before and after.
 #[derive(Clone, Debug, Serialize)]
 pub struct Residual {
     /// With the robot file as it is.
     pub before: f64,
-    /// With what was found.
+    /// With the estimated parameters.
     pub after: f64,
-    /// `m`, `Hz`, or `std` where readings of several units are mixed.
+    /// `m`, `Hz`, or `std` where readings have different units.
     pub unit: &'static str,
 }
 
-/// RMS over readings that the fit had not seen.
+/// RMS of cross-validation residuals.
 #[derive(Clone, Debug, Serialize)]
 pub struct HeldOutFigures {
-    /// Parts that were held out in turn.
+    /// Number of folds.
     pub folds: usize,
-    /// With the parameters fitted to the others.
+    /// With the parameters fitted to the other folds.
     pub rms: f64,
     /// With the robot file as it is.
     pub rms_before: f64,
-    /// As of the residual.
+    /// Unit, as in [`Residual`].
     pub unit: &'static str,
 }
 
-/// A reading that argues against the rest.
+/// Reading that contradicts the others.
 #[derive(Clone, Debug, Serialize)]
 pub struct Suspicious {
-    /// Which reading and number of it.
+    /// Name of the reading and of the number in it.
     pub reading: String,
-    /// Measured (SI).
+    /// Measured value (SI).
     pub measured: f64,
-    /// Expected with what was found.
+    /// Value predicted with the estimated parameters (SI).
     pub expected: f64,
-    /// Difference over what its scatter would be.
+    /// Residual over its own standard deviation after the fit.
     pub normalised: f64,
 }
 
-/// A measured shape against the arm's mode that is most like it.
+/// Measured mode shape and the most similar mode of the arm.
 #[derive(Clone, Debug, Serialize)]
 pub struct ShapeFigures {
-    /// Which reading.
+    /// Name of the reading.
     pub reading: String,
-    /// The mode, from 1, with what was found.
+    /// Number of the mode, from 1, with the estimated parameters.
     pub mode: usize,
-    /// Modal assurance criterion with the robot file as it is, from 0 to 1.
+    /// Modal assurance criterion with the robot file as it is (0 to 1).
     pub assurance_before: f64,
-    /// The same with what was found.
+    /// Modal assurance criterion with the estimated parameters (0 to 1).
     pub assurance: f64,
 }
 
-/// Where an instrument stands.
+/// Pose of an instrument.
 #[derive(Clone, Debug, Serialize)]
 pub struct FoundFrame {
-    /// Its name.
+    /// Name of the instrument.
     pub name: String,
-    /// In the world (m).
+    /// Position in the world (m).
     pub xyz: [f64; 3],
     /// Roll, pitch, yaw (rad).
     pub rpy: [f64; 3],
 }
 
-/// Where a target is.
+/// Position of a target.
 #[derive(Clone, Debug, Serialize)]
 pub struct FoundPoint {
-    /// Its name.
+    /// Name of the target.
     pub name: String,
-    /// In tool axes (m).
+    /// Position in tool axes (m).
     pub xyz: [f64; 3],
 }
 
 /// One measured number.
 #[derive(Clone, Debug, Serialize)]
 pub struct Compared {
-    /// Which.
+    /// Name.
     pub name: String,
-    /// Its unit.
+    /// Unit.
     pub unit: &'static str,
-    /// Kind of its reading.
+    /// Kind of the reading.
     pub kind: &'static str,
-    /// Measured.
+    /// Measured value.
     pub measured: f64,
-    /// Expected of the robot file as it is.
+    /// Value predicted with the robot file as it is.
     pub before: f64,
-    /// Expected with what was found.
+    /// Value predicted with the estimated parameters.
     pub after: f64,
-    /// Its deviation.
+    /// Standard deviation of the measured value.
     pub std: f64,
 }
 
-/// A frequency response by its magnitude.
+/// Magnitude of a frequency response.
 #[derive(Clone, Debug)]
 pub struct ResponseCurves {
-    /// Which reading.
+    /// Name of the reading.
     pub name: String,
     /// Unit of the magnitudes.
     pub unit: &'static str,
     /// Frequencies (Hz).
     pub hz: Vec<f64>,
-    /// Measured, expected of the robot file as it is, expected with what was found.
+    /// Measured, predicted with the robot file as it is, predicted with the estimated parameters.
     pub magnitude: [Vec<f64>; 3],
 }
 
-/// Kind of a reading, for people.
+/// Returns the name of the kind of a reading, for output.
 fn kind_of(reading: &Reading) -> &'static str {
     match reading.kind {
         ReadingKind::Displacement { .. } => "displacements",
@@ -223,7 +223,7 @@ fn kind_of(reading: &Reading) -> &'static str {
     }
 }
 
-/// What each instrument and target is, in a sentence.
+/// Describes each instrument and target in a sentence.
 fn described(input: &MeasurementInput, found: &Identified) -> Vec<String> {
     let millimetres = |v: &Vector3<f64>| format!("{:.3}, {:.3}, {:.3} mm", 1e3 * v.x, 1e3 * v.y, 1e3 * v.z);
     let deviation = |of: &dyn Fn(&ReadingKind) -> Option<String>| {
@@ -266,7 +266,7 @@ fn described(input: &MeasurementInput, found: &Identified) -> Vec<String> {
     instruments.chain(targets).collect()
 }
 
-/// Magnitudes of the responses, from the numbers that were compared.
+/// Returns the magnitudes of the responses from the compared numbers.
 fn responses(measurements: &Measurements, compared: &[Compared]) -> Vec<ResponseCurves> {
     let mut first = 0;
     let mut all = Vec::new();
@@ -291,7 +291,7 @@ fn responses(measurements: &Measurements, compared: &[Compared]) -> Vec<Response
     all
 }
 
-/// Unit of each number, and its name within the reading.
+/// Returns the name and unit of each measured number.
 fn numbers(measurements: &Measurements) -> Vec<(String, &'static str)> {
     let axis = |v: &Vector3<f64>| match v.iter().position(|x| *x == 1.0) {
         Some(k) => ["x", "y", "z"][k].to_owned(),

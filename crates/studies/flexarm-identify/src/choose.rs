@@ -1,4 +1,4 @@
-//! What is to be found, by the file of measurements or by the request.
+//! Choice of the parameters to fit, from the file of measurements or the request.
 
 use crate::estimation::{Probe, Reading, ReadingKind};
 
@@ -11,10 +11,10 @@ use flexarm_run::Robot;
 use flexarm_run::RobotFileError;
 use flexarm_run::TCP_FRAME;
 
-/// What the file or the request asks for, in the robot's order.
+/// Returns the parameters that the file or the request selects, in the robot's order.
 pub(super) fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Result<Vec<parameters::Candidate>, Error> {
     let all = parameters::candidates(arm.robot(), arm.flexible());
-    // Entries of matrices are many: their names say what they are.
+    // Only the first entry of each matrix is listed.
     let names = || {
         let all = all.iter().map(|c| c.parameter.name.clone());
         all.filter(|name| !parameters::is_entry(name) || name.ends_with("[0][0]")).collect::<Vec<_>>()
@@ -35,7 +35,7 @@ pub(super) fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Res
     let wanted = |name: &str| match (fit.is_empty(), input.fit.is_empty()) {
         (false, _) => fit.iter().any(|p| parameters::asks_for(p, name)),
         (true, false) => input.fit.iter().any(|(p, _)| parameters::asks_for(p, name)),
-        // Masses, dampings and single directions of links are asked for by name.
+        // Masses, dampings and single directions of links are fitted only if named.
         (true, true) => name != "payload.mass" && !parameters::is_damping(name) && parameters::asks_for("*", name),
     };
     let kept = |name: &str| input.keep.iter().any(|(p, _)| parameters::fits(p, name));
@@ -72,7 +72,7 @@ pub(super) fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Res
     Ok(chosen)
 }
 
-/// An entry of a link's matrix and a factor on the same matrix.
+/// Finds a fitted entry of a link's matrix together with a fitted factor on the same matrix.
 fn said_twice(chosen: &[parameters::Candidate]) -> Option<(String, String)> {
     let factor_of = |own: &str| {
         let factors = chosen.iter().filter(|c| match &c.written {
@@ -87,7 +87,8 @@ fn said_twice(chosen: &[parameters::Candidate]) -> Option<(String, String)> {
     })
 }
 
-/// Whether the place of the tool can be found from these readings and written into the robot file.
+/// Checks that the pose of the tool can be identified from these readings and written to the robot
+/// file.
 pub(super) fn check_tool(
     robot: &Robot,
     chosen: &[parameters::Candidate],

@@ -1,4 +1,4 @@
-//! What is doubtful of an identification.
+//! Caveats about an identification.
 
 use crate::estimation::{Identified, MeasuredArm, NoAnswer, Plant, Reading, ReadingKind};
 use nalgebra::DVector;
@@ -10,7 +10,7 @@ use flexarm_run::Caveat;
 use flexarm_run::Robot;
 use flexarm_run::caveat::CaveatKind;
 
-/// Displacements of another size than the robot's.
+/// Measured displacements differ in magnitude from those of the robot.
 const LOAD_UNIT: CaveatKind = CaveatKind::warning(
     "load-unit",
     "displacements under {where} are {value} times those of the robot as it is, beyond {yardstick} times either way: loads or the first \
@@ -18,7 +18,7 @@ const LOAD_UNIT: CaveatKind = CaveatKind::warning(
     "",
     "force is in the file's unit of force, mass in kg: a weight of 100 kg is mass = 100, or a force of 981 N",
 );
-/// Encoders whose rest is no noise.
+/// The residual of an encoder exceeds its noise.
 const ENCODER_RESIDUAL: CaveatKind = CaveatKind::warning(
     "encoder-rest",
     "{where}: {value} rad (or m) of the deflection do not follow from the torque, the instruments' noise is {yardstick}: the stiffness \
@@ -27,15 +27,16 @@ const ENCODER_RESIDUAL: CaveatKind = CaveatKind::warning(
     "give the measured torque, lower `below`, or look at friction, masses, errors of the transmission and neighbouring links that bend",
 );
 
-/// Displacements so many times larger or smaller than the robot's are no guess of a stiffness.
+/// Ratio of measured to predicted displacements above which an initial stiffness is not a plausible
+/// cause.
 const LOAD_RATIO: f64 = 5.0;
-/// Weight of a kilogram (N).
+/// Weight of one kilogram (N).
 const WEIGHT: f64 = 9.81;
-/// A rest of encoders over their noise that is told.
+/// Minimum ratio of encoder residual to noise for a caveat.
 const ENCODER_REST: f64 = 1.5;
 
-/// Scatter of places about the rigid robot, over their spread, beyond which frames or joints do not
-/// fit.
+/// Ratio of position residuals to the spread of the positions above which frames or joints are
+/// suspect.
 const FRAME_RATIO: f64 = 0.05;
 
 pub(super) fn caveats(found: &Identified) -> Vec<Caveat> {
@@ -80,7 +81,7 @@ pub(super) fn caveats(found: &Identified) -> Vec<Caveat> {
     caveats
 }
 
-/// Laws of gears that the readings are met without.
+/// Returns a caveat about gear effects that the fit does not include.
 pub(super) fn gear_caveat(robot: &Robot) -> Option<Caveat> {
     let has = |drive: &&flexarm_run::Drive| {
         drive.gearbox.as_ref().is_some_and(|(_, gear)| gear.hysteresis.is_some() || !gear.transmission.is_empty())
@@ -95,8 +96,8 @@ pub(super) fn gear_caveat(robot: &Robot) -> Option<Caveat> {
     })
 }
 
-/// Encoders whose rest is more than the noise of the instruments, and as a part of the deflection
-/// more than the deviation of the stiffness.
+/// Encoders whose residual exceeds their noise, and whose excess relative to the deflection exceeds
+/// the relative deviation of the stiffness.
 pub(super) fn encoder_caveats(encoders: &[EncoderFigures]) -> impl Iterator<Item = Caveat> + '_ {
     let odd = |gear: &&EncoderFigures| {
         let more = (gear.rest_rms.powi(2) - gear.noise_rms.powi(2)).max(0.0).sqrt();
@@ -109,8 +110,8 @@ pub(super) fn encoder_caveats(encoders: &[EncoderFigures]) -> impl Iterator<Item
     encoders.iter().filter(odd).map(told)
 }
 
-/// Displacements under forces, or under masses, that are as much larger or smaller than the robot's
-/// as a kilogram weighs.
+/// Displacements under forces, or under masses, that differ from the robot's by more than
+/// [`LOAD_RATIO`]. Checks whether the factor between N and kg explains the ratio.
 pub(super) fn load_caveats(plant: &Plant, input: &MeasurementInput) -> Result<Vec<Caveat>, NoAnswer> {
     let mut caveats = Vec::new();
     for (what, slip, pulls) in [("forces", "kg given as N", true), ("masses", "N given as kg", false)] {
@@ -126,7 +127,7 @@ pub(super) fn load_caveats(plant: &Plant, input: &MeasurementInput) -> Result<Ve
             continue;
         }
         let arm = MeasuredArm { plant, parameters: &[], measurements: &some };
-        // Rotations of instruments are fitted; the size of a displacement does not depend on them.
+        // The size of a displacement does not depend on the unknown rotations of instruments.
         let predicted = arm.predicted(&DVector::zeros(some.own_unknowns()))?;
         let deviations: Vec<f64> = some.readings.iter().flat_map(Reading::deviations).collect();
         let size =
@@ -145,7 +146,7 @@ pub(super) fn load_caveats(plant: &Plant, input: &MeasurementInput) -> Result<Ve
     Ok(caveats)
 }
 
-/// Places that no placement of the instrument brings near those of the robot.
+/// Positions that do not fit the robot at any pose of the instrument.
 pub(super) fn frame_caveat(answer: &Identification) -> Option<Caveat> {
     let metres: Vec<usize> = (0..answer.compared.len()).filter(|k| answer.compared[*k].kind == "places").collect();
     if metres.is_empty() {

@@ -1,5 +1,5 @@
-//! Gears from recorded positions of motors and links: torques of the rigid robot along the motion
-//! of its links, filters, the fit's reading.
+//! Gear stiffness from recorded positions of motors and links: torques of the rigid robot along the
+//! motion of its links, filters, and the reading for the fit.
 
 use crate::estimation::{
     CoupledOutput, GearEstimate, GearRun, Parameter, Reading, ReadingKind, coupled_gear_stiffness, gear_stiffness,
@@ -16,43 +16,43 @@ use flexarm_run::Error;
 use flexarm_run::RobotCoupling;
 use flexarm_run::RobotFileError;
 
-/// What recordings tell of a gear. SI units.
+/// Result for one gear from recordings. SI units.
 #[derive(Clone, Debug, Serialize)]
 pub struct EncoderFigures {
-    /// Joint.
+    /// Name of the joint.
     pub joint: String,
     /// Stiffness (N m/rad, N/m).
     pub stiffness: f64,
-    /// Its standard deviation, by leaving out seconds of the recordings.
+    /// Standard deviation of the stiffness, by leaving out seconds of the recordings.
     pub std: f64,
-    /// By how much the link's encoder is late (s).
+    /// Delay of the link's encoder (s).
     pub delay_s: f64,
-    /// Share of the deflection, without offsets and delay, that the torque explains.
+    /// Share of the deflection, without offsets and delay, that the torque explains (R²).
     pub r2: f64,
-    /// The same of each run by the others (of each half, with one run).
+    /// R² of each run predicted from the others (of each half if there is one run).
     pub unseen_r2: Vec<f64>,
-    /// Stiffness without each run.
+    /// Stiffness estimated without each run.
     pub without_each: Vec<f64>,
     /// RMS of the deflection without offsets and delay (rad, m).
     pub deflection_rms: f64,
-    /// RMS of what is left of it.
+    /// RMS of the unexplained deflection (rad, m).
     pub rest_rms: f64,
-    /// RMS of the noise of both instruments below `below`, from the noise that is faster (rad, m).
+    /// RMS of the noise of both encoders below the cut-off frequency, extrapolated from the noise
+    /// at higher frequencies (rad, m).
     pub noise_rms: f64,
-    /// Time between samples of each run, or half of one (s).
+    /// Sampling interval of each run, or of each half of a single run (s).
     #[serde(skip)]
     pub steps_s: Vec<f64>,
-    /// Of each run the deflection without offset and delay, and what the torque makes of it (rad,
-    /// m).
+    /// Deflection of each run without offset and delay, and the deflection that the torque predicts
+    /// (rad, m).
     #[serde(skip)]
     pub curves: Vec<[Vec<f64>; 2]>,
-    /// Whether the recordings tell the gear: most of an unseen run follows, and no run decides
-    /// alone.
+    /// Whether the recordings determine the stiffness ([`GearEstimate::is_told`]).
     pub told: bool,
-    /// The parameter that it is.
+    /// Name of the parameter.
     #[serde(skip)]
     parameter: String,
-    /// Its first guess.
+    /// Initial value of the parameter.
     #[serde(skip)]
     initial: f64,
 }
@@ -61,7 +61,7 @@ impl EncoderFigures {
     fn of(joint: &str, gear: GearEstimate, parameter: &Parameter, noise_rms: f64, steps_s: &[f64]) -> Self {
         Self {
             noise_rms,
-            // One run is taken as two halves.
+            // A single run is split into two halves.
             steps_s: if steps_s.len() == 1 { vec![steps_s[0]; gear.curves.len()] } else { steps_s.to_vec() },
 
             joint: joint.to_owned(),
@@ -80,7 +80,7 @@ impl EncoderFigures {
         }
     }
 
-    /// The reading for the fit, if the recordings tell the gear.
+    /// Returns the reading for the fit if the recordings determine the stiffness.
     pub(super) fn reading(&self) -> Option<Reading> {
         let kind = ReadingKind::Known {
             parameter: self.parameter.clone(),
@@ -91,7 +91,7 @@ impl EncoderFigures {
     }
 }
 
-/// Each gear with an encoder behind it.
+/// Estimates the stiffness of each gear with an encoder on its link side.
 pub(super) fn told(arm: &Arm, input: &MeasurementInput, chosen: &[Candidate]) -> Result<Vec<EncoderFigures>, Error> {
     let Some(first) = input.recordings.first() else { return Ok(Vec::new()) };
     let model = link_side(&arm.robot().rigid)
@@ -132,31 +132,32 @@ pub(super) fn told(arm: &Arm, input: &MeasurementInput, chosen: &[Candidate]) ->
     Ok(found)
 }
 
-/// Steps of the recordings that have an encoder behind a gear (s).
+/// Returns the sampling intervals of the recordings that have an encoder on the link side of a
+/// joint (s).
 fn steps(runs: &[Smooth<'_>], joint: usize) -> Vec<f64> {
     runs.iter().filter(|run| run.recording.link[joint].is_some()).map(|run| run.recording.step_s).collect()
 }
 
-/// RMS of the noise of the instruments of a gear in the band that is kept.
+/// Returns the RMS of the noise of a gear's encoders in the passband.
 fn noise(runs: &[Smooth<'_>], joint: usize) -> f64 {
     let squares: Vec<f64> = runs.iter().filter_map(|run| run.noise_square(joint)).collect();
     (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }
 
-/// The one stiffness of a joint's gearbox.
+/// Returns the parameter for a gearbox with one stiffness.
 fn gearbox_of<'a>(of: &'a [Candidate], joint: &str) -> Option<&'a Parameter> {
     let is_it = |c: &&Candidate| matches!(&c.written, Written::Gearbox { joint: own, entry: None } if own == joint);
     of.iter().find(is_it).map(|c| &c.parameter)
 }
 
-/// Recordings in the robot's order of joints.
+/// Recordings, and the joints in the robot's order.
 struct Recorded<'a> {
     runs: &'a [Smooth<'a>],
     joints: &'a [String],
 }
 
-/// Springs of motors that move several joints. Those that are not to be found have the stiffness of
-/// the robot file.
+/// Estimates the springs of motors that move several joints. Springs that are not to be identified
+/// keep the stiffness of the robot file.
 fn told_of_coupled(
     recorded: &Recorded<'_>,
     coupling: &RobotCoupling,
@@ -198,7 +199,8 @@ fn told_of_coupled(
             };
             let part = |motor: usize| part_of(&run.torque, motor);
             for motor in (0..places.len()).filter(|motor| !is_unknown(*motor)) {
-                // A gear that is kept deflects by what the robot file says; a rigid one does not.
+                // Subtracts the deflection of springs with known stiffness; rigid gears do not
+                // deflect.
                 let Some(known) = gearbox_of(all, &coupling.joints[motor]) else { continue };
                 gear.deflection.iter_mut().zip(part(motor)).for_each(|(d, torque)| *d -= torque / known.initial);
             }
@@ -232,28 +234,31 @@ fn told_of_coupled(
     Ok(unknown.iter().zip(gears).map(figure).collect())
 }
 
-/// The rigid robot without its rotors: what goes through the gears.
+/// Returns the rigid robot without its rotors; its inverse dynamics give the torques through the
+/// gears.
 fn link_side(robot: &Mechanism) -> Result<Model, flexarm_kinematics::ModelError> {
     let mut mechanism = robot.clone();
     mechanism.joints.iter_mut().for_each(|joint| joint.armature = 0.0);
     Model::new(&mechanism)
 }
 
-/// A recording without what is fast, with the torques through the gears. What is compared has
-/// passed the filter twice: the torque of a filtered motion is filtered again, as its products of
-/// rates are fast.
+/// Low-pass filtered recording with the torques through the gears. Compared signals pass the filter
+/// twice: the torque of a filtered motion is filtered again, because its products of velocities
+/// contain higher frequencies.
 struct Smooth<'a> {
     recording: &'a EncoderRecording,
     rate: Vec<Vec<f64>>,
     torque: Vec<Vec<f64>>,
-    /// The torque that the motors' motion would need, which has no part in the noise of the links'
-    /// encoders; or the measured one.
+    /// Measured torque, or the torque computed from the motion of the motors, which is independent
+    /// of the noise of the links' encoders.
     instrument: Vec<Vec<f64>>,
     low: LowPass,
     seen: std::ops::Range<usize>,
 }
 
 impl<'a> Smooth<'a> {
+    /// Filters a recording, and computes its torques.
+    ///
     /// * `filed`: stiffness of each joint's gearbox in the robot file.
     fn of(recording: &'a EncoderRecording, model: &Model, filed: &[Option<f64>]) -> Result<Self, Error> {
         let EncoderRecording { step_s, below_hz, edge_s, .. } = *recording;
@@ -268,7 +273,7 @@ impl<'a> Smooth<'a> {
         }
         let low = LowPass::new(below_hz, 1.0 / step_s);
         let motor: Vec<Vec<f64>> = recording.motor.iter().map(|q| low.of(q)).collect();
-        // A link is where its encoder says, but for the offset between the two instruments.
+        // Link positions by their encoders, without the offset between the two encoders.
         let link = motor.iter().zip(&recording.link).map(|(motor, link)| {
             let Some(link) = link else { return motor.clone() };
             let link = low.of(link);
@@ -276,7 +281,7 @@ impl<'a> Smooth<'a> {
             link.iter().map(|link| link + offset).collect()
         });
         let mut link: Vec<Vec<f64>> = link.collect();
-        // A gear without an encoder gives way as the robot file says.
+        // A gear without an encoder deflects with the stiffness of the robot file.
         let rough = torques(model, &link, step_s);
         for (k, stiffness) in filed.iter().enumerate() {
             if let (Some(stiffness), None) = (stiffness, &recording.link[k]) {
@@ -311,21 +316,21 @@ impl<'a> Smooth<'a> {
         })
     }
 
-    /// Mean square of what white noise of the two instruments leaves in the band. Fifth differences
-    /// show it: what is as slow as an arm moves and swings is hardly in them.
+    /// Returns the mean square of the white noise of both encoders in the passband, estimated from
+    /// fifth differences, which suppress the slow motion and the vibration of the arm.
     fn noise_square(&self, joint: usize) -> Option<f64> {
         let link = self.recording.link[joint].as_ref()?;
         let mut x: Vec<f64> = self.recording.motor[joint].iter().zip(link).map(|(motor, link)| motor - link).collect();
         for _ in 0..5 {
             x = x.windows(2).map(|pair| pair[1] - pair[0]).collect();
         }
-        // The sum of the squares of the binomial coefficients.
+        // 252 is the sum of the squared binomial coefficients.
         let white = x.iter().map(|x| x * x).sum::<f64>() / (252.0 * x.len().max(1) as f64);
         Some(white * (2.0 * self.recording.below_hz * self.recording.step_s).min(1.0))
     }
 }
 
-/// Torques of the rigid robot along a motion, a list per joint.
+/// Computes the torques of the rigid robot along a motion, one list per joint.
 fn torques(model: &Model, motion: &[Vec<f64>], step_s: f64) -> Vec<Vec<f64>> {
     let (m, n) = (motion.len(), motion[0].len());
     let rates: Vec<[Vec<f64>; 2]> = motion.iter().map(|q| derivatives(q, step_s)).collect();
@@ -343,8 +348,8 @@ fn torques(model: &Model, motion: &[Vec<f64>], step_s: f64) -> Vec<Vec<f64>> {
     torque
 }
 
-/// First and second derivative by central differences of fourth order; at the ends the signal
-/// stands still.
+/// Computes first and second derivatives by central differences of fourth order. Beyond its ends
+/// the signal is constant.
 fn derivatives(x: &[f64], step_s: f64) -> [Vec<f64>; 2] {
     let at = |i: usize, by: isize| x[i.saturating_add_signed(by).min(x.len() - 1)];
     let n = 0..x.len();

@@ -1,4 +1,4 @@
-//! Why measurements tell nothing.
+//! Errors of an identification.
 
 use crate::estimation::{FoundSlip, IdentifyError, Slip};
 use flexarm_run::ExternalError;
@@ -6,122 +6,122 @@ use flexarm_run::ExternalError;
 use super::file::MeasurementInput;
 use flexarm_run::Error;
 
-/// What keeps measurements from telling anything.
+/// Reason why measurements cannot be used for an identification.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum IdentifyFileError {
-    /// A rigid robot.
+    /// The robot is rigid.
     #[error(
         "the robot has no flexible link and no elastic drive: there is no stiffness to find; add [[flexible_link]] or [[drive]] \
          entries with a first guess"
     )]
     NothingGives,
-    /// A name that is not there.
+    /// Unknown name of a parameter.
     #[error("{text}")]
     UnknownParameter {
-        /// All of it.
+        /// Message.
         text: String,
     },
-    /// An entry of a matrix and a factor on it.
+    /// An entry of a matrix and a factor on the same matrix.
     #[error("{entry} and {factor} say the same twice: fit one of them and keep the other")]
     Twice {
-        /// Entry.
+        /// Name of the entry.
         entry: String,
-        /// Factor.
+        /// Name of the factor.
         factor: String,
     },
-    /// A tool that is not the robot file's.
+    /// The tool is not that of the robot file.
     #[error("{name} is that of the robot file, and link {link:?} was chosen in its place at loading: leave that out")]
     OtherTool {
-        /// Parameter.
+        /// Name of the parameter.
         name: String,
-        /// Link.
+        /// Name of the link.
         link: String,
     },
-    /// Nodes on a tool that is to be found.
+    /// A node is on a tool whose pose is unknown.
     #[error(
         "{reading} is seen or hit at a node on the tool, which {name} would move: give the node the link on which the sensor sits, and its \
          place there"
     )]
     ToolNode {
-        /// Parameter.
+        /// Name of the parameter.
         name: String,
-        /// Which.
+        /// Name of the reading.
         reading: String,
     },
-    /// Everything is kept.
+    /// All parameters are kept.
     #[error("nothing is left to fit: of {known:?} all are kept")]
     NothingFitted {
-        /// Names.
+        /// Names of the parameters.
         known: Vec<String>,
     },
-    /// Numbers out of all proportion.
+    /// Displacements or distances differ from the model by orders of magnitude.
     #[error(
         "the measured {what} are {ratio:.3e} times as large as those of the robot as it is: no robot is that far from its description. \
          The file says length = {length:?}; {help}"
     )]
     Units {
-        /// Displacements, or distances between places.
+        /// Quantity: displacements, or distances between positions.
         what: &'static str,
-        /// Measured over expected.
+        /// Ratio of measured to predicted values.
         ratio: f64,
-        /// Unit of the file.
+        /// Unit of length of the file.
         length: &'static str,
-        /// What to try.
+        /// Advice.
         help: String,
     },
-    /// A point that does not move.
+    /// A measured point does not move.
     #[error(
         "{reading}: the arm as it is does not move there along that direction, or cannot be hit so: look at nodes, their links and directions"
     )]
     Still {
-        /// Which.
+        /// Name of the reading.
         reading: String,
     },
-    /// A response out of all proportion.
+    /// A response differs from the model by orders of magnitude.
     #[error(
         "{reading}: the measured response is {ratio:.3e} times as large as that of the robot as it is: no robot is that far from its \
          description; look at unit, at what was measured (displacement, velocity, acceleration), at nodes and directions"
     )]
     ResponseUnits {
-        /// Which.
+        /// Name of the reading.
         reading: String,
-        /// Measured over expected.
+        /// Ratio of measured to predicted values.
         ratio: f64,
     },
-    /// A mode that the model does not have.
+    /// The model does not have a measured mode.
     #[error("{reading}: mode {mode} is asked for, the model has {modes} modes")]
     NoMode {
-        /// Which reading.
+        /// Name of the reading.
         reading: String,
-        /// From 1.
+        /// Number of the mode, from 1.
         mode: usize,
-        /// How many there are.
+        /// Number of modes of the model.
         modes: usize,
     },
-    /// Recordings that tell no gear.
+    /// The recordings do not determine the stiffness of any gear.
     #[error("the recordings of {joints:?} tell no stiffness: deflection and torque do not go together")]
     NoGear {
-        /// Joints.
+        /// Names of the joints.
         joints: Vec<String>,
     },
-    /// Joint values in another order.
+    /// The joint values are in another order.
     #[error(
         "the readings do not fit the robot's joints in their order {joints:?} ({:.0} % of them is left without a cause), but they do if the \
          values are those of {likely:?} ({:.0} %): is the order of `joints`, or are the names of the columns, another one?",
         100.0 * rest, 100.0 * mended
     )]
     JointOrder {
-        /// The robot's joints.
+        /// Joints of the robot.
         joints: Vec<String>,
-        /// Whose values they seem to be, in this order.
+        /// Probable order of the joint values.
         likely: Vec<String>,
-        /// Part of the readings that nothing explains.
+        /// Relative residual of the readings.
         rest: f64,
-        /// The same in the other order.
+        /// Relative residual in the other order.
         mended: f64,
     },
-    /// Displacements in other axes.
+    /// The displacements are in other axes.
     #[error(
         "the displacements do not fit the robot in world axes ({:.0} % of them is left without a cause), but they do in axes that are \
          turned by rpy = [{:.1}, {:.1}, {:.1}] degrees ({:.0} %): are they in the axes of the instrument? Then add an instrument, \
@@ -131,12 +131,12 @@ pub enum IdentifyFileError {
     Axes {
         /// Roll, pitch and yaw of the axes in the world (degrees).
         rpy_deg: [f64; 3],
-        /// Part of the displacements that nothing explains.
+        /// Relative residual of the displacements.
         rest: f64,
-        /// The same in the other axes.
+        /// Relative residual in the other axes.
         mended: f64,
     },
-    /// No fit.
+    /// The fit failed.
     #[error("{0}")]
     Fit(String),
 }
@@ -149,13 +149,13 @@ impl From<IdentifyFileError> for flexarm_run::Error {
 
 impl ExternalError for IdentifyFileError {}
 
-/// A slip that explains what the arm does not.
+/// Returns the error for a mistake that explains the readings.
 pub(super) fn of_slip(found: FoundSlip, joints: &[(String, bool)]) -> Error {
     let FoundSlip { slip, rest, rest_mended: mended } = found;
     let joints: Vec<String> = joints.iter().map(|(name, _)| name.clone()).collect();
     match slip {
         Slip::Order(order) => {
-            // The value of joint k stands at place order[k].
+            // The value of joint k is at position order[k].
             let mut likely = joints.clone();
             order.iter().zip(&joints).for_each(|(place, joint)| likely[*place].clone_from(joint));
             IdentifyFileError::JointOrder { joints, likely, rest, mended }.into()
@@ -167,7 +167,7 @@ pub(super) fn of_slip(found: FoundSlip, joints: &[(String, bool)]) -> Error {
     }
 }
 
-/// The fit's error with the names of instruments.
+/// Returns the error of the fit with names instead of numbers of instruments.
 pub(super) fn of_names(input: &MeasurementInput) -> impl Fn(IdentifyError) -> Error + '_ {
     |error| {
         let text = error.to_string();

@@ -1,8 +1,8 @@
-//! Parameters of a robot file from measurements at the robot, and poses that are worth measuring.
+//! Identification of robot file parameters from measurements, and choice of poses to measure.
 //!
-//! [`identify_robot`] reads a file of measurements (`docs/identify.md`), finds what they tell of
-//! the robot file's numbers and says how well; [`plan_measurements`] chooses poses. What they are
-//! made of takes and gives values and is passed on here: [`identify`], [`plan`], [`MeasuredArm`].
+//! [`identify_robot`] reads a file of measurements (`docs/identify.md`), estimates the robot file's
+//! parameters and their uncertainty; [`plan_measurements`] chooses poses. The underlying functions
+//! on plain values are re-exported: [`identify`], [`plan`], [`MeasuredArm`].
 #![allow(non_snake_case, reason = "monogram notation: X_WT, J; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
@@ -48,32 +48,32 @@ pub use self::encoders::EncoderFigures;
 pub use self::error::IdentifyFileError;
 pub use self::plan_file::{MeasurementPlan, PlanRequest, PlannedReading, plan_measurements};
 
-/// Returns the arm as the identification takes it: tree, springs, TCP.
+/// Returns the arm as model for the identification: tree, springs, TCP.
 pub fn plant(arm: &Arm) -> Plant {
     parameters::plant(arm.flexible())
 }
 
-/// Returns what can be identified on an arm, by the names that files and `--fit` use.
+/// Returns the identifiable parameters of an arm, with the names that files and `--fit` use.
 pub fn parameters(arm: &Arm) -> Vec<Parameter> {
     let special =
         |name: &str| parameters::is_direction(name) || parameters::is_entry(name) || parameters::is_tool(name);
     candidates_that(arm, |name| !special(name))
 }
 
-/// Returns the six directions of each lumped link's springs, `link.LINK.stiffness_factors[k]`:
-/// together they are the link's stiffness, which [`parameters()`] has as a whole.
+/// Returns the six directions of each lumped link's springs, `link.LINK.stiffness_factors[k]`.
+/// Together they are the link's stiffness, which [`parameters()`] contains as a single factor.
 pub fn link_directions(arm: &Arm) -> Vec<Parameter> {
     candidates_that(arm, parameters::is_direction)
 }
 
 /// Returns the 21 entries of the 6x6 of each lumped link in two parts, `link.LINK.stiffness[i][j]`
-/// with i up to j. They exclude the link's factors.
+/// with `i <= j`, before the link's factors are applied.
 pub fn link_entries(arm: &Arm) -> Vec<Parameter> {
     candidates_that(arm, parameters::is_entry)
 }
 
-/// Returns place and attitude of the TCP, `tcp.x` to `tcp.rz`: moved and turned about its own axes
-/// (m, rad).
+/// Returns the parameters of the TCP, `tcp.x` to `tcp.rz`: translation and rotation about its own
+/// axes (m, rad).
 pub fn tcp_parameters(arm: &Arm) -> Vec<Parameter> {
     candidates_that(arm, parameters::is_tool)
 }
@@ -83,24 +83,24 @@ fn candidates_that(arm: &Arm, wanted: impl Fn(&str) -> bool) -> Vec<Parameter> {
     all.map(|c| c.parameter).filter(|parameter| wanted(&parameter.name)).collect()
 }
 
-/// What is asked of [`identify_robot`].
+/// Arguments of [`identify_robot`].
 #[derive(Clone, Debug, Default)]
 pub struct IdentifyRequest {
-    /// How links and drives are modelled.
+    /// Modelling of links and drives.
     pub modelling: Modelling,
-    /// Names of what is unknown, * for anything, in the place of those in the file.
+    /// Names of the unknown parameters, with `*` as a wildcard, in place of those in the file.
     pub fit: Vec<String>,
-    /// Folder of the new robot file and the page; nothing is written without it.
+    /// Folder of the new robot file and the page; none are written if absent.
     pub output: Option<PathBuf>,
-    /// Overwrite what is there.
+    /// Whether to overwrite existing files.
     pub overwrite: bool,
 }
 
-/// Finds what measurements tell of a robot's numbers, and writes a robot file with them.
+/// Identifies parameters of a robot from measurements, and writes a robot file with them.
 ///
 /// # Errors
-/// [`Error::RobotFile`] with line and column for what is wrong in the file, [`Error::File`] for its
-/// tables; [`IdentifyFileError`] where the measurements cannot be met: units, frames, rank;
+/// [`Error::RobotFile`] with line and column for errors in the file, [`Error::File`] for its
+/// tables; [`IdentifyFileError`] if the measurements do not fit the robot: units, frames, rank;
 /// [`Error::Taken`], [`Error::Write`].
 pub fn identify_robot(robot: &Robot, measurements: &Path, request: &IdentifyRequest) -> Result<Identification, Error> {
     let arm = robot.flexible(request.modelling)?;
@@ -151,14 +151,14 @@ pub fn identify_robot(robot: &Robot, measurements: &Path, request: &IdentifyRequ
     Ok(answer)
 }
 
-/// Actuated joints in coordinate order, and whether they slide.
+/// Returns the actuated joints in coordinate order, and whether they slide.
 fn joints_of(arm: &Arm) -> Vec<(String, bool)> {
     let model = &arm.flexible().model;
     let actuated = &model.coordinates()[..model.n_actuated()];
     actuated.iter().map(|c| (c.joint.clone(), c.kind == "prismatic")).collect()
 }
 
-/// Files of an answer.
+/// Output files.
 struct Targets {
     robot: PathBuf,
     page: PathBuf,
@@ -183,7 +183,7 @@ impl Targets {
         let text = flexarm_files::read_text(&robot.path)?;
         let home = robot.path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let folder = self.robot.parent().unwrap_or(Path::new("."));
-        // The place of the new file must be there for paths as seen from it.
+        // Relative paths from the new file need its folder to exist.
         std::fs::create_dir_all(folder).map_err(|source| Error::Write { path: folder.to_owned(), source })?;
         let new = rewrite::rewritten(&text, &told, robot.tcp(), home, folder)
             .map_err(|what| Error::File { path: robot.path.clone(), what })?;

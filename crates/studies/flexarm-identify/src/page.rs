@@ -1,5 +1,5 @@
-//! The page of an identification: what was found, instruments and targets, residuals, curves of
-//! responses and encoders against the model, correlation; one file without scripts.
+//! HTML page of an identification: estimates, instruments and targets, residuals, curves of
+//! responses and encoders against the model, correlation; a single file without scripts.
 
 use std::fmt::Write as _;
 
@@ -9,10 +9,10 @@ use super::{Compared, EncoderFigures, Identification, ResponseCurves};
 use flexarm_run::html_page::opening;
 use flexarm_settings::written::markup;
 
-/// Most samples of a recording in a picture.
+/// Maximum number of plotted samples of a recording.
 const MOST_SAMPLES: usize = 1500;
 
-/// The page.
+/// Returns the HTML page.
 pub(super) fn html(answer: &Identification) -> String {
     let correlation_style = ".correlation td { text-align: center; font-size: 12px; min-width: 2.6rem }\n";
     let mut page = opening(&format!("Identification of {}", answer.robot), correlation_style);
@@ -48,7 +48,7 @@ pub(super) fn html(answer: &Identification) -> String {
     page + "</body></html>\n"
 }
 
-/// Unit for people, and its factor.
+/// Returns the display unit and its factor.
 fn readable(unit: &str) -> (&'static str, f64) {
     match unit {
         "m" => ("mm", 1e3),
@@ -123,7 +123,7 @@ fn suspicious(answer: &Identification) -> String {
     out + "</table>\n"
 }
 
-/// Residuals of one kind of readings, before and after.
+/// Plots the residuals of one kind of reading, before and after.
 fn residuals(kind: &str, unit: &str, of: &[&Compared]) -> String {
     let (name, factor) = readable(unit);
     let x: Vec<f64> = (1..=of.len()).map(|k| k as f64).collect();
@@ -138,7 +138,7 @@ fn residuals(kind: &str, unit: &str, of: &[&Compared]) -> String {
     picture(&format!("Residuals of {kind} ({name})"), "number", &[panel])
 }
 
-/// Magnitude of a frequency response: measured, and of the model before and after.
+/// Plots the magnitude of a frequency response: measured, and of the model before and after.
 fn response_plot(response: &ResponseCurves) -> String {
     let looks = [CurveLook::Dots, CurveLook::Dashed, CurveLook::Plain];
     let curves = ["measured", "model before", "model after"].into_iter().zip(looks).zip(&response.magnitude);
@@ -149,7 +149,7 @@ fn response_plot(response: &ResponseCurves) -> String {
     picture(&format!("Response: {}", response.name), "frequency (Hz)", &[panel])
 }
 
-/// Deflection of a gear over time: measured, and what its torque says.
+/// Plots the deflection of a gear over time: measured, and predicted from its torque.
 fn encoder_plot(gear: &EncoderFigures) -> String {
     let panel = |(number, ([measured, expected], step_s)): (usize, (&[Vec<f64>; 2], &f64))| {
         let every = measured.len().div_ceil(MOST_SAMPLES).max(1);
@@ -169,7 +169,7 @@ fn encoder_plot(gear: &EncoderFigures) -> String {
     picture(&format!("Deflection of the gear of {}", gear.joint), "time (s)", &panels)
 }
 
-/// A heading with its picture; nothing if nothing finite is to be drawn.
+/// Returns a heading with its plot; nothing if there are no finite values.
 fn picture(title: &str, x_label: &str, panels: &[Panel]) -> String {
     let plot = LinePlot { title, x_label, panels, ..LinePlot::default() };
     plot.svg().map(|svg| format!("<h2>{}</h2>\n{svg}\n", markup(title))).unwrap_or_default()
@@ -196,7 +196,7 @@ fn interval([low, high]: [f64; 2]) -> String {
     if low.is_nan() { "-".into() } else { format!("{} to {}", number(low), number(high)) }
 }
 
-/// A number with the digits that a person reads.
+/// Formats a number with about four significant digits.
 fn number(x: f64) -> String {
     match x.abs() {
         a if a.is_nan() => "-".into(),

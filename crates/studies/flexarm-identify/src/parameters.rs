@@ -1,19 +1,19 @@
-//! What of a robot file can be identified: its numbers by name, what each does to the arm, and
-//! where it is written.
+//! Identifiable parameters of a robot file: their names, their effect on the arm, and their places
+//! in the file.
 //!
-//! | name | what |
+//! | name | meaning |
 //! | --- | --- |
-//! | `drive.JOINT.gearbox.stiffness` | a gearbox with one stiffness (N m/rad, N/m of a joint that slides) |
-//! | `drive.JOINT.gearbox.stiffness[k]` | one of three or six, from 0 |
-//! | `link.LINK.stiffness_factor` | all of a flexible link's stiffness, as a factor |
-//! | `link.LINK.stiffness_factors[k]` | one of the six directions of a lumped link's springs, as a factor, from 0 |
-//! | `link.LINK.stiffness[i][j]` | an entry of the 6x6 of a lumped link in two parts, and its mirror image (N/m, N, N m/rad) |
-//! | `tcp.x`, `.y`, `.z`, `.rx`, `.ry`, `.rz` | the tool moved and turned about its own axes (m, rad) |
+//! | `drive.JOINT.gearbox.stiffness` | single stiffness of a gearbox (N m/rad; N/m if it slides) |
+//! | `drive.JOINT.gearbox.stiffness[k]` | one of three or six stiffnesses, from 0 |
+//! | `link.LINK.stiffness_factor` | factor on the whole stiffness of a flexible link |
+//! | `link.LINK.stiffness_factors[k]` | factor on one of six directions of a lumped link, from 0 |
+//! | `link.LINK.stiffness[i][j]` | entry of a two-part link's symmetric 6x6 (N/m, N, N m/rad) |
+//! | `tcp.x`, `.y`, `.z`, `.rx`, `.ry`, `.rz` | shift and rotation of the tool, own axes (m, rad) |
 //! | `mounting.stiffness[k]` | one of six springs under the base, from 0 |
-//! | `drive.JOINT.gearbox.damping` | its damping, if the file has it (N m s/rad, N s/m) |
-//! | `drive.JOINT.gearbox.damping[k]` | one of three or six, from 0 |
+//! | `drive.JOINT.gearbox.damping` | damping of a gearbox, if the file has it (N m s/rad, N s/m) |
+//! | `drive.JOINT.gearbox.damping[k]` | one of three or six dampers, from 0 |
 //! | `link.LINK.damping` | modal ratio, `stiffness_beta` (s), or a factor on `rayleigh` |
-//! | `payload.mass` | kg, at its centre of mass |
+//! | `payload.mass` | mass of the payload (kg), its centre of mass fixed |
 
 use crate::estimation::{Effect, Parameter, Place, Plant};
 use flexarm_flexlink::GearStiffness;
@@ -28,41 +28,41 @@ use flexarm_run::RobotLink;
 use flexarm_run::RobotMounting;
 use flexarm_run::robot::PAYLOAD_LINK;
 
-/// Key of what is only fitted if it is named: its directions together are the whole of a link's
-/// stiffness.
+/// Key of parameters that are fitted only if named explicitly: together the directions make up the
+/// whole stiffness of a link.
 const DIRECTIONS: &str = "stiffness_factors";
 
-/// Where a parameter is written in the robot file.
+/// Location of a parameter in the robot file.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Written {
-    /// `[[drive]]` of the joint: the stiffness of its gearbox, or one of its entries.
+    /// `[[drive]]` of the joint: stiffness of its gearbox, or one of its entries.
     Gearbox { joint: String, entry: Option<usize> },
-    /// `[[drive]]` of the joint: the damping of its gearbox, or one of its entries.
+    /// `[[drive]]` of the joint: damping of its gearbox, or one of its entries.
     GearboxDamping { joint: String, entry: Option<usize> },
-    /// `[[flexible_link]]` of the link: its damping.
+    /// `[[flexible_link]]` of the link: damping.
     LinkDamping { link: String },
-    /// `[[flexible_link]]` of the link: its `stiffness_factor`.
+    /// `[[flexible_link]]` of the link: `stiffness_factor`.
     Link { link: String },
-    /// The same: one of its `stiffness_factors`.
+    /// `[[flexible_link]]` of the link: one of `stiffness_factors`.
     LinkDirection { link: String, entry: usize },
-    /// The same: an entry of its `stiffness`, which is this if the file has none.
+    /// `[[flexible_link]]` of the link: entry of `stiffness`, which is `K` if the file has none.
     LinkEntry { link: String, row: usize, column: usize, K: Box<Matrix6<f64>> },
     /// `tcp`: x, y, z, rx, ry, rz.
     Tool { axis: usize },
-    /// `mounting.stiffness`, one of six.
+    /// One of the six `mounting.stiffness`.
     Mounting { entry: usize },
     /// `payload.mass`.
     Payload,
 }
 
-/// A parameter and where it stands.
+/// A parameter and its location in the robot file.
 #[derive(Clone, Debug)]
 pub(crate) struct Candidate {
     pub(crate) parameter: Parameter,
     pub(crate) written: Written,
 }
 
-/// All parameters of an arm, in the order of drives, links, payload.
+/// Returns all parameters of an arm, in the order of drives, links, tool and payload.
 pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candidate> {
     let of = |owner: Owner| -> Vec<usize> {
         flexible.owners.iter().enumerate().filter(|(_, o)| **o == owner).map(|(k, _)| k).collect()
@@ -71,7 +71,7 @@ pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candida
     for (number, drive) in robot.drives.iter().enumerate() {
         let springs = of(Owner::Drive(number));
         let Some((gearbox, damping)) = drive.gearbox.as_ref().filter(|_| !springs.is_empty()) else { continue };
-        // A curve of points has no one stiffness; a play has.
+        // A piecewise stiffness curve has no single stiffness, but one with backlash has.
         if damping.curve.is_some() && drive.backlash == 0.0 {
             continue;
         }
@@ -132,7 +132,7 @@ fn stiffness(name: String, unit: &str, initial: f64, places: Vec<Place>, written
     Candidate::new(name, unit, initial, Effect::Stiffness(places), written)
 }
 
-/// The dampers of a gearbox, one by one; those that are zero are none.
+/// Returns a parameter per non-zero damper of a gearbox.
 fn gearbox_damping(joint: &str, dampers: &[f64], springs: &[usize], slides: bool) -> Vec<Candidate> {
     let name = format!("drive.{joint}.gearbox.damping");
     let damper = |(k, initial): (usize, &f64)| {
@@ -151,7 +151,8 @@ fn gearbox_damping(joint: &str, dampers: &[f64], springs: &[usize], slides: bool
     dampers.iter().enumerate().filter(|(_, d)| **d > 0.0).map(damper).collect()
 }
 
-/// The six directions of a lumped link's springs, in all of them alike.
+/// Returns the factors on the six directions of a lumped link's springs, each common to all
+/// springs.
 fn link_directions<'a>(
     link: &'a str,
     factors: &'a [f64; 6],
@@ -164,8 +165,8 @@ fn link_directions<'a>(
     })
 }
 
-/// Entries of the 6x6 of a link that is one spring between two rigid parts, in the matrix before
-/// its factors.
+/// Returns the 6x6 entries of a link modelled as one spring between two rigid parts, before the
+/// factors are applied.
 fn link_entries(link: &RobotLink, spring: usize, flexible: &FlexibleRobot) -> Vec<Candidate> {
     let group = &flexible.model.elastic()[spring];
     if group.size != 6 || group.modal {
@@ -189,7 +190,7 @@ fn link_entries(link: &RobotLink, spring: usize, flexible: &FlexibleRobot) -> Ve
     (0..6).flat_map(|row| (row..6).map(move |column| (row, column))).map(|(row, column)| entry(row, column)).collect()
 }
 
-/// The tool moved and turned about its own axes.
+/// Returns translation and rotation of the tool about its own axes.
 fn tool_parameters() -> impl Iterator<Item = Candidate> {
     ["x", "y", "z", "rx", "ry", "rz"].into_iter().enumerate().map(|(axis, name)| {
         let unit = if axis < 3 { "m" } else { "rad" };
@@ -217,7 +218,7 @@ fn gearbox_parameters(joint: &str, K: &GearStiffness, springs: &[usize], slides:
             };
             (0..6).map(entry).collect()
         }
-        // A full matrix: all of it by a factor.
+        // Full matrix: one factor on all entries.
         _ => {
             let places = springs.iter().map(|spring| Place { spring: *spring, coordinate: None }).collect();
             vec![stiffness(name, "1", 1.0, places, written(None))]
@@ -225,8 +226,8 @@ fn gearbox_parameters(joint: &str, K: &GearStiffness, springs: &[usize], slides:
     }
 }
 
-/// Six springs under the base that are not coupled, one by one; a beam or a mesh there has no
-/// numbers of its own in the robot file.
+/// Returns the six uncoupled springs under the base. A beam or mesh there has no stiffness values
+/// in the robot file.
 fn mounting_parameters(robot: &Robot, springs: &[usize]) -> Vec<Candidate> {
     let (Some(RobotMounting::Springs { springs: mounting, .. }), [spring]) = (&robot.mounting, springs) else {
         return Vec::new();
@@ -246,7 +247,7 @@ fn is_diagonal(K: &nalgebra::Matrix6<f64>) -> bool {
     (0..6).all(|i| (0..6).all(|j| i == j || K[(i, j)] == 0.0))
 }
 
-/// The arm as the identification takes it.
+/// Converts the flexible robot to the plant of the estimation.
 pub(crate) fn plant(flexible: &FlexibleRobot) -> Plant {
     Plant {
         model: flexible.model.clone(),
@@ -256,7 +257,7 @@ pub(crate) fn plant(flexible: &FlexibleRobot) -> Plant {
     }
 }
 
-/// Whether a pattern asks for a parameter to be fitted.
+/// Whether a pattern selects a parameter for fitting.
 pub fn asks_for(pattern: &str, name: &str) -> bool {
     let by_name = match name {
         _ if is_direction(name) => pattern.contains(DIRECTIONS),
@@ -267,41 +268,41 @@ pub fn asks_for(pattern: &str, name: &str) -> bool {
     by_name && fits(pattern, name)
 }
 
-/// Whether it is an entry of a link's matrix.
+/// Whether the name is that of an entry of a link's matrix.
 pub(crate) fn is_entry(name: &str) -> bool {
     name.starts_with("link.") && name.contains("][")
 }
 
-/// Whether it is the place or the attitude of the tool.
+/// Whether the name is that of the position or orientation of the tool.
 pub(crate) fn is_tool(name: &str) -> bool {
     name.starts_with("tcp.")
 }
 
-/// Whether it is a damping: of a gearbox, one of its dampers, of a link.
+/// Whether the name is that of a damping: of a gearbox, one of its dampers, or a link.
 pub(crate) fn is_damping(name: &str) -> bool {
     name.split('[').next().is_some_and(|name| name.ends_with(".damping"))
 }
 
-/// One of a gearbox's dampers by the name of all of them.
+/// Returns the name of a gearbox's damping from that of one of its dampers.
 fn all_dampers(name: &str) -> Option<&str> {
     let whole = name.split('[').next()?;
     (whole.ends_with(".gearbox.damping") && whole != name).then_some(whole)
 }
 
-/// An entry of a matrix by the name of its mirror image.
+/// Returns the name of a matrix entry with row and column exchanged.
 fn mirrored(name: &str) -> Option<String> {
     let (head, indices) = name.strip_suffix(']')?.split_once(".stiffness[")?;
     let (row, column) = indices.split_once("][")?;
     Some(format!("{head}.stiffness[{column}][{row}]"))
 }
 
-/// Whether it is one direction of a link's springs.
+/// Whether the name is that of one direction of a link's springs.
 pub(crate) fn is_direction(name: &str) -> bool {
     name.starts_with("link.") && name.contains(DIRECTIONS)
 }
 
-/// Whether a name, that of the mirrored entry, or that of all dampers of a gearbox, fits a pattern
-/// in which * stands for anything.
+/// Whether a pattern with `*` as a wildcard matches a name, that of the symmetric matrix entry, or
+/// that of the whole gearbox damping.
 pub fn fits(pattern: &str, name: &str) -> bool {
     matches(pattern, name)
         || mirrored(name).is_some_and(|name| matches(pattern, &name))

@@ -1,4 +1,4 @@
-//! Poses and loads that are worth measuring on a robot, and the files to fill in.
+//! Choice of poses and loads to measure on a robot, and the files to fill in.
 
 use std::path::{Path, PathBuf};
 
@@ -21,48 +21,48 @@ use flexarm_run::Robot;
 use flexarm_run::caveat::Use;
 use flexarm_run::caveat::warnings;
 
-/// Poses among which a plan chooses, unless they are given.
+/// Number of candidate poses if none are given.
 const CANDIDATES: usize = 400;
-/// Joints without limits turn as far as this to each side (rad), and slide (m).
+/// Range of joints without limits to each side (rad; m for sliding joints).
 const WITHOUT_LIMITS: f64 = std::f64::consts::PI;
-/// Part of each joint's range that is used.
+/// Fraction of each joint's range that is used.
 const RANGE: f64 = 0.9;
 
-/// What is asked of [`plan_measurements`].
+/// Arguments of [`plan_measurements`].
 #[derive(Clone, Debug)]
 pub struct PlanRequest {
-    /// How links and drives are modelled.
+    /// Modelling of links and drives.
     pub modelling: Modelling,
-    /// Names of what is to be found, * for anything; all stiffnesses without.
+    /// Names of the parameters to identify, with `*` as a wildcard; all stiffnesses if empty.
     pub fit: Vec<String>,
-    /// How many readings.
+    /// Number of readings.
     pub count: usize,
-    /// Forces on the tool among which the plan chooses, world axes (N).
+    /// Candidate forces on the tool, world axes (N).
     pub forces: Vec<[f64; 3]>,
-    /// Points of the tool at which a force may act, tool axes (m); the TCP where it is empty. About
-    /// an axis through the point nothing turns.
+    /// Candidate points of application of the force, tool axes (m); the TCP if empty. A force
+    /// causes no rotation about an axis through its point of application.
     pub levers: Vec<[f64; 3]>,
-    /// Points of the tool that may be watched, tool axes (m); the TCP where it is empty.
+    /// Candidate points to measure on the tool, tool axes (m); the TCP if empty.
     pub points: Vec<[f64; 3]>,
-    /// Directions along which a gauge may stand, world axes; all three numbers of the displacement
-    /// are read where it is empty.
+    /// Candidate directions of a gauge, world axes. If empty, all three components of the
+    /// displacement are measured.
     pub directions: Vec<[f64; 3]>,
-    /// Deviation of a measured displacement (m).
+    /// Standard deviation of a measured displacement (m).
     pub std_m: f64,
-    /// A table of poses (a column per joint) among which is chosen: those that are reachable and
-    /// free; rad or m.
+    /// Table of candidate poses, reachable and free of collisions (a column per joint; rad or m).
     pub poses: Option<PathBuf>,
-    /// A table of poses where the work will be done: the plan makes the tool's error there sure
-    /// under the first force.
+    /// Table of poses where the robot will work. The plan minimises the uncertainty of the tool's
+    /// deflection there under the first force.
     pub work: Option<PathBuf>,
-    /// Folder of the files to fill in; nothing is written without it.
+    /// Folder for the files to fill in; none are written if absent.
     pub output: Option<PathBuf>,
-    /// Overwrite what is there.
+    /// Whether to overwrite existing files.
     pub overwrite: bool,
 }
 
 impl PlanRequest {
-    /// So many readings under 500 N down and to both sides, measured to 0.03 mm.
+    /// Returns a request for a number of readings under 500 N downwards and to two sides, measured
+    /// to 0.03 mm.
     pub fn new(count: usize) -> Self {
         let forces = vec![[0.0, 0.0, -500.0], [500.0, 0.0, 0.0], [0.0, 500.0, 0.0]];
         Self {
@@ -82,68 +82,68 @@ impl PlanRequest {
     }
 }
 
-/// Answer of `flexarm identify --plan N`.
+/// Result of `flexarm identify --plan N`.
 #[derive(Clone, Debug, Serialize)]
 pub struct MeasurementPlan {
-    /// The robot.
+    /// Robot.
     pub robot: String,
-    /// Joints, in the order of the poses.
+    /// Joints, in the order of the pose values.
     pub joints: Vec<String>,
-    /// What to measure, the most telling first.
+    /// Planned readings, most informative first.
     pub poses: Vec<PlannedReading>,
-    /// What to expect of each parameter.
+    /// Expected uncertainty of each parameter.
     pub parameters: Vec<ExpectedParameter>,
-    /// Deviation of the tool's displacement where the work is done, largest over these poses and
-    /// axes (m); null without them.
+    /// Maximum standard deviation of the tool's displacement over the poses of the work and the
+    /// axes (m); null without such poses.
     pub work_std_m: Option<f64>,
-    /// How much more the plan tells than the same number of the candidates as they come: half the
-    /// logarithm of the ratio of the determinants, over the number of parameters; 0.69 is half the
-    /// deviation.
+    /// Gain in information over the same number of candidates in their given order: half the
+    /// logarithm of the ratio of the determinants, divided by the number of parameters. 0.69
+    /// corresponds to half the standard deviation.
     pub gain_over_first: f64,
-    /// How many poses were candidates.
+    /// Number of candidate poses.
     pub candidates: usize,
-    /// The files to fill in.
+    /// File of measurements to fill in.
     pub file: Option<String>,
-    /// The table among them.
+    /// Table to fill in.
     pub table: Option<String>,
-    /// What is doubtful of the robot, as `check` says it.
+    /// Caveats about the robot, as from `check`.
     pub caveats: Vec<Caveat>,
-    /// The sentences of those that warn.
+    /// Sentences of the caveats that are warnings.
     pub warnings: Vec<String>,
 }
 
-/// A pose and a load.
+/// Pose and load of a planned reading.
 #[derive(Clone, Debug, Serialize)]
 pub struct PlannedReading {
-    /// Joints (rad or m).
+    /// Joint values (rad or m).
     pub joints: Vec<f64>,
     /// Force on the tool, world axes (N).
     pub force: [f64; 3],
-    /// Where it acts, tool axes (m).
+    /// Point of application of the force, tool axes (m).
     pub at: [f64; 3],
-    /// What is watched, tool axes (m).
+    /// Measured point, tool axes (m).
     pub point: [f64; 3],
-    /// Direction of the gauge, world axes; null where all three numbers are read.
+    /// Direction of the gauge, world axes; null if all three components are measured.
     pub direction: Option<[f64; 3]>,
-    /// Displacement of the point to expect with the robot file as it is (m).
+    /// Predicted displacement of the point with the robot file as it is (m).
     pub expected_m: [f64; 3],
 }
 
-/// What may be done at a pose.
+/// Load and measured quantity at a pose.
 #[derive(Clone, Copy, Debug)]
 struct Setup {
-    /// World axes (N).
+    /// Force, world axes (N).
     force: [f64; 3],
-    /// Tool axes (m).
+    /// Point of application, tool axes (m).
     at: [f64; 3],
-    /// Tool axes (m).
+    /// Measured point, tool axes (m).
     point: [f64; 3],
-    /// Of unit length, world axes.
+    /// Unit vector, world axes.
     direction: Option<[f64; 3]>,
 }
 
 impl PlanRequest {
-    /// Every force at every lever, each point seen along every direction.
+    /// Returns all combinations of force, point of application, measured point and direction.
     fn setups(&self) -> Vec<Setup> {
         let or_tcp = |points: &[[f64; 3]]| if points.is_empty() { vec![[0.0; 3]] } else { points.to_vec() };
         let unit = |d: &[f64; 3]| Some(Vector3::from(*d).normalize().into());
@@ -161,7 +161,7 @@ impl PlanRequest {
         all
     }
 
-    /// What makes no plan, as a sentence.
+    /// Returns the reason why the request is invalid, as a sentence.
     fn fault(&self) -> Option<String> {
         if self.count == 0 || self.forces.is_empty() || !(self.std_m > 0.0 && self.std_m.is_finite()) {
             return Some("a plan needs at least one reading, one force and a positive deviation".into());
@@ -183,24 +183,25 @@ impl PlanRequest {
     }
 }
 
-/// What to expect of a parameter.
+/// Expected uncertainty of a parameter.
 #[derive(Clone, Debug, Serialize)]
 pub struct ExpectedParameter {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its unit.
+    /// Unit.
     pub unit: String,
-    /// Now.
+    /// Present value.
     pub initial: f64,
     /// Standard deviation after the measurement.
     pub std: f64,
 }
 
-/// Chooses poses and loads at which displacements of the tool tell the robot's parameters best.
+/// Chooses poses and loads at which displacements of the tool give the most information about the
+/// robot's parameters.
 ///
 /// # Errors
-/// [`Error::File`] for a table that has no such poses, [`IdentifyFileError`] where there is nothing
-/// to find, [`Error::Taken`], [`Error::Write`].
+/// [`Error::File`] for a table without valid poses, [`IdentifyFileError`] if there is nothing to
+/// identify, [`Error::Taken`], [`Error::Write`].
 pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<MeasurementPlan, Error> {
     let arm = robot.flexible(request.modelling)?;
     let (joints, slides): (Vec<String>, Vec<bool>) = joints_of(&arm).into_iter().unzip();
@@ -303,7 +304,7 @@ fn displacement(q: &[f64], setup: &Setup, std: f64) -> Reading {
     Reading { name: format!("pose {q:?}"), q: q.to_vec(), kind }
 }
 
-/// Poses spread over the joint ranges: Halton's points.
+/// Poses spread over the joint ranges as Halton points.
 fn spread_poses(arm: &Arm) -> Vec<Vec<f64>> {
     const PRIMES: [u32; 16] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53];
     let model = &arm.flexible().model;
@@ -332,7 +333,7 @@ fn spread_poses(arm: &Arm) -> Vec<Vec<f64>> {
     (1..=CANDIDATES as u32).map(pose).collect()
 }
 
-/// Poses of a table with a column per joint.
+/// Reads poses from a table with a column per joint.
 fn poses_of(path: &Path, joints: &[String]) -> Result<Vec<Vec<f64>>, Error> {
     let table = NumberTable::read(path)?;
     let fail = |what: String| Error::File { path: path.to_owned(), what };
@@ -375,7 +376,7 @@ fn planned(
     best.chosen.iter().map(one).collect()
 }
 
-/// A file of measurements that names the table.
+/// Returns a file of measurements that refers to the table.
 fn job(answer: &MeasurementPlan, request: &PlanRequest) -> String {
     let fit = match request.fit.is_empty() {
         true => String::new(),
@@ -398,7 +399,7 @@ fn job(answer: &MeasurementPlan, request: &PlanRequest) -> String {
     )
 }
 
-/// The table with empty cells.
+/// Returns the table with empty cells.
 fn to_fill_in(answer: &MeasurementPlan, request: &PlanRequest, slides: &[bool]) -> String {
     let (levers, gauges) = (!request.levers.is_empty(), !request.directions.is_empty());
     let points = !request.points.is_empty();

@@ -17,18 +17,18 @@ use super::file::{Joints, LoadEntry, Reader};
 use super::uff::{UffFunction, read_functions};
 use flexarm_run::Error;
 
-/// Largest universal file that is read (bytes).
+/// Maximum size of a universal file (bytes).
 const LARGEST: u64 = 1 << 30;
-/// Most points of one response.
+/// Maximum number of points of one response.
 const MOST_POINTS: usize = 20_000;
-/// Acceleration of falling, of which accelerometers speak (m/s²).
+/// Standard gravity, the unit `g` of accelerometers (m/s²).
 const GRAVITY: f64 = 9.80665;
 
-/// A point of the arm.
+/// Point of the arm.
 #[derive(Debug, Deserialize, Clone)]
 #[serde(deny_unknown_fields)]
 pub(super) struct NodeEntry {
-    /// A link; the tool without.
+    /// Name of a link; the tool if absent.
     link: Option<Spanned<String>>,
     #[serde(default)]
     xyz: [f64; 3],
@@ -43,7 +43,7 @@ pub(super) struct ResponseEntry {
     joints: Spanned<Joints>,
     #[serde(default)]
     load: LoadEntry,
-    /// Nodes and directions, of tables.
+    /// Nodes and directions; only for tables.
     watched: Option<Spanned<String>>,
     watched_direction: Option<Spanned<Direction>>,
     hit: Option<Spanned<String>>,
@@ -68,7 +68,7 @@ pub(super) struct ShapeEntry {
     std: Option<Spanned<f64>>,
 }
 
-/// `x`, `-y`, or three numbers.
+/// Direction: `x`, `-y`, or three numbers.
 #[derive(Debug, Deserialize, Clone)]
 #[serde(untagged, expecting = "expected \"x\", \"-y\" and so on, or a list of three numbers")]
 enum Direction {
@@ -93,7 +93,7 @@ impl Direction {
     }
 }
 
-/// What is measured in, by name: the answer, and how many SI units it is.
+/// Units by name: measured quantity and factor to SI units.
 const UNITS: [(&str, Answer, f64); 11] = [
     ("m/N", Answer::Receptance, 1.0),
     ("mm/N", Answer::Receptance, 1e-3),
@@ -108,10 +108,10 @@ const UNITS: [(&str, Answer, f64); 11] = [
     ("mm/kN", Answer::Receptance, 1e-6),
 ];
 
-/// Hz, value in SI units, and its deviation where the file has one.
+/// Frequency (Hz), value in SI units, and its standard deviation if the file has one.
 type Point = (f64, Complex<f64>, Option<f64>);
 
-/// A response before its points of the arm are known.
+/// A response whose nodes are not resolved yet.
 struct Curve {
     name: String,
     watched: (Option<String>, Vector3<f64>),
@@ -121,7 +121,7 @@ struct Curve {
 }
 
 impl Reader<'_> {
-    /// Responses of one file at a pose.
+    /// Reads the responses of one file at a pose.
     pub(super) fn response(
         &mut self,
         nodes: &BTreeMap<String, Spanned<NodeEntry>>,
@@ -172,12 +172,12 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// The points within the range that is asked for.
+    /// Returns the points within the requested range.
     fn kept(&self, curve: &Curve, e: &ResponseEntry) -> Result<Vec<Point>, Error> {
         let bound = |given: &Option<Spanned<f64>>, otherwise: f64| given.as_ref().map_or(otherwise, |x| *x.get_ref());
         let (from, to) = (bound(&e.from, 0.0), bound(&e.to, f64::INFINITY));
         let every = e.every.as_ref().map_or(1, |n| *n.get_ref()).max(1);
-        // At rest nothing accelerates, and a logarithm needs a size.
+        // At 0 Hz there is no acceleration, and the logarithm needs a value above zero.
         let counts = |(hz, value, _): &&Point| *hz > 0.0 && *hz >= from && *hz <= to && value.norm() > 0.0;
         let kept: Vec<_> = curve.values.iter().filter(counts).step_by(every).copied().collect();
         match kept.len() {
@@ -193,7 +193,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Answer and factor of a unit.
+    /// Returns the measured quantity and the factor of a unit.
     fn unit(&self, unit: &Spanned<String>) -> Result<(Answer, f64), Error> {
         let found = UNITS.iter().find(|(name, ..)| name == unit.get_ref());
         found.map(|(_, answer, factor)| (*answer, *factor)).ok_or_else(|| {
@@ -202,7 +202,7 @@ impl Reader<'_> {
         })
     }
 
-    /// A response from a table.
+    /// Reads a response from a table.
     fn curve(&self, path: &Path, e: &ResponseEntry) -> Result<Curve, Error> {
         let table = NumberTable::read(path)?;
         let fail = |what: String| Error::File { path: path.to_owned(), what };
@@ -254,7 +254,7 @@ impl Reader<'_> {
         })
     }
 
-    /// Responses of a universal file.
+    /// Reads the responses of a universal file.
     fn universal(&self, path: &Path, e: &ResponseEntry) -> Result<Vec<Curve>, Error> {
         let fail = |what: String| Error::File { path: path.to_owned(), what };
         let size = path.metadata().map_or(0, |there| there.len());
@@ -298,7 +298,7 @@ impl Reader<'_> {
         functions.iter().map(one).collect()
     }
 
-    /// A mode's shape.
+    /// Reads a mode shape.
     pub(super) fn shape(
         &mut self,
         nodes: &BTreeMap<String, Spanned<NodeEntry>>,
@@ -334,7 +334,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// A point of the arm and a direction, world axes at the pose.
+    /// Returns a point of the arm and a direction in world axes at the pose.
     fn probe(
         &self,
         nodes: &BTreeMap<String, Spanned<NodeEntry>>,
@@ -387,7 +387,8 @@ impl Reader<'_> {
     }
 }
 
-/// What a function of a universal file is in: by its label, else by the file's units and its kind.
+/// Returns the unit of a function of a universal file: from its label, otherwise from the file's
+/// units and its kind.
 fn unit_of(function: &UffFunction) -> Option<(Answer, f64)> {
     let label = function.unit.replace([' ', '^'], "").to_lowercase();
     let label = label.split("/n").next().unwrap_or_default();

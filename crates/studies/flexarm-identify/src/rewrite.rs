@@ -1,5 +1,4 @@
-//! The robot file with identified numbers in the places of the old ones; everything else stays as
-//! it was written.
+//! Replacement of values in a robot file by identified ones; everything else stays as written.
 
 use std::path::Path;
 
@@ -10,13 +9,15 @@ use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
 use super::parameters::Written;
 
-/// The text of the robot file with other values; each with its standard deviation as a comment.
+/// Returns the text of the robot file with the identified values; each is listed in a comment with
+/// its standard deviation.
 ///
-/// * `tool`: link of the tool and its pose in the link, as it was; `home`: folder of the old file,
-///   `to`: of the new one; paths in the file are rewritten if they differ.
+/// * `tool`: link of the tool and its present pose in the link.
+/// * `home`: folder of the old file; `to`: folder of the new file. Relative paths in the file are
+///   rewritten if they differ.
 ///
 /// # Errors
-/// A sentence about what was not found where it should be.
+/// A sentence that names the missing entry.
 pub(super) fn rewritten(
     text: &str,
     found: &[(Found, Written)],
@@ -102,7 +103,7 @@ pub(super) fn rewritten(
     Ok(comments(&told) + &file.to_string())
 }
 
-/// What was found, before the first line of the file.
+/// Returns the header comment that lists the identified values.
 fn comments(told: &[(String, &Found)]) -> String {
     let mut out = String::from("# Identified by flexarm identify: value, standard deviation, value before.\n");
     for (_, p) in told {
@@ -116,7 +117,7 @@ fn comments(told: &[(String, &Found)]) -> String {
     out + "\n"
 }
 
-/// A value with two digits beyond its deviation's first.
+/// Rounds a value to two digits beyond the first digit of its deviation.
 fn rounded(value: f64, std: f64) -> f64 {
     if !(std > 0.0 && std.is_finite() && value.is_finite()) {
         return value;
@@ -132,7 +133,7 @@ fn rounded(value: f64, std: f64) -> f64 {
     text.parse().unwrap_or(value)
 }
 
-/// The entry of an array of tables with a name.
+/// Returns the entry with a given name in an array of tables.
 fn named<'a>(file: &'a mut DocumentMut, list: &str, key: &str, name: &str) -> Result<&'a mut dyn TableLike, String> {
     let missing = || format!("there is no [[{list}]] with {key} = {name:?}");
     let is_it = |table: &dyn TableLike| table.get(key).and_then(Item::as_str) == Some(name);
@@ -160,7 +161,7 @@ fn put_stiffness(item: &mut Item, entry: Option<usize>, found: &Found) -> Result
             let old = list.get_mut(k).ok_or_else(|| format!("gearbox.stiffness has no entry {k}"))?;
             replace(old, number);
         }
-        // A full matrix: every entry by the factor.
+        // Full matrix: scales every entry by the factor.
         (Value::Array(rows), None) => {
             for cell in rows.iter_mut().filter_map(Value::as_array_mut).flat_map(toml_edit::Array::iter_mut) {
                 let old = cell.as_float().or_else(|| cell.as_integer().map(|n| n as f64)).unwrap_or(0.0);
@@ -172,8 +173,8 @@ fn put_stiffness(item: &mut Item, entry: Option<usize>, found: &Found) -> Result
     Ok(())
 }
 
-/// An entry and its mirror image in the `stiffness` of a link, which is `K` where the file has
-/// none.
+/// Sets an entry of a link's `stiffness` and its symmetric counterpart. A missing `stiffness` is
+/// written as `K` first.
 fn put_entry(link: &mut dyn TableLike, place: (usize, usize), K: &Matrix6<f64>, number: f64) -> Option<()> {
     if link.get("stiffness").is_none() {
         let mut rows: Array = (0..6).map(|i| (0..6).map(|j| K[(i, j)]).collect::<Array>()).collect();
@@ -189,7 +190,7 @@ fn put_entry(link: &mut dyn TableLike, place: (usize, usize), K: &Matrix6<f64>, 
     Some(())
 }
 
-/// The place of the tool, moved and turned about its own axes by what was found of it.
+/// Writes the pose of the tool, moved and rotated about its own axes by the identified values.
 fn put_tool(file: &mut DocumentMut, found: &[(Found, Written)], tool: (&str, &Pose)) -> Result<(), String> {
     let mut shift = [0.0; 6];
     for (parameter, written) in found {
@@ -207,7 +208,7 @@ fn put_tool(file: &mut DocumentMut, found: &[(Found, Written)], tool: (&str, &Po
         file.insert("tcp", toml_edit::value(link));
     }
     let entry = file.get_mut("tcp").and_then(Item::as_table_like_mut).ok_or("tcp is no table")?;
-    // Tenths of micrometres and of microradians.
+    // Rounded to 0.1 µm and 0.1 µrad.
     let list = |values: [f64; 3]| values.map(|x| (x * 1e7).round() / 1e7).into_iter().collect::<Array>();
     entry.insert("xyz", toml_edit::value(list(X_LT.translation.vector.into())));
     if part(3) != Vector3::zeros() {
@@ -217,7 +218,7 @@ fn put_tool(file: &mut DocumentMut, found: &[(Found, Written)], tool: (&str, &Po
     Ok(())
 }
 
-/// The damping of a gearbox, or one entry of it.
+/// Sets the damping of a gearbox, or one entry of it.
 fn put_gear_damping(drive: &mut dyn TableLike, joint: &str, entry: Option<usize>, found: &Found) -> Result<(), String> {
     let gearbox = drive.get_mut("gearbox").and_then(Item::as_table_like_mut);
     let damping = gearbox.and_then(|gearbox| gearbox.get_mut("damping")).and_then(Item::as_value_mut);
@@ -232,7 +233,8 @@ fn put_gear_damping(drive: &mut dyn TableLike, joint: &str, entry: Option<usize>
     Ok(())
 }
 
-/// A number by the new one; of a list every entry by how many times as large it is.
+/// Sets a number to the new value; scales the entries of a longer list by the ratio of new to
+/// initial.
 fn put_damping(item: &mut Value, found: &Found) {
     let factor = found.value / found.initial;
     match item {
@@ -249,14 +251,14 @@ fn put_damping(item: &mut Value, found: &Found) {
     }
 }
 
-/// Another number with the spaces and comments of the old one.
+/// Replaces a number and keeps the spaces and comments around it.
 fn replace(old: &mut Value, number: f64) {
     let decor = old.decor().clone();
     *old = Value::from(number);
     *old.decor_mut() = decor;
 }
 
-/// Relative paths, which count from the folder of the file, from another folder.
+/// Rewrites the relative paths of a file for another folder.
 pub fn moved_paths(file: &mut DocumentMut, home: &Path, to: &Path) {
     let moved = |text: &str| -> Option<String> {
         let path = Path::new(text);
@@ -280,7 +282,7 @@ pub fn moved_paths(file: &mut DocumentMut, home: &Path, to: &Path) {
     }
 }
 
-/// A path as seen from a folder.
+/// Returns a path relative to a folder.
 fn relative(path: &Path, from: &Path) -> std::path::PathBuf {
     let real =
         |path: &Path| path.canonicalize().unwrap_or_else(|_| std::path::absolute(path).unwrap_or_else(|_| path.into()));

@@ -1,41 +1,41 @@
-//! Universal files with dataset 58: functions of a modal test, as text (58) and binary (58b);
-//! dataset 164 tells their units.
+//! Universal files with dataset 58: functions of a modal test, as text (58) and binary (58b).
+//! Dataset 164 gives their units.
 //!
-//! Start at [`read_functions`]. Frequency responses (function type 4) are taken, other functions
-//! and other datasets are passed over.
+//! Start at [`read_functions`]. It reads frequency responses (function type 4) and skips other
+//! functions and other datasets.
 
 use nalgebra::Complex;
 
-/// Most values of a file.
+/// Maximum number of values of a function.
 const MOST: usize = 10_000_000;
-/// Lines before the values of a function.
+/// Number of header lines before the values of a function.
 const HEAD: usize = 11;
 /// Function type of a frequency response.
 const RESPONSE: i64 = 4;
 
-/// A frequency response of a file.
+/// Frequency response in a file.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct UffFunction {
-    /// Line at which its dataset begins, from 1.
+    /// First line of its dataset, from 1.
     pub(super) line: usize,
     /// Node and direction (±1 to ±3 for x, y, z) of the response.
     pub(super) response: (i64, i64),
-    /// The same of the force.
+    /// Node and direction of the force.
     pub(super) reference: (i64, i64),
-    /// What is measured: 8 displacement, 11 velocity, 12 acceleration; others are unknown.
+    /// Measured quantity: 8 displacement, 11 velocity, 12 acceleration; others are unknown.
     pub(super) ordinate: i64,
-    /// Its unit as the file labels it; may be empty.
+    /// Unit label in the file; may be empty.
     pub(super) unit: String,
-    /// Length and force of the file per m and N, if dataset 164 before it tells them.
+    /// Length and force units of the file per m and N, if dataset 164 precedes the function.
     pub(super) per_si: Option<[f64; 2]>,
-    /// Hz and values.
+    /// Frequencies (Hz) and values.
     pub(super) values: Vec<(f64, Complex<f64>)>,
 }
 
-/// All frequency responses of a file.
+/// Reads all frequency responses of a file.
 ///
 /// # Errors
-/// A sentence with the line of what cannot be read.
+/// A sentence with the line that cannot be read.
 pub(super) fn read_functions(bytes: &[u8]) -> Result<Vec<UffFunction>, String> {
     let mut reader = Lines { bytes, at: 0, line: 0 };
     let (mut found, mut per_si, mut sets) = (Vec::new(), None, 0);
@@ -59,7 +59,7 @@ pub(super) fn read_functions(bytes: &[u8]) -> Result<Vec<UffFunction>, String> {
             Some("164") => per_si = Some(units(&mut reader)?),
             _ => {}
         }
-        // To the end of the dataset.
+        // Skips to the end of the dataset.
         while let Some(line) = reader.next() {
             if line.trim() == "-1" {
                 break;
@@ -73,7 +73,7 @@ pub(super) fn read_functions(bytes: &[u8]) -> Result<Vec<UffFunction>, String> {
     }
 }
 
-/// Lines of text, among which bytes may stand.
+/// Lines of text, with binary data possibly in between.
 struct Lines<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -97,14 +97,14 @@ impl Lines<'_> {
     }
 }
 
-/// How the values of a dataset 58b stand.
+/// Binary format of a dataset 58b.
 struct Binary {
     little: bool,
     bytes: usize,
 }
 
 impl Binary {
-    /// From byte order, number format, lines of the head, and bytes.
+    /// Reads byte order, number format, number of header lines, and number of bytes.
     fn of(words: &[&str]) -> Option<Self> {
         let number = |k: usize| words.get(k)?.parse::<usize>().ok();
         let (order, format, lines, bytes) = (number(0)?, number(1)?, number(2)?, number(3)?);
@@ -112,7 +112,7 @@ impl Binary {
     }
 }
 
-/// Factors from SI to the units of the file: length, force.
+/// Reads the factors from SI to the units of the file: length, force.
 fn units(reader: &mut Lines<'_>) -> Result<[f64; 2], String> {
     reader.expect("the code of the units")?;
     let line = reader.expect("factors of the units")?;
@@ -123,12 +123,12 @@ fn units(reader: &mut Lines<'_>) -> Result<[f64; 2], String> {
     }
 }
 
-/// A number as Fortran writes it.
+/// Parses a number in Fortran notation.
 fn number(word: &str) -> Option<f64> {
     word.replace(['D', 'd'], "E").parse().ok().filter(|x: &f64| x.is_finite())
 }
 
-/// Letters of a line from one place to another.
+/// Returns the trimmed characters of a line in a range of columns.
 fn part(line: &str, from: usize, to: usize) -> String {
     line.chars().skip(from).take(to - from).collect::<String>().trim().to_owned()
 }
@@ -217,7 +217,7 @@ fn text_to_numbers(reader: &mut Lines<'_>, wanted: usize, place: usize) -> Resul
     Ok(numbers)
 }
 
-/// Numbers of a line; where no blank stands between them, each begins at its sign.
+/// Splits a line into numbers; without blanks between them, a sign starts a new number.
 fn fields(line: &str) -> Vec<String> {
     let mut words: Vec<String> = vec![String::new()];
     let mut before = ' ';
@@ -273,7 +273,7 @@ fn bytes_to_numbers(
 mod tests {
     use super::*;
 
-    /// A function of three even values; what follows the head is given.
+    /// Writes a function with three values at equal spacing; `values` follows the header.
     fn dataset(kind: &str, form: i64, spacing: i64, values: &[u8]) -> Vec<u8> {
         let mut text = format!("    -1\n    {kind}\nfirst\nNONE\nNONE\nNONE\nNONE\n").into_bytes();
         let places =
@@ -289,7 +289,7 @@ mod tests {
         text
     }
 
-    /// Truth: the numbers that went in.
+    /// Truth: the numbers that were written.
     #[test]
     fn a_function_is_the_same_as_text_and_in_both_orders_of_bytes() {
         let H = [(1.5, -2.0), (0.25, 3.0), (-1e-3, 4e-7)];

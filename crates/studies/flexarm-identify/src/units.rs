@@ -1,4 +1,4 @@
-//! Measurements against the arm as it is known: modes that it does not have, units.
+//! Checks of measurements against the nominal arm: modes and units.
 
 use crate::estimation::{
     Form, Instrument, MeasuredArm, MeasuredResponse, Measurements, Plant, Reading, ReadingKind, Target,
@@ -10,10 +10,10 @@ use super::error::IdentifyFileError;
 use super::file::MeasurementInput;
 use flexarm_run::Error;
 
-/// Beyond this ratio of measured to expected size the units are wrong, not the robot.
+/// Ratio of measured to predicted size above which wrong units are the only plausible cause.
 const UNIT_RATIO: f64 = 100.0;
 
-/// Modes beyond those that the model has.
+/// Rejects modes with numbers beyond those of the model.
 pub(super) fn check_modes(plant: &Plant, input: &MeasurementInput) -> Result<(), Error> {
     let modes = plant.model.n_elastic();
     for reading in &input.measurements.readings {
@@ -26,7 +26,8 @@ pub(super) fn check_modes(plant: &Plant, input: &MeasurementInput) -> Result<(),
     Ok(())
 }
 
-/// Displacements and distances against those of the robot as it is: a thousandfold is a unit.
+/// Compares displacements and distances with those of the nominal robot; a large ratio indicates
+/// wrong units.
 pub(super) fn check_units(plant: &Plant, input: &MeasurementInput) -> Result<(), Error> {
     let of = |kind: fn(&ReadingKind) -> bool| {
         let mut some = input.measurements.of_readings(|k| kind(&input.measurements.readings[k].kind));

@@ -1,5 +1,5 @@
-//! Entries of a spring's matrix and the place of the tool as parameters: derivatives against
-//! Richardson differences, truths found again.
+//! Entries of a spring's matrix and the tool pose as parameters: derivatives against Richardson
+//! extrapolation, and recovery of known values.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(non_snake_case, reason = "monogram notation")]
@@ -14,7 +14,7 @@ use nalgebra::{Complex, DMatrix, DVector, Matrix3, Rotation3, Translation3, Vect
 
 const POSE: [f64; 6] = [0.4, 0.5, -0.3, 0.7, 0.6, -1.2];
 
-/// The reference arm twenty times as soft.
+/// Returns the reference arm with a twentieth of its stiffness.
 fn plant() -> Plant {
     let reference = reference_arm(true);
     let model = Arc::new(Model::new(&reference.mechanism).unwrap());
@@ -50,7 +50,7 @@ fn step_of(parameter: &Parameter) -> f64 {
     }
 }
 
-/// Derivative by differences of sixth order.
+/// Computes a derivative by sixth-order Richardson extrapolation of central differences.
 fn richardson(h: f64, f: impl Fn(f64) -> DVector<f64>) -> DVector<f64> {
     let d = |h: f64| (f(h) - f(-h)) / (2.0 * h);
     let (a, b, c) = (d(h), d(0.5 * h), d(0.25 * h));
@@ -58,7 +58,8 @@ fn richardson(h: f64, f: impl Fn(f64) -> DVector<f64>) -> DVector<f64> {
     (bc * 16.0 - ab) / 15.0
 }
 
-/// One reading of every kind, with a load that acts beside the tool and a mass that hangs there.
+/// Returns one reading of every kind, with a load that acts beside the tool and a mass attached
+/// there.
 fn measurements(plant: &Plant) -> Measurements {
     let carried = SpatialInertia::from_com(12.0, &Vector3::new(0.1, 0.2, 0.3), &(Matrix3::identity() * 0.3));
     let at = Vector3::new(0.1, 0.02, -0.05);
@@ -115,8 +116,8 @@ fn measurements(plant: &Plant) -> Measurements {
     Measurements { readings, targets, instruments: vec![Instrument::Known(X)] }
 }
 
-/// Truth: differences of sixth order of the residuals, reading after reading, away from the first
-/// guess.
+/// Truth: sixth-order differences of the residuals, reading after reading, away from the initial
+/// values.
 #[test]
 fn readings_of_all_kinds_change_with_entries_and_with_the_tool_as_differences_say() {
     let plant = plant();
@@ -128,7 +129,8 @@ fn readings_of_all_kinds_change_with_entries_and_with_the_tool_as_differences_sa
         let arm = MeasuredArm { plant: &plant, parameters: &parameters, measurements: &one };
         let mut J = DMatrix::zeros(0, 0);
         arm.evaluate(&x, Some(&mut J)).unwrap();
-        // What a step of each does; entries that do next to nothing are held against the others.
+        // Change of the residuals per step; entries with almost no effect are compared with the
+        // largest one.
         let largest = (0..J.ncols()).map(|p| J.column(p).amax() * step_of(&parameters[p])).fold(0.0, f64::max);
         for (p, parameter) in parameters.iter().enumerate() {
             let residuals = |h: f64| {
@@ -141,13 +143,13 @@ fn readings_of_all_kinds_change_with_entries_and_with_the_tool_as_differences_sa
             let size = truth.amax().max(1e-3 * largest / step_of(parameter));
             let error = (J.column(p) - &truth).amax();
             eprintln!("reading {k}, {}: {:.1e} of {:.2e}", parameter.name, error / size, truth.amax());
-            // Measured: 7e-10 and less.
+            // Measured: at most 7e-10.
             assert!(error < 1e-8 * size, "reading {k}, {}: {:e}", parameter.name, error / size);
         }
     }
 }
 
-/// Truth: differences of the compliance with the entry changed.
+/// Truth: differences of the compliance with a changed entry.
 #[test]
 fn the_compliance_changes_with_an_entry_as_differences_say() {
     let plant = plant();
@@ -197,8 +199,8 @@ fn read(of: &Measurements, values: &[f64]) -> Measurements {
     all
 }
 
-/// Truth: the arm that was measured. Its bending is a third as stiff and coupled to shear; a full
-/// step of Newton's from the first guess leads to a matrix that is not definite.
+/// Truth: the measured arm. One bending stiffness is a third of the initial value, with coupling to
+/// shear; a full Newton step from the initial values leads to an indefinite matrix.
 #[test]
 fn entries_far_from_the_guess_are_found_and_the_matrix_stays_definite_on_the_way() {
     let plant = plant();
@@ -222,12 +224,13 @@ fn entries_far_from_the_guess_are_found_and_the_matrix_stays_definite_on_the_way
         eprintln!("{}: {:.6e} of {truth:.6e}, first {:.6e}", p.name, p.value, p.initial);
         assert!(p.identifiable && (p.value - truth).abs() < 1e-7 * soft.springs[0].K[(0, 0)], "{}", p.name);
     }
-    // Outside of the cone the arm has no answer, so that the search turns back.
+    // Outside the cone of positive definite matrices the arm has no solution, so the search rejects
+    // the step.
     let arm = MeasuredArm { plant: &plant, parameters: &parameters, measurements: &poses };
     let beyond = DVector::from_vec(vec![0.0, 1.5 * root(&plant.springs[0].K, 0, 4), 0.0]);
     assert!(arm.predicted(&beyond).unwrap_err().to_string().contains("stiffness of an elastic joint"));
-    // Noise: errors over the stated deviations are standard normal; 120 of them within 0.8 to 1.2
-    // in 99 of 100 cases.
+    // With noise, errors over the reported deviations are standard normal; the RMS of 120 of them
+    // is within 0.8 to 1.2 with 99 % probability.
     let mut draw = Draw(7);
     let mut normal = || {
         let (u, v) = (draw.between(1e-12, 1.0), draw.between(0.0, std::f64::consts::TAU));

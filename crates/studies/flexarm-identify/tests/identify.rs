@@ -1,5 +1,5 @@
-//! Parameters found again from made-up measurements: unbiased, with honest uncertainties, and
-//! silent where nothing is told.
+//! Recovery of known parameters from simulated measurements: unbiased, with correct uncertainties,
+//! and without values for parameters that the readings do not determine.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(clippy::expect_used, clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(non_snake_case, reason = "monogram notation")]
@@ -28,7 +28,7 @@ fn stiffness(name: &str, spring: usize, coordinate: Option<usize>) -> Parameter 
     Parameter { name: name.into(), unit: "1".into(), initial: 1.0, prior: 2f64.ln(), effect }
 }
 
-/// Bending and twist of both links, each a parameter of its own.
+/// Returns bending and torsion of both links as separate parameters.
 fn parameters() -> Vec<Parameter> {
     vec![
         stiffness("lower about x", 0, Some(3)),
@@ -51,8 +51,8 @@ fn pose(draw: &mut Draw) -> Vec<f64> {
     [2.5, 0.8, 0.9, 2.5, 1.5, 2.5].iter().map(|range| range * draw.signed()).collect()
 }
 
-/// Displacements under a weight of 100 kg and pulls of 500 N to the side, on an arm of 0.4 m, along
-/// three axes.
+/// Displacements along three axes under a weight of 100 kg and lateral forces of 500 N on a lever
+/// of 0.4 m.
 fn pulled(draw: &mut Draw, count: usize) -> Measurements {
     let readings = (0..count).map(|k| {
         let mut force = Vector3::new(0.0, 0.0, -981.0);
@@ -73,7 +73,7 @@ fn pulled(draw: &mut Draw, count: usize) -> Measurements {
     Measurements { readings: readings.collect(), ..Measurements::default() }
 }
 
-/// The readings that an arm would have shown, with noise.
+/// Simulates the readings of an arm, with noise.
 fn read(plant: &Plant, parameters: &[Parameter], truth: &[f64], from: &Measurements, draw: &mut Draw) -> Measurements {
     let arm = MeasuredArm { plant, parameters, measurements: from };
     let mut unknowns = DVector::zeros(parameters.len() + from.own_unknowns());
@@ -91,7 +91,7 @@ fn read(plant: &Plant, parameters: &[Parameter], truth: &[f64], from: &Measureme
             }
             ReadingKind::Known { value, std, .. } => *value = next(*std, draw),
             ReadingKind::Frequencies { rows, .. } => rows.iter_mut().for_each(|row| row.value = next(row.std, draw)),
-            // What is known of a frame is said and not drawn.
+            // Prior knowledge of a frame is given without noise.
             ReadingKind::TargetAt { .. } | ReadingKind::InstrumentAt { .. } => {}
             other => panic!("not drawn here: {other:?}"),
         }
@@ -99,8 +99,8 @@ fn read(plant: &Plant, parameters: &[Parameter], truth: &[f64], from: &Measureme
     noisy
 }
 
-/// Truth: the made-up arm. Over 200 seeds each error over its stated deviation is standard normal.
-/// Over 1000 seeds: 94.7 % within their intervals, spread 0.998.
+/// Truth: the simulated arm. Over 200 seeds each error over its reported deviation is standard
+/// normal. Over 1000 seeds: 94.7 % within their intervals, spread 0.998.
 #[test]
 fn of_two_hundred_fits_the_stated_deviations_are_those_of_the_errors() {
     let (plant, parameters) = (plant(), parameters());
@@ -127,7 +127,7 @@ fn of_two_hundred_fits_the_stated_deviations_are_those_of_the_errors() {
     eprintln!("coverage {coverage:.3}, mean {mean:.3}, spread {spread:.3}, misfits {misfits}");
     assert!((0.92..0.98).contains(&coverage), "{coverage}");
     assert!(mean.abs() < 0.12 && (0.92..1.08).contains(&spread), "{mean} {spread}");
-    // One in a thousand is told a misfit by chance.
+    // One in a thousand reports a misfit by chance.
     assert!(misfits <= 2, "{misfits}");
 }
 
@@ -143,15 +143,15 @@ fn a_dial_gauge_under_one_weight_tells_one_combination_and_the_rest_stays_where_
     }
     let noisy = read(&plant, &parameters, &TRUTH, &one, &mut draw);
     let found = identify(&plant, &parameters, &noisy, &IdentifyOptions::default()).unwrap();
-    // In the plane of the arm only bending about y counts, of both links together.
+    // In the plane of the arm only bending about y has an effect, combined over both links.
     assert_eq!(found.solution.identified, 1, "{:?}", found.solution.gains);
     for k in [0, 2, 3, 4, 5] {
         assert!(!found.parameters[k].identifiable, "{}", found.parameters[k].name);
     }
-    // In the combination that is known the lower link has the larger part.
+    // The lower link has the larger weight in the identified combination.
     let [lower, upper] = [found.solution.unknowns[1], found.solution.unknowns[4]];
     assert!(lower < 0.0 && upper.abs() < lower.abs(), "{lower} {upper}");
-    // A prior that says next to nothing makes nothing identifiable.
+    // A very weak prior makes no parameter identifiable.
     let weak: Vec<Parameter> = parameters.iter().map(|p| Parameter { prior: 1000f64.ln(), ..p.clone() }).collect();
     let unsure = identify(&plant, &weak, &noisy, &IdentifyOptions::default()).unwrap();
     for (k, parameter) in found.parameters.iter().chain(&unsure.parameters).enumerate().filter(|(k, _)| k % 6 != 1) {
@@ -242,7 +242,8 @@ fn planned_poses_tell_more_than_random_ones_and_the_deviations_promised_are_thos
         assert!(planned.gain > others.gain + 0.5, "{} {}", planned.gain, others.gain);
         let readings = planned.chosen.iter().map(|k| candidates[*k].0.clone()).collect();
         let poses = Measurements { readings, ..Measurements::default() };
-        // Readings without noise: the deviations are those of the plan but for its prior.
+        // Readings without noise: the deviations equal those of the plan, except for the influence
+        // of its prior.
         let mut exact = poses.clone();
         let arm = MeasuredArm { plant: &plant, parameters: &parameters, measurements: &poses };
         let mut values = arm.predicted(&DVector::zeros(6)).unwrap().into_iter();
@@ -261,7 +262,7 @@ fn planned_poses_tell_more_than_random_ones_and_the_deviations_promised_are_thos
     }
 }
 
-/// Truth: the same readings without the two outliers, which lie 67 deviations away.
+/// Truth: the same readings without the two outliers of 67 standard deviations.
 #[test]
 fn two_slipped_readings_are_named_and_leave_scatter_and_deviations_as_they_are() {
     let (plant, parameters) = (plant(), parameters());
@@ -285,7 +286,7 @@ fn two_slipped_readings_are_named_and_leave_scatter_and_deviations_as_they_are()
     }
 }
 
-/// Truth: the fit of the same readings with the deviation that they have.
+/// Truth: the fit of the same readings with the correct standard deviation.
 #[test]
 fn readings_without_a_deviation_tell_it_and_name_an_outlier() {
     let (plant, parameters) = (plant(), parameters());
@@ -312,7 +313,7 @@ fn readings_without_a_deviation_tell_it_and_name_an_outlier() {
     }
 }
 
-/// Truth: the made-up arm and the made-up rotation.
+/// Truth: the simulated arm and rotation.
 #[test]
 fn displacements_in_the_axes_of_an_instrument_tell_stiffness_and_axes() {
     let (plant, parameters) = (plant(), parameters());
@@ -339,7 +340,7 @@ fn displacements_in_the_axes_of_an_instrument_tell_stiffness_and_axes() {
             assert!(parameter.identifiable && z.abs() < 4.0, "{}: {z}", parameter.name);
         }
     }
-    // With a deviation of the axes beside the readings.
+    // With prior knowledge of the axes, given with a standard deviation.
     let std_rotation = 1e-4;
     let value = Pose::from_parts(Translation3::identity(), R * Rotation3::new(Vector3::new(1e-4, -1e-4, 5e-5)));
     noisy.instruments = vec![Instrument::Axes(value.rotation)];
@@ -350,8 +351,7 @@ fn displacements_in_the_axes_of_an_instrument_tell_stiffness_and_axes() {
     assert!(turned < 4e-4, "{turned:e}");
 }
 
-/// Truth: an arm whose springs are those of the plant under displacements with joints and axes
-/// mixed up.
+/// Truth: simulated readings of the plant, with permuted joints and rotated axes.
 #[test]
 fn joints_in_another_order_and_axes_of_another_frame_are_recognised() {
     let (plant, parameters) = (plant(), parameters());
@@ -360,7 +360,7 @@ fn joints_in_another_order_and_axes_of_another_frame_are_recognised() {
     let slides = [false; 6];
     let found = |read: &Measurements| likely_slip(&plant, &parameters, read, &slides);
     assert_eq!(found(&noisy), None);
-    // Of each joint the place of its value.
+    // For each joint, the position of its value.
     for order in [[5, 4, 3, 2, 1, 0], [0, 2, 1, 3, 4, 5], [1, 2, 0, 3, 5, 4]] {
         let mut mixed = noisy.clone();
         for reading in &mut mixed.readings {
@@ -383,9 +383,9 @@ fn joints_in_another_order_and_axes_of_another_frame_are_recognised() {
     assert!(off < 0.05, "{off}");
 }
 
-/// Truth: the made-up arm, whose springs are up to two and a half times as stiff or soft as the
-/// first guess. From there a plain search ends where resonances of the model lie on others of the
-/// arm.
+/// Truth: the simulated arm, whose stiffnesses differ from the initial values by factors of up to
+/// two and a half. From there a plain search ends in a local minimum where resonances of the model
+/// are close to other resonances of the arm.
 #[test]
 fn responses_that_draw_the_search_into_a_false_minimum_are_met_from_another_start() {
     let (plant, parameters) = (plant(), parameters());
@@ -443,7 +443,7 @@ fn responses_that_draw_the_search_into_a_false_minimum_are_met_from_another_star
     }
 }
 
-/// Five springs of six are not fitted.
+/// Five of six springs are not fitted.
 #[test]
 fn a_fit_that_does_not_meet_the_readings_has_no_deviations() {
     let (plant, parameters) = (plant(), parameters());

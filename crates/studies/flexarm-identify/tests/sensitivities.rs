@@ -1,5 +1,5 @@
-//! Derivatives by parameters against Richardson differences of the nonlinear answers, on a soft arm
-//! whose equilibrium moves.
+//! Derivatives with respect to parameters against Richardson extrapolation of nonlinear solutions,
+//! for a soft arm whose equilibrium depends on the parameters.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(clippy::expect_used, clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(non_snake_case, reason = "monogram notation")]
@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Translation3, Vector3};
 
 const POSE: [f64; 6] = [0.4, 0.5, -0.3, 0.7, 0.6, -1.2];
 
-/// The reference arm twenty times as soft: its tool hangs down by 4 cm.
+/// Returns the reference arm with a twentieth of its stiffness: its tool sags by 4 cm.
 fn plant() -> Plant {
     let reference = reference_arm(true);
     let model = Arc::new(Model::new(&reference.mechanism).expect("valid"));
@@ -40,7 +40,7 @@ fn parameters(plant: &Plant) -> Vec<Parameter> {
     ]
 }
 
-/// Two dampings, one of each kind that springs have.
+/// Parameters for damping, one for each damping model of the springs.
 fn with_damping(plant: &mut Plant) -> Vec<Parameter> {
     plant.springs[1].damping = Damping::Rayleigh(0.4, 3e-4);
     let damping = |name: &str, spring| Parameter {
@@ -55,7 +55,7 @@ fn with_damping(plant: &mut Plant) -> Vec<Parameter> {
     all
 }
 
-/// A blow beside the tool, seen on the upper link.
+/// Returns two points beside the tool on its body, each with a direction.
 fn probes(plant: &Plant) -> [Probe; 2] {
     let moved = |x: f64, y: f64, z: f64| {
         let frame = plant.tool.clone();
@@ -67,7 +67,7 @@ fn probes(plant: &Plant) -> [Probe; 2] {
     ]
 }
 
-/// Derivative by differences of sixth order.
+/// Computes a derivative by sixth-order Richardson extrapolation of central differences.
 fn richardson(h: f64, f: impl Fn(f64) -> DVector<f64>) -> DVector<f64> {
     let d = |h: f64| (f(h) - f(-h)) / (2.0 * h);
     let (a, b, c) = (d(h), d(0.5 * h), d(0.25 * h));
@@ -104,7 +104,7 @@ fn the_tool_moves_with_each_parameter_as_the_nonlinear_equilibrium_does() {
             let truth = richardson(step_of(parameter), place);
             let error = (slopes.column(k) - &truth).amax() / truth.amax();
             eprintln!("{}: {error:.1e} of {:.2e}", parameter.name, truth.amax());
-            // Measured: 5e-11 and less; the truth is a difference itself.
+            // Measured: at most 5e-11; the truth is a difference itself.
             assert!(error < 1e-8, "{}: {error:e}", parameter.name);
         }
     }
@@ -202,7 +202,7 @@ fn every_row_of_every_kind_of_reading_has_the_derivatives_of_its_residual() {
     }
 }
 
-/// Truth: the linear system of the arm from its own matrices, as `flexarm response` solves it.
+/// Truth: the linear system of the arm from its own matrices, as in `flexarm response`.
 #[test]
 fn a_response_is_that_of_the_linearised_arm() {
     let mut plant = plant();

@@ -1,5 +1,5 @@
-//! Derivatives of the tool's error along a motion by parameters, against Richardson differences of
-//! runs: the damping follows the modes.
+//! Derivatives of the tool error along a motion with respect to parameters, against Richardson
+//! extrapolation of runs; the damping depends on the modes.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(non_snake_case, reason = "monogram notation")]
@@ -14,7 +14,7 @@ use flexarm_stepping::{
 use flexarm_testkit::{reference_arm, reference_motion};
 use nalgebra::{DVector, Matrix3, Vector3};
 
-/// The reference motion with a joint shifted.
+/// Reference motion with one joint shifted.
 struct Shifted(usize, f64);
 
 impl PrescribedMotion for Shifted {
@@ -58,7 +58,7 @@ fn parameters(plant: &Plant) -> Vec<RunParameter> {
     ]
 }
 
-/// The arm and its tool with a parameter changed.
+/// Returns the arm and its tool with one parameter changed.
 fn changed(plant: &Plant, parameter: Option<&RunParameter>, x: f64) -> (FlexibleArm, Frame) {
     let mut plant = plant.clone();
     let mut motion = Shifted(0, 0.0);
@@ -82,7 +82,7 @@ fn request(tool: Frame) -> SlopesRequest {
     }
 }
 
-/// Derivative by differences of sixth order.
+/// Computes a derivative by sixth-order Richardson extrapolation of central differences.
 fn richardson(h: f64, f: impl Fn(f64) -> DVector<f64>) -> DVector<f64> {
     let d = |h: f64| (f(h) - f(-h)) / (2.0 * h);
     let (a, b, c) = (d(h), d(0.5 * h), d(0.25 * h));
@@ -95,8 +95,8 @@ fn the_error_along_a_motion_depends_on_each_parameter_with_the_damping_that_foll
     compare(|arm| arm);
 }
 
-/// What is carried changes twice: on the body of the mass that is a parameter, which is gone then,
-/// and modal damping follows.
+/// The inertia of the tool body, which has the mass parameter, changes twice; each change replaces
+/// the mass, and the modal damping is recomputed.
 #[test]
 fn the_damping_after_a_change_of_payload_follows_the_parameters() {
     let body = plant().tool.body;
@@ -119,7 +119,8 @@ fn compare(carrying: impl Fn(FlexibleArm) -> FlexibleArm) {
             let found = run_slopes(&carrying(arm), &request(tool), &[]).unwrap();
             DVector::from_iterator(6 * found.errors.len(), found.errors.iter().flatten().copied())
         };
-        // The truth is lost in rounding where the step is small, and damping does little.
+        // Small steps lose accuracy to rounding where the parameter has little effect, such as
+        // damping.
         let h = match parameter {
             RunParameter::Arm(Parameter { effect: Effect::Mass { .. }, .. }) => 0.2,
             RunParameter::Arm(Parameter { effect: Effect::Damping(_), .. }) => 0.15,
@@ -130,7 +131,7 @@ fn compare(carrying: impl Fn(FlexibleArm) -> FlexibleArm) {
         let error = (DVector::from_vec(own) - &truth).amax() / truth.amax();
         let name = if let RunParameter::Arm(own) = parameter { own.name.as_str() } else { "motion or tool" };
         eprintln!("{name}: {error:.1e} of {:.2e}", truth.amax());
-        // 1e-9 and less.
+        // Measured: at most 1e-9.
         assert!(error < 1e-8, "{name}: {error:e}");
     }
 }

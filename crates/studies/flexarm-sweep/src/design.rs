@@ -1,8 +1,8 @@
-//! The runs of a study: which values the parameters have in each, by its number.
+//! Design of a study: the values of the parameters in each run, given its number.
 //!
-//! Parameters with listed values make a full grid, the last one changing fastest; those of one
-//! `linked` word go along together. Parameters with a distribution are drawn together, and every
-//! point of the grid gets the same draws.
+//! Parameters with listed values form a full grid, in which the last one changes fastest;
+//! parameters of the same `linked` group vary together. Parameters with a distribution are sampled
+//! jointly, and every point of the grid uses the same samples.
 
 use crate::statistics::{Sample, grid_levels};
 
@@ -12,7 +12,7 @@ use super::store::CAVEATS;
 use super::value::ParameterValue;
 use flexarm_run::RobotFileError;
 
-/// A parameter that has a column.
+/// Parameter with a column in the table of runs.
 #[derive(Clone, Debug)]
 pub(super) struct Column {
     pub(super) name: String,
@@ -21,41 +21,41 @@ pub(super) struct Column {
     pub(super) values: Values,
     pub(super) bounds: Option<(f64, f64)>,
     pub(super) place: RobotFileError,
-    /// What it is linked to.
+    /// Group of linked parameters.
     linked: Option<String>,
 }
 
-/// Which columns have which values in a run.
+/// Values of the columns in each run.
 #[derive(Clone, Debug)]
 pub(super) struct Design {
     pub(super) columns: Vec<Column>,
     /// Sizes of the grid, and the columns of each of its directions.
     sizes: Vec<usize>,
     directions: Vec<Vec<usize>>,
-    /// Columns that are drawn.
+    /// Columns of random parameters.
     drawn: Vec<usize>,
-    /// Columns that follow from others.
+    /// Columns computed from others.
     derived: Vec<(usize, Formula)>,
     sample: Sample,
     runs: usize,
 }
 
-/// Most runs of a study.
+/// Maximum number of runs of a study.
 const MOST_RUNS: u64 = 5_000_000;
 
 impl Column {
-    /// The column of an entry, with its own name or that of its path.
+    /// Returns a column of a parameter entry.
     pub(super) fn of(entry: &ParameterEntry, name: String, paths: Vec<String>) -> Self {
         let ParameterEntry { role, values, bounds, place, linked, .. } = entry.clone();
         Self { name, paths, role, values, bounds, place, linked }
     }
 
-    /// Whether it is linked by this word.
+    /// Whether the column belongs to a linked group.
     pub(super) fn is_linked_by(&self, word: &str) -> bool {
         self.linked.as_deref() == Some(word)
     }
 
-    /// Whether its values are numbers.
+    /// Whether all values are numbers.
     pub(super) fn is_numeric(&self) -> bool {
         match &self.values {
             Values::Levels(list) | Values::Choice(list) => list.iter().all(|value| value.number().is_some()),
@@ -65,9 +65,11 @@ impl Column {
 }
 
 impl Design {
+    /// Builds the design from the columns of a study.
+    ///
     /// # Errors
-    /// With the place in the study: linked parameters of different lengths, too many runs or drawn
-    /// parameters, names twice.
+    /// With the place in the study: linked parameters with different numbers of values, too many
+    /// runs or random parameters, duplicate names.
     pub(super) fn new(columns: Vec<Column>, file: &StudyFile) -> Result<Self, RobotFileError> {
         let fail = |place: &RobotFileError, message: String| RobotFileError { message, ..place.clone() };
         for (k, column) in columns.iter().enumerate() {
@@ -129,29 +131,30 @@ impl Design {
         Ok(Self { columns, sizes, directions, drawn, derived, sample, runs: runs as usize })
     }
 
-    /// Number of runs.
+    /// Returns the number of runs.
     pub(super) fn runs(&self) -> usize {
         self.runs
     }
 
-    /// Points of the grid; a run's is its number over the drawn ones.
+    /// Returns the number of points of the grid; run number divided by samples per point gives the
+    /// point of a run.
     pub(super) fn grid_points(&self) -> usize {
         self.sizes.iter().product()
     }
 
-    /// The directions of the grid: the columns of each, and how many values it has.
+    /// Directions of the grid: the columns and the number of values of each.
     pub(super) fn directions(&self) -> impl DoubleEndedIterator<Item = (&[usize], usize)> {
         self.directions.iter().map(Vec::as_slice).zip(self.sizes.iter().copied())
     }
 
-    /// Columns that are drawn.
+    /// Columns of random parameters.
     pub(super) fn drawn(&self) -> &[usize] {
         &self.drawn
     }
 
-    /// Returns the coordinates of the first, the middle and the last drawn point; the bits are the
-    /// same on every machine. They differ between programs that draw differently. Empty if nothing
-    /// is drawn.
+    /// Returns the coordinates of the first, the middle and the last sampled point, which are
+    /// bitwise equal on every machine but differ between versions that sample differently. Empty if
+    /// there are no random parameters.
     pub(super) fn drawn_coordinates(&self) -> Vec<f64> {
         let points = self.sample.points();
         let places = [0, points / 2, points.saturating_sub(1)];
@@ -159,7 +162,7 @@ impl Design {
         places.iter().flat_map(|point| dimensions.clone().map(|d| self.sample.coordinate(*point, d))).collect()
     }
 
-    /// The values of a run, in the order of the columns.
+    /// Returns the values of a run, in the order of the columns.
     pub(super) fn values(&self, run: usize) -> Vec<ParameterValue> {
         let points = self.runs / self.grid_points().max(1);
         let (grid, point) = (run / points.max(1), run % points.max(1));
@@ -184,7 +187,7 @@ impl Design {
         values
     }
 
-    /// Puts in what follows from the other values.
+    /// Computes the values that depend on others.
     pub(super) fn derive(&self, values: &mut [ParameterValue]) {
         for (column, formula) in &self.derived {
             values[*column] = ParameterValue::Number(formula.of_parameters(values));
@@ -192,7 +195,7 @@ impl Design {
     }
 }
 
-/// Columns that follow from those before them.
+/// Parses the expressions of the columns computed from others.
 fn derived(columns: &[Column]) -> Result<Vec<(usize, Formula)>, RobotFileError> {
     let mut found = Vec::new();
     for (k, column) in columns.iter().enumerate() {

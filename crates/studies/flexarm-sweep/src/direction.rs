@@ -1,23 +1,24 @@
-//! Whether a metric is better if it is higher or if it is lower.
+//! Preferred direction of a metric: lower or higher values.
 //!
-//! In this order: what the study says, what the numbers of the run in its expression are (a
-//! frequency should be high, an error low, and one over a sag should be high), what its name says.
+//! The direction is taken, in this order, from the study, from the numbers of the run in the
+//! metric's expression (a frequency should be high, an error low, and the inverse of a sag high),
+//! and from its name.
 
 use exmex::{Express, FlatEx};
 use serde::Serialize;
 
-/// What is better of a metric.
+/// Preferred direction of a metric.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Better {
-    /// Less: errors, sag, mass.
+    /// Lower values: errors, sag, mass.
     Lower,
-    /// More: frequencies, stiffness, life.
+    /// Higher values: frequencies, stiffness, life.
     Higher,
 }
 
 impl Better {
-    /// From a word of a study.
+    /// Parses a word of a study.
     pub(super) fn from_word(word: &str) -> Option<Self> {
         match word {
             "lower" => Some(Self::Lower),
@@ -33,7 +34,7 @@ impl Better {
         }
     }
 
-    /// `lower` or `higher`.
+    /// Returns `lower` or `higher`.
     pub fn word(self) -> &'static str {
         match self {
             Self::Lower => "lower",
@@ -41,7 +42,7 @@ impl Better {
         }
     }
 
-    /// `least` or `highest`.
+    /// Returns `least` or `highest`.
     pub fn most(self) -> &'static str {
         match self {
             Self::Lower => "least",
@@ -49,7 +50,7 @@ impl Better {
         }
     }
 
-    /// The value with the sign by which less is better.
+    /// Returns the value with the sign for minimisation.
     pub(super) fn as_cost(self, value: f64) -> f64 {
         match self {
             Self::Lower => value,
@@ -58,12 +59,12 @@ impl Better {
     }
 }
 
-/// Numbers of a run that say nothing by being high or low.
+/// Numbers of a run without a preferred direction.
 const NEUTRAL: [&str; 4] = ["t_peak_s", "t_dynamic_peak_s", "dominant_hz", "visits"];
-/// Parts of a run that should be small: errors, deflections, torques.
+/// Sections of a summary with values that should be low: errors, deflections, torques.
 const LOW: [&str; 6] = ["tcp", "path", "links", "elastic_drives", "drives", "motors"];
 
-/// Of a number of the run by its place.
+/// Returns the preferred direction of a number of the run, by its path.
 pub(super) fn of_fact(path: &[String]) -> Option<Better> {
     let words: Vec<&str> = path.iter().map(String::as_str).collect();
     match words[..] {
@@ -75,7 +76,7 @@ pub(super) fn of_fact(path: &[String]) -> Option<Better> {
     }
 }
 
-/// Words of names.
+/// Words in names.
 const HIGHER: [&str; 8] = ["frequency", "frequencies", "freq", "hz", "stiffness", "life", "lifetime", "margin"];
 const LOWER: [&str; 12] = [
     "error",
@@ -92,13 +93,14 @@ const LOWER: [&str; 12] = [
     "cost",
 ];
 
-/// Of a metric or a parameter by the words of its name; none if it has none that tells, or two that
-/// disagree.
+/// Returns the preferred direction by the words of a name; `None` without a known word, or with
+/// contradictory ones.
 pub(super) fn of_name(name: &str) -> Option<Better> {
     let name = name.to_lowercase();
     let words: Vec<&str> = name.split(|c: char| !c.is_alphanumeric()).collect();
     let has = |known: &[&str]| words.iter().any(|word| known.contains(word));
-    // A payload is what an arm is for, whatever of it is told.
+    // Higher values of any property of a payload are preferred, because the arm is there to carry
+    // it.
     match (has(&["payload"]), has(&HIGHER), has(&LOWER)) {
         (true, ..) | (_, true, false) => Some(Better::Higher),
         (_, false, true) => Some(Better::Lower),
@@ -106,12 +108,13 @@ pub(super) fn of_name(name: &str) -> Option<Better> {
     }
 }
 
-/// Sizes of numbers at which an expression is looked at.
+/// Values of the variables at which the slope of an expression is tested.
 const SIZES: [f64; 7] = [1e-5, 1e-3, 0.1, 1.0, 10.0, 1e3, 1e5];
-/// By how much they are changed.
+/// Factor of the change of a variable.
 const CHANGE: f64 = 1.01;
 
-/// Of an expression of variables of which some have a direction: all of them must agree.
+/// Returns the preferred direction of an expression of variables with and without directions;
+/// `None` if they contradict each other.
 pub(super) fn of_expression(expression: &FlatEx<f64>, variables: &[Option<Better>]) -> Option<Better> {
     let mut found = None;
     for (place, own) in variables.iter().enumerate() {
@@ -128,7 +131,7 @@ pub(super) fn of_expression(expression: &FlatEx<f64>, variables: &[Option<Better
     found
 }
 
-/// Whether an expression rises with a variable; none if it sometimes does and sometimes falls.
+/// Whether an expression increases with a variable; `None` if it is not monotonic.
 fn rises(expression: &FlatEx<f64>, count: usize, place: usize) -> Option<bool> {
     let (mut up, mut down) = (false, false);
     for size in SIZES {

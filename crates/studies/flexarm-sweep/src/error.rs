@@ -1,107 +1,107 @@
-//! What keeps a study from being run, planned or merged.
+//! Errors of studies.
 
 use flexarm_run::ExternalError;
 use std::path::PathBuf;
 
 use flexarm_settings::{Fault, Setting};
 
-/// A study that cannot be run, planned or merged.
+/// Reason why a study cannot be run, planned or merged.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SweepError {
-    /// A run that cannot be made ready.
+    /// A run cannot be prepared.
     #[error("{0}")]
     Run(String),
-    /// A run without a motion.
+    /// A run has no motion.
     #[error("there is no motion: neither the study nor the robot file (default_trajectory) names one")]
     NoMotion,
-    /// A folder with results of another study.
+    /// The folder contains results of another study.
     #[error(
         "{} holds results of another study ({differs}): choose another folder with {} or replace them with {}",
         folder.display(), Setting::Output, Setting::Overwrite
     )]
     Foreign {
-        /// The folder.
+        /// Folder.
         folder: PathBuf,
-        /// What differs.
+        /// Differences between the studies.
         differs: String,
     },
-    /// A folder to be merged that is of another study than the first.
+    /// A folder to be merged belongs to another study than the first.
     #[error("{} is no shard of the study in {}: {differs} differs; leave it out, or run it again with the same files", folder.display(), first.display())]
     ForeignShard {
-        /// The folder.
+        /// Folder.
         folder: PathBuf,
-        /// The first folder.
+        /// First folder.
         first: PathBuf,
-        /// What differs.
+        /// Differences between the studies.
         differs: String,
     },
-    /// A folder without a study.
+    /// The folder contains no study.
     #[error("{} holds no study: there is no study.json in it; give the folder that a run of the study wrote into", folder.display())]
     NoStudy {
-        /// The folder.
+        /// Folder.
         folder: PathBuf,
     },
-    /// A file of a study's folder that is not as it was written.
+    /// A file in the folder of a study is damaged.
     #[error("{}: {what}", path.display())]
     Broken {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong, and what to do.
+        /// Description of the damage and advice.
         what: String,
     },
     /// Another process works on the same shard.
     #[error("{}: another process is running this shard: wait for it or stop it", path.display())]
     Running {
-        /// Its journal.
+        /// Path of the journal.
         path: PathBuf,
     },
-    /// A shard that there is not.
+    /// The shard does not exist.
     #[error("shard {number} of {of}: expected a number from 1 to {of}, and at most {runs} shards, one for each run")]
     Shard {
-        /// Its number.
+        /// Number of the shard.
         number: usize,
-        /// Of so many.
+        /// Number of shards.
         of: usize,
-        /// Runs of the study.
+        /// Number of runs of the study.
         runs: usize,
     },
-    /// Runs that no shard has.
+    /// No shard contains some of the runs.
     #[error("{missing} of {runs} runs are missing: {which}{}", hint(*shards))]
     Missing {
-        /// How many.
+        /// Number of missing runs.
         missing: usize,
-        /// Of so many.
+        /// Number of runs of the study.
         runs: usize,
-        /// Which.
+        /// Description of the missing runs.
         which: String,
-        /// Into how many shards the others were cut.
+        /// Number of shards of the other runs.
         shards: Option<usize>,
     },
-    /// A run that two shards have with different results.
+    /// Two shards contain a run with different results.
     #[error("run {run} is there twice with different results, in {} and {}: one of them was made by another program or of other files", first.display(), second.display())]
     Twice {
-        /// The run.
+        /// Number of the run.
         run: usize,
-        /// A file with it.
+        /// File with the run.
         first: PathBuf,
-        /// The other one.
+        /// Other file with the run.
         second: PathBuf,
     },
-    /// The user stopped it.
+    /// The user stopped the study.
     #[error("stopped after {done} of {runs} runs; they are kept in {}, the same command goes on from there", folder.display())]
     Stopped {
-        /// Runs that are done.
+        /// Number of finished runs.
         done: usize,
-        /// Of so many.
+        /// Number of all runs.
         runs: usize,
-        /// Where they are.
+        /// Folder of the results.
         folder: PathBuf,
     },
-    /// A search without room.
+    /// A minimisation is not possible.
     #[error("{what}")]
     Minimise {
-        /// What is missing.
+        /// Reason.
         what: String,
     },
 }

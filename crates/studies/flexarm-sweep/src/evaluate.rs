@@ -1,8 +1,8 @@
-//! Runs of a study, some at a time, with what was asked of each.
+//! Evaluation of the metrics of some runs of a study.
 //!
-//! Where nothing is asked but how far the tool is off, how long that takes and the frequencies at
-//! the start, four runs go side by side ([`flexarm_stepping::Batch`]); else each has its whole
-//! summary. Which way a study goes depends on its metrics alone.
+//! If the metrics only need the tool deflection, its time, and the frequencies at the start, four
+//! runs are computed together ([`flexarm_stepping::Batch`]); otherwise each run has its full
+//! summary. The choice depends only on the metrics of the study.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -22,23 +22,23 @@ use flexarm_run::run::static_sag;
 use flexarm_run::run::steps_per_sample;
 use flexarm_run::{Keep, RunOptions, RunRequest};
 
-/// What a run gave.
+/// Result of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Answer {
     pub(super) run: usize,
-    /// Values of the metrics, or why there are none.
+    /// Values of the metrics, or the reason of the failure.
     pub(super) result: Result<Vec<f64>, String>,
-    /// What is to be said of it.
+    /// Caveats.
     pub(super) told: Told,
 }
 
-/// Values of the metrics, and by how much each constraint is passed.
+/// Values of the metrics, and relative violation of each constraint.
 pub(super) type Judgement = (Vec<f64>, Vec<f64>);
 
-/// Gets of each run its place among the points, what it gave, and what is to be said of it.
+/// Callback with the index of the point, the result of its run, and the caveats.
 pub(super) type Tell<'a> = dyn FnMut(usize, Result<Judgement, Error>, Told) + 'a;
 
-/// A run of the quick way.
+/// Run without a full summary.
 struct QuickRun {
     place: usize,
     told: Told,
@@ -50,7 +50,7 @@ struct QuickRun {
     flexible: Arc<flexarm_run::FlexibleRobot>,
 }
 
-/// Facts without a summary.
+/// Numbers of a run without a full summary.
 #[derive(Clone, Debug, Default)]
 struct QuickFacts {
     peak_m: f64,
@@ -80,7 +80,7 @@ impl Facts for QuickFacts {
 }
 
 impl QuickFacts {
-    /// With the figures of the samples that a run would log, by the sums of its summary.
+    /// Adds the figures of the samples that a run would log, with the same sums as its summary.
     fn of(self, deflection: &ToolDeflection, options: &RunOptions) -> Self {
         let every = steps_per_sample(options);
         let mut facts = Self { duration_s: deflection.steps as f64 * options.step_s, ..self };
@@ -105,7 +105,7 @@ impl QuickFacts {
 }
 
 impl Sweep {
-    /// Some runs, one group after the other; `tell` gets each answer as soon as it is there.
+    /// Computes some runs, one group after the other; calls `tell` with each result.
     pub(super) fn evaluate(&self, runs: &[usize], stop: &AtomicBool, tell: &mut dyn FnMut(Answer)) {
         let points: Vec<(usize, Vec<ParameterValue>)> =
             runs.iter().map(|run| (*run, self.design.values(*run))).collect();
@@ -115,8 +115,8 @@ impl Sweep {
         });
     }
 
-    /// Runs with these values of the parameters; what each gave, and by how much it passes each
-    /// constraint of the study.
+    /// Computes runs with given parameter values; calls `tell` with their metrics and their
+    /// violation of each constraint of the study.
     pub(super) fn evaluate_points(
         &self,
         points: &[(usize, Vec<ParameterValue>)],
@@ -154,7 +154,7 @@ impl Sweep {
                 Err(error) => tell(place, Err(error), told),
             }
         }
-        // Side by side go runs that last about equally long.
+        // Runs of similar duration are computed together.
         going.sort_by(|a, b| a.run.duration_s.total_cmp(&b.run.duration_s).then(a.place.cmp(&b.place)));
         for group in going.chunk_by(QuickRun::goes_with) {
             for few in group.chunks(Batch::most_side_by_side()) {
@@ -179,12 +179,12 @@ impl Sweep {
         }
     }
 
-    /// What is to be said of a run, as it is kept.
+    /// Returns the caveats of a run in their stored form.
     fn told(&self, caveats: Vec<Caveat>) -> Told {
         told(caveats, &|text| self.workshop.plain(text))
     }
 
-    /// A run with its summary. `caveats` gets what is to be said of it, also if it fails.
+    /// Computes a run with its full summary. `caveats` receives its caveats, also if it fails.
     fn whole(
         &self,
         values: &[ParameterValue],
@@ -202,8 +202,8 @@ impl Sweep {
         Ok(SummaryFacts { summary, mass_kg: built.mass_kg })
     }
 
-    /// A run ready to go side by side with others. `caveats` gets what is to be said of it as far
-    /// as that can be told before its first step, also if it fails.
+    /// Prepares a run to be computed together with others. `caveats` receives the caveats known
+    /// before its first step, also if it fails.
     fn quick_run(&self, place: usize, values: &[ParameterValue], caveats: &mut Vec<Caveat>) -> Result<QuickRun, Error> {
         let Ready { built, scenario, options } = self.workshop.ready(values)?;
         caveats.extend_from_slice(&built.arm.robot_caveats());
@@ -231,7 +231,7 @@ impl Sweep {
 }
 
 impl QuickRun {
-    /// Whether two runs have the same steps, start and tool.
+    /// Whether two runs have the same stepper, step size, start and tool.
     fn goes_with(&self, other: &Self) -> bool {
         self.options.stepper == other.options.stepper
             && self.options.step_s == other.options.step_s

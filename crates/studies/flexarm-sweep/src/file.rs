@@ -1,5 +1,5 @@
-//! The file of a study (`docs/sweep.md`): what is varied, how, and what is asked of each run. Only
-//! what can be told without the robot is checked here.
+//! File of a study (`docs/sweep.md`): varied parameters, sampling, and metrics. Checks only what
+//! does not need the robot.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use flexarm_run::RobotFileError;
 use flexarm_run::robot_file::Source;
 use flexarm_run::toml_file::parsed;
 
-/// The file as written.
+/// Contents of the file as written.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StudyToml {
@@ -41,7 +41,7 @@ struct StudyToml {
     minimise: Option<Spanned<MinimiseToml>>,
 }
 
-/// What is varied.
+/// Varied parameter.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ParameterToml {
@@ -90,55 +90,55 @@ struct MinimiseToml {
     seed: u64,
 }
 
-/// What a value does to what the file says.
+/// Effect of a parameter's value on the value in the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Role {
-    /// Takes its place.
+    /// Replaces the value in the file.
     Value,
-    /// Multiplies it.
+    /// Multiplies the value in the file.
     Factor,
-    /// Is added to it.
+    /// Is added to the value in the file.
     Offset,
 }
 
-/// The values of a parameter.
+/// Values of a parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Values {
-    /// All of them in turn.
+    /// List of values, all of which are used.
     Levels(Vec<ParameterValue>),
-    /// Drawn from a distribution.
+    /// Random values from a distribution.
     Spread(Distribution),
-    /// Drawn from a list, each as likely as the others.
+    /// Random values from a list with equal probabilities.
     Choice(Vec<ParameterValue>),
-    /// From the other parameters.
+    /// Expression of other parameters.
     Derived(String),
 }
 
-/// A parameter as the file has it, with its place for messages.
+/// Parameter with its place in the file, for messages.
 #[derive(Clone, Debug)]
 pub(super) struct ParameterEntry {
     pub(super) name: Option<String>,
     pub(super) paths: Vec<String>,
     pub(super) role: Role,
-    /// Whether every place that its paths lead to gets a value of its own.
+    /// Whether every entry that its paths match is a parameter of its own.
     pub(super) each: bool,
-    /// Parameters of one word go along together.
+    /// Group of parameters that vary together.
     pub(super) linked: Option<String>,
     pub(super) values: Values,
-    /// Least and largest value, where a search goes.
+    /// Minimum and maximum in a search.
     pub(super) bounds: Option<(f64, f64)>,
     pub(super) place: RobotFileError,
 }
 
-/// A text with its place.
+/// Text with its place in the file.
 #[derive(Clone, Debug)]
 pub(super) struct Placed {
     pub(super) text: String,
     pub(super) place: RobotFileError,
 }
 
-/// What is to be least.
+/// Options of a minimisation.
 #[derive(Clone, Debug)]
 pub(super) struct MinimiseEntry {
     pub(super) metric: Placed,
@@ -147,7 +147,7 @@ pub(super) struct MinimiseEntry {
     pub(super) seed: u64,
 }
 
-/// The file, checked.
+/// Contents of the file after checks.
 #[derive(Clone, Debug)]
 pub(super) struct StudyFile {
     pub(super) path: PathBuf,
@@ -157,7 +157,7 @@ pub(super) struct StudyFile {
     pub(super) motion: Option<Placed>,
     pub(super) loads: Option<Placed>,
     pub(super) options: Vec<(String, ParameterValue, RobotFileError)>,
-    /// Jobs by which links are reduced again.
+    /// Jobs for recomputing reduced links.
     pub(super) reduce: Vec<(String, PathBuf, RobotFileError)>,
     pub(super) parameters: Vec<ParameterEntry>,
     pub(super) method: SampleMethod,
@@ -165,18 +165,18 @@ pub(super) struct StudyFile {
     pub(super) seed: u64,
     pub(super) sample_place: RobotFileError,
     pub(super) metrics: Vec<Placed>,
-    /// What is better of a metric, by its name.
+    /// Preferred direction of metrics, by name.
     pub(super) better: Vec<(String, Better, RobotFileError)>,
     pub(super) best: Option<Placed>,
     pub(super) pareto: Option<([String; 2], RobotFileError)>,
     pub(super) minimise: Option<MinimiseEntry>,
 }
 
-/// What the columns of a table of runs are linked by.
+/// Name of the group that links the columns of a table of runs.
 pub(super) const TABLE: &str = "the table of runs";
-/// Values of a range that does not say how many.
+/// Default number of values in a range.
 const USUAL_STEPS: usize = 5;
-/// Most levels of a parameter, and points of a sample.
+/// Maximum number of levels of a parameter, and of points of a sample.
 const MOST_VALUES: i64 = 1_000_000;
 
 /// Reads the file of a study.
@@ -335,7 +335,7 @@ fn parameter(entry: &Spanned<ParameterToml>, source: &Source) -> Result<Paramete
     Ok(ParameterEntry { name, paths, role, each, linked, values, bounds, place })
 }
 
-/// Values of a parameter, and its bounds.
+/// Returns the values of a parameter, and its bounds.
 fn values(
     own: &ParameterToml,
     source: &Source,
@@ -373,7 +373,7 @@ fn values(
     }
 }
 
-/// Steps from one number to another.
+/// Returns equally or logarithmically spaced values of a range, and its bounds.
 fn range(
     own: &ParameterToml,
     source: &Source,
@@ -473,7 +473,7 @@ fn distribution(
     })
 }
 
-/// A table of runs: a column for each parameter, named by its path, a row for each run.
+/// Reads a table of runs: a column for each parameter, named by its path, a row for each run.
 fn table_of_runs(path: &Path, place: &RobotFileError) -> Result<Vec<ParameterEntry>, Error> {
     let table = flexarm_files::NumberTable::read(path)?;
     let fail = |what: String| Error::File { path: path.to_owned(), what };

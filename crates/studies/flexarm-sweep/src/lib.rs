@@ -1,13 +1,13 @@
-//! Studies: many runs of one robot with other numbers in its files, on all cores or anywhere, and
-//! what they tell.
+//! Studies: many runs of one robot with varied values in its files, on all cores or several
+//! machines, and their evaluation.
 //!
 //! `docs/sweep.md` describes the file of a study. [`Sweep::load`] reads and checks it,
-//! [`Sweep::run`] runs what is not done yet in a folder or in a shard of it, [`merge`] joins
-//! folders of shards, [`Sweep::minimise`] looks for the least of a metric. Runs have numbers from
-//! 0; a number alone says what a run is, on any machine.
+//! [`Sweep::run`] computes the missing runs in a folder or in a shard of it, [`merge`] joins
+//! folders of shards, and [`Sweep::minimise`] minimises a metric. Runs are numbered from 0; the
+//! number alone determines a run, on any machine.
 //!
-//! Not here: points of designs and what results tell as mathematics ([`statistics`]); a few runs
-//! with their curves over each other ([`flexarm_run::compare_study`]).
+//! Not here: the mathematics of designs and their evaluation ([`statistics`]); comparison of a few
+//! runs by their curves ([`flexarm_run::compare_study`]).
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
@@ -70,70 +70,71 @@ pub use self::store::Shard;
 pub use self::told::CaveatFigures;
 pub use self::value::ParameterValue;
 
-/// What is asked of each run where the study does not say.
+/// Default metrics of a study.
 const USUAL_METRICS: [&str; 4] = ["tcp.peak_m", "tcp.rms_m", "tcp.end_m", "tcp.static_sag_m"];
-/// The input that stands for how points are drawn.
+/// Name of the sampled points in the list of inputs.
 const DRAWN_POINTS: &str = "the drawn points";
-/// The page of a study.
+/// File name of the page of a study.
 const PAGE: &str = "report.html";
-/// Runs that a thread takes at a time where four go side by side.
+/// Maximum number of quick runs that a thread takes at a time; four of them are computed together.
 const WINDOW: usize = 64;
-/// Between two looks at the wish to stop.
+/// Interval between two calls of the progress function, which can stop the runs.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// How a study finds robots and motions that it calls by a name.
+/// Functions that find robots and motions by name.
 #[derive(Clone, Copy, Debug)]
 pub struct Finders {
-    /// A robot file.
+    /// Path of a robot file.
     pub robot: fn(&Path) -> PathBuf,
-    /// A motion or a file of loads.
+    /// Path of a motion or a file of loads.
     pub motion: fn(&Path) -> PathBuf,
 }
 
 impl Default for Finders {
-    /// Names are paths.
+    /// Takes names as paths.
     fn default() -> Self {
         Self { robot: Path::to_path_buf, motion: Path::to_path_buf }
     }
 }
 
-/// A study, checked.
+/// Study that has been read and checked.
 pub struct Sweep {
     file: StudyFile,
     design: Design,
     workshop: Workshop,
     metrics: Vec<Metric>,
     constraints: Vec<Constraint>,
-    /// Whether no run needs its whole summary.
+    /// Whether all metrics and constraints are available without the full summary of a run.
     quick: bool,
-    /// A summary with all names that a run has.
+    /// Example of a summary with all names that a run can have.
     vocabulary: serde_json::Value,
 }
 
-/// How a study is run.
+/// Arguments of [`Sweep::run`].
 #[derive(Clone, Debug)]
 pub struct SweepRequest {
-    /// Folder of the results; runs that are there already are not run again.
+    /// Folder of the results; runs that it contains are not repeated.
     pub output: PathBuf,
-    /// Replace results of another study.
+    /// Whether to replace the results of another study.
     pub overwrite: bool,
-    /// The part of the runs that is run.
+    /// Shard of the runs to compute.
     pub shard: Shard,
-    /// Threads; as many as there are cores without it.
+    /// Number of threads; the number of cores if absent.
     pub threads: Option<usize>,
-    /// How a run of these files is asked for, in the words of the face.
+    /// Function that returns the command for a run of the written files, as shown by the caller's
+    /// interface.
     pub command: Option<fn(&Replay) -> String>,
 }
 
-/// Runs that are over, and all.
+/// Progress function, called with the numbers of finished runs and of all runs.
 pub type SweepProgress<'a> = dyn FnMut(usize, usize) -> ControlFlow<()> + 'a;
 
 impl Sweep {
     /// Reads and checks a study and all files that it names.
     ///
     /// # Errors
-    /// [`Error::RobotFile`] with line and column of what is wrong in the study: paths that lead
-    /// nowhere, metrics that no run has, files that are not there; what is wrong with the robot.
+    /// [`Error::RobotFile`] with line and column of an error in the study: invalid paths, unknown
+    /// metrics, missing files; errors of the robot.
     pub fn load(path: &Path, finders: &Finders) -> Result<Self, Error> {
         let file = file::read(path)?;
         let mut workshop = Workshop::new(&file, finders)?;
@@ -174,12 +175,12 @@ impl Sweep {
         Ok(Self { file, design, workshop, metrics, constraints, quick, vocabulary: summary })
     }
 
-    /// Name of the study: that of its file if it has none of its own.
+    /// Returns the name of the study, by default the stem of its file name.
     pub fn name(&self) -> &str {
         &self.file.name
     }
 
-    /// Number of runs.
+    /// Returns the number of runs.
     pub fn runs(&self) -> usize {
         self.design.runs()
     }
@@ -194,24 +195,24 @@ impl Sweep {
         self.metrics.iter().map(|metric| metric.name.as_str()).collect()
     }
 
-    /// Names of the parameters that are numbers.
+    /// Names of the parameters; `None` for those that are not numeric.
     fn parameter_names(&self) -> Vec<Option<String>> {
         parameter_names(&self.design)
     }
 
-    /// Values of the parameters in a run, in their order.
+    /// Values of the parameters in a run, in the order of the parameters.
     pub fn values(&self, run: usize) -> Vec<ParameterValue> {
         self.design.values(run)
     }
 
-    /// Runs what is not done yet of a shard; if that is all of the study, makes the table of all
-    /// runs.
+    /// Computes the missing runs of a shard. If the shard is the whole study, also writes the table
+    /// of all runs.
     ///
-    /// A run that fails is a row with its reason.
+    /// A failed run is a row with the reason of the failure.
     ///
     /// # Errors
-    /// [`SweepError`]: a folder of another study, another process at the same shard, [`SweepError::Stopped`] if `progress` breaks
-    /// off; [`Error::Write`]: what was done up to there is kept.
+    /// [`SweepError`] for a folder of another study or another process at the same shard,
+    /// [`SweepError::Stopped`] if `progress` breaks; [`Error::Write`]. Finished runs are kept.
     pub fn run(&mut self, request: &SweepRequest, progress: &mut SweepProgress<'_>) -> Result<SweepSummary, Error> {
         let (started, cpu) = (Instant::now(), cpu_time::ProcessTime::now());
         let SweepRequest { output, shard, .. } = request;
@@ -234,7 +235,7 @@ impl Sweep {
             new.push(answer.clone());
             store.keep(answer, self)
         });
-        // Whatever ended it: what is there becomes a part, if the disk has room.
+        // Finished runs are kept even after an error, if the disk has space.
         let rolled = store.roll(self);
         let is_whole = ended?;
         rolled?;
@@ -257,7 +258,7 @@ impl Sweep {
         self.finish(&collected, &path, output, request.command, &spent)
     }
 
-    /// Summary, page and the best run of a study that is whole.
+    /// Writes summary, page and the best run of a complete study.
     fn finish(
         &self,
         collected: &Collected,
@@ -281,7 +282,7 @@ impl Sweep {
         Ok(summary)
     }
 
-    /// Runs on several threads; whether all were run.
+    /// Computes runs on several threads; returns whether all are finished.
     fn run_all(
         &self,
         todo: &[usize],
@@ -305,7 +306,7 @@ impl Sweep {
                         }
                         let few = &todo[start..(start + window).min(todo.len())];
                         self.evaluate(few, stop, &mut |answer| {
-                            let _ = tell.send(answer); // who hears nothing any more has stopped
+                            let _ = tell.send(answer); // the receiver is gone if the run was stopped
                         });
                     }
                 });
@@ -334,7 +335,7 @@ impl Sweep {
         }
     }
 
-    /// The table of all runs.
+    /// Writes the table of all runs.
     fn write_all_runs(&self, collected: &Collected, manifest: &Manifest, folder: &Path) -> Result<PathBuf, Error> {
         if let Some(missing) = collected.missing(self.runs()) {
             return Err(missing.into());
@@ -375,10 +376,10 @@ impl Sweep {
 
 /// Joins the results of shards: all runs of all folders in one table.
 ///
-/// * `output`: folder of the table; that of the first folder without it.
+/// * `output`: folder of the table.
 ///
 /// # Errors
-/// [`SweepError`]: runs that are missing, runs that are there twice with different results, folders of other studies.
+/// [`SweepError`] for missing runs, repeated runs with different results, folders of other studies.
 pub fn merge(
     study: &Sweep,
     folders: &[PathBuf],
@@ -413,7 +414,7 @@ pub fn merge(
     study.finish(&collected, &path, output, command, &|| (started.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64()))
 }
 
-/// Writes the files of a plan.
+/// Writes files prepared in memory.
 ///
 /// # Errors
 /// [`Error::Taken`], [`Error::Write`].
@@ -423,7 +424,7 @@ pub fn write_files(files: &[(PathBuf, String)], overwrite: bool) -> Result<(), E
     Ok(flexarm_files::write_all(files)?)
 }
 
-/// What the study calls best, better or a front must be metrics.
+/// Checks that `best`, `better` and `pareto` name metrics.
 fn check_names(file: &StudyFile, metrics: &[Metric]) -> Result<(), RobotFileError> {
     let best = file.best.iter().map(|best| (&best.text, &best.place));
     let pareto = file.pareto.iter().flat_map(|(pair, place)| pair.iter().map(move |name| (name, place)));
@@ -438,7 +439,7 @@ fn check_names(file: &StudyFile, metrics: &[Metric]) -> Result<(), RobotFileErro
     Ok(())
 }
 
-/// The columns of the parameters; one for each place where that is asked for.
+/// Returns the columns of the parameters; one per matched entry for parameters with `each`.
 fn columns(file: &StudyFile, workshop: &Workshop) -> Result<Vec<Column>, RobotFileError> {
     let mut columns = Vec::new();
     for entry in &file.parameters {
@@ -464,7 +465,7 @@ fn parameter_names(design: &Design) -> Vec<Option<String>> {
     design.columns.iter().map(|column| column.is_numeric().then(|| column.name.clone())).collect()
 }
 
-/// A summary with all names that a run of the robot has.
+/// Returns an example of a summary with all names that a run of the robot can have.
 fn skeleton(robot: &Robot, flexible: &FlexibleRobot) -> Summary {
     let links = flexible.spans.iter().map(|span| LinkFigures { name: span.link.clone(), ..LinkFigures::default() });
     let elastic = robot.drives.iter().filter(|drive| drive.gearbox.is_some());
@@ -482,8 +483,8 @@ fn skeleton(robot: &Robot, flexible: &FlexibleRobot) -> Summary {
     }
 }
 
-/// A number for a text: the same text has the same on any machine (FNV-1a, 64 bits twice with
-/// different starts).
+/// Returns a hash of a text that is the same on any machine (FNV-1a, 64 bits, twice with different
+/// initial values).
 fn fingerprint(bytes: &[u8]) -> String {
     let hash = |start: u64| bytes.iter().fold(start, |h, byte| (h ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3));
     format!("{:016x}{:016x}", hash(0xcbf2_9ce4_8422_2325), hash(0x9e37_79b9_7f4a_7c15))

@@ -1,5 +1,5 @@
-//! What is asked of each run: numbers of its summary by their place in the JSON, parameters, and
-//! expressions of both.
+//! Metrics of a run: numbers of its summary by their path in the JSON, parameters, and expressions
+//! of both.
 
 use exmex::{Express, FlatEx, FloatOpsFactory, MakeOperators};
 use serde_json::Value;
@@ -8,14 +8,14 @@ use super::direction::{self, Better};
 use super::path::near;
 use super::value::ParameterValue;
 
-/// Keys of the summary that depend on the machine and the hour.
+/// Keys of the summary that depend on the machine and the time of the run.
 const OF_THE_MACHINE: [&str; 4] = ["wall_s", "cpu_s", "real_time_factor", "cpu_s_per_simulated_s"];
-/// Longest expression that is read.
+/// Maximum length of an expression (bytes).
 const LONGEST: usize = 1000;
 /// Keys that name the entries of a list.
 const NAMES: [&str; 3] = ["name", "joint", "label"];
 
-/// A number that a run has without its whole summary.
+/// Number of a run that is available without its full summary.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Quick {
     Peak,
@@ -28,53 +28,53 @@ pub(super) enum Quick {
     Mass,
 }
 
-/// A variable of an expression.
+/// Variable of an expression.
 #[derive(Clone, Debug, PartialEq)]
 enum Variable {
-    /// A parameter by its column.
+    /// Parameter, by its column.
     Parameter(usize),
-    /// A metric that stands before this one.
+    /// Earlier metric, by its index.
     Metric(usize),
-    /// A number of the run.
+    /// Number of the run, by its path.
     Fact(Vec<String>, Option<Quick>),
 }
 
-/// A number that is asked of each run.
+/// Metric of a run.
 #[derive(Clone, Debug)]
 pub(super) struct Metric {
     pub(super) name: String,
-    /// As written.
+    /// Text as written.
     pub(super) text: String,
-    /// What is better of it, if that is known.
+    /// Preferred direction, if known.
     pub(super) better: Option<Better>,
     formula: Formula,
 }
 
-/// An expression of parameters, metrics and numbers of a run.
+/// Expression of parameters, metrics and numbers of a run.
 #[derive(Clone, Debug)]
 pub(super) struct Formula {
     expression: FlatEx<f64>,
     variables: Vec<Variable>,
 }
 
-/// What a metric may speak of.
+/// Names that a metric may refer to.
 pub(super) struct Vocabulary<'a> {
-    /// Names of the parameters, in the order of their columns; none of those whose values are
-    /// words.
+    /// Names of the parameters, in the order of their columns; `None` for parameters that are not
+    /// numeric.
     pub(super) parameters: &'a [Option<String>],
-    /// Metrics before it.
+    /// Earlier metrics.
     pub(super) metrics: &'a [Metric],
-    /// A summary with all names that a run of this study has.
+    /// Summary with all names that a run of this study can have.
     pub(super) summary: &'a Value,
 }
 
-/// Numbers of a run.
+/// Access to the numbers of a run.
 pub(super) trait Facts {
-    /// The number at a place; NaN where there is none.
+    /// Returns the number at a path; NaN if there is none.
     fn number(&self, path: &[String], quick: Option<Quick>) -> f64;
 }
 
-/// Facts of a whole summary.
+/// Numbers from a full summary.
 pub(super) struct SummaryFacts {
     pub(super) summary: Value,
     pub(super) mass_kg: f64,
@@ -89,12 +89,12 @@ impl Facts for SummaryFacts {
     }
 }
 
-/// A number; true is 1.
+/// Converts a value to a number; true is 1.
 fn number(value: &Value) -> Option<f64> {
     value.as_f64().or_else(|| value.as_bool().map(|truth| if truth { 1.0 } else { 0.0 }))
 }
 
-/// The value at a place; entries of lists by number, or by their name.
+/// Returns the value at a path; list entries by index or by name.
 fn find<'a>(value: &'a Value, path: &[String]) -> Option<&'a Value> {
     path.iter().try_fold(value, |value, word| match value {
         Value::Object(map) => map.get(word),
@@ -107,10 +107,10 @@ fn find<'a>(value: &'a Value, path: &[String]) -> Option<&'a Value> {
 }
 
 impl Metric {
-    /// `expression`, or `name = expression`.
+    /// Parses `expression`, or `name = expression`.
     ///
     /// # Errors
-    /// A sentence about what is not known or no expression.
+    /// A sentence that names an unknown variable or a syntax error.
     pub(super) fn parse(text: &str, known: &Vocabulary<'_>) -> Result<Self, String> {
         let (name, expression) = match text.split_once('=') {
             Some((name, expression)) => (name.trim(), expression.trim()),
@@ -129,28 +129,30 @@ impl Metric {
         Ok(Self { name: name.to_owned(), text: text.trim().to_owned(), better, formula })
     }
 
-    /// Whether a run needs no whole summary for it.
+    /// Whether the metric is available without the full summary of a run.
     pub(super) fn is_quick(&self) -> bool {
         self.formula.is_quick()
     }
 
-    /// Its value.
+    /// Evaluates the metric.
     ///
-    /// * `before`: values of the metrics before it.
+    /// * `before`: values of the earlier metrics.
     pub(super) fn value(&self, parameters: &[ParameterValue], before: &[f64], facts: &dyn Facts) -> f64 {
         self.formula.value(parameters, before, facts)
     }
 }
 
 impl Formula {
+    /// Parses an expression.
+    ///
     /// # Errors
-    /// A sentence about what is not known or no expression.
+    /// A sentence that names an unknown variable or a syntax error.
     pub(super) fn parse(text: &str, known: &Vocabulary<'_>) -> Result<Self, String> {
         let (expression, variables) = expression_of(text, known)?;
         Ok(Self { expression, variables })
     }
 
-    /// What is better of it, by the numbers that it is made of.
+    /// Returns the preferred direction, derived from those of the variables.
     fn better(&self, known: &Vocabulary<'_>) -> Option<Better> {
         let of = |variable: &Variable| match variable {
             Variable::Parameter(column) => direction::of_name(known.parameters[*column].as_deref()?),
@@ -161,24 +163,24 @@ impl Formula {
         direction::of_expression(&self.expression, &variables)
     }
 
-    /// Its value where it speaks of parameters alone.
+    /// Evaluates an expression of parameters only.
     pub(super) fn of_parameters(&self, parameters: &[ParameterValue]) -> f64 {
         self.value(parameters, &[], &SummaryFacts { summary: Value::Null, mass_kg: f64::NAN })
     }
 
-    /// Whether it speaks of parameters alone.
+    /// Whether all variables are parameters.
     pub(super) fn is_of_parameters(&self) -> bool {
         self.variables.iter().all(|variable| matches!(variable, Variable::Parameter(_)))
     }
 
-    /// Whether a run needs no whole summary for it.
+    /// Whether the expression is available without the full summary of a run.
     pub(super) fn is_quick(&self) -> bool {
         self.variables.iter().all(|variable| !matches!(variable, Variable::Fact(_, None)))
     }
 
-    /// Its value.
+    /// Evaluates the expression.
     ///
-    /// * `before`: values of the metrics before it.
+    /// * `before`: values of the earlier metrics.
     pub(super) fn value(&self, parameters: &[ParameterValue], before: &[f64], facts: &dyn Facts) -> f64 {
         let of = |variable: &Variable| match variable {
             Variable::Parameter(column) => parameters[*column].number().unwrap_or(f64::NAN),
@@ -187,12 +189,12 @@ impl Formula {
         };
         let values: Vec<f64> = self.variables.iter().map(of).collect();
         let value = self.expression.eval(&values).unwrap_or(f64::NAN);
-        // What is infinite has no place in a table that people make means of.
+        // Infinite values would spoil means over a table of runs.
         if value.is_finite() { value } else { f64::NAN }
     }
 }
 
-/// The values of all metrics of a run.
+/// Evaluates all metrics of a run.
 pub(super) fn values(metrics: &[Metric], parameters: &[ParameterValue], facts: &dyn Facts) -> Vec<f64> {
     let mut found = Vec::with_capacity(metrics.len());
     for metric in metrics {
@@ -202,7 +204,7 @@ pub(super) fn values(metrics: &[Metric], parameters: &[ParameterValue], facts: &
     found
 }
 
-/// The expression with a variable in the place of each path.
+/// Parses an expression, with a variable in place of each path.
 fn expression_of(text: &str, known: &Vocabulary<'_>) -> Result<(FlatEx<f64>, Vec<Variable>), String> {
     if text.len() > LONGEST {
         return Err(format!("the expression has {} letters, at most {LONGEST} are read", text.len()));
@@ -231,13 +233,13 @@ fn expression_of(text: &str, known: &Vocabulary<'_>) -> Result<(FlatEx<f64>, Vec
 }
 
 enum Token {
-    /// A path.
+    /// Path.
     Word(String),
-    /// Anything else, as the parser takes it.
+    /// Any other text, as the parser expects it.
     Other(String),
 }
 
-/// Paths, numbers and the rest.
+/// Splits an expression into paths and other text.
 fn tokens(text: &str) -> Vec<Token> {
     let functions: Vec<&str> = FloatOpsFactory::<f64>::make().iter().map(|operator| operator.repr()).collect();
     let letters: Vec<char> = text.chars().collect();
@@ -260,7 +262,7 @@ fn tokens(text: &str) -> Vec<Token> {
                 k += 1;
             }
             let word: String = letters[start..k].iter().collect();
-            // Without an exponent, which the parser would take for a name.
+            // Written without an exponent, which the parser would take for a name.
             found.push(Token::Other(word.parse::<f64>().map_or(word, |x| x.to_string())));
         } else if c.is_alphabetic() || c == '_' {
             while k < letters.len() && goes_on(&letters, k) {
@@ -276,7 +278,7 @@ fn tokens(text: &str) -> Vec<Token> {
     found
 }
 
-/// Whether a path goes on with this letter.
+/// Whether a path continues with this character.
 fn goes_on(letters: &[char], k: usize) -> bool {
     let next = letters.get(k + 1).copied().unwrap_or(' ');
     match letters[k] {
@@ -335,7 +337,7 @@ fn quick(path: &[String]) -> Option<Quick> {
     })
 }
 
-/// All places of numbers.
+/// Collects the paths of all numbers.
 fn leaves(value: &Value, place: &str, found: &mut Vec<String>) {
     let below = |word: &str| if place.is_empty() { word.to_owned() } else { format!("{place}.{word}") };
     match value {
@@ -351,17 +353,19 @@ fn leaves(value: &Value, place: &str, found: &mut Vec<String>) {
     }
 }
 
-/// A bound that a run must keep: `expression <= expression`, or with >=.
+/// Constraint on a run: `expression <= expression`, or with `>=`.
 #[derive(Clone, Debug)]
 pub(super) struct Constraint {
     pub(super) text: String,
-    /// What must not be larger.
+    /// Smaller side.
     less: Formula,
-    /// Than this.
+    /// Larger side.
     more: Formula,
 }
 
 impl Constraint {
+    /// Parses a constraint.
+    ///
     /// # Errors
     /// As [`Metric::parse`].
     pub(super) fn parse(text: &str, known: &Vocabulary<'_>) -> Result<Self, String> {
@@ -375,13 +379,13 @@ impl Constraint {
         Ok(Self { text: text.trim().to_owned(), less, more })
     }
 
-    /// Whether a run needs no whole summary for it.
+    /// Whether the constraint is available without the full summary of a run.
     pub(super) fn is_quick(&self) -> bool {
         self.less.is_quick() && self.more.is_quick()
     }
 
-    /// By how much it is passed, in parts of the larger side; 0 if it is kept, NaN if a side has no
-    /// value.
+    /// Returns the relative violation: excess over the larger magnitude of both sides; 0 if the
+    /// constraint holds, NaN if a side has no value.
     pub(super) fn violation(&self, parameters: &[ParameterValue], metrics: &[f64], facts: &dyn Facts) -> f64 {
         let [less, more] = [&self.less, &self.more].map(|side| side.value(parameters, metrics, facts));
         if less.is_nan() || more.is_nan() {

@@ -1,8 +1,8 @@
-//! The search for the least of a metric within the bounds of the parameters and under constraints.
+//! Minimisation of a metric within the bounds of the parameters and under constraints.
 //!
-//! Runs are asked for a generation at a time ([`LeastSearch`]). Each answer stands in a journal
-//! with the values of its parameters; a search that was stopped asks for the same points again and
-//! finds them there.
+//! The search requests one generation of runs at a time ([`LeastSearch`]). A journal stores each
+//! result with the values of its parameters. A search that is resumed requests the same points
+//! again and finds their results there.
 
 use std::collections::HashMap;
 use std::fs::{File, OpenOptions};
@@ -31,67 +31,67 @@ use super::{LOOK, PAGE, Sweep, SweepProgress, SweepRequest, fingerprint, table};
 use flexarm_run::Error;
 use flexarm_run::RobotFileError;
 
-/// Runs of a search that does not say how many.
+/// Default number of runs.
 const USUAL_RUNS: usize = 400;
-/// The answers of a search.
+/// File name of the journal.
 const JOURNAL: &str = "minimise.journal";
-/// Runs that a thread takes at a time.
+/// Maximum number of runs that a thread takes at a time.
 const FEW: usize = 4;
 
-/// What is to be least, and how long it is looked for, in the place of what the study says.
+/// Objective, constraints and length of a search, in place of those of the study.
 #[derive(Clone, Debug, Default)]
 pub struct MinimiseRequest {
-    /// A metric of the study.
+    /// Metric to minimise, one of the study's.
     pub metric: Option<String>,
-    /// Constraints beside those of the study, such as `peak_mm <= 6`.
+    /// Constraints in addition to those of the study, such as `peak_mm <= 6`.
     pub constraints: Vec<String>,
-    /// Most runs.
+    /// Maximum number of runs.
     pub runs: Option<usize>,
 }
 
-/// How a search went.
+/// Progress and result of a search.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct MinimiseFigures {
-    /// What is to be least.
+    /// Metric to minimise.
     pub metric: String,
-    /// What must hold.
+    /// Constraints.
     pub constraints: Vec<String>,
-    /// Whether the best run keeps them all.
+    /// Whether the best run satisfies all constraints.
     pub kept: bool,
-    /// Whether the search ended by itself: its points hardly differed any more.
+    /// Whether the search converged, that is, its points hardly differ.
     pub settled: bool,
-    /// Generations.
+    /// Number of generations.
     pub generations: usize,
-    /// What the files give before anything is looked for; null if that run failed.
+    /// Value at the start of the search; null if that run failed.
     pub start: Option<f64>,
-    /// Whether that keeps the constraints.
+    /// Whether the run at the start satisfies the constraints.
     pub start_kept: bool,
-    /// Least value so far that keeps the constraints, after each generation; null before there is
-    /// one.
+    /// Minimum so far of the runs that satisfy the constraints, after each generation; null before
+    /// there is one.
     pub progress: Vec<Option<f64>>,
 }
 
-/// A line of the journal: values of the parameters that are looked for, then metrics and
-/// violations, or a reason; caveats.
+/// Line of the journal: values of the search variables, reason of a failure, metrics, violations,
+/// caveats.
 #[derive(Serialize, Deserialize)]
 struct Line(Vec<f64>, Option<String>, Vec<Option<f64>>, Vec<Option<f64>>, #[serde(default)] Option<String>);
 
-/// What a run gave.
+/// Result of a run.
 #[derive(Clone)]
 struct Outcome {
-    /// Metrics and violations, or why there are none.
+    /// Metrics and violations, or the reason why there are none.
     result: Result<Judgement, String>,
     told: Told,
 }
 
-/// A parameter that is looked for.
+/// Variable of the search.
 struct Varied {
     column: usize,
     low: f64,
     high: f64,
 }
 
-/// What was tried, in its order.
+/// Points tried, in order, with their results.
 #[derive(Default)]
 struct Tried {
     values: Vec<Vec<ParameterValue>>,
@@ -106,7 +106,7 @@ fn judged(outcome: &Outcome, goal: usize) -> Judged {
 }
 
 impl Tried {
-    /// The place of the best one.
+    /// Returns the index of the best point.
     fn best(&self, goal: usize) -> Option<usize> {
         (0..self.outcomes.len()).reduce(|best, k| {
             if judged(&self.outcomes[k], goal).beats(&judged(&self.outcomes[best], goal)) { k } else { best }
@@ -114,7 +114,7 @@ impl Tried {
     }
 }
 
-/// The answers so far, on the disk and by their parameters.
+/// Results so far, on disk and by parameter values.
 struct Journal {
     path: PathBuf,
     file: File,
@@ -161,12 +161,13 @@ fn key(values: &[f64]) -> Vec<u64> {
 }
 
 impl Sweep {
-    /// Looks for the least of a metric: the parameters move within their bounds,
-    /// [`MinimiseRequest`] and the study say what is to be least and what must hold. The runs that
-    /// were tried are written as those of a study.
+    /// Minimises a metric over the parameters within their bounds; [`MinimiseRequest`] and the
+    /// study give metric and constraints. The runs are written like those of a study.
     ///
     /// # Errors
-    /// [`SweepError::Minimise`]: nothing to be least, parameters without bounds; otherwise as [`Sweep::run`].
+    /// [`SweepError::Minimise`] without a metric to minimise or without parameters to vary; an
+    /// error with the place in the study for parameters without bounds; otherwise as
+    /// [`Sweep::run`].
     pub fn minimise(
         &mut self,
         request: &SweepRequest,
@@ -208,7 +209,7 @@ impl Sweep {
         self.search_summary(&tried, goal, figures, &manifest, request, &spent)
     }
 
-    /// Takes over what is asked beside the study; the place of the metric that is to be least.
+    /// Adds the constraints of the request; returns the index of the metric to minimise.
     fn aim(&mut self, search: &MinimiseRequest) -> Result<usize, Error> {
         let fail = |what: String| Error::from(SweepError::Minimise { what });
         let name = (self.parameter_names(), self.metrics.clone());
@@ -233,7 +234,7 @@ impl Sweep {
         }
     }
 
-    /// The parameters that are looked for.
+    /// Returns the variables of the search.
     fn varied(&self) -> Result<Vec<Varied>, Error> {
         let mut found = Vec::new();
         for (column, own) in self.design.columns.iter().enumerate() {
@@ -257,8 +258,8 @@ impl Sweep {
         }
     }
 
-    /// Where a parameter starts, as a part of its range: what the files say now, if that is within;
-    /// else the middle.
+    /// Returns the start of a variable as a fraction of its range: the present value in the files
+    /// if it is in the range, otherwise the middle.
     fn start(&self, varied: &Varied) -> f64 {
         let own = &self.design.columns[varied.column];
         let now = self.workshop.current(varied.column).filter(|_| own.role != Role::Offset || varied.low <= 0.0);
@@ -267,7 +268,7 @@ impl Sweep {
             .unwrap_or(0.5)
     }
 
-    /// Values of all parameters at a point of the search.
+    /// Returns the values of all parameters at a point of the search.
     fn point(&self, varied: &[Varied], parts: &[f64]) -> Vec<ParameterValue> {
         let mut values = vec![ParameterValue::Whole(0); self.design.columns.len()];
         for (own, part) in varied.iter().zip(parts) {
@@ -277,7 +278,7 @@ impl Sweep {
         values
     }
 
-    /// What the points of a generation give; none if the user stopped it.
+    /// Returns the results of a generation; `None` if the user stopped it.
     fn generation(
         &self,
         points: &[Vec<ParameterValue>],
@@ -343,7 +344,7 @@ impl Sweep {
         }
     }
 
-    /// Which search a folder is of.
+    /// Returns the description that identifies the search of a folder.
     fn search_manifest(&self, goal: usize) -> Manifest {
         let mut manifest = self.manifest();
         let constraints: Vec<&str> = self.constraints.iter().map(|c| c.text.as_str()).collect();
@@ -353,7 +354,7 @@ impl Sweep {
         manifest
     }
 
-    /// Takes a folder for this search.
+    /// Prepares a folder for this search.
     fn claim(&self, request: &SweepRequest, manifest: &Manifest) -> Result<(), Error> {
         let folder = &request.output;
         if let Some(known) = known_manifest(folder)?
@@ -370,7 +371,7 @@ impl Sweep {
         Ok(flexarm_files::write_all(&[(folder.join(STUDY), text)])?)
     }
 
-    /// Table, page and figures of what was tried.
+    /// Writes table, page and figures of the points tried.
     fn search_summary(
         &self,
         tried: &Tried,

@@ -1,5 +1,4 @@
-//! Options of the runs of a study, under the words that `flexarm compare` has for them, with _ for
-//! -.
+//! Options of the runs of a study, with the names of `flexarm compare`, `_` in place of `-`.
 
 use flexarm_stepping::{ReferenceMethod, STEPPERS, Start, StepperOptions};
 
@@ -8,7 +7,7 @@ use flexarm_run::DriveModel;
 use flexarm_run::LinkModel;
 use flexarm_run::RunOptions;
 
-/// All options.
+/// Names of all options.
 const KEYS: [&str; 15] = [
     "step",
     "stepper",
@@ -27,16 +26,16 @@ const KEYS: [&str; 15] = [
     "round_corners",
 ];
 
-/// How runs are stepped and measured.
+/// Options of time integration and evaluation of runs.
 #[derive(Clone, Debug)]
 pub(super) struct StudyOptions {
     stepper: usize,
-    /// The stepper's own without it (s).
+    /// Step size (s); the stepper's default if absent.
     step_s: Option<f64>,
     settings: StepperOptions,
     run: RunOptions,
     pub(super) start: Start,
-    /// Time within which corners of motions are rounded (s).
+    /// Duration over which corners of motions are rounded (s).
     pub(super) round_corners: Option<f64>,
 }
 
@@ -48,7 +47,7 @@ impl Default for StudyOptions {
 }
 
 impl StudyOptions {
-    /// What a run takes.
+    /// Returns the options in the form for a run.
     pub(super) fn run(&self) -> RunOptions {
         let entry = STEPPERS[self.stepper];
         let step_s = self.step_s.unwrap_or(entry.default_step_s);
@@ -58,7 +57,7 @@ impl StudyOptions {
     /// Sets an option.
     ///
     /// # Errors
-    /// A sentence: an option that is not known, a value of another kind.
+    /// A sentence about an unknown option or a value of the wrong type.
     pub(super) fn set(&mut self, key: &str, value: &ParameterValue) -> Result<(), String> {
         match key {
             "step" => self.step_s = Some(number(key, value)?),

@@ -1,5 +1,5 @@
-//! The page of a study: figures, heat maps, main effects, sensitivities, Pareto front, scatter
-//! matrix, the best run; one file without scripts.
+//! HTML page of a study: figures, heat maps, main effects, sensitivities, Pareto front, scatter
+//! matrix, the best run; a single file without scripts.
 
 use std::fmt::Write as _;
 
@@ -13,22 +13,22 @@ use super::results::{Columns, SweepSummary};
 use flexarm_run::html_page::opening;
 use flexarm_settings::written::markup;
 
-/// Results that have pictures of their own.
+/// Maximum number of metrics with plots.
 const MOST_METRICS: usize = 4;
-/// Columns of the scatter matrix.
+/// Maximum number of columns in the scatter matrix.
 const MOST_COLUMNS: usize = 8;
-/// Points of a scatter plot, and of each in the scatter matrix.
+/// Maximum number of points of a scatter plot, and of each plot in the scatter matrix.
 const MOST_POINTS: usize = 1500;
 const MOST_IN_MATRIX: usize = 1000;
-/// Panels in a row of effects.
+/// Maximum number of panels in a row of effects.
 const MOST_PANELS: usize = 6;
-/// Values of a parameter that each have a row or column of a heat map.
+/// Maximum number of parameter values with a heat map row or column each.
 const MOST_CELLS: usize = 40;
-/// Rows or columns of others.
+/// Number of rows or columns for parameters with more values.
 const BINS: usize = 10;
 
 impl Sweep {
-    /// The page of what is there.
+    /// Returns the HTML page.
     pub(super) fn page(&self, summary: &SweepSummary, columns: &Columns) -> String {
         let mut page = opening(&format!("Study {}", summary.study), "");
         let _ = writeln!(
@@ -60,7 +60,7 @@ impl Sweep {
         page + "</body></html>\n"
     }
 
-    /// A parameter with what its numbers are, and by how much they are multiplied to be shown.
+    /// Returns the label of a parameter, and the factor for displaying its values.
     fn shown(&self, parameter: usize) -> (String, f64) {
         let column = &self.design.columns[parameter];
         match column.role {
@@ -70,18 +70,18 @@ impl Sweep {
         }
     }
 
-    /// The numbers of a parameter as they are shown.
+    /// Returns the values of a parameter in display units.
     fn shown_values(&self, parameter: usize, columns: &Columns) -> Option<Vec<f64>> {
         let factor = self.shown(parameter).1;
         Some(columns.parameters[parameter].as_ref()?.iter().map(|x| x * factor).collect())
     }
 
-    /// The rankings of the metrics that have pictures.
+    /// Returns the rankings of the metrics with plots.
     fn rankings(&self, columns: &Columns) -> Vec<Ranking> {
         (0..self.metrics.len().min(MOST_METRICS)).map(|metric| self.ranking(columns, metric)).collect()
     }
 
-    /// What is said of the parameters before any picture: who matters, and who cannot be told from
+    /// Lists the parameters that matter, and those whose effect cannot be distinguished from
     /// chance.
     fn who_matters(&self, rankings: &[Ranking]) -> String {
         let names = |list: &mut dyn Iterator<Item = usize>| {
@@ -251,7 +251,8 @@ impl Sweep {
     }
 }
 
-/// Which axis each parameter has in the heat maps of a page: the same one in all of them.
+/// Axes of the parameters in the heat maps of a page; each parameter has the same axis in all of
+/// them.
 #[derive(Debug, Default)]
 struct Axes {
     to_the_right: Vec<usize>,
@@ -259,8 +260,8 @@ struct Axes {
 }
 
 impl Axes {
-    /// The strongest parameter and the next one that can have the other axis: what goes to the
-    /// right, and what goes up.
+    /// Chooses the strongest parameter and the next one that can take the other axis; returns the
+    /// horizontal and the vertical one.
     fn pair(&mut self, ranked: &[(usize, f64)]) -> Option<(usize, usize)> {
         let (first, rest) = ranked.split_first()?;
         let goes_up = self.upwards.contains(&first.0);
@@ -273,12 +274,12 @@ impl Axes {
     }
 }
 
-/// A heading, if there is something below it.
+/// Returns a section with a heading; nothing if the section is empty.
 fn headed(title: &str, inside: String) -> String {
     if inside.is_empty() { inside } else { format!("<h2>{title}</h2>\n{inside}") }
 }
 
-/// Names of the cells along a parameter, and the cell of each run.
+/// Returns the labels of the cells along a parameter, and the cell of each run.
 fn cells(values: &[f64]) -> (Vec<String>, Vec<Option<usize>>) {
     let mut levels: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
     levels.sort_by(f64::total_cmp);
@@ -317,7 +318,7 @@ fn figures(summary: &SweepSummary) -> String {
     out + "</table>\n"
 }
 
-/// How a search went.
+/// Describes the progress and result of a search.
 fn search(summary: &SweepSummary) -> String {
     let Some(found) = &summary.minimise else { return String::new() };
     let kept = if found.start_kept { "keeps" } else { "does not keep" };
@@ -368,7 +369,7 @@ fn sensitivities(summary: &SweepSummary) -> String {
     headed("Sobol indices with 95 % intervals", out)
 }
 
-/// The middle of a cell, with three digits.
+/// Formats the centre of a cell with three significant digits.
 fn rounded(x: f64) -> String {
     match x == 0.0 {
         true => "0".into(),
@@ -379,7 +380,7 @@ fn rounded(x: f64) -> String {
     }
 }
 
-/// A number with the digits that a person reads.
+/// Formats a number with about five significant digits.
 fn number(x: f64) -> String {
     match x.abs() {
         0.0 => "0".into(),
@@ -403,7 +404,7 @@ mod tests {
         assert_eq!(pair(&[0, 1, 2]), Some((0, 1)));
         assert_eq!(pair(&[1, 0, 2]), Some((0, 1)));
         assert_eq!(pair(&[1, 2]), Some((2, 1)));
-        // 2 and 0 both go to the right: the next one goes up.
+        // Parameters 2 and 0 are both horizontal: the next one is vertical.
         assert_eq!(pair(&[2, 0, 1]), Some((2, 1)));
         assert_eq!(pair(&[0, 2]), None);
         assert_eq!(pair(&[3]), None);

@@ -1,9 +1,9 @@
-//! Paths of numbers in a TOML file: `payload.mass`, `drive.joint_2.gearbox.stiffness`,
+//! Paths of values in a TOML file: `payload.mass`, `drive.joint_2.gearbox.stiffness`,
 //! `mounting.stiffness[2]`, `drive.*.gearbox`.
 //!
-//! An entry of a list is named by its `joint`, `link` or `name`, or by its number from 0; `*`
-//! stands for all. What is resolved against the file is a [`Place`], at which a text of the file is
-//! changed with everything else left as it was written.
+//! A list entry is identified by its `joint`, `link` or `name`, or by its index from 0; `*` matches
+//! all. A path resolved in a file is a [`Place`], which changes one value in the text of the file
+//! and keeps everything else as written.
 
 use flexarm_urdf::closest;
 use toml_edit::{DocumentMut, Item, Value};
@@ -12,39 +12,39 @@ use super::value::ParameterValue;
 
 /// Keys that name the entries of a list.
 const NAMES: [&str; 3] = ["joint", "link", "name"];
-/// Paths that are told beside the nearest one.
+/// Maximum number of similar paths listed in addition to the closest one.
 const MOST_TOLD: usize = 6;
 
-/// A part of a path.
+/// Segment of a path.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Segment {
-    /// A key of a table, or the name of an entry.
+    /// Key of a table, or name of a list entry.
     Key(String),
-    /// An entry by its number.
+    /// Index of a list entry.
     Index(usize),
     /// All keys or entries.
     Any,
 }
 
-/// A part of the way to one value.
+/// Step to a value in a parsed file.
 #[derive(Clone, Debug, PartialEq)]
 enum Step {
     Key(String),
     Index(usize),
 }
 
-/// Where one value is, or would be.
+/// Location of a value, present or not.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Place {
     steps: Vec<Step>,
-    /// With the names of entries, as a path that leads here again.
+    /// Path that resolves to this location, with the names of list entries.
     pub(super) name: String,
-    /// Whether there is a value already.
+    /// Whether a value is present.
     pub(super) is_there: bool,
 }
 
-/// The parts of a path; none if it has empty ones, brackets without a number or quotes without an
-/// end.
+/// Splits a path into segments; `None` if a segment is empty, brackets contain no number, or a
+/// quote is not closed.
 pub(super) fn segments(text: &str) -> Option<Vec<Segment>> {
     let mut found = Vec::new();
     let mut rest = text.trim();
@@ -75,8 +75,8 @@ pub(super) fn segments(text: &str) -> Option<Vec<Segment>> {
     }
 }
 
-/// All places that a path means in a file; none if it leads nowhere. The last keys of it may be new
-/// in a table that is there.
+/// Returns all locations that a path matches in a file; empty if there are none. The last keys may
+/// be new in an existing table.
 pub(super) fn places(root: &toml::Value, path: &[Segment]) -> Vec<Place> {
     let mut found = Vec::new();
     let start = Place { steps: Vec::new(), name: String::new(), is_there: true };
@@ -114,7 +114,7 @@ fn follow(value: &toml::Value, path: &[Segment], so_far: Place, found: &mut Vec<
     }
 }
 
-/// A value that the file does not have yet, in a table that it has.
+/// Returns the location of a new value in an existing table.
 fn new_place(path: &[Segment], so_far: Place) -> Option<Place> {
     if so_far.steps.is_empty() {
         return None;
@@ -125,7 +125,7 @@ fn new_place(path: &[Segment], so_far: Place) -> Option<Place> {
     })
 }
 
-/// What an entry of a list is called.
+/// Returns the name of a list entry.
 fn name_of(entry: &toml::Value) -> Option<&String> {
     let table = entry.as_table()?;
     NAMES.iter().find_map(|key| match table.get(*key) {
@@ -155,7 +155,7 @@ impl Place {
         self.with(Step::Index(number), &name)
     }
 
-    /// The value that is there.
+    /// Returns the present value.
     pub(super) fn value<'a>(&self, root: &'a toml::Value) -> Option<&'a toml::Value> {
         self.steps.iter().try_fold(root, |value, step| match step {
             Step::Key(key) => value.get(key),
@@ -163,7 +163,7 @@ impl Place {
         })
     }
 
-    /// Puts another value there, with the spaces and comments of the old one.
+    /// Sets a value, and keeps the spaces and comments around the old one.
     pub(super) fn put(&self, file: &mut DocumentMut, value: Value) {
         let Some((last, way)) = self.steps.split_last() else { return };
         let mut item: &mut Item = file.as_item_mut();
@@ -191,7 +191,7 @@ fn quoted(key: &str) -> String {
     if key.contains(['.', '[', '"', ' ']) { format!("\"{key}\"") } else { key.to_owned() }
 }
 
-/// All paths of a file that lead to a number, a text or a list of them.
+/// Returns all paths of a file that lead to a number, a text, or a list of these.
 pub(super) fn leaves(root: &toml::Value) -> Vec<String> {
     let mut found = Vec::new();
     collect(root, &Place { steps: Vec::new(), name: String::new(), is_there: true }, &mut found);
@@ -211,10 +211,10 @@ fn collect(value: &toml::Value, place: &Place, found: &mut Vec<String>) {
     }
 }
 
-/// The paths nearest to one that leads nowhere, as the end of a sentence.
+/// Lists the paths closest to an invalid one, as the end of a sentence.
 pub(super) fn near(path: &str, known: &[String]) -> String {
     let meant = closest(path, known.iter().map(String::as_str));
-    // What begins alike, as far as it does.
+    // Paths with the longest common prefix.
     let alike = |other: &String| path.bytes().zip(other.bytes()).take_while(|(a, b)| a == b).count();
     let most = known.iter().map(alike).max().unwrap_or(0);
     let mut others: Vec<&String> =
@@ -229,11 +229,11 @@ pub(super) fn near(path: &str, known: &[String]) -> String {
     }
 }
 
-/// A value as it is written into a file whose old value is `old`.
+/// Returns a value as written into a file whose old value is `old`.
 pub(super) fn written(value: &ParameterValue, old: Option<&toml::Value>) -> Value {
     match value {
         ParameterValue::Whole(n) => Value::from(*n),
-        // Where the file counts, a whole number is one.
+        // A whole number replaces an integer as an integer.
         ParameterValue::Number(x)
             if matches!(old, Some(toml::Value::Integer(_))) && x.fract() == 0.0 && x.abs() < 1e15 =>
         {
@@ -245,7 +245,7 @@ pub(super) fn written(value: &ParameterValue, old: Option<&toml::Value>) -> Valu
     }
 }
 
-/// The numbers of a value that is there, each changed: one number, or lists of them.
+/// Applies a function to a number, or to all numbers in nested lists.
 pub(super) fn changed(old: &toml::Value, change: &dyn Fn(f64) -> f64) -> Option<Value> {
     match old {
         toml::Value::Integer(n) => Some(Value::from(change(*n as f64))),
@@ -279,7 +279,7 @@ mod tests {
         assert_eq!(names("drive.\"j.1\".gearbox.damping"), ["drive.\"j.1\".gearbox.damping"]);
         assert_eq!(names("drive.*.gearbox.stiffness").len(), 2);
         assert_eq!(names("payload.*").len(), 2);
-        // New keys only in tables that are there.
+        // New keys are valid only in existing tables.
         assert_eq!(names("drive.j2.ratio"), ["drive.j2.ratio"]);
         assert!(
             names("drve.j2.ratio").is_empty()

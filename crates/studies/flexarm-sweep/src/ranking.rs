@@ -1,9 +1,9 @@
-//! Which parameters matter for a metric.
+//! Ranking of parameters by their effect on a metric.
 //!
-//! Listed values cross with all others, so that the effect of such a parameter is exact. Drawn
-//! values are a sample: a parameter without any effect varies with the result by chance, the more
-//! the fewer the draws ([`beyond_chance`]). Every point of the grid has the same draws, so a draw
-//! counts once, with its mean over the grid.
+//! Listed values are crossed with all others, so that the effect of such a parameter is exact.
+//! Random values are a sample: a parameter without any effect correlates with the result by chance,
+//! the more the smaller the sample is ([`beyond_chance`]). Every point of the grid has the same
+//! samples, so each sample counts once, with its mean over the grid.
 
 use crate::statistics::{Grouping, MainEffect, SampleMethod, beyond_chance, main_effect};
 
@@ -11,46 +11,46 @@ use super::Sweep;
 use super::file::{TABLE, Values};
 use super::results::Columns;
 
-/// Parts of the variance below this are rounding.
+/// Share of the variance that counts as rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// The numeric parameters that vary, by what they do to a metric.
+/// Numeric parameters that vary, ranked by their effect on a metric.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ranking {
-    /// Those that matter, with their part of the variance, the strongest first.
+    /// Significant parameters with their share of the variance, strongest first.
     pub(super) matter: Vec<(usize, f64)>,
-    /// Drawn ones whose effect cannot be told from chance.
+    /// Random parameters whose effect cannot be distinguished from chance.
     pub(super) untold: Vec<usize>,
-    /// Part of the scatter of the draws that the strongest of the drawn parameters would explain by
-    /// chance in 1 of 100 studies.
+    /// Share of the variance due to random sampling that the strongest random parameter would
+    /// explain by chance in 1 of 100 studies.
     pub(super) chance: Option<f64>,
 }
 
-/// Parameters that are drawn together: which are told apart by [`beyond_chance`].
+/// Parameters that are sampled jointly, to be tested with [`beyond_chance`].
 struct Source {
     columns: Vec<usize>,
-    /// Runs from one draw to the next, and how many draws there are.
+    /// Number of runs from one sample to the next, and number of samples.
     stride: usize,
     draws: usize,
-    /// Of so many draws one after the other only the first two are independent.
+    /// Length of blocks of consecutive samples of which only the first two are independent.
     block: Option<usize>,
 }
 
 impl Sweep {
-    /// How runs are put into groups by a parameter.
+    /// Returns the grouping of runs by a parameter.
     fn grouping(&self, parameter: usize, columns: &Columns) -> Grouping {
         let column = &self.design.columns[parameter];
         let is_listed = matches!(column.values, Values::Levels(_)) && !column.is_linked_by(TABLE);
         if is_listed && columns.of_design { Grouping::Levels } else { Grouping::Bins }
     }
 
-    /// The main effect of a numeric parameter on a metric.
+    /// Returns the main effect of a numeric parameter on a metric.
     pub(super) fn effect(&self, parameter: usize, metric: usize, columns: &Columns) -> Option<MainEffect> {
         let x = columns.parameters[parameter].as_ref()?;
         main_effect(x, &columns.metrics[metric], self.grouping(parameter, columns))
     }
 
-    /// What the parameters do to a metric.
+    /// Ranks the parameters by their effect on a metric.
     pub(super) fn ranking(&self, columns: &Columns, metric: usize) -> Ranking {
         let sources = if columns.of_design { self.sources() } else { Vec::new() };
         let mut ranking = Ranking::default();
@@ -62,7 +62,7 @@ impl Sweep {
             ranking.chance = Some(found.chance.max(ranking.chance.unwrap_or(0.0)));
         }
         for (k, column) in self.design.columns.iter().enumerate() {
-            // What follows from others shows what they show.
+            // Derived parameters only repeat the effects of others.
             if matches!(column.values, Values::Derived(_)) {
                 continue;
             }
@@ -77,7 +77,7 @@ impl Sweep {
         ranking
     }
 
-    /// The sample, and the table of runs.
+    /// Returns the sources of random values: the sample, and the table of runs.
     fn sources(&self) -> Vec<Source> {
         let design = &self.design;
         let numeric = |list: &[usize]| list.iter().copied().filter(|k| design.columns[*k].is_numeric()).collect();
@@ -99,8 +99,8 @@ impl Sweep {
 }
 
 impl Source {
-    /// Values of the parameters in each draw, and what the metric has there beyond its mean over
-    /// all draws, on average over the grid.
+    /// Returns the values of the parameters in each sample, and the deviation of the metric from
+    /// its mean over all samples, averaged over the grid.
     fn draws(&self, columns: &Columns, metric: usize) -> (Vec<Vec<f64>>, Vec<f64>) {
         let draw = |run: usize| run / self.stride % self.draws;
         let rest = |run: usize| run - draw(run) * self.stride;

@@ -1,11 +1,11 @@
-//! Arms and motions of the last runs, shared by threads.
+//! Cache of the arms and motions of the last runs, shared by threads.
 
 use std::sync::{Mutex, PoisonError};
 
-/// Values that are kept for the next runs.
+/// Maximum number of values in the cache.
 const KEPT: usize = 64;
 
-/// Values by their keys, the latest last.
+/// Values by their keys, most recently used last.
 pub(super) struct Recent<T>(Mutex<Vec<(String, T)>>);
 
 impl<T> Default for Recent<T> {

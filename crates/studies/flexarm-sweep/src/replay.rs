@@ -1,4 +1,4 @@
-//! A run of a study as files that can be run by themselves.
+//! Files with which a single run of a study can be repeated.
 
 use std::path::{Path, PathBuf};
 
@@ -13,28 +13,28 @@ use flexarm_run::Error;
 use flexarm_run::Motion;
 use flexarm_run::MotionOptions;
 
-/// Rows per second of a motion that is no waypoints (Hz).
+/// Sampling rate of a motion that is not given by waypoints (Hz).
 const ROWS_HZ: f64 = 1000.0;
 
-/// The files of a run, and its options; a face makes a command of them.
+/// Files and options of a run, from which an interface builds a command.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Replay {
     /// Robot file.
     pub robot: String,
-    /// Motion; none where the robot file names it.
+    /// Motion; `None` if the robot file names it.
     pub motion: Option<String>,
-    /// Loads.
+    /// File of loads.
     pub loads: Option<String>,
-    /// Options by their words.
+    /// Options by key.
     pub options: Vec<(String, ParameterValue)>,
 }
 
 impl Sweep {
-    /// Writes the files of a run with these values, as a person would write them: those that differ
-    /// from what is there.
+    /// Writes the files of a run with given parameter values, as a user would write them; unchanged
+    /// files are not written.
     ///
     /// # Errors
-    /// [`Error::Write`], [`Error::Taken`]; what keeps the run from going.
+    /// [`Error::Write`], [`Error::Taken`]; the reason why the run cannot start.
     pub(super) fn write_replay(&self, values: &[ParameterValue], folder: &Path) -> Result<Replay, Error> {
         let (files, ..) = self.workshop.run_files(values)?;
         let mut written: Vec<(PathBuf, Vec<u8>)> = Vec::new();
@@ -55,8 +55,8 @@ impl Sweep {
         Ok(Replay { robot, motion, loads, options: files.options })
     }
 
-    /// The motion at another speed: waypoints with other durations where all of them have one, else
-    /// a table.
+    /// Writes the motion at another speed: waypoints with scaled durations if all of them have one,
+    /// otherwise a table.
     fn faster(
         &self,
         files: &RunFiles,
@@ -83,7 +83,7 @@ impl Sweep {
     }
 }
 
-/// The path of a file of the run: that of the original if nothing was changed in it.
+/// Returns the path of a file of the run: that of the original if its text is unchanged.
 fn put(
     written: &mut Vec<(PathBuf, Vec<u8>)>,
     folder: &Path,
@@ -103,14 +103,14 @@ fn put(
     }
 }
 
-/// A robot file for another folder.
+/// Rewrites a robot file for another folder.
 fn moved(text: &str, home: &Path, to: &Path) -> String {
     let Ok(mut file) = text.parse::<DocumentMut>() else { return text.to_owned() };
     moved_paths(&mut file, home.parent().unwrap_or(Path::new(".")), to);
     file.to_string()
 }
 
-/// Loads whose tables are named from the root.
+/// Rewrites loads with absolute paths of their tables.
 fn with_whole_files(text: &str, home: &Path) -> String {
     let Ok(mut file) = text.parse::<DocumentMut>() else { return text.to_owned() };
     let folder = home.parent().unwrap_or(Path::new("."));
@@ -124,14 +124,14 @@ fn with_whole_files(text: &str, home: &Path) -> String {
     file.to_string()
 }
 
-/// Waypoints that are run through faster; none unless every move has a duration.
+/// Scales the durations of waypoints; `None` unless every move has a duration.
 fn faster_waypoints(text: &str, speed: f64) -> Option<String> {
     let mut file: DocumentMut = text.parse().ok()?;
     let Item::ArrayOfTables(moves) = file.get_mut("move")? else { return None };
     let number = |item: &Item| item.as_float().or_else(|| item.as_integer().map(|n| n as f64));
     for entry in moves.iter_mut() {
         let duration = number(entry.get("duration")?)?;
-        // A ramp in the time that limits allow does not become faster with the rest.
+        // Profiles limited by velocity and acceleration do not scale with the duration.
         if entry.get("profile").is_some_and(|profile| profile.as_str() != Some("quintic")) {
             return None;
         }

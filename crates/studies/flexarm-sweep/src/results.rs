@@ -1,4 +1,4 @@
-//! What a study tells: figures of its metrics, failures, the best run.
+//! Results of a study: figures of its metrics, failures, the best run.
 
 use std::collections::BTreeMap;
 
@@ -15,70 +15,69 @@ use super::store::Collected;
 use super::told::{self, CaveatFigures};
 use super::value::ParameterValue;
 
-/// Answer of `flexarm sweep`.
+/// Result of `flexarm sweep`.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct SweepSummary {
     /// Name of the study.
     pub study: String,
-    /// Runs of the study.
+    /// Number of runs of the study.
     pub runs: usize,
-    /// Runs that gave a result.
+    /// Number of successful runs.
     pub done: usize,
-    /// Runs that failed.
+    /// Number of failed runs.
     pub failed: usize,
-    /// The part of the runs that was run, as `number/of`; null for all.
+    /// Shard that was computed, as `number/of`; null for all runs.
     pub shard: Option<String>,
     /// Wall-clock time (s).
     pub wall_s: f64,
     /// Processor time, all threads (s).
     pub cpu_s: f64,
-    /// The table of all runs, or the folder of a shard.
+    /// Path of the table of all runs, or of the folder of a shard.
     pub file: String,
-    /// The page.
+    /// Path of the page.
     pub page: Option<String>,
-    /// What is varied.
+    /// Varied parameters.
     pub parameters: Vec<ParameterFigures>,
-    /// What came out.
+    /// Metrics.
     pub metrics: Vec<MetricFigures>,
-    /// Why runs failed, the most frequent first.
+    /// Reasons of failed runs, most frequent first.
     pub failures: Vec<FailureFigures>,
-    /// The best run; null if none was done.
+    /// Best run; null if no run succeeded.
     pub best: Option<BestRun>,
-    /// The runs that no other beats in two metrics; null with one metric.
+    /// Pareto-optimal runs of two metrics; null with one metric.
     pub pareto: Option<ParetoFigures>,
-    /// How the search went, if one was made.
+    /// Figures of the search, if this is one.
     pub minimise: Option<MinimiseFigures>,
-    /// The sentences of the caveats that warn, each once, with the number of runs that it concerns.
+    /// Sentences of the caveats that are warnings, each once, with the number of affected runs.
     pub warnings: Vec<String>,
-    /// What `check` and `compare` would say of the runs, each caveat once with its worst value,
-    /// warnings first.
+    /// Caveats as from `check` and `compare`, each once with its worst value, warnings first.
     pub caveats: Vec<CaveatFigures>,
-    /// Runs that several shards had, with the same result; they count once.
+    /// Number of runs that several shards contain with the same result; they count once.
     pub doubles: usize,
 }
 
-/// A parameter.
+/// Figures of a parameter.
 #[derive(Clone, Debug, Serialize)]
 pub struct ParameterFigures {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Least and largest value; null of words.
+    /// Minimum and maximum; null if not numeric.
     pub range: Option<[f64; 2]>,
-    /// What its values do to those of the files: `value`, `factor` or `offset`.
+    /// Effect of its values on those in the files: `value`, `factor` or `offset`.
     #[serde(rename = "as")]
     pub role: Role,
 }
 
-/// A metric over all runs that were done.
+/// Figures of a metric over all successful runs.
 #[derive(Clone, Debug, Serialize)]
 pub struct MetricFigures {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Runs that have it.
+    /// Number of runs with a value.
     pub count: usize,
-    /// Least.
+    /// Minimum.
     pub min: Option<f64>,
-    /// Largest.
+    /// Maximum.
     pub max: Option<f64>,
     /// Mean.
     pub mean: Option<f64>,
@@ -86,104 +85,104 @@ pub struct MetricFigures {
     pub std: Option<f64>,
     /// Quantiles 0.05, 0.5 and 0.95.
     pub quantiles: Option<[f64; 3]>,
-    /// Part of its variance that each parameter makes by itself (correlation ratio); null of words
-    /// and where nothing varies.
+    /// Share of the variance that each parameter explains by itself (correlation ratio); null if
+    /// the parameter is not numeric or nothing varies.
     pub shares: BTreeMap<String, Option<f64>>,
-    /// The parameters that matter, the strongest first: listed ones with an effect, and drawn ones
-    /// whose effect stands out of chance.
+    /// Parameters that matter, strongest first: listed ones with an effect, and random ones whose
+    /// effect chance does not explain.
     pub matters: Vec<String>,
-    /// Part of the scatter of the draws that the strongest of the drawn parameters would have by
-    /// chance in 1 of 100 studies; null where nothing is drawn.
+    /// Share of the variance due to random sampling that the strongest random parameter would
+    /// explain by chance in 1 of 100 studies; null if nothing is random.
     pub chance: Option<f64>,
-    /// What is better of it; null if neither the study nor its expression nor its name tells.
+    /// Preferred direction; null if neither study, expression nor name determines it.
     pub better: Option<Better>,
-    /// Sobol indices of the parameters that were drawn by Saltelli's design; empty otherwise.
+    /// Sobol indices of the parameters in a Saltelli design; empty otherwise.
     pub sobol: Vec<IndexFigures>,
 }
 
 /// Sobol indices of a parameter.
 #[derive(Clone, Debug, Serialize)]
 pub struct IndexFigures {
-    /// The parameter.
+    /// Name of the parameter.
     pub parameter: String,
-    /// Part of the variance that it makes by itself.
+    /// First-order index: share of the variance due to the parameter by itself.
     pub first: f64,
-    /// Where that lies in 95 of 100 cases.
+    /// 95 % confidence interval of `first`.
     pub first_interval: [f64; 2],
-    /// Part that it makes with others too.
+    /// Total index: share of the variance including interactions.
     pub total: f64,
-    /// Likewise.
+    /// 95 % confidence interval of `total`.
     pub total_interval: [f64; 2],
 }
 
-/// The best run by a metric.
+/// Best run by a metric.
 #[derive(Clone, Debug, Serialize)]
 pub struct BestRun {
-    /// Its number.
+    /// Number of the run.
     pub run: usize,
-    /// What is least or highest in it.
+    /// Name of the metric.
     pub metric: String,
-    /// Which of both: lower where it is not known what is better.
+    /// Direction of the optimum; lower if the preferred direction is unknown.
     pub better: Better,
-    /// How much that is.
+    /// Value of the metric.
     pub value: f64,
-    /// Values of its parameters.
+    /// Values of the parameters.
     pub parameters: BTreeMap<String, ParameterValue>,
-    /// Its metrics.
+    /// Values of the metrics.
     pub metrics: BTreeMap<String, Option<f64>>,
-    /// Its files, ready to be run; null where none are written.
+    /// Files of the run, ready to use; null if none are written.
     pub files: Option<Replay>,
-    /// The command that runs it.
+    /// Command that repeats the run.
     pub command: Option<String>,
 }
 
-/// Runs that no other beats in two metrics.
+/// Pareto-optimal runs of two metrics.
 #[derive(Clone, Debug, Serialize)]
 pub struct ParetoFigures {
-    /// Both.
+    /// Names of the metrics.
     pub metrics: [String; 2],
-    /// What is better of each: lower where that is not known.
+    /// Preferred directions; lower if unknown.
     pub better: [Better; 2],
-    /// By the first metric.
+    /// Runs, sorted by the first metric.
     pub runs: Vec<ParetoRun>,
 }
 
-/// A run of the front.
+/// Pareto-optimal run.
 #[derive(Clone, Debug, Serialize)]
 pub struct ParetoRun {
-    /// Its number.
+    /// Number of the run.
     pub run: usize,
-    /// Both metrics.
+    /// Values of both metrics.
     pub values: [f64; 2],
 }
 
-/// A reason why runs failed.
+/// Reason of failed runs.
 #[derive(Clone, Debug, Serialize)]
 pub struct FailureFigures {
-    /// The reason.
+    /// Reason.
     pub reason: String,
-    /// Runs.
+    /// Number of runs.
     pub runs: usize,
-    /// The first of them.
+    /// Number of the first of these runs.
     pub first: usize,
 }
 
-/// Results as columns: one value per run that is over, in the order of the runs.
+/// Results as columns: one value per finished run, in the order of the runs.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Columns {
     pub(super) runs: Vec<usize>,
     /// Whether the runs are those of the design, not of a search.
     pub(super) of_design: bool,
-    /// Of numeric parameters.
+    /// Values of the parameters; `None` if not numeric.
     pub(super) parameters: Vec<Option<Vec<f64>>>,
     pub(super) metrics: Vec<Vec<f64>>,
 }
 
-/// Reasons that are told.
+/// Maximum number of reported reasons.
 const MOST_REASONS: usize = 10;
 
 impl Sweep {
-    /// Results as columns.
+    /// Converts results to columns.
     fn columns(&self, answers: &[(&Answer, Vec<ParameterValue>)], of_design: bool) -> Columns {
         let number = |value: &ParameterValue| value.number().unwrap_or(f64::NAN);
         let parameter = |k: usize| {
@@ -203,7 +202,7 @@ impl Sweep {
         }
     }
 
-    /// Figures of what is there, and the results as columns.
+    /// Returns the figures of the collected runs, and the results as columns.
     pub(super) fn summary(&self, collected: &Collected) -> (SweepSummary, Columns) {
         let answers: Vec<(&Answer, Vec<ParameterValue>)> =
             collected.answers.values().map(|(answer, _)| (answer, self.design.values(answer.run))).collect();
@@ -211,7 +210,8 @@ impl Sweep {
         (SweepSummary { doubles: collected.doubles, ..summary }, columns)
     }
 
-    /// Figures of runs with these values of the parameters; whether they are those of the design.
+    /// Returns the figures of runs with given parameter values; `of_design`: whether the runs are
+    /// those of the design.
     pub(super) fn summary_of(
         &self,
         answers: &[(&Answer, Vec<ParameterValue>)],
@@ -237,7 +237,7 @@ impl Sweep {
         (summary, columns)
     }
 
-    /// The place of the metric by which a run is the best.
+    /// Returns the index of the metric that defines the best run.
     fn goal(&self) -> usize {
         let named = self.file.best.as_ref().and_then(|best| self.metrics.iter().position(|m| m.name == best.text));
         named.unwrap_or(0)
@@ -253,12 +253,12 @@ impl Sweep {
         Some(self.best_of(answers[row].0, &answers[row].1, goal, better))
     }
 
-    /// What is taken to be better of a metric.
+    /// Returns the preferred direction of a metric, by default lower.
     pub(super) fn better(&self, metric: usize) -> Better {
         self.metrics[metric].better.unwrap_or(Better::Lower)
     }
 
-    /// A run as the best one.
+    /// Describes a run as the best one.
     pub(super) fn best_of(&self, answer: &Answer, values: &[ParameterValue], goal: usize, better: Better) -> BestRun {
         let empty = Vec::new();
         let results = answer.result.as_ref().unwrap_or(&empty);
@@ -294,17 +294,17 @@ impl Sweep {
         (!runs.is_empty()).then_some(ParetoFigures { metrics, better, runs })
     }
 
-    /// Sobol indices of a metric; with a grid besides, of what scatters about the mean at each of
-    /// its points.
+    /// Computes the Sobol indices of a metric. With a grid, those of the deviation from the mean at
+    /// each grid point.
     fn indices(&self, values: &[f64], columns: &Columns) -> Vec<IndexFigures> {
         let drawn = self.design.drawn();
         if self.file.method != SampleMethod::Saltelli || drawn.is_empty() || !columns.of_design {
             return Vec::new();
         }
-        // What is not there, or failed, is missing in its place.
+        // Missing and failed runs are NaN.
         let mut whole = vec![f64::NAN; self.runs()];
         columns.runs.iter().zip(values).for_each(|(run, value)| whole[*run] = *value);
-        // What the grid makes is not what scatters.
+        // The variance due to the grid is not part of the indices.
         let points = self.runs() / self.design.grid_points().max(1);
         for point in whole.chunks_mut(points.max(1)) {
             let mean = spread(point).map_or(0.0, |spread| spread.mean);

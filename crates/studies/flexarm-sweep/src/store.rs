@@ -1,15 +1,14 @@
-//! The folder of a study: what was computed so far, in files that survive whatever ends the
-//! program.
+//! Results folder of a study: results so far, in files that survive a crash of the program.
 //!
 //! ```text
-//! study.json              which study it is: its runs, columns and the files that it was made of
-//! parts/1-of-4.journal    a line for each run that is over, written at once
-//! parts/1-of-4-0.parquet  the same as a table, when the journal has become long or the shard is over
-//! runs.parquet            all runs by number, when none is missing; parts are then gone
+//! study.json              identifies the study: its runs, columns and input files
+//! parts/1-of-4.journal    a line for each finished run, written at once
+//! parts/1-of-4-0.parquet  the same as a table, once the journal is long or the shard is finished
+//! runs.parquet            all runs by number, once none is missing; parts are then removed
 //! ```
-//! A journal whose last line was cut is read up to there. Parts come into being under another name.
-//! The bytes of `runs.parquet` are those of its rows: who computed them, in how many shards and in
-//! which order does not show.
+//! A truncated last line of a journal is ignored. Parts are written under a temporary name. The
+//! bytes of `runs.parquet` depend only on its rows, not on the machine, the number of shards or the
+//! order of the runs.
 
 use std::collections::{BTreeMap, HashSet};
 use std::fs::{File, OpenOptions, TryLockError};
@@ -29,20 +28,20 @@ use super::table;
 use super::value::ParameterValue;
 use flexarm_run::Error;
 
-/// The file that says which study a folder is of.
+/// File that identifies the study of a folder.
 pub(super) const STUDY: &str = "study.json";
-/// The table of all runs.
+/// Table of all runs.
 pub(super) const RUNS: &str = "runs.parquet";
-/// The column of what is to be said of each run.
+/// Column of the caveats of each run.
 pub(super) const CAVEATS: &str = "caveats";
 /// Folder of the parts.
 const PARTS: &str = "parts";
-/// Lines of a journal that become a part.
+/// Number of journal entries that are converted to a part.
 const ROLL: usize = 20_000;
-/// Longest time between two waits for the disk.
+/// Maximum time between two syncs to disk.
 const SYNC: Duration = Duration::from_secs(2);
 
-/// Which study a folder is of.
+/// Description that identifies the study of a folder.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Manifest {
     pub(super) format: u32,
@@ -53,14 +52,14 @@ pub(super) struct Manifest {
     pub(super) runs: usize,
     pub(super) parameters: Vec<String>,
     pub(super) metrics: Vec<String>,
-    /// The files that it was made of and some drawn points, with a fingerprint of each.
+    /// Input files and some sampled points, with a fingerprint of each.
     pub(super) inputs: Vec<(String, String)>,
-    /// Where the file of the study was.
+    /// Path of the study file.
     pub(super) file: String,
 }
 
 impl Manifest {
-    /// What differs from another study, in words.
+    /// Returns the differences from another study, in words.
     pub(super) fn differs(&self, other: &Self) -> String {
         let mut told = Vec::new();
         if self.runs != other.runs {
@@ -86,20 +85,20 @@ impl Manifest {
     }
 }
 
-/// A part of the runs: those whose number leaves `number - 1` when divided by `of`.
+/// Shard of the runs: those with `run % of == number - 1`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
-    /// From 1.
+    /// Number of the shard, from 1.
     pub number: usize,
-    /// How many there are.
+    /// Number of shards.
     pub of: usize,
 }
 
 impl Shard {
-    /// All runs.
+    /// All runs as one shard.
     pub const ALL: Self = Self { number: 1, of: 1 };
 
-    /// Whether a run belongs to it.
+    /// Whether a run belongs to the shard.
     pub fn has(self, run: usize) -> bool {
         run % self.of == self.number - 1
     }
@@ -109,27 +108,27 @@ impl Shard {
     }
 }
 
-/// What a folder has.
+/// Contents of a results folder.
 #[derive(Debug, Default)]
 pub(super) struct Collected {
-    /// By run, with the file that it was found in.
+    /// Results by run, with the index of the file that contains them.
     pub(super) answers: BTreeMap<usize, (Answer, usize)>,
     /// Files, for messages.
     files: Vec<PathBuf>,
-    /// Runs that were found more than once, with the same result.
+    /// Number of runs found more than once with the same result.
     pub(super) doubles: usize,
-    /// Into how many shards the parts were cut.
+    /// Number of shards.
     pub(super) shards: Option<usize>,
-    /// What is said of runs: each text once.
+    /// Texts of caveats, each stored once.
     texts: HashSet<Arc<str>>,
 }
 
-/// A line of a journal: run, reason, metrics, caveats.
+/// Line of a journal: run, reason of failure, metrics, caveats.
 #[derive(Serialize, Deserialize)]
 struct Line(usize, Option<String>, Vec<Option<f64>>, #[serde(default)] Option<String>);
 
 impl Collected {
-    /// Has an answer share its caveats with those of which the same is said.
+    /// Makes a result share the text of its caveats with equal ones.
     pub(super) fn share(&mut self, answer: &mut Answer) {
         let Some(text) = &answer.told else { return };
         match self.texts.get(text) {
@@ -153,10 +152,10 @@ impl Collected {
         Ok(())
     }
 
-    /// Adds all that a folder has: parts, journals, the table of all runs.
+    /// Reads all parts, journals, and the table of all runs in a folder.
     ///
     /// # Errors
-    /// [`SweepError::Twice`], [`SweepError::Broken`], what the system says.
+    /// [`SweepError::Twice`], [`SweepError::Broken`], errors of the operating system.
     pub(super) fn read(&mut self, folder: &Path, manifest: &Manifest) -> Result<(), Error> {
         let whole = folder.join(RUNS);
         if whole.is_file() {
@@ -176,7 +175,7 @@ impl Collected {
                     let file = self.files.len() - 1;
                     let before = self.doubles;
                     answers.into_iter().try_for_each(|answer| self.add(answer, file))?;
-                    // A journal that became a part before it was emptied says the same once more.
+                    // A journal converted to a part but not yet emptied repeats the same runs.
                     self.doubles = before;
                 }
                 _ => continue,
@@ -232,7 +231,7 @@ impl Collected {
         Ok(())
     }
 
-    /// The runs that are missing, in words; none if all are there.
+    /// Describes the missing runs; `None` if all are present.
     pub(super) fn missing(&self, runs: usize) -> Option<SweepError> {
         let missing = runs - self.answers.len();
         if missing == 0 {
@@ -261,7 +260,7 @@ impl Collected {
     }
 }
 
-/// A list, cut after a few.
+/// Shortens a list to its first few entries.
 fn shortened(list: &[String]) -> String {
     const MOST: usize = 5;
     match list.len() > MOST {
@@ -270,7 +269,7 @@ fn shortened(list: &[String]) -> String {
     }
 }
 
-/// Whether two answers to one run are the same, to the last bit.
+/// Whether two results of one run are bitwise equal.
 fn same(a: &Answer, b: &Answer) -> bool {
     match (&a.result, &b.result) {
         (Ok(a), Ok(b)) => {
@@ -281,7 +280,7 @@ fn same(a: &Answer, b: &Answer) -> bool {
     }
 }
 
-/// The answers of a journal, and how many bytes of it are whole lines.
+/// Reads the results in a journal, and the length of its complete lines in bytes.
 fn read_journal(path: &Path, manifest: &Manifest) -> Result<(Vec<Answer>, u64), Error> {
     let bytes = std::fs::read(path)
         .map_err(|error| Error::File { path: path.into(), what: format!("cannot be read: {error}") })?;
@@ -289,7 +288,7 @@ fn read_journal(path: &Path, manifest: &Manifest) -> Result<(Vec<Answer>, u64), 
     let mut whole = 0;
     for line in bytes.split_inclusive(|byte| *byte == b'\n') {
         if line.last() != Some(&b'\n') {
-            break; // cut while it was written
+            break; // truncated while being written
         }
         let broken = || SweepError::Broken {
             path: path.to_owned(),
@@ -309,7 +308,7 @@ fn read_journal(path: &Path, manifest: &Manifest) -> Result<(Vec<Answer>, u64), 
     Ok((answers, whole))
 }
 
-/// The folder of a study that is being run.
+/// Open results folder of a study.
 #[derive(Debug)]
 pub(super) struct Store {
     pub(super) folder: PathBuf,
@@ -317,17 +316,17 @@ pub(super) struct Store {
     shard: Shard,
     journal: File,
     journal_path: PathBuf,
-    /// What the journal holds.
+    /// Results in the journal.
     held: Vec<Answer>,
     synced: Instant,
 }
 
 impl Store {
-    /// Opens the folder of a study for a shard, and reads what is there.
+    /// Opens the folder of a study for a shard, and reads its contents.
     ///
     /// # Errors
-    /// [`SweepError::Foreign`], [`SweepError::Running`], [`SweepError::Broken`]; what the system
-    /// says.
+    /// [`SweepError::Foreign`], [`SweepError::Running`], [`SweepError::Broken`]; errors of the
+    /// operating system.
     pub(super) fn open(
         folder: &Path,
         manifest: Manifest,
@@ -361,7 +360,7 @@ impl Store {
         let mut journal = journal.map_err(write(&journal_path))?;
         match journal.try_lock() {
             Err(TryLockError::WouldBlock) => return Err(SweepError::Running { path: journal_path }.into()),
-            // Where files have no locks, two processes are the user's to avoid.
+            // On file systems without locks the user must avoid two processes on one shard.
             Ok(()) | Err(TryLockError::Error(_)) => {}
         }
         let (held, whole) = read_journal(&journal_path, &manifest)?;
@@ -372,10 +371,10 @@ impl Store {
         Ok((Self { folder, manifest, shard, journal, journal_path, held, synced: Instant::now() }, collected))
     }
 
-    /// Keeps the answer to a run; it is there whatever ends the program after this.
+    /// Stores the result of a run, so that it survives the end of the program.
     ///
     /// # Errors
-    /// [`Error::Write`]: a full disk, for instance; what was kept before stays.
+    /// [`Error::Write`], for instance on a full disk; earlier results are kept.
     pub(super) fn keep(&mut self, answer: Answer, sweep: &Sweep) -> Result<(), Error> {
         let (reason, metrics) = match &answer.result {
             Ok(values) => (None, values.iter().map(|x| x.is_finite().then_some(*x)).collect()),
@@ -396,7 +395,7 @@ impl Store {
         Ok(())
     }
 
-    /// Makes a part of the journal.
+    /// Converts the journal to a part.
     ///
     /// # Errors
     /// As [`Store::keep`].
@@ -411,23 +410,23 @@ impl Store {
         self.held.sort_by_key(|answer| answer.run);
         self.held.dedup_by_key(|answer| answer.run);
         table::write(&name(number), &sweep.table(&self.held, &self.manifest), CreateOptions::default())?;
-        // The same runs are twice there until now, never nowhere.
+        // Until now the runs are in both files, so that a crash loses none.
         self.journal.set_len(0).and_then(|()| self.journal.seek(SeekFrom::Start(0))).map_err(failed)?;
         self.journal.sync_data().map_err(failed)?;
         self.held.clear();
         Ok(())
     }
 
-    /// Removes parts that a table of all runs has made superfluous.
+    /// Removes the parts once the table of all runs exists.
     pub(super) fn remove_parts(self) {
         let parts = self.folder.join(PARTS);
         drop(self.journal);
-        // What cannot be removed says the same as the table.
+        // Parts that cannot be removed only repeat the table.
         let _ = std::fs::remove_dir_all(parts);
     }
 }
 
-/// The study that a folder is of.
+/// Returns the study of a folder.
 ///
 /// # Errors
 /// [`SweepError::Broken`].
@@ -446,7 +445,7 @@ pub(super) fn known_manifest(folder: &Path) -> Result<Option<Manifest>, Error> {
     Ok(Some(manifest))
 }
 
-/// Removes the results of a study, and nothing else.
+/// Removes the results of a study and no other files.
 pub(super) fn clear(folder: &Path) -> Result<(), Error> {
     for name in [RUNS, STUDY, "sweep.json", "report.html"] {
         let path = folder.join(name);
@@ -462,13 +461,13 @@ pub(super) fn clear(folder: &Path) -> Result<(), Error> {
 }
 
 impl Sweep {
-    /// The table of some runs, in their order.
+    /// Returns the table of some runs, in the given order.
     pub(super) fn table(&self, answers: &[Answer], manifest: &Manifest) -> DataTable {
         let values: Vec<Vec<ParameterValue>> = answers.iter().map(|answer| self.design.values(answer.run)).collect();
         self.table_of(answers, &values, manifest)
     }
 
-    /// The table of runs with these values of the parameters.
+    /// Returns the table of runs with the given parameter values.
     pub(super) fn table_of(
         &self,
         answers: &[Answer],

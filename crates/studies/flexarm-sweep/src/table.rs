@@ -1,4 +1,4 @@
-//! Tables of results as Parquet, in builds that have it.
+//! Tables of results as Parquet, in builds that support it.
 
 use std::path::Path;
 
@@ -6,15 +6,20 @@ use flexarm_log::{CreateOptions, DataTable};
 
 use flexarm_run::Error;
 
+/// Writes a table.
+///
 /// # Errors
-/// What the system says; [`flexarm_run::RecordingError::WithoutFormat`] in a build without Parquet.
+/// Errors of the operating system; [`flexarm_run::RecordingError::WithoutFormat`] in a build
+/// without Parquet.
 #[cfg(feature = "parquet")]
 pub(super) fn write(path: &Path, table: &DataTable, options: CreateOptions) -> Result<(), Error> {
     Ok(table.write(path, options)?)
 }
 
+/// Reads a table.
+///
 /// # Errors
-/// What the system says, a file that is no table.
+/// Errors of the operating system; an error if the file is not a table.
 #[cfg(feature = "parquet")]
 pub(super) fn read(path: &Path) -> Result<DataTable, Error> {
     Ok(DataTable::read(path)?)
@@ -34,7 +39,7 @@ pub(super) fn read(_: &Path) -> Result<DataTable, Error> {
     Err(MISSING.into())
 }
 
-/// Whether this build can write tables.
+/// Checks that this build can write tables.
 ///
 /// # Errors
 /// [`flexarm_run::RecordingError::WithoutFormat`].

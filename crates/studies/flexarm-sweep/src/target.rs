@@ -1,43 +1,43 @@
-//! What a path of a parameter leads to: the robot file, the motion, the loads, an option, a job by
-//! which a link is reduced again.
+//! Targets of a parameter's path: the robot file, the motion, the loads, an option, or the job of a
+//! reduced link.
 
 use super::file::Role;
 use super::path::{Place, Segment, changed, leaves, near, places, segments, written};
 use super::value::ParameterValue;
 
-/// The file that a place is in.
+/// File that contains a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) enum Which {
-    /// The robot file.
+    /// Robot file.
     Robot,
-    /// The file of the motion.
+    /// Motion file.
     Motion,
-    /// The file of loads.
+    /// File of loads.
     Loads,
-    /// The job of a link, by its number.
+    /// Job of a link, by its index.
     Job(usize),
 }
 
-/// What one path of a parameter changes.
+/// Target of one path of a parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Target {
-    /// Which robot, motion or loads.
+    /// Choice of the robot, motion or loads.
     File(Which),
-    /// How fast the motion is run through.
+    /// Speed of the motion, relative to the file.
     Speed,
-    /// An option.
+    /// Option, by name.
     Option(String),
-    /// Values of a file.
+    /// Values in a file.
     Entry(Which, Vec<Segment>),
 }
 
 impl Target {
-    /// From a path as written.
+    /// Parses a path.
     ///
-    /// * `jobs`: names of the links that have one.
+    /// * `jobs`: names of the links with a job.
     ///
     /// # Errors
-    /// A sentence.
+    /// A sentence about an invalid path.
     pub(super) fn parse(path: &str, jobs: &[String]) -> Result<Self, String> {
         let all = segments(path).ok_or_else(|| {
             format!(
@@ -70,7 +70,7 @@ impl Target {
     }
 }
 
-/// Links that bend are called links for short.
+/// Replaces `link`, the short form, by `flexible_link`.
 fn of_robot(mut path: Vec<Segment>) -> Vec<Segment> {
     if let Some(Segment::Key(key)) = path.first_mut()
         && key == "link"
@@ -81,20 +81,20 @@ fn of_robot(mut path: Vec<Segment>) -> Vec<Segment> {
     path
 }
 
-/// A change of one value of a file.
+/// Change of one value in a file.
 #[derive(Clone, Debug)]
 pub(super) struct Edit {
     pub(super) place: Place,
     pub(super) value: toml_edit::Value,
 }
 
-/// The changes that a value makes where a path leads.
+/// Returns the edits that a value makes at all locations that a path matches.
 ///
-/// * `known`: changes before it: a factor or an offset goes on top of them.
+/// * `known`: earlier edits, to which a factor or an offset is applied.
 ///
 /// # Errors
-/// A sentence: a path that leads nowhere, with those that are near; a factor or an offset of what
-/// is no number.
+/// A sentence about a path without a match, with similar paths, or about a factor or an offset for
+/// a value that is not numeric.
 pub(super) fn edits(
     root: &toml::Value,
     path: &[Segment],
@@ -130,7 +130,7 @@ pub(super) fn edits(
     found.into_iter().map(edit).collect()
 }
 
-/// Numbers and lists of them as they are read.
+/// Converts numbers and lists of them.
 fn plain(value: &toml_edit::Value) -> Option<toml::Value> {
     match value {
         toml_edit::Value::Integer(n) => Some(toml::Value::Integer(*n.value())),

@@ -1,5 +1,4 @@
-//! What is to be said of the runs of a study: the caveats of each, kept with its answer, and each
-//! of them once for all runs.
+//! Caveats of the runs of a study, stored with each result, and merged over all runs.
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -11,22 +10,22 @@ use flexarm_run::Caveat;
 use flexarm_run::Severity;
 use flexarm_run::caveat::once_each;
 
-/// Caveats of a run as JSON; none if there are none. Runs of which the same is said share one text.
+/// Caveats of a run as JSON; `None` if there are none. Runs with equal caveats share one text.
 pub(super) type Told = Option<Arc<str>>;
 
-/// A caveat, and the runs that it concerns. It is that of the run in which it is worst.
+/// Caveat with the runs it concerns, represented by the worst of them.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CaveatFigures {
-    /// The caveat with the worst value.
+    /// Caveat with the worst value.
     #[serde(flatten)]
     pub caveat: Caveat,
-    /// Runs of which it is said.
+    /// Number of runs with this caveat.
     pub runs: usize,
-    /// The run with the worst value.
+    /// Number of the run with the worst value.
     pub worst_run: usize,
 }
 
-/// Caveats as they are kept; `plain` takes out of a text what differs from machine to machine.
+/// Serialises the caveats of a run; `plain` removes parts of a text that depend on the machine.
 pub(super) fn told(caveats: Vec<Caveat>, plain: &dyn Fn(String) -> String) -> Told {
     if caveats.is_empty() {
         return None;
@@ -36,7 +35,7 @@ pub(super) fn told(caveats: Vec<Caveat>, plain: &dyn Fn(String) -> String) -> To
     serde_json::to_string(&caveats).ok().map(Arc::from)
 }
 
-/// Each caveat of all runs once, warnings first.
+/// Merges the caveats of all runs, warnings first.
 pub(super) fn figures<'a>(answers: impl Iterator<Item = &'a Answer>) -> Vec<CaveatFigures> {
     let mut read: HashMap<&str, Vec<Caveat>> = HashMap::new();
     let mut found: BTreeMap<(String, String, String), CaveatFigures> = BTreeMap::new();
@@ -62,8 +61,8 @@ pub(super) fn figures<'a>(answers: impl Iterator<Item = &'a Answer>) -> Vec<Cave
     found
 }
 
-/// What makes two caveats the same: kind and place, and where they have no value their words but
-/// for the numbers in them.
+/// Returns the key of caveats to merge: kind and location, and for caveats without a value also the
+/// message without its digits.
 fn key(caveat: &Caveat) -> (String, String, String) {
     let words = match caveat.value {
         Some(_) => String::new(),
@@ -72,12 +71,13 @@ fn key(caveat: &Caveat) -> (String, String, String) {
     (caveat.code.clone(), caveat.location.clone(), words)
 }
 
-/// How bad the value of a caveat is beside others of its kind: how far it is from its yardstick.
+/// Returns the severity of a caveat's value among others of its kind: its distance from the
+/// yardstick.
 fn badness(caveat: &Caveat) -> f64 {
     let (Some(value), Some(yardstick)) = (caveat.value, caveat.yardstick) else { return 0.0 };
     match caveat.code.as_str() {
-        // Their yardsticks are no limits: the reach of the arm, damping without any swing, a
-        // frequency that needs ten samples.
+        // These yardsticks are not limits: the reach of the arm, critical damping, the frequency
+        // that needs ten samples.
         "sag" | "damped-mode" => value / yardstick,
         "few-samples" => yardstick / value,
         _ if value > 0.0 && yardstick > 0.0 => (value / yardstick).ln().abs(),
@@ -85,7 +85,7 @@ fn badness(caveat: &Caveat) -> f64 {
     }
 }
 
-/// The sentences of those that warn, with how many of all runs they concern.
+/// Returns the sentences of the warnings, with the number of runs they concern.
 pub(super) fn warnings(caveats: &[CaveatFigures], runs: usize) -> Vec<String> {
     let told = |figures: &CaveatFigures| {
         let CaveatFigures { caveat, runs: own, worst_run } = figures;

@@ -2,22 +2,22 @@
 
 use std::fmt;
 
-/// A value of a parameter.
+/// Value of a parameter.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 #[serde(untagged)]
 pub enum ParameterValue {
-    /// A number.
+    /// Floating-point number.
     Number(f64),
-    /// A number that was written without a point.
+    /// Integer, written without a decimal point.
     Whole(i64),
-    /// A word or a file.
+    /// Word or file name.
     Text(String),
-    /// Yes or no.
+    /// Boolean.
     Truth(bool),
 }
 
 impl ParameterValue {
-    /// The number that it is.
+    /// Returns the value as a number; `None` if it is not one.
     pub fn number(&self) -> Option<f64> {
         match self {
             Self::Number(x) => Some(*x),
@@ -26,7 +26,8 @@ impl ParameterValue {
         }
     }
 
-    /// From a value of a file; none of a list, a table or a date, and of what is no finite number.
+    /// Converts a value of a file; `None` for a list, a table, a date, or a number that is not
+    /// finite.
     pub(super) fn of(value: &toml::Value) -> Option<Self> {
         match value {
             toml::Value::Float(x) if x.is_finite() => Some(Self::Number(*x)),

@@ -1,9 +1,8 @@
-//! The runs of a study made ready: the robot of each as its file would say, its motion, loads and
-//! options.
+//! Preparation of the runs of a study: robot, motion, loads and options of each.
 //!
-//! A change goes into the text of the file, which is then read as any other, so a run is that of a
-//! person who wrote this file. What does not change (URDF, meshes, reduced links, motions, arms of
-//! equal files) is read and built once and shared by threads.
+//! Changes are made in the text of a file, which is then read like any other, so that a run equals
+//! one from a file edited by hand. Everything that does not change (URDF, meshes, reduced links,
+//! motions, arms from equal files) is read and built once and shared between threads.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -38,45 +37,45 @@ use flexarm_run::reduce::ReduceOptions;
 use flexarm_run::reduce::ReduceOutputs;
 use flexarm_run::reduce::reduce;
 
-/// Keys of a robot file that a motion of joints does not depend on.
+/// Keys of a robot file that do not affect joint motions.
 const NOT_OF_THE_MOTION: [&str; 7] =
     ["payload", "flexible_link", "drive", "gravity", "mounting", "balancer", "coupling"];
 
-/// A file that is changed or chosen.
+/// File that a study changes or selects.
 #[derive(Debug)]
 pub(super) struct TextFile {
     pub(super) path: PathBuf,
     pub(super) text: String,
-    /// The same as values, if it is TOML.
+    /// Parsed content, if it is TOML.
     parsed: Option<(toml::Value, DocumentMut)>,
 }
 
-/// A robot that is modelled.
+/// Flexible model of a robot.
 pub(super) struct Built {
     pub(super) arm: Arm,
-    /// All links without the payload (kg).
+    /// Mass of all links without the payload (kg).
     pub(super) mass_kg: f64,
 }
 
-/// A run that can go.
+/// Run that is ready to simulate.
 pub(super) struct Ready {
     pub(super) built: Arc<Built>,
     pub(super) scenario: Scenario,
     pub(super) options: RunOptions,
 }
 
-/// The files of a run as they would be written.
+/// Files of a run as they would be written to disk.
 #[derive(Clone, Debug, Default)]
 pub(super) struct RunFiles {
     pub(super) robot: (PathBuf, String),
-    /// None where the motion is the robot's own or no text.
+    /// Path and text; `None` for the robot's own motion, text `None` for an unchanged file.
     pub(super) motion: Option<(PathBuf, Option<String>)>,
     pub(super) loads: Option<(PathBuf, String)>,
     pub(super) options: Vec<(String, ParameterValue)>,
     pub(super) speed: Option<f64>,
 }
 
-/// Which files a run takes, and its options.
+/// Files and options of a run.
 struct Chosen {
     robot: PathBuf,
     motion: Option<PathBuf>,
@@ -86,11 +85,11 @@ struct Chosen {
     speed: Option<f64>,
 }
 
-/// Makes runs ready.
+/// Preparation of runs.
 pub(super) struct Workshop {
     files: FileCache,
     texts: BTreeMap<PathBuf, TextFile>,
-    /// Paths of what the study calls by a word.
+    /// Paths of the files that the study refers to by name.
     called: BTreeMap<(Which, String), PathBuf>,
     robot: String,
     motion: Option<String>,
@@ -98,14 +97,14 @@ pub(super) struct Workshop {
     jobs: Vec<(String, PathBuf)>,
     options: StudyOptions,
     given_options: Vec<(String, ParameterValue)>,
-    /// What each column changes.
+    /// Targets of each column.
     targets: Vec<Vec<(Target, String)>>,
     roles: Vec<Role>,
     arms: Recent<Arc<Built>>,
     motions: Recent<Motion>,
-    /// Reduced links that were made, by the text of their job.
+    /// Reduced links computed so far, by the text of their job.
     reduced: Mutex<BTreeMap<String, PathBuf>>,
-    /// Where they are put.
+    /// Folder of reduced links.
     links_folder: PathBuf,
 }
 
@@ -113,7 +112,7 @@ impl Workshop {
     /// Reads all files that the study names.
     ///
     /// # Errors
-    /// With the place in the study: files that are not there, options and paths that are not known.
+    /// With the place in the study: missing files, unknown options and paths.
     pub(super) fn new(file: &StudyFile, finders: &Finders) -> Result<Self, Error> {
         let mut options = StudyOptions::default();
         for (key, value, place) in &file.options {
@@ -152,12 +151,12 @@ impl Workshop {
         Ok(shop)
     }
 
-    /// Where reduced links are put that a study makes.
+    /// Sets the results folder in which reduced links are stored.
     pub(super) fn put_links_into(&mut self, folder: &Path) {
         self.links_folder = folder.join("links");
     }
 
-    /// All files that were read, with the study's own fingerprint of each.
+    /// Returns all files that were read, with a fingerprint of each.
     pub(super) fn inputs(&self) -> Vec<(String, String)> {
         let mut found: Vec<(String, String)> = self
             .texts
@@ -173,12 +172,13 @@ impl Workshop {
         found
     }
 
-    /// Why a run failed, with files by their names: where they are differs from machine to machine.
+    /// Returns the reason why a run failed, with file names in place of paths, which depend on the
+    /// machine.
     pub(super) fn reason(&self, error: &Error) -> String {
         self.plain(error.to_string())
     }
 
-    /// A text with files by their names.
+    /// Replaces paths by file names in a text.
     pub(super) fn plain(&self, text: String) -> String {
         self.texts.keys().fold(text, |text, path| {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -186,19 +186,19 @@ impl Workshop {
         })
     }
 
-    /// The robot as the study names it.
+    /// Returns the robot that the study names.
     pub(super) fn base_robot(&self) -> Result<Robot, Error> {
         let path = &self.called[&(Which::Robot, self.robot.clone())];
         let text = &self.texts[path].text;
         self.robot_of(path, text)
     }
 
-    /// How links and drives are modelled where no run says otherwise.
+    /// Returns the modelling of links and drives for runs without options of their own.
     pub(super) fn base_modelling(&self) -> Modelling {
         self.options.run().modelling
     }
 
-    /// Finds what the study calls by a word, and reads it.
+    /// Finds a file that the study refers to by name, and reads it.
     fn call(
         &mut self,
         which: Which,
@@ -228,7 +228,7 @@ impl Workshop {
         Ok(())
     }
 
-    /// The motion that a robot file names.
+    /// Returns the motion that a robot file names.
     fn own_motion(&self, robot: &Path) -> Option<PathBuf> {
         let (root, _) = self.texts.get(robot)?.parsed.as_ref()?;
         let own = root.get("default_trajectory")?.as_str()?;
@@ -239,7 +239,8 @@ impl Workshop {
         if self.texts.contains_key(path) {
             return Ok(());
         }
-        // Bags and other motions are no text; their content does not count into what the study is.
+        // Binary motions such as bags have no text; their content is not part of the study's
+        // fingerprint.
         let text = match read_text(path) {
             Ok(text) => text,
             Err(_) if path.exists() => String::new(),
@@ -254,11 +255,10 @@ impl Workshop {
         Ok(())
     }
 
-    /// Takes the columns of the design.
+    /// Sets the columns of the design.
     ///
     /// # Errors
-    /// With the place in the study: paths that lead nowhere, files that are not there, values that
-    /// are no option.
+    /// With the place in the study: invalid paths, missing files, invalid values of options.
     pub(super) fn vary(&mut self, columns: &[Column], file: &StudyFile, finders: &Finders) -> Result<(), Error> {
         let jobs: Vec<String> = self.jobs.iter().map(|(link, _)| link.clone()).collect();
         for column in columns {
@@ -317,7 +317,7 @@ impl Workshop {
         Ok(())
     }
 
-    /// Where the file is that the study names.
+    /// Returns the path of a file that the study names.
     pub(super) fn base_path(&self, which: Which) -> Option<PathBuf> {
         let word = match which {
             Which::Robot => Some(&self.robot),
@@ -331,8 +331,8 @@ impl Workshop {
         }
     }
 
-    /// The places that a path means in the robot file and others of the study, by name, for
-    /// parameters of each.
+    /// Returns the names of all entries that a path matches in the robot file or another file of
+    /// the study, for one parameter each.
     pub(super) fn expanded(&self, text: &str) -> Result<Vec<String>, String> {
         let jobs: Vec<String> = self.jobs.iter().map(|(link, _)| link.clone()).collect();
         let Target::Entry(which, path) = Target::parse(text, &jobs)? else { return Ok(vec![text.to_owned()]) };
@@ -350,7 +350,8 @@ impl Workshop {
         Ok(found.collect())
     }
 
-    /// What the files say now where a parameter leads: the number, or what changes nothing.
+    /// Returns the present value of a parameter: the number in the file, or the neutral value of a
+    /// factor or offset.
     pub(super) fn current(&self, column: usize) -> Option<f64> {
         let (target, _) = self.targets[column].first()?;
         match (self.roles[column], target) {
@@ -369,7 +370,7 @@ impl Workshop {
         }
     }
 
-    /// The changes that a value makes in a file that is changed already.
+    /// Returns the edits that a value makes in a file, given earlier edits.
     fn entry_edits(
         &self,
         file: &Path,
@@ -385,7 +386,7 @@ impl Workshop {
         }
     }
 
-    /// The text of a file with changes.
+    /// Returns the text of a file with edits.
     fn changed(&self, file: &Path, edits: &[Edit]) -> String {
         match self.texts.get(file) {
             Some(TextFile { parsed: Some((_, document)), .. }) if !edits.is_empty() => {
@@ -400,11 +401,11 @@ impl Workshop {
         }
     }
 
-    /// The files of a run as they would be written by hand; reduces links again where the run asks
-    /// for that.
+    /// Returns the files of a run as they would be written by hand. Recomputes the reduced links
+    /// that the run changes.
     ///
     /// # Errors
-    /// What keeps the run from going.
+    /// The reason why the run cannot start.
     pub(super) fn run_files(&self, values: &[ParameterValue]) -> Result<(RunFiles, StudyOptions, bool), Error> {
         let Chosen { robot, motion, loads, options, given, speed } = self.chosen(values)?;
         let mut changes = self.changes(values, &robot, motion.as_deref(), loads.as_deref())?;
@@ -431,7 +432,7 @@ impl Workshop {
         Ok((files, options, moves))
     }
 
-    /// Which files a run takes, and its options.
+    /// Returns the files and options of a run.
     fn chosen(&self, values: &[ParameterValue]) -> Result<Chosen, Error> {
         let mut words = [Some(self.robot.clone()), self.motion.clone(), self.loads.clone()];
         let (mut options, mut given) = (self.options.clone(), self.given_options.clone());
@@ -467,7 +468,7 @@ impl Workshop {
         Ok(Chosen { motion, loads: path_of(Which::Loads), robot, options, given, speed })
     }
 
-    /// What the values change in each file.
+    /// Returns the edits that the values make in each file.
     fn changes(
         &self,
         values: &[ParameterValue],
@@ -495,7 +496,7 @@ impl Workshop {
         Ok(changes)
     }
 
-    /// Reduces the links whose jobs are changed, and puts them into the robot file.
+    /// Recomputes the reduced links whose jobs changed, and refers to them in the robot file.
     fn reduce_again(&self, robot: &Path, changes: &mut BTreeMap<Which, Vec<Edit>>) -> Result<(), Error> {
         for (number, (link, job)) in self.jobs.iter().enumerate() {
             let Some(edits) = changes.remove(&Which::Job(number)) else { continue };
@@ -509,10 +510,10 @@ impl Workshop {
         Ok(())
     }
 
-    /// A run made ready.
+    /// Prepares a run.
     ///
     /// # Errors
-    /// What keeps it from going: numbers that no robot has, a motion that is not there.
+    /// The reason why it cannot start: values that are invalid for a robot, a missing motion.
     pub(super) fn ready(&self, values: &[ParameterValue]) -> Result<Ready, Error> {
         let (files, options, robot_moves) = self.run_files(values)?;
         let run = options.run();
@@ -554,7 +555,7 @@ impl Workshop {
         robot_moves: bool,
     ) -> Result<Motion, Error> {
         let Some((path, text)) = &files.motion else { return Err(super::SweepError::NoMotion.into()) };
-        // A path of the tool depends on all of the robot, a motion of its joints on little.
+        // A TCP path depends on the whole robot, a joint motion only on a few of its keys.
         let of_joints = self
             .texts
             .get(path)
@@ -582,9 +583,9 @@ impl Workshop {
         Ok(motion)
     }
 
-    /// The reduced link that a job makes.
+    /// Returns the path of the reduced link from a job.
     fn reduced_link(&self, link: &str, job: &Path, text: &str) -> Result<PathBuf, Error> {
-        // One at a time: a reduction takes all cores by itself.
+        // One at a time, because a reduction uses all cores.
         let mut made = self.reduced.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = made.get(text) {
             return Ok(known.clone());
@@ -602,7 +603,7 @@ impl Workshop {
     }
 }
 
-/// Mass of all links with the parts of those that bend, without the payload (kg).
+/// Mass of all links, including the parts of flexible links, without the payload (kg).
 fn mass(robot: &Robot, flexible: &FlexibleRobot) -> f64 {
     let own = robot.rigid.links.iter().filter(|link| link.name != flexarm_run::robot::PAYLOAD_LINK);
     let own: f64 = own.filter_map(|link| link.inertia).map(|inertia| inertia.mass).sum();
@@ -610,7 +611,7 @@ fn mass(robot: &Robot, flexible: &FlexibleRobot) -> f64 {
     own + parts.sum::<f64>()
 }
 
-/// Place of a file among robot, motion and loads.
+/// Returns the index of a file in the list of robot, motion and loads.
 fn word_place(which: Which) -> usize {
     match which {
         Which::Robot | Which::Job(_) => 0,

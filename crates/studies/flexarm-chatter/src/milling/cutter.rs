@@ -1,5 +1,5 @@
-//! What cuts: teeth, engagement, and the force of a tooth on the tool per metre of depth and of
-//! chip.
+//! Cutter: teeth, engagement, and the force of a tooth on the tool per metre of depth and of chip
+//! thickness.
 //!
 //! Axes: x along the feed (of the tool relative to the work), z along the tool from its tip to the
 //! spindle, y completes them. The angle φ of a tooth runs from +y to +x (clockwise seen from the
@@ -10,7 +10,7 @@
 //! t = (cos φ, -sin φ, 0)                    a = (cos κ sin φ, cos κ cos φ, sin κ)
 //! F = -(depth / sin κ) (K_t t + K_r n + K_a a) (nᵀ u)
 //! ```
-//! On a helical tooth the edge at the height z is behind by `2 z tan(helix) / diameter`; the
+//! On a helical tooth the edge at height z lags by the angle `2 z tan(helix) / diameter`; the
 //! integral over the depth is in closed form.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -19,81 +19,84 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::milling::error::ChatterError;
 
-/// Cutting coefficients, N/m².
+/// Cutting coefficients (N/m²).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coefficients {
-    /// Along the cut.
+    /// Along the cutting velocity.
     pub tangential: f64,
-    /// Across the cut surface, from it into the tool.
+    /// Normal to the cut surface, towards the tool.
     pub radial: f64,
-    /// Along the edge; with a lead angle of 90 degrees it pulls the tool out of the spindle.
+    /// Along the edge; with a lead angle of 90 degrees this force pulls the tool out of the
+    /// spindle.
     pub axial: f64,
 }
 
-/// Angles between which a tooth cuts, rad.
+/// Range of angles in which a tooth cuts (rad).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Engagement {
-    /// Where it enters, within 0 to 2π.
+    /// Entry angle, from -2π to 2π.
     pub entry: f64,
-    /// Where it leaves, above `entry` by at most 2π.
+    /// Exit angle, above `entry` by at most 2π.
     pub exit: f64,
 }
 
 impl Engagement {
-    /// Up-milling: the chip starts with no thickness. `immersion`: radial depth over diameter,
-    /// above 0 to 1.
+    /// Returns the engagement of up-milling: the chip thickness increases from zero. `immersion`:
+    /// radial depth of cut over diameter, above 0 to 1.
     pub fn up(immersion: f64) -> Self {
         Self { entry: 0.0, exit: (1.0 - 2.0 * immersion).clamp(-1.0, 1.0).acos() }
     }
 
-    /// Down-milling: the chip ends with no thickness.
+    /// Returns the engagement of down-milling: the chip thickness decreases to zero.
     pub fn down(immersion: f64) -> Self {
         Self { entry: (2.0 * immersion - 1.0).clamp(-1.0, 1.0).acos(), exit: PI }
     }
 
-    /// The whole width of the tool.
+    /// Returns the engagement of a slot of the width of the tool.
     pub fn slot() -> Self {
         Self { entry: 0.0, exit: PI }
     }
 
-    /// All the way round.
+    /// Returns the engagement over the full turn.
     pub fn full() -> Self {
         Self { entry: 0.0, exit: TAU }
     }
 }
 
-/// The tool's edges and how they are engaged.
+/// Edges of the tool, and their engagement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cutter {
     /// Number of teeth, evenly spaced.
     pub teeth: usize,
-    /// Diameter, m; it only counts with a helix.
+    /// Diameter (m); it matters only with a helix.
     pub diameter: f64,
-    /// Helix angle, rad, 0 to below π/2.
+    /// Helix angle (rad), from 0 to below 1.5.
     pub helix: f64,
-    /// Angle κ of the edge to the feed plane, rad, above 0 to π/2.
+    /// Lead angle κ of the edge to the feed plane (rad), above 0 to π/2.
     pub lead: f64,
     /// Cutting coefficients.
     pub coefficients: Coefficients,
-    /// Where teeth cut.
+    /// Engagement.
     pub engagement: Engagement,
 }
 
-/// Force on the tool and reading of the chip at one moment: `F = -push (thicknessᵀ u)`, columns one
-/// by one.
+/// Force on the tool and chip thickness at one instant: `F = -push (thicknessᵀ u)`, as pairs of
+/// columns.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Regeneration {
     pub(crate) pairs: Vec<(Vector3<f64>, Vector3<f64>)>,
 }
 
 impl Cutter {
-    /// Straight teeth on the side of an end mill.
+    /// Returns an end mill with straight teeth.
     pub fn straight(teeth: usize, coefficients: Coefficients, engagement: Engagement) -> Self {
         Self { teeth, diameter: 1.0, helix: 0.0, lead: FRAC_PI_2, coefficients, engagement }
     }
 
+    /// Checks the parameters.
+    ///
     /// # Errors
-    /// [`ChatterError::Value`] for numbers that make no sense.
+    /// [`ChatterError::Value`] for invalid parameters.
     pub fn check(&self) -> Result<(), ChatterError> {
         let Engagement { entry, exit } = self.engagement;
         let Coefficients { tangential, radial, axial } = self.coefficients;
@@ -125,34 +128,34 @@ impl Cutter {
         }
     }
 
-    /// Angle between teeth, rad.
+    /// Returns the angle between teeth (rad).
     pub fn pitch(&self) -> f64 {
         TAU / self.teeth as f64
     }
 
-    /// Time between teeth, s, at a spindle speed in rad/s.
+    /// Returns the time between teeth (s) at a spindle speed in rad/s.
     pub fn tooth_period(&self, spindle: f64) -> f64 {
         self.pitch() / spindle
     }
 
-    /// How far the edge lags per metre of height, rad/m.
+    /// Returns the lag of the edge per height (rad/m).
     pub(crate) fn lag(&self) -> f64 {
         2.0 * self.helix.tan() / self.diameter
     }
 
-    /// Whether the forces do not depend on the depth but for a factor.
+    /// Whether the forces are proportional to the depth.
     pub(crate) fn is_straight(&self) -> bool {
         self.helix == 0.0
     }
 
-    /// Direction of the chip's thickness, per displacement.
+    /// Returns the direction of the chip thickness.
     pub(crate) fn thickness(&self, phi: f64) -> Vector3<f64> {
         let (s, c) = phi.sin_cos();
         let (sk, ck) = self.lead.sin_cos();
         Vector3::new(sk * s, sk * c, if ck.abs() < 1e-12 { 0.0 } else { -ck })
     }
 
-    /// Force per metre of depth and of thickness, its sign turned: N/m².
+    /// Returns the negative force per depth and chip thickness (N/m²).
     pub(crate) fn push(&self, phi: f64) -> Vector3<f64> {
         let (s, c) = phi.sin_cos();
         let (sk, ck) = self.lead.sin_cos();
@@ -162,8 +165,8 @@ impl Cutter {
         (t * k.tangential + self.thickness(phi) * k.radial + a * k.axial) / sk
     }
 
-    /// Cutter angles within one pitch at which a tooth, or its end at this depth, enters or leaves;
-    /// ascending, with 0 and the pitch.
+    /// Returns the cutter angles within one pitch at which a tooth, at its tip or at this depth,
+    /// enters or leaves the cut; ascending, with 0 and the pitch.
     pub(crate) fn events(&self, depth: f64) -> Vec<f64> {
         let pitch = self.pitch();
         let Engagement { entry, exit } = self.engagement;
@@ -185,8 +188,8 @@ impl Cutter {
         kept
     }
 
-    /// The force at the cutter angle `alpha` (of tooth 0 at the tip) per metre of displacement, at
-    /// a depth.
+    /// Returns the force per displacement at the cutter angle `alpha` (of tooth 0 at the tip) and a
+    /// depth.
     pub(crate) fn regeneration(&self, alpha: f64, depth: f64) -> Regeneration {
         let axes = if self.thickness(0.0).z == 0.0 { 2 } else { 3 };
         if self.is_straight() {
@@ -205,13 +208,14 @@ impl Cutter {
         Regeneration { pairs: (0..axes).map(pair).collect() }
     }
 
-    /// Whether a tooth at this angle is within the engagement.
+    /// Whether a tooth at this angle is engaged.
     pub(crate) fn cuts(&self, phi: f64) -> bool {
         let Engagement { entry, exit } = self.engagement;
         (phi - entry).rem_euclid(TAU) <= exit - entry
     }
 
-    /// `F = -H u` at a cutter angle and a depth, all teeth, integrated over the depth: N/m, 3×3.
+    /// Returns `H` of `F = -H u` at a cutter angle and a depth, over all teeth and integrated over
+    /// the depth (N/m), 3×3.
     pub fn force_matrix(&self, alpha: f64, depth: f64) -> Matrix3<f64> {
         let mut H = Matrix3::zeros();
         for j in 0..self.teeth {
@@ -228,12 +232,13 @@ impl Cutter {
         H
     }
 
-    /// Mean of `F = -H u` over a turn, per metre of depth: N/m², 3×3. The helix does not change it.
+    /// Returns the mean of `H` in `F = -H u` over a turn, per metre of depth (N/m²), 3×3. It does
+    /// not depend on the helix.
     pub fn mean_force_matrix(&self) -> Matrix3<f64> {
         self.swept(self.engagement.entry, self.engagement.exit) * (self.teeth as f64 / TAU)
     }
 
-    /// Integral of push times thickness over the engaged part of an interval of angles.
+    /// Integrates push times thickness over the engaged part of an interval of angles.
     fn swept(&self, from: f64, to: f64) -> Matrix3<f64> {
         let Engagement { entry, exit } = self.engagement;
         let mut H = Matrix3::zeros();
@@ -249,9 +254,9 @@ impl Cutter {
         H
     }
 
-    /// Primitive over φ of push times thickness.
+    /// Returns the antiderivative over φ of push times thickness.
     fn primitive(&self, phi: f64) -> Matrix3<f64> {
-        // Both are e s + f c + g with constant vectors e, f, g.
+        // Both are e sin φ + f cos φ + g with constant vectors e, f, g.
         let split = |of: &dyn Fn(f64) -> Vector3<f64>| {
             let constant = (of(0.0) + of(PI)) * 0.5;
             (of(FRAC_PI_2) - constant, of(0.0) - constant, constant)

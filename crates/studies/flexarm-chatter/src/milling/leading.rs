@@ -1,21 +1,21 @@
-//! The eigenvalue of largest size of the map over a period.
+//! Leading eigenvalue (of maximum magnitude) of the map over a period.
 //!
-//! Small maps as matrices. Large ones by Arnoldi's method: most of their eigenvalues are next to
-//! nothing, as the motion of a period ago acts through few shapes alone, so that a subspace a
-//! little larger than the number of states holds all that count.
+//! Small maps are converted to matrices. Large ones are treated with the Arnoldi method: most of
+//! their eigenvalues are almost zero, because the motion one period ago acts only through a few
+//! shapes, so that a subspace slightly larger than the number of states contains all relevant ones.
 
 use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::milling::period::PeriodMap;
 
-/// Up to this size the matrix is quicker.
+/// Size up to which the matrix is faster.
 const SMALL: usize = 60;
-/// Accepted residual of the eigenvalue, relative to its size.
+/// Maximum relative residual of the eigenvalue.
 const EXACT: f64 = 1e-10;
-/// Directions beyond the number of states at first.
+/// Initial number of directions beyond the number of states.
 const MORE: usize = 30;
 
-/// The eigenvalue of largest size; infinite for a map that overflows.
+/// Returns the leading eigenvalue; infinite for a map that overflows.
 pub(crate) fn leading(map: &PeriodMap) -> Complex<f64> {
     if map.size() <= SMALL {
         return largest(&map.matrix());
@@ -39,7 +39,7 @@ pub(crate) fn leading(map: &PeriodMap) -> Complex<f64> {
 
 fn largest(matrix: &DMatrix<f64>) -> Complex<f64> {
     let larger = |a: &Complex<f64>, b: &Complex<f64>| a.norm_sqr().total_cmp(&b.norm_sqr());
-    // The iteration for eigenvalues would not end.
+    // The eigenvalue iteration would not terminate.
     if !matrix.iter().all(|x| x.is_finite()) {
         return Complex::new(f64::INFINITY, 0.0);
     }
@@ -55,7 +55,7 @@ struct Krylov<'a> {
 
 impl<'a> Krylov<'a> {
     fn new(map: &'a PeriodMap) -> Self {
-        // Numbers without a pattern, the same on every machine.
+        // Pseudo-random numbers, the same on every machine.
         let mut seed = 1_u64;
         let start = DMatrix::from_fn(map.size(), 1, |_, _| {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -69,7 +69,7 @@ impl<'a> Krylov<'a> {
         self.V.len() - 1
     }
 
-    /// Up to so many directions; whether they span all that the start can reach.
+    /// Extends the subspace to a number of directions; returns whether it is invariant.
     fn extend(&mut self, wanted: usize) -> bool {
         let known = self.directions();
         self.H = std::mem::take(&mut self.H).resize(wanted + 1, wanted, 0.0);
@@ -77,7 +77,7 @@ impl<'a> Krylov<'a> {
         for k in known..wanted {
             self.map.apply(&self.V[k], &mut image);
             let before = image.norm();
-            // Twice: once leaves rounding of the first behind.
+            // Two passes, because one leaves rounding errors.
             for _ in 0..2 {
                 for (i, direction) in self.V.iter().enumerate() {
                     let part = direction.dot(&image);
@@ -96,8 +96,8 @@ impl<'a> Krylov<'a> {
         false
     }
 
-    /// `|A v - λ v|` of the unit vector that stands for an eigenvalue of `H`: what is left outside
-    /// of the directions.
+    /// Returns the residual `|A v - λ v|` of the unit Ritz vector of an eigenvalue of `H`, that is,
+    /// its part outside the subspace.
     fn residual(&self, H: &DMatrix<f64>, value: Complex<f64>) -> f64 {
         let n = H.nrows();
         let shift = value * (1.0 + 1e-12) + Complex::new(1e-300, 0.0);
@@ -127,8 +127,8 @@ mod tests {
     use crate::milling::period::Period;
     use crate::milling::structure::{Mode, Structure};
 
-    /// Truth: all eigenvalues of the matrix. Slow modes of an arm that hardly decay within a
-    /// period, and fast ones of a tool.
+    /// Truth: all eigenvalues of the matrix, for slow modes of an arm that hardly decay within a
+    /// period, and fast modes of a tool.
     #[test]
     fn few_directions_hold_the_largest_multiplier() {
         let mode = |k: u32| Mode {
@@ -150,7 +150,7 @@ mod tests {
             }
         }
         println!("worst {worst:.1e}");
-        // measured 1e-12
+        // measured: 1e-12
         assert!(worst < 1e-9, "{worst:.1e}");
     }
 }

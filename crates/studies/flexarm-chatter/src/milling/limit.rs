@@ -1,8 +1,7 @@
-//! The smallest depth at which a multiplier leaves the unit circle, at one spindle speed.
+//! Minimum depth of cut at which a Floquet multiplier leaves the unit circle, at one spindle speed.
 //!
-//! The depth is searched upwards on elements that are half a period of the fastest mode that
-//! matters; the limit found there is then solved for again with elements half as long, until it no
-//! longer moves.
+//! The depth is searched upwards with elements of half a period of the fastest relevant mode. The
+//! limit found is then refined with elements of half the length until it converges.
 
 use std::f64::consts::{PI, TAU};
 
@@ -14,78 +13,78 @@ use crate::milling::leading::leading;
 use crate::milling::period::Period;
 use crate::milling::structure::Structure;
 
-/// Depths of the search cover this part of the deepest.
+/// Minimum depth of the search over the maximum depth.
 const SHALLOWEST: f64 = 1e-3;
-/// They start at this part of a bound of the zero-order solution, where that is deeper.
+/// Factor on the bound of the zero-order solution; the search starts there if that is deeper.
 const BOUND: f64 = 0.5;
-/// And go down to this part where even that is not stable.
+/// Depth over the maximum depth at which a downward search ends.
 const NOTHING: f64 = 1e-9;
-/// Depths that are solved for meet the limit to this part.
+/// Relative tolerance of a limit on given elements.
 const EXACT: f64 = 1e-7;
-/// Most halvings of the elements.
+/// Maximum number of refinements of the elements.
 const MOST_HALVINGS: usize = 6;
-/// A mode matters if the deepest cut times its compliance at resonance times the cutting
-/// coefficients is above this (at about 1 it chatters by itself).
+/// Minimum product of maximum depth, compliance at resonance and cutting coefficients for a mode to
+/// be relevant (at about 1 it chatters by itself).
 const MATTERS: f64 = 0.2;
-/// Largest map whose eigenvalues are asked for.
+/// Maximum size of a map for computing eigenvalues.
 const MOST_UNKNOWNS: usize = 2500;
-/// A multiplier as near to the negative axis as this (rad) is on it.
+/// Angle (rad) from the negative real axis within which a multiplier counts as on it.
 const ON_AXIS: f64 = 1e-6;
 
-/// How a limit is searched for.
+/// Options for the search of a limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LimitOptions {
-    /// Deepest cut that is asked for, m.
+    /// Maximum depth of cut (m).
     pub deepest: f64,
-    /// Depths that are tried on the way there, spaced by equal ratios over three decades.
+    /// Number of depths tried, at equal ratios over three decades.
     pub depths: usize,
-    /// Relative change of the limit with elements half as long, below which it is accepted.
+    /// Relative change of the limit at which the refinement of the elements ends.
     pub tolerance: f64,
 }
 
 impl LimitOptions {
-    /// Up to a depth, to 0.1 % or better.
+    /// Returns options for limits up to a depth, to 0.1 % or better.
     pub fn to(deepest: f64) -> Self {
         Self { deepest, depths: 120, tolerance: 1e-3 }
     }
 }
 
-/// How the motion grows beyond a limit.
+/// Type of bifurcation at a limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// A frequency that has nothing to do with that of the teeth (complex multipliers).
+    /// Complex multipliers: chatter at a frequency independent of the tooth frequency.
     Hopf,
-    /// Every second tooth cuts the same (multiplier -1): period doubling.
+    /// Multiplier -1: period doubling, that is, every second tooth cuts the same.
     Flip,
 }
 
-/// A limit of depth.
+/// Stability limit of the depth of cut.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limit {
-    /// Depth, m.
+    /// Depth (m).
     pub depth: f64,
-    /// Hopf or flip.
+    /// Type of bifurcation.
     pub kind: Kind,
-    /// Frequency at which the tip swings most, Hz.
+    /// Frequency of the largest component of the tip's motion (Hz).
     pub chatter_hz: f64,
-    /// Angle of the multiplier over the tooth period, Hz, 0 to half the tooth frequency: the
-    /// chatter without multiples of that.
+    /// Angle of the multiplier over the tooth period (Hz), from 0 to half the tooth frequency: the
+    /// chatter frequency up to multiples of the tooth frequency.
     pub multiplier_hz: f64,
-    /// Relative change of the depth when the elements were halved last.
+    /// Relative change of the depth in the last refinement.
     pub change: f64,
-    /// States and chips of the finest map.
+    /// Number of states and chips of the finest map.
     pub unknowns: usize,
 }
 
-/// The smallest depth at which the cut chatters at a spindle speed (rad/s); none if it is stable up
-/// to the deepest.
+/// Computes the minimum depth at which the cut chatters at a spindle speed (rad/s); `None` if it is
+/// stable up to the maximum depth.
 ///
-/// A first unstable range of depths that is narrower than a step of the search (6 %) is found if
-/// the largest multiplier shows its peak.
+/// A first unstable range that is narrower than a step of the search (6 %) is found if the largest
+/// multiplier has a visible peak there.
 ///
 /// # Errors
-/// [`ChatterError::Value`] for a cutter, a speed or options that make no sense,
-/// [`ChatterError::TooSlow`] where a tooth period holds too many oscillations.
+/// [`ChatterError::Value`] for an invalid cutter, speed or option, [`ChatterError::TooSlow`] if a
+/// tooth period contains too many oscillations.
 pub fn limit_of_depth(
     structure: &Structure,
     cutter: &Cutter,
@@ -113,11 +112,12 @@ pub fn limit_of_depth(
     Ok(Some(described(structure, cutter, spindle, &period, depth, change)))
 }
 
-/// All ranges of depth up to the deepest in which the cut chatters, with their ends to the given
-/// tolerance; the last may end at the deepest.
+/// Computes all ranges of depth up to the maximum in which the cut chatters. The first limit has
+/// the given tolerance; the other ends are those of elements refined once. The last range may end
+/// at the maximum depth.
 ///
-/// Costs as many times a limit as there are depths of the search beyond it. Ranges narrower than a
-/// step may be missed.
+/// Cost: that of a limit, plus an eigenvalue problem per further depth of the search. Ranges
+/// narrower than a step may be missed.
 ///
 /// # Errors
 /// As [`limit_of_depth`].
@@ -151,8 +151,8 @@ pub fn unstable_ranges(
     Ok(ranges)
 }
 
-/// The Floquet multiplier of largest size over one tooth period at a depth, elements halved until
-/// it settles to `1e-6`.
+/// Computes the largest Floquet multiplier over one tooth period at a depth. The elements are
+/// refined until its magnitude converges to `1e-6`.
 ///
 /// # Errors
 /// As [`limit_of_depth`].
@@ -200,7 +200,8 @@ fn check_size(period: &Period, depth: f64, spindle: f64) -> Result<(), ChatterEr
     Ok(())
 }
 
-/// Half a period of the fastest mode that matters, s: six nodes on that.
+/// Returns the initial element length (s): half a period of the fastest relevant mode, with six
+/// nodes, at most a tooth period.
 fn first_length(structure: &Structure, cutter: &Cutter, spindle: f64, options: &LimitOptions) -> f64 {
     let stiffness =
         options.deepest * (0..64).map(|k| cutter.push(TAU * f64::from(k) / 64.0).norm()).fold(0.0, f64::max);
@@ -211,7 +212,7 @@ fn first_length(structure: &Structure, cutter: &Cutter, spindle: f64, options: &
     if fastest > 0.0 { (PI / fastest).min(tooth) } else { tooth }
 }
 
-/// Logarithm of the largest multiplier: above 0 beyond the limit.
+/// Returns the logarithm of the magnitude of the largest multiplier: above 0 beyond the limit.
 fn growth(period: &Period, depth: f64) -> f64 {
     leading(&period.at(depth)).norm().ln()
 }
@@ -220,7 +221,7 @@ fn step_ratio(options: &LimitOptions) -> f64 {
     (1.0 / SHALLOWEST).powf(1.0 / (options.depths - 1) as f64)
 }
 
-/// First crossing on the way from shallow to deep.
+/// Finds the first crossing from shallow to deep.
 fn first_limit(period: &Period, options: &LimitOptions) -> Option<f64> {
     let ratio = step_ratio(options);
     let bound = BOUND * period.zero_order_bound();
@@ -229,7 +230,7 @@ fn first_limit(period: &Period, options: &LimitOptions) -> Option<f64> {
     let at = |k: usize| options.deepest * SHALLOWEST.powf(1.0 - k as f64 / (options.depths - 1) as f64);
     let mut below = (at(start), 0.0);
     below.1 = growth(period, below.0);
-    // From the first depth downwards if it is beyond the limit already.
+    // Searches downwards if the first depth is unstable already.
     while below.1 > 0.0 {
         let above = below;
         below.0 /= ratio;
@@ -255,7 +256,8 @@ fn first_limit(period: &Period, options: &LimitOptions) -> Option<f64> {
     None
 }
 
-/// A depth between stable ones that is not, where the middle one of three is the largest.
+/// Searches for an unstable depth between stable ones if the growth has a peak at the middle of
+/// three depths.
 fn hidden_peak(period: &Period, a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> Option<(f64, f64)> {
     let drop = (b.1 - a.1).max(b.1 - c.1);
     if !(b.1 > a.1 && b.1 > c.1 && c.1 <= 0.0 && b.1 + 2.0 * drop > 0.0) {
@@ -278,7 +280,7 @@ fn hidden_peak(period: &Period, a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> 
     None
 }
 
-/// The crossing on other elements, near the one that is known.
+/// Finds the crossing on refined elements, near a known one.
 fn nearby_limit(period: &Period, depth: f64, options: &LimitOptions) -> Option<f64> {
     let mut reach = 0.1 * options.tolerance;
     while reach < 0.1 {
@@ -292,14 +294,14 @@ fn nearby_limit(period: &Period, depth: f64, options: &LimitOptions) -> Option<f
     None
 }
 
-/// Where the growth is zero between two depths with opposite signs: regula falsi, the end that
-/// stays halved (Illinois).
+/// Finds the zero of the growth between two depths with opposite signs: regula falsi with the
+/// Illinois modification.
 fn crossing(period: &Period, mut a: (f64, f64), mut b: (f64, f64)) -> f64 {
     for k in 0..100 {
         if (b.0 - a.0).abs() <= EXACT * b.0.abs() {
             break;
         }
-        // A bisection now and then: where branches cross, the growth has a kink.
+        // Bisects in every fourth step, because the growth has kinks where branches cross.
         let part = if k % 4 == 3 { 0.5 } else { (a.1 / (a.1 - b.1)).clamp(0.01, 0.99) };
         let x = a.0 + part * (b.0 - a.0);
         let at = (x, growth(period, x));
@@ -327,8 +329,8 @@ fn described(structure: &Structure, cutter: &Cutter, spindle: f64, period: &Peri
     Limit { depth, kind, chatter_hz: chatter / TAU, multiplier_hz: angle / TAU / tooth, change, unknowns: map.nrows() }
 }
 
-/// Frequency `|arg μ / T + 2π k / T|` (rad/s) of the largest harmonic of the tip for the
-/// eigenvector of μ.
+/// Returns the frequency `|arg μ / T + 2π k / T|` (rad/s) of the largest harmonic of the tip's
+/// motion for the eigenvector of μ.
 fn strongest_harmonic(
     structure: &Structure,
     period: &Period,
@@ -339,7 +341,7 @@ fn strongest_harmonic(
 ) -> f64 {
     let base = multiplier.arg() / tooth;
     let Some(vector) = eigenvector(map, multiplier) else { return base };
-    // Forces at the nodes, the exponential taken out of them; the vector holds the chips of the
+    // Forces at the nodes, without the exponential factor. The vector contains the chips of the
     // last tooth, which grow by μ.
     let nodes = period.cut_nodes(depth);
     let force = |first: usize, pairs: &[(Vector3<f64>, Vector3<f64>)]| {
@@ -360,7 +362,7 @@ fn strongest_harmonic(
     all.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(base, |(omega, _)| omega)
 }
 
-/// By inverse iteration.
+/// Computes an eigenvector by inverse iteration.
 fn eigenvector(map: &DMatrix<f64>, multiplier: Complex<f64>) -> Option<DVector<Complex<f64>>> {
     let n = map.nrows();
     let shift = multiplier * (1.0 + 1e-9);

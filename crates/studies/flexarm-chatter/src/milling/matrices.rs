@@ -1,33 +1,34 @@
-//! A structure from its matrices, with any damping.
+//! Structure from its mass, damping and stiffness matrices, with any damping.
 //!
 //! ```text
 //! M x'' + D x' + K x = Jᵀ F      u = J x
 //! ```
-//! In the coordinates of the undamped modes, `x = Φ η`, with `z = (Ω η, η')`, the first-order
-//! matrix is as large as the highest frequency and not as its square. Its right and left
-//! eigenvectors give the poles; what they promise is checked on the frequency response.
+//! In the coordinates of the undamped modes, `x = Φ η`, with `z = (Ω η, η')`, the norm of the
+//! first-order matrix is proportional to the highest frequency, not to its square. Its right and
+//! left eigenvectors give the poles; the frequency response of the poles is then checked against
+//! that of the matrices.
 
 use nalgebra::{Cholesky, Complex, DMatrix, Matrix3, Matrix3xX, Schur, SymmetricEigen, Vector3};
 
 use crate::milling::error::ChatterError;
 use crate::milling::structure::{Pole, Structure};
 
-/// Accepted relative difference of the frequency response.
+/// Maximum relative error of the frequency response.
 const ALLOWED: f64 = 1e-6;
-/// Imaginary parts below this part of the largest eigenvalue are rounding.
+/// Ratio to the largest eigenvalue below which an imaginary part counts as rounding.
 const REAL: f64 = 1e-11;
 
 impl Structure {
-    /// From mass, damping and stiffness matrix and the tip's Jacobian.
+    /// Builds a structure from mass, damping and stiffness matrix and the tip's Jacobian.
     ///
-    /// * `M`, `D`, `K`: n×n; `M` positive definite, the symmetric part of `K` too; `D` any that
-    ///   takes energy out. SI units.
+    /// * `M`, `D`, `K`: n×n; `M` and the symmetric part of `K` positive definite; `D` dissipative.
+    ///   SI units.
     /// * `J`: 3×n, velocity of the tip per rate of the coordinates, in the axes of the cut.
     ///
     /// # Errors
     /// [`ChatterError::Size`], [`ChatterError::NotFinite`], [`ChatterError::NotPositiveDefinite`],
     /// [`ChatterError::Undamped`] for a mode that does not decay, [`ChatterError::NotConverged`];
-    /// [`ChatterError::NotModal`] for two modes that are the same one.
+    /// [`ChatterError::NotModal`] for two coinciding modes.
     pub fn from_matrices(
         M: &DMatrix<f64>,
         D: &DMatrix<f64>,
@@ -41,6 +42,7 @@ impl Structure {
         }
         let (omega, Phi) = undamped(M, K)?;
         let (D_eta, K_eta, J_eta) = (Phi.tr_mul(&(D * &Phi)), Phi.tr_mul(&(K * &Phi)), J * &Phi);
+        // z' = A z + (0, Φᵀ Jᵀ F).
         let A = DMatrix::from_fn(2 * n, 2 * n, |i, j| match (i < n, j < n) {
             (true, true) => 0.0,
             (true, false) => {
@@ -57,6 +59,7 @@ impl Structure {
         let left =
             right.clone().try_inverse().ok_or(ChatterError::NotModal { found: f64::INFINITY, allowed: ALLOWED })?;
 
+        // One pole per conjugate pair: output from the right, input from the left eigenvector.
         let scale = values.iter().map(|x| x.norm()).fold(0.0, f64::max);
         let mut poles = Vec::new();
         for (k, value) in values.iter().enumerate() {
@@ -79,7 +82,8 @@ impl Structure {
         Ok(structure)
     }
 
-    /// The poles must have the response of the matrices, at and between the modes.
+    /// Compares the frequency response of the poles with that of the matrices, at and between the
+    /// modes.
     fn check_response(
         &self,
         omega: &[f64],
@@ -116,14 +120,14 @@ fn check(M: &DMatrix<f64>, D: &DMatrix<f64>, K: &DMatrix<f64>, J: &Matrix3xX<f64
     Ok(())
 }
 
-/// Frequencies (rad/s) and mass-normalised shapes of the symmetric part.
+/// Frequencies (rad/s) and mass-normalised mode shapes, with the symmetric part of the stiffness.
 fn undamped(M: &DMatrix<f64>, K: &DMatrix<f64>) -> Result<(Vec<f64>, DMatrix<f64>), ChatterError> {
     let mass = Cholesky::new((M + M.transpose()) * 0.5);
     let mass = mass.ok_or(ChatterError::NotPositiveDefinite { what: "mass matrix" })?;
     let stiffness = Cholesky::new((K + K.transpose()) * 0.5);
     let stiffness = stiffness.ok_or(ChatterError::NotPositiveDefinite { what: "stiffness matrix" })?;
-    // Eigenvalues 1/ω² of L^-1 M L^-T with K = L Lᵀ: the low modes, which move the tip most, are
-    // the largest.
+    // Eigenvalues 1/ω² of L^-1 M L^-T with K = L Lᵀ: the low modes, which move the tip most, have
+    // the largest ones.
     let singular = || ChatterError::NotPositiveDefinite { what: "stiffness matrix" };
     let (L, half) = (stiffness.l(), mass.l());
     let X = L.solve_lower_triangular(&half).ok_or_else(singular)?;
@@ -139,10 +143,11 @@ fn undamped(M: &DMatrix<f64>, K: &DMatrix<f64>) -> Result<(Vec<f64>, DMatrix<f64
     Ok((eigen.eigenvalues.iter().map(|x| 1.0 / x.sqrt()).collect(), Phi))
 }
 
-/// Eigenvalues, and in columns their vectors.
+/// Eigenvalues, and eigenvectors as columns.
 type Eigenvectors = (Vec<Complex<f64>>, DMatrix<Complex<f64>>);
 
-/// All eigenvalues and, in columns, eigenvectors of a real matrix, by its complex Schur form.
+/// Computes all eigenvalues of a real matrix, and its eigenvectors as columns, from its complex
+/// Schur form.
 fn eigenvectors(A: &DMatrix<f64>) -> Result<Eigenvectors, ChatterError> {
     let n = A.nrows();
     let complex = A.map(|x| Complex::new(x, 0.0));
@@ -155,7 +160,7 @@ fn eigenvectors(A: &DMatrix<f64>) -> Result<Eigenvectors, ChatterError> {
         for i in (0..k).rev() {
             let sum: Complex<f64> = (i + 1..=k).map(|j| T[(i, j)] * Y[(j, k)]).sum();
             let gap = T[(i, i)] - T[(k, k)];
-            // Equal eigenvalues without coupling have any vector of their common space.
+            // For equal uncoupled eigenvalues any vector of their eigenspace is valid.
             let gap = if gap.norm() < least { Complex::new(least, 0.0) } else { gap };
             Y[(i, k)] = -sum / gap;
         }
@@ -168,8 +173,8 @@ fn eigenvectors(A: &DMatrix<f64>) -> Result<Eigenvectors, ChatterError> {
     Ok(((0..n).map(|k| T[(k, k)]).collect(), right))
 }
 
-/// The product `o lᵀ` of a real pole is real; so are then its factors, but for a phase that they
-/// share.
+/// Makes the factors of a real pole real. Their product `o lᵀ` is real, so that they are real up to
+/// opposite phases.
 fn real_residue(pole: &mut Pole) {
     let largest = pole.input.iter().copied().max_by(|a, b| a.norm_sqr().total_cmp(&b.norm_sqr())).unwrap_or_default();
     if largest.norm() > 0.0 {
@@ -179,7 +184,7 @@ fn real_residue(pole: &mut Pole) {
     }
 }
 
-/// `J (K + i ω D - ω² M)^-1 Jᵀ`.
+/// Computes the frequency response `J (K + i ω D - ω² M)^-1 Jᵀ`.
 fn response(
     M: &DMatrix<f64>,
     D: &DMatrix<f64>,

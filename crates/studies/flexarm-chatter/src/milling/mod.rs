@@ -1,11 +1,11 @@
-//! Stability of milling with a structure that yields.
+//! Stability of milling with a flexible structure.
 //!
-//! A tooth cuts what the last one left. Where the structure swings between them, the chip is
-//! thicker or thinner, the force follows, and above a depth of cut the swing grows: chatter.
-//! [`Structure`] says how the tool's tip yields, [`Cutter`] what cuts; [`limit_of_depth`] finds the
-//! depth at a spindle speed from the Floquet multipliers of a tooth period, [`zero_order_limit`]
-//! from the mean force alone [Altintas & Budak 1995], and [`simulate`] cuts step by step, with
-//! teeth that leave the work.
+//! A tooth cuts the surface left by the previous one. Where the structure vibrates between them,
+//! the chip thickness varies, the force follows, and above a certain depth of cut the vibration
+//! grows: chatter. [`Structure`] describes the compliance at the tool's tip, [`Cutter`] the teeth.
+//! At a spindle speed, [`limit_of_depth`] computes the limit of depth from the Floquet multipliers
+//! of a tooth period, [`zero_order_limit`] from the mean force [Altintas & Budak 1995], and
+//! [`simulate`] integrates a cut in time, with loss of contact.
 //!
 //! ```
 //! use flexarm_chatter::milling::{Coefficients, Cutter, Engagement, LimitOptions, Mode, Structure, limit_of_depth};
@@ -21,7 +21,7 @@
 //! # Ok::<(), flexarm_chatter::milling::ChatterError>(())
 //! ```
 //!
-//! Not here: robots, poses, tools by name, files and units (the facade).
+//! Not here: robots, poses, tools by name, files and units (the crate root).
 #![allow(non_snake_case, reason = "letters of the equations: M, D, K, G, H; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests"))]
 

@@ -1,34 +1,35 @@
-//! What a force between nodes does to a pole, in closed form or by quadrature to rounding.
+//! Response of a pole to a force interpolated between nodes, in closed form or by quadrature to
+//! rounding.
 //!
 //! ```text
 //! I_j(c) = ∫_0^c e^{z (c - σ)} ℓ_j(σ) dσ
 //! ```
-//! with the Lagrange polynomials ℓ_j of the Gauss nodes of (0, 1). Small `z` by Gauss quadrature;
-//! for large ones by parts, which is a finite sum as ℓ_j is a polynomial.
+//! with the Lagrange polynomials ℓ_j of the Gauss nodes of (0, 1). For small `z` by Gauss
+//! quadrature; for large `z` by integration by parts, a finite sum because ℓ_j is a polynomial.
 
 use std::sync::LazyLock;
 
 use nalgebra::{Complex, SMatrix, SVector};
 
-/// Nodes of an element.
+/// Number of nodes of an element.
 pub(crate) const NODES: usize = 6;
-/// Points of the quadrature.
+/// Number of quadrature points.
 const POINTS: usize = 14;
-/// Up to here the quadrature is exact to rounding, beyond the sum by parts is.
+/// Magnitude of `z` up to which the quadrature is exact to rounding; above, the sum by parts is.
 const SMALL: f64 = 7.0;
 
-/// The nodes and what depends on them alone. Targets are the nodes and, last, the end of the
+/// Nodes, and the data that depend only on them. Targets are the nodes and, last, the end of the
 /// element.
 pub(crate) struct Rule {
-    /// Gauss nodes within (0, 1).
+    /// Gauss nodes in (0, 1).
     pub(crate) nodes: [f64; NODES],
-    /// Their weights.
+    /// Weights of the nodes.
     pub(crate) weights: [f64; NODES],
-    /// `1 - x_q` of the quadrature on (0, 1).
+    /// `1 - x_q` at the quadrature points on (0, 1).
     backward: [f64; POINTS],
-    /// Weight times ℓ_j at a point of the quadrature on (0, c): by target, point and node.
+    /// Weight times ℓ_j at a quadrature point on (0, c), by target, point and node.
     table: Vec<[[f64; NODES]; POINTS]>,
-    /// Derivatives of ℓ_j at 0: by order and node; and at the targets.
+    /// Derivatives of ℓ_j, by order and node: at 0, and at the targets.
     at_start: [[f64; NODES]; NODES],
     at_target: Vec<[[f64; NODES]; NODES]>,
 }
@@ -63,8 +64,8 @@ impl Rule {
         }
     }
 
-    /// All moments for `z`, the pole times the length of the element, with lengths in units of the
-    /// element.
+    /// Computes all moments for `z`, the pole times the length of the element; lengths are relative
+    /// to that of the element.
     pub(crate) fn moments(&self, z: Complex<f64>) -> Moments {
         let targets: [f64; NODES + 1] = std::array::from_fn(|i| *self.nodes.get(i).unwrap_or(&1.0));
         let decay = targets.map(|c| (z * c).exp());
@@ -100,14 +101,14 @@ impl Rule {
     }
 }
 
-/// Gauss-Legendre nodes and weights on (0, 1).
+/// Computes Gauss-Legendre nodes and weights on (0, 1).
 fn gauss<const N: usize>() -> ([f64; N], [f64; N]) {
     let (mut nodes, mut weights) = ([0.0; N], [0.0; N]);
     for k in 0..N {
         let mut x = -(std::f64::consts::PI * (k as f64 + 0.75) / (N as f64 + 0.5)).cos();
         let mut slope = 1.0;
         for _ in 0..50 {
-            // P_N and its derivative by the recurrence of three terms.
+            // P_N and its derivative by the three-term recurrence.
             let (mut before, mut value) = (1.0, x);
             for n in 2..=N {
                 let n = n as f64;
@@ -125,11 +126,11 @@ fn gauss<const N: usize>() -> ([f64; N], [f64; N]) {
     (nodes, weights)
 }
 
-/// Monomial coefficients of ℓ_j in column j.
+/// Computes the monomial coefficients of ℓ_j in column j.
 fn lagrange_coefficients(nodes: &[f64; NODES]) -> SMatrix<f64, NODES, NODES> {
     let mut coefficients = SMatrix::<f64, NODES, NODES>::zeros();
     for j in 0..NODES {
-        // Multiply out Π (x - x_k) / (x_j - x_k).
+        // Multiplies out Π (x - x_k) / (x_j - x_k).
         let mut polynomial = SVector::<f64, NODES>::zeros();
         polynomial[0] = 1.0;
         for k in (0..NODES).filter(|k| *k != j) {
@@ -144,7 +145,7 @@ fn lagrange_coefficients(nodes: &[f64; NODES]) -> SMatrix<f64, NODES, NODES> {
     coefficients
 }
 
-/// Derivative of ℓ_j at x.
+/// Evaluates a derivative of ℓ_j at x.
 fn derivative(coefficients: &SMatrix<f64, NODES, NODES>, j: usize, order: usize, x: f64) -> f64 {
     let mut sum = 0.0;
     for n in (order..NODES).rev() {
@@ -158,8 +159,8 @@ fn derivative(coefficients: &SMatrix<f64, NODES, NODES>, j: usize, order: usize,
 mod tests {
     use super::*;
 
-    /// Truth: for ℓ summed over all nodes (which is 1) the integral is (e^{z c} - 1) / z; weighted
-    /// with x_j, ∫ e^{z(c-σ)} σ dσ.
+    /// Truth: the sum of ℓ_j over all nodes is 1, with the integral (e^{z c} - 1) / z; weighted
+    /// with x_j it is σ, with ∫ e^{z(c-σ)} σ dσ.
     #[test]
     fn moments_of_one_and_of_the_first_power_are_those_of_the_closed_form() {
         let mut worst: f64 = 0.0;
@@ -184,7 +185,7 @@ mod tests {
         assert!(worst < 1e-11, "{worst:e}");
     }
 
-    /// Truth: the two ways to the same integral, where both are good.
+    /// Truth: both methods for the same integral, where both are accurate.
     #[test]
     fn quadrature_and_parts_meet() {
         let z = Complex::from_polar(SMALL, 1.8);

@@ -1,17 +1,18 @@
-//! One tooth period as a linear map: the state of the structure and what the last tooth left, to
-//! the same a period later.
+//! Linear map over one tooth period: from the state of the structure and the chips of the last
+//! tooth to those one period later.
 //!
 //! ```text
 //! z' = Λ z + l F(t)      F = -Σ_k P_k(t) (w_k(t) - w_k(t - T))      w_k = N_k(t)ᵀ u(t)
 //! ```
-//! The period is cut where teeth enter or leave. While none cuts the structure moves freely,
-//! without error. The rest is divided into elements: within one the force is the polynomial through
-//! its values at the Gauss nodes, and the poles answer it exactly. The unknowns are the chip
-//! thicknesses at the nodes, so that their number depends on how long and how fast something cuts,
-//! not on the structure.
+//! The period is divided where teeth enter or leave the cut. While no tooth cuts, the free motion
+//! of the structure is exact. The rest is divided into elements: in each the force is the
+//! polynomial through its values at the Gauss nodes, and the response of the poles to it is exact.
+//! The unknowns are the chip thicknesses at the nodes, so that their number depends on the duration
+//! and frequency of the cutting motion, not on the structure.
 //!
-//! In the order of the error this is a semi-discretisation [Insperger & Stépán 2004] of all of the
-//! force, a full one [Ding 2010], with elements of sixth order in place of steps of the first.
+//! In terms of its error this is a semi-discretisation [Insperger & Stépán 2004] of the whole
+//! force, that is, a full discretisation [Ding 2010], with elements of sixth order in place of
+//! steps of first order.
 
 use nalgebra::{Complex, DMatrix, Matrix3, Vector3};
 
@@ -19,25 +20,25 @@ use crate::milling::cutter::{Cutter, Regeneration};
 use crate::milling::moments::{Moments, NODES, RULE};
 use crate::milling::structure::Structure;
 
-/// A tooth period with its division.
+/// Division of a tooth period.
 pub(crate) struct Period<'a> {
     structure: &'a Structure,
     cutter: &'a Cutter,
-    /// Spindle speed, rad/s.
+    /// Spindle speed (rad/s).
     spindle: f64,
-    /// Longest element, s.
+    /// Maximum length of an element (s).
     longest: f64,
-    /// Where the division does not depend on the depth: made once.
+    /// Stretches computed once, if they do not depend on the depth.
     straight: Option<Vec<Stretch>>,
 }
 
-/// Elements of equal length, or free motion.
+/// Interval of free motion, or of cutting with elements of equal length.
 struct Stretch {
-    /// Cutter angle where it starts, rad.
+    /// Cutter angle at its start (rad).
     start: f64,
-    /// Length of an element, s.
+    /// Length of an element (s).
     length: f64,
-    /// How many; without cutting one.
+    /// Number of elements; one for free motion.
     elements: usize,
     motion: Motion,
 }
@@ -47,25 +48,25 @@ enum Motion {
     Cutting(Box<Answers>),
 }
 
-/// How the structure answers within an element.
+/// Response of the structure within an element.
 struct Answers {
     /// `e^{λ h}`, by pole.
     decay: Vec<Complex<f64>>,
-    /// Displacement at a node per state at the start, 3×nz.
+    /// Displacement at each node per initial state, 3×nz.
     to_nodes: Vec<DMatrix<f64>>,
-    /// Displacement at node i per force at node j, m/N.
+    /// Displacement at node i per force at node j (m/N).
     gains: Vec<[Matrix3<f64>; NODES]>,
     /// State at the end per force at node j, nz×3.
     to_end: Vec<DMatrix<f64>>,
 }
 
-/// Where something is cut, for what is read from an eigenvector.
+/// Node with chips, for evaluating an eigenvector.
 pub(crate) struct CutNode {
-    /// Time since the start of the period, s.
+    /// Time from the start of the period (s).
     pub(crate) time: f64,
-    /// Weight of its time in an integral over the period, s.
+    /// Weight of the node in an integral over the period (s).
     pub(crate) weight: f64,
-    /// Where its chips start among the unknowns, and what they do.
+    /// Index of its first chip among the unknowns, and the force law of the chips.
     pub(crate) first: usize,
     pub(crate) regeneration: Regeneration,
 }
@@ -79,7 +80,7 @@ impl<'a> Period<'a> {
         period
     }
 
-    /// Calls with the stretches for a depth.
+    /// Calls a function with the stretches for a depth.
     fn with_stretches<T>(&self, depth: f64, run: impl FnOnce(&[Stretch]) -> T) -> T {
         match &self.straight {
             Some(stretches) => run(stretches),
@@ -115,6 +116,7 @@ impl<'a> Period<'a> {
             let Moments { decay, integrals } = RULE.moments(pole.value * h);
             let (reading, pair) = (pole.reading(), pole.n_states() == 2);
             for i in 0..NODES {
+                // A complex state is two real states, its real and imaginary part.
                 let shown = reading * decay[i];
                 answers.to_nodes[i].set_column(row, &shown.map(|x| x.re));
                 if pair {
@@ -135,8 +137,8 @@ impl<'a> Period<'a> {
         answers
     }
 
-    /// A depth below which the mean force makes nothing chatter, at any speed:
-    /// `|b (1 - e^{-i ω T})| = 1/|λ|` with an eigenvalue of `G H`.
+    /// Returns a depth below which the mean force causes no chatter at any speed:
+    /// `|b (1 - e^{-i ω T})| = 1/|λ|` with an eigenvalue λ of `G H`.
     pub(crate) fn zero_order_bound(&self) -> f64 {
         let H = self.cutter.mean_force_matrix().map(|x| Complex::new(x, 0.0));
         let size = |w: &f64| (self.structure.frequency_response(*w) * H).norm();
@@ -144,7 +146,7 @@ impl<'a> Period<'a> {
         0.5 / largest.max(f64::MIN_POSITIVE)
     }
 
-    /// Size of the map.
+    /// Returns the size of the map.
     pub(crate) fn unknowns(&self, depth: f64) -> usize {
         let chips = self.with_stretches(depth, |stretches| {
             let cutting = |s: &&Stretch| matches!(s.motion, Motion::Cutting(_));
@@ -157,7 +159,7 @@ impl<'a> Period<'a> {
         self.structure.n_states() + chips
     }
 
-    /// The map over one period at a depth.
+    /// Computes the map over one period at a depth.
     pub(crate) fn at(&self, depth: f64) -> PeriodMap {
         self.with_stretches(depth, |stretches| {
             let mut first = self.structure.n_states();
@@ -179,7 +181,7 @@ impl<'a> Period<'a> {
         })
     }
 
-    /// What cuts at the nodes, by stretch and element.
+    /// Returns the force laws at the nodes, by stretch and element.
     fn regenerations(&self, stretches: &[Stretch], depth: f64) -> Vec<Vec<Vec<Regeneration>>> {
         let at = |s: &Stretch, e: usize, x: f64| {
             self.cutter.regeneration(s.start + (e as f64 + x) * s.length * self.spindle, depth)
@@ -192,8 +194,8 @@ impl<'a> Period<'a> {
         stretches.iter().map(all).collect()
     }
 
-    /// One element: its chips from the state at its start and the chips of the last tooth, then the
-    /// state at its end.
+    /// Computes the matrices of one element: its chips from the initial state and the chips of the
+    /// last tooth, then the state at its end.
     fn element(&self, answers: &Answers, nodes: &[Regeneration], first: usize, decay: &[Rotation]) -> Element {
         let nz = self.structure.n_states();
         let pairs: Vec<(usize, Vector3<f64>, Vector3<f64>)> = nodes
@@ -222,13 +224,13 @@ impl<'a> Period<'a> {
         Element { first, decay: decay.to_vec(), chips: S, old: Z, to_end }
     }
 
-    /// Free motion of the states with `e^{λ h}`.
+    /// Returns the free motion of the states for the factors `e^{λ h}`.
     fn rotations(&self, decay: &[Complex<f64>]) -> Vec<Rotation> {
         let poles = self.structure.poles().iter().zip(decay);
         poles.map(|(pole, e)| Rotation { pair: pole.n_states() == 2, by: *e }).collect()
     }
 
-    /// The nodes at which something is cut, in the order of the unknowns.
+    /// Returns the nodes with chips, in the order of the unknowns.
     pub(crate) fn cut_nodes(&self, depth: f64) -> Vec<CutNode> {
         self.with_stretches(depth, |stretches| {
             let mut nodes = Vec::new();
@@ -255,16 +257,16 @@ struct Rotation {
     by: Complex<f64>,
 }
 
-/// An element at a depth.
+/// Matrices of an element at a depth.
 struct Element {
-    /// Where its chips start among the unknowns.
+    /// Index of its first chip among the unknowns.
     first: usize,
     decay: Vec<Rotation>,
-    /// Chips per state at the start, n×nz.
+    /// Chips per initial state, n×nz.
     chips: DMatrix<f64>,
     /// Chips per chip of the last tooth, n×n.
     old: DMatrix<f64>,
-    /// State at the end per change of the chips, its sign turned, nz×n.
+    /// Negative derivative of the final state with respect to the change of the chips, nz×n.
     to_end: DMatrix<f64>,
 }
 
@@ -273,7 +275,7 @@ enum Piece {
     Cutting(Element),
 }
 
-/// States and chips of the last tooth to the same a period later.
+/// Map from states and chips of the last tooth to those one period later.
 pub(crate) struct PeriodMap {
     n_states: usize,
     size: usize,
@@ -281,17 +283,17 @@ pub(crate) struct PeriodMap {
 }
 
 impl PeriodMap {
-    /// Number of states of the structure.
+    /// Returns the number of states of the structure.
     pub(crate) fn n_states(&self) -> usize {
         self.n_states
     }
 
-    /// Number of states and chips.
+    /// Returns the number of states and chips.
     pub(crate) fn size(&self) -> usize {
         self.size
     }
 
-    /// The images of vectors, column by column.
+    /// Applies the map to vectors, column by column.
     pub(crate) fn apply(&self, from: &DMatrix<f64>, to: &mut DMatrix<f64>) {
         let mut state = from.rows(0, self.n_states).into_owned();
         for piece in &self.pieces {
@@ -303,7 +305,7 @@ impl PeriodMap {
                     let mut chips = &element.chips * &state;
                     chips.gemm(1.0, &element.old, &old, 1.0);
                     to.rows_mut(element.first, n).copy_from(&chips);
-                    // The force goes with the change from tooth to tooth.
+                    // The force is proportional to the change from tooth to tooth.
                     chips -= old;
                     rotate(&mut state, &element.decay);
                     state.gemm(-1.0, &element.to_end, &chips, 1.0);
@@ -313,7 +315,7 @@ impl PeriodMap {
         to.rows_mut(0, self.n_states).copy_from(&state);
     }
 
-    /// As a matrix.
+    /// Returns the map as a matrix.
     pub(crate) fn matrix(&self) -> DMatrix<f64> {
         let mut map = DMatrix::zeros(self.size, self.size);
         self.apply(&DMatrix::identity(self.size, self.size), &mut map);

@@ -1,11 +1,12 @@
-//! Cutting step by step: teeth that leave the work where the tool swings out of it, and meet what
-//! earlier ones left.
+//! Simulation of a cut in time: teeth lose contact where the tool moves out of the workpiece, and
+//! cut the surface left by earlier teeth.
 //!
-//! Each angle of a tooth has the deepest cut that was made there. The chip is what goes beyond it;
-//! without one there is no force. The edge is cut into slices along the tool, each with angles of
-//! its own, so that a helix needs no interpolation. The structure moves exactly under a force that
-//! is linear within a step, the force at its end found by corrections. [`simulate`] does both; who
-//! steps a structure in another way takes [`RegenerativeCut`] alone.
+//! For each angle of a tooth the deepest earlier cut is stored. The chip is the excess over it;
+//! without a chip there is no force. The edge is divided into slices along the tool, each with
+//! angles of its own, so that a helix needs no interpolation. The motion of the structure is exact
+//! for a force that is linear within a step; the force at the end of a step is found by fixed-point
+//! iteration. [`simulate`] does both; other time integrators can use [`RegenerativeCut`] on its
+//! own.
 
 use std::f64::consts::TAU;
 
@@ -15,43 +16,43 @@ use crate::milling::cutter::Cutter;
 use crate::milling::error::ChatterError;
 use crate::milling::structure::Structure;
 
-/// Most slices of a helical edge; each lags by at most one step.
+/// Maximum number of slices of a helical edge; if fewer suffice, each lags by at most one step.
 const MOST_SLICES: usize = 200;
-/// Corrections of the force at the end of a step.
+/// Number of fixed-point iterations for the force at the end of a step.
 const CORRECTIONS: usize = 3;
 
-/// A cut.
+/// Parameters of a cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cut {
-    /// Spindle speed, rad/s.
+    /// Spindle speed (rad/s).
     pub spindle: f64,
-    /// Depth along the tool, m.
+    /// Depth of cut along the tool (m).
     pub depth: f64,
-    /// Feed per tooth, m.
+    /// Feed per tooth (m).
     pub feed: f64,
-    /// Steps per tooth period.
+    /// Number of steps per tooth period.
     pub steps: usize,
-    /// How many tooth periods.
+    /// Number of tooth periods.
     pub teeth: usize,
 }
 
-/// What happened, one entry per step.
+/// Result of a simulation, one entry per step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Simulated {
-    /// Time, s.
+    /// Time (s).
     pub time: Vec<f64>,
-    /// Displacement of the tip, m.
+    /// Displacement of the tip (m).
     pub displacement: Vec<Vector3<f64>>,
-    /// Force on the tool, N.
+    /// Force on the tool (N).
     pub force: Vec<Vector3<f64>>,
-    /// Thickest chip, m; 0 where nothing is cut.
+    /// Maximum chip thickness (m); 0 without contact.
     pub chip: Vec<f64>,
 }
 
-/// Cuts from rest.
+/// Simulates a cut from rest.
 ///
 /// # Errors
-/// [`ChatterError::Value`] for numbers that make no sense.
+/// [`ChatterError::Value`] for invalid parameters.
 pub fn simulate(structure: &Structure, cutter: &Cutter, cut: &Cut) -> Result<Simulated, ChatterError> {
     let mut work = RegenerativeCut::new(cutter, cut)?;
     let h = work.step_s();
@@ -77,9 +78,9 @@ pub fn simulate(structure: &Structure, cutter: &Cutter, cut: &Cut) -> Result<Sim
 }
 
 impl Simulated {
-    /// How much the motion differs from tooth to tooth: standard deviation of the displacement at
-    /// one moment of each period about its mean, the largest over the moments and directions, m.
-    /// Over the last `teeth` periods.
+    /// Returns the scatter of the motion from tooth to tooth over the last `teeth` periods (m):
+    /// standard deviation of the displacement at one instant of each period about its mean, maximum
+    /// over instants and directions.
     pub fn scatter(&self, steps: usize, teeth: usize) -> f64 {
         let from = self.displacement.len().saturating_sub(steps * teeth);
         let mut largest: f64 = 0.0;
@@ -114,24 +115,24 @@ fn check(cutter: &Cutter, cut: &Cut) -> Result<(), ChatterError> {
 struct Step {
     /// `e^{λ h}`.
     decay: Complex<f64>,
-    /// Displacement per state.
+    /// Displacement per unit state.
     reading: Vector3<Complex<f64>>,
-    /// State per force at the start and at the end.
+    /// State per force at the start and at the end of the step.
     start: Vector3<Complex<f64>>,
     end: Vector3<Complex<f64>>,
 }
 
-/// The structure, exactly under a force that is linear within a step.
+/// Time integration of the structure, exact for a force that is linear within a step.
 #[derive(Clone, Debug)]
 pub struct ForcedMotion {
     poles: Vec<Step>,
     state: Vec<Complex<f64>>,
-    /// Displacement at the end of a step per force there.
+    /// Displacement at the end of a step per force there (m/N).
     end_gain: Matrix3<f64>,
 }
 
 impl ForcedMotion {
-    /// At rest; steps of `h` (s).
+    /// Returns the structure at rest, for steps of `h` (s).
     pub fn new(structure: &Structure, h: f64) -> Self {
         let mut motion = Self { poles: Vec::new(), state: Vec::new(), end_gain: Matrix3::zeros() };
         for pole in structure.poles() {
@@ -144,15 +145,15 @@ impl ForcedMotion {
         motion
     }
 
-    /// Displacement at the end of a step, m, under the force at its start (N) that goes to none at
-    /// its end.
+    /// Returns the displacement at the end of a step (m) under a force that decreases from the
+    /// given value (N) to zero.
     pub fn predicted(&self, force: &Vector3<f64>) -> Vector3<f64> {
         let force = force.map(|x| Complex::new(x, 0.0));
         let parts = self.poles.iter().zip(&self.state);
         parts.map(|(p, z)| (p.reading * (p.decay * z + p.start.dot(&force))).map(|x| x.re)).sum()
     }
 
-    /// One step under a force (N) from one value to another.
+    /// Advances one step under a force (N) that changes linearly between two values.
     pub fn advance(&mut self, from: &Vector3<f64>, to: &Vector3<f64>) {
         let (from, to) = (from.map(|x| Complex::new(x, 0.0)), to.map(|x| Complex::new(x, 0.0)));
         for (p, z) in self.poles.iter().zip(&mut self.state) {
@@ -160,21 +161,21 @@ impl ForcedMotion {
         }
     }
 
-    /// Displacement per force at the end of a step, m/N.
+    /// Returns the displacement per force at the end of a step (m/N).
     pub fn end_gain(&self) -> Matrix3<f64> {
         self.end_gain
     }
 
-    /// Of the tip, m.
+    /// Returns the displacement of the tip (m).
     pub fn displacement(&self) -> Vector3<f64> {
         self.poles.iter().zip(&self.state).map(|(p, z)| (p.reading * *z).map(|x| x.re)).sum()
     }
 }
 
-/// `∫_0^1 e^{z (1 - s)} ds` and `∫_0^1 e^{z (1 - s)} s ds`.
+/// Computes `∫_0^1 e^{z (1 - s)} ds` and `∫_0^1 e^{z (1 - s)} s ds`.
 fn ramps(z: Complex<f64>) -> (Complex<f64>, Complex<f64>) {
     if z.norm() < 0.5 {
-        // 1/1! + z/2! + ..., 1/2! + z/3! + ...
+        // Power series: 1/1! + z/2! + ..., 1/2! + z/3! + ...
         let (mut whole, mut ramp) = (Complex::new(0.0, 0.0), Complex::new(0.0, 0.0));
         let mut term = Complex::new(1.0, 0.0);
         for k in 1..20 {
@@ -195,16 +196,16 @@ pub struct RegenerativeCut {
     cutter: Cutter,
     cut: Cut,
     slices: usize,
-    /// Farthest that the edge has been at an angle, along the thickness, m: by slice, then step of
-    /// the turn.
+    /// Maximum position of the edge along the thickness at each angle (m), by slice and step of the
+    /// turn.
     surface: Vec<Vec<f64>>,
 }
 
 impl RegenerativeCut {
-    /// Just before a cut, the surface as rigid teeth leave it.
+    /// Returns the state just before a cut, with the surface that rigid teeth leave.
     ///
     /// # Errors
-    /// [`ChatterError::Value`] for numbers that make no sense.
+    /// [`ChatterError::Value`] for invalid parameters.
     pub fn new(cutter: &Cutter, cut: &Cut) -> Result<Self, ChatterError> {
         check(cutter, cut)?;
         let per_turn = cut.steps * cutter.teeth;
@@ -213,7 +214,7 @@ impl RegenerativeCut {
         let mut work = Self { cutter: *cutter, cut: *cut, slices, surface: Vec::new() };
         for slice in 0..slices {
             let before = |station: usize| {
-                // The step, counted back from the start, at which a tooth was last at this station.
+                // Number of steps since a tooth last passed this station.
                 let steps = (cut.steps - station % cut.steps) as f64;
                 -cutter.thickness(work.angle(station, 0, slice)).x * cut.feed * steps / cut.steps as f64
             };
@@ -223,20 +224,21 @@ impl RegenerativeCut {
         Ok(work)
     }
 
-    /// Length of a step, s.
+    /// Returns the step size (s).
     pub fn step_s(&self) -> f64 {
         self.cutter.tooth_period(self.cut.spindle) / self.cut.steps as f64
     }
 
-    /// Angle of a tooth at a step of the turn.
+    /// Returns the angle of a tooth at a step of the turn (rad).
     fn angle(&self, step: usize, tooth: usize, slice: usize) -> f64 {
         let per_turn = (self.cut.steps * self.cutter.teeth) as f64;
         let height = (slice as f64 + 0.5) / self.slices as f64 * self.cut.depth;
-        // Half a step off, so that entry and exit fall between steps.
+        // Offset by half a step, so that entry and exit are between steps.
         TAU * ((step as f64 + 0.5) / per_turn + tooth as f64 / self.cutter.teeth as f64) - self.cutter.lag() * height
     }
 
-    /// Place of the edge along the thickness, and the chip, of each tooth and slice in the cut.
+    /// Visits each engaged tooth and slice with the position of its edge along the thickness, and
+    /// its chip.
     fn each(&self, step: usize, u: &Vector3<f64>, mut visit: impl FnMut(usize, usize, f64, f64, f64)) {
         let per_turn = self.cut.steps * self.cutter.teeth;
         let travel = self.cut.feed * step as f64 / self.cut.steps as f64;
@@ -253,8 +255,8 @@ impl RegenerativeCut {
         }
     }
 
-    /// Force on the tool (N) at the end of a step with the tip displaced by `u` (m), axes of the
-    /// cut.
+    /// Returns the force on the tool (N) at the end of a step for a displacement `u` of the tip
+    /// (m), axes of the cut.
     pub fn force(&self, step: usize, u: &Vector3<f64>) -> Vector3<f64> {
         let mut force = Vector3::zeros();
         let width = self.cut.depth / self.slices as f64;
@@ -262,7 +264,7 @@ impl RegenerativeCut {
         force
     }
 
-    /// Takes the chips of a step away; the thickest of them, m.
+    /// Removes the chips of a step, and returns the maximum thickness (m).
     pub fn leave(&mut self, step: usize, u: &Vector3<f64>) -> f64 {
         let (mut cuts, mut thickest) = (Vec::new(), 0.0_f64);
         self.each(step, u, |slice, station, _, reach, chip| {

@@ -1,51 +1,51 @@
-//! What yields: the motion of the tool's tip under a force on it, as a sum of poles.
+//! Linear structure: motion of the tool's tip under a force on it, as a sum of poles.
 //!
 //! ```text
 //! z_r' = λ_r z_r + l_rᵀ F        u = Σ 2 Re(o_r z_r)  (pairs)  + Σ o_r z_r  (real poles)
 //! ```
-//! Any linear structure without repeated defective poles is of this form: modes with damping
-//! ratios, or `M`, `D`, `K` with any damping ([`crate::milling::poles_of_matrices`]). Structures in
-//! series, such as a tool on a flange, are the poles of both.
+//! Any linear structure without defective poles has this form: modes with damping ratios, or `M`,
+//! `D`, `K` with any damping ([`Structure::from_matrices`]). Structures in series, such as a tool
+//! on a flange, have the poles of both.
 
 use nalgebra::{Complex, Matrix3, Vector3};
 
 use crate::milling::error::ChatterError;
 
-/// An eigenvalue of the structure with what excites it and what it moves. One above the real axis
-/// stands for a conjugate pair.
+/// Eigenvalue of the structure with its input and output vectors. A pole above the real axis
+/// represents a conjugate pair.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pole {
-    /// `λ`, 1/s, negative real part, not below the real axis.
+    /// `λ` (1/s), with negative real part and non-negative imaginary part.
     pub value: Complex<f64>,
     /// `l`, per newton along x, y, z.
     pub input: Vector3<Complex<f64>>,
-    /// `o`, metres along x, y, z; only products `o lᵀ` mean something.
+    /// `o` (m) along x, y, z; only the products `o lᵀ` are determined.
     pub output: Vector3<Complex<f64>>,
 }
 
-/// A real mode: `q'' + 2 ζ ω q' + ω² q = φᵀ F`, `u = φ q`.
+/// Real mode: `q'' + 2 ζ ω q' + ω² q = φᵀ F`, `u = φ q`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mode {
-    /// `ω` without damping, rad/s.
+    /// Undamped natural frequency `ω` (rad/s).
     pub angular_frequency: f64,
-    /// `ζ`, above 0; 1 and more do not oscillate.
+    /// Damping ratio `ζ`, above 0; modes with 1 or more do not oscillate.
     pub damping_ratio: f64,
-    /// `φ` at the tip along x, y, z, mass-normalised, kg^-1/2.
+    /// Mode shape `φ` at the tip along x, y, z, mass-normalised (kg^-1/2).
     pub shape: Vector3<f64>,
 }
 
-/// Linear structure as the cutter feels it: poles, displacements in m, forces in N.
+/// Linear structure at the cutter: poles, displacements in m, forces in N.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Structure {
     poles: Vec<Pole>,
 }
 
-/// Two equal real poles have no such form; they are moved apart by this part of themselves, which
-/// the square of it changes.
+/// Relative separation of two equal real poles, for which the form does not exist. The response
+/// changes by the square of it.
 const APART: f64 = 1e-6;
 
 impl Structure {
-    /// From its poles.
+    /// Returns a structure with given poles.
     ///
     /// # Errors
     /// [`ChatterError::NotFinite`]; [`ChatterError::Undamped`] for a pole that does not decay,
@@ -64,7 +64,7 @@ impl Structure {
         Ok(Self { poles })
     }
 
-    /// From real modes.
+    /// Returns a structure with given real modes.
     ///
     /// # Errors
     /// As [`Structure::from_poles`].
@@ -76,7 +76,7 @@ impl Structure {
             if omega <= 0.0 {
                 return Err(ChatterError::Undamped { rad_per_s: omega, damping_ratio: zeta });
             }
-            // 1 / (s² + 2 ζ ω s + ω²) in partial fractions.
+            // Partial fractions of 1 / (s² + 2 ζ ω s + ω²).
             let root = Complex::new(zeta * zeta - 1.0, 0.0).sqrt() * omega;
             let pole = |value: Complex<f64>, other: Complex<f64>| Pole {
                 value,
@@ -92,15 +92,15 @@ impl Structure {
         Self::from_poles(poles)
     }
 
-    /// Both under the same force, their displacements added: a tool that yields on a flange that
-    /// does.
+    /// Returns both structures under the same force with their displacements added, such as a
+    /// flexible tool on a flexible flange.
     #[must_use]
     pub fn in_series(mut self, other: &Self) -> Self {
         self.poles.extend_from_slice(&other.poles);
         self
     }
 
-    /// The same in other axes, `u_new = R u`.
+    /// Returns the structure in other axes, `u_new = R u`.
     #[must_use]
     pub fn rotated(mut self, R: &Matrix3<f64>) -> Self {
         let R = R.map(|x| Complex::new(x, 0.0));
@@ -111,12 +111,12 @@ impl Structure {
         self
     }
 
-    /// All poles.
+    /// Returns all poles.
     pub fn poles(&self) -> &[Pole] {
         &self.poles
     }
 
-    /// Frequency response of the tip, `u = G(i ω) F`, m/N, 3×3.
+    /// Returns the frequency response of the tip, `u = G(i ω) F` (m/N), 3×3.
     pub fn frequency_response(&self, omega: f64) -> Matrix3<Complex<f64>> {
         let s = Complex::new(0.0, omega);
         let mut G = Matrix3::zeros();
@@ -129,7 +129,7 @@ impl Structure {
         G
     }
 
-    /// Number of real states: two per pair, one per real pole.
+    /// Returns the number of real states: two per pair, one per real pole.
     pub(crate) fn n_states(&self) -> usize {
         self.poles.iter().map(Pole::n_states).sum()
     }
@@ -140,12 +140,12 @@ impl Pole {
         if self.value.im > 0.0 { 2 } else { 1 }
     }
 
-    /// What its state contributes to the displacement, per unit of it.
+    /// Returns the displacement per unit of the pole's state; its real part counts.
     pub(crate) fn reading(&self) -> Vector3<Complex<f64>> {
         if self.value.im > 0.0 { self.output * Complex::new(2.0, 0.0) } else { self.output }
     }
 
-    /// Compliance at its resonance, m/N.
+    /// Returns the compliance at its resonance (m/N).
     pub(crate) fn peak(&self) -> f64 {
         self.output.norm() * self.input.norm() / self.value.re.abs()
     }

@@ -1,12 +1,12 @@
-//! The limit from the mean force of the teeth alone [Altintas & Budak 1995]: exact where the force
-//! is constant, good for slots and many teeth, blind to what teeth that come and go excite (period
-//! doubling at low immersion).
+//! Stability limit from the mean force of the teeth [Altintas & Budak 1995]: exact for constant
+//! forces, accurate for slots and many teeth, but without the parametric excitation by entering and
+//! leaving teeth (period doubling at low immersion).
 //!
 //! ```text
 //! det(1 + b (1 - e^{-i ω T}) G(i ω) H) = 0        H: mean force matrix
 //! ```
-//! With an eigenvalue λ of `G H`: `b (1 - e^{-i ω T}) = -1/λ`, whose phase gives ω and whose size
-//! b. It needs the frequency response alone, so a measured one will do.
+//! With an eigenvalue λ of `G H`: `b (1 - e^{-i ω T}) = -1/λ`; the phase of this equation gives ω,
+//! its magnitude b. Only the frequency response is needed, which may be a measured one.
 
 use std::f64::consts::TAU;
 
@@ -16,37 +16,37 @@ use crate::milling::cutter::Cutter;
 use crate::milling::error::ChatterError;
 use crate::milling::structure::Structure;
 
-/// Points per turn of `e^{i ω T}`.
+/// Number of points per turn of `e^{i ω T}`.
 const PER_TURN: f64 = 24.0;
-/// Bisections of a crossing.
+/// Number of bisections for a crossing.
 const BISECTIONS: usize = 50;
-/// Most points of a search.
+/// Maximum number of points of a search.
 const MOST_POINTS: usize = 100_000;
-/// Between two frequencies of the band the response is at most this many times that at the larger
+/// Assumed maximum ratio of the response between two frequencies of the band to that at the larger
 /// end.
 const BETWEEN: f64 = 4.0;
-/// An eigenvalue below this part of the product of norms is nothing.
+/// Ratio to the product of norms below which an eigenvalue counts as zero.
 const NOTHING: f64 = 1e-12;
 
-/// A limit of the zero-order solution.
+/// Limit of the zero-order solution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ZeroOrderLimit {
-    /// Depth, m.
+    /// Depth (m).
     pub depth: f64,
-    /// Frequency of the chatter, Hz.
+    /// Chatter frequency (Hz).
     pub chatter_hz: f64,
 }
 
-/// The smallest depth of the zero-order solution at a spindle speed (rad/s); none if no frequency
-/// of the band chatters up to the deepest cut (m).
+/// Computes the minimum depth of the zero-order solution at a spindle speed (rad/s); `None` if no
+/// frequency of the band chatters up to the maximum depth (m).
 ///
-/// * `response`: of the tip, m/N, at an angular frequency in rad/s.
-/// * `band`: angular frequencies (rad/s), ascending, fine enough for the resonances
-///   ([`Structure::frequencies`]); points are put between them as the tooth period asks.
+/// * `response`: frequency response of the tip (m/N) at an angular frequency in rad/s.
+/// * `band`: angular frequencies (rad/s), ascending, with sufficient resolution of the resonances
+///   ([`Structure::frequencies`]); points between them are added as the tooth period requires.
 ///
 /// # Errors
-/// [`ChatterError::Value`] for a cutter or a speed that makes no sense, [`ChatterError::TooSlow`]
-/// where a tooth period holds too many oscillations.
+/// [`ChatterError::Value`] for an invalid cutter or speed, [`ChatterError::TooSlow`] if a tooth
+/// period contains too many oscillations.
 pub fn zero_order_limit(
     response: &dyn Fn(f64) -> Matrix3<Complex<f64>>,
     cutter: &Cutter,
@@ -91,7 +91,7 @@ pub fn zero_order_limit(
     Ok(best.filter(|best| best.depth <= deepest))
 }
 
-/// `b` times the square of `1 - e^{-i ω T}`, real where there is a limit.
+/// Returns the depth `b` times `|1 - e^{-i ω T}|²` for an eigenvalue; real at a limit.
 fn product(w: f64, lambda: Complex<f64>, T: f64) -> Complex<f64> {
     let delay = Complex::new(1.0, 0.0) - Complex::cis(-w * T);
     -lambda.inv() * delay.conj()
@@ -122,11 +122,11 @@ fn crossing(
     }
     let size = (Complex::new(1.0, 0.0) - Complex::cis(-low.0 * T)).norm_sqr();
     let depth = product(low.0, low.1, T).re / size;
-    // A whole number of waves between teeth changes no chip.
+    // A whole number of waves between teeth does not modulate the chip.
     (depth > 0.0 && size > 1e-9).then_some(ZeroOrderLimit { depth, chatter_hz: low.0 / TAU })
 }
 
-/// Of a 3×3 matrix; those that are rounding are zero.
+/// Eigenvalues of a 3×3 matrix; those below rounding are set to zero.
 fn eigenvalues(A: &Matrix3<Complex<f64>>) -> [Complex<f64>; 3] {
     let size = A.norm();
     let zero = Complex::new(0.0, 0.0);
@@ -138,7 +138,7 @@ fn eigenvalues(A: &Matrix3<Complex<f64>>) -> [Complex<f64>; 3] {
     std::array::from_fn(|k| if T[(k, k)].norm() < NOTHING { zero } else { T[(k, k)] * size })
 }
 
-/// In the order in which they are nearest to the last ones.
+/// Sorts eigenvalues to be closest to the previous ones.
 fn matched(found: [Complex<f64>; 3], last: &[Complex<f64>; 3]) -> [Complex<f64>; 3] {
     const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
     let distance = |order: &[usize; 3]| -> f64 { (0..3).map(|k| (found[order[k]] - last[k]).norm()).sum() };
@@ -147,8 +147,8 @@ fn matched(found: [Complex<f64>; 3], last: &[Complex<f64>; 3]) -> [Complex<f64>;
 }
 
 impl Structure {
-    /// Angular frequencies (rad/s) at which the response is worth knowing: evenly by ratio, and
-    /// densely about each resonance.
+    /// Returns angular frequencies (rad/s) for evaluating the response: at equal ratios, and dense
+    /// around each resonance.
     pub fn frequencies(&self) -> Vec<f64> {
         let sizes: Vec<f64> = self.poles().iter().map(|p| p.value.norm()).collect();
         let (Some(low), Some(high)) = (sizes.iter().copied().reduce(f64::min), sizes.iter().copied().reduce(f64::max))

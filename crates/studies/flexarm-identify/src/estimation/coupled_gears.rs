@@ -1,37 +1,39 @@
-//! Stiffness of gears that move several joints, from the positions of the motors and of the links
-//! behind them.
+//! Stiffness of gears that move several joints, from recorded positions of the motors and of the
+//! links they drive.
 //!
 //! ```text
-//! C q_m - q_link = C diag(c) Cᵀ τ:     row i:  Σ_k c_k C_ik (Cᵀ τ)_k + d_i q̇_i + offset of the run
+//! C q_m - q_link = C diag(c) Cᵀ τ:    row i:  Σ_k c_k C_ik (Cᵀ τ)_k + d_i q̇_i + offset of the run
 //! ```
-//! with the compliance `c_k` of each motor's spring behind its gear and a delay `d_i` of each
-//! link's encoder (and, fitted to the rest, damping in proportion to the rate of what each link
-//! shows): what one link shows is a combination of springs, and one encoder may tell several of
-//! them. Deviations and what counts as told as for a single gear
-//! ([`crate::estimation::gear_stiffness`]), of each spring beside what the others do.
+//! with the compliance `c_k` of each motor's gear and a delay `d_i` of each link's encoder. Damping
+//! proportional to the deflection rate of each link is fitted to the residual. The deflection of
+//! one link is a combination of springs, and one encoder may determine several of them. Standard
+//! deviations and the criterion for a determined stiffness are as for a single gear
+//! ([`crate::estimation::gear_stiffness`]), for the part of the deflection due to each spring.
 
 use crate::estimation::encoders::{BLOCK, GearEstimate, Normal, centred, damping_time, jackknife, squares};
 
-/// One link's encoder in a recording, evenly sampled, all filtered alike.
+/// Recording of one link's encoder, evenly sampled, all signals filtered alike.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CoupledOutput {
-    /// Where the motors say that the joint is, less the link (rad).
+    /// Joint position from the motors minus link position (rad).
     pub deflection: Vec<f64>,
-    /// Speed of the joint (rad/s).
+    /// Velocity of the joint (rad/s).
     pub rate: Vec<f64>,
     /// Rate of the deflection (rad/s); zeros for gears without damping.
     pub deflection_rate: Vec<f64>,
-    /// Of each spring its part of the deflection per compliance: `C_ik (Cᵀ τ)_k` (N m).
+    /// Derivative of the deflection with respect to each spring's compliance: `C_ik (Cᵀ τ)_k` (N
+    /// m).
     pub torques: Vec<Vec<f64>>,
-    /// The same of signals without the noise of the encoders
+    /// Instrumental variables, as `torques` but free of the noise of the encoders
     /// ([`crate::estimation::GearRun::instrument`]).
     pub instruments: Vec<Vec<f64>>,
 }
 
-/// Finds the stiffness of each spring from all recordings of the same encoders; one recording is
-/// taken as two halves.
+/// Estimates the stiffness of each spring from all recordings of the same encoders; a single
+/// recording is split into two halves.
 ///
-/// None for less than two blocks of samples, or springs that these encoders do not tell apart.
+/// Returns `None` with fewer than two blocks of samples, or if these encoders do not distinguish
+/// the springs.
 pub fn coupled_gear_stiffness(runs: &[Vec<CoupledOutput>]) -> Option<Vec<GearEstimate>> {
     let halves;
     let runs = match runs {
@@ -48,6 +50,7 @@ pub fn coupled_gear_stiffness(runs: &[Vec<CoupledOutput>]) -> Option<Vec<GearEst
     }
     let all: Vec<usize> = (0..runs.len()).collect();
     let fit = Fit::of(runs, &all, None)?;
+    // Jackknife over blocks of time, and cross-validation over runs.
     let blocks = all.iter().flat_map(|run| (0..length(&runs[*run]) / BLOCK).map(move |k| (*run, k * BLOCK)));
     let left: Vec<Fit> = blocks.filter_map(|block| Fit::of(runs, &all, Some(block))).collect();
     let others = |run: usize| all.iter().copied().filter(|k| *k != run).collect::<Vec<_>>();
@@ -74,7 +77,7 @@ pub fn coupled_gear_stiffness(runs: &[Vec<CoupledOutput>]) -> Option<Vec<GearEst
     Some((0..first.torques.len()).map(of).collect())
 }
 
-/// The encoder that shows most of a spring.
+/// Returns the encoder with the largest contribution of a spring.
 fn seen_most(runs: &[Vec<CoupledOutput>], motor: usize) -> usize {
     let size = |output: usize| {
         runs.iter().flat_map(|run| &run[output].torques[motor]).map(|torque| torque * torque).sum::<f64>()
@@ -100,7 +103,7 @@ fn split(run: &[CoupledOutput]) -> [Vec<CoupledOutput>; 2] {
     [half(false), half(true)]
 }
 
-/// Compliance of each spring, delay of each encoder.
+/// Compliance of each spring, delay and damping time constant of each encoder.
 struct Fit {
     compliance: Vec<f64>,
     delay: Vec<f64>,
@@ -108,7 +111,7 @@ struct Fit {
 }
 
 impl Fit {
-    /// Least squares with an offset for each encoder of each run, without one block.
+    /// Fits runs with an offset for each encoder of each run, without one block.
     fn of(runs: &[Vec<CoupledOutput>], some: &[usize], without: Option<(usize, usize)>) -> Option<Self> {
         let (outputs, motors) = (runs[0].len(), runs[0][0].torques.len());
         let mut sums = Normal::new(motors + outputs);
@@ -138,7 +141,7 @@ impl Fit {
         Some(fit)
     }
 
-    /// What is left of the deflection of an encoder.
+    /// Returns the residual of an encoder's deflection.
     fn rest(&self, output: &CoupledOutput, number: usize) -> Vec<f64> {
         let kept: Vec<usize> = (0..output.deflection.len()).collect();
         let mut rest = centred(&output.deflection, &kept);
@@ -151,8 +154,8 @@ impl Fit {
         rest
     }
 
-    /// Of a run, over the encoders that show a spring: what that spring does by the readings
-    /// without the others, and by its torque.
+    /// Returns, for a run and the encoders that a spring affects, the deflection without the
+    /// contributions of the other springs, and the deflection that the spring's torque predicts.
     fn curves(&self, run: &[CoupledOutput], motor: usize) -> [Vec<f64>; 2] {
         let (mut measured, mut expected) = (Vec::new(), Vec::new());
         for (number, output) in run.iter().enumerate() {
@@ -206,11 +209,12 @@ mod tests {
             let found = coupled_gear_stiffness(runs).unwrap();
             for (gear, truth) in found.iter().zip(STIFFNESS) {
                 let error = (gear.stiffness / truth - 1.0).abs();
-                // Measured: 1e-12 and less.
+                // Measured: at most 1e-12.
                 assert!(error < 1e-9 && gear.is_told() && gear.r2 > 1.0 - 1e-12, "{gear:?}");
             }
         }
-        // Without noise the delays come out too; the first spring is seen most by its own encoder.
+        // Without noise the delays are exact too; the first spring's largest contribution is in its
+        // own encoder.
         let found = coupled_gear_stiffness(&runs).unwrap();
         assert!((found[0].delay_s - DELAY[0]).abs() < 1e-10 && (found[2].delay_s - DELAY[2]).abs() < 1e-10);
     }

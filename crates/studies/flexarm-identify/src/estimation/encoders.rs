@@ -1,64 +1,65 @@
-//! Stiffness of a gear from the positions of its motor and of the link behind it, recorded while
-//! the robot moves.
+//! Stiffness of a gear from recorded positions of its motor and of the link it drives, while the
+//! robot moves.
 //!
 //! ```text
 //! δ = motor - link = c τ - T dδ/dt + d q̇ + offset of the run
 //! ```
-//! with the compliance c, the torque τ through the gear, the time T = damping / stiffness of the
-//! gear, and a delay d between the two instruments. T is fitted to what the others leave. The
-//! torque follows from the link's motion or from a sensor. The noise of the link's encoder is in
-//! the deflection and, through its second derivative, in the torque; a plain least-squares fit
-//! would take the one for the cause of the other. So both are compared by a third signal without
-//! that noise (instrumental variables): the torque that the motor's motion would need. Samples of a
-//! recording are not independent: deviations are those of a jackknife over blocks of time. Whether
-//! the gear is told at all is asked of runs, or halves of one run, that the fit has not seen. Not
-//! here: torques, filters.
+//! with the compliance c, the torque τ through the gear, the time constant T = damping / stiffness
+//! of the gear, and a delay d between the two encoders. T is fitted to the residual of the other
+//! terms. The torque is computed from the link's motion or measured by a sensor. The noise of the
+//! link's encoder is in the deflection and, through its second derivative, in the torque; a plain
+//! least-squares fit would be biased by this correlation. The fit therefore uses an instrumental
+//! variable without that noise: the torque computed from the motor's motion. Samples of a recording
+//! are not independent: standard deviations come from a jackknife over blocks of time. Runs that
+//! the fit has not seen, or halves of a single run, show whether the recordings determine the
+//! stiffness at all. Not here: torques, filters.
 
 use nalgebra::{DMatrix, DVector};
 
-/// One recording of one gear, evenly sampled, all filtered alike.
+/// Recording of one gear, evenly sampled, all signals filtered alike.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GearRun {
-    /// Motor (over the ratio) less link (rad).
+    /// Motor position (over the ratio) minus link position (rad).
     pub deflection: Vec<f64>,
-    /// Through the gear, on the link's side (N m).
+    /// Torque through the gear, on the link side (N m).
     pub torque: Vec<f64>,
-    /// A signal that goes along with the torque and has no part in the noise of the link's encoder
-    /// (N m); the torque itself if it is measured.
+    /// Instrumental variable (N m): correlated with the torque but not with the noise of the link's
+    /// encoder; the torque itself if it is measured.
     pub instrument: Vec<f64>,
-    /// Speed of the joint (rad/s).
+    /// Velocity of the joint (rad/s).
     pub rate: Vec<f64>,
     /// Rate of the deflection (rad/s); zeros for a gear without damping.
     pub deflection_rate: Vec<f64>,
 }
 
-/// What recordings tell of a gear.
+/// Stiffness of a gear from recordings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GearEstimate {
-    /// N m/rad; not a positive number where the deflection does not follow the torque.
+    /// Stiffness (N m/rad); not a positive number if the deflection does not follow the torque.
     pub stiffness: f64,
-    /// Standard deviation of its logarithm.
+    /// Standard deviation of the logarithm of the stiffness.
     pub std_ln: f64,
-    /// By how much the link's instrument is late (s).
+    /// Delay of the link's encoder (s).
     pub delay_s: f64,
-    /// Share of the deflection, without offsets and delay, that the torque explains.
+    /// Share of the deflection, without offsets and delay, that the torque explains (R²).
     pub r2: f64,
-    /// The same of each run, with stiffness and delay of the others.
+    /// R² of each run, with stiffness and delay fitted to the other runs.
     pub unseen_r2: Vec<f64>,
-    /// Stiffness without each run.
+    /// Stiffness estimated without each run.
     pub without_each: Vec<f64>,
-    /// What is left of the deflection (rad, RMS).
+    /// RMS of the unexplained deflection (rad).
     pub rest_rms: f64,
-    /// Deflection without offsets and delay (rad, RMS).
+    /// RMS of the deflection without offsets and delay (rad).
     pub deflection_rms: f64,
-    /// Of each run, or half of one: the deflection without offset and delay, and what the torque
-    /// makes of the gear (rad).
+    /// Deflection without offset and delay, and the deflection that the torque predicts (rad), for
+    /// each run or each half of a single run.
     pub curves: Vec<[Vec<f64>; 2]>,
 }
 
 impl GearEstimate {
-    /// Whether the recordings tell the stiffness: most of a run that was not seen follows from it,
-    /// and it does not depend on one run.
+    /// Whether the recordings determine the stiffness: the median R² of unseen runs is above 0.3,
+    /// no single run changes the logarithm of the stiffness by 0.5 or more, and [`Self::std_ln`] is
+    /// below 0.5.
     pub fn is_told(&self) -> bool {
         let sound = |x: &f64| x.is_finite() && *x > 0.0;
         let mut unseen = self.unseen_r2.clone();
@@ -69,12 +70,12 @@ impl GearEstimate {
     }
 }
 
-/// Samples of one block of the jackknife.
+/// Number of samples in one block of the jackknife.
 pub(crate) const BLOCK: usize = 250;
 
-/// Finds the stiffness of a gear from all its runs; one run is taken as two halves.
+/// Estimates the stiffness of a gear from all its runs; a single run is split into two halves.
 ///
-/// None for less than two blocks of samples, or torques that do not change.
+/// Returns `None` with fewer than two blocks of samples, or if the torque is constant.
 pub fn gear_stiffness(runs: &[GearRun]) -> Option<GearEstimate> {
     let halves;
     let runs = match runs {
@@ -89,10 +90,12 @@ pub fn gear_stiffness(runs: &[GearRun]) -> Option<GearEstimate> {
     }
     let all: Vec<usize> = (0..runs.len()).collect();
     let fit = Fit::of(runs, &all, None)?;
+    // Jackknife over blocks of time.
     let blocks: Vec<(usize, usize)> =
         all.iter().flat_map(|run| (0..runs[*run].deflection.len() / BLOCK).map(move |k| (*run, k * BLOCK))).collect();
     let left: Vec<f64> =
         blocks.iter().filter_map(|block| Fit::of(runs, &all, Some(*block))).map(|fit| fit.compliance).collect();
+    // Cross-validation over runs.
     let (mut unseen_r2, mut without_each) = (Vec::new(), Vec::new());
     for run in &all {
         let others: Vec<usize> = all.iter().copied().filter(|k| k != run).collect();
@@ -118,7 +121,8 @@ pub fn gear_stiffness(runs: &[GearRun]) -> Option<GearEstimate> {
     })
 }
 
-/// Standard deviation of an estimate from its values without one part of the data each.
+/// Returns the jackknife standard deviation of an estimate, from the estimates that each leave out
+/// one part of the data.
 pub(crate) fn jackknife(without: &[f64]) -> f64 {
     let n = without.len() as f64;
     let mean = without.iter().sum::<f64>() / n;
@@ -137,11 +141,11 @@ fn split(run: &GearRun) -> [GearRun; 2] {
     [part(0..middle), part(middle..run.deflection.len())]
 }
 
-/// Sums of a linear fit by instrumental variables: `Zᵀ X a = Zᵀ y`.
+/// Normal equations of a linear fit with instrumental variables: `Zᵀ X a = Zᵀ y`.
 pub(crate) struct Normal {
     zx: DMatrix<f64>,
     zy: DVector<f64>,
-    /// Squares of the columns of X and Z.
+    /// Squared norms of the columns of X and Z.
     sizes: [DVector<f64>; 2],
 }
 
@@ -151,7 +155,7 @@ impl Normal {
         Self { zx: DMatrix::zeros(n, n), zy: zeros(), sizes: [zeros(), zeros()] }
     }
 
-    /// Adds samples: of each column its number, X and Z.
+    /// Adds samples, given as column number, X and Z per column.
     pub(crate) fn add(&mut self, columns: &[(usize, &[f64], &[f64])], y: &[f64]) {
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         for (a, x, z) in columns {
@@ -164,8 +168,8 @@ impl Normal {
         }
     }
 
-    /// The coefficients; columns from `needed` on that are zero have none. None if the others
-    /// cannot be told apart.
+    /// Returns the coefficients, 0 for zero columns. Returns `None` if one of the first `needed`
+    /// columns is zero, or if the columns are linearly dependent.
     pub(crate) fn solved(&self, needed: usize) -> Option<Vec<f64>> {
         let n = self.zy.len();
         let scales = self.sizes.each_ref().map(|sizes| sizes.map(f64::sqrt));
@@ -188,10 +192,10 @@ impl Normal {
     }
 }
 
-/// Smallest singular value of scaled columns that are told apart.
+/// Minimum singular value of the scaled matrix for linearly independent columns.
 const DEPENDENT: f64 = 1e-9;
 
-/// Compliance, delay and time of damping of some runs.
+/// Compliance, delay and damping time constant fitted to some runs.
 struct Fit {
     compliance: f64,
     delay: f64,
@@ -199,7 +203,7 @@ struct Fit {
 }
 
 impl Fit {
-    /// Least squares with an offset for each run, without one block.
+    /// Fits runs with an offset for each, without one block.
     fn of(runs: &[GearRun], some: &[usize], without: Option<(usize, usize)>) -> Option<Self> {
         let centred_runs: Vec<[Vec<f64>; 5]> = some
             .iter()
@@ -216,8 +220,8 @@ impl Fit {
         centred_runs.iter().for_each(|[y, t, z, v, _]| sums.add(&[(0, t, z), (1, v, v)], y));
         let found = sums.solved(1)?;
         let (compliance, delay) = (found[0], found[1]);
-        // Of what is left: friction, which jumps where the torque is largest, would pass for
-        // damping and change the compliance.
+        // Damping is fitted to the residual: in a joint fit, friction, which jumps where the torque
+        // is largest, would be taken for damping and change the compliance.
         let damping = centred_runs.iter().map(|[y, t, _, v, w]| {
             let rest: Vec<f64> = (0..y.len()).map(|k| y[k] - compliance * t[k] - delay * v[k]).collect();
             (rest, &w[..])
@@ -225,7 +229,8 @@ impl Fit {
         Some(Self { compliance, delay, damping_s: damping_time(damping) })
     }
 
-    /// Of a run: the deflection without offset, delay and damping, and what the torque makes of it.
+    /// Returns the deflection of a run without offset, delay and damping, and the deflection that
+    /// the torque predicts.
     fn curves(&self, run: &GearRun) -> [Vec<f64>; 2] {
         let kept: Vec<usize> = (0..run.deflection.len()).collect();
         let [y, t, v, w] = [&run.deflection, &run.torque, &run.rate, &run.deflection_rate].map(|x| centred(x, &kept));
@@ -233,13 +238,14 @@ impl Fit {
         [measured, t.iter().map(|t| self.compliance * t).collect()]
     }
 
-    /// Sums of squares of a run: what is left, and without the torque, offset free.
+    /// Returns the sums of squares of a run without offset: the residual, and the deflection.
     fn left_of(&self, run: &GearRun) -> (f64, f64) {
         squares(&self.curves(run))
     }
 }
 
-/// Time T of a rest that is `-T` times a rate; 0 where nothing gives way.
+/// Returns the time constant T of a residual modelled as `-T` times a rate; 0 if the rates are
+/// zero.
 pub(crate) fn damping_time<'a>(of: impl Iterator<Item = (Vec<f64>, &'a [f64])>) -> f64 {
     let sums = of.fold((0.0, 0.0), |sums, (rest, rate)| {
         rest.iter().zip(rate).fold(sums, |(a, b), (r, w)| (a + r * w, b + w * w))
@@ -247,7 +253,7 @@ pub(crate) fn damping_time<'a>(of: impl Iterator<Item = (Vec<f64>, &'a [f64])>) 
     if sums.1 > 0.0 { -sums.0 / sums.1 } else { 0.0 }
 }
 
-/// Sums of squares of what is left of a measured curve, and of all of it.
+/// Returns the sums of squares of the residual of a measured curve and of the curve itself.
 pub(crate) fn squares([measured, expected]: &[Vec<f64>; 2]) -> (f64, f64) {
     measured.iter().zip(expected).fold((0.0, 0.0), |(rest, whole), (y, c)| (rest + (y - c).powi(2), whole + y * y))
 }
@@ -271,8 +277,8 @@ mod tests {
         GearRun { deflection_rate: vec![0.0; n], deflection, instrument: torque.clone(), torque, rate }
     }
 
-    /// Truth: the stiffness from which the deflection was made. The link's encoder has noise about
-    /// 5 Hz, which its second derivative carries into the torque of 400 kg m².
+    /// Truth: the stiffness that generated the deflection. The link's encoder has noise at about 5
+    /// Hz; its second derivative times 400 kg m² is in the torque.
     #[test]
     fn noise_of_the_link_encoder_that_is_in_deflection_and_torque_does_not_pass_for_a_spring() {
         let noisy = |seed: f64| {
@@ -299,7 +305,7 @@ mod tests {
         let found = gear_stiffness(&runs).unwrap();
         assert!((found.stiffness / 8e6 - 1.0).abs() < 1e-10 && (found.delay_s - 3e-3).abs() < 1e-12, "{found:?}");
         assert!(found.is_told() && found.r2 > 1.0 - 1e-12 && found.unseen_r2.iter().all(|r2| *r2 > 1.0 - 1e-12));
-        // One run is held against itself by halves.
+        // A single run is cross-validated by its halves.
         assert!(gear_stiffness(&runs[..1]).unwrap().is_told());
     }
 

@@ -1,5 +1,5 @@
-//! Parameters of an arm from readings: estimate, uncertainty, what is not told, what argues against
-//! the model.
+//! Identification of arm parameters from readings: estimates, uncertainties, combinations that are
+//! not identifiable, and evidence against the model.
 
 use flexarm_kinematics::Pose;
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Translation3, Vector3};
@@ -9,29 +9,30 @@ use crate::estimation::measurement::{MeasuredArm, NoAnswer};
 use crate::estimation::parameter::{Parameter, Plant};
 use crate::estimation::reading::{Component, Instrument, Measurements, Reading, ReadingKind, Target};
 
-/// A residual over its own standard deviation beyond which a reading is named.
+/// Magnitude of a normalised residual above which its reading is suspicious.
 const SUSPICIOUS: f64 = 4.0;
-/// One-sided normal quantile at which the scatter is said to be larger than declared: one in a
-/// thousand.
+/// One-sided normal quantile for a probability of one in a thousand, above which the scatter counts
+/// as larger than declared.
 const MISFIT_QUANTILE: f64 = 3.09;
-/// Most rounds in which an unknown scatter is found.
+/// Maximum number of rounds of the iteration for an unknown scatter.
 const SCATTER_ROUNDS: usize = 6;
-/// Starts of a search that may end in a false minimum.
+/// Maximum number of further starts of a search that may end in a local minimum.
 const STARTS: usize = 12;
-/// A scatter so many times as large as declared is no fit: its deviations would say nothing.
+/// Ratio of scatter to declared deviation above which the fit is rejected and reports no
+/// deviations.
 const NO_FIT: f64 = 2.0;
-/// Part of a parameter that may lie in directions that are not identified.
+/// Maximum share of an identifiable parameter in directions that are not identified.
 const UNTOLD: f64 = 0.05;
 
-/// How parameters are found.
+/// Options of an identification.
 #[derive(Clone, Copy, Debug)]
 pub struct IdentifyOptions {
-    /// Loss, iterations, tolerance.
+    /// Loss, maximum number of iterations, and tolerance.
     pub search: Search,
-    /// Whether the deviations of the readings are known; if not, only their ratios count and the
-    /// scatter tells their size.
+    /// Whether the deviations of the readings are known. If not, only their ratios count and the
+    /// scatter about the fit sets their size.
     pub deviations_known: bool,
-    /// Parts into which readings are divided to hold one out after another; 0 for none.
+    /// Number of folds of the cross-validation; 0 for none.
     pub folds: usize,
 }
 
@@ -41,126 +42,126 @@ impl Default for IdentifyOptions {
     }
 }
 
-/// A parameter as it was found.
+/// Estimate of one parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
     /// Name, as in the robot file.
     pub name: String,
     /// Unit of the values.
     pub unit: String,
-    /// Before.
+    /// Initial value.
     pub initial: f64,
-    /// Now; the initial value where the readings say nothing.
+    /// Estimated value; the initial value if the parameter is not identifiable.
     pub value: f64,
-    /// Standard deviation; not a number where the readings say nothing or the fit does not meet
-    /// them.
+    /// Standard deviation; NaN if the parameter is not identifiable or the model does not fit the
+    /// readings.
     pub std: f64,
-    /// Where it lies in 95 of 100 cases; not numbers where there is no deviation.
+    /// 95 % confidence interval; NaN where `std` is NaN.
     pub interval: [f64; 2],
-    /// Whether the readings tell it.
+    /// Whether the readings determine the parameter.
     pub identifiable: bool,
 }
 
-/// How readings are met that the fit has not seen.
+/// Cross-validation: residuals of readings that the fit did not use.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeldOut {
-    /// Parts that were held out in turn.
+    /// Number of folds.
     pub folds: usize,
-    /// RMS of residuals over their deviations, with the fitted values of the other parts.
+    /// RMS of the standardised residuals, each predicted from the other folds.
     pub rms: f64,
-    /// The same with the initial values.
+    /// RMS of the standardised residuals with the initial values.
     pub rms_initial: f64,
-    /// Of each number of each reading: residual over its deviation.
+    /// Standardised residual of each number of each reading; NaN where no prediction is possible.
     pub residuals: Vec<f64>,
 }
 
-/// Parameters of an arm as readings tell them.
+/// Result of an identification.
 #[derive(Clone, Debug)]
 pub struct Identified {
-    /// One per parameter, in order.
+    /// Estimates, one per parameter, in order.
     pub parameters: Vec<Found>,
-    /// Correlation of the parameters' coordinates, p×p.
+    /// Correlation matrix of the parameters' coordinates, p×p.
     pub correlation: DMatrix<f64>,
-    /// Combinations that the readings do not tell: parameter and weight, the largest first.
+    /// Combinations that the readings do not determine: parameter and weight, largest weight first.
     pub untold: Vec<Vec<(usize, f64)>>,
-    /// The search's result.
+    /// Solution of the least-squares problem.
     pub solution: Solution,
-    /// Standard residuals with the initial values, unknowns of the measurement fitted.
+    /// Standardised residuals with the initial values, with the unknowns of the measurement fitted.
     pub before: Vec<f64>,
-    /// Residual of each number over what its own scatter would be: beyond four it argues against
-    /// the rest.
+    /// Residuals over their own standard deviation after the fit; a magnitude above four
+    /// contradicts the other readings.
     pub normalised: Vec<f64>,
-    /// Numbers of [`Self::normalised`] beyond four, the largest first.
+    /// Indices into [`Self::normalised`] with a magnitude above four, largest first.
     pub suspicious: Vec<usize>,
-    /// How many times larger than declared the scatter is, where chance does so less than once in a
-    /// thousand cases.
+    /// Ratio of the scatter to the declared one, if chance exceeds it less than once in a thousand
+    /// cases.
     pub misfit: Option<f64>,
-    /// Readings that the fit has not seen.
+    /// Cross-validation.
     pub held_out: Option<HeldOut>,
-    /// Unknown instruments as found: the world in their axes.
+    /// Estimated poses of unknown instruments: the world in the instrument's axes.
     pub instruments: Vec<Pose>,
-    /// Targets as found, tool axes (m).
+    /// Estimated positions of the targets in tool axes (m).
     pub targets: Vec<Vector3<f64>>,
 }
 
-/// Why nothing was found.
+/// Reason why an identification fails.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum IdentifyError {
-    /// Nothing to find or nothing to find it from.
+    /// No parameter or no reading.
     #[error("{parameters} parameters and {rows} measured numbers: at least one of each is needed")]
     Nothing {
-        /// How many parameters.
+        /// Number of parameters.
         parameters: usize,
-        /// How many numbers.
+        /// Number of measured numbers.
         rows: usize,
     },
-    /// An instrument of which too few places are known.
+    /// Too few measured places for an instrument.
     #[error(
         "instrument {instrument}: where it stands follows from at least three measured places that are not on one line, found {places}"
     )]
     Instrument {
-        /// Its number.
+        /// Number of the instrument.
         instrument: usize,
-        /// Places.
+        /// Number of its places.
         places: usize,
     },
-    /// An instrument of whose axes too little is seen.
+    /// Too few displacements to find the axes of an instrument.
     #[error(
         "instrument {instrument}: its axes follow from displacements with all three components along at least two directions, found \
          {displacements}; add such readings, or say how it is turned"
     )]
     Axes {
-        /// Its number.
+        /// Number of the instrument.
         instrument: usize,
-        /// Displacements.
+        /// Number of its displacements.
         displacements: usize,
     },
-    /// The arm has no answer.
+    /// The arm model has no solution for a reading.
     #[error(transparent)]
     Model(#[from] NoAnswer),
-    /// Unknowns of the measurement that nothing tells.
+    /// The readings do not determine an unknown of the measurement.
     #[error("the readings do not tell {what}: move the arm into more different poses, above all turn the tool")]
     Untold {
-        /// Which.
+        /// Description of the unknown.
         what: String,
     },
-    /// Deviations that nothing tells.
+    /// The scatter cannot be estimated, because there are as many unknowns as numbers.
     #[error(
         "the {rows} numbers have no standard deviation and there are as many unknowns: nothing scatters; give a deviation or measure more"
     )]
     NoScatter {
-        /// How many numbers.
+        /// Number of measured numbers.
         rows: usize,
     },
-    /// Overflow.
+    /// A value is not finite.
     #[error(
         "a residual or a derivative is not a number: a value, a deviation or an uncertainty is out of all proportion"
     )]
     NotFinite,
 }
 
-/// Finds the parameters.
+/// Identifies the parameters.
 ///
 /// # Errors
 /// [`IdentifyError`].
@@ -187,7 +188,7 @@ pub fn identify(
     };
     let held_out = held_out(plant, parameters, &measurements, options, &solution, &before)?;
     let mut found = told(parameters, &measurements, options, solution, before, held_out);
-    // In units of the deviations that were given.
+    // Back to units of the given deviations.
     found.solution.residuals *= scatter;
     found.before.iter_mut().for_each(|r| *r *= scatter);
     if let Some(held) = &mut found.held_out {
@@ -201,10 +202,10 @@ pub fn identify(
     }
 }
 
-/// Returns how many times larger than the given deviations the readings scatter about the fit,
-/// where only the ratios of deviations are known, and where the search ended. It begins with the
-/// scatter about the arm as it is, so that losses and what is identified have a measure from the
-/// start.
+/// Returns the ratio of the scatter about the fit to the given deviations, for the case in which
+/// only the ratios of deviations are known, and the unknowns at the end of the search. The
+/// iteration starts from the scatter about the arm with its initial values, so that the loss and
+/// the test for identifiable directions are scaled from the start.
 fn scatter(
     plant: &Plant,
     parameters: &[Parameter],
@@ -239,8 +240,8 @@ fn scatter(
     Ok((scatter, at.unwrap_or_else(|| DVector::zeros(parameters.len() + measurements.own_unknowns()))))
 }
 
-/// What is known before. A prior weaker than the reference does not count: the readings alone make
-/// a parameter identifiable.
+/// Returns the prior deviations, each at most the parameter's reference: a weaker prior must not
+/// make a parameter identifiable.
 fn priors(parameters: &[Parameter]) -> Vec<f64> {
     parameters.iter().map(|parameter| parameter.prior.min(parameter.reference())).collect()
 }
@@ -261,9 +262,9 @@ fn fitted(
     })
 }
 
-/// The fit of all readings. Frequency responses have minima that are none where resonances of the
-/// model lie on others of the arm: they are fitted by their logarithm first, and from several
-/// starts as long as the scatter is not that declared.
+/// Fits all readings. The cost of frequency responses has local minima where resonances of the
+/// model are close to other resonances of the arm. Such problems are first fitted in the logarithm
+/// of the response, and from further starts as long as the scatter exceeds the declared one.
 fn searched(
     plant: &Plant,
     parameters: &[Parameter],
@@ -305,20 +306,20 @@ fn searched(
     best
 }
 
-/// A number between -1.5 and 1.5 for a start and a coordinate: the additive recurrence of roots of
-/// primes.
+/// Returns a number between -1.5 and 1.5 for a start and a coordinate, from the additive recurrence
+/// of square roots of primes.
 fn spread(start: usize, coordinate: usize) -> f64 {
     const PRIMES: [f64; 12] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0, 37.0];
     let root = PRIMES[coordinate % PRIMES.len()].sqrt() * (1 + coordinate / PRIMES.len()) as f64;
     3.0 * (root * (start + 1) as f64).fract() - 1.5
 }
 
-/// Whether residuals scatter more than chance does.
+/// Whether the residuals scatter more than chance explains.
 fn misfits(solution: &Solution) -> bool {
     solution.freedom > 0 && solution.scale > chi_square_bound(solution.freedom)
 }
 
-/// What an unknown of the measurements is.
+/// Describes an unknown of the measurements by its number.
 fn own_name(measurements: &Measurements, number: usize) -> String {
     let mut first = 0;
     for (k, instrument) in measurements.instruments.iter().enumerate() {
@@ -333,7 +334,8 @@ fn own_name(measurements: &Measurements, number: usize) -> String {
     "where a target is on the tool".to_owned()
 }
 
-/// The measurements with unknown instruments where they fit best to the arm as it is known.
+/// Returns the measurements with each unknown instrument at its best fit to the arm with its
+/// initial values.
 fn placed(plant: &Plant, measurements: &Measurements) -> Result<Measurements, IdentifyError> {
     let mut placed = measurements.clone();
     for number in 0..measurements.instruments.len() {
@@ -362,21 +364,22 @@ fn placed(plant: &Plant, measurements: &Measurements) -> Result<Measurements, Id
     Ok(placed)
 }
 
-/// Whether a reading is a displacement of which all three components were seen in the axes of an
-/// instrument, and nothing else.
+/// Whether a reading consists of exactly the three components of a displacement in the axes of an
+/// instrument.
 fn seen_in_axes(kind: &ReadingKind, instrument: usize) -> bool {
     let ReadingKind::Displacement { rows, .. } = kind else { return false };
     let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
     rows.len() == 3 && rows.iter().zip(axes).all(|(row, axis)| row.of == Component::AlongSeen(instrument, axis))
 }
 
-/// Vectors of some readings as the arm as it is known has them in the world, and as they were seen.
+/// Returns the vectors of some readings, predicted in world axes by the arm with its initial
+/// values, and as observed.
 fn both_points(
     plant: &Plant,
     measurements: &Measurements,
     some: impl Fn(&ReadingKind) -> bool,
 ) -> Result<[Vec<Vector3<f64>>; 2], IdentifyError> {
-    // In world axes: the instrument as if it stood there.
+    // With instruments at the identity, predictions are in world axes.
     let mut seen = measurements.of_readings(|k| some(&measurements.readings[k].kind));
     seen.instruments.iter_mut().for_each(|i| *i = Instrument::Known(Pose::identity()));
     seen.targets.iter_mut().for_each(|t| {
@@ -392,8 +395,8 @@ pub(crate) fn points(values: &[f64]) -> Vec<Vector3<f64>> {
     values.chunks_exact(3).map(Vector3::from_column_slice).collect()
 }
 
-/// Rotation and translation that bring points onto others with the least sum of squares (Arun,
-/// Huang and Blostein 1987).
+/// Returns the rotation and translation that map points onto others with the least sum of squares
+/// (Arun, Huang and Blostein 1987).
 pub(crate) fn rigid_fit(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Pose> {
     let n = from.len();
     if n < 3 {
@@ -406,8 +409,8 @@ pub(crate) fn rigid_fit(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Po
     Some(Pose::from_parts(Translation3::from(b - R * a), R))
 }
 
-/// Rotation that brings vectors onto others with the least sum of squares; none where all are along
-/// one line.
+/// Returns the rotation that maps vectors onto others with the least sum of squares; `None` if all
+/// are collinear.
 pub(crate) fn rotation_fit(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Rotation3<f64>> {
     let H: Matrix3<f64> = from.iter().zip(to).map(|(p, q)| p * q.transpose()).sum();
     if !H.norm_squared().is_finite() {
@@ -417,7 +420,7 @@ pub(crate) fn rotation_fit(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option
     let (U, Vt) = (svd.u?, svd.v_t?);
     let mut sizes: Vec<f64> = svd.singular_values.iter().copied().collect();
     sizes.sort_by(|x, y| y.total_cmp(x));
-    // On one line any turn about it fits.
+    // Collinear vectors leave the rotation about their line undetermined.
     if sizes[1] <= 1e-9 * sizes[0] {
         return None;
     }
@@ -427,7 +430,8 @@ pub(crate) fn rotation_fit(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option
     Some(Rotation3::from_matrix_unchecked(Vt.transpose() * turn * U.transpose()))
 }
 
-/// Standard residuals of the arm as it is known, unknowns of the measurements fitted.
+/// Returns the standardised residuals of the arm with its initial values, with the unknowns of the
+/// measurements fitted.
 fn initial_residuals(
     plant: &Plant,
     measurements: &Measurements,
@@ -436,7 +440,7 @@ fn initial_residuals(
     Ok(fitted(plant, &[], measurements, options, None)?.residuals.iter().copied().collect())
 }
 
-/// Each part of the readings predicted from the others.
+/// Predicts each fold of the readings from the other folds.
 fn held_out(
     plant: &Plant,
     parameters: &[Parameter],
@@ -459,8 +463,7 @@ fn held_out(
     for fold in 0..folds {
         let others = measurements.of_readings(|k| k % folds != fold);
         let own = measurements.of_readings(|k| k % folds == fold);
-        // What belongs to the measurement may not follow from the others alone: then this part has
-        // no say.
+        // A fold is skipped if the others do not determine the unknowns of the measurement.
         let Ok(found) = fitted(plant, parameters, &others, options, Some(&all.unknowns)) else { continue };
         let arm = MeasuredArm { plant, parameters, measurements: &own };
         let unseen = arm.evaluate(&found.unknowns, None)?;
@@ -479,8 +482,7 @@ fn held_out(
     Ok(Some(HeldOut { folds, rms: rms(&residuals), rms_initial: rms(before), residuals }))
 }
 
-/// χ² over its degrees of freedom that chance exceeds once in a thousand cases (Wilson and
-/// Hilferty).
+/// Returns the upper 0.1 % quantile of χ² over its degrees of freedom (Wilson and Hilferty).
 fn chi_square_bound(freedom: usize) -> f64 {
     let nine = 2.0 / (9.0 * freedom as f64);
     (1.0 - nine + MISFIT_QUANTILE * nine.sqrt()).powi(3)
@@ -506,8 +508,8 @@ fn told(
     let share = |k: usize| 1.0 - V.row(k).norm_squared();
     let found = parameters.iter().enumerate().map(|(k, parameter)| {
         let spread = solution.covariance[(k, k)].sqrt();
-        // Directions are judged where the prior holds them; where the search ends they may be known
-        // less.
+        // The search judges directions before the prior is dropped; at the solution the data may
+        // determine them less well, hence the second condition.
         let identifiable = share(k) <= UNTOLD && spread <= parameter.reference();
         let (x, std) = (solution.unknowns[k], if identifiable && fits { spread * scatter } else { f64::NAN });
         Found {
@@ -576,7 +578,7 @@ mod tests {
 
     #[test]
     fn the_bound_on_the_scatter_is_that_of_the_tables() {
-        // χ² exceeded with probability 0.001: 29.588 of 10, 149.449 of 100 degrees of freedom.
+        // Truth: upper 0.1 % quantiles of χ², 29.588 and 149.449 for 10 and 100 degrees of freedom.
         for (freedom, table) in [(10, 29.588), (100, 149.449)] {
             let found = chi_square_bound(freedom) * freedom as f64;
             assert!((found / table - 1.0).abs() < 1e-2, "{found} for {table}"); // measured: 5.8e-3

@@ -1,43 +1,45 @@
-//! Nonlinear least squares with what the data cannot say kept at its prior, and the uncertainty of
-//! the rest.
+//! Nonlinear least squares with uncertainties. Directions that the data do not determine stay at
+//! their prior.
 //!
 //! ```text
-//! minimise Σ ρ(r_i(x, b))        x parameters with priors N(0, σ_p²), b unknowns of the measurement without priors
+//! minimise Σ ρ(r_i(x, b))
+//! x: parameters with priors N(0, σ_p²); b: unknowns of the measurement without priors
 //! ```
-//! First Levenberg and Marquardt's method with the prior as rows of its own. Then the singular
-//! values of the Jacobian (columns times σ_p, nuisance unknowns projected out) say which directions
-//! of x the data know better than the prior; within these the prior is dropped, so that estimates
-//! are free of it, and across them x stays where the prior has it. Residuals are in units of their
-//! standard deviations. Not here: what is measured and what the parameters are.
+//! The Levenberg-Marquardt method first solves the problem with the prior as additional rows. Then
+//! the singular values of the Jacobian (columns scaled by σ_p, nuisance unknowns projected out)
+//! show which directions of x the data determine better than the prior. A second solution drops the
+//! prior in these directions, so that the estimates are free of it; in the others x stays at the
+//! prior. Residuals are in units of their standard deviations. Not here: the measurements and the
+//! meaning of the parameters.
 
 use nalgebra::{DMatrix, DVector};
 
 /// A model of measurements.
 pub trait Residuals {
-    /// What can go wrong.
+    /// Error of the model.
     type Error;
 
-    /// Residuals over their standard deviations at all unknowns, parameters first; their
-    /// derivatives into `J` if it is there (resized as needed).
+    /// Returns the residuals over their standard deviations, given all unknowns, parameters first.
+    /// Writes their derivatives into `J` if given (resized as needed).
     ///
     /// # Errors
-    /// Where the model has no answer at these unknowns.
+    /// If the model has no solution at these unknowns.
     fn evaluate(&self, unknowns: &DVector<f64>, J: Option<&mut DMatrix<f64>>) -> Result<DVector<f64>, Self::Error>;
 }
 
-/// How a residual counts.
+/// Loss function of a residual.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Loss {
-    /// Its square.
+    /// Square of the residual.
     Square,
-    /// Huber's: beyond so many standard deviations in proportion to its size.
+    /// Huber's loss: linear above this number of standard deviations.
     Huber(f64),
-    /// Cauchy's: outliers lose their influence altogether; more than one minimum is possible.
+    /// Cauchy's loss: the influence of outliers vanishes; more than one minimum is possible.
     Cauchy(f64),
 }
 
 impl Loss {
-    /// Weight of a residual in the equivalent weighted problem.
+    /// Returns the weight of a residual in the equivalent weighted problem.
     fn weight(self, r: f64) -> f64 {
         match self {
             Self::Square => 1.0,
@@ -47,7 +49,7 @@ impl Loss {
         }
     }
 
-    /// Twice its cost: the square of small residuals.
+    /// Returns twice the cost; the square for small residuals.
     fn cost(self, r: f64) -> f64 {
         match self {
             Self::Square => r * r,
@@ -58,14 +60,14 @@ impl Loss {
     }
 }
 
-/// How the search goes.
+/// Options of a search.
 #[derive(Clone, Copy, Debug)]
 pub struct Search {
-    /// How residuals count.
+    /// Loss function.
     pub loss: Loss,
-    /// Most iterations of each phase.
+    /// Maximum number of iterations of each phase.
     pub most_iterations: usize,
-    /// A step that moves no unknown by more than this part of its standard deviation ends it.
+    /// Maximum step of any unknown over its standard deviation at convergence.
     pub tolerance: f64,
 }
 
@@ -75,66 +77,66 @@ impl Default for Search {
     }
 }
 
-/// What was found.
+/// Solution of a least-squares problem.
 #[derive(Clone, Debug)]
 pub struct Solution {
     /// All unknowns, parameters first.
     pub unknowns: DVector<f64>,
     /// Residuals over their standard deviations.
     pub residuals: DVector<f64>,
-    /// Their weights under the loss, 1 where it is the square.
+    /// Weights of the residuals under the loss; 1 for the square.
     pub weights: DVector<f64>,
-    /// Of each residual the part that its own measurement decides, 0 to 1.
+    /// Leverages of the residuals, 0 to 1.
     pub leverages: DVector<f64>,
-    /// Covariance of the parameters, with the prior's across what is not identified.
+    /// Covariance of the parameters; that of the prior in directions that are not identified.
     pub covariance: DMatrix<f64>,
-    /// Directions in the parameters over their prior deviations: one unit column each, the best
-    /// known first.
+    /// Directions in the parameters over their prior deviations, as unit columns, best determined
+    /// first.
     pub directions: DMatrix<f64>,
-    /// How many times better than the prior each direction is known.
+    /// Ratio of the prior deviation to the deviation due to the data, per direction.
     pub gains: Vec<f64>,
-    /// How many of the directions are identified.
+    /// Number of identified directions.
     pub identified: usize,
-    /// Square of the residuals' scale, `Σ r² / (m - n)` where their square counts; else robust, so
-    /// that a few outliers leave it.
+    /// Square of the scale of the residuals: `Σ r² / (m - n)` with the square loss, otherwise a
+    /// robust estimate that a few outliers do not change.
     pub scale: f64,
     /// Twice the cost of the residuals under the loss.
     pub cost: f64,
-    /// m - n.
+    /// Degrees of freedom, m - n.
     pub freedom: usize,
     /// Iterations of both phases.
     pub iterations: usize,
-    /// Whether the last step was below the tolerance; of an identification also that the fit meets
-    /// the readings.
+    /// Whether the last step was below the tolerance and, for an identification, whether the model
+    /// fits the readings.
     pub converged: bool,
 }
 
-/// Why there is no solution.
+/// Reason why there is no solution.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SolveError<E> {
-    /// The model has no answer at the start.
+    /// The model has no solution at the start.
     #[error(transparent)]
     Model(E),
-    /// Unknowns of the measurement that no residual tells.
+    /// The residuals do not determine an unknown of the measurement.
     #[error("the measurements do not tell the unknown {0} that belongs to them alone")]
     Nuisance(usize),
-    /// Residuals or derivatives that are no numbers.
+    /// A residual or derivative is not finite.
     #[error("a residual or a derivative is not a number")]
     NotFinite,
 }
 
-/// Smallest gain of a direction that counts as identified: the data know it as well as the prior
-/// does.
+/// Gain above which a direction counts as identified. At 1 the data determine it as well as the
+/// prior does.
 const IDENTIFIED: f64 = 1.0;
-/// Relative size below which a column depends on the others.
+/// Relative size below which a column counts as linearly dependent.
 const DEPENDENT: f64 = 1e-10;
 
 /// Solves the problem from a start.
 ///
 /// * `start`: all unknowns; those of the measurements may be guesses.
-/// * `prior`: standard deviation of each parameter about 0, positive; the unknowns after them have
-///   none.
+/// * `prior`: standard deviation of each parameter about 0, positive; the unknowns of the
+///   measurements have none.
 ///
 /// # Errors
 /// [`SolveError`].
@@ -146,9 +148,9 @@ pub fn solve<P: Residuals>(
 ) -> Result<Solution, SolveError<P::Error>> {
     let prior = DVector::from_column_slice(prior);
     let n = start.len();
-    // With the prior: every direction is held.
+    // Phase 1: all parameters are regularised by the prior.
     let held = descend(problem, &DMatrix::identity(n, n), start.clone(), Some(&prior), search)?;
-    // What the data know, and again without the prior.
+    // Phase 2: without the prior, along the identified directions.
     let known = Known::of(&held, &prior)?;
     let begin = known.projected(&held.unknowns, &prior);
     let basis = known.basis(&prior, n);
@@ -157,7 +159,7 @@ pub fn solve<P: Residuals>(
     Ok(finish(found, known, &basis, &prior, search.loss))
 }
 
-/// Where a descent ended.
+/// End of a descent.
 struct Descent {
     unknowns: DVector<f64>,
     residuals: DVector<f64>,
@@ -167,8 +169,8 @@ struct Descent {
     converged: bool,
 }
 
-/// Levenberg and Marquardt's method along the columns of `basis`; weights of the loss renewed at
-/// every point.
+/// Runs the Levenberg-Marquardt method along the columns of `basis`. The weights of the loss are
+/// updated in every iteration.
 fn descend<P: Residuals>(
     problem: &P,
     basis: &DMatrix<f64>,
@@ -191,6 +193,7 @@ fn descend<P: Residuals>(
     while iterations < search.most_iterations && !converged {
         iterations += 1;
         let w = weights_of(&r);
+        // Normal equations of the weighted problem in coordinates along the basis.
         let B = &J * basis;
         let weighted = DMatrix::from_fn(B.nrows(), B.ncols(), |i, j| w[i] * B[(i, j)]);
         let mut normal = B.tr_mul(&weighted);
@@ -202,6 +205,7 @@ fn descend<P: Residuals>(
             }
         }
         let diagonal = normal.diagonal();
+        // Increases the damping until a step does not increase the cost.
         let mut better = false;
         for _ in 0..12 {
             let mut damped = normal.clone();
@@ -223,7 +227,7 @@ fn descend<P: Residuals>(
                     damping = (damping * 0.1).max(1e-12);
                     break;
                 }
-                // As good as rounding allows.
+                // Converged to rounding.
                 _ if size <= search.tolerance => {
                     converged = true;
                     break;
@@ -245,7 +249,7 @@ fn descend<P: Residuals>(
     Ok(Descent { unknowns: x, residuals: r, weights, J, iterations, converged })
 }
 
-/// Directions of the parameters by how well the data know them.
+/// Directions of the parameters, sorted by how well the data determine them.
 struct Known {
     directions: DMatrix<f64>,
     gains: Vec<f64>,
@@ -270,10 +274,10 @@ impl Known {
             let Q = orthonormal(&own).map_err(SolveError::Nuisance)?;
             A -= &Q * Q.tr_mul(&A);
         }
-        // Rows of zeros leave the singular values and make all directions come out.
+        // Rows of zeros do not change the singular values and make the SVD return all directions.
         let rows = A.nrows().max(p);
         let A = A.resize(rows, p, 0.0);
-        // A prior of 1e308 times a derivative, or its square in the sizes of columns.
+        // A prior of 1e308 times a derivative overflows, here or in the squared norm of a column.
         if !A.norm_squared().is_finite() {
             return Err(SolveError::NotFinite);
         }
@@ -284,8 +288,8 @@ impl Known {
         Ok(Self { directions, gains, identified })
     }
 
-    /// Columns along which the unknowns may move: identified directions of the parameters, then all
-    /// unknowns without a prior.
+    /// Columns along which the unknowns may move: identified directions of the parameters, then the
+    /// unknowns of the measurements.
     fn basis(&self, prior: &DVector<f64>, unknowns: usize) -> DMatrix<f64> {
         let (p, k) = (prior.len(), self.identified);
         let own = unknowns - p;
@@ -299,7 +303,7 @@ impl Known {
         basis
     }
 
-    /// The unknowns with what is not identified back at the prior.
+    /// Returns the unknowns with the directions that are not identified set to the prior.
     fn projected(&self, unknowns: &DVector<f64>, prior: &DVector<f64>) -> DVector<f64> {
         let p = prior.len();
         let over = DVector::from_fn(p, |i, _| unknowns[i] / prior[i]);
@@ -313,8 +317,8 @@ impl Known {
     }
 }
 
-/// Orthonormal columns that span those of a matrix; the number of a column that depends on those
-/// before.
+/// Returns orthonormal columns that span those of `A`. The error is the number of the first column
+/// that depends on earlier ones.
 fn orthonormal(A: &DMatrix<f64>) -> Result<DMatrix<f64>, usize> {
     let (Q, R) = A.clone().qr().unpack();
     let is_own = |k: usize| R.get((k, k)).is_some_and(|left| *left > DEPENDENT * A.column(k).norm());
@@ -327,7 +331,7 @@ fn finish(found: Descent, known: Known, basis: &DMatrix<f64>, prior: &DVector<f6
     let root = found.weights.map(f64::sqrt);
     let B = &found.J * basis;
     let weighted = DMatrix::from_fn(m, columns, |i, j| root[i] * B[(i, j)]);
-    // Independent columns, scaled so that their units do not matter.
+    // Normal matrix scaled to a unit diagonal, so that units do not matter.
     let normal = weighted.tr_mul(&weighted);
     let scales = normal.diagonal().map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 });
     let scaled = DMatrix::from_fn(columns, columns, |i, j| scales[i] * normal[(i, j)] * scales[j]);
@@ -335,7 +339,7 @@ fn finish(found: Descent, known: Known, basis: &DMatrix<f64>, prior: &DVector<f6
     let inverse = DMatrix::from_fn(columns, columns, |i, j| scales[i] * inverse[(i, j)] * scales[j]);
     let spread = basis * &inverse * basis.transpose();
     let mut covariance = spread.view((0, 0), (p, p)).into_owned();
-    // Across what was left at the prior.
+    // Covariance of the prior in the directions that are not identified.
     let S = DMatrix::from_diagonal(prior);
     let kept = known.directions.columns(0, known.identified);
     let across = DMatrix::identity(p, p) - kept * kept.transpose();
@@ -362,13 +366,13 @@ fn finish(found: Descent, known: Known, basis: &DMatrix<f64>, prior: &DVector<f6
     }
 }
 
-/// Residuals beyond so many times their scale count as if they were there.
+/// Multiple of the scale at which residuals are clipped.
 const CLIPPED: f64 = 2.5;
-/// Mean of `min(z², CLIPPED²)` over normal numbers z.
+/// Mean of `min(z², CLIPPED²)` for standard normal z.
 const CLIPPED_MEAN: f64 = 0.977_56;
 
-/// Square of the scale s of residuals, not a number without degrees of freedom. Robust (Huber's
-/// second proposal): `Σ min(r²/s², CLIPPED²) = CLIPPED_MEAN (m - n)`.
+/// Returns the square of the scale s of the residuals; NaN without degrees of freedom. Robust
+/// (Huber's proposal 2): `Σ min(r²/s², CLIPPED²) = CLIPPED_MEAN (m - n)`.
 pub(crate) fn scale(residuals: &[f64], freedom: usize, loss: Loss) -> f64 {
     if freedom == 0 {
         return f64::NAN;
@@ -422,7 +426,7 @@ mod tests {
         assert_eq!(orthonormal(&DMatrix::zeros(3, 1)), Err(0));
     }
 
-    /// Its square is beyond the largest number.
+    /// The square of the prior deviation overflows.
     #[test]
     fn a_prior_out_of_all_proportion_is_refused() {
         let t: Vec<f64> = (0..40).map(|k| 0.1 * f64::from(k)).collect();
@@ -444,13 +448,13 @@ mod tests {
         assert!((found.covariance[(2, 2)].sqrt() - 0.7).abs() < 1e-12, "its deviation is the prior's");
     }
 
-    /// Truth: quantiles of the normal distribution, whose scale is 1; two of 402 numbers are a
-    /// hundred.
+    /// Truth: quantiles of the standard normal distribution, scale 1; two of the 402 numbers are
+    /// ±100.
     #[test]
     fn two_wild_residuals_leave_the_scale_where_it_was() {
         let mut residuals: Vec<f64> = Vec::new();
         for k in 0..400 {
-            // Box and Muller's transform of a regular grid.
+            // Box-Muller transform of a regular grid.
             let (u, v) = ((f64::from(k % 20) + 0.5) / 20.0, (f64::from(k / 20) + 0.5) / 20.0);
             residuals.push((-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos());
         }

@@ -1,9 +1,9 @@
-//! What an arm with given parameters would have shown of what was measured.
+//! Residuals: readings predicted by an arm with given parameters against measured ones.
 //!
-//! A reading is one thing done at the robot: a displacement between two loads at a pose, a place in
-//! the axes of an instrument, the natural frequencies of a hammer test. Each becomes rows: residual
-//! over standard deviation, and its derivatives by the parameters and by the unknowns that belong
-//! to the measurement (where the instrument stands, where the target is on the tool).
+//! A reading is one measurement at the robot: a displacement between two loads at a pose, a
+//! position in the axes of an instrument, the natural frequencies from a hammer test. Each gives
+//! rows: residual over standard deviation, and its derivatives with respect to the parameters and
+//! to the unknowns of the measurement (pose of the instrument, position of the target on the tool).
 
 use std::borrow::Cow;
 
@@ -19,36 +19,36 @@ use crate::estimation::reading::{
 use crate::estimation::response::structure_slopes;
 use crate::estimation::sensitivity::{frequency_slopes, tool_slopes};
 
-/// An arm with unknown parameters under measurements.
+/// An arm with unknown parameters and the measurements made on it.
 pub struct MeasuredArm<'a> {
-    /// The arm as it is known.
+    /// Nominal arm.
     pub plant: &'a Plant,
-    /// What is unknown of it.
+    /// Unknown parameters.
     pub parameters: &'a [Parameter],
-    /// What was read.
+    /// Measurements.
     pub measurements: &'a Measurements,
 }
 
-/// A reading for which the arm has no answer.
+/// Error: the arm has no solution for a reading.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{reading}: {source}")]
 pub struct NoAnswer {
     /// Name of the reading.
     pub reading: String,
-    /// Why.
+    /// Cause.
     pub source: StepError,
 }
 
-/// Derivatives of three numbers or less: rows by unknowns.
+/// Up to a few predicted numbers and their derivatives: rows by unknowns.
 struct Block {
     values: Vec<f64>,
     slopes: DMatrix<f64>,
 }
 
-/// Tool at rest at a pose: where a point of it is, and how it moves with the parameters.
+/// Tool at rest at a pose, and its derivatives with respect to the parameters.
 struct AtRest {
     X_WT: Pose,
-    /// At the tool's origin.
+    /// Translation at the tool's origin.
     slopes: Option<Matrix3xX<f64>>,
     turns: Option<Matrix3xX<f64>>,
 }
@@ -69,7 +69,7 @@ impl AtRest {
     }
 }
 
-/// Workspaces of the loads met so far.
+/// Operating points of the loads met so far.
 struct Workspaces<'a> {
     plant: Plant,
     parameters: &'a [Parameter],
@@ -79,7 +79,7 @@ struct Workspaces<'a> {
 }
 
 impl<'a> Workspaces<'a> {
-    /// The tool at rest at a pose under a load.
+    /// Solves for the tool at rest at a pose under a load.
     fn at_rest(&mut self, q: &[f64], load: &LoadCase, slopes: bool) -> Result<AtRest, StepError> {
         let known = self.known.iter().position(|(at, carried, _)| *at == load.at && *carried == load.carried);
         let number = match known {
@@ -106,7 +106,7 @@ impl<'a> Workspaces<'a> {
         let arm = X_WT.rotation * load.at;
         let tools: Vec<(usize, [Vector3<f64>; 2])> = tool_twists(self.parameters, &X_WT.rotation, &turn).collect();
         if !tools.is_empty() {
-            // A force that moves along has another moment.
+            // The applied force moves with the tool, which changes its moment.
             let C = at.compliance();
             for (k, [v, w]) in &tools {
                 let moment = (v + w.cross(&arm)).cross(&load.wrench.force);
@@ -116,7 +116,7 @@ impl<'a> Workspaces<'a> {
         let mut turns = V.fixed_rows::<3>(3).into_owned();
         let mut moved = V.fixed_rows::<3>(0).into_owned();
         for (mut to, w) in moved.column_iter_mut().zip(turns.column_iter()) {
-            // From where the load acts to the tool's origin.
+            // From the point of application of the load to the tool's origin.
             to -= w.cross(&arm);
         }
         for (k, [v, w]) in tools {
@@ -126,8 +126,8 @@ impl<'a> Workspaces<'a> {
         Ok(AtRest { X_WT, slopes: Some(moved), turns: Some(turns) })
     }
 
-    /// The parameters as they act on an arm that carries this at its tool: moving the tool moves
-    /// that mass.
+    /// Returns the parameters for an arm that carries a mass at its tool: moving the tool also
+    /// moves that mass.
     fn under(&self, carried: &SpatialInertia) -> Cow<'a, [Parameter]> {
         if !self.parameters.iter().any(|p| matches!(p.effect, Effect::Tool(_))) {
             return Cow::Borrowed(self.parameters);
@@ -149,10 +149,10 @@ impl<'a> Workspaces<'a> {
 }
 
 impl MeasuredArm<'_> {
-    /// What each reading would have shown, in its own units, reading after reading.
+    /// Returns the predicted numbers of all readings in their own units, reading after reading.
     ///
     /// # Errors
-    /// [`NoAnswer`].
+    /// [`NoAnswer`] if the arm has no solution for a reading.
     pub fn predicted(&self, unknowns: &DVector<f64>) -> Result<Vec<f64>, NoAnswer> {
         let mut rooms = self.rooms(unknowns);
         let own = &unknowns.as_slice()[self.parameters.len()..];
@@ -163,7 +163,7 @@ impl MeasuredArm<'_> {
         Ok(values)
     }
 
-    /// What was read, in the same order.
+    /// Returns the measured numbers in the order of [`Self::predicted`].
     pub fn observed(&self) -> Vec<f64> {
         let of = |reading: &Reading| -> Vec<f64> {
             match &reading.kind {
@@ -186,11 +186,11 @@ impl MeasuredArm<'_> {
         self.measurements.readings.iter().flat_map(of).collect()
     }
 
-    /// Of each measured shape its reading's number, the mode of the arm that is most like it (from
-    /// 0), and how much: the modal assurance criterion, from 0 to 1.
+    /// Returns, for each measured mode shape, the number of its reading, the index of the most
+    /// similar mode of the arm, and their modal assurance criterion (0 to 1).
     ///
     /// # Errors
-    /// [`NoAnswer`].
+    /// [`NoAnswer`] if the arm has no solution for a reading.
     pub fn assurances(&self, unknowns: &DVector<f64>) -> Result<Vec<(usize, usize, f64)>, NoAnswer> {
         let rooms = self.rooms(unknowns);
         let mut all = Vec::new();
@@ -209,7 +209,8 @@ impl MeasuredArm<'_> {
         Workspaces { plant: self.plant.with(self.parameters, &x), parameters: self.parameters, x, known: Vec::new() }
     }
 
-    /// Numbers of a reading, with their derivatives by all unknowns if asked for.
+    /// Predicts the numbers of a reading, and their derivatives with respect to all unknowns if
+    /// `slopes`.
     fn block(
         &self,
         rooms: &mut Workspaces<'_>,
@@ -227,7 +228,7 @@ impl MeasuredArm<'_> {
                 Ok(self.place(&at, *target, *instrument, own))
             }
             ReadingKind::Known { parameter, .. } => {
-                // One that is not fitted stays at zero.
+                // A parameter that is not fitted stays at zero.
                 let number = self.parameters.iter().position(|p| p.name == *parameter);
                 let value = number.map_or(0.0, |k| rooms.x[k]);
                 let columns = if slopes { self.parameters.len() + own.len() } else { 0 };
@@ -258,22 +259,24 @@ impl MeasuredArm<'_> {
         }
     }
 
-    /// Derivatives by the arm's parameters beside zeros for what belongs to the measurements.
+    /// Pads derivatives with respect to the parameters with zeros for the unknowns of the
+    /// measurements.
     fn with_own(&self, rows: usize, own: usize, slopes: bool, slope: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
         let p = self.parameters.len();
         let columns = if slopes { p + own } else { 0 };
         DMatrix::from_fn(rows, columns, |i, j| if j < p { slope(i, j) } else { 0.0 })
     }
 
-    /// Derivatives by what belongs to the measurements beside zeros for the arm's parameters.
+    /// Pads derivatives with respect to the unknowns of the measurements with zeros for the
+    /// parameters.
     fn of_own(&self, rows: usize, own: usize, slopes: bool, slope: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
         let p = self.parameters.len();
         let columns = if slopes { p + own } else { 0 };
         DMatrix::from_fn(rows, columns, |i, j| if j < p { 0.0 } else { slope(i, j - p) })
     }
 
-    /// Place of an instrument in the world if it counts, and by which rotation vector (its axes) it
-    /// is turned from `X`.
+    /// Returns the position of an instrument in the world if `placed`, and the rotation vector, in
+    /// the instrument's axes, by which it is turned from `X`.
     fn instrument_at(&self, number: usize, X: &Pose, placed: bool, own: &[f64], slopes: bool) -> Block {
         let (X_IW, place, turn) = self.measurements.instrument(number, own);
         let X_WI = X_IW.inverse();
@@ -346,7 +349,8 @@ impl MeasuredArm<'_> {
                 let turned = found.slopes[p].rows.iter().map(|row| (row * &phi)[0]);
                 let change = raw(&all[p]) + DVector::from_iterator(seen.len(), turned);
                 let amplitude = raw(&phi);
-                // Of a vector of unit length, across it.
+                // Derivative of a vector normalised to unit length: only its part normal to the
+                // vector.
                 let sign = amplitude.dot(&seen).signum();
                 let change = change * (sign / amplitude.norm());
                 &change - &seen * seen.dot(&change)
@@ -356,7 +360,7 @@ impl MeasuredArm<'_> {
         Ok(Block { values: seen.iter().copied().collect(), slopes })
     }
 
-    /// A target seen from an instrument.
+    /// Predicts the position of a target as seen from an instrument.
     fn place(&self, at: &AtRest, target: usize, instrument: usize, own: &[f64]) -> Block {
         let p = self.parameters.len();
         let (X_IW, place, turn) = self.measurements.instrument(instrument, own);
@@ -370,8 +374,8 @@ impl MeasuredArm<'_> {
             slopes.view_mut((0, p + first), (3, 3)).fill_with_identity();
         }
         if let Some(first) = turn {
-            // The increments are of a rotation vector: its rate map to the angular velocity on the
-            // left.
+            // The unknowns are increments of a rotation vector; the left Jacobian maps their rates
+            // to the angular velocity.
             let rates = left_jacobian(&Vector3::new(own[first], own[first + 1], own[first + 2]));
             for k in 0..3 {
                 slopes.view_mut((0, p + first + k), (3, 1)).copy_from(&rates.column(k).cross(&seen));
@@ -384,11 +388,11 @@ impl MeasuredArm<'_> {
     }
 }
 
-/// Velocity at the tool's origin and angular velocity per unit of each parameter that moves the
-/// tool, by its number.
+/// Returns the velocity at the tool's origin and the angular velocity per unit of each parameter
+/// that moves the tool, with the index of the parameter.
 ///
-/// * `R`: rotation of the tool as it is now, in the axes asked for; `turn`: by which of that it is
-///   turned from its own axes.
+/// * `R`: present rotation of the tool in the axes of the result.
+/// * `turn`: rotation vector of the part of `R` that the parameters contribute.
 fn tool_twists<'a>(
     parameters: &'a [Parameter],
     R: &Rotation3<f64>,
@@ -403,7 +407,8 @@ fn tool_twists<'a>(
     })
 }
 
-/// Angular velocity (fixed axes) per rate of a rotation vector.
+/// Returns the left Jacobian of a rotation vector: angular velocity (fixed axes) per rate of the
+/// vector.
 fn left_jacobian(v: &Vector3<f64>) -> nalgebra::Matrix3<f64> {
     let angle = v.norm();
     let K = v.cross_matrix();
@@ -431,7 +436,7 @@ impl MeasuredArm<'_> {
         let moved = after.point(point) - before.point(point);
         let turn = after.X_WT.rotation * before.X_WT.rotation.inverse();
         let turned = rotation_vector(turn.matrix());
-        // In world axes; of an instrument's axes by the world in them.
+        // Directions in world axes; directions in an instrument's axes are rotated into the world.
         let seen_from = |instrument: Option<usize>| instrument.map(|k| self.measurements.instrument(k, own));
         let world = |row: &Row<Component>| {
             let (d, instrument, about) = row.of.parts();
@@ -445,8 +450,8 @@ impl MeasuredArm<'_> {
         let none = |values| Ok(Block { values, slopes: DMatrix::zeros(rows.len(), 0) });
         let (Some(a), Some(b)) = (after.point_slopes(point), before.point_slopes(point)) else { return none(values) };
         let (Some(wa), Some(wb)) = (&after.turns, &before.turns) else { return none(values) };
-        // Rotation from before to after: its angular velocity is wa - R wb, its vector's rate the
-        // inverse of the rate map.
+        // The rotation from before to after has the angular velocity wa - R wb; the inverse left
+        // Jacobian maps it to the rate of the rotation vector.
         let rate = left_jacobian(&turned).try_inverse().unwrap_or_else(nalgebra::Matrix3::identity);
         let p = a.ncols();
         let mut all = DMatrix::zeros(rows.len(), p + own.len());

@@ -1,13 +1,13 @@
-//! Parameters of flexible arms from measurements, with their uncertainties.
+//! Parameters of flexible arms estimated from measurements, with their uncertainties.
 //!
-//! A [`Plant`] is an arm as it is known, [`Parameter`]s say what of it is unknown, [`Measurements`]
-//! what was read at the robot. [`MeasuredArm`] puts them together; [`identify`] finds the
-//! parameters, says which of them the readings tell and how well, and which readings argue against
-//! the model. [`plan`] chooses poses and loads that are worth measuring. Derivatives are in closed
-//! form ([`tool_slopes`], [`compliance_slopes`], [`frequency_slopes`], [`structure_slopes`], and
-//! [`error_slopes`] along a motion).
+//! A [`Plant`] is the nominal arm, [`Parameter`]s are its unknowns, and [`Measurements`] the
+//! readings taken at the robot. [`MeasuredArm`] combines them; [`identify`] estimates the
+//! parameters with their uncertainties, and reports which of them the readings determine and which
+//! readings contradict the model. [`plan`] chooses poses and loads to measure. Derivatives are in
+//! closed form ([`tool_slopes`], [`compliance_slopes`], [`frequency_slopes`], [`structure_slopes`],
+//! and [`error_slopes`] along a motion).
 //!
-//! Not here: files, units, robots by name (the facade).
+//! Not here: files, units, robots by name (the crate root).
 
 mod coupled_gears;
 mod encoders;

@@ -1,4 +1,4 @@
-//! What may be unknown of an arm, and the arm with given values of it.
+//! Unknown parameters of an arm, and the arm with given parameter values.
 
 use std::sync::Arc;
 
@@ -6,38 +6,39 @@ use flexarm_kinematics::{Frame, Model, Pose, SpatialInertia};
 use flexarm_stepping::{Damping, FlexibleArm, GearCoupling, Held, Spring, StepError};
 use nalgebra::{DMatrix, Matrix3, Rotation3, Translation3, Vector3};
 
-/// An arm before anything is measured: tree, springs in coordinate order, tool.
+/// Model of an arm: tree, springs in coordinate order, tool.
 #[derive(Clone, Debug)]
 pub struct Plant {
-    /// The tree.
+    /// Kinematic tree.
     pub model: Arc<Model>,
-    /// Its springs, one per elastic group.
+    /// Springs, one per elastic group.
     pub springs: Vec<Spring>,
-    /// The tool.
+    /// Tool frame.
     pub tool: Frame,
-    /// Gears that move several joints; their springs above are those of the motors.
+    /// Coupling of gears that move several joints; `springs` then contains the springs of their
+    /// motors.
     pub coupling: Option<GearCoupling>,
 }
 
-/// Where a stiffness or a damping acts.
+/// Spring, or one of its coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Place {
     /// Number of the spring.
     pub spring: usize,
-    /// One of its coordinates; all of them without.
+    /// One of its coordinates; all of them if `None`.
     pub coordinate: Option<usize>,
 }
 
-/// What a parameter does.
+/// Effect of a parameter on the arm.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Effect {
-    /// Factor on the stiffness of springs. On one coordinate of a spring K becomes `S K S` with
-    /// `√factor` there, so that it stays symmetric and positive definite.
+    /// Factor on the stiffness of springs. For one coordinate of a spring, K becomes `S K S` with
+    /// `√factor` there, so that K stays symmetric and positive definite.
     Stiffness(Vec<Place>),
-    /// Entry of a spring's matrix and its mirror image: the search's coordinate is the change of
-    /// the parameter's value, and the entry changes by `factor` times that. The matrix must stay
-    /// positive definite: an arm without is no answer, and the search goes no step that leads
-    /// there. Not to be taken beside [`Effect::Stiffness`] on the same spring.
+    /// Entry of a spring's matrix and its mirror image. The search coordinate is the change of the
+    /// parameter's value, and the entry changes by `factor` times that. The matrix must stay
+    /// positive definite: otherwise the arm has no solution, and the search rejects the step. Not
+    /// to be combined with [`Effect::Stiffness`] on the same spring.
     Entry {
         /// Number of the spring.
         spring: usize,
@@ -47,55 +48,55 @@ pub enum Effect {
         column: usize,
         /// Change of the entry per unit of the value.
         factor: f64,
-        /// `√(K_ii K_jj)` in the unit of the value: what the entry is large or small against.
+        /// `√(K_ii K_jj)` in the unit of the value, the scale of the entry.
         size: f64,
     },
-    /// Tool moved along one of its own axes (0 to 2; m), or turned by a rotation vector about them
-    /// (3 to 5; rad): together `X_BT exp`, the displacement in the axes as they were. What is
-    /// measured, loaded and carried at the tool moves along.
+    /// Translation of the tool along one of its own axes (0 to 2; m), or component of a rotation
+    /// vector about them (3 to 5; rad). Together they give `X_BT exp`, with the displacement in the
+    /// initial axes. Measured points, loads and payload at the tool move with it.
     Tool(usize),
-    /// Factor on the damping of springs, whatever describes it.
+    /// Factor on the damping of springs of any damping model.
     Damping(Vec<usize>),
     /// Factor on the damper of one coordinate of a spring.
     Damper {
         /// Number of the spring.
         spring: usize,
-        /// One of its coordinates, from 0.
+        /// Coordinate of the spring, from 0.
         coordinate: usize,
     },
-    /// Mass (kg) on a body with inertia in proportion: `per_kg` about Bo, B axes.
+    /// Mass (kg) on a body, with inertia proportional to it: `per_kg` about Bo, B axes.
     Mass {
-        /// The body.
+        /// Number of the body.
         body: usize,
-        /// Inertia of a kilogram of it.
+        /// Spatial inertia per kilogram.
         per_kg: SpatialInertia,
     },
 }
 
-/// Something unknown of an arm.
+/// Unknown parameter of an arm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameter {
-    /// Name for people, as in robot files.
+    /// Name for output, as in robot files.
     pub name: String,
-    /// Unit of its value.
+    /// Unit of the value.
     pub unit: String,
-    /// Value in the arm as it is.
+    /// Initial value.
     pub initial: f64,
-    /// Standard deviation of what is known before: of the logarithm for stiffnesses and dampings,
-    /// in the unit else.
+    /// Prior standard deviation: of the logarithm for stiffness and damping, otherwise in the unit
+    /// of the value.
     pub prior: f64,
-    /// What it does.
+    /// Effect on the arm.
     pub effect: Effect,
 }
 
 impl Parameter {
-    /// Whether the search goes along its logarithm, so that it stays positive.
+    /// Whether the search coordinate is the logarithm of the value, which keeps the value positive.
     pub fn is_logarithmic(&self) -> bool {
         matches!(self.effect, Effect::Stiffness(_) | Effect::Damping(_) | Effect::Damper { .. })
     }
 
-    /// Standard deviation of the search's coordinate that the readings must reach for the parameter
-    /// to be told, whatever its prior is; the default of a prior.
+    /// Returns the maximum standard deviation of the search coordinate for the parameter to count
+    /// as identifiable, whatever its prior is. It is also the default prior.
     pub fn reference(&self) -> f64 {
         match &self.effect {
             Effect::Stiffness(_) | Effect::Damping(_) | Effect::Damper { .. } => std::f64::consts::LN_2,
@@ -105,24 +106,25 @@ impl Parameter {
         }
     }
 
-    /// Value at a coordinate of the search, which is 0 at the initial value.
+    /// Returns the value at a search coordinate, which is 0 at the initial value.
     pub fn value(&self, x: f64) -> f64 {
         if self.is_logarithmic() { self.initial * x.exp() } else { self.initial + x }
     }
 
-    /// Standard deviation of the value, to first order, from that of the search's coordinate.
+    /// Returns the standard deviation of the value from that of the search coordinate, to first
+    /// order.
     pub fn deviation(&self, x: f64, std: f64) -> f64 {
         if self.is_logarithmic() { self.value(x) * std } else { std }
     }
 
-    /// Interval of the value, so many deviations to each side.
+    /// Returns the interval of the value for a number of standard deviations to each side.
     pub fn interval(&self, x: f64, std: f64, deviations: f64) -> [f64; 2] {
         [self.value(x - deviations * std), self.value(x + deviations * std)]
     }
 }
 
 impl Plant {
-    /// The plant with parameters at coordinates `x` of the search.
+    /// Returns the plant with parameters at search coordinates `x`.
     #[must_use]
     pub fn with(&self, parameters: &[Parameter], x: &[f64]) -> Self {
         let mut plant = self.clone();
@@ -159,7 +161,7 @@ impl Plant {
         plant
     }
 
-    /// The plant with inertia added to a body (about Bo, B axes).
+    /// Returns the plant with inertia added to a body (about Bo, B axes).
     #[must_use]
     pub fn carrying(&self, body: usize, inertia: &SpatialInertia) -> Self {
         let mut sum = self.model.bodies()[body].inertia;
@@ -167,7 +169,7 @@ impl Plant {
         Self { model: Arc::new(self.model.with_inertia(body, sum)), ..self.clone() }
     }
 
-    /// The arm held at a pose.
+    /// Returns the arm with drives locked at a pose.
     ///
     /// # Errors
     /// As [`FlexibleArm::new`] and [`FlexibleArm::with_coupling`].
@@ -180,8 +182,8 @@ impl Plant {
     }
 }
 
-/// Displacement (m) and rotation vector (rad) of the tool in its own axes at coordinates of the
-/// search.
+/// Returns displacement (m) and rotation vector (rad) of the tool in its own axes at given search
+/// coordinates.
 pub(crate) fn tool_shift(parameters: &[Parameter], x: &[f64]) -> (Vector3<f64>, Vector3<f64>) {
     let (mut p, mut turn) = (Vector3::zeros(), Vector3::zeros());
     for (parameter, x) in parameters.iter().zip(x) {
@@ -194,8 +196,8 @@ pub(crate) fn tool_shift(parameters: &[Parameter], x: &[f64]) -> (Vector3<f64>, 
     (p, turn)
 }
 
-/// Change of an inertia about Bo, B axes, as it moves with velocity `v` at the point `p` and
-/// angular velocity `w`.
+/// Returns the rate of change of an inertia about Bo, B axes, as it moves with velocity `v` at the
+/// point `p` and angular velocity `w`.
 pub(crate) fn carried_along(
     I: &SpatialInertia,
     p: &Vector3<f64>,
@@ -213,7 +215,7 @@ pub(crate) fn carried_along(
     }
 }
 
-/// So many kilograms of it.
+/// Scales an inertia per kilogram to a mass.
 pub(crate) fn scaled(per_kg: &SpatialInertia, kg: f64) -> SpatialInertia {
     SpatialInertia {
         mass: kg * per_kg.mass,
@@ -239,14 +241,14 @@ fn stiffen(spring: &mut Spring, coordinate: Option<usize>, factor: f64) {
     }
 }
 
-/// A change of one entry of a symmetric matrix of n rows.
+/// Returns a symmetric n×n matrix with one entry, and its mirror image, equal to `change`.
 pub(crate) fn entry_slope(n: usize, row: usize, column: usize, change: f64) -> DMatrix<f64> {
     let mut dK = DMatrix::zeros(n, n);
     (dK[(row, column)], dK[(column, row)]) = (change, change);
     dK
 }
 
-/// `dK/d(ln factor)` of a spring's matrix.
+/// Returns `dK/d(ln factor)` of a spring's matrix.
 pub(crate) fn slope_of(K: &DMatrix<f64>, coordinate: Option<usize>) -> DMatrix<f64> {
     match coordinate {
         None => K.clone(),

@@ -1,9 +1,9 @@
-//! Poses and loads that are worth measuring.
+//! Choice of poses and loads to measure.
 //!
-//! Of many candidates those are taken whose readings together tell the parameters best: the largest
-//! determinant of the information (D-optimal), or the smallest variance of what the parameters will
-//! be used for. First one after another, the best next one each time, then by exchange as long as
-//! an exchange pays (Fedorov). The prior's information counts from the start.
+//! Chooses the candidates whose readings together give the most information about the parameters:
+//! maximum determinant of the information matrix (D-optimal), or minimum variance of given
+//! quantities. Candidates are first added greedily, then exchanged as long as this improves the
+//! plan (Fedorov). The information of the prior is included from the start.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -12,40 +12,39 @@ use crate::estimation::measurement::{MeasuredArm, NoAnswer};
 use crate::estimation::parameter::{Parameter, Plant};
 use crate::estimation::reading::{Measurements, Reading};
 
-/// Something that could be measured: a reading with the deviations expected of it; its values do
-/// not count.
+/// Candidate: a reading with its expected deviations; its values are ignored.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate(pub Reading);
 
-/// What is asked of a plan.
+/// Options of a plan.
 #[derive(Clone, Debug, Default)]
 pub struct PlanOptions {
-    /// How many readings.
+    /// Number of readings.
     pub count: usize,
-    /// Readings whose predicted numbers should be as sure as possible, the unit of each by its
-    /// deviation; the determinant without.
+    /// Readings whose predicted numbers should have minimum variance, each relative to its
+    /// deviation; if empty, the determinant is maximised.
     pub purpose: Vec<Reading>,
-    /// Whether a candidate may be taken more than once.
+    /// Whether a candidate may be chosen more than once.
     pub repeat: bool,
 }
 
-/// What should be measured.
+/// Plan of measurements.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// Numbers of the candidates, in the order in which they were found worth it.
+    /// Indices of the chosen candidates, in order of choice.
     pub chosen: Vec<usize>,
-    /// Standard deviation to expect of each parameter's coordinate.
+    /// Expected standard deviation of each parameter's coordinate.
     pub deviations: Vec<f64>,
-    /// Logarithm of the determinant of the information over that of the prior alone.
+    /// Logarithm of the determinant of the information over that of the prior.
     pub gain: f64,
-    /// Standard deviation of each number of the purpose, in its own unit.
+    /// Expected standard deviation of each number of the purpose, in its own unit.
     pub purpose: Vec<f64>,
 }
 
-/// Most rounds of exchange.
+/// Maximum number of rounds of exchange.
 const ROUNDS: usize = 20;
 
-/// Rows of one reading over the prior's deviations.
+/// Rows of the Jacobian of one reading, scaled by the prior deviations.
 fn rows_of(plant: &Plant, parameters: &[Parameter], reading: &Reading) -> Result<DMatrix<f64>, NoAnswer> {
     let one = Measurements { readings: vec![reading.clone()], ..Measurements::default() };
     let arm = MeasuredArm { plant, parameters, measurements: &one };
@@ -59,10 +58,10 @@ fn rows_of(plant: &Plant, parameters: &[Parameter], reading: &Reading) -> Result
 
 /// Chooses readings among candidates.
 ///
-/// Candidates for which the arm has no answer are passed over.
+/// Candidates for which the arm has no solution are skipped.
 ///
 /// # Errors
-/// [`NoAnswer`] for a reading of the purpose.
+/// [`NoAnswer`] if the arm has no solution for a reading of the purpose.
 pub fn plan(
     plant: &Plant,
     parameters: &[Parameter],
@@ -78,6 +77,7 @@ pub fn plan(
         options.purpose.iter().map(|reading| rows_of(plant, parameters, reading)).collect::<Result<Vec<_>, _>>()?;
     let mut search = Choice { rows: &rows, purpose: &purpose, repeat: options.repeat, chosen: Vec::new() };
     let mut information = DMatrix::identity(p, p);
+    // Greedy selection, then exchange.
     while search.chosen.len() < options.count {
         let Some(best) = search.best(&information) else { break };
         search.add(&mut information, best, 1.0);
@@ -95,7 +95,7 @@ pub fn plan(
 }
 
 fn inverse_of(information: &DMatrix<f64>) -> DMatrix<f64> {
-    // The prior's identity is in it: positive definite.
+    // Positive definite, because it includes the identity of the prior.
     Cholesky::new(information.clone())
         .map_or_else(|| DMatrix::identity(information.nrows(), information.nrows()), |f| f.inverse())
 }
@@ -118,7 +118,7 @@ impl Choice<'_> {
         }
     }
 
-    /// What is to be small.
+    /// Evaluates the cost function of the plan.
     fn cost(&self, information: &DMatrix<f64>) -> f64 {
         if self.purpose.is_empty() {
             return -log_determinant(information);
@@ -127,7 +127,7 @@ impl Choice<'_> {
         self.purpose.iter().map(|J| (J * &inverse).component_mul(J).sum()).sum()
     }
 
-    /// The candidate that makes the information best.
+    /// Returns the candidate that reduces the cost most.
     fn best(&self, information: &DMatrix<f64>) -> Option<usize> {
         let mut best: Option<(usize, f64)> = None;
         for number in 0..self.rows.len() {
@@ -144,7 +144,7 @@ impl Choice<'_> {
         best.map(|(number, _)| number)
     }
 
-    /// Each chosen one against all others, as long as it pays.
+    /// Exchanges each chosen candidate for a better one, as long as the cost decreases.
     fn exchange(&mut self, information: &mut DMatrix<f64>) {
         for _ in 0..ROUNDS {
             let mut paid = false;

@@ -1,24 +1,24 @@
-//! What was measured: readings, and what belongs to them.
+//! Readings, and the instruments and targets they refer to.
 
 use flexarm_kinematics::{Pose, SpatialInertia, Wrench};
 use nalgebra::{Complex, DVector, Rotation3, Translation3, Vector3};
 
 use crate::estimation::response::{Answer, Probe, StructureSlopes};
 
-/// What the tool carries and what pulls at it.
+/// Additional mass at the tool and force on it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadCase {
-    /// Force and moment at the point, world axes (N, N m).
+    /// Force and moment at the point of application, world axes (N, N m).
     pub wrench: Wrench,
-    /// Where they act, in tool axes (m).
+    /// Point of application, tool axes (m).
     pub at: Vector3<f64>,
-    /// What is fixed to the tool besides what the robot carries: inertia about the tool's origin,
+    /// Inertia fixed to the tool in addition to the robot's own payload: about the tool's origin,
     /// tool axes.
     pub carried: SpatialInertia,
 }
 
 impl LoadCase {
-    /// Nothing besides what the robot carries anyway.
+    /// Returns a load without additional mass and force.
     pub fn none() -> Self {
         Self { wrench: Wrench::zeros(), at: Vector3::zeros(), carried: SpatialInertia::zeros() }
     }
@@ -30,33 +30,33 @@ impl Default for LoadCase {
     }
 }
 
-/// One number: what it is of, what was read, how sure it is.
+/// One measured number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row<T> {
-    /// What of the reading.
+    /// Quantity within the reading.
     pub of: T,
-    /// The number (m, rad or Hz).
+    /// Measured value (m, rad or Hz).
     pub value: f64,
-    /// Its standard deviation.
+    /// Standard deviation.
     pub std: f64,
 }
 
-/// A component of a displacement.
+/// Component of a displacement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Component {
-    /// Along a direction, world axes, of unit length.
+    /// Translation along a unit vector in world axes.
     Along(Vector3<f64>),
-    /// Rotation about a direction, world axes.
+    /// Rotation about a unit vector in world axes.
     About(Vector3<f64>),
-    /// Along a direction in the axes of an instrument, by its number.
+    /// Translation along a unit vector in the axes of an instrument, given by its number.
     AlongSeen(usize, Vector3<f64>),
-    /// Rotation about a direction in the axes of an instrument.
+    /// Rotation about a unit vector in the axes of an instrument, given by its number.
     AboutSeen(usize, Vector3<f64>),
 }
 
 impl Component {
-    /// Its direction, the instrument in whose axes it is (else those of the world), and whether it
-    /// is a rotation.
+    /// Returns the direction, the number of the instrument in whose axes it is given (`None`: world
+    /// axes), and whether the component is a rotation.
     pub fn parts(&self) -> (Vector3<f64>, Option<usize>, bool) {
         match *self {
             Self::Along(d) => (d, None, false),
@@ -67,49 +67,48 @@ impl Component {
     }
 }
 
-/// One thing measured at a pose.
+/// One measurement at a pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reading {
-    /// Name for people: file and row.
+    /// Name for output: file and row.
     pub name: String,
     /// Actuated joints (rad or m).
     pub q: Vec<f64>,
-    /// What.
+    /// Kind and values.
     pub kind: ReadingKind,
 }
 
-/// How a measured response is compared with the arm's.
+/// Form in which a measured response is compared with the model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Form {
-    /// Logarithm of the magnitude, and phase (rad): what is off by a part of itself counts alike
-    /// everywhere.
+    /// Logarithm of the magnitude, and phase (rad): equal relative errors have equal weight.
     #[default]
     Logarithmic,
-    /// Real and imaginary part: what is large counts.
+    /// Real and imaginary part: large values dominate.
     Complex,
 }
 
-/// The curve of a hammer test.
+/// Measured frequency response.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeasuredResponse {
-    /// What the tool carries; a wrench does not count.
+    /// Additional mass at the tool; the wrench is ignored.
     pub load: LoadCase,
-    /// What is watched.
+    /// Measured point and direction.
     pub watched: Probe,
-    /// What is hit.
+    /// Excited point and direction.
     pub hit: Probe,
-    /// What is measured per newton.
+    /// Quantity measured per newton.
     pub answer: Answer,
-    /// How it is compared.
+    /// Form of the comparison.
     pub form: Form,
-    /// Frequencies (rad/s), values in SI units, and the deviations of the two numbers that each
-    /// becomes.
+    /// Frequencies (rad/s), values in SI units, and the standard deviations of the two numbers that
+    /// each value gives.
     pub points: Vec<(f64, Complex<f64>, [f64; 2])>,
 }
 
 impl MeasuredResponse {
-    /// The two numbers of a value at a point: of a phase that one within half a turn of the
-    /// measured.
+    /// Returns the two numbers of a value at a point. The phase is unwrapped to within π of the
+    /// measured one.
     pub(crate) fn numbers(&self, k: usize, value: Complex<f64>) -> [f64; 2] {
         let measured = self.points[k].1;
         match self.form {
@@ -118,7 +117,7 @@ impl MeasuredResponse {
         }
     }
 
-    /// Change of the same two numbers with that of the value.
+    /// Returns the derivatives of the same two numbers, given that of the value.
     pub(crate) fn number_slopes(&self, value: Complex<f64>, slope: Complex<f64>) -> [f64; 2] {
         match self.form {
             Form::Complex => [slope.re, slope.im],
@@ -130,28 +129,28 @@ impl MeasuredResponse {
     }
 }
 
-/// The shape of a mode as it was seen at some points.
+/// Mode shape measured at some points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeasuredShape {
-    /// What the tool carries; a wrench does not count.
+    /// Additional mass at the tool; the wrench is ignored.
     pub load: LoadCase,
-    /// Where and along which directions it was seen.
+    /// Measured points and directions.
     pub probes: Vec<Probe>,
-    /// Amplitudes there, in any unit and with any sign in common.
+    /// Amplitudes, up to a common factor of any sign.
     pub amplitudes: DVector<f64>,
-    /// Deviation of each amplitude, as a part of the length of all of them.
+    /// Standard deviation of each amplitude over the norm of all amplitudes.
     pub std: f64,
 }
 
 impl MeasuredShape {
-    /// The measured amplitudes with length 1.
+    /// Returns the amplitudes normalised to length 1.
     pub(crate) fn unit(&self) -> DVector<f64> {
         self.amplitudes.normalize()
     }
 
-    /// The mode of the arm that is most like it: its number, its modal assurance criterion `(aᵀb)²`
-    /// of unit vectors a and b, and its amplitudes at the probes, with length 1 and the sign of the
-    /// measured.
+    /// Returns the most similar mode of the arm: its number, its modal assurance criterion `(aᵀb)²`
+    /// of unit vectors a and b, and its amplitudes at the probes, normalised to length 1 and with
+    /// the sign of the measured ones.
     pub(crate) fn likeliest(&self, found: &StructureSlopes) -> Option<(usize, f64, DVector<f64>)> {
         let measured = self.unit();
         let of = |j: usize| {
@@ -169,77 +168,76 @@ impl MeasuredShape {
 /// Kinds of readings.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ReadingKind {
-    /// How far a point of the tool moves from one load to another.
+    /// Displacement of a point of the tool from one load to another.
     Displacement {
-        /// Before.
+        /// First load.
         before: LoadCase,
-        /// After.
+        /// Second load.
         after: LoadCase,
-        /// The point, tool axes (m).
+        /// Measured point, tool axes (m).
         point: Vector3<f64>,
-        /// What was read.
+        /// Measured components.
         rows: Vec<Row<Component>>,
     },
-    /// Where a target on the tool is, in the axes of an instrument.
+    /// Position of a target on the tool, in the axes of an instrument.
     Place {
-        /// Load at that time.
+        /// Load during the measurement.
         load: LoadCase,
         /// Number of the target.
         target: usize,
         /// Number of the instrument.
         instrument: usize,
-        /// Place (m).
+        /// Position (m).
         value: Vector3<f64>,
         /// Standard deviation of each component (m).
         std: Vector3<f64>,
     },
-    /// A parameter by itself, told by a measurement of another kind
-    /// ([`crate::estimation::gear_stiffness`]).
+    /// Direct measurement of a parameter by another method ([`crate::estimation::gear_stiffness`]).
     Known {
         /// Name of the parameter.
         parameter: String,
-        /// Its coordinate: of stiffnesses the logarithm of the value over the initial one, else the
-        /// difference.
+        /// Coordinate of the parameter: logarithm of value over initial value for stiffnesses,
+        /// otherwise their difference.
         value: f64,
-        /// Standard deviation of that.
+        /// Standard deviation of the coordinate.
         std: f64,
     },
-    /// Where a target is known to be, with a deviation.
+    /// Prior position of a target.
     TargetAt {
         /// Number of the target.
         target: usize,
-        /// Place, tool axes (m).
+        /// Position, tool axes (m).
         value: Vector3<f64>,
         /// Standard deviation of each component (m).
         std: f64,
     },
-    /// How an instrument is known to stand, with deviations: the first guess of it, which must be
+    /// Prior pose of an instrument, which is also the initial guess. The instrument must be
     /// unknown.
     InstrumentAt {
         /// Number of the instrument.
         instrument: usize,
-        /// The world in its axes.
+        /// Pose of the world in the instrument's axes.
         value: Pose,
-        /// Standard deviation of each component of its place, none where only its axes count (m).
+        /// Standard deviation of each component of its position (m); none if only its axes matter.
         std: Option<f64>,
         /// Standard deviation of the rotation about each axis (rad).
         std_rotation: f64,
     },
-    /// Natural frequencies, drives locked.
+    /// Natural frequencies with locked drives.
     Frequencies {
-        /// What the tool carries; a wrench does not count.
+        /// Additional mass at the tool; the wrench is ignored.
         load: LoadCase,
-        /// Number of the mode, from 0 with the lowest; Hz.
+        /// Number of the mode, from 0 for the lowest; frequency in Hz.
         rows: Vec<Row<usize>>,
     },
-    /// A frequency response, drives locked.
+    /// Frequency response with locked drives.
     Response(MeasuredResponse),
-    /// A mode's shape, drives locked. The arm's own is that which is most like it.
+    /// Mode shape with locked drives, compared with the most similar mode of the arm.
     Shape(MeasuredShape),
 }
 
 impl Reading {
-    /// How many numbers.
+    /// Returns the number of measured numbers.
     pub fn rows(&self) -> usize {
         match &self.kind {
             ReadingKind::Displacement { rows, .. } => rows.len(),
@@ -253,7 +251,7 @@ impl Reading {
         }
     }
 
-    /// All standard deviations so many times as large.
+    /// Multiplies all standard deviations by a factor.
     pub(crate) fn scale_deviations(&mut self, factor: f64) {
         match &mut self.kind {
             ReadingKind::Displacement { rows, .. } => rows.iter_mut().for_each(|row| row.std *= factor),
@@ -271,7 +269,7 @@ impl Reading {
         }
     }
 
-    /// Standard deviation of each number.
+    /// Returns the standard deviation of each number.
     pub fn deviations(&self) -> Vec<f64> {
         match &self.kind {
             ReadingKind::Displacement { rows, .. } => rows.iter().map(|row| row.std).collect(),
@@ -288,28 +286,28 @@ impl Reading {
     }
 }
 
-/// A point on the tool whose place is measured.
+/// Measured point on the tool.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Target {
-    /// Known, tool axes (m).
+    /// Known position, tool axes (m).
     Known(Vector3<f64>),
-    /// Unknown; a guess.
+    /// Unknown position; initial guess, tool axes (m).
     Unknown(Vector3<f64>),
 }
 
-/// Where an instrument stands: the world in its axes.
+/// Pose of an instrument, as the pose of the world in its axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Instrument {
-    /// Known.
+    /// Known pose.
     Known(Pose),
-    /// Unknown; a guess.
+    /// Unknown pose; initial guess.
     Unknown(Pose),
-    /// Only its axes count, and are unknown; a guess.
+    /// Unknown axes, irrelevant position; initial guess.
     Axes(Rotation3<f64>),
 }
 
 impl Instrument {
-    /// How many unknowns it has.
+    /// Returns the number of unknowns.
     pub fn unknowns(&self) -> usize {
         match self {
             Self::Known(_) => 0,
@@ -319,19 +317,19 @@ impl Instrument {
     }
 }
 
-/// Readings, and what belongs to them.
+/// Readings with their targets and instruments.
 #[derive(Clone, Debug, Default)]
 pub struct Measurements {
-    /// What was read.
+    /// Readings.
     pub readings: Vec<Reading>,
-    /// Points that places are of.
+    /// Targets.
     pub targets: Vec<Target>,
-    /// Instruments that places are seen from.
+    /// Instruments.
     pub instruments: Vec<Instrument>,
 }
 
 impl Measurements {
-    /// How many unknowns belong to the measurements: those of the instruments, then three per
+    /// Returns the number of unknowns of the measurements: those of the instruments, then three per
     /// unknown target.
     pub fn own_unknowns(&self) -> usize {
         let targets = self.targets.iter().filter(|t| matches!(t, Target::Unknown(_))).count();
@@ -342,20 +340,20 @@ impl Measurements {
         self.instruments.iter().map(Instrument::unknowns).sum()
     }
 
-    /// How many numbers were read.
+    /// Returns the number of measured numbers.
     pub fn rows(&self) -> usize {
         self.readings.iter().map(Reading::rows).sum()
     }
 
-    /// The same with some of the readings.
+    /// Returns a copy with some of the readings.
     #[must_use]
     pub fn of_readings(&self, keep: impl Fn(usize) -> bool) -> Self {
         let readings = self.readings.iter().enumerate().filter(|(k, _)| keep(*k)).map(|(_, r)| r.clone()).collect();
         Self { readings, ..self.clone() }
     }
 
-    /// The same with the logarithm of responses in the place of their real and imaginary parts;
-    /// none if there are no such.
+    /// Returns a copy that compares all responses by their logarithm; `None` if all of them are
+    /// already compared so.
     pub(crate) fn logarithmic(&self) -> Option<Self> {
         let mut all = self.clone();
         let mut some = false;
@@ -363,8 +361,8 @@ impl Measurements {
             let ReadingKind::Response(response) = &mut reading.kind else { continue };
             if response.form == Form::Complex {
                 (some, response.form) = (true, Form::Logarithmic);
-                // A deviation as a part of the value; of a value in the noise next to nothing is
-                // known.
+                // Relative deviation, at most 10: values below the noise carry hardly any
+                // information.
                 let part = |value: &Complex<f64>, std: &[f64; 2]| std.map(|std| (std / value.norm()).min(10.0));
                 response.points.retain(|(_, value, _)| value.norm() > 0.0);
                 response.points.iter_mut().for_each(|(_, value, std)| *std = part(value, std));
@@ -373,8 +371,8 @@ impl Measurements {
         some.then_some(all)
     }
 
-    /// The world in the axes of an instrument, and where in `own` the unknowns of its place and of
-    /// its rotation begin.
+    /// Returns the pose of the world in the axes of an instrument, and the indices in `own` of the
+    /// first unknown of its position and of its rotation.
     pub(crate) fn instrument(&self, number: usize, own: &[f64]) -> (Pose, Option<usize>, Option<usize>) {
         let first = self.instruments[..number].iter().map(Instrument::unknowns).sum();
         let v = |at: usize| Vector3::new(own[at], own[at + 1], own[at + 2]);
@@ -393,7 +391,7 @@ impl Measurements {
         }
     }
 
-    /// A target on the tool, and where in `own` its three unknowns begin.
+    /// Returns a target on the tool, and the index in `own` of the first of its three unknowns.
     pub(crate) fn target(&self, number: usize, own: &[f64]) -> (Vector3<f64>, Option<usize>) {
         let before = self.targets[..number].iter().filter(|t| matches!(t, Target::Unknown(_))).count();
         match self.targets[number] {

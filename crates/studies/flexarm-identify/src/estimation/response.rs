@@ -1,15 +1,16 @@
-//! Frequency responses of a held arm, and how they change with its parameters.
+//! Frequency responses of an arm with locked drives, and their derivatives with respect to its
+//! parameters.
 //!
 //! ```text
 //! H(ω) = (iω)^s cᵀ Z^-1 b,     Z = K + iωD - ω²M
 //! dH   = (iω)^s [ dcᵀ Z^-1 b + cᵀ Z^-1 db - (Z^-T c)ᵀ dZ Z^-1 b ]
 //! ```
-//! with b and c the Jacobians of the excited and of the watched point along their directions, about
-//! the equilibrium under weight, drives locked. Modal damping follows the modes: its change has
-//! those of their shapes,
+//! with b and c the Jacobians of the excited and the measured point along their directions, at the
+//! equilibrium under gravity, drives locked. Modal damping depends on the mode shapes; its
+//! derivative contains theirs,
 //!
 //! ```text
-//! dφ_j = Σ_i a_ij φ_i,     a_ij = φ_iᵀ(dK - ω_j² dM)φ_j / (ω_j² - ω_i²),     a_jj = -φ_jᵀ dM φ_j / 2
+//! dφ_j = Σ_i a_ij φ_i,   a_ij = φ_iᵀ(dK - ω_j² dM)φ_j / (ω_j² - ω_i²),   a_jj = -φ_jᵀ dM φ_j / 2
 //! ```
 //! Start at [`structure_slopes`].
 
@@ -20,28 +21,28 @@ use nalgebra::{Complex, DMatrix, DVector, RowDVector, Vector3};
 use crate::estimation::parameter::{Effect, Parameter, Plant, entry_slope, slope_of};
 use crate::estimation::sensitivity::{along, eigen, explicit, force_slopes};
 
-/// Squares of two frequencies nearer than this part of each other belong to modes whose shapes are
-/// not determined.
+/// Relative distance between squared frequencies below which the shapes of the two modes are not
+/// determined.
 const SAME_FREQUENCY: f64 = 1e-9;
 
-/// A point of the arm and a direction, of a force or of an accelerometer.
+/// Point of the arm and direction of a force or an accelerometer.
 #[derive(Clone, Debug)]
 pub struct Probe {
-    /// The point: origin of a frame on a body.
+    /// Origin of a frame on a body.
     pub frame: Frame,
-    /// Direction of unit length, world axes.
+    /// Unit vector in world axes.
     pub direction: Vector3<f64>,
 }
 
 impl PartialEq for Probe {
-    /// The same point and direction, whatever the frame is called.
+    /// Compares point and direction; ignores the name of the frame.
     fn eq(&self, other: &Self) -> bool {
         let place = |probe: &Self| (probe.frame.body, probe.frame.X_BF, probe.direction);
         place(self) == place(other)
     }
 }
 
-/// What of the watched point is measured per newton.
+/// Measured quantity of the response per newton.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Answer {
     /// Displacement (m/N).
@@ -54,7 +55,7 @@ pub enum Answer {
 }
 
 impl Answer {
-    /// `(iω)^s`.
+    /// Returns `(iω)^s`.
     pub fn factor(self, omega: f64) -> Complex<f64> {
         match self {
             Self::Receptance => Complex::new(1.0, 0.0),
@@ -63,7 +64,7 @@ impl Answer {
         }
     }
 
-    /// Unit of its magnitude.
+    /// Returns the unit of the magnitude.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Receptance => "m/N",
@@ -73,44 +74,45 @@ impl Answer {
     }
 }
 
-/// A held arm about its equilibrium as a linear structure, n elastic coordinates.
+/// An arm with locked drives, linearised about its equilibrium; n elastic coordinates.
 #[derive(Clone, Debug)]
 pub struct Structure {
-    /// Mass, n×n.
+    /// Mass matrix, n×n.
     pub M: DMatrix<f64>,
-    /// Damping, n×n.
+    /// Damping matrix, n×n.
     pub D: DMatrix<f64>,
-    /// Stiffness with the change of weight, n×n.
+    /// Stiffness matrix including the derivative of gravity forces, n×n.
     pub K: DMatrix<f64>,
-    /// Of each probe: how far it moves along its direction per elastic coordinate.
+    /// Displacement of each probe along its direction per elastic coordinate.
     pub rows: Vec<RowDVector<f64>>,
 }
 
-/// A structure and its change per unit of each parameter's coordinate.
+/// A structure and its derivatives with respect to the parameters' coordinates.
 #[derive(Clone, Debug)]
 pub struct StructureSlopes {
-    /// As it is.
+    /// Structure with the present parameters.
     pub structure: Structure,
-    /// One per parameter.
+    /// Derivatives, one per parameter.
     pub slopes: Vec<Structure>,
     /// Squares of the natural frequencies, ascending (rad²/s²).
     pub omega2: Vec<f64>,
-    /// Shapes with `φᵀ M φ = 1`, one column each.
+    /// Mode shapes with `φᵀ M φ = 1`, one column each.
     pub shapes: DMatrix<f64>,
 }
 
-/// The linear structure of an arm held at a pose under its weight, and its derivatives by
+/// Linearises an arm held at a pose under gravity, and computes its derivatives with respect to the
 /// parameters.
 ///
-/// * `plant`: with the parameters as they are now; `q`: actuated joints (rad or m); `probes`:
-///   points that are hit or watched.
+/// * `plant`: arm with the present parameters.
+/// * `q`: actuated joints (rad or m).
+/// * `probes`: excited and measured points.
 ///
-/// Explicit parts are exact, those by the moving equilibrium central differences of fourth order
-/// along its path. Where two natural frequencies coincide, modal damping that differs between
-/// elements has no derivative.
+/// Explicit derivatives are exact. Those due to the change of the equilibrium are central
+/// differences of fourth order along its path. Where two natural frequencies coincide, modal
+/// damping that differs between elements is not differentiable.
 ///
 /// # Errors
-/// As [`OperatingPoint::solve`]; [`StepError::Singular`] where a coordinate moves no mass.
+/// As [`OperatingPoint::solve`]; [`StepError::Singular`] if a coordinate has no mass.
 pub fn structure_slopes(
     plant: &Plant,
     parameters: &[Parameter],
@@ -153,7 +155,7 @@ pub fn structure_slopes(
     })
 }
 
-/// Jacobian of each probe along its direction.
+/// Computes the Jacobian of each probe along its direction.
 fn rows(arm: &FlexibleArm, probes: &[Probe], q: &DVector<f64>) -> Vec<RowDVector<f64>> {
     let row = |probe: &Probe| {
         let J = Tangents::at(arm, &probe.frame, &Wrench::zeros(), q).J;
@@ -162,7 +164,7 @@ fn rows(arm: &FlexibleArm, probes: &[Probe], q: &DVector<f64>) -> Vec<RowDVector
     probes.iter().map(row).collect()
 }
 
-/// Damping that follows modes and springs.
+/// Data for the derivative of the damping matrix.
 pub(crate) struct Damped<'a> {
     pub(crate) arm: &'a FlexibleArm,
     pub(crate) M: &'a DMatrix<f64>,
@@ -170,21 +172,21 @@ pub(crate) struct Damped<'a> {
     pub(crate) shapes: &'a DMatrix<f64>,
 }
 
-/// A spring's stiffness and damping, and their change by a parameter.
+/// Stiffness and damping of a spring, and their derivatives with respect to a parameter.
 struct SpringSlope {
     first: usize,
     size: usize,
     K: DMatrix<f64>,
     dK: DMatrix<f64>,
     damping: Damping,
-    /// Change of the damping's own numbers: so many times themselves.
+    /// Relative change of the damping coefficients per unit of the parameter.
     more: f64,
-    /// The same of one damper.
+    /// Index of the damper that changes, if only one does.
     damper: Option<usize>,
 }
 
 impl Damped<'_> {
-    /// Change of the damping matrix with that of the structure.
+    /// Computes the derivative of the damping matrix, given those of stiffness and mass.
     pub(crate) fn slope(&self, effect: &Effect, dK: &DMatrix<f64>, dM: &DMatrix<f64>) -> DMatrix<f64> {
         let springs = self.springs(effect);
         let n = dK.nrows();
@@ -208,7 +210,7 @@ impl Damped<'_> {
                 }),
             }
         }
-        // Of coupled gears each motor's damper is in the damping of several joints.
+        // With coupled gears, each motor's damper contributes to the damping of several joints.
         let one;
         let dampers = match effect {
             Effect::Damping(dampers) => &dampers[..],
@@ -233,8 +235,8 @@ impl Damped<'_> {
             match effect {
                 Effect::Stiffness(places) => {
                     for place in places {
-                        // Of coupled gears each motor's spring is in the stiffness of several
-                        // joints.
+                        // With coupled gears, each motor's spring contributes to the stiffness of
+                        // several joints.
                         match self.arm.coupled_stiffness_slope(place.spring) {
                             Some((coupled, slope)) => {
                                 let own = coupled.iter().position(|k| *k == self.arm.offset(e));
@@ -264,7 +266,8 @@ impl Damped<'_> {
         self.arm.elements.iter().enumerate().map(of).collect()
     }
 
-    /// `D = Σ 2 ζ_j ω_j Mφ_j (Mφ_j)ᵀ` with ζ_j the mean over the springs by their strain energy.
+    /// Adds the derivative of `D = Σ 2 ζ_j ω_j Mφ_j (Mφ_j)ᵀ`, where ζ_j is the mean over the
+    /// springs weighted by strain energy.
     fn add_modal(&self, springs: &[SpringSlope], dK: &DMatrix<f64>, dM: &DMatrix<f64>, dD: &mut DMatrix<f64>) {
         let (S, T) = (self.shapes.tr_mul(&(dK * self.shapes)), self.shapes.tr_mul(&(dM * self.shapes)));
         let n = self.omega2.len();
@@ -274,7 +277,7 @@ impl Damped<'_> {
             let dphi = self.shapes * shape_parts(self.omega2, j, &S, &T);
             let omega = w2.sqrt();
             let domega = (S[(j, j)] - w2 * T[(j, j)]) / (2.0 * omega);
-            // Energies, and what of them is damped.
+            // Strain energies, total and weighted by damping ratio.
             let [mut total, mut dtotal, mut lost, mut dlost] = [0.0; 4];
             for s in springs {
                 let (x, dx) = (phi.rows(s.first, s.size), dphi.rows(s.first, s.size));
@@ -299,8 +302,8 @@ impl Damped<'_> {
 }
 
 impl StructureSlopes {
-    /// Change of a mode's shape (number from 0, the lowest) per unit of each parameter's
-    /// coordinate, its modal mass kept at 1.
+    /// Computes the derivatives of a mode's shape (`mode` from 0, the lowest) with respect to each
+    /// parameter's coordinate, at unit modal mass.
     pub fn shape_slopes(&self, mode: usize) -> Vec<DVector<f64>> {
         let of = |change: &Structure| {
             let (S, T) =
@@ -311,8 +314,8 @@ impl StructureSlopes {
     }
 }
 
-/// Parts of the other shapes in the change of a mode's, from the changes of stiffness and mass in
-/// the modes.
+/// Coefficients `a_ij` of the modes in the derivative of mode j, from the derivatives of stiffness
+/// and mass in modal coordinates.
 fn shape_parts(omega2: &[f64], j: usize, S: &DMatrix<f64>, T: &DMatrix<f64>) -> DVector<f64> {
     let w2 = omega2[j];
     DVector::from_fn(omega2.len(), |i, _| match w2 - omega2[i] {
@@ -322,21 +325,21 @@ fn shape_parts(omega2: &[f64], j: usize, S: &DMatrix<f64>, T: &DMatrix<f64>) -> 
     })
 }
 
-/// The response of one probe to a force at another, at each frequency, and its derivatives.
+/// Response of one probe to a force at another, per frequency, and its derivatives.
 #[derive(Clone, Debug)]
 pub struct ResponseSlopes {
-    /// One per frequency.
+    /// Values, one per frequency.
     pub values: Vec<Complex<f64>>,
-    /// A row per frequency, a column per parameter.
+    /// Derivatives: a row per frequency, a column per parameter.
     pub slopes: DMatrix<Complex<f64>>,
 }
 
 impl StructureSlopes {
-    /// `H(ω)` of the probe `watched` per newton at the probe `hit` (numbers among the probes), at
-    /// `omega` (rad/s), and its derivatives by the parameters.
+    /// Computes `H(ω)` of the probe `watched` per newton at the probe `hit` (indices of the probes)
+    /// at `omega` (rad/s), and its derivatives with respect to the parameters.
     ///
     /// # Errors
-    /// [`StepError::Singular`] at a resonance without damping.
+    /// [`StepError::Singular`] at an undamped resonance.
     pub fn response(
         &self,
         watched: usize,
@@ -370,7 +373,7 @@ impl StructureSlopes {
     }
 }
 
-/// `K + iωD - ω²M`.
+/// Returns the dynamic stiffness `K + iωD - ω²M`.
 fn dynamic(s: &Structure, omega: f64) -> DMatrix<Complex<f64>> {
     let square = omega * omega;
     DMatrix::from_fn(s.K.nrows(), s.K.ncols(), |i, j| {

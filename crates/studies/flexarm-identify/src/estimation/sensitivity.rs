@@ -1,11 +1,12 @@
-//! How an arm at rest answers to its parameters: the tool's place and the natural frequencies.
+//! Derivatives of the tool pose and the natural frequencies of an arm at rest with respect to its
+//! parameters.
 //!
 //! ```text
 //! K e + p(e) = 0:     V_T = -J (K + dp/de)^-1 dr/dx          dω²/dx = φᵀ (dK/dx - ω² dM/dx) φ
 //! ```
-//! with r the unbalanced forces. One matrix of an operating point serves all parameters. In dK/dx
-//! and dM/dx the explicit part is exact; the part by the moving equilibrium is a central difference
-//! of fourth order of the closed tangents along de/dx.
+//! with r the unbalanced forces. One factorisation at an operating point serves all parameters. The
+//! explicit parts of dK/dx and dM/dx are exact; the parts due to the change of the equilibrium are
+//! central differences of fourth order of the analytic tangents along de/dx.
 
 use flexarm_kinematics::{Frame, Wrench};
 use flexarm_stepping::{FlexibleArm, OperatingPoint, StepError, Tangents};
@@ -13,11 +14,11 @@ use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, SymmetricEigen};
 
 use crate::estimation::parameter::{Effect, Parameter, Plant, entry_slope, scaled, slope_of};
 
-/// Length of the differences along the equilibrium's path, over the size of the elastic
-/// coordinates.
+/// Step of the central differences: maximum change of an elastic coordinate per step (m, rad).
 const DIFFERENCE: f64 = 1e-3;
 
-/// `dr/dx`: change of the unbalanced forces on the elastic coordinates per parameter, n×p.
+/// Computes `dr/dx`, the derivative of the unbalanced forces on the elastic coordinates with
+/// respect to each parameter, n×p.
 pub(crate) fn force_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) -> Result<DMatrix<f64>, StepError> {
     let n = at.deflections().len();
     let mut slopes = DMatrix::zeros(n, parameters.len());
@@ -33,8 +34,7 @@ pub(crate) fn force_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) ->
                     }
                     let element = &arm.elements[place.spring];
                     let first = arm.offset(element);
-                    // A spring of one coordinate is turned by the error of its transmission as
-                    // well.
+                    // The deflection of a single-coordinate spring includes its transmission error.
                     let turned = arm.deflection(place.spring, e[first], at.coordinates().as_slice());
                     let e = if element.size == 1 { &[turned] } else { &e[first..first + element.size] };
                     let f = match &element.curve {
@@ -54,7 +54,8 @@ pub(crate) fn force_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) ->
                     slopes[(first + column, k)] += factor * e[first + row];
                 }
             }
-            // What a tool carries and where it is loaded is known to the measurement.
+            // Damping exerts no force at rest; for a moved tool the caller accounts for payload and
+            // load.
             Effect::Damping(_) | Effect::Damper { .. } | Effect::Tool(_) => {}
             Effect::Mass { body, per_kg } => {
                 // Forces are linear in a mass: a difference of any size is exact.
@@ -70,18 +71,19 @@ pub(crate) fn force_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) ->
     Ok(slopes)
 }
 
-/// The arm with a kilogram more.
+/// Returns the arm with one kilogram added.
 fn carrying(arm: &FlexibleArm, body: usize, per_kg: &flexarm_kinematics::SpatialInertia) -> FlexibleArm {
     let mut inertia = arm.model.bodies()[body].inertia;
     inertia += scaled(per_kg, 1.0);
     arm.with_inertia(body, inertia)
 }
 
-/// Twist of the tool (world axes, at its point; m, rad) per unit of each parameter's coordinate,
-/// 6×p, at a pose that is solved.
+/// Computes the derivatives of the tool pose as twists (world axes, at the tool's origin; m, rad)
+/// per unit of each parameter's coordinate, 6×p, at a solved pose.
 ///
-/// Of [`Effect::Tool`] the part by deflection, which is zero here: loads stay where they are, and
-/// the frame itself is not moved. [`crate::estimation::MeasuredArm`] has all of it.
+/// For [`Effect::Tool`] this is only the part due to deflection, which is zero here: loads stay in
+/// place, and the motion of the frame itself is not included. [`crate::estimation::MeasuredArm`]
+/// includes both.
 ///
 /// # Errors
 /// As [`OperatingPoint::solve`].
@@ -91,24 +93,27 @@ pub fn tool_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) -> Result<
     Ok(Matrix6xX::from_fn(parameters.len(), |i, j| -moved[(i, j)]))
 }
 
-/// Natural frequencies of a held arm with their slopes.
+/// Natural frequencies of an arm with locked drives, and their derivatives.
 #[derive(Clone, Debug)]
 pub struct FrequencySlopes {
     /// Frequencies, ascending (Hz).
     pub hz: Vec<f64>,
-    /// Per unit of each parameter's coordinate: a row per frequency, a column per parameter (Hz).
+    /// Derivatives per unit of each parameter's coordinate (Hz): a row per frequency, a column per
+    /// parameter.
     pub slopes: DMatrix<f64>,
 }
 
-/// Natural frequencies at a pose without a wrench, and their derivatives by parameters.
+/// Computes the natural frequencies at a pose without a wrench, and their derivatives with respect
+/// to the parameters.
 ///
-/// * `plant`: with the parameters as they are now; `q`: actuated joints (rad or m).
+/// * `plant`: arm with the present parameters.
+/// * `q`: actuated joints (rad or m).
 ///
-/// Where two frequencies coincide their shapes are not determined, and neither is the derivative of
-/// each.
+/// Where two frequencies coincide, their mode shapes and their individual derivatives are not
+/// determined.
 ///
 /// # Errors
-/// As [`OperatingPoint::solve`]; [`StepError::Singular`] where a coordinate moves no mass.
+/// As [`OperatingPoint::solve`]; [`StepError::Singular`] if a coordinate has no mass.
 pub fn frequency_slopes(plant: &Plant, parameters: &[Parameter], q: &[f64]) -> Result<FrequencySlopes, StepError> {
     let arm = plant.held(q)?;
     let none = Wrench::zeros();
@@ -138,7 +143,7 @@ pub fn frequency_slopes(plant: &Plant, parameters: &[Parameter], q: &[f64]) -> R
     Ok(FrequencySlopes { hz: omega2.iter().map(|w2| w2.sqrt() / std::f64::consts::TAU).collect(), slopes })
 }
 
-/// Squares of the natural frequencies, ascending, and shapes with `φᵀ M φ = 1`.
+/// Squares of the natural frequencies, ascending, and mode shapes with `φᵀ M φ = 1`.
 pub(crate) fn eigen(at: &Tangents) -> Result<(Vec<f64>, DMatrix<f64>), StepError> {
     let singular = |matrix| StepError::Singular { matrix, t: 0.0 };
     let K = (&at.K + at.K.transpose()) * 0.5;
@@ -164,7 +169,8 @@ pub(crate) fn eigen(at: &Tangents) -> Result<(Vec<f64>, DMatrix<f64>), StepError
     Ok((omega2, shapes))
 }
 
-/// Change of matrices that depend on the coordinates as the elastic ones move by `de` per unit.
+/// Computes the derivative of matrices that depend on the coordinates, as the elastic coordinates
+/// move by `de` per unit.
 pub(crate) fn along(
     arm: &FlexibleArm,
     q: &DVector<f64>,
@@ -176,7 +182,7 @@ pub(crate) fn along(
     along_coordinates(q, &dq, look)
 }
 
-/// As [`along`], as all coordinates move by `dq` per unit: central differences of fourth order.
+/// As [`along`], for a motion `dq` of all coordinates: central differences of fourth order.
 pub(crate) fn along_coordinates(
     q: &DVector<f64>,
     dq: &DVector<f64>,
@@ -192,13 +198,13 @@ pub(crate) fn along_coordinates(
     (0..a.len()).map(|k| ((&c[k] - &b[k]) * 8.0 - (&d[k] - &a[k])) / (12.0 * h)).collect()
 }
 
-/// Derivatives of the Cartesian compliance of the tool, drives locked, at a pose that is solved:
-/// one 6×6 per parameter, per unit of its coordinate (m/N, rad/N; m/(N m), rad/(N m)).
+/// Computes the derivatives of the Cartesian compliance of the tool with locked drives at a solved
+/// pose: one 6×6 per parameter, per unit of its coordinate (m/N, rad/N; m/(N m), rad/(N m)).
 ///
-/// * `F_T_W`: the wrench with which it was solved.
+/// * `F_T_W`: wrench of the solved operating point.
 ///
 /// # Errors
-/// [`StepError::Singular`] where a motion has no stiffness.
+/// [`StepError::Singular`] if a motion has no stiffness.
 pub fn compliance_slopes(
     at: &mut OperatingPoint,
     F_T_W: &Wrench,
@@ -220,13 +226,14 @@ pub fn compliance_slopes(
         let moved = -solve(&here.K, &forces.columns(k, 1).into_owned())?.column(0);
         let change = along(&arm, &q, &moved, look);
         let (eK, _) = explicit(&arm, &tool, F_T_W, &parameter.effect, &q, &here);
+        // dC = dJ K^-1 Jᵀ + J K^-1 dJᵀ - J K^-1 dK K^-1 Jᵀ
         let dC = &change[0] * &U + Y.tr_mul(&change[0].transpose()) - Y.tr_mul(&((&change[1] + eK) * &U));
         found.push(Matrix6::from_fn(|i, j| dC[(i, j)]));
     }
     Ok(found)
 }
 
-/// Change of stiffness and mass by the parameter itself.
+/// Computes the explicit derivatives of stiffness and mass with respect to the parameter.
 pub(crate) fn explicit(
     arm: &FlexibleArm,
     tool: &Frame,

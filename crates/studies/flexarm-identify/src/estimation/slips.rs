@@ -1,14 +1,14 @@
-//! Slips in a file of measurements that no stiffness explains: joints in another order,
+//! Detection of mistakes in a file of measurements that no stiffness explains: permuted joints,
 //! displacements in other axes.
 //!
 //! Displacements are nearly linear in the compliances of the springs,
 //!
 //! ```text
-//! d ≈ -Σ a_k ∂d/∂(ln k_k),     a_k ≥ 0: compliance over that of the arm as it is
+//! d ≈ -Σ a_k ∂d/∂(ln k_k),     a_k ≥ 0: compliance over its initial value
 //! ```
-//! so that each order of joints and each rotation of the axes leaves a rest that no compliances
-//! explain, whatever the first guess of the stiffnesses is. A slip is told if the rest is large and
-//! another order or other axes leave almost nothing.
+//! Each order of joints and each rotation of the axes therefore leaves a residual that no
+//! compliances explain, whatever the initial stiffnesses are. A mistake is reported if the residual
+//! is large and another order or other axes reduce it to almost nothing.
 
 use flexarm_kinematics::Pose;
 use nalgebra::{DMatrix, DVector, Rotation3, Vector3};
@@ -19,41 +19,42 @@ use crate::estimation::measurement::MeasuredArm;
 use crate::estimation::parameter::{Effect, Parameter, Plant};
 use crate::estimation::reading::{Component, Instrument, Measurements, ReadingKind, Target};
 
-/// What explains readings that the arm does not.
+/// Mistake that explains readings which the arm does not.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Slip {
-    /// Of each joint the place at which its value stands.
+    /// For each joint, the position in the list at which its value is given.
     Order(Vec<usize>),
-    /// Rotation that brings the measured displacements into world axes.
+    /// Rotation from the axes of the measured displacements to world axes.
     Axes(Rotation3<f64>),
 }
 
-/// A slip, and the parts of the readings that are left without a cause.
+/// A mistake, and the relative residuals with and without it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FoundSlip {
-    /// Which.
+    /// Mistake.
     pub slip: Slip,
-    /// Rest over readings (RMS) as they are.
+    /// Residual over readings (RMS) as given.
     pub rest: f64,
-    /// The same with the slip mended.
+    /// Residual over readings (RMS) with the mistake corrected.
     pub rest_mended: f64,
 }
 
-/// Smallest rest, over the displacements, that calls for a slip; of places over their spread.
+/// Minimum relative residual for a search: of displacements over themselves, of positions over
+/// their spread.
 const REST: [f64; 2] = [0.25, 0.1];
-/// A mended slip leaves this part of the rest at most, and so much of the displacements, of the
-/// places' spread.
+/// Maximum residual with the mistake corrected: as a fraction of that before, and relative to the
+/// displacements and the spread of positions.
 const MENDED: f64 = 1.0 / 3.0;
 const LEFT: [f64; 2] = [0.15, 0.05];
-/// Readings that are looked at.
+/// Maximum number of readings used.
 const MOST_READINGS: usize = 16;
-/// Rounds of compliances and rotation.
+/// Number of alternating fits of compliances and rotation.
 const ROUNDS: usize = 15;
 
-/// Returns the slip that explains what the arm cannot; none if the arm can, or nothing simple
-/// explains it.
+/// Returns the mistake that explains readings which the arm does not; `None` if the arm explains
+/// them or no simple mistake does.
 ///
-/// * `slides`: of each joint whether it slides; values of both kinds are not exchanged.
+/// * `slides`: whether each joint slides; values of sliding and rotating joints are not exchanged.
 pub fn likely_slip(
     plant: &Plant,
     parameters: &[Parameter],
@@ -77,8 +78,8 @@ pub fn likely_slip(
     found.flatten().or_else(|| among(rest, || None, slides, 1))
 }
 
-/// Some readings, evenly from all of them; instruments at the world's origin, targets where they
-/// are guessed.
+/// Selects some readings at equal intervals, with instruments at the world's origin and targets at
+/// their initial guess.
 fn some_of(measurements: &Measurements, some: impl Fn(&ReadingKind) -> bool) -> Measurements {
     let all: Vec<usize> = (0..measurements.readings.len()).filter(|k| some(&measurements.readings[*k].kind)).collect();
     let every = all.len().div_ceil(MOST_READINGS).max(1);
@@ -93,15 +94,15 @@ fn some_of(measurements: &Measurements, some: impl Fn(&ReadingKind) -> bool) -> 
     few
 }
 
-/// The readings with each joint's value from another place.
+/// Returns the readings with permuted joint values.
 fn ordered(measurements: &Measurements, order: &[usize]) -> Measurements {
     let mut other = measurements.clone();
     other.readings.iter_mut().for_each(|reading| reading.q = order.iter().map(|k| reading.q[*k]).collect());
     other
 }
 
-/// The best slip of those that leave little of a rest which calls for one; `kind`: 0 for
-/// displacements, 1 for places.
+/// Returns the mistake with the smallest residual if the readings call for one and it explains
+/// them; `kind`: 0 for displacements, 1 for positions.
 fn among(
     rest: impl Fn(&[usize]) -> Option<f64>,
     axes: impl Fn() -> Option<(Rotation3<f64>, f64)>,
@@ -117,8 +118,8 @@ fn among(
     (rest_mended < (MENDED * before).min(LEFT[kind])).then_some(FoundSlip { slip, rest: before, rest_mended })
 }
 
-/// The order of joints that leaves least: from the order as it is, the reverse and the shifts by
-/// exchanges as long as one pays.
+/// Searches for the order of joints with the smallest residual: from the given order, the reverse
+/// and the cyclic shifts, by pairwise exchanges as long as they reduce the residual.
 fn best_order(
     rest: &impl Fn(&[usize]) -> Option<f64>,
     as_said: Vec<usize>,
@@ -147,7 +148,7 @@ fn best_order(
     climbed.min_by(least).unwrap_or((Vec::new(), f64::INFINITY))
 }
 
-/// Displacements, and those of each spring alone, over their deviations.
+/// Displacements, and their derivatives with respect to each compliance, over their deviations.
 struct Moved {
     A: DMatrix<f64>,
     b: DVector<f64>,
@@ -163,8 +164,8 @@ impl Moved {
         Some(Self { A: -J, b: DVector::from_vec(b) })
     }
 
-    /// What the springs explain with compliances of 0 or above: the most negative one is left out
-    /// until none is.
+    /// Returns the part of `b` that the springs explain with non-negative compliances: the most
+    /// negative compliance is removed until none is negative.
     fn explained(&self, b: &DVector<f64>) -> DVector<f64> {
         let mut kept: Vec<usize> = (0..self.A.ncols()).collect();
         while !kept.is_empty() {
@@ -185,8 +186,8 @@ impl Moved {
         (&self.b - self.explained(&self.b)).norm() / self.b.norm()
     }
 
-    /// The rotation into world axes that leaves least, and what it leaves: in turn the best
-    /// compliances and the best rotation, from all axes that stand on those of the world.
+    /// Returns the rotation into world axes with the smallest residual, and this residual. Fits
+    /// compliances and rotation alternately, starting from all 24 axis-aligned rotations.
     fn turned(&self) -> Option<(Rotation3<f64>, f64)> {
         let seen = points(self.b.as_slice());
         let upright = [Vector3::x(), Vector3::y(), Vector3::z()];
@@ -208,7 +209,7 @@ impl Moved {
     }
 }
 
-/// What the best placement of each instrument leaves of the places, over their spread.
+/// Returns the residual of the positions over their spread, with each instrument at its best fit.
 fn place_rest(plant: &Plant, measurements: &Measurements) -> Option<f64> {
     let arm = MeasuredArm { plant, parameters: &[], measurements };
     let (world, seen) = (points(&arm.predicted(&DVector::zeros(0)).ok()?), points(&arm.observed()));

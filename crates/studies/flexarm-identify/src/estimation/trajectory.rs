@@ -1,9 +1,10 @@
-//! How the error of the tool along a motion answers to parameters of the arm, its tool and its
-//! motion.
+//! Derivatives of the tool error along a motion with respect to parameters of the arm, its tool and
+//! its motion.
 //!
-//! The equations of motion are differentiated by [`run_slopes`]; here is what each parameter is to
-//! them. Modal damping and Rayleigh's follow the modes and the mass of the start, which move with
-//! the equilibrium there, so that all parameters have a part in the damping matrix.
+//! [`run_slopes`] differentiates the equations of motion; this module provides the derivatives of
+//! their terms with respect to each parameter. Modal and Rayleigh damping depend on the modes and
+//! the mass matrix at the start, and these depend on the equilibrium there. Therefore all
+//! parameters affect the damping matrix.
 
 use std::sync::Arc;
 
@@ -18,36 +19,37 @@ use crate::estimation::parameter::{Effect, Parameter, entry_slope, slope_of};
 use crate::estimation::response::Damped;
 use crate::estimation::sensitivity::{along_coordinates, eigen, explicit};
 
-/// What a run is differentiated by.
+/// Parameter with respect to which a run is differentiated.
 #[derive(Clone)]
 pub enum RunParameter {
-    /// Of the arm, per unit of its coordinate of the search: of the logarithm of what is
+    /// Parameter of the arm, per unit of its search coordinate: of the logarithm if it is
     /// logarithmic.
     Arm(Parameter),
-    /// A shift of a joint's whole motion, by its coordinate (per rad or m).
+    /// Shift of a joint's whole motion, given by its coordinate (per rad or m).
     Joint(usize),
-    /// Any change of the motion, per unit of it.
+    /// Arbitrary change of the motion, per unit of it.
     Motion(Arc<dyn PrescribedMotion>),
-    /// Place of the tool's point along this, tool axes (per m).
+    /// Shift of the tool's point along a vector, tool axes (per m).
     Tool(Vector3<f64>),
-    /// Friction of a joint, by its coordinate: changes of the numbers of its law, per unit. It
-    /// moves joints under servos alone.
+    /// Friction of a joint, given by its coordinate: change of the coefficients of its friction
+    /// law, per unit. It has an effect only on joints under servo control.
     Friction(usize, Friction),
-    /// The controller of a joint, by the number of its axis, per unit.
+    /// Controller of a joint, given by the number of its axis, per unit.
     Servo(usize, AxisSlope),
-    /// Another one of which the controllers know.
+    /// Another parameter, whose change the controllers also use.
     Followed {
-        /// What changes of the arm or its motion.
+        /// Change of the arm or its motion.
         parameter: Box<RunParameter>,
-        /// Inertia of bodies of the rigid robot whose torques are fed forward, about Bo, B axes.
+        /// Derivatives of the inertia of bodies in the rigid model for torque feedforward, about
+        /// Bo, B axes.
         fed_forward: Vec<(usize, SpatialInertia)>,
-        /// What becomes of controllers, by the number of the axis.
+        /// Changes of the controllers, by number of the axis.
         gains: Vec<(usize, AxisSlope)>,
     },
 }
 
 impl RunParameter {
-    /// What it does to the arm, if it is a parameter of it.
+    /// Returns the effect on the arm if this is a parameter of the arm.
     fn effect(&self) -> Option<&Effect> {
         match self {
             Self::Arm(parameter) => Some(&parameter.effect),
@@ -57,10 +59,10 @@ impl RunParameter {
     }
 }
 
-/// Error of the tool along a run and its derivatives, a number or column per parameter.
+/// Computes the tool error along a run and its derivatives, one number or column per parameter.
 ///
 /// # Errors
-/// As [`run_slopes`]; [`StepError::Singular`] where a coordinate moves no mass.
+/// As [`run_slopes`]; [`StepError::Singular`] if a coordinate has no mass.
 pub fn error_slopes(
     arm: &FlexibleArm,
     parameters: &[RunParameter],
@@ -77,8 +79,8 @@ pub fn error_slopes(
     run_slopes(arm, request, &directions)
 }
 
-/// Changes of the damping matrix after each change of inertia, a matrix per parameter: the damping
-/// then is that of the arm with what it carries then, where the motion begins.
+/// Computes the derivatives of the damping matrix after each change of inertia, a matrix per
+/// parameter. That damping is computed with the changed inertia at the initial pose.
 fn damping_after_changes(
     arm: &FlexibleArm,
     effects: &[Option<&Effect>],
@@ -89,7 +91,7 @@ fn damping_after_changes(
     let mut found: Vec<Vec<DMatrix<f64>>> = Vec::new();
     for change in &arm.inertia_changes {
         changed.model = Arc::new(changed.model.with_inertia(change.body, change.inertia));
-        // What was carried there before is gone.
+        // The change replaces the inertia of the body.
         for (effect, direction) in effects.iter_mut().zip(&mut directions) {
             direction.inertias.retain(|(body, _)| *body != change.body);
             *effect = effect.filter(|effect| !matches!(effect, Effect::Mass { body, .. } if *body == change.body));
@@ -99,7 +101,7 @@ fn damping_after_changes(
             changed = renewed;
             found.push(damping_slopes(&changed, &effects, &directions)?);
         } else {
-            // It keeps the damping that it had.
+            // The damping stays as before.
             let before = found.last().cloned().map_or_else(|| damping_slopes(arm, &effects, &directions), Ok)?;
             found.push(before);
         }
@@ -107,7 +109,7 @@ fn damping_after_changes(
     Ok(found)
 }
 
-/// A parameter without what it does to the damping.
+/// Computes the derivatives with respect to a parameter, without those of the damping matrix.
 fn direction(arm: &FlexibleArm, parameter: &RunParameter) -> Direction {
     let mut direction = Direction::default();
     match parameter {
@@ -135,7 +137,7 @@ fn direction(arm: &FlexibleArm, parameter: &RunParameter) -> Direction {
                 direction.springs.push((*spring, SpringSlope::Matrix(slope)));
             }
             Effect::Tool(axis @ 0..3) => direction.tool = Vector3::ith(*axis, 1.0),
-            // A tool that is turned in its place is off by the same angle.
+            // A rotation of the tool about its origin does not change its position error.
             Effect::Damping(_) | Effect::Damper { .. } | Effect::Tool(_) => {}
             Effect::Mass { body, per_kg } => direction.inertias.push((*body, *per_kg)),
         },
@@ -157,7 +159,8 @@ fn direction(arm: &FlexibleArm, parameter: &RunParameter) -> Direction {
     direction
 }
 
-/// Change of the damping matrix with each parameter, which follows the modes at the start.
+/// Computes the derivatives of the damping matrix with respect to each parameter, by way of the
+/// modes at the start.
 fn damping_slopes(
     arm: &FlexibleArm,
     effects: &[Option<&Effect>],
@@ -165,7 +168,7 @@ fn damping_slopes(
 ) -> Result<Vec<DMatrix<f64>>, StepError> {
     let moved = equilibrium_slopes(arm, directions)?;
     let (m, n) = (arm.model.n_actuated(), arm.n_elastic_coordinates());
-    // Dampers, and what is in proportion to the springs, know nothing of masses and poses.
+    // Dampers and stiffness-proportional damping do not depend on masses and pose.
     let by_modes = arm.elements.iter().any(|e| matches!(e.damping, Damping::Modal(_) | Damping::Rayleigh(..)));
     let (tool, none) = (&arm.model.frames()[0], Wrench::zeros());
     let mut q = DVector::zeros(m + n);

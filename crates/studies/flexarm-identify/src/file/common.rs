@@ -1,4 +1,4 @@
-//! What readings of all kinds have: joint values, loads, deviations, tables.
+//! Common parts of all kinds of readings: joint values, loads, deviations, tables.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -14,7 +14,7 @@ use toml::Spanned;
 use super::{Reader, Units};
 use flexarm_run::Error;
 
-/// Values of the joints: all in order, or by name.
+/// Joint values: a list in order, or by name.
 #[derive(Debug, Deserialize, Clone)]
 #[serde(untagged, expecting = "expected a list of joint values, or a table { joint = value }")]
 pub(crate) enum Joints {
@@ -40,13 +40,13 @@ pub(crate) struct LoadEntry {
     inertia: [f64; 6],
 }
 
-/// Columns of loads in tables.
+/// Columns of tables that describe loads.
 pub(super) const LOAD_COLUMNS: [&str; 19] = [
     "fx", "fy", "fz", "mx", "my", "mz", "ax", "ay", "az", "mass", "cx", "cy", "cz", "ixx", "iyy", "izz", "ixy", "ixz",
     "iyz",
 ];
 
-/// A row of a table, by the names of its columns.
+/// Row of a table, accessed by column name.
 pub(super) struct TableRow<'a> {
     pub(super) table: &'a NumberTable,
     pub(super) row: usize,
@@ -58,10 +58,10 @@ impl TableRow<'_> {
         (!value.is_nan()).then_some(value)
     }
 
-    /// Components of which some have a column, those without zero.
+    /// Returns components, 0 for those without a column; `None` if none has a column.
     ///
     /// # Errors
-    /// The name of a column that is there and has no value in this row.
+    /// The name of a column without a value in this row.
     pub(super) fn all<const N: usize>(&self, names: [&str; N]) -> Result<Option<[f64; N]>, String> {
         if names.iter().all(|name| self.table.column(name).is_none()) {
             return Ok(None);
@@ -75,7 +75,7 @@ impl TableRow<'_> {
         Ok(Some(values))
     }
 
-    /// Three components, those that are filled in.
+    /// Returns three components, `None` for empty cells; `None` if all are empty.
     pub(super) fn filled(&self, names: [&str; 3]) -> Option<[Option<f64>; 3]> {
         let values = names.map(|name| self.get(name));
         values.iter().any(Option::is_some).then_some(values)
@@ -83,7 +83,7 @@ impl TableRow<'_> {
 }
 
 impl Reader<'_> {
-    /// Joint values of a reading in SI units.
+    /// Returns the joint values of a reading in SI units.
     pub(crate) fn joints(&self, joints: &Spanned<Joints>) -> Result<Vec<f64>, Error> {
         let known = self.cell.joints;
         let names: Vec<&str> = known.iter().map(|(name, _)| name.as_str()).collect();
@@ -113,7 +113,7 @@ impl Reader<'_> {
         let scaled = values.iter().zip(self.cell.joints).map(|(value, (name, slides))| {
             let factor = if *slides { self.units.length } else { self.units.angle };
             let q = value * factor;
-            // More than ten turns are degrees that were taken for rad.
+            // Values above ten turns are probably degrees read as rad.
             let most = if *slides { 1e3 } else { 20.0 * std::f64::consts::PI };
             match q.is_finite() && q.abs() <= most {
                 true => Ok(q),
@@ -127,7 +127,7 @@ impl Reader<'_> {
         scaled.collect()
     }
 
-    /// A load in SI units.
+    /// Returns a load in SI units.
     pub(crate) fn load(&self, load: &LoadEntry, span: &Range<usize>) -> Result<LoadCase, Error> {
         let LoadEntry { force, torque, at, mass, com, inertia } = *load;
         let all = [&force[..], &torque, &at, &[mass], &com, &inertia].concat();
@@ -153,13 +153,13 @@ impl Reader<'_> {
             return Err(self.error(span.clone(), "a load has an inertia and no mass: give both"));
         }
         let Units { length, force: newton, .. } = self.units;
-        // Moments in the units of force and length.
+        // Moments are in the product of the units of force and length.
         let wrench = Wrench::new(Vector3::from(force) * newton, Vector3::from(torque) * newton * length);
         let carried = SpatialInertia::from_com(mass, &(Vector3::from(com) * length), &about_com);
         Ok(LoadCase { wrench, at: Vector3::from(at) * length, carried })
     }
 
-    /// A standard deviation in SI units; 1 where none is given.
+    /// Returns a standard deviation in SI units; 1 if none is given.
     pub(crate) fn std(&self, given: Option<&Spanned<f64>>, factor: f64) -> Result<f64, Error> {
         match given {
             None => Ok(1.0),
@@ -204,14 +204,14 @@ impl Reader<'_> {
         self.scaled(values, span)
     }
 
-    /// An empty cell of a row whose number is needed.
+    /// Returns the error for an empty cell where a number is required.
     pub(super) fn empty(&self, row: &TableRow<'_>, file: &Spanned<PathBuf>, name: &str) -> Error {
         let line = row.table.lines[row.row];
         let text = format!("{} line {line}: {name} is empty: a number is needed", file.get_ref().display());
         self.error(file.span(), text)
     }
 
-    /// A load with what a row of a table says of it.
+    /// Returns a load with the values of a table row in place of the given ones.
     pub(super) fn with_columns(
         &self,
         load: LoadEntry,
@@ -232,7 +232,7 @@ impl Reader<'_> {
         Ok(LoadEntry { force, torque, at, mass, com, inertia })
     }
 
-    /// The direction of the gauge of a row that has one read.
+    /// Returns the direction of the gauge of a row if the row has a gauge reading.
     pub(super) fn table_direction(
         &self,
         row: &TableRow<'_>,

@@ -23,7 +23,7 @@ pub(super) struct DisplacementEntry {
     #[serde(default)]
     point: [f64; 3],
     direction: Option<Spanned<[f64; 3]>>,
-    /// In whose axes directions, values and rotations are; the world's without.
+    /// Instrument in whose axes directions, values and rotations are given; world axes if absent.
     instrument: Option<Spanned<String>>,
     value: Option<Spanned<Value>>,
     rotation: Option<[f64; 3]>,
@@ -47,14 +47,14 @@ impl Value {
     }
 }
 
-/// A displacement as it was read: along a direction, or the components that were.
+/// Measured displacement: along a direction, or the measured components.
 #[derive(Debug, Clone, Copy)]
 enum Measured {
     One(f64),
     Three([Option<f64>; 3]),
 }
 
-/// A displacement before its units.
+/// Displacement in the units of the file.
 struct Said {
     name: String,
     q: Vec<f64>,
@@ -67,7 +67,7 @@ struct Said {
     std_rotation: Option<Spanned<f64>>,
 }
 
-/// Columns of a table beside joints and loads.
+/// Columns of a table in addition to joints and loads.
 const COLUMNS: [&str; 15] =
     ["px", "py", "pz", "dx", "dy", "dz", "rx", "ry", "rz", "d", "ux", "uy", "uz", "std", "std_rotation"];
 
@@ -122,7 +122,7 @@ impl Reader<'_> {
         }
     }
 
-    /// One displacement.
+    /// Adds one displacement.
     fn moved(&mut self, entry: &Spanned<DisplacementEntry>, said: Said) -> Result<(), Error> {
         let (e, span) = (entry.get_ref(), entry.span());
         let Said { name, q, load, point, value, direction, rotation, std, std_rotation } = said;

@@ -1,4 +1,4 @@
-//! Instruments and targets: where they are, how well that is known, what of it counts.
+//! Instruments and targets: pose or position, uncertainty, and the components that are unknown.
 
 use std::collections::BTreeMap;
 
@@ -16,9 +16,9 @@ use flexarm_run::Error;
 pub(super) struct InstrumentEntry {
     xyz: Option<[f64; 3]>,
     rpy: Option<[f64; 3]>,
-    /// Deviation of each component of `xyz`.
+    /// Standard deviation of each component of `xyz`.
     std: Option<Spanned<f64>>,
-    /// Deviation of the rotation about each axis.
+    /// Standard deviation of the rotation about each axis.
     std_rotation: Option<Spanned<f64>>,
 }
 
@@ -28,12 +28,12 @@ pub(super) struct TargetEntry {
     xyz: [f64; 3],
     #[serde(default)]
     unknown: bool,
-    /// Deviation of each component.
+    /// Standard deviation of each component.
     std: Option<Spanned<f64>>,
 }
 
 impl Reader<'_> {
-    /// Names of instruments and targets, and where they are said to be.
+    /// Reads the names of instruments and targets, and their given poses and positions.
     pub(super) fn frames(
         &mut self,
         instruments: &BTreeMap<String, Spanned<InstrumentEntry>>,
@@ -72,7 +72,8 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// What of instruments and targets is unknown, by the readings that use them.
+    /// Decides which unknowns of instruments and targets are fitted, given the readings that refer
+    /// to them.
     pub(super) fn settle_frames(
         &mut self,
         instruments: &BTreeMap<String, Spanned<InstrumentEntry>>,
@@ -126,7 +127,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Takes what is known of a frame as a reading.
+    /// Adds prior knowledge of a frame as a reading.
     fn known(&mut self, what: &'static str, name: &str, kind: ReadingKind, span: std::ops::Range<usize>) {
         self.given.push((what, true, span));
         self.measurements.readings.push(Reading { name: format!("{what} {name}"), q: Vec::new(), kind });

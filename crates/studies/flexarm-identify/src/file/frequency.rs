@@ -1,4 +1,4 @@
-//! Natural frequencies at a pose.
+//! Natural frequencies measured at a pose.
 
 use crate::estimation::{Reading, ReadingKind, Row};
 use serde::Deserialize;
@@ -17,7 +17,7 @@ pub(super) struct FrequencyEntry {
     hz: Spanned<Vec<f64>>,
     modes: Option<Spanned<Vec<usize>>>,
     std: Option<Spanned<f64>>,
-    /// Deviation as a part of each frequency.
+    /// Relative standard deviation of each frequency.
     std_relative: Option<Spanned<f64>>,
 }
 

@@ -1,5 +1,5 @@
-//! The file of measurements (`docs/identify.md`): readings one by one or as tables, units, what is
-//! unknown.
+//! File of measurements (`docs/identify.md`): single readings or tables, units, and the unknown
+//! parameters.
 
 mod common;
 mod displacement;
@@ -32,7 +32,7 @@ use flexarm_run::toml_file::parsed;
 pub(super) use self::common::{Joints, LoadEntry};
 pub(super) use self::recording::EncoderRecording;
 
-/// The file as written.
+/// Contents of the file as written.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct MeasurementFile {
@@ -60,7 +60,7 @@ struct MeasurementFile {
     frequency: Vec<Spanned<FrequencyEntry>>,
     #[serde(default)]
     encoders: Vec<Spanned<EncodersEntry>>,
-    /// Points of the arm that are hit or watched.
+    /// Excited and measured points of the arm.
     #[serde(default)]
     node: BTreeMap<String, Spanned<NodeEntry>>,
     #[serde(default)]
@@ -69,7 +69,7 @@ struct MeasurementFile {
     shape: Vec<Spanned<ShapeEntry>>,
 }
 
-/// What is known of one parameter before.
+/// Prior knowledge of one parameter.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ParameterEntry {
@@ -77,29 +77,30 @@ struct ParameterEntry {
     uncertainty: Spanned<f64>,
 }
 
-/// What the file says, in SI units.
+/// Contents of the file in SI units.
 #[derive(Debug)]
 pub(super) struct MeasurementInput {
     pub(super) measurements: Measurements,
     pub(super) recordings: Vec<EncoderRecording>,
     pub(super) instruments: Vec<String>,
     pub(super) targets: Vec<String>,
-    /// Patterns of names of what is unknown, with their places; empty: all stiffnesses.
+    /// Name patterns of the unknown parameters, with their places in the file; empty for all
+    /// stiffnesses.
     pub(super) fit: Vec<(String, RobotFileError)>,
     pub(super) keep: Vec<(String, RobotFileError)>,
     pub(super) uncertainty: Option<f64>,
-    /// Name, uncertainty, place.
+    /// Name, uncertainty, and place in the file.
     pub(super) known: Vec<(String, f64, RobotFileError)>,
     pub(super) loss: Loss,
-    /// Whether deviations are given.
+    /// Whether standard deviations are given.
     pub(super) deviations_known: bool,
-    /// Name of the unit of length, for words about it.
+    /// Name of the unit of length, for messages.
     pub(super) length: &'static str,
     pub(super) length_m: f64,
     pub(super) angle_rad: f64,
 }
 
-/// Factors of the units of a file.
+/// Factors from the units of a file to SI units.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Units {
     pub(super) length: f64,
@@ -111,18 +112,18 @@ const LENGTHS: [(&str, f64); 3] = [("m", 1.0), ("mm", 1e-3), ("um", 1e-6)];
 const ANGLES: [(&str, f64); 3] = [("rad", 1.0), ("deg", std::f64::consts::PI / 180.0), ("mrad", 1e-3)];
 const FORCES: [(&str, f64); 2] = [("N", 1.0), ("kN", 1e3)];
 
-/// What the robot is asked while its measurements are read.
+/// Robot data needed to read its measurements.
 pub(super) struct Cell<'a> {
     /// Actuated joints in coordinate order, and whether they slide.
     pub(super) joints: &'a [(String, bool)],
-    /// The arm that is measured.
+    /// Measured arm.
     pub(super) arm: &'a Arm,
 }
 
-/// Reads a file.
+/// Reads a file of measurements.
 ///
 /// # Errors
-/// [`Error`] with file, place, what was found and what was expected.
+/// [`Error`] with the file and place, the value found and the values expected.
 pub(super) fn read(path: &Path, cell: &Cell<'_>) -> Result<MeasurementInput, Error> {
     let text = read_text(path)?;
     let source = Source::new(path, &text, "measurements");
@@ -215,7 +216,7 @@ fn loss(given: &Option<Spanned<String>>, source: &Source) -> Result<Loss, RobotF
     }
 }
 
-/// Readings being collected.
+/// State of the reader.
 pub(super) struct Reader<'a> {
     pub(super) cell: &'a Cell<'a>,
     source: &'a Source,
@@ -224,7 +225,8 @@ pub(super) struct Reader<'a> {
     instruments: Vec<String>,
     targets: Vec<String>,
     pub(super) measurements: Measurements,
-    /// Of each reading: what was measured in, whether a deviation is given, where.
+    /// For each reading: kind of quantity, whether a standard deviation is given, and its place in
+    /// the file.
     pub(super) given: Vec<(&'static str, bool, Range<usize>)>,
 }
 
@@ -233,7 +235,8 @@ impl Reader<'_> {
         self.source.error(span, message).into()
     }
 
-    /// Whether deviations are given: by all readings or by none, and by all where kinds are mixed.
+    /// Whether standard deviations are given. All readings must give one or none; all must if kinds
+    /// are mixed.
     fn deviations(&self, recordings: bool) -> Result<bool, Error> {
         let Some(first) = self.given.first() else {
             if recordings {
@@ -247,7 +250,8 @@ impl Reader<'_> {
         }
         let mixed = self.given.iter().find(|(kind, given, _)| *kind != first.0 || *given != first.1);
         match mixed {
-            // Beside recordings, which have deviations of their own.
+            // Encoder recordings have standard deviations of their own, so the other readings need
+            // them too.
             None if recordings => {
                 Err(self.error(first.2.clone(), "std is missing: readings beside [[encoders]] need one"))
             }

@@ -1,4 +1,4 @@
-//! Places of targets on the tool in the axes of an instrument.
+//! Positions of targets on the tool in the axes of an instrument.
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -25,7 +25,7 @@ pub(super) struct PlaceEntry {
     std: Option<Spanned<f64>>,
 }
 
-/// Columns of a table beside joints and loads.
+/// Columns of a table in addition to joints and loads.
 const COLUMNS: [&str; 4] = ["x", "y", "z", "std"];
 
 impl Reader<'_> {
@@ -73,7 +73,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Number of a named instrument or target; the only one without a name.
+    /// Returns the number of a named instrument or target; without a name, of the only one.
     pub(super) fn chosen(
         &self,
         what: &str,

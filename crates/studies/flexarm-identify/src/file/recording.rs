@@ -1,4 +1,4 @@
-//! Recordings of motors and links over time.
+//! Recordings of motor and link positions over time.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -12,48 +12,48 @@ use super::{Reader, Units};
 use flexarm_run::Error;
 use flexarm_run::RobotFileError;
 
-/// Positions of motors and links over time.
+/// Entry of a recording of motor and link positions.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct EncodersEntry {
     file: Spanned<PathBuf>,
     /// Column of the time (s).
     time: Spanned<String>,
-    /// Columns of the motors, over their ratios, of all joints.
+    /// Columns of motor positions, over the gear ratios, of all joints.
     motor: Spanned<BTreeMap<String, String>>,
-    /// Columns of the encoders behind the gears, of some joints.
+    /// Columns of link-side encoders, of some joints.
     link: Spanned<BTreeMap<String, String>>,
-    /// Columns of the torques through the gears, on the side of the links, of some joints.
+    /// Columns of torques through the gears, on the link side, of some joints.
     torque: Option<Spanned<BTreeMap<String, String>>>,
-    /// Of coupled gears: whether the columns of motors are those of the motors behind their gears
-    /// or what the controller makes of them.
+    /// For coupled gears: whether the motor columns are positions of the motors over their gear
+    /// ratios, or joint positions computed by the controller.
     positions: Option<Spanned<String>>,
     below: Option<Spanned<f64>>,
     edge: Option<Spanned<f64>>,
 }
 
-/// A recording of motors and links, in SI units and the robot's order.
+/// Recording of motor and link positions, in SI units and the robot's order of joints.
 #[derive(Debug)]
 pub(crate) struct EncoderRecording {
     pub(crate) place: RobotFileError,
     pub(crate) step_s: f64,
-    /// One list per joint (rad or m): where the motors say that it is.
+    /// Joint positions according to the motors, one list per joint (rad or m).
     pub(crate) motor: Vec<Vec<f64>>,
-    /// Of the joints that have one.
+    /// Joint positions according to the link-side encoders, if any.
     pub(crate) link: Vec<Option<Vec<f64>>>,
-    /// Torque through the gear where it was measured (N m or N).
+    /// Measured torques through the gears, if any (N m or N).
     pub(crate) torque: Vec<Option<Vec<f64>>>,
-    /// Both are compared up to here (Hz).
+    /// Cut-off frequency of the low-pass filter on both signals (Hz).
     pub(crate) below_hz: f64,
-    /// Left out at both ends (s).
+    /// Time discarded at both ends (s).
     pub(crate) edge_s: f64,
 }
 
-/// What is faster than this is left out of recordings unless they say otherwise (Hz).
+/// Default cut-off frequency of recordings (Hz).
 const BELOW_HZ: f64 = 12.0;
-/// So much is left out at both ends of a recording (s).
+/// Default time discarded at both ends of a recording (s).
 const EDGE_S: f64 = 0.4;
-/// Times may be off an even step by this part of it.
+/// Maximum relative deviation of a time step from the mean.
 const UNEVEN: f64 = 0.01;
 
 impl Reader<'_> {
@@ -135,7 +135,7 @@ impl Reader<'_> {
     }
 }
 
-/// The step of evenly spaced times (s).
+/// Returns the step of evenly spaced times (s); `None` if they are not even.
 fn even_step(time: &[f64]) -> Option<f64> {
     let n = time.len();
     if n < 3 {
@@ -147,8 +147,8 @@ fn even_step(time: &[f64]) -> Option<f64> {
 }
 
 impl Reader<'_> {
-    /// Joints from motors that move several of them, `q = C q_m`; joints that the controller has
-    /// made of them stay.
+    /// Computes joint positions from motors that move several joints, `q = C q_m`; joint positions
+    /// from the controller are left unchanged.
     fn behind_coupling(&self, e: &EncodersEntry, motor: &mut [Vec<f64>]) -> Result<(), Error> {
         let Some(coupling) = self.cell.arm.robot().coupling() else { return Ok(()) };
         match e.positions.as_ref().map(|word| (word.get_ref().as_str(), word.span())) {

@@ -1,46 +1,46 @@
-//! Which drawn parameters have an effect that chance does not explain.
+//! Test for random parameters whose effect on a result exceeds chance.
 //!
-//! With few draws every parameter varies with a result by chance. A parameter is named only if the
-//! part of the variance that it explains is one that the strongest of all parameters without an
-//! effect would reach in 1 of 100 studies.
+//! With few samples every parameter is correlated with a result by chance. A parameter is
+//! significant only if the share of the variance that it explains exceeds the one that the
+//! strongest of all parameters without effect would reach in 1 of 100 studies.
 //!
 //! ```text
-//! R^2 = |Q^T r|^2 / |r|^2                            part that the orthonormal columns Q (q of them) explain of the residuals r   (1)
-//! R^2 ~ Beta(q/2, (d - q)/2)                         for random r with d degrees of freedom                                       (2)
+//! R^2 = |Q^T r|^2 / |r|^2        share of the residuals r that q orthonormal columns Q explain (1)
+//! R^2 ~ Beta(q/2, (d - q)/2)     for random r with d degrees of freedom                        (2)
 //! ```
-//! The columns of a parameter are polynomials of its ranks. Parameters are taken one after the
-//! other, the strongest first (forward selection): what a stronger one explains is no scatter in
-//! which a weaker one is lost.
+//! The columns of a parameter are polynomials of its ranks. Parameters are selected one after the
+//! other, strongest first (forward selection), so that the variance explained by strong parameters
+//! does not hide weaker ones.
 
 use statrs::function::beta::inv_beta_reg;
 
-/// Parameters whose effects stand out of chance.
+/// Parameters whose effect exceeds chance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BeyondChance {
-    /// Their places, the strongest first.
+    /// Indices of the parameters, strongest first.
     pub parameters: Vec<usize>,
-    /// Part of the variance that the strongest of all parameters would stay below in 99 of 100
-    /// studies if none had an effect; 1 where the draws are too few to tell anything.
+    /// Share of the variance below which the strongest of all parameters stays in 99 of 100 studies
+    /// without any effect; 1 if there are too few samples.
     pub chance: f64,
 }
 
-/// How often the strongest of all parameters without an effect may be named.
+/// Significance level: probability of selecting any parameter if none has an effect.
 const LEVEL: f64 = 0.01;
-/// Fewest draws that tell anything.
+/// Minimum number of samples.
 const FEWEST: usize = 8;
-/// Draws for each polynomial of a parameter, and how many polynomials there are.
+/// Number of samples for each polynomial of a parameter, and range of the number of polynomials.
 const DRAWS_PER_TERM: usize = 16;
 const TERMS: (usize, usize) = (2, 6);
-/// Most draws that are looked at: more of them do not change who is named.
+/// Maximum number of samples used; more of them do not change the selection.
 const MOST_DRAWS: usize = 4000;
-/// A column that others explain up to this is no column of its own.
+/// Relative length below which a column counts as linearly dependent.
 const TINY: f64 = 1e-9;
 
-/// The drawn parameters whose effect on a result stands out of chance.
+/// Returns the random parameters whose effect on a result exceeds chance.
 ///
-/// * `columns`: values of each parameter, one for each draw. Draws must be independent of each
+/// * `columns`: values of each parameter, one for each sample. Samples must be independent of each
 ///   other.
-/// * `y`: the result; draws with a NaN are left out.
+/// * `y`: the result; samples with a NaN are ignored.
 pub fn beyond_chance(columns: &[Vec<f64>], y: &[f64]) -> BeyondChance {
     let sound = |k: &usize| y[*k].is_finite() && columns.iter().all(|x| x[*k].is_finite());
     let rows: Vec<usize> = (0..y.len()).filter(sound).collect();
@@ -60,6 +60,7 @@ pub fn beyond_chance(columns: &[Vec<f64>], y: &[f64]) -> BeyondChance {
     let mut freedom = rows.len() - 1;
     found.chance = threshold(terms, freedom, columns.len());
     loop {
+        // Parameter with the largest share of the remaining variance, equation (1).
         let scatter = dot(&residuals, &residuals);
         let part = |k: usize| bases[k].iter().map(|q| dot(q, &residuals).powi(2)).sum::<f64>() / scatter;
         let open: Vec<usize> = (0..columns.len()).filter(|k| !bases[*k].is_empty()).collect();
@@ -69,6 +70,7 @@ pub fn beyond_chance(columns: &[Vec<f64>], y: &[f64]) -> BeyondChance {
         if explains_all || freedom < 2 * q || part(best) <= threshold(q, freedom, open.len()) {
             break;
         }
+        // Projects its columns out of the residuals and of the other parameters.
         found.parameters.push(best);
         freedom -= q;
         let taken = std::mem::take(&mut bases[best]);
@@ -78,8 +80,8 @@ pub fn beyond_chance(columns: &[Vec<f64>], y: &[f64]) -> BeyondChance {
     found
 }
 
-/// Returns the part of the variance that the strongest of so many parameters without effect exceeds
-/// with probability [`LEVEL`], by (2), which is the F test of a regression.
+/// Returns the share of the variance that the strongest of several parameters without effect
+/// exceeds with probability [`LEVEL`], by (2). This is the F test of a regression.
 fn threshold(terms: usize, freedom: usize, parameters: usize) -> f64 {
     if freedom <= terms {
         return 1.0;
@@ -87,8 +89,8 @@ fn threshold(terms: usize, freedom: usize, parameters: usize) -> f64 {
     1.0 - inv_beta_reg(0.5 * (freedom - terms) as f64, 0.5 * terms as f64, LEVEL / parameters as f64)
 }
 
-/// Legendre polynomials of the ranks, which are spread from -1 to 1; equal values share the mean of
-/// their ranks.
+/// Computes Legendre polynomials of the ranks, scaled to -1 to 1; equal values share their mean
+/// rank.
 fn polynomials(x: &[f64], terms: usize) -> Vec<Vec<f64>> {
     let mut order: Vec<usize> = (0..x.len()).collect();
     order.sort_by(|i, j| x[*i].total_cmp(&x[*j]));
@@ -110,13 +112,13 @@ fn polynomials(x: &[f64], terms: usize) -> Vec<Vec<f64>> {
     found
 }
 
-/// Columns at right angles to each other and to others, of length 1; those that depend on others
-/// are left out.
+/// Orthonormalises columns with respect to each other and to `others`; linearly dependent columns
+/// are dropped.
 fn orthonormal(columns: Vec<Vec<f64>>, others: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let mut found: Vec<Vec<f64>> = Vec::with_capacity(columns.len());
     for mut column in columns {
         let before = dot(&column, &column).sqrt();
-        // Twice is enough (Kahan, Parlett).
+        // Two passes suffice (Kahan, Parlett).
         for _ in 0..2 {
             others.iter().chain(&found).for_each(|q| remove(&mut column, q));
         }
@@ -133,7 +135,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Takes the part along a column of length 1 away.
+/// Subtracts the projection on a column of length 1.
 fn remove(from: &mut [f64], q: &[f64]) {
     let part = dot(from, q);
     from.iter_mut().zip(q).for_each(|(x, q)| *x -= part * q);
@@ -156,8 +158,8 @@ mod tests {
         (0..dimensions).map(|d| (0..count).map(|k| sample.coordinate(k, d)).collect()).collect()
     }
 
-    /// Truth: the tails of Beta(1, b), Beta(2, b) and Beta(3, b), and that of Beta(a, 1),
-    /// integrated in closed form.
+    /// Truth: the tails of Beta(1, b), Beta(2, b), Beta(3, b) and Beta(a, 1), integrated in closed
+    /// form.
     #[test]
     fn chance_reaches_the_threshold_with_the_probability_of_the_beta_distribution() {
         for parameters in [1, 5, 100] {
@@ -166,7 +168,7 @@ mod tests {
                 for (terms, sum) in [(2, [0.0, 0.0]), (4, [1.0, 0.0]), (6, [1.0, 0.5])] {
                     let (x, b) = (threshold(terms, freedom, parameters), 0.5 * (freedom - terms) as f64);
                     let tail = (1.0 - x).powf(b) * (1.0 + sum[0] * b * x + sum[1] * b * (b + 1.0) * x * x);
-                    // measured 7e-10, by the logarithms of gamma functions of 2000
+                    // measured: 7e-10, due to the logarithms of gamma functions of 2000
                     assert!((tail / level - 1.0).abs() < 1e-8, "{terms} {freedom} {parameters}: {tail:e}");
                 }
             }
@@ -178,7 +180,7 @@ mod tests {
         assert_eq!(threshold(6, 6, 1), 1.0);
     }
 
-    /// Truth: in 1 of 100 studies without any effect a parameter is named.
+    /// Truth: a parameter is selected in 1 of 100 studies without any effect.
     #[test]
     fn a_parameter_without_effect_is_named_in_one_of_a_hundred_studies() {
         for (count, method) in
@@ -189,12 +191,12 @@ mod tests {
                 usize::from(!beyond_chance(&drawn(method, 6, count, seed), &noise).parameters.is_empty())
             };
             let named: usize = (0..600).map(named).sum();
-            // 6 +- 2.4 expected; measured 7, 9 and 5
+            // expected: 6 +- 2.4; measured: 7, 9 and 5
             assert!((1..=14).contains(&named), "{named} of 600 with {count} draws, {method:?}");
         }
     }
 
-    /// Truth: the result is made of the parameters that must be named, and of no other.
+    /// Truth: the parameters of which the result is a function.
     #[test]
     fn what_makes_a_result_is_named_and_what_does_not_is_not() {
         let (mut missed, mut wrong) = (0, 0);
@@ -205,15 +207,14 @@ mod tests {
             missed += usize::from(found.parameters.first() != Some(&3));
             wrong += usize::from(found.parameters.len() > 1);
             assert!((0.4..0.6).contains(&found.chance), "{}", found.chance);
-            // The weaker one is not lost in the scatter that the stronger one makes, whatever its
-            // shape.
+            // A strong effect of any shape must not hide a weaker one.
             let x = drawn(SampleMethod::Random, 7, 100, seed);
             let y: Vec<f64> = (0..100).map(|k| (3.0 * x[1][k]).exp() + 4.0 * (x[5][k] - 0.5).powi(2)).collect();
             let found = beyond_chance(&x, &y).parameters;
             missed += usize::from(found[..2] != [1, 5]);
             wrong += usize::from(found.len() > 2);
         }
-        assert!(missed == 0 && wrong <= 6, "{missed} missed, {wrong} named without reason"); // 2 expected, measured 4
+        assert!(missed == 0 && wrong <= 6, "{missed} missed, {wrong} named without reason"); // expected: 2, measured: 4
     }
 
     #[test]
@@ -223,7 +224,7 @@ mod tests {
         assert_eq!(beyond_chance(&x, &x[0].clone()), nothing);
         assert_eq!(beyond_chance(&drawn(SampleMethod::Random, 2, 30, 0), &[3.0; 30]), nothing);
         assert_eq!(beyond_chance(&[], &[]), nothing);
-        // One parameter twice is named once.
+        // Only one of two equal parameters is selected.
         let x = drawn(SampleMethod::Random, 1, 50, 0).remove(0);
         assert_eq!(beyond_chance(&[x.clone(), x.clone()], &x).parameters.len(), 1);
         assert!(beyond_chance(&[vec![1.0; 50]], &x).parameters.is_empty());

@@ -1,53 +1,53 @@
-//! Distributions by their quantiles: where a number between 0 and 1 falls.
+//! Probability distributions, given by their quantile functions.
 
 use std::f64::consts::SQRT_2;
 
 use statrs::function::erf::erfc_inv;
 
-/// How a parameter is spread.
+/// Distribution of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Distribution {
-    /// As likely everywhere between both.
+    /// Uniform distribution.
     Uniform {
-        /// Least value.
+        /// Minimum.
         low: f64,
-        /// Largest value.
+        /// Maximum.
         high: f64,
     },
-    /// Its logarithm is uniform; both positive.
+    /// Uniform distribution of the logarithm; both bounds positive.
     LogUniform {
-        /// Least value.
+        /// Minimum.
         low: f64,
-        /// Largest value.
+        /// Maximum.
         high: f64,
     },
-    /// Gauss.
+    /// Normal distribution.
     Normal {
         /// Mean.
         mean: f64,
         /// Standard deviation.
         std: f64,
     },
-    /// Its logarithm is normal.
+    /// Normal distribution of the logarithm.
     LogNormal {
-        /// Half of the values lie below.
+        /// Median.
         median: f64,
         /// Standard deviation of the natural logarithm.
         sigma: f64,
     },
-    /// Straight up to the mode and down from there.
+    /// Triangular distribution.
     Triangular {
-        /// Least value.
+        /// Minimum.
         low: f64,
-        /// Likeliest value.
+        /// Mode.
         mode: f64,
-        /// Largest value.
+        /// Maximum.
         high: f64,
     },
 }
 
 impl Distribution {
-    /// The value below which lies the part `u` of all, 0 < u < 1.
+    /// Returns the quantile for probability `u`, 0 < u < 1.
     pub fn quantile(&self, u: f64) -> f64 {
         match *self {
             Self::Uniform { low, high } => low + (high - low) * u,
@@ -64,7 +64,7 @@ impl Distribution {
         }
     }
 
-    /// Least and largest value, if it has them.
+    /// Returns minimum and maximum; `None` if unbounded.
     pub fn bounds(&self) -> Option<(f64, f64)> {
         match *self {
             Self::Uniform { low, high } | Self::LogUniform { low, high } | Self::Triangular { low, high, .. } => {
@@ -88,13 +88,13 @@ mod tests {
     #[test]
     fn normal_quantiles_are_those_of_the_tables() {
         for (u, z) in NORMAL_TABLE {
-            // measured 4e-16
+            // measured: 4e-16
             assert!((normal_quantile(u) - z).abs() <= 2e-15 * z.abs().max(1.0), "{u}: {} {z}", normal_quantile(u));
         }
         assert_eq!(normal_quantile(0.5), 0.0);
     }
 
-    /// Truth: means and variances in closed form; the quantile over an even sample of u is the
+    /// Truth: means and variances in closed form; averaging quantiles over equally spaced u is the
     /// midpoint rule.
     #[test]
     fn means_and_variances_are_those_of_the_formulas() {
@@ -124,7 +124,7 @@ mod tests {
             let x: Vec<f64> = (0..n).map(|k| distribution.quantile((f64::from(k) + 0.5) / f64::from(n))).collect();
             let found = x.iter().sum::<f64>() / f64::from(n);
             let spread = x.iter().map(|x| (x - found).powi(2)).sum::<f64>() / f64::from(n);
-            // measured 3e-8 and 3e-5 (the tails of the normal distribution)
+            // measured: 3e-8 and 3e-5 (due to the tails of the normal distribution)
             assert!((found / mean - 1.0).abs() < 1e-6, "{distribution:?}: {found} {mean}");
             assert!((spread / variance - 1.0).abs() < 3e-4, "{distribution:?}: {spread} {variance}");
             if let Some((low, high)) = distribution.bounds() {

@@ -1,52 +1,52 @@
-//! What a parameter does to a result on average, and how results spread.
+//! Main effect of a parameter on a result, and the distribution of results.
 
 use crate::statistics::indices::quantile;
 
-/// Runs whose parameter is the same, or nearly.
+/// Group of runs with equal or similar values of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EffectGroup {
     /// Mean of the parameter.
     pub x: f64,
-    /// Runs.
+    /// Number of runs.
     pub count: usize,
     /// Mean of the result.
     pub mean: f64,
-    /// Standard error of that.
+    /// Standard error of the mean result.
     pub std_error: f64,
 }
 
 /// Means of a result over groups of a parameter's values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MainEffect {
-    /// By the parameter.
+    /// Groups, sorted by the parameter.
     pub groups: Vec<EffectGroup>,
-    /// Part of the variance of the result that the means of the groups have (correlation ratio). On
-    /// a full grid this is the part of the main effect in the analysis of variance; on a sample it
-    /// is an estimate of the first Sobol index, from above.
+    /// Share of the result's variance that is between the groups (correlation ratio). On a full
+    /// grid it is the share of the main effect in the analysis of variance; on a sample it is an
+    /// estimate of the first-order Sobol index with positive bias.
     pub share: f64,
 }
 
-/// How runs are put into groups by a parameter.
+/// Grouping of runs by a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Grouping {
-    /// A group for each value: for parameters whose values are listed.
+    /// One group for each value: for parameters with listed values.
     Levels,
-    /// Groups of about equally many runs if there are many values: for parameters that are drawn.
-    /// Runs of one value stay together.
+    /// Groups of about equal size if there are many values: for random parameters. Runs with the
+    /// same value are in one group.
     Bins,
 }
 
-/// A drawn parameter with so many values or fewer has a group for each.
+/// Maximum number of values of a random parameter for one group per value.
 const MOST_LEVELS: usize = 12;
-/// Most groups of other drawn parameters.
+/// Maximum number of groups of other random parameters.
 const BINS: usize = 8;
-/// Runs that a group has at least, if there are enough for three groups.
+/// Minimum size of a group, if there are enough runs for three groups.
 const LEAST_IN_BIN: usize = 6;
 
-/// The main effect of a parameter; none without two values of it or with a result that does not
-/// vary.
+/// Returns the main effect of a parameter; `None` with fewer than two groups, or if the result does
+/// not vary.
 ///
-/// Runs whose `x` or `y` is NaN are left out.
+/// Ignores runs whose `x` or `y` is NaN.
 pub fn main_effect(x: &[f64], y: &[f64], grouping: Grouping) -> Option<MainEffect> {
     let mut pairs: Vec<(f64, f64)> =
         x.iter().copied().zip(y.iter().copied()).filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
@@ -69,7 +69,8 @@ pub fn main_effect(x: &[f64], y: &[f64], grouping: Grouping) -> Option<MainEffec
     Some(MainEffect { groups, share: between / variance })
 }
 
-/// Sorted pairs in groups of about equal size; pairs of one value stay together.
+/// Divides sorted pairs into groups of about equal size; pairs with the same value are in one
+/// group.
 fn bins(pairs: &[(f64, f64)]) -> Vec<&[(f64, f64)]> {
     let n = pairs.len();
     let wanted = (n / LEAST_IN_BIN).clamp(3, BINS);
@@ -97,24 +98,24 @@ fn group(pairs: &[(f64, f64)]) -> EffectGroup {
     }
 }
 
-/// How a result spreads.
+/// Statistics of a result.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
-    /// Numbers that there are.
+    /// Number of finite values.
     pub count: usize,
-    /// Least.
+    /// Minimum.
     pub min: f64,
-    /// Largest.
+    /// Maximum.
     pub max: f64,
     /// Mean.
     pub mean: f64,
-    /// Standard deviation; 0 of one number.
+    /// Standard deviation; 0 for a single value.
     pub std: f64,
     /// Quantiles 0.05, 0.5 and 0.95.
     pub quantiles: [f64; 3],
 }
 
-/// The spread of numbers; NaN are left out, none without any other.
+/// Returns the statistics of the finite values; `None` if there are none.
 pub fn spread(values: &[f64]) -> Option<Spread> {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
@@ -127,8 +128,8 @@ pub fn spread(values: &[f64]) -> Option<Spread> {
     Some(Spread { count: sorted.len(), min, max, mean, std, quantiles })
 }
 
-/// Points of which no other is less in one of both numbers and not larger in the other, by the
-/// first number.
+/// Returns the Pareto-optimal points of two minimised quantities, sorted by the first; of equal
+/// points only the first one.
 pub fn pareto_front(a: &[f64], b: &[f64]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..a.len().min(b.len())).filter(|k| a[*k].is_finite() && b[*k].is_finite()).collect();
     order.sort_by(|i, j| a[*i].total_cmp(&a[*j]).then(b[*i].total_cmp(&b[*j])).then(i.cmp(j)));
@@ -147,7 +148,7 @@ mod tests {
     use crate::statistics::random::uniform;
 
     /// Truth: two-way analysis of variance by hand. With a = 0..n-1, b = 0, 1, 2 and y = 3 a + 2
-    /// b^2 + c (a - m)(b - 1), where m is the mean of a, the last term has no mean over a and none
+    /// b^2 + c (a - m)(b - 1), where m is the mean of a, the last term has zero mean over a and
     /// over b, so that
     ///
     /// ```text
@@ -171,7 +172,7 @@ mod tests {
             let all = va + vb + vab;
             let effects = [&a, &b].map(|x| main_effect(x, &y, Grouping::Levels).unwrap());
             for (effect, expected) in effects.iter().zip([va / all, vb / all]) {
-                // measured 3e-14
+                // measured: 3e-14
                 assert!((effect.share - expected).abs() < 1e-12, "{n} levels: {} for {expected}", effect.share);
             }
             let groups = &effects[0].groups;
@@ -187,7 +188,7 @@ mod tests {
         assert_eq!(main_effect(&[1.0; 20], &[2.0; 20], Grouping::Levels), None);
     }
 
-    /// Truth: 50 values with 1 to 7 runs each: the runs of a value are all in one group.
+    /// Truth: 50 values with 1 to 7 runs each; all runs of a value are in one group.
     #[test]
     fn groups_of_a_drawn_parameter_never_cut_a_value_in_two() {
         let x: Vec<f64> = (0..50).flat_map(|k| vec![f64::from(k); 1 + (k as usize * 3) % 7]).collect();
@@ -204,7 +205,7 @@ mod tests {
         }
     }
 
-    /// Truth: the mean over a bin of y = x^2 with x uniform.
+    /// Truth: the mean of y = x^2 over a bin, with x uniform.
     #[test]
     fn values_that_are_all_different_are_taken_in_groups_of_equal_size() {
         let x: Vec<f64> = (0..8000).map(|k| uniform(0, 0, k)).collect();

@@ -1,42 +1,42 @@
-//! Which parameter makes how much of the variance of a result: Sobol indices of a Saltelli design,
-//! with their confidence.
+//! Sobol indices of a Saltelli design: the share of a result's variance due to each parameter, with
+//! confidence intervals.
 //!
 //! ```text
-//! first  S_i  = mean of f(B) (f(AB_i) - f(A)) / V                   (1)   alone
-//! total  ST_i = mean of (f(A) - f(AB_i))^2 / (2 V)                  (2)   with all that it does together with others
+//! first  S_i  = mean of f(B) (f(AB_i) - f(A)) / V                   (1)   without interactions
+//! total  ST_i = mean of (f(A) - f(AB_i))^2 / (2 V)                  (2)   with all interactions
 //! ```
-//! A and B are the two points of a base, AB_i is A with coordinate i of B; V is the variance of f
-//! over all A and B. Source: [Saltelli 2010], table 2, (b) and (f).
+//! A and B are the two points of a base, AB_i is A with coordinate i of B, and V is the variance of
+//! f over all A and B. Source: [Saltelli 2010], table 2, (b) and (f).
 
 use rand::RngExt;
 
 use crate::statistics::random::stream;
 
-/// How much of the variance a parameter makes.
+/// Sobol indices of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SobolIndex {
-    /// By itself, equation (1).
+    /// First-order index, equation (1).
     pub first: f64,
-    /// Where that lies in 95 of 100 cases.
+    /// 95 % confidence interval of `first`.
     pub first_interval: [f64; 2],
-    /// With others too, equation (2).
+    /// Total index, equation (2).
     pub total: f64,
-    /// Likewise.
+    /// 95 % confidence interval of `total`.
     pub total_interval: [f64; 2],
 }
 
-/// Times that the base points are drawn again for the intervals.
+/// Number of bootstrap samples for the intervals.
 const DRAWS: usize = 400;
-/// Fewest base points that say something.
+/// Minimum number of base points.
 const FEWEST: usize = 8;
 
-/// Sobol indices of all parameters; none with fewer than eight sound base points, or if the result
-/// does not vary.
+/// Returns the Sobol indices of all parameters; `None` with fewer than eight valid base points, or
+/// if the result does not vary.
 ///
-/// * `y`: the result at each point of the design, in its order; a base point with a NaN in one of
-///   its points is left out.
+/// * `y`: the result at each point of the design, in its order; base points with a NaN in one of
+///   their points are ignored.
 /// * `dimensions`: number of parameters.
-/// * `seed`: of the draws for the intervals (bootstrap over base points, percentiles).
+/// * `seed`: seed for the intervals (bootstrap over base points, percentiles).
 pub fn sobol_indices(y: &[f64], dimensions: usize, seed: u64) -> Option<Vec<SobolIndex>> {
     let size = dimensions + 2;
     let sound: Vec<&[f64]> = y.chunks_exact(size).filter(|base| base.iter().all(|y| y.is_finite())).collect();
@@ -49,7 +49,7 @@ pub fn sobol_indices(y: &[f64], dimensions: usize, seed: u64) -> Option<Vec<Sobo
     let mut numbers = stream(seed, 0);
     for _ in 0..DRAWS {
         let rows: Vec<usize> = all.iter().map(|_| numbers.random_range(0..sound.len())).collect();
-        // A draw without variance says nothing.
+        // Resamples without variance are ignored.
         let Some(again) = estimate(&sound, &rows, dimensions) else { continue };
         drawn.iter_mut().zip(again).for_each(|(list, pair)| list.push(pair));
     }
@@ -67,14 +67,14 @@ pub fn sobol_indices(y: &[f64], dimensions: usize, seed: u64) -> Option<Vec<Sobo
     Some(found.iter().zip(&drawn).map(index).collect())
 }
 
-/// First and total index of each parameter over these base points.
+/// Returns the first-order and total index of each parameter over some base points.
 fn estimate(bases: &[&[f64]], rows: &[usize], dimensions: usize) -> Option<Vec<[f64; 2]>> {
     let n = rows.len() as f64;
     let sum: f64 = rows.iter().map(|k| bases[*k][0] + bases[*k][1]).sum();
     let mean = sum / (2.0 * n);
     let square = |y: f64| (y - mean) * (y - mean);
     let variance = rows.iter().map(|k| square(bases[*k][0]) + square(bases[*k][1])).sum::<f64>() / (2.0 * n);
-    // Rounding alone makes no variance.
+    // A variance due to rounding counts as zero.
     if variance <= 1e-24 * mean * mean || variance == 0.0 {
         return None;
     }
@@ -91,7 +91,7 @@ fn estimate(bases: &[&[f64]], rows: &[usize], dimensions: usize) -> Option<Vec<[
     Some((0..dimensions).map(of).collect())
 }
 
-/// A quantile of sorted values, between two of them by a straight line.
+/// Returns a quantile of sorted values by linear interpolation.
 pub(crate) fn quantile(sorted: &[f64], part: f64) -> f64 {
     let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
     let place = part * last as f64;
@@ -127,7 +127,7 @@ mod tests {
         let expected = [(v1 / v, (v1 + v13) / v), (v2 / v, v2 / v), (0.0, v13 / v)];
         let found = sobol_indices(&y, 3, 0).unwrap();
         for (index, (first, total)) in found.iter().zip(expected) {
-            // measured 2e-3
+            // measured: 2e-3
             assert!((index.first - first).abs() < 0.01, "{index:?} {first}");
             assert!((index.total - total).abs() < 0.01, "{index:?} {total}");
         }
@@ -149,15 +149,15 @@ mod tests {
         }
     }
 
-    /// Truth: of 100 studies with other seeds about 95 intervals hold the index of a linear
-    /// function, a_i^2 / sum a^2.
+    /// Truth: in about 95 of 100 studies with different seeds the interval contains the index of a
+    /// linear function, a_i^2 / sum a^2.
     #[test]
     fn intervals_hold_the_index_as_often_as_they_say() {
         let expected = 4.0 / 5.25;
         let mut held = [0, 0];
         for seed in 0..100 {
             let mut y = results(3, 64, seed, |u| 2.0 * u[0] + u[1] - 0.5 * u[2]);
-            // Random points instead of even ones: the intervals are made for those.
+            // Random points in place of the low-discrepancy ones, as the bootstrap assumes.
             let point = |k: u64, c: u64| crate::statistics::random::uniform(seed + 1000, c, k);
             for (base, values) in y.chunks_exact_mut(5).enumerate() {
                 let at = |mixed: &dyn Fn(u64) -> bool| {

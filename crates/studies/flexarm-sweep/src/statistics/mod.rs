@@ -1,9 +1,9 @@
-//! Designs of studies, and what their results tell: pure functions on numbers.
+//! Designs of studies, and evaluation of their results: pure functions on numbers.
 //!
-//! A study tries many points of a cube: [`Sample`] (random, Latin hypercube, Sobol, Saltelli) or a
-//! full grid ([`grid_levels`]); a [`Distribution`] makes values of coordinates. Of the results
-//! [`main_effect`], [`beyond_chance`], [`sobol_indices`], [`spread`] and [`pareto_front`] say what
-//! matters; [`LeastSearch`] goes for the least of one of them within bounds.
+//! A study evaluates many points of a unit cube: a [`Sample`] (random, Latin hypercube, Sobol,
+//! Saltelli) or a full grid ([`grid_levels`]); a [`Distribution`] maps coordinates to values.
+//! [`main_effect`], [`beyond_chance`], [`sobol_indices`], [`spread`] and [`pareto_front`] evaluate
+//! the results; [`LeastSearch`] minimises one of them within bounds.
 //!
 //! ```
 //! use flexarm_sweep::statistics::{Distribution, Sample, SampleMethod, sobol_indices};
@@ -17,8 +17,8 @@
 //! assert!(indices[0].first > 0.9 && indices[1].first < 0.1);
 //! ```
 //!
-//! Everything depends on its seed alone: any point can be had by its number on any machine. Not
-//! here: what is run, files.
+//! Results depend only on their seed: any point follows from its number on any machine. Not here:
+//! simulations, files.
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod chance;

@@ -1,22 +1,21 @@
-//! Random numbers that depend on nothing but their place: seed, stream and index. Any of them can
-//! be had alone, on any machine, in any order.
+//! Random numbers that depend only on seed, stream and index. Each can be computed by itself, on
+//! any machine, in any order.
 
 use rand::distr::Open01;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
-/// Returns the generator of a stream at its start. Numbers of different streams have nothing to do
-/// with each other.
+/// Returns the generator of a stream at its start. Different streams are independent.
 pub(crate) fn stream(seed: u64, stream: u64) -> ChaCha8Rng {
     let mut generator = ChaCha8Rng::seed_from_u64(seed);
     generator.set_stream(stream);
     generator
 }
 
-/// Returns the `index`-th number of a stream, between 0 and 1, neither of them.
+/// Returns the `index`-th number of a stream, in the open interval from 0 to 1.
 pub(crate) fn uniform(seed: u64, stream: u64, index: u64) -> f64 {
     let mut generator = self::stream(seed, stream);
-    // A number takes two words of 32 bits.
+    // A number consumes two words of 32 bits.
     generator.set_word_pos(2 * u128::from(index));
     generator.sample(Open01)
 }
@@ -25,7 +24,7 @@ pub(crate) fn uniform(seed: u64, stream: u64, index: u64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Truth: the generator itself, one number after the other.
+    /// Truth: the numbers of the generator in sequence.
     #[test]
     fn a_number_by_its_index_is_the_one_that_the_stream_has_there() {
         let numbers: Vec<f64> = stream(1, 5).sample_iter(Open01).take(100).collect();

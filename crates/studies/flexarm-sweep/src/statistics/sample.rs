@@ -1,26 +1,26 @@
-//! Designs: which points of a cube are tried. Each point can be had by its number alone.
+//! Sampling designs: points in a unit cube, each determined by its number.
 
 use rand::seq::SliceRandom;
 
 use crate::statistics::random::{stream, uniform};
 use crate::statistics::sobol;
 
-/// How the points are chosen.
+/// Sampling method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SampleMethod {
-    /// Each by itself.
+    /// Independent random points.
     Random,
-    /// Of n intervals of each coordinate every one is met once.
+    /// Latin hypercube: each of the n intervals of every coordinate contains one point.
     LatinHypercube,
-    /// Sobol's sequence with its digits shifted, otherwise for each 65536 points.
+    /// Sobol's sequence with a random digital shift, a new one for each 65536 points.
     Sobol,
     /// Saltelli's design for [`crate::statistics::sobol_indices`]: two points of Sobol's sequence,
-    /// and the first with one coordinate after the other from the second.
+    /// and the first with one coordinate at a time replaced by that of the second.
     Saltelli,
 }
 
 impl SampleMethod {
-    /// Its word in files, and what it means.
+    /// Words for the methods in files, and their meaning.
     pub const WORDS: [(&'static str, Self, &'static str); 4] = [
         ("random", Self::Random, "each point by itself"),
         ("latin-hypercube", Self::LatinHypercube, "every interval of each parameter once"),
@@ -28,7 +28,7 @@ impl SampleMethod {
         ("saltelli", Self::Saltelli, "count times (parameters + 2) points for Sobol indices"),
     ];
 
-    /// Most dimensions.
+    /// Returns the maximum number of dimensions.
     pub fn most_dimensions(self) -> usize {
         match self {
             Self::Random | Self::LatinHypercube => usize::MAX,
@@ -38,22 +38,22 @@ impl SampleMethod {
     }
 }
 
-/// Points of a cube.
+/// Sample of points in a unit cube.
 #[derive(Clone, Debug)]
 pub struct Sample {
     method: SampleMethod,
     dimensions: usize,
     count: usize,
     seed: u64,
-    /// Which interval each point takes, by dimension.
+    /// Interval of each point, by dimension.
     order: Vec<Vec<usize>>,
 }
 
 impl Sample {
-    /// `count` points, or so many base points of Saltelli's design; none for more dimensions than
-    /// the method has.
+    /// Returns a sample of `count` points, or of `count` base points of Saltelli's design; `None`
+    /// if the method does not support the number of dimensions.
     ///
-    /// Cost: memory of `count` times `dimensions` for Latin hypercubes, else next to nothing.
+    /// Cost: memory of `count` times `dimensions` for Latin hypercubes, otherwise negligible.
     pub fn new(method: SampleMethod, dimensions: usize, count: usize, seed: u64) -> Option<Self> {
         if dimensions > method.most_dimensions() {
             return None;
@@ -70,7 +70,7 @@ impl Sample {
         Some(Self { method, dimensions, count, seed, order })
     }
 
-    /// How many points there are.
+    /// Returns the number of points.
     pub fn points(&self) -> usize {
         match self.method {
             SampleMethod::Saltelli => self.count * (self.dimensions + 2),
@@ -78,7 +78,7 @@ impl Sample {
         }
     }
 
-    /// A coordinate of a point, between 0 and 1, neither of them.
+    /// Returns a coordinate of a point, in the open interval from 0 to 1.
     pub fn coordinate(&self, point: usize, dimension: usize) -> f64 {
         let own = || uniform(self.seed, 2 * dimension as u64, point as u64);
         match self.method {
@@ -87,7 +87,7 @@ impl Sample {
             SampleMethod::Sobol => sobol::shifted(point, dimension, self.seed),
             SampleMethod::Saltelli => {
                 let (base, place) = (point / (self.dimensions + 2), point % (self.dimensions + 2));
-                // A, B, then A with one coordinate of B.
+                // Order of the points: A, B, then A with one coordinate of B.
                 let from_b = place == 1 || place == dimension + 2;
                 let column = dimension + if from_b { self.dimensions } else { 0 };
                 sobol::shifted(base, column, self.seed)
@@ -96,9 +96,10 @@ impl Sample {
     }
 }
 
-/// The levels of the `point`-th point of a full grid, the last parameter changing fastest.
+/// Returns the levels of the `point`-th point of a full grid, in which the last parameter changes
+/// fastest.
 ///
-/// * `sizes`: levels of each parameter.
+/// * `sizes`: number of levels of each parameter.
 pub fn grid_levels(point: usize, sizes: &[usize]) -> Vec<usize> {
     let mut rest = point;
     let mut levels: Vec<usize> = sizes
@@ -131,8 +132,8 @@ mod tests {
         }
     }
 
-    /// Truth: for a sum of the coordinates a Latin hypercube has an error of order n^-3/2, random
-    /// points of order n^-1/2.
+    /// Truth: for a sum of the coordinates the error of a Latin hypercube is of order n^-3/2, that
+    /// of random points of order n^-1/2.
     #[test]
     fn a_latin_hypercube_and_sobols_sequence_meet_the_mean_of_a_sum_closer_than_random_points() {
         let (n, d) = (256, 4);
@@ -148,7 +149,7 @@ mod tests {
         };
         let (random, latin, sobol) =
             (error(SampleMethod::Random), error(SampleMethod::LatinHypercube), error(SampleMethod::Sobol));
-        // expected sqrt(4/12/256) = 3.6e-2, and for Latin hypercubes that over 256
+        // expected: sqrt(4/12/256) = 3.6e-2 for random points, 256 times less for Latin hypercubes
         assert!((random / 0.0361 - 1.0).abs() < 0.3, "{random}");
         assert!((latin / (0.0361 / 256.0) - 1.0).abs() < 0.3, "{latin}");
         assert!(sobol < random / 10.0, "{sobol}");

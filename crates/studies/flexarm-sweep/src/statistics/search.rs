@@ -1,13 +1,14 @@
-//! The least of a function within a box and under constraints, from its values alone: covariance
-//! matrix adaptation (CMA-ES).
+//! Derivative-free constrained minimisation of a function within a box: covariance matrix
+//! adaptation (CMA-ES).
 //!
-//! A generation is asked for, its points are tried by the caller, in any order and on any number of
-//! machines, and told. Of the crates there are, `argmin` has no such method and `cmaes` (still
-//! since 2023, with a linear algebra of its own version) wants to call the function itself and
-//! knows no constraints; here generations go out as a whole.
+//! The search has an ask-and-tell interface: the caller evaluates the points of a generation, in
+//! any order and on any number of machines. Of the existing crates, `argmin` does not have this
+//! method; `cmaes` (unchanged since 2023, with its own version of the linear algebra crate) calls
+//! the function itself and does not support constraints.
 //!
-//! Source: [Hansen 2016], with its default numbers. Constraints are a penalty in proportion to
-//! their violation, whose weight grows while most points violate them and falls while none does.
+//! Source: [Hansen 2016], with its default constants. Constraints are a penalty proportional to
+//! their violation. Its weight grows while most points violate constraints and falls while none
+//! does.
 
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
@@ -16,23 +17,22 @@ use rand::distr::Open01;
 use crate::statistics::distribution::normal_quantile;
 use crate::statistics::random::stream;
 
-/// What a point gave.
+/// Evaluation of a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Judged {
-    /// What is to be least; NaN of a point that could not be tried.
+    /// Value to minimise; NaN if the evaluation failed.
     pub value: f64,
-    /// How far it is from keeping the constraints: 0 if it does, else the sum of the relative
-    /// violations.
+    /// Sum of the relative constraint violations; 0 if all constraints hold.
     pub violation: f64,
 }
 
 impl Judged {
-    /// Whether it keeps the constraints.
+    /// Whether the constraints hold.
     pub fn keeps(&self) -> bool {
         self.value.is_finite() && self.violation <= 0.0
     }
 
-    /// Whether it is better: keeping the constraints first, then less violation, then the value.
+    /// Whether the point is better: first by feasibility, then by violation, then by value.
     pub fn beats(&self, other: &Self) -> bool {
         let key = |j: &Self| match j.value.is_finite() && j.violation.is_finite() {
             false => (2, 0.0, 0.0),
@@ -44,7 +44,7 @@ impl Judged {
     }
 }
 
-/// A search in the unit cube.
+/// Search in the unit cube.
 #[derive(Clone, Debug)]
 pub struct LeastSearch {
     seed: u64,
@@ -54,19 +54,19 @@ pub struct LeastSearch {
     covariance: DMatrix<f64>,
     path_sigma: DVector<f64>,
     path_covariance: DVector<f64>,
-    /// Weight of violations; none before the first generation is told.
+    /// Penalty weight of violations; `None` before the results of the first generation.
     penalty: Option<f64>,
-    /// The generation that is out.
+    /// Points of the present generation.
     points: Vec<DVector<f64>>,
 }
 
-/// Step at the start, of the cube's side.
+/// Initial step size, relative to the side of the cube.
 const FIRST_STEP: f64 = 0.3;
-/// A search whose points differ by less ends, of the cube's side.
+/// Step size at which a search has converged, relative to the side of the cube.
 const NOTHING: f64 = 1e-7;
 
 impl LeastSearch {
-    /// A search from a point.
+    /// Returns a search from a start point.
     pub fn new(start: &[f64], seed: u64) -> Self {
         let n = start.len();
         Self {
@@ -82,13 +82,13 @@ impl LeastSearch {
         }
     }
 
-    /// Points of a generation: a multiple of four.
+    /// Returns the number of points in a generation: a multiple of four.
     pub fn size(dimensions: usize) -> usize {
         let usual = 4 + (3.0 * (dimensions.max(1) as f64).ln()) as usize;
         usual.max(8).next_multiple_of(4)
     }
 
-    /// The next generation, in the cube. The first point of all is the start.
+    /// Returns the next generation of points in the cube. The very first point is the start.
     pub fn ask(&mut self) -> Vec<Vec<f64>> {
         let n = self.mean.len();
         let root = self.root();
@@ -103,10 +103,11 @@ impl LeastSearch {
         self.points.iter().map(|p| p.as_slice().to_vec()).collect()
     }
 
-    /// What the points that were asked for gave, in their order.
+    /// Updates the search with the evaluations of the requested points, in their order.
     pub fn tell(&mut self, judged: &[Judged]) {
         let n = self.mean.len() as f64;
         let order = self.ranked(judged);
+        // Weighted recombination of the better half of the points.
         let mu = self.points.len() / 2;
         let weights: Vec<f64> = (0..mu).map(|k| (mu as f64 + 0.5).ln() - (k as f64 + 1.0).ln()).collect();
         let sum: f64 = weights.iter().sum();
@@ -118,7 +119,7 @@ impl LeastSearch {
         let step = steps.iter().zip(&weights).fold(DVector::zeros(old.len()), |sum, (y, w)| sum + y * *w);
         self.mean = &old + &step * self.sigma;
 
-        // Both paths, then matrix and step: [Hansen 2016], figure 6.
+        // Learning rates; the updates below are those of [Hansen 2016], figure 6.
         let c_sigma = (effective + 2.0) / (n + effective + 5.0);
         let d_sigma = 1.0 + 2.0 * (((effective - 1.0) / (n + 1.0)).sqrt() - 1.0).max(0.0) + c_sigma;
         let c_c = (4.0 + effective / n) / (n + 4.0 + 2.0 * effective / n);
@@ -126,6 +127,7 @@ impl LeastSearch {
         let c_mu = (1.0 - c_1).min(2.0 * (effective - 2.0 + 1.0 / effective) / ((n + 2.0).powi(2) + effective));
         let expected = n.sqrt() * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n));
 
+        // Evolution paths of step size and covariance.
         let whitened = self.inverse_root() * &step;
         self.path_sigma =
             &self.path_sigma * (1.0 - c_sigma) + whitened * (c_sigma * (2.0 - c_sigma) * effective).sqrt();
@@ -135,6 +137,7 @@ impl LeastSearch {
         let on = if goes_on { 1.0 } else { 0.0 };
         self.path_covariance =
             &self.path_covariance * (1.0 - c_c) + step * (on * (c_c * (2.0 - c_c) * effective).sqrt());
+        // Rank-one and rank-mu update of the covariance, then the step size.
         let rank_mu = steps
             .iter()
             .zip(&weights)
@@ -146,14 +149,14 @@ impl LeastSearch {
         self.sigma = self.sigma.min(FIRST_STEP);
     }
 
-    /// Whether its points hardly differ any more.
+    /// Whether the search has converged.
     pub fn is_settled(&self) -> bool {
         let widest = self.covariance.diagonal().iter().fold(0.0f64, |most, c| most.max(*c));
         self.sigma * widest.sqrt() < NOTHING
     }
 
-    /// Points from the best to the worst: the value with the penalty, points that could not be
-    /// tried last.
+    /// Sorts the points from best to worst by value plus penalty; points whose evaluation failed
+    /// are last.
     fn ranked(&mut self, judged: &[Judged]) -> Vec<usize> {
         let tried: Vec<&Judged> = judged.iter().filter(|j| j.value.is_finite() && j.violation.is_finite()).collect();
         let violating = tried.iter().filter(|j| !j.keeps()).count();
@@ -166,7 +169,7 @@ impl LeastSearch {
                 let (value, violation) = (range(|j| j.value), range(|j| j.violation));
                 if violation > 0.0 && value > 0.0 { 2.0 * value / violation } else { 0.0 }
             }
-            // Before anything was violated there was nothing to compare with.
+            // The first violation sets the weight by the sizes of value and violation.
             Some(0.0) if violating > 0 => {
                 tried.iter().map(|j| j.value.abs()).fold(0.0, f64::max)
                     / tried.iter().map(|j| j.violation).fold(f64::MIN_POSITIVE, f64::max)
@@ -185,7 +188,7 @@ impl LeastSearch {
         order
     }
 
-    /// A root of the covariance.
+    /// Returns the symmetric square root of the covariance.
     fn root(&self) -> DMatrix<f64> {
         self.spectral(f64::sqrt)
     }
@@ -205,7 +208,7 @@ impl LeastSearch {
 mod tests {
     use super::*;
 
-    /// Best point and how many were tried.
+    /// Returns the best point, its evaluation, and the number of evaluations.
     fn least(start: &[f64], most: usize, f: impl Fn(&[f64]) -> Judged) -> (Vec<f64>, Judged, usize) {
         let mut search = LeastSearch::new(start, 1);
         let mut best: Option<(Vec<f64>, Judged)> = None;
@@ -229,7 +232,7 @@ mod tests {
         Judged { value, violation: 0.0 }
     }
 
-    /// Truth: the least is where it was put.
+    /// Truth: the position of the minimum.
     #[test]
     fn a_long_valley_that_lies_across_the_axes_is_followed_to_its_lowest_point() {
         let f = |x: &[f64]| {
@@ -241,8 +244,8 @@ mod tests {
         assert!(judged.value < 1e-9);
     }
 
-    /// Truth: the least mass of two walls with a compliance kept, min a + 2 b under 1/a + 1/b <= c,
-    /// is at a = sqrt(2) b, b = (1 + 1/sqrt(2)) / c.
+    /// Truth: the minimum of the mass a + 2 b of two walls under the compliance constraint 1/a +
+    /// 1/b <= c is at a = sqrt(2) b, b = (1 + 1/sqrt(2)) / c.
     #[test]
     fn two_walls_are_as_thin_as_the_compliance_allows() {
         let c = 6.0;
@@ -255,12 +258,12 @@ mod tests {
         for start in [[1.0, 1.0], [0.05, 0.05], [0.5, 0.9]] {
             let (x, judged, tried) = least(&start, 600, f);
             assert!(judged.keeps(), "{x:?}");
-            // measured 1e-7
+            // measured: 1e-7
             assert!(judged.value / expected - 1.0 < 1e-4, "{} {expected} after {tried}", judged.value);
         }
     }
 
-    /// Truth: the corner of the box.
+    /// Truth: a corner of the box.
     #[test]
     fn a_least_in_a_corner_is_met_exactly_and_one_parameter_is_enough() {
         let (x, ..) = least(&[0.5, 0.5], 800, |x| free(x[0] - x[1]));
@@ -279,7 +282,7 @@ mod tests {
         assert!(off.beats(&failed) && free(5.0).beats(&off) && !failed.beats(&failed));
     }
 
-    /// A search is the same on every machine and in every company.
+    /// The points depend only on the seed, on every machine.
     #[test]
     fn the_same_seed_asks_for_the_same_points() {
         let ask = |seed| LeastSearch::new(&[0.5, 0.5], seed).ask();

@@ -1,4 +1,4 @@
-//! Sobol's sequence: points that fill a cube evenly, in any number.
+//! Sobol's low-discrepancy sequence of points in a unit cube.
 //!
 //! Source: [Joe and Kuo 2008].
 
@@ -9,19 +9,20 @@ use crate::statistics::random::stream;
 
 /// Maximum number of dimensions.
 pub(crate) const MOST_DIMENSIONS: usize = sobol_burley::NUM_DIMENSIONS as usize;
-/// Binary digits of the number of points, after which the sequence starts again with another shift.
+/// Number of binary digits of the point number, after which the sequence repeats with another
+/// shift.
 const BLOCK: u32 = 16;
 
-/// Returns a coordinate of the sequence as it is in books: its 32 binary digits after the point.
+/// Returns a coordinate of the sequence without a shift, as its 32 binary fraction digits.
 fn digits(point: u32, dimension: usize) -> u32 {
     let gray = point ^ (point >> 1);
     sobol_rev(gray.reverse_bits(), dimension as u32).reverse_bits()
 }
 
-/// Returns a coordinate with its digits shifted at random, between 0 and 1, neither of them.
+/// Returns a coordinate with a random digital shift, in the open interval from 0 to 1.
 ///
-/// A shift keeps how even the points are: every interval of length 2^-k has as many of 2^m points
-/// as before.
+/// A digital shift preserves uniformity: every interval of length 2^-k contains as many of 2^m
+/// points as before.
 pub(crate) fn shifted(point: usize, dimension: usize, seed: u64) -> f64 {
     let mut shifts = stream(seed, dimension as u64);
     shifts.set_word_pos((point >> BLOCK) as u128);
@@ -37,8 +38,8 @@ mod tests {
         f64::from(digits(point, dimension)) / 2f64.powi(32)
     }
 
-    /// Truth: the first points as scipy 1.17.1's `qmc.Sobol(scramble=False)` prints them, with the
-    /// same direction numbers.
+    /// Truth: the first points of `qmc.Sobol(scramble=False)` of scipy 1.17.1, with the same
+    /// direction numbers.
     #[test]
     fn the_first_points_are_those_of_joe_and_kuo() {
         let expected = [
@@ -57,7 +58,7 @@ mod tests {
         }
     }
 
-    /// Truth: the same program, far out in the sequence and in high dimensions.
+    /// Truth: the same program, for large point numbers and in high dimensions.
     #[test]
     fn points_far_out_and_in_high_dimensions_are_those_of_joe_and_kuo() {
         for (point, dimension, expected) in FAR {
@@ -77,8 +78,8 @@ mod tests {
         (17, 127, 0.84375),
     ];
 
-    /// Truth: the definition of a (0, m, 1)-net: each of 2^m intervals holds one of 2^m points, in
-    /// every dimension and block.
+    /// Truth: the definition of a (0, m, 1)-net: each of 2^m intervals contains one of 2^m points,
+    /// in every dimension and block.
     #[test]
     fn every_interval_holds_one_point() {
         for (seed, first) in [(0, 0), (1, 0), (0, 3 << BLOCK)] {
@@ -88,7 +89,7 @@ mod tests {
                 assert!(seen.iter().all(|s| *s), "dimension {dimension}");
             }
         }
-        // Blocks are not the same points again.
+        // Blocks contain different points.
         assert_ne!(shifted(5, 2, 0), shifted((1 << BLOCK) + 5, 2, 0));
     }
 }
