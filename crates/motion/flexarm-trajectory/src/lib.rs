@@ -38,18 +38,18 @@
 //!
 //! Where to look:
 //!
-//! * least times: [`time_law`], and [`jerk_law`] within jerks;
+//! * time-optimal laws: [`time_law`], and [`jerk_law`] with jerk bounds;
 //! * mathematics: [`Trajectory`] (sampling, time scaling, moves and holds), [`Plan`] (quintic,
-//!   trapezoid and S-curve moves, points passed on the way), [`Samples`] (splines through sampled
-//!   joint values), [`JointPeak`], [`LimitViolation`];
+//!   trapezoid and S-curve moves, via points), [`Samples`] (splines through sampled joint values),
+//!   [`JointPeak`], [`LimitViolation`];
 //! * files: [`Trajectory::from_path`], [`Trajectory::parse_csv`], [`Trajectory::parse_toml`],
 //!   [`Trajectory::to_csv`], [`Trajectory::to_waypoints_toml`], [`Trajectory::parse_table`] for
 //!   tables of other programs. The module pages [`csv_file`], [`waypoints`] and [`table`] describe
 //!   the formats.
 //!
 //! Units: s, rad, rad/s, rad/s² (m, m/s, m/s² for a prismatic joint) everywhere except inside the
-//! files. Not here: robots, links and inverse kinematics; a trajectory knows its joints by name
-//! only.
+//! files. Not here: robots, links and inverse kinematics; a trajectory knows only the names of its
+//! joints.
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test"))]
 
 mod barrier;

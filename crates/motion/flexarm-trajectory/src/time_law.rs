@@ -1,49 +1,49 @@
-//! How fast a path is run: the least time within bounds that are linear in the squared speed and
-//! the acceleration along it, and the same with accelerations that rise in a given time.
+//! Time-optimal laws along a path within bounds that are linear in the squared speed and the
+//! acceleration along it, and their smoothing with a finite rise time of the acceleration.
 //!
 //! ```text
 //! x = s'^2,  u = s'',     low <= a u + b x <= high at every point,   x <= x_max
 //! x(s + ds) = x + 2 u ds  between two points
 //! ```
-//! Backwards along the path the largest `x` from which the rest can be run, then forwards the
-//! largest `u` that stays below it: reachability analysis [Pham & Pham 2018]. Bounds hold at both
-//! ends of every interval, which costs time in proportion to its length: few points are therefore
-//! divided, with bounds that are linear in between. From a standstill no bound may be broken at
-//! `x = u = 0`.
+//! A backward pass finds the largest `x` at each point from which the end can be reached; a forward
+//! pass then takes the largest `u` that stays below it: reachability analysis [Pham & Pham 2018].
+//! Bounds are enforced at both ends of every interval, which costs time in proportion to its
+//! length; intervals are therefore divided if there are few points, with linear interpolation of
+//! the bounds. Rest must be admissible: no bound may be violated at `x = u = 0`.
 //!
-//! [`Law::smoothed`] is the moving average of the speed over a time T: the path stays,
-//! accelerations rise and fall in T, and the run lasts T longer.
+//! [`Law::smoothed`] is the moving average of the speed over a time T: the path stays the same,
+//! accelerations rise and fall within T, and the duration increases by T.
 #![allow(non_snake_case, reason = "letters of the formulas")]
 
-/// `low <= a u + b x <= high`.
+/// Bound `low <= a u + b x <= high`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bound {
     /// Factor of the acceleration along the path.
     pub a: f64,
     /// Factor of the squared speed.
     pub b: f64,
-    /// Least value, not positive.
+    /// Minimum value, not positive.
     pub low: f64,
-    /// Greatest value, not negative.
+    /// Maximum value, not negative.
     pub high: f64,
 }
 
-/// What holds at a point of a path.
+/// Bounds at a point of a path.
 ///
-/// Bounds of one kind have the same place in the lists of all points. A point at which other bounds
-/// begin has those of the path before it, then those of the path behind it.
+/// Corresponding bounds have the same index in the lists of all points. A point at which the set of
+/// bounds changes has those of the path before it, followed by those of the path after it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PathPoint {
     /// Parameter of the path, ascending from point to point.
     pub s: f64,
-    /// Greatest squared speed; infinite where only the bounds rule.
+    /// Maximum squared speed; infinite if only the bounds below apply.
     pub x_max: f64,
     /// Linear bounds.
     pub bounds: Vec<Bound>,
 }
 
 impl PathPoint {
-    /// What holds between two points at a part of their distance.
+    /// Bounds between two points at a fraction of their distance.
     fn between(here: &Self, next: &Self, part: f64) -> Self {
         let s = here.s + part * (next.s - here.s);
         Self { s, x_max: between(here.x_max, next.x_max, part), bounds: bounds_between(here, next, part).collect() }
@@ -85,7 +85,7 @@ fn bounds_between<'a>(here: &'a PathPoint, next: &'a PathPoint, part: f64) -> im
 /// The run cannot be timed.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum LawError {
-    /// Fewer than two points, or parameters that do not ascend.
+    /// Number of gaps.
     #[error("a path needs two points or more, with ascending parameters (point {0})")]
     Points(usize),
     /// A bound does not allow to stand still, or speed and bounds leave no way on.
@@ -93,10 +93,10 @@ pub enum LawError {
     Infeasible(usize),
 }
 
-/// Fewer intervals than these are divided, each into so many parts at most.
+/// Usual sampling interval, s.
 const INTERVALS: usize = 4000;
 const MOST_PARTS: usize = 128;
-/// Below this part of the largest factor of `u` at a point a bound does not hold `u`.
+/// The last row of a table is incomplete.
 const NO_FACTOR: f64 = 1e-12;
 
 /// Bounds at a point and, for the interval that begins there, at its end: lines `u <= p + q x` and
@@ -110,7 +110,7 @@ struct Lines {
 
 impl Lines {
     /// Lines of a point with `ds` to the next one, whose bounds hold as well; from `goal` on the
-    /// rest can be run.
+    /// The given duration makes a joint exceed an acceleration or jerk limit.
     fn fill(&mut self, here: &PathPoint, next: &PathPoint, goal: f64) {
         let ds = next.s - here.s;
         self.upper.clear();
