@@ -239,7 +239,7 @@ impl Curve {
         Self { knots: self.knots.iter().map(|knot| knot * stretch).collect(), pieces }
     }
 
-    /// Largest speed, acceleration and jerk.
+    /// Maximum speed, acceleration and jerk.
     fn peaks(&self) -> [f64; 3] {
         if self.pieces.is_empty() {
             return [0.0; 3];

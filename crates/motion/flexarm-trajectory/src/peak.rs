@@ -1,4 +1,4 @@
-//! Largest positions, speeds, accelerations and jerks of each joint, with their times.
+//! Extrema of the position, velocity, acceleration and jerk of each joint, with their times.
 //!
 //! Exact: extrema come from the roots of the next derivative of each polynomial piece, not from
 //! samples.

@@ -68,7 +68,7 @@ impl Trajectory {
     /// * `origin`: file name for messages.
     ///
     /// # Errors
-    /// As [`Trajectory::parse_csv`], and for what the table leaves open: which column is the time,
+    /// As [`Trajectory::parse_csv`], and if the table is ambiguous: no or several time columns,
     /// decimal commas between commas, large angles without a unit.
     pub fn parse_table(
         text: &str,
