@@ -13,7 +13,7 @@
 //! let motion = read_text(text, "plan.yaml", &Request { joints: Some(&["shoulder", "elbow"]), topic: None })?;
 //! assert_eq!(motion.trajectory.joints(), ["shoulder"]);
 //! assert_eq!(motion.trajectory.duration(), 1.5);
-//! assert_eq!(motion.dropped, ["gripper"]); // told in `motion.caveats` as well
+//! assert_eq!(motion.dropped, ["gripper"]); // also reported in `motion.caveats`
 //! # Ok::<(), flexarm_motion_io::MotionError>(())
 //! ```
 //!

@@ -47,7 +47,7 @@ pub(crate) fn collect_bytes(mut bytes: Vec<u8>, into: &mut Collector<'_>) -> Res
     collect(&database, into)
 }
 
-/// A letter of a path in the address of a file.
+/// Escapes a character of a path in a file URI.
 fn escaped(letter: char) -> String {
     match letter {
         '%' | '?' | '#' => format!("%{:02X}", u32::from(letter)),

@@ -21,7 +21,7 @@
 //! let trajectory = Trajectory::parse_toml(text, "lift.toml", &[])?;
 //! assert_eq!(trajectory.duration(), 2.5);
 //!
-//! // Half-way a quintic move is at its mean, at 15/8 of its mean speed, and free of acceleration.
+//! // Halfway in time a quintic move has half its travel, 15/8 of its mean speed and no acceleration.
 //! let (mut q, mut qdot, mut qddot) = ([0.0; 2], [0.0; 2], [0.0; 2]);
 //! trajectory.sample(1.0, &mut q, &mut qdot, &mut qddot);
 //! let half_turn = std::f64::consts::FRAC_PI_2;
@@ -29,7 +29,7 @@
 //! assert!((qdot[0] - 15.0 / 8.0 * half_turn / 2.0).abs() < 1e-15);
 //! assert!(qddot[0].abs() < 1e-14);
 //!
-//! // Every limit that is passed is listed, not the first one only.
+//! // All violated limits are listed, not only the first one.
 //! let limits = JointLimits { upper: 1.0, velocity: 1.4, ..JointLimits::UNLIMITED };
 //! let violations = trajectory.check_limits(&[limits; 2]);
 //! assert_eq!(violations.len(), 2); // the shoulder's position and speed
