@@ -1,5 +1,5 @@
-//! From the messages of a topic to curves: which clock counts, what of the samples is left out,
-//! which velocities are used.
+//! Builds curves from the messages of a topic: choice of the clock, removal of unusable samples,
+//! choice of velocities.
 
 use flexarm_settings::Caveat;
 use flexarm_trajectory::{JointSamples, SampleError, Samples, Trajectory, TrajectoryError};
@@ -8,22 +8,23 @@ use crate::collect::{Received, Series, Topic, names_in_words};
 use crate::error::{Problem, Trouble};
 use crate::message::Point;
 
-/// Stamps that go back by no more than this are put in order (s).
+/// Stamps that go back by at most this are sorted (s).
 const DISORDER_S: f64 = 1.0;
-/// A repeated stamp with other positions is a slip if it is rarer than this.
+/// Repeated stamps with different positions are tolerated below this fraction.
 const FEW: f64 = 0.01;
-/// Trajectories of one message meet within this (rad or m).
+/// Maximum position difference between consecutive trajectories of one message (rad or m).
 const MEET: f64 = 1e-3;
-/// Points of trajectories that are no farther apart are at one time (s): less than a period of any
+/// Trajectory points closer than this are simultaneous (s); shorter than a period of any
 /// controller.
 const SAME_TIME_S: f64 = 1e-6;
-/// A joint that is told so many of its steps later or earlier than others goes on at its speed.
+/// A joint whose record starts later or ends earlier by at most this number of its steps is
+/// extrapolated at its speed.
 const REACH: f64 = 2.0;
-/// Velocities belong to positions whose slopes differ from them by less than this part of the
+/// Velocities match positions if the slopes differ from them by less than this fraction of the
 /// slopes, and this (rad/s).
 const BELONGS: [f64; 2] = [0.1, 0.02];
 
-/// A joint's samples, times in s since a time of all joints. Rates that are not told are NaN.
+/// Samples of a joint, times in s relative to a common origin. Missing rates are NaN.
 #[derive(Debug, Default)]
 struct Line {
     joint: String,
@@ -33,16 +34,16 @@ struct Line {
     a: Vec<f64>,
 }
 
-/// A trajectory with what is to be said of it.
+/// A trajectory with its caveats.
 pub(crate) struct Assembled {
     pub(crate) trajectory: Trajectory,
     pub(crate) samples: usize,
     pub(crate) caveats: Vec<Caveat>,
 }
 
-/// The curves of a topic.
+/// Builds the curves of a topic.
 ///
-/// * `file`: for caveats.
+/// * `file`: file name for caveats.
 /// * `has_clock`: whether the times of reception are known.
 pub(crate) fn assemble(topic: Topic, file: &str, has_clock: bool) -> Result<Assembled, Trouble> {
     let mut told = Told { file, caveats: Vec::new() };
@@ -82,7 +83,7 @@ impl Told<'_> {
 }
 
 impl Line {
-    /// Its curve, and when it begins. A joint that was told once stays there.
+    /// Returns its start time and curve. A joint with a single sample is held there.
     fn curve(&self, first: f64, last: f64) -> Result<(f64, Trajectory), TrajectoryError> {
         let known = |rates: &Vec<f64>| rates.iter().all(|rate| rate.is_finite()).then(|| rates.clone());
         let velocity = known(&self.v);
@@ -113,14 +114,14 @@ impl Line {
 }
 
 impl Line {
-    /// Mean distance of its samples (s); it has two at least.
+    /// Mean sampling interval (s); requires at least two samples.
     fn step(&self) -> f64 {
         (self.t[self.t.len() - 1] - self.t[0]) / (self.t.len() - 1) as f64
     }
 
-    /// Goes on at its speed to the ends of the others, where these are no farther than two of its
-    /// steps: publishers of other joints on the same topic send at other times, which is no reason
-    /// to stop and start at once.
+    /// Extrapolates the joint at constant speed to the ends of the other joints if these are within
+    /// two of its steps: publishers of other joints on the same topic send at other times, which
+    /// must not cause abrupt starts and stops.
     fn reach(&mut self, first: f64, last: f64) {
         if self.t.len() < 2 {
             return;
@@ -145,7 +146,8 @@ impl Line {
     }
 }
 
-/// Joints that begin later or end earlier than others by more than two of their own steps.
+/// Warns about joints that start later or end earlier than others by more than two of their own
+/// steps.
 fn tell_ends(lines: &[Line], first: f64, last: f64, told: &mut Told<'_>) {
     let mut late = Vec::new();
     for line in lines.iter().filter(|line| line.t.len() > 1) {
@@ -227,11 +229,11 @@ fn states(mut topic: Topic, has_clock: bool, told: &mut Told<'_>) -> Result<Vec<
     Ok(lines)
 }
 
-/// What was done to the samples of a joint.
+/// Changes to the samples of a joint.
 struct Counts {
     sorted: usize,
     repeated: usize,
-    /// Largest difference of positions with one time.
+    /// Maximum difference of positions with the same time.
     differ: f64,
 }
 
@@ -257,7 +259,7 @@ impl Series {
         dropped
     }
 
-    /// Samples in the order of their times, each time once.
+    /// Returns the samples in the order of their times, each time once.
     fn line(&self, use_log: bool, origin: i64) -> (Line, Counts) {
         let times = self.times(use_log);
         let mut order: Vec<usize> = (0..times.len()).collect();
@@ -279,7 +281,7 @@ impl Series {
     }
 }
 
-/// Whether the times of reception are taken instead of the stamps; told in any case.
+/// Whether the times of reception are used instead of the stamps; a caveat gives the choice.
 fn clock(series: &[Series], has_clock: bool, told: &mut Told<'_>) -> Result<bool, Trouble> {
     let total: usize = series.iter().map(|series| series.stamp_ns.len()).sum();
     let unset: usize = series.iter().map(|series| series.stamp_ns.iter().filter(|stamp| **stamp == 0).count()).sum();
@@ -330,8 +332,8 @@ fn clock(series: &[Series], has_clock: bool, told: &mut Told<'_>) -> Result<bool
     }
 }
 
-/// Velocities that are not the slopes of the positions are not used: drivers without them send
-/// zeros.
+/// Discards velocities that do not match the slopes of the positions, since drivers without
+/// velocities send zeros.
 fn judge_velocities(lines: &mut [Line], told: &mut Told<'_>) {
     let (mut foreign, mut partial) = (Vec::new(), Vec::new());
     for line in lines.iter_mut().filter(|line| line.t.len() > 1) {
@@ -377,9 +379,8 @@ fn tell_partial(partial: &[String], told: &mut Told<'_>) {
 // -------------------------------------------------------------------------------------------------------------------
 // plans
 
-/// Lines of joints from the points of trajectories. Each message begins at its stamp, else when it
-/// was received, else when the one before is over, and takes the place of what is left of the one
-/// before.
+/// Lines of joints from the points of trajectories. Each message begins at its stamp, otherwise at
+/// its reception, otherwise after the previous one, and replaces the remainder of the previous one.
 fn plans(topic: Topic, has_clock: bool, told: &mut Told<'_>) -> Result<Vec<Line>, Trouble> {
     let mut lines: Vec<Line> =
         topic.series.iter().map(|series| Line { joint: series.joint.clone(), ..Line::default() }).collect();
@@ -422,7 +423,8 @@ fn plans(topic: Topic, has_clock: bool, told: &mut Told<'_>) -> Result<Vec<Line>
     Ok(lines)
 }
 
-/// Where the robot is before the first point, if it is told and the first point comes later.
+/// Adds the position of the robot before the first point, if it is given and the first point is
+/// later.
 fn put_start(message: &Received, lines: &mut [Line], told: &mut Told<'_>) {
     let Some(points) = message.trajectories.iter().find(|points| !points.points.is_empty()) else { return };
     let first = points.points.first().map_or(0.0, |point| point.time_s);
@@ -454,9 +456,9 @@ fn put_start(message: &Received, lines: &mut [Line], told: &mut Told<'_>) {
 }
 
 impl Line {
-    /// Makes room for a message that begins at `from`: what would come later is gone. Up to its
-    /// first point the joint is where it was going: at its end if that was reached, else on the
-    /// way, between the points before and after.
+    /// Removes the samples after `from`, where a message begins. Up to the first point of the
+    /// message the joint keeps its earlier motion: it is at the end if that was reached, otherwise
+    /// interpolated between the points before and after `from`.
     fn cut(&mut self, from: f64, first: Option<&Point>, column: usize) {
         let keep = self.t.partition_point(|t| *t <= from + SAME_TIME_S);
         let next = self.t.get(keep).map(|&t| (t, self.q[keep], self.v[keep], self.a[keep]));
@@ -475,14 +477,14 @@ impl Line {
             }
             return;
         }
-        // A stream of points comes now and then a little late, and goes on.
+        // Points of a stream may be slightly late, in which case the motion continues.
         let step = keep.checked_sub(2).map_or(first.time_s, |before| t - self.t[before]);
         if first.time_s > 0.0 && gap < 0.5 * step {
             return;
         }
         let joins = first.position.get(column).is_some_and(|next| (next - q).abs() <= MEET);
-        // A hold is two steps without motion; where the message begins elsewhere at once, it goes
-        // there within the gap.
+        // A hold is two steps without motion; if the message begins elsewhere at once, the joint
+        // moves there within the gap.
         if first.time_s > 0.0 || joins {
             self.push(t + 0.5 * gap, q, 0.0, 0.0);
         }
@@ -528,7 +530,7 @@ fn tell_plan(messages: &[&Received], by_stamp: bool, has_clock: bool, segments: 
     }
 }
 
-/// Which rates of the points are used.
+/// Chooses the rates of the points that are used.
 fn judge_plan(lines: &mut [Line], told: &mut Told<'_>) {
     let mut partial = Vec::new();
     let mut without = true;

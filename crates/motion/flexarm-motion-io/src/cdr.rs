@@ -1,29 +1,28 @@
-//! Bytes of a message to a tree, by its definition: CDR of either byte order as ROS 2 writes it,
-//! and the plain bytes of ROS 1.
+//! Decodes the bytes of a message by its definition: CDR of either byte order as in ROS 2, and the
+//! serialisation of ROS 1.
 //!
-//! CDR begins with four bytes, of which the second says the byte order; numbers stand at multiples
-//! of their size, counted from behind these four. ROS 1 has little endian numbers one after
-//! another.
+//! CDR begins with a four-byte header whose second byte gives the byte order; numbers are aligned
+//! to their size, counted from the end of the header. ROS 1 has packed little-endian numbers.
 
 use std::rc::Rc;
 
 use crate::definition::{Definitions, Field, Kind, Many};
 use crate::value::{Node, Value};
 
-/// Structs nested deeper are refused.
+/// Maximum nesting depth of structs.
 const MOST_NESTED: usize = 16;
 
-/// How bytes are written.
+/// Serialisation format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Encoding {
     Cdr,
     Ros1,
 }
 
-/// The tree of a message.
+/// Decodes the tree of a message.
 ///
 /// # Errors
-/// What is wrong, as the end of a sentence.
+/// A description of the problem, as the end of a sentence.
 pub(crate) fn decode(message: &[u8], encoding: Encoding, definitions: &Definitions) -> Result<Node, String> {
     let mut bytes = match encoding {
         Encoding::Ros1 => Bytes { body: message, at: 0, align_to: 1, big: false, has_nul: false },
@@ -31,7 +30,7 @@ pub(crate) fn decode(message: &[u8], encoding: Encoding, definitions: &Definitio
             let (big, align_to) = match message {
                 [0, 0, _, _, ..] => (true, 8),
                 [0, 1, _, _, ..] => (false, 8),
-                // The second version of CDR has no alignment beyond four.
+                // Version 2 of CDR aligns to at most four bytes.
                 [0, 6, _, _, ..] => (true, 4),
                 [0, 7, _, _, ..] => (false, 4),
                 [first, second, _, _, ..] => {
@@ -75,7 +74,7 @@ impl Bytes<'_> {
             Many::Fixed(count) => count,
             Many::Sequence => self.u32().ok_or_else(cut)? as usize,
         };
-        // No value is smaller than a byte, but for structs without fields.
+        // Every value has at least one byte, except structs without fields.
         if count > self.body.len().saturating_sub(self.at) {
             return Err(format!("`{}` is to have {count} values, more than the message has bytes", field.name));
         }
@@ -99,7 +98,7 @@ impl Bytes<'_> {
             }
             Kind::Duration => {
                 let (sec, nanosec) = (self.u32().ok_or_else(cut)?, self.u32().ok_or_else(cut)?);
-                // Both have a sign.
+                // Both are signed.
                 return Ok(time(i64::from(sec.cast_signed()), i64::from(nanosec.cast_signed())));
             }
             Kind::F32 | Kind::F64 => Value::Number(self.number(&field.kind).ok_or_else(cut)?),

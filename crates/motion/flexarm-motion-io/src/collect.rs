@@ -1,4 +1,4 @@
-//! Messages by topic and joint: what of them is kept, and which topic is taken.
+//! Collects messages by topic and joint, and selects the topic.
 
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -10,12 +10,13 @@ use crate::error::{Problem, Trouble, list};
 use crate::message::{Message, Points, State, motion_of};
 use crate::value::Node;
 
-/// Most positions of all topics together: with times, velocities and accelerations half a gigabyte.
+/// Maximum number of positions of all topics together: about half a gigabyte with times, velocities
+/// and accelerations.
 const MOST_POSITIONS: usize = 12_000_000;
-/// Names of joints that nobody asked for, kept for messages.
+/// Maximum number of unrequested joint names kept for messages.
 const MOST_FOREIGN: usize = 1000;
 
-/// What a joint does on a topic, message by message. What is not told is NaN.
+/// Samples of a joint on a topic, by message. Missing values are NaN.
 #[derive(Debug, Default)]
 pub(crate) struct Series {
     pub(crate) joint: String,
@@ -28,7 +29,7 @@ pub(crate) struct Series {
     pub(crate) acceleration: Vec<f64>,
 }
 
-/// Trajectories of one message, with the time of its reception (ns).
+/// Trajectories of one message, with its time of reception (ns).
 #[derive(Debug)]
 pub(crate) struct Received {
     pub(crate) log_ns: i64,
@@ -40,24 +41,24 @@ pub(crate) struct Received {
 #[derive(Debug, Default)]
 pub(crate) struct Topic {
     pub(crate) name: String,
-    /// Type of its messages, as the file says it.
+    /// Type of its messages, as given in the file.
     pub(crate) message: String,
-    /// How its messages are read; `None` if they hold no motion.
+    /// Encoding and definition of its messages; `None` if they hold no motion.
     pub(crate) reader: Option<(Encoding, Rc<Definitions>)>,
-    /// Messages seen.
+    /// Number of messages.
     pub(crate) count: usize,
     pub(crate) series: Vec<Series>,
     places: HashMap<Rc<str>, Option<usize>>,
-    /// Joints that nobody asked for.
+    /// Joints that were not requested.
     pub(crate) foreign: Vec<String>,
     pub(crate) received: Vec<Received>,
-    /// Which field the positions of states come from.
+    /// Field from which the positions of states come.
     pub(crate) of: &'static str,
-    /// States without a position for each joint that is wanted.
+    /// Number of states without a position for each requested joint.
     pub(crate) without_position: usize,
-    /// States whose velocities are not one for each joint.
+    /// Number of states whose velocities are not one per joint.
     pub(crate) odd_rates: usize,
-    /// Why a message of it could not be read.
+    /// Problem with one of its messages.
     pub(crate) trouble: Option<Trouble>,
 }
 
@@ -74,9 +75,9 @@ impl<'a> Collector<'a> {
         Self { request, topics: Vec::new(), positions: 0 }
     }
 
-    /// The number of a topic; a new one if there is none of this name and type yet.
+    /// Returns the index of a topic; adds it if there is none with this name and type.
     ///
-    /// * `definition`: of its messages, as the file has it.
+    /// * `definition`: definition of its messages in the file.
     pub(crate) fn topic(&mut self, name: &str, message: &str, encoding: &str, definition: Option<&str>) -> usize {
         if let Some(known) = self.topics.iter().position(|topic| topic.name == name && topic.message == message) {
             return known;
@@ -87,20 +88,19 @@ impl<'a> Collector<'a> {
         self.topics.len() - 1
     }
 
-    /// Whether a topic was asked for.
+    /// Whether a topic was requested.
     pub(crate) fn asked(&self) -> bool {
         self.request.topic.is_some()
     }
 
-    /// Whether messages of a topic are worth to be unpacked.
+    /// Whether messages of a topic need to be decoded.
     pub(crate) fn wants(&self, topic: usize) -> bool {
         let Some(topic) = self.topics.get(topic) else { return false };
         let asked = self.request.topic.is_none_or(|asked| same_topic(asked, &topic.name));
         asked && topic.reader.is_some() && topic.trouble.is_none()
     }
 
-    /// Counts a message and keeps what it says. What is wrong with it is told only if its topic is
-    /// the one that is taken.
+    /// Counts a message and keeps its content. A problem is reported only if the topic is selected.
     ///
     /// # Errors
     /// [`Problem::TooManyNumbers`].
@@ -129,10 +129,10 @@ impl<'a> Collector<'a> {
         Ok(())
     }
 
-    /// Keeps what a tree says.
+    /// Keeps the content of a decoded message.
     ///
     /// # Errors
-    /// What is wrong with its motion.
+    /// A problem with its motion.
     pub(crate) fn node(&mut self, index: usize, log_ns: i64, node: &Node) -> Result<(), Trouble> {
         let topic = &mut self.topics[index];
         match motion_of(node)? {
@@ -151,10 +151,10 @@ impl<'a> Collector<'a> {
         Ok(())
     }
 
-    /// The topic to take, and others that could be.
+    /// Returns the selected topic and others that could be selected.
     ///
     /// # Errors
-    /// [`Problem::NoTopic`], [`Problem::Topic`], what is wrong with a message of the topic,
+    /// [`Problem::NoTopic`], [`Problem::Topic`], a problem with a message of the topic, or
     /// [`Problem::NoJoint`].
     pub(crate) fn choose(mut self) -> Result<(Topic, Vec<String>), Trouble> {
         let all: Vec<String> = self.topics.iter().map(Topic::described).collect();
@@ -178,8 +178,8 @@ impl<'a> Collector<'a> {
                 Some(_) => {}
             }
         }
-        // Of several: the one that moves most joints, then what a robot did before what it was
-        // told, then the longest.
+        // Preference: most moving joints, then measured before commanded motion, then most
+        // messages.
         let rank = |topic: &Topic| {
             let filled = topic.series.iter().filter(|series| !series.position.is_empty()).count();
             let matched = if topic.received.is_empty() { filled } else { topic.series.len() };
@@ -190,7 +190,7 @@ impl<'a> Collector<'a> {
         let usable = |topic: &Topic| topic.has_motion() || topic.trouble.is_some();
         let best = (0..self.topics.len()).filter(|&i| usable(&self.topics[i])).max_by_key(|&i| {
             let topic = &self.topics[i];
-            // Of equals the first.
+            // The first one of equals.
             (topic.has_motion(), rank(topic), usize::MAX - i)
         });
         let Some(best) = best else {
@@ -221,7 +221,7 @@ impl Topic {
         format!("{} ({}, {} messages)", self.name, self.message, self.count)
     }
 
-    /// Whether a motion was seen, of whatever joints.
+    /// Whether the topic holds any motion, of any joints.
     pub(crate) fn has_something(&self) -> bool {
         self.has_motion() || self.without_position > 0
     }
@@ -230,7 +230,7 @@ impl Topic {
         !self.series.is_empty() || !self.foreign.is_empty() || !self.received.is_empty()
     }
 
-    /// Where a joint is kept, if it is wanted.
+    /// Index of a joint's series, if the joint is requested.
     fn place(&mut self, joint: &Rc<str>, wanted: Option<&[&str]>) -> Option<usize> {
         if let Some(place) = self.places.get(joint) {
             return *place;
@@ -248,10 +248,10 @@ impl Topic {
         place
     }
 
-    /// Keeps the values of the joints that are wanted; how many there are.
+    /// Keeps the values of the requested joints and returns their number.
     fn state(&mut self, log_ns: i64, mut state: State, wanted: Option<&[&str]>) -> Result<usize, Trouble> {
         let places: Vec<Option<usize>> = state.joints.iter().map(|joint| self.place(joint, wanted)).collect();
-        // What is wrong with a gripper's state is nobody's matter.
+        // Errors in the states of other devices, such as a gripper, are ignored.
         if places.iter().all(Option::is_none) {
             return Ok(0);
         }
@@ -275,7 +275,7 @@ impl Topic {
     }
 }
 
-/// How messages are read that may hold motion.
+/// Encoding and definition of messages that may hold motion.
 fn reader(message: &str, encoding: &str, definition: Option<&str>) -> Option<(Encoding, Rc<Definitions>)> {
     let encoding = match encoding {
         "cdr" => Encoding::Cdr,
@@ -291,7 +291,7 @@ fn reader(message: &str, encoding: &str, definition: Option<&str>) -> Option<(En
     tells.then(|| (encoding, Rc::new(definitions)))
 }
 
-/// `/joint_states` and `joint_states` are one topic.
+/// Whether two topic names are equal; `/joint_states` equals `joint_states`.
 fn same_topic(asked: &str, name: &str) -> bool {
     asked.trim_start_matches('/') == name.trim_start_matches('/')
 }
@@ -305,7 +305,7 @@ fn joined(topics: &[String]) -> String {
     if text.is_empty() { "none".to_owned() } else { text }
 }
 
-/// For messages.
+/// Formats names for messages.
 pub(crate) fn names_in_words(names: &[String]) -> String {
     list(names)
 }

@@ -1,10 +1,9 @@
-//! What a message is made of: definitions of ROS as text (`ros2msg`, `ros1msg`), and those that are
-//! known without a file.
+//! Definitions of ROS messages: as text (`ros2msg`, `ros1msg`), and built-in ones.
 
 use std::collections::HashMap;
 use std::rc::Rc;
 
-/// Kinds of values of a field.
+/// Type of a field's values.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Kind {
     Bool,
@@ -24,11 +23,11 @@ pub(crate) enum Kind {
     /// `duration` of ROS 1.
     Duration,
     Struct(String),
-    /// A kind that no motion has, such as `wstring`.
+    /// A type that does not occur in motions, such as `wstring`.
     Other(String),
 }
 
-/// How many values a field has.
+/// Number of values of a field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Many {
     One,
@@ -43,15 +42,15 @@ pub(crate) struct Field {
     pub(crate) many: Many,
 }
 
-/// A message and those that it is made of, by their names without `msg`: `std_msgs/Header`.
+/// A message and its parts, by their names without `msg`: `std_msgs/Header`.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Definitions {
     pub(crate) root: String,
     structs: HashMap<String, Vec<Field>>,
 }
 
-/// The types that are read where a file has no definitions. Of the state of a controller the fields
-/// up to the first point, which is the set point in all versions of the message (`desired`, later
+/// Built-in types for files without definitions. The state of a controller has only the fields up
+/// to the first point, which is the set point in all versions of the message (`desired`, later
 /// `reference`).
 const KNOWN: [(&str, &str); 7] = [
     (
@@ -76,13 +75,14 @@ const KNOWN: [(&str, &str); 7] = [
     ("builtin_interfaces/Duration", "int32 sec\nuint32 nanosec"),
 ];
 
-/// The name of a type without `msg`: `sensor_msgs/msg/JointState` is `sensor_msgs/JointState`.
+/// Returns the name of a type without `msg`: `sensor_msgs/msg/JointState` becomes
+/// `sensor_msgs/JointState`.
 pub(crate) fn plain_name(name: &str) -> String {
     name.replace("::", "/").replace("/msg/", "/").replace("/dds_/", "/").trim_end_matches('_').to_owned()
 }
 
 impl Definitions {
-    /// The definition of a type that is known without a file.
+    /// Built-in definition of a type.
     pub(crate) fn known(message: &str) -> Option<Self> {
         let root = plain_name(message);
         if !KNOWN[..4].iter().any(|(name, _)| *name == root) {
@@ -92,8 +92,8 @@ impl Definitions {
         Some(Self { root, structs })
     }
 
-    /// The definition in a file: that of the message, and after lines of `=` those of its parts,
-    /// each after `MSG: name`.
+    /// Parses the definition in a file: that of the message, followed by those of its parts, each
+    /// after a line of `=` and `MSG: name`.
     pub(crate) fn parse(message: &str, text: &str) -> Self {
         let root = plain_name(message);
         let mut structs = HashMap::new();
@@ -101,8 +101,7 @@ impl Definitions {
         let mut close = |name: &str, body: &mut String| {
             let found = fields(body, package(name));
             body.clear();
-            // The first one of a name counts: a file that has the root as its own part is odd, but
-            // whole.
+            // The first definition of a name applies, for files that list the root as its own part.
             structs.entry(name.to_owned()).or_insert(found);
         };
         for line in text.lines() {
@@ -121,8 +120,7 @@ impl Definitions {
         Self { root, structs }
     }
 
-    /// The fields of a part. A name without a package is one of ROS's own where there is no such
-    /// part.
+    /// Fields of a part. A name without a package refers to `std_msgs` if there is no such part.
     pub(crate) fn fields(&self, name: &str) -> Option<&[Field]> {
         let found = self.structs.get(name).or_else(|| {
             let (_, last) = name.rsplit_once('/')?;
@@ -131,7 +129,7 @@ impl Definitions {
         found.map(Vec::as_slice)
     }
 
-    /// Whether some field of the message or of its parts has one of these names.
+    /// Whether any field of the message or of its parts has one of these names.
     pub(crate) fn has_field(&self, names: &[&str]) -> bool {
         self.structs.values().flatten().any(|field| names.contains(&&*field.name))
     }
@@ -141,7 +139,7 @@ fn package(name: &str) -> &str {
     name.split_once('/').map_or("", |(package, _)| package)
 }
 
-/// The fields of one message; constants and comments are none.
+/// Fields of one message, without constants and comments.
 fn fields(text: &str, package: &str) -> Vec<Field> {
     let mut fields = Vec::new();
     for line in text.lines() {

@@ -1,5 +1,4 @@
-//! Everything that can be wrong with messages and bags: where, what was found, what was expected,
-//! how to mend it.
+//! Errors of messages and bags: place, value found, value expected and remedy.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -7,7 +6,7 @@ use std::path::PathBuf;
 use flexarm_settings::Setting;
 use flexarm_trajectory::TrajectoryError;
 
-/// Why there is no motion.
+/// Error of reading a motion.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MotionError {
@@ -16,35 +15,35 @@ pub enum MotionError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the operating system says.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// The content of a file is wrong.
+    /// The content of a file is invalid.
     #[error("{origin}{place}: {problem}")]
     Content {
-        /// File name, or what the caller called the text.
+        /// File name, or the caller's name for the text.
         origin: String,
-        /// Where in it.
+        /// Place in the file.
         place: Place,
-        /// What is wrong.
+        /// The problem.
         problem: Box<Problem>,
     },
 }
 
-/// Where in a file something is wrong.
+/// Place of a problem in a file.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub enum Place {
-    /// In all of it.
+    /// The file as a whole.
     #[default]
     Whole,
-    /// In a line of text, from 1.
+    /// A line of text, from 1.
     Line(usize),
-    /// In a message of a bag.
+    /// A message of a bag.
     Message {
-        /// Its topic.
+        /// Topic of the message.
         topic: String,
-        /// Its number on this topic, from 1.
+        /// Number of the message on its topic, from 1.
         number: usize,
     },
 }
@@ -59,66 +58,66 @@ impl fmt::Display for Place {
     }
 }
 
-/// What is wrong, and how to mend it.
+/// A problem; the message includes the remedy.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Problem {
-    /// The text is not YAML, and hence not JSON.
+    /// The text is neither YAML nor JSON.
     #[error("the text is neither YAML nor JSON: {message}")]
     NotYaml {
-        /// What the parser says.
+        /// Parser message.
         message: String,
     },
-    /// More numbers than are kept in memory.
+    /// Too many values for memory.
     #[error("more than {most} numbers, which is more than is read; cut the recording, or leave out samples")]
     TooManyNumbers {
-        /// How many are read.
+        /// Maximum number of values.
         most: usize,
     },
-    /// A file larger than is read.
+    /// The file is too large.
     #[error("more than {most} bytes, which is more than is read of such a file; {mend}")]
     TooLarge {
-        /// How many are read.
+        /// Maximum number of bytes.
         most: u64,
-        /// How to mend it.
+        /// Remedy.
         mend: &'static str,
     },
-    /// There is no message in the text.
+    /// The text holds no motion.
     #[error(
         "there is no motion in the text: expected a JointTrajectory (`joint_names` and `points`), a JointState (`name` and \
          `position`) or the state of a controller (`joint_names` and `reference` or `desired`), at any depth; its keys are \
          {found}"
     )]
     NoMessage {
-        /// Keys at the top.
+        /// Top-level keys.
         found: String,
     },
-    /// An array that the printing program has shortened.
+    /// Array shortened by the program that printed it.
     #[error(
         "an array ends with \"...\": it was shortened when it was printed; print it whole (ros2 topic echo --full-length)"
     )]
     ShortenedArray,
-    /// A key that must be there.
+    /// Missing key.
     #[error("{of} has no `{key}`; {expected}")]
     MissingKey {
-        /// What lacks it.
+        /// Object without the key.
         of: String,
         /// The key.
         key: &'static str,
-        /// What is expected.
+        /// Content expected.
         expected: &'static str,
     },
-    /// A value of another kind.
+    /// Value of the wrong kind.
     #[error("`{key}` is {found}; expected {expected}")]
     Value {
         /// The key.
         key: String,
-        /// What was found.
+        /// Value found.
         found: String,
-        /// What is expected.
+        /// Value expected.
         expected: &'static str,
     },
-    /// Values that are not one per joint.
+    /// Number of values differs from the number of joints.
     #[error(
         "`{key}` has {found} values for {expected} joints; expected one for each name{hint}{}",
         point.map_or_else(String::new, |point| format!(" (point {point})"))
@@ -128,42 +127,42 @@ pub enum Problem {
         point: Option<usize>,
         /// The key.
         key: String,
-        /// Values found.
+        /// Number of values found.
         found: usize,
-        /// Names of joints.
+        /// Number of joints.
         expected: usize,
-        /// What may be the matter, beginning with `: `; or nothing.
+        /// Possible reason, beginning with `: `, or empty.
         hint: &'static str,
     },
-    /// A joint that is named twice in a message.
+    /// Joint that occurs twice in a message.
     #[error("joint {joint:?} is named twice in one message; each may be there once")]
     RepeatedJoint {
         /// Its name.
         joint: String,
     },
-    /// Points of a trajectory whose times do not increase.
+    /// Trajectory points whose times do not increase.
     #[error(
         "point {point} is at {this} s, the one before it at {previous} s: `time_from_start` must increase from point to point"
     )]
     PointTimes {
         /// Number of the point, from 1.
         point: usize,
-        /// Its time, s.
+        /// Time of the point, s.
         this: f64,
-        /// Time of the one before, s.
+        /// Time of the previous point, s.
         previous: f64,
     },
-    /// A position that is no number.
+    /// Position that is not finite.
     #[error("joint {joint:?}, point {point}: the position is {value}; expected a finite number")]
     NotFinite {
         /// The joint.
         joint: String,
         /// Number of the point, from 1.
         point: usize,
-        /// What was found.
+        /// Value found.
         value: f64,
     },
-    /// Trajectories of one file that do not follow each other.
+    /// Consecutive trajectories of one message that do not join.
     #[error(
         "trajectory {number} has joint {joint:?} at {this} where the one before ends with it at {previous}: trajectories of \
          one message run one after another; split the file"
@@ -173,47 +172,47 @@ pub enum Problem {
         number: usize,
         /// The joint.
         joint: String,
-        /// Where it starts, rad or m.
+        /// Position at its start, rad or m.
         this: f64,
-        /// Where the one before ends, rad or m.
+        /// Position at the end of the previous one, rad or m.
         previous: f64,
     },
-    /// Stamps that jump back where nothing else tells the time.
+    /// Time stamps that jump back, without other times.
     #[error(
         "the time stamps jump back by {seconds} s at sample {number} of joint {joint:?}: the text holds two recordings, or a \
          clock was set; keep one of them"
     )]
     StampsJumpBack {
-        /// By how much, s.
+        /// Size of the jump, s.
         seconds: f64,
         /// Number of the sample, from 1.
         number: usize,
         /// The joint.
         joint: String,
     },
-    /// Messages without a time.
+    /// Messages without time stamps.
     #[error(
         "the messages have no time stamps (`header`, `stamp`), so nothing says when they were; record with stamps, or record \
          a bag, which has the times of reception"
     )]
     NoStamps,
-    /// A message that is not as its definition says.
+    /// Message that does not match its definition.
     #[error("a message of the type {message} cannot be read: {what}")]
     Message {
-        /// Its type.
+        /// Message type.
         message: String,
-        /// What is wrong.
+        /// Description of the problem.
         what: String,
     },
-    /// A container that cannot be read.
+    /// Unreadable container.
     #[error("the {container} cannot be read: {what}")]
     Container {
         /// MCAP or SQLite file.
         container: &'static str,
-        /// What is wrong.
+        /// Description of the problem.
         what: String,
     },
-    /// A bag without motions.
+    /// Bag without motions.
     #[error(
         "no topic holds a motion: read are JointState, JointTrajectory and JointTrajectoryControllerState with at least one \
          message; the topics are {found}"
@@ -222,49 +221,49 @@ pub enum Problem {
         /// The topics with their types.
         found: String,
     },
-    /// A topic that is not there, or holds no motion.
+    /// Topic that does not exist or holds no motion.
     #[error("the topic {asked:?} ({}) {what}; topics with motions are {readable}", Setting::Topic)]
     Topic {
-        /// The topic that was asked for.
+        /// Topic requested.
         asked: String,
-        /// What is wrong with it.
+        /// Description of the problem.
         what: String,
-        /// Topics that could be asked for.
+        /// Topics that can be requested.
         readable: String,
     },
-    /// A topic of a text, which has none.
+    /// Topic requested from a text, which has no topics.
     #[error("a topic was asked for ({} {asked:?}), and a text of messages has none; leave it out", Setting::Topic)]
     TopicOfText {
-        /// The topic that was asked for.
+        /// Topic requested.
         asked: String,
     },
-    /// None of the joints is wanted.
+    /// None of the joints belongs to the robot.
     #[error("none of the joints {} is a joint of the robot", list(names))]
     NoJoint {
         /// Joints of the messages.
         names: Vec<String>,
     },
-    /// No sample that could be used.
+    /// No usable sample.
     #[error("there is no position that is a number; was the robot connected when this was recorded?")]
     NoPositions,
-    /// A folder that is no bag.
+    /// Folder that is not a bag.
     #[error("the folder is no bag of rosbag2: {what}; expected metadata.yaml and files *.mcap or *.db3 in it")]
     NotABag {
-        /// What is missing.
+        /// Missing item.
         what: String,
     },
-    /// A kind of file that is not read.
+    /// Unsupported kind of file.
     #[error("{what}")]
     NotRead {
-        /// What it is, and how to convert it.
+        /// Kind of file, and its conversion.
         what: String,
     },
-    /// The samples make no trajectory.
+    /// The samples do not form a valid trajectory.
     #[error(transparent)]
     Trajectory(TrajectoryError),
 }
 
-/// `"a", "b"`, at most twelve.
+/// Formats names as `"a", "b"`, at most twelve.
 pub(crate) fn list(names: &[String]) -> String {
     const MOST: usize = 12;
     if names.is_empty() {
@@ -277,7 +276,7 @@ pub(crate) fn list(names: &[String]) -> String {
     shown.join(", ")
 }
 
-/// A problem with its place, before the file is known.
+/// A problem with its place, before the file name is known.
 #[derive(Debug)]
 pub(crate) struct Trouble {
     pub(crate) place: Place,
@@ -289,13 +288,13 @@ impl Trouble {
         Self { place: Place::Whole, problem: Box::new(problem) }
     }
 
-    /// At a line of text; 0 stands for none.
+    /// A problem at a line of text; 0 means no line.
     pub(crate) fn at(line: u32, problem: Problem) -> Self {
         let place = if line > 0 { Place::Line(line as usize) } else { Place::Whole };
         Self { place, problem: Box::new(problem) }
     }
 
-    /// In a message, unless the place is known better.
+    /// Sets the place to a message unless a place is set already.
     pub(crate) fn in_message(mut self, topic: &str, number: usize) -> Self {
         if self.place == Place::Whole {
             self.place = Place::Message { topic: topic.to_owned(), number };

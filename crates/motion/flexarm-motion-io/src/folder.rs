@@ -1,4 +1,4 @@
-//! Bags of one or several files: those that `metadata.yaml` of a folder names, or all in it.
+//! Bags of one or several files: those listed in `metadata.yaml` of a folder, or all in the folder.
 
 use std::fs::File;
 use std::io::Read;
@@ -13,10 +13,10 @@ use crate::unpack::{Inside, ZSTD_MAGIC, look_inside};
 use crate::value::{Node, Value};
 use crate::{MessageMotion, Request, mcap, rosbag, sqlite, yaml};
 
-/// A description of a bag is small.
+/// Maximum size of `metadata.yaml` (bytes).
 const MOST_METADATA: u64 = 16 << 20;
 
-/// Reads a folder of rosbag2.
+/// Reads a rosbag2 folder.
 ///
 /// # Errors
 /// As [`crate::read_mcap`], and [`Problem::NotABag`].
@@ -25,7 +25,7 @@ pub fn read_folder(path: &Path, request: &Request<'_>) -> Result<MessageMotion, 
     read_files(&files, path, request)
 }
 
-/// The files of a bag in their order.
+/// Returns the files of a bag in order.
 fn files_of(folder: &Path) -> Result<Vec<PathBuf>, MotionError> {
     let origin = folder.display().to_string();
     let metadata = folder.join("metadata.yaml");
@@ -46,7 +46,7 @@ fn files_of(folder: &Path) -> Result<Vec<PathBuf>, MotionError> {
         })
         .map_err(|trouble| trouble.of(&metadata.display().to_string()))?;
     }
-    // Older bags name the folder as well; files elsewhere are not this bag's.
+    // Older bags list the folder as well; files elsewhere do not belong to the bag.
     let beside = |name: &String| folder.join(Path::new(name).file_name().unwrap_or_default());
     let files: Vec<PathBuf> = match names.is_empty() {
         false => names.iter().map(beside).collect(),
@@ -78,7 +78,7 @@ fn files_of(folder: &Path) -> Result<Vec<PathBuf>, MotionError> {
     }
 }
 
-/// The name of the bag that a file is a part of: `bag_3.mcap` is of `bag`.
+/// Name of the bag that a file belongs to: `bag_3.mcap` belongs to `bag`.
 fn stem(file: &Path) -> String {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
     let name = name.split('.').next().unwrap_or_default();
@@ -101,7 +101,7 @@ pub fn read_db3(path: &Path, request: &Request<'_>) -> Result<MessageMotion, Mot
 
 /// Reads the files of a bag as one.
 ///
-/// * `bag`: what is spoken of in messages.
+/// * `bag`: name of the bag for messages.
 pub(crate) fn read_files(files: &[PathBuf], bag: &Path, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
     let shown = bag.display().to_string();
     let mut collector = Collector::new(*request);
@@ -144,7 +144,7 @@ fn finish(
 ) -> Result<MessageMotion, MotionError> {
     let was_asked = collector.asked();
     let cut = |trouble: Trouble| match (broken.first(), &*trouble.problem) {
-        // Why there is nothing in it is what matters.
+        // The reason for the missing motion is more important.
         (Some((_, why)), Problem::NoTopic { .. }) => {
             Trouble::new(Problem::Container { container: "bag", what: format!("{why}, and there is no motion before") })
         }
@@ -168,7 +168,7 @@ fn finish(
     Ok(MessageMotion { trajectory, format, topic: Some(name), message, samples, dropped, caveats })
 }
 
-/// Which topic is taken; a warning where there was a choice.
+/// Caveat about the selected topic; a warning if there was a choice.
 fn chosen(taken: &str, others: &[String], shown: &str) -> Caveat {
     use flexarm_settings::Setting;
     if others.is_empty() {
@@ -183,7 +183,7 @@ fn chosen(taken: &str, others: &[String], shown: &str) -> Caveat {
     Caveat::said("motion-topic", shown, message, "").mended_by(&[Setting::Topic])
 }
 
-/// Which joints are left out.
+/// Caveat about dropped joints.
 pub(crate) fn dropped_note(dropped: &[String], shown: &str) -> Option<Caveat> {
     let message = format!("{shown}: joints that the robot does not move are left out: {}", names_in_words(dropped));
     let caveat = Caveat::said("motion-dropped-joints", shown, message, "a gripper is one; a joint of the arm is not");

@@ -1,4 +1,4 @@
-//! Joint motions that other programs wrote: messages of ROS as text and in bags, ending in a
+//! Joint motions from other programs: ROS messages as text and in bags, converted to a
 //! [`flexarm_trajectory::Trajectory`].
 //!
 //! ```
@@ -13,25 +13,25 @@
 //! let motion = read_text(text, "plan.yaml", &Request { joints: Some(&["shoulder", "elbow"]), topic: None })?;
 //! assert_eq!(motion.trajectory.joints(), ["shoulder"]);
 //! assert_eq!(motion.trajectory.duration(), 1.5);
-//! assert_eq!(motion.dropped, ["gripper"]); // told in `motion.caveats` as well
+//! assert_eq!(motion.dropped, ["gripper"]); // also reported in `motion.caveats`
 //! # Ok::<(), flexarm_motion_io::MotionError>(())
 //! ```
 //!
 //! | what | read by | messages |
 //! | --- | --- | --- |
-//! | YAML and JSON, also as printed by `ros2 topic echo` and `rostopic echo` | [`read_text`] | those below, wherever they stand in the text |
-//! | MCAP, chunks plain or packed by zstd or lz4 | [`read_mcap`] | `trajectory_msgs/JointTrajectory`, `sensor_msgs/JointState`, `control_msgs/JointTrajectoryControllerState`, and what holds a `JointTrajectory` (CDR of either byte order, ROS 1) |
+//! | YAML and JSON, also as printed by `ros2 topic echo` and `rostopic echo` | [`read_text`] | those below, at any depth of the text |
+//! | MCAP, chunks plain or compressed by zstd or lz4 | [`read_mcap`] | `trajectory_msgs/JointTrajectory`, `sensor_msgs/JointState`, `control_msgs/JointTrajectoryControllerState`, and messages that contain a `JointTrajectory` (CDR of either byte order, ROS 1) |
 //! | SQLite bags (`.db3`) | [`read_db3`] | the same in CDR |
-//! | bags of ROS 1 (`.bag`), chunks plain or packed by bzip2 or lz4 | [`read_rosbag`] | the same in the bytes of ROS 1 |
-//! | folders of rosbag2 with `metadata.yaml` | [`read_folder`] | the same; files packed as a whole (`.zstd`) too |
+//! | bags of ROS 1 (`.bag`), chunks plain or compressed by bzip2 or lz4 | [`read_rosbag`] | the same in the serialisation of ROS 1 |
+//! | folders of rosbag2 with `metadata.yaml` | [`read_folder`] | the same; also files compressed as a whole (`.zstd`) |
 //!
-//! All ends in one tree of values ([`value`]): [`yaml`] makes it of text, [`cdr`] of bytes by the
-//! definition of the message ([`definition`]); [`message`] finds motions in it, [`collect`] keeps
-//! them by topic and joint, [`assemble`] makes curves of them. Joints go by their names in every
-//! single message. [`write_joint_trajectory`] is the way back.
+//! All formats are converted to one tree of values ([`value`]): [`yaml`] builds it from text,
+//! [`cdr`] from bytes by the definition of the message ([`definition`]); [`message`] finds motions
+//! in it, [`collect`] groups them by topic and joint, [`assemble`] builds curves. Joints are
+//! matched by name in each message. [`write_joint_trajectory`] is the inverse.
 //!
-//! Units: rad, rad/s, rad/s², m, s, as ROS has them. Not here: robots; which joints a robot has is
-//! told ([`Request`]).
+//! Units: rad, rad/s, rad/s², m, s, as in ROS. Not here: robots; the caller gives the robot's
+//! joints ([`Request`]).
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test"))]
 #![allow(rustdoc::private_intra_doc_links, reason = "the page tells how the modules work together")]
 
@@ -64,31 +64,31 @@ pub use write::{TextFormat, write_joint_trajectory};
 use flexarm_settings::Caveat;
 use flexarm_trajectory::Trajectory;
 
-/// What of a file is wanted.
+/// Selection of the joints and the topic of a file.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Request<'a> {
-    /// Joints of the robot; others are left out, and told. Without it all are taken.
+    /// Joints of the robot; others are dropped, with a caveat. Without it all joints are read.
     pub joints: Option<&'a [&'a str]>,
-    /// The topic of a bag; without it one is chosen, and told.
+    /// Topic of a bag; without it one is selected, with a caveat.
     pub topic: Option<&'a str>,
 }
 
-/// A motion with what is to be known about where it comes from.
+/// A motion with information about its origin.
 #[derive(Clone, Debug)]
 pub struct MessageMotion {
-    /// The curves of the joints that are wanted, those of the file's order.
+    /// Curves of the requested joints, in the order of the file.
     pub trajectory: Trajectory,
-    /// What the file is, such as `MCAP bag`.
+    /// Kind of file, such as `MCAP bag`.
     pub format: &'static str,
     /// Topic of a bag.
     pub topic: Option<String>,
-    /// Type of the messages, such as `sensor_msgs/msg/JointState`, as far as the file says it or
-    /// their keys show it.
+    /// Type of the messages, such as `sensor_msgs/msg/JointState`, as given in the file or
+    /// recognised from the keys.
     pub message: String,
-    /// Most samples of a joint.
+    /// Maximum number of samples of a joint.
     pub samples: usize,
-    /// Joints of the messages that were not asked for.
+    /// Joints of the messages that were not requested.
     pub dropped: Vec<String>,
-    /// What was chosen, assumed and left out.
+    /// Choices, assumptions and dropped content.
     pub caveats: Vec<Caveat>,
 }

@@ -1,8 +1,8 @@
-//! Messages of an MCAP file, record by record from its beginning: the index at its end is not
-//! needed, so a file that is cut off is read up to its last whole chunk.
+//! Messages of an MCAP file, record by record from the beginning: the index at the end is not
+//! needed, so a truncated file is read up to its last complete chunk.
 //!
-//! The `mcap` crate walks over the records and unpacks chunks; three kinds of records matter here
-//! (schema, channel, message).
+//! The `mcap` crate iterates over the records and decompresses chunks; three kinds of records are
+//! used here (schema, channel, message).
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -22,17 +22,17 @@ use crate::{MessageMotion, Request};
 /// First bytes of an MCAP file.
 pub const MCAP_MAGIC: &[u8] = mcap::MAGIC;
 
-/// Maximum size of a record, or of an unpacked chunk, in bytes: the library takes memory for a
-/// chunk before it unpacks it.
+/// Maximum size of a record, or of a decompressed chunk, in bytes: the library allocates a chunk
+/// before decompressing it.
 const MOST_BYTES: usize = 256 << 20;
-/// Bytes that are read at once, however long a record claims to be.
+/// Number of bytes read at once, regardless of the stated length of a record.
 const READ_BYTES: usize = 64 << 10;
 
 /// Reads an MCAP file.
 ///
 /// # Errors
-/// [`MotionError::Read`], or [`MotionError::Content`] for what is no MCAP file, a topic that is not
-/// there, messages that cannot be read, and bags without a motion of the joints that are wanted.
+/// [`MotionError::Read`], or [`MotionError::Content`] if the file is not MCAP, the requested topic
+/// does not exist, a message cannot be read, or the bag has no motion of the requested joints.
 pub fn read_mcap(path: &Path, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
     crate::folder::read_files(&[path.to_owned()], path, request)
 }
@@ -42,11 +42,11 @@ pub(crate) fn collect_file(path: &Path, into: &mut Collector<'_>) -> Result<Opti
     collect(File::open(path).map_err(failed)?, into).map_err(|trouble| trouble.of(&path.display().to_string()))
 }
 
-/// Collects the messages of a file. Returns why it ends before its end, if it does.
+/// Collects the messages of a file. Returns the reason if it ends prematurely.
 pub(crate) fn collect(mut file: impl Read, into: &mut Collector<'_>) -> Result<Option<String>, Trouble> {
     let options = LinearReaderOptions::default()
         .with_skip_end_magic(true)
-        .with_prevalidate_chunk_crcs(true) // a damaged chunk gives nothing
+        .with_prevalidate_chunk_crcs(true) // a damaged chunk is dropped as a whole
         .with_record_length_limit(MOST_BYTES);
     let mut reader = LinearReader::new_with_options(options);
     reader.add_decompressor(Lz4::default()).expect("it has a name");
@@ -72,7 +72,7 @@ pub(crate) fn collect(mut file: impl Read, into: &mut Collector<'_>) -> Result<O
     Ok(Some("its end is missing".to_owned()))
 }
 
-/// Returns why a file is read no further.
+/// Describes the reason why reading stops.
 fn in_words(error: McapError) -> String {
     match error {
         McapError::UnexpectedEof | McapError::UnexpectedEoc => "its end is missing".to_owned(),
@@ -88,7 +88,7 @@ fn in_words(error: McapError) -> String {
     }
 }
 
-/// Unpacks chunks that are packed by lz4.
+/// Decompressor of lz4 chunks.
 struct Lz4(FrameDecoder<Cursor<Vec<u8>>>);
 
 impl Default for Lz4 {
@@ -102,7 +102,7 @@ impl Decompressor for Lz4 {
         "lz4"
     }
 
-    /// Asks for the whole chunk: the decoder cannot go on where its input ended.
+    /// Requests the whole chunk: the decoder cannot resume in the middle of its input.
     fn next_read_size(&self) -> usize {
         usize::MAX
     }
@@ -121,17 +121,17 @@ impl Decompressor for Lz4 {
     }
 }
 
-/// What records are about.
+/// Schemas and channels read so far.
 #[derive(Default)]
 struct Known {
     /// Name, encoding and text of each schema.
     schemas: HashMap<u16, [String; 3]>,
-    /// Number of the topic of each channel.
+    /// Topic index of each channel.
     channels: HashMap<u16, usize>,
 }
 
 impl Known {
-    /// Takes a record. Returns what is wrong with it, if anything.
+    /// Processes a record. Returns a description of the problem, if any.
     fn record(&mut self, kind: u8, body: &[u8], into: &mut Collector<'_>) -> Result<Option<String>, Trouble> {
         let done = match kind {
             op::SCHEMA => self.schema(body),
@@ -175,8 +175,8 @@ fn number(rest: &mut &[u8]) -> Option<u16> {
     Some(u16::from_le_bytes(*bytes))
 }
 
-/// Takes a text off a record. The library's own parser takes memory for its length before it looks
-/// whether it is there.
+/// Reads a string from a record. The library's own parser allocates the stated length before
+/// checking that the bytes exist.
 fn text(rest: &mut &[u8]) -> Option<String> {
     let (length, behind) = rest.split_first_chunk()?;
     let (bytes, behind) = behind.split_at_checked(u32::from_le_bytes(*length) as usize)?;

@@ -1,41 +1,41 @@
-//! Motions in the tree of a message: trajectories of points, states of joints, states of
-//! controllers; told by their keys.
+//! Finds motions in the tree of a message by its keys: trajectories of points, joint states,
+//! controller states.
 
 use std::rc::Rc;
 
 use crate::error::{Problem, Trouble};
 use crate::value::{Node, Value};
 
-/// How deep motions are looked for in a message.
+/// Maximum depth of a motion in a message.
 const DEEPEST: usize = 6;
 
-/// Values of some joints, by the names of one message.
+/// Values of the joints named in one message.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct State {
-    /// `header.stamp` in ns; 0 if it is not set.
+    /// `header.stamp` (ns); 0 if not set.
     pub(crate) stamp_ns: i64,
     pub(crate) joints: Vec<Rc<str>>,
-    /// One per joint, rad or m; empty if the message has none.
+    /// Positions, one per joint, rad or m; empty if the message has none.
     pub(crate) position: Vec<f64>,
-    /// One per joint or none.
+    /// Velocities, one per joint or none.
     pub(crate) velocity: Vec<f64>,
-    /// One per joint or none.
+    /// Accelerations, one per joint or none.
     pub(crate) acceleration: Vec<f64>,
-    /// What the values are: `position`, `reference`, ...
+    /// Source field of the values: `position`, `reference`, ...
     pub(crate) of: &'static str,
     /// Line of the message in a text; 0 in a bag.
     pub(crate) line: u32,
 }
 
-/// A point of a trajectory; values of the joints of its trajectory.
+/// A point of a trajectory, with values of the trajectory's joints.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Point {
-    /// Since the start of the trajectory, s.
+    /// Time since the start of the trajectory (s).
     pub(crate) time_s: f64,
     pub(crate) position: Vec<f64>,
-    /// One per joint or none.
+    /// Velocities, one per joint or none.
     pub(crate) velocity: Vec<f64>,
-    /// One per joint or none.
+    /// Accelerations, one per joint or none.
     pub(crate) acceleration: Vec<f64>,
 }
 
@@ -47,22 +47,21 @@ pub(crate) struct Points {
     pub(crate) points: Vec<Point>,
 }
 
-/// What a message says about motion.
+/// Motion in a message.
 #[derive(Clone, Debug)]
 pub(crate) enum Message {
     State(State),
-    /// Trajectories that run one after another, and where the robot is before the first, as far as
-    /// it is told.
+    /// Consecutive trajectories, and the robot's state before the first, if given.
     Trajectories(Vec<Points>, Option<State>),
 }
 
-/// Set point and measured value of a controller, in the order in which they are taken.
+/// Set point and measured value of a controller, in order of preference.
 const CONTROLLER: [&str; 4] = ["reference", "desired", "feedback", "actual"];
 
-/// The motion of a message, if there is one in it.
+/// Returns the motion of a message, if any.
 ///
 /// # Errors
-/// [`Trouble`] for a motion that is not as it should be.
+/// [`Trouble`] for an invalid motion.
 pub(crate) fn motion_of(node: &Node) -> Result<Option<Message>, Trouble> {
     if let (Some(names), Some(_)) = (node.get("name"), node.get("position")) {
         return state(node, names, node, "position").map(|state| Some(Message::State(state)));
@@ -81,12 +80,12 @@ pub(crate) fn motion_of(node: &Node) -> Result<Option<Message>, Trouble> {
     }
     let start = node.get("trajectory_start").and_then(|start| start.get("joint_state"));
     let start = start.and_then(|start| Some((start, start.get("name")?)));
-    // A start without values is none: planners leave it empty.
+    // A start without values is ignored: planners leave it empty.
     let start = start.map(|(start, names)| state(start, names, start, "trajectory_start")).transpose()?;
     Ok(Some(Message::Trajectories(found, start.filter(|start| !start.position.is_empty()))))
 }
 
-/// The first of the fields of a controller that has positions.
+/// The first field of a controller that has positions.
 fn set_point(node: &Node) -> Option<&'static str> {
     let filled = |of: &&&str| {
         let positions = node.get(of).and_then(|point| point.get("positions"));
@@ -96,7 +95,7 @@ fn set_point(node: &Node) -> Option<&'static str> {
     CONTROLLER.iter().find(filled).or_else(first).copied()
 }
 
-/// Looks for tables with `joint_names` and `points`.
+/// Searches for tables with `joint_names` and `points`.
 fn trajectories(node: &Node, depth: usize, found: &mut Vec<Points>) -> Result<(), Trouble> {
     if depth > DEEPEST {
         return Ok(());
@@ -104,7 +103,7 @@ fn trajectories(node: &Node, depth: usize, found: &mut Vec<Points>) -> Result<()
     match &node.value {
         Value::Map(pairs) => {
             if let (Some(names), Some(list)) = (node.get("joint_names"), node.get("points")) {
-                // MoveIt leaves it empty where there is nothing to move.
+                // MoveIt leaves the trajectory empty if there is nothing to move.
                 let trajectory = points(node, names, list)?;
                 if !(trajectory.joints.is_empty() && trajectory.points.is_empty()) {
                     found.push(trajectory);
@@ -161,8 +160,8 @@ fn points(node: &Node, names: &Node, list: &Node) -> Result<Points, Trouble> {
     Ok(Points { stamp_ns: stamp_ns(node)?, joints, points: found })
 }
 
-/// Values of joints whose names stand in `names`; `values` has position and velocity, or positions
-/// and velocities.
+/// State of the joints named in `names`; `values` has position and velocity, or positions and
+/// velocities.
 fn state(node: &Node, names: &Node, values: &Node, of: &'static str) -> Result<State, Trouble> {
     let plural = matches!(of, "reference" | "desired" | "feedback" | "actual");
     let (position, velocity, acceleration) =
@@ -180,8 +179,8 @@ fn state(node: &Node, names: &Node, values: &Node, of: &'static str) -> Result<S
 }
 
 impl State {
-    /// Whether there is one position for each joint, or none at all. Velocities and accelerations
-    /// of another number are nobody's; whether there were such.
+    /// Checks that there is one position per joint or none. Drops velocities and accelerations of
+    /// another number and returns whether there were any.
     ///
     /// # Errors
     /// [`Problem::Lengths`].
@@ -245,13 +244,13 @@ fn numbers(node: &Node, key: &str) -> Result<Vec<f64>, Trouble> {
         Value::List(items) => {
             let number = |item: &Node| match &item.value {
                 Value::Text(text) if &**text == "..." => Err(Trouble::at(item.line, Problem::ShortenedArray)),
-                // JSON has no word for what is not a number.
+                // JSON has no literal for NaN.
                 Value::Null => Ok(f64::NAN),
                 _ => item.number().ok_or_else(|| wrong(key, item, "numbers alone")),
             };
             items.iter().map(number).collect()
         }
-        // How Python prints an array of numbers.
+        // Python's output of an array of numbers.
         Value::Text(text) if text.starts_with("array(") => {
             let inside = text.split_once('[').and_then(|(_, rest)| rest.split_once(']')).map(|(inside, _)| inside);
             let parts = inside.into_iter().flat_map(|inside| inside.split(',')).map(str::trim);
@@ -262,7 +261,7 @@ fn numbers(node: &Node, key: &str) -> Result<Vec<f64>, Trouble> {
     }
 }
 
-/// Numbers that need not be there.
+/// Optional list of numbers.
 fn rates(node: &Node, key: &str) -> Result<Vec<f64>, Trouble> {
     node.get(key).map_or(Ok(Vec::new()), |values| numbers(values, key))
 }
@@ -271,14 +270,14 @@ fn wrong(key: &str, node: &Node, expected: &'static str) -> Trouble {
     Trouble::at(node.line, Problem::Value { key: key.to_owned(), found: node.in_words(), expected })
 }
 
-/// `header.stamp` in ns since 1970; 0 without one.
+/// `header.stamp` in ns since 1970; 0 if missing.
 fn stamp_ns(node: &Node) -> Result<i64, Trouble> {
     let Some(stamp) = node.get("header").and_then(|header| header.get("stamp")) else { return Ok(0) };
     match (whole_ns(stamp), &stamp.value) {
         (Some(ns), _) => Ok(ns),
-        // So many are ns since 1970.
+        // A number of this size is in ns since 1970.
         (None, Value::Whole(whole)) if *whole > 100_000_000_000_000_000 => Ok(*whole),
-        // A float is as exact as it was written.
+        // A float is as precise as it was written.
         _ => match stamp.number() {
             Some(seconds) if seconds.abs() < 9e9 => Ok((seconds * 1e9).round() as i64),
             _ => Err(wrong("stamp", stamp, "sec and nanosec, or seconds")),
@@ -286,7 +285,7 @@ fn stamp_ns(node: &Node) -> Result<i64, Trouble> {
     }
 }
 
-/// Seconds, of a whole number of ns or as a number.
+/// Duration in s, given as seconds and nanoseconds or as one number.
 fn duration_s(node: &Node) -> Result<f64, Trouble> {
     match (whole_ns(node), node.number()) {
         (Some(ns), _) => Ok(ns as f64 / 1e9),
@@ -300,7 +299,7 @@ fn whole_ns(node: &Node) -> Option<i64> {
         let found = names.iter().find_map(|name| node.get(name))?;
         match found.value {
             Value::Whole(whole) => Some(whole),
-            // JSON of some programs writes 1.0 for 1.
+            // Some JSON writers print 1 as 1.0.
             Value::Number(number) if number.fract() == 0.0 && number.abs() < 9e15 => Some(number as i64),
             _ => None,
         }

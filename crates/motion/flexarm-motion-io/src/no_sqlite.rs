@@ -1,4 +1,4 @@
-//! In place of the reader of SQLite files where the feature `sqlite` is off.
+//! Replacement of the SQLite reader without the feature `sqlite`.
 
 use std::path::Path;
 

@@ -1,9 +1,9 @@
-//! Messages of a bag of ROS 1 (`.bag`, format 2.0), record by record from its beginning: the index
-//! at its end is not needed, so a file that is cut off, or was never closed (`.bag.active`), is
-//! read as far as it goes.
+//! Messages of a ROS 1 bag (`.bag`, format 2.0), record by record from the beginning: the index at
+//! the end is not needed, so a file that is truncated or was never closed (`.bag.active`) is read
+//! as far as possible.
 //!
-//! A record is a head of fields `name=value` and data. Four kinds matter here: the bag's own head,
-//! chunks, connections (topic, type and definition of the messages) and messages.
+//! A record consists of a header with fields `name=value` and data. Four kinds are relevant: the
+//! bag header, chunks, connections (topic, type and definition of the messages) and messages.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -15,19 +15,19 @@ use crate::error::{MotionError, Problem, Trouble};
 use crate::unpack::{MOST_BYTES, Packing, unpacked};
 use crate::{MessageMotion, Request};
 
-/// First bytes of a bag of ROS 1, of any version.
+/// First bytes of a ROS 1 bag of any version.
 pub const ROSBAG_MAGIC: &[u8] = b"#ROSBAG V";
 
-/// The version that is read, with the end of its line.
+/// First line of the supported version.
 const VERSION: &[u8] = b"#ROSBAG V2.0\n";
 /// Kinds of records, the field `op`.
 const MESSAGE: u8 = 0x02;
 const CHUNK: u8 = 0x05;
 const CONNECTION: u8 = 0x07;
-/// A head longer than this is none (bytes).
+/// Maximum length of a record header (bytes).
 const MOST_HEAD: u64 = 1 << 20;
 
-/// Reads a bag of ROS 1.
+/// Reads a ROS 1 bag.
 ///
 /// # Errors
 /// As [`crate::read_mcap`].
@@ -45,7 +45,7 @@ fn container(what: String) -> Trouble {
     Trouble::new(Problem::Container { container: "bag of ROS 1", what })
 }
 
-/// Collects the messages of a bag; why it ends before its end, if it does.
+/// Collects the messages of a bag; returns the reason if it ends prematurely.
 fn collect(mut file: impl Read, into: &mut Collector<'_>) -> Result<Option<String>, Trouble> {
     let mut version = [0; VERSION.len()];
     if file.read_exact(&mut version).is_err() || version != VERSION {
@@ -66,7 +66,7 @@ fn collect(mut file: impl Read, into: &mut Collector<'_>) -> Result<Option<Strin
             Part::Cut(data) => (data, false),
             Part::End => return Ok(cut()),
         };
-        // A chunk that is cut off still has the messages before the cut.
+        // A truncated chunk still has the messages before the end.
         let broken = match Head::of(&head) {
             None => Some("damaged: a record has no head".to_owned()),
             Some(head) if head.op == CHUNK => known.chunk(&head, &data, into)?,
@@ -83,12 +83,12 @@ fn cut() -> Option<String> {
     Some("its end is missing".to_owned())
 }
 
-/// A length and as many bytes.
+/// A block of bytes preceded by its length.
 enum Part {
     Whole(Vec<u8>),
-    /// What is there of it.
+    /// The bytes present.
     Cut(Vec<u8>),
-    /// Nothing is there at all.
+    /// No bytes are present.
     End,
 }
 
@@ -110,14 +110,14 @@ fn part(file: &mut impl Read, most: u64) -> Result<Part, Trouble> {
     Ok(if bytes.len() as u64 == length { Part::Whole(bytes) } else { Part::Cut(bytes) })
 }
 
-/// The head of a record.
+/// Header of a record.
 struct Head<'a> {
     op: u8,
     fields: HashMap<&'a [u8], &'a [u8]>,
 }
 
 impl<'a> Head<'a> {
-    /// None if it is damaged.
+    /// Parses a header; `None` if it is damaged.
     fn of(bytes: &'a [u8]) -> Option<Self> {
         let fields = fields(bytes)?;
         let op = *fields.get(&b"op"[..])?.first()?;
@@ -134,7 +134,7 @@ impl<'a> Head<'a> {
     }
 }
 
-/// Fields `name=value`, each after its length.
+/// Parses fields `name=value`, each preceded by its length.
 fn fields(mut rest: &[u8]) -> Option<HashMap<&[u8], &[u8]>> {
     let mut fields = HashMap::new();
     while !rest.is_empty() {
@@ -145,7 +145,7 @@ fn fields(mut rest: &[u8]) -> Option<HashMap<&[u8], &[u8]>> {
     Some(fields)
 }
 
-/// The next bytes that have their length before them.
+/// Reads bytes preceded by their length.
 fn with_length<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
     let (length, behind) = rest.split_first_chunk::<4>()?;
     let (bytes, behind) = behind.split_at_checked(u32::from_le_bytes(*length) as usize)?;
@@ -153,12 +153,12 @@ fn with_length<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
     Some(bytes)
 }
 
-/// Number of the topic of each connection.
+/// Topic index of each connection.
 #[derive(Default)]
 struct Connections(HashMap<u32, usize>);
 
 impl Connections {
-    /// The records of a chunk, as far as it goes.
+    /// Reads the records of a chunk, as far as possible.
     fn chunk(&mut self, head: &Head<'_>, packed: &[u8], into: &mut Collector<'_>) -> Result<Option<String>, Trouble> {
         let (records, broken) = match head.text("compression").as_deref() {
             None | Some("none") => (packed.to_vec(), None),
@@ -183,12 +183,12 @@ impl Connections {
         Ok(broken)
     }
 
-    /// A record outside of or in a chunk; what is wrong with it, if anything.
+    /// Processes a record outside or inside a chunk; returns a description of the problem, if any.
     fn record(&mut self, head: &Head<'_>, data: &[u8], into: &mut Collector<'_>) -> Result<Option<String>, Trouble> {
         let done = match head.op {
             CONNECTION => self.connection(head, data, into),
             MESSAGE => return self.message(head, data, into),
-            // What says nothing here, such as an index.
+            // Records that are not needed here, such as an index.
             _ => Some(()),
         };
         Ok(done.is_none().then(|| "damaged: a connection does not say what it is of".to_owned()))

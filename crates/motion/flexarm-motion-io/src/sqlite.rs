@@ -1,8 +1,7 @@
 //! Messages of a SQLite file of rosbag2 (`.db3`): tables `topics` and `messages`, and since ROS 2
 //! Iron `message_definitions`.
 //!
-//! The one module that names `rusqlite`. The file is opened for reading only and nothing is written
-//! beside it.
+//! Only this module uses `rusqlite`. The file is opened read-only and no other file is created.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -18,8 +17,8 @@ pub(crate) fn collect_file(path: &Path, into: &mut Collector<'_>) -> Result<Opti
     let file = || {
         let mut log = path.as_os_str().to_owned();
         log.push("-wal");
-        // What a killed recorder left in its log is read with the file; without a log nothing must
-        // be made beside it.
+        // Content that a killed recorder left in its log is read along with the file; without a log
+        // no file must be created.
         let has_log = std::fs::metadata(&log).is_ok_and(|log| log.len() > 0);
         let name: String = path.to_str()?.chars().map(escaped).collect();
         Some(format!("file:{name}?mode=ro{}", if has_log { "" } else { "&immutable=1" }))
@@ -33,10 +32,9 @@ pub(crate) fn collect_file(path: &Path, into: &mut Collector<'_>) -> Result<Opti
     collect(&database, into).map_err(|trouble| trouble.of(&origin))
 }
 
-/// A database that was unpacked into memory.
+/// Collects from a database that was decompressed into memory.
 pub(crate) fn collect_bytes(mut bytes: Vec<u8>, into: &mut Collector<'_>) -> Result<Option<String>, Trouble> {
-    // In memory there is no log beside the file: versions 2 of format (with a log) are read as
-    // version 1.
+    // There is no log file in memory: format version 2 (with a log) is read as version 1.
     for at in [18, 19] {
         if let Some(version) = bytes.get_mut(at) {
             *version = 1;
@@ -49,7 +47,7 @@ pub(crate) fn collect_bytes(mut bytes: Vec<u8>, into: &mut Collector<'_>) -> Res
     collect(&database, into)
 }
 
-/// A letter of a path in the address of a file.
+/// Escapes a character of a path in a file URI.
 fn escaped(letter: char) -> String {
     match letter {
         '%' | '?' | '#' => format!("%{:02X}", u32::from(letter)),
@@ -86,11 +84,11 @@ fn collect(database: &Connection, into: &mut Collector<'_>) -> Result<Option<Str
 }
 
 fn names_of_tables(database: &Connection) -> rusqlite::Result<Vec<String>> {
-    // A file that was cut off has fewer pages than its head says. Only with this are the others
-    // read; nothing is written.
+    // A truncated file has fewer pages than its header states. Only this setting makes the others
+    // readable; nothing is written.
     database.pragma_update(None, "writable_schema", true)?;
     database.pragma_update(None, "trusted_schema", false)?;
-    // Views could be made to compute for ever.
+    // Views are excluded, since they could compute endlessly.
     let mut query =
         database.prepare("SELECT name FROM sqlite_schema WHERE type = 'table' AND sql LIKE 'CREATE TABLE%'")?;
     query.query_map([], |row| row.get(0))?.collect()
@@ -107,8 +105,8 @@ fn definitions(database: &Connection) -> rusqlite::Result<HashMap<String, String
     query.query_map([], |row| Ok((row.get(0)?, row.get(1)?)))?.collect()
 }
 
-/// The messages in the order in which they were received; why the file ends before its end, if it
-/// does.
+/// Collects the messages in the order of reception; returns the reason if the file ends
+/// prematurely.
 fn messages(
     database: &Connection,
     places: &HashMap<i64, usize>,
@@ -122,7 +120,7 @@ fn messages(
         let row = match rows.next() {
             Ok(Some(row)) => row,
             Ok(None) => return Ok(None),
-            // A file that was cut off has its first pages.
+            // A truncated file still has its first pages.
             Err(error) if read > 0 => return Ok(Some(format!("it cannot be read on ({error})"))),
             Err(error) => return Err(failed(&error)),
         };

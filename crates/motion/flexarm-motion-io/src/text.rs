@@ -1,4 +1,4 @@
-//! Messages as text: one, or several documents as printed by `ros2 topic echo`.
+//! Messages as text: one document, or several as printed by `ros2 topic echo`.
 
 use flexarm_settings::Caveat;
 
@@ -9,11 +9,11 @@ use crate::folder::dropped_note;
 use crate::value::{Node, Value};
 use crate::{MessageMotion, Request, yaml};
 
-/// Longest text (bytes): its tree takes some ten times as much.
+/// Maximum length of a text (bytes); its tree takes about ten times as much memory.
 const LONGEST: usize = 200 << 20;
-/// Lines that are looked at to tell what a text is.
+/// Number of lines examined to recognise the kind of text.
 const LOOKED_AT: usize = 400;
-/// Keys of messages that hold motion, or hold messages that do.
+/// Keys of messages that hold motion or contain such messages.
 const KEYS: [&str; 12] = [
     "joint_names",
     "points",
@@ -48,7 +48,7 @@ pub fn looks_like_messages(text: &str) -> bool {
 /// * `origin`: file name for messages.
 ///
 /// # Errors
-/// [`MotionError::Content`] with the line of what is wrong.
+/// [`MotionError::Content`] with the line of the problem.
 pub fn read_text(text: &str, origin: &str, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
     read(text.trim_start_matches('\u{feff}'), origin, request).map_err(|trouble| trouble.of(origin))
 }
@@ -81,8 +81,8 @@ fn read(text: &str, origin: &str, request: &Request<'_>) -> Result<MessageMotion
     })?;
     let mut caveats = Vec::new();
     if let Some(trouble) = pending {
-        // What a program printed when it was stopped ends somewhere; one document alone must be
-        // whole.
+        // The output of an interrupted program may end anywhere; a text of less than three
+        // documents must be complete.
         if documents < 3 {
             return Err(trouble);
         }
@@ -108,7 +108,7 @@ fn read(text: &str, origin: &str, request: &Request<'_>) -> Result<MessageMotion
     Ok(MessageMotion { trajectory, format, topic: None, message: message.to_owned(), samples, dropped, caveats })
 }
 
-/// The keys of a document, for messages.
+/// Keys of a document, for messages.
 fn top(node: &Node) -> String {
     node.in_words()
 }

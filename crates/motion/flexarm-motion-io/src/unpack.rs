@@ -1,4 +1,4 @@
-//! Packed data, unpacked no further than to a limit: what a head says about sizes is not believed.
+//! Decompression up to a size limit, regardless of sizes stated in headers.
 
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -6,12 +6,12 @@ use std::path::Path;
 use crate::error::{MotionError, Problem, Trouble};
 use crate::{MessageMotion, Request, mcap};
 
-/// First bytes of what zstd has packed.
+/// First bytes of zstd data.
 pub const ZSTD_MAGIC: &[u8] = &[0x28, 0xB5, 0x2F, 0xFD];
-/// Most bytes that a chunk, a message or a packed database unpacks to.
+/// Maximum decompressed size of a chunk, a message or a database (bytes).
 pub(crate) const MOST_BYTES: u64 = 1 << 30;
 
-/// What is unpacked of some bytes before they end or break, and why they break.
+/// Returns the bytes decompressed before the end or an error, and the reason for the error.
 pub(crate) fn unpacked(packing: Packing, bytes: &[u8]) -> (Vec<u8>, Option<String>) {
     let mut out = Vec::new();
     let result = match packing {
@@ -30,7 +30,7 @@ pub(crate) fn unpacked(packing: Packing, bytes: &[u8]) -> (Vec<u8>, Option<Strin
     (out, broken)
 }
 
-/// How bytes are packed.
+/// Compression format.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Packing {
     Bzip2,
@@ -39,25 +39,25 @@ pub(crate) enum Packing {
     Lz4,
 }
 
-/// A bag that is packed as a whole (`.mcap.zstd`, `.db3.zstd`).
+/// Reads a bag that is compressed as a whole (`.mcap.zstd`, `.db3.zstd`).
 ///
 /// # Errors
-/// [`MotionError`] as [`crate::read_mcap`] and [`crate::read_db3`] have it, and for what is no bag
-/// inside.
+/// [`MotionError`] as [`crate::read_mcap`] and [`crate::read_db3`], and if the content is not a
+/// bag.
 pub fn read_packed(path: &Path, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
     crate::folder::read_files(&[path.to_owned()], path, request)
 }
 
-/// A packed file as a stream.
+/// Opens a compressed file as a stream.
 fn open_packed(path: &Path) -> std::io::Result<Box<dyn Read>> {
     Ok(Box::new(zstd::stream::read::Decoder::new(std::fs::File::open(path)?)?))
 }
 
-/// What is in a packed file, by its first bytes.
+/// Content of a compressed file, according to its first bytes.
 pub(crate) enum Inside {
-    /// A bag that can be read as it comes.
+    /// A bag that can be read as a stream.
     Mcap(Box<dyn Read>),
-    /// A database, all of it.
+    /// The bytes of a whole database.
     Database(Vec<u8>),
 }
 

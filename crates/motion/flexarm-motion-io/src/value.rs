@@ -1,8 +1,8 @@
-//! A message as a tree of values, whether it was text or bytes.
+//! Messages as trees of values, from text or bytes.
 
 use std::rc::Rc;
 
-/// A value and where it stands.
+/// A value and its place.
 #[derive(Clone, Debug)]
 pub(crate) struct Node {
     pub(crate) value: Value,
@@ -10,15 +10,15 @@ pub(crate) struct Node {
     pub(crate) line: u32,
 }
 
-/// What a message is made of.
+/// Value of a message.
 #[derive(Clone, Debug)]
 pub(crate) enum Value {
     Null,
-    /// A whole number, exact.
+    /// Integer, exact.
     Whole(i64),
     Number(f64),
     Text(Rc<str>),
-    /// A list of numbers and nothing else.
+    /// List that holds only numbers.
     Numbers(Vec<f64>),
     List(Vec<Node>),
     Map(Vec<(Rc<str>, Node)>),
@@ -29,7 +29,7 @@ impl Node {
         Self { value, line }
     }
 
-    /// The value of a key of a map; the last one, should it be there twice.
+    /// Value of a key of a map; the last one if the key is repeated.
     pub(crate) fn get(&self, key: &str) -> Option<&Self> {
         match &self.value {
             Value::Map(pairs) => pairs.iter().rev().find(|(name, _)| &**name == key).map(|(_, node)| node),
@@ -45,7 +45,7 @@ impl Node {
         }
     }
 
-    /// What it is, for messages.
+    /// Description for messages.
     pub(crate) fn in_words(&self) -> String {
         match &self.value {
             Value::Null => "empty".to_owned(),

@@ -1,26 +1,27 @@
-//! A motion as `trajectory_msgs/JointTrajectory`, in YAML or JSON.
+//! Writes a motion as `trajectory_msgs/JointTrajectory`, in YAML or JSON.
 
 use std::fmt::Write;
 
 use flexarm_trajectory::{Trajectory, TrajectoryError};
 
-/// Most points of a file.
+/// Maximum number of points in a file.
 const MOST_POINTS: f64 = 5e6;
 
-/// How a message is written as text.
+/// Text format of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TextFormat {
-    /// YAML, as `ros2 topic pub` takes it.
+    /// YAML, as accepted by `ros2 topic pub`.
     Yaml,
     /// JSON.
     Json,
 }
 
-/// A motion as points with positions, velocities and accelerations in SI units: one every
-/// `1 / rate_hz` s, at whole nanoseconds, and one at the end. Numbers are written in full.
+/// Writes a motion as points with positions, velocities and accelerations in SI units: one every
+/// `1 / rate_hz` s, rounded to nanoseconds, and one at the end. Numbers are written in full
+/// precision.
 ///
 /// # Errors
-/// [`TrajectoryError::BadRate`].
+/// [`TrajectoryError::BadRate`] if the rate is invalid or gives too many points.
 pub fn write_joint_trajectory(
     trajectory: &Trajectory,
     rate_hz: f64,
@@ -49,11 +50,11 @@ pub fn write_joint_trajectory(
     for k in 0..=regular {
         let seconds = if k == regular { duration_s } else { k as f64 / rate_hz };
         let ns = (seconds * 1e9).round() as i64;
-        // Where the point is said to be, not where it was meant to be.
+        // Samples at the rounded time that is written.
         trajectory.sample((ns as f64 / 1e9).min(duration_s), &mut q, &mut qdot, &mut qddot);
         let (sec, nanosec) = (ns / 1_000_000_000, ns % 1_000_000_000);
         let (q, v, a) = (numbers(&q), numbers(&qdot), numbers(&qddot));
-        // Writing to a text does not fail.
+        // Writing to a string does not fail.
         let _ = match format {
             TextFormat::Yaml => writeln!(
                 text,
@@ -75,11 +76,11 @@ pub fn write_joint_trajectory(
 }
 
 fn numbers(values: &[f64]) -> String {
-    // A point makes a number of it for every reader of YAML.
+    // The decimal point makes every YAML reader parse a float.
     values.iter().map(|value| format!("{value:?}")).collect::<Vec<_>>().join(", ")
 }
 
-/// A name between quotes, as both formats have it.
+/// Quotes a name for both formats.
 fn quoted(name: &str) -> String {
     let mut text = String::from("\"");
     for letter in name.chars() {

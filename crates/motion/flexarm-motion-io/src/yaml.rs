@@ -1,4 +1,4 @@
-//! Text to trees: YAML, of which JSON is a part, one tree for each document.
+//! Parses YAML, of which JSON is a subset, into one tree for each document.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -9,13 +9,12 @@ use flexarm_files::{YamlError, YamlNode, YamlValue, read_yaml};
 use crate::error::{Problem, Trouble};
 use crate::value::{Node, Value};
 
-/// Maximum number of values of a text, those behind aliases counted each time.
+/// Maximum number of values of a text, with those behind aliases counted each time.
 const MOST_VALUES: usize = 20_000_000;
 
-/// Calls `take` with each document, one after another, so that a long recording is not in memory
-/// twice.
+/// Calls `take` with each document in turn, so that a long recording is not in memory twice.
 pub(crate) fn documents(text: &str, take: &mut dyn FnMut(Node) -> Result<(), Trouble>) -> Result<(), Trouble> {
-    // Keys are few and come often.
+    // There are few keys, which occur often; they are shared.
     let mut keys = HashMap::new();
     read_yaml(text, MOST_VALUES, |root| take(node(root, &mut keys)))
 }
@@ -35,7 +34,7 @@ fn node<'t>(YamlNode { line, value }: YamlNode<'t>, keys: &mut HashMap<Cow<'t, s
             let mut pairs = Vec::with_capacity(items.len() / 2);
             let mut items = items.into_iter();
             while let (Some(key), Some(value)) = (items.next(), items.next()) {
-                // A key that is a collection is no key of a message.
+                // A collection used as a key cannot be a key of a message.
                 let YamlValue::Scalar { text: key, .. } = key.value else { continue };
                 let key = keys.entry(key).or_insert_with_key(|key| key.as_ref().into()).clone();
                 pairs.push((key, node(value, keys)));
@@ -53,7 +52,7 @@ fn numbers_or_list(items: Vec<Node>) -> Value {
     }
 }
 
-/// Text without quotes.
+/// Parses an unquoted scalar.
 fn plain(text: &str) -> Value {
     match text {
         "" | "~" | "null" => return Value::Null,
@@ -62,7 +61,7 @@ fn plain(text: &str) -> Value {
         "-.inf" | "-.Inf" | "-.INF" => return Value::Number(f64::NEG_INFINITY),
         _ => {}
     }
-    // Words that Rust takes for numbers are numbers here too: Python prints nan and inf so.
+    // Words that Rust parses as numbers are accepted, since Python prints nan and inf.
     match (text.parse::<i64>(), text.parse::<f64>()) {
         (Ok(whole), _) => Value::Whole(whole),
         (_, Ok(number)) => Value::Number(number),

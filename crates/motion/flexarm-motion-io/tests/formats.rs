@@ -1,5 +1,5 @@
-//! One motion in every format, as the Python packages of ROS wrote it
-//! (`tools/make_motion_fixtures.py`): the same samples as those of our own CSV.
+//! One motion in every format, written by the Python packages of ROS
+//! (`tools/make_motion_fixtures.py`): the same samples as in the library's own CSV.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 #![allow(clippy::print_stdout, reason = "measured errors, with --nocapture")]
 
@@ -13,7 +13,7 @@ use flexarm_trajectory::Trajectory;
 
 const JOINTS: [&str; 2] = ["joint_1", "joint_2"];
 const ROBOT: Request<'static> = Request { joints: Some(&JOINTS), topic: None };
-/// Largest difference to the CSV (rad, rad/s, rad/s²).
+/// Maximum difference from the CSV (rad, rad/s, rad/s²).
 const SAME: f64 = 1e-9;
 
 fn data(name: &str) -> PathBuf {
@@ -28,7 +28,7 @@ fn truth(name: &str) -> Trajectory {
     Trajectory::parse_csv(&text(name), name).unwrap().with_joint_order(&JOINTS).unwrap()
 }
 
-/// Largest difference of positions, velocities and accelerations at 1000 times.
+/// Maximum differences of positions, velocities and accelerations at 1000 times.
 fn differences(a: &Trajectory, b: &Trajectory) -> [f64; 3] {
     let b = b.with_joint_order(&a.joints().iter().map(String::as_str).collect::<Vec<_>>()).unwrap();
     let n = a.joints().len();
@@ -123,7 +123,7 @@ fn bags_of_ros_1_of_every_packing_are_the_motion_of_the_csv() {
     assert_same(&read_rosbag(&data("plan.bag"), &ROBOT).unwrap(), "plan.csv", "plan.bag");
 }
 
-/// What a recorder leaves that was killed: a bag without index, cut within a chunk or a record.
+/// Bags of a killed recorder: without index, truncated within a chunk or a record.
 #[test]
 fn bags_of_ros_1_that_are_cut_off_are_read_up_to_there() {
     let folder = std::env::temp_dir().join(format!("flexarm-rosbag-{}", std::process::id()));
@@ -219,8 +219,7 @@ fn a_bag_that_is_cut_off_is_read_up_to_there_and_says_so() {
         std::fs::write(&path, &whole[..(part * whole.len() as f64) as usize]).unwrap();
         read_db3(&path, &ROBOT)
     };
-    // A database has its pages in any order: what is left of it is a part of the motion, or an
-    // error.
+    // A database has its pages in any order: the remainder is a part of the motion, or an error.
     for part in [0.9, 0.8, 0.6, 0.4] {
         match cut(part) {
             Ok(motion) => assert!(motion.samples <= 26 && motion.trajectory.duration() > 0.0),
@@ -287,7 +286,7 @@ fn at(motion: &MessageMotion, t: f64) -> Vec<f64> {
 
 #[test]
 fn publishers_of_different_joints_on_one_topic_keep_their_own_times() {
-    // joint_1 every 10 ms; joint_2 every 25 ms and 4 ms later; a gripper in between.
+    // joint_1 every 10 ms; joint_2 every 25 ms, offset by 4 ms; a gripper in between.
     let mut messages: Vec<(i64, String)> = Vec::new();
     for k in 0..41 {
         let t = 10_000_000 * k;
@@ -303,14 +302,14 @@ fn publishers_of_different_joints_on_one_topic_keep_their_own_times() {
     assert!((motion.trajectory.duration() - 0.4).abs() < 1e-12);
     let q = at(&motion, 0.2);
     assert!((q[0] - 0.1).abs() < 1e-9 && (q[1] - 0.6).abs() < 1e-9, "{q:?}");
-    // Before its first sample, by less than two of its steps, it goes as it does then: no blow at
-    // the start.
+    // Before its first sample, by less than two of its steps, it is extrapolated at its initial
+    // speed, without a velocity jump at the start.
     assert!((at(&motion, 0.001)[1] - 0.998).abs() < 1e-9, "{:?}", at(&motion, 0.001));
     assert!(motion.trajectory.velocity_jumps().iter().all(|jump| jump.time_s == 0.0 || jump.time_s == 0.4));
     assert_eq!(motion.dropped, ["finger"]);
 }
 
-/// Truth: the messages that were left out.
+/// Truth: the messages left out.
 #[test]
 fn a_gap_between_messages_is_told_once_with_all_its_joints() {
     let message = |k: i64| {
@@ -392,7 +391,7 @@ fn plans_of_one_message_follow_each_other_and_a_start_that_is_told_is_where_the_
     let motion = read_text(&text, "start", &ROBOT).unwrap();
     assert_eq!(motion.trajectory.duration(), 1.0);
     assert!((at(&motion, 0.0)[0] + 0.1).abs() < 1e-12 && at(&motion, 0.25)[0].abs() < 1e-12);
-    // Without it the motion begins with the first point, and says so.
+    // Without it the motion begins with the first point, with a caveat.
     let motion = read_text(&format!("trajectory: [{}]", plan(0.0, 0.5, 0.25)), "no start", &ROBOT).unwrap();
     assert_eq!(motion.trajectory.duration(), 0.75);
     assert!(told(&motion).iter().any(|line| line.contains("the first point is at 0.25 s")));
@@ -419,11 +418,11 @@ fn a_later_trajectory_takes_the_place_of_what_is_left_of_the_one_before() {
 
 #[test]
 fn a_stream_of_single_points_is_the_way_through_them() {
-    // As servoing sends them: every 10 ms the point to be at 10 ms later.
+    // As in servoing: every 10 ms the goal for 10 ms later.
     let goal = |t: f64| 0.3 * (2.0 * t).sin();
     let text: String = (0..100)
         .map(|k| {
-            // Now and then a little late, as messages are; the goal is that of the time.
+            // Some messages are slightly late; the goal corresponds to the actual time.
             let ns = 10_000_000 * k + [0, 200_000, 0, 350_000][k as usize % 4];
             let q = goal(1e-9 * (ns + 10_000_000) as f64);
             format!(
@@ -436,16 +435,18 @@ fn a_stream_of_single_points_is_the_way_through_them() {
     let mut worst = 0.0f64;
     for k in 0..990 {
         let t = 0.001 * f64::from(k);
-        // Where one comes early, the way to the point before is left a little before it; measured
+        // Before an early message the path to the previous point is left slightly early; measured
         // 5.5e-6.
         worst = worst.max((at(&motion, t)[0] - goal(t + 0.01)).abs());
     }
     println!("stream of points: {worst:.1e} rad");
     assert!(worst < 2e-5, "{worst:e}");
     let fastest = motion.trajectory.peak()[0].velocity.value;
-    // The goal has 0.6 rad/s; stops before late points would have to be made up for.
+    // The goal moves at 0.6 rad/s; stops before late points would require a higher speed
+    // afterwards.
     assert!(fastest < 0.65, "{fastest}");
-    // One that comes half-way: the joint is between the points of the one before, and turns round.
+    // A message that arrives halfway: the joint is between the points of the previous one, and
+    // reverses.
     let plan = |sec: f64, to: f64| {
         format!(
             "header: {{stamp: {sec}}}\njoint_names: [joint_1]\npoints:\n- {{positions: [0.0], time_from_start: 0.5}}\n\
@@ -574,7 +575,7 @@ fn what_is_wrong_with_a_bag_is_told() {
     assert!(found.starts_with("cannot read motion "), "{found}");
 }
 
-/// Sizes that nobody has: nothing is taken for them, and what is wrong is told.
+/// Unrealistic sizes: no memory is allocated for them, and the problem is reported.
 #[test]
 fn sizes_that_a_bag_makes_up_are_refused() {
     let place = std::env::temp_dir().join(format!("flexarm-motion-sizes-{}", std::process::id()));

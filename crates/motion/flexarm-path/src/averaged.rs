@@ -1,22 +1,22 @@
-//! The least time with a speed that is averaged: accelerations rise in a given time.
+//! Time-optimal law with an averaged speed: accelerations rise within a given time.
 
 use crate::route::Route;
 use crate::schedule::SLACK;
 use crate::time_law::{Law, LawError, PathPoint, least_time};
 
-/// A law that is faster by less than this part of its time is no better.
+/// A law is better only if it is faster by more than this fraction of its duration.
 const NEAR: f64 = 1e-4;
-/// Most attempts to find a better one.
+/// Maximum number of attempts to find a better law.
 const ATTEMPTS: usize = 12;
-/// Widest jerk window that is tried, as a multiple of the one asked for.
+/// Maximum jerk window that is tried, as a multiple of the requested one.
 const WIDEST: f64 = 200.0;
 
-/// A smoothed law, and by how much it must be slowed as a whole to keep all bounds.
+/// Returns a smoothed law and the factor by which it must be slowed as a whole to keep all bounds.
 ///
-/// Where the average passes a bound, the law before it is slowed; where it does not reach one any
-/// more, the law becomes faster again. Of all laws on the way the one of the least time is taken.
+/// Where the averaged law exceeds a bound, the underlying law is slowed; where it no longer reaches
+/// a bound, the underlying law is sped up again. The fastest law of all iterations is returned.
 ///
-/// * `points`: what holds along the route.
+/// * `points`: bounds along the route.
 pub(crate) fn kept(points: &[PathPoint], route: &Route, rise: f64) -> Result<(Law, f64), LawError> {
     let s: Vec<f64> = points.iter().map(|point| point.s).collect();
     let mut slowed = points.to_vec();
@@ -41,7 +41,7 @@ pub(crate) fn kept(points: &[PathPoint], route: &Route, rise: f64) -> Result<(La
         if !widen && (vain > 1 || slowing == 1.0 && slowed == points) {
             break;
         }
-        // The greatest ratio of all averages that a point is in.
+        // Maximum ratio over all averages that include the point.
         let mut reached = vec![0.0f64; s.len()];
         for (t, ratio) in ratios {
             let [from, to] = [t - window, t].map(|t| raw.at(t).s);
@@ -64,8 +64,8 @@ pub(crate) fn kept(points: &[PathPoint], route: &Route, rise: f64) -> Result<(La
     best.ok_or(LawError::Points(points.len()))
 }
 
-/// Moments of an averaged law with the ratios of its squared speeds to the greatest that the bounds
-/// allow.
+/// Times of an averaged law with the ratios of its squared speeds to the largest ones that the
+/// bounds allow.
 fn ratios(law: &Law, points: &[PathPoint]) -> Vec<(f64, f64)> {
     let knots = law.knots();
     let middles = knots.windows(2).map(|pair| 0.5 * (pair[0] + pair[1]));
@@ -78,7 +78,7 @@ fn ratios(law: &Law, points: &[PathPoint]) -> Vec<(f64, f64)> {
     knots.iter().copied().chain(middles).map(ratio).collect()
 }
 
-/// Greatest jerk along the path of the tool over the programmed one; 0 where none is programmed.
+/// Maximum ratio of the jerk along the TCP path to the programmed one; 0 where none is programmed.
 fn path_jerk(law: &Law, route: &Route) -> f64 {
     let bounded: Vec<(f64, f64, f64)> = route
         .pieces

@@ -1,7 +1,8 @@
-//! Which of the inverse kinematics' solutions a target means.
+//! Selection of the inverse kinematics solution of a target.
 //!
-//! In closed form where the arm has one ([`AnalyticArm`]), else from many starts; the nearest to
-//! where the arm is if the target says no more.
+//! Solutions are in closed form if the arm has one ([`AnalyticArm`]), otherwise found numerically
+//! from many starts. The solution nearest to the current joint values is chosen if the target does
+//! not specify more.
 
 use flexarm_kinematics::{
     AnalyticArm, ControllerAxes, Data, Frame, IkOptions, Model, Selection, Solutions, forward_kinematics,
@@ -13,10 +14,10 @@ use nalgebra::DVector;
 use crate::plan::ProgramArm;
 use crate::program::Configuration;
 
-/// Starts of the numerical search.
+/// Number of starts of the numerical search.
 const STARTS: usize = 64;
 
-/// Why there is no solution, as a sentence.
+/// Reason for the lack of a solution, as a sentence.
 pub(crate) struct NoBranch(pub(crate) String);
 
 /// The arm and its workspaces.
@@ -24,7 +25,7 @@ pub(crate) struct Branches<'m> {
     model: &'m Model,
     data: Data,
     solutions: Solutions,
-    /// One for each tool.
+    /// Tool poses with their analytic arms, if any.
     arms: Vec<(Pose, Option<AnalyticArm>)>,
 }
 
@@ -39,7 +40,7 @@ impl<'m> Branches<'m> {
         self.data.X_WF(frame)
     }
 
-    /// Joint values of the branch that is meant.
+    /// Returns the joint values of the specified branch.
     pub(crate) fn choose(
         &mut self,
         frame: &Frame,
@@ -130,7 +131,7 @@ fn selection(configuration: &Configuration) -> Selection {
     }
 }
 
-/// Why no solution was chosen: out of reach, beyond the limits, or on another branch.
+/// Reason why no solution was chosen: out of reach, beyond the limits, or on another branch.
 fn why_none(arm: &AnalyticArm, counted: &ControllerAxes, solutions: &Solutions, selection: &Selection) -> String {
     if solutions.is_empty() {
         return match solutions.miss() {
@@ -185,7 +186,7 @@ fn named(selection: &Selection) -> String {
     }
 }
 
-/// Joints, counted from 1, that no solution has within their limits.
+/// Joints, counted from 1, whose values exceed the limits in some solution.
 fn joints_beyond(arm: &AnalyticArm, solutions: &Solutions) -> String {
     let beyond = |k: usize| {
         let (lower, upper) = arm.limits()[k];

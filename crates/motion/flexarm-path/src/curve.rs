@@ -1,32 +1,32 @@
-//! Curves of the tool in space: position and orientation over one parameter, with two derivatives.
+//! TCP curves in space: position and orientation over one parameter, with two derivatives.
 //!
-//! The parameter `s` is metres along the path where the tool travels; where it only turns, an angle
-//! counts [`TURN_LENGTH`] for each radian. A [`ToolCurve`] is what a line, an arc, a blend or a
-//! piece of a spline all are: a law of the position and a law of the rotation over the same `s`.
+//! The parameter `s` is the distance along the path (m) where the tool travels; where it only
+//! turns, a radian counts as [`TURN_LENGTH`]. A [`ToolCurve`] represents a line, an arc, a blend or
+//! a piece of a spline: a function for the position and one for the rotation over the same `s`.
 //!
-//! Rotation vectors beyond the identity: `R = R_ref exp(phi(s))`, with the rate map of
-//! [`ElasticAngles::RotationVector`] [Bullo & Murray 1995].
+//! Rotations other than uniform ones use rotation vectors: `R = R_ref exp(phi(s))`, with the rate
+//! map of [`ElasticAngles::RotationVector`] [Bullo & Murray 1995].
 
 use flexarm_spatial::{ElasticAngles, Pose, rotation_vector};
 use nalgebra::{Matrix3, Rotation3, Translation3, Vector3, Vector6};
 
-/// Metres that a radian counts where the tool turns without travelling.
+/// Path length of a radian where the tool turns without travelling (m).
 pub const TURN_LENGTH: f64 = 0.2;
-/// Points nearer than this are one, m.
+/// Points nearer than this coincide (m).
 const SAME_POINT: f64 = 1e-9;
 
-/// Pose of the tool with its first and second derivative by `s`, in world axes.
+/// Pose of the tool with its first and second derivatives by `s`, in world axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ToolJet {
     /// `X_WT`.
     pub X: Pose,
-    /// `[p'; w]`: m and rad for each unit of `s`.
+    /// `[p'; w]`: m and rad per unit of `s`.
     pub V: Vector6<f64>,
     /// `[p''; w']`.
     pub A: Vector6<f64>,
 }
 
-/// A quintic in `s` with vector coefficients, lowest first.
+/// Quintic in `s` with vector coefficients, lowest first.
 type Quintic = [Vector3<f64>; 6];
 
 #[derive(Debug, Clone, PartialEq)]
@@ -50,14 +50,14 @@ enum Position {
 enum Rotation {
     /// `exp(w s) R0`, w in world axes.
     Even { R0: Matrix3<f64>, w: Vector3<f64> },
-    /// `exp(k s) exp(w s) R0`: evenly within axes that turn with an arc, `k` along its axis
-    /// (rad/m).
+    /// `exp(k s) exp(w s) R0`: uniform rotation relative to axes that turn with an arc, `k` along
+    /// its axis (rad/m).
     WithArc { R0: Matrix3<f64>, w: Vector3<f64>, k: Vector3<f64> },
     /// `R_ref exp(phi(s))`.
     Log { R_ref: Matrix3<f64>, phi: Quintic },
 }
 
-/// How the tool moves over `0 <= s <= length`.
+/// TCP motion over `0 <= s <= length`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ToolCurve {
     position: Position,
@@ -65,13 +65,13 @@ pub struct ToolCurve {
     length: f64,
 }
 
-/// Why three points are no circle.
+/// Three points that do not define a circle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ArcError {
-    /// Two of them coincide.
+    /// Two of the points coincide.
     #[error("two of the three points of the circle are the same point")]
     SamePoint,
-    /// They are on a line.
+    /// The points are on a straight line.
     #[error("the three points of the circle lie on a straight line")]
     Straight,
 }
@@ -85,8 +85,9 @@ fn turn(R0: &Matrix3<f64>, R1: &Matrix3<f64>) -> Vector3<f64> {
     rotation_vector(&(R1 * R0.transpose()))
 }
 
-/// The same rotation, at most half a turn as `w` or the other way round, whichever has the smaller
-/// `distance`. Orientations in programs are rounded, so the other way round must be clearly nearer.
+/// The same rotation as `w` (at most half a turn) or its complement in the opposite sense,
+/// whichever has the smaller `distance`. Orientations in programs are rounded, so the complement
+/// must be clearly nearer.
 fn nearer_way(w: Vector3<f64>, distance: impl Fn(&Vector3<f64>) -> f64) -> Vector3<f64> {
     const CLEARLY: f64 = 0.02;
     let Some(axis) = w.try_normalize(1e-12) else { return w };
@@ -113,7 +114,7 @@ fn at(c: &Quintic, s: f64) -> [Vector3<f64>; 3] {
 }
 
 impl ToolCurve {
-    /// A straight line, the orientation turned evenly about one axis by at most half a turn.
+    /// A straight line with uniform rotation about one axis by at most half a turn.
     pub fn line(X0: &Pose, X1: &Pose) -> Self {
         let (R0, R1) = (X0.rotation.into_inner(), X1.rotation.into_inner());
         let way = X1.translation.vector - X0.translation.vector;
@@ -124,17 +125,17 @@ impl ToolCurve {
         Self { position, rotation: Rotation::Even { R0, w: turned * per }, length }
     }
 
-    /// The arc from `X0` through `via` to `X1`; further or less far if `angle` (rad) is given.
+    /// The arc from `X0` through `via` to `X1`, or over `angle` (rad) if it is given.
     ///
-    /// The orientation turns evenly in the world, or in axes that turn with the tangent, and is
-    /// that of `X1` at the point of `X1`; it passes through `via_rotation` if given. In axes that
-    /// turn with the tangent there are two ways round: the tool takes the one nearer to following
-    /// the tangent or to keeping its orientation. So equal orientations at both ends of half a
-    /// circle stay as they are. An arc backwards (negative `angle`) turns the orientation
-    /// backwards.
+    /// The orientation changes uniformly in the world, or relative to axes that turn with the
+    /// tangent, and equals that of `X1` at the point of `X1`; it passes through `via_rotation` if
+    /// given. Relative to the tangent there are two senses of rotation: the tool takes the one
+    /// nearer to following the tangent or to keeping its orientation, so that equal orientations at
+    /// both ends of a half circle remain constant. An arc backwards (negative `angle`) turns the
+    /// orientation backwards.
     ///
     /// # Errors
-    /// [`ArcError`]: the points are no circle.
+    /// [`ArcError`] if the points do not define a circle.
     pub fn arc(
         X0: &Pose,
         via: &Vector3<f64>,
@@ -174,8 +175,8 @@ impl ToolCurve {
         Ok(Self { position, rotation, length })
     }
 
-    /// The quintic in position and rotation vector that has both jets at its ends, `length` apart
-    /// in `s`.
+    /// The quintic in position and rotation vector that matches both jets at its ends, `length`
+    /// apart in `s`.
     pub fn between(a: &ToolJet, b: &ToolJet, length: f64) -> Self {
         let part = |v: &Vector6<f64>, row: usize| Vector3::new(v[row], v[row + 1], v[row + 2]);
         let (Ra, Rb) = (a.X.rotation.into_inner(), b.X.rotation.into_inner());
@@ -184,7 +185,7 @@ impl ToolCurve {
             [a.X.translation.vector, part(&a.V, 0), part(&a.A, 0)],
             [b.X.translation.vector, part(&b.V, 0), part(&b.A, 0)],
         );
-        // At phi = 0 the rate map is the identity and its bias zero.
+        // At phi = 0 the rate map is the identity and its bias is zero.
         let at_a = [Vector3::zeros(), Ra.transpose() * part(&a.V, 3), Ra.transpose() * part(&a.A, 3)];
         let phi = rotation_vector(&(Ra.transpose() * Rb));
         let map = ElasticAngles::RotationVector.kinematics(&phi, &Vector3::zeros()).B;
@@ -196,7 +197,7 @@ impl ToolCurve {
         Self { position: Position::Quintic(position), rotation, length }
     }
 
-    /// Where it ends, in `s`.
+    /// Length of the curve in `s`.
     pub fn length(&self) -> f64 {
         self.length
     }
@@ -252,7 +253,7 @@ impl Circle {
             return Err(ArcError::SamePoint);
         }
         let n = a.cross(&b);
-        // Radii beyond a million times the size of the arc are straight.
+        // Radii beyond a million times the size of the arc count as straight.
         if n.norm() <= 1e-6 * longest * longest.min(a.norm().min(b.norm())) {
             return Err(ArcError::Straight);
         }
@@ -262,7 +263,7 @@ impl Circle {
         let axis = n.normalize();
         let y = axis.cross(&x);
         let angle = |p: &Vector3<f64>| (p - c).dot(&y).atan2((p - c).dot(&x)).rem_euclid(std::f64::consts::TAU);
-        // Seen along a x b, the three points follow each other counterclockwise.
+        // Viewed along a x b, the three points are in counterclockwise order.
         Ok(Self { c, x, y, r, to_via: angle(p1), to_end: angle(p2) })
     }
 }
@@ -309,8 +310,8 @@ mod tests {
             assert_derivatives(&line, 1e-7)?;
         }
 
-        /// Truth: every point is as far from the centre as the three given ones, and the target is
-        /// met.
+        /// Truth: every point has the same distance from the centre as the three given ones, and
+        /// the target is reached.
         #[test]
         fn an_arc_passes_its_three_points_at_one_distance_from_its_centre(
             a in prop::array::uniform6(-1.0..1.0f64), b in prop::array::uniform6(-1.0..1.0f64),
@@ -364,20 +365,21 @@ mod tests {
             assert!(apart(&arc.at(arc.length()).X, &end) < 1e-14);
             assert!((arc.length() - 3.0 * quarter).abs() < 1e-14);
         }
-        // The other way round.
+        // In the opposite sense.
         let back = ToolCurve::arc(&X0, &via, None, &X1, Some(-quarter), false).unwrap();
         assert!((back.at(back.length()).X.translation.vector - Vector3::new(0.0, -1.0, 0.0)).norm() < 1e-14);
         let line = Vector3::new(0.5, 0.5, 0.0);
         assert_eq!(ToolCurve::arc(&X0, &line, None, &X1, None, false), Err(ArcError::Straight));
     }
 
-    /// An arc about z of radius 0.1 m from (0.1, 0, 0) over an angle, to an orientation.
+    /// Start, middle and end of an arc about z of radius 0.1 m from (0.1, 0, 0) over an angle, with
+    /// end orientation.
     fn about_z(angle: f64, R0: Rotation3<f64>, R1: Rotation3<f64>) -> [Pose; 3] {
         let at = |a: f64, R| Pose::from_parts(Translation3::new(0.1 * a.cos(), 0.1 * a.sin(), 0.0), R);
         [at(0.0, R0), at(angle / 2.0, R0), at(angle, R1)]
     }
 
-    /// Angle by which the tool turns in all along a curve.
+    /// Total angle by which the tool turns along a curve.
     fn turned(arc: &ToolCurve) -> f64 {
         (0..1000).map(|k| arc.at(arc.length() * (f64::from(k) + 0.5) / 1e3).V.fixed_rows::<3>(3).norm()).sum::<f64>()
             * arc.length()
@@ -385,8 +387,8 @@ mod tests {
     }
 
     proptest! {
-        /// Truth: the tool keeps its orientation. Where rounded ends differ, what is turned grows
-        /// by (a/2) / sin(a/2) at most, 21 at the largest angle a.
+        /// Truth: the tool keeps its orientation. With rounded end orientations the total rotation
+        /// grows by at most (a/2) / sin(a/2), 21 at the largest angle a.
         #[test]
         fn a_tool_that_is_told_the_same_orientation_at_both_ends_of_an_arc_does_not_turn(
             angle in prop_oneof![Just(std::f64::consts::PI), 3.1..3.2f64, 0.3..6.0f64],
@@ -402,7 +404,7 @@ mod tests {
             prop_assert!(turned(&arc) < bound, "{} rad", turned(&arc)); // measured up to 1e-13 without rounding
         }
 
-        /// Truth: a tool that is told to turn as the tangent does turns by the angle of the arc.
+        /// Truth: a tool that is programmed to turn with the tangent turns by the angle of the arc.
         #[test]
         fn a_tool_that_follows_the_tangent_turns_by_the_angle_of_the_arc(angle in 0.3..6.0f64, r in prop::array::uniform3(-3.0..3.0f64)) {
             let R0 = Rotation3::new(Vector3::from(r));
@@ -412,7 +414,7 @@ mod tests {
         }
     }
 
-    /// Truth: a half turn to the auxiliary point and on to 240 degrees is no turn back.
+    /// Truth: a rotation to the auxiliary point and on to the end continues in one sense.
     #[test]
     fn an_orientation_at_the_auxiliary_point_is_passed_in_one_sense() {
         for (via, end) in [(2.0, 4.0), (-2.0, -4.0), (3.0, 5.0)] {
@@ -423,8 +425,8 @@ mod tests {
         }
     }
 
-    /// Truth: backwards over three quarters is forwards over one: the end is the same place, turned
-    /// back by three quarters.
+    /// Truth: three quarters backwards end at the same place as one quarter forwards, with the
+    /// orientation turned back by three quarters.
     #[test]
     fn an_arc_backwards_turns_the_orientation_backwards() {
         let quarter = std::f64::consts::FRAC_PI_2;

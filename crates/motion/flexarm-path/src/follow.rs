@@ -1,14 +1,14 @@
-//! Joints along a path of the tool: values and two derivatives by the parameter, by continuation
-//! from where the path begins.
+//! Joints along a TCP path: values and two derivatives by the parameter, by continuation from the
+//! start of the path.
 //!
 //! ```text
 //! J q' = V,    J q'' = A - J' q',    V, A: derivatives of the tool's pose by s
 //! ```
 //! From one point to the next the joints are predicted by their Taylor polynomial and corrected by
-//! Newton's method; steps are halved where the two disagree, so that the branch of the inverse
-//! kinematics is kept. An arm with fewer than six joints follows paths that it can follow (least
-//! squares, and a check); of an arm with more, joints are held until six are left, or move as
-//! [`ToolWay::guided`] tells.
+//! Newton's method; steps are halved where the two differ too much, so that the branch of the
+//! inverse kinematics is kept. An arm with fewer than six joints follows the paths that it can
+//! follow (least squares, then a check). For an arm with more than six joints, joints are held
+//! until six are left, or move according to [`ToolWay::guided`].
 //!
 //! Start at [`Follower::start`], then [`Follower::advance`].
 
@@ -22,21 +22,21 @@ use nalgebra::{DMatrix, DVector, Matrix6xX, Vector6};
 use crate::curve::{TURN_LENGTH, ToolCurve};
 use crate::route::between;
 
-/// Newton's method has arrived below this, m and rad.
+/// Newton's method has converged below this error (m and rad).
 const ARRIVED: f64 = 1e-12;
-/// An arm with fewer than six joints follows a path whose rest is below this, m and rad.
+/// Maximum residual for an arm with fewer than six joints (m and rad).
 const FOLLOWED: f64 = 1e-9;
-/// Prediction and correction may differ by this, rad or m, before a step is halved.
+/// Maximum difference between prediction and correction before a step is halved (rad or m).
 const SURPRISE: f64 = 0.03;
-/// Shortest step along a path before it counts as blocked, of its length.
+/// Minimum step along a path before the path counts as blocked, relative to its length.
 const SHORTEST: f64 = 1e-7;
-/// Most corrections of a point.
+/// Maximum number of Newton corrections of a point.
 const CORRECTIONS: usize = 12;
 
-/// Values of all independent coordinates with their derivatives by the parameter of the path.
+/// All independent coordinates with their derivatives by the parameter of the path.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointJet {
-    /// rad or m.
+    /// Values (rad or m).
     pub q: DVector<f64>,
     /// First derivative.
     pub d: DVector<f64>,
@@ -44,19 +44,19 @@ pub struct JointJet {
     pub dd: DVector<f64>,
 }
 
-/// A coordinate that moves along a way by its own polynomial while others follow the tool.
+/// A coordinate that moves along a path by its own polynomial while others follow the tool.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GuidedJoint {
-    /// Number of the coordinate.
+    /// Index of the coordinate.
     pub k: usize,
-    /// Value and two derivatives by the parameter where the way begins (rad or m, and per m).
+    /// Value and two derivatives by the parameter at the start of the path (rad or m, and per m).
     pub from: [f64; 3],
-    /// The same where it ends.
+    /// The same at the end of the path.
     pub to: [f64; 3],
 }
 
 impl GuidedJoint {
-    /// Value and two derivatives at `s` of a way of length `h`: the quintic between both ends.
+    /// Value and two derivatives at `s` of a path of length `h`: the quintic between both ends.
     pub fn at(&self, h: f64, s: f64) -> [f64; 3] {
         let one = |x: f64| DVector::from_element(1, x);
         let jet = |[q, d, dd]: [f64; 3]| JointJet { q: one(q), d: one(d), dd: one(dd) };
@@ -65,20 +65,19 @@ impl GuidedJoint {
     }
 }
 
-/// A curve that a frame of the arm follows.
+/// A curve with the frame of the arm that follows it.
 #[derive(Debug, Clone)]
 pub struct ToolWay {
     /// The curve.
     pub curve: Box<ToolCurve>,
-    /// What follows it.
+    /// Frame that follows the curve.
     pub frame: Frame,
-    /// Joints of a redundant arm that move along it by themselves; the others that it has too many
-    /// stay.
+    /// Redundant joints that move along by their own polynomial; other redundant joints are held.
     pub guided: Vec<GuidedJoint>,
 }
 
 impl ToolWay {
-    /// With all joints that are left over at rest.
+    /// With all redundant joints held.
     pub fn new(curve: ToolCurve, frame: Frame) -> Self {
         Self { curve: Box::new(curve), frame, guided: Vec::new() }
     }
@@ -88,17 +87,16 @@ impl ToolWay {
     }
 }
 
-/// The joints cannot follow the tool.
+/// The joints cannot follow the tool path.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Blocked {
-    /// Parameter up to which they could.
+    /// Parameter up to which they can.
     pub s: f64,
-    /// Least singular value of the Jacobian there (rotation counted with [`TURN_LENGTH`]), m/rad.
+    /// Minimum singular value of the Jacobian there (rotation scaled by [`TURN_LENGTH`]), m/rad.
     pub sigma: f64,
-    /// Joint that would have to turn fastest there.
+    /// Joint that would have to move fastest there.
     pub joint: String,
-    /// Whether the tool could not be followed because the arm has too few joints for its
-    /// orientation or position.
+    /// Whether the arm has too few joints for the position or orientation of the tool.
     pub too_few_joints: bool,
 }
 
@@ -110,15 +108,15 @@ pub struct Follower<'m> {
     state: State,
     J: Matrix6xX<f64>,
     Jdot: Matrix6xX<f64>,
-    /// Coordinates that follow, ascending.
+    /// Indices of the coordinates that follow the tool, ascending.
     active: Vec<usize>,
 }
 
-/// Coordinates that move a frame, ascending.
+/// Returns the indices of the coordinates that move a frame, ascending.
 pub fn coordinates_of(model: &Model, frame: &Frame) -> Vec<usize> {
     let mut data = Data::new(model);
     let mut J = Matrix6xX::zeros(model.nv());
-    // At a pose that is special for no arm.
+    // At a generic, non-singular pose.
     let q = DVector::from_fn(model.nv(), |k, _| if k < model.n_actuated() { 0.3 + 0.17 * k as f64 } else { 0.0 });
     forward_kinematics(model, &mut data, &q);
     frame_jacobian(model, &data, frame, &mut J);
@@ -126,11 +124,12 @@ pub fn coordinates_of(model: &Model, frame: &Frame) -> Vec<usize> {
 }
 
 impl<'m> Follower<'m> {
-    /// For a frame of a model, at joint values from which the joints to hold are chosen: of an arm
-    /// with more than six joints, those without which the rest moves the tool best.
+    /// Creates a follower for a frame of a model. For an arm with more than six joints the held
+    /// joints are chosen at `q` so that the minimum singular value of the remaining ones is
+    /// largest.
     ///
     /// * `q`: all independent coordinates.
-    /// * `hold`: a joint that stays in any case, of an arm with more than six.
+    /// * `hold`: a joint that is held in any case if the arm has more than six joints.
     pub fn new(model: &'m Model, frame: &Frame, q: &DVector<f64>, hold: Option<usize>) -> Self {
         let mut follower = Self {
             model,
@@ -150,13 +149,13 @@ impl<'m> Follower<'m> {
         follower
     }
 
-    /// Joints that stay while the others follow, of an arm with more than six.
+    /// Joints that are held while the others follow, if the arm has more than six.
     pub fn held(&self) -> Vec<usize> {
         let moving = coordinates_of(self.model, &self.frame);
         moving.into_iter().filter(|k| !self.active.contains(k)).collect()
     }
 
-    /// Leaves out the joint without which the least singular value is largest.
+    /// Holds the joint without which the minimum singular value is largest.
     fn hold_one(&mut self, q: &DVector<f64>) {
         forward_kinematics(self.model, &mut self.data, q);
         frame_jacobian(self.model, &self.data, &self.frame, &mut self.J);
@@ -168,12 +167,12 @@ impl<'m> Follower<'m> {
         self.active.retain(|&k| Some(k) != best);
     }
 
-    /// Columns of the last Jacobian, rotation in metres.
+    /// Columns of the last Jacobian, with rotations scaled to metres.
     fn scaled(&self, columns: &[usize]) -> DMatrix<f64> {
         DMatrix::from_fn(6, columns.len(), |r, c| self.J[(r, columns[c])] * if r < 3 { 1.0 } else { TURN_LENGTH })
     }
 
-    /// Solution of `J x = b` over the active joints (least squares if there are fewer than six).
+    /// Solution of `J x = b` for the active joints (least squares if there are fewer than six).
     fn solve(&self, b: &Vector6<f64>) -> Option<DVector<f64>> {
         let scaled = DVector::from_fn(6, |r, _| b[r] * if r < 3 { 1.0 } else { TURN_LENGTH });
         let J = self.scaled(&self.active);
@@ -187,8 +186,8 @@ impl<'m> Follower<'m> {
         x.iter().all(|x| x.is_finite()).then_some(x)
     }
 
-    /// Joint values at which the frame has the pose, from values near by; `None` if Newton's method
-    /// does not arrive.
+    /// Finds the joint values at which the frame has the given pose, starting from nearby values;
+    /// `None` if Newton's method does not converge.
     fn correct(&mut self, X_WT: &Pose, q: &mut DVector<f64>) -> Option<()> {
         let mut last = f64::INFINITY;
         for _ in 0..CORRECTIONS {
@@ -198,7 +197,7 @@ impl<'m> Follower<'m> {
             let r = rotation_vector((X_WT.rotation * X.rotation.inverse()).matrix());
             let error = p.norm().max(r.norm());
             frame_jacobian(self.model, &self.data, &self.frame, &mut self.J);
-            // Rounding ends the descent of large arms a little above.
+            // For large arms rounding stops the convergence slightly above `ARRIVED`.
             if error <= ARRIVED || (error <= FOLLOWED && error > 0.5 * last) {
                 return Some(());
             }
@@ -214,7 +213,7 @@ impl<'m> Follower<'m> {
         None
     }
 
-    /// Values and derivatives at `s` of a way, from values near by.
+    /// Joint values and derivatives at `s` of a path, from nearby values.
     fn jet(&mut self, way: &ToolWay, s: f64, near: &DVector<f64>) -> Option<JointJet> {
         let tool = way.curve.at(s);
         let mut q = near.clone();
@@ -248,14 +247,15 @@ impl<'m> Follower<'m> {
         Some(JointJet { q, d, dd })
     }
 
-    /// Speed of the frame's origin for rates `d` of the joints, m for each unit of the parameter.
+    /// Speed of the frame's origin for the joint rates `d` (m per unit of the parameter).
     pub fn speed(&mut self, jet: &JointJet) -> f64 {
         forward_kinematics(self.model, &mut self.data, &jet.q);
         frame_jacobian(self.model, &self.data, &self.frame, &mut self.J);
         (&self.J * &jet.d).fixed_rows::<3>(0).norm()
     }
 
-    /// How far the frame is from a curve's pose at `s`, m and rad, whichever is more.
+    /// Distance of the frame from a curve's pose at `s`: maximum of position (m) and rotation (rad)
+    /// errors.
     pub fn distance(&mut self, curve: &ToolCurve, s: f64, q: &DVector<f64>) -> f64 {
         forward_kinematics(self.model, &mut self.data, q);
         let (X, target) = (self.data.X_WF(&self.frame), curve.at(s).X);
@@ -263,24 +263,23 @@ impl<'m> Follower<'m> {
         p.norm().max(rotation_vector((target.rotation * X.rotation.inverse()).matrix()).norm())
     }
 
-    /// Least singular value of the Jacobian at the last point, m/rad.
+    /// Minimum singular value of the Jacobian at the last point, m/rad.
     pub fn sigma(&self) -> f64 {
         self.scaled(&self.active).singular_values().min()
     }
 
-    /// Values and derivatives where a way begins at `s`, from joint values that bring the tool
-    /// there or near.
+    /// Joint values and derivatives at `s`, where a path begins, from joint values near that pose.
     ///
     /// # Errors
-    /// [`Blocked`]: the pose is not met near these values, or the arm is singular there.
+    /// [`Blocked`] if the pose is not reached near these values, or the arm is singular there.
     pub fn start(&mut self, way: &ToolWay, s: f64, q: &DVector<f64>) -> Result<JointJet, Blocked> {
         self.jet(way, s, q).ok_or_else(|| self.blocked(s, q))
     }
 
-    /// Values and derivatives at `to`, from those at `from`; either may be the larger.
+    /// Joint values and derivatives at `to`, from those at `from`; either may be the larger.
     ///
     /// # Errors
-    /// [`Blocked`]: the arm cannot reach that far on this branch, or passes a singular pose.
+    /// [`Blocked`] if the arm cannot reach that far on this branch, or passes a singular pose.
     pub fn advance(&mut self, way: &ToolWay, from: f64, at: &JointJet, to: f64) -> Result<JointJet, Blocked> {
         let shortest = SHORTEST * way.curve.length().max((to - from).abs());
         let (mut s, mut jet, mut h) = (from, at.clone(), to - from);
@@ -329,7 +328,7 @@ mod tests {
         data.X_WF(frame)
     }
 
-    /// Truth: forward kinematics, and differences of the joints themselves.
+    /// Truth: forward kinematics, and finite differences of the joint values.
     #[test]
     fn joints_follow_a_line_with_their_derivatives() {
         let (model, frame, q) = arm();

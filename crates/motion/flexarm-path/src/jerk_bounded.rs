@@ -1,5 +1,5 @@
-//! The least time of a route within the jerks of its joints. They bound every joint: one of which
-//! none is told raises its acceleration to its bound in a given time.
+//! Time-optimal law of a route with joint jerk limits. Every moving joint gets a jerk limit:
+//! without a given one it is such that the acceleration rises to its limit in a given time.
 
 use crate::jerk_law::{QuinticLaw, least_time_with_jerks};
 use crate::limits::Limits;
@@ -7,23 +7,23 @@ use crate::plan::ProgramArm;
 use crate::route::Route;
 use crate::time_law::{Law, LawError, PathPoint, least_time};
 
-/// Is the jerk of some joint told?
+/// Whether some joint has a given jerk limit.
 pub(crate) fn has_jerks(arm: &ProgramArm<'_>) -> bool {
     arm.bounds.iter().any(|bounds| bounds.jerk.is_some())
 }
 
-/// A law with the bounds of jerk that it keeps.
+/// A law with the jerk limits that it keeps.
 pub(crate) struct JerkBounded {
     pub(crate) law: QuinticLaw,
-    /// By joint, infinite where it stays.
+    /// Jerk limit by joint, infinite for joints at rest.
     pub(crate) jerks: Vec<f64>,
-    /// Names of joints whose jerk is told.
+    /// Names of the joints with a given jerk limit.
     pub(crate) told: Vec<Option<String>>,
 }
 
 impl JerkBounded {
-    /// * `points`: what holds at the stations.
-    /// * `rise`: s, of joints whose jerk is not told.
+    /// * `points`: bounds at the stations.
+    /// * `rise`: rise time of the acceleration of joints without a given jerk limit (s).
     pub(crate) fn new(points: &[PathPoint], route: &Route, arm: &ProgramArm<'_>, rise: f64) -> Result<Self, LawError> {
         let moves = |k: usize| route.stations.iter().any(|station| station.d[k] != 0.0 || station.after[k] != 0.0);
         let jerks: Vec<f64> = (0..arm.bounds.len())
@@ -32,7 +32,7 @@ impl JerkBounded {
                 _ => f64::INFINITY,
             })
             .collect();
-        // Times in which joints reach their accelerations.
+        // Times in which joints reach their acceleration limits.
         let rises = arm.bounds.iter().zip(&jerks).filter(|(_, jerk)| jerk.is_finite());
         let rises: Vec<f64> = rises.map(|(bounds, jerk)| bounds.acceleration / jerk).collect();
         let (shortest, longest) = rises.iter().fold((f64::INFINITY, 0.0f64), |(a, b), x| (a.min(*x), b.max(*x)));

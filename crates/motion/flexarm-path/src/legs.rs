@@ -1,4 +1,4 @@
-//! From the moves of a program to ways from target to target, with the joints at both ends.
+//! Converts the moves of a program to paths from target to target, with the joints at both ends.
 
 use flexarm_kinematics::{Data, Frame, IkOptions, inverse_kinematics_with_rule};
 use flexarm_spatial::{Pose, rotation_vector};
@@ -10,31 +10,31 @@ use crate::follow::{Blocked, Follower, GuidedJoint, JointJet, ToolWay};
 use crate::plan::{PathError, PathOptions, ProgramArm};
 use crate::program::{Blend, Item, Move, MoveKind, Target};
 
-/// Joint moves shorter than this, rad or m, are none.
+/// Joint moves shorter than this (rad or m) are ignored.
 const NO_WAY: f64 = 1e-12;
-/// Length that a radian counts in a joint move that does not move the tool, m.
+/// Length of a radian in a joint move that does not move the tool (m).
 const JOINT_LENGTH: f64 = 0.5;
 
-/// Part of a joint's speed and acceleration that it may use for a better posture while the tool
-/// moves.
+/// Fraction of a joint's velocity and acceleration limits for motion towards a better posture while
+/// the tool moves.
 const PART: f64 = 0.2;
-/// Speed of the tool where the program tells none, m/s.
+/// TCP speed assumed if the program gives none (m/s).
 const SPEED: f64 = 0.5;
-/// A shift of less than this part of what is wanted is none.
+/// A posture change smaller than this fraction of the desired one is dropped.
 const SMALLEST_PART: f64 = 1e-6;
 
-/// Along which way a leg goes, over a parameter in metres.
+/// Path of a leg, over a parameter in metres.
 #[derive(Debug, Clone)]
 pub(crate) enum Way {
-    /// A frame of the arm along a curve.
+    /// A frame of the arm follows a curve.
     Tool(ToolWay),
-    /// All joints straight: `q0 + d s`.
+    /// Straight line in joint space: `q0 + d s`.
     Joints { q0: DVector<f64>, d: DVector<f64> },
     /// The quintic between two joint jets.
     Bridge { from: JointJet, to: JointJet },
 }
 
-/// One move: its way and the joints at both ends.
+/// One move: its path and the joints at both ends.
 #[derive(Debug, Clone)]
 pub(crate) struct Leg {
     /// The move.
@@ -43,21 +43,21 @@ pub(crate) struct Leg {
     pub(crate) length: f64,
     pub(crate) q0: DVector<f64>,
     pub(crate) q1: DVector<f64>,
-    /// Knot of a spline: the next leg goes on smoothly.
+    /// Whether the end is a knot of a spline, after which the next leg continues smoothly.
     pub(crate) smooth: bool,
 }
 
-/// Where the arm is, and what is said next.
+/// Current joint values and the next item of the program.
 pub(crate) struct Start {
     pub(crate) q: DVector<f64>,
-    /// First item that is still to be done.
+    /// Index of the first item still to be done.
     pub(crate) first: usize,
-    /// Whether `q` is where the program is, not only near it.
+    /// Whether `q` is the exact start of the program, not only near it.
     pub(crate) known: bool,
 }
 
 impl Start {
-    /// Before the first move, once all numbers are checked.
+    /// State before the first move; checks all numbers.
     pub(crate) fn of(items: &[Item], arm: &ProgramArm<'_>) -> Result<Self, PathError> {
         for item in items {
             item.check().map_err(|source| PathError::out_of_range(item, source))?;
@@ -74,13 +74,13 @@ impl Start {
     }
 }
 
-/// The arm and its workspaces while legs are made.
+/// The arm and its workspaces for building legs.
 pub(crate) struct Legs<'m> {
     pub(crate) arm: ProgramArm<'m>,
     pub(crate) options: PathOptions,
     branches: Branches<'m>,
     followers: Vec<(Pose, Follower<'m>)>,
-    /// Joint that stays on paths of the tool.
+    /// Joint held on tool paths.
     hold: Option<usize>,
 }
 
@@ -90,13 +90,14 @@ impl<'m> Legs<'m> {
         Self { arm: arm.clone(), options: options.clone(), branches, followers: Vec::new(), hold }
     }
 
-    /// The flange with the tool of a move.
+    /// Frame of the tool of a move on the flange.
     pub(crate) fn tool_frame(&self, of: &Move) -> Frame {
         let X_FT = of.X_FT.unwrap_or(self.arm.X_FT);
         Frame { X_BF: self.arm.flange.X_BF * X_FT, ..self.arm.flange.clone() }
     }
 
-    /// The follower of a frame: one for each tool, so that a redundant arm holds the same joints.
+    /// Returns the follower of a frame: one per tool, so that a redundant arm always holds the same
+    /// joints.
     pub(crate) fn follower(&mut self, frame: &Frame, q: &DVector<f64>) -> &mut Follower<'m> {
         let found = self.followers.iter().position(|(X, _)| *X == frame.X_BF);
         let k = found.unwrap_or_else(|| {
@@ -106,7 +107,7 @@ impl<'m> Legs<'m> {
         &mut self.followers[k].1
     }
 
-    /// Names of joints that stay although they could move the tool.
+    /// Names of joints that are held although they could move the tool.
     pub(crate) fn held(&self) -> Vec<String> {
         let mut held: Vec<usize> = self.followers.iter().flat_map(|(_, follower)| follower.held()).collect();
         held.sort_unstable();
@@ -119,7 +120,8 @@ impl<'m> Legs<'m> {
         self.branches.pose(frame, q)
     }
 
-    /// Legs from here to the next stop; `k` is left behind the last of them.
+    /// Builds the legs up to the next stop; afterwards `k` is the index of the item after the last
+    /// leg.
     pub(crate) fn up_to_stop(
         &mut self,
         items: &[Item],
@@ -149,7 +151,7 @@ impl<'m> Legs<'m> {
         Ok(legs)
     }
 
-    /// The way of one move; nothing if the arm is there already.
+    /// Builds the leg of one move; `None` if the arm is already at the target.
     pub(crate) fn leg(&mut self, of: &Move, start: &mut Start) -> Result<Option<Leg>, PathError> {
         if of.kind == MoveKind::Joint {
             return self.joint_leg(of, start);
@@ -164,7 +166,7 @@ impl<'m> Legs<'m> {
         let X_MB = self.arm.X_MW * of.X_WB;
         let X1 = match &of.to {
             Target::Pose { X_BT, .. } => X_MB * X_BT,
-            // A line to joint values (movel with a list of joints): to the pose that they have.
+            // A line to joint values (movel with a list of joints) goes to their pose.
             Target::Joints(values) => {
                 let q = self.with_axes(of, values, &self.arm.rest.clone())?;
                 let frame = self.tool_frame(of);
@@ -180,7 +182,7 @@ impl<'m> Legs<'m> {
             .map_err(|source| PathError::Arc { line: of.line, statement: of.statement.clone(), source })
     }
 
-    /// Follows a curve once to its end, for the joints there.
+    /// Follows a curve once to find the joints at its end.
     fn tool_leg(
         &mut self,
         of: &Move,
@@ -202,7 +204,7 @@ impl<'m> Legs<'m> {
         Ok(Some(Leg { of: of.clone(), way: Way::Tool(way), length, q0, q1, smooth: false }))
     }
 
-    /// Values of the controller's axes put into all coordinates.
+    /// Inserts values of the controller's axes into the vector of all coordinates.
     fn with_axes(&self, of: &Move, values: &[f64], q: &DVector<f64>) -> Result<DVector<f64>, PathError> {
         let (found, axes) = (values.len(), self.arm.axes.len());
         if found > axes {
@@ -240,7 +242,7 @@ impl<'m> Legs<'m> {
         Ok(Some(Leg { of: of.clone(), way, length, q0, q1, smooth: false }))
     }
 
-    /// Length of the tool's path in a joint move, m, by chords.
+    /// Length of the TCP path in a joint move, by chords (m).
     fn travel(&mut self, frame: &Frame, q0: &DVector<f64>, step: &DVector<f64>) -> f64 {
         const CHORDS: usize = 16;
         let mut point = |k: usize| {
@@ -251,16 +253,16 @@ impl<'m> Legs<'m> {
         points.windows(2).map(|pair| (pair[1] - pair[0]).norm()).sum()
     }
 
-    /// Joints where a way ends.
+    /// Joints at the end of a path.
     fn end_of(&mut self, way: &ToolWay, q0: &DVector<f64>) -> Result<DVector<f64>, Blocked> {
         let follower = self.follower(&way.frame, q0);
         let begun = follower.start(way, 0.0, q0)?;
         Ok(follower.advance(way, 0.0, &begun, way.curve.length())?.q)
     }
 
-    /// How the joints that are left over move along a way so that it ends as the rule of the
-    /// options wants, or part of the way there; and the joints at its end. None without a rule, or
-    /// if nothing better is found.
+    /// Motion of the redundant joints along a path towards the posture of the options' rule, or
+    /// part of the way there; and the joints at its end. `None` without a rule, or if no better
+    /// posture is found.
     fn guided(
         &mut self,
         of: &Move,
@@ -294,10 +296,10 @@ impl<'m> Legs<'m> {
         None
     }
 
-    /// How far a joint may go by itself along a way without slowing the tool: a fifth of its speed
-    /// and acceleration.
+    /// Maximum change of a redundant joint along a path that does not slow the tool: a fifth of its
+    /// velocity and acceleration limits.
     fn room(&self, of: &Move, k: usize, length: f64) -> f64 {
-        // Largest derivatives of the quintic from rest to rest over its length.
+        // Peak derivatives of the quintic from rest to rest over its length.
         const RATE: f64 = 1.875;
         const SECOND: f64 = 5.7735;
         let (bounds, speed) = (&self.arm.bounds[k], of.speed.linear_m_s.unwrap_or(SPEED));
@@ -306,7 +308,7 @@ impl<'m> Legs<'m> {
         by_rate.min(by_second)
     }
 
-    /// Pieces of a spline through the targets of moves that follow each other.
+    /// Legs of a spline through the targets of consecutive moves.
     pub(crate) fn spline(&mut self, group: &[&Move], start: &mut Start) -> Result<Vec<Leg>, PathError> {
         let frame = self.tool_frame(group[0]);
         let mut poses = vec![self.pose(&frame, &start.q)];
@@ -332,8 +334,7 @@ impl<'m> Legs<'m> {
     }
 }
 
-/// Moves from `k` on that are knots of one spline: same tool and base kinds of moves that follow
-/// each other.
+/// Moves from `k` on that are knots of one spline: consecutive spline moves with the same tool.
 pub(crate) fn spline_group(items: &[Item], k: usize) -> Vec<&Move> {
     let knot = |item: &'_ Item| matches!(item, Item::Move(of) if of.kind == MoveKind::Spline);
     let mut group: Vec<&Move> = Vec::new();
@@ -351,7 +352,7 @@ pub(crate) fn spline_group(items: &[Item], k: usize) -> Vec<&Move> {
     group
 }
 
-/// The natural cubic spline through positions over their chords, orientations with continuous
+/// The natural cubic spline through positions over chord length; orientations have continuous
 /// rates.
 fn spline_curves(poses: &[Pose]) -> Vec<ToolCurve> {
     let p: Vec<Vector3<f64>> = poses.iter().map(|X| X.translation.vector).collect();
@@ -380,7 +381,7 @@ fn spline_curves(poses: &[Pose]) -> Vec<ToolCurve> {
     (0..n).map(|k| ToolCurve::between(&jet(k), &jet(k + 1), h[k])).collect()
 }
 
-/// Second derivatives at the knots of the natural cubic spline (Thomas' algorithm).
+/// Second derivatives at the knots of the natural cubic spline (Thomas algorithm).
 fn natural_second_derivatives(p: &[Vector3<f64>], h: &[f64]) -> Vec<Vector3<f64>> {
     let n = h.len();
     let mut second = vec![Vector3::zeros(); n + 1];
@@ -397,7 +398,7 @@ fn natural_second_derivatives(p: &[Vector3<f64>], h: &[f64]) -> Vec<Vector3<f64>
     second
 }
 
-/// A path that cannot be followed, as a sentence.
+/// Error for a path that cannot be followed, with the reason as a sentence.
 pub(crate) fn blocked_error(of: &Move, curve: &ToolCurve, blocked: Blocked) -> PathError {
     let part = 100.0 * blocked.s / curve.length();
     let p = curve.at(blocked.s).X.translation.vector;

@@ -1,10 +1,10 @@
-//! Motions that are told by the path of a tool: a program of moves, the geometry between its
-//! targets, the joints along it, and the time law.
+//! Motions programmed by a tool path: a program of moves, the geometry between its targets, the
+//! joints along it, and the time law.
 //!
-//! * [`program`]: what a robot program or a motion file asks for, as values: moves, targets,
+//! * [`program`]: the request of a robot program or a motion file as values: moves, targets,
 //!   frames, speeds, blends.
 //!
-//! Not here: text of programs and files, link bending.
+//! Not here: parsing of programs and files, link deflection.
 #![allow(non_snake_case, reason = "monogram notation: X_WT, R_AB; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test stops at the first failure"))]
 

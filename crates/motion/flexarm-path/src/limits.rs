@@ -1,4 +1,4 @@
-//! What holds at the stations of a route: bounds of joints, torques and the tool, and which of them
+//! Bounds at the stations of a route: joint limits, torques and tool limits, and which of them
 //! slows a move.
 
 use flexarm_kinematics::{Data, State, inverse_dynamics};
@@ -10,45 +10,46 @@ use crate::plan::{JointBounds, ProgramArm, SlowedBy};
 use crate::route::{Piece, Route, Station};
 use crate::time_law::{Bound, Law, PathPoint};
 
-/// Points along a route of few stations, and least and most of them for each station.
+/// Number of points along a route with few stations, and minimum and maximum number of parts per
+/// station.
 const POINTS: usize = 2000;
 const LEAST_PARTS: usize = 2;
 const MOST_PARTS: usize = 8;
-/// Parts of the time between two knots of a law at which its limits are looked at.
+/// Fractions of the time between two knots of a law at which its limits are checked.
 const CHECKED: [f64; 4] = [0.0, 0.25, 0.5, 0.75];
-/// A limit is near from this part of it on, in squared speeds.
+/// A limit is near above this fraction of it, in squared speeds.
 const NEAR: f64 = 0.98;
 
-/// What limits the speed at a station beyond the program, with the greatest squared speed.
+/// Tightest limit of the robot at a station (not of the program), with the maximum squared speed.
 #[derive(Debug, Clone)]
 pub(crate) struct Cap {
     pub(crate) x: f64,
     pub(crate) by: SlowedBy,
 }
 
-/// Bounds of all stations, what the program asks, and the tightest limit of the robot.
+/// Bounds of all stations, programmed speeds, and the tightest limits of the robot.
 pub(crate) struct Limited {
     pub(crate) points: Vec<PathPoint>,
     pub(crate) programmed: Vec<f64>,
     pub(crate) caps: Vec<Option<Cap>>,
 }
 
-/// Limits at places of a route.
+/// Evaluates the limits at places of a route.
 pub(crate) struct Limits<'a> {
     route: &'a Route,
     arm: &'a ProgramArm<'a>,
     torques: Option<Torques>,
-    /// Accelerations of joints whose jerk is not told rise in this time, s; `None`: no jerk is
-    /// looked at.
+    /// Rise time of the acceleration of joints without a given jerk limit (s); `None`: jerks are
+    /// not evaluated.
     rise: Option<f64>,
 }
 
-/// Joints and the tool at a place, by the parameter.
+/// Joints and tool at a place, with derivatives by the parameter.
 struct There<'a> {
     q: &'a DVector<f64>,
     d: &'a DVector<f64>,
     dd: &'a DVector<f64>,
-    /// Not looked at where no jerk is.
+    /// Third derivative; `None` where jerks are not evaluated.
     ddd: Option<DVector<f64>>,
     tool: Option<[Vector6<f64>; 2]>,
     travel: Option<f64>,
@@ -60,7 +61,7 @@ impl<'a> Limits<'a> {
         Self { route, arm, torques, rise }
     }
 
-    /// What holds at all stations; one between two pieces has the bounds of both.
+    /// Bounds at all stations; a station between two pieces has the bounds of both.
     pub(crate) fn at_stations(&mut self) -> Limited {
         let route = self.route;
         let n = route.stations.len();
@@ -88,7 +89,7 @@ impl<'a> Limits<'a> {
         Limited { points, programmed, caps }
     }
 
-    /// The points of all stations with more between them, so that short routes have many.
+    /// Adds points between the stations, so that short routes have many.
     pub(crate) fn divided(&mut self, stations: &[PathPoint]) -> Vec<PathPoint> {
         let parts = (POINTS / stations.len()).clamp(LEAST_PARTS, MOST_PARTS);
         let mut points = Vec::with_capacity(parts * stations.len());
@@ -104,11 +105,11 @@ impl<'a> Limits<'a> {
         points
     }
 
-    /// By how much a law must be slower to keep all limits at its knots and between them; 1 or
-    /// more.
+    /// Returns the factor by which a law must be slower to keep all limits at its knots and between
+    /// them; at least 1.
     ///
-    /// * `points`: what holds along the route. Where they differ little from each other, or are far
-    ///   from being reached, the limits between them are not looked at.
+    /// * `points`: bounds along the route. Where adjacent ones are almost equal, or far from being
+    ///   reached, the limits between them are not evaluated.
     pub(crate) fn slowing(&mut self, law: &Law, points: &[PathPoint]) -> f64 {
         let stations: Vec<f64> = self.route.stations.iter().map(|station| station.s).collect();
         let mut most: f64 = 1.0;
@@ -131,7 +132,7 @@ impl<'a> Limits<'a> {
         most
     }
 
-    /// What holds at a parameter of the interval between station `k` and the next.
+    /// Bounds at a parameter of the interval between station `k` and the next.
     pub(crate) fn at(&mut self, k: usize, s: f64) -> Place {
         let piece = &self.route.pieces[self.route.pieces.partition_point(|piece| piece.stations[1] <= k)];
         let (jet, ddd) = self.route.joints(k, s);
@@ -175,7 +176,7 @@ impl<'a> Limits<'a> {
     }
 }
 
-/// What is collected at one station.
+/// Bounds collected at one station.
 struct AtStation<'a> {
     point: &'a mut PathPoint,
     programmed: &'a mut f64,
@@ -184,7 +185,7 @@ struct AtStation<'a> {
 }
 
 impl AtStation<'_> {
-    /// The robot allows `x` at most.
+    /// The robot allows a squared speed of at most `x`.
     fn limit(&mut self, x: f64, by: impl FnOnce() -> SlowedBy) {
         if x.is_finite() && self.cap.as_ref().is_none_or(|cap| x < cap.x) {
             *self.cap = Some(Cap { x, by: by() });
@@ -192,7 +193,7 @@ impl AtStation<'_> {
         self.point.x_max = self.point.x_max.min(x);
     }
 
-    /// The program allows `x` at most.
+    /// The program allows a squared speed of at most `x`.
     fn program(&mut self, x: f64) {
         *self.programmed = self.programmed.min(x);
         self.point.x_max = self.point.x_max.min(x);
@@ -221,7 +222,7 @@ impl AtStation<'_> {
         }
     }
 
-    /// Jerk of a joint with its derivatives by the parameter.
+    /// Adds the jerk bound of a joint, from its derivatives by the parameter.
     fn jerk(&mut self, [d, dd, ddd]: [f64; 3], bounds: &JointBounds, rise: f64, name: &dyn Fn() -> String) {
         let most = bounds.jerk.unwrap_or(bounds.acceleration / rise);
         if (d == 0.0 && dd == 0.0 && ddd == 0.0) || !most.is_finite() {
@@ -239,7 +240,7 @@ impl AtStation<'_> {
         let speed = &piece.speed;
         let three = |six: &Vector6<f64>, row: usize| Vector3::new(six[row], six[row + 1], six[row + 2]);
         let (v, w, dv, dw) = (three(V, 0), three(V, 3), three(A, 0), three(A, 3));
-        // A list of bounds has the same length at all stations of a piece.
+        // The list of bounds must have the same length at all stations of a piece.
         let along = |v: &Vector3<f64>, dv: &Vector3<f64>, most: f64| match v.norm() {
             norm if norm > 1e-9 => Bound { a: norm, b: v.dot(dv) / norm, low: -most, high: most },
             _ => Bound { a: 0.0, b: 0.0, low: -most, high: most },
@@ -259,8 +260,8 @@ impl AtStation<'_> {
         }
         if let Some(most) = speed.angular_rad_s.filter(|_| w.norm() > 1e-9) {
             let x = (most / w.norm()).powi(2);
-            // Where the tool travels as well, turning slows the path; where it only turns, it is
-            // what was programmed.
+            // Where the tool also travels, its rotation slows the path; where it only turns, the
+            // rotation speed is the programmed speed.
             if v.norm() > 1e-9 && speed.linear_m_s.is_some() {
                 self.limit(x, || SlowedBy::Turning);
             } else {
@@ -303,7 +304,8 @@ impl Torques {
     }
 }
 
-/// The tool's derivatives at `s` of an interval of length `h`: the cubic through those at its ends.
+/// Derivatives of the tool pose at `s` of an interval of length `h`: the cubic through those at its
+/// ends.
 fn cubic(from: &ToolJet, to: &ToolJet, h: f64, s: f64) -> [Vector6<f64>; 2] {
     let (step, z) = ((to.V - from.V) / h, s / h);
     let c2 = step * 3.0 - from.A * 2.0 - to.A;

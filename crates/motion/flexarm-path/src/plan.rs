@@ -1,5 +1,4 @@
-//! From a program to joints over time: the public face of the planner, what it is told and what it
-//! tells.
+//! Public interface of the planner: converts a program to joint motions over time.
 
 use flexarm_kinematics::{ControllerAxes, Frame, Model, NullSpaceRule};
 use flexarm_spatial::Pose;
@@ -14,34 +13,34 @@ use crate::range::{OutOfRange, check_end};
 use crate::route::Route;
 use crate::schedule::{Knot, Schedule};
 
-/// A joint that moves less in all of a motion stays, rad or m.
+/// A joint that moves less than this during a whole motion is at rest (rad or m).
 const STILL: f64 = 1e-12;
 
-/// What a joint may do while it follows a program.
+/// Limits of a joint while it follows a program.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointBounds {
-    /// rad/s or m/s, positive, may be infinite.
+    /// Maximum speed (rad/s or m/s), positive, may be infinite.
     pub velocity: f64,
-    /// rad/s² or m/s², positive.
+    /// Maximum acceleration (rad/s² or m/s²), positive.
     pub acceleration: f64,
-    /// N m or N of the rigid arm, positive; `None`: not looked at.
+    /// Maximum torque (N m) or force (N) of the rigid arm, positive; `None`: not checked.
     pub torque: Option<f64>,
-    /// rad/s³ or m/s³, positive. Where it is told of some joint, the accelerations of the others
-    /// rise to their bounds in [`PathOptions::rise_s`] or more.
+    /// Maximum jerk (rad/s³ or m/s³), positive. If any joint has one, the accelerations of the
+    /// others rise to their limits in at least [`PathOptions::rise_s`].
     pub jerk: Option<f64>,
 }
 
-/// How paths are resolved.
+/// Resolution of paths.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PathOptions {
-    /// Points of the time law are no further apart than this, m of path.
+    /// Maximum spacing of the points of the time law (m of path).
     pub spacing_m: f64,
-    /// The joints leave the path by no more than this between points, m and rad.
+    /// Maximum deviation of the joints from the path between points (m and rad).
     pub chord_m: f64,
-    /// Accelerations rise and fall in this time, s; 0: they jump.
+    /// Rise and fall time of accelerations (s).
     pub rise_s: f64,
-    /// What an arm with more joints than the path needs does with them: it moves them along towards
-    /// the posture of this rule; they stay without it.
+    /// Null-space rule for an arm with more joints than the path needs: redundant joints move
+    /// towards its posture; without a rule they are held.
     pub rule: Option<NullSpaceRule>,
 }
 
@@ -51,54 +50,54 @@ impl Default for PathOptions {
     }
 }
 
-/// The arm that runs a program, as its controller sees it.
+/// The arm that runs a program, in terms of its controller.
 #[derive(Debug, Clone)]
 pub struct ProgramArm<'m> {
-    /// Rigid arm.
+    /// Rigid-body model.
     pub model: &'m Model,
     /// Flange of the controller, F.
     pub flange: Frame,
-    /// The robot's own tool on it, `X_FT`, where the program tells none.
+    /// The robot's own tool on the flange, `X_FT`, used if the program gives none.
     pub X_FT: Pose,
-    /// The controller's world in the model's, `X_MW`.
+    /// Pose of the controller's world in the model's, `X_MW`.
     pub X_MW: Pose,
-    /// Coordinates in the order in which the controller counts its axes.
+    /// Coordinates in the order of the controller's axes.
     pub axes: Vec<usize>,
-    /// How it counts each of them; empty where its axes are the joints.
+    /// Definition of each controller axis; empty if the axes are the joints.
     pub controller: Vec<ControllerAxis>,
-    /// One for each independent coordinate.
+    /// Limits, one for each independent coordinate.
     pub bounds: Vec<JointBounds>,
-    /// All independent coordinates before the program; joints that it does not move stay there.
+    /// All independent coordinates before the program; joints that it does not move keep these
+    /// values.
     pub rest: DVector<f64>,
-    /// Whether the program begins there; otherwise it begins where its first move ends.
+    /// Whether the program starts at `rest`; otherwise it starts at the target of its first move.
     pub starts_at_rest: bool,
 }
 
-/// How a controller counts an axis. The joint is at
+/// Definition of a controller axis. The joint value is
 ///
 /// ```text
 /// q = zero + sense a + factor a_other
 /// ```
-/// where `a` is the value of the axis and `a_other` that of an axis before it: arms whose third
-/// axis is driven by a rod count it against the horizontal and not against the link that carries
-/// it.
+/// where `a` is the value of the axis and `a_other` that of an earlier axis: arms whose third axis
+/// is driven by a rod measure it against the horizontal and not against the previous link.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ControllerAxis {
-    /// 1 or -1.
+    /// Sign, 1 or -1.
     pub sense: f64,
-    /// Value of the joint where the axis is at zero (rad or m).
+    /// Joint value at axis value zero (rad or m).
     pub zero: f64,
-    /// Number of the other axis, from 0, and its factor.
+    /// Index of the other axis, from 0, and its factor.
     pub relative: Option<(usize, f64)>,
 }
 
 impl ControllerAxis {
-    /// The joint itself.
+    /// Axis value equal to the joint value.
     pub const SAME: Self = Self { sense: 1.0, zero: 0.0, relative: None };
 }
 
 impl ProgramArm<'_> {
-    /// Puts values of the controller's first axes into all coordinates.
+    /// Sets the coordinates of the controller's first axes from axis values.
     pub fn set_axes(&self, values: &[f64], q: &mut DVector<f64>) {
         for (n, (value, &k)) in values.iter().zip(&self.axes).enumerate() {
             let axis = self.controller.get(n).unwrap_or(&ControllerAxis::SAME);
@@ -107,21 +106,21 @@ impl ProgramArm<'_> {
         }
     }
 
-    /// Values of the controller's axes for all coordinates: the inverse of
+    /// Returns the values of the controller's axes for all coordinates: the inverse of
     /// [`ProgramArm::set_axes`].
     pub fn axis_values(&self, q: &DVector<f64>) -> Vec<f64> {
         let mut values: Vec<f64> = Vec::with_capacity(self.axes.len());
         for (n, &k) in self.axes.iter().enumerate() {
             let axis = self.controller.get(n).unwrap_or(&ControllerAxis::SAME);
-            // An axis is relative to one before it.
+            // An axis is relative to an earlier one.
             let other = axis.relative.and_then(|(other, factor)| Some(factor * values.get(other)?));
             values.push((q[k] - axis.zero - other.unwrap_or(0.0)) / axis.sense);
         }
         values
     }
 
-    /// Zeros and senses of six joints, for words that speak of the controller's axes. What is
-    /// measured against another axis decides none of them.
+    /// Zeros and senses of six joints, for configuration words that refer to the controller's axes.
+    /// Coupling to another axis is ignored.
     pub(crate) fn controller_axes(&self, joints: [usize; 6]) -> ControllerAxes {
         let of = |k: usize| {
             let n = self.axes.iter().position(|&axis| axis == k);
@@ -132,76 +131,77 @@ impl ProgramArm<'_> {
     }
 }
 
-/// What became of a move.
+/// Result of one move.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlannedMove {
     /// Line in the program.
     pub line: usize,
     /// Statement.
     pub statement: String,
-    /// First and last moment, s; with a blend, the middle of it.
+    /// Start and end time (s); with a blend, the time at its middle.
     pub span_s: [f64; 2],
-    /// Greatest speed of the tool centre point on its path, m/s (`None` for joint moves).
+    /// Maximum speed of the tool centre point on its path, m/s (`None` for joint moves).
     pub top_m_s: Option<f64>,
     /// Programmed speed, m/s.
     pub programmed_m_s: Option<f64>,
-    /// Where it is slower than programmed because a limit demands it: the worst place.
+    /// Place where a limit makes it slowest relative to the programmed speed.
     pub slowed: Option<Slowed>,
-    /// Least singular value of the Jacobian on the way, m/rad, with its moment, s; tool paths only.
+    /// Minimum singular value of the Jacobian on the path, m/rad, with its time, s; tool paths
+    /// only.
     pub least_sigma: Option<(f64, f64)>,
-    /// Distance from the target at which its corner is left, m; 0 at a stop.
+    /// Distance from the target at which the path enters the blend, m; 0 at a stop.
     pub blend_m: f64,
 }
 
 /// A place where a limit of the robot slows a move.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slowed {
-    /// s from the start of the motion.
+    /// Time from the start of the motion (s).
     pub time_s: f64,
-    /// Part of the programmed speed, or of the joints' own limits.
+    /// Fraction of the programmed speed, or of the joints' own limits.
     pub part: f64,
-    /// What demands it.
+    /// The limit.
     pub by: SlowedBy,
 }
 
-/// What slows a move.
+/// Limit that slows a move.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SlowedBy {
     /// Speed of a joint.
     JointSpeed(String),
-    /// Acceleration of a joint where the path bends.
+    /// Acceleration of a joint where the path is curved.
     JointAcceleration(String),
     /// Torque of a joint.
     JointTorque(String),
     /// Jerk of a joint.
     JointJerk(String),
-    /// Turning of the tool.
+    /// Rotation of the tool.
     Turning,
-    /// Acceleration of the tool across its path.
+    /// Acceleration of the tool normal to its path.
     PathAcceleration,
 }
 
-/// A program as a motion.
+/// A program planned as a motion.
 #[derive(Debug, Clone)]
 pub struct Planned {
     /// All actuated joints over time.
     pub trajectory: Trajectory,
-    /// Move by move.
+    /// Results by move.
     pub moves: Vec<PlannedMove>,
-    /// Corners that are stops although a blend was asked for: line and why.
+    /// Corners at which the tool stops although a blend was requested: line and reason.
     pub stops: Vec<(usize, String)>,
-    /// Joints that stay although they could move the tool (redundant arms).
+    /// Joints held although they could move the tool (redundant arms).
     pub held: Vec<String>,
 }
 
-/// A program that this arm cannot run.
+/// Error for a program that the arm cannot run.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PathError {
-    /// Nothing moves.
+    /// The program has no move.
     #[error("the program has no move")]
     NoMove,
-    /// A tool path from nowhere.
+    /// Tool path from an unknown start.
     #[error(
         "line {line}: {statement}: the program begins with a move of the tool, and where it starts is not known: begin with a \
          joint move, or tell a start"
@@ -212,71 +212,71 @@ pub enum PathError {
         /// Statement.
         statement: String,
     },
-    /// More axes than the arm has.
+    /// More axis values than the arm has axes.
     #[error("line {line}: {statement}: {found} axis values for an arm of {axes} axes")]
     Axes {
         /// Line.
         line: usize,
         /// Statement.
         statement: String,
-        /// Values.
+        /// Number of values.
         found: usize,
-        /// Axes of the arm.
+        /// Number of axes of the arm.
         axes: usize,
     },
-    /// No joint values.
+    /// No joint values reach the target.
     #[error("line {line}: {statement}: no joint values bring the tool there: {why}")]
     Unreachable {
         /// Line.
         line: usize,
         /// Statement.
         statement: String,
-        /// What was found.
+        /// Reason.
         why: String,
     },
-    /// A path that leads out of reach or through a singular pose.
+    /// A path that leaves the workspace or passes a singular pose.
     #[error("line {line}: {statement}: {why}")]
     Blocked {
         /// Line.
         line: usize,
         /// Statement.
         statement: String,
-        /// Where and why, as numbers.
+        /// Place and cause as numbers.
         blocked: Blocked,
         /// The same as a sentence.
         why: String,
     },
-    /// Three points that are no circle.
+    /// Three points that do not define a circle.
     #[error("line {line}: {statement}: {source}")]
     Arc {
         /// Line.
         line: usize,
         /// Statement.
         statement: String,
-        /// Which.
+        /// Cause.
         source: ArcError,
     },
-    /// A number that is none, or outside of what a robot can do.
+    /// Number that is not finite, or outside the range of a robot.
     #[error("line {line}: {statement}: {source}")]
     Value {
         /// Line.
         line: usize,
         /// Statement.
         statement: String,
-        /// Which.
+        /// Cause.
         source: OutOfRange,
     },
-    /// The time law.
+    /// No time law was found.
     #[error("line {line}: {statement}: {why}")]
     Law {
         /// Line of the first move up to the next stop.
         line: usize,
         /// Statement.
         statement: String,
-        /// Why.
+        /// Reason.
         why: String,
     },
-    /// Joints over time.
+    /// The joint trajectory is invalid.
     #[error(transparent)]
     Trajectory(#[from] TrajectoryError),
 }
@@ -290,17 +290,17 @@ impl PathError {
     }
 }
 
-/// The motion that a program asks for.
+/// Plans the motion of a program.
 ///
 /// # Errors
-/// [`PathError`]: targets out of reach, paths through singular poses, statements that contradict each other.
+/// [`PathError`] for targets out of reach, paths through singular poses, contradictory statements.
 pub fn plan(program: &Program, arm: &ProgramArm<'_>, options: &PathOptions) -> Result<Planned, PathError> {
     let moving = coordinates_of(arm.model, &arm.flange);
     if moving.len() != 7 {
         return plan_holding(program, arm, options, None);
     }
-    // Of seven joints one stays while the tool follows its path: the best at the start, or the
-    // first with which the path can be run.
+    // Of seven joints one is held while the tool follows its path: the best one at the start, or
+    // the first one with which the path can be run.
     let first = plan_holding(program, arm, options, None);
     if !matches!(first, Err(PathError::Blocked { .. })) {
         return first;
@@ -309,8 +309,8 @@ pub fn plan(program: &Program, arm: &ProgramArm<'_>, options: &PathOptions) -> R
     others.into_iter().find(Result::is_ok).unwrap_or(first)
 }
 
-/// The same with a joint that stays on paths of the tool; `None`: the one without which the rest
-/// moves the tool best.
+/// Plans with a given joint held on tool paths; `None`: the joint without which the minimum
+/// singular value is largest.
 fn plan_holding(
     program: &Program,
     arm: &ProgramArm<'_>,
@@ -319,7 +319,7 @@ fn plan_holding(
 ) -> Result<Planned, PathError> {
     let mut legs = Legs::new(arm, options, held);
     let mut knots: Vec<Knot> = Vec::new();
-    // A dwell before the first target is known is one at that target.
+    // A dwell before the first target is known takes place at that target.
     let mut waiting = 0.0;
     let (mut moves, mut stops, mut now) = (Vec::new(), Vec::new(), 0.0);
     let items = &program.items;
@@ -356,7 +356,7 @@ fn plan_holding(
     Ok(Planned { trajectory: trajectory(arm.model, knots)?, moves, stops, held })
 }
 
-/// Knots of all routes and dwells as curves.
+/// Builds curves from the knots of all routes and dwells.
 fn trajectory(model: &Model, mut knots: Vec<Knot>) -> Result<Trajectory, TrajectoryError> {
     knots.dedup_by(|next, knot| {
         let same = next.t - knot.t <= 1e-9;
@@ -388,7 +388,7 @@ pub(crate) fn through(model: &Model, knots: &[Knot]) -> Result<Trajectory, Traje
     Trajectory::through_knots(&times, &joints)
 }
 
-/// Does a joint move by no more than the rounding of Newton's method?
+/// Whether a joint moves by no more than the rounding error of Newton's method.
 fn stays(knots: &[Knot], joint: usize) -> bool {
     let range = knots
         .iter()

@@ -1,31 +1,31 @@
-//! Numbers of a program are finite and inside of what a robot can do, which bounds the work of
-//! planning.
+//! Checks that the numbers of a program are finite and within the range of a robot, which bounds
+//! the work of planning.
 
 use flexarm_spatial::Pose;
 use flexarm_trajectory::LONGEST;
 
 use crate::program::{Blend, Configuration, Item, Move, MoveKind, Target};
 
-/// Largest axis value, coordinate of a point, and angle of an arc (rad or m).
+/// Maximum axis value, coordinate of a point, and angle of an arc (rad or m).
 const FARTHEST: f64 = 1e4;
-/// Smallest and largest speed, acceleration, jerk, and part of them (SI units).
+/// Minimum and maximum speed, acceleration, jerk, and fraction of them (SI units).
 const RATES: [f64; 2] = [1e-6, 1e12];
 
-/// A number of a program that is outside of its range.
+/// A number of a program outside its range.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("{what} is {}, expected {} to {} ({unit})", short(*.value), short(.range[0]), short(.range[1]))]
 pub struct OutOfRange {
-    /// What the number is.
+    /// Name of the quantity.
     pub what: &'static str,
     /// The number.
     pub value: f64,
-    /// Smallest and largest value.
+    /// Minimum and maximum value.
     pub range: [f64; 2],
     /// Unit of the numbers.
     pub unit: &'static str,
 }
 
-/// A number without long rows of zeros.
+/// Formats a number without long rows of zeros.
 fn short(value: f64) -> String {
     let size = value.abs();
     if size.is_finite() && size != 0.0 && !(1e-4..1e6).contains(&size) {
@@ -42,7 +42,7 @@ fn within(what: &'static str, unit: &'static str, value: f64, range: [f64; 2]) -
 /// Checks axis values (rad or m).
 ///
 /// # Errors
-/// [`OutOfRange`]: the first that is no number or too large.
+/// [`OutOfRange`] for the first value that is not finite or too large.
 pub fn check_axes(values: &[f64]) -> Result<(), OutOfRange> {
     values.iter().try_for_each(|value| within("an axis value", "rad or m", *value, [-FARTHEST, FARTHEST]))
 }
@@ -64,19 +64,19 @@ pub(crate) fn check_end(time: f64) -> Result<(), OutOfRange> {
     within("the time at which the motion ends", "s", time, [0.0, LONGEST])
 }
 
-/// Checks a speed, acceleration, jerk, or part of them (SI units).
+/// Checks a speed, acceleration, jerk, or fraction of them (SI units).
 ///
 /// # Errors
-/// [`OutOfRange`].
+/// [`OutOfRange`] if the value is outside the range.
 pub fn check_rate(what: &'static str, unit: &'static str, value: f64) -> Result<(), OutOfRange> {
     within(what, unit, value, RATES)
 }
 
 impl Item {
-    /// Checks that all numbers are inside of what a robot can do.
+    /// Checks that all numbers are within the range of a robot.
     ///
     /// # Errors
-    /// [`OutOfRange`]: the first that is not.
+    /// [`OutOfRange`] for the first one that is not.
     pub fn check(&self) -> Result<(), OutOfRange> {
         match self {
             Self::Move(of) => of.check(),
@@ -86,10 +86,10 @@ impl Item {
 }
 
 impl Move {
-    /// Checks that all numbers are inside of what a robot can do.
+    /// Checks that all numbers are within the range of a robot.
     ///
     /// # Errors
-    /// [`OutOfRange`]: the first that is not.
+    /// [`OutOfRange`] for the first one that is not.
     pub fn check(&self) -> Result<(), OutOfRange> {
         match &self.to {
             Target::Joints(values) => check_axes(values)?,

@@ -1,4 +1,4 @@
-//! From one stop to the next: legs joined by blends, and the joints at points along all of it.
+//! Routes from one stop to the next: legs joined by blends, with the joints at points along them.
 
 use flexarm_spatial::{Pose, rotation_vector};
 use nalgebra::{DVector, Vector3};
@@ -10,25 +10,26 @@ use crate::legs::{Leg, Legs, Way, blocked_error};
 use crate::plan::{PathError, PathOptions};
 use crate::program::{Blend, Speed};
 
-/// Two legs go on without a corner if their derivatives agree to this (m/m, rad/m).
+/// Two legs join without a corner if their derivatives agree to this (m/m, rad/m).
 const ALIGNED: f64 = 1e-6;
-/// And without a jump of the curvature if their second derivatives agree to this (1/m, rad/m²).
+/// And without a curvature jump if their second derivatives agree to this (1/m, rad/m²).
 const CURVED: f64 = 1e-6;
-/// Cosine between two tangents below which a corner turns back: within 10 degrees.
+/// A corner reverses the path if the cosine between its tangents is below this (within 10 degrees).
 const TURNED_BACK: f64 = -0.985;
-/// Why a path without a corner has a stop.
+/// Reason for a stop on a path without a corner.
 const CURVATURE: &str = "the curvature of the path jumps, and joints with a bound of their jerk pass that only at rest";
-/// No blend is shorter than this, m.
+/// Minimum length of a blend (m).
 const SHORTEST_BLEND: f64 = 1e-7;
-/// Acceleration with which a blend by speed is measured where the program tells none, m/s².
+/// Deceleration assumed for a blend by speed if the program gives none (m/s²).
 const BRAKING: f64 = 2.0;
-/// Least number of intervals of a piece.
+/// Minimum number of intervals of a piece.
 const LEAST_INTERVALS: usize = 24;
-/// The same of a piece shorter than the spacing: programs of milling have many.
+/// Minimum number of intervals of a piece shorter than the spacing, of which milling programs have
+/// many.
 const LEAST_OF_SHORT: usize = 6;
-/// Most of them before the path is refined.
+/// Maximum number of intervals before the path is refined.
 const MOST_INTERVALS: usize = 4000;
-/// Most halvings of an interval.
+/// Maximum number of halvings of an interval.
 const HALVINGS: usize = 12;
 
 /// A point of the route.
@@ -38,25 +39,25 @@ pub(crate) struct Station {
     pub(crate) s: f64,
     pub(crate) q: DVector<f64>,
     pub(crate) d: DVector<f64>,
-    /// Second derivative of the piece that ends here and of the one that begins here.
+    /// Second derivatives of the piece that ends here and of the one that begins here.
     pub(crate) before: DVector<f64>,
     pub(crate) after: DVector<f64>,
 }
 
-/// A stretch with one way and one set of speeds.
+/// Section with one path and one set of speeds.
 #[derive(Debug, Clone)]
 pub(crate) struct Piece {
-    /// Leg that it belongs to, and for a blend the next one.
+    /// Leg that it belongs to; a blend belongs to the leg before it.
     pub(crate) leg: usize,
     pub(crate) is_blend: bool,
     /// First and last station.
     pub(crate) stations: [usize; 2],
-    /// The tool's derivatives at the stations; empty for joint moves.
+    /// Tool poses and derivatives at the stations; empty for joint moves.
     pub(crate) tool: Vec<ToolJet>,
-    /// Way of the tool for each unit of the parameter (m/m) at the stations of a joint move whose
-    /// tool has a programmed speed.
+    /// Tool travel per unit of the parameter (m/m) at the stations of a joint move with a
+    /// programmed tool speed.
     pub(crate) travel: Vec<f64>,
-    /// Least singular value and its parameter from the start of the route.
+    /// Minimum singular value and its parameter from the start of the route.
     pub(crate) least_sigma: Option<(f64, f64)>,
     pub(crate) speed: Speed,
 }
@@ -64,13 +65,13 @@ pub(crate) struct Piece {
 /// Legs from one stop to the next.
 pub(crate) struct Route {
     pub(crate) legs: Vec<Leg>,
-    /// Distance before its end at which each leg is left.
+    /// Distance from the end of each leg at which the blend begins.
     pub(crate) blends: Vec<f64>,
     pub(crate) pieces: Vec<Piece>,
     pub(crate) stations: Vec<Station>,
 }
 
-/// What happens between two legs.
+/// Transition between two legs.
 enum Corner {
     Stop(&'static str),
     Smooth,
@@ -87,8 +88,8 @@ struct Stretch {
 }
 
 impl Route {
-    /// Routes of legs between which the program does not stop; a corner that cannot be passed is a
-    /// stop after all.
+    /// Builds routes from legs between which the program does not stop; a corner that cannot be
+    /// passed becomes a stop.
     pub(crate) fn all(
         owner: &mut Legs<'_>,
         legs: Vec<Leg>,
@@ -114,7 +115,7 @@ impl Route {
 
     fn new(owner: &mut Legs<'_>, legs: Vec<Leg>) -> Result<Self, PathError> {
         let n = legs.len();
-        // How much of each leg its two blends take.
+        // Length of each leg that its two blends take.
         let mut taken = vec![[0.0, 0.0]; n];
         for k in 0..n - 1 {
             if matches!(corner(&legs[k], &legs[k + 1], has_jerks(&owner.arm)), Corner::Blend) {
@@ -142,7 +143,7 @@ impl Route {
         between(&from, &to, h, (s - a.s).clamp(0.0, h))
     }
 
-    /// Puts stations along a stretch behind those that are there.
+    /// Appends stations along a stretch.
     fn add(&mut self, owner: &mut Legs<'_>, stretch: Stretch) -> Result<(), PathError> {
         let options = owner.options.clone();
         let (points, tool, sigma) = match &stretch.way {
@@ -181,7 +182,7 @@ impl Route {
     }
 }
 
-/// Speed of the tool centre point for each unit of the parameter, of joints that move.
+/// Speed of the tool centre point per unit of the parameter in a joint move.
 fn travel(owner: &mut Legs<'_>, leg: &Leg, points: &[(f64, JointJet)]) -> Vec<f64> {
     let frame = owner.tool_frame(&leg.of);
     let near = &leg.q0;
@@ -189,9 +190,9 @@ fn travel(owner: &mut Legs<'_>, leg: &Leg, points: &[(f64, JointJet)]) -> Vec<f6
     points.iter().map(|(_, jet)| follower.speed(jet)).collect()
 }
 
-/// What two legs that follow each other have between them.
+/// Classifies the transition between two consecutive legs.
 ///
-/// * `jerks`: joints whose jerks are bounded pass a jump of the curvature only at rest.
+/// * `jerks`: whether joint jerks are bounded, so that a curvature jump can be passed only at rest.
 fn corner(a: &Leg, b: &Leg, jerks: bool) -> Corner {
     if a.smooth {
         return Corner::Smooth;
@@ -222,9 +223,9 @@ fn corner(a: &Leg, b: &Leg, jerks: bool) -> Corner {
     }
 }
 
-/// How far before and behind their common target two legs are left and entered.
+/// Lengths of a blend before and after the common target of two legs.
 fn blend_reach(owner: &mut Legs<'_>, a: &Leg, b: &Leg) -> [f64; 2] {
-    // Each leg keeps a half for its other end.
+    // Each leg keeps half of its length for the blend at its other end.
     let most = [0.5 * a.length, 0.5 * b.length];
     let both = |reach: f64| [reach.min(most[0]), reach.min(most[1])];
     match a.of.blend {
@@ -244,10 +245,10 @@ fn blend_reach(owner: &mut Legs<'_>, a: &Leg, b: &Leg) -> [f64; 2] {
     }
 }
 
-/// Parameter from the end (or from the start) of a leg at which the tool is `distance` from the
-/// corner.
+/// Distance in the parameter from the end (or the start) of a leg at which the tool is `distance`
+/// from the corner.
 fn leave(owner: &mut Legs<'_>, leg: &Leg, distance: f64, at_end: bool) -> f64 {
-    // A tool that only turns leaves its pose by an angle that counts as a length.
+    // Where the tool only turns, its angle from the corner counts as a length.
     let travels = match &leg.way {
         Way::Tool(way) => way.curve.at(0.0).V.fixed_rows::<3>(0).norm() > 0.0,
         _ => true,
@@ -258,7 +259,7 @@ fn leave(owner: &mut Legs<'_>, leg: &Leg, distance: f64, at_end: bool) -> f64 {
     })
 }
 
-/// The same for an angle by which the tool is turned from the corner.
+/// The same for the rotation angle of the tool from the corner.
 fn turned(owner: &mut Legs<'_>, leg: &Leg, angle: f64, at_end: bool) -> f64 {
     from_corner(owner, leg, angle, at_end, angle_between)
 }
@@ -267,7 +268,7 @@ fn angle_between(a: &Pose, b: &Pose) -> f64 {
     rotation_vector((a.rotation * b.rotation.inverse()).matrix()).norm()
 }
 
-/// Parameter from the corner at which `away` reaches `most`.
+/// Distance in the parameter from the corner at which `away` reaches `most`.
 fn from_corner(owner: &mut Legs<'_>, leg: &Leg, most: f64, at_end: bool, away: impl Fn(&Pose, &Pose) -> f64) -> f64 {
     let place = |s: f64| if at_end { leg.length - s } else { s };
     let frame = owner.tool_frame(&leg.of);
@@ -279,8 +280,8 @@ fn from_corner(owner: &mut Legs<'_>, leg: &Leg, most: f64, at_end: bool, away: i
     first_beyond(leg.length, most, |s| away(&pose(s), &corner))
 }
 
-/// The first parameter at which `away` reaches `distance`, or `length`: a coarse search, then
-/// bisection.
+/// The first parameter at which `away` reaches `distance`, or `length` if it never does: a coarse
+/// search, then bisection.
 fn first_beyond(length: f64, distance: f64, mut away: impl FnMut(f64) -> f64) -> f64 {
     const COARSE: usize = 64;
     let Some(k) = (1..=COARSE).find(|&k| away(length * k as f64 / COARSE as f64) >= distance) else { return length };
@@ -292,7 +293,7 @@ fn first_beyond(length: f64, distance: f64, mut away: impl FnMut(f64) -> f64) ->
     0.5 * (low + high)
 }
 
-/// Legs, trimmed, with the blends between them.
+/// Trimmed legs with the blends between them.
 fn stretches(owner: &mut Legs<'_>, legs: &[Leg], taken: &[[f64; 2]]) -> Result<Vec<Stretch>, PathError> {
     let mut stretches = Vec::new();
     for (k, leg) in legs.iter().enumerate() {
@@ -325,8 +326,8 @@ fn stretches(owner: &mut Legs<'_>, legs: &[Leg], taken: &[[f64; 2]]) -> Result<V
     Ok(stretches)
 }
 
-/// Joints that move by themselves on a blend: between what they do at both of its ends; `corner`:
-/// joints where both ways meet.
+/// Guided joints on a blend, interpolated between their states at both ends; `corner`: joint values
+/// where both paths meet.
 fn guided_between(a: (&ToolWay, f64), b: (&ToolWay, f64), corner: &DVector<f64>) -> Vec<GuidedJoint> {
     let at = |(way, s): (&ToolWay, f64), k: usize| {
         let found = way.guided.iter().find(|joint| joint.k == k);
@@ -338,7 +339,7 @@ fn guided_between(a: (&ToolWay, f64), b: (&ToolWay, f64), corner: &DVector<f64>)
     joints.into_iter().map(|k| GuidedJoint { k, from: at(a, k), to: at(b, k) }).collect()
 }
 
-/// Joints on a leg at a parameter, continued from its end or its start.
+/// Joints on a leg at a parameter, by continuation from its end or its start.
 fn joints_at(owner: &mut Legs<'_>, leg: &Leg, s: f64, from_end: bool) -> Result<JointJet, PathError> {
     match &leg.way {
         Way::Tool(way) => {
@@ -373,7 +374,7 @@ pub(crate) fn between(a: &JointJet, b: &JointJet, h: f64, s: f64) -> (JointJet, 
     (JointJet { q, d, dd }, ddd)
 }
 
-/// The slower of two speeds in every respect.
+/// The slower of two speeds for each quantity.
 fn slower(a: &Speed, b: &Speed) -> Speed {
     let least = |a: Option<f64>, b: Option<f64>| match (a, b) {
         (Some(a), Some(b)) => Some(a.min(b)),
@@ -398,7 +399,7 @@ fn intervals(length: f64, options: &PathOptions) -> usize {
     ((length / options.spacing_m).ceil() as usize).clamp(least, MOST_INTERVALS)
 }
 
-/// Points of a way in joint space.
+/// Points of a path in joint space.
 fn straight(way: &Way, [from, to]: [f64; 2], options: &PathOptions) -> Vec<(f64, JointJet)> {
     let n = intervals(to - from, options);
     let at = |k: usize| from + (to - from) * k as f64 / n as f64;
@@ -407,8 +408,8 @@ fn straight(way: &Way, [from, to]: [f64; 2], options: &PathOptions) -> Vec<(f64,
 
 type Walked = (Vec<(f64, JointJet)>, (f64, f64));
 
-/// Joints along a curve of the tool at points so near that the quintics between them keep to the
-/// curve; the least singular value with its parameter.
+/// Joints along a tool curve at points so close that the quintics between them follow the curve,
+/// and the minimum singular value with its parameter.
 fn walk(
     follower: &mut Follower<'_>,
     way: &ToolWay,
@@ -435,7 +436,7 @@ fn walk(
     Ok((points, least))
 }
 
-/// Puts points between two until the quintics keep to the curve in the middle.
+/// Inserts points between two others until the quintics follow the curve at the midpoints.
 fn refine(
     follower: &mut Follower<'_>,
     way: &ToolWay,

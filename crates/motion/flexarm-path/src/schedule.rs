@@ -1,4 +1,4 @@
-//! A route over time: its time law, the knots of the joints' curves, and what became of its moves.
+//! A route over time: its time law, the knots of the joint curves, and the results of its moves.
 
 use flexarm_trajectory::{JointPeak, LONGEST, TrajectoryError};
 use nalgebra::DVector;
@@ -11,32 +11,32 @@ use crate::plan::{JointBounds, PathError, PathOptions, PlannedMove, ProgramArm, 
 use crate::route::{Route, Station, between};
 use crate::time_law::{Law, LawError, Progress};
 
-/// Limits count as kept up to this part.
+/// Relative tolerance of limits.
 pub(crate) const SLACK: f64 = 1e-3;
-/// Joints keep their limits to this part of them: less than what checks allow.
+/// Relative tolerance of joint limits, tighter than that of the checks.
 const ROUNDING: f64 = 1e-10;
-/// Shorter averages drown in rounding, s.
+/// Shorter averaging windows are lost in rounding (s).
 const SHORTEST_RISE: f64 = 1e-5;
-/// Attempts to slow a route until its curves keep the limits of the joints.
+/// Maximum number of attempts to slow a route until its curves keep the joint limits.
 const ROUNDS: usize = 4;
-/// A place is slowed by a limit where its speed is within this part of it.
+/// A limit slows a place where the speed is within this fraction of the limit.
 const AT_LIMIT: f64 = 0.02;
-/// A jerk slows a place where it is nearer to its bound than this part.
+/// A jerk slows a place where it exceeds this fraction of its bound.
 const AT_JERK: f64 = 0.9;
-/// Knots nearer than this are one, s.
+/// Knots nearer than this coincide (s).
 const SAME_TIME: f64 = 1e-6;
-/// Joints over time keep to those along the path within this, rad or m.
+/// Maximum deviation of the joint curves over time from the path (rad or m).
 const KEPT: f64 = 1e-10;
-/// Most intervals of the law between two knots.
+/// Maximum number of intervals of the law between two knots.
 const MOST_INTERVALS: usize = 64;
-/// Most halvings between two knots.
+/// Maximum number of halvings between two knots.
 const HALVINGS: usize = 10;
-/// Jerks of joints over time keep to those along the path within this part of their bounds.
+/// Maximum deviation of joint jerks over time from those along the path, relative to their bounds.
 const JERK_KEPT: f64 = 2e-4;
-/// Parts of an interval at which that is looked at.
+/// Fractions of an interval at which the jerks are compared.
 const JERKS_AT: [f64; 9] = [1e-3, 0.07, 0.19, 0.31, 0.43, 0.57, 0.69, 0.81, 0.999];
 
-/// Joints at a moment.
+/// Joint state at one time.
 #[derive(Debug, Clone)]
 pub(crate) struct Knot {
     pub(crate) t: f64,
@@ -48,18 +48,18 @@ pub(crate) struct Knot {
 }
 
 impl Knot {
-    /// At rest.
+    /// Knot at rest.
     pub(crate) fn rest(t: f64, q: &DVector<f64>) -> Self {
         let zero = DVector::zeros(q.len());
         Self { t, q: q.clone(), v: zero.clone(), before: zero.clone(), after: zero }
     }
 }
 
-/// The law of a route.
+/// Time law of a route.
 enum Timing {
-    /// Its speed is averaged.
+    /// With averaged speed.
     Averaged(Law),
-    /// Jerks of joints are bounded.
+    /// With bounded joint jerks.
     Bounded(JerkBounded),
 }
 
@@ -90,9 +90,9 @@ impl Timing {
 pub(crate) struct Schedule<'r> {
     route: &'r Route,
     law: Timing,
-    /// All times are multiplied by this.
+    /// Factor of all times.
     stretch: f64,
-    /// Programmed squared speed and the tightest limit of the robot, by station.
+    /// Programmed squared speeds and tightest limits of the robot, by station.
     programmed: Vec<f64>,
     caps: Vec<Option<Cap>>,
 }
@@ -134,7 +134,7 @@ impl<'r> Schedule<'r> {
         Ok(schedule)
     }
 
-    /// By how much the run must be slower for the durations that the program tells.
+    /// Factor by which the motion must be slower for the durations that the program gives.
     fn told_duration(&self, fail: &dyn Fn(String) -> PathError) -> Result<f64, PathError> {
         let told: Vec<f64> = self.route.legs.iter().filter_map(|leg| leg.of.speed.duration_s).collect();
         if told.is_empty() {
@@ -159,8 +159,8 @@ impl<'r> Schedule<'r> {
         self.law.duration() * self.stretch
     }
 
-    /// As [`Self::write`], slowed so that the curves through the knots keep the speeds and
-    /// accelerations of the joints.
+    /// [`Self::write`], slowed so that the curves through the knots keep the velocity and
+    /// acceleration limits of the joints.
     pub(crate) fn write_within(
         &mut self,
         arm: &ProgramArm<'_>,
@@ -185,13 +185,13 @@ impl<'r> Schedule<'r> {
         Ok(())
     }
 
-    /// Parameter with derivatives at a time of this route.
+    /// Parameter and its derivatives at a time of this route.
     fn progress(&self, t: f64) -> [f64; 4] {
         let (at, stretch) = (self.law.at(t / self.stretch), self.stretch);
         [at.s, at.v / stretch, at.a / (stretch * stretch), at.j / stretch.powi(3)]
     }
 
-    /// Time at which the run is at `s`.
+    /// Time at which the route reaches `s`.
     fn time_of(&self, s: f64) -> f64 {
         let (mut low, mut high) = (0.0, self.duration());
         for _ in 0..80 {
@@ -201,11 +201,11 @@ impl<'r> Schedule<'r> {
         0.5 * (low + high)
     }
 
-    /// Appends the knots of this route, which begins at `now`, and what became of its moves.
+    /// Appends the knots of this route, which begins at `now`, and the results of its moves.
     pub(crate) fn write(&self, now: f64, knots: &mut Vec<Knot>, moves: &mut Vec<PlannedMove>) {
         let stations = &self.route.stations;
         let pieces = &self.route.pieces;
-        // Places where the second derivative may jump, with their times.
+        // Stations where the second derivative may jump, with their times.
         let seams: Vec<(f64, usize)> = pieces[..pieces.len() - 1]
             .iter()
             .map(|piece| (self.time_of(stations[piece.stations[1]].s), piece.stations[1]))
@@ -221,7 +221,7 @@ impl<'r> Schedule<'r> {
         };
         let mut last = Knot::rest(0.0, &stations[0].q);
         push(knots, now, last.clone());
-        // As many intervals of the law as one quintic can hold; never across a seam.
+        // Each quintic spans as many intervals of the law as it can represent, but never a seam.
         let (mut k, mut stride) = (0, 1);
         while k < times.len() {
             let seam = times[k..].iter().position(|(_, seam)| seam.is_some()).unwrap_or(times.len() - 1 - k);
@@ -249,7 +249,7 @@ impl<'r> Schedule<'r> {
         times.extend(seams.iter().map(|(t, station)| (*t, Some(*station))));
         times.sort_by(|a, b| a.0.total_cmp(&b.0));
         times.retain(|(t, _)| *t > SAME_TIME && *t < end - SAME_TIME);
-        // Of two that are one, the seam stays.
+        // Of two coincident times the seam is kept.
         times.dedup_by(|b, a| {
             let same = b.0 - a.0 < SAME_TIME && (a.1.is_none() || b.1.is_none());
             if same && b.1.is_some() {
@@ -260,7 +260,7 @@ impl<'r> Schedule<'r> {
         times
     }
 
-    /// Does one quintic over time keep to the path between two knots?
+    /// Whether one quintic over time follows the path between two knots.
     fn fits(&self, a: &Knot, b: &Knot) -> bool {
         let from = JointJet { q: a.q.clone(), d: a.v.clone(), dd: a.after.clone() };
         let to = JointJet { q: b.q.clone(), d: b.v.clone(), dd: b.before.clone() };
@@ -271,7 +271,7 @@ impl<'r> Schedule<'r> {
             && (!self.bounds_jerks() || JERKS_AT.iter().all(|part| self.keeps_jerk(a.t + part * h, &at(part).1)))
     }
 
-    /// The first piece of each leg that is no blend, and the blend at its end.
+    /// First piece of each leg that is not a blend, and the blend at its end.
     fn pieces_by_leg(&self) -> Vec<[Option<usize>; 2]> {
         let mut found = vec![[None, None]; self.route.legs.len()];
         for (k, piece) in self.route.pieces.iter().enumerate() {
@@ -280,7 +280,7 @@ impl<'r> Schedule<'r> {
         found
     }
 
-    /// Knots between two until the quintics over time keep to the path.
+    /// Inserts knots between two others until the quintics over time follow the path.
     fn refine(&self, a: &Knot, b: &Knot, depth: usize, now: f64, knots: &mut Vec<Knot>) {
         let middle = 0.5 * (a.t + b.t);
         if depth == 0 || b.t - a.t < 4.0 * SAME_TIME {
@@ -321,7 +321,7 @@ impl<'r> Schedule<'r> {
         self.route.joints(k, s)
     }
 
-    /// Jerks of the joints at a moment.
+    /// Joint jerks at a given time.
     fn jerks(&self, t: f64) -> DVector<f64> {
         let [s, v, a, j] = self.progress(t);
         let (jet, ddd) = self.joints(s);
@@ -332,8 +332,8 @@ impl<'r> Schedule<'r> {
         matches!(self.law, Timing::Bounded(_))
     }
 
-    /// Are the jerks of a quintic over time those along the path at a moment, where they are
-    /// bounded?
+    /// Whether the jerks of a quintic over time agree with those along the path at a given time, if
+    /// they are bounded.
     fn keeps_jerk(&self, t: f64, jerk: &DVector<f64>) -> bool {
         let Timing::Bounded(bounded) = &self.law else { return true };
         let truth = self.jerks(t);
@@ -341,12 +341,12 @@ impl<'r> Schedule<'r> {
         (0..truth.len()).all(near)
     }
 
-    /// What became of a leg.
+    /// Result of a leg.
     fn planned(&self, leg: usize, by_leg: &[[Option<usize>; 2]], now: f64) -> PlannedMove {
         let route = self.route;
         let span = self.span(leg, by_leg);
         let of = &route.legs[leg].of;
-        // Of a leg that its blends leave nothing of, the blend.
+        // The blend, if the blends leave nothing of the leg.
         let own = by_leg[leg][0].or(by_leg[leg][1]).map(|k| &route.pieces[k]);
         let (mut top, mut slowed): (Option<f64>, Option<Slowed>) = (None, None);
         let least_sigma = own.and_then(|piece| piece.least_sigma);
@@ -375,7 +375,8 @@ impl<'r> Schedule<'r> {
         }
     }
 
-    /// Where a leg, or the blend behind it, is slowest against its program, within bounds of jerks.
+    /// Slowest place of a leg, or of the blend after it, relative to the programmed speed, with
+    /// bounded jerks.
     fn slowest(&self, leg: usize, by_leg: &[[Option<usize>; 2]]) -> Option<Slowed> {
         let pieces = by_leg[leg].iter().flatten().map(|k| &self.route.pieces[*k]);
         let along =
@@ -390,7 +391,7 @@ impl<'r> Schedule<'r> {
         slowed.min_by(|a, b| a.part.total_cmp(&b.part))
     }
 
-    /// The joint whose jerk makes a station slower than its neighbours.
+    /// Joint whose jerk makes a station slower than its neighbours.
     fn least_by_jerk(&self, k: usize) -> Option<SlowedBy> {
         let Timing::Bounded(bounded) = &self.law else { return None };
         let [before, t, after] = [k - 1, k, k + 1].map(|k| self.time_of_station(k));
@@ -411,7 +412,7 @@ impl<'r> Schedule<'r> {
         by.map(|name| SlowedBy::JointJerk(name.clone()))
     }
 
-    /// First and last moment of a leg, with half of the blends.
+    /// Start and end time of a leg, including half of the blends.
     fn span(&self, leg: usize, by_leg: &[[Option<usize>; 2]]) -> [f64; 2] {
         let ends = |k: usize| self.route.pieces[k].stations.map(|k| self.route.stations[k].s);
         let middle = |k: usize| {
@@ -429,8 +430,8 @@ impl<'r> Schedule<'r> {
         self.time_of(self.route.stations[k].s)
     }
 
-    /// Part of the programmed speed that a limit of the robot leaves at a station, where it is at
-    /// that limit.
+    /// Fraction of the programmed speed that a limit of the robot allows at a station, if the speed
+    /// is at that limit.
     fn part(&self, k: usize, t: f64) -> Option<(f64, SlowedBy)> {
         let cap = self.caps[k].as_ref()?;
         let programmed = self.programmed[k];
@@ -442,8 +443,8 @@ impl<'r> Schedule<'r> {
     }
 }
 
-/// By how much the quintics through knots must be slower to keep the speeds and accelerations of
-/// the joints; 1 if they do.
+/// Factor by which the quintics through the knots must be slower to keep the velocity and
+/// acceleration limits of the joints; 1 if they do.
 fn slowing(knots: &[Knot], arm: &ProgramArm<'_>) -> Result<f64, TrajectoryError> {
     let peaks = through(arm.model, knots)?.peak();
     let ratio = |(peak, bounds): (&JointPeak, &JointBounds)| {

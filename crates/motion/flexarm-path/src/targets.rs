@@ -1,4 +1,4 @@
-//! Targets of a program and the joints that they stand for, both ways.
+//! Conversion between program targets and joint values.
 
 use flexarm_kinematics::{AnalyticArm, Data, Frame, forward_kinematics, kuka_turn};
 use flexarm_spatial::Pose;
@@ -8,8 +8,8 @@ use crate::legs::{Legs, Start, spline_group};
 use crate::plan::{PathError, PathOptions, ProgramArm};
 use crate::program::{Configuration, Item, Move, MoveKind, Program, Target};
 
-/// Joints at the target of each item, whether a blend lets the tool pass it or not; none of dwells,
-/// and of arcs with a told angle, which do not end at their target.
+/// Returns the joints at the target of each item, even if a blend passes it; `None` for dwells and
+/// for arcs with a given angle, which do not end at their target.
 ///
 /// # Errors
 /// As [`crate::plan`].
@@ -36,7 +36,7 @@ pub fn target_joints(
             k += 1;
             continue;
         }
-        // A knot where the arm is already has no leg of its own.
+        // A knot at the current position has no leg of its own.
         let mut at = start.q.clone();
         let mut pieces = legs.spline(&group, &mut start)?.into_iter().peekable();
         for of in &group {
@@ -50,19 +50,19 @@ pub fn target_joints(
     Ok(found)
 }
 
-/// The flange with the tool of a move, on the rigid arm.
+/// Frame of the tool of a move on the flange of the rigid arm.
 pub fn tool_of(arm: &ProgramArm<'_>, of: &Move) -> Frame {
     let X_FT = of.X_FT.unwrap_or(arm.X_FT);
     Frame { X_BF: arm.flange.X_BF * X_FT, ..arm.flange.clone() }
 }
 
-/// Base of a move in the world of the model, `X_MB`.
+/// Pose of the base of a move in the world of the model, `X_MB`.
 pub fn base_of(arm: &ProgramArm<'_>, of: &Move) -> Pose {
     arm.X_MW * of.X_WB
 }
 
-/// The target with which a move ends at joint values, told as the old one is: axis values, or a
-/// pose with its branch.
+/// Returns the target of a move that ends at the given joint values, in the form of the old one:
+/// axis values, or a pose with its branch.
 pub fn target_at(arm: &ProgramArm<'_>, of: &Move, q: &DVector<f64>) -> Target {
     if let Target::Joints(old) = &of.to {
         let mut values = arm.axis_values(q);
@@ -77,7 +77,7 @@ pub fn target_at(arm: &ProgramArm<'_>, of: &Move, q: &DVector<f64>) -> Target {
     let configuration = match (configuration, AnalyticArm::new(arm.model, &frame)) {
         (Configuration::Kuka { status, turn }, Ok(analytic)) => {
             let (counted, six) = (arm.controller_axes(*analytic.joints()), analytic.joints().map(|k| q[k]));
-            // Other bits of the old words say nothing of the branch and stay.
+            // Other bits of the old word do not concern the branch and are kept.
             let told = analytic.kuka_status(&six, &counted);
             let status = status.map(|old| told.map_or(old, |told| old & !7 | told));
             Configuration::Kuka { status, turn: turn.map(|old| old & !63 | kuka_turn(&six, &counted)) }

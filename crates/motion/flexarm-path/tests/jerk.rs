@@ -1,5 +1,6 @@
-//! Least durations within joint speeds, accelerations and jerks against a nonlinear program over
-//! time (`tools/golden_jerk.py`), and without jerks against TOPP-RA (`tools/golden_toppra.py`).
+//! Minimum durations within joint velocity, acceleration and jerk limits against a nonlinear
+//! program over time (`tools/golden_jerk.py`), and without jerks against TOPP-RA
+//! (`tools/golden_toppra.py`).
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 
 use std::path::Path;
@@ -18,10 +19,10 @@ fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
 }
 
-/// Bounds of speed, acceleration and jerk of a joint.
+/// Velocity, acceleration and jerk limits of a joint.
 type Joint = [f64; 3];
 
-/// What holds at a place, from three derivatives of each joint.
+/// Bounds at a place, from three derivatives of each joint.
 fn place(rates: &[[f64; 3]], joints: &[Joint]) -> Place {
     let each = || rates.iter().zip(joints);
     let x_max = each().map(|(r, most)| (most[0] / r[0]).powi(2)).fold(f64::INFINITY, f64::min);
@@ -30,8 +31,8 @@ fn place(rates: &[[f64; 3]], joints: &[Joint]) -> Place {
     Place { x_max, bounds, jerks }
 }
 
-/// The least time of a path over 0 to 1 whose derivatives are told at a parameter of an interval
-/// between stations.
+/// Time-optimal law of a path over 0 to 1, from derivatives at a parameter of an interval between
+/// stations.
 fn fastest(stations: &[f64], joints: &[Joint], rates: &dyn Fn(usize, f64) -> Vec<[f64; 3]>) -> QuinticLaw {
     let last = stations.len() - 2;
     let point = |(k, s): (usize, &f64)| {
@@ -45,7 +46,7 @@ fn fastest(stations: &[f64], joints: &[Joint], rates: &dyn Fn(usize, f64) -> Vec
     let window = long.min(law.duration());
     let mut here = |k: usize, s: f64| place(&rates(k, s), joints);
     let found = least_time_with_jerks(&law.smoothed(window), stations, short, &mut here);
-    // No bound is passed, also between nodes.
+    // No bound is violated, even between nodes.
     let mut of_node = |k: usize, s: f64| {
         let middle = 0.5 * (found.s[k] + found.s[k + 1]);
         here(stations.partition_point(|s| *s <= middle) - 1, s)
@@ -72,12 +73,12 @@ fn the_least_time_within_jerks_is_that_of_a_nonlinear_program() {
         let stations: Vec<f64> = (0..=200).map(|k| f64::from(k) / 200.0).collect();
         let found = fastest(&stations, &joints, &rates).duration();
         let truth = case["duration_s"].as_f64().unwrap();
-        // measured 2.7e-4, which is what 600 intervals cost the program
+        // measured 2.7e-4, the discretisation error of 600 intervals of the nonlinear program
         assert!((found / truth - 1.0).abs() < 1e-3, "{} {found} {truth}", case["seed"]);
     }
 }
 
-/// Truth: TOPP-RA's durations, which no jerk lengthens.
+/// Truth: TOPP-RA's durations, which are not lengthened by jerk limits.
 #[test]
 fn the_least_time_within_jerks_tends_to_that_of_toppra_as_they_grow() {
     for case in golden("toppra.json").iter().step_by(4) {
@@ -89,7 +90,7 @@ fn the_least_time_within_jerks_tends_to_that_of_toppra_as_they_grow() {
             .iter()
             .map(|p| p.as_array().unwrap().iter().map(numbers).collect())
             .collect();
-        // Each piece of the spline in parts: its third derivative jumps at the knots alone.
+        // Each piece of the spline is divided: its third derivative jumps only at the knots.
         let parts = 1 + 400 / pieces.len();
         let stations: Vec<f64> = (0..=pieces.len() * parts)
             .map(|k| match k / parts {

@@ -1,5 +1,5 @@
-//! Programs of moves as motions: the tool keeps to its path everywhere, and speeds and
-//! accelerations to their bounds.
+//! Programs of moves as motions: the tool follows its path everywhere, and velocities and
+//! accelerations keep their limits.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
@@ -48,7 +48,7 @@ impl Cell {
         data.X_WF(self.model.frame("tcp").unwrap())
     }
 
-    /// Poses at `n + 1` times with the joints' values and rates.
+    /// Poses at `n + 1` times with joint values and rates.
     fn sampled(&self, planned: &Planned, n: usize) -> Vec<Sampled> {
         let sample = |k: usize| {
             let t = planned.trajectory.duration() * k as f64 / n as f64;
@@ -182,7 +182,7 @@ fn joint_limits_slow_a_line_and_say_which_joint_it_is() {
     assert!(hardest < 20.0 * (1.0 + 1e-9), "{hardest}");
 }
 
-/// Limits of all joints as they are checked.
+/// Joint limits for the check.
 fn checked(arm: &ProgramArm<'_>) -> Vec<JointLimits> {
     let limits = |b: &JointBounds| JointLimits {
         velocity: b.velocity,
@@ -196,7 +196,7 @@ fn checked(arm: &ProgramArm<'_>) -> Vec<JointLimits> {
 #[test]
 fn a_line_past_a_singular_pose_keeps_the_limits_that_are_checked_with_and_without_jerks() {
     let model = industrial_arm([1.0; 6], [0.0; 6]);
-    // The forearm is all but straight on half of the way.
+    // The forearm is almost straight halfway.
     let q = [0.0, -1.0, 1.3, 0.0, -0.3, 0.0];
     let pose_at = |q: &[f64]| {
         let mut data = Data::new(&model);
@@ -213,7 +213,7 @@ fn a_line_past_a_singular_pose_keeps_the_limits_that_are_checked_with_and_withou
         ];
         arm.bounds = vec![JointBounds { velocity: 100.0, acceleration: 1e4, torque: None, jerk: None }; 6];
         let free = plan(&program(items.clone()), &arm, &PathOptions::default()).unwrap();
-        // Each joint may move at 1/2.6 of the speed that the line asks for, and at half of the
+        // Each joint is limited to 1/2.6 of the speed that the line requires, and to half of the
         // acceleration.
         for (bounds, peak) in arm.bounds.iter_mut().zip(free.trajectory.peak()) {
             bounds.velocity = peak.velocity.value.abs().max(0.1) / 2.6;
@@ -232,7 +232,7 @@ fn a_line_past_a_singular_pose_keeps_the_limits_that_are_checked_with_and_withou
     }
 }
 
-/// Truth: the speed of the tool by forward kinematics at 40000 moments.
+/// Truth: the speed of the tool from forward kinematics at 40000 times.
 #[test]
 fn the_tool_does_not_pass_its_speed_in_blends_and_reaches_it() {
     let cell = Cell::new();
@@ -280,7 +280,7 @@ fn a_tool_that_turns_along_an_arc_keeps_both_its_circle_and_its_turn() {
     }
     assert!(off < 1e-9, "{off:.1e}");
     let length = std::f64::consts::PI * r;
-    // Truth: half a circle, an acceleration of 2 m/s² and a rise of 0.05 s.
+    // Truth: half a circle, an acceleration of 2 m/s² and a rise time of 0.05 s.
     let truth = length / 0.3 + 0.3 / 2.0 + 0.05;
     assert!((planned.trajectory.duration() - truth).abs() < 3e-3 * truth, "{} {truth}", planned.trajectory.duration());
 }
@@ -308,19 +308,19 @@ fn joint_moves_lines_and_splines_blend_into_each_other_with_continuous_accelerat
     ];
     let planned = plan(&program(items), &cell.arm(), &PathOptions::default()).unwrap();
     let samples = cell.sampled(&planned, 20011);
-    // Two samples 0.2 ms apart differ by the jerk alone.
+    // Two samples 0.2 ms apart differ only by the jerk.
     let jump = samples.windows(2).flat_map(|p| (0..6).map(move |k| (p[1].a[k] - p[0].a[k]).abs())).fold(0.0, f64::max);
     assert!(jump < 1.0, "{jump}"); // measured 0.22 rad/s²
     assert!(planned.trajectory.velocity_jumps().is_empty());
     let speed = samples.iter().rev().take(1000).flat_map(|s| s.v).map(f64::abs).fold(0.0, f64::max);
     assert!(speed <= 1.5 * 1.002);
-    // The knot of the spline is met.
+    // The path passes the knot of the spline.
     let knot = X.translation.vector + Vector3::new(0.0, 0.25, 0.1);
     let near = samples.iter().map(|s| (s.X.translation.vector - knot).norm()).fold(f64::INFINITY, f64::min);
     assert!(near < 1e-4, "{near}");
 }
 
-/// Truth: the tool's own path in a joint move, by differences.
+/// Truth: the TCP path of a joint move, by finite differences.
 #[test]
 fn a_joint_move_with_a_speed_of_the_tool_keeps_it() {
     let cell = Cell::new();
@@ -366,7 +366,8 @@ fn torque_limits_are_kept_by_inverse_dynamics() {
         most
     };
     let free = torque(&line(&arm).unwrap());
-    // Four fifths of what the free run asks of joint 1, on which gravity does not act.
+    // Four fifths of the torque of joint 1 in the unlimited run; gravity does not act on this
+    // joint.
     arm.bounds[0].torque = Some(0.8 * free[0]);
     let bound = torque(&line(&arm).unwrap());
     assert!(bound[0] < 0.8 * free[0] * 1.003 && bound[0] > 0.8 * free[0] * 0.95);
@@ -407,7 +408,7 @@ fn numbers_beyond_any_motion_are_refused_before_work_begins() {
         let error = run(item);
         assert!(matches!(error, PathError::Value { line: 1, .. }), "{error}");
     }
-    // A speed at which the motion takes longer than any.
+    // A speed at which the motion exceeds the maximum duration.
     let slow = to(MoveKind::Line, pose(shifted(&X, [0.0, 0.1, 0.0])), feed(1e-12), Blend::Stop);
     assert!(matches!(run(slow), PathError::Trajectory(_) | PathError::Law { .. } | PathError::Value { .. }));
 }
@@ -432,7 +433,7 @@ fn a_dwell_before_the_first_target_is_one_at_that_target() {
     assert!(at_rest.map(|s| (s.X.translation.vector - start).norm()).fold(0.0, f64::max) < 1e-12);
 }
 
-/// An upright arm of seven joints, roll and pitch in turn.
+/// An upright arm with seven joints, alternating roll and pitch.
 fn seven_joints() -> Model {
     let mut arm = Mechanism::new("seven");
     arm.links.push(Link { name: "base".into(), inertia: None });
@@ -446,7 +447,7 @@ fn seven_joints() -> Model {
     Model::new(&arm).unwrap()
 }
 
-/// An arm of seven joints with its last link as the tool.
+/// Program arm with seven joints and its last link as the flange.
 fn seven_joint_arm(model: &Model) -> ProgramArm<'_> {
     ProgramArm {
         model,
@@ -497,7 +498,7 @@ fn a_redundant_arm_follows_its_line_with_one_joint_at_rest() {
     assert!(off < 1e-9, "{off:.1e}");
 }
 
-/// Truth: the posture that a rule finds at the pose by itself, and the way of the tool.
+/// Truth: the posture that the rule finds for the pose alone, and the TCP path.
 #[test]
 fn a_redundant_arm_goes_to_the_posture_of_its_rule_without_leaving_its_path() {
     let model = seven_joints();
@@ -515,8 +516,8 @@ fn a_redundant_arm_goes_to_the_posture_of_its_rule_without_leaving_its_path() {
     let (held, guided) = (run(None), run(Some(rule.clone())));
     let samples = joints_over_time(&guided, 4001);
 
-    // Beyond the blend the tool is on its lines, and turns as without the rule, for both ways of
-    // the tool are the same.
+    // Outside the blend the tool is on its lines, with the same orientation as without the rule,
+    // because both TCP paths are the same.
     let way = [X0, X1, X2].map(|X| X.translation.vector);
     let far = |p: &Vector3<f64>| (p - way[1]).norm() > 0.031;
     let (mut off, mut turned) = (0.0_f64, 0.0_f64);
@@ -529,7 +530,7 @@ fn a_redundant_arm_goes_to_the_posture_of_its_rule_without_leaving_its_path() {
     }
     assert!(off < 1e-9 && turned < 1e-9, "off {off:.1e}, turned {turned:.1e}"); // measured 1.7e-11, 4.9e-11
 
-    // Rates are those of the positions, over the blend too.
+    // The rates are the derivatives of the positions, also over the blend.
     let dt = guided.trajectory.duration() / 4001.0;
     let rate = |k: usize| (&samples[k + 1].0 - &samples[k - 1].0) / (2.0 * dt) - &samples[k].1;
     let wrong = (1..4001).map(|k| rate(k).amax()).fold(0.0, f64::max);
@@ -550,13 +551,13 @@ fn a_redundant_arm_goes_to_the_posture_of_its_rule_without_leaving_its_path() {
     // Measured: 0.7253 rad away with a joint held, 0.4738 with the rule.
     assert!(away(&best) < 0.7 * away(without), "the case has something to gain");
     assert!(away(with) < away(&best) + 1e-3, "{} of {}", away(with), away(&best));
-    // What is left over moves slowly enough not to slow the tool.
+    // Redundant joints move slowly enough not to slow the tool.
     assert!(guided.trajectory.duration() < 1.02 * held.trajectory.duration());
 }
 
-/// An arm of the usual kind: upright, two parallel axes, a spherical wrist. Joint k turns about
-/// `senses[k]` times its axis and is at `zeros[k]` where that of the arm with senses 1 and zeros 0
-/// is at zero.
+/// Typical industrial arm: upright, two parallel axes, a spherical wrist. Joint k turns about
+/// `senses[k]` times its axis and has the value `zeros[k]` where that of the arm with senses 1 and
+/// zeros 0 is zero.
 fn industrial_arm(senses: [f64; 6], zeros: [f64; 6]) -> Model {
     let mut arm = Mechanism::new("six");
     arm.links.push(Link { name: "base".into(), inertia: None });
@@ -598,8 +599,8 @@ fn arm_of<'m>(model: &'m Model, controller: Vec<ControllerAxis>) -> ProgramArm<'
     }
 }
 
-/// Truth: the same program on the arm whose joints are the axes. Off by 3.7e-8 m or rad along the
-/// whole motion, as far as the iterations of the time law go; bound 1e-6.
+/// Truth: the same program on the arm whose joints are the axes. The difference is 3.7e-8 m or rad
+/// along the whole motion, due to the tolerance of the time law's iterations; bound 1e-6.
 #[test]
 fn an_arm_with_other_zeros_and_senses_runs_a_program_as_the_arm_whose_joints_are_the_axes() {
     let (senses, zeros) = ([-1.0, 1.0, -1.0, -1.0, 1.0, -1.0], [0.4, -1.2, 1.5, 0.3, -0.2, 2.0]);
@@ -646,7 +647,7 @@ fn an_arm_with_other_zeros_and_senses_runs_a_program_as_the_arm_whose_joints_are
         off = off.max((X[0].rotation.inverse() * X[1].rotation).scaled_axis().norm());
     }
     assert!(off < 1e-6, "{off:.1e}");
-    // The end, by its turns, is the one that was meant.
+    // The end has the specified turns.
     let mut end = [0.0; 6];
     planned[1].trajectory.sample(duration, &mut end, &mut [0.0; 6], &mut [0.0; 6]);
     for k in 0..6 {
@@ -654,8 +655,8 @@ fn an_arm_with_other_zeros_and_senses_runs_a_program_as_the_arm_whose_joints_are
     }
 }
 
-/// Truth: the direction of the forearm. Where axis 3 is counted against the horizontal, axis 2
-/// alone does not tilt it.
+/// Truth: the direction of the forearm. If axis 3 is measured against the horizontal, axis 2 does
+/// not tilt the forearm.
 #[test]
 fn an_axis_that_is_counted_against_the_horizontal_keeps_the_forearm_level_while_the_one_before_moves() {
     let model = industrial_arm([1.0; 6], [0.0; 6]);
@@ -673,8 +674,8 @@ fn an_axis_that_is_counted_against_the_horizontal_keeps_the_forearm_level_while_
     assert!(tilted < 1e-12, "{tilted:.1e}");
 }
 
-/// Truth: the joints that the targets were made of, with blends, knots of a spline and coupled axes
-/// of the controller.
+/// Truth: the joints from which the targets were computed, with blends, knots of a spline and
+/// coupled controller axes.
 #[test]
 fn joints_at_targets_are_those_that_the_targets_were_made_of_and_make_them_again() {
     let cell = Cell::new();
@@ -698,7 +699,7 @@ fn joints_at_targets_are_those_that_the_targets_were_made_of_and_make_them_again
         spline(2, Blend::Pass),
         Item::Dwell { line: 1, seconds: 0.1 },
         spline(3, Blend::Pass),
-        // Where the arm is already.
+        // The arm is already there.
         spline(3, Blend::Pass),
         spline(4, Blend::Stop),
         to(MoveKind::Joint, pose(cell.pose(&places[5])), free, Blend::Stop),
@@ -723,12 +724,12 @@ fn joints_at_targets_are_those_that_the_targets_were_made_of_and_make_them_again
     }
 }
 
-/// Largest jerk of each joint, jumps of its acceleration counted with their time.
+/// Maximum jerk and maximum acceleration jump of each joint.
 fn hardest(planned: &Planned) -> Vec<[f64; 2]> {
     planned.trajectory.peak().iter().map(|peak| [peak.jerk.value.abs(), peak.acceleration_jump.value.abs()]).collect()
 }
 
-/// Truth: the S-curve of seven phases of one joint, v/a + a/j + L/v.
+/// Truth: the seven-phase S-curve of one joint, v/a + a/j + L/v.
 #[test]
 fn one_joint_moves_in_the_least_time_of_its_speed_acceleration_and_jerk() {
     let cell = Cell::new();
@@ -775,12 +776,12 @@ fn jerks_of_all_joints_hold_along_lines_blends_arcs_and_splines() {
     for [jerk, jump] in hardest(&planned) {
         assert!(jerk < 60.0 * 1.001 && jump < 1e-6, "{jerk} {jump}"); // measured 60.0084, 1.2e-11
     }
-    // Corners are rounded without a stop, and the tool keeps to its speed elsewhere.
+    // Corners are rounded without a stop, and the tool keeps its speed elsewhere.
     assert!(planned.stops.is_empty() && hardest(&free).iter().all(|[jerk, _]| *jerk > 180.0));
     let (free, bounded) = (free.trajectory.duration(), planned.trajectory.duration());
     assert!(bounded > free && bounded < 1.15 * free, "{free} {bounded}"); // measured 2.644 s and 2.888 s
     assert!(planned.moves[1].top_m_s.unwrap() > 0.399);
-    // The sharp corner between arc and line, where the tool is nearly at rest.
+    // The sharp corner between arc and line, where the tool is almost at rest.
     let slowed = planned.moves[2].slowed.as_ref().unwrap();
     assert!(slowed.part < 0.2 && (slowed.time_s - planned.moves[2].span_s[1]).abs() < 0.05, "{slowed:?}");
 }
@@ -824,7 +825,7 @@ fn an_arc_that_leaves_a_line_along_its_tangent_is_entered_at_rest_or_by_a_blend_
         let arc = to(arc.clone(), pose(shifted(&corner, end.into())), feed(0.3), Blend::Stop);
         plan(&program(vec![joints(&START), line, arc]), arm, &PathOptions::default()).unwrap()
     };
-    // Without a bound the joints' accelerations jump at the seam.
+    // Without a jerk bound the joint accelerations jump at the seam.
     let jumps = |planned: &Planned| hardest(planned).iter().map(|[_, jump]| *jump).fold(0.0, f64::max);
     let free = run(&cell.arm(), Blend::Pass);
     assert!(free.stops.is_empty() && jumps(&free) > 0.5, "{}", jumps(&free));

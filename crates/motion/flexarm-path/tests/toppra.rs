@@ -1,4 +1,4 @@
-//! Least durations against TOPP-RA on its own kind of paths (`tools/golden_toppra.py`).
+//! Minimum durations against TOPP-RA on its own kind of paths (`tools/golden_toppra.py`).
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 
 use std::path::Path;
@@ -10,7 +10,7 @@ fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
 }
 
-/// First and second derivative of each joint at `s`.
+/// First and second derivatives of each joint at `s`.
 fn rates(knots: &[f64], pieces: &[Vec<Vec<f64>>], s: f64) -> Vec<[f64; 2]> {
     let k = knots.partition_point(|knot| *knot <= s).clamp(1, knots.len() - 1) - 1;
     let t = s - knots[k];

@@ -1,5 +1,4 @@
-//! Robot programs as they come from controllers, read into moves: KUKA KRL, ABB RAPID, URScript and
-//! G-code.
+//! Readers of robot programs as used on controllers: KUKA KRL, ABB RAPID, URScript and G-code.
 //!
 //! ```
 //! use flexarm_path::program::{Item, MoveKind};
@@ -21,14 +20,13 @@
 //! # Ok::<(), flexarm_programs::ProgramError>(())
 //! ```
 //!
-//! A reader runs the program: variables are computed, loops counted, routines called. What cannot
-//! change the motion is passed and noted; what could and is not understood is an error with file,
-//! line, column and statement. Units are converted here.
+//! A reader executes the program: variables are computed, loops counted, routines called. A
+//! statement that cannot affect the motion is skipped with a note; one that could and is not
+//! supported is an error with file, line, column and statement. Units are converted here.
 //!
-//! Modules: one per language, and `common` with expressions, statements and the machine that runs
-//! them.
+//! Modules: one per language, and `common` with expressions, statements and the interpreter.
 //!
-//! Not here: how the moves are planned ([`flexarm_path`]), what robot runs them.
+//! Not here: planning of the moves ([`flexarm_path`]), and the robot that runs them.
 #![allow(non_snake_case, reason = "monogram notation: X_WB, X_FT, R_BT; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
@@ -52,7 +50,7 @@ pub use options::{ForwardKinematics, GCodeOptions, Language, ReadOptions, Rotary
 pub use recognise::recognise;
 pub use rewrite::{NewTarget, ProgramText, Rewritten, read_program_text};
 
-/// Why a robot program cannot be read.
+/// Error of reading a robot program.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ProgramError {
@@ -62,38 +60,38 @@ pub enum ProgramError {
         /// The file.
         path: PathBuf,
     },
-    /// A statement cannot be read, or what it does is not known here.
+    /// A statement cannot be read, or its effect is unknown.
     #[error(transparent)]
     Statement(#[from] TextFileError),
-    /// The program runs through without a move.
+    /// The program ends without a move.
     #[error("{}: the program ({language}) runs through without a move: {hint}", path.display())]
     NoMoves {
         /// The file.
         path: PathBuf,
-        /// The language it was read as.
+        /// Language as which the file was read.
         language: &'static str,
-        /// What may be the reason.
+        /// Possible reason.
         hint: &'static str,
     },
 }
 
-/// The moves of a robot program.
+/// Reads the moves of a robot program.
 ///
-/// * `path`: of the file, for messages, and where its companions are
+/// * `path`: path of the file, for messages and for finding companion files
 ///   ([`ReadOptions::find_companions`]).
-/// * `bytes`: what is in it, UTF-8 or Latin-1.
+/// * `bytes`: content of the file, UTF-8 or Latin-1.
 ///
-/// Angles of the program are rad, lengths m, whatever its language writes.
+/// Angles of the result are in rad and lengths in m, regardless of the language.
 ///
 /// # Errors
 /// [`ProgramError::Unknown`] if no language is recognised; [`ProgramError::Statement`] at the first
-/// statement that cannot be read, that depends on what only the controller knows, or whose effect
-/// on the motion is not known here; [`ProgramError::NoMoves`] if nothing moves.
+/// statement that cannot be read, that depends on a value known only to the controller, or whose
+/// effect on the motion is unknown; [`ProgramError::NoMoves`] if nothing moves.
 pub fn read_program(path: &Path, bytes: &[u8], options: &ReadOptions<'_>) -> Result<Program, ProgramError> {
     read_recorded(path, bytes, options).map(|(recorded, ..)| recorded.program)
 }
 
-/// A program with its language, its texts and the places of its targets in them.
+/// Reads a program with its language, its texts and the places of its targets.
 fn read_recorded(
     path: &Path,
     bytes: &[u8],
@@ -125,7 +123,7 @@ fn read_recorded(
     Ok((recorded, language, texts))
 }
 
-/// Where and what, for people.
+/// Converts an error to one with place and excerpt for the user.
 fn place(texts: &[Text], fail: &Fail) -> TextFileError {
     let text = &texts[fail.span.file];
     let excerpt = text.excerpt(fail.span);
@@ -133,7 +131,7 @@ fn place(texts: &[Text], fail: &Fail) -> TextFileError {
     Source::new(&text.path, &text.text, "program").error(fail.span.start..fail.span.end, message)
 }
 
-/// Text of UTF-8, else of Latin-1, which every byte is; ends of lines as they are.
+/// Decodes UTF-8, otherwise Latin-1, in which every byte is valid; line ends are kept.
 pub(crate) fn decode(bytes: &[u8]) -> String {
     match std::str::from_utf8(bytes) {
         Ok(text) => text.trim_start_matches('\u{feff}').to_owned(),
@@ -141,7 +139,7 @@ pub(crate) fn decode(bytes: &[u8]) -> String {
     }
 }
 
-/// What was given beside the file, as one text of assignments; its lines are the entries.
+/// Text of assignments from the given values; each line is one entry.
 pub(crate) fn given_text(options: &ReadOptions<'_>, assign: &str, end: &str) -> Text {
     let lines = options.given.iter().map(|(name, value)| format!("{name}{assign}{value}{end}\n"));
     Text::new(Path::new("given"), &lines.collect::<String>())

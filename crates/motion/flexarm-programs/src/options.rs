@@ -1,4 +1,4 @@
-//! What a reader is told beside the file.
+//! Options of a reader.
 
 use std::path::PathBuf;
 
@@ -20,7 +20,7 @@ pub enum Language {
 }
 
 impl Language {
-    /// Its name for people.
+    /// Display name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Krl => "KUKA KRL",
@@ -31,41 +31,41 @@ impl Language {
     }
 }
 
-/// Pose `X_WF` of the flange in the controller's world for joint values (rad or m); `None` if they
-/// are not as many as the robot has.
+/// Pose `X_WF` of the flange in the controller's world for joint values (rad or m); `None` if their
+/// number is not that of the robot's joints.
 pub type ForwardKinematics<'a> = &'a dyn Fn(&[f64]) -> Option<Pose>;
 
-/// What a reader is told beside the file; all may stay as it is.
+/// Options of a reader; all have defaults.
 #[derive(Clone)]
 pub struct ReadOptions<'a> {
-    /// The language; `None`: recognised by the content.
+    /// Language; `None`: recognised from the content.
     pub language: Option<Language>,
-    /// Routine with which the program starts; `None`: what the language says (`main`, the first
+    /// Routine with which the program starts; `None`: the language's default (`main`, the first
     /// `DEF`).
     pub entry: Option<String>,
-    /// Joint values at the start, rad or m; with them a program may begin with a line.
+    /// Joint values at the start, rad or m; they allow a program to begin with a line.
     pub start: Option<Vec<f64>>,
     /// Names and values that the file leaves open, in its language:
     /// `("BASE_DATA[1]", "{X 1000, Y 0, Z 500, A 0, B 0, C 0}")`, `("di1", "1")`.
     pub given: Vec<(String, String)>,
     /// Further files of the program with their bytes: KUKA's `$config.dat`, other modules.
     pub companions: Vec<(PathBuf, Vec<u8>)>,
-    /// Look beside the file for what belongs to it: KUKA's `.dat`, and `.src` of routines that it
-    /// calls.
+    /// Whether to search next to the file for companions: KUKA's `.dat`, and `.src` of called
+    /// routines.
     pub find_companions: bool,
-    /// Waiting for the outside (`WAIT FOR`, `WaitDI`) is taken as over at once.
+    /// Whether waiting for external events (`WAIT FOR`, `WaitDI`) ends at once.
     pub waits_are_over: bool,
-    /// How often a loop without end is run; `None`: such a loop is an error.
+    /// Number of passes of an endless loop; `None`: such a loop is an error.
     pub endless_passes: Option<usize>,
-    /// Moves and dwells at most.
+    /// Maximum number of moves and dwells.
     pub most_moves: usize,
-    /// Statements at most that are run.
+    /// Maximum number of executed statements.
     pub most_steps: usize,
-    /// Kinematics of the robot, for moves relative to a position that was told in joint values.
+    /// Kinematics of the robot, for moves relative to a position given in joint values.
     pub forward: Option<ForwardKinematics<'a>>,
-    /// The robot's own tool centre point on its flange, `X_FT`, for the same.
+    /// The robot's own tool centre point on its flange, `X_FT`, for the same purpose.
     pub own_tool: Option<Pose>,
-    /// What only G-code needs.
+    /// Options for G-code only.
     pub gcode: GCodeOptions,
 }
 
@@ -104,44 +104,44 @@ impl std::fmt::Debug for ReadOptions<'_> {
     }
 }
 
-/// How rotary words of G-code are understood.
+/// Interpretation of rotary words in G-code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Rotary {
-    /// They are refused, unless they are 0.
+    /// Rejected, unless they are 0.
     #[default]
     Refused,
-    /// The tool is turned about the axes of the work frame: `R_BT = Rz(C) Ry(B) Rx(A) R`, with `R`
+    /// The tool is rotated about the axes of the work frame: `R_BT = Rz(C) Ry(B) Rx(A) R`, with `R`
     /// the orientation at A = B = C = 0.
     Tilt,
 }
 
-/// What G-code leaves to the machine.
+/// Machine properties that G-code leaves open.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GCodeOptions {
-    /// Orientation of the tool in the work frame, `R_BT`; by itself its z axis points against the
-    /// work frame's z, its x axis along the work frame's x.
+    /// Orientation of the tool in the work frame, `R_BT`; by default its z axis is opposite to the
+    /// work frame's z axis, and its x axis along the work frame's x axis.
     pub R_BT: Rotation3<f64>,
-    /// How A, B and C are understood.
+    /// Interpretation of A, B and C.
     pub rotary: Rotary,
-    /// Work frames in the controller's world, by their code: `("G54", X_WB)`; those that are not
-    /// told are where the robot stands, which is noted.
+    /// Work frames in the controller's world, by their code: `("G54", X_WB)`; those not given are
+    /// at the robot's base, with a note.
     pub offsets: Vec<(String, Pose)>,
     /// Frame of the machine coordinates (G53) in the controller's world.
     pub machine: Pose,
-    /// Where the tool is in the work frame at the start, mm; coordinates that are told neither here
-    /// nor in the first move are 0, which is noted.
+    /// Position of the tool in the work frame at the start, mm; coordinates given neither here nor
+    /// in the first move are 0, with a note.
     pub start_mm: Option<[f64; 3]>,
-    /// Point to which G28 goes, in machine coordinates, mm; `None`: G28 is refused. G30 likewise.
+    /// Target of G28 in machine coordinates, mm; `None`: G28 is rejected. G30 likewise.
     pub reference_mm: Option<[f64; 3]>,
-    /// Rapids (G0) are straight lines at this speed, m/s; `None`: they are joint moves.
+    /// Speed of rapids (G0) as straight lines, m/s; `None`: they are joint moves.
     pub rapid_m_s: Option<f64>,
-    /// The tool centre point is the tip of the tool, so that G43 with a tool length changes
-    /// nothing. `false`: G43 is refused.
+    /// Whether the tool centre point is the tip of the tool, so that G43 with a tool length has no
+    /// effect. `false`: G43 is rejected.
     pub tip_is_known: bool,
-    /// `P` of G4 is in milliseconds, not in seconds.
+    /// Whether `P` of G4 is in milliseconds instead of seconds.
     pub dwell_in_ms: bool,
-    /// How far the arcs by which a helix is made may be away from it, m.
+    /// Maximum distance of the arcs that replace a helix from it, m.
     pub helix_error_m: f64,
 }
 

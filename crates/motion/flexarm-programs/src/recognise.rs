@@ -1,11 +1,11 @@
-//! Which language a file is in, by its content; the name decides where the content allows several.
+//! Recognition of the language from the content of a file; its extension decides ambiguous cases.
 
 use crate::{Language, decode};
 
-/// The language of a program, or `None` if it is none that is read here.
+/// Returns the language of a program, or `None` if it is not supported.
 ///
-/// * `bytes`: what is in the file.
-/// * `name`: of the file; only its ending is used, and only where the content leaves it open.
+/// * `bytes`: content of the file.
+/// * `name`: file name; only its extension is used, and only if the content is ambiguous.
 pub fn recognise(bytes: &[u8], name: &str) -> Option<Language> {
     let text = decode(&bytes[..bytes.len().min(LOOKED_AT)]);
     if text.contains('\0') {
@@ -32,7 +32,7 @@ pub fn recognise(bytes: &[u8], name: &str) -> Option<Language> {
     }
 }
 
-/// Bytes at the beginning that are looked at.
+/// Number of leading bytes examined.
 const LOOKED_AT: usize = 1 << 18;
 
 fn language_of_ending(name: &str) -> Option<Language> {
@@ -46,7 +46,7 @@ fn language_of_ending(name: &str) -> Option<Language> {
     }
 }
 
-/// Does the line begin with one of the words, and does the word end there?
+/// Whether the line begins with one of the words as a whole word.
 fn begins(line: &str, words: &[&str]) -> bool {
     words.iter().any(|word| {
         line.strip_prefix(word).is_some_and(|rest| !rest.starts_with(|c: char| c.is_alphanumeric() || c == '_'))
@@ -109,7 +109,8 @@ fn is_urscript(line: &str) -> bool {
         || line.contains("= p[")
 }
 
-/// Lines that are words of one letter and a number; a lone one is none.
+/// Number of lines that consist of words of a letter and a number; 0 if they are less than a third
+/// of the lines or none has a G or M.
 fn gcode_score(lines: &[String]) -> usize {
     let blocks = lines.iter().filter(|line| is_gcode(line)).count();
     let codes = lines.iter().filter(|line| is_gcode(line) && line.contains(['g', 'm'])).count();

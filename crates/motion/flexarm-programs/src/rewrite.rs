@@ -1,9 +1,9 @@
-//! A program with other targets: the numbers of their literals are replaced, everything else stays
-//! as it is written.
+//! Rewrites a program with other targets: the numbers of their literals are replaced, everything
+//! else is kept.
 //!
-//! Start at [`read_program_text`]. A target can be replaced where it is a literal (`{X 1000, ...}`,
-//! `[[1000, ...], ...]`), in the statement or assigned to a variable that it names; what is
-//! computed, relative or indexed has no place of its own.
+//! Start at [`read_program_text`]. A target can be replaced if it is a literal (`{X 1000, ...}`,
+//! `[[1000, ...], ...]`), in the statement or assigned to a variable that it names; a computed,
+//! relative or indexed target has no literal of its own.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -21,53 +21,53 @@ use crate::common::value::Value;
 use crate::common::{Span, Text};
 use crate::{Language, ProgramError, ReadOptions, krl, rapid, read_recorded};
 
-/// Digits behind the point: mm, degrees, parts of quaternions. Nothing is lost by them that a
-/// controller would notice.
+/// Decimals of mm, degrees and quaternion components; the rounding is below what a controller
+/// resolves.
 const DIGITS: [usize; 3] = [4, 6, 9];
-/// Values from several visits of one literal that differ by less than so many units of the last
-/// digit are one value.
+/// Maximum difference of values for one literal from several moves that count as equal, in units of
+/// the last digit.
 const SAME: f64 = 2.5;
 /// The controller's own file, which other programs use as well.
 const CONFIGURATION: &str = "$config.dat";
 
-/// Where a move is to go.
+/// New target of a move.
 #[derive(Clone, Debug, PartialEq)]
 pub enum NewTarget {
     /// Values of the controller's axes (rad or m).
     Joints(Vec<f64>),
-    /// Pose `X_BT`, with the branch of the inverse kinematics; as much of the branch is written as
-    /// the old target tells.
+    /// Pose `X_BT` with the branch of the inverse kinematics; only those parts of the branch are
+    /// written that the old target gives.
     Pose {
         /// `X_BT`.
         X_BT: Pose,
-        /// Which branch.
+        /// Branch of the inverse kinematics.
         configuration: Configuration,
     },
 }
 
-/// A program that was read, with its texts.
+/// A program with its texts.
 pub struct ProgramText {
-    /// Its moves.
+    /// Moves of the program.
     pub program: Program,
-    /// Its language.
+    /// Language of the program.
     pub language: Language,
     texts: Vec<Text>,
     sources: Vec<Sources>,
-    /// Bytes of the files as they are on the disk, as far as they are written again.
+    /// Bytes of the program's own file, to keep its encoding.
     main: Vec<u8>,
 }
 
-/// The files of a program with other targets.
+/// Files of a program with other targets.
 pub struct Rewritten {
-    /// Files that changed, with the program's own first: names as they were, and bytes.
+    /// Changed files, with the program's own first: original names, and bytes.
     pub files: Vec<(PathBuf, Vec<u8>)>,
-    /// Moves by their number among the items whose targets were replaced.
+    /// Indices of the items whose targets were replaced.
     pub replaced: Vec<usize>,
-    /// Moves whose targets stay, and why.
+    /// Indices of the moves whose targets are unchanged, with the reason.
     pub left: Vec<(usize, &'static str)>,
 }
 
-/// Reads a program as [`crate::read_program`], and keeps where its targets stand.
+/// Reads a program like [`crate::read_program`], and keeps the places of its targets.
 ///
 /// # Errors
 /// As [`crate::read_program`].
@@ -77,12 +77,12 @@ pub fn read_program_text(path: &Path, bytes: &[u8], options: &ReadOptions<'_>) -
     Ok(ProgramText { program, language, texts, sources, main: bytes.to_vec() })
 }
 
-/// A number in a text and what takes its place.
+/// A number in a text and its replacement.
 #[derive(Clone, Debug)]
 struct Edit {
     value: f64,
     digits: usize,
-    /// What stands before the number: nothing, or the name of a coordinate that was not told.
+    /// Text inserted before the number: empty, or the name of a coordinate that was omitted.
     before: String,
 }
 
@@ -94,13 +94,13 @@ impl ProgramText {
         matches!(self.language, Language::Krl | Language::Rapid)
     }
 
-    /// The files with other targets, their lines as they were.
+    /// Returns the files with other targets; the lines are not moved.
     ///
-    /// * `targets`: of some items (by number among those of the program) where they are to go, and
-    ///   auxiliary points of circles, in the base B (m).
-    /// * `comment`: one line for the head of each file that changes, plain letters.
+    /// * `targets`: for some items (by index among those of the program) the new target, and the
+    ///   auxiliary point of a circle, in the base B (m).
+    /// * `comment`: one line of plain letters for the head of each changed file.
     ///
-    /// A literal that several moves use must become the same for all of them; otherwise it stays.
+    /// A literal used by several moves is replaced only if all of them agree.
     pub fn rewritten(&self, targets: &[(usize, NewTarget, Option<Vector3<f64>>)], comment: &str) -> Rewritten {
         let mut edits = Edits::new();
         let (mut replaced, mut left) = (Vec::new(), Vec::new());
@@ -112,7 +112,7 @@ impl ProgramText {
                 Err(why) => left.push((*item, why)),
             }
         }
-        // What several moves ask for differently stays as it is, for all of them.
+        // Conflicting replacements of a literal are dropped for all its moves.
         for (item, own) in &wanted {
             let differs = own.iter().any(|(place, edit)| {
                 edits.get(place).is_some_and(|old: &Edit| {
@@ -148,11 +148,11 @@ impl ProgramText {
         Ok(edits)
     }
 
-    /// The literal at a place, with places in its file.
+    /// Parses the literal at a place; spans are relative to its file.
     fn parsed(&self, source: Span) -> Result<Expr, &'static str> {
         let text = self.texts.get(source.file).ok_or("its target stands in no file")?;
         let name = text.path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
-        // The last text is what was given beside the files.
+        // The last text holds the given values.
         if source.file + 1 == self.texts.len() && self.texts.len() > 1 {
             return Err("its target was given beside the files");
         }
@@ -223,7 +223,7 @@ impl ProgramText {
         Ok(edits)
     }
 
-    /// The place of an auxiliary point.
+    /// Edits of an auxiliary point.
     fn point(&self, source: Span, p_B: &Vector3<f64>) -> Result<Edits, &'static str> {
         let literal = self.parsed(source)?;
         let (mut edits, p) = (Edits::new(), p_B * 1e3);
@@ -239,7 +239,7 @@ impl ProgramText {
         Ok(edits)
     }
 
-    /// The changed files, and always the program's own.
+    /// Returns the changed files, always including the program's own.
     fn files(&self, edits: &Edits, comment: &str) -> Vec<(PathBuf, Vec<u8>)> {
         let changed = |k: usize| k == 0 || edits.keys().any(|(file, ..)| *file == k);
         let texts = self.texts.iter().enumerate().filter(|(k, _)| changed(*k));
@@ -259,7 +259,7 @@ impl ProgramText {
             .collect()
     }
 
-    /// The comment behind the first line of the program, so that no line moves.
+    /// Inserts the comment after the first line of the program's text, so that no line moves.
     fn with_comment(&self, text: String, comment: &str) -> String {
         let (words, mark): (&[&str], _) = match self.language {
             Language::Krl => (&["def ", "deffct ", "defdat ", "global def"], ';'),
@@ -279,7 +279,7 @@ impl ProgramText {
         format!("{} {mark} {comment}{}", &text[..end], &text[end..])
     }
 
-    /// In the encoding that the file had.
+    /// Encodes the text as the file was encoded.
     fn encoded(&self, file: usize, text: &str) -> Vec<u8> {
         let old = if file == 0 { self.main.clone() } else { std::fs::read(&self.texts[file].path).unwrap_or_default() };
         match std::str::from_utf8(&old) {
@@ -290,7 +290,7 @@ impl ProgramText {
     }
 }
 
-/// A field of a record; one that is not told is added if it may be.
+/// Replaces a field of a record; a missing one is added if `add` is set.
 fn put_field(
     edits: &mut Edits,
     record: &Expr,
@@ -307,7 +307,7 @@ fn put_field(
             let end = record.span.end - 1;
             let comma = if fields.is_empty() { "" } else { ", " };
             let before = format!("{comma}{} ", name.to_uppercase());
-            // Several are added at one place: they stand after each other.
+            // Several fields added at one place follow each other.
             match edits.get_mut(&(record.span.file, end, end)) {
                 Some(edit) => {
                     edit.before += &format!("{}{before}", number(edit.value, edit.digits));
@@ -338,8 +338,8 @@ fn put(edits: &mut Edits, old: &Expr, value: f64, digits: usize) -> Result<(), &
     Ok(())
 }
 
-/// A number with so many digits, without zeros at the end; one digit stays behind the point unless
-/// none is asked for.
+/// Formats a number with at most `digits` decimals, without trailing zeros; at least one decimal is
+/// kept unless `digits` is 0.
 fn number(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$}");
     if digits == 0 {

@@ -1,5 +1,4 @@
-//! Whatever stands in a file: its language is recognised, no text makes a reader panic or run for
-//! ever.
+//! Arbitrary texts: the language is recognised, and no text makes a reader panic or run endlessly.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 mod common;
@@ -76,7 +75,7 @@ fn programs_that_grow_without_bound_end_with_a_clear_error() {
     assert!(error.contains("operators follow each other"), "{error}");
 }
 
-/// A number that no robot can follow is refused where it stands, before any work on it.
+/// A number beyond the range of a robot is rejected with its place, before further work.
 #[test]
 fn numbers_beyond_what_a_robot_can_do_are_refused_with_their_place() {
     let huge = format!("1{}", "0".repeat(308));
@@ -151,7 +150,7 @@ fn files_of_western_europe_and_of_windows_are_read() {
     assert_eq!(read_text("a.src", marked, &ReadOptions::default()).unwrap().items.len(), 1);
 }
 
-/// A change of a text.
+/// A mutation of a text.
 #[derive(Debug, Clone)]
 enum Change {
     Cut(usize, usize),

@@ -1,4 +1,4 @@
-//! G-code: values of a fixture against circles in closed form and numbers worked out by hand.
+//! G-code: values of a fixture against circles in closed form and numbers computed by hand.
 #![allow(non_snake_case, reason = "X_WB: a pose")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
@@ -45,7 +45,7 @@ fn whole_circles_and_helices_are_arcs_that_stay_on_them() {
     let program = read("plate.ngc", &ReadOptions::default());
     let all = moves(&program);
     let on_line = |line: usize| all.iter().filter(|step| step.line == line).copied().collect::<Vec<_>>();
-    // A whole circle of radius 5 about (5, 50), clockwise: two halves, over the top first.
+    // A full circle of radius 5 about (5, 50), clockwise: two halves, the upper one first.
     let circle = on_line(15);
     assert_eq!(circle.len(), 2);
     assert!((via_mm(circle[0]) - Vector3::new(5.0, 55.0, -1.0)).norm() < 1e-12);
@@ -63,7 +63,7 @@ fn whole_circles_and_helices_are_arcs_that_stay_on_them() {
         let (via, end) = (via_mm(piece), Vector3::from(place_mm(piece)));
         let u = |part: f64| std::f64::consts::TAU * (k as f64 + part) / count as f64;
         assert!((via - point(u(0.5))).norm() < 1e-11 && (end - point(u(1.0))).norm() < 1e-11);
-        // Plane and centre of the circle, by its perpendicular bisectors.
+        // Plane and centre of the circle, from its perpendicular bisectors.
         let normal = (via - start).cross(&(end - start)).normalize();
         let rows =
             nalgebra::Matrix3::from_rows(&[(via - start).transpose(), (end - start).transpose(), normal.transpose()]);
@@ -96,15 +96,15 @@ fn planes_radii_units_and_times_follow_the_standard() {
     assert_relative_eq!(at(20).speed.linear_m_s.unwrap(), 10.0 * 0.0254 / 60.0, max_relative = 1e-15);
     assert_eq!(at(22).speed.duration_s, Some(30.0)); // G93 F2: half a minute
 
-    // G18: I and K; from z to x is counterclockwise, seen from y. A negative radius takes the
-    // longer way.
+    // G18: I and K; from z to x is counterclockwise viewed from y. A negative radius selects the
+    // longer arc.
     let text =
         "G21 G61 G18 F600\nG0 X0 Y5 Z10\nG3 X10 Z0 I0 K-10\nG17\nG3 X0 Y-5 R-10\nG90.1\nG19\nG3 Y5 Z10 J-5 K10\nM2\n";
     let program = read_text("a.nc", text, &ReadOptions::default()).unwrap();
     let moves = moves(&program);
     let side = 10.0 * std::f64::consts::FRAC_1_SQRT_2;
     assert!((via_mm(moves[1]) - Vector3::new(side, 5.0, side)).norm() < 1e-12);
-    // From (10, 5) to (0, -5) with radius 10, the longer way counterclockwise: the centre is (0,
+    // From (10, 5) to (0, -5) with radius 10, the longer arc counterclockwise: the centre is (0,
     // 5), three quarters.
     assert!((via_mm(moves[2]) - Vector3::new(-side, 5.0 + side, 0.0)).norm() < 1e-12);
     // Absolute centre (y -5, z 10) of radius 10: a quarter, from (y -5, z 0) to (y 5, z 10).
@@ -130,7 +130,7 @@ fn work_frames_offsets_and_tilts_are_those_of_the_options() {
     assert_pose(&pose(moves[1]), &at_mm(15.0, 20.0, 30.0, euler_product(90.0, 30.0, 0.0) * down));
     // Machine coordinates (1000, 0, 300) are 100 mm above the work zero.
     assert_pose(&pose(moves[2]), &at_mm(0.0, 0.0, 100.0, euler_product(90.0, 30.0, 0.0) * down));
-    // In G54, which is the machine's own, the tool still is at (1000, 0, 300).
+    // In G54, which equals the machine frame, the tool is still at (1000, 0, 300).
     assert_pose(&moves[3].X_WB, &at_mm(0.0, 0.0, 0.0, Rotation3::identity()));
     assert_relative_eq!(place_mm(moves[3])[2], 300.0, max_relative = 1e-12);
     assert_relative_eq!(place_mm(moves[4])[2], 100.0, max_relative = 1e-12); // G28 by Z100
@@ -138,8 +138,7 @@ fn work_frames_offsets_and_tilts_are_those_of_the_options() {
     assert_relative_eq!(place_mm(moves[5])[0], 7.0, max_relative = 1e-12);
 }
 
-/// Truth: a place of the tool at the start, which the kinematics tell; what a line leaves out
-/// stays.
+/// Truth: the tool position at the start, known from the kinematics; omitted coordinates are kept.
 #[test]
 fn from_joint_values_at_the_start_rapids_at_a_speed_are_lines_from_where_the_tool_is() {
     let start = at_mm(40.0, 30.0, 80.0, Rotation3::identity());

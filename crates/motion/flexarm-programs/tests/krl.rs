@@ -1,5 +1,5 @@
-//! KUKA KRL: values of fixtures against products of rotation matrices written out and numbers
-//! worked out by hand.
+//! KUKA KRL: values of fixtures against explicit products of rotation matrices and numbers computed
+//! by hand.
 #![allow(non_snake_case, reason = "X_WB: a pose")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
@@ -32,14 +32,14 @@ fn inline_forms_of_a_pendant_take_speed_frames_and_blends_from_the_data_list() {
     assert_pose(&ptp.X_WB, &at_mm(500.0, 0.0, 100.0, euler_product(90.0, 0.0, 0.0)));
     assert_pose(&ptp.X_FT.unwrap(), &at_mm(10.0, 20.0, 150.0, euler_product(0.0, 90.0, 0.0)));
     assert_eq!((ptp.speed.joint_fraction, ptp.speed.joint_acceleration_fraction), (Some(0.3), Some(0.8)));
-    // 60 % of half the way
+    // 60 % of half the path
     assert_eq!(ptp.blend, Blend::Fraction(0.3));
     let Target::Pose { configuration, .. } = &ptp.to else { panic!() };
     assert_eq!(*configuration, Configuration::Kuka { status: Some(2), turn: Some(35) });
 
     assert_eq!((lin.speed.linear_m_s, lin.kind.clone()), (Some(0.4), MoveKind::Line));
     assert_relative_eq!(lin.speed.linear_m_s2.unwrap(), 0.5 * 2.3, max_relative = 1e-15);
-    // WAIT SEC behind the output stops what C_DIS would have blended.
+    // WAIT SEC after the output makes the move stop despite C_DIS.
     assert_eq!(lin.blend, Blend::Stop);
     assert_eq!(program.items[3], Item::Dwell { line: 31, seconds: 0.5 });
     let outputs = program.notes.iter().find(|note| note.text.starts_with("inputs and outputs")).unwrap();
@@ -58,7 +58,8 @@ fn what_a_target_leaves_out_stays_and_relative_moves_add() {
         }
         assert_relative_eq!(step.speed.joint_fraction.unwrap(), 0.4 * 0.5, max_relative = 1e-15);
     }
-    // The base is the product of two frames: 100 mm along the first one's y, turned by 90 degrees.
+    // The base is the product of two frames: 100 mm along y of the first one, rotated by 90
+    // degrees.
     let X_WB = at_mm(1000.0, 100.0, 0.0, euler_product(90.0, 0.0, 0.0));
     let R = euler_product(0.0, 0.0, 180.0);
     let expected = [(100.0, 50.0), (120.0, 50.0), (140.0, 50.0), (160.0, 50.0), (160.0, 80.0), (170.0, 75.0)];
@@ -74,15 +75,15 @@ fn what_a_target_leaves_out_stays_and_relative_moves_add() {
     );
     assert_eq!(moves[4].speed.linear_m_s, Some(0.1)); // 0.2 m/s at 50 %
     assert_relative_eq!(moves[4].speed.angular_rad_s.unwrap(), 50f64.to_radians(), max_relative = 1e-15);
-    assert_eq!(moves[4].speed.linear_m_s2, Some(1.5)); // the override leaves accelerations alone
+    assert_eq!(moves[4].speed.linear_m_s2, Some(1.5)); // the override does not affect accelerations
 }
 
 #[test]
 fn frames_are_seen_from_the_left_one_and_tool_moves_follow_the_tool() {
     let program = read("shapes.src", &ReadOptions::default());
     let moves = moves(&program);
-    // The tool points down (C = 180): -20 along its z is 20 upwards, a turn of 30 about it is -30
-    // about the base's z.
+    // The tool points down (C = 180): -20 along its z is 20 upwards, a rotation of 30 about it is
+    // -30 about the base's z.
     let R = euler_product(-30.0, 0.0, 0.0) * euler_product(0.0, 0.0, 180.0);
     assert_pose(&pose(moves[9]), &at_mm(160.0, 0.0, 70.0, R));
     assert_pose(&pose(moves[10]), &at_mm(160.0, 0.0, 50.0, R)); // 20 along the tool: downwards
@@ -141,7 +142,7 @@ fn a_relative_move_from_joint_values_uses_the_kinematics_that_are_given() {
         "DEF r()\n$TOOL={X 0,Y 0,Z 100,A 0,B 0,C 0}\nPTP {A1 90,A2 0,A3 0,A4 0,A5 0,A6 0}\nLIN_REL {X 50}\nEND\n";
     let refused = read_text("r.src", text, &ReadOptions::default()).unwrap_err();
     assert!(refused.starts_with("r.src:4:9: `{X 50}`: what is not told stays"), "{refused}");
-    // An arm of one metre that turns about z.
+    // An arm of one metre that rotates about z.
     let forward = |q: &[f64]| -> Option<Pose> {
         Some(at_mm(1000.0 * q[0].cos(), 1000.0 * q[0].sin(), 0.0, euler_product(q[0].to_degrees(), 0.0, 0.0)))
     };

@@ -1,5 +1,5 @@
-//! ABB RAPID: values of a fixture against rotation matrices of quaternions written out and numbers
-//! worked out by hand.
+//! ABB RAPID: values of a fixture against explicit rotation matrices of quaternions and numbers
+//! computed by hand.
 #![allow(non_snake_case, reason = "X_WB: a pose")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
@@ -11,7 +11,7 @@ use flexarm_path::program::{Blend, Configuration, Item, MoveKind, Target};
 use flexarm_programs::ReadOptions;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
-/// The matrix of a quaternion whose first part is the real one, written out.
+/// Explicit rotation matrix of a quaternion with the real part first.
 fn of_quaternion(q: [f64; 4]) -> Rotation3<f64> {
     let [w, x, y, z] = q;
     Rotation3::from_matrix_unchecked(Matrix3::new(
@@ -39,7 +39,7 @@ fn targets_tools_and_work_objects_are_poses_of_their_quaternions() {
     assert_pose(&pose(moves[1]), &at_mm(600.0, 100.0, 700.0, R));
     let half = std::f64::consts::FRAC_1_SQRT_2;
     assert_pose(&moves[1].X_FT.unwrap(), &at_mm(0.0, 0.0, 120.0, of_quaternion([half, 0.0, half, 0.0])));
-    // User frame turned by 90 degrees about z; the object frame's (0, 50) is (-50, 0) there.
+    // User frame rotated by 90 degrees about z; the object frame's (0, 50) is (-50, 0) there.
     assert_pose(&moves[1].X_WB, &at_mm(950.0, 0.0, 20.0, euler_product(90.0, 0.0, 0.0)));
     let Target::Pose { configuration, .. } = &moves[1].to else { panic!() };
     assert_eq!(*configuration, Configuration::Abb { quadrants: [0, -1, 2], cfx: 1 });
@@ -58,7 +58,7 @@ fn speeds_zones_and_times_are_those_of_their_data_and_switches() {
     assert_relative_eq!(moves[2].speed.linear_m_s.unwrap(), 0.075, max_relative = 1e-15);
     assert_relative_eq!(moves[2].speed.angular_rad_s.unwrap(), 30f64.to_radians(), max_relative = 1e-15);
     assert_eq!(moves[2].blend, Blend::Stop);
-    // \V goes before v200, \Z before z50; the loop counts downwards by itself.
+    // \V takes precedence over v200, \Z over z50; the loop counts downwards automatically.
     let xs: Vec<f64> = moves[3..5].iter().map(|step| pose(step).translation.x).collect();
     assert_eq!(xs, [0.65, 0.6]);
     for step in &moves[3..5] {

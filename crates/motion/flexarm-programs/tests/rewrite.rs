@@ -1,4 +1,4 @@
-//! Programs with other targets: lines and words stay, the reader finds the new targets.
+//! Programs with other targets: lines and words are kept, the reader finds the new targets.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
@@ -65,7 +65,7 @@ fn lines(bytes: &[u8]) -> Vec<String> {
     String::from_utf8(bytes.to_vec()).unwrap().split('\n').map(str::to_owned).collect()
 }
 
-/// Truth: the numbers that were asked for, to the digits that are written.
+/// Truth: the requested numbers, to the digits written.
 fn meets(old: &ProgramText, new: &ProgramText, asked: &Rewritten) {
     let targets = all(old);
     for k in &asked.replaced {
@@ -87,7 +87,7 @@ fn meets(old: &ProgramText, new: &ProgramText, asked: &Rewritten) {
 fn literals_of_krl_and_of_its_data_list_are_replaced_in_their_lines() {
     let old = read("square.src", KRL, &[("square.dat", DAT)]);
     let rewritten = old.rewritten(&all(&old), "compensated");
-    // What is told relative to the move before has no literal of its own.
+    // A target relative to the previous move has no literal of its own.
     assert_eq!(rewritten.replaced, [0, 1, 2, 3, 5]);
     assert_eq!(rewritten.left.len(), 1);
     assert!(rewritten.left[0].0 == 4 && rewritten.left[0].1.contains("relative"));
@@ -106,8 +106,8 @@ fn literals_of_krl_and_of_its_data_list_are_replaced_in_their_lines() {
         moves(&old).iter().map(|m| m.line).collect::<Vec<_>>(),
         moves(&new).iter().map(|m| m.line).collect::<Vec<_>>()
     );
-    // Coordinates that stayed are told now, because those before moved; branches that were not told
-    // are not.
+    // Unchanged coordinates are now written, because earlier ones changed; branches that were not
+    // given are still omitted.
     assert!(text.contains("LIN {Z 1194.0, X 1503.0, Y -3.0, A "), "{text}");
     // The auxiliary point.
     assert!(text.contains("CIRC {X 1400.0, Y 200.0, Z 1000.0}"), "{text}");
@@ -130,7 +130,7 @@ fn robtargets_and_jointtargets_are_replaced_and_shared_ones_only_if_all_agree() 
     let Target::Pose { X_BT: found, configuration } = &moves(&new)[3].to else { panic!() };
     assert!((found.translation.vector - X_BT.translation.vector).norm() < 1e-7);
     assert_eq!(*configuration, Configuration::Abb { quadrants: [-1, 0, 1], cfx: 2 });
-    // Asked for differently, the target stays for both.
+    // The target is unchanged for both moves if they request different values.
     let torn = old.rewritten(&all(&old), "compensated");
     assert_eq!(torn.replaced, [0]);
     assert!(torn.left.iter().filter(|(_, why)| why.contains("share")).count() == 2);

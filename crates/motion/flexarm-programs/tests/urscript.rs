@@ -1,5 +1,4 @@
-//! URScript: values of a fixture against Rodrigues' formula written out and numbers worked out by
-//! hand.
+//! URScript: values of a fixture against Rodrigues' formula and numbers computed by hand.
 #![allow(non_snake_case, reason = "X_WB: a pose")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
@@ -20,7 +19,7 @@ fn poses_are_places_and_rotation_vectors_in_the_base() {
     assert_eq!(moves[0].to, Target::Joints(vec![0.0, -1.57, 1.57, -1.57, -1.57, 0.0]));
     assert_eq!((moves[0].speed.joint_rad_s, moves[0].speed.joint_rad_s2), (Some(0.8), Some(2.0)));
     assert_pose(&moves[0].X_FT.unwrap(), &at_mm(0.0, 0.0, 150.0, euler_product(0.0, 90.0, 0.0)));
-    // The feature's x axis is the base's y axis; the tool is turned by 180 degrees about x.
+    // The feature's x axis is the base's y axis; the tool is rotated by 180 degrees about x.
     let R = euler_product(90.0, 0.0, 0.0) * euler_product(0.0, 0.0, 180.0);
     for (k, step) in moves[1..4].iter().enumerate() {
         assert_pose(&pose(step), &at_mm(400.0, -200.0 + 50.0 * k as f64, 100.0, R));
@@ -54,8 +53,7 @@ fn an_arc_of_mode_1_turns_the_tool_with_the_circle() {
 
 #[test]
 fn functions_of_poses_follow_the_manual() {
-    // pose_add adds places and lets turns follow each other; the inverse undoes; interpolation is
-    // even.
+    // pose_add adds positions and composes rotations; the inverse undoes; interpolation is uniform.
     let text = "a = p[0.1, 0.2, 0.3, 0.4, 0, 0]\nb = p[0.01, 0.02, 0.03, 0, 0.5, 0]\nmovej(pose_add(a, b))\n\
         movel(pose_trans(pose_inv(a), pose_trans(a, b)))\nmovel(interpolate_pose(a, p[0.3, 0.2, 0.3, 1.2, 0, 0], 0.25))\n\
         r = rpy2rotvec([0.1, 0.2, 0.3])\nmovel(p[0, 0, 0.5, r[0], r[1], r[2]])\nb[2] = 0.7\nmovel(b)\nx = (2 + 4) / 3 - 5 % 3\nsleep(x + 0.5)\n\

@@ -1,28 +1,27 @@
-//! The convex programs of [`crate::jerk_law`]: a cubic spline of least time within its bounds, by
-//! an interior-point method.
+//! Interior-point method for the convex programs of [`crate::jerk_law`]: minimises the travel time
+//! of a cubic spline within its bounds.
 #![allow(non_snake_case, reason = "letters of the formulas")]
 
 use crate::jerk_law::{Place, QuinticLaw};
 use crate::time_law::Progress;
 
-/// By this the weight of the barrier falls.
+/// Factor by which the weight of the barrier decreases.
 const FALL: f64 = 0.1;
-/// Most steps of Newton's method for one weight.
+/// Maximum number of Newton steps for one weight.
 const STEPS: usize = 40;
-/// Most halvings of a step.
+/// Maximum number of halvings of a step.
 const HALVINGS: usize = 40;
-/// A weight is done with where a step gains less than this part of it.
+/// Newton's method ends for a weight when the decrement is below this fraction of the weight.
 const CENTRED: f64 = 0.05;
-/// The search begins this far inside of all bounds.
+/// The search starts at this fraction of the tightest bound.
 const INSIDE: f64 = 0.95;
-/// Places of an interval where bounds are kept.
+/// Places within an interval at which the bounds are enforced, as fractions of the interval.
 const PARTS: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
-/// Three points of Gauss with their weights.
+/// Three-point Gauss quadrature on 0 to 1: points and weights.
 const GAUSS: [(f64, f64); 3] =
     [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
 
-/// Moments, speeds and accelerations at the nodes of a law that is improved, as
-/// [`QuinticLaw::improved`] tells.
+/// Times, speeds and accelerations at the nodes of the improved law; see [`QuinticLaw::improved`].
 pub(crate) fn improved(
     law: &QuinticLaw,
     gap: [f64; 2],
@@ -46,13 +45,13 @@ pub(crate) fn improved(
     (t, v, a)
 }
 
-/// `f c < 1` over four coefficients from `i` on.
+/// `f c < 1` for the four coefficients `c` from index `i` on.
 struct Linear {
     i: usize,
     f: [f64; 4],
 }
 
-/// `|f c| < (e c)^(-1/2)`, both over four coefficients from `i` on.
+/// `|f c| < (e c)^(-1/2)` for the four coefficients `c` from index `i` on.
 struct Third {
     i: usize,
     f: [f64; 4],
@@ -76,9 +75,9 @@ fn dot(f: &[f64; 4], c: &[f64]) -> f64 {
     f[0] * c[0] + f[1] * c[1] + f[2] * c[2] + f[3] * c[3]
 }
 
-/// Cubic B-splines over nodes.
+/// Cubic B-splines on a sequence of nodes.
 struct Spline {
-    /// Nodes, those at the ends four times.
+    /// Knots: the nodes, with the first and the last repeated four times.
     knots: Vec<f64>,
 }
 
@@ -90,13 +89,13 @@ impl Spline {
         Self { knots }
     }
 
-    /// Values, halves of the first and halves of the second derivatives at `theta` of the four
-    /// splines of interval `k` [de Boor 1978].
+    /// Values, half the first and half the second derivatives at `theta` of the four B-splines that
+    /// are not zero on interval `k` [de Boor 1978].
     fn at(&self, k: usize, theta: f64) -> [[f64; 4]; 3] {
         let (K, m) = (&self.knots, k + 3);
-        // Knots under spline i of degree p.
+        // Length of the support of spline i of degree p.
         let length = |i: usize, p: usize| K[i + p + 1] - K[i];
-        // B[p][1 + j] is spline m - p + j of degree p; zeros on both sides.
+        // B[p][1 + j] is spline m - p + j of degree p; zero padding on both sides.
         let mut B = [[0.0; 5]; 4];
         B[0][1] = 1.0;
         for p in 1..4 {
@@ -107,7 +106,8 @@ impl Spline {
                 B[p][1 + j] = left + right;
             }
         }
-        // Derivatives of splines of degree p from values, or derivatives, of one degree less.
+        // Derivatives of the splines of degree p from the values (or derivatives) of those of
+        // degree p - 1.
         let derive = |p: usize, lower: &[f64; 5]| {
             let mut D = [0.0; 5];
             for j in 0..=p {
@@ -124,7 +124,7 @@ impl Spline {
     }
 }
 
-/// All bounds and the duration over the coefficients of the spline.
+/// All bounds and the duration as functions of the spline coefficients.
 struct Problem {
     spline: Spline,
     linear: Vec<Linear>,
@@ -132,7 +132,8 @@ struct Problem {
     times: Vec<Time>,
 }
 
-/// Symmetric matrix with three lines beside the diagonal.
+/// Symmetric matrix with three superdiagonals; each row holds the diagonal entry and those right of
+/// it.
 type Banded = Vec<[f64; 4]>;
 
 impl Problem {
@@ -153,7 +154,7 @@ impl Problem {
         problem
     }
 
-    /// Takes in what holds at a place of interval `i`.
+    /// Adds the bounds at one place of interval `i`.
     fn keep(&mut self, i: usize, theta: f64, at: &Progress, place: &Place) {
         let [y, u, w] = self.spline.at(i, theta);
         let (v, x) = (at.v, at.v * at.v);
@@ -175,14 +176,14 @@ impl Problem {
         }
     }
 
-    /// `f c <= most` with a positive, `f c >= most` with a negative one.
+    /// Adds `f c <= most` for positive `most`, `f c >= most` for negative `most`.
     fn below(&mut self, i: usize, f: [f64; 4], most: f64) {
         if most.is_finite() && f != [0.0; 4] {
             self.linear.push(Linear { i, f: f.map(|f| f / most) });
         }
     }
 
-    /// Coefficients of the given law slowed evenly until it keeps all bounds.
+    /// Coefficients of the given law, slowed uniformly until it is strictly inside all bounds.
     fn inside(&self, n: usize) -> Vec<f64> {
         let ones = [1.0; 4];
         let linear = self.linear.iter().map(|bound| dot(&bound.f, &ones)).fold(0.0, f64::max);
@@ -195,7 +196,8 @@ impl Problem {
         self.times.iter().map(|time| time.at(c)).sum()
     }
 
-    /// Duration less `mu` times the logarithms of all distances from bounds; infinite outside.
+    /// Barrier function: duration minus `mu` times the sum of the logarithms of all slacks;
+    /// infinite outside.
     fn value(&self, c: &[f64], mu: f64) -> f64 {
         let mut logs = Logs { product: 1.0, sum: 0.0 };
         for bound in &self.linear {
@@ -210,7 +212,8 @@ impl Problem {
         if value.is_nan() { f64::INFINITY } else { value }
     }
 
-    /// Gradient and Hessian, without the part of it by which a bound of jerk is not convex.
+    /// Gradient and Hessian of the barrier function; the Hessian omits the non-convex part of the
+    /// jerk bounds.
     fn derivatives(&self, c: &[f64], mu: f64, g: &mut [f64], H: &mut Banded) {
         g.fill(0.0);
         H.fill([0.0; 4]);
@@ -241,7 +244,7 @@ impl Problem {
         }
     }
 
-    /// From coefficients inside all bounds to those of the least time.
+    /// Replaces coefficients inside all bounds by those of the shortest duration.
     fn minimise(&self, c: &mut Vec<f64>, gap: [f64; 2]) {
         let n = c.len();
         let (mut g, mut H, mut trial) = (vec![0.0; n], vec![[0.0; 4]; n], vec![0.0; n]);
@@ -266,7 +269,7 @@ impl Problem {
                 value = there;
                 std::mem::swap(c, &mut trial);
             }
-            // Each bound is worth its weight.
+            // Duality gap: each bound contributes `mu`.
             if mu * count < gap[1] * self.duration(c) {
                 return;
             }
@@ -275,7 +278,7 @@ impl Problem {
     }
 }
 
-/// Sum of logarithms as logarithms of products that neither over- nor underflow.
+/// Sum of logarithms, accumulated as logarithms of products that neither overflow nor underflow.
 struct Logs {
     product: f64,
     sum: f64,
@@ -299,7 +302,8 @@ impl Logs {
     }
 }
 
-/// Solution of a positive definite system, whose matrix becomes its factors; `None` if it is not.
+/// Solves a positive definite system and replaces the matrix by its factors; `None` if it is not
+/// positive definite.
 fn solve(H: &mut Banded, g: &[f64]) -> Option<Vec<f64>> {
     let n = g.len();
     let mut x = g.to_vec();

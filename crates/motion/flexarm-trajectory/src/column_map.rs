@@ -1,8 +1,9 @@
-//! Which columns of a table are the time and the joints, told by the user.
+//! User's assignment of table columns to the time and the joints.
 
 use std::str::FromStr;
 
-/// Which columns of a table hold what. Without one, the names in the header say it.
+/// Assignment of table columns to the time and the joints. Without one, the names in the header
+/// decide.
 ///
 /// ```
 /// use flexarm_trajectory::ColumnMap;
@@ -12,23 +13,23 @@ use std::str::FromStr;
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ColumnMap {
-    /// Column of the time.
+    /// Time column.
     pub time: Option<String>,
-    /// Joints and their columns. Each column is the whole name in the header, the name without its
-    /// unit, a name with another unit in brackets behind it (`A1[deg]`), or a number from 1
-    /// (`#2[rad]`).
+    /// Joints and their columns. A column is given by its full name in the header, by its name
+    /// without the unit, by its name with another unit in brackets (`A1[deg]`), or by its number
+    /// from 1 (`#2[rad]`).
     pub joints: Vec<(String, String)>,
 }
 
 impl ColumnMap {
-    /// With the column of the time.
+    /// Sets the time column.
     #[must_use]
     pub fn with_time(mut self, column: &str) -> Self {
         self.time = Some(column.to_owned());
         self
     }
 
-    /// With the column of a joint.
+    /// Adds the column of a joint.
     #[must_use]
     pub fn with_joint(mut self, joint: &str, column: &str) -> Self {
         self.joints.push((joint.to_owned(), column.to_owned()));
@@ -36,20 +37,20 @@ impl ColumnMap {
     }
 }
 
-/// A text that is no map of columns.
+/// Text that is not a valid column map.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
     "{found:?}: expected pairs such as t=Time[s],joint_1=A1[deg] with t (or time) and the names of joints before the signs"
 )]
 pub struct ColumnMapError {
-    /// The part that is none.
+    /// The invalid part.
     pub found: String,
 }
 
 impl FromStr for ColumnMap {
     type Err = ColumnMapError;
 
-    /// Pairs `t=Time[s],joint_1=A1[deg]`; `t` and `time` stand for the time.
+    /// Parses pairs such as `t=Time[s],joint_1=A1[deg]`; `t` and `time` both mean the time.
     fn from_str(text: &str) -> Result<Self, ColumnMapError> {
         let mut map = Self::default();
         for pair in text.split(',').filter(|pair| !pair.trim().is_empty()) {

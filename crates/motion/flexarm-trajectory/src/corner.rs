@@ -1,51 +1,50 @@
-//! Corners of sampled positions: where the velocity jumps from one sample to the next, as distinct
-//! from curvature.
+//! Corners of sampled positions: velocity jumps between samples, as distinct from curvature.
 //!
-//! Between samples the position has the slopes s; over a sample they change by
-//! `d_i = s_i - s_(i-1)`. Smooth data share their changes among neighbours, noise and rounding
-//! change sign from sample to sample. A corner stands alone: at a sample it is in one d, between
-//! two samples in two of the same sign, whose shares tell where it lies.
+//! Between samples the position has slopes s, which change at a sample by `d_i = s_i - s_(i-1)`. In
+//! smooth data neighbouring changes are similar; noise and rounding change sign from sample to
+//! sample. A corner is isolated: at a sample it appears in one d, between two samples in two d of
+//! the same sign, whose ratio gives its place.
 //!
-//! Start at [`corners`]. Not here: what a spline does with them, and velocities that a file gives.
+//! Start at [`corners`]. Not here: how a spline treats corners, and velocities given in a file.
 
-/// A corner stands out so many times over the changes of slope around it.
+/// Ratio of a corner's change of slope to the largest one around it, at least.
 const STANDS_OUT: f64 = 10.0;
-/// Changes of slope that are looked at on either side, and how many there must be.
+/// Number of changes of slope considered on either side, and minimum number required.
 const AROUND: usize = 4;
 const LEAST_AROUND: usize = 2;
-/// Smaller jumps are left to the spline, as parts of the top speed.
+/// Smaller jumps are left to the spline; fraction of the top speed.
 const SMALLEST: f64 = 1e-4;
-/// Samples on either side over which rounded data must differ from a smooth curve, in steps of the
-/// rounding. Half a step is what rounding leaves; a corner of one step per sample leaves 3/32 of
-/// the window, 1.1 over the shorter one.
+/// Numbers of samples on either side of a corner, over which rounded data must differ from a smooth
+/// curve by more than `BEYOND_ROUNDING` rounding steps. Rounding alone leaves half a step; a corner
+/// of one step per sample leaves 3/32 of the window, 1.1 steps over the shorter one.
 const WINDOWS: [usize; 2] = [16, 12];
 const BEYOND_ROUNDING: f64 = 1.0;
-/// A corner nearer to a sample than this part of the interval is at the sample.
+/// A corner within this fraction of the interval from a sample is placed at the sample.
 const AT_SAMPLE: f64 = 0.01;
 
-/// A corner after sample `sample`, or at it.
+/// Corner at sample `sample` or between it and the next one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Corner {
     pub(crate) sample: usize,
-    /// Part of the interval to the next sample, 0 to 1; 0 is at the sample.
+    /// Fraction of the interval to the next sample, 0 to 1; 0 is at the sample.
     pub(crate) fraction: f64,
-    /// Position there.
+    /// Position at the corner.
     pub(crate) position: f64,
 }
 
-/// The corners of positions q at times t, in order.
+/// Returns the corners of positions q at times t, in ascending order.
 pub(crate) fn corners(t: &[f64], q: &[f64]) -> Vec<Corner> {
     let last = q.len() - 1;
     let slope: Vec<f64> = (0..last).map(|i| (q[i + 1] - q[i]) / (t[i + 1] - t[i])).collect();
     let top = slope.iter().fold(0.0, |top: f64, s| top.max(s.abs()));
-    // Positions are known to a few units in the last place.
+    // Positions are exact to a few units in the last place.
     let size = q.iter().fold(0.0, |size: f64, q| size.max(q.abs()));
     let rounding = |i: usize| 1e-14 * size / (t[i + 1] - t[i]).min(t[i] - t[i - 1]);
-    // Accelerations at the inner samples.
+    // Acceleration at inner sample i: change(i) / span(i).
     let span = |i: usize| 0.5 * (t[i + 1] - t[i - 1]);
     let change = |i: usize| slope[i] - slope[i - 1];
-    // What is ordinary around the samples `i..=j`, as an acceleration; unknown where too few
-    // samples are near.
+    // Largest acceleration around the samples `i..=j`, and the means on the left and on the right;
+    // `None` with too few samples nearby.
     let around = |i: usize, j: usize| {
         let (left, right) = (i.saturating_sub(AROUND).max(1)..i, j + 1..last.min(j + 1 + AROUND));
         let enough = left.len() >= LEAST_AROUND && right.len() >= LEAST_AROUND;
@@ -61,8 +60,8 @@ pub(crate) fn corners(t: &[f64], q: &[f64]) -> Vec<Corner> {
     };
 
     let resolution = resolution(q);
-    // Whether a cubic, rounded, would give the same samples: then what stands out is a step of the
-    // rounding.
+    // Whether the samples equal a cubic within rounding: then the apparent corner is a rounding
+    // step.
     let is_rounding = |i: usize| {
         resolution > 0.0
             && WINDOWS.iter().any(|window| {
@@ -76,7 +75,7 @@ pub(crate) fn corners(t: &[f64], q: &[f64]) -> Vec<Corner> {
     while i < last {
         let between = (i + 1 < last).then(|| around(i, i + 1)).flatten().and_then(|(most, left, right)| {
             let h = t[i + 1] - t[i];
-            // The curvature beside the corner is not part of it.
+            // Subtracts the curvature on either side, which is not part of the corner.
             let shares = [change(i) - left * span(i), change(i + 1) - right * span(i + 1)];
             let jump = shares[0] + shares[1];
             let fraction = shares[1] / jump;
@@ -100,12 +99,12 @@ pub(crate) fn corners(t: &[f64], q: &[f64]) -> Vec<Corner> {
     corners
 }
 
-/// The step that all positions are multiples of, but for an offset: decimals of a table, counts of
-/// an encoder. 0 when there is none that matters.
+/// Resolution of positions that are multiples of a step plus an offset: decimals of a table, counts
+/// of an encoder. 0 if there is no significant one.
 fn resolution(q: &[f64]) -> f64 {
     let differences = || q.windows(2).map(|pair| (pair[1] - pair[0]).abs());
     let least = 1e-5 * differences().fold(0.0, f64::max);
-    // Euclid's algorithm; what is below `least` is zero, as is what is short of a multiple by less.
+    // Euclid's algorithm; remainders within `least` of zero or of a full multiple count as zero.
     let divisor = |mut a: f64, mut b: f64| {
         while b > least {
             let rest = a % b;
@@ -123,13 +122,13 @@ fn resolution(q: &[f64]) -> f64 {
     step
 }
 
-/// Largest distance of samples from the cubic of least squares through them.
+/// Largest distance of samples from their least-squares cubic.
 fn distance_from_cubic(t: &[f64], q: &[f64]) -> f64 {
     let (first, last) = (t[0], t[t.len() - 1]);
     let x: Vec<f64> = t.iter().map(|t| 2.0 * (t - first) / (last - first) - 1.0).collect();
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let mut rest = q.to_vec();
-    // 1, x, x² and x³, each without its part along those before: the sums of squares fall apart.
+    // 1, x, x² and x³, orthogonalised one after the other (Gram-Schmidt).
     let mut basis: Vec<Vec<f64>> = Vec::new();
     for power in 0..4 {
         let mut column: Vec<f64> = x.iter().map(|x| x.powi(power)).collect();
@@ -154,7 +153,7 @@ mod tests {
         corners(&t, &q).iter().map(|c| (h * (c.sample as f64 + c.fraction), c.position)).collect()
     }
 
-    /// Truth: two parabolas that meet in a corner, at a sample and anywhere between two.
+    /// Truth: two parabolas that meet in a corner, at a sample or between two samples.
     #[test]
     fn a_corner_is_found_where_it_is() {
         for corner in [0.5, 0.5002, 0.5007, 0.50049] {
@@ -169,7 +168,8 @@ mod tests {
         }
     }
 
-    /// Truth: a path to and fro, in a table whose last digit is as large as one sample's way.
+    /// Truth: a path back and forth, in a table whose last digit is as large as the motion per
+    /// sample.
     #[test]
     fn corners_of_rounded_data_are_found() {
         for step in [1e-3, 1e-4, 1e-6] {
@@ -183,8 +183,8 @@ mod tests {
         }
     }
 
-    /// Accelerations that jump, fast curvature, coarse data, rounding to five digits, noise: no
-    /// corner in any of them.
+    /// No corner is found in jumps of the acceleration, fast curvature, coarse data, rounding to
+    /// five digits or noise.
     #[test]
     fn smooth_and_rough_data_have_no_corners() {
         let trapezoid = |t: f64| if t < 0.3 { 5.0 * t * t } else { 0.45 + 3.0 * (t - 0.3) };

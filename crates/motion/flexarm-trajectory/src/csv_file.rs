@@ -11,13 +11,12 @@
 //! * The first line that is neither blank nor a comment names the columns: `time` in s, one column
 //!   per joint, and optionally `<joint>.vel` and `<joint>.acc`. Columns are separated by commas and
 //!   may come in any order.
-//! * Lines that start with `#` are comments. Three of them mean something: `# unit: rad` (the
+//! * Lines that start with `#` are comments. Three comments have a meaning: `# unit: rad` (the
 //!   default) or `# unit: deg` for all joint columns, with `deg/s` and `deg/s²` for velocities and
 //!   accelerations; `# metres: joint_x, joint_y` names prismatic joints, whose columns are in m
-//!   whatever the unit; `# time: s`.
+//!   regardless of the unit; `# time: s`.
 //! * Times must increase; the first one becomes `t = 0`. Steps may vary.
-//! * Between the rows the joints follow quintic splines; [`crate::Samples::interpolate`] tells how,
-//!   by what is given.
+//! * Between the rows the joints follow quintic splines; see [`crate::Samples::interpolate`].
 //!
 //! Not here: the splines. Start at [`Trajectory::parse_csv`].
 
@@ -27,20 +26,19 @@ use crate::spline::{JointSamples, Samples, not_increasing};
 use crate::trajectory::{ToldUnit, Trajectory};
 use crate::warning::Warning;
 
-/// A joint of a file without a unit that reaches this is likely to be in degrees: two turns.
+/// A joint position above this (two turns) in a file without a unit is probably in degrees.
 const SUSPICIOUS_ANGLE: f64 = 4.0 * std::f64::consts::PI;
 
-/// Most numbers of a file.
+/// Maximum number of values in a file.
 const MOST_NUMBERS: usize = 30_000_000;
 
 impl Trajectory {
-    /// Reads sampled joint values; the page of the module [`crate::csv_file`] describes the format.
+    /// Reads sampled joint values; the module page [`crate::csv_file`] describes the format.
     ///
     /// * `origin`: file name for messages.
     ///
     /// # Errors
-    /// [`TrajectoryError::File`] with the line, the number of the column where it matters, what was
-    /// found and how to mend it.
+    /// [`TrajectoryError::File`] with the line and, where it applies, the column of the problem.
     pub fn parse_csv(text: &str, origin: &str) -> Result<Self, TrajectoryError> {
         parse(text.trim_start_matches('\u{feff}')).map_err(|Located { line, column, problem, more_lines }| {
             let (origin, problem) = (origin.to_owned(), *problem);
@@ -49,12 +47,12 @@ impl Trajectory {
     }
 }
 
-/// A problem and its place.
+/// A problem and its place in the file.
 struct Located {
     line: Option<usize>,
     column: Option<usize>,
     problem: Box<Problem>,
-    /// Further lines with something wrong.
+    /// Other lines that are wrong.
     more_lines: Vec<usize>,
 }
 
@@ -66,7 +64,7 @@ fn nowhere(problem: Problem) -> Located {
     Located { line: None, column: None, problem: Box::new(problem), more_lines: Vec::new() }
 }
 
-/// What a column holds.
+/// Quantity that a column holds.
 #[derive(Clone, Copy, PartialEq)]
 enum Quantity {
     Time,
@@ -87,8 +85,8 @@ fn parse(text: &str) -> Result<Trajectory, Located> {
     let mut rows: Vec<(usize, Vec<f64>)> = Vec::new();
     let (mut repeated, mut wrong): (usize, Option<Located>) = (0, None);
     for record in reader.records() {
-        // The text is UTF-8 and rows may differ in length, so the reader has nothing left to
-        // complain about.
+        // The text is UTF-8 and rows of different lengths are accepted, so the reader cannot fail
+        // otherwise.
         let record = record.map_err(|_| nowhere(Problem::NotUtf8))?;
         let line = record.position().map_or(0, |position| line_of(text, position));
         if record.iter().all(str::is_empty) && record.len() <= 1 {
@@ -121,8 +119,8 @@ fn parse(text: &str) -> Result<Trajectory, Located> {
     Ok(if repeated > 0 { trajectory.with_note(Warning::RepeatedRows { count: repeated }) } else { trajectory })
 }
 
-/// Line of a record, from 1. The position that the reader gives lies before the blank and comment
-/// lines that it skipped to get to the record.
+/// Line of a record, from 1. The reader's position is before the blank and comment lines that it
+/// skipped to reach the record.
 fn line_of(text: &str, position: &csv::Position) -> usize {
     let rest = text.get(position.byte() as usize..).unwrap_or_default();
     let skipped = rest.lines().take_while(|line| line.is_empty() || line.starts_with('#')).count();
@@ -147,7 +145,7 @@ fn numbers(record: &csv::StringRecord, line: usize, columns: &[String]) -> Resul
     Ok(values)
 }
 
-/// The line that names the columns.
+/// The header line that names the columns.
 struct Header {
     line: usize,
     columns: Vec<String>,
@@ -195,7 +193,7 @@ impl Header {
     }
 }
 
-/// Sorts the columns by joint and converts them to SI.
+/// Groups the columns by joint and converts them to SI.
 fn assemble(header: &Header, rows: &[(usize, Vec<f64>)], units: &Units) -> Result<Samples, Located> {
     let positions = header.meaning.iter().filter(|(_, quantity)| *quantity == Quantity::Position);
     let names: Vec<String> = positions.map(|(name, _)| name.clone()).collect();
@@ -219,7 +217,7 @@ fn assemble(header: &Header, rows: &[(usize, Vec<f64>)], units: &Units) -> Resul
     Ok(Samples { times: column("time", Quantity::Time).unwrap_or_default(), joints })
 }
 
-/// Gives what is wrong with the samples its place in the file.
+/// Adds the place in the file to an error in the samples.
 fn placed(error: TrajectoryError, samples: &Samples, header: &Header, rows: &[(usize, Vec<f64>)]) -> Located {
     match error {
         TrajectoryError::Samples(error) => {
@@ -240,7 +238,7 @@ fn placed(error: TrajectoryError, samples: &Samples, header: &Header, rows: &[(u
             let row = samples.times.iter().position(|t| t - samples.times[0] >= time_s).unwrap_or(0);
             located(rows[row].0, None, Problem::OutOfRange { joint })
         }
-        // `interpolate` knows no other error; should it learn one, its text is still passed on.
+        // `interpolate` has no other error today; the text of a future one is passed on.
         other => located(header.line, None, Problem::Toml { message: other.to_string() }),
     }
 }
@@ -259,12 +257,12 @@ fn with_doubts(trajectory: Trajectory, samples: &Samples, units: &Units) -> Traj
     })
 }
 
-/// What the comments say about units.
+/// Units stated in the comments.
 #[derive(Default)]
 struct Units {
-    /// Is the angle unit degrees? `None` when the file does not say.
+    /// Whether angles are in degrees; `None` if the file does not say.
     degrees: Option<bool>,
-    /// Line that says so.
+    /// Line that states the unit.
     line: usize,
     /// Prismatic joints, with the line that names them.
     metres: Vec<(usize, String)>,
@@ -309,7 +307,7 @@ impl Units {
         Ok(())
     }
 
-    /// What they say about a joint.
+    /// Unit stated for a joint.
     fn told(&self, joint: &str) -> Option<ToldUnit> {
         let told = |is_length: bool, line: usize| ToldUnit { joint: joint.to_owned(), is_length, line };
         match self.metres.iter().find(|(_, name)| name == joint) {

@@ -1,4 +1,4 @@
-//! A trajectory as a CSV file that [`Trajectory::parse_csv`] reads again.
+//! Writes a trajectory as a CSV file that [`Trajectory::parse_csv`] reads.
 
 use std::io::Write;
 
@@ -7,13 +7,13 @@ use flexarm_settings::written::csv_field;
 use crate::error::TrajectoryError;
 use crate::trajectory::Trajectory;
 
-/// More rows than this are a mistake in the rate.
+/// Maximum number of rows; more means a wrong rate.
 const MOST_ROWS: f64 = 1e8;
 
 impl Trajectory {
-    /// Writes positions, velocities and accelerations in SI units: a row every `1 / rate_hz` s from
-    /// `t = 0`, and one at the end. Numbers are written in full, so that reading gives back the
-    /// same values.
+    /// Writes positions, velocities and accelerations in SI units: one row every `1 / rate_hz` s
+    /// from `t = 0`, and one at the end. Numbers are written in full precision, so that reading
+    /// returns the same values.
     ///
     /// # Errors
     /// [`TrajectoryError::BadRate`] or [`TrajectoryError::Write`].
@@ -33,7 +33,7 @@ impl Trajectory {
 
         let n = self.joints().len();
         let (mut q, mut qdot, mut qddot) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-        // The last regular row gives way to the one at the end when both fall together.
+        // The row at the end replaces the last regular row where they coincide.
         let regular = (intervals - 1e-6).ceil().max(1.0) as usize;
         for k in 0..=regular {
             let t = if k == regular { duration_s } else { k as f64 / rate_hz };

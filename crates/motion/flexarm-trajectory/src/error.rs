@@ -1,8 +1,7 @@
-//! Everything that can be wrong with a trajectory: where, what was found, what was expected, how to
-//! mend it.
+//! Errors of trajectories: place, value found, value expected and remedy.
 //!
-//! Each error is one line through `Display` and a plain enum for programs. A [`FileError`] adds
-//! file, line and column to a [`Problem`]; the others have no place in a file.
+//! Each error displays as one line and is a plain enum for programs. A [`FileError`] adds file,
+//! line and column to a [`Problem`]; the other errors have no place in a file.
 
 use std::fmt;
 use std::io;
@@ -12,7 +11,7 @@ use crate::polynomial::FARTHEST;
 use crate::problem::{PlanError, Problem, SampleError, list};
 use crate::trajectory::LONGEST;
 
-/// Why there is no trajectory.
+/// Error of reading, planning or writing a trajectory.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TrajectoryError {
@@ -21,24 +20,24 @@ pub enum TrajectoryError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the operating system says.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// The file is of no known kind.
+    /// The file extension is unknown.
     #[error("trajectory {}: the ending is {found:?}, expected .csv (samples) or .toml (waypoints); rename or convert the file", path.display())]
     UnknownExtension {
         /// The file.
         path: PathBuf,
-        /// Its ending, without the dot.
+        /// Its extension, without the dot.
         found: String,
     },
     /// The content of a file is wrong.
     #[error(transparent)]
     File(#[from] Box<FileError>),
-    /// Sampled values are wrong.
+    /// Sampled values are invalid.
     #[error(transparent)]
     Samples(#[from] SampleError),
-    /// A plan is wrong.
+    /// A plan is invalid.
     #[error(transparent)]
     Plan(#[from] PlanError),
     /// The joints of the trajectory are not those of the robot.
@@ -49,16 +48,16 @@ pub enum TrajectoryError {
         list(want)
     )]
     JointOrder {
-        /// Wanted, but not in the trajectory.
+        /// Expected joints that the trajectory lacks.
         missing: Vec<String>,
-        /// In the trajectory, but not wanted.
+        /// Joints of the trajectory that are not expected.
         unknown: Vec<String>,
         /// Joints of the trajectory.
         have: Vec<String>,
-        /// Joints that were asked for.
+        /// Expected joints.
         want: Vec<String>,
     },
-    /// Values or times are beyond any motion, or too extreme for polynomials in f64.
+    /// Values or times are beyond any real motion, or too extreme for polynomials in f64.
     #[error(
         "joint {joint:?}, t = {time_s:e} s: values or times are too extreme (a motion has {FARTHEST:e} rad or m and {LONGEST:e} s at \
          most); check the units of the file"
@@ -66,49 +65,49 @@ pub enum TrajectoryError {
     OutOfRange {
         /// Joint name.
         joint: String,
-        /// Start of the offending piece, s.
+        /// Start of the polynomial piece concerned, s.
         time_s: f64,
     },
-    /// A time scale that is not positive and finite.
+    /// Time scale that is not positive and finite.
     #[error("time scale {factor} is not a positive number; 2 makes the motion take twice the time")]
     BadFactor {
-        /// What was given.
+        /// Value given.
         factor: f64,
     },
-    /// A time for blends at corners that is not positive and finite.
+    /// Blend time at corners that is not positive and finite.
     #[error("corners cannot be rounded within {seconds} s; give a positive time, such as 0.02 s")]
     BadRounding {
-        /// What was given, s.
+        /// Value given, s.
         seconds: f64,
     },
-    /// A sampling rate that is not positive and finite, or that would give more than 100 million
+    /// Sampling rate that is not positive and finite, or that would give more than 100 million
     /// rows.
     #[error(
         "sampling rate {rate_hz} Hz is not possible for {duration_s} s of motion; give a positive rate that makes at most 100 million rows"
     )]
     BadRate {
-        /// What was given, Hz.
+        /// Value given, Hz.
         rate_hz: f64,
         /// Duration of the trajectory, s.
         duration_s: f64,
     },
-    /// A motion that is not made of quintic moves from rest to rest.
+    /// Motion that does not consist of quintic moves from rest to rest.
     #[error(
         "the motion is not made of quintic moves from rest to rest: as waypoints, joint {joint:?} would be off by {difference:.2e} \
          rad (or m) at t = {time_s:.3} s; write it as samples (.csv)"
     )]
     NotWaypoints {
-        /// Joint that differs most.
+        /// Joint with the largest difference.
         joint: String,
-        /// Where, s.
+        /// Time of the largest difference, s.
         time_s: f64,
-        /// By how much, rad or m.
+        /// Largest difference, rad or m.
         difference: f64,
     },
     /// The output cannot be written.
     #[error("cannot write the trajectory: {source}")]
     Write {
-        /// What the operating system says.
+        /// Error of the operating system.
         #[from]
         source: io::Error,
     },
@@ -117,19 +116,19 @@ pub enum TrajectoryError {
 /// A problem and its place: `arm.csv, line 7, column 3: ...`.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub struct FileError {
-    /// File name, or what the caller called the text.
+    /// File name, or the caller's name for the text.
     pub origin: String,
     /// Line, counted from 1.
     pub line: Option<usize>,
     /// TOML: character within the line; CSV: number of the field. Counted from 1.
     pub column: Option<usize>,
-    /// What is wrong.
+    /// The problem.
     pub problem: Problem,
-    /// Further lines with something wrong, ascending.
+    /// Other lines that are wrong, ascending.
     pub more_lines: Vec<usize>,
 }
 
-/// So many further lines are named.
+/// Maximum number of further lines listed in the message.
 const NAMED: usize = 10;
 
 impl fmt::Display for FileError {

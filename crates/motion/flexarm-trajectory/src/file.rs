@@ -1,4 +1,4 @@
-//! From a path to a trajectory: reads the file and chooses the reader by the ending of its name.
+//! Reads a trajectory from a path; the file extension selects the reader.
 
 use std::fs::File;
 use std::io::{Error, ErrorKind, Read};
@@ -9,19 +9,19 @@ use crate::limits::JointLimits;
 use crate::problem::Problem;
 use crate::trajectory::Trajectory;
 
-/// A file larger than this is refused (bytes): an hour of six joints at 1 kHz has a third of it.
+/// Maximum file size (bytes); an hour of six joints at 1 kHz takes a third of it.
 const LARGEST: u64 = 1 << 30;
 
 impl Trajectory {
     /// Reads a trajectory file: `.csv` holds samples ([`Trajectory::parse_csv`]), `.toml` waypoints
     /// ([`Trajectory::parse_toml`]).
     ///
-    /// * `limits`: what is known about the robot's joints, by name; used by waypoints without a
+    /// * `limits`: known limits of the robot's joints, by name; used by waypoints without a
     ///   duration. Joints may be missing and need not occur in the file.
     ///
     /// # Errors
     /// [`TrajectoryError::Read`], [`TrajectoryError::UnknownExtension`], or
-    /// [`TrajectoryError::File`] with line and column of what is wrong in the file.
+    /// [`TrajectoryError::File`] with line and column of the problem.
     pub fn from_path(path: &Path, limits: &[(&str, JointLimits)]) -> Result<Self, TrajectoryError> {
         let extension = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
         if extension != "csv" && extension != "toml" {
@@ -38,7 +38,7 @@ impl Trajectory {
     }
 }
 
-/// The bytes of a file; no device, which might never end, and no pipe, which might never begin.
+/// Reads a regular file; refuses devices and pipes, from which a read may never end or never begin.
 fn read(path: &Path) -> std::io::Result<Vec<u8>> {
     if !std::fs::metadata(path)?.is_file() {
         return Err(Error::other("this is not a file"));
@@ -52,15 +52,15 @@ fn read(path: &Path) -> std::io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The bytes of a motion file.
+/// Returns the bytes of a motion file.
 ///
 /// # Errors
-/// [`TrajectoryError::Read`], also for what is no file and for more than 1 GiB.
+/// [`TrajectoryError::Read`], also if the path is not a regular file or the file exceeds 1 GiB.
 pub fn bytes_of_file(path: &Path) -> Result<Vec<u8>, TrajectoryError> {
     read(path).map_err(|source| TrajectoryError::Read { path: path.to_owned(), source })
 }
 
-/// The text of a motion file.
+/// Returns the text of a motion file.
 ///
 /// # Errors
 /// As [`bytes_of_file`] and [`text_of_bytes`].
@@ -68,13 +68,13 @@ pub fn text_of_file(path: &Path) -> Result<String, TrajectoryError> {
     text_of_bytes(bytes_of_file(path)?, &path.display().to_string())
 }
 
-/// The text of a file: UTF-8; UTF-16 where the file begins with its mark, as spreadsheets write it;
-/// or Windows-1252.
+/// Decodes the text of a file: UTF-8, UTF-16 with a byte order mark (as spreadsheets write it), or
+/// Windows-1252.
 ///
 /// * `origin`: file name for messages.
 ///
 /// # Errors
-/// [`TrajectoryError::File`] with the line of what is none of them.
+/// [`TrajectoryError::File`] with the line that cannot be decoded.
 pub fn text_of_bytes(bytes: Vec<u8>, origin: &str) -> Result<String, TrajectoryError> {
     let word: fn([u8; 2]) -> u16 = match bytes.get(..2) {
         Some([0xFF, 0xFE]) => u16::from_le_bytes,
@@ -95,15 +95,15 @@ pub fn text_of_bytes(bytes: Vec<u8>, origin: &str) -> Result<String, TrajectoryE
     })
 }
 
-/// The text of bytes that are not UTF-8 from the first special letter on, without control
-/// characters.
+/// Decodes Windows-1252 text without control characters; `None` if the bytes are UTF-8, have
+/// non-ASCII letters before the first invalid byte, or are not text.
 fn windows_1252(bytes: &[u8]) -> Option<String> {
-    /// Letters of the bytes 0x80 to 0x9f; 0 where there is none.
+    /// Letters of the bytes 0x80 to 0x9f; NUL where undefined.
     const SPECIAL: &str = "€\0‚ƒ„…†‡ˆ‰Š‹Œ\0Ž\0\0‘’“”•–—˜™š›œ\0žŸ";
     let error = std::str::from_utf8(bytes).err()?;
     let letter = |byte: &u8| match *byte {
         byte @ 0x80..=0x9f => SPECIAL.chars().nth(usize::from(byte - 0x80)).filter(|letter| *letter != '\0'),
-        // Bytes that are no text have it more often than texts.
+        // 0xff (ÿ) is more frequent in binary data than in text.
         0xff => None,
         byte => Some(char::from(byte)).filter(|letter| !letter.is_control() || letter.is_ascii_whitespace()),
     };

@@ -3,24 +3,23 @@
 use crate::spline::JointSamples;
 use crate::warning::Warning;
 
-/// A step is a gap beyond this multiple of the usual step.
+/// A step is a gap if it exceeds this multiple of the usual step.
 const GAP: f64 = 4.0;
-/// Least number of steps that show what is usual.
+/// Minimum number of steps from which the usual step is determined.
 const LEAST_STEPS: usize = 10;
-/// Longer usual steps, s, are those of waypoints and not of samples.
+/// Maximum usual step of samples (s); longer steps are those of waypoints.
 const LONGEST_STEP: f64 = 0.1;
-/// Least part of the steps that is within a factor of two of their median where data are sampled
-/// evenly.
+/// Minimum fraction of the steps within a factor of two of their median in evenly sampled data.
 const EVEN: f64 = 0.75;
 
-/// The gaps in samples, if they were taken evenly.
+/// Returns the gaps in the samples, if these are evenly spaced.
 ///
 /// The usual step is the median. Data whose steps vary by more than jitter have no usual step, and
-/// those of slow steps are waypoints. A joint that is at the same place on both sides of a long
-/// step may rest there, so that is no gap. Neither is a sample that comes late and is followed by
-/// others in quick succession: none is missing.
+/// data with long steps are waypoints. A joint with the same position on both sides of a long step
+/// may be at rest, so that is not a gap. A sample that arrives late and is followed by others in
+/// quick succession is not a gap either, since no sample is missing.
 ///
-/// * `times`: s from the first sample, increasing.
+/// * `times`: times from the first sample, increasing (s).
 pub(crate) fn gaps(times: &[f64], joints: &[JointSamples]) -> Option<Warning> {
     let steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     if steps.len() < LEAST_STEPS {
@@ -46,7 +45,7 @@ pub(crate) fn gaps(times: &[f64], joints: &[JointSamples]) -> Option<Warning> {
     })
 }
 
-/// Do the steps behind a long one, short as they are, bring the samples back to their usual number?
+/// Whether short steps after a long one restore the usual number of samples.
 fn is_made_up_for(steps: &[f64], long: usize, usual: f64) -> bool {
     let late = steps[long] - usual;
     let behind = steps[long + 1..].iter().take((steps[long] / usual).ceil() as usize);
@@ -94,13 +93,13 @@ mod tests {
         times.iter_mut().skip(150).for_each(|t| *t += 2.0);
         let hold = |t: f64| if t < 1.49 { t } else { 1.49 + (t - 3.5).max(0.0) };
         assert_eq!(found(&times, hold), None);
-        // Five messages that are received late, all at once.
+        // Five messages received late, all at once.
         let mut times = sampled(300, 0.01);
         for (k, late) in [(100, 0.05), (101, 0.041), (102, 0.032), (103, 0.023), (104, 0.014)] {
             times[k] += late;
         }
         assert_eq!(found(&times, f64::sin), None);
-        // Waypoints at even times, with one long move, and at uneven times.
+        // Waypoints at even times with one long move, and waypoints at uneven times.
         let mut times = sampled(30, 0.5);
         times.iter_mut().skip(12).for_each(|t| *t += 4.0);
         assert_eq!(found(&times, f64::sin), None);

@@ -1,31 +1,31 @@
-//! The least time of a path within bounds that know the jerk.
+//! Time-optimal law along a path within bounds that include the jerk.
 //!
 //! ```text
 //! s = sigma(theta),  y = theta'^2,  u = theta'' = y_theta / 2,  w = u_theta
 //! T = int d theta / sqrt(y),   low <= a u + b y <= high,   |a w + b u + c y| <= most / sqrt(y)
 //! ```
-//! Over the parameter `s` itself (`sigma` the identity) the last bound is the jerk of a joint with
-//! `a = q'`, `b = 3 q''`, `c = q'''`. Here the parameter is the time `theta` of a law that runs the
-//! path already: then `y` is smooth and not zero, also where the path begins and ends at rest, and
-//! `y = 1` where that law cannot be improved. The bounds keep their form, with
+//! Over the parameter `s` itself (`sigma` the identity), the last bound is the jerk of a joint with
+//! `a = q'`, `b = 3 q''`, `c = q'''`. Here the parameter is the time `theta` of a law that already
+//! follows the path: then `y` is smooth and not zero, even where the path begins and ends at rest,
+//! and `y = 1` where that law cannot be improved. The bounds keep their form, with
 //!
 //! ```text
 //! a -> a v,   b -> b v^2 + 3 a v',   c -> c v^3 + b v v' + a v''      (jerk;  v = d sigma / d theta)
-//! a -> a v,   b -> b v^2 + a v'                                       (bounds that are linear)
+//! a -> a v,   b -> b v^2 + a v'                                       (linear bounds)
 //! ```
-//! `1 / sqrt(y)` is convex: replaced by its tangent it is a bound that is tighter and linear, so
-//! that a convex program with ever new tangents ends at a law that cannot be improved nearby and
-//! keeps every bound on the way [Debrouwere et al. 2013]. The steps of an interior-point method
-//! take these tangents as they go. `y` is a cubic spline, so that the jerk is continuous; what its
-//! switches cost falls with the square of the distance of the nodes.
+//! `1 / sqrt(y)` is convex: replacing it by its tangent gives a bound that is tighter and linear,
+//! so that a sequence of convex programs with updated tangents ends at a locally optimal law and
+//! keeps every bound on the way [Debrouwere et al. 2013]. The steps of the interior-point method
+//! update these tangents as they go. `y` is a cubic spline, so that the jerk is continuous; the
+//! loss of time at jerk switches falls with the square of the node spacing.
 //!
-//! Start at [`QuinticLaw::improved`]. Not here: which bounds a path has, how nodes are chosen.
+//! Start at [`QuinticLaw::improved`]. Not here: the bounds of a particular path.
 #![allow(non_snake_case, reason = "letters of the formulas")]
 
 use crate::barrier;
 use crate::time_law::{Bound, Law, Progress};
 
-/// `|a u' + b u + c x| sqrt(x) <= most` along the parameter `s` with `x = s'^2`, `u = s''`.
+/// Bound `|a u' + b u + c x| sqrt(x) <= most` along the parameter `s` with `x = s'^2`, `u = s''`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JerkBound {
     /// Factor of `u'`: first derivative of a joint by `s`.
@@ -34,24 +34,24 @@ pub struct JerkBound {
     pub b: f64,
     /// Factor of `x`: third derivative.
     pub c: f64,
-    /// Greatest value, positive.
+    /// Maximum value, positive.
     pub most: f64,
 }
 
-/// What holds at a place of a path.
+/// Bounds at one place of a path.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Place {
-    /// Greatest squared speed; infinite where only the bounds rule.
+    /// Maximum squared speed; infinite if only the bounds below apply.
     pub x_max: f64,
     /// Linear bounds.
     pub bounds: Vec<Bound>,
-    /// Bounds of jerks.
+    /// Jerk bounds.
     pub jerks: Vec<JerkBound>,
 }
 
 impl Place {
-    /// Bounds without jerk and bounds of jerk that a run keeps if it would keep those here so many
-    /// times slower.
+    /// Tightens the bounds for a run that passes them by the given factors of speed: `linear` for
+    /// the bounds without jerk, `jerk` for those of jerk.
     #[must_use]
     pub fn drawn_in(mut self, [linear, jerk]: [f64; 2]) -> Self {
         let (second, third) = (linear * linear, jerk.powi(3));
@@ -63,8 +63,8 @@ impl Place {
         self
     }
 
-    /// Without bounds that others of the same place imply: joints that go along with one that is
-    /// nearer to its bound.
+    /// Removes bounds that are implied by others at the same place, such as those of joints that
+    /// move along with one nearer to its bound.
     ///
     /// With `a = l a_m` and `|a_m u + b_m x| <= 1`, `x <= X`: `|a u + b x| <= |l| + |b - l b_m| X`;
     /// likewise for jerks.
@@ -94,8 +94,8 @@ impl Place {
         self
     }
 
-    /// By how much a run must be slower to keep the bounds without jerk and those of jerk: at most
-    /// 1 where it does.
+    /// Factors by which a run must be slower to keep the bounds without jerk and those of jerk; at
+    /// most 1 if it keeps them.
     pub fn slowing(&self, at: &Progress) -> [f64; 2] {
         let (x, u, third) = (at.v * at.v, at.a, at.v.powi(3));
         let linear = self.bounds.iter().map(|bound| {
@@ -110,33 +110,32 @@ impl Place {
     }
 }
 
-/// In so many parts of an interval it is looked whether bounds are kept; in the second number where
-/// one is near.
+/// Number of parts of an interval at which bounds are checked: normally, and where a bound is near.
 const CHECKED: [usize; 2] = [8, 32];
-/// Nearer than this part of the speed.
+/// Fraction of the admissible speed above which a bound is near.
 const NEAR: f64 = 0.97;
-/// Intervals of a rise of the acceleration, at the end.
+/// Number of intervals over a rise of the acceleration in the last round.
 const OF_RISE: f64 = 10.0;
-/// Least and most intervals of a route, stations apart.
+/// Minimum and maximum number of intervals over the duration, not counting the stations.
 const LEAST: f64 = 200.0;
 const MOST: f64 = 30_000.0;
-/// Intervals are so many times longer at first; what is left to gain where each round begins and
-/// ends, of the duration.
+/// Rounds of the search: factor of the interval length, and relative gap to the optimal duration at
+/// the start and at the end of the round.
 const ROUNDS: [(f64, [f64; 2]); 2] = [(4.0, [0.1, 1e-3]), (1.0, [1e-2, 1e-5])];
-/// Bounds are drawn in where a run would have to be slower by more than this part to keep them,
-/// this often.
+/// Bounds are tightened where they are violated by more than this fraction of the speed, at most
+/// `DRAWN` times.
 const PASSED: f64 = 1e-4;
 const DRAWN: usize = 3;
 const DRAWN_GAP: [f64; 2] = [1e-3, 1e-5];
 
-/// The least time within bounds that know the jerk; nowhere are they passed.
+/// Returns the time-optimal law within bounds that include the jerk; no bound is violated anywhere.
 ///
-/// * `law`: a law of the same path whose acceleration is continuous and whose speed is zero at both
-///   ends alone.
+/// * `law`: a law of the same path with continuous acceleration whose speed is zero only at both
+///   ends.
 /// * `stations`: parameters from start to end, at which bounds and their derivatives may jump.
-/// * `rise`: time that an acceleration takes from zero to its bound, s: where intervals must be
-///   short.
-/// * `place`: what holds at a parameter of the interval behind station `k`.
+/// * `rise`: time in which the acceleration rises from zero to its bound (s); it sets the length of
+///   the intervals.
+/// * `place`: bounds at a parameter within the interval after station `k`.
 pub fn least_time_with_jerks(
     law: &Law,
     stations: &[f64],
@@ -150,7 +149,7 @@ pub fn least_time_with_jerks(
         let of = intervals(stations, &law.s);
         law = law.improved(gap, &mut |k, s| place(of[k], s));
     }
-    // Where bounds are passed between the places that were looked at, they are drawn in.
+    // Tightens bounds that are violated between the places at which they are enforced.
     let of = intervals(stations, &law.s);
     let mut drawn = vec![[1.0; 2]; of.len()];
     for _ in 0..DRAWN {
@@ -167,7 +166,7 @@ pub fn least_time_with_jerks(
     law.slowed(slowing.iter().flatten().fold(1.0, |most: f64, slowing| most.max(*slowing)))
 }
 
-/// Intervals between stations in which those between nodes lie.
+/// Returns the station interval that contains each interval between nodes.
 fn intervals(stations: &[f64], nodes: &[f64]) -> Vec<usize> {
     let last = stations.len() - 2;
     let of = |pair: &[f64]| {
@@ -177,21 +176,22 @@ fn intervals(stations: &[f64], nodes: &[f64]) -> Vec<usize> {
     nodes.windows(2).map(of).collect()
 }
 
-/// A run along a path: place, speed and acceleration at moments, quintics between them.
+/// Motion along a path: parameter, speed and acceleration at given times, with quintics between
+/// them.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct QuinticLaw {
-    /// s, ascending.
+    /// Times (s), ascending.
     pub t: Vec<f64>,
     /// Parameter of the path.
     pub s: Vec<f64>,
-    /// Its speed.
+    /// Speed of the parameter.
     pub v: Vec<f64>,
-    /// Its acceleration.
+    /// Acceleration of the parameter.
     pub a: Vec<f64>,
 }
 
 impl QuinticLaw {
-    /// A law at stations of its path and at moments that are `step` apart.
+    /// Samples a law at the stations of its path and at times about `step` apart.
     pub fn along(law: &Law, stations: &[f64], step: f64) -> Self {
         let (end, last) = (law.duration(), stations.len() - 1);
         let mut times: Vec<(f64, Option<usize>)> = (1..last).map(|k| (time_of(law, stations[k]), Some(k))).collect();
@@ -215,7 +215,7 @@ impl QuinticLaw {
         found
     }
 
-    /// Appends a moment.
+    /// Appends a node.
     pub fn push(&mut self, t: f64, at: &Progress) {
         self.t.push(t);
         self.s.push(at.s);
@@ -223,23 +223,23 @@ impl QuinticLaw {
         self.a.push(at.a);
     }
 
-    /// How long it lasts, s.
+    /// Duration (s).
     pub fn duration(&self) -> f64 {
         self.t[self.t.len() - 1]
     }
 
-    /// Where the run is at `t` (s).
+    /// State of the motion at time `t` (s).
     pub fn at(&self, t: f64) -> Progress {
         let last = self.t.len() - 1;
         let k = self.t.partition_point(|knot| *knot <= t).clamp(1, last) - 1;
         self.within(k, (t - self.t[k]).clamp(0.0, self.t[k + 1] - self.t[k]))
     }
 
-    /// `tau` behind node `k`, in the interval that begins there.
+    /// State of the motion at time `tau` after node `k`, in the interval that begins there.
     pub fn within(&self, k: usize, tau: f64) -> Progress {
         let h = self.t[k + 1] - self.t[k];
         let (v0, v1, a0, a1) = (self.v[k], self.v[k + 1], self.a[k], self.a[k + 1]);
-        // What goes beyond constant acceleration.
+        // Change of position, speed and acceleration beyond constant acceleration.
         let step = (self.s[k + 1] - self.s[k]) - h * (v0 + 0.5 * h * a0);
         let (dv, da) = (v1 - v0 - h * a0, a1 - a0);
         let c3 = (10.0 * step - 4.0 * dv * h + 0.5 * da * h * h) / h.powi(3);
@@ -253,7 +253,7 @@ impl QuinticLaw {
         }
     }
 
-    /// The same run with intervals of at most `longest` seconds.
+    /// The same motion with intervals of at most `longest` seconds.
     #[must_use]
     pub fn divided(&self, longest: f64) -> Self {
         let mut fine = Self::default();
@@ -270,7 +270,7 @@ impl QuinticLaw {
         fine
     }
 
-    /// The run in `factor` times its time.
+    /// The motion with `factor` times its duration.
     #[must_use]
     pub fn slowed(mut self, factor: f64) -> Self {
         self.t.iter_mut().for_each(|t| *t *= factor);
@@ -279,10 +279,10 @@ impl QuinticLaw {
         self
     }
 
-    /// By how much the run must be slower in each interval to keep all bounds, also between the
-    /// places at which [`QuinticLaw::improved`] keeps them; 1 or less where it does.
+    /// Factors by which the motion must be slower in each interval to keep all bounds, also between
+    /// the places at which [`QuinticLaw::improved`] enforces them; at most 1 where it keeps them.
     ///
-    /// * `place`: what holds at a parameter of interval `k`.
+    /// * `place`: bounds at a parameter of interval `k`.
     pub fn slowing(&self, place: &mut dyn FnMut(usize, f64) -> Place) -> Vec<[f64; 2]> {
         let mut of = |k: usize, parts: usize| {
             let h = (self.t[k + 1] - self.t[k]) / parts as f64;
@@ -297,14 +297,12 @@ impl QuinticLaw {
             .collect()
     }
 
-    /// The fastest run through the same nodes with a speed that is this one's times the root of a
-    /// cubic spline over its time; this run itself need not keep its bounds. It begins and ends at
-    /// rest as this one does.
+    /// Returns the fastest motion through the same nodes whose speed is that of this one times the
+    /// square root of a cubic spline over its time. This motion itself need not keep the bounds.
+    /// The result begins and ends at rest if this one does.
     ///
-    /// * `place`: what holds at a parameter of interval `k`; a standstill must be allowed
-    ///   everywhere.
-    /// * `gap`: what may be left to gain, of the duration: where the search begins and where it
-    ///   ends.
+    /// * `place`: bounds at a parameter of interval `k`; rest must be admissible everywhere.
+    /// * `gap`: relative gap to the optimal duration at the start and at the end of the search.
     #[must_use]
     pub fn improved(&self, gap: [f64; 2], place: &mut dyn FnMut(usize, f64) -> Place) -> Self {
         let (t, v, a) = barrier::improved(self, gap, place);
@@ -312,12 +310,12 @@ impl QuinticLaw {
     }
 }
 
-/// The larger of both, one by one.
+/// Elementwise maximum.
 fn larger(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0].max(b[0]), a[1].max(b[1])]
 }
 
-/// When a law is at `s`.
+/// Time at which a law reaches `s`.
 fn time_of(law: &Law, s: f64) -> f64 {
     let (mut low, mut high) = (0.0, law.duration());
     for _ in 0..60 {
@@ -331,8 +329,8 @@ fn time_of(law: &Law, s: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// One joint that is the parameter, at rest at both ends; its run as a sine, over `n`
-    /// intervals.
+    /// One joint equal to the parameter, at rest at both ends, with a sinusoidal acceleration over
+    /// `n` intervals.
     fn sine(length: f64, n: usize) -> QuinticLaw {
         let tau = std::f64::consts::TAU;
         let mut law = QuinticLaw::default();
@@ -346,7 +344,7 @@ mod tests {
         law
     }
 
-    /// By hand: a ramp to the speed v takes v/a + a/j, or 2 sqrt(v/j) if a is not reached.
+    /// Closed form: a ramp to the speed v takes v/a + a/j, or 2 sqrt(v/j) if a is not reached.
     fn s_curve(length: f64, [v, a, j]: [f64; 3]) -> f64 {
         let ramp = |v: f64| if v * j >= a * a { v / a + a / j } else { 2.0 * (v / j).sqrt() };
         if v * ramp(v) <= length {
@@ -362,8 +360,8 @@ mod tests {
 
     #[test]
     fn a_straight_path_is_run_as_the_s_curve_of_seven_phases() {
-        // Cruise with constant accelerations; no cruise; jerk alone; no bound of the acceleration;
-        // a short rise.
+        // Cruise and constant acceleration; no cruise; jerk limit only; no acceleration limit;
+        // short rise.
         let cases = [
             (1.0, [0.5, 2.0, 20.0]),
             (1.0, [10.0, 2.0, 20.0]),
@@ -380,18 +378,18 @@ mod tests {
             let truth = s_curve(length, [v, a, j]);
             let mut law = sine(length, 50);
             for (round, gap) in [(4.0, [0.1, 1e-3]), (1.0, [1e-2, 1e-5])] {
-                // Ten intervals of each rise of the acceleration.
+                // Ten intervals per rise of the acceleration.
                 let step = (0.1 * a / j).min(law.duration() / 200.0);
                 law = law.divided(round * step).improved(gap, &mut place);
             }
             let (late, slowing) =
                 (law.duration() / truth - 1.0, law.slowing(&mut place).into_iter().flatten().fold(0.0, f64::max));
-            // measured 8.7e-5 and 1.00039, the latter without bounds that are drawn in
+            // measured 8.7e-5 and 1.00039, the latter without tightened bounds
             assert!(late.abs() < 5e-4 && slowing < 1.002, "{length} {v} {a} {j}: {late:.1e} {slowing}");
         }
     }
 
-    /// Truth: one joint over q = s + s², whose least time does not depend on what `s` is.
+    /// Truth: one joint with q = s + s², whose minimum time does not depend on the choice of `s`.
     #[test]
     fn a_curved_parameter_changes_nothing_of_the_least_time_with_jerk() {
         let [v, a, j] = [0.8, 2.0, 10.0];
@@ -411,7 +409,7 @@ mod tests {
         assert!(late.abs() < 2e-4, "{late:.1e}"); // measured 1.3e-5
     }
 
-    /// Second algorithm: differences of the law itself.
+    /// Second algorithm: finite differences of the law.
     #[test]
     fn speed_acceleration_and_jerk_of_quintics_are_derivatives_of_their_place() {
         let law = sine(0.7, 40);

@@ -1,7 +1,7 @@
-//! One move of a plan, from where the move before it ended.
+//! One move of a plan, from the end of the previous move.
 //!
-//! Start at [`Leg::curves`]: unit shapes (`shape`, or `via` through points on the way) times the
-//! way of each joint.
+//! Start at [`Leg::curves`]: unit shapes (`shape`, or `via` for moves through via points) times the
+//! travel of each joint.
 
 use crate::optimal::JointPath;
 use crate::plan::{MotionLimits, PlannedMove, Profile};
@@ -12,19 +12,19 @@ use crate::trajectory::Curve;
 use crate::via;
 use crate::warning::Warning;
 
-/// One move seen from where it starts.
+/// One move and its start.
 pub(crate) struct Leg<'a> {
     /// Number of the move, counted from 1.
     pub(crate) number: usize,
-    /// Where every joint starts.
+    /// Position of every joint at the start.
     pub(crate) from: &'a [f64],
     pub(crate) planned: &'a PlannedMove,
     pub(crate) joints: &'a [String],
 }
 
 impl Leg<'_> {
-    /// The curve of every joint from time 0 of the move, and how long the move takes. A joint that
-    /// stays has a curve without pieces; one that arrives early has a curve that ends early.
+    /// Returns the curve of every joint from time 0 of the move, and the duration of the move. The
+    /// curve of a joint at rest has no pieces; that of a joint that arrives early ends early.
     pub(crate) fn curves(&self) -> Result<(Vec<Curve>, f64), PlanError> {
         if self.planned.profile == Profile::Optimal {
             return self.fastest_curves();
@@ -38,7 +38,7 @@ impl Leg<'_> {
             return Ok((vec![stay; self.joints.len()], self.planned.duration.unwrap_or(0.0)));
         }
 
-        // One shape for all joints, under the strictest limits; or one for each.
+        // One shape for all joints under the strictest limits, or one for each joint.
         let is_common = self.planned.synchronised || self.planned.duration.is_some();
         let common = if is_common { Some(self.shape(&moving)?) } else { None };
         let mut curves = Vec::with_capacity(self.joints.len());
@@ -58,7 +58,7 @@ impl Leg<'_> {
         self.planned.to[joint] - self.from[joint]
     }
 
-    /// The shape `s(t)` that moves the given joints within their limits or within the duration.
+    /// The shape `s(t)` that moves the given joints within their limits or in the given duration.
     fn shape(&self, moving: &[usize]) -> Result<Curve, PlanError> {
         let mut limits = ShapeLimits { velocity: f64::INFINITY, acceleration: f64::INFINITY, jerk: f64::INFINITY };
         for &i in moving {
@@ -88,8 +88,8 @@ impl Leg<'_> {
         }
     }
 
-    /// A move without a duration: every joint in motion needs the limits that its profile is made
-    /// of.
+    /// Shape of a move without a duration: every moving joint needs the limits that the profile
+    /// uses.
     fn fastest_shape(&self, moving: &[usize], limits: &ShapeLimits) -> Result<Curve, PlanError> {
         self.require("velocity", moving, |limits| limits.velocity)?;
         match self.planned.profile {
@@ -120,7 +120,7 @@ impl Leg<'_> {
         }
     }
 
-    /// A move through points on the way: always synchronised, always quintic.
+    /// Curves of a move through via points: always synchronised, always quintic.
     fn curves_through_points(&self) -> Result<(Vec<Curve>, f64), PlanError> {
         let Self { number, planned, .. } = *self;
         if planned.profile != Profile::Quintic {
@@ -148,24 +148,24 @@ impl Leg<'_> {
         Ok((unit.iter().map(|curve| curve.stretched(duration)).collect(), duration))
     }
 
-    /// All points from start to goal, what counts as one unit of way of each joint, and the joints
-    /// that move.
+    /// Returns all points from start to goal, the unit of travel of each joint, and the joints that
+    /// move.
     fn points(&self) -> (Vec<&[f64]>, Vec<f64>, Vec<usize>) {
         let mut points: Vec<&[f64]> = vec![self.from];
         points.extend(self.planned.via.iter().map(Vec::as_slice));
         points.push(&self.planned.to);
         let n = self.joints.len();
         let moving: Vec<usize> = (0..n).filter(|&i| points.iter().any(|point| point[i] != self.from[i])).collect();
-        // A unit of way is what the speed limit allows in a unit of time, where all limits are
-        // known.
+        // The unit of travel is the travel per unit of time at the speed limit if all limits are
+        // known, otherwise 1.
         let speed = |i: usize| self.planned.limits[i].velocity;
         let weighted = moving.iter().all(|&i| speed(i).is_finite());
         let weights = (0..n).map(|i| if weighted && speed(i).is_finite() { speed(i) } else { 1.0 }).collect();
         (points, weights, moving)
     }
 
-    /// A move along the spline through all points in the least time, or slower if a duration is
-    /// given.
+    /// Returns the time-optimal curves along the spline through all points, slowed to the duration
+    /// if one is given.
     fn fastest_curves(&self) -> Result<(Vec<Curve>, f64), PlanError> {
         let Self { number, planned, .. } = *self;
         let (points, weights, moving) = self.points();
@@ -182,7 +182,7 @@ impl Leg<'_> {
         Ok((curves.iter().map(|curve| curve.stretched(duration / least)).collect(), duration))
     }
 
-    /// Acceleration and jerk limits that a given duration does not leave room for.
+    /// Acceleration and jerk limits that the given duration violates.
     pub(crate) fn warnings(&self, curves: &[Curve]) -> Vec<Warning> {
         let mut warnings = Vec::new();
         if self.planned.duration.is_none() {
@@ -190,7 +190,7 @@ impl Leg<'_> {
         }
         for ((curve, limits), joint) in curves.iter().zip(&self.planned.limits).zip(self.joints) {
             let [_, acceleration, jerk] = curve.peaks();
-            // The jerk limit shapes S-curves and optimal moves; the other profiles do not promise
+            // The jerk limit applies to S-curve and optimal moves; the other profiles do not keep
             // it.
             let is_jerk_limited = matches!(self.planned.profile, Profile::SCurve | Profile::Optimal);
             let jerk = if is_jerk_limited { jerk } else { 0.0 };
@@ -207,7 +207,7 @@ impl Leg<'_> {
 }
 
 impl Curve {
-    /// Appends a part that starts at time `now`, and stays at `goal` from the end of the part until
+    /// Appends a part that starts at time `now`, and holds `goal` from the end of the part until
     /// `end`.
     pub(crate) fn append(&mut self, now: f64, part: &Self, end: f64, goal: f64) {
         self.pieces.extend(&part.pieces);
@@ -215,10 +215,10 @@ impl Curve {
         self.append_hold(end, goal);
     }
 
-    /// Stays at `q` from the last knot until `until`.
+    /// Holds `q` from the last knot until `until`.
     pub(crate) fn append_hold(&mut self, until: f64, q: f64) {
         let last = self.knots.len() - 1;
-        // What is left after rounding of the times is not a hold.
+        // A remainder from rounding of the times is not a hold.
         if until - self.knots[last] > 1e-14 * until {
             self.pieces.push(Piece::hold(until - self.knots[last], q));
             self.knots.push(until);
@@ -233,13 +233,13 @@ impl Curve {
         Self { knots: self.knots.clone(), pieces }
     }
 
-    /// The same values in `stretch` times the time.
+    /// The same values with the time multiplied by `stretch`.
     pub(crate) fn stretched(&self, stretch: f64) -> Self {
         let pieces = self.pieces.iter().map(|piece| piece.mapped(0.0, 1.0, stretch)).collect();
         Self { knots: self.knots.iter().map(|knot| knot * stretch).collect(), pieces }
     }
 
-    /// Largest speed, acceleration and jerk.
+    /// Maximum speed, acceleration and jerk.
     fn peaks(&self) -> [f64; 3] {
         if self.pieces.is_empty() {
             return [0.0; 3];

@@ -21,7 +21,7 @@
 //! let trajectory = Trajectory::parse_toml(text, "lift.toml", &[])?;
 //! assert_eq!(trajectory.duration(), 2.5);
 //!
-//! // Half-way a quintic move is at its mean, at 15/8 of its mean speed, and free of acceleration.
+//! // Halfway in time a quintic move has half its travel, 15/8 of its mean speed and no acceleration.
 //! let (mut q, mut qdot, mut qddot) = ([0.0; 2], [0.0; 2], [0.0; 2]);
 //! trajectory.sample(1.0, &mut q, &mut qdot, &mut qddot);
 //! let half_turn = std::f64::consts::FRAC_PI_2;
@@ -29,7 +29,7 @@
 //! assert!((qdot[0] - 15.0 / 8.0 * half_turn / 2.0).abs() < 1e-15);
 //! assert!(qddot[0].abs() < 1e-14);
 //!
-//! // Every limit that is passed is listed, not the first one only.
+//! // All violated limits are listed, not only the first one.
 //! let limits = JointLimits { upper: 1.0, velocity: 1.4, ..JointLimits::UNLIMITED };
 //! let violations = trajectory.check_limits(&[limits; 2]);
 //! assert_eq!(violations.len(), 2); // the shoulder's position and speed
@@ -38,18 +38,18 @@
 //!
 //! Where to look:
 //!
-//! * least times: [`time_law`], and [`jerk_law`] within jerks;
+//! * time-optimal laws: [`time_law`], and [`jerk_law`] with jerk bounds;
 //! * mathematics: [`Trajectory`] (sampling, time scaling, moves and holds), [`Plan`] (quintic,
-//!   trapezoid and S-curve moves, points passed on the way), [`Samples`] (splines through sampled
-//!   joint values), [`JointPeak`], [`LimitViolation`];
+//!   trapezoid and S-curve moves, via points), [`Samples`] (splines through sampled joint values),
+//!   [`JointPeak`], [`LimitViolation`];
 //! * files: [`Trajectory::from_path`], [`Trajectory::parse_csv`], [`Trajectory::parse_toml`],
 //!   [`Trajectory::to_csv`], [`Trajectory::to_waypoints_toml`], [`Trajectory::parse_table`] for
 //!   tables of other programs. The module pages [`csv_file`], [`waypoints`] and [`table`] describe
 //!   the formats.
 //!
 //! Units: s, rad, rad/s, rad/s² (m, m/s, m/s² for a prismatic joint) everywhere except inside the
-//! files. Not here: robots, links and inverse kinematics; a trajectory knows its joints by name
-//! only.
+//! files. Not here: robots, links and inverse kinematics; a trajectory knows only the names of its
+//! joints.
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test"))]
 
 mod barrier;

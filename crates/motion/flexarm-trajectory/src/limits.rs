@@ -1,19 +1,20 @@
-//! A trajectory against the limits of its joints: all violations, each with its time and size.
+//! Checks a trajectory against the limits of its joints: all violations, each with its time and
+//! size.
 
 use std::fmt;
 
 use crate::trajectory::{Curve, Trajectory};
 
-/// A limit counts as passed beyond this part of its value: a move planned at the limit must not
-/// violate it.
+/// Relative tolerance: a limit counts as violated beyond this fraction of its value, so that a move
+/// planned at the limit does not violate it.
 const RELATIVE_SLACK: f64 = 1e-9;
-/// The same for limits near zero, rad or m (and their rates).
+/// Absolute tolerance for limits near zero, rad or m (and their rates).
 const ABSOLUTE_SLACK: f64 = 1e-12;
 
-/// What a joint can do; an infinite, NaN or absent entry is not limited.
+/// Limits of one joint; an infinite, NaN or absent entry means no limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointLimits {
-    /// Least position, rad or m.
+    /// Minimum position, rad or m.
     pub lower: f64,
     /// Greatest position, rad or m.
     pub upper: f64,
@@ -24,7 +25,7 @@ pub struct JointLimits {
 }
 
 impl JointLimits {
-    /// No limit at all, to be overwritten field by field.
+    /// No limits, as a base for struct update.
     pub const UNLIMITED: Self =
         Self { lower: f64::NEG_INFINITY, upper: f64::INFINITY, velocity: f64::INFINITY, acceleration: None };
 }
@@ -35,7 +36,7 @@ impl Default for JointLimits {
     }
 }
 
-/// Which limit was passed.
+/// Kind of limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LimitKind {
     /// Position below [`JointLimits::lower`].
@@ -48,16 +49,16 @@ pub enum LimitKind {
     Acceleration,
 }
 
-/// A limit that a joint passes, with the worst value; `Display` gives one line.
+/// A limit that a joint violates, with the worst value; `Display` gives one line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LimitViolation {
     /// Joint name.
     pub joint: String,
-    /// Which limit.
+    /// Kind of limit.
     pub kind: LimitKind,
     /// Time of the worst value, s.
     pub time_s: f64,
-    /// Time at which the limit is passed for the first time, s.
+    /// Time of the first violation, s.
     pub since_s: f64,
     /// The worst value with its sign, rad, rad/s or rad/s² (m, m/s or m/s²).
     pub value: f64,
@@ -83,16 +84,16 @@ impl fmt::Display for LimitViolation {
 }
 
 impl Trajectory {
-    /// Every limit that some joint passes, by joint and then in the order of [`LimitKind`]; empty
-    /// when all hold.
+    /// Returns all limit violations, by joint and then in the order of [`LimitKind`]; empty if
+    /// there are none.
     ///
-    /// Exact extrema of the polynomials are compared, with a slack of 1e-9 relative and 1e-12
+    /// Compares exact extrema of the polynomials, with a tolerance of 1e-9 relative and 1e-12
     /// absolute, so that a move planned at a limit keeps it.
     ///
     /// * `limits`: one entry per joint, in the order of [`Trajectory::joints`].
     ///
     /// # Panics
-    /// When `limits` does not have one entry per joint.
+    /// If `limits` does not have one entry per joint.
     pub fn check_limits(&self, limits: &[JointLimits]) -> Vec<LimitViolation> {
         let n = self.joints().len();
         assert_eq!(limits.len(), n, "check_limits needs one JointLimits per joint of the trajectory");
@@ -121,7 +122,7 @@ fn passed(joint: &str, curve: &Curve, kind: LimitKind, limit: f64) -> Option<Lim
     };
     let slack = RELATIVE_SLACK * limit.abs() + ABSOLUTE_SLACK;
 
-    // Distance beyond either side; the worse side is reported, the earlier one sets `since_s`.
+    // Excess over either limit; the worse side is reported, the earlier one sets `since_s`.
     let [least, greatest] = curve.range(order);
     let beyond_upper = upper.map(|level| (greatest.value - level, greatest, level));
     let beyond_lower = lower.map(|level| (level - least.value, least, level));
@@ -139,7 +140,7 @@ fn passed(joint: &str, curve: &Curve, kind: LimitKind, limit: f64) -> Option<Lim
     })
 }
 
-/// First time at which derivative `order` lies beyond `level` by more than `slack`.
+/// First time at which derivative `order` is beyond `level` by more than `slack`.
 fn first_beyond(curve: &Curve, order: usize, level: f64, above: bool, slack: f64) -> f64 {
     let bound = if above { level + slack } else { level - slack };
     let is_beyond = |value: f64| if above { value > bound } else { value < bound };

@@ -1,7 +1,7 @@
-//! A move along a joint spline in the least time within speeds, accelerations and jerks.
+//! Time-optimal move along a joint spline within velocity, acceleration and jerk limits.
 //!
-//! The curve is the natural cubic spline through the points over the length of their chords;
-//! [`crate::jerk_law`] says how fast it is run.
+//! The path is the natural cubic spline through the points over chord length; [`crate::jerk_law`]
+//! computes the time law.
 
 use crate::jerk_law::{JerkBound, Place, least_time_with_jerks};
 use crate::plan::MotionLimits;
@@ -10,26 +10,28 @@ use crate::spline::natural_spline;
 use crate::time_law::{Bound, Law, PathPoint, least_time};
 use crate::trajectory::Curve;
 
-/// An acceleration whose jerk is not limited rises to its limit in this time, s.
+/// Rise time of the acceleration to its limit where no jerk limit is given (s).
 pub(crate) const RISE: f64 = 0.05;
-/// Least number of places of the path at which the first law is found.
+/// Minimum number of stations of the path for the first law.
 const STATIONS: usize = 400;
 
 /// The joints along the path.
 pub(crate) struct JointPath<'a> {
     /// Parameter of each point, ascending from 0.
     s: Vec<f64>,
-    /// Of each joint the pieces of its spline.
+    /// Pieces of the spline of each joint.
     splines: Vec<Vec<Piece>>,
     limits: &'a [MotionLimits],
 }
 
 impl<'a> JointPath<'a> {
-    /// The spline through points, which differ from their neighbours.
+    /// Returns the spline through the points, which must differ from their neighbours.
     ///
-    /// * `weights`: per joint, what counts as one unit of way.
+    /// * `weights`: unit of travel of each joint.
     ///
-    /// Returns the index of a point that equals the one before it as the error.
+    /// # Errors
+    ///
+    /// The index of a point that equals the previous one.
     pub(crate) fn new(points: &[&[f64]], weights: &[f64], limits: &'a [MotionLimits]) -> Result<Self, usize> {
         let mut s = vec![0.0];
         for (i, pair) in points.windows(2).enumerate() {
@@ -54,7 +56,7 @@ impl<'a> JointPath<'a> {
         self.splines.iter().map(move |pieces| pieces[interval].at(s - self.s[interval]))
     }
 
-    /// What holds at a place; a joint that does not move there bounds nothing.
+    /// Bounds at a place; a joint that does not move there adds none.
     fn place(&self, interval: usize, s: f64) -> Place {
         let mut place = Place { x_max: f64::INFINITY, ..Place::default() };
         for ([_, d, dd, ddd], limit) in self.at(interval, s).zip(self.limits) {
@@ -81,7 +83,7 @@ impl<'a> JointPath<'a> {
             PathPoint { s: *s, x_max, bounds }
         };
         let points: Vec<PathPoint> = stations.iter().enumerate().map(point).collect();
-        // Each joint may stand still everywhere, so that there is a law.
+        // Rest is admissible everywhere, so a law exists.
         let Ok(x) = least_time(&points) else { return Vec::new() };
         let law = Law::new(&stations, &x);
         let moving = (0..self.limits.len()).filter(|joint| self.splines[*joint].iter().any(|piece| !piece.is_still()));
@@ -104,7 +106,7 @@ impl<'a> JointPath<'a> {
             Curve { pieces: (0..law.t.len() - 1).map(piece).collect(), knots: law.t.clone() }
         };
         let curves: Vec<Curve> = (0..self.limits.len()).map(curve).collect();
-        // What the curves over time pass between the nodes of the law.
+        // Slows the curves for violations between the nodes of the law.
         let passed = |(curve, limit): (&Curve, &MotionLimits)| {
             let [speed, acceleration, third] = [1, 2, 3].map(|order| curve.largest(order));
             let ratios =
@@ -116,7 +118,7 @@ impl<'a> JointPath<'a> {
     }
 }
 
-/// Greatest jerk of a joint.
+/// Maximum jerk of a joint.
 fn jerk(limit: &MotionLimits) -> f64 {
     if limit.jerk.is_finite() { limit.jerk } else { limit.acceleration / RISE }
 }

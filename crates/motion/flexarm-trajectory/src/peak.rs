@@ -1,11 +1,11 @@
-//! Largest positions, speeds, accelerations and jerks of each joint, with their times.
+//! Extrema of the position, velocity, acceleration and jerk of each joint, with their times.
 //!
-//! Exact: each comes from the roots of the next derivative of each polynomial piece, not from
+//! Exact: extrema come from the roots of the next derivative of each polynomial piece, not from
 //! samples.
 
 use crate::trajectory::{Curve, Trajectory};
 
-/// A value and the time at which it is taken.
+/// A value and its time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extreme {
     /// Time, s.
@@ -14,29 +14,29 @@ pub struct Extreme {
     pub value: f64,
 }
 
-/// The largest values of one joint over the whole trajectory.
+/// Extrema of one joint over the whole trajectory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointPeak {
     /// Joint name.
     pub joint: String,
-    /// Least position, rad or m.
+    /// Minimum position, rad or m.
     pub lower: Extreme,
-    /// Greatest position, rad or m.
+    /// Maximum position, rad or m.
     pub upper: Extreme,
     /// Velocity of greatest magnitude, rad/s or m/s.
     pub velocity: Extreme,
     /// Acceleration of greatest magnitude, rad/s² or m/s².
     pub acceleration: Extreme,
-    /// Jerk of greatest magnitude within the pieces, rad/s³ or m/s³. A jump of the acceleration is
-    /// not in it.
+    /// Jerk of greatest magnitude within the pieces, rad/s³ or m/s³, without jumps of the
+    /// acceleration.
     pub jerk: Extreme,
-    /// Largest jump of the acceleration, rad/s² or m/s²: rounding only, unless a trapezoid is
-    /// unrounded or the data are sampled from something that jumps.
+    /// Largest jump of the acceleration, rad/s² or m/s²: at rounding level, except for an unrounded
+    /// trapezoid or samples of a motion with jumps.
     pub acceleration_jump: Extreme,
 }
 
 impl Trajectory {
-    /// The largest values of every joint, in the order of [`Trajectory::joints`]; exact up to
+    /// Returns the extrema of every joint, in the order of [`Trajectory::joints`]; exact up to
     /// rounding.
     pub fn peak(&self) -> Vec<JointPeak> {
         let peak = |(joint, curve): (&String, &Curve)| {
@@ -57,7 +57,7 @@ impl Trajectory {
 }
 
 impl Curve {
-    /// Least and greatest value of derivative `order` over all pieces.
+    /// Minimum and maximum of derivative `order` over all pieces.
     pub(crate) fn range(&self, order: usize) -> [Extreme; 2] {
         let mut extremes = [f64::INFINITY, f64::NEG_INFINITY].map(|value| Extreme { time_s: 0.0, value });
         for (knot, piece) in self.knots.iter().zip(&self.pieces) {
@@ -73,7 +73,7 @@ impl Curve {
     }
 }
 
-/// The one of greatest magnitude, the first of several.
+/// Returns the extreme of greatest magnitude, the first one if several are equal.
 fn largest(extremes: impl IntoIterator<Item = Extreme>) -> Extreme {
     let zero = Extreme { time_s: 0.0, value: 0.0 };
     extremes.into_iter().fold(zero, |best, e| if e.value.abs() > best.value.abs() { e } else { best })

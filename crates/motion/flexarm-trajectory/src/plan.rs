@@ -1,55 +1,54 @@
-//! Point-to-point planning: moves with a profile and holds between them, made into a trajectory.
+//! Point-to-point planning: builds a trajectory from moves with a profile and holds between them.
 //!
-//! Start at [`Plan::build`]. One move is planned in `leg`, from the unit shapes in `shape` and
-//! `via`.
+//! Start at [`Plan::build`]. `leg` plans one move from the unit shapes in `shape` and `via`.
 //!
-//! **Duration given**: every joint takes it. A quintic needs nothing else. A trapezoid uses the
-//! acceleration limit in its ramps if there is one, otherwise each ramp takes a quarter of the
-//! duration; an S-curve uses acceleration and jerk limit if both are there, otherwise each ramp
-//! takes a third, a third of that for either rise. A duration too short for these limits gets the
-//! default ramps and a [`crate::Warning::ShorterThanLimitsAllow`].
+//! **Duration given**: it applies to every joint. A quintic needs nothing else. A trapezoid uses
+//! the acceleration limit in its ramps if there is one; otherwise each ramp takes a quarter of the
+//! duration. An S-curve uses acceleration and jerk limits if both are given; otherwise each ramp
+//! takes a third of the duration, and each rise of the acceleration a third of that. If the
+//! duration is too short for these limits, the move gets the default ramps and a
+//! [`crate::Warning::ShorterThanLimitsAllow`].
 //!
-//! **No duration**: the move is as fast as the limits allow. Synchronised, all joints follow one
+//! **No duration**: the move is as fast as the limits allow. If synchronised, all joints follow one
 //! common shape (a straight line in joint space) under the strictest limits; otherwise each joint
-//! has a shape of its own and the move lasts as long as its slowest joint.
+//! has its own shape and the slowest joint determines the duration.
 
 use crate::error::TrajectoryError;
 use crate::leg::Leg;
 use crate::problem::PlanError;
 use crate::trajectory::{Curve, Trajectory};
 
-/// How a move gathers and loses speed.
+/// Velocity profile of a move.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Profile {
     /// `D u³ (10 - 15 u + 6 u²)`: peaks `15/8 D/T`, `10/sqrt(3) D/T²`.
     Quintic,
     /// Ramp, cruise, ramp.
     Trapezoid {
-        /// Part of each ramp, 0 to 1, in which the acceleration rises and falls linearly (half of
-        /// it at either side); 0 is the plain trapezoid, whose acceleration jumps.
+        /// Fraction of each ramp, 0 to 1, in which the acceleration rises and falls linearly (half
+        /// of it at either end); 0 is the plain trapezoid, whose acceleration jumps.
         rounding: f64,
     },
     /// Ramp, cruise, ramp with limited jerk: seven phases.
     SCurve,
-    /// The least time along the spline through the points on the way, within speeds, accelerations
-    /// and jerks. A joint without a limit of its jerk takes 0.05 s or more to reach its
-    /// acceleration.
+    /// Minimum time along the spline through the via points, within velocity, acceleration and jerk
+    /// limits. Without a jerk limit a joint takes at least 0.05 s to reach its acceleration limit.
     Optimal,
 }
 
-/// Limits that shape the moves of one joint; infinite when there is none.
+/// Limits of one joint for planning; infinite means no limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotionLimits {
-    /// Greatest speed, rad/s or m/s.
+    /// Maximum speed, rad/s or m/s.
     pub velocity: f64,
-    /// Greatest acceleration, rad/s² or m/s².
+    /// Maximum acceleration, rad/s² or m/s².
     pub acceleration: f64,
-    /// Greatest jerk, rad/s³ or m/s³.
+    /// Maximum jerk, rad/s³ or m/s³.
     pub jerk: f64,
 }
 
 impl MotionLimits {
-    /// No limit at all.
+    /// No limits.
     pub const UNLIMITED: Self = Self { velocity: f64::INFINITY, acceleration: f64::INFINITY, jerk: f64::INFINITY };
 }
 
@@ -58,24 +57,24 @@ impl MotionLimits {
 pub struct PlannedMove {
     /// Goal of every joint, rad or m.
     pub to: Vec<f64>,
-    /// Points passed without a stop (quintic and optimal only), each with a value for every joint.
+    /// Via points, passed without a stop (quintic and optimal only), each with a value for every
+    /// joint.
     pub via: Vec<Vec<f64>>,
-    /// Duration in s; `None` is as fast as the limits allow.
+    /// Duration (s); `None` means as fast as the limits allow.
     pub duration: Option<f64>,
-    /// Rest after the move, s.
+    /// Hold after the move (s).
     pub hold: f64,
-    /// Shape of the move.
+    /// Profile of the move.
     pub profile: Profile,
-    /// Do all joints start and stop together? Matters only without a duration and without points on
-    /// the way.
+    /// Whether all joints start and stop together. Matters only without a duration and without via
+    /// points.
     pub synchronised: bool,
-    /// One per joint.
+    /// Limits, one per joint.
     pub limits: Vec<MotionLimits>,
 }
 
 impl PlannedMove {
-    /// A quintic move to the goal within `duration` seconds, without limits, points on the way or
-    /// hold.
+    /// A quintic move to the goal within `duration` seconds, without limits, via points or hold.
     pub fn quintic(to: Vec<f64>, duration: f64) -> Self {
         let limits = vec![MotionLimits::UNLIMITED; to.len()];
         let (via, duration, profile) = (Vec::new(), Some(duration), Profile::Quintic);
@@ -83,23 +82,23 @@ impl PlannedMove {
     }
 }
 
-/// A start and the moves after it.
+/// A start and the moves that follow.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// Joint names.
     pub joints: Vec<String>,
     /// Position of every joint at `t = 0`, rad or m.
     pub start: Vec<f64>,
-    /// The moves, each from where the one before it ended.
+    /// The moves, each from the end of the previous one.
     pub moves: Vec<PlannedMove>,
 }
 
 impl Plan {
-    /// The trajectory that carries out the plan; starts and ends every move at rest.
+    /// Returns the trajectory of the plan, in which every move starts and ends at rest.
     ///
     /// # Errors
-    /// [`TrajectoryError::Plan`] when the plan contradicts itself or a limit that it needs is
-    /// missing; [`TrajectoryError::OutOfRange`] when numbers are too extreme for f64.
+    /// [`TrajectoryError::Plan`] if the plan is inconsistent or a required limit is missing;
+    /// [`TrajectoryError::OutOfRange`] if numbers are too extreme for f64.
     pub fn build(&self) -> Result<Trajectory, TrajectoryError> {
         self.check()?;
         let mut curves: Vec<Curve> =
@@ -122,7 +121,7 @@ impl Plan {
         Trajectory::from_curves(self.joints.clone(), curves, now, notes)
     }
 
-    /// Checks shapes and numbers of everything that is given.
+    /// Checks list lengths and number ranges.
     fn check(&self) -> Result<(), PlanError> {
         let n = self.joints.len();
         let length = |what: &'static str, number: usize, found: usize| match found == n {

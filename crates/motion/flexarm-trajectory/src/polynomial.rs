@@ -4,15 +4,15 @@
 //! q(τ) = c0 + c1 τ + c2 τ² + c3 τ³ + c4 τ⁴ + c5 τ⁵,    0 <= τ <= width,   τ in s from the start of the piece
 //! ```
 //! Start at [`Piece::hermite`]; everything else evaluates. Extrema come from the real roots of the
-//! next derivative, isolated between the roots of the derivative after that: no sampling, none is
-//! missed.
+//! next derivative, isolated between the roots of the derivative after that: there is no sampling,
+//! and none is missed.
 
 use std::ops::Deref;
 
-/// Greatest distance of a joint from 0, rad or m: a spindle turns so far in a day.
+/// Maximum distance of a joint from 0, rad or m: about a day's travel of a spindle.
 pub(crate) const FARTHEST: f64 = 1e9;
 
-/// Where a quantity is least and where it is greatest within a piece, as `(τ, value)`.
+/// Minimum and maximum of a quantity within a piece, as `(τ, value)`.
 pub(crate) type Range = [(f64, f64); 2];
 
 /// A polynomial of degree five on `0 <= τ <= width`.
@@ -51,7 +51,7 @@ impl Piece {
         ]
     }
 
-    /// `offset + factor * q(τ)`, run through in `stretch` times the time.
+    /// `offset + factor * q(τ)`, with the time multiplied by `stretch`.
     pub(crate) fn mapped(&self, offset: f64, factor: f64, stretch: f64) -> Self {
         let mut c = self.c;
         let mut scale = factor;
@@ -63,25 +63,24 @@ impl Piece {
         Self { width: self.width * stretch, c }
     }
 
-    /// Are width and all coefficients finite, the width positive, and the values no farther from 0
-    /// than [`FARTHEST`]?
+    /// Whether the width is positive and finite, all coefficients are finite, and all values are
+    /// within [`FARTHEST`] of 0.
     pub(crate) fn is_sound(&self) -> bool {
         let finite = self.width.is_finite() && self.c.iter().all(|c| c.is_finite());
         self.width > 0.0 && finite && self.c[0].abs() + self.excursion_bound() <= FARTHEST
     }
 
-    /// Does it stay exactly where it starts?
+    /// Whether the value is constant.
     pub(crate) fn is_still(&self) -> bool {
         self.c[1..].iter().all(|c| *c == 0.0)
     }
 
-    /// Bound on how far the piece leaves its starting value.
+    /// Upper bound on the distance from the starting value.
     pub(crate) fn excursion_bound(&self) -> f64 {
         (1..6).map(|k| self.c[k].abs() * self.width.powi(k as i32)).sum()
     }
 
-    /// Least and greatest value of derivative `order` (0 position ... 3 jerk), exact up to
-    /// rounding.
+    /// Minimum and maximum of derivative `order` (0 position ... 3 jerk), exact up to rounding.
     pub(crate) fn range(&self, order: usize) -> Range {
         let value = |u: f64| self.at(u * self.width)[order];
         let (mut least, mut greatest) = ((0.0, value(0.0)), (0.0, value(0.0)));
@@ -104,8 +103,7 @@ impl Piece {
     /// First `τ` at which derivative `order` equals `level`, if any.
     pub(crate) fn first_crossing(&self, order: usize, level: f64) -> Option<f64> {
         let mut p = self.derivative_in_u(order);
-        // The derivative with respect to u = τ / width is width^order times the one with respect to
-        // τ.
+        // The derivative by u = τ / width is width^order times the derivative by τ.
         p.all[0] -= level * self.width.powi(order as i32);
         roots_in_unit_interval(&p).first().map(|u| u * self.width)
     }
@@ -120,8 +118,8 @@ impl Piece {
     }
 }
 
-/// A few numbers, in place: coefficients of a polynomial of degree five at most, or its roots and
-/// the ends of their interval.
+/// A few numbers without heap allocation: coefficients of a polynomial of degree at most five, or
+/// its roots and the ends of their interval.
 #[derive(Clone, Copy, Debug, Default)]
 struct Few {
     all: [f64; 12],
@@ -140,7 +138,7 @@ impl Few {
         self.count += 1;
     }
 
-    /// Adds a root, if it is not the one found last.
+    /// Adds a root unless it equals the last one.
     fn push_new(&mut self, root: f64) {
         if self.last() != Some(&root) {
             self.push(root);
@@ -166,8 +164,8 @@ fn evaluate(p: &[f64], u: f64) -> f64 {
 
 /// The real roots in `0 <= u <= 1` at which `p` changes sign (or vanishes at an end), ascending.
 ///
-/// Between two neighbouring roots of `p'` the polynomial is monotone and has one root at most, so
-/// the recursion over the derivatives finds all of them.
+/// Between neighbouring roots of `p'` the polynomial is monotone and has at most one root, so the
+/// recursion over the derivatives finds all roots.
 fn roots_in_unit_interval(p: &[f64]) -> Few {
     if p.len() < 2 {
         return Few::default();
@@ -191,8 +189,8 @@ fn roots_in_unit_interval(p: &[f64]) -> Few {
     roots
 }
 
-/// Newton's method kept inside a bracket with a change of sign; halves the bracket where Newton
-/// leaves it.
+/// Newton's method within a bracket with a change of sign; bisects where a Newton step leaves the
+/// bracket.
 fn bracketed_root(p: &[f64], slope: &[f64], mut low: f64, mut high: f64) -> f64 {
     let rising = evaluate(p, low) < 0.0;
     let mut u = 0.5 * (low + high);
@@ -255,7 +253,7 @@ mod tests {
         fn hermite_piece_meets_its_end_values(ends in prop::array::uniform6(-3.0..3.0_f64), width in 0.01..5.0_f64) {
             let [q0, v0, a0, q1, v1, a1] = ends;
             let [q, v, a, _] = Piece::hermite(width, [q0, v0, a0], [q1, v1, a1]).at(width);
-            // The size of the terms, not of the result, sets the rounding; measured 8e-17 of it.
+            // The rounding error scales with the terms, not with the result; measured 8e-17 of it.
             let scale = 50.0 * (q0.abs() + q1.abs() + (v0.abs() + v1.abs()) * width + (a0.abs() + a1.abs()) * width * width);
             prop_assert!((q - q1).abs() <= 1e-14 * scale);
             prop_assert!((v - v1).abs() * width <= 1e-14 * scale);

@@ -1,14 +1,13 @@
-//! What can be wrong in a file, in samples and in a plan; each says what was found, what was
-//! expected, how to mend it.
+//! Problems of files, samples and plans: value found, value expected and remedy.
 //!
-//! The place of a problem is in [`crate::FileError`].
+//! [`crate::FileError`] adds the place of a problem.
 
 use flexarm_settings::Setting;
 
 use crate::polynomial::FARTHEST;
 use crate::trajectory::LONGEST;
 
-/// What is wrong in a file, and how to mend it.
+/// A problem in a file; the message includes the remedy.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Problem {
@@ -29,21 +28,21 @@ pub enum Problem {
         "the columns are separated by {separator:?}, expected commas (and points in decimal numbers); export the file again or replace them"
     )]
     WrongSeparator {
-        /// What separates them.
+        /// The separator found.
         separator: char,
     },
-    /// A column without a name.
+    /// Column without a name.
     #[error("a column has no name; name each column of the header or remove the comma too much")]
     UnnamedColumn,
-    /// The same column twice.
+    /// Repeated column name.
     #[error("the column is called {name:?}, as column {first} is; remove or rename one of them")]
     RepeatedColumn {
-        /// Its name.
+        /// The name.
         name: String,
         /// Number of the first column of that name, from 1.
         first: usize,
     },
-    /// A `.vel` or `.acc` column without its position.
+    /// `.vel` or `.acc` column without a position column.
     #[error(
         "column {column:?} has no position column {joint:?} beside it; the header has {}; add it or correct the name",
         list(found)
@@ -56,23 +55,23 @@ pub enum Problem {
         /// Columns of the header.
         found: Vec<String>,
     },
-    /// A row of another length than the header, as in a truncated file.
+    /// Row whose length differs from the header's, as in a truncated file.
     #[error("the row has {found} fields, the header {expected}; was the file cut off? complete or remove the row")]
     Ragged {
-        /// Fields of the row.
+        /// Number of fields in the row.
         found: usize,
-        /// Fields of the header.
+        /// Number of fields in the header.
         expected: usize,
     },
-    /// More numbers than are kept in memory.
+    /// Too many values for memory.
     #[error(
         "more than {most} numbers, which is more than is read (an hour of six joints at 1 kHz has 25 million); leave out rows: splines pass between them"
     )]
     TooManyNumbers {
-        /// How many are read.
+        /// Maximum number of values.
         most: usize,
     },
-    /// A field that is not a number.
+    /// Field that is not a number.
     #[error("{column}: {found:?} is not a number; expected one such as 0.25 or -1e-3")]
     NotANumber {
         /// Column name.
@@ -80,14 +79,14 @@ pub enum Problem {
         /// The field.
         found: String,
     },
-    /// A unit that is not known.
+    /// Unknown unit.
     #[error("unit {found:?} of `{key}` is not known; accepted: {accepted}")]
     UnknownUnit {
         /// `unit` or `time`.
         key: &'static str,
-        /// What was given.
+        /// Value given.
         found: String,
-        /// What may be given.
+        /// Accepted values.
         accepted: &'static str,
     },
     /// Two comments that state different units.
@@ -100,15 +99,15 @@ pub enum Problem {
         /// Second value.
         second: String,
     },
-    /// Numbers of a joint were read as what it has not.
+    /// The file's unit of a joint contradicts the robot's joint type.
     #[error("joint {joint:?} {}", contradicted(joint, *is_length))]
     UnitOfJoint {
         /// The joint.
         joint: String,
-        /// They were read as metres, otherwise as degrees.
+        /// Whether the values were read as metres, otherwise as degrees.
         is_length: bool,
     },
-    /// A name that is no joint of the file.
+    /// Name that is not a joint of the file.
     #[error("{name:?} in `{key}` is not a joint of this file; it has {}", list(joints))]
     UnknownJoint {
         /// The key that holds the name.
@@ -118,47 +117,47 @@ pub enum Problem {
         /// Joints of the file.
         joints: Vec<String>,
     },
-    /// The text is not the TOML that is expected: syntax, unknown or missing key, wrong type.
+    /// TOML text with a syntax error, an unknown or missing key or a wrong type.
     #[error("{message}")]
     Toml {
-        /// What the parser says, in one line.
+        /// Parser message, in one line.
         message: String,
     },
-    /// A version of the format that is not known.
+    /// Unknown version of the format.
     #[error("format {found} is not known; this program reads `format = 1`")]
     Format {
-        /// What was given.
+        /// Version given.
         found: i64,
     },
-    /// A value outside its range.
+    /// Value outside its range.
     #[error("`{key}` is {found}; expected {expected}")]
     Value {
         /// The key.
         key: String,
-        /// What was given.
+        /// Value given.
         found: String,
-        /// What may be given.
+        /// Accepted values.
         expected: &'static str,
     },
-    /// A list that does not have one entry per joint.
+    /// List that does not have one entry per joint.
     #[error("`{key}` has {found} entries; expected {expected}, one for each of `joints`")]
     ListLength {
         /// The key.
         key: String,
-        /// Entries found.
+        /// Number of entries found.
         found: usize,
         /// Number of joints.
         expected: usize,
     },
-    /// Commas between columns and in numbers.
+    /// Commas both as column separators and as decimal separators.
     #[error(
         "the row has {found} fields, the header {expected}: twice as many, as if numbers had decimal commas between commas, \
          which nobody can tell apart; export the table with semicolons, or with points in numbers"
     )]
     DecimalCommas {
-        /// Fields of the row.
+        /// Number of fields in the row.
         found: usize,
-        /// Fields of the header.
+        /// Number of fields in the header.
         expected: usize,
     },
     /// Decimal points and decimal commas in one table.
@@ -172,17 +171,17 @@ pub enum Problem {
         /// First line with a comma.
         comma: usize,
     },
-    /// Numbers without names of columns.
+    /// Numbers without a header.
     #[error(
         "the table has {fields} columns of numbers and no header; put one above (`time,<joint>,...`), or tell the columns by \
          number: {} t=#1[s],<joint>=#2[rad]",
         Setting::Columns
     )]
     NoHeader {
-        /// Columns.
+        /// Number of columns.
         fields: usize,
     },
-    /// No column looks like a time.
+    /// No time column recognised.
     #[error(
         "no column of the header {} is a time (`time`, `t`, `Time[s]`, `timestamp`); rename one, or tell which it is: {} \
          t=<column>",
@@ -193,17 +192,17 @@ pub enum Problem {
         /// Columns of the header.
         found: Vec<String>,
     },
-    /// Several columns look like times.
+    /// Several time columns recognised.
     #[error(
         "the columns {} are all times; tell which one counts: {} t=<column>,<joint>=<column>",
         list(columns),
         Setting::Columns
     )]
     SeveralTimes {
-        /// They.
+        /// Time columns.
         columns: Vec<String>,
     },
-    /// No column is one of the joints.
+    /// No column matches a joint.
     #[error(
         "no column of the header {} is a joint: the joints are {}; rename the columns, or tell which they are: {} \
          <joint>=<column>",
@@ -217,7 +216,7 @@ pub enum Problem {
         /// Joints of the robot.
         joints: Vec<String>,
     },
-    /// A column that was asked for and is not there.
+    /// Requested column that does not exist.
     #[error("there is no column {asked:?}; the header has {}", list(found))]
     NoSuchColumn {
         /// The column.
@@ -225,7 +224,7 @@ pub enum Problem {
         /// Columns of the header.
         found: Vec<String>,
     },
-    /// A name that several columns have.
+    /// Name that matches several columns.
     #[error("{asked:?} could be each of the columns {}; give the whole name, or its number as in #2", list(columns))]
     AmbiguousColumn {
         /// The name.
@@ -233,17 +232,17 @@ pub enum Problem {
         /// The columns.
         columns: Vec<String>,
     },
-    /// A unit of something else.
+    /// Column whose unit belongs to another quantity.
     #[error("the column {column:?} has the unit of {found}; expected {expected}")]
     WrongMeasure {
         /// The column.
         column: String,
-        /// What its unit measures.
+        /// Quantity of its unit.
         found: &'static str,
-        /// What is expected.
+        /// Quantity expected.
         expected: &'static str,
     },
-    /// Angles too large for radians, without a unit.
+    /// Angles without a unit that are too large for radians.
     #[error(
         "joint {joint:?} reaches {largest:.4} in a table that does not state its unit, too much for radians to be assumed; \
          name the unit in the header (`{column}[deg]`), in a line `# unit: deg` above it, or with {} {joint}={column}[deg]",
@@ -254,16 +253,16 @@ pub enum Problem {
         joint: String,
         /// Its column.
         column: String,
-        /// Largest position as it is written.
+        /// Largest position as written.
         largest: f64,
     },
-    /// Sampled values are wrong.
+    /// Sampled values are invalid.
     #[error(transparent)]
     Samples(SampleError),
-    /// The plan is wrong.
+    /// The plan is invalid.
     #[error(transparent)]
     Plan(PlanError),
-    /// Values or times are beyond any motion, or too extreme for polynomials in f64.
+    /// Values or times are beyond any real motion, or too extreme for polynomials in f64.
     #[error(
         "joint {joint:?}: values or times are too extreme (a motion has {FARTHEST:e} rad or m and {LONGEST:e} s at most); check the \
          units of the file"
@@ -274,17 +273,17 @@ pub enum Problem {
     },
 }
 
-/// What is wrong with sampled values.
+/// A problem with sampled values.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SampleError {
-    /// Not enough rows.
+    /// Too few rows.
     #[error("{found} rows of samples; expected at least 2, a start and an end")]
     TooFew {
-        /// How many there are.
+        /// Number of rows.
         found: usize,
     },
-    /// No joint at all.
+    /// No joint.
     #[error("no joint columns; expected at least one joint beside the time")]
     NoJoint,
     /// A joint name appears twice.
@@ -298,14 +297,14 @@ pub enum SampleError {
         "time {this} s does not follow {previous} s; times must increase from row to row: sort the rows and remove repeated ones"
     )]
     TimeNotIncreasing {
-        /// Index of the offending row, from 0.
+        /// Index of the row concerned, from 0.
         row: usize,
-        /// Time of the row before, s.
+        /// Time of the previous row, s.
         previous: f64,
         /// Time of the row, s.
         this: f64,
     },
-    /// NaN or infinite.
+    /// NaN or infinite value.
     #[error("{what} is {value}; expected a finite number: remove or repair the row")]
     NotFinite {
         /// Column name.
@@ -315,7 +314,7 @@ pub enum SampleError {
         /// The value.
         value: f64,
     },
-    /// A column of another length than the times.
+    /// Column whose length differs from that of the times.
     #[error("{what} has {found} values; expected {expected}, one for each time")]
     Length {
         /// Column name.
@@ -335,41 +334,41 @@ pub enum SampleError {
     },
 }
 
-/// What is wrong with a plan. Moves are counted from 1; 0 stands for the start.
+/// A problem with a plan. Moves are counted from 1; 0 is the start.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlanError {
-    /// No joint at all.
+    /// No joint.
     #[error("the plan has no joints; name at least one")]
     NoJoint,
     /// The plan lasts 0 s.
     #[error("nothing moves and nothing is held, so the trajectory lasts 0 s; add a move or a hold")]
     NothingHappens,
-    /// A list that does not have one entry per joint.
+    /// List that does not have one entry per joint.
     #[error("{}`{what}` has {found} entries; expected {expected}, one per joint", of_move(*number))]
     Length {
-        /// Which list.
+        /// The list.
         what: &'static str,
         /// Number of the move.
         number: usize,
-        /// Entries found.
+        /// Number of entries found.
         found: usize,
         /// Number of joints.
         expected: usize,
     },
-    /// A number outside its range.
+    /// Number outside its range.
     #[error("{}`{what}` is {value}; expected {allowed}", of_move(*number))]
     BadNumber {
-        /// Which number.
+        /// The quantity.
         what: &'static str,
         /// Number of the move.
         number: usize,
-        /// What was given.
+        /// Value given.
         value: f64,
-        /// What may be given.
+        /// Accepted values.
         allowed: &'static str,
     },
-    /// A limit that the profile needs is not known.
+    /// A limit that the profile needs is missing.
     #[error(
         "move {number} has no duration, and the {quantity} limit of joint {joint:?} is not known; \
          give `duration`, or the limit (for example `[limits]` `{joint} = {{ {quantity} = 2.0 }}`)"
@@ -382,7 +381,7 @@ pub enum PlanError {
         /// `"velocity"`, `"acceleration"` or `"jerk"`.
         quantity: &'static str,
     },
-    /// Points on the way with another profile than the quintic.
+    /// Via points with a profile other than quintic or optimal.
     #[error(
         "move {number} passes points on the way, which only the quintic and the optimal law can; set `profile = \"quintic\"` in this \
          move or drop `via`"
@@ -391,7 +390,7 @@ pub enum PlanError {
         /// Number of the move.
         number: usize,
     },
-    /// A point on the way that cannot be told from the one before it.
+    /// Via point that coincides with the previous point.
     #[error(
         "move {number}: point {via} on the way (the goal counts as the last) lies where the one before it is; remove it, or make two moves with a hold"
     )]
@@ -404,7 +403,7 @@ pub enum PlanError {
 }
 
 impl PlanError {
-    /// Number of the move that is wrong, from 1.
+    /// Number of the move concerned, from 1.
     pub fn move_number(&self) -> Option<usize> {
         match *self {
             Self::NoJoint | Self::NothingHappens => None,
@@ -424,7 +423,7 @@ pub(crate) fn list(names: &[String]) -> String {
     }
 }
 
-/// What a robot says against the unit of a joint, and how to mend it.
+/// Contradiction between the robot and the unit of a joint, with the remedy.
 fn contradicted(joint: &str, is_length: bool) -> String {
     match is_length {
         true => {

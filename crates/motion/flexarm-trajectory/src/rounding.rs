@@ -1,8 +1,8 @@
-//! Rounding of corners: a velocity that jumps becomes one that changes within a given time.
+//! Rounding of corners: a velocity jump becomes a change of velocity within a given time.
 //!
-//! Around each corner a stretch of the curve gives way to one quintic with position, velocity and
-//! acceleration of the curve at both ends. Not here: finding corners (`corner`), ends of the record
-//! at speed.
+//! Around each corner one quintic replaces a section of the curve, with the curve's position,
+//! velocity and acceleration at both ends. Not here: finding corners (`corner`), recordings that
+//! start or end at speed.
 
 use crate::error::TrajectoryError;
 use crate::polynomial::Piece;
@@ -10,14 +10,14 @@ use crate::trajectory::{Curve, Trajectory};
 use crate::warning::QUIET_SPEED;
 
 impl Trajectory {
-    /// The same motion with every corner inside it replaced by a quintic blend that lasts
-    /// `seconds`, less where two corners, or a corner and an end, are nearer than that. A joint
-    /// leaves its curve by up to `|Δv| seconds / 8` and a little more; a motion that starts or ends
-    /// at speed still does.
+    /// Returns the same motion with every interior corner replaced by a quintic blend of duration
+    /// `seconds`, or less where two corners, or a corner and an end, are nearer than that. A joint
+    /// deviates from its curve by slightly more than `|Δv| seconds / 8` at most. A motion that
+    /// starts or ends at speed still does.
     ///
     /// # Errors
     /// [`TrajectoryError::BadRounding`] unless `seconds` is positive and finite;
-    /// [`TrajectoryError::OutOfRange`] when it is so short that numbers are too extreme for f64.
+    /// [`TrajectoryError::OutOfRange`] if it is so short that numbers are too extreme for f64.
     pub fn with_rounded_corners(&self, seconds: f64) -> Result<Self, TrajectoryError> {
         if !(seconds > 0.0 && seconds.is_finite()) {
             return Err(TrajectoryError::BadRounding { seconds });
@@ -47,11 +47,11 @@ impl Curve {
         rounded
     }
 
-    /// Goes on along `other` from the last knot until `until`.
+    /// Appends `other` from the last knot until `until`.
     fn append_part(&mut self, other: &Self, until: f64) {
         for (piece, knots) in other.pieces.iter().zip(other.knots.windows(2)) {
             let (from, to) = (self.knots[self.knots.len() - 1].max(knots[0]), until.min(knots[1]));
-            // What is left after rounding of the times is no piece.
+            // A remainder from rounding of the times is not a piece.
             if to - from > 1e-9 * piece.width {
                 self.pieces.push(piece.part(from - knots[0], to - knots[0]));
                 self.knots.push(to);
@@ -63,10 +63,10 @@ impl Curve {
 }
 
 impl Piece {
-    /// The stretch between two of its times.
+    /// The part between two of its times.
     fn part(&self, from: f64, to: f64) -> Self {
         let mut c = self.c;
-        // Taylor's shift, by Horner's scheme repeated.
+        // Taylor shift by repeated Horner steps.
         for first in 0..5 {
             for k in (first..5).rev() {
                 c[k] += from * c[k + 1];

@@ -1,4 +1,4 @@
-//! Samples in a motion file: what is not made of moves from rest to rest, in TOML.
+//! Samples in a TOML motion file, for motions that are not made of moves from rest to rest.
 //!
 //! ```toml
 //! format = 1
@@ -11,7 +11,7 @@
 //! velocity = [[0.0, 0.0], [10.0, -20.0], [0.0, 0.0]]      # optional, and `acceleration` with it
 //! ```
 //!
-//! The same as samples in CSV ([`crate::csv_file`]): quintics between the rows.
+//! Equivalent to samples in CSV ([`crate::csv_file`]): quintics between the rows.
 
 use serde::Deserialize;
 use toml::Spanned;
@@ -22,7 +22,7 @@ use crate::spline::{JointSamples, Samples};
 use crate::trajectory::Trajectory;
 use crate::waypoints_check::{Located, bad_value, joint_names, scales};
 
-/// Most rows that are written.
+/// Maximum number of rows written.
 const MOST_ROWS: f64 = 5e6;
 
 /// The whole file.
@@ -46,7 +46,7 @@ struct SamplesToml {
     acceleration: Option<Spanned<Vec<Vec<f64>>>>,
 }
 
-/// Does the text hold samples instead of moves?
+/// Whether the text holds samples instead of moves.
 pub(crate) fn has_samples(text: &str) -> bool {
     text.lines().any(|line| line.split('#').next().is_some_and(|line| line.trim() == "[samples]"))
 }
@@ -92,7 +92,8 @@ pub(crate) fn trajectory(file: &SamplesFileToml) -> Result<Trajectory, Located> 
 
 impl Trajectory {
     /// Writes any motion as a motion file with positions, velocities and accelerations in SI units:
-    /// a row every `1 / rate_hz` s from `t = 0`, and one at the end. Numbers are written in full.
+    /// one row every `1 / rate_hz` s from `t = 0`, and one at the end. Numbers are written in full
+    /// precision.
     ///
     /// # Errors
     /// [`TrajectoryError::BadRate`].

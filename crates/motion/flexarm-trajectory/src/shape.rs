@@ -1,33 +1,33 @@
-//! Shapes of a move: how a way of length 1 is covered from rest to rest.
+//! Shapes of a move: travel of length 1 from rest to rest.
 //!
 //! A shape is a [`Curve`] `s(t)` from `s(0) = 0` to `s(T) = 1`; a joint that moves by `D` follows
-//! `q0 + D s(t)`. Limits are given per unit of way: a joint with velocity limit `v` that moves by
-//! `D` allows `s' <= v / |D|`.
+//! `q0 + D s(t)`. Limits are given per unit of travel: a joint with velocity limit `v` that moves
+//! by `D` allows `s' <= v / |D|`.
 //!
 //! ```text
 //! quintic      s(u) = u³ (10 - 15 u + 6 u²),  u = t / T;  peaks 15/8 1/T, 10/sqrt(3) 1/T², 60 1/T³
-//! seven-phase  the acceleration rises, stays, falls; cruise; the same backwards
+//! seven-phase  the acceleration rises, stays, falls; cruise; the same in reverse
 //!
 //!              a ┐   ________                             t_jerk  rise of the acceleration
-//!                │  /        \                            t_ramp  from rest to the cruise, both t_jerk included
-//!              0 ┼-/          \--------\          /--     T       all of it
+//!                │  /        \                            t_ramp  from rest to the cruise, including both t_jerk
+//!              0 ┼-/          \--------\          /--     T       total
 //!                │                      \________/        v = 1 / (T - t_ramp),  a = v / (t_ramp - t_jerk)
 //! ```
-//! Trapezoid and S-curve are both seven-phase: a trapezoid rounds a fixed part of its ramps
-//! (`t_jerk = rounding t_ramp / 2`, none gives jumps of the acceleration), an S-curve rounds by a
-//! jerk limit (`t_jerk = a / jerk`).
+//! Trapezoid and S-curve are both seven-phase: a trapezoid rounds a fixed fraction of its ramps
+//! (`t_jerk = rounding t_ramp / 2`; without rounding the acceleration jumps), an S-curve rounds by
+//! a jerk limit (`t_jerk = a / jerk`).
 
 use crate::polynomial::Piece;
 use crate::trajectory::Curve;
 
-/// Part of the duration that each ramp of a trapezoid takes when only the duration is given.
+/// Fraction of the duration for each ramp of a trapezoid if only the duration is given.
 const TRAPEZOID_RAMP: f64 = 0.25;
-/// Part of the duration that each ramp of an S-curve takes when only the duration is given.
+/// Fraction of the duration for each ramp of an S-curve if only the duration is given.
 const S_CURVE_RAMP: f64 = 1.0 / 3.0;
-/// Part of such a ramp in which the acceleration rises (and again in which it falls).
+/// Fraction of such a ramp in which the acceleration rises (and again in which it falls).
 const S_CURVE_RISE: f64 = 1.0 / 3.0;
 
-/// Limits of `s'`, `s''` and `s'''`; infinite when there is none.
+/// Limits of `s'`, `s''` and `s'''`; infinite means no limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ShapeLimits {
     pub(crate) velocity: f64,
@@ -50,7 +50,7 @@ pub(crate) fn quintic(duration: f64) -> Curve {
     Curve { knots: vec![0.0, duration], pieces: vec![unit.mapped(0.0, 1.0, duration)] }
 }
 
-/// Least duration of a shape with these peaks (for `T = 1`) within the limits.
+/// Minimum duration within the limits of a shape with these peaks (for `T = 1`).
 pub(crate) fn duration_for_peaks(peaks: [f64; 3], limits: &ShapeLimits) -> f64 {
     let [velocity, acceleration, jerk] = peaks;
     let by_velocity = velocity / limits.velocity;
@@ -64,8 +64,8 @@ pub(crate) fn quintic_peaks() -> [f64; 3] {
 }
 
 impl Phases {
-    /// The fastest trapezoid within velocity and (finite) acceleration limit; a triangle when the
-    /// way is short.
+    /// The fastest trapezoid within the velocity and the (finite) acceleration limit; a triangle if
+    /// the travel is short.
     pub(crate) fn trapezoid(limits: &ShapeLimits, rounding: f64) -> Self {
         // A rounded ramp reaches the speed of a plain one with this mean acceleration.
         let mean = limits.acceleration * (1.0 - rounding / 2.0);
@@ -75,7 +75,7 @@ impl Phases {
     }
 
     /// The trapezoid of the given duration that uses the acceleration limit, if there is one and it
-    /// suffices; `None` when even a triangle would exceed it.
+    /// suffices; `None` if even a triangle would exceed it.
     pub(crate) fn trapezoid_in(duration: f64, acceleration: f64, rounding: f64) -> Option<Self> {
         let mean = acceleration * (1.0 - rounding / 2.0);
         // v (T - ramp) = 1 with v = mean ramp: the smaller root.
@@ -84,21 +84,21 @@ impl Phases {
         (ramp > 0.0).then_some(Self { jerk: rounding * ramp / 2.0, ramp, total: duration })
     }
 
-    /// The trapezoid of which nothing but the duration is known.
+    /// The default trapezoid for a given duration.
     pub(crate) fn trapezoid_default(duration: f64, rounding: f64) -> Self {
         let ramp = TRAPEZOID_RAMP * duration;
         Self { jerk: rounding * ramp / 2.0, ramp, total: duration }
     }
 
-    /// The fastest S-curve within velocity, (finite) acceleration and (finite) jerk limit.
+    /// The fastest S-curve within the velocity and the (finite) acceleration and jerk limits.
     pub(crate) fn s_curve(limits: &ShapeLimits) -> Self {
         let ShapeLimits { velocity, acceleration: a, jerk } = *limits;
         let with_cruise = Self::ramp_to(velocity, a, jerk);
         if velocity * with_cruise.ramp <= 1.0 {
             return Self { total: with_cruise.ramp + 1.0 / velocity, ..with_cruise };
         }
-        // No cruise: v ramp = 1, first as if the acceleration limit were reached, else by the jerk
-        // alone.
+        // No cruise: v ramp = 1, first assuming that the acceleration limit is reached, otherwise
+        // with the jerk limit only.
         let rise = a / jerk;
         let ramp = 0.5 * (rise + (rise * rise + 4.0 / a).sqrt());
         if ramp >= 2.0 * rise {
@@ -108,15 +108,15 @@ impl Phases {
         Self { jerk: rise, ramp: 2.0 * rise, total: 4.0 * rise }
     }
 
-    /// The S-curve of the given duration that uses acceleration and jerk limit; `None` when they do
-    /// not suffice.
+    /// The S-curve of the given duration that uses the acceleration and jerk limits; `None` if they
+    /// do not suffice.
     pub(crate) fn s_curve_in(duration: f64, acceleration: f64, jerk: f64) -> Option<Self> {
         let unlimited = ShapeLimits { velocity: f64::INFINITY, acceleration, jerk };
         let fastest = Self::s_curve(&unlimited);
         if fastest.total > duration * (1.0 + 1e-12) {
             return None;
         }
-        // The way covered, v (T - ramp(v)), grows with the cruise speed v up to that of the fastest
+        // The travel v (T - ramp(v)) increases with the cruise speed v up to that of the fastest
         // curve.
         let (mut low, mut high) = (0.0, 1.0 / fastest.ramp);
         for _ in 0..100 {
@@ -130,7 +130,7 @@ impl Phases {
         Some(Self { total: duration, ..Self::ramp_to(high, acceleration, jerk) })
     }
 
-    /// The S-curve of which nothing but the duration is known.
+    /// The default S-curve for a given duration.
     pub(crate) fn s_curve_default(duration: f64) -> Self {
         let ramp = S_CURVE_RAMP * duration;
         Self { jerk: S_CURVE_RISE * ramp, ramp, total: duration }
@@ -146,15 +146,15 @@ impl Phases {
         Self { jerk: rise, ramp: 2.0 * rise, total: 0.0 }
     }
 
-    /// The curve with these times; exactly 1 long, whatever the rounding of the times.
+    /// Builds the curve with these times; its length is exactly 1 regardless of the rounding of the
+    /// times.
     pub(crate) fn curve(&self) -> Curve {
         let Self { jerk: rise, ramp, total } = *self;
         let v = 1.0 / (total - ramp);
         let a = v / (ramp - rise);
         let j = if rise > 0.0 { a / rise } else { 0.0 };
 
-        // Each phase: its length, the acceleration at its start, its jerk. The state is carried
-        // along.
+        // Each phase: duration, acceleration at its start, jerk. Position and speed carry over.
         let (plateau, cruise) = (ramp - 2.0 * rise, total - 2.0 * ramp);
         let phases = [
             (rise, 0.0, j),
@@ -168,7 +168,7 @@ impl Phases {
         let mut curve = Curve { knots: vec![0.0], pieces: Vec::new() };
         let (mut t, mut s, mut speed) = (0.0, 0.0, 0.0);
         for (width, acceleration, jerk) in phases {
-            // A phase this short is a rounding error of the times.
+            // A phase this short is a rounding error.
             if width <= 1e-14 * total {
                 continue;
             }
@@ -207,7 +207,7 @@ mod tests {
         assert_relative_eq!(peak(&curve, 3), j / 8.0, max_relative = 1e-14); // measured 0
     }
 
-    /// Truth: T = 1/v + v/a for a way of 1, and 2/sqrt(a) for one too short to cruise.
+    /// Truth: T = 1/v + v/a for a travel of 1, and 2/sqrt(a) for one too short to cruise.
     #[test]
     fn fastest_plain_trapezoid_is_bang_coast_bang() {
         let phases = Phases::trapezoid(&LIMITS, 0.0);
@@ -216,14 +216,14 @@ mod tests {
         assert_relative_eq!(Phases::trapezoid(&fast, 0.0).total, 2.0 / 2.0_f64.sqrt(), max_relative = 1e-15);
     }
 
-    /// Truth: T = 1/v + v/a + a/j for a way of 1 that reaches all three limits.
+    /// Truth: T = 1/v + v/a + a/j for a travel of 1 that reaches all three limits.
     #[test]
     fn fastest_s_curve_reaches_its_limits_and_no_more() {
         let phases = Phases::s_curve(&LIMITS);
         assert_relative_eq!(phases.total, 1.0 / 0.8 + 0.8 / 2.0 + 2.0 / 15.0, max_relative = 1e-15); // measured 0
         let cases = [
             (LIMITS, [0.8, 2.0, 15.0]),
-            // No time to cruise; no time to reach the acceleration either.
+            // No cruise; acceleration limit not reached either.
             (ShapeLimits { velocity: 9.0, ..LIMITS }, [f64::NAN, 2.0, 15.0]),
             (ShapeLimits { velocity: 9.0, acceleration: 90.0, ..LIMITS }, [f64::NAN, f64::NAN, 15.0]),
             (ShapeLimits { acceleration: 90.0, ..LIMITS }, [0.8, f64::NAN, 15.0]),

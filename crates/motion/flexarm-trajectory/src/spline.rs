@@ -1,8 +1,7 @@
-//! Splines through sampled joint values: positions, with velocities and accelerations where they
-//! are known.
+//! Splines through sampled joint positions, with velocities and accelerations where they are known.
 //!
 //! Between two samples every joint follows the quintic with the position, velocity and acceleration
-//! of both, so position, velocity and acceleration are continuous. What is not given is estimated:
+//! of both, so position, velocity and acceleration are continuous. Missing values are estimated:
 //!
 //! | given | velocity at the samples | acceleration at the samples |
 //! | --- | --- | --- |
@@ -10,20 +9,19 @@
 //! | and velocities | given | mean of the two cubic Hermite pieces that meet there; 0 at an end at rest |
 //! | and accelerations | given | given |
 //!
-//! A cubic spline knows nothing of rest and would ring into a hold. Hence, where only positions are
-//! given, it is cut at holds: at the ends of the record one repeated position is a hold, further
-//! inside two are (a symmetric turning point repeats a position once). In a hold the joint stands
-//! still, exactly; towards it, the spline has zero velocity (clamped) and the last quintic takes
-//! the acceleration to zero. An end without a hold is natural (zero acceleration), unless the
-//! spline is slower there than 2 % of its top speed: then it is taken to be at rest as well.
-//! Otherwise the velocity jumps at that end, which [`crate::Trajectory::warnings`] tells.
+//! A cubic spline would oscillate next to a hold. Hence, where only positions are given, it is cut
+//! at holds: at the ends of the record one repeated position counts as a hold, inside the record
+//! two do (a symmetric turning point repeats a position once). During a hold the joint is exactly
+//! at rest; next to it the spline has zero velocity (clamped) and the last quintic takes the
+//! acceleration to zero. An end without a hold is natural (zero acceleration), unless the speed of
+//! the spline there is below 2 % of its top speed: then the end is taken to be at rest as well.
+//! Otherwise the velocity jumps at that end, which [`crate::Trajectory::warnings`] reports.
 //!
-//! Nor does a spline know of corners: through positions that were sampled from a velocity that
-//! jumps, it would ring, and no stepper would see the impulse. Corners are found (`corner`), at a
-//! sample or between two, and the joint's curve is cut there: either side has its own spline with
-//! an end of constant acceleration, and the velocity jumps between them. Velocities and
-//! accelerations that are given beside a corner are not used, for they may be of either side or of
-//! neither.
+//! A cubic spline would also oscillate around a velocity jump in the sampled positions, and no
+//! integrator would see the impulse. Corners are therefore found (`corner`), at a sample or between
+//! two, and the joint's curve is cut there: either side has its own spline with an end of constant
+//! acceleration, and the velocity jumps in between. Given velocities and accelerations next to a
+//! corner are not used, since it is unknown which side they belong to.
 
 use crate::corner::{Corner, corners};
 use crate::error::TrajectoryError;
@@ -32,15 +30,15 @@ use crate::polynomial::Piece;
 use crate::problem::SampleError;
 use crate::trajectory::{Curve, Trajectory};
 
-/// An end slower than this part of the top speed is at rest.
+/// An end with a speed below this fraction of the top speed is at rest.
 const REST_FRACTION: f64 = 0.02;
 
-/// Joint values at common times, as read from a file or a message.
+/// Joint values at common times, read from a file or a message.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Samples {
     /// Times in s, strictly increasing; the first becomes `t = 0`.
     pub times: Vec<f64>,
-    /// The joints, in the order that the trajectory shall have.
+    /// The joints, in the order of the trajectory.
     pub joints: Vec<JointSamples>,
 }
 
@@ -49,15 +47,15 @@ pub struct Samples {
 pub struct JointSamples {
     /// Joint name.
     pub name: String,
-    /// One per time, rad or m.
+    /// Positions, one per time, rad or m.
     pub position: Vec<f64>,
-    /// One per time, rad/s or m/s, when known.
+    /// Velocities, one per time, rad/s or m/s, if known.
     pub velocity: Option<Vec<f64>>,
-    /// One per time, rad/s² or m/s², when known; used together with velocities only.
+    /// Accelerations, one per time, rad/s² or m/s², if known; used only together with velocities.
     pub acceleration: Option<Vec<f64>>,
 }
 
-/// Rows whose time does not follow the latest one before.
+/// Rows whose time does not exceed all earlier times.
 pub(crate) fn not_increasing(times: &[f64]) -> impl Iterator<Item = usize> {
     let mut latest = f64::NEG_INFINITY;
     times.iter().enumerate().filter_map(move |(row, time)| {
@@ -68,12 +66,11 @@ pub(crate) fn not_increasing(times: &[f64]) -> impl Iterator<Item = usize> {
 }
 
 impl Samples {
-    /// The trajectory through the samples; the module page says how.
+    /// Returns the trajectory through the samples; the module page describes the interpolation.
     ///
-    /// # Errors
     /// [`TrajectoryError::Samples`] for fewer than two samples, times that do not increase, values
-    /// that are not finite, columns of another length, accelerations without velocities, repeated
-    /// names; or [`TrajectoryError::OutOfRange`] when the values are too extreme for f64.
+    /// that are not finite, columns of different lengths, accelerations without velocities, or
+    /// repeated names; [`TrajectoryError::OutOfRange`] if the values are too extreme for f64.
     pub fn interpolate(&self) -> Result<Trajectory, TrajectoryError> {
         self.check()?;
         let knots: Vec<f64> = self.times.iter().map(|t| t - self.times[0]).collect();
@@ -84,7 +81,7 @@ impl Samples {
         Trajectory::from_curves(names, curves, knots[knots.len() - 1], notes)
     }
 
-    /// Checks everything that [`Samples::interpolate`] relies on.
+    /// Checks the preconditions of [`Samples::interpolate`].
     fn check(&self) -> Result<(), SampleError> {
         let n = self.times.len();
         if n < 2 {
@@ -96,7 +93,7 @@ impl Samples {
         if let Some(row) = self.times.iter().position(|t| !t.is_finite()) {
             return Err(SampleError::NotFinite { what: "time".to_owned(), row, value: self.times[row] });
         }
-        // The first time is subtracted below; two close times far from zero may fall together then.
+        // The first time is subtracted below; two close times far from zero may then coincide.
         let elapsed = |row: usize| self.times[row] - self.times[0];
         if let Some(row) = (1..n).find(|&row| !(elapsed(row) > elapsed(row - 1) && elapsed(row).is_finite())) {
             return Err(SampleError::TimeNotIncreasing { row, previous: self.times[row - 1], this: self.times[row] });
@@ -111,28 +108,29 @@ impl Samples {
     }
 }
 
-/// Exact values of one joint at knots: nothing is estimated, no corner is looked for.
+/// Exact values of one joint at knots: nothing is estimated, no corners are searched for.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct JointKnots {
     /// Joint name.
     pub name: String,
-    /// rad or m, one per knot.
+    /// Positions, one per knot, rad or m.
     pub position: Vec<f64>,
-    /// rad/s or m/s.
+    /// Velocities, one per knot, rad/s or m/s.
     pub velocity: Vec<f64>,
-    /// rad/s² or m/s²: just before and just after each knot.
+    /// Accelerations just before and just after each knot, rad/s² or m/s².
     pub acceleration: Vec<[f64; 2]>,
 }
 
 impl Trajectory {
-    /// The quintics through values that are known with their rates, as a planner computes them.
+    /// Returns the quintics through known positions, velocities and accelerations, such as those of
+    /// a planner.
     ///
     /// * `times`: s, strictly increasing; the first becomes `t = 0`.
     ///
     /// # Errors
     /// [`TrajectoryError::Samples`] for fewer than two knots, values that are not finite, columns
-    /// of another length, repeated names; [`TrajectoryError::OutOfRange`] for values too extreme
-    /// for f64.
+    /// of different lengths, or repeated names; [`TrajectoryError::OutOfRange`] for values too
+    /// extreme for f64.
     pub fn through_knots(times: &[f64], joints: &[JointKnots]) -> Result<Self, TrajectoryError> {
         let as_samples = |joint: &JointKnots| JointSamples {
             name: joint.name.clone(),
@@ -181,7 +179,7 @@ struct Rates {
 }
 
 impl JointSamples {
-    /// The curve through the samples, with a knot more for each corner between two of them.
+    /// The curve through the samples, with an additional knot for each corner between two samples.
     fn curve(&self, times: &[f64]) -> Curve {
         let found = corners(times, &self.position);
         let (mut knots, mut position, mut is_corner) = (Vec::new(), Vec::new(), Vec::new());
@@ -220,8 +218,8 @@ impl JointSamples {
             return given.into_iter().map(|rate| Rates { before: rate, after: rate }).collect();
         }
         let mut rates = rates_from_positions(knots, position, is_corner);
-        // What is given counts away from corners. Knots between the samples are corners, so the
-        // rest are the samples.
+        // Given values are used except next to corners. Knots between the samples are corners; all
+        // other knots are samples.
         let mut samples = given.into_iter();
         for i in 0..knots.len() {
             let is_sample = times.binary_search_by(|t| t.total_cmp(&knots[i])).is_ok();
@@ -275,7 +273,7 @@ fn rates_from_positions(t: &[f64], q: &[f64], is_corner: &[bool]) -> Vec<Rates> 
         while end < last && !is_hold(end) && !is_corner[end] {
             end += 1;
         }
-        // Within the record a run ends at a hold or a corner; at the ends of the record it need
+        // Inside the record a section ends at a hold or a corner; at the ends of the record it need
         // not.
         let kind = |k: usize, inside: bool| match (is_corner[k], inside) {
             (true, _) => End::Free,
@@ -311,20 +309,20 @@ fn rates_from_positions(t: &[f64], q: &[f64], is_corner: &[bool]) -> Vec<Rates> 
         }
         first = end;
     }
-    // Beyond the ends of the record nothing is known.
+    // No motion is known beyond the ends of the record.
     rates[0].before = rates[0].after;
     rates[last].after = rates[last].before;
     rates
 }
 
-/// How a spline ends.
+/// End condition of a spline.
 #[derive(Clone, Copy, PartialEq)]
 enum End {
-    /// Without velocity.
+    /// Zero velocity.
     Clamped,
-    /// Without acceleration.
+    /// Zero acceleration.
     Natural,
-    /// With the acceleration of the next knot.
+    /// Acceleration equal to that of the next knot.
     Free,
 }
 
@@ -335,7 +333,7 @@ pub(crate) fn natural_spline(t: &[f64], q: &[f64]) -> Vec<[f64; 2]> {
 
 /// Velocity and acceleration at the knots of the cubic spline.
 ///
-/// Unknown are the accelerations `M`; the rows are the usual ones,
+/// The unknowns are the accelerations `M`; the rows are
 /// `h[i-1] M[i-1] + 2 (h[i-1] + h[i]) M[i] + h[i] M[i+1] = 6 (slope[i] - slope[i-1])`.
 fn cubic_spline(t: &[f64], q: &[f64], start: End, end: End) -> Vec<[f64; 2]> {
     let last = q.len() - 1;
@@ -344,14 +342,14 @@ fn cubic_spline(t: &[f64], q: &[f64], start: End, end: End) -> Vec<[f64; 2]> {
     let row = |i: usize| match i {
         0 if start == End::Clamped => [0.0, 2.0 * h[0], h[0], 6.0 * slope[0]],
         i if i == last && end == End::Clamped => [h[i - 1], 2.0 * h[i - 1], 0.0, -6.0 * slope[i - 1]],
-        // Two knots alone have one slope and no acceleration.
+        // With only two knots there is one slope and no acceleration.
         0 if start == End::Free && last > 1 => [0.0, 1.0, -1.0, 0.0],
         i if i == last && end == End::Free && last > 1 => [-1.0, 1.0, 0.0, 0.0],
         i if i == 0 || i == last => [0.0, 1.0, 0.0, 0.0],
         i => [h[i - 1], 2.0 * (h[i - 1] + h[i]), h[i], 6.0 * (slope[i] - slope[i - 1])],
     };
 
-    // Elimination from left to right: M[i] = g[i] - e[i] M[i+1].
+    // Thomas algorithm, from left to right: M[i] = g[i] - e[i] M[i+1].
     let mut eliminated: Vec<[f64; 2]> = Vec::with_capacity(q.len());
     for i in 0..=last {
         let [lower, diagonal, upper, rhs] = row(i);

@@ -1,56 +1,56 @@
-//! How fast a path is run: the least time within bounds that are linear in the squared speed and
-//! the acceleration along it, and the same with accelerations that rise in a given time.
+//! Time-optimal laws along a path within bounds that are linear in the squared speed and the
+//! acceleration along it, and their smoothing with a finite rise time of the acceleration.
 //!
 //! ```text
 //! x = s'^2,  u = s'',     low <= a u + b x <= high at every point,   x <= x_max
 //! x(s + ds) = x + 2 u ds  between two points
 //! ```
-//! Backwards along the path the largest `x` from which the rest can be run, then forwards the
-//! largest `u` that stays below it: reachability analysis [Pham & Pham 2018]. Bounds hold at both
-//! ends of every interval, which costs time in proportion to its length: few points are therefore
-//! divided, with bounds that are linear in between. From a standstill no bound may be broken at
-//! `x = u = 0`.
+//! A backward pass finds the largest `x` at each point from which the end can be reached; a forward
+//! pass then takes the largest `u` that stays below it: reachability analysis [Pham & Pham 2018].
+//! Bounds are enforced at both ends of every interval, which costs time in proportion to its
+//! length; intervals are therefore divided if there are few points, with linear interpolation of
+//! the bounds. Rest must be admissible: no bound may be violated at `x = u = 0`.
 //!
-//! [`Law::smoothed`] is the moving average of the speed over a time T: the path stays,
-//! accelerations rise and fall in T, and the run lasts T longer.
+//! [`Law::smoothed`] is the moving average of the speed over a time T: the path stays the same,
+//! accelerations rise and fall within T, and the duration increases by T.
 #![allow(non_snake_case, reason = "letters of the formulas")]
 
-/// `low <= a u + b x <= high`.
+/// Bound `low <= a u + b x <= high`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bound {
     /// Factor of the acceleration along the path.
     pub a: f64,
     /// Factor of the squared speed.
     pub b: f64,
-    /// Least value, not positive.
+    /// Minimum value, not positive.
     pub low: f64,
-    /// Greatest value, not negative.
+    /// Maximum value, not negative.
     pub high: f64,
 }
 
-/// What holds at a point of a path.
+/// Bounds at a point of a path.
 ///
-/// Bounds of one kind have the same place in the lists of all points. A point at which other bounds
-/// begin has those of the path before it, then those of the path behind it.
+/// Corresponding bounds have the same index in the lists of all points. A point at which the set of
+/// bounds changes has those of the path before it, followed by those of the path after it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PathPoint {
     /// Parameter of the path, ascending from point to point.
     pub s: f64,
-    /// Greatest squared speed; infinite where only the bounds rule.
+    /// Maximum squared speed; infinite if only the bounds below apply.
     pub x_max: f64,
     /// Linear bounds.
     pub bounds: Vec<Bound>,
 }
 
 impl PathPoint {
-    /// What holds between two points at a part of their distance.
+    /// Bounds between two points at a fraction of their distance.
     fn between(here: &Self, next: &Self, part: f64) -> Self {
         let s = here.s + part * (next.s - here.s);
         Self { s, x_max: between(here.x_max, next.x_max, part), bounds: bounds_between(here, next, part).collect() }
     }
 
-    /// By how much a squared speed and an acceleration pass what holds between two points: the
-    /// greatest ratio, of 1 or less if they keep it.
+    /// Maximum ratio of a squared speed and an acceleration to the bounds between two points; at
+    /// most 1 if they keep them.
     pub fn passed(here: &Self, next: &Self, part: f64, x: f64, u: f64) -> f64 {
         let ratio = |bound: Bound| {
             let value = bound.a * u + bound.b * x;
@@ -82,24 +82,24 @@ fn bounds_between<'a>(here: &'a PathPoint, next: &'a PathPoint, part: f64) -> im
     })
 }
 
-/// The run cannot be timed.
+/// No time law exists for the path.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum LawError {
-    /// Fewer than two points, or parameters that do not ascend.
+    /// Fewer than two points, or parameters that are not ascending.
     #[error("a path needs two points or more, with ascending parameters (point {0})")]
     Points(usize),
-    /// A bound does not allow to stand still, or speed and bounds leave no way on.
+    /// A bound excludes rest, or speed limit and bounds leave no admissible motion.
     #[error("no speed along the path keeps all bounds at point {0}")]
     Infeasible(usize),
 }
 
-/// Fewer intervals than these are divided, each into so many parts at most.
+/// Paths with fewer intervals than this are divided, each interval into at most `MOST_PARTS` parts.
 const INTERVALS: usize = 4000;
 const MOST_PARTS: usize = 128;
-/// Below this part of the largest factor of `u` at a point a bound does not hold `u`.
+/// Relative to `b`, a factor of `u` below this counts as zero.
 const NO_FACTOR: f64 = 1e-12;
 
-/// Bounds at a point and, for the interval that begins there, at its end: lines `u <= p + q x` and
+/// Bounds at a point and at the end of the interval that begins there, as lines `u <= p + q x` and
 /// `u >= p + q x`.
 #[derive(Default)]
 struct Lines {
@@ -109,8 +109,8 @@ struct Lines {
 }
 
 impl Lines {
-    /// Lines of a point with `ds` to the next one, whose bounds hold as well; from `goal` on the
-    /// rest can be run.
+    /// Collects the lines of a point and of the next one, whose bounds apply as well; `goal` is the
+    /// largest squared speed at the next point from which the end can be reached.
     fn fill(&mut self, here: &PathPoint, next: &PathPoint, goal: f64) {
         let ds = next.s - here.s;
         self.upper.clear();
@@ -148,7 +148,7 @@ impl Lines {
         }
     }
 
-    /// Lowest upper and highest lower line at `x`.
+    /// Lowest upper line and highest lower line at `x`.
     fn tightest(&self, x: f64) -> ([f64; 2], [f64; 2]) {
         let value = |line: &[f64; 2]| line[0] + line[1] * x;
         let none = [f64::INFINITY, 0.0];
@@ -157,12 +157,12 @@ impl Lines {
         (upper, lower.unwrap_or([f64::NEG_INFINITY, 0.0]))
     }
 
-    /// Largest `x` at which some `u` is left: the gap between the lines is concave in `x`, so
+    /// Largest `x` at which some `u` is admissible. The gap between the lines is concave in `x`, so
     /// Newton's method from above ends at the root after finitely many lines.
     fn largest_x(&self) -> Option<f64> {
         let mut x = self.x_max;
         if x == f64::INFINITY {
-            // Somewhere beyond all crossings.
+            // Beyond all crossings.
             x = 1e18;
         }
         for _ in 0..200 {
@@ -177,7 +177,7 @@ impl Lines {
             if !(slope < 0.0 && crossing >= -1e-12) {
                 return None;
             }
-            // The same lines again: what is left is rounding.
+            // The same lines again: the remainder is rounding.
             if crossing >= x {
                 return Some(x);
             }
@@ -186,17 +186,18 @@ impl Lines {
         None
     }
 
-    /// Largest `u` at `x`, not below the least.
+    /// Largest admissible `u` at `x`, at least the lower bound.
     fn largest_u(&self, x: f64) -> f64 {
         let (upper, lower) = self.tightest(x);
         (upper[0] + upper[1] * x).max(lower[0] + lower[1] * x)
     }
 }
 
-/// Squared speeds at the points of a path that is run in the least time, from `x = 0` to `x = 0`.
+/// Returns the squared speeds of the time-optimal law at the points of a path, from `x = 0` to
+/// `x = 0`.
 ///
 /// # Errors
-/// [`LawError`]: points out of order, bounds that cannot be kept.
+/// [`LawError`] if the points are not ascending or the bounds cannot be kept.
 pub fn least_time(points: &[PathPoint]) -> Result<Vec<f64>, LawError> {
     let n = points.len();
     if n < 2 {
@@ -220,17 +221,17 @@ pub fn least_time(points: &[PathPoint]) -> Result<Vec<f64>, LawError> {
     Ok(x.into_iter().step_by(parts).collect())
 }
 
-/// The same without more points.
+/// [`least_time`] without dividing the intervals.
 fn least_time_at(points: &[PathPoint]) -> Result<Vec<f64>, LawError> {
     let n = points.len();
-    // Backwards: from these the end can be reached.
+    // Backward pass: largest speeds from which the end can be reached.
     let mut lines = Lines::default();
     let mut reach = vec![0.0; n];
     for k in (0..n - 1).rev() {
         lines.fill(&points[k], &points[k + 1], reach[k + 1]);
         reach[k] = lines.largest_x().ok_or(LawError::Infeasible(k))?;
     }
-    // Forwards: as fast as that allows.
+    // Forward pass: as fast as these allow.
     let mut x = vec![0.0; n];
     for k in 0..n - 1 {
         lines.fill(&points[k], &points[k + 1], reach[k + 1]);
@@ -244,7 +245,7 @@ fn least_time_at(points: &[PathPoint]) -> Result<Vec<f64>, LawError> {
     Ok(x)
 }
 
-/// A run along a path: the speed is linear in time between the points, and may be averaged over a
+/// Motion along a path: the speed is linear in time between the points, optionally averaged over a
 /// window.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Law {
@@ -253,28 +254,28 @@ pub struct Law {
     v: Vec<f64>,
     /// Integral of `s` from the start to each point.
     integral: Vec<f64>,
-    /// Width of the moving average, s; 0 for none.
+    /// Width of the moving average (s); 0 for none.
     window: f64,
 }
 
-/// Parameter of a path with its derivatives by time.
+/// Parameter of a path and its time derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress {
     /// Parameter.
     pub s: f64,
-    /// 1/s times its unit.
+    /// Speed (1/s times the unit of the parameter).
     pub v: f64,
-    /// 1/s².
+    /// Acceleration (1/s² times the unit of the parameter).
     pub a: f64,
-    /// 1/s³, just after the time.
+    /// Jerk just after the time (1/s³ times the unit of the parameter).
     pub j: f64,
 }
 
 impl Law {
-    /// The run with squared speeds `x` at the parameters `s`.
+    /// Builds the law with squared speeds `x` at the parameters `s`.
     ///
     /// # Panics
-    /// Unless both are equally long.
+    /// If `s` and `x` differ in length.
     pub fn new(s: &[f64], x: &[f64]) -> Self {
         assert_eq!(s.len(), x.len(), "a speed at each point");
         let v: Vec<f64> = x.iter().map(|x| x.sqrt()).collect();
@@ -282,7 +283,7 @@ impl Law {
         for k in 1..s.len() {
             let dt = 2.0 * (s[k] - s[k - 1]) / (v[k] + v[k - 1]);
             t.push(t[k - 1] + dt);
-            // s is a parabola in between.
+            // Between the points s is quadratic in time.
             let a = (v[k] - v[k - 1]) / dt;
             integral.push(integral[k - 1] + dt * (s[k - 1] + dt * (v[k - 1] / 2.0 + dt * a / 6.0)));
         }
@@ -295,12 +296,12 @@ impl Law {
         Self { window, ..self }
     }
 
-    /// How long it lasts, s.
+    /// Duration (s).
     pub fn duration(&self) -> f64 {
         self.t[self.t.len() - 1] + self.window
     }
 
-    /// Times at which the acceleration or its rate may jump, ascending, with start and end.
+    /// Times at which the acceleration or jerk may jump, ascending, including start and end.
     pub fn knots(&self) -> Vec<f64> {
         let mut knots = self.t.clone();
         if self.window > 0.0 {
@@ -310,7 +311,7 @@ impl Law {
         knots
     }
 
-    /// Integral of s, s, speed and acceleration just after `t`, without the average.
+    /// Integral of s, s, speed and acceleration just after `t`, without averaging.
     fn raw(&self, t: f64) -> [f64; 4] {
         let last = self.t.len() - 1;
         if t < 0.0 {
@@ -326,7 +327,7 @@ impl Law {
         [integral, s + tau * (v + tau * a / 2.0), v + a * tau, a]
     }
 
-    /// Where the run is at `t` (s).
+    /// State of the motion at time `t` (s).
     pub fn at(&self, t: f64) -> Progress {
         let [integral, s, v, a] = self.raw(t);
         if self.window <= 0.0 {
@@ -354,18 +355,18 @@ mod tests {
         Law::new(&s, &least_time(points).unwrap())
     }
 
-    /// Truth: the trapezoid, L/v + v/a; the triangle, 2 sqrt(L/a).
+    /// Truth: trapezoid, L/v + v/a; triangle, 2 sqrt(L/a).
     #[test]
     fn a_straight_path_is_run_as_a_trapezoid_or_a_triangle() {
         let trapezoid = timed(&straight(400, 2.0, 0.5, 1.0));
         assert!((trapezoid.duration() - 4.5).abs() < 1e-12, "{}", trapezoid.duration()); // measured 8.9e-16
-        // The peak of the triangle is a grid point.
+        // The peak of the triangle is at a grid point.
         let triangle = timed(&straight(400, 2.0, 100.0, 2.0));
         assert!((triangle.duration() - 2.0).abs() < 1e-10, "{}", triangle.duration()); // measured 2.0e-12
     }
 
-    /// Truth: one joint over q = s² + s, from 0 to 2, with an acceleration of 1 at most: 2 sqrt(2),
-    /// whatever s is.
+    /// Truth: one joint with q = s² + s, from 0 to 2, with maximum acceleration 1: 2 sqrt(2),
+    /// independent of the parameter.
     #[test]
     fn a_curved_parameter_changes_nothing_of_the_least_time() {
         let point = |k: usize| {
@@ -381,7 +382,7 @@ mod tests {
         assert!(error < 3e-3, "{error:.1e}"); // measured 1.1e-3, in the first and the last interval
     }
 
-    /// Truth: the least time does not depend on the parameter, however few points there are.
+    /// Truth: the minimum time does not depend on the parameter or on the number of points.
     #[test]
     fn few_points_cost_little_time() {
         for n in [30, 100, 2000] {
@@ -396,9 +397,9 @@ mod tests {
         }
     }
 
-    /// Truth: joints `s` and `s²/2` with accelerations of 1 and A at most. The first bound holds up
-    /// to `s = A/3`, then the second with `x = A - A³/(27 s²)`, and from where that meets
-    /// `2 (1 - s)` on the first again.
+    /// Truth: joints `s` and `s²/2` with maximum accelerations 1 and A. The first bound is active
+    /// up to `s = A/3`, then the second with `x = A - A³/(27 s²)`, and from its intersection with
+    /// `2 (1 - s)` the first again.
     #[test]
     fn two_joints_switch_from_one_bound_to_the_other_where_the_closed_form_does() {
         let A: f64 = 1.2;
@@ -422,8 +423,8 @@ mod tests {
         }
     }
 
-    /// Truth: the average has the exact path length, ends T later, and its acceleration is at most
-    /// that of the trapezoid and rises at a/T.
+    /// Truth: the averaged law has the exact path length and ends T later; its acceleration is at
+    /// most that of the trapezoid and rises at a/T.
     #[test]
     fn a_smoothed_law_is_an_s_curve() {
         let law = timed(&straight(400, 2.0, 0.5, 1.0)).smoothed(0.1);
@@ -431,7 +432,7 @@ mod tests {
         assert!((law.at(4.6).s - 2.0).abs() < 1e-12 && law.at(4.6).v.abs() < 1e-12);
         assert!((law.at(0.05).a - 0.5).abs() < 1e-9 && (law.at(0.05).j - 10.0).abs() < 1e-9);
         assert!((law.at(2.0).v - 0.5).abs() < 1e-12);
-        // Second algorithm: differences.
+        // Second algorithm: finite differences.
         for k in 1..460 {
             let (t, h) = (0.01 * f64::from(k) + 0.0033, 1e-5);
             let (low, mid, high) = (law.at(t - h), law.at(t), law.at(t + h));
@@ -445,9 +446,9 @@ mod tests {
         let mut points = straight(1000, 2.0, 1.0, 2.0);
         points[500].x_max = 0.01;
         let law = timed(&points);
-        // Truth: two runs of 1 m between 0, 1 and 0.1 m/s: (1/2 + 1 + 1/2 ...) by hand.
+        // Truth: two sections of 1 m between 0, 1 and 0.1 m/s: (1/2 + 1 + 1/2 ...) by hand.
         let run = 0.5 + (1.0 - 0.25 - (1.0 - 0.01) / 4.0) / 1.0 + (1.0 - 0.1) / 2.0;
-        // The corner of the speed lies between two points.
+        // The corner of the speed is between two points.
         assert!((law.duration() - 2.0 * run).abs() < 1e-5); // measured 1.5e-6
     }
 

@@ -1,8 +1,8 @@
-//! The trajectory itself: named piecewise polynomials, sampled, reordered, slowed down, cut into
+//! Trajectories as named piecewise polynomials: sampling, reordering, time scaling, division into
 //! moves.
 //!
-//! Start at [`Trajectory::sample`]. Built by [`crate::Plan`] and [`crate::Samples`], never changed
-//! afterwards.
+//! Start at [`Trajectory::sample`]. Trajectories are built by [`crate::Plan`] and
+//! [`crate::Samples`] and do not change afterwards.
 
 use crate::error::{FileError, TrajectoryError};
 use crate::polynomial::Piece;
@@ -10,59 +10,58 @@ use crate::problem::{Problem, SampleError};
 use crate::table::KnownJoint;
 use crate::warning::{QUIET_SPEED, Warning};
 
-/// A joint that moves less than this within a piece, in rad or m, is at rest there.
+/// A joint that moves less than this within a piece (rad or m) is at rest there.
 const REST: f64 = 1e-9;
 
-/// Greatest duration of a motion, s: four months.
+/// Maximum duration of a motion (s): about four months.
 pub const LONGEST: f64 = 1e7;
 
 /// Joint positions, velocities and accelerations as functions of time, from `t = 0` to
 /// [`Trajectory::duration`].
 ///
-/// Position, velocity and acceleration are continuous everywhere, with three exceptions, each of
-/// which shows in
-/// [`Trajectory::warnings`]: an unrounded trapezoid jumps in acceleration; sampled data may start or end in
-/// motion or have corners, where the velocity jumps ([`Trajectory::velocity_jumps`]); data with
-/// velocities or accelerations of its own may do the same.
+/// Position, velocity and acceleration are continuous everywhere, with three exceptions, each
+/// reported by [`Trajectory::warnings`]: the acceleration of an unrounded trapezoid jumps; sampled
+/// data may start or end in motion or have corners, where the velocity jumps
+/// ([`Trajectory::velocity_jumps`]); so may data that include velocities or accelerations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
     joints: Vec<String>,
     curves: Vec<Curve>,
     duration: f64,
-    /// What the reader or planner noticed; see [`Trajectory::warnings`].
+    /// Notes of the reader or planner; see [`Trajectory::warnings`].
     notes: Vec<Warning>,
-    /// What the file said about the units of its joints.
+    /// Units that the file states for its joints.
     told: Vec<ToldUnit>,
 }
 
-/// What a file says about the unit of a joint: degrees, or metres.
+/// Unit that a file states for a joint: degrees, or metres.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct ToldUnit {
     pub(crate) joint: String,
     pub(crate) is_length: bool,
-    /// Where, from 1.
+    /// Line of the statement, from 1.
     pub(crate) line: usize,
 }
 
-/// One joint: `knots[i] <= t < knots[i + 1]` belongs to `pieces[i]`.
+/// Curve of one joint: `knots[i] <= t < knots[i + 1]` belongs to `pieces[i]`.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Curve {
     pub(crate) knots: Vec<f64>,
     pub(crate) pieces: Vec<Piece>,
 }
 
-/// A corner: a velocity that is one thing just before a time and another just after it.
+/// Corner: a velocity jump of one joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VelocityJump {
     /// Joint name.
     pub joint: String,
     /// Time, s.
     pub time_s: f64,
-    /// Velocity after less velocity before, rad/s or m/s.
+    /// Velocity after minus velocity before, rad/s or m/s.
     pub jump: f64,
 }
 
-/// A stretch of time in which at least one joint moves; between two of them nothing does.
+/// Time span in which at least one joint moves; between two of them all joints are at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Move {
     /// Time at which the first joint starts, s.
@@ -72,13 +71,13 @@ pub struct Move {
 }
 
 impl Trajectory {
-    /// Puts checked curves together.
+    /// Assembles a trajectory from curves and checks them.
     ///
     /// All curves must cover `0..duration`.
     ///
     /// # Errors
-    /// [`TrajectoryError::OutOfRange`] when a coefficient or a time is not finite or beyond any
-    /// motion, or a piece shorter than the rounding of its time.
+    /// [`TrajectoryError::OutOfRange`] if a coefficient or a time is not finite or beyond any real
+    /// motion, or a piece is shorter than the rounding of its time.
     pub(crate) fn from_curves(
         joints: Vec<String>,
         curves: Vec<Curve>,
@@ -88,7 +87,7 @@ impl Trajectory {
         assert_eq!(joints.len(), curves.len(), "one curve per joint");
         for (joint, curve) in joints.iter().zip(&curves) {
             assert_eq!(curve.knots.len(), curve.pieces.len() + 1, "a piece between every two knots");
-            // Far from zero, short pieces drown in the rounding of the knots.
+            // Far from zero, short pieces are lost in the rounding of the knots.
             let spans = curve.knots.windows(2).zip(&curve.pieces);
             let mut sound = spans
                 .map(|(knot, piece)| piece.is_sound() && (knot[1] - knot[0] - piece.width).abs() <= 1e-6 * piece.width);
@@ -102,19 +101,19 @@ impl Trajectory {
         Ok(Self { joints, curves, duration, notes, told: Vec::new() })
     }
 
-    /// The curve of a joint as it is stored, for programs that keep motions: knots (s), one more
-    /// than there are pieces, and of each piece its length (s) and the coefficients of 1, τ, ...
-    /// τ⁵, where τ is the time since it began.
+    /// Returns the stored curve of a joint, for programs that save motions: the knots (s), one more
+    /// than there are pieces, and for each piece its length (s) and the coefficients of 1, τ, ...
+    /// τ⁵, where τ is the time since the start of the piece.
     pub fn pieces(&self, joint: usize) -> Option<(&[f64], Vec<[f64; 7]>)> {
         let row = |piece: &Piece| std::array::from_fn(|k| if k == 0 { piece.width } else { piece.c[k - 1] });
         let curve = self.curves.get(joint)?;
         Some((&curve.knots, curve.pieces.iter().map(row).collect()))
     }
 
-    /// The trajectory of such curves, to the last bit: of each joint its name, knots and pieces.
+    /// Rebuilds a trajectory bit for bit from the name, knots and pieces of each joint.
     ///
     /// # Errors
-    /// [`TrajectoryError::OutOfRange`] for numbers that make no curve from 0 to `duration` (s).
+    /// [`TrajectoryError::OutOfRange`] if the numbers do not form a curve from 0 to `duration` (s).
     pub fn of_pieces(joints: Vec<(String, Vec<f64>, Vec<[f64; 7]>)>, duration: f64) -> Result<Self, TrajectoryError> {
         let piece = |row: &[f64; 7]| Piece { width: row[0], c: std::array::from_fn(|k| row[k + 1]) };
         let (mut names, mut curves) = (Vec::new(), Vec::new());
@@ -144,16 +143,15 @@ impl Trajectory {
     /// [`Trajectory::joints`].
     ///
     /// Before 0 and after the end the joints are held: constant position, zero velocity and
-    /// acceleration. At a knot where the acceleration jumps the value is the one just after it
-    /// (just before it at the very end). Nothing is allocated; the cost is one binary search per
-    /// joint.
+    /// acceleration. At a knot where the acceleration jumps, the value is the one just after it
+    /// (just before it at the end). Nothing is allocated; the cost is one binary search per joint.
     ///
     /// * `t`: s, not NaN.
     /// * `q`, `qdot`, `qddot`: rad, rad/s, rad/s² (m, m/s, m/s² for a prismatic joint), one entry
     ///   per joint.
     ///
     /// # Panics
-    /// When a slice does not have one entry per joint.
+    /// If a slice does not have one entry per joint.
     pub fn sample(&self, t: f64, q: &mut [f64], qdot: &mut [f64], qddot: &mut [f64]) {
         let n = self.joints.len();
         assert!(
@@ -172,11 +170,11 @@ impl Trajectory {
         }
     }
 
-    /// The same motion with the joints in the order of `names`.
+    /// Returns the same motion with the joints in the order of `names`.
     ///
     /// # Errors
     /// [`TrajectoryError::JointOrder`] unless `names` holds each joint of the trajectory exactly
-    /// once; it lists every missing and every unknown one.
+    /// once; it lists all missing and unknown joints.
     pub fn with_joint_order(&self, names: &[&str]) -> Result<Self, TrajectoryError> {
         let place = |name: &str| self.joints.iter().position(|joint| joint == name);
         let mut repeated = names.to_vec();
@@ -206,14 +204,14 @@ impl Trajectory {
         })
     }
 
-    /// The same motion with further joints, each held where it is told (rad or m) from the start to
-    /// the end.
+    /// Returns the same motion with additional joints, each held at the given position (rad or m)
+    /// from start to end.
     ///
     /// # Errors
     /// [`TrajectoryError::OutOfRange`] for a value that is not finite.
     ///
     /// # Panics
-    /// When a joint is there already.
+    /// If a joint is already part of the trajectory.
     pub fn with_held_joints(&self, held: &[(&str, f64)]) -> Result<Self, TrajectoryError> {
         let (mut joints, mut curves) = (self.joints.clone(), self.curves.clone());
         for (joint, value) in held {
@@ -225,16 +223,16 @@ impl Trajectory {
         Self::from_curves(joints, curves, self.duration, self.notes.clone())
     }
 
-    /// One motion of several that move different joints, each beginning at its own time; before and
-    /// after a joint is held where its part begins and ends. What was noted of the parts holds for
-    /// the whole.
+    /// Combines motions of different joints into one; each part begins at its own time, and its
+    /// joints are held before its start and after its end. The notes of the parts apply to the
+    /// whole.
     ///
-    /// * `parts`: when each begins (s, not negative) and what it is.
+    /// * `parts`: start time (s, not negative) and motion of each part.
     ///
     /// # Errors
-    /// [`TrajectoryError::Samples`] for no part at all and for a joint that two parts move,
-    /// [`TrajectoryError::OutOfRange`] for a time that is not finite or negative, or that drowns a
-    /// part in its rounding.
+    /// [`TrajectoryError::Samples`] if there is no part or a joint occurs in two parts;
+    /// [`TrajectoryError::OutOfRange`] if a start time is not finite or negative, or so large that
+    /// a part is lost in its rounding.
     pub fn side_by_side(parts: &[(f64, Self)]) -> Result<Self, TrajectoryError> {
         let duration = parts.iter().map(|(start, part)| start + part.duration).fold(0.0, f64::max);
         let (mut joints, mut curves, mut notes): (Vec<String>, Vec<Curve>, Vec<Warning>) = Default::default();
@@ -259,11 +257,11 @@ impl Trajectory {
         Self::from_curves(joints, curves, duration, notes)
     }
 
-    /// The same path run through in `factor` times the time: 2 halves every velocity.
+    /// Returns the same path with the time multiplied by `factor`: 2 halves every velocity.
     ///
     /// # Errors
     /// [`TrajectoryError::BadFactor`] unless `factor` is positive and finite;
-    /// [`TrajectoryError::OutOfRange`] when it is too extreme for f64.
+    /// [`TrajectoryError::OutOfRange`] if it is too extreme for f64.
     pub fn scaled(&self, factor: f64) -> Result<Self, TrajectoryError> {
         if !(factor > 0.0 && factor.is_finite()) {
             return Err(TrajectoryError::BadFactor { factor });
@@ -273,14 +271,14 @@ impl Trajectory {
             pieces: curve.pieces.iter().map(|piece| piece.mapped(0.0, 1.0, factor)).collect(),
         };
         let curves = self.curves.iter().map(stretch).collect();
-        // What the planner said about times and limits holds for the unscaled motion only.
+        // The planner's notes on times and limits apply only to the unscaled motion.
         let notes = self.notes.iter().filter(|note| !note.depends_on_time());
         let notes = notes.map(|note| note.clone().at_times(0.0, factor)).collect();
         Self::from_curves(self.joints.clone(), curves, self.duration * factor, notes)
     }
 
-    /// Where velocities jump, by time: corners of sampled data, and both ends where the motion does
-    /// not start or end at rest (before and after it the joints are held).
+    /// Returns the velocity jumps by time: corners of sampled data, and both ends if the motion
+    /// does not start or end at rest (the joints are held before and after it).
     pub fn velocity_jumps(&self) -> Vec<VelocityJump> {
         let of_curve = |(joint, curve): (&String, &Curve)| -> Vec<VelocityJump> {
             let jumps = curve.jumps().filter(|jump| jump.exceeds(1, QUIET_SPEED));
@@ -291,8 +289,8 @@ impl Trajectory {
         jumps
     }
 
-    /// Times at which the velocity, the acceleration or the jerk of some joint jumps, ascending:
-    /// knots that a step of an integrator should end at. Includes 0 and the end when the motion
+    /// Returns the times at which the velocity, acceleration or jerk of some joint jumps,
+    /// ascending: knots at which integrator steps should end. Includes 0 and the end if the motion
     /// does not start or end smoothly.
     pub fn kinks(&self) -> Vec<f64> {
         let mut times: Vec<f64> = self.curves.iter().flat_map(Curve::kinks).collect();
@@ -301,10 +299,10 @@ impl Trajectory {
         times
     }
 
-    /// The stretches of time in which at least one joint moves, ascending and disjoint.
+    /// Returns the time spans in which at least one joint moves, ascending and disjoint.
     ///
-    /// A joint is at rest in a piece in which it moves less than 1e-9 rad (or m). Two moves that
-    /// follow each other without a hold count as one, because nothing can settle between them.
+    /// A joint is at rest in a piece in which it moves less than 1e-9 rad (or m). Two moves without
+    /// a hold between them count as one, because nothing can settle between them.
     pub fn moves(&self) -> Vec<Move> {
         let moving = |curve: &Curve| -> Vec<Move> {
             let spans = curve.knots.windows(2).map(|pair| Move { start: pair[0], end: pair[1] });
@@ -324,8 +322,8 @@ impl Trajectory {
         moves
     }
 
-    /// Time up to which every velocity is exactly zero from `t` on, s: `t` itself where a joint
-    /// moves, infinity after the last motion. Stricter than what lies between two
+    /// Returns the time until which all velocities are exactly zero from `t` on (s): `t` itself
+    /// where a joint moves, infinity after the last motion. Stricter than the gaps between
     /// [`Trajectory::moves`].
     ///
     /// * `t`: s, not NaN.
@@ -337,14 +335,14 @@ impl Trajectory {
         self.curves.iter().map(|curve| curve.still_until(t)).fold(f64::INFINITY, f64::min)
     }
 
-    /// Largest speed at `t = 0` over all joints, rad/s (or m/s): by how much the velocity jumps at
-    /// the start.
+    /// Returns the largest speed of all joints at `t = 0` (rad/s or m/s), that is, the velocity
+    /// jump at the start.
     pub fn initial_speed(&self) -> f64 {
         self.curves.iter().map(|curve| curve.start()[1].abs()).fold(0.0, f64::max)
     }
 
-    /// Everything about this trajectory that a user should know before trusting a result: velocity
-    /// jumps at the ends, acceleration jumps, and what the file reader or the planner noticed.
+    /// Returns all warnings a user should know before trusting a result: velocity jumps at the
+    /// ends, acceleration jumps, and the notes of the file reader or planner.
     pub fn warnings(&self) -> Vec<Warning> {
         let mut warnings = self.notes.clone();
         for (joint, curve) in self.joints.iter().zip(&self.curves) {
@@ -361,14 +359,14 @@ impl Trajectory {
         &self.curves
     }
 
-    /// Checks the units that the file tells against a robot whose joints slide or turn. In a
-    /// trajectory that was made of another one they are not told any more.
+    /// Checks the units stated in the file against a robot with prismatic or revolute joints.
+    /// Trajectories derived from another one no longer have stated units.
     ///
     /// * `origin`: file name for messages.
     ///
     /// # Errors
-    /// [`TrajectoryError::File`] for a joint that slides and whose numbers were read as degrees,
-    /// and for one that turns and whose numbers were read as metres.
+    /// [`TrajectoryError::File`] for a prismatic joint whose values were read as degrees, and for a
+    /// revolute one whose values were read as metres.
     pub fn check_units(&self, origin: &str, joints: &[KnownJoint<'_>]) -> Result<(), TrajectoryError> {
         let contradicts = |told: &ToldUnit| {
             joints.iter().any(|joint| joint.name == told.joint && joint.is_prismatic != told.is_length)
@@ -385,14 +383,14 @@ impl Trajectory {
         Self { told, ..self }
     }
 
-    /// Adds what a reader noticed about its file.
+    /// Adds a note of a reader about its file.
     pub(crate) fn with_note(mut self, note: Warning) -> Self {
         self.notes.push(note);
         self
     }
 }
 
-/// Adds a note; a gap that is there already takes the joints of the new one.
+/// Adds a note; a gap that is already noted takes the joints of the new one.
 fn add_note(notes: &mut Vec<Warning>, note: Warning) {
     if let Warning::Gaps { joints, sample, from_s, to_s, .. } = &note {
         let same = notes.iter_mut().find_map(|other| match other {
@@ -410,8 +408,7 @@ fn add_note(notes: &mut Vec<Warning>, note: Warning) {
 }
 
 impl Curve {
-    /// Position, velocity, acceleration and jerk at `t`, which is held within the first and last
-    /// knot.
+    /// Position, velocity, acceleration and jerk at `t`, clamped to the range of the knots.
     pub(crate) fn at(&self, t: f64) -> [f64; 4] {
         let last = self.pieces.len() - 1;
         let i = self.knots[1..=last].partition_point(|&knot| knot <= t);
@@ -419,7 +416,7 @@ impl Curve {
         piece.at((t - self.knots[i]).clamp(0.0, piece.width))
     }
 
-    /// The curve begun at `start`, held before it and after its end up to `duration`.
+    /// The curve started at `start`, held before it and after its end until `duration`.
     fn within(&self, start: f64, duration: f64) -> Self {
         let mut knots: Vec<f64> = self.knots.iter().map(|knot| start + knot).collect();
         let mut pieces = self.pieces.clone();
@@ -428,7 +425,7 @@ impl Curve {
             pieces.insert(0, Piece::hold(start, self.start()[0]));
         }
         let end = knots[knots.len() - 1];
-        // An end that differs by rounding alone is the same end.
+        // Ends that differ only by rounding are the same.
         if duration - end > 1e-9 * duration {
             knots.push(duration);
             pieces.push(Piece::hold(duration - end, self.end()[0]));
@@ -440,7 +437,7 @@ impl Curve {
         Self { knots, pieces }
     }
 
-    /// As [`Trajectory::still_until`], of one joint.
+    /// [`Trajectory::still_until`] for one joint.
     fn still_until(&self, t: f64) -> f64 {
         let last = self.pieces.len() - 1;
         let first = self.knots[1..=last].partition_point(|&knot| knot <= t);
@@ -460,7 +457,7 @@ impl Curve {
         piece.at(piece.width)
     }
 
-    /// The jumps at every knot, the holds before and after included.
+    /// Jumps at every knot, including those to the holds before and after.
     pub(crate) fn jumps(&self) -> impl Iterator<Item = Jump> + '_ {
         let held = |[q, ..]: [f64; 4]| [q, 0.0, 0.0, 0.0];
         let last = self.pieces.len();
@@ -469,8 +466,8 @@ impl Curve {
             let right = self.pieces.get(i);
             let before = left.map_or_else(|| held(self.start()), |piece| piece.at(piece.width));
             let after = right.map_or_else(|| held(self.end()), |piece| piece.at(0.0));
-            // Positions are known to a few units in the last place; each derivative divides that by
-            // the width.
+            // Positions are exact to a few units in the last place; each derivative divides this
+            // error by the width.
             let width = left.into_iter().chain(right).map(|piece| piece.width).fold(f64::INFINITY, f64::min);
             let rounding = |order: i32| 1e-13 * after[0].abs() / width.powi(order);
             Jump {
@@ -481,31 +478,31 @@ impl Curve {
         })
     }
 
-    /// Knots at which velocity, acceleration or jerk jumps by more than rounding and a millionth of
-    /// its peak.
+    /// Knots at which the velocity, acceleration or jerk jumps by more than rounding and, for the
+    /// latter two, a millionth of its peak.
     fn kinks(&self) -> Vec<f64> {
         let levels = [0.0, QUIET_SPEED, 1e-6 * self.largest(2), 1e-6 * self.largest(3)];
         let kinks = self.jumps().filter(|jump| (1..4).any(|order| jump.exceeds(order, levels[order])));
         kinks.map(|jump| jump.time_s).collect()
     }
 
-    /// Largest magnitude of derivative `order`.
+    /// Maximum magnitude of derivative `order`.
     pub(crate) fn largest(&self, order: usize) -> f64 {
         let [least, greatest] = self.range(order);
         greatest.value.max(-least.value)
     }
 }
 
-/// By how much position, velocity, acceleration and jerk jump at a knot.
+/// Jumps of position, velocity, acceleration and jerk at a knot.
 pub(crate) struct Jump {
     pub(crate) time_s: f64,
     pub(crate) size: [f64; 4],
-    /// Jumps below this are rounding.
+    /// Jumps below this are rounding errors.
     rounding: [f64; 4],
 }
 
 impl Jump {
-    /// Is the jump of derivative `order` larger than `level` and than rounding explains?
+    /// Whether the jump of derivative `order` exceeds `level` and the rounding error.
     pub(crate) fn exceeds(&self, order: usize, level: f64) -> bool {
         self.size[order].abs() > level.max(self.rounding[order])
     }

@@ -1,12 +1,10 @@
-//! A move through points on the way: the smoothest curve, from rest to rest, that passes all of
-//! them.
+//! Moves through via points: the smoothest curve from rest to rest through all of them.
 //!
 //! Between the points each joint follows a quintic; velocity, acceleration, jerk and snap are
 //! continuous at the points, velocity and acceleration vanish at both ends. Of all curves through
-//! the points this one has the least integral of the squared jerk [Flash and Hogan 1985]. Without a
-//! point on the way it is the quintic `u³ (10 - 15 u
-//! + 6 u²)`, and so it is with points on the straight line, because of the way the times are
-//!   chosen:
+//! the points this one has the smallest integral of the squared jerk [Flash and Hogan 1985].
+//! Without a via point it is the quintic `u³ (10 - 15 u + 6 u²)`; so it is with via points on the
+//! straight line, because the times are chosen as follows:
 //!
 //! ```text
 //! chord     d_i = max over joints of |Δq_j| / w_j,      w_j a velocity limit or 1
@@ -16,12 +14,14 @@
 
 use crate::polynomial::Piece;
 
-/// Times `0 = u_0 < u_1 < ... < u_n = 1` at which the points are passed.
+/// Returns the times `0 = u_0 < u_1 < ... < u_n = 1` at which the points are passed.
 ///
-/// * `points`: start, points on the way, goal; each one value per joint.
-/// * `weights`: per joint, what counts as one unit of way.
+/// * `points`: start, via points, goal; each with one value per joint.
+/// * `weights`: unit of travel of each joint.
 ///
-/// Returns the index of a point that equals the one before it as the error.
+/// # Errors
+///
+/// The index of a point that equals the previous one.
 pub(crate) fn passing_times(points: &[&[f64]], weights: &[f64]) -> Result<Vec<f64>, usize> {
     let mut ways = vec![0.0];
     let mut total = 0.0;
@@ -30,7 +30,7 @@ pub(crate) fn passing_times(points: &[&[f64]], weights: &[f64]) -> Result<Vec<f6
         let chord = steps.fold(0.0, f64::max);
         total += chord;
         ways.push(total);
-        // A chord below the rounding of the whole way would not advance the time either.
+        // A chord below the rounding of the total travel would not advance the time.
         if total <= ways[i] {
             return Err(i + 1);
         }
@@ -59,9 +59,11 @@ fn time_of_fraction(s: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// The quintic spline through `q` at the times `u`, at rest at both ends; one piece per interval.
+/// Returns the quintic spline through `q` at the times `u`, at rest at both ends; one piece per
+/// interval.
 ///
-/// Unknown are velocity and acceleration at the inner knots. Continuity of jerk and snap there,
+/// The unknowns are velocity and acceleration at the inner knots. Continuity of jerk and snap
+/// there,
 ///
 /// ```text
 /// jerk(0) =   60 Δ/h³ - (36 v0 + 24 v1)/h² - ( 9 a0 -  3 a1)/h
@@ -125,7 +127,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Truth: the single quintic passes these points, and only one curve has least squared jerk.
+    /// Truth: the single quintic passes through these points, and the curve of least squared jerk
+    /// is unique.
     #[test]
     fn points_on_the_straight_line_do_not_change_the_quintic() {
         let points = [[0.0, 0.0], [0.1, -0.2], [0.55, -1.1], [1.0, -2.0]];

@@ -1,4 +1,4 @@
-//! What is worth saying about a trajectory that can be used all the same.
+//! Warnings about a trajectory that can be used nevertheless.
 
 use std::fmt;
 
@@ -6,13 +6,12 @@ use flexarm_settings::Setting;
 
 use crate::trajectory::Curve;
 
-/// Speeds below this, in rad/s or m/s, are not worth a warning.
+/// Speeds below this (rad/s or m/s) give no warning.
 pub(crate) const QUIET_SPEED: f64 = 1e-6;
-/// Jumps below this part of the peak acceleration are rounding.
+/// Jumps below this fraction of the peak acceleration are rounding errors.
 const QUIET_JUMP: f64 = 1e-6;
 
-/// Something a user should know before trusting a result; `Display` gives one line with how to mend
-/// it.
+/// A warning for the user; `Display` gives one line that includes the remedy.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Warning {
@@ -36,9 +35,9 @@ pub enum Warning {
         joint: String,
         /// Time of the largest jump, s.
         time_s: f64,
-        /// Its size, rad/s or m/s.
+        /// Size of the jump, rad/s or m/s.
         jump: f64,
-        /// How many corners there are.
+        /// Number of corners.
         count: usize,
     },
     /// The acceleration jumps within the motion, or at an end at which the velocity is continuous.
@@ -47,16 +46,16 @@ pub enum Warning {
         joint: String,
         /// Time of the largest jump, s.
         time_s: f64,
-        /// Its size, rad/s² or m/s².
+        /// Size of the jump, rad/s² or m/s².
         jump: f64,
-        /// How many knots have a jump.
+        /// Number of knots with a jump.
         count: usize,
     },
     /// A CSV file without a `# unit:` line holds values that are large for radians.
     LooksLikeDegrees {
         /// Joint name.
         joint: String,
-        /// Largest absolute position as it was read, rad.
+        /// Maximum absolute position as read, rad.
         largest: f64,
     },
     /// A table does not state the unit of these joints.
@@ -68,49 +67,49 @@ pub enum Warning {
     AssumedTime {
         /// Name of the column.
         column: String,
-        /// What was assumed.
+        /// Unit assumed.
         unit: &'static str,
     },
-    /// Columns of a table that are not of the motion.
+    /// Columns of a table that are not part of the motion.
     DroppedColumns {
         /// Their names.
         columns: Vec<String>,
     },
-    /// Rows of a table that repeat the one before, time and all.
+    /// Rows of a table that repeat the previous one, including the time.
     RepeatedRows {
-        /// How many.
+        /// Number of repeated rows.
         count: usize,
     },
-    /// Samples are missing in data that are otherwise sampled evenly.
+    /// Samples are missing in evenly sampled data.
     Gaps {
-        /// Joints that are sampled.
+        /// Joints concerned.
         joints: Vec<String>,
-        /// How many gaps there are.
+        /// Number of gaps.
         count: usize,
-        /// Number of the sample before the longest, counted from 1.
+        /// Number of the sample before the longest gap, counted from 1.
         sample: usize,
-        /// Start of the longest, s.
+        /// Start of the longest gap, s.
         from_s: f64,
-        /// End of the longest, s.
+        /// End of the longest gap, s.
         to_s: f64,
-        /// The usual time between two samples, s.
+        /// Usual sampling interval, s.
         usual_s: f64,
     },
-    /// The last row of a table is not whole.
+    /// The last row of a table is incomplete.
     CutRow {
-        /// Its line.
+        /// Line of the row.
         line: usize,
     },
-    /// Lines above the header of a table that are no comments.
+    /// Lines above the header of a table that are not comments.
     Preamble {
-        /// The first.
+        /// First line.
         first: usize,
-        /// The last.
+        /// Last line.
         last: usize,
     },
     /// The positions are those of a run.
     PositionsOfRun,
-    /// The duration asked for makes a joint pass an acceleration or jerk limit.
+    /// The given duration makes a joint exceed an acceleration or jerk limit.
     ShorterThanLimitsAllow {
         /// Number of the move, counted from 1.
         number: usize,
@@ -205,7 +204,7 @@ impl fmt::Display for Warning {
     }
 }
 
-/// The first few names.
+/// Lists the first few names.
 fn some(names: &[String]) -> String {
     const MOST: usize = 8;
     let mut shown: Vec<String> = names.iter().take(MOST).map(|name| format!("{name:?}")).collect();
@@ -216,12 +215,12 @@ fn some(names: &[String]) -> String {
 }
 
 impl Warning {
-    /// Does a change of speed make this warning wrong?
+    /// Whether time scaling makes this warning invalid.
     pub(crate) fn depends_on_time(&self) -> bool {
         matches!(self, Self::ShorterThanLimitsAllow { .. })
     }
 
-    /// The same of a motion whose times are `start + factor t`.
+    /// The same warning for a motion with times `start + factor t`.
     pub(crate) fn at_times(mut self, start: f64, factor: f64) -> Self {
         if let Self::Gaps { from_s, to_s, usual_s, .. } = &mut self {
             (*from_s, *to_s, *usual_s) = (start + factor * *from_s, start + factor * *to_s, factor * *usual_s);
@@ -229,7 +228,7 @@ impl Warning {
         self
     }
 
-    /// What the curve of one joint gives rise to.
+    /// Warnings about the curve of one joint.
     pub(crate) fn of_curve(joint: &str, curve: &Curve) -> Vec<Self> {
         let mut warnings = Vec::new();
         let (start, end) = (curve.start()[1], curve.end()[1]);
@@ -249,7 +248,7 @@ impl Warning {
             warnings.push(Self::VelocityJumps { joint, time_s: most.time_s, jump: most.size[1], count });
         }
 
-        // Where the velocity jumps already, the acceleration says nothing new.
+        // Acceleration jumps at velocity jumps are not reported separately.
         let level = QUIET_JUMP * curve.largest(2);
         let jumps: Vec<_> =
             curve.jumps().filter(|jump| !jump.exceeds(1, QUIET_SPEED) && jump.exceeds(2, level)).collect();

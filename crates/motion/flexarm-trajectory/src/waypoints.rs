@@ -27,20 +27,20 @@
 //! ```
 //!
 //! A limit is looked up in the move (`acceleration`, `jerk`), then at the top of the file, then in
-//! `[limits]`, then among the limits that the caller gives (the robot's). [`crate::Plan`] tells how
-//! the profiles use them, and how a given duration is divided. Unknown keys are errors.
+//! `[limits]`, then among the limits that the caller gives (the robot's). [`crate::Plan`] describes
+//! how the profiles use them, and how a given duration is divided. Unknown keys are errors.
 //!
 //! A move with `via` is the curve of least squared jerk through the points: quintic pieces with
-//! continuous velocity, acceleration, jerk and snap, at rest at both ends. The points are passed
-//! when a straight quintic would have covered the same fraction of the way; all joints start and
-//! stop together. Points on the straight line from start to goal therefore change nothing.
+//! continuous velocity, acceleration, jerk and snap, at rest at both ends. Each point is passed at
+//! the time at which a straight quintic would have covered the same fraction of the travel; all
+//! joints start and stop together. Via points on the straight line from start to goal therefore
+//! change nothing.
 //!
-//! A move with `law = "optimal"` in the place of a profile is run in the least time along the
-//! natural cubic spline through its points, within speeds, accelerations and jerks
-//! ([`crate::jerk_law`]).
+//! A move with `law = "optimal"` instead of a profile follows the natural cubic spline through its
+//! points in minimum time, within velocity, acceleration and jerk limits ([`crate::jerk_law`]).
 //!
-//! A motion that is not made of moves has `[samples]` in their place
-//! ([`Trajectory::to_samples_toml`] writes them).
+//! A motion that does not consist of moves has `[samples]` instead ([`Trajectory::to_samples_toml`]
+//! writes them).
 //!
 //! Start at [`Trajectory::parse_toml`]. Not here: the mathematics of the moves ([`crate::Plan`]).
 
@@ -53,14 +53,14 @@ use crate::waypoints_check::{Checked, check, told_units};
 use crate::waypoints_toml::FileToml;
 
 impl Trajectory {
-    /// Reads waypoints; the page of the module [`crate::waypoints`] describes the format.
+    /// Reads waypoints; the module page [`crate::waypoints`] describes the format.
     ///
     /// * `origin`: file name for messages.
-    /// * `limits`: what is known about the robot's joints, by name; joints may be missing and need
-    ///   not occur in the file. A velocity or acceleration that is not positive counts as unknown.
+    /// * `limits`: known limits of the robot's joints, by name; joints may be missing and need not
+    ///   occur in the file. A velocity or acceleration that is not positive counts as unknown.
     ///
     /// # Errors
-    /// [`TrajectoryError::File`] with line and column of what is wrong and how to mend it.
+    /// [`TrajectoryError::File`] with line and column of the problem and its remedy.
     pub fn parse_toml(text: &str, origin: &str, limits: &[(&str, JointLimits)]) -> Result<Self, TrajectoryError> {
         let fail = |offset: Option<usize>, problem: Problem| {
             let (line, column) = offset.map(|offset| place(text, offset)).unzip();

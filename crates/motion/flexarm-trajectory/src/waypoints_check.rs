@@ -1,8 +1,8 @@
-//! From the waypoint file as written to a [`Plan`]: units, defaults, limits, and every check that
-//! needs a place.
+//! Converts a waypoint file to a [`Plan`]: units, defaults, limits, and all checks that report a
+//! place in the file.
 //!
-//! Start at [`check`]. The plan checks what is left (missing limits, repeated points) and names the
-//! move.
+//! Start at [`check`]. The plan makes the remaining checks (missing limits, repeated points) and
+//! reports the number of the move.
 
 use std::ops::Range;
 
@@ -15,16 +15,16 @@ use crate::problem::Problem;
 use crate::trajectory::{LONGEST, ToldUnit};
 use crate::waypoints_toml::{FileToml, LawToml, MoveToml, ProfileToml, Values};
 
-/// Rounding of trapezoids when the file does not say.
+/// Default rounding of trapezoids.
 const DEFAULT_ROUNDING: f64 = 0.1;
 
-/// A problem and the byte at which it stands.
+/// A problem and its byte offset in the file.
 pub(crate) struct Located {
     pub(crate) offset: Option<usize>,
     pub(crate) problem: Box<Problem>,
 }
 
-/// The plan, and where each move stands in the text.
+/// The plan and the offset of each move in the text.
 pub(crate) struct Checked {
     pub(crate) plan: Plan,
     pub(crate) move_offsets: Vec<usize>,
@@ -100,7 +100,7 @@ pub(crate) fn scales(
     Ok(joints.iter().map(|joint| if is_prismatic(joint) { 1.0 } else { angle }).collect())
 }
 
-/// What a file says about the units of its joints, with the lines where.
+/// Units that a file states for its joints, with the lines of the statements.
 pub(crate) fn told_units(
     unit: &Spanned<String>,
     metres: &[Spanned<String>],
@@ -125,7 +125,7 @@ fn unknown_joint(entry: &Spanned<String>, key: &'static str, joints: &[String]) 
     located(entry.span(), problem)
 }
 
-/// What all moves share.
+/// Data shared by all moves.
 struct Context<'a> {
     file: &'a FileToml,
     joints: Vec<String>,
@@ -162,7 +162,7 @@ impl Context<'_> {
         }
     }
 
-    /// Goal of a move; joints that a table leaves out stay where they are.
+    /// Goal of a move; joints missing in a table stay in place.
     fn goal(&self, to: &Spanned<Values>, here: &[f64]) -> Result<Vec<f64>, Located> {
         let Values::Table(table) = to.get_ref() else {
             return self.full(to, "to");
@@ -202,8 +202,8 @@ impl Context<'_> {
         }
     }
 
-    /// What is known of each joint without looking at a move: `[limits]` before the limits of the
-    /// caller.
+    /// Known limits of each joint regardless of the move: `[limits]` takes precedence over the
+    /// caller's.
     fn limits(&self, known: &[(&str, JointLimits)]) -> Result<Vec<MotionLimits>, Located> {
         for name in self.file.limits.keys() {
             if !self.joints.contains(name.get_ref()) {
@@ -253,7 +253,7 @@ impl Context<'_> {
             hold => hold.as_ref().map_or(0.0, |hold| *hold.get_ref()),
         };
 
-        // What the move says goes before what the top of the file says.
+        // A value in the move takes precedence over one at the top of the file.
         let rounding = entry.rounding.as_ref().or(file.rounding.as_ref());
         let rounding = match rounding {
             Some(value) if !(0.0..=1.0).contains(value.get_ref()) => {

@@ -1,6 +1,6 @@
-//! The waypoint file as it is written, key by key; nothing is converted or checked here.
+//! Waypoint file as written, key by key; nothing is converted or checked here.
 //!
-//! Every value remembers where it stands in the text, so that later checks can say so.
+//! Every value keeps its place in the text for later error messages.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -60,7 +60,7 @@ pub(crate) struct LimitsToml {
     pub(crate) jerk: Option<Spanned<f64>>,
 }
 
-/// Name of a law, in the place of a profile.
+/// Name of a law, used instead of a profile.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum LawToml {
@@ -90,7 +90,7 @@ impl<'de> Deserialize<'de> for Values {
     }
 }
 
-/// Written by hand because serde's untagged enums do not say what they expected.
+/// Hand-written visitor, because serde's untagged enums do not report what they expected.
 struct ValuesVisitor;
 
 impl<'de> Visitor<'de> for ValuesVisitor {

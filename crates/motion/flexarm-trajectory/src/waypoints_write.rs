@@ -1,26 +1,27 @@
-//! A trajectory as a waypoint file that [`Trajectory::parse_toml`] reads again.
+//! Writes a trajectory as a waypoint file that [`Trajectory::parse_toml`] reads.
 
 use std::fmt::Write;
 
 use crate::error::TrajectoryError;
 use crate::trajectory::{Move, Trajectory};
 
-/// The waypoints may differ from the trajectory by this (rad or m): rounding of long sums.
+/// Maximum difference between the waypoints and the trajectory (rad or m), due to rounding of long
+/// sums.
 const SAME: f64 = 1e-9;
-/// Times at which each move is compared.
+/// Number of times at which each move is compared.
 const TIMES: usize = 200;
-/// Shortest hold that is written (s).
+/// Minimum duration of a hold that is written (s).
 const SHORTEST: f64 = 1e-9;
 
 impl Trajectory {
     /// Writes the moves as quintics from rest to rest, in rad and m, with the holds between them.
     ///
     /// # Errors
-    /// [`TrajectoryError::NotWaypoints`] for a motion that is made of something else, such as
-    /// samples or points on the way: by how much it would differ.
+    /// [`TrajectoryError::NotWaypoints`] for a motion that does not consist of such moves, such as
+    /// one with samples or via points; it holds the difference.
     pub fn to_waypoints_toml(&self) -> Result<String, TrajectoryError> {
         let text = self.waypoints();
-        // What was written is read: a motion that is not made of such moves shows here.
+        // Reads the result back to detect motions that do not consist of such moves.
         let back = Self::parse_toml(&text, "waypoints", &[])?;
         let n = self.joints().len();
         let (mut q, mut p, mut rest) = (vec![0.0; n], vec![0.0; n], [vec![0.0; n], vec![0.0; n]]);
@@ -54,7 +55,7 @@ impl Trajectory {
         let first = moves.first().map_or(self.duration(), |span| span.start);
         let mut begin = 0.0;
         if first > SHORTEST {
-            // A move to where the robot is, and a hold, are rest.
+            // Initial rest is written as a move to the current position and a hold.
             self.write_move(&mut text, &Move { start: 0.0, end: 0.5 * first }, first);
             begin = first;
         }
@@ -67,7 +68,7 @@ impl Trajectory {
     }
 
     fn write_move(&self, text: &mut String, span: &Move, next: f64) {
-        // Writing to a text does not fail.
+        // Writing to a string does not fail.
         let _ = write!(text, "\n[[move]]\nto = {}\nduration = {:?}\n", self.positions(span.end), span.end - span.start);
         if next - span.end > SHORTEST {
             let _ = writeln!(text, "hold = {:?}", next - span.end);

@@ -1,4 +1,4 @@
-//! CSV files: every way of interpolating, round trips, and every way in which a file can be wrong.
+//! CSV files: all kinds of interpolation, round trips, and all errors of a file.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use std::f64::consts::PI;
@@ -18,7 +18,7 @@ fn problem(text: &str) -> FileError {
     }
 }
 
-/// Position, velocity and acceleration of the only joint.
+/// Position, velocity and acceleration of the single joint.
 fn at(trajectory: &Trajectory, t: f64) -> [f64; 3] {
     let mut state = [0.0; 3];
     let [q, qdot, qddot] = &mut state;
@@ -26,8 +26,7 @@ fn at(trajectory: &Trajectory, t: f64) -> [f64; 3] {
     state
 }
 
-/// `sin² t` with its derivatives at intervals `h`, as far as asked for, over one period from rest
-/// to rest.
+/// `sin² t` over one period from rest to rest with its first `derivatives` derivatives.
 fn sine_file(intervals: u32, derivatives: usize) -> String {
     let header = ["time,q", "time,q,q.vel", "time,q,q.vel,q.acc"][derivatives];
     let mut text = format!("{header}\n");
@@ -43,8 +42,8 @@ fn sine_file(intervals: u32, derivatives: usize) -> String {
     text
 }
 
-/// Largest error of the position inside the record (away from the ends, where sin² is not at rest
-/// in acceleration).
+/// Largest position error in the middle of the record (away from the ends, where the acceleration
+/// of sin² is not zero).
 fn sine_error(intervals: u32, derivatives: usize) -> f64 {
     let trajectory = parse(&sine_file(intervals, derivatives));
     (0..1000)
@@ -53,7 +52,7 @@ fn sine_error(intervals: u32, derivatives: usize) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Truth: a quintic with exact end values errs by O(h⁶), the estimates from less by O(h⁴).
+/// Truth: a quintic with exact end values has an error of O(h⁶), with estimated ones O(h⁴).
 #[test]
 fn halving_the_row_spacing_divides_the_error_by_the_order_of_the_spline() {
     for (derivatives, order) in [(0, 4), (1, 4), (2, 6)] {
@@ -83,12 +82,12 @@ fn accelerations_are_continuous_whatever_is_given() {
         for k in 1..20 {
             let t = PI * f64::from(k) / 20.0;
             let (before, after) = (at(&trajectory, t - 1e-9), at(&trajectory, t + 1e-9));
-            assert!((before[2] - after[2]).abs() < 1e-6); // measured 3.6e-8, the jerk times the distance of the samples
+            assert!((before[2] - after[2]).abs() < 1e-6); // measured 3.6e-8, the jerk times the sampling interval
         }
     }
 }
 
-/// Positions only, with holds: at rest in the holds, exactly, and smooth into and out of them.
+/// Positions only, with holds: exactly at rest in the holds, and smooth into and out of them.
 #[test]
 fn a_hold_in_the_positions_stands_still() {
     let trajectory = parse("time,q\n0,0\n1,0\n2,1\n3,2\n4,2\n5,2\n6,1\n7,0\n8,0\n");
@@ -203,7 +202,7 @@ fn a_message_tells_place_finding_and_remedy_in_one_line() {
     assert_eq!(message, truth);
 }
 
-/// Truth: rows that were taken out of a record at 50 Hz.
+/// Truth: the rows removed from a record at 50 Hz.
 #[test]
 fn a_gap_in_evenly_sampled_rows_is_told_with_its_place_and_length() {
     let row = |k: u32| format!("{},{}\n", 0.02 * f64::from(k), (0.02 * f64::from(k)).sin());
@@ -218,7 +217,7 @@ fn a_gap_in_evenly_sampled_rows_is_told_with_its_place_and_length() {
     assert!(found.len() == 1 && found[0].starts_with(truth), "{found:?}");
     let found = gaps(&rows(|k| !(30..34).contains(&k) && !(101..121).contains(&k)));
     assert!(found.len() == 1 && found[0].contains("the longest of 2 gaps"), "{found:?}");
-    // Slower by half, the gap lasts twice as long.
+    // With twice the duration, the gap is twice as long.
     let text = format!("# unit: rad\ntime,q\n{}", rows(|k| !(101..121).contains(&k)));
     let slow = parse(&text).scaled(2.0).unwrap().warnings();
     assert!(slow.iter().any(|w| w.to_string().contains("from t = 4.0000 s to 4.8400 s")), "{slow:?}");
@@ -258,7 +257,7 @@ fn times_and_positions_beyond_any_motion_are_refused_with_their_line() {
 }
 
 proptest! {
-    /// A plan written at a rate that meets its knots comes back as the same curve.
+    /// A plan written at a rate that includes its knots is read back as the same curve.
     #[test]
     fn written_and_read_again_a_plan_is_the_same_motion(
         goals in prop::collection::vec(prop::collection::vec(-3.0..3.0_f64, 2), 1..4),
@@ -294,7 +293,7 @@ proptest! {
         let _ = Trajectory::parse_csv(&String::from_utf8_lossy(&bytes), "noise");
     }
 
-    /// Noise close enough to the format to get past the header.
+    /// Random text close enough to the format to pass the header.
     #[test]
     fn no_table_makes_the_reader_panic(text in "(# (unit|time|metres): [a-z,]{0,4}\n)?time,a(,a.vel)?(,a.acc)?(,b)?\n([0-9eE.+\\-]{1,6},[0-9eE.+\\-]{0,8}(,[0-9]{1,2})?\n){0,6}") {
         if let Ok(trajectory) = Trajectory::parse_csv(&text, "noise") {
@@ -302,8 +301,7 @@ proptest! {
         }
     }
 
-    /// Every number that f64 can hold, in increasing times: an error or a trajectory that can be
-    /// sampled.
+    /// Any f64 values in ascending times: an error or a trajectory that can be sampled.
     #[test]
     fn no_number_makes_the_reader_panic(
         rows in prop::collection::vec((any::<f64>(), any::<f64>(), any::<f64>()), 2..6),
@@ -325,8 +323,8 @@ proptest! {
 // --- Corners
 // -----------------------------------------------------------------------------------------------------------
 
-/// Rest, 2 rad/s, -2 rad/s, rest, with `columns` of `.vel`: a triangle whose corners lie `shift`
-/// beside 0.5, 1.0 and 1.5 s.
+/// Rest, 2 rad/s, -2 rad/s, rest, optionally with velocities: a triangle whose corners are at 0.5,
+/// 1.0 and 1.5 s plus `shift`.
 fn triangle_file(rate_hz: f64, shift: f64, velocities: bool) -> String {
     let mut text = if velocities { "time,q,q.vel\n".to_owned() } else { "time,q\n".to_owned() };
     for k in 0..=(2.0 * rate_hz) as u32 {
@@ -339,8 +337,8 @@ fn triangle_file(rate_hz: f64, shift: f64, velocities: bool) -> String {
     text
 }
 
-/// Truth: the triangle. Corners at the rows and between them, with and without given velocities;
-/// nothing rings beside them.
+/// Truth: the triangle. Corners at the rows and between them, with and without given velocities,
+/// without oscillation next to them.
 #[test]
 fn corners_of_sampled_positions_are_jumps_of_the_velocity() {
     for (rate, shift) in [(1000.0, 0.0), (500.0, 0.0), (1000.0, 3.7e-4), (500.0, 6e-4), (100.0, 2.5e-3)] {
@@ -366,8 +364,8 @@ fn corners_of_sampled_positions_are_jumps_of_the_velocity() {
     }
 }
 
-/// Truth: `cos` before and after a kick of 1 rad/s, curved on both sides, between two rows; third
-/// order in the distance of rows.
+/// Truth: `cos` before and after a velocity jump of 1 rad/s between two rows, curved on both sides;
+/// third order in the row spacing.
 #[test]
 fn a_corner_between_curved_pieces_is_found() {
     for rate in [1000.0, 200.0] {
@@ -387,8 +385,8 @@ fn a_corner_between_curved_pieces_is_found() {
     }
 }
 
-/// Truth: away from the blends the curve, within them at most an eighth of the jump times their
-/// length beside it.
+/// Truth: the curve away from the blends; within them a deviation of at most an eighth of the
+/// velocity jump times their length.
 #[test]
 fn rounded_corners_jump_no_more_and_stay_near() {
     let corners = parse(&triangle_file(1000.0, 3.7e-4, false));
@@ -403,7 +401,7 @@ fn rounded_corners_jump_no_more_and_stay_near() {
         // measured 7.5e-3 at the middle of the blend of 4 rad/s
         assert!(beside <= if near { 4.0 * 0.02 / 8.0 } else { 1e-12 }, "{t} {beside}");
     }
-    // Blends that have no room share what there is.
+    // Blends without enough room share the available time.
     let long = corners.with_rounded_corners(10.0).unwrap();
     assert_eq!(long.velocity_jumps(), []);
     assert!(corners.with_rounded_corners(0.0).is_err() && corners.with_rounded_corners(f64::NAN).is_err());

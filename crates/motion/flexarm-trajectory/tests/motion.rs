@@ -1,5 +1,4 @@
-//! Moves against closed forms, continuity of everything that can be planned, limits, holds, time
-//! scaling.
+//! Moves against closed forms, continuity of all plans, limits, holds, time scaling.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use approx::assert_relative_eq;
@@ -46,13 +45,13 @@ fn quintic_move_is_the_closed_form() {
     assert_eq!(trajectory.warnings(), []);
 }
 
-/// Truth: the velocities of samples.
+/// Truth: velocities of samples.
 #[test]
 fn nothing_moves_until_the_motion_says_so() {
     let rest = PlannedMove { hold: 0.7, ..PlannedMove::quintic(vec![0.2, 0.0], 0.5) };
     let trajectory = plan(&[0.2, 0.0], vec![rest, PlannedMove::quintic(vec![0.2, 0.4], 0.8)]);
     let trajectory = trajectory.with_held_joints(&[("held", 1.0)]).unwrap();
-    // The first move leads nowhere.
+    // The first move ends where it starts.
     for (t, until) in [(0.0, 1.2), (0.6, 1.2), (1.2, 1.2), (1.5, 1.5), (2.1, f64::INFINITY)] {
         assert_eq!(trajectory.still_until(t), until, "{t}");
     }
@@ -63,8 +62,8 @@ fn nothing_moves_until_the_motion_says_so() {
     }
 }
 
-/// Truth: the velocity of a trapezoid in 2 s with ramps of 0.5 s is D / 1.5 s, its acceleration
-/// that over 0.5 s.
+/// Truth: the velocity of a trapezoid of 2 s with ramps of 0.5 s is D / 1.5 s, its acceleration
+/// that divided by 0.5 s.
 #[test]
 fn plain_trapezoid_of_given_duration_ramps_for_a_quarter() {
     let profile = Profile::Trapezoid { rounding: 0.0 };
@@ -87,7 +86,8 @@ fn rounding_makes_the_acceleration_of_a_trapezoid_continuous() {
     assert_eq!(trajectory.warnings(), []);
 }
 
-/// Two joints with limits 1 and 2 rad/s move by 1 and 4 rad: the second one sets the pace.
+/// Two joints with limits 1 and 2 rad/s move by 1 and 4 rad: the second one determines the
+/// duration.
 #[test]
 fn synchronised_joints_stop_together_and_others_as_early_as_they_can() {
     let limit = |velocity| MotionLimits { velocity, ..MotionLimits::UNLIMITED };
@@ -103,7 +103,7 @@ fn synchronised_joints_stop_together_and_others_as_early_as_they_can() {
     assert_relative_eq!(apart.duration(), together.duration(), max_relative = 1e-14);
     assert_relative_eq!(together.peak()[0].velocity.value, 0.5, max_relative = 1e-13);
     assert_relative_eq!(apart.peak()[0].velocity.value, 1.0, max_relative = 1e-13);
-    // Half-way in time the slower joint of the unsynchronised move has just arrived.
+    // At half the duration the joint of the shorter unsynchronised move has just arrived.
     assert_relative_eq!(sample(&apart, apart.duration() / 2.0)[0][0], 1.0, max_relative = 1e-14);
     assert_eq!(sample(&apart, 0.6 * apart.duration())[1][0], 0.0);
 }
@@ -120,7 +120,7 @@ fn nothing_moves_before_the_start_in_a_hold_and_after_the_end() {
         let [q, qdot, qddot] = sample(&trajectory, t);
         assert_eq!((&q[..], &qdot[..], &qddot[..]), (&truth[..], &[0.0; 2][..], &[0.0; 2][..]), "t = {t}");
     }
-    // The second and third move follow each other without a hold and count as one.
+    // The second and third moves have no hold between them and count as one.
     let moves: Vec<_> = trajectory.moves().iter().map(|span| (span.start, span.end)).collect();
     assert_eq!(moves, [(0.0, 1.0), (1.5, 3.5)]);
     assert_eq!(trajectory.initial_speed(), 0.0);
@@ -208,7 +208,7 @@ fn a_duration_too_short_for_the_acceleration_limit_is_reported() {
     assert_eq!(trajectory.scaled(3.0).unwrap().warnings(), []);
 }
 
-/// Any move that can be planned: profile, durations and limits, holds, points on the way.
+/// Any valid move: profile, durations and limits, holds, via points.
 fn any_move() -> impl Strategy<Value = PlannedMove> {
     let profile = prop_oneof![
         Just(Profile::Quintic),
@@ -234,8 +234,8 @@ fn any_move() -> impl Strategy<Value = PlannedMove> {
 }
 
 proptest! {
-    /// Continuity at every knot, rest at both ends, every goal reached, limits kept where no
-    /// duration is given.
+    /// Continuity at every knot, rest at both ends, every goal reached, limits kept if no duration
+    /// is given.
     #[test]
     fn every_plan_is_smooth_reaches_its_goals_and_keeps_its_limits(
         moves in prop::collection::vec(any_move(), 1..4),
@@ -278,7 +278,7 @@ proptest! {
     }
 }
 
-/// Truth: the trajectory itself, to the last bit.
+/// Truth: the trajectory itself, bit for bit.
 #[test]
 fn a_trajectory_of_its_pieces_is_the_same() {
     let moves = vec![PlannedMove::quintic(vec![0.4, -1.0], 0.7), PlannedMove::quintic(vec![0.1, 0.2], 1.3)];
@@ -290,7 +290,7 @@ fn a_trajectory_of_its_pieces_is_the_same() {
     let again = Trajectory::of_pieces(vec![curve(0), curve(1)], trajectory.duration()).unwrap();
     assert_eq!(again, trajectory);
     assert!(trajectory.pieces(2).is_none());
-    // Numbers that make no curve are refused.
+    // Numbers that do not form a curve are rejected.
     let (name, knots, pieces) = curve(0);
     let spoilt = [
         (knots[..1].to_vec(), pieces.clone()),

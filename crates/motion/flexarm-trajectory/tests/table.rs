@@ -1,4 +1,4 @@
-//! Tables of other programs: the same motion in every dialect, and what a table may not leave open.
+//! Tables from other programs: the same motion in every dialect, and errors for ambiguous tables.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 #![allow(clippy::print_stdout, reason = "measured errors, with --nocapture")]
 
@@ -16,7 +16,7 @@ fn request(columns: Option<&ColumnMap>) -> TableRequest<'_> {
     TableRequest { columns, joints: Some(&JOINTS) }
 }
 
-/// Rows (t in s, joint_1 in deg, joint_2 in deg) of the motion that all tables hold.
+/// Rows (t in s, joint_1 in deg, joint_2 in deg) of the motion in all tables.
 fn rows() -> Vec<[f64; 3]> {
     (0..11)
         .map(|k| f64::from(k) * 0.05)
@@ -25,7 +25,7 @@ fn rows() -> Vec<[f64; 3]> {
         .collect()
 }
 
-/// The same as our own CSV.
+/// The same motion in the library's own CSV format.
 fn truth() -> Trajectory {
     let mut text = "# unit: deg\ntime,joint_1,joint_2\n".to_owned();
     for [t, a, b] in rows() {
@@ -34,7 +34,7 @@ fn truth() -> Trajectory {
     Trajectory::parse_csv(&text, "truth.csv").unwrap()
 }
 
-/// Largest difference to the truth (rad).
+/// Largest difference from the truth (rad).
 fn difference(motion: &Trajectory) -> f64 {
     let motion = motion.with_joint_order(&["joint_1", "joint_2"]).unwrap();
     let truth = truth();
@@ -149,7 +149,7 @@ fn our_own_format_is_read_as_ever() {
     let (motion, info) = Trajectory::parse_table(text, "own", &request(None)).unwrap();
     assert_eq!(motion, Trajectory::parse_csv(text, "own").unwrap());
     assert_eq!(info.format, "CSV samples");
-    // A joint that the robot does not have stays in it: the caller refuses it.
+    // A joint that the robot lacks is kept: the caller rejects it.
     let (motion, _) = Trajectory::parse_table("time,joint_1,axis\n0,0,0\n1,1,1\n", "own", &request(None)).unwrap();
     assert_eq!(motion.joints(), ["joint_1", "axis"]);
 }
@@ -166,7 +166,7 @@ fn the_user_names_columns_units_and_numbers() {
     let text = table("", |[t, a, b]| format!("{t} {a} {b}"));
     let map: ColumnMap = "t=#1[s],joint_1=#2[deg],joint_2=#3[deg]".parse().unwrap();
     assert!(difference(&Trajectory::parse_table(&text, "map", &request(Some(&map))).unwrap().0) < 1e-9);
-    // The whole name counts before its unit.
+    // The full name has priority over the name without unit.
     let text = table("t[s],A[deg],A[rad],x\n", |[t, a, b]| format!("{t},{a},{},{b}", a * PI / 180.0));
     let map: ColumnMap = "joint_1=A[rad],joint_2=x[deg]".parse().unwrap();
     assert!(difference(&Trajectory::parse_table(&text, "map", &request(Some(&map))).unwrap().0) < 1e-9);
@@ -193,7 +193,7 @@ fn the_table_of_a_run_is_its_motion() {
         (&["joint_1".to_owned(), "rail".to_owned()][..], 1.0, 3)
     );
     assert!(info.format.starts_with("table of a run"));
-    // A run that was killed may end within a line.
+    // A run that was killed may end in the middle of a line.
     let cut = &text[..text.len() - 20];
     let (motion, info) = Trajectory::parse_table(cut, "run.csv", &request(None)).unwrap();
     assert_eq!((motion.duration(), info.rows), (0.5, 2));
@@ -321,7 +321,7 @@ fn a_table_in_the_letters_of_old_windows_is_text() {
     };
     let old: Vec<u8> = text.chars().map(byte).collect();
     assert_eq!(text_of_bytes(old, "t").unwrap(), text);
-    // Neither bytes of no letter nor UTF-8 with a broken letter.
+    // Neither undefined bytes nor UTF-8 with an incomplete character are accepted.
     let damaged = [&b"A1 [\xc2\xb0], \xb0\n"[..], b"A1, \x81\n", b"A1, \xb0\x00\n"];
     for bytes in damaged {
         assert!(text_of_bytes(bytes.to_vec(), "t").unwrap_err().to_string().contains("not UTF-8"), "{bytes:?}");

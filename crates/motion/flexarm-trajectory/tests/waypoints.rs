@@ -1,4 +1,4 @@
-//! Waypoint files: what each key does, and every way in which a file can be wrong.
+//! Waypoint files: effect of each key, and all errors of a file.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use std::f64::consts::PI;
@@ -46,11 +46,11 @@ fn prismatic_joints_are_in_metres_in_a_file_of_degrees() {
                 axis = { velocity = 90.0 }\n[[move]]\nto = { rail = 1.5 }";
     let trajectory = parse(text);
     assert_eq!(position(&trajectory, 0.0), [0.5, PI]);
-    // 1 m at 1 m/s and 2 m/s²: 1 s of cruise and half a second of ramps.
+    // 1 m at 1 m/s and 2 m/s²: 0.5 s of cruise and 1 s of ramps.
     assert_relative_eq!(trajectory.duration(), 1.5, max_relative = 1e-15);
 }
 
-/// The limits of the move go before those of the file, these before those of the caller.
+/// The limits of the move take precedence over those of the file, and these over the caller's.
 #[test]
 fn the_nearest_limit_counts() {
     let robot = JointLimits { velocity: PI, acceleration: Some(PI), ..JointLimits::UNLIMITED };
@@ -78,7 +78,7 @@ fn points_on_the_way_are_passed_without_a_stop() {
     let trajectory = parse(&format!("{HEAD}[[move]]\nto = [60, 10]\nvia = [[30, 40]]\nduration = 1.0"));
     assert_eq!(trajectory.moves().len(), 1);
     let knots = trajectory.kinks();
-    assert_eq!(knots, [0.0, 1.0]); // jerk is continuous at the point on the way
+    assert_eq!(knots, [0.0, 1.0]); // the jerk is continuous at the via point
     let q = position(&trajectory, 0.5);
     assert!((q[0] - PI / 6.0).abs() < 1e-14 && (q[1] - 40.0 * PI / 180.0).abs() < 1e-14); // measured 0
 }
@@ -90,7 +90,7 @@ fn every_profile_can_be_chosen_per_move() {
         "{head}[[move]]\nto = [1]\nduration = 1\n[[move]]\nto = [2]\nduration = 1\nprofile = \"trapezoid\"\n\
          [[move]]\nto = [3]\nduration = 1\nprofile = \"quintic\"\n"
     ));
-    // s-curve: 7 pieces, trapezoid: 7 pieces, quintic: 1; each end of a piece is a kink.
+    // s-curve: 7 pieces, trapezoid: 7 pieces, quintic: 1; each boundary of a piece is a kink.
     assert_eq!(trajectory.kinks().len(), 16);
     assert_eq!(trajectory.warnings(), []);
 }
@@ -150,12 +150,13 @@ fn each_fault_of_a_file_is_named_with_its_place() {
     assert!(matches!(error.problem, Problem::Plan(PlanError::NothingHappens)));
     let error = fault(&format!("{HEAD}[[move]]\nto = [1e308, 2]\nduration = 1e-300"));
     assert!(matches!(error.problem, Problem::OutOfRange { .. }));
-    // So slow that the duration is infinite, with a joint that does not move at all.
+    // The duration is infinite because of a tiny velocity limit; the other joint does not move at
+    // all.
     let text = format!("{HEAD}[limits]\na = {{ velocity = 1e-308 }}\n[[move]]\nto = {{ a = 1e300 }}\n");
     assert!(matches!(fault(&text).problem, Problem::OutOfRange { .. }));
 }
 
-/// Truth by hand: one joint as an S-curve of seven phases, v/a + a/j + L/v; two of which one is
+/// Truth by hand: one joint with a seven-phase S-curve, v/a + a/j + L/v; of two joints one is
 /// always the slower.
 #[test]
 fn an_optimal_move_takes_the_least_time_of_its_limits() {
@@ -172,7 +173,7 @@ fn an_optimal_move_takes_the_least_time_of_its_limits() {
     }
 }
 
-/// Truth: the points, the limits, and the quintic through the same points, which is slower.
+/// Truth: the points, the limits, and the slower quintic through the same points.
 #[test]
 fn an_optimal_move_passes_its_points_within_all_limits_and_before_the_quintic_does() {
     let head = "format = 1\nunit = \"deg\"\njoints = [\"a\", \"b\", \"c\"]\nstart = [0, 0, 5]\nspeed = 0.8\n\
@@ -197,10 +198,10 @@ fn an_optimal_move_passes_its_points_within_all_limits_and_before_the_quintic_do
         assert!(peak.jerk.value.abs() <= j && peak.acceleration_jump.value.abs() < 1e-6, "{peak:?}");
     }
     assert_eq!(motion.warnings(), []);
-    // Twice the time, the same path.
+    // Longer duration, same path.
     let slow = parse(&format!("{head}[[move]]\nlaw = \"optimal\"\n{via}duration = 5.0\n"));
     assert_eq!(slow.duration(), 5.0);
-    // A duration that is too short is told, an acceleration that is not known is asked for.
+    // A duration that is too short gives a warning, an unknown acceleration limit an error.
     let short = parse(&format!("{head}[[move]]\nlaw = \"optimal\"\n{via}duration = 0.5\n"));
     assert!(short.warnings().iter().any(|warning| warning.to_string().contains("move 1: the given duration takes")));
     let fault = fault(&format!(
@@ -225,7 +226,7 @@ fn numbers_beyond_any_motion_are_refused_with_their_place() {
 #[test]
 fn a_message_tells_place_finding_and_remedy_in_one_line() {
     let message = fault(&HEAD.replace("\"deg\"", "\"degrees\"")).to_string();
-    // The first thing wrong here is that no move follows.
+    // The first error here is that no move follows.
     assert!(message.starts_with("arm.toml, line 1, column 1: missing field `move`"), "{message}");
     let text = format!("{}[[move]]\nto = [1, 2]\n", HEAD.replace("\"deg\"", "\"degrees\""));
     let truth = "arm.toml, line 2, column 8: unit \"degrees\" of `unit` is not known; accepted: \"rad\", \"deg\"";
@@ -260,7 +261,7 @@ proptest! {
         let _ = Trajectory::parse_toml(&String::from_utf8_lossy(&bytes), "noise", &[]);
     }
 
-    /// Noise within the format: any number that f64 can hold, any profile.
+    /// Random values within the format: any f64 and any profile.
     #[test]
     fn no_number_makes_the_reader_panic(
         numbers in prop::collection::vec(prop_oneof![any::<f64>(), -2.0..2.0_f64], 8),
@@ -329,7 +330,7 @@ fn quintic_moves_are_written_as_the_waypoints_that_they_are_and_other_motions_ar
     assert!(matches!(error, TrajectoryError::NotWaypoints { difference, .. } if difference > 0.1), "{error}");
 }
 
-/// Truth: the motion itself, whose knots are rows of the file.
+/// Truth: the motion itself, whose knots are at rows of the file.
 #[test]
 fn a_motion_that_is_not_made_of_moves_comes_back_from_its_samples() {
     let sine = "time,a,rail\n0,0,1\n0.5,0.3,2\n1,0.5,2\n1.5,0.3,1\n2,0,1\n";
@@ -345,7 +346,7 @@ fn a_motion_that_is_not_made_of_moves_comes_back_from_its_samples() {
         worst = worst.max((q[0] - p[0]).abs()).max((q[1] - p[1]).abs());
     }
     assert!(worst < 1e-12, "{worst:e}");
-    // In degrees, with a joint that slides, without velocities.
+    // In degrees, with a prismatic joint, without velocities.
     let text = "format = 1\nunit = \"deg\"\nmetres = [\"rail\"]\njoints = [\"a\", \"rail\"]\n[samples]\ntime = [0, 1]\nposition = [[0, 0], [90, 2]]\n";
     let (mut q, mut x, mut y) = ([0.0; 2], [0.0; 2], [0.0; 2]);
     Trajectory::parse_toml(text, "deg.toml", &[]).unwrap().sample(1.0, &mut q, &mut x, &mut y);

@@ -1,4 +1,4 @@
-//! Why a robot description was refused: one variant of [`Problem`] for each kind of fault.
+//! Errors of robot descriptions: one variant of [`Problem`] for each kind of fault.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -7,24 +7,23 @@ use flexarm_settings::Setting;
 
 use crate::finding::{Finding, Place, Severity};
 
-/// Why a file could not be turned into a robot.
+/// Error of reading a robot description.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum UrdfError {
-    /// The file cannot be read at all.
+    /// The file cannot be read.
     #[error("{}: cannot be read", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         #[source]
         source: std::io::Error,
     },
-    /// A xacro file that does not make a description.
+    /// A xacro file that cannot be expanded.
     #[error("{0}")]
     Xacro(#[source] Box<XacroError>),
-    /// The file was read and something is wrong in it. All faults are listed, in the order of the
-    /// file.
+    /// The file has faults. All of them are listed, in the order of the file.
     #[error("{}", listed(issues))]
     Invalid {
         /// At least one.
@@ -33,7 +32,7 @@ pub enum UrdfError {
 }
 
 impl UrdfError {
-    /// The faults inside the file; empty when it could not be read.
+    /// The faults in the file; empty if it could not be read or expanded.
     pub fn issues(&self) -> &[Issue] {
         match self {
             Self::Invalid { issues } => issues,
@@ -41,7 +40,7 @@ impl UrdfError {
         }
     }
 
-    /// The same as findings, for a report.
+    /// The errors as findings, for a report.
     pub fn findings(&self) -> Vec<Finding> {
         match self {
             Self::Invalid { issues } => issues.iter().map(Finding::from).collect(),
@@ -67,21 +66,21 @@ fn listed(issues: &[Issue]) -> String {
     issues.iter().map(Issue::to_string).collect::<Vec<_>>().join("\n")
 }
 
-/// Why a xacro file could not be expanded: the first thing that went wrong.
+/// First error in the expansion of a xacro file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct XacroError {
-    /// The element.
+    /// Place of the element.
     pub place: Place,
-    /// What is wrong.
+    /// Description of the problem.
     pub message: String,
-    /// How to mend it; may be empty.
+    /// Remedy; may be empty.
     pub help: String,
-    /// Macro calls and files that led there, the innermost first.
+    /// Enclosing macro calls and files, the innermost first.
     pub trail: Vec<String>,
 }
 
 impl XacroError {
-    /// What is wrong, and how it came there.
+    /// Description of the problem with the enclosing calls.
     fn whole_message(&self) -> String {
         let steps = self.trail.iter().map(|step| format!("\n  {step}"));
         self.message.clone() + &steps.collect::<String>()
@@ -97,12 +96,12 @@ impl fmt::Display for XacroError {
 
 impl std::error::Error for XacroError {}
 
-/// One fault and its place.
+/// A fault and its place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Issue {
-    /// Where.
+    /// Place of the fault.
     pub place: Place,
-    /// What.
+    /// The fault.
     pub problem: Problem,
 }
 
@@ -126,75 +125,75 @@ impl From<&Issue> for Finding {
     }
 }
 
-/// What is wrong in a URDF. Names are those of the file, values in SI units.
+/// A fault of a URDF. Names are those of the file, values in SI units.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the fields are explained by the message above them")]
 pub enum Problem {
-    /// The bytes are not text.
+    /// The bytes are not UTF-8 text.
     #[error("the byte 0x{byte:02x} is not UTF-8 text")]
     NotUtf8 { byte: u8 },
-    /// The text is not well-formed XML, or is cut off.
+    /// The text is truncated or not well-formed XML.
     #[error("found {found}, expected {expected}")]
     Malformed { found: String, expected: String },
-    /// Well-formed XML with another root element.
+    /// XML with another root element.
     #[error("the root element is <{root}>, expected <robot>")]
     NotUrdf { root: String },
-    /// More links or joints than any robot has.
+    /// Too many links or joints.
     #[error("the robot has {found} links and joints, at most {most} are read")]
     TooManyElements { found: usize, most: usize },
-    /// A robot that `urdf_rs` refuses, though no fault was found.
+    /// A robot that `urdf_rs` rejects although no fault was found.
     #[error("urdf-rs does not read this robot: {reason}")]
     NotRead { reason: String },
     /// A robot without any link.
     #[error("the robot {robot:?} has no <link>{}", macros_text(idle_macros))]
     NoLink { robot: String, idle_macros: Vec<String> },
-    /// A child element that URDF demands.
+    /// A missing child element that URDF requires.
     #[error("{owner} has no <{element}>")]
     MissingElement { owner: String, element: &'static str },
-    /// An attribute that URDF demands.
+    /// A missing attribute that URDF requires.
     #[error("{owner} has no attribute {attribute:?}")]
     MissingAttribute { owner: String, attribute: &'static str },
-    /// Something else where numbers belong; NaN and infinity count as something else.
+    /// An attribute that is not a number, or NaN or infinite.
     #[error("{owner}: {attribute}={found:?}, expected {expected}")]
     NotANumber { owner: String, attribute: &'static str, found: String, expected: &'static str },
-    /// Two links of one name.
+    /// Two links with the same name.
     #[error("link {link:?} is defined twice, first in line {first_line}")]
     DuplicateLink { link: String, first_line: u32 },
-    /// Two joints of one name.
+    /// Two joints with the same name.
     #[error("joint {joint:?} is defined twice, first in line {first_line}")]
     DuplicateJoint { joint: String, first_line: u32 },
-    /// A joint to or from a link that is not there.
+    /// A joint whose parent or child link does not exist.
     #[error("joint {joint:?}: its {role} link {link:?} does not exist")]
     UnknownLink { joint: String, role: &'static str, link: String, closest: Option<String> },
     /// A link that is the child of two joints: a closed loop.
     #[error("link {link:?} is the child of two joints, {first:?} (line {first_line}) and {second:?}")]
     TwoParents { link: String, first: String, first_line: u32, second: String },
-    /// Links that are each other's ancestors.
+    /// Links in a cycle.
     #[error("the joints {} form a cycle without a base link", quoted(joints))]
     Cycle { joints: Vec<String> },
     /// More than one link without a parent.
     #[error("the links are not connected: {} have no parent joint, expected one base link", quoted(roots))]
     Disconnected { roots: Vec<String> },
-    /// A joint type that URDF does not have.
+    /// Unknown joint type.
     #[error("joint {joint:?}: unknown type {found:?}")]
     UnknownJointType { joint: String, found: String, closest: Option<String> },
-    /// A joint type that URDF has and flexarm has not.
+    /// A URDF joint type that flexarm does not support.
     #[error("joint {joint:?} is of type {kind:?}, which is not supported")]
     UnsupportedJoint { joint: String, kind: String },
     /// A revolute or prismatic joint without limits.
     #[error("{kind} joint {joint:?} has no <limit>")]
     MissingLimit { joint: String, kind: &'static str },
-    /// Lower above upper.
+    /// The lower limit is above the upper limit.
     #[error("joint {joint:?}: the lower limit {lower} is above the upper limit {upper}")]
     LimitsReversed { joint: String, lower: f64, upper: f64 },
-    /// A negative speed or effort.
+    /// A negative velocity or effort limit.
     #[error("joint {joint:?}: the {attribute} limit {value} is negative")]
     NegativeLimit { joint: String, attribute: &'static str, value: f64 },
-    /// An axis without direction.
+    /// The axis is the zero vector.
     #[error("joint {joint:?}: the axis is the zero vector")]
     ZeroAxis { joint: String },
-    /// A mimic joint whose leader is not there.
+    /// A mimic joint whose leader does not exist.
     #[error("joint {joint:?} mimics {leader:?}, which does not exist")]
     UnknownMimic { joint: String, leader: String, closest: Option<String> },
     /// Joints that mimic each other.
@@ -209,26 +208,26 @@ pub enum Problem {
     /// A moving body without any `<inertial>`.
     #[error("link {link:?} is moved by joint {joint:?} and has no <inertial>{}", lumped_text(lumped))]
     MissingInertial { link: String, joint: String, lumped: Vec<String>, no_estimate: Option<String> },
-    /// An inertia matrix that no body can have, or of a body without extent.
+    /// An inertia matrix that is not positive definite.
     #[error(
         "the inertia of link {link:?} is not positive definite: principal moments {} kg m^2",
         moments_text(moments)
     )]
     InertiaNotPositiveDefinite { link: String, moments: [f64; 3] },
-    /// A principal moment above the sum of the two others.
+    /// A principal moment above the sum of the other two.
     #[error(
         "the inertia of link {link:?} breaks the triangle inequality: principal moments {} kg m^2, the \
          largest is above the sum of the two others by {excess:.2e}",
         moments_text(moments)
     )]
     TriangleInequality { link: String, moments: [f64; 3], excess: f64 },
-    /// A density or a total mass to estimate inertias from that is not positive.
+    /// A density or total mass for the estimate of inertias that is not positive.
     #[error("inertia from meshes was asked for with {what} {value}, expected a positive number")]
     BadEstimate { what: &'static str, value: f64 },
 }
 
 impl Problem {
-    /// Stable short name, the `code` of a [`Finding`].
+    /// Stable short name, used as the `code` of a [`Finding`].
     pub fn code(&self) -> &'static str {
         match self {
             Self::NotUtf8 { .. } => "not-utf8",
@@ -263,7 +262,7 @@ impl Problem {
         }
     }
 
-    /// How to mend it.
+    /// Remedy for the problem.
     pub fn help(&self) -> String {
         match self {
             Self::NotUtf8 { .. } => "save the file as UTF-8; is it a URDF at all?".into(),

@@ -1,12 +1,12 @@
-//! Where something is in a file, and what a check has to say about it.
+//! Places in files, and findings of checks.
 
 use std::fmt;
 use std::path::PathBuf;
 
-/// A place in a text file; lines and columns are counted from 1, columns in characters.
+/// A place in a text file; lines and columns count from 1, columns in characters.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
-    /// The file as it was named by the caller.
+    /// File as named by the caller.
     pub file: PathBuf,
     /// Line, from 1.
     pub line: u32,
@@ -20,14 +20,14 @@ impl fmt::Display for Place {
     }
 }
 
-/// How bad a [`Finding`] is, worst first.
+/// Severity of a [`Finding`], worst first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Severity {
     /// The robot cannot be used.
     Error,
-    /// The robot can be used, but the file probably does not say what was meant.
+    /// The robot can be used, but the file probably differs from what was intended.
     Warning,
-    /// A choice was made that the reader of a result should know.
+    /// A choice that is relevant to the interpretation of results.
     Note,
 }
 
@@ -41,18 +41,18 @@ impl fmt::Display for Severity {
     }
 }
 
-/// One thing that a check found.
+/// One result of a check.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Finding {
-    /// How bad it is.
+    /// Severity.
     pub severity: Severity,
     /// Stable short name for programs, such as `"duplicate-link"`.
     pub code: &'static str,
-    /// `"file:line"`, or the file alone where no line can be named.
+    /// `"file:line"`, or only the file if there is no line.
     pub location: String,
-    /// What was found, in one sentence.
+    /// Description in one sentence.
     pub message: String,
-    /// How to mend it; may be empty.
+    /// Remedy; may be empty.
     pub help: String,
 }
 

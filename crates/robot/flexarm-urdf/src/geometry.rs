@@ -1,4 +1,4 @@
-//! What a link looks like: shapes and meshes placed on links.
+//! Geometry of links: shapes and meshes placed on links.
 //!
 //! Frames: L link, V the visual's own frame. Primitives as in URDF: centred at Vo, the cylinder
 //! along z.
@@ -30,13 +30,13 @@ pub struct Visual {
 pub enum Geometry {
     /// Triangles in a file.
     Mesh {
-        /// The reference as it stands in the URDF (`package://...`).
+        /// Reference as written in the URDF (`package://...`).
         uri: String,
         /// The file, if it was found.
         path: Option<PathBuf>,
-        /// Factors along x, y and z, applied after the unit and the up axis of the file.
+        /// Scale factors along x, y and z, applied after the unit and the up axis of the file.
         scale: Vector3<f64>,
-        /// What to do with the up axis of a COLLADA file.
+        /// Treatment of the up axis of a COLLADA file.
         up_axis: UpAxis,
     },
     /// A box.
@@ -58,14 +58,15 @@ pub enum Geometry {
     },
 }
 
-/// Corners of the circles that stand for cylinders and spheres.
+/// Number of corners of the circles that approximate cylinders and spheres.
 const CORNERS: u32 = 48;
 
 impl Geometry {
-    /// The shape as triangles in V, scale applied, outward sides counter-clockwise.
+    /// Returns the shape as triangles in V, with the scale applied and outward sides
+    /// counter-clockwise.
     ///
-    /// Round shapes are inscribed polyhedra of 48 corners, for drawing; their exact mass properties
-    /// are those of [`Geometry::mass_properties`].
+    /// Round shapes become inscribed polyhedra with 48 corners, for drawing; for their exact mass
+    /// properties use [`Geometry::mass_properties`].
     ///
     /// # Errors
     /// [`MeshError`], for meshes only.
@@ -79,8 +80,8 @@ impl Geometry {
         })
     }
 
-    /// Volume, centroid and inertia per unit density in V: closed forms, and exact integrals over
-    /// meshes.
+    /// Returns volume, centroid and inertia per unit density in V: closed forms for primitives, and
+    /// exact integrals for meshes.
     ///
     /// # Errors
     /// [`MeshError`], for meshes only.
@@ -94,7 +95,7 @@ impl Geometry {
             }
             Self::Sphere { radius: r } => (4.0 / 3.0 * std::f64::consts::PI * r.powi(3), Vector3::repeat(r * r / 5.0)),
         };
-        // I = ∫ (r·r 1 - r rᵀ) dV, all of it on the axes
+        // I = ∫ (r·r 1 - r rᵀ) dV, diagonal for all primitives
         let s = second_moments * volume;
         Ok(MassProperties {
             volume,

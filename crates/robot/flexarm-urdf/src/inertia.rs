@@ -1,5 +1,5 @@
-//! Masses and inertias: turned into link axes, checked for being a body's, estimated from meshes on
-//! request.
+//! Masses and inertias: transformed to link axes, checked for physical validity, and on request
+//! estimated from meshes.
 //!
 //! Frames: L link, I the axes of `<inertial>`, R the root link of a moving body (links fixed to
 //! each other).
@@ -7,7 +7,7 @@
 //! ```text
 //! c = p_LoLcm_L,   I_com_L = R_LI I_com_I R_LIᵀ
 //! ```
-//! Start at [`link_inertias`]. Checks are about the centre of mass and relative to the largest
+//! Start at [`link_inertias`]. Checks refer to the centre of mass and are relative to the largest
 //! principal moment.
 
 use flexarm_kinematics::{LinkInertia, SpatialInertia, moment_floor};
@@ -25,9 +25,9 @@ use crate::tree::Body;
 /// Relative tolerance of the checks, that of single-precision files.
 const TOLERANCE: f64 = 1e-6;
 
-/// The inertia of each link; `None` for mere frames. Faults go to the report.
+/// Returns the inertia of each link; `None` for massless frames. Faults go to the report.
 ///
-/// `bodies` is empty where the tree is broken: then no missing mass can be told.
+/// `bodies` is empty if the tree is broken: then missing masses are not reported.
 pub(crate) fn link_inertias(
     robot: &RawRobot,
     bodies: &[Body],
@@ -45,7 +45,7 @@ pub(crate) fn link_inertias(
         None => vec![None; robot.links.len()],
     };
 
-    // Each link for itself. What stands on the base does not matter for motion: a warning will do.
+    // Checks each link. Links on the base do not affect the motion, so warnings suffice.
     let mut moves = vec![true; robot.links.len()];
     for body in bodies.iter().filter(|b| b.moved_by.is_none()) {
         body.members.iter().for_each(|&(link, _)| moves[link] = false);
@@ -75,7 +75,7 @@ pub(crate) fn link_inertias(
         massless.extend(check_body(robot, body, &inertias, &without_extent, &failures, options, report));
     }
     tell_massless(robot, massless, report);
-    // An <inertial> of zeros is a way to write a frame.
+    // An <inertial> of zeros denotes a massless frame.
     for inertia in &mut inertias {
         if inertia.is_some_and(|i| i.mass == 0.0 && i.inertia_com == Matrix3::zeros()) {
             *inertia = None;
@@ -90,12 +90,12 @@ fn in_link_axes(raw: &RawInertial) -> LinkInertia {
     LinkInertia {
         mass: raw.mass,
         com: raw.X_LI.translation.vector,
-        // the products leave the last bit unsymmetric
+        // Rounding makes the product slightly unsymmetric.
         inertia_com: (inertia + inertia.transpose()) * 0.5,
     }
 }
 
-/// Warns of names that no link has.
+/// Warns about names without a link.
 fn check_names(robot: &RawRobot, names: &[String], what: &str, code: &'static str, report: &mut Report) {
     for name in names.iter().filter(|name| robot.links.iter().all(|l| l.name != **name)) {
         let message = format!("{what} link {name:?}, which does not exist");
@@ -105,9 +105,9 @@ fn check_names(robot: &RawRobot, names: &[String], what: &str, code: &'static st
     }
 }
 
-/// Principal moments in rising order (kg m²); NaN if the matrix is not finite.
+/// Principal moments in ascending order (kg m²); NaN if the matrix is not finite.
 fn principal_moments(inertia: &Matrix3<f64>) -> [f64; 3] {
-    // Scaled to one: the squares of huge entries would overflow, and the iteration never end.
+    // Scaled to one: squares of huge entries would overflow, and the iteration would not end.
     let scale = inertia.amax();
     if !scale.is_finite() || inertia.iter().any(|x| x.is_nan()) {
         return [f64::NAN; 3];
@@ -120,8 +120,8 @@ fn principal_moments(inertia: &Matrix3<f64>) -> [f64; 3] {
     moments.map(|m| m * scale)
 }
 
-/// Positive definite and triangle inequality. True if the link has no extent in some direction
-/// (rank deficient).
+/// Checks positive definiteness and the triangle inequality. Returns whether the matrix is rank
+/// deficient (no extent in some direction).
 fn check_moments(
     name: &str,
     raw: &RawInertial,
@@ -137,14 +137,14 @@ fn check_moments(
     let excess = high - (low + middle);
     let floor = moment_floor(raw.mass, scale);
     let problem = if low.is_nan() || low < -floor {
-        // no waiver where it moves: this adds energy where it should take some
+        // no waiver for moving links: a negative moment would add energy
         Problem::InertiaNotPositiveDefinite { link, moments }
     } else if excess > floor && !waived {
         Problem::TriangleInequality { link, moments, excess }
     } else {
         return low <= TOLERANCE * scale || high <= floor;
     };
-    // Without motion nothing follows from it.
+    // Without motion the inertia has no effect.
     if !moves && waived {
         return false;
     }
@@ -156,8 +156,8 @@ fn check_moments(
     false
 }
 
-/// Joints can be moved without mass behind them; what that leaves out must be known. One warning
-/// stands for many.
+/// Warns about joints that move no mass, whose inertia is missing in the results. Many such joints
+/// give one warning.
 fn tell_massless(robot: &RawRobot, massless: Vec<(Place, Problem)>, report: &mut Report) {
     const MOST: usize = 3;
     if massless.len() <= MOST {
@@ -178,7 +178,7 @@ fn tell_massless(robot: &RawRobot, massless: Vec<(Place, Problem)>, report: &mut
     report.warning(&robot.place, "missing-inertial", message, first.help());
 }
 
-/// Mass and inertia of a moving body; what it lacks altogether comes back.
+/// Checks mass and inertia of a moving body; returns a problem if they are missing entirely.
 fn check_body(
     robot: &RawRobot,
     body: &Body,
@@ -203,7 +203,7 @@ fn check_body(
         }
         return Some((root.place.clone(), problem));
     }
-    // Unreadable or negative masses were reported; what follows from them is not.
+    // Unreadable or negative masses were reported already; consequences are not.
     let unsound = |&i: &usize| robot.links[i].inertial.as_ref().is_some_and(|raw| raw.faulty || raw.mass < 0.0);
     if with_inertia.iter().any(unsound) {
         return None;
@@ -219,7 +219,7 @@ fn check_body(
         return Some((place(with_inertia[0]).clone(), Problem::ZeroMass { link, joint, lumped: lumped() }));
     }
 
-    // A point mass is sound where other links of the same body give it inertia.
+    // A point mass is valid if other links of the same body have inertia.
     let thin = with_inertia.iter().copied().filter(|&i| without_extent[i]);
     let thin = thin.into_iter().find(|&i| !options.waive.contains(&robot.links[i].name))?;
     let name = &robot.links[thin].name;
@@ -230,21 +230,22 @@ fn check_body(
     None
 }
 
-/// Compares radii of gyration and centre of mass with the box around the shapes of the link.
+/// Compares the radius of gyration and the centre of mass with the box around the shapes of the
+/// link.
 fn plausible(name: &str, raw: &RawInertial, inertia: &LinkInertia, shape: &LinkShape, report: &mut Report) {
     let Some((low, high)) = shape.bounds else { return };
     let diagonal = (high - low).norm();
     let radius = (principal_moments(&inertia.inertia_com)[2].max(0.0) / inertia.mass).sqrt();
     let help = "check units (kg, m, kg m^2) of inertia and geometry";
     if radius > 0.5 * diagonal {
-        // all mass in the corners of the box would give half the diagonal
+        // All mass in the corners of the box would give half the diagonal.
         let message = format!(
             "link {name:?}: the radius of gyration {radius:.3} m does not fit into its geometry, whose diagonal is \
              {diagonal:.3} m"
         );
         report.warning(&raw.place, "inertia-too-large", message, help);
     } else if radius < 0.02 * diagonal {
-        // a homogeneous rod, the most slender body, has 0.29 of its length
+        // A homogeneous rod, the most slender body, has 0.29 of its length.
         let message = format!(
             "link {name:?}: the radius of gyration {radius:.2e} m is tiny against its geometry, whose diagonal is \
              {diagonal:.3} m"
@@ -263,8 +264,8 @@ fn plausible(name: &str, raw: &RawInertial, inertia: &LinkInertia, shape: &LinkS
     }
 }
 
-/// Fills links of bodies without any `<inertial>` from their shapes; says for each link why it
-/// could not.
+/// Estimates the inertia of links in bodies without any `<inertial>` from their shapes; returns for
+/// each link the reason if this failed.
 fn fill_from_shapes(
     robot: &RawRobot,
     bodies: &[Body],
@@ -283,14 +284,13 @@ fn fill_from_shapes(
         return failures;
     }
 
-    // The base is filled too, so that a total mass can be the one of the data sheet.
+    // The base is included, so that the total mass may be that of the data sheet.
     let empty = bodies_without(robot, bodies);
     let (mut filled, mut shapeless): (Vec<(usize, SpatialInertia)>, Vec<usize>) = (Vec::new(), Vec::new());
     for i in empty.flat_map(|b| b.members.iter().map(|m| m.0)) {
         let link = &robot.links[i];
         match &shapes[i].solids {
-            // A mere frame between others may stay without mass, as long as there is something to
-            // estimate.
+            // A frame without shapes may remain massless if other links have shapes.
             Ok(solids) if solids.is_empty() => shapeless.push(i),
             Ok(solids) => {
                 let open: usize = solids.iter().map(|(_, p)| p.open_edges).sum();
@@ -324,7 +324,7 @@ fn fill_from_shapes(
     if filled.is_empty() {
         shapeless.iter().for_each(|&i| failures[i] = Some("there is no shape".to_owned()));
     }
-    // Of rods the volume is the length.
+    // For rods the "volume" is the length.
     let volume: f64 = filled.iter().map(|(_, M)| M.mass).sum();
     let density = match estimate {
         InertiaEstimate::Density(density) => density,
@@ -346,15 +346,15 @@ fn fill_from_shapes(
     failures
 }
 
-/// Bodies of which no link has an `<inertial>`.
+/// Bodies without any `<inertial>`.
 fn bodies_without<'a>(robot: &'a RawRobot, bodies: &'a [Body]) -> impl Iterator<Item = &'a Body> {
     bodies.iter().filter(|b| b.members.iter().all(|&(i, _)| robot.links[i].inertial.is_none()))
 }
 
-/// Diameter of a rod over its length.
+/// Ratio of diameter to length of a rod.
 const ROD: f64 = 0.2;
 
-/// A link as a rod from its frame to its farthest joint, of the mass 1 kg/m; `None` for a link
+/// Approximates a link by a rod of 1 kg/m from its frame to its farthest joint; `None` for a link
 /// without length.
 fn rod(robot: &RawRobot, link: usize) -> Option<SpatialInertia> {
     let ends =

@@ -1,4 +1,4 @@
-//! Joints as written to joints as simulated: unit axes, limits, followers.
+//! Conversion of joints as written to joints of the mechanism: unit axes, limits, mimic joints.
 
 use std::collections::HashMap;
 
@@ -12,11 +12,11 @@ use crate::raw::{RawJoint, RawRobot};
 use crate::report::Report;
 use crate::spelling::closest;
 
-/// Axes written with four digits of 1/√2 pass without a warning.
+/// Tolerance of the axis length; axes written with four digits of 1/√2 pass without a warning.
 const UNIT_TOLERANCE: f64 = 1e-4;
 
-/// Takes `<mimic>` from joints that cannot move, and fixes joints that follow one which cannot:
-/// their value is constant.
+/// Removes `<mimic>` from fixed joints, and fixes joints that follow a fixed one, since their value
+/// is constant.
 pub(crate) fn fix_still_followers(robot: &mut RawRobot, report: &mut Report) {
     let mut still: HashMap<String, f64> =
         robot.joints.iter().filter(|j| j.is_fixed()).map(|j| (j.urdf.name.clone(), 0.0)).collect();
@@ -26,7 +26,7 @@ pub(crate) fn fix_still_followers(robot: &mut RawRobot, report: &mut Report) {
             report.warning(&joint.mimic, "mimic-fixed", message, "remove <mimic>, or let the joint move");
         }
     }
-    // each round fixes the followers of what the round before has fixed
+    // Each round fixes followers of joints fixed in an earlier round.
     loop {
         let follows = |j: &&mut RawJoint| j.urdf.mimic.as_ref().is_some_and(|m| still.contains_key(&m.joint));
         let Some(joint) = robot.joints.iter_mut().find(follows) else { return };
@@ -48,7 +48,7 @@ pub(crate) fn fix_still_followers(robot: &mut RawRobot, report: &mut Report) {
     }
 }
 
-/// All joints in the order of the file; faults go to the report.
+/// Converts all joints in the order of the file; faults go to the report.
 pub(crate) fn convert_joints(robot: &RawRobot, report: &mut Report) -> Vec<Joint> {
     let faults = report.issues.len();
     check_mimics(robot, report);
@@ -141,13 +141,13 @@ fn limits(raw: &RawJoint, place: &Place, report: &mut Report) -> Limits {
     limits
 }
 
-/// A follower of a follower becomes one of the independent joint:
+/// Makes a follower of a follower follow the independent joint:
 /// `r (r' q + o') + o = (r r') q + (r o' + o)`.
 fn join_mimic_chains(joints: &mut [Joint]) {
     let written: HashMap<String, Mimic> =
         joints.iter().filter_map(|j| Some((j.name.clone(), j.mimic.clone()?))).collect();
     for mimic in joints.iter_mut().filter_map(|j| j.mimic.as_mut()) {
-        // the bound only guards against joints of one name
+        // The bound only guards against duplicate joint names.
         for _ in 0..written.len() {
             let Some(next) = written.get(&mimic.joint) else { break };
             mimic.offset += mimic.ratio * next.offset;
@@ -157,12 +157,12 @@ fn join_mimic_chains(joints: &mut [Joint]) {
     }
 }
 
-/// Followers need a leader that exists and moves; a circle of followers has none.
+/// Checks that the leaders of mimic joints exist and do not form a cycle.
 fn check_mimics(robot: &RawRobot, report: &mut Report) {
     let joints: HashMap<&str, &RawJoint> = robot.joints.iter().map(|j| (j.urdf.name.as_str(), j)).collect();
     let mut in_reported_circle: Vec<&str> = Vec::new();
     for joint in &robot.joints {
-        // an empty name was already reported as a missing attribute
+        // An empty name was already reported as a missing attribute.
         let Some(mimic) = joint.urdf.mimic.as_ref().filter(|m| !m.joint.is_empty()) else { continue };
         let Some(leader) = joints.get(mimic.joint.as_str()) else {
             let problem = Problem::UnknownMimic {
@@ -180,7 +180,7 @@ fn check_mimics(robot: &RawRobot, report: &mut Report) {
         let mut at = *leader;
         while let Some(next) = &at.urdf.mimic {
             if let Some(start) = circle.iter().position(|n| *n == at.urdf.name) {
-                // a follower of the circle that is not in it is no second fault
+                // A joint that follows the cycle without being in it is not another fault.
                 if start == 0 {
                     let joints = circle.iter().map(|n| (*n).to_owned()).collect();
                     report.error(&joint.mimic, Problem::MimicCycle { joints });

@@ -1,10 +1,10 @@
-//! URDF and its meshes to a flexarm mechanism.
+//! Converts URDF and its meshes to a flexarm mechanism.
 //!
-//! Start at [`read_urdf`], which gives a [`Mechanism`](flexarm_kinematics::Mechanism) with the
-//! shapes of its links, or at [`check_urdf`], which lists everything that is wrong or doubtful.
-//! Every error names file, line, what was found and how to mend it, and all of them come at once.
-//! Nothing is printed and, but for [`search_paths_from_environment`] and the `$(env NAME)` of a
-//! xacro file, no environment is read.
+//! Start at [`read_urdf`], which returns a [`Mechanism`](flexarm_kinematics::Mechanism) with the
+//! shapes of its links, or at [`check_urdf`], which lists all errors and doubtful places. Every
+//! error has file, line, value found and remedy, and all errors are reported together. Nothing is
+//! printed, and the environment is read only by [`search_paths_from_environment`] and by
+//! `$(env NAME)` in a xacro file.
 //!
 //! ```
 //! use flexarm_urdf::{ReadOptions, check_urdf_text, default_tcp, parse_urdf};
@@ -38,10 +38,10 @@
 //! # Ok::<(), flexarm_urdf::UrdfError>(())
 //! ```
 //!
-//! What URDF leaves open is decided so: inertias are turned by the `rpy` of their origin; frames
-//! without mass stay links; an effort or velocity limit of 0 means unknown; a joint's `<dynamics>`
-//! is listed and does not act. Meshes ([`load_mesh`]) come out in metres, z up, with the node
-//! transforms of their format applied.
+//! Points that URDF leaves open: inertias are rotated by the `rpy` of their origin; massless frames
+//! remain links; an effort or velocity limit of 0 means unknown; a joint's `<dynamics>` is listed
+//! but has no effect. Meshes ([`load_mesh`]) are in metres, z up, with the node transforms of their
+//! format applied.
 //!
 //! Notation: `X_PJ` pose of J in P; L link, V visual, I axes of `<inertial>`. SI units.
 //! Not here: SDF and MJCF, collision shapes, textures, the dynamics model (`flexarm-kinematics`).

@@ -1,27 +1,28 @@
-//! Finds what is wrong or doubtful in the tree of a URDF, and writes the text that `urdf_rs` reads.
+//! Finds errors and doubtful places in the tree of a URDF, and writes the text that `urdf_rs`
+//! reads.
 //!
 //! Start at [`lint`]. The values of a robot come from `urdf_rs`. It drops words of a vector that
-//! are no numbers, takes a missing `<inertial>` for zeros, stops at the first fault and knows no
-//! lines. The lint reports such faults with their places. It then writes a [`Plain`] text with the
-//! elements and attributes that a mechanism needs, as they stand in the file, without prefixes and
-//! with the first of each element that may stand once. This has three reasons:
+//! are not numbers, treats a missing `<inertial>` as zeros, stops at the first fault and has no
+//! line numbers. The lint reports such faults with their places. It then writes a [`Plain`] text
+//! with the elements and attributes that a mechanism needs, as they are in the file, without
+//! prefixes and with only the first of each element that may occur once. This has three reasons:
 //!
 //! * The parsers of `urdf_rs` recurse, and overflow the stack in a file of 100,000 nested elements.
 //!   The plain text is five elements deep and has at most [`MOST_ELEMENTS`] links and joints,
-//!   whatever the file holds.
-//! * All faults come at once: zeros stand for what is missing or wrong, and `urdf_rs` reads on.
-//! * `urdf_rs` refuses robots that are in use: a `<limit>` without velocity, an `<axis>` without
+//!   regardless of the file.
+//! * All faults are reported together: missing or wrong values are replaced by zeros, and `urdf_rs`
+//!   continues.
+//! * `urdf_rs` rejects robots that are in use: a `<limit>` without velocity, an `<axis>` without
 //!   `xyz`, a `<material>` without name, a `<color>` without `rgba`, an unknown shape, a second
 //!   `<origin>`, an `<inertial>` between visuals, a `<safety_controller>` without `k_velocity`. The
-//!   plain text has the default or leaves the element out. A `<collision>` with a fault is left
-//!   out.
+//!   plain text has the default or omits the element. A `<collision>` with a fault is omitted.
 //!
-//! The model takes four things from the tree, for which `urdf_rs::Robot` has no place: where an
-//! element stands and whether it is there ([`Mark`]), the transmissions, the version (a bound that
-//! URDF 1.2 leaves open is written as infinite, as `urdf_rs` does itself), and `quat_xyzw`, which
-//! `urdf_rs` turns into angles that are wrong by up to 0.3 degrees near a pitch of 90.
+//! The model takes four things from the tree that `urdf_rs::Robot` does not contain: the places of
+//! elements and whether they exist ([`Mark`]), the transmissions, the version (a bound that URDF
+//! 1.2 leaves open is written as infinite, as `urdf_rs` does itself), and `quat_xyzw`, which
+//! `urdf_rs` converts to angles that are wrong by up to 0.3 degrees near a pitch of 90.
 //!
-//! Not here: what follows from the values ([`crate::raw`] and beyond).
+//! Not here: conclusions from the values ([`crate::raw`] and beyond).
 
 use std::fmt::Write as _;
 
@@ -35,7 +36,7 @@ use crate::report::Report;
 use crate::spelling::closest;
 use crate::xml::{Lines, escaped};
 
-/// Maximum number of links and joints of a robot: checks compare each with each.
+/// Maximum number of links and joints of a robot; some checks compare every pair.
 const MOST_ELEMENTS: usize = 4000;
 
 const JOINT_TYPES: [&str; 7] = ["fixed", "revolute", "continuous", "prismatic", "floating", "planar", "spherical"];
@@ -70,7 +71,7 @@ const JOINT_CHILDREN: [&str; 11] = [
     "hardwareInterface",
 ];
 
-/// The text for `urdf_rs`, and a mark for each of its links and joints, in the same order.
+/// Text for `urdf_rs`, and a mark for each of its links and joints, in the same order.
 pub(crate) struct Plain {
     pub(crate) text: String,
     pub(crate) place: Place,
@@ -79,17 +80,17 @@ pub(crate) struct Plain {
     pub(crate) transmissions: Vec<Transmission>,
 }
 
-/// An element that may have an `<origin>`, as the tree has it.
+/// Marks of an element that may have an `<origin>`.
 pub(crate) struct Mark {
     pub(crate) place: Place,
-    /// The rotation of `<origin>` where no `rpy` gives it: from a quaternion, or the identity
-    /// where there is no origin.
+    /// Rotation of `<origin>` if it is not given by `rpy`: from a quaternion, or the identity if
+    /// there is no origin.
     pub(crate) quaternion: Option<UnitQuaternion<f64>>,
-    /// Some part could not be read: no further checks.
+    /// Whether some part could not be read; disables further checks.
     pub(crate) faulty: bool,
 }
 
-/// Elements of a link in the tree; `None` stands for an element that is not there.
+/// Elements of a link in the tree; `None` if an element does not exist.
 pub(crate) struct LinkMarks {
     pub(crate) place: Place,
     pub(crate) inertial: Option<Mark>,
@@ -97,7 +98,7 @@ pub(crate) struct LinkMarks {
     pub(crate) collisions: Vec<Mark>,
 }
 
-/// Elements of a joint in the tree; `None` stands for an element that is not there.
+/// Elements of a joint in the tree; `None` if an element does not exist.
 pub(crate) struct JointMarks {
     pub(crate) joint: Mark,
     pub(crate) axis: Option<Place>,
@@ -109,9 +110,9 @@ pub(crate) struct JointMarks {
 #[derive(Clone, Copy)]
 enum Kind {
     Text,
-    /// Text that is not empty.
+    /// Non-empty text.
     Name,
-    /// So many finite numbers.
+    /// The given number of finite numbers.
     Numbers(usize),
     /// A number that may be infinite.
     Bound,
@@ -140,7 +141,7 @@ impl Kind {
         }
     }
 
-    /// Returns what stands for a value that is missing or wrong.
+    /// Returns the replacement of a missing or wrong value.
     fn zero(self) -> &'static str {
         match self {
             Self::Text | Self::Name => "",
@@ -163,7 +164,7 @@ use Missing::{As, Fault, LeftOut};
 type Attribute = (&'static str, Kind, Missing);
 
 /// Reports the faults of everything below `<robot>`. Returns `None` if the root is another element,
-/// or has too many links and joints.
+/// or there are too many links and joints.
 pub(crate) fn lint(root: Node<'_, '_>, lines: &Lines<'_>, report: &mut Report) -> Option<Plain> {
     let place = lines.of(root);
     if root.tag_name().name() != "robot" {
@@ -181,7 +182,7 @@ pub(crate) fn lint(root: Node<'_, '_>, lines: &Lines<'_>, report: &mut Report) -
     Some(lint.robot(root, place))
 }
 
-/// The `version` attribute; URDF without one is 1.0.
+/// Value of the `version` attribute; 1.0 if it is missing.
 fn version(root: Node<'_, '_>) -> (u32, u32) {
     root.attribute("version")
         .and_then(|v| v.trim().split_once('.'))
@@ -192,9 +193,9 @@ fn version(root: Node<'_, '_>) -> (u32, u32) {
 struct Lint<'a, 't> {
     lines: &'a Lines<'t>,
     report: &'a mut Report,
-    /// `quat_xyzw` counts (URDF 1.1 and later).
+    /// Whether `quat_xyzw` is used (URDF 1.1 and later).
     quaternions: bool,
-    /// Limits that are not written are infinite (URDF 1.2 and later), not zero.
+    /// Whether missing limits are infinite (URDF 1.2 and later) instead of zero.
     open_limits: bool,
     /// Name of the current robot, link or joint in messages.
     owner: String,
@@ -229,7 +230,7 @@ impl Lint<'_, '_> {
         let name = self.name(node)?;
         self.start("link", &[("name", name)]);
         let all = |name: &'static str| elements(node).filter(move |n| n.tag_name().name() == name);
-        // An element between visuals would make two lists of them, which `urdf_rs` refuses.
+        // An element between visuals would split their list in two, which `urdf_rs` rejects.
         let inertial = all("inertial").next().map(|n| self.inertial(n));
         if let Some(second) = all("inertial").nth(1) {
             let message = format!("{} has a second <inertial>, which is ignored", self.owner);
@@ -255,8 +256,8 @@ impl Lint<'_, '_> {
         Mark { place: self.lines.of(node), quaternion, faulty: self.report.issues.len() > faults }
     }
 
-    /// Writes a `<visual>` or `<collision>`. Leaves out one that cannot be drawn, and a collision
-    /// with any fault.
+    /// Writes a `<visual>` or `<collision>`. Omits one that cannot be drawn, and a collision with
+    /// any fault.
     fn shape(&mut self, node: Node<'_, '_>) -> Option<Mark> {
         let (faults, start, tag) = (self.report.issues.len(), self.text.len(), node.tag_name().name());
         let name = node.attribute("name").map(|name| ("name", name));
@@ -300,7 +301,7 @@ impl Lint<'_, '_> {
         self.start("geometry", &[]);
         let numbers = self.element(shape, &format!("{}, <{kind}>", self.owner), attributes);
         self.end("geometry");
-        // The sign of a scale mirrors.
+        // A negative scale mirrors.
         let extent = |x: &f64| if kind == "mesh" { x.abs() } else { *x };
         if numbers.iter().any(|x| extent(x) <= 0.0) {
             let message = format!("{}, <{kind}> has no extent and is not drawn", self.owner);
@@ -346,7 +347,7 @@ impl Lint<'_, '_> {
         Some(JointMarks { joint, axis, limit, mimic })
     }
 
-    /// Returns the type for `urdf_rs`. "floating" stands for all that are not supported.
+    /// Returns the type for `urdf_rs`; "floating" replaces all unsupported types.
     fn joint_type<'n>(&mut self, node: Node<'n, '_>, name: &str) -> &'n str {
         let owner = format!("{}, <joint>", self.owner);
         let Some(found) = self.required(node, &owner, "type", Text) else { return "floating" };
@@ -360,9 +361,9 @@ impl Lint<'_, '_> {
         "floating"
     }
 
-    /// Writes `<origin>`; returns its rotation if no `rpy` gives it.
+    /// Writes `<origin>`; returns its rotation if it is not given by `rpy`.
     fn origin(&mut self, node: Node<'_, '_>) -> Option<UnitQuaternion<f64>> {
-        // Three angles of zero give a matrix with a negative zero; this is the identity.
+        // Three zero angles would give a matrix with a negative zero; this is the exact identity.
         let Some(origin) = named(node, "origin") else { return Some(UnitQuaternion::identity()) };
         let place = self.lines.of(origin);
         let owner = format!("{}, <origin>", self.outer(node));
@@ -386,8 +387,8 @@ impl Lint<'_, '_> {
         None
     }
 
-    /// Writes the first child of this name and returns its place. Writes one that must be there
-    /// with zeros if it is missing.
+    /// Writes the first child of this name and returns its place. A missing required child is
+    /// written with zeros.
     fn child(&mut self, node: Node<'_, '_>, name: &'static str, must: bool, attributes: &[Attribute]) -> Option<Place> {
         let found = if must { self.needed(node, name) } else { named(node, name) };
         if let Some(child) = found {
@@ -444,7 +445,7 @@ impl Lint<'_, '_> {
         let _ = write!(self.text, "</{element}>");
     }
 
-    /// Returns the name of a link or joint, which later messages mention.
+    /// Returns the name of a link or joint and sets it as the owner in later messages.
     fn name<'n>(&mut self, node: Node<'n, '_>) -> Option<&'n str> {
         let tag = node.tag_name().name();
         let name = self.required(node, &format!("<{tag}>"), "name", Name)?;
@@ -452,7 +453,7 @@ impl Lint<'_, '_> {
         Some(name)
     }
 
-    /// Returns how messages name the element around another one.
+    /// Returns the name of an element for messages about its children.
     fn outer(&self, node: Node<'_, '_>) -> String {
         match node.tag_name().name() {
             "link" | "joint" => self.owner.clone(),
@@ -486,7 +487,8 @@ impl Lint<'_, '_> {
         value
     }
 
-    /// Warns of an element that is neither URDF nor a known extension: it is probably misspelt.
+    /// Warns about an element that is neither URDF nor a known extension, and thus probably
+    /// misspelt.
     fn known_element(&mut self, node: Node<'_, '_>, known: &[&'static str]) {
         let name = node.tag_name().name();
         if node.tag_name().namespace().is_some() || known.contains(&name) {
@@ -537,7 +539,7 @@ mod tests {
         urdf_rs::read_from_string(text).map(|robot| format!("{robot:?}")).map_err(|e| e.to_string())
     }
 
-    /// Truth: what `urdf_rs` makes of the file itself.
+    /// Truth: the result of `urdf_rs` for the file itself.
     #[test]
     fn nothing_that_urdf_rs_reads_is_lost() {
         let robots = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../robots");
@@ -572,7 +574,7 @@ mod tests {
 </robot>
 "#;
 
-    /// Truth: faults that real robots have and `urdf_rs` refuses.
+    /// Truth: faults of real robots that `urdf_rs` rejects.
     #[test]
     fn what_urdf_rs_would_refuse_is_made_plain() {
         for (from, to) in [
@@ -594,7 +596,7 @@ mod tests {
         }
     }
 
-    /// The plain text has no extensions, and zeros where there are faults.
+    /// The plain text has no extensions, and zeros in place of faults.
     #[test]
     fn the_text_is_shallow_and_whole_whatever_is_wrong() {
         let deep =

@@ -1,4 +1,4 @@
-//! Turns the values of `urdf_rs` into frames and matrices, and joins them with the marks of the
+//! Converts the values of `urdf_rs` to frames and matrices, and joins them with the marks of the
 //! lint. Start at [`read_robot`].
 //!
 //! Not here: conclusions from the values ([`crate::joints`], [`crate::inertia`],
@@ -21,7 +21,7 @@ use crate::xml::Lines;
 pub(crate) struct RawRobot {
     pub(crate) name: String,
     pub(crate) place: Place,
-    /// Macros of a file that calls none of them.
+    /// Macros defined in a file that calls none of them.
     pub(crate) idle_macros: Vec<String>,
     pub(crate) links: Vec<RawLink>,
     pub(crate) joints: Vec<RawJoint>,
@@ -35,7 +35,7 @@ pub(crate) struct RawLink {
     pub(crate) place: Place,
     pub(crate) inertial: Option<RawInertial>,
     pub(crate) visuals: Vec<RawVisual>,
-    /// Shapes of `<collision>` that can be read; what is wrong with others is not looked at.
+    /// Shapes of readable `<collision>` elements; faults of others are not reported.
     pub(crate) collisions: Vec<RawVisual>,
 }
 
@@ -45,14 +45,14 @@ pub(crate) struct RawInertial {
     pub(crate) X_LI: Pose,
     pub(crate) mass: f64,
     pub(crate) inertia_I: Matrix3<f64>,
-    /// Some number could not be read: no further checks.
+    /// Whether some number could not be read; disables further checks.
     pub(crate) faulty: bool,
 }
 
 pub(crate) struct RawVisual {
     pub(crate) place: Place,
     pub(crate) X_LV: Pose,
-    /// A collision is one without material.
+    /// Visual, or a collision converted to a visual without material.
     pub(crate) urdf: urdf_rs::Visual,
 }
 
@@ -60,13 +60,13 @@ pub(crate) struct RawJoint {
     pub(crate) urdf: urdf_rs::Joint,
     pub(crate) X_PJ: Pose,
     pub(crate) place: Place,
-    /// Place of `<axis>`; `None` where it is missing and `urdf` has the default.
+    /// Place of `<axis>`; `None` if it is missing and `urdf` has the default.
     pub(crate) axis: Option<Place>,
-    /// Place of `<limit>`; `None` where it is missing and `urdf` has zeros.
+    /// Place of `<limit>`; `None` if it is missing and `urdf` has zeros.
     pub(crate) limit: Option<Place>,
     /// Place of `<mimic>`, or of the joint if there is none.
     pub(crate) mimic: Place,
-    /// Some part could not be read: no further checks.
+    /// Whether some part could not be read; disables further checks.
     pub(crate) faulty: bool,
 }
 
@@ -76,7 +76,7 @@ impl RawJoint {
     }
 }
 
-/// Reads everything below `<robot>`. Returns `None` if `urdf_rs` was not asked or refuses the text.
+/// Reads everything below `<robot>`. Returns `None` if the lint or `urdf_rs` rejects the text.
 pub(crate) fn read_robot(root: Node<'_, '_>, lines: &Lines<'_>, report: &mut Report) -> Option<RawRobot> {
     let plain = lint(root, lines, report)?;
     let fits = |urdf: &urdf_rs::Robot| urdf.links.len() == plain.links.len() && urdf.joints.len() == plain.joints.len();
@@ -90,7 +90,7 @@ pub(crate) fn read_robot(root: Node<'_, '_>, lines: &Lines<'_>, report: &mut Rep
 
 impl RawRobot {
     fn new(urdf: urdf_rs::Robot, plain: Plain) -> Self {
-        // A material may also be defined once inside a visual and used by name elsewhere.
+        // A material may be defined inside a visual and used by name elsewhere.
         let of_visuals = urdf.links.iter().flat_map(|l| &l.visual).filter_map(|v| v.material.as_ref()).rev();
         let all = of_visuals.chain(&urdf.materials);
         let materials = all.filter_map(|m| Some((m.name.clone(), color(m)?))).collect();

@@ -1,4 +1,4 @@
-//! The way from a file to a robot: text, elements, tree, joints, shapes, masses.
+//! Reads a robot from a file: text, elements, tree, joints, shapes, masses.
 
 use std::path::{Path, PathBuf};
 
@@ -14,25 +14,25 @@ use crate::resolve::Resolver;
 use crate::tcp::tcp_candidates;
 use crate::{inertia, joints, shapes, tree, xacro, xml};
 
-/// How to read. `ReadOptions::default()` reads files as they are and looks into meshes.
+/// Options for reading. `ReadOptions::default()` reads files unchanged and inspects meshes.
 #[derive(Clone, Debug)]
 pub struct ReadOptions {
-    /// Folders of packages by name, for `package://name/...`.
+    /// Package folders by name, for `package://name/...`.
     pub packages: Vec<(String, PathBuf)>,
-    /// Folders to look for packages in, after the folders above the URDF; see
+    /// Folders in which packages are searched, after the parent folders of the URDF; see
     /// [`crate::search_paths_from_environment`].
     pub search_paths: Vec<PathBuf>,
-    /// Estimate mass and inertia of moving bodies that have none in the file.
+    /// Estimate of mass and inertia for moving bodies that have none in the file.
     pub inertia_from_mesh: Option<InertiaEstimate>,
     /// Links whose inertia may be rank deficient or break the triangle inequality, as the
     /// rotor-only first link of the Manutec r3 does. Negative moments are never waived.
     pub waive: Vec<String>,
-    /// Links whose `<inertial>` counts as not written: masses that only hold a place.
+    /// Links whose `<inertial>` is ignored, such as placeholder masses.
     pub discard: Vec<String>,
-    /// Read the mesh files, to check them and to compare inertias with them. Off, files are only
-    /// found.
+    /// Whether mesh files are read, to check them and to compare inertias with them; otherwise they
+    /// are only located.
     pub inspect_meshes: bool,
-    /// What to do with the up axis of COLLADA meshes.
+    /// Treatment of the up axis of COLLADA meshes.
     pub up_axis: UpAxis,
     /// Values of `$(arg name)` in xacro files, by name.
     pub arguments: Vec<(String, String)>,
@@ -53,11 +53,11 @@ impl Default for ReadOptions {
     }
 }
 
-/// Masses for bodies without `<inertial>`, from the volume of their visuals taken as homogeneous
-/// and solid. Where no link has a visual, a total mass is spread by the lengths of the links, each
-/// a rod.
+/// Estimate of masses for bodies without `<inertial>`, from the volume of their visuals as
+/// homogeneous solids. If no link has a visual, a total mass is distributed by the lengths of the
+/// links, each as a rod.
 ///
-/// Bodies count as a whole: where one link of several fixed to each other has an `<inertial>`,
+/// Bodies are treated as a whole: if one of several links fixed to each other has an `<inertial>`,
 /// nothing is added.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InertiaEstimate {
@@ -70,11 +70,11 @@ pub enum InertiaEstimate {
 /// A robot description, read and checked.
 #[derive(Clone, Debug)]
 pub struct UrdfRobot {
-    /// Links, joints and masses. Every link of the file is there, frames without mass too.
+    /// Links, joints and masses, including massless frames.
     pub mechanism: Mechanism,
-    /// The URDF, expanded if it was xacro: without comments then.
+    /// Text of the URDF; after the expansion of xacro, without comments.
     pub text: String,
-    /// What the links look like, in the order of the file.
+    /// Visual shapes of the links, in the order of the file.
     pub visuals: Vec<Visual>,
     /// Shapes for collisions that can be read, in the order of the file. Nothing is checked of
     /// them.
@@ -92,7 +92,7 @@ pub struct UrdfRobot {
     pub transmissions: Vec<Transmission>,
 }
 
-/// `<dynamics>` of one moving joint; zero where the file says nothing.
+/// `<dynamics>` of one moving joint; zero if not given.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointDynamics {
     /// Name of the joint.
@@ -106,36 +106,36 @@ pub struct JointDynamics {
 /// A `<transmission>`, listed for information.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Transmission {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Names of its joints.
+    /// Names of the joints.
     pub joints: Vec<String>,
-    /// Gear ratio, where it is written.
+    /// Gear ratio, if given.
     pub reduction: Option<f64>,
 }
 
-/// Reads a `.urdf` or `.xacro` file; a URDF with xacro in it counts as xacro.
+/// Reads a `.urdf` or `.xacro` file; a URDF that contains xacro is treated as xacro.
 ///
 /// # Errors
-/// [`UrdfError`]: unreadable, xacro that does not make a description, or all faults in it with their lines.
+/// [`UrdfError`] if the file is unreadable, its xacro cannot be expanded, or it has faults (all of
+/// them, with their lines).
 pub fn read_urdf(path: impl AsRef<Path>, options: &ReadOptions) -> Result<UrdfRobot, UrdfError> {
     let path = path.as_ref();
     parse(&load_text(path)?, path, options).0
 }
 
-/// Reads URDF or xacro text; `origin_path` serves messages, and its folder relative paths.
+/// Reads URDF or xacro text; `origin_path` is used in messages, and its folder for relative paths.
 ///
 /// # Errors
-/// As [`read_urdf`], but for reading the text itself.
+/// As [`read_urdf`], except for reading the file.
 pub fn parse_urdf(text: &str, origin_path: impl AsRef<Path>, options: &ReadOptions) -> Result<UrdfRobot, UrdfError> {
     parse(text, origin_path.as_ref(), options).0
 }
 
-/// The URDF that a xacro file stands for, as text; comments are left out.
+/// Expands a xacro file to URDF text; comments are omitted.
 ///
 /// # Errors
-/// [`UrdfError`] if it cannot be read or does not make a document. Whether that is a robot is not
-/// looked at.
+/// [`UrdfError`] if it cannot be read or expanded. The result is not checked to be a robot.
 pub fn expand_xacro(path: impl AsRef<Path>, options: &ReadOptions) -> Result<String, UrdfError> {
     let path = path.as_ref();
     let text = load_text(path)?;
@@ -143,7 +143,7 @@ pub fn expand_xacro(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Str
     Ok(expanded.text)
 }
 
-/// Everything that can be said about a file: errors, warnings and notes, in the order of the file.
+/// Returns all findings about a file: errors, warnings and notes, in the order of the file.
 pub fn check_urdf(path: impl AsRef<Path>, options: &ReadOptions) -> Vec<Finding> {
     let path = path.as_ref();
     match load_text(path) {
@@ -152,7 +152,7 @@ pub fn check_urdf(path: impl AsRef<Path>, options: &ReadOptions) -> Vec<Finding>
     }
 }
 
-/// As [`check_urdf`], for text.
+/// [`check_urdf`] for text.
 pub fn check_urdf_text(text: &str, origin_path: impl AsRef<Path>, options: &ReadOptions) -> Vec<Finding> {
     all_findings(parse(text, origin_path.as_ref(), options))
 }
@@ -163,13 +163,13 @@ fn all_findings((result, report): (Result<UrdfRobot, UrdfError>, Report)) -> Vec
         Err(error) => error.findings(),
     };
     findings.extend(report.remarks());
-    // a stable sort: within a line, errors stay before remarks
+    // Stable sort: within a line, errors precede remarks.
     let line = |f: &Finding| f.location.rsplit(':').next().and_then(|l| l.parse::<u32>().ok()).unwrap_or(0);
     findings.sort_by_key(line);
     findings
 }
 
-/// A description larger than this is refused (bytes): those of real robots have up to one megabyte.
+/// Maximum size of a description (bytes); real robots have up to one megabyte.
 const LARGEST: u64 = 64 << 20;
 
 fn resolver<'a>(path: &Path, options: &'a ReadOptions) -> Resolver<'a> {
@@ -183,7 +183,7 @@ fn load_text(path: &Path) -> Result<String, UrdfError> {
     if meta.is_dir() {
         return Err(io_error(std::io::Error::other("this is a folder; name the URDF file in it")));
     }
-    // Not a device or a pipe, which might never end.
+    // Devices and pipes are refused, since a read may never end.
     if !meta.is_file() {
         return Err(io_error(std::io::Error::other("this is not a file")));
     }
@@ -244,8 +244,8 @@ fn parse_expanded(
     }
 }
 
-/// All checks, each as far as the ones before it allow, and the robot, which counts only without
-/// errors.
+/// Runs all checks, each as far as the previous ones allow, and builds the robot, which is valid
+/// only without errors.
 fn assemble(
     raw: &RawRobot,
     text: &str,
@@ -267,7 +267,8 @@ fn assemble(
     } else {
         shapes::unknown(raw)
     };
-    // Bodies are told only where the tree is sound; else missing masses would be false alarms.
+    // Bodies are determined only if the tree is sound; otherwise missing masses would be false
+    // alarms.
     let bodies = if sound_tree { tree::moving_bodies(raw) } else { Vec::new() };
     let inertias = inertia::link_inertias(raw, &bodies, &shapes, options, report);
     mechanism.links =

@@ -1,4 +1,4 @@
-//! Collects what the checks find, so that all faults come out at once.
+//! Collects the findings of the checks, so that all faults are reported together.
 
 use crate::error::{Issue, Problem};
 use crate::finding::{Finding, Place, Severity};
@@ -30,7 +30,7 @@ impl Report {
         self.remarks.push((place.line, Finding { severity, code, location, message, help }));
     }
 
-    /// Takes over what was found before.
+    /// Adds earlier findings.
     pub(crate) fn take(&mut self, findings: Vec<Finding>) {
         let line = |f: &Finding| f.location.rsplit(':').next().and_then(|l| l.parse().ok()).unwrap_or(0);
         self.remarks.extend(findings.into_iter().map(|finding| (line(&finding), finding)));

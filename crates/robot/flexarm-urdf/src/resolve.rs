@@ -1,16 +1,16 @@
-//! From `package://name/meshes/a.stl` and its kin to a file.
+//! Resolves `package://name/meshes/a.stl` and similar references to files.
 //!
-//! Order for packages: the caller's map, the folders above the URDF, the caller's search paths. The
-//! environment is read by [`search_paths_from_environment`] alone, which the caller may use or not.
+//! Order for packages: the caller's map, the parent folders of the URDF, the caller's search paths.
+//! Only [`search_paths_from_environment`], which the caller may use, reads the environment.
 
 use std::path::{Path, PathBuf};
 
 use flexarm_settings::Setting;
 
-/// Folders from `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH`, for
+/// Returns the folders in `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH`, for
 /// [`crate::ReadOptions::search_paths`].
 ///
-/// The one function of this crate that reads the environment.
+/// The only function of this crate that reads the environment, apart from `$(env NAME)` in xacro.
 pub fn search_paths_from_environment() -> Vec<PathBuf> {
     ["ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH"]
         .into_iter()
@@ -20,7 +20,7 @@ pub fn search_paths_from_environment() -> Vec<PathBuf> {
         .collect()
 }
 
-/// Where to look.
+/// Places to search.
 pub(crate) struct Resolver<'a> {
     /// Folder of the URDF.
     pub(crate) folder: PathBuf,
@@ -28,7 +28,7 @@ pub(crate) struct Resolver<'a> {
     pub(crate) search_paths: &'a [PathBuf],
 }
 
-/// Why no file was found.
+/// Reason why no file was found.
 #[derive(Debug, PartialEq)]
 pub(crate) struct NotFound {
     pub(crate) reason: String,
@@ -36,8 +36,8 @@ pub(crate) struct NotFound {
 }
 
 impl Resolver<'_> {
-    /// Each mesh reference of a URDF once, as it stands there, with its file; those without one are
-    /// left out.
+    /// Returns each mesh reference of a URDF once, as written, with its file; references without a
+    /// file are omitted.
     pub(crate) fn mesh_files(&self, urdf: &str) -> Vec<(String, PathBuf)> {
         let mut files: Vec<(String, PathBuf)> = Vec::new();
         for element in urdf.split("<mesh").skip(1).filter_map(|rest| rest.split('>').next()) {
@@ -96,8 +96,8 @@ impl Resolver<'_> {
         })
     }
 
-    /// The folder of a package, as an absolute path; `near` is the folder of the file that asks for
-    /// it.
+    /// Returns the folder of a package as an absolute path; `near` is the folder of the file that
+    /// refers to it.
     pub(crate) fn find_package(&self, package: &str, near: Option<&Path>) -> Result<PathBuf, NotFound> {
         let mut found = self.package_folders(package).into_iter().next();
         for start in near.into_iter().chain([self.folder.as_path()]) {
@@ -121,8 +121,8 @@ impl Resolver<'_> {
         let mut folders: Vec<PathBuf> =
             self.packages.iter().filter(|(name, _)| name == package).map(|(_, path)| path.clone()).collect();
 
-        // Upwards from the URDF: the package itself, or its neighbour in a workspace. By the name
-        // it was given first, then where links lead (installations often link to sources).
+        // Upwards from the URDF: the package itself, or a sibling in a workspace. First along the
+        // given path, then along the canonical one (installations often link to sources).
         let named = std::path::absolute(&self.folder).ok();
         let real = named.as_deref().and_then(|folder| folder.canonicalize().ok());
         for start in named.iter().chain(real.as_ref().filter(|real| named.as_ref() != Some(real))) {
@@ -149,7 +149,7 @@ impl Resolver<'_> {
     }
 }
 
-/// A package beside the one that holds `start`, whose folder has another name.
+/// Finds a package next to the one that contains `start`, whose folder has another name.
 fn neighbour(start: &Path, package: &str) -> Option<PathBuf> {
     let start = std::path::absolute(start).ok()?;
     let own = start.ancestors().find(|folder| folder.join("package.xml").is_file())?;
@@ -159,7 +159,7 @@ fn neighbour(start: &Path, package: &str) -> Option<PathBuf> {
     folders.into_iter().find(|folder| is_package(folder, package))
 }
 
-/// True if the folder bears the package's name or its `package.xml` does.
+/// Whether the folder or its `package.xml` has the package's name.
 fn is_package(folder: &Path, package: &str) -> bool {
     if folder.file_name().is_some_and(|name| name == package) {
         return true;
@@ -174,7 +174,7 @@ fn existing(path: &Path) -> Option<PathBuf> {
     path.is_file().then(|| path.to_owned())
 }
 
-/// Files written on systems that do not care about case.
+/// Hint for a file name that differs only in case, from case-insensitive systems.
 fn other_case(path: &Path) -> Option<String> {
     let wanted = path.file_name()?.to_str()?;
     let names = std::fs::read_dir(path.parent()?).ok()?.flatten().filter_map(|e| e.file_name().into_string().ok());

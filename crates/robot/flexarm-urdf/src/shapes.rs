@@ -1,4 +1,4 @@
-//! The visuals of a robot: files found and, if asked for, looked into.
+//! Visuals of a robot: finds their files and, on request, inspects them.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -14,20 +14,20 @@ use crate::raw::{RawRobot, RawVisual, color};
 use crate::report::Report;
 use crate::resolve::Resolver;
 
-/// Geometry larger than this was probably drawn in millimetres (m).
+/// Size above which geometry was probably drawn in millimetres (m).
 const LARGE: f64 = 30.0;
-/// Geometry smaller than this was probably scaled twice (m).
+/// Size below which geometry was probably scaled twice (m).
 const SMALL: f64 = 1e-4;
 
-/// What the checks of inertia need to know of a link's shapes.
+/// Shape data of a link for the inertia checks.
 pub(crate) struct LinkShape {
-    /// Box around all shapes in link axes; `None` if there are none or one is not known.
+    /// Bounding box of all shapes in link axes; `None` if there are none or one is unknown.
     pub(crate) bounds: Option<(Vector3<f64>, Vector3<f64>)>,
-    /// Poses `X_LV` and mass properties of all shapes, or why one is not known.
+    /// Poses `X_LV` and mass properties of all shapes, or the reason why one is unknown.
     pub(crate) solids: Result<Vec<(Pose, MassProperties)>, String>,
 }
 
-/// All visuals, with mesh files found.
+/// Returns all visuals, with their mesh files.
 pub(crate) fn find_visuals(
     robot: &RawRobot,
     resolver: &Resolver<'_>,
@@ -51,7 +51,7 @@ pub(crate) fn find_visuals(
     visuals
 }
 
-/// All shapes for collisions, with mesh files where there are some.
+/// Returns all collision shapes, with their mesh files if found.
 pub(crate) fn find_collisions(robot: &RawRobot, resolver: &Resolver<'_>, up_axis: UpAxis) -> Vec<Visual> {
     let mut unheard = Report::default();
     let of_link = robot.links.iter().flat_map(|link| link.collisions.iter().map(move |raw| (link, raw)));
@@ -85,7 +85,7 @@ fn geometry(raw: &RawVisual, link: &str, resolver: &Resolver<'_>, up_axis: UpAxi
     }
 }
 
-/// Bounds and mass properties of every link's shapes. `visuals` are those of [`find_visuals`].
+/// Bounds and mass properties of every link's shapes; `visuals` are those of [`find_visuals`].
 pub(crate) fn inspect(robot: &RawRobot, visuals: &[Visual], report: &mut Report) -> Vec<LinkShape> {
     let mut meshes = Meshes::default();
     let mut visuals = visuals.iter();
@@ -114,7 +114,7 @@ pub(crate) fn inspect(robot: &RawRobot, visuals: &[Visual], report: &mut Report)
         .collect()
 }
 
-/// No look into any file: nothing is known.
+/// Shape data without inspection of files.
 pub(crate) fn unknown(robot: &RawRobot) -> Vec<LinkShape> {
     let unknown = || LinkShape { bounds: None, solids: Err("meshes were not looked into".to_owned()) };
     robot.links.iter().map(|_| unknown()).collect()
@@ -162,7 +162,7 @@ impl Meshes {
                 (low, high, shape.mass_properties().map_err(|e| e.to_string())?)
             }
         };
-        // the box of the turned box: at most a little larger than that of the shape
+        // Bounding box of the rotated box: slightly larger than that of the shape.
         let corners = (0..8).map(|k| {
             let corner = Vector3::from_fn(|i, _| if k >> i & 1 == 0 { low_V[i] } else { high_V[i] });
             (visual.X_LV * Point3::from(corner)).coords

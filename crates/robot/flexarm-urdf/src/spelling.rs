@@ -1,12 +1,12 @@
-//! The name that was probably meant.
+//! Suggestions for misspelt names.
 
-/// Longest name for which another one is looked for (characters).
+/// Maximum length of a name for which a suggestion is made (characters).
 const LONGEST_WORD: usize = 200;
 
-/// The candidate closest to `name`, if it is close enough to be a slip of the pen.
+/// Returns the candidate closest to `name`, if it is close enough for a typing error.
 pub fn closest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
     let length = name.chars().count();
-    // What is this long was not typed.
+    // Longer names were not typed.
     if length > LONGEST_WORD {
         return None;
     }

@@ -1,8 +1,8 @@
-//! Names and tree: every joint joins two known links, every link has one parent, one base holds
-//! them all.
+//! Checks of names and tree: every joint connects two known links, every link has one parent, and
+//! all links have a common base.
 //!
-//! Start at [`check_names`] and [`check_tree`]; [`moving_bodies`] groups the links that no joint
-//! moves against each other, for the checks of masses.
+//! Start at [`check_names`] and [`check_tree`]; [`moving_bodies`] groups links that are fixed to
+//! each other, for the mass checks.
 
 use std::collections::{HashMap, HashSet};
 
@@ -13,7 +13,7 @@ use crate::raw::{RawJoint, RawRobot};
 use crate::report::Report;
 use crate::spelling::closest;
 
-/// Reports links and joints of one name; only the first counts in what follows.
+/// Reports duplicate names of links and joints; later checks use only the first.
 pub(crate) fn check_names(robot: &RawRobot, report: &mut Report) {
     if robot.links.is_empty() && report.issues.is_empty() {
         report
@@ -35,14 +35,14 @@ pub(crate) fn check_names(robot: &RawRobot, report: &mut Report) {
     }
 }
 
-/// Reports joints to unknown links, second parents, cycles and unconnected parts.
+/// Reports unknown links, second parents, cycles and unconnected parts.
 pub(crate) fn check_tree(robot: &RawRobot, report: &mut Report) {
     let faults = report.issues.len();
     let names: HashSet<&str> = robot.links.iter().map(|l| l.name.as_str()).collect();
     let mut parent_joint: HashMap<&str, &RawJoint> = HashMap::new();
     for joint in &robot.joints {
         for (role, link) in [("parent", &joint.urdf.parent.link), ("child", &joint.urdf.child.link)] {
-            // an empty name was already reported as a missing element
+            // An empty name was already reported as a missing element.
             if !link.is_empty() && !names.contains(link.as_str()) {
                 let (joint_name, link) = (joint.urdf.name.clone(), link.clone());
                 let closest = closest(&link, robot.links.iter().map(|l| l.name.as_str()));
@@ -67,7 +67,7 @@ pub(crate) fn check_tree(robot: &RawRobot, report: &mut Report) {
     }
     report_cycles(robot, &parent_joint, report);
 
-    // A broken joint leaves parts behind; they are no second fault.
+    // A broken joint leaves unconnected parts, which are not another fault.
     if report.issues.len() > faults
         || robot.joints.iter().any(|j| j.urdf.parent.link.is_empty() || j.urdf.child.link.is_empty())
     {
@@ -82,7 +82,7 @@ pub(crate) fn check_tree(robot: &RawRobot, report: &mut Report) {
 
 fn report_cycles(robot: &RawRobot, parent_joint: &HashMap<&str, &RawJoint>, report: &mut Report) {
     let mut reported: Vec<&str> = Vec::new();
-    // links already followed up to a base or to a reported cycle
+    // Links already followed up to a base or to a reported cycle.
     let mut settled: HashSet<&str> = HashSet::new();
     for link in &robot.links {
         let mut path: Vec<&RawJoint> = Vec::new();
@@ -119,7 +119,7 @@ pub(crate) struct Body {
     pub(crate) moved_by: Option<usize>,
 }
 
-/// All bodies of a sound tree, the base first.
+/// Returns all bodies of a sound tree, the base first.
 pub(crate) fn moving_bodies(robot: &RawRobot) -> Vec<Body> {
     let index: HashMap<&str, usize> = robot.links.iter().enumerate().map(|(i, l)| (l.name.as_str(), i)).collect();
     let mut children: Vec<Vec<usize>> = vec![Vec::new(); robot.links.len()];

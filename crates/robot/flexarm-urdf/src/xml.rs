@@ -1,6 +1,6 @@
-//! Well-formedness and positions: what a broken file has instead of what it should have, and where.
+//! Well-formedness and positions: describes the first syntax error of a broken file, and its place.
 //!
-//! Not here: any meaning of elements ([`crate::document`]).
+//! Not here: the meaning of elements ([`crate::document`]).
 
 use std::path::{Path, PathBuf};
 
@@ -9,12 +9,13 @@ use roxmltree::{Document, Error, Node};
 use crate::error::{Issue, Problem};
 use crate::finding::Place;
 
-/// Start offsets of all lines, to turn byte offsets into places without reading the text each time.
+/// Start offsets of all lines, to convert byte offsets to places without scanning the text each
+/// time.
 pub(crate) struct Lines<'t> {
     file: PathBuf,
     text: &'t str,
     starts: Vec<usize>,
-    /// Where each line was written, if the text is made from other files.
+    /// Origin of each line, if the text was generated from other files.
     origins: &'t [Place],
 }
 
@@ -24,7 +25,7 @@ impl<'t> Lines<'t> {
         Self { file: file.to_owned(), text, starts, origins: &[] }
     }
 
-    /// The same for a text whose lines come from somewhere else.
+    /// Sets the origins of the lines of a generated text.
     pub(crate) fn with_origins(self, origins: &'t [Place]) -> Self {
         Self { origins, ..self }
     }
@@ -44,13 +45,13 @@ impl<'t> Lines<'t> {
         self.place(node.range().start)
     }
 
-    /// Behind the last character that is not white space: where a truncated file ends.
+    /// Place after the last character that is not white space: the end of a truncated file.
     fn end(&self) -> Place {
         self.place(self.text.trim_end().len())
     }
 }
 
-/// Bytes to text, without a byte order mark.
+/// Decodes UTF-8 without a byte order mark.
 pub(crate) fn decode(bytes: Vec<u8>, file: &Path) -> Result<String, Box<Issue>> {
     let text = String::from_utf8(bytes).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
@@ -62,12 +63,12 @@ pub(crate) fn decode(bytes: Vec<u8>, file: &Path) -> Result<String, Box<Issue>> 
     Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
 }
 
-/// Maximum number of attributes of an element, and of declarations of name spaces in a text:
-/// parsers compare each with each. Real descriptions have up to a hundred and a dozen.
+/// Maximum number of attributes of an element, and of namespace declarations in a text, since
+/// parsers compare every pair. Real descriptions have up to a hundred and a dozen.
 const MOST_ATTRIBUTES: usize = 500;
 
-/// Returns the tree of the text, or the first place where it is not XML. Counts attributes before
-/// any parser sees them.
+/// Returns the tree of the text, or the first syntax error. Limits the attributes before any parser
+/// sees them.
 pub(crate) fn parse<'t>(text: &'t str, lines: &Lines<'_>) -> Result<Document<'t>, Box<Issue>> {
     if let Some((at, what)) = crowded(text) {
         return Err(Box::new(issue(lines.place(at), format!("more than {MOST_ATTRIBUTES} {what}"), "fewer")));
@@ -75,12 +76,12 @@ pub(crate) fn parse<'t>(text: &'t str, lines: &Lines<'_>) -> Result<Document<'t>
     Document::parse(text).map_err(|error| Box::new(describe(text, lines, &error)))
 }
 
-/// Returns where there are too many attributes or name spaces, and which of them.
+/// Returns the place and kind of an excess of attributes or namespaces.
 fn crowded(text: &str) -> Option<(usize, &'static str)> {
     if let Some((at, _)) = text.match_indices("xmlns").nth(MOST_ATTRIBUTES) {
         return Some((at, "declared name spaces"));
     }
-    // Parsers go no further than a '<' within a tag.
+    // Parsers stop at a '<' within a tag.
     let elements = tags(text).filter_map(|(at, tag, _)| Some((at, tag[1..].split('<').next()?)));
     let mut elements = elements.filter(|(_, tag)| !tag.starts_with(['!', '?']));
     let crowded = elements.find(|(_, tag)| tag.match_indices('=').nth(MOST_ATTRIBUTES).is_some());
@@ -92,7 +93,7 @@ fn describe(text: &str, lines: &Lines<'_>, error: &Error) -> Issue {
         let place = lines.place(text.find("<!DOCTYPE").unwrap_or(0));
         return issue(place, "a document type declaration", "plain XML: remove <!DOCTYPE ...> and what it declares");
     }
-    // A file that simply ends: name the element that is still open.
+    // For a truncated file, name the element that is still open.
     let cut_off = matches!(error, Error::UnclosedRootNode | Error::UnexpectedEndOfStream | Error::NoRootNode)
         || position(lines, error).is_none_or(|place| place.line >= lines.end().line && ends_inside(text));
     if cut_off {
@@ -136,7 +137,7 @@ fn shown(byte: u8) -> String {
     format!("{:?}", char::from(byte))
 }
 
-/// The place of an error that has one.
+/// Place of an error, if it has one.
 fn position(lines: &Lines<'_>, error: &Error) -> Option<Place> {
     let without = matches!(
         error,
@@ -152,20 +153,20 @@ fn position(lines: &Lines<'_>, error: &Error) -> Option<Place> {
     (!without).then(|| Place { file: lines.file.clone(), line: pos.row, column: pos.col })
 }
 
-/// True if the text stops within a tag, as a file cut anywhere usually does.
+/// Whether the text ends within a tag, as truncated files usually do.
 fn ends_inside(text: &str) -> bool {
     matches!(innermost_open(text), Open::InsideTag(..))
 }
 
 enum Open<'t> {
     Nothing,
-    /// An element without its end tag, and the offset of its start tag.
+    /// An element without end tag, and the offset of its start tag.
     Element(&'t str, usize),
-    /// A tag without its '>'.
+    /// A tag without '>'.
     InsideTag(&'t str, usize),
 }
 
-/// Returns what is still open where the text ends.
+/// Returns the innermost open element or tag at the end of the text.
 fn innermost_open(text: &str) -> Open<'_> {
     let mut stack: Vec<(&str, usize)> = Vec::new();
     for (start, tag, whole) in tags(text) {
@@ -185,8 +186,8 @@ fn innermost_open(text: &str) -> Open<'_> {
     stack.pop().map_or(Open::Nothing, |(name, at)| Open::Element(name, at))
 }
 
-/// Returns the tags, comments, CDATA and the like of a text: offset, text, and whether the end is
-/// there. The scan forgives what is not well-formed.
+/// Returns the tags, comments, CDATA sections etc. of a text: offset, text, and whether the end
+/// exists. The scan tolerates malformed text.
 fn tags(text: &str) -> impl Iterator<Item = (usize, &str, bool)> {
     let mut at = 0;
     std::iter::from_fn(move || {
@@ -207,7 +208,7 @@ fn tags(text: &str) -> impl Iterator<Item = (usize, &str, bool)> {
     })
 }
 
-/// Length of the tag at the start of `rest`, quotes respected.
+/// Length of the tag at the start of `rest`; quotes are respected.
 fn tag_end(rest: &str, skip: usize, close: &str) -> Option<usize> {
     if close != ">" {
         return rest[skip..].find(close).map(|i| skip + i + close.len());
@@ -224,7 +225,7 @@ fn tag_end(rest: &str, skip: usize, close: &str) -> Option<usize> {
     None
 }
 
-/// Returns text as it is written in XML.
+/// Escapes text for XML.
 pub(crate) fn escaped(text: &str, in_attribute: bool) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -235,7 +236,7 @@ pub(crate) fn escaped(text: &str, in_attribute: bool) -> String {
             '"' => out.push_str("&quot;"),
             '\n' | '\t' if in_attribute => out.push_str(&format!("&#{};", u32::from(c))),
             '\r' => out.push_str("&#13;"),
-            // what XML has no way to write
+            // Characters that cannot be represented in XML.
             c if c < ' ' && c != '\n' && c != '\t' => out.push(' '),
             '\u{fffe}' | '\u{ffff}' => out.push(' '),
             c => out.push(c),

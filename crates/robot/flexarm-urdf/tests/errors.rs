@@ -1,4 +1,4 @@
-//! Every fault is found, with its line, once, and with a way to mend it.
+//! Every fault is found once, with its line and a remedy.
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
 mod common;
@@ -185,13 +185,13 @@ fn followers_have_a_leader_that_moves() {
     assert_eq!(problem(&text).1, Problem::MimicCycle { joints: vec!["j".into(), "k".into()] });
 }
 
-/// Codes of the warnings about a robot that can be used.
+/// Codes of the warnings about a usable robot.
 fn warned(text: &str) -> Vec<&'static str> {
     let robot = parse_urdf(text, "r.urdf", &ReadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
     robot.warnings_only().map(|finding| finding.code).collect()
 }
 
-/// A joint that is moved along a motion needs no mass behind it; that it has none is told.
+/// A joint with prescribed motion needs no mass, but a missing mass gives a warning.
 #[test]
 fn a_moving_link_without_mass_is_told_and_taken() {
     assert_eq!(warned(&with_inertial("")), ["missing-inertial"]);
@@ -210,8 +210,8 @@ fn a_moving_link_without_mass_is_told_and_taken() {
     assert!(told[0].help.contains("(inertia_from_density or inertia_from_total_mass, "));
 }
 
-/// What rounding leaves below zero is no fault: six digits of the file, a micrometre about the
-/// mass, nothing at all.
+/// Slightly negative moments due to rounding are accepted: six digits of the file, a micrometre
+/// about the mass, no mass.
 #[test]
 fn a_moment_below_zero_by_rounding_is_zero() {
     for (mass, moments) in [
@@ -225,8 +225,8 @@ fn a_moment_below_zero_by_rounding_is_zero() {
     }
 }
 
-/// Truth: what does not move has no say, so that the same tensor is a warning at the base and an
-/// error on an arm.
+/// Truth: links fixed to the base do not affect the motion, so the same tensor is a warning at the
+/// base and an error on an arm.
 #[test]
 fn inertia_fixed_to_the_base_is_no_error_and_can_be_waived() {
     let bad = format!("<link name='foot'>{}</link>\n", inertial(1.0, [1.0, 1.0, -1.0]));
@@ -240,7 +240,7 @@ fn inertia_fixed_to_the_base_is_no_error_and_can_be_waived() {
     assert_eq!(parse_urdf(&text, "r.urdf", &waived).unwrap().warnings_only().count(), 0);
 }
 
-/// Truth: a joint that follows a fixed one stands at its offset, here a quarter turn.
+/// Truth: a joint that follows a fixed one is at its offset, here a quarter turn.
 #[test]
 fn what_follows_a_fixed_joint_is_fixed_at_its_offset() {
     let fixed = "<joint name='f' type='fixed'><parent link='arm'/><child link='tip'/><mimic joint='j'/></joint>\n";
@@ -290,7 +290,7 @@ fn a_moving_link_has_the_mass_of_a_body() {
     let (_, fault) = problem(&with_inertial(&inertial(1.0, [1.0, 1.0, 2.1])));
     let Problem::TriangleInequality { excess, .. } = fault else { panic!("{fault}") };
     approx::assert_relative_eq!(excess, 0.1, max_relative = 1e-12); // measured 9e-16
-    // a flat plate, rounded in the seventh digit, is a body
+    // A flat plate, rounded in the seventh digit, is valid.
     assert_eq!(problems(&with_inertial(&inertial(1.0, [1.0, 1.0, 2.000001]))), []);
     assert_eq!(
         problem(&with_inertial(&inertial(1.0, [1e308, 1e308, 1e308]))).1.code(),
@@ -312,7 +312,7 @@ fn a_rotor_without_extent_passes_where_it_is_waived_by_name() {
     assert!(findings.iter().any(|f| f.code == "waived-unknown-link"));
 }
 
-/// Mass may sit on links fixed to the moving one; a point mass there needs no inertia of its own.
+/// Mass may be on links fixed to the moving one; a point mass there needs no inertia of its own.
 #[test]
 fn the_mass_of_fixed_children_counts() {
     let fixed = "<joint name='f' type='fixed'><parent link='arm'/><child link='body'/><origin xyz='0 0 1'/></joint>\n";

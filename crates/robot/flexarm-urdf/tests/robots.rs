@@ -1,4 +1,4 @@
-//! What a sound URDF becomes: frames, inertias, limits, followers, shapes.
+//! Results for valid URDFs: frames, inertias, limits, mimic joints, shapes.
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 #![allow(non_snake_case, reason = "monogram notation: X_PJ, R_LI")]
 
@@ -23,7 +23,7 @@ fn codes(findings: &[Finding]) -> Vec<(Severity, &'static str)> {
 }
 
 /// The shoulder of a KUKA KR 210 R2700-2 (kroshu/kuka_robot_descriptions, Apache-2.0): principal
-/// moments, here with an inertial frame turned by a yaw.
+/// moments, here with an inertial frame rotated by a yaw.
 fn kuka_link(rpy: [f64; 3]) -> String {
     let [r, p, y] = rpy;
     format!(
@@ -52,8 +52,8 @@ fn principal_moments_are_turned_by_the_inertial_yaw() {
     assert_relative_eq!(inertia_of([0.0; 3]), Matrix3::from_diagonal(&vector![Ix, Iy, Iz]), epsilon = 1e-12);
 }
 
-/// Closed form for three angles: R written out as Rz(yaw) Ry(pitch) Rx(roll), the fixed axes of
-/// URDF.
+/// Closed form for three angles: R as the explicit product Rz(yaw) Ry(pitch) Rx(roll), about the
+/// fixed axes of URDF.
 #[test]
 fn three_angles_turn_about_fixed_axes_in_the_order_roll_pitch_yaw() {
     let [r, p, y] = [0.4, -1.1, 2.3];
@@ -180,7 +180,8 @@ fn visuals_have_pose_shape_and_colour() {
     assert!(visuals.iter().all(|v| !v.geometry.triangles().unwrap().triangles.is_empty()));
 }
 
-/// Truth: what `urdf_rs` reads from the file itself. The reader hands it a text made from the file.
+/// Truth: values that `urdf_rs` reads from the file itself. The reader passes it a text generated
+/// from the file.
 #[test]
 fn the_numbers_are_those_that_urdf_rs_reads() {
     let text = arm();
@@ -261,8 +262,8 @@ fn inertia_that_does_not_fit_the_geometry_is_warned_of() {
     assert!(findings.iter().any(|f| f.code == "massless-shape"));
 }
 
-/// Closed form: a box of 0.2 × 0.4 × 0.6 m at 2700 kg/m³, displaced and turned by a quarter about
-/// z.
+/// Closed form: a box of 0.2 × 0.4 × 0.6 m at 2700 kg/m³, displaced and rotated by a quarter turn
+/// about z.
 #[test]
 fn inertia_is_estimated_from_shapes_on_request() {
     let visual = "<origin xyz='0 0 0.3' rpy='0 0 1.5707963267948966'/><geometry><box size='0.2 0.4 0.6'/></geometry>";
@@ -379,8 +380,8 @@ fn inertia_from_a_mesh_file_needs_it_closed() {
     assert!(error.to_string().contains("could not be estimated: the mesh \"none.obj\" was not found"), "{error}");
 }
 
-/// Every shipped arm of six joints: the class by the axes of its file, and joint values found again
-/// from the pose.
+/// Every bundled arm with six joints: the class from the axes of its file, and joint values
+/// recovered from the pose.
 #[test]
 fn inverse_kinematics_of_the_shipped_arms_has_a_closed_form() {
     use flexarm_kinematics::{AnalyticArm, ArmClass, Data, Model, PositionForm, Solutions, forward_kinematics};
@@ -402,7 +403,7 @@ fn inverse_kinematics_of_the_shipped_arms_has_a_closed_form() {
         assert_eq!(arm.class(), ArmClass::SphericalWrist(PositionForm::Parallel23), "{name}");
         let mut solutions = Solutions::default();
         for k in 0..200 {
-            // Joint values spread evenly within the limits.
+            // Joint values distributed evenly within the limits.
             let q: [f64; 6] = std::array::from_fn(|j| {
                 let (low, high) = arm.limits()[j];
                 low + (high - low) * (0.5 + f64::from(k) * [0.618, 0.382, 0.755, 0.570, 0.819, 0.671][j]).fract()

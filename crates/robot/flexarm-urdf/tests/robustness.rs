@@ -1,4 +1,4 @@
-//! No text makes the reader panic, and every cut through a file is noticed.
+//! No text makes the reader panic, and every truncation of a file is detected.
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
 mod common;
@@ -43,14 +43,14 @@ fn deep_nesting_is_no_danger() {
     let deep = format!("<gazebo>{}{}</gazebo>", "<a>".repeat(depth), "</a>".repeat(depth));
     let text = robot(&[&link("base"), &deep]);
     assert!(parse_urdf(&text, "r.urdf", &ReadOptions::default()).is_ok());
-    // The same within URDF: the parsers of `urdf_rs` recurse, and never see this.
+    // The same within URDF: the recursive parsers of `urdf_rs` never see this.
     for tag in ["link", "visual", "geometry", "joint", "material"] {
         let (start, end) = (format!("<{tag} name='a'>").repeat(depth), format!("</{tag}>").repeat(depth));
         let _ = parse_urdf(&robot(&[&link("base"), &start, &end]), "r.urdf", &ReadOptions::default());
     }
 }
 
-/// Parsers compare each attribute and each name space with each: 60 000 take minutes.
+/// Parsers compare every pair of attributes and of namespaces: 60 000 take minutes.
 #[test]
 fn crowds_of_attributes_are_refused_before_they_are_read() {
     let many = |what: &str| (0..60_000).map(|i| what.replace('#', &i.to_string())).collect::<String>();
@@ -65,7 +65,7 @@ fn crowds_of_attributes_are_refused_before_they_are_read() {
     }
 }
 
-/// Returns all findings. `urdf_rs` refuses nothing that is handed to it.
+/// Returns all findings; `urdf_rs` must not reject any text passed to it.
 fn check(text: &str, options: &ReadOptions) -> Vec<Finding> {
     let findings = check_urdf_text(text, "r.urdf", options);
     assert!(findings.iter().all(|f| f.code != "not-read"), "{findings:?}");
@@ -93,8 +93,7 @@ proptest! {
         check(&text, &ReadOptions::default());
     }
 
-    /// Elements in any order, cyclic, repeated, with any numbers: reported or read, and never in
-    /// doubt.
+    /// Elements in any order, cyclic, repeated, with any numbers: they are either reported or read.
     #[test]
     fn no_arrangement_of_elements_panics(parts in prop::collection::vec(
         (0usize..6, 0usize..4, 0usize..4, prop::sample::select(vec!["0 0 1", "0 0 0", "1e308 1e308 1e308", "nan 0 0", "", "1"])),

@@ -1,4 +1,4 @@
-//! Xacro against ROS's program, and against files that want to run away.
+//! Xacro against ROS's implementation, and against files without termination.
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
 mod common;
@@ -19,8 +19,7 @@ fn with_arguments(arguments: &[(&str, &str)]) -> ReadOptions {
     ReadOptions { packages: vec![("test_parts".to_owned(), data())], arguments, ..ReadOptions::default() }
 }
 
-/// Elements with attributes in order of name and text, without white space around it; namespaces
-/// are left out.
+/// Elements with sorted attributes and text, without surrounding white space and namespaces.
 fn outline(text: &str) -> String {
     fn walk(node: roxmltree::Node<'_, '_>, depth: usize, out: &mut String) {
         let prefix = node.tag_name().namespace().unwrap_or_default();
@@ -41,7 +40,7 @@ fn outline(text: &str) -> String {
     out
 }
 
-/// Truth: ROS's xacro 2.1.1, whose results `tools/xacro_expectations.py` writes beside the files.
+/// Truth: results of ROS's xacro 2.1.1, written next to the files by `tools/xacro_expectations.py`.
 #[track_caller]
 fn assert_as_ros_does(name: &str) {
     let path = data().join(format!("{name}.xacro"));
@@ -114,7 +113,7 @@ fn a_robot_is_read_from_a_xacro_file_with_its_arguments() {
     };
     assert_eq!(com(&ReadOptions::default()), 0.5);
     assert_eq!(com(&with_arguments(&[("length", "3")])), 1.5);
-    // a URDF with xacro in it is the same
+    // A URDF that contains xacro gives the same.
     let text = format!("{HEAD}{body}</robot>");
     assert_eq!(parse_urdf(&text, "robot.urdf", &ReadOptions::default()).unwrap().mechanism.joints.len(), 1);
 
@@ -192,7 +191,7 @@ fn a_file_of_macros_says_which_one_to_call() {
     assert!(error.contains("defines macros and calls none") && error.contains("<xacro:arm_robot"), "{error}");
 }
 
-/// Each of these would take forever, all memory or the stack, were it not bounded.
+/// Without limits each of these would take unlimited time, memory or stack.
 #[test]
 fn a_file_that_never_ends_is_stopped() {
     let doubling: String = (0..60)

@@ -1,5 +1,4 @@
-//! Tokens to expressions: one parser for KRL, RAPID and URScript, which differ in their operators
-//! and aggregates.
+//! Expression parser for KRL, RAPID and URScript, which differ in their operators and aggregates.
 
 use std::rc::Rc;
 
@@ -8,7 +7,7 @@ use super::tree::{Argument, Expr, Kind, Operator};
 use super::value::Value;
 use super::{Result, Span, fail};
 
-/// Whose expressions.
+/// Language of the expressions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Syntax {
     Krl,
@@ -16,7 +15,7 @@ pub(crate) enum Syntax {
     UrScript,
 }
 
-/// Tokens of one file, and how far they are read.
+/// Tokens of one file and the current position.
 pub(crate) struct Parser {
     pub(crate) syntax: Syntax,
     pub(crate) lexemes: Vec<Lexeme>,
@@ -24,10 +23,10 @@ pub(crate) struct Parser {
     depth: usize,
 }
 
-/// Expressions and blocks in each other, at most.
+/// Maximum nesting depth of expressions and blocks.
 pub(crate) const DEEPEST: usize = 48;
 
-/// Operators that follow each other, at most.
+/// Maximum number of consecutive operators.
 const LONGEST: usize = 200;
 
 impl Parser {
@@ -35,12 +34,12 @@ impl Parser {
         Self { syntax, lexemes, at: 0, depth: 0 }
     }
 
-    /// The token that comes next; the last one of a file is a line's end.
+    /// Next token; the last token of a file is a line end.
     pub(crate) fn peek(&self) -> &Token {
         &self.lexeme(0).token
     }
 
-    /// The token after `ahead` others.
+    /// Lexeme `ahead` tokens after the next one.
     pub(crate) fn lexeme(&self, ahead: usize) -> &Lexeme {
         &self.lexemes[(self.at + ahead).min(self.lexemes.len() - 1)]
     }
@@ -49,7 +48,7 @@ impl Parser {
         self.lexeme(0).span
     }
 
-    /// Where the token before ended.
+    /// Span of the previous token.
     pub(crate) fn last_span(&self) -> Span {
         self.lexemes[self.at.saturating_sub(1).min(self.lexemes.len() - 1)].span
     }
@@ -72,7 +71,7 @@ impl Parser {
         matches!(&self.lexeme(ahead).token, Token::Symbol(found) if *found == symbol)
     }
 
-    /// The name that comes next, if one does.
+    /// The next token if it is a name.
     pub(crate) fn word(&self) -> Option<Rc<str>> {
         self.word_ahead(0)
     }
@@ -128,7 +127,7 @@ impl Parser {
         }
     }
 
-    /// What comes next, for messages.
+    /// Description of the next token for messages.
     pub(crate) fn found(&self) -> String {
         match self.peek() {
             Token::Number(value, _) => format!("the number {value}"),
@@ -141,7 +140,7 @@ impl Parser {
         }
     }
 
-    /// Counts what is inside of each other, so that no text can exhaust the stack.
+    /// Limits the nesting depth, so that no text can exhaust the stack.
     pub(crate) fn nested<T>(&mut self, inner: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
         if self.depth >= DEEPEST {
             return fail(
@@ -155,7 +154,7 @@ impl Parser {
         result
     }
 
-    /// An expression.
+    /// Parses an expression.
     pub(crate) fn expression(&mut self) -> Result<Expr> {
         self.nested(|parser| parser.binary(0))
     }
@@ -173,7 +172,7 @@ impl Parser {
         Ok(left)
     }
 
-    /// One more link of a chain, whose tree is as deep as it is long.
+    /// Counts the links of a chain, whose tree is as deep as it is long, and limits their number.
     fn longer(&self, length: usize) -> Result<usize> {
         if length >= LONGEST {
             return fail(
@@ -184,7 +183,7 @@ impl Parser {
         Ok(length + 1)
     }
 
-    /// The operator that comes next, and how strongly it binds.
+    /// Operator that comes next, with its precedence.
     fn operator(&self) -> Option<(Operator, u8)> {
         use Operator::*;
         let (operator, level) = match self.peek() {
@@ -311,7 +310,7 @@ impl Parser {
                 }
                 let end = self.expect_symbol(close)?;
                 let span = inner.span.to(end);
-                // KRL names a whole array by empty brackets.
+                // In KRL empty brackets denote a whole array.
                 inner = if indices.is_empty() {
                     Expr { span, ..inner }
                 } else {
@@ -328,7 +327,7 @@ impl Parser {
         }
     }
 
-    /// `[a, b, c]`.
+    /// Parses `[a, b, c]`.
     fn list(&mut self) -> Result<Vec<Expr>> {
         self.expect_symbol("[")?;
         let mut elements = Vec::new();
@@ -345,14 +344,14 @@ impl Parser {
         Ok(elements)
     }
 
-    /// Within brackets URScript may go on with the next line.
+    /// Skips line ends within brackets, where URScript allows them.
     fn pass_lines(&mut self) {
         while self.syntax == Syntax::UrScript && !self.is_over() && *self.peek() == Token::Line {
             self.advance();
         }
     }
 
-    /// `{X 1, Y 2}` or `{E6POS: X 1, Y 2}`.
+    /// Parses `{X 1, Y 2}` or `{E6POS: X 1, Y 2}`.
     fn record(&mut self) -> Result<Expr> {
         let start = self.expect_symbol("{")?;
         let mut kind: Rc<str> = "".into();
@@ -375,8 +374,8 @@ impl Parser {
         Ok(Expr { kind: Kind::Record(kind, fields), span: start.to(end) })
     }
 
-    /// `(a, b)` with what the language allows: left out values in KRL, `\Name:=value` in RAPID,
-    /// `name=value` in URScript.
+    /// Parses `(a, b)` with the variants of each language: omitted values in KRL, `\Name:=value` in
+    /// RAPID, `name=value` in URScript.
     pub(crate) fn arguments(&mut self) -> Result<Vec<Argument>> {
         self.expect_symbol("(")?;
         let mut arguments = Vec::new();
@@ -416,7 +415,7 @@ impl Parser {
     }
 }
 
-/// KRL's `'HFF'` and `'B101'`.
+/// Parses KRL's `'HFF'` and `'B101'`.
 fn quoted_number(text: &str, span: Span) -> Result<i64> {
     let digits = text.get(1..).unwrap_or_default();
     let number = match text.chars().next() {

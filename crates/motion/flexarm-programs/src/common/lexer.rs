@@ -1,29 +1,29 @@
-//! Text to tokens, for the three languages that have expressions.
+//! Lexer for the three languages with expressions.
 
 use std::rc::Rc;
 
 use super::{Result, Span, fail};
 
-/// How a language writes its tokens.
+/// Lexical rules of a language.
 pub(crate) struct Spelling {
-    /// What starts a comment up to the end of its line.
+    /// Character that starts a comment up to the end of its line.
     pub(crate) comment: char,
-    /// Does a line end a statement?
+    /// Whether a line end terminates a statement.
     pub(crate) lines: bool,
-    /// Upper and lower case are the same; names are told in lower case.
+    /// Whether case is ignored; names are then converted to lower case.
     pub(crate) folds_case: bool,
-    /// Symbols, longer ones before their beginnings.
+    /// Symbols; longer ones precede their prefixes.
     pub(crate) symbols: &'static [&'static str],
-    /// Are `'...'` texts as well (hexadecimal and binary numbers in KRL)?
+    /// Whether `'...'` are texts as well (hexadecimal and binary numbers in KRL).
     pub(crate) apostrophes: bool,
-    /// May a quote stand in a text, written twice?
+    /// Whether a quote within a text is written twice.
     pub(crate) doubled_quotes: bool,
 }
 
 /// A token.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Token {
-    /// Value, and whether it was written without point and exponent.
+    /// Value, and whether it was written without decimal point and exponent.
     Number(f64, bool),
     Name(Rc<str>),
     Text(Rc<str>),
@@ -33,15 +33,15 @@ pub(crate) enum Token {
     Line,
 }
 
-/// A token and where it stands.
+/// A token and its place.
 #[derive(Debug, Clone)]
 pub(crate) struct Lexeme {
     pub(crate) token: Token,
     pub(crate) span: Span,
 }
 
-/// The tokens of a text. What cannot be a token is an error only where a statement uses it, so it
-/// is given as a name.
+/// Returns the tokens of a text. An invalid character is an error only where a statement uses it,
+/// so it is returned as a name.
 pub(crate) fn tokens(text: &str, file: usize, spelling: &Spelling) -> Result<Vec<Lexeme>> {
     let mut found: Vec<Lexeme> = Vec::with_capacity(text.len() / 5);
     let bytes = text.as_bytes();
@@ -107,7 +107,7 @@ fn is_name(c: char) -> bool {
     c.is_alphabetic() || c == '_' || c == '$'
 }
 
-/// Bytes of a text with its quotes, which ends on its line.
+/// Length in bytes of a quoted text including its quotes; it must end on its line.
 fn text_length(rest: &str, quote: char, doubled: bool) -> Option<usize> {
     let mut characters = rest.char_indices().skip(1).peekable();
     while let Some((at, c)) = characters.next() {
@@ -125,7 +125,7 @@ fn text_length(rest: &str, quote: char, doubled: bool) -> Option<usize> {
     None
 }
 
-/// Bytes of a number without sign.
+/// Length in bytes of a number without sign.
 fn number_length(rest: &str) -> usize {
     let bytes = rest.as_bytes();
     let digits = |mut at: usize| {

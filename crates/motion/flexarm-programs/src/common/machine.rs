@@ -1,8 +1,9 @@
-//! Runs a program: variables, expressions, branches, loops and calls. What a language does with its
-//! own words is its [`Dialect`]'s matter.
+//! Interpreter of programs: variables, expressions, branches, loops and calls. The instructions of
+//! a language are in its [`Dialect`].
 //!
-//! A value that only the controller knows (an input, a measured position) goes through expressions
-//! and variables as [`Value::Outside`]; it is an error where a move, a branch or a loop needs it.
+//! A value that only the controller knows (an input, a measured position) passes through
+//! expressions and variables as [`Value::Outside`]; it is an error where a move, a branch or a loop
+//! needs it.
 
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -12,21 +13,21 @@ use super::tree::{Action, Argument, Expr, Kind, Operator, Routine, Statement};
 use super::value::{Record, Value, depends};
 use super::{Fail, Result, Span, fail};
 
-/// What is a language's own.
+/// Language-specific part of the interpreter.
 pub(crate) trait Dialect: Sized {
     /// First index of a list.
     const FIRST_INDEX: i64;
 
-    /// A name that is no variable.
+    /// Value of a name that is not a variable.
     fn name(machine: &mut Machine<Self>, name: &str, span: Span) -> Result<Value>;
 
-    /// A function that is not of the file.
+    /// Calls a function that is not defined in the file.
     fn function(machine: &mut Machine<Self>, name: &str, arguments: &[Argument], span: Span) -> Result<Value>;
 
-    /// An instruction that is no routine of the file.
+    /// Runs an instruction that is not a routine of the file.
     fn instruction(machine: &mut Machine<Self>, name: &str, arguments: &[Argument], span: Span) -> Result<Flow>;
 
-    /// Statements that a word holds together.
+    /// Runs a block of statements with a keyword.
     fn block(
         machine: &mut Machine<Self>,
         name: &str,
@@ -35,29 +36,29 @@ pub(crate) trait Dialect: Sized {
         span: Span,
     ) -> Result<Flow>;
 
-    /// May a variable that was not declared be assigned? A note may be made of it; `false`: the
-    /// assignment has no effect.
+    /// Whether an undeclared variable may be assigned; may add a note. `false`: the assignment has
+    /// no effect.
     fn undeclared(machine: &mut Machine<Self>, name: &str, span: Span) -> Result<bool>;
 
-    /// A value for a variable or parameter of a type.
+    /// Converts a value to the type of a variable or parameter.
     fn coerce(machine: &mut Machine<Self>, kind: &str, value: Value, span: Span) -> Result<Value>;
 
-    /// Operators on values of the language's own types; `None`: none of them.
+    /// Applies an operator to values of the language's own types; `None` if it does not apply.
     fn binary(operator: Operator, left: &Value, right: &Value, span: Span) -> Option<Result<Value>>;
 
-    /// Does the instruction wait for a time?
+    /// Whether the instruction waits for a given time.
     fn takes_time(name: &str) -> bool {
         matches!(name, "waittime" | "wait sec" | "sleep")
     }
 
-    /// Has the instruction no effect on the motion?
+    /// Whether the instruction has no effect on the motion.
     fn is_still(name: &str) -> bool;
 }
 
 /// A variable.
 #[derive(Debug, Clone)]
 pub(crate) struct Variable {
-    /// Where the literal stands that it has its value from, as long as nothing else has changed it.
+    /// Span of the literal that gave the value, as long as nothing else has changed it.
     origin: Option<Span>,
     pub(crate) value: Value,
     pub(crate) kind: Rc<str>,
@@ -65,7 +66,7 @@ pub(crate) struct Variable {
 
 type Variables = HashMap<Rc<str>, Variable>;
 
-/// How a statement ends.
+/// Control flow after a statement.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Flow {
     On,
@@ -75,22 +76,22 @@ pub(crate) enum Flow {
     Halt,
 }
 
-/// A program while it is run.
+/// State of a running program.
 pub(crate) struct Machine<'a, D> {
     pub(crate) recorder: Recorder<'a>,
     pub(crate) dialect: D,
     pub(crate) globals: Variables,
     locals: Vec<Variables>,
     pub(crate) routines: HashMap<Rc<str>, Rc<Routine>>,
-    /// How often a variable got another value: globals, then by scope.
+    /// Numbers of assignments to variables: globals, then by scope.
     changes: Vec<usize>,
     steps: usize,
     depth: usize,
 }
 
-/// Routines, blocks and loops inside of each other, at most.
+/// Maximum nesting depth of routines, blocks and loops.
 const DEEPEST: usize = 120;
-/// Values of one variable, at most.
+/// Maximum number of values in one variable.
 const LARGEST: usize = 200_000;
 
 /// One step from a variable to a part of it.
@@ -113,7 +114,7 @@ impl<'a, D: Dialect> Machine<'a, D> {
         self.globals.get(name).map(|variable| &variable.value)
     }
 
-    /// Statements one after the other.
+    /// Runs statements in sequence.
     pub(crate) fn run(&mut self, statements: &[Statement]) -> Result<Flow> {
         for statement in statements {
             let flow = self.statement(statement)?;
@@ -124,7 +125,7 @@ impl<'a, D: Dialect> Machine<'a, D> {
         Ok(Flow::On)
     }
 
-    /// One more block inside of those that run.
+    /// Runs a nested block and limits the depth.
     pub(crate) fn nested<T>(&mut self, span: Span, inner: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
         if self.depth >= DEEPEST {
             return fail(
@@ -217,7 +218,7 @@ impl<'a, D: Dialect> Machine<'a, D> {
         Ok(())
     }
 
-    /// An array of values that were not set.
+    /// Creates an array of unset values.
     fn array(&mut self, kind: &str, sizes: &[Expr], span: Span) -> Result<Value> {
         let mut value = D::coerce(self, kind, Value::Nothing, span)?;
         for size in sizes.iter().rev() {
@@ -234,7 +235,7 @@ impl<'a, D: Dialect> Machine<'a, D> {
         Ok(value)
     }
 
-    /// A value of a type, or a list of them.
+    /// Converts a value, or a list of values, to a type.
     fn fit(&mut self, kind: &str, value: Value, span: Span) -> Result<Value> {
         if kind.is_empty() || matches!(value, Value::Outside(_)) {
             return Ok(value);
@@ -266,7 +267,7 @@ impl<'a, D: Dialect> Machine<'a, D> {
         self.nested(span, |machine| machine.run(otherwise))
     }
 
-    /// Do the statements leave the motion alone, whether they run or not?
+    /// Whether the statements have no effect on the motion, whether they run or not.
     fn is_still(&self, body: &[Statement]) -> bool {
         body.iter().all(|statement| match &statement.action {
             Action::Still(_) => true,
@@ -286,7 +287,7 @@ impl<'a, D: Dialect> Machine<'a, D> {
         })
     }
 
-    /// Variables that statements may have set are known to the controller alone.
+    /// Marks variables that the statements may have set as known only to the controller.
     fn forget(&mut self, body: &[Statement], what: &Rc<str>) {
         for statement in body {
             match &statement.action {
@@ -327,7 +328,7 @@ impl<'a, D: Dialect> Machine<'a, D> {
                 Flow::On | Flow::Again => {}
                 out => return Ok(out),
             }
-            // What changed nothing does the same in each pass.
+            // A pass without a change of variables repeats identically.
             idle = before == self.visible_changes();
             if idle {
                 self.check_endless(span)?;
@@ -380,7 +381,7 @@ impl<'a, D: Dialect> Machine<'a, D> {
         }
         let [from, to, mut step] = numbers;
         if D::FIRST_INDEX == 1 && range[2].is_none() && !whole && to < from {
-            step = -1.0; // RAPID counts downwards by itself
+            step = -1.0; // RAPID counts downwards automatically
         }
         if step == 0.0 {
             return fail(span, "the step of this loop is 0, so it does not end: give another step");
@@ -428,7 +429,7 @@ impl<'a, D: Dialect> Machine<'a, D> {
         }
     }
 
-    /// Runs a routine; what it returns is in [`Flow::Return`].
+    /// Runs a routine; its return value is in [`Flow::Return`].
     pub(crate) fn invoke(&mut self, routine: &Rc<Routine>, arguments: &[Argument], span: Span) -> Result<Flow> {
         let mut scope = Variables::new();
         let mut returned: Vec<(Rc<str>, Expr)> = Vec::new();
@@ -482,7 +483,7 @@ impl<'a, D: Dialect> Machine<'a, D> {
         Ok(flow)
     }
 
-    /// Was the argument of a routine given (RAPID's `Present`)?
+    /// Whether an argument of the current routine was given (RAPID's `Present`).
     pub(crate) fn is_given(&self, name: &str) -> bool {
         self.locals.last().is_some_and(|scope| scope.contains_key(name))
     }
@@ -496,12 +497,12 @@ impl<'a, D: Dialect> Machine<'a, D> {
         self.globals.get_mut(name)
     }
 
-    /// Is there such a variable?
+    /// Whether a variable of this name exists.
     pub(crate) fn is_variable(&self, name: &str) -> bool {
         self.locals.last().is_some_and(|scope| scope.contains_key(name)) || self.globals.contains_key(name)
     }
 
-    /// Counts a change of a variable, by where it lives.
+    /// Counts a change of a variable at the level of its scope.
     fn changed(&mut self, name: &str) {
         let is_local = self.locals.last().is_some_and(|scope| scope.contains_key(name));
         let level = if is_local { self.locals.len() } else { 0 };
@@ -511,7 +512,7 @@ impl<'a, D: Dialect> Machine<'a, D> {
         self.changes[level] += 1;
     }
 
-    /// Changes of the variables that are seen here.
+    /// Number of changes of the variables visible here.
     fn visible_changes(&self) -> usize {
         let local = self.changes.get(self.locals.len()).copied().unwrap_or(0);
         if self.locals.is_empty() { self.changes[0] } else { self.changes[0] + local }
@@ -552,7 +553,7 @@ impl<'a, D: Dialect> Machine<'a, D> {
         }
         let only_indices = parts.iter().all(|part| matches!(part, Part::Index(_)));
         let value = if only_indices {
-            // Each index takes one dimension of an array's type away.
+            // Each index removes one dimension from an array's type.
             let element = parts.iter().fold(&*kind, |kind, _| kind.strip_suffix("{}").unwrap_or(kind));
             self.fit(element, value, place.span)?
         } else {
@@ -583,7 +584,7 @@ impl<'a, D: Dialect> Machine<'a, D> {
         Ok(())
     }
 
-    /// The number of a pose that a place names (`p[2]`).
+    /// Number within a pose that a place refers to (`p[2]`).
     fn number_of_pose(&mut self, name: &str, parts: &[Part], span: Span) -> Result<Option<&mut f64>> {
         let Some((Part::Index(at), parts)) = parts.split_last() else { return Ok(None) };
         let index = usize::try_from(at - D::FIRST_INDEX).unwrap_or(usize::MAX);
@@ -599,7 +600,7 @@ impl<'a, D: Dialect> Machine<'a, D> {
         }
     }
 
-    /// The variable of a place, and the way from it to the part that is meant.
+    /// Variable of a place and the path from it to the part.
     fn parts(&mut self, place: &Expr, parts: &mut Vec<Part>) -> Result<Rc<str>> {
         match &place.kind {
             Kind::Name(name) => Ok(name.clone()),
@@ -619,7 +620,7 @@ impl<'a, D: Dialect> Machine<'a, D> {
         }
     }
 
-    /// The value of an expression.
+    /// Evaluates an expression.
     pub(crate) fn value(&mut self, expression: &Expr) -> Result<Value> {
         let span = expression.span;
         match &expression.kind {
@@ -727,7 +728,7 @@ impl<'a, D: Dialect> Machine<'a, D> {
 
     fn binary(&mut self, operator: Operator, left: &Expr, right: &Expr, span: Span) -> Result<Value> {
         let a = self.value(left)?;
-        // What decides alone is not asked further.
+        // Short-circuit evaluation.
         match (operator, &a) {
             (Operator::And, Value::Flag(false)) => return Ok(Value::Flag(false)),
             (Operator::Or, Value::Flag(true)) => return Ok(Value::Flag(true)),
@@ -746,8 +747,8 @@ impl<'a, D: Dialect> Machine<'a, D> {
         combine(operator, &a, &b, [left.span, right.span], span)
     }
 
-    /// Where the literal stands that an expression has its value from: itself, or what was assigned
-    /// to a variable.
+    /// Span of the literal from which the value of an expression comes: the expression itself, or
+    /// the literal assigned to a variable.
     pub(crate) fn origin(&mut self, expression: &Expr) -> Option<Span> {
         match &expression.kind {
             Kind::Record(..) | Kind::List(_) => Some(expression.span),
@@ -756,12 +757,12 @@ impl<'a, D: Dialect> Machine<'a, D> {
         }
     }
 
-    /// As [`Machine::origin`], of an argument.
+    /// [`Machine::origin`] of an argument.
     pub(crate) fn argument_origin(&mut self, arguments: &[Argument], position: usize) -> Option<Span> {
         self.origin(positional(arguments, position)?)
     }
 
-    /// Value of an argument, or an error that says that it is missing.
+    /// Value of an argument, or an error if it is missing.
     pub(crate) fn argument(&mut self, arguments: &[Argument], position: usize, span: Span) -> Result<(Value, Span)> {
         match positional(arguments, position) {
             Some(expression) => Ok((self.value(expression)?, expression.span)),
@@ -769,13 +770,13 @@ impl<'a, D: Dialect> Machine<'a, D> {
         }
     }
 
-    /// Number of an argument.
+    /// Numeric value of an argument.
     pub(crate) fn number(&mut self, arguments: &[Argument], position: usize, span: Span) -> Result<f64> {
         let (value, at) = self.argument(arguments, position, span)?;
         value.number(at)
     }
 
-    /// Value of an argument that is called by its name, if it is there.
+    /// Value of a named argument, if it is present.
     pub(crate) fn named(&mut self, arguments: &[Argument], name: &str) -> Result<Option<(Value, Span)>> {
         match arguments.iter().find(|argument| argument.name.as_deref() == Some(name)) {
             Some(Argument { value: Some(value), .. }) => Ok(Some((self.value(value)?, value.span))),
@@ -785,12 +786,12 @@ impl<'a, D: Dialect> Machine<'a, D> {
     }
 }
 
-/// The argument at a position among those without names.
+/// The unnamed argument at a position.
 pub(crate) fn positional(arguments: &[Argument], position: usize) -> Option<&Expr> {
     arguments.iter().filter(|argument| argument.name.is_none()).nth(position)?.value.as_ref()
 }
 
-/// The variable of which an expression is a part.
+/// Variable that an expression is part of.
 fn root_name(place: &Expr) -> Option<&Rc<str>> {
     match &place.kind {
         Kind::Name(name) => Some(name),
@@ -799,7 +800,7 @@ fn root_name(place: &Expr) -> Option<&Rc<str>> {
     }
 }
 
-/// Is there a way out of an endless loop?
+/// Whether an endless loop contains an exit.
 fn can_end(body: &[Statement]) -> bool {
     body.iter().any(|statement| match &statement.action {
         Action::Leave | Action::Return(_) | Action::Halt => true,
@@ -810,7 +811,7 @@ fn can_end(body: &[Statement]) -> bool {
     })
 }
 
-/// A part of a value that is about to be set; records and lists grow.
+/// Mutable reference to a part of a value; records and lists grow as needed.
 fn part_of<'v>(value: &'v mut Value, part: &Part, first: i64, span: Span) -> Result<&'v mut Value> {
     if let Value::Outside(what) = value {
         return fail(span, depends(what));
@@ -875,11 +876,11 @@ fn read_field(value: Value, field: &str, base: Span, span: Span) -> Result<Value
     }
 }
 
-/// Are two values the same?
+/// Whether two values are equal.
 pub(crate) fn equal(a: &Value, b: &Value) -> bool {
     match (a, b) {
         (Value::Whole(a), Value::Number(b)) | (Value::Number(b), Value::Whole(a)) => *a as f64 == *b,
-        // RAPID compares aggregates, which may be typed on one side only.
+        // RAPID compares aggregates of which only one may be typed.
         (Value::Record(record), Value::List(values)) | (Value::List(values), Value::Record(record)) => {
             record.fields.len() == values.len()
                 && record.fields.iter().zip(values.iter()).all(|((_, a), b)| equal(a, b))
@@ -889,7 +890,7 @@ pub(crate) fn equal(a: &Value, b: &Value) -> bool {
     }
 }
 
-/// Operators on numbers, truth values and texts.
+/// Applies an operator to numbers, truth values or texts.
 fn combine(operator: Operator, a: &Value, b: &Value, sides: [Span; 2], span: Span) -> Result<Value> {
     use Operator::*;
     match operator {
@@ -931,7 +932,7 @@ fn combine(operator: Operator, a: &Value, b: &Value, sides: [Span; 2], span: Spa
     Ok(Value::Number(number))
 }
 
-/// Whole numbers stay whole; `None` where they are compared.
+/// Integer arithmetic; `None` for other operators.
 fn combine_whole(operator: Operator, a: i64, b: i64, span: Span) -> Option<Result<Value>> {
     use Operator::*;
     let result = match operator {

@@ -1,5 +1,5 @@
-//! What the languages have in common: tokens, expressions, statements, the machine that runs them,
-//! frames, and the recorder of moves and notes.
+//! Parts shared by the languages: tokens, expressions, statements, the interpreter, frames, and the
+//! recorder of moves and notes.
 
 pub(crate) mod expressions;
 pub(crate) mod frames;
@@ -11,7 +11,7 @@ pub(crate) mod value;
 
 use std::rc::Rc;
 
-/// A place in one of the files of a program, in bytes.
+/// Byte range in one of the files of a program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Span {
     pub(crate) file: usize,
@@ -20,13 +20,13 @@ pub(crate) struct Span {
 }
 
 impl Span {
-    /// From the start of this one to the end of the other.
+    /// Span from the start of this one to the end of the other.
     pub(crate) fn to(self, other: Self) -> Self {
         Self { end: other.end.max(self.end), ..self }
     }
 }
 
-/// What is wrong, and where.
+/// An error and its place.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Fail {
     pub(crate) span: Span,
@@ -35,7 +35,7 @@ pub(crate) struct Fail {
 
 pub(crate) type Result<T> = std::result::Result<T, Fail>;
 
-/// The error of a reader at a place.
+/// Returns an error at a place.
 pub(crate) fn fail<T>(span: Span, message: impl Into<String>) -> Result<T> {
     Err(Fail { span, message: message.into() })
 }
@@ -45,7 +45,7 @@ pub(crate) fn fail<T>(span: Span, message: impl Into<String>) -> Result<T> {
 pub(crate) struct Text {
     pub(crate) path: std::path::PathBuf,
     pub(crate) text: Rc<str>,
-    /// Where each line starts.
+    /// Start of each line.
     lines: Vec<usize>,
 }
 
@@ -55,12 +55,12 @@ impl Text {
         Self { path: path.to_owned(), text: text.into(), lines }
     }
 
-    /// Line of a place, from 1.
+    /// Line of a byte offset, from 1.
     pub(crate) fn line(&self, at: usize) -> usize {
         self.lines.partition_point(|&start| start <= at)
     }
 
-    /// What stands at a place, on one line and not longer than a message bears.
+    /// Text of a span, on one line and shortened for messages.
     pub(crate) fn excerpt(&self, span: Span) -> String {
         let text = self.text.get(span.start..span.end).unwrap_or_default();
         let mut words = text.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -71,5 +71,5 @@ impl Text {
     }
 }
 
-/// Characters of a statement in a message or a move.
+/// Maximum number of characters of a statement in a message or a move.
 const LONGEST_EXCERPT: usize = 100;

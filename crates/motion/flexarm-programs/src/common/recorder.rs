@@ -1,4 +1,4 @@
-//! What a program did so far: its moves, its notes, and where the robot is by them.
+//! Recorder of a running program: its moves, its notes, and the resulting position of the robot.
 
 use flexarm_path::program::{Blend, Item, Move, MoveKind, Note, Program, Target};
 use flexarm_spatial::Pose;
@@ -6,37 +6,36 @@ use flexarm_spatial::Pose;
 use super::{Fail, Result, Span, Text, fail};
 use crate::ReadOptions;
 
-/// Collects what a program does.
+/// Collects the moves and notes of a program.
 pub(crate) struct Recorder<'a> {
     pub(crate) options: &'a ReadOptions<'a>,
     pub(crate) texts: Vec<Text>,
     pub(crate) items: Vec<Item>,
-    /// Of each item, where the literals of its target and of the auxiliary point of its circle
-    /// stand.
+    /// Spans of the literals of each item's target and auxiliary point.
     sources: Vec<Sources>,
-    /// The same of the next move.
+    /// The same for the next move.
     pub(crate) next: Sources,
     notes: Vec<Told>,
     moves: usize,
-    /// Values of external axes, and where they were told first.
+    /// Values of external axes, and the lines where they were first given.
     external: [Option<(f64, usize)>; 6],
     place: Place,
 }
 
-/// Where the literals stand that a move has its target and the auxiliary point of its circle from.
+/// Spans of the literals of a move's target and of the auxiliary point of its circle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Sources {
     pub(crate) target: Option<Span>,
     pub(crate) via: Option<Span>,
 }
 
-/// A program with the places of its targets, item by item.
+/// A program with the places of its targets, by item.
 pub(crate) struct Recorded {
     pub(crate) program: Program,
     pub(crate) sources: Vec<Sources>,
 }
 
-/// A note that is told once, with all its lines.
+/// A note that is given once, with all its lines.
 struct Told {
     text: String,
     file: usize,
@@ -44,13 +43,13 @@ struct Told {
     times: usize,
 }
 
-/// Lines that a note names.
+/// Maximum number of lines listed in a note.
 const LINES_OF_A_NOTE: usize = 8;
 
-/// Where the robot is by the moves so far.
+/// Position of the robot after the moves so far.
 #[allow(clippy::large_enum_variant, reason = "there is one of it")]
 enum Place {
-    /// A move ended where only kinematics knows, or none was made.
+    /// No move was made, or its end is known only from kinematics.
     Unknown,
     Joints(Vec<f64>),
     Tool {
@@ -84,7 +83,7 @@ impl<'a> Recorder<'a> {
         self.texts[span.file].excerpt(span)
     }
 
-    /// Something that the user should know, told once with its lines.
+    /// Adds a note for the user; repeated notes only add their line.
     pub(crate) fn note(&mut self, text: &str, span: Span) {
         let line = self.line(span);
         match self.notes.iter_mut().find(|told| told.text == text && told.file == span.file) {
@@ -100,14 +99,15 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Something that is true of the program as a whole.
+    /// Adds a note about the program as a whole.
     pub(crate) fn note_all(&mut self, text: &str) {
         if !self.notes.iter().any(|told| told.text == text) {
             self.notes.push(Told { text: text.to_owned(), file: 0, lines: Vec::new(), times: 0 });
         }
     }
 
-    /// Tells which files were read beside the program; the last text is what was given.
+    /// Notes which files were read in addition to the program; the last text holds the given
+    /// values.
     pub(crate) fn note_files(&mut self) {
         let files = &self.texts[1..self.texts.len().max(2) - 1];
         if !files.is_empty() {
@@ -116,7 +116,7 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// The robot stands still.
+    /// Adds a dwell.
     pub(crate) fn dwell(&mut self, seconds: f64, span: Span) -> Result<()> {
         let item = Item::Dwell { line: self.line(span), seconds };
         item.check().or_else(|error| fail(span, error.to_string()))?;
@@ -129,7 +129,7 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// The last move stops at its end.
+    /// Makes the last move stop at its end.
     pub(crate) fn stop(&mut self) {
         for item in self.items.iter_mut().rev() {
             if let Item::Move(last) = item {
@@ -148,7 +148,7 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// A move, whose `line` and `statement` are set from its place.
+    /// Adds a move, whose `line` and `statement` are set from its span.
     pub(crate) fn add(&mut self, mut step: Move, span: Span) -> Result<()> {
         self.count(span)?;
         step.check().or_else(|error| fail(span, error.to_string()))?;
@@ -172,12 +172,12 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// The robot ended where `X_BT` says, whatever its last target was.
+    /// Sets the position to `X_BT`, regardless of the last target.
     pub(crate) fn now_at(&mut self, X_WB: Pose, X_FT: Option<Pose>, X_BT: Pose) {
         self.place = Place::Tool { X_WB, X_FT, X_BT };
     }
 
-    /// External axes as a target tells them (`None`: not told); they must stay.
+    /// Checks the external axes of a target (`None`: not given); they must not move.
     pub(crate) fn external_axes(&mut self, values: [Option<f64>; 6], span: Span) -> Result<()> {
         let line = self.line(span);
         for (k, (value, before)) in values.iter().zip(&mut self.external).enumerate() {
@@ -205,7 +205,7 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Joint values where the last move ended, if it was told in joint values.
+    /// Joint values at the end of the last move, if its target was given in joint values.
     pub(crate) fn joints(&self) -> Option<&[f64]> {
         match &self.place {
             Place::Joints(joints) => Some(joints),
@@ -213,7 +213,7 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Pose `X_BT` of a tool in a base where the last move ended.
+    /// Pose `X_BT` of a tool in a base at the end of the last move.
     pub(crate) fn pose(&self, X_WB: &Pose, X_FT: &Option<Pose>, span: Span) -> Result<Pose> {
         let unknown = |why: &str| Fail {
             span,
@@ -236,7 +236,7 @@ impl<'a> Recorder<'a> {
             }
             Place::Tool { X_WB: X_WB0, X_FT: X_FT0, X_BT: X_B0T0 } => {
                 if X_FT0 == X_FT {
-                    // The same frames: no rounding.
+                    // The frames are unchanged, which avoids rounding.
                     return Ok(if X_WB0 == X_WB { *X_B0T0 } else { X_WB.inverse() * X_WB0 * X_B0T0 });
                 }
                 let tools = self.tool(X_FT0).zip(self.tool(X_FT));
@@ -247,18 +247,18 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Tool on the flange; the robot's own where the program tells none.
+    /// Tool on the flange; the robot's own tool if the program gives none.
     fn tool(&self, X_FT: &Option<Pose>) -> Option<Pose> {
         X_FT.or(self.options.own_tool)
     }
 
-    /// Pose of the tool for joint values, if the robot's kinematics were given.
+    /// Tool pose for joint values, if the robot's kinematics are given.
     pub(crate) fn forward(&self, joints: &[f64], X_FT: &Option<Pose>) -> Option<Pose> {
         let forward = self.options.forward?;
         Some(forward(joints)? * self.tool(X_FT)?)
     }
 
-    /// The program.
+    /// Returns the recorded program.
     pub(crate) fn finish(mut self, name: &str) -> Recorded {
         self.notes.sort_by_key(|told| (told.file, told.lines.first().copied().unwrap_or(0)));
         let texts = &self.texts;

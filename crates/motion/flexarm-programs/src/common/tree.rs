@@ -1,18 +1,18 @@
-//! Programs as trees: expressions, statements, routines.
+//! Syntax trees: expressions, statements, routines.
 
 use std::rc::Rc;
 
 use super::Span;
 use super::value::Value;
 
-/// An expression and where it stands.
+/// An expression and its place.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Expr {
     pub(crate) kind: Kind,
     pub(crate) span: Span,
 }
 
-/// What an expression is.
+/// Kind of expression.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Kind {
     Literal(Value),
@@ -30,7 +30,7 @@ pub(crate) enum Kind {
     Pose(Vec<Expr>),
 }
 
-/// Operators of two sides.
+/// Binary operators.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Operator {
     Add,
@@ -52,7 +52,7 @@ pub(crate) enum Operator {
     BitAnd,
     BitOr,
     BitEither,
-    /// KRL's `:`, the frame on the right seen from the frame on the left.
+    /// KRL's `:`, the frame on the right relative to the frame on the left.
     Frame,
 }
 
@@ -64,14 +64,14 @@ pub(crate) struct Argument {
     pub(crate) span: Span,
 }
 
-/// A statement and where it stands.
+/// A statement and its place.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Statement {
     pub(crate) action: Action,
     pub(crate) span: Span,
 }
 
-/// What a statement does.
+/// Action of a statement.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Action {
     Declare {
@@ -113,22 +113,22 @@ pub(crate) enum Action {
         name: Rc<str>,
         arguments: Vec<Argument>,
     },
-    /// Statements that a word holds together (KRL's SPLINE).
+    /// Block of statements with a keyword (KRL's SPLINE).
     Block {
         name: Rc<str>,
         arguments: Vec<Argument>,
         body: Vec<Statement>,
     },
     Return(Option<Expr>),
-    /// The innermost loop ends.
+    /// Leaves the innermost loop.
     Leave,
-    /// The innermost loop begins its next pass.
+    /// Continues with the next pass of the innermost loop.
     Again,
-    /// The program ends.
+    /// Ends the program.
     Halt,
-    /// No effect on the motion; the words say what it is ("outputs are set").
+    /// No effect on the motion; the text describes it ("outputs are set").
     Still(&'static str),
-    /// Cannot be done; said only if it is reached.
+    /// Unsupported; an error only if it is reached.
     Refused(String),
 }
 
@@ -137,9 +137,9 @@ pub(crate) enum Action {
 pub(crate) struct Parameter {
     pub(crate) name: Rc<str>,
     pub(crate) kind: Rc<str>,
-    /// Changes are seen by the caller.
+    /// Whether changes are visible to the caller.
     pub(crate) returned: bool,
-    /// May be left out; called by its name where the language says so (`\name`).
+    /// Whether it may be omitted; then given by name if the language does so (`\name`).
     pub(crate) optional: bool,
     pub(crate) default: Option<Expr>,
 }

@@ -7,22 +7,22 @@ use super::{Result, Span, fail};
 /// A value of a language.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Value {
-    /// KRL's INT, which divides without a remainder.
+    /// KRL's INT, with integer division.
     Whole(i64),
     Number(f64),
     Flag(bool),
     Text(Rc<str>),
-    /// A word of an enumeration (`#BASE`), or of the language (`\Off`).
+    /// Enumeration value (`#BASE`) or keyword (`\Off`).
     Word(Rc<str>),
-    /// Elements; those that were never set are [`Value::Nothing`].
+    /// Elements; unset ones are [`Value::Nothing`].
     List(Rc<Vec<Value>>),
     Record(Rc<Record>),
     /// `p[x, y, z, rx, ry, rz]`, m and rad.
     Pose([f64; 6]),
-    /// Joint values that stand for a pose (`get_inverse_kin`): the pose and joint values near which
-    /// they are.
+    /// Joint values of a pose (`get_inverse_kin`): the pose and the joint values near which they
+    /// are.
     Inverse(Box<([f64; 6], Option<Vec<f64>>)>),
-    /// What only the controller knows, and what was made of it.
+    /// Value known only to the controller, or computed from one.
     Outside(Rc<str>),
     /// No value yet.
     Nothing,
@@ -31,7 +31,7 @@ pub(crate) enum Value {
 /// Named values.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Record {
-    /// Type in its language; empty where it is not told.
+    /// Type name in the language; empty if not given.
     pub(crate) kind: Rc<str>,
     pub(crate) fields: Vec<(Rc<str>, Value)>,
 }
@@ -66,7 +66,7 @@ impl Value {
         Self::Record(Rc::new(Record::new(kind, fields)))
     }
 
-    /// What it is, for messages.
+    /// Description of the kind of value, for messages.
     pub(crate) fn kind(&self) -> &str {
         match self {
             Self::Whole(_) | Self::Number(_) => "a number",
@@ -83,7 +83,7 @@ impl Value {
         }
     }
 
-    /// The value, or an error if only the controller knows it or it was never set.
+    /// Returns the value, or an error if only the controller knows it or it was never set.
     pub(crate) fn known(self, span: Span) -> Result<Self> {
         match self {
             Self::Outside(what) => fail(span, depends(&what)),
@@ -105,7 +105,7 @@ impl Value {
         }
     }
 
-    /// A number that counts.
+    /// An integer value.
     pub(crate) fn count(&self, span: Span) -> Result<i64> {
         let number = self.number(span)?;
         if number.fract() != 0.0 || number.abs() > 1e9 {
@@ -124,7 +124,7 @@ impl Value {
         }
     }
 
-    /// Numbers of a list.
+    /// Numbers of a list or pose.
     pub(crate) fn numbers(&self, span: Span) -> Result<Vec<f64>> {
         match self {
             Self::List(values) => values.iter().map(|value| value.number(span)).collect(),
@@ -136,7 +136,7 @@ impl Value {
         }
     }
 
-    /// How many values it holds; bounded, so that a program cannot fill the memory.
+    /// Number of values contained; limited so that a program cannot exhaust the memory.
     pub(crate) fn size(&self) -> usize {
         match self {
             Self::List(values) => values.iter().map(Self::size).fold(1, usize::saturating_add),
@@ -147,7 +147,7 @@ impl Value {
     }
 }
 
-/// What is said where a value is needed that only the controller knows.
+/// Message for a required value that only the controller knows.
 pub(crate) fn depends(what: &str) -> String {
     format!(
         "depends on {what}, which only the controller knows: write a value in its place, or give it as an option (`given`)"

@@ -1,4 +1,4 @@
-//! G2 and G3: arcs in the three planes, from centres or radii, whole circles and helices.
+//! G2 and G3: arcs in the three planes, given by centres or radii, full circles and helices.
 
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
@@ -9,7 +9,8 @@ use nalgebra::Vector3;
 use super::{Gcode, Motion};
 use crate::common::{Result, Span, fail};
 
-/// The plane of an arc; its first axis turns counterclockwise to its second, seen from its third.
+/// Plane of an arc; the sense from the first to the second axis is counterclockwise viewed from the
+/// third.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Plane {
     XY,
@@ -28,7 +29,7 @@ impl Plane {
     }
 }
 
-/// Start and end on a circle, perhaps rising along its axis.
+/// Arc of a circle, optionally with a rise along its axis.
 #[derive(Debug, Clone, Copy)]
 struct Helix {
     plane: Plane,
@@ -42,7 +43,7 @@ struct Helix {
 }
 
 impl Helix {
-    /// The point at a part of the way, 0 to 1.
+    /// Point at a fraction of the arc, 0 to 1.
     fn at(&self, part: f64) -> Vector3<f64> {
         let [u, v, w] = self.plane.axes();
         let (sin, cos) = (self.from + self.angle * part).sin_cos();
@@ -53,7 +54,8 @@ impl Helix {
         p
     }
 
-    /// How far the circle through three points of a piece is from the helix, at most (m).
+    /// Maximum distance between a piece of the helix and the circle through three of its points
+    /// (m).
     fn distance_of_piece(&self, from: f64, to: f64) -> f64 {
         let at = |part: f64| self.at(from + (to - from) * part);
         let Some(circle) = crate::common::frames::Circle::through(at(0.0), at(0.5), at(1.0)) else {
@@ -73,7 +75,7 @@ impl Helix {
 type Values = HashMap<char, (f64, Span)>;
 
 impl Gcode<'_> {
-    /// An arc from where the tool is.
+    /// Adds an arc from the current position.
     pub(super) fn arc(
         &mut self,
         motion: Motion,
@@ -119,7 +121,7 @@ impl Gcode<'_> {
         Ok([start[u] + told(u).unwrap_or(0.0), start[v] + told(v).unwrap_or(0.0)])
     }
 
-    /// Centre in the plane from R: the shorter arc, for a negative R the longer one.
+    /// Centre in the plane from R: the shorter arc, or the longer one for a negative R.
     fn centre_of_radius(
         &self,
         motion: Motion,
@@ -148,7 +150,7 @@ impl Gcode<'_> {
             );
         }
         let height = (radius * radius - half * half).max(0.0).sqrt();
-        // Left of the way for a short counterclockwise arc.
+        // Left of the chord for a short counterclockwise arc.
         let side = if (motion == Motion::Counterclockwise) == (radius > 0.0) { height } else { -height };
         Ok([start[u] + du / 2.0 - dv / chord * side, start[v] + dv / 2.0 + du / chord * side])
     }
@@ -189,8 +191,8 @@ impl Gcode<'_> {
         Ok(Helix { plane: self.plane, centre, radius, from, angle, start: start[w], rise: goal[w] - start[w] })
     }
 
-    /// Moves of an arc: one where it is flat and less than whole, else pieces that follow each
-    /// other without a stop.
+    /// Adds the moves of an arc: one if it is flat and less than a full circle, otherwise several
+    /// without a stop.
     fn pieces(&mut self, helix: &Helix, goal: Vector3<f64>, speed: Speed, span: Span) -> Result<()> {
         let error = self.recorder.options.gcode.helix_error_m.max(1e-9);
         let mut count = (helix.angle.abs() / if helix.rise == 0.0 { 1.75 * PI } else { PI / 2.0 }).ceil().max(1.0);
@@ -205,7 +207,7 @@ impl Gcode<'_> {
         for k in 0..count as u64 {
             let (from, to) = (k as f64 / count, (k + 1) as f64 / count);
             let is_last = k + 1 == count as u64;
-            // The last piece ends where the line says, whose centre is rounded.
+            // The last piece ends at the coordinates of the line, since the centre is rounded.
             let end = if is_last { goal } else { helix.at(to) };
             let via = helix.at((from + to) / 2.0) + self.offset;
             let kind = MoveKind::Arc { via, via_rotation: None, angle: None, turns_with_path: false };

@@ -1,10 +1,10 @@
 //! G-code of milling machines (RS274/NGC) for a robot that carries the tool.
 //!
-//! [`words`] makes words of the lines, [`arcs`] moves of G2 and G3, this module keeps what is in
-//! force and runs the blocks in the order of the standard.
+//! [`words`] splits lines into words, [`arcs`] converts G2 and G3, and this module keeps the modal
+//! state and executes the blocks in the order of the standard.
 //!
-//! Frames: B is the work frame (G54 and its kin), T the tool. The tool's orientation is fixed, or
-//! turned by A, B, C ([`crate::Rotary`]).
+//! Frames: B is the work frame (G54 etc.), T the tool. The tool's orientation is fixed, or rotated
+//! by A, B, C ([`crate::Rotary`]).
 
 mod arcs;
 mod words;
@@ -25,10 +25,10 @@ use words::{Line, Parameters, Word};
 /// Work frames, by their code times 10.
 const WORK_FRAMES: [i32; 9] = [540, 550, 560, 570, 580, 590, 591, 592, 593];
 
-/// Largest number behind a letter, in the unit of the program.
+/// Maximum number after a letter, in the unit of the program.
 const LARGEST: f64 = 1e9;
 
-/// How a line moves.
+/// Motion mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Motion {
     Rapid,
@@ -37,36 +37,36 @@ enum Motion {
     Counterclockwise,
 }
 
-/// What an F word means.
+/// Meaning of F words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum FeedMode {
     PerMinute,
     InverseTime,
 }
 
-/// What is in force until it is changed.
+/// Modal state.
 struct Gcode<'a> {
     recorder: Recorder<'a>,
     motion: Option<Motion>,
     plane: arcs::Plane,
-    /// m per unit of the program.
+    /// Length of one program unit (m).
     unit: f64,
     unit_is_told: bool,
     relative: bool,
     absolute_centres: bool,
     feed_mode: FeedMode,
-    /// m/s.
+    /// Feed rate (m/s).
     feed: Option<f64>,
     work_frame: i32,
     blend: Blend,
     blend_is_told: bool,
-    /// Position in the work frame without offsets, m; `None`: not told yet.
+    /// Position in the work frame without offsets (m); `None`: unknown.
     at: [Option<f64>; 3],
     /// A, B, C in rad.
     rotary: [f64; 3],
-    /// Offsets of G92, m.
+    /// G92 offsets (m).
     offset: Vector3<f64>,
-    /// Work frames that G10 moved, by their code.
+    /// Work frames set by G10, by their code.
     moved_frames: HashMap<i32, Vector3<f64>>,
     has_moved: bool,
 }
@@ -162,7 +162,7 @@ impl<'a> Gcode<'a> {
         );
     }
 
-    /// One line; `true` at the end of the program.
+    /// Executes one line; returns `true` at the end of the program.
     fn block(&mut self, line: &Line, span: Span) -> Result<bool> {
         let mut codes: Vec<(i32, Span)> = Vec::new();
         let mut values: HashMap<char, (f64, Span)> = HashMap::new();
@@ -230,7 +230,7 @@ impl<'a> Gcode<'a> {
         Ok(())
     }
 
-    /// Modes, in the order of the standard; what moves comes later.
+    /// Sets the modes, in the order of the standard, before any motion.
     fn modes(&mut self, codes: &[(i32, Span)], values: &HashMap<char, (f64, Span)>) -> Result<()> {
         for &(code, span) in codes {
             match code {
@@ -278,7 +278,7 @@ impl<'a> Gcode<'a> {
         Ok(())
     }
 
-    /// The position stays where it is when another work frame counts.
+    /// Changes the work frame; the tool does not move.
     fn change_frame(&mut self, code: i32, span: Span) -> Result<()> {
         if code == self.work_frame {
             return Ok(());
@@ -288,7 +288,7 @@ impl<'a> Gcode<'a> {
         let now = self.frame(code);
         if !self.has_moved && self.recorder.options.gcode.start_mm.is_none() {
             if self.recorder.options.start.is_some() {
-                self.at = [None; 3]; // told again in the new frame by `place_at_start`
+                self.at = [None; 3]; // set again in the new frame by `place_at_start`
             }
             return Ok(());
         }
@@ -320,7 +320,7 @@ impl<'a> Gcode<'a> {
         Ok(())
     }
 
-    /// Codes that do something once; `false` if they use the coordinates of the line.
+    /// Executes non-modal codes; returns `false` if they consume the coordinates of the line.
     fn other_codes(&mut self, codes: &[(i32, Span)], values: &HashMap<char, (f64, Span)>, span: Span) -> Result<bool> {
         let mut moves = true;
         for &(code, at) in codes {
@@ -373,7 +373,7 @@ impl<'a> Gcode<'a> {
         self.recorder.dwell(seconds, span)
     }
 
-    /// G92: what stands in the line is the position from here on.
+    /// G92: defines the coordinates of the current position.
     fn set_offset(&mut self, values: &HashMap<char, (f64, Span)>, span: Span) -> Result<()> {
         let mut offset = self.offset;
         for (k, letter) in ['X', 'Y', 'Z'].into_iter().enumerate() {
@@ -388,7 +388,7 @@ impl<'a> Gcode<'a> {
         Ok(())
     }
 
-    /// Other offsets of G92; the tool stays.
+    /// Changes the G92 offsets; the tool does not move.
     fn shift(&mut self, offset: Vector3<f64>) {
         for (k, at) in self.at.iter_mut().enumerate() {
             *at = at.map(|at| at + self.offset[k] - offset[k]);
@@ -396,7 +396,7 @@ impl<'a> Gcode<'a> {
         self.offset = offset;
     }
 
-    /// G10 L2 Pn: where a work frame is.
+    /// G10 L2 Pn: sets a work frame.
     fn set_frame(&mut self, values: &HashMap<char, (f64, Span)>, span: Span) -> Result<()> {
         let number = |letter: char| values.get(&letter).map(|(value, _)| *value);
         let frame = number('P').and_then(|p| match p.round() as i32 {
@@ -425,7 +425,7 @@ impl<'a> Gcode<'a> {
         Ok(())
     }
 
-    /// G28 and G30: by the point in the line to the reference point.
+    /// G28 and G30: moves via the point in the line to the reference point.
     fn reference(&mut self, values: &HashMap<char, (f64, Span)>, code: Span, span: Span) -> Result<()> {
         let Some(reference) = self.recorder.options.gcode.reference_mm else {
             return fail(
@@ -453,7 +453,7 @@ impl<'a> Gcode<'a> {
         Ok(())
     }
 
-    /// Takes the coordinates before the first move from the joint values at the start, if the
+    /// Sets the coordinates before the first move from the joint values at the start, if the
     /// robot's kinematics are known.
     fn place_at_start(&mut self, span: Span) {
         if self.has_moved || self.recorder.options.start.is_none() {
@@ -467,7 +467,7 @@ impl<'a> Gcode<'a> {
         }
     }
 
-    /// Coordinates at the end of the line, in the work frame without offsets, m.
+    /// Coordinates at the end of the line, in the work frame without offsets (m).
     fn goal(&self, values: &HashMap<char, (f64, Span)>, absolute: bool) -> Result<[Option<f64>; 3]> {
         let mut goal = self.at;
         for (k, letter) in ['X', 'Y', 'Z'].into_iter().enumerate() {
@@ -502,7 +502,7 @@ impl<'a> Gcode<'a> {
         Ok(())
     }
 
-    /// The move of a line, if it has coordinates.
+    /// Adds the move of a line, if it has coordinates.
     fn motion_of_line(&mut self, codes: &[(i32, Span)], values: &HashMap<char, (f64, Span)>, span: Span) -> Result<()> {
         if !['X', 'Y', 'Z', 'A', 'B', 'C', 'I', 'J', 'K', 'R'].iter().any(|letter| values.contains_key(letter)) {
             return Ok(());
@@ -543,7 +543,7 @@ impl<'a> Gcode<'a> {
         }
     }
 
-    /// G53: coordinates of the machine for one line.
+    /// G53: one line in machine coordinates.
     fn machine_move(&mut self, values: &HashMap<char, (f64, Span)>, feed: Speed, span: Span) -> Result<()> {
         let X_MB = self.recorder.options.gcode.machine.inverse() * self.frame(self.work_frame);
         let mut place = match self.at {
@@ -570,12 +570,12 @@ impl<'a> Gcode<'a> {
         self.step_with(goal, speed, span)
     }
 
-    /// A rapid or a line.
+    /// Adds a rapid or a line.
     fn step_with(&mut self, goal: [Option<f64>; 3], speed: Speed, span: Span) -> Result<()> {
         let is_rapid = self.motion == Some(Motion::Rapid);
         let to = self.settled(goal, span);
         let kind = match (is_rapid, self.recorder.options.gcode.rapid_m_s) {
-            // Without joint values at the start, the first move comes from anywhere.
+            // Without joint values at the start, the start of the first move is unknown.
             (true, Some(_)) if self.has_moved || self.recorder.options.start.is_some() => MoveKind::Line,
             (true, _) => MoveKind::Joint,
             _ => MoveKind::Line,
@@ -585,7 +585,7 @@ impl<'a> Gcode<'a> {
         self.add(kind, to, speed, blend, span)
     }
 
-    /// Coordinates that are all known; those never told are 0 and that is noted.
+    /// Sets unknown coordinates to 0, with a note.
     fn settled(&mut self, goal: [Option<f64>; 3], span: Span) -> Vector3<f64> {
         for (value, text) in goal.iter().zip([
             "X is not told before this move: 0 of the work frame is taken",
@@ -601,7 +601,7 @@ impl<'a> Gcode<'a> {
         Vector3::from(goal)
     }
 
-    /// Adds a move to a place in the work frame without offsets.
+    /// Adds a move to a position in the work frame without offsets.
     fn add(&mut self, kind: MoveKind, to: Vector3<f64>, speed: Speed, blend: Blend, span: Span) -> Result<()> {
         let [a, b, c] = self.rotary;
         let R_BT = rotation_zyx(c, b, a) * self.recorder.options.gcode.R_BT;
@@ -615,7 +615,7 @@ impl<'a> Gcode<'a> {
     }
 }
 
-/// Two codes of one group in a line contradict each other.
+/// Rejects two codes of one modal group in a line.
 fn check_groups(codes: &[(i32, Span)]) -> Result<()> {
     const GROUPS: [&[i32]; 8] = [
         &[0, 10, 20, 30, 800],
@@ -640,7 +640,7 @@ fn check_groups(codes: &[(i32, Span)]) -> Result<()> {
     Ok(())
 }
 
-/// What is said of a code that is not read.
+/// Error message for an unsupported code.
 fn refused(code: i32) -> String {
     match code {
         410 | 420 | 411 | 421 => {

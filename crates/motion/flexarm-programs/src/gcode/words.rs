@@ -1,4 +1,5 @@
-//! Lines of G-code to words: letters with their numbers, which may be expressions of parameters.
+//! Splits lines of G-code into words: letters with numbers, which may be expressions with
+//! parameters.
 
 use std::collections::HashMap;
 
@@ -18,15 +19,15 @@ pub(super) struct Parameters {
     values: HashMap<String, f64>,
 }
 
-/// A line as its words, without comments and number.
+/// A line as its words, without comments and line number.
 #[derive(Debug, Default)]
 pub(super) struct Line {
     pub(super) words: Vec<Word>,
-    /// It begins with `/`.
+    /// Whether the line begins with `/`.
     pub(super) is_optional: bool,
 }
 
-/// Brackets inside of each other, at most.
+/// Maximum nesting depth of brackets.
 const DEEPEST: usize = 32;
 
 impl Parameters {
@@ -34,7 +35,7 @@ impl Parameters {
         self.values.insert(name.to_lowercase(), value);
     }
 
-    /// The words of a line; parameters that it sets take effect behind it.
+    /// Returns the words of a line; parameters set in it take effect after the line.
     pub(super) fn line(&mut self, text: &str, file: usize, start: usize) -> Result<Line> {
         let mut reader = Reader { text: text.as_bytes(), at: 0, file, start, parameters: &self.values, depth: 0 };
         let (line, set) = reader.line()?;
@@ -59,7 +60,7 @@ impl Reader<'_> {
         Span { file: self.file, start: self.start + from, end: self.start + self.at.max(from) }
     }
 
-    /// Passes blanks and comments.
+    /// Skips blanks and comments.
     fn pass(&mut self) -> Result<()> {
         while let Some(byte) = self.text.get(self.at) {
             match byte {
@@ -126,7 +127,7 @@ impl Reader<'_> {
         Ok((line, set))
     }
 
-    /// Behind `#`: a number, `<name>` or `[expression]`.
+    /// Parses the name after `#`: a number, `<name>` or `[expression]`.
     fn parameter_name(&mut self) -> Result<String> {
         self.pass()?;
         let from = self.at;
@@ -142,7 +143,7 @@ impl Reader<'_> {
         Ok(format!("{}", value.round() as i64))
     }
 
-    /// A number, a parameter, an expression in brackets, a function.
+    /// Parses a number, a parameter, an expression in brackets or a function.
     fn value(&mut self) -> Result<f64> {
         if self.depth >= DEEPEST {
             return fail(
@@ -302,7 +303,7 @@ impl Reader<'_> {
     }
 }
 
-/// Bytes of a comment with its brackets, which may hold others.
+/// Length in bytes of a comment with its brackets, which may be nested.
 fn comment_length(text: &[u8]) -> Option<usize> {
     let mut depth = 0;
     for (at, byte) in text.iter().enumerate() {
@@ -316,7 +317,7 @@ fn comment_length(text: &[u8]) -> Option<usize> {
     text.iter().position(|byte| *byte == b')').map(|at| at + 1)
 }
 
-/// `O0001` names the program; `O100 sub` and the like are control.
+/// Whether an O word is the program name (`O0001`) and not control flow (`O100 sub` etc.).
 fn is_program_number(rest: &[u8]) -> bool {
     let text = String::from_utf8_lossy(rest);
     let outside = text.split(['(', ';']).next().unwrap_or_default().trim();

@@ -1,10 +1,10 @@
-//! KUKA's KRL: `.src` with its `.dat`, and what teach pendants write into both.
+//! KUKA's KRL: `.src` with `.dat`, including the code written by teach pendants.
 //!
-//! [`parse`] makes statements of the lines, [`system`] knows BAS, the inline forms' helpers and the
-//! system variables, [`motion`] makes moves of PTP, LIN, CIRC and the splines.
+//! [`parse`] converts lines to statements, [`system`] implements BAS, the helpers of the inline
+//! forms and the system variables, [`motion`] converts PTP, LIN, CIRC and the splines to moves.
 //!
-//! Frames: B `$BASE` in W `$WORLD` (less `$ROBROOT`), T `$TOOL` on the flange F. A, B, C are
-//! Z-Y'-X'' in degrees.
+//! Frames: B `$BASE` in W `$WORLD` (relative to `$ROBROOT`), T `$TOOL` on the flange F. A, B, C are
+//! Z-Y'-X'' angles in degrees.
 
 mod motion;
 mod parse;
@@ -25,10 +25,10 @@ pub(crate) use parse::SPELLING;
 use parse::Unit;
 use system::Krl;
 
-/// Files of routines beside the program that are read, at most.
+/// Maximum number of routine files read in addition to the program.
 const MOST_SIBLINGS: usize = 64;
 
-/// Folders above the program in which its controller's data are looked for.
+/// Number of parent folders of the program in which the controller's data are searched.
 const LEVELS_OF_A_BACKUP: usize = 4;
 
 pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<Recorded> {
@@ -66,7 +66,7 @@ pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<R
         run_data(&mut machine, &further.data);
     }
     run_data(&mut machine, &unit.data);
-    machine.run(&given.main)?; // goes before what the files say
+    machine.run(&given.main)?; // takes precedence over the files
     machine.dialect.is_given = false;
     for routine in unit.routines {
         machine.routines.entry(routine.name.clone()).or_insert_with(|| Rc::new(routine));
@@ -103,13 +103,13 @@ fn stem(path: &Path) -> String {
     path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// A further file of the program.
+/// Adds a file of the program.
 fn add(texts: &mut Vec<Text>, path: &Path, bytes: &[u8]) -> Result<Unit> {
     texts.push(Text::new(path, &decode(bytes)));
     parse::parse(&texts[texts.len() - 1], texts.len() - 1)
 }
 
-/// A file in the folder of the program, whatever the case of its name.
+/// Finds a file in the folder of the program, ignoring the case of its name.
 fn beside(path: &Path, stem: &str, ending: &str) -> Option<(std::path::PathBuf, Vec<u8>)> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let wanted = format!("{stem}.{ending}").to_lowercase();
@@ -123,8 +123,8 @@ fn beside(path: &Path, stem: &str, ending: &str) -> Option<(std::path::PathBuf, 
     Some((file, bytes))
 }
 
-/// `$config.dat` of the controller, where a backup has it: in `System` beside a folder that the
-/// program is in.
+/// Finds `$config.dat` of the controller in a backup: in `System` next to a folder that contains
+/// the program.
 fn configuration(path: &Path) -> Option<(std::path::PathBuf, Vec<u8>)> {
     let folders = path.ancestors().skip(1).take(LEVELS_OF_A_BACKUP);
     folders
@@ -132,7 +132,7 @@ fn configuration(path: &Path) -> Option<(std::path::PathBuf, Vec<u8>)> {
         .find_map(|place| beside(&place, "$config", "dat"))
 }
 
-/// Routines that are called and are files of their own beside the program.
+/// Adds called routines that have files of their own next to the program.
 fn add_siblings(texts: &mut Vec<Text>, path: &Path, unit: &mut Unit, data: &mut Vec<Unit>) -> Result<()> {
     let mut asked: HashSet<Rc<str>> = unit.routines.iter().map(|routine| routine.name.clone()).collect();
     let mut calls = Vec::new();
@@ -155,7 +155,7 @@ fn add_siblings(texts: &mut Vec<Text>, path: &Path, unit: &mut Unit, data: &mut 
     Ok(())
 }
 
-/// Names of all routines that statements call.
+/// Collects the names of all routines that the statements call.
 fn called(body: &[Statement], names: &mut Vec<Rc<str>>) {
     for statement in body {
         match &statement.action {
@@ -179,7 +179,7 @@ fn called(body: &[Statement], names: &mut Vec<Rc<str>>) {
     }
 }
 
-/// Declarations of a data list; one that cannot be read is an error where its name is used.
+/// Runs the declarations of a data list; an unreadable one is an error only where its name is used.
 fn run_data(machine: &mut Machine<'_, Krl>, data: &[Statement]) {
     for statement in data {
         if let Err(fail) = machine.run(std::slice::from_ref(statement))
@@ -192,7 +192,7 @@ fn run_data(machine: &mut Machine<'_, Krl>, data: &[Statement]) {
     }
 }
 
-/// The routine with which the program starts; `None`: statements that stand outside of routines.
+/// Routine with which the program starts; `None` for statements outside of routines.
 fn entry(unit: &Unit, options: &ReadOptions<'_>) -> Result<Option<Rc<str>>> {
     if let Some(entry) = &options.entry {
         return Ok(Some(entry.to_lowercase().into()));

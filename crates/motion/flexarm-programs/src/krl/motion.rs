@@ -16,17 +16,17 @@ use crate::common::{Result, Span, fail};
 type Krls<'a> = Machine<'a, Krl>;
 
 const AXES: [&str; 6] = ["a1", "a2", "a3", "a4", "a5", "a6"];
-/// Axes that a first target tells, at least.
+/// Minimum number of axes of a first target.
 const FEWEST_AXES: usize = 4;
 const EXTERNAL: [&str; 6] = ["e1", "e2", "e3", "e4", "e5", "e6"];
 
-/// Axis values in rad as KRL's aggregate in degrees.
+/// Converts axis values in rad to KRL's aggregate in degrees.
 pub(super) fn axes_value(joints: &[f64]) -> Value {
     let fields = AXES.iter().zip(joints).map(|(name, joint)| (*name, Value::Number(joint.to_degrees()))).collect();
     Value::record("axis", fields)
 }
 
-/// A move of one line.
+/// Runs a motion instruction.
 pub(super) fn motion(machine: &mut Krls<'_>, word: &str, arguments: &[Argument], span: Span) -> Result<()> {
     let to_itself = ["$axis_act", "$pos_act", "$axis_for", "$pos_for", "xact"];
     if matches!(word, "ptp" | "sptp") && is_name(arguments, 0, &to_itself) {
@@ -39,7 +39,7 @@ pub(super) fn motion(machine: &mut Krls<'_>, word: &str, arguments: &[Argument],
     with_settings(machine, arguments, |machine| make(machine, word, arguments, span))
 }
 
-/// Does something with the assignments of WITH in force, which end with it.
+/// Runs `inner` with the assignments of WITH in force, and restores the old values.
 fn with_settings<T>(
     machine: &mut Krls<'_>,
     arguments: &[Argument],
@@ -54,7 +54,7 @@ fn with_settings<T>(
         }
         let value = machine.value(value)?;
         match (root, &place.kind) {
-            // One number is for all axes here.
+            // A value for one axis applies to all axes here.
             ("$vel_axis" | "$acc_axis", Kind::Index(..)) => {
                 let percent = value.number(argument.span)?;
                 set_axes(machine, root, percent);
@@ -81,7 +81,7 @@ fn has(arguments: &[Argument], word: &str) -> bool {
     arguments.iter().any(|argument| argument.name.as_deref() == Some(word))
 }
 
-/// `X_WB` of `$BASE` and `X_FT` of `$TOOL`; a tool that nothing tells is the robot's own.
+/// `X_WB` of `$BASE` and `X_FT` of `$TOOL`; an undefined tool is the robot's own.
 pub(super) fn frames(machine: &mut Krls<'_>, span: Span) -> Result<(Pose, Option<Pose>)> {
     let frame = |machine: &Krls<'_>, name: &str| -> Result<Option<Pose>> {
         match machine.global(name) {
@@ -115,7 +115,7 @@ pub(super) fn frames(machine: &mut Krls<'_>, span: Span) -> Result<(Pose, Option
     Ok((X_WB, tool))
 }
 
-/// One move, with the settings in force.
+/// Adds one move with the current settings.
 fn make(machine: &mut Krls<'_>, word: &str, arguments: &[Argument], span: Span) -> Result<()> {
     if matches!(machine.global("$ipo_mode"), Some(Value::Word(mode)) if &**mode == "tcp") {
         return fail(
@@ -155,7 +155,7 @@ fn make(machine: &mut Krls<'_>, word: &str, arguments: &[Argument], span: Span) 
     Ok(())
 }
 
-/// Where the literals of a move stand; none where it is told relative to others.
+/// Spans of the literals of a move; none if its target depends on others.
 fn sources(machine: &mut Krls<'_>, arguments: &[Argument], context: &Context, step: &Move) -> Sources {
     let constant = matches!(machine.global("$ori_type"), Some(Value::Word(word)) if &**word == "constant");
     let joint = step.kind == MoveKind::Joint;
@@ -169,7 +169,7 @@ fn sources(machine: &mut Krls<'_>, arguments: &[Argument], context: &Context, st
     }
 }
 
-/// Frames of a move, and how its targets are meant.
+/// Frames of a move, and the interpretation of its targets.
 struct Context {
     X_WB: Pose,
     X_FT: Option<Pose>,
@@ -177,7 +177,7 @@ struct Context {
     is_relative: bool,
 }
 
-/// The target at a position of the arguments.
+/// Target at a position of the arguments.
 fn target(
     machine: &mut Krls<'_>,
     context: &Context,
@@ -225,11 +225,11 @@ fn target(
     Ok(Target::Pose { X_BT, configuration: configuration(record, at)? })
 }
 
-/// Axis values; what is not told stays.
+/// Axis values; omitted ones are kept.
 fn joints(machine: &mut Krls<'_>, context: &Context, axes: [Option<f64>; 6], span: Span) -> Result<Target> {
     let told = axes.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
     let before = machine.recorder.joints().map(<[f64]>::to_vec);
-    // Arms with fewer than six axes are told by as many.
+    // Arms with fewer than six axes have fewer values.
     let count = before.as_ref().map_or(FEWEST_AXES, Vec::len).max(told);
     let mut joints = Vec::with_capacity(count);
     for k in 0..count {
@@ -250,7 +250,7 @@ fn joints(machine: &mut Krls<'_>, context: &Context, axes: [Option<f64>; 6], spa
     Ok(Target::Joints(joints))
 }
 
-/// Pose in the base; what is not told stays.
+/// Pose in the base; omitted components are kept.
 fn pose(machine: &mut Krls<'_>, context: &Context, told: [Option<f64>; 6], span: Span) -> Result<Pose> {
     if context.is_relative {
         let change = told.map(|value| value.unwrap_or(0.0));
@@ -267,7 +267,7 @@ fn pose(machine: &mut Krls<'_>, context: &Context, told: [Option<f64>; 6], span:
     Ok(pose_zyx_mm_deg(parts))
 }
 
-/// A relative move: along and about the axes of the base, or of the tool.
+/// Relative move along and about the axes of the base, or of the tool.
 fn moved_by(X_BT: Pose, change: [f64; 6], in_tool: bool, span: Span) -> Result<Pose> {
     if in_tool {
         return Ok(X_BT * pose_zyx_mm_deg(change));
@@ -296,8 +296,8 @@ fn configuration(record: &Record, span: Span) -> Result<Configuration> {
     Ok(if status.is_none() && turn.is_none() { Configuration::Nearest } else { Configuration::Kuka { status, turn } })
 }
 
-/// The orientation that a path ends with, by `$ORI_TYPE`; `turned` is how far a path that is
-/// followed turns it.
+/// Applies `$ORI_TYPE` to the orientation at the end of a path; `turned` is the rotation due to
+/// following the path.
 fn oriented(
     machine: &mut Krls<'_>,
     context: &Context,
@@ -326,7 +326,7 @@ fn oriented(
     }
 }
 
-/// `CIRC via, target, CA angle`.
+/// Reads `CIRC via, target, CA angle`.
 fn arc(machine: &mut Krls<'_>, context: &Context, arguments: &[Argument], span: Span) -> Result<(MoveKind, Target)> {
     let via = target_point(machine, context, arguments, span)?;
     let to = target(machine, context, arguments, 1, span)?;
@@ -353,7 +353,7 @@ fn arc(machine: &mut Krls<'_>, context: &Context, arguments: &[Argument], span: 
     Ok((MoveKind::Arc { via, via_rotation: None, angle, turns_with_path }, to))
 }
 
-/// The auxiliary point of a circle; parts of it that are not told are those of the start.
+/// Auxiliary point of a circle; omitted coordinates are those of the start.
 fn target_point(machine: &mut Krls<'_>, context: &Context, arguments: &[Argument], span: Span) -> Result<Vector3<f64>> {
     let (value, at) = machine.argument(arguments, 0, span)?;
     let value = value.known(at)?;
@@ -375,7 +375,7 @@ fn target_point(machine: &mut Krls<'_>, context: &Context, arguments: &[Argument
     Ok(pose(machine, context, told, at)?.translation.vector)
 }
 
-/// Where an arc of a told angle ends, if where it starts is known.
+/// End of an arc with a given angle, if its start is known.
 fn end_of_arc(machine: &Krls<'_>, context: &Context, kind: &MoveKind, to: &Target, span: Span) -> Option<Pose> {
     let MoveKind::Arc { via, angle: angle @ Some(_), turns_with_path, .. } = kind else { return None };
     let Target::Pose { X_BT, .. } = to else { return None };
@@ -384,7 +384,7 @@ fn end_of_arc(machine: &Krls<'_>, context: &Context, kind: &MoveKind, to: &Targe
     Some(arc.at(arc.length()).X)
 }
 
-/// A number of a system variable's part, if it was set.
+/// Number of a component of a system variable, if it is set.
 fn setting(machine: &Krls<'_>, name: &str, part: &str, span: Span) -> Result<Option<f64>> {
     let value = match machine.global(name) {
         Some(Value::Record(record)) => record.get(part).cloned(),
@@ -400,7 +400,7 @@ fn setting(machine: &Krls<'_>, name: &str, part: &str, span: Span) -> Result<Opt
     }
 }
 
-/// `$OV_PRO` as a part of 1.
+/// `$OV_PRO` as a fraction.
 fn overriding(machine: &Krls<'_>, span: Span) -> Result<f64> {
     let percent = match machine.global("$ov_pro") {
         Some(value) => value.number(span)?,
@@ -415,7 +415,7 @@ fn overriding(machine: &Krls<'_>, span: Span) -> Result<f64> {
     Ok(percent / 100.0)
 }
 
-/// The one percentage of all axes, as a part of 1.
+/// Common percentage of all axes, as a fraction.
 fn of_axes(machine: &Krls<'_>, name: &str, span: Span) -> Result<Option<f64>> {
     let Some(Value::List(values)) = machine.global(name) else { return Ok(None) };
     let mut percents = [100.0; 6];
@@ -473,8 +473,8 @@ fn path_speed(machine: &mut Krls<'_>, span: Span) -> Result<Speed> {
     })
 }
 
-/// What the words behind a target say of its end; the last one counts, as `C_PTP C_DIS` is for a
-/// path behind a PTP.
+/// Blend given by the words after a target; the last one applies, as in `C_PTP C_DIS`, whose second
+/// word is for a path after a PTP.
 fn blend(machine: &mut Krls<'_>, arguments: &[Argument], span: Span) -> Result<Blend> {
     let mut result = Blend::Stop;
     for argument in arguments {
@@ -507,7 +507,7 @@ fn blend(machine: &mut Krls<'_>, arguments: &[Argument], span: Span) -> Result<B
     Ok(result)
 }
 
-/// `SPLINE ... ENDSPLINE`.
+/// Runs `SPLINE ... ENDSPLINE`.
 pub(super) fn spline(machine: &mut Krls<'_>, arguments: &[Argument], body: &[Statement], span: Span) -> Result<Flow> {
     let first = machine.recorder.items.len();
     let (flow, blend) = with_settings(machine, arguments, |machine| {

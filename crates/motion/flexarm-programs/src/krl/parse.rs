@@ -1,5 +1,5 @@
-//! Lines of KRL to statements. What is not understood becomes a statement that is an error where it
-//! is reached.
+//! Parser of KRL lines. An unsupported line becomes a statement that is an error only where it is
+//! reached.
 
 use std::rc::Rc;
 
@@ -78,7 +78,7 @@ pub(super) fn parse(text: &Text, file: usize) -> Result<Unit> {
     Ok(unit)
 }
 
-/// Lines of the controller's own (`&ACCESS RVP`) as blanks, so that places stay.
+/// Replaces the controller's own lines (`&ACCESS RVP`) by blanks, so that positions do not change.
 fn without_header(text: &str) -> String {
     let blank = |line: &str| -> String {
         if !line.trim_start().starts_with('&') {
@@ -95,7 +95,7 @@ fn pass_empty_lines(parser: &mut Parser) {
     }
 }
 
-/// To the beginning of the next line.
+/// Skips to the beginning of the next line.
 fn pass_line(parser: &mut Parser) {
     while !parser.is_over() && *parser.peek() != Token::Line {
         parser.advance();
@@ -103,7 +103,7 @@ fn pass_line(parser: &mut Parser) {
     parser.advance();
 }
 
-/// `DEF name(a :IN, b :OUT)` or `DEFFCT REAL name(a :IN)` to its end.
+/// Parses `DEF name(a :IN, b :OUT)` or `DEFFCT REAL name(a :IN)` to its end.
 fn routine(parser: &mut Parser) -> Result<Routine> {
     let span = parser.span();
     parser.take_word("global");
@@ -142,7 +142,7 @@ fn routine(parser: &mut Parser) -> Result<Routine> {
     Ok(Routine { name, parameters, body, span })
 }
 
-/// Statements up to one of the words, which is left.
+/// Parses statements up to one of the words, which is not consumed.
 fn block(parser: &mut Parser, ends: &[&str]) -> Result<Vec<Statement>> {
     let mut body = Vec::new();
     loop {
@@ -153,7 +153,7 @@ fn block(parser: &mut Parser, ends: &[&str]) -> Result<Vec<Statement>> {
         if parser.word().is_some_and(|word| ["def", "deffct", "end", "endfct", "enddat"].contains(&&*word))
             && !is_assigned(parser)
         {
-            return Ok(body); // the block above misses its end and says so
+            return Ok(body); // the enclosing block reports its missing end
         }
         body.append(&mut statement(parser)?);
     }
@@ -163,7 +163,7 @@ fn is_assigned(parser: &Parser) -> bool {
     parser.is_symbol_ahead(1, "=")
 }
 
-/// The statement of a line, or a whole block.
+/// Parses the statement of a line, or a whole block.
 fn statement(parser: &mut Parser) -> Result<Vec<Statement>> {
     let (start, span) = (parser.at, parser.span());
     let word = parser.word().unwrap_or_default();
@@ -190,14 +190,14 @@ fn statement(parser: &mut Parser) -> Result<Vec<Statement>> {
     }
 }
 
-/// The line that begins at a token.
+/// Span of the line that begins at a token.
 fn line_span(parser: &Parser, start: usize) -> crate::common::Span {
     let tokens = &parser.lexemes[start..];
     let length = tokens.iter().take_while(|lexeme| lexeme.token != Token::Line).count();
     tokens[0].span.to(tokens[length.saturating_sub(1)].span)
 }
 
-/// Blocks; the word at their end is taken.
+/// Parses a block and consumes its end word.
 fn structure(parser: &mut Parser, word: &str) -> Result<Option<Action>> {
     let start = parser.span();
     let end = |parser: &mut Parser, word: &str| {
@@ -291,7 +291,7 @@ fn switch(parser: &mut Parser) -> Result<Action> {
     }
 }
 
-/// A statement of one line; declarations may be several.
+/// Parses a statement of one line; a declaration may give several.
 fn simple(parser: &mut Parser, word: &str) -> Result<Vec<Action>> {
     let still = |parser: &mut Parser, what: &'static str| {
         skip_rest(parser);
@@ -372,7 +372,7 @@ fn assignment(parser: &mut Parser) -> Result<Vec<Action>> {
     Ok(actions)
 }
 
-/// `[GLOBAL] DECL [GLOBAL] [CONST] TYPE name[n]=value, name`.
+/// Parses `[GLOBAL] DECL [GLOBAL] [CONST] TYPE name[n]=value, name`.
 fn declaration(parser: &mut Parser) -> Result<Vec<Action>> {
     while ["decl", "global", "const", "public"].iter().any(|word| parser.take_word(word)) {}
     if parser.word().is_some_and(|word| ["struc", "enum", "signal"].contains(&&*word)) {
@@ -414,7 +414,7 @@ fn wait(parser: &mut Parser) -> Result<Vec<Action>> {
     Ok(vec![Action::Call { name, arguments }])
 }
 
-/// `PTP target words`, `CIRC via, target, CA 180 words`; words are arguments with names.
+/// Parses `PTP target words`, `CIRC via, target, CA 180 words`; words become named arguments.
 fn motion(parser: &mut Parser) -> Result<Vec<Action>> {
     let name = parser.expect_name()?;
     let mut arguments = Vec::new();
@@ -436,7 +436,7 @@ fn motion(parser: &mut Parser) -> Result<Vec<Action>> {
     Ok(vec![Action::Call { name, arguments }])
 }
 
-/// Words after a target: `C_DIS`, `#TOOL`, `WITH $VEL.CP=0.5, $APO.CDIS=5`.
+/// Parses the words after a target: `C_DIS`, `#TOOL`, `WITH $VEL.CP=0.5, $APO.CDIS=5`.
 fn tail(parser: &mut Parser) -> Result<Vec<Argument>> {
     let mut words = Vec::new();
     while *parser.peek() != Token::Line {

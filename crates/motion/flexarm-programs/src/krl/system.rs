@@ -9,13 +9,13 @@ use crate::common::tree::{Argument, Expr, Kind, Operator, Statement};
 use crate::common::value::{Record, Value, depends};
 use crate::common::{Result, Span, fail};
 
-/// What KRL keeps beside its variables.
+/// KRL state in addition to variables.
 pub(super) struct Krl {
-    /// Assignments of the user, who may set everything.
+    /// Whether the user's assignments are running, which may set everything.
     pub(super) is_given: bool,
-    /// The tool whose data are not in the files.
+    /// Number of the tool whose data are not in the files.
     pub(super) unknown_tool: Option<i64>,
-    /// Inside of a SPLINE block.
+    /// Whether a SPLINE block is running.
     pub(super) in_spline: bool,
 }
 
@@ -77,12 +77,12 @@ const STILL: [&str; 31] = [
     "$tech",
 ];
 
-/// Words of the file that name what this reader knows itself.
+/// Whether a name is implemented by this reader.
 pub(super) fn is_built_in(name: &str) -> bool {
     parse::MOTIONS.contains(&name) || matches!(name, "bas" | "wait sec" | "wait for")
 }
 
-/// Variables as a controller has them at the start.
+/// Sets the variables to their initial values on a controller.
 pub(super) fn set_up(machine: &mut Krls<'_>) {
     let parts = |names: &[&str]| Value::record("", names.iter().map(|name| (*name, Value::Nothing)).collect());
     let zero = frame_value([0.0; 6]);
@@ -125,7 +125,7 @@ pub(super) fn set_up(machine: &mut Krls<'_>) {
     }
 }
 
-/// KUKA's default of the inline forms of joint moves.
+/// KUKA's default data of the inline forms of joint moves.
 fn pdat_default() -> Value {
     Value::record(
         "pdat",
@@ -133,12 +133,12 @@ fn pdat_default() -> Value {
     )
 }
 
-/// A frame in mm and degrees as KRL's aggregate.
+/// KRL aggregate of a frame in mm and degrees.
 pub(super) fn frame_value(parts: [f64; 6]) -> Value {
     Value::record("frame", CARTESIAN.iter().zip(parts).map(|(name, part)| (*name, Value::Number(part))).collect())
 }
 
-/// The six numbers of a frame, if it is one; parts that are not told are 0 in a frame.
+/// The six numbers of a frame, if the value is one; omitted components are 0.
 pub(super) fn frame_of(value: &Value, span: Span) -> Result<Option<[f64; 6]>> {
     let Value::Record(record) = value else { return Ok(None) };
     if !CARTESIAN.iter().any(|name| record.get(name).is_some()) {
@@ -379,7 +379,7 @@ fn record_of(value: Option<&Value>) -> Record {
     }
 }
 
-/// A part of an aggregate.
+/// Component of an aggregate.
 fn part(value: &Value, name: &str, span: Span) -> Result<Value> {
     match value {
         Value::Record(record) => match record.get(name) {
@@ -398,7 +398,7 @@ fn data(machine: &mut Krls<'_>, arguments: &[Argument], position: usize, name: &
     part(&value, name, at)
 }
 
-/// `a : b`: the frame b seen from a. Both in mm and degrees.
+/// `a : b`: composition of the frames a and b, both in mm and degrees.
 fn frame_product(left: &Value, right: &Value, span: Span) -> Result<Value> {
     let (Some(a), Some(b)) = (frame_of(left, span)?, frame_of(right, span)?) else {
         return fail(span, "frames are expected on both sides of `:`");
@@ -417,19 +417,19 @@ fn frame_product(left: &Value, right: &Value, span: Span) -> Result<Value> {
     Ok(Value::Record(Rc::new(result)))
 }
 
-/// An element of a list of the controller, if the files tell it.
+/// Element of a controller's list, if the files define it.
 fn listed(machine: &Krls<'_>, list: &str, number: i64) -> Option<Value> {
     let Some(Value::List(values)) = machine.global(list) else { return None };
     let value = values.get(usize::try_from(number - 1).ok()?)?;
     (!matches!(value, Value::Nothing)).then(|| value.clone())
 }
 
-/// The number of a tool whose data are not in the files.
+/// Number of a tool whose data are not in the files.
 pub(super) fn unknown_tool_number(what: &str) -> Option<i64> {
     what.strip_prefix("`TOOL_DATA[")?.strip_suffix("]`")?.parse().ok()
 }
 
-/// `TOOL_DATA[n]`; one tool that the files do not tell is the robot's own.
+/// `TOOL_DATA[n]`; a single tool that the files do not define is the robot's own.
 pub(super) fn tool_data(machine: &mut Krls<'_>, number: i64, span: Span) -> Result<Value> {
     if number == 0 {
         return Ok(frame_value([0.0; 6]));
@@ -467,7 +467,7 @@ fn base_data(machine: &Krls<'_>, number: i64, span: Span) -> Result<Value> {
     }
 }
 
-/// m/s² of a percentage, if the files tell the controller's default.
+/// Acceleration (m/s²) of a percentage, if the files define the controller's default.
 fn path_acceleration(machine: &mut Krls<'_>, percent: f64, span: Span) -> Result<Value> {
     match machine.global("def_acc_cp").cloned() {
         Some(value) => Ok(Value::Number(value.number(span)? * percent / 100.0)),
@@ -478,26 +478,26 @@ fn path_acceleration(machine: &mut Krls<'_>, percent: f64, span: Span) -> Result
     }
 }
 
-/// Sets one part of a system variable.
+/// Sets one component of a system variable.
 fn set_part(machine: &mut Krls<'_>, name: &str, field: &str, value: Value) {
     let mut record = record_of(machine.global(name));
     record.set(field, value);
     machine.set_global(name, Value::Record(Rc::new(record)));
 }
 
-/// `$VEL.CP`, not above what `$config.dat` allows.
+/// Sets `$VEL.CP`, limited to the maximum of `$config.dat`.
 fn set_path_speed(machine: &mut Krls<'_>, speed: f64, span: Span) -> Result<()> {
     let largest = machine.global("def_vel_cp").cloned().map(|value| value.number(span)).transpose()?;
     set_part(machine, "$vel", "cp", Value::Number(largest.map_or(speed, |largest| speed.min(largest))));
     Ok(())
 }
 
-/// The same percentage for all axes.
+/// Sets the same percentage for all axes.
 pub(super) fn set_axes(machine: &mut Krls<'_>, name: &str, percent: f64) {
     machine.set_global(name, Value::list(vec![Value::Number(percent); 12]));
 }
 
-/// `BAS(#COMMAND, number)`.
+/// Runs `BAS(#COMMAND, number)`.
 fn bas(machine: &mut Krls<'_>, arguments: &[Argument], span: Span) -> Result<()> {
     let command = match machine.argument(arguments, 0, span)?.0 {
         Value::Word(word) => word,
@@ -564,7 +564,7 @@ fn bas(machine: &mut Krls<'_>, arguments: &[Argument], span: Span) -> Result<()>
     Ok(())
 }
 
-/// Tool and base of FDAT_ACT.
+/// Sets tool and base of FDAT_ACT.
 fn act_frames(machine: &mut Krls<'_>, span: Span) -> Result<()> {
     let fdat = record_of(machine.global("fdat_act"));
     let number = |name: &str| match fdat.get(name) {
@@ -645,7 +645,7 @@ fn wait_for(machine: &mut Krls<'_>, arguments: &[Argument], span: Span) -> Resul
     }
 }
 
-/// The expression at a position is this name.
+/// Whether the argument at a position is one of these names.
 pub(super) fn is_name(arguments: &[Argument], position: usize, names: &[&str]) -> bool {
     matches!(positional(arguments, position), Some(Expr { kind: Kind::Name(name), .. }) if names.contains(&&**name))
 }

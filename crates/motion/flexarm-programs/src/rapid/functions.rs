@@ -1,4 +1,4 @@
-//! RAPID's functions of numbers, frames and targets, and its operators on positions and texts.
+//! RAPID functions of numbers, frames and targets, and operators on positions and texts.
 
 use std::rc::Rc;
 
@@ -19,7 +19,7 @@ fn number(record: &Record, name: &str, span: Span) -> Result<f64> {
     }
 }
 
-/// A value as an aggregate of a type.
+/// Converts a value to an aggregate of a type.
 pub(super) fn typed(machine: &mut Rapids<'_>, kind: &str, value: Value, span: Span) -> Result<Rc<Record>> {
     let value = value.known(span)?;
     match Rapid::coerce(machine, kind, value, span)? {
@@ -31,7 +31,7 @@ pub(super) fn typed(machine: &mut Rapids<'_>, kind: &str, value: Value, span: Sp
     }
 }
 
-/// `pos` in mm.
+/// Reads a `pos` in mm.
 pub(super) fn position(value: Option<&Value>, span: Span) -> Result<Vector3<f64>> {
     match value {
         Some(Value::Record(record)) => {
@@ -48,7 +48,7 @@ pub(super) fn position(value: Option<&Value>, span: Span) -> Result<Vector3<f64>
     }
 }
 
-/// `orient`.
+/// Reads an `orient`.
 pub(super) fn rotation(value: Option<&Value>, span: Span) -> Result<Rotation3<f64>> {
     let q = match value {
         Some(Value::Record(record)) => [
@@ -75,7 +75,7 @@ pub(super) fn rotation(value: Option<&Value>, span: Span) -> Result<Rotation3<f6
     }
 }
 
-/// `pose`, `trans` and `rot` of a target: in mm.
+/// Pose of `trans` and `rot` of a `pose` or target, in mm.
 pub(super) fn pose_mm(record: &Record, span: Span) -> Result<Pose> {
     let (p, R) = (position(record.get("trans"), span)?, rotation(record.get("rot"), span)?);
     Ok(Pose::from_parts(p.into(), R))
@@ -94,7 +94,7 @@ fn pose_value(X: &Pose) -> Value {
     Value::record("pose", vec![("trans", position_value(X.translation.vector)), ("rot", rotation_value(&X.rotation))])
 }
 
-/// The target with another place and orientation, mm.
+/// The target with another position and orientation, in mm.
 fn moved(target: &Record, X: &Pose) -> Value {
     let mut target = target.clone();
     target.set("trans", position_value(X.translation.vector));
@@ -129,7 +129,7 @@ fn argument<'v>(values: &'v [Value], k: usize, name: &str, span: Span) -> Result
     }
 }
 
-/// Functions of targets and frames; `None`: it is none of them.
+/// Functions of targets and frames; `None` if the name is not one of them.
 fn geometry(
     machine: &mut Rapids<'_>,
     name: &str,
@@ -157,7 +157,7 @@ fn geometry(
         "reltool" => {
             let target = typed(machine, "robtarget", at(0)?.clone(), span)?;
             let [x, y, z] = [angle(machine, "rx")?, angle(machine, "ry")?, angle(machine, "rz")?];
-            // About x, then the new y, then the new z.
+            // Rotation about x, then the new y, then the new z.
             let turn = Rotation3::from_axis_angle(&Vector3::x_axis(), x)
                 * Rotation3::from_axis_angle(&Vector3::y_axis(), y)
                 * Rotation3::from_axis_angle(&Vector3::z_axis(), z);
@@ -218,8 +218,8 @@ fn geometry(
     }))
 }
 
-/// Frame with its origin at the first of three targets, x towards the second, the third on the side
-/// of y.
+/// Frame with its origin at the first of three targets, x towards the second, and the third on the
+/// positive side of y.
 fn def_frame<'v>(machine: &mut Rapids<'_>, at: &impl Fn(usize) -> Result<&'v Value>, span: Span) -> Result<Value> {
     let mut points = [Vector3::zeros(); 3];
     for (k, point) in points.iter_mut().enumerate() {

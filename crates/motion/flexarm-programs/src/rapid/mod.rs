@@ -1,10 +1,10 @@
-//! ABB's RAPID: modules with `main`, its data types and its moves.
+//! ABB's RAPID: modules with `main`, data types and moves.
 //!
-//! [`parse`] makes statements of the text, [`types`] knows the data types and what is predefined,
+//! [`parse`] converts text to statements, [`types`] defines the data types and predefined data,
 //! [`functions`] the functions, [`motion`] the moves.
 //!
 //! Frames: B is the object frame of the work object (user frame, then object frame, then program
-//! displacement) in W; T the tool's frame on the flange F. Quaternions have their real part first.
+//! displacement) in W; T the tool frame on the flange F. Quaternions have the real part first.
 
 mod functions;
 mod motion;
@@ -23,17 +23,17 @@ use crate::{ReadOptions, decode, given_text};
 use motion::Settings;
 pub(crate) use parse::SPELLING;
 
-/// What RAPID keeps beside its variables.
+/// RAPID state in addition to variables.
 pub(crate) struct Rapid {
     settings: Settings,
-    /// Fields of types that the file declares.
+    /// Fields of types declared in the files.
     records: types::Records,
-    /// The tool whose data are not in the files.
+    /// Name of the tool whose data are not in the files.
     unknown_tool: Option<Rc<str>>,
     is_given: bool,
 }
 
-/// Modules beside the program that are looked into, at most.
+/// Maximum number of modules searched next to the program.
 const MOST_SIBLINGS: usize = 64;
 
 type Rapids<'a> = Machine<'a, Rapid>;
@@ -58,7 +58,7 @@ pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<R
     machine.recorder.note_files();
     machine.run(&given.main)?;
     declare(&mut machine, &unit.data);
-    machine.run(&given.main)?; // goes before what the files say
+    machine.run(&given.main)?; // takes precedence over the files
     machine.dialect.is_given = false;
     let file_entry = match entries.as_slice() {
         [only] => only.name.clone(),
@@ -93,8 +93,8 @@ pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<R
     Ok(machine.recorder.finish(&name))
 }
 
-/// Modules in the folder of the program that alone declare a name which the program uses and does
-/// not declare.
+/// Adds modules in the folder of the program that are the only ones to declare a name which the
+/// program uses but does not declare.
 fn add_siblings(texts: &mut Vec<Text>, unit: &mut parse::Unit) -> Result<()> {
     let path = texts[0].path.clone();
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(std::path::Path::new("."));
@@ -110,7 +110,7 @@ fn add_siblings(texts: &mut Vec<Text>, unit: &mut parse::Unit) -> Result<()> {
     for file in files {
         let Ok(bytes) = std::fs::read(&file) else { continue };
         let text = Text::new(&file, &decode(&bytes));
-        // One that cannot be read is missed where it is needed.
+        // An unreadable module matters only if it is needed.
         if let Ok(sibling) = parse::parse(&text, 0) {
             siblings.push((text, sibling));
         }
@@ -130,8 +130,7 @@ fn add_siblings(texts: &mut Vec<Text>, unit: &mut parse::Unit) -> Result<()> {
     }
 }
 
-/// Declarations of modules, in any order of need; one that cannot be read is an error where its
-/// name is used.
+/// Runs the declarations of modules; an unreadable one is an error only where its name is used.
 fn declare(machine: &mut Rapids<'_>, data: &[Statement]) {
     use crate::common::tree::Action;
     for statement in data {
@@ -284,7 +283,7 @@ fn still_words(name: &str) -> &'static str {
     }
 }
 
-/// Waiting for the outside; a condition that the program knows to be true is over.
+/// Handles waiting for external events; a condition known to be true ends at once.
 fn wait(machine: &mut Rapids<'_>, name: &str, arguments: &[Argument], span: Span) -> Result<()> {
     let known = if name == "waituntil" {
         machine.argument(arguments, 0, span)?.0
@@ -305,7 +304,7 @@ fn wait(machine: &mut Rapids<'_>, name: &str, arguments: &[Argument], span: Span
     }
 }
 
-/// `Incr`, `Decr`, `Add`, `Clear`.
+/// Runs `Incr`, `Decr`, `Add`, `Clear`.
 fn count(machine: &mut Rapids<'_>, name: &str, arguments: &[Argument], span: Span) -> Result<()> {
     let Some(place) = crate::common::machine::positional(arguments, 0).cloned() else {
         return fail(span, "the variable is missing");

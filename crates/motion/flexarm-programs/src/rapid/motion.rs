@@ -1,4 +1,4 @@
-//! Moves (MoveAbsJ, MoveJ, MoveL, MoveC and their kin) and the settings that change them.
+//! Moves (MoveAbsJ, MoveJ, MoveL, MoveC and their variants) and the settings that affect them.
 
 use std::rc::Rc;
 
@@ -15,25 +15,25 @@ use crate::common::tree::{Argument, Expr, Kind};
 use crate::common::value::{Record, Value};
 use crate::common::{Result, Span, fail};
 
-/// What is in force until it is changed.
+/// Modal settings.
 #[derive(Debug, Clone)]
 pub(super) struct Settings {
     check_joint_configuration: bool,
     check_line_configuration: bool,
-    /// Part of the accelerations, 1 at the start.
+    /// Fraction of the accelerations, initially 1.
     acceleration: f64,
-    /// m/s².
+    /// Acceleration along the path (m/s²).
     path_acceleration: Option<f64>,
-    /// Part of the programmed speeds, 1 at the start.
+    /// Fraction of the programmed speeds, initially 1.
     speed: f64,
-    /// m/s.
+    /// Maximum speed (m/s).
     largest_speed: Option<f64>,
     /// Program displacement in the object frame.
     displacement: Pose,
     circle: CircleOrientation,
 }
 
-/// How circles turn the tool.
+/// Orientation mode on circles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum CircleOrientation {
     WithPath,
@@ -56,7 +56,7 @@ impl Default for Settings {
     }
 }
 
-/// Places of the arguments of a move among those without names.
+/// Positions of a move's arguments among the unnamed ones.
 struct Places {
     circle_point: Option<usize>,
     target: usize,
@@ -86,7 +86,7 @@ fn places(name: &str) -> Option<Places> {
     })
 }
 
-/// A move; `false` if it is none.
+/// Runs a move; `false` if the instruction is not a move.
 pub(super) fn motion(machine: &mut Rapids<'_>, name: &str, arguments: &[Argument], span: Span) -> Result<bool> {
     let Some(places) = places(name) else { return Ok(false) };
     for argument in arguments {
@@ -156,7 +156,7 @@ fn frames(
     Ok((X_WO, X_FT))
 }
 
-/// One tool that the files do not tell is the robot's own.
+/// A single tool that the files do not define is the robot's own.
 fn unknown_tool(machine: &mut Rapids<'_>, name: &Rc<str>, span: Span) -> Result<Option<Pose>> {
     if let Some(other) = machine.dialect.unknown_tool.as_ref().filter(|other| *other != name) {
         return fail(
@@ -182,7 +182,7 @@ fn part(machine: &mut Rapids<'_>, record: &Record, name: &str, kind: &str, span:
     typed(machine, kind, value, span)
 }
 
-/// Pose in m of one in mm.
+/// Converts the translation of a pose from mm to m.
 fn in_metres(mut X: Pose) -> Pose {
     X.translation = Translation3::from(X.translation.vector * 1e-3);
     X
@@ -221,7 +221,7 @@ fn object_frame(machine: &mut Rapids<'_>, value: Value, span: Span) -> Result<Po
     Ok(in_metres(user * pose_mm(&*part(machine, &object, "oframe", "pose", span)?, span)?))
 }
 
-/// Values of external axes; 9E9 is none.
+/// Checks the values of external axes; 9E9 means not connected.
 fn external(machine: &mut Rapids<'_>, target: &Record, span: Span) -> Result<()> {
     let Some(Value::Record(record)) = target.get("extax").cloned() else { return Ok(()) };
     let mut values = [None; 6];
@@ -236,7 +236,7 @@ fn joints(machine: &mut Rapids<'_>, value: Value, span: Span) -> Result<Target> 
     external(machine, &target, span)?;
     let axes = part(machine, &target, "robax", "robjoint", span)?;
     let values: Vec<f64> = axes.fields.iter().map(|(_, value)| value.number(span)).collect::<Result<_>>()?;
-    // Arms of four axes write 9E9 for those that they have not.
+    // Arms with four axes have 9E9 for the missing ones.
     let count = values.iter().rposition(|value| value.abs() < 8.9e9).map_or(0, |last| last + 1);
     if count == 0 || values[..count].iter().any(|value| value.abs() > 8.9e9) {
         return fail(span, "an axis has the value 9E9, which is none: write the angle of each axis in degrees");
@@ -326,12 +326,12 @@ fn zone(machine: &mut Rapids<'_>, arguments: &[Argument], place: usize, span: Sp
     Ok(if tcp > 0.0 { Blend::Distance(tcp * 1e-3) } else { Blend::Pass })
 }
 
-/// Is the switch there?
+/// Whether the switch is present.
 fn has(arguments: &[Argument], name: &str) -> bool {
     arguments.iter().any(|argument| argument.name.as_deref() == Some(name))
 }
 
-/// Instructions that change the moves behind them; `false` if it is none.
+/// Runs an instruction that affects later moves; `false` if it is not one.
 pub(super) fn setting(machine: &mut Rapids<'_>, name: &str, arguments: &[Argument], span: Span) -> Result<bool> {
     match name {
         "confj" => machine.dialect.settings.check_joint_configuration = !has(arguments, "off"),
@@ -422,7 +422,7 @@ fn acceleration_limit(machine: &mut Rapids<'_>, name: &str, arguments: &[Argumen
     Ok(())
 }
 
-/// Where the robot is, as a target, if the moves before tell it.
+/// Current position of the robot as a target, if it is known from earlier moves.
 pub(super) fn current_target(
     machine: &mut Rapids<'_>,
     name: &str,

@@ -1,5 +1,4 @@
-//! Text of RAPID to statements. What is not understood becomes a statement that is an error where
-//! it is reached.
+//! Parser of RAPID text. An unsupported statement is an error only where it is reached.
 
 use std::collections::HashSet;
 use std::rc::Rc;
@@ -31,14 +30,14 @@ pub(super) struct Unit {
     pub(super) data: Vec<Statement>,
     /// Statements outside of routines.
     pub(super) main: Vec<Statement>,
-    /// All names that stand in it.
+    /// All names used in the file.
     pub(super) used: HashSet<Rc<str>>,
     /// Fields of declared types, with their types.
     pub(super) records: Records,
 }
 
 impl Unit {
-    /// Names that it declares.
+    /// Names declared in the file.
     pub(super) fn declared(&self) -> HashSet<Rc<str>> {
         let data = self.data.iter().filter_map(|statement| match &statement.action {
             Action::Declare { name, .. } => Some(name.clone()),
@@ -48,7 +47,7 @@ impl Unit {
         data.chain(routines).chain(self.records.keys().cloned()).collect()
     }
 
-    /// Takes another module in; what was there goes before.
+    /// Adds another module; existing declarations take precedence.
     pub(super) fn take_in(&mut self, other: Self) {
         self.routines.extend(other.routines);
         self.data.splice(0..0, other.data);
@@ -105,7 +104,8 @@ pub(super) fn parse(text: &Text, file: usize) -> Result<Unit> {
     Ok(unit)
 }
 
-/// The header of stored programs (`%%% VERSION:1 ... %%%`) as blanks, so that places stay.
+/// Replaces the header of stored programs (`%%% VERSION:1 ... %%%`) by blanks, so that positions do
+/// not change.
 fn without_header(text: &str) -> String {
     let start = text.len() - text.trim_start().len();
     let header =
@@ -116,7 +116,7 @@ fn without_header(text: &str) -> String {
     blanks + &text[end..]
 }
 
-/// To behind the next semicolon.
+/// Skips the next semicolon.
 fn pass_statement(parser: &mut Parser) {
     while !parser.is_over() && !parser.take_symbol(";") {
         if parser.word().is_some_and(|word| OUTER.contains(&&*word)) {
@@ -138,7 +138,7 @@ fn record(parser: &mut Parser) -> Result<(Rc<str>, Fields)> {
     Ok((name, fields))
 }
 
-/// `PROC name(num a, \num b) ... ENDPROC`, `FUNC`, `TRAP`.
+/// Parses `PROC name(num a, \num b) ... ENDPROC`, `FUNC`, `TRAP`.
 fn routine(parser: &mut Parser) -> Result<Routine> {
     let start = parser.span();
     let word = parser.expect_name()?;
@@ -154,7 +154,7 @@ fn routine(parser: &mut Parser) -> Result<Routine> {
         _ => "endproc",
     };
     let body = block(parser, &[end, "error", "undo", "backward"])?;
-    // Handlers run only when something went wrong.
+    // Handlers run only after an error.
     while !parser.is_over() && !parser.is_word(end) && !parser.is_word("endmodule") {
         parser.advance();
     }
@@ -195,7 +195,7 @@ fn parameters(parser: &mut Parser) -> Result<Vec<Parameter>> {
     Ok(parameters)
 }
 
-/// Statements up to one of the words, which is left.
+/// Parses statements up to one of the words, which is not consumed.
 fn block(parser: &mut Parser, ends: &[&str]) -> Result<Vec<Statement>> {
     let mut body = Vec::new();
     loop {
@@ -207,7 +207,7 @@ fn block(parser: &mut Parser, ends: &[&str]) -> Result<Vec<Statement>> {
     }
 }
 
-/// Words that begin what stands in a module.
+/// Words that begin a declaration in a module.
 const BEGINNINGS: [&str; 10] = ["local", "task", "pers", "var", "const", "proc", "func", "trap", "record", "alias"];
 
 /// Words that end every block.
@@ -242,7 +242,7 @@ fn statement(parser: &mut Parser) -> Result<Statement> {
             };
             pass_statement(parser);
             if parser.at == start {
-                parser.advance(); // the end of a block that did not begin
+                parser.advance(); // an end word without a block
             }
             let end = parser.lexemes[parser.at.saturating_sub(1).max(start)].span;
             Ok(Statement { action: Action::Refused(message), span: span.to(end) })
@@ -250,7 +250,7 @@ fn statement(parser: &mut Parser) -> Result<Statement> {
     }
 }
 
-/// Blocks; the word at their end is taken.
+/// Parses a block and consumes its end word.
 fn structure(parser: &mut Parser, word: &str) -> Result<Option<Action>> {
     let start = parser.span();
     if parser.is_symbol_ahead(1, ":=") {
@@ -330,7 +330,7 @@ fn structure(parser: &mut Parser, word: &str) -> Result<Option<Action>> {
     Ok(Some(action))
 }
 
-/// A statement up to its semicolon, which is left.
+/// Parses a statement up to its semicolon, which is not consumed.
 fn simple(parser: &mut Parser, word: &str) -> Result<Action> {
     if parser.is_symbol(";") {
         return Ok(Action::If { branches: Vec::new(), otherwise: Vec::new() });
@@ -365,7 +365,7 @@ fn simple(parser: &mut Parser, word: &str) -> Result<Action> {
         return Ok(Action::Refused("calls by a text (%...%) are not read: write the name of the routine".into()));
     }
     if parser.word().is_some() && parser.is_symbol_ahead(1, ":") {
-        // A label, which is no statement: the statement behind it is taken.
+        // A label is skipped; the statement after it is parsed.
         parser.advance();
         parser.advance();
         let word = parser.word().unwrap_or_default();
@@ -386,7 +386,7 @@ fn skip(parser: &mut Parser) {
     }
 }
 
-/// `Name a, b \C:=d;`.
+/// Parses `Name a, b \C:=d;`.
 fn call(parser: &mut Parser) -> Result<Action> {
     let name = parser.expect_name()?;
     let mut arguments: Vec<Argument> = Vec::new();
@@ -400,7 +400,7 @@ fn call(parser: &mut Parser) -> Result<Action> {
     Ok(Action::Call { name, arguments })
 }
 
-/// `[LOCAL] [TASK] PERS type name{2,3} := value`.
+/// Parses `[LOCAL] [TASK] PERS type name{2,3} := value`.
 fn declaration(parser: &mut Parser) -> Result<Action> {
     while ["local", "task", "pers", "var", "const"].iter().any(|word| parser.take_word(word)) {}
     let mut kind = parser.expect_name()?.to_string();

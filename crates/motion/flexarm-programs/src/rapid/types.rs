@@ -1,4 +1,4 @@
-//! RAPID's data types, and the speeds, zones, tool and work object that every controller has.
+//! RAPID data types, and the predefined speeds, zones, tool and work object of every controller.
 
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -9,10 +9,10 @@ use crate::common::{Result, Span, fail};
 /// Names and types of fields.
 pub(super) type Fields = Vec<(Rc<str>, Rc<str>)>;
 
-/// Fields that a file declares for a type.
+/// Fields of types declared in a file.
 pub(super) type Records = HashMap<Rc<str>, Fields>;
 
-/// Fields of a type of the language, with their types.
+/// Fields of a built-in type, with their types.
 fn fields(kind: &str) -> Option<&'static [(&'static str, &'static str)]> {
     Some(match kind {
         "pos" => &[("x", "num"), ("y", "num"), ("z", "num")],
@@ -58,8 +58,8 @@ fn fields(kind: &str) -> Option<&'static [(&'static str, &'static str)]> {
     })
 }
 
-/// A value of a type: lists become records, what is not told gets the language's default. `kind`
-/// ends with `{}` for each dimension of an array.
+/// Converts a value to a type: lists become records, omitted values get the language's default.
+/// `kind` ends with `{}` for each dimension of an array.
 pub(super) fn coerce(records: &Records, kind: &str, value: Value, span: Span, depth: usize) -> Result<Value> {
     if depth > 8 {
         return fail(span, format!("the type `{kind}` contains itself"));
@@ -84,7 +84,7 @@ pub(super) fn coerce(records: &Records, kind: &str, value: Value, span: Span, de
     let values = match &value {
         Value::List(values) if values.len() == fields.len() => values.to_vec(),
         Value::List(values) if kind == "robtarget" && values.len() == 2 => {
-            // Position and orientation alone, as some generators write them.
+            // Only position and orientation, as some generators write them.
             vec![values[0].clone(), values[1].clone(), Value::Nothing, Value::Nothing]
         }
         Value::List(values) => {
@@ -98,7 +98,7 @@ pub(super) fn coerce(records: &Records, kind: &str, value: Value, span: Span, de
     let is_short = matches!(&value, Value::List(written) if written.len() < fields.len());
     for ((name, kind), value) in fields.iter().zip(values) {
         if is_short && matches!(value, Value::Nothing) {
-            record.fields.push(((*name).into(), value)); // not told, so not 0
+            record.fields.push(((*name).into(), value)); // omitted, which is not 0
             continue;
         }
         record.fields.push(((*name).into(), coerce(records, kind, value, span, depth + 1)?));
@@ -110,7 +110,7 @@ fn numbers(values: &[f64]) -> Value {
     Value::list(values.iter().map(|value| Value::Number(*value)).collect())
 }
 
-/// Data that every controller has, with their type.
+/// Predefined data of every controller, with their type.
 pub(super) fn predefined(name: &str) -> Option<(&'static str, Value)> {
     let no_turn = || numbers(&[1.0, 0.0, 0.0, 0.0]);
     let no_pose = || Value::list(vec![numbers(&[0.0; 3]), no_turn()]);

@@ -1,4 +1,4 @@
-//! URScript's functions of numbers and poses.
+//! URScript functions of numbers and poses.
 
 use flexarm_spatial::Pose;
 use nalgebra::Rotation3;
@@ -75,7 +75,7 @@ pub(super) fn function(machine: &mut UrScripts<'_>, name: &str, arguments: &[Arg
     Ok(match name {
         "pose_trans" => as_pose(place(0)? * place(1)?),
         "pose_inv" => as_pose(place(0)?.inverse()),
-        // Places are added, turns follow each other.
+        // Positions are added, rotations are composed.
         "pose_add" => {
             let (a, b): (Pose, Pose) = (place(0)?, place(1)?);
             as_pose(Pose::from_parts((a.translation.vector + b.translation.vector).into(), a.rotation * b.rotation))
@@ -188,7 +188,7 @@ fn mathematics(name: &str, number: impl Fn(usize) -> Result<f64>) -> Result<Valu
     }))
 }
 
-/// `get_inverse_kin(pose, qnear)`: which joint values they are, the planner of the moves finds.
+/// `get_inverse_kin(pose, qnear)`: the planner of the moves computes the joint values.
 fn inverse(values: &[(Option<std::rc::Rc<str>>, Value)], span: Span) -> Result<Value> {
     let find = |name: &str, position: usize| {
         let named = values.iter().find(|(given, _)| given.as_deref() == Some(name));
@@ -203,7 +203,7 @@ fn inverse(values: &[(Option<std::rc::Rc<str>>, Value)], span: Span) -> Result<V
     Ok(Value::Inverse(Box::new((pose(target, span)?, near))))
 }
 
-/// `+`, `-`, `*` of lists, part by part, and of lists with numbers.
+/// `+`, `-`, `*`, `/` of lists, elementwise, and of lists with numbers.
 pub(super) fn binary(operator: Operator, left: &Value, right: &Value, span: Span) -> Option<Result<Value>> {
     let apply = |a: f64, b: f64| match operator {
         Operator::Add => Some(a + b),

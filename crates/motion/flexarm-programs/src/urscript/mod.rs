@@ -1,9 +1,9 @@
 //! Universal Robots' URScript.
 //!
-//! [`parse`] makes statements of the text, [`functions`] knows the functions, this module the
+//! [`parse`] converts text to statements, [`functions`] implements the functions, this module the
 //! moves.
 //!
-//! Poses are m and rotation vectors in rad, in the robot's base; T is what `set_tcp` says, on the
+//! Poses are m and rotation vectors in rad, in the robot's base; T is set by `set_tcp` on the
 //! flange F.
 
 mod functions;
@@ -22,7 +22,7 @@ use crate::common::value::{Value, depends};
 use crate::common::{Result, Span, Text, fail};
 use crate::{ReadOptions, decode, given_text};
 
-/// What URScript keeps beside its variables.
+/// URScript state in addition to variables.
 pub(crate) struct UrScript {
     X_FT: Option<Pose>,
 }
@@ -52,7 +52,7 @@ pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<R
     let entry = match &options.entry {
         Some(entry) => Some(entry.as_str().into()),
         None if is_called || flow == Flow::Halt => None,
-        // A controller runs the one definition that it is sent.
+        // A controller runs the only definition that it receives.
         None => {
             outer.iter().find(|routine| ***routine == *name).or(outer.first().filter(|_| outer.len() == 1)).cloned()
         }
@@ -190,7 +190,7 @@ impl Dialect for UrScript {
     }
 }
 
-/// Functions that move by what only the controller knows, or change how moves are run.
+/// Functions that depend on values known only to the controller, or change the execution of moves.
 fn is_refused(name: &str) -> bool {
     const WORDS: [&str; 22] = [
         "servoj",
@@ -238,7 +238,7 @@ fn still_words(name: &str) -> &'static str {
     }
 }
 
-/// Six numbers of a pose; a list of six is one too.
+/// Six numbers of a pose or of a list of six.
 fn pose(value: &Value, span: Span) -> Result<[f64; 6]> {
     match value {
         Value::Pose(pose) => Ok(*pose),
@@ -252,7 +252,7 @@ fn pose(value: &Value, span: Span) -> Result<[f64; 6]> {
     }
 }
 
-/// A number by position or name, or its default.
+/// Optional number given by position or name.
 fn number(machine: &mut UrScripts<'_>, arguments: &[Argument], position: usize, name: &str) -> Result<Option<f64>> {
     if let Some((value, at)) = machine.named(arguments, name)? {
         return value.number(at).map(Some);
@@ -263,7 +263,7 @@ fn number(machine: &mut UrScripts<'_>, arguments: &[Argument], position: usize, 
     }
 }
 
-/// Where a move goes: joint values, a pose, or joint values of a pose.
+/// Target of a move: joint values, a pose, or joint values of a pose.
 fn target(value: Value, span: Span) -> Result<Target> {
     match value.known(span)? {
         Value::Pose(pose) => {
@@ -291,7 +291,7 @@ fn target(value: Value, span: Span) -> Result<Target> {
     }
 }
 
-/// The value of an argument by position or name.
+/// Value of an argument given by position or name.
 fn required(
     machine: &mut UrScripts<'_>,
     arguments: &[Argument],
@@ -325,7 +325,7 @@ fn motion(machine: &mut UrScripts<'_>, name: &str, arguments: &[Argument], span:
     let first = last + 1;
     let a = number(machine, arguments, first, "a")?;
     let v = number(machine, arguments, first + 1, "v")?;
-    // movep and movec have no time.
+    // movep and movec have no duration.
     let (t, r) = match name {
         "movej" | "movel" => (number(machine, arguments, first + 2, "t")?, number(machine, arguments, first + 3, "r")?),
         _ => (None, number(machine, arguments, first + 2, "r")?),
@@ -354,8 +354,8 @@ fn motion(machine: &mut UrScripts<'_>, name: &str, arguments: &[Argument], span:
     machine.recorder.add(step, span)
 }
 
-/// `movec(via, to, a, v, r, mode)`: mode 0 turns the tool evenly, mode 1 keeps it relative to the
-/// circle.
+/// `movec(via, to, a, v, r, mode)`: in mode 0 the orientation changes uniformly, in mode 1 it is
+/// constant relative to the circle.
 fn arc(machine: &mut UrScripts<'_>, arguments: &[Argument], to: &mut Target, span: Span) -> Result<MoveKind> {
     let (value, at) = required(machine, arguments, 0, &["pose_via"], span)?;
     let via = match target(value, at)? {
@@ -382,7 +382,7 @@ fn arc(machine: &mut UrScripts<'_>, arguments: &[Argument], to: &mut Target, spa
     Ok(MoveKind::Arc { via: via.translation.vector, via_rotation: None, angle: None, turns_with_path })
 }
 
-/// Pose of the tool for joint values.
+/// Tool pose for joint values.
 fn forward(machine: &UrScripts<'_>, joints: &[f64], span: Span) -> Result<Pose> {
     match machine.recorder.forward(joints, &machine.dialect.X_FT) {
         Some(X_WT) => Ok(X_WT),
@@ -390,7 +390,7 @@ fn forward(machine: &UrScripts<'_>, joints: &[f64], span: Span) -> Result<Pose> 
     }
 }
 
-/// The same as six numbers.
+/// Tool pose for joint values, as six numbers.
 fn forward_value(machine: &UrScripts<'_>, joints: &[f64]) -> Option<Value> {
     let X_WT = machine.recorder.forward(joints, &machine.dialect.X_FT)?;
     Some(Value::Pose(rotation_vector_of(&X_WT)))

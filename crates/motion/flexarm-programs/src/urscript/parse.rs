@@ -1,5 +1,4 @@
-//! Text of URScript to statements. What is not understood becomes a statement that is an error
-//! where it is reached.
+//! Parser of URScript text. An unsupported statement is an error only where it is reached.
 
 use std::rc::Rc;
 
@@ -24,7 +23,7 @@ const SPELLING: Spelling = Spelling {
 /// One file.
 #[derive(Default)]
 pub(super) struct Unit {
-    /// Definitions, with how many others they are inside of.
+    /// Definitions with their nesting depth.
     pub(super) routines: Vec<(Routine, usize)>,
     /// Statements outside of definitions.
     pub(super) main: Vec<Statement>,
@@ -51,7 +50,8 @@ pub(super) fn parse(text: &Text, file: usize) -> Result<Unit> {
     Ok(reader.unit)
 }
 
-/// Lines that the teach pendant writes for itself (`$ 3 "MoveJ"`) as blanks, so that places stay.
+/// Replaces the teach pendant's own lines (`$ 3 "MoveJ"`) by blanks, so that positions do not
+/// change.
 fn without_labels(text: &str) -> String {
     let blank = |line: &str| -> String {
         if !line.trim_start().starts_with('$') {
@@ -69,7 +69,7 @@ impl Reader {
         }
     }
 
-    /// Statements up to one of the words, which is left.
+    /// Parses statements up to one of the words, which is not consumed.
     fn block(&mut self, ends: &[&str]) -> Result<Vec<Statement>> {
         let mut body = Vec::new();
         loop {
@@ -118,7 +118,7 @@ impl Reader {
         }
     }
 
-    /// A block from its first word on; `end` is taken.
+    /// Parses a block from its first word on and consumes `end`.
     fn structure(&mut self, word: &str) -> Result<Action> {
         if self.depth >= crate::common::expressions::DEEPEST {
             return fail(self.parser.span(), "too many blocks are inside of each other: write it flatter");
@@ -157,7 +157,7 @@ impl Reader {
         fail(start, "this block does not end: `end` is missing")
     }
 
-    /// `def name(a, b=1):` to its end; definitions inside of it are known everywhere.
+    /// Parses `def name(a, b=1):` to its end; nested definitions are global.
     fn definition(&mut self) -> Result<()> {
         if self.depth >= crate::common::expressions::DEEPEST {
             return fail(self.parser.span(), "too many definitions are inside of each other: write it flatter");
@@ -194,7 +194,7 @@ impl Reader {
     }
 }
 
-/// `while 1:` is `while True:`.
+/// Converts `while 1:` to `while True:`.
 fn as_flag(condition: Expr) -> Expr {
     match condition.kind {
         Kind::Literal(Value::Number(number)) => Expr { kind: Kind::Literal(Value::Flag(number != 0.0)), ..condition },

@@ -1,4 +1,4 @@
-//! Fixtures, and what the tests compare.
+//! Fixtures and comparisons.
 #![allow(dead_code, reason = "each test file uses its part")]
 #![allow(non_snake_case, reason = "X_BT: a pose")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
@@ -21,7 +21,7 @@ pub(crate) fn read(name: &str, options: &ReadOptions<'_>) -> Program {
     read_program(&path, &bytes, options).unwrap()
 }
 
-/// A program from text that stands nowhere.
+/// Reads a program from a text without a file.
 pub(crate) fn read_text(name: &str, text: &str, options: &ReadOptions<'_>) -> Result<Program, String> {
     let path = Path::new("/nowhere").join(name);
     read_program(&path, text.as_bytes(), options).map_err(|error| error.to_string().replace("/nowhere/", ""))
@@ -45,7 +45,7 @@ pub(crate) fn joints_deg(step: &Move) -> Vec<f64> {
     }
 }
 
-/// Rotation from three matrices written out: Rz(a) Ry(b) Rx(c), degrees.
+/// Rotation as an explicit product of matrices: Rz(a) Ry(b) Rx(c), degrees.
 pub(crate) fn euler_product(a: f64, b: f64, c: f64) -> Rotation3<f64> {
     let [(sa, ca), (sb, cb), (sc, cc)] = [a, b, c].map(|angle| angle.to_radians().sin_cos());
     let z = Matrix3::new(ca, -sa, 0.0, sa, ca, 0.0, 0.0, 0.0, 1.0);
@@ -64,12 +64,12 @@ pub(crate) fn rodrigues(r: Vector3<f64>) -> Rotation3<f64> {
     Rotation3::from_matrix_unchecked(Matrix3::identity() + k * angle.sin() + k * k * (1.0 - angle.cos()))
 }
 
-/// A pose of a place in mm.
+/// A pose with its position in mm.
 pub(crate) fn at_mm(x: f64, y: f64, z: f64, R: Rotation3<f64>) -> Pose {
     IsometryMatrix3::from_parts((Vector3::new(x, y, z) * 1e-3).into(), R)
 }
 
-/// Largest difference of the entries of two poses, m and 1.
+/// Maximum difference of the entries of two poses (m and 1).
 pub(crate) fn distance(a: &Pose, b: &Pose) -> f64 {
     (a.to_homogeneous() - b.to_homogeneous()).amax()
 }

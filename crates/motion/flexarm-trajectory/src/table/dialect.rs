@@ -1,9 +1,8 @@
-//! Lines, separators and numbers of tables: what is between the fields, and whether decimals are
-//! behind points or commas.
+//! Dialects of tables: lines, field separators, and numbers with decimal points or commas.
 
 use flexarm_settings::written::csv_fields;
 
-/// What separates the fields of a line.
+/// Field separator of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Separator {
     Semicolon,
@@ -14,8 +13,8 @@ pub(super) enum Separator {
 }
 
 impl Separator {
-    /// In the order in which they are tried: a comma may be in a number, so those that may not come
-    /// first.
+    /// Separators in the order in which they are tried; the comma comes after those that cannot
+    /// occur in a number.
     pub(super) const ALL: [Self; 4] = [Self::Semicolon, Self::Tab, Self::Comma, Self::Spaces];
 
     pub(super) fn in_words(self) -> &'static str {
@@ -36,32 +35,32 @@ impl Separator {
         }
     }
 
-    /// The fields of a line, without the quotes around them; a quote within quotes is doubled.
+    /// Splits a line into fields without the surrounding quotes; a quote within quotes is doubled.
     pub(super) fn split(self, line: &str) -> Vec<String> {
         let line = if self == Self::Spaces { line.trim() } else { line };
         csv_fields(line, |letter| self.is(letter), self == Self::Spaces)
     }
 }
 
-/// What stands before decimals.
+/// Decimal separator of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Decimal {
-    /// The number is whole.
+    /// The number has no decimals.
     None,
     Point,
     Comma,
 }
 
-/// A number and its decimal sign; `None` for what is no finite number.
+/// A number and its decimal separator; `None` if the field is not a finite number.
 pub(super) fn number(field: &str) -> Option<(f64, Decimal)> {
     let (text, decimal) = plain(field)?;
-    // Words such as `inf` and `nan` are no numbers here.
+    // Words such as `inf` and `nan` are not accepted as numbers.
     let is_numeric = text.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c)) && !text.contains(['n', 'N']);
     let value: f64 = if is_numeric { text.parse().ok()? } else { return None };
     value.is_finite().then_some((value, decimal))
 }
 
-/// The number with a point, a hyphen as its sign.
+/// The number with a decimal point and an ASCII minus sign.
 fn plain(field: &str) -> Option<(String, Decimal)> {
     let text = field.trim().replace('\u{2212}', "-");
     match (text.contains('.'), text.matches(',').count()) {
@@ -72,8 +71,8 @@ fn plain(field: &str) -> Option<(String, Decimal)> {
     }
 }
 
-/// A time in units of 1e-12, exact as far as it is written: seconds since 1970 with nanoseconds
-/// have more digits than an f64.
+/// A time in units of 1e-12, exact as written: seconds since 1970 with nanoseconds have more digits
+/// than an f64.
 pub(super) fn exact(field: &str) -> Option<i128> {
     const DIGITS: usize = 12;
     let (text, _) = plain(field)?;
@@ -92,14 +91,15 @@ pub(super) fn exact(field: &str) -> Option<i128> {
 }
 
 /// A time of day, with or without a date (`2024-03-01T12:00:00.004Z`, `12:00:00.004`), in units of
-/// 1e-12 s since 1970 or since midnight. Zones are passed over: all rows of a table have the same.
+/// 1e-12 s since 1970 or since midnight. Time zones are ignored: they are the same in all rows of a
+/// table.
 pub(super) fn clock_time(field: &str) -> Option<i128> {
     let field = field.trim().trim_end_matches('Z');
     let (date, clock) = match field.split_once(['T', ' ']) {
         Some((date, clock)) => (Some(date), clock.trim()),
         None => (None, field),
     };
-    // A zone such as +01:00 stands behind.
+    // A zone such as +01:00 follows the time.
     let clock = clock.split_once('+').map_or(clock, |(clock, _)| clock);
     let mut parts = clock.split(':');
     let mut whole = |below: i128| parts.next()?.parse::<u8>().ok().map(i128::from).filter(|n| *n < below);
@@ -112,7 +112,7 @@ pub(super) fn clock_time(field: &str) -> Option<i128> {
     Some(((days * 24 + hours) * 60 + minutes) * 60_000_000_000_000 + seconds)
 }
 
-/// Days of the Gregorian calendar, `2024-03-01` or `2024/03/01`.
+/// Days of the Gregorian calendar since 1970, from `2024-03-01` or `2024/03/01`.
 fn days_since_1970(date: &str) -> Option<i128> {
     let mut parts = date.trim().split(['-', '/']);
     let mut part = |digits: usize| parts.next().filter(|p| p.len() == digits)?.parse::<u16>().ok().map(i128::from);
@@ -120,7 +120,7 @@ fn days_since_1970(date: &str) -> Option<i128> {
     if parts.next().is_some() || !(1..=12).contains(&month) || !(1..=31).contains(&day) {
         return None;
     }
-    // Years begin in March, so that the day that some have more is their last.
+    // Years start in March, so that a leap day is the last day of its year.
     let (y, m) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
     Some(365 * y + y / 4 - y / 100 + y / 400 + (153 * m + 2) / 5 + day - 719_469)
 }

@@ -1,8 +1,8 @@
-//! What the names of columns say: joint or time, position or rate, and the unit.
+//! Interpretation of column names: joint or time, position or rate, and the unit.
 
 use std::f64::consts::PI;
 
-/// What a unit measures.
+/// Quantity that a unit measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Measure {
     Time,
@@ -10,7 +10,7 @@ pub(super) enum Measure {
     Length,
 }
 
-/// A unit: what it measures, how often it is divided by s, and its factor to SI.
+/// A unit: quantity, number of divisions by s, and factor to SI.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Unit {
     pub(super) measure: Measure,
@@ -30,7 +30,7 @@ const UNITS: [(&[&str], Measure, f64); 10] = [
     (&["m", "meter", "metre", "meters", "metres"], Measure::Length, 1.0),
     (&["mm", "millimeter", "millimetre"], Measure::Length, 1e-3),
 ];
-/// Units that may stand behind an underscore.
+/// Units that may follow an underscore.
 const SUFFIXES: [&str; 9] = ["s", "sec", "ms", "us", "ns", "rad", "deg", "m", "mm"];
 const TIMES: [&str; 9] = ["time", "t", "timestamp", "time_stamp", "%time", "__time", "zeit", "elapsed", "elapsed_time"];
 const RATES: [(&str, usize); 8] = [
@@ -43,7 +43,7 @@ const RATES: [(&str, usize); 8] = [
     ("position", 0),
     ("pos", 0),
 ];
-/// Words of columns that are no motion.
+/// Words in the names of columns that are not part of the motion.
 const OTHERS: [&str; 6] = ["effort", "torque", "current", "eff", "temperature", "force"];
 
 /// The unit of a word such as `deg`, `rad/s` or `deg/s^2`.
@@ -69,15 +69,15 @@ pub(super) fn unit(word: &str) -> Option<Unit> {
     is_sound.then_some(Unit { measure: *measure, per_s, scale: *scale })
 }
 
-/// Name and unit of a column: `A1[deg]`, `joint_1 (rad)`, `q1_deg`, `t / s`. A bracket that holds
-/// no unit belongs to the name, and is returned as the third: a unit that is not known.
+/// Splits a column name into name and unit: `A1[deg]`, `joint_1 (rad)`, `q1_deg`, `t / s`. A
+/// bracket without a known unit stays part of the name, and its content is returned third.
 pub(super) fn name_and_unit(column: &str) -> (String, Option<Unit>, Option<String>) {
     let column = column.trim();
     for (open, close) in [('[', ']'), ('(', ')'), ('{', '}'), ('<', '>')] {
         if let Some(rest) = column.strip_suffix(close)
             && let Some((name, inside)) = rest.rsplit_once(open)
         {
-            // `q[0]` is the first of several, not a unit.
+            // `q[0]` is an index, not a unit.
             if inside.trim().parse::<u32>().is_ok() {
                 return (column.to_owned(), None, None);
             }
@@ -92,7 +92,7 @@ pub(super) fn name_and_unit(column: &str) -> (String, Option<Unit>, Option<Strin
     {
         return (name.trim().to_owned(), Some(unit), None);
     }
-    // `vel_deg_s` before `_s`.
+    // `vel_deg_s` is matched before `_s`.
     for word in ["rad_s2", "deg_s2", "rad_s", "deg_s", "m_s2", "m_s", "mm_s"] {
         if let Some(name) = column.strip_suffix(word).and_then(|name| name.strip_suffix('_')) {
             return (name.to_owned(), unit(word), None);
@@ -108,16 +108,16 @@ pub(super) fn name_and_unit(column: &str) -> (String, Option<Unit>, Option<Strin
     (column.to_owned(), None, None)
 }
 
-/// What a column is about.
+/// Meaning of a column.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Meaning {
     Time,
-    /// A value of a joint, differentiated so many times.
+    /// Value of a joint and its order of differentiation.
     Joint(String, usize),
     Other,
 }
 
-/// What the name of a column, without its unit, says.
+/// Meaning of a column according to its name without the unit.
 pub(super) fn meaning(name: &str, unit: Option<Unit>) -> Meaning {
     let lower = name.to_ascii_lowercase();
     if TIMES.contains(&lower.as_str()) || unit.is_some_and(|unit| unit.measure == Measure::Time) {

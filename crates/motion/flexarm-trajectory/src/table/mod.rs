@@ -1,18 +1,17 @@
-//! Tables of joint values that other programs wrote: any separator, decimal points or commas, units
-//! in the names of the columns, columns that are not of the motion; and `run.csv`, the table of a
-//! run of this library.
+//! Tables of joint values from other programs: any separator, decimal points or commas, units in
+//! the column names, columns that are not part of the motion; and `run.csv`, the table of a run of
+//! this library.
 //!
-//! What the table does not say is either told by the user ([`ColumnMap`]) or assumed with a
-//! [`Warning`] that says so. Our own format ([`crate::csv_file`]) is read as ever: a table with
+//! What the table leaves open is either given by the user ([`ColumnMap`]) or assumed, with a
+//! [`Warning`]. The library's own format ([`crate::csv_file`]) is read unchanged: a table with
 //! commas, a column `time` and no units in its header.
 //!
 //! * The header is the first line that is neither blank nor a comment (`#`, `%`, `//`), or the last
-//!   comment before numbers begin. A second line may hold units alone.
+//!   comment before numbers begin. A second line may hold only units.
 //! * A name may end with its unit: `A1[deg]`, `q1 (rad)`, `q1_deg`, `t / ms`. Names that end with
-//!   `vel`, `velocity`, `acc` are rates, the last part of `/joint_states/joint_1/position` is what
-//!   it says.
-//! * Where the joints of the robot are known, columns with other names are left out, with a
-//!   warning.
+//!   `vel`, `velocity`, `acc` are rates; in `/joint_states/joint_1/position` the last part is the
+//!   quantity.
+//! * If the joints of the robot are known, columns with other names are dropped, with a warning.
 //!
 //! Start at [`Trajectory::parse_table`].
 
@@ -30,47 +29,46 @@ use crate::spline::{JointSamples, Samples, not_increasing};
 use crate::trajectory::Trajectory;
 use crate::warning::Warning;
 
-/// A joint of a table without a unit that reaches this is in degrees, or the unit must be told: two
-/// turns.
+/// A joint position above this (two turns) in a table without a unit is taken to be in degrees, and
+/// the unit must be given.
 const SUSPICIOUS_ANGLE: f64 = 4.0 * std::f64::consts::PI;
-/// Most numbers that are kept.
+/// Maximum number of values kept.
 const MOST_NUMBERS: usize = 30_000_000;
 
 /// A joint of the robot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KnownJoint<'a> {
-    /// Its name.
+    /// Joint name.
     pub name: &'a str,
-    /// Whether it is in m.
+    /// Whether the joint is prismatic (in m).
     pub is_prismatic: bool,
 }
 
-/// What is known besides the table.
+/// Information in addition to the table.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TableRequest<'a> {
-    /// Which columns are what.
+    /// Assignment of columns to the time and the joints.
     pub columns: Option<&'a ColumnMap>,
     /// Joints of the robot; without them every column of numbers may be a joint.
     pub joints: Option<&'a [KnownJoint<'a>]>,
 }
 
-/// What a table was.
+/// Summary of a table that was read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TableInfo {
-    /// In words, such as `table, semicolons, decimal commas`.
+    /// Description of the format, such as `table, semicolons, decimal commas`.
     pub format: String,
-    /// Rows that are used.
+    /// Number of rows used.
     pub rows: usize,
 }
 
 impl Trajectory {
-    /// Reads sampled joint values from a table of any of the kinds that the page of the module
-    /// describes.
+    /// Reads sampled joint values from a table of any kind described on the module page.
     ///
     /// * `origin`: file name for messages.
     ///
     /// # Errors
-    /// As [`Trajectory::parse_csv`], and for what the table leaves open: which column is the time,
+    /// As [`Trajectory::parse_csv`], and if the table is ambiguous: no or several time columns,
     /// decimal commas between commas, large angles without a unit.
     pub fn parse_table(
         text: &str,
@@ -78,7 +76,7 @@ impl Trajectory {
         request: &TableRequest<'_>,
     ) -> Result<(Self, TableInfo), TrajectoryError> {
         let text = text.trim_start_matches('\u{feff}');
-        // Lines that end as on an old Macintosh.
+        // Line ends of old Macintosh files.
         let with_ends = (text.contains('\r') && !text.contains('\n')).then(|| text.replace('\r', "\n"));
         let text = with_ends.as_deref().unwrap_or(text);
         let mut table = Table::find(text, request);
@@ -95,7 +93,7 @@ impl Trajectory {
     }
 }
 
-/// A row of our own format with twice the fields has commas in its numbers.
+/// A row of the library's own format with twice the number of fields has decimal commas.
 fn decimal_commas(error: TrajectoryError) -> TrajectoryError {
     let TrajectoryError::File(mut file) = error else { return error };
     if let Problem::Ragged { found, expected } = file.problem
@@ -106,17 +104,17 @@ fn decimal_commas(error: TrajectoryError) -> TrajectoryError {
     TrajectoryError::File(file)
 }
 
-/// A problem and its place.
+/// A problem and its place in the file.
 struct Located {
     line: Option<usize>,
     column: Option<usize>,
     problem: Box<Problem>,
-    /// Further lines with something wrong.
+    /// Other lines that are wrong.
     more_lines: Vec<usize>,
 }
 
 impl Located {
-    /// The problem, to be passed on.
+    /// Moves the problem out.
     fn take(&mut self) -> Self {
         let problem = std::mem::replace(&mut self.problem, Box::new(Problem::Empty));
         Self { line: self.line, column: self.column, problem, more_lines: Vec::new() }
@@ -140,22 +138,22 @@ struct Table<'t> {
     separator: Separator,
     header_line: usize,
     names: Vec<String>,
-    /// Of a second line with units alone.
+    /// Units from a second header line that holds only units.
     units: Vec<Option<Unit>>,
     /// Number and text of each line of numbers.
     lines: Vec<(usize, &'t str)>,
-    /// What comments say: unit of angles in degrees, prismatic joints.
+    /// Units stated in the comments: whether angles are in degrees, prismatic joints.
     degrees: Option<bool>,
     metres: Vec<String>,
-    /// Whether the last line has its end.
+    /// Whether the last line is terminated.
     ends_whole: bool,
-    /// First and last line of what stands above the header.
+    /// First and last line of the text above the header.
     preamble: Option<(usize, usize)>,
 }
 
 fn is_comment(line: &str) -> bool {
     let line = line.trim_start();
-    // `%time` is how rostopic names its first column.
+    // rostopic names its first column `%time`.
     line.starts_with('#') || line.starts_with("//") || (line.starts_with('%') && !line.starts_with("%time"))
 }
 
@@ -167,8 +165,8 @@ impl<'t> Table<'t> {
         let mut content = lines().filter(|(_, line)| !line.trim().is_empty() && !is_comment(line));
         let Some((first_line, first)) = content.next() else { return Err(nowhere(Problem::Empty)) };
         let second = content.next();
-        // In a file without a header the last comment before the numbers may be one, as numpy
-        // writes it.
+        // In a file without a header line the last comment before the numbers may be the header, as
+        // numpy writes it.
         let comment = lines().take_while(|(line, _)| *line < first_line).filter(|(_, line)| is_comment(line)).last();
         let comment = comment.map(|(line, text)| (line, text.trim_start().trim_start_matches(['#', '%', '/']).trim()));
 
@@ -222,7 +220,7 @@ impl<'t> Table<'t> {
         Ok(table)
     }
 
-    /// What comments say about units, as in our own format.
+    /// Reads units from the comments, as in the library's own format.
     fn read_comments(&mut self, text: &str) -> Result<(), Located> {
         for (i, line) in text.lines().enumerate().filter(|(_, line)| line.starts_with('#')) {
             let Some((key, value)) = line[1..].split_once(':') else { continue };
@@ -247,7 +245,7 @@ impl<'t> Table<'t> {
         Ok(())
     }
 
-    /// Whether it is a table of our own format.
+    /// Whether the table has the library's own format.
     fn is_own(&self, request: &TableRequest<'_>) -> bool {
         let is_known = |name: &str| request.joints.is_some_and(|joints| joints.iter().any(|joint| joint.name == name));
         let is_plain = |name: &String| is_known(name) || matches!(name_and_unit(name), (_, None, None));
@@ -259,7 +257,7 @@ impl<'t> Table<'t> {
             && self.names.iter().all(|name| !name.is_empty() && is_plain(name))
     }
 
-    /// Whether it is the table of a run.
+    /// Whether the table is that of a run.
     fn is_run(&self) -> bool {
         let has = |name: &str| self.names.iter().any(|own| own == name);
         has("time")
@@ -275,8 +273,7 @@ fn run_joint(name: &str) -> Option<(&str, bool)> {
     joint.or_else(|| name.strip_suffix("_position_m").map(|joint| (joint, true)))
 }
 
-/// What separates the names of a header, so that the line below it has as many numbers if that is
-/// possible.
+/// Separator of a header: preferably one with which the line below has the same number of fields.
 fn separator_of(header: &str, below: Option<&str>) -> Separator {
     let width = |separator: &Separator| separator.split(header).len();
     let fits = |separator: &&Separator| {
@@ -290,8 +287,8 @@ fn separator_of(header: &str, below: Option<&str>) -> Separator {
     candidates.iter().find(fits).or_else(|| candidates.first()).copied().unwrap_or(Separator::Comma)
 }
 
-/// Separator, line and names of a header that stands below lines of another kind: right above the
-/// first line of numbers, with as many fields. None where the first line could be the header.
+/// Separator, line and names of a header below a preamble: the line directly above the first line
+/// of numbers, with the same number of fields. `None` if the first line could be the header.
 fn below_preamble(lines: &[(usize, &str)]) -> Option<(Separator, usize, Vec<String>)> {
     let are_numbers = |separator: &Separator, line: &str| {
         let fields = separator.split(line);
@@ -310,7 +307,7 @@ fn below_preamble(lines: &[(usize, &str)]) -> Option<(Separator, usize, Vec<Stri
     (header > 0 && !fits(0)).then(|| (separator, lines[header].0, separator.split(lines[header].1)))
 }
 
-/// The units of a line that has nothing else.
+/// Units of a line that holds nothing else.
 fn units_alone(fields: &[String], width: usize) -> Option<Vec<Option<Unit>>> {
     let units: Vec<Option<Unit>> = fields.iter().map(|field| unit(field)).collect();
     let is_unit = |(field, unit): (&String, &Option<Unit>)| unit.is_some() || field.is_empty() || field == "-";
@@ -318,7 +315,7 @@ fn units_alone(fields: &[String], width: usize) -> Option<Vec<Option<Unit>>> {
     (all && units.iter().any(Option::is_some)).then_some(units)
 }
 
-/// A column that is used.
+/// A column in use.
 #[derive(Clone, Debug)]
 struct Used {
     joint: String,
@@ -327,13 +324,13 @@ struct Used {
     scale: f64,
 }
 
-/// Which columns are what.
+/// Assignment of columns to the time and the joints.
 struct Layout {
     time: usize,
     time_unit: Option<Unit>,
     used: Vec<Used>,
     notes: Vec<Warning>,
-    /// Joints whose unit nothing says.
+    /// Joints whose unit is not given anywhere.
     assumed: Vec<String>,
 }
 
@@ -370,7 +367,7 @@ impl Table<'_> {
         Ok((trajectory, TableInfo { format, rows: rows.times.len() }))
     }
 
-    /// The columns of `run.csv`.
+    /// Layout of `run.csv`.
     fn of_run(&self) -> Result<Layout, Located> {
         let place = |name: &str| self.names.iter().position(|own| own == name);
         let used = self.names.iter().enumerate().filter_map(|(place, name)| {
@@ -387,7 +384,7 @@ impl Table<'_> {
         at(self.header_line, Problem::NoTimeColumnFound { found: self.names.clone() })
     }
 
-    /// The columns that the user names.
+    /// Layout given by the user.
     fn mapped(&self, map: &ColumnMap, request: &TableRequest<'_>) -> Result<Layout, Located> {
         let mut layout = Layout { time: 0, time_unit: None, used: Vec::new(), notes: Vec::new(), assumed: Vec::new() };
         let time = match &map.time {
@@ -411,7 +408,7 @@ impl Table<'_> {
         Ok(layout)
     }
 
-    /// The columns that the header names.
+    /// Layout according to the header.
     fn guessed(&self, request: &TableRequest<'_>) -> Result<Layout, Located> {
         let known = |name: &str| request.joints.is_none_or(|joints| joints.iter().any(|joint| joint.name == name));
         let (time, time_unit) = self.only_time()?;
@@ -419,8 +416,8 @@ impl Table<'_> {
         let mut dropped = Vec::new();
         for (place, column) in self.names.iter().enumerate().filter(|(place, _)| *place != time) {
             if column.is_empty() {
-                // A line that ends with its separator has an empty field more; elsewhere it is a
-                // count of rows, for instance.
+                // A trailing separator leaves an empty last field; an unnamed column elsewhere may
+                // be a row index.
                 if place + 1 < self.names.len() {
                     dropped.push(format!("#{}", place + 1));
                 }
@@ -448,7 +445,7 @@ impl Table<'_> {
                 _ => dropped.push(column.clone()),
             }
         }
-        // Rates without positions beside them are nothing that can be used.
+        // Rates without positions cannot be used.
         let (used, rates): (Vec<Used>, Vec<Used>) = {
             let has = |joint: &str| layout.used.iter().any(|used| used.joint == joint && used.order == 0);
             layout.used.iter().cloned().partition(|used| has(&used.joint))
@@ -465,7 +462,8 @@ impl Table<'_> {
         Ok(layout)
     }
 
-    /// Joint, order, unit and unknown unit of a column; no joint for one that is none.
+    /// Joint, order, unit and unknown unit of a column; the joint is `None` if the column is not
+    /// one.
     fn read_name(
         &self,
         place: usize,
@@ -491,7 +489,7 @@ impl Table<'_> {
         self.lines.first().map(|(_, line)| self.separator.split(line)).unwrap_or_default()
     }
 
-    /// The one column that is a time.
+    /// The only time column.
     fn only_time(&self) -> Result<(usize, Option<Unit>), Located> {
         let mut found = Vec::new();
         for (place, column) in self.names.iter().enumerate() {
@@ -511,8 +509,8 @@ impl Table<'_> {
         }
     }
 
-    /// The column that a text names: a number, the whole name, the name without its unit, a name
-    /// with another unit.
+    /// The column that a text refers to: by number, full name, name without its unit, or name with
+    /// another unit.
     fn column(&self, asked: &str) -> Result<(usize, Option<Unit>), Located> {
         let (bare, told, unknown) = name_and_unit(asked);
         let missing = || {
@@ -569,7 +567,7 @@ impl Table<'_> {
         place: usize,
         unit: Option<Unit>,
     ) -> Result<(), Located> {
-        // `joint_1.vel=...` names a rate.
+        // `joint_1.vel=...` refers to a rate.
         let (joint, order) = match meaning(joint, None) {
             Meaning::Joint(base, order) if order > 0 => (base, order),
             _ => (joint.to_owned(), 0),
@@ -615,7 +613,8 @@ impl Table<'_> {
             (None, Some(true), _) | (None, _, Some(false)) => 1.0,
             (None, _, Some(true)) => std::f64::consts::PI / 180.0,
             (None, _, None) => {
-                // Rates go with the positions, whose unit is looked up when all columns are known.
+                // A rate has the unit of its position, which is looked up once all columns are
+                // known.
                 let position = layout.used.iter().find(|used| used.joint == joint && used.order == 0);
                 let scale = position.filter(|_| order > 0).map_or(1.0, |used| used.scale);
                 if order == 0 {
@@ -629,7 +628,7 @@ impl Table<'_> {
     }
 }
 
-/// A time as it is written.
+/// A time as written.
 #[derive(Clone, Copy, Debug)]
 struct Time {
     exact: Option<i128>,
@@ -643,7 +642,7 @@ impl Default for Time {
 }
 
 impl Time {
-    /// Time since another one, without the rounding of both.
+    /// Time elapsed since another one, without rounding either of them first.
     fn since(self, other: Self) -> f64 {
         match (self.exact, other.exact) {
             (Some(this), Some(other)) => (this - other) as f64 / 1e12,
@@ -652,7 +651,7 @@ impl Time {
     }
 }
 
-/// The numbers of the columns that are used, in the order of the layout.
+/// Values of the columns in use, in the order of the layout.
 #[derive(Default)]
 struct Rows {
     lines: Vec<usize>,
@@ -661,7 +660,7 @@ struct Rows {
     repeated: usize,
     cut: bool,
     comma: bool,
-    /// Times are times of day.
+    /// Whether times are times of day.
     clock: bool,
 }
 
@@ -723,18 +722,18 @@ impl Table<'_> {
         Ok(rows)
     }
 
-    /// The fields of a line of numbers.
+    /// Splits a line of numbers.
     fn fields(&self, text: &str) -> Vec<String> {
         let mut fields = self.separator.split(text);
-        // A separator at the end of the line makes an empty field more.
+        // A trailing separator adds an empty field.
         if fields.len() == self.names.len() + 1 && fields.last().is_some_and(String::is_empty) {
             fields.pop();
         }
         fields
     }
 
-    /// Reads the values of a line in the order of the layout. Returns its time, and whether that is
-    /// a time of day.
+    /// Reads the values of a line in the order of the layout. Returns its time and whether it is a
+    /// time of day.
     fn row(
         &self,
         line: usize,
@@ -775,7 +774,7 @@ impl Table<'_> {
         Ok((time, clock.is_some()))
     }
 
-    /// Angles that are too large for radians, in a table that does not state its unit.
+    /// Rejects angles too large for radians in a table that does not state its unit.
     fn check_angles(&self, layout: &Layout, rows: &Rows) -> Result<(), Located> {
         for (used, values) in layout.used.iter().zip(&rows.values) {
             let largest = values.iter().fold(0.0, |most: f64, q| most.max(q.abs()));
@@ -787,7 +786,7 @@ impl Table<'_> {
         Ok(())
     }
 
-    /// Factor of the times to s. Without a unit they are seconds, unless only a date since 1970
+    /// Factor from the times to s. Times without a unit are seconds, unless only a date since 1970
     /// explains their size.
     fn time_scale(&self, layout: &mut Layout, rows: &Rows) -> f64 {
         if rows.clock {
@@ -804,7 +803,7 @@ impl Table<'_> {
         scale
     }
 
-    /// Gives what is wrong with the samples its place in the file.
+    /// Adds the place in the file to an error in the samples.
     fn placed(&self, error: TrajectoryError, layout: &Layout, rows: &Rows) -> Located {
         match error {
             TrajectoryError::Samples(error) => match &error {
@@ -826,7 +825,7 @@ impl Table<'_> {
     }
 }
 
-/// The values by joint.
+/// Groups the values by joint.
 fn joints(layout: &Layout, rows: &Rows) -> Vec<JointSamples> {
     let find = |joint: &str, order: usize| {
         let place = layout.used.iter().position(|used| used.joint == joint && used.order == order)?;

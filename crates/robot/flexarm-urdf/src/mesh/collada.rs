@@ -1,8 +1,8 @@
 //! COLLADA 1.4/1.5: triangles and polylists of the visual scene, in metres, z up, node transforms
 //! applied.
 //!
-//! `mesh_loader` reads COLLADA too, but it draws a geometry that is placed several times only once,
-//! leaves normals unturned, ignores the up axis and panics on some broken files. Not read: skins,
+//! `mesh_loader` reads COLLADA too, but it draws a geometry with several instances only once, does
+//! not rotate normals, ignores the up axis and panics on some broken files. Not supported: skins,
 //! textures, curves, line sets.
 //!
 //! Frames: G geometry, N node, V the URDF's visual frame. `T_VG` includes the unit.
@@ -15,12 +15,12 @@ use roxmltree::{Document, Node};
 
 use super::{MAX_TRIANGLES, MeshError, TriangleMesh, UpAxis, dominant_color, stl, unit_normal};
 
-/// Nodes below nodes; deeper is taken for a cycle of `<instance_node>`.
+/// Maximum nesting depth of nodes; a deeper one is treated as a cycle of `<instance_node>`.
 const MAX_DEPTH: usize = 64;
-/// Nodes in one scene; more is taken for a trap.
+/// Maximum number of nodes in one scene; more are rejected as malicious.
 const MAX_INSTANCES: usize = 100_000;
 
-/// What a node does to points, normals and the winding of triangles.
+/// Transform of a node for points, normals and the winding of triangles.
 pub(super) struct Transform {
     pub(super) T: Matrix4<f64>,
     /// Inverse transpose of the linear part.
@@ -74,7 +74,7 @@ pub(super) fn decode(
     let scene = named(root, "scene").and_then(|s| named(s, "instance_visual_scene"));
     match scene.and_then(|s| reader.target(s, "url")) {
         Some(scene) => reader.children(scene, &T_V, 0)?,
-        // A library without a scene: every geometry once, where it is.
+        // A library without a scene: every geometry once, in its own frame.
         None => {
             for geometry in root.descendants().filter(|n| n.has_tag_name_of("geometry")) {
                 reader.geometry(geometry, &T_V, &HashMap::new())?;
@@ -96,7 +96,8 @@ pub(super) fn decode(
     Ok(mesh)
 }
 
-/// Unit and up axis of the file: from its coordinates to metres with z up.
+/// Transform from the file's coordinates to metres with z up, from the unit and up axis of the
+/// file.
 fn asset_transform(root: Node<'_, '_>, up_axis: UpAxis, remarks: &mut Vec<String>) -> Matrix4<f64> {
     let asset = named(root, "asset");
     let meter = asset
@@ -132,11 +133,11 @@ struct Reader<'a, 'i> {
     normals: Vec<[f32; 3]>,
     colors: Vec<(Option<[f32; 4]>, usize)>,
     instances: usize,
-    /// The first kind of primitive that was left out.
+    /// First unsupported kind of primitive, which is omitted.
     unsupported: Option<String>,
 }
 
-/// Material symbol to material element.
+/// Map from material symbol to material element.
 type Bindings<'a, 'i> = HashMap<&'a str, Node<'a, 'i>>;
 
 impl<'a, 'i> Reader<'a, 'i> {
@@ -146,12 +147,12 @@ impl<'a, 'i> Reader<'a, 'i> {
         MeshError::Malformed { path: self.path.to_owned(), format: "COLLADA", reason }
     }
 
-    /// The element that a `#id` attribute means.
+    /// Element that a `#id` attribute refers to.
     fn target(&self, node: Node<'_, '_>, attribute: &str) -> Option<Node<'a, 'i>> {
         self.ids.get(node.attribute(attribute)?.trim().strip_prefix('#')?).copied()
     }
 
-    /// Everything below a node or scene, whose own transform is already in `T`.
+    /// Adds everything below a node or scene, whose own transform is already in `T`.
     fn children(&mut self, parent: Node<'a, 'i>, T: &Matrix4<f64>, depth: usize) -> Result<(), MeshError> {
         self.instances += 1;
         if depth > MAX_DEPTH || self.instances > MAX_INSTANCES {
@@ -181,7 +182,7 @@ impl<'a, 'i> Reader<'a, 'i> {
         Ok(())
     }
 
-    /// The transform elements of a node, in their order.
+    /// Product of the transform elements of a node, in order.
     fn local(&self, node: Node<'a, 'i>) -> Result<Matrix4<f64>, MeshError> {
         let mut T = Matrix4::identity();
         for element in elements(node) {
@@ -234,7 +235,7 @@ impl<'a, 'i> Reader<'a, 'i> {
         Ok(())
     }
 
-    /// Adds one `<triangles>` or `<polylist>`; gives the number of triangles.
+    /// Adds one `<triangles>` or `<polylist>`; returns the number of triangles.
     fn primitive(&mut self, primitive: Node<'a, 'i>, transform: &Transform) -> Result<usize, MeshError> {
         let inputs: Vec<Input> = elements(primitive)
             .filter(|n| n.tag_name().name() == "input")
@@ -256,7 +257,7 @@ impl<'a, 'i> Reader<'a, 'i> {
             None => vec![3; corners / 3],
         };
 
-        // vertices shared where position and normal are the same
+        // Vertices with the same position and normal are shared.
         let mut vertices: HashMap<(u32, u32), u32> = HashMap::new();
         let mut count = 0;
         let mut first = 0usize;
@@ -282,7 +283,7 @@ impl<'a, 'i> Reader<'a, 'i> {
                 }
                 polygon.push(vertex);
             }
-            // a fan: exact for convex polygons, which is what exporters write
+            // Triangle fan: exact for convex polygons, which exporters write.
             for k in 2..size {
                 self.mesh.triangles.push(transform.winding([polygon[0], polygon[k - 1], polygon[k]]));
                 count += 1;
@@ -296,7 +297,7 @@ impl<'a, 'i> Reader<'a, 'i> {
         self.malformed(primitive, format!("index {index} is beyond its source"))
     }
 
-    /// An `<input>`; VERTEX is followed to the positions behind it.
+    /// Reads an `<input>`; for VERTEX, the positions that it refers to.
     fn input(&self, node: Node<'a, 'i>) -> Result<Input, MeshError> {
         let offset = node.attribute("offset").and_then(|o| o.trim().parse().ok()).unwrap_or(0usize);
         if offset > 64 {
@@ -353,7 +354,7 @@ trait TagName {
 }
 
 impl TagName for Node<'_, '_> {
-    /// Local name, whatever the namespace: 1.4 and 1.5 differ in it.
+    /// Compares the local name regardless of the namespace, which differs between 1.4 and 1.5.
     fn has_tag_name_of(&self, name: &str) -> bool {
         self.is_element() && self.tag_name().name() == name
     }

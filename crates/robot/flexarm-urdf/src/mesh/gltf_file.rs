@@ -1,9 +1,9 @@
-//! glTF 2.0, binary or with buffers beside it: triangles of the default scene, z up, node
-//! transforms applied.
+//! glTF 2.0, binary or with separate buffers: triangles of the default scene, z up, node transforms
+//! applied.
 //!
-//! The `gltf` crate splits the file and reads its structure; indices and ranges are followed here,
-//! because its own validation and iterators panic on those that lead nowhere. Not read: textures,
-//! skins, sparse or packed accessors.
+//! The `gltf` crate splits the file and reads its structure; indices and ranges are resolved here,
+//! because its own validation and iterators panic on invalid ones. Not supported: textures, skins,
+//! sparse or packed accessors.
 
 use std::path::Path;
 
@@ -17,9 +17,9 @@ use nalgebra::{Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3, Vector4};
 use super::collada::Transform;
 use super::{LARGEST, MAX_TRIANGLES, MeshError, TriangleMesh, dominant_color, stl};
 
-/// Nodes below nodes; deeper is taken for a cycle.
+/// Maximum nesting depth of nodes; a deeper one is treated as a cycle.
 const MAX_DEPTH: usize = 64;
-/// Placed meshes in one file; more is taken for a trap.
+/// Maximum number of mesh instances in one file; more are rejected as malicious.
 const MAX_INSTANCES: usize = 100_000;
 
 pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, MeshError> {
@@ -32,7 +32,7 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, MeshErro
         (bytes.into(), None)
     };
     let root = Root::from_slice(&json).map_err(|error| malformed(error.to_string()))?;
-    // Extensions of materials do not touch the triangles.
+    // Extensions of materials do not affect the triangles.
     let required = root.extensions_required.iter().find(|e| !e.starts_with("KHR_materials") && !e.contains("texture"));
     if let Some(extension) = required {
         let feature = format!("files with the glTF extension {extension}");
@@ -48,7 +48,7 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, MeshErro
         colors: Vec::new(),
         instances: 0,
     };
-    // glTF has y up: x, y, z of the file as columns in axes with z up
+    // glTF has y up: x, y, z of the file as columns in axes with z up.
     let R = Matrix3::from_columns(&[Vector3::x(), Vector3::z(), -Vector3::y()]);
     let T_V = R.to_homogeneous();
     let scene = root.scene.map_or_else(|| root.scenes.first(), |index| root.get(index));
@@ -64,7 +64,7 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, MeshErro
     Ok(mesh)
 }
 
-/// The lengths in the header of a binary file, which must not exceed it.
+/// Checks the lengths in the header of a binary file, which must not exceed the file.
 fn check_lengths(bytes: &[u8]) -> Result<(), String> {
     if !bytes.starts_with(b"glTF") {
         return Ok(());
@@ -77,7 +77,7 @@ fn check_lengths(bytes: &[u8]) -> Result<(), String> {
     Ok(())
 }
 
-/// The bytes of all buffers, from the file itself, files beside it, or base64 text.
+/// Reads the bytes of all buffers, from the file itself, separate files, or base64 text.
 fn read_buffers(root: &Root, mut blob: Option<Vec<u8>>, path: &Path) -> Result<Vec<Vec<u8>>, MeshError> {
     let missing = |reason: String| MeshError::Malformed { path: path.to_owned(), format: "glTF", reason };
     let mut buffers = Vec::new();
@@ -149,7 +149,7 @@ impl<'a> Reader<'a> {
         MeshError::Unsupported { path: self.path.to_owned(), feature: feature.into() }
     }
 
-    /// The element of an index, which may lead nowhere.
+    /// Returns the element at an index, or an error if it does not exist.
     fn get<T>(&self, index: Index<T>, what: &str) -> Result<&'a T, MeshError>
     where
         Root: gltf::json::root::Get<T>,
@@ -236,7 +236,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The elements of `size` bytes each, with all bounds checked.
+    /// Reads the elements of `size` bytes each, with all bounds checked.
     fn elements<T>(&self, accessor: &Accessor, size: usize, read: impl Fn(&[u8]) -> T) -> Result<Vec<T>, MeshError> {
         if accessor.sparse.is_some() {
             return Err(self.unsupported("sparse accessors of glTF"));
@@ -247,7 +247,7 @@ impl<'a> Reader<'a> {
         let stride = view.byte_stride.map_or(size, |s| s.0.max(size));
         let bytes = slice(buffer, view.byte_offset.map_or(0, |o| o.0), view.byte_length.0)
             .and_then(|bytes| bytes.get(usize::try_from(accessor.byte_offset.map_or(0, |o| o.0)).ok()?..));
-        // the last element need not fill its stride
+        // The last element need not fill its stride.
         let count = usize::try_from(accessor.count.0).ok();
         let span =
             count.and_then(|n| n.checked_sub(1).map_or(Some(0), |last| last.checked_mul(stride)?.checked_add(size)));
@@ -265,7 +265,7 @@ fn slice(bytes: &[u8], offset: u64, length: u64) -> Option<&[u8]> {
     bytes.get(start..start.checked_add(usize::try_from(length).ok()?)?)
 }
 
-/// Matrix, or translation, rotation and scale, of a node.
+/// Transform of a node, from its matrix or its translation, rotation and scale.
 fn local_transform(node: &Node) -> Matrix4<f64> {
     if let Some(matrix) = node.matrix {
         return Matrix4::from_column_slice(&matrix.map(f64::from));

@@ -1,4 +1,4 @@
-//! Volume, centroid and inertia of the body inside a closed mesh, as exact sums over tetrahedra.
+//! Volume, centroid and inertia of the body enclosed by a mesh, as exact sums over tetrahedra.
 
 use std::collections::HashMap;
 
@@ -15,28 +15,28 @@ pub struct MassProperties {
     pub centroid: Vector3<f64>,
     /// Inertia about the centroid per unit density, in m⁵.
     pub inertia: Matrix3<f64>,
-    /// Edges that do not have one triangle on each side, with vertices at one place taken as one.
+    /// Number of edges without exactly one triangle on each side; coincident vertices count as one.
     pub open_edges: usize,
-    /// The triangles face inward; the values above are those of the body turned outside out.
+    /// Whether the triangles face inward; the values above are corrected for this.
     pub inside_out: bool,
 }
 
 impl MassProperties {
-    /// The mesh has an inside; without one the other values mean nothing.
+    /// Whether the mesh is closed; otherwise the other values are meaningless.
     pub fn is_closed(&self) -> bool {
         self.open_edges == 0
     }
 }
 
 impl TriangleMesh {
-    /// Mass properties of the body inside.
+    /// Returns the mass properties of the enclosed body.
     ///
-    /// Each triangle (a, b, c) makes a tetrahedron with a reference point; with d = a · (b × c):
+    /// Each triangle (a, b, c) forms a tetrahedron with a reference point; with d = a · (b × c):
     ///
     /// ```text
     /// V = Σ d/6,   V c = Σ d/24 (a+b+c),   ∫ r rᵀ = Σ d/120 (aaᵀ + bbᵀ + ccᵀ + (a+b+c)(a+b+c)ᵀ)
     /// ```
-    /// Exact for a closed mesh, up to rounding. The reference is the middle of the bounding box, so
+    /// Exact for a closed mesh, up to rounding. The reference is the centre of the bounding box, so
     /// that a mesh far from its origin loses no digits.
     pub fn mass_properties(&self) -> MassProperties {
         let (low, high) = self.bounds().unwrap_or_default();
@@ -59,7 +59,7 @@ impl TriangleMesh {
             (volume, first, second) = (-volume, -first, -second);
         }
         let centroid = if volume > 0.0 { first / volume } else { Vector3::zeros() };
-        // from the reference to the centroid, then ∫ r rᵀ to the inertia
+        // Parallel axis theorem from the reference to the centroid, then ∫ r rᵀ to the inertia.
         let covariance = second - centroid * centroid.transpose() * volume;
         MassProperties {
             volume,
@@ -70,14 +70,14 @@ impl TriangleMesh {
         }
     }
 
-    /// One number for all vertices at one place.
+    /// Index for each vertex, equal for coincident vertices.
     pub(crate) fn welded(&self) -> Vec<u32> {
         let (low, high) = self.bounds().unwrap_or_default();
         self.welded_by((high - low).norm())
     }
 
-    /// Formats without shared vertices repeat them, some with rounding: weld to a millionth of the
-    /// size.
+    /// Formats without shared vertices repeat them, some with rounding; vertices are welded to a
+    /// millionth of the size.
     fn welded_by(&self, size: f64) -> Vec<u32> {
         let cell = (size * 1e-6).max(f64::MIN_POSITIVE);
         let mut cells: HashMap<[i64; 3], u32> = HashMap::new();
@@ -90,7 +90,7 @@ impl TriangleMesh {
             .collect()
     }
 
-    /// Edges that are not passed equally often in both directions.
+    /// Number of edges that are not traversed equally often in both directions.
     fn open_edges(&self, size: f64) -> usize {
         let welded = self.welded_by(size);
         let mut balance: HashMap<(u32, u32), i64> = HashMap::new();

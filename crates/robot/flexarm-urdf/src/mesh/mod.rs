@@ -1,6 +1,7 @@
 //! Triangle meshes: reading STL, OBJ, COLLADA and glTF, and their mass properties.
 //!
-//! Everything comes out in metres and in the axes of the URDF's visual frame, ready to be drawn:
+//! All meshes are converted to metres and to the axes of the URDF's visual frame, ready for
+//! drawing:
 //!
 //! | format | unit | up axis | node transforms |
 //! | --- | --- | --- | --- |
@@ -8,10 +9,10 @@
 //! | COLLADA (`.dae`) | `<unit>` applied | `<up_axis>` turned to z | applied |
 //! | glTF (`.glb`, `.gltf`) | metres by definition | y by definition, turned to z | applied |
 //!
-//! Turning is `(x, y, z) -> (x, -z, y)` for y up. Viewers do not agree on it: for glTF, RViz (since
-//! 2025), Drake and Blender turn, older RViz does not; for COLLADA, RViz and Gazebo ignore
-//! `<up_axis>`, and some robot files carry a wrong one for that reason: [`UpAxis::Ignored`] reads
-//! them. The scale of the URDF comes last ([`TriangleMesh::scaled`]).
+//! For y up the rotation is `(x, y, z) -> (x, -z, y)`. Viewers differ here: for glTF, RViz (since
+//! 2025), Drake and Blender rotate, older RViz does not; for COLLADA, RViz and Gazebo ignore
+//! `<up_axis>`, so that some robot files have a wrong one: [`UpAxis::Ignored`] reads them. The
+//! scale of the URDF is applied last ([`TriangleMesh::scaled`]).
 //!
 //! Start at [`load_mesh`]. Not here: finding files (`resolve`), placing shapes on links
 //! ([`crate::Visual`]).
@@ -33,13 +34,13 @@ use nalgebra::Vector3;
 pub use mass::MassProperties;
 pub use section::{CrossSection, cross_section};
 
-/// A file that places its meshes so often that it has more than this is taken for a trap.
+/// Maximum number of triangles including instances; more are rejected as malicious.
 const MAX_TRIANGLES: usize = 50_000_000;
 
-/// A file larger than this is refused (bytes): 20 million triangles of a binary STL.
+/// Maximum file size (bytes): 20 million triangles of a binary STL.
 const LARGEST: u64 = 1 << 30;
 
-/// Triangles with shared vertices; counter-clockwise seen from outside.
+/// Triangles with shared vertices; counter-clockwise viewed from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriangleMesh {
     /// Vertices in m.
@@ -52,11 +53,11 @@ pub struct TriangleMesh {
     pub color: Option<[f32; 4]>,
 }
 
-/// Why a mesh cannot be used.
+/// Error of reading a mesh.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshError {
-    /// The reference in the URDF did not lead to a file.
+    /// No file was found for the reference in the URDF.
     #[error("no file was found for {uri:?}")]
     NotFound {
         /// The reference.
@@ -67,35 +68,35 @@ pub enum MeshError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         #[source]
         source: std::io::Error,
     },
-    /// Neither the name nor the content is of a known format.
+    /// The format is unknown by both extension and content.
     #[error("{}: unknown mesh format, expected STL, OBJ, DAE, GLB or GLTF", path.display())]
     UnknownFormat {
         /// The file.
         path: PathBuf,
     },
-    /// The file breaks the rules of its format.
+    /// The file violates its format.
     #[error("{}: not a sound {format} file: {reason}", path.display())]
     Malformed {
         /// The file.
         path: PathBuf,
         /// The format.
         format: &'static str,
-        /// What is wrong, with the place where the format has one.
+        /// Description of the problem, with its place if the format has one.
         reason: String,
     },
-    /// A part of the format that is not read.
+    /// Unsupported feature of the format.
     #[error("{}: {feature} are not supported; export plain triangles", path.display())]
     Unsupported {
         /// The file.
         path: PathBuf,
-        /// The part.
+        /// The feature.
         feature: String,
     },
-    /// No triangle in it.
+    /// The file has no triangles.
     #[error("{}: there are no triangles in it", path.display())]
     Empty {
         /// The file.
@@ -103,25 +104,26 @@ pub enum MeshError {
     },
 }
 
-/// What to do with the `<up_axis>` of a COLLADA file; other formats have no choice.
+/// Treatment of the `<up_axis>` of a COLLADA file; not applicable to other formats.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum UpAxis {
-    /// Turn the mesh from the axis that the file declares to z, as COLLADA means it.
+    /// Rotates the mesh from the declared up axis to z, as specified by COLLADA.
     #[default]
     Declared,
-    /// Take the coordinates as they are, as RViz and Gazebo do.
+    /// Uses the coordinates as they are, like RViz and Gazebo.
     Ignored,
 }
 
-/// Reads a mesh as its format means it; the format is told by the extension, else by the content.
+/// Reads a mesh according to its format, which is recognised by the extension, otherwise by the
+/// content.
 ///
 /// # Errors
-/// [`MeshError`]; any bytes are refused or read, never a panic.
+/// [`MeshError`]; arbitrary bytes never cause a panic.
 pub fn load_mesh(path: impl AsRef<Path>) -> Result<TriangleMesh, MeshError> {
     load_mesh_with(path, UpAxis::Declared)
 }
 
-/// As [`load_mesh`], with a choice for COLLADA.
+/// [`load_mesh`] with a choice for COLLADA.
 ///
 /// # Errors
 /// As [`load_mesh`].
@@ -129,7 +131,7 @@ pub fn load_mesh_with(path: impl AsRef<Path>, up_axis: UpAxis) -> Result<Triangl
     load_with_remarks(path.as_ref(), up_axis).map(|loaded| loaded.mesh)
 }
 
-/// A mesh and what the reader should know about the way it was read.
+/// A mesh and remarks on how it was read.
 #[derive(Debug)]
 pub(crate) struct Loaded {
     pub(crate) mesh: TriangleMesh,
@@ -138,7 +140,7 @@ pub(crate) struct Loaded {
 
 pub(crate) fn load_with_remarks(path: &Path, up_axis: UpAxis) -> Result<Loaded, MeshError> {
     let io_error = |source| MeshError::Io { path: path.to_owned(), source };
-    // Not a device or a pipe, which might never end.
+    // Devices and pipes are refused, since a read may never end.
     let meta = std::fs::metadata(path).map_err(io_error)?;
     if !meta.is_file() {
         return Err(io_error(std::io::Error::other("this is not a file")));
@@ -150,7 +152,8 @@ pub(crate) fn load_with_remarks(path: &Path, up_axis: UpAxis) -> Result<Loaded, 
     decode(&std::fs::read(path).map_err(io_error)?, path, up_axis)
 }
 
-/// Bytes of a mesh file; `path` serves the extension, messages and files beside it.
+/// Decodes the bytes of a mesh file; `path` gives the extension, the name for messages, and the
+/// folder of further files.
 pub(crate) fn decode(bytes: &[u8], path: &Path, up_axis: UpAxis) -> Result<Loaded, MeshError> {
     let mut remarks = Vec::new();
     let mesh = match format(bytes, path) {
@@ -193,7 +196,7 @@ fn format(bytes: &[u8], path: &Path) -> Option<Format> {
     }
 }
 
-/// What every reader must have kept: indices within range, numbers finite, something to draw.
+/// Checks the invariants of every reader: indices in range, finite numbers, at least one triangle.
 fn check(mesh: &TriangleMesh, path: &Path) -> Result<(), MeshError> {
     let malformed = |reason: String| MeshError::Malformed { path: path.to_owned(), format: "mesh", reason };
     if mesh.triangles.is_empty() {
@@ -210,7 +213,7 @@ fn check(mesh: &TriangleMesh, path: &Path) -> Result<(), MeshError> {
 }
 
 impl TriangleMesh {
-    /// Stretched along the axes; negative factors mirror, and the triangles stay outside out.
+    /// Scales along the axes; negative factors mirror, and the triangles keep their outward side.
     pub fn scaled(mut self, scale: &Vector3<f64>) -> Self {
         for p in &mut self.positions {
             *p = std::array::from_fn(|i| (f64::from(p[i]) * scale[i]) as f32);
@@ -227,7 +230,7 @@ impl TriangleMesh {
         self
     }
 
-    /// In the axes of A, for this mesh in B and `X_AB`.
+    /// Transforms this mesh from B to A by `X_AB`.
     pub fn transformed(mut self, X_AB: &Pose) -> Self {
         for p in &mut self.positions {
             let p_A = X_AB * nalgebra::Point3::from(p.map(f64::from));
@@ -241,7 +244,7 @@ impl TriangleMesh {
         self
     }
 
-    /// Lowest and highest corner of the box around all vertices; `None` without vertices.
+    /// Minimum and maximum corner of the bounding box of all vertices; `None` without vertices.
     pub fn bounds(&self) -> Option<(Vector3<f64>, Vector3<f64>)> {
         let mut points = self.positions.iter().map(|p| Vector3::from(p.map(f64::from)));
         let first = points.next()?;
@@ -249,7 +252,7 @@ impl TriangleMesh {
     }
 }
 
-/// Normalised, or +z where there is no direction.
+/// Normalised vector, or +z if it has no direction.
 fn unit_normal(n: Vector3<f64>) -> [f32; 3] {
     n.try_normalize(1e-300)
         .filter(|n| n.iter().all(|x| x.is_finite()))
@@ -258,7 +261,7 @@ fn unit_normal(n: Vector3<f64>) -> [f32; 3] {
         .into()
 }
 
-/// The colour with most triangles.
+/// Colour with the most triangles.
 fn dominant_color(parts: &[(Option<[f32; 4]>, usize)]) -> Option<[f32; 4]> {
     let mut totals: Vec<([f32; 4], usize)> = Vec::new();
     for &(color, count) in parts {

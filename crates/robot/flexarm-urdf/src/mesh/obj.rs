@@ -1,11 +1,12 @@
-//! OBJ with the colours of its material files, by `mesh_loader`; and its scenes as one mesh.
+//! OBJ with the colours of its material files, read by `mesh_loader`; and conversion of its scenes
+//! to one mesh.
 
 use std::path::Path;
 
 use super::{MeshError, TriangleMesh, dominant_color, stl};
 
 pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, MeshError> {
-    // Material files only: a name in the file must not make us read a device.
+    // Only regular files are read: a name in the file must not lead to a device.
     let read_file = |file: &Path| match std::fs::metadata(file) {
         Ok(meta) if meta.is_file() => std::fs::read(file),
         _ => Err(std::io::Error::other("not a file")),
@@ -19,7 +20,7 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, MeshErro
     merged(scene, path)
 }
 
-/// All parts of a scene as one mesh.
+/// Merges all parts of a scene into one mesh.
 pub(super) fn merged(scene: mesh_loader::Scene, path: &Path) -> Result<TriangleMesh, MeshError> {
     let mut mesh = TriangleMesh::default();
     let mut normals = Vec::new();

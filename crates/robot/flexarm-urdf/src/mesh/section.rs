@@ -1,10 +1,9 @@
 //! Cross sections of triangle meshes: the outline in a plane, its area and second moments.
 //!
-//! What counts is the outside: of loops within each other the outermost, so that a hollow body and
-//! its outer hull have the same section. A mesh that is not closed there counts as the convex hull
-//! of its cut.
+//! Only the outside counts: of nested loops the outermost, so that a hollow body and its outer hull
+//! have the same section. Where a mesh is not closed, the convex hull of its cut is used.
 //!
-//! Notation: S is the frame of the section, x the normal of its plane, y and z in it.
+//! Notation: S is the frame of the section, x the normal of its plane, y and z in the plane.
 
 use std::collections::HashMap;
 
@@ -13,34 +12,34 @@ use nalgebra::{Matrix2, Point3, Vector2, Vector3};
 
 use super::TriangleMesh;
 
-/// Outline of a mesh in a plane, as numbers; lengths in m, axes y and z of the section's frame.
+/// Outline of a mesh in a plane; lengths in m, axes y and z of the section's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CrossSection {
     /// Area within the outline (m²).
     pub area: f64,
-    /// Its centroid (m).
+    /// Centroid (m).
     pub centroid: Vector2<f64>,
-    /// `∫ (r - c)(r - c)ᵀ dA` (m⁴): entry (0, 0) is `∫ y² dA`, which resists bending about z.
+    /// `∫ (r - c)(r - c)ᵀ dA` (m⁴): entry (0, 0) is `∫ y² dA`, relevant for bending about z.
     pub second_moments: Matrix2<f64>,
     /// Length of the outline (m).
     pub perimeter: f64,
-    /// Whether the mesh was closed there; if not, the numbers are those of the convex hull of the
+    /// Whether the mesh was closed there; otherwise the values are those of the convex hull of the
     /// cut.
     pub is_closed: bool,
 }
 
-/// Outlines with more loops than this count as their convex hull: screens and threads, not
-/// sections.
+/// Maximum number of loops; outlines with more, such as screens and threads, are replaced by their
+/// convex hull.
 const MOST_LOOPS: usize = 400;
-/// Part of the cut's length that may belong to open ends.
+/// Maximum fraction of the cut's length in open outlines.
 const OPEN: f64 = 0.02;
-/// Loops that overlap: together they are larger than their hull by more than this.
+/// Loops overlap if their total area exceeds that of their hull by this factor.
 const OVERLAP: f64 = 1.001;
 
-/// The section of meshes, all in the axes of one link L, by the plane y-z of S.
+/// Returns the section of meshes, all in the axes of one link L, with the plane y-z of S.
 ///
-/// Loops within others do not count. `None` where the plane passes all meshes by, or only touches
-/// them.
+/// Loops within others are ignored. `None` if the plane does not intersect any mesh, or only
+/// touches one.
 pub fn cross_section(meshes: &[TriangleMesh], X_LS: &Pose) -> Option<CrossSection> {
     let X_SL = X_LS.inverse();
     let (mut loops, mut points) = (Vec::new(), Vec::new());
@@ -66,21 +65,21 @@ pub fn cross_section(meshes: &[TriangleMesh], X_LS: &Pose) -> Option<CrossSectio
     if sum.area > OVERLAP * largest.area { of_hull() } else { Some(sum) }
 }
 
-/// What a plane cuts out of a mesh.
+/// Intersection of a mesh and a plane.
 struct Cut {
     /// Closed outlines.
     loops: Vec<Vec<Vector2<f64>>>,
-    /// Points of outlines that do not close.
+    /// Points of outlines that are not closed.
     open: Vec<Vector2<f64>>,
-    /// Length of all and of those that do not close (m).
+    /// Total length of all outlines, and of the open ones (m).
     length: f64,
     open_length: f64,
 }
 
-/// Segments of all triangles that the plane x = 0 of S passes, joined at the edges that they share.
+/// Intersects all triangles with the plane x = 0 of S, and joins the segments at shared edges.
 ///
-/// A vertex on the plane counts as in front of it, so every edge is either passed or not, the same
-/// for both its triangles.
+/// A vertex on the plane counts as in front of it, so every edge is either crossed or not,
+/// identically for both its triangles.
 fn cut(mesh: &TriangleMesh, X_SL: &Pose) -> Cut {
     let points: Vec<Vector3<f64>> =
         mesh.positions.iter().map(|p| (X_SL * Point3::from(p.map(f64::from))).coords).collect();
@@ -105,7 +104,7 @@ fn cut(mesh: &TriangleMesh, X_SL: &Pose) -> Cut {
             });
             found += 1;
         }
-        // Triangles that welding has made thin may have one edge twice.
+        // Triangles that are thin after welding may have the same edge twice.
         if found == 2 && ends[0] != ends[1] {
             segments.push([ends[0], ends[1]]);
         }
@@ -113,7 +112,7 @@ fn cut(mesh: &TriangleMesh, X_SL: &Pose) -> Cut {
     join(&places, &segments)
 }
 
-/// Segments joined to loops.
+/// Joins segments to loops.
 fn join(places: &[Vector2<f64>], segments: &[[usize; 2]]) -> Cut {
     let mut at: Vec<Vec<usize>> = vec![Vec::new(); places.len()];
     for (k, segment) in segments.iter().enumerate() {
@@ -149,7 +148,7 @@ fn join(places: &[Vector2<f64>], segments: &[[usize; 2]]) -> Cut {
     cut
 }
 
-/// Loops that lie in no other one.
+/// Loops that are not within another one.
 fn outermost(loops: &[Vec<Vector2<f64>>]) -> Vec<&Vec<Vector2<f64>>> {
     let areas: Vec<f64> = loops.iter().map(|points| doubled_area(points).abs()).collect();
     let within = |inner: usize, outer: usize| {
@@ -159,7 +158,7 @@ fn outermost(loops: &[Vec<Vector2<f64>>]) -> Vec<&Vec<Vector2<f64>>> {
     (0..loops.len()).filter(is_outer).map(|k| &loops[k]).collect()
 }
 
-/// Twice the area, positive where the points go round counter-clockwise.
+/// Twice the area, positive if the points are counter-clockwise.
 fn doubled_area(points: &[Vector2<f64>]) -> f64 {
     sides(points).map(|(a, b)| a.perp(&b)).sum()
 }
@@ -168,7 +167,7 @@ fn sides(points: &[Vector2<f64>]) -> impl Iterator<Item = (Vector2<f64>, Vector2
     points.iter().zip(points.iter().cycle().skip(1)).map(|(a, b)| (*a, *b))
 }
 
-/// Whether a ray from the point passes the outline an odd number of times.
+/// Whether a ray from the point crosses the outline an odd number of times.
 fn contains(points: &[Vector2<f64>], p: &Vector2<f64>) -> bool {
     let passes = |(a, b): &(Vector2<f64>, Vector2<f64>)| {
         (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x)
@@ -182,7 +181,7 @@ fn contains(points: &[Vector2<f64>], p: &Vector2<f64>) -> bool {
 /// ```text
 /// A = Σ d/2,   A c = Σ d/6 (a + b),   ∫ r rᵀ = Σ d/24 (aaᵀ + bbᵀ + (a + b)(a + b)ᵀ)
 /// ```
-/// `None` without an area.
+/// `None` if the area is zero.
 fn polygon(points: &[Vector2<f64>]) -> Option<CrossSection> {
     let reference = points.first().copied()?;
     let (mut area, mut first, mut second, mut perimeter) = (0.0, Vector2::zeros(), Matrix2::zeros(), 0.0);
@@ -206,7 +205,7 @@ fn polygon(points: &[Vector2<f64>]) -> Option<CrossSection> {
     Some(CrossSection { area, centroid: c + reference, second_moments, perimeter, is_closed: true })
 }
 
-/// Two outlines beside each other as one section.
+/// Combines two adjacent outlines to one section.
 fn joined(a: CrossSection, b: CrossSection) -> CrossSection {
     let area = a.area + b.area;
     let centroid = (a.centroid * a.area + b.centroid * b.area) / area;
@@ -251,7 +250,7 @@ mod tests {
     use crate::Geometry;
 
     fn section_of(meshes: &[TriangleMesh], at: f64, X_LM: &Pose) -> CrossSection {
-        // The plane across x at that place, in the frame M in which the meshes were made.
+        // Plane normal to x at that place, in the frame M of the meshes.
         let X_MS = Pose::from_parts(Translation3::new(at, 0.0, 0.0), Rotation3::identity());
         let placed: Vec<_> = meshes.iter().map(|mesh| mesh.clone().transformed(X_LM)).collect();
         cross_section(&placed, &(X_LM * X_MS)).unwrap()
@@ -261,7 +260,7 @@ mod tests {
         Pose::from_parts(Translation3::new(0.3, -0.2, 0.5), Rotation3::from_euler_angles(0.4, -0.7, 1.1))
     }
 
-    /// Truth: b h, b h³/12. Bounds: positions of meshes have seven digits.
+    /// Truth: b h, b h³/12. Bounds: mesh positions have seven digits.
     #[test]
     fn the_section_of_a_box_has_the_area_and_the_moments_of_a_rectangle() {
         let (b, h) = (0.24, 0.1);
@@ -299,7 +298,7 @@ mod tests {
         assert!(open.area < area && open.area > 0.9 * area, "{} {area}", open.area);
     }
 
-    /// Truth: Steiner's rule by hand for two squares beside each other.
+    /// Truth: Steiner's rule by hand for two squares side by side.
     #[test]
     fn parts_beside_each_other_add_up_and_parts_in_each_other_count_once() {
         let cube = Geometry::Box { size: Vector3::new(1.0, 0.1, 0.1) }.triangles().unwrap();

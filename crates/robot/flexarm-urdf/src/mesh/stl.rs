@@ -1,5 +1,5 @@
-//! STL, binary and ascii, told apart by size: a binary file has 84 + 50 n bytes, whatever its
-//! header says.
+//! STL, binary and ASCII, distinguished by size: a binary file has 84 + 50 n bytes, regardless of
+//! its header.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use super::{MeshError, TriangleMesh, obj};
 const HEADER: usize = 80;
 const RECORD: usize = 50;
 
-/// The size is the one of a binary file with the number of triangles in its header.
+/// Whether the size is that of a binary file with the number of triangles in its header.
 pub(super) fn has_binary_size(bytes: &[u8]) -> bool {
     triangle_count(bytes).is_some_and(|n| bytes.len() as u64 == size(n))
 }
@@ -23,7 +23,7 @@ fn size(triangles: u32) -> u64 {
 
 pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, MeshError> {
     let malformed = |reason: String| MeshError::Malformed { path: path.to_owned(), format: "STL", reason };
-    // Many exporters write "solid" into the header of binary files, so the size decides first.
+    // Many exporters write "solid" into the header of binary files, so the size is decisive.
     let ascii = bytes.trim_ascii_start().starts_with(b"solid") && std::str::from_utf8(bytes).is_ok();
     if ascii && !has_binary_size(bytes) {
         let scene = mesh_loader::Loader::default()
@@ -41,7 +41,7 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, MeshErro
             bytes.len()
         )));
     }
-    // Bytes behind the last triangle (line ends, tool data) are left alone.
+    // Bytes after the last triangle (line ends, tool data) are ignored.
     let records = bytes[HEADER + 4..].chunks_exact(RECORD).take(count as usize);
     let mut mesh = TriangleMesh::default();
     let mut normals = Vec::new();
@@ -58,7 +58,7 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, MeshErro
     Ok(mesh)
 }
 
-/// STL files often carry zero normals; then there are none.
+/// Returns the normals if they are unit vectors; many STL files have zero normals.
 pub(super) fn usable(normals: Vec<[f32; 3]>) -> Option<Vec<[f32; 3]>> {
     let unit = |n: &[f32; 3]| (n.iter().map(|x| x * x).sum::<f32>() - 1.0).abs() < 1e-2;
     (!normals.is_empty() && normals.iter().all(unit)).then_some(normals)

@@ -1,4 +1,4 @@
-//! One box in every format, against the closed form; and bytes that are no mesh at all.
+//! One box in every format against the closed form; and bytes that are not a mesh.
 
 use std::path::Path;
 
@@ -9,12 +9,12 @@ use proptest::prelude::*;
 use super::*;
 use crate::geometry::Geometry;
 
-/// As the format means it.
+/// Decodes with the declared up axis.
 fn decode(bytes: &[u8], path: &Path) -> Result<Loaded, MeshError> {
     super::decode(bytes, path, UpAxis::Declared)
 }
 
-/// Edges of the box (m) and its centre.
+/// Edge lengths and centre of the box (m).
 const SIZE: [f64; 3] = [0.25, 0.5, 0.75];
 const CENTRE: [f64; 3] = [1.0, -2.0, 0.5];
 
@@ -43,7 +43,7 @@ fn stl_ascii() -> Vec<u8> {
     (text + "endsolid box\n").into_bytes()
 }
 
-/// Binary, with a header that says ascii.
+/// Binary, with a header that claims to be ASCII.
 fn stl_binary() -> Vec<u8> {
     let p = corners(SIZE, CENTRE);
     let mut bytes = b"solid this header lies".to_vec();
@@ -57,7 +57,7 @@ fn stl_binary() -> Vec<u8> {
     bytes
 }
 
-/// Quads, counted from the end.
+/// Quads with indices relative to the end.
 fn obj() -> Vec<u8> {
     let mut text = "# box\no box\n".to_owned();
     corners(SIZE, CENTRE).iter().for_each(|p| text += &format!("v {} {} {}\n", p[0], p[1], p[2]));
@@ -67,10 +67,11 @@ fn obj() -> Vec<u8> {
     text.into_bytes()
 }
 
-/// In millimetres, y up, with a node that moves and a second geometry level; the box as a polylist.
+/// In millimetres, y up, with a translating node and a second geometry level; the box as a
+/// polylist.
 fn collada() -> Vec<u8> {
-    // V has z up: x_V = x, y_V = -z, z_V = y of the file; the node moves by 100 mm along the file's
-    // x
+    // V has z up: x_V = x, y_V = -z, z_V = y of the file; the node translates by 100 mm along x of
+    // the file.
     let file_size = [SIZE[0], SIZE[2], SIZE[1]].map(|x| x * 1000.0);
     let file_centre = [CENTRE[0], CENTRE[2], -CENTRE[1]].map(|x| x * 1000.0);
     let moved = [file_centre[0] - 100.0, file_centre[1], file_centre[2]];
@@ -102,7 +103,7 @@ fn collada() -> Vec<u8> {
     .into_bytes()
 }
 
-/// A unit box that a node stretches and moves; y up: x_V = x, y_V = -z, z_V = y of the file.
+/// A unit box scaled and translated by a node; y up: x_V = x, y_V = -z, z_V = y of the file.
 fn glb() -> Vec<u8> {
     let mut data = Vec::new();
     corners([1.0; 3], [0.0; 3]).iter().flatten().for_each(|x| data.extend((*x as f32).to_le_bytes()));
@@ -159,7 +160,7 @@ fn a_box_has_its_mass_properties_in_every_format() {
         let p = mesh.mass_properties();
         assert_eq!(mesh.triangles.len(), 12, "{name}");
         assert!(p.is_closed() && !p.inside_out, "{name}: {p:?}");
-        // measured 0, 0 and 9e-19: single precision holds these corners exactly
+        // measured 0, 0 and 9e-19: these corners are exact in single precision
         assert_relative_eq!(p.volume, SIZE.iter().product::<f64>(), max_relative = 1e-14);
         assert_relative_eq!(p.centroid, Vector3::from(CENTRE), max_relative = 1e-14);
         assert_relative_eq!(p.inertia, box_inertia(), epsilon = 1e-16);
@@ -204,7 +205,7 @@ fn a_geometry_placed_twice_is_there_twice() {
         text.replace("<node><scale>", "<node><scale>-1 1 1</scale><instance_geometry url=\"#g\"/></node><node><scale>");
     let mesh = decode(twice.as_bytes(), Path::new("a.dae")).unwrap().mesh;
     let p = mesh.mass_properties();
-    // the mirrored one is turned outside out, so volumes add
+    // The mirrored instance keeps its outward side, so the volumes add.
     assert_relative_eq!(p.volume, 2.0 * SIZE.iter().product::<f64>(), max_relative = 1e-6);
     assert_eq!(mesh.triangles.len(), 24);
 }
@@ -275,8 +276,7 @@ fn an_open_mesh_and_one_inside_out_are_recognised() {
     assert_eq!(mesh.mass_properties().open_edges, 3);
 }
 
-/// Closed forms of primitives against the integrals over their polyhedra, inscribed with 48
-/// corners.
+/// Closed forms of primitives against the integrals over their inscribed polyhedra with 48 corners.
 #[test]
 fn primitives_agree_with_their_triangles() {
     let shapes = [
@@ -300,7 +300,7 @@ fn primitives_agree_with_their_triangles() {
     }
 }
 
-/// Mirroring keeps the outside out; a pose turns the inertia with it.
+/// Mirroring preserves the outward side; a pose rotates the inertia.
 #[test]
 fn scaling_and_moving_keep_a_body_a_body() {
     let mesh = decode(&stl_binary(), Path::new("a.stl")).unwrap().mesh;
@@ -328,7 +328,7 @@ fn every_truncation_is_read_or_refused() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Sound files with some bytes changed reach deeper than noise does.
+    /// Valid files with some bytes changed reach deeper code than noise does.
     #[test]
     fn no_change_of_bytes_panics(
         which in 0usize..5,

@@ -1,4 +1,4 @@
-//! XML as a tree that can be copied, with the place of every element, from text and back to text.
+//! XML as a tree that can be copied, with the place of every element; parsing and writing.
 
 use std::fmt;
 use std::path::Path;
@@ -10,7 +10,7 @@ use crate::error::Issue;
 use crate::finding::Place;
 use crate::xml;
 
-/// Elements nested deeper are refused.
+/// Maximum nesting depth of elements.
 const MOST_NESTED: usize = 200;
 
 /// Place of an element; copies share the name of the file.
@@ -38,7 +38,7 @@ impl fmt::Display for At {
     }
 }
 
-/// An element with its attributes in the order of the file. Names have their prefixes, as in the
+/// An element with its attributes in the order of the file. Names include their prefixes, as in the
 /// file.
 #[derive(Clone, Debug)]
 pub(crate) struct Element {
@@ -48,12 +48,12 @@ pub(crate) struct Element {
     pub(crate) at: At,
 }
 
-/// Comments are left out: nothing follows from them.
+/// Comments are omitted, since they have no effect.
 #[derive(Clone, Debug)]
 pub(crate) enum Node {
     Element(Rc<Element>),
     Text(String),
-    /// In which nothing is evaluated.
+    /// Text that is not evaluated.
     Literal(String),
 }
 
@@ -74,7 +74,7 @@ impl Element {
     }
 }
 
-/// The root element of a text.
+/// Parses a text and returns its root element.
 pub(crate) fn parse(text: &str, file: &Rc<Path>) -> Result<Element, Box<Issue>> {
     let lines = xml::Lines::new(file, text);
     let document = xml::parse(text, &lines)?;
@@ -92,7 +92,7 @@ pub(crate) fn parse(text: &str, file: &Rc<Path>) -> Result<Element, Box<Issue>> 
 fn element(document: &Document<'_>, node: roxmltree::Node<'_, '_>, lines: &xml::Lines<'_>, file: &Rc<Path>) -> Element {
     let text = document.input_text();
     let range = node.range();
-    // the name with its prefix stands behind the bracket
+    // The name with its prefix follows the bracket.
     let tag = text.get(range.start + 1..range.end).unwrap_or_default();
     let end = tag.find(|c: char| c.is_whitespace() || c == '>' || c == '/').unwrap_or(tag.len());
     let place = lines.of(node);
@@ -124,7 +124,7 @@ fn element(document: &Document<'_>, node: roxmltree::Node<'_, '_>, lines: &xml::
     }
 }
 
-/// A document as text, and for each of its lines where it comes from.
+/// A document as text, and the origin of each of its lines.
 pub(crate) struct Written {
     pub(crate) text: String,
     pub(crate) origins: Vec<At>,

@@ -1,4 +1,4 @@
-//! Macros: their parameters, and what a call does.
+//! Macros: parameters and calls.
 
 use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
@@ -11,10 +11,10 @@ use super::scope::{Scope, Table};
 use super::{Content, Interpreter, Outcome};
 use crate::spelling::closest;
 
-/// Calls within calls; ROS's program ends at about 200.
+/// Maximum depth of nested calls; ROS's xacro fails at about 200.
 const MOST_CALLS: usize = 300;
 
-/// A macro as it was defined.
+/// A macro definition.
 pub(crate) struct Macro {
     name: String,
     parameters: Vec<Parameter>,
@@ -24,14 +24,14 @@ pub(crate) struct Macro {
 /// A parameter with its default.
 #[derive(Clone, Debug, PartialEq)]
 struct Parameter {
-    /// With `*` or `**` if a block is meant.
+    /// Name, with `*` or `**` for a block.
     name: String,
-    /// `^`: taken from the caller's property of that name.
+    /// Whether the value is taken from the caller's property of that name (`^`).
     forwarded: bool,
     default: Option<String>,
 }
 
-/// Macros by name, and those of namespaces; what is not here is looked for where the call stands.
+/// Macros by name, and those of namespaces; other names are looked up in `outer`.
 #[derive(Default)]
 pub(crate) struct Macros {
     macros: RefCell<HashMap<String, Rc<Macro>>>,
@@ -76,7 +76,7 @@ impl Macros {
 }
 
 impl Interpreter<'_> {
-    /// `<xacro:macro name="..." params="...">`
+    /// Handles `<xacro:macro name="..." params="...">`.
     pub(super) fn define_macro(&mut self, element: &Rc<Element>, macros: &Rc<Macros>) -> Outcome<()> {
         let name = self.required(element, "name")?;
         let name = name.strip_prefix("xacro:").unwrap_or(name);
@@ -93,7 +93,7 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// `<xacro:NAME ...>` and `<xacro:call macro="NAME" ...>`
+    /// Handles `<xacro:NAME ...>` and `<xacro:call macro="NAME" ...>`.
     pub(super) fn call_macro(&mut self, element: &Element, macros: &Rc<Macros>, scope: &Scope) -> Outcome<Content> {
         let at = &element.at;
         let (name, skipped) = if element.name == "xacro:call" {
@@ -130,7 +130,8 @@ impl Interpreter<'_> {
         Ok(content)
     }
 
-    /// The elements inside a call, evaluated where the call stands, to the parameters with a star.
+    /// Assigns the elements inside a call, evaluated in the caller's scope, to the block
+    /// parameters.
     fn take_blocks(
         &mut self,
         element: &Element,
@@ -197,7 +198,7 @@ impl Interpreter<'_> {
         Err(self.fault(at, trouble.help("give it as an attribute of the call")))
     }
 
-    /// A macro with the tables that its call looks into.
+    /// Returns a macro with the tables for its call.
     fn resolve(
         &mut self,
         full: &str,
@@ -243,7 +244,7 @@ fn unknown_parameter(called: &Macro, name: &str) -> Trouble {
     }
 }
 
-/// `a b:=1 c:='x y' d:=${e} f:=^ g:=^|2 *block **blocks`
+/// Parses parameters such as `a b:=1 c:='x y' d:=${e} f:=^ g:=^|2 *block **blocks`.
 fn parameters(text: &str) -> Vec<Parameter> {
     let mut found: Vec<Parameter> = Vec::new();
     let mut rest = text.trim_start();
@@ -268,13 +269,13 @@ fn parameters(text: &str) -> Vec<Parameter> {
         found.push(parameter);
         rest = after.trim_start();
     }
-    // a parameter that is named twice counts once
+    // A duplicate parameter counts once.
     let mut seen = HashSet::new();
     found.retain(|p| seen.insert(p.name.clone()));
     found
 }
 
-/// Length of the default at the start of a text: it ends where white space or nothing follows.
+/// Length of the default at the start of a text, which ends before white space or at the end.
 fn default_length(text: &str) -> Option<usize> {
     let ends_at = |at: usize| text[at..].chars().next().is_none_or(char::is_whitespace);
     for (open, close) in [("${", '}'), ("$(", ')')] {

@@ -1,20 +1,19 @@
-//! Xacro, the macro language of robot descriptions, read as ROS's program reads it (version 2, in
-//! order of the file).
+//! Xacro, the macro language of robot descriptions, with the semantics of ROS's xacro (version 2,
+//! in the order of the file).
 //!
-//! Start at [`expand`]: a file in, one element tree as text out, with the place of every line of
-//! it. The way in between: [`document`] is XML as a tree, [`process`] what the elements of xacro
-//! do, [`macros`] and [`scope`] what they define, [`text`] cuts attributes into pieces,
-//! [`expression`] and [`substitution`] give the pieces their values, [`yaml`] reads
-//! `xacro.load_yaml`.
+//! Start at [`expand`], which converts a file to one element tree as text, with the origin of each
+//! line. Modules: [`document`] holds XML as a tree, [`process`] implements the elements of xacro,
+//! [`macros`] and [`scope`] what they define, [`text`] splits attributes into pieces,
+//! [`expression`] and [`substitution`] evaluate the pieces, [`yaml`] reads `xacro.load_yaml`.
 //!
-//! A file is read from anywhere, so nothing here may run away: calls are counted, depth and work
-//! are bounded, and no clock is needed. The result is the same on every machine but for what the
-//! file itself asks of the environment.
+//! Files may be untrusted, so resources are limited: calls, depth and work are counted and bounded,
+//! without a clock. The result is the same on every machine, except for what the file requests from
+//! the environment.
 //!
-//! Not here: comments and processing instructions, which are left out; what a URDF means.
+//! Not here: comments and processing instructions, which are omitted; interpretation of the URDF.
 //!
 //! # Source
-//! <https://github.com/ros/xacro>, version 2.1.1; where it leaves a choice, what it does.
+//! <https://github.com/ros/xacro>, version 2.1.1, whose behaviour is followed in unspecified cases.
 
 mod document;
 mod expression;
@@ -39,54 +38,55 @@ use crate::resolve::Resolver;
 use crate::spelling::closest;
 use crate::{Issue, UrdfError, xml};
 
-/// Work that one document may cost, about the bytes that it looks at and makes.
+/// Maximum work for one document, approximately the number of bytes read and written.
 const MOST_WORK: usize = 100_000_000;
-/// What an element costs, about its memory.
+/// Work charged for an element, approximately its memory (bytes).
 const ELEMENT: usize = 200;
-/// Levels of elements, macros, files and expressions within each other.
+/// Maximum nesting depth of elements, macros, files and expressions.
 const MOST_DEPTH: usize = 5_000;
-/// Files included in each other.
+/// Maximum nesting depth of included files.
 const MOST_FILES: usize = 50;
-/// Largest file, in bytes.
+/// Maximum size of a file (bytes).
 const MOST_BYTES: u64 = 32 << 20;
-/// Stack of the thread that expands: the depth needs about 40 MB of it in a debug build.
+/// Stack size of the expansion thread (bytes); the maximum depth needs about 40 MB in a debug
+/// build.
 const STACK: usize = 256 << 20;
 
-/// A document without any xacro in it.
+/// A document after expansion.
 pub(crate) struct Expanded {
     pub(crate) text: String,
-    /// Where each line of the text comes from.
+    /// Origin of each line of the text.
     pub(crate) origins: Vec<Place>,
-    /// What the file says by `xacro.warning` and the like, and doubts about the arguments.
+    /// Messages of `xacro.warning` etc., and doubts about the arguments.
     pub(crate) remarks: Vec<Finding>,
-    /// Macros that are defined and not called, if there is nothing else.
+    /// Macros that are defined but not called, if the document has nothing else.
     pub(crate) idle_macros: Vec<String>,
 }
 
-/// True for the ending of xacro files.
+/// Whether the path has the extension of xacro files.
 pub(crate) fn is_xacro(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("xacro"))
 }
 
-/// True if the text has something that only xacro understands.
+/// Whether the text contains xacro syntax.
 pub(crate) fn has_xacro(text: &str) -> bool {
     text.contains("<xacro:") || text.contains("${") || text.contains("$(")
 }
 
-/// The document that a xacro file stands for.
+/// Expands a xacro file.
 ///
-/// * `text`: what the file at `path` holds.
+/// * `text`: content of the file at `path`.
 /// * `arguments`: values of `$(arg name)`.
 ///
 /// # Errors
-/// [`UrdfError::Xacro`] with the place in the file, and the calls that led there.
+/// [`UrdfError::Xacro`] with the place in the file and the enclosing calls.
 pub(crate) fn expand(
     text: &str,
     path: &Path,
     resolver: &Resolver<'_>,
     arguments: &[(String, String)],
 ) -> Result<Expanded, UrdfError> {
-    // Depth is bounded, but may need more stack than the caller has left.
+    // The depth is bounded, but may need more stack than the caller has left.
     std::thread::scope(|threads| {
         let work = || Interpreter::new(path, resolver, arguments).document(text, path);
         let thread = std::thread::Builder::new().stack_size(STACK).spawn_scoped(threads, work);
@@ -97,19 +97,19 @@ pub(crate) fn expand(
 
 type Outcome<T> = Result<T, Box<XacroError>>;
 
-/// What an element becomes: nodes in its place, and attributes for the element around it.
+/// Result of an element: nodes in its place, and attributes for the enclosing element.
 #[derive(Default)]
 struct Content {
     nodes: Vec<Node>,
     attributes: Vec<(String, String)>,
 }
 
-/// Everything that is known while a document is expanded.
+/// State of the expansion of a document.
 pub(crate) struct Interpreter<'a> {
     resolver: &'a Resolver<'a>,
-    /// Files that are being read, the innermost last.
+    /// Files being read, the innermost last.
     files: Vec<Rc<Path>>,
-    /// Macros that are being called, with the places of the calls.
+    /// Macros being called, with the places of the calls.
     calls: Vec<(String, At)>,
     arguments: BTreeMap<String, String>,
     used_arguments: BTreeSet<String>,
@@ -163,7 +163,7 @@ impl<'a> Interpreter<'a> {
         Ok(Expanded { text: written.text, origins, remarks: self.remarks, idle_macros })
     }
 
-    /// An argument that nothing asks for is probably misspelt.
+    /// Warns about unused arguments, which are probably misspelt.
     fn doubt_arguments(&mut self, given: &[String], path: &Path) {
         for name in given {
             if self.used_arguments.contains(name) || self.declared_arguments.contains(name) {
@@ -185,7 +185,7 @@ impl<'a> Interpreter<'a> {
         }
     }
 
-    /// Counts work, and stops what would never end or not fit.
+    /// Charges work, and fails if the limit is exceeded.
     fn charge(&mut self, work: usize) -> Result<(), Trouble> {
         self.work = self.work.saturating_add(work);
         if self.work <= MOST_WORK {
@@ -195,7 +195,7 @@ impl<'a> Interpreter<'a> {
             .help("does a macro call itself without an end, or a list grow with every call?"))
     }
 
-    /// One level deeper; the caller takes it back.
+    /// Enters one nesting level; the caller leaves it.
     fn deeper(&mut self) -> Result<(), Trouble> {
         self.depth += 1;
         if self.depth <= MOST_DEPTH {
@@ -205,7 +205,7 @@ impl<'a> Interpreter<'a> {
             .help("does one of them use itself without an end?"))
     }
 
-    /// The text of a file that the document asks for.
+    /// Reads a file that the document refers to.
     fn read(&mut self, path: &Path) -> Result<String, Trouble> {
         let failed = |what: String| {
             Trouble::new(format!("{} cannot be read: {what}", path.display())).help("correct the path, or the package")
@@ -222,7 +222,7 @@ impl<'a> Interpreter<'a> {
         xml::decode(bytes, path).map_err(|issue| Trouble::new(issue.to_string()))
     }
 
-    /// A fault at a place, with the calls and files that led there.
+    /// Creates an error at a place, with the enclosing calls and files.
     fn fault(&self, at: &At, trouble: Trouble) -> Box<XacroError> {
         let calls = self.calls.iter().rev().map(|(name, at)| format!("in the macro {name:?}, called at {at}"));
         let outer = self.files[..self.files.len().saturating_sub(1)].iter().rev();
@@ -239,7 +239,7 @@ impl<'a> Interpreter<'a> {
     }
 }
 
-/// The ends of a long way; the middle repeats itself.
+/// Keeps the ends of a long trail and omits the middle.
 fn shortened_trail(mut trail: Vec<String>) -> Vec<String> {
     if trail.len() > 12 {
         let left_out = format!("... {} more ...", trail.len() - 10);
@@ -248,7 +248,7 @@ fn shortened_trail(mut trail: Vec<String>) -> Vec<String> {
     trail
 }
 
-/// What counts as true or false in a condition; `None` if it is neither.
+/// Truth value of a condition; `None` if it has none.
 fn boolean(value: &Value) -> Option<bool> {
     match value {
         Value::Str(text) => match &**text {

@@ -1,4 +1,4 @@
-//! What the elements of xacro do, one after the other in the order of the file.
+//! Processing of xacro elements in the order of the file.
 
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -13,7 +13,7 @@ use crate::error::XacroError;
 use crate::finding::Severity;
 
 impl Interpreter<'_> {
-    /// An element that is not xacro's, with everything in it evaluated.
+    /// Evaluates an element that is not xacro's, with all its content.
     pub(super) fn element(&mut self, element: &Element, macros: &Rc<Macros>, scope: &Scope) -> Outcome<Element> {
         let at = &element.at;
         self.charge(ELEMENT + 60 * element.attributes.len()).map_err(|e| self.fault(at, e))?;
@@ -41,14 +41,14 @@ impl Interpreter<'_> {
         Ok(done)
     }
 
-    /// Namespaces are declared once, at the root of the result.
+    /// Collects namespaces, which are declared once, at the root of the result.
     fn declare(&mut self, name: &str, uri: &str) {
         if name != "xmlns:xacro" && !self.namespaces.iter().any(|(n, _)| n == name) {
             self.namespaces.push((name.to_owned(), uri.to_owned()));
         }
     }
 
-    /// Nodes one after the other: what a later one may use, an earlier one has defined.
+    /// Processes nodes in sequence: later ones may use what earlier ones define.
     pub(super) fn children(&mut self, nodes: &[Node], macros: &Rc<Macros>, scope: &Scope) -> Outcome<Content> {
         let mut content = Content::default();
         for node in nodes {
@@ -112,7 +112,7 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// An attribute that must be there.
+    /// A required attribute.
     pub(super) fn required<'e>(&mut self, element: &'e Element, name: &str) -> Outcome<&'e str> {
         element.attribute(name).ok_or_else(|| {
             let trouble = Trouble::new(format!("<{}> has no attribute {name:?}", element.name));
@@ -120,7 +120,7 @@ impl Interpreter<'_> {
         })
     }
 
-    /// The text of an attribute that must be there and not be empty, evaluated.
+    /// Evaluated text of a required attribute, which must not be empty.
     pub(super) fn attribute_text(&mut self, element: &Element, name: &str, scope: &Scope) -> Outcome<String> {
         let raw = self.required(element, name)?.to_owned();
         let text = self.shown_text(&raw, scope).map_err(|e| self.fault(&element.at, e))?;
@@ -131,7 +131,7 @@ impl Interpreter<'_> {
         Ok(text)
     }
 
-    /// Says which attributes an element of xacro ignores.
+    /// Warns about attributes that an element of xacro ignores.
     pub(super) fn expect_attributes(&mut self, element: &Element, known: &[&str]) {
         for (name, _) in &element.attributes {
             if !known.contains(&name.as_str()) && !name.starts_with("xmlns") {
@@ -141,14 +141,14 @@ impl Interpreter<'_> {
         }
     }
 
-    /// `<xacro:arg name="..." default="..."/>`
+    /// Handles `<xacro:arg name="..." default="..."/>`.
     fn declare_argument(&mut self, element: &Element, scope: &Scope) -> Outcome<()> {
         let name = self.required(element, "name")?.to_owned();
         self.declared_arguments.insert(name.clone());
         if self.arguments.contains_key(&name) {
             return Ok(());
         }
-        // without a default it is an error only if it is asked for
+        // Without a default it is an error only where it is used.
         if element.attribute("default").is_some() {
             let default = self.required(element, "default")?.to_owned();
             let value = self.shown_text(&default, scope).map_err(|e| self.fault(&element.at, e))?;
@@ -157,7 +157,7 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// `<xacro:property name="..." value="..."/>`, or with a block inside.
+    /// Handles `<xacro:property name="..." value="..."/>`, or with a block inside.
     fn property_element(&mut self, element: &Rc<Element>, scope: &Scope) -> Outcome<()> {
         let at = &element.at;
         let mut name = self.attribute_text(element, "name", scope)?;
@@ -206,7 +206,7 @@ impl Interpreter<'_> {
             },
             _ => None,
         };
-        // What leaves its scope is evaluated where it stands.
+        // A property set in another scope is evaluated in the current one.
         let eager = target.is_some() || !lazy;
         let value = match &value {
             Value::Str(text) if eager => self.text(text, scope).map_err(|e| self.fault(at, e))?,
@@ -216,7 +216,7 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// A Boolean attribute.
+    /// Evaluates a Boolean attribute.
     fn flag(&mut self, element: &Element, name: &str, default: bool, scope: &Scope) -> Outcome<bool> {
         let Some(text) = element.attribute(name) else { return Ok(default) };
         let at = &element.at;
@@ -224,7 +224,7 @@ impl Interpreter<'_> {
         boolean(&value).ok_or_else(|| self.fault(at, not_boolean(text, &value)))
     }
 
-    /// `<xacro:insert_block name="..."/>`
+    /// Handles `<xacro:insert_block name="..."/>`.
     fn insert_block(&mut self, element: &Element, macros: &Rc<Macros>, scope: &Scope) -> Outcome<Vec<Node>> {
         let at = &element.at;
         let name = self.required(element, "name")?.to_owned();
@@ -238,7 +238,7 @@ impl Interpreter<'_> {
                 return Ok(content.nodes);
             }
             let mut content = Content::default();
-            // the block itself is taken as it is, even if it is an element of xacro
+            // The block itself is inserted as it is, even if it is an element of xacro.
             let done = self.element(&block, macros, scope)?;
             content.nodes.push(Node::Element(Rc::new(done)));
             return Ok(content.nodes);
@@ -248,7 +248,7 @@ impl Interpreter<'_> {
         Err(self.fault(at, trouble.help(help)))
     }
 
-    /// `<xacro:include filename="..." ns="..." optional="..."/>`
+    /// Handles `<xacro:include filename="..." ns="..." optional="..."/>`.
     fn include(&mut self, element: &Element, macros: &Rc<Macros>, scope: &Scope) -> Outcome<Vec<Node>> {
         let at = &element.at;
         self.expect_attributes(element, &["filename", "ns", "optional"]);
@@ -298,8 +298,8 @@ impl Interpreter<'_> {
         Ok(content.nodes)
     }
 
-    /// The files that a name means: one, or all that fit its `*`, `?` and `[...]` in the order of
-    /// their names.
+    /// Files that a name refers to: one, or all that match its `*`, `?` and `[...]`, ordered by
+    /// name.
     fn matching(&mut self, spec: &str, at: &At) -> Outcome<Vec<PathBuf>> {
         let path = self.beside(spec);
         if !spec.contains(['*', '?', '[']) || path.is_file() {
@@ -341,10 +341,10 @@ fn not_boolean(text: &str, value: &Value) -> Trouble {
     trouble.help("expected are true, false, a number or a comparison; texts are compared as ${x == 'a'}")
 }
 
-/// Whether a name fits a pattern of `*`, `?` and `[...]`.
+/// Whether a name matches a pattern of `*`, `?` and `[...]`.
 fn fits(pattern: &str, name: &str) -> bool {
     let (pattern, name): (Vec<char>, Vec<char>) = (pattern.chars().collect(), name.chars().collect());
-    // where the last star stands, and what it has taken
+    // Position of the last star, and of the name part that it has consumed.
     let (mut p, mut n, mut star) = (0, 0, None);
     while n < name.len() {
         match one(&pattern[p..], name[n]) {
@@ -365,7 +365,7 @@ fn fits(pattern: &str, name: &str) -> bool {
     pattern[p..].iter().all(|c| *c == '*')
 }
 
-/// Length of the pattern's first part if it stands for the letter.
+/// Length of the pattern's first part if it matches the character.
 fn one(pattern: &[char], letter: char) -> Option<usize> {
     match pattern.first()? {
         '*' => None,

@@ -1,7 +1,7 @@
-//! Properties by name: one table for the document, one for each macro call and each namespace.
+//! Properties by name: one table for the document, and one for each macro call and namespace.
 //!
-//! A name that a table does not have is looked for in the one it was made from: that of the caller,
-//! as ROS's xacro does. Texts are evaluated at their first use.
+//! A name missing in a table is looked up in its parent: that of the caller, as in ROS's xacro.
+//! Texts are evaluated at first use.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -14,11 +14,11 @@ use super::{Interpreter, boolean};
 
 pub(crate) type Scope = Rc<Table>;
 
-/// Properties of one place in the document.
+/// Properties of one scope.
 pub(crate) struct Table {
     entries: RefCell<HashMap<String, Entry>>,
     parent: Option<Scope>,
-    /// Made by an include with a namespace.
+    /// Whether it was created by an include with a namespace.
     is_namespace: bool,
 }
 
@@ -31,7 +31,7 @@ struct Entry {
 
 #[derive(Clone, Copy, PartialEq)]
 enum State {
-    /// A text that was not looked at.
+    /// Text that was not evaluated yet.
     Unevaluated,
     Evaluating,
     Known,
@@ -50,12 +50,13 @@ impl Table {
         Rc::new(Self { entries: RefCell::default(), parent: Some(parent.clone()), is_namespace: true })
     }
 
-    /// A value that is known.
+    /// Defines a known value.
     pub(crate) fn define(&self, name: &str, value: Value) {
         self.put(name, value, State::Known, None);
     }
 
-    /// A value as an attribute gives it: text may be a number, and is evaluated later if `lazy`.
+    /// Sets a value from an attribute: text may be converted to a number, and is evaluated later if
+    /// `lazy`.
     pub(crate) fn set(&self, name: &str, value: Value, lazy: bool, at: &At) {
         let value = literal(value);
         let unevaluated = lazy && matches!(value, Value::Str(_));
@@ -71,7 +72,7 @@ impl Table {
         self.entries.borrow().contains_key(name) || self.parent.as_ref().is_some_and(|p| p.contains(name))
     }
 
-    /// Removes a name here and in all tables that this one was made from.
+    /// Removes a name here and in all parent tables.
     pub(crate) fn remove(&self, name: &str) {
         self.entries.borrow_mut().remove(name);
         if let Some(parent) = &self.parent {
@@ -79,7 +80,7 @@ impl Table {
         }
     }
 
-    /// Names that can be used here.
+    /// Names that are visible here.
     pub(crate) fn names(&self) -> Vec<String> {
         let mut names: Vec<String> = self.entries.borrow().keys().filter(|n| !n.starts_with('*')).cloned().collect();
         names.extend(self.parent.iter().flat_map(|p| p.names()));
@@ -89,7 +90,7 @@ impl Table {
     }
 }
 
-/// The table of the document.
+/// Returns the table of the document.
 pub(crate) fn top(scope: &Scope) -> Scope {
     let mut table = scope;
     while let Some(parent) = &table.parent {
@@ -98,7 +99,7 @@ pub(crate) fn top(scope: &Scope) -> Scope {
     table.clone()
 }
 
-/// Where `scope="parent"` leads: out of the macro, past the namespaces that it was called through.
+/// Target of `scope="parent"`: the scope outside the macro, skipping the namespaces of the call.
 pub(crate) fn outer(scope: &Scope) -> Option<Scope> {
     let mut target = scope.parent.clone()?;
     while !scope.is_namespace && target.is_namespace {
@@ -108,13 +109,13 @@ pub(crate) fn outer(scope: &Scope) -> Option<Scope> {
     Some(target)
 }
 
-/// Text in single quotes loses them; text that is a number or a Boolean becomes one.
+/// Removes single quotes from text; converts text to a number or a Boolean if possible.
 fn literal(value: Value) -> Value {
     let Value::Str(text) = &value else { return value };
     if text.len() >= 2 && text.starts_with('\'') && text.ends_with('\'') {
         return Value::text(&text[1..text.len() - 1]);
     }
-    // Python would read 1_000 as a number: names such as 2_1 stay text
+    // Python would read 1_000 as a number; names such as 2_1 remain text.
     if text.contains('_') {
         return value;
     }
@@ -122,7 +123,7 @@ fn literal(value: Value) -> Value {
     number.or_else(|| boolean(&value).map(Value::Bool)).unwrap_or(value)
 }
 
-/// Whether a property may be called so: as a variable of Python.
+/// Whether a property may have this name, which must be a Python identifier.
 pub(crate) fn is_name(name: &str) -> bool {
     let mut letters = name.chars();
     letters.next().is_some_and(|c| c.is_alphabetic() || c == '_')
@@ -131,7 +132,7 @@ pub(crate) fn is_name(name: &str) -> bool {
 }
 
 impl Interpreter<'_> {
-    /// The value of a name in a scope; a text is evaluated now, in the table that holds it.
+    /// Value of a name in a scope; a text is evaluated now, in the table that holds it.
     pub(crate) fn property(&mut self, scope: &Scope, name: &str) -> Result<Option<Value>, Trouble> {
         let mut table = scope;
         let entry = loop {

@@ -14,7 +14,7 @@ use crate::spelling::closest;
 const COMMANDS: [&str; 7] = ["arg", "find", "env", "optenv", "eval", "dirname", "cwd"];
 
 impl Interpreter<'_> {
-    /// The text for what stands between `$(` and `)`.
+    /// Evaluates the text between `$(` and `)`.
     pub(crate) fn substitution(&mut self, inner: &str) -> Result<String, Trouble> {
         if let Some(expression) = inner.strip_prefix("eval ") {
             return self.eval(expression);
@@ -43,7 +43,7 @@ impl Interpreter<'_> {
         Ok(text)
     }
 
-    /// The value of an argument of the document.
+    /// Value of an argument of the document.
     pub(crate) fn argument(&mut self, name: &str) -> Result<String, Trouble> {
         self.used_arguments.insert(name.to_owned());
         self.arguments.get(name).cloned().ok_or_else(|| {
@@ -65,7 +65,8 @@ impl Interpreter<'_> {
         Ok(folder)
     }
 
-    /// `$(eval ...)`: arguments are names, as numbers where they look like numbers.
+    /// Evaluates `$(eval ...)`: arguments are variables, converted to numbers if they look like
+    /// numbers.
     fn eval(&mut self, expression: &str) -> Result<String, Trouble> {
         let scope = Table::root();
         for (name, value) in &self.arguments {
@@ -79,13 +80,13 @@ impl Interpreter<'_> {
         self.shown(&value)
     }
 
-    /// The file that is being read, as an absolute path.
+    /// Absolute path of the file being read.
     fn here(&self) -> PathBuf {
         let file: &Path = self.files.last().map_or(Path::new("."), |file| file);
         std::path::absolute(file).unwrap_or_else(|_| file.to_owned())
     }
 
-    /// A path that may be relative to the file that is being read.
+    /// Resolves a path relative to the file being read.
     pub(crate) fn beside(&self, path: &str) -> PathBuf {
         match self.files.last().and_then(|file| file.parent()) {
             Some(folder) => folder.join(path),

@@ -1,11 +1,11 @@
-//! Text with `${expressions}` and `$(substitutions)` in it.
+//! Text that contains `${expressions}` and `$(substitutions)`.
 
 use super::Interpreter;
 use super::expression::value::Value;
 use super::expression::{Trouble, shortened};
 use super::scope::Scope;
 
-/// A stretch of text.
+/// Piece of a text.
 #[derive(Debug, PartialEq)]
 enum Piece<'t> {
     Plain(&'t str),
@@ -15,8 +15,8 @@ enum Piece<'t> {
     Substitution(&'t str),
 }
 
-/// Cuts a text: an expression ends at the first `}`, a substitution at the first `)`; `$${` stands
-/// for `${`.
+/// Splits a text: an expression ends at the first `}`, a substitution at the first `)`; `$${`
+/// escapes `${`.
 fn pieces(text: &str) -> Result<Vec<Piece<'_>>, Trouble> {
     let mut found = Vec::new();
     let mut rest = text;
@@ -36,7 +36,7 @@ fn pieces(text: &str) -> Result<Vec<Piece<'_>>, Trouble> {
             found.push(if open == '{' { Piece::Expression(inner) } else { Piece::Substitution(inner) });
             end + 1
         } else {
-            // dollars before anything else are text, as far as the next one
+            // Other dollar signs are plain text, up to the next one.
             let end = rest[dollars..].find('$').map_or(rest.len(), |at| at + dollars);
             found.push(Piece::Plain(&rest[..end]));
             end
@@ -47,7 +47,7 @@ fn pieces(text: &str) -> Result<Vec<Piece<'_>>, Trouble> {
 }
 
 impl Interpreter<'_> {
-    /// The value of a text: that of its only piece, or all of them put together.
+    /// Value of a text: that of its only piece, or all pieces concatenated.
     pub(crate) fn text(&mut self, text: &str, scope: &Scope) -> Result<Value, Trouble> {
         self.charge(text.len())?;
         if !text.contains('$') {
@@ -72,7 +72,7 @@ impl Interpreter<'_> {
     fn piece(&mut self, piece: &Piece<'_>, scope: &Scope) -> Result<Value, Trouble> {
         match piece {
             Piece::Plain(text) => Ok(Value::text(text)),
-            // what stands inside may have pieces of its own
+            // The inner text may contain pieces itself.
             Piece::Expression(inner) => {
                 let inner = self.inner(inner, scope)?;
                 self.expression(&inner, scope)
@@ -84,7 +84,7 @@ impl Interpreter<'_> {
         }
     }
 
-    /// The value of a text, as text again.
+    /// Value of a text, converted to text.
     pub(crate) fn shown_text(&mut self, text: &str, scope: &Scope) -> Result<String, Trouble> {
         let value = self.text(text, scope)?;
         self.shown(&value)

@@ -11,9 +11,9 @@ use super::expression::unique;
 use super::expression::value::{Value, float_of, lookup};
 use super::scope::Table;
 
-/// Maximum number of values of a file, those behind aliases counted each time.
+/// Maximum number of values of a file, with those behind aliases counted each time.
 const MOST_VALUES: usize = 1_000_000;
-/// Tags that multiply by a unit: to rad and to m.
+/// Tags that multiply by a unit, with the factor to rad or m.
 const UNITS: [(&str, f64); 6] = [
     ("radians", 1.0),
     ("degrees", std::f64::consts::PI / 180.0),
@@ -24,7 +24,7 @@ const UNITS: [(&str, f64); 6] = [
 ];
 
 impl Interpreter<'_> {
-    /// The content of a YAML file; its path is relative to the file that is being read.
+    /// Content of a YAML file; its path is relative to the file being read.
     pub(crate) fn load_yaml(&mut self, path: &str) -> Result<Value, Trouble> {
         let path = self.beside(path);
         let text = self.read(&path)?;
@@ -65,7 +65,7 @@ impl Interpreter<'_> {
         }
     }
 
-    /// A dictionary of keys and values by turns. What `<<` brings stands before the rest.
+    /// Builds a dictionary from alternating keys and values. The content of `<<` precedes the rest.
     fn dictionary(&mut self, values: Vec<Value>) -> Result<Value, Trouble> {
         let (mut pairs, mut merged) = (Vec::new(), Vec::new());
         let mut values = values.into_iter();
@@ -83,7 +83,7 @@ impl Interpreter<'_> {
             }
         }
         merged.extend(pairs);
-        // Each key is looked for among the ones before.
+        // Each key is compared with all previous ones.
         self.charge(merged.len() * merged.len() / 2)?;
         Ok(Value::Dict(Rc::new(unique(merged))))
     }
@@ -114,7 +114,7 @@ impl From<YamlError> for Trouble {
     }
 }
 
-/// What PyYAML makes of text without quotes.
+/// Converts an unquoted scalar like PyYAML.
 fn plain(text: &str) -> Value {
     match text {
         "" | "~" | "null" | "Null" | "NULL" => return Value::None,
@@ -143,7 +143,7 @@ fn whole(text: &str) -> Option<i128> {
     } else if let Some(hex) = digits.strip_prefix("0x") {
         only(hex, 16)
     } else if digits.contains(':') {
-        // sixties, as in 1:30
+        // Sexagesimal numbers such as 1:30.
         let parts: Option<Vec<i128>> = digits.split(':').map(|part| only(part, 10)).collect();
         let parts = parts.filter(|p| !digits.starts_with('0') && p[1..].iter().all(|x| *x < 60));
         parts.and_then(|parts| parts.iter().try_fold(0i128, |sum, part| sum.checked_mul(60)?.checked_add(*part)))
@@ -157,7 +157,7 @@ fn whole(text: &str) -> Option<i128> {
     Some(sign * value?)
 }
 
-/// A decimal needs a dot, and its exponent a sign.
+/// A decimal needs a point, and its exponent a sign.
 fn decimal(text: &str) -> Option<f64> {
     let (sign, digits) = sign(text);
     match digits {

@@ -1,4 +1,4 @@
-//! Small robots and a folder for files, shared by the tests.
+//! Small robots and a temporary folder, shared by the tests.
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use flexarm_urdf::{Problem, ReadOptions, parse_urdf};
 
-/// A folder of its own that is removed at the end.
+/// A temporary folder that is removed at the end.
 pub(crate) struct TestFolder(pub(crate) PathBuf);
 
 impl TestFolder {
@@ -38,11 +38,11 @@ impl AsRef<Path> for TestFolder {
     }
 }
 
-/// A sound `<inertial>`.
+/// A valid `<inertial>`.
 pub(crate) const INERTIAL: &str =
     r#"<inertial><mass value="2"/><inertia ixx="0.02" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial>"#;
 
-/// A link with sound mass.
+/// A link with valid mass.
 pub(crate) fn link(name: &str) -> String {
     format!("<link name=\"{name}\">{INERTIAL}</link>\n")
 }
@@ -59,12 +59,12 @@ pub(crate) fn robot(parts: &[&str]) -> String {
     format!("<robot name=\"r\">\n{}</robot>\n", parts.concat())
 }
 
-/// Two links and a joint, of which one part is given.
+/// Two links and the given joint.
 pub(crate) fn with_joint(joint: &str) -> String {
     robot(&[&link("base"), &link("arm"), joint, "\n"])
 }
 
-/// The faults of a text and their lines.
+/// Faults of a text and their lines.
 pub(crate) fn problems(text: &str) -> Vec<(u32, Problem)> {
     problems_with(text, &ReadOptions::default())
 }

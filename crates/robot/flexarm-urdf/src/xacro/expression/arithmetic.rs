@@ -1,4 +1,4 @@
-//! Operators on values, with Python's rules for signs, whole numbers and texts.
+//! Operators on values, with Python's rules for signs, integers and strings.
 
 use std::cmp::Ordering;
 use std::rc::Rc;
@@ -38,7 +38,7 @@ pub(super) fn unary(sign: &str, operand: &Value) -> Result<Value, Trouble> {
     })
 }
 
-/// `left sign right`; what needs memory is announced before.
+/// Evaluates `left sign right`; memory is charged before it is allocated.
 pub(super) fn binary(
     sign: &str,
     left: &Value,
@@ -108,7 +108,7 @@ fn whole(sign: &str, a: i128, b: i128) -> Result<Value, Trouble> {
         "**" if b < 0 => return Ok(Value::Float((a as f64).powf(b as f64))),
         "**" => match u32::try_from(b) {
             Ok(exponent) => a.checked_pow(exponent),
-            // only these stay small
+            // Only these bases have integer results for other exponents.
             Err(_) if a == 0 || a == 1 => Some(a),
             Err(_) if a == -1 => Some(if b % 2 == 0 { 1 } else { -1 }),
             Err(_) => None,
@@ -126,7 +126,7 @@ fn whole(sign: &str, a: i128, b: i128) -> Result<Value, Trouble> {
     value.map(Value::Int).ok_or_else(too_large)
 }
 
-/// `None` if floats do not have the operator.
+/// Float arithmetic; `None` if floats do not have the operator.
 fn decimal(sign: &str, a: f64, b: f64) -> Option<Result<Value, Trouble>> {
     let by_zero = matches!(sign, "/" | "//" | "%") && b == 0.0;
     let pole = sign == "**" && a == 0.0 && b < 0.0;
@@ -152,7 +152,7 @@ fn decimal(sign: &str, a: f64, b: f64) -> Option<Result<Value, Trouble>> {
     Some(Ok(Value::Float(value)))
 }
 
-/// Quotient and remainder as CPython computes them: the remainder has the sign of the divisor.
+/// Quotient and remainder as in CPython: the remainder has the sign of the divisor.
 pub(super) fn floor_division(a: f64, b: f64) -> (f64, f64) {
     let mut remainder = a % b;
     let mut quotient = (a - remainder) / b;

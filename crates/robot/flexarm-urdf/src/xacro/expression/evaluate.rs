@@ -1,4 +1,4 @@
-//! A tree to its value.
+//! Evaluation of an expression tree.
 
 use std::rc::Rc;
 
@@ -93,8 +93,8 @@ impl Interpreter<'_> {
         })
     }
 
-    /// Counts a value with all that is in it, before it is printed or compared: lists may share
-    /// their elements, and be much larger than what they take.
+    /// Charges a value with all its elements before it is printed or compared: lists may share
+    /// their elements, and be much larger than their memory.
     pub(crate) fn charge_whole(&mut self, value: &Value) -> Result<(), Trouble> {
         self.charge(value.size())?;
         match value {
@@ -107,7 +107,7 @@ impl Interpreter<'_> {
         }
     }
 
-    /// A value as text.
+    /// Converts a value to text.
     pub(crate) fn shown(&mut self, value: &Value) -> Result<String, Trouble> {
         self.charge_whole(value)?;
         Ok(value.shown())
@@ -117,7 +117,7 @@ impl Interpreter<'_> {
         trees.iter().map(|tree| self.evaluate(tree, scope)).collect()
     }
 
-    /// The first value that is as true as `wanted`, else the last one: `and`, `or`.
+    /// First value with the truth value `wanted`, otherwise the last one: `and`, `or`.
     fn until(&mut self, terms: &[Expr], scope: &Scope, wanted: bool) -> Result<Value, Trouble> {
         let mut value = Value::Bool(!wanted);
         for term in terms {
@@ -129,7 +129,7 @@ impl Interpreter<'_> {
         Ok(value)
     }
 
-    /// A property, else what the language brings.
+    /// Looks up a property, otherwise a built-in name.
     fn name(&mut self, name: &str, scope: &Scope) -> Result<Value, Trouble> {
         if let Some(value) = self.property(scope, name)? {
             return Ok(value);
@@ -166,7 +166,7 @@ impl Interpreter<'_> {
         named: &[(String, Expr)],
         scope: &Scope,
     ) -> Result<Value, Trouble> {
-        // a method, unless the owner is a module or a namespace
+        // A method call, unless the owner is a module or a namespace.
         let method = match function {
             Expr::Attribute(owner, name) => match self.evaluate(owner, scope)? {
                 Value::Module(_) | Value::Namespace(_) => None,
@@ -245,7 +245,7 @@ fn missing_key(items: &[(Value, Value)], name: &str) -> Trouble {
     }
 }
 
-/// What a loop over the value sees.
+/// Elements that a loop over the value visits.
 pub(super) fn elements(value: &Value) -> Result<Vec<Value>, Trouble> {
     Ok(match value {
         Value::List(items) | Value::Tuple(items) => items.to_vec(),
@@ -255,7 +255,7 @@ pub(super) fn elements(value: &Value) -> Result<Vec<Value>, Trouble> {
     })
 }
 
-/// The last value of each key, at the place of the first one.
+/// Keeps the last value of each key, at the position of the first one.
 pub(crate) fn unique(pairs: Vec<(Value, Value)>) -> Vec<(Value, Value)> {
     let mut kept: Vec<(Value, Value)> = Vec::with_capacity(pairs.len());
     for (key, value) in pairs {

@@ -1,4 +1,4 @@
-//! What the language brings: constants, functions of `math`, Python's and xacro's own.
+//! Built-in names: constants, functions of `math`, and those of Python and xacro.
 
 use std::f64::consts;
 use std::rc::Rc;
@@ -80,7 +80,7 @@ const FUNCTIONS: [&str; 68] = [
     "fsum",
 ];
 
-/// A constant, a module or a function.
+/// Returns a constant, a module or a function.
 pub(super) fn named_value(name: &str) -> Option<Value> {
     Some(match name {
         "pi" => Value::Float(consts::PI),
@@ -97,7 +97,7 @@ pub(super) fn named_value(name: &str) -> Option<Value> {
     })
 }
 
-/// Whether a property of that name hides something of the language.
+/// Whether a property of that name hides a built-in one.
 pub(crate) fn is_built_in(name: &str) -> bool {
     named_value(name).is_some()
 }
@@ -167,7 +167,7 @@ fn dict(arguments: &[Value], named: Vec<(String, Value)>) -> Result<Value, Troub
     Ok(Value::Dict(Rc::new(unique(pairs))))
 }
 
-/// A function that needs nothing but its arguments.
+/// A function that depends only on its arguments.
 fn plain(name: &str, arguments: &[Value]) -> Result<Value, Trouble> {
     let numbers: Option<Vec<f64>> = arguments.iter().map(Value::as_float).collect();
     if let Some(value) = numbers.as_deref().and_then(|numbers| of_numbers(name, numbers)) {
@@ -303,7 +303,7 @@ fn not_number(what: &str, text: &str) -> Trouble {
     Trouble::new(format!("{text:?} is not a {what}"))
 }
 
-/// A float to a whole number by a rule; whole numbers stay.
+/// Rounds a float to an integer by a rule; integers are unchanged.
 fn rounded(x: &Value, rule: fn(f64) -> f64) -> Option<Value> {
     match x {
         Value::Float(x) if x.is_finite() && x.abs() < 1e38 => Some(Value::Int(rule(*x) as i128)),
@@ -312,7 +312,7 @@ fn rounded(x: &Value, rule: fn(f64) -> f64) -> Option<Value> {
     }
 }
 
-/// Correctly rounded in decimal, as Python does.
+/// Rounds correctly in decimal, like Python.
 fn round_to(x: &Value, digits: &Value) -> Option<Value> {
     if matches!(digits, Value::None) {
         return rounded(x, f64::round_ties_even);
@@ -330,7 +330,7 @@ fn round_to(x: &Value, digits: &Value) -> Option<Value> {
     }
 }
 
-/// Functions of real numbers; `None` if there is no such function of so many.
+/// Functions of real numbers; `None` if there is no such function with this number of arguments.
 fn of_numbers(name: &str, arguments: &[f64]) -> Option<Result<f64, Trouble>> {
     let value = match (name, arguments) {
         ("sin", [x]) => x.sin(),

@@ -1,4 +1,4 @@
-//! Methods of texts, lists and dictionaries, indices, and the two ways to format.
+//! Methods of strings, lists and dictionaries, indexing, and the two ways of formatting.
 
 use std::rc::Rc;
 
@@ -174,7 +174,7 @@ fn title(text: &str) -> String {
     out
 }
 
-/// `text.format(...)`: `{}`, `{0}`, `{name}`, each with `:spec`.
+/// Evaluates `text.format(...)`: `{}`, `{0}`, `{name}`, each with `:spec`.
 fn format(text: &str, arguments: &[Value], named: &[(String, Value)]) -> Result<String, Trouble> {
     let mut out = String::new();
     let (mut rest, mut next) = (text, 0);
@@ -235,7 +235,7 @@ pub(super) fn percent(format: &str, values: &Value) -> Result<Value, Trouble> {
     }
 }
 
-/// One value by a spec such as `.3f`, `04d`, `>8`, `s`.
+/// Formats one value by a spec such as `.3f`, `04d`, `>8`, `s`.
 fn formatted(value: &Value, spec: &str) -> Result<String, Trouble> {
     let bad = || Trouble::new(format!("the format {spec:?} does not fit {}", value.repr()));
     if spec.is_empty() {

@@ -1,8 +1,9 @@
-//! Expressions between `${` and `}`: Python's, without anything that could leave the document.
+//! Expressions between `${` and `}`: those of Python, without access to anything outside the
+//! document.
 //!
-//! Start at [`Interpreter::expression`]. Tokens, a tree by precedence, then values; what a value
-//! prints as is Python's `repr`, because that is what ends up in the document. Whole numbers have
-//! 128 bits; passing that is an error.
+//! Start at [`Interpreter::expression`]. The text is split into tokens, parsed to a tree by
+//! precedence, and evaluated; values are printed like Python's `repr`, because this text is
+//! inserted in the document. Integers have 128 bits; overflow is an error.
 
 mod arithmetic;
 mod evaluate;
@@ -20,7 +21,7 @@ use value::Value;
 use super::Interpreter;
 use super::scope::Scope;
 
-/// What is wrong in an expression; the place is added where the element is known.
+/// An error in an expression; the place is added where the element is known.
 #[derive(Debug)]
 pub(crate) struct Trouble {
     pub(crate) message: String,
@@ -37,7 +38,7 @@ impl Trouble {
         self
     }
 
-    /// Says what was looked at when it happened.
+    /// Prefixes the message with its context.
     pub(crate) fn within(mut self, what: impl AsRef<str>) -> Self {
         self.message = format!("{}: {}", what.as_ref(), self.message);
         self
@@ -45,7 +46,7 @@ impl Trouble {
 }
 
 impl Interpreter<'_> {
-    /// The value of the text of an expression.
+    /// Evaluates the text of an expression.
     pub(crate) fn expression(&mut self, text: &str, scope: &Scope) -> Result<Value, Trouble> {
         self.charge(8 * text.len())?;
         let value = parse::parse(text).and_then(|tree| self.evaluate(&tree, scope));
@@ -53,7 +54,7 @@ impl Interpreter<'_> {
     }
 }
 
-/// The beginning of a text, for messages.
+/// Beginning of a text, for messages.
 pub(crate) fn shortened(text: &str) -> String {
     let text = text.trim();
     match text.char_indices().nth(80) {

@@ -1,12 +1,12 @@
-//! Tokens to a tree, by precedence; the rules are Python's.
+//! Parser from tokens to a tree by precedence, with Python's rules.
 
 use super::Trouble;
 use super::token::{Token, tokens};
 use super::value::Value;
 
-/// Brackets, signs and conditions nested deeper are not read.
+/// Maximum nesting depth of brackets, signs and conditions.
 const MOST_NESTED: usize = 60;
-/// Longest expression, in tokens.
+/// Maximum number of tokens in an expression.
 const MOST_TOKENS: usize = 4000;
 
 #[derive(Debug)]
@@ -41,7 +41,7 @@ pub(super) enum Expr {
     },
 }
 
-/// A number, a text or one of the three words.
+/// A number, a string or one of the three constants.
 #[derive(Debug)]
 pub(super) enum Constant {
     None,
@@ -71,7 +71,7 @@ pub(super) struct Clause {
     pub(super) conditions: Vec<Expr>,
 }
 
-/// Words that are no names.
+/// Reserved words.
 pub(crate) const KEYWORDS: [&str; 35] = [
     "False", "None", "True", "and", "as", "assert", "async", "await", "break", "class", "continue", "def", "del",
     "elif", "else", "except", "finally", "for", "from", "global", "if", "import", "in", "is", "lambda", "nonlocal",
@@ -94,7 +94,7 @@ pub(super) fn parse(text: &str) -> Result<Expr, Trouble> {
     }
 }
 
-/// Arguments of a call: by place, then by name.
+/// Arguments of a call: positional, then named.
 type Arguments = (Vec<Expr>, Vec<(String, Expr)>);
 
 struct Parser {
@@ -179,7 +179,7 @@ impl Parser {
         }
     }
 
-    /// `a` or `a, b`: a tuple needs no brackets.
+    /// Parses `a` or `a, b`: a tuple needs no brackets.
     fn list_or_one(&mut self) -> Result<Expr, Trouble> {
         let first = self.expression()?;
         if !self.is_sign(",") {
@@ -195,7 +195,7 @@ impl Parser {
         Ok(Expr::Tuple(items))
     }
 
-    /// `a if b else c`
+    /// Parses `a if b else c`.
     fn expression(&mut self) -> Result<Expr, Trouble> {
         self.nested += 1;
         if self.nested > MOST_NESTED {
@@ -270,7 +270,7 @@ impl Parser {
         Ok(if rest.is_empty() { first } else { Expr::Compare(Box::new(first), rest) })
     }
 
-    /// Operators of at least this power, grouped from the left.
+    /// Parses operators of at least this power, left-associative.
     fn binary(&mut self, least: u8) -> Result<Expr, Trouble> {
         let mut left = self.unary()?;
         while let Some(Token::Sign(sign)) = self.peek() {
@@ -299,7 +299,7 @@ impl Parser {
         }
         let base = self.primary()?;
         if self.take_sign("**") {
-            // from the right, and stronger than a sign on its left only
+            // Right-associative; binds more strongly than a sign on its left, but not on its right.
             self.nested += 1;
             if self.nested > MOST_NESTED {
                 return Err(Trouble::new(format!("the expression is nested more than {MOST_NESTED} deep")));
@@ -311,7 +311,7 @@ impl Parser {
         Ok(base)
     }
 
-    /// An atom with calls, attributes and indices behind it.
+    /// Parses an atom followed by calls, attributes and indices.
     fn primary(&mut self) -> Result<Expr, Trouble> {
         let mut tree = self.atom()?;
         loop {
@@ -408,7 +408,7 @@ impl Parser {
             Token::Float(x) => self.constant(Constant::Float(x)),
             Token::Text(mut text) => {
                 self.at += 1;
-                // strings side by side are one
+                // Adjacent strings are concatenated.
                 while let Some(Token::Text(more)) = self.peek() {
                     text.push_str(more);
                     self.at += 1;

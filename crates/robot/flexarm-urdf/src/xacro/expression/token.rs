@@ -1,4 +1,4 @@
-//! Text of an expression to tokens.
+//! Splits the text of an expression into tokens.
 
 use super::Trouble;
 
@@ -12,7 +12,7 @@ pub(super) enum Token {
     Sign(&'static str),
 }
 
-/// Longest first, so that `**` is not read as `*` twice.
+/// Signs, longest first, so that `**` is not read as two `*`.
 const SIGNS: [&str; 31] = [
     "**", "//", "<<", ">>", "<=", ">=", "==", "!=", "+", "-", "*", "/", "%", "(", ")", "[", "]", "{", "}", ",", ":",
     ".", "<", ">", "=", "&", "|", "^", "~", "!", ";",
@@ -89,7 +89,7 @@ fn number(text: &str) -> Result<(Token, usize), Trouble> {
     }
     let digits = text[..end].replace('_', "");
     if whole {
-        // Python refuses 012, to keep people from meaning octal numbers
+        // Python rejects 012, which could be meant as an octal number.
         if digits.len() > 1 && digits.starts_with('0') && digits.bytes().any(|b| b != b'0') {
             return Err(Trouble::new(format!("the number {digits} starts with 0")).help("remove the leading zeros"));
         }
@@ -98,7 +98,7 @@ fn number(text: &str) -> Result<(Token, usize), Trouble> {
     Ok((Token::Float(digits.parse().map_err(|_| bad(end))?), end))
 }
 
-/// A string that starts after `prefix` bytes, its escapes resolved unless it is raw.
+/// Reads a string that starts after `prefix` bytes, with escapes resolved unless it is raw.
 fn string(text: &str, prefix: usize, raw: bool) -> Result<(Token, usize), Trouble> {
     let body = &text[prefix..];
     let quote = if body.starts_with("'''") || body.starts_with("\"\"\"") { &body[..3] } else { &body[..1] };

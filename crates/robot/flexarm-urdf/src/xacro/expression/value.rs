@@ -1,4 +1,4 @@
-//! Values of expressions, printed, compared and tested as Python does.
+//! Values of expressions, with Python's printing, comparison and truth values.
 
 use std::cmp::Ordering;
 use std::rc::Rc;
@@ -6,18 +6,18 @@ use std::rc::Rc;
 use super::super::document::Element;
 use super::super::scope::Table;
 
-/// What a property or an expression may be.
+/// Value of a property or an expression.
 #[derive(Clone)]
 pub(crate) enum Value {
     None,
     Bool(bool),
-    /// Python's whole numbers have no bound; these end at 1.7e38, and passing that is an error.
+    /// Integer; Python's are unbounded, these are limited to 1.7e38, and overflow is an error.
     Int(i128),
     Float(f64),
     Str(Rc<str>),
     List(Rc<Vec<Value>>),
     Tuple(Rc<Vec<Value>>),
-    /// In the order of insertion.
+    /// Dictionary in the order of insertion.
     Dict(Rc<Vec<(Value, Value)>>),
     /// XML kept for `<xacro:insert_block>`.
     Block(Rc<Element>),
@@ -25,7 +25,7 @@ pub(crate) enum Value {
     Function(&'static str),
     /// `math`, `python` or `xacro`.
     Module(&'static str),
-    /// What `<xacro:include ns="...">` makes.
+    /// Namespace of `<xacro:include ns="...">`.
     Namespace(Rc<Table>),
 }
 
@@ -38,7 +38,7 @@ impl Value {
         Self::List(Rc::new(items))
     }
 
-    /// Python's word for the type.
+    /// Python's name of the type.
     pub(crate) fn kind(&self) -> &'static str {
         match self {
             Self::None => "None",
@@ -69,7 +69,7 @@ impl Value {
         }
     }
 
-    /// A whole number; a Boolean counts as one.
+    /// Integer value; a Boolean counts as one.
     pub(crate) fn as_int(&self) -> Option<i128> {
         match self {
             Self::Bool(b) => Some(i128::from(*b)),
@@ -85,7 +85,7 @@ impl Value {
         }
     }
 
-    /// As `str()` gives it, and as it is written into the document.
+    /// Text as from `str()`, as it is written into the document.
     pub(crate) fn shown(&self) -> String {
         match self {
             Self::Str(s) => s.to_string(),
@@ -93,7 +93,7 @@ impl Value {
         }
     }
 
-    /// As `repr()` gives it: strings in quotes.
+    /// Text as from `repr()`, with quoted strings.
     pub(crate) fn repr(&self) -> String {
         let joined = |items: &[Value]| items.iter().map(Self::repr).collect::<Vec<_>>().join(", ");
         match self {
@@ -129,7 +129,7 @@ impl Value {
         }
     }
 
-    /// Python's `<`, for what has an order.
+    /// Python's `<` for values that have an order.
     pub(crate) fn order(&self, other: &Self) -> Option<Ordering> {
         match (self, other) {
             (Self::Str(a), Self::Str(b)) => Some(a.cmp(b)),
@@ -144,7 +144,7 @@ impl Value {
         }
     }
 
-    /// A rough number of bytes, for the account of work.
+    /// Approximate number of bytes, for the work limit.
     pub(crate) fn size(&self) -> usize {
         match self {
             Self::Str(s) => s.len(),
@@ -155,12 +155,12 @@ impl Value {
     }
 }
 
-/// The value of a key.
+/// Value of a key.
 pub(crate) fn lookup<'a>(items: &'a [(Value, Value)], key: &Value) -> Option<&'a Value> {
     items.iter().find(|(k, _)| k.equals(key)).map(|(_, v)| v)
 }
 
-/// The shortest digits that give the number back, laid out as Python's `repr` does.
+/// Shortest digits that restore the number, laid out like Python's `repr`.
 pub(crate) fn float_repr(x: f64) -> String {
     if x.is_nan() {
         return "nan".into();
@@ -196,7 +196,7 @@ fn quoted(text: &str) -> String {
     out
 }
 
-/// What Python's `int()` takes from text.
+/// Parses text like Python's `int()`.
 pub(crate) fn int_of(text: &str) -> Option<i128> {
     let digits = text.trim();
     let bare = digits.strip_prefix(['+', '-']).unwrap_or(digits);
@@ -205,7 +205,7 @@ pub(crate) fn int_of(text: &str) -> Option<i128> {
     plain.then(|| digits.replace('_', "").parse().ok()).flatten()
 }
 
-/// What Python's `float()` takes from text.
+/// Parses text like Python's `float()`.
 pub(crate) fn float_of(text: &str) -> Option<f64> {
     let text = text.trim();
     let bare = text.strip_prefix(['+', '-']).unwrap_or(text).to_ascii_lowercase();
