@@ -24,6 +24,7 @@ pub mod caveat;
 mod fault;
 mod gathered;
 mod quantity;
+mod spelling;
 mod toml_message;
 pub mod written;
 
@@ -34,6 +35,7 @@ pub use caveat::Caveat;
 pub use fault::Fault;
 pub use gathered::gathered;
 pub use quantity::{OutOfRange, Quantity};
+pub use spelling::closest;
 pub use toml_message::without_types;
 
 /// Setting named in a message.

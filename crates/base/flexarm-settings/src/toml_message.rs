@@ -1,5 +1,7 @@
 //! Messages of the TOML parser in terms of files instead of Rust types.
 
+use crate::spelling::closest;
+
 /// Returns the message on one line, without type names: `expected struct TcpEntry` means nothing to
 /// a user.
 #[must_use]
@@ -13,7 +15,35 @@ pub fn without_types(message: &str) -> String {
         }
         None => message,
     };
-    message.replace("invalid type: map", "invalid type: table").replace("expected a map", TABLE)
+    let message = message.replace("invalid type: map", "invalid type: table").replace("expected a map", TABLE);
+    let message = ["f64", "f32"].iter().fold(message, |text, kind| said(&text, kind, "a number"));
+    let whole = ["i64", "i32", "u64", "u32", "u16", "u8", "usize"];
+    suggested(&whole.iter().fold(message, |text, kind| said(&text, kind, "a whole number")))
+}
+
+/// The message with a type of numbers that is expected in words.
+fn said(message: &str, kind: &str, words: &str) -> String {
+    let expected = format!("expected {kind}");
+    match message.split_once(&expected) {
+        Some((before, after)) if !after.starts_with(char::is_alphanumeric) => {
+            format!("{before}expected {words}{after}")
+        }
+        _ => message.to_owned(),
+    }
+}
+
+/// The message about an unknown key or value with the known one that is meant, if one is close.
+fn suggested(message: &str) -> String {
+    let known = message.split_once(", expected ").filter(|(found, _)| found.starts_with("unknown "));
+    let quoted = |text: &str| text.split('`').skip(1).step_by(2).map(str::to_owned).collect::<Vec<_>>();
+    let meant = known.and_then(|(found, expected)| {
+        closest(quoted(found).first()?, quoted(expected).iter().map(String::as_str))
+            .map(|meant| (found, meant, expected))
+    });
+    match meant {
+        Some((found, meant, expected)) => format!("{found}, did you mean `{meant}`? expected {expected}"),
+        None => message.to_owned(),
+    }
 }
 
 #[cfg(test)]
@@ -37,6 +67,13 @@ mod tests {
                 "invalid type: integer `3`, expected a table, { key = value, ... }",
             ),
             ("missing field `section`", "missing field `section`"),
+            ("invalid type: string \"1\", expected f64", "invalid type: string \"1\", expected a number"),
+            ("invalid type: string \"1\", expected usize", "invalid type: string \"1\", expected a whole number"),
+            (
+                "unknown field `payloadd`, expected one of `tcp`, `payload`",
+                "unknown field `payloadd`, did you mean `payload`? expected one of `tcp`, `payload`",
+            ),
+            ("unknown field `x`, expected `mass` or `com`", "unknown field `x`, expected `mass` or `com`"),
         ] {
             assert_eq!(without_types(found), told);
         }

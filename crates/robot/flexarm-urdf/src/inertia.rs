@@ -99,7 +99,7 @@ fn in_link_axes(raw: &RawInertial) -> LinkInertia {
 fn check_names(robot: &RawRobot, names: &[String], what: &str, code: &'static str, report: &mut Report) {
     for name in names.iter().filter(|name| robot.links.iter().all(|l| l.name != **name)) {
         let message = format!("{what} link {name:?}, which does not exist");
-        let help = crate::spelling::closest(name, robot.links.iter().map(|l| l.name.as_str()));
+        let help = flexarm_settings::closest(name, robot.links.iter().map(|l| l.name.as_str()));
         let help = help.map_or_else(String::new, |meant| format!("did you mean {meant:?}?"));
         report.warning(&robot.place, code, message, help);
     }

@@ -10,7 +10,7 @@ use crate::error::Problem;
 use crate::finding::Place;
 use crate::raw::{RawJoint, RawRobot};
 use crate::report::Report;
-use crate::spelling::closest;
+use flexarm_settings::closest;
 
 /// Tolerance of the axis length; axes written with four digits of 1/√2 pass without a warning.
 const UNIT_TOLERANCE: f64 = 1e-4;

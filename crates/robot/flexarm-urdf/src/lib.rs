@@ -60,7 +60,6 @@ mod read;
 mod report;
 mod resolve;
 mod shapes;
-mod spelling;
 mod tcp;
 mod tree;
 mod xacro;
@@ -68,6 +67,7 @@ mod xml;
 
 pub use error::{Issue, Problem, UrdfError, XacroError};
 pub use finding::{Finding, Place, Severity};
+pub use flexarm_settings::closest;
 pub use geometry::{Geometry, Visual};
 pub use mesh::{
     CrossSection, MassProperties, MeshError, TriangleMesh, UpAxis, cross_section, load_mesh, load_mesh_with,
@@ -77,5 +77,4 @@ pub use read::{
     parse_urdf, read_urdf,
 };
 pub use resolve::search_paths_from_environment;
-pub use spelling::closest;
 pub use tcp::{default_tcp, tcp_candidates};

@@ -33,8 +33,8 @@ use crate::error::Problem;
 use crate::finding::Place;
 use crate::read::Transmission;
 use crate::report::Report;
-use crate::spelling::closest;
 use crate::xml::{Lines, escaped};
+use flexarm_settings::closest;
 
 /// Maximum number of links and joints of a robot; some checks compare every pair.
 const MOST_ELEMENTS: usize = 4000;

@@ -11,7 +11,7 @@ use flexarm_kinematics::Pose;
 use crate::error::Problem;
 use crate::raw::{RawJoint, RawRobot};
 use crate::report::Report;
-use crate::spelling::closest;
+use flexarm_settings::closest;
 
 /// Reports duplicate names of links and joints; later checks use only the first.
 pub(crate) fn check_names(robot: &RawRobot, report: &mut Report) {

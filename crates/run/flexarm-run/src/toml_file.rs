@@ -24,6 +24,9 @@ pub fn parsed<T: DeserializeOwned>(
     let file: T = toml::from_str(text).map_err(|error| {
         let hint = match error.message().contains("missing field `format`") {
             true => ": add format = 1 as the first line",
+            false if error.message().contains("missing field `kind`") => {
+                ": kind = \"...\" says what the entry is; `flexarm format` lists the kinds"
+            }
             false => "",
         };
         source.unread(error.span(), &format!("{}{hint}", error.message().trim()))

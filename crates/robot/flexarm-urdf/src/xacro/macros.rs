@@ -9,7 +9,7 @@ use super::expression::Trouble;
 use super::expression::value::Value;
 use super::scope::{Scope, Table};
 use super::{Content, Interpreter, Outcome};
-use crate::spelling::closest;
+use flexarm_settings::closest;
 
 /// Maximum depth of nested calls; ROS's xacro fails at about 200.
 const MOST_CALLS: usize = 300;

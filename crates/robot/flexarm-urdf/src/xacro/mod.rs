@@ -35,8 +35,8 @@ use expression::value::{Value, int_of};
 use crate::error::XacroError;
 use crate::finding::{Finding, Place, Severity};
 use crate::resolve::Resolver;
-use crate::spelling::closest;
 use crate::{Issue, UrdfError, xml};
+use flexarm_settings::closest;
 
 /// Maximum work for one document, approximately the number of bytes read and written.
 const MOST_WORK: usize = 100_000_000;

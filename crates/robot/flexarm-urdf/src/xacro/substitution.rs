@@ -9,7 +9,7 @@ use super::Interpreter;
 use super::expression::value::{Value, float_of, int_of};
 use super::expression::{Trouble, shortened};
 use super::scope::Table;
-use crate::spelling::closest;
+use flexarm_settings::closest;
 
 const COMMANDS: [&str; 7] = ["arg", "find", "env", "optenv", "eval", "dirname", "cwd"];
 

@@ -9,7 +9,7 @@ use super::methods::{index, slice};
 use super::parse::{Clause, Expr};
 use super::value::{Value, lookup};
 use super::{Interpreter, Scope, Trouble};
-use crate::spelling::closest;
+use flexarm_settings::closest;
 
 impl Interpreter<'_> {
     pub(super) fn evaluate(&mut self, tree: &Expr, scope: &Scope) -> Result<Value, Trouble> {
