@@ -14,8 +14,7 @@ use crate::values::{plain, word};
 
 /// Static equilibrium at a pose, or at m of them: arrays then have an axis of m in front.
 ///
-/// World axes at the tool, linear first. Poses without an equilibrium have NaN everywhere and stand
-/// in :attr:`failures`.
+/// World axes at the tool, linear first. Poses without an equilibrium have NaN everywhere and stand in :attr:`failures`.
 #[pyclass(frozen, name = "Statics", module = "flexarm")]
 pub(crate) struct PyStatics {
     rows: Option<usize>,
@@ -92,8 +91,7 @@ impl PyStatics {
         Self::array(slf, |_| vec![3], |own| &own.deflection)
     }
 
-    /// Displacement of the tool per wrench on it (m/N, rad/N; m/(N m), rad/(N m)), (6, 6) or (m, 6,
-    /// 6).
+    /// Displacement of the tool per wrench on it (m/N, rad/N; m/(N m), rad/(N m)), (6, 6) or (m, 6, 6).
     #[getter]
     fn compliance<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         Self::array(slf, |_| vec![6, 6], |own| &own.compliance)
@@ -111,8 +109,8 @@ impl PyStatics {
         self.failures.clone()
     }
 
-    /// All that is known of a single pose, found when it is first asked for (dict as ``flexarm
-    /// statics --json``): sag, holding torques, what each element carries.
+    /// All that is known of a single pose, found when it is first asked for (dict as ``flexarm statics --json``): sag,
+    /// holding torques, what each element carries.
     #[getter]
     fn details<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let (arm, q, wrench) = self.asked.as_ref().ok_or_else(|| only_for_one("details"))?;

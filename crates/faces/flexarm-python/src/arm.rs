@@ -187,25 +187,40 @@ impl PyArm {
     ///
     /// The interpreter's lock is given back; Ctrl-C ends the run with readable files.
     ///
-    /// Parameters ---------- motion : Motion, Scenario, str or os.PathLike, optional Where the
-    /// joints go: a file, the name of a shipped motion, or the robot's own motion without it. step
-    /// : float, optional Time step (s), without it that of the stepper: 1e-3, of spook and rk4
-    /// 1e-4. stepper : str, default "generalized-alpha" Or ``"spook"``, ``"rk4"``, ``"reference"``,
-    /// ``"sdirk3"``, ``"extrapolated-alpha"``. stepper_options : dict, optional Settings of the
-    /// stepper, such as ``{"rho": 0.9}``. loads : sequence of Load, or path of a file of loads,
-    /// optional payloads : sequence of Payload, optional start : {"equilibrium", "undeformed"},
-    /// default "equilibrium" log_rate : float, default 500 Samples per second; the nearest whole
-    /// number of steps is used. twin : bool, default True Measure against the rigid robot.
-    /// ignore_limits : bool, default False Run although the motion passes joint limits.
-    /// settling_band : float, default 1e-4 Band of the settling time (m). output : str or
-    /// os.PathLike, optional Folder for recordings and a report; nothing is written without it.
-    /// overwrite : bool, default False formats : sequence of str, optional Recordings to write, of
-    /// ``"csv"``, ``"mcap"``, ``"rrd"``, ``"parquet"``, ``"arrow"``; the usual ones without it.
-    /// figures : bool, default False Also write plots and pictures for papers. magnify : float,
-    /// optional Factor by which recordings show deflections. observer : callable, optional Called
-    /// with each logged :class:`Sample`; if it returns False the run stops with
-    /// :class:`flexarm.Stopped`. progress : bool or callable, default False True for a bar of tqdm
-    /// if that is there; or a function of simulated and total time.
+    /// Parameters
+    /// ----------
+    /// motion : Motion, Scenario, str or os.PathLike, optional
+    ///     Where the joints go: a file, the name of a shipped motion, or the robot's own motion without it.
+    /// step : float, optional
+    ///     Time step (s), without it that of the stepper: 1e-3, of spook and rk4 1e-4.
+    /// stepper : str, default "generalized-alpha"
+    ///     Or ``"spook"``, ``"rk4"``, ``"reference"``, ``"sdirk3"``, ``"extrapolated-alpha"``.
+    /// stepper_options : dict, optional
+    ///     Settings of the stepper, such as ``{"rho": 0.9}``.
+    /// loads : sequence of Load, or path of a file of loads, optional
+    /// payloads : sequence of Payload, optional
+    /// start : {"equilibrium", "undeformed"}, default "equilibrium"
+    /// log_rate : float, default 500
+    ///     Samples per second; the nearest whole number of steps is used.
+    /// twin : bool, default True
+    ///     Measure against the rigid robot.
+    /// ignore_limits : bool, default False
+    ///     Run although the motion passes joint limits.
+    /// settling_band : float, default 1e-4
+    ///     Band of the settling time (m).
+    /// output : str or os.PathLike, optional
+    ///     Folder for recordings and a report; nothing is written without it.
+    /// overwrite : bool, default False
+    /// formats : sequence of str, optional
+    ///     Recordings to write, of ``"csv"``, ``"mcap"``, ``"rrd"``, ``"parquet"``, ``"arrow"``; the usual ones without it.
+    /// figures : bool, default False
+    ///     Also write plots and pictures for papers.
+    /// magnify : float, optional
+    ///     Factor by which recordings show deflections.
+    /// observer : callable, optional
+    ///     Called with each logged :class:`Sample`; if it returns False the run stops with :class:`flexarm.Stopped`.
+    /// progress : bool or callable, default False
+    ///     True for a bar of tqdm if that is there; or a function of simulated and total time.
     ///
     /// Returns
     /// -------
@@ -266,10 +281,13 @@ impl PyArm {
 
     /// Runs many motions or Scenarios on all cores; each has the bits of the run alone.
     ///
-    /// Parameters ---------- runs : sequence of Motion, Scenario, str or os.PathLike step, stepper,
-    /// stepper_options, log_rate, twin, ignore_limits, settling_band As for :meth:`simulate`.
-    /// errors : {"raise", "return"}, default "raise" What becomes of runs that fail: the first one
-    /// is raised, or the exceptions stand in the list.
+    /// Parameters
+    /// ----------
+    /// runs : sequence of Motion, Scenario, str or os.PathLike
+    /// step, stepper, stepper_options, log_rate, twin, ignore_limits, settling_band
+    ///     As for :meth:`simulate`.
+    /// errors : {"raise", "return"}, default "raise"
+    ///     What becomes of runs that fail: the first one is raised, or the exceptions stand in the list.
     ///
     /// Returns
     /// -------
@@ -313,25 +331,31 @@ impl PyArm {
         Ok(list)
     }
 
-    /// How far the tool is off in many runs: figures alone, several runs at a time in vector
-    /// registers, on all cores.
+    /// How far the tool is off in many runs: figures alone, several runs at a time in vector registers, on all cores.
     ///
-    /// Runs are a list, or one motion or Scenario with arrays of parameters; each parameter is one
-    /// for all runs, or an array with one for each. A run has the same bits in any company;
-    /// :meth:`simulate` finds the same within rounding.
+    /// Runs are a list, or one motion or Scenario with arrays of parameters; each parameter is one for all runs, or an array
+    /// with one for each. A run has the same bits in any company; :meth:`simulate` finds the same within rounding.
     ///
-    /// Parameters ---------- runs : sequence of Motion, Scenario, str or os.PathLike, or one of
-    /// them, optional The robot's own motion without it. stiffness, damping : float or array_like,
-    /// shape (m,), default 1 Factors of all stiffnesses and of all damping. time_scale : float or
-    /// array_like, shape (m,), default 1 Each motion in so many times its time: 1.25 is slower, 0.8
-    /// faster. payload_mass : float or array_like, shape (m,), optional What the tool carries from
-    /// the start in the place of the robot's own payload (kg); 0 is nothing. payload_com :
-    /// array_like, shape (3,) or (m, 3), optional Its centre of mass in the link that carries it
-    /// (m). payload_inertia : array_like, shape (3, 3) or (m, 3, 3), optional About the centre of
-    /// mass, axes of the link (kg m²); a point without it. step, stepper, stepper_options,
-    /// ignore_limits As for :meth:`simulate`. samples : bool, default False Keep the deflection
-    /// after every step. errors : {"raise", "nan"}, default "raise" Runs that fail are raised, or
-    /// have NaN and stand in ``failures``.
+    /// Parameters
+    /// ----------
+    /// runs : sequence of Motion, Scenario, str or os.PathLike, or one of them, optional
+    ///     The robot's own motion without it.
+    /// stiffness, damping : float or array_like, shape (m,), default 1
+    ///     Factors of all stiffnesses and of all damping.
+    /// time_scale : float or array_like, shape (m,), default 1
+    ///     Each motion in so many times its time: 1.25 is slower, 0.8 faster.
+    /// payload_mass : float or array_like, shape (m,), optional
+    ///     What the tool carries from the start in the place of the robot's own payload (kg); 0 is nothing.
+    /// payload_com : array_like, shape (3,) or (m, 3), optional
+    ///     Its centre of mass in the link that carries it (m).
+    /// payload_inertia : array_like, shape (3, 3) or (m, 3, 3), optional
+    ///     About the centre of mass, axes of the link (kg m²); a point without it.
+    /// step, stepper, stepper_options, ignore_limits
+    ///     As for :meth:`simulate`.
+    /// samples : bool, default False
+    ///     Keep the deflection after every step.
+    /// errors : {"raise", "nan"}, default "raise"
+    ///     Runs that fail are raised, or have NaN and stand in ``failures``.
     ///
     /// Returns
     /// -------
@@ -381,8 +405,7 @@ impl PyArm {
         PyDeflections::of(found, raises, step_s)
     }
 
-    /// Static equilibrium under weight and a wrench at the tool, drives locked, with compliance and
-    /// natural frequencies.
+    /// Static equilibrium under weight and a wrench at the tool, drives locked, with compliance and natural frequencies.
     ///
     /// Parameters
     /// ----------
@@ -417,8 +440,7 @@ impl PyArm {
         PyStatics::of_one(slf, &mut at, poses, F)
     }
 
-    /// A workspace for one pose after another, for loops in which the calls are to cost nothing
-    /// (OperatingPoint).
+    /// A workspace for one pose after another, for loops in which the calls are to cost nothing (OperatingPoint).
     fn operating_point(slf: &Bound<'_, Self>) -> PyResult<PyOperatingPoint> {
         Ok(PyOperatingPoint::new(slf.get().arm.operating_point().or_raise()?, slf.get().n()))
     }

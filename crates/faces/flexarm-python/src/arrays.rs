@@ -1,8 +1,6 @@
-//! Arrays of numpy: what comes in is checked and named if it is wrong, what goes out is
-//! C-contiguous and not copied.
+//! Arrays of numpy: what comes in is checked and named if it is wrong, what goes out is C-contiguous and not copied.
 //!
-//! A batch has one axis more in front. Start at [`numbers`] for what comes in, [`array`] for what
-//! goes out.
+//! A batch has one axis more in front. Start at [`numbers`] for what comes in, [`array`] for what goes out.
 #![allow(unsafe_code, reason = "an array of numpy that borrows from its owner has no lifetime; see `view`")]
 
 use numpy::ndarray::{Array, ArrayView, Dim, Dimension, IntoDimension, ShapeError};
@@ -56,8 +54,7 @@ fn shape_of(shape: &[usize]) -> String {
     }
 }
 
-/// An array of `float64` as it is, or made of what is nearly one: lists, integers, other orders in
-/// memory.
+/// An array of `float64` as it is, or made of what is nearly one: lists, integers, other orders in memory.
 fn floats<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     if let Ok(array) = value.cast::<PyArrayDyn<f64>>()
         && array.is_c_contiguous()
@@ -199,8 +196,8 @@ where
     let wrong = |error: ShapeError| PyValueError::new_err(format!("a result has no shape {shape:?}: {error}"));
     let view = ArrayView::from_shape(shape.as_slice(), values).map_err(wrong)?;
     // SAFETY: the numbers are borrowed from the owner for any lifetime, so they stay valid and
-    // unchanged as long as it lives: a frozen class gives out no `&mut`. The array holds a
-    // reference to the owner.
+    // unchanged as long as it lives: a frozen class gives out no `&mut`. The array holds a reference
+    // to the owner.
     let array = unsafe { PyArray::borrow_from_array(&view, owner.clone().into_any()) };
     array.readwrite().make_nonwriteable();
     Ok(array.into_any())

@@ -1,5 +1,4 @@
-//! Caveats: what is probably wrong with an input, or limits the worth of a result, as warnings of
-//! their own class.
+//! Caveats: what is probably wrong with an input, or limits the worth of a result, as warnings of their own class.
 
 use flexarm::{Caveat, gathered, written};
 use pyo3::call::PyCallArgs;
@@ -51,8 +50,7 @@ pub(crate) fn tell(py: Python<'_>, caveats: &[Caveat]) -> PyResult<()> {
     Ok(())
 }
 
-/// Sentences as they may be logged: those of one kind as one, without characters that a terminal
-/// obeys.
+/// Sentences as they may be logged: those of one kind as one, without characters that a terminal obeys.
 pub(crate) fn sentences(texts: &[String]) -> Vec<String> {
     gathered(texts).iter().map(|text| written::message(text)).collect()
 }

@@ -6,8 +6,7 @@ use std::sync::Once;
 
 use pyo3::prelude::*;
 
-/// From the first call of the library on, messages name keyword arguments; a process that is a
-/// command line names flags before.
+/// From the first call of the library on, messages name keyword arguments; a process that is a command line names flags before.
 pub(crate) fn name_keywords() {
     static NAMED: Once = Once::new();
     NAMED.call_once(|| {

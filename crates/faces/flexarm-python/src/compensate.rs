@@ -38,8 +38,7 @@ impl PyCompensated {
         self.motion.clone_ref(py)
     }
 
-    /// Error of the tool with the motion as it was (dict): ``peak_m``, ``rms_m``, ``peak_rad``,
-    /// ``end_m``.
+    /// Error of the tool with the motion as it was (dict): ``peak_m``, ``rms_m``, ``peak_rad``, ``end_m``.
     #[getter]
     fn before<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.figures.plain(py)?.get_item("before")
@@ -97,25 +96,45 @@ impl Pickled for PyCompensated {
 
 /// Finds joint commands with which the tool of a flexible arm follows the path of the rigid one.
 ///
-/// Parameters ---------- robot : Robot motion : Motion, Scenario or path, optional The robot's own
-/// motion without it. method : {"dynamic", "static"}, default "dynamic" With inertia and damping,
-/// iterated on the simulation; or weight alone, point by point. components : sequence of str,
-/// optional Which of x, y, z, rx, ry, rz of the tool count; all without it. iterations : int,
-/// default 5 cutoff_hz : float, optional Highest frequency that is corrected. shaper : {"zv",
-/// "zvd", "optimal"}, optional Run the motion through a shaper before: of the first mode at its
-/// end, or what leaves least of all modes there within ``delay``. delay : float, optional At most
-/// so much longer the motion is with the optimal shaper (s); a period of the first mode without it.
-/// band : float, default 0.1 Part by which frequencies may be off, for the optimal shaper. plant :
-/// Robot, optional Another robot that judges. sweep : bool, default True Judge with stiffness,
-/// damping and drives that are off as well. step : float, default 1e-3 Time step (s). loads :
-/// sequence of Load, or path of a file of loads, optional payloads : sequence of Payload, optional
-/// What acts on the arm besides weight, corrected as well. limits : {"slow", "refuse", "tell"},
-/// default "slow" What becomes of commands that pass a limit of a joint which the motion itself
-/// keeps. accelerations : array_like, optional Greatest acceleration of each joint (rad/s² or
-/// m/s²); not looked at without it. links, drives : str, optional As for :meth:`Robot.flexible`.
-/// output : path, optional Folder of the new motion, a page and a recording; nothing is written
-/// without it. write : sequence of path, optional Further files of the new motion: .csv, .toml,
-/// .yaml or .json by their endings. overwrite : bool, default False
+/// Parameters
+/// ----------
+/// robot : Robot
+/// motion : Motion, Scenario or path, optional
+///     The robot's own motion without it.
+/// method : {"dynamic", "static"}, default "dynamic"
+///     With inertia and damping, iterated on the simulation; or weight alone, point by point.
+/// components : sequence of str, optional
+///     Which of x, y, z, rx, ry, rz of the tool count; all without it.
+/// iterations : int, default 5
+/// cutoff_hz : float, optional
+///     Highest frequency that is corrected.
+/// shaper : {"zv", "zvd", "optimal"}, optional
+///     Run the motion through a shaper before: of the first mode at its end, or what leaves least of all modes there
+///     within ``delay``.
+/// delay : float, optional
+///     At most so much longer the motion is with the optimal shaper (s); a period of the first mode without it.
+/// band : float, default 0.1
+///     Part by which frequencies may be off, for the optimal shaper.
+/// plant : Robot, optional
+///     Another robot that judges.
+/// sweep : bool, default True
+///     Judge with stiffness, damping and drives that are off as well.
+/// step : float, default 1e-3
+///     Time step (s).
+/// loads : sequence of Load, or path of a file of loads, optional
+/// payloads : sequence of Payload, optional
+///     What acts on the arm besides weight, corrected as well.
+/// limits : {"slow", "refuse", "tell"}, default "slow"
+///     What becomes of commands that pass a limit of a joint which the motion itself keeps.
+/// accelerations : array_like, optional
+///     Greatest acceleration of each joint (rad/s² or m/s²); not looked at without it.
+/// links, drives : str, optional
+///     As for :meth:`Robot.flexible`.
+/// output : path, optional
+///     Folder of the new motion, a page and a recording; nothing is written without it.
+/// write : sequence of path, optional
+///     Further files of the new motion: .csv, .toml, .yaml or .json by their endings.
+/// overwrite : bool, default False
 ///
 /// Returns
 /// -------

@@ -191,8 +191,7 @@ impl PyDeflections {
         view(slf, |own| Ok((vec![own.peak.len(), 3], &own.end)))
     }
 
-    /// The same at the start and after every step, of run ``k``, (steps + 1, 3); with
-    /// ``samples=True``.
+    /// The same at the start and after every step, of run ``k``, (steps + 1, 3); with ``samples=True``.
     fn samples<'py>(slf: &Bound<'py, Self>, k: usize) -> PyResult<Bound<'py, PyAny>> {
         view(slf, |own| {
             let all = &own.samples;

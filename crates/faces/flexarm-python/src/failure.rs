@@ -1,5 +1,4 @@
-//! Errors of the library as exceptions, by cause. The classes are Python's (`flexarm/errors.py`),
-//! for they have two parents.
+//! Errors of the library as exceptions, by cause. The classes are Python's (`flexarm/errors.py`), for they have two parents.
 
 use flexarm::compensate::CompensateError;
 use flexarm::identify::IdentifyFileError;

@@ -1,5 +1,4 @@
-//! Figures of a result with the keys of `--json`, and their caveats: as they were found, or as a
-//! pickle told them.
+//! Figures of a result with the keys of `--json`, and their caveats: as they were found, or as a pickle told them.
 
 use std::sync::Arc;
 

@@ -12,8 +12,7 @@ use crate::robot::PyRobot;
 use crate::values::{modelling, texts, whole};
 use crate::watch::stoppable;
 
-/// Finds numbers of a robot file from measurements at the robot: tracker, dial gauge, hammer,
-/// encoders.
+/// Finds numbers of a robot file from measurements at the robot: tracker, dial gauge, hammer, encoders.
 ///
 /// Parameters
 /// ----------
@@ -54,17 +53,30 @@ pub(crate) fn identify<'py>(
 
 /// Chooses poses and forces that tell most of what is unknown.
 ///
-/// Parameters ---------- robot : Robot count : int How many readings. fit : sequence of str,
-/// optional Names of what is to be found; all stiffnesses without it. forces : array_like, shape
-/// (m, 3), optional Forces on the tool among which the plan chooses, world axes (N). levers :
-/// array_like, optional Points of the tool at which the forces may act, tool axes (m), a row each;
-/// the TCP without. points : array_like, optional Points of the tool that may be watched, tool axes
-/// (m), a row each; the TCP without. gauges : array_like, optional Directions along which a dial
-/// gauge may stand, world axes, a row each; without, all three numbers are read. std : float,
-/// default 3e-5 Deviation of a measured displacement (m). poses, work : path, optional Tables of
-/// poses: those that are reachable, and those where the work will be done. links, drives : str,
-/// optional As for :meth:`Robot.flexible`. output : path, optional Folder of the files to fill in;
-/// nothing is written without it. overwrite : bool, default False
+/// Parameters
+/// ----------
+/// robot : Robot
+/// count : int
+///     How many readings.
+/// fit : sequence of str, optional
+///     Names of what is to be found; all stiffnesses without it.
+/// forces : array_like, shape (m, 3), optional
+///     Forces on the tool among which the plan chooses, world axes (N).
+/// levers : array_like, optional
+///     Points of the tool at which the forces may act, tool axes (m), a row each; the TCP without.
+/// points : array_like, optional
+///     Points of the tool that may be watched, tool axes (m), a row each; the TCP without.
+/// gauges : array_like, optional
+///     Directions along which a dial gauge may stand, world axes, a row each; without, all three numbers are read.
+/// std : float, default 3e-5
+///     Deviation of a measured displacement (m).
+/// poses, work : path, optional
+///     Tables of poses: those that are reachable, and those where the work will be done.
+/// links, drives : str, optional
+///     As for :meth:`Robot.flexible`.
+/// output : path, optional
+///     Folder of the files to fill in; nothing is written without it.
+/// overwrite : bool, default False
 ///
 /// Returns
 /// -------

@@ -1,9 +1,8 @@
 //! The Python package `flexarm`: the facade one to one, numpy in and out, and the command line.
 //!
-//! A module per thing that can be held (`robot`, `motion`, `arm`, `run`, ...); what all share is
-//! how arrays come in and go out (`arrays`), how errors become exceptions (`failure`) and caveats
-//! warnings (`caveat`), and how long calls give back the interpreter's lock and are ended by Ctrl-C
-//! (`watch`). What needs no speed is Python, in `python/flexarm`.
+//! A module per thing that can be held (`robot`, `motion`, `arm`, `run`, ...); what all share is how arrays come in and go out
+//! (`arrays`), how errors become exceptions (`failure`) and caveats warnings (`caveat`), and how long calls give back the
+//! interpreter's lock and are ended by Ctrl-C (`watch`). What needs no speed is Python, in `python/flexarm`.
 #![allow(non_snake_case, reason = "the letters of the matrices")]
 
 mod answers;

@@ -7,8 +7,7 @@ use crate::arrays::view;
 use crate::failure::raised;
 use crate::parts::{Parts, Pickled};
 
-/// Linear structure about an equilibrium; k free coordinates (joints driven by torque, then elastic
-/// ones), n joints.
+/// Linear structure about an equilibrium; k free coordinates (joints driven by torque, then elastic ones), n joints.
 ///
 /// World axes at the tool, linear first. Made by :meth:`Arm.linearise`.
 ///
@@ -156,8 +155,7 @@ impl PyLinear {
         self.driven
     }
 
-    /// Name, and first and last but one free coordinate, of each elastic element (list of (str,
-    /// int, int)).
+    /// Name, and first and last but one free coordinate, of each elastic element (list of (str, int, int)).
     #[getter]
     fn elements(&self) -> Vec<(String, usize, usize)> {
         self.elements.clone()

@@ -17,10 +17,13 @@ use crate::watch::{stoppable, stoppable_telling};
 
 /// Reduces a mesh to a flexible link and writes its files.
 ///
-/// Parameters ---------- job : str, os.PathLike or dict A job file, a mesh, or the keys of a job
-/// file as a dict: ``mesh``, ``units``, ``material``, ``modes``, ``interface``, ... output : str or
-/// os.PathLike, optional Folder for the link file, the complete job, the figures and a report;
-/// nothing is written without it. overwrite : bool, default False
+/// Parameters
+/// ----------
+/// job : str, os.PathLike or dict
+///     A job file, a mesh, or the keys of a job file as a dict: ``mesh``, ``units``, ``material``, ``modes``, ``interface``, ...
+/// output : str or os.PathLike, optional
+///     Folder for the link file, the complete job, the figures and a report; nothing is written without it.
+/// overwrite : bool, default False
 ///
 /// Returns
 /// -------

@@ -10,8 +10,7 @@ use crate::failure::OrRaise;
 use crate::operating_point::homogeneous;
 use crate::values::{as_wrench, wrench};
 
-/// An arm that is commanded while it moves, control period by control period. Made by
-/// :meth:`Arm.live`.
+/// An arm that is commanded while it moves, control period by control period. Made by :meth:`Arm.live`.
 ///
 /// Examples
 /// --------
@@ -45,10 +44,15 @@ impl PyLive {
 impl PyLive {
     /// One control period, at whose end the joints are told to be at ``q``.
     ///
-    /// Parameters ---------- q : array_like, shape (n,) Targets (rad or m). velocity : array_like,
-    /// shape (n,), optional Target velocities. Without them joints go on the parabola through the
-    /// last three targets, and the feed-forward of servos is a period late. wrench : array_like,
-    /// shape (3,) or (6,), optional What pulls at the tool meanwhile, world axes (N, N m).
+    /// Parameters
+    /// ----------
+    /// q : array_like, shape (n,)
+    ///     Targets (rad or m).
+    /// velocity : array_like, shape (n,), optional
+    ///     Target velocities. Without them joints go on the parabola through the last three targets, and the feed-forward
+    ///     of servos is a period late.
+    /// wrench : array_like, shape (3,) or (6,), optional
+    ///     What pulls at the tool meanwhile, world axes (N, N m).
     #[pyo3(signature = (q, velocity=None, wrench=None))]
     fn step(
         &self,

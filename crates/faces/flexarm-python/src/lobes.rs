@@ -16,18 +16,36 @@ use crate::watch::stoppable;
 
 /// Finds the depth of cut beyond which a tool chatters, over the spindle speed.
 ///
-/// Parameters ---------- robot : Robot tool : path or str A file of a cutting tool (``flexarm
-/// format tool`` describes it), or the name of a shipped one, such as ``"endmill_20mm"``. q :
-/// array_like, shape (n,), optional The pose (rad or m), all zero without it. along : Motion or
-/// path, optional A motion in the place of a pose. places : int, default 12 At how many places of
-/// it. rpm : array_like, optional Spindle speeds (1/min) in the place of those in the file. deepest
-/// : float, optional Deepest cut that is looked at (m). zero_order : bool, default False By the
-/// mean force alone. ranges : bool, default False All unstable ranges of depth at each speed.
-/// links, drives : str, optional As for :meth:`Robot.flexible`. output : path, optional Folder of
-/// table, picture and page; nothing is written without it. overwrite : bool, default False
+/// Parameters
+/// ----------
+/// robot : Robot
+/// tool : path or str
+///     A file of a cutting tool (``flexarm format tool`` describes it), or the name of a shipped one, such as
+///     ``"endmill_20mm"``.
+/// q : array_like, shape (n,), optional
+///     The pose (rad or m), all zero without it.
+/// along : Motion or path, optional
+///     A motion in the place of a pose.
+/// places : int, default 12
+///     At how many places of it.
+/// rpm : array_like, optional
+///     Spindle speeds (1/min) in the place of those in the file.
+/// deepest : float, optional
+///     Deepest cut that is looked at (m).
+/// zero_order : bool, default False
+///     By the mean force alone.
+/// ranges : bool, default False
+///     All unstable ranges of depth at each speed.
+/// links, drives : str, optional
+///     As for :meth:`Robot.flexible`.
+/// output : path, optional
+///     Folder of table, picture and page; nothing is written without it.
+/// overwrite : bool, default False
 ///
-/// Returns ------- dict ``points`` with ``spindle_rpm``, ``depth_m``, ``chatter_hz`` and ``kind``,
-/// and more, as ``flexarm lobes --json``.
+/// Returns
+/// -------
+/// dict
+///     ``points`` with ``spindle_rpm``, ``depth_m``, ``chatter_hz`` and ``kind``, and more, as ``flexarm lobes --json``.
 #[pyfunction]
 #[pyo3(signature = (robot, tool, *, q=None, along=None, places=12, rpm=None, deepest=None, zero_order=false, ranges=false,
                     links=None, drives=None, output=None, overwrite=false))]

@@ -156,29 +156,51 @@ fn over_joints(joints: &Bound<'_, PyDict>) -> PyResult<MapRegion> {
 
 /// Maps sag, compliance, natural frequencies and error under load over the workspace.
 ///
-/// Parameters ---------- robot : Robot bounds : array_like, shape (2, 3), optional Lowest and
-/// highest corner of a box of places of the tool (m, world); all that the arm can reach without it.
-/// spacing : float, optional Distance of the places (m). keep_out : float, default 0 Leave out
-/// places nearer than this to the upright line through the first joint (m). tool_axis : array_like,
-/// shape (3,), default (0, 0, -1) Where the z axis of the tool points in the world. roll, cone :
-/// float, default 0 Rotation about that axis, half angle of a cone within which the tool may tilt
-/// (rad). tilts, rolls : int, optional Directions in the cone, and rotations of the tool, that
-/// count. joints : dict of str to (float, float, int), optional Go through values of joints
-/// instead: from, to, how many (rad or m). poses : array_like, shape (m, n), optional Go through
-/// these joint values instead, in coordinate order (rad or m); the table then has the 6x6
-/// compliance of each. along : Motion or path, optional Go along a motion instead, at ``points``
-/// instants. points : int, default 1000 at : array_like, shape (n,), optional Joints that the map
-/// does not move, and near which branches are taken. wrench : array_like, shape (3,) or (6,),
-/// optional On the tool besides weight, world axes (N, N m). by : str, optional Quantity by which
-/// poses are compared. keep : {"best", "worst", "all"}, default "best" Which of a place's poses are
-/// kept. frequencies : int, default 3 workpiece : array_like, shape (3,), optional Edges of a box
-/// whose best place is to be found (m). tool : path or str, optional A cutting tool as for
-/// :func:`lobes`: the depth beyond which it chatters becomes the quantity ``depth_m``. rpm :
-/// sequence of float, optional Its spindle speeds (1/min), of which the lowest limit counts; those
-/// of its file without them. zero_order : bool, default False Limits from the mean cutting force
-/// alone: quick, blind to period doubling. links, drives : str, optional As for
-/// :meth:`Robot.flexible`. output : path, optional Folder of table, page and recording; nothing is
-/// written without it. overwrite : bool, default False progress : bool or callable, default False
+/// Parameters
+/// ----------
+/// robot : Robot
+/// bounds : array_like, shape (2, 3), optional
+///     Lowest and highest corner of a box of places of the tool (m, world); all that the arm can reach without it.
+/// spacing : float, optional
+///     Distance of the places (m).
+/// keep_out : float, default 0
+///     Leave out places nearer than this to the upright line through the first joint (m).
+/// tool_axis : array_like, shape (3,), default (0, 0, -1)
+///     Where the z axis of the tool points in the world.
+/// roll, cone : float, default 0
+///     Rotation about that axis, half angle of a cone within which the tool may tilt (rad).
+/// tilts, rolls : int, optional
+///     Directions in the cone, and rotations of the tool, that count.
+/// joints : dict of str to (float, float, int), optional
+///     Go through values of joints instead: from, to, how many (rad or m).
+/// poses : array_like, shape (m, n), optional
+///     Go through these joint values instead, in coordinate order (rad or m); the table then has the 6x6 compliance of each.
+/// along : Motion or path, optional
+///     Go along a motion instead, at ``points`` instants.
+/// points : int, default 1000
+/// at : array_like, shape (n,), optional
+///     Joints that the map does not move, and near which branches are taken.
+/// wrench : array_like, shape (3,) or (6,), optional
+///     On the tool besides weight, world axes (N, N m).
+/// by : str, optional
+///     Quantity by which poses are compared.
+/// keep : {"best", "worst", "all"}, default "best"
+///     Which of a place's poses are kept.
+/// frequencies : int, default 3
+/// workpiece : array_like, shape (3,), optional
+///     Edges of a box whose best place is to be found (m).
+/// tool : path or str, optional
+///     A cutting tool as for :func:`lobes`: the depth beyond which it chatters becomes the quantity ``depth_m``.
+/// rpm : sequence of float, optional
+///     Its spindle speeds (1/min), of which the lowest limit counts; those of its file without them.
+/// zero_order : bool, default False
+///     Limits from the mean cutting force alone: quick, blind to period doubling.
+/// links, drives : str, optional
+///     As for :meth:`Robot.flexible`.
+/// output : path, optional
+///     Folder of table, page and recording; nothing is written without it.
+/// overwrite : bool, default False
+/// progress : bool or callable, default False
 ///
 /// Returns
 /// -------

@@ -15,9 +15,9 @@ const MANY: usize = 64;
 
 /// A tree of rigid bodies with its recursions. Springs, dampers and friction are none of it.
 ///
-/// Six-vectors are linear first, world axes at the origin of the frame. Every argument takes a row
-/// of n numbers, or m rows, which are shared by all cores. Names in Pinocchio: ``rnea``, ``crba``,
-/// ``aba``, ``computeFrameJacobian`` with LOCAL_WORLD_ALIGNED.
+/// Six-vectors are linear first, world axes at the origin of the frame. Every argument takes a row of n numbers, or m rows,
+/// which are shared by all cores. Names in Pinocchio: ``rnea``, ``crba``, ``aba``, ``computeFrameJacobian`` with
+/// LOCAL_WORLD_ALIGNED.
 ///
 /// Examples
 /// --------
@@ -133,8 +133,7 @@ impl PyModel {
         self.each(q.py(), ["q", "v", "a"], [q, v, a], &row, |r, [q, v, a], tau| r.inverse_dynamics(q, v, a, tau))
     }
 
-    /// Forces at zero acceleration: gravity, balancers, centrifugal and Coriolis forces, (n,) or
-    /// (m, n).
+    /// Forces at zero acceleration: gravity, balancers, centrifugal and Coriolis forces, (n,) or (m, n).
     fn nonlinear_effects<'py>(&self, q: &Bound<'py, PyAny>, v: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let row = [self.nv()];
         self.each(q.py(), ["q", "v"], [q, v], &row, |r, [q, v], tau| r.nonlinear_effects(q, v, tau))
@@ -173,8 +172,7 @@ impl PyModel {
         self.each(q.py(), ["q"], [q], &row, |r, [q], J| r.jacobian(q, &frame, J))
     }
 
-    /// Pose of a frame in the world as a homogeneous matrix, (4, 4) or (m, 4, 4): forward
-    /// kinematics.
+    /// Pose of a frame in the world as a homogeneous matrix, (4, 4) or (m, 4, 4): forward kinematics.
     #[pyo3(signature = (q, frame="tcp"))]
     fn fk<'py>(&self, q: &Bound<'py, PyAny>, frame: &str) -> PyResult<Bound<'py, PyAny>> {
         self.check_frame(frame)?;

@@ -15,8 +15,8 @@ use crate::values::path;
 
 /// Where the joints go, as a function of time.
 ///
-/// ``Motion(t, q)`` goes through samples by a spline; :meth:`Robot.motion` reads files. A motion of
-/// samples knows no robot yet: it is checked against the limits of the one that runs it.
+/// ``Motion(t, q)`` goes through samples by a spline; :meth:`Robot.motion` reads files. A motion of samples knows no robot yet:
+/// it is checked against the limits of the one that runs it.
 ///
 /// Parameters
 /// ----------
@@ -43,8 +43,7 @@ pub(crate) struct PyMotion {
 enum Kind {
     /// Samples that no robot has seen: times, rows of positions, numbers per row.
     Samples { name: String, t: Vec<f64>, q: Vec<f64>, width: usize },
-    /// A motion of a robot, and how it is made again in another process: what was read, or its
-    /// curves without that.
+    /// A motion of a robot, and how it is made again in another process: what was read, or its curves without that.
     Bound { motion: Box<Motion>, robot: Py<PyRobot>, again: Option<Py<PyAny>> },
 }
 
@@ -292,8 +291,7 @@ impl PyMotion {
 /// A joint with its knots and pieces, as arrays.
 type Curve<'py> = (String, Bound<'py, PyAny>, Bound<'py, PyAny>);
 
-/// The curves of a trajectory: of each joint its name, knots, and a row of seven numbers for each
-/// piece.
+/// The curves of a trajectory: of each joint its name, knots, and a row of seven numbers for each piece.
 fn pieces<'py>(py: Python<'py>, trajectory: &Trajectory) -> PyResult<Vec<Curve<'py>>> {
     let mut curves = Vec::new();
     for (k, joint) in trajectory.joints().iter().enumerate() {

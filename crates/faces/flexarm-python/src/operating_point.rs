@@ -11,8 +11,7 @@ use crate::values::{as_wrench, wrench};
 
 /// A workspace for one pose after another; made by :meth:`Arm.operating_point`.
 ///
-/// A pose near the last one costs least. For many poses at once ask :meth:`Arm.statics` with an
-/// array: that takes all cores.
+/// A pose near the last one costs least. For many poses at once ask :meth:`Arm.statics` with an array: that takes all cores.
 ///
 /// Examples
 /// --------

@@ -45,14 +45,22 @@ pub(crate) fn estimate(density: Option<f64>, total_mass: Option<f64>) -> PyResul
 
 /// Loads a robot.
 ///
-/// Parameters ---------- robot : str or os.PathLike, default "kr210" A ``robot.toml``, a folder
-/// with one, a bare ``.urdf`` or ``.xacro``, or the name of a shipped robot. tcp : str, optional
-/// Link to use as tool centre point instead of the file's. packages : dict of str to path, optional
-/// Folders of ROS packages by name, for ``package://name/...``. arguments : dict of str to str,
-/// optional Values of ``$(arg name)`` in xacro files. inertia_from_density : float, optional
-/// Density (kg/m³) from which missing inertias are estimated by the meshes. inertia_from_total_mass
-/// : float, optional Mass of the whole arm (kg) from which they are estimated. waive_inertia :
-/// sequence of str, optional Links whose inertia may be rank deficient.
+/// Parameters
+/// ----------
+/// robot : str or os.PathLike, default "kr210"
+///     A ``robot.toml``, a folder with one, a bare ``.urdf`` or ``.xacro``, or the name of a shipped robot.
+/// tcp : str, optional
+///     Link to use as tool centre point instead of the file's.
+/// packages : dict of str to path, optional
+///     Folders of ROS packages by name, for ``package://name/...``.
+/// arguments : dict of str to str, optional
+///     Values of ``$(arg name)`` in xacro files.
+/// inertia_from_density : float, optional
+///     Density (kg/m³) from which missing inertias are estimated by the meshes.
+/// inertia_from_total_mass : float, optional
+///     Mass of the whole arm (kg) from which they are estimated.
+/// waive_inertia : sequence of str, optional
+///     Links whose inertia may be rank deficient.
 ///
 /// Returns
 /// -------
@@ -117,17 +125,19 @@ fn shipped(given: &Path) -> PyResult<PathBuf> {
     flexarm_cli::shipped_robot(name.unwrap_or(given)).or_raise()
 }
 
-/// Makes a robot of values: the keys of a robot file as a dict, or changed ones of a file that was
-/// read.
+/// Makes a robot of values: the keys of a robot file as a dict, or changed ones of a file that was read.
 ///
-/// :class:`RobotBuilder` writes the keys, one call each, and the links and joints too if there is
-/// no URDF.
+/// :class:`RobotBuilder` writes the keys, one call each, and the links and joints too if there is no URDF.
 ///
-/// Parameters ---------- keys : dict What ``robot.toml`` would have: ``urdf``, ``tcp``,
-/// ``payload``, ``flexible_link``, ``drive``, ... (``flexarm format robot`` prints all). Arrays are
-/// taken as lists; ``format = 1`` may be left out. folder : path, default "." Paths in the keys are
-/// relative to it. urdf : str, optional Text of a URDF or xacro, in the place of the file that the
-/// keys name.
+/// Parameters
+/// ----------
+/// keys : dict
+///     What ``robot.toml`` would have: ``urdf``, ``tcp``, ``payload``, ``flexible_link``, ``drive``, ...
+///     (``flexarm format robot`` prints all). Arrays are taken as lists; ``format = 1`` may be left out.
+/// folder : path, default "."
+///     Paths in the keys are relative to it.
+/// urdf : str, optional
+///     Text of a URDF or xacro, in the place of the file that the keys name.
 ///
 /// Returns
 /// -------
@@ -235,8 +245,7 @@ impl PyRobot {
         PyTuple::new(py, model.coordinates()[..model.n_actuated()].iter().map(|c| c.joint.clone()))
     }
 
-    /// Lowest and highest position of each joint, (n, 2) (rad or m); infinite where there is no
-    /// limit.
+    /// Lowest and highest position of each joint, (n, 2) (rad or m); infinite where there is no limit.
     #[getter]
     fn limits<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.limits_of(py, |c| [c.limits.lower, c.limits.upper])
@@ -272,14 +281,18 @@ impl PyRobot {
         Ok(PyModel::new(self.robot.recursions().or_raise()?))
     }
 
-    /// Puts flexible links and drives in place, which costs milliseconds; the arm is then asked
-    /// often.
+    /// Puts flexible links and drives in place, which costs milliseconds; the arm is then asked often.
     ///
-    /// Parameters ---------- links : {"rigid", "lumped", "modal"}, optional How flexible links are
-    /// modelled; as the robot file says without it. drives : {"rigid", "elastic", "servo"},
-    /// optional How drives are modelled: exactly on the motion, with gearboxes that yield, by
-    /// torque under servos. segments : int, optional Number of rigid parts of lumped links. modes :
-    /// int, optional Number of modes of modal links.
+    /// Parameters
+    /// ----------
+    /// links : {"rigid", "lumped", "modal"}, optional
+    ///     How flexible links are modelled; as the robot file says without it.
+    /// drives : {"rigid", "elastic", "servo"}, optional
+    ///     How drives are modelled: exactly on the motion, with gearboxes that yield, by torque under servos.
+    /// segments : int, optional
+    ///     Number of rigid parts of lumped links.
+    /// modes : int, optional
+    ///     Number of modes of modal links.
     ///
     /// Returns
     /// -------
@@ -298,8 +311,7 @@ impl PyRobot {
         Ok(PyArm::new(slf.clone().unbind(), arm))
     }
 
-    /// Reads a motion for the robot: waypoints, tables, ROS messages and bags, tool paths, robot
-    /// programs.
+    /// Reads a motion for the robot: waypoints, tables, ROS messages and bags, tool paths, robot programs.
     ///
     /// Parameters
     /// ----------
@@ -327,8 +339,7 @@ impl PyRobot {
         load_motion(slf, motion, args)
     }
 
-    /// What was loaded, with kinematics and dynamics at a pose (dict as ``flexarm inspect
-    /// --json``).
+    /// What was loaded, with kinematics and dynamics at a pose (dict as ``flexarm inspect --json``).
     ///
     /// Parameters
     /// ----------

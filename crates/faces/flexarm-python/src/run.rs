@@ -12,8 +12,7 @@ use crate::parts::{Parts, Pickled};
 
 /// What a run gives: figures, and every logged sample as columns.
 ///
-/// Columns are read-only arrays on the run's own numbers: nothing is copied. ``run[name]`` is any
-/// of :attr:`columns`.
+/// Columns are read-only arrays on the run's own numbers: nothing is copied. ``run[name]`` is any of :attr:`columns`.
 ///
 /// Examples
 /// --------
@@ -107,8 +106,7 @@ impl PyRun {
         Ok(names)
     }
 
-    /// Names of the joints, in the order of ``position``, ``velocity`` and ``effort`` (tuple of
-    /// str).
+    /// Names of the joints, in the order of ``position``, ``velocity`` and ``effort`` (tuple of str).
     #[getter]
     fn joints<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         PyTuple::new(py, &self.columns.joints)
@@ -228,8 +226,7 @@ impl PyRun {
         Ok(table)
     }
 
-    /// The stream of Arrow's C interface, by which pyarrow, pandas, polars and DuckDB take the
-    /// table without a copy.
+    /// The stream of Arrow's C interface, by which pyarrow, pandas, polars and DuckDB take the table without a copy.
     #[pyo3(signature = (requested_schema=None))]
     fn __arrow_c_stream__<'py>(
         &self,
@@ -272,8 +269,7 @@ impl PyRun {
         slf.py().import("flexarm._plot")?.call_method1("run", (slf, ax, parts))
     }
 
-    /// Opens the recording: in the notebook with ``rerun.notebook``, else in the Rerun viewer. The
-    /// run needs ``output=``.
+    /// Opens the recording: in the notebook with ``rerun.notebook``, else in the Rerun viewer. The run needs ``output=``.
     fn show<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         slf.py().import("flexarm._show")?.call_method1("run", (slf,))
     }

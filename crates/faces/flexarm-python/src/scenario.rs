@@ -96,10 +96,18 @@ pub(crate) struct PyPayload {
 impl PyPayload {
     /// A payload is picked up.
     ///
-    /// Parameters ---------- at : float When (s). mass : float kg. com : array_like, shape (3,)
-    /// Centre of mass in the carrying link (m). inertia : array_like, shape (3, 3), optional About
-    /// the centre of mass, axes of the link (kg m²); a point without it. link : str, optional The
-    /// link that carries it; the one with the robot's own payload, else with the tool, without it.
+    /// Parameters
+    /// ----------
+    /// at : float
+    ///     When (s).
+    /// mass : float
+    ///     kg.
+    /// com : array_like, shape (3,)
+    ///     Centre of mass in the carrying link (m).
+    /// inertia : array_like, shape (3, 3), optional
+    ///     About the centre of mass, axes of the link (kg m²); a point without it.
+    /// link : str, optional
+    ///     The link that carries it; the one with the robot's own payload, else with the tool, without it.
     #[staticmethod]
     #[pyo3(signature = (at, mass, com, inertia=None, link=None))]
     fn attach(
@@ -236,8 +244,7 @@ fn motion_of(robot: &Bound<'_, PyRobot>, given: Option<&Bound<'_, PyAny>>) -> Py
     }
 }
 
-/// A scenario of its parts; `given` is a motion of any kind, or a Scenario that has all parts
-/// itself.
+/// A scenario of its parts; `given` is a motion of any kind, or a Scenario that has all parts itself.
 pub(crate) fn scenario(
     robot: &Bound<'_, PyRobot>,
     given: Option<&Bound<'_, PyAny>>,

@@ -12,16 +12,25 @@ use crate::robot::PyRobot;
 use crate::scenario::scenario;
 use crate::values::{modelling, texts};
 
-/// Derivatives of the tool's error along a motion by every number of the robot, its tool and its
-/// motion, in one run.
+/// Derivatives of the tool's error along a motion by every number of the robot, its tool and its motion, in one run.
 ///
-/// Parameters ---------- robot : Robot motion : Motion, Scenario or path, optional The robot's own
-/// motion without it. by : sequence of str, optional Names of what counts, ``*`` for anything:
-/// ``"drive.*"``, ``"motion.joint_1"``; all without it. step : float, default 1e-3 Time step (s).
-/// loads : sequence of Load, or path of a file of loads, optional payloads : sequence of Payload,
-/// optional What acts on the arm besides weight. links, drives : str, optional As for
-/// :meth:`Robot.flexible`. table : path, optional A table of error and derivatives after every step
-/// (CSV). overwrite : bool, default False
+/// Parameters
+/// ----------
+/// robot : Robot
+/// motion : Motion, Scenario or path, optional
+///     The robot's own motion without it.
+/// by : sequence of str, optional
+///     Names of what counts, ``*`` for anything: ``"drive.*"``, ``"motion.joint_1"``; all without it.
+/// step : float, default 1e-3
+///     Time step (s).
+/// loads : sequence of Load, or path of a file of loads, optional
+/// payloads : sequence of Payload, optional
+///     What acts on the arm besides weight.
+/// links, drives : str, optional
+///     As for :meth:`Robot.flexible`.
+/// table : path, optional
+///     A table of error and derivatives after every step (CSV).
+/// overwrite : bool, default False
 ///
 /// Returns
 /// -------

@@ -19,8 +19,7 @@ const FINDERS: Finders = Finders { robot: flexarm_cli::shipped_robot_file, motio
 
 /// Runs a study: many runs with other payloads, stiffness, speeds or options, on all cores.
 ///
-/// What is in the folder of the same study already is not run again, so a study that was stopped
-/// goes on with the same call.
+/// What is in the folder of the same study already is not run again, so a study that was stopped goes on with the same call.
 ///
 /// Parameters
 /// ----------

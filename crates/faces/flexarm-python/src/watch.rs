@@ -74,8 +74,7 @@ impl Watch {
 
 /// Work on a thread of its own that looks at a flag; meanwhile this thread looks at signals.
 ///
-/// After a signal the work has a moment to end; then nobody waits for it any more: what it finds is
-/// lost, and it writes no files.
+/// After a signal the work has a moment to end; then nobody waits for it any more: what it finds is lost, and it writes no files.
 ///
 /// # Errors
 /// What a signal raised.
