@@ -1,5 +1,5 @@
-//! `flexarm statics`, `flexarm modes` and `flexarm response`: flags to a request, tables for
-//! people.
+//! `flexarm statics`, `flexarm modes` and `flexarm response`: from flags to a request, and tables
+//! for people.
 
 use std::process::ExitCode;
 
@@ -16,9 +16,9 @@ use crate::print::{caveats, lines, table};
 use crate::shipped::OutputFolder;
 use crate::{answer, load_options, shipped, to_json, values};
 
-/// Directions at the TCP.
+/// Names of the directions at the TCP.
 const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
-/// Columns that a terminal has room for: peaks of a response.
+/// Number of peaks of a response shown on a terminal.
 const SHOWN_PEAKS: usize = 3;
 
 fn load(pose: &PoseArgs) -> Result<Robot, Failure> {
@@ -94,7 +94,7 @@ pub(crate) fn response(cli: &Cli, args: &ResponseArgs) -> Result<ExitCode, Failu
     Ok(ExitCode::SUCCESS)
 }
 
-/// Numbers to the right from a column on.
+/// Aligns the columns from `from` on to the right.
 fn right(table: &mut comfy_table::Table, from: usize) {
     for k in from..table.column_count() {
         if let Some(column) = table.column_mut(k) {
@@ -159,7 +159,7 @@ fn modes_text(m: &ModeTable) -> String {
     for (k, mode) in m.modes.iter().enumerate() {
         let mut row = vec![
             (k + 1).to_string(),
-            // A decay without oscillation has a rate, no frequency.
+            // A mode that decays without oscillation has a rate but no frequency.
             if mode.damping_ratio < 1.0 {
                 format!("{:.3}", mode.frequency_hz)
             } else {
@@ -167,7 +167,7 @@ fn modes_text(m: &ModeTable) -> String {
             },
             if mode.damping_ratio < 1.0 { format!("{:.3}", 100.0 * mode.damping_ratio) } else { "decays".into() },
             direction(&mode.tcp),
-            // Of the whole translation.
+            // Effective mass for the whole translation.
             mass(mode.tcp[..3].iter().map(|x| x * x).sum()),
         ];
         row.extend(mode.strain_energy.iter().map(|x| percent(*x)));
@@ -185,12 +185,12 @@ fn modes_text(m: &ModeTable) -> String {
     out
 }
 
-/// The one mass that moves like the mode, for the square of the motion at unit modal mass.
+/// Effective mass of a mode from the squared motion at unit modal mass.
 fn mass(square: f64) -> String {
     if square > 1e-12 { format!("{:.2}", 1.0 / square) } else { "-".into() }
 }
 
-/// Components of a translation that count, the largest as 1.
+/// Significant components of a translation, scaled so that the largest is 1.
 fn direction(tcp: &[f64; 6]) -> String {
     let largest = tcp[..3].iter().fold(0.0f64, |top, x| top.max(x.abs()));
     if largest < 1e-9 {
