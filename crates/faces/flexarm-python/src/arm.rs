@@ -451,8 +451,8 @@ impl PyArm {
         Ok(PyOperatingPoint::new(slf.get().arm.operating_point().or_raise()?, slf.get().n()))
     }
 
-    /// Computes the lowest natural modes at a pose under gravity, drives locked or under their
-    /// servos.
+    /// Computes the lowest natural modes at a pose under gravity, drives locked or
+    /// servo-controlled.
     ///
     /// Parameters
     /// ----------
@@ -517,8 +517,7 @@ impl PyArm {
         Ok(response(found, &request))
     }
 
-    /// Linearises about the equilibrium at a pose: mass, damping, stiffness of the free
-    /// coordinates.
+    /// Linearises about the equilibrium at a pose: mass, damping, stiffness matrices.
     ///
     /// Parameters
     /// ----------

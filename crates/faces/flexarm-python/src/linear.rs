@@ -156,8 +156,7 @@ impl PyLinear {
         self.driven
     }
 
-    /// Name, first and one-past-last free coordinate of each elastic element (list of (str, int,
-    /// int)).
+    /// Name, first and one-past-last free coordinate of each element (list of (str, int, int)).
     #[getter]
     fn elements(&self) -> Vec<(String, usize, usize)> {
         self.elements.clone()

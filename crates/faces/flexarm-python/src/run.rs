@@ -227,8 +227,7 @@ impl PyRun {
         Ok(table)
     }
 
-    /// Exports Arrow's C stream, by which pyarrow, pandas, polars and DuckDB take the table
-    /// zero-copy.
+    /// Exports Arrow's C stream: pyarrow, pandas, polars and DuckDB read the table without a copy.
     #[pyo3(signature = (requested_schema=None))]
     fn __arrow_c_stream__<'py>(
         &self,

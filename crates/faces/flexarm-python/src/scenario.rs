@@ -164,8 +164,7 @@ pub(crate) fn inertia_matrix(name: &str, I: &[f64]) -> PyResult<[[f64; 3]; 3]> {
     Ok([column(0), column(1), column(2)])
 }
 
-/// A motion with loads, payloads and start; for batches of runs that differ in more than the
-/// motion.
+/// A motion with loads, payloads and start, for batches that differ in more than the motion.
 ///
 /// Parameters
 /// ----------
