@@ -25,7 +25,7 @@ class Notebook:
         self.kernel, self.client = manager.start_new_kernel(kernel_name="python3", cwd=str(folder))
 
     def run(self, code: str) -> str:
-        """What a cell shows."""
+        """Return the output of a cell."""
         shown: "list[str]" = []
 
         def look(message: "dict[str, Any]") -> None:
