@@ -1,4 +1,5 @@
-"""A new user in a notebook: the first ten lines in an empty folder, completion, help, tracebacks."""
+"""A new user in a notebook: the first ten lines in an empty folder, completion, help,
+tracebacks."""
 
 import re
 from pathlib import Path
